@@ -194,6 +194,7 @@ fn command_line() -> Command {
 #[must_use]
 pub fn main() -> ExitCode {
     outlive_file_size_limit();
+    failure::print_whole_lines();
     let mut command = command_line();
     let matches =
         command.try_get_matches_from_mut(std::env::args_os()).unwrap_or_else(|error| error.exit());

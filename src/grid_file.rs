@@ -2,7 +2,7 @@
 
 use std::{
     fs,
-    io::{self, Cursor},
+    io::{self, Cursor, Read as _},
     path::{Path, PathBuf},
 };
 
@@ -30,6 +30,15 @@ pub enum GridFileFault {
     /// It is no description or image of a map.
     #[error(transparent)]
     Map(#[from] ImageError),
+    /// The image that the description names is not there, or can't be read.
+    #[error("the image that `image:` names: {0}")]
+    Image(#[source] io::Error),
+    /// The image of a map in place of its description.
+    #[error("it is an image, not the description of a map")]
+    IsImage,
+    /// A map that is turned about its lower left corner, radians.
+    #[error("the map is turned by {0} radians (the third number of `origin`)")]
+    Turned(f64),
     /// It is no PNG, or too large a one.
     #[error("PNG: {0}")]
     Png(#[from] png::DecodingError),
@@ -39,7 +48,18 @@ impl GridFileError {
     /// What would be right.
     #[must_use]
     pub const fn help(&self) -> &'static str {
-        "give a map as `sonard map` writes it: map.yaml beside map.pgm (or a PNG)"
+        match self.fault {
+            GridFileFault::Turned(_) => {
+                "give a map along the axes; `sonard scene from-grid` reads turned ones"
+            }
+            GridFileFault::Image(_) => "put the image beside the description, or correct `image:`",
+            GridFileFault::IsImage => {
+                "give its description: a text beside it with `image: NAME`, `resolution: 0.05` and `origin: [0, 0, 0]`"
+            }
+            _ => {
+                "give a map as `sonard map` or map_saver writes it: map.yaml beside map.pgm (or a PNG)"
+            }
+        }
     }
 }
 
@@ -47,26 +67,68 @@ impl GridFileError {
 const PNG: &[u8] = b"\x89PNG";
 /// The most that an image takes in memory, bytes: as many as a grid has cells, in four colours.
 const MOST_BYTES: usize = 1 << 28;
-/// What map_server takes for unknown.
-const UNKNOWN: u8 = 127;
 
-/// A map by its description, or by the folder that holds `map.yaml`; `note` is told of each file before it is read.
+/// A map by its description, or by the folder that holds `map.yaml`, with probabilities for shades; `note` is told of each
+/// file before it is read.
+///
+/// # Errors
+/// The file that can't be read or is none of a map, or a map that is turned.
+pub fn read(path: &Path, note: impl FnMut(&Path)) -> Result<Grid, GridFileError> {
+    let with_shades = |yaml: MapYaml| MapYaml { is_graded: true, ..yaml };
+    let (grid, yaml) = read_as(path, with_shades, note)?;
+    match yaml.origin[2] {
+        0.0 => Ok(grid),
+        yaw => Err(GridFileError { path: path.to_path_buf(), fault: GridFileFault::Turned(yaw) }),
+    }
+}
+
+/// A map as map_server reads it, by the thresholds and the mode of its description, which comes with it; only
+/// the cells of a map that this program wrote have probabilities.
 ///
 /// # Errors
 /// The file that can't be read or is none of a map.
-pub fn read(path: &Path, mut note: impl FnMut(&Path)) -> Result<Grid, GridFileError> {
+pub fn read_by_rules(
+    path: &Path,
+    note: impl FnMut(&Path),
+) -> Result<(Grid, MapYaml), GridFileError> {
+    read_as(path, |yaml| yaml, note)
+}
+
+fn read_as(
+    path: &Path,
+    as_meant: impl Fn(MapYaml) -> MapYaml,
+    mut note: impl FnMut(&Path),
+) -> Result<(Grid, MapYaml), GridFileError> {
     let yaml_path = if path.is_dir() { path.join("map.yaml") } else { path.to_path_buf() };
     note(&yaml_path);
     let yaml = description(&yaml_path)
+        .map(as_meant)
         .map_err(|fault| GridFileError { path: yaml_path.clone(), fault })?;
     let path = yaml_path.parent().unwrap_or(Path::new("")).join(&yaml.image);
     note(&path);
-    image(&path, &yaml).map_err(|fault| GridFileError { path, fault })
+    match image(&path, &yaml) {
+        Ok(grid) => Ok((grid, yaml)),
+        Err(GridFileFault::Disk(error)) => {
+            Err(GridFileError { path, fault: GridFileFault::Image(error) })
+        }
+        Err(fault) => Err(GridFileError { path, fault }),
+    }
 }
 
+/// The longest description that is read, bytes: more is none.
+const MAX_DESCRIPTION_BYTES: u64 = 1 << 20;
+
 fn description(path: &Path) -> Result<MapYaml, GridFileFault> {
-    Ok(MapYaml::from_text(&fs::read_to_string(path)?)?)
+    let mut bytes = Vec::new();
+    fs::File::open(path)?.take(MAX_DESCRIPTION_BYTES).read_to_end(&mut bytes)?;
+    if IMAGES.iter().any(|magic| bytes.starts_with(magic)) {
+        return Err(GridFileFault::IsImage);
+    }
+    Ok(MapYaml::from_text(&String::from_utf8_lossy(&bytes))?)
 }
+
+/// What images begin with that are given in place of a description.
+const IMAGES: [&[u8]; 4] = [PNG, b"P5", b"P2", b"\xff\xd8\xff"];
 
 fn image(path: &Path, yaml: &MapYaml) -> Result<Grid, GridFileFault> {
     let bytes = fs::read(path)?;
@@ -78,7 +140,7 @@ fn image(path: &Path, yaml: &MapYaml) -> Result<Grid, GridFileFault> {
 }
 
 /// Size and brightness of the pixels of a PNG; those that one sees through are unknown.
-fn grey(bytes: &[u8]) -> Result<([usize; 2], Vec<u8>), png::DecodingError> {
+fn grey(bytes: &[u8]) -> Result<([usize; 2], Vec<Option<u8>>), png::DecodingError> {
     let limits = png::Limits { bytes: MOST_BYTES };
     let mut decoder = png::Decoder::new_with_limits(Cursor::new(bytes), limits);
     decoder.set_transformations(png::Transformations::EXPAND | png::Transformations::STRIP_16);
@@ -88,10 +150,10 @@ fn grey(bytes: &[u8]) -> Result<([usize; 2], Vec<u8>), png::DecodingError> {
     let frame = reader.next_frame(&mut image)?;
     let channels = frame.color_type.samples();
     let pixel = |samples: &[u8]| match *samples {
-        [.., alpha] if matches!(channels, 2 | 4) && alpha < 128 => UNKNOWN,
-        [grey] | [grey, _] => grey,
-        [r, g, b, ..] => ((u16::from(r) + u16::from(g) + u16::from(b)) / 3) as u8,
-        [] => UNKNOWN,
+        [.., alpha] if matches!(channels, 2 | 4) && alpha < 128 => None,
+        [grey] | [grey, _] => Some(grey),
+        [r, g, b, ..] => Some(((u16::from(r) + u16::from(g) + u16::from(b)) / 3) as u8),
+        [] => None,
     };
     let pixels = image[..frame.buffer_size()].chunks(channels).map(pixel).collect();
     Ok(([frame.width as usize, frame.height as usize], pixels))

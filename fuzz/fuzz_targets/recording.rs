@@ -26,6 +26,7 @@ fuzz_target!(|bytes: &[u8]| {
         array: None,
         sensor: "hc-sr04".to_owned(),
         longest_m: 4.0,
+        least_m: 0.02,
         air: Air::default(),
         started: "1970-01-01T00:00:00Z".parse().expect("a time"),
         as_said: false,

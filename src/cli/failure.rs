@@ -100,6 +100,15 @@ pub(super) fn is_wrong_place(error: &io::Error) -> bool {
     )
 }
 
+/// Leaves the wrapping of failures to the terminal, so that the options which they name can be copied.
+pub(super) fn print_whole_lines() {
+    let whole = |_: &dyn miette::Diagnostic| -> Box<dyn miette::ReportHandler> {
+        Box::new(miette::MietteHandlerOpts::new().wrap_lines(false).build())
+    };
+    // Only the first handler of a process counts, and this is it.
+    let _ = miette::set_hook(Box::new(move |error| whole(error)));
+}
+
 /// Prints a failure and turns it into the process's exit code.
 pub(super) fn report(outcome: Outcome) -> ExitCode {
     match outcome {

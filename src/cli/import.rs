@@ -1,6 +1,7 @@
 //! `sonard import`.
 
 mod bag;
+mod columns;
 #[cfg(feature = "sqlite")]
 mod database;
 
@@ -11,6 +12,7 @@ use std::{
     sync::Arc,
 };
 
+use columns::ColumnArgs;
 use jiff::Timestamp;
 
 use super::{
@@ -18,13 +20,16 @@ use super::{
     array::load_array,
     options::{AirArgs, SensorArgs},
     output::{OutPath, Overwrite, closed, records_to},
+    picture::Target,
     scene_file,
 };
 use crate::{
     acoustics::{Air, Sensor},
+    array::RangerArray,
     geometry::Pose,
-    import::{Format, ImportError, Imported, Mapping, Source, Taken},
-    scan::{ImportRef, Provenance, Record, Session},
+    import::{ImportError, Imported, Mapping, Source, Taken},
+    plot::draw_scans,
+    scan::{ImportRef, Provenance, Record, ScanView, Session},
     scene::{Scene, parse_pose},
     store::{RecordWriter, StoreError},
 };
@@ -50,83 +55,42 @@ pub(super) struct Args {
     /// goes into the log
     #[arg(long, value_name = "SCENE")]
     scene: Option<PathBuf>,
-    /// Array of rangers, a preset (`sonard array list`) or a file with an array's data; of a
-    /// CARMEN or Player log that does not say where its rangers are
+    /// Array of rangers, a preset (`sonard array list`) or a file with an array's data: of a table with a
+    /// range of each ranger in a row, and of a CARMEN or Player log that does not say where its rangers are
     #[arg(long, value_name = "NAME|FILE")]
     array: Option<String>,
     /// Accept the numbers as declared, even if they look wrong
     #[arg(long)]
     as_said: bool,
+    /// Examine the file and print what was assumed and left out, but write no log
+    #[arg(long, conflicts_with = "output")]
+    dry_run: bool,
+    /// Picture of the first scan on its plan, .svg or .png by its name
+    #[arg(long, value_name = "FILE")]
+    picture: Option<OutPath>,
     #[command(flatten)]
     sensor: SensorArgs,
     #[command(flatten)]
     air: AirArgs,
 }
 
-/// What the file's columns mean.
-#[derive(Debug, Clone, clap::Args)]
-#[command(next_help_heading = "Columns")]
-struct ColumnArgs {
-    /// Meaning of the columns: FIELD=COLUMN,... with the number of the column, from 1, or its name; of JSON,
-    /// the name of the member [default: as the header says]
-    #[arg(long, value_name = "FIELD=COLUMN,...")]
-    columns: Option<String>,
-    /// Format of the file [default: guessed from its content]
-    #[arg(long, value_enum)]
-    format: Option<FormatName>,
-    /// File (TOML) with all of this: the keys format, columns, topics, clockwise, zero_deg, none, none_from and
-    /// sound_speed_m_s; options override it
-    #[arg(long, value_name = "FILE")]
-    mapping: Option<PathBuf>,
-    /// Topic of a recording to read; may be given several times [default: all Range but predictions, else LaserScan]
-    #[arg(long, value_name = "TOPIC")]
-    topic: Vec<String>,
-    /// Azimuths and bearings count clockwise
-    #[arg(long)]
-    clockwise: bool,
-    /// Where azimuth zero points, degrees counter-clockwise from the heading (bearing zero: from the x axis)
-    #[arg(long, value_name = "DEG", allow_negative_numbers = true)]
-    zero_deg: Option<f64>,
-    /// A range, in the file's unit, that means no echo; may be given several times
-    #[arg(long, value_name = "VALUE", allow_negative_numbers = true)]
-    none: Vec<f64>,
-    /// A range, in the file's unit, at and beyond which there is no echo
-    #[arg(long, value_name = "VALUE")]
-    none_from: Option<f64>,
-    /// Speed of sound that the file's ranges were computed with, metres a second: they are computed again
-    /// with that of the air
-    #[arg(long, value_name = "M/S")]
-    ranged_with: Option<f64>,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-enum FormatName {
-    /// Lines of values apart by commas, semicolons, tabs or blanks
-    Csv,
-    /// A list of objects, or an object a line; numbers or lists of numbers in them
-    Json,
-    /// The log of CARMEN
-    Carmen,
-    /// The log of Player
-    Player,
-    /// A recording of ROS 2 (MCAP or SQLite), of sensor_msgs/Range or LaserScan
-    Mcap,
-}
-
 pub(super) const ABOUT: &str = "\
-Convert readings from elsewhere to a log: tables, JSON, logs of CARMEN and Player, recordings of ROS 2.
+Convert readings from elsewhere to a log: tables, JSON, messages of ROS as text, logs of CARMEN and Player, recordings of \
+ROS 2.
 
 The log is like any other, with provenance `imported`; its session states the source file and the meaning of its \
-columns. Without --columns the meaning is taken from the header and shown. Numbers that contradict their stated \
-unit (radians for degrees, centimetres for metres, a constant that stands for no echo) are refused. A file \
-always makes the same log.
+columns. Without --columns the meaning is taken from the header and shown. Every assumption and everything that is left \
+out is printed, a line each; try --dry-run --picture first.svg. What the file does not settle is refused with the option that \
+settles it: numbers that contradict their unit (radians for degrees, metres for centimetres), and constants that stand for no \
+echo (0, -1, 255, 65535, the sensor's longest range). A file always makes the same log.
 
-Scans are separated by the field `scan`, or else by the robot's position, or else by full turns.
+Scans are separated by the field `scan`, or else by the robot's position, or else where the motion turns round, jumps back or \
+has gone full circle.
 
 Of a recording (MCAP, or a file or folder of rosbag2 in MCAP or SQLite) all sensor_msgs/Range are read, or else LaserScan; \
-/tf and /tf_static must give the pose of the ranger at each reading. A ranger that turns on the robot makes \
-scans; fixed rangers are an array. Ranges at or below min_range are too near, those at or above max_range no \
-echo, NaN is no reading.";
+/tf and /tf_static give the pose of the ranger at each reading, and readings outside their span are left out. A ranger that \
+turns on the robot makes scans; fixed rangers are an array. Ranges at or below min_range are too near, those at or above \
+max_range and those of 0 no echo, NaN is no reading.";
 
 const HELP: &str = "\
 Fields: azimuth_deg|rad|grad (from the heading) or bearing_deg|rad|grad (in the world); range_m|cm|mm|in|ft or \
@@ -141,6 +105,8 @@ Examples:
     -o sweeps.jsonl
   sonard import rosbag2_2026_01_31 --topic /front_sonar -o run.jsonl
   sonard import robot.clf --none-from 5 --sensor pioneer -o robot.jsonl
+  sonard import rounds.tsv --array pioneer-8 --columns range_m=1-8 -o rounds.jsonl
+  sonard import wall.csv --columns time_ms=1,range_cm=2 --azimuth-deg 0 --started 2026-01-31T12:00:00Z -o wall.jsonl
 
 Exit codes: 0 done, 2 wrong usage or input, 3 the disk gave up.";
 
@@ -149,8 +115,15 @@ pub(super) fn run(args: &Args) -> Outcome {
     let refuse = |error: ImportError| Failure::input(format!("{name}: {error}"), error.help());
     let mapping = args.columns.mapping()?;
     let scene = args.scene.as_deref().map(scene_file::load).transpose()?;
-    let (sensor, air) = (args.sensor.sensor()?, args.air.air()?);
-    let taken = taken(args, scene.as_ref(), &sensor, &air)?;
+    let array = args.array.as_deref().map(load_array).transpose()?;
+    let sensor = match &array {
+        Some(array) => args.sensor.sensor_or(&array.sensor)?,
+        None => args.sensor.sensor()?,
+    };
+    let air = args.air.air()?;
+    let picture =
+        args.picture.as_deref().map(|path| Target::of(path, args.overwrite)).transpose()?;
+    let taken = taken(args, scene.as_ref(), array, &sensor, &air)?;
     let bytes = if args.file.as_os_str() == "-" { Some(standard_input()?) } else { None };
     let files = if args.file.is_dir() { bag::files(&args.file)? } else { vec![args.file.clone()] };
     bag::check(&files)?;
@@ -164,13 +137,26 @@ pub(super) fn run(args: &Args) -> Outcome {
     if let Some(sha256) = bag::digest_of_databases(&files).map_err(|error| refuse(error.into()))? {
         found.taken.sha256 = sha256;
     }
+    let session = session(args, &found, scene.as_ref(), sensor, &air);
+    if let Some(picture) = &picture {
+        let source = open().map_err(|error| refuse(error.into()))?;
+        let view = first_scan(&found, source, &session).map_err(refuse)?;
+        picture.write(&draw_scans(&view, scene.as_ref()), PICTURE_WIDTH_PX)?;
+    }
+    if args.dry_run {
+        let source = open().map_err(|error| refuse(error.into()))?;
+        let scans = found.scans(source).map_err(refuse)?;
+        let scans =
+            scans.map(|scan| scan.map(|_| 1_u64)).sum::<Result<u64, _>>().map_err(refuse)?;
+        tell(args, &found, scans);
+        return Ok(());
+    }
     let mut out = records_to(args.output.as_deref(), args.overwrite)?;
     let source = open().map_err(|error| refuse(error.into()))?;
-    let session = session(args, &found, scene.as_ref(), sensor, &air);
     match write(&found, source, session, &mut *out) {
         Ok(scans) => {
             closed(out.finish())?;
-            tell(&found, scans, has_poses(args, &found));
+            tell(args, &found, scans);
             Ok(())
         }
         Err(Stop::File(error)) => Err(refuse(error)),
@@ -222,21 +208,48 @@ const fn has_poses(args: &Args, found: &Imported) -> bool {
     args.pose.is_some() || found.has_poses
 }
 
-/// Says what was taken for what, on standard error.
-fn tell(found: &Imported, scans: u64, has_poses: bool) {
+/// The first scan of a file, as a picture shows it.
+fn first_scan(
+    found: &Imported,
+    source: impl io::Read,
+    session: &Session,
+) -> Result<Vec<ScanView>, ImportError> {
+    let mut records = vec![Record::Session(Box::new(session.clone()))];
+    if let Some(scan) = found.scans(source)?.next() {
+        records.extend(scan?);
+    }
+    Ok(ScanView::from_records(records))
+}
+
+/// Width of a PNG of the first scan, pixels.
+const PICTURE_WIDTH_PX: u32 = 1000;
+
+/// Prints what was assumed and left out, a line each, and the counts, on standard error.
+fn tell(args: &Args, found: &Imported, scans: u64) {
     if found.guessed && !found.mapping.columns.is_empty() {
         let said = found.mapping.columns.iter();
         let said: Vec<_> = said.map(|(field, column)| format!("{field} from {column}")).collect();
         notice!("by the header: {}", said.join(", "));
     }
-    let silent = found.readings - found.echoes;
+    for note in &found.notes {
+        notice!("note: {note}");
+    }
+    if found.format.entry().has_columns && found.taken.array.is_none() {
+        let Mapping { clockwise, zero_deg, azimuth_deg, .. } = found.mapping;
+        if !clockwise && zero_deg == 0.0 && azimuth_deg.is_none() {
+            notice!(
+                "note: directions count counter-clockwise from the heading; --clockwise and --zero-deg give another sense and zero"
+            );
+        }
+    }
+    let without = found.readings - found.echoes;
     notice!(
-        "{scans} scans, {} readings: {} with a range, {silent} without; sensor {}",
+        "{scans} scans, {} readings: {} with a range, {without} without; sensor {}",
         found.readings,
         found.echoes,
         found.taken.sensor
     );
-    if !has_poses {
+    if !has_poses(args, found) {
         notice!(
             "note: where the robot stood is not known: give --pose, or columns x_m, y_m and heading_deg"
         );
@@ -259,7 +272,13 @@ fn standard_input() -> Result<Arc<[u8]>, Failure> {
 /// So much of standard input is kept, bytes.
 const MOST_STANDARD_INPUT: u64 = 256 << 20;
 
-fn taken(args: &Args, scene: Option<&Scene>, sensor: &Sensor, air: &Air) -> Result<Taken, Failure> {
+fn taken(
+    args: &Args,
+    scene: Option<&Scene>,
+    array: Option<RangerArray>,
+    sensor: &Sensor,
+    air: &Air,
+) -> Result<Taken, Failure> {
     let origin = Pose { x_m: 0.0, y_m: 0.0, heading_deg: 0.0 };
     let pose = match (&args.pose, scene) {
         (Some(pose), Some(scene)) => scene_file::pose(scene, pose)?,
@@ -271,13 +290,20 @@ fn taken(args: &Args, scene: Option<&Scene>, sensor: &Sensor, air: &Air) -> Resu
     Ok(Taken {
         sha256: String::new(),
         pose,
-        array: args.array.as_deref().map(load_array).transpose()?,
+        array,
         sensor: sensor.name.clone(),
         longest_m: sensor.max_range_m,
+        least_m: least_m(sensor, air),
         air: *air,
         started: started(&args.file),
         as_said: args.as_said,
     })
+}
+
+/// The least range of a sensor, by its shortest blanking, metres.
+fn least_m(sensor: &Sensor, air: &Air) -> f64 {
+    let blanking_us = sensor.short_blanking_us.unwrap_or(f64::INFINITY).min(sensor.blanking_us);
+    blanking_us * 1e-6 * air.sound_speed_m_s() / 2.0
 }
 
 /// When scans were taken that do not say it: at the latest when their file was last written.
@@ -310,52 +336,4 @@ fn session(
         poses_known: has_poses(args, found),
     }));
     session
-}
-
-impl ColumnArgs {
-    fn mapping(&self) -> Result<Mapping, Failure> {
-        let mut mapping = match &self.mapping {
-            Some(path) => read_mapping(path)?,
-            None => Mapping::default(),
-        };
-        if let Some(columns) = &self.columns {
-            mapping.columns = Mapping::columns_of(columns)
-                .map_err(|error| Failure::input(format!("--columns: {error}"), error.help()))?;
-        }
-        let format = self.format.map(|format| match format {
-            FormatName::Csv => Format::Csv,
-            FormatName::Json => Format::Json,
-            FormatName::Carmen => Format::Carmen,
-            FormatName::Player => Format::Player,
-            FormatName::Mcap => Format::Mcap,
-        });
-        mapping.format = format.or(mapping.format);
-        if !self.topic.is_empty() {
-            mapping.topics.clone_from(&self.topic);
-        }
-        mapping.clockwise |= self.clockwise;
-        mapping.zero_deg = self.zero_deg.unwrap_or(mapping.zero_deg);
-        if !self.none.is_empty() {
-            mapping.none.clone_from(&self.none);
-        }
-        mapping.none_from = self.none_from.or(mapping.none_from);
-        mapping.sound_speed_m_s = self.ranged_with.or(mapping.sound_speed_m_s);
-        if let Some(speed) =
-            mapping.sound_speed_m_s.filter(|speed| !(200.0..=500.0).contains(speed))
-        {
-            let what = format!("ranges computed with a speed of sound of {speed} m/s");
-            return Err(Failure::input(what, "give metres a second, 200 to 500"));
-        }
-        Ok(mapping)
-    }
-}
-
-fn read_mapping(path: &Path) -> Result<Mapping, Failure> {
-    let name = path.display();
-    let text = fs::read_to_string(path).map_err(|error| {
-        Failure::input(format!("cannot read {name}: {error}"), "give a TOML file")
-    })?;
-    toml::from_str(&text).map_err(|error| {
-        Failure::input(format!("{name}: {error}"), "see `sonard import --help` for its keys")
-    })
 }

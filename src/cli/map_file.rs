@@ -16,6 +16,11 @@ pub(super) fn read(path: &Path) -> Result<Grid, Failure> {
     grid_file::read(path, note_input).map_err(|error| Failure::input(&error, error.help()))
 }
 
+/// The same by the rules of map_server, with its description.
+pub(super) fn read_by_rules(path: &Path) -> Result<(Grid, MapYaml), Failure> {
+    grid_file::read_by_rules(path, note_input).map_err(|error| Failure::input(&error, error.help()))
+}
+
 /// Notes that the command reads a map, before it does.
 pub(super) fn note(path: &Path) {
     for name in ["map.yaml", "map.pgm"] {

@@ -1,8 +1,10 @@
 //! Readings from elsewhere, through the whole program.
 
+mod answers;
 #[cfg(feature = "sqlite")]
 #[cfg(feature = "sqlite")]
 mod databases;
+mod formats;
 
 use std::{fs, path::Path};
 
@@ -178,7 +180,7 @@ fn wrong_files_and_outputs_are_refused() {
     let zero = folder.path().join("zero.csv");
     fs::write(&zero, "azimuth_deg,range_cm\n0,100\n10,0\n").expect("writes");
     let silent = refused(&["import", zero.to_str().expect("a plain path")]);
-    assert!(silent.contains("a range of 0") && silent.contains("--none=VALUE"), "{silent}");
+    assert!(silent.contains("a range of 0") && silent.contains("--none=0"), "{silent}");
     let none = refused(&["import", "/nowhere.csv"]);
     assert!(none.contains("No such file"), "{none}");
     let picture = folder.path().join("a.gz");

@@ -1,5 +1,9 @@
 //! `sonard scene from-grid`, `from-svg`, `from-dxf` and `from-sdf`.
 
+mod drawings;
+mod maps;
+mod worlds;
+
 use std::fs;
 
 use sonard::{
@@ -364,9 +368,9 @@ fn what_a_world_of_gazebo_has_at_the_rangers_height_becomes_a_scene() {
     }
     fs::write(&path, "<svg/>").expect("writable");
     refused(&["scene", "from-sdf", world], "not sdf");
-    fs::write(&path, WORLD.replace("<pose>0 2", "<pose relative_to=\"crate\">0 2"))
+    fs::write(&path, WORLD.replace("<pose>0 2", "<pose relative_to=\"shed\">0 2"))
         .expect("writable");
     let output = run(&["scene", "from-sdf", world]);
-    assert!(stderr(&output).contains("1 poses relative"), "{}", stderr(&output));
+    assert!(stderr(&output).contains("relative to `shed`"), "{}", stderr(&output));
     assert!(!String::from_utf8_lossy(&output.stdout).contains("north"));
 }

@@ -6,7 +6,7 @@
 
 use crate::{
     ImportError, Location,
-    rounds::{self, Message, count, number, numbers},
+    rounds::{self, Content, Device, Message, count, number, numbers},
 };
 
 /// Words after the ranges and places: when it was sent, by which computer, and when it was logged.
@@ -18,22 +18,23 @@ const AFTER: usize = 3;
 /// A line of such a kind that holds something else.
 pub(crate) fn message(place: Location, line: &str) -> Result<Option<Message>, ImportError> {
     let words: Vec<&str> = line.split_whitespace().collect();
-    match words.first() {
-        Some(&"ODOM") => pose(place, &words, false).map(Some),
-        Some(&"TRUEPOS") => pose(place, &words, true).map(Some),
-        Some(&"SONAR") => ranges(place, &words).map(Some),
-        _ => Ok(None),
-    }
+    let content = match words.first() {
+        Some(&"ODOM") => pose(place, &words, false)?,
+        Some(&"TRUEPOS") => pose(place, &words, true)?,
+        Some(&"SONAR") => ranges(place, &words)?,
+        _ => return Ok(None),
+    };
+    Ok(Some(Message { device: Device::default(), content }))
 }
 
-fn pose(place: Location, words: &[&str], is_true: bool) -> Result<Message, ImportError> {
+fn pose(place: Location, words: &[&str], is_true: bool) -> Result<Content, ImportError> {
     let [x_m, y_m, heading_rad] =
         [(1, "x"), (2, "y"), (3, "theta")].map(|(at, what)| number(place, words, at, what));
-    Ok(Message::Pose { pose: rounds::pose(x_m?, y_m?, heading_rad?), is_true })
+    Ok(Content::Pose { pose: rounds::pose(x_m?, y_m?, heading_rad?), is_true })
 }
 
 /// The count of words tells how the line is made.
-fn ranges(place: Location, words: &[&str]) -> Result<Message, ImportError> {
+fn ranges(place: Location, words: &[&str]) -> Result<Content, ImportError> {
     let fits = |at: usize| {
         let count: usize = words.get(at)?.parse().ok().filter(|count| *count > 0)?;
         let rest = words.len().checked_sub(at + 1 + count + AFTER)?;
@@ -49,11 +50,11 @@ fn ranges(place: Location, words: &[&str]) -> Result<Message, ImportError> {
         ));
     };
     let count = count(place, words, from - 1)?;
-    let ranges_m = numbers(place, words, from, count, "range")?;
+    let ranges = rounds::ranges(place, words, from, count)?;
     let places = has_places.then(|| numbers(place, words, from + count, 3 * count, "place"));
     let geometry = places.transpose()?.map(|numbers| {
         numbers.chunks_exact(3).map(|place| [place[0], place[1], place[2]]).collect()
     });
     let seconds = number(place, words, words.len() - AFTER, "time")?;
-    Ok(Message::Ranges { seconds: Some(seconds), ranges_m, geometry })
+    Ok(Content::Ranges { seconds: Some(seconds), ranges, geometry })
 }

@@ -9,6 +9,8 @@ use thiserror::Error;
 pub enum Location {
     /// A line, from 1.
     Line(u64),
+    /// A message of a recording, from 1, among those of readings.
+    Message(u64),
     /// An object of a JSON file, and one of the numbers in its lists, both from 1.
     Entry {
         /// The object.
@@ -22,6 +24,7 @@ impl fmt::Display for Location {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Line(line) => write!(f, "line {line}"),
+            Self::Message(message) => write!(f, "message {message}"),
             Self::Entry { object, number: None } => write!(f, "object {object}"),
             Self::Entry { object, number: Some(number) } => {
                 write!(f, "object {object}, number {number} of its lists")

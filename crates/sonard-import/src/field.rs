@@ -54,6 +54,13 @@ impl Quantity {
     }
 }
 
+impl Quantity {
+    /// Whether a reading has it: a direction, a range or a time of flight.
+    pub(crate) const fn is_of_reading(self) -> bool {
+        matches!(self, Self::Azimuth | Self::Bearing | Self::Range | Self::Tof)
+    }
+}
+
 const DEG: f64 = 180.0 / std::f64::consts::PI;
 
 /// Names of fields, the quantity, and what turns a number into degrees, metres, microseconds, seconds or
@@ -130,7 +137,22 @@ impl Field {
 
     /// Whether it is counted in radians.
     pub(crate) fn is_radians(self) -> bool {
-        self.name().ends_with("_rad")
+        self.unit() == Some("rad")
+    }
+
+    /// The unit in its name; `None` of a text.
+    pub(crate) fn unit(self) -> Option<&'static str> {
+        FIELDS[self.0].2.and(self.name().rsplit_once('_')).map(|(_, unit)| unit)
+    }
+
+    /// The field of a quantity in a unit.
+    pub(crate) fn of(quantity: Quantity, unit: Option<&str>) -> Option<Self> {
+        Self::all().find(|field| field.quantity() == quantity && field.unit() == unit)
+    }
+
+    /// The fields of a quantity.
+    pub(crate) fn of_quantity(quantity: Quantity) -> impl Iterator<Item = Self> {
+        Self::all().filter(move |field| field.quantity() == quantity)
     }
 }
 

@@ -8,12 +8,15 @@ use std::{
 use sonard_model::array::RangerArray;
 use sonard_records::Record;
 
-use crate::{ImportError, Mapping, Taken};
+use crate::{
+    ImportError, Mapping, Taken,
+    doubt::{Ranges, Ways},
+};
 
 /// How every such file begins.
 pub(crate) const MAGIC: &[u8] = b"\x89MCAP0\r\n";
 
-/// There is none.
+/// Stands for the recording, of which there is none.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Bag {
     pub(crate) has_poses: bool,
@@ -25,6 +28,7 @@ impl Bag {
     pub(crate) fn look(
         _open: &dyn Fn() -> io::Result<Box<dyn Read>>,
         _mapping: &Mapping,
+        _taken: &Taken,
     ) -> Result<Self, ImportError> {
         Err(ImportError::mapping(
             "recordings can't be read here",
@@ -36,12 +40,21 @@ impl Bag {
         None
     }
 
+    pub(crate) fn examine(
+        &self,
+        _open: &dyn Fn() -> io::Result<Box<dyn Read>>,
+        _ways: (&Ways, &Taken),
+        _ranges: &mut Ranges,
+    ) -> Result<Vec<String>, ImportError> {
+        Ok(Vec::new())
+    }
+
     pub(crate) fn scans(
         &self,
         _source: impl Read,
         _mapping: &Mapping,
         _taken: &Taken,
-    ) -> iter::Empty<Result<Vec<Record>, ImportError>> {
-        iter::empty()
+    ) -> Result<iter::Empty<Result<Vec<Record>, ImportError>>, ImportError> {
+        Ok(iter::empty())
     }
 }

@@ -3,13 +3,26 @@
 use jiff::Timestamp;
 use sonard_model::{acoustics::Air, geometry::Pose, reading::PingStatus};
 
-use crate::{Field, ImportError, Location, Mapping, Quantity, Taken};
+use crate::{
+    Field, ImportError, Location, Mapping, Quantity, Taken, mapping::Decimal, number,
+    rounds::Round, time::Times,
+};
 
-/// The values of the mapping's columns, in its order; `None` where there is nothing.
+/// The values of the mapping's columns, in its order: one each, or of an array one a ranger; `None` where there is
+/// nothing.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Row {
     pub(crate) place: Location,
-    pub(crate) cells: Vec<Option<String>>,
+    pub(crate) cells: Vec<Vec<Option<String>>>,
+}
+
+/// Numbers of a reading as the file has them, before units, senses and no echo.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(crate) struct Raw {
+    /// Azimuth or bearing.
+    pub(crate) direction: f64,
+    /// Range or time of flight.
+    pub(crate) range: Option<f64>,
 }
 
 /// One firing, in the units and senses of a log.
@@ -37,6 +50,8 @@ pub struct Reading {
     pub heading_deg: Option<f64>,
     /// The air, where the file says its temperature.
     pub air: Option<Air>,
+    /// The same numbers as the file has them.
+    pub(crate) raw: Raw,
 }
 
 impl Reading {
@@ -47,57 +62,88 @@ impl Reading {
     }
 }
 
-/// Makes readings of rows.
+/// Makes readings of rows, in their order.
 #[derive(Debug)]
 pub(crate) struct Reader<'a> {
     mapping: &'a Mapping,
     fields: Vec<Field>,
     taken: &'a Taken,
+    decimal: Decimal,
+    pub(crate) times: Times<'a>,
 }
 
 impl<'a> Reader<'a> {
-    pub(crate) fn new(mapping: &'a Mapping, taken: &'a Taken) -> Self {
-        Self { mapping, fields: mapping.columns.keys().copied().collect(), taken }
+    /// # Errors
+    /// The mapping has an offset from UTC that is none.
+    pub(crate) fn new(
+        mapping: &'a Mapping,
+        taken: &'a Taken,
+        decimal: Decimal,
+    ) -> Result<Self, ImportError> {
+        let fields = mapping.columns.keys().copied().collect();
+        Ok(Self { mapping, fields, taken, decimal, times: Times::new(mapping, taken.started)? })
+    }
+
+    /// The cells of a quantity.
+    fn cells<'r>(&self, row: &'r Row, quantity: Quantity) -> Option<(Field, &'r [Option<String>])> {
+        let place = self.fields.iter().position(|field| field.quantity() == quantity)?;
+        Some((self.fields[place], row.cells.get(place)?))
+    }
+
+    /// The cell of a quantity that has one.
+    fn cell<'r>(&self, row: &'r Row, quantity: Quantity) -> Option<(Field, &'r str)> {
+        let (field, cells) = self.cells(row, quantity)?;
+        cells.first()?.as_deref().map(|cell| (field, cell))
+    }
+
+    fn number_of(
+        &self,
+        row: &Row,
+        quantity: Quantity,
+    ) -> Result<Option<(Field, f64)>, ImportError> {
+        let Some((field, cell)) = self.cell(row, quantity) else { return Ok(None) };
+        Ok(self.number(row.place, field, cell)?.map(|number| (field, number)))
+    }
+
+    fn scaled(&self, row: &Row, quantity: Quantity) -> Result<Option<f64>, ImportError> {
+        let found = self.number_of(row, quantity)?;
+        Ok(found.map(|(field, number)| field.scaled(number)))
     }
 
     /// The reading of a row.
     ///
     /// # Errors
     /// A value that is none, with its field and column.
-    pub(crate) fn read(&self, row: &Row) -> Result<Reading, ImportError> {
-        let cells = || self.fields.iter().copied().zip(&row.cells);
-        let text = |quantity: Quantity| {
-            let (_, cell) = cells().find(|(field, _)| field.quantity() == quantity)?;
-            cell.clone()
-        };
-        let number = |quantity: Quantity| {
-            let found = cells().find(|(field, _)| field.quantity() == quantity);
-            let Some((field, Some(cell))) = found else { return Ok(None) };
-            self.number(row.place, field, cell).map(|number| number.map(|number| (field, number)))
-        };
-        let scaled = |quantity| {
-            number(quantity).map(|found| found.map(|(field, number)| field.scaled(number)))
-        };
+    pub(crate) fn read(&mut self, row: &Row) -> Result<Reading, ImportError> {
         let is_bearing = self.mapping.field(Quantity::Bearing).is_some();
         let direction = if is_bearing { Quantity::Bearing } else { Quantity::Azimuth };
-        let direction_deg = scaled(direction)?.ok_or_else(|| {
+        let fixed = self.mapping.azimuth_deg.map(|azimuth_deg| (azimuth_deg, azimuth_deg));
+        let found = self.number_of(row, direction)?;
+        let found = found.map(|(field, number)| (number, field.scaled(number)));
+        let (raw_direction, direction_deg) = found.or(fixed).ok_or_else(|| {
             let what = format!("there is no {}", direction.words());
             ImportError::at(row.place, what, "every reading needs a direction: correct that row")
         })?;
         let sense = if self.mapping.clockwise { -1.0 } else { 1.0 };
-        let status = match text(Quantity::Status) {
-            Some(word) => Some(self.status(row.place, &word)?),
+        let status = match self.cell(row, Quantity::Status) {
+            Some((_, word)) => Some(self.status(row.place, word)?),
             None => None,
         };
-        let air = match scaled(Quantity::Temperature)? {
+        let air = match self.scaled(row, Quantity::Temperature)? {
             Some(temperature_c) => Some(self.air(row.place, temperature_c)?),
             None => None,
         };
         let sound_speed_m_s = air.unwrap_or(self.taken.air).sound_speed_m_s();
-        let measured = number(Quantity::Range)?.or(number(Quantity::Tof)?);
-        let tof_us = self.tof_us(row.place, measured, status, sound_speed_m_s)?;
+        let measured = match self.number_of(row, Quantity::Range)? {
+            Some(range) => Some(range),
+            None => self.number_of(row, Quantity::Tof)?,
+        };
+        let is_without = status.is_some_and(|status| status != PingStatus::Echo);
+        let measured = measured.filter(|_| !is_without);
+        let tof_us =
+            measured.and_then(|(field, number)| self.tof_us(field, number, sound_speed_m_s));
         let range_m = tof_us.map(|tof_us| tof_us * 1e-6 * sound_speed_m_s / 2.0);
-        let [x, y] = [scaled(Quantity::X)?, scaled(Quantity::Y)?];
+        let [x, y] = [self.scaled(row, Quantity::X)?, self.scaled(row, Quantity::Y)?];
         Ok(Reading {
             place: row.place,
             direction_deg: self.mapping.zero_deg + sense * direction_deg,
@@ -110,11 +156,43 @@ impl<'a> Reader<'a> {
             range_m,
             tof_us,
             time: self.time(row)?,
-            scan: text(Quantity::Scan),
+            scan: self.cell(row, Quantity::Scan).map(|(_, scan)| scan.to_owned()),
             place_m: x.zip(y).map(|(x, y)| [x, y]),
-            heading_deg: scaled(Quantity::Heading)?,
+            heading_deg: self.scaled(row, Quantity::Heading)?,
             air,
+            raw: Raw { direction: raw_direction, range: measured.map(|(_, number)| number) },
         })
+    }
+
+    /// The round of a row that has a range of each ranger.
+    ///
+    /// # Errors
+    /// A value that is none, with its field and column.
+    pub(crate) fn round(&mut self, row: &Row) -> Result<Round, ImportError> {
+        let found = self.cells(row, Quantity::Range).or_else(|| self.cells(row, Quantity::Tof));
+        let Some((field, cells)) = found else {
+            return Err(ImportError::mapping("no column has a range", "name one with --columns"));
+        };
+        let sound_speed_m_s = self.taken.air.sound_speed_m_s();
+        let raw = cells.iter().map(|cell| match cell {
+            Some(cell) => self.number(row.place, field, cell),
+            None => Ok(None),
+        });
+        let raw: Vec<Option<f64>> = raw.collect::<Result<_, _>>()?;
+        let range_m = |number: &Option<f64>| {
+            let tof_us = self.tof_us(field, (*number)?, sound_speed_m_s)?;
+            Some(tof_us * 1e-6 * sound_speed_m_s / 2.0)
+        };
+        let ranges_m = raw.iter().map(range_m).collect();
+        let [x, y] = [self.scaled(row, Quantity::X)?, self.scaled(row, Quantity::Y)?];
+        let heading_deg = self.scaled(row, Quantity::Heading)?;
+        let otherwise = self.taken.pose;
+        let pose = (x.is_some() || heading_deg.is_some()).then(|| Pose {
+            x_m: x.unwrap_or(otherwise.x_m),
+            y_m: y.unwrap_or(otherwise.y_m),
+            heading_deg: heading_deg.unwrap_or(otherwise.heading_deg),
+        });
+        Ok(Round { place: row.place, time: self.time(row)?, pose, ranges_m, raw })
     }
 
     fn air(&self, place: Location, temperature_c: f64) -> Result<Air, ImportError> {
@@ -123,36 +201,20 @@ impl<'a> Reader<'a> {
             .map_err(|error| ImportError::at(place, error.to_string(), "is the unit right?"))
     }
 
-    /// The time of flight of a row, microseconds; `None` where nothing was heard.
-    fn tof_us(
-        &self,
-        place: Location,
-        measured: Option<(Field, f64)>,
-        status: Option<PingStatus>,
-        sound_speed_m_s: f64,
-    ) -> Result<Option<f64>, ImportError> {
-        let Some((field, number)) = measured else { return Ok(None) };
-        let is_silent = status.is_some_and(|status| status != PingStatus::Echo);
-        if self.mapping.is_silence(number) || number.is_infinite() || is_silent {
-            return Ok(None);
+    /// The time of flight of a number of the file, microseconds; `None` of one that stands for no echo, or is no
+    /// distance.
+    fn tof_us(&self, field: Field, number: f64, sound_speed_m_s: f64) -> Option<f64> {
+        if self.mapping.is_no_echo(number) || number.is_infinite() || number <= 0.0 {
+            return None;
         }
-        if number <= 0.0 {
-            let help = "if that means that nothing was heard, say so: --none=VALUE";
-            return Err(self.wrong(
-                place,
-                field,
-                format!("a {} of {number}", field.quantity().words()),
-                help,
-            ));
-        }
-        Ok(Some(match field.quantity() {
+        Some(match field.quantity() {
             Quantity::Tof => field.scaled(number),
             // What the ranger measured is a time: its program made a range of that.
             _ => {
                 let assumed_m_s = self.mapping.sound_speed_m_s.unwrap_or(sound_speed_m_s);
                 2e6 * field.scaled(number) / assumed_m_s
             }
-        }))
+        })
     }
 
     /// A number; `None` where the cell says that there is none.
@@ -166,14 +228,18 @@ impl<'a> Reader<'a> {
             "nan" | "null" | "none" | "na" | "n/a" | "-" => return Ok(None),
             _ => {}
         }
-        match cell.parse::<f64>() {
-            Ok(number) if !number.is_finite() && field.quantity() != Quantity::Range => {
+        match number::parse(cell, self.decimal) {
+            Some(number) if !number.is_finite() && field.quantity() != Quantity::Range => {
                 Err(self.wrong(place, field, format!("{cell} is not finite"), "correct that value"))
             }
-            Ok(number) => Ok(Some(number)),
-            Err(_) => {
+            Some(number) => Ok(Some(number)),
+            None => {
                 let what = format!("`{}` is no number", shortened(cell));
-                Err(self.wrong(place, field, what, "is it the right column? see --columns"))
+                let help = match number::shows(cell) {
+                    number::Shows::Nothing => "is it the right column? see --columns",
+                    _ => "is the comma a decimal sign? --decimal comma",
+                };
+                Err(self.wrong(place, field, what, help))
             }
         }
     }
@@ -185,31 +251,15 @@ impl<'a> Reader<'a> {
         })
     }
 
-    fn time(&self, row: &Row) -> Result<Option<Timestamp>, ImportError> {
-        let found = self
-            .fields
-            .iter()
-            .zip(&row.cells)
-            .find(|(field, _)| field.quantity() == Quantity::Time);
-        let Some((&field, Some(cell))) = found else { return Ok(None) };
-        if field.name() == "time" {
-            let time = cell.parse::<Timestamp>();
-            return time.map(Some).map_err(|error| {
-                let help =
-                    "write it as in 2026-01-31T12:00:00Z, or name a column time_s for seconds";
-                self.wrong(row.place, field, error.to_string(), help)
-            });
-        }
-        let Some(seconds) = self.number(row.place, field, cell)? else { return Ok(None) };
-        let nanoseconds = (field.scaled(seconds) * 1e9).round();
-        Timestamp::from_nanosecond(nanoseconds as i128).map(Some).map_err(|error| {
-            self.wrong(
-                row.place,
-                field,
-                error.to_string(),
-                "times count from 1970: is the unit right?",
-            )
-        })
+    fn time(&mut self, row: &Row) -> Result<Option<Timestamp>, ImportError> {
+        let Some((field, cell)) = self.cell(row, Quantity::Time) else { return Ok(None) };
+        let read = if field.name() == "time" {
+            self.times.text(cell)
+        } else {
+            let Some(number) = self.number(row.place, field, cell)? else { return Ok(None) };
+            self.times.number(Some(field), field.scaled(number)).map(Some)
+        };
+        read.map_err(|(what, help)| self.wrong(row.place, field, what, &help))
     }
 
     fn wrong(&self, place: Location, field: Field, what: String, help: &str) -> ImportError {

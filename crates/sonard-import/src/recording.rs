@@ -4,9 +4,11 @@
 //! do not are an array. Poses are those of `base_link` in the root of the tree of frames.
 
 mod cdr;
+mod look;
 mod mcap;
 mod message;
 mod numbers;
+mod order;
 mod scan;
 mod transforms;
 
@@ -17,16 +19,22 @@ use std::{
 
 use sonard_model::{
     array::{MountedRanger, RangerArray},
-    geometry::{Pose, wrap_180},
+    geometry::Pose,
     reading::PingStatus,
 };
 use sonard_records::Record;
 
-use crate::{ImportError, Mapping, Taken};
+use crate::{
+    ImportError, Location, Mapping, Taken,
+    doubt::{Ranges, Ways},
+    examine::check_beyond,
+    limits::{LimitNotes, Limits, Told},
+};
 use cdr::{Cdr, CdrError, Part};
 use mcap::{Message, Messages};
 use message::{Header, LaserScan, Range, Transform};
 use numbers::{as_written, billionths, plain_deg};
+use order::in_order;
 use scan::Gathered;
 use transforms::{Placed, TransformError, Transforms};
 
@@ -40,6 +48,22 @@ pub(crate) struct Bag {
     /// Whether the ranger turns: if not, they are an array.
     turns: bool,
     pub(crate) has_poses: bool,
+    clock: Clock,
+    /// Whether messages stand in the order of their stamps.
+    is_in_order: bool,
+    /// What was assumed, a line each.
+    notes: Vec<String>,
+    /// The greatest range that a message states, in its unit.
+    stated_most: f64,
+}
+
+/// The recording's clock, where stamps count from the start of a board.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+struct Clock {
+    /// From stamps before 2000 to the recorder's clock, nanoseconds.
+    of_board_ns: Option<i64>,
+    /// From stamps to what the log shall have, nanoseconds.
+    shown_ns: i64,
 }
 
 /// A topic of readings.
@@ -47,6 +71,8 @@ pub(crate) struct Bag {
 struct Source {
     is_scan: bool,
     frame: String,
+    /// The frame by which its place is known: its own, or the robot's where nothing places it.
+    placed_as: String,
     /// From the root of the tree: frame of the world, of the robot, and of what the readings are told from.
     world: String,
     robot: String,
@@ -63,6 +89,16 @@ pub(crate) struct Heard {
     pub(crate) direction_deg: f64,
     pub(crate) status: PingStatus,
     pub(crate) range_m: Option<f64>,
+    /// The range in the message's unit, unless it stands for none.
+    raw: Option<f64>,
+}
+
+/// Readings of a message, and those that have no place.
+#[derive(Debug, Default)]
+struct Placeable {
+    heard: Vec<Heard>,
+    left_out: u64,
+    why: Option<TransformError>,
 }
 
 const RANGE: &str = "sensor_msgs/msg/Range";
@@ -74,92 +110,59 @@ pub const MESSAGE_TYPES: [&str; 3] = [RANGE, LASER_SCAN, TRANSFORMS];
 
 /// Rangers that turn by less than this stand still, degrees.
 const STILL_DEG: f64 = 0.05;
-/// Frames that are a robot's, the best first.
-const ROBOT: [&str; 3] = ["base_link", "base_footprint", "base"];
+/// No ranger of sound reaches so far, metres: limits beyond it are in another unit.
+const MAX_STATED_M: f64 = 60.0;
 
 impl Bag {
-    /// Looks a recording through; `open` gives it from its beginning, as often as is asked.
+    /// Reads all readings once: what is left out, and what their ranges say.
     ///
     /// # Errors
-    /// A damaged recording, one without readings or with several rangers that turn.
-    pub(crate) fn look(
+    /// A damaged message, or no reading with a place.
+    pub(crate) fn examine(
+        &self,
         open: &dyn Fn() -> std::io::Result<Box<dyn Read>>,
-        mapping: &Mapping,
-    ) -> Result<Self, ImportError> {
-        let mut transforms = Transforms::default();
-        let mut kinds: BTreeMap<String, bool> = BTreeMap::new();
-        for message in Messages::of(open()?, &MESSAGE_TYPES) {
+        (ways, taken): (&Ways, &Taken),
+        ranges: &mut Ranges,
+    ) -> Result<Vec<String>, ImportError> {
+        let mut limits = LimitNotes::default();
+        let mut left_out: BTreeMap<&str, (u64, u64, Option<TransformError>)> = BTreeMap::new();
+        let stated_m = Some(self.stated_most * ways.mapping.metres());
+        let stated_m = stated_m.filter(|stated_m| *stated_m <= MAX_STATED_M).unwrap_or(0.0);
+        let taken = &Taken { longest_m: taken.longest_m.max(stated_m), ..taken.clone() };
+        for (number, message) in (1..).zip(Messages::of(open()?, &READINGS)) {
             let message = message?;
-            let channel = &message.channel;
-            if channel.type_name != TRANSFORMS {
-                kinds.insert(channel.topic.clone(), channel.type_name == LASER_SCAN);
-                continue;
-            }
-            for transform in decode(&message, Transform::all)? {
-                let added = transforms.add(transform, channel.topic.ends_with("tf_static"));
-                added.map_err(|error| misplaced(&channel.topic, &error))?;
+            let Some((ranger, topic, source)) = self.source_of(&message) else { continue };
+            let found = self.readings(&message, source, ways.mapping, &mut limits)?;
+            let counts = left_out.entry(topic).or_default();
+            counts.0 += found.left_out;
+            counts.1 += found.left_out + found.heard.len() as u64;
+            counts.2 = counts.2.take().or(found.why);
+            for heard in found.heard {
+                let direction = if self.turns { heard.direction_deg } else { ranger as f64 };
+                let place = Location::Message(number);
+                ranges.add(place, direction, heard.raw, heard.range_m, (ways, taken));
             }
         }
-        transforms.sort();
-        let topics = choose(kinds, mapping)?;
-        let mut bag = Self { transforms, topics: BTreeMap::new(), turns: false, has_poses: false };
-        for message in Messages::of(open()?, &READINGS) {
-            let message = message?;
-            if let Some(is_scan) = topics.get(&message.channel.topic) {
-                bag.know(&message, *is_scan)?;
+        check_beyond(&limits, taken)?;
+        let mut notes = self.notes.clone();
+        for (topic, (missing, of, why)) in left_out {
+            let Some(why) = why else { continue };
+            if ranges.readings == 0 {
+                return Err(misplaced(topic, &why));
             }
-        }
-        bag.turns |= bag.topics.values().any(|source| source.is_scan);
-        if bag.turns && bag.topics.len() > 1 {
-            let names: Vec<_> = bag.topics.keys().map(String::as_str).collect();
-            return Err(ImportError::mapping(
-                format!("several rangers, one of which turns: {}", names.join(", ")),
-                "choose one: --topic TOPIC",
+            notes.push(format!(
+                "{topic}: {missing} of {of} readings are left out, because their place is not known: {why}"
             ));
         }
-        Ok(bag)
+        notes.extend(limits.lines());
+        Ok(notes)
     }
 
-    /// Where a topic's ranger is, by its first message, and whether it turns.
-    fn know(&mut self, message: &Message, is_scan: bool) -> Result<(), ImportError> {
-        let channel = &message.channel;
-        let mut header = decode(message, Header::decode)?;
-        stamp(&mut header, message);
-        let misplaced = |error: TransformError| misplaced(&channel.topic, &error);
-        let Some(source) = self.topics.get(&channel.topic) else {
-            let source = self.source(&header, is_scan).map_err(misplaced)?;
-            self.has_poses |= source.world != source.robot;
-            self.topics.insert(channel.topic.clone(), source);
-            return Ok(());
-        };
-        if source.frame != header.frame {
-            let what = format!(
-                "{}: the frame is `{}`, and `{}` before",
-                channel.topic, header.frame, source.frame
-            );
-            return Err(ImportError::mapping(what, "cut the recording where that changes"));
-        }
-        let now = self.transforms.place(&source.frame, &source.robot, header.stamp_ns);
-        let turned = wrap_180(now.map_err(misplaced)?.yaw_deg() - source.mounted.yaw_deg());
-        self.turns |= turned.abs() > STILL_DEG;
-        Ok(())
-    }
-
-    fn source(&self, header: &Header, is_scan: bool) -> Result<Source, TransformError> {
-        let way = self.transforms.way_up(&header.frame)?;
-        let world = way.last().copied().unwrap_or_default();
-        let robot = ROBOT.into_iter().find(|name| way.contains(name)).unwrap_or(world);
-        // What turns stands on the frame above it; a scan is told from its own.
-        let above = way.get(1).copied().filter(|_| !is_scan && header.frame != robot);
-        let mounted = self.transforms.place(&header.frame, robot, header.stamp_ns)?;
-        Ok(Source {
-            is_scan,
-            frame: header.frame.clone(),
-            world: world.to_owned(),
-            robot: robot.to_owned(),
-            axis: above.unwrap_or(&header.frame).to_owned(),
-            mounted,
-        })
+    /// The ranger of a message, with its number.
+    fn source_of(&self, message: &Message) -> Option<(usize, &str, &Source)> {
+        let mut topics = self.topics.iter().enumerate();
+        let found = topics.find(|(_, (topic, _))| **topic == message.channel.topic);
+        found.map(|(ranger, (topic, source))| (ranger, topic.as_str(), source))
     }
 
     /// The array that the recording is of; `None` of a ranger that turns.
@@ -194,22 +197,39 @@ impl Bag {
     }
 
     /// The records of each scan, one after the other; `source` is the recording again.
+    ///
+    /// # Errors
+    /// Messages out of order are more than fit into memory.
     pub(crate) fn scans<'a>(
         &'a self,
         source: impl Read + 'a,
-        mapping: &Mapping,
+        mapping: &'a Mapping,
         taken: &'a Taken,
-    ) -> impl Iterator<Item = Result<Vec<Record>, ImportError>> + 'a {
+    ) -> Result<impl Iterator<Item = Result<Vec<Record>, ImportError>> + 'a, ImportError> {
         let ids = if self.turns { Vec::new() } else { self.ids().collect() };
         let mut gathered = Gathered::new(taken, mapping.sound_speed_m_s, ids);
-        let mut messages = Messages::of(source, &READINGS);
+        let messages = Messages::of(source, &READINGS);
+        let mut messages: Box<dyn Iterator<Item = Result<Message, ImportError>> + 'a> =
+            match self.is_in_order {
+                true => Box::new(messages),
+                false => {
+                    let wanted = messages.filter(|message| {
+                        message.as_ref().map_or(true, |message| self.source_of(message).is_some())
+                    });
+                    Box::new(in_order(wanted, |message| self.stamp_of(message))?)
+                }
+            };
+        let mut limits = LimitNotes::default();
         let mut ready = VecDeque::new();
         let mut is_over = false;
-        std::iter::from_fn(move || {
+        Ok(std::iter::from_fn(move || {
             while ready.is_empty() && !is_over {
                 match messages.next() {
                     Some(message) => {
-                        match message.and_then(|message| self.take(&message, &mut gathered)) {
+                        let scans = message.and_then(|message| {
+                            self.take(&message, mapping, &mut limits, &mut gathered)
+                        });
+                        match scans {
                             Ok(scans) => ready.extend(scans),
                             Err(error) => return Some(Err(error)),
                         }
@@ -221,57 +241,100 @@ impl Bag {
                 }
             }
             ready.pop_front().map(Ok)
-        })
+        }))
+    }
+
+    /// The time of a message of readings.
+    fn stamp_of(&self, message: &Message) -> Result<i64, ImportError> {
+        let mut header = decode(message, Header::decode)?;
+        self.clock.stamp(&mut header, message);
+        Ok(header.stamp_ns)
     }
 
     /// Takes a message in; the scans that end with it.
     fn take(
         &self,
         message: &Message,
+        mapping: &Mapping,
+        limits: &mut LimitNotes,
         gathered: &mut Gathered<'_>,
     ) -> Result<Vec<Vec<Record>>, ImportError> {
-        let mut topics = self.topics.iter().enumerate();
-        let found = topics.find(|(_, (topic, _))| **topic == message.channel.topic);
-        let Some((place, (_, source))) = found else { return Ok(Vec::new()) };
-        let heard = self.readings(message, source)?;
+        let Some((ranger, _, source)) = self.source_of(message) else { return Ok(Vec::new()) };
+        let mut heard = self.readings(message, source, mapping, limits)?.heard;
+        for heard in &mut heard {
+            heard.time_ns = heard.time_ns.saturating_add(self.clock.shown_ns);
+        }
         if source.is_scan {
             return Ok(gathered.whole(heard).into_iter().collect());
         }
-        Ok(heard.into_iter().filter_map(|heard| gathered.add(place, heard)).collect())
+        Ok(heard.into_iter().filter_map(|heard| gathered.add(ranger, heard)).collect())
     }
 
-    /// The readings of a message, in their places.
-    fn readings(&self, message: &Message, source: &Source) -> Result<Vec<Heard>, ImportError> {
-        let place = |time_ns: i64, turned_deg: f64, range_m: f32, limits_m: [f32; 2]| {
-            let Some((status, range_m)) = told(range_m, limits_m) else { return Ok(None) };
-            let in_robot = self.transforms.place(&source.frame, &source.robot, time_ns)?;
-            let pose = match source.world == source.robot {
-                true => None,
-                false => Some(self.pose(source, time_ns)?),
+    /// The readings of a message, in their places; those without a place are counted.
+    fn readings(
+        &self,
+        message: &Message,
+        source: &Source,
+        mapping: &Mapping,
+        notes: &mut LimitNotes,
+    ) -> Result<Placeable, ImportError> {
+        let metres = mapping.metres();
+        let mut found = Placeable::default();
+        let mut place = |time_ns: i64, turned_deg: f64, range: f32, limits: Limits| {
+            let (status, raw) = match limits.tell(as_written(range), mapping, notes) {
+                Told::Nothing => return Ok(()),
+                Told::Without(status) => (status, None),
+                Told::Echo(range) => (PingStatus::Echo, Some(range)),
             };
-            let direction_deg = billionths(in_robot.yaw_deg() + turned_deg);
+            let (in_robot, pose) = match self.placed(source, time_ns) {
+                Ok(placed) => placed,
+                Err(why @ (TransformError::Lacks { .. } | TransformError::Gap { .. })) => {
+                    found.left_out += 1;
+                    found.why.get_or_insert(why);
+                    return Ok(());
+                }
+                Err(error) => return Err(misplaced(&message.channel.topic, &error)),
+            };
+            let direction_deg = billionths(in_robot.beam_deg(turned_deg));
             // A beam of no angle is none.
-            if !direction_deg.is_finite() {
-                return Ok(None);
+            if direction_deg.is_finite() {
+                let range_m = raw.map(|range| range * metres);
+                found.heard.push(Heard { time_ns, pose, direction_deg, status, range_m, raw });
             }
-            Ok(Some(Heard { time_ns, pose, direction_deg, status, range_m }))
+            Ok(())
         };
-        let misplaced = |error: TransformError| misplaced(&message.channel.topic, &error);
+        let limits =
+            |[least, most]: [f32; 2]| Limits { least: as_written(least), most: as_written(most) };
         if !source.is_scan {
             let mut range = decode(message, Range::decode)?;
-            stamp(&mut range.header, message);
-            let heard = place(range.header.stamp_ns, 0.0, range.range_m, range.limits_m);
-            return Ok(heard.map_err(misplaced)?.into_iter().collect());
+            self.clock.stamp(&mut range.header, message);
+            place(range.header.stamp_ns, 0.0, range.range_m, limits(range.limits_m))?;
+            return Ok(found);
         }
         let mut scan = decode(message, LaserScan::decode)?;
-        stamp(&mut scan.header, message);
-        let beams = (0_u32..).zip(&scan.ranges_m).filter_map(|(beam, range_m)| {
+        self.clock.stamp(&mut scan.header, message);
+        let limits = limits(scan.limits_m);
+        for (beam, range) in (0_u32..).zip(&scan.ranges_m) {
             let later_ns = f64::from(scan.apart_s) * f64::from(beam) * 1e9;
             let turned_rad = f64::from(scan.first_rad) + f64::from(scan.step_rad) * f64::from(beam);
             let time_ns = scan.header.stamp_ns.saturating_add(later_ns as i64);
-            place(time_ns, plain_deg(turned_rad), *range_m, scan.limits_m).transpose()
-        });
-        beams.collect::<Result<_, _>>().map_err(misplaced)
+            place(time_ns, plain_deg(turned_rad), *range, limits)?;
+        }
+        Ok(found)
+    }
+
+    /// Place of a ranger in its robot, and the robot's pose.
+    fn placed(
+        &self,
+        source: &Source,
+        time_ns: i64,
+    ) -> Result<(Placed, Option<Pose>), TransformError> {
+        let in_robot = self.transforms.place(&source.placed_as, &source.robot, time_ns)?;
+        let pose = match source.world == source.robot {
+            true => None,
+            false => Some(self.pose(source, time_ns)?),
+        };
+        Ok((in_robot, pose))
     }
 
     /// Of the robot; of a ranger that turns on an axis beside its middle, of that axis.
@@ -289,6 +352,23 @@ impl Bag {
     }
 }
 
+impl Clock {
+    /// Sets the time of a header on the recorder's clock where the sender has none: no stamp at all, or one that counts
+    /// from the start of a board.
+    fn stamp(&self, header: &mut Header, message: &Message) {
+        if header.stamp_ns == 0 {
+            header.stamp_ns = i64::try_from(message.recorded_ns).unwrap_or(i64::MAX);
+        } else if let Some(of_board_ns) =
+            self.of_board_ns.filter(|_| header.stamp_ns < MIN_CLOCK_NS)
+        {
+            header.stamp_ns = header.stamp_ns.saturating_add(of_board_ns);
+        }
+    }
+}
+
+/// Stamps before 2000-01-01 are of no clock, nanoseconds since 1970.
+const MIN_CLOCK_NS: i64 = 946_684_800_000_000_000;
+
 /// Decodes a message of one of the types that are read; how many numbers and frames it has.
 ///
 /// # Errors
@@ -305,37 +385,6 @@ pub fn read_message(type_name: &str, bytes: &[u8]) -> Result<usize, ImportError>
         LASER_SCAN => decode(&message, LaserScan::decode).map(|scan| scan.ranges_m.len()),
         _ => decode(&message, Range::decode).map(|_| 1),
     }
-}
-
-/// Which topics are read: those that are named, else all ranges but predictions, else the scans.
-fn choose(
-    kinds: BTreeMap<String, bool>,
-    mapping: &Mapping,
-) -> Result<BTreeMap<String, bool>, ImportError> {
-    let names: Vec<String> = kinds.keys().cloned().collect();
-    let all = || if names.is_empty() { "none".to_owned() } else { names.join(", ") };
-    if let Some(lacks) = mapping.topics.iter().find(|topic| !kinds.contains_key(*topic)) {
-        return Err(ImportError::mapping(
-            format!("there is no topic {lacks} of ranges or scans"),
-            format!("those in it are: {}", all()),
-        ));
-    }
-    let is_meant = |topic: &str| match mapping.topics.is_empty() {
-        true => !topic.contains("/predicted/"),
-        false => mapping.topics.iter().any(|named| named == topic),
-    };
-    let mut meant: BTreeMap<_, _> =
-        kinds.into_iter().filter(|(topic, _)| is_meant(topic)).collect();
-    if mapping.topics.is_empty() && meant.values().any(|is_scan| !is_scan) {
-        meant.retain(|_, is_scan| !*is_scan);
-    }
-    if meant.is_empty() {
-        return Err(ImportError::mapping(
-            "there is no message of sensor_msgs/Range or sensor_msgs/LaserScan in it",
-            "give a recording of a sonar",
-        ));
-    }
-    Ok(meant)
 }
 
 fn decode<T>(
@@ -362,27 +411,6 @@ fn misplaced(topic: &str, error: &TransformError) -> ImportError {
         format!("{topic}: {error}"),
         "record /tf and /tf_static beside it, or cut the recording to where they are",
     )
-}
-
-/// A driver without a clock leaves the stamp out: then it was when it was recorded.
-fn stamp(header: &mut Header, message: &Message) {
-    if header.stamp_ns == 0 {
-        header.stamp_ns = i64::try_from(message.recorded_ns).unwrap_or(i64::MAX);
-    }
-}
-
-/// What a range says, by REP 117 and by the limits beside it; `None` of one that is none.
-fn told(range_m: f32, [least_m, most_m]: [f32; 2]) -> Option<(PingStatus, Option<f64>)> {
-    if range_m.is_nan() {
-        return None;
-    }
-    let near = range_m == f32::NEG_INFINITY || range_m <= least_m.max(0.0);
-    let far = range_m == f32::INFINITY || range_m >= most_m;
-    Some(match (near, far) {
-        (true, _) => (PingStatus::MinRange, None),
-        (_, true) => (PingStatus::NoEcho, None),
-        _ => (PingStatus::Echo, Some(as_written(range_m))),
-    })
 }
 
 #[cfg(test)]

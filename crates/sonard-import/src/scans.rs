@@ -10,7 +10,7 @@ use sonard_model::{
 use sonard_records::{AirSource, Ping, Record, ScanAir, ScanEnd, ScanStart};
 use uuid::Uuid;
 
-use crate::{Reading, Taken, rounds::Round};
+use crate::{Reading, Taken, rounds::Round, turning::Turning};
 
 /// Motor steps a revolution that `step` counts in.
 const STEPS_PER_REVOLUTION: f64 = 400.0;
@@ -24,34 +24,30 @@ fn turn_deg(from_deg: f64, to_deg: f64) -> f64 {
     wrap_pi((to_deg - from_deg).to_radians()).to_degrees()
 }
 
-/// Cuts a stream of readings into scans: where the file names another scan, else where the robot stands
-/// elsewhere, else after a full turn.
+/// Cuts a stream of readings into scans: where the file names another scan, else where the robot stands elsewhere, else
+/// where a sweep ends.
 #[derive(Debug, Default)]
 pub(crate) struct Cutter {
     readings: Vec<Reading>,
-    turned_deg: f64,
+    turning: Turning,
 }
 
 impl Cutter {
     /// Takes the next reading; the scan before it, if that ended.
     pub(crate) fn push(&mut self, reading: Reading) -> Option<Vec<Reading>> {
-        let Some(last) = self.readings.last() else {
-            self.readings.push(reading);
-            return None;
-        };
-        let turned_deg =
-            self.turned_deg + turn_deg(last.direction_deg, reading.direction_deg).abs();
-        let moved = (&reading.place_m, &reading.heading_deg) != (&last.place_m, &last.heading_deg);
-        // A little less than a turn, for the rounding of the angles.
-        let is_next = match (&reading.scan, &last.scan) {
-            (Some(this), Some(before)) => this != before,
-            _ => moved || turned_deg > 360.0 - 1e-6,
-        };
+        let is_swept = self.turning.is_next(reading.direction_deg);
+        let is_next = self.readings.last().is_some_and(|last| {
+            let moved =
+                (&reading.place_m, &reading.heading_deg) != (&last.place_m, &last.heading_deg);
+            match (&reading.scan, &last.scan) {
+                (Some(this), Some(before)) => this != before,
+                _ => moved || is_swept,
+            }
+        });
         if is_next || self.readings.len() == MOST_FIRINGS {
-            self.turned_deg = 0.0;
+            self.turning.restart(reading.direction_deg);
             return Some(std::mem::replace(&mut self.readings, vec![reading]));
         }
-        self.turned_deg = turned_deg;
         self.readings.push(reading);
         None
     }

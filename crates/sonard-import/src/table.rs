@@ -1,180 +1,165 @@
-//! Tables of text: comma separated values and their kin.
+//! Tables of text: comma separated values and their kin (RFC 4180 and what programs make of it).
 
-use std::io::{BufRead, BufReader, Read};
+use std::io::Read;
 
 use csv::{ReaderBuilder, StringRecord, Trim};
 
-use crate::{Column, ImportError, Location, Mapping, Row};
+use crate::{
+    Column, ImportError, Location, Mapping, Row,
+    layout::{Between, Header},
+    lines::{Ends, Line, Lines},
+};
 
-/// A line longer than this is no row of readings, bytes.
-const LONGEST_LINE: u64 = 1 << 20;
-
-/// What stands between the values of a line.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Between {
-    Byte(u8),
-    Blanks,
-}
-
-/// The first line of a table that is not a comment: column names, if it has any, and what is between them.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct Header {
-    between: Between,
-    /// Its values.
-    pub(crate) cells: Vec<String>,
-    /// Whether these are names and not numbers.
-    pub(crate) has_names: bool,
-}
-
-impl Header {
-    /// Reads it from the beginning of a file.
-    ///
-    /// # Errors
-    /// There is no line but comments.
-    pub(crate) fn of(head: &str) -> Result<Self, ImportError> {
-        let mut lines = head.lines().filter(|line| !is_comment(line));
-        let first = lines.next().ok_or_else(|| {
-            ImportError::mapping("the file holds no line of values", "give a table of readings")
-        })?;
-        let between = [b',', b';', b'\t']
-            .into_iter()
-            .find(|byte| first.as_bytes().contains(byte))
-            .map_or(Between::Blanks, Between::Byte);
-        let cells: Vec<String> = match between {
-            Between::Blanks => first.split_whitespace().map(str::to_owned).collect(),
-            Between::Byte(byte) => {
-                let mut record = StringRecord::new();
-                reader(byte, first.as_bytes()).read_record(&mut record).map_err(|error| {
-                    ImportError::at(Location::Line(1), error.to_string(), "correct the first line")
-                })?;
-                record.iter().map(str::to_owned).collect()
-            }
-        };
-        // A line with a number in it is a reading, which must not be lost.
-        let is_number = |cell: &String| cell.parse::<f64>().is_ok();
-        let has_names = !cells.iter().any(is_number) && cells.iter().any(|cell| !cell.is_empty());
-        Ok(Self { between, cells, has_names })
-    }
-
-    /// The place of a column, from 0.
-    fn find(&self, column: &Column) -> Result<usize, ImportError> {
-        let count = self.cells.len();
-        match column {
-            Column::Number(number) if *number <= count => Ok(number - 1),
-            Column::Number(number) => Err(ImportError::mapping(
-                format!("there is no column {number}: the first line has {count}"),
-                "columns count from 1",
-            )),
-            Column::Name(name) if !self.has_names => Err(ImportError::mapping(
-                format!("there is no column `{name}`: the first line has no names"),
-                "give the number of the column, from 1",
-            )),
-            Column::Name(name) => {
-                self.cells.iter().position(|cell| cell == name).ok_or_else(|| {
-                    ImportError::mapping(
-                        format!("there is no column `{name}`"),
-                        format!("the columns are {}", self.cells.join(", ")),
-                    )
-                })
-            }
-        }
-    }
-}
-
-fn is_comment(line: &str) -> bool {
-    let line = line.trim();
-    line.is_empty() || line.starts_with('#') || line.starts_with("//")
-}
-
-fn reader<R: Read>(delimiter: u8, source: R) -> csv::Reader<R> {
-    ReaderBuilder::new()
-        .delimiter(delimiter)
-        .has_headers(false)
-        .flexible(true)
-        .trim(Trim::All)
-        .from_reader(source)
+/// Rows of a table, and what was found wrong with it on the way.
+#[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Raggedness {
+    /// Rows that lack columns which the mapping does not use.
+    pub(crate) short: u64,
+    /// The last row, which has no end and lacks a column.
+    pub(crate) cut: Option<Location>,
 }
 
 /// The rows of a table, with the values of the mapping's columns in its order.
-///
-/// # Errors
-/// The header has not the mapping's columns; later, a line that can't be read.
-pub(crate) fn rows<'a>(
-    source: impl Read + 'a,
-    header: &Header,
-    mapping: &Mapping,
-) -> Result<impl Iterator<Item = Result<Row, ImportError>> + 'a, ImportError> {
-    let places: Vec<_> =
-        mapping.columns.values().map(|column| header.find(column)).collect::<Result<_, _>>()?;
-    let (between, mut names) = (header.between, header.has_names);
-    let lines = Lines::of(source);
-    Ok(lines.filter_map(move |line| {
-        let (number, line) = match line {
-            Ok(line) => line,
-            Err(error) => return Some(Err(error)),
-        };
-        if is_comment(&line) {
-            return None;
-        }
-        if std::mem::take(&mut names) {
-            return None;
-        }
-        let place = Location::Line(number);
-        Some(cells(between, &line, place).map(|cells| {
-            let cell = |&at: &usize| cells.get(at).filter(|cell| !cell.is_empty()).cloned();
-            Row { place, cells: places.iter().map(cell).collect() }
-        }))
-    }))
+pub(crate) struct Rows<R> {
+    lines: Lines<R>,
+    header: Header,
+    /// Places of the mapping's columns, from 0, in its order.
+    places: Vec<Vec<usize>>,
+    is_behind_names: bool,
+    to_skip: u64,
+    pub(crate) raggedness: Raggedness,
 }
 
-fn cells(between: Between, line: &str, place: Location) -> Result<Vec<String>, ImportError> {
-    match between {
-        Between::Blanks => Ok(line.split_whitespace().map(str::to_owned).collect()),
-        Between::Byte(byte) => {
-            let mut record = StringRecord::new();
-            reader(byte, line.as_bytes())
-                .read_record(&mut record)
-                .map_err(|error| ImportError::at(place, error.to_string(), "correct that line"))?;
-            Ok(record.iter().map(str::to_owned).collect())
-        }
-    }
-}
-
-/// Lines with their numbers, none of them longer than [`LONGEST_LINE`].
-pub(crate) struct Lines<R> {
-    source: BufReader<R>,
-    count: u64,
-}
-
-impl<R: Read> Lines<R> {
-    pub(crate) fn of(source: R) -> Self {
-        Self { source: BufReader::new(source), count: 0 }
+impl<R: Read> Rows<R> {
+    /// # Errors
+    /// The header has not the mapping's columns.
+    pub(crate) fn of(source: R, header: &Header, mapping: &Mapping) -> Result<Self, ImportError> {
+        let places = mapping.columns.values().map(|column| match column {
+            Column::Several(numbers) => {
+                numbers.iter().map(|number| header.find(&Column::Number(*number))).collect()
+            }
+            one => header.find(one).map(|place| vec![place]),
+        });
+        Ok(Self {
+            lines: Lines::of(source, header.ends),
+            places: places.collect::<Result<_, _>>()?,
+            header: header.clone(),
+            is_behind_names: !header.has_names || header.is_comment,
+            to_skip: u64::from(header.has_separator_line),
+            raggedness: Raggedness::default(),
+        })
     }
 
-    fn read(&mut self) -> Result<Option<(u64, String)>, ImportError> {
-        let mut line = Vec::new();
-        let length = (&mut self.source).take(LONGEST_LINE).read_until(b'\n', &mut line)? as u64;
-        if length == 0 {
+    fn row(&mut self, line: &Line) -> Result<Option<Row>, ImportError> {
+        let place = line.place();
+        let text = without_comment(&line.text);
+        let cells = split(self.header.between, text)
+            .map_err(|what| ImportError::at(place, what, "correct that line"))?;
+        let columns = self.header.cells.len();
+        let used = cells.iter().rposition(|cell| !cell.is_empty()).map_or(0, |last| last + 1);
+        if used > columns {
+            let what = format!("{used} values, and the table has {columns} columns");
+            let comma = match self.header.between {
+                Between::Byte(b',') => {
+                    "; decimal commas need another separator, such as semicolons"
+                }
+                _ => "",
+            };
+            let help = format!("are line ends missing? Give a file with a reading a line{comma}");
+            return Err(ImportError::at(place, what, help));
+        }
+        let lacks = self.places.iter().flatten().any(|place| *place >= cells.len());
+        // A capture of a stream may begin within a record, too.
+        let is_first = self.header.ends == Ends::Stops && line.number == 1;
+        let is_without = cells.first().is_some_and(String::is_empty);
+        if (lacks && (!line.is_ended || is_first)) || (is_without && is_first) {
+            self.raggedness.cut = Some(place);
             return Ok(None);
         }
-        self.count += 1;
-        let place = Location::Line(self.count);
-        if length == LONGEST_LINE {
-            let what = format!("longer than {LONGEST_LINE} bytes");
-            return Err(ImportError::at(place, what, "give a file with a reading a line"));
+        if lacks {
+            let what = format!("{} values, and the table has {columns} columns", cells.len());
+            return Err(ImportError::at(
+                place,
+                what,
+                "complete that line, or remove it; an empty value is written as two separators",
+            ));
         }
-        let line = String::from_utf8(line).map_err(|_| {
-            ImportError::at(place, "no UTF-8 text", "give a text file: is it compressed?")
-        })?;
-        let line = line.trim_start_matches('\u{feff}').trim_end_matches(['\n', '\r']).to_owned();
-        Ok(Some((self.count, line)))
+        self.raggedness.short += u64::from(cells.len() < columns);
+        let cell = |at: &usize| cells.get(*at).filter(|cell| !cell.is_empty()).cloned();
+        let cells = self.places.iter().map(|places| places.iter().map(cell).collect());
+        Ok(Some(Row { place, cells: cells.collect() }))
     }
 }
 
-impl<R: Read> Iterator for Lines<R> {
-    type Item = Result<(u64, String), ImportError>;
+impl<R: Read> Iterator for Rows<R> {
+    type Item = Result<Row, ImportError>;
 
     fn next(&mut self) -> Option<Self::Item> {
-        self.read().transpose()
+        loop {
+            let line = match self.lines.next()? {
+                Ok(line) => line,
+                Err(error) => return Some(Err(error)),
+            };
+            if is_comment(&line.text) {
+                continue;
+            }
+            if self.to_skip > 0 {
+                self.to_skip -= 1;
+                continue;
+            }
+            if !std::mem::replace(&mut self.is_behind_names, true) {
+                continue;
+            }
+            if let Some(row) = self.row(&line).transpose() {
+                return Some(row);
+            }
+        }
+    }
+}
+
+/// Signs that begin a comment: of shells and Octave, of MATLAB, of C.
+const COMMENTS: [&str; 3] = ["#", "%", "//"];
+
+pub(crate) fn is_comment(line: &str) -> bool {
+    let line = line.trim();
+    line.is_empty() || COMMENTS.iter().any(|sign| line.starts_with(sign))
+}
+
+/// The text of a comment line, without its sign.
+pub(crate) fn comment(line: &str) -> Option<&str> {
+    let line = line.trim();
+    let sign = COMMENTS.iter().find(|sign| line.starts_with(**sign))?;
+    Some(line.trim_start_matches(*sign).trim())
+}
+
+/// A row without the comment behind it.
+fn without_comment(line: &str) -> &str {
+    let is_start = |at: &usize| {
+        let before = line[..*at].chars().next_back();
+        before.is_some_and(char::is_whitespace) && !line[..*at].contains('"')
+    };
+    let begins = line.match_indices(['#', '%']).map(|(at, _)| at);
+    line.get(..begins.into_iter().find(is_start).unwrap_or(line.len())).unwrap_or(line)
+}
+
+/// The values of a line.
+pub(crate) fn split(between: Between, line: &str) -> Result<Vec<String>, String> {
+    match between {
+        Between::Blanks => Ok(line.split_whitespace().map(str::to_owned).collect()),
+        // Most lines have no quotes, and need no parser of them.
+        Between::Byte(byte) if !line.contains('"') => {
+            Ok(line.split(char::from(byte)).map(|cell| cell.trim().to_owned()).collect())
+        }
+        Between::Byte(byte) => {
+            let mut record = StringRecord::new();
+            let mut reader = ReaderBuilder::new()
+                .delimiter(byte)
+                .has_headers(false)
+                .flexible(true)
+                .trim(Trim::All)
+                .from_reader(line.as_bytes());
+            reader.read_record(&mut record).map_err(|error| error.to_string())?;
+            Ok(record.iter().map(str::to_owned).collect())
+        }
     }
 }

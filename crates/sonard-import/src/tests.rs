@@ -1,7 +1,12 @@
 //! Files as people have them.
 
+mod headers;
 mod messages;
+mod no_echo;
+mod ros_text;
 mod tables;
+mod texts;
+mod units;
 
 use std::io::{self, Cursor, Read};
 
@@ -19,6 +24,7 @@ fn taken() -> Taken {
         array: None,
         sensor: "hc-sr04".to_owned(),
         longest_m: 4.0,
+        least_m: 0.02,
         air: Air::default(),
         started: Timestamp::UNIX_EPOCH,
         as_said: false,

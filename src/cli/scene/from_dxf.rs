@@ -1,18 +1,18 @@
 //! `sonard scene from-dxf`.
 
-use std::{collections::BTreeSet, panic, path::PathBuf};
+mod layers;
+mod plan;
 
-use dxf::{
-    Drawing, Point, Vector,
-    entities::{Arc, Circle, Entity, EntityType, LwPolyline, Polyline},
-    enums::Units,
-};
+use std::{panic, path::PathBuf};
+
+use dxf::{Drawing, enums::Units};
 
 use super::{
     super::{Failure, Outcome, numbers::positive},
-    made::{MadeArgs, arc, read, refuse},
+    made::{MadeArgs, read, refuse},
 };
-use crate::{geometry::DVec2, scene::Surfaces};
+use layers::Layers;
+use plan::Plan;
 
 /// Options of `sonard scene from-dxf`.
 #[derive(Debug, clap::Args)]
@@ -23,7 +23,7 @@ pub(in crate::cli) struct FromDxfArgs {
     /// Length of a unit of the drawing, metres [default: as its $INSUNITS says]
     #[arg(long, value_name = "M", value_parser = positive)]
     unit_m: Option<f64>,
-    /// Layers with walls, separated by commas [default: all that are not switched off]
+    /// Layers with walls, separated by commas [default: all that are neither switched off nor frozen]
     #[arg(long, value_name = "NAME", value_delimiter = ',')]
     layer: Vec<String>,
     #[command(flatten)]
@@ -33,10 +33,13 @@ pub(in crate::cli) struct FromDxfArgs {
 pub(super) const ABOUT: &str = "\
 Make a scene of a drawing of a CAD program: lines are walls, circles are columns.
 
-LINE, LWPOLYLINE, POLYLINE and ARC become walls (curves short ones, off the curve by a millimetre at most), CIRCLE \
-becomes a cylinder, each named by its layer. Texts, dimensions and hatches are none; blocks, splines and \
-ellipses are left out with a warning: explode them in the CAD program, or turn them into polylines. The drawing is \
-seen from above, x and y are the world's. All is of one material: give walls their own in the file that comes out.";
+LINE, LWPOLYLINE, POLYLINE and ARC become walls (curves short ones, off the curve by a millimetre at most), SOLID and TRACE \
+their outlines, CIRCLE becomes a cylinder, each named by its layer; blocks (INSERT) are drawn where they stand. Layers that are \
+switched off or frozen count only where --layer names them. Everything else that is drawn is left out with a warning: \
+explode splines and ellipses in the CAD program, or turn them into polylines. The drawing is seen from above, x and y are the \
+world's; one far from its origin, as surveyors draw, is moved to it. A plan smaller or larger than buildings are is refused: \
+$INSUNITS is often wrong, and --unit-m says what it should be. All is of one material: give walls their own in the file that \
+comes out.";
 
 pub(super) const EXAMPLES: &str = "\
 Examples:
@@ -44,30 +47,52 @@ Examples:
   sonard scene from-dxf plan.dxf --layer A-WALL,A-COLS --unit-m 0.001 -o plan.json
   sonard scene draw plan.json -o check.svg";
 
+/// Rooms and buildings are at least and at most so large, metres.
+const SIZES_M: std::ops::RangeInclusive<f64> = 0.5..=2000.0;
+
 pub(super) fn run(args: &FromDxfArgs) -> Outcome {
     let help = "give a DXF file, ASCII or binary, as a CAD program writes it";
     let bytes = read(&args.drawing, help)?;
     let drawing =
         load(&bytes).map_err(|error| refuse(&args.drawing, &format!("no DXF: {error}"), help))?;
-    let unit_m = match args.unit_m {
-        Some(unit_m) => unit_m,
-        None => metres(drawing.header.default_drawing_units).ok_or_else(|| {
-            let help = "say how long a unit of it is: --unit-m 0.001 for millimetres";
-            refuse(&args.drawing, &"the drawing has no units ($INSUNITS)", help)
-        })?,
-    };
-    let layers = layers(args, &drawing)?;
-    let shown = drawing.entities().filter(|entity| {
-        let common = &entity.common;
-        common.is_visible && !common.is_in_paper_space && layers.contains(&common.layer)
-    });
-    let mut found = Plan { unit_m, found: Surfaces::default() };
-    for entity in shown {
-        found.add(entity);
+    let stated_m = metres(drawing.header.default_drawing_units);
+    let unit_m = args.unit_m.or(stated_m).ok_or_else(|| {
+        let help = "say how long a unit of it is: --unit-m 0.001 for millimetres";
+        refuse(&args.drawing, &"the drawing has no units ($INSUNITS)", help)
+    })?;
+    let layers = Layers::of(&drawing, &bytes, &args.layer)
+        .map_err(|(what, help)| refuse(&args.drawing, &what, &help))?;
+    let mut plan = Plan::new(&drawing, &layers, unit_m);
+    plan.add_all();
+    let size_m = plan.size_m();
+    if args.unit_m.is_none() && size_m.is_some_and(|size_m| !SIZES_M.contains(&size_m)) {
+        return Err(implausible(args, &drawing, unit_m, size_m.unwrap_or_default()));
     }
     let help =
         "draw walls as lines or polylines, on layers that are switched on or named with --layer";
-    args.made.write(&args.drawing, &found.found, help)
+    let (found, mut notes) = plan.finish();
+    notes.extend(layers.notes(&args.layer));
+    args.made.write(&args.drawing, &found, &notes, help)
+}
+
+/// A plan whose size no building has.
+fn implausible(args: &FromDxfArgs, drawing: &Drawing, unit_m: f64, size_m: f64) -> Failure {
+    let units = drawing.header.default_drawing_units;
+    let what = format!(
+        "by its units ($INSUNITS: {units:?}) the plan is {size_m:.3} m across, which no room is: is the unit right?"
+    );
+    let fits = |unit: &&f64| (2.0..=200.0).contains(&(size_m / unit_m * **unit));
+    let options = [1.0, 0.01, 0.001, 0.0254, 0.3048];
+    let options: Vec<String> =
+        options.iter().filter(fits).map(|unit| format!("--unit-m {unit}")).collect();
+    let help = match options.is_empty() {
+        true => format!("say how long a unit is: --unit-m {unit_m} takes it as it is"),
+        false => format!(
+            "say how long a unit is: {}; --unit-m {unit_m} takes it as it is",
+            options.join(" or ")
+        ),
+    };
+    refuse(&args.drawing, &what, &help)
 }
 
 /// What a file holds. The crate that reads it panics at dates out of range.
@@ -81,133 +106,6 @@ fn load(bytes: &[u8]) -> Result<Drawing, String> {
         Err(_) => Err("a figure in it is out of range".to_owned()),
     }
 }
-
-/// The layers that count.
-fn layers(args: &FromDxfArgs, drawing: &Drawing) -> Result<BTreeSet<String>, Failure> {
-    let off = drawing.layers().filter(|layer| !layer.is_layer_on).map(|layer| &layer.name);
-    let off: BTreeSet<&String> = off.collect();
-    let used: BTreeSet<&String> = drawing.entities().map(|entity| &entity.common.layer).collect();
-    if let Some(wanted) = args.layer.iter().find(|wanted| !used.contains(wanted)) {
-        let names: Vec<&str> = used.iter().map(|name| name.as_str()).collect();
-        let help = format!("these have something: {}", names.join(", "));
-        return Err(refuse(&args.drawing, &format!("nothing is on layer `{wanted}`"), &help));
-    }
-    Ok(match args.layer.is_empty() {
-        true => used.difference(&off).map(|name| (*name).clone()).collect(),
-        false => args.layer.iter().cloned().collect(),
-    })
-}
-
-/// What was found so far.
-struct Plan {
-    /// Metres a unit.
-    unit_m: f64,
-    found: Surfaces,
-}
-
-impl Plan {
-    fn add(&mut self, entity: &Entity) {
-        let layer = entity.common.layer.as_str();
-        match &entity.specific {
-            EntityType::Line(line) => {
-                let ends = [&line.p1, &line.p2].map(|end| self.place(end.x, end.y));
-                self.found.walls(layer, ends.to_vec(), false);
-            }
-            EntityType::LwPolyline(line) => self.light_polyline(layer, line),
-            EntityType::Polyline(line) => self.polyline(layer, line),
-            EntityType::Circle(circle) => self.circle(layer, circle),
-            EntityType::Arc(arc) => self.arc(layer, arc),
-            EntityType::Insert(_) => self.found.leave_out("blocks (INSERT)"),
-            EntityType::Spline(_) | EntityType::Ellipse(_) => {
-                self.found.leave_out("splines and ellipses");
-            }
-            EntityType::MLine(_) | EntityType::Face3D(_) | EntityType::Solid3D(_) => {
-                self.found.leave_out("multiple lines, faces and solids");
-            }
-            _ => {}
-        }
-    }
-
-    fn light_polyline(&mut self, layer: &str, line: &LwPolyline) {
-        let vertices = line.vertices.iter().map(|vertex| (vertex.x, vertex.y, vertex.bulge));
-        let vertices: Vec<_> = vertices.collect();
-        self.bulged(layer, &vertices, line.is_closed(), &line.extrusion_direction);
-    }
-
-    fn polyline(&mut self, layer: &str, line: &Polyline) {
-        if line.is_3d_polygon_mesh() || line.is_polyface_mesh() {
-            return self.found.leave_out("multiple lines, faces and solids");
-        }
-        let vertices = line.vertices().filter(|vertex| !vertex.is_spline_frame_control_point());
-        let vertices = vertices.map(|vertex| (vertex.location.x, vertex.location.y, vertex.bulge));
-        let vertices: Vec<_> = vertices.collect();
-        self.bulged(layer, &vertices, line.is_closed(), &line.normal);
-    }
-
-    /// A row of lines and arcs: x, y, and the bulge of what leads to the next corner, the tangent of a quarter of its
-    /// turn.
-    fn bulged(
-        &mut self,
-        layer: &str,
-        vertices: &[(f64, f64, f64)],
-        is_closed: bool,
-        normal: &Vector,
-    ) {
-        let Some(side) = self.side(normal) else { return };
-        let Some(&first) = vertices.first() else { return };
-        let place = |vertex: (f64, f64, f64)| self.place(side * vertex.0, vertex.1);
-        let mut corners = vec![place(first)];
-        let next = vertices.iter().skip(1).copied().chain(is_closed.then_some(first));
-        for (&from, to) in vertices.iter().zip(next) {
-            let (a, b, bulge) = (place(from), place(to), side * from.2);
-            if bulge.abs() < LEAST_BULGE {
-                corners.push(b);
-                continue;
-            }
-            let center = a.midpoint(b) + (b - a).perp() * ((1.0 - bulge * bulge) / (4.0 * bulge));
-            corners.extend(arc(center, a, 4.0 * bulge.atan()));
-        }
-        self.found.walls(layer, corners, is_closed);
-    }
-
-    fn circle(&mut self, layer: &str, circle: &Circle) {
-        if let Some(side) = self.side(&circle.normal) {
-            let center = self.place(side * circle.center.x, circle.center.y);
-            self.found.round(layer, center, self.unit_m * circle.radius);
-        }
-    }
-
-    fn arc(&mut self, layer: &str, drawn: &Arc) {
-        let Some(side) = self.side(&drawn.normal) else { return };
-        let Arc { center: Point { x, y, .. }, radius, start_angle, end_angle, .. } = *drawn;
-        let center = self.place(side * x, y);
-        let from = DVec2::from_angle(start_angle.to_radians()) * (self.unit_m * radius);
-        let from = center + DVec2::new(side * from.x, from.y);
-        let turn_deg = (end_angle - start_angle).rem_euclid(360.0);
-        let corners = arc(center, from, side * turn_deg.to_radians());
-        let corners = std::iter::once(from).chain(corners).collect();
-        self.found.walls(layer, corners, false);
-    }
-
-    /// 1 for what is drawn as it is seen from above, -1 for what is mirrored, because it is seen from below; the rest
-    /// does not stand upright.
-    fn side(&mut self, normal: &Vector) -> Option<f64> {
-        let along_z =
-            normal.z / (normal.x * normal.x + normal.y * normal.y + normal.z * normal.z).sqrt();
-        if along_z.abs() > 1.0 - 1e-6 {
-            return Some(along_z.signum());
-        }
-        self.found.leave_out("outlines that are not level");
-        None
-    }
-
-    fn place(&self, x: f64, y: f64) -> DVec2 {
-        self.unit_m * DVec2::new(x, y)
-    }
-}
-
-/// Less than this is straight: a turn of a thousandth of a degree.
-const LEAST_BULGE: f64 = 4e-6;
 
 /// Length of a unit, metres.
 const fn metres(units: Units) -> Option<f64> {

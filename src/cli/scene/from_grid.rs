@@ -6,7 +6,11 @@ use super::{
     super::{Outcome, map_file, numbers::not_negative},
     made::MadeArgs,
 };
-use crate::interpret::grid::{TraceSettings, surfaces};
+use crate::{
+    geometry::DVec2,
+    interpret::grid::{TraceSettings, WallLine, trace},
+    scene::Surfaces,
+};
 
 /// Options of `sonard scene from-grid`.
 #[derive(Debug, clap::Args)]
@@ -14,7 +18,8 @@ pub(in crate::cli) struct FromGridArgs {
     /// Map as map_server has it: its description (YAML), or the folder of map.yaml; beside it the image, PGM or PNG
     #[arg(value_name = "MAP")]
     map: PathBuf,
-    /// How far a wall may be off the sides of the cells that it stands for, metres [default: one and a half cells]
+    /// How far a wall may be off the sides of the cells that it stands for, metres [default: 0 along rows and columns of
+    /// cells, one and a half cells for slanting walls]
     #[arg(long, value_name = "M", value_parser = not_negative)]
     tolerance_m: Option<f64>,
     /// Leave out what is less around, metres [default: four cells]
@@ -27,9 +32,11 @@ pub(in crate::cli) struct FromGridArgs {
 pub(super) const ABOUT: &str = "\
 Make a scene of a map: the walls that cells show, traced as lines.
 
-Walls are where occupied cells (above 0.65) meet free ones (below 0.49, or two cells behind such); where nothing is \
-occupied there is no wall, so what a robot did not see is open. The steps of cells are straightened. A wall that both \
-sides were seen of has two faces. All is of one material: give walls their own in the file that comes out.";
+Walls are where occupied cells meet free ones (or two cells behind such); where nothing is occupied there is no wall, so \
+what a robot did not see is open. Which cells these are is said by the file's thresholds, negate and mode (trinary, scale, raw), \
+as map_server has them; origin places and turns the map. In a map that `sonard map` wrote, cells above 0.65 are occupied \
+and those below 0.49 free. Walls along rows and columns stay where the cells are; stairs are straightened to slanting walls. A \
+wall that both sides were seen of has two faces. All is of one material: give walls their own in the file that comes out.";
 
 pub(super) const EXAMPLES: &str = "\
 Examples:
@@ -37,14 +44,26 @@ Examples:
   sonard scene from-grid ~/maps/office.yaml --least-m 0.5 | sonard scene check /dev/stdin";
 
 pub(super) fn run(args: &FromGridArgs) -> Outcome {
-    let grid = map_file::read(&args.map)?;
+    let (grid, yaml) = map_file::read_by_rules(&args.map)?;
     let by_default = TraceSettings::of_cells(grid.shape().resolution_m);
     let settings = TraceSettings {
         tolerance_m: args.tolerance_m.unwrap_or(by_default.tolerance_m),
         least_m: args.least_m.unwrap_or(by_default.least_m),
+        // What a sonar mapped has ragged walls; others draw them as they are.
+        keeps_rows: !yaml.is_graded && args.tolerance_m.is_none(),
         ..by_default
     };
-    let help =
-        "give a map with occupied cells (above 0.65) beside free ones, or a smaller --least-m";
-    args.made.write(&args.map, &surfaces(&grid, &settings), help)
+    let [x_m, y_m, yaw_rad] = yaml.origin;
+    let (origin, turn) = (DVec2::new(x_m, y_m), DVec2::from_angle(yaw_rad));
+    let turned =
+        |corner: DVec2| if yaw_rad == 0.0 { corner } else { origin + turn.rotate(corner - origin) };
+    let mut found = Surfaces::default();
+    for WallLine { corners, is_closed } in trace(&grid, &settings) {
+        found.walls("wall", corners.into_iter().map(turned).collect(), is_closed);
+    }
+    let help = format!(
+        "give a map with occupied cells beside free ones (by this file above {} and below {}), or a smaller --least-m",
+        yaml.occupied_thresh, yaml.free_thresh
+    );
+    args.made.write(&args.map, &found, &[], &help)
 }

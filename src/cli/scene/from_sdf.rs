@@ -1,8 +1,13 @@
 //! `sonard scene from-sdf`.
 
+mod frames;
+mod include;
+mod shapes;
+mod state;
+
 use std::path::PathBuf;
 
-use glam::{DAffine3, DMat3, DVec3};
+use glam::{DAffine3, DVec3};
 use roxmltree::{Document, Node};
 
 use super::{
@@ -10,6 +15,8 @@ use super::{
     made::{MadeArgs, read, refuse},
 };
 use crate::scene::Surfaces;
+use frames::Scope;
+use state::State;
 
 /// Options of `sonard scene from-sdf`.
 #[derive(Debug, clap::Args)]
@@ -29,8 +36,10 @@ Make a scene of a world of Gazebo: boxes and outlines of an SDF file are walls, 
 
 What has to do with collisions is cut at the height of the ranger (--cut-z-m), so the ground is none, and a table's top is \
 only for a ranger at its height; boxes, cylinders and outlines (polyline) that stand upright count, \
-each named by its model. Meshes, spheres, models from elsewhere (include), poses that are told relative to something \
-else, and what leans are left out with a warning. All is of one material: give walls their own in the file that comes out.";
+each named by its model. Poses and scales of a saved <state> override those of the models; poses relative to other frames, \
+nested models, and models from files beside the world (include) are followed. Meshes, spheres, other shapes, upright planes, populations, \
+models from elsewhere and what leans are left out with a warning that names them. All is of one material: give walls their own in \
+the file that comes out.";
 
 pub(super) const EXAMPLES: &str = "\
 Examples:
@@ -48,165 +57,158 @@ pub(super) fn run(args: &FromSdfArgs) -> Outcome {
         let what = format!("the outermost element is {}, not sdf", root.tag_name().name());
         return Err(refuse(&args.world, &what, help));
     }
-    let mut world = World { args, found: Surfaces::default() };
-    world.add(root, "body", &DAffine3::IDENTITY)?;
+    let mut world = World {
+        args,
+        found: Surfaces::default(),
+        notes: Vec::new(),
+        file: args.world.clone(),
+        depth: 0,
+    };
+    world.add_worlds(root)?;
     let help = "give a world with boxes, cylinders or outlines that the height of --cut-z-m meets";
-    args.made.write(&args.world, &world.found, help)
+    args.made.write(&args.world, &world.found, &world.notes, help)
 }
 
 /// What was found so far.
 struct World<'a> {
     args: &'a FromSdfArgs,
     found: Surfaces,
+    /// What was left out, by its name.
+    notes: Vec<String>,
+    /// The file that is read: the world, or one that it includes.
+    file: PathBuf,
+    /// Files included within each other.
+    depth: usize,
+}
+
+/// A body that shapes belong to: its name and the scale of its model.
+#[derive(Clone, Copy)]
+struct Body<'n> {
+    name: &'n str,
+    scale: DVec3,
 }
 
 impl World<'_> {
-    /// All that is in an element, whose frame is known in the world.
-    fn add(&mut self, element: Node, name: &str, frame: &DAffine3) -> Outcome {
-        for child in element.children().filter(Node::is_element) {
-            match child.tag_name().name() {
-                "world" => self.add(child, name, frame)?,
-                kind @ ("model" | "link" | "collision") => {
-                    if let Some(frame) = self.frame(child, frame)? {
-                        let of_model = (kind == "model").then(|| child.attribute("name")).flatten();
-                        self.add(child, of_model.unwrap_or(name), &frame)?;
-                    }
+    /// The worlds of a file, and the models beside them.
+    fn add_worlds(&mut self, root: Node) -> Outcome {
+        for child in root.children().filter(Node::is_element) {
+            if child.has_tag_name("world") {
+                let states = child.children().filter(|child| child.has_tag_name("state"));
+                let state = State::of(states.collect());
+                self.add_members(&Scope::world(child), &state)?;
+                for inserted in state.insertions() {
+                    self.add_model(inserted, &Scope::world(child), &state)?;
                 }
-                "geometry" => self.geometry(child, name, frame)?,
-                "include" => self.found.leave_out("models from elsewhere (include)"),
+            } else if child.has_tag_name("model") {
+                self.add_model(child, &Scope::world(root), &State::default())?;
+            }
+        }
+        Ok(())
+    }
+
+    /// The models and links in a world or a model.
+    fn add_members(&mut self, scope: &Scope, state: &State) -> Outcome {
+        for child in scope.element.children().filter(Node::is_element) {
+            match child.tag_name().name() {
+                "model" => self.add_model(child, scope, state)?,
+                "link" => self.add_link(child, scope, state)?,
+                "include" => self.include(child, scope, state)?,
+                "population" => {
+                    let name = child.attribute("name").unwrap_or("without a name");
+                    self.notes.push(format!("left out: population `{name}`"));
+                }
                 _ => {}
             }
         }
         Ok(())
     }
 
-    /// The frame of an element, in the world; none where it is told relative to another.
-    fn frame(&mut self, element: Node, parent: &DAffine3) -> Result<Option<DAffine3>, Failure> {
-        let Some(pose) = child(element, "pose") else { return Ok(Some(*parent)) };
-        let is_relative = |name: &str| pose.attribute(name).is_some_and(|frame| !frame.is_empty());
-        if is_relative("relative_to") || is_relative("frame") {
-            self.found.leave_out("poses relative to something else");
+    fn add_model<'n>(
+        &mut self,
+        model: Node<'n, 'n>,
+        scope: &Scope<'_, 'n>,
+        state: &State<'_, 'n>,
+    ) -> Outcome {
+        let name = model.attribute("name").unwrap_or("body");
+        if state.is_deleted(name) {
+            return Ok(());
+        }
+        let Some(frame) = self.frame_of_model(model, name, scope, state)? else { return Ok(()) };
+        let state = state.of_model(name);
+        let scale = scope.scale * state.scale(self)?;
+        let inner = Scope { element: model, frame, scale, name, outer: Some(scope) };
+        self.add_members(&inner, &state)
+    }
+
+    /// The frame of a model: that of the state, else its own pose.
+    fn frame_of_model<'n>(
+        &mut self,
+        model: Node<'n, 'n>,
+        name: &str,
+        scope: &Scope<'_, 'n>,
+        state: &State<'_, 'n>,
+    ) -> Result<Option<DAffine3>, Failure> {
+        if model.attribute("placement_frame").is_some_and(|frame| !frame.is_empty()) {
+            self.notes.push(format!(
+                "left out: model `{name}`, which is placed by one of its frames (placement_frame)"
+            ));
             return Ok(None);
         }
-        let text = pose.text().unwrap_or_default();
-        let [x, y, z, roll, pitch, yaw] = match text.trim().is_empty() {
-            true => [0.0; 6],
-            false => self.numbers(pose)?,
-        };
-        let unit = match pose.attribute("degrees") {
-            Some("true" | "1") => 1_f64.to_radians(),
-            _ => 1.0,
-        };
-        let [roll, pitch, yaw] = [roll, pitch, yaw].map(|angle| unit * angle);
-        let turn = DMat3::from_rotation_z(yaw)
-            * DMat3::from_rotation_y(pitch)
-            * DMat3::from_rotation_x(roll);
-        Ok(Some(*parent * DAffine3::from_mat3_translation(turn, DVec3::new(x, y, z))))
+        match state.of_model(name).pose(self)? {
+            Some(frame) => Ok(Some(frame)),
+            None => self.placed(model, scope, name),
+        }
     }
 
-    fn geometry(&mut self, geometry: Node, name: &str, frame: &DAffine3) -> Outcome {
-        for shape in geometry.children().filter(Node::is_element) {
-            match shape.tag_name().name() {
-                "box" => {
-                    let half = 0.5 * DVec3::from(self.numbers_of(shape, "size")?);
-                    self.upright_box(name, frame, half);
-                }
-                "cylinder" => {
-                    let [radius_m] = self.numbers_of(shape, "radius")?;
-                    let [length_m] = self.numbers_of(shape, "length")?;
-                    self.cylinder(name, frame, radius_m, length_m);
-                }
-                "polyline" => self.outline(shape, name, frame)?,
-                "plane" | "empty" => {}
-                _ => self.found.leave_out("meshes, spheres and other shapes"),
+    fn add_link<'n>(
+        &mut self,
+        link: Node<'n, 'n>,
+        scope: &Scope<'_, 'n>,
+        state: &State<'_, 'n>,
+    ) -> Outcome {
+        let own = link.attribute("name").unwrap_or_default();
+        let frame = match state.of_link(own, self)? {
+            Some(frame) => Some(frame),
+            None => self.placed(link, scope, scope.name)?,
+        };
+        let Some(frame) = frame else { return Ok(()) };
+        let of_link =
+            Scope { element: link, frame, scale: scope.scale, name: own, outer: Some(scope) };
+        for collision in link.children().filter(|child| child.has_tag_name("collision")) {
+            let Some(frame) = self.placed(collision, &of_link, scope.name)? else { continue };
+            let body = Body { name: scope.name, scale: scope.scale };
+            for geometry in collision.children().filter(|child| child.has_tag_name("geometry")) {
+                self.geometry(geometry, body, &frame)?;
             }
         }
         Ok(())
     }
 
-    /// A box that stands on one of its sides, half as long along its axes as `half` says, metres.
-    fn upright_box(&mut self, name: &str, frame: &DAffine3, half: DVec3) {
-        let Some(up) = axis_up(frame) else { return self.found.leave_out(LEANS) };
-        if !self.cuts(frame.translation.z, half[up]) {
-            return;
-        }
-        let along = |axis: usize| half[axis] * frame.matrix3.col(axis).truncate();
-        let (a, b) = (along((up + 1) % 3), along((up + 2) % 3));
-        let corners =
-            [-a - b, a - b, a + b, b - a].map(|corner| frame.translation.truncate() + corner);
-        self.found.walls(name, corners.to_vec(), true);
-    }
-
-    fn cylinder(&mut self, name: &str, frame: &DAffine3, radius_m: f64, length_m: f64) {
-        if axis_up(frame) != Some(AXIS_Z) {
-            self.found.leave_out(LEANS);
-        } else if self.cuts(frame.translation.z, 0.5 * length_m) {
-            self.found.round(name, frame.translation.truncate(), radius_m);
-        }
-    }
-
-    /// An outline that stands on its frame's ground.
-    fn outline(&mut self, shape: Node, name: &str, frame: &DAffine3) -> Outcome {
-        let [height_m] = self.numbers_of(shape, "height")?;
-        let points = shape.children().filter(|child| child.has_tag_name("point"));
-        let corners = points.map(|point| {
-            let [x, y] = self.numbers(point)?;
-            Ok(frame.transform_point3(DVec3::new(x, y, 0.0)).truncate())
-        });
-        let corners = corners.collect::<Result<Vec<_>, Failure>>()?;
-        if axis_up(frame) != Some(AXIS_Z) {
-            self.found.leave_out(LEANS);
-        } else {
-            let up_m = height_m * frame.matrix3.z_axis.z.signum();
-            if self.cuts(frame.translation.z + 0.5 * up_m, 0.5 * height_m) {
-                self.found.walls(name, corners, true);
+    /// The frame of an element by its pose; none, with a note, where that is relative to what is not there.
+    fn placed<'n>(
+        &mut self,
+        element: Node<'n, 'n>,
+        scope: &Scope<'_, 'n>,
+        name: &str,
+    ) -> Result<Option<DAffine3>, Failure> {
+        match self.frame(element, scope, 0)? {
+            Ok(frame) => Ok(Some(frame)),
+            Err(missing) => {
+                self.found.leave_out("poses relative to something else");
+                self.notes.push(format!(
+                    "left out: {} of `{name}`, whose pose is relative to `{missing}`",
+                    element.tag_name().name()
+                ));
+                Ok(None)
             }
         }
-        Ok(())
-    }
-
-    /// Whether the height of the cut meets a body whose middle is so high, metres.
-    fn cuts(&self, middle_z_m: f64, half_m: f64) -> bool {
-        (self.args.cut_z_m - middle_z_m).abs() <= half_m
-    }
-
-    /// The numbers of an element's child.
-    fn numbers_of<const N: usize>(&self, element: Node, name: &str) -> Result<[f64; N], Failure> {
-        match child(element, name) {
-            Some(child) => self.numbers(child),
-            None => {
-                Err(self.refuse(element, &format!("{} has no {name}", element.tag_name().name())))
-            }
-        }
-    }
-
-    fn numbers<const N: usize>(&self, element: Node) -> Result<[f64; N], Failure> {
-        let text = element.text().unwrap_or_default().trim();
-        let numbers: Option<Vec<f64>> = text
-            .split_whitespace()
-            .map(|number| number.parse().ok().filter(|number: &f64| number.is_finite()))
-            .collect();
-        numbers.and_then(|numbers| numbers.try_into().ok()).ok_or_else(|| {
-            let name = element.tag_name().name();
-            self.refuse(element, &format!("{name} is `{text}`: {N} numbers are wanted"))
-        })
     }
 
     fn refuse(&self, element: Node, what: &str) -> Failure {
         let at = element.document().text_pos_at(element.range().start);
         let place = format!("line {}, column {}: {what}", at.row, at.col);
-        refuse(&self.args.world, &place, "mend it, as http://sdformat.org describes the format")
+        refuse(&self.file, &place, "mend it, as http://sdformat.org describes the format")
     }
-}
-
-const LEANS: &str = "bodies that lean or lie";
-const AXIS_Z: usize = 2;
-/// Cosine of the lean that is none: a quarter of a degree.
-const UPRIGHT: f64 = 1.0 - 1e-5;
-
-/// The axis of a frame that is upright: 0 to 2 for x, y, z.
-fn axis_up(frame: &DAffine3) -> Option<usize> {
-    (0..3).find(|axis| frame.matrix3.col(*axis).z.abs() > UPRIGHT)
 }
 
 /// The first child of a name.

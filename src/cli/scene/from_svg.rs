@@ -1,5 +1,8 @@
 //! `sonard scene from-svg`.
 
+mod clip;
+mod file;
+
 use std::path::PathBuf;
 
 use usvg::{
@@ -12,6 +15,7 @@ use super::{
     made::{MadeArgs, read, refuse},
 };
 use crate::{geometry::DVec2, scene::Surfaces};
+use clip::Window;
 
 /// Options of `sonard scene from-svg`.
 #[derive(Debug, clap::Args)]
@@ -19,7 +23,7 @@ pub(in crate::cli) struct FromSvgArgs {
     /// Drawing of the plan, an SVG file
     #[arg(value_name = "DRAWING")]
     drawing: PathBuf,
-    /// Width of the whole drawing (its `width`, else its `viewBox`) in the world, metres
+    /// Width of the whole drawing (its `width`, else its `viewBox`, else what is drawn) in the world, metres
     #[arg(long, value_name = "M", value_parser = positive)]
     width_m: f64,
     #[command(flatten)]
@@ -30,8 +34,9 @@ pub(super) const ABOUT: &str = "\
 Make a scene of a drawing: every line of an SVG file is a wall.
 
 Lines, polylines, polygons, rectangles, circles and paths count, in whatever groups they are and however they are \
-turned; fills, colours, widths and texts do not. Curves become short walls, a hundredth of the drawing's width at most. The lower left \
-corner of the drawing is the origin, y points up. All is of one material: give walls their own in the file that comes out.";
+turned; fills, colours, widths, markers (arrow heads) and texts do not. What a rectangular clip path or the edge of an inner page hides \
+is no wall; other clip paths and masks are not followed, with a warning. Curves become short walls, a hundredth of the drawing's \
+width at most. The lower left corner of the drawing is the origin, y points up. Compressed files (.svgz) are read. All is of one material: give walls their own in the file that comes out.";
 
 pub(super) const EXAMPLES: &str = "\
 Examples:
@@ -46,14 +51,17 @@ const MOST_OF_CURVE: usize = 64;
 
 pub(super) fn run(args: &FromSvgArgs) -> Outcome {
     let help = "give an SVG file, as a drawing program writes it";
-    let text = read(&args.drawing, help)?;
-    let tree = Tree::from_data(&text, &Options::default())
+    let bytes = read(&args.drawing, help)?;
+    let file::Drawing { text, notes } =
+        file::text(bytes).map_err(|what| refuse(&args.drawing, &what, help))?;
+    let tree = Tree::from_str(&text, &Options::default())
         .map_err(|error| refuse(&args.drawing, &error, help))?;
     let (width, height) = (f64::from(tree.size().width()), f64::from(tree.size().height()));
     let scale = args.width_m / width;
-    let mut drawing = Drawing { scale, width, height, found: Surfaces::default() };
-    drawing.group(tree.root());
-    args.made.write(&args.drawing, &drawing.found, "draw walls as lines; texts and images are none")
+    let mut drawing = Drawing { scale, width, height, found: Surfaces::default(), notes };
+    drawing.group(tree.root(), Window::default());
+    let help = "draw walls as lines; texts and images are none";
+    args.made.write(&args.drawing, &drawing.found, &drawing.notes, help)
 }
 
 /// What was found so far.
@@ -64,30 +72,53 @@ struct Drawing {
     width: f64,
     height: f64,
     found: Surfaces,
+    /// What was assumed and left out.
+    notes: Vec<String>,
 }
 
 impl Drawing {
-    fn group(&mut self, group: &Group) {
+    /// Adds what is seen of a group through a window of the drawing.
+    fn group(&mut self, group: &Group, window: Window) {
+        let window = match group.clip_path() {
+            Some(clip) => match clip::rectangle(group, clip) {
+                Some(rectangle) => window.within(rectangle),
+                None => {
+                    self.note("a clip path that is no upright rectangle is not followed: what it hides is drawn");
+                    window
+                }
+            },
+            None => window,
+        };
+        if group.mask().is_some() {
+            self.note("a mask is not followed: what it hides is drawn");
+        }
         for node in group.children() {
             match node {
-                Node::Group(group) => self.group(group),
+                Node::Group(group) => self.group(group, window),
                 Node::Path(path) if path.is_visible() => {
                     if let Some(outline) = path.data().clone().transform(path.abs_transform()) {
-                        self.outline(&outline);
+                        self.outline(&outline, window);
                     }
                 }
-                Node::Path(_) | Node::Image(_) | Node::Text(_) => {}
+                Node::Image(_) => self.note("an image is left out"),
+                Node::Path(_) | Node::Text(_) => {}
             }
         }
     }
 
-    fn outline(&mut self, outline: &Outline) {
+    fn note(&mut self, what: &str) {
+        if !self.notes.iter().any(|known| known == what) {
+            self.notes.push(what.to_owned());
+        }
+    }
+
+    fn outline(&mut self, outline: &Outline, window: Window) {
         let mut corners: Vec<DVec2> = Vec::new();
         let mut last = Point::zero();
         for segment in outline.segments() {
             match segment {
                 PathSegment::MoveTo(to) => {
-                    self.line(&mut corners, false);
+                    self.line(&mut corners, false, window);
                     corners.push(self.place(to));
                     last = to;
                 }
@@ -105,10 +136,10 @@ impl Drawing {
                     self.curve(&mut corners, [last, by, and, to]);
                     last = to;
                 }
-                PathSegment::Close => self.line(&mut corners, true),
+                PathSegment::Close => self.line(&mut corners, true, window),
             }
         }
-        self.line(&mut corners, false);
+        self.line(&mut corners, false, window);
     }
 
     /// A Bezier curve as short lines; it is no longer than the way by its control points.
@@ -128,9 +159,13 @@ impl Drawing {
         self.scale * DVec2::new(f64::from(point.x), self.height - f64::from(point.y))
     }
 
-    /// Keeps a line, and begins another.
-    fn line(&mut self, corners: &mut Vec<DVec2>, is_closed: bool) {
-        self.found.walls("wall", std::mem::take(corners), is_closed);
+    /// Keeps what is seen of a line, and begins another.
+    fn line(&mut self, corners: &mut Vec<DVec2>, is_closed: bool, window: Window) {
+        let corners = std::mem::take(corners);
+        let seen = window.transformed(|[x, y]| self.place(Point::from_xy(x as f32, y as f32)));
+        for (corners, is_closed) in seen.cut(corners, is_closed) {
+            self.found.walls("wall", corners, is_closed);
+        }
     }
 }
 

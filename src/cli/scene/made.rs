@@ -58,12 +58,21 @@ pub(super) fn arc(center: DVec2, from: DVec2, turn_rad: f64) -> impl Iterator<It
 }
 
 impl MadeArgs {
-    /// Writes the scene of what was found in a file, and says what was left out.
+    /// Writes the scene of what was found in a file, and prints what was assumed and left out.
     ///
     /// # Errors
     /// When nothing was found, with this help, and what the disk refuses.
-    pub(super) fn write(&self, from: &Path, found: &Surfaces, help_if_none: &str) -> Outcome {
+    pub(super) fn write(
+        &self,
+        from: &Path,
+        found: &Surfaces,
+        notes: &[String],
+        help_if_none: &str,
+    ) -> Outcome {
         let shown = from.display();
+        for note in notes {
+            notice!("warning: {shown}: {note}");
+        }
         for (what, count) in found.left_out() {
             notice!("warning: {shown}: left out: {count} {what}");
         }

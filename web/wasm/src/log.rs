@@ -102,6 +102,7 @@ fn foreign(text: &str, pose: Pose) -> Result<Vec<Record>, Refusal> {
         array: None,
         sensor: sensor.name.clone(),
         longest_m: sensor.max_range_m,
+        least_m: 0.0,
         air,
         started: Timestamp::UNIX_EPOCH,
         as_said: false,

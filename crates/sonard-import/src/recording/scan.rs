@@ -6,7 +6,9 @@ use sonard_records::Record;
 use super::{Heard, message::moment};
 use crate::{
     Location, Reading, Taken,
+    reading::Raw,
     scans::{self, Firing, MOST_FIRINGS},
+    turning::Turning,
 };
 
 /// Readings that come one by one, cut into scans: of a ranger that turns where it is back where it began, of an
@@ -18,9 +20,9 @@ pub(super) struct Gathered<'a> {
     /// The rangers of an array.
     ids: Vec<String>,
     heard: Vec<(usize, Heard)>,
-    /// Whether it has turned away from where it began, and by how much in all, degrees.
+    /// Whether it has turned away from where it began.
     is_away: bool,
-    turned_deg: f64,
+    turning: Turning,
     scans: u64,
 }
 
@@ -29,17 +31,20 @@ const SAME_DEG: f64 = 1e-3;
 
 impl<'a> Gathered<'a> {
     pub(super) fn new(taken: &'a Taken, assumed_m_s: Option<f64>, ids: Vec<String>) -> Self {
-        let (heard, is_away, turned_deg, scans) = (Vec::new(), false, 0.0, 0);
-        Self { taken, assumed_m_s, ids, heard, is_away, turned_deg, scans }
+        let (heard, is_away, turning, scans) = (Vec::new(), false, Turning::default(), 0);
+        Self { taken, assumed_m_s, ids, heard, is_away, turning, scans }
     }
 
     /// Takes a reading of a ranger, by its number; the scan before it, if that ended.
     pub(super) fn add(&mut self, ranger: usize, heard: Heard) -> Option<Vec<Record>> {
         let ended = match self.ids.is_empty() {
-            true => self.is_round(&heard),
+            true => self.is_swept(&heard),
             false => self.heard.iter().any(|(other, _)| *other == ranger),
         };
         let scan = if ended || self.heard.len() == MOST_FIRINGS { self.finish() } else { None };
+        if scan.is_some() {
+            self.turning.restart(heard.direction_deg);
+        }
         self.heard.push((ranger, heard));
         scan
     }
@@ -52,7 +57,7 @@ impl<'a> Gathered<'a> {
 
     /// The last scan.
     pub(super) fn finish(&mut self) -> Option<Vec<Record>> {
-        (self.is_away, self.turned_deg) = (false, 0.0);
+        self.is_away = false;
         let heard = std::mem::take(&mut self.heard);
         if heard.is_empty() {
             return None;
@@ -68,15 +73,13 @@ impl<'a> Gathered<'a> {
         Some(scans::firings_of_array(self.taken, self.scans, &firings.collect::<Vec<_>>()))
     }
 
-    /// Whether a reading is the first of another turn.
-    fn is_round(&mut self, next: &Heard) -> bool {
-        let (Some((_, first)), Some((_, last))) = (self.heard.first(), self.heard.last()) else {
-            return false;
-        };
-        self.turned_deg += wrap_180(next.direction_deg - last.direction_deg).abs();
-        let off_deg = wrap_180(next.direction_deg - first.direction_deg).abs();
-        self.is_away |= off_deg > SAME_DEG;
-        self.is_away && (off_deg <= SAME_DEG || self.turned_deg > 360.0 - SAME_DEG)
+    /// Whether a reading is the first of another sweep: where the motion turns round, or is back where it began.
+    fn is_swept(&mut self, next: &Heard) -> bool {
+        let is_swept = self.turning.is_next(next.direction_deg);
+        let Some((_, first)) = self.heard.first() else { return false };
+        let is_back = wrap_180(next.direction_deg - first.direction_deg).abs() <= SAME_DEG;
+        self.is_away |= !is_back;
+        self.is_away && (is_back || is_swept)
     }
 
     fn reading(&self, heard: &Heard) -> Reading {
@@ -96,6 +99,7 @@ impl<'a> Gathered<'a> {
             place_m: heard.pose.map(|pose| [pose.x_m, pose.y_m]),
             heading_deg: heard.pose.map(|pose| pose.heading_deg),
             air: None,
+            raw: Raw::default(),
         }
     }
 }

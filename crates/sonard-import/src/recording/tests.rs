@@ -1,6 +1,7 @@
 //! Recordings as other programs write them: encoded by another's encoder, in both byte orders.
 
 mod chunks;
+mod places;
 
 use std::{
     collections::BTreeMap,
@@ -120,6 +121,7 @@ fn taken() -> Taken {
         array: None,
         sensor: "hc-sr04".to_owned(),
         longest_m: 4.0,
+        least_m: 0.02,
         air: Air::default(),
         started: "2026-01-01T00:00:00Z".parse().expect("a time"),
         as_said: false,
@@ -242,12 +244,19 @@ fn a_laser_scan_is_a_scan_whose_beams_have_times_and_places_of_their_own() {
 }
 
 #[test]
-fn where_transforms_lack_topic_frame_and_time_are_told() {
+fn readings_without_a_place_are_left_out_and_topic_frame_and_time_named() {
     let late = driving(Order::Little).range("/front/range", 3.5, "front", 1.0).bytes();
-    let told = said(scans(&late, Mapping::default()));
-    for part in ["/front/range", "`base_link` in `map`", "1970-01-01T00:00:03.5Z", "00:00:02Z"] {
+    let found = examine(&late, Mapping::default()).expect("the rest is read");
+    assert_eq!(found.readings, 3);
+    let told = found.notes.join("\n");
+    for part in
+        ["/front/range: 1 of 4", "`base_link` in `map`", "1970-01-01T00:00:03.5Z", "00:00:02Z"]
+    {
         assert!(told.contains(part), "{part}: {told}");
     }
+    let never = Bag::new(Order::Little).moves(9.0, [0.0; 3]).range("/range", 1.0, "base_link", 1.0);
+    let told = said(scans(&never.moves(10.0, [1.0, 0.0, 0.0]).bytes(), Mapping::default()));
+    assert!(told.contains("/range: there is no transform"), "{told}");
     let looped = driving(Order::Little).mounts("front", "map", [0.0; 3]).bytes();
     assert!(said(scans(&looped, Mapping::default())).contains("its own parent"));
     let twice = driving(Order::Little).mounts("odom", "front", [0.0; 3]).bytes();

@@ -37,6 +37,10 @@ pub(crate) enum TransformError {
         "there is no transform of the frame `{child}` in `{parent}` at {time}: they go from {from} to {to}"
     )]
     Lacks { child: String, parent: String, time: String, from: String, to: String },
+    #[error(
+        "the transforms of the frame `{child}` in `{parent}` have a gap from {from} to {to}, and it moved"
+    )]
+    Gap { child: String, parent: String, from: String, to: String },
     #[error("the frame `{0}` is its own parent")]
     Loop(String),
     #[error("the frame `{child}` is in `{parent}` and in `{other}`")]
@@ -49,8 +53,15 @@ pub(crate) enum TransformError {
 
 /// As many as are kept: 64 MB.
 const MOST: usize = 1 << 20;
+/// A frame that moved is not where it was between, after so long without a transform, nanoseconds.
+const MAX_GAP_NS: i64 = 5_000_000_000;
+/// A frame that moved by more than this has moved, metres and radians.
+const MOVED_M: f64 = 0.05;
+const MOVED_RAD: f64 = 0.05;
 /// No robot is so far from where its map begins, metres.
 const MOST_M: f64 = 1e9;
+/// Cosine of a tilt that is none.
+const LEVEL: f64 = 1.0 - 1e-12;
 /// No tree of a robot is this deep.
 const MOST_DEEP: usize = 64;
 
@@ -60,6 +71,38 @@ impl Placed {
     /// What is placed so in a frame that is itself placed.
     pub(crate) fn then(self, inner: Self) -> Self {
         Self { at: self.at + self.turn * inner.at, turn: self.turn * inner.turn }
+    }
+
+    /// Direction over the floor of a beam that is turned about its z axis, degrees counter-clockwise.
+    pub(crate) fn beam_deg(self, turned_deg: f64) -> f64 {
+        match self.upright().z {
+            // Level: without the rounding of a rotation.
+            up if up > LEVEL => self.yaw_deg() + turned_deg,
+            up if up < -LEVEL => self.yaw_deg() - turned_deg,
+            _ => {
+                let beam = self.turn * DQuat::from_rotation_z(turned_deg.to_radians()) * DVec3::X;
+                beam.y.atan2(beam.x).to_degrees()
+            }
+        }
+    }
+
+    /// Direction of its z axis.
+    fn upright(self) -> DVec3 {
+        self.turn * DVec3::Z
+    }
+
+    /// By how much the plane of its x and y is tilted, whichever side is up, degrees.
+    pub(crate) fn tilt_deg(self) -> f64 {
+        self.upright().z.abs().min(1.0).acos().to_degrees()
+    }
+
+    /// Elevation of its x axis, degrees.
+    pub(crate) fn elevation_deg(self) -> f64 {
+        (self.turn * DVec3::X).z.clamp(-1.0, 1.0).asin().to_degrees()
+    }
+
+    fn has_moved(self, from: Self) -> bool {
+        self.at.distance(from.at) > MOVED_M || self.turn.angle_between(from.turn) > MOVED_RAD
     }
 
     /// Direction of its x axis over the floor, degrees counter-clockwise.
@@ -98,6 +141,14 @@ impl Transforms {
         }
         if is_fixed {
             link.places.clear();
+        } else if let [.., (_, before), (last, at)] = &mut link.places[..]
+            && *before == placed
+            && *at == placed
+            && *last <= header.stamp_ns
+        {
+            // A frame that rests is told again and again: its first time and its last are enough.
+            *last = header.stamp_ns;
+            return Ok(());
         } else {
             self.count += 1;
             if self.count > MOST {
@@ -106,6 +157,11 @@ impl Transforms {
         }
         link.places.push((header.stamp_ns, placed));
         Ok(())
+    }
+
+    /// Whether a frame is placed in another, or another in it.
+    pub(crate) fn knows(&self, frame: &str) -> bool {
+        self.frames.contains_key(frame) || self.frames.values().any(|link| link.parent == frame)
     }
 
     /// Brings them into the order of time.
@@ -157,6 +213,14 @@ impl Link {
                 return Ok(*placed);
             }
             if let Some((before, from)) = after.checked_sub(1).and_then(|at| self.places.get(at)) {
+                if time - before > MAX_GAP_NS && placed.has_moved(*from) {
+                    return Err(TransformError::Gap {
+                        child: child.to_owned(),
+                        parent: self.parent.clone(),
+                        from: moment(*before).to_string(),
+                        to: moment(*time).to_string(),
+                    });
+                }
                 let part = (time_ns - before) as f64 / (time - before) as f64;
                 return Ok(from.between(*placed, part));
             }

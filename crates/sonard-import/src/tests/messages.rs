@@ -27,7 +27,8 @@ fn a_log_of_carmen_is_an_arrays() {
     let starts = starts(&records);
     // The true pose, though odometry came later.
     assert_eq!(starts[0].pose, Pose { x_m: 1.0, y_m: 2.0, heading_deg: 90.0 });
-    assert_eq!(starts[1].time.as_millisecond(), 1_000_700);
+    // Such times count from the start of a board, half a second apart.
+    assert_eq!(starts[1].time.as_millisecond(), 500);
     let readings: Vec<_> = pings(&records)
         .iter()
         .map(|ping| (ping.ranger.clone().expect("a ranger"), ping.range_m))
@@ -54,7 +55,7 @@ fn an_array_that_the_log_does_not_say_is_asked_for() {
 const PLAYER: &str = "\
 ## Player version 2.0.0
 0010.000 robot 6665 position2d 00 001 001 +01.000 +02.000 +0.000 0 0 0 0
-0010.000 robot 6665 sonar 00 004 002 2 0.2 0.0 0.0 0.0 0.1 1.5707963267948966
+0010.000 robot 6665 sonar 00 001 002 2 0.2 0.0 0.0 0.0 0.1 1.5707963267948966
 0010.100 robot 6665 sonar 00 001 001 2 1.500 2.500
 0010.200 robot 6665 laser 00 001 001 0 0 0 0 0
 ";
@@ -97,4 +98,107 @@ fn messages_that_are_cut_or_change_are_named() {
         let said = said(examine(text.as_bytes(), Mapping::default(), taken()));
         assert!(said.contains(words), "{said}");
     }
+}
+
+/// Places as data (1:2) and as a reply (4:1), and the base's offset and size, which are no pose.
+#[test]
+fn types_and_subtypes_of_player_decide_what_a_message_is() {
+    let base = "0009.000 robot 6665 position2d 00 004 001 -00.040 +00.000 +00.000 +00.440 +00.400\n\
+                0009.000 robot 6665 position2d 00 001 002 -00.040 +00.000 +00.000 +00.440 +00.400\n\
+                0009.000 robot 6665 sonar 00 004 003 2 9 9 9 9 9 9\n";
+    let with = |geometry: &str| {
+        let log = PLAYER.replace("sonar 00 001 002", &format!("sonar 00 {geometry}"));
+        import(&format!("{base}{log}"), Mapping::default()).expect("right")
+    };
+    for geometry in ["001 002", "004 001"] {
+        let records = with(geometry);
+        assert_eq!(pings(&records).len(), 2, "{geometry}");
+        assert_eq!(starts(&records)[0].pose, Pose { x_m: 1.0, y_m: 2.0, heading_deg: 0.0 });
+    }
+}
+
+#[test]
+fn player_3_has_rangers_with_their_places() {
+    let log = "## Player version 3.0.2\n\
+               0010.0 h 6665 ranger 00 004 001 0 0 0 0 0 0 0.1 0.1 0.1 2 0.2 0 0 0 0 0 0 0.1 0 0 0 1.5707963267948966 \
+               2 0.01 0.01 0.01 0.01 0.01 0.01\n\
+               0010.1 h 6665 ranger 00 001 001 0002 1.5 2.5\n\
+               0010.1 h 6665 ranger 00 001 003 0002 7 7\n";
+    let records = import(log, Mapping::default()).expect("right");
+    let read: Vec<_> =
+        pings(&records).iter().map(|ping| (ping.azimuth_deg, ping.range_m)).collect();
+    assert_eq!(read, [(0.0, Some(1.5)), (90.0, Some(2.5))]);
+}
+
+#[test]
+fn player_1_has_a_second_time_and_places_in_its_lines() {
+    let log = "1106955333.270 rob 6665 position 00 1106955333.260 +01.200 -00.910 -1.501 -0.005 +0.000 +0.000\n\
+               1106955333.287 rob 6665 sonar 00 1106955333.277 2 +00.115 +00.130 +1.5708 +00.115 -00.130 -1.5708 2 0.326 7.365\n";
+    let records = import(log, Mapping::default()).expect("right");
+    let pose = starts(&records)[0].pose;
+    assert!((pose.x_m - 1.2).abs() < 1e-12 && (pose.heading_deg + 86.0).abs() < 0.01, "{pose:?}");
+    assert_eq!(
+        pings(&records).iter().map(|ping| ping.range_m).collect::<Vec<_>>(),
+        [Some(0.326), Some(7.365)]
+    );
+    // The time of a simulation, which is small.
+    let simulated = log.replace("1106955333.260", "0012.260").replace("1106955333.277", "0012.277");
+    assert!(
+        (starts(&import(&simulated, Mapping::default()).expect("right"))[0].pose.x_m - 1.2).abs()
+            < 1e-12
+    );
+}
+
+#[test]
+fn of_several_devices_one_is_imported_and_the_others_are_named() {
+    let other =
+        PLAYER.replace(" 6665 ", " 6666 ").replace("+01.000", "-03.000").replace("1.500", "0.500");
+    let second = "0010.050 robot 6665 position2d 01 001 001 +05.000 +07.000 +1.571 0 0 0 0\n";
+    let log = format!("{second}{PLAYER}{other}");
+    let found = examine(log.as_bytes(), Mapping::default(), taken()).expect("right");
+    let notes = found.notes.join("\n");
+    for part in
+        ["sonar robot:6666:00 (1 messages)", "position2d robot:6665:01 (1 messages)", "--device"]
+    {
+        assert!(notes.contains(part), "{part}: {notes}");
+    }
+    let records = import(&log, Mapping::default()).expect("right");
+    assert_eq!((pings(&records).len(), starts(&records)[0].pose.x_m), (2, 1.0));
+    for device in ["6666:00", "robot:6666:00", "6666"] {
+        let mapping = Mapping { device: Some(device.to_owned()), ..Mapping::default() };
+        let records = import(&log, mapping).expect("right");
+        assert_eq!(
+            (pings(&records)[0].range_m, starts(&records)[0].pose.x_m),
+            (Some(0.5), -3.0),
+            "{device}"
+        );
+    }
+    let none = Mapping { device: Some("7000:00".to_owned()), ..Mapping::default() };
+    assert!(said(import(&log, none)).contains("sonar robot:6665:00"));
+}
+
+#[test]
+fn infinities_and_zeros_in_logs_are_no_echo() {
+    for value in ["inf", "-inf", "nan", "0.000", "0"] {
+        let log = CARMEN.replace("5.00", value);
+        let found = examine(log.as_bytes(), Mapping::default(), taken()).expect(value);
+        assert_eq!((found.readings, found.echoes), (4, 3), "{value}");
+        let is_noted = found.notes.iter().any(|note| note.contains("ranges are 0"));
+        assert_eq!(is_noted, value.starts_with('0'), "{value}: {:?}", found.notes);
+    }
+}
+
+#[test]
+fn ranges_of_logs_may_be_in_another_unit() {
+    let log = CARMEN.replace("1.50 5.00", "150 500").replace("1.40 0.75", "140 75");
+    let told = said(examine(log.as_bytes(), Mapping::default(), taken()));
+    assert!(told.contains("--range-unit cm"), "{told}");
+    let mapping = Mapping { range_unit: Some(crate::RangeUnit::Cm), ..Mapping::default() };
+    let records = import(&log, mapping).expect("right");
+    let ranges: Vec<_> = pings(&records).iter().filter_map(|ping| ping.range_m).collect();
+    let off = ranges
+        .iter()
+        .zip([1.5, 5.0, 1.4, 0.75])
+        .map(|(is, should): (&f64, f64)| (is - should).abs());
+    assert!(ranges.len() == 4 && off.fold(0.0, f64::max) < 1e-12, "{ranges:?}");
 }

@@ -131,15 +131,19 @@ fn a_header_is_understood_or_asked_about() {
     );
     let twice = said(guess("angle_deg,true_range_m,range_cm"));
     assert!(
-        twice.contains("may both be the range") && twice.contains("--columns range_cm=range_cm"),
+        twice.contains("may both be the range")
+            && twice.contains("--columns azimuth_deg=angle_deg,range_cm=range_cm"),
         "{twice}"
     );
     let unit = said(guess("angle_deg,distance"));
     assert!(unit.contains("does not say its unit") && unit.contains("range_mm=distance"), "{unit}");
     let nothing = said(guess("foo,bar"));
-    assert!(nothing.contains("no column has the azimuth") && nothing.contains("foo"), "{nothing}");
+    assert!(
+        nothing.contains("no column is named as a direction") && nothing.contains("foo"),
+        "{nothing}"
+    );
     let numbers = said(examine(b"1,2\n", Mapping::default(), taken()));
-    assert!(numbers.contains("the first line has no names"), "{numbers}");
+    assert!(numbers.contains("the first line of 2 values has no names"), "{numbers}");
 }
 
 /// An error names line, field and column, and what to do.
@@ -149,8 +153,12 @@ fn what_is_wrong_is_named() {
     for (text, mapping, words) in [
         ("1,2\n2,abc\n", mapping(), "line 2, range_cm (column 2): `abc` is no number"),
         ("1,2\n,3\n", mapping(), "line 2: there is no azimuth"),
-        ("1,2\n3,-1\n", mapping(), "line 2, range_cm (column 2): a range of -1; if that means"),
-        ("1,2\n3,0\n", mapping(), "--none=VALUE"),
+        (
+            "1,2\n3,-1\n",
+            mapping(),
+            "line 2, range_cm (column 2): a range of -1 is no distance (1 of 2 are)",
+        ),
+        ("1,2\n3,0\n", mapping(), "--none=0"),
         (
             "1,2\n",
             columns("azimuth_deg=1,range_cm=5"),
@@ -214,7 +222,7 @@ fn other_units_than_said_are_found_out() {
             "if these are degrees",
         ),
         (table(|deg| deg, |m| 100.0 * m), columns("azimuth_deg=1,range_m=2"), "is the unit right?"),
-        (table(|deg| deg, |m| 0.01 * m), columns("azimuth_deg=1,range_m=2"), "is the unit right?"),
+        (table(|deg| deg, |m| 0.01 * m), columns("azimuth_deg=1,range_m=2"), "is the unit right"),
         (
             table(|deg| deg, |m| if m > 1.4 { 2.55 } else { m }),
             columns("azimuth_deg=1,range_ft=2"),
@@ -223,7 +231,7 @@ fn other_units_than_said_are_found_out() {
         (
             table(|deg| deg, |m| if m > 1.4 { 255.0 } else { m }),
             columns("azimuth_deg=1,range_m=2"),
-            "mixed units? Or do these stand for silence",
+            "10 of 120 ranges are 255 by range_m",
         ),
     ] {
         let found = import(&text, mapping.clone());

@@ -9,6 +9,7 @@ mod beam_model;
 mod ideal;
 mod image;
 mod polar;
+mod rows;
 mod score;
 mod tiles;
 mod trace;
@@ -18,7 +19,7 @@ mod tests;
 
 pub use beam_model::{BeamModel, GaussianBeam, PhysicalBeam};
 pub use ideal::ideal;
-pub use image::{ImageError, MapYaml, from_pgm, from_pixels, to_pgm};
+pub use image::{ImageError, MapMode, MapYaml, from_pgm, from_pixels, to_pgm};
 pub use score::{MapScore, PathSettings, ScoreError, score};
 pub(super) use tiles::Tiles;
 pub use trace::{TraceSettings, WallLine, surfaces, trace};

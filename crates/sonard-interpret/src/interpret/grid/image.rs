@@ -1,6 +1,6 @@
 //! Maps as the pair of files that ROS's map_server reads: an image and a description.
 
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize, de};
 use thiserror::Error;
 
 use super::{Grid, GridError, GridShape};
@@ -16,17 +16,62 @@ pub struct MapYaml {
     /// Pose of the lower left corner: metres, metres, radians.
     pub origin: [f64; 3],
     /// 0: dark is occupied.
+    #[serde(default, deserialize_with = "zero_or_one")]
     pub negate: u8,
     /// Occupied above this probability.
+    #[serde(default = "occupied_thresh")]
     pub occupied_thresh: f64,
     /// Free below this probability.
+    #[serde(default = "free_thresh")]
     pub free_thresh: f64,
+    /// Meaning of a shade.
+    #[serde(default)]
+    pub mode: MapMode,
+    /// Whether shades are probabilities, to be taken as they are: of maps that this program wrote.
+    #[serde(skip)]
+    pub is_graded: bool,
 }
+
+/// Meaning of the shades of a map's image, by map_server.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum MapMode {
+    /// Occupied above one threshold, free below the other, else unknown.
+    #[default]
+    Trinary,
+    /// The same, with probabilities between the thresholds.
+    Scale,
+    /// The occupancy itself, 0 to 100; more is unknown.
+    Raw,
+}
+
+const fn occupied_thresh() -> f64 {
+    0.65
+}
+
+const fn free_thresh() -> f64 {
+    0.196
+}
+
+/// 0 or 1, as a number or as `false` or `true`.
+fn zero_or_one<'de, D: Deserializer<'de>>(deserializer: D) -> Result<u8, D::Error> {
+    let value = serde_json::Value::deserialize(deserializer)?;
+    match value {
+        serde_json::Value::Bool(negate) => Ok(u8::from(negate)),
+        serde_json::Value::Number(number) if number.as_f64().is_some() => {
+            Ok(u8::from(number.as_f64() != Some(0.0)))
+        }
+        other => Err(de::Error::custom(format!("negate is {other}, and should be 0 or 1"))),
+    }
+}
+
+/// The mark of a description whose map has probabilities for shades.
+const GRADED: &str = "# shades are probabilities of being occupied: 1 - shade / 255";
 
 /// An error in the image of a map or its description.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum ImageError {
-    /// Not a binary PGM with 8 bits a pixel.
+    /// Not a PGM.
     #[error("byte {at}: {what}")]
     Image {
         /// Where in the file, from 0.
@@ -34,14 +79,9 @@ pub enum ImageError {
         /// What is wrong and what would be right.
         what: &'static str,
     },
-    /// The description lacks a line or has a wrong value.
-    #[error("line {line}: {what}")]
-    Yaml {
-        /// Line, from 1; 0 when a line is missing.
-        line: usize,
-        /// What is wrong.
-        what: String,
-    },
+    /// The description lacks a key or has a wrong value, with its line.
+    #[error("the description is no YAML of a map: {0}")]
+    Yaml(String),
     /// Such a grid can't be.
     #[error(transparent)]
     Grid(#[from] GridError),
@@ -65,19 +105,20 @@ pub fn to_pgm(grid: &Grid) -> Vec<u8> {
 /// A map from its image and description.
 ///
 /// # Errors
-/// When the image is not a binary PGM of 8 bits, is cut off, or makes no grid.
+/// When the image is no PGM, is cut off, or makes no grid.
 pub fn from_pgm(bytes: &[u8], yaml: &MapYaml) -> Result<Grid, ImageError> {
-    let (width, height, start) = header(bytes)?;
-    from_pixels([width, height], bytes.get(start..).unwrap_or_default(), yaml)
+    let (size, pixels) = pixels(bytes)?;
+    from_pixels(size, &pixels, yaml)
 }
 
-/// A map from the pixels of its image, 8 bits each, row by row from the upper left one, and its description.
+/// A map from the shades of its image, 0 to 255 and `None` for what is transparent, row by row from the upper left one, and
+/// its description.
 ///
 /// # Errors
 /// When they are too few for this width and height, or make no grid.
 pub fn from_pixels(
     [width, height]: [usize; 2],
-    pixels: &[u8],
+    pixels: &[Option<u8>],
     yaml: &MapYaml,
 ) -> Result<Grid, ImageError> {
     let shape = GridShape::covering(
@@ -90,17 +131,15 @@ pub fn from_pixels(
         at: pixels.len(),
         what: "the image ends before its last pixel",
     })?;
-    let is_of_map_saver = pixels.iter().all(|pixel| OF_MAP_SAVER.contains(pixel));
-    let probability = |pixel: u8| {
-        let dark = 1.0 - f64::from(pixel) / 255.0;
-        // 127 and 128 are the two sides of unknown.
-        let is_unknown = matches!(pixel, 127 | 128) || (is_of_map_saver && pixel == UNKNOWN);
-        let p = if is_unknown { 0.5 } else { dark };
-        if yaml.negate == 0 { p } else { 1.0 - p }
+    let dark_on_light = |pixel: u8| if yaml.negate == 0 { pixel } else { 255 - pixel };
+    let is_of_map_saver =
+        pixels.iter().flatten().all(|pixel| OF_MAP_SAVER.contains(&dark_on_light(*pixel)));
+    let probability = |pixel: &Option<u8>| match pixel {
+        Some(pixel) => yaml.probability(dark_on_light(*pixel), is_of_map_saver),
+        None => 0.5,
     };
     let rows = pixels.chunks(shape.width).rev();
-    let cells: Vec<f64> =
-        rows.flat_map(|row| row.iter().map(|pixel| probability(*pixel))).collect();
+    let cells: Vec<f64> = rows.flat_map(|row| row.iter().map(probability)).collect();
     Ok(Grid::of_probabilities(shape, &cells))
 }
 
@@ -108,40 +147,73 @@ pub fn from_pixels(
 const OF_MAP_SAVER: [u8; 4] = [0, UNKNOWN, 254, 255];
 const UNKNOWN: u8 = 205;
 
-/// Width, height and where the pixels begin.
-fn header(bytes: &[u8]) -> Result<(usize, usize, usize), ImageError> {
+/// Width and height, and the shades of a PGM, plain (P2) or binary (P5) (Netpbm, pgm(5)).
+fn pixels(bytes: &[u8]) -> Result<([usize; 2], Vec<Option<u8>>), ImageError> {
     let refuse = |at, what| Err(ImageError::Image { at, what });
-    if !bytes.starts_with(b"P5") {
-        return refuse(0, "a map's image must be a binary PGM, which begins with P5");
+    let is_plain = bytes.starts_with(b"P2");
+    if !is_plain && !bytes.starts_with(b"P5") {
+        return refuse(
+            0,
+            "a map's image must be a PGM, which begins with P5 or P2, or a PNG; convert others: `convert IMAGE map.pgm`",
+        );
     }
     let mut at = 2;
-    let mut numbers = [0_usize; 3];
-    for number in &mut numbers {
-        loop {
-            match bytes.get(at) {
-                Some(b'#') => {
-                    while bytes.get(at).is_some_and(|byte| *byte != b'\n') {
-                        at += 1;
-                    }
-                }
-                Some(byte) if byte.is_ascii_whitespace() => at += 1,
-                Some(byte) if byte.is_ascii_digit() => break,
-                _ => return refuse(at, "width, height and greatest value must follow P5"),
-            }
-        }
-        while let Some(byte) = bytes.get(at).filter(|byte| byte.is_ascii_digit()) {
-            *number = number.saturating_mul(10).saturating_add(usize::from(byte - b'0'));
-            at += 1;
-        }
-    }
-    let [width, height, most] = numbers;
-    if most != 255 {
-        return refuse(at, "the greatest value must be 255");
-    }
+    let mut next = || number(bytes, &mut at);
+    let (Some(width), Some(height), Some(most)) = (next(), next(), next()) else {
+        return refuse(at, "width, height and greatest value must follow P5 or P2");
+    };
     if width == 0 || height == 0 || width.saturating_mul(height) > super::MOST_CELLS as usize {
         return refuse(at, "the image has no pixel, or too many");
     }
-    Ok((width, height, at + 1))
+    if !(1..=65_535).contains(&most) {
+        return refuse(at, "the greatest value must be from 1 to 65535");
+    }
+    let shade = |value: usize| {
+        let value = value.min(most);
+        Some(if most == 255 { value } else { (255 * value + most / 2) / most } as u8)
+    };
+    let count = width * height;
+    let mut shades = Vec::new();
+    if is_plain {
+        while shades.len() < count {
+            match number(bytes, &mut at) {
+                Some(value) => shades.push(shade(value)),
+                None => return refuse(at, "the image ends before its last pixel"),
+            }
+        }
+        return Ok(([width, height], shades));
+    }
+    // One blank ends the header.
+    let body = bytes.get(at + 1..).unwrap_or_default();
+    if most < 256 {
+        shades.extend(body.iter().take(count).map(|value| shade(usize::from(*value))));
+    } else {
+        let pairs = body.chunks_exact(2).take(count);
+        shades.extend(pairs.map(|pair| shade(usize::from(u16::from_be_bytes([pair[0], pair[1]])))));
+    }
+    Ok(([width, height], shades))
+}
+
+/// The next number of a PGM, behind blanks and comments.
+fn number(bytes: &[u8], at: &mut usize) -> Option<usize> {
+    loop {
+        match bytes.get(*at)? {
+            b'#' => {
+                while bytes.get(*at).is_some_and(|byte| *byte != b'\n') {
+                    *at += 1;
+                }
+            }
+            byte if byte.is_ascii_whitespace() => *at += 1,
+            byte if byte.is_ascii_digit() => break,
+            _ => return None,
+        }
+    }
+    let mut number = 0_usize;
+    while let Some(byte) = bytes.get(*at).filter(|byte| byte.is_ascii_digit()) {
+        number = number.saturating_mul(10).saturating_add(usize::from(byte - b'0'));
+        *at += 1;
+    }
+    Some(number)
 }
 
 impl MapYaml {
@@ -153,8 +225,34 @@ impl MapYaml {
             resolution: shape.resolution_m,
             origin: [shape.origin.x, shape.origin.y, 0.0],
             negate: 0,
-            occupied_thresh: 0.65,
-            free_thresh: 0.196,
+            occupied_thresh: occupied_thresh(),
+            free_thresh: free_thresh(),
+            mode: MapMode::Trinary,
+            is_graded: true,
+        }
+    }
+
+    /// The probability of a cell of such a shade, dark for occupied.
+    fn probability(&self, shade: u8, is_of_map_saver: bool) -> f64 {
+        let dark = 1.0 - f64::from(shade) / 255.0;
+        if self.mode == MapMode::Raw {
+            return if shade <= 100 { f64::from(shade) / 100.0 } else { 0.5 };
+        }
+        if is_of_map_saver && shade == UNKNOWN {
+            return 0.5;
+        }
+        if self.is_graded {
+            // 127 and 128 are the two sides of unknown.
+            return if matches!(shade, 127 | 128) { 0.5 } else { dark };
+        }
+        if dark > self.occupied_thresh {
+            1.0
+        } else if dark < self.free_thresh {
+            0.0
+        } else if self.mode == MapMode::Scale && self.occupied_thresh > self.free_thresh {
+            (dark - self.free_thresh) / (self.occupied_thresh - self.free_thresh)
+        } else {
+            0.5
         }
     }
 
@@ -162,52 +260,31 @@ impl MapYaml {
     #[must_use]
     pub fn to_text(&self) -> String {
         let [x, y, turn] = self.origin;
+        let mode = match self.mode {
+            MapMode::Trinary => "trinary",
+            MapMode::Scale => "scale",
+            MapMode::Raw => "raw",
+        };
+        let graded = if self.is_graded { format!("{GRADED}\n") } else { String::new() };
         format!(
             "image: {}\nresolution: {}\norigin: [{x}, {y}, {turn:.1}]\nnegate: {}\n\
-             occupied_thresh: {}\nfree_thresh: {}\nmode: trinary\n",
+             occupied_thresh: {}\nfree_thresh: {}\nmode: {mode}\n{graded}",
             self.image, self.resolution, self.negate, self.occupied_thresh, self.free_thresh
         )
     }
 
-    /// From text: the lines that map_server knows, in any order.
+    /// From text, YAML with the keys that map_server knows.
     ///
     /// # Errors
-    /// When a line that is needed is missing or a value is not of its kind.
+    /// When a key that is needed is missing or a value is not of its kind.
     pub fn from_text(text: &str) -> Result<Self, ImageError> {
-        let value = |key: &str| {
-            text.lines().enumerate().find_map(|(at, line)| {
-                let (name, value) = line.split('#').next()?.split_once(':')?;
-                (name.trim() == key).then(|| (at + 1, value.trim().trim_matches(['"', '\''])))
-            })
-        };
-        let needed = |key: &str| {
-            value(key)
-                .ok_or_else(|| ImageError::Yaml { line: 0, what: format!("`{key}:` is missing") })
-        };
-        let number = |(line, text): (usize, &str)| {
-            text.parse::<f64>()
-                .ok()
-                .filter(|number| number.is_finite())
-                .ok_or_else(|| ImageError::Yaml { line, what: format!("`{text}` is not a number") })
-        };
-        let (line, place) = needed("origin")?;
-        let parts: Vec<f64> = place
-            .trim_matches(['[', ']'])
-            .split(',')
-            .map(|part| number((line, part.trim())))
-            .collect::<Result<_, _>>()?;
-        let origin = parts.try_into().map_err(|_| ImageError::Yaml {
-            line,
-            what: "origin must be [x, y, yaw]".to_owned(),
-        })?;
-        let or = |key, otherwise| value(key).map_or(Ok(otherwise), number);
-        Ok(Self {
-            image: needed("image")?.1.to_owned(),
-            resolution: number(needed("resolution")?)?,
-            origin,
-            negate: u8::from(or("negate", 0.0)? != 0.0),
-            occupied_thresh: or("occupied_thresh", 0.65)?,
-            free_thresh: or("free_thresh", 0.196)?,
-        })
+        let plain = text.trim_start_matches('\u{feff}');
+        let read: Self =
+            serde_saphyr::from_str(plain).map_err(|error| ImageError::Yaml(error.to_string()))?;
+        let numbers = [read.resolution, read.occupied_thresh, read.free_thresh];
+        if numbers.iter().chain(&read.origin).any(|number| !number.is_finite()) {
+            return Err(ImageError::Yaml("a number in it is not finite".to_owned()));
+        }
+        Ok(Self { is_graded: plain.lines().any(|line| line.trim() == GRADED), ..read })
     }
 }

@@ -166,6 +166,84 @@ fn what_map_saver_writes_for_unknown_is_unknown_unless_the_map_has_other_shades(
     assert!((unknown(&[0, 230, 254, 254, 205, 205, 205, 0, 0]) - 0.196).abs() < 1e-3);
 }
 
+/// A description of three columns and one row.
+fn described(more: &str) -> MapYaml {
+    let text = format!("image: a.pgm\nresolution: 0.1\norigin: [0, 0, 0]\n{more}");
+    MapYaml::from_text(&text).expect("a description")
+}
+
+/// Probabilities of the cells of a row of shades.
+fn row(yaml: &MapYaml, shades: &[u8]) -> Vec<f64> {
+    let pgm = [format!("P5\n{} 1\n255\n", shades.len()).as_bytes(), shades].concat();
+    from_pgm(&pgm, yaml).expect("a map").probabilities().map(|p| (1e3 * p).round() / 1e3).collect()
+}
+
+#[test]
+fn cells_are_what_the_files_own_thresholds_make_of_them() {
+    let near = |yaml: &str, shades: &[u8], expected: &[f64]| {
+        let found = row(&described(yaml), shades);
+        assert!(
+            found.iter().zip(expected).all(|(is, should)| (is - should).abs() < 5e-3),
+            "{yaml}: {found:?}"
+        );
+    };
+    // 205 is 0.19608, not below 0.196; one other shade changes nothing elsewhere.
+    near("", &[0, 205, 254, 150], &[1.0, 0.5, 0.0, 0.5]);
+    near("free_thresh: 0.25", &[0, 205, 254], &[1.0, 0.5, 0.0]);
+    near("free_thresh: 0.25", &[0, 205, 254, 150], &[1.0, 0.0, 0.0, 0.5]);
+    near("occupied_thresh: 0.3\nfree_thresh: 0.1", &[150, 254, 205], &[1.0, 0.0, 0.5]);
+    near("negate: 1", &[255, 50, 1], &[1.0, 0.5, 0.0]);
+    near("negate: true", &[255, 50, 1], &[1.0, 0.5, 0.0]);
+    near("negate: false", &[0, 205, 254], &[1.0, 0.5, 0.0]);
+    near("mode: raw", &[0, 100, 40, 101, 255], &[0.0, 1.0, 0.4, 0.5, 0.5]);
+    near("mode: scale\noccupied_thresh: 0.8\nfree_thresh: 0.2", &[0, 254, 127], &[1.0, 0.0, 0.5]);
+}
+
+#[test]
+fn descriptions_are_yaml_in_any_style() {
+    for text in [
+        "image: a.pgm\nresolution: 0.05\norigin: [1.0, 2.0, 0.5]\n",
+        "image: a.pgm\nmode: trinary\nresolution: 0.05\norigin:\n- 1.0\n- 2.0\n- 0.5\n",
+        "{image: a.pgm, resolution: 0.05, origin: [1, 2, 0.5], negate: 0, occupied_thresh: 0.65}",
+        "\u{feff}# by hand\r\nimage: \"a.pgm\"  # beside\r\nresolution: 5e-2\r\norigin: [ 1., 2., 0.5 ]\r\n",
+    ] {
+        let read = MapYaml::from_text(text).expect(text);
+        assert_eq!(
+            (read.image.as_str(), read.resolution, read.origin),
+            ("a.pgm", 0.05, [1.0, 2.0, 0.5]),
+            "{text}"
+        );
+        assert!(!read.is_graded);
+    }
+}
+
+#[test]
+fn plain_images_and_other_greatest_values_are_the_same_map() {
+    let yaml = described("");
+    let expected = row(&yaml, &[0, 205, 255]);
+    for image in [
+        &b"P2\n# plain\n3 1\n255\n0 205\n255\n"[..],
+        b"P2 3 1 255 0 205 255",
+        b"P5\n3 1\n65535\n\x00\x00\xcd\xcd\xff\xff",
+        b"P5 3 1 255\n\x00\xcd\xff",
+    ] {
+        let found: Vec<f64> = from_pgm(image, &yaml).expect("a map").probabilities().collect();
+        assert_eq!(found.len(), 3);
+        assert!(
+            found.iter().zip(&expected).all(|(is, should)| (is - should).abs() < 5e-3),
+            "{found:?}"
+        );
+    }
+    for (image, part) in [
+        (&b"P6\n1 1\n255\n"[..], "convert"),
+        (b"P2 3 1 255 0 1", "last pixel"),
+        (b"P2 3 1 0 0 1 2", "greatest"),
+    ] {
+        let error = from_pgm(image, &yaml).expect_err(part).to_string();
+        assert!(error.contains(part), "{error}");
+    }
+}
+
 #[test]
 fn damaged_files_are_named() {
     let grid = Grid::new(shape(1.0, 0.1));
@@ -174,9 +252,10 @@ fn damaged_files_are_named() {
         assert!(matches!(from_pgm(&pgm[..cut], &yaml), Err(ImageError::Image { .. })), "{cut}");
     }
     for (text, part) in [
-        ("image: a.pgm\nresolution: 0.1\n", "`origin:` is missing"),
-        ("image: a.pgm\nresolution: x\norigin: [0, 0, 0]", "line 2: `x` is not a number"),
+        ("image: a.pgm\nresolution: 0.1\n", "origin"),
+        ("image: a.pgm\nresolution: x\norigin: [0, 0, 0]", "line 2"),
         ("image: a.pgm\nresolution: 1\norigin: [0, 0]", "line 3"),
+        ("image: a.pgm\nresolution: 1\norigin: [0, 0, 0]\nmode: round", "mode"),
     ] {
         let error = MapYaml::from_text(text).expect_err(part).to_string();
         assert!(error.contains(part), "{error}");

@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use super::Grid;
+use super::{Grid, rows};
 use sonard_model::{
     geometry::{DVec2, distance_to_segment, enclosed_area},
     scene::Surfaces,
@@ -32,6 +32,8 @@ pub struct TraceSettings {
     pub tolerance_m: f64,
     /// Lines shorter than this are left out, metres: specks.
     pub least_m: f64,
+    /// Keep walls along the rows and columns of the cells where they are: only stairs become slanting walls.
+    pub keeps_rows: bool,
 }
 
 impl TraceSettings {
@@ -44,12 +46,13 @@ impl TraceSettings {
             gap_cells: 2,
             tolerance_m: 1.5 * resolution_m,
             least_m: 4.0 * resolution_m,
+            keeps_rows: false,
         }
     }
 }
 
 /// A corner of cells: column and row of the cell that it is the lower left corner of.
-type Node = (i64, i64);
+pub(super) type Node = (i64, i64);
 
 /// The walls of a map as surfaces of a scene.
 #[must_use]
@@ -72,9 +75,13 @@ pub fn trace(grid: &Grid, settings: &TraceSettings) -> Vec<WallLine> {
         |node: &Node| shape.origin + shape.resolution_m * DVec2::new(node.0 as f64, node.1 as f64);
     let lines = chains(&sides(grid, settings)).into_iter().filter_map(|(nodes, is_closed)| {
         let points: Vec<DVec2> = nodes.iter().map(place).collect();
-        let line = match is_closed {
-            true => straightened_ring(&points, settings.tolerance_m),
-            false => straightened(&points, settings.tolerance_m),
+        let line = match (settings.keeps_rows, is_closed) {
+            (true, _) => rows::corners(&nodes, is_closed, |stairs| {
+                let points: Vec<DVec2> = stairs.iter().map(place).collect();
+                straightened(&points, settings.tolerance_m)
+            }),
+            (false, true) => straightened_ring(&points, settings.tolerance_m),
+            (false, false) => straightened(&points, settings.tolerance_m),
         };
         let length_m = (points.len() - usize::from(!is_closed)) as f64 * shape.resolution_m;
         // Of a ring that is thinner than the tolerance nothing is left that encloses anything: it is a line.

@@ -1,0 +1,82 @@
+//! LaserScan and Range messages as JSON and as YAML.
+
+use super::*;
+use crate::Format;
+
+const SCAN: &str = "{\"header\": {\"stamp\": {\"sec\": 1760000000, \"nanosec\": 500000000}, \"frame_id\": \"laser\"}, \
+    \"angle_min\": -1.0, \"angle_max\": 1.0, \"angle_increment\": 0.5, \"range_min\": 0.02, \"range_max\": 4.0, \
+    \"ranges\": [1.0, 1.1, null, 0.0, 5.0]}";
+
+fn read(text: &str) -> Vec<(f64, Option<f64>)> {
+    let records =
+        import(text, Mapping::default()).unwrap_or_else(|error| panic!("{text}: {error}"));
+    let round = |number: f64| (number * 1e3).round() / 1e3;
+    pings(&records).iter().map(|ping| (round(ping.azimuth_deg), ping.range_m.map(round))).collect()
+}
+
+#[test]
+fn a_laser_scan_is_read_by_itself_in_a_list_and_published() {
+    let expected = [(302.704, Some(1.0)), (331.352, Some(1.1)), (28.648, None), (57.296, None)];
+    for text in [
+        SCAN.to_owned(),
+        format!("[{SCAN}]"),
+        format!("{{\"op\": \"publish\", \"topic\": \"/scan\", \"msg\": {SCAN}}}\n"),
+        format!("\u{feff}{SCAN}\n"),
+    ] {
+        assert_eq!(read(&text), expected, "{text}");
+    }
+    let twice = format!("{SCAN}\n{SCAN}\n");
+    let records = import(&twice, Mapping::default()).expect("two scans");
+    assert_eq!(starts(&records).len(), 2);
+    assert_eq!(pings(&records)[0].time.map(|time| time.as_millisecond()), Some(1_760_000_000_500));
+    let found = examine(SCAN.as_bytes(), Mapping::default(), taken()).expect("a scan");
+    assert_eq!(found.format, Format::RosText);
+    let notes = found.notes.join("\n");
+    for part in ["ranges are 0", "beyond max_range", "frames are not in it"] {
+        assert!(notes.contains(part), "{part}: {notes}");
+    }
+}
+
+#[test]
+fn what_rostopic_echo_prints_is_read() {
+    let ros_1 = "header:\n  seq: 1\n  stamp:\n    secs: 1760000000\n    nsecs: 0\n  frame_id: \"laser\"\nangle_min: 0.0\n\
+        angle_max: 3.14159\nangle_increment: 1.5707963\ntime_increment: 0.0\nscan_time: 0.1\nrange_min: 0.1\nrange_max: 10.0\n\
+        ranges: [1.0, inf, 2.5]\nintensities: []\n---\n";
+    let ros_2 = "header:\n  stamp:\n    sec: 1760000000\n    nanosec: 0\n  frame_id: laser\nangle_min: 0.0\nangle_max: 3.14159\n\
+        angle_increment: 1.5707963\ntime_increment: 0.0\nscan_time: 0.1\nrange_min: 0.1\nrange_max: 10.0\nranges:\n- 1.0\n- .inf\n- 2.5\n\
+        intensities: []\n---\n";
+    for text in [ros_1, ros_2] {
+        assert_eq!(read(text), [(0.0, Some(1.0)), (90.0, None), (180.0, Some(2.5))], "{text}");
+        assert_eq!(read(&text.repeat(3)).len(), 9);
+    }
+    let shortened = ros_2.replace("- 2.5\n", "- '...'\n");
+    assert!(said(import(&shortened, Mapping::default())).contains("--full-length"));
+}
+
+#[test]
+fn range_messages_are_of_a_fixed_ranger() {
+    let message = |range: &str| {
+        format!(
+            "header:\n  stamp:\n    secs: 1760000000\n    nsecs: 0\n  frame_id: sonar\nradiation_type: 0\nfield_of_view: 0.26\n\
+                 min_range: 0.02\nmax_range: 4.0\nrange: {range}\n---\n"
+        )
+    };
+    let text = [message("1.25"), message("4.0"), message("nan")].concat();
+    let found = examine(text.as_bytes(), Mapping::default(), taken()).expect("ranges");
+    assert_eq!((found.readings, found.echoes), (2, 1));
+    assert!(found.notes.join(" ").contains("--azimuth-deg"), "{:?}", found.notes);
+    let turned = Mapping { azimuth_deg: Some(-90.0), ..Mapping::default() };
+    assert_eq!(pings(&import(&text, turned).expect("ranges"))[0].azimuth_deg, 270.0);
+}
+
+#[test]
+fn lists_of_pairs_are_read_by_their_places() {
+    for text in ["[[0, 1.0], [10, 1.1], [20, null]]", "[0, 1.0]\n[10, 1.1]\n[20, NaN]\n"] {
+        let told = said(import(text, Mapping::default()));
+        assert!(told.contains("lists") && told.contains("--columns azimuth_deg=1"), "{told}");
+        let records = import(text, columns("azimuth_deg=1,range_m=2")).expect("pairs");
+        let read: Vec<_> =
+            pings(&records).iter().map(|ping| (ping.azimuth_deg, ping.range_m.is_some())).collect();
+        assert_eq!(read, [(0.0, true), (10.0, true), (20.0, false)], "{text}");
+    }
+}

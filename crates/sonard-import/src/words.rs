@@ -1,0 +1,348 @@
+//! Words by which people name quantities and units in the header of a table.
+
+use crate::{Field, Quantity};
+
+/// What a name says.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Name {
+    Field(Field),
+    /// A quantity, but not in which unit.
+    Quantity(Quantity),
+    /// A unit, but not of what.
+    Unit(&'static str),
+    Nothing,
+}
+
+use Quantity::{Azimuth, Bearing, Heading, Range, Scan, Status, Temperature, Time, Tof, X, Y};
+
+/// Words for a quantity, the more specific first; a word may be used for several, which its unit tells apart.
+const WORDS: &[(&str, &[Quantity])] = &[
+    ("flight", &[Tof]),
+    ("tof", &[Tof]),
+    ("laufzeit", &[Tof]),
+    ("flugzeit", &[Tof]),
+    ("duration", &[Tof]),
+    ("dauer", &[Tof]),
+    ("duree", &[Tof]),
+    ("durée", &[Tof]),
+    ("duracion", &[Tof]),
+    ("duración", &[Tof]),
+    ("durata", &[Tof]),
+    ("travel", &[Tof, Range]),
+    ("pulse", &[Tof]),
+    ("pulso", &[Tof]),
+    ("puls", &[Tof]),
+    ("azimuth", &[Azimuth]),
+    ("azimut", &[Azimuth]),
+    ("pan", &[Azimuth]),
+    ("servo", &[Azimuth]),
+    ("angle", &[Azimuth]),
+    ("ang", &[Azimuth]),
+    ("theta", &[Azimuth]),
+    ("phi", &[Azimuth]),
+    ("winkel", &[Azimuth]),
+    ("drehwinkel", &[Azimuth]),
+    ("richtung", &[Azimuth]),
+    ("direction", &[Azimuth]),
+    ("angulo", &[Azimuth]),
+    ("ángulo", &[Azimuth]),
+    ("ângulo", &[Azimuth]),
+    ("angolo", &[Azimuth]),
+    ("hoek", &[Azimuth]),
+    ("kąt", &[Azimuth]),
+    ("kat", &[Azimuth]),
+    ("vinkel", &[Azimuth]),
+    ("kulma", &[Azimuth]),
+    ("угол", &[Azimuth]),
+    ("bearing", &[Bearing]),
+    ("peilung", &[Bearing]),
+    ("range", &[Range]),
+    ("distance", &[Range]),
+    ("distances", &[Range]),
+    ("ranges", &[Range]),
+    ("dist", &[Range]),
+    ("entfernung", &[Range]),
+    ("abstand", &[Range]),
+    ("distanz", &[Range]),
+    ("distancia", &[Range]),
+    ("distância", &[Range]),
+    ("distanza", &[Range]),
+    ("portée", &[Range]),
+    ("afstand", &[Range]),
+    ("odległość", &[Range]),
+    ("odleglosc", &[Range]),
+    ("avstånd", &[Range]),
+    ("avstand", &[Range]),
+    ("etäisyys", &[Range]),
+    ("расстояние", &[Range]),
+    ("sonar", &[Range]),
+    ("ultrasonic", &[Range]),
+    ("echo", &[Tof, Range]),
+    ("eco", &[Tof, Range]),
+    ("timestamp", &[Time]),
+    ("time", &[Time]),
+    ("millis", &[Time]),
+    ("micros", &[Time]),
+    ("zeit", &[Time]),
+    ("uhrzeit", &[Time]),
+    ("zeitstempel", &[Time]),
+    ("datetime", &[Time]),
+    ("temps", &[Time]),
+    ("tiempo", &[Time]),
+    ("tempo", &[Time]),
+    ("tijd", &[Time]),
+    ("scan", &[Scan]),
+    ("sweep", &[Scan]),
+    ("x", &[X]),
+    ("y", &[Y]),
+    ("heading", &[Heading]),
+    ("yaw", &[Heading]),
+    ("temperature", &[Temperature]),
+    ("temperatur", &[Temperature]),
+    ("temp", &[Temperature]),
+    ("status", &[Status]),
+];
+
+/// Words for a unit, and how fields write it.
+const UNITS: &[(&str, &str)] = &[
+    ("deg", "deg"),
+    ("degs", "deg"),
+    ("degree", "deg"),
+    ("degrees", "deg"),
+    ("grados", "deg"),
+    ("gradi", "deg"),
+    ("graden", "deg"),
+    ("graus", "deg"),
+    ("degré", "deg"),
+    ("degrés", "deg"),
+    ("rad", "rad"),
+    ("rads", "rad"),
+    ("radian", "rad"),
+    ("radians", "rad"),
+    ("radiant", "rad"),
+    ("gon", "grad"),
+    ("m", "m"),
+    ("meter", "m"),
+    ("meters", "m"),
+    ("metre", "m"),
+    ("metres", "m"),
+    ("cm", "cm"),
+    ("centimeter", "cm"),
+    ("centimeters", "cm"),
+    ("centimetres", "cm"),
+    ("zentimeter", "cm"),
+    ("mm", "mm"),
+    ("millimeter", "mm"),
+    ("millimeters", "mm"),
+    ("millimetres", "mm"),
+    ("in", "in"),
+    ("inch", "in"),
+    ("inches", "in"),
+    ("zoll", "in"),
+    ("ft", "ft"),
+    ("feet", "ft"),
+    ("us", "us"),
+    ("usec", "us"),
+    ("micros", "us"),
+    ("microsecond", "us"),
+    ("microseconds", "us"),
+    ("mikrosekunden", "us"),
+    ("ms", "ms"),
+    ("msec", "ms"),
+    ("millis", "ms"),
+    ("millisecond", "ms"),
+    ("milliseconds", "ms"),
+    ("millisekunden", "ms"),
+    ("s", "s"),
+    ("sec", "s"),
+    ("secs", "s"),
+    ("second", "s"),
+    ("seconds", "s"),
+    ("sekunden", "s"),
+    ("ns", "ns"),
+    ("nsec", "ns"),
+    ("nanoseconds", "ns"),
+    ("c", "c"),
+    ("celsius", "c"),
+    ("k", "k"),
+    ("kelvin", "k"),
+];
+
+/// Words of columns that are no reading: limits, steps, spreads, and angles about level axes.
+const OTHERS: [&str; 34] = [
+    "min",
+    "minimum",
+    "max",
+    "maximum",
+    "limit",
+    "least",
+    "greatest",
+    "increment",
+    "inc",
+    "step",
+    "std",
+    "stddev",
+    "sigma",
+    "error",
+    "err",
+    "variance",
+    "var",
+    "accuracy",
+    "confidence",
+    "quality",
+    "intensity",
+    "amplitude",
+    "tilt",
+    "pitch",
+    "roll",
+    "elevation",
+    "inclination",
+    "neigung",
+    "fov",
+    "view",
+    "width",
+    "resolution",
+    "seq",
+    "covariance",
+];
+
+/// Words of an echo's place, which is not the robot's.
+const OF_ECHO: [&str; 8] = ["echo", "point", "hit", "target", "obstacle", "plot", "px", "py"];
+
+/// German words for a direction, beside which `Grad` is the degree.
+const GERMAN: [&str; 5] = ["winkel", "drehwinkel", "richtung", "azimut", "peilung"];
+
+/// The words of a name, in lower case: parted at signs, and where a capital follows a small letter.
+fn words(name: &str) -> Vec<String> {
+    let name = name.replace(['\u{b5}', '\u{3bc}'], "u").replace(['\u{b0}', '\u{ba}'], " deg ");
+    let mut parted = String::new();
+    let mut last = ' ';
+    for c in name.chars() {
+        if (last.is_lowercase() && c.is_uppercase()) || last.is_numeric() != c.is_numeric() {
+            parted.push(' ');
+        }
+        parted.push(c);
+        last = c;
+    }
+    let lower = parted.to_lowercase();
+    lower
+        .split(|c: char| !c.is_alphanumeric())
+        .filter(|word| !word.is_empty())
+        .map(str::to_owned)
+        .collect()
+}
+
+pub(crate) fn is_yaw(name: &str) -> bool {
+    words(name).iter().any(|word| word == "yaw" || word == "heading")
+}
+
+pub(crate) fn is_clockwise(name: &str) -> bool {
+    words(name).iter().any(|word| word == "cw" || word == "clockwise")
+}
+
+/// What the name of a column says of it.
+pub(crate) fn meaning(name: &str) -> Name {
+    let words = words(name);
+    let has = |known: &[&str]| words.iter().any(|word| known.contains(&word.as_str()));
+    if let Some(field) = Field::named(&name.trim().to_lowercase()) {
+        return Name::Field(field);
+    }
+    if has(&OTHERS) {
+        return Name::Nothing;
+    }
+    let is_german_degree = has(&["grad"]) && has(&GERMAN);
+    let unit = words.iter().rev().find_map(|word| {
+        let unit = UNITS.iter().find(|(known, _)| known == word).map(|(_, unit)| *unit);
+        unit.or_else(|| (word == "grad" && is_german_degree).then_some("deg"))
+    });
+    let quantities = || {
+        let named = WORDS.iter().filter(|(known, _)| words.iter().any(|word| word == known));
+        named.flat_map(|(_, quantities)| quantities.iter().copied())
+    };
+    let is_of_echo = has(&OF_ECHO) && quantities().any(|quantity| matches!(quantity, X | Y));
+    if is_of_echo {
+        return Name::Nothing;
+    }
+    if let Some(field) = quantities().find_map(|quantity| Field::of(quantity, unit)) {
+        return Name::Field(field);
+    }
+    match (quantities().next(), unit) {
+        // A text with a unit beside it.
+        (Some(Scan | Status), _) => {
+            let field = quantities().find_map(|quantity| Field::of(quantity, None));
+            field.map_or(Name::Nothing, Name::Field)
+        }
+        (_, Some(unit)) => Name::Unit(unit),
+        (Some(quantity), None) => Name::Quantity(quantity),
+        (None, None) => Name::Nothing,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_in_several_languages_and_spellings_are_understood() {
+        for (name, field) in [
+            ("Angle (deg)", "azimuth_deg"),
+            ("angleDeg", "azimuth_deg"),
+            ("pan_deg", "azimuth_deg"),
+            ("servo [\u{b0}]", "azimuth_deg"),
+            ("Winkel [Grad]", "azimuth_deg"),
+            ("Winkel_deg", "azimuth_deg"),
+            ("theta_rad", "azimuth_rad"),
+            ("ángulo (grados)", "azimuth_deg"),
+            ("Distance [cm]", "range_cm"),
+            ("distanceCm", "range_cm"),
+            ("echo_distance_cm", "range_cm"),
+            ("echo_cm", "range_cm"),
+            ("Entfernung_cm", "range_cm"),
+            ("Abstand [mm]", "range_mm"),
+            ("distancia (cm)", "range_cm"),
+            ("sonar1_cm", "range_cm"),
+            ("echo_us", "tof_us"),
+            ("echo [\u{b5}s]", "tof_us"),
+            ("time_of_flight_us", "tof_us"),
+            ("pulse_duration_us", "tof_us"),
+            ("duration_us", "tof_us"),
+            ("Laufzeit [us]", "tof_us"),
+            ("timestamp", "time"),
+            ("time_ms", "time_ms"),
+            ("millis", "time_ms"),
+            ("Zeit [s]", "time_s"),
+            ("x [m]", "x_m"),
+            ("temp_c", "temperature_c"),
+            ("scan_id", "scan"),
+            ("yaw_deg", "heading_deg"),
+        ] {
+            assert_eq!(meaning(name), Name::Field(Field::named(field).expect("a field")), "{name}");
+        }
+    }
+
+    #[test]
+    fn limits_tilts_and_places_of_echoes_are_no_readings() {
+        for name in [
+            "min_range_m",
+            "max_range",
+            "rangeMax_m",
+            "field.min_range",
+            "angle_increment",
+            "tilt_deg",
+            "pitch_rad",
+            "elevation_deg",
+            "echo_x_cm",
+            "target_y_m",
+            "range_std_m",
+            "foo",
+            "class",
+        ] {
+            assert_eq!(meaning(name), Name::Nothing, "{name}");
+        }
+        assert_eq!(meaning("angle"), Name::Quantity(Azimuth));
+        assert_eq!(meaning("angle_grad"), Name::Quantity(Azimuth));
+        assert_eq!(meaning("Messwert_cm"), Name::Unit("cm"));
+        assert_eq!(meaning("angle_cm"), Name::Unit("cm"));
+        assert!(is_clockwise("angle_cw_deg") && !is_clockwise("angle_ccw_deg"));
+    }
+}

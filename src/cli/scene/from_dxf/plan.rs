@@ -1,0 +1,363 @@
+//! Entities of a drawing as surfaces.
+
+use std::collections::BTreeMap;
+
+use dxf::{
+    Block, Drawing, Point, Vector,
+    entities::{Arc, Circle, Entity, EntityType, Insert, LwPolyline, Polyline, Solid, Trace},
+};
+use glam::DAffine2;
+
+use super::{super::made::arc, layers::Layers};
+use crate::{geometry::DVec2, scene::Surfaces};
+
+/// What was found, before it is moved to the origin, metres.
+enum Shape {
+    Walls { layer: String, corners: Vec<DVec2>, is_closed: bool },
+    Round { layer: String, center: DVec2, radius_m: f64 },
+}
+
+/// What was found so far.
+pub(super) struct Plan<'a> {
+    drawing: &'a Drawing,
+    layers: &'a Layers,
+    /// From the drawing's units, or those of a block, to metres.
+    frame: DAffine2,
+    /// The layer of the block that is drawn, which its layer 0 stands for.
+    of_block: Option<String>,
+    depth: usize,
+    count: usize,
+    shapes: Vec<Shape>,
+    left_out: BTreeMap<String, usize>,
+    filled: usize,
+}
+
+/// Blocks within blocks, at most.
+const MAX_DEPTH: usize = 8;
+/// Entities that are drawn, those of blocks each time, at most.
+const MAX_ENTITIES: usize = 1 << 20;
+/// A plan farther than this from the origin is moved to it, metres.
+const FAR_M: f64 = 1000.0;
+
+impl<'a> Plan<'a> {
+    pub(super) fn new(drawing: &'a Drawing, layers: &'a Layers, unit_m: f64) -> Self {
+        Self {
+            drawing,
+            layers,
+            frame: DAffine2::from_scale(DVec2::splat(unit_m)),
+            of_block: None,
+            depth: 0,
+            count: 0,
+            shapes: Vec::new(),
+            left_out: BTreeMap::new(),
+            filled: 0,
+        }
+    }
+
+    /// Adds all that is seen in the drawing.
+    pub(super) fn add_all(&mut self) {
+        let drawing = self.drawing;
+        for entity in drawing.entities() {
+            self.add(entity);
+        }
+    }
+
+    /// The greater side of the plan, metres.
+    pub(super) fn size_m(&self) -> Option<f64> {
+        let (low, high) = self.bounds()?;
+        Some((high - low).max_element())
+    }
+
+    fn bounds(&self) -> Option<(DVec2, DVec2)> {
+        let points = self.shapes.iter().flat_map(|shape| match shape {
+            Shape::Walls { corners, .. } => corners.clone(),
+            Shape::Round { center, radius_m, .. } => {
+                vec![*center - DVec2::splat(*radius_m), *center + DVec2::splat(*radius_m)]
+            }
+        });
+        let mut points = points.filter(|point| point.is_finite()).peekable();
+        points.peek()?;
+        Some(points.fold((DVec2::INFINITY, DVec2::NEG_INFINITY), |(low, high), point| {
+            (low.min(point), high.max(point))
+        }))
+    }
+
+    /// The surfaces, near the origin, and what was left out or moved, a line each.
+    pub(super) fn finish(self) -> (Surfaces, Vec<String>) {
+        let mut notes: Vec<String> =
+            self.left_out.iter().map(|(what, count)| format!("left out: {count} {what}")).collect();
+        if self.filled > 0 {
+            notes.push(format!(
+                "{} filled areas (SOLID, TRACE) are taken as their outlines",
+                self.filled
+            ));
+        }
+        let far =
+            self.bounds().filter(|(low, high)| low.abs().max(high.abs()).max_element() > FAR_M);
+        let shift = far.map_or(DVec2::ZERO, |(low, _)| low.floor());
+        if shift != DVec2::ZERO {
+            notes.push(format!(
+                "the plan is far from the origin: moved by {} m in x and {} m in y",
+                -shift.x, -shift.y
+            ));
+        }
+        let mut found = Surfaces::default();
+        for shape in self.shapes {
+            match shape {
+                Shape::Walls { layer, corners, is_closed } => {
+                    let corners = corners.into_iter().map(|corner| corner - shift);
+                    found.walls(&layer, corners.collect(), is_closed);
+                }
+                Shape::Round { layer, center, radius_m } => {
+                    found.round(&layer, center - shift, radius_m);
+                }
+            }
+        }
+        (found, notes)
+    }
+
+    fn leave_out(&mut self, what: &str) {
+        *self.left_out.entry(what.to_owned()).or_default() += 1;
+    }
+
+    fn walls(&mut self, layer: &str, corners: Vec<DVec2>, is_closed: bool) {
+        self.shapes.push(Shape::Walls { layer: layer.to_owned(), corners, is_closed });
+    }
+
+    fn add(&mut self, entity: &Entity) {
+        let common = &entity.common;
+        let own = common.layer.as_str();
+        let of_block = self.of_block.clone().filter(|_| own == "0");
+        let layer = of_block.as_deref().unwrap_or(own);
+        if !common.is_visible || common.is_in_paper_space || !self.layers.has(layer) {
+            return;
+        }
+        self.count += 1;
+        if self.count > MAX_ENTITIES {
+            return self.leave_out("entities behind the first million");
+        }
+        match &entity.specific {
+            EntityType::Line(line) => {
+                let ends = [&line.p1, &line.p2].map(|end| self.place(end.x, end.y));
+                self.walls(layer, ends.to_vec(), false);
+            }
+            EntityType::LwPolyline(line) => self.light_polyline(layer, line),
+            EntityType::Polyline(line) => self.polyline(layer, line),
+            EntityType::Circle(circle) => self.circle(layer, circle),
+            EntityType::Arc(arc) => self.arc(layer, arc),
+            EntityType::Insert(insert) => self.insert(layer, insert),
+            EntityType::Solid(solid) => {
+                let Solid {
+                    first_corner: a,
+                    second_corner: b,
+                    third_corner: c,
+                    fourth_corner: d,
+                    ..
+                } = solid;
+                self.filled(layer, [a, b, d, c], &solid.extrusion_direction);
+            }
+            EntityType::Trace(trace) => {
+                let Trace {
+                    first_corner: a,
+                    second_corner: b,
+                    third_corner: c,
+                    fourth_corner: d,
+                    ..
+                } = trace;
+                self.filled(layer, [a, b, d, c], &trace.extrusion_direction);
+            }
+            EntityType::Seqend(_) | EntityType::Vertex(_) => {}
+            other => self.leave_out(kind(other)),
+        }
+    }
+
+    /// The outline of an area of four corners, in their order round it; of a triangle the last two are one.
+    fn filled(&mut self, layer: &str, corners: [&Point; 4], normal: &Vector) {
+        let Some(side) = self.side(normal) else { return };
+        let corners = corners.map(|corner| self.place(side * corner.x, corner.y));
+        self.filled += 1;
+        self.walls(layer, corners.to_vec(), true);
+    }
+
+    /// The entities of a block, where it stands.
+    fn insert(&mut self, layer: &str, insert: &Insert) {
+        let drawing = self.drawing;
+        let named = |block: &&Block| block.name.eq_ignore_ascii_case(&insert.name);
+        let Some(block) = drawing.blocks().find(named).filter(|block| !block.is_xref()) else {
+            return self.leave_out("blocks (INSERT) that are not in the file");
+        };
+        if self.depth == MAX_DEPTH {
+            return self.leave_out("blocks (INSERT) within too many others");
+        }
+        let Some(side) = self.side(&insert.extrusion_direction) else { return };
+        let outer = (self.frame, self.of_block.take());
+        self.of_block = Some(layer.to_owned());
+        self.depth += 1;
+        let (columns, rows) = (insert.column_count.clamp(1, 1000), insert.row_count.clamp(1, 1000));
+        let turn = DAffine2::from_angle(insert.rotation.to_radians());
+        let scale = DAffine2::from_scale(DVec2::new(insert.x_scale_factor, insert.y_scale_factor));
+        let base = DAffine2::from_translation(-DVec2::new(block.base_point.x, block.base_point.y));
+        let at = DAffine2::from_translation(DVec2::new(insert.location.x, insert.location.y));
+        let seen = DAffine2::from_scale(DVec2::new(side, 1.0));
+        for (column, row) in (0..columns).flat_map(|column| (0..rows).map(move |row| (column, row)))
+        {
+            let [column, row] = [column, row].map(f64::from);
+            let aside = DVec2::new(column * insert.column_spacing, row * insert.row_spacing);
+            self.frame =
+                outer.0 * seen * at * turn * DAffine2::from_translation(aside) * scale * base;
+            for entity in &block.entities {
+                self.add(entity);
+            }
+        }
+        self.depth -= 1;
+        (self.frame, self.of_block) = outer;
+    }
+
+    fn light_polyline(&mut self, layer: &str, line: &LwPolyline) {
+        let vertices = line.vertices.iter().map(|vertex| (vertex.x, vertex.y, vertex.bulge));
+        let vertices: Vec<_> = vertices.collect();
+        self.bulged(layer, &vertices, line.is_closed(), &line.extrusion_direction);
+    }
+
+    fn polyline(&mut self, layer: &str, line: &Polyline) {
+        if line.is_3d_polygon_mesh() || line.is_polyface_mesh() {
+            return self.leave_out("meshes (POLYLINE)");
+        }
+        let vertices = line.vertices().filter(|vertex| !vertex.is_spline_frame_control_point());
+        let vertices = vertices.map(|vertex| (vertex.location.x, vertex.location.y, vertex.bulge));
+        let vertices: Vec<_> = vertices.collect();
+        self.bulged(layer, &vertices, line.is_closed(), &line.normal);
+    }
+
+    /// A row of lines and arcs: x, y, and the bulge of what leads to the next corner, the tangent of a quarter of its
+    /// turn.
+    fn bulged(
+        &mut self,
+        layer: &str,
+        vertices: &[(f64, f64, f64)],
+        is_closed: bool,
+        normal: &Vector,
+    ) {
+        let Some(side) = self.side(normal) else { return };
+        let Some(&first) = vertices.first() else { return };
+        let flat = |vertex: (f64, f64, f64)| DVec2::new(side * vertex.0, vertex.1);
+        let mut corners = vec![self.at(flat(first))];
+        let next = vertices.iter().skip(1).copied().chain(is_closed.then_some(first));
+        for (&from, to) in vertices.iter().zip(next) {
+            let (a, b, bulge) = (flat(from), flat(to), side * from.2);
+            if bulge.abs() < LEAST_BULGE {
+                corners.push(self.at(b));
+                continue;
+            }
+            let center = a.midpoint(b) + (b - a).perp() * ((1.0 - bulge * bulge) / (4.0 * bulge));
+            corners.extend(self.arc_about(center, a, 4.0 * bulge.atan()));
+        }
+        self.walls(layer, corners, is_closed);
+    }
+
+    fn circle(&mut self, layer: &str, circle: &Circle) {
+        let Some(side) = self.side(&circle.normal) else { return };
+        let center = DVec2::new(side * circle.center.x, circle.center.y);
+        if self.is_uniform() {
+            let radius_m = self.scale_m() * circle.radius;
+            let center = self.at(center);
+            self.shapes.push(Shape::Round { layer: layer.to_owned(), center, radius_m });
+        } else {
+            let from = center + DVec2::new(circle.radius, 0.0);
+            let corners = self.arc_about(center, from, std::f64::consts::TAU);
+            self.walls(layer, corners, true);
+        }
+    }
+
+    fn arc(&mut self, layer: &str, drawn: &Arc) {
+        let Some(side) = self.side(&drawn.normal) else { return };
+        let Arc { center: Point { x, y, .. }, radius, start_angle, end_angle, .. } = *drawn;
+        let center = DVec2::new(side * x, y);
+        let from = DVec2::from_angle(start_angle.to_radians()) * radius;
+        let from = center + DVec2::new(side * from.x, from.y);
+        let turn_deg = (end_angle - start_angle).rem_euclid(360.0);
+        let mut corners = vec![self.at(from)];
+        corners.extend(self.arc_about(center, from, side * turn_deg.to_radians()));
+        self.walls(layer, corners, false);
+    }
+
+    /// Corners along an arc of the drawing, as fine as its size in metres asks for.
+    fn arc_about(&self, center: DVec2, from: DVec2, turn_rad: f64) -> Vec<DVec2> {
+        let scale_m = self.scale_m().max(f64::MIN_POSITIVE);
+        let corners = arc(scale_m * center, scale_m * from, turn_rad);
+        corners.map(|corner| self.at(corner / scale_m)).collect()
+    }
+
+    /// Metres a unit, the greater of those along two axes.
+    fn scale_m(&self) -> f64 {
+        self.frame.matrix2.x_axis.length().max(self.frame.matrix2.y_axis.length())
+    }
+
+    /// Whether circles stay circles.
+    fn is_uniform(&self) -> bool {
+        let [x, y] = [self.frame.matrix2.x_axis, self.frame.matrix2.y_axis];
+        let size = x.length().max(y.length());
+        (x.length() - y.length()).abs() < 1e-6 * size && x.dot(y).abs() < 1e-6 * size * size
+    }
+
+    /// 1 for what is drawn as it is seen from above, -1 for what is mirrored, because it is seen from below; the rest
+    /// does not stand upright.
+    fn side(&mut self, normal: &Vector) -> Option<f64> {
+        let along_z =
+            normal.z / (normal.x * normal.x + normal.y * normal.y + normal.z * normal.z).sqrt();
+        if along_z.abs() > 1.0 - 1e-6 {
+            return Some(along_z.signum());
+        }
+        self.leave_out("outlines that are not level");
+        None
+    }
+
+    fn at(&self, point: DVec2) -> DVec2 {
+        self.frame.transform_point2(point)
+    }
+
+    fn place(&self, x: f64, y: f64) -> DVec2 {
+        self.at(DVec2::new(x, y))
+    }
+}
+
+/// The kind of an entity that makes no wall.
+const fn kind(entity: &EntityType) -> &'static str {
+    match entity {
+        EntityType::Spline(_) | EntityType::Ellipse(_) | EntityType::Helix(_) => {
+            "splines and ellipses"
+        }
+        EntityType::MLine(_) => "multiple lines (MLINE)",
+        EntityType::Face3D(_)
+        | EntityType::Solid3D(_)
+        | EntityType::Body(_)
+        | EntityType::Region(_) => "faces, regions and solids (3DFACE, REGION, 3DSOLID)",
+        EntityType::Text(_)
+        | EntityType::MText(_)
+        | EntityType::RText(_)
+        | EntityType::ArcAlignedText(_)
+        | EntityType::Attribute(_)
+        | EntityType::AttributeDefinition(_) => "texts",
+        EntityType::RotatedDimension(_)
+        | EntityType::RadialDimension(_)
+        | EntityType::DiameterDimension(_)
+        | EntityType::AngularThreePointDimension(_)
+        | EntityType::OrdinateDimension(_)
+        | EntityType::Leader(_)
+        | EntityType::Tolerance(_) => "dimensions and leaders",
+        EntityType::Image(_)
+        | EntityType::OleFrame(_)
+        | EntityType::Ole2Frame(_)
+        | EntityType::Wipeout(_)
+        | EntityType::DgnUnderlay(_)
+        | EntityType::DwfUnderlay(_)
+        | EntityType::PdfUnderlay(_) => "images and underlays",
+        EntityType::Ray(_) | EntityType::XLine(_) => "lines without end (RAY, XLINE)",
+        EntityType::ModelPoint(_) => "points",
+        EntityType::Shape(_) => "shapes of fonts (SHAPE)",
+        _ => "other entities",
+    }
+}
+
+/// Less than this is straight: a turn of a thousandth of a degree.
+const LEAST_BULGE: f64 = 4e-6;

@@ -1,0 +1,143 @@
+//! Shapes of collisions, cut at the height of the ranger.
+
+use glam::{DAffine3, DVec3};
+use roxmltree::Node;
+
+use super::{
+    super::super::{Failure, Outcome},
+    Body, World, child,
+};
+
+impl World<'_> {
+    /// The shape of a collision, in its frame.
+    pub(super) fn geometry(&mut self, geometry: Node, body: Body, frame: &DAffine3) -> Outcome {
+        let Body { name, scale } = body;
+        for shape in geometry.children().filter(Node::is_element) {
+            match shape.tag_name().name() {
+                "box" => {
+                    let half = 0.5 * scale * DVec3::from(self.numbers_of(shape, "size")?);
+                    self.upright_box(name, frame, half);
+                }
+                "cylinder" => {
+                    let [radius_m] = self.numbers_of(shape, "radius")?;
+                    let [length_m] = self.numbers_of(shape, "length")?;
+                    if (scale.x - scale.y).abs() > 1e-6 * scale.x.abs() {
+                        self.notes.push(format!(
+                            "left out: a cylinder of `{name}` that is scaled to an oval"
+                        ));
+                        continue;
+                    }
+                    self.cylinder(name, frame, scale.x * radius_m, scale.z * length_m);
+                }
+                "polyline" => self.outline(shape, body, frame)?,
+                "plane" => self.plane(shape, name, frame)?,
+                "empty" => {}
+                kind => {
+                    self.found.leave_out("meshes, spheres and other shapes");
+                    self.notes.push(format!("left out: {kind} of `{name}`"));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// A plane is the ground, unless it stands.
+    fn plane(&mut self, shape: Node, name: &str, frame: &DAffine3) -> Outcome {
+        let normal = match child(shape, "normal") {
+            Some(normal) => DVec3::from(self.numbers(normal)?),
+            None => DVec3::Z,
+        };
+        if (frame.matrix3 * normal.normalize_or(DVec3::Z)).z.abs() < UPRIGHT {
+            self.notes.push(format!("left out: a plane of `{name}` that is not level"));
+        }
+        Ok(())
+    }
+
+    /// A box that stands on one of its sides, half as long along its axes as `half` says, metres.
+    fn upright_box(&mut self, name: &str, frame: &DAffine3, half: DVec3) {
+        let Some(up) = axis_up(frame) else { return self.lean(name) };
+        if !self.cuts(frame.translation.z, half[up]) {
+            return;
+        }
+        let along = |axis: usize| half[axis] * frame.matrix3.col(axis).truncate();
+        let (a, b) = (along((up + 1) % 3), along((up + 2) % 3));
+        let corners =
+            [-a - b, a - b, a + b, b - a].map(|corner| frame.translation.truncate() + corner);
+        self.found.walls(name, corners.to_vec(), true);
+    }
+
+    fn cylinder(&mut self, name: &str, frame: &DAffine3, radius_m: f64, length_m: f64) {
+        if axis_up(frame) != Some(AXIS_Z) {
+            self.lean(name);
+        } else if self.cuts(frame.translation.z, 0.5 * length_m) {
+            self.found.round(name, frame.translation.truncate(), radius_m);
+        }
+    }
+
+    /// An outline that stands on its frame's ground.
+    fn outline(&mut self, shape: Node, Body { name, scale }: Body, frame: &DAffine3) -> Outcome {
+        let [height_m] = self.numbers_of(shape, "height")?;
+        let height_m = scale.z * height_m;
+        let points = shape.children().filter(|child| child.has_tag_name("point"));
+        let corners = points.map(|point| {
+            let [x, y] = self.numbers(point)?;
+            Ok(frame.transform_point3(scale * DVec3::new(x, y, 0.0)).truncate())
+        });
+        let corners = corners.collect::<Result<Vec<_>, Failure>>()?;
+        if axis_up(frame) != Some(AXIS_Z) {
+            self.lean(name);
+        } else {
+            let up_m = height_m * frame.matrix3.z_axis.z.signum();
+            if self.cuts(frame.translation.z + 0.5 * up_m, 0.5 * height_m) {
+                self.found.walls(name, corners, true);
+            }
+        }
+        Ok(())
+    }
+
+    fn lean(&mut self, name: &str) {
+        self.found.leave_out(LEANS);
+        self.notes.push(format!("left out: a body of `{name}` that leans or lies"));
+    }
+
+    /// Whether the height of the cut meets a body whose middle is so high, metres.
+    fn cuts(&self, middle_z_m: f64, half_m: f64) -> bool {
+        (self.args.cut_z_m - middle_z_m).abs() <= half_m
+    }
+
+    /// The numbers of an element's child.
+    pub(super) fn numbers_of<const N: usize>(
+        &self,
+        element: Node,
+        name: &str,
+    ) -> Result<[f64; N], Failure> {
+        match child(element, name) {
+            Some(child) => self.numbers(child),
+            None => {
+                Err(self.refuse(element, &format!("{} has no {name}", element.tag_name().name())))
+            }
+        }
+    }
+
+    pub(super) fn numbers<const N: usize>(&self, element: Node) -> Result<[f64; N], Failure> {
+        let text = element.text().unwrap_or_default().trim();
+        let numbers: Option<Vec<f64>> = text
+            .split_whitespace()
+            .map(|number| number.parse().ok().filter(|number: &f64| number.is_finite()))
+            .collect();
+        numbers.and_then(|numbers| numbers.try_into().ok()).ok_or_else(|| {
+            let name = element.tag_name().name();
+            self.refuse(element, &format!("{name} is `{text}`: {N} numbers are wanted"))
+        })
+    }
+}
+
+const LEANS: &str = "bodies that lean or lie";
+const AXIS_Z: usize = 2;
+/// Cosine of the lean that is none: a quarter of a degree.
+const UPRIGHT: f64 = 1.0 - 1e-5;
+
+/// The axis of a frame that is upright: 0 to 2 for x, y, z.
+fn axis_up(frame: &DAffine3) -> Option<usize> {
+    (0..3).find(|axis| frame.matrix3.col(*axis).z.abs() > UPRIGHT)
+}

@@ -1,0 +1,204 @@
+//! Questions of `sonard import`: each option that a message offers exists, and following it gives right readings.
+
+use std::fs;
+
+use super::{done, refused};
+use crate::common::Log;
+
+/// The words of a command as a shell splits them.
+fn split(text: &str) -> Vec<String> {
+    let (mut words, mut word, mut quote) = (Vec::new(), String::new(), None);
+    for c in text.chars() {
+        match (quote, c) {
+            (None, '\'') => quote = Some(c),
+            (Some(_), '\'') => quote = None,
+            (None, ' ') => {
+                words.extend(Some(std::mem::take(&mut word)).filter(|word| !word.is_empty()))
+            }
+            _ => word.push(c),
+        }
+    }
+    words.extend(Some(word).filter(|word| !word.is_empty()));
+    words
+}
+
+/// Options with a value behind them.
+const WITH_VALUE: [&str; 6] =
+    ["--columns", "--decimal", "--range-unit", "--time-format", "--azimuth-deg", "--utc-offset"];
+
+/// The answers that a message offers, the words of each.
+fn offered(said: &str) -> Vec<Vec<String>> {
+    let mut answers: Vec<Vec<String>> = Vec::new();
+    let mut words = split(said).into_iter().peekable();
+    let mut is_going_on = false;
+    while let Some(word) = words.next() {
+        let option = word.trim_end_matches([';', ',']).to_owned();
+        if !option.starts_with("--") || option == "--as-said" {
+            is_going_on = false;
+            continue;
+        }
+        if !std::mem::replace(&mut is_going_on, true) {
+            answers.push(Vec::new());
+        }
+        let ends = word.ends_with(';');
+        let answer = answers.last_mut().expect("begun");
+        let takes_value = WITH_VALUE.contains(&option.as_str());
+        answer.push(option);
+        if takes_value {
+            let value = words.next().expect("a value");
+            answer.push(value.trim_end_matches([';', ',']).replace("DEG", "90"));
+            is_going_on = !value.ends_with(';');
+        }
+        is_going_on &= !ends;
+    }
+    answers
+}
+
+/// Azimuth in whole degrees and range in centimetres of each reading.
+fn readings(log: &str) -> Vec<(i64, Option<i64>)> {
+    let cm =
+        |ping: &serde_json::Value| ping["range_m"].as_f64().map(|m| (100.0 * m).round() as i64);
+    let deg = |ping: &serde_json::Value| {
+        ping["azimuth_deg"].as_f64().expect("a direction").round() as i64
+    };
+    Log::parse(log).pings().iter().map(|ping| (deg(ping), cm(ping))).collect()
+}
+
+/// A row each ten degrees.
+fn rows(header: &str, row: impl Fn(i32) -> String) -> String {
+    let rows: String = (0..36).map(|at| format!("{}\n", row(at))).collect();
+    format!("{header}\n{rows}")
+}
+
+const fn cm(at: i32) -> i32 {
+    120 + at * 7 % 11
+}
+
+#[test]
+fn every_offered_option_is_accepted_and_the_right_one_gives_right_readings() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let expected: Vec<_> =
+        (0..36).map(|at| (10 * i64::from(at), Some(i64::from(cm(at))))).collect();
+    let third: Vec<_> =
+        expected.iter().map(|&(deg, cm)| (deg, cm.filter(|_| deg / 10 % 3 != 0))).collect();
+    let fixed: Vec<_> = expected.iter().map(|&(_, cm)| (90, cm)).collect();
+    let with = |constant: &'static str| {
+        move |at: i32| match at % 3 {
+            0 => format!("{},{constant}", 10 * at),
+            _ => format!("{},{}", 10 * at, cm(at)),
+        }
+    };
+    let names = "angle_deg,distance_cm";
+    for (name, text, right) in [
+        ("longest", rows(names, with("400")), &third),
+        ("beyond", rows(names, with("65535")), &third),
+        ("zero", rows(names, with("0")), &third),
+        ("minus one", rows(names, with("-1")), &third),
+        (
+            "metres",
+            rows(names, |at| format!("{},{}", 10 * at, f64::from(cm(at)) / 100.0)),
+            &expected,
+        ),
+        ("millimetres", rows(names, |at| format!("{},{}", 10 * at, 10 * cm(at))), &expected),
+        (
+            "radians",
+            rows(names, |at| format!("{:.4},{}", f64::from(10 * at).to_radians(), cm(at))),
+            &expected,
+        ),
+        (
+            "no unit",
+            rows("angle_deg,min_range,range", |at| format!("{},2,{}", 10 * at, cm(at))),
+            &expected,
+        ),
+        (
+            "blanks in names",
+            rows("Lage [deg],Mess wert [cm]", |at| format!("{},{}", 10 * at, cm(at))),
+            &expected,
+        ),
+        (
+            "two ranges",
+            rows("angle_deg,raw range_cm,range_cm", |at| format!("{},1,{}", 10 * at, cm(at))),
+            &expected,
+        ),
+        ("fixed", rows("n,distance_cm", |at| format!("{at},{}", cm(at))), &fixed),
+        (
+            "the echo's place",
+            rows("angle_deg,distance_cm,x_cm,y_cm", |at| {
+                let (sin, cos) = f64::from(10 * at).to_radians().sin_cos();
+                format!(
+                    "{},{},{:.1},{:.1}",
+                    10 * at,
+                    cm(at),
+                    f64::from(cm(at)) * cos,
+                    f64::from(cm(at)) * sin
+                )
+            }),
+            &expected,
+        ),
+        (
+            "dates",
+            rows("time,angle_deg,distance_cm", |at| {
+                format!("01/02/2026 12:00:{at:02},{},{}", 10 * at, cm(at))
+            }),
+            &expected,
+        ),
+        (
+            "commas",
+            rows("angle_deg;distance_mm", |at| format!("{};1,{:03}", 10 * at, 10 * cm(at) - 1000)),
+            &expected,
+        ),
+    ] {
+        let path = folder.path().join("table.csv");
+        fs::write(&path, text).expect("writes");
+        let path = path.to_str().expect("a plain path");
+        let given = ["import", path, "--sensor", "hc-sr04"];
+        let said = refused(&given);
+        let answers = offered(&said);
+        assert!(!answers.is_empty(), "{name}: {said}");
+        let read: Vec<_> = answers
+            .iter()
+            .filter_map(|answer| {
+                let arguments = given.iter().copied().chain(answer.iter().map(String::as_str));
+                let output = crate::common::run(&arguments.collect::<Vec<_>>());
+                let text = crate::common::stderr(&output);
+                assert!(
+                    !text.contains("unexpected argument") && !text.contains("invalid value"),
+                    "{name}: {answer:?}: {text}"
+                );
+                output.status.success().then(|| String::from_utf8(output.stdout).expect("text"))
+            })
+            .collect();
+        assert!(read.iter().any(|log| readings(log) == **right), "{name}: {answers:?}");
+    }
+}
+
+#[test]
+fn a_dry_run_tells_and_draws_but_writes_no_log() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = |name: &str| folder.path().join(name).to_str().expect("a plain path").to_owned();
+    fs::write(
+        path("a.csv"),
+        rows("angle_deg,distance_cm,n", |at| format!("{},{},7", 10 * at, cm(at))),
+    )
+    .expect("writes");
+    let output = crate::common::run(&[
+        "import",
+        &path("a.csv"),
+        "--dry-run",
+        "--picture",
+        &path("a.svg"),
+        "--scene",
+        "simple-room",
+    ]);
+    let said = crate::common::stderr(&output);
+    assert!(output.status.success() && output.stdout.is_empty(), "{said}");
+    for part in
+        ["by the header", "columns not used: `n`", "counter-clockwise", "1 scans, 36 readings"]
+    {
+        assert!(said.contains(part), "{part}: {said}");
+    }
+    assert!(fs::read_to_string(path("a.svg")).expect("drawn").starts_with("<svg"));
+    refused(&["import", &path("a.csv"), "--dry-run", "-o", &path("a.jsonl")]);
+    done(&["import", &path("a.csv"), "-o", &path("a.jsonl"), "--picture", &path("a.png")]);
+    assert!(fs::read(path("a.png")).expect("drawn").starts_with(b"\x89PNG"));
+}
