@@ -8,7 +8,7 @@ use sonard::{
     store::{LogWriter, read_log},
 };
 
-const LOG: &str = include_str!("../tests/fixtures/small.jsonl");
+const LOG: &str = include_str!("../../tests/fixtures/small.jsonl");
 const RECORDS: u64 = 1000;
 
 fn ping() -> Record {
