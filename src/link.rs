@@ -98,11 +98,15 @@ fn is_console(metadata: &fs::Metadata) -> bool {
     matches!((rustix::fs::major(device), rustix::fs::minor(device)), (5, 0 | 2) | (4, 0..64))
 }
 
-/// Whether it can be opened and is no terminal at all, such as `/dev/null`. Asked only of what could
-/// not be opened as a line: opening resets many a board.
-fn is_no_terminal(path: &Path) -> bool {
+/// `true` if a path can be opened and is no terminal at all, such as `/dev/null`. Tried only if it could
+/// not be opened as a line, because opening resets many a board.
+///
+/// # Errors
+/// If it can't be opened either, with the number that the other error has lost.
+fn is_no_terminal(path: &Path) -> Result<bool, Errno> {
     let flags = OFlags::RDONLY | OFlags::NONBLOCK | OFlags::NOCTTY | OFlags::CLOEXEC;
-    rustix::fs::open(path, flags, Mode::empty()).is_ok_and(|file| !rustix::termios::isatty(file))
+    let file = rustix::fs::open(path, flags, Mode::empty())?;
+    Ok(!rustix::termios::isatty(file))
 }
 
 /// `true` if the kernel denies access by another rule than the file's permissions: those give EACCES,
@@ -126,8 +130,11 @@ fn classify(path: &Path, error: serialport::Error) -> LinkError {
             port: port.display().to_string(),
             present: PortFolders::system().present(),
         },
-        _ if is_no_terminal(path) => LinkError::NotSerial(port),
-        _ => LinkError::Io { port, source: error.into() },
+        _ => match is_no_terminal(path) {
+            Ok(true) => LinkError::NotSerial(port),
+            Ok(false) => LinkError::Io { port, source: error.into() },
+            Err(error) => LinkError::Io { port, source: error.into() },
+        },
     }
 }
 

@@ -250,7 +250,8 @@ fn parse(text: &str) -> Result<Sample, Fault> {
     }
     if !text.contains("crc=") && !text.contains("t=") {
         // The first register of a `w1_slave` that is cut off looks like a number.
-        if !text.ends_with('\n') && text.len() <= 2 && text != "0" {
+        let number = text.trim();
+        if !text.ends_with('\n') && number.len() <= 2 && number != "0" {
             return Err(Fault::CutOff("the end of the line"));
         }
         let thousandths = parse_thousandths(text)?;

@@ -1,6 +1,6 @@
 //! Async runtime of the verbs that use a device or a daemon.
 
-use std::time::Duration;
+use std::{io, time::Duration};
 
 use tokio::runtime::{Builder, Runtime};
 
@@ -9,12 +9,20 @@ pub(super) use crate::interrupts::Interrupts;
 
 /// Time allowed for tasks and blocking calls that are left when a verb has ended.
 const SHUTDOWN_TIMEOUT: Duration = Duration::from_millis(500);
+/// Pairs of file descriptors that must be free for the runtime to start: its library panics where it gets none for
+/// signals.
+const DESCRIPTOR_PAIRS: usize = 6;
 
 /// A runtime of two threads.
 ///
 /// # Errors
 /// When the system refuses threads or descriptors.
 pub(super) fn new() -> Result<Runtime, Failure> {
+    let spare: io::Result<Vec<_>> = (0..DESCRIPTOR_PAIRS).map(|_| io::pipe()).collect();
+    spare.map_err(|error| {
+        let help = "raise the limit of file descriptors (`ulimit -n`, `LimitNOFILE=` of a unit)";
+        Failure::device(format!("cannot start: {error}"), help)
+    })?;
     Builder::new_multi_thread().worker_threads(2).enable_all().build().map_err(|error| {
         Failure::device(format!("cannot start: {error}"), "free some threads or memory")
     })

@@ -54,7 +54,7 @@ pub enum LinkError {
     #[error("the device policy of this service or container does not allow {0}")]
     DevicePolicy(PathBuf),
     /// Another program has it open.
-    #[error("{} is in use by {}", port.display(), holders.describe("another program"))]
+    #[error("{} is in use by another program{}", port.display(), holders.suffix())]
     Busy {
         /// The port's path.
         port: PathBuf,
@@ -139,13 +139,14 @@ impl LinkError {
                  allowed yet; in a container, pass {} on",
                 port.display()
             ),
-            Self::Busy { port, holders } => holders.advice(port).unwrap_or_else(|| {
-                format!(
+            Self::Busy { port, holders } => match holders.advice(port) {
+                Some(advice) => format!("{advice}; `sudo fuser -v {}` lists them", port.display()),
+                None => format!(
                     "find the program with `sudo fuser -v {}` and stop it; a running daemon owns \
                      its port",
                     port.display()
-                )
-            }),
+                ),
+            },
             Self::NotSerial(_) => {
                 "give a character device such as /dev/ttyACM0, or the link a mock made".into()
             }

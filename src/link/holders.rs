@@ -1,7 +1,8 @@
 //! Programs that have a port open, from `/proc`.
 
 use std::{
-    fs,
+    ffi::OsStr,
+    fs, io,
     os::unix::fs::MetadataExt as _,
     path::{Path, PathBuf},
 };
@@ -52,10 +53,9 @@ pub fn find_holders(path: &Path) -> Holders {
         match port.is_held_by(&process.path()) {
             Ok(true) => holders.found.push(Holder::read(pid, &process.path())),
             Ok(false) => {}
-            Err(error) => {
-                // A process that has ended meanwhile holds nothing.
-                holders.is_partial |= error.kind() == std::io::ErrorKind::PermissionDenied;
-            }
+            // A process that has ended meanwhile holds nothing.
+            Err(error) if error.kind() == io::ErrorKind::NotFound => {}
+            Err(_) => holders.is_partial = true,
         }
     }
     holders.found.sort_by_key(|holder| holder.pid);
@@ -77,6 +77,11 @@ impl Holders {
         let names =
             self.found.iter().map(|Holder { pid, command, .. }| format!("`{command}` (pid {pid})"));
         names.collect::<Vec<_>>().join(", ")
+    }
+
+    /// The same after a colon; empty if there are none.
+    pub(super) fn suffix(&self) -> String {
+        if self.found.is_empty() { String::new() } else { format!(": {}", self.describe("")) }
     }
 
     /// A remedy for each of them; `None` if there are none.
@@ -147,13 +152,13 @@ impl PortNode {
     }
 
     /// # Errors
-    /// If the process has ended, or this user may not see its files.
-    fn is_held_by(&self, process: &Path) -> std::io::Result<bool> {
+    /// If the process has ended, or its files can't be examined.
+    fn is_held_by(&self, process: &Path) -> io::Result<bool> {
         let mut is_held = false;
         for file in fs::read_dir(process.join("fd"))?.flatten() {
             // Only device nodes are examined further: a file on a dead network share would block.
             let Ok(target) = fs::read_link(file.path()) else { continue };
-            if self.is_other_end(process, &file.file_name(), &target) {
+            if self.is_other_end(process, &file.file_name(), &target)? {
                 return Ok(false);
             }
             is_held |= is_device_path(&target)
@@ -166,13 +171,14 @@ impl PortNode {
     }
 
     /// `true` for the master of the pseudo-terminal.
-    fn is_other_end(&self, process: &Path, file: &std::ffi::OsStr, target: &Path) -> bool {
+    fn is_other_end(&self, process: &Path, file: &OsStr, target: &Path) -> io::Result<bool> {
         if self.devpts.is_none() || target.file_name().is_none_or(|name| name != "ptmx") {
-            return false;
+            return Ok(false);
         }
-        let info = fs::read_to_string(process.join("fdinfo").join(file)).unwrap_or_default();
+        let info = fs::read_to_string(process.join("fdinfo").join(file))?;
         let index = info.lines().find_map(|line| line.strip_prefix("tty-index:"));
-        index.and_then(|index| index.trim().parse().ok()) == Some(rustix::fs::minor(self.device))
+        let index = index.and_then(|index| index.trim().parse().ok());
+        Ok(index == Some(rustix::fs::minor(self.device)))
     }
 }
 

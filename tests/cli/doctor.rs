@@ -262,6 +262,32 @@ fn program_that_reads_the_port_is_named_before_anything_is_moved() {
 }
 
 #[test]
+fn few_descriptors_are_an_error_with_its_name_and_no_panic() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mock = MockProcess::start(folder.path(), &[]);
+    let mut named = 0;
+    for limit in 4..28 {
+        let program = env!("CARGO_BIN_EXE_sonard");
+        let port = mock.port();
+        let command = format!(
+            "ulimit -n {limit}; {program} doctor; exec {program} doctor --port {port} --no-motion --pings 1"
+        );
+        let output = std::process::Command::new("sh").args(["-c", &command]).output();
+        let output = output.expect("the shell starts");
+        let text = String::from_utf8_lossy(&output.stdout).into_owned() + &stderr(&output);
+        assert!(!text.contains("panicked"), "{limit}: {text}");
+        assert!(!text.contains("has it open, too"), "{limit}: {text}");
+        let code = output.status.code();
+        assert!(
+            code == Some(0) || text.contains("Too many open files"),
+            "{limit}: {code:?} {text}"
+        );
+        named += u32::from(code != Some(0));
+    }
+    assert!(named > 0, "the limits are too generous for this test");
+}
+
+#[test]
 fn program_that_locks_the_port_is_named() {
     let folder = tempfile::tempdir().expect("a folder");
     let mock = MockProcess::start(folder.path(), &[]);

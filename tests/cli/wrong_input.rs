@@ -100,7 +100,8 @@ fn a_busy_port() {
     // Once it has written something, it has the port.
     let mut byte = [0];
     std::io::Read::read_exact(first.stdout.as_mut().expect("piped"), &mut byte).expect("writes");
-    check(&arguments, 3, &["in use by another program", "fuser"]);
+    let holder = format!("(pid {})", first.id());
+    check(&arguments, 3, &["in use by another program", "fuser", &holder]);
     first.kill().expect("it runs");
     first.wait().expect("it ends");
 }
