@@ -6,7 +6,7 @@ use bytes::Bytes;
 use jiff::Timestamp;
 use rumqttc::Publish;
 use tokio::{
-    task::{JoinError, JoinHandle},
+    task::JoinError,
     time::{Instant, MissedTickBehavior, interval, sleep},
 };
 use tokio_util::sync::CancellationToken;
@@ -15,8 +15,8 @@ use super::{
     account::Account,
     commands::{Asked, Clerk},
     connection::{Connection, Loss, News},
-    diagnosis::{Cause, Diagnosis, Finding, Sending},
-    log_side::{Errand, LogSide, Outcome},
+    diagnosis::{Cause, Diagnosis, Finding, STEADY, Sending},
+    log_side::{Errand, Errands, LogSide, Outcome, back},
     patience::Patience,
     status::StatusNews,
     topics::{Kind, Topics},
@@ -30,8 +30,6 @@ const LOOK: Duration = Duration::from_millis(100);
 const TELL: Duration = Duration::from_secs(1);
 /// A broker that acknowledges nothing for so long does not do its part.
 const SILENCE: Duration = Duration::from_secs(30);
-/// A connection that lasts so long is not one that is ended again and again.
-const STEADY: Duration = Duration::from_secs(120);
 /// How long the end may take.
 const FAREWELL: Duration = Duration::from_secs(3);
 /// How long the broker may take to hear that it is.
@@ -491,15 +489,5 @@ impl Courier {
         let told = [cause, line, log, commands].into_iter().flatten().next();
         self.report.trouble = told.cloned();
         self.daemon.report_mqtt(self.report.clone());
-    }
-}
-
-type Errands = JoinHandle<(LogSide, Outcome)>;
-
-/// What came of the errand under way; never, if there is none. Cancel-safe.
-async fn back(errand: &mut Option<Errands>) -> Result<(LogSide, Outcome), JoinError> {
-    match errand {
-        Some(errand) => errand.await,
-        None => std::future::pending().await,
     }
 }

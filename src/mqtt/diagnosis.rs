@@ -16,7 +16,7 @@ const STRIKES: u8 = 2;
 /// Losses in a row without a message to blame until another client is suspected.
 const UNEXPLAINED: u8 = 4;
 /// A connection that lasts so long ends such a row.
-const STEADY: Duration = Duration::from_secs(120);
+pub(super) const STEADY: Duration = Duration::from_secs(120);
 
 /// A message that is under way.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -2,7 +2,7 @@
 
 use std::{io, path::PathBuf};
 
-use tokio::task::{JoinHandle, spawn_blocking};
+use tokio::task::{JoinError, JoinHandle, spawn_blocking};
 
 use super::{
     bookmark::Bookmark,
@@ -54,5 +54,16 @@ impl LogSide {
         let piece = errand.read.map(|bytes| self.tail.read(bytes));
         let behind_bytes = errand.behind.and_then(|place| self.tail.behind(&place).ok());
         Outcome { piece, remembered, behind_bytes }
+    }
+}
+
+/// An errand under way.
+pub(super) type Errands = JoinHandle<(LogSide, Outcome)>;
+
+/// What came of the errand under way; never, if there is none. Cancel-safe.
+pub(super) async fn back(errand: &mut Option<Errands>) -> Result<(LogSide, Outcome), JoinError> {
+    match errand {
+        Some(errand) => errand.await,
+        None => std::future::pending().await,
     }
 }
