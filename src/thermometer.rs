@@ -218,6 +218,10 @@ impl Thermometer {
                 let (send, receive) = oneshot::channel();
                 let file = self.file.clone();
                 let thread = std::thread::Builder::new().name("thermometer".into());
+                #[allow(
+                    clippy::disallowed_methods,
+                    reason = "its end is received as the end of a channel"
+                )]
                 let started = thread.spawn(move || drop(send.send(read_sample(&file))));
                 started.map_err(|error| Fault::Unreadable(format!("no thread for it: {error}")))?;
                 receive

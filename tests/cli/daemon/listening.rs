@@ -10,7 +10,9 @@ use std::{
 
 use serde_json::{Value, json};
 
-use super::{Daemon, Signal, ask, write_token};
+use rustix::process::Signal;
+
+use super::{Daemon, ask, write_token};
 use crate::common::{run, stderr, wait_until};
 
 fn health_by_tcp(address: &str) -> Value {

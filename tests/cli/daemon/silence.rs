@@ -7,7 +7,9 @@ use std::{
     time::{Duration, Instant},
 };
 
-use super::{Daemon, Signal};
+use rustix::process::Signal;
+
+use super::Daemon;
 use crate::common::{sonard, wait_until};
 
 /// A client has detected a daemon's silence by then.
