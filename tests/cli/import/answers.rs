@@ -13,7 +13,7 @@ fn split(text: &str) -> Vec<String> {
             (None, '\'') => quote = Some(c),
             (Some(_), '\'') => quote = None,
             (None, ' ') => {
-                words.extend(Some(std::mem::take(&mut word)).filter(|word| !word.is_empty()))
+                words.extend(Some(std::mem::take(&mut word)).filter(|word| !word.is_empty()));
             }
             _ => word.push(c),
         }
