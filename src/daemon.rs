@@ -9,6 +9,7 @@
 //!
 //! [`LinkMachine`] and [`Agenda`] are pure and decide; the operator carries out their decisions and reports the
 //! outcome to them. [`prepare`] wires them, and [`Daemon::run`] returns when all are done.
+#![warn(clippy::expect_used, clippy::indexing_slicing, clippy::panic)]
 
 mod agenda;
 mod air;

@@ -2,6 +2,7 @@
 //!
 //! Each is asked by itself, in a time and a number of bytes that are bounded: one that is silent,
 //! refuses, or answers something else delays no other. [`judge`] and [`Roll`] are pure.
+#![warn(clippy::expect_used, clippy::indexing_slicing, clippy::panic)]
 
 mod ask;
 mod judge;

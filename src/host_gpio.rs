@@ -1,5 +1,6 @@
 //! Pins of the computer that the ranger hangs on: reset line, module's power, home switch,
 //! emergency stop and status light. Behind a trait, because most computers have none of them.
+#![warn(clippy::expect_used, clippy::indexing_slicing, clippy::panic)]
 
 use thiserror::Error;
 

@@ -1,4 +1,5 @@
 //! Serial lines: finding, opening and locking them, with errors that tell causes apart.
+#![warn(clippy::expect_used, clippy::indexing_slicing, clippy::panic)]
 
 mod adapter;
 mod error;

@@ -3,6 +3,7 @@
 //! Standard error can be closed, full (a pipe without reader, a stopped terminal, a stuck journal) or gone with its
 //! terminal. A message must neither fail nor block the task that emits it, so messages pass through a bounded queue to
 //! a thread of its own. When the queue is full, messages are dropped and counted.
+#![warn(clippy::expect_used, clippy::indexing_slicing, clippy::panic)]
 
 use std::{
     collections::VecDeque,

@@ -3,6 +3,7 @@
 //! They come from the log and not from the hub: what the broker has not acknowledged is in the log, whatever
 //! happens to daemon, broker or line. [`window`](Window) knows what is under way and which place of the log is to be
 //! remembered, `diagnosis` which messages a broker does not take; both are pure. The courier owns the client.
+#![warn(clippy::expect_used, clippy::indexing_slicing, clippy::panic)]
 
 mod account;
 mod bookmark;

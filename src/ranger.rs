@@ -1,5 +1,6 @@
 //! Drives a ranger over its protocol: [`Driver`] pumps the host machine on a line, [`Ranger`]
 //! takes scans with it.
+#![warn(clippy::expect_used, clippy::indexing_slicing, clippy::panic)]
 
 mod budget;
 mod clock;

@@ -2,6 +2,7 @@
 //!
 //! One thread follows the daemon's records, as a viewer of Foxglove does, and hands messages to DDS. What waits for that thread
 //! waits in the hub; what waits for subscribers is bounded for each topic (`budget`). Nobody is waited for.
+#![warn(clippy::expect_used, clippy::indexing_slicing, clippy::panic)]
 
 mod budget;
 mod gaps;

@@ -5,6 +5,7 @@
 //! connection, and never one of another's: whoever comes by the unix socket, shows the token, or is
 //! neither, has places and requests a second of their own. The operator, who measures, is a task of
 //! its own and never waits for a client.
+#![warn(clippy::expect_used, clippy::indexing_slicing, clippy::panic)]
 
 mod access;
 mod answer;

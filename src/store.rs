@@ -4,6 +4,7 @@
 //! [`LogWriter`] appends one record with one write. [`read_log`] gives every line of a log with
 //! its record or with what is wrong. [`check`] looks at a whole log, [`repair`] leaves out what
 //! can't be read. [`History`] finds the scans in a folder of logs.
+#![warn(clippy::expect_used, clippy::indexing_slicing, clippy::panic)]
 
 mod check;
 mod error;

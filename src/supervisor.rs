@@ -4,6 +4,7 @@
 //! stopping, is a [`TaskFailure`]; the first one is returned by [`Supervisor::failure`], upon which the daemon shuts
 //! down and exits with a non-zero code, so that the service manager restarts it. `clippy.toml` forbids the plain
 //! spawning functions, so that no task is left out.
+#![warn(clippy::expect_used, clippy::indexing_slicing, clippy::panic)]
 
 use std::{
     any::Any,
@@ -241,6 +242,7 @@ mod fault {
     const DELAY: std::time::Duration = std::time::Duration::from_secs(1);
 
     #[cfg(debug_assertions)]
+    #[expect(clippy::panic, reason = "the fault that a test requests")]
     pub(super) async fn with_panic<F: Future>(task: Task, future: F) -> F::Output {
         if !is_named(task) {
             return future.await;
@@ -252,6 +254,7 @@ mod fault {
     }
 
     #[cfg(debug_assertions)]
+    #[expect(clippy::panic, reason = "the fault that a test requests")]
     pub(super) fn panic_now(task: Task) {
         if is_named(task) {
             std::thread::sleep(DELAY);

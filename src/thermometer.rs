@@ -1,4 +1,5 @@
 //! A thermometer behind a file of a Linux driver (1-wire, hwmon, thermal).
+#![warn(clippy::expect_used, clippy::indexing_slicing, clippy::panic)]
 
 mod file;
 mod plausibility;

@@ -14,7 +14,7 @@ pub fn judged_line(line: &[u8], beside: &Beside) -> Vec<u8> {
         return line.to_vec();
     };
     // The second object's fields take the place of the first one's end.
-    [open, b",", &fields[1..], newline].concat()
+    [open, b",", fields.get(1..).unwrap_or_default(), newline].concat()
 }
 
 #[cfg(test)]

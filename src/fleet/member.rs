@@ -219,14 +219,14 @@ pub fn check_all(members: Vec<Member>) -> Result<Vec<Member>, MemberError> {
         });
     }
     for (i, member) in members.iter().enumerate() {
-        if members[..i].iter().any(|before| before.place == member.place) {
+        if members.iter().take(i).any(|before| before.place == member.place) {
             return Err(MemberError {
                 message: format!("{} is named twice", member.address()),
                 help: "name each daemon once".into(),
             });
         }
         let is_taken = |before: &Member| before.robot.is_some() && before.robot == member.robot;
-        if members[..i].iter().any(is_taken) {
+        if members.iter().take(i).any(is_taken) {
             return Err(MemberError {
                 message: format!("two daemons are of {}", member.robot.as_deref().unwrap_or("")),
                 help: "give each robot a name of its own (fleet.robot)".into(),

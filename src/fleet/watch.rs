@@ -68,17 +68,21 @@ async fn keep(mut roll: Roll, fleet: Vec<Asked>, tell: watch::Sender<Bytes>) {
             Some(news) = news.recv() => news,
             () = tell.closed() => return,
         };
+        // Each daemon reports under the number that it was spawned with.
+        let Some((request, client)) = requests.get_mut(number).zip(clients.get(number)) else {
+            continue;
+        };
         match news {
             News::Answer(answer) => {
                 roll.take(number, *answer, (Timestamp::now(), began.elapsed()));
             }
             News::Picture(scan, picture) => {
-                requests[number].is_pending = false;
+                request.is_pending = false;
                 picture.into_iter().for_each(|picture| roll.show(number, scan, picture));
             }
         }
-        if let Some(scan) = requests[number].next(roll.lacks_picture(number)) {
-            let (client, send) = (clients[number].clone(), send.clone());
+        if let Some(scan) = request.next(roll.lacks_picture(number)) {
+            let (client, send) = (client.clone(), send.clone());
             let turn = Arc::clone(&drawing);
             asking.spawn(async move {
                 let Ok(_turn) = turn.acquire().await else { return };

@@ -119,8 +119,8 @@ impl Window {
 
     /// The next record to send on this connection, with the number that it is acknowledged by.
     pub fn give(&mut self) -> Option<(u64, Message)> {
-        while self.given < self.entries.len().min(MOST_UNDER_WAY) {
-            let entry = &self.entries[self.given];
+        while self.given < MOST_UNDER_WAY {
+            let entry = self.entries.get(self.given)?;
             self.given += 1;
             if let Some(message) = entry.message.as_ref().filter(|_| !entry.is_done) {
                 return Some((self.first + self.given as u64 - 1, message.clone()));

@@ -25,7 +25,10 @@ impl<S: AsyncWrite + Unpin> Worded<S> {
     fn poll_refusal(&mut self, context: &mut Context<'_>) -> Poll<io::Result<()>> {
         let (bytes, written) = &mut self.refusal;
         while *written < bytes.len() {
-            let more = ready!(Pin::new(&mut self.stream).poll_write(context, &bytes[*written..]))?;
+            let more = ready!(
+                Pin::new(&mut self.stream)
+                    .poll_write(context, bytes.get(*written..).unwrap_or_default())
+            )?;
             if more == 0 {
                 return Poll::Ready(Err(io::ErrorKind::WriteZero.into()));
             }

@@ -290,7 +290,8 @@ impl Passage {
             let line = line?;
             let Some(rest) = line.strip_prefix(head.as_bytes()) else { continue };
             let digits = rest.iter().take_while(|byte| byte.is_ascii_digit()).count();
-            let here = std::str::from_utf8(&rest[..digits]).ok().and_then(|text| text.parse().ok());
+            let digits = rest.get(..digits).unwrap_or_default();
+            let here = std::str::from_utf8(digits).ok().and_then(|text| text.parse().ok());
             highest = highest.max(here);
             if here == Some(index)
                 && let Ok(Record::Ping(ping)) = decode_line(line.trim_ascii_end())

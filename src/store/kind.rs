@@ -164,7 +164,7 @@ fn text_of(head: &[u8]) -> Option<&str> {
     let text = match std::str::from_utf8(head) {
         Ok(text) => text,
         Err(error) if error.error_len().is_none() => {
-            std::str::from_utf8(&head[..error.valid_up_to()]).ok()?
+            std::str::from_utf8(head.get(..error.valid_up_to())?).ok()?
         }
         Err(_) => return None,
     };

@@ -20,7 +20,7 @@ impl Mark {
     /// Goes on by what comes next in the log.
     pub fn push(&mut self, bytes: &[u8]) {
         let most = MARK_BYTES as usize;
-        self.0.extend_from_slice(&bytes[bytes.len().saturating_sub(most)..]);
+        self.0.extend_from_slice(bytes.get(bytes.len().saturating_sub(most)..).unwrap_or_default());
         self.0.drain(..self.0.len().saturating_sub(most));
     }
 
@@ -49,7 +49,7 @@ pub fn digest_of(file: &mut File) -> io::Result<(u64, String)> {
             return Ok((bytes, hexadecimal(&hash.finalize())));
         }
         bytes += read as u64;
-        hash.update(&piece[..read]);
+        hash.update(piece.get(..read).unwrap_or_default());
     }
 }
 

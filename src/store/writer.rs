@@ -236,7 +236,7 @@ impl<M: Medium> LogWriter<M> {
     fn write_line(&mut self) -> Result<(), StoreError> {
         let mut written = 0;
         let source = loop {
-            match self.medium.write(&self.line[written..]) {
+            match self.medium.write(self.line.get(written..).unwrap_or_default()) {
                 Ok(0) => break io::ErrorKind::WriteZero.into(),
                 Ok(count) => written += count,
                 Err(error) if error.kind() == io::ErrorKind::Interrupted => {}

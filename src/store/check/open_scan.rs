@@ -59,13 +59,15 @@ fn ranges(indices: &[u32]) -> String {
     let runs: Vec<String> = indices
         .chunk_by(|a, b| a + 1 == *b)
         .map(|run| match run {
-            [one] => one.to_string(),
-            _ => format!("{}-{}", run[0], run[run.len() - 1]),
+            [first, .., last] => format!("{first}-{last}"),
+            run => run.iter().map(ToString::to_string).collect(),
         })
         .collect();
     match runs.len() {
         0 => String::new(),
         1..=8 => format!(": {}", runs.join(", ")),
-        more => format!(": {} and {} more runs", runs[..8].join(", "), more - 8),
+        more => {
+            format!(": {} and {} more runs", runs.get(..8).unwrap_or_default().join(", "), more - 8)
+        }
     }
 }
