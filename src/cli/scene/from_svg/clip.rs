@@ -55,7 +55,7 @@ impl Window {
             let Some((from, to)) = self.seen(from, to) else { continue };
             match parts.last_mut() {
                 Some((part, _)) if part.last().is_some_and(|last| last.distance(from) < 1e-9) => {
-                    part.push(to)
+                    part.push(to);
                 }
                 _ => parts.push((vec![from, to], false)),
             }
