@@ -21,9 +21,9 @@ pub(crate) struct Ways<'a> {
     pub(crate) mapping: &'a Mapping,
     /// Names of the columns.
     pub(crate) names: &'a [String],
-    /// Whether columns have units by their fields.
+    /// True if columns have units by their fields.
     pub(crate) has_columns: bool,
-    /// Whether 0 is what the format's drivers write for no echo.
+    /// True if 0 is what the format's drivers write for no echo.
     pub(crate) zero_is_no_echo: bool,
 }
 
@@ -119,7 +119,7 @@ impl Ranges {
         self.near += u64::from(range_m < taken.least_m.max(MIN_NEAR_M));
     }
 
-    /// What speaks against the mapping; else what was taken for no echo.
+    /// Checks the readings against the mapping; notes on what was taken as no echo.
     pub(crate) fn check(&self, ways: &Ways, taken: &Taken) -> Result<Vec<String>, ImportError> {
         self.check_below(ways)?;
         if !taken.as_said {
@@ -279,7 +279,7 @@ impl Doubts {
         }
     }
 
-    /// What speaks against the mapping; else what was taken for no echo.
+    /// Checks the readings against the mapping; notes on what was taken as no echo.
     pub(crate) fn check(&self, ways: &Ways, taken: &Taken) -> Result<Vec<String>, ImportError> {
         if self.ranges.readings == 0 {
             return Err(ImportError::mapping(
@@ -341,11 +341,11 @@ impl Doubts {
             .collect();
         Err(ImportError::Doubtful {
             what: format!(
-                "{} follow direction and range: the echo's place, not the robot's",
+                "{} follow direction and range: the place of the echo, not of the robot",
                 named.join(" and ")
             ),
             help: format!(
-                "leave them out: {}; --as-said takes them as the robot's",
+                "leave them out: {}; --as-said takes them as the place of the robot",
                 crate::mapping::columns_option(columns, ways.names)
             ),
         })

@@ -2,7 +2,7 @@
 
 use crate::{Field, Quantity};
 
-/// What a name says.
+/// Meaning of a name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Name {
     Field(Field),
@@ -240,7 +240,7 @@ pub(crate) fn is_clockwise(name: &str) -> bool {
     words(name).iter().any(|word| word == "cw" || word == "clockwise")
 }
 
-/// What the name of a column says of it.
+/// Meaning of a column's name.
 pub(crate) fn meaning(name: &str) -> Name {
     let words = words(name);
     let has = |known: &[&str]| words.iter().any(|word| known.contains(&word.as_str()));
