@@ -162,6 +162,10 @@ impl Ranges {
     fn check_constant(&self, ways: &Ways, taken: &Taken) -> Result<(), ImportError> {
         let longest = taken.longest_m / ways.metres(taken.air.sound_speed_m_s());
         let Some(constant) = self.silence.constant(longest) else { return Ok(()) };
+        // Where most ranges are beyond reach, and not by this constant, the unit is wrong.
+        if 2 * self.far >= self.echoes && 2 * constant.count < self.far {
+            return Ok(());
+        }
         let (value, count, of) = (constant.value, constant.count, constant.of);
         let first = constant.first.map(|first| format!(" (first at {first})")).unwrap_or_default();
         let unit = ways.unit();
