@@ -127,7 +127,7 @@ fn description(path: &Path) -> Result<MapYaml, GridFileFault> {
     Ok(MapYaml::from_text(&String::from_utf8_lossy(&bytes))?)
 }
 
-/// What images begin with that are given in place of a description.
+/// First bytes of images that are given in place of a description.
 const IMAGES: [&[u8]; 4] = [PNG, b"P5", b"P2", b"\xff\xd8\xff"];
 
 fn image(path: &Path, yaml: &MapYaml) -> Result<Grid, GridFileFault> {

@@ -56,7 +56,7 @@ pub(super) struct Args {
     #[arg(long, value_name = "SCENE")]
     scene: Option<PathBuf>,
     /// Array of rangers, a preset (`sonard array list`) or a file with an array's data: of a table with a
-    /// range of each ranger in a row, and of a CARMEN or Player log that does not say where its rangers are
+    /// range of each ranger in a row, and of a CARMEN or Player log without the places of its rangers
     #[arg(long, value_name = "NAME|FILE")]
     array: Option<String>,
     /// Accept the numbers as declared, even if they look wrong

@@ -39,7 +39,7 @@ const fn case(
     Case { output, input, arguments }
 }
 
-const CASES: [Case; 36] = [
+const CASES: [Case; 37] = [
     case("plot --output", ("a.svg", LOG), "plot IN -o IN"),
     case("plot --output", ("a.png", LOG), "plot IN -o IN --force"),
     case("plot --output", ("a.svg", SCENE), "plot LOG --scene IN -o IN"),
@@ -79,6 +79,7 @@ const CASES: [Case; 36] = [
     case("map --out", ("map.png", SCENE), "map LOG --scene IN --out DIR --force"),
     case("map --confidences", ("c.jsonl", LOG), "map IN --out DIR/map --confidences IN --force"),
     case("import --output", ("a", TABLE), "import IN -o IN --force"),
+    case("import --picture", ("a.svg", TABLE), "import IN --dry-run --picture IN --force"),
     case("export --output", ("a.csv", LOG), "export IN -o IN --force"),
     case("export --output", ("a.mcap", LOG), "export IN -o IN --force"),
     case("export --output", ("a.parquet", LOG), "export IN -o IN --force"),

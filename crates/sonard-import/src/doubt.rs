@@ -21,9 +21,9 @@ pub(crate) struct Ways<'a> {
     pub(crate) mapping: &'a Mapping,
     /// Names of the columns.
     pub(crate) names: &'a [String],
-    /// Whether columns have units by their fields.
+    /// True if columns have units by their fields.
     pub(crate) has_columns: bool,
-    /// Whether 0 is what the format's drivers write for no echo.
+    /// True if 0 is what the format's drivers write for no echo.
     pub(crate) zero_is_no_echo: bool,
 }
 
@@ -119,7 +119,7 @@ impl Ranges {
         self.near += u64::from(range_m < taken.least_m.max(MIN_NEAR_M));
     }
 
-    /// What speaks against the mapping; else what was taken for no echo.
+    /// Checks the readings against the mapping; notes on what was taken as no echo.
     pub(crate) fn check(&self, ways: &Ways, taken: &Taken) -> Result<Vec<String>, ImportError> {
         self.check_below(ways)?;
         if !taken.as_said {
@@ -162,6 +162,10 @@ impl Ranges {
     fn check_constant(&self, ways: &Ways, taken: &Taken) -> Result<(), ImportError> {
         let longest = taken.longest_m / ways.metres(taken.air.sound_speed_m_s());
         let Some(constant) = self.silence.constant(longest) else { return Ok(()) };
+        // Where most ranges are beyond reach, and not by this constant, the unit is wrong.
+        if 2 * self.far >= self.echoes && 2 * constant.count < self.far {
+            return Ok(());
+        }
         let (value, count, of) = (constant.value, constant.count, constant.of);
         let first = constant.first.map(|first| format!(" (first at {first})")).unwrap_or_default();
         let unit = ways.unit();
@@ -279,7 +283,7 @@ impl Doubts {
         }
     }
 
-    /// What speaks against the mapping; else what was taken for no echo.
+    /// Checks the readings against the mapping; notes on what was taken as no echo.
     pub(crate) fn check(&self, ways: &Ways, taken: &Taken) -> Result<Vec<String>, ImportError> {
         if self.ranges.readings == 0 {
             return Err(ImportError::mapping(
@@ -341,11 +345,11 @@ impl Doubts {
             .collect();
         Err(ImportError::Doubtful {
             what: format!(
-                "{} follow direction and range: the echo's place, not the robot's",
+                "{} follow direction and range: the place of the echo, not of the robot",
                 named.join(" and ")
             ),
             help: format!(
-                "leave them out: {}; --as-said takes them as the robot's",
+                "leave them out: {}; --as-said takes them as the place of the robot",
                 crate::mapping::columns_option(columns, ways.names)
             ),
         })

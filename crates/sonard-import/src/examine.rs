@@ -130,7 +130,7 @@ impl Source<'_> {
         let Some(array) = &found.taken.array else {
             return Err(ImportError::mapping(
                 "several columns of ranges need an array",
-                "say where the rangers are: --array NAME or FILE",
+                "give their places: --array NAME or FILE",
             ));
         };
         let count = array.rangers.len();
@@ -246,7 +246,7 @@ impl Source<'_> {
             (Some(geometry), given) => {
                 let note = given.as_ref().map(|given| {
                     format!(
-                        "the log says where its rangers are: the array {} is not used",
+                        "the log states the places of its rangers: the array {} is not used",
                         given.name
                     )
                 });
@@ -325,7 +325,7 @@ fn ask_unit_of_array(found: &Imported, rangers: usize) -> ImportError {
         format!(
             "each row has {rangers} values, as many as the array {name} has rangers, and no names"
         ),
-        format!("say their unit: {}", options.join(" | ")),
+        format!("choose their unit: {}", options.join(" | ")),
     )
 }
 
@@ -343,7 +343,7 @@ fn unnamed(columns: Option<usize>, is_json: bool) -> ImportError {
 }
 
 impl Imported {
-    /// Whether each row is a round of an array.
+    /// Checks whether each row is a round of an array.
     pub(crate) fn is_of_array(&self) -> bool {
         self.mapping.is_of_array()
             || (self.format == crate::Format::Json && self.taken.array.is_some())

@@ -55,7 +55,7 @@ impl Quantity {
 }
 
 impl Quantity {
-    /// Whether a reading has it: a direction, a range or a time of flight.
+    /// Checks whether a reading has it: a direction, a range or a time of flight.
     pub(crate) const fn is_of_reading(self) -> bool {
         matches!(self, Self::Azimuth | Self::Bearing | Self::Range | Self::Tof)
     }

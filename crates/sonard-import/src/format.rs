@@ -46,12 +46,12 @@ pub struct FormatEntry {
     pub format: Format,
     /// Its name on the command line and in mapping files.
     pub name: &'static str,
-    /// What such files hold, for the help and the documentation.
+    /// Content of such files, for the help and the documentation.
     pub about: &'static str,
-    /// Whether `--columns` gives its columns a meaning.
+    /// True if `--columns` gives its columns a meaning.
     pub has_columns: bool,
     pub(crate) kind: Kind,
-    /// Whether the first bytes, and their text if they are one, are of this format.
+    /// True if the first bytes, and their text if they are one, are of this format.
     is: fn(&[u8], &str) -> bool,
 }
 
@@ -155,7 +155,7 @@ fn is_ros_text(text: &str) -> bool {
 
 /// A kind of file that is known but holds no readings that can be read here.
 struct Foreign {
-    /// What it is.
+    /// Name of the kind.
     what: &'static str,
     /// The way in.
     help: &'static str,
@@ -331,7 +331,7 @@ fn is_stage_world(text: &str) -> bool {
     (has_bracket || text.contains("(\n")) && text.lines().map(str::trim_start).any(opens)
 }
 
-/// What a file is that holds no readings which can be read here, and the way in.
+/// Names a file that holds no readings which can be read here, and the way in.
 pub(crate) fn foreign(bytes: &[u8], text: &str) -> Option<ImportError> {
     let found = FOREIGN.iter().find(|foreign| (foreign.is)(bytes, text))?;
     Some(ImportError::mapping(format!("it is {}", found.what), found.help))

@@ -6,7 +6,7 @@ use crate::{
     words::{self, Name},
 };
 
-/// What names of columns say, taken into a mapping.
+/// Meanings of the columns' names, on the way into a mapping.
 #[derive(Debug, Default)]
 pub(crate) struct Guess {
     /// Columns whose quantity and unit are certain.
@@ -48,7 +48,7 @@ impl Guess {
         self.has(Quantity::Range) || self.has(Quantity::Tof)
     }
 
-    /// Where nothing else turns and nothing moves, yaw is that of the ranger's mount.
+    /// Takes yaw as the azimuth of the ranger's mount, where nothing else turns and nothing moves.
     fn take_yaw_as_azimuth(&mut self) {
         if self.has_direction() || self.has(Quantity::X) {
             return;
@@ -94,7 +94,7 @@ impl Guess {
             return Err(ImportError::mapping(
                 format!("{} columns are ranges: one a ranger of an array?", places.len()),
                 format!(
-                    "say where the rangers are: --array NAME {columns}, with an array of `sonard array list` or a file"
+                    "give the places of the rangers: --array NAME {columns}, with an array of `sonard array list` or a file"
                 ),
             ));
         }
@@ -106,7 +106,7 @@ impl Guess {
                     .map(|choice| self.option(&[choice], names));
                 return Err(ImportError::mapping(
                     format!("`{twin}` and `{name}` may both be the {}", field.quantity().words()),
-                    format!("say which: {one} or {two}"),
+                    format!("choose: {one} or {two}"),
                 ));
             }
         }
@@ -134,7 +134,7 @@ impl Guess {
         offers
     }
 
-    /// What is missing, with the options that would say it in the file's own names.
+    /// Checks that a direction and a range are named; offers the options that name them with the file's own columns.
     fn check_missing(&self, mapping: &Mapping, names: &[String]) -> Result<(), ImportError> {
         let needs_direction = !self.has_direction() && mapping.azimuth_deg.is_none();
         let needs_range = !self.has_range();
@@ -173,24 +173,26 @@ impl Guess {
         let mut help = match &options[..] {
             [] => String::new(),
             [one] => format!("if that is meant: {one}"),
-            all => format!("say which it is: {}", all.join(" | ")),
+            all => format!("choose: {}", all.join(" | ")),
         };
         if needs_direction && !needs_range && options.is_empty() {
-            help = "say where the ranger looks, if it is fixed: --azimuth-deg DEG".to_owned();
+            help = "give the direction of the ranger, if it is fixed: --azimuth-deg DEG".to_owned();
         } else if needs_direction && options.is_empty() && ranges.len() == 1 {
             let with = self.option(&ranges[..1], names);
-            help = format!("say where the ranger looks, if it is fixed: --azimuth-deg DEG {with}");
+            help = format!(
+                "give the direction of the ranger, if it is fixed: --azimuth-deg DEG {with}"
+            );
         } else if needs_direction && options.is_empty() && !ranges.is_empty() {
             let with: Vec<String> =
                 ranges.iter().take(MAX_OFFERS).map(|range| self.option(&[*range], names)).collect();
             help = format!(
-                "say where the ranger looks, if it is fixed, and which it is: --azimuth-deg DEG {}",
+                "give the direction of the ranger, if it is fixed, and choose a unit: --azimuth-deg DEG {}",
                 with.join(" | --azimuth-deg DEG ")
             );
         } else if options.is_empty() {
             let place = if needs_range { "range_cm" } else { "azimuth_deg" };
             help = format!(
-                "say which columns they are, by name or number, and their units: --columns azimuth_deg=1,{place}=2, or any \
+                "name the columns, by name or number, and their units: --columns azimuth_deg=1,{place}=2, or any \
                  other fields of `sonard import --help`"
             );
         }
@@ -198,7 +200,7 @@ impl Guess {
     }
 }
 
-/// So many ways are offered at most.
+/// Options offered at most.
 const MAX_OFFERS: usize = 6;
 
 impl Mapping {

@@ -79,7 +79,7 @@ pub(crate) fn objects<'a>(
     Ok(Box::new(values.into_iter().map(Ok)))
 }
 
-/// Whether a list is a row of numbers.
+/// Checks whether a list is a row of numbers.
 fn is_pair(value: &Value) -> bool {
     let is_cell = |cell: &Value| !cell.is_object() && !cell.is_array();
     value.as_array().is_some_and(|cells| cells.len() > 1 && cells.iter().all(is_cell))
@@ -233,7 +233,7 @@ fn cell(value: &Value) -> Option<String> {
     }
 }
 
-/// What the first entry of a file is.
+/// Kind of the first entry of a file.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Entry {
     /// Names of the members of an object.

@@ -36,13 +36,13 @@ pub(crate) struct Header {
     pub(crate) decimal: Decimal,
     /// Names of the columns, or the values of the first row.
     pub(crate) cells: Vec<String>,
-    /// Whether `cells` are names and not values.
+    /// True if `cells` are names and not values.
     pub(crate) has_names: bool,
-    /// Whether the names stand in a comment.
+    /// True if the names stand in a comment.
     pub(crate) is_comment: bool,
     /// A first line `sep=;`, as Excel writes it.
     pub(crate) has_separator_line: bool,
-    /// What was found that a reader should know.
+    /// Notes on the layout.
     pub(crate) notes: Vec<String>,
 }
 
@@ -140,7 +140,7 @@ impl Header {
             )),
             Column::Several(_) => Err(ImportError::mapping(
                 "several columns of ranges need an array",
-                "say which: --array NAME or FILE",
+                "name it: --array NAME or FILE",
             )),
             Column::Name(name) if !self.has_names => Err(ImportError::mapping(
                 format!("there is no column `{name}`: the first line has no names"),
@@ -230,13 +230,13 @@ fn decimal(rows: &[&str], between: Between, mapping: &Mapping) -> Result<Decimal
     match either {
         Some(cell) => Err(ImportError::mapping(
             format!("`{cell}` may have a decimal comma, or a comma between thousands"),
-            "say which: --decimal comma or --decimal point",
+            "choose: --decimal comma or --decimal point",
         )),
         None => Ok(Decimal::Point),
     }
 }
 
-/// Whether a text is a stream of `angle,distance.` without line ends, as the "radar" sketches send it. Its beginning and
+/// Checks whether a text is a stream of `angle,distance.` without line ends, as the "radar" sketches send it. Its beginning and
 /// its end may be cut.
 fn is_stream(head: &str) -> bool {
     let is_whole =

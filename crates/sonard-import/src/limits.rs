@@ -11,7 +11,7 @@ pub(crate) struct Limits {
     pub(crate) most: f64,
 }
 
-/// What a range says.
+/// Meaning of a range.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Told {
     /// No reading: REP 117's NaN.
@@ -21,7 +21,7 @@ pub(crate) enum Told {
     Echo(f64),
 }
 
-/// What was assumed about limits and ranges of a file, counted.
+/// Counts of the assumptions about limits and ranges of a file.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct LimitNotes {
     pub(crate) readings: u64,
@@ -99,7 +99,7 @@ impl LimitNotes {
         }
         if self.fixed_distance > 0 {
             lines.push(format!(
-                "{} of {of} readings are of a fixed-distance ranger (min_range = max_range = {}): they say only whether \
+                "{} of {of} readings are of a fixed-distance ranger (min_range = max_range = {}): they detect only whether \
                  something is nearer",
                 self.fixed_distance, self.fixed_m
             ));
@@ -113,7 +113,7 @@ impl LimitNotes {
         lines
     }
 
-    /// Whether all ranges are finite and beyond the greatest, which a wrong unit makes them.
+    /// Checks whether all ranges are finite and beyond the greatest, which a wrong unit makes them.
     pub(crate) const fn are_all_beyond(&self) -> bool {
         self.readings > 0 && self.beyond_most == self.readings
     }

@@ -24,7 +24,7 @@ pub(crate) struct Line {
     pub(crate) number: u64,
     /// Its text, without its end.
     pub(crate) text: String,
-    /// Whether it has an end, or the file stopped within it.
+    /// True if it has an end, or the file stopped within it.
     pub(crate) is_ended: bool,
 }
 

@@ -68,7 +68,7 @@ pub enum Decimal {
     Comma,
 }
 
-/// Unit of the lengths of a format whose specification says metres.
+/// Unit of the ranges of a format that specifies metres.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum RangeUnit {
@@ -136,7 +136,7 @@ pub struct Mapping {
     /// Azimuth of every reading, degrees: of a fixed ranger, whose file has no column for it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub azimuth_deg: Option<f64>,
-    /// Unit of the ranges of logs and recordings whose format says metres.
+    /// Unit of the ranges of logs and recordings whose format specifies metres.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub range_unit: Option<RangeUnit>,
     /// Sign before the fraction of numbers; without it, as the file shows.
@@ -193,7 +193,7 @@ impl Mapping {
         self.columns.keys().copied().find(|field| field.quantity() == quantity)
     }
 
-    /// Whether a range of the file, in its unit, stands for no echo.
+    /// Checks whether a range of the file, in its unit, stands for no echo.
     pub(crate) fn is_no_echo(&self, range: f64) -> bool {
         self.none.contains(&range) || self.none_from.is_some_and(|from| range >= from)
     }
@@ -266,7 +266,7 @@ impl Mapping {
         Ok(())
     }
 
-    /// Whether one column a ranger is named.
+    /// Checks whether one column a ranger is named.
     pub(crate) fn is_of_array(&self) -> bool {
         self.columns.values().any(|column| matches!(column, Column::Several(_)))
     }

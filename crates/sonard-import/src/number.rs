@@ -34,7 +34,7 @@ fn is_grouped(whole: &str, sign: char) -> bool {
         && rest.iter().all(|group| group.len() == 3 && is_digits(group))
 }
 
-/// What a cell with a comma in it shows of the sign before fractions.
+/// Evidence of a cell with a comma for the sign before fractions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Shows {
     Comma,

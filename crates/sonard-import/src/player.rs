@@ -20,7 +20,7 @@ pub(crate) const INTERFACES: [&str; 4] = ["sonar", "ranger", "position2d", "posi
 const BEFORE: usize = 7;
 const BEFORE_IN_OLD: usize = 5;
 
-/// What a message is by type and subtype; `None` in logs of Player 1.
+/// Type and subtype of a message; `None` in logs of Player 1.
 type Kind = Option<(u32, u32)>;
 
 /// The message of a line, if it is one of ranges or poses.
@@ -53,7 +53,7 @@ pub(crate) fn message(place: Location, line: &str) -> Result<Option<Message>, Im
     Ok(content.map(|content| Message { device: device(), content }))
 }
 
-/// Where the data of a line of Player 1 begin: behind a second time, if there is one. Times have no sign and places have
+/// First word of the data in a line of Player 1: behind a second time, if there is one. Times have no sign and places have
 /// one, and no place is a million metres away.
 fn old_start(words: &[&str]) -> usize {
     let number = |at: usize| words.get(at).and_then(|word| word.parse::<f64>().ok());

@@ -49,9 +49,9 @@ pub(crate) struct Bag {
     turns: bool,
     pub(crate) has_poses: bool,
     clock: Clock,
-    /// Whether messages stand in the order of their stamps.
+    /// True if messages stand in the order of their stamps.
     is_in_order: bool,
-    /// What was assumed, a line each.
+    /// Assumptions that were made, a line each.
     notes: Vec<String>,
     /// The greatest range that a message states, in its unit.
     stated_most: f64,

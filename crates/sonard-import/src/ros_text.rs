@@ -233,7 +233,7 @@ fn time(message: &Value) -> Option<Timestamp> {
     Timestamp::from_nanosecond(time).ok().filter(|time| time.as_second() > 0)
 }
 
-/// Whether each message is of a ranger that turns.
+/// Checks whether each message is of a ranger that turns.
 pub(crate) fn is_scan(message: &Value) -> bool {
     inner(message).is_some_and(|message| message.get("ranges").is_some())
 }

@@ -10,7 +10,7 @@ use sonard_model::{
 
 use crate::{ImportError, Location, Mapping, time::Times};
 
-/// What all rangers measured at one time.
+/// Measurements of all rangers at one time.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Round {
     pub(crate) place: Location,
@@ -23,7 +23,7 @@ pub(crate) struct Round {
     pub(crate) raw: Vec<Option<f64>>,
 }
 
-/// What a message of a robot's log holds.
+/// Content of a message of a robot's log.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Content {
     /// Places of the rangers: ahead, to the left, metres, and their directions, radians.
@@ -52,7 +52,7 @@ pub(crate) struct Device {
 }
 
 impl Device {
-    /// Whether an option means it: its whole name, or the end of it.
+    /// Checks whether an option means it: its whole name, or the end of it.
     fn is_meant(&self, wanted: &str) -> bool {
         let name = format!(":{}:{}", self.robot, self.index);
         name.ends_with(&format!(":{wanted}")) || self.robot.ends_with(wanted)
@@ -68,7 +68,7 @@ impl std::fmt::Display for Device {
 /// The devices of a log, with counts of their messages.
 #[derive(Debug, Default)]
 pub(crate) struct Devices {
-    /// Of ranges, in the order in which they first come.
+    /// Devices of ranges, in the order in which they first come.
     ranges: Vec<(Device, u64)>,
     poses: BTreeMap<Device, u64>,
 }

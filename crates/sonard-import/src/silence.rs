@@ -37,7 +37,7 @@ const CODES: [f64; 19] = [
 /// Share of the sensor's longest range from which a value is the longest range, as written.
 const AT_LONGEST: f64 = 0.9965;
 
-/// What a direction is.
+/// Meaning of a direction.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Across {
     /// An angle of one ranger that turns: near angles meet the same wall.
@@ -83,12 +83,12 @@ struct Step {
 pub(crate) struct Constant {
     /// The value in the unit of the file; the least of a cluster.
     pub(crate) value: f64,
-    /// Whether values vary about it.
+    /// True if values vary about it.
     pub(crate) is_cluster: bool,
     pub(crate) count: u64,
     pub(crate) of: u64,
     pub(crate) first: Option<Location>,
-    /// What speaks for it.
+    /// Evidence for it.
     pub(crate) why: &'static str,
 }
 
@@ -197,7 +197,7 @@ impl Silence {
             let is_top = rank == 0;
             let why =
                 if is_at_longest && seen.count >= 3 && share >= 0.01 && (is_top || is_frequent) {
-                    Some("at or beyond the sensor's longest range")
+                    Some("at or beyond the longest range of the sensor")
                 } else if is_code
                     && seen.count >= 3
                     && is_top
@@ -249,11 +249,11 @@ impl Silence {
             count,
             of: self.count,
             first: None,
-            why: "the greatest, close together at the sensor's longest range and in many directions",
+            why: "the greatest, close together at the longest range of the sensor and in many directions",
         })
     }
 
-    /// Whether no wall at one distance occurs in these directions: it fills one arc of those that were measured.
+    /// Checks whether no wall at one distance occurs in these directions: it fills one arc of those that were measured.
     fn is_scattered(&self, directions: &Directions) -> bool {
         let has = |directions: &Directions, at: usize| directions[at / 64] >> (at % 64) & 1 == 1;
         let visited: Vec<usize> = (0..360).filter(|at| has(&self.visited, *at)).collect();

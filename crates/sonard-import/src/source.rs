@@ -65,7 +65,7 @@ pub struct Imported {
     pub echoes: u64,
     /// Whether it says where the robot stood.
     pub has_poses: bool,
-    /// What was assumed and what was left out, a line each.
+    /// Notes on assumptions and on what was left out, a line each.
     pub notes: Vec<String>,
     pub(crate) encoding: &'static Encoding,
     pub(crate) header: Option<Header>,
@@ -90,7 +90,7 @@ impl Source<'_> {
         let entry = format.entry();
         if !mapping.columns.is_empty() && !entry.has_columns {
             return Err(ImportError::mapping(
-                format!("a file of the format {} says itself what its fields mean", entry.name),
+                format!("a file of the format {} defines its own fields", entry.name),
                 "leave --columns out",
             ));
         }
@@ -158,7 +158,7 @@ impl Source<'_> {
     fn examine_recording(&self, found: &mut Imported) -> Result<(), ImportError> {
         if found.taken.array.is_some() {
             return Err(ImportError::mapping(
-                "a recording says itself where its rangers are",
+                "a recording states the places of its rangers",
                 "leave --array out",
             ));
         }

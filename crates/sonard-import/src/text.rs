@@ -78,19 +78,19 @@ impl Survey {
         Some(if self.is_utf8 { UTF_8 } else { WINDOWS_1252 })
     }
 
-    /// Whether the last line ends as lines do.
+    /// Checks whether the last line ends as lines do.
     pub(crate) fn has_last_end(&self) -> bool {
         let last = self.tail.iter().rev().find(|byte| **byte != 0);
         self.bytes == 0 || matches!(last, Some(b'\n' | b'\r'))
     }
 
-    /// Whether more follows behind the head.
+    /// Checks whether more follows behind the head.
     pub(crate) fn is_longer_than_head(&self) -> bool {
         self.bytes > self.head.len() as u64
     }
 }
 
-/// Whether bytes continue a UTF-8 text; `cut` holds a character that the end of the last piece split.
+/// Checks whether bytes continue a UTF-8 text; `cut` holds a character that the end of the last piece split.
 fn is_utf8(cut: &mut Vec<u8>, piece: &[u8]) -> bool {
     let joined;
     let bytes = if cut.is_empty() {

@@ -24,7 +24,7 @@ pub(crate) struct Assumed {
     pub(crate) without_date: u64,
     /// Counts from the start of a board.
     pub(crate) from_start: u64,
-    /// How often such a counter began again at 2^32, and from zero.
+    /// Wraps of such a counter at 2^32, and its restarts from zero.
     pub(crate) wraps: u64,
     pub(crate) restarts: u64,
     /// Numbers that may be seconds, milliseconds or anything else.
@@ -194,7 +194,7 @@ impl<'a> Times<'a> {
         self.local(civil)
     }
 
-    /// What was assumed, a line each.
+    /// Assumptions that were made, a line each.
     pub(crate) fn notes(&self) -> Vec<String> {
         let Assumed { without_zone, without_date, from_start, wraps, restarts, without_unit } =
             self.assumed;
@@ -288,11 +288,11 @@ fn advice(cell: &str) -> String {
             "%y"
         };
         return format!(
-            "say which is first: --time-format '%d/%m/{year}{clock}' for the day, --time-format '%m/%d/{year}{clock}' for \
+            "choose: --time-format '%d/%m/{year}{clock}' for the day, --time-format '%m/%d/{year}{clock}' for \
              the month"
         );
     }
-    "write it as in 2026-01-31T12:00:00Z, say its form with --time-format '%d.%m.%Y %H:%M:%S', or name a column time_s \
+    "write it as in 2026-01-31T12:00:00Z, give its form with --time-format '%d.%m.%Y %H:%M:%S', or name a column time_s \
      for seconds"
         .to_owned()
 }

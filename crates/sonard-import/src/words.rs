@@ -2,7 +2,7 @@
 
 use crate::{Field, Quantity};
 
-/// What a name says.
+/// Meaning of a name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Name {
     Field(Field),
@@ -36,7 +36,9 @@ const WORDS: &[(&str, &[Quantity])] = &[
     ("azimut", &[Azimuth]),
     ("pan", &[Azimuth]),
     ("servo", &[Azimuth]),
+    ("azimuths", &[Azimuth]),
     ("angle", &[Azimuth]),
+    ("angles", &[Azimuth]),
     ("ang", &[Azimuth]),
     ("theta", &[Azimuth]),
     ("phi", &[Azimuth]),
@@ -55,6 +57,7 @@ const WORDS: &[(&str, &[Quantity])] = &[
     ("kulma", &[Azimuth]),
     ("угол", &[Azimuth]),
     ("bearing", &[Bearing]),
+    ("bearings", &[Bearing]),
     ("peilung", &[Bearing]),
     ("range", &[Range]),
     ("distance", &[Range]),
@@ -240,7 +243,7 @@ pub(crate) fn is_clockwise(name: &str) -> bool {
     words(name).iter().any(|word| word == "cw" || word == "clockwise")
 }
 
-/// What the name of a column says of it.
+/// Meaning of a column's name.
 pub(crate) fn meaning(name: &str) -> Name {
     let words = words(name);
     let has = |known: &[&str]| words.iter().any(|word| known.contains(&word.as_str()));
@@ -301,6 +304,7 @@ mod tests {
             ("Abstand [mm]", "range_mm"),
             ("distancia (cm)", "range_cm"),
             ("sonar1_cm", "range_cm"),
+            ("bearings_rad", "bearing_rad"),
             ("echo_us", "tof_us"),
             ("echo [\u{b5}s]", "tof_us"),
             ("time_of_flight_us", "tof_us"),

@@ -1,4 +1,4 @@
-//! What the columns of an imported file mean, on the command line and in a mapping file.
+//! Meaning of an imported file's columns, on the command line and in a mapping file.
 
 use std::{
     fs,
@@ -11,7 +11,7 @@ use jiff::Timestamp;
 use super::super::Failure;
 use crate::import::{Decimal, FORMATS, Format, Mapping, RangeUnit};
 
-/// What the file's columns mean.
+/// Meaning of the file's columns.
 #[derive(Debug, Clone, clap::Args)]
 #[command(next_help_heading = "Columns")]
 pub(super) struct ColumnArgs {
@@ -51,7 +51,7 @@ pub(super) struct ColumnArgs {
     /// with that of the air
     #[arg(long, value_name = "M/S")]
     ranged_with: Option<f64>,
-    /// Unit of ranges and limits in logs and recordings, whose formats say metres
+    /// Unit of ranges and limits in logs and recordings, whose formats specify metres
     #[arg(long, value_name = "UNIT", value_parser = one_of(&RangeUnit::ALL))]
     range_unit: Option<RangeUnit>,
     /// Sign before the fraction of numbers: point or comma [default: as the file shows]

@@ -38,7 +38,7 @@ their outlines, CIRCLE becomes a cylinder, each named by its layer; blocks (INSE
 switched off or frozen count only where --layer names them. Everything else that is drawn is left out with a warning: \
 explode splines and ellipses in the CAD program, or turn them into polylines. The drawing is seen from above, x and y are the \
 world's; one far from its origin, as surveyors draw, is moved to it. A plan smaller or larger than buildings are is refused: \
-$INSUNITS is often wrong, and --unit-m says what it should be. All is of one material: give walls their own in the file that \
+$INSUNITS is often wrong, and --unit-m overrides it. All is of one material: give walls their own in the file that \
 comes out.";
 
 pub(super) const EXAMPLES: &str = "\
@@ -57,7 +57,7 @@ pub(super) fn run(args: &FromDxfArgs) -> Outcome {
         load(&bytes).map_err(|error| refuse(&args.drawing, &format!("no DXF: {error}"), help))?;
     let stated_m = metres(drawing.header.default_drawing_units);
     let unit_m = args.unit_m.or(stated_m).ok_or_else(|| {
-        let help = "say how long a unit of it is: --unit-m 0.001 for millimetres";
+        let help = "give the length of a unit of it: --unit-m 0.001 for millimetres";
         refuse(&args.drawing, &"the drawing has no units ($INSUNITS)", help)
     })?;
     let layers = Layers::of(&drawing, &bytes, &args.layer)
@@ -86,9 +86,9 @@ fn implausible(args: &FromDxfArgs, drawing: &Drawing, unit_m: f64, size_m: f64) 
     let options: Vec<String> =
         options.iter().filter(fits).map(|unit| format!("--unit-m {unit}")).collect();
     let help = match options.is_empty() {
-        true => format!("say how long a unit is: --unit-m {unit_m} takes it as it is"),
+        true => format!("give the length of a unit: --unit-m {unit_m} takes it as it is"),
         false => format!(
-            "say how long a unit is: {}; --unit-m {unit_m} takes it as it is",
+            "give the length of a unit: {}; --unit-m {unit_m} takes it as it is",
             options.join(" or ")
         ),
     };

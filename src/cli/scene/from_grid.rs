@@ -33,7 +33,7 @@ pub(super) const ABOUT: &str = "\
 Make a scene of a map: the walls that cells show, traced as lines.
 
 Walls are where occupied cells meet free ones (or two cells behind such); where nothing is occupied there is no wall, so \
-what a robot did not see is open. Which cells these are is said by the file's thresholds, negate and mode (trinary, scale, raw), \
+what a robot did not see is open. The file's thresholds, negate and mode (trinary, scale, raw) decide which cells these are, \
 as map_server has them; origin places and turns the map. In a map that `sonard map` wrote, cells above 0.65 are occupied \
 and those below 0.49 free. Walls along rows and columns stay where the cells are; stairs are straightened to slanting walls. A \
 wall that both sides were seen of has two faces. All is of one material: give walls their own in the file that comes out.";

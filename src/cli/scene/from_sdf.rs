@@ -73,7 +73,7 @@ pub(super) fn run(args: &FromSdfArgs) -> Outcome {
 struct World<'a> {
     args: &'a FromSdfArgs,
     found: Surfaces,
-    /// What was left out, by its name.
+    /// Names of the things left out.
     notes: Vec<String>,
     /// The file that is read: the world, or one that it includes.
     file: PathBuf,

@@ -72,7 +72,7 @@ struct Drawing {
     width: f64,
     height: f64,
     found: Surfaces,
-    /// What was assumed and left out.
+    /// Notes on assumptions and on what was left out.
     notes: Vec<String>,
 }
 

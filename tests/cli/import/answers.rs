@@ -10,7 +10,8 @@ fn split(text: &str) -> Vec<String> {
     let (mut words, mut word, mut quote) = (Vec::new(), String::new(), None);
     for c in text.chars() {
         match (quote, c) {
-            (None, '\'') => quote = Some(c),
+            // An apostrophe within a word is none.
+            (None, '\'') if word.is_empty() => quote = Some(c),
             (Some(_), '\'') => quote = None,
             (None, ' ') => {
                 words.extend(Some(std::mem::take(&mut word)).filter(|word| !word.is_empty()));

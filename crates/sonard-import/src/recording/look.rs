@@ -25,7 +25,7 @@ const MAX_TILT_DEG: f64 = 5.0;
 /// Frames of a recording, at most.
 const MAX_FRAMES: usize = 1 << 16;
 
-/// What one pass over a recording shows, without any transform being kept.
+/// Outline of a recording after one pass, which keeps no transform.
 #[derive(Debug, Default)]
 struct Outline {
     /// Topics of readings, and whether they are of LaserScan.
@@ -178,7 +178,7 @@ impl Bag {
         });
     }
 
-    /// Where a topic's ranger is, by its first message, and whether it turns; the message's time.
+    /// Places a topic's ranger by its first message, and notices whether it turns; returns the message's time.
     fn know(
         &mut self,
         message: &Message,
@@ -261,7 +261,7 @@ impl Bag {
         let frame = &source.frame;
         if !self.transforms.knows(frame) && !ROBOT.contains(&frame.as_str()) {
             self.notes.push(format!(
-                "{topic}: no transform says where on the robot the frame `{frame}` is: taken to be at its middle, looking \
+                "{topic}: no transform places the frame `{frame}` on the robot: taken to be at its middle, looking \
                  ahead; /tf_static may be in another part of the recording, whose folder can be imported as a whole"
             ));
         }

@@ -20,7 +20,7 @@ pub(super) struct Gathered<'a> {
     /// The rangers of an array.
     ids: Vec<String>,
     heard: Vec<(usize, Heard)>,
-    /// Whether it has turned away from where it began.
+    /// True if it has turned away from where it began.
     is_away: bool,
     turning: Turning,
     scans: u64,
@@ -73,7 +73,7 @@ impl<'a> Gathered<'a> {
         Some(scans::firings_of_array(self.taken, self.scans, &firings.collect::<Vec<_>>()))
     }
 
-    /// Whether a reading is the first of another sweep: where the motion turns round, or is back where it began.
+    /// Checks whether a reading is the first of another sweep: where the motion turns round, or is back where it began.
     fn is_swept(&mut self, next: &Heard) -> bool {
         let is_swept = self.turning.is_next(next.direction_deg);
         let Some((_, first)) = self.heard.first() else { return false };

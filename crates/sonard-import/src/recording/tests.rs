@@ -326,7 +326,7 @@ fn what_is_cut_off_or_no_recording_is_told() {
         columns: Mapping::columns_of("azimuth_deg=1,range_m=2").expect("columns"),
         ..Mapping::default()
     };
-    assert!(said(examine(&whole, mapping())).contains("says itself"));
+    assert!(said(examine(&whole, mapping())).contains("defines its own fields"));
 }
 
 #[test]

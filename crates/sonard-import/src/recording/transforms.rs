@@ -159,7 +159,7 @@ impl Transforms {
         Ok(())
     }
 
-    /// Whether a frame is placed in another, or another in it.
+    /// Checks whether a frame is placed in another, or another in it.
     pub(crate) fn knows(&self, frame: &str) -> bool {
         self.frames.contains_key(frame) || self.frames.values().any(|link| link.parent == frame)
     }

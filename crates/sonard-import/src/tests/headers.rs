@@ -35,7 +35,7 @@ fn columns_are_taken_from_names_that_are_clear() {
     );
 }
 
-/// What is offered is complete, in the file's own names, and right when it is followed.
+/// Offered options are complete, in the file's own names, and give right readings.
 #[test]
 fn what_is_offered_is_accepted_as_it_stands() {
     for (header, row, offered) in [

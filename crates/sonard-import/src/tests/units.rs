@@ -81,7 +81,7 @@ fn the_place_of_an_echo_is_not_the_robots() {
         let text = format!("angle_deg,distance_cm,x_cm,y_cm\n{text}");
         let told = said(examine(text.as_bytes(), Mapping::default(), taken()));
         let option = "--columns azimuth_deg=angle_deg,range_cm=distance_cm";
-        assert!(told.contains("the echo's place") && told.contains(option), "{told}");
+        assert!(told.contains("the place of the echo") && told.contains(option), "{told}");
         let mapping = columns("azimuth_deg=angle_deg,range_cm=distance_cm");
         assert!(!examine(text.as_bytes(), mapping, taken()).expect("answered").has_poses);
     }

@@ -47,7 +47,7 @@ impl Layers {
         self.shown.contains(&same(layer))
     }
 
-    /// What was left out by its layer.
+    /// Notes on the layers left out.
     pub(super) fn notes(&self, wanted: &[String]) -> Vec<String> {
         let mut notes = Vec::new();
         if wanted.is_empty() && !self.hidden.is_empty() {

@@ -11,13 +11,13 @@ use glam::DAffine2;
 use super::{super::made::arc, layers::Layers};
 use crate::{geometry::DVec2, scene::Surfaces};
 
-/// What was found, before it is moved to the origin, metres.
+/// A surface that was found, before it is moved to the origin, metres.
 enum Shape {
     Walls { layer: String, corners: Vec<DVec2>, is_closed: bool },
     Round { layer: String, center: DVec2, radius_m: f64 },
 }
 
-/// What was found so far.
+/// Surfaces and notes found so far.
 pub(super) struct Plan<'a> {
     drawing: &'a Drawing,
     layers: &'a Layers,
@@ -293,7 +293,7 @@ impl<'a> Plan<'a> {
         self.frame.matrix2.x_axis.length().max(self.frame.matrix2.y_axis.length())
     }
 
-    /// Whether circles stay circles.
+    /// Checks whether circles stay circles.
     fn is_uniform(&self) -> bool {
         let [x, y] = [self.frame.matrix2.x_axis, self.frame.matrix2.y_axis];
         let size = x.length().max(y.length());

@@ -113,7 +113,7 @@ impl World<'_> {
         if pose.attribute("rotation_format") == Some("quat_xyzw") {
             let [x, y, z, qx, qy, qz, qw] = self.numbers(pose)?;
             let turn = DQuat::from_xyzw(qx, qy, qz, qw);
-            if turn.length().is_nan() || turn.length() <= 1e-6 {
+            if !turn.is_finite() || turn.length() < 1e-6 {
                 return Err(self.refuse(pose, "the quaternion of the pose has no length"));
             }
             return Ok(DAffine3::from_rotation_translation(turn.normalize(), DVec3::new(x, y, z)));

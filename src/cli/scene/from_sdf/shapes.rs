@@ -100,7 +100,7 @@ impl World<'_> {
         self.notes.push(format!("left out: a body of `{name}` that leans or lies"));
     }
 
-    /// Whether the height of the cut meets a body whose middle is so high, metres.
+    /// Checks whether the height of the cut meets a body whose middle is so high, metres.
     fn cuts(&self, middle_z_m: f64, half_m: f64) -> bool {
         (self.args.cut_z_m - middle_z_m).abs() <= half_m
     }

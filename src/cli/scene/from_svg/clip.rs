@@ -1,4 +1,4 @@
-//! What is seen of lines through rectangular clip paths.
+//! Lines cut at rectangular clip paths.
 
 use usvg::{ClipPath, Group, Node, Transform, tiny_skia_path::PathSegment};
 
@@ -18,7 +18,7 @@ impl Default for Window {
 }
 
 impl Window {
-    /// What is seen through both.
+    /// Intersection of two windows.
     pub(super) fn within(self, other: Self) -> Self {
         Self {
             low: [0, 1].map(|axis| self.low[axis].max(other.low[axis])),
@@ -63,7 +63,7 @@ impl Window {
         parts
     }
 
-    /// What is seen of a straight line (Liang and Barsky).
+    /// Visible part of a straight line (Liang and Barsky).
     fn seen(self, from: DVec2, to: DVec2) -> Option<(DVec2, DVec2)> {
         let (mut enters, mut leaves) = (0.0_f64, 1.0_f64);
         for axis in 0..2 {

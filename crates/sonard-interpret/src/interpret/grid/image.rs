@@ -27,7 +27,7 @@ pub struct MapYaml {
     /// Meaning of a shade.
     #[serde(default)]
     pub mode: MapMode,
-    /// Whether shades are probabilities, to be taken as they are: of maps that this program wrote.
+    /// True if shades are probabilities, to be taken as they are: of maps that this program wrote.
     #[serde(skip)]
     pub is_graded: bool,
 }
