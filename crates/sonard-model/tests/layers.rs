@@ -146,3 +146,45 @@ fn a_module_is_a_file_beside_its_folder() {
     crates.chain(others).for_each(|folder| look(&folder, &mut found));
     assert!(found.is_empty(), "foo.rs, not foo/mod.rs: {found:?}");
 }
+
+/// Files and folders of the repository that a document names in backticks: a known first folder, no placeholder.
+fn named_paths(document: &str) -> BTreeSet<String> {
+    const FIRST: [&str; 12] = [
+        "benches/",
+        "config/",
+        "crates/",
+        "docs/",
+        "emulator/",
+        "firmware/",
+        "firmware-protocol/",
+        "packaging/",
+        "python/",
+        "src/",
+        "systemd/",
+        "tests/",
+    ];
+    let spans = document.split('`').skip(1).step_by(2);
+    let paths = spans.filter(|span| {
+        let is_path = FIRST.iter().any(|folder| span.starts_with(folder));
+        is_path && !span.contains(['{', ' ', '*']) && !span.contains("NAME")
+    });
+    paths.map(str::to_owned).collect()
+}
+
+#[test]
+fn documents_name_paths_that_exist() {
+    let mut missing = Vec::new();
+    for document in ["ARCHITECTURE.md", "CONTRIBUTING.md", "docs/life-of-an-echo.md"] {
+        let text = fs::read_to_string(root().join(document)).expect("a document");
+        let paths = named_paths(&text);
+        missing.extend(
+            paths
+                .into_iter()
+                .filter(|path| !root().join(path).exists())
+                .map(|path| format!("{document}: {path}")),
+        );
+    }
+    assert!(missing.is_empty(), "{missing:#?}");
+    let text = fs::read_to_string(root().join("docs/life-of-an-echo.md")).expect("a document");
+    assert!(named_paths(&text).len() > 20, "the stations name their files");
+}
