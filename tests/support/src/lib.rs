@@ -2,7 +2,6 @@
 //!
 //! Tests of other packages (`tests/browser`, `tests/terminal`) use it too. The program must have been built:
 //! `cargo test` builds it for the tests of its own package only.
-#![allow(clippy::disallowed_methods, reason = "tests have no supervisor")]
 
 pub mod collection;
 pub mod daemon;
