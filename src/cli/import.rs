@@ -55,7 +55,7 @@ pub(super) struct Args {
     /// goes into the log
     #[arg(long, value_name = "SCENE")]
     scene: Option<PathBuf>,
-    /// Array of rangers, a preset (`sonard array list`) or a file with an array's data: of a table with a
+    /// Array of rangers, a preset (`sonard array list`) or a file with an array's data; of a table with a
     /// range of each ranger in a row, and of a CARMEN or Player log without the places of its rangers
     #[arg(long, value_name = "NAME|FILE")]
     array: Option<String>,

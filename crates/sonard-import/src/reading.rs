@@ -117,13 +117,18 @@ impl<'a> Reader<'a> {
     pub(crate) fn read(&mut self, row: &Row) -> Result<Reading, ImportError> {
         let is_bearing = self.mapping.field(Quantity::Bearing).is_some();
         let direction = if is_bearing { Quantity::Bearing } else { Quantity::Azimuth };
-        let fixed = self.mapping.azimuth_deg.map(|azimuth_deg| (azimuth_deg, azimuth_deg));
+        let fixed = self.mapping.azimuth_deg;
         let found = self.number_of(row, direction)?;
         let found = found.map(|(field, number)| (number, field.scaled(number)));
-        let (raw_direction, direction_deg) = found.or(fixed).ok_or_else(|| {
-            let what = format!("there is no {}", direction.words());
-            ImportError::at(row.place, what, "every reading needs a direction: correct that row")
-        })?;
+        let (raw_direction, direction_deg) =
+            found.or(fixed.map(|deg| (deg, deg))).ok_or_else(|| {
+                let what = format!("there is no {}", direction.words());
+                ImportError::at(
+                    row.place,
+                    what,
+                    "every reading needs a direction: correct that row",
+                )
+            })?;
         let sense = if self.mapping.clockwise { -1.0 } else { 1.0 };
         let status = match self.cell(row, Quantity::Status) {
             Some((_, word)) => Some(self.status(row.place, word)?),
@@ -146,7 +151,7 @@ impl<'a> Reader<'a> {
         let [x, y] = [self.scaled(row, Quantity::X)?, self.scaled(row, Quantity::Y)?];
         Ok(Reading {
             place: row.place,
-            direction_deg: self.mapping.zero_deg + sense * direction_deg,
+            direction_deg: fixed.unwrap_or(self.mapping.zero_deg + sense * direction_deg),
             is_bearing,
             status: status.unwrap_or(if range_m.is_some() {
                 PingStatus::Echo

@@ -38,7 +38,8 @@ pub(super) struct ColumnArgs {
     /// Where azimuth zero points, degrees counter-clockwise from the heading (bearing zero: from the x axis)
     #[arg(long, value_name = "DEG", allow_negative_numbers = true)]
     zero_deg: Option<f64>,
-    /// Azimuth of every reading, degrees: of a fixed ranger, whose file has no column for it
+    /// Azimuth, degrees counter-clockwise from the heading; that of every reading of a fixed ranger, whose file has no
+    /// column for it
     #[arg(long, value_name = "DEG", allow_negative_numbers = true)]
     azimuth_deg: Option<f64>,
     /// A range, in the file's unit, that means no echo; may be given several times
