@@ -9,7 +9,7 @@ use std::{
     collections::VecDeque,
     io::{self, IsTerminal as _, Write},
     os::fd::BorrowedFd,
-    sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError},
+    sync::{Arc, Condvar, Mutex, MutexGuard, OnceLock, PoisonError},
     thread,
     time::{Duration, Instant},
 };
@@ -30,6 +30,15 @@ const DIRECT_TIMEOUT: Duration = Duration::from_secs(1);
 const ATOMIC_WRITE_BYTES: usize = 4096;
 /// Level of messages unless `SONARD_LOG` sets another.
 const DEFAULT_FILTER: &str = "info,rustdds=off";
+
+/// Queue of this process's messages, once there is one.
+static QUEUE: OnceLock<MessageQueue> = OnceLock::new();
+
+/// Messages of this process that were dropped because standard error was blocked or gone.
+#[must_use]
+pub fn dropped() -> u64 {
+    QUEUE.get().map_or(0, MessageQueue::dropped)
+}
 
 /// Queue of messages for standard error. Clones share it.
 #[derive(Debug, Clone)]
@@ -56,11 +65,11 @@ struct State {
     unreported: u64,
 }
 
-/// Sends tracing's messages to standard error through a [`MessageQueue`]. Under systemd the journal adds the time.
-/// Returns the queue, for the count of dropped messages, and the guard that drains it.
+/// Sends tracing's messages to standard error through a [`MessageQueue`] that is drained when the guard is dropped. Under
+/// systemd the journal adds the time.
 #[must_use]
-pub fn log_to_stderr() -> (MessageQueue, MessageGuard) {
-    let queue = MessageQueue::start(stderr());
+pub fn log_to_stderr() -> MessageGuard {
+    let queue = QUEUE.get_or_init(|| MessageQueue::start(stderr())).clone();
     let filter =
         EnvFilter::try_from_env("SONARD_LOG").unwrap_or_else(|_| EnvFilter::new(DEFAULT_FILTER));
     let subscriber = tracing_subscriber::fmt()
@@ -82,7 +91,7 @@ pub fn log_to_stderr() -> (MessageQueue, MessageGuard) {
         let cause = crate::supervisor::panic_message(panic.payload());
         tracing::error!("internal error at {place}: {cause}; please report it");
     }));
-    (queue.clone(), MessageGuard(queue))
+    MessageGuard(queue)
 }
 
 /// Sends warnings to standard error, for programs that write their own messages there. `SONARD_LOG` sets another level.

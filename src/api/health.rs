@@ -27,6 +27,9 @@ pub struct Health {
     pub last_scan_age_s: Option<f64>,
     /// How long after its firing the last reading came in, seconds, if it is known when that was.
     pub reading_lateness_s: Option<f64>,
+    /// Messages dropped because standard error was blocked or gone.
+    #[serde(default)]
+    pub dropped_messages: u64,
 }
 
 /// Agreement of a scan with the model's prediction, by its last reading of each beam.

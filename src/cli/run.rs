@@ -127,7 +127,7 @@ pub(super) fn run(args: Args) -> Outcome {
     if args.print_config {
         return print(&crate::config::document::<crate::config::Keys>());
     }
-    let (_messages, _drain) = messages::log_to_stderr();
+    let _drain = messages::log_to_stderr();
     let (check, mock, virtual_time) = (args.check, args.mock, args.virtual_time);
     let world = args.world.clone();
     let mut loader = Loader::new(args);

@@ -25,6 +25,7 @@ use crate::{
     compare::Explanation,
     config::ScanningKeys,
     geometry::Pose,
+    messages,
     scan::{AirSource, Device, Provenance, Record, ScanEnd, ScanPlan, ScanView, SceneRef, Session},
     scene::Scene,
 };
@@ -366,6 +367,7 @@ impl Shared {
         };
         Health {
             healthy: reasons.is_empty(),
+            dropped_messages: messages::dropped(),
             reasons,
             line: view.line.totals(),
             scans: view.scans,

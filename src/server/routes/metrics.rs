@@ -124,7 +124,7 @@ fn register_mqtt(registry: &mut Registry, report: &MqttReport) {
 }
 
 /// What only ever grows: name, meaning, value.
-fn counters(status: &Status, health: &Health) -> [(&'static str, &'static str, u64); 20] {
+fn counters(status: &Status, health: &Health) -> [(&'static str, &'static str, u64); 22] {
     [
         ("line_sent_bytes", "Bytes sent to the device", health.line.bytes_sent),
         ("line_received_bytes", "Bytes received from the device", health.line.bytes_received),
@@ -143,7 +143,17 @@ fn counters(status: &Status, health: &Health) -> [(&'static str, &'static str, u
         ("device_restarts", "Restarts of the device that scans survived", health.scans.restarts),
         ("clock_steps", "Times that the wall clock was set", health.clock.steps),
         ("log_records", "Records written to the log", status.log.written),
-        ("log_synced_records", "Of those, records on the disk for good", status.log.synced),
+        ("log_synced_records", "Of those, records confirmed to be on the disk", status.log.synced),
+        (
+            "log_uncertain_records",
+            "Of those, records that will never be confirmed",
+            status.log.uncertain,
+        ),
+        (
+            "dropped_messages",
+            "Messages dropped because standard error was blocked or gone",
+            health.dropped_messages,
+        ),
         (
             "dropped_readings",
             "Readings that slow subscribers missed",
