@@ -1,7 +1,7 @@
 //! Signals that request the end of a program.
 //!
 //! SIGINT, SIGTERM and, with a controlling terminal, SIGHUP request an orderly end. Process wrappers such as `timeout`
-//! and `sudo` deliver one request as several signals, so signals within [`BURST`] of the first one count as one
+//! and `sudo` deliver one request as several signals, so signals within half a second of the first one count as one
 //! request. A later signal requests the end within [`FORCED_END`]: motor and log are still closed.
 #![warn(clippy::expect_used, clippy::indexing_slicing, clippy::panic)]
 

@@ -1,4 +1,4 @@
-//! How far the probabilities of [`interpret`](sonard_interpret::interpret::interpret) can be believed: of the arcs that it calls an edge with
+//! Reliability of the probabilities of [`interpret`]: of the arcs that it calls an edge with
 //! a probability of 0.9, are nine in ten edges?
 //!
 //! Made-up rooms are read by the model with the sensor's whole receiver, from a random place, and from
