@@ -8,6 +8,7 @@
 
 mod carmen;
 mod doubt;
+mod encoding;
 mod error;
 mod examine;
 mod field;

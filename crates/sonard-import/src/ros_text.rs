@@ -83,10 +83,20 @@ fn yaml(number: u64, first_line: u64, text: &str) -> Result<Value, ImportError> 
             "print whole lists: `ros2 topic echo --full-length TOPIC`",
         ));
     }
-    serde_saphyr::from_str::<Value>(&with_words(text)).map_err(|error| {
+    parse_yaml(&with_words(text)).map_err(|error| {
         let what = format!("no YAML from line {first_line} on: {error}");
         ImportError::at(place, what, "messages are separated by lines `---`")
     })
+}
+
+#[cfg(feature = "texts")]
+fn parse_yaml(text: &str) -> Result<Value, String> {
+    serde_saphyr::from_str(text).map_err(|error| error.to_string())
+}
+
+#[cfg(not(feature = "texts"))]
+fn parse_yaml(_: &str) -> Result<Value, String> {
+    Err("this build has no reader for it; convert it with `sonard import`".to_owned())
 }
 
 /// YAML's infinities and NaN as texts, which JSON can hold.

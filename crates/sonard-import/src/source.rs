@@ -2,7 +2,6 @@
 
 use std::io::{self, Read};
 
-use encoding_rs::{Encoding, UTF_8};
 use jiff::Timestamp;
 use sha2::{Digest as _, Sha256};
 use sonard_model::{acoustics::Air, array::RangerArray, geometry::Pose};
@@ -11,6 +10,7 @@ use sonard_records::Record;
 use crate::{
     Format, ImportError, Mapping,
     doubt::{Ranges, Ways},
+    encoding::{self, Encoding, UTF_8},
     format::{self, Kind},
     layout::Header,
     recording::Bag,
@@ -138,6 +138,7 @@ impl Source<'_> {
                     "give utf-8, utf-16le, utf-16be or latin1",
                 )
             })?;
+            check_supported(encoding)?;
             return Ok((encoding, text::head(survey, encoding)));
         }
         let Some(encoding) = survey.encoding() else {
@@ -148,6 +149,7 @@ impl Source<'_> {
                 )
             }));
         };
+        check_supported(encoding)?;
         let head = text::head(survey, encoding);
         match format::foreign(&survey.head, &head).filter(|_| mapping.format.is_none()) {
             Some(error) => Err(error),
@@ -207,7 +209,7 @@ pub(crate) type Scan = Result<Vec<Record>, ImportError>;
 impl Imported {
     /// The text of the file as UTF-8.
     pub(crate) fn decoded<'a>(&self, source: impl Read + 'a) -> Box<dyn Read + 'a> {
-        Box::new(text::decoded(source, self.encoding))
+        Box::new(encoding::decoded(source, self.encoding))
     }
 
     /// The records of each scan, one after the other; `source` is the file again.
@@ -229,4 +231,15 @@ impl Imported {
             },
         }
     }
+}
+
+/// Rejects a text that this build does not decode.
+fn check_supported(encoding: &'static Encoding) -> Result<(), ImportError> {
+    if encoding::is_supported(encoding) {
+        return Ok(());
+    }
+    Err(ImportError::mapping(
+        format!("the text is {}, and this build reads UTF-8 alone", encoding.name()),
+        "convert it with `sonard import`, or save it as UTF-8",
+    ))
 }

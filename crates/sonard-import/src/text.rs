@@ -2,9 +2,9 @@
 
 use std::io::{self, Read};
 
-use encoding_rs::{Encoding, UTF_8, UTF_16BE, UTF_16LE, WINDOWS_1252};
-use encoding_rs_io::DecodeReaderBytesBuilder;
 use sha2::{Digest as _, Sha256};
+
+use crate::encoding::{Encoding, UTF_8, UTF_16BE, UTF_16LE, WINDOWS_1252};
 
 /// Leading bytes of a file that are kept for detection.
 const HEAD_BYTES: usize = 64 * 1024;
@@ -121,11 +121,6 @@ pub(crate) fn hexadecimal(hash: Sha256) -> String {
     hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-/// A file's text as UTF-8, without a byte order mark.
-pub(crate) fn decoded<R: Read>(source: R, encoding: &'static Encoding) -> impl Read + use<R> {
-    DecodeReaderBytesBuilder::new().encoding(Some(encoding)).strip_bom(true).build(source)
-}
-
 /// The head of a file as text, without a line that its end cuts.
 pub(crate) fn head(survey: &Survey, encoding: &'static Encoding) -> String {
     let (text, _) = encoding.decode_with_bom_removal(&survey.head);
@@ -139,11 +134,14 @@ pub(crate) fn head(survey: &Survey, encoding: &'static Encoding) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    #[cfg(feature = "texts")]
+    use crate::encoding::decoded;
 
     fn survey(bytes: &[u8]) -> Survey {
         Survey::of(bytes).expect("memory is readable")
     }
 
+    #[cfg(feature = "texts")]
     #[test]
     fn encodings_are_detected_with_and_without_mark() {
         let text = "angle_deg,distance_cm\n15,31\n16,32\n";
