@@ -8,7 +8,13 @@ use std::{
 
 use thiserror::Error;
 
-use crate::interpret::grid::{Grid, ImageError, MapYaml, from_pgm, from_pixels};
+use crate::{
+    geometry::DVec2,
+    interpret::grid::{
+        Grid, ImageError, MapYaml, TraceSettings, WallLine, from_pgm, from_pixels, trace,
+    },
+    scene::Surfaces,
+};
 
 /// A file of a map that can't be used.
 #[derive(Debug, Error)]
@@ -92,6 +98,38 @@ pub fn read_by_rules(
     note: impl FnMut(&Path),
 ) -> Result<(Grid, MapYaml), GridFileError> {
     read_as(path, |yaml| yaml, note)
+}
+
+/// Walls of a map that is read by the rules of map_server, as surfaces in its frame, with its description. Without a
+/// tolerance, walls along rows and columns of cells stay where the cells are, unless this program mapped them; lengths are
+/// metres.
+///
+/// # Errors
+/// As [`read_by_rules`].
+pub fn read_walls(
+    path: &Path,
+    tolerance_m: Option<f64>,
+    least_m: Option<f64>,
+    note: impl FnMut(&Path),
+) -> Result<(Surfaces, MapYaml), GridFileError> {
+    let (grid, yaml) = read_by_rules(path, note)?;
+    let by_default = TraceSettings::of_cells(grid.shape().resolution_m);
+    let settings = TraceSettings {
+        tolerance_m: tolerance_m.unwrap_or(by_default.tolerance_m),
+        least_m: least_m.unwrap_or(by_default.least_m),
+        // What a sonar mapped has ragged walls; others draw them as they are.
+        keeps_rows: !yaml.is_graded && tolerance_m.is_none(),
+        ..by_default
+    };
+    let [x_m, y_m, yaw_rad] = yaml.origin;
+    let (origin, turn) = (DVec2::new(x_m, y_m), DVec2::from_angle(yaw_rad));
+    let turned =
+        |corner: DVec2| if yaw_rad == 0.0 { corner } else { origin + turn.rotate(corner - origin) };
+    let mut found = Surfaces::default();
+    for WallLine { corners, is_closed } in trace(&grid, &settings) {
+        found.walls("wall", corners.into_iter().map(turned).collect(), is_closed);
+    }
+    Ok((found, yaml))
 }
 
 fn read_as(

@@ -35,7 +35,9 @@ pub(crate) use reader::open_for_reading;
 pub use reader::{Line, LineError, Lines, Loaded, load, read_log};
 pub use repair::{LeftOut, Repair, repair};
 pub use scenes::{MAX_LOGGED_SCENE_BYTES, SceneLost, logged_scene};
-pub(crate) use sync::{sync_file, sync_folder, sync_folder_of};
+#[cfg(feature = "daemon")]
+pub(crate) use sync::sync_folder_of;
+pub(crate) use sync::{sync_file, sync_folder};
 pub use whole::WholeFile;
 pub use writer::{LogWriter, SYNC_INTERVAL};
 

@@ -9,6 +9,7 @@ use super::{
 use crate::{
     grid_file,
     interpret::grid::{Grid, MapYaml, to_pgm},
+    scene::Surfaces,
 };
 
 /// A map by its description, or by the folder that holds `map.yaml`.
@@ -16,9 +17,14 @@ pub(super) fn read(path: &Path) -> Result<Grid, Failure> {
     grid_file::read(path, note_input).map_err(|error| Failure::input(&error, error.help()))
 }
 
-/// The same by the rules of map_server, with its description.
-pub(super) fn read_by_rules(path: &Path) -> Result<(Grid, MapYaml), Failure> {
-    grid_file::read_by_rules(path, note_input).map_err(|error| Failure::input(&error, error.help()))
+/// Walls of a map as surfaces, with its description; lengths are metres.
+pub(super) fn read_walls(
+    path: &Path,
+    tolerance_m: Option<f64>,
+    least_m: Option<f64>,
+) -> Result<(Surfaces, MapYaml), Failure> {
+    grid_file::read_walls(path, tolerance_m, least_m, note_input)
+        .map_err(|error| Failure::input(&error, error.help()))
 }
 
 /// Notes that the command reads a map, before it does.

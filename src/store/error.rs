@@ -159,8 +159,8 @@ fn help_for(error: &io::Error, path: &Path) -> String {
             "the disk quota of this user is used up: raise it or make room; every record before this one is in the log"
         }
         Kind::FileTooLarge => {
-            "the file-size limit of this process is reached (`ulimit -f`, LimitFSIZE=): raise it, or lower \
-             log.rotate_mb; every record before this one is in the log"
+            "the file-size limit of this process is reached (`ulimit -f`, LimitFSIZE=): raise it; every record before \
+             this one is in the log"
         }
         Kind::NotFound => "check the path; its folder must exist",
         Kind::ReadOnlyFilesystem => {

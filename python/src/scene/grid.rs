@@ -3,10 +3,7 @@
 use std::path::Path;
 
 use pyo3::prelude::*;
-use sonard::{
-    grid_file::{self, GridFileError, GridFileFault},
-    interpret::grid::{TraceSettings, surfaces},
-};
+use sonard::grid_file::{self, GridFileError, GridFileFault};
 use sonard_model::scene;
 
 use super::between;
@@ -23,17 +20,8 @@ pub(super) fn traced(
     for (name, value) in [("tolerance_m", tolerance_m), ("least_m", least_m)] {
         between(name, value.unwrap_or_default(), [0.0, 1e6])?;
     }
-    let found = py.detach(|| {
-        let grid = grid_file::read(path, |_| {})?;
-        let by_default = TraceSettings::of_cells(grid.shape().resolution_m);
-        let settings = TraceSettings {
-            tolerance_m: tolerance_m.unwrap_or(by_default.tolerance_m),
-            least_m: least_m.unwrap_or(by_default.least_m),
-            ..by_default
-        };
-        Ok::<_, GridFileError>(surfaces(&grid, &settings))
-    });
-    let found = found.map_err(|error| unusable(py, &error))?;
+    let found = py.detach(|| grid_file::read_walls(path, tolerance_m, least_m, |_| {}));
+    let (found, _) = found.map_err(|error| unusable(py, &error))?;
     if found.is_empty() {
         let help =
             "give a map with occupied cells (above 0.65) beside free ones, or a smaller least_m";
@@ -48,9 +36,12 @@ pub(super) fn traced(
 
 fn unusable(py: Python<'_>, error: &GridFileError) -> PyErr {
     match &error.fault {
-        GridFileFault::Disk(source) => error::unreadable(py, error.path.clone(), source),
-        GridFileFault::Map(_) | GridFileFault::Png(_) => {
-            refuse::<SceneError>(py, &error.to_string(), error.help())
+        GridFileFault::Disk(source) | GridFileFault::Image(source) => {
+            error::unreadable(py, error.path.clone(), source)
         }
+        GridFileFault::IsImage
+        | GridFileFault::Map(_)
+        | GridFileFault::Png(_)
+        | GridFileFault::Turned(_) => refuse::<SceneError>(py, &error.to_string(), error.help()),
     }
 }

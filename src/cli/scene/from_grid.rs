@@ -6,11 +6,6 @@ use super::{
     super::{Outcome, map_file, numbers::not_negative},
     made::MadeArgs,
 };
-use crate::{
-    geometry::DVec2,
-    interpret::grid::{TraceSettings, WallLine, trace},
-    scene::Surfaces,
-};
 
 /// Options of `sonard scene from-grid`.
 #[derive(Debug, clap::Args)]
@@ -44,23 +39,7 @@ Examples:
   sonard scene from-grid ~/maps/office.yaml --least-m 0.5 | sonard scene check /dev/stdin";
 
 pub(super) fn run(args: &FromGridArgs) -> Outcome {
-    let (grid, yaml) = map_file::read_by_rules(&args.map)?;
-    let by_default = TraceSettings::of_cells(grid.shape().resolution_m);
-    let settings = TraceSettings {
-        tolerance_m: args.tolerance_m.unwrap_or(by_default.tolerance_m),
-        least_m: args.least_m.unwrap_or(by_default.least_m),
-        // What a sonar mapped has ragged walls; others draw them as they are.
-        keeps_rows: !yaml.is_graded && args.tolerance_m.is_none(),
-        ..by_default
-    };
-    let [x_m, y_m, yaw_rad] = yaml.origin;
-    let (origin, turn) = (DVec2::new(x_m, y_m), DVec2::from_angle(yaw_rad));
-    let turned =
-        |corner: DVec2| if yaw_rad == 0.0 { corner } else { origin + turn.rotate(corner - origin) };
-    let mut found = Surfaces::default();
-    for WallLine { corners, is_closed } in trace(&grid, &settings) {
-        found.walls("wall", corners.into_iter().map(turned).collect(), is_closed);
-    }
+    let (found, yaml) = map_file::read_walls(&args.map, args.tolerance_m, args.least_m)?;
     let help = format!(
         "give a map with occupied cells beside free ones (by this file above {} and below {}), or a smaller --least-m",
         yaml.occupied_thresh, yaml.free_thresh

@@ -95,7 +95,7 @@ fn a_full_disk_stops_it_and_with_room_again_it_goes_on() {
     limit_files(child.id(), Some(6_000));
     let output = child.wait_with_output().expect("it ends");
     let text = said(&output);
-    assert!(output.status.code() == Some(3) && text.contains("make room"), "{text}");
+    assert!(output.status.code() == Some(3) && text.contains("file-size limit"), "{text}");
     case.collect_all(&[]);
     case.assert_each_scan_once(1, 4, 25);
 }

@@ -22,7 +22,7 @@ pub use ideal::ideal;
 pub use image::{ImageError, MapMode, MapYaml, from_pgm, from_pixels, to_pgm};
 pub use score::{MapScore, PathSettings, ScoreError, score};
 pub(super) use tiles::Tiles;
-pub use trace::{TraceSettings, WallLine, surfaces, trace};
+pub use trace::{TraceSettings, WallLine, trace};
 
 use thiserror::Error;
 

@@ -3,10 +3,7 @@
 use std::collections::HashMap;
 
 use super::{Grid, rows};
-use sonard_model::{
-    geometry::{DVec2, distance_to_segment, enclosed_area},
-    scene::Surfaces,
-};
+use sonard_model::geometry::{DVec2, distance_to_segment, enclosed_area};
 
 /// A line along walls, free space on its left.
 #[derive(Debug, Clone, PartialEq)]
@@ -53,16 +50,6 @@ impl TraceSettings {
 
 /// A corner of cells: column and row of the cell that it is the lower left corner of.
 pub(super) type Node = (i64, i64);
-
-/// The walls of a map as surfaces of a scene.
-#[must_use]
-pub fn surfaces(grid: &Grid, settings: &TraceSettings) -> Surfaces {
-    let mut found = Surfaces::default();
-    for WallLine { corners, is_closed } in trace(grid, settings) {
-        found.walls("wall", corners, is_closed);
-    }
-    found
-}
 
 /// The walls of a map.
 ///
