@@ -123,7 +123,7 @@ fn where_the_disk_ends_no_half_record_stays() {
     let said = String::from_utf8_lossy(&output.stdout).into_owned();
     assert!(output.status.success(), "{said}");
     let failed = said.lines().find(|line| line.starts_with("failed")).expect("the disk ends");
-    assert!(failed.contains("scan.jsonl") && failed.contains("make room"), "{failed}");
+    assert!(failed.contains("scan.jsonl") && failed.contains("file-size limit"), "{failed}");
     assert!(fs::read(&log).expect("it is there").ends_with(b"\n"));
     let kept = numbers(&log);
     assert!(kept.len() > 20 && kept.len() as u64 == last_synced(said.lines()), "{said}");

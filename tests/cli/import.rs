@@ -127,7 +127,7 @@ fn a_table_becomes_a_log_that_every_verb_takes() {
         vec!["plot", &predicted, "-o", &picture],
         vec!["plot", &predicted, "--kind", "residuals", "-o", &picture],
         vec!["map", &predicted, "--out", &map],
-        vec!["log", "show", "--pings", &predicted],
+        vec!["log", "show", "--readings", &predicted],
         vec!["log", "annotate", &predicted, "-o", &trusted],
         vec!["interpret", &predicted],
         vec!["lines", &predicted],

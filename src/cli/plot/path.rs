@@ -47,7 +47,7 @@ pub(super) fn draw(
     let record = ping.sound_path().ok_or_else(|| {
         Failure::input(
             format!("beam {index}, azimuth {azimuth_deg}\u{b0}, has no path: nothing came near"),
-            "choose a beam with an echo; `sonard log show --pings` lists them",
+            "choose a beam with an echo; `sonard log show --readings` lists them",
         )
     })?;
     let viewpoint = view.viewpoint(ping).zip(view.polyline(ping, record));
