@@ -65,7 +65,11 @@ fn a_turned_map_is_turned_about_its_origin() {
             "{one:?} {other:?}"
         );
     }
-    let refused = run(&["benchmark", "score", &path, "simple-room"]);
+    let [log, out] =
+        ["scan.jsonl", "map"].map(|name| folder.path().join(name).display().to_string());
+    let simulated = ["simulate", "--scene", "simple-room", "--pose", "fig9", "--step-deg", "36"];
+    assert!(run(&[&simulated[..], &["-o", &log]].concat()).status.success());
+    let refused = run(&["map", &log, "--onto", &path, "--out", &out]);
     assert!(stderr(&refused).contains("turned"), "{}", stderr(&refused));
 }
 
