@@ -186,7 +186,8 @@ fn write_turned_ring(folder: &Path) {
     fs::create_dir_all(&log).expect("there is room");
     let log = log.join("sonard-20260101T000000Z.jsonl");
     let ring = ["simulate", "--array", "ring-12", "--rounds", "3", "--scene", "two-surface-room"];
-    let further = ["--pose", "1.2,1,30", "--max-range", "4", "--out", log.to_str().expect("plain")];
+    let further =
+        ["--pose", "1.2,1,30", "--max-range", "4", "--output", log.to_str().expect("plain")];
     let made = run(&[&ring[..], &further].concat());
     assert!(made.status.success(), "{}", stderr(&made));
 }

@@ -41,8 +41,13 @@ fn without_its_folder_there_is_no_way_to_the_playground() {
     assert!(page.contains("href=\"/playground/\" hidden"), "the link is hidden");
     drop(daemon);
     let folder = tempfile::tempdir().expect("a folder");
-    let nowhere = ["--set", "server.playground=/nowhere"];
-    let daemon = Daemon::start_mock(folder.path(), &nowhere);
+    // The page is checked at the start, and may disappear later.
+    let page = folder.path().join("playground");
+    std::fs::create_dir(&page).expect("a folder");
+    std::fs::write(page.join("index.html"), "").expect("there is room");
+    let setting = format!("server.playground={}", page.display());
+    let daemon = Daemon::start_mock(folder.path(), &["--set", &setting]);
+    std::fs::remove_dir_all(&page).expect("it is there");
     let reply = daemon.get("/playground/playground.js");
     assert_eq!(reply.status, 500);
     assert!(reply.json()["error"].as_str().is_some_and(|error| error.contains("playground.js")));
