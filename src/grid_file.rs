@@ -88,31 +88,19 @@ pub fn read(path: &Path, note: impl FnMut(&Path)) -> Result<Grid, GridFileError>
     }
 }
 
-/// A map as map_server reads it, by the thresholds and the mode of its description, which comes with it; only
-/// the cells of a map that this program wrote have probabilities.
-///
-/// # Errors
-/// The file that can't be read or is none of a map.
-pub fn read_by_rules(
-    path: &Path,
-    note: impl FnMut(&Path),
-) -> Result<(Grid, MapYaml), GridFileError> {
-    read_as(path, |yaml| yaml, note)
-}
-
-/// Walls of a map that is read by the rules of map_server, as surfaces in its frame, with its description. Without a
+/// Walls of a map that is read by the thresholds and the mode of its description, as map_server does, as surfaces in its frame, with its description. Without a
 /// tolerance, walls along rows and columns of cells stay where the cells are, unless this program mapped them; lengths are
 /// metres.
 ///
 /// # Errors
-/// As [`read_by_rules`].
+/// The file that can't be read or is none of a map.
 pub fn read_walls(
     path: &Path,
     tolerance_m: Option<f64>,
     least_m: Option<f64>,
     note: impl FnMut(&Path),
 ) -> Result<(Surfaces, MapYaml), GridFileError> {
-    let (grid, yaml) = read_by_rules(path, note)?;
+    let (grid, yaml) = read_as(path, |yaml| yaml, note)?;
     let by_default = TraceSettings::of_cells(grid.shape().resolution_m);
     let settings = TraceSettings {
         tolerance_m: tolerance_m.unwrap_or(by_default.tolerance_m),

@@ -20,6 +20,7 @@ use tokio::sync::watch;
 
 use crate::{
     api::LogStatus,
+    backoff::Backoff,
     scan::{Event, EventKind, Record, Sink, SinkError},
     store::{LogFolder, Rotation, StoreError},
     supervisor::{Supervisor, Task},
@@ -35,8 +36,7 @@ const QUEUE_POLL: Duration = Duration::from_millis(2);
 const SYNC_CHECK: Duration = Duration::from_millis(500);
 /// Interval at which the open file is compared with the one that its path names.
 const FILE_CHECK: Duration = Duration::from_secs(2);
-const RETRY_MIN: Duration = Duration::from_millis(250);
-const RETRY_MAX: Duration = Duration::from_secs(10);
+const RETRY: Backoff = Backoff::new(Duration::from_millis(250), Duration::from_secs(10));
 /// Time without a failure after which the next one is retried as soon as a first one.
 const CALM: Duration = Duration::from_secs(60);
 /// Duration of a write or sync from which it is reported.
@@ -140,7 +140,7 @@ impl Journal {
         let writer = Writer {
             log,
             waiting: VecDeque::new(),
-            retry: RETRY_MIN,
+            retry: RETRY,
             retry_at: None,
             failed_at: None,
             next_file_check: Instant::now() + FILE_CHECK,
@@ -282,7 +282,7 @@ struct Writer {
     log: LogFolder,
     waiting: VecDeque<Box<Record>>,
     /// Wait from try to try, and when the next one is due, while in trouble.
-    retry: Duration,
+    retry: Backoff,
     retry_at: Option<Instant>,
     /// Last failure, until the log has been well for a while.
     failed_at: Option<Instant>,
@@ -345,11 +345,11 @@ impl Writer {
         if is_ok {
             self.retry_at = None;
             if self.failed_at.is_some_and(|at| now.saturating_duration_since(at) >= CALM) {
-                (self.retry, self.failed_at) = (RETRY_MIN, None);
+                self.retry.reset();
+                self.failed_at = None;
             }
         } else {
-            self.retry_at = Some(now + self.retry);
-            self.retry = (self.retry * 2).min(RETRY_MAX);
+            self.retry_at = Some(now + self.retry.next_wait());
             self.failed_at = Some(now);
         }
     }
