@@ -40,62 +40,36 @@
 #![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 
 pub use sonard_export as export;
-#[cfg(feature = "generate")]
+#[cfg(feature = "store")]
 pub use sonard_generate as generate;
 pub use sonard_import as import;
 pub use sonard_interpret::{compare, interpret};
 #[cfg(feature = "inverse")]
 pub use sonard_inverse as inverse;
+#[cfg(feature = "store")]
+pub use sonard_log::{self as store, dataset, grid_file};
 pub use sonard_model::{acoustics, array, geometry, model, motion, scene, viewpoint};
 #[cfg(feature = "plot")]
 pub use sonard_plot as plot;
 pub use sonard_records as scan;
 
 #[cfg(feature = "daemon")]
-pub mod api;
-#[cfg(feature = "daemon")]
-pub mod backoff;
-#[cfg(feature = "daemon")]
 pub mod cli;
 #[cfg(feature = "daemon")]
-pub mod client;
+pub use sonard_api::{self as api, client, config, fleet};
 #[cfg(feature = "daemon")]
-pub mod collect;
+pub use sonard_collect as collect;
 #[cfg(feature = "daemon")]
-pub mod config;
-#[cfg(feature = "daemon")]
-pub mod daemon;
-#[cfg(feature = "generate")]
-pub mod dataset;
-#[cfg(feature = "daemon")]
-pub mod fleet;
-#[cfg(feature = "store")]
-pub mod grid_file;
-#[cfg(feature = "daemon")]
-pub mod host_gpio;
-#[cfg(feature = "daemon")]
-pub mod interrupts;
-#[cfg(feature = "daemon")]
-pub mod link;
-#[cfg(feature = "daemon")]
-pub mod messages;
-#[cfg(feature = "daemon")]
-pub mod mock;
-#[cfg(feature = "mqtt")]
-pub mod mqtt;
+pub use sonard_daemon::{self as daemon, secret, server};
 #[cfg(feature = "pi")]
-pub mod pi;
+pub use sonard_device::pi;
 #[cfg(feature = "daemon")]
-pub mod ranger;
+pub use sonard_device::{host_gpio, link, ranger, thermometer};
+#[cfg(feature = "daemon")]
+pub use sonard_mock as mock;
+#[cfg(feature = "mqtt")]
+pub use sonard_mqtt as mqtt;
 #[cfg(feature = "ros")]
-pub mod ros;
+pub use sonard_ros as ros;
 #[cfg(feature = "daemon")]
-pub mod secret;
-#[cfg(feature = "daemon")]
-pub mod server;
-#[cfg(feature = "store")]
-pub mod store;
-#[cfg(feature = "daemon")]
-pub mod supervisor;
-#[cfg(feature = "daemon")]
-pub mod thermometer;
+pub use sonard_runtime::{backoff, interrupts, messages, supervisor};

@@ -21,7 +21,7 @@ use crate::{
         scene_file,
     },
     config::{ConfigError, Keys, Layers, Mode, robot_name_of_host},
-    daemon::{Mismatch, Settings, Simulated},
+    daemon::{Mismatch, OptionalOutputs, Settings, Simulated},
     host_gpio,
     scene::{PoseError, parse_pose},
 };
@@ -182,7 +182,8 @@ fn settings(keys: Keys) -> Result<Settings, Failure> {
         None => (None, parse_pose(&keys.place.pose).map_err(refuse_pose)?),
     };
     let sensor = load_sensor(&keys.model.sensor)?;
-    Ok(Settings { keys, scene, sensor, pose, simulated: None, files: BTreeMap::new() })
+    let outputs = OptionalOutputs { mqtt: cfg!(feature = "mqtt"), ros: cfg!(feature = "ros") };
+    Ok(Settings { keys, scene, sensor, pose, simulated: None, outputs, files: BTreeMap::new() })
 }
 
 /// The same for an array that the model plays; its rangers are what it says, unless the sensor was

@@ -1,0 +1,55 @@
+//! What is said over the HTTP API: the types of its requests and answers, for whoever serves them
+//! and whoever asks.
+//!
+//! `GET /v1/openapi.json` is made from these types, and from those of [`scan`](sonard_records) that
+//! records are.
+
+mod air;
+mod beam;
+mod body;
+mod findings;
+mod fleet;
+mod health;
+mod link;
+mod location;
+mod logs;
+mod mqtt;
+mod orders;
+mod preview;
+mod problem;
+mod ros;
+mod scans;
+mod sensor;
+mod server;
+mod setup;
+mod simulation;
+mod status;
+
+pub use air::{AirOrder, AirStatus};
+pub use beam::{Beam, Echo};
+pub use body::{Strict, has_list};
+pub use findings::{Findings, FoundFeature, FoundLine, MapCells};
+pub use fleet::{Fleet, FleetPicture, FleetReport, FleetRobot, FleetScan, FleetState};
+pub use health::{ClockReport, Health, LineTotals, ScanFit, ScanTotals};
+pub use link::{LinkReport, LinkState, Trouble};
+pub use location::Location;
+pub use logs::LogEntry;
+pub use mqtt::MqttReport;
+pub use orders::{Accepted, CancelRequest, ScanRequest, Scanning, Started};
+pub use preview::PreviewRequest;
+pub use problem::Problem;
+pub use ros::RosReport;
+pub use scans::{ListedScan, ScanReport, WholeScan};
+pub use sensor::{SensorFigures, SensorOrder};
+pub use server::ServerReport;
+pub use setup::Setup;
+pub use simulation::{RangerReading, SimulationReport};
+pub use status::{
+    ConfigurationReport, InForce, LogStatus, Pending, ScanProgress, ScanningReport, Status,
+    SubscriberReport,
+};
+
+// Those that the pure part makes.
+pub use sonard_interpret::compare::{Beside, JudgedPing, Word};
+pub use sonard_inverse::{Doubt, Mode};
+pub use sonard_records::{Body, Circle, FloorPlan, PeakLine, PlanPoint, TraceLine, WallLine};

@@ -1,0 +1,110 @@
+//! The configuration file that documents every key, written from the keys themselves.
+
+use std::fmt::Write as _;
+
+use super::schema::{Form, Key};
+
+const WIDTH: usize = 98;
+
+/// The file that documents every key; for `sonard run` the text of `config/sonard.toml`.
+#[must_use]
+pub fn document<K: Form>() -> String {
+    let mut text = K::HEAD.to_owned();
+    for section in K::sections() {
+        text += "\n";
+        comment(&mut text, &section.about);
+        // Writing to a text can't fail.
+        let _ = writeln!(text, "[{}]", section.name);
+        for key in &section.keys {
+            write_key(&mut text, key);
+        }
+    }
+    text
+}
+
+fn write_key(text: &mut String, key: &Key) {
+    comment(text, &format!("{} {}", key.about, key.kind.wanted()));
+    let _ = match (&key.default, &key.example) {
+        (Some(default), _) if key.default_yields => {
+            writeln!(text, "# {} = {}", key.name, key.kind.toml(default))
+        }
+        (Some(default), _) => writeln!(text, "{} = {}", key.name, key.kind.toml(default)),
+        (None, Some(example)) => {
+            writeln!(text, "# {} = {}", key.name, key.kind.toml(example))
+        }
+        (None, None) => writeln!(text, "# {} =", key.name),
+    };
+}
+
+fn comment(text: &mut String, about: &str) {
+    for line in textwrap::wrap(about, WIDTH) {
+        let _ = writeln!(text, "# {line}");
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{
+        super::{Keys, Kind, Layers, sections},
+        *,
+    };
+
+    const SHIPPED: &str = include_str!("../../../../config/sonard.toml");
+
+    #[test]
+    fn the_shipped_file_shows_every_key_as_the_program_knows_it() {
+        let fresh = document::<Keys>();
+        if std::env::var_os("SONARD_TEST_WRITE").is_some() {
+            std::fs::write("config/sonard.toml", &fresh).expect("it can be written");
+        }
+        assert!(
+            SHIPPED == fresh,
+            "config/sonard.toml is behind: `SONARD_TEST_WRITE=1 cargo test config::document`"
+        );
+    }
+
+    #[test]
+    fn the_shipped_file_is_the_defaults_and_its_examples_are_right() {
+        let read = |text: &str| Layers::new().file("sonard.toml", text).and_then(Layers::keys);
+        assert_eq!(read(SHIPPED), Ok(Keys::default()));
+        // Every comment that holds a key becomes that key.
+        let sets = |line: &str| line.split_once(" = ").is_some_and(|(key, _)| !key.contains(' '));
+        let opened: Vec<&str> = SHIPPED
+            .lines()
+            .map(|line| line.strip_prefix("# ").filter(|rest| sets(rest)).unwrap_or(line))
+            .collect();
+        let opened = read(&opened.join("\n")).expect("the examples are right");
+        assert_eq!(opened.server.listen.as_deref(), Some("127.0.0.1:8765"));
+        assert_eq!(opened.gpio.reset_pin, Some(17));
+    }
+
+    #[test]
+    fn the_shipped_file_sets_no_default_that_gives_way() {
+        let read = Layers::<Keys>::new().file("sonard.toml", SHIPPED).expect("it is right");
+        let mut yielding = Vec::new();
+        for section in sections() {
+            for key in section.keys.iter().filter(|key| key.default_yields) {
+                yielding.push(format!("{}.{}", section.name, key.name));
+                assert_eq!(read.origin(&section.name, &key.name), None, "{}", key.name);
+            }
+        }
+        assert_eq!(
+            yielding,
+            ["scanning.mode", "model.sensor", "log.folder", "server.socket", "fleet.robot"]
+        );
+    }
+
+    #[test]
+    fn every_key_says_what_it_is_and_every_number_has_a_range() {
+        for section in sections() {
+            assert!(!section.about.is_empty() && !section.keys.is_empty(), "{}", section.name);
+            for key in &section.keys {
+                assert!(key.about.ends_with('.'), "{}.{}: {}", section.name, key.name, key.about);
+                if let Kind::Number { min, max } | Kind::Whole { min, max } = key.kind {
+                    assert!(min > f64::MIN && max < f64::MAX, "{}.{}", section.name, key.name);
+                }
+                assert!(key.default.is_some() || key.example.is_some(), "{}", key.name);
+            }
+        }
+    }
+}

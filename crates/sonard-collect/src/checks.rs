@@ -1,0 +1,173 @@
+//! Whether a scan is as it should be. Pure.
+
+use serde::{Deserialize, Serialize};
+use sonard_interpret::compare::compare;
+use sonard_records::{EventKind, PingStatus, ScanView};
+
+use super::keys::{Action, CheckKeys};
+
+/// A finding of a check of a scan.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Finding {
+    /// Which check, as its key in `[checks]` is called without `max_`.
+    pub check: String,
+    /// In words, with numbers.
+    pub detail: String,
+    /// What the plan wants done about it.
+    pub action: Action,
+}
+
+/// Figures of a whole scan, for the report and its pictures.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct Figures {
+    /// Beams of the plan.
+    pub beams: u32,
+    /// Beams without a usable reading.
+    pub missing: u32,
+    /// Beams set beside a prediction.
+    pub compared: u32,
+    /// Share of the pairs of echoes that agree; `null` without a pair.
+    pub agree_fraction: Option<f64>,
+    /// Share of the compared beams that the model leaves unexplained; `null` without one.
+    pub unexplained_share: Option<f64>,
+    /// Median of measured minus predicted range, metres.
+    pub median_residual_m: Option<f64>,
+    /// Distance that nine tenths of the pairs of echoes don't exceed, metres.
+    pub p90_abs_residual_m: Option<f64>,
+    /// How far off the index was found afterwards, motor steps.
+    pub home_drift_steps: Option<i32>,
+    /// Air temperature that the scan's ranges were computed with, degrees Celsius.
+    pub temperature_c: Option<f64>,
+    /// How far the thermometer moved during the scan, degrees Celsius.
+    pub temperature_change_c: Option<f64>,
+}
+
+impl Figures {
+    /// Of a scan with every record it will ever have.
+    #[must_use]
+    pub fn of(view: &ScanView, temperature_change_c: Option<f64>) -> Self {
+        let views = std::slice::from_ref(view);
+        let comparison = compare(views).0;
+        let beams = view.start.as_ref().map_or(0, |start| start.plan.beams());
+        let usable =
+            |status| matches!(status, PingStatus::Echo | PingStatus::NoEcho | PingStatus::MinRange);
+        let usable = view.pings.iter().filter(|ping| usable(ping.status)).count() as u32;
+        let session = view.session.as_ref().map(|session| session.air.temperature_c);
+        let air = view.start.as_ref().and_then(|start| start.air);
+        Self {
+            beams,
+            missing: beams.saturating_sub(usable),
+            compared: comparison.beams,
+            agree_fraction: comparison.agree_fraction,
+            unexplained_share: (comparison.beams > 0)
+                .then(|| f64::from(comparison.verdicts.unexplained) / f64::from(comparison.beams)),
+            median_residual_m: comparison.median_residual_m,
+            p90_abs_residual_m: comparison.p90_abs_residual_m,
+            home_drift_steps: view.end.as_ref().and_then(|end| end.home_drift_steps),
+            temperature_c: air.map(|air| air.temperature_c).or(session),
+            temperature_change_c,
+        }
+    }
+}
+
+/// Whether the scan was broken off before its end: by a signal, a crash or a power cut.
+///
+/// A scan that was given up because the ranger was lost is no such thing: it has an end and a
+/// reading, if only a `link_lost` one, for each beam, and the checks decide.
+#[must_use]
+pub fn is_cut(view: &ScanView) -> bool {
+    let beams = view.start.as_ref().map_or(u32::MAX, |start| start.plan.beams());
+    let stopped = view.events.iter().any(|event| event.kind == EventKind::Stopped);
+    view.end.is_none() || stopped || view.pings.len() < beams as usize
+}
+
+/// What the plan's checks find in a scan.
+#[must_use]
+pub fn check(figures: &Figures, keys: &CheckKeys) -> Vec<Finding> {
+    let mut findings = Vec::new();
+    let mut find = |check: &str, action, detail| {
+        findings.push(Finding { check: check.to_owned(), detail, action });
+    };
+    if figures.missing > keys.max_missing_beams {
+        let Figures { missing, beams, .. } = figures;
+        let detail = format!("{missing} of {beams} beams have no usable reading");
+        find("missing_beams", keys.on_missing_beams, detail);
+    }
+    if let Some(drift) = figures.home_drift_steps
+        && drift.unsigned_abs() > keys.max_home_drift_steps
+    {
+        let detail = format!("the index was found off by {drift} motor steps: it missed steps");
+        find("home_drift_steps", keys.on_home_drift, detail);
+    }
+    if let Some(change_c) = figures.temperature_change_c
+        && change_c.abs() > keys.max_temperature_change_c
+    {
+        let detail = format!("the air changed by {change_c:+.2} C during the scan");
+        find("temperature_change_c", keys.on_temperature_change, detail);
+    }
+    if let Some(share) = figures.unexplained_share
+        && share > keys.max_unexplained_share
+    {
+        let detail = format!(
+            "the model leaves {:.0} % of {} beams unexplained: is it the right pose and scene?",
+            100.0 * share,
+            figures.compared
+        );
+        find("unexplained_share", keys.on_unexplained, detail);
+    }
+    findings
+}
+
+/// The strongest action that findings ask for.
+#[must_use]
+pub fn verdict(findings: &[Finding]) -> Action {
+    findings.iter().map(|finding| finding.action).max().unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn good() -> Figures {
+        Figures {
+            beams: 400,
+            compared: 400,
+            unexplained_share: Some(0.02),
+            home_drift_steps: Some(0),
+            temperature_change_c: Some(0.1),
+            ..Figures::default()
+        }
+    }
+
+    #[test]
+    fn each_check_trips_at_its_limit_and_the_strongest_action_counts() {
+        let keys = CheckKeys { on_unexplained: Action::Stop, ..CheckKeys::default() };
+        assert_eq!(check(&good(), &keys), []);
+        for (figures, name, action) in [
+            (Figures { missing: 1, ..good() }, "missing_beams", Action::Retake),
+            (Figures { home_drift_steps: Some(-1), ..good() }, "home_drift_steps", Action::Retake),
+            (
+                Figures { temperature_change_c: Some(-0.6), ..good() },
+                "temperature_change_c",
+                Action::Retake,
+            ),
+            (
+                Figures { unexplained_share: Some(0.51), ..good() },
+                "unexplained_share",
+                Action::Stop,
+            ),
+        ] {
+            let found = check(&figures, &keys);
+            assert_eq!(found.len(), 1, "{found:?}");
+            assert_eq!((found[0].check.as_str(), found[0].action), (name, action));
+        }
+        let all = Figures {
+            missing: 3,
+            unexplained_share: Some(0.9),
+            home_drift_steps: Some(4),
+            ..good()
+        };
+        assert_eq!(verdict(&check(&all, &keys)), Action::Stop);
+        assert_eq!(verdict(&[]), Action::Note);
+    }
+}

@@ -1,0 +1,215 @@
+//! The beginning of a run: the journal, the plan it knows, what was left over, the device.
+
+use std::{
+    collections::{BTreeMap, HashMap, HashSet},
+    time::Duration,
+};
+
+use jiff::Timestamp;
+use sonard_device::thermometer::Thermometer;
+use sonard_records::SceneRef;
+use sonard_runtime::interrupts::Interrupts;
+use uuid::Uuid;
+
+use super::{
+    super::{
+        Conditions, Connected, Device, Entry, Folder, Halt, INPUTS, Journal, Plan, PlanEntry,
+        Poses, Started, Watcher, changes,
+        estimate::{Pace, budget},
+        numbers_of, sha256,
+        source::{Source, answered},
+    },
+    Choices, Collector, warn_of_disk,
+};
+
+impl<D: Device, W: Watcher> Collector<D, W> {
+    pub(super) async fn begin(
+        plan: Plan,
+        choices: Choices,
+        mut device: D,
+        watcher: W,
+        interrupts: Interrupts,
+    ) -> Result<Self, Halt> {
+        let mut thermometer = plan.keys.air.file.as_deref().map(Thermometer::new);
+        let measured_c = match &mut thermometer {
+            Some(thermometer) => Some(thermometer.read().await.map_err(|error| {
+                Halt::failed(
+                    format!("the thermometer has no valid temperature: {error}"),
+                    "correct air.file in the plan, or leave it out",
+                )
+            })?),
+            None => None,
+        };
+        let told_c = match device.is_local() || plan.gives_air() {
+            true => measured_c,
+            false => device.temperature_c().await,
+        };
+        let air = plan.air(told_c.unwrap_or(plan.keys.air.temperature_c))?;
+        let folder = Folder::open(&plan.folder)?;
+        let journal = Journal::open(&folder.journal())?;
+        let id = journal.history().plans.last().map_or_else(Uuid::new_v4, |plan| plan.collection);
+        let scan_s = budget(&plan)?.total_s();
+        let patience = Duration::from_secs_f64(plan.keys.collection.patience_s);
+        device.go_on(patience, journal.history().borrowed.clone());
+        let mut collector = Self {
+            choices,
+            source: Source::of(&plan.poses),
+            more: true,
+            thermometer,
+            air,
+            id,
+            folder,
+            journal,
+            interrupts,
+            prepared: HashMap::new(),
+            device,
+            here: None,
+            carried_to: None,
+            losses: None,
+            refused: BTreeMap::new(),
+            conditions: Conditions::new(),
+            pace: Pace::new(scan_s, plan.keys.collection.pause_s),
+            watcher,
+            plan,
+        };
+        collector.folder.remove_drafts()?;
+        collector.adopt_plan()?;
+        collector.take_in_left_overs()?;
+        collector.write_manifest()?;
+        Ok(collector)
+    }
+
+    /// Goes on with the plan that the journal knows, or begins with this one.
+    fn adopt_plan(&mut self) -> Result<(), Halt> {
+        let sensor = serde_json::to_string_pretty(&self.plan.sensor).unwrap_or_default();
+        let sensor_sha256 = sha256(sensor.as_bytes());
+        if !self.journal.history().plans.is_empty() {
+            let changes = changes::since(self.journal.history(), &self.plan, &sensor_sha256);
+            if changes.is_empty() {
+                return Ok(());
+            }
+            if !self.choices.accept_changed_plan {
+                return Err(Halt::wrong(
+                    format!(
+                        "{} holds a collection by another plan: {}",
+                        self.folder.root().display(),
+                        changes.join("; ")
+                    ),
+                    "give another --out, put the plan back, or go on with the new one by \
+                     --accept-changed-plan: scans that are there stay, and the journal keeps both",
+                ));
+            }
+        }
+        // The files first: a plan that the journal knows is there to be read.
+        for (name, text) in [
+            ("plan.toml", &self.plan.text),
+            ("scene.json", &self.plan.scene_text),
+            ("sensor.json", &sensor),
+        ] {
+            let path = format!("{INPUTS}/{name}");
+            self.folder.write(&path, text.as_bytes())?;
+        }
+        let poses = self.number_poses()?;
+        let scene = &self.plan.scene;
+        let plan = PlanEntry {
+            time: Timestamp::now(),
+            collection: self.id,
+            sonard: env!("CARGO_PKG_VERSION").into(),
+            keys: serde_json::to_value(&self.plan.keys).unwrap_or_default(),
+            scene: SceneRef::of(scene),
+            sensor_sha256,
+            poses,
+        };
+        self.note(Entry::Plan(Box::new(plan)))
+    }
+
+    /// Gives each listed pose that has none a number, and returns them all in order.
+    fn number_poses(&mut self) -> Result<Option<Vec<u32>>, Halt> {
+        let Poses::Listed(listed) = self.plan.poses.clone() else { return Ok(None) };
+        let known = &self.journal.history().poses;
+        let mut last = known.keys().last().copied().unwrap_or(0);
+        let mut numbers = Vec::new();
+        for (pose, number) in listed.iter().zip(numbers_of(&listed, known)) {
+            numbers.push(match number {
+                Some(number) => number,
+                None => {
+                    last += 1;
+                    self.note(Entry::Pose { number: last, pose: pose.clone() })?;
+                    last
+                }
+            });
+        }
+        Ok(Some(numbers))
+    }
+
+    /// Meets the device, unless nothing is left to do.
+    pub(super) async fn start(&mut self) -> Result<(), Halt> {
+        let history = self.journal.history();
+        let done: HashSet<_> = history.accepted().map(|take| take.slot).collect();
+        let wanted = history.wanted();
+        let open: Vec<_> = wanted
+            .iter()
+            .filter(|slot| !done.contains(slot))
+            .filter(|slot| self.choices.retry_given_up || !history.is_given_up(**slot))
+            .collect();
+        let listed = matches!(self.plan.poses, Poses::Listed(_));
+        if open.is_empty() && listed {
+            return Ok(());
+        }
+        let left = open.len() as u32;
+        if listed {
+            self.watcher.announce(left, self.pace.left_s(left));
+            warn_of_disk(&self.plan, &self.folder, left, &self.watcher);
+        }
+        let first = match open.first() {
+            Some(slot) => slot.pose,
+            None => {
+                // The first pose is asked for before the device, which may need to know it.
+                if !self.another_pose().await? {
+                    return Ok(());
+                }
+                self.journal.history().wanted().first().map_or(1, |slot| slot.pose)
+            }
+        };
+        if self.device.is_local() {
+            let prepared = self.prepared(first)?;
+            self.carried_to = Some(first);
+            self.device.prepare(&self.plan, &prepared)?;
+        }
+        let Connected { device, provenance } = self.device.meet().await?;
+        self.check_device(&device.serial)?;
+        self.ask_at_start().await?;
+        let time = Timestamp::now();
+        let started = Started { time, device, provenance, conditions: self.conditions.clone() };
+        self.note(Entry::Started(Box::new(started)))
+    }
+
+    /// Refuses another ranger than the plan or the journal knows.
+    fn check_device(&self, serial: &str) -> Result<(), Halt> {
+        let wanted = self.plan.keys.device.serial.as_deref();
+        if let Some(wanted) = wanted.filter(|wanted| *wanted != serial) {
+            return Err(Halt::failed(
+                format!("the ranger says it is {serial}, not {wanted}"),
+                "connect that one, or change device.serial in the plan",
+            ));
+        }
+        let before = self.journal.history().starts.last().map(|start| start.device.serial.as_str());
+        match before {
+            Some(before) if before != serial && !self.choices.accept_changed_plan => {
+                Err(Halt::failed(
+                    format!("the ranger says it is {serial}; so far {before} measured"),
+                    "connect that one, or go on with this one by --accept-changed-plan",
+                ))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    async fn ask_at_start(&mut self) -> Result<(), Halt> {
+        for key in self.plan.keys.ask.at_start.clone() {
+            let answer = answered(&mut self.watcher, &format!("{key}:"), &self.interrupts).await?;
+            self.conditions.insert(key, answer.unwrap_or_default().into());
+        }
+        Ok(())
+    }
+}

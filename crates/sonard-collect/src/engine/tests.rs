@@ -1,0 +1,221 @@
+//! The engine with a device and a person that are made up.
+
+use std::{
+    path::Path,
+    sync::{Arc, Mutex},
+    time::Duration,
+};
+
+use jiff::Timestamp;
+use sonard_api::{AirOrder, config::Layers};
+use sonard_log::LogWriter;
+use sonard_model::{
+    acoustics::Sensor,
+    model::{Options, Simulator},
+    scene::{Scene, shipped},
+};
+use sonard_records::{Device as Told, Provenance, Record, ScanPlan, ScanView};
+use sonard_runtime::interrupts::Interrupts;
+
+use super::*;
+use crate::{Borrowed, CollectionKeys, Connected, History, Poses, ScanOrder, Taken, read_journal};
+
+/// Somewhere, scans are taken: by the model, but for those that are lost.
+struct Elsewhere {
+    scene: Arc<Scene>,
+    taken: u32,
+    /// Of so many tries, the first ones come to nothing.
+    lost: u32,
+    given_back: Arc<Mutex<u32>>,
+}
+
+impl Device for Elsewhere {
+    fn is_local(&self) -> bool {
+        false
+    }
+
+    fn prepare(&mut self, _: &Plan, _: &PreparedScan) -> Result<(), Halt> {
+        unreachable!("it is not local")
+    }
+
+    fn go_on(&mut self, _: Duration, _: Option<Borrowed>) {}
+
+    async fn meet(&mut self) -> Result<Connected, Halt> {
+        let device = Told {
+            serial: "ELSEWHERE".into(),
+            firmware: "1".into(),
+            protocol: 1,
+            boot: "1".into(),
+            tick_hz: 2_000_000,
+            steps_per_revolution: 400,
+        };
+        Ok(Connected { device, provenance: Provenance::Simulated })
+    }
+
+    fn carry_to(&mut self, _: &PreparedScan) -> Result<(), Halt> {
+        unreachable!("it is not local")
+    }
+
+    async fn to_borrow(&self, _: Option<&AirOrder>) -> Result<Option<Borrowed>, Halt> {
+        Ok(None)
+    }
+
+    async fn borrow(&mut self, _: Option<Borrowed>, _: Option<&AirOrder>) -> Result<(), Halt> {
+        Ok(())
+    }
+
+    async fn give_back(&mut self) -> Result<bool, Halt> {
+        *self.given_back.lock().expect("nobody panics") += 1;
+        Ok(false)
+    }
+
+    async fn temperature_c(&self) -> Option<f64> {
+        None
+    }
+
+    async fn take(
+        &mut self,
+        order: ScanOrder<'_>,
+        beam: &(dyn Fn() + Sync),
+    ) -> Result<Taken, Halt> {
+        assert!(order.prepared.is_none(), "who is elsewhere predicts by itself");
+        let mut log = LogWriter::open(order.path)?;
+        let (view, lost) = if self.lost > 0 {
+            self.lost -= 1;
+            (None, Some(Halt::failed("it is gone", "wait")))
+        } else {
+            self.taken += 1;
+            let view = simulated(&self.scene, &order);
+            let mut session = view.session.as_deref().cloned().expect("a session");
+            session.collection = Some(Box::new(order.of));
+            log.append(&Record::Session(Box::new(session)))?;
+            log.append(&Record::ScanStart(view.start.clone().expect("a start")))?;
+            for ping in &view.pings {
+                log.append(&Record::Ping(Box::new(ping.clone())))?;
+                beam();
+            }
+            log.append(&Record::ScanEnd(view.end.clone().expect("an end")))?;
+            (Some(view), None)
+        };
+        log.close()?;
+        Ok(Taken { view, gone: lost.is_some(), lost, stopped: false, wall_s: 0.1 })
+    }
+
+    async fn close(self) {}
+}
+
+fn simulated(scene: &Scene, order: &ScanOrder<'_>) -> ScanView {
+    let sensor = Sensor::preset("senscomp-6500").expect("a preset");
+    let scene = Arc::new(scene.with_robot_at(&order.pose));
+    let simulator =
+        Simulator::new(scene, sensor, Air::default(), Options::default()).expect("good options");
+    ScanView::simulated(&simulator, Uuid::new_v4(), &order.pose, &order.plan, Timestamp::now())
+        .expect("few paths")
+}
+
+/// Nobody, who keeps what was said.
+#[derive(Default)]
+struct Nobody(Arc<Mutex<Vec<String>>>);
+
+impl Watcher for Nobody {
+    fn begin(&self, doing: &str, _: u32, _: u32, _: f64) {
+        self.say(doing);
+    }
+
+    fn beam(&self) {}
+
+    fn say(&self, line: &str) {
+        self.0.lock().expect("nobody panics").push(line.to_owned());
+    }
+
+    fn announce(&self, scans: u32, _: f64) {
+        self.say(&format!("{scans} scans"));
+    }
+
+    fn rest(&self) {}
+
+    async fn ask(&mut self, _: &str) -> Option<String> {
+        None
+    }
+
+    fn report(&self, _: &Folder, history: &History) -> Result<(), Halt> {
+        self.say(&format!("a report of {}", history.accepted().count()));
+        Ok(())
+    }
+}
+
+fn plan(folder: &Path, further: &str) -> Plan {
+    let text = format!(
+        "[place]\nscene = \"simple-room\"\n[poses]\nlist = [\"fig7\", \"fig9\"]\n\
+         [plan]\nto_deg = 18\nstep_deg = 1.8\n{further}"
+    );
+    let layers = Layers::<CollectionKeys>::new().file("plan.toml", &text).expect("right");
+    let keys = layers.clone().keys().expect("right");
+    let scene_text = shipped::text("simple-room").expect("shipped").to_owned();
+    let scene = Arc::new(Scene::from_json(&scene_text).expect("a scene"));
+    let poses = ["fig7", "fig9"].map(|name| NamedPose::parse(name, &scene).expect("a pose"));
+    Plan {
+        azimuths: ScanPlan { to_deg: 18.0, step_deg: 1.8, ..ScanPlan::default() },
+        keys,
+        text,
+        folder: folder.into(),
+        scene,
+        scene_text,
+        sensor: Sensor::preset("senscomp-6500").expect("a preset"),
+        poses: Poses::Listed(poses.into()),
+        steps_per_revolution: 400,
+        layers,
+        name: "plan.toml".into(),
+    }
+}
+
+async fn run(folder: &Path, further: &str, lost: u32) -> (Result<(), Halt>, Vec<String>) {
+    let plan = plan(folder, further);
+    let (given_back, said) = (Arc::default(), Arc::default());
+    let device = Elsewhere {
+        scene: Arc::clone(&plan.scene),
+        taken: 0,
+        lost,
+        given_back: Arc::clone(&given_back),
+    };
+    let watcher = Nobody(Arc::clone(&said));
+    let outcome = collect(plan, Choices::default(), device, watcher, Interrupts::listen()).await;
+    let said = said.lock().expect("nobody panics").clone();
+    if !said.is_empty() {
+        assert_eq!(*given_back.lock().expect("nobody panics"), 1);
+    }
+    (outcome, said)
+}
+
+#[tokio::test]
+async fn every_scan_of_a_plan_is_taken_once_by_any_device() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let root = folder.path().join("collection");
+    let twice = "[collection]\nrepeats = 2\n";
+    let (outcome, said) = run(&root, twice, 0).await;
+    outcome.expect("every scan is there");
+    assert_eq!(said.first().map(String::as_str), Some("4 scans"), "{said:?}");
+    assert!(said.contains(&"a report of 4".to_owned()), "{said:?}");
+    let history = read_journal(&Folder::at(&root).journal()).expect("readable");
+    let taken: Vec<_> = history.accepted().map(|take| (take.slot.pose, take.slot.repeat)).collect();
+    assert_eq!(taken, [(1, 1), (1, 2), (2, 1), (2, 2)]);
+    assert_eq!(Folder::at(&root).scans().expect("readable").len(), 4);
+    // Started again there is nothing to do, and another plan is refused.
+    run(&root, twice, 0).await.0.expect("it is done");
+    let (other, _) = run(&root, "[collection]\nrepeats = 3\n", 0).await;
+    assert!(
+        matches!(&other, Err(Halt::Wrong { message, .. }) if message.contains("repeats")),
+        "{other:?}"
+    );
+}
+
+#[tokio::test]
+async fn a_scan_that_is_lost_is_taken_again_and_patience_ends() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (outcome, said) = run(&folder.path().join("once"), "", 1).await;
+    outcome.expect("every scan is there");
+    assert!(said.iter().any(|line| line.contains("taken again in 1 s: it is gone")), "{said:?}");
+    let (outcome, _) =
+        run(&folder.path().join("never"), "[collection]\npatience_s = 0\n", u32::MAX).await;
+    assert!(matches!(&outcome, Err(Halt::Failed { .. })), "{outcome:?}");
+}

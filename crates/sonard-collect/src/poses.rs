@@ -1,0 +1,313 @@
+//! Poses as people, files and programs give them. Pure.
+
+use std::{collections::BTreeMap, fmt};
+
+use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value};
+use sonard_model::{geometry::Pose, scene::Scene};
+
+use super::keys::Conditions;
+
+/// A pose of a collection, with its notes.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct NamedPose {
+    /// What it is called.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub name: Option<String>,
+    /// Where.
+    #[serde(flatten)]
+    pub pose: Pose,
+    /// What was noted.
+    #[serde(default, skip_serializing_if = "Conditions::is_empty")]
+    pub conditions: Conditions,
+}
+
+/// The reason why a pose is missing or invalid.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct PoseFault {
+    /// Line of the file, from 1, if it is one.
+    pub line: Option<u64>,
+    /// What is wrong.
+    pub message: String,
+    /// What would be right.
+    pub help: String,
+}
+
+impl fmt::Display for PoseFault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.message)
+    }
+}
+
+impl PoseFault {
+    fn new(message: impl fmt::Display, help: impl fmt::Display) -> Self {
+        Self { line: None, message: message.to_string(), help: help.to_string() }
+    }
+
+    fn at(self, line: u64) -> Self {
+        Self { line: Some(line), ..self }
+    }
+}
+
+impl NamedPose {
+    /// Reads a pose that stands on a line of its own: a JSON object, `X,Y,DEG`, or the name of a
+    /// pose of the scene. The ranger must be able to stand there.
+    ///
+    /// # Errors
+    /// What is wrong, and what would be right.
+    pub fn parse(text: &str, scene: &Scene) -> Result<Self, PoseFault> {
+        Self::read(text, scene, None)?.checked(scene)
+    }
+
+    /// The same, whether or not a ranger can stand there, with the heading where none is given.
+    fn read(text: &str, scene: &Scene, heading_deg: Option<f64>) -> Result<Self, PoseFault> {
+        let text = text.trim();
+        if text.starts_with('{') {
+            let object = serde_json::from_str(text).map_err(|error| {
+                PoseFault::new(format!("{text}: no JSON object: {error}"), JSON_HELP)
+            })?;
+            return Self::from_object(object, heading_deg);
+        }
+        let pose = scene.pose(text).map_err(|error| PoseFault::new(&error, error.help()))?;
+        let name = scene.poses.contains_key(text).then(|| text.to_owned());
+        Ok(Self { name, pose, conditions: Conditions::new() })
+    }
+
+    /// Reads a pose of an object with `x_m`, `y_m`, `heading_deg`; `name` is its name, and
+    /// everything else is noted as a condition.
+    fn from_object(
+        mut object: Map<String, Value>,
+        heading_deg: Option<f64>,
+    ) -> Result<Self, PoseFault> {
+        let mut figure = |key: &str, otherwise: Option<f64>| match object.remove(key) {
+            Some(value) => {
+                value.as_f64().ok_or_else(|| PoseFault::new(format!("{key} is {value}"), JSON_HELP))
+            }
+            None => {
+                otherwise.ok_or_else(|| PoseFault::new(format!("there is no {key}"), JSON_HELP))
+            }
+        };
+        let (x_m, y_m) = (figure("x_m", None)?, figure("y_m", None)?);
+        let heading_deg = figure("heading_deg", heading_deg)?;
+        let name = match object.remove("name") {
+            None | Some(Value::Null) => None,
+            Some(Value::String(name)) => Some(name).filter(|name| !name.is_empty()),
+            Some(other) => Some(other.to_string()),
+        };
+        let pose = Pose { x_m, y_m, heading_deg };
+        Ok(Self { name, pose, conditions: object.into_iter().collect() })
+    }
+
+    fn checked(self, scene: &Scene) -> Result<Self, PoseFault> {
+        scene.check_pose(&self.pose).map_err(|error| PoseFault::new(&error, error.help()))?;
+        Ok(self)
+    }
+
+    /// Whether it is the same place under the same name, whatever was noted.
+    #[must_use]
+    pub fn is_place(&self, other: &Self) -> bool {
+        self.pose == other.pose && self.name == other.name
+    }
+
+    /// What a person calls it.
+    #[must_use]
+    pub fn label(&self) -> String {
+        let Pose { x_m, y_m, heading_deg } = self.pose;
+        self.name.clone().unwrap_or_else(|| format!("{x_m},{y_m},{heading_deg}"))
+    }
+}
+
+/// For each listed pose the number that a collection gave it; `None` for a new one. A place that is
+/// listed twice has two numbers.
+#[must_use]
+pub fn numbers_of(listed: &[NamedPose], known: &BTreeMap<u32, NamedPose>) -> Vec<Option<u32>> {
+    let mut free: Vec<(u32, &NamedPose)> =
+        known.iter().map(|(number, pose)| (*number, pose)).collect();
+    let mut number = |pose: &NamedPose| {
+        let at = free.iter().position(|(_, known)| known.is_place(pose))?;
+        Some(free.remove(at).0)
+    };
+    listed.iter().map(&mut number).collect()
+}
+
+const JSON_HELP: &str = "a pose is {\"x_m\": 1.2, \"y_m\": 0.8, \"heading_deg\": 90}, perhaps with \
+                         \"name\", in metres and degrees; or X,Y,DEG; or a pose of the scene";
+const CSV_HELP: &str = "the first line names the columns: x_m,y_m,heading_deg, perhaps name, and \
+                        any others, which are noted as conditions";
+
+/// A line of a file of poses.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PoseLine {
+    /// Number of the line, from 1.
+    pub line: u64,
+    /// The pose, wherever it is, or why there is none.
+    pub pose: Result<NamedPose, PoseFault>,
+}
+
+/// Reads a file of poses: JSON lines if its first character is `{`, else CSV with a header. A ranger
+/// must be able to stand at each.
+///
+/// # Errors
+/// The first line that is wrong.
+pub fn read_file(text: &str, scene: &Scene) -> Result<Vec<NamedPose>, PoseFault> {
+    let lines = read_lines(text, scene, None)?.into_iter();
+    lines
+        .map(|PoseLine { line, pose }| {
+            pose.and_then(|pose| pose.checked(scene)).map_err(|fault| fault.at(line))
+        })
+        .collect()
+}
+
+/// Reads a file of poses line by line, so that one that is wrong costs no other. `heading_deg` is
+/// taken where a JSON object has none.
+///
+/// # Errors
+/// When there is no pose to be read at all: an empty file, or columns that are missing.
+pub fn read_lines(
+    text: &str,
+    scene: &Scene,
+    heading_deg: Option<f64>,
+) -> Result<Vec<PoseLine>, PoseFault> {
+    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+    let lines = if text.trim_start().starts_with('{') {
+        json_lines(text, scene, heading_deg)
+    } else {
+        comma_separated(text)?
+    };
+    if lines.is_empty() {
+        return Err(PoseFault::new("no pose in it", CSV_HELP));
+    }
+    Ok(lines)
+}
+
+fn json_lines(text: &str, scene: &Scene, heading_deg: Option<f64>) -> Vec<PoseLine> {
+    (1..)
+        .zip(text.lines())
+        .filter(|(_, text)| !text.trim().is_empty())
+        .map(|(line, text)| PoseLine { line, pose: NamedPose::read(text, scene, heading_deg) })
+        .collect()
+}
+
+fn comma_separated(text: &str) -> Result<Vec<PoseLine>, PoseFault> {
+    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(text.as_bytes());
+    let fault = |error: &csv::Error| {
+        let line = error.position().map(csv::Position::line);
+        PoseFault { line, ..PoseFault::new(error, CSV_HELP) }
+    };
+    let columns = reader.headers().map_err(|error| fault(&error))?.clone();
+    for needed in ["x_m", "y_m", "heading_deg"] {
+        if !columns.iter().any(|column| column == needed) {
+            return Err(PoseFault::new(format!("there is no column {needed}"), CSV_HELP).at(1));
+        }
+    }
+    let lines = reader.records().map(|record| {
+        let record = match record {
+            Ok(record) => record,
+            Err(error) => {
+                let fault = fault(&error);
+                return PoseLine { line: fault.line.unwrap_or(1), pose: Err(fault) };
+            }
+        };
+        let line = record.position().map_or(0, csv::Position::line);
+        let cells = columns.iter().zip(record.iter()).filter(|(_, cell)| !cell.is_empty());
+        let object = cells.map(|(column, cell)| (column.to_owned(), value(column, cell))).collect();
+        PoseLine { line, pose: NamedPose::from_object(object, None) }
+    });
+    Ok(lines.collect())
+}
+
+/// A cell as a number or a switch if it is one; a name is always text.
+fn value(column: &str, cell: &str) -> Value {
+    let plain = serde_json::from_str(cell).ok();
+    let kept = plain.filter(|value: &Value| value.is_number() || value.is_boolean());
+    kept.filter(|_| column != "name").unwrap_or_else(|| cell.into())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sonard_model::scene::shipped;
+
+    use proptest::prelude::*;
+
+    fn room() -> Scene {
+        Scene::from_json(shipped::text("simple-room").expect("shipped")).expect("it is right")
+    }
+
+    #[test]
+    fn poses_are_read_in_every_form() {
+        let room = room();
+        let named = NamedPose::parse("fig9", &room).expect("a pose");
+        assert_eq!((named.label().as_str(), named.pose.x_m), ("fig9", 0.774));
+        let json = r#"{"x_m": 0.5, "y_m": 0.3, "heading_deg": 90, "name": "a", "door": "open"}"#;
+        let pose = NamedPose::parse(json, &room).expect("a pose");
+        assert_eq!((pose.label().as_str(), &pose.conditions["door"]), ("a", &"open".into()));
+        assert_eq!(NamedPose::parse("0.5,0.3,90", &room).expect("a pose").label(), "0.5,0.3,90");
+        let text = "name, x_m, y_m, heading_deg, carpet\nb,0.5,0.3,0,true\n7,0.6,0.2,45,\n";
+        let poses = read_file(text, &room).expect("poses");
+        assert_eq!(poses[0].conditions["carpet"], true);
+        assert_eq!(poses[1].name.as_deref(), Some("7"));
+        assert!(poses[1].conditions.is_empty());
+        let lines = format!("{json}\n\n{json}\n");
+        assert_eq!(read_file(&lines, &room).expect("poses").len(), 2);
+    }
+
+    proptest! {
+        /// Whatever a file of poses holds: no panic, and what is refused is refused at a line of it.
+        #[test]
+        fn any_text_is_read_or_refused_at_a_line(
+            pieces in prop::collection::vec(
+                prop_oneof![
+                    8 => prop::sample::select(vec![
+                        "x_m", "y_m", "heading_deg", "name", ",", ",", "\n", "0.5", "0.3", "1e999",
+                        "\"", "{\"x_m\":0.5,\"y_m\":0.3,\"heading_deg\":0}", "{", "}", "true", "\r\n",
+                    ]).prop_map(str::to_owned),
+                    1 => "\\PC{0,6}",
+                ],
+                0..30,
+            ),
+            header in any::<bool>(),
+        ) {
+            let text = if header { "x_m,y_m,heading_deg\n".to_owned() } else { String::new() };
+            let text = text + &pieces.concat();
+            match read_file(&text, &room()) {
+                Ok(poses) => prop_assert!(!poses.is_empty()),
+                Err(fault) => {
+                    let lines = text.split('\n').count() as u64;
+                    let line = fault.line.unwrap_or(1);
+                    prop_assert!((1..=lines + 1).contains(&line), "{fault} at {line} of {lines}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_place_that_is_listed_twice_has_two_numbers_and_a_new_one_none() {
+        let room = room();
+        let pose = |text| NamedPose::parse(text, &room).expect("a pose");
+        let known = [(1, pose("fig9")), (2, pose("fig7")), (4, pose("fig9"))].into();
+        let listed = [pose("fig9"), pose("fig9"), pose("0.5,0.3,0"), pose("fig7"), pose("fig9")];
+        assert_eq!(numbers_of(&listed, &known), [Some(1), Some(4), None, Some(2), None]);
+    }
+
+    #[test]
+    fn what_is_no_pose_is_named_with_its_line() {
+        let room = room();
+        for (text, line, message) in [
+            ("x_m,y_m\n0.5,0.3\n", Some(1), "no column heading_deg"),
+            ("x_m,y_m,heading_deg\n0.5,0.3,0\n0.5,zero,0\n", Some(3), "y_m is \"zero\""),
+            ("x_m,y_m,heading_deg\n0.5,0.3\n", Some(2), "fields"),
+            ("x_m,y_m,heading_deg\n5,0.3,0\n", Some(2), ""),
+            ("x_m,y_m,heading_deg\n", None, "no pose"),
+            ("", Some(1), "no column"),
+            ("{\"x_m\":0.5,\"y_m\":0.3,\"heading_deg\":0}\n{\"x_m\":1}\n", Some(2), "no y_m"),
+            ("{\"x_m\":0.5,\n", Some(1), "no JSON object"),
+        ] {
+            let fault = read_file(text, &room).expect_err(text);
+            assert_eq!(fault.line, line, "{text:?}: {fault}");
+            assert!(fault.message.contains(message), "{text:?}: {fault}");
+            assert!(!fault.help.is_empty());
+        }
+        assert!(NamedPose::parse("fig99", &room).expect_err("none").help.contains("fig9"));
+    }
+}

@@ -1,0 +1,297 @@
+//! A thermometer behind a file of a Linux driver (1-wire, hwmon, thermal).
+#![warn(clippy::expect_used, clippy::indexing_slicing, clippy::panic)]
+
+mod file;
+mod plausibility;
+mod scratchpad;
+
+use std::{
+    path::{Path, PathBuf},
+    time::Duration,
+};
+
+use sonard_model::acoustics::Air;
+use thiserror::Error;
+use tokio::{
+    sync::oneshot,
+    time::{Instant, sleep, timeout},
+};
+
+use file::read_file;
+pub use plausibility::{Admission, FastChange, MAX_SLOPE_K_S, MAX_STEP_K, Plausibility};
+use scratchpad::Scratchpad;
+
+/// Attempts for one reading: a 1-wire bus garbles one now and then.
+const ATTEMPTS: u32 = 3;
+const PAUSE: Duration = Duration::from_millis(300);
+/// Time allowed for one attempt: a 1-wire conversion takes most of a second.
+const READ_LIMIT: Duration = Duration::from_secs(10);
+
+/// A thermometer's file, with what its readings so far allow to check.
+#[derive(Debug)]
+pub struct Thermometer {
+    file: PathBuf,
+    /// Start of the time line of `plausibility`.
+    epoch: Instant,
+    plausibility: Plausibility,
+    last_valid: Option<(f64, Instant)>,
+    /// Name of the chip that was read first.
+    chip: Option<String>,
+    /// An attempt that has not returned yet.
+    under_way: Option<oneshot::Receiver<Result<Sample, Fault>>>,
+    remark: Option<String>,
+    has_remarked_registers: bool,
+}
+
+/// A reading that was rejected, or a file that gives none.
+#[derive(Debug, Clone, PartialEq, Error)]
+#[error("{}: {fault}", file.display())]
+pub struct ThermometerError {
+    /// The thermometer's file.
+    pub file: PathBuf,
+    /// The cause.
+    pub fault: Fault,
+}
+
+/// A cause for which a thermometer has no valid reading.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum Fault {
+    /// The file can't be opened or read.
+    #[error("{0}")]
+    Unreadable(String),
+    /// The path leads to something else than a file.
+    #[error("it is {0} and no thermometer's file")]
+    NotAFile(&'static str),
+    /// The driver does not return.
+    #[error("reading it takes more than {} s", READ_LIMIT.as_secs())]
+    TimedOut,
+    /// The file is longer than any thermometer's.
+    #[error("it is too long for a thermometer's file")]
+    TooLong,
+    /// The file is binary.
+    #[error("it is no text")]
+    NotText,
+    /// The file is empty.
+    #[error("it is empty")]
+    Empty,
+    /// The two lines of `w1_slave` are not complete.
+    #[error("it is cut off: {0} is missing")]
+    CutOff(&'static str),
+    /// The text is no number.
+    #[error("{0:?} is no number of thousandths of a degree")]
+    NotANumber(String),
+    /// The sensor's checksum is wrong.
+    #[error("the sensor's checksum is wrong")]
+    Checksum,
+    /// All registers are equal.
+    #[error("all registers of the sensor are {0:02x}: check its supply, ground and data line")]
+    StuckBus(u8),
+    /// A register has a value that the sensor can't have.
+    #[error("the sensor can't have these registers: {0}")]
+    ImpossibleRegisters(String),
+    /// The value that a DS18B20 has before its first conversion.
+    #[error("85 C is what a DS18B20 has before its first conversion: check its supply and pull-up")]
+    PowerOnValue,
+    /// The air can't be so cold or warm, or the model does not cover it.
+    #[error("{0}")]
+    NotOfAir(String),
+    /// A sensor that measures a part of the computer.
+    #[error(
+        "it belongs to {0}, which does not measure the air: give the path of the air's sensor (hwmon \
+         numbers change from boot to boot; the path under /sys/devices does not)"
+    )]
+    NotAmbient(String),
+    /// The file belongs to another chip than before.
+    #[error("it belongs to {now} now and to {before} before: give a path that stays the same")]
+    OtherChip {
+        /// The chip that was read first.
+        before: String,
+        /// The chip that the file belongs to now.
+        now: String,
+    },
+    /// The temperature changed faster than that of air.
+    #[error("{0}")]
+    TooFast(FastChange),
+}
+
+/// A temperature as a file gives it.
+#[derive(Debug, Clone, PartialEq)]
+struct Sample {
+    temperature_c: f64,
+    chip: Option<String>,
+    /// Registers that a genuine sensor does not have.
+    is_unusual: bool,
+}
+
+impl Fault {
+    /// `true` if another attempt may succeed at once.
+    const fn is_transient(&self) -> bool {
+        !matches!(
+            self,
+            Self::NotAFile(_) | Self::TimedOut | Self::NotAmbient(_) | Self::OtherChip { .. }
+        )
+    }
+}
+
+impl Thermometer {
+    /// A thermometer that was not read yet.
+    #[must_use]
+    pub fn new(file: impl Into<PathBuf>) -> Self {
+        Self {
+            file: file.into(),
+            epoch: Instant::now(),
+            plausibility: Plausibility::default(),
+            last_valid: None,
+            chip: None,
+            under_way: None,
+            remark: None,
+            has_remarked_registers: false,
+        }
+    }
+
+    /// Reads the temperature, degrees Celsius. Takes a second with a 1-wire sensor, and at most some
+    /// 30 s.
+    ///
+    /// # Errors
+    /// If it can't be read, or if sensor or air can't have the value.
+    pub async fn read(&mut self) -> Result<f64, ThermometerError> {
+        let mut attempts = 0;
+        loop {
+            let read = self.read_once().await;
+            attempts += 1;
+            match read {
+                Ok(temperature_c) => {
+                    self.last_valid = Some((temperature_c, Instant::now()));
+                    return Ok(temperature_c);
+                }
+                Err(fault) if attempts == ATTEMPTS || !fault.is_transient() => {
+                    return Err(ThermometerError { file: self.file.clone(), fault });
+                }
+                Err(_) => sleep(PAUSE).await,
+            }
+        }
+    }
+
+    /// The last valid temperature, degrees Celsius, and its age.
+    #[must_use]
+    pub fn last_valid(&self) -> Option<(f64, Duration)> {
+        self.last_valid.map(|(temperature_c, at)| (temperature_c, at.elapsed()))
+    }
+
+    /// A remark on accepted readings, once.
+    pub fn take_remark(&mut self) -> Option<String> {
+        self.remark.take()
+    }
+
+    async fn read_once(&mut self) -> Result<f64, Fault> {
+        let sample = self.sample().await?;
+        if let (Some(before), Some(now)) = (&self.chip, &sample.chip)
+            && before != now
+        {
+            return Err(Fault::OtherChip { before: before.clone(), now: now.clone() });
+        }
+        let admitted = self.plausibility.admit(sample.temperature_c, self.epoch.elapsed());
+        if let Admission::Persistent { from_c, waited } = admitted.map_err(Fault::TooFast)? {
+            self.remark = Some(format!(
+                "{}: {:.1} C after {from_c:.1} C is accepted, because it stays for {:.0} s",
+                self.file.display(),
+                sample.temperature_c,
+                waited.as_secs_f64(),
+            ));
+        }
+        if sample.is_unusual && !std::mem::replace(&mut self.has_remarked_registers, true) {
+            self.remark = Some(format!(
+                "{}: the sensor's reserved registers are not those of a DS18B20: a copy, which may be \
+                 off by some degrees",
+                self.file.display()
+            ));
+        }
+        self.chip = sample.chip.or(self.chip.take());
+        Ok(sample.temperature_c)
+    }
+
+    /// A driver may block, and then for ever: it is called by a thread of its own, which neither
+    /// occupies the runtime nor keeps the program from ending.
+    async fn sample(&mut self) -> Result<Sample, Fault> {
+        let mut under_way = match self.under_way.take() {
+            Some(under_way) => under_way,
+            None => {
+                let (send, receive) = oneshot::channel();
+                let file = self.file.clone();
+                let thread = std::thread::Builder::new().name("thermometer".into());
+                #[allow(
+                    clippy::disallowed_methods,
+                    reason = "its end is received as the end of a channel"
+                )]
+                let started = thread.spawn(move || drop(send.send(read_sample(&file))));
+                started.map_err(|error| Fault::Unreadable(format!("no thread for it: {error}")))?;
+                receive
+            }
+        };
+        match timeout(READ_LIMIT, &mut under_way).await {
+            Ok(Ok(sample)) => sample,
+            Ok(Err(_)) => Err(Fault::Unreadable("its reader has ended".into())),
+            Err(_) => {
+                self.under_way = Some(under_way);
+                Err(Fault::TimedOut)
+            }
+        }
+    }
+}
+
+fn read_sample(file: &Path) -> Result<Sample, Fault> {
+    let chip = file::chip(file);
+    if let Some(chip) = chip.as_deref().filter(|chip| file::is_internal(chip)) {
+        return Err(Fault::NotAmbient(chip.to_owned()));
+    }
+    parse(&read_file(file)?).map(|sample| Sample { chip, ..sample })
+}
+
+/// Either a number of thousandths of a degree, or the two lines of `w1_slave`: registers with their
+/// checksum and a `YES`, and `t=` with the number.
+fn parse(text: &str) -> Result<Sample, Fault> {
+    if text.trim().is_empty() {
+        return Err(Fault::Empty);
+    }
+    if !text.contains("crc=") && !text.contains("t=") {
+        // The first register of a `w1_slave` that is cut off looks like a number.
+        let number = text.trim();
+        if !text.ends_with('\n') && number.len() <= 2 && number != "0" {
+            return Err(Fault::CutOff("the end of the line"));
+        }
+        let thousandths = parse_thousandths(text)?;
+        let temperature_c = check_air(thousandths)?;
+        return Ok(Sample { temperature_c, chip: None, is_unusual: false });
+    }
+    let (head, number) = text.split_once("t=").ok_or(Fault::CutOff("the temperature"))?;
+    if !head.contains("YES") {
+        return Err(Fault::Checksum);
+    }
+    let scratchpad = Scratchpad::parse(head)?;
+    let thousandths = parse_thousandths(number)?;
+    scratchpad.check(thousandths)?;
+    let temperature_c = check_air(thousandths)?;
+    Ok(Sample { temperature_c, chip: None, is_unusual: scratchpad.is_unusual() })
+}
+
+fn parse_thousandths(text: &str) -> Result<i32, Fault> {
+    let text = text.trim();
+    text.parse().map_err(|_| match text {
+        "" => Fault::CutOff("the temperature"),
+        _ => Fault::NotANumber(text.chars().take(40).collect()),
+    })
+}
+
+fn check_air(thousandths: i32) -> Result<f64, Fault> {
+    if thousandths == scratchpad::POWER_ON_THOUSANDTHS {
+        return Err(Fault::PowerOnValue);
+    }
+    let temperature_c = f64::from(thousandths) / 1e3;
+    match Air::new(temperature_c, 50.0, 101.325) {
+        Ok(_) => Ok(temperature_c),
+        Err(error) => Err(Fault::NotOfAir(error.to_string())),
+    }
+}
+
+#[cfg(test)]
+mod tests;

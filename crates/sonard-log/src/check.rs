@@ -1,0 +1,320 @@
+//! Looks at a whole log and says, line by line, what does not hold.
+
+mod finding;
+mod open_scan;
+
+use std::{
+    collections::HashSet,
+    io::{self, BufRead},
+    mem,
+};
+
+use jiff::{SignedDuration, Timestamp};
+use sonard_model::array::{MountedRanger, RangerArray};
+use sonard_records::{
+    Event, EventKind, FaultKind, Ping, PingStatus, Record, ScanEnd, ScanPlan, ScanStart, Session,
+};
+use uuid::Uuid;
+
+pub use finding::{Finding, FindingKind, Severity, Totals};
+use open_scan::OpenScan;
+
+use super::{Line, read_log};
+
+/// Azimuths are multiples of a motor step; a record may have rounded them, degrees.
+const AZIMUTH_TOLERANCE_DEG: f64 = 1e-3;
+/// A residual may have been rounded to the millimetre, metres.
+const RESIDUAL_TOLERANCE_M: f64 = 1e-3;
+/// Records of the host and of the device's fitted clock interleave within this.
+const TIME_TOLERANCE: SignedDuration = SignedDuration::from_secs(1);
+
+/// Checks a log and hands each finding to `tell`, in the order of the lines.
+///
+/// # Errors
+/// When reading fails.
+pub fn check<R: BufRead>(reader: R, mut tell: impl FnMut(Finding)) -> io::Result<Totals> {
+    let mut checker = Checker::default();
+    for line in read_log(reader) {
+        checker.line(&line?);
+        checker.take_findings().for_each(&mut tell);
+    }
+    checker.end();
+    checker.take_findings().for_each(&mut tell);
+    Ok(checker.totals)
+}
+
+/// Checks a log line by line; what [`check`] does, for callers with lines of their own.
+#[derive(Debug, Default)]
+pub struct Checker {
+    totals: Totals,
+    findings: Vec<Finding>,
+    /// The line now looked at.
+    at: u64,
+    session: bool,
+    /// The array of the session in force.
+    array: Option<RangerArray>,
+    /// Whether its readings were imported, with directions that no plan may have.
+    imported: bool,
+    scan: Option<OpenScan>,
+    scans: HashSet<Uuid>,
+    latest: Option<Timestamp>,
+}
+
+impl Checker {
+    /// Looks at the next line.
+    pub fn line(&mut self, line: &Line) {
+        self.at = line.number;
+        self.totals.lines += 1;
+        match &line.record {
+            Err(error) if error.fault.kind == FaultKind::Torn => {
+                self.problem(FindingKind::TornTail, error.fault.to_string());
+            }
+            Err(error) if error.fault.kind == FaultKind::UnsupportedFormat => {
+                self.session = true;
+                self.problem(FindingKind::UnsupportedFormat, error.fault.to_string());
+            }
+            Err(error) => self.problem(FindingKind::Damaged, error.fault.to_string()),
+            Ok(record) => {
+                self.record(record);
+                if !line.ended {
+                    let detail = "the newline after the last record is missing";
+                    self.problem(FindingKind::NoNewline, detail.into());
+                }
+            }
+        }
+    }
+
+    /// Looks at what the log lacks at its end.
+    pub fn end(&mut self) {
+        if self.totals.lines == 0 {
+            self.problem(FindingKind::EmptyLog, "the log is empty".into());
+        }
+        if let Some(scan) = self.scan.take() {
+            // The scan may be running; and a log that was cut off and repaired is consistent.
+            self.warn(FindingKind::NotEnded, scan.not_ended("at the end of the log"));
+        }
+    }
+
+    /// What was found since the last call.
+    pub fn take_findings(&mut self) -> impl Iterator<Item = Finding> + use<> {
+        mem::take(&mut self.findings).into_iter()
+    }
+
+    /// What the lines so far hold.
+    #[must_use]
+    pub fn totals(&self) -> Totals {
+        self.totals
+    }
+
+    fn record(&mut self, record: &Record) {
+        match record {
+            Record::Session(session) => self.session(session),
+            Record::ScanStart(start) => self.scan_start(start),
+            Record::Ping(ping) => self.ping(ping),
+            Record::ScanEnd(end) => self.scan_end(end),
+            Record::Event(event) => self.event(event),
+        }
+    }
+
+    fn session(&mut self, session: &Session) {
+        self.totals.sessions += 1;
+        self.leave_scan("when another session begins");
+        self.session = true;
+        self.array.clone_from(&session.array);
+        self.imported = session.imported.is_some();
+        self.time(session.started);
+    }
+
+    fn scan_start(&mut self, start: &ScanStart) {
+        self.totals.scans += 1;
+        self.leave_scan("when another scan begins");
+        self.need_session();
+        let id = start.scan;
+        if !self.scans.insert(id) {
+            self.problem(FindingKind::ScanTwice, format!("scan {id} begins a second time"));
+        }
+        let plan = start.plan.check();
+        if let Err(error) = &plan {
+            self.problem(FindingKind::BadPlan, format!("plan: {error}"));
+        }
+        self.scan = Some(OpenScan::new(id, self.at, plan.is_ok().then_some(start.plan)));
+        self.time(start.time);
+    }
+
+    fn ping(&mut self, ping: &Ping) {
+        self.totals.pings += 1;
+        self.enter_scan(ping.scan, "ping");
+        for detail in contradictions(ping) {
+            self.problem(FindingKind::Contradiction, format!("beam {}: {detail}", ping.index));
+        }
+        if let Some(plan) = self.scan.as_ref().and_then(|scan| scan.plan) {
+            self.place(ping, &plan);
+        }
+        self.count_beam(ping);
+        // A reading fetched again fired before those that came through at once.
+        if let (Some(time), false) = (ping.time, ping.repaired) {
+            self.time(time);
+        }
+    }
+
+    fn scan_end(&mut self, end: &ScanEnd) {
+        self.enter_scan(end.scan, "scan_end");
+        if let Some(scan) = self.scan.take() {
+            for detail in scan.wrong_counts(end) {
+                // The log accounts for records that it lost.
+                if scan.has_gap {
+                    self.warn(FindingKind::WrongCount, detail);
+                } else {
+                    self.problem(FindingKind::WrongCount, detail);
+                }
+            }
+        }
+        self.time(end.time);
+    }
+
+    fn event(&mut self, event: &Event) {
+        self.totals.events += 1;
+        if let Some(scan) = &mut self.scan {
+            scan.interrupted = true;
+            scan.has_gap |= event.kind == EventKind::Gap;
+        }
+        self.time(event.time);
+    }
+
+    /// A record belongs to the scan that is open; if not, that is found once a scan.
+    fn enter_scan(&mut self, id: Uuid, what: &str) {
+        if self.scan.as_ref().is_some_and(|scan| scan.id == id) {
+            return;
+        }
+        self.leave_scan("when records of another scan follow");
+        let why = if self.scans.insert(id) { "its scan_start is missing" } else { "it is over" };
+        self.problem(FindingKind::OutsideScan, format!("{what} outside of scan {id}: {why}"));
+        self.need_session();
+        self.scan = Some(OpenScan::new(id, self.at, None));
+    }
+
+    fn leave_scan(&mut self, when: &str) {
+        let Some(scan) = self.scan.take() else { return };
+        let detail = scan.not_ended(when);
+        if scan.interrupted {
+            self.warn(FindingKind::NotEnded, detail);
+        } else {
+            self.problem(FindingKind::NotEnded, detail);
+        }
+    }
+
+    fn need_session(&mut self) {
+        if !mem::replace(&mut self.session, true) {
+            let detail =
+                "no session before the first scan: device, sensor, air and scene are unknown";
+            self.problem(FindingKind::NoSession, detail.into());
+        }
+    }
+
+    /// Whether the plan has this beam, there.
+    fn place(&mut self, ping: &Ping, plan: &ScanPlan) {
+        let index = ping.index;
+        if index >= plan.beams() {
+            let detail = format!("beam {index}: the plan has beams 0 to {}", plan.beams() - 1);
+            return self.problem(FindingKind::NoSuchBeam, detail);
+        }
+        if let Some(id) = &ping.ranger {
+            return self.mounted(ping, id);
+        }
+        let planned_deg = plan.azimuth_deg(index / plan.pings_per_stop);
+        let off = !self.imported && is_off(ping.azimuth_deg, planned_deg);
+        if off && ping.status != PingStatus::StepDoubtful {
+            let is_deg = ping.azimuth_deg;
+            let detail =
+                format!("beam {index}: azimuth_deg is {is_deg}; the plan says {planned_deg}");
+            self.problem(FindingKind::WrongAzimuth, detail);
+        }
+    }
+
+    /// Whether the session's array has this ranger, looking there.
+    fn mounted(&mut self, ping: &Ping, id: &str) {
+        let (index, is_deg) = (ping.index, ping.azimuth_deg);
+        let ranger = self.array.as_ref().and_then(|array| array.ranger(id));
+        match ranger.map(MountedRanger::azimuth_deg) {
+            Some(deg) if is_off(is_deg, deg) => {
+                let detail =
+                    format!("beam {index}: azimuth_deg is {is_deg}; ranger {id} looks to {deg}");
+                self.problem(FindingKind::WrongAzimuth, detail);
+            }
+            Some(_) => {}
+            None => {
+                let detail = format!("beam {index}: the session has no array with a ranger {id}");
+                self.problem(FindingKind::UnknownRanger, detail);
+            }
+        }
+    }
+
+    fn count_beam(&mut self, ping: &Ping) {
+        let (at, index) = (self.at, ping.index);
+        let came_through = ping.status != PingStatus::LinkLost;
+        let Some(scan) = &mut self.scan else { return };
+        // A lost reading that was fetched later stands in the log twice, and may.
+        if let Some((first, true)) = scan.beams.insert(index, (at, came_through)) {
+            let detail = format!("beam {index} has a reading already, on line {first}");
+            self.problem(FindingKind::DuplicateBeam, detail);
+        }
+    }
+
+    fn time(&mut self, time: Timestamp) {
+        if let Some(latest) = self.latest
+            && latest.duration_since(time) > TIME_TOLERANCE
+        {
+            let detail = format!("time goes backwards, from {latest} to {time}");
+            self.warn(FindingKind::TimeBackwards, detail);
+            self.latest = Some(time);
+        }
+        self.latest = self.latest.max(Some(time));
+    }
+
+    fn problem(&mut self, kind: FindingKind, detail: String) {
+        self.totals.problems += 1;
+        self.findings.push(Finding { line: self.at, severity: Severity::Problem, kind, detail });
+    }
+
+    fn warn(&mut self, kind: FindingKind, detail: String) {
+        self.totals.warnings += 1;
+        self.findings.push(Finding { line: self.at, severity: Severity::Warning, kind, detail });
+    }
+}
+
+/// Whether two azimuths are not the same, degrees.
+fn is_off(one_deg: f64, other_deg: f64) -> bool {
+    let apart_deg = (one_deg - other_deg + 180.0).rem_euclid(360.0) - 180.0;
+    apart_deg.abs() > AZIMUTH_TOLERANCE_DEG
+}
+
+/// What in a reading contradicts itself.
+fn contradictions(ping: &Ping) -> Vec<String> {
+    let mut found = Vec::new();
+    let mut side = |what: &str, status: PingStatus, range_m: Option<f64>| match range_m {
+        Some(range_m) if !status.has_range() => {
+            found.push(format!("{what}range_m is {range_m} although status is {status:?}"));
+        }
+        Some(range_m) if range_m < 0.0 => found.push(format!("{what}range_m is {range_m}")),
+        None if status.has_range() => {
+            found.push(format!("{what}range_m is null although status is {status:?}"));
+        }
+        _ => {}
+    };
+    side("", ping.status, ping.range_m);
+    if let Some(sim) = &ping.sim {
+        side("sim.", sim.status, sim.range_m);
+    }
+    let predicted_m = ping.sim.as_ref().and_then(|sim| sim.range_m);
+    let difference_m = ping.range_m.zip(predicted_m).map(|(measured, sim)| measured - sim);
+    match (ping.residual_m, difference_m) {
+        (Some(residual_m), Some(m)) if (residual_m - m).abs() > RESIDUAL_TOLERANCE_M => {
+            found.push(format!("residual_m is {residual_m}; the ranges differ by {m:.6}"));
+        }
+        (Some(residual_m), None) => {
+            found.push(format!("residual_m is {residual_m} although a range is missing"));
+        }
+        _ => {}
+    }
+    found
+}

@@ -1,0 +1,131 @@
+//! The reader on damaged files.
+
+use std::io::{self, BufRead, BufReader, Read};
+
+use proptest::prelude::*;
+use sonard_records::{FaultKind, MAX_LINE_BYTES};
+
+use super::*;
+use crate::{Line, read_log};
+
+fn lines(bytes: &[u8]) -> Vec<Line> {
+    read_log(bytes).map(|line| line.expect("memory can be read")).collect()
+}
+
+fn faults(bytes: &[u8]) -> Vec<(u64, FaultKind)> {
+    let fault = |line: Line| line.record.err().map(|error| (error.line, error.fault.kind));
+    lines(bytes).into_iter().filter_map(fault).collect()
+}
+
+#[test]
+fn every_line_is_there_with_its_place() {
+    let lines = lines(LOG.as_bytes());
+    assert_eq!(lines.len(), 11);
+    for line in &lines {
+        let (from, to) = (line.offset as usize, (line.offset + line.length) as usize);
+        assert_eq!(&LOG.as_bytes()[from..to], line.bytes);
+        assert_eq!(&LOG.as_bytes()[to..=to], b"\n");
+    }
+    assert_eq!(lines.last().map(|line| line.number), Some(11));
+    assert_eq!(
+        lines.into_iter().filter_map(|line| line.record.ok()).collect::<Vec<_>>(),
+        records()
+    );
+}
+
+#[test]
+fn damage_costs_its_own_line_only() {
+    let session = LOG.lines().next().expect("a session");
+    let end = LOG.lines().nth(9).expect("an end");
+    let log = format!("{session}\nrubbish\n\n{end}\n\0\0\0\n{{\"type\":\"pong\"}}\n{end}\n{{\"ty");
+    let (empty, text) = (FaultKind::Empty, FaultKind::NotText);
+    assert_eq!(
+        faults(log.as_bytes()),
+        [
+            (2, FaultKind::NotJson),
+            (3, empty),
+            (5, text),
+            (6, FaultKind::UnknownType),
+            (8, FaultKind::Torn)
+        ]
+    );
+}
+
+#[test]
+fn windows_line_ends_and_a_byte_order_mark_are_read() {
+    let windows = format!("\u{feff}{}", LOG.replace('\n', "\r\n"));
+    assert_eq!(faults(windows.as_bytes()), []);
+    // In the middle it is damage.
+    let late = LOG.replace("\n{\"type\":\"scan_end\"", "\n\u{feff}{\"type\":\"scan_end\"");
+    assert_eq!(faults(late.as_bytes()), [(10, FaultKind::NotJson)]);
+}
+
+#[test]
+fn a_line_without_end_does_not_fill_the_memory() {
+    // 64 MiB of one line between two good ones, from a reader that holds none of it.
+    let good = LOG.lines().next().expect("a session").to_owned() + "\n";
+    let long = io::repeat(b'x').take(64 << 20);
+    let log = good.as_bytes().chain(long).chain(&b"\n"[..]).chain(good.as_bytes());
+    let lines: Vec<Line> = read_log(BufReader::new(log)).map(|line| line.expect("read")).collect();
+    assert_eq!(lines.len(), 3);
+    assert_eq!(lines[1].length, 64 << 20);
+    assert!(lines[1].bytes.capacity() <= 4 * MAX_LINE_BYTES, "{}", lines[1].bytes.capacity());
+    assert_eq!(lines[1].record.as_ref().err().map(|e| e.fault.kind), Some(FaultKind::TooLong));
+    assert!(lines[2].record.is_ok());
+    assert_eq!(lines[2].offset, good.len() as u64 + (64 << 20) + 1);
+}
+
+#[test]
+fn a_line_of_the_greatest_length_is_read_and_one_more_byte_is_not() {
+    let event = LOG.lines().nth(10).expect("an event");
+    for (length, ok) in [(MAX_LINE_BYTES, true), (MAX_LINE_BYTES + 3, false)] {
+        let filler = "x".repeat(length - event.len());
+        let line = event.replace("on request", &format!("on request{filler}")) + "\n";
+        let read = lines(line.as_bytes());
+        assert_eq!((read.len(), read[0].length, read[0].record.is_ok()), (1, length as u64, ok));
+    }
+}
+
+#[test]
+fn an_error_of_the_disk_ends_the_reading() {
+    struct Broken;
+    impl Read for Broken {
+        fn read(&mut self, _: &mut [u8]) -> io::Result<usize> {
+            Err(io::Error::other("bad sector"))
+        }
+    }
+    let log = LOG.as_bytes().chain(BufReader::new(Broken));
+    let items: Vec<_> = read_log(log).collect();
+    assert_eq!(items.len(), 12);
+    assert!(items[..11].iter().all(Result::is_ok) && items[11].is_err());
+}
+
+proptest! {
+    /// Whatever the bytes: no panic, every byte accounted for, and nothing after a line without
+    /// a newline.
+    #[test]
+    fn lines_tile_the_file(
+        pieces in proptest::collection::vec(
+            prop_oneof![
+                proptest::collection::vec(any::<u8>(), 0..40),
+                (0..11_usize).prop_map(|i| LOG.lines().nth(i).expect("11 lines").into()),
+                Just(b"\n".to_vec()),
+            ],
+            0..20,
+        ),
+        buffer in 1..64_usize,
+    ) {
+        let bytes = pieces.concat();
+        let mut at = 0;
+        let mut ended = true;
+        for line in read_log(BufReader::with_capacity(buffer, &bytes[..])) {
+            let line = line.expect("memory can be read");
+            prop_assert!(ended);
+            prop_assert_eq!(line.offset, at);
+            ended = line.ended;
+            at += line.length + u64::from(ended);
+        }
+        prop_assert_eq!(at, bytes.len() as u64);
+        prop_assert_eq!(lines(&bytes).len(), bytes.lines().count());
+    }
+}

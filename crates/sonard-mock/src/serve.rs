@@ -1,0 +1,254 @@
+//! Plays the board on a pty, in real time or as fast as the host keeps up.
+
+use std::{
+    collections::VecDeque,
+    io,
+    path::{Path, PathBuf},
+    time::Duration,
+};
+
+use sonard_device::link::Pty;
+use tokio::{
+    io::unix::AsyncFd,
+    sync::mpsc::UnboundedReceiver,
+    time::{Instant, sleep_until},
+};
+
+use super::{
+    board::{MockBoard, WakeKind},
+    identity::Pace,
+    note::Note,
+    world::Soundings,
+};
+
+/// How often a lock left behind by a killed host is lifted.
+const LOCK_CHECK: Duration = Duration::from_millis(200);
+/// How long the port is away after a hangup.
+const HANGUP: Duration = Duration::from_millis(300);
+const TICK_HZ: u64 = firmware_protocol::messages::limits::TICK_HZ as u64;
+
+/// A board on a pty.
+#[derive(Debug)]
+pub struct MockPort {
+    board: MockBoard,
+    pty: AsyncFd<Pty>,
+    link: Option<PathBuf>,
+    epoch: Instant,
+    epoch_ticks: u64,
+    to_host: DelayedBytes,
+    to_board: DelayedBytes,
+    lock_check: Instant,
+    moves: Option<UnboundedReceiver<Soundings>>,
+}
+
+/// One direction of the line, with bytes that are held back.
+#[derive(Debug, Default)]
+struct DelayedBytes {
+    chunks: VecDeque<(Instant, Vec<u8>)>,
+}
+
+impl DelayedBytes {
+    /// Bytes never overtake bytes.
+    fn push(&mut self, bytes: Vec<u8>, delay: Duration) {
+        let earliest = self.chunks.back().map(|(at, _)| *at);
+        let at = Instant::now() + delay;
+        self.chunks.push_back((earliest.map_or(at, |earliest| at.max(earliest)), bytes));
+    }
+
+    fn pop_due(&mut self) -> Option<Vec<u8>> {
+        let due = self.chunks.front().is_some_and(|(at, _)| *at <= Instant::now());
+        due.then(|| self.chunks.pop_front()).flatten().map(|(_, bytes)| bytes)
+    }
+
+    fn next_due(&self) -> Option<Instant> {
+        self.chunks.front().map(|(at, _)| *at)
+    }
+}
+
+impl MockPort {
+    /// Opens the pty. Must be called within a tokio runtime.
+    ///
+    /// # Errors
+    /// What the system says; `AlreadyExists` if `link` is something else than a symbolic link.
+    pub fn open(board: MockBoard, link: Option<&Path>) -> io::Result<Self> {
+        Ok(Self {
+            epoch: Instant::now(),
+            epoch_ticks: board.now(),
+            pty: open_watched(link)?,
+            link: link.map(Path::to_path_buf),
+            board,
+            to_host: DelayedBytes::default(),
+            to_board: DelayedBytes::default(),
+            lock_check: Instant::now() + LOCK_CHECK,
+            moves: None,
+        })
+    }
+
+    /// The same board, carried from place to place: what comes is heard from then on, before any
+    /// byte that was sent after it.
+    #[must_use]
+    pub fn moved_by(self, moves: UnboundedReceiver<Soundings>) -> Self {
+        Self { moves: Some(moves), ..self }
+    }
+
+    /// Where a host opens it.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        self.pty.get_ref().path()
+    }
+
+    /// Plays until `shutdown` is ready, handing what happens to `on_note`.
+    ///
+    /// # Errors
+    /// When the pty fails.
+    pub async fn run(
+        mut self,
+        shutdown: impl Future<Output = ()>,
+        mut on_note: impl FnMut(Note),
+    ) -> io::Result<()> {
+        tokio::pin!(shutdown);
+        loop {
+            while let Some(soundings) = self.moves.as_mut().and_then(|moves| moves.try_recv().ok())
+            {
+                self.board.world().set_soundings(soundings);
+            }
+            let due = self.due();
+            self.board.advance(due);
+            while !self.board.stalled()
+                && let Some(bytes) = self.to_board.pop_due()
+            {
+                self.board.handle_bytes(&bytes);
+            }
+            self.speak()?;
+            self.board.take_notes().into_iter().for_each(&mut on_note);
+            if self.board.take_hangup() {
+                self.hang_up().await?;
+            }
+            tokio::select! {
+                biased;
+                () = &mut shutdown => return self.drain().await,
+                heard = self.wait() => heard?,
+            }
+        }
+    }
+
+    /// The device time that has come.
+    fn due(&mut self) -> u64 {
+        let real = self.epoch_ticks + ticks(self.epoch.elapsed());
+        let Some(at) = self.jump().filter(|&at| at > real) else { return real };
+        // From the jump on, the host's patience is measured from here.
+        self.epoch = Instant::now();
+        self.epoch_ticks = at;
+        at
+    }
+
+    /// The device time that virtual time may jump to.
+    fn jump(&self) -> Option<u64> {
+        let wake = self.board.next_wake().filter(|wake| wake.kind == WakeKind::Work)?;
+        (self.board.pace() == Pace::Virtual).then_some(wake.at)
+    }
+
+    /// Waits for bytes from the host or for the next thing to happen.
+    async fn wait(&mut self) -> io::Result<()> {
+        let at = match self.jump() {
+            Some(_) => Some(Instant::now()),
+            None => self.board.next_wake().map(|wake| self.real_time(wake.at)),
+        };
+        let lines = [self.to_host.next_due(), self.to_board.next_due()];
+        let stalled_lines =
+            if self.board.stalled() { None } else { lines.into_iter().flatten().min() };
+        let wake_at = [at, stalled_lines].into_iter().flatten().fold(self.lock_check, Instant::min);
+        let timer = async {
+            // A jump still gives the host's bytes their turn.
+            if wake_at <= Instant::now() {
+                tokio::task::yield_now().await;
+            } else {
+                sleep_until(wake_at).await;
+            }
+        };
+        let mut buffer = [0; 1024];
+        let count = tokio::select! {
+            biased;
+            read = read_some(&self.pty, &mut buffer) => read?,
+            () = timer => {
+                self.check_lock();
+                return Ok(());
+            }
+        };
+        let delay = Duration::from_millis(self.board.line_delay_ms().into());
+        self.to_board.push(buffer.get(..count).unwrap_or_default().to_vec(), delay);
+        Ok(())
+    }
+
+    fn check_lock(&mut self) {
+        if self.lock_check <= Instant::now() {
+            self.pty.get_ref().clear_exclusive();
+            self.lock_check = Instant::now() + LOCK_CHECK;
+        }
+    }
+
+    fn real_time(&self, at_ticks: u64) -> Instant {
+        let ahead = at_ticks.saturating_sub(self.epoch_ticks);
+        self.epoch + Duration::from_nanos(ahead * (1_000_000_000 / TICK_HZ))
+    }
+
+    fn speak(&mut self) -> io::Result<()> {
+        let mut said = Vec::new();
+        self.board.poll_transmit(&mut said);
+        if !said.is_empty() {
+            let delay = Duration::from_millis(self.board.line_delay_ms().into());
+            self.to_host.push(said, delay);
+        }
+        while let Some(bytes) = self.to_host.pop_due() {
+            match self.pty.get_ref().write(&bytes) {
+                // A serial line loses what nobody reads; so does a full pty.
+                Ok(_) => {}
+                Err(error) if error.kind() == io::ErrorKind::WouldBlock => {}
+                Err(error) => return Err(error),
+            }
+        }
+        Ok(())
+    }
+
+    /// The port goes away and comes back under the same link, as after an unplug.
+    async fn hang_up(&mut self) -> io::Result<()> {
+        self.to_host.chunks.clear();
+        self.to_board.chunks.clear();
+        // The old pty has to be gone before its link can be made anew.
+        let parked = open_watched(None)?;
+        drop(std::mem::replace(&mut self.pty, parked));
+        tokio::time::sleep(HANGUP).await;
+        if let Some(link) = self.link.as_deref() {
+            self.pty = open_watched(Some(link))?;
+        }
+        Ok(())
+    }
+
+    /// What is queued when the master closes is lost: lets the host read it first.
+    async fn drain(&mut self) -> io::Result<()> {
+        self.speak()?;
+        tokio::time::sleep(Duration::from_millis(20)).await;
+        Ok(())
+    }
+}
+
+#[expect(unsafe_code, reason = "tokio offers no safe way to watch a descriptor of one's own")]
+fn open_watched(link: Option<&Path>) -> io::Result<AsyncFd<Pty>> {
+    let pty = Pty::open(link)?;
+    // SAFETY: `Pty` owns its master descriptor from `open` to `drop` and never replaces it.
+    Ok(unsafe { AsyncFd::register(pty) }?)
+}
+
+async fn read_some(pty: &AsyncFd<Pty>, buffer: &mut [u8]) -> io::Result<usize> {
+    loop {
+        let mut ready = pty.readable().await?;
+        match ready.try_io(|pty| pty.get_ref().read(buffer)) {
+            Ok(read) => return read,
+            Err(_would_block) => {}
+        }
+    }
+}
+
+fn ticks(elapsed: Duration) -> u64 {
+    u64::try_from(elapsed.as_nanos() * u128::from(TICK_HZ) / 1_000_000_000).unwrap_or(u64::MAX)
+}
