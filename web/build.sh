@@ -35,7 +35,7 @@ bundle web/playground/main.js "$page/playground.js"
 bundle web/playground/worker.js "$target/playground-worker.js"
 # From a folder a page can neither fetch a module nor start a worker's file: both come in a script.
 node web/pack.mjs "$wasm" "$target/playground-worker.js" >"$page/model-data.js"
-cp web/playground/{index.html,playground.css} src/server/page/{style.css,icon.svg} "$page"
+cp web/playground/{index.html,playground.css} crates/sonard-daemon/src/server/page/{style.css,icon.svg} "$page"
 
 bytes=0
 for file in "$page"/*; do

@@ -170,7 +170,7 @@ async fn daemon(args: &Args, plan: &mut Plan, interrupts: Interrupts) -> Result<
     let tell = |line: &str| notice!("{line}");
     let (daemon, status) = ByDaemon::find(args.at.client()?, interrupts, tell).await?;
     check_scene(status.scene.as_ref(), &plan.scene)?;
-    plan.adopt(&daemon, &status)?;
+    adopt::adopt(plan, &daemon, &status)?;
     Ok(daemon)
 }
 

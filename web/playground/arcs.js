@@ -1,11 +1,11 @@
 // Readings as arcs: all that a ranger knows is that something within its beam is so far away.
 
-import { MARKS } from "../../src/server/page/verdicts.js";
+import { MARKS } from "../../crates/sonard-daemon/src/server/page/verdicts.js";
 
 const TURN = Math.PI / 180;
 
 /**
- * @param {import("../../src/server/page/pens.js").Layer} layer
+ * @param {import("../../crates/sonard-daemon/src/server/page/pens.js").Layer} layer
  * @param {any} plan
  * @param {number | null} half_deg half the width of the beam; none are drawn without it
  */

@@ -1,8 +1,8 @@
 // The engines side by side: what each would have the ranger read, and what it misses.
 
-import { Plan } from "../../src/server/page/plan.js";
-import { Scan } from "../../src/server/page/scan.js";
-import { setText } from "../../src/server/page/words.js";
+import { Plan } from "../../crates/sonard-daemon/src/server/page/plan.js";
+import { Scan } from "../../crates/sonard-daemon/src/server/page/scan.js";
+import { setText } from "../../crates/sonard-daemon/src/server/page/words.js";
 
 /** Ranges agree within so much, metres, or that share: what the module is made for. */
 const AGREE_M = 0.01;

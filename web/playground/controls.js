@@ -1,6 +1,6 @@
 // Sensor, air and walls: each control sets one thing of what is shown, and says it with its unit.
 
-import { decibels } from "../../src/server/page/words.js";
+import { decibels } from "../../crates/sonard-daemon/src/server/page/words.js";
 
 /** @param {string} id */
 const byId = (id) => /** @type {any} */ (document.getElementById(id));

@@ -1,8 +1,8 @@
 // Drawing a room: corners and pillars as handles on the plan, walls by clicks.
 
-import { Handle } from "../../src/server/page/handles.js";
+import { Handle } from "../../crates/sonard-daemon/src/server/page/handles.js";
 import { addPillar, addWall, cornersOf, emptyRoom, moveCorner, removeCorner } from "./room.js";
-import { rounded } from "../../src/server/page/ranger.js";
+import { rounded } from "../../crates/sonard-daemon/src/server/page/ranger.js";
 
 /** @param {string} id */
 const byId = (id) => /** @type {HTMLButtonElement} */ (document.getElementById(id));

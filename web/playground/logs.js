@@ -1,6 +1,6 @@
 // A log that was opened: its scans, each with room, sensor, air and model as it was taken in.
 
-import { count } from "../../src/server/page/words.js";
+import { count } from "../../crates/sonard-daemon/src/server/page/words.js";
 
 /** @param {string} id */
 const byId = (id) => /** @type {any} */ (document.getElementById(id));

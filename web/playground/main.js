@@ -1,15 +1,15 @@
 // Puts the playground together: what is shown is one state; every change of it asks the model anew.
 
-import { BeamPanel, inWords } from "../../src/server/page/beam.js";
-import { Plan } from "../../src/server/page/plan.js";
-import { Ranger } from "../../src/server/page/ranger.js";
-import { Scan } from "../../src/server/page/scan.js";
-import { Strip } from "../../src/server/page/strip.js";
-import { BeamTable } from "../../src/server/page/table.js";
-import { addTools } from "../../src/server/page/tools.js";
-import { EchoTrace } from "../../src/server/page/trace.js";
-import { colours, legend } from "../../src/server/page/verdicts.js";
-import { count, setText } from "../../src/server/page/words.js";
+import { BeamPanel, inWords } from "../../crates/sonard-daemon/src/server/page/beam.js";
+import { Plan } from "../../crates/sonard-daemon/src/server/page/plan.js";
+import { Ranger } from "../../crates/sonard-daemon/src/server/page/ranger.js";
+import { Scan } from "../../crates/sonard-daemon/src/server/page/scan.js";
+import { Strip } from "../../crates/sonard-daemon/src/server/page/strip.js";
+import { BeamTable } from "../../crates/sonard-daemon/src/server/page/table.js";
+import { addTools } from "../../crates/sonard-daemon/src/server/page/tools.js";
+import { EchoTrace } from "../../crates/sonard-daemon/src/server/page/trace.js";
+import { colours, legend } from "../../crates/sonard-daemon/src/server/page/verdicts.js";
+import { count, setText } from "../../crates/sonard-daemon/src/server/page/words.js";
 import { drawArcs } from "./arcs.js";
 import { SideBySide } from "./compare.js";
 import { Controls } from "./controls.js";

@@ -1,6 +1,6 @@
 // The room in the project's scene format, and what is drawn in it.
 
-import { rounded } from "../../src/server/page/ranger.js";
+import { rounded } from "../../crates/sonard-daemon/src/server/page/ranger.js";
 
 /**
  * @typedef {[number, number]} Point

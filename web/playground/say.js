@@ -1,6 +1,6 @@
 // What the page says of itself: its state, what is refused, and a sweep in one sentence.
 
-import { count, setText } from "../../src/server/page/words.js";
+import { count, setText } from "../../crates/sonard-daemon/src/server/page/words.js";
 
 /** @param {string} id */
 const byId = (id) => /** @type {any} */ (document.getElementById(id));

@@ -1,6 +1,6 @@
 // The tour's card: its steps, and what is said instead where something else is shown.
 
-import { setText } from "../../src/server/page/words.js";
+import { setText } from "../../crates/sonard-daemon/src/server/page/words.js";
 import { STEPS } from "./steps.js";
 
 /** @param {string} id */

@@ -177,6 +177,7 @@ fn grey(bytes: &[u8]) -> Result<([usize; 2], Vec<Option<u8>>), png::DecodingErro
         [r, g, b, ..] => Some(((u16::from(r) + u16::from(g) + u16::from(b)) / 3) as u8),
         [] => None,
     };
-    let pixels = image[..frame.buffer_size()].chunks(channels).map(pixel).collect();
+    image.truncate(frame.buffer_size());
+    let pixels = image.chunks(channels).map(pixel).collect();
     Ok(([frame.width as usize, frame.height as usize], pixels))
 }

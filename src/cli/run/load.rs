@@ -171,6 +171,10 @@ impl Loader {
     }
 }
 
+/// Optional outputs of this build.
+const OUTPUTS: OptionalOutputs =
+    OptionalOutputs { mqtt: cfg!(feature = "mqtt"), ros: cfg!(feature = "ros") };
+
 fn settings(keys: Keys) -> Result<Settings, Failure> {
     let refuse_pose = |error: PoseError| Failure::input(&error, error.help());
     let (scene, pose) = match &keys.place.scene {
@@ -182,8 +186,15 @@ fn settings(keys: Keys) -> Result<Settings, Failure> {
         None => (None, parse_pose(&keys.place.pose).map_err(refuse_pose)?),
     };
     let sensor = load_sensor(&keys.model.sensor)?;
-    let outputs = OptionalOutputs { mqtt: cfg!(feature = "mqtt"), ros: cfg!(feature = "ros") };
-    Ok(Settings { keys, scene, sensor, pose, simulated: None, outputs, files: BTreeMap::new() })
+    Ok(Settings {
+        keys,
+        scene,
+        sensor,
+        pose,
+        simulated: None,
+        outputs: OUTPUTS,
+        files: BTreeMap::new(),
+    })
 }
 
 /// The same for an array that the model plays; its rangers are what it says, unless the sensor was
@@ -226,6 +237,7 @@ fn simulated(mut keys: Keys, sensor_chosen: bool) -> Result<Settings, Failure> {
         sensor,
         pose,
         simulated: Some(simulated),
+        outputs: OUTPUTS,
         files: BTreeMap::new(),
     })
 }

@@ -13,7 +13,7 @@ use sonard::{
     acoustics::Sensor,
     api::{LinkState, Trouble},
     config::{Keys, Mode},
-    daemon::{Asked, Handle, Journal, Order, Resources, Settings, prepare},
+    daemon::{Asked, Handle, Journal, OptionalOutputs, Order, Resources, Settings, prepare},
     host_gpio::HostGpio,
     link,
     mock::Pace,
@@ -67,7 +67,16 @@ fn settings(port: String) -> Settings {
     (keys.link.retry_min_s, keys.link.retry_max_s) = (0.05, 0.3);
     let sensor = Sensor::preset("senscomp-6500").expect("a preset");
     let pose = parse_pose("0,0,0").expect("a pose");
-    Settings { keys, scene: None, sensor, pose, simulated: None, files: Default::default() }
+    let outputs = OptionalOutputs { mqtt: false, ros: false };
+    Settings {
+        keys,
+        scene: None,
+        sensor,
+        pose,
+        simulated: None,
+        outputs,
+        files: Default::default(),
+    }
 }
 
 /// Runs a daemon with pins made of switches while `act` goes on. Returns the switches as the daemon left them.
