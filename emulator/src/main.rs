@@ -16,14 +16,14 @@ use clap::Parser;
 use firmware_protocol::messages::Capabilities;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_pcg::Pcg64;
-use sonard::{
+use sonard_device::link::Pty;
+use sonard_emulator::{Emulator, MotorLimits, serve};
+use sonard_mock::{Soundings, World};
+use sonard_model::{
     acoustics::{Air, Sensor, TofNoise},
-    link::Pty,
-    mock::{Soundings, World},
     model::{Options, Simulator},
     scene::{Scene, shipped},
 };
-use sonard_emulator::{Emulator, MotorLimits, serve};
 
 /// Run the firmware's machine code in an emulated Arduino Uno, with its serial line on a pty.
 ///

@@ -134,7 +134,7 @@ impl Motor {
 
 #[cfg(test)]
 mod tests {
-    use sonard::motion::Trapezoid;
+    use sonard_model::motion::Trapezoid;
 
     use super::*;
 

@@ -7,7 +7,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use sonard::link::Pty;
+use sonard_device::link::Pty;
 
 use crate::{CYCLES_PER_US, Emulator};
 

@@ -1,7 +1,7 @@
 //! What the motor turns in and the ranger listens to.
 
 use firmware_protocol::messages::limits::{TICK_HZ, WINDOW_TICKS_MAX};
-use sonard::mock::World;
+use sonard_mock::World;
 
 use crate::CYCLES_PER_TICK;
 

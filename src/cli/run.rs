@@ -281,7 +281,7 @@ fn open_and_announce(daemon: Arc<OnceLock<Handle>>) -> OpenPort {
                 daemon.event(EventKind::Reconnected, change);
             }
         }
-        Ok(line)
+        Ok(Box::new(line))
     })
 }
 

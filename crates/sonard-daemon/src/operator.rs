@@ -11,12 +11,11 @@ use firmware_protocol::{
 };
 use sonard_api::{ScanTotals, Trouble};
 use sonard_device::{
-    link::{self, BAUD, LinkError},
+    link::{self, BAUD, Line, LinkError},
     ranger::{DriveError, Driver, Ranger, Unasked, serial_text},
 };
 use sonard_records::{EventKind, Session};
 use tokio::time::{Instant, sleep_until};
-use tokio_serial::SerialStream;
 
 use super::{
     agenda::Due,
@@ -34,14 +33,14 @@ const AWAITS_START: &str = "there was an emergency stop: nothing moves until som
 const BEAT: Duration = Duration::from_secs(1);
 
 /// Opens the port of a name.
-pub type OpenPort = Box<dyn FnMut(&str) -> Result<SerialStream, LinkError> + Send>;
+pub type OpenPort = Box<dyn FnMut(&str) -> Result<Box<dyn Line>, LinkError> + Send>;
 
 pub(super) struct Operator {
     control: Control,
     machine: LinkMachine,
     open_port: OpenPort,
-    ranger: Option<Ranger<SerialStream>>,
-    line: Option<SerialStream>,
+    ranger: Option<Ranger<Box<dyn Line>>>,
+    line: Option<Box<dyn Line>>,
     forecast: Forecast,
     /// The device that was met last, on whatever connection.
     met: Option<Identity>,
@@ -163,7 +162,7 @@ impl Operator {
     }
 
     /// Takes the device if it is the right one.
-    fn meet(&mut self, ranger: Ranger<SerialStream>) {
+    fn meet(&mut self, ranger: Ranger<Box<dyn Line>>) {
         let serial = serial_text(ranger.identity());
         let wanted = self.control.settings.keys.device.serial.clone();
         if let Some(wanted) = wanted.filter(|wanted| *wanted != serial) {

@@ -19,6 +19,7 @@ use rustix::{
     io::Errno,
 };
 use serialport::{ClearBuffer, ErrorKind, SerialPort as _};
+use tokio::io::{AsyncRead, AsyncWrite};
 use tokio_serial::{SerialPortBuilderExt as _, SerialStream};
 
 pub use adapter::{is_kernel_console, latency_timer_ms};
@@ -29,7 +30,12 @@ pub use ports::{Candidate, candidates};
 use ports::{PortFolders, Resolved};
 pub use pty::Pty;
 
-/// Line rate of the firmware, bits a second (8N1).
+/// Byte stream to a device: a serial port, or a pipe in memory.
+pub trait Line: AsyncRead + AsyncWrite + Send + Unpin {}
+
+impl<T: AsyncRead + AsyncWrite + Send + Unpin> Line for T {}
+
+/// Line rate of the firmware, bits per second (8N1).
 pub const BAUD: u32 = 115_200;
 
 /// Opens a line for the ranger's protocol, locked against other programs and emptied of what

@@ -9,6 +9,7 @@ mod board;
 mod faults;
 mod identity;
 mod liar;
+mod memory;
 mod note;
 mod serve;
 #[cfg(test)]
@@ -19,6 +20,7 @@ pub use board::{MockBoard, Wake, WakeKind};
 pub use faults::{DeviceFault, FAULT_HELP, FaultPlan, FaultSpecError, Faults};
 pub use identity::{BoardSettings, Pace};
 pub use liar::{LIES, Lie};
+pub use memory::MemorySocket;
 pub use note::Note;
 pub use serve::MockPort;
 pub use world::{Soundings, World};

@@ -1,4 +1,4 @@
-//! Plays the board on a pty, in real time or as fast as the host keeps up.
+//! Runs the board on a pseudo-terminal or a port in memory, in real time or as fast as the host keeps up.
 
 use std::{
     collections::VecDeque,
@@ -11,12 +11,13 @@ use sonard_device::link::Pty;
 use tokio::{
     io::unix::AsyncFd,
     sync::mpsc::UnboundedReceiver,
-    time::{Instant, sleep_until},
+    time::{Instant, sleep, sleep_until},
 };
 
 use super::{
     board::{MockBoard, WakeKind},
     identity::Pace,
+    memory::{MemoryLine, MemorySocket},
     note::Note,
     world::Soundings,
 };
@@ -27,18 +28,80 @@ const LOCK_CHECK: Duration = Duration::from_millis(200);
 const HANGUP: Duration = Duration::from_millis(300);
 const TICK_HZ: u64 = firmware_protocol::messages::limits::TICK_HZ as u64;
 
-/// A board on a pty.
+/// A board behind a port that hosts can open.
 #[derive(Debug)]
 pub struct MockPort {
     board: MockBoard,
-    pty: AsyncFd<Pty>,
-    link: Option<PathBuf>,
+    line: Line,
     epoch: Instant,
     epoch_ticks: u64,
     to_host: DelayedBytes,
     to_board: DelayedBytes,
     lock_check: Instant,
     moves: Option<UnboundedReceiver<Soundings>>,
+}
+
+/// The board's side of the port.
+#[derive(Debug)]
+enum Line {
+    /// Pseudo-terminal, with the symbolic link to it.
+    Pty {
+        pty: AsyncFd<Pty>,
+        link: Option<PathBuf>,
+    },
+    Memory(MemoryLine),
+}
+
+impl Line {
+    /// Waits for bytes of the host. Cancel-safe.
+    async fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        match self {
+            Self::Pty { pty, .. } => read_some(pty, buffer).await,
+            Self::Memory(line) => line.read(buffer).await,
+        }
+    }
+
+    /// Writes without waiting: a serial line loses bytes that are not read, and so does a full pipe.
+    fn write(&mut self, bytes: &[u8]) -> io::Result<()> {
+        match self {
+            Self::Pty { pty, .. } => match pty.get_ref().write(bytes) {
+                Err(error) if error.kind() != io::ErrorKind::WouldBlock => Err(error),
+                _written => Ok(()),
+            },
+            Self::Memory(line) => {
+                line.write(bytes);
+                Ok(())
+            }
+        }
+    }
+
+    /// Lifts a lock left behind by a killed host.
+    fn clear_lock(&self) {
+        if let Self::Pty { pty, .. } = self {
+            pty.get_ref().clear_exclusive();
+        }
+    }
+
+    /// Takes the port away for [`HANGUP`] and returns it under the same name, as after an unplug.
+    async fn hang_up(&mut self) -> io::Result<()> {
+        match self {
+            Self::Pty { pty, link } => {
+                // The old pty has to be gone before its link can be created again.
+                let parked = open_watched(None)?;
+                drop(std::mem::replace(pty, parked));
+                sleep(HANGUP).await;
+                if let Some(link) = link.as_deref() {
+                    *pty = open_watched(Some(link))?;
+                }
+            }
+            Self::Memory(line) => {
+                line.unplug();
+                sleep(HANGUP).await;
+                line.replug();
+            }
+        }
+        Ok(())
+    }
 }
 
 /// One direction of the line, with bytes that are held back.
@@ -71,17 +134,27 @@ impl MockPort {
     /// # Errors
     /// What the system says; `AlreadyExists` if `link` is something else than a symbolic link.
     pub fn open(board: MockBoard, link: Option<&Path>) -> io::Result<Self> {
-        Ok(Self {
+        let pty = open_watched(link)?;
+        Ok(Self::with_line(board, Line::Pty { pty, link: link.map(Path::to_path_buf) }))
+    }
+
+    /// Plugs the board into a port in memory. Must be called within a tokio runtime, whose clock may be paused.
+    #[must_use]
+    pub fn in_memory(board: MockBoard, socket: MemorySocket) -> Self {
+        Self::with_line(board, Line::Memory(MemoryLine::plug(socket)))
+    }
+
+    fn with_line(board: MockBoard, line: Line) -> Self {
+        Self {
             epoch: Instant::now(),
             epoch_ticks: board.now(),
-            pty: open_watched(link)?,
-            link: link.map(Path::to_path_buf),
+            line,
             board,
             to_host: DelayedBytes::default(),
             to_board: DelayedBytes::default(),
             lock_check: Instant::now() + LOCK_CHECK,
             moves: None,
-        })
+        }
     }
 
     /// The same board, carried from place to place: what comes is heard from then on, before any
@@ -91,10 +164,13 @@ impl MockPort {
         Self { moves: Some(moves), ..self }
     }
 
-    /// Where a host opens it.
+    /// Path of the pseudo-terminal for hosts; empty for a port in memory.
     #[must_use]
     pub fn path(&self) -> &Path {
-        self.pty.get_ref().path()
+        match &self.line {
+            Line::Pty { pty, .. } => pty.get_ref().path(),
+            Line::Memory(_) => Path::new(""),
+        }
     }
 
     /// Plays until `shutdown` is ready, handing what happens to `on_note`.
@@ -169,7 +245,7 @@ impl MockPort {
         let mut buffer = [0; 1024];
         let count = tokio::select! {
             biased;
-            read = read_some(&self.pty, &mut buffer) => read?,
+            read = self.line.read(&mut buffer) => read?,
             () = timer => {
                 self.check_lock();
                 return Ok(());
@@ -182,7 +258,7 @@ impl MockPort {
 
     fn check_lock(&mut self) {
         if self.lock_check <= Instant::now() {
-            self.pty.get_ref().clear_exclusive();
+            self.line.clear_lock();
             self.lock_check = Instant::now() + LOCK_CHECK;
         }
     }
@@ -200,34 +276,21 @@ impl MockPort {
             self.to_host.push(said, delay);
         }
         while let Some(bytes) = self.to_host.pop_due() {
-            match self.pty.get_ref().write(&bytes) {
-                // A serial line loses what nobody reads; so does a full pty.
-                Ok(_) => {}
-                Err(error) if error.kind() == io::ErrorKind::WouldBlock => {}
-                Err(error) => return Err(error),
-            }
+            self.line.write(&bytes)?;
         }
         Ok(())
     }
 
-    /// The port goes away and comes back under the same link, as after an unplug.
     async fn hang_up(&mut self) -> io::Result<()> {
         self.to_host.chunks.clear();
         self.to_board.chunks.clear();
-        // The old pty has to be gone before its link can be made anew.
-        let parked = open_watched(None)?;
-        drop(std::mem::replace(&mut self.pty, parked));
-        tokio::time::sleep(HANGUP).await;
-        if let Some(link) = self.link.as_deref() {
-            self.pty = open_watched(Some(link))?;
-        }
-        Ok(())
+        self.line.hang_up().await
     }
 
     /// What is queued when the master closes is lost: lets the host read it first.
     async fn drain(&mut self) -> io::Result<()> {
         self.speak()?;
-        tokio::time::sleep(Duration::from_millis(20)).await;
+        sleep(Duration::from_millis(20)).await;
         Ok(())
     }
 }

@@ -4,8 +4,8 @@ use crate::common::{SETTINGS, commanded, ready};
 use firmware_protocol::host::{Command, HostEvent, Outcome};
 use firmware_protocol::messages::Settings;
 use rand::{RngExt as _, SeedableRng as _};
-use sonard::motion::Trapezoid;
 use sonard_emulator::{Commanded, HZ};
+use sonard_model::motion::Trapezoid;
 
 const QUICK: Settings =
     Settings { speed: 4_000, acceleration: 200_000, settle_ticks: 0, ..SETTINGS };

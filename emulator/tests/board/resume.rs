@@ -7,12 +7,13 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use crate::common::{SETTINGS, commanded, config, elf};
 use firmware_protocol::host::HostConfig;
 use firmware_protocol::messages::Settings;
-use sonard::geometry::Pose;
-use sonard::link;
-use sonard::link::Pty;
-use sonard::ranger::{Driver, Ranger, ScanJob, ScanSummary};
-use sonard::scan::{EventKind, Record, ScanPlan, Sink, SinkError};
+use sonard_device::{
+    link::{self, Pty},
+    ranger::{Driver, Ranger, ScanJob, ScanSummary},
+};
 use sonard_emulator::{Emulator, HZ, serve};
+use sonard_model::geometry::Pose;
+use sonard_records::{EventKind, Record, ScanPlan, Sink, SinkError};
 
 const MS: u64 = HZ / 1000;
 const BEAMS: u32 = 60;

@@ -6,12 +6,14 @@ use std::sync::Arc;
 use crate::common::{SETTINGS, readings, ready};
 use firmware_protocol::host::Command;
 use firmware_protocol::messages::{ReadingStatus, Settings, Sweep, limits::TICK_HZ};
-use sonard::acoustics::{Air, Sensor, TofNoise};
-use sonard::mock::{Soundings, World};
-use sonard::model::{Options, Simulator};
-use sonard::ranger::limit_s;
-use sonard::scan::ScanPlan;
-use sonard::scene::Scene;
+use sonard_device::ranger::limit_s;
+use sonard_mock::{Soundings, World};
+use sonard_model::{
+    acoustics::{Air, Sensor, TofNoise},
+    model::{Options, Simulator},
+    plan::ScanPlan,
+    scene::Scene,
+};
 
 fn world() -> World {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenes/simple-room.json");

@@ -92,7 +92,12 @@ fn run(
     let opened = Journal::open(&folder.join("log"), settings.rotation(), &supervisor);
     let (journal, thread) = opened.expect("a log");
     let gpio = Box::new(Switchboard(Arc::clone(&switches)));
-    let resources = Resources { open_port: Box::new(link::open), gpio, journal, supervisor };
+    let resources = Resources {
+        open_port: Box::new(|port| Ok(Box::new(link::open(port)?))),
+        gpio,
+        journal,
+        supervisor,
+    };
     let stop = CancellationToken::new();
     let (daemon, handle) = prepare(resources, settings);
     drop(context);

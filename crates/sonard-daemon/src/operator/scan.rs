@@ -4,10 +4,10 @@ use std::future::pending;
 
 use firmware_protocol::{host::HostError, messages::Identity};
 use sonard_api::Trouble;
+use sonard_device::link::Line;
 use sonard_device::ranger::{DriveError, Ranger, ScanError, ScanJob, ScanSummary};
 use sonard_records::{EventKind, Record, STOPPED_ON_REQUEST, Session};
 use tokio::{sync::oneshot, time::Instant};
-use tokio_serial::SerialStream;
 use uuid::Uuid;
 
 use super::{
@@ -129,7 +129,7 @@ impl Operator {
     /// know comes back with the outcome.
     async fn scan_attended(
         &mut self,
-        ranger: &mut Ranger<SerialStream>,
+        ranger: &mut Ranger<Box<dyn Line>>,
         job: &ScanJob,
     ) -> (Result<ScanSummary, ScanError>, Vec<Interrupt>) {
         let mut out = self.out.clone();
