@@ -67,6 +67,7 @@ mod what_if;
 mod worlds;
 
 pub use failure::{Failure, Outcome};
+pub use run::{EmbeddedControl, EmbeddedDaemon};
 
 use std::{process::ExitCode, sync::Arc};
 

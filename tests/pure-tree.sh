@@ -16,8 +16,14 @@ check() {
     fi
   done
 }
-shell=(tokio tokio-serial serialport axum rppal mio sonard)
+shell=(
+  tokio tokio-serial serialport axum rppal mio sonard sonard-api sonard-collect sonard-daemon sonard-device sonard-mock
+  sonard-runtime
+)
 for crate in "${pure[@]}"; do check "$crate" "${shell[@]}" rustix clap; done
-# A program, with options and files.
+# With files, and the first with options.
 check sonard-papers "${shell[@]}"
-printf '%s: none depends on tokio, serialport, axum or rppal\n' "${pure[*]} sonard-papers"
+check sonard-log "${shell[@]}" clap
+# The emulator runs boards; it needs the mock's world and no daemon.
+check sonard-emulator axum sonard sonard-daemon sonard-log
+printf '%s: none depends on tokio, serialport, axum or rppal\n' "${pure[*]} sonard-papers sonard-log"

@@ -1,6 +1,7 @@
 //! `sonard run`.
 
 mod broker;
+mod embedded;
 mod files;
 mod load;
 mod mock;
@@ -32,6 +33,7 @@ use crate::{
     server::{Access, Listeners, Server},
     supervisor::{Supervisor, Task},
 };
+pub use embedded::{EmbeddedControl, EmbeddedDaemon};
 use files::Files;
 use load::Loader;
 use mock::Mock;

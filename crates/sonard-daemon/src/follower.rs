@@ -61,7 +61,7 @@ impl Follower {
             }
             // A whole scan takes its time, and may end with the next one's start.
             Ok(record @ (Record::ScanStart(_) | Record::ScanEnd(_))) => {
-                tokio::task::block_in_place(|| self.take(record, audience));
+                crate::blocking::block_in_place(|| self.take(record, audience));
             }
             Ok(record) => self.take(record, audience),
             Err(_missed) => {

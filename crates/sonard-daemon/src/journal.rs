@@ -164,7 +164,7 @@ impl Journal {
     pub fn record(&self, record: &Record) {
         if self.progress.is_full() {
             let deadline = Instant::now() + QUEUE_TIMEOUT;
-            tokio::task::block_in_place(|| {
+            crate::blocking::block_in_place(|| {
                 while self.progress.is_full() && Instant::now() < deadline {
                     thread::sleep(QUEUE_POLL);
                 }

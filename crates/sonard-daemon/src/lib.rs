@@ -14,6 +14,7 @@
 
 mod agenda;
 mod air;
+mod blocking;
 mod control;
 mod fan_out;
 mod fit;

@@ -297,7 +297,7 @@ impl Operator {
         };
         if trouble == Trouble::NotAnswering && self.control.gpio.can_reset() {
             tracing::warn!("the device does not answer: pulling its reset line");
-            tokio::task::block_in_place(|| self.control.gpio.reset());
+            crate::blocking::block_in_place(|| self.control.gpio.reset());
         }
         let contention = match trouble {
             Trouble::NotAnswering => {

@@ -166,6 +166,12 @@ impl Server {
             stall: Duration::from_secs_f64(keys.stall_s),
         }
     }
+
+    /// The API without connections: requests carry a [`Peer`] as an extension.
+    #[must_use]
+    pub fn router(&self) -> Router {
+        self.router.clone()
+    }
 }
 
 impl Api {

@@ -12,9 +12,32 @@ use crate::{
         mock_world::{AssumedModel, MockWorldArgs},
     },
     daemon::Settings,
-    mock::{MockPort, Pace},
+    mock::{MockBoard, MockPort, Pace},
     supervisor::{Supervisor, Task},
 };
+
+/// The board in the world that `settings` describe, but for what `world` changes.
+pub(super) fn board(
+    world: &MockWorldArgs,
+    pace: Pace,
+    settings: &Settings,
+) -> Result<MockBoard, Failure> {
+    let air = &settings.keys.air;
+    let air = Air::new(air.temperature_c, air.humidity_percent, air.pressure_kpa)
+        .map_err(|error| Failure::input(error, "see [air]"))?;
+    // Loading has rejected a mock without a scene.
+    let Some(scene) = &settings.scene else {
+        return Err(Failure::input("a mock needs a scene", "give --scene"));
+    };
+    let assumed = AssumedModel {
+        scene,
+        pose: &settings.pose,
+        sensor: &settings.sensor,
+        air: &air,
+        options: &settings.options(),
+    };
+    world.board_at(pace, &assumed)
+}
 
 pub(super) struct Mock {
     link: PathBuf,
@@ -29,22 +52,8 @@ impl Mock {
         settings: &Settings,
         supervisor: &Supervisor,
     ) -> Result<Self, Failure> {
-        let air = &settings.keys.air;
-        let air = Air::new(air.temperature_c, air.humidity_percent, air.pressure_kpa)
-            .map_err(|error| Failure::input(error, "see [air]"))?;
-        // Loading has refused a mock without a scene.
-        let Some(scene) = &settings.scene else {
-            return Err(Failure::input("a mock needs a scene", "give --scene"));
-        };
-        let assumed = AssumedModel {
-            scene,
-            pose: &settings.pose,
-            sensor: &settings.sensor,
-            air: &air,
-            options: &settings.options(),
-        };
         let pace = if virtual_time { Pace::Virtual } else { Pace::RealTime };
-        let board = world.board_at(pace, &assumed)?;
+        let board = board(world, pace, settings)?;
         let link = std::env::temp_dir().join(format!("sonard-mock-{}", std::process::id()));
         let port = MockPort::open(board, Some(&link)).map_err(|error| {
             Failure::device(format!("cannot make a pty: {error}"), "is /dev/pts mounted?")

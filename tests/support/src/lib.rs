@@ -6,6 +6,7 @@
 pub mod collection;
 pub mod daemon;
 pub mod fleet;
+pub mod in_process;
 pub mod rig;
 
 use std::{

@@ -1,0 +1,143 @@
+//! A daemon within another program.
+
+use std::{ffi::OsStr, io, path::PathBuf};
+
+use axum::Router;
+use clap::{Args as _, Command, FromArgMatches as _};
+use tokio_util::sync::CancellationToken;
+
+use super::{Args, load::Loader};
+use crate::{
+    cli::Failure,
+    daemon::{self, Daemon, Handle, Journal, JournalThread, OpenPort, Order, Resources},
+    host_gpio::NoGpio,
+    link::{Holders, LinkError},
+    mock::{MemorySocket, MockPort, Note, Pace},
+    server::{Access, Server},
+    supervisor::{Supervisor, Task},
+};
+
+/// A daemon that runs within the calling program: without sockets, signals and messages on standard error.
+///
+/// Requests go through [`router`](Self::router). The device is a mock in memory (`--mock`), the simulated array of
+/// `--simulate`, or whatever is plugged into [`socket`](Self::socket). A single-threaded tokio runtime with a paused
+/// clock can run it, so that tests wait for no real second.
+pub struct EmbeddedDaemon {
+    /// Handle for orders and state.
+    pub handle: Handle,
+    /// HTTP API; requests carry a [`Peer`](crate::server::Peer) as an extension.
+    pub router: Router,
+    /// Port that the daemon opens, whatever `device.port` is.
+    pub socket: MemorySocket,
+    loader: Loader,
+    daemon: Daemon,
+    log: JournalThread,
+    supervisor: Supervisor,
+}
+
+impl EmbeddedDaemon {
+    /// Prepares a daemon with the options of `sonard run`. Must be called within a tokio runtime.
+    ///
+    /// # Errors
+    /// Those of `sonard run`: wrong options, configuration or files, or a log that can't be written.
+    pub fn from_options<T: AsRef<OsStr>>(options: &[T]) -> Result<Self, Failure> {
+        let command = Args::augment_args(Command::new("run").no_binary_name(true));
+        let matches = command.try_get_matches_from(options.iter().map(AsRef::as_ref));
+        let args = matches.and_then(|matches| Args::from_arg_matches(&matches));
+        let args = args.map_err(|error| Failure::input(error, "see `sonard run --help`"))?;
+        let (plays_mock, virtual_time, world) = (args.mock, args.virtual_time, args.world.clone());
+        let mut loader = Loader::new(args);
+        if !plays_mock {
+            loader.fix_port("memory".to_owned());
+        }
+        let (settings, files) = loader.load()?;
+        let supervisor = Supervisor::default();
+        let socket = MemorySocket::default();
+        if plays_mock {
+            let pace = if virtual_time { Pace::Virtual } else { Pace::RealTime };
+            let port =
+                MockPort::in_memory(super::mock::board(&world, pace, &settings)?, socket.clone());
+            let stop = supervisor.stopping().clone().cancelled_owned();
+            let note = |note: Note| tracing::debug!("mock: {note}");
+            drop(
+                supervisor
+                    .spawn_finite(Task::Mock, async move { drop(port.run(stop, note).await) }),
+            );
+        }
+        let keys = settings.keys.clone();
+        let log_folder = PathBuf::from(&keys.log.folder);
+        let (journal, log) = Journal::open(&log_folder, settings.rotation(), &supervisor)
+            .map_err(|error| Failure::device(error, "see log.folder"))?;
+        let (daemon, handle) = match settings.simulated {
+            Some(_) => daemon::prepare_simulated(journal, supervisor.clone(), settings),
+            None => {
+                let open_port = open_memory(socket.clone());
+                let gpio = Box::new(NoGpio);
+                let resources =
+                    Resources { open_port, gpio, journal, supervisor: supervisor.clone() };
+                daemon::prepare(resources, settings)
+            }
+        };
+        let access = Access::new(&keys.server.hosts, files.token.as_deref());
+        let server = Server::new(handle.clone(), log_folder, access, &keys, files.fleet);
+        Ok(Self { handle, router: server.router(), socket, loader, daemon, log, supervisor })
+    }
+
+    /// Separates the daemon's work from what controls it.
+    #[must_use]
+    pub fn split(self) -> (EmbeddedControl, impl Future<Output = Result<(), String>> + Send) {
+        let Self { handle, router, socket, loader, daemon, log, supervisor } = self;
+        let stop = CancellationToken::new();
+        let stopped = stop.clone().cancelled_owned();
+        let work = async move {
+            let outcome = daemon.run(stopped).await.map_err(|failure| failure.to_string());
+            supervisor.stopping().cancel();
+            let last = tokio::task::spawn_blocking(|| log.close()).await.unwrap_or_default();
+            outcome.and_then(|()| last.error.map_or(Ok(()), Err))
+        };
+        (EmbeddedControl { handle, router, socket, loader, stop }, work)
+    }
+}
+
+/// Controls of an [`EmbeddedDaemon`] that runs.
+pub struct EmbeddedControl {
+    /// Handle for orders and state.
+    pub handle: Handle,
+    /// HTTP API.
+    pub router: Router,
+    /// Port that the daemon opens.
+    pub socket: MemorySocket,
+    loader: Loader,
+    stop: CancellationToken,
+}
+
+impl EmbeddedControl {
+    /// Ends the daemon in order: motor stopped, scan closed, log synced.
+    pub fn stop(&self) {
+        self.stop.cancel();
+    }
+
+    /// Reads the configuration again, as `sonard run` does at SIGHUP.
+    ///
+    /// # Errors
+    /// A daemon that is stopping takes no configuration. A configuration with errors is reported by the daemon.
+    pub async fn reload(&mut self) -> Result<(), String> {
+        let loaded = self.loader.load().map(|(settings, _files)| Box::new(settings));
+        let loaded = loaded.map_err(|failure| super::load::words(&failure));
+        let ordered = self.handle.order(Order::Reload(loaded)).await;
+        ordered.map_err(|refusal| refusal.message)
+    }
+}
+
+fn open_memory(socket: MemorySocket) -> OpenPort {
+    Box::new(move |port| match socket.connect() {
+        Ok(stream) => Ok(Box::new(stream)),
+        Err(error) if error.kind() == io::ErrorKind::NotFound => {
+            Err(LinkError::NotFound { port: port.to_owned(), present: Ok(Vec::new()) })
+        }
+        Err(error) if error.kind() == io::ErrorKind::ResourceBusy => {
+            Err(LinkError::Busy { port: port.into(), holders: Holders::default() })
+        }
+        Err(source) => Err(LinkError::Io { port: port.into(), source }),
+    })
+}
