@@ -20,6 +20,7 @@ use sonard::{
     geometry::Pose,
     scan::{ScanPlan, Session},
 };
+use sonard_test_support::in_process::Daemon as InProcess;
 
 use super::{Daemon, clean_log, logs, schema::misfits};
 use crate::common::{run, stderr, wait_until};
@@ -167,7 +168,7 @@ fn every_answer_is_read_by_the_type_it_is_written_by() {
         assert_eq!(serde_json::from_str::<Value>(&written).expect("JSON"), *answer, "{path}");
     }
     let folder = tempfile::tempdir().expect("a folder");
-    let daemon = Daemon::start_mock(folder.path(), &SHORT);
+    let daemon = InProcess::start_mock(folder.path(), &SHORT);
     daemon.wait_for("ready");
     same::<Started>("/v1/start", &daemon.send("POST", "/v1/start", r#"{"scans":1}"#).json());
     daemon.wait_for_scans(1);
@@ -194,7 +195,7 @@ fn every_answer_is_read_by_the_type_it_is_written_by() {
     check(&scan, same::<WholeScan>);
     check(&format!("{scan}/beams/7"), same::<Beam>);
     check(&format!("{scan}/scene"), same::<FloorPlan>);
-    assert_eq!(daemon.stop(), Some(0));
+    daemon.stop();
 }
 
 /// Both forms of a stream carry what the document says.
@@ -230,7 +231,7 @@ fn check_stream(daemon: &Daemon, path: &str, content: &Value, document: &Value) 
 #[test]
 fn past_scans_and_their_beams_are_read_from_the_logs() {
     let folder = tempfile::tempdir().expect("a folder");
-    let daemon = Daemon::start_mock(folder.path(), &SHORT);
+    let daemon = InProcess::start_mock(folder.path(), &SHORT);
     daemon.wait_for("ready");
     assert_eq!(daemon.get("/v1/scans").json(), json!([]));
     assert_eq!(daemon.send("POST", "/v1/start", r#"{"scans":2}"#).status, 202);

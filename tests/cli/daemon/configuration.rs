@@ -2,10 +2,10 @@
 
 use std::{fs, os::unix::fs::PermissionsExt as _};
 
-use rustix::process::Signal;
+use sonard_test_support::in_process::Daemon as InProcess;
 
 use super::{Daemon, clean_log, logs, write_token};
-use crate::common::{run, sonard, stderr, wait_until};
+use crate::common::{run, sonard, stderr};
 
 #[test]
 fn the_shipped_file_is_what_the_program_prints_and_it_is_right() {
@@ -104,12 +104,12 @@ fn a_robot_is_called_as_its_host_unless_it_has_a_name_and_says_so_everywhere() {
     let host = rustix::system::uname();
     let host = host.nodename().to_str().expect("plain");
     let folder = tempfile::tempdir().expect("a folder");
-    let daemon = Daemon::start_mock(folder.path(), &["--set", "plan.to_deg=9"]);
+    let daemon = InProcess::start_mock(folder.path(), &["--set", "plan.to_deg=9"]);
     assert_eq!(daemon.status()["robot"], host);
-    assert_eq!(daemon.stop(), Some(0));
+    daemon.stop();
 
     let named = ["--set", "plan.to_deg=9", "--set", "fleet.robot=kiwi-7"];
-    let daemon = Daemon::start_mock(folder.path(), &named);
+    let daemon = InProcess::start_mock(folder.path(), &named);
     assert_eq!(daemon.status()["robot"], "kiwi-7");
     let figures = String::from_utf8(daemon.get("/metrics").body).expect("text");
     let info = format!(
@@ -121,7 +121,7 @@ fn a_robot_is_called_as_its_host_unless_it_has_a_name_and_says_so_everywhere() {
     assert_eq!(daemon.send("POST", "/v1/start", r#"{"scans":1}"#).status, 202);
     daemon.wait_for_scans(1);
     assert_eq!(daemon.get("/v1/session").json()["robot"], "kiwi-7");
-    assert_eq!(daemon.stop(), Some(0));
+    daemon.stop();
     let log = clean_log(folder.path());
     let session = log.of_type("session").next().expect("a session");
     assert_eq!(session["robot"], "kiwi-7");
@@ -136,23 +136,23 @@ fn a_hangup_takes_changes_in_and_a_wrong_file_changes_nothing() {
     let file = folder.path().join("s.toml");
     fs::write(&file, "[plan]\nto_deg = 90\n").expect("a file");
     let config = ["--config", file.to_str().expect("plain path")];
-    let daemon = Daemon::start_mock(folder.path(), &config);
+    let mut daemon = InProcess::start_mock(folder.path(), &config);
     assert_eq!(daemon.status()["plan"]["to_deg"], 90.0);
 
     fs::write(&file, "[plan]\nto_deg = 45\n[server]\nmax_clients = 7\n").expect("a file");
-    daemon.signal(Signal::HUP);
-    wait_until("the new plan", || daemon.status()["plan"]["to_deg"] == 45.0);
+    daemon.reload();
+    daemon.wait_until("the new plan", || daemon.status()["plan"]["to_deg"] == 45.0);
     let configuration = &daemon.status()["configuration"];
     assert_eq!(configuration["needs_restart"], serde_json::json!(["server"]));
 
     fs::write(&file, "[plan]\nto_dge = 30\n").expect("a file");
-    daemon.signal(Signal::HUP);
-    wait_until("the refusal", || daemon.status()["configuration"]["error"].is_string());
+    daemon.reload();
+    daemon.wait_until("the refusal", || daemon.status()["configuration"]["error"].is_string());
     let status = daemon.status();
     assert_eq!(status["plan"]["to_deg"], 45.0);
     let error = status["configuration"]["error"].as_str().expect("text");
     assert!(error.contains("s.toml:2:1") && error.contains("to_deg"), "{error}");
-    assert_eq!(daemon.stop(), Some(0));
+    daemon.stop();
 }
 
 #[test]

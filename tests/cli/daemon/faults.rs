@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use serde_json::json;
 use sonard::mock::Pace;
+use sonard_test_support::in_process::{Daemon as InProcess, RIG_OPTIONS};
 
 use super::{
     Daemon, clean_log, logs,
@@ -84,9 +85,9 @@ fn what_is_wrong_with_a_port_or_device_is_told_apart() {
 #[test]
 fn another_ranger_than_the_configured_one_is_refused() {
     let folder = tempfile::tempdir().expect("a folder");
-    let mut rig = Rig::new(folder.path(), Pace::Virtual);
-    rig.plug("", 1);
-    let daemon = start(&rig, folder.path(), &["--set", "device.serial=SONARD-0007"]);
+    let serial = ["--set", "device.serial=SONARD-0007"];
+    let mut daemon = InProcess::start(folder.path(), &[&RIG_OPTIONS[..], &serial].concat());
+    daemon.plug("", 1, Pace::Virtual);
     daemon.wait_for("wrong_device");
     let trouble = daemon.status()["link"]["trouble"].clone();
     assert!(

@@ -8,8 +8,9 @@ use std::{
 
 use serde_json::{Value, json};
 use sonard::api::Location;
+use sonard_test_support::in_process::Daemon as InProcess;
 
-use super::Daemon;
+use super::{Daemon, Reply};
 use crate::common::{run, stderr};
 
 /// A room whose ends look alike turned by half, with a short wall near its middle that does not.
@@ -72,8 +73,8 @@ fn assert_same(location: &Location, listed: &[Value]) {
 }
 
 /// The scans of a daemon's logs, oldest first.
-fn scans(daemon: &Daemon) -> Vec<String> {
-    let scans = daemon.get("/v1/scans?limit=500").json();
+fn scans(list: &Reply) -> Vec<String> {
+    let scans = list.json();
     let of = |scan: &Value| scan["scan"].as_str().expect("an id").to_owned();
     scans.as_array().expect("a list").iter().rev().map(of).collect()
 }
@@ -82,8 +83,8 @@ fn scans(daemon: &Daemon) -> Vec<String> {
 fn scans_are_located_as_by_the_program_and_along_their_way() {
     let folder = tempfile::tempdir().expect("a folder");
     let log = simulated(folder.path(), 1, ROOM, WAY, &["--step-deg", "4", "--max-range", "1.5"]);
-    let daemon = Daemon::start_mock(folder.path(), &["--set", "scanning.mode=on-request"]);
-    let scans = scans(&daemon);
+    let daemon = InProcess::start_mock(folder.path(), &["--set", "scanning.mode=on-request"]);
+    let scans = scans(&daemon.get("/v1/scans?limit=500"));
     assert_eq!(scans.len(), 3);
     let alone = located(&log, &[]);
     let last = daemon.get(&format!("/v1/scans/{}/location", scans[2]));
@@ -127,8 +128,8 @@ fn what_can_not_be_located_is_said_with_the_reason() {
     let folder = tempfile::tempdir().expect("a folder");
     let short = ["--step-deg", "90", "--max-range", "1.5"];
     simulated(folder.path(), 1, ROOM, "2.2,0.4,5\n", &short);
-    let daemon = Daemon::start_mock(folder.path(), &["--set", "scanning.mode=on-request"]);
-    let scan = &scans(&daemon)[0];
+    let daemon = InProcess::start_mock(folder.path(), &["--set", "scanning.mode=on-request"]);
+    let scan = &scans(&daemon.get("/v1/scans?limit=500"))[0];
     let refused = daemon.get(&format!("/v1/scans/{scan}/location"));
     assert_eq!(refused.status, 409);
     assert!(refused.json()["error"].as_str().expect("words").contains("at least 8"));
@@ -144,7 +145,7 @@ fn one_client_at_a_time_is_answered_and_none_that_has_left() {
     simulated(folder.path(), 1, &hall(), "4.8,9.3,0\n", &["--step-deg", "9"]);
     simulated(folder.path(), 2, ROOM, "2.2,0.4,5\n", &["--step-deg", "9", "--max-range", "1.5"]);
     let daemon = Daemon::start_mock(folder.path(), &["--set", "scanning.mode=on-request"]);
-    let scans = scans(&daemon);
+    let scans = scans(&daemon.get("/v1/scans?limit=500"));
     let [hall, room] = [&scans[0], &scans[1]].map(|scan| format!("/v1/scans/{scan}/location"));
     let mut first = daemon.connect().expect("it listens");
     write!(first, "GET {hall} HTTP/1.1\r\nHost: localhost\r\n\r\n").expect("it listens");

@@ -4,8 +4,9 @@ use std::fs;
 
 use serde_json::{Value, json};
 use sonard::api::{Findings, WholeScan};
+use sonard_test_support::in_process::{Daemon, start_array};
 
-use super::{Daemon, start_array, write_scans};
+use super::write_scans;
 use crate::common::{run, stderr};
 
 /// A full turn of a hundred beams.

@@ -2,7 +2,8 @@
 
 use std::collections::BTreeSet;
 
-use super::{Daemon, ask};
+use sonard::server::Peer;
+use sonard_test_support::in_process::Daemon;
 
 const FILES: [(&str, &str); 3] = [
     ("grafana-sonard.json", include_str!("../../../config/monitoring/grafana-sonard.json")),
@@ -74,8 +75,7 @@ fn format_follows_accept() {
     let daemon = Daemon::start_mock(folder.path(), &[]);
     daemon.wait_for("ready");
     let get = |accept: &str| {
-        let headers = [("Host", "localhost"), ("Accept", accept)];
-        let reply = ask(daemon.connect().expect("it listens"), "GET", "/metrics", &headers, "");
+        let reply = daemon.request(Peer::Unix, "GET", "/metrics", &[("accept", accept)], "");
         (reply.head, String::from_utf8(reply.body).expect("text"))
     };
     for accept in ["*/*", "application/openmetrics-text;q=0.5,text/plain;version=0.0.4;q=0.3"] {

@@ -4,11 +4,11 @@
 use std::{
     io::{BufRead as _, BufReader, Write as _},
     process::Stdio,
-    thread,
     time::Duration,
 };
 
 use serde_json::{Value, json};
+use sonard_test_support::in_process::Daemon as InProcess;
 
 use super::{Daemon, write_token};
 use crate::common::{Log, interrupt, sonard, stderr, wait_until};
@@ -116,11 +116,11 @@ fn over_tcp_a_scan_needs_the_token_and_a_look_does_not() {
 #[test]
 fn air_from_a_program_is_forgotten_on_request() {
     let folder = tempfile::tempdir().expect("a folder");
-    let daemon = Daemon::start_mock(folder.path(), &SHORT);
+    let daemon = InProcess::start_mock(folder.path(), &SHORT);
     assert_eq!(daemon.send("PUT", "/v1/air", r#"{"temperature_c":25}"#).status, 202);
-    wait_until("the air", || daemon.get("/v1/air").json()["source"] == "api");
+    daemon.wait_until("the air", || daemon.get("/v1/air").json()["source"] == "api");
     assert_eq!(daemon.send("DELETE", "/v1/air", "").status, 202);
-    wait_until("its own air", || daemon.get("/v1/air").json()["source"] == "configuration");
+    daemon.wait_until("its own air", || daemon.get("/v1/air").json()["source"] == "configuration");
     let air = daemon.get("/v1/air").json();
     assert_eq!((&air["temperature_c"], &air["age_s"]), (&json!(20.0), &Value::Null));
     let setup = daemon.get("/v1/setup").json();
@@ -129,7 +129,7 @@ fn air_from_a_program_is_forgotten_on_request() {
         (&setup["sensor"]["name"], &setup["thermometer"]),
         (&json!("senscomp-6500"), &json!(false))
     );
-    assert_eq!(daemon.stop(), Some(0));
+    daemon.stop();
 }
 
 #[test]
@@ -158,7 +158,7 @@ fn an_interrupt_and_a_stop_end_the_wait_for_a_scan() {
 #[test]
 fn the_mode_can_be_changed_while_it_runs() {
     let folder = tempfile::tempdir().expect("a folder");
-    let daemon = Daemon::start_mock(folder.path(), &SHORT);
+    let daemon = InProcess::start_mock(folder.path(), &SHORT);
     daemon.wait_for("ready");
     assert_eq!(daemon.get("/v1/scanning").json(), json!({"mode": "on-request", "every_s": 60.0}));
     assert_eq!(daemon.send("PUT", "/v1/scanning", r#"{"mode":"continuous"}"#).status, 202);
@@ -166,9 +166,11 @@ fn the_mode_can_be_changed_while_it_runs() {
     let scheduled = r#"{"mode":"schedule","every_s":3600}"#;
     assert_eq!(daemon.send("PUT", "/v1/scanning", scheduled).status, 202);
     // The schedule begins at once, and then waits for an hour.
-    wait_until("the wait", || daemon.status()["scanning"]["next_in_s"].as_f64() > Some(3500.0));
+    daemon.wait_until("the wait", || {
+        daemon.status()["scanning"]["next_in_s"].as_f64() > Some(3500.0)
+    });
     assert_eq!(daemon.send("PUT", "/v1/scanning", r#"{"mode":"on-request"}"#).status, 202);
-    wait_until("rest", || daemon.status()["scan"].is_null());
+    daemon.wait_until("rest", || daemon.status()["scan"].is_null());
     let status = daemon.status();
     assert_eq!(
         (&status["scanning"]["mode"], &status["scanning"]["every_s"]),
@@ -183,25 +185,25 @@ fn the_mode_can_be_changed_while_it_runs() {
     }
     let unknown = format!(r#"{{"request":"{}"}}"#, "6ba7b810-9dad-11d1-80b4-00c04fd430c8");
     assert_eq!(daemon.send("POST", "/v1/cancel", &unknown).status, 404);
-    assert_eq!(daemon.stop(), Some(0));
+    daemon.stop();
 }
 
 #[test]
 fn the_figures_of_the_line_go_on_within_a_scan() {
     let folder = tempfile::tempdir().expect("a folder");
-    let daemon = Daemon::start_mock(folder.path(), &["--set", "model.max_range_m=4"]);
+    let daemon = InProcess::start_mock(folder.path(), &["--set", "model.max_range_m=4"]);
     daemon.wait_for("ready");
     assert_eq!(daemon.send("POST", "/v1/start", r#"{"scans":1}"#).status, 202);
     let done = || daemon.status()["scan"]["done"].as_u64();
-    wait_until("beams", || done() > Some(3));
+    daemon.wait_until("beams", || done() > Some(3));
     let mut received = Vec::new();
     for _ in 0..4 {
         received.push(daemon.health()["line"]["bytes_received"].as_u64().expect("a count"));
-        thread::sleep(Duration::from_millis(300));
+        daemon.pass(Duration::from_millis(300));
     }
     assert!(done() < Some(400), "still the same scan");
     assert!(received.windows(2).all(|pair| pair[1] > pair[0]), "{received:?}");
-    assert_eq!(daemon.stop(), Some(0));
+    daemon.stop();
 }
 
 #[test]

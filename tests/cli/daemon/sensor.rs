@@ -2,11 +2,10 @@
 
 use std::fs;
 
-use rustix::process::Signal;
 use serde_json::{Value, json};
+use sonard_test_support::in_process::{Daemon, start_array};
 
-use super::{Daemon, clean_log, start_array};
-use crate::common::wait_until;
+use super::clean_log;
 
 const TURN: [&str; 4] = ["--set", "plan.step_deg=3.6", "--set", "model.max_range_m=3"];
 
@@ -53,7 +52,7 @@ fn a_sensor_is_previewed_pending_in_force_and_given_back() {
     }
     // While a scan is under way it waits for the next one.
     assert_eq!(daemon.send("POST", "/v1/start", r#"{"scans":1}"#).status, 202);
-    wait_until("a scan", || daemon.status()["scan"]["done"].as_u64() > Some(2));
+    daemon.wait_until("a scan", || daemon.status()["scan"]["done"].as_u64() > Some(2));
     assert_eq!(daemon.send("PUT", "/v1/sensor", &deaf.to_string()).status, 202);
     let status = daemon.status();
     assert_eq!(status["sensor"]["threshold"], own["threshold"]);
@@ -78,7 +77,7 @@ fn a_sensor_is_previewed_pending_in_force_and_given_back() {
         .of_type("ping")
         .filter(|ping| ping["scan"] == scans[1]["scan"] && ping["sim"]["status"] == "echo");
     assert_eq!(predicted.count(), then);
-    assert_eq!(daemon.stop(), Some(0));
+    daemon.stop();
 }
 
 #[test]
@@ -87,7 +86,7 @@ fn a_sensor_is_refused_where_device_or_configuration_says_otherwise() {
     let file = folder.path().join("s.toml");
     fs::write(&file, "[model]\nthreshold = 0.03\n").expect("there is room");
     let with_file = ["--config", file.to_str().expect("plain path")];
-    let daemon = Daemon::start_mock(folder.path(), &[&TURN[..], &with_file].concat());
+    let mut daemon = Daemon::start_mock(folder.path(), &[&TURN[..], &with_file].concat());
     daemon.wait_for("ready");
     for (body, status, words) in [
         (r#"{"preset":"ear"}"#, 422, "no sensor preset"),
@@ -105,20 +104,19 @@ fn a_sensor_is_refused_where_device_or_configuration_says_otherwise() {
     assert_eq!(daemon.status()["pending"]["sensor"], Value::Null);
     assert_eq!(daemon.send("PUT", "/v1/sensor", r#"{"blanking_us":900}"#).status, 202);
     // A configuration that is read again leaves it, unless it says something else of the sensor.
-    let blanking = || daemon.get("/v1/sensor").json()["blanking_us"].clone();
     for (text, blanking_us) in
         [("[model]\nthreshold = 0.04\n", 900.0), ("[model]\nsensor = \"polaroid-chirp\"\n", 1600.0)]
     {
         fs::write(&file, text).expect("there is room");
-        daemon.signal(Signal::HUP);
-        wait_until(text, || {
+        daemon.reload();
+        daemon.wait_until(text, || {
             let model = daemon.get("/v1/setup").json()["model"].clone();
             text.contains("sensor") == (model["sensor"] == "polaroid-chirp")
                 && (text.contains("sensor") || model["threshold"] == 0.04)
         });
-        assert_eq!(blanking(), blanking_us, "{text}");
+        assert_eq!(daemon.get("/v1/sensor").json()["blanking_us"], blanking_us, "{text}");
     }
-    assert_eq!(daemon.stop(), Some(0));
+    daemon.stop();
 }
 
 #[test]
@@ -152,7 +150,7 @@ fn preview_rejects_what_an_order_is_rejected_for() {
             assert_eq!(previewed.json(), ordered.json(), "{request}");
         }
     }
-    assert_eq!(daemon.stop(), Some(0));
+    daemon.stop();
 }
 
 #[test]
@@ -172,9 +170,9 @@ fn an_array_is_previewed_and_its_rangers_are_another_sensor_from_the_next_round_
     // What a round then reads is what was previewed.
     let newest = || daemon.get("/v1/scan/latest").json();
     let session = || daemon.get("/v1/session").json();
-    wait_until("a round by it", || session()["sensor"]["threshold"] == 0.5);
+    daemon.wait_until("a round by it", || session()["sensor"]["threshold"] == 0.5);
     let before = newest()["start"]["scan"].clone();
-    wait_until("another round", || newest()["start"]["scan"] != before);
+    daemon.wait_until("another round", || newest()["start"]["scan"] != before);
     let scan = newest();
     let id = scan["start"]["scan"].as_str().expect("an id");
     let whole = daemon.get(&format!("/v1/scans/{id}")).json();
@@ -190,5 +188,5 @@ fn an_array_is_previewed_and_its_rangers_are_another_sensor_from_the_next_round_
     }
     let plan = r#"{"plan":{"from_deg":0,"to_deg":9,"step_deg":0.9,"pings_per_stop":1}}"#;
     assert_eq!(daemon.send("POST", "/v1/preview", plan).status, 409);
-    assert_eq!(daemon.stop(), Some(0));
+    daemon.stop();
 }

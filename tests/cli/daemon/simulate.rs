@@ -10,8 +10,8 @@ use std::{
 };
 
 use jiff::Timestamp;
-use rustix::process::Signal;
 use serde_json::{Value, json};
+use sonard_test_support::in_process::Daemon as InProcess;
 
 use super::{Daemon, clean_log, logs};
 use crate::common::{Log, run, sonard, stderr, wait_until};
@@ -21,6 +21,12 @@ const IDS: [&str; 8] = ["s0", "s1", "s2", "s3", "s4", "s5", "s6", "s7"];
 fn start(folder: &Path, further: &[&str]) -> Daemon {
     let array = ["--simulate", "--array", "pioneer-8", "--scene", "mcgill-lab"];
     Daemon::start(folder, &[&array, further].concat())
+}
+
+/// An array in the laboratory, within the test's process.
+fn in_process(folder: &Path, pose: &[&str], further: &[&str]) -> InProcess {
+    let array = ["--simulate", "--array", "pioneer-8", "--scene", "mcgill-lab"];
+    InProcess::start(folder, &[&array, pose, further].concat())
 }
 
 /// One in the laboratory, standing.
@@ -63,7 +69,7 @@ fn predicted(pose: &str) -> Vec<(Value, Value)> {
 }
 
 /// What the daemon says that its rangers read.
-fn told(daemon: &Daemon) -> Vec<(Value, Value)> {
+fn told(daemon: &InProcess) -> Vec<(Value, Value)> {
     let status = daemon.status();
     let readings = status["simulation"]["readings"].as_array().expect("an array").clone();
     readings.iter().map(|reading| (reading["status"].clone(), reading["range_m"].clone())).collect()
@@ -111,7 +117,7 @@ fn sonars_fire_in_turn_and_every_record_is_marked_simulated() {
 #[test]
 fn a_pose_set_shows_in_readings_that_are_those_of_sonard_simulate() {
     let folder = tempfile::tempdir().expect("a folder");
-    let daemon = standing(folder.path(), &[]);
+    let daemon = in_process(folder.path(), &["--pose", "3,1.2,20"], &[]);
     daemon.wait_for_scans(1);
     assert_eq!(told(&daemon), predicted("3,1.2,20"));
     for pose in ["2.2,1.4,110", "2.2,1.4,-70"] {
@@ -137,7 +143,7 @@ fn a_pose_set_shows_in_readings_that_are_those_of_sonard_simulate() {
             reply.json()
         );
     }
-    assert_eq!(daemon.stop(), Some(0));
+    daemon.stop();
     clean_log(folder.path());
 }
 
@@ -187,17 +193,18 @@ fn a_robot_drives_along_its_course_and_its_log_says_where_each_sonar_fired() {
     let text = line(0.0, 2.0, 1.2, 0.0) + &line(3.0, 3.2, 1.2, 0.0) + &line(5.0, 3.2, 1.2, 90.0);
     fs::write(&course, text).expect("writes");
     let setting = format!("simulate.course={}", course.display());
-    let daemon = start(folder.path(), &["--set", &setting]);
+    let daemon = in_process(folder.path(), &[], &["--set", &setting]);
     daemon.wait_for_scans(1);
     assert_eq!(daemon.status()["simulation"]["driving"], true);
-    wait_until("the end of the course", || daemon.status()["simulation"]["driving"] == false);
+    daemon
+        .wait_until("the end of the course", || daemon.status()["simulation"]["driving"] == false);
     let skipped = daemon.status()["simulation"]["skipped"].clone();
     let pose = daemon.get("/v1/pose").json();
     assert_eq!(pose, json!({"x_m": 3.2, "y_m": 1.2, "heading_deg": 90.0}));
     let scans = daemon.health()["scans"]["completed"].as_u64().expect("a count");
     daemon.wait_for_scans(scans + 2);
     assert_eq!(told(&daemon), predicted("3.2,1.2,90"));
-    assert_eq!(daemon.stop(), Some(0));
+    daemon.stop();
     println!("{skipped} turns left out");
 
     let log = clean_log(folder.path());
@@ -218,9 +225,10 @@ fn a_robot_drives_along_its_course_and_its_log_says_where_each_sonar_fired() {
 #[test]
 fn rounds_are_taken_on_request_and_stop_when_told() {
     let folder = tempfile::tempdir().expect("a folder");
-    let daemon = standing(folder.path(), &["--set", "scanning.mode=on-request"]);
+    let daemon =
+        in_process(folder.path(), &["--pose", "3,1.2,20"], &["--set", "scanning.mode=on-request"]);
     daemon.wait_for("ready");
-    std::thread::sleep(Duration::from_millis(500));
+    daemon.pass(Duration::from_millis(500));
     assert_eq!(daemon.get("/v1/scan/latest").status, 404, "nothing is played unasked");
     assert_eq!(daemon.send("POST", "/v1/start", r#"{"scans":3}"#).status, 202);
     daemon.wait_for_scans(3);
@@ -231,9 +239,9 @@ fn rounds_are_taken_on_request_and_stop_when_told() {
     assert_eq!(daemon.send("POST", "/v1/stop", "").status, 202);
     daemon.wait_for("ready");
     let scans = daemon.health()["scans"].clone();
-    std::thread::sleep(Duration::from_millis(600));
+    daemon.pass(Duration::from_millis(600));
     assert_eq!(daemon.health()["scans"], scans, "it stays stopped");
-    assert_eq!(daemon.stop(), Some(0));
+    daemon.stop();
     let log = clean_log(folder.path());
     assert!(log.events().iter().any(|event| event.contains("on request")), "{:?}", log.events());
 }

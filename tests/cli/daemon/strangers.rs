@@ -4,15 +4,17 @@ use std::collections::BTreeSet;
 
 use serde_json::Value;
 use sonard::mock::Pace;
+use sonard_test_support::in_process::{Daemon, RIG_OPTIONS};
 
-use super::{Daemon, clean_log, rig::Rig};
-use crate::common::{Log, wait_until};
+use super::clean_log;
+use crate::common::Log;
 
-/// A daemon that scans without end on a rig.
-fn start(rig: &Rig, folder: &std::path::Path, further: &[&str]) -> Daemon {
-    let options = rig.options();
-    let options: Vec<&str> = options.iter().map(String::as_str).collect();
-    Daemon::start(folder, &[&options[..], &["--set", "scanning.mode=continuous"], further].concat())
+/// A continuously scanning daemon with a board in virtual time.
+fn start(folder: &std::path::Path, faults: &str, further: &[&str]) -> Daemon {
+    let options = [&RIG_OPTIONS[..], &["--set", "scanning.mode=continuous"], further].concat();
+    let mut daemon = Daemon::start(folder, &options);
+    daemon.plug(faults, 1, Pace::Virtual);
+    daemon
 }
 
 /// Checks each reading against the session that it stands in; how many sessions of each kind had
@@ -49,11 +51,10 @@ fn a_board_that_comes_back_as_another_begins_a_session_of_its_own() {
         ("emulator", "MOCK-00001 emulator 400", "-SIMULATED"),
     ] {
         let folder = tempfile::tempdir().expect("a folder");
-        let mut rig = Rig::new(folder.path(), Pace::Virtual);
-        rig.plug(&format!("reset=0.01,lie={lie}"), 1);
-        let daemon = start(&rig, folder.path(), &["--set", "plan.step_deg=1.8"]);
-        wait_until("scans", || daemon.health()["scans"]["completed"].as_u64() >= Some(3));
-        assert_eq!(daemon.stop(), Some(0));
+        let faults = format!("reset=0.01,lie={lie}");
+        let daemon = start(folder.path(), &faults, &["--set", "plan.step_deg=1.8"]);
+        daemon.wait_until("scans", || daemon.health()["scans"]["completed"].as_u64() >= Some(3));
+        daemon.stop();
         let log = clean_log(folder.path());
         let kinds = sessions_of_readings(&log);
         let first = "MOCK-00001 mock 400".to_owned();
@@ -65,16 +66,15 @@ fn a_board_that_comes_back_as_another_begins_a_session_of_its_own() {
 #[test]
 fn another_board_is_refused_where_one_is_named_also_after_a_restart() {
     let folder = tempfile::tempdir().expect("a folder");
-    let mut rig = Rig::new(folder.path(), Pace::Virtual);
-    rig.plug("reset=0.01,lie=other-serial", 1);
-    let daemon = start(&rig, folder.path(), &["--set", "device.serial=MOCK-00001"]);
+    let serial = ["--set", "device.serial=MOCK-00001"];
+    let daemon = start(folder.path(), "reset=0.01,lie=other-serial", &serial);
     daemon.wait_for("wrong_device");
-    wait_until("the name", || {
+    daemon.wait_until("the name", || {
         let trouble = daemon.status()["link"]["trouble"].clone();
         trouble.as_str().is_some_and(|trouble| trouble.contains("not MOCK-00001"))
     });
-    std::thread::sleep(std::time::Duration::from_secs(1));
-    assert_eq!(daemon.stop(), Some(0));
+    daemon.pass(std::time::Duration::from_secs(1));
+    daemon.stop();
     let kinds = sessions_of_readings(&clean_log(folder.path()));
     assert_eq!(kinds, BTreeSet::from(["MOCK-00001 mock 400".to_owned()]));
 }
@@ -83,12 +83,10 @@ fn another_board_is_refused_where_one_is_named_also_after_a_restart() {
 fn a_restart_or_hangup_in_the_home_after_a_scan_is_what_it_is() {
     for faults in ["motor_reset=0.2", "motor_hangup=0.2"] {
         let folder = tempfile::tempdir().expect("a folder");
-        let mut rig = Rig::new(folder.path(), Pace::Virtual);
-        rig.plug(faults, 1);
         // One beam at home: the motor only ever goes home, before and after.
-        let daemon = start(&rig, folder.path(), &["--set", "plan.to_deg=0.9"]);
-        wait_until("scans", || daemon.health()["scans"]["completed"].as_u64() >= Some(20));
-        assert_eq!(daemon.stop(), Some(0));
+        let daemon = start(folder.path(), faults, &["--set", "plan.to_deg=0.9"]);
+        daemon.wait_until("scans", || daemon.health()["scans"]["completed"].as_u64() >= Some(20));
+        daemon.stop();
         let log = clean_log(folder.path());
         let events = log.events();
         assert!(events.iter().any(|event| event.contains("could not go home")), "{events:?}");

@@ -3,16 +3,17 @@
 use std::io::{BufRead as _, BufReader, Write as _};
 
 use serde_json::Value;
+use sonard_test_support::in_process;
 
-use super::{Daemon, start_ahead, start_array};
+use super::{Reply, start_ahead};
 use crate::common::wait_until;
 
-/// The newest scan that is over.
-fn newest(daemon: &Daemon) -> Value {
-    let scans = daemon.get("/v1/scans").json();
+/// The newest scan that has ended, by a function that sends GET requests.
+fn newest(get: impl Fn(&str) -> Reply) -> Value {
+    let scans = get("/v1/scans").json();
     let over = scans.as_array().expect("scans").iter().find(|scan| !scan["end"].is_null());
     let id = over.expect("a scan that is over")["scan"].as_str().expect("an id").to_owned();
-    daemon.get(&format!("/v1/scans/{id}")).json()
+    get(&format!("/v1/scans/{id}")).json()
 }
 
 fn point(of: &Value) -> [f64; 2] {
@@ -31,11 +32,11 @@ fn viewpoint(reading: &Value) -> ([f64; 2], f64) {
 
 /// That each path begins and ends at its reading's transducer, and that half of it is the range but for
 /// what `late_m` allows, of how far the echo is over its threshold in decibels. Returns how many were heard.
-fn check_paths(daemon: &Daemon, whole: &Value, late_m: impl Fn(f64) -> f64) -> usize {
+fn check_paths(get: impl Fn(&str) -> Reply, whole: &Value, late_m: impl Fn(f64) -> f64) -> usize {
     let mut heard = 0;
     for reading in whole["pings"].as_array().expect("readings") {
         let scan = reading["scan"].as_str().expect("an id");
-        let beam = daemon.get(&format!("/v1/scans/{scan}/beams/{}", reading["index"])).json();
+        let beam = get(&format!("/v1/scans/{scan}/beams/{}", reading["index"])).json();
         assert_eq!(&beam["reading"], reading);
         let Some(range_m) = reading["range_m"].as_f64() else { continue };
         let points: Vec<[f64; 2]> =
@@ -68,10 +69,10 @@ const CONE: [&str; 2] = ["--set", "model.engine=cone"];
 fn readings_of_an_array_say_where_their_sonar_was_and_paths_end_there() {
     for (further, late_m) in [(&[][..], time_walk_m as fn(f64) -> f64), (&FAN, |_| 1e-3)] {
         let folder = tempfile::tempdir().expect("a folder");
-        let daemon = start_array(folder.path(), further);
+        let daemon = in_process::start_array(folder.path(), further);
         daemon.wait_for_scans(1);
-        let whole = newest(&daemon);
-        assert!(check_paths(&daemon, &whole, late_m) >= 6);
+        let whole = newest(|path| daemon.get(path));
+        assert!(check_paths(|path| daemon.get(path), &whole, late_m) >= 6);
         let robot = &whole["start"]["pose"];
         let [x_m, y_m, heading_deg] =
             ["x_m", "y_m", "heading_deg"].map(|name| robot[name].as_f64().expect("a figure"));
@@ -109,8 +110,8 @@ fn readings_of_a_transducer_ahead_of_its_axis_say_where_its_face_was_live_and_la
             .filter(|record| record["type"] == "ping")
             .collect();
         daemon.wait_for_scans(1);
-        let whole = newest(&daemon);
-        assert!(check_paths(&daemon, &whole, late_m) >= 10);
+        let whole = newest(|path| daemon.get(path));
+        assert!(check_paths(|path| daemon.get(path), &whole, late_m) >= 10);
         let readings = whole["pings"].as_array().expect("readings");
         assert_eq!(told.len(), readings.len());
         for (live, reading) in told.iter().zip(readings) {

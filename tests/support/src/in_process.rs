@@ -4,6 +4,7 @@
 //! device time takes milliseconds.
 
 use std::{
+    io,
     path::{Path, PathBuf},
     time::Duration,
 };
@@ -16,12 +17,31 @@ use http_body_util::BodyExt as _;
 use serde_json::Value;
 use sonard::{
     cli::{EmbeddedControl, EmbeddedDaemon},
+    mock::{MockPort, Pace},
     server::Peer,
 };
-use tokio::{runtime::Runtime, task::JoinHandle, time::sleep};
+use tokio::{runtime::Runtime, sync::oneshot, task::JoinHandle, time::sleep};
 use tower::ServiceExt as _;
 
-use crate::daemon::Reply;
+use crate::{daemon::Reply, rig};
+
+/// Options for a daemon whose boards are plugged in by [`Daemon::plug`].
+pub const RIG_OPTIONS: [&str; 14] = [
+    "--scene",
+    "simple-room",
+    "--pose",
+    "fig9",
+    "--set",
+    "model.max_range_m=3",
+    "--set",
+    "link.attempts=3",
+    "--set",
+    "link.retry_min_s=0.05",
+    "--set",
+    "link.retry_max_s=0.4",
+    "--set",
+    "link.check_s=0.3",
+];
 
 /// Simulated time that passes before each request.
 const STEP: Duration = Duration::from_millis(20);
@@ -36,6 +56,8 @@ pub struct Daemon {
     pub control: EmbeddedControl,
     runtime: Runtime,
     running: JoinHandle<Result<(), String>>,
+    boots: u16,
+    board: Option<(oneshot::Sender<()>, JoinHandle<io::Result<()>>)>,
 }
 
 impl Daemon {
@@ -44,7 +66,8 @@ impl Daemon {
     /// # Panics
     /// If the options are wrong.
     pub fn start(folder: &Path, options: &[&str]) -> Self {
-        let runtime = tokio::runtime::Builder::new_current_thread().enable_all().start_paused(true).build();
+        let runtime =
+            tokio::runtime::Builder::new_current_thread().enable_all().start_paused(true).build();
         let runtime = runtime.expect("a runtime");
         let log = folder.join("log");
         let log = ["--log", log.to_str().expect("plain path")];
@@ -54,13 +77,39 @@ impl Daemon {
         let (control, work) = daemon.split();
         let running = runtime.spawn(work);
         drop(context);
-        Self { folder: folder.into(), control, runtime, running }
+        Self { folder: folder.into(), control, runtime, running, boots: 0, board: None }
     }
 
     /// Starts a daemon with a mock in the simple room.
     pub fn start_mock(folder: &Path, options: &[&str]) -> Self {
         let mock = ["--mock", "--scene", "simple-room", "--pose", "fig9"];
         Self::start(folder, &[&mock, options].concat())
+    }
+
+    /// Plugs a board of the simple room into the daemon's port, in place of an earlier one.
+    ///
+    /// # Panics
+    /// If the faults are no specification.
+    pub fn plug(&mut self, faults: &str, seed: u64, pace: Pace) {
+        self.unplug();
+        self.boots += 1;
+        let faults = faults.parse().expect("faults");
+        let _context = self.runtime.enter();
+        let port = MockPort::in_memory(
+            rig::board(rig::simple_room(), self.boots, faults, seed, pace),
+            self.control.socket.clone(),
+        );
+        let (stop, stopped) = oneshot::channel::<()>();
+        let running = self.runtime.spawn(port.run(async move { drop(stopped.await) }, drop));
+        self.board = Some((stop, running));
+    }
+
+    /// Removes the board; the port no longer exists then.
+    pub fn unplug(&mut self) {
+        if let Some((stop, running)) = self.board.take() {
+            let _ = stop.send(());
+            drop(self.runtime.block_on(running));
+        }
     }
 
     /// Lets simulated time pass.
@@ -160,4 +209,10 @@ impl Daemon {
         let outcome = self.runtime.block_on(self.running).expect("no panic");
         assert_eq!(outcome, Ok(()));
     }
+}
+
+/// Starts a simulated array of eight rangers in the laboratory.
+pub fn start_array(folder: &Path, options: &[&str]) -> Daemon {
+    let array = ["--simulate", "--array", "pioneer-8", "--scene", "mcgill-lab", "--pose", "fig4"];
+    Daemon::start(folder, &[&array, options].concat())
 }

@@ -32,17 +32,10 @@ pub struct Rig {
 impl Rig {
     /// With nothing plugged in. The stable name is `ranger` in `folder`.
     pub fn new(folder: &Path, pace: Pace) -> Self {
-        let text = shipped::text("simple-room").expect("a shipped scene");
-        let scene = Scene::from_json(text).expect("it is right");
-        let pose = scene.pose("fig9").expect("its pose");
-        let sensor = Sensor::preset("senscomp-6500").expect("a preset");
-        let simulator = Simulator::new(Arc::new(scene), sensor, Air::default(), Options::default());
-        let soundings =
-            Soundings::of(&simulator.expect("it is right"), &pose, 400, 0.0).expect("few paths");
         Self {
             link: folder.join("ranger"),
             runtime: Runtime::new().expect("threads"),
-            soundings,
+            soundings: simple_room(),
             pace,
             boots: 0,
             plugged: None,
@@ -72,17 +65,9 @@ impl Rig {
         self.unplug();
         self.boots += 1;
         let faults: FaultPlan = faults.parse().expect("faults");
-        let settings = BoardSettings {
-            boot: self.boots,
-            clock: 0,
-            steps_per_revolution: 400,
-            faults,
-            seed,
-            pace: self.pace,
-        };
-        let world = World::new(self.soundings.clone(), TofNoise::NONE, 0.0, seed);
+        let board = board(self.soundings.clone(), self.boots, faults, seed, self.pace);
         let _context = self.runtime.enter();
-        let port = MockPort::open(MockBoard::new(settings, world), Some(&self.link));
+        let port = MockPort::open(board, Some(&self.link));
         let (stop, stopped) = oneshot::channel::<()>();
         let played = Arc::clone(&self.played);
         let note = move |note: Note| {
@@ -121,6 +106,28 @@ impl Rig {
     pub fn played(&self) -> u64 {
         self.played.load(Ordering::Relaxed)
     }
+}
+
+/// Echoes of the simple room at its pose `fig9`.
+pub fn simple_room() -> Soundings {
+    let text = shipped::text("simple-room").expect("a shipped scene");
+    let scene = Scene::from_json(text).expect("a scene");
+    let pose = scene.pose("fig9").expect("its pose");
+    let sensor = Sensor::preset("senscomp-6500").expect("a preset");
+    let simulator = Simulator::new(Arc::new(scene), sensor, Air::default(), Options::default());
+    Soundings::of(&simulator.expect("a simulator"), &pose, 400, 0.0).expect("few paths")
+}
+
+/// A board without noise and with 400 steps per revolution.
+pub fn board(
+    soundings: Soundings,
+    boot: u16,
+    faults: FaultPlan,
+    seed: u64,
+    pace: Pace,
+) -> MockBoard {
+    let settings = BoardSettings { boot, clock: 0, steps_per_revolution: 400, faults, seed, pace };
+    MockBoard::new(settings, World::new(soundings, TofNoise::NONE, 0.0, seed))
 }
 
 /// Takes a name away when dropped.

@@ -1,13 +1,15 @@
 //! Scans on request, and changes of what is in force.
 
+use sonard_test_support::in_process::Daemon as InProcess;
+
 use super::*;
 
 #[test]
 fn scans_are_taken_on_request_with_the_plan_pose_and_air_in_force() {
     let folder = tempfile::tempdir().expect("a folder");
-    let daemon = Daemon::start_mock(folder.path(), &SHORT);
+    let daemon = InProcess::start_mock(folder.path(), &SHORT);
     daemon.wait_for("ready");
-    std::thread::sleep(Duration::from_millis(300));
+    daemon.pass(Duration::from_millis(300));
     assert_eq!(daemon.get("/v1/scan/latest").status, 404, "nothing is scanned unasked");
     for (method, path, body) in [
         ("PUT", "/v1/plan", r#"{"from_deg":-9,"to_deg":9,"step_deg":0.9,"pings_per_stop":2}"#),
@@ -33,7 +35,7 @@ fn scans_are_taken_on_request_with_the_plan_pose_and_air_in_force() {
     );
     assert_eq!(off.status, 409);
     assert!(off.json()["error"].as_str().is_some_and(|error| error.contains("0.9")));
-    assert_eq!(daemon.stop(), Some(0));
+    daemon.stop();
     let log = clean_log(folder.path());
     assert_eq!(log.of_type("scan_end").count(), 2);
     assert_eq!(log.of_type("session").count(), 1);
@@ -42,8 +44,8 @@ fn scans_are_taken_on_request_with_the_plan_pose_and_air_in_force() {
 #[test]
 fn continuous_scans_stop_in_mid_scan_and_go_on_when_told() {
     let folder = tempfile::tempdir().expect("a folder");
-    let daemon = Daemon::start_mock(folder.path(), &["--set", "scanning.mode=continuous"]);
-    wait_until("some beams", || daemon.status()["scan"]["done"].as_u64() >= Some(5));
+    let daemon = InProcess::start_mock(folder.path(), &["--set", "scanning.mode=continuous"]);
+    daemon.wait_until("some beams", || daemon.status()["scan"]["done"].as_u64() >= Some(5));
     assert_eq!(daemon.send("POST", "/v1/stop", "").status, 202);
     daemon.wait_for("ready");
     let health = daemon.health();
@@ -51,11 +53,11 @@ fn continuous_scans_stop_in_mid_scan_and_go_on_when_told() {
         (&health["scans"]["stopped"], &health["scans"]["completed"]),
         (&json!(1), &json!(0))
     );
-    std::thread::sleep(Duration::from_millis(300));
+    daemon.pass(Duration::from_millis(300));
     assert_eq!(daemon.status()["scanning"]["paused"], true);
     assert_eq!(daemon.send("POST", "/v1/start", "{}").status, 202);
-    wait_until("the next scan", || daemon.status()["scan"]["done"].as_u64() >= Some(2));
-    assert_eq!(daemon.stop(), Some(0));
+    daemon.wait_until("the next scan", || daemon.status()["scan"]["done"].as_u64() >= Some(2));
+    daemon.stop();
     let log = clean_log(folder.path());
     let stops: Vec<String> = log.events().into_iter().filter(|e| e.contains("stopped")).collect();
     assert!(

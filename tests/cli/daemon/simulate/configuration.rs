@@ -13,11 +13,11 @@ fn another_scene_array_and_noise_come_with_the_configuration() {
     };
     fs::write(&file, text("mcgill-lab", "pioneer-8", 0.0)).expect("writes");
     let config = file.display().to_string();
-    let daemon = Daemon::start(folder.path(), &["--simulate", "--config", &config]);
+    let mut daemon = InProcess::start(folder.path(), &["--simulate", "--config", &config]);
     daemon.wait_for_scans(1);
     fs::write(&file, text("two-surface-room", "pioneer-7", 2.0)).expect("writes");
-    daemon.signal(Signal::HUP);
-    wait_until("the other array", || daemon.status()["simulation"]["array"] == "pioneer-7");
+    daemon.reload();
+    daemon.wait_until("the other array", || daemon.status()["simulation"]["array"] == "pioneer-7");
     let scans = daemon.health()["scans"]["completed"].as_u64().expect("a count");
     daemon.wait_for_scans(scans + 4);
     // A scan of the other scene is still drawn and looked into in its own.
@@ -28,10 +28,10 @@ fn another_scene_array_and_noise_come_with_the_configuration() {
     assert_eq!(daemon.get(&format!("/v1/scans/{first}/beams/0")).json()["lacks"], Value::Null);
     // A configuration that makes no sense changes nothing and is told.
     fs::write(&file, text("two-surface-room", "pioneer-9", 2.0)).expect("writes");
-    daemon.signal(Signal::HUP);
-    wait_until("the refusal", || daemon.status()["configuration"]["error"].is_string());
+    daemon.reload();
+    daemon.wait_until("the refusal", || daemon.status()["configuration"]["error"].is_string());
     assert_eq!(daemon.status()["simulation"]["array"], "pioneer-7");
-    assert_eq!(daemon.stop(), Some(0));
+    daemon.stop();
     let log = clean_log(folder.path());
     let sessions: Vec<_> = log
         .of_type("session")
