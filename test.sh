@@ -2,7 +2,7 @@
 # Tests of a change, in three tiers. Each installs what is missing where it may, else names it, and prints the time of its
 # steps.
 #
-#   ./test.sh quick      format, Clippy, unit tests
+#   ./test.sh quick      format, Clippy, unit tests, layers of the crates, wording
 #   ./test.sh            the above, tests of the program, doctests, smoke tests of page, playground and Python
 #   ./test.sh all        the above, long tests, browser tests, firmware and emulator, other programs, API fuzzer, package,
 #                        booted units, fuzz targets, Python package, documentation: what CI runs
@@ -345,8 +345,8 @@ case $tier in
 quick)
   check_tools
   check_text
-  step "unit tests"
-  run_tests --lib || finish $?
+  step "unit tests, layers, wording"
+  run_tests --lib --test layers --test wording || finish $?
   ;;
 default)
   check_tools
