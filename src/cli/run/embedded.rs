@@ -33,6 +33,7 @@ pub struct EmbeddedDaemon {
     daemon: Daemon,
     log: JournalThread,
     supervisor: Supervisor,
+    mock_stop: CancellationToken,
 }
 
 impl EmbeddedDaemon {
@@ -53,11 +54,13 @@ impl EmbeddedDaemon {
         let (settings, files) = loader.load()?;
         let supervisor = Supervisor::default();
         let socket = MemorySocket::default();
+        // Ends after the daemon, which stops the motor first.
+        let mock_stop = CancellationToken::new();
         if plays_mock {
             let pace = if virtual_time { Pace::Virtual } else { Pace::RealTime };
             let port =
                 MockPort::in_memory(super::mock::board(&world, pace, &settings)?, socket.clone());
-            let stop = supervisor.stopping().clone().cancelled_owned();
+            let stop = mock_stop.clone().cancelled_owned();
             let note = |note: Note| tracing::debug!("mock: {note}");
             drop(
                 supervisor
@@ -80,18 +83,28 @@ impl EmbeddedDaemon {
         };
         let access = Access::new(&keys.server.hosts, files.token.as_deref());
         let server = Server::new(handle.clone(), log_folder, access, &keys, files.fleet);
-        Ok(Self { handle, router: server.router(), socket, loader, daemon, log, supervisor })
+        Ok(Self {
+            handle,
+            router: server.router(),
+            socket,
+            loader,
+            daemon,
+            log,
+            supervisor,
+            mock_stop,
+        })
     }
 
     /// Separates the daemon's work from what controls it.
     #[must_use]
     pub fn split(self) -> (EmbeddedControl, impl Future<Output = Result<(), String>> + Send) {
-        let Self { handle, router, socket, loader, daemon, log, supervisor } = self;
+        let Self { handle, router, socket, loader, daemon, log, supervisor, mock_stop } = self;
         let stop = CancellationToken::new();
         let stopped = stop.clone().cancelled_owned();
         let work = async move {
             let outcome = daemon.run(stopped).await.map_err(|failure| failure.to_string());
             supervisor.stopping().cancel();
+            mock_stop.cancel();
             let last = tokio::task::spawn_blocking(|| log.close()).await.unwrap_or_default();
             outcome.and_then(|()| last.error.map_or(Ok(()), Err))
         };

@@ -87,7 +87,7 @@ fn another_ranger_than_the_configured_one_is_refused() {
     let folder = tempfile::tempdir().expect("a folder");
     let serial = ["--set", "device.serial=SONARD-0007"];
     let mut daemon = InProcess::start(folder.path(), &[&RIG_OPTIONS[..], &serial].concat());
-    daemon.plug("", 1, Pace::Virtual);
+    daemon.plug("", 1);
     daemon.wait_for("wrong_device");
     let trouble = daemon.status()["link"]["trouble"].clone();
     assert!(

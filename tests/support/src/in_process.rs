@@ -88,15 +88,17 @@ impl Daemon {
 
     /// Plugs a board of the simple room into the daemon's port, in place of an earlier one.
     ///
+    /// The board keeps pace with the paused clock; one in virtual time would never let the runtime become idle.
+    ///
     /// # Panics
     /// If the faults are no specification.
-    pub fn plug(&mut self, faults: &str, seed: u64, pace: Pace) {
+    pub fn plug(&mut self, faults: &str, seed: u64) {
         self.unplug();
         self.boots += 1;
         let faults = faults.parse().expect("faults");
         let _context = self.runtime.enter();
         let port = MockPort::in_memory(
-            rig::board(rig::simple_room(), self.boots, faults, seed, pace),
+            rig::board(rig::simple_room(), self.boots, faults, seed, Pace::RealTime),
             self.control.socket.clone(),
         );
         let (stop, stopped) = oneshot::channel::<()>();
@@ -114,7 +116,7 @@ impl Daemon {
 
     /// Lets simulated time pass.
     pub fn pass(&self, time: Duration) {
-        self.runtime.block_on(sleep(time));
+        self.runtime.block_on(async { sleep(time).await });
     }
 
     pub fn get(&self, path: &str) -> Reply {
@@ -175,7 +177,7 @@ impl Daemon {
     pub fn wait_until(&self, what: &str, condition: impl Fn() -> bool) {
         let start = self.now();
         while !condition() {
-            self.runtime.block_on(sleep(STEP));
+            self.runtime.block_on(async { sleep(STEP).await });
             std::thread::sleep(REAL_STEP);
             assert!(self.now() - start < LIMIT, "waited in vain for {what}: {}", self.status());
         }

@@ -22,7 +22,7 @@ fn scans_are_taken_on_request_with_the_plan_pose_and_air_in_force() {
     }
     daemon.wait_for_scans(2);
     let latest = daemon.get("/v1/scan/latest").json();
-    assert_eq!(latest["pings"].as_array().map(Vec::len), Some(40));
+    assert_eq!(latest["pings"].as_array().map(Vec::len), Some(40), "{latest}");
     assert_eq!(latest["start"]["pose"]["heading_deg"], 90.0);
     let air = &latest["start"]["air"];
     assert_eq!((&air["temperature_c"], &air["source"]), (&json!(25.0), &json!("api")));
