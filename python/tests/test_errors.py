@@ -15,7 +15,7 @@ MODEL = sonard.Model("simple-room")
 REFUSED: list[tuple[Callable[[], Any], type[Exception], str]] = [
     (lambda: MODEL.predict([[0.4, 0.3, 0.0], [9.0, 9.0, 0.0]]), sonard.PoseError, "poses[1]: the pose (9, 9) m is outside the room"),
     (lambda: MODEL.predict([np.nan, 0, 0]), sonard.PoseError, "is not a number"),
-    (lambda: MODEL.reading([0, 0, 0]), sonard.PoseError, "keep 1 mm away"),
+    (lambda: MODEL.reading([0, 0, 0]), sonard.PoseError, "keep at least 1 mm"),
     (lambda: MODEL.predict([[0.4, 0.3]]), ValueError, "x_m, y_m, heading_deg"),
     (lambda: MODEL.paths([[0.4, 0.3, 0]]), ValueError, "it must be (3,)"),
     (lambda: MODEL.predict([0.4, 0.3, 0], [np.inf]), ValueError, "azimuths_deg[0] is inf"),

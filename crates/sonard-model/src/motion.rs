@@ -4,7 +4,7 @@
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Trapezoid {
     steps: i32,
-    /// Peak speed, steps/s.
+    /// Peak speed of the move, steps/s.
     peak: f64,
     acceleration: f64,
 }

@@ -11,7 +11,7 @@ use crate::geometry::wrap_360;
 /// `to_deg` is excluded so that no beam of a full revolution is measured twice.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ScanPlan {
-    /// First azimuth, degrees.
+    /// First azimuth of the range, degrees.
     pub from_deg: f64,
     /// End of the range, degrees, exclusive.
     pub to_deg: f64,
@@ -38,7 +38,7 @@ pub enum PlanError {
     NotFinite {
         /// Name of the field.
         field: &'static str,
-        /// Rejected value.
+        /// Value that is not finite.
         value: f64,
     },
     /// Step of zero or less.
@@ -47,7 +47,7 @@ pub enum PlanError {
     /// Empty range, or a range of more than a full revolution.
     #[error("to_deg {to_deg} must be greater than from_deg {from_deg}, by at most 360")]
     BadRange {
-        /// First azimuth, degrees.
+        /// First azimuth of the range, degrees.
         from_deg: f64,
         /// End of the range, degrees.
         to_deg: f64,
@@ -61,11 +61,11 @@ pub enum PlanError {
          ({steps_per_revolution} per revolution, {motor_deg} degrees each): use a multiple of {motor_deg}"
     )]
     OffMotorGrid {
-        /// Requested step, degrees.
+        /// Requested step or start angle, degrees.
         step_deg: f64,
         /// Motor steps per revolution.
         steps_per_revolution: u32,
-        /// Motor step, degrees.
+        /// Angle of one motor step, degrees.
         motor_deg: f64,
     },
     /// More beams than a scan can number.

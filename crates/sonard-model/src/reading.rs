@@ -36,7 +36,7 @@ impl PingStatus {
 )]
 #[serde(rename_all = "snake_case")]
 pub enum PathKind {
-    /// Mirror reflections only.
+    /// Specular path: mirror reflections only.
     Specular,
     /// Diffraction at an edge or free end, once or twice.
     Diffracted,

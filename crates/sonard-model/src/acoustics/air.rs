@@ -24,11 +24,11 @@ pub struct Air {
 pub struct AirError {
     /// Name of the rejected quantity.
     pub field: &'static str,
-    /// Rejected value.
+    /// Value outside the range.
     pub value: f64,
-    /// Minimum allowed value.
+    /// Lower end of the allowed range.
     pub min: f64,
-    /// Maximum allowed value.
+    /// Upper end of the allowed range.
     pub max: f64,
 }
 
@@ -104,19 +104,19 @@ impl Air {
         Ok(Self { temperature_c: high_c, ..self })
     }
 
-    /// Temperature, degrees Celsius.
+    /// Temperature of the air, degrees Celsius.
     #[must_use]
     pub const fn temperature_c(&self) -> f64 {
         self.temperature_c
     }
 
-    /// Relative humidity, percent.
+    /// Relative humidity of the air, percent.
     #[must_use]
     pub const fn humidity_percent(&self) -> f64 {
         self.humidity_percent
     }
 
-    /// Static pressure, kilopascals.
+    /// Static pressure of the air, kilopascals.
     #[must_use]
     pub const fn pressure_kpa(&self) -> f64 {
         self.pressure_kpa

@@ -52,7 +52,7 @@ pub struct Incidence {
     pub leaving_rad: f64,
     /// Direction of arrival relative to the axis, radians, counter-clockwise.
     pub arriving_rad: f64,
-    /// Path length, metres.
+    /// Round-trip length of the path, metres.
     pub length_m: f64,
     /// Image of the face over the path.
     pub image: Image,
@@ -161,7 +161,8 @@ impl ApertureResponse {
             Image::Bent(edge) => Some(edge.shares()),
             _ => None,
         };
-        let edge_share = |x: f64, y: f64| shares.as_ref().map_or(Complex64::ONE, |share| share(x, y));
+        let edge_share =
+            |x: f64, y: f64| shares.as_ref().map_or(Complex64::ONE, |share| share(x, y));
         let heights = self.heights(length_m);
         let mut leads = Vec::with_capacity(self.points.len() * self.points.len());
         for (&(u, share_u), heights) in self.points.iter().zip(&heights) {

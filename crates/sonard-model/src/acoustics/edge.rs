@@ -188,7 +188,8 @@ impl Wedge {
     fn images(&self, aspect: &Aspect, from: &Aspect) -> [WedgeImage; 4] {
         let difference = [aspect, from].map(|at| at.out_rad - at.in_rad);
         let sum = [aspect, from].map(|at| at.out_rad + at.in_rad);
-        let [direct_low, direct_high] = self.pair(difference, [-self.opening_rad, self.opening_rad], false);
+        let [direct_low, direct_high] =
+            self.pair(difference, [-self.opening_rad, self.opening_rad], false);
         let [mirrored_low, mirrored_high] = self.pair(sum, [0.0, 2.0 * self.opening_rad], true);
         [direct_low, direct_high, mirrored_low, mirrored_high]
     }

@@ -20,7 +20,7 @@ pub struct Face {
 /// The back does not reflect: sound from behind the face is ignored.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Disc {
-    /// Size and reflectance.
+    /// Radius and reflectance of the disc.
     pub face: Face,
     /// Wave number `2 pi f / c`, radians per metre.
     pub wave_number_per_m: f64,
@@ -215,11 +215,7 @@ mod tests {
             let (in_rad, out_rad) = (in_deg.to_radians(), out_deg.to_radians());
             let found = FACE.reflection(&FaceAspect { in_m, out_m, in_rad, out_rad });
             let off = (found.norm() - sum.norm() / mirror).abs();
-            assert!(
-                off < 0.02,
-                "{in_m} {in_deg} {out_deg}: {found} for {}",
-                sum.norm() / mirror
-            );
+            assert!(off < 0.02, "{in_m} {in_deg} {out_deg}: {found} for {}", sum.norm() / mirror);
         }
     }
 

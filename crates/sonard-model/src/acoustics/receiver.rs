@@ -17,9 +17,9 @@
 //! all echoes and is left out as well.
 
 mod detection;
-mod gain;
-mod envelope;
 mod detector_bank;
+mod envelope;
+mod gain;
 mod noise;
 mod trace;
 
@@ -36,8 +36,8 @@ pub use self::{
 };
 
 use self::{
-    gain::{Sensitivity, gain_db},
     envelope::EnvelopeSum,
+    gain::{Sensitivity, gain_db},
 };
 use super::{ApertureResponse, Detector, EchoShape, Gain, Incidence, Response, Sensor};
 use crate::reading::PingStatus;

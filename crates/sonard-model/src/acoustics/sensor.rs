@@ -49,7 +49,7 @@ pub struct Sensor {
     pub name: String,
     /// One-sentence description of the sensor.
     pub description: String,
-    /// Carrier frequency, hertz.
+    /// Carrier frequency of the pulse, hertz.
     pub frequency_hz: f64,
     /// Shape of the radiating face, which determines the beam pattern.
     pub aperture: Aperture,
@@ -151,15 +151,15 @@ pub enum SensorError {
     Figure {
         /// Path of the field.
         field: &'static str,
-        /// Rejected value.
+        /// Value outside the range.
         value: f64,
         /// Description of the valid range.
         expected: &'static str,
     },
-    /// Unknown preset name.
+    /// Request of a preset that does not exist.
     #[error("unknown sensor preset \"{name}\"; known presets: {known}")]
     UnknownPreset {
-        /// Requested preset name.
+        /// Name of the requested preset.
         name: String,
         /// Names of all presets.
         known: String,

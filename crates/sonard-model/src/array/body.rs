@@ -29,7 +29,7 @@ pub struct Body {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum BodyShape {
-    /// Circular outline.
+    /// Circular outline of the body.
     Circle {
         /// Centre, `[forward, left]` in metres.
         center: [f64; 2],

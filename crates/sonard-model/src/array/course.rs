@@ -92,7 +92,10 @@ impl Course {
 
     fn push(&mut self, waypoint: &Waypoint) -> Result<(), String> {
         let Waypoint { time_s, x_m, y_m, heading_deg } = *waypoint;
-        if ![time_s.unwrap_or_default(), x_m, y_m, heading_deg].iter().all(|value| value.is_finite()) {
+        if ![time_s.unwrap_or_default(), x_m, y_m, heading_deg]
+            .iter()
+            .all(|value| value.is_finite())
+        {
             return Err("numbers must be finite".into());
         }
         if !self.poses.is_empty() && time_s.is_some() == self.times_s.is_empty() {
@@ -101,7 +104,9 @@ impl Course {
         if let Some(time_s) = time_s {
             match self.times_s.last() {
                 Some(before_s) if time_s <= *before_s => {
-                    return Err(format!("time_s {time_s} is not after the previous one, {before_s}"));
+                    return Err(format!(
+                        "time_s {time_s} is not after the previous one, {before_s}"
+                    ));
                 }
                 _ => {}
             }

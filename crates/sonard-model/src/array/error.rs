@@ -24,11 +24,11 @@ pub enum ArrayError {
     Figure {
         /// Path of the field.
         field: String,
-        /// Rejected value.
+        /// Value outside the range.
         value: f64,
-        /// Minimum allowed value.
+        /// Lower end of the allowed range.
         min: f64,
-        /// Maximum allowed value.
+        /// Upper end of the allowed range.
         max: f64,
     },
     /// Empty list, or too many entries.
@@ -36,7 +36,7 @@ pub enum ArrayError {
     Count {
         /// Name of the list.
         field: &'static str,
-        /// Number of entries.
+        /// Actual number of entries.
         count: usize,
         /// Maximum number of entries.
         max: usize,
@@ -52,7 +52,7 @@ pub enum ArrayError {
     SameId {
         /// Path of the second id.
         field: String,
-        /// Duplicate id.
+        /// Id that both rangers have.
         id: String,
         /// Index of the first ranger with the id.
         first: usize,
@@ -62,9 +62,9 @@ pub enum ArrayError {
     NoSuchRanger {
         /// Path of the field.
         field: String,
-        /// Unknown id.
+        /// Id that no ranger has.
         id: String,
-        /// Existing ids.
+        /// Ids of the array's rangers.
         known: Vec<String>,
     },
     /// Empty list of simultaneous firings.
@@ -81,10 +81,10 @@ pub enum ArrayError {
         /// Id of the ranger.
         id: String,
     },
-    /// Unknown preset name.
+    /// Request of a preset that does not exist.
     #[error("unknown array preset \"{name}\"")]
     UnknownPreset {
-        /// Requested preset name.
+        /// Name of the requested preset.
         name: String,
         /// Names of all presets.
         known: Vec<String>,

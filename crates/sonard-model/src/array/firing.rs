@@ -122,7 +122,11 @@ impl RangerArray {
     pub(super) fn check_order(&self) -> Result<(), ArrayError> {
         let ordered: usize = self.firing_order.iter().map(|turn| turn.ids().len()).sum();
         if ordered > MAX_ENTRIES {
-            return Err(ArrayError::Count { field: "firing_order", count: ordered, max: MAX_ENTRIES });
+            return Err(ArrayError::Count {
+                field: "firing_order",
+                count: ordered,
+                max: MAX_ENTRIES,
+            });
         }
         for (at, turn) in self.firing_order.iter().enumerate() {
             let (field, ids) = (format!("firing_order[{at}]"), turn.ids());

@@ -113,7 +113,7 @@ fn pose_error_names_the_ranger() {
     let screen = Scene::from_json(text).expect("a scene");
     let error = array.check_pose(&screen, &at(0.0, 0.0, 0.0)).expect_err("through the screen");
     assert_eq!(error.ranger.as_deref(), Some("s2"));
-    assert!(error.to_string().contains("other side of `screen`"), "{error}");
+    assert!(error.to_string().contains("separated from the robot by `screen`"), "{error}");
     assert_eq!(array.check_pose(&screen, &at(-0.1, 0.0, 0.0)), Ok(()));
     assert_eq!(array.check_pose(&room, &at(2.0, 0.3, 0.0)).expect_err("outside").ranger, None);
     let nan = array.check_pose(&room, &at(f64::NAN, 0.3, 0.0));
@@ -126,7 +126,7 @@ fn pose_error_names_the_ranger() {
     assert!(error.to_string().contains("inside `b12`"), "{error}");
     assert_eq!(error.ranger.as_deref(), Some("s5"));
     let error = preset("ring-12").check_pose(&room, &at(0.4, 0.14, 0.0)).expect_err("no room");
-    assert!(error.to_string().contains("`b12` runs into `south`"), "{error}");
+    assert!(error.to_string().contains("`b12` collides with `south`"), "{error}");
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! The rules of a scene: names that exist and differ, numbers that make sense, poses that fit.
+//! Rules of a scene: unique and existing names, values in range, accessible poses.
 
 use std::{
     collections::{BTreeMap, HashMap},
@@ -11,26 +11,26 @@ use super::{
     Cylinder, DEFAULT_SNAP_M, Material, Robot, RobotShape, Scene, SceneProblem, Wall,
     error::MAX_COORDINATE_M,
     file::{CircleFile, CylinderFile, Point, RobotFile, SceneFile, WallFile},
-    locate::{JsonPath, Part},
+    locate::{JsonPath, MemberPart},
     outline::{Outlines, contains},
     pose::{CLEARANCE_M, MAX_HEADING_DEG},
 };
 use crate::geometry::{DVec2, Pose, distance_to_segment};
 
-/// Shortest wall, metres: far below the wavelength, far above rounding.
+/// Minimum length of a wall, metres: far below the wavelength, far above rounding.
 const MIN_WALL_M: f64 = 1e-4;
 
-/// Most that `snap_m` can be, metres: below the wavelength of any ranger.
+/// Maximum of `snap_m`, metres: below the wavelength of any ranger.
 const MAX_SNAP_M: f64 = 5e-3;
 
-/// A rule that is broken, and the member of the file that breaks it.
+/// Violated rule, and the member of the file that violates it.
 pub(super) struct Fault {
     pub(super) path: JsonPath,
-    pub(super) part: Part,
+    pub(super) part: MemberPart,
     pub(super) problem: SceneProblem,
 }
 
-/// Turns a well-formed file into a scene; `text` is what it was read from.
+/// Validates a well-formed file and converts it to a scene; `text` is its source.
 pub(super) fn checked(file: SceneFile, text: &str) -> Result<Scene, Fault> {
     let root = JsonPath::root();
     is_name(&file.name, &root.key("name"))?;
@@ -73,10 +73,10 @@ pub(super) fn checked(file: SceneFile, text: &str) -> Result<Scene, Fault> {
     Ok(scene)
 }
 
-/// What has an id: the list that it is in, and its place there.
+/// Owner of an id: its list, and its index in the list.
 type Owner = (&'static str, Option<usize>);
 
-/// What the parts of a scene share: the materials there are, and the ids taken so far.
+/// Shared state of the checks: defined materials, and ids in use.
 struct Rules {
     materials: BTreeMap<String, Material>,
     ids: HashMap<Arc<str>, Owner>,
@@ -86,7 +86,7 @@ impl Rules {
     fn new(materials: BTreeMap<String, Material>) -> Result<Self, Fault> {
         for (name, material) in &materials {
             let path = JsonPath::root().key("materials").key(name);
-            is_name(name, &path).map_err(|fault| Fault { part: Part::Key, ..fault })?;
+            is_name(name, &path).map_err(|fault| Fault { part: MemberPart::Key, ..fault })?;
             share("reflectance", material.reflectance, &path)?;
             share("roughness", material.roughness, &path)?;
         }
@@ -144,7 +144,7 @@ impl Rules {
         })
     }
 
-    /// The material of floor or ceiling, which have to have a height.
+    /// Material of floor or ceiling, whose height has to be defined.
     fn level(
         &self,
         (field, name, height, z_m): (&str, &Option<String>, &'static str, Option<f64>),
@@ -164,7 +164,7 @@ impl Rules {
     fn material_at(&self, name: &str, path: JsonPath) -> Result<Material, Fault> {
         self.materials.get(name).copied().ok_or_else(|| Fault {
             path,
-            part: Part::Value,
+            part: MemberPart::Value,
             problem: SceneProblem::UnknownMaterial {
                 name: name.to_owned(),
                 known: self.materials.keys().cloned().collect(),
@@ -185,7 +185,7 @@ impl Rules {
     }
 }
 
-/// The segments of a wall, each from and to where.
+/// Segments of a wall by their end points.
 fn corners(file: &WallFile, path: &JsonPath) -> Result<Vec<(DVec2, DVec2)>, Fault> {
     match (file.from, file.to, &file.polyline) {
         (Some(from), Some(to), None) if !file.closed => {
@@ -200,10 +200,9 @@ fn corners(file: &WallFile, path: &JsonPath) -> Result<Vec<(DVec2, DVec2)>, Faul
         (None, None, None) => {
             fault(path, SceneProblem::WallShape("this wall has neither ends nor a polyline"))
         }
-        (_, _, Some(_)) => fault(
-            path,
-            SceneProblem::WallShape("this wall has a polyline and beside it `from` or `to`"),
-        ),
+        (_, _, Some(_)) => {
+            fault(path, SceneProblem::WallShape("this wall has both a polyline and `from` or `to`"))
+        }
         (None, Some(_), None) => fault(path, SceneProblem::MissingField("from".to_owned())),
         (Some(_), None, None) => fault(path, SceneProblem::MissingField("to".to_owned())),
     }
@@ -258,10 +257,10 @@ fn check_poses(scene: &Scene, path: &JsonPath) -> Result<(), Fault> {
     if scene.poses.is_empty() {
         return Ok(());
     }
-    let outlines = Outlines::of(scene);
+    let outlines = Outlines::from_scene(scene);
     for (name, pose) in &scene.poses {
         let path = path.key(name);
-        let bad_name = |problem| Fault { path: path.clone(), part: Part::Key, problem };
+        let bad_name = |problem| Fault { path: path.clone(), part: MemberPart::Key, problem };
         is_name(name, &path).map_err(|fault| bad_name(fault.problem))?;
         if name.contains(',') {
             return Err(bad_name(SceneProblem::CommaInName(name.clone())));
@@ -321,7 +320,7 @@ fn point([x, y]: Point, path: &JsonPath) -> Result<DVec2, Fault> {
 }
 
 fn length(value: f64, path: &JsonPath) -> Result<(), Fault> {
-    // Written so that NaN fails too.
+    // Written so that NaN fails as well.
     if value.abs() <= MAX_COORDINATE_M {
         return Ok(());
     }
@@ -361,5 +360,5 @@ fn is_name(name: &str, path: &JsonPath) -> Result<(), Fault> {
 }
 
 fn fault<T>(path: &JsonPath, problem: SceneProblem) -> Result<T, Fault> {
-    Err(Fault { path: path.clone(), part: Part::Value, problem })
+    Err(Fault { path: path.clone(), part: MemberPart::Value, problem })
 }

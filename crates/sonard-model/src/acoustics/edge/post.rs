@@ -31,7 +31,7 @@ pub const MOST_KA: f64 = 15.0;
 /// Number of terms beyond `ka`, where the series decays faster than exponentially.
 const TERMS_BEYOND: f64 = 12.0;
 
-/// Thin upright cylinder.
+/// Precomputed scattering series of a thin upright cylinder.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Post {
     radius_m: f64,

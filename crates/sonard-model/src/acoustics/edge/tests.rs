@@ -34,7 +34,10 @@ fn utd_matches_full_wave() {
         let found = EdgeLaw::Utd.echo(&wedge, &back(range, aspect), K).norm();
         for reference in [exact, utd] {
             let error_db = 20.0 * (found / reference).log10();
-            assert!(error_db.abs() < 0.075, "{range} m, {aspect} deg: {found} is {error_db} dB off");
+            assert!(
+                error_db.abs() < 0.075,
+                "{range} m, {aspect} deg: {found} is {error_db} dB off"
+            );
         }
         if let Some(kuc) = kuc {
             let found = EdgeLaw::KucSiegel.echo(&wedge, &back(range, aspect), K).norm();
@@ -199,10 +202,7 @@ fn view_compensates_lost_echo() {
         let excess = at(&view, left_m) - share(left_m, left_m) * middle;
         // The aspect angle of the edge increases to the right.
         let expected = if left_mm < -6 { 1.0 } else { 0.0 };
-        assert!(
-            left_mm == -6 || (excess.norm() - expected).abs() < 1e-3,
-            "{left_mm}: {excess}"
-        );
+        assert!(left_mm == -6 || (excess.norm() - expected).abs() < 1e-3, "{left_mm}: {excess}");
     }
 }
 

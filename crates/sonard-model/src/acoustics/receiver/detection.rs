@@ -39,7 +39,8 @@ impl Receiver {
         };
         let status = self.status_at(first_us);
         let is_min_range = status == PingStatus::MinRange;
-        let reported_us = first_us + if is_min_range { 0.0 } else { envelope.crest_after_us(first_us) };
+        let reported_us =
+            first_us + if is_min_range { 0.0 } else { envelope.crest_after_us(first_us) };
         let cause = envelope.cause(first_us);
         let (peak, margin_db) = self.peak(envelope, first_us, cause.as_ref());
         let mut last_us = first_us;
@@ -95,8 +96,11 @@ impl Receiver {
             return firings.remove(0);
         }
         let is_echo = |firing: &&Detection| firing.status == PingStatus::Echo;
-        let first_us: Vec<f64> =
-            firings.iter().filter(is_echo).filter_map(|firing| firing.echoes_us.first().copied()).collect();
+        let first_us: Vec<f64> = firings
+            .iter()
+            .filter(is_echo)
+            .filter_map(|firing| firing.echoes_us.first().copied())
+            .collect();
         let is_detected = 2 * first_us.len() > firings.len();
         let has_result = |firing: &Detection| (firing.status == PingStatus::Echo) == is_detected;
         let at = firings.iter().position(has_result).unwrap_or(0);
@@ -130,7 +134,8 @@ impl Receiver {
     fn no_echo(&self, envelope: &mut EnvelopeSum) -> Detection {
         let (echoes_us, window_us) = (SmallVec::new(), self.window_us());
         // Unknown arrivals may exceed the known ones.
-        let known: &[PulseArrival] = if envelope.exceeds_horizon() { &[] } else { envelope.arrivals };
+        let known: &[PulseArrival] =
+            if envelope.exceeds_horizon() { &[] } else { envelope.arrivals };
         let relative =
             |arrival: &PulseArrival| arrival.amplitude / self.threshold_at(self.tof_us(arrival));
         let arrival = known

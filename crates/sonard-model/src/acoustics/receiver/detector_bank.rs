@@ -10,10 +10,10 @@ pub struct Listening<'a> {
     envelope: EnvelopeSum<'a>,
 }
 
-/// Rise of ECHO.
+/// First rise of ECHO at one of the thresholds.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Rise {
-    /// `Echo` or `MinRange`.
+    /// Outcome: `Echo` or `MinRange`.
     pub status: PingStatus,
     /// Half the detected path, or the range of the end of blanking, metres.
     pub range_m: f64,

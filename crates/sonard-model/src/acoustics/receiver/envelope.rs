@@ -6,8 +6,8 @@
 
 mod ideal;
 mod level;
-mod rise;
 mod pulse;
+mod rise;
 
 use std::cell::Cell;
 
@@ -82,7 +82,7 @@ struct Bounds {
     /// Active range that the bounds belong to.
     range: (usize, usize),
     strength: f64,
-    /// Slope, per microsecond.
+    /// Slope of the envelope, per microsecond.
     steepest: f64,
 }
 
@@ -174,8 +174,7 @@ impl<'a> EnvelopeSum<'a> {
         let known =
             self.pulses[self.over..].iter().take_while(|pulse| !pulse.is_placeholder()).count();
         self.pulses.truncate(self.over + known);
-        self.begun =
-            self.pulses.partition_point(|pulse| pulse.lasts_us[0] <= t_us).max(self.over);
+        self.begun = self.pulses.partition_point(|pulse| pulse.lasts_us[0] <= t_us).max(self.over);
         (self.summed, self.watched, self.bounds) = (0, None, Bounds::default());
         self.peek_next();
     }

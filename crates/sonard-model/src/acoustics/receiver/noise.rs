@@ -21,7 +21,7 @@ pub struct ReceiverNoise {
 }
 
 impl ReceiverNoise {
-    /// Noise-free receiver.
+    /// Receiver without noise and jitter.
     pub const NONE: Self = Self { floor: 0.0, jitter_us: 0.0 };
 
     /// Draws the noise of one firing.

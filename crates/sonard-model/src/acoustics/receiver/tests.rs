@@ -32,7 +32,8 @@ fn rising(threshold_rise_db_per_m: f64) -> Receiver {
 
 /// Times (microseconds), amplitudes and phases.
 fn arrivals(sounds: &[(f64, f64, f64)]) -> Vec<PulseArrival> {
-    sounds.iter()
+    sounds
+        .iter()
         .zip(0..)
         .map(|(&(tof_us, amplitude, phase_rad), index)| PulseArrival {
             length_m: tof_us * SPEED_M_S * 1e-6,
@@ -47,7 +48,8 @@ fn arrivals(sounds: &[(f64, f64, f64)]) -> Vec<PulseArrival> {
 
 /// Asserts the status and the rise times of ECHO.
 fn check(sounds: &[(f64, f64)], status: PingStatus, echoes_us: &[f64]) -> Detection {
-    let sounds: Vec<_> = sounds.iter().map(|&(tof_us, amplitude)| (tof_us, amplitude, 0.0)).collect();
+    let sounds: Vec<_> =
+        sounds.iter().map(|&(tof_us, amplitude)| (tof_us, amplitude, 0.0)).collect();
     let detection = receiver().detect(&arrivals(&sounds));
     assert_eq!(detection.status, status, "{sounds:?}: {detection:?}");
     assert_eq!(detection.echoes_us.len(), echoes_us.len(), "{detection:?}");
@@ -190,7 +192,10 @@ fn higher_threshold_rises_no_earlier() {
             let [whole_us, late_us] =
                 [&whole, &late].map(|detection| detection.echoes_us.first().copied());
             let apart_us = whole_us.zip(late_us).map_or(0.0, |(a, b)| (a - b).abs());
-            assert!(apart_us < 1.0 && whole_us.is_some() == late_us.is_some(), "{whole:?} {late:?}");
+            assert!(
+                apart_us < 1.0 && whole_us.is_some() == late_us.is_some(),
+                "{whole:?} {late:?}"
+            );
             ready_us = whole_us.unwrap_or(ready_us);
             threshold *= 1.12;
         }
@@ -222,7 +227,10 @@ fn ideal_receiver_is_the_limit() {
         coherent.echoes_us.iter().zip(&ideal.echoes_us).zip(sounds)
     {
         assert!((ideal_us - tof_us).abs() < 1e-9);
-        assert!((coherent_us - ideal_us - walk_us(strength)).abs() < 0.05, "{one} {other}");
+        assert!(
+            (coherent_us - ideal_us - walk_us(strength)).abs() < 0.05,
+            "{coherent_us} {ideal_us}"
+        );
     }
 }
 

@@ -22,7 +22,7 @@ pub struct TracePoint {
     pub t_us: f64,
     /// Envelope of the summed arrivals after gain compensation.
     pub envelope: f64,
-    /// Effective detection threshold.
+    /// Effective detection threshold at that time.
     pub threshold: f64,
     /// Gain, decibels re the gain that compensates the spreading from a wall at 1 m.
     pub gain_db: f64,

@@ -17,7 +17,7 @@ use crate::geometry::wrap_pi;
 pub enum Aperture {
     /// Circular piston in a baffle.
     Piston {
-        /// Radius, metres.
+        /// Radius of the piston, metres.
         radius_m: f64,
         /// Side-lobe floor: one-way amplitude relative to the axis, decibels, times the cosine of
         /// the angle. Real faces radiate and receive more far off the axis than a piston's side
@@ -27,7 +27,7 @@ pub enum Aperture {
     },
     /// Line aperture in the scan plane.
     Line {
-        /// Half length, metres.
+        /// Half length of the line, metres.
         half_length_m: f64,
         /// Full amplitude up to this angle from the axis, degrees.
         #[serde(default = "right_angle_deg")]

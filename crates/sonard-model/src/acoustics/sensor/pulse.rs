@@ -37,9 +37,9 @@ pub enum Pulse {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ChirpPart {
-    /// Number of cycles.
+    /// Number of cycles of the burst.
     pub cycles: f64,
-    /// Frequency, hertz.
+    /// Frequency of the burst, hertz.
     pub frequency_hz: f64,
 }
 

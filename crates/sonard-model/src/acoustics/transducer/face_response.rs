@@ -41,7 +41,8 @@ impl FaceResponse {
     /// Response of a sensor's face to its pulse, up to a phase of at least `max_rad`; flat if the
     /// aperture is defined by its beam.
     pub(super) fn for_sensor(sensor: &Sensor, max_rad: f64) -> Rc<Self> {
-        let step_rad = STEP_RAD * (max_rad / (MAX_ENTRIES * STEP_RAD)).log2().ceil().max(0.0).exp2();
+        let step_rad =
+            STEP_RAD * (max_rad / (MAX_ENTRIES * STEP_RAD)).log2().ceil().max(0.0).exp2();
         let face = FaceKey {
             aperture: unit_half_width(&sensor.aperture),
             pulse: sensor.pulse.clone(),
@@ -55,7 +56,8 @@ impl FaceResponse {
                 return Rc::clone(response);
             }
             cached.retain(|(key, _)| *key != face);
-            let response = Rc::new(Self::tabulated(&PulsedFace::for_sensor(sensor), step_rad, max_rad));
+            let response =
+                Rc::new(Self::tabulated(&PulsedFace::for_sensor(sensor), step_rad, max_rad));
             cached.truncate(CACHE_SIZE - 1);
             cached.push_front((face, Rc::clone(&response)));
             response
@@ -99,7 +101,7 @@ impl FaceResponse {
 /// Cache key of a response.
 #[derive(PartialEq)]
 struct FaceKey {
-    /// Output of [`unit_half_width`].
+    /// Shape of the face, from [`unit_half_width`].
     aperture: Aperture,
     pulse: Pulse,
     frequency_hz: f64,
@@ -134,7 +136,7 @@ pub(super) struct PulsedFace {
 const SEARCH_US: f64 = 6.0;
 
 impl PulsedFace {
-    pub(super) fn of(sensor: &Sensor) -> Self {
+    pub(super) fn for_sensor(sensor: &Sensor) -> Self {
         let middle_us = match sensor.pulse {
             Pulse::Burst { .. } => Some(0.5e6 * sensor.pulse_s()),
             Pulse::Gaussian { .. } => Some(0.0),

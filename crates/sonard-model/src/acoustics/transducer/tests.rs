@@ -138,7 +138,8 @@ fn shared_table_fits_each_face() {
         (10.0 * RADIUS_M, 343.99),
     ] {
         let sensor = sensor_with(radius_m);
-        let (beam, fresh) = (BeamPattern::new(&sensor, speed_m_s), in_new_thread(radius_m, speed_m_s));
+        let (beam, fresh) =
+            (BeamPattern::new(&sensor, speed_m_s), in_new_thread(radius_m, speed_m_s));
         let ka = TAU * sensor.frequency_hz / speed_m_s * radius_m;
         for i in 0..180 {
             let degrees = 0.5 * f64::from(i);
@@ -158,7 +159,8 @@ fn shared_table_fits_each_face() {
 /// A file can hold a face of thousands of wavelengths: the table must not take minutes.
 #[test]
 fn table_size_is_bounded() {
-    let face = |ka: f64| face_response::FaceResponse::for_sensor(&preset("senscomp-6500"), ka).entries();
+    let face =
+        |ka: f64| face_response::FaceResponse::for_sensor(&preset("senscomp-6500"), ka).entries();
     for ka in [0.0, 1.0, 17.3, 39.9, 40.1, 81.0, 300.0] {
         assert!(face(ka) <= 4003, "{ka}: {}", face(ka));
     }

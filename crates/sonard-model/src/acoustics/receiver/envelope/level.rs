@@ -2,7 +2,7 @@
 
 use num_complex::Complex64;
 
-use super::{Combining, EnvelopeSum, Receiver, ActivePulse, modulus};
+use super::{ActivePulse, Combining, EnvelopeSum, Receiver, modulus};
 use crate::acoustics::Detector;
 
 impl EnvelopeSum<'_> {
@@ -44,9 +44,8 @@ impl EnvelopeSum<'_> {
         }
         // Fast path for most sensors.
         let Receiver { shape, lead_us, .. } = self.receiver;
-        let fields = live
-            .iter()
-            .map(|pulse| pulse.field * shape.real_at(t_us - pulse.tof_us + lead_us));
+        let fields =
+            live.iter().map(|pulse| pulse.field * shape.real_at(t_us - pulse.tof_us + lead_us));
         match self.receiver.combining {
             Combining::Incoherent => fields.map(|field| field.norm_sqr()).sum::<f64>().sqrt(),
             _ => modulus(fields.fold(Complex64::ZERO, |sum, field| sum + field)),

@@ -6,7 +6,7 @@ use crate::acoustics::EchoShape;
 
 pub(super) struct ActivePulse {
     pub(super) tof_us: f64,
-    /// Start and end.
+    /// Start and end, microseconds after firing.
     pub(super) lasts_us: [f64; 2],
     /// Amplitude, to be multiplied with the shape and the gain increase since firing.
     pub(super) size: f64,
@@ -14,7 +14,7 @@ pub(super) struct ActivePulse {
     /// Amplitude and phase, computed on demand.
     pub(super) field: Complex64,
     has_field: bool,
-    /// Maximum modulus.
+    /// Maximum modulus over the pulse.
     pub(super) strength: f64,
     /// Total strength of all pulses active when this one begins, itself included: an upper bound
     /// until the next one begins.
@@ -42,8 +42,8 @@ impl ActivePulse {
         }
     }
 
-    /// Creates a transmitted with its own shape or that of `transmitted`. `others` is the total strength of the
-    /// pulses still active when it begins.
+    /// Creates a transmitted with its own shape or that of `transmitted`. `others` is the total
+    /// strength of the pulses still active when it begins.
     pub(super) fn new(
         (tof_us, lasts_us): (f64, [f64; 2]),
         (size, phase_rad): (f64, f64),

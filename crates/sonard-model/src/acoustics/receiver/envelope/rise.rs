@@ -1,6 +1,6 @@
 //! Search for the time at which the envelope has exceeded the threshold for the integration time.
 
-use super::{EnvelopeSum, IsolatedPulse, ActivePulse, WINDOW_SLACK_US};
+use super::{ActivePulse, EnvelopeSum, IsolatedPulse, WINDOW_SLACK_US};
 use crate::{
     acoustics::{Detector, Gain, PulseArrival},
     reading::PingStatus,
@@ -202,8 +202,7 @@ impl EnvelopeSum<'_> {
         if rise_us < t_us {
             return None;
         }
-        let done_us =
-            rise_us + self.receiver.integration_us - pulse.tof_us + self.receiver.lead_us;
+        let done_us = rise_us + self.receiver.integration_us - pulse.tof_us + self.receiver.lead_us;
         Some((rise_us, self.shape(pulse).most_from(done_us) >= level_at(rise_us)))
     }
 
@@ -260,9 +259,9 @@ impl EnvelopeSum<'_> {
 /// Envelope relative to the threshold.
 #[derive(Clone, Copy)]
 struct RelativeLevel {
-    /// Envelope over threshold.
+    /// Ratio of envelope to threshold.
     relative: f64,
-    /// Effective threshold.
+    /// Effective threshold at that time.
     threshold: f64,
 }
 

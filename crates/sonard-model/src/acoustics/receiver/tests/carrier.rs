@@ -18,8 +18,7 @@ fn reported_us(receiver: &Receiver, amplitude: f64, phase_rad: f64) -> f64 {
 
 #[test]
 fn weak_echoes_are_cycles_late() {
-    let (envelope, carrier) =
-        (with_detector(Detector::Envelope), with_detector(Detector::Carrier));
+    let (envelope, carrier) = (with_detector(Detector::Envelope), with_detector(Detector::Carrier));
     assert!((reported_us(&carrier, 1.0, 0.0) - 3000.0).abs() < 0.01, "the reference is not late");
     let mut most = 0.0_f64;
     for step in 0..60 {
