@@ -34,10 +34,10 @@ impl Trapezoid {
     /// in seconds after the start.
     #[must_use]
     pub fn braked_at(&self, time_s: f64) -> (i32, f64) {
-        let (gone, speed) = self.state_at(time_s);
+        let (travelled, speed) = self.state_at(time_s);
         let distance = f64::from(self.steps.unsigned_abs());
-        let stand = (gone + speed * speed / (2.0 * self.acceleration)).round().min(distance);
-        (stand as i32 * self.steps.signum(), time_s + speed / self.acceleration)
+        let stop = (travelled + speed * speed / (2.0 * self.acceleration)).round().min(distance);
+        (stop as i32 * self.steps.signum(), time_s + speed / self.acceleration)
     }
 
     /// Time of pulse `number` (from 1 on), seconds after the start: the motor passes the midpoint
@@ -45,27 +45,27 @@ impl Trapezoid {
     #[must_use]
     pub fn pulse_s(&self, number: u32) -> f64 {
         let distance = f64::from(self.steps.unsigned_abs());
-        let gone = (f64::from(number) - 0.5).clamp(0.0, distance);
+        let travelled = (f64::from(number) - 0.5).clamp(0.0, distance);
         let ramp = self.peak * self.peak / (2.0 * self.acceleration);
-        if gone <= ramp.min(distance / 2.0) {
-            (2.0 * gone / self.acceleration).sqrt()
-        } else if gone < distance - ramp {
-            self.peak / self.acceleration + (gone - ramp) / self.peak
+        if travelled <= ramp.min(distance / 2.0) {
+            (2.0 * travelled / self.acceleration).sqrt()
+        } else if travelled < distance - ramp {
+            self.peak / self.acceleration + (travelled - ramp) / self.peak
         } else {
-            self.duration_s() - (2.0 * (distance - gone) / self.acceleration).sqrt()
+            self.duration_s() - (2.0 * (distance - travelled) / self.acceleration).sqrt()
         }
     }
 
     /// Same move, braked from `time_s` on, to the position of [`Self::braked_at`].
     #[must_use]
     pub fn braked(&self, time_s: f64) -> Self {
-        let (stand, _) = self.braked_at(time_s);
-        let (gone, speed) = self.state_at(time_s);
-        let slowing = f64::from(self.steps.unsigned_abs()) - gone
+        let (stop, _) = self.braked_at(time_s);
+        let (travelled, speed) = self.state_at(time_s);
+        let slowing = f64::from(self.steps.unsigned_abs()) - travelled
             <= speed * speed / (2.0 * self.acceleration) + 0.5;
         let peak = if slowing { self.peak } else { speed };
-        let reachable = (f64::from(stand.unsigned_abs()) * self.acceleration).sqrt();
-        Self { steps: stand, peak: peak.min(reachable), acceleration: self.acceleration }
+        let reachable = (f64::from(stop.unsigned_abs()) * self.acceleration).sqrt();
+        Self { steps: stop, peak: peak.min(reachable), acceleration: self.acceleration }
     }
 
     /// Signed number of steps.
@@ -113,8 +113,11 @@ mod tests {
             let motion = Trapezoid::new(steps, speed, acceleration);
             let pulses: Vec<f64> = (1..=steps.unsigned_abs()).map(|k| motion.pulse_s(k)).collect();
             for (k, at_s) in pulses.iter().enumerate() {
-                let (gone, _) = motion.state_at(*at_s);
-                assert!((gone - (k as f64 + 0.5)).abs() < 1e-9, "{steps}: pulse {k} at {gone}");
+                let (travelled, _) = motion.state_at(*at_s);
+                assert!(
+                    (travelled - (k as f64 + 0.5)).abs() < 1e-9,
+                    "{steps}: pulse {k} at {travelled}"
+                );
             }
             // Symmetric in time.
             let end_s = motion.duration_s();
@@ -131,8 +134,8 @@ mod tests {
             let time_s = f64::from(hundredth) / 100.0;
             let braked = motion.braked(time_s);
             assert_eq!(braked.steps(), motion.braked_at(time_s).0);
-            let (gone, _) = motion.state_at(time_s);
-            for k in 1..=gone as u32 {
+            let (travelled, _) = motion.state_at(time_s);
+            for k in 1..=travelled as u32 {
                 let off_s = braked.pulse_s(k) - motion.pulse_s(k);
                 // Rounding of the final position by half a step, at the current speed.
                 assert!(off_s.abs() < 0.01, "{time_s}: pulse {k} is {off_s} s off");
@@ -145,10 +148,10 @@ mod tests {
         let motion = Trapezoid::new(-1000, 500, 1000);
         let mut last = 0;
         for tenth in 0..=30 {
-            let (stand, at_s) = motion.braked_at(f64::from(tenth) / 10.0);
-            assert!((-1000..=last).contains(&stand), "{tenth}: {stand} after {last}");
+            let (stop, at_s) = motion.braked_at(f64::from(tenth) / 10.0);
+            assert!((-1000..=last).contains(&stop), "{tenth}: {stop} after {last}");
             assert!(at_s >= f64::from(tenth) / 10.0);
-            last = stand;
+            last = stop;
         }
         assert_eq!(last, -1000);
         // Braking from full speed takes v^2 / 2a = 125 steps.

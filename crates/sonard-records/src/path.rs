@@ -88,7 +88,7 @@ impl Point {
 }
 
 impl InteractionRecord {
-    fn in_words(&self) -> String {
+    fn label(&self) -> String {
         match self.kind {
             InteractionKind::Diffraction => format!("edge {}", self.id),
             _ => self.id.clone(),
@@ -100,8 +100,7 @@ impl PathRecord {
     /// Ids of the interactions in order, edges marked as such.
     #[must_use]
     pub fn in_words(&self) -> String {
-        let parts: Vec<String> =
-            self.interactions.iter().map(InteractionRecord::in_words).collect();
+        let parts: Vec<String> = self.interactions.iter().map(InteractionRecord::label).collect();
         parts.join(", ")
     }
 

@@ -99,7 +99,7 @@ impl Course {
             return Err("numbers must be finite".into());
         }
         if !self.poses.is_empty() && time_s.is_some() == self.times_s.is_empty() {
-            return Err("either every line must have a time_s, or none".into());
+            return Err("either every line has a time_s, or none".into());
         }
         if let Some(time_s) = time_s {
             match self.times_s.last() {

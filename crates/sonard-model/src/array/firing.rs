@@ -91,10 +91,10 @@ impl RangerArray {
     }
 
     /// Firings whose sound can arrive during a firing of a round, counted from 0: those of its own
-    /// slot and of `turns_back` slots before, latest first. The array is assumed to fire round
+    /// slot and of `slots_back` slots before, latest first. The array is assumed to fire round
     /// after round without a pause.
     #[must_use]
-    pub fn others(&self, firing: usize, turns_back: usize) -> Vec<OtherFiring> {
+    pub fn others(&self, firing: usize, slots_back: usize) -> Vec<OtherFiring> {
         let turns = self.turns();
         let mut first = 0;
         let own = turns.iter().position(|turn| {
@@ -105,7 +105,7 @@ impl RangerArray {
         let among = firing + turns[own].len() - first;
         let together = turns[own].iter().enumerate().filter(|(place, _)| *place != among);
         let together = together.map(|(_, &ranger)| OtherFiring { ranger, before_us: 0.0 });
-        let before = (1..=turns_back).flat_map(|back| {
+        let before = (1..=slots_back).flat_map(|back| {
             let turn = (own + turns.len() * back - back) % turns.len();
             let before_us = 1e3 * self.interval_ms * back as f64;
             turns[turn].iter().map(move |&ranger| OtherFiring { ranger, before_us })

@@ -24,14 +24,14 @@ const MAX_ROUNDS: usize = 50;
 /// Segments that touch only at their ends.
 #[derive(Debug, Clone, Default)]
 pub struct Arrangement {
-    /// SegmentEnd points of the pieces, without duplicates.
+    /// End points of the pieces, without duplicates.
     pub points: Vec<DVec2>,
     /// Pieces of the segments; no two connect the same points.
     pub pieces: Vec<Piece>,
     /// Overlapping segments that were given later, by the key ([`between`]) of the piece that
     /// covers them.
     pub covered: HashMap<[u32; 2], Vec<u32>>,
-    /// SegmentEnd points of each segment.
+    /// End points of each segment.
     pub ends: Vec<[u32; 2]>,
 }
 
@@ -55,8 +55,11 @@ impl Arrangement {
     /// The run time is O(n log n) for segments with few neighbours.
     #[must_use]
     pub fn of(segments: &[(DVec2, DVec2)]) -> Self {
-        let mut parts: Vec<Part> =
-            segments.iter().zip(0..).map(|(&(a, b), segment)| Part { a, b, segment }).collect();
+        let mut parts: Vec<SegmentPart> = segments
+            .iter()
+            .zip(0..)
+            .map(|(&(a, b), segment)| SegmentPart { a, b, segment })
+            .collect();
         let mut joined = join(&mut parts);
         // After each round, ends are identical or farther apart than SAME_M, and every contact is
         // split.
@@ -73,13 +76,13 @@ impl Arrangement {
 }
 
 #[derive(Debug, Clone, Copy)]
-struct Part {
+struct SegmentPart {
     a: DVec2,
     b: DVec2,
     segment: u32,
 }
 
-impl Part {
+impl SegmentPart {
     /// Pieces of this part, split at `points` near it.
     fn cut(self, mut points: Vec<DVec2>) -> Vec<Self> {
         if points.is_empty() {
@@ -139,7 +142,7 @@ impl Part {
 }
 
 /// Split points inside each part, where another part ends or crosses it.
-fn cuts(parts: &[Part]) -> Vec<Vec<DVec2>> {
+fn cuts(parts: &[SegmentPart]) -> Vec<Vec<DVec2>> {
     let boxes = parts.iter().enumerate().map(|(index, part)| {
         let bounds = part.bounds();
         GeomWithData::new(Rectangle::from_corners(bounds.lower(), bounds.upper()), index)
@@ -169,14 +172,14 @@ fn cuts(parts: &[Part]) -> Vec<Vec<DVec2>> {
     cuts
 }
 
-/// SegmentEnd points of parts, and their indices for each part.
+/// End points of parts, and their indices for each part.
 struct Joined {
     points: Vec<DVec2>,
     ends: Vec<[u32; 2]>,
 }
 
 /// Merges ends that are closer than [`SAME_M`] into the first of them.
-fn join(parts: &mut [Part]) -> Joined {
+fn join(parts: &mut [SegmentPart]) -> Joined {
     let ends: Vec<DVec2> = parts.iter().flat_map(|part| [part.a, part.b]).collect();
     let tree = RTree::bulk_load(
         ends.iter().enumerate().map(|(i, end)| GeomWithData::new(end.to_array(), i)).collect(),
@@ -203,7 +206,7 @@ fn join(parts: &mut [Part]) -> Joined {
 }
 
 /// Collects the pieces of the segments; overlapping pieces are listed as covered.
-fn collect(parts: &[Part], joined: Joined, segments: usize) -> Arrangement {
+fn collect(parts: &[SegmentPart], joined: Joined, segments: usize) -> Arrangement {
     let mut result = Arrangement {
         points: joined.points,
         ends: vec![NO_ENDS; segments],

@@ -37,9 +37,9 @@ pub struct SnapMove {
 pub enum SnapCause {
     /// Gap to another end.
     Apart(SegmentEnd),
-    /// SegmentEnd short of a segment.
+    /// End short of a segment.
     Short(u32),
-    /// SegmentEnd past a segment.
+    /// End past a segment.
     Past(u32),
     /// Corner slightly off a right angle, or the segment's other end was moved.
     Turned,

@@ -80,7 +80,7 @@ impl fmt::Display for JsonPath {
     }
 }
 
-/// MemberPart of an object member.
+/// Part of an object member.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum MemberPart {
     Value,
@@ -88,9 +88,9 @@ pub(super) enum MemberPart {
 }
 
 /// Parsed document with the source position of each value.
-pub(super) struct Located<'a>(Value<'a>);
+pub(super) struct LocatedDocument<'a>(Value<'a>);
 
-impl<'a> Located<'a> {
+impl<'a> LocatedDocument<'a> {
     /// Returns `None` if the text is not JSON.
     pub(super) fn new(text: &'a str) -> Option<Self> {
         let options = ParseOptions { allow_comments: false, ..ParseOptions::default() };

@@ -24,11 +24,11 @@ const MAX_NAMED: usize = 8;
 
 /// Closed outlines of a scene's plan, classified as rooms and bodies.
 #[derive(Debug, Default)]
-pub(super) struct Outlines {
+pub(super) struct SceneOutlines {
     plan: FloorPlan,
     /// Outer boundaries of the connected components.
-    around: Rings,
-    rings: Rings,
+    around: WallRings,
+    rings: WallRings,
     /// Classification by ring: a body that sound does not enter, or else a room.
     is_body: Vec<bool>,
     /// Bounding box of all rooms, lower left and upper right corner, metres, if there are any.
@@ -37,7 +37,7 @@ pub(super) struct Outlines {
     outside_counts: bool,
 }
 
-impl Outlines {
+impl SceneOutlines {
     /// Finds and classifies the outlines of a scene. The order and direction of walls are
     /// irrelevant.
     ///
@@ -48,10 +48,10 @@ impl Outlines {
     /// than the largest room.
     pub(super) fn from_scene(scene: &Scene) -> Self {
         let plan = scene.floor_plan();
-        let rings = Rings::new(rings(scene, &plan.arrangement));
+        let rings = WallRings::new(rings(scene, &plan.arrangement));
         let boundaries = plan.arrangement.outlines().into_iter();
-        let around = Rings::new(
-            boundaries.map(|walk| Ring::new(Vec::new(), &walk, &plan.arrangement)).collect(),
+        let around = WallRings::new(
+            boundaries.map(|walk| WallRing::new(Vec::new(), &walk, &plan.arrangement)).collect(),
         );
         let faces = Faces::new(&plan, &rings);
         let is_body = faces.bodies(scene, &plan, &rings);
@@ -81,7 +81,7 @@ impl Outlines {
         Some(self.rings.all[ring].name(scene))
     }
 
-    fn rooms(&self) -> impl Iterator<Item = &Ring> {
+    fn rooms(&self) -> impl Iterator<Item = &WallRing> {
         self.rings
             .all
             .iter()
@@ -97,7 +97,7 @@ impl Outlines {
             here.any(|ring| !self.is_body[ring])
         };
         // A component belongs to a room if any part of it is in the room or on its walls.
-        let touches_room = |part: &Ring| {
+        let touches_room = |part: &WallRing| {
             part.corners
                 .iter()
                 .any(|&corner| is_in_room(corner) || self.rooms().any(|room| room.touches(corner)))
@@ -109,7 +109,7 @@ impl Outlines {
 
 /// Closed loop of walls.
 #[derive(Debug, Clone)]
-struct Ring {
+struct WallRing {
     /// Indices into `scene.walls`, ascending.
     walls: Vec<u32>,
     corners: Vec<DVec2>,
@@ -118,7 +118,7 @@ struct Ring {
     extent: [[f64; 2]; 2],
 }
 
-impl Ring {
+impl WallRing {
     fn new(mut walls: Vec<u32>, points: &[u32], plan: &Arrangement) -> Self {
         walls.sort_unstable();
         let corners: Vec<DVec2> = points.iter().map(|&point| plan.points[point as usize]).collect();
@@ -166,14 +166,14 @@ fn number_in_polyline(id: &str) -> Option<(&str, u32)> {
 
 /// Rings with a spatial index.
 #[derive(Debug, Default)]
-struct Rings {
-    all: Vec<Ring>,
+struct WallRings {
+    all: Vec<WallRing>,
     boxes: RTree<GeomWithData<Rectangle<[f64; 2]>, usize>>,
 }
 
-impl Rings {
-    fn new(all: Vec<Ring>) -> Self {
-        let around = |(index, ring): (usize, &Ring)| {
+impl WallRings {
+    fn new(all: Vec<WallRing>) -> Self {
+        let around = |(index, ring): (usize, &WallRing)| {
             let [low, high] = ring.extent;
             GeomWithData::new(Rectangle::from_corners(low, high), index)
         };
@@ -193,7 +193,7 @@ impl Rings {
 }
 
 /// Rings of walls: closed polylines, and closed loops of the remaining walls.
-fn rings(scene: &Scene, plan: &Arrangement) -> Vec<Ring> {
+fn rings(scene: &Scene, plan: &Arrangement) -> Vec<WallRing> {
     let mut polylines: BTreeMap<&str, Vec<(u32, u32)>> = BTreeMap::new();
     for (wall, index) in scene.walls.iter().zip(0..) {
         if let Some((stem, number)) = number_in_polyline(&wall.id) {
@@ -211,7 +211,7 @@ fn rings(scene: &Scene, plan: &Arrangement) -> Vec<Ring> {
         if is_closed && walls.len() >= 3 {
             walls.iter().for_each(|&wall| is_free[wall as usize] = false);
             let points: Vec<u32> = ends.iter().map(|end| end[0]).collect();
-            rings.push(Ring::new(walls, &points, plan));
+            rings.push(WallRing::new(walls, &points, plan));
         }
     }
     rings.extend(loops(plan, is_free));
@@ -219,7 +219,7 @@ fn rings(scene: &Scene, plan: &Arrangement) -> Vec<Ring> {
 }
 
 /// Closed loops of walls joined at their ends, without dead ends.
-fn loops(plan: &Arrangement, mut is_free: Vec<bool>) -> Vec<Ring> {
+fn loops(plan: &Arrangement, mut is_free: Vec<bool>) -> Vec<WallRing> {
     let mut at: HashMap<u32, Vec<u32>> = HashMap::new();
     for (ends, wall) in plan.ends.iter().zip(0_u32..).filter(|(ends, _)| ends[0] != ends[1]) {
         if is_free[wall as usize] {
@@ -259,13 +259,13 @@ fn loops(plan: &Arrangement, mut is_free: Vec<bool>) -> Vec<Ring> {
     rings
 }
 
-fn ring_around(plan: &Arrangement, walls: Vec<u32>) -> Option<Ring> {
+fn ring_around(plan: &Arrangement, walls: Vec<u32>) -> Option<WallRing> {
     let at = |point: u32| plan.points[point as usize];
     let segments: Vec<_> =
         walls.iter().map(|&wall| plan.ends[wall as usize].map(at)).map(|[a, b]| (a, b)).collect();
     let own = Arrangement::of(&segments);
     let outline = own.outlines().into_iter().next()?;
-    let ring = Ring::new(walls, &outline, &own);
+    let ring = WallRing::new(walls, &outline, &own);
     (ring.area > 0.0).then_some(ring)
 }
 
@@ -277,7 +277,7 @@ struct Faces {
 
 impl Faces {
     /// Tests points on both sides of each piece: every face is adjacent to a piece.
-    fn new(plan: &FloorPlan, rings: &Rings) -> Self {
+    fn new(plan: &FloorPlan, rings: &WallRings) -> Self {
         let Arrangement { points, pieces, .. } = &plan.arrangement;
         let test_points = pieces.iter().flat_map(|piece| {
             let [a, b] = piece.ends.map(|end| points[end as usize]);
@@ -289,7 +289,7 @@ impl Faces {
     }
 
     /// Classification of the rings: `true` for bodies.
-    fn bodies(&self, scene: &Scene, plan: &FloorPlan, rings: &Rings) -> Vec<bool> {
+    fn bodies(&self, scene: &Scene, plan: &FloorPlan, rings: &WallRings) -> Vec<bool> {
         let area = |ring: usize| rings.all[ring].area;
         let mut is_body = vec![false; rings.all.len()];
         let mut is_empty = vec![true; rings.all.len()];
@@ -324,7 +324,7 @@ impl Faces {
         &self,
         scene: &Scene,
         plan: &FloorPlan,
-        rings: &Rings,
+        rings: &WallRings,
         is_empty: &mut [bool],
         has_contact: &mut [bool],
     ) {

@@ -5,7 +5,7 @@ use super::{
     check::checked,
     error::{floor_char_boundary, line_and_column},
     file::SceneFile,
-    locate::{JsonPath, Located, MemberPart},
+    locate::{JsonPath, LocatedDocument, MemberPart},
     prescan::is_unambiguous,
 };
 
@@ -26,10 +26,10 @@ fn read(text: &str, whole: &str) -> Result<Scene, SceneError> {
     // The syntax tree takes thirty times the memory of the text: it is built only to locate a
     // fault.
     let at = |path: &JsonPath, part: MemberPart| {
-        Located::new(text).map_or(0..text.len(), |located| located.find(path, part))
+        LocatedDocument::new(text).map_or(0..text.len(), |located| located.find(path, part))
     };
     let is_unambiguous = is_unambiguous(text).map_err(|error| syntax_error(text, &error))?;
-    if !is_unambiguous && let Some(located) = Located::new(text) {
+    if !is_unambiguous && let Some(located) = LocatedDocument::new(text) {
         reject_ambiguous(text, &located)?;
     }
     let mut json = serde_json::Deserializer::from_str(text);
@@ -57,7 +57,7 @@ fn read(text: &str, whole: &str) -> Result<Scene, SceneError> {
 }
 
 /// Rejects documents that the parser accepts but a reader would misunderstand.
-fn reject_ambiguous(text: &str, located: &Located<'_>) -> Result<(), SceneError> {
+fn reject_ambiguous(text: &str, located: &LocatedDocument<'_>) -> Result<(), SceneError> {
     if let Some((path, span)) = located.duplicate_key() {
         let name = path.last_key().unwrap_or_default().to_owned();
         return Err(SceneError::new(text, span, &path, SceneProblem::DuplicateKey(name)));

@@ -5,7 +5,7 @@ use thiserror::Error;
 use super::{
     FloorPlan, Scene,
     error::{MAX_COORDINATE_M, suggest},
-    outline::Outlines,
+    outline::SceneOutlines,
     robot::wall_between,
 };
 use crate::geometry::{DVec2, Pose, distance_to_segment};
@@ -191,7 +191,7 @@ impl Scene {
     /// # Errors
     /// Names the violated condition and the extent of the room.
     pub fn check_pose(&self, pose: &Pose) -> Result<(), PoseError> {
-        self.check_pose_among(&Outlines::from_scene(self), pose)
+        self.check_pose_among(&SceneOutlines::from_scene(self), pose)
     }
 
     /// Checks many poses as [`check_pose`](Self::check_pose) does, finding the outlines once.
@@ -199,7 +199,7 @@ impl Scene {
     /// # Errors
     /// Returns the index of the first pose that fails, and its error.
     pub fn check_poses(&self, poses: &[Pose]) -> Result<(), (usize, PoseError)> {
-        let outlines = Outlines::from_scene(self);
+        let outlines = SceneOutlines::from_scene(self);
         let check =
             |(at, pose)| self.check_pose_among(&outlines, pose).map_err(|error| (at, error));
         poses.iter().enumerate().try_for_each(check)
@@ -208,7 +208,7 @@ impl Scene {
     /// Checks a pose against precomputed outlines.
     pub(super) fn check_pose_among(
         &self,
-        outlines: &Outlines,
+        outlines: &SceneOutlines,
         pose: &Pose,
     ) -> Result<(), PoseError> {
         within("DEG", pose.heading_deg, MAX_HEADING_DEG)?;
@@ -227,7 +227,7 @@ impl Scene {
         pose: &Pose,
         places: &[DVec2],
     ) -> Result<(), (Option<usize>, PoseError)> {
-        self.check_places_among(&Outlines::from_scene(self), pose, places)
+        self.check_places_among(&SceneOutlines::from_scene(self), pose, places)
     }
 
     /// Checks many poses as [`check_places`](Self::check_places) does, each with its face
@@ -239,7 +239,7 @@ impl Scene {
         &self,
         poses: impl IntoIterator<Item = (Pose, Vec<DVec2>)>,
     ) -> Result<(), (usize, (Option<usize>, PoseError))> {
-        let outlines = Outlines::from_scene(self);
+        let outlines = SceneOutlines::from_scene(self);
         poses.into_iter().enumerate().try_for_each(|(at, (pose, places))| {
             self.check_places_among(&outlines, &pose, &places).map_err(|error| (at, error))
         })
@@ -247,7 +247,7 @@ impl Scene {
 
     fn check_places_among(
         &self,
-        outlines: &Outlines,
+        outlines: &SceneOutlines,
         pose: &Pose,
         places: &[DVec2],
     ) -> Result<(), (Option<usize>, PoseError)> {
@@ -273,11 +273,11 @@ impl Scene {
     /// [`check_places`](Self::check_places).
     #[must_use]
     pub fn can_stand(&self, places: &[DVec2]) -> Vec<bool> {
-        let outlines = Outlines::from_scene(self);
+        let outlines = SceneOutlines::from_scene(self);
         places.iter().map(|place| self.check_place(&outlines, *place).is_ok()).collect()
     }
 
-    fn check_place(&self, outlines: &Outlines, position: DVec2) -> Result<(), PoseError> {
+    fn check_place(&self, outlines: &SceneOutlines, position: DVec2) -> Result<(), PoseError> {
         let DVec2 { x: x_m, y: y_m } = position;
         within("X", x_m, MAX_COORDINATE_M)?;
         within("Y", y_m, MAX_COORDINATE_M)?;
@@ -313,7 +313,7 @@ impl Scene {
     }
 
     /// Name of the body around a point.
-    fn body_around(&self, outlines: &Outlines, position: DVec2) -> Option<String> {
+    fn body_around(&self, outlines: &SceneOutlines, position: DVec2) -> Option<String> {
         let cylinder = self
             .cylinders
             .iter()

@@ -14,7 +14,7 @@ use std::cell::Cell;
 use num_complex::Complex64;
 
 use self::pulse::ActivePulse;
-use super::{Combining, Incident, PulseArrival, Receiver, gain::Step, noise::NoiseTrack};
+use super::{Combining, Incident, PulseArrival, Receiver, gain::GainInterval, noise::NoiseTrack};
 use crate::acoustics::{EchoShape, Gain};
 
 /// Maximum relative amplitude of neighbouring arrivals that are neglected.
@@ -40,7 +40,7 @@ pub(super) struct EnvelopeSum<'a> {
     /// Number of pulses that have begun, and number of those that have ended.
     begun: usize,
     over: usize,
-    /// Number of begun pulses whose field is computed, ended ones not counted as missing.
+    /// Number of begun pulses whose fields are up to date.
     summed: usize,
     /// Start of the next arrival, or the horizon; infinite if there is neither.
     next_us: f64,
@@ -49,12 +49,12 @@ pub(super) struct EnvelopeSum<'a> {
     /// Value of [`Self::active_range`] for which step-by-step evaluation was last found necessary.
     watched: Option<(usize, usize)>,
     /// Upper bounds for the active pulses, keyed by [`Self::active_range`].
-    bounds: Bounds,
+    bounds: ActiveBounds,
     /// Source of the last rise, if it was an isolated pulse with the carrier's phase and the
     /// detector uses the envelope.
     isolated: Option<IsolatedPulse>,
     /// Gain step of the last query.
-    step: Cell<Step>,
+    step: Cell<GainInterval>,
     /// All arrivals have the shape and phase of the transmitted pulse, the gain is constant within
     /// a pulse, and there is no noise.
     is_plain: bool,
@@ -78,7 +78,7 @@ struct IsolatedPulse {
 
 /// Upper bounds for the sum of the active pulses.
 #[derive(Clone, Copy, Default)]
-struct Bounds {
+struct ActiveBounds {
     /// Active range that the bounds belong to.
     range: (usize, usize),
     strength: f64,
@@ -120,7 +120,7 @@ impl<'a> EnvelopeSum<'a> {
             next_us: f64::INFINITY,
             next_tof_us: f64::INFINITY,
             watched: None,
-            bounds: Bounds::default(),
+            bounds: ActiveBounds::default(),
             isolated: None,
             step: Cell::new(receiver.sensitivity.step_at(0.0)),
             is_plain,
@@ -175,7 +175,7 @@ impl<'a> EnvelopeSum<'a> {
             self.pulses[self.over..].iter().take_while(|pulse| !pulse.is_placeholder()).count();
         self.pulses.truncate(self.over + known);
         self.begun = self.pulses.partition_point(|pulse| pulse.lasts_us[0] <= t_us).max(self.over);
-        (self.summed, self.watched, self.bounds) = (0, None, Bounds::default());
+        (self.summed, self.watched, self.bounds) = (0, None, ActiveBounds::default());
         self.peek_next();
     }
 
@@ -286,10 +286,10 @@ impl<'a> EnvelopeSum<'a> {
     }
 
     /// Upper bounds for the sum of the active pulses.
-    fn bounds(&mut self) -> Bounds {
+    fn bounds(&mut self) -> ActiveBounds {
         if self.bounds.range != self.active_range() {
             let live = &self.pulses[self.over..self.begun];
-            self.bounds = Bounds {
+            self.bounds = ActiveBounds {
                 range: self.active_range(),
                 strength: live.iter().map(|pulse| pulse.strength).sum(),
                 steepest: live.iter().map(|pulse| pulse.steepest).sum(),
@@ -381,16 +381,16 @@ fn modulus(number: Complex64) -> f64 {
 /// which keeps the bound valid.
 fn min_threshold(receiver: &Receiver) -> f64 {
     // Same range clamp as in `Receiver::threshold_at`.
-    let least_us = 1e-3 / receiver.range_m(1.0);
-    let (mut from_us, mut least) = (receiver.blanking_us, f64::INFINITY);
+    let min_us = 1e-3 / receiver.range_m(1.0);
+    let (mut from_us, mut minimum) = (receiver.blanking_us, f64::INFINITY);
     for &(until_us, sensitivity) in &receiver.sensitivity.steps {
         if from_us < until_us {
-            least = least.min(from_us.max(least_us) * sensitivity);
+            minimum = minimum.min(from_us.max(min_us) * sensitivity);
             from_us = until_us;
         }
     }
-    if least.is_finite() {
-        receiver.threshold * receiver.range_m(least)
+    if minimum.is_finite() {
+        receiver.threshold * receiver.range_m(minimum)
     } else {
         receiver.threshold
     }

@@ -33,7 +33,7 @@ impl Sensitivity {
 
     /// Effective threshold within a step of the gain.
     #[inline]
-    pub(super) fn in_step(&self, step: &Step, nominal: f64, range_m: f64) -> f64 {
+    pub(super) fn in_step(&self, step: &GainInterval, nominal: f64, range_m: f64) -> f64 {
         let reciprocal = step.reciprocal;
         let threshold = reciprocal.map_or(nominal, |by| nominal * range_m.max(1e-3) * by);
         if self.rise_db_per_m == 0.0 {
@@ -43,30 +43,30 @@ impl Sensitivity {
     }
 
     /// Gain step at a time after firing.
-    pub(super) fn step_at(&self, t_us: f64) -> Step {
+    pub(super) fn step_at(&self, t_us: f64) -> GainInterval {
         let mut from_us = f64::NEG_INFINITY;
         for &(until_us, reciprocal) in &self.steps {
             if t_us < until_us {
-                return Step { from_us, until_us, reciprocal: Some(reciprocal) };
+                return GainInterval { from_us, until_us, reciprocal: Some(reciprocal) };
             }
             from_us = from_us.max(until_us);
         }
         // The last step has no end.
         let reciprocal = self.steps.last().map(|step| step.1);
-        Step { from_us, until_us: f64::INFINITY, reciprocal }
+        GainInterval { from_us, until_us: f64::INFINITY, reciprocal }
     }
 }
 
 /// A step of the gain.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Step {
+pub(super) struct GainInterval {
     from_us: f64,
     until_us: f64,
     /// Reciprocal of the gain; `None` for gain that compensates spreading.
     reciprocal: Option<f64>,
 }
 
-impl Step {
+impl GainInterval {
     #[inline]
     pub(super) fn holds(&self, t_us: f64) -> bool {
         self.from_us <= t_us && t_us < self.until_us

@@ -111,14 +111,14 @@ fn first_detectable_arrival_wins() {
 
 #[test]
 fn no_echo_names_best_candidate() {
-    let silence = check(
+    let no_echo = check(
         &[(1000.0, 1.0), (3000.0, 0.01), (4000.0, 0.015), (25_000.0, 1.0)],
         PingStatus::NoEcho,
         &[],
     );
-    assert_eq!(silence.arrival.map(|arrival| arrival.index), Some(2));
+    assert_eq!(no_echo.arrival.map(|arrival| arrival.index), Some(2));
     let lacked_db = 20.0 * (0.015_f64 / 0.02).log10();
-    assert!((silence.margin_db.expect("a margin") - lacked_db).abs() < 1e-6);
+    assert!((no_echo.margin_db.expect("a margin") - lacked_db).abs() < 1e-6);
     assert_eq!(check(&[], PingStatus::NoEcho, &[]).arrival, None);
 }
 

@@ -29,13 +29,13 @@ const SHARE: f64 = 0.5;
 const MAX_SEGMENTS: usize = 1000;
 
 /// Corner of two sides, each extended over collinear segments.
-struct Corner {
+struct SideCorner {
     vertex: u32,
     /// Far ends of the two sides.
     far: [u32; 2],
 }
 
-/// Vertex inner a side, at a fraction of its length.
+/// Vertex within a side, at a fraction of its length.
 struct InnerVertex {
     vertex: u32,
     ends: [u32; 2],
@@ -53,7 +53,7 @@ pub(super) fn square_up(vertices: &mut Vertices, joints: &Joints, max_move_m: f6
     let (corners, inner) = sides(vertices, joints);
     let mut is_moved = false;
     for _ in 0..MAX_ROUNDS {
-        let off = |corner: &Corner| {
+        let off = |corner: &SideCorner| {
             let at = vertices.at[corner.vertex as usize];
             let [a, b] = corner.far.map(|far| vertices.at[far as usize]);
             let off = right_angled(at, a, b) - at;
@@ -74,8 +74,8 @@ pub(super) fn square_up(vertices: &mut Vertices, joints: &Joints, max_move_m: f6
     }
 }
 
-/// Corners of two sides, and vertices inner sides.
-fn sides(vertices: &Vertices, joints: &Joints) -> (Vec<Corner>, Vec<InnerVertex>) {
+/// Corners of two sides, and vertices within sides.
+fn sides(vertices: &Vertices, joints: &Joints) -> (Vec<SideCorner>, Vec<InnerVertex>) {
     let (mut corners, mut inner) = (Vec::new(), Vec::new());
     for vertex in 0..vertices.len() as u32 {
         let ends: SmallVec<[SegmentEnd; 4]> = vertices.ends(vertex).collect();
@@ -84,7 +84,7 @@ fn sides(vertices: &Vertices, joints: &Joints) -> (Vec<Corner>, Vec<InnerVertex>
             [first, second]
                 if !is_through && joints.segments_at(vertex).is_empty() && first.0 != second.0 =>
             {
-                corners.push(Corner {
+                corners.push(SideCorner {
                     vertex,
                     far: [first, second].map(|end| far_end(vertices, end)),
                 });

@@ -15,7 +15,7 @@ const MAX_NEAR: usize = 32;
 /// intersection of lines that differ by less than a milliradian is ill-defined.
 const HOLD: f64 = 1e-6;
 
-/// SegmentEnd of a segment: index of the segment, and `true` for its second end.
+/// End of a segment: index of the segment, and `true` for its second end.
 pub type SegmentEnd = (u32, bool);
 
 /// Distinct end points of segments.
@@ -131,7 +131,7 @@ impl Vertices {
         }
         let determinant = xx * yy - xy * xy;
         let mut at = middle;
-        // Iterated with the current position held, so that intersecting lines are met exactly.
+        // Iterated with the current position held, so that the position is exact for intersecting lines.
         for _ in 0..3 {
             let right: DVec2 =
                 lines.iter().map(|&(point, normal)| normal.dot(point - at) * normal).sum();

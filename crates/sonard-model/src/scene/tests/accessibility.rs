@@ -26,22 +26,22 @@ fn ranger_needs_free_space() {
 
 #[test]
 fn single_ring_depends_on_poses() {
-    let lone = |pose: &str| {
+    let single_ring = |pose: &str| {
         Scene::from_json(&format!(
-            r#"{{"name": "lone", "materials": {{"m": {{"reflectance": 1}}}},
+            r#"{{"name": "ring", "materials": {{"m": {{"reflectance": 1}}}},
                "walls": [{{"id": "ring", "polyline": [[0,0],[1,0],[1,1],[0,1]], "closed": true, "material": "m"}}],
                "poses": {{{pose}}}}}"#
         ))
-        .expect("a lone ring")
+        .expect("a single ring")
     };
     let (inside, outside) = (
         Pose { x_m: 0.5, y_m: 0.5, heading_deg: 0.0 },
         Pose { x_m: 2.0, y_m: 0.5, heading_deg: 0.0 },
     );
-    let room = lone("");
+    let room = single_ring("");
     assert_eq!(room.check_pose(&inside), Ok(()));
     assert!(matches!(room.check_pose(&outside), Err(PoseError::OutsideRoom { .. })));
-    let body = lone(r#""p": {"x_m": 3, "y_m": 3}"#);
+    let body = single_ring(r#""p": {"x_m": 3, "y_m": 3}"#);
     assert!(matches!(body.check_pose(&inside), Err(PoseError::InsideBody { .. })));
     assert_eq!(body.check_pose(&outside), Ok(()));
 }

@@ -8,7 +8,7 @@ impl EnvelopeSum<'_> {
     pub(super) fn next_rise_separate(&mut self, ready_us: f64) -> Option<f64> {
         let receiver = self.receiver;
         let lasts_until_us = |arrival: &PulseArrival| receiver.tof_us(arrival) + receiver.pulse_us;
-        let found = self.loud().find(|arrival| lasts_until_us(arrival) >= ready_us);
+        let found = self.detectable().find(|arrival| lasts_until_us(arrival) >= ready_us);
         let rise_us = found.map(|arrival| receiver.tof_us(arrival).max(ready_us));
         self.examined_us = self.examined_us.max(rise_us.unwrap_or(f64::MAX));
         rise_us
@@ -18,7 +18,7 @@ impl EnvelopeSum<'_> {
     pub(super) fn cause_separate(&self, t_us: f64) -> Option<PulseArrival> {
         let receiver = self.receiver;
         let lasting = || {
-            let begun = self.loud().take_while(|arrival| receiver.tof_us(arrival) <= t_us);
+            let begun = self.detectable().take_while(|arrival| receiver.tof_us(arrival) <= t_us);
             begun.filter(|arrival| receiver.tof_us(arrival) + receiver.pulse_us >= t_us)
         };
         let strongest = || lasting().max_by(|a, b| a.amplitude.total_cmp(&b.amplitude));
@@ -26,7 +26,7 @@ impl EnvelopeSum<'_> {
     }
 
     /// Arrivals that exceed the threshold individually.
-    fn loud(&self) -> impl Iterator<Item = &PulseArrival> {
+    fn detectable(&self) -> impl Iterator<Item = &PulseArrival> {
         let receiver = self.receiver;
         let window_us = receiver.window_us() + WINDOW_SLACK_US;
         self.arrivals

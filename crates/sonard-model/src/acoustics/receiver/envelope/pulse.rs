@@ -1,4 +1,4 @@
-//! Arrival as a transmitted in the envelope sum.
+//! Arrival as a pulse in the envelope sum.
 
 use num_complex::Complex64;
 
@@ -21,7 +21,7 @@ pub(super) struct ActivePulse {
     pub(super) with_others: f64,
     /// Maximum slope, per microsecond.
     pub(super) steepest: f64,
-    /// Individual shape; `None` for the transmitted transmitted.
+    /// Individual shape; `None` for the transmitted pulse.
     pub(super) shape: Option<Box<EchoShape>>,
 }
 
@@ -42,7 +42,7 @@ impl ActivePulse {
         }
     }
 
-    /// Creates a transmitted with its own shape or that of `transmitted`. `others` is the total
+    /// Creates a pulse with its own shape or that of `transmitted`. `others` is the total
     /// strength of the pulses still active when it begins.
     pub(super) fn new(
         (tof_us, lasts_us): (f64, [f64; 2]),

@@ -149,12 +149,12 @@ impl EnvelopeSum<'_> {
 
     /// Returns `true` if the active pulses, added in phase, could exceed the minimum threshold.
     fn may_pass(&mut self, t_us: f64) -> bool {
-        let least = self.threshold_factor * self.min_threshold;
+        let minimum = self.threshold_factor * self.min_threshold;
         let gain = self.gain_increase(t_us).max(1.0);
         let last = self.pulses[self.over..self.begun].last();
         // The first condition is a cheap upper bound of the second.
-        last.is_some_and(|last| last.with_others * gain >= least)
-            && self.bounds().strength * gain >= least
+        last.is_some_and(|last| last.with_others * gain >= minimum)
+            && self.bounds().strength * gain >= minimum
     }
 
     /// Ends the scan without an echo, a result that depends on all arrivals.

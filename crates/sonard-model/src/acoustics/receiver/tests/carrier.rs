@@ -20,7 +20,7 @@ fn reported_us(receiver: &Receiver, amplitude: f64, phase_rad: f64) -> f64 {
 fn weak_echoes_are_cycles_late() {
     let (envelope, carrier) = (with_detector(Detector::Envelope), with_detector(Detector::Carrier));
     assert!((reported_us(&carrier, 1.0, 0.0) - 3000.0).abs() < 0.01, "the reference is not late");
-    let mut most = 0.0_f64;
+    let mut max_cycles = 0.0_f64;
     for step in 0..60 {
         let amplitude = 0.0201 * 50f64.powf(f64::from(step) / 60.0);
         let [by_envelope_us, reported_us] =
@@ -28,9 +28,9 @@ fn weak_echoes_are_cycles_late() {
         let cycles = (reported_us - 3000.0) / CYCLE_US;
         assert!((cycles - cycles.round()).abs() < 1e-3, "{amplitude}: {cycles} cycles late");
         assert!((reported_us - by_envelope_us).abs() < CYCLE_US, "{amplitude}: {reported_us}");
-        most = most.max(cycles.round());
+        max_cycles = max_cycles.max(cycles.round());
     }
-    assert!((3.0..12.0).contains(&most), "{most} cycles at the threshold itself");
+    assert!((3.0..12.0).contains(&max_cycles), "{max_cycles} cycles at the threshold itself");
 }
 
 /// Half a cycle of phase offset moves the crests by half a cycle.

@@ -29,9 +29,9 @@ fn noise_affects_weak_echoes_most() {
     let (weak, strong) = (spread_us(0.05), spread_us(1.0));
     assert!(weak > 1.0 && weak > 1.5 * strong, "{weak} {strong}");
     // Noise alone raises ECHO when its envelope is comparable to the threshold.
-    let loud = ReceiverNoise { floor: 0.05, jitter_us: 0.0 };
+    let strong_noise = ReceiverNoise { floor: 0.05, jitter_us: 0.0 };
     let mut rng = Pcg64::seed_from_u64(3);
-    let alarm = receiver().detect_in_noise(&[], &|_| None, &loud, &mut rng);
+    let alarm = receiver().detect_in_noise(&[], &|_| None, &strong_noise, &mut rng);
     assert_eq!((alarm.status, alarm.arrival), (PingStatus::Echo, None));
 }
 
