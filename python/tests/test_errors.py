@@ -32,7 +32,7 @@ REFUSED: list[tuple[Callable[[], Any], type[Exception], str]] = [
     (lambda: sonard.Scene.from_points([[0, 0], [1, 0], [1, 1]], reflectance=2), sonard.SceneError, "reflectance"),
     (lambda: sonard.Scene.from_points([[0, 0], [1, 0], [1, 1]], floor_z_m=0), ValueError, "ceiling_z_m"),
     (lambda: sonard.Scene.shipped("corridor").pose("x"), sonard.PoseError, "has no pose `x`"),
-    (lambda: sonard.Sensor.preset("x"), sonard.SensorError, "there are: senscomp-6500"),
+    (lambda: sonard.Sensor.preset("x"), sonard.SensorError, "known presets: senscomp-6500"),
     (lambda: MODEL.sensor.replace(treshold=1), TypeError, "did you mean `threshold`"),
     (lambda: MODEL.sensor.replace(threshold=-1), sonard.SensorError, "threshold is -1: it must be"),
     (lambda: sonard.Air(99), sonard.AirError, "temperature_c is 99: it must be from -20 to 50"),

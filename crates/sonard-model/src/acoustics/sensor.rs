@@ -157,7 +157,7 @@ pub enum SensorError {
         expected: &'static str,
     },
     /// Request of a preset that does not exist.
-    #[error("unknown sensor preset \"{name}\"; known presets: {known}")]
+    #[error("there is no sensor preset \"{name}\"; known presets: {known}")]
     UnknownPreset {
         /// Name of the requested preset.
         name: String,

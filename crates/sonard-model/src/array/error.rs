@@ -82,7 +82,7 @@ pub enum ArrayError {
         id: String,
     },
     /// Request of a preset that does not exist.
-    #[error("unknown array preset \"{name}\"")]
+    #[error("there is no array preset \"{name}\"")]
     UnknownPreset {
         /// Name of the requested preset.
         name: String,
