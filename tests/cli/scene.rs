@@ -76,7 +76,7 @@ fn check_lists_what_is_not_taken_as_drawn_and_draw_shows_the_plan() {
     let path = written(folder.path(), &scene_file.to_string());
     scene(&["check", &path])
         .success()
-        .stdout(contains("\n").count(2).and(contains("again lies on")));
+        .stdout(contains("\n").count(2).and(contains("again overlaps")));
     assert_ne!(drawn(&path), snapped);
     scene_file["snap_m"] = serde_json::json!(0.1);
     let path = written(folder.path(), &scene_file.to_string());
