@@ -1,4 +1,4 @@
-//! Mirror lines.
+//! Reflection of points and directions at a line.
 
 use super::DVec2;
 

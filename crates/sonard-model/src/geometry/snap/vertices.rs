@@ -131,7 +131,8 @@ impl Vertices {
         }
         let determinant = xx * yy - xy * xy;
         let mut at = middle;
-        // Iterated with the current position held, so that the position is exact for intersecting lines.
+        // Iterated with the current position held, so that the position is exact for intersecting
+        // lines.
         for _ in 0..3 {
             let right: DVec2 =
                 lines.iter().map(|&(point, normal)| normal.dot(point - at) * normal).sum();
