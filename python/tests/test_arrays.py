@@ -284,7 +284,7 @@ def test_what_is_refused_says_why() -> None:
         (lambda: sonard.ArrayModel("simple-room", nonsense), TypeError, "give a RangerArray"),
         (lambda: sonard.ArrayModel("simple-room", "ring-12", engine=nonsense), TypeError, "str"),
         (lambda: sonard.Course([]), sonard.ArrayError, "no pose"),
-        (lambda: sonard.Course([[0, 0, 0], [1, 0, 0]], [1, 1]), sonard.ArrayError, r"poses[1]: time_s 1 is not after 1"),
+        (lambda: sonard.Course([[0, 0, 0], [1, 0, 0]], [1, 1]), sonard.ArrayError, r"poses[1]: time_s 1 is not after the previous one, 1"),
         (lambda: sonard.Course([[0, 0, np.nan]]), sonard.ArrayError, "finite"),
         (lambda: sonard.Course([0, 0, 0]), ValueError, "(n, 3)"),
         (lambda: sonard.Course([[0, 0, 0]], speed_m_s=0), ValueError, "speed_m_s is 0"),

@@ -15,7 +15,7 @@ MODEL = sonard.Model("simple-room")
 REFUSED: list[tuple[Callable[[], Any], type[Exception], str]] = [
     (lambda: MODEL.predict([[0.4, 0.3, 0.0], [9.0, 9.0, 0.0]]), sonard.PoseError, "poses[1]: the pose (9, 9) m is outside the room"),
     (lambda: MODEL.predict([np.nan, 0, 0]), sonard.PoseError, "is not a number"),
-    (lambda: MODEL.reading([0, 0, 0]), sonard.PoseError, "keep 1 mm away"),
+    (lambda: MODEL.reading([0, 0, 0]), sonard.PoseError, "keep at least 1 mm"),
     (lambda: MODEL.predict([[0.4, 0.3]]), ValueError, "x_m, y_m, heading_deg"),
     (lambda: MODEL.paths([[0.4, 0.3, 0]]), ValueError, "it must be (3,)"),
     (lambda: MODEL.predict([0.4, 0.3, 0], [np.inf]), ValueError, "azimuths_deg[0] is inf"),
@@ -32,7 +32,7 @@ REFUSED: list[tuple[Callable[[], Any], type[Exception], str]] = [
     (lambda: sonard.Scene.from_points([[0, 0], [1, 0], [1, 1]], reflectance=2), sonard.SceneError, "reflectance"),
     (lambda: sonard.Scene.from_points([[0, 0], [1, 0], [1, 1]], floor_z_m=0), ValueError, "ceiling_z_m"),
     (lambda: sonard.Scene.shipped("corridor").pose("x"), sonard.PoseError, "has no pose `x`"),
-    (lambda: sonard.Sensor.preset("x"), sonard.SensorError, "there are: senscomp-6500"),
+    (lambda: sonard.Sensor.preset("x"), sonard.SensorError, "known presets: senscomp-6500"),
     (lambda: MODEL.sensor.replace(treshold=1), TypeError, "did you mean `threshold`"),
     (lambda: MODEL.sensor.replace(threshold=-1), sonard.SensorError, "threshold is -1: it must be"),
     (lambda: sonard.Air(99), sonard.AirError, "temperature_c is 99: it must be from -20 to 50"),

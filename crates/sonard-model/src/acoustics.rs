@@ -1,4 +1,4 @@
-//! The physics of the sound: air, transducer, pulse and receiver.
+//! Physics of the sound: air, transducer, pulse and receiver.
 
 mod air;
 mod aperture;

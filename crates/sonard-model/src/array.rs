@@ -1,9 +1,10 @@
-//! Arrays: several rangers at fixed bearings on a robot, fired in turn. The arrangement beside the
-//! stepper, on which one ranger turns.
+//! Arrays: several rangers at fixed bearings on a robot, fired in sequence, in contrast to one
+//! ranger on a stepper.
 //!
-//! [`RangerArray`] is what is known about one, [`Course`] the course of its robot.
-//! [`ArrayModel`](crate::model::ArrayModel) predicts what its rangers read, with crosstalk: rangers that fire
-//! at once, or before the sound of the turn before has died away, receive one another.
+//! [`RangerArray`] holds an array's parameters, [`Course`] the trajectory of its robot.
+//! [`ArrayModel`](crate::model::ArrayModel) predicts the readings of the rangers, with crosstalk:
+//! rangers receive each other's sound if they fire simultaneously, or before the sound of the
+//! previous slot has decayed.
 
 mod body;
 mod course;
@@ -28,64 +29,63 @@ use crate::{
     scene::Scene,
 };
 
-/// The data files that come with the program, by name.
+/// Data files shipped with the program, by name.
 const PRESETS: [(&str, &str); 3] = [
     ("pioneer-8", include_str!("../../../arrays/pioneer-8.json")),
     ("pioneer-7", include_str!("../../../arrays/pioneer-7.json")),
     ("ring-12", include_str!("../../../arrays/ring-12.json")),
 ];
 
-/// Most rangers of an array, and most firings of a round.
-const MOST: usize = 256;
+/// Maximum number of rangers of an array, and of firings of a round.
+const MAX_ENTRIES: usize = 256;
 
 /// Rangers at fixed bearings on one robot.
 ///
-/// Places are in a frame that moves and turns with the robot's pose: x ahead, y to the left.
+/// Positions are in the robot's frame: x forward, y to the left.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RangerArray {
-    /// The preset's name.
+    /// Name of the preset.
     pub name: String,
-    /// What it is, in a sentence.
+    /// One-sentence description of the array.
     pub description: String,
-    /// What kind of ranger all of them are: a sensor preset, or a file with a sensor's data.
+    /// Sensor of all rangers: a preset, or a file with a sensor's data.
     pub sensor: String,
-    /// From one firing to the next, milliseconds. A ranger listens for as long.
+    /// Interval between consecutive firings, milliseconds; also the detection window of a ranger.
     pub interval_ms: f64,
-    /// The rangers.
+    /// Rangers in their default firing order.
     pub rangers: Vec<MountedRanger>,
-    /// Ids in the order in which they are fired, some perhaps more than once or not at all, a list of ids for
-    /// rangers that fire at once; without it, all in the order above, one after the other.
+    /// Firing order by id. Ids may be repeated or left out; a list of ids is fired simultaneously.
+    /// Default: all rangers in the order above, one after the other.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub firing_order: Vec<Turn>,
-    /// The body of the robot, which sound does not pass. Without it, the one that the scene has, or
-    /// none.
+    /// Body of the robot, which blocks sound. Default: the robot of the scene, if it has one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub body: Option<Body>,
-    /// For each figure above, by field name, where it comes from.
+    /// Source of each figure above, by field name.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub sources: BTreeMap<String, String>,
 }
 
-/// A ranger on the robot.
+/// Ranger mounted on the robot.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MountedRanger {
-    /// Its name in records.
+    /// Identifier of the ranger in records.
     pub id: String,
-    /// The middle of its face ahead of the robot's place, metres.
+    /// Forward offset of the face's centre from the robot's position, metres.
     pub x_m: f64,
-    /// The same to the left, metres.
+    /// Left offset of the face's centre from the robot's position, metres.
     pub y_m: f64,
-    /// Where it looks, degrees counter-clockwise from the heading.
+    /// Beam direction, degrees counter-clockwise from the heading.
     pub bearing_deg: f64,
-    /// Height in a scene with heights, metres; without it, the sensor's.
+    /// Height in a scene with heights, metres; default: the sensor's.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub z_m: Option<f64>,
 }
 
 impl MountedRanger {
-    /// Where it stands in the world and looks to, on a robot at a pose.
+    /// World pose of the ranger on a robot at a pose.
     #[must_use]
     pub fn pose_on(&self, robot: &Pose) -> Pose {
         let turn = DVec2::from_angle(robot.direction_rad(0.0));
@@ -94,7 +94,7 @@ impl MountedRanger {
         Pose { x_m: place.x, y_m: place.y, heading_deg }
     }
 
-    /// Its bearing as records have it, degrees in [0, 360).
+    /// Bearing as an azimuth in records, degrees in [0, 360).
     #[must_use]
     pub fn azimuth_deg(&self) -> f64 {
         wrap_360(self.bearing_deg)
@@ -102,21 +102,21 @@ impl MountedRanger {
 }
 
 impl RangerArray {
-    /// The names of the presets.
+    /// Names of the presets, in order.
     pub fn preset_names() -> impl Iterator<Item = &'static str> {
         PRESETS.iter().map(|(name, _)| *name)
     }
 
-    /// The file of an array that comes with the program, as it is shipped.
+    /// Data file of a shipped array, verbatim.
     #[must_use]
     pub fn preset_text(name: &str) -> Option<&'static str> {
         PRESETS.iter().find(|(known, _)| *known == name).map(|(_, text)| *text)
     }
 
-    /// An array that comes with the program.
+    /// Loads a shipped array.
     ///
     /// # Errors
-    /// When there is none of that name.
+    /// If there is no preset of that name.
     pub fn preset(name: &str) -> Result<Self, ArrayError> {
         match Self::preset_text(name) {
             Some(text) => Self::from_json(text),
@@ -127,10 +127,10 @@ impl RangerArray {
         }
     }
 
-    /// An array from the text of a data file.
+    /// Parses an array from the text of a data file.
     ///
     /// # Errors
-    /// When the text is not an array's, a figure is out of range, or ids do not fit.
+    /// If the text is not an array's, a value is out of range, or ids are inconsistent.
     pub fn from_json(text: &str) -> Result<Self, ArrayError> {
         let mut json = serde_json::Deserializer::from_str(text);
         let array: Self = serde_path_to_error::deserialize(&mut json).map_err(|error| {
@@ -142,15 +142,15 @@ impl RangerArray {
         Ok(array)
     }
 
-    /// Checks that every figure makes sense and that ids fit.
+    /// Checks that every value is in range and that ids are consistent.
     ///
     /// # Errors
-    /// Names the first that does not.
+    /// Returns the first value that is not.
     pub fn check(&self) -> Result<(), ArrayError> {
         within("interval_ms", self.interval_ms, 1.0, 10_000.0)?;
         let count = self.rangers.len();
-        if !(1..=MOST).contains(&count) {
-            return Err(ArrayError::Count { field: "rangers", count, most: MOST });
+        if !(1..=MAX_ENTRIES).contains(&count) {
+            return Err(ArrayError::Count { field: "rangers", count, max: MAX_ENTRIES });
         }
         for (at, ranger) in self.rangers.iter().enumerate() {
             let field = |name| format!("rangers[{at}].{name}");
@@ -171,28 +171,28 @@ impl RangerArray {
         self.check_order()
     }
 
-    /// The ranger of an id, as an index into `rangers`.
+    /// Index into `rangers` of the ranger with an id.
     #[must_use]
     pub fn index_of(&self, id: &str) -> Option<usize> {
         self.rangers.iter().position(|ranger| ranger.id == id)
     }
 
-    /// The ranger of an id.
+    /// Ranger with an id.
     #[must_use]
     pub fn ranger(&self, id: &str) -> Option<&MountedRanger> {
         self.index_of(id).map(|at| &self.rangers[at])
     }
 
-    /// A plan that counts so many rounds right: as many beams as there are firings, spread evenly.
-    /// Where they look is each reading's own.
+    /// Scan plan with the beam count of `rounds` rounds, evenly spaced. The directions are those of
+    /// the individual readings.
     #[must_use]
     pub fn plan(&self, rounds: u32) -> ScanPlan {
         let beams = self.round().count() as f64 * f64::from(rounds.max(1));
         ScanPlan { step_deg: 360.0 / beams, ..ScanPlan::default() }
     }
 
-    /// Where a robot stands in each of so many rounds from a pose on: it turns in place by equal parts of the angle
-    /// between two rangers of an even ring, so that directions are spread evenly.
+    /// Robot poses of `rounds` rounds from a pose on. The robot rotates in place by equal parts of
+    /// the angle between two rangers of an even ring, so that the directions are evenly spaced.
     #[must_use]
     pub fn turned(&self, pose: &Pose, rounds: u32) -> Vec<Pose> {
         let step_deg = self.plan(rounds).step_deg;
@@ -201,26 +201,26 @@ impl RangerArray {
         std::iter::once(*pose).chain(turned).collect()
     }
 
-    /// A scene with this robot's body as its robot.
+    /// Scene with the body of this array's robot as its robot.
     #[must_use]
     pub fn in_scene(&self, scene: &Scene) -> Scene {
         let own = self.body.as_ref().map(Body::robot);
         Scene { robot: own.or_else(|| scene.robot.clone()), ..scene.clone() }
     }
 
-    /// Whether a robot that carries the array can stand at a pose of a scene: as for one ranger,
-    /// and every ranger has to have its face in the open, outside the body too.
+    /// Checks that a robot with the array fits at a pose of a scene: the conditions for a single
+    /// ranger, and the face of every ranger in free space and outside the body.
     ///
     /// # Errors
-    /// Which ranger can't be there, and why.
+    /// Names the ranger that does not fit, and the obstruction.
     pub fn check_pose(&self, scene: &Scene, robot: &Pose) -> Result<(), ArrayPoseError> {
         self.check_poses(scene, std::slice::from_ref(robot)).map_err(|(_, error)| error)
     }
 
-    /// The same for many poses.
+    /// Checks many poses as [`check_pose`](Self::check_pose) does.
     ///
     /// # Errors
-    /// The first pose that fails, by its index, and why.
+    /// Returns the index of the first pose that fails, and its error.
     pub fn check_poses(
         &self,
         scene: &Scene,
@@ -238,11 +238,11 @@ impl RangerArray {
     }
 }
 
-/// Written so that NaN is refused too.
-fn within(field: impl Into<String>, value: f64, least: f64, most: f64) -> Result<(), ArrayError> {
-    if (least..=most).contains(&value) {
+/// Range check that rejects NaN as well.
+fn within(field: impl Into<String>, value: f64, min: f64, max: f64) -> Result<(), ArrayError> {
+    if (min..=max).contains(&value) {
         Ok(())
     } else {
-        Err(ArrayError::Figure { field: field.into(), value, least, most })
+        Err(ArrayError::Figure { field: field.into(), value, min, max })
     }
 }

@@ -1,10 +1,10 @@
-//! Points, poses and angles. The world frame has x to the right and y up, in metres.
+//! Points, poses and angles. In the world frame x points right and y up, in metres.
 
 mod arrangement;
 mod mirror;
 mod outline;
-mod sets;
 mod snap;
+mod union_find;
 
 pub use arrangement::{Arrangement, Piece, between};
 pub use glam::DVec2;
@@ -12,7 +12,7 @@ pub use mirror::Mirror;
 pub use outline::{enclosed_area, encloses};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-pub use snap::{Cause, End, Move, snap};
+pub use snap::{SegmentEnd, SnapCause, SnapMove, snap};
 
 /// Position of the ranger's rotation axis and direction of azimuth 0.
 ///
@@ -30,30 +30,30 @@ pub struct Pose {
 }
 
 impl Pose {
-    /// The position of the rotation axis.
+    /// Position of the rotation axis.
     #[must_use]
     pub const fn position(&self) -> DVec2 {
         DVec2::new(self.x_m, self.y_m)
     }
 
-    /// World direction (radians counter-clockwise from +x) of an azimuth in degrees.
+    /// World direction of an azimuth in degrees, radians counter-clockwise from +x.
     #[must_use]
     pub fn direction_rad(&self, azimuth_deg: f64) -> f64 {
         (self.heading_deg + azimuth_deg).to_radians()
     }
 
-    /// The point at `range_m` along `azimuth_deg`.
+    /// Point at `range_m` along `azimuth_deg`.
     #[must_use]
     pub fn point_at(&self, azimuth_deg: f64, range_m: f64) -> DVec2 {
         self.position() + range_m * DVec2::from_angle(self.direction_rad(azimuth_deg))
     }
 }
 
-/// The angle from one direction to another, radians in [-pi, pi], counter-clockwise positive; the vectors' lengths
-/// do not matter.
+/// Signed angle from one direction to another, radians in [-pi, pi], counter-clockwise positive.
+/// The lengths of the vectors are irrelevant.
 ///
-/// By the arc tangent, which is right to rounding: the arc cosine of a scalar product loses half of the digits where
-/// the directions are nearly the same.
+/// Uses the arc tangent, which is accurate to rounding. The arc cosine of a dot product loses half
+/// of the digits for nearly equal directions.
 #[must_use]
 pub fn turn_rad(from: DVec2, to: DVec2) -> f64 {
     from.perp_dot(to).atan2(from.dot(to))
@@ -67,7 +67,7 @@ pub fn distance_to_segment(point: DVec2, a: DVec2, b: DVec2) -> f64 {
     point.distance(a + share.clamp(0.0, 1.0) * along)
 }
 
-/// An angle in degrees brought into [0, 360).
+/// Wraps an angle in degrees to [0, 360).
 #[must_use]
 pub fn wrap_360(angle_deg: f64) -> f64 {
     let wrapped = angle_deg.rem_euclid(360.0);
@@ -75,18 +75,18 @@ pub fn wrap_360(angle_deg: f64) -> f64 {
     if wrapped >= 360.0 { 0.0 } else { wrapped }
 }
 
-/// An angle in degrees brought into (-180, 180].
+/// Wraps an angle in degrees to (-180, 180].
 #[must_use]
 pub fn wrap_180(angle_deg: f64) -> f64 {
     let wrapped = wrap_360(angle_deg);
     if wrapped > 180.0 { wrapped - 360.0 } else { wrapped }
 }
 
-/// An angle in radians brought into (-pi, pi].
+/// Wraps an angle in radians to (-pi, pi].
 #[must_use]
 pub fn wrap_pi(angle_rad: f64) -> f64 {
     use std::f64::consts::{PI, TAU};
-    // Nearly all are a turn off at most; the remainder of a division costs more than what they are for.
+    // Fast path: nearly all angles are off by one turn at most, and a division is expensive here.
     if angle_rad.abs() < 3.0 * PI {
         return if angle_rad > PI {
             angle_rad - TAU
@@ -105,7 +105,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn wrap_360_stays_below_the_modulus() {
+    fn wrap_360_is_below_360() {
         for (angle_deg, expected) in [(-0.9, 359.1), (360.0, 0.0), (-1e-17, 0.0), (725.0, 5.0)] {
             assert!((wrap_360(angle_deg) - expected).abs() < 1e-9, "{angle_deg}");
             assert!(wrap_360(angle_deg) < 360.0, "{angle_deg}");
@@ -113,7 +113,7 @@ mod tests {
     }
 
     #[test]
-    fn point_at_turns_counter_clockwise_from_the_heading() {
+    fn azimuth_is_counter_clockwise() {
         let pose = Pose { x_m: 1.0, y_m: 2.0, heading_deg: 90.0 };
         let ahead = pose.point_at(0.0, 2.0);
         let left = pose.point_at(90.0, 2.0);

@@ -1,8 +1,8 @@
-//! Physical model of an ultrasonic ranger on a stepper, or of several on a robot.
+//! Physical model of an ultrasonic ranger on a stepper, or of several rangers on a robot.
 //!
-//! From a [`scene`] (walls and cylinders with materials) and the [`acoustics`] of air, transducer and receiver, a
-//! [`model`] predicts the reading at each azimuth of a [`plan`]. An [`array`](mod@array) has several rangers at fixed
-//! bearings instead of one that turns.
+//! From a [`scene`] (walls and cylinders with materials) and the [`acoustics`] of air, transducer
+//! and receiver, a [`model`] predicts the reading at each azimuth of a [`plan`]. An
+//! [`array`](mod@array) has several rangers at fixed bearings instead of one that rotates.
 //!
 //! A room in ten lines:
 //!
@@ -18,14 +18,14 @@
 //! let pose = Pose { x_m: 1.0, y_m: 1.0, heading_deg: 0.0 };
 //! let readings = simulator.predict(&pose, &ScanPlan::default())?;
 //! // The wall ahead is 3 m away; the echo crosses the threshold a little late.
-//! let range_m = readings[0].range_m.ok_or("silent")?;
+//! let range_m = readings[0].range_m.ok_or("no echo")?;
 //! assert!((3.0..3.005).contains(&range_m));
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! The crate uses no clock, file or socket; random numbers are passed in.
+//! The crate uses no clock, file or socket; the caller passes in random numbers.
 
-// Modules are `foo.rs` beside `foo/`.
+// Modules are `foo.rs` next to `foo/`.
 #![warn(clippy::mod_module_files)]
 
 pub mod acoustics;

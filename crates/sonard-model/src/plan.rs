@@ -1,4 +1,4 @@
-//! What a scan is to measure.
+//! Scan plan: the azimuths and pings of a scan.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -6,78 +6,78 @@ use thiserror::Error;
 
 use crate::geometry::wrap_360;
 
-/// Azimuths of a scan: from `from_deg` up to, but not including, `to_deg`, every `step_deg`.
+/// Azimuths of a scan: from `from_deg` up to, but not including, `to_deg`, in steps of `step_deg`.
 ///
-/// `to_deg` itself is left out so that a full turn has no beam twice.
+/// `to_deg` is excluded so that no beam of a full revolution is measured twice.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ScanPlan {
-    /// First azimuth, degrees.
+    /// First azimuth of the range, degrees.
     pub from_deg: f64,
-    /// End of the range, degrees, not itself measured.
+    /// End of the range, degrees, exclusive.
     pub to_deg: f64,
-    /// Between stops, degrees.
+    /// Step between stops, degrees.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub step_deg: f64,
-    /// Firings at each stop.
+    /// Pings at each stop.
     #[schemars(range(min = 1, max = 255))]
     pub pings_per_stop: u32,
 }
 
 impl Default for ScanPlan {
-    /// A full turn at the 400-step motor's 0.9 degrees.
+    /// Returns a full revolution at the 400-step motor's 0.9 degrees.
     fn default() -> Self {
         Self { from_deg: 0.0, to_deg: 360.0, step_deg: 0.9, pings_per_stop: 1 }
     }
 }
 
-/// An error in a plan.
+/// Error in a scan plan.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum PlanError {
-    /// Not a finite number.
+    /// Value that is not a finite number.
     #[error("{field} is {value}: it must be a finite number of degrees")]
     NotFinite {
-        /// Which field.
+        /// Name of the field.
         field: &'static str,
-        /// What it holds.
+        /// Value that is not finite.
         value: f64,
     },
-    /// A step of zero or less.
+    /// Step of zero or less.
     #[error("step_deg is {0}: it must be greater than 0")]
     StepNotPositive(f64),
-    /// Nothing between the ends.
+    /// Empty range, or a range of more than a full revolution.
     #[error("to_deg {to_deg} must be greater than from_deg {from_deg}, by at most 360")]
     BadRange {
-        /// First azimuth, degrees.
+        /// First azimuth of the range, degrees.
         from_deg: f64,
-        /// End, degrees.
+        /// End of the range, degrees.
         to_deg: f64,
     },
-    /// No firing at all, or more than a device can be told.
+    /// No pings, or more than the protocol allows.
     #[error("pings_per_stop is {0}: it must be 1 to 255")]
     BadPings(u32),
-    /// The step does not fall on the motor's steps.
+    /// Step that is not a multiple of the motor's steps.
     #[error(
         "step_deg {step_deg} is not a whole number of the motor's steps \
-         ({steps_per_revolution} a turn, {motor_deg} degrees each): use a multiple of {motor_deg}"
+         ({steps_per_revolution} per revolution, {motor_deg} degrees each): use a multiple of {motor_deg}"
     )]
     OffMotorGrid {
-        /// The step asked for, degrees.
+        /// Requested step or start angle, degrees.
         step_deg: f64,
-        /// Motor steps a turn.
+        /// Motor steps per revolution.
         steps_per_revolution: u32,
-        /// One motor step, degrees.
+        /// Angle of one motor step, degrees.
         motor_deg: f64,
     },
-    /// More beams than one sweep can number.
+    /// More beams than a scan can number.
     #[error("the plan has {0} beams; a scan has at most 65535")]
     TooManyBeams(u64),
 }
 
 impl ScanPlan {
-    /// Checks that the numbers make a scan.
+    /// Checks that the plan is valid.
     ///
     /// # Errors
-    /// Says which field is wrong and what would be right.
+    /// Names the invalid field and its valid range.
     pub fn check(&self) -> Result<(), PlanError> {
         for (field, value) in
             [("from_deg", self.from_deg), ("to_deg", self.to_deg), ("step_deg", self.step_deg)]
@@ -103,11 +103,11 @@ impl ScanPlan {
     /// Number of stops of a checked plan.
     #[must_use]
     pub fn stops(&self) -> u32 {
-        // A stop whose azimuth reaches to_deg only by rounding is not wanted.
+        // Excludes a stop that reaches to_deg only by rounding.
         ((self.to_deg - self.from_deg) / self.step_deg - 1e-9).ceil().max(0.0) as u32
     }
 
-    /// Number of firings.
+    /// Number of firings of a checked plan.
     #[must_use]
     pub fn beams(&self) -> u32 {
         self.stops() * self.pings_per_stop
@@ -117,14 +117,14 @@ impl ScanPlan {
     #[must_use]
     pub fn azimuth_deg(&self, stop: u32) -> f64 {
         let azimuth_deg = wrap_360(self.from_deg + f64::from(stop) * self.step_deg);
-        // Multiples of 0.9 should print as such.
+        // Rounded so that multiples of 0.9 print as such.
         wrap_360((azimuth_deg * 1e9).round() / 1e9)
     }
 
-    /// First motor step and stride of the plan on a motor with so many steps a turn.
+    /// First motor step and stride of the plan on a motor with `steps_per_revolution`.
     ///
     /// # Errors
-    /// When `step_deg` or `from_deg` does not fall on a motor step.
+    /// If `step_deg` or `from_deg` is not a multiple of a motor step.
     pub fn motor_steps(&self, steps_per_revolution: u32) -> Result<(i32, i32), PlanError> {
         let motor_deg = 360.0 / f64::from(steps_per_revolution);
         let whole = |angle_deg: f64| {
@@ -149,7 +149,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_full_turn_has_400_stops_and_no_beam_twice() {
+    fn full_revolution_has_400_stops() {
         let plan = ScanPlan::default();
         assert_eq!(plan.check(), Ok(()));
         assert_eq!(plan.stops(), 400);
@@ -158,7 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn a_range_across_zero_wraps() {
+    fn range_across_zero_wraps() {
         let plan = ScanPlan { from_deg: -9.0, to_deg: 9.0, ..ScanPlan::default() };
         assert_eq!(plan.stops(), 20);
         assert_eq!(plan.azimuth_deg(0), 351.0);
@@ -167,7 +167,7 @@ mod tests {
     }
 
     #[test]
-    fn wrong_plans_are_named() {
+    fn rejects_invalid_plans() {
         let good = ScanPlan::default();
         for (plan, part) in [
             (ScanPlan { step_deg: 0.0, ..good }, "step_deg"),

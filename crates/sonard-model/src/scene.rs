@@ -1,8 +1,7 @@
-//! Scenes: walls and cylinders of some material, and named poses.
+//! Scenes: walls and cylinders with materials, and named poses.
 //!
-//! [`Scene::from_json`] reads a scene file and checks it; what is wrong comes back as a
-//! [`SceneError`] with line, column and what would be right. [`shipped`] holds the scenes that
-//! come with the program.
+//! [`Scene::from_json`] parses and validates a scene file; faults are returned as a [`SceneError`]
+//! with line, column and the valid values. [`shipped`] holds the scenes included in the program.
 
 mod builder;
 mod check;
@@ -12,8 +11,8 @@ mod floor_plan;
 mod locate;
 mod outline;
 mod parse;
-mod plain;
 mod pose;
+mod prescan;
 mod rewrite;
 mod robot;
 mod schema;
@@ -37,48 +36,47 @@ use serde::{Deserialize, Serialize};
 
 use crate::geometry::{DVec2, Pose, distance_to_segment};
 
-/// A checked scene: every wall has a length, every material is known.
+/// Validated scene: every wall has a length, every material is defined.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scene {
-    /// The scene's name.
+    /// Scene name, not empty.
     pub name: String,
-    /// Where its dimensions come from.
+    /// Source of the dimensions.
     pub source: Option<String>,
-    /// What in it is approximate, one sentence each.
+    /// Approximations and assumptions, one sentence each.
     pub approximate: Vec<String>,
-    /// Surfaces by name, also those that nothing is made of.
+    /// Surfaces by name, including unused ones.
     pub materials: BTreeMap<String, Material>,
     /// Flat reflectors, one segment each.
     pub walls: Vec<Wall>,
-    /// Upright circular reflectors.
+    /// Upright circular reflectors of the scene.
     pub cylinders: Vec<Cylinder>,
     /// Height of the floor, metres; `None` for a scene in the plane.
     pub floor_z_m: Option<f64>,
     /// Height of the ceiling, metres.
     pub ceiling_z_m: Option<f64>,
-    /// The floor's surface; what it scatters is lost to the model.
+    /// Material of the floor; sound scattered by it is not modelled.
     pub floor_material: Material,
-    /// The ceiling's.
+    /// Material of the ceiling.
     pub ceiling_material: Material,
-    /// What is drawn closer together than this was meant to meet, metres; see [`FloorPlan`].
+    /// Snap tolerance, metres: ends closer than this are joined; see [`FloorPlan`].
     pub snap_m: f64,
     /// Named poses of the ranger.
     pub poses: BTreeMap<String, Pose>,
     /// Body of the robot that carries the ranger; see [`Scene::with_robot_at`].
     pub robot: Option<Robot>,
-    /// SHA-256 of the text it was read from, hexadecimal.
+    /// SHA-256 of the source text, hexadecimal.
     pub sha256: String,
-    /// That text.
+    /// Source text of the scene file.
     pub text: Arc<str>,
 }
 
 impl Scene {
-    /// Reads the text of a scene file and checks it.
+    /// Parses and validates the text of a scene file.
     ///
     /// # Errors
-    /// The first fault: syntax, an unknown or missing field, a wrong type, or a rule of scenes
-    /// that is broken (a material that is not there, a wall without length, ...). No input
-    /// makes it panic.
+    /// Returns the first fault: syntax, an unknown or missing field, a wrong type, or a violated
+    /// rule (an undefined material, a wall of zero length, ...). Never panics, whatever the input.
     pub fn from_json(text: &str) -> Result<Self, SceneError> {
         parse::scene_from_json(text)
     }
@@ -100,43 +98,43 @@ pub struct Material {
     /// Amplitude of the mirror reflection relative to the incident wave, 0 to 1.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub reflectance: f64,
-    /// Share of what is not absorbed that is scattered instead of mirrored, 0 to 1.
+    /// Share of the unabsorbed sound that is scattered instead of mirrored, 0 to 1.
     #[serde(default)]
     #[schemars(range(min = 0.0, max = 1.0))]
     pub roughness: f64,
 }
 
 impl Material {
-    /// A perfect mirror.
+    /// Perfectly reflecting, smooth surface.
     pub const RIGID: Self = Self { reflectance: 1.0, roughness: 0.0 };
 }
 
-/// A flat reflector: one segment of the floor plan. Both faces reflect.
+/// Flat reflector: one segment of the floor plan. Both faces reflect.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Wall {
-    /// Its name; segments of a polyline are `id.0`, `id.1`, ...
+    /// Identifier; segments of a polyline are `id.0`, `id.1`, ...
     pub id: Arc<str>,
-    /// One end, metres.
+    /// Position of the first end, metres.
     pub a: DVec2,
-    /// The other end, metres.
+    /// Position of the second end, metres.
     pub b: DVec2,
-    /// Its surface.
+    /// Surface material of the wall.
     pub material: Material,
-    /// From and to what height it stands, metres; `None`: without end.
+    /// Lower and upper height, metres; `None`: unbounded.
     pub z_m: Option<[f64; 2]>,
 }
 
-/// An upright circular reflector.
+/// Upright circular reflector: a pillar, a table leg.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Cylinder {
-    /// Its name.
+    /// Identifier of the cylinder.
     pub id: Arc<str>,
-    /// Its axis, metres.
+    /// Position of the axis, metres.
     pub center: DVec2,
-    /// Its radius, metres.
+    /// Radius of the cylinder, metres.
     pub radius_m: f64,
-    /// Its surface.
+    /// Surface material of the cylinder.
     pub material: Material,
-    /// From and to what height it stands, metres; `None`: without end.
+    /// Lower and upper height, metres; `None`: unbounded.
     pub z_m: Option<[f64; 2]>,
 }

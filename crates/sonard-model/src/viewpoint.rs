@@ -1,4 +1,4 @@
-//! Where a transducer is when it fires, and where it points.
+//! Position and direction of a transducer at a firing.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -8,54 +8,53 @@ use crate::{
     geometry::{DVec2, Pose, wrap_360},
 };
 
-/// Place and direction of a transducer at the moment of a firing, in the world.
+/// Position and direction of a transducer at a firing, in world coordinates.
 ///
-/// Ranges count from its middle: half the length of a path. Made by [`Mounting::viewpoint`] and by nothing
-/// else, so that predictions, pictures and the live page agree on it.
+/// Ranges are half the path length, measured from the transducer's centre. Constructed only by
+/// [`Mounting::viewpoint`], so that predictions, pictures and the live page agree.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Viewpoint {
-    /// Middle of the face, or between transmitter and receiver, metres.
+    /// Centre of the face, or midpoint between transmitter and receiver: x, metres.
     pub x_m: f64,
-    /// The same along y, metres.
+    /// Centre of the face, or midpoint between transmitter and receiver: y, metres.
     pub y_m: f64,
-    /// Its height in a scene with heights, metres; `null` for the model's usual one.
+    /// Height in a scene with heights, metres; `null` for the model's default.
     pub z_m: Option<f64>,
-    /// Where it points, degrees counter-clockwise from +x, in [0, 360).
+    /// Beam direction, degrees counter-clockwise from +x, in [0, 360).
     pub direction_deg: f64,
-    /// How far up it points, degrees.
+    /// Upward tilt of the beam, degrees.
     pub tilt_deg: f64,
-    /// Distance of the transmitter (on the left) from the receiver, metres; 0 for one transducer that is
-    /// both.
+    /// Distance between transmitter (on the left) and receiver, metres; 0 for a common transducer.
     pub separation_m: f64,
 }
 
 impl Viewpoint {
-    /// The middle, metres.
+    /// Centre of the transducer, metres.
     #[must_use]
     pub fn position(&self) -> DVec2 {
         DVec2::new(self.x_m, self.y_m)
     }
 
-    /// Where it points, radians counter-clockwise from +x.
+    /// Beam direction, radians counter-clockwise from +x.
     #[must_use]
     pub fn direction_rad(&self) -> f64 {
         self.direction_deg.to_radians()
     }
 
-    /// Where transmitter and receiver are, metres.
+    /// Positions of transmitter and receiver, metres.
     #[must_use]
     pub fn ends(&self) -> [DVec2; 2] {
         let left = DVec2::from_angle(self.direction_rad()).perp();
         [0.5, -0.5].map(|side| self.position() + side * self.separation_m * left)
     }
 
-    /// The point straight ahead at a range in metres.
+    /// Point on the beam axis at a range in metres.
     #[must_use]
     pub fn point_at(&self, range_m: f64) -> DVec2 {
         self.position() + range_m * DVec2::from_angle(self.direction_rad())
     }
 
-    /// The middle as a pose whose heading is the direction.
+    /// Centre of the transducer as a pose, with the beam direction as its heading.
     #[must_use]
     pub const fn pose(&self) -> Pose {
         Pose { x_m: self.x_m, y_m: self.y_m, heading_deg: self.direction_deg }
@@ -63,8 +62,8 @@ impl Viewpoint {
 }
 
 impl Mounting {
-    /// The viewpoint of a transducer so mounted, with its rotation axis at `axis` and turned to the heading
-    /// of that pose.
+    /// Viewpoint of the mounted transducer for a rotation axis at the position of `axis` and a beam
+    /// at its heading.
     #[must_use]
     pub fn viewpoint(&self, axis: &Pose) -> Viewpoint {
         let direction_deg = wrap_360(axis.heading_deg);
@@ -86,7 +85,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_face_beside_its_axis_turns_round_it() {
+    fn offset_face_rotates_with_axis() {
         let mounting =
             Mounting { ahead_m: 0.1, left_m: 0.02, separation_m: 0.026, ..Mounting::default() };
         for (heading_deg, middle) in

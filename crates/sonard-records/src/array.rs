@@ -1,4 +1,4 @@
-//! Scans of an array: one round of its rangers, or several.
+//! Records of array scans: one or more rounds of an array's rangers.
 
 use jiff::Timestamp;
 use uuid::Uuid;
@@ -11,7 +11,7 @@ use sonard_model::{
 };
 
 impl Session {
-    /// The session of an array that the model plays.
+    /// Session of a simulated array.
     #[must_use]
     pub fn of_array(model: &ArrayModel, started: Timestamp) -> Self {
         let array = Some(model.array().as_ref().clone());
@@ -20,7 +20,7 @@ impl Session {
 }
 
 impl ScanStart {
-    /// So many rounds of an array that the model plays begin.
+    /// Start of a simulated scan of `rounds` rounds of an array.
     #[must_use]
     pub fn of_array(
         model: &ArrayModel,
@@ -35,24 +35,24 @@ impl ScanStart {
 }
 
 impl Ping {
-    /// What a ranger of an array reads in the model, in a scan that began at `scan_pose`.
+    /// Predicted reading of an array's ranger, in a scan that began at `scan_pose`.
     #[must_use]
     pub fn of_array(
-        stand: &ArrayAtPose<'_>,
+        at_pose: &ArrayAtPose<'_>,
         scan: Uuid,
         scan_pose: &Pose,
         index: u32,
         ranger: usize,
         prediction: &Prediction,
     ) -> Self {
-        let mounted = &stand.array().rangers[ranger];
+        let mounted = &at_pose.array().rangers[ranger];
         let azimuth_deg = mounted.azimuth_deg();
-        let ping = Self::simulated(stand.simulator(ranger), scan, index, azimuth_deg, prediction);
+        let ping = Self::simulated(at_pose.simulator(ranger), scan, index, azimuth_deg, prediction);
         Self {
             step: 0,
             ranger: Some(mounted.id.clone()),
-            crosstalk: crosstalk(stand.array(), prediction),
-            pose: Some(*stand.pose()).filter(|pose| pose != scan_pose),
+            crosstalk: crosstalk(at_pose.array(), prediction),
+            pose: Some(*at_pose.pose()).filter(|pose| pose != scan_pose),
             provenance: Some(Provenance::Simulated),
             ..ping
         }
@@ -60,11 +60,11 @@ impl Ping {
 }
 
 impl SimRecord {
-    /// The prediction of an array's ranger as it stands in a log.
+    /// Record of a prediction for an array's ranger.
     #[must_use]
-    pub fn of_array(stand: &ArrayAtPose<'_>, ranger: usize, prediction: &Prediction) -> Self {
-        let crosstalk = crosstalk(stand.array(), prediction);
-        Self { crosstalk, ..Self::of(stand.simulator(ranger), prediction) }
+    pub fn of_array(at_pose: &ArrayAtPose<'_>, ranger: usize, prediction: &Prediction) -> Self {
+        let crosstalk = crosstalk(at_pose.array(), prediction);
+        Self { crosstalk, ..Self::of(at_pose.simulator(ranger), prediction) }
     }
 }
 
@@ -74,7 +74,7 @@ fn crosstalk(array: &RangerArray, prediction: &Prediction) -> Option<CrosstalkRe
 }
 
 impl ScanEnd {
-    /// The end of a round or several, of which so many rangers fired and so many did not.
+    /// End of an array scan, with the numbers of measured and missing beams.
     #[must_use]
     pub fn of_array(
         model: &ArrayModel,
@@ -108,7 +108,7 @@ mod tests {
                    "material": "hard"}]}"#;
 
     #[test]
-    fn a_scan_of_an_array_says_where_each_transducer_was() {
+    fn array_scan_has_viewpoints() {
         let array = RangerArray::preset("pioneer-8").expect("a preset");
         let sensor = Sensor::preset(&array.sensor).expect("a preset");
         let room = Scene::from_json(ROOM).expect("a scene");
@@ -118,14 +118,14 @@ mod tests {
         let (time, scan) = (jiff::Timestamp::UNIX_EPOCH, uuid::Uuid::from_u128(1));
         let [from, to] = [0.0, 10.0].map(|heading_deg| Pose { x_m: 1.0, y_m: 1.0, heading_deg });
         let pings = [from, to].into_iter().zip(0..).map(|(pose, index)| {
-            let stand = model.at(pose).expect("a stand");
+            let at_pose = model.at(pose).expect("a valid pose");
             Record::Ping(Box::new(Ping::of_array(
-                &stand,
+                &at_pose,
                 scan,
                 &from,
                 index,
                 1,
-                &stand.ping(1).expect("few paths"),
+                &at_pose.ping(1).expect("few paths"),
             )))
         });
         let records = [
@@ -135,8 +135,8 @@ mod tests {
         let records = records.into_iter().chain(pings.collect::<Vec<_>>());
         let through_text = records.map(|record| {
             let mut line = Vec::new();
-            encode_line(&record, &mut line).expect("it can be written");
-            let read = decode_line(line.trim_ascii_end()).expect("and read");
+            encode_line(&record, &mut line).expect("encodable");
+            let read = decode_line(line.trim_ascii_end()).expect("decodable");
             assert_eq!(read, record);
             read
         });
@@ -148,8 +148,8 @@ mod tests {
             assert!(viewpoint.position().distance(mounted.position()) < 1e-12);
             assert_eq!(viewpoint.direction_deg, wrap_360(mounted.heading_deg));
         }
-        let mut stranger = view.pings[0].clone();
-        stranger.ranger = Some("s99".into());
-        assert_eq!(view.viewpoint(&stranger), None);
+        let mut unknown = view.pings[0].clone();
+        unknown.ranger = Some("s99".into());
+        assert_eq!(view.viewpoint(&unknown), None);
     }
 }

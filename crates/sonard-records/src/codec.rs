@@ -1,4 +1,4 @@
-//! One line of a log: a record to bytes, and bytes to a record or to what is wrong with them.
+//! Encoding and decoding of log lines: one record per line.
 
 use std::{borrow::Cow, fmt};
 
@@ -7,42 +7,42 @@ use thiserror::Error;
 
 use super::{LOG_FORMAT, PathRecord, Point, Record};
 
-/// Longest line that is written or read, bytes. A record of 65535 echo times would fit.
+/// Maximum length of a line, bytes. A record with 65535 echo times fits.
 pub const MAX_LINE_BYTES: usize = 1 << 20;
 
-/// The kind of an error in a line.
+/// Kind of an error in a log line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum FaultKind {
-    /// Nothing on it.
+    /// Blank line without a record.
     Empty,
-    /// Longer than [`MAX_LINE_BYTES`].
+    /// Line longer than [`MAX_LINE_BYTES`].
     TooLong,
-    /// Not UTF-8, or NUL bytes.
+    /// Invalid UTF-8, or NUL bytes.
     NotText,
-    /// Not a JSON object.
+    /// Text that is not a JSON object.
     NotJson,
-    /// A JSON object without a `type` that is a string.
+    /// JSON object without a string `type`.
     NoType,
-    /// A JSON object of a `type` that this program does not know.
+    /// JSON object with an unknown `type`.
     UnknownType,
-    /// A record with a field missing or of the wrong kind.
+    /// Record with a missing field or a field of the wrong type.
     BadField,
-    /// A session of a log format other than [`LOG_FORMAT`].
+    /// Session of a log format other than [`LOG_FORMAT`].
     UnsupportedFormat,
-    /// The last line, cut off in the middle of the record.
+    /// Incomplete last line, truncated within the record.
     Torn,
 }
 
-/// A line that is not a record.
+/// Error of a line that is not a valid record.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 pub struct RecordError {
-    /// What kind of thing is wrong.
+    /// Kind of the error.
     pub kind: FaultKind,
-    /// Byte on the line where it was noticed, from 1, if there is such a place.
+    /// Byte position on the line, from 1, where the error was detected, if it has a position.
     pub column: Option<usize>,
-    /// The field, as a path such as `sim.path.interactions[2]`.
+    /// Path of the field, such as `sim.path.interactions[2]`.
     pub field: Option<String>,
-    /// What is wrong and what would be right.
+    /// Description of the error and the expected form.
     pub message: String,
 }
 
@@ -59,8 +59,8 @@ impl fmt::Display for RecordError {
 }
 
 impl RecordError {
-    /// Whether the line is a whole record all the same, which another version of the program may
-    /// read: a JSON object with a `type`.
+    /// Returns `true` if the line is a complete JSON object with a `type`, which another version of
+    /// the program may support.
     #[must_use]
     pub fn is_whole_record(&self) -> bool {
         use FaultKind as Kind;
@@ -68,30 +68,30 @@ impl RecordError {
     }
 }
 
-/// A record that cannot be written.
+/// Error of a record that cannot be encoded.
 #[derive(Debug, Error)]
 pub enum EncodeError {
-    /// JSON has no such number, and the field may not be `null`.
+    /// Non-finite number in a field that may not be `null`.
     #[error("{field} is {value}: it must be a finite number")]
     NotFinite {
-        /// Which field.
+        /// Name of the field.
         field: &'static str,
-        /// What it holds.
+        /// Value that is not finite.
         value: f64,
     },
-    /// No reader would take it.
+    /// Record longer than a line may be.
     #[error("the record is {0} bytes long; a line has at most {MAX_LINE_BYTES}")]
     TooLong(usize),
-    /// A map with a key that JSON can't hold.
+    /// Map with a key that JSON does not support.
     #[error("the record can't be written as JSON: {0}")]
     Json(#[from] serde_json::Error),
 }
 
-/// Writes one record and its newline at the end of `line`.
+/// Appends one record and a newline to `line`.
 ///
 /// # Errors
-/// When a number that may not be `null` is not finite, or the line gets too long; `line` is then
-/// as it was.
+/// If a number that may not be `null` is not finite, or the line is too long. `line` is then
+/// unchanged.
 pub fn encode_line(record: &Record, line: &mut Vec<u8>) -> Result<(), EncodeError> {
     if let Some((field, value)) = first_not_finite(record) {
         return Err(EncodeError::NotFinite { field, value });
@@ -110,20 +110,20 @@ pub fn encode_line(record: &Record, line: &mut Vec<u8>) -> Result<(), EncodeErro
     result
 }
 
-/// Reads one line, without its newline, as a record. A carriage return at its end is ignored.
+/// Decodes one line, without its newline. A carriage return at its end is ignored.
 ///
 /// # Errors
-/// Says where on the line and in which field, and what would be right.
+/// Names the position on the line, the field, and the expected form.
 pub fn decode_line(bytes: &[u8]) -> Result<Record, RecordError> {
     let bytes = bytes.strip_suffix(b"\r").unwrap_or(bytes);
-    let text = text_of(bytes)?;
+    let text = as_text(bytes)?;
     let tag: Tag = serde_json::from_str(text).map_err(|error| tag_fault(text, &error))?;
     match &*tag.kind {
         "session" => decode_session(text),
-        "scan_start" => fields_of(text).map(Record::ScanStart),
-        "ping" => fields_of(text).map(Record::Ping),
-        "scan_end" => fields_of(text).map(Record::ScanEnd),
-        "event" => fields_of(text).map(Record::Event),
+        "scan_start" => decode_fields(text).map(Record::ScanStart),
+        "ping" => decode_fields(text).map(Record::Ping),
+        "scan_end" => decode_fields(text).map(Record::ScanEnd),
+        "event" => decode_fields(text).map(Record::Event),
         other => Err(RecordError {
             kind: FaultKind::UnknownType,
             column: None,
@@ -135,28 +135,27 @@ pub fn decode_line(bytes: &[u8]) -> Result<Record, RecordError> {
     }
 }
 
-/// What stands in front of every record.
+/// Type tag common to all records.
 #[derive(Deserialize)]
 struct Tag<'a> {
     #[serde(rename = "type", borrow)]
     kind: Cow<'a, str>,
 }
 
-fn text_of(bytes: &[u8]) -> Result<&str, RecordError> {
+fn as_text(bytes: &[u8]) -> Result<&str, RecordError> {
     let fault =
         |kind, column, message: String| Err(RecordError { kind, column, field: None, message });
     if bytes.trim_ascii().is_empty() {
-        return fault(FaultKind::Empty, None, "empty line: expected one record a line".into());
+        return fault(FaultKind::Empty, None, "empty line: expected one record per line".into());
     }
     if let Some(at) = bytes.iter().position(|&byte| byte == 0) {
         let count = bytes.iter().filter(|&&byte| byte == 0).count();
-        let message = format!(
-            "{count} NUL byte(s): space that was reserved but not written before the power went"
-        );
+        let message =
+            format!("{count} NUL byte(s): space reserved but not written before a power failure");
         return fault(FaultKind::NotText, Some(at + 1), message);
     }
     match std::str::from_utf8(bytes) {
-        // serde would take an array for a struct.
+        // serde would accept an array for a struct.
         Ok(text) if !text.trim_start().starts_with('{') => {
             fault(FaultKind::NotJson, Some(1), "expected a JSON object, { ... }".into())
         }
@@ -169,7 +168,7 @@ fn text_of(bytes: &[u8]) -> Result<&str, RecordError> {
     }
 }
 
-/// Tells damaged JSON from a whole object without a usable `type`.
+/// Distinguishes damaged JSON from a complete object without a usable `type`.
 fn tag_fault(text: &str, error: &serde_json::Error) -> RecordError {
     if serde_json::from_str::<serde::de::IgnoredAny>(text).is_ok() {
         return RecordError {
@@ -186,7 +185,7 @@ fn tag_fault(text: &str, error: &serde_json::Error) -> RecordError {
     RecordError { kind: FaultKind::NotJson, column: Some(error.column()), field: None, message }
 }
 
-/// Decodes a session. Its format is checked first, because fields of another format may differ.
+/// Decodes a session. The format is checked first, because fields of another format may differ.
 fn decode_session(text: &str) -> Result<Record, RecordError> {
     #[derive(Deserialize)]
     struct Version {
@@ -208,12 +207,13 @@ fn decode_session(text: &str) -> Result<Record, RecordError> {
                 ),
             })
         }
-        _ => fields_of(text).map(Record::Session),
+        _ => decode_fields(text).map(Record::Session),
     }
 }
 
-/// Reads a record's fields; only when that fails, again with an eye on the path.
-fn fields_of<T: DeserializeOwned>(text: &str) -> Result<T, RecordError> {
+/// Decodes a record's fields. The path of an error is tracked only in a second pass after a
+/// failure.
+fn decode_fields<T: DeserializeOwned>(text: &str) -> Result<T, RecordError> {
     serde_json::from_str(text).or_else(|_| {
         let mut json = serde_json::Deserializer::from_str(text);
         serde_path_to_error::deserialize(&mut json).map_err(|error| {
@@ -229,14 +229,14 @@ fn fields_of<T: DeserializeOwned>(text: &str) -> Result<T, RecordError> {
     })
 }
 
-/// The message without serde_json's own position, which counts lines inside the line.
+/// Message without serde_json's position, which counts lines within the line.
 fn plain(error: &serde_json::Error) -> String {
     let text = error.to_string();
     let position = format!(" at line {} column {}", error.line(), error.column());
     text.strip_suffix(&position).unwrap_or(&text).to_owned()
 }
 
-/// The first number that must be known and is not finite.
+/// First required number that is not finite.
 fn first_not_finite(record: &Record) -> Option<(&'static str, f64)> {
     let numbers: &[(&'static str, f64)] = match record {
         Record::Session(session) => {
@@ -263,9 +263,10 @@ fn first_not_finite(record: &Record) -> Option<(&'static str, f64)> {
         Record::Ping(ping) => {
             let length = |path: Option<&PathRecord>| path.map_or(0.0, |path| path.length_m);
             let place = |path: Option<&PathRecord>| {
-                let met = path.into_iter().flat_map(|path| &path.interactions);
-                let known = met.map(|met| met.point).all(Point::is_finite);
-                if known { 0.0 } else { f64::NAN }
+                let interactions = path.into_iter().flat_map(|path| &path.interactions);
+                let is_finite =
+                    interactions.map(|interaction| interaction.point).all(Point::is_finite);
+                if is_finite { 0.0 } else { f64::NAN }
             };
             let path = ping.path.as_ref();
             let sim_path = ping.sim.as_ref().and_then(|sim| sim.path.as_ref());

@@ -1,4 +1,4 @@
-//! A scene as it is drawn.
+//! Floor plan of a scene, for drawing.
 
 use std::collections::BTreeMap;
 
@@ -10,67 +10,68 @@ use sonard_model::{
     scene::{Material, RobotShape, Scene},
 };
 
-/// A point of a floor plan: x and y, metres.
+/// Point of a floor plan: x and y, metres.
 pub type PlanPoint = [f64; 2];
 
-/// A scene: everything that a drawn floor plan shows.
+/// Elements of a scene that a drawn floor plan shows.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct FloorPlan {
-    /// Its name.
+    /// Name of the scene.
     pub name: String,
-    /// SHA-256 of its file, hexadecimal, as sessions of logs have it.
+    /// SHA-256 of the scene file, hexadecimal, as in sessions of logs.
     pub sha256: String,
-    /// Flat reflectors.
+    /// Flat reflectors of the scene.
     pub walls: Vec<WallLine>,
-    /// Upright round reflectors.
+    /// Upright circular reflectors of the scene.
     pub cylinders: Vec<Circle>,
-    /// The body that carries the ranger, if the scene has one.
+    /// Body of the robot that carries the ranger, if the scene has one.
     pub robot: Option<Body>,
-    /// Named poses.
+    /// Named poses of the ranger.
     pub poses: BTreeMap<String, Pose>,
 }
 
-/// A flat reflector.
+/// Flat reflector in the plan.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct WallLine {
-    /// Its name.
+    /// Identifier of the wall.
     pub id: String,
-    /// One end.
+    /// Position of the first end, metres.
     pub from: PlanPoint,
-    /// The other.
+    /// Position of the second end, metres.
     pub to: PlanPoint,
-    /// What it is made of.
+    /// Surface material of the wall.
     pub material: Material,
 }
 
-/// An upright round reflector.
+/// Upright circular reflector in the plan.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Circle {
-    /// Its name.
+    /// Identifier of the cylinder.
     pub id: String,
-    /// Its axis.
+    /// Position of the axis, metres.
     pub center: PlanPoint,
-    /// Its radius, metres.
+    /// Radius of the cylinder, metres.
     pub radius_m: f64,
-    /// What it is made of.
+    /// Surface material of the cylinder.
     pub material: Material,
 }
 
-/// A body in its own frame: the ranger's axis is its origin, x its heading.
+/// Body of a robot, in the robot's frame: the origin is the ranger's axis, x points along the
+/// heading.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Body {
-    /// Its name.
+    /// Identifier of the body.
     pub id: String,
-    /// Corners of one with flat sides.
+    /// Corners of a polygonal body.
     pub outline: Vec<PlanPoint>,
-    /// Centre of a round one.
+    /// Centre of a circular body.
     pub center: Option<PlanPoint>,
-    /// Radius of a round one, metres.
+    /// Radius of a circular body, metres.
     pub radius_m: Option<f64>,
 }
 
 impl FloorPlan {
-    /// Of a scene.
+    /// Extracts the floor plan of a scene.
     #[must_use]
     pub fn of(scene: &Scene) -> Self {
         Self {

@@ -1,15 +1,15 @@
-//! Records of scans: sessions, plans, readings, and their format in a log.
+//! Records of scans: sessions, plans, readings, and their log format.
 
-// Modules are `foo.rs` beside `foo/`.
+// Modules are `foo.rs` next to `foo/`.
 #![warn(clippy::mod_module_files)]
 
 mod array;
 mod codec;
-mod drawn;
+mod conversions;
 mod floor_plan;
-mod modelled;
 mod path;
 mod peak;
+mod polyline;
 mod record;
 mod remaining;
 mod session;

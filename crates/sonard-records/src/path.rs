@@ -1,4 +1,4 @@
-//! The path of an echo as it stands in a log.
+//! Propagation path of an echo in a log record.
 
 use std::fmt;
 
@@ -11,74 +11,74 @@ use sonard_model::geometry::DVec2;
 
 use crate::{PathKind, Ping};
 
-/// The path of an echo.
+/// Propagation path of an echo.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct PathRecord {
-    /// How the sound got back.
+    /// Kind of the propagation path.
     pub kind: PathKind,
     /// Number of mirror reflections: at walls, cylinders, floor and ceiling.
     pub order: u32,
     /// Interactions in order, from the transmitter to the receiver.
     pub interactions: Vec<InteractionRecord>,
-    /// Length there and back, metres.
+    /// Round-trip length of the path, metres.
     pub length_m: f64,
 }
 
-/// A point where the sound changed its direction.
+/// Point at which the sound changes direction.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct InteractionRecord {
-    /// What changed it.
+    /// Kind of the interaction.
     pub kind: InteractionKind,
-    /// By what: the id of a wall or cylinder, `floor`, `ceiling` or `transducer`; of diffraction the edge,
-    /// `WALL.a` or `WALL.b` for the upright ones at the ends of a wall, `WALL.top` or `WALL.bottom` for
-    /// the level ones of a wall that ends below or above.
+    /// Id of the reflector: a wall or cylinder, `floor`, `ceiling` or `transducer`. For diffraction
+    /// the edge: `WALL.a` or `WALL.b` for the vertical edges at the ends of a wall, `WALL.top` or
+    /// `WALL.bottom` for the horizontal edges of a wall of limited height.
     pub id: String,
-    /// Place of the interaction, to a micrometre.
+    /// Position of the interaction, rounded to a micrometre.
     pub point: Point,
 }
 
-/// Kind of a change of direction.
+/// Kind of an interaction with a surface.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum InteractionKind {
-    /// Mirror reflection.
+    /// Mirror reflection at a surface.
     Reflection,
     /// Diffraction at an edge.
     Diffraction,
     /// Diffuse scattering by a rough wall.
     Scattering,
-    /// Return from the transducer's own face.
+    /// Reflection from the transducer's own face.
     Transducer,
 }
 
-/// A place of the scene, metres.
+/// Position in the scene, metres.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 #[serde(untagged)]
 pub enum Point {
-    /// `[x, y]`, in a scene without floor and ceiling.
+    /// Coordinates `[x, y]`, in a scene without floor and ceiling.
     Plan([f64; 2]),
-    /// `[x, y, z]`.
+    /// Coordinates `[x, y, z]`.
     Space([f64; 3]),
 }
 
 impl Point {
-    /// Rounded to a micrometre, which keeps records short.
+    /// Rounds to a micrometre, which keeps records short.
     #[must_use]
     pub fn rounded(plan: DVec2, z_m: Option<f64>) -> Self {
-        // No negative zero.
+        // Adding 0.0 removes a negative zero.
         let round = |value: f64| (value * 1e6).round() / 1e6 + 0.0;
         let [x, y] = plan.to_array().map(round);
         z_m.map_or(Self::Plan([x, y]), |z_m| Self::Space([x, y, round(z_m)]))
     }
 
-    /// The place in the plan.
+    /// Position in the plan.
     #[must_use]
     pub const fn plan(self) -> DVec2 {
         let (Self::Plan([x, y]) | Self::Space([x, y, _])) = self;
         DVec2::new(x, y)
     }
 
-    /// Whether all its coordinates are numbers.
+    /// Returns `true` if all coordinates are finite.
     pub(crate) fn is_finite(self) -> bool {
         match self {
             Self::Plan(at) => at.iter().all(|value| value.is_finite()),
@@ -88,8 +88,7 @@ impl Point {
 }
 
 impl InteractionRecord {
-    /// Its id; of an edge with that word.
-    fn in_words(&self) -> String {
+    fn label(&self) -> String {
         match self.kind {
             InteractionKind::Diffraction => format!("edge {}", self.id),
             _ => self.id.clone(),
@@ -98,29 +97,29 @@ impl InteractionRecord {
 }
 
 impl PathRecord {
-    /// What the sound met, in order.
+    /// Ids of the interactions in order, edges marked as such.
     #[must_use]
     pub fn in_words(&self) -> String {
-        let met: Vec<String> = self.interactions.iter().map(InteractionRecord::in_words).collect();
-        met.join(", ")
+        let parts: Vec<String> = self.interactions.iter().map(InteractionRecord::label).collect();
+        parts.join(", ")
     }
 
-    /// Whether it met that wall, cylinder or edge.
+    /// Returns `true` if the path interacts with a wall, cylinder or edge.
     #[must_use]
     pub fn meets(&self, id: &str) -> bool {
-        self.interactions.iter().any(|met| met.id == id)
+        self.interactions.iter().any(|interaction| interaction.id == id)
     }
 
-    /// Path as a line in the plan, from the transmitter over the interactions to the receiver, metres.
+    /// Path as a polyline in the plan, metres: transmitter, interactions, receiver.
     #[must_use]
     pub fn polyline(&self, [transmitter, receiver]: [DVec2; 2]) -> Vec<DVec2> {
-        let points = self.interactions.iter().map(|met| met.point.plan());
+        let points = self.interactions.iter().map(|interaction| interaction.point.plan());
         [transmitter].into_iter().chain(points).chain([receiver]).collect()
     }
 }
 
 impl Ping {
-    /// The path of its sound: of a simulated reading its own, else the one that the model predicts.
+    /// Path of the received sound: the reading's own if simulated, else the predicted one.
     #[must_use]
     pub fn sound_path(&self) -> Option<&PathRecord> {
         self.path.as_ref().or_else(|| self.sim.as_ref()?.path.as_ref())
@@ -165,7 +164,7 @@ mod tests {
     }
 
     #[test]
-    fn points_are_of_two_coordinates_or_of_three() {
+    fn points_have_two_or_three_values() {
         let text = r#"{"kind":"specular","order":2,"interactions":[
             {"kind":"reflection","id":"south","point":[0.5,-0.25]},
             {"kind":"reflection","id":"floor","point":[0.75,0.5,0.0]}],"length_m":1.5}"#;
@@ -182,7 +181,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_met_is_told_in_order_and_edges_as_such() {
+    fn describes_interactions_in_order() {
         let text = r#"{"kind":"diffracted","order":1,"interactions":[
             {"kind":"diffraction","id":"p.a","point":[0.5,0.25]},
             {"kind":"reflection","id":"south","point":[0.5,0.0]}],"length_m":1}"#;

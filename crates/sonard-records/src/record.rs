@@ -1,4 +1,4 @@
-//! The log's records: one JSON object a line. These names are the project's public interface.
+//! Log records: one JSON object per line. The field names are a public interface of the project.
 
 use jiff::Timestamp;
 use schemars::JsonSchema;
@@ -11,63 +11,63 @@ use crate::{
 };
 use sonard_model::geometry::Pose;
 
-/// One line of a log.
+/// Line of a log.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "type", rename_all = "snake_case")]
 pub enum Record {
-    /// What is true for everything until the next session.
+    /// Conditions of all following records, until the next session.
     Session(Box<Session>),
-    /// A scan begins.
+    /// Start of a scan.
     ScanStart(ScanStart),
-    /// One reading.
+    /// Single reading of a scan.
     Ping(Box<Ping>),
-    /// A scan is over.
+    /// End of a scan.
     ScanEnd(ScanEnd),
-    /// Something happened that a reader of the data must know.
+    /// Event that affects the interpretation of the data.
     Event(Event),
 }
 
-/// A scan begins.
+/// Start of a scan.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ScanStart {
-    /// Identifies the scan in all its records.
+    /// Identifier of the scan in all its records.
     pub scan: Uuid,
-    /// Wall clock.
+    /// Wall-clock time of the record.
     pub time: Timestamp,
-    /// Where the ranger stands.
+    /// Pose of the ranger.
     pub pose: Pose,
-    /// What is to be measured. Of an array, it has as many beams as the scan has firings; where they
-    /// look is the array's.
+    /// Scan plan. For an array, the number of beams equals the number of firings; the directions
+    /// are those of the array.
     pub plan: ScanPlan,
-    /// The air as it was known then; the session's if it is not here.
+    /// Air conditions at the start of the scan; default: those of the session.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub air: Option<ScanAir>,
-    /// The session's, repeated for readers of a live stream, by sources that make readings up.
+    /// Provenance of the session, repeated by simulating sources for readers of a live stream.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub provenance: Option<Provenance>,
-    /// The request to a daemon that it was taken for, if it was one.
+    /// Request to a daemon that the scan answers, if there was one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub request: Option<Uuid>,
 }
 
 impl ScanStart {
-    /// A scan of the session's ranger, in the session's air, that nobody asked for.
+    /// Start of an unrequested scan with the session's ranger, in the session's air.
     #[must_use]
     pub const fn new(scan: Uuid, time: Timestamp, pose: Pose, plan: ScanPlan) -> Self {
         Self { scan, time, pose, plan, air: None, provenance: None, request: None }
     }
 }
 
-/// The air of a scan, as it was known when it began.
+/// Air conditions at the start of a scan.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ScanAir {
-    /// Temperature, degrees Celsius.
+    /// Temperature of the air, degrees Celsius.
     pub temperature_c: f64,
-    /// Speed of sound that ranges were computed with, metres a second.
+    /// Speed of sound that ranges were computed with, m/s.
     pub sound_speed_m_s: f64,
-    /// Who gave the temperature.
+    /// Source of the temperature.
     pub source: AirSource,
-    /// How old it was, seconds; `null` for a fixed one.
+    /// Age of the temperature, seconds; `null` for a fixed one.
     pub age_s: Option<f64>,
 }
 
@@ -75,40 +75,40 @@ pub struct ScanAir {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum AirSource {
-    /// The configuration.
+    /// Value from the configuration file.
     Configuration,
-    /// A thermometer's file.
+    /// File of a thermometer.
     File,
-    /// A program, through the API.
+    /// Program that uses the API.
     Api,
 }
 
-/// One reading, measured or simulated, and beside a measured one what the model predicts.
+/// Single reading, measured or simulated. A measured one may have a prediction alongside.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Ping {
-    /// The scan it belongs to.
+    /// Identifier of the scan.
     pub scan: Uuid,
     /// Index in the plan: stop times pings-per-stop plus ping.
     pub index: u32,
-    /// Motor position, steps from home; of a ranger of an array, which has no motor, 0.
+    /// Motor position, steps from home; 0 for a ranger of an array, which has no motor.
     pub step: i32,
     /// Azimuth, degrees counter-clockwise from the heading, in [0, 360).
     pub azimuth_deg: f64,
-    /// Which ranger of the session's array; without it, the one on the stepper.
+    /// Id of the ranger in the session's array; default: the one on the stepper.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub ranger: Option<String>,
-    /// Where the robot stood at firing, if that is not the scan's pose: `azimuth_deg` counts from
-    /// its heading.
+    /// Pose of the robot at firing, if it differs from the scan's pose. `azimuth_deg` is relative
+    /// to its heading.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pose: Option<Pose>,
-    /// The session's, repeated for readers of a live stream, by sources that make readings up.
+    /// Provenance of the session, repeated by simulating sources for readers of a live stream.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub provenance: Option<Provenance>,
-    /// Wall clock at firing, from the fit of the device's clock.
+    /// Wall-clock time of firing, from the fit of the device's clock.
     pub time: Option<Timestamp>,
     /// Standard deviation of `time`, microseconds.
     pub time_sigma_us: Option<f64>,
-    /// What became of it.
+    /// Outcome of the firing.
     pub status: PingStatus,
     /// Device ticks at firing, extended past 32 bits.
     pub fired_ticks: Option<u64>,
@@ -118,34 +118,34 @@ pub struct Ping {
     pub tof_us: Option<f64>,
     /// Half the first echo's path, metres; `null` unless the status has a range.
     pub range_m: Option<f64>,
-    /// Fetched again after the line lost it, or measured again.
+    /// Repeated after a loss on the line: transferred or measured again.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub repaired: bool,
     /// Simulated readings only: amplitude relative to a head-on perfect wall.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub amplitude: Option<f64>,
-    /// Simulated readings only: amplitude above the threshold then in force, decibels.
+    /// Simulated readings only: amplitude above the effective threshold, decibels.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub margin_db: Option<f64>,
-    /// Simulated readings only: the path the sound took.
+    /// Simulated readings only: propagation path of the echo.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub path: Option<PathRecord>,
-    /// Simulated readings only: whose sound it was, if not this firing's.
+    /// Simulated readings only: firing that the sound came from, if not this one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub crosstalk: Option<CrosstalkRecord>,
-    /// What the model predicts for this firing.
+    /// Prediction of the model for this firing.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sim: Option<SimRecord>,
     /// Measured minus predicted range, metres, where both have one.
     pub residual_m: Option<f64>,
-    /// How far Feature Prediction trusts it, from 0 (not at all) to 0.5 (nothing speaks against it);
-    /// written by `sonard log annotate`.
+    /// Confidence of Feature Prediction in the reading, from 0 (none) to 0.5 (no contradicting
+    /// evidence); written by `sonard log annotate`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub confidence: Option<f64>,
 }
 
 impl Ping {
-    /// A firing of which nothing is known but where it looked and what became of it.
+    /// Reading with no data except its azimuth and status.
     #[must_use]
     pub const fn new(scan: Uuid, index: u32, azimuth_deg: f64, status: PingStatus) -> Self {
         Self {
@@ -175,98 +175,100 @@ impl Ping {
     }
 }
 
-/// A prediction.
+/// Prediction of a reading.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct SimRecord {
-    /// What the model says becomes of the firing.
+    /// Predicted outcome of the firing.
     pub status: PingStatus,
-    /// Predicted range, metres.
+    /// Predicted range, metres; `null` without an echo.
     pub range_m: Option<f64>,
     /// Amplitude relative to a head-on, perfectly reflecting wall with gain compensation.
     pub amplitude: Option<f64>,
-    /// Amplitude above the threshold then in force, decibels; negative for `no_echo`: what the
-    /// best candidate lacked.
+    /// Amplitude above the effective threshold, decibels; negative for `no_echo`: the deficit of
+    /// the strongest candidate.
     pub margin_db: Option<f64>,
-    /// The path the sound took (for `no_echo`, the best candidate's).
+    /// Propagation path of the echo (for `no_echo`, of the strongest candidate).
     pub path: Option<PathRecord>,
-    /// Crosstalk: whose sound it was, if not this firing's.
+    /// Crosstalk: firing that the sound came from, if not this one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub crosstalk: Option<CrosstalkRecord>,
 }
 
-/// Another firing of an array, whose sound a ranger received as an echo of its own.
+/// Other firing of an array whose sound a ranger received as its own echo.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct CrosstalkRecord {
-    /// The ranger that fired.
+    /// Id of the ranger that fired.
     pub ranger: String,
-    /// How long before, microseconds; 0 for one at the same time. The path is longer than twice the range by
-    /// what sound runs meanwhile.
+    /// Lead of the other firing, microseconds; 0 for a simultaneous one. The path is longer than
+    /// twice the range by the distance that sound travels in this time.
     pub before_us: f64,
 }
 
-/// A scan is over.
+/// End of a scan.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ScanEnd {
-    /// The scan.
+    /// Identifier of the scan.
     pub scan: Uuid,
-    /// Wall clock.
+    /// Wall-clock time of the record.
     pub time: Timestamp,
-    /// Beams of the plan that were measured.
+    /// Number of planned beams that were measured.
     pub beams: u32,
-    /// Beams of the plan that were not: a scan that was given up logs them as `link_lost`, one
-    /// that was stopped on request leaves them out.
+    /// Number of planned beams that were not measured. A failed scan logs them as `link_lost`; a
+    /// scan stopped on request omits them.
     pub missing: u32,
-    /// Readings that the line lost at first.
+    /// Number of readings that were lost on the line at first.
     pub repaired: u32,
-    /// Device time from the first firing to the end of the last listening window, seconds; after a
-    /// restart of the device without the time in between, which its clock did not see.
+    /// Device time from the first firing to the end of the last detection window, seconds. After a
+    /// restart of the device, the time in between is not included, as the device's clock did not
+    /// run.
     pub duration_s: f64,
-    /// What no ordering could avoid in that span: every listening window, and between stops the
-    /// step and its settling, seconds.
+    /// Physical minimum of the duration, seconds: all detection windows, and steps with settling
+    /// between stops.
     pub acoustic_limit_s: f64,
-    /// Where the index was found against where it was expected when the motor went home after
-    /// the scan, steps; `null` if it did not.
+    /// Position of the index mark relative to the expected one at homing after the scan, steps;
+    /// `null` without homing.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub home_drift_steps: Option<i32>,
-    /// The session's, repeated for readers of a live stream, by sources that make readings up.
+    /// Provenance of the session, repeated by simulating sources for readers of a live stream.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub provenance: Option<Provenance>,
 }
 
-/// An event that matters for the interpretation of the data.
+/// Event that affects the interpretation of the data.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct Event {
-    /// Wall clock.
+    /// Wall-clock time of the record.
     pub time: Timestamp,
-    /// What kind of thing.
+    /// Kind of the event.
     pub kind: EventKind,
-    /// In words, with numbers.
+    /// Free-text description of the event.
     pub detail: String,
 }
 
-/// What an event says of a scan that somebody told a daemon to stop.
+/// Detail of the event of a scan that was stopped by a request to a daemon.
 pub const STOPPED_ON_REQUEST: &str = "stopped on request";
 
-/// Kinds of events.
+/// Kinds of logged events.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum EventKind {
     /// The device stopped answering or the line hung up.
     LinkLost,
-    /// It is back.
+    /// The connection was restored.
     Reconnected,
-    /// The device restarted.
+    /// The device rebooted: its clock restarted.
     Reboot,
     /// The device or the motor reported a fault.
     Fault,
-    /// Records are known to be missing here.
+    /// Records are missing at this position.
     Gap,
-    /// Stopped on request.
+    /// The scan was stopped on request.
     Stopped,
-    /// The computer's wall clock was set.
+    /// The wall clock of the computer was set.
     ClockStep,
-    /// The model could not say what would be heard; the readings that follow have no predictions.
+    /// The model could not compute predictions; the following readings have none.
     NoPrediction,
-    /// Something else than what is believed would explain the readings of scans better, or no longer would.
+    /// Another hypothesis explains the readings of recent scans better than the current one, or no
+    /// longer does.
     Explanation,
 }

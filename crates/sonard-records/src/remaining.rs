@@ -1,31 +1,30 @@
-//! What is left of a plan when some of its beams have been measured.
+//! Remaining beams of a partially measured plan.
 
-/// A run of beams that one sweep can cover.
+/// Run of beams that one sweep can cover.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Segment {
     /// First stop, index into the plan's stops.
     pub first_stop: u32,
-    /// Number of stops.
+    /// Number of consecutive stops.
     pub stops: u32,
-    /// First firing wanted at each stop.
+    /// First requested ping at each stop.
     pub first_ping: u32,
-    /// Firings wanted at each stop.
+    /// Number of requested pings at each stop.
     pub pings: u32,
 }
 
 impl Segment {
-    /// The first run of beams not yet `done` (index: stop times pings-per-stop plus ping);
-    /// `None` when all are.
+    /// First run of beams not yet `done` (index: stop times pings-per-stop plus ping); `None` if
+    /// all are.
     ///
-    /// A stop that was left half measured makes a segment of its own, so that no beam is fired
-    /// twice.
+    /// A partially measured stop becomes a run of its own, so that no beam is fired twice.
     #[must_use]
     pub fn next(done: &[bool], pings_per_stop: u32) -> Option<Self> {
         let per_stop = pings_per_stop.max(1) as usize;
         let first = done.iter().position(|&done| !done)?;
         let (stop, ping) = (first / per_stop, first % per_stop);
-        let untouched = |stop: &[bool]| stop.iter().all(|&done| !done);
-        let stops = done.chunks(per_stop).skip(stop).take_while(|stop| untouched(stop)).count();
+        let is_missing = |stop: &[bool]| stop.iter().all(|&done| !done);
+        let stops = done.chunks(per_stop).skip(stop).take_while(|stop| is_missing(stop)).count();
         let (stops, pings) = if stops > 0 {
             (stops, per_stop)
         } else {
@@ -48,7 +47,7 @@ impl Segment {
             + local % self.pings
     }
 
-    /// Number of beams.
+    /// Number of beams in the run.
     #[must_use]
     pub const fn beams(&self) -> u32 {
         self.stops * self.pings
@@ -61,8 +60,8 @@ mod tests {
     use proptest::prelude::*;
 
     #[test]
-    fn an_untouched_plan_is_one_segment() {
-        let segment = Segment::next(&[false; 12], 3).expect("all is left");
+    fn new_plan_is_one_run() {
+        let segment = Segment::next(&[false; 12], 3).expect("all beams remain");
         assert_eq!(segment, Segment { first_stop: 0, stops: 4, first_ping: 0, pings: 3 });
         assert_eq!(Segment::next(&[true; 12], 3), None);
         assert_eq!(Segment::next(&[], 3), None);
@@ -70,7 +69,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn segments_cover_each_missing_beam_exactly_once(
+        fn runs_cover_each_beam_once(
             pings_per_stop in 1_u32..5,
             stops in proptest::collection::vec(any::<u8>(), 0..20),
         ) {

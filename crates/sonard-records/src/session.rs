@@ -1,4 +1,4 @@
-//! The record that opens a log: what is true for everything until the next one.
+//! Session record: the conditions of all records until the next session.
 
 use std::sync::Arc;
 
@@ -14,69 +14,70 @@ use sonard_model::{
     scene::Scene,
 };
 
-/// Version of the record format, written into every session. Sessions of other formats are rejected.
+/// Version of the record format, written into every session. Sessions of other formats are
+/// rejected.
 pub const LOG_FORMAT: u32 = 1;
 
-/// Where the readings of a session come from.
+/// Source of a session's readings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Provenance {
-    /// A real ranger.
+    /// Real ranger connected to the host.
     Hardware,
-    /// The firmware's machine code in an emulator, with sound from the model.
+    /// Firmware's machine code in an emulator, with sound from the model.
     Emulator,
-    /// The device machine on a pty, with sound from the model.
+    /// Device state machine on a pty, with sound from the model.
     Mock,
-    /// The model alone.
+    /// Model without a device.
     Simulated,
     /// Converted from another format.
     Imported,
-    /// An earlier log played again.
+    /// Conversion from another format.
     Replay,
 }
 
-/// The record that opens a log, and again follows each reconnection to a different device.
+/// Opening record of a log, repeated after each reconnection to a different device.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Session {
-    /// Record format: [`LOG_FORMAT`].
+    /// Version of the record format: [`LOG_FORMAT`].
     pub format: u32,
-    /// Wall clock at the start.
+    /// Wall-clock time at the start.
     pub started: Timestamp,
     /// Version of the program that wrote the log.
     pub sonard: String,
-    /// Where the readings come from.
+    /// Source of the readings.
     pub provenance: Provenance,
-    /// The robot it is of, where a daemon wrote it.
+    /// Name of the robot, if a daemon wrote the session.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub robot: Option<String>,
-    /// The ranger that answered; `null` for simulated scans.
+    /// Connected device; `null` for simulated scans.
     pub device: Option<Device>,
-    /// The sensor's data in force.
+    /// Current parameters of the sensor.
     pub sensor: Sensor,
-    /// The array, all of whose rangers are such sensors; without it, one ranger on a stepper.
+    /// Array of rangers with this sensor; default: one ranger on a stepper.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub array: Option<RangerArray>,
-    /// The air in force.
+    /// Air conditions at the start of the session.
     pub air: AirRecord,
-    /// The scene the model was given.
+    /// Scene of the model.
     pub scene: Option<SceneRef>,
-    /// The text of that scene's file, so that a log is whole by itself. In a log it stands once: a
-    /// later session of the same scene goes without, and so does one of a scene too long for a line,
-    /// which is kept beside the log.
+    /// Text of the scene file, which makes a log self-contained. The text is stored once per log:
+    /// later sessions of the same scene omit it. A scene too long for a line is stored next to the
+    /// log.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub scene_text: Option<Arc<str>>,
-    /// The model whose predictions stand beside the readings.
+    /// Model of the predictions stored with the readings.
     pub model: Option<ModelRecord>,
-    /// The collection that its scans were taken for, if it was one.
+    /// Collection that the scans were taken for, if there was one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub collection: Option<Box<CollectionRef>>,
-    /// The file that its readings were imported from, if they were.
+    /// Source file of imported readings.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub imported: Option<Box<ImportRef>>,
 }
 
 impl Session {
-    /// One of this program without device, array, scene and model.
+    /// Creates a session of this program without device, array, scene and model.
     #[must_use]
     pub fn new(started: Timestamp, provenance: Provenance, sensor: Sensor, air: &Air) -> Self {
         Self {
@@ -97,17 +98,17 @@ impl Session {
         }
     }
 
-    /// Says which scene it is of, with its text; a scene that was never a file has none.
+    /// Sets the scene and its text; a scene built without a file has no text.
     pub fn set_scene(&mut self, scene: &Scene) {
         self.scene = Some(SceneRef::of(scene));
         self.scene_text = Some(Arc::clone(&scene.text)).filter(|text| !text.is_empty());
     }
 
-    /// Air and options to predict this session's readings with: the default options if it names no model, `None` if
-    /// this program cannot set up the model that it names.
+    /// Air and options for predictions of this session's readings. The options are the defaults if
+    /// the session has no model, and `None` if this program cannot set up its model.
     ///
     /// # Errors
-    /// When the air is out of the range of the model.
+    /// If the air is out of the range of the model.
     pub fn conditions(&self) -> Result<(Air, Option<Options>), AirError> {
         let options =
             self.model.as_ref().map_or_else(|| Some(Options::default()), ModelRecord::options);
@@ -118,32 +119,32 @@ impl Session {
 /// Source and interpretation of imported readings.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ImportRef {
-    /// The file's name.
+    /// Name of the imported file.
     pub file: String,
     /// SHA-256 of the file's bytes, hexadecimal.
     pub sha256: String,
-    /// What its columns were taken to mean, as it would be given again.
+    /// Interpretation of the columns, in the form of the import options.
     pub mapping: serde_json::Map<String, serde_json::Value>,
-    /// Whether the poses of its scans come from the file or from whoever imported it; else they are not known, and
-    /// stand at the origin.
+    /// `true` if the poses of the scans come from the file or from the user. Otherwise they are
+    /// unknown and set to the origin.
     pub poses_known: bool,
 }
 
-/// Place of a scan in a collection, with its notes.
+/// Place of a scan in a collection, with notes.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct CollectionRef {
-    /// Identifies the collection.
+    /// Identifier of the collection.
     pub id: Uuid,
-    /// What it is called.
+    /// Name of the collection.
     pub name: String,
     /// Number of the pose, from 1.
     pub pose: u32,
-    /// What the pose is called.
+    /// Name of the pose.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pose_name: Option<String>,
     /// Number of the scan at that pose, from 1.
     pub repeat: u32,
-    /// Conditions: name and value.
+    /// Conditions by name and value.
     #[serde(default, skip_serializing_if = "serde_json::Map::is_empty")]
     pub conditions: serde_json::Map<String, serde_json::Value>,
 }
@@ -153,42 +154,42 @@ pub struct CollectionRef {
 pub struct Device {
     /// Serial number stored on the board.
     pub serial: String,
-    /// Firmware version.
+    /// Version of the firmware.
     pub firmware: String,
-    /// Protocol version.
+    /// Version of the serial protocol.
     pub protocol: u32,
-    /// Boot nonce: another value means the device restarted.
+    /// Boot nonce: a different value indicates a restart of the device.
     pub boot: String,
-    /// Device clock, ticks a second.
+    /// Device clock, ticks per second.
     pub tick_hz: u32,
-    /// Motor steps (as the driver counts them) a revolution.
+    /// Motor steps (as counted by the driver) per revolution.
     pub steps_per_revolution: u32,
 }
 
 /// Air conditions and the speed of sound that follows from them.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct AirRecord {
-    /// Temperature, degrees Celsius.
+    /// Temperature of the air, degrees Celsius.
     pub temperature_c: f64,
-    /// Relative humidity, percent.
+    /// Relative humidity of the air, percent.
     pub humidity_percent: f64,
-    /// Static pressure, kilopascals.
+    /// Static pressure of the air, kilopascals.
     pub pressure_kpa: f64,
-    /// Speed of sound, metres a second.
+    /// Speed of sound, m/s.
     pub sound_speed_m_s: f64,
 }
 
 /// Reference to the scene file of the model.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct SceneRef {
-    /// The scene's own name.
+    /// Name of the scene.
     pub name: String,
     /// SHA-256 of the file's bytes, hexadecimal.
     pub sha256: String,
 }
 
 impl SceneRef {
-    /// Of a scene.
+    /// Creates the reference to a scene.
     #[must_use]
     pub fn of(scene: &Scene) -> Self {
         Self { name: scene.name.clone(), sha256: scene.sha256.clone() }
@@ -200,7 +201,7 @@ impl SceneRef {
 pub struct ModelRecord {
     /// Engine: `paths`, `fan` or `cone`.
     pub engine: String,
-    /// The engine's settings, as they would be given again.
+    /// Settings of the engine, in the form of its options.
     #[serde(flatten)]
     pub settings: serde_json::Map<String, serde_json::Value>,
 }

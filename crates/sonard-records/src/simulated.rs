@@ -1,4 +1,4 @@
-//! Scans made by the model alone.
+//! Simulated scans, without a device.
 
 use jiff::Timestamp;
 use uuid::Uuid;
@@ -9,15 +9,14 @@ use sonard_model::{
     model::{Prediction, Simulator, TooCostly},
 };
 
-/// Motor steps a revolution that `step` counts in.
+/// Motor steps per revolution, the unit of `step`.
 const STEPS_PER_REVOLUTION: f64 = 400.0;
 
 impl ScanView {
-    /// What the model reads at a pose, as a whole scan with its session; `time` is what all of it
-    /// is stamped with.
+    /// Simulates a whole scan at a pose, with its session; `time` is the time stamp of all records.
     ///
     /// # Errors
-    /// When there are more paths than the model can find.
+    /// If there are more paths than the model can trace.
     pub fn simulated(
         simulator: &Simulator,
         scan: Uuid,
@@ -44,7 +43,7 @@ impl ScanView {
 }
 
 impl Session {
-    /// The session of a simulated log.
+    /// Session of a simulated log.
     #[must_use]
     pub fn simulated(simulator: &Simulator, started: Timestamp) -> Self {
         let (sensor, air) = (simulator.sensor().clone(), simulator.air());
@@ -56,7 +55,7 @@ impl Session {
 }
 
 impl Ping {
-    /// A prediction as a reading of its own.
+    /// Simulated reading from a prediction.
     #[must_use]
     pub fn simulated(
         simulator: &Simulator,
@@ -65,33 +64,33 @@ impl Ping {
         azimuth_deg: f64,
         prediction: &Prediction,
     ) -> Self {
-        let said = SimRecord::of(simulator, prediction);
+        let record = SimRecord::of(simulator, prediction);
         Self {
             step: (azimuth_deg / 360.0 * STEPS_PER_REVOLUTION).round() as i32,
             tof_us: prediction.echoes_us.first().copied(),
-            range_m: said.range_m,
-            amplitude: said.amplitude,
-            margin_db: said.margin_db,
-            path: said.path,
-            ..Self::new(scan, index, azimuth_deg, said.status)
+            range_m: record.range_m,
+            amplitude: record.amplitude,
+            margin_db: record.margin_db,
+            path: record.path,
+            ..Self::new(scan, index, azimuth_deg, record.status)
         }
     }
 }
 
 impl ScanEnd {
-    /// The model has no motor: a scan lasts as long as its listening windows.
+    /// End of a simulated scan. Without a motor, a scan takes the sum of its detection windows.
     #[must_use]
     pub fn simulated(simulator: &Simulator, scan: Uuid, beams: u32, time: Timestamp) -> Self {
         let window_s = 2.0 * simulator.receiver().max_range_m / simulator.sound_speed_m_s();
-        let listening_s = f64::from(beams) * window_s;
+        let windows_s = f64::from(beams) * window_s;
         Self {
             scan,
             time,
             beams,
             missing: 0,
             repaired: 0,
-            duration_s: listening_s,
-            acoustic_limit_s: listening_s,
+            duration_s: windows_s,
+            acoustic_limit_s: windows_s,
             home_drift_steps: None,
             provenance: None,
         }
@@ -110,9 +109,9 @@ mod tests {
 
     use super::*;
 
-    /// Sound goes to the largest range and back once a beam.
+    /// Each window lasts for the round trip to the maximum range.
     #[test]
-    fn a_simulated_scan_lasts_as_long_as_its_listening_windows() {
+    fn simulated_duration_is_all_windows() {
         let scene = Scene::from_json(shipped::text("simple-room").expect("shipped"));
         let sensor = Sensor::preset("senscomp-6500").expect("a preset");
         let options = Options { max_range_m: Some(3.4), ..Options::default() };

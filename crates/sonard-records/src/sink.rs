@@ -1,4 +1,4 @@
-//! Where records go while a scan is taken.
+//! Output of records during a scan.
 
 use std::{error::Error, io};
 
@@ -6,16 +6,16 @@ use thiserror::Error;
 
 use crate::Record;
 
-/// Takes records as they are made: a log, a live stream, a memory.
+/// Consumer of records as they are produced: a log, a live stream, a buffer.
 pub trait Sink: Send {
-    /// Takes a record in.
+    /// Stores or forwards a record.
     ///
     /// # Errors
-    /// When it can't be kept.
+    /// If the record cannot be stored.
     fn record(&mut self, record: &Record) -> Result<(), SinkError>;
 }
 
-/// A record could not be stored.
+/// Error of a record that could not be stored.
 #[derive(Debug, Error)]
 #[error("{cause}")]
 pub struct SinkError {
@@ -24,18 +24,18 @@ pub struct SinkError {
 }
 
 impl SinkError {
-    /// What went wrong, and what a person can do about it.
+    /// Creates an error from its cause and a hint for the user.
     pub fn new(cause: impl Into<Box<dyn Error + Send + Sync>>, help: impl Into<String>) -> Self {
         Self { cause: cause.into(), help: help.into() }
     }
 
-    /// What a person can do about it.
+    /// Hint for the user.
     #[must_use]
     pub fn help(&self) -> &str {
         &self.help
     }
 
-    /// Whether the reader of a pipe went away, which is no failure of whoever writes.
+    /// Returns `true` if the reader of a pipe closed it, which is no failure of the writer.
     #[must_use]
     pub fn is_broken_pipe(&self) -> bool {
         let mut cause: Option<&(dyn Error + 'static)> = Some(&*self.cause);
@@ -61,9 +61,9 @@ mod tests {
     struct Outer(#[source] io::Error);
 
     #[test]
-    fn a_reader_that_left_is_found_behind_other_causes() {
-        let behind = |kind: io::ErrorKind| SinkError::new(Outer(kind.into()), "");
-        assert!(behind(io::ErrorKind::BrokenPipe).is_broken_pipe());
-        assert!(!behind(io::ErrorKind::StorageFull).is_broken_pipe());
+    fn finds_nested_broken_pipe() {
+        let nested = |kind: io::ErrorKind| SinkError::new(Outer(kind.into()), "");
+        assert!(nested(io::ErrorKind::BrokenPipe).is_broken_pipe());
+        assert!(!nested(io::ErrorKind::StorageFull).is_broken_pipe());
     }
 }

@@ -1,37 +1,37 @@
-//! The echo trace of a firing, as it is drawn.
+//! Predicted echo trace of a firing, for drawing.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use sonard_model::{acoustics::EchoTrace, model::Simulator};
 
-/// More points than this are told as so many, each the highest of its neighbours.
-const MOST_POINTS: usize = 4096;
+/// Maximum number of points; longer traces keep the maximum of neighbouring points.
+const MAX_POINTS: usize = 4096;
 
-/// The echo trace that the model predicts.
+/// Predicted echo trace in drawable form.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct TraceLine {
-    /// Between its points, microseconds; the first is the firing.
+    /// Sample spacing, microseconds; the first sample is at firing.
     pub step_us: f64,
-    /// Half the speed of sound, metres a microsecond: time times this is range.
+    /// Half the speed of sound, metres per microsecond: converts time to range.
     pub m_per_us: f64,
-    /// Envelope of all arrivals together, relative to a head-on, perfectly reflecting wall.
+    /// Envelope of the summed arrivals, relative to a head-on, perfectly reflecting wall.
     pub envelope: Vec<f32>,
-    /// Least envelope that is noticed then.
+    /// Effective detection threshold at each sample.
     pub threshold: Vec<f32>,
-    /// Until when the receiver is deaf, microseconds.
+    /// End of receiver blanking, microseconds.
     pub blanking_us: f64,
 }
 
 impl TraceLine {
-    /// A trace whose points are `step_us` apart.
+    /// Converts a trace whose samples are `step_us` apart.
     #[must_use]
     pub fn of(simulator: &Simulator, trace: &EchoTrace, step_us: f64) -> Self {
-        let together = trace.points.len().div_ceil(MOST_POINTS).max(1);
-        let pieces = || trace.points.chunks(together);
-        let highest = pieces().map(|piece| piece.iter().map(|p| p.envelope).fold(0.0, f64::max));
-        let threshold = pieces().filter_map(|piece| Some(piece.first()?.threshold as f32));
+        let group_size = trace.points.len().div_ceil(MAX_POINTS).max(1);
+        let groups = || trace.points.chunks(group_size);
+        let highest = groups().map(|group| group.iter().map(|p| p.envelope).fold(0.0, f64::max));
+        let threshold = groups().filter_map(|group| Some(group.first()?.threshold as f32));
         Self {
-            step_us: step_us * together as f64,
+            step_us: step_us * group_size as f64,
             m_per_us: simulator.sound_speed_m_s() * 0.5e-6,
             envelope: highest.map(|envelope| envelope as f32).collect(),
             threshold: threshold.collect(),

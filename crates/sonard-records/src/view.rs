@@ -1,4 +1,4 @@
-//! A log's records gathered scan by scan, for everything that looks at whole scans.
+//! Grouping of a log's records into scans.
 
 use std::{collections::VecDeque, iter::Fuse, sync::Arc};
 
@@ -7,72 +7,71 @@ use uuid::Uuid;
 use super::{Event, Ping, Record, ScanEnd, ScanStart, SceneRef, Session};
 use sonard_model::geometry::Pose;
 
-/// One scan with the session it was taken in.
+/// Single scan with its session.
 ///
-/// Parts that a damaged or unfinished log lacks are `None`.
+/// Parts missing in a damaged or unfinished log are `None`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ScanView {
-    /// Identifies the scan.
+    /// Identifier of the scan.
     pub scan: Uuid,
-    /// The session in force when the scan's first record was written.
+    /// Current session at the scan's first record.
     pub session: Option<Arc<Session>>,
-    /// How it began.
+    /// Start record of the scan.
     pub start: Option<ScanStart>,
-    /// Its readings, in the order of the log.
+    /// Readings of the scan, in the order of the log.
     pub pings: Vec<Ping>,
-    /// Events between its first and its last record.
+    /// Events between the first and the last record of the scan.
     pub events: Vec<Event>,
-    /// How it ended.
+    /// End record of the scan.
     pub end: Option<ScanEnd>,
 }
 
 impl ScanView {
-    /// Gathers records into scans, in the order in which the scans begin.
+    /// Groups records into scans, in the order of the scans' first records.
     ///
-    /// Readings belong to their scan by its id, wherever they stand; events to the scan that is
-    /// open when they happen.
+    /// Readings are assigned by scan id, wherever they occur; events to the scan open at that time.
     pub fn from_records(records: impl IntoIterator<Item = Record>) -> Vec<Self> {
-        let mut gathered = Gathered::default();
+        let mut assembler = ScanAssembler::default();
         for record in records {
-            gathered.add(record);
+            assembler.add(record);
         }
-        gathered.scans
+        assembler.scans
     }
 
-    /// Scans one by one as they end, for logs too long to be held whole.
+    /// Yields scans one by one as they end, for logs too long to be held in memory.
     ///
-    /// A scan without an end comes before the first that begins after its last record and ends,
-    /// or with the last of the log. A reading that stands after its scan's end makes a scan by
-    /// itself: no log of this program has one.
+    /// A scan without an end record is yielded before the first scan that begins after its last
+    /// record and ends, or at the end of the log. A reading after its scan's end record forms a
+    /// scan of its own; logs of this program have none.
     pub fn one_by_one(records: impl IntoIterator<Item = Record>) -> impl Iterator<Item = Self> {
-        OneByOne {
+        ScanStream {
             records: records.into_iter().fuse(),
-            gathered: Gathered::default(),
+            assembler: ScanAssembler::default(),
             ready: VecDeque::new(),
         }
     }
 
-    /// Where the ranger stood, if the log says so.
+    /// Pose of the ranger, if the log contains the start record.
     #[must_use]
     pub fn pose(&self) -> Option<Pose> {
         self.start.as_ref().map(|start| start.pose)
     }
 }
 
-/// What has been read and not been given away.
+/// Assembler of scans from consecutive records.
 #[derive(Default)]
-struct Gathered {
+struct ScanAssembler {
     session: Option<Arc<Session>>,
-    /// The last scene that came with its text: its SHA-256, and the text.
+    /// SHA-256 and text of the last scene with a text.
     scene: Option<(String, Arc<str>)>,
-    /// In the order in which they begin.
+    /// Scans in the order of their first records.
     scans: Vec<ScanView>,
-    /// Numbers of the first and last record of each.
+    /// Numbers of the first and last record of each scan.
     records: Vec<[u64; 2]>,
     count: u64,
 }
 
-impl Gathered {
+impl ScanAssembler {
     fn add(&mut self, record: Record) {
         self.count += 1;
         match record {
@@ -94,7 +93,7 @@ impl Gathered {
         }
     }
 
-    /// A log has the text of a scene once: later sessions get it back.
+    /// Restores the scene text, which a log contains only once.
     fn begin_session(&mut self, mut session: Box<Session>) {
         if let Some(SceneRef { sha256, .. }) = &session.scene {
             match (&session.scene_text, &self.scene) {
@@ -108,9 +107,9 @@ impl Gathered {
         self.session = Some(Arc::from(session));
     }
 
-    /// The view of `scan`, made if this is its first record.
+    /// View of `scan`, created at its first record.
     fn entry(&mut self, scan: Uuid) -> &mut ScanView {
-        // Records of a scan stand together, so the search from the end stops at once.
+        // Records of a scan are adjacent, so the backward search is short.
         let at = self.scans.iter().rposition(|view| view.scan == scan).unwrap_or_else(|| {
             self.scans.push(ScanView {
                 scan,
@@ -127,7 +126,7 @@ impl Gathered {
         &mut self.scans[at]
     }
 
-    /// Gives `scan` away, and before it those that were left without an end when it began.
+    /// Moves `scan` to `ready`, preceded by scans left without an end when it began.
     fn take_ended(&mut self, scan: Uuid, ready: &mut VecDeque<ScanView>) {
         let Some(at) = self.scans.iter().rposition(|view| view.scan == scan) else { return };
         let [first, _] = self.records[at];
@@ -144,29 +143,29 @@ impl Gathered {
     }
 }
 
-/// See [`ScanView::one_by_one`].
-struct OneByOne<I> {
+/// Iterator returned by [`ScanView::one_by_one`].
+struct ScanStream<I> {
     records: Fuse<I>,
-    gathered: Gathered,
+    assembler: ScanAssembler,
     ready: VecDeque<ScanView>,
 }
 
-impl<I: Iterator<Item = Record>> Iterator for OneByOne<I> {
+impl<I: Iterator<Item = Record>> Iterator for ScanStream<I> {
     type Item = ScanView;
 
     fn next(&mut self) -> Option<ScanView> {
         while self.ready.is_empty() {
             let Some(record) = self.records.next() else {
-                self.ready.extend(std::mem::take(&mut self.gathered.scans));
+                self.ready.extend(std::mem::take(&mut self.assembler.scans));
                 break;
             };
             let ended = match &record {
                 Record::ScanEnd(end) => Some(end.scan),
                 _ => None,
             };
-            self.gathered.add(record);
+            self.assembler.add(record);
             if let Some(scan) = ended {
-                self.gathered.take_ended(scan, &mut self.ready);
+                self.assembler.take_ended(scan, &mut self.ready);
             }
         }
         self.ready.pop_front()
@@ -195,7 +194,7 @@ mod tests {
     }
 
     #[test]
-    fn readings_find_their_scan_even_after_the_next_one_began() {
+    fn readings_are_assigned_by_id() {
         let (first, second) = (Uuid::from_u128(1), Uuid::from_u128(2));
         let event = Record::Event(Event {
             time: jiff::Timestamp::UNIX_EPOCH,
@@ -231,7 +230,7 @@ mod tests {
     }
 
     #[test]
-    fn one_by_one_gives_the_same_scans_as_soon_as_they_end() {
+    fn stream_yields_scans_as_they_end() {
         let [first, killed, second, last] = [1, 2, 3, 4].map(Uuid::from_u128);
         let records = [
             start(first),
@@ -254,7 +253,7 @@ mod tests {
     }
 
     #[test]
-    fn one_by_one_keeps_a_scan_that_goes_on_beside_another() {
+    fn stream_keeps_interleaved_scans() {
         let (long, short) = (Uuid::from_u128(1), Uuid::from_u128(2));
         let records = [
             start(long),
@@ -273,7 +272,7 @@ mod tests {
     }
 
     #[test]
-    fn a_scan_without_its_start_is_still_there() {
+    fn keeps_scans_without_start() {
         let scan = Uuid::from_u128(7);
         let views = ScanView::from_records([ping(scan, 3)]);
         assert_eq!((views.len(), views[0].pings.len()), (1, 1));

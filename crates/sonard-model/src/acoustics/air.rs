@@ -2,14 +2,14 @@
 
 use thiserror::Error;
 
-/// Mole fraction of carbon dioxide assumed throughout.
+/// Assumed mole fraction of carbon dioxide.
 const CARBON_DIOXIDE: f64 = 0.0004;
 const ZERO_CELSIUS_K: f64 = 273.15;
 
-/// Temperatures that the formulas cover, degrees Celsius.
+/// Temperature range of the formulas, degrees Celsius.
 const TEMPERATURES_C: (f64, f64) = (-20.0, 50.0);
 
-/// The state of the air.
+/// State of the air.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Air {
     temperature_c: f64,
@@ -18,22 +18,22 @@ pub struct Air {
     sound_speed_override_m_s: Option<f64>,
 }
 
-/// A state of the air that the formulas do not cover.
+/// State of the air outside the range of the formulas.
 #[derive(Debug, Clone, Copy, PartialEq, Error)]
 #[error("{field} is {value}: it must be from {min} to {max}")]
 pub struct AirError {
-    /// Which quantity.
+    /// Name of the rejected quantity.
     pub field: &'static str,
-    /// What was given.
+    /// Value outside the range.
     pub value: f64,
-    /// Least value allowed.
+    /// Lower end of the allowed range.
     pub min: f64,
-    /// Greatest value allowed.
+    /// Upper end of the allowed range.
     pub max: f64,
 }
 
 impl Default for Air {
-    /// 20 degrees Celsius, 50 percent, one standard atmosphere.
+    /// Returns air at 20 degrees Celsius, 50 percent and one standard atmosphere.
     fn default() -> Self {
         Self {
             temperature_c: 20.0,
@@ -45,14 +45,14 @@ impl Default for Air {
 }
 
 impl Air {
-    /// Air of a temperature (degrees Celsius, -20 to 50), relative humidity (percent, 0 to 100)
-    /// and static pressure (kilopascals, 60 to 110).
+    /// Creates air from temperature (degrees Celsius, -20 to 50), relative humidity (percent, 0 to
+    /// 100) and static pressure (kilopascals, 60 to 110).
     ///
-    /// Cramer states his fit for 0 to 30 degrees and 75 to 102 kPa and ISO 9613-1 covers -20 to
-    /// 50 degrees; outside Cramer's range the speed is an extrapolation.
+    /// Cramer states his fit for 0 to 30 degrees and 75 to 102 kPa; ISO 9613-1 covers -20 to 50
+    /// degrees. Outside Cramer's range the speed of sound is an extrapolation.
     ///
     /// # Errors
-    /// When one of them is out of range or not a number.
+    /// If an argument is out of range or not a number.
     pub fn new(
         temperature_c: f64,
         humidity_percent: f64,
@@ -64,22 +64,23 @@ impl Air {
         Ok(Self { temperature_c, humidity_percent, pressure_kpa, sound_speed_override_m_s: None })
     }
 
-    /// The same air with the speed of sound given (metres a second, 200 to 500) instead of
-    /// computed; absorption still follows from the air's state.
+    /// Replaces the computed speed of sound by a given one (m/s, 200 to 500). Absorption still
+    /// follows from the state of the air.
     ///
     /// # Errors
-    /// When the speed is out of range or not a number.
+    /// If the speed is out of range or not a number.
     pub fn with_sound_speed(self, sound_speed_m_s: f64) -> Result<Self, AirError> {
         check("sound_speed_m_s", sound_speed_m_s, 200.0, 500.0)?;
         Ok(Self { sound_speed_override_m_s: Some(sound_speed_m_s), ..self })
     }
 
-    /// The same air as warm as it must be to have this speed of sound (metres a second), at its humidity and pressure, so
-    /// that its absorption follows. Air whose speed was given is left as warm as it is, and so, at the end of the range,
-    /// is air that would have to be colder or warmer than [`Air::new`] allows.
+    /// Sets the temperature at which the air has this speed of sound (m/s), at unchanged humidity
+    /// and pressure, so that absorption follows. Air with a given speed of sound keeps its
+    /// temperature. A temperature outside the range of [`Air::new`] is clamped and the speed is set
+    /// as given.
     ///
     /// # Errors
-    /// When the speed is out of range (200 to 500) or not a number.
+    /// If the speed is out of range (200 to 500) or not a number.
     pub fn warmed_to_sound_speed(self, sound_speed_m_s: f64) -> Result<Self, AirError> {
         let given = self.with_sound_speed(sound_speed_m_s)?;
         if self.sound_speed_override_m_s.is_some() {
@@ -94,8 +95,8 @@ impl Air {
         if is_colder(high_c) {
             return Ok(Self { temperature_c: high_c, ..given });
         }
-        // Invariant: the speed, which rises with the temperature, is passed between the two. Half as far apart each time, they
-        // come as near as numbers do.
+        // Invariant: the speed, which increases with temperature, is reached between the two.
+        // Bisection to machine precision.
         for _ in 0..f64::MANTISSA_DIGITS {
             let middle_c = 0.5 * (low_c + high_c);
             *(if is_colder(middle_c) { &mut low_c } else { &mut high_c }) = middle_c;
@@ -103,25 +104,25 @@ impl Air {
         Ok(Self { temperature_c: high_c, ..self })
     }
 
-    /// Temperature, degrees Celsius.
+    /// Temperature of the air, degrees Celsius.
     #[must_use]
     pub const fn temperature_c(&self) -> f64 {
         self.temperature_c
     }
 
-    /// Relative humidity, percent.
+    /// Relative humidity of the air, percent.
     #[must_use]
     pub const fn humidity_percent(&self) -> f64 {
         self.humidity_percent
     }
 
-    /// Static pressure, kilopascals.
+    /// Static pressure of the air, kilopascals.
     #[must_use]
     pub const fn pressure_kpa(&self) -> f64 {
         self.pressure_kpa
     }
 
-    /// Speed of sound, metres a second: the one given, else Cramer's.
+    /// Speed of sound, m/s: the given value or Cramer's equation.
     #[must_use]
     pub fn sound_speed_m_s(&self) -> f64 {
         self.sound_speed_override_m_s.unwrap_or_else(|| {
@@ -129,7 +130,7 @@ impl Air {
         })
     }
 
-    /// Pure-tone absorption, decibels a metre, at a frequency in hertz.
+    /// Pure-tone absorption, dB/m, at a frequency in hertz.
     ///
     /// ISO 9613-1:1993, equations (3) to (5) and annex B; stated accuracy 10 percent for -20 to
     /// 50 degrees Celsius and frequency over pressure up to 10 MHz/atm at usual humidities.
@@ -157,8 +158,8 @@ fn check(field: &'static str, value: f64, min: f64, max: f64) -> Result<(), AirE
     if (min..=max).contains(&value) { Ok(()) } else { Err(AirError { field, value, min, max }) }
 }
 
-/// Speed of sound, metres a second, for a temperature in degrees Celsius, a relative humidity
-/// from 0 to 1 and a pressure in pascals.
+/// Speed of sound, m/s, for a temperature in degrees Celsius, a relative humidity from 0 to 1 and a
+/// pressure in pascals.
 ///
 /// Cramer, "The variation of the specific heat ratio and the speed of sound in air with
 /// temperature, pressure, humidity, and CO2 concentration", JASA 93 (1993), equation (15), with
@@ -186,18 +187,18 @@ mod tests {
     use super::*;
 
     #[test]
-    fn speed_of_sound_matches_cramers_table_to_its_digits() {
+    fn dry_to_moist_matches_cramer() {
         for (humidity_percent, expected) in [(0.0, 343.36), (50.0, 343.99), (100.0, 344.61)] {
             let air = Air::new(20.0, humidity_percent, 101.325).expect("in range");
             assert!((air.sound_speed_m_s() - expected).abs() < 0.005, "{humidity_percent} %");
         }
     }
 
-    /// Equation (15) worked out apart from this code, for saturated air. At 30 degrees and 101.325 kPa the saturation
-    /// pressure is 4,245.19 Pa and the enhancement factor 1.0043056, so 4.2077 % of the air are water; at 50 degrees
-    /// 11.284 and 20.655 %.
+    /// Equation (15) evaluated independently of this code, for saturated air. At 30 degrees and
+    /// 101.325 kPa the saturation pressure is 4,245.19 Pa and the enhancement factor 1.0043056, so
+    /// the mole fraction of water is 4.2077 %; at 50 degrees it is 11.284 and 20.655 %.
     #[test]
-    fn moist_air_has_the_speed_of_the_published_equation() {
+    fn saturated_air_matches_equation_15() {
         for (temperature_c, pressure_kpa, expected) in
             [(30.0, 101.325, 351.46888), (50.0, 110.0, 366.79618), (50.0, 60.0, 372.00668)]
         {
@@ -208,13 +209,13 @@ mod tests {
     }
 
     #[test]
-    fn air_is_warmed_to_a_speed_of_sound() {
+    fn temperature_from_sound_speed() {
         for (humidity_percent, pressure_kpa) in [(0.0, 110.0), (50.0, 101.325), (100.0, 60.0)] {
             for temperature_c in [-19.0, 3.0, 20.0, 49.0] {
-                let wanted = Air::new(temperature_c, humidity_percent, pressure_kpa);
-                let wanted = wanted.expect("in range");
+                let expected = Air::new(temperature_c, humidity_percent, pressure_kpa);
+                let expected = expected.expect("in range");
                 let air = Air::new(20.0, humidity_percent, pressure_kpa).expect("in range");
-                let speed_m_s = wanted.sound_speed_m_s();
+                let speed_m_s = expected.sound_speed_m_s();
                 let warmed = air.warmed_to_sound_speed(speed_m_s).expect("in range");
                 assert!((warmed.temperature_c() - temperature_c).abs() < 1e-9, "{warmed:?}");
                 assert!((warmed.sound_speed_m_s() - speed_m_s).abs() < 1e-10, "{warmed:?}");
@@ -231,7 +232,7 @@ mod tests {
     }
 
     #[test]
-    fn absorption_matches_iso_9613_to_its_digits() {
+    fn absorption_matches_iso_9613() {
         for (frequency_hz, expected) in [(49.4e3, 1.641), (50e3, 1.661), (60e3, 1.980)] {
             let absorption = Air::default().absorption_db_per_m(frequency_hz);
             assert!((absorption - expected).abs() < 5e-4, "{frequency_hz} Hz: {absorption}");
@@ -239,7 +240,7 @@ mod tests {
     }
 
     #[test]
-    fn air_out_of_range_is_named() {
+    fn rejects_values_out_of_range() {
         for (air, field) in [
             (Air::new(51.0, 50.0, 101.0), "temperature_c"),
             (Air::new(20.0, f64::NAN, 101.0), "humidity_percent"),
@@ -251,10 +252,10 @@ mod tests {
     }
 
     #[test]
-    fn air_says_what_it_was_made_of() {
+    fn keeps_its_parameters() {
         let air = Air::new(-7.5, 35.0, 98.2).expect("in range");
-        let told = [air.temperature_c(), air.humidity_percent(), air.pressure_kpa()];
-        assert_eq!(told, [-7.5, 35.0, 98.2]);
+        let parameters = [air.temperature_c(), air.humidity_percent(), air.pressure_kpa()];
+        assert_eq!(parameters, [-7.5, 35.0, 98.2]);
         let slower = air.with_sound_speed(300.0).expect("in range");
         assert_eq!((slower.sound_speed_m_s(), slower.pressure_kpa()), (300.0, 98.2));
     }

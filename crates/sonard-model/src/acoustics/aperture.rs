@@ -1,8 +1,8 @@
-//! The face in full: every point of it sends to every point of it.
+//! Full aperture response: every point of the face transmits to every point of it.
 //!
-//! A beam pattern says how strong a steady tone leaves at an angle. A pulse is no steady tone:
-//! off the axis it reaches the near rim of the face first, so it begins earlier and weaker than the
-//! pattern says, and where the pattern has a null its beginning and its end are still heard.
+//! A beam pattern gives the amplitude of a steady tone at an angle. Off the axis a pulse reaches
+//! the near rim of the face first. It therefore begins earlier and weaker than the pattern
+//! predicts, and in a null of the pattern its beginning and end are still detectable.
 
 use std::f64::consts::{PI, TAU};
 
@@ -10,70 +10,71 @@ use num_complex::Complex64;
 
 use super::{Aperture, EchoShape, Gain, Sensor, edge::EdgeView};
 
-/// Points across a face: enough for a phase that runs over 40 radians.
+/// Quadrature points across a face: sufficient for a phase range of 40 radians.
 const POINTS: usize = 24;
 
-/// Points up and down a disc's chords: enough for five radians.
+/// Quadrature points along a disc's chords: sufficient for five radians.
 const HEIGHT_POINTS: usize = 8;
 
-/// Standard deviations of the band that are kept on each side of the carrier.
+/// Truncation of the band on each side of the carrier, in standard deviations.
 const BAND_SIGMAS: f64 = 4.0;
 
-/// Spacing of the responses, microseconds.
+/// Sample spacing of the responses, microseconds.
 const STEP_US: f64 = 2.0;
 
-/// Response of the whole face, on sending and on receiving, to the sensor's own pulse.
+/// Response of the whole face, transmitting and receiving, to the sensor's own pulse.
 ///
-/// Summed point by point with the curvature of the wave front at finite range (Fresnel's
-/// approximation), which fills the nulls of the pattern at ranges below some tens of `a^2 / lambda`.
-/// Well beyond them a disc is Kuc and Siegel's: [`kuc_siegel_response`](super::kuc_siegel_response) of
-/// departure and of arrival, both convolved with the pulse. What a disc's height adds to the curvature
-/// is taken at the carrier's frequency.
+/// Summed point by point with the wavefront curvature at finite range (Fresnel approximation),
+/// which fills the nulls of the pattern at ranges below some tens of `a^2 / lambda`. Well beyond
+/// those ranges a disc follows Kuc and Siegel: [`kuc_siegel_response`](super::kuc_siegel_response)
+/// of departure and of arrival, both convolved with the pulse. The curvature due to a disc's height
+/// is evaluated at the carrier frequency.
 #[derive(Debug, Clone)]
 pub struct ApertureResponse {
     aperture: Aperture,
     half_width_m: f64,
-    /// Place across the face, metres, and share.
+    /// Position across the face, metres, and weight.
     points: Vec<(f64, f64)>,
-    /// The pulse's spectrum: hertz above the carrier, and strength.
+    /// Spectrum of the pulse: offset from the carrier, hertz, and amplitude.
     lines: Vec<(f64, Complex64)>,
     carrier_hz: f64,
     sound_speed_m_s: f64,
     first_us: f64,
     samples: usize,
-    /// Peak of a head-on wall at 1 m before scaling, with the gain's rise while it sounds.
+    /// Peak of a head-on wall at 1 m before scaling, including the gain increase during the echo.
     head_on: f64,
 }
 
-/// The incidence of an echo on the face.
+/// Incidence of an echo on the face.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Incidence {
-    /// From the axis to where the sound leaves, radians, counter-clockwise.
+    /// Departure direction relative to the axis, radians, counter-clockwise.
     pub leaving_rad: f64,
-    /// From the axis to where it comes from, radians, counter-clockwise.
+    /// Direction of arrival relative to the axis, radians, counter-clockwise.
     pub arriving_rad: f64,
-    /// Length of the path, metres.
+    /// Round-trip length of the path, metres.
     pub length_m: f64,
-    /// The face's image over the path.
+    /// Image of the face over the path.
     pub image: Image,
 }
 
-/// The face as it is seen over an echo's path.
+/// Image of the face as formed by the path of an echo.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Image {
-    /// Over an even number of mirrors: the right way round.
+    /// Even number of mirror reflections: not reversed.
     Upright,
-    /// Over an odd number of mirrors: left and right swapped.
+    /// Odd number of mirror reflections: left and right swapped.
     Swapped,
-    /// Off a place that forgets where on the face the sound left.
+    /// Point scatterer: the image does not depend on the point of departure.
     Lost,
-    /// Round an edge, which forgets it too, but is seen otherwise from every point of the face.
+    /// Edge diffraction: independent of the point of departure, but with an aspect that varies
+    /// across the face.
     Bent(EdgeView),
 }
 
 impl ApertureResponse {
-    /// For a sensor at a speed of sound in metres a second; `None` for an aperture that is given by
-    /// its beam only.
+    /// Creates the response of a sensor for a speed of sound in m/s; `None` for an aperture that is
+    /// defined only by its beam.
     #[must_use]
     pub fn new(sensor: &Sensor, sound_speed_m_s: f64) -> Option<Self> {
         let aperture = sensor.aperture.clone();
@@ -102,16 +103,16 @@ impl ApertureResponse {
             Gain::Compensating { exponent, .. } => exponent,
             Gain::Steps { .. } => 0.0,
         };
-        let way_us = 2e6 / sound_speed_m_s;
+        let reference_us = 2e6 / sound_speed_m_s;
         response.head_on = response
             .echo(&head_on)?
             .samples()
-            .map(|(t_us, sample)| sample.norm() * (1.0 + t_us / way_us).powf(exponent))
+            .map(|(t_us, sample)| sample.norm() * (1.0 + t_us / reference_us).powf(exponent))
             .fold(0.0, f64::max);
         Some(response)
     }
 
-    /// The echo that meets the face so; a head-on wall at 1 m has the peak 1. `None` where nothing
+    /// Echo for an incidence on the face. A head-on wall at 1 m has a peak of 1. `None` if nothing
     /// leaves or arrives.
     #[must_use]
     pub fn echo(&self, incidence: &Incidence) -> Option<EchoShape> {
@@ -138,15 +139,16 @@ impl ApertureResponse {
         Some(EchoShape::from_samples(self.first_us, STEP_US, samples))
     }
 
-    /// Time that an echo may last longer at either end than one on the axis, microseconds.
+    /// Maximum extension of an off-axis echo at either end relative to one on the axis,
+    /// microseconds.
     pub(super) fn crossing_us(&self) -> f64 {
         2e6 * self.half_width_m / self.sound_speed_m_s
     }
 
-    /// By how much each pair of points shortens the path, metres, and its share.
+    /// Path shortening of each pair of points, metres, and its weight.
     ///
-    /// Where the paths part into a sum over departure and one over arrival (no curvature, or an edge
-    /// between) a grid of delays would do; the pairs are few enough to be taken one by one.
+    /// Where the path separates into departure and arrival (no curvature, or an edge in between) a
+    /// grid of delays would suffice; the pairs are few enough for direct summation.
     fn leads_m(&self, incidence: &Incidence) -> Vec<(f64, Complex64)> {
         let Incidence { leaving_rad, arriving_rad, length_m, image } = *incidence;
         let bend_m = |x: f64, y: f64| match image {
@@ -159,21 +161,22 @@ impl ApertureResponse {
             Image::Bent(edge) => Some(edge.shares()),
             _ => None,
         };
-        let seen = |x: f64, y: f64| shares.as_ref().map_or(Complex64::ONE, |share| share(x, y));
+        let edge_share =
+            |x: f64, y: f64| shares.as_ref().map_or(Complex64::ONE, |share| share(x, y));
         let heights = self.heights(length_m);
         let mut leads = Vec::with_capacity(self.points.len() * self.points.len());
         for (&(u, share_u), heights) in self.points.iter().zip(&heights) {
             for (&(v, share_v), height) in self.points.iter().zip(heights) {
                 let (x, y) = (u * leaving_rad.cos(), v * arriving_rad.cos());
                 let lead_m = u * leaving_rad.sin() + v * arriving_rad.sin() - bend_m(x, y);
-                leads.push((lead_m, share_u * share_v * seen(x, y) * height));
+                leads.push((lead_m, share_u * share_v * edge_share(x, y) * height));
             }
         }
         leads
     }
 
-    /// For each pair of points across a disc what is left of the sound between the chords through them
-    /// over a path of `length_m`, because they have a height: the mean of `exp(-i k (z - z')^2 / (2 L))`.
+    /// Height factor of each pair of chords of a disc over a path of `length_m`: the mean of
+    /// `exp(-i k (z - z')^2 / (2 L))` over both chords.
     fn heights(&self, length_m: f64) -> Vec<Vec<Complex64>> {
         let count = self.points.len();
         let Aperture::Piston { radius_m, .. } = self.aperture else {
@@ -181,11 +184,11 @@ impl ApertureResponse {
         };
         let bend = PI * self.carrier_hz / self.sound_speed_m_s / length_m;
         let nodes = gauss_legendre(HEIGHT_POINTS);
-        let between = |one_m: f64, other_m: f64| -> Complex64 {
-            let pairs = nodes.iter().flat_map(|one| nodes.iter().map(move |other| (one, other)));
-            let part = |(&(z, share), &(other_z, other_share)): (&(f64, f64), &(f64, f64))| {
-                let apart_m = one_m * z - other_m * other_z;
-                0.25 * share * other_share * Complex64::cis(-bend * apart_m * apart_m)
+        let between = |a_m: f64, b_m: f64| -> Complex64 {
+            let pairs = nodes.iter().flat_map(|a| nodes.iter().map(move |b| (a, b)));
+            let part = |(&(a_z, a_share), &(b_z, b_share)): (&(f64, f64), &(f64, f64))| {
+                let apart_m = a_m * a_z - b_m * b_z;
+                0.25 * a_share * b_share * Complex64::cis(-bend * apart_m * apart_m)
             };
             pairs.map(part).sum()
         };
@@ -194,7 +197,7 @@ impl ApertureResponse {
             .iter()
             .map(|(u, _)| (radius_m * radius_m - u * u).max(0.0).sqrt())
             .collect();
-        // Chords left and right of the middle are alike.
+        // Chords left and right of the middle are equal.
         let half = count.div_ceil(2);
         let row = |i: usize| -> Vec<Complex64> {
             let part: Vec<_> = (0..half).map(|j| between(halves[i], halves[j])).collect();
@@ -205,7 +208,7 @@ impl ApertureResponse {
     }
 }
 
-/// The pulse's lines `1 / period` apart over its band.
+/// Spectral lines of the pulse, spaced `1 / period` over its band.
 fn spectrum(sensor: &Sensor, pulse: &EchoShape, period_us: f64) -> Vec<(f64, Complex64)> {
     let band_hz = BAND_SIGMAS * sensor.pulse.bandwidth_hz();
     let spacing_hz = 1e6 / period_us;
@@ -220,8 +223,8 @@ fn spectrum(sensor: &Sensor, pulse: &EchoShape, period_us: f64) -> Vec<(f64, Com
         .collect()
 }
 
-/// Points across a face, metres from its middle, and their shares of it; `None` for an aperture
-/// that is given by its beam only.
+/// Quadrature points across a face, metres from its middle, and their weights; `None` for an
+/// aperture that is defined only by its beam.
 pub(super) fn points(aperture: &Aperture, count: usize) -> Option<Vec<(f64, f64)>> {
     match *aperture {
         Aperture::Piston { radius_m, .. } => {
@@ -287,7 +290,7 @@ mod tests {
     }
 
     #[test]
-    fn on_the_axis_it_is_the_pulse() {
+    fn on_axis_echo_is_the_pulse() {
         for name in ["senscomp-6500", "fullwave-line"] {
             let sensor = preset(name);
             let response = ApertureResponse::new(&sensor, SPEED_M_S).expect("a face");
@@ -303,14 +306,14 @@ mod tests {
 
     /// Departure and arrival are two convolutions with Kuc and Siegel's impulse response.
     #[test]
-    fn a_disc_convolves_the_pulse_with_both_responses() {
+    fn disc_matches_kuc_siegel() {
         let sensor = preset("senscomp-6500");
         let Aperture::Piston { radius_m, .. } = sensor.aperture else { panic!("a disc") };
         let pulse = EchoShape::of(&sensor);
         let (leaving, arriving) = (0.15_f64, -0.3_f64);
         let omega = TAU * sensor.frequency_hz;
         let steps = 160;
-        // Places between which the response has equal area would be better; many places do too.
+        // Midpoint rule; equal-area nodes would converge faster.
         let delays = |theta: f64| {
             let span_s = radius_m * theta.sin().abs() / SPEED_M_S;
             let step_s = 2.0 * span_s / f64::from(steps);
@@ -325,20 +328,20 @@ mod tests {
             let t_us = f64::from(i);
             let mut sum = Complex64::ZERO;
             for (first, weight) in delays(leaving) {
-                for (second, other) in delays(arriving) {
+                for (second, second_weight) in delays(arriving) {
                     let turn = Complex64::cis(-omega * (first + second));
-                    sum += weight * other * turn * pulse.at(t_us - 1e6 * (first + second));
+                    sum += weight * second_weight * turn * pulse.at(t_us - 1e6 * (first + second));
                 }
             }
             assert!((echo.at(t_us) - sum).norm() < 5e-4, "{t_us}: {} {sum}", echo.at(t_us));
         }
     }
 
-    /// Two equal discs face to face (a disc and its mirror image), at one frequency: Rogers and Van Buren,
-    /// "An exact expression for the Lommel diffraction correction integral", JASA 55 (1974),
+    /// Two equal discs face to face (a disc and its mirror image), at one frequency: Rogers and Van
+    /// Buren, "An exact expression for the Lommel diffraction correction integral", JASA 55 (1974),
     /// `1 - exp(-i x) (J0(x) + i J1(x))` with `x = k a^2 / z`.
     #[test]
-    fn a_disc_before_a_near_mirror_is_lommels() {
+    fn near_mirror_matches_lommel() {
         let sensor = preset("senscomp-6500");
         let Aperture::Piston { radius_m, .. } = sensor.aperture else { panic!("a disc") };
         let response = ApertureResponse::new(&sensor, SPEED_M_S).expect("a face");
@@ -357,15 +360,16 @@ mod tests {
             let x = k * radius_m * radius_m / length_m;
             let bessels = Complex64::new(bessel(0.0, x), bessel(1.0, x));
             let lommel = Complex64::ONE - Complex64::cis(-x) * bessels;
-            // Lommel's is beside a plane wave, ours beside a point's, which is `x / 2` of that.
+            // Lommel's result is relative to a plane wave, this one to a point source, which is `x
+            // / 2` of that.
             let error = face.norm() - 2.0 * lommel.norm() / x;
             assert!(error.abs() < 1e-5, "{length_m}: {error}");
         }
     }
 
-    /// `head_on` of the reference: peak and bias of a head-on wall by range, relative to 1 m.
+    /// Reference `head_on`: peak and bias of a head-on wall versus range, relative to 1 m.
     #[test]
-    fn head_on_walls_are_those_of_the_full_wave_reference() {
+    fn head_on_walls_match_full_wave() {
         let response = ApertureResponse::new(&preset("fullwave-line"), SPEED_M_S).expect("a face");
         let wall = |range_m: f64| {
             let length_m = 2.0 * range_m;
@@ -373,7 +377,7 @@ mod tests {
                 Incidence { leaving_rad: 0.0, arriving_rad: 0.0, length_m, image: Image::Swapped };
             response.echo(&head_on).expect("an echo")
         };
-        // Range, height in the middle of the burst, bias at a threshold of 0.02.
+        // Range, level in the middle of the burst, bias at a threshold of 0.02.
         let reference = [
             (0.15, 0.97377, -7.685),
             (0.3, 1.00187, -7.885),
@@ -386,7 +390,7 @@ mod tests {
             assert!((found / height - 1.0).abs() < 2e-3, "{range_m}: {found} for {height}");
             let rise_us = wall(range_m).rise_us(0.02).expect("it gets there");
             let found_mm = rise_us * SPEED_M_S * 1e-3 / 2.0;
-            // Its band ends 20 kHz off the carrier.
+            // The reference's band ends 20 kHz off the carrier.
             assert!((found_mm - bias_mm).abs() < 0.1, "{range_m}: {found_mm} for {bias_mm}");
         }
     }

@@ -1,11 +1,10 @@
-//! Edge laws: the echo that an edge sends back.
+//! Diffraction laws: the echo of an edge.
 //!
-//! All laws give the echo of an edge relative to the echo that a large, rigid, head-on wall
-//! would give over a path of the same length. With legs `s'` (to the edge) and `s` (from it) a
-//! diffraction coefficient `D` gives `D sqrt((s + s') / (s s')) = D / sqrt(L)`, where
-//! `L = s s' / (s + s')` is the distance parameter; this ratio is the same for a line source in
-//! the plane as for a point source in space. For a ranger that looks straight at the edge,
-//! `2 L` is the range. Time convention `exp(+i omega t)`.
+//! All laws give the echo of an edge relative to that of a large, rigid, head-on wall over a path
+//! of the same length. With legs `s'` (to the edge) and `s` (from it) a diffraction coefficient `D`
+//! gives `D sqrt((s + s') / (s s')) = D / sqrt(L)`, where `L = s s' / (s + s')` is the distance
+//! parameter. This ratio is the same for a line source in the plane as for a point source in space.
+//! For a ranger that points at the edge, `2 L` is the range. Time convention `exp(+i omega t)`.
 
 use std::f64::consts::{FRAC_PI_4, PI, TAU};
 
@@ -15,52 +14,53 @@ pub use post::{MOST_KA, Post};
 pub use strip::{MOST_WAVELENGTHS, Strip};
 pub use view::EdgeView;
 
-/// A law for the strength of the echo of an edge.
+/// Law for the echo amplitude of an edge.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum EdgeLaw {
-    /// The uniform theory of diffraction of Kouyoumjian and Pathak (1974): the level follows from
-    /// the wedge's angle and the aspect, and the whole field stays continuous where a mirror
-    /// echo or the edge's shadow begins.
+    /// Uniform theory of diffraction of Kouyoumjian and Pathak (1974). The amplitude follows from
+    /// the wedge's angle and the aspect; the total field is continuous at reflection and shadow
+    /// boundaries.
     #[default]
     Utd,
-    /// `1 / (2 pi sqrt(z / lambda))` at range `z`, whatever the aspect (Dudek, Jenkin, Milios and
-    /// Wilkes, after Kuc and Siegel).
+    /// Amplitude `1 / (2 pi sqrt(z / lambda))` at range `z`, independent of aspect (Dudek, Jenkin,
+    /// Milios and Wilkes, after Kuc and Siegel).
     KucSiegel,
-    /// `sigma_E sqrt(r_f / r)` at range `r`, whatever the aspect (Bozma and Kuc).
+    /// Amplitude `sigma_E sqrt(r_f / r)` at range `r`, independent of aspect (Bozma and Kuc).
     BozmaKuc {
-        /// `sigma_E`: 0.035 to 0.10 for a right-angled edge.
+        /// Edge constant `sigma_E`: 0.035 to 0.10 for a right-angled edge.
         sigma: f64,
-        /// Where the far field begins, `r_f = a^2 / lambda`, metres.
+        /// Start of the far field, `r_f = a^2 / lambda`, metres.
         far_field_m: f64,
     },
 }
 
-/// A wedge of air between two walls that meet, or all around a free end.
+/// Wedge of air between two walls with a common edge, or around a free end.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Wedge {
-    /// Opening of the air, radians: `2 pi` around a free end, `3 pi / 2` around a box's corner,
-    /// `pi / 2` in a room's corner.
+    /// Opening angle of the air, radians: `2 pi` around a free end, `3 pi / 2` around a box's
+    /// corner, `pi / 2` in a room's corner.
     pub opening_rad: f64,
-    /// Reflectance of the wall where angles in the wedge start, and of the other one.
+    /// Reflectance of the wall from which angles are measured, and of the second wall.
     pub reflectance: [f64; 2],
 }
 
-/// Incidence on a wedge and departure from it: in on one leg, out on another.
+/// Directions of incidence on a wedge and of departure from it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Aspect {
-    /// Direction from the edge towards the source, from the wedge's first wall, radians.
+    /// Direction from the edge towards the source, measured from the wedge's first wall, radians.
     pub in_rad: f64,
-    /// Direction from the edge towards the receiver, from the wedge's first wall, radians.
+    /// Direction from the edge towards the receiver, measured from the wedge's first wall, radians.
     pub out_rad: f64,
     /// Distance parameter `s s' / (s + s')`, metres.
     pub distance_m: f64,
 }
 
 impl EdgeLaw {
-    /// Field behind the edge relative to that of a head-on rigid wall, at `wave_number_per_m`.
+    /// Field diffracted by the edge relative to that of a head-on rigid wall, at
+    /// `wave_number_per_m`.
     ///
-    /// Laws without an aspect say nothing about concave wedges, which then give nothing, and
-    /// take the geometric mean of the two reflectances.
+    /// Aspect-independent laws do not cover concave wedges, which give zero, and use the geometric
+    /// mean of the two reflectances.
     #[must_use]
     pub fn echo(&self, wedge: &Wedge, aspect: &Aspect, wave_number_per_m: f64) -> Complex64 {
         let range_m = 2.0 * aspect.distance_m;
@@ -76,7 +76,7 @@ impl EdgeLaw {
         Complex64::from(level * (first * second).sqrt())
     }
 
-    /// Whether a wedge sends anything back under this law.
+    /// Returns `true` if a wedge has an echo under this law.
     #[must_use]
     pub fn answers(&self, wedge: &Wedge) -> bool {
         match self {
@@ -85,7 +85,7 @@ impl EdgeLaw {
         }
     }
 
-    /// An upper bound of the magnitude of [`Self::echo`], an order cheaper to get.
+    /// Upper bound of the magnitude of [`Self::echo`], an order of magnitude cheaper to compute.
     #[must_use]
     pub fn bound(&self, wedge: &Wedge, aspect: &Aspect, wave_number_per_m: f64) -> f64 {
         match self {
@@ -95,34 +95,35 @@ impl EdgeLaw {
     }
 }
 
-/// Echo of an edge at range `range_m` relative to a plane's, at a wavelength in metres: S. Dudek,
-/// Jenkin, Milios and Wilkes's rule from Kuc and Siegel. For ranges well beyond a wavelength.
+/// Echo of an edge relative to a plane's, at range `range_m` and a wavelength in metres: rule of S.
+/// Dudek, Jenkin, Milios and Wilkes from Kuc and Siegel. Valid for ranges well beyond a wavelength.
 #[must_use]
 pub fn kuc_siegel(range_m: f64, wavelength_m: f64) -> f64 {
     1.0 / (TAU * (range_m / wavelength_m).sqrt())
 }
 
-/// Echo of an edge at range `range_m` relative to a plane's: Bozma and Kuc's amplitude of edges
-/// over their amplitude of planes and corners.
+/// Echo of an edge relative to a plane's, at range `range_m`: Bozma and Kuc's amplitude of edges
+/// over that of planes and corners.
 #[must_use]
 pub fn bozma_kuc(range_m: f64, sigma: f64, far_field_m: f64) -> f64 {
     sigma * (far_field_m / range_m).sqrt()
 }
 
-/// Openings closer than this to `pi / m` are `pi / m`, radians. Scenes hold decimal coordinates,
-/// of which rounding leaves 1e-14.
+/// Tolerance for an opening of `pi / m`, radians. Scenes hold decimal coordinates, whose rounding
+/// errors are about 1e-14.
 const REGULAR_RAD: f64 = 1e-10;
 
-/// Over which angle an edge fades towards an opening at which there is none, radians.
-const FADES_RAD: f64 = 0.1;
+/// Angle over which an edge fades towards an opening without diffraction, radians.
+const FADE_RAD: f64 = 0.1;
 
-/// On a boundary the edge counts as lit; this far from it at most, radians.
+/// Tolerance of a boundary, radians; on the boundary the edge counts as lit.
 const ON_BOUNDARY_RAD: f64 = 1e-9;
 
 impl Wedge {
-    /// Whether mirror images alone are the exact field: an opening of `pi / m` (a flat wall, a
-    /// right-angled corner, ...), which diffracts nothing. With an odd `m` both walls have to reflect alike:
-    /// else the image in the last one jumps, as where two materials meet on one line.
+    /// Returns `true` if mirror images alone are the exact field: an opening of `pi / m` (flat
+    /// wall, right-angled corner, ...), which does not diffract. For odd `m` both reflectances have
+    /// to be equal. Otherwise the last image is discontinuous, as at the joint of two materials on
+    /// one line.
     #[must_use]
     pub fn is_regular(&self) -> bool {
         let count = (PI / self.opening_rad).round();
@@ -133,26 +134,26 @@ impl Wedge {
             && (is_even || first == second)
     }
 
-    /// Whether the air takes up more than half a turn.
+    /// Returns `true` if the opening of the air exceeds half a turn.
     #[must_use]
     pub fn is_convex(&self) -> bool {
         self.opening_rad > PI + REGULAR_RAD
     }
 
-    /// Kouyoumjian and Pathak, "A uniform geometrical theory of diffraction for an edge in a
-    /// perfectly conducting surface", Proc. IEEE 62 (1974), equation (25) for the hard case,
-    /// over `sqrt(L)`.
+    /// Uniform diffraction coefficient over `sqrt(L)`: Kouyoumjian and Pathak, "A uniform
+    /// geometrical theory of diffraction for an edge in a perfectly conducting surface", Proc. IEEE
+    /// 62 (1974), equation (25) for the hard case.
     ///
-    /// Each of its four cotangents belongs to one mirror image of the source in the wedge, and
-    /// takes away half of that image's field where it comes into sight. It is weighed with the
-    /// reflectances that made the image, so that the sum stays continuous for walls that absorb
-    /// too (after Luebbers, IEEE Trans. Antennas Propag. 32, 1984). An image that comes into sight only
-    /// beyond the walls is weighed so that less and less is left towards a flat wall, which diffracts nothing.
-    /// Error below 1 % from half a wavelength off the edge, without multiple diffraction between near edges.
+    /// Each of the four cotangents belongs to one mirror image of the source in the wedge and
+    /// cancels half of that image's field at its boundary. The weights are the reflectances that
+    /// produce the image, so that the sum is continuous for absorbing walls too (after Luebbers,
+    /// IEEE Trans. Antennas Propag. 32, 1984). An image whose boundary is beyond the walls is faded
+    /// out towards a flat wall, which does not diffract. Error below 1 % from half a wavelength off
+    /// the edge, without multiple diffraction between near edges.
     ///
-    /// Between `from` and `aspect` the coefficient runs on without the jumps that it has where an image
-    /// comes into sight: the field there beside images as they are seen at `from`. The same twice
-    /// gives the coefficient itself.
+    /// Between `from` and `aspect` the coefficient is continued without its jumps at image
+    /// boundaries: it complements the images as visible from `from`. With both arguments equal it
+    /// is the coefficient itself.
     fn uniform(&self, aspect: &Aspect, from: &Aspect, wave_number_per_m: f64) -> Complex64 {
         if self.is_regular() {
             return Complex64::ZERO;
@@ -167,37 +168,39 @@ impl Wedge {
         -Complex64::cis(-FRAC_PI_4) / (2.0 * n * (TAU * kl).sqrt()) * sum
     }
 
-    /// The same with transition functions of 1, but no image's share above the half that it has
-    /// at its boundary.
+    /// Upper bound of [`Self::uniform`]: transition functions of 1, and no image's share above its
+    /// half on the boundary.
     fn uniform_bound(&self, aspect: &Aspect, wave_number_per_m: f64) -> f64 {
         if self.is_regular() {
             return 0.0;
         }
         let n = self.opening_rad / PI;
         let scale = 2.0 * n * (TAU * wave_number_per_m * aspect.distance_m).sqrt();
-        let share = |image: &Image| {
+        let share = |image: &WedgeImage| {
             let far = 1.0 / (image.past_rad / (2.0 * n)).tan().abs() / scale;
             image.reflectance * far.min(0.5)
         };
         self.images(aspect, aspect).iter().map(share).sum()
     }
 
-    /// The images whose boundaries are nearest on each side of `from`, for the source and its first
+    /// The images with the nearest boundaries on each side of `from`, for the source and its first
     /// image.
-    fn images(&self, aspect: &Aspect, from: &Aspect) -> [Image; 4] {
+    fn images(&self, aspect: &Aspect, from: &Aspect) -> [WedgeImage; 4] {
         let difference = [aspect, from].map(|at| at.out_rad - at.in_rad);
         let sum = [aspect, from].map(|at| at.out_rad + at.in_rad);
-        let [one, two] = self.pair(difference, [-self.opening_rad, self.opening_rad], false);
-        let [three, four] = self.pair(sum, [0.0, 2.0 * self.opening_rad], true);
-        [one, two, three, four]
+        let [direct_low, direct_high] =
+            self.pair(difference, [-self.opening_rad, self.opening_rad], false);
+        let [mirrored_low, mirrored_high] = self.pair(sum, [0.0, 2.0 * self.opening_rad], true);
+        [direct_low, direct_high, mirrored_low, mirrored_high]
     }
 
-    /// The two of them at an angle `here`, as they are seen `there`, for angles within `air`.
+    /// Two adjacent images at an angle `here`, with visibility evaluated at `there`, for angles
+    /// within `air`.
     ///
-    /// Towards an opening of `pi / m` the boundary of one leaves the air where that of the other comes in, and
-    /// both images become one. So the one whose boundary is outside, where nothing asks for its strength, is given
-    /// more and more of the other's.
-    fn pair(&self, [here, there]: [f64; 2], air: [f64; 2], mirrored: bool) -> [Image; 2] {
+    /// Towards an opening of `pi / m` the boundary of one image leaves the air where the other's
+    /// enters, and both images coincide. The strength of the image with the outside boundary, which
+    /// has no physical meaning there, is therefore faded to the strength of the other.
+    fn pair(&self, [here, there]: [f64; 2], air: [f64; 2], mirrored: bool) -> [WedgeImage; 2] {
         let turn = 2.0 * self.opening_rad;
         let mut outside = [0.0; 2];
         let mut images = [1.0, -1.0].map(|side| {
@@ -205,7 +208,7 @@ impl Wedge {
             let past_rad = |beta: f64| PI + side * beta - count * turn;
             let boundary = side * (count * turn - PI);
             outside[usize::from(side < 0.0)] = (air[0] - boundary).max(boundary - air[1]);
-            Image {
+            WedgeImage {
                 past_rad: past_rad(here),
                 is_lit: past_rad(there) > -ON_BOUNDARY_RAD,
                 reflectance: self.image_reflectance((side * count) as i32, mirrored),
@@ -214,7 +217,7 @@ impl Wedge {
         let own = [images[0].reflectance, images[1].reflectance];
         for (at, image) in images.iter_mut().enumerate() {
             if outside[at] > -ON_BOUNDARY_RAD && outside[1 - at] <= ON_BOUNDARY_RAD {
-                let share = (outside[at] / FADES_RAD).clamp(0.0, 1.0);
+                let share = (outside[at] / FADE_RAD).clamp(0.0, 1.0);
                 image.reflectance = own[1 - at] + share * (own[at] - own[1 - at]);
                 break;
             }
@@ -234,18 +237,20 @@ impl Wedge {
     }
 }
 
-/// A mirror image of the source in the wedge.
-struct Image {
-    /// Angle by which the receiver is past the boundary of the image's light, on the lit side, radians.
+/// Mirror image of the source in the wedge.
+struct WedgeImage {
+    /// Angle of the receiver past the boundary of the image's lit region, positive on the lit side,
+    /// radians.
     past_rad: f64,
-    /// Whether the image counts as seen.
+    /// Visibility: the image counts as visible.
     is_lit: bool,
-    /// Strength of the image.
+    /// Product of the reflectances.
     reflectance: f64,
 }
 
-impl Image {
-    /// `cot((pi +- beta) / 2n) F(k L a(beta))`, with its limit on the boundary (equations 25, 33).
+impl WedgeImage {
+    /// Cotangent term `cot((pi +- beta) / 2n) F(k L a(beta))`, with its limit on the boundary
+    /// (equations 25, 33).
     fn cotangent_term(&self, n: f64, kl: f64) -> Complex64 {
         let side = if self.is_lit { 1.0 } else { -1.0 };
         if self.past_rad.abs() < ON_BOUNDARY_RAD {
@@ -257,20 +262,20 @@ impl Image {
         if (self.past_rad > 0.0) == self.is_lit {
             return term;
         }
-        // Past the boundary: Fresnel's integral from the other end.
+        // Beyond the boundary: Fresnel integral from the opposite end.
         term + side * 2.0 * (PI * x).sqrt() * cotangent.abs() * Complex64::cis(FRAC_PI_4 + x)
     }
 }
 
-/// The transition function `F(x) = 2 i sqrt(x) exp(i x) int_sqrt(x)^inf exp(-i t^2) dt` of
-/// Kouyoumjian and Pathak, equation (26), for `x >= 0`, to better than 1e-7.
+/// Transition function `F(x) = 2 i sqrt(x) exp(i x) int_sqrt(x)^inf exp(-i t^2) dt` of Kouyoumjian
+/// and Pathak, equation (26), for `x >= 0`. Error below 1e-7.
 #[must_use]
 pub fn transition(x: f64) -> Complex64 {
     let ix = Complex64::new(0.0, x);
     if x < 3.0 { transition_series(x, ix) } else { transition_fraction(x, ix) }
 }
 
-/// From the power series of the error function (Abramowitz and Stegun, 7.1.6).
+/// Power series of the error function (Abramowitz and Stegun, 7.1.6).
 fn transition_series(x: f64, ix: Complex64) -> Complex64 {
     let mut term = Complex64::ONE;
     let mut sum = term;
@@ -281,8 +286,8 @@ fn transition_series(x: f64, ix: Complex64) -> Complex64 {
     (PI * x).sqrt() * Complex64::cis(FRAC_PI_4 + x) - 2.0 * ix * sum
 }
 
-/// From the continued fraction of the complementary error function (Abramowitz and Stegun,
-/// 7.1.14, in its even form): `2z^2 / (2z^2 + 1 - 1*2/(2z^2 + 5 - 3*4/(2z^2 + 9 - ...)))`.
+/// Continued fraction of the complementary error function (Abramowitz and Stegun, 7.1.14, in its
+/// even form): `2z^2 / (2z^2 + 1 - 1*2/(2z^2 + 5 - 3*4/(2z^2 + 9 - ...)))`.
 fn transition_fraction(x: f64, ix: Complex64) -> Complex64 {
     let depth = if x > 30.0 { 5 } else { 24 };
     let mut rest = Complex64::ZERO;

@@ -1,64 +1,64 @@
-//! The transducer's face as a reflector.
+//! Transducer face as a reflector.
 
 use num_complex::Complex64;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use smallvec::{SmallVec, smallvec};
 
-/// A transducer's face and housing as a reflector.
+/// Face and housing of a transducer as a reflector.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Face {
     /// Radius of the disc, metres.
     pub radius_m: f64,
-    /// Amplitude that it mirrors, 0 to 1.
+    /// Amplitude reflection coefficient, 0 to 1.
     pub reflectance: f64,
 }
 
-/// A disc that reflects sound of some frequency.
+/// Disc that reflects sound of one frequency.
 ///
-/// Its back is left out: sound that comes from behind the face is not reflected.
+/// The back does not reflect: sound from behind the face is ignored.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Disc {
-    /// Size and surface.
+    /// Radius and reflectance of the disc.
     pub face: Face,
-    /// Wave number `2 pi f / c`, radians a metre.
+    /// Wave number `2 pi f / c`, radians per metre.
     pub wave_number_per_m: f64,
 }
 
-/// The path of sound that a face reflects.
+/// Geometry of a path that a face reflects.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FaceAspect {
-    /// From the (mirrored) source to the disc, metres.
+    /// Distance from the (mirrored) source to the disc, metres.
     pub in_m: f64,
-    /// From the disc to the (mirrored) receiver, metres.
+    /// Distance from the disc to the (mirrored) receiver, metres.
     pub out_m: f64,
-    /// Direction towards the source, from the disc's axis, radians.
+    /// Direction towards the source, relative to the disc's axis, radians.
     pub in_rad: f64,
-    /// Direction towards the receiver, from the disc's axis and the same way round, radians.
+    /// Direction towards the receiver, relative to the disc's axis, with the same sense, radians.
     pub out_rad: f64,
 }
 
 impl Disc {
-    /// Field that the disc returns relative to that of an endless mirror in its place.
+    /// Field reflected by the disc, relative to an infinite mirror in its place.
     ///
-    /// Kirchhoff's integral over the disc in Fresnel's approximation (Born and Wolf, Principles
-    /// of Optics, section 8.8, has the same integral for a lens). From a source at `R1` and to a
-    /// receiver at `R2` the path over a point at `rho a` from the centre is longer by
-    /// `(rho a)^2 / 2 (1/R1 + 1/R2)`, and by `rho a (sin i + sin o) cos(phi)` to one side. With
-    /// `p = k a^2 / 2 (1/R1 + 1/R2)` and `q = k a |sin i + sin o|` the field is
+    /// Kirchhoff integral over the disc in the Fresnel approximation (Born and Wolf, Principles of
+    /// Optics, section 8.8, has the same integral for a lens). From a source at `R1` and to a
+    /// receiver at `R2` the path over a point at `rho a` from the centre is longer by `(rho a)^2 /
+    /// 2 (1/R1 + 1/R2)`, and by `rho a (sin i + sin o) cos(phi)` to one side. With `p = k a^2 / 2
+    /// (1/R1 + 1/R2)` and `q = k a |sin i + sin o|` the field is
     ///
     /// ```text
     /// F = 2 i p  integral from 0 to 1 of  J0(q rho) exp(-i p rho^2) rho d rho,
     /// ```
     ///
-    /// over what an endless disc gives (`p` times as many zones, each cancelling the next but
-    /// for half of the first). On the axis (`q = 0`) that is `1 - exp(-i p)`, between nothing
-    /// and twice a mirror; far away it is the aperture's pattern `i p 2 J1(q)/q`. Seen at an
-    /// angle the disc is an ellipse; its zones are counted by the geometric mean, `p cos`, with
-    /// the mean of both cosines, so that it reads the same backwards.
+    /// normalized by the integral over an infinite disc, whose zones cancel except for half of the
+    /// first. On the axis (`q = 0`) the field is `1 - exp(-i p)`, between zero and twice a mirror;
+    /// far away it is the aperture pattern `i p 2 J1(q)/q`. Seen at an angle the disc is an
+    /// ellipse. Its zones are counted by the geometric mean, `p cos`, with the mean of both cosines
+    /// to preserve reciprocity.
     ///
-    /// Legs of at least `a`; at the rim of a disc smaller than a wavelength it is an estimate.
+    /// Valid for legs of at least `a`; an estimate at the rim of a disc smaller than a wavelength.
     #[must_use]
     pub fn reflection(&self, aspect: &FaceAspect) -> Complex64 {
         let (in_sin, in_cos) = aspect.in_rad.sin_cos();
@@ -73,8 +73,8 @@ impl Disc {
         self.face.reflectance * zones(p, q)
     }
 
-    /// Strength with which the disc scatters with all its zones in phase, metres: no aspect gives
-    /// [`Self::reflection`] more than this times `1/R1 + 1/R2`.
+    /// Scattering strength with all zones in phase, metres. The maximum of [`Self::reflection`]
+    /// over all aspects is this value times `1/R1 + 1/R2`.
     #[must_use]
     pub fn strength_m(&self) -> f64 {
         self.face.reflectance * self.zone_m()
@@ -86,32 +86,32 @@ impl Disc {
     }
 }
 
-/// `i p` times the integral over `u = rho^2` from 0 to 1 of `J0(q sqrt(u)) exp(-i p u)`, by
-/// Lommel's functions (Born and Wolf, Principles of Optics, 8.8.1, with `u = 2 p`, `v = q`).
+/// Integral over `u = rho^2` from 0 to 1 of `J0(q sqrt(u)) exp(-i p u)`, times `i p`, by Lommel
+/// functions (Born and Wolf, Principles of Optics, 8.8.1, with `u = 2 p`, `v = q`).
 fn zones(p: f64, q: f64) -> Complex64 {
     if q < 1e-9 {
         return Complex64::ONE - Complex64::cis(-p);
     }
-    // In the geometric shadow one series converges, in the light the other.
-    let is_light = 2.0 * p > q;
-    let ratio = if is_light { q / (2.0 * p) } else { 2.0 * p / q };
-    // Both functions at once: U1 + i U2, or V0 + i V1, with `i^2s = (-1)^s`.
+    // One series converges in the geometric shadow, the other in the illuminated region.
+    let is_lit = 2.0 * p > q;
+    let ratio = if is_lit { q / (2.0 * p) } else { 2.0 * p / q };
+    // Sums both functions at once: U1 + i U2, or V0 + i V1, with `i^2s = (-1)^s`.
     let turn = Complex64::new(0.0, ratio);
     let (mut power, mut sum) = (Complex64::ONE, Complex64::ZERO);
-    for bessel in &bessel(q)[usize::from(!is_light)..] {
+    for bessel in &bessel(q)[usize::from(!is_lit)..] {
         sum += power * bessel;
         power *= turn;
     }
-    if is_light {
+    if is_lit {
         Complex64::cis(0.5 * q * ratio) - Complex64::cis(-p) * sum
     } else {
         Complex64::new(0.0, ratio) * Complex64::cis(-p) * sum
     }
 }
 
-/// Bessel's functions of the first kind of an argument above 0, of orders 0, 1, 2 and so on to where
-/// they are below 1e-9: by the recurrence backwards, and `1 = J0 + 2 (J2 + J4 + ...)` (Abramowitz
-/// and Stegun, 9.1.27, 9.1.46).
+/// Bessel functions of the first kind for an argument above 0, orders 0, 1, 2 and so on until they
+/// are below 1e-9. Downward recurrence, normalized by `1 = J0 + 2 (J2 + J4 + ...)` (Abramowitz and
+/// Stegun, 9.1.27, 9.1.46).
 fn bessel(x: f64) -> SmallVec<[f64; 40]> {
     let last = (1.2 * x) as usize + 18;
     let mut orders: SmallVec<[f64; 40]> = smallvec![0.0; last + 2];
@@ -143,19 +143,19 @@ mod tests {
     }
 
     #[test]
-    fn on_its_axis_it_is_the_closed_form() {
+    fn on_axis_is_the_closed_form() {
         for (near, far) in [(0.094, 0.188), (0.5, 0.5), (3.0, 0.2)] {
             let p = PI * 0.0215_f64.powi(2) / LAMBDA_M * (1.0 / near + 1.0 / far);
             let expected = (Complex64::ONE - Complex64::cis(-p)).norm();
             let found = FACE.reflection(&head_on(near, far)).norm();
             assert!((found - expected).abs() < 1e-12, "{near} {far}");
-            // The series agree with it just off the axis.
+            // The series agree with the closed form just off the axis.
             assert!((zones(p, 1e-7).norm() - expected).abs() < 1e-9, "{p}");
         }
     }
 
     #[test]
-    fn its_zones_are_the_integral_over_them() {
+    fn zones_match_their_integral() {
         const RINGS: u32 = 4000;
         for p in [0.01, 0.5, 3.0, 12.0, 40.0] {
             for q in [1e-7, 0.1, 1.0, 2.0 * p, 2.000_001 * p, 8.0, 30.0, 90.0] {
@@ -165,13 +165,13 @@ mod tests {
                 };
                 let expected = Complex64::new(0.0, p) * (0..RINGS).map(ring).sum::<Complex64>();
                 let off = (zones(p, q) - expected).norm();
-                assert!(off < 2e-4 * p.max(1.0), "{p} {q}: {} beside {expected}", zones(p, q));
+                assert!(off < 2e-4 * p.max(1.0), "{p} {q}: {} for {expected}", zones(p, q));
             }
         }
     }
 
     #[test]
-    fn far_away_it_is_the_apertures_pattern() {
+    fn far_field_is_the_aperture_pattern() {
         for degrees in [1.0_f64, 4.0, 9.0, 20.0, 60.0] {
             let theta_rad = degrees.to_radians();
             let aspect =
@@ -183,9 +183,9 @@ mod tests {
         }
     }
 
-    /// Kirchhoff's integral summed point by point over the disc, with exact distances.
+    /// Kirchhoff integral summed point by point over the disc, with exact distances.
     #[test]
-    fn off_its_axis_it_is_the_sum_over_the_disc() {
+    fn off_axis_matches_kirchhoff_sum() {
         let k = FACE.wave_number_per_m;
         for (in_m, out_m, in_deg, out_deg) in
             [(0.188, 0.188, 0.0_f64, 0.0_f64), (0.188, 0.3, 4.0, 0.0), (0.3, 0.3, 9.0, -9.0)]
@@ -210,21 +210,17 @@ mod tests {
                     sum += obliquity * element / (r1 * r2) * Complex64::cis(-k * (r1 + r2));
                 }
             }
-            // An endless mirror gives exp(-i k (R1 + R2)) / (R1 + R2).
+            // An infinite mirror gives exp(-i k (R1 + R2)) / (R1 + R2).
             let mirror = TAU / k / (in_m + out_m);
             let (in_rad, out_rad) = (in_deg.to_radians(), out_deg.to_radians());
             let found = FACE.reflection(&FaceAspect { in_m, out_m, in_rad, out_rad });
             let off = (found.norm() - sum.norm() / mirror).abs();
-            assert!(
-                off < 0.02,
-                "{in_m} {in_deg} {out_deg}: {found} beside {}",
-                sum.norm() / mirror
-            );
+            assert!(off < 0.02, "{in_m} {in_deg} {out_deg}: {found} for {}", sum.norm() / mirror);
         }
     }
 
     #[test]
-    fn it_reads_the_same_backwards_and_not_from_behind() {
+    fn is_reciprocal_and_one_sided() {
         let aspect = FaceAspect { in_m: 0.2, out_m: 0.7, in_rad: 0.3, out_rad: -0.1 };
         let back = FaceAspect { in_m: 0.7, out_m: 0.2, in_rad: -0.1, out_rad: 0.3 };
         assert!((FACE.reflection(&aspect) - FACE.reflection(&back)).norm() < 1e-12);

@@ -1,4 +1,4 @@
-//! The shape of an echo: the pulse as transducer and receiver pass it on.
+//! Envelope of an echo: the transmit pulse filtered by transducer and receiver.
 
 use std::f64::consts::{FRAC_1_SQRT_2, TAU};
 
@@ -6,51 +6,52 @@ use num_complex::Complex64;
 
 use super::{Pulse, Sensor};
 
-/// Complex envelope of a lone echo against time: the echo is the real part of
-/// `envelope * exp(i omega t)` at the carrier, its largest modulus is 1.
+/// Complex envelope of an isolated echo versus time. The echo is the real part of `envelope * exp(i
+/// omega t)` at the carrier; the maximum modulus is 1.
 ///
-/// Time 0 is where the sound's path would end at the speed of sound: for a burst its nominal
-/// onset, for a Gaussian pulse its middle. The band filter is taken without delay, so an echo
-/// begins a little before; what that does to a range is the receiver's business.
+/// Time 0 is the nominal time of flight: the onset of a burst, the centre of a Gaussian pulse. The
+/// band filter has no delay, so an echo begins slightly earlier. The receiver corrects ranges for
+/// this lead.
 #[derive(Debug, Clone, PartialEq)]
 pub struct EchoShape {
     first_us: f64,
     step_us: f64,
     steps_per_us: f64,
     samples: Vec<Complex64>,
-    /// The same of an envelope that is real, each with the step to the next, but the last; empty of another.
+    /// For a real envelope: each sample and the increment to the next; empty for a complex
+    /// envelope.
     real: Vec<[f64; 2]>,
-    /// By levels in steps of a [`RISE_LEVELS`]th of the peak, how many samples come before the modulus first reaches one.
+    /// For levels in steps of 1/[`RISE_LEVELS`] of the peak: number of samples before the modulus
+    /// first reaches the level.
     rises: Vec<u32>,
-    /// The largest modulus up to each sample, and from each sample on.
+    /// Maximum modulus up to each sample, and from each sample on.
     so_far: Vec<f64>,
     to_come: Vec<f64>,
-    /// The fastest that it changes, one a microsecond.
+    /// Maximum slope, per microsecond.
     steepest: f64,
 }
 
-/// Spacing of the tables, microseconds: 1/45 of a 7 kHz filter's standard deviation.
+/// Sample spacing, microseconds: 1/45 of a 7 kHz filter's standard deviation.
 const STEP_US: f64 = 0.5;
 
-/// Levels whose places in a rise are tabulated.
+/// Number of tabulated levels of the rise.
 const RISE_LEVELS: usize = 64;
 
-/// Standard deviations of a Gaussian that are kept on each side; at the last, `exp(-10)`.
+/// Truncation of a Gaussian on each side, in standard deviations; `exp(-10)` is left at the end.
 const SIGMAS_KEPT: f64 = 4.5;
 
-/// Standard deviation in time, microseconds, of the impulse response of a Gaussian band filter
-/// of standard deviation `bandwidth_hz`: `1 / (2 pi s)`.
+/// Standard deviation in time, microseconds, of the impulse response of a Gaussian band filter of
+/// standard deviation `bandwidth_hz`: `1 / (2 pi s)`.
 #[must_use]
 pub(super) fn filter_sigma_us(bandwidth_hz: f64) -> f64 {
     1e6 / (TAU * bandwidth_hz)
 }
 
 impl EchoShape {
-    /// The echo on the axis of a sensor's transducer.
+    /// Echo on the axis of a sensor's transducer.
     ///
-    /// A burst through the filter is the difference of two error functions; a chirp, whose parts
-    /// differ in frequency, is convolved with the filter numerically, its phase running on from
-    /// part to part.
+    /// A filtered burst is the difference of two error functions. A chirp, whose parts differ in
+    /// frequency, is convolved with the filter numerically, with continuous phase across its parts.
     #[must_use]
     pub fn of(sensor: &Sensor) -> Self {
         match &sensor.pulse {
@@ -75,7 +76,7 @@ impl EchoShape {
         }
     }
 
-    /// From samples at even spacing.
+    /// Creates a shape from evenly spaced samples.
     #[must_use]
     pub(super) fn from_samples(first_us: f64, step_us: f64, samples: Vec<Complex64>) -> Self {
         let mut so_far: Vec<f64> = samples.iter().map(|sample| sample.norm()).collect();
@@ -120,7 +121,7 @@ impl EchoShape {
         Self::from_samples(-margin_us, STEP_US, samples)
     }
 
-    /// The envelope at a time, microseconds.
+    /// Complex envelope at a time, microseconds.
     #[must_use]
     #[inline]
     pub fn at(&self, t_us: f64) -> Complex64 {
@@ -134,18 +135,18 @@ impl EchoShape {
         low + part * (high - low)
     }
 
-    /// Whether its phase stays that of the carrier.
+    /// Returns `true` if the envelope is real: its phase is that of the carrier.
     #[must_use]
     pub(super) fn is_real(&self) -> bool {
         !self.real.is_empty()
     }
 
-    /// The envelope at a time, microseconds, if it [is real](Self::is_real).
+    /// Envelope at a time, microseconds, if the shape [is real](Self::is_real).
     #[must_use]
     #[inline]
     pub(super) fn real_at(&self, t_us: f64) -> f64 {
         let place = (t_us - self.first_us) * self.steps_per_us;
-        // Fewer instructions than it takes to make a `usize`.
+        // Conversion to `u32` takes fewer instructions than to `usize`.
         let below = place as u32;
         match self.real.get(below as usize) {
             Some([low, step]) if place >= 0.0 => low + (place - f64::from(below)) * step,
@@ -153,31 +154,31 @@ impl EchoShape {
         }
     }
 
-    /// When it begins, microseconds.
+    /// Start of the echo, microseconds.
     #[must_use]
     pub fn first_us(&self) -> f64 {
         self.first_us
     }
 
-    /// When it is over, microseconds.
+    /// End of the echo, microseconds.
     #[must_use]
     pub fn last_us(&self) -> f64 {
         self.first_us + self.step_us * (self.samples.len() - 1) as f64
     }
 
-    /// Its largest modulus.
+    /// Maximum modulus of the envelope.
     #[must_use]
     pub fn peak(&self) -> f64 {
         self.so_far.last().copied().unwrap_or(0.0)
     }
 
-    /// The fastest that it changes, one a microsecond.
+    /// Maximum slope of the envelope, per microsecond.
     #[must_use]
     pub fn steepest(&self) -> f64 {
         self.steepest
     }
 
-    /// The largest modulus up to a time.
+    /// Maximum modulus up to a time.
     #[must_use]
     pub fn most_until(&self, t_us: f64) -> f64 {
         let place = (t_us - self.first_us) / self.step_us;
@@ -187,7 +188,7 @@ impl EchoShape {
         self.so_far.get(place as usize + 1).copied().unwrap_or_else(|| self.peak())
     }
 
-    /// When its modulus first reaches `level`, microseconds; `None` if it never does.
+    /// Time of the first crossing of `level` by the modulus, microseconds; `None` if there is none.
     #[must_use]
     pub fn rise_us(&self, level: f64) -> Option<f64> {
         let above = self.before_rise(level);
@@ -196,18 +197,19 @@ impl EchoShape {
         Some(self.first_us + self.step_us * (above as f64 - (high - level) / (high - low)))
     }
 
-    /// How many samples come before its modulus first reaches `level`.
+    /// Number of samples before the modulus first reaches `level`.
     fn before_rise(&self, level: f64) -> usize {
-        // The table says between which two it lies: levels between its own are passed between theirs.
+        // The table brackets the level: a level between two tabulated ones is crossed between
+        // theirs.
         let place = (level / self.peak() * RISE_LEVELS as f64) as usize;
-        let known = |place: usize| self.rises.get(place).map(|at| *at as usize);
-        // A step to both sides, for what rounding makes of a level beside its own.
-        let from = known(place.saturating_sub(1)).unwrap_or(0);
-        let to = known(place + 2).unwrap_or(self.so_far.len());
+        let tabulated = |place: usize| self.rises.get(place).map(|at| *at as usize);
+        // One step of margin to each side covers rounding of the level.
+        let from = tabulated(place.saturating_sub(1)).unwrap_or(0);
+        let to = tabulated(place + 2).unwrap_or(self.so_far.len());
         from + self.so_far[from..to].partition_point(|so_far| *so_far < level)
     }
 
-    /// When its modulus last is at `level`, microseconds; `None` if it never is.
+    /// Time of the last crossing of `level` by the modulus, microseconds; `None` if there is none.
     #[must_use]
     pub fn fall_us(&self, level: f64) -> Option<f64> {
         let below = self.to_come.partition_point(|to_come| *to_come >= level);
@@ -218,7 +220,7 @@ impl EchoShape {
         Some(self.first_us + self.step_us * (above as f64 + part))
     }
 
-    /// The largest modulus from a time on, up to which [`fall_us`](Self::fall_us) finds that time.
+    /// Maximum modulus from a time on; the inverse of [`fall_us`](Self::fall_us).
     #[must_use]
     pub fn most_from(&self, t_us: f64) -> f64 {
         let place = (t_us - self.first_us) / self.step_us;
@@ -231,7 +233,7 @@ impl EchoShape {
         low + (place - below as f64) * (high - low)
     }
 
-    /// Samples and their times, microseconds.
+    /// Samples with their times, microseconds.
     pub(super) fn samples(&self) -> impl Iterator<Item = (f64, Complex64)> {
         self.samples
             .iter()
@@ -244,10 +246,10 @@ impl EchoShape {
     }
 }
 
-/// Bursts of several frequencies, one after the other without a jump of phase.
+/// Bursts of several frequencies with continuous phase.
 struct Chirp {
-    /// Start, end (microseconds), frequency above the carrier (cycles a microsecond), phase at
-    /// the start (cycles).
+    /// Start, end (microseconds), frequency offset from the carrier (cycles per microsecond), phase
+    /// at the start (cycles).
     parts: Vec<(f64, f64, f64, f64)>,
 }
 
@@ -279,7 +281,7 @@ impl Chirp {
         })
     }
 
-    /// Convolved with a Gaussian of unit area.
+    /// Convolution with a Gaussian of unit area.
     fn filtered(&self, t_us: f64, sigma_us: f64) -> Complex64 {
         let count = 720;
         let step = 2.0 * SIGMAS_KEPT / f64::from(count);
@@ -302,22 +304,23 @@ mod tests {
 
     const BURST: Pulse = Pulse::Burst { cycles: 16.0, bandwidth_hz: 7000.0 };
 
-    /// The reference's own figure: a head-on wall passes 0.02 of its height 8.0 mm of range
-    /// early, 0.05 at 6.36 mm and 0.1 at 4.94 mm (tests/data/fullwave, `onset_lead_m`).
+    /// Full-wave reference: a head-on wall crosses 0.02 of its peak 8.0 mm of range early, 0.05 at
+    /// 6.36 mm and 0.1 at 4.94 mm (tests/data/fullwave, `onset_lead_m`).
     #[test]
-    fn a_burst_rises_like_the_full_wave_reference() {
+    fn burst_rise_matches_full_wave() {
         let shape = EchoShape::of(&sensor(BURST));
         for (level, lead_mm) in [(0.02, 8.00), (0.05, 6.36), (0.1, 4.94)] {
             let rise_us = shape.rise_us(level).expect("it gets there");
-            // Its band ends 20 kHz off the carrier, and it samples every 2 us, 0.34 mm.
+            // The reference's band ends 20 kHz off the carrier, and its samples are 2 us (0.34 mm)
+            // apart.
             assert!((rise_us * 343.2e-3 / 2.0 + lead_mm).abs() < 0.1, "{level}: {rise_us}");
             let fall_us = shape.fall_us(level).expect("it gets there");
-            // Even about its middle.
+            // Symmetric about the middle.
             assert!((rise_us + fall_us - 16e6 / 49.4e3).abs() < 0.01, "{level}");
         }
         assert!((shape.at(0.0).norm() - 0.5).abs() < 1e-6, "half way up at the onset");
         assert!(shape.rise_us(1.01).is_none() && shape.fall_us(1.01).is_none());
-        // What is still to come falls from the peak to each level when that is passed for the last time.
+        // The remaining maximum falls to each level when that level is crossed for the last time.
         for level in [0.02, 0.3, 0.99] {
             let fall_us = shape.fall_us(level).expect("it gets there");
             assert!((shape.most_from(fall_us) - level).abs() < 1e-9, "{level}");
@@ -326,7 +329,7 @@ mod tests {
     }
 
     #[test]
-    fn a_chirp_of_one_frequency_is_a_burst() {
+    fn single_tone_chirp_is_a_burst() {
         let parts = vec![
             ChirpPart { cycles: 6.0, frequency_hz: 49.4e3 },
             ChirpPart { cycles: 10.0, frequency_hz: 49.4e3 },
@@ -339,13 +342,13 @@ mod tests {
         }
     }
 
-    /// The phase turns by the frequency's distance from the carrier, and the filter lets less of
-    /// it through: `exp(-(f - f0)^2 / (2 s^2))`.
+    /// The phase advances with the frequency offset from the carrier, and the filter attenuates by
+    /// `exp(-(f - f0)^2 / (2 s^2))`.
     #[test]
-    fn a_part_off_the_carrier_turns_and_is_weakened() {
+    fn off_carrier_part_is_attenuated() {
         let part = |frequency_hz: f64| ChirpPart { cycles: 40.0, frequency_hz };
-        let of = |parts| EchoShape::of(&sensor(Pulse::Chirp { parts, bandwidth_hz: 7000.0 }));
-        let both = of(vec![part(49.4e3), part(56.4e3)]);
+        let shape = |parts| EchoShape::of(&sensor(Pulse::Chirp { parts, bandwidth_hz: 7000.0 }));
+        let both = shape(vec![part(49.4e3), part(56.4e3)]);
         let [early, late] = [both.at(400.0), both.at(1200.0)];
         assert!((late.norm() / early.norm() - (-0.5_f64).exp()).abs() < 1e-3);
         let turned = (both.at(1210.0) / late).arg();

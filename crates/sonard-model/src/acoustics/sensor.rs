@@ -1,4 +1,4 @@
-//! What is known about a ranger: one data file a preset, with a source for each figure.
+//! Sensor parameters: one data file per preset, with a source for each figure.
 
 mod aperture;
 mod detector;
@@ -26,7 +26,7 @@ use self::{
 };
 use super::Face;
 
-/// The data files that come with the program, by name.
+/// Data files shipped with the program, by name.
 const PRESETS: [(&str, &str); 7] = [
     ("senscomp-6500", include_str!("../../../../sensors/senscomp-6500.json")),
     ("polaroid-chirp", include_str!("../../../../sensors/polaroid-chirp.json")),
@@ -37,152 +37,151 @@ const PRESETS: [(&str, &str); 7] = [
     ("lego-nxt", include_str!("../../../../sensors/lego-nxt.json")),
 ];
 
-/// A threshold that rises faster is a range at which the module gives up.
-const MOST_RISE_DB_PER_M: f64 = 100.0;
-/// Coarser ones are no ranges.
-const MOST_RANGE_STEP_M: f64 = 1.0;
+/// A steeper rise amounts to a maximum range.
+const MAX_RISE_DB_PER_M: f64 = 100.0;
+const MAX_RANGE_STEP_M: f64 = 1.0;
 
-/// A ranger's data.
+/// Parameters of an ultrasonic ranger.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Sensor {
-    /// The preset's name.
+    /// Name of the preset.
     pub name: String,
-    /// What it is, in a sentence.
+    /// One-sentence description of the sensor.
     pub description: String,
-    /// Carrier frequency, hertz.
+    /// Carrier frequency of the pulse, hertz.
     pub frequency_hz: f64,
-    /// Shape of the radiating face, and with it the beam pattern.
+    /// Shape of the radiating face, which determines the beam pattern.
     pub aperture: Aperture,
-    /// Face and housing as a reflector; without it sound passes the ranger as if it were not
-    /// there.
+    /// Face and housing as a reflector; if absent, sound passes the ranger unobstructed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub face: Option<Face>,
-    /// Where it sits on the rotation axis.
+    /// Position of the transducer relative to the rotation axis.
     #[serde(default, skip_serializing_if = "Mounting::is_default")]
     pub mounting: Mounting,
-    /// What it sends.
+    /// Transmitted pulse shape and bandwidth.
     pub pulse: Pulse,
-    /// From firing until the receiver listens, microseconds.
+    /// Receiver blanking after firing, microseconds.
     pub blanking_us: f64,
-    /// The same when the blanking is shortened by hand, microseconds.
+    /// Receiver blanking when shortened by hand, microseconds.
     #[serde(default)]
     pub short_blanking_us: Option<f64>,
-    /// After an echo, how long the detector is held before it can report another, microseconds.
+    /// Hold-off of the detector after an echo, microseconds.
     #[serde(default = "default_rearm_us")]
     pub rearm_us: f64,
-    /// How long an echo has to stay above the threshold to be taken for one, microseconds; time
-    /// below it counts back. 0 for a plain threshold.
+    /// Minimum time above the threshold for a detection, microseconds; time below it counts back. 0
+    /// for a plain threshold.
     #[serde(default, skip_serializing_if = "is_default")]
     pub integration_us: f64,
-    /// Farthest range it is made for, metres.
+    /// Maximum rated range, metres.
     pub max_range_m: f64,
     /// Time-variable gain of the amplifier.
     #[serde(default, skip_serializing_if = "is_default")]
     pub gain: Gain,
-    /// How the face answers to a pulse.
+    /// Response of the face to a pulse.
     #[serde(default, skip_serializing_if = "is_default")]
     pub response: Response,
-    /// What edges send back in the experiments that the figures come from; without it, `utd`.
+    /// Edge diffraction law in the experiments that the figures come from; `utd` if absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub edge_law: Option<EdgeLawKind>,
-    /// Least amplitude that is detected, relative to a head-on, perfectly reflecting wall with
+    /// Detection threshold as an amplitude relative to a head-on, perfectly reflecting wall with
     /// gain compensation.
     pub threshold: f64,
-    /// What the threshold gains with each metre of range beside what the gain says, decibels: a module that hears
-    /// worse and worse from afar, for whatever reason. `threshold` is the one at range 0.
+    /// Rise of the threshold with range, dB/m, in addition to the gain: loss of sensitivity of the
+    /// module with range, whatever its cause. `threshold` applies at range 0.
     #[serde(default, skip_serializing_if = "is_default")]
     pub threshold_rise_db_per_m: f64,
-    /// Whole steps in which the module tells ranges, metres, each rounded to the nearest; 0 for ranges as they are.
+    /// Range resolution of the module, metres; ranges are rounded to the nearest step. 0 for
+    /// unquantized ranges.
     #[serde(default, skip_serializing_if = "is_default")]
     pub range_step_m: f64,
-    /// What the detector watches.
+    /// Signal that the detector compares with the threshold.
     #[serde(default, skip_serializing_if = "is_default")]
     pub detector: Detector,
-    /// How many firings a reading is the mean of; it matters where there is noise.
+    /// Number of firings averaged per reading; relevant only with noise.
     #[serde(default = "once", skip_serializing_if = "is_once")]
     pub averaged_firings: u32,
-    /// For each figure above, by field name, where it comes from.
+    /// Source of each figure above, by field name.
     pub sources: BTreeMap<String, String>,
 }
 
-/// What edges send back; see [`EdgeLaw`](super::edge::EdgeLaw).
+/// Edge diffraction law; see [`EdgeLaw`](super::edge::EdgeLaw).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[cfg_attr(feature = "clap", derive(clap::ValueEnum))]
 #[serde(rename_all = "kebab-case")]
 pub enum EdgeLawKind {
     /// Uniform coefficients for the wedge's angle and aspect (Kouyoumjian and Pathak).
     Utd,
-    /// One ratio to a plane at the same range, whatever the aspect.
+    /// Constant ratio to a plane at the same range, independent of aspect.
     KucSiegel,
-    /// One scattering strength, whatever the aspect, level with planes at the face.
+    /// Constant scattering strength, independent of aspect, equal to a plane's at the face.
     BozmaKuc,
 }
 
-/// How the face answers to a pulse.
+/// Response of the face to a pulse.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[cfg_attr(feature = "clap", derive(clap::ValueEnum))]
 #[serde(rename_all = "snake_case")]
 pub enum Response {
-    /// By its beam pattern: every echo has the shape of one on the axis, only weaker.
+    /// Beam pattern: every echo has the shape of one on the axis, attenuated.
     #[default]
     Stationary,
-    /// Point by point: echoes off the axis are longer and begin earlier, and the pattern's nulls fill
-    /// up.
+    /// Point by point: off-axis echoes are longer and begin earlier, and the nulls of the pattern
+    /// are filled.
     Full,
 }
 
-/// An error in a sensor's data.
+/// Error in a sensor's data.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum SensorError {
-    /// Not JSON, or not of a sensor's form.
+    /// Invalid JSON, or not a sensor's structure.
     #[error("line {line}, column {column}: {field}: {message}")]
     Form {
         /// Line in the text, from 1.
         line: usize,
         /// Column in the line, from 1.
         column: usize,
-        /// Which field, as far as it was understood.
+        /// Path of the field, as far as it was parsed.
         field: String,
-        /// What is wrong.
+        /// Description of the error.
         message: String,
     },
-    /// A figure out of range.
+    /// Value out of range.
     #[error("{field} is {value}: it must be {expected}")]
     Figure {
-        /// Which field.
+        /// Path of the field.
         field: &'static str,
-        /// What it holds.
+        /// Value outside the range.
         value: f64,
-        /// What would be right.
+        /// Description of the valid range.
         expected: &'static str,
     },
-    /// No preset of that name.
-    #[error("there is no sensor preset \"{name}\"; there are: {known}")]
+    /// Request of a preset that does not exist.
+    #[error("there is no sensor preset \"{name}\"; known presets: {known}")]
     UnknownPreset {
-        /// What was asked for.
+        /// Name of the requested preset.
         name: String,
-        /// Every preset's name.
+        /// Names of all presets.
         known: String,
     },
 }
 
 impl Sensor {
-    /// The names of the presets, the default one first.
+    /// Names of the presets, the default one first.
     pub fn preset_names() -> impl Iterator<Item = &'static str> {
         PRESETS.iter().map(|(name, _)| *name)
     }
 
-    /// The data file of a sensor that comes with the program, as it is shipped.
+    /// Data file of a shipped sensor, verbatim.
     #[must_use]
     pub fn preset_text(name: &str) -> Option<&'static str> {
         PRESETS.iter().find(|(known, _)| *known == name).map(|(_, text)| *text)
     }
 
-    /// A sensor that comes with the program.
+    /// Loads a shipped sensor.
     ///
     /// # Errors
-    /// When there is none of that name.
+    /// If there is no preset of that name.
     pub fn preset(name: &str) -> Result<Self, SensorError> {
         match Self::preset_text(name) {
             Some(text) => Self::from_json(text),
@@ -193,10 +192,10 @@ impl Sensor {
         }
     }
 
-    /// A sensor from the text of a data file.
+    /// Parses a sensor from the text of a data file.
     ///
     /// # Errors
-    /// When the text is not a sensor's, or a figure is out of range.
+    /// If the text is not a sensor's, or a value is out of range.
     pub fn from_json(text: &str) -> Result<Self, SensorError> {
         let mut json = serde_json::Deserializer::from_str(text);
         let sensor: Self = serde_path_to_error::deserialize(&mut json).map_err(|error| {
@@ -208,10 +207,10 @@ impl Sensor {
         Ok(sensor)
     }
 
-    /// Checks that every figure makes sense.
+    /// Checks that every value is in range.
     ///
     /// # Errors
-    /// Names the first that does not.
+    /// Returns the first value that is not.
     pub fn check(&self) -> Result<(), SensorError> {
         positive("frequency_hz", self.frequency_hz)?;
         self.aperture.check()?;
@@ -228,12 +227,12 @@ impl Sensor {
         self.gain.check()?;
         positive("max_range_m", self.max_range_m)?;
         positive("threshold", self.threshold)?;
-        from_0_to("threshold_rise_db_per_m", self.threshold_rise_db_per_m, MOST_RISE_DB_PER_M)?;
-        from_0_to("range_step_m", self.range_step_m, MOST_RANGE_STEP_M)?;
+        from_0_to("threshold_rise_db_per_m", self.threshold_rise_db_per_m, MAX_RISE_DB_PER_M)?;
+        from_0_to("range_step_m", self.range_step_m, MAX_RANGE_STEP_M)?;
         check_firings(self.averaged_firings)
     }
 
-    /// How long the pulse lasts, seconds (a Gaussian one: three sigma to each side).
+    /// Duration of the pulse, seconds (for a Gaussian: three sigma on each side).
     #[must_use]
     pub fn pulse_s(&self) -> f64 {
         match &self.pulse {
@@ -245,7 +244,7 @@ impl Sensor {
         }
     }
 
-    /// Half the width of the face in the plane of the scan, metres.
+    /// Half width of the face in the scan plane, metres.
     #[must_use]
     pub const fn half_width_m(&self) -> f64 {
         match self.aperture {
@@ -267,7 +266,7 @@ fn is_default<T: Default + PartialEq>(value: &T) -> bool {
 
 fn form_error(field: String, error: &serde_json::Error) -> SensorError {
     let message = error.to_string();
-    // serde_json appends the place, which is reported apart.
+    // serde_json appends the position, which is reported separately.
     let message = message.split(" at line ").next().unwrap_or_default().to_owned();
     SensorError::Form { line: error.line(), column: error.column(), field, message }
 }
@@ -278,7 +277,7 @@ mod tests {
     use crate::acoustics::{Air, BeamPattern, Receiver};
 
     #[test]
-    fn every_figure_of_every_preset_has_a_source() {
+    fn presets_name_their_sources() {
         for (name, text) in PRESETS {
             let sensor = Sensor::preset(name).expect(name);
             assert_eq!(sensor.name, name);
@@ -298,7 +297,7 @@ mod tests {
     }
 
     #[test]
-    fn wrong_data_are_named() {
+    fn rejects_invalid_data() {
         let text = PRESETS[0].1;
         let with_points = |points: &str| {
             let table = format!(
@@ -360,7 +359,7 @@ mod tests {
         assert!(error.contains("senscomp-6500"), "{error}");
     }
 
-    /// Half the arc over which a rigid wall is heard at a range, degrees.
+    /// Half the arc over which a rigid wall is detected at a range, degrees.
     fn half_arc_deg(sensor: &Sensor, range_m: f64) -> f64 {
         let air = Air::default();
         let receiver = Receiver::new(sensor, air.sound_speed_m_s());
@@ -370,10 +369,10 @@ mod tests {
         beam.angle_at((threshold * 10f64.powf(loss_db / 20.0)).sqrt()).to_degrees()
     }
 
-    /// The arena's sweeps (docs/reality.md): a wall before the ranger answers over some 100 degrees at 0.28 m and over
-    /// 60 at 0.81 m, and that at 1.8 m over a score or less.
+    /// Measured sweeps of the arena (docs/reality.md): a wall ahead is detected over some 100
+    /// degrees at 0.28 m, over 60 at 0.81 m, and over 20 or less at 1.8 m.
     #[test]
-    fn a_lego_nxt_hears_walls_over_narrower_arcs_from_afar() {
+    fn lego_nxt_arcs_narrow_with_range() {
         let sensor = Sensor::preset("lego-nxt").expect("a preset");
         let [near, middle, far] = [0.28, 0.81, 1.8].map(|range_m| half_arc_deg(&sensor, range_m));
         assert!((45.0..60.0).contains(&near), "{near}");
@@ -382,7 +381,7 @@ mod tests {
     }
 
     #[test]
-    fn threshold_is_what_a_wall_at_the_rated_range_gives() {
+    fn threshold_fits_the_rated_range() {
         let sensor = Sensor::preset("senscomp-6500").expect("a preset");
         let loss_db = 2.0
             * sensor.max_range_m

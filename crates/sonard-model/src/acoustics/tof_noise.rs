@@ -1,13 +1,13 @@
-//! Noise of a time of flight: normal, with a longer tail towards far ranges.
+//! Time-of-flight noise: normal, with a longer tail towards far ranges.
 
 use rand::{Rng, RngExt as _};
 use rand_distr::{Distribution as _, Exp1, StandardNormal};
 
-/// Spread of the readings of one and the same echo.
+/// Random error of repeated readings of one echo.
 ///
-/// Dudek, Jenkin, Milios and Wilkes (section 1) describe the error of a single echo as normal
-/// with a far tail slightly longer than the near one; here some readings, at random, come later
-/// by an exponentially distributed time.
+/// Dudek, Jenkin, Milios and Wilkes (section 1) describe the error of a single echo as normal with
+/// a far tail slightly longer than the near one. Here a random share of the readings is delayed by
+/// an exponentially distributed time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TofNoise {
     /// Standard deviation of the normal part, microseconds.
@@ -19,21 +19,21 @@ pub struct TofNoise {
 }
 
 impl TofNoise {
-    /// No noise at all.
+    /// Noise-free time of flight.
     pub const NONE: Self = Self { sigma_us: 0.0, tail_share: 0.0, tail_us: 0.0 };
 
-    /// Noise whose normal part has a standard deviation of so many millimetres of range, with
-    /// one reading in ten in a tail of twice that mean.
+    /// Noise with a normal standard deviation of `sigma_mm` of range. One reading in ten is in the
+    /// tail, whose mean is twice that value.
     #[must_use]
     pub fn of_range_mm(sigma_mm: f64, sound_speed_m_s: f64) -> Self {
         let sigma_us = 2.0 * sigma_mm * 1e3 / sound_speed_m_s;
         Self { sigma_us, tail_share: 0.1, tail_us: 2.0 * sigma_us }
     }
 
-    /// One error, microseconds.
+    /// Draws one error, microseconds.
     pub fn sample_us(&self, rng: &mut impl Rng) -> f64 {
         let normal: f64 = StandardNormal.sample(rng);
-        // The tail is drawn whether or not it is used: the sequence stays the same for any share.
+        // The tail is always drawn, so that the random sequence does not depend on the share.
         let tail: f64 = Exp1.sample(rng);
         let late = rng.random_bool(self.tail_share.clamp(0.0, 1.0));
         self.sigma_us * normal + if late { self.tail_us * tail } else { 0.0 }
@@ -47,12 +47,12 @@ mod tests {
     use rand_pcg::Pcg64;
 
     #[test]
-    fn the_far_tail_is_longer() {
+    fn far_tail_is_longer() {
         let noise = TofNoise::of_range_mm(1.0, 343.0);
         let mut rng = Pcg64::seed_from_u64(5);
         let errors: Vec<f64> = (0..200_000).map(|_| noise.sample_us(&mut rng)).collect();
         let mean = errors.iter().sum::<f64>() / errors.len() as f64;
-        // The tail alone shifts the mean, by its share times its mean.
+        // Only the tail shifts the mean, by its share times its mean.
         let expected = noise.tail_share * noise.tail_us;
         assert!((mean - expected).abs() < 0.05 * noise.sigma_us, "{mean} {expected}");
         let beyond = |sign: f64| {

@@ -1,40 +1,40 @@
-//! The transducer's face: how strong a sound leaves or arrives at an angle to its axis.
+//! Beam pattern of the transducer: amplitude versus angle from its axis.
 
-mod face;
+mod face_response;
 
 use std::{
     f64::consts::{FRAC_PI_2, PI, TAU},
     sync::Arc,
 };
 
-use self::face::FaceResponse;
+use self::face_response::FaceResponse;
 use super::{Aperture, Sensor, sensor::level_at};
 
-/// Table spacing: 0.05 degrees. For a 19 mm face at 50 kHz a straight line between entries errs by
-/// less than 2e-5 in the main lobe, and by less than 4e-4 where a side lobe's steady part overtakes
-/// the transient and the pattern has a kink (there is a test).
+/// Table spacing: 0.05 degrees. For a 19 mm face at 50 kHz linear interpolation errs by less than
+/// 2e-5 in the main lobe. The error is below 4e-4 where a side lobe's steady part exceeds the
+/// transient and the pattern has a kink (tested).
 const STEP_RAD: f64 = FRAC_PI_2 / 1800.0;
 
-/// Entries from the axis to straight backwards.
+/// Number of table entries from the axis to the back.
 const TABLE_LENGTH: usize = 3601;
 
-/// One-way amplitude against the angle from the axis, 1 on the axis and 0 behind the face.
+/// One-way amplitude versus angle from the axis: 1 on the axis, 0 behind the face.
 #[derive(Debug, Clone)]
-pub struct BeamPattern(Shape);
+pub struct BeamPattern(PatternData);
 
 #[derive(Debug, Clone)]
-enum Shape {
-    /// The face's response to the pulse, from 0 degrees to straight backwards.
+enum PatternData {
+    /// Response of the face to the pulse, from 0 degrees to the back.
     Table(Arc<[f64]>),
     /// `exp(-2 theta^2 / half_angle^2)`.
     Gaussian { half_angle_rad: f64 },
 }
 
 impl BeamPattern {
-    /// The pattern of a sensor at a speed of sound in metres a second.
+    /// Computes the pattern of a sensor for a speed of sound in m/s.
     ///
-    /// A disc answers with Kuc and Siegel's impulse response convolved with the sensor's pulse:
-    /// the peak of the envelope, relative to the axis. For a long pulse that is the piston's
+    /// For a disc, Kuc and Siegel's impulse response is convolved with the sensor's pulse; the
+    /// pattern is the peak of the envelope relative to the axis. A long pulse gives the piston's
     /// [`piston_directivity`] times `cos(theta)`; a short one fills the nulls.
     #[must_use]
     pub fn new(sensor: &Sensor, sound_speed_m_s: f64) -> Self {
@@ -45,23 +45,23 @@ impl BeamPattern {
                 .map(level)
                 .collect();
             table.push(0.0);
-            Shape::Table(table.into())
+            PatternData::Table(table.into())
         };
         Self(match sensor.aperture {
             Aperture::Piston { .. } | Aperture::Line { .. } => {
                 let ka = TAU * sensor.frequency_hz / sound_speed_m_s * sensor.half_width_m();
-                let face = FaceResponse::of(sensor, ka);
+                let face = FaceResponse::for_sensor(sensor, ka);
                 tabulated(&|theta_rad| {
-                    let alone =
+                    let face_only =
                         sensor.aperture.obliquity(theta_rad) * face.at(ka * theta_rad.sin().abs());
-                    with_skirts(&sensor.aperture, alone, theta_rad)
+                    with_skirts(&sensor.aperture, face_only, theta_rad)
                 })
             }
             Aperture::Table { ref points, .. } => {
                 tabulated(&|theta_rad| level_at(points, theta_rad))
             }
             Aperture::Gaussian { half_angle_deg, .. } => {
-                Shape::Gaussian { half_angle_rad: half_angle_deg.to_radians() }
+                PatternData::Gaussian { half_angle_rad: half_angle_deg.to_radians() }
             }
         })
     }
@@ -71,7 +71,7 @@ impl BeamPattern {
     pub fn one_way(&self, theta_rad: f64) -> f64 {
         let theta_rad = theta_rad.abs();
         match &self.0 {
-            Shape::Table(table) => {
+            PatternData::Table(table) => {
                 let place = theta_rad * (1.0 / STEP_RAD);
                 let below = place as usize;
                 let (Some(low), Some(high)) = (table.get(below), table.get(below + 1)) else {
@@ -79,15 +79,16 @@ impl BeamPattern {
                 };
                 low + (place - below as f64) * (high - low)
             }
-            Shape::Gaussian { .. } if theta_rad >= FRAC_PI_2 => 0.0,
-            Shape::Gaussian { half_angle_rad } => {
+            PatternData::Gaussian { .. } if theta_rad >= FRAC_PI_2 => 0.0,
+            PatternData::Gaussian { half_angle_rad } => {
                 (-2.0 * (theta_rad / half_angle_rad).powi(2)).exp()
             }
         }
     }
 
-    /// Integral over the angle of the two-way power, the pattern's fourth power, radians: how
-    /// wide a strip of a surface that scatters counts as fully in the beam.
+    /// Equivalent two-way beam width, radians: the integral over the angle of the two-way power,
+    /// the pattern's fourth power. Used for the strip of a scattering surface that is effectively
+    /// within the beam.
     #[must_use]
     pub fn two_way_power_rad(&self) -> f64 {
         const STEPS: usize = 1800;
@@ -96,32 +97,32 @@ impl BeamPattern {
         2.0 * step_rad * (0.5 + (1..STEPS).map(power).sum::<f64>())
     }
 
-    /// The least angle from the axis, radians, at which the one-way amplitude is down to `level`
-    /// (between 0 and 1); 90 degrees if it never is.
+    /// Smallest angle from the axis, radians, at which the one-way amplitude has fallen to `level`
+    /// (0 to 1); 90 degrees if there is none.
     #[must_use]
     pub fn angle_at(&self, level: f64) -> f64 {
         match &self.0 {
-            Shape::Table(table) => {
+            PatternData::Table(table) => {
                 let falls = |pair: &[f64]| pair[1] <= level;
                 let Some(at) = table.windows(2).position(falls) else { return FRAC_PI_2 };
-                // Between entries the pattern is the straight line that `one_way` draws.
+                // Linear interpolation as in `one_way`.
                 let [low, high] = [table[at], table[at + 1]];
                 let part = if low > high { ((low - level) / (low - high)).max(0.0) } else { 0.0 };
                 ((at as f64 + part) * STEP_RAD).min(FRAC_PI_2)
             }
-            Shape::Gaussian { half_angle_rad } => {
+            PatternData::Gaussian { half_angle_rad } => {
                 (half_angle_rad * (-level.min(1.0).ln() / 2.0).sqrt()).min(FRAC_PI_2)
             }
         }
     }
 }
 
-/// Amplitude at an angle of a face that has one alone, with the skirts' power if there are any.
-fn with_skirts(aperture: &Aperture, alone: f64, theta_rad: f64) -> f64 {
-    let Aperture::Piston { skirts_db: Some(level_db), .. } = *aperture else { return alone };
+/// Amplitude at an angle with the power of the side-lobe floor added, if there is one.
+fn with_skirts(aperture: &Aperture, face_only: f64, theta_rad: f64) -> f64 {
+    let Aperture::Piston { skirts_db: Some(level_db), .. } = *aperture else { return face_only };
     let skirts = 10f64.powf(level_db / 20.0) * aperture.obliquity(theta_rad);
-    // Nothing is added on the axis.
-    (alone * alone + (1.0 - alone * alone) * skirts * skirts).sqrt()
+    // The on-axis amplitude is unchanged.
+    (face_only * face_only + (1.0 - face_only * face_only) * skirts * skirts).sqrt()
 }
 
 /// Far-field amplitude of a circular piston in a baffle at one frequency, relative to its axis:
@@ -139,8 +140,8 @@ pub fn piston_directivity(ka: f64, theta_rad: f64) -> f64 {
 ///
 /// Kuc and Siegel, "Physically based simulation model for acoustic sensor robot navigation",
 /// IEEE PAMI 9 (1987), as equation (1) of Dudek, Jenkin, Milios and Wilkes, with `t - 2z/c` as
-/// the delay. Its integral is `cos(theta)`; at 0 it is a unit impulse, which has no value here.
-/// Valid beyond `a^2/lambda`, `0 < |theta| <= pi/2`.
+/// the delay. The integral over time is `cos(theta)`; at 0 the response is a unit impulse, which
+/// has no finite value. Valid beyond `a^2/lambda`, `0 < |theta| <= pi/2`.
 #[must_use]
 pub fn kuc_siegel_response(
     delay_s: f64,

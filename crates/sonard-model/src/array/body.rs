@@ -1,4 +1,4 @@
-//! The body of a robot that carries an array.
+//! Body of a robot that carries an array.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -9,34 +9,34 @@ use crate::{
     scene::{Material, Robot, RobotShape},
 };
 
-/// The body of a robot, in the robot's frame. The rangers' faces are outside it, and the robot's
-/// own place may be inside.
+/// Body of a robot, in the robot's frame. The rangers' faces are outside the body; the robot's own
+/// position may be inside.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Body {
-    /// Its name in records.
+    /// Identifier of the body in records.
     pub id: String,
-    /// Its outline.
+    /// Outline in the robot's frame.
     pub shape: BodyShape,
-    /// Its surface.
+    /// Surface material of the body.
     pub material: Material,
-    /// From and to what height it stands, metres; without it, without end.
+    /// Lower and upper height, metres; default: unbounded.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub z_m: Option<[f64; 2]>,
 }
 
-/// Outline of a body, `[ahead, left]` in metres from the robot's place.
+/// Outline of a body, `[forward, left]` in metres from the robot's position.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum BodyShape {
-    /// Round.
+    /// Circular outline of the body.
     Circle {
-        /// Its centre.
+        /// Centre, `[forward, left]` in metres.
         center: [f64; 2],
-        /// Its radius, metres.
+        /// Radius of the circle, metres.
         radius_m: f64,
     },
-    /// Flat sides between at least three corners, the last joined to the first.
+    /// Polygon of at least three corners, implicitly closed.
     Outline(Vec<[f64; 2]>),
 }
 
@@ -63,7 +63,7 @@ impl Body {
         Ok(())
     }
 
-    /// As a scene has it.
+    /// Robot of a scene with this body.
     pub(super) fn robot(&self) -> Robot {
         let shape = match &self.shape {
             BodyShape::Circle { center, radius_m } => {

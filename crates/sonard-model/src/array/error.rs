@@ -1,92 +1,92 @@
-//! What can be wrong with an array or with where it stands.
+//! Errors in an array's data or pose.
 
 use thiserror::Error;
 
 use crate::scene::{PoseError, suggest};
 
-/// An error in an array's data.
+/// Error in an array's data.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum ArrayError {
-    /// Not JSON, or not of an array's form.
+    /// Invalid JSON, or not an array's structure.
     #[error("line {line}, column {column}: {field}: {message}")]
     Form {
         /// Line in the text, from 1.
         line: usize,
         /// Column in the line, from 1.
         column: usize,
-        /// Which field, as far as it was understood.
+        /// Path of the field, as far as it was parsed.
         field: String,
-        /// What is wrong.
+        /// Description of the error.
         message: String,
     },
-    /// A figure out of range.
-    #[error("{field} is {value}: it must be from {least} to {most}")]
+    /// Value out of range.
+    #[error("{field} is {value}: it must be from {min} to {max}")]
     Figure {
-        /// Which field.
+        /// Path of the field.
         field: String,
-        /// What it holds.
+        /// Value outside the range.
         value: f64,
-        /// Least that would be right.
-        least: f64,
-        /// Most that would be right.
-        most: f64,
+        /// Lower end of the allowed range.
+        min: f64,
+        /// Upper end of the allowed range.
+        max: f64,
     },
-    /// No ranger, or too many of them.
-    #[error("{field} has {count} entries: it must have 1 to {most}")]
+    /// Empty list, or too many entries.
+    #[error("{field} has {count} entries: it must have 1 to {max}")]
     Count {
-        /// Which list.
+        /// Name of the list.
         field: &'static str,
-        /// How many entries it has.
+        /// Actual number of entries.
         count: usize,
-        /// Most that it may have.
-        most: usize,
+        /// Maximum number of entries.
+        max: usize,
     },
-    /// A ranger without a name.
-    #[error("{field} is empty: every ranger needs a name")]
+    /// Ranger without an id.
+    #[error("{field} is empty: every ranger needs an id")]
     NoId {
-        /// Which field.
+        /// Path of the field.
         field: String,
     },
-    /// Two rangers with one name.
-    #[error("{field} is \"{id}\", as rangers[{first}].id is: every ranger needs a name of its own")]
+    /// Two rangers with the same id.
+    #[error("{field} is \"{id}\", the id of rangers[{first}]: every ranger needs a unique id")]
     SameId {
-        /// The second one.
+        /// Path of the second id.
         field: String,
-        /// Their name.
+        /// Id that both rangers have.
         id: String,
-        /// Index of the first one.
+        /// Index of the first ranger with the id.
         first: usize,
     },
-    /// A name in the firing order that no ranger has.
+    /// Id in the firing order that no ranger has.
     #[error("{field} is \"{id}\": no ranger has that id")]
     NoSuchRanger {
-        /// Which field.
+        /// Path of the field.
         field: String,
-        /// The name.
+        /// Id that no ranger has.
         id: String,
-        /// The names there are.
+        /// Ids of the array's rangers.
         known: Vec<String>,
     },
-    /// A turn in which nobody fires.
+    /// Empty list of simultaneous firings.
     #[error("{field} is an empty list: it must have the id of at least one ranger")]
     EmptyTurn {
-        /// Which field.
+        /// Path of the field.
         field: String,
     },
-    /// A ranger that is to fire twice at once.
-    #[error("{field} has \"{id}\" twice: a ranger fires once in a turn")]
+    /// Ranger listed twice in one slot.
+    #[error("{field} has \"{id}\" twice: a ranger fires once per slot")]
     FiredTwice {
-        /// Which field.
+        /// Path of the field.
         field: String,
-        /// The ranger's id.
+        /// Id of the ranger.
         id: String,
     },
-    /// No preset of that name.
+    /// Request of a preset that does not exist.
     #[error("there is no array preset \"{name}\"")]
     UnknownPreset {
-        /// What was asked for.
+        /// Name of the requested preset.
         name: String,
-        /// Every preset's name.
+        /// Names of all presets.
         known: Vec<String>,
     },
 }
@@ -94,12 +94,12 @@ pub enum ArrayError {
 impl ArrayError {
     pub(super) fn form(field: String, error: &serde_json::Error) -> Self {
         let message = error.to_string();
-        // serde_json appends the place, which is reported apart.
+        // serde_json appends the position, which is reported separately.
         let message = message.split(" at line ").next().unwrap_or_default().to_owned();
         Self::Form { line: error.line(), column: error.column(), field, message }
     }
 
-    /// What would be right.
+    /// Hint for correcting the error.
     #[must_use]
     pub fn help(&self) -> String {
         match self {
@@ -109,19 +109,19 @@ impl ArrayError {
             | Self::NoId { .. }
             | Self::SameId { .. }
             | Self::EmptyTurn { .. }
-            | Self::FiredTwice { .. } => "correct that in the array's file".into(),
+            | Self::FiredTwice { .. } => "correct it in the array's file".into(),
             Self::NoSuchRanger { id, known, .. } => suggest(id, known, "rangers"),
             Self::UnknownPreset { name, known } => suggest(name, known, "presets"),
         }
     }
 }
 
-/// An error in the pose of an array.
+/// Error in the pose of an array.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ArrayPoseError {
-    /// The ranger that can't be there; `None` for the robot itself.
+    /// Ranger that does not fit; `None` for the robot itself.
     pub ranger: Option<String>,
-    /// What is in the way.
+    /// Obstruction of the pose.
     pub error: PoseError,
 }
 
@@ -137,7 +137,7 @@ impl std::fmt::Display for ArrayPoseError {
 impl std::error::Error for ArrayPoseError {}
 
 impl ArrayPoseError {
-    /// What would be right.
+    /// Hint for correcting the pose.
     #[must_use]
     pub fn help(&self) -> String {
         match self.ranger {

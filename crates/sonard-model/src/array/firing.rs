@@ -1,31 +1,31 @@
-//! The rhythm of an array: which rangers fire in which turn, and whose sound is still on its way then.
+//! Firing schedule of an array: slots of simultaneous firings, and interference between firings.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{ArrayError, MOST, RangerArray};
+use super::{ArrayError, MAX_ENTRIES, RangerArray};
 
-/// A turn of a round: the rangers that fire together.
+/// Slot of a round: the rangers that fire simultaneously.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(untagged, expecting = "a ranger's id, or a list of ids that fire at once")]
 pub enum Turn {
-    /// The ranger of this id.
+    /// Single ranger, by id.
     One(String),
-    /// The rangers of these ids, at once: each may receive the others' sound.
+    /// Rangers that fire simultaneously, by id: each may receive the others' sound.
     Together(Vec<String>),
 }
 
-/// Another firing, whose sound a listening ranger may receive.
+/// Other firing whose sound a ranger may receive.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OtherFiring {
-    /// The ranger that fired, as an index into the array's.
+    /// Index of the ranger that fired.
     pub ranger: usize,
-    /// How long before, microseconds; 0 for one at the same time.
+    /// Lead over the receiving ranger's firing, microseconds; 0 for a simultaneous firing.
     pub before_us: f64,
 }
 
 impl Turn {
-    /// The ids of the rangers that fire.
+    /// Ids of the rangers that fire.
     #[must_use]
     pub fn ids(&self) -> &[String] {
         match self {
@@ -42,7 +42,7 @@ impl From<&str> for Turn {
 }
 
 impl RangerArray {
-    /// Indices into `rangers` by turn.
+    /// Indices into `rangers` by slot.
     #[must_use]
     pub fn turns(&self) -> Vec<Vec<usize>> {
         if self.firing_order.is_empty() {
@@ -53,13 +53,13 @@ impl RangerArray {
         self.firing_order.iter().map(indices).collect()
     }
 
-    /// Indices into `rangers` in the order in which a round fires them; those of a turn side by side.
+    /// Indices into `rangers` in the order of firing; those of a slot are adjacent.
     pub fn round(&self) -> impl Iterator<Item = usize> {
         self.turns().into_iter().flatten()
     }
 
-    /// How long a round, or several, takes up to the end of a firing's turn, seconds; the firing counted from 1
-    /// over all rounds.
+    /// Time from the start to the end of a firing's slot, seconds. Firings are counted from 1 over
+    /// all rounds.
     #[must_use]
     pub fn duration_s(&self, firings: u32) -> f64 {
         let turns = self.turns();
@@ -74,12 +74,12 @@ impl RangerArray {
         (whole * turns.len() + begun.count()) as f64 * self.interval_ms * 1e-3
     }
 
-    /// When each firing of so many rounds begins, seconds after the first.
+    /// Start of each firing of `rounds` rounds, seconds after the first.
     #[must_use]
     pub fn firing_times_s(&self, rounds: u32) -> Vec<f64> {
         let turns = self.turns();
         let begins_s = |turn: usize| turn as f64 * self.interval_ms * 1e-3;
-        let of_round = |round: u32| {
+        let round_times = |round: u32| {
             let first = round as usize * turns.len();
             let times = turns
                 .iter()
@@ -87,13 +87,14 @@ impl RangerArray {
                 .flat_map(|(turn, number)| std::iter::repeat_n(begins_s(number), turn.len()));
             times.collect::<Vec<_>>()
         };
-        (0..rounds).flat_map(of_round).collect()
+        (0..rounds).flat_map(round_times).collect()
     }
 
-    /// The firings whose sound can be on its way when one of a round listens, counted from 0: those of its own
-    /// turn and of so many turns before, latest first. The array is taken to poll on and on, round after round.
+    /// Firings whose sound can arrive during a firing of a round, counted from 0: those of its own
+    /// slot and of `slots_back` slots before, latest first. The array is assumed to fire round
+    /// after round without a pause.
     #[must_use]
-    pub fn others(&self, firing: usize, turns_back: usize) -> Vec<OtherFiring> {
+    pub fn others(&self, firing: usize, slots_back: usize) -> Vec<OtherFiring> {
         let turns = self.turns();
         let mut first = 0;
         let own = turns.iter().position(|turn| {
@@ -104,7 +105,7 @@ impl RangerArray {
         let among = firing + turns[own].len() - first;
         let together = turns[own].iter().enumerate().filter(|(place, _)| *place != among);
         let together = together.map(|(_, &ranger)| OtherFiring { ranger, before_us: 0.0 });
-        let before = (1..=turns_back).flat_map(|back| {
+        let before = (1..=slots_back).flat_map(|back| {
             let turn = (own + turns.len() * back - back) % turns.len();
             let before_us = 1e3 * self.interval_ms * back as f64;
             turns[turn].iter().map(move |&ranger| OtherFiring { ranger, before_us })
@@ -112,7 +113,7 @@ impl RangerArray {
         together.chain(before).collect()
     }
 
-    /// Whether rangers fire at once in any turn.
+    /// Returns `true` if any slot has simultaneous firings.
     #[must_use]
     pub fn fires_together(&self) -> bool {
         self.firing_order.iter().any(|turn| turn.ids().len() > 1)
@@ -120,8 +121,12 @@ impl RangerArray {
 
     pub(super) fn check_order(&self) -> Result<(), ArrayError> {
         let ordered: usize = self.firing_order.iter().map(|turn| turn.ids().len()).sum();
-        if ordered > MOST {
-            return Err(ArrayError::Count { field: "firing_order", count: ordered, most: MOST });
+        if ordered > MAX_ENTRIES {
+            return Err(ArrayError::Count {
+                field: "firing_order",
+                count: ordered,
+                max: MAX_ENTRIES,
+            });
         }
         for (at, turn) in self.firing_order.iter().enumerate() {
             let (field, ids) = (format!("firing_order[{at}]"), turn.ids());

@@ -1,4 +1,4 @@
-//! Arrays and courses: their data, and where their rangers stand.
+//! Arrays and courses: data, and positions of their rangers.
 
 use super::*;
 use crate::scene::shipped;
@@ -12,7 +12,7 @@ fn scene(name: &str) -> Scene {
 }
 
 #[test]
-fn every_figure_of_every_preset_has_a_source_and_its_sensor_is_there() {
+fn presets_name_their_sources() {
     for name in RangerArray::preset_names() {
         let array = preset(name);
         assert_eq!(array.name, name);
@@ -26,13 +26,13 @@ fn every_figure_of_every_preset_has_a_source_and_its_sensor_is_there() {
 }
 
 #[test]
-fn the_rings_look_where_their_papers_say() {
+fn bearings_match_the_papers() {
     let bearings = |name| -> Vec<f64> {
         preset(name).rangers.iter().map(|ranger| ranger.bearing_deg).collect()
     };
     assert_eq!(bearings("pioneer-8"), [90.0, 50.0, 30.0, 10.0, -10.0, -30.0, -50.0, -90.0]);
     assert_eq!(bearings("pioneer-7"), [90.0, 30.0, 15.0, 0.0, -15.0, -30.0, -90.0]);
-    // Every ranger of the ring of twelve looks straight away from its middle.
+    // Every ranger of the ring of twelve points radially outwards.
     for (at, ranger) in preset("ring-12").rangers.iter().enumerate() {
         assert_eq!(ranger.azimuth_deg(), 30.0 * at as f64);
         let out = DVec2::new(ranger.x_m, ranger.y_m);
@@ -42,17 +42,17 @@ fn the_rings_look_where_their_papers_say() {
 }
 
 #[test]
-fn rangers_turn_and_move_with_the_robot() {
+fn rangers_move_with_the_robot() {
     let array = preset("pioneer-8");
     let robot = Pose { x_m: 2.0, y_m: 1.0, heading_deg: 90.0 };
-    // s3 is 166 mm ahead and 27 mm to the left: up and to the left of a robot that looks up.
+    // s3 is 166 mm ahead and 27 mm to the left; the robot points along +y.
     let s3 = array.ranger("s3").expect("there").pose_on(&robot);
     assert!((s3.position() - DVec2::new(2.0 - 0.027, 1.166)).length() < 1e-12, "{s3:?}");
     assert_eq!(s3.heading_deg, 100.0);
 }
 
 #[test]
-fn the_firing_order_may_leave_out_and_repeat_and_defaults_to_all() {
+fn firing_order_defaults_to_all() {
     let mut array = preset("pioneer-7");
     assert_eq!(array.round().collect::<Vec<_>>(), [0, 1, 2, 3, 4, 5, 6]);
     assert_eq!((array.plan(1).beams(), array.plan(3).beams()), (7, 21));
@@ -69,10 +69,10 @@ fn the_firing_order_may_leave_out_and_repeat_and_defaults_to_all() {
 }
 
 #[test]
-fn wrong_data_are_named() {
+fn rejects_invalid_data() {
     let text = PRESETS[0].1;
     for (wrong, part) in [
-        (text.replace("\"s5\"", "\"s2\""), "rangers[5].id is \"s2\", as rangers[2].id is"),
+        (text.replace("\"s5\"", "\"s2\""), "rangers[5].id is \"s2\", the id of rangers[2]"),
         (text.replace("\"s5\"", "\"\""), "rangers[5].id is empty"),
         (text.replace("0.148", "148"), "rangers[2].x_m is 148: it must be from -10 to 10"),
         (text.replace("-50.0", "1e999"), "line 13"),
@@ -96,29 +96,29 @@ fn wrong_data_are_named() {
 }
 
 #[test]
-fn a_ranger_outside_the_room_or_in_a_wall_is_named() {
+fn pose_error_names_the_ranger() {
     let (array, room) = (preset("pioneer-8"), scene("simple-room"));
     let at = |x_m, y_m, heading_deg| Pose { x_m, y_m, heading_deg };
     assert_eq!(array.check_pose(&room, &at(0.4, 0.37, 0.0)), Ok(()));
-    // The robot's place is in the room, 0.928 m wide, but its foremost sonars are not.
+    // The robot's position is in the room, 0.928 m wide, but its foremost sonars are not.
     let error = array.check_pose(&room, &at(0.8, 0.37, 0.0)).expect_err("beyond the wall");
     assert_eq!(error.ranger.as_deref(), Some("s2"));
     assert!(matches!(error.error, crate::scene::PoseError::OutsideRoom { .. }), "{error}");
     let error = array.check_pose(&room, &at(0.762, 0.37, 0.0)).expect_err("on the wall");
     assert_eq!(error.ranger.as_deref(), Some("s3"));
     assert!(error.to_string().starts_with("ranger s3 of the array: "), "{error}");
-    // A screen between the robot's middle and its foremost sonars.
+    // Screen between the robot's middle and its foremost sonars.
     let text = r#"{"name":"screen","materials":{"m":{"reflectance":1.0}},
         "walls":[{"id":"screen","from":[0.12,-1],"to":[0.12,1],"material":"m"}]}"#;
     let screen = Scene::from_json(text).expect("a scene");
     let error = array.check_pose(&screen, &at(0.0, 0.0, 0.0)).expect_err("through the screen");
     assert_eq!(error.ranger.as_deref(), Some("s2"));
-    assert!(error.to_string().contains("other side of `screen`"), "{error}");
+    assert!(error.to_string().contains("separated from the robot by `screen`"), "{error}");
     assert_eq!(array.check_pose(&screen, &at(-0.1, 0.0, 0.0)), Ok(()));
     assert_eq!(array.check_pose(&room, &at(2.0, 0.3, 0.0)).expect_err("outside").ranger, None);
     let nan = array.check_pose(&room, &at(f64::NAN, 0.3, 0.0));
     assert!(nan.is_err());
-    // The body has to leave its rangers free, and has to fit itself.
+    // The body must not cover its rangers, and must fit itself.
     let mut ring = preset("ring-12");
     assert_eq!(ring.check_pose(&room, &at(0.4, 0.37, 0.0)), Ok(()));
     ring.rangers[5].x_m = -0.05;
@@ -126,17 +126,17 @@ fn a_ranger_outside_the_room_or_in_a_wall_is_named() {
     assert!(error.to_string().contains("inside `b12`"), "{error}");
     assert_eq!(error.ranger.as_deref(), Some("s5"));
     let error = preset("ring-12").check_pose(&room, &at(0.4, 0.14, 0.0)).expect_err("no room");
-    assert!(error.to_string().contains("`b12` runs into `south`"), "{error}");
+    assert!(error.to_string().contains("`b12` collides with `south`"), "{error}");
 }
 
 #[test]
-fn a_course_is_read_timed_and_driven() {
+fn course_interpolates_poses() {
     let text = "{\"x_m\":0,\"y_m\":0}\n\n{\"x_m\":1,\"y_m\":0,\"heading_deg\":350}\n";
     let course = Course::from_json_lines(text).expect("two poses").timed(0.5);
     assert_eq!((course.poses().len(), course.duration_s()), (2, 2.0));
     let half = course.pose_at(1.0);
     assert_eq!((half.x_m, half.y_m), (0.5, 0.0));
-    assert!((half.heading_deg - 355.0).abs() < 1e-9, "the shorter way: {half:?}");
+    assert!((half.heading_deg - 355.0).abs() < 1e-9, "smaller angle: {half:?}");
     assert_eq!(course.pose_at(-1.0), course.poses()[0]);
     assert_eq!(course.pose_at(0.0), course.poses()[0]);
     assert_eq!(course.pose_at(2.0), course.poses()[1]);
@@ -146,11 +146,11 @@ fn a_course_is_read_timed_and_driven() {
     assert_eq!((timed.duration_s(), timed.pose_at(1.0).x_m), (4.0, 0.25));
     let turning = "{\"x_m\":0,\"y_m\":0}\n{\"x_m\":0,\"y_m\":0,\"heading_deg\":90}";
     let turning = Course::from_json_lines(turning).expect("a turn").timed(0.5);
-    assert!((turning.duration_s() - 1.5).abs() < 1e-12, "60 degrees a second");
+    assert!((turning.duration_s() - 1.5).abs() < 1e-12, "60 degrees per second");
 }
 
 #[test]
-fn wrong_courses_are_named_by_their_line() {
+fn rejects_invalid_courses() {
     for (text, line, part) in [
         ("", 1, "no pose"),
         ("{\"x_m\":0,\"y_m\":0}\n{\"x_m\":0}", 2, "y_m"),
@@ -160,7 +160,7 @@ fn wrong_courses_are_named_by_their_line() {
         (
             "{\"time_s\":1,\"x_m\":0,\"y_m\":0}\n{\"time_s\":1,\"x_m\":0,\"y_m\":0}",
             2,
-            "not after 1",
+            "not after the previous one, 1",
         ),
         ("{\"x_m\":1e999,\"y_m\":0}", 1, "number"),
     ] {
@@ -171,7 +171,7 @@ fn wrong_courses_are_named_by_their_line() {
 }
 
 #[test]
-fn a_course_of_poses_is_that_of_its_lines() {
+fn course_from_poses_and_lines() {
     let at = |x_m, heading_deg| Pose { x_m, y_m: 0.0, heading_deg };
     let poses = [at(0.0, 0.0), at(1.0, 350.0)];
     let text = "{\"time_s\":5,\"x_m\":0,\"y_m\":0}\n{\"time_s\":9,\"x_m\":1,\"y_m\":0,\"heading_deg\":350}";
@@ -182,7 +182,7 @@ fn a_course_of_poses_is_that_of_its_lines() {
     for (poses, times_s, line, part) in [
         (&poses[..0], None, 1, "no pose"),
         (&poses[..], Some(&[1.0][..]), 2, "2 poses, but 1 times"),
-        (&poses[..], Some(&[1.0, 1.0][..]), 2, "not after 1"),
+        (&poses[..], Some(&[1.0, 1.0][..]), 2, "not after the previous one, 1"),
         (&poses[..], Some(&[1.0, f64::NAN][..]), 2, "finite"),
         (&[at(f64::INFINITY, 0.0)][..], None, 1, "finite"),
     ] {
@@ -192,7 +192,7 @@ fn a_course_of_poses_is_that_of_its_lines() {
 }
 
 #[test]
-fn rounds_begin_one_after_the_other_and_turn_by_parts_of_the_ring() {
+fn rounds_follow_and_rotate() {
     let mut array = preset("ring-12");
     array.interval_ms = 50.0;
     array.firing_order =
@@ -213,7 +213,7 @@ fn rounds_begin_one_after_the_other_and_turn_by_parts_of_the_ring() {
 }
 
 #[test]
-fn of_many_poses_the_first_that_fails_is_named() {
+fn first_failing_pose_is_named() {
     let room = scene("simple-room");
     let at = |x_m, y_m| Pose { x_m, y_m, heading_deg: 0.0 };
     let (array, good) = (preset("pioneer-8"), at(0.4, 0.37));

@@ -1,4 +1,5 @@
-//! Segments cut where they meet, so that they touch at their ends only.
+//! Planar arrangement: segments split at their intersections, so that they touch only at their
+//! ends.
 
 use std::collections::{HashMap, HashSet};
 
@@ -9,55 +10,60 @@ use rstar::{
 
 use super::DVec2;
 
-/// Points closer than this are one point, metres: what the rounding of coordinates and crossings leaves.
-/// What was drawn apart is brought together before ([`snap`](super::snap())).
+/// Points closer than this coincide, metres: rounding of coordinates and intersections. Larger gaps
+/// are closed before by [`snap`](super::snap()).
 const SAME_M: f64 = 1e-9;
 
-/// The ends of a segment of which nothing is left.
-const NOWHERE: [u32; 2] = [u32::MAX; 2];
+/// Placeholder for the ends of a segment without pieces.
+const NO_ENDS: [u32; 2] = [u32::MAX; 2];
 
-/// Cutting and joining can bring pieces into contact by rounding, which settles in a round or two; dozens of
-/// walls scribbled on a few millimetres need some more.
-const ROUNDS: usize = 50;
+/// Maximum number of splitting rounds. Splitting and merging can create contacts by rounding, which
+/// converges in one or two rounds; dozens of walls within a few millimetres need some more.
+const MAX_ROUNDS: usize = 50;
 
-/// Segments that touch at their ends only.
+/// Segments that touch only at their ends.
 #[derive(Debug, Clone, Default)]
 pub struct Arrangement {
-    /// Ends of pieces, each once.
+    /// End points of the pieces, without duplicates.
     pub points: Vec<DVec2>,
-    /// What is left of the segments; no two between the same points.
+    /// Pieces of the segments; no two connect the same points.
     pub pieces: Vec<Piece>,
-    /// Segments that lie on one of these and were given later, by [`between`] its ends.
+    /// Overlapping segments that were given later, by the key ([`between`]) of the piece that
+    /// covers them.
     pub covered: HashMap<[u32; 2], Vec<u32>>,
-    /// For each segment the points where it ends.
+    /// End points of each segment.
     pub ends: Vec<[u32; 2]>,
 }
 
-/// A part of a segment between two points of an [`Arrangement`].
+/// Part of a segment between two points of an [`Arrangement`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Piece {
-    /// Indices of its ends, in the segment's direction.
+    /// Indices of the end points, in the segment's direction.
     pub ends: [u32; 2],
     /// Index of the segment.
     pub segment: u32,
 }
 
-/// A piece's name, whichever its direction: the indices of its ends, the smaller one first.
+/// Key of a piece, independent of its direction: the indices of its ends in ascending order.
 #[must_use]
 pub fn between([a, b]: [u32; 2]) -> [u32; 2] {
     [a.min(b), a.max(b)]
 }
 
 impl Arrangement {
-    /// Cuts segments where they cross or touch. Where two lie on each other, the one given first
-    /// stays. Time grows like n log n for segments that meet few others.
+    /// Splits segments at crossings and contacts. Of overlapping segments the first one is kept.
+    /// The run time is O(n log n) for segments with few neighbours.
     #[must_use]
     pub fn of(segments: &[(DVec2, DVec2)]) -> Self {
-        let mut parts: Vec<Part> =
-            segments.iter().zip(0..).map(|(&(a, b), segment)| Part { a, b, segment }).collect();
+        let mut parts: Vec<SegmentPart> = segments
+            .iter()
+            .zip(0..)
+            .map(|(&(a, b), segment)| SegmentPart { a, b, segment })
+            .collect();
         let mut joined = join(&mut parts);
-        // In each round ends are the same or farther apart than SAME_M, and what crosses or touches is cut there.
-        for _ in 0..ROUNDS {
+        // After each round, ends are identical or farther apart than SAME_M, and every contact is
+        // split.
+        for _ in 0..MAX_ROUNDS {
             let cuts = cuts(&parts);
             if cuts.iter().all(Vec::is_empty) {
                 break;
@@ -65,19 +71,19 @@ impl Arrangement {
             parts = parts.iter().zip(cuts).flat_map(|(part, cuts)| part.cut(cuts)).collect();
             joined = join(&mut parts);
         }
-        listed(&parts, joined, segments.len())
+        collect(&parts, joined, segments.len())
     }
 }
 
 #[derive(Debug, Clone, Copy)]
-struct Part {
+struct SegmentPart {
     a: DVec2,
     b: DVec2,
     segment: u32,
 }
 
-impl Part {
-    /// This part in pieces, cut at `points` near it.
+impl SegmentPart {
+    /// Pieces of this part, split at `points` near it.
     fn cut(self, mut points: Vec<DVec2>) -> Vec<Self> {
         if points.is_empty() {
             return vec![self];
@@ -101,8 +107,8 @@ impl Part {
         AABB::from_corners(low.to_array(), high.to_array())
     }
 
-    /// Whether `point` lies on this part but at neither end.
-    fn has_inside(&self, point: DVec2) -> bool {
+    /// Returns `true` if `point` lies on this part but at neither end.
+    fn contains_inside(&self, point: DVec2) -> bool {
         let along = self.b - self.a;
         let length = along.length();
         let place = (point - self.a).dot(along) / length;
@@ -113,10 +119,10 @@ impl Part {
             && point.distance(self.b) > SAME_M
     }
 
-    /// Where two parts that have no end in common cross.
+    /// Intersection of two parts without a common end.
     fn crossing(&self, other: &Self) -> Option<DVec2> {
-        // The exact signs: a crossing within rounding of an end is none or a cut, as its neighbours say.
-        if !self.parts_ends_of(other) || !other.parts_ends_of(self) {
+        // Exact orientation tests: a crossing within rounding of an end is resolved consistently.
+        if !self.separates_ends_of(other) || !other.separates_ends_of(self) {
             return None;
         }
         let (u, v) = (self.b - self.a, other.b - other.a);
@@ -126,8 +132,8 @@ impl Part {
         Some(near.unwrap_or(point)).filter(|point| point.is_finite())
     }
 
-    /// Whether the ends of `other` lie to both sides of this part's line.
-    fn parts_ends_of(&self, other: &Self) -> bool {
+    /// Returns `true` if the ends of `other` lie on opposite sides of this part's line.
+    fn separates_ends_of(&self, other: &Self) -> bool {
         let [a, b, c, d] =
             [self.a, self.b, other.a, other.b].map(|p| robust::Coord { x: p.x, y: p.y });
         let sides = [c, d].map(|end| robust::orient2d(a, b, end));
@@ -135,8 +141,8 @@ impl Part {
     }
 }
 
-/// For each part, the points inside it where another part ends or crosses it.
-fn cuts(parts: &[Part]) -> Vec<Vec<DVec2>> {
+/// Split points inside each part, where another part ends or crosses it.
+fn cuts(parts: &[SegmentPart]) -> Vec<Vec<DVec2>> {
     let boxes = parts.iter().enumerate().map(|(index, part)| {
         let bounds = part.bounds();
         GeomWithData::new(Rectangle::from_corners(bounds.lower(), bounds.upper()), index)
@@ -147,11 +153,12 @@ fn cuts(parts: &[Part]) -> Vec<Vec<DVec2>> {
         for near in tree.locate_in_envelope_intersecting(part.bounds()) {
             let other = &parts[near.data];
             let before = cuts[i].len();
-            cuts[i].extend([other.a, other.b].into_iter().filter(|&end| part.has_inside(end)));
-            let ends_meet =
-                cuts[i].len() > before || other.has_inside(part.a) || other.has_inside(part.b);
+            cuts[i].extend([other.a, other.b].into_iter().filter(|&end| part.contains_inside(end)));
+            let has_contact = cuts[i].len() > before
+                || other.contains_inside(part.a)
+                || other.contains_inside(part.b);
             if near.data > i
-                && !ends_meet
+                && !has_contact
                 && let Some(point) = part.crossing(other)
             {
                 for (index, part) in [(i, part), (near.data, other)] {
@@ -165,14 +172,14 @@ fn cuts(parts: &[Part]) -> Vec<Vec<DVec2>> {
     cuts
 }
 
-/// Points where parts end, and for each part the indices of its own.
+/// End points of parts, and their indices for each part.
 struct Joined {
     points: Vec<DVec2>,
     ends: Vec<[u32; 2]>,
 }
 
-/// Makes ends that are closer than [`SAME_M`] one point: the first of them.
-fn join(parts: &mut [Part]) -> Joined {
+/// Merges ends that are closer than [`SAME_M`] into the first of them.
+fn join(parts: &mut [SegmentPart]) -> Joined {
     let ends: Vec<DVec2> = parts.iter().flat_map(|part| [part.a, part.b]).collect();
     let tree = RTree::bulk_load(
         ends.iter().enumerate().map(|(i, end)| GeomWithData::new(end.to_array(), i)).collect(),
@@ -198,11 +205,11 @@ fn join(parts: &mut [Part]) -> Joined {
     Joined { points, ends }
 }
 
-/// What is left of the segments; pieces that lie on others are put aside.
-fn listed(parts: &[Part], joined: Joined, segments: usize) -> Arrangement {
+/// Collects the pieces of the segments; overlapping pieces are listed as covered.
+fn collect(parts: &[SegmentPart], joined: Joined, segments: usize) -> Arrangement {
     let mut result = Arrangement {
         points: joined.points,
-        ends: vec![NOWHERE; segments],
+        ends: vec![NO_ENDS; segments],
         ..Arrangement::default()
     };
     let mut seen = HashSet::new();
@@ -231,7 +238,7 @@ mod tests {
     }
 
     #[test]
-    fn meetings_cut_segments() {
+    fn contacts_split_segments() {
         let line = segment(0.0, 0.0, 2.0, 0.0);
         let cases = [
             ("apart", vec![line, segment(0.0, 1.0, 2.0, 1.0)], 4, 2),
@@ -242,40 +249,41 @@ mod tests {
             ("common end, nearly", vec![line, segment(2.0, 3e-11, 2.0, 1.0)], 3, 2),
             ("overlap", vec![line, segment(1.0, 0.0, 3.0, 0.0)], 4, 3),
             ("twice", vec![line, segment(2.0, 0.0, 0.0, 0.0)], 2, 1),
-            ("a gap that counts", vec![line, segment(1.0, 1e-4, 1.0, 1.0)], 4, 2),
+            ("gap above the tolerance", vec![line, segment(1.0, 1e-4, 1.0, 1.0)], 4, 2),
         ];
         for (name, segments, points, pieces) in cases {
-            let made = Arrangement::of(&segments);
-            assert_eq!((made.points.len(), made.pieces.len()), (points, pieces), "{name}");
-            for (ends, (a, b)) in made.ends.iter().zip(&segments) {
-                let [p, q] = ends.map(|end| made.points[end as usize]);
+            let arrangement = Arrangement::of(&segments);
+            let counts = (arrangement.points.len(), arrangement.pieces.len());
+            assert_eq!(counts, (points, pieces), "{name}");
+            for (ends, (a, b)) in arrangement.ends.iter().zip(&segments) {
+                let [p, q] = ends.map(|end| arrangement.points[end as usize]);
                 assert!(p.distance(*a) < 1e-9 && q.distance(*b) < 1e-9, "{name}");
             }
         }
     }
 
     #[test]
-    fn pieces_keep_the_length_and_the_segment() {
+    fn pieces_preserve_length() {
         let grid: Vec<_> = (0..5)
             .flat_map(|i| {
                 let x = f64::from(i) + 0.1;
                 [segment(x, -0.3, x + 0.2, 5.0), segment(-0.2, x, 5.3, x - 0.1)]
             })
             .collect();
-        let made = Arrangement::of(&grid);
+        let arrangement = Arrangement::of(&grid);
         for (index, &(a, b)) in grid.iter().enumerate() {
-            let length: f64 = made
+            let length: f64 = arrangement
                 .pieces
                 .iter()
                 .filter(|piece| piece.segment == index as u32)
                 .map(|piece| {
-                    let [p, q] = piece.ends.map(|end| made.points[end as usize]);
+                    let [p, q] = piece.ends.map(|end| arrangement.points[end as usize]);
                     assert!((q - p).dot(b - a) > 0.0);
                     p.distance(q)
                 })
                 .sum();
             assert!((length - a.distance(b)).abs() < 1e-9);
         }
-        assert_eq!(made.points.len(), 2 * 10 + 25);
+        assert_eq!(arrangement.points.len(), 2 * 10 + 25);
     }
 }

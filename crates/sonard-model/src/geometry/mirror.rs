@@ -1,44 +1,44 @@
-//! Mirror lines.
+//! Reflection of points and directions at a line.
 
 use super::DVec2;
 
-/// A straight line as a mirror for points and directions.
+/// Mirror line for points and directions.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Mirror {
-    /// Unit vector across the line.
+    /// Unit normal of the line.
     pub normal: DVec2,
-    /// `normal . p` of the points `p` on the line, metres.
+    /// Dot product `normal . p` of any point `p` on the line, metres.
     pub offset_m: f64,
 }
 
 impl Mirror {
-    /// The line through two different points.
+    /// Creates the line through two different points.
     #[must_use]
     pub fn through(a: DVec2, b: DVec2) -> Self {
         let normal = (b - a).perp().normalize();
-        // The middle, so that neither end is favoured by the rounding.
+        // Uses the midpoint, so that rounding favours neither end.
         Self { normal, offset_m: normal.dot(0.5 * (a + b)) }
     }
 
-    /// Distance of a point from the line, positive on the side the normal points to, metres.
+    /// Signed distance of a point from the line, positive on the side of the normal, metres.
     #[must_use]
     pub fn height_m(&self, point: DVec2) -> f64 {
         self.normal.dot(point) - self.offset_m
     }
 
-    /// The mirror image of a point.
+    /// Mirror image of a point.
     #[must_use]
     pub fn image(&self, point: DVec2) -> DVec2 {
         point - 2.0 * self.height_m(point) * self.normal
     }
 
-    /// The mirror image of a direction.
+    /// Mirror image of a direction.
     #[must_use]
     pub fn turn(&self, direction: DVec2) -> DVec2 {
         direction - 2.0 * self.normal.dot(direction) * self.normal
     }
 
-    /// The unit complex number `u` with which the image of a direction `d` is `u conj(d)`.
+    /// Unit complex number `u` such that the image of a direction `d` is `u conj(d)`.
     #[must_use]
     pub fn rotor(&self) -> DVec2 {
         let along = self.normal.perp();
@@ -51,7 +51,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn image_twice_is_the_point_itself_and_points_on_the_line_stay() {
+    fn image_is_an_involution() {
         let (a, b) = (DVec2::new(0.3, -1.0), DVec2::new(2.0, 0.7));
         let mirror = Mirror::through(a, b);
         let point = DVec2::new(-0.4, 5.0);
@@ -61,7 +61,7 @@ mod tests {
     }
 
     #[test]
-    fn rotor_and_turn_agree() {
+    fn rotor_matches_reflection() {
         let mirror = Mirror::through(DVec2::ZERO, DVec2::new(1.0, 3.0));
         let direction = DVec2::from_angle(0.4);
         let conjugate = DVec2::new(direction.x, -direction.y);

@@ -1,20 +1,20 @@
-//! What segments that meet enclose.
+//! Outer boundaries of connected segments.
 
 use smallvec::SmallVec;
 
-use super::{Arrangement, DVec2, sets::Sets};
+use super::{Arrangement, DVec2, union_find::UnionFind};
 
 impl Arrangement {
-    /// Once round the outside of each group of pieces that hang together: the points in order, clockwise. A
-    /// piece with the outside on both of its sides is passed there and back.
+    /// Outer boundary of each connected component: its points in order, clockwise. A piece with the
+    /// outside on both sides is traversed in both directions.
     #[must_use]
     pub fn outlines(&self) -> Vec<Vec<u32>> {
-        let ways = Ways::of(self);
-        let mut groups = Sets::new(self.points.len());
+        let half_edges = HalfEdges::new(self);
+        let mut components = UnionFind::new(self.points.len());
         for piece in &self.pieces {
-            groups.join(piece.ends[0], piece.ends[1]);
+            components.union(piece.ends[0], piece.ends[1]);
         }
-        // Of all ways round the faces of a group that round its outside encloses the least: less than nothing.
+        // The outer face of a component has the smallest signed area, which is negative.
         let mut best: Vec<Option<(f64, u32)>> = vec![None; self.points.len()];
         let mut is_seen = vec![false; 2 * self.pieces.len()];
         for start in 0..is_seen.len() as u32 {
@@ -22,32 +22,34 @@ impl Arrangement {
                 continue;
             }
             let mut area = 0.0;
-            let origin = self.points[ways.from(start) as usize];
-            for way in ways.round(start) {
-                is_seen[way as usize] = true;
-                let [a, b] =
-                    [ways.from(way), ways.from(way ^ 1)].map(|p| self.points[p as usize] - origin);
+            let origin = self.points[half_edges.origin(start) as usize];
+            for half_edge in half_edges.face(start) {
+                is_seen[half_edge as usize] = true;
+                let [a, b] = [half_edge, half_edge ^ 1]
+                    .map(|end| self.points[half_edges.origin(end) as usize] - origin);
                 area += 0.5 * a.perp_dot(b);
             }
-            let known = &mut best[groups.root(ways.from(start)) as usize];
-            if known.is_none_or(|(least, _)| area < least) {
-                *known = Some((area, start));
+            let smallest = &mut best[components.root(half_edges.origin(start)) as usize];
+            if smallest.is_none_or(|(smallest, _)| area < smallest) {
+                *smallest = Some((area, start));
             }
         }
-        let walk = |(_, start): (f64, u32)| ways.round(start).map(|way| ways.from(way)).collect();
+        let walk = |(_, start): (f64, u32)| {
+            half_edges.face(start).map(|half_edge| half_edges.origin(half_edge)).collect()
+        };
         best.into_iter().flatten().map(walk).collect()
     }
 }
 
-/// Pieces as ways from end to end: `2 i` along piece `i`, `2 i + 1` back.
-struct Ways<'a> {
+/// Directed pieces: `2 i` along piece `i`, `2 i + 1` against it.
+struct HalfEdges<'a> {
     arrangement: &'a Arrangement,
-    /// For each way that which goes on round the face on its left.
+    /// Next half-edge of the face on the left of each half-edge.
     next: Vec<u32>,
 }
 
-impl<'a> Ways<'a> {
-    fn of(arrangement: &'a Arrangement) -> Self {
+impl<'a> HalfEdges<'a> {
+    fn new(arrangement: &'a Arrangement) -> Self {
         let mut around: Vec<SmallVec<[(f64, u32); 4]>> =
             vec![SmallVec::new(); arrangement.points.len()];
         for (piece, index) in arrangement.pieces.iter().zip(0..) {
@@ -56,31 +58,33 @@ impl<'a> Ways<'a> {
             around[piece.ends[1] as usize].push(((a - b).to_angle(), 2 * index + 1));
         }
         let mut next = vec![0; 2 * arrangement.pieces.len()];
-        for ways in &mut around {
-            ways.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-            for (at, &(_, leaving)) in ways.iter().enumerate() {
-                // Who arrives against this way turns off as far to the right as there is.
-                next[(leaving ^ 1) as usize] = ways[(at + ways.len() - 1) % ways.len()].1;
+        for outgoing in &mut around {
+            outgoing.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+            for (at, &(_, leaving)) in outgoing.iter().enumerate() {
+                // The face continues with the rightmost turn.
+                next[(leaving ^ 1) as usize] =
+                    outgoing[(at + outgoing.len() - 1) % outgoing.len()].1;
             }
         }
         Self { arrangement, next }
     }
 
-    fn from(&self, way: u32) -> u32 {
-        self.arrangement.pieces[way as usize / 2].ends[way as usize % 2]
+    fn origin(&self, half_edge: u32) -> u32 {
+        self.arrangement.pieces[half_edge as usize / 2].ends[half_edge as usize % 2]
     }
 
-    fn round(&self, start: u32) -> impl Iterator<Item = u32> {
+    fn face(&self, start: u32) -> impl Iterator<Item = u32> {
         let mut ahead = Some(start);
         std::iter::from_fn(move || {
-            let way = ahead?;
-            ahead = Some(self.next[way as usize]).filter(|&next| next != start);
-            Some(way)
+            let half_edge = ahead?;
+            ahead = Some(self.next[half_edge as usize]).filter(|&next| next != start);
+            Some(half_edge)
         })
     }
 }
 
-/// Whether a point lies inside a closed line through `corners` (even-odd rule; on it: either answer).
+/// Returns `true` if a point lies inside the closed polygon of `corners` (even-odd rule; undefined
+/// on the boundary).
 #[must_use]
 pub fn encloses(corners: &[DVec2], point: DVec2) -> bool {
     let next = corners.iter().cycle().skip(1);
@@ -95,7 +99,7 @@ pub fn encloses(corners: &[DVec2], point: DVec2) -> bool {
     crossings % 2 == 1
 }
 
-/// The area inside a closed line through `corners` that does not cross itself.
+/// Area of the simple closed polygon of `corners`.
 #[must_use]
 pub fn enclosed_area(corners: &[DVec2]) -> f64 {
     let Some(&first) = corners.first() else { return 0.0 };
@@ -110,22 +114,22 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_group_has_one_outline_with_all_that_hangs_on_it() {
+    fn component_has_one_outline() {
         let segment = |ax: f64, ay: f64, bx: f64, by: f64| (DVec2::new(ax, ay), DVec2::new(bx, by));
         let two_rooms = [
             segment(0.0, 0.0, 4.0, 0.0),
             segment(4.0, 0.0, 4.0, 2.0),
             segment(4.0, 2.0, 0.0, 2.0),
             segment(0.0, 2.0, 0.0, 0.0),
-            // Between them, past the wall outside; and a table within.
+            // A partition that extends beyond the outer wall, and a table inside.
             segment(2.0, 0.0, 2.0, 3.0),
             segment(0.5, 0.5, 1.0, 0.5),
         ];
-        let made = Arrangement::of(&two_rooms);
-        let mut outlines: Vec<Vec<DVec2>> = made
+        let arrangement = Arrangement::of(&two_rooms);
+        let mut outlines: Vec<Vec<DVec2>> = arrangement
             .outlines()
             .iter()
-            .map(|walk| walk.iter().map(|&point| made.points[point as usize]).collect())
+            .map(|walk| walk.iter().map(|&point| arrangement.points[point as usize]).collect())
             .collect();
         outlines.sort_by_key(Vec::len);
         assert_eq!(outlines.len(), 2);
@@ -136,18 +140,18 @@ mod tests {
         }
     }
 
-    /// However small a room is, and however it is divided: the outside is the face that encloses less than nothing.
+    /// Independent of the size and the subdivision of a room, the outer face has a negative area.
     #[test]
-    fn small_rooms_have_outlines_too() {
+    fn small_rooms_have_outlines() {
         let at = |x: f64, y: f64| DVec2::new(3.0 + 0.1 * x, -2.0 + 0.1 * y);
         let corners = [at(0.0, 0.0), at(1.0, 0.0), at(1.0, 1.0), at(0.0, 1.0)];
         let mut segments: Vec<_> = (0..4).map(|i| (corners[i], corners[(i + 1) % 4])).collect();
         segments.push((corners[0], corners[2]));
-        let made = Arrangement::of(&segments);
-        let outlines = made.outlines();
+        let arrangement = Arrangement::of(&segments);
+        let outlines = arrangement.outlines();
         assert_eq!(outlines.len(), 1);
         let outline: Vec<DVec2> =
-            outlines[0].iter().map(|&point| made.points[point as usize]).collect();
+            outlines[0].iter().map(|&point| arrangement.points[point as usize]).collect();
         assert_eq!(outline.len(), 4, "{outline:?}");
         assert!((enclosed_area(&outline) - 0.01).abs() < 1e-12);
     }

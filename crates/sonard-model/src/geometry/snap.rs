@@ -1,10 +1,10 @@
-//! Ends of segments brought to where they were meant to be.
+//! Snapping of segment ends to their intended positions.
 //!
-//! A floor plan drawn by hand or turned and written to some decimals has corners that gape, walls that stop
-//! short of the one they join or run past it, and the same wall twice. Sound finds an opening of a nanometre as
-//! well as one of a metre, so such a plan is made good first: ends near each other become one vertex, vertices
-//! near a segment come to lie on it. Segments stay straight; what crosses or touches is cut later
-//! ([`Arrangement`](super::Arrangement)).
+//! Floor plans drawn by hand, or rotated and rounded, have open corners, walls that stop short of
+//! the wall they join or run past it, and duplicate walls. Acoustically a gap of a nanometre is as
+//! open as one of a metre. Such a plan is therefore repaired first: ends near each other become one
+//! vertex, and vertices near a segment are moved onto it. Segments stay straight; crossings and
+//! contacts are split later ([`Arrangement`](super::Arrangement)).
 
 mod joints;
 mod square;
@@ -13,100 +13,105 @@ mod vertices;
 use super::DVec2;
 use joints::Joints;
 use square::square_up;
-pub use vertices::End;
+pub use vertices::SegmentEnd;
 use vertices::Vertices;
 
-/// Moves below this are rounding of the arithmetic, metres.
+/// Moves below this are rounding errors, metres.
 const ROUNDING_M: f64 = 1e-12;
 
-/// An end that was moved.
+/// Correction of a segment end.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Move {
-    /// The end.
-    pub end: End,
-    /// From where, metres.
+pub struct SnapMove {
+    /// Segment end that was moved.
+    pub end: SegmentEnd,
+    /// Position as drawn, metres.
     pub from: DVec2,
-    /// To where, metres.
+    /// Position after the correction, metres.
     pub to: DVec2,
-    /// To make what good.
-    pub cause: Cause,
+    /// Defect that was corrected.
+    pub cause: SnapCause,
 }
 
-/// The defect of a drawing that a move corrects.
+/// Defect of a drawing that a move corrects.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Cause {
-    /// It was apart from another end.
-    Apart(End),
-    /// It stopped short of a segment.
+pub enum SnapCause {
+    /// Gap to another end.
+    Apart(SegmentEnd),
+    /// End short of a segment.
     Short(u32),
-    /// It ran past a segment.
+    /// End past a segment.
     Past(u32),
-    /// A corner was a little off a right angle, or a segment's other end was moved.
+    /// Corner slightly off a right angle, or the segment's other end was moved.
     Turned,
 }
 
-/// Moves ends of segments by little more than `tolerance_m`, so that what was meant to meet does.
+/// Moves segment ends by little more than `tolerance_m`, so that walls join as intended.
 ///
-/// - Ends closer than the tolerance become one vertex, where their segments' lines meet if that is as near.
-/// - Vertices closer than the tolerance to the inside of a segment come to lie on it, along their own line.
-/// - If `is_squared`, corners of two segments become right-angled where a tenth of a millimetre does it.
+/// - Ends closer than the tolerance become one vertex, at the intersection of their segments' lines
+///   if that is within the tolerance.
+/// - Vertices closer than the tolerance to the inside of a segment are moved onto it, along their
+///   own line.
+/// - If `is_squared`, corners of two segments are made right-angled where a tenth of a millimetre
+///   suffices.
 ///
-/// A segment shorter than the tolerance stays, with both its ends. What comes out does not depend on the
-/// segments' directions, and on their order only if two are the same. With a tolerance of 0 nothing is moved.
-pub fn snap(segments: &mut [(DVec2, DVec2)], tolerance_m: f64, is_squared: bool) -> Vec<Move> {
+/// A segment shorter than the tolerance keeps both its ends. The result does not depend on the
+/// segments' directions, and on their order only for duplicates. With a tolerance of 0 nothing is
+/// moved.
+pub fn snap(segments: &mut [(DVec2, DVec2)], tolerance_m: f64, is_squared: bool) -> Vec<SnapMove> {
     if tolerance_m <= 0.0 {
         return Vec::new();
     }
     let drawn = segments.to_vec();
-    let mut vertices = Vertices::of(&drawn, tolerance_m);
+    let mut vertices = Vertices::from_segments(&drawn, tolerance_m);
     let joints = joints::find(&vertices, tolerance_m);
     if is_squared {
         square_up(&mut vertices, &joints, tolerance_m);
     }
     joints::close(&mut vertices, &joints, tolerance_m);
     let mut moves = Vec::new();
-    for (index, (segment, was)) in segments.iter_mut().zip(&drawn).enumerate() {
+    for (index, (segment, original)) in segments.iter_mut().zip(&drawn).enumerate() {
         *segment = vertices.segment(index);
         if segment.0 == segment.1 {
-            *segment = *was;
+            *segment = *original;
             continue;
         }
-        for (at_b, from, to) in [(false, was.0, segment.0), (true, was.1, segment.1)] {
+        for (at_b, from, to) in [(false, original.0, segment.0), (true, original.1, segment.1)] {
             if from.distance(to) > ROUNDING_M {
                 let end = (index as u32, at_b);
                 let cause = cause(&vertices, &joints, end);
-                moves.push(Move { end, from, to, cause });
+                moves.push(SnapMove { end, from, to, cause });
             }
         }
     }
     moves
 }
 
-fn cause(vertices: &Vertices, joints: &Joints, end: End) -> Cause {
+fn cause(vertices: &Vertices, joints: &Joints, end: SegmentEnd) -> SnapCause {
     let vertex = vertices.vertex_of(end);
-    if let Some(&through) = joints.of(vertex).first() {
+    if let Some(&through) = joints.segments_at(vertex).first() {
         let (a, b) = vertices.drawn(through as usize);
         let side = |point: DVec2| (b - a).perp_dot(point - a);
         let here = vertices.drawn_end(end);
         let far = vertices.drawn_end((end.0, !end.1));
         let is_past = side(here) * side(far) < 0.0;
-        return if is_past { Cause::Past(through) } else { Cause::Short(through) };
+        return if is_past { SnapCause::Past(through) } else { SnapCause::Short(through) };
     }
     let here = vertices.drawn_end(end);
     let other =
         vertices.ends(vertex).map(|other| (vertices.drawn_end(other).distance(here), other));
     let farthest = other.filter(|(apart_m, _)| *apart_m > 0.0).max_by(|a, b| a.0.total_cmp(&b.0));
-    farthest.map_or(Cause::Turned, |(_, other)| Cause::Apart(other))
+    farthest.map_or(SnapCause::Turned, |(_, other)| SnapCause::Apart(other))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    /// A corner 0.04 mm off a right angle, one side of which is drawn as two of 10 m, three tenths of a nanometre off
-    /// a line: rounding. The corner is made right with the whole side, and the point within it goes along.
+    /// Corner 0.04 mm off a right angle, one side of which consists of two segments of 10 m that
+    /// are collinear to 0.3 nm (rounding). The corner is squared with the whole side, and the inner
+    /// vertex moves with it.
     #[test]
-    fn a_side_goes_on_through_a_point_within_it() {
+    fn side_spans_collinear_segments() {
         let middle = DVec2::new(0.0, 3e-10);
         let (end, corner, up) =
             (DVec2::new(-10.0, 0.0), DVec2::new(10.0, 0.0), DVec2::new(10.00004, 5.0));
@@ -120,9 +125,10 @@ mod tests {
         assert!(off_m.abs() < 1e-9, "{off_m}");
     }
 
-    /// A bend of a micrometre is a bend, however short what follows it: the corner is one of three, not of two.
+    /// A bend of a micrometre ends a side, however short the next segment: the corner has three
+    /// segments, not two.
     #[test]
-    fn a_bend_ends_a_side() {
+    fn bend_ends_a_side() {
         let bend = DVec2::new(0.01, 1e-6);
         let (end, corner, up) = (DVec2::ZERO, DVec2::new(0.02, 0.0), DVec2::new(0.02 + 4e-5, 5.0));
         let mut segments = [(end, bend), (bend, corner), (corner, up)];

@@ -1,13 +1,13 @@
-//! Scenes from code.
+//! Construction of scenes in code.
 
 use serde_json::{Map, Value, json};
 
 use super::{Scene, SceneError};
 
-/// Puts a scene together without a file.
+/// Builder of a scene without a file.
 ///
-/// What it holds is a scene file all along: [`build`](Self::build) checks it by the same rules, and
-/// [`text`](Self::text) is what would have to be written for others to read the scene.
+/// The builder holds a scene file: [`build`](Self::build) validates it by the same rules, and
+/// [`text`](Self::text) returns its text for other programs.
 ///
 /// ```
 /// use sonard_model::scene::Scene;
@@ -29,12 +29,12 @@ use super::{Scene, SceneError};
 #[derive(Debug, Clone)]
 pub struct SceneBuilder {
     file: Map<String, Value>,
-    /// The list that the last wall or cylinder went into.
+    /// List that the last wall or cylinder was added to.
     last: Option<&'static str>,
 }
 
 impl Scene {
-    /// An empty scene of that name, to be filled.
+    /// Starts an empty scene of that name.
     #[must_use]
     pub fn builder(name: &str) -> SceneBuilder {
         let file =
@@ -45,21 +45,21 @@ impl Scene {
 }
 
 impl SceneBuilder {
-    /// A smooth surface whose mirror reflection has so much of the incident amplitude, 0 to 1.
+    /// Adds a smooth surface with an amplitude reflection coefficient of 0 to 1.
     #[must_use]
     pub fn material(self, name: &str, reflectance: f64) -> Self {
         self.rough_material(name, reflectance, 0.0)
     }
 
-    /// A surface that scatters a share of what it does not absorb, 0 to 1.
+    /// Adds a surface that scatters a share of the unabsorbed sound, 0 to 1.
     #[must_use]
     pub fn rough_material(mut self, name: &str, reflectance: f64, roughness: f64) -> Self {
         self.file["materials"][name] = json!({"reflectance": reflectance, "roughness": roughness});
         self
     }
 
-    /// A row of walls from corner to corner, metres; a single one keeps `id` for its name, of several each
-    /// is `id.0`, `id.1`, ...
+    /// Adds a row of walls along corners, in metres. A single wall keeps `id` as its name; several
+    /// are `id.0`, `id.1`, ...
     #[must_use]
     pub fn walls(self, id: &str, corners: &[[f64; 2]], material: &str) -> Self {
         let wall = match corners {
@@ -69,14 +69,14 @@ impl SceneBuilder {
         self.with("walls", wall)
     }
 
-    /// The same with a last wall back to the first corner.
+    /// Adds a closed row of walls, with a last wall back to the first corner.
     #[must_use]
     pub fn room(self, id: &str, corners: &[[f64; 2]], material: &str) -> Self {
         let wall = json!({"id": id, "polyline": corners, "closed": true, "material": material});
         self.with("walls", wall)
     }
 
-    /// An upright circular reflector, metres.
+    /// Adds an upright circular reflector; dimensions in metres.
     #[must_use]
     pub fn cylinder(self, id: &str, center: [f64; 2], radius_m: f64, material: &str) -> Self {
         let cylinder =
@@ -84,7 +84,7 @@ impl SceneBuilder {
         self.with("cylinders", cylinder)
     }
 
-    /// Lets the walls or the cylinder given last stand from one height to another, metres, and not from
+    /// Sets the lower and upper height, metres, of the walls or the cylinder added last, instead of
     /// floor to ceiling.
     #[must_use]
     pub fn standing_from(mut self, bottom_z_m: f64, top_z_m: f64) -> Self {
@@ -96,7 +96,7 @@ impl SceneBuilder {
         self
     }
 
-    /// A floor and a ceiling, metres; without them the scene is a plane.
+    /// Sets the heights of floor and ceiling, metres; without them the scene is planar.
     #[must_use]
     pub fn heights(mut self, floor_z_m: f64, ceiling_z_m: f64) -> Self {
         self.file.insert("floor_z_m".into(), json!(floor_z_m));
@@ -104,7 +104,7 @@ impl SceneBuilder {
         self
     }
 
-    /// What floor and ceiling are made of; without it both are rigid.
+    /// Sets the materials of floor and ceiling; rigid by default.
     #[must_use]
     pub fn floor_and_ceiling(mut self, floor_material: &str, ceiling_material: &str) -> Self {
         self.file.insert("floor_material".into(), json!(floor_material));
@@ -112,24 +112,25 @@ impl SceneBuilder {
         self
     }
 
-    /// A named pose of the ranger: metres, and the heading in degrees counter-clockwise from +x.
+    /// Adds a named pose of the ranger: metres, and the heading in degrees counter-clockwise from
+    /// +x.
     #[must_use]
     pub fn pose(mut self, name: &str, x_m: f64, y_m: f64, heading_deg: f64) -> Self {
         self.file["poses"][name] = json!({"x_m": x_m, "y_m": y_m, "heading_deg": heading_deg});
         self
     }
 
-    /// The scene file.
+    /// Text of the scene file.
     #[must_use]
     pub fn text(&self) -> String {
         format!("{:#}\n", Value::Object(self.file.clone()))
     }
 
-    /// The scene.
+    /// Builds and validates the scene.
     ///
     /// # Errors
-    /// As [`Scene::from_json`] of [`text`](Self::text): the error names the wall, cylinder or pose, and what
-    /// would be right.
+    /// As [`Scene::from_json`] of [`text`](Self::text): the error names the wall, cylinder or pose,
+    /// and the valid values.
     pub fn build(&self) -> Result<Scene, SceneError> {
         Scene::from_json(&self.text())
     }
@@ -147,7 +148,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_built_scene_is_the_one_that_its_text_makes() {
+    fn text_reproduces_the_scene() {
         let builder = Scene::builder("room")
             .rough_material("felt", 0.3, 0.5)
             .walls("screen", &[[0.0, 0.0], [1.0, 0.1]], "felt")
@@ -159,7 +160,7 @@ mod tests {
     }
 
     #[test]
-    fn faults_are_named_where_they_are() {
+    fn errors_name_the_path() {
         let bare = Scene::builder("room").material("wood", 0.9);
         for (scene, path) in [
             (bare.clone().walls("w", &[[0.0, 0.0], [1.0, 0.0]], "glass"), "walls[0].material"),

@@ -1,4 +1,4 @@
-//! The rules of a scene: names that exist and differ, numbers that make sense, poses that fit.
+//! Rules of a scene: unique and existing names, values in range, accessible poses.
 
 use std::{
     collections::{BTreeMap, HashMap},
@@ -11,27 +11,27 @@ use super::{
     Cylinder, DEFAULT_SNAP_M, Material, Robot, RobotShape, Scene, SceneProblem, Wall,
     error::MAX_COORDINATE_M,
     file::{CircleFile, CylinderFile, Point, RobotFile, SceneFile, WallFile},
-    locate::{JsonPath, Part},
-    outline::{Outlines, contains},
+    locate::{JsonPath, MemberPart},
+    outline::{SceneOutlines, contains},
     pose::{CLEARANCE_M, MAX_HEADING_DEG},
 };
 use crate::geometry::{DVec2, Pose, distance_to_segment};
 
-/// Shortest wall, metres: far below the wavelength, far above rounding.
+/// Minimum length of a wall, metres: far below the wavelength, far above rounding.
 const MIN_WALL_M: f64 = 1e-4;
 
-/// Most that `snap_m` can be, metres: below the wavelength of any ranger.
+/// Maximum of `snap_m`, metres: below the wavelength of any ranger.
 const MAX_SNAP_M: f64 = 5e-3;
 
-/// A rule that is broken, and the member of the file that breaks it.
-pub(super) struct Fault {
+/// Violated rule, and the member of the file that violates it.
+pub(super) struct RuleViolation {
     pub(super) path: JsonPath,
-    pub(super) part: Part,
+    pub(super) part: MemberPart,
     pub(super) problem: SceneProblem,
 }
 
-/// Turns a well-formed file into a scene; `text` is what it was read from.
-pub(super) fn checked(file: SceneFile, text: &str) -> Result<Scene, Fault> {
+/// Validates a well-formed file and converts it to a scene; `text` is its source.
+pub(super) fn checked(file: SceneFile, text: &str) -> Result<Scene, RuleViolation> {
     let root = JsonPath::root();
     is_name(&file.name, &root.key("name"))?;
     let mut rules = Rules::new(file.materials)?;
@@ -73,20 +73,21 @@ pub(super) fn checked(file: SceneFile, text: &str) -> Result<Scene, Fault> {
     Ok(scene)
 }
 
-/// What has an id: the list that it is in, and its place there.
+/// Owner of an id: its list, and its index in the list.
 type Owner = (&'static str, Option<usize>);
 
-/// What the parts of a scene share: the materials there are, and the ids taken so far.
+/// Shared state of the checks: defined materials, and ids in use.
 struct Rules {
     materials: BTreeMap<String, Material>,
     ids: HashMap<Arc<str>, Owner>,
 }
 
 impl Rules {
-    fn new(materials: BTreeMap<String, Material>) -> Result<Self, Fault> {
+    fn new(materials: BTreeMap<String, Material>) -> Result<Self, RuleViolation> {
         for (name, material) in &materials {
             let path = JsonPath::root().key("materials").key(name);
-            is_name(name, &path).map_err(|fault| Fault { part: Part::Key, ..fault })?;
+            is_name(name, &path)
+                .map_err(|fault| RuleViolation { part: MemberPart::Key, ..fault })?;
             share("reflectance", material.reflectance, &path)?;
             share("roughness", material.roughness, &path)?;
         }
@@ -98,7 +99,7 @@ impl Rules {
         file: &WallFile,
         number: usize,
         path: &JsonPath,
-    ) -> Result<Vec<Wall>, Fault> {
+    ) -> Result<Vec<Wall>, RuleViolation> {
         let material = self.material(&file.material, path)?;
         let z_m = heights(file.z_m, path)?;
         let corners = corners(file, path)?;
@@ -120,7 +121,7 @@ impl Rules {
         file: CylinderFile,
         number: usize,
         path: &JsonPath,
-    ) -> Result<Cylinder, Fault> {
+    ) -> Result<Cylinder, RuleViolation> {
         Ok(Cylinder {
             center: point(file.center, &path.key("center"))?,
             radius_m: radius(file.radius_m, &path.key("radius_m"))?,
@@ -130,7 +131,7 @@ impl Rules {
         })
     }
 
-    fn robot(&mut self, file: RobotFile, path: &JsonPath) -> Result<Robot, Fault> {
+    fn robot(&mut self, file: RobotFile, path: &JsonPath) -> Result<Robot, RuleViolation> {
         let shape = match (file.circle, file.outline) {
             (Some(circle), None) => round_body(&circle, &path.key("circle"))?,
             (None, Some(outline)) => flat_body(&outline, &path.key("outline"))?,
@@ -144,12 +145,12 @@ impl Rules {
         })
     }
 
-    /// The material of floor or ceiling, which have to have a height.
+    /// Material of floor or ceiling, whose height has to be defined.
     fn level(
         &self,
         (field, name, height, z_m): (&str, &Option<String>, &'static str, Option<f64>),
         root: &JsonPath,
-    ) -> Result<Material, Fault> {
+    ) -> Result<Material, RuleViolation> {
         let Some(name) = name else { return Ok(Material::RIGID) };
         if z_m.is_none() {
             return fault(&root.key(field), SceneProblem::NoSuchLevel(height));
@@ -157,14 +158,14 @@ impl Rules {
         self.material_at(name, root.key(field))
     }
 
-    fn material(&self, name: &str, path: &JsonPath) -> Result<Material, Fault> {
+    fn material(&self, name: &str, path: &JsonPath) -> Result<Material, RuleViolation> {
         self.material_at(name, path.key("material"))
     }
 
-    fn material_at(&self, name: &str, path: JsonPath) -> Result<Material, Fault> {
-        self.materials.get(name).copied().ok_or_else(|| Fault {
+    fn material_at(&self, name: &str, path: JsonPath) -> Result<Material, RuleViolation> {
+        self.materials.get(name).copied().ok_or_else(|| RuleViolation {
             path,
-            part: Part::Value,
+            part: MemberPart::Value,
             problem: SceneProblem::UnknownMaterial {
                 name: name.to_owned(),
                 known: self.materials.keys().cloned().collect(),
@@ -172,7 +173,12 @@ impl Rules {
         })
     }
 
-    fn take_id(&mut self, id: String, owner: Owner, path: &JsonPath) -> Result<Arc<str>, Fault> {
+    fn take_id(
+        &mut self,
+        id: String,
+        owner: Owner,
+        path: &JsonPath,
+    ) -> Result<Arc<str>, RuleViolation> {
         is_name(&id, &path.key("id"))?;
         if let Some(&(list, number)) = self.ids.get(id.as_str()) {
             let first = JsonPath::root().key(list);
@@ -185,8 +191,8 @@ impl Rules {
     }
 }
 
-/// The segments of a wall, each from and to where.
-fn corners(file: &WallFile, path: &JsonPath) -> Result<Vec<(DVec2, DVec2)>, Fault> {
+/// Segments of a wall by their end points.
+fn corners(file: &WallFile, path: &JsonPath) -> Result<Vec<(DVec2, DVec2)>, RuleViolation> {
     match (file.from, file.to, &file.polyline) {
         (Some(from), Some(to), None) if !file.closed => {
             let from = point(from, &path.key("from"))?;
@@ -200,16 +206,19 @@ fn corners(file: &WallFile, path: &JsonPath) -> Result<Vec<(DVec2, DVec2)>, Faul
         (None, None, None) => {
             fault(path, SceneProblem::WallShape("this wall has neither ends nor a polyline"))
         }
-        (_, _, Some(_)) => fault(
-            path,
-            SceneProblem::WallShape("this wall has a polyline and beside it `from` or `to`"),
-        ),
+        (_, _, Some(_)) => {
+            fault(path, SceneProblem::WallShape("this wall has both a polyline and `from` or `to`"))
+        }
         (None, Some(_), None) => fault(path, SceneProblem::MissingField("from".to_owned())),
         (Some(_), None, None) => fault(path, SceneProblem::MissingField("to".to_owned())),
     }
 }
 
-fn sides(points: &[Point], closed: bool, path: &JsonPath) -> Result<Vec<(DVec2, DVec2)>, Fault> {
+fn sides(
+    points: &[Point],
+    closed: bool,
+    path: &JsonPath,
+) -> Result<Vec<(DVec2, DVec2)>, RuleViolation> {
     let needed = if closed { 3 } else { 2 };
     if points.len() < needed {
         return fault(path, SceneProblem::TooFewPoints { points: points.len(), needed });
@@ -229,14 +238,14 @@ fn sides(points: &[Point], closed: bool, path: &JsonPath) -> Result<Vec<(DVec2, 
         .collect()
 }
 
-fn side(from: DVec2, to: DVec2, path: &JsonPath) -> Result<(DVec2, DVec2), Fault> {
+fn side(from: DVec2, to: DVec2, path: &JsonPath) -> Result<(DVec2, DVec2), RuleViolation> {
     if from.distance(to) >= MIN_WALL_M {
         return Ok((from, to));
     }
     fault(path, SceneProblem::NoLength { from: from.to_array(), to: to.to_array() })
 }
 
-fn round_body(circle: &CircleFile, path: &JsonPath) -> Result<RobotShape, Fault> {
+fn round_body(circle: &CircleFile, path: &JsonPath) -> Result<RobotShape, RuleViolation> {
     let center = point(circle.center, &path.key("center"))?;
     let radius_m = radius(circle.radius_m, &path.key("radius_m"))?;
     if center.length() - radius_m < CLEARANCE_M {
@@ -245,7 +254,7 @@ fn round_body(circle: &CircleFile, path: &JsonPath) -> Result<RobotShape, Fault>
     Ok(RobotShape::Circle { center, radius_m })
 }
 
-fn flat_body(outline: &[Point], path: &JsonPath) -> Result<RobotShape, Fault> {
+fn flat_body(outline: &[Point], path: &JsonPath) -> Result<RobotShape, RuleViolation> {
     let sides = sides(outline, true, path)?;
     let touches = sides.iter().any(|&(a, b)| distance_to_segment(DVec2::ZERO, a, b) < CLEARANCE_M);
     if touches || contains(&sides, DVec2::ZERO) {
@@ -254,14 +263,15 @@ fn flat_body(outline: &[Point], path: &JsonPath) -> Result<RobotShape, Fault> {
     Ok(RobotShape::Outline(sides.into_iter().map(|(a, _)| a).collect()))
 }
 
-fn check_poses(scene: &Scene, path: &JsonPath) -> Result<(), Fault> {
+fn check_poses(scene: &Scene, path: &JsonPath) -> Result<(), RuleViolation> {
     if scene.poses.is_empty() {
         return Ok(());
     }
-    let outlines = Outlines::of(scene);
+    let outlines = SceneOutlines::from_scene(scene);
     for (name, pose) in &scene.poses {
         let path = path.key(name);
-        let bad_name = |problem| Fault { path: path.clone(), part: Part::Key, problem };
+        let bad_name =
+            |problem| RuleViolation { path: path.clone(), part: MemberPart::Key, problem };
         is_name(name, &path).map_err(|fault| bad_name(fault.problem))?;
         if name.contains(',') {
             return Err(bad_name(SceneProblem::CommaInName(name.clone())));
@@ -281,7 +291,7 @@ fn floor_below_ceiling(
     floor_z_m: Option<f64>,
     ceiling_z_m: Option<f64>,
     root: &JsonPath,
-) -> Result<(), Fault> {
+) -> Result<(), RuleViolation> {
     let ceiling_path = root.key("ceiling_z_m");
     floor_z_m.map(|height_m| length(height_m, &root.key("floor_z_m"))).transpose()?;
     ceiling_z_m.map(|height_m| length(height_m, &ceiling_path)).transpose()?;
@@ -293,7 +303,7 @@ fn floor_below_ceiling(
     }
 }
 
-fn heights(z_m: Option<[f64; 2]>, path: &JsonPath) -> Result<Option<[f64; 2]>, Fault> {
+fn heights(z_m: Option<[f64; 2]>, path: &JsonPath) -> Result<Option<[f64; 2]>, RuleViolation> {
     let path = path.key("z_m");
     if let Some([lower, upper]) = z_m {
         length(lower, &path.index(0))?;
@@ -307,35 +317,35 @@ fn rising(
     (lower_name, lower): (&'static str, f64),
     (upper_name, upper): (&'static str, f64),
     path: &JsonPath,
-) -> Result<(), Fault> {
+) -> Result<(), RuleViolation> {
     if lower < upper {
         return Ok(());
     }
     fault(path, SceneProblem::HeightsReversed { lower_name, lower, upper_name, upper })
 }
 
-fn point([x, y]: Point, path: &JsonPath) -> Result<DVec2, Fault> {
+fn point([x, y]: Point, path: &JsonPath) -> Result<DVec2, RuleViolation> {
     length(x, &path.index(0))?;
     length(y, &path.index(1))?;
     Ok(DVec2::new(x, y))
 }
 
-fn length(value: f64, path: &JsonPath) -> Result<(), Fault> {
-    // Written so that NaN fails too.
+fn length(value: f64, path: &JsonPath) -> Result<(), RuleViolation> {
+    // Written so that NaN fails as well.
     if value.abs() <= MAX_COORDINATE_M {
         return Ok(());
     }
     fault(path, SceneProblem::OutOfBounds { value })
 }
 
-fn radius(radius_m: f64, path: &JsonPath) -> Result<f64, Fault> {
+fn radius(radius_m: f64, path: &JsonPath) -> Result<f64, RuleViolation> {
     if radius_m > 0.0 && radius_m <= MAX_COORDINATE_M {
         return Ok(radius_m);
     }
     fault(path, SceneProblem::Radius(radius_m))
 }
 
-fn snap(snap_m: Option<f64>, path: &JsonPath) -> Result<f64, Fault> {
+fn snap(snap_m: Option<f64>, path: &JsonPath) -> Result<f64, RuleViolation> {
     let snap_m = snap_m.unwrap_or(DEFAULT_SNAP_M);
     if (0.0..=MAX_SNAP_M).contains(&snap_m) {
         return Ok(snap_m);
@@ -343,14 +353,14 @@ fn snap(snap_m: Option<f64>, path: &JsonPath) -> Result<f64, Fault> {
     fault(path, SceneProblem::Snap(snap_m))
 }
 
-fn share(field: &'static str, value: f64, path: &JsonPath) -> Result<(), Fault> {
+fn share(field: &'static str, value: f64, path: &JsonPath) -> Result<(), RuleViolation> {
     if (0.0..=1.0).contains(&value) {
         return Ok(());
     }
     fault(&path.key(field), SceneProblem::Share { field, value })
 }
 
-fn is_name(name: &str, path: &JsonPath) -> Result<(), Fault> {
+fn is_name(name: &str, path: &JsonPath) -> Result<(), RuleViolation> {
     if name.trim().is_empty() {
         return fault(path, SceneProblem::EmptyName);
     }
@@ -360,6 +370,6 @@ fn is_name(name: &str, path: &JsonPath) -> Result<(), Fault> {
     }
 }
 
-fn fault<T>(path: &JsonPath, problem: SceneProblem) -> Result<T, Fault> {
-    Err(Fault { path: path.clone(), part: Part::Value, problem })
+fn fault<T>(path: &JsonPath, problem: SceneProblem) -> Result<T, RuleViolation> {
+    Err(RuleViolation { path: path.clone(), part: MemberPart::Value, problem })
 }

@@ -1,4 +1,4 @@
-//! What can be wrong with a scene file, and where.
+//! Errors in a scene file, with their positions.
 
 use std::{error::Error, fmt, ops::Range};
 
@@ -6,18 +6,18 @@ use thiserror::Error;
 
 use super::pose::PoseError;
 
-/// An error in a scene file: where, what, and the remedy.
+/// Error in a scene file: position, description and hint.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SceneError {
     /// Line, counted from 1.
     pub line: usize,
     /// Column in characters, counted from 1.
     pub column: usize,
-    /// Bytes of the text that are meant.
+    /// Byte range of the offending text.
     pub span: Range<usize>,
-    /// The way to the value in the document, as `walls[2].to`; empty for the document itself.
+    /// Path of the value in the document, such as `walls[2].to`; empty for the document itself.
     pub path: String,
-    /// What is wrong.
+    /// Kind of the error.
     pub problem: Box<SceneProblem>,
 }
 
@@ -32,13 +32,13 @@ impl SceneError {
         Self { line, column, span, path: path.to_string(), problem: Box::new(problem) }
     }
 
-    /// What is wrong, with the offending text.
+    /// Description of the error, with the offending text.
     #[must_use]
     pub fn message(&self) -> String {
         shown(&self.problem.to_string())
     }
 
-    /// What would be right.
+    /// Hint for correcting the error.
     #[must_use]
     pub fn help(&self) -> String {
         shown(&self.problem.help())
@@ -57,21 +57,22 @@ impl fmt::Display for SceneError {
 
 impl Error for SceneError {}
 
-/// Longest part of a message, characters.
-const LONGEST: usize = 1000;
+/// Maximum length of a message, characters.
+const MAX_SHOWN: usize = 1000;
 
-/// What of a text can go to a terminal: its control characters written out, and the middle of a long one left out.
+/// Sanitizes a text for a terminal: escapes control characters and truncates the middle of a long
+/// text.
 #[must_use]
 pub fn shown(text: &str) -> String {
     let written = |found: char| {
         let escaped = found.is_control().then(|| found.escape_debug());
         escaped.into_iter().flatten().chain((!found.is_control()).then_some(found))
     };
-    if text.len() <= LONGEST {
+    if text.len() <= MAX_SHOWN {
         return text.chars().flat_map(written).collect();
     }
-    let start = text.chars().take(LONGEST / 2).flat_map(written);
-    let end: String = text.chars().rev().take(LONGEST / 4).collect();
+    let start = text.chars().take(MAX_SHOWN / 2).flat_map(written);
+    let end: String = text.chars().rev().take(MAX_SHOWN / 4).collect();
     start.chain(" [...] ".chars()).chain(end.chars().rev().flat_map(written)).collect()
 }
 
@@ -82,137 +83,137 @@ pub(super) fn line_and_column(text: &str, offset: usize) -> (usize, usize) {
     (before.matches('\n').count() + 1, before[line_start..].chars().count() + 1)
 }
 
-/// The last character boundary at or before `offset`.
+/// Last character boundary at or before `offset`.
 pub(super) fn floor_char_boundary(text: &str, offset: usize) -> usize {
     let offset = offset.min(text.len());
     (0..=offset).rev().find(|at| text.is_char_boundary(*at)).unwrap_or(0)
 }
 
-/// The kind of an error in a scene file.
+/// Kind of an error in a scene file.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum SceneProblem {
-    /// Not JSON.
+    /// Text that is not valid JSON.
     #[error("this is not JSON: {0}")]
     Syntax(String),
-    /// A bracket or brace that is never closed.
+    /// Bracket or brace that is never closed.
     #[error("this `{0}` is never closed")]
     Unclosed(char),
-    /// The same name twice in one object.
+    /// Duplicate member of an object.
     #[error("`{0}` is given twice")]
     DuplicateKey(String),
-    /// A field that scene files don't have.
+    /// Unknown field of an object.
     #[error("unknown field `{field}`")]
     UnknownField {
-        /// The field.
+        /// Name of the unknown field.
         field: String,
-        /// Fields that may stand there.
+        /// Fields allowed at that position.
         known: Vec<String>,
     },
-    /// A field that must be there.
+    /// Object without a required field.
     #[error("the field `{0}` is missing")]
     MissingField(String),
-    /// A value of the wrong type.
+    /// Value of the wrong type.
     #[error("{0}")]
     Type(String),
-    /// A name without a character.
+    /// Empty or blank name.
     #[error("this name is empty")]
     EmptyName,
-    /// A name that a terminal would obey, and no one could read.
+    /// Name with a control character, which a terminal would interpret.
     #[error("this name has the character {} in it", .0.escape_debug())]
     ControlCharacter(char),
-    /// A pose name that reads like coordinates.
+    /// Pose name that looks like coordinates.
     #[error("the pose name `{0}` contains a comma")]
     CommaInName(String),
-    /// A material that is not in `materials`.
+    /// Material that is not in `materials`.
     #[error("there is no material `{name}` in this scene")]
     UnknownMaterial {
-        /// The name.
+        /// Name of the unknown material.
         name: String,
-        /// The materials of the scene.
+        /// Materials of the scene.
         known: Vec<String>,
     },
-    /// Two reflectors of the same name.
+    /// Two reflectors with the same id.
     #[error("the id `{id}` is already the name of {first}")]
     DuplicateId {
-        /// The id.
+        /// Id that both reflectors have.
         id: String,
-        /// Path of the first one.
+        /// Path of the first reflector.
         first: String,
     },
-    /// A wall with neither both ends nor a polyline, or with both.
+    /// Wall with neither both ends nor a polyline, or with both.
     #[error("{0}")]
     WallShape(&'static str),
-    /// A body with neither circle nor outline, or with both.
+    /// Body with neither circle nor outline, or with both.
     #[error("a robot has either a `circle` or an `outline`")]
     RobotShape,
-    /// The ranger is inside the robot's body.
+    /// Ranger inside the robot's body.
     #[error("the ranger, at [0, 0], is inside the body or on its surface: no sound could leave")]
     RangerInBody,
-    /// Two points where one is enough.
+    /// Wall whose ends coincide.
     #[error("this wall has no length: it goes from {from:?} to {to:?}")]
     NoLength {
-        /// One end, metres.
+        /// Position of the first end, metres.
         from: [f64; 2],
-        /// The other end, metres.
+        /// Position of the second end, metres.
         to: [f64; 2],
     },
-    /// Too few points.
+    /// Polyline with too few points.
     #[error("{points} points are too few")]
     TooFewPoints {
-        /// How many there are.
+        /// Actual number of points.
         points: usize,
-        /// How many are needed.
+        /// Minimum number of points.
         needed: usize,
     },
-    /// Too far out, or not a number.
+    /// Coordinate out of bounds, or not a number.
     #[error("{value} m is out of bounds")]
     OutOfBounds {
-        /// The value, metres.
+        /// Value outside the range, metres.
         value: f64,
     },
-    /// A heading that is no angle.
+    /// Heading out of bounds.
     #[error("a heading of {0} degrees is out of bounds")]
     Heading(f64),
-    /// A radius of zero or less, or too large.
+    /// Radius of zero or less, or too large.
     #[error("a radius of {0} m is not possible")]
     Radius(f64),
-    /// A tolerance of the plan that is none.
+    /// Snap tolerance out of bounds.
     #[error("snap_m is {0}")]
     Snap(f64),
-    /// A share outside 0..1.
+    /// Fraction outside 0 to 1.
     #[error("{field} is {value}")]
     Share {
-        /// Which one.
+        /// Name of the field.
         field: &'static str,
-        /// The value.
+        /// Value outside the range.
         value: f64,
     },
-    /// The upper height is not above the lower.
+    /// Upper height not above the lower height.
     #[error("{upper_name} ({upper} m) is not above {lower_name} ({lower} m)")]
     HeightsReversed {
-        /// What the lower one is called.
+        /// Name of the lower height.
         lower_name: &'static str,
-        /// Metres.
+        /// Value of the lower height, metres.
         lower: f64,
-        /// What the upper one is called.
+        /// Name of the upper height.
         upper_name: &'static str,
-        /// Metres.
+        /// Value of the upper height, metres.
         upper: f64,
     },
-    /// A material of a floor or ceiling that is not there; holds the field of its height.
-    #[error("there is none: the scene has no {0}")]
+    /// Material of an absent floor or ceiling; holds the field of the missing height.
+    #[error("the scene has no {0}")]
     NoSuchLevel(&'static str),
-    /// A named pose where no ranger can stand.
+    /// Named pose that is inaccessible.
     #[error(transparent)]
     Pose(#[from] PoseError),
 }
 
-/// Nothing in a scene lies farther than this from the origin, metres. A ranger sees 10.7 m.
+/// Maximum magnitude of a coordinate, metres. The range of a ranger is 10.7 m.
 pub(super) const MAX_COORDINATE_M: f64 = 1000.0;
 
 impl SceneProblem {
-    /// What would be right.
+    /// Hint for correcting the error.
     #[must_use]
     pub fn help(&self) -> String {
         match self {
@@ -236,20 +237,20 @@ impl SceneProblem {
         }
     }
 
-    /// Help that is the same whatever was found.
+    /// Hint that does not depend on the offending value.
     const fn fixed_help(&self) -> &'static str {
         match self {
-            Self::DuplicateKey(_) => "keep one of the two; only one could count",
+            Self::DuplicateKey(_) => "keep one of the two",
             Self::Type(_) => {
-                "`sonard scene schema` prints what each field holds; numbers stand without quotes"
+                "`sonard scene schema` prints the type of each field; numbers are written without quotes"
             }
             Self::EmptyName => "give it a name of one character or more",
-            Self::ControlCharacter(_) => "leave out tabs, line ends and other control characters",
+            Self::ControlCharacter(_) => "remove tabs, line ends and other control characters",
             Self::CommaInName(_) => {
-                "leave the comma out: on the command line X,Y,DEG is a pose by its numbers"
+                "remove the comma: on the command line X,Y,DEG denotes coordinates"
             }
             Self::DuplicateId { .. } => {
-                "give each wall, cylinder and body a name of its own: records refer to them by it \
+                "give each wall, cylinder and body a unique name, by which records refer to it \
                  (segments of a polyline are `id.0`, `id.1`, ...)"
             }
             Self::WallShape(_) => {
@@ -257,8 +258,8 @@ impl SceneProblem {
                  [[x, y], [x, y], ...] (with \"closed\": true if it returns to its beginning)"
             }
             Self::RobotShape => {
-                "write \"circle\": {\"center\": [ahead, left], \"radius_m\": r} or \"outline\": \
-                 [[ahead, left], ...]"
+                "write \"circle\": {\"center\": [forward, left], \"radius_m\": r} or \"outline\": \
+                 [[forward, left], ...]"
             }
             Self::RangerInBody => {
                 "the origin of the robot's frame is the ranger's rotation axis: move the body, as \
@@ -269,9 +270,7 @@ impl SceneProblem {
                  first point"
             }
             Self::Heading(_) => "use degrees between -360 and 360",
-            Self::Snap(_) => {
-                "use metres, from 0 (the plan is taken as drawn) to 0.005; without it 0.002"
-            }
+            Self::Snap(_) => "use metres, from 0 (plan as drawn) to 0.005; default 0.002",
             Self::Share { .. } => "use a number from 0 to 1",
             Self::HeightsReversed { .. } => "write the lower height first, in metres",
             Self::Syntax(_)
@@ -290,7 +289,7 @@ impl SceneProblem {
 
 fn unclosed_help(open: char) -> String {
     let close = if open == '[' { ']' } else { '}' };
-    format!("add the `{close}` that belongs to it, and look for a missing comma before it")
+    format!("add the matching `{close}`, and check for a missing comma before it")
 }
 
 fn syntax_help(found: &str) -> String {
@@ -303,12 +302,12 @@ fn syntax_help(found: &str) -> String {
          Infinity, no comments and no comma before a closing bracket)"
             .to_owned()
     } else {
-        "check the commas, quotes and brackets at and before this place".to_owned()
+        "check the commas, quotes and brackets at and before this position".to_owned()
     }
 }
 
-/// Which of the known names may have been meant, and all of them; `what` says what they are
-/// ("poses").
+/// Hint for an unknown name: the most similar known name, if there is one, and all known names.
+/// `what` is the plural of the kind ("poses").
 #[must_use]
 pub fn suggest(given: &str, known: &[String], what: &str) -> String {
     let near = known
@@ -318,7 +317,7 @@ pub fn suggest(given: &str, known: &[String], what: &str) -> String {
         .max_by(|a, b| a.0.total_cmp(&b.0));
     let all = known.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ");
     match near {
-        _ if known.is_empty() => format!("there are no {what} yet"),
+        _ if known.is_empty() => format!("no {what} are defined"),
         Some((_, name)) => format!("did you mean `{name}`? {what}: {all}"),
         None => format!("{what}: {all}"),
     }

@@ -1,113 +1,115 @@
-//! The plan that is made of a scene's walls as they were drawn, the same for every engine.
+//! Floor plan derived from the walls of a scene as drawn, shared by all engines.
 
 use std::cmp::Ordering;
 
 use super::{Scene, Wall};
-use crate::geometry::{Arrangement, Cause, DVec2, Piece, between, snap};
+use crate::geometry::{Arrangement, DVec2, Piece, SnapCause, between, snap};
 
-/// Two points of a plan are one if they are closer than this, unless the scene says otherwise, metres: a
-/// quarter of the wavelength at 50 kHz, and twice what a hand misses a corner by.
+/// Default snap tolerance, metres: a quarter of the wavelength at 50 kHz, and twice the typical
+/// error of a corner drawn by hand.
 pub const DEFAULT_SNAP_M: f64 = 0.002;
 
-/// Moves below this are not told, metres.
-const TOLD_M: f64 = 1e-9;
+/// Moves below this are not reported, metres.
+const MIN_REPORTED_M: f64 = 1e-9;
 
-/// A joint is straight if it is off the line through its neighbours by less than this, metres: rounding.
+/// Maximum offset of a straight joint from the line through its neighbours, metres: rounding error.
 const STRAIGHT_M: f64 = 1e-9;
 
-/// The walls of a scene as sound meets them: corners closed, overshoots cut, cut where they meet, and where
-/// several lie on each other one of them. From here on who meets whom is a matter of numbers, not of distances.
+/// Walls of a scene as the model uses them: corners closed, overshoots removed, split at
+/// intersections, and overlaps reduced to one wall. Topology is represented by indices, not by
+/// distances.
 #[derive(Debug, Clone, Default)]
 pub struct FloorPlan {
-    /// By wall of the scene, its ends, metres.
+    /// End points of each wall of the scene, metres.
     pub walls: Vec<(DVec2, DVec2)>,
     /// Pieces of the walls and the points between them; `segment` is the index of a wall.
     ///
-    /// Of walls that lie on each other the tallest has the piece; of these the one that reflects most, then
-    /// the least rough one, then the longest, then the first by its id.
+    /// Of overlapping walls the tallest has the piece; among equals the one with the highest
+    /// reflectance, then the lowest roughness, then the greatest length, then the first by id.
     pub arrangement: Arrangement,
-    /// What was changed, in the order of the walls.
+    /// Differences from the walls as drawn, in the order of the walls.
     pub changes: Vec<Change>,
 }
 
-/// A difference between a wall of the plan and the wall as drawn.
+/// Difference between a wall of the plan and the wall as drawn.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Change {
-    /// One of its ends was moved.
+    /// End that was moved.
     Moved {
-        /// Index of the wall.
+        /// Index of the wall in the scene.
         wall: u32,
-        /// Whether it is its second end.
+        /// `true` for the second end of the wall.
         at_b: bool,
-        /// Where it was drawn, metres.
+        /// Position as drawn, metres.
         from: DVec2,
-        /// Where it is, metres.
+        /// Position in the plan, metres.
         to: DVec2,
-        /// What that makes good.
-        cause: Cause,
+        /// Defect that the move corrects.
+        cause: SnapCause,
     },
-    /// It lies on another one, at least partly, and that one counts there.
+    /// Wall covered at least partly by another, which replaces it there.
     Covered {
-        /// Index of the wall.
+        /// Index of the covered wall.
         wall: u32,
-        /// Index of the other.
+        /// Index of the covering wall.
         by: u32,
-        /// Over which length, metres.
+        /// Length of the overlap, metres.
         length_m: f64,
     },
 }
 
 impl Scene {
-    /// The plan of its walls.
+    /// Floor plan of the scene's walls.
     #[must_use]
     pub fn floor_plan(&self) -> FloorPlan {
-        FloorPlan::of(self, true)
+        FloorPlan::from_scene(self, true)
     }
 
-    /// The same without the corners that are made right-angled for the sake of mirror images: no ray can tell.
+    /// Floor plan without right-angle corrections, which matter for mirror images but not for rays.
     #[must_use]
     pub fn ray_plan(&self) -> FloorPlan {
-        FloorPlan::of(self, false)
+        FloorPlan::from_scene(self, false)
     }
 }
 
 impl FloorPlan {
-    /// Whatever is decided between two is decided by place and name, so that neither the order of the file nor
-    /// the direction of walls matters.
-    fn of(scene: &Scene, is_squared: bool) -> Self {
-        let mut by_place: Vec<u32> = (0..scene.walls.len() as u32).collect();
+    /// Conflicts are resolved by position and name, so that the order of the file and the direction
+    /// of walls are irrelevant.
+    fn from_scene(scene: &Scene, is_squared: bool) -> Self {
+        let mut by_position: Vec<u32> = (0..scene.walls.len() as u32).collect();
         let wall = |index: u32| &scene.walls[index as usize];
-        by_place.sort_by(|&a, &b| places(wall(a), wall(b)));
+        by_position.sort_by(|&a, &b| compare_positions(wall(a), wall(b)));
         let is_turned: Vec<bool> =
             scene.walls.iter().map(|wall| order(wall.b, wall.a) == Ordering::Less).collect();
         let turned = |index: u32, (a, b): (DVec2, DVec2)| {
             if is_turned[index as usize] { (b, a) } else { (a, b) }
         };
         let mut segments: Vec<_> =
-            by_place.iter().map(|&at| turned(at, (wall(at).a, wall(at).b))).collect();
+            by_position.iter().map(|&at| turned(at, (wall(at).a, wall(at).b))).collect();
         let moves = snap(&mut segments, scene.snap_m, is_squared);
         let mut walls = vec![(DVec2::ZERO, DVec2::ZERO); segments.len()];
-        for (&index, &segment) in by_place.iter().zip(&segments) {
+        for (&index, &segment) in by_position.iter().zip(&segments) {
             walls[index as usize] = turned(index, segment);
         }
         let drawn_end = |(segment, at_b): (u32, bool)| {
-            let index = by_place[segment as usize];
+            let index = by_position[segment as usize];
             (index, at_b != is_turned[index as usize])
         };
-        let told = moves.into_iter().filter(|change| change.from.distance(change.to) > TOLD_M);
-        let moved = told.map(|change| {
+        let reported =
+            moves.into_iter().filter(|change| change.from.distance(change.to) > MIN_REPORTED_M);
+        let moved = reported.map(|change| {
             let (wall, at_b) = drawn_end(change.end);
             let cause = match change.cause {
-                Cause::Apart(other) => Cause::Apart(drawn_end(other)),
-                Cause::Short(segment) => Cause::Short(by_place[segment as usize]),
-                Cause::Past(segment) => Cause::Past(by_place[segment as usize]),
-                Cause::Turned => Cause::Turned,
+                SnapCause::Apart(other) => SnapCause::Apart(drawn_end(other)),
+                SnapCause::Short(segment) => SnapCause::Short(by_position[segment as usize]),
+                SnapCause::Past(segment) => SnapCause::Past(by_position[segment as usize]),
+                SnapCause::Turned => SnapCause::Turned,
             };
             Change::Moved { wall, at_b, from: change.from, to: change.to, cause }
         });
         let mut changes: Vec<Change> = moved.collect();
-        let mut by_rank = by_place;
-        by_rank.sort_by(|&a, &b| ranks(wall(a), wall(b)));
+        let mut by_rank = by_position;
+        by_rank.sort_by(|&a, &b| compare_ranks(wall(a), wall(b)));
         let ranked: Vec<_> =
             by_rank.iter().map(|&index| turned(index, walls[index as usize])).collect();
         let arrangement =
@@ -117,7 +119,7 @@ impl FloorPlan {
         Self { walls, arrangement, changes }
     }
 
-    /// The scene with its walls as they are in the plan.
+    /// Scene with its walls replaced by those of the plan.
     #[must_use]
     pub fn scene(&self, scene: &Scene) -> Scene {
         let mut planned = scene.clone();
@@ -127,7 +129,7 @@ impl FloorPlan {
         planned
     }
 
-    /// What of each wall counts, by wall: from where to where it is not covered by another, metres.
+    /// Uncovered stretches of each wall: index of the wall and end points, metres.
     #[must_use]
     pub fn stretches(&self) -> Vec<(u32, (DVec2, DVec2))> {
         let mut pieces = self.arrangement.pieces.clone();
@@ -137,7 +139,7 @@ impl FloorPlan {
             (at(piece.ends[0]) - a).dot(b - a)
         };
         pieces.sort_by(|p, q| p.segment.cmp(&q.segment).then(along(p).total_cmp(&along(q))));
-        let goes_on = |p: &Piece, q: &Piece| p.segment == q.segment && p.ends[1] == q.ends[0];
+        let continues = |p: &Piece, q: &Piece| p.segment == q.segment && p.ends[1] == q.ends[0];
         let whole = |stretch: &[Piece]| {
             let (wall, ends) =
                 (stretch[0].segment, [stretch[0].ends[0], stretch[stretch.len() - 1].ends[1]]);
@@ -147,10 +149,11 @@ impl FloorPlan {
             let last = if ends[1] == to { b } else { at(ends[1]) };
             (wall, (first, last))
         };
-        pieces.chunk_by(goes_on).map(whole).collect()
+        pieces.chunk_by(continues).map(whole).collect()
     }
 
-    /// By point, whether nothing happens there: a wall goes straight on, as itself or another of its material.
+    /// Classification of points: `true` where a wall continues straight on, as itself or another
+    /// wall of the same material.
     #[must_use]
     pub fn straight_joints(&self, scene: &Scene) -> Vec<bool> {
         let mut around: Vec<Vec<(u32, u32)>> = vec![Vec::new(); self.arrangement.points.len()];
@@ -159,20 +162,20 @@ impl FloorPlan {
             around[*b as usize].push((*a, *segment));
         }
         let at = |point: u32| self.arrangement.points[point as usize];
-        let goes_on = |(pieces, point): (&Vec<(u32, u32)>, u32)| {
-            let [(from, one), (to, other)] = pieces[..] else { return false };
-            let [one, other] = [one, other].map(|wall| &scene.walls[wall as usize]);
+        let is_straight = |(pieces, point): (&Vec<(u32, u32)>, u32)| {
+            let [(from, before), (to, after)] = pieces[..] else { return false };
+            let [first, second] = [before, after].map(|wall| &scene.walls[wall as usize]);
             let (before, after) = (at(point) - at(from), at(to) - at(point));
             let off_m = before.perp_dot(after).abs() / (at(to) - at(from)).length();
-            one.material == other.material
-                && one.z_m == other.z_m
+            first.material == second.material
+                && first.z_m == second.z_m
                 && before.dot(after) > 0.0
                 && off_m < STRAIGHT_M
         };
-        around.iter().zip(0..).map(goes_on).collect()
+        around.iter().zip(0..).map(is_straight).collect()
     }
 
-    /// The arrangement of those walls that are there.
+    /// Arrangement restricted to the walls for which `is_there` returns `true`.
     #[must_use]
     pub fn of_walls(&self, is_there: impl Fn(u32) -> bool) -> Arrangement {
         let mut kept = self.arrangement.clone();
@@ -198,7 +201,7 @@ impl FloorPlan {
 }
 
 impl Change {
-    /// What was changed, where and by how much, in words.
+    /// Description of the change, with position and size.
     #[must_use]
     pub fn describe(&self, scene: &Scene) -> String {
         let id = |wall: u32| &scene.walls[wall as usize].id;
@@ -206,27 +209,26 @@ impl Change {
             Self::Moved { wall, at_b, from, to, cause } => {
                 let moved = format!("moved by {} mm", millimetres(from.distance(to)));
                 let why = match cause {
-                    Cause::Apart((other, at_b)) => {
+                    SnapCause::Apart((other, at_b)) => {
                         let drawn = &scene.walls[other as usize];
                         let apart_m = from.distance(if at_b { drawn.b } else { drawn.a });
                         let name = format!("{}.{}", id(other), end_name(at_b));
-                        format!("it was {} mm from {name}", millimetres(apart_m))
+                        format!("{} mm from {name}", millimetres(apart_m))
                     }
-                    Cause::Short(other) => format!("it stopped short of {}", id(other)),
-                    Cause::Past(other) => format!("it ran past {}", id(other)),
-                    Cause::Turned => "a corner was nearly right-angled".to_owned(),
+                    SnapCause::Short(other) => format!("short of {}", id(other)),
+                    SnapCause::Past(other) => format!("past {}", id(other)),
+                    SnapCause::Turned => "corner nearly right-angled".to_owned(),
                 };
                 let end = format!("{}.{}", id(wall), end_name(at_b));
                 format!("{end} at ({:.4}, {:.4}): {moved}, {why}", from.x, from.y)
             }
             Self::Covered { wall, by, length_m } => {
-                let (one, other) = (id(wall), id(by));
-                format!("{one} lies on {other} for {length_m:.3} m: {other} counts there")
+                format!("{0} overlaps {1} over {length_m:.3} m: {1} is used", id(wall), id(by))
             }
         }
     }
 
-    /// The wall that it is about.
+    /// Index of the changed wall.
     #[must_use]
     pub const fn wall(&self) -> u32 {
         match self {
@@ -246,13 +248,13 @@ const fn end_name(at_b: bool) -> &'static str {
     if at_b { "b" } else { "a" }
 }
 
-/// Metres as millimetres: to the micrometre, and what is less to the picometre.
+/// Length in millimetres: three decimals, or nine below one micrometre.
 fn millimetres(length_m: f64) -> String {
     let decimals = if length_m < 1e-6 { 9 } else { 3 };
     format!("{:.decimals$}", 1e3 * length_m)
 }
 
-/// An arrangement of walls in another order and partly turned round, by the walls as they were drawn.
+/// Maps an arrangement of reordered and partly reversed walls back to the walls as drawn.
 fn as_drawn(
     mut arrangement: Arrangement,
     order: &[u32],
@@ -274,7 +276,7 @@ fn as_drawn(
     arrangement
 }
 
-/// Walls that share heights with one they lie on.
+/// Walls that overlap another one within common heights.
 fn covered(scene: &Scene, arrangement: &Arrangement) -> Vec<Change> {
     let mut found: std::collections::BTreeMap<(u32, u32), f64> = std::collections::BTreeMap::new();
     for piece in &arrangement.pieces {
@@ -289,9 +291,9 @@ fn covered(scene: &Scene, arrangement: &Arrangement) -> Vec<Change> {
     found.into_iter().map(|((wall, by), length_m)| Change::Covered { wall, by, length_m }).collect()
 }
 
-fn share_heights(one: &Wall, other: &Wall) -> bool {
-    match (one.z_m, other.z_m) {
-        (Some([a, b]), Some([c, d])) => a < d && c < b,
+fn share_heights(a: &Wall, b: &Wall) -> bool {
+    match (a.z_m, b.z_m) {
+        (Some([a_low, a_high]), Some([b_low, b_high])) => a_low < b_high && b_low < a_high,
         _ => true,
     }
 }
@@ -300,24 +302,24 @@ fn order(a: DVec2, b: DVec2) -> Ordering {
     a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y))
 }
 
-/// Walls by where they are, then by their names.
-fn places(one: &Wall, other: &Wall) -> Ordering {
+/// Order of walls by position, then by name.
+fn compare_positions(first: &Wall, second: &Wall) -> Ordering {
     let ends = |wall: &Wall| match order(wall.a, wall.b) {
         Ordering::Greater => [wall.b, wall.a],
         _ => [wall.a, wall.b],
     };
-    let ([a, b], [c, d]) = (ends(one), ends(other));
-    order(a, c).then(order(b, d)).then_with(|| one.id.cmp(&other.id))
+    let ([a, b], [c, d]) = (ends(first), ends(second));
+    order(a, c).then(order(b, d)).then_with(|| first.id.cmp(&second.id))
 }
 
-/// Which of walls on each other counts: the lesser.
-fn ranks(one: &Wall, other: &Wall) -> Ordering {
+/// Precedence of overlapping walls: the lesser is kept.
+fn compare_ranks(a: &Wall, b: &Wall) -> Ordering {
     let height_m = |wall: &Wall| wall.z_m.map_or(f64::INFINITY, |[from, to]| to - from);
-    height_m(other)
-        .total_cmp(&height_m(one))
-        .then(other.material.reflectance.total_cmp(&one.material.reflectance))
-        .then(one.material.roughness.total_cmp(&other.material.roughness))
-        .then(other.a.distance(other.b).total_cmp(&one.a.distance(one.b)))
-        .then_with(|| one.id.cmp(&other.id))
-        .then_with(|| places(one, other))
+    height_m(b)
+        .total_cmp(&height_m(a))
+        .then(b.material.reflectance.total_cmp(&a.material.reflectance))
+        .then(a.material.roughness.total_cmp(&b.material.roughness))
+        .then(b.a.distance(b.b).total_cmp(&a.a.distance(a.b)))
+        .then_with(|| a.id.cmp(&b.id))
+        .then_with(|| compare_positions(a, b))
 }

@@ -1,4 +1,4 @@
-//! Where in the text of a JSON document a value stands.
+//! Source positions of values in the text of a JSON document.
 
 use std::{
     collections::HashSet,
@@ -13,12 +13,12 @@ use jsonc_parser::{
 };
 use serde_path_to_error::Segment;
 
-/// The way to a value: `walls[2].to[0]`.
+/// Path to a value: `walls[2].to[0]`.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub(super) struct JsonPath(Vec<Step>);
+pub(super) struct JsonPath(Vec<PathStep>);
 
 #[derive(Debug, Clone, PartialEq, Eq)]
-enum Step {
+enum PathStep {
     Key(String),
     Index(usize),
 }
@@ -28,25 +28,25 @@ impl JsonPath {
         Self::default()
     }
 
-    /// The member `key` of this object.
+    /// Path to the member `key` of this object.
     pub(super) fn key(&self, key: &str) -> Self {
-        self.with(Step::Key(key.to_owned()))
+        self.with(PathStep::Key(key.to_owned()))
     }
 
-    /// The element `index` of this array.
+    /// Path to the element `index` of this array.
     pub(super) fn index(&self, index: usize) -> Self {
-        self.with(Step::Index(index))
+        self.with(PathStep::Index(index))
     }
 
-    /// The name of the member it ends at.
+    /// Name of the last member on the path.
     pub(super) fn last_key(&self) -> Option<&str> {
         match self.0.last() {
-            Some(Step::Key(key)) => Some(key),
+            Some(PathStep::Key(key)) => Some(key),
             _ => None,
         }
     }
 
-    fn with(&self, step: Step) -> Self {
+    fn with(&self, step: PathStep) -> Self {
         let mut steps = self.0.clone();
         steps.push(step);
         Self(steps)
@@ -58,8 +58,8 @@ impl From<&serde_path_to_error::Path> for JsonPath {
         Self(
             path.iter()
                 .filter_map(|segment| match segment {
-                    Segment::Seq { index } => Some(Step::Index(*index)),
-                    Segment::Map { key } => Some(Step::Key(key.clone())),
+                    Segment::Seq { index } => Some(PathStep::Index(*index)),
+                    Segment::Map { key } => Some(PathStep::Key(key.clone())),
                     Segment::Enum { .. } | Segment::Unknown => None,
                 })
                 .collect(),
@@ -71,49 +71,47 @@ impl fmt::Display for JsonPath {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for (at, step) in self.0.iter().enumerate() {
             match step {
-                Step::Index(index) => write!(f, "[{index}]")?,
-                Step::Key(key) if at == 0 => write!(f, "{}", key.escape_debug())?,
-                Step::Key(key) => write!(f, ".{}", key.escape_debug())?,
+                PathStep::Index(index) => write!(f, "[{index}]")?,
+                PathStep::Key(key) if at == 0 => write!(f, "{}", key.escape_debug())?,
+                PathStep::Key(key) => write!(f, ".{}", key.escape_debug())?,
             }
         }
         Ok(())
     }
 }
 
-/// Which part of a member is meant.
+/// Part of an object member.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Part {
-    /// Its value.
+pub(super) enum MemberPart {
     Value,
-    /// Its name.
     Key,
 }
 
-/// A parsed document that knows the place of each value.
-pub(super) struct Located<'a>(Value<'a>);
+/// Parsed document with the source position of each value.
+pub(super) struct LocatedDocument<'a>(Value<'a>);
 
-impl<'a> Located<'a> {
-    /// `None` if the text is not JSON.
+impl<'a> LocatedDocument<'a> {
+    /// Returns `None` if the text is not JSON.
     pub(super) fn new(text: &'a str) -> Option<Self> {
         let options = ParseOptions { allow_comments: false, ..ParseOptions::default() };
         jsonc_parser::parse_to_ast(text, &CollectOptions::default(), &options).ok()?.value.map(Self)
     }
 
-    /// Bytes of the value at `path` (or of its name), or of the innermost value on the way to it
-    /// that exists.
-    pub(super) fn find(&self, path: &JsonPath, part: Part) -> Range<usize> {
+    /// Byte range of the value at `path` (or of its name), or of the innermost existing value on
+    /// the path.
+    pub(super) fn find(&self, path: &JsonPath, part: MemberPart) -> Range<usize> {
         let mut value = &self.0;
         for (at, step) in path.0.iter().enumerate() {
             match (step, value) {
-                (Step::Index(index), Value::Array(array)) if *index < array.elements.len() => {
+                (PathStep::Index(index), Value::Array(array)) if *index < array.elements.len() => {
                     value = &array.elements[*index];
                 }
-                (Step::Key(key), Value::Object(object)) => {
+                (PathStep::Key(key), Value::Object(object)) => {
                     let Some(member) = object.properties.iter().rfind(|p| name_of(&p.name) == key)
                     else {
                         break;
                     };
-                    if part == Part::Key && at + 1 == path.0.len() {
+                    if part == MemberPart::Key && at + 1 == path.0.len() {
                         return bytes(&member.name);
                     }
                     value = &member.value;
@@ -124,13 +122,13 @@ impl<'a> Located<'a> {
         bytes(value)
     }
 
-    /// The first value at one of the places where an object belongs that is an array instead.
+    /// First array in a position where an object is required.
     ///
-    /// Serde's derived code takes an array for a struct, by the order of the fields; a scene
-    /// file written so could not be read by a person, and its schema refuses it.
+    /// Serde's derived code accepts an array for a struct, in the order of the fields. Such a scene
+    /// file would be unreadable, and its schema rejects it.
     pub(super) fn array_for_object(&self) -> Option<(JsonPath, Range<usize>)> {
         let root = JsonPath::root();
-        let Value::Object(scene) = &self.0 else { return refuse_array(&self.0, &root) };
+        let Value::Object(scene) = &self.0 else { return reject_array(&self.0, &root) };
         scene.properties.iter().find_map(|member| {
             let name = name_of(&member.name);
             let path = root.key(name);
@@ -139,30 +137,30 @@ impl<'a> Located<'a> {
                     .elements
                     .iter()
                     .enumerate()
-                    .find_map(|(index, element)| refuse_array(element, &path.index(index))),
+                    .find_map(|(index, element)| reject_array(element, &path.index(index))),
                 ("materials" | "poses", Value::Object(named)) => {
                     named.properties.iter().find_map(|member| {
-                        refuse_array(&member.value, &path.key(name_of(&member.name)))
+                        reject_array(&member.value, &path.key(name_of(&member.name)))
                     })
                 }
                 ("robot", Value::Object(robot)) => robot
                     .properties
                     .iter()
                     .filter(|member| name_of(&member.name) == "circle")
-                    .find_map(|member| refuse_array(&member.value, &path.key("circle"))),
-                ("materials" | "poses" | "robot", value) => refuse_array(value, &path),
+                    .find_map(|member| reject_array(&member.value, &path.key("circle"))),
+                ("materials" | "poses" | "robot", value) => reject_array(value, &path),
                 _ => None,
             }
         })
     }
 
-    /// The first member that repeats a name of its object: the path and the bytes of its name.
+    /// First duplicate member name of an object: the path and the byte range of the name.
     pub(super) fn duplicate_key(&self) -> Option<(JsonPath, Range<usize>)> {
         duplicate_in(&self.0, &JsonPath::root())
     }
 }
 
-fn refuse_array(value: &Value<'_>, path: &JsonPath) -> Option<(JsonPath, Range<usize>)> {
+fn reject_array(value: &Value<'_>, path: &JsonPath) -> Option<(JsonPath, Range<usize>)> {
     matches!(value, Value::Array(_)).then(|| (path.clone(), bytes(value)))
 }
 

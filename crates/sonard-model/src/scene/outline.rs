@@ -1,4 +1,4 @@
-//! Where a ranger can stand by the plan of a scene: in its rooms, not outside them and not in bodies.
+//! Accessible area of a scene's plan: inside rooms, not outside them and not inside bodies.
 
 use std::collections::{BTreeMap, HashMap};
 
@@ -10,67 +10,70 @@ use rstar::{
 use super::{FloorPlan, Scene};
 use crate::geometry::{Arrangement, DVec2, distance_to_segment, enclosed_area, encloses};
 
-/// This far beside a wall is in the face of the plan there, metres.
-const BESIDE_M: f64 = 1e-6;
+/// Offset of test points from a wall, metres.
+const SIDE_OFFSET_M: f64 = 1e-6;
 
-/// An empty outline that stands by itself is a body if it is smaller than this share of the largest room.
+/// Maximum area of an isolated empty outline that is a body, relative to the largest room.
 const BODY_SHARE: f64 = 0.25;
 
-/// Areas that agree to this are equal.
+/// Relative tolerance for equal areas.
 const SAME_AREA: f64 = 1e-6;
 
-/// Walls by whose ids an outline is called, at most.
-const MOST_NAMED: usize = 8;
+/// Maximum number of walls listed in the name of an outline.
+const MAX_NAMED: usize = 8;
 
-/// What the closed outlines of a scene's plan are.
+/// Closed outlines of a scene's plan, classified as rooms and bodies.
 #[derive(Debug, Default)]
-pub(super) struct Outlines {
+pub(super) struct SceneOutlines {
     plan: FloorPlan,
-    /// Round everything that hangs together.
-    around: Rings,
-    rings: Rings,
-    /// By ring, whether it is a body that sound does not enter; else a room.
+    /// Outer boundaries of the connected components.
+    around: WallRings,
+    rings: WallRings,
+    /// Classification by ring: a body that sound does not enter, or else a room.
     is_body: Vec<bool>,
-    /// Lower left and upper right corner of all rooms, metres, if there are any.
+    /// Bounding box of all rooms, lower left and upper right corner, metres, if there are any.
     pub(super) room: Option<[[f64; 2]; 2]>,
-    /// Whether there is something to measure outside of the rooms too.
+    /// The area outside the rooms is accessible as well.
     outside_counts: bool,
 }
 
-impl Outlines {
-    /// Finds them. Neither the order of walls nor their directions matter.
+impl SceneOutlines {
+    /// Finds and classifies the outlines of a scene. The order and direction of walls are
+    /// irrelevant.
     ///
-    /// A closed polyline is a ring, and so are walls that meet at their ends and close. A ring that a larger one
-    /// overlaps is a body: a box in a room, or through its wall. One that nothing larger overlaps is a room, but
-    /// for empty ones: these are bodies where the scene names poses and none is in any room, and, away from the
-    /// others, where they are much smaller than the largest.
-    pub(super) fn of(scene: &Scene) -> Self {
+    /// Closed polylines are rings, and so are walls joined at their ends to a closed loop. A ring
+    /// that overlaps a larger one is a body: a box in a room, or through its wall. A ring without a
+    /// larger overlapping one is a room, except for empty rings. These are bodies if the scene
+    /// names poses and none is in any room. An isolated empty ring is a body if it is much smaller
+    /// than the largest room.
+    pub(super) fn from_scene(scene: &Scene) -> Self {
         let plan = scene.floor_plan();
-        let rings = Rings::new(rings(scene, &plan.arrangement));
-        let round = plan.arrangement.outlines().into_iter();
-        let around =
-            Rings::new(round.map(|walk| Ring::new(Vec::new(), &walk, &plan.arrangement)).collect());
-        let faces = Faces::of(&plan, &rings);
+        let rings = WallRings::new(rings(scene, &plan.arrangement));
+        let boundaries = plan.arrangement.outlines().into_iter();
+        let around = WallRings::new(
+            boundaries.map(|walk| WallRing::new(Vec::new(), &walk, &plan.arrangement)).collect(),
+        );
+        let faces = Faces::new(&plan, &rings);
         let is_body = faces.bodies(scene, &plan, &rings);
         let mut outlines = Self { plan, around, rings, is_body, room: None, outside_counts: false };
         outlines.room = outlines.rooms().map(|ring| ring.extent).reduce(|[low, high], [l, h]| {
             [[low[0].min(l[0]), low[1].min(l[1])], [high[0].max(h[0]), high[1].max(h[1])]]
         });
-        outlines.outside_counts = outlines.room.is_none() || outlines.stands_outside(scene);
+        outlines.outside_counts = outlines.room.is_none() || outlines.has_objects_outside(scene);
         outlines
     }
 
-    /// The plan.
     pub(super) const fn plan(&self) -> &FloorPlan {
         &self.plan
     }
 
-    /// Whether a point is outside the rooms, where there are rooms and nothing else.
+    /// Returns `true` if a point is outside the rooms of a scene that has rooms and nothing outside
+    /// them.
     pub(super) fn is_outside(&self, point: DVec2) -> bool {
-        !self.outside_counts && !self.around.hold(point)
+        !self.outside_counts && !self.around.contain(point)
     }
 
-    /// Name of a body of walls that a point is in: the smallest.
+    /// Name of the smallest body of walls around a point.
     pub(super) fn body_around(&self, scene: &Scene, point: DVec2) -> Option<String> {
         let here = self.rings.around(point).filter(|&ring| self.is_body[ring]);
         let ring =
@@ -78,7 +81,7 @@ impl Outlines {
         Some(self.rings.all[ring].name(scene))
     }
 
-    fn rooms(&self) -> impl Iterator<Item = &Ring> {
+    fn rooms(&self) -> impl Iterator<Item = &WallRing> {
         self.rings
             .all
             .iter()
@@ -87,35 +90,35 @@ impl Outlines {
             .map(|(ring, _)| ring)
     }
 
-    /// Whether something stands by itself outside of the rooms.
-    fn stands_outside(&self, scene: &Scene) -> bool {
+    /// Returns `true` if walls or cylinders are isolated from the rooms.
+    fn has_objects_outside(&self, scene: &Scene) -> bool {
         let is_in_room = |point: DVec2| {
             let mut here = self.rings.around(point);
             here.any(|ring| !self.is_body[ring])
         };
-        // A part of the plan belongs to a room if any of it is in the room or on its walls.
-        let touches_room = |part: &Ring| {
+        // A component belongs to a room if any part of it is in the room or on its walls.
+        let touches_room = |part: &WallRing| {
             part.corners
                 .iter()
                 .any(|&corner| is_in_room(corner) || self.rooms().any(|room| room.touches(corner)))
         };
         let walls = self.around.all.iter().any(|part| !touches_room(part));
-        walls || scene.cylinders.iter().any(|cylinder| !self.around.hold(cylinder.center))
+        walls || scene.cylinders.iter().any(|cylinder| !self.around.contain(cylinder.center))
     }
 }
 
-/// A closed line of walls.
+/// Closed loop of walls.
 #[derive(Debug, Clone)]
-struct Ring {
-    /// Indices into `scene.walls`, in rising order.
+struct WallRing {
+    /// Indices into `scene.walls`, ascending.
     walls: Vec<u32>,
     corners: Vec<DVec2>,
     area: f64,
-    /// Lower left and upper right corner of the box around it.
+    /// Bounding box, lower left and upper right corner.
     extent: [[f64; 2]; 2],
 }
 
-impl Ring {
+impl WallRing {
     fn new(mut walls: Vec<u32>, points: &[u32], plan: &Arrangement) -> Self {
         walls.sort_unstable();
         let corners: Vec<DVec2> = points.iter().map(|&point| plan.points[point as usize]).collect();
@@ -128,44 +131,49 @@ impl Ring {
 
     fn touches(&self, point: DVec2) -> bool {
         let next = self.corners.iter().cycle().skip(1);
-        self.corners.iter().zip(next).any(|(&a, &b)| distance_to_segment(point, a, b) < BESIDE_M)
+        self.corners
+            .iter()
+            .zip(next)
+            .any(|(&a, &b)| distance_to_segment(point, a, b) < SIDE_OFFSET_M)
     }
 
-    /// The polyline's id if it is one, else the ids of all its walls.
+    /// Id of the polyline if the ring is one, else the ids of all its walls.
     fn name(&self, scene: &Scene) -> String {
         let ids: Vec<&str> =
             self.walls.iter().map(|&wall| &*scene.walls[wall as usize].id).collect();
         match number_in_polyline(ids[0]) {
             Some((stem, _))
-                if ids.iter().all(|id| number_in_polyline(id).is_some_and(|of| of.0 == stem)) =>
+                if ids
+                    .iter()
+                    .all(|id| number_in_polyline(id).is_some_and(|(own, _)| own == stem)) =>
             {
                 stem.to_owned()
             }
-            _ if ids.len() > MOST_NAMED => {
-                let first = ids[..MOST_NAMED].join(", ");
-                format!("{first} and {} more", ids.len() - MOST_NAMED)
+            _ if ids.len() > MAX_NAMED => {
+                let first = ids[..MAX_NAMED].join(", ");
+                format!("{first} and {} more", ids.len() - MAX_NAMED)
             }
             _ => ids.join(", "),
         }
     }
 }
 
-/// The polyline that a wall belongs to by its id, and its number there.
+/// Polyline of a wall, derived from its id, and its index in the polyline.
 fn number_in_polyline(id: &str) -> Option<(&str, u32)> {
     let (stem, number) = id.rsplit_once('.')?;
     Some((stem, number.parse().ok()?))
 }
 
-/// Rings, found by place.
+/// Rings with a spatial index.
 #[derive(Debug, Default)]
-struct Rings {
-    all: Vec<Ring>,
+struct WallRings {
+    all: Vec<WallRing>,
     boxes: RTree<GeomWithData<Rectangle<[f64; 2]>, usize>>,
 }
 
-impl Rings {
-    fn new(all: Vec<Ring>) -> Self {
-        let around = |(index, ring): (usize, &Ring)| {
+impl WallRings {
+    fn new(all: Vec<WallRing>) -> Self {
+        let around = |(index, ring): (usize, &WallRing)| {
             let [low, high] = ring.extent;
             GeomWithData::new(Rectangle::from_corners(low, high), index)
         };
@@ -173,19 +181,19 @@ impl Rings {
         Self { all, boxes }
     }
 
-    /// Those that a point is in.
+    /// Indices of the rings around a point.
     fn around(&self, point: DVec2) -> impl Iterator<Item = usize> {
         let near = self.boxes.locate_in_envelope_intersecting(AABB::from_point(point.to_array()));
         near.map(|near| near.data).filter(move |&ring| encloses(&self.all[ring].corners, point))
     }
 
-    fn hold(&self, point: DVec2) -> bool {
+    fn contain(&self, point: DVec2) -> bool {
         self.around(point).next().is_some()
     }
 }
 
-/// All rings of walls: closed polylines, and of the other walls what closes by their ends.
-fn rings(scene: &Scene, plan: &Arrangement) -> Vec<Ring> {
+/// Rings of walls: closed polylines, and closed loops of the remaining walls.
+fn rings(scene: &Scene, plan: &Arrangement) -> Vec<WallRing> {
     let mut polylines: BTreeMap<&str, Vec<(u32, u32)>> = BTreeMap::new();
     for (wall, index) in scene.walls.iter().zip(0..) {
         if let Some((stem, number)) = number_in_polyline(&wall.id) {
@@ -199,40 +207,40 @@ fn rings(scene: &Scene, plan: &Arrangement) -> Vec<Ring> {
         let walls: Vec<u32> = walls.iter().map(|&(_, wall)| wall).collect();
         let ends: Vec<[u32; 2]> = walls.iter().map(|&wall| plan.ends[wall as usize]).collect();
         let mut after = ends.iter().cycle().skip(1);
-        let closes = ends.iter().all(|end| after.next().is_some_and(|next| end[1] == next[0]));
-        if closes && walls.len() >= 3 {
+        let is_closed = ends.iter().all(|end| after.next().is_some_and(|next| end[1] == next[0]));
+        if is_closed && walls.len() >= 3 {
             walls.iter().for_each(|&wall| is_free[wall as usize] = false);
             let points: Vec<u32> = ends.iter().map(|end| end[0]).collect();
-            rings.push(Ring::new(walls, &points, plan));
+            rings.push(WallRing::new(walls, &points, plan));
         }
     }
-    rings.extend(joined(plan, is_free));
+    rings.extend(loops(plan, is_free));
     rings
 }
 
-/// What walls enclose that meet at their ends, leaving out those that end nowhere.
-fn joined(plan: &Arrangement, mut is_free: Vec<bool>) -> Vec<Ring> {
+/// Closed loops of walls joined at their ends, without dead ends.
+fn loops(plan: &Arrangement, mut is_free: Vec<bool>) -> Vec<WallRing> {
     let mut at: HashMap<u32, Vec<u32>> = HashMap::new();
     for (ends, wall) in plan.ends.iter().zip(0_u32..).filter(|(ends, _)| ends[0] != ends[1]) {
         if is_free[wall as usize] {
             ends.iter().for_each(|&end| at.entry(end).or_default().push(wall));
         }
     }
-    let mut loose: Vec<u32> =
+    let mut dead_ends: Vec<u32> =
         at.iter().filter(|(_, walls)| walls.len() == 1).map(|(&point, _)| point).collect();
-    while let Some(point) = loose.pop() {
+    while let Some(point) = dead_ends.pop() {
         let Some(wall) = at.get_mut(&point).and_then(Vec::pop) else { continue };
         is_free[wall as usize] = false;
         for end in plan.ends[wall as usize] {
             if let Some(walls) = at.get_mut(&end) {
                 walls.retain(|&other| other != wall);
                 if walls.len() == 1 {
-                    loose.push(end);
+                    dead_ends.push(end);
                 }
             }
         }
     }
-    // What is left closes; each group by itself, as others may cross it.
+    // The remaining walls form loops; each group is taken separately, as others may cross it.
     let mut rings = Vec::new();
     for first in 0..plan.ends.len() as u32 {
         let mut walls = Vec::new();
@@ -251,49 +259,49 @@ fn joined(plan: &Arrangement, mut is_free: Vec<bool>) -> Vec<Ring> {
     rings
 }
 
-fn ring_around(plan: &Arrangement, walls: Vec<u32>) -> Option<Ring> {
+fn ring_around(plan: &Arrangement, walls: Vec<u32>) -> Option<WallRing> {
     let at = |point: u32| plan.points[point as usize];
     let segments: Vec<_> =
         walls.iter().map(|&wall| plan.ends[wall as usize].map(at)).map(|[a, b]| (a, b)).collect();
     let own = Arrangement::of(&segments);
     let outline = own.outlines().into_iter().next()?;
-    let ring = Ring::new(walls, &outline, &own);
+    let ring = WallRing::new(walls, &outline, &own);
     (ring.area > 0.0).then_some(ring)
 }
 
-/// The faces of a plan, by a point of each.
+/// Faces of a plan, represented by the rings around a test point in each.
 struct Faces {
-    /// For each point the rings that it is in, where there are any.
+    /// Rings around each test point, where there are any.
     rings: Vec<Vec<usize>>,
 }
 
 impl Faces {
-    /// By points on both sides of each piece: every face has a piece.
-    fn of(plan: &FloorPlan, rings: &Rings) -> Self {
+    /// Tests points on both sides of each piece: every face is adjacent to a piece.
+    fn new(plan: &FloorPlan, rings: &WallRings) -> Self {
         let Arrangement { points, pieces, .. } = &plan.arrangement;
-        let beside = pieces.iter().flat_map(|piece| {
+        let test_points = pieces.iter().flat_map(|piece| {
             let [a, b] = piece.ends.map(|end| points[end as usize]);
-            let off = BESIDE_M.min(1e-3 * a.distance(b)) * (b - a).normalize_or_zero().perp();
+            let off = SIDE_OFFSET_M.min(1e-3 * a.distance(b)) * (b - a).normalize_or_zero().perp();
             [0.5 * (a + b) + off, 0.5 * (a + b) - off]
         });
-        let here = beside.map(|point| rings.around(point).collect::<Vec<_>>());
+        let here = test_points.map(|point| rings.around(point).collect::<Vec<_>>());
         Self { rings: here.filter(|here| !here.is_empty()).collect() }
     }
 
-    /// Which rings are bodies.
-    fn bodies(&self, scene: &Scene, plan: &FloorPlan, rings: &Rings) -> Vec<bool> {
+    /// Classification of the rings: `true` for bodies.
+    fn bodies(&self, scene: &Scene, plan: &FloorPlan, rings: &WallRings) -> Vec<bool> {
         let area = |ring: usize| rings.all[ring].area;
         let mut is_body = vec![false; rings.all.len()];
         let mut is_empty = vec![true; rings.all.len()];
         for here in &self.rings {
-            let most = here.iter().map(|&ring| area(ring)).fold(0.0, f64::max);
+            let largest = here.iter().map(|&ring| area(ring)).fold(0.0, f64::max);
             for &ring in here {
-                is_body[ring] |= area(ring) < most * (1.0 - SAME_AREA);
+                is_body[ring] |= area(ring) < largest * (1.0 - SAME_AREA);
                 is_empty[ring] &= here.len() == 1;
             }
         }
-        let mut is_met = vec![false; rings.all.len()];
-        self.contents(scene, plan, rings, &mut is_empty, &mut is_met);
+        let mut has_contact = vec![false; rings.all.len()];
+        self.mark_contents(scene, plan, rings, &mut is_empty, &mut has_contact);
         let mut has_pose = vec![false; rings.all.len()];
         for pose in scene.poses.values() {
             rings.around(pose.position()).for_each(|ring| has_pose[ring] = true);
@@ -302,7 +310,7 @@ impl Faces {
         let all_outside = !scene.poses.is_empty() && !rooms().any(|ring| has_pose[ring]);
         let largest = rooms().map(area).fold(0.0, f64::max);
         let is_empty_body = |&ring: &usize| {
-            let is_small = !is_met[ring] && area(ring) < BODY_SHARE * largest;
+            let is_small = !has_contact[ring] && area(ring) < BODY_SHARE * largest;
             is_empty[ring] && !has_pose[ring] && (all_outside || is_small)
         };
         let more: Vec<usize> = rooms().filter(is_empty_body).collect();
@@ -310,14 +318,15 @@ impl Faces {
         is_body
     }
 
-    /// Which rings have something in them, and which meet walls that are not their own.
-    fn contents(
+    /// Clears `is_empty` for rings with contents, and sets `has_contact` for rings joined to walls
+    /// of others.
+    fn mark_contents(
         &self,
         scene: &Scene,
         plan: &FloorPlan,
-        rings: &Rings,
+        rings: &WallRings,
         is_empty: &mut [bool],
-        is_met: &mut [bool],
+        has_contact: &mut [bool],
     ) {
         let mut rings_at: HashMap<u32, Vec<usize>> = HashMap::new();
         for (index, ring) in rings.all.iter().enumerate() {
@@ -334,7 +343,7 @@ impl Faces {
             let at_ends = piece.ends.iter().filter_map(|end| rings_at.get(end)).flatten();
             at_ends
                 .filter(|&&ring| !is_own(ring, piece.segment))
-                .for_each(|&ring| is_met[ring] = true);
+                .for_each(|&ring| has_contact[ring] = true);
         }
         for cylinder in &scene.cylinders {
             rings.around(cylinder.center).for_each(|ring| is_empty[ring] = false);
@@ -342,7 +351,7 @@ impl Faces {
     }
 }
 
-/// Whether a point lies inside closed sides (even-odd rule; on a side: either answer).
+/// Returns `true` if a point lies inside closed sides (even-odd rule; undefined on a side).
 pub(super) fn contains(sides: &[(DVec2, DVec2)], point: DVec2) -> bool {
     let corners: Vec<DVec2> = sides.iter().map(|&(a, _)| a).collect();
     encloses(&corners, point)

@@ -1,15 +1,15 @@
-//! From the text of a scene file to a checked [`Scene`], with each fault in its place.
+//! Parser of scene files, with the position of each fault.
 
 use super::{
     Scene, SceneError, SceneProblem,
     check::checked,
     error::{floor_char_boundary, line_and_column},
     file::SceneFile,
-    locate::{JsonPath, Located, Part},
-    plain::is_plain,
+    locate::{JsonPath, LocatedDocument, MemberPart},
+    prescan::is_unambiguous,
 };
 
-/// The mark that some editors begin a text with.
+/// Byte order mark that some editors prepend.
 const BYTE_ORDER_MARK: char = '\u{feff}';
 
 pub(super) fn scene_from_json(text: &str) -> Result<Scene, SceneError> {
@@ -21,19 +21,20 @@ pub(super) fn scene_from_json(text: &str) -> Result<Scene, SceneError> {
     })
 }
 
-/// The scene of some JSON, which `whole` is kept as.
+/// Parses a scene from JSON; `whole` is kept as its source text.
 fn read(text: &str, whole: &str) -> Result<Scene, SceneError> {
-    // Only a fault is looked for in a tree of the whole document, which takes thirty times the text.
-    let at = |path: &JsonPath, part: Part| {
-        Located::new(text).map_or(0..text.len(), |located| located.find(path, part))
+    // The syntax tree takes thirty times the memory of the text: it is built only to locate a
+    // fault.
+    let at = |path: &JsonPath, part: MemberPart| {
+        LocatedDocument::new(text).map_or(0..text.len(), |located| located.find(path, part))
     };
-    let is_plain = is_plain(text).map_err(|error| syntax_error(text, &error))?;
-    if !is_plain && let Some(located) = Located::new(text) {
-        refuse_ambiguous(text, &located)?;
+    let is_unambiguous = is_unambiguous(text).map_err(|error| syntax_error(text, &error))?;
+    if !is_unambiguous && let Some(located) = LocatedDocument::new(text) {
+        reject_ambiguous(text, &located)?;
     }
     let mut json = serde_json::Deserializer::from_str(text);
     let file = serde_path_to_error::deserialize(&mut json).or_else(|error| {
-        // An array of too many: from the text serde does not say how many.
+        // For an array with too many elements, serde reports their number only from a parsed value.
         let value = || serde_json::from_str::<serde_json::Value>(text).ok();
         let is_vague = without_place(error.inner()) == "trailing characters";
         match is_vague.then(value).flatten() {
@@ -45,8 +46,8 @@ fn read(text: &str, whole: &str) -> Result<Scene, SceneError> {
         let path = JsonPath::from(error.path());
         let problem = shape_problem(error.inner());
         let part = match problem {
-            SceneProblem::UnknownField { .. } => Part::Key,
-            _ => Part::Value,
+            SceneProblem::UnknownField { .. } => MemberPart::Key,
+            _ => MemberPart::Value,
         };
         SceneError::new(text, at(&path, part), &path, problem)
     })?;
@@ -55,8 +56,8 @@ fn read(text: &str, whole: &str) -> Result<Scene, SceneError> {
     })
 }
 
-/// What the parser accepts and a reader would misunderstand.
-fn refuse_ambiguous(text: &str, located: &Located<'_>) -> Result<(), SceneError> {
+/// Rejects documents that the parser accepts but a reader would misunderstand.
+fn reject_ambiguous(text: &str, located: &LocatedDocument<'_>) -> Result<(), SceneError> {
     if let Some((path, span)) = located.duplicate_key() {
         let name = path.last_key().unwrap_or_default().to_owned();
         return Err(SceneError::new(text, span, &path, SceneProblem::DuplicateKey(name)));
@@ -69,7 +70,8 @@ fn refuse_ambiguous(text: &str, located: &Located<'_>) -> Result<(), SceneError>
     Ok(())
 }
 
-/// A fault of the syntax; an unclosed bracket is shown where it opens, not where the text ends.
+/// Converts a syntax error. An unclosed bracket is reported where it opens, not at the end of the
+/// text.
 fn syntax_error(text: &str, error: &serde_json::Error) -> SceneError {
     if error.is_eof()
         && let Some((offset, open)) = innermost_open_bracket(text)
@@ -83,14 +85,14 @@ fn syntax_error(text: &str, error: &serde_json::Error) -> SceneError {
     if message.starts_with("expected `,`")
         && let Some((opens, open)) = innermost_open_bracket(&text[..offset])
     {
-        // The bracket that should have been closed is often lines before the place.
+        // The unclosed bracket is often many lines before the error.
         let (line, column) = line_and_column(text, opens);
         message.push_str(&format!(" (the `{open}` at {line}:{column} is still open)"));
     }
     SceneError::new(text, offset..end, &"", SceneProblem::Syntax(message))
 }
 
-/// Byte offset of a line and column as serde_json counts them: columns in bytes, from 1.
+/// Byte offset of a line and column of serde_json: columns in bytes, from 1.
 fn offset_of(text: &str, line: usize, column: usize) -> usize {
     let line_start = match line {
         0 | 1 => 0,
@@ -99,7 +101,7 @@ fn offset_of(text: &str, line: usize, column: usize) -> usize {
     floor_char_boundary(text, line_start + column.saturating_sub(1))
 }
 
-/// The last bracket of a cut-off text that has no partner, if the text does not end in a string.
+/// Last unmatched bracket of a truncated text, if the text does not end within a string.
 fn innermost_open_bracket(text: &str) -> Option<(usize, char)> {
     let mut open = Vec::new();
     let mut in_string = false;
@@ -117,13 +119,13 @@ fn innermost_open_bracket(text: &str) -> Option<(usize, char)> {
     open.pop().filter(|_| !in_string)
 }
 
-/// Serde's message without the place, which is reported apart from it.
+/// Serde's message without the position, which is reported separately.
 fn without_place(error: &serde_json::Error) -> String {
     let message = error.to_string();
     message.rsplit_once(" at line ").map_or(message.clone(), |(message, _)| message.to_owned())
 }
 
-/// What serde's derived code says about the shape, as a problem of its own kind.
+/// Converts a message of serde's derived code into a specific problem.
 fn shape_problem(error: &serde_json::Error) -> SceneProblem {
     let message = without_place(error);
     let quoted = || message.split('`').skip(1).step_by(2).map(str::to_owned);

@@ -1,116 +1,116 @@
-//! Poses: named or in numbers, and whether a ranger can stand there.
+//! Poses by name or coordinates, and checks of their accessibility.
 
 use thiserror::Error;
 
 use super::{
     FloorPlan, Scene,
     error::{MAX_COORDINATE_M, suggest},
-    outline::Outlines,
+    outline::SceneOutlines,
     robot::wall_between,
 };
 use crate::geometry::{DVec2, Pose, distance_to_segment};
 
-/// A ranger closer to a surface than this is taken to be inside it, metres.
+/// Minimum distance of a ranger from a surface, metres.
 pub(super) const CLEARANCE_M: f64 = 1e-3;
 
-/// Largest magnitude of a heading, degrees.
+/// Maximum magnitude of a heading, degrees.
 pub(super) const MAX_HEADING_DEG: f64 = 360.0;
 
-/// A pose that can't be used.
+/// Pose that is malformed or inaccessible.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum PoseError {
-    /// Not the name of a pose.
+    /// Request of a named pose that does not exist.
     #[error("the scene `{scene}` has no pose `{name}`")]
     Unknown {
-        /// What was asked for.
+        /// Name of the requested pose.
         name: String,
-        /// The scene.
+        /// Name of the scene.
         scene: String,
-        /// The poses it has.
+        /// Names of the scene's poses.
         known: Vec<String>,
     },
-    /// Numbers, but not two or three.
+    /// Wrong number of coordinates: neither two nor three.
     #[error("`{0}` is not a pose")]
     Malformed(String),
-    /// A part that is not a number within bounds.
+    /// Coordinate that is not a number within bounds.
     #[error("{field} `{text}` is not a number from -{limit} to {limit}")]
     BadNumber {
-        /// X, Y or DEG.
+        /// Name of the coordinate: X, Y or DEG.
         field: &'static str,
-        /// What was written.
+        /// Text of the rejected coordinate.
         text: String,
-        /// Largest magnitude.
+        /// Maximum magnitude of the coordinate.
         limit: f64,
     },
-    /// Beyond the walls.
+    /// Pose outside the rooms.
     #[error("the pose ({x_m}, {y_m}) m is outside the room")]
     OutsideRoom {
-        /// World x, metres.
+        /// World x of the position, metres.
         x_m: f64,
-        /// World y, metres.
+        /// World y of the position, metres.
         y_m: f64,
         /// Lower left corner of the room's extent, metres.
         low: [f64; 2],
         /// Upper right corner of the room's extent, metres.
         high: [f64; 2],
     },
-    /// In a body that sound does not enter.
+    /// Pose inside a body that sound does not enter.
     #[error("the pose ({x_m}, {y_m}) m is inside `{body}`")]
     InsideBody {
-        /// World x, metres.
+        /// World x of the position, metres.
         x_m: f64,
-        /// World y, metres.
+        /// World y of the position, metres.
         y_m: f64,
         /// Name of the cylinder or of the ring of walls.
         body: String,
-        /// The room's extent, if there is a room, lower left and upper right corner, metres.
+        /// Bounding box of the rooms, if there are any: lower left and upper right corner, metres.
         room: Option<[[f64; 2]; 2]>,
     },
-    /// On a surface.
+    /// Pose on a surface.
     #[error("the pose ({x_m}, {y_m}) m is {:.2} mm from `{reflector}`", distance_m * 1e3)]
     TooClose {
-        /// World x, metres.
+        /// World x of the position, metres.
         x_m: f64,
-        /// World y, metres.
+        /// World y of the position, metres.
         y_m: f64,
         /// Name of the wall or cylinder.
         reflector: String,
-        /// Distance, metres.
+        /// Distance from the reflector, metres.
         distance_m: f64,
-        /// The room's extent, if there is a room, lower left and upper right corner, metres.
+        /// Bounding box of the rooms, if there are any: lower left and upper right corner, metres.
         room: Option<[[f64; 2]; 2]>,
     },
-    /// A wall separates it from the robot that carries it.
-    #[error("the place ({x_m}, {y_m}) m is on the other side of `{reflector}` than the robot")]
+    /// Wall between a face and the robot that carries it.
+    #[error("the position ({x_m}, {y_m}) m is separated from the robot by `{reflector}`")]
     BehindWall {
-        /// World x, metres.
+        /// World x of the position, metres.
         x_m: f64,
-        /// World y, metres.
+        /// World y of the position, metres.
         y_m: f64,
         /// Name of the wall.
         reflector: String,
     },
-    /// The robot's body does not fit there.
+    /// Collision of the robot's body with a reflector.
     #[error(
-        "at the pose ({x_m}, {y_m}) m, heading {heading_deg} degrees, the body `{robot}` runs into `{reflector}`"
+        "at the pose ({x_m}, {y_m}) m, heading {heading_deg} degrees, the body `{robot}` collides with `{reflector}`"
     )]
     BodyCollides {
-        /// World x, metres.
+        /// World x of the position, metres.
         x_m: f64,
-        /// World y, metres.
+        /// World y of the position, metres.
         y_m: f64,
-        /// Heading, degrees.
+        /// Heading of the robot, degrees.
         heading_deg: f64,
-        /// Name of the robot.
+        /// Identifier of the robot.
         robot: String,
-        /// Name of what it runs into.
+        /// Identifier of the reflector.
         reflector: String,
     },
 }
 
 impl PoseError {
-    /// What would be right.
+    /// Hint for correcting the pose.
     #[must_use]
     pub fn help(&self) -> String {
         match self {
@@ -125,15 +125,15 @@ impl PoseError {
             Self::OutsideRoom { low, high, .. } => extent(low, high),
             Self::InsideBody { room, .. } => match room {
                 Some([low, high]) => extent(low, high),
-                None => "stand outside it".to_owned(),
+                None => "choose a pose outside the body".to_owned(),
             },
             Self::TooClose { room, .. } => match room {
-                Some([low, high]) => format!("keep 1 mm away from surfaces; {}", extent(low, high)),
-                None => "keep 1 mm away from surfaces".to_owned(),
+                Some([low, high]) => format!("keep at least 1 mm from surfaces; {}", extent(low, high)),
+                None => "keep at least 1 mm from surfaces".to_owned(),
             },
             Self::BehindWall { .. } => "keep the robot clear of walls".to_owned(),
             Self::BodyCollides { .. } => {
-                "move or turn the pose; the body stands as `robot` in the scene says, relative to \
+                "move or turn the pose; the body is defined by `robot` in the scene, relative to \
                  position and heading"
                     .to_owned()
             }
@@ -145,10 +145,10 @@ fn extent(low: &[f64; 2], high: &[f64; 2]) -> String {
     format!("the room spans x {} to {} m and y {} to {} m", low[0], high[0], low[1], high[1])
 }
 
-/// The pose written `X,Y,DEG` or `X,Y`, metres and degrees.
+/// Parses a pose written as `X,Y,DEG` or `X,Y`, in metres and degrees.
 ///
 /// # Errors
-/// Numbers that make no pose.
+/// If the text is not two or three numbers within bounds.
 pub fn parse_pose(spec: &str) -> Result<Pose, PoseError> {
     let parts: Vec<&str> = spec.split(',').map(str::trim).collect();
     let (x, y, heading) = match parts[..] {
@@ -164,11 +164,11 @@ pub fn parse_pose(spec: &str) -> Result<Pose, PoseError> {
 }
 
 impl Scene {
-    /// The pose meant by `X,Y,DEG`, `X,Y`, or the name of a pose of this scene. Whether a
-    /// ranger can stand there is for [`Scene::check_pose`] to say.
+    /// Resolves `X,Y,DEG`, `X,Y`, or the name of a pose of this scene. [`Scene::check_pose`] checks
+    /// whether the pose is accessible.
     ///
     /// # Errors
-    /// A name the scene does not have, or numbers that make no pose.
+    /// If the scene has no pose of that name, or the numbers are invalid.
     pub fn pose(&self, spec: &str) -> Result<Pose, PoseError> {
         if let Some(pose) = self.poses.get(spec) {
             return Ok(*pose);
@@ -183,31 +183,32 @@ impl Scene {
         parse_pose(spec)
     }
 
-    /// Whether a ranger can stand at a pose: inside a room (if the walls close some, and nothing stands
-    /// outside them), in no closed body, a millimetre from every surface, and the robot's
-    /// body, if there is one, in nothing's way. The plan decides ([`Scene::floor_plan`]), not the order of walls.
+    /// Checks that a ranger fits at a pose: inside a room (if walls enclose rooms and nothing is
+    /// outside them), in no closed body, at least a millimetre from every surface, and without
+    /// collision of the robot's body, if there is one. The result follows from the plan
+    /// ([`Scene::floor_plan`]), independent of the order of walls.
     ///
     /// # Errors
-    /// Which of these fails, and the room's extent.
+    /// Names the violated condition and the extent of the room.
     pub fn check_pose(&self, pose: &Pose) -> Result<(), PoseError> {
-        self.check_pose_among(&Outlines::of(self), pose)
+        self.check_pose_among(&SceneOutlines::from_scene(self), pose)
     }
 
-    /// The same for many poses, with the outlines found once.
+    /// Checks many poses as [`check_pose`](Self::check_pose) does, finding the outlines once.
     ///
     /// # Errors
-    /// The first pose that fails, by its index, and why.
+    /// Returns the index of the first pose that fails, and its error.
     pub fn check_poses(&self, poses: &[Pose]) -> Result<(), (usize, PoseError)> {
-        let outlines = Outlines::of(self);
+        let outlines = SceneOutlines::from_scene(self);
         let check =
             |(at, pose)| self.check_pose_among(&outlines, pose).map_err(|error| (at, error));
         poses.iter().enumerate().try_for_each(check)
     }
 
-    /// The same with the outlines found before.
+    /// Checks a pose against precomputed outlines.
     pub(super) fn check_pose_among(
         &self,
-        outlines: &Outlines,
+        outlines: &SceneOutlines,
         pose: &Pose,
     ) -> Result<(), PoseError> {
         within("DEG", pose.heading_deg, MAX_HEADING_DEG)?;
@@ -215,36 +216,38 @@ impl Scene {
         self.check_robot(outlines.plan(), pose)
     }
 
-    /// Whether a robot can stand at a pose whose rangers have their faces at some places: inside the room, in
-    /// no body, a millimetre from every surface, its own body's too, and no wall between a face and the pose.
+    /// Checks that a robot fits at a pose with its rangers' faces at `places`: inside the room, in
+    /// no body, at least a millimetre from every surface including its own body, and without a wall
+    /// between a face and the pose.
     ///
     /// # Errors
-    /// Why the pose fails, or the first place that does, by its index.
+    /// Returns the error of the pose, or the index of the first face that fails with its error.
     pub fn check_places(
         &self,
         pose: &Pose,
         places: &[DVec2],
     ) -> Result<(), (Option<usize>, PoseError)> {
-        self.check_places_among(&Outlines::of(self), pose, places)
+        self.check_places_among(&SceneOutlines::from_scene(self), pose, places)
     }
 
-    /// The same for many poses, each with the places of its faces, with the outlines found once.
+    /// Checks many poses as [`check_places`](Self::check_places) does, each with its face
+    /// positions, finding the outlines once.
     ///
     /// # Errors
-    /// The first pose that fails, by its index, with what [`Self::check_places`] says of it.
+    /// Returns the index of the first pose that fails, with the error of [`Self::check_places`].
     pub fn check_many_places(
         &self,
-        stands: impl IntoIterator<Item = (Pose, Vec<DVec2>)>,
+        poses: impl IntoIterator<Item = (Pose, Vec<DVec2>)>,
     ) -> Result<(), (usize, (Option<usize>, PoseError))> {
-        let outlines = Outlines::of(self);
-        stands.into_iter().enumerate().try_for_each(|(at, (pose, places))| {
+        let outlines = SceneOutlines::from_scene(self);
+        poses.into_iter().enumerate().try_for_each(|(at, (pose, places))| {
             self.check_places_among(&outlines, &pose, &places).map_err(|error| (at, error))
         })
     }
 
     fn check_places_among(
         &self,
-        outlines: &Outlines,
+        outlines: &SceneOutlines,
         pose: &Pose,
         places: &[DVec2],
     ) -> Result<(), (Option<usize>, PoseError)> {
@@ -266,14 +269,15 @@ impl Scene {
         Ok(())
     }
 
-    /// At which of some places the face of a ranger can stand, as [`check_places`](Self::check_places) says.
+    /// Accessibility of positions for the face of a ranger, by the rules of
+    /// [`check_places`](Self::check_places).
     #[must_use]
     pub fn can_stand(&self, places: &[DVec2]) -> Vec<bool> {
-        let outlines = Outlines::of(self);
+        let outlines = SceneOutlines::from_scene(self);
         places.iter().map(|place| self.check_place(&outlines, *place).is_ok()).collect()
     }
 
-    fn check_place(&self, outlines: &Outlines, position: DVec2) -> Result<(), PoseError> {
+    fn check_place(&self, outlines: &SceneOutlines, position: DVec2) -> Result<(), PoseError> {
         let DVec2 { x: x_m, y: y_m } = position;
         within("X", x_m, MAX_COORDINATE_M)?;
         within("Y", y_m, MAX_COORDINATE_M)?;
@@ -295,7 +299,7 @@ impl Scene {
         }
     }
 
-    /// Name and distance (metres) of the nearest surface.
+    /// Id and distance (metres) of the nearest surface.
     fn nearest_surface(&self, plan: &FloorPlan, position: DVec2) -> Option<(&str, f64)> {
         let walls = self
             .walls
@@ -308,8 +312,8 @@ impl Scene {
         walls.chain(cylinders).min_by(|a, b| a.1.total_cmp(&b.1))
     }
 
-    /// Name of the body that a point is in.
-    fn body_around(&self, outlines: &Outlines, position: DVec2) -> Option<String> {
+    /// Name of the body around a point.
+    fn body_around(&self, outlines: &SceneOutlines, position: DVec2) -> Option<String> {
         let cylinder = self
             .cylinders
             .iter()
@@ -320,13 +324,13 @@ impl Scene {
 }
 
 fn number(field: &'static str, text: &str, limit: f64) -> Result<f64, PoseError> {
-    let refused = || PoseError::BadNumber { field, text: text.to_owned(), limit };
-    let value = text.parse().map_err(|_| refused())?;
-    within(field, value, limit).map_err(|_| refused())?;
+    let rejected = || PoseError::BadNumber { field, text: text.to_owned(), limit };
+    let value = text.parse().map_err(|_| rejected())?;
+    within(field, value, limit).map_err(|_| rejected())?;
     Ok(value)
 }
 
-/// Written so that NaN is refused too.
+/// Range check that rejects NaN as well.
 fn within(field: &'static str, value: f64, limit: f64) -> Result<(), PoseError> {
     if value.abs() <= limit {
         return Ok(());

@@ -1,16 +1,16 @@
-//! A scene file with walls and materials as they have become.
+//! Output of a scene file with modified walls and materials.
 
 use serde_json::{Value, json};
 
 use super::{Scene, Wall};
 
 impl Scene {
-    /// The scene's file with the places of its walls and the reflectances of its materials as they are in it now,
-    /// and all else as it was written.
+    /// Text of the scene file with the current positions of its walls and reflectances of its
+    /// materials. Everything else is unchanged.
     #[must_use]
     pub fn rewritten(&self) -> String {
         let Ok(mut file) = serde_json::from_str::<Value>(&self.text) else {
-            // Every scene was read from a text that is one.
+            // The text of a parsed scene is valid JSON.
             return self.text.to_string();
         };
         let mut walls = self.walls.iter();
@@ -52,7 +52,7 @@ mod tests {
     use crate::geometry::DVec2;
 
     #[test]
-    fn a_scene_that_did_not_change_is_the_same_and_a_moved_one_has_moved() {
+    fn updates_only_moved_walls() {
         for name in shipped::names() {
             let scene = Scene::from_json(shipped::text(name).expect("shipped")).expect("a scene");
             let again = Scene::from_json(&scene.rewritten()).expect("a scene");
@@ -62,7 +62,7 @@ mod tests {
                 (scene.poses.clone(), scene.materials.clone())
             );
             let mut moved = scene.clone();
-            // No farther than that all named poses stay where one can stand.
+            // Small enough that all named poses stay accessible.
             let by = DVec2::new(0.02, -0.01);
             moved.walls.iter_mut().for_each(|wall| (wall.a, wall.b) = (wall.a + by, wall.b + by));
             let again = Scene::from_json(&moved.rewritten()).expect("a scene");

@@ -1,4 +1,4 @@
-//! The body of the robot that carries the ranger.
+//! Body of the robot that carries the ranger.
 
 use std::sync::Arc;
 
@@ -7,39 +7,39 @@ use super::{
 };
 use crate::geometry::{DVec2, Pose, distance_to_segment};
 
-/// A robot's body, in a frame that moves and turns with the pose.
+/// Body of a robot, in the robot's frame.
 ///
-/// The frame's origin is the ranger's rotation axis, x points along the heading and y to the
-/// left of it. The body stays where it is while the ranger turns. Engines need not know
-/// bodies: [`Scene::with_robot_at`] gives a scene in which the body stands among the reflectors.
+/// The origin of the frame is the ranger's rotation axis, x points along the heading and y to the
+/// left. The body does not rotate with the ranger. Engines do not handle bodies:
+/// [`Scene::with_robot_at`] returns a scene with the body among the reflectors.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Robot {
-    /// Its name.
+    /// Identifier of the body.
     pub id: Arc<str>,
-    /// Its outline.
+    /// Outline in the robot's frame.
     pub shape: RobotShape,
-    /// Its surface.
+    /// Surface material of the body.
     pub material: Material,
-    /// From and to what height it stands, metres; `None`: without end.
+    /// Lower and upper height, metres; `None`: unbounded.
     pub z_m: Option<[f64; 2]>,
 }
 
-/// Outline of a body in the robot's frame. The ranger is outside it.
+/// Outline of a body in the robot's frame. The ranger is outside the outline.
 #[derive(Debug, Clone, PartialEq)]
 pub enum RobotShape {
-    /// Round.
+    /// Circular outline of the body.
     Circle {
-        /// Its centre, metres.
+        /// Centre in the robot's frame, metres.
         center: DVec2,
-        /// Its radius, metres.
+        /// Radius of the circle, metres.
         radius_m: f64,
     },
-    /// Flat sides between these corners, metres; the last is joined to the first.
+    /// Polygon of these corners, metres; implicitly closed.
     Outline(Vec<DVec2>),
 }
 
 impl Robot {
-    /// The body's sides in the world, with the ranger at `pose`; none for a round body.
+    /// World coordinates of the body's sides, with the ranger at `pose`; empty for a circular body.
     fn sides_at(&self, pose: &Pose) -> Vec<(DVec2, DVec2)> {
         match &self.shape {
             RobotShape::Circle { .. } => Vec::new(),
@@ -52,7 +52,8 @@ impl Robot {
         }
     }
 
-    /// Whether a place is inside the body, with the ranger at `pose`, and how far it is from its surface, metres.
+    /// Returns whether a position is inside the body, with the ranger at `pose`, and its distance
+    /// from the body's surface, metres.
     fn off_surface(&self, pose: &Pose, place: DVec2) -> (bool, f64) {
         if let RobotShape::Circle { center, radius_m } = self.shape {
             let off_m = to_world(pose, center).distance(place) - radius_m;
@@ -63,8 +64,9 @@ impl Robot {
         (contains(&sides, place), off_m.fold(f64::INFINITY, f64::min))
     }
 
-    /// Whether the body, with the ranger at `pose`, touches the segment `a`-`b` or has it inside.
-    fn meets_segment(&self, pose: &Pose, a: DVec2, b: DVec2) -> bool {
+    /// Returns `true` if the body, with the ranger at `pose`, touches or contains the segment
+    /// `a`-`b`.
+    fn intersects_segment(&self, pose: &Pose, a: DVec2, b: DVec2) -> bool {
         if let RobotShape::Circle { center, radius_m } = self.shape {
             return distance_to_segment(to_world(pose, center), a, b) < radius_m;
         }
@@ -72,8 +74,8 @@ impl Robot {
         contains(&sides, a) || sides.iter().any(|&(c, d)| cross(a, b, c, d))
     }
 
-    /// Whether the body, with the ranger at `pose`, touches a circle or has it inside.
-    fn meets_circle(&self, pose: &Pose, around: DVec2, reach_m: f64) -> bool {
+    /// Returns `true` if the body, with the ranger at `pose`, touches or contains a circle.
+    fn intersects_circle(&self, pose: &Pose, around: DVec2, reach_m: f64) -> bool {
         if let RobotShape::Circle { center, radius_m } = self.shape {
             return to_world(pose, center).distance(around) < radius_m + reach_m;
         }
@@ -84,8 +86,8 @@ impl Robot {
 }
 
 impl Scene {
-    /// This scene with the robot's body among its reflectors, for a ranger at `pose`; sides of
-    /// a body with flat sides are called `id.0`, `id.1`, ... Without a robot, a plain copy.
+    /// Copy of the scene with the robot's body among its reflectors, for a ranger at `pose`. Sides
+    /// of a polygonal body are named `id.0`, `id.1`, ... Without a robot, a plain copy.
     #[must_use]
     pub fn with_robot_at(&self, pose: &Pose) -> Self {
         let mut scene = self.clone();
@@ -108,7 +110,7 @@ impl Scene {
         scene
     }
 
-    /// Whether a place is off the surface of the robot's body at a pose, and outside of it.
+    /// Checks that a position is outside the robot's body and off its surface.
     pub(super) fn check_off_robot(
         &self,
         pose: &Pose,
@@ -125,14 +127,14 @@ impl Scene {
         if inside { Err(PoseError::InsideBody { x_m, y_m, body: name, room }) } else { Ok(()) }
     }
 
-    /// Whether the robot's body fits at a pose.
+    /// Checks that the robot's body fits at a pose.
     pub(super) fn check_robot(&self, plan: &FloorPlan, pose: &Pose) -> Result<(), PoseError> {
         let Some(robot) = &self.robot else { return Ok(()) };
         let walls = self.walls.iter().zip(&plan.walls);
-        let mut met = walls.filter(|(_, (a, b))| robot.meets_segment(pose, *a, *b));
-        let wall = met.next().map(|(wall, _)| wall);
+        let mut hits = walls.filter(|(_, (a, b))| robot.intersects_segment(pose, *a, *b));
+        let wall = hits.next().map(|(wall, _)| wall);
         let cylinder =
-            || self.cylinders.iter().find(|c| robot.meets_circle(pose, c.center, c.radius_m));
+            || self.cylinders.iter().find(|c| robot.intersects_circle(pose, c.center, c.radius_m));
         match wall.map(|wall| &wall.id).or_else(|| cylinder().map(|cylinder| &cylinder.id)) {
             None => Ok(()),
             Some(reflector) => Err(PoseError::BodyCollides {
@@ -150,12 +152,12 @@ fn to_world(pose: &Pose, point: DVec2) -> DVec2 {
     pose.position() + DVec2::from_angle(pose.direction_rad(0.0)).rotate(point)
 }
 
-/// Index of a wall of a plan that stands between two places, if there is one.
+/// Index of a plan's wall between two positions, if there is one.
 pub(super) fn wall_between(plan: &FloorPlan, from: DVec2, to: DVec2) -> Option<usize> {
     plan.walls.iter().position(|&(a, b)| cross(from, to, a, b))
 }
 
-/// Whether two segments cross or touch.
+/// Returns `true` if two segments cross or touch.
 fn cross(a: DVec2, b: DVec2, c: DVec2, d: DVec2) -> bool {
     let side = |p: DVec2, q: DVec2, r: DVec2| (q - p).perp_dot(r - p);
     let (c_side, d_side) = (side(a, b, c), side(a, b, d));

@@ -1,6 +1,6 @@
-//! The scenes that come with the program, so that an installed binary knows them by name.
+//! Scenes included in the program, available by name from an installed binary.
 
-/// A shipped scene: its name and the text of its file.
+/// Shipped scenes: names and texts of their files.
 pub const SCENES: &[(&str, &str)] = &[
     ("simple-room", include_str!("../../../../scenes/simple-room.json")),
     ("simple-room-robot", include_str!("../../../../scenes/simple-room-robot.json")),
@@ -13,13 +13,13 @@ pub const SCENES: &[(&str, &str)] = &[
     ("plane-corner-edge", include_str!("../../../../scenes/plane-corner-edge.json")),
 ];
 
-/// The text of a shipped scene.
+/// Text of a shipped scene, if there is one of that name.
 #[must_use]
 pub fn text(name: &str) -> Option<&'static str> {
     SCENES.iter().find(|(known, _)| *known == name).map(|(_, text)| *text)
 }
 
-/// Names of the shipped scenes.
+/// Names of the shipped scenes, in order.
 pub fn names() -> impl Iterator<Item = &'static str> {
     SCENES.iter().map(|(name, _)| *name)
 }

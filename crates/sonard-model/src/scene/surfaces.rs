@@ -1,11 +1,11 @@
-//! Surfaces that were found in drawings, maps and worlds of others, on the way to a scene.
+//! Surfaces imported from drawings, maps and simulated worlds, as input of a scene.
 
 use std::collections::BTreeMap;
 
 use super::{Scene, SceneBuilder};
 use crate::geometry::DVec2;
 
-/// Walls and round bodies by the names of what they were found in, and a count of what makes none.
+/// Imported walls and round bodies by name, and counts of ignored elements.
 ///
 /// ```
 /// use sonard_model::{geometry::DVec2, scene::Surfaces};
@@ -23,30 +23,31 @@ pub struct Surfaces {
     left_out: BTreeMap<&'static str, usize>,
 }
 
-/// A surface that was found.
+/// Imported surface of a scene.
 #[derive(Debug, Clone, PartialEq)]
 enum Surface {
-    /// A row of walls, metres.
+    /// Row of walls, metres.
     Walls { corners: Vec<DVec2>, is_closed: bool },
-    /// An upright round body, metres.
+    /// Upright round body, metres.
     Round { center: DVec2, radius_m: f64 },
 }
 
-/// Points this near are one, metres: scenes are written to a tenth of a millimetre.
+/// Tolerance for coincident points, metres: scenes are written to a tenth of a millimetre.
 const SAME_M: f64 = 2e-4;
-/// The material of everything.
+/// Name of the single material.
 const MATERIAL: &str = "wall";
 
 impl Surfaces {
-    /// Keeps a row of walls, unless it has no length; one that comes back to its first corner is closed.
+    /// Adds a row of walls, unless it has no length. A row that returns to its first corner is
+    /// closed.
     pub fn walls(&mut self, name: &str, mut corners: Vec<DVec2>, is_closed: bool) {
         corners.dedup_by(|a, b| a.distance(*b) < SAME_M);
-        let meets = |corners: &[DVec2]| match corners {
+        let is_ring = |corners: &[DVec2]| match corners {
             [first, .., last] => corners.len() > 2 && first.distance(*last) < SAME_M,
             _ => false,
         };
-        let is_closed = (is_closed || meets(&corners)) && corners.len() > 2;
-        if meets(&corners) {
+        let is_closed = (is_closed || is_ring(&corners)) && corners.len() > 2;
+        if is_ring(&corners) {
             corners.pop();
         }
         if corners.len() > 1 && corners.iter().all(|corner| corner.is_finite()) {
@@ -55,31 +56,31 @@ impl Surfaces {
         }
     }
 
-    /// Keeps an upright round body, unless it has no width.
+    /// Adds an upright round body, unless it has no width.
     pub fn round(&mut self, name: &str, center: DVec2, radius_m: f64) {
         if radius_m > SAME_M && radius_m.is_finite() && center.is_finite() {
             self.found.push((name.to_owned(), Surface::Round { center, radius_m }));
         }
     }
 
-    /// Counts what makes no wall.
+    /// Counts an element that is not converted to walls.
     pub fn leave_out(&mut self, what: &'static str) {
         *self.left_out.entry(what).or_default() += 1;
     }
 
-    /// What makes no wall, with how often it was met.
+    /// Ignored kinds of elements, with their counts.
     pub fn left_out(&self) -> impl Iterator<Item = (&'static str, usize)> + '_ {
         self.left_out.iter().map(|(what, count)| (*what, *count))
     }
 
-    /// Whether nothing was found.
+    /// Returns `true` if no surface was added.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.found.is_empty()
     }
 
-    /// The scene of what was found, of one material that mirrors such a share of the amplitude, 0 to 1. Rounded to a
-    /// tenth of a millimetre: nobody draws finer.
+    /// Scene of all surfaces, of one material with an amplitude reflection coefficient of 0 to 1.
+    /// Coordinates are rounded to a tenth of a millimetre, finer than any drawing.
     #[must_use]
     pub fn scene(&self, name: &str, reflectance: f64) -> SceneBuilder {
         let empty = Scene::builder(name).material(MATERIAL, reflectance);
@@ -113,7 +114,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn lines_without_length_are_none_and_a_ring_that_comes_back_is_closed() {
+    fn ignores_empty_and_closes_rings() {
         let mut found = Surfaces::default();
         let corner = |x: f64, y: f64| DVec2::new(x, y);
         found.walls("dot", vec![corner(1.0, 1.0), corner(1.0, 1.0 + 1e-5)], false);
@@ -122,23 +123,23 @@ mod tests {
         assert!(found.is_empty());
         let ring = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 0.0)].map(|(x, y)| corner(x, y));
         found.walls("ring", ring.to_vec(), false);
-        found.walls("there and back", vec![ring[0], ring[1], ring[0]], true);
-        let [(_, one), (_, other)] = &found.found[..] else { panic!("{found:?}") };
-        assert!(matches!(one, Surface::Walls { corners, is_closed: true } if corners.len() == 3));
+        found.walls("retraced", vec![ring[0], ring[1], ring[0]], true);
+        let [(_, ring), (_, retraced)] = &found.found[..] else { panic!("{found:?}") };
+        assert!(matches!(ring, Surface::Walls { corners, is_closed: true } if corners.len() == 3));
         assert!(
-            matches!(other, Surface::Walls { corners, is_closed: false } if corners.len() == 2)
+            matches!(retraced, Surface::Walls { corners, is_closed: false } if corners.len() == 2)
         );
     }
 
     #[test]
-    fn what_makes_no_wall_is_counted() {
+    fn counts_ignored_elements() {
         let mut found = Surfaces::default();
         ["texts", "arcs", "texts"].into_iter().for_each(|what| found.leave_out(what));
         assert_eq!(found.left_out().collect::<Vec<_>>(), [("arcs", 1), ("texts", 2)]);
     }
 
     #[test]
-    fn what_was_found_is_a_scene() {
+    fn surfaces_become_a_scene() {
         let mut found = Surfaces::default();
         found.round("column", DVec2::new(3.000_04, 1.0), 0.2);
         let ring = [[0.0, 0.0], [4.0, 0.0], [4.0, 3.0]].map(DVec2::from);

@@ -1,6 +1,6 @@
+mod accessibility;
 mod errors;
 mod plans;
-mod standing;
 
 use super::*;
 
@@ -22,7 +22,7 @@ fn good() -> Scene {
 }
 
 #[test]
-fn a_scene_is_read_with_its_polylines_cut_into_segments() {
+fn polylines_become_segments() {
     let scene = good();
     let ids: Vec<&str> = scene.walls.iter().map(|wall| &*wall.id).collect();
     assert_eq!(ids, ["south", "rest.0", "rest.1", "rest.2", "pillar.0", "pillar.1", "pillar.2"]);
@@ -40,22 +40,21 @@ fn a_scene_is_read_with_its_polylines_cut_into_segments() {
 }
 
 #[test]
-fn sha256_is_that_of_the_text() {
+fn sha256_covers_the_text() {
     // printf '%s' '{"name":"e","materials":{}}' | sha256sum
     let scene = Scene::from_json(r#"{"name":"e","materials":{}}"#).expect("an empty scene");
     assert_eq!(scene.sha256, "4b036c0d60e29f6609387a558642084f9bd0fddd5152a8e4531910d7c7c2b4d2");
 }
 
 #[test]
-fn a_robot_has_one_shape_and_leaves_the_ranger_outside() {
+fn robot_has_one_shape() {
     let robot = |shape: &str| {
         let member = format!(
             "\"robot\": {{\"id\": \"b12\", \"material\": \"board\", {shape}}}, \"floor_z_m\""
         );
         Scene::from_json(&GOOD.replace("\"floor_z_m\"", &member))
     };
-    let round =
-        robot(r#""circle": {"center": [-0.16, 0], "radius_m": 0.15}"#).expect("a round one");
+    let round = robot(r#""circle": {"center": [-0.16, 0], "radius_m": 0.15}"#).expect("a circle");
     // Heading 90 degrees at (0.5, 0.5): 0.16 m behind is 0.16 m below.
     let with_body = round.with_robot_at(&round.poses["door"]);
     let body = with_body.cylinders.last().expect("the body");
@@ -63,7 +62,7 @@ fn a_robot_has_one_shape_and_leaves_the_ranger_outside() {
     assert_eq!(&*body.id, "b12");
 
     let flat = robot(r#""outline": [[-0.1, 0.1], [-0.3, 0.1], [-0.3, -0.1], [-0.1, -0.1]]"#)
-        .expect("a flat one");
+        .expect("an outline");
     let with_body = flat.with_robot_at(&flat.poses["door"]);
     assert_eq!(with_body.walls.len(), flat.walls.len() + 4);
     let first = &with_body.walls[flat.walls.len()];
@@ -76,11 +75,11 @@ fn a_robot_has_one_shape_and_leaves_the_ranger_outside() {
         (r#""z_m": [0, 1]"#, "robot: a robot has either"),
         (
             r#""circle": {"center": [-0.7, 0], "radius_m": 0.65}"#,
-            "the body `b12` runs into `south`",
+            "the body `b12` collides with `south`",
         ),
         (
             r#""outline": [[-0.1, 0.1], [-0.7, 0.1], [-0.1, -0.1]]"#,
-            "the body `b12` runs into `south`",
+            "the body `b12` collides with `south`",
         ),
     ] {
         let error = robot(shape).expect_err(problem).to_string();
@@ -89,7 +88,7 @@ fn a_robot_has_one_shape_and_leaves_the_ranger_outside() {
 }
 
 #[test]
-fn poses_are_named_or_in_numbers() {
+fn poses_by_name_or_coordinates() {
     let scene = good();
     assert_eq!(scene.pose("door"), Ok(Pose { x_m: 0.5, y_m: 0.5, heading_deg: 90.0 }));
     assert_eq!(scene.pose(" 1 , -2.5 "), Ok(Pose { x_m: 1.0, y_m: -2.5, heading_deg: 0.0 }));
@@ -111,25 +110,25 @@ fn poses_are_named_or_in_numbers() {
 }
 
 #[test]
-fn shipped_scenes_pass_their_check() {
+fn shipped_scenes_are_valid() {
     for (name, text) in shipped::SCENES {
         let scene = Scene::from_json(text).unwrap_or_else(|error| panic!("{name}: {error}"));
         assert_eq!(scene.name, *name);
         assert!(scene.source.is_some(), "{name} names no source");
-        assert!(!scene.approximate.is_empty(), "{name} does not say what is approximate");
+        assert!(!scene.approximate.is_empty(), "{name} lists no approximations");
         assert!(!scene.poses.is_empty(), "{name} has no pose");
     }
 }
 
 #[test]
-fn the_committed_schema_is_current() {
+fn committed_schema_is_current() {
     let current = format!("{:#}\n", json_schema());
     let committed = include_str!("../../../../scenes/scene.schema.json");
-    assert!(current == committed, "write it again: sonard scene schema > scenes/scene.schema.json");
+    assert!(current == committed, "regenerate it: sonard scene schema > scenes/scene.schema.json");
 }
 
 #[test]
-fn each_scene_file_is_shipped_under_its_name() {
+fn scene_files_match_shipped_names() {
     let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../../scenes");
     let mut files: Vec<String> = std::fs::read_dir(folder)
         .expect("the scenes")

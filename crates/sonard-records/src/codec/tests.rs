@@ -10,7 +10,7 @@ fn line_of(kind: &str) -> &'static str {
 }
 
 #[test]
-fn every_record_of_the_fixture_comes_back_as_the_same_json() {
+fn fixture_round_trips() {
     for line in LOG.lines() {
         let record = decode_line(line.as_bytes()).expect("the fixture is clean");
         let mut written = Vec::new();
@@ -24,7 +24,7 @@ fn every_record_of_the_fixture_comes_back_as_the_same_json() {
     }
 }
 
-/// Kind, column and field of the fault on a line.
+/// Asserts kind, column and field of the error of a line.
 fn check(line: impl AsRef<[u8]>, kind: FaultKind, column: Option<usize>, field: &str) {
     let shown = String::from_utf8_lossy(line.as_ref()).into_owned();
     let fault = decode_line(line.as_ref()).expect_err(&shown);
@@ -37,7 +37,7 @@ fn check(line: impl AsRef<[u8]>, kind: FaultKind, column: Option<usize>, field: 
 }
 
 #[test]
-fn damage_is_named_with_its_place() {
+fn damage_is_located() {
     let ping = line_of("ping");
     check("", FaultKind::Empty, None, "");
     check(" \r", FaultKind::Empty, None, "");
@@ -79,14 +79,14 @@ fn damage_is_named_with_its_place() {
 }
 
 #[test]
-fn unknown_fields_and_carriage_returns_do_no_harm() {
+fn ignores_unknown_fields() {
     let ping = line_of("ping");
     let more = ping.replace("\"index\"", "\"note\":{\"a\":[1,2]},\"index\"") + "\r";
     assert_eq!(decode_line(more.as_bytes()), decode_line(ping.as_bytes()));
 }
 
 #[test]
-fn what_no_reader_would_take_is_not_written() {
+fn rejects_unreadable_records() {
     let Ok(Record::Ping(ping)) = decode_line(line_of("ping").as_bytes()) else {
         panic!("the fixture is clean")
     };
@@ -100,7 +100,7 @@ fn what_no_reader_would_take_is_not_written() {
     let error = encode_line(&Record::Ping(long), &mut line).expect_err("too long");
     assert!(matches!(error, EncodeError::TooLong(_)), "{error}");
     assert_eq!(line, b"before");
-    // What may be unknown is written as unknown.
+    // Optional values may be non-finite and are encoded as null.
     let mut unknown = ping;
     unknown.range_m = Some(f64::INFINITY);
     encode_line(&Record::Ping(unknown), &mut line).expect("null is a value");
@@ -110,7 +110,7 @@ fn what_no_reader_would_take_is_not_written() {
 
 proptest! {
     #[test]
-    fn every_finite_number_comes_back_bit_for_bit(
+    fn finite_numbers_round_trip(
         range_m in proptest::num::f64::NORMAL | proptest::num::f64::SUBNORMAL,
         azimuth_deg in 0.0..360.0_f64,
         ticks in any::<u64>(),
@@ -128,13 +128,13 @@ proptest! {
     }
 
     #[test]
-    fn no_bytes_make_it_panic(bytes in proptest::collection::vec(any::<u8>(), 0..200)) {
+    fn arbitrary_bytes_do_not_panic(bytes in proptest::collection::vec(any::<u8>(), 0..200)) {
         let _ = decode_line(&bytes);
     }
 
-    /// Nearly right lines reach deeper than noise.
+    /// Nearly valid lines exercise more code than noise.
     #[test]
-    fn no_change_of_a_record_makes_it_panic(
+    fn modified_records_do_not_panic(
         line in 0..11_usize, at in 0..2000_usize, byte in any::<u8>(), cut in any::<bool>(),
     ) {
         let mut bytes = LOG.lines().nth(line).expect("11 lines").as_bytes().to_vec();

@@ -1,21 +1,23 @@
-//! Posts: thin upright cylinders, which sound goes round, as chair legs are.
+//! Posts: thin upright cylinders, such as chair legs, with diffraction all around.
 //!
-//! The field of a line source beside a cylinder of radius `a` is a series of cylindrical waves (Bowman, Senior and
-//! Uslenghi, Electromagnetic and Acoustic Scattering by Simple Shapes, 1969, section 2.2). With the admittance `b`
-//! of its surface, relative to that of air, and for `exp(+i omega t)` what it adds is
+//! The field of a line source near a cylinder of radius `a` is a series of cylindrical waves
+//! (Bowman, Senior and Uslenghi, Electromagnetic and Acoustic Scattering by Simple Shapes, 1969,
+//! section 2.2). With the surface admittance `b` relative to that of air, and for `exp(+i omega
+//! t)`, the scattered field is
 //!
 //! ```text
 //! D = -sqrt(2 / (pi k)) exp(i pi / 4) sum_n e_n T_n cos(n p) exp(-i (n^2 - 1/4) / (2 k L))
 //! T_n = (J_n'(ka) - i b J_n(ka)) / (H_n'(ka) - i b H_n(ka))        e_0 = 1, else 2
 //! ```
 //!
-//! with Hankel's functions of the second kind and the angle `p` between the directions of propagation before and
-//! after. `H_n(k s) H_n(k s')` of the legs to the axis stands in it by its phase at some distance (Abramowitz and
-//! Stegun, 9.2.29, to the second term), which depends on the distance parameter `L` alone; a radius off the surface
-//! that is right to some per cent, at ten to a thousandth.
+//! with Hankel functions of the second kind and the angle `p` between the directions of propagation
+//! before and after. `H_n(k s) H_n(k s')` of the legs to the axis is approximated by its phase at a
+//! distance (Abramowitz and Stegun, 9.2.29, to the second term), which depends on the distance
+//! parameter `L` alone. The error is a few percent at one radius from the surface, 0.1 % at ten.
 //!
-//! This is all that a post does, to all sides: reflection, what creeps round it, and its shadow, which is `-2 a /
-//! sqrt(lambda L)` of the sound behind it. No mirror echo and no shadow is to be added to it.
+//! The series is the complete scattered field in all directions: reflection, creeping waves, and
+//! the shadow, `-2 a / sqrt(lambda L)` of the sound behind the post. No mirror echo and no shadow
+//! has to be added.
 
 use std::f64::consts::{FRAC_PI_4, PI};
 
@@ -23,23 +25,24 @@ use num_complex::Complex64;
 
 use super::Aspect;
 
-/// Thickest post, as the wave number times its radius: 1.7 cm at 49.4 kHz.
+/// Maximum wave number times radius of a post: 1.7 cm at 49.4 kHz.
 pub const MOST_KA: f64 = 15.0;
 
-/// Terms beyond `ka`, which fall faster than exponentially there.
+/// Number of terms beyond `ka`, where the series decays faster than exponentially.
 const TERMS_BEYOND: f64 = 12.0;
 
-/// A thin upright cylinder.
+/// Precomputed scattering series of a thin upright cylinder.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Post {
     radius_m: f64,
     wave_number_per_m: f64,
-    /// `-sqrt(2 / (pi k)) exp(i pi / 4) e_n T_n (-1)^n`.
+    /// Coefficients `-sqrt(2 / (pi k)) exp(i pi / 4) e_n T_n (-1)^n`.
     terms: Vec<Complex64>,
 }
 
 impl Post {
-    /// A cylinder of a radius and a reflectance at `wave_number_per_m`; `None` if it is too thick to be one.
+    /// Creates a post of a radius and a reflectance at `wave_number_per_m`; `None` if it is too
+    /// thick.
     #[must_use]
     pub fn new(radius_m: f64, reflectance: f64, wave_number_per_m: f64) -> Option<Self> {
         let ka = wave_number_per_m * radius_m;
@@ -48,25 +51,25 @@ impl Post {
         fits.then(|| Self { radius_m, wave_number_per_m, terms: terms() })
     }
 
-    /// By how much the path by its surface is shorter than that by its axis, metres: the envelope of a pulse comes by
-    /// the surface.
+    /// Path difference between the axis and the surface, metres. The envelope of a pulse travels
+    /// via the surface.
     #[must_use]
     pub fn lead_m(&self, aspect: &Aspect) -> f64 {
         2.0 * self.radius_m * (0.5 * (aspect.out_rad - aspect.in_rad)).cos().abs()
     }
 
-    /// Its radius, metres.
+    /// Radius of the post, metres.
     #[must_use]
     pub const fn radius_m(&self) -> f64 {
         self.radius_m
     }
 
-    /// Field of the post relative to that of a head-on rigid wall, between directions from its axis and with the
-    /// distance parameter of the legs to it.
+    /// Field of the post relative to that of a head-on rigid wall, between directions from its axis
+    /// and with the distance parameter of the legs to it.
     #[must_use]
     pub fn echo(&self, aspect: &Aspect) -> Complex64 {
         let Aspect { in_rad, out_rad, distance_m } = *aspect;
-        // Back to the source is the angle 0 here, hence the signs in the terms.
+        // The backward direction has the angle 0 here, hence the signs in the terms.
         let step = Complex64::cis(out_rad - in_rad);
         let near = -0.5 / (self.wave_number_per_m * distance_m);
         let (mut turn, mut sum) = (Complex64::ONE, Complex64::ZERO);
@@ -78,7 +81,8 @@ impl Post {
         sum / distance_m.sqrt()
     }
 
-    /// The most that it sends anywhere but behind it is the mirror's field; there it is the shadow.
+    /// Upper bound of the field in all directions: the shadow behind the post, which exceeds the
+    /// reflection elsewhere.
     #[must_use]
     pub fn bound(&self, distance_m: f64) -> f64 {
         self.terms.iter().map(|term| term.norm()).sum::<f64>() / distance_m.sqrt()
@@ -91,25 +95,25 @@ fn terms(ka: f64, reflectance: f64, wave_number_per_m: f64) -> Vec<Complex64> {
     let term = |n: i32| {
         let [j, y] = [libm::jn(n, ka), libm::yn(n, ka)];
         let [j_slope, y_slope] = [slope(libm::jn, n, ka), slope(libm::yn, n, ka)];
-        let of = |slope: Complex64, value: Complex64| slope - admittance * value;
-        let ratio = of(j_slope.into(), j.into())
-            / of(Complex64::new(j_slope, -y_slope), Complex64::new(j, -y));
+        let boundary = |slope: Complex64, value: Complex64| slope - admittance * value;
+        let ratio = boundary(j_slope.into(), j.into())
+            / boundary(Complex64::new(j_slope, -y_slope), Complex64::new(j, -y));
         let weight = if n == 0 { 1.0 } else { 2.0 };
         let sign = if n % 2 == 0 { 1.0 } else { -1.0 };
         scale * weight * sign * ratio
     };
     let count = (ka + TERMS_BEYOND) as i32;
-    // Far beyond `ka` the functions of the second kind overflow; what they divide is nothing then.
+    // Far beyond `ka` the functions of the second kind overflow, and the terms vanish.
     (0..count).map(term).take_while(|term| term.is_finite()).collect()
 }
 
-/// The derivative of a cylinder function of whole order.
-fn slope(of: fn(i32, f64) -> f64, n: i32, x: f64) -> f64 {
-    if n == 0 { -of(1, x) } else { 0.5 * (of(n - 1, x) - of(n + 1, x)) }
+/// Derivative of a cylinder function of integer order.
+fn slope(function: fn(i32, f64) -> f64, n: i32, x: f64) -> f64 {
+    if n == 0 { -function(1, x) } else { 0.5 * (function(n - 1, x) - function(n + 1, x)) }
 }
 
-/// The whole series of a rigid cylinder with Hankel's functions of the legs, relative to the field that a line
-/// source leaves over both: what posts are held to. The legs to its axis have an angle between them.
+/// Exact series of a rigid cylinder with Hankel functions of the legs, relative to the field of a
+/// line source over both legs: the reference for posts. The legs to the axis enclose `between_rad`.
 #[cfg(test)]
 pub(crate) fn series(
     radius_m: f64,
@@ -127,7 +131,7 @@ pub(crate) fn series(
         -weight * ratio * wave * (f64::from(n) * between_rad).cos()
     };
     let sum: Complex64 = (0..ka as i32 + 14).map(term).sum();
-    // The field of a line source that has run the same length, by its amplitude and phase far away.
+    // Free field of a line source over the same length, in the far-field approximation.
     let length_m = there_m + back_m;
     let free = (2.0 / (PI * wave_number_per_m * length_m)).sqrt()
         * Complex64::cis(FRAC_PI_4 - wave_number_per_m * length_m);
@@ -147,7 +151,7 @@ mod tests {
     }
 
     #[test]
-    fn a_post_has_the_field_of_the_whole_series_at_any_angle_and_distance() {
+    fn post_matches_exact_series() {
         let mut worst: f64 = 0.0;
         for radius_m in [0.002, 0.005, 0.01, 0.0165] {
             let post = Post::new(radius_m, 1.0, K).expect("thin");
@@ -164,28 +168,28 @@ mod tests {
             }
         }
         assert!(worst < 0.01, "{worst}");
-        println!("posts: off by {worst:.1e} of the field at most");
+        println!("posts: maximum relative error {worst:.1e}");
     }
 
-    /// Before a convex mirror of radius `a`, at the distance `s` from its surface, the tube of rays has spread to
-    /// `2 s (1 + s / a)` where a flat one leaves `2 s`.
+    /// In front of a convex mirror of radius `a`, at the distance `s` from its surface, the ray
+    /// tube has spread to `2 s (1 + s / a)`, compared with `2 s` for a flat one.
     #[test]
-    fn a_thick_post_reflects_as_a_mirror_does() {
+    fn thick_post_reflects_like_a_mirror() {
         for (radius_m, within) in [(0.01_f64, 0.03), (0.0165, 0.015)] {
             let gap_m: f64 = 1.0;
             let range_m = gap_m + radius_m;
             let spread = (1.0 + gap_m / radius_m).sqrt().recip();
-            // The length that a post's echo is told with is that to its axis.
+            // The path length of a post's echo is measured to its axis.
             let mirror = spread * (range_m / gap_m).sqrt();
             let ratio = back(radius_m, 1.0, range_m).norm() / mirror;
             assert!((ratio - 1.0).abs() < within, "{radius_m}: {ratio}");
         }
     }
 
-    /// The phase turns with the frequency as that of a path by the surface, to the middle of which it is
-    /// `2 a sin(p / 2)` shorter than to the axis: so the pulse does not come by the axis.
+    /// The phase varies with frequency like that of a path via the surface, whose midpoint is `2 a
+    /// sin(p / 2)` closer than the axis.
     #[test]
-    fn the_pulse_comes_by_the_surface() {
+    fn pulse_travels_via_the_surface() {
         for radius_m in [0.008, 0.012, 0.016] {
             let field = |k: f64, out_rad: f64| {
                 let post = Post::new(radius_m, 1.0, k).expect("thin");
@@ -195,7 +199,7 @@ mod tests {
                 let turned = (field(1.001 * K, out_rad) / field(0.999 * K, out_rad)).arg();
                 let aspect = Aspect { in_rad: 0.0, out_rad, distance_m: 0.5 };
                 let lead_m = Post::new(radius_m, 1.0, K).expect("thin").lead_m(&aspect);
-                // The waves that creep round it beat with it, the more so towards the shadow.
+                // Interference with creeping waves, which increases towards the shadow.
                 let delay_m = turned / (0.002 * K) - lead_m;
                 assert!(delay_m.abs() < 3.2e-3, "{radius_m} {out_rad}: {delay_m}");
             }
@@ -203,19 +207,18 @@ mod tests {
     }
 
     #[test]
-    fn behind_it_is_its_shadow_by_its_width() {
+    fn shadow_scales_with_the_width() {
         let (radius_m, distance_m) = (0.0165, 20.0);
         let post = Post::new(radius_m, 1.0, K).expect("thin");
         let behind = post.echo(&Aspect { in_rad: 0.0, out_rad: PI, distance_m });
         let expected = -2.0 * radius_m / (TAU / K * distance_m).sqrt() * Complex64::cis(FRAC_PI_4);
-        // Its edge is no knife's: by about (ka)^(-2/3), 16 %.
+        // The deviation from a flat screen is about (ka)^(-2/3), 16 %.
         assert!((behind - expected).norm() < 0.2 * expected.norm(), "{behind} {expected}");
         assert!(post.bound(distance_m) >= behind.norm());
     }
 
-    /// A surface that takes all in sends less back, and hides as much.
     #[test]
-    fn what_absorbs_reflects_less_and_hides_as_much() {
+    fn absorption_keeps_the_shadow() {
         let post = |reflectance| Post::new(0.015, reflectance, K).expect("thin");
         let field = |reflectance: f64, out_rad: f64| {
             post(reflectance).echo(&Aspect { in_rad: 0.0, out_rad, distance_m: 0.5 }).norm()
@@ -226,11 +229,11 @@ mod tests {
     }
 
     #[test]
-    fn it_reads_the_same_backwards_and_a_thick_cylinder_is_no_post() {
+    fn is_reciprocal_and_thin() {
         let post = Post::new(0.012, 0.8, K).expect("thin");
-        for (one, other) in [(0.3, 2.0), (1.0, -0.4), (2.9, -2.0)] {
+        for (a, b) in [(0.3, 2.0), (1.0, -0.4), (2.9, -2.0)] {
             let field = |in_rad, out_rad| post.echo(&Aspect { in_rad, out_rad, distance_m: 0.3 });
-            assert!((field(one, other) - field(other, one)).norm() < 1e-12);
+            assert!((field(a, b) - field(b, a)).norm() < 1e-12);
         }
         assert_eq!(Post::new(0.02, 1.0, K), None);
         assert_eq!(Post::new(0.0, 1.0, K), None);

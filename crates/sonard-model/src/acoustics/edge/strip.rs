@@ -1,10 +1,12 @@
-//! Narrow strips: free-standing walls of a wavelength or less, whose ends are not edges of their own any more.
+//! Narrow strips: free-standing walls of at most a wavelength, whose ends do not diffract
+//! independently.
 //!
-//! A rigid strip of half-width `a` scatters by the jump of the pressure across it. With
-//! `t = x / a` along it that jump is `sum b_n sqrt(1 - t^2) U_n(t)` (Chebyshev's polynomials of the second kind,
-//! which have the right behaviour at both ends), and in the spectrum of plane waves what the air's velocity across
-//! the strip has to be makes a small symmetric system of it, for `kappa = k a` and a plane wave at the angle `i`
-//! from the strip (Galerkin's method; Butler 1985 and others for the strip in electromagnetism):
+//! A rigid strip of half-width `a` scatters by the pressure jump across it. With `t = x / a` along
+//! the strip the jump is `sum b_n sqrt(1 - t^2) U_n(t)` (Chebyshev polynomials of the second kind,
+//! with the correct behaviour at both ends). The boundary condition on the normal velocity, in the
+//! plane-wave spectrum, then gives a small symmetric system for `kappa = k a` and a plane wave at
+//! the angle `i` from the strip (Galerkin's method; Butler 1985 and others for the strip in
+//! electromagnetism):
 //!
 //! ```text
 //! sum_n I_mn X_n = 2 kappa sin i (-1)^m j_m(kappa cos i),       j_n(u) = J_{n+1}(u) / u
@@ -12,11 +14,13 @@
 //! D = pi / 2 kappa sin o sum_n X_n j_n(kappa cos o) exp(-i pi / 4) / sqrt(2 pi k)
 //! ```
 //!
-//! with `D` the coefficient of a line in the strip's middle, for `exp(-i omega t)`, towards `o`. A hair
-//! (`kappa -> 0`) gives `pi / 2 kappa^2 sin i sin o / sqrt(2 pi k)`, as it has to.
+//! with `D` the coefficient of a line source in the strip's middle, for `exp(-i omega t)`, towards
+//! `o`. The limit `kappa -> 0` is `pi / 2 kappa^2 sin i sin o / sqrt(2 pi k)`, as required for a
+//! thin wire.
 //!
-//! This is all that a strip does, to either side: no mirror echo and no shadow is to be added to it. The far field
-//! of a wavelength serves from some centimetres on: at 3 cm the fronts' curvature over it is 0.4 rad.
+//! The solution is the complete scattered field on either side: no mirror echo and no shadow has to
+//! be added. For a strip of one wavelength the far field is adequate from a few centimetres on: at
+//! 3 cm the wavefront curvature over it is 0.4 rad.
 
 use std::f64::consts::{FRAC_PI_4, PI, TAU};
 
@@ -24,28 +28,30 @@ use num_complex::Complex64;
 
 use super::Aspect;
 
-/// Polynomials in the jump: those left out matter by less than 1e-6 up to [`MOST_WAVELENGTHS`].
+/// Number of polynomials: the truncation error is below 1e-6 up to [`MOST_WAVELENGTHS`].
 const TERMS: usize = 8;
 
-/// Widest strip, wavelengths: above it the diffraction at its ends is right to 0.5 dB where it is seen head-on.
+/// Maximum width of a strip, wavelengths. Above it, edge diffraction at its ends is accurate to 0.5
+/// dB for head-on incidence.
 pub const MOST_WAVELENGTHS: f64 = 1.0;
 
-/// Points of the integrals on either side of `kappa`, and how far these go.
+/// Quadrature points on either side of `kappa`, and upper limit of the integrals.
 const POINTS: u32 = 300;
 const LAST_U: f64 = 60.0;
 
-/// A free-standing wall of a wavelength or less.
+/// Free-standing wall of at most a wavelength.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Strip {
     width_m: f64,
     wave_number_per_m: f64,
     reflectance: f64,
-    /// The inverse of `I`, with the signs of the right side.
+    /// Inverse of `I`, with the signs of the right-hand side.
     inverse: [[Complex64; TERMS]; TERMS],
 }
 
 impl Strip {
-    /// A strip of a width and a reflectance at `wave_number_per_m`; `None` if it is too wide to be one.
+    /// Creates a strip of a width and a reflectance at `wave_number_per_m`; `None` if it is too
+    /// wide.
     #[must_use]
     pub fn new(width_m: f64, reflectance: f64, wave_number_per_m: f64) -> Option<Self> {
         let is_narrow = width_m * wave_number_per_m <= MOST_WAVELENGTHS * TAU;
@@ -53,8 +59,9 @@ impl Strip {
         is_narrow.then(|| Self { width_m, wave_number_per_m, reflectance, inverse: inverse() })
     }
 
-    /// Field of the strip relative to that of a head-on rigid wall, between directions counter-clockwise from it.
-    /// What absorbs in front hides as much as before behind.
+    /// Field of the strip relative to that of a head-on rigid wall, between directions
+    /// counter-clockwise from it. Absorption reduces the reflection in front but not the shadow
+    /// behind.
     #[must_use]
     pub fn echo(&self, aspect: &Aspect) -> Complex64 {
         let is_in_front = aspect.in_rad.sin() * aspect.out_rad.sin() > 0.0;
@@ -62,7 +69,8 @@ impl Strip {
         gain * self.coefficient(aspect.in_rad, aspect.out_rad) / aspect.distance_m.sqrt()
     }
 
-    /// The strip's coefficient for `exp(+i omega t)`, between directions counter-clockwise from it.
+    /// Scattering coefficient for `exp(+i omega t)`, between directions counter-clockwise from the
+    /// strip.
     fn coefficient(&self, in_rad: f64, out_rad: f64) -> Complex64 {
         let k = self.wave_number_per_m;
         let kappa = 0.5 * k * self.width_m;
@@ -75,8 +83,8 @@ impl Strip {
     }
 }
 
-/// `I_mn` of the module's description. Below `kappa` with `u = kappa sin p`, above it with `u = kappa cosh q`,
-/// where the integral at rest, `1 / (2 (n + 1))`, is taken off first.
+/// Integrals `I_mn` of the module documentation, with `u = kappa sin p` below `kappa` and `u =
+/// kappa cosh q` above. The static integral, `1 / (2 (n + 1))`, is subtracted first.
 fn integrals(kappa: f64) -> [[Complex64; TERMS]; TERMS] {
     let mut sums = [[Complex64::ZERO; TERMS]; TERMS];
     let mut add = |u: f64, weight: Complex64| {
@@ -90,7 +98,7 @@ fn integrals(kappa: f64) -> [[Complex64; TERMS]; TERMS] {
     let i = Complex64::I;
     for (p, weight) in simpson(0.5 * PI) {
         let u = kappa * p.sin();
-        // Propagating waves, and what is taken off of those at rest.
+        // Propagating waves, minus the static part.
         let wave = kappa * p.cos();
         add(u, weight * wave * (wave - i * u));
     }
@@ -104,7 +112,7 @@ fn integrals(kappa: f64) -> [[Complex64; TERMS]; TERMS] {
     sums
 }
 
-/// Points and weights from 0 to an end, by Simpson's rule.
+/// Nodes and weights of Simpson's rule from 0 to `end`.
 fn simpson(end: f64) -> impl Iterator<Item = (f64, f64)> {
     let step = end / f64::from(POINTS);
     (0..=POINTS).map(move |point| {
@@ -117,7 +125,8 @@ fn simpson(end: f64) -> impl Iterator<Item = (f64, f64)> {
     })
 }
 
-/// The inverse times the signs `(-1)^n` of the right side, by elimination: the diagonal is the largest.
+/// Inverse times the signs `(-1)^n` of the right-hand side, by elimination without pivoting: the
+/// diagonal is dominant.
 fn signed_inverse(mut matrix: [[Complex64; TERMS]; TERMS]) -> [[Complex64; TERMS]; TERMS] {
     let mut inverse = [[Complex64::ZERO; TERMS]; TERMS];
     for (n, row) in inverse.iter_mut().enumerate() {
@@ -138,7 +147,8 @@ fn signed_inverse(mut matrix: [[Complex64; TERMS]; TERMS]) -> [[Complex64; TERMS
     inverse
 }
 
-/// `J_{n+1}(u) / u` for each term, by Miller's downward recurrence (Abramowitz and Stegun, 9.12).
+/// Values of `J_{n+1}(u) / u` for each term, by Miller's downward recurrence (Abramowitz and
+/// Stegun, 9.12).
 fn bessel_over(u: f64) -> [f64; TERMS] {
     let mut found = [0.0; TERMS];
     let size = u.abs();
@@ -150,7 +160,7 @@ fn bessel_over(u: f64) -> [f64; TERMS] {
     let start = 2 * (0.75 * size.max(TERMS as f64)) as u32 + 24;
     let (mut above, mut here, mut sum) = (0.0, 1e-300, 0.0);
     for order in (1..=start).rev() {
-        // `here` is J of this order, `below` of the next lower one.
+        // `here` is J of this order, `below` of the next lower order.
         if let Some(kept) = found.get_mut(order as usize - 1) {
             *kept = here;
         }
@@ -179,7 +189,7 @@ mod tests {
     const K: f64 = TAU * 49_400.0 / 343.2;
 
     #[test]
-    fn bessel_functions_are_those_of_the_library() {
+    fn bessel_matches_libm() {
         for u in [-3.1, -0.2, 1e-5, 0.03, 1.0, 3.1, 17.0, 59.0] {
             for (n, found) in bessel_over(u).into_iter().enumerate() {
                 let expected = libm::jn(n as i32 + 1, u) / u;
@@ -188,7 +198,8 @@ mod tests {
         }
     }
 
-    /// See `strips_have_the_levels_of_a_boundary_integral`.
+    /// Width in wavelengths, angle in degrees and relative echo level; see
+    /// `matches_boundary_integral`.
     const REFERENCE: [(f64, f64, f64); 18] = [
         (0.0202, 90.0, 0.000168),
         (0.0202, 60.0, 0.000126),
@@ -210,17 +221,17 @@ mod tests {
         (1.0, 30.0, 0.029935),
     ];
 
-    /// The echo of a strip seen from a distance and an angle.
+    /// Echo of a strip at a range and an angle.
     fn back_from(strip: &Strip, range_m: f64, angle_deg: f64) -> Complex64 {
         let angle = angle_deg.to_radians();
         strip.echo(&Aspect { in_rad: angle, out_rad: angle, distance_m: 0.5 * range_m })
     }
 
-    /// A boundary integral in the plane, computed for this test (Galerkin's method with 40 hat functions, closer
-    /// together towards the ends): relative level of the echo of a rigid strip from 0.5 m, by width in wavelengths
-    /// and aspect.
+    /// Boundary integral in the plane, computed for this test (Galerkin's method with 40 hat
+    /// functions, refined towards the ends): relative level of the echo of a rigid strip at 0.5 m,
+    /// by width in wavelengths and aspect.
     #[test]
-    fn strips_have_the_levels_of_a_boundary_integral() {
+    fn matches_boundary_integral() {
         for (wavelengths, angle_deg, expected) in REFERENCE {
             let strip = Strip::new(wavelengths * TAU / K, 1.0, K).expect("narrow");
             let found = back_from(&strip, 0.5, angle_deg).norm();
@@ -229,9 +240,9 @@ mod tests {
         }
     }
 
-    /// `(pi / 2) kappa^2 sin^2 i / sqrt(2 pi k L)`: 0.14 mm at 0.5 m gives 0.00017.
+    /// Limit `(pi / 2) kappa^2 sin^2 i / sqrt(2 pi k L)`: 0.14 mm at 0.5 m gives 0.00017.
     #[test]
-    fn a_hair_scatters_by_the_square_of_its_width() {
+    fn thin_wire_scales_with_width_squared() {
         for width_m in [1e-6, 1e-5, 1.4e-4] {
             let strip = Strip::new(width_m, 1.0, K).expect("narrow");
             for angle_deg in [90.0_f64, 50.0, 12.0] {
@@ -244,9 +255,10 @@ mod tests {
         }
     }
 
-    /// Of a wavelength it joins on to two edges and a mirror, but for what runs from edge to edge.
+    /// Continuity at one wavelength with two edges and a mirror, except for edge-to-edge
+    /// diffraction.
     #[test]
-    fn a_strip_of_a_wavelength_is_nearly_its_two_edges_and_its_mirror() {
+    fn wide_strip_matches_two_edges() {
         let (width_m, range_m) = (TAU / K, 0.5);
         let strip = Strip::new(width_m, 1.0, K).expect("narrow");
         let half_plane = Wedge { opening_rad: TAU, reflectance: [1.0; 2] };
@@ -261,15 +273,14 @@ mod tests {
         assert!((edges / exact).arg().abs() < 0.1);
     }
 
-    /// Behind it there is less: its shadow.
     #[test]
-    fn a_strip_takes_from_the_sound_behind_it_and_reads_the_same_backwards() {
+    fn casts_a_shadow_and_is_reciprocal() {
         let strip = Strip::new(0.0069, 0.8, K).expect("narrow");
         let field =
             |in_rad: f64, out_rad: f64| strip.echo(&Aspect { in_rad, out_rad, distance_m: 0.3 });
         assert!(field(1.2, 1.2 - PI).re < -0.05, "{}", field(1.2, 1.2 - PI));
-        for (one, other) in [(0.3, 2.0), (1.0, -0.4), (2.9, -2.0)] {
-            assert!((field(one, other) - field(other, one)).norm() < 1e-12);
+        for (a, b) in [(0.3, 2.0), (1.0, -0.4), (2.9, -2.0)] {
+            assert!((field(a, b) - field(b, a)).norm() < 1e-12);
         }
     }
 }

@@ -16,11 +16,11 @@ fn back(range_m: f64, aspect_deg: f64) -> Aspect {
     Aspect { in_rad: angle, out_rad: angle, distance_m: range_m / 2.0 }
 }
 
-/// The table of single edges of the full-wave reference computed for this project
-/// (tests/data/fullwave/README.md): wedge, range, aspect, exact, UTD, Kuc-Siegel. It has three
-/// or fewer digits and a band around the carrier, hence the tolerance.
+/// Single-edge table of the full-wave reference computed for this project
+/// (tests/data/fullwave/README.md): wedge, range, aspect, exact, UTD, Kuc-Siegel. The table has
+/// three or fewer digits and a band around the carrier, hence the tolerance.
 #[test]
-fn edges_have_the_levels_of_the_full_wave_reference() {
+fn utd_matches_full_wave() {
     let table = [
         (half_plane(), 0.5, 125.0, 0.00987, 0.00979, Some(0.01876)),
         (half_plane(), 0.3, 125.0, 0.01274, 0.01264, None),
@@ -31,28 +31,32 @@ fn edges_have_the_levels_of_the_full_wave_reference() {
         (right_edge(), 1.0, 135.0, 0.01434, 0.01434, None),
     ];
     for (wedge, range, aspect, exact, utd, kuc) in table {
-        let made = EdgeLaw::Utd.echo(&wedge, &back(range, aspect), K).norm();
+        let found = EdgeLaw::Utd.echo(&wedge, &back(range, aspect), K).norm();
         for reference in [exact, utd] {
-            let error_db = 20.0 * (made / reference).log10();
-            assert!(error_db.abs() < 0.075, "{range} m, {aspect} deg: {made} is {error_db} dB off");
+            let error_db = 20.0 * (found / reference).log10();
+            assert!(
+                error_db.abs() < 0.075,
+                "{range} m, {aspect} deg: {found} is {error_db} dB off"
+            );
         }
         if let Some(kuc) = kuc {
-            let made = EdgeLaw::KucSiegel.echo(&wedge, &back(range, aspect), K).norm();
-            assert!((made - kuc).abs() < 1e-5, "{range} m: {made}, not {kuc}");
+            let found = EdgeLaw::KucSiegel.echo(&wedge, &back(range, aspect), K).norm();
+            assert!((found - kuc).abs() < 1e-5, "{range} m: {found}, not {kuc}");
         }
     }
 }
 
 #[test]
-fn on_the_foot_of_the_normal_half_of_the_wall_is_left() {
-    // The mirror echo counts as seen there. The reference has 0.483: the rest is of higher order.
+fn half_field_at_the_boundary() {
+    // The mirror echo counts as visible there. The reference has 0.483: the difference is of higher
+    // order.
     let edge = EdgeLaw::Utd.echo(&half_plane(), &back(0.5, 90.0), K);
     let total = (1.0 + edge).norm();
     assert!((total - 0.483).abs() < 0.015, "{total}");
 }
 
 #[test]
-fn the_field_is_continuous_across_every_boundary() {
+fn field_is_continuous() {
     for opening_deg in [70.0, 80.0, 100.0, 137.0, 200.0, 270.0, 330.0, 360.0] {
         for reflectance in [[1.0, 1.0], [0.9, 0.4]] {
             let wedge = Wedge { opening_rad: f64::to_radians(opening_deg), reflectance };
@@ -62,16 +66,16 @@ fn the_field_is_continuous_across_every_boundary() {
     }
 }
 
-/// Largest step of mirror images plus edge while the receiver goes around the edge.
+/// Maximum step of mirror images plus edge for a receiver on a circle around the edge.
 fn largest_step(wedge: &Wedge) -> f64 {
-    // At a fifth of the wave number, for the images' phases to run slowly beside the steps.
+    // A fifth of the wave number: slow image phases compared with the steps.
     let (k, in_rad) = (K / 5.0, 0.3 * wedge.opening_rad);
     let steps = 100_000;
     let at = |i: u32| {
         let out_rad = wedge.opening_rad * f64::from(i) / f64::from(steps);
         let (s, t) = (0.8, 0.5);
         let aspect = Aspect { in_rad, out_rad, distance_m: s * t / (s + t) };
-        // The edge's echo travels s + t; each image is nearer by the law of cosines.
+        // The edge's echo travels s + t; each image's path is shorter by the law of cosines.
         let mut field = EdgeLaw::Utd.echo(wedge, &aspect, k);
         for number in -6..=6_i32 {
             for mirrored in [false, true] {
@@ -98,13 +102,14 @@ fn largest_step(wedge: &Wedge) -> f64 {
 }
 
 #[test]
-fn opening_a_right_angled_corner_passes_through_one_echo() {
+fn corner_limit_is_one_echo() {
     for closed_by in [1e-3, 1e-5, 1e-7] {
         let echo = |opening_rad: f64| {
             let wedge = Wedge { opening_rad, reflectance: [1.0; 2] };
             EdgeLaw::Utd.echo(&wedge, &back(1e-3, 35.0), K / 1e-3)
         };
-        // Two mirror echoes below 90 degrees, none above; the edge makes it one on both sides.
+        // Two mirror echoes below 90 degrees, none above; with the edge the total is one on both
+        // sides.
         let (below, above) = (echo(PI / 2.0 - closed_by), echo(PI / 2.0 + closed_by));
         assert!((2.0 + below - 1.0).norm() < 40.0 * closed_by.sqrt(), "{below}");
         assert!((above - 1.0).norm() < 40.0 * closed_by.sqrt(), "{above}");
@@ -114,7 +119,7 @@ fn opening_a_right_angled_corner_passes_through_one_echo() {
 }
 
 #[test]
-fn both_directions_are_alike() {
+fn laws_are_reciprocal() {
     let wedge = Wedge { opening_rad: 4.1, reflectance: [0.9, 0.5] };
     let there = Aspect { in_rad: 0.7, out_rad: 3.3, distance_m: 0.4 };
     let back = Aspect { in_rad: 3.3, out_rad: 0.7, ..there };
@@ -124,7 +129,7 @@ fn both_directions_are_alike() {
 }
 
 #[test]
-fn bound_bounds() {
+fn bound_is_never_exceeded() {
     for opening in [1.2, 1.7, 3.5, 4.712, TAU] {
         let wedge = Wedge { opening_rad: opening, reflectance: [0.95, 0.8] };
         for i in 1..200 {
@@ -142,10 +147,10 @@ fn bound_bounds() {
     }
 }
 
-/// Against the integral itself on a contour where it does not oscillate:
-/// `F(x) = 2 i sqrt(x) e^(-i pi/4) int_0^inf exp(-u^2 - 2 sqrt(x) e^(i pi/4) u) du`.
+/// Compared with the integral on a contour where it does not oscillate: `F(x) = 2 i sqrt(x) e^(-i
+/// pi/4) int_0^inf exp(-u^2 - 2 sqrt(x) e^(i pi/4) u) du`.
 #[test]
-fn transition_function_is_its_integral() {
+fn transition_matches_its_integral() {
     for x in [1e-6, 0.01, 0.3, 1.0, 2.9, 3.1, 5.5, 10.0, 29.0, 31.0, 300.0, 1e5] {
         let root = f64::sqrt(x);
         let decay = 2.0 * root * Complex64::cis(FRAC_PI_4);
@@ -168,14 +173,14 @@ fn transition_function_is_its_integral() {
     }
 }
 
-/// A wall that ends 6 mm beside the foot of the perpendicular: from most of a face 38 mm wide it is seen
-/// head-on, from the rest it is not.
+/// Wall that ends 6 mm from the foot of the perpendicular: specular for most of a 38 mm wide face,
+/// not for the rest.
 fn near_the_end() -> EdgeView {
-    let (range_m, beside_m) = (0.6, 0.006_f64);
-    let seen_rad = PI / 2.0 - (beside_m / range_m).asin();
+    let (range_m, offset_m) = (0.6, 0.006_f64);
+    let aspect_rad = PI / 2.0 - (offset_m / range_m).asin();
     EdgeView {
         wedge: half_plane(),
-        aspect: back(range_m, seen_rad.to_degrees()),
+        aspect: back(range_m, aspect_rad.to_degrees()),
         wave_number_per_m: K,
         legs_m: [range_m; 2],
         swapped: [false; 2],
@@ -186,26 +191,23 @@ fn at(view: &EdgeView, left_m: f64) -> Complex64 {
     EdgeLaw::Utd.echo(&view.wedge, &view.aspect_from(left_m, left_m), view.wave_number_per_m)
 }
 
-/// Where the face sees the wall as its middle does, what it sees of the edge is the coefficient; where it
-/// does not, the mirrored echo that is counted nevertheless is taken away.
+/// Where the wall is specular as for the face's middle, the edge contribution is the coefficient.
+/// Elsewhere the mirror echo, which is counted nevertheless, is subtracted.
 #[test]
-fn a_view_runs_on_where_the_walls_echo_ends() {
+fn view_compensates_lost_echo() {
     let view = near_the_end();
     let (middle, share) = (at(&view, 0.0), view.shares());
     for left_mm in -19..=19 {
         let left_m = 1e-3 * f64::from(left_mm);
-        let too_much = at(&view, left_m) - share(left_m, left_m) * middle;
-        // The edge is seen under a larger angle from farther right.
+        let excess = at(&view, left_m) - share(left_m, left_m) * middle;
+        // The aspect angle of the edge increases to the right.
         let expected = if left_mm < -6 { 1.0 } else { 0.0 };
-        assert!(
-            left_mm == -6 || (too_much.norm() - expected).abs() < 1e-3,
-            "{left_mm}: {too_much}"
-        );
+        assert!(left_mm == -6 || (excess.norm() - expected).abs() < 1e-3, "{left_mm}: {excess}");
     }
 }
 
 #[test]
-fn a_view_has_no_jumps() {
+fn view_is_continuous() {
     let share = near_the_end().shares();
     let at = |i: i32| 1e-4 * f64::from(i);
     let shares: Vec<Complex64> = (-190..=190).map(|i| share(at(i), at(i))).collect();
@@ -215,10 +217,10 @@ fn a_view_has_no_jumps() {
     assert!((shares[190] - 1.0).norm() < 1e-12);
 }
 
-/// Where walls that absorb stand at little more or less than `pi / m` there is no more of an edge than at that
-/// angle; and two materials on one line are the limit of walls that bend ever less.
+/// Absorbing walls at slightly more or less than `pi / m` diffract no more than at that angle. Two
+/// materials on one line are the limit of walls with a vanishing bend.
 #[test]
-fn edges_fade_towards_the_angles_at_which_there_is_none() {
+fn edges_fade_at_regular_angles() {
     for opening_deg in [60.0, 90.0, 180.0] {
         for reflectance in [[1.0; 2], [0.6; 2], [0.0; 2], [0.9, 0.3]] {
             let wedge = |off_rad: f64| Wedge {

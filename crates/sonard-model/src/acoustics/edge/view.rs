@@ -1,67 +1,68 @@
-//! An edge seen from points beside one another.
+//! Variation of an edge's echo across the transducer's face.
 
 use num_complex::Complex64;
 
 use super::{Aspect, Wedge};
 
-/// The change of an edge's echo across a face that is not small beside the boundaries of light.
+/// Edge echo as a function of position on a face that is not small compared with the boundary
+/// regions.
 ///
-/// Where a wall ends less than the face's width off the foot of the perpendicular, some points of the face
-/// see a mirrored echo of others and some do not. The mirrored echo is taken as it is between the
-/// middles; what is missing or too much of it is the edge's, whose coefficient then runs on over the
-/// boundary without a jump. By Kouyoumjian and Pathak's coefficient alone.
+/// Where a wall ends within the face's width of the foot of the perpendicular, the mirror echo is
+/// visible from some points of the face and not from others. The mirror echo is evaluated between
+/// the middles of the face. The difference is attributed to the edge, whose coefficient is
+/// continued across the boundary without a jump. Uses Kouyoumjian and Pathak's coefficient only.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EdgeView {
-    /// The air around the edge.
+    /// Wedge of air around the edge.
     pub wedge: Wedge,
-    /// From the middle of the face and back to it.
+    /// Aspect from the middle of the face and back.
     pub aspect: Aspect,
-    /// Wave number `2 pi f / c`, radians a metre.
+    /// Wave number `2 pi f / c`, radians per metre.
     pub wave_number_per_m: f64,
-    /// From the face to the edge and from the edge to the face, metres.
+    /// Distances from the face to the edge and from the edge to the face, metres.
     pub legs_m: [f64; 2],
-    /// Whether mirrors on either leg swap left and right.
+    /// Left and right are swapped by mirrors on either leg.
     pub swapped: [bool; 2],
 }
 
 impl EdgeView {
-    /// Field beside that from middle to middle, without the difference of the paths' lengths: from a point
-    /// of the face so many metres to the left, as one looks to where the sound goes, back to one so many
-    /// to the left, as one looks to where it comes from.
+    /// Field relative to that from middle to middle, without the phase of the path difference. The
+    /// arguments are the points of departure and arrival on the face, metres to the left when
+    /// facing the direction of departure and of arrival.
     pub fn shares(&self) -> impl Fn(f64, f64) -> Complex64 + use<> {
         let view = *self;
         let field =
             move |aspect: &Aspect| view.wedge.uniform(aspect, &view.aspect, view.wave_number_per_m);
         let middle = field(&view.aspect);
-        move |sent_m, heard_m| {
+        move |sent_m, received_m| {
             if middle == Complex64::ZERO {
                 return Complex64::ONE;
             }
-            field(&view.aspect_from(sent_m, heard_m)) / middle
+            field(&view.aspect_from(sent_m, received_m)) / middle
         }
     }
 
-    /// By how much longer the paths are, metres, to second order: what distance adds to the slant.
+    /// Path excess due to wavefront curvature, metres, to second order.
     #[must_use]
-    pub fn bend_m(&self, sent_m: f64, heard_m: f64) -> f64 {
+    pub fn bend_m(&self, sent_m: f64, received_m: f64) -> f64 {
         let [out_m, back_m] = self.legs_m;
-        sent_m * sent_m / (2.0 * out_m) + heard_m * heard_m / (2.0 * back_m)
+        sent_m * sent_m / (2.0 * out_m) + received_m * received_m / (2.0 * back_m)
     }
 
-    /// As the edge is seen from two such points, at the same distance parameter.
-    pub(super) fn aspect_from(&self, sent_m: f64, heard_m: f64) -> Aspect {
+    /// Aspect of the edge from two such points, at the same distance parameter.
+    pub(super) fn aspect_from(&self, sent_m: f64, received_m: f64) -> Aspect {
         Aspect {
-            in_rad: self.seen_rad(self.aspect.in_rad, 0, sent_m),
-            out_rad: self.seen_rad(self.aspect.out_rad, 1, heard_m),
+            in_rad: self.direction_rad(self.aspect.in_rad, 0, sent_m),
+            out_rad: self.direction_rad(self.aspect.out_rad, 1, received_m),
             ..self.aspect
         }
     }
 
-    /// The direction in which a point to the left of the face's middle is seen from the edge, at the end of a leg.
-    fn seen_rad(&self, middle_rad: f64, leg: usize, left_m: f64) -> f64 {
+    /// Direction from the edge to a point left of the face's middle, at the end of a leg.
+    fn direction_rad(&self, middle_rad: f64, leg: usize, left_m: f64) -> f64 {
         let turn_rad = left_m / self.legs_m[leg];
-        let seen_rad =
+        let direction_rad =
             if self.swapped[leg] { middle_rad + turn_rad } else { middle_rad - turn_rad };
-        seen_rad.clamp(0.0, self.wedge.opening_rad)
+        direction_rad.clamp(0.0, self.wedge.opening_rad)
     }
 }

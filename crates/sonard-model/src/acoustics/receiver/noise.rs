@@ -1,4 +1,4 @@
-//! Noise of the receiver: off unless asked for; random numbers are the caller's.
+//! Receiver noise. Disabled by default; the caller supplies the random numbers.
 
 use std::f64::consts::PI;
 
@@ -9,21 +9,22 @@ use rand_distr::{Distribution as _, StandardNormal};
 use super::Receiver;
 use crate::acoustics::{Sensor, pulse::filter_sigma_us};
 
-/// Disturbances of a reading.
+/// Noise parameters of a receiver.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct ReceiverNoise {
-    /// Root mean square of the noise's envelope at the receiver's input, as the amplitude of an echo
-    /// from 1 m; the gain raises it with the range, so it counts ten times as much at 10 m.
+    /// Root mean square of the noise envelope at the receiver's input, as the amplitude of an echo
+    /// from 1 m. The gain raises it with range: it counts ten times as much at 10 m.
     pub floor: f64,
-    /// Standard deviation of ECHO's time beside what the noise does to it, microseconds.
+    /// Standard deviation of ECHO's time in addition to the effect of the noise floor,
+    /// microseconds.
     pub jitter_us: f64,
 }
 
 impl ReceiverNoise {
-    /// None at all.
+    /// Receiver without noise and jitter.
     pub const NONE: Self = Self { floor: 0.0, jitter_us: 0.0 };
 
-    /// The noise of one firing.
+    /// Draws the noise of one firing.
     pub(super) fn track(&self, receiver: &Receiver, rng: &mut impl Rng) -> NoiseTrack {
         let spacing_us = receiver.noise_sigma_us;
         let count = (receiver.window_us() / spacing_us) as usize + 2 * NoiseTrack::REACH;
@@ -45,7 +46,7 @@ impl ReceiverNoise {
     }
 }
 
-/// White noise behind the band filter, over one firing.
+/// White noise after the band filter, over one firing.
 pub(super) struct NoiseTrack {
     grains: Vec<Complex64>,
     first_us: f64,
@@ -54,10 +55,10 @@ pub(super) struct NoiseTrack {
 }
 
 impl NoiseTrack {
-    /// Grains farther than this from a time add less than 1e-5.
+    /// Grains farther away than this many spacings contribute less than 1e-5.
     const REACH: usize = 5;
 
-    /// Its envelope after the gain that makes up for the spreading, at a time after firing.
+    /// Noise envelope at a time after firing, after the gain that compensates spreading.
     pub(super) fn at(&self, t_us: f64) -> Complex64 {
         let place = (t_us - self.first_us) / self.spacing_us;
         let middle = place.round().max(0.0) as usize;

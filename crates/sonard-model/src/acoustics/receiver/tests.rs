@@ -1,4 +1,4 @@
-//! Arrivals at given times against what the module's description says of them.
+//! Detection of arrivals at given times.
 
 mod carrier;
 mod noise;
@@ -12,13 +12,13 @@ use super::*;
 /// At 340 m/s a path of 0.34 m takes 1000 us.
 const SPEED_M_S: f64 = 340.0;
 
-/// The 6500's timing and pulse with a gain that makes up for the spreading: the reference echo
-/// rises 47 us before its nominal onset at 0.02 and sounds for 417 us.
+/// Receiver with the 6500's timing and pulse and gain that compensates spreading. The reference
+/// echo crosses 0.02 at 47 us before its nominal onset and lasts 417 us.
 fn receiver() -> Receiver {
     rising(0.0)
 }
 
-/// The same whose threshold rises with the range, decibels a metre.
+/// Receiver whose threshold rises with range, dB/m.
 fn rising(threshold_rise_db_per_m: f64) -> Receiver {
     let sensor = Sensor {
         threshold_rise_db_per_m,
@@ -31,24 +31,27 @@ fn rising(threshold_rise_db_per_m: f64) -> Receiver {
 }
 
 /// Times (microseconds), amplitudes and phases.
-fn arrivals(of: &[(f64, f64, f64)]) -> Vec<PulseArrival> {
-    of.iter()
+fn arrivals(sounds: &[(f64, f64, f64)]) -> Vec<PulseArrival> {
+    sounds
+        .iter()
         .zip(0..)
         .map(|(&(tof_us, amplitude, phase_rad), index)| PulseArrival {
             length_m: tof_us * SPEED_M_S * 1e-6,
             amplitude,
-            // The way's own phase is taken out, so that `phase_rad` is what meets.
+            // Compensates the phase of the path length, so that `phase_rad` is the phase at
+            // arrival.
             phase_rad: phase_rad + TAU * 49.4e-3 * tof_us,
             index,
         })
         .collect()
 }
 
-/// Expected status and times of ECHO.
-fn check(of: &[(f64, f64)], status: PingStatus, echoes_us: &[f64]) -> Detection {
-    let of: Vec<_> = of.iter().map(|&(tof_us, amplitude)| (tof_us, amplitude, 0.0)).collect();
-    let detection = receiver().detect(&arrivals(&of));
-    assert_eq!(detection.status, status, "{of:?}: {detection:?}");
+/// Asserts the status and the rise times of ECHO.
+fn check(sounds: &[(f64, f64)], status: PingStatus, echoes_us: &[f64]) -> Detection {
+    let sounds: Vec<_> =
+        sounds.iter().map(|&(tof_us, amplitude)| (tof_us, amplitude, 0.0)).collect();
+    let detection = receiver().detect(&arrivals(&sounds));
+    assert_eq!(detection.status, status, "{sounds:?}: {detection:?}");
     assert_eq!(detection.echoes_us.len(), echoes_us.len(), "{detection:?}");
     for (found, expected) in detection.echoes_us.iter().zip(echoes_us) {
         assert!((found - expected).abs() < 0.05, "{detection:?}");
@@ -56,8 +59,8 @@ fn check(of: &[(f64, f64)], status: PingStatus, echoes_us: &[f64]) -> Detection 
     detection
 }
 
-/// When an echo of this strength rises after one of strength 1, microseconds: the error function
-/// solved by hand for the filter's 22.736 us.
+/// Delay of an echo of this strength relative to one of strength 1, microseconds: inverse error
+/// function for the filter's 22.736 us.
 fn walk_us(strength: f64) -> f64 {
     let (mut low, mut high) = (-6.0, 6.0);
     let solve = |level: f64, low: &mut f64, high: &mut f64| {
@@ -75,7 +78,7 @@ fn walk_us(strength: f64) -> f64 {
 }
 
 #[test]
-fn a_strong_echo_is_timed_by_its_path_and_a_weak_one_is_late() {
+fn weak_echoes_are_late() {
     let strong = check(&[(3000.0, 1.0)], PingStatus::Echo, &[3000.0]);
     assert!((strong.range_m.expect("a range") - 0.51).abs() < 1e-6);
     assert!((strong.margin_db.expect("a margin") - 34.0).abs() < 0.03);
@@ -86,18 +89,18 @@ fn a_strong_echo_is_timed_by_its_path_and_a_weak_one_is_late() {
 }
 
 #[test]
-fn blanking_loses_what_ended_and_catches_what_still_sounds() {
+fn blanking_catches_active_sound() {
     check(&[(1900.0, 1.0)], PingStatus::NoEcho, &[]);
     let caught = check(&[(2100.0, 1.0)], PingStatus::MinRange, &[2380.0]);
     assert!((caught.range_m.expect("a range") - 0.4046).abs() < 1e-12);
     check(&[(2100.0, 0.01)], PingStatus::NoEcho, &[]);
-    // Above the threshold at the end of blanking, but not for the three cycles it takes.
+    // Above the threshold at the end of blanking, but not for the required three cycles.
     check(&[(2000.0, 1.0)], PingStatus::NoEcho, &[]);
     check(&[(2380.5, 1.0)], PingStatus::Echo, &[2380.5]);
 }
 
 #[test]
-fn the_first_loud_sound_wins_over_louder_later_ones() {
+fn first_detectable_arrival_wins() {
     let echo = check(
         &[(3000.0, 0.019), (4000.0, 0.1), (5000.0, 0.9)],
         PingStatus::Echo,
@@ -107,20 +110,20 @@ fn the_first_loud_sound_wins_over_louder_later_ones() {
 }
 
 #[test]
-fn silence_names_its_best_candidate_in_the_window_and_what_it_lacked() {
-    let silence = check(
+fn no_echo_names_best_candidate() {
+    let no_echo = check(
         &[(1000.0, 1.0), (3000.0, 0.01), (4000.0, 0.015), (25_000.0, 1.0)],
         PingStatus::NoEcho,
         &[],
     );
-    assert_eq!(silence.arrival.map(|arrival| arrival.index), Some(2));
+    assert_eq!(no_echo.arrival.map(|arrival| arrival.index), Some(2));
     let lacked_db = 20.0 * (0.015_f64 / 0.02).log10();
-    assert!((silence.margin_db.expect("a margin") - lacked_db).abs() < 1e-6);
+    assert!((no_echo.margin_db.expect("a margin") - lacked_db).abs() < 1e-6);
     assert_eq!(check(&[], PingStatus::NoEcho, &[]).arrival, None);
 }
 
 #[test]
-fn held_detector_skips_sounds_that_end_and_catches_those_that_last() {
+fn hold_off_skips_ended_sounds() {
     check(&[(3000.0, 1.0), (3010.0, 0.005)], PingStatus::Echo, &[3000.0]);
     check(&[(3000.0, 1.0), (3200.0, 1.0)], PingStatus::Echo, &[3000.0, 3440.0]);
     let many: Vec<(f64, f64)> = (0..20).map(|i| (3000.0 + 700.0 * f64::from(i), 1.0)).collect();
@@ -129,7 +132,7 @@ fn held_detector_skips_sounds_that_end_and_catches_those_that_last() {
 }
 
 #[test]
-fn two_weak_sounds_in_phase_are_heard_and_out_of_phase_are_not() {
+fn phase_decides_on_weak_pairs() {
     let pair = |phase_rad| arrivals(&[(3000.0, 0.015, 0.0), (3001.0, 0.015, phase_rad)]);
     let together = receiver().detect(&pair(0.0));
     assert_eq!(together.status, PingStatus::Echo);
@@ -143,7 +146,7 @@ fn two_weak_sounds_in_phase_are_heard_and_out_of_phase_are_not() {
 
 /// Over all phases the mean power of a coherent pair is the power of an incoherent one.
 #[test]
-fn pairs_of_unknown_phase_have_their_mean_power() {
+fn incoherent_pairs_add_powers() {
     let incoherent = Receiver { combining: Combining::Incoherent, ..receiver() };
     let pair = |phase_rad: f64| arrivals(&[(3000.0, 0.4, 0.0), (3001.0, 0.3, phase_rad)]);
     let amplitude = |receiver: &Receiver, phase_rad: f64| {
@@ -157,51 +160,54 @@ fn pairs_of_unknown_phase_have_their_mean_power() {
         assert!((together - 0.5).abs() < 1e-3, "{phase_rad}: {together}");
         assert!((together.powi(2) - mean).abs() < 2e-3, "{together} {mean}");
     }
-    // Weak ones that cancel are heard on average, and one alone as ever.
+    // Weak arrivals that cancel are detected on average; an isolated one is unaffected.
     let weak = arrivals(&[(3000.0, 0.015, 0.0), (3001.0, 0.015, TAU / 2.0)]);
     assert_eq!(incoherent.detect(&weak).status, PingStatus::Echo);
-    let lone = arrivals(&[(2600.0, 0.4, 1.0), (3500.0, 0.05, 2.0)]);
-    assert_eq!(incoherent.detect(&lone), receiver().detect(&lone));
+    let isolated = arrivals(&[(2600.0, 0.4, 1.0), (3500.0, 0.05, 2.0)]);
+    assert_eq!(incoherent.detect(&isolated), receiver().detect(&isolated));
 }
 
-/// From the time on at which a more sensitive receiver was raised, a less sensitive one detects what it does from the end
-/// of blanking on.
+/// From the rise of a more sensitive receiver on, a less sensitive one detects the same as from the
+/// end of blanking on.
 #[test]
-fn a_higher_threshold_is_passed_no_earlier() {
+fn higher_threshold_rises_no_earlier() {
     let mut rng = Pcg64::seed_from_u64(5);
     for trial in 0..300 {
-        let mut of: Vec<(f64, f64, f64)> = (0..12)
+        let mut sounds: Vec<(f64, f64, f64)> = (0..12)
             .map(|_| {
                 let amplitude = 10f64.powf(rng.random_range(-2.2..0.0));
                 (rng.random_range(2400.0..6000.0), amplitude, rng.random_range(0.0..TAU))
             })
             .collect();
-        of.sort_by(|one, other| one.0.total_cmp(&other.0));
-        let all = arrivals(&of);
+        sounds.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let all = arrivals(&sounds);
         let (mut ready_us, mut threshold) = (0.0, 0.005);
         while threshold < 1.5 {
             let receiver = Receiver { threshold, ..receiver() };
-            let listen = |ready_us: f64| {
+            let detect_from = |ready_us: f64| {
                 receiver.detect_within(f64::INFINITY, &all, &|_| None, Latch::First, ready_us).0
             };
-            let (whole, late) = (listen(0.0), listen(ready_us));
+            let (whole, late) = (detect_from(0.0), detect_from(ready_us));
             assert_eq!((whole.status, whole.arrival), (late.status, late.arrival), "{trial}");
-            let [one_us, other_us] =
+            let [whole_us, late_us] =
                 [&whole, &late].map(|detection| detection.echoes_us.first().copied());
-            let apart_us = one_us.zip(other_us).map_or(0.0, |(one, other)| (one - other).abs());
-            assert!(apart_us < 1.0 && one_us.is_some() == other_us.is_some(), "{whole:?} {late:?}");
-            ready_us = one_us.unwrap_or(ready_us);
+            let apart_us = whole_us.zip(late_us).map_or(0.0, |(a, b)| (a - b).abs());
+            assert!(
+                apart_us < 1.0 && whole_us.is_some() == late_us.is_some(),
+                "{whole:?} {late:?}"
+            );
+            ready_us = whole_us.unwrap_or(ready_us);
             threshold *= 1.12;
         }
     }
 }
 
 #[test]
-fn a_strong_pair_out_of_phase_is_heard_where_it_does_not_overlap() {
+fn pair_out_of_phase_cancels_overlap() {
     let pair = arrivals(&[(3000.0, 0.5, 0.0), (3150.0, 0.5, TAU / 2.0)]);
     let detection = receiver().detect(&pair);
     assert!((detection.echoes_us[0] - 3000.0 - walk_us(0.5)).abs() < 0.05, "{detection:?}");
-    // Then both are gone from the envelope until the first one is over.
+    // Both cancel in the envelope until the first one ends.
     let trace = receiver().trace(&pair, &|_| None, 4000.0, 1.0);
     let at = |t_us: f64| trace.points[t_us as usize].envelope;
     assert!(at(3130.0) > 0.45 && at(3285.0) < 0.02 && at(3450.0) > 0.45);
@@ -209,23 +215,26 @@ fn a_strong_pair_out_of_phase_is_heard_where_it_does_not_overlap() {
     assert!((trace.peaks[1].peak.0 - 0.5).abs() < 1e-3);
 }
 
-/// The ideal detector names the same arrivals and times each by its path.
+/// The ideal detector selects the same arrivals and times each by its path.
 #[test]
-fn the_ideal_receiver_is_the_limit_of_sounds_that_do_not_overlap() {
-    let of = [(2600.0, 0.4, 1.0), (3500.0, 0.05, 2.0), (4400.0, 0.9, 0.3), (9000.0, 0.03, 0.0)];
-    let coherent = receiver().detect(&arrivals(&of));
-    let ideal = Receiver { combining: Combining::Ideal, ..receiver() }.detect(&arrivals(&of));
+fn ideal_receiver_is_the_limit() {
+    let sounds = [(2600.0, 0.4, 1.0), (3500.0, 0.05, 2.0), (4400.0, 0.9, 0.3), (9000.0, 0.03, 0.0)];
+    let coherent = receiver().detect(&arrivals(&sounds));
+    let ideal = Receiver { combining: Combining::Ideal, ..receiver() }.detect(&arrivals(&sounds));
     assert_eq!(coherent.arrival, ideal.arrival);
     assert_eq!(coherent.echoes_us.len(), 4);
-    for ((one, other), (tof_us, strength, _)) in
-        coherent.echoes_us.iter().zip(&ideal.echoes_us).zip(of)
+    for ((coherent_us, ideal_us), (tof_us, strength, _)) in
+        coherent.echoes_us.iter().zip(&ideal.echoes_us).zip(sounds)
     {
-        assert!((other - tof_us).abs() < 1e-9);
-        assert!((one - other - walk_us(strength)).abs() < 0.05, "{one} {other}");
+        assert!((ideal_us - tof_us).abs() < 1e-9);
+        assert!(
+            (coherent_us - ideal_us - walk_us(strength)).abs() < 0.05,
+            "{coherent_us} {ideal_us}"
+        );
     }
 }
 
-/// Sounds at random, of which a receiver hears some: times in microseconds, amplitudes, phases.
+/// Random arrivals, some of them detectable: times in microseconds, amplitudes, phases.
 fn random_sounds(rng: &mut Pcg64) -> Vec<(f64, f64, f64)> {
     let count = rng.random_range(1..6);
     let mut sounds: Vec<(f64, f64, f64)> = (0..count)
@@ -235,40 +244,40 @@ fn random_sounds(rng: &mut Pcg64) -> Vec<(f64, f64, f64)> {
             (tof_us, 10f64.powf(level_db / 20.0), rng.random_range(0.0..TAU))
         })
         .collect();
-    sounds.sort_by(|one, other| one.0.total_cmp(&other.0));
+    sounds.sort_by(|a, b| a.0.total_cmp(&b.0));
     sounds
 }
 
 #[test]
-fn ranges_are_told_in_whole_steps_to_the_nearest() {
+fn ranges_are_quantized() {
     let mut coarse = receiver();
     coarse.range_step_m = 0.01;
     let mut rng = Pcg64::seed_from_u64(3);
-    let mut told = 0;
+    let mut echoes = 0;
     for _ in 0..300 {
         let sounds = arrivals(&random_sounds(&mut rng));
         let [fine, coarse] = [receiver().detect(&sounds), coarse.detect(&sounds)];
         assert_eq!(fine.status, coarse.status);
         assert_eq!(fine.echoes_us.len(), coarse.echoes_us.len());
         if fine.status == PingStatus::MinRange {
-            assert_eq!(fine.range_m, coarse.range_m, "the end of the blanking is no range");
+            assert_eq!(fine.range_m, coarse.range_m, "the end of blanking is not quantized");
         }
         let (Some(fine_m), Some(coarse_m), PingStatus::Echo) =
             (fine.range_m, coarse.range_m, fine.status)
         else {
             continue;
         };
-        told += 1;
+        echoes += 1;
         assert!((fine_m - coarse_m).abs() <= 0.005 + 1e-12, "{fine_m} {coarse_m}");
         assert!((coarse_m * 100.0 - (coarse_m * 100.0).round()).abs() < 1e-9, "{coarse_m}");
         let of_time_m = 0.5e-6 * SPEED_M_S * coarse.echoes_us[0];
         assert!((of_time_m - coarse_m).abs() < 1e-9, "{of_time_m} {coarse_m}");
     }
-    assert!(told > 150, "{told}");
+    assert!(echoes > 150, "{echoes}");
 }
 
 #[test]
-fn measured_times_at_the_end_of_blanking_are_minimum_range() {
+fn early_tof_is_minimum_range() {
     for (tof_us, status) in [
         (None, PingStatus::NoEcho),
         (Some(2380.0), PingStatus::MinRange),

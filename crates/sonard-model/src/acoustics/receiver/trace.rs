@@ -1,50 +1,51 @@
-//! The trace of a firing, as an oscilloscope would show it.
+//! Oscilloscope trace of a firing.
 
-use super::{Detection, Incident, Latch, PulseArrival, Receiver, hearing::Hearing};
+use super::{Detection, Incident, Latch, PulseArrival, Receiver, envelope::EnvelopeSum};
 
-/// The signal of one firing against time.
+/// Signal of one firing versus time.
 #[derive(Debug, Clone, PartialEq)]
 pub struct EchoTrace {
-    /// At even spacing, from firing on.
+    /// Evenly spaced samples from firing on.
     pub points: Vec<TracePoint>,
-    /// The transmission: its envelope in the same units, cut off at 1, while it lasts.
+    /// Transmit pulse: times and envelope in the same units, clipped at 1.
     pub transmission: Vec<(f64, f64)>,
-    /// The envelope of each arrival, shortest path first.
+    /// Envelope peak of each arrival, shortest path first.
     pub peaks: Vec<EnvelopePeak>,
-    /// The receiver's detection.
+    /// Detection result for the firing.
     pub detection: Detection,
 }
 
-/// A moment of a firing.
+/// Sample of an [`EchoTrace`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TracePoint {
-    /// After firing, microseconds.
+    /// Time after firing, microseconds.
     pub t_us: f64,
-    /// Envelope of all arrivals together, after gain compensation.
+    /// Envelope of the summed arrivals after gain compensation.
     pub envelope: f64,
-    /// Least envelope that the detector notices then.
+    /// Effective detection threshold at that time.
     pub threshold: f64,
-    /// Gain, decibels above what makes up for the spreading from a wall at 1 m.
+    /// Gain, decibels re the gain that compensates the spreading from a wall at 1 m.
     pub gain_db: f64,
 }
 
-/// The envelope peak of one arrival in a trace.
+/// Envelope peak of one arrival in a trace.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EnvelopePeak {
-    /// The arrival.
+    /// Arrival that the peak belongs to.
     pub arrival: PulseArrival,
-    /// When it arrives by its path, microseconds after firing.
+    /// Nominal time of flight, microseconds after firing.
     pub tof_us: f64,
-    /// The most of its own envelope, and when that is, microseconds after firing.
+    /// Peak of the arrival's own envelope and its time, microseconds after firing.
     pub peak: (f64, f64),
 }
 
 impl Receiver {
-    /// The trace of a firing up to `until_us`, in steps of `step_us` (at least 1 microsecond).
+    /// Computes the trace of a firing up to `until_us`, in steps of `step_us` (at least 1
+    /// microsecond).
     ///
-    /// Arrivals come in order of their length; `incident` as for
-    /// [`detect_at_face`](Self::detect_at_face). The transmission is the pulse as the band filter
-    /// passes it: how the transducer rings after it is not modelled.
+    /// Arrivals are sorted by length; `incident` as for [`detect_at_face`](Self::detect_at_face).
+    /// The transmit pulse is limited by the band filter only: ringing of the transducer is not
+    /// modelled.
     #[must_use]
     pub fn trace(
         &self,
@@ -55,14 +56,14 @@ impl Receiver {
     ) -> EchoTrace {
         let step_us = step_us.max(1.0);
         let count = (until_us.clamp(0.0, self.window_us()) / step_us) as usize;
-        let mut hearing = Hearing::new(self, arrivals, incident);
+        let mut sum = EnvelopeSum::new(self, arrivals, incident);
         let mut peaks = vec![(0.0, 0.0); arrivals.len()];
         let points = (0..=count)
             .map(|i| {
                 let t_us = i as f64 * step_us;
-                let envelope = hearing.level(t_us);
-                for place in hearing.living() {
-                    let share = hearing.share(place, t_us);
+                let envelope = sum.level(t_us);
+                for place in sum.active_indices() {
+                    let share = sum.share(place, t_us);
                     if share > peaks[place].0 {
                         peaks[place] = (share, t_us);
                     }

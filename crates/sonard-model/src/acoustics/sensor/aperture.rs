@@ -1,4 +1,4 @@
-//! The radiating face.
+//! Radiating face of a sensor.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -17,55 +17,55 @@ use crate::geometry::wrap_pi;
 pub enum Aperture {
     /// Circular piston in a baffle.
     Piston {
-        /// Radius, metres.
+        /// Radius of the piston, metres.
         radius_m: f64,
-        /// What real faces send and hear far off the axis, where a piston's side lobes are weaker (its mount, its
-        /// housing, the rim): amplitude one way beside the axis', decibels, times the cosine of the angle. It adds to
-        /// the piston's power.
+        /// Side-lobe floor: one-way amplitude relative to the axis, decibels, times the cosine of
+        /// the angle. Real faces radiate and receive more far off the axis than a piston's side
+        /// lobes (mount, housing, rim). Its power adds to the piston's.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         skirts_db: Option<f64>,
     },
-    /// Line aperture in the plane of the scan.
+    /// Line aperture in the scan plane.
     Line {
-        /// Half length, metres.
+        /// Half length of the line, metres.
         half_length_m: f64,
-        /// Full strength up to this angle from the axis, degrees.
+        /// Full amplitude up to this angle from the axis, degrees.
         #[serde(default = "right_angle_deg")]
         full_within_deg: f64,
-        /// Nothing beyond this angle, with a cosine's slope between the two, degrees.
+        /// Zero amplitude beyond this angle, with a raised-cosine slope between the two, degrees.
         #[serde(default = "right_angle_deg")]
         none_beyond_deg: f64,
     },
-    /// Amplitude `exp(-2 theta^2 / theta_o^2)` one way (Bozma and Kuc, equation 3).
+    /// One-way amplitude `exp(-2 theta^2 / theta_o^2)` (Bozma and Kuc, equation 3).
     Gaussian {
         /// Half beam angle `theta_o`, degrees.
         half_angle_deg: f64,
-        /// Radius of the face, metres; the beam does not follow from it.
+        /// Radius of the face, metres; does not determine the beam.
         radius_m: f64,
     },
-    /// As measured: straight lines between points, in decibels against degrees.
+    /// Measured pattern: linear interpolation of decibels over degrees.
     Table {
-        /// From 0 degrees and 0 decibels outwards.
+        /// Points from 0 degrees and 0 decibels outwards.
         points: Vec<BeamPoint>,
-        /// Radius of the face, metres; the beam does not follow from it.
+        /// Radius of the face, metres; does not determine the beam.
         radius_m: f64,
     },
 }
 
-/// A point of a measured beam pattern.
+/// Point of a measured beam pattern.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct BeamPoint {
     /// Angle from the axis, degrees.
     pub angle_deg: f64,
-    /// Amplitude one way beside the axis', decibels; `null` for nothing, at the last point only, towards which the
-    /// amplitude falls in a straight line.
+    /// One-way amplitude relative to the axis, decibels. `null` (zero amplitude) is allowed at the
+    /// last point only; the amplitude falls linearly towards it.
     pub level_db: Option<f64>,
 }
 
 impl Aperture {
-    /// Share of the face that is seen at an angle from its axis, radians: `cos` for a disc (Kuc and
-    /// Siegel), the line's own window; 0 behind.
+    /// Projected share of the face at an angle from its axis, radians: `cos` for a disc (Kuc and
+    /// Siegel), the window of a line; 0 behind.
     #[must_use]
     pub fn obliquity(&self, theta_rad: f64) -> f64 {
         let theta_rad = wrap_pi(theta_rad).abs();
@@ -138,12 +138,12 @@ fn check_points(points: &[BeamPoint]) -> Result<(), SensorError> {
     Ok(())
 }
 
-/// Where a measured pattern ends, degrees.
+/// Angle at which a measured pattern ends, degrees.
 fn outermost_deg(points: &[BeamPoint]) -> f64 {
     points.last().map_or(0.0, |point| point.angle_deg)
 }
 
-/// Amplitude one way at an angle from the axis, radians from 0 to pi, of a pattern given by points.
+/// One-way amplitude of a tabulated pattern at an angle from the axis, radians from 0 to pi.
 pub(in crate::acoustics) fn level_at(points: &[BeamPoint], theta_rad: f64) -> f64 {
     let theta_deg = theta_rad.to_degrees();
     let after = points.partition_point(|point| point.angle_deg <= theta_deg);

@@ -1,4 +1,4 @@
-//! Checks of single figures.
+//! Range checks of single values.
 
 use super::SensorError;
 
@@ -26,15 +26,15 @@ pub(super) fn not_positive(field: &'static str, value: f64) -> Result<(), Sensor
 pub(super) fn within(
     field: &'static str,
     value: f64,
-    most: f64,
+    max: f64,
     expected: &'static str,
 ) -> Result<(), SensorError> {
-    hold(value.abs() <= most, field, value, expected)
+    hold(value.abs() <= max, field, value, expected)
 }
 
-pub(super) fn from_0_to(field: &'static str, value: f64, most: f64) -> Result<(), SensorError> {
-    let expected = if most > 1.0 { "from 0 to 100" } else { "from 0 to 1" };
-    hold((0.0..=most).contains(&value), field, value, expected)
+pub(super) fn from_0_to(field: &'static str, value: f64, max: f64) -> Result<(), SensorError> {
+    let expected = if max > 1.0 { "from 0 to 100" } else { "from 0 to 1" };
+    hold((0.0..=max).contains(&value), field, value, expected)
 }
 
 pub(super) fn at_most_1(field: &'static str, value: f64) -> Result<(), SensorError> {

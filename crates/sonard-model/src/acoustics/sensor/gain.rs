@@ -1,4 +1,4 @@
-//! The receiver's gain, as a sensor's data say.
+//! Amplifier gain in a sensor's data.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -12,30 +12,30 @@ use super::{
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
 pub enum Gain {
-    /// Makes up for it: the threshold is the same for all ranges.
+    /// Compensates spreading: the threshold is the same for all ranges.
     Compensating {
-        /// Power of the time with which the gain still rises while an echo sounds: 0 if each echo
-        /// is made up for by the length of its path, 0.5 in a plane, 1 in space.
+        /// Exponent of the gain's rise with time during an echo: 0 if each echo is compensated by
+        /// its path length, 0.5 in a plane, 1 in space.
         #[serde(default)]
         exponent: f64,
-        /// Whether it makes up for what the air absorbs as well.
+        /// Compensates air absorption as well.
         #[serde(default)]
         air: bool,
     },
-    /// Rises in steps; between them the threshold in force drifts up with the range.
+    /// Rises in steps; within a step the effective threshold rises with range.
     Steps {
-        /// The steps in order; the last one's `until_us` is `null`.
+        /// Steps in order; the last one's `until_us` is `null`.
         steps: Vec<GainStep>,
     },
 }
 
-/// A step of the gain.
+/// Step of the amplifier gain.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct GainStep {
-    /// When it ends, microseconds after firing; `null` for the last.
+    /// End of the step, microseconds after firing; `null` for the last.
     pub until_us: Option<f64>,
-    /// Gain, decibels above what makes up for the spreading from a wall at 1 m.
+    /// Gain, decibels re the gain that compensates the spreading from a wall at 1 m.
     pub gain_db: f64,
 }
 
@@ -46,7 +46,7 @@ impl Default for Gain {
 }
 
 impl Gain {
-    /// Whether the absorption of the air is made up for.
+    /// Returns `true` if air absorption is compensated.
     #[must_use]
     pub const fn makes_up_for_air(&self) -> bool {
         matches!(self, Self::Compensating { air: true, .. })

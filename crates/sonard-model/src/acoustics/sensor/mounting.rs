@@ -1,4 +1,4 @@
-//! Where a transducer sits.
+//! Mounting position of a transducer.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -6,28 +6,29 @@ use serde::{Deserialize, Serialize};
 use super::{SensorError, figures::within};
 use crate::geometry::DVec2;
 
-/// Position of the transducer relative to the rotation axis, with which it turns.
+/// Position of the transducer relative to the rotation axis, with which it rotates.
 ///
-/// Ranges are measured from the face, or from the middle between transmitter and receiver: half
-/// the path of the sound. What is met ahead lies `ahead_m` farther from the axis.
+/// Ranges are half the path length, measured from the face or from the midpoint between transmitter
+/// and receiver. An obstacle straight ahead is `ahead_m` farther from the axis.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Mounting {
-    /// The middle of the face in front of the axis, metres.
+    /// Forward offset of the face's centre from the axis, metres.
     pub ahead_m: f64,
-    /// The same to the left of it, metres.
+    /// Left offset of the face's centre from the axis, metres.
     pub left_m: f64,
-    /// Transmitter and receiver side by side, their middles this far apart, metres: the
-    /// transmitter on the left. 0 for a transducer that does both.
+    /// Distance between the centres of separate transmitter and receiver, metres, with the
+    /// transmitter on the left. 0 for a common transducer.
     pub separation_m: f64,
-    /// Height of its middle in a scene with heights, metres.
+    /// Height of the centre in a scene with heights, metres.
     pub z_m: Option<f64>,
-    /// How far its axis points up, degrees.
+    /// Upward tilt of the axis, degrees.
     pub tilt_deg: f64,
 }
 
 impl Mounting {
-    /// Transmitter and receiver with the axis at `axis`, looking into `direction_rad`.
+    /// Positions of transmitter and receiver for a rotation axis at `axis` and a beam in
+    /// `direction_rad`.
     #[must_use]
     pub fn places(&self, axis: DVec2, direction_rad: f64) -> [DVec2; 2] {
         let turn = DVec2::from_angle(direction_rad);
@@ -41,7 +42,8 @@ impl Mounting {
         *self == Self::default()
     }
 
-    /// Whether it is one transducer on the axis itself, so that turning does not move it.
+    /// Returns `true` for a single transducer on the axis itself, whose position does not depend on
+    /// rotation.
     #[must_use]
     pub fn is_on_axis(&self) -> bool {
         self.ahead_m == 0.0 && self.left_m == 0.0 && self.separation_m == 0.0

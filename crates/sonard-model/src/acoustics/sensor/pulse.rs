@@ -1,4 +1,4 @@
-//! What a ranger sends, as its data say.
+//! Transmitted pulse in a sensor's data.
 
 use std::f64::consts::TAU;
 
@@ -7,45 +7,45 @@ use serde::{Deserialize, Serialize};
 
 use super::{SensorError, figures::positive};
 
-/// The transmitted pulse.
+/// Transmitted pulse shape and bandwidth.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "shape", rename_all = "snake_case", deny_unknown_fields)]
 pub enum Pulse {
-    /// So many cycles of the carrier at full strength, as transducer and receiver pass them.
+    /// Carrier cycles of constant amplitude, filtered by transducer and receiver.
     Burst {
-        /// Number of cycles.
+        /// Number of carrier cycles.
         cycles: f64,
-        /// Standard deviation of the Gaussian band filter that transducer and receiver are
-        /// together, hertz.
+        /// Standard deviation of the combined Gaussian band filter of transducer and receiver,
+        /// hertz.
         bandwidth_hz: f64,
     },
-    /// A sine under a Gaussian envelope.
+    /// Sine with a Gaussian envelope.
     Gaussian {
         /// Standard deviation of the envelope, microseconds.
         sigma_us: f64,
     },
-    /// Bursts of several frequencies, one after the other.
+    /// Consecutive bursts of different frequencies.
     Chirp {
-        /// The bursts in order.
+        /// Bursts in order of transmission.
         parts: Vec<ChirpPart>,
         /// As for a burst; centred on the sensor's `frequency_hz`.
         bandwidth_hz: f64,
     },
 }
 
-/// One frequency of a chirp.
+/// Burst of one frequency within a chirp.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ChirpPart {
-    /// Number of cycles.
+    /// Number of cycles of the burst.
     pub cycles: f64,
-    /// Frequency, hertz.
+    /// Frequency of the burst, hertz.
     pub frequency_hz: f64,
 }
 
 impl Pulse {
-    /// Standard deviation of the band that transducer and receiver let through, hertz; of a Gaussian envelope that of its
-    /// spectrum.
+    /// Standard deviation of the passband of transducer and receiver, hertz; for a Gaussian
+    /// envelope that of its spectrum.
     #[must_use]
     pub fn bandwidth_hz(&self) -> f64 {
         match self {
@@ -54,7 +54,7 @@ impl Pulse {
         }
     }
 
-    /// Makes its [band](Self::bandwidth_hz) so many times as wide.
+    /// Multiplies the [bandwidth](Self::bandwidth_hz) by a factor.
     pub fn widen_band(&mut self, by: f64) {
         match self {
             Self::Burst { bandwidth_hz, .. } | Self::Chirp { bandwidth_hz, .. } => {

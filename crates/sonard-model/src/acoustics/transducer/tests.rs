@@ -1,6 +1,6 @@
-//! Beam patterns against closed forms and tables.
+//! Beam patterns compared with closed forms and tables.
 
-use super::{face::MetFace, *};
+use super::{face_response::PulsedFace, *};
 use crate::acoustics::{BeamPoint, Pulse};
 
 const SPEED_M_S: f64 = 343.99;
@@ -15,7 +15,7 @@ fn ka(sound_speed_m_s: f64) -> f64 {
 }
 
 #[test]
-fn the_angle_at_a_level_is_where_the_pattern_first_falls_to_it() {
+fn angle_at_inverts_the_pattern() {
     for name in Sensor::preset_names() {
         let beam = BeamPattern::new(&preset(name), SPEED_M_S);
         assert_eq!(beam.one_way(0.0), 1.0, "{name}");
@@ -31,7 +31,7 @@ fn the_angle_at_a_level_is_where_the_pattern_first_falls_to_it() {
 }
 
 #[test]
-fn piston_has_the_tabulated_lobe_null_and_side_lobe() {
+fn piston_matches_tables() {
     let one_way = |degrees: f64| piston_directivity(ka(343.2), degrees.to_radians());
     assert!((20.0 * one_way(7.28).log10() + 6.0).abs() < 0.05, "{}", one_way(7.28));
     assert!(one_way(12.67) > 0.0 && one_way(12.69) < 0.0);
@@ -40,7 +40,7 @@ fn piston_has_the_tabulated_lobe_null_and_side_lobe() {
 }
 
 #[test]
-fn kuc_siegel_response_integrates_to_the_cosine() {
+fn kuc_siegel_integrates_to_cosine() {
     for degrees in [0.5_f64, 7.0, 30.0, 60.0, 89.0] {
         let theta_rad = degrees.to_radians();
         let half_span_s = RADIUS_M * theta_rad.sin() / SPEED_M_S;
@@ -55,7 +55,7 @@ fn kuc_siegel_response_integrates_to_the_cosine() {
 }
 
 #[test]
-fn a_long_pulse_sees_the_piston_times_the_cosine() {
+fn long_pulse_gives_the_piston() {
     let sensor = Sensor { pulse: Pulse::Gaussian { sigma_us: 5000.0 }, ..preset("senscomp-6500") };
     let beam = BeamPattern::new(&sensor, SPEED_M_S);
     for i in 0..89 {
@@ -67,7 +67,7 @@ fn a_long_pulse_sees_the_piston_times_the_cosine() {
 }
 
 #[test]
-fn convolution_agrees_with_a_direct_sum_in_time() {
+fn matches_direct_convolution() {
     let sensor = preset("senscomp-6500");
     let Pulse::Burst { cycles, bandwidth_hz } = sensor.pulse else { panic!("a burst") };
     let length_s = cycles / sensor.frequency_hz;
@@ -101,10 +101,10 @@ fn convolution_agrees_with_a_direct_sum_in_time() {
 }
 
 #[test]
-fn interpolation_errs_less_than_stated() {
+fn interpolation_error_is_bounded() {
     let sensor = preset("senscomp-6500");
     let beam = BeamPattern::new(&sensor, SPEED_M_S);
-    let disc = MetFace::of(&sensor);
+    let disc = PulsedFace::for_sensor(&sensor);
     for i in 0..1800 {
         let theta_rad = (f64::from(i) * 0.05 + 0.025).to_radians();
         let expected =
@@ -115,18 +115,20 @@ fn interpolation_errs_less_than_stated() {
     }
 }
 
-/// Faces of a shape share a table, whatever their size and the air, and whichever was asked about first: what a pattern is
-/// does not depend on the ones before. Wide faces have a coarser table and no longer one.
+/// Faces of one shape share a table, whatever their size and the air: a pattern does not depend on
+/// earlier requests. Wide faces have a coarser table of the same maximum size.
 #[test]
-fn patterns_of_one_table_are_those_of_their_own_faces() {
-    let of = |radius_m: f64| Sensor {
+fn shared_table_fits_each_face() {
+    let sensor_with = |radius_m: f64| Sensor {
         aperture: Aperture::Piston { radius_m, skirts_db: None },
         ..preset("senscomp-6500")
     };
-    let disc = MetFace::of(&of(RADIUS_M));
+    let disc = PulsedFace::for_sensor(&sensor_with(RADIUS_M));
     let level = |beam: &BeamPattern, degrees: f64| beam.one_way(degrees.to_radians());
-    let alone = |radius_m: f64, speed_m_s: f64| {
-        std::thread::spawn(move || BeamPattern::new(&of(radius_m), speed_m_s)).join().expect("one")
+    let in_new_thread = |radius_m: f64, speed_m_s: f64| {
+        std::thread::spawn(move || BeamPattern::new(&sensor_with(radius_m), speed_m_s))
+            .join()
+            .expect("a pattern")
     };
     for (radius_m, speed_m_s) in [
         (RADIUS_M, 343.99),
@@ -135,16 +137,17 @@ fn patterns_of_one_table_are_those_of_their_own_faces() {
         (RADIUS_M, 300.0),
         (10.0 * RADIUS_M, 343.99),
     ] {
-        let sensor = of(radius_m);
-        let (beam, alone) = (BeamPattern::new(&sensor, speed_m_s), alone(radius_m, speed_m_s));
+        let sensor = sensor_with(radius_m);
+        let (beam, fresh) =
+            (BeamPattern::new(&sensor, speed_m_s), in_new_thread(radius_m, speed_m_s));
         let ka = TAU * sensor.frequency_hz / speed_m_s * radius_m;
         for i in 0..180 {
             let degrees = 0.5 * f64::from(i);
-            assert_eq!(level(&beam, degrees), level(&alone, degrees), "{radius_m} {degrees}");
+            assert_eq!(level(&beam, degrees), level(&fresh, degrees), "{radius_m} {degrees}");
             let theta_rad = degrees.to_radians();
             let expected = theta_rad.cos() * disc.peak(ka * theta_rad.sin()) / disc.peak(0.0);
             let error = (level(&beam, degrees) - expected).abs();
-            // Kinks of side lobes are missed by as much as the entries of the pattern miss them.
+            // Kinks of side lobes are limited by the resolution of the pattern's table.
             assert!(
                 error < if ka < 40.0 { 1e-4 } else { 2e-3 },
                 "{radius_m} {speed_m_s} {degrees}: {error}"
@@ -153,20 +156,21 @@ fn patterns_of_one_table_are_those_of_their_own_faces() {
     }
 }
 
-/// A face of thousands of wavelengths is nonsense that a file can hold: it must not take minutes.
+/// A file can hold a face of thousands of wavelengths: the table must not take minutes.
 #[test]
-fn the_table_of_any_face_is_bounded() {
-    let face = |ka: f64| face::FaceResponse::of(&preset("senscomp-6500"), ka).entries();
+fn table_size_is_bounded() {
+    let face =
+        |ka: f64| face_response::FaceResponse::for_sensor(&preset("senscomp-6500"), ka).entries();
     for ka in [0.0, 1.0, 17.3, 39.9, 40.1, 81.0, 300.0] {
         assert!(face(ka) <= 4003, "{ka}: {}", face(ka));
     }
 }
 
 #[test]
-fn gaussian_beam_is_bozma_and_kucs() {
+fn gaussian_matches_bozma_kuc() {
     let beam = BeamPattern::new(&preset("bozma-kuc-60khz"), 343.0);
     assert!((beam.one_way(11.8_f64.to_radians()) - (-2.0_f64).exp()).abs() < 1e-12);
-    // Extent of a plane between tau = 0.02 on both sides, two ways: 23.3 degrees.
+    // Two-way extent of a plane at tau = 0.02 on both sides: 23.3 degrees.
     let extent_deg = 2.0 * beam.angle_at(0.02_f64.sqrt()).to_degrees();
     assert!((extent_deg - 23.3).abs() < 0.05, "{extent_deg}");
 }
@@ -176,24 +180,24 @@ fn with_skirts(level_db: Option<f64>) -> Sensor {
     Sensor { aperture, ..preset("hc-sr04") }
 }
 
-/// Above the piston by the skirts' power, and falling with the angle where the piston does.
+/// Exceeds the piston by the floor's power, and falls with the angle where the piston does.
 #[test]
-fn skirts_hold_up_what_a_piston_lets_fall() {
+fn side_lobe_floor_adds_power() {
     let [without, with] =
         [None, Some(-8.0)].map(|db| BeamPattern::new(&with_skirts(db), SPEED_M_S));
     let level = 10f64.powf(-8.0 / 20.0);
     let mut last = 1.0;
     for i in 0..=900 {
         let theta_rad = f64::from(i).to_radians() / 10.0;
-        let [alone, held] = [&without, &with].map(|beam| beam.one_way(theta_rad));
+        let [piston, held] = [&without, &with].map(|beam| beam.one_way(theta_rad));
         let skirts = level * theta_rad.cos();
-        let expected = (alone.powi(2) + (1.0 - alone.powi(2)) * skirts.powi(2)).sqrt();
+        let expected = (piston.powi(2) + (1.0 - piston.powi(2)) * skirts.powi(2)).sqrt();
         assert!((held - expected).abs() < 1e-5, "{i}: {held} for {expected}");
         assert!(held <= last + 1e-12 && last - held < 0.01, "{i}: {held} after {last}");
         last = held;
     }
     assert!((with.one_way(0.0) - 1.0).abs() < 1e-6 && with.one_way(FRAC_PI_2) == 0.0);
-    // Weaker skirts are less, down to none.
+    // A floor at -120 dB has no effect.
     let faint = BeamPattern::new(&with_skirts(Some(-120.0)), SPEED_M_S);
     for i in 0..900 {
         let theta_rad = f64::from(i).to_radians() / 10.0;
@@ -202,7 +206,7 @@ fn skirts_hold_up_what_a_piston_lets_fall() {
 }
 
 #[test]
-fn a_table_is_met_at_its_points_and_is_straight_between() {
+fn table_interpolates_linearly() {
     let points = [(0.0, Some(0.0)), (20.0, Some(-4.0)), (45.0, Some(-9.0)), (100.0, None)];
     let points = points.map(|(angle_deg, level_db)| BeamPoint { angle_deg, level_db }).to_vec();
     let aperture = Aperture::Table { points, radius_m: 6.5e-3 };
@@ -213,7 +217,7 @@ fn a_table_is_met_at_its_points_and_is_straight_between() {
     {
         assert!((level_db(degrees) - expected_db).abs() < 1e-4, "{degrees}");
     }
-    // In a straight line to nothing.
+    // Linear to zero amplitude.
     assert!((level_db(72.5) - (-9.0 + 20.0 * 0.5_f64.log10())).abs() < 1e-4);
     assert_eq!([100.1_f64, 179.0].map(|degrees| beam.one_way(degrees.to_radians())), [0.0; 2]);
     for i in 0..2000 {
@@ -226,7 +230,7 @@ fn a_table_is_met_at_its_points_and_is_straight_between() {
 }
 
 #[test]
-fn nothing_leaves_backwards_and_nothing_beats_the_axis() {
+fn pattern_is_bounded_by_the_axis() {
     let line = Sensor {
         aperture: Aperture::Line {
             half_length_m: 0.0192,
@@ -248,9 +252,9 @@ fn nothing_leaves_backwards_and_nothing_beats_the_axis() {
     }
 }
 
-/// The fourth power of `exp(-2 t^2 / h^2)` has the integral `h sqrt(pi / 8)`.
+/// Integral of the fourth power of `exp(-2 t^2 / h^2)`: `h sqrt(pi / 8)`.
 #[test]
-fn a_gaussian_beams_power_is_its_integral() {
+fn gaussian_power_matches_integral() {
     for half_angle_deg in [5.0, 12.0] {
         let aperture = Aperture::Gaussian { half_angle_deg, radius_m: 0.019 };
         let sensor = Sensor { aperture, ..Sensor::preset("senscomp-6500").expect("a preset") };

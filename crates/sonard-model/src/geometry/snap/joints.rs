@@ -1,4 +1,4 @@
-//! Vertices that belong on a segment: T-joints, crossings with an overshoot, walls drawn over each other.
+//! Vertices that belong on a segment: T-joints, crossings with an overshoot, overlapping walls.
 
 use rstar::{AABB, RTree, primitives::GeomWithData};
 use smallvec::SmallVec;
@@ -6,25 +6,25 @@ use smallvec::SmallVec;
 use super::vertices::Vertices;
 use crate::geometry::DVec2;
 
-/// Closing one joint moves the ends of others by less each time.
-const ROUNDS: usize = 200;
+/// Maximum number of rounds. Closing one joint moves other ends, by a decreasing amount.
+const MAX_ROUNDS: usize = 200;
 
-/// Joints that are closed to this are closed, metres: rounding of the arithmetic.
+/// Tolerance of a closed joint, metres: rounding error.
 const CLOSED_M: f64 = 1e-12;
 
-/// How much a vertex is held at its foot on a segment against how much it is drawn to its own line.
+/// Weight of a vertex's foot on the segment relative to that of its own line.
 const HOLD: f64 = 1e-6;
 
-/// The segments on which each vertex belongs, the nearest first, two at most.
+/// Nearest segments on which each vertex belongs, two at most.
 pub(super) struct Joints(Vec<SmallVec<[u32; 2]>>);
 
 impl Joints {
-    pub(super) fn of(&self, vertex: u32) -> &[u32] {
+    pub(super) fn segments_at(&self, vertex: u32) -> &[u32] {
         &self.0[vertex as usize]
     }
 }
 
-/// Vertices closer than the tolerance to the inside of a segment.
+/// Finds vertices closer than the tolerance to the inside of a segment.
 pub(super) fn find(vertices: &Vertices, tolerance_m: f64) -> Joints {
     let tree = RTree::bulk_load(
         (0..vertices.len())
@@ -58,14 +58,15 @@ pub(super) fn find(vertices: &Vertices, tolerance_m: f64) -> Joints {
     )
 }
 
-/// Distance of a point from a segment whose inside is nearest to it, metres.
+/// Distance of a point from a segment, metres; `None` if the nearest point is an end.
 fn off_inside(point: DVec2, a: DVec2, b: DVec2) -> Option<f64> {
     let along = (b - a).normalize_or_zero();
     let place_m = (point - a).dot(along);
     (place_m > 0.0 && place_m < a.distance(b)).then(|| along.perp_dot(point - a).abs())
 }
 
-/// The nearest, and another one that it meets as near.
+/// Selects the nearest segment, and a second one whose intersection with it is within the
+/// tolerance.
 fn choose(
     vertices: &Vertices,
     vertex: usize,
@@ -77,50 +78,57 @@ fn choose(
     let mut chosen: SmallVec<[u32; 2]> = near.next().into_iter().collect();
     if let Some(&first) = chosen.first() {
         let at = vertices.at[vertex];
-        let meets = |other: &u32| {
-            meeting(vertices.segment(first as usize), vertices.segment(*other as usize))
+        let joins = |other: &u32| {
+            intersection(vertices.segment(first as usize), vertices.segment(*other as usize))
                 .is_some_and(|point| point.distance(at) <= tolerance_m)
         };
-        chosen.extend(near.find(meets));
+        chosen.extend(near.find(joins));
     }
     chosen
 }
 
-fn meeting((a, b): (DVec2, DVec2), (c, d): (DVec2, DVec2)) -> Option<DVec2> {
+fn intersection((a, b): (DVec2, DVec2), (c, d): (DVec2, DVec2)) -> Option<DVec2> {
     let (u, v) = (b - a, d - c);
     let slant = u.perp_dot(v);
     let is_parallel = slant.abs() <= 1e-9 * u.length() * v.length();
     (!is_parallel).then(|| a + (c - a).perp_dot(v) / slant * u)
 }
 
-/// Moves vertices onto their segments until all lie there: a segment that is moved takes those on it along.
+/// Moves vertices onto their segments until all joints are closed. A segment that moves takes its
+/// vertices along.
 pub(super) fn close(vertices: &mut Vertices, joints: &Joints, tolerance_m: f64) {
-    let on: Vec<u32> =
-        (0..vertices.len() as u32).filter(|&vertex| !joints.of(vertex).is_empty()).collect();
+    let on: Vec<u32> = (0..vertices.len() as u32)
+        .filter(|&vertex| !joints.segments_at(vertex).is_empty())
+        .collect();
     let from = vertices.at.clone();
-    for _ in 0..ROUNDS {
-        let mut is_settled = true;
+    for _ in 0..MAX_ROUNDS {
+        let mut is_converged = true;
         for &vertex in &on {
             let at = vertices.at[vertex as usize];
-            let place =
-                place(vertices, vertex, joints.of(vertex), from[vertex as usize], tolerance_m);
-            if place.distance(at) > CLOSED_M * 1e-2 {
-                vertices.at[vertex as usize] = place;
-                is_settled &= place.distance(at) <= CLOSED_M;
+            let position = place(
+                vertices,
+                vertex,
+                joints.segments_at(vertex),
+                from[vertex as usize],
+                tolerance_m,
+            );
+            if position.distance(at) > CLOSED_M * 1e-2 {
+                vertices.at[vertex as usize] = position;
+                is_converged &= position.distance(at) <= CLOSED_M;
             }
         }
-        if is_settled {
+        if is_converged {
             break;
         }
     }
 }
 
-/// Where a vertex belongs that is at `from` without its joint.
+/// Position on the joint for a vertex at `from`.
 fn place(vertices: &Vertices, vertex: u32, on: &[u32], from: DVec2, tolerance_m: f64) -> DVec2 {
     let segments = on.iter().map(|&segment| vertices.segment(segment as usize));
     let lines: SmallVec<[_; 2]> = segments.collect();
-    if let [one, other] = lines[..]
-        && let Some(point) = meeting(one, other)
+    if let [a, b] = lines[..]
+        && let Some(point) = intersection(a, b)
         && point.distance(from) <= 2.0 * tolerance_m
     {
         return point;
@@ -128,7 +136,8 @@ fn place(vertices: &Vertices, vertex: u32, on: &[u32], from: DVec2, tolerance_m:
     let (a, b) = lines[0];
     let along = (b - a).normalize_or_zero();
     let foot = a + (from - a).dot(along) * along;
-    // Least (n . (slid - p))^2, summed over its own lines, and HOLD times the way to where it is held.
+    // Minimizes (n . (slid - p))^2, summed over the vertex's own lines, plus HOLD times the squared
+    // distance to the current position.
     let hold =
         HOLD + vertices.lines(vertex).map(|(_, normal)| normal.dot(along).powi(2)).sum::<f64>();
     let mut slid = foot;
@@ -143,7 +152,7 @@ fn place(vertices: &Vertices, vertex: u32, on: &[u32], from: DVec2, tolerance_m:
     } else if foot.distance(from) <= 2.0 * tolerance_m {
         foot
     } else {
-        // What it belongs on was moved away: it stays, and the joint is open.
+        // The segment was moved away: the vertex stays and the joint is open.
         from
     }
 }

@@ -1,12 +1,12 @@
-//! What is wrong with a file, and where.
+//! Errors in a scene file, with their positions.
 
 use super::*;
 
-/// Replaces `part` of the good scene by `bad` and expects an error that points at the text
-/// `points_at`, starts with `expect` (path and message) and whose help contains `help`.
+/// Replaces `part` of the good scene by `bad` and expects an error with the text `points_at` as its
+/// span. Path and message start with `expect`; the help contains `help`.
 #[track_caller]
 fn check(part: &str, bad: &str, points_at: &str, expect: &str, help: &str) {
-    assert_eq!(GOOD.matches(part).count(), 1, "`{part}` must stand there once");
+    assert_eq!(GOOD.matches(part).count(), 1, "`{part}` must occur once");
     let text = GOOD.replace(part, bad);
     let error = Scene::from_json(&text).expect_err(expect);
     assert_eq!(&text[error.span.clone()], points_at, "{error}");
@@ -23,7 +23,7 @@ fn check(part: &str, bad: &str, points_at: &str, expect: &str, help: &str) {
 }
 
 #[test]
-fn line_and_column_count_from_one_and_in_characters() {
+fn positions_count_characters() {
     let error =
         Scene::from_json("{\n  \"name\": \"\u{e9}\u{e9}\", \"nam\": 3}").expect_err("no field");
     assert_eq!((error.line, error.column, error.path.as_str()), (2, 17, "nam"));
@@ -31,7 +31,7 @@ fn line_and_column_count_from_one_and_in_characters() {
 
 #[test]
 #[rustfmt::skip]
-fn syntax_errors_point_at_the_place() {
+fn syntax_errors_have_positions() {
     check(r#"[4, 0], "material""#, r#"[4, 0, "material""#, ":", "this is not JSON: expected `,` or `]`", "brackets");
     check("0.5}}\n}", "0.5", "{", "this `{` is never closed", "`}`");
     check("[0, 0]]", "[0, 0]", ":", "this is not JSON: expected `,` or `]` (the `[` at 6:32 is still open)", "brackets");
@@ -45,9 +45,9 @@ fn syntax_errors_point_at_the_place() {
     assert_eq!((empty.line, empty.column), (1, 1));
 }
 
-/// A text that was cut off names its open bracket, whatever stands in its strings.
+/// The text is cut off: the error names the open bracket, independent of the contents of strings.
 #[test]
-fn quotes_and_brackets_in_strings_are_no_syntax() {
+fn strings_hide_brackets() {
     for name in [r#"a\"b"#, r#"a\"]b"#, r#"\\"#, "[[", r#"\"{\""#] {
         let text = format!("{{\"name\": \"{name}\", \"walls\": [{{\"id\": \"]\"}}, ");
         let error = Scene::from_json(&text).expect_err("cut off");
@@ -59,7 +59,7 @@ fn quotes_and_brackets_in_strings_are_no_syntax() {
 
 #[test]
 #[rustfmt::skip]
-fn shapes_that_do_not_fit_are_named() {
+fn structure_errors_are_named() {
     check(r#""floor_z_m""#, r#""flor_z_m""#, r#""flor_z_m""#, "flor_z_m: unknown field `flor_z_m`", "did you mean `floor_z_m`?");
     check(r#""closed""#, r#""close""#, r#""close""#, "walls[2].close: unknown field `close`", "did you mean `closed`?");
     check("0.9", r#""0.9""#, r#""0.9""#, "materials.board.reflectance: found string \"0.9\", expected a number", "quotes");
@@ -76,8 +76,8 @@ fn shapes_that_do_not_fit_are_named() {
 
 #[test]
 #[rustfmt::skip]
-fn rules_of_scenes_are_kept() {
-    check(r#""leg""#, r#""south""#, r#""south""#, "cylinders[0].id: the id `south` is already the name of walls[0]", "own");
+fn rules_are_enforced() {
+    check(r#""leg""#, r#""south""#, r#""south""#, "cylinders[0].id: the id `south` is already the name of walls[0]", "unique");
     check(r#""leg""#, r#""rest.1""#, r#""rest.1""#, "cylinders[0].id: the id `rest.1` is already the name of walls[1]", "");
     check(r#""leg""#, r#"" ""#, r#"" ""#, "cylinders[0].id: this name is empty", "");
     check(r#"0.1, "material": "board""#, r#"0.1, "material": "bord""#, r#""bord""#, "cylinders[0].material: there is no material `bord`", "did you mean `board`?");
@@ -91,7 +91,7 @@ fn rules_of_scenes_are_kept() {
     check("[4, 3]", "[4, 3000]", "3000", "walls[1].polyline[1][1]: 3000 m is out of bounds", "millimetres");
     check("0.1", "-0.1", "-0.1", "cylinders[0].radius_m: a radius of -0.1 m", "greater than 0");
     check("0.9", "1.2", "1.2", "materials.board.reflectance: reflectance is 1.2", "0 to 1");
-    check(r#""ceiling_z_m": 2.5"#, r#""ceiling_material": "board""#, r#""board""#, "ceiling_material: there is none", "give its height as `ceiling_z_m`");
+    check(r#""ceiling_z_m": 2.5"#, r#""ceiling_material": "board""#, r#""board""#, "ceiling_material: the scene has no ceiling_z_m", "give its height as `ceiling_z_m`");
     check(r#""floor_z_m": 0"#, r#""floor_z_m": 0, "floor_material": "bord""#, r#""bord""#, "floor_material: there is no material `bord`", "did you mean `board`?");
     check(r#""ceiling_z_m": 2.5"#, r#""ceiling_z_m": -1"#, "-1", "ceiling_z_m: ceiling_z_m (-1 m) is not above floor_z_m (0 m)", "");
     check("[0, 1]", "[1, 0]", "[1, 0]", "walls[2].z_m: the upper height (0 m) is not above", "lower height first");
@@ -101,7 +101,7 @@ fn rules_of_scenes_are_kept() {
 }
 
 #[test]
-fn a_byte_order_mark_is_let_pass() {
+fn byte_order_mark_is_accepted() {
     let marked = format!("\u{feff}{GOOD}");
     assert_eq!(Scene::from_json(&marked).expect("with a mark").walls, good().walls);
     let wrong = marked.replace("\"closed\"", "\"close\"");
@@ -110,7 +110,7 @@ fn a_byte_order_mark_is_let_pass() {
 }
 
 #[test]
-fn no_text_of_a_scene_reaches_a_terminal_as_a_command_or_without_end() {
+fn messages_are_sanitized() {
     for (name, text) in [
         ("an id", GOOD.replace("\"leg\"", r#""\u001b[2Jleg""#)),
         ("a pose", GOOD.replace("\"desk\"", r#""de\u0007sk""#)),
@@ -132,9 +132,9 @@ fn no_text_of_a_scene_reaches_a_terminal_as_a_command_or_without_end() {
         }),
     ] {
         let error = Scene::from_json(&text).expect_err(name);
-        for said in [error.to_string(), error.help()] {
-            assert!(said.len() < 4000, "{name}: {} characters", said.len());
-            assert!(!said.contains(char::is_control), "{name}: {said:?}");
+        for text in [error.to_string(), error.help()] {
+            assert!(text.len() < 4000, "{name}: {} characters", text.len());
+            assert!(!text.contains(char::is_control), "{name}: {text:?}");
         }
     }
 }

@@ -1,13 +1,13 @@
-//! Plans that are made of walls as they were drawn.
+//! Floor plans derived from walls as drawn.
 
 use super::{
-    standing::{plan_of, single},
+    accessibility::{scene_with_walls, single},
     *,
 };
 
 fn plan(walls: &[String]) -> (Scene, FloorPlan) {
     let texts: Vec<&str> = walls.iter().map(String::as_str).collect();
-    let scene = plan_of(&texts, "");
+    let scene = scene_with_walls(&texts, "");
     let plan = scene.floor_plan();
     (scene, plan)
 }
@@ -16,9 +16,9 @@ fn described(scene: &Scene, plan: &FloorPlan) -> Vec<String> {
     plan.changes.iter().map(|change| change.describe(scene)).collect()
 }
 
-/// A wall that stops half a millimetre short of another ends on it.
+/// A wall that ends half a millimetre short of another is extended to it.
 #[test]
-fn a_joint_is_closed_and_told_in_millimetres() {
+fn closes_and_describes_a_joint() {
     let (scene, plan) =
         plan(&[single("long", [0.3, 1.0], [4.3, 1.0]), single("t", [2.1, 1.0005], [2.1, 3.0])]);
     let (foot, far) = plan.walls[1];
@@ -26,15 +26,15 @@ fn a_joint_is_closed_and_told_in_millimetres() {
     assert_eq!(plan.walls[0], (DVec2::new(0.3, 1.0), DVec2::new(4.3, 1.0)));
     assert_eq!(
         described(&scene, &plan),
-        ["t.a at (2.1000, 1.0005): moved by 0.500 mm, it stopped short of long"]
+        ["t.a at (2.1000, 1.0005): moved by 0.500 mm, short of long"]
     );
-    // Three pieces meet there.
+    // The arrangement has three pieces.
     assert_eq!(plan.arrangement.pieces.len(), 3);
 }
 
-/// One that ends near where two cross ends in their crossing.
+/// A wall that ends near the crossing of two others is moved to the crossing.
 #[test]
-fn where_two_walls_cross_a_third_ends_in_the_crossing() {
+fn third_wall_ends_in_the_crossing() {
     let (_, plan) = plan(&[
         single("one", [0.2, 1.0], [4.2, 1.0]),
         single("other", [1.2, 0.1], [2.2, 2.1]),
@@ -44,9 +44,9 @@ fn where_two_walls_cross_a_third_ends_in_the_crossing() {
     assert!(end.distance(DVec2::new(1.65, 1.0)) < 1e-9, "{end}");
 }
 
-/// Where a wall goes straight on, in its own material, nothing happens.
+/// A joint is straight where a wall continues in the same material.
 #[test]
-fn joints_of_one_line_are_straight_and_bends_are_not() {
+fn collinear_joints_are_straight() {
     let (scene, plan) = plan(&[
         single("one", [1.0, 1.0], [2.0, 1.5]),
         single("two", [2.0, 1.5], [4.0, 2.5]),

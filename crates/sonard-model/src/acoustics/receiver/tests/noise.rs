@@ -1,9 +1,9 @@
-//! Noise of the receiver: its size, and what it does to readings.
+//! Noise of the receiver: magnitude and effect on readings.
 
 use super::*;
 
 #[test]
-fn noise_is_off_by_default_repeats_with_its_seed_and_shakes_weak_echoes_most() {
+fn noise_affects_weak_echoes_most() {
     let one = |strength, noise: &ReceiverNoise, seed| {
         let mut rng = Pcg64::seed_from_u64(seed);
         receiver().detect_in_noise(
@@ -28,16 +28,15 @@ fn noise_is_off_by_default_repeats_with_its_seed_and_shakes_weak_echoes_most() {
     };
     let (weak, strong) = (spread_us(0.05), spread_us(1.0));
     assert!(weak > 1.0 && weak > 1.5 * strong, "{weak} {strong}");
-    // Noise alone raises ECHO when its envelope is of the threshold's size.
-    let loud = ReceiverNoise { floor: 0.05, jitter_us: 0.0 };
+    // Noise alone raises ECHO when its envelope is comparable to the threshold.
+    let strong_noise = ReceiverNoise { floor: 0.05, jitter_us: 0.0 };
     let mut rng = Pcg64::seed_from_u64(3);
-    let alarm = receiver().detect_in_noise(&[], &|_| None, &loud, &mut rng);
+    let alarm = receiver().detect_in_noise(&[], &|_| None, &strong_noise, &mut rng);
     assert_eq!((alarm.status, alarm.arrival), (PingStatus::Echo, None));
 }
 
-/// The envelope of the noise has the size asked for.
 #[test]
-fn noise_has_its_floor() {
+fn noise_rms_equals_floor() {
     let noise = ReceiverNoise { floor: 0.01, jitter_us: 0.0 };
     let receiver = receiver();
     let track = noise.track(&receiver, &mut Pcg64::seed_from_u64(5));

@@ -1,18 +1,18 @@
-//! Thresholds that move: with the steps of the gain, and with the range.
+//! Thresholds that vary with gain steps and with range.
 
 use super::*;
 
-/// The threshold in force drifts up with the range within a step and falls at its end.
+/// The effective threshold rises with range within a step and falls at its end.
 #[test]
-fn gain_steps_move_the_threshold() {
+fn gain_steps_lower_the_threshold() {
     let sensor = Sensor::preset("senscomp-6500").expect("a preset");
     let receiver = Receiver::new(&sensor, 343.99);
     let [before, after] = [5119.0, 5121.0].map(|t_us| receiver.threshold_at(t_us));
     assert!((20.0 * (before / after).log10() - 5.2).abs() < 0.01, "{before} {after}");
-    // It is the sensor's own within each step, and at the rated range.
+    // The sensor's own threshold applies within each step and at the rated range.
     assert!((receiver.threshold_at(3491.0) / sensor.threshold - 1.0).abs() < 0.01);
     assert!((receiver.threshold_at(62_210.0) / sensor.threshold - 1.0).abs() < 0.01);
-    // An echo too weak at the end of step 1 is heard once the gain has risen.
+    // An echo too weak at the end of step 1 is detected once the gain has risen.
     let tof_us = 5000.0;
     let weak = PulseArrival {
         length_m: tof_us * 343.99e-6,
@@ -26,7 +26,7 @@ fn gain_steps_move_the_threshold() {
 }
 
 #[test]
-fn a_threshold_that_rises_is_continuous_and_never_hears_more_or_earlier() {
+fn rising_threshold_delays_echoes() {
     let flat = receiver();
     let mut rng = Pcg64::seed_from_u64(1);
     for _ in 0..300 {
@@ -43,7 +43,7 @@ fn a_threshold_that_rises_is_continuous_and_never_hears_more_or_earlier() {
         }
     }
     let rising = rising(4.0);
-    // 6000 us are 1.02 m.
+    // 6000 us correspond to 1.02 m.
     assert!((rising.threshold_at(6000.0) / 0.02 - 10f64.powf(4.08 / 20.0)).abs() < 1e-9);
     let steps = (0..20_000).map(|t_us| rising.threshold_at(f64::from(t_us)));
     let steps: Vec<f64> = steps.collect();
@@ -52,31 +52,31 @@ fn a_threshold_that_rises_is_continuous_and_never_hears_more_or_earlier() {
     }
 }
 
-/// Whether the receiver hears worse or the sounds are weaker is the same.
+/// A rising threshold is equivalent to weaker arrivals.
 #[test]
-fn a_threshold_that_rises_is_sound_that_falls() {
+fn rising_threshold_attenuates() {
     let mut rng = Pcg64::seed_from_u64(2);
-    let (mut same, mut heard) = (0, 0);
+    let (mut same, mut detected) = (0, 0);
     for _ in 0..400 {
         let sounds = random_sounds(&mut rng);
-        // At the middle of the pulse, which lasts 324 us.
+        // Evaluated at the middle of the pulse, which lasts 324 us.
         let weaker = |&(tof_us, amplitude, phase): &(f64, f64, f64)| {
             let range_m = 0.5e-6 * SPEED_M_S * (tof_us + 100.0);
             (tof_us, amplitude * 10f64.powf(-5.0 * range_m / 20.0), phase)
         };
         let weaker: Vec<_> = sounds.iter().map(weaker).collect();
-        let [one, other] =
+        let [risen, attenuated] =
             [rising(5.0).detect(&arrivals(&sounds)), receiver().detect(&arrivals(&weaker))];
-        let firsts = [&one, &other].map(|found| found.echoes_us.first().copied());
+        let firsts = [&risen, &attenuated].map(|found| found.echoes_us.first().copied());
         match firsts {
-            [Some(one_us), Some(other_us)] if (one_us - other_us).abs() < 4.0 => {
-                heard += 1;
+            [Some(a_us), Some(b_us)] if (a_us - b_us).abs() < 4.0 => {
+                detected += 1;
                 same += 1;
             }
             [None, None] => same += 1,
             _ => {}
         }
     }
-    // Some stand within a few tenths of a decibel of the threshold.
-    assert!(same >= 385 && heard > 150, "{same} of 400, {heard} heard");
+    // Some arrivals are within a few tenths of a decibel of the threshold.
+    assert!(same >= 385 && detected > 150, "{same} of 400, {detected} detected");
 }

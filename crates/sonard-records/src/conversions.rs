@@ -1,4 +1,4 @@
-//! Records of the model's words: air, settings, predictions and paths, and back from them.
+//! Conversion between model types and records: air, settings, predictions and paths.
 
 use serde_json::Value;
 use sonard_model::{
@@ -25,8 +25,8 @@ impl From<&Air> for AirRecord {
 impl TryFrom<&AirRecord> for Air {
     type Error = AirError;
 
-    /// The air a log was taken in; a speed of sound that the state does not explain was given by hand and
-    /// stays.
+    /// Reconstructs the air of a log. A speed of sound that differs from the computed one was set
+    /// by hand and is kept.
     fn try_from(record: &AirRecord) -> Result<Self, AirError> {
         let air = Self::new(record.temperature_c, record.humidity_percent, record.pressure_kpa)?;
         if (air.sound_speed_m_s() - record.sound_speed_m_s).abs() < 1e-9 {
@@ -38,14 +38,14 @@ impl TryFrom<&AirRecord> for Air {
 }
 
 impl From<&Options> for ModelRecord {
-    /// Engine and settings as they stand in a log: what is not given is left out.
+    /// Engine and settings in the form of a log record; unset values are omitted.
     fn from(options: &Options) -> Self {
         let mut settings = serde_json::Map::new();
         if let Ok(Value::Object(values)) = serde_json::to_value(OptionKeys::from(options)) {
             settings.extend(values.into_iter().filter(|(_, value)| !value.is_null()));
         }
         settings.remove("engine");
-        // Records had no such settings at first.
+        // Omitted when `false`, for logs that predate these settings.
         for later in ["double_diffraction", "without_crosstalk"] {
             if settings.get(later) == Some(&Value::Bool(false)) {
                 settings.remove(later);
@@ -56,8 +56,8 @@ impl From<&Options> for ModelRecord {
 }
 
 impl ModelRecord {
-    /// The options that a log's model was run with; `None` if this program has no such engine or
-    /// setting. Early logs have the defaults of all engines, which mean nothing.
+    /// Options of a log's model; `None` if this program lacks the engine or a setting. Early logs
+    /// contain the defaults of all engines, which are ignored.
     #[must_use]
     pub fn options(&self) -> Option<Options> {
         let mut settings = self.settings.clone();
@@ -72,7 +72,7 @@ impl ModelRecord {
 }
 
 impl SimRecord {
-    /// A prediction as it stands in a log.
+    /// Record of a prediction.
     #[must_use]
     pub fn of(simulator: &Simulator, prediction: &Prediction) -> Self {
         let arrival = prediction.arrival.as_ref();
@@ -89,16 +89,17 @@ impl SimRecord {
 }
 
 impl PathRecord {
-    /// A path of so many metres there and back, with the names of what it meets in its scene.
+    /// Record of a path with its round-trip length in metres and the ids of the reflectors in its
+    /// scene.
     ///
     /// # Panics
-    /// If the path is of another scene.
+    /// If the path belongs to another scene.
     #[must_use]
     pub fn of(scene: &Scene, path: &Path, length_m: f64) -> Self {
-        let interaction = |met: &Interaction| InteractionRecord {
-            kind: met.mechanism.into(),
-            id: met.mechanism.name(scene),
-            point: Point::rounded(met.point, met.z_m),
+        let interaction = |interaction: &Interaction| InteractionRecord {
+            kind: interaction.mechanism.into(),
+            id: interaction.mechanism.name(scene),
+            point: Point::rounded(interaction.point, interaction.z_m),
         };
         Self {
             kind: path.kind(),
@@ -126,7 +127,7 @@ mod tests {
     use sonard_model::model::{ConeOptions, EngineKind, EngineOptions, FanOptions, PathOptions};
 
     #[test]
-    fn air_survives_its_record() {
+    fn air_round_trips() {
         for air in [
             Air::default(),
             Air::new(-12.5, 80.0, 99.0).expect("in range"),
@@ -137,7 +138,7 @@ mod tests {
     }
 
     #[test]
-    fn options_survive_their_record() {
+    fn options_round_trip() {
         let paths = PathOptions { double_diffraction: true, lossless: true, ..Default::default() };
         let fan = FanOptions { ray_spacing_deg: 0.5, ..FanOptions::default() };
         let cone = ConeOptions { aperture_deg: Some(15.0) };
@@ -159,7 +160,7 @@ mod tests {
     }
 
     #[test]
-    fn early_records_have_the_defaults_of_all_engines() {
+    fn accepts_early_records() {
         for engine in [EngineKind::Paths, EngineKind::Fan, EngineKind::Cone] {
             let text = format!(
                 r#"{{"engine":"{}","max_range_m":4.0,"ideal_receiver":false,"lossless":false,

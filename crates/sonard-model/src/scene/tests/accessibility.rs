@@ -1,16 +1,16 @@
-//! Where a ranger can stand.
+//! Accessible positions of a ranger.
 
 use super::*;
 
 #[test]
-fn a_ranger_stands_only_where_there_is_air() {
+fn ranger_needs_free_space() {
     let scene = good();
-    let refusal = |x_m: f64, y_m: f64| {
+    let rejection = |x_m: f64, y_m: f64| {
         scene.check_pose(&Pose { x_m, y_m, heading_deg: 0.0 }).err().map(|error| error.to_string())
     };
-    assert_eq!(refusal(0.5, 0.5), None);
-    // In the corner of the pillar's box, but not in its triangle.
-    assert_eq!(refusal(1.2, 1.8), None);
+    assert_eq!(rejection(0.5, 0.5), None);
+    // In the bounding box of the triangular pillar, but not in the triangle.
+    assert_eq!(rejection(1.2, 1.8), None);
     for (x_m, y_m, message) in [
         (-1.0, 1.0, "outside the room"),
         (1.8, 1.2, "inside `pillar`"),
@@ -19,35 +19,35 @@ fn a_ranger_stands_only_where_there_is_air() {
         (3.0, 2.1005, "0.50 mm from `leg`"),
         (f64::NAN, 1.0, ""),
     ] {
-        let found = refusal(x_m, y_m).unwrap_or_default();
+        let found = rejection(x_m, y_m).unwrap_or_default();
         assert!(!found.is_empty() && found.contains(message), "({x_m}, {y_m}): {found}");
     }
 }
 
 #[test]
-fn a_lone_ring_is_a_room_unless_the_poses_stand_outside() {
-    let lone = |pose: &str| {
+fn single_ring_depends_on_poses() {
+    let single_ring = |pose: &str| {
         Scene::from_json(&format!(
-            r#"{{"name": "lone", "materials": {{"m": {{"reflectance": 1}}}},
+            r#"{{"name": "ring", "materials": {{"m": {{"reflectance": 1}}}},
                "walls": [{{"id": "ring", "polyline": [[0,0],[1,0],[1,1],[0,1]], "closed": true, "material": "m"}}],
                "poses": {{{pose}}}}}"#
         ))
-        .expect("a lone ring")
+        .expect("a single ring")
     };
     let (inside, outside) = (
         Pose { x_m: 0.5, y_m: 0.5, heading_deg: 0.0 },
         Pose { x_m: 2.0, y_m: 0.5, heading_deg: 0.0 },
     );
-    let room = lone("");
+    let room = single_ring("");
     assert_eq!(room.check_pose(&inside), Ok(()));
     assert!(matches!(room.check_pose(&outside), Err(PoseError::OutsideRoom { .. })));
-    let body = lone(r#""p": {"x_m": 3, "y_m": 3}"#);
+    let body = single_ring(r#""p": {"x_m": 3, "y_m": 3}"#);
     assert!(matches!(body.check_pose(&inside), Err(PoseError::InsideBody { .. })));
     assert_eq!(body.check_pose(&outside), Ok(()));
 }
 
 #[test]
-fn walls_that_do_not_close_enclose_nothing() {
+fn open_walls_enclose_nothing() {
     let open = GOOD.replace(", [0, 0]], \"material\"", "], \"material\"");
     let scene = Scene::from_json(&open).expect("an open room");
     let outside = Pose { x_m: -1.0, y_m: 1.0, heading_deg: 0.0 };
@@ -58,8 +58,8 @@ fn walls_that_do_not_close_enclose_nothing() {
     }
 }
 
-/// A scene of walls and what `more` says.
-pub(super) fn plan_of(walls: &[&str], more: &str) -> Scene {
+/// Scene of walls and additional members.
+pub(super) fn scene_with_walls(walls: &[&str], more: &str) -> Scene {
     let text = format!(
         r#"{{"name": "plan", "materials": {{"m": {{"reflectance": 0.9}}}}, "walls": [{}] {more}}}"#,
         walls.join(",")
@@ -79,8 +79,8 @@ pub(super) fn single(id: &str, from: [f64; 2], to: [f64; 2]) -> String {
 }
 
 #[test]
-fn where_a_ranger_can_stand_follows_from_the_plan_alone() {
-    let refusal = |scene: &Scene, [x_m, y_m]: [f64; 2]| {
+fn access_is_order_independent() {
+    let rejection = |scene: &Scene, [x_m, y_m]: [f64; 2]| {
         let error = scene.check_pose(&Pose { x_m, y_m, heading_deg: 0.0 }).err();
         error.map_or_else(String::new, |error| error.to_string())
     };
@@ -162,26 +162,27 @@ fn where_a_ranger_can_stand_follows_from_the_plan_alone() {
         ),
     ];
     for (name, mut walls, places) in cases {
-        for turn in 0..2 * walls.len() {
+        for rotation in 0..2 * walls.len() {
             walls.rotate_left(1);
-            if turn == walls.len() {
+            if rotation == walls.len() {
                 walls.reverse();
             }
             let texts: Vec<&str> = walls.iter().map(String::as_str).collect();
-            let scene = plan_of(&texts, "");
+            let scene = scene_with_walls(&texts, "");
             for (at, expected) in places {
-                let found = refusal(&scene, *at);
+                let found = rejection(&scene, *at);
                 let fits =
                     if expected.is_empty() { found.is_empty() } else { found.contains(expected) };
-                assert!(fits, "{name}, {turn}: {at:?} is `{found}`, not `{expected}`");
+                assert!(fits, "{name}, {rotation}: {at:?} is `{found}`, not `{expected}`");
             }
         }
     }
 }
 
-/// A large body is told from a second room by the larger outline around it, on whichever side of its walls that is found.
+/// A large body differs from a second room by the larger outline around it, whatever the direction
+/// of its walls.
 #[test]
-fn an_outline_encloses_the_same_whichever_way_round_it_is_drawn() {
+fn outline_direction_is_irrelevant() {
     let ring = |id: &str, corners: &str| {
         let m = r#""closed": true, "material": "m""#;
         format!(r#"{{"id": "{id}", "polyline": [{corners}], {m}}}"#)
@@ -192,7 +193,7 @@ fn an_outline_encloses_the_same_whichever_way_round_it_is_drawn() {
     let at = |x_m: f64, y_m: f64| Pose { x_m, y_m, heading_deg: 0.0 };
     for room in rooms {
         for body in bodies {
-            let scene = plan_of(&[&ring("R", room), &ring("B", body)], "");
+            let scene = scene_with_walls(&[&ring("R", room), &ring("B", body)], "");
             assert_eq!(scene.check_pose(&at(0.3, 0.3)), Ok(()), "{room} {body}");
             let inside = scene.check_pose(&at(2.0, 1.5));
             assert!(

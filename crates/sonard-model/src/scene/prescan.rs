@@ -1,22 +1,22 @@
-//! A first look at a scene's text: whether it is JSON, and whether serde would read it as it stands there.
+//! Fast check of a scene's text: valid JSON without ambiguities for serde.
 
 use std::{collections::HashSet, fmt};
 
 use serde::de::{DeserializeSeed, Deserializer, MapAccess, SeqAccess, Visitor};
 
-/// Whether no object names a member twice, and nothing is an array where an object belongs: of both serde's
-/// derived code would make something. Takes no memory but for the names of the objects that are open.
+/// Returns `true` if no object has duplicate members and no array is in place of an object; serde's
+/// derived code would accept both. Memory is needed only for the member names of the open objects.
 ///
 /// # Errors
-/// Text that is not JSON.
-pub(super) fn is_plain(text: &str) -> serde_json::Result<bool> {
+/// If the text is not JSON.
+pub(super) fn is_unambiguous(text: &str) -> serde_json::Result<bool> {
     let mut json = serde_json::Deserializer::from_str(text);
     let is_plain = ValueKind::Scene.deserialize(&mut json)?;
     json.end()?;
     Ok(is_plain)
 }
 
-/// What a value stands for.
+/// Expected kind of a JSON value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum ValueKind {
     Scene,
@@ -30,7 +30,7 @@ enum ValueKind {
 }
 
 impl ValueKind {
-    fn of_member(self, name: &str) -> Self {
+    fn for_member(self, name: &str) -> Self {
         match (self, name) {
             (Self::Scene, "walls" | "cylinders") => Self::Objects,
             (Self::Scene, "materials" | "poses") => Self::Named,
@@ -93,7 +93,7 @@ impl<'de> Visitor<'de> for ValueKind {
         let mut names: HashSet<String> = HashSet::new();
         let mut is_plain = true;
         while let Some(name) = object.next_key::<String>()? {
-            is_plain &= object.next_value_seed(self.of_member(&name))?;
+            is_plain &= object.next_value_seed(self.for_member(&name))?;
             is_plain &= names.insert(name);
         }
         Ok(is_plain)

@@ -1,33 +1,33 @@
-//! An arrival as a summand of the envelope.
+//! Arrival as a pulse in the envelope sum.
 
 use num_complex::Complex64;
 
 use crate::acoustics::EchoShape;
 
-pub(super) struct Summand {
+pub(super) struct ActivePulse {
     pub(super) tof_us: f64,
-    /// When it begins and when it is over.
+    /// Start and end, microseconds after firing.
     pub(super) lasts_us: [f64; 2],
-    /// To be multiplied with the shape and with what the gain adds while it sounds.
+    /// Amplitude, to be multiplied with the shape and the gain increase since firing.
     pub(super) size: f64,
-    /// Phase of the carrier.
     phase_rad: f64,
-    /// Size and phase, once they are wanted.
+    /// Amplitude and phase, computed on demand.
     pub(super) field: Complex64,
     has_field: bool,
-    /// The most of its modulus.
+    /// Maximum modulus over the pulse.
     pub(super) strength: f64,
-    /// The most of all that sound when it begins, itself among them: no less than of what sounds until the next begins.
+    /// Total strength of all pulses active when this one begins, itself included: an upper bound
+    /// until the next one begins.
     pub(super) with_others: f64,
-    /// The most that its shape changes it in a microsecond.
+    /// Maximum slope, per microsecond.
     pub(super) steepest: f64,
-    /// Its own shape; without it, the pulse's.
+    /// Individual shape; `None` for the transmitted pulse.
     pub(super) shape: Option<Box<EchoShape>>,
 }
 
-impl Summand {
-    /// One that is over and only keeps its place.
-    pub(super) const fn gone(tof_us: f64, lasts_us: [f64; 2]) -> Self {
+impl ActivePulse {
+    /// Placeholder for an arrival that has ended.
+    pub(super) const fn placeholder(tof_us: f64, lasts_us: [f64; 2]) -> Self {
         Self {
             tof_us,
             lasts_us,
@@ -42,17 +42,17 @@ impl Summand {
         }
     }
 
-    /// One of a size and a phase of the carrier, with its own shape or that of the `pulse`; at most so strong are all
-    /// `others` that are not over when it begins.
+    /// Creates a pulse with its own shape or that of `transmitted`. `others` is the total
+    /// strength of the pulses still active when it begins.
     pub(super) fn new(
         (tof_us, lasts_us): (f64, [f64; 2]),
         (size, phase_rad): (f64, f64),
         shape: Option<Box<EchoShape>>,
-        pulse: &EchoShape,
+        transmitted: &EchoShape,
         others: f64,
     ) -> Self {
-        let of = shape.as_deref().unwrap_or(pulse);
-        let strength = size * of.peak();
+        let own = shape.as_deref().unwrap_or(transmitted);
+        let strength = size * own.peak();
         Self {
             tof_us,
             lasts_us,
@@ -62,12 +62,12 @@ impl Summand {
             has_field: false,
             strength,
             with_others: others + strength,
-            steepest: size * of.steepest(),
+            steepest: size * own.steepest(),
             shape,
         }
     }
 
-    pub(super) fn is_gone(&self) -> bool {
+    pub(super) fn is_placeholder(&self) -> bool {
         self.size == 0.0
     }
 

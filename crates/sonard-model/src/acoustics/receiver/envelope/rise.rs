@@ -1,0 +1,282 @@
+//! Search for the time at which the envelope has exceeded the threshold for the integration time.
+
+use super::{ActivePulse, EnvelopeSum, IsolatedPulse, WINDOW_SLACK_US};
+use crate::{
+    acoustics::{Detector, Gain, PulseArrival},
+    reading::PingStatus,
+};
+
+/// Sampling step of the envelope, microseconds: a third of the standard deviation of a 7 kHz
+/// filter's response, the shortest rise.
+const STEP_US: f64 = 8.0;
+
+/// Maximum step while the envelope is above the threshold, microseconds.
+const LONG_STEP_US: f64 = 30.0;
+
+/// Maximum step over which the envelope provably stays below the threshold, microseconds. The gain
+/// rises by at most one step in that time.
+const LONG_QUIET_US: f64 = 200.0;
+
+impl EnvelopeSum<'_> {
+    /// Next rise and its arrival at a threshold not below the last one's, if both rises belong to
+    /// the same isolated arrival. Earlier arrivals do not cross a higher threshold either. Returns
+    /// `None` if [`Self::next_rise`] is required. Valid for envelope detectors only.
+    pub(in super::super) fn isolated_rise_at(
+        &mut self,
+        from_us: f64,
+    ) -> Option<(f64, PulseArrival)> {
+        let IsolatedPulse { place, factor, from_us: search_from_us } = self.isolated?;
+        if factor > self.threshold_factor || from_us < search_from_us {
+            return None;
+        }
+        let (rise_us, lasts) = self.isolated_rise(&self.pulses[place], from_us)?;
+        let is_in_window = rise_us <= self.receiver.window_us() + WINDOW_SLACK_US;
+        if !lasts || !is_in_window || self.receiver.status_at(rise_us) != PingStatus::Echo {
+            return None;
+        }
+        self.examined_us = self.examined_us.max(rise_us + self.receiver.integration_us);
+        Some((rise_us, self.arrivals[place]))
+    }
+
+    /// Returns `true` if the last rise belongs to an isolated arrival.
+    pub(in super::super) const fn is_isolated(&self) -> bool {
+        self.isolated.is_some()
+    }
+
+    pub(super) fn next_rise_of_sum(&mut self, ready_us: f64) -> Option<f64> {
+        self.isolated = None;
+        let integration_us = self.receiver.integration_us;
+        let window_us = self.receiver.window_us() + WINDOW_SLACK_US;
+        let in_window = |rise_us: f64| Some(rise_us.max(ready_us)).filter(|us| *us <= window_us);
+        let (mut t_us, mut here) = (ready_us, self.relative_level(ready_us));
+        // Time above the threshold minus time below it since then.
+        let mut charge_us = 0.0_f64;
+        while t_us <= window_us + 2.0 * integration_us && !self.exceeds_horizon() {
+            if !here.is_above() && charge_us == 0.0 && self.watched != Some(self.active_range()) {
+                match self.skip(t_us) {
+                    Skip::Exhausted => return None,
+                    Skip::Isolated { rise_us } => {
+                        let is_isolated = self.is_plain
+                            && self.receiver.detector == Detector::Envelope
+                            && self.is_isolated_now();
+                        self.isolated = is_isolated.then_some(IsolatedPulse {
+                            place: self.over,
+                            factor: self.threshold_factor,
+                            from_us: ready_us,
+                        });
+                        return in_window(rise_us);
+                    }
+                    Skip::To(later_us) if later_us > t_us => {
+                        (t_us, here) = (later_us, self.relative_level(later_us));
+                        continue;
+                    }
+                    Skip::To(_) => self.watched = Some(self.active_range()),
+                }
+            }
+            let missing_us = integration_us - charge_us;
+            if here.is_above() && missing_us <= 0.0 {
+                return in_window(t_us - charge_us);
+            }
+            let step_us = if here.is_above() {
+                missing_us.clamp(1.0, LONG_STEP_US)
+            } else {
+                self.quiet_us(t_us, &here)
+            };
+            let next_us = t_us + step_us;
+            let next = self.relative_level(next_us);
+            let crossing_us = if here.is_above() == next.is_above() {
+                next_us
+            } else {
+                self.crossing_us((t_us, here.relative), (next_us, next.relative))
+            };
+            // Before the crossing the state is that of `here`, after it that of `next`.
+            let charged = |charge_us: f64, part_us: f64, above: bool| {
+                (charge_us + if above { part_us } else { -part_us }).max(0.0)
+            };
+            charge_us = charged(charge_us, crossing_us - t_us, here.is_above());
+            charge_us = charged(charge_us, next_us - crossing_us, next.is_above());
+            (t_us, here) = (next_us, next);
+        }
+        None
+    }
+
+    /// Next time at which the envelope may cross the threshold, from a time at which it is below.
+    fn skip(&mut self, mut t_us: f64) -> Skip {
+        if self.noise.is_some() {
+            return Skip::To(t_us);
+        }
+        loop {
+            self.advance(t_us);
+            if self.exceeds_horizon() {
+                return Skip::Exhausted;
+            }
+            let start_us = self.next_start_us();
+            if self.may_pass(t_us) {
+                let live = &self.pulses[self.over..self.begun];
+                let [pulse] = live else { return Skip::To(t_us) };
+                if self.gain_steps_during(pulse) {
+                    return Skip::To(t_us);
+                }
+                let Some((rise_us, lasts)) = self.isolated_rise(pulse, t_us) else {
+                    // The crossing is in the past or absent.
+                    let end_us = pulse.tof_us + self.span_us.1 + 1e-3;
+                    match start_us {
+                        Some(start_us) => t_us = start_us.min(end_us),
+                        None => return self.exhausted(),
+                    }
+                    continue;
+                };
+                let done_us = rise_us + self.receiver.integration_us;
+                if start_us.is_none_or(|start_us| start_us > done_us) {
+                    if lasts {
+                        self.examined_us = self.examined_us.max(done_us);
+                        return Skip::Isolated { rise_us };
+                    }
+                    t_us = pulse.tof_us + self.span_us.1 + 1e-3;
+                    if let Some(start_us) = start_us {
+                        t_us = t_us.min(start_us);
+                    }
+                    continue;
+                }
+                return Skip::To(t_us.max(rise_us.min(start_us.unwrap_or(rise_us)) - STEP_US));
+            }
+            match start_us {
+                Some(start_us) => t_us = start_us,
+                None => return self.exhausted(),
+            }
+        }
+    }
+
+    /// Returns `true` if the active pulses, added in phase, could exceed the minimum threshold.
+    fn may_pass(&mut self, t_us: f64) -> bool {
+        let minimum = self.threshold_factor * self.min_threshold;
+        let gain = self.gain_increase(t_us).max(1.0);
+        let last = self.pulses[self.over..self.begun].last();
+        // The first condition is a cheap upper bound of the second.
+        last.is_some_and(|last| last.with_others * gain >= minimum)
+            && self.bounds().strength * gain >= minimum
+    }
+
+    /// Ends the scan without an echo, a result that depends on all arrivals.
+    const fn exhausted(&mut self) -> Skip {
+        self.examined_us = f64::MAX;
+        Skip::Exhausted
+    }
+
+    /// Envelope relative to the threshold at a time. Times must not decrease between calls.
+    fn relative_level(&mut self, t_us: f64) -> RelativeLevel {
+        let (level, threshold) = (self.level(t_us), self.threshold_at(t_us));
+        RelativeLevel { relative: level / threshold, threshold }
+    }
+
+    /// Time for which the envelope provably stays below the threshold from the state `here`, but at
+    /// least the sampling step.
+    fn quiet_us(&mut self, t_us: f64, here: &RelativeLevel) -> f64 {
+        // The factor 1.1 covers the increase of the gain in that time.
+        let grows = 1.1 * self.gain_increase(t_us);
+        let steepest = self.bounds().steepest;
+        let threshold = here.threshold;
+        let start_us = self.next_start_us().unwrap_or(f64::INFINITY);
+        let quiet_us =
+            ((1.0 - here.relative) * threshold / (grows * steepest)).min(start_us - t_us);
+        let is_long = self.noise.is_none() && quiet_us.min(LONG_QUIET_US) > STEP_US;
+        // The threshold rises with range and falls at a gain step.
+        if is_long && self.threshold_at(t_us + quiet_us.min(LONG_QUIET_US)) >= threshold {
+            quiet_us.min(LONG_QUIET_US)
+        } else {
+            STEP_US
+        }
+    }
+
+    /// Threshold crossing of an isolated arrival after `t_us`, and whether it stays above for the
+    /// integration time or is above again after it.
+    fn isolated_rise(&self, pulse: &ActivePulse, t_us: f64) -> Option<(f64, bool)> {
+        let at = |offset_us: f64| pulse.tof_us + offset_us - self.receiver.lead_us;
+        let level_at =
+            |t_us: f64| self.threshold_at(t_us) / (pulse.size * self.gain_increase(t_us));
+        let mut rise_us = pulse.tof_us;
+        // The threshold changes with range and the gain with time.
+        for _ in 0..2 {
+            rise_us = at(self.shape(pulse).rise_us(level_at(rise_us))?);
+        }
+        if rise_us < t_us {
+            return None;
+        }
+        let done_us = rise_us + self.receiver.integration_us - pulse.tof_us + self.receiver.lead_us;
+        Some((rise_us, self.shape(pulse).most_from(done_us) >= level_at(rise_us)))
+    }
+
+    /// Returns `true` if the only active pulse begins after the last one ended and ends before the
+    /// next begins.
+    fn is_isolated_now(&self) -> bool {
+        let (past, live) = self.pulses[..self.begun].split_at(self.over);
+        let [ActivePulse { lasts_us: [begins_us, ends_us], .. }] = live else { return false };
+        let is_last_over = past.last().is_none_or(|last| last.lasts_us[1] < *begins_us);
+        is_last_over && *ends_us < self.next_us
+    }
+
+    /// Returns `true` if a gain step begins during an arrival.
+    fn gain_steps_during(&self, pulse: &ActivePulse) -> bool {
+        let Gain::Steps { steps } = &self.receiver.gain else { return false };
+        let [begins_us, ends_us] = pulse.lasts_us;
+        if self.step.get().holds_all(begins_us, ends_us) {
+            return false;
+        }
+        let mut ends = steps.iter().filter_map(|step| step.until_us);
+        ends.any(|until_us| (begins_us..ends_us).contains(&until_us))
+    }
+
+    /// Threshold crossing of the envelope between two times, by false position on its logarithm,
+    /// which is nearly linear.
+    fn crossing_us(&self, from: (f64, f64), to: (f64, f64)) -> f64 {
+        let (mut low, mut high) = ((from.0, from.1.max(1e-9).ln()), (to.0, to.1.max(1e-9).ln()));
+        let rises = high.1 >= 0.0;
+        let mut t_us = low.0;
+        for round in 0..16 {
+            // A gain step causes a jump, for which only bisection converges.
+            let share = if round < 4 { low.1 / (low.1 - high.1) } else { 0.5 };
+            t_us = low.0 + share * (high.0 - low.0);
+            let here = self.relative_level_back(t_us).max(1e-9).ln();
+            if (here >= 0.0) == rises {
+                high = (t_us, here);
+            } else {
+                low = (t_us, here);
+            }
+            if here.abs() < 1e-4 || high.0 - low.0 < 0.01 {
+                break;
+            }
+        }
+        t_us
+    }
+
+    /// Envelope over threshold at most one step before the last time examined.
+    fn relative_level_back(&self, t_us: f64) -> f64 {
+        // Pulses that have ended at the later time may still be active.
+        self.level_of(self.over.saturating_sub(8), t_us) / self.threshold_at(t_us)
+    }
+}
+
+/// Envelope relative to the threshold.
+#[derive(Clone, Copy)]
+struct RelativeLevel {
+    /// Ratio of envelope to threshold.
+    relative: f64,
+    /// Effective threshold at that time.
+    threshold: f64,
+}
+
+impl RelativeLevel {
+    fn is_above(&self) -> bool {
+        self.relative >= 1.0
+    }
+}
+
+/// Continuation of the scan from a time below the threshold.
+enum Skip {
+    /// No further arrival can be detected.
+    Exhausted,
+    /// An isolated arrival crosses the threshold.
+    Isolated { rise_us: f64 },
+    /// Time from which the envelope has to be sampled.
+    To(f64),
+}
