@@ -1,4 +1,4 @@
-//! Listings of echoes, compared.
+//! Comparison of echo listings.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -10,21 +10,22 @@ use sonard_model::{
     },
 };
 
-/// What two listings of the same echoes may differ by, beside rounding.
+/// Permitted differences between two listings of the same echoes, apart from rounding.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Turned {
-    /// Directions of the second listing are these, radians; `None`: they are not compared.
+    /// Map of the directions of the second listing, radians; `None` if they are not compared.
     pub(crate) direction: Option<fn(f64, f64) -> f64>,
     pub(crate) by_rad: f64,
-    /// Whether up is down in the second listing.
+    /// `true` if up is down in the second listing.
     pub(crate) is_upside_down: bool,
 }
 
-/// Directions are as they are.
+/// Unchanged directions.
 pub(crate) const AS_IS: Turned =
     Turned { direction: Some(|direction, _| direction), by_rad: 0.0, is_upside_down: false };
 
-/// Whether two echoes are the same: length to 0.1 um, field to 1e-5, directions to a microradian.
+/// Returns `true` if two echoes are equal: length to 0.1 um, field to 1e-5, directions to a
+/// microradian.
 fn is_same(one: &EchoPath, other: &EchoPath, turned: Turned) -> bool {
     let field = |echo: &EchoPath| {
         let (sine, cosine) = echo.phase_rad.sin_cos();
@@ -47,7 +48,7 @@ fn is_same(one: &EchoPath, other: &EchoPath, turned: Turned) -> bool {
         && looks(one.arrival_rad, other.arrival_rad)
 }
 
-/// Every echo of a listing that is not at its very limits is in another one.
+/// Asserts that every echo of a listing that is not at its very limits is in another one.
 #[track_caller]
 pub(crate) fn assert_has_all(
     all: &[EchoPath],
@@ -61,7 +62,7 @@ pub(crate) fn assert_has_all(
     }
 }
 
-/// Two listings have the same echoes, apart from those at their very limits.
+/// Asserts that two listings have the same echoes, apart from those at their very limits.
 #[track_caller]
 pub(crate) fn assert_same(
     one: &[EchoPath],
@@ -77,12 +78,12 @@ pub(crate) fn assert_same(
     assert!(count(one).abs_diff(count(other)) <= slack, "some are listed twice");
 }
 
-/// Whether an echo is above the floor that holds for it and within reach by more than rounding.
+/// Returns `true` if an echo is above its floor and within reach by more than rounding.
 pub(crate) fn is_well_within(echo: &EchoPath, settings: &Settings) -> bool {
     echo.amplitude > 1.0001 * floor_of(echo, settings) && echo.length_m < settings.max_path_m - 1e-6
 }
 
-/// The floor down to which all echoes of such paths are listed.
+/// Amplitude floor of the listing for such paths.
 pub(crate) fn floor_of(echo: &EchoPath, settings: &Settings) -> f64 {
     let is_round = |m: &Mechanism| matches!(m, Mechanism::Reflection(Reflector::Cylinder(_)));
     let is_bend = |m: &Mechanism| matches!(m, Mechanism::Diffraction(_));

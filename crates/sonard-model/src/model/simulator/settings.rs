@@ -7,17 +7,17 @@ use crate::{
     model::{FanOptions, FanSettings, Options, PathOptions, paths},
 };
 
-/// Paths this far below the threshold are given up, decibels: a silence is still explained by
-/// what came within that.
+/// Margin below the threshold at which paths are dropped, decibels: a missing echo is still
+/// explained by arrivals within it.
 const MARGIN_KEPT_DB: f64 = 40.0;
 
-/// The same for `paths`, which would find a great many more down there.
+/// The margin for `paths`, which would find a great many more weak paths.
 const PATHS_KEPT_DB: f64 = 20.0;
 
 /// Bozma and Kuc's scattering strength of the right-angled edge that they scanned.
 const SIGMA_E: f64 = 0.095;
 
-/// The sensor's receiver with the options applied. Only `paths` knows phases.
+/// Returns the sensor's receiver with the options applied. Only `paths` has phases.
 #[must_use]
 pub fn receiver(sensor: &Sensor, air: &Air, options: &Options) -> Receiver {
     let paths = options.engine.paths();
@@ -65,8 +65,8 @@ pub(super) fn path_settings(
     }
 }
 
-/// The length of path that sound has run when the first echo can be noticed, metres; with a long blanking less, since
-/// beside a round body there are many times more paths with every metre.
+/// Length of path at which the first echo can be detected, metres. For a long blanking it is
+/// limited, since near a round body the number of paths multiplies with every metre.
 fn crowded_m(receiver: &Receiver) -> f64 {
     let opens_us = receiver.blanking_us + receiver.integration_us;
     (opens_us * 1e-6 * receiver.sound_speed_m_s).min(1.0)
@@ -100,9 +100,10 @@ pub(super) fn fan_settings(
 mod tests {
     use super::*;
 
-    /// 2380 us of blanking and an integration of 60 us are 0.83 m of path; of a long blanking a metre counts.
+    /// 2380 us of blanking and an integration of 60 us are 0.83 m of path; a long blanking counts
+    /// as a metre.
     #[test]
-    fn sound_is_crowded_until_the_receiver_can_notice_it() {
+    fn crowded_until_detection() {
         let preset = Sensor::preset("senscomp-6500").expect("a preset");
         let of = |blanking_us: f64| {
             let sensor = Sensor { blanking_us, integration_us: 60.0, ..preset.clone() };

@@ -1,11 +1,11 @@
-//! Sound that the transducer's own face sends back.
+//! Multiple echoes by the transducer's own face.
 
 use super::*;
 use crate::model::Mechanism;
 
-/// What an arrival brings is its path's strength by the beam pattern at both of its ends.
+/// The amplitude of an arrival is its path's strength times the beam pattern at both of its ends.
 #[test]
-fn arrivals_are_paths_seen_by_the_beam() {
+fn arrivals_include_the_beam() {
     let room = scene(vec![
         wall("wall", (0.5, -3.0), (0.5, 3.0), 1.0),
         wall("far", (-1.0, -3.0), (2.0, 3.0), 0.9),
@@ -33,10 +33,10 @@ fn arrivals_are_paths_seen_by_the_beam() {
     assert!(multiples > 1, "{multiples}");
 }
 
-/// Sound to and fro before one wall: `n` ways there and back are `n` times as long, and leave and come back along
-/// the wall's normal.
+/// Multiple echoes in front of one wall: `n` round trips are `n` times as long, and leave and
+/// return along the wall's normal.
 #[test]
-fn sound_to_and_fro_is_as_long_as_its_ways() {
+fn length_is_that_of_all_rounds() {
     let before = scene(vec![wall("wall", (0.5, -3.0), (0.5, 3.0), 1.0)]);
     let simulator = simulator(before, PathOptions { lossless: true, ..PathOptions::default() });
     let arrivals = simulator.at(DVec2::ZERO).arrivals(0.05).expect("few paths");

@@ -1,9 +1,9 @@
-//! Figures of a model that are in no range.
+//! Model options outside their ranges.
 
 use super::*;
 
 #[test]
-fn figures_out_of_range_are_named() {
+fn values_out_of_range_are_named() {
     let fan = |ray_spacing_deg| Options::from(FanOptions { ray_spacing_deg, ..BARE });
     let cone = |aperture_deg| Options::from(ConeOptions { aperture_deg: Some(aperture_deg) });
     let usual = Options::default;

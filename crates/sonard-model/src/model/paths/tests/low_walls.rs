@@ -1,4 +1,5 @@
-//! Low, hanging and high walls among each other: beams end where no ray of theirs stands at the right height.
+//! Low, hanging and high walls in combination: beams end where none of their rays is at the right
+//! height.
 
 use super::*;
 use crate::scene::Cylinder;
@@ -65,7 +66,7 @@ fn told(echoes: &[EchoPath]) -> Vec<[f64; 6]> {
 }
 
 #[test]
-fn no_echo_is_lost_with_the_beams_that_end_by_their_heights() {
+fn height_cuts_lose_no_echo() {
     let mut random = Pcg64::seed_from_u64(7);
     let [mut echoes, mut cut, mut uncut] = [0; 3];
     for case in 0..60 {

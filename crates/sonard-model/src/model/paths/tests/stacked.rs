@@ -35,7 +35,7 @@ fn echoes(room: &Scene, z_m: f64, edge_law: Option<EdgeLaw>) -> Vec<EchoPath> {
 }
 
 #[test]
-fn each_is_met_at_its_own_height() {
+fn each_at_its_own_height() {
     let room = room_with(&[SILL, LINTEL]);
     for (z_m, first, length_m) in [(0.5, 0, 3.0), (1.1, 3, 6.0), (2.0, 1, 3.0)] {
         let ahead: Vec<_> = echoes(&room, z_m, None)
@@ -48,7 +48,7 @@ fn each_is_met_at_its_own_height() {
 }
 
 #[test]
-fn which_is_named_first_does_not_matter() {
+fn order_does_not_matter() {
     let [one, other] = [[SILL, LINTEL], [LINTEL, SILL]].map(|heights| room_with(&heights));
     for z_m in [0.5, 1.1, 2.0] {
         let laws = [None, Some(EdgeLaw::Utd)];
@@ -79,7 +79,7 @@ fn which_is_named_first_does_not_matter() {
 }
 
 #[test]
-fn two_without_a_gap_mirror_as_one() {
+fn adjoining_walls_are_one() {
     let [whole, halves] = [vec![[0.0, 2.5]], vec![[0.0, 1.0], [1.0, 2.5]]]
         .map(|heights| echoes(&room_with(&heights), 1.1, None));
     let lengths = |echoes: &[EchoPath]| echoes.iter().map(|echo| echo.length_m).collect::<Vec<_>>();
