@@ -26,7 +26,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut arguments = std::env::args().skip(1).map(|argument| argument.parse::<u64>());
     let mut next = |usual| arguments.next().unwrap_or(Ok(usual));
     let (count, seed, first) = (next(100)?, next(1)?, next(0)?);
-    let (mut seconds, mut echoes_heard, mut refused) = (Vec::new(), 0, 0);
+    let (mut seconds, mut echo_count, mut rejected) = (Vec::new(), 0, 0);
     for room in first..first + count {
         // A generator for each room, so that each can be reproduced alone.
         let mut rng = Pcg64::new(seed.into(), room.into());
@@ -44,9 +44,9 @@ fn main() -> Result<(), Box<dyn Error>> {
         }
         seconds.push(taken_s);
         match echoes {
-            Ok(count) => echoes_heard += count,
+            Ok(count) => echo_count += count,
             Err(error) => {
-                refused += 1;
+                rejected += 1;
                 println!("room {room}: {error}");
             }
         }
@@ -54,13 +54,13 @@ fn main() -> Result<(), Box<dyn Error>> {
     seconds.sort_by(f64::total_cmp);
     let share = |share: f64| 1e3 * seconds[((seconds.len() - 1) as f64 * share) as usize];
     println!(
-        "{} rooms, seed {seed}: {echoes_heard} echoes, {refused} refused; median {:.1} ms, 95 % {:.1} ms, worst {:.1} ms; \
-         most memory {} MB",
+        "{} rooms, seed {seed}: {echo_count} echoes, {rejected} rejected; median {:.1} ms, 95 % {:.1} ms, worst {:.1} ms; \
+         peak memory {} MB",
         seconds.len(),
         share(0.5),
         share(0.95),
         share(1.0),
-        most_memory_mb().map_or("unknown".into(), |mb| mb.to_string())
+        peak_memory_mb().map_or("unknown".into(), |mb| mb.to_string())
     );
     Ok(())
 }
@@ -82,7 +82,7 @@ fn processor_s() -> Option<f64> {
 }
 
 /// Peak memory of this process, where the system provides it.
-fn most_memory_mb() -> Option<u64> {
+fn peak_memory_mb() -> Option<u64> {
     let status = fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
     let kilobytes: u64 = line.split_whitespace().next()?.parse().ok()?;

@@ -19,7 +19,7 @@ use sources::{Module, Sources};
 const HEADING: &str = "### Layers within a crate";
 
 /// Maximum number of files in a circle of imports: a type, its parts and its builder.
-const MOST_IN_A_CIRCLE: usize = 3;
+const MAX_CIRCLE: usize = 3;
 
 fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
@@ -91,7 +91,7 @@ fn no_large_circle_of_files() {
     let large: Vec<_> = crates
         .iter()
         .flat_map(|source| Sources::read(source).circles())
-        .filter(|circle| circle.len() > MOST_IN_A_CIRCLE)
+        .filter(|circle| circle.len() > MAX_CIRCLE)
         .collect();
     assert!(large.is_empty(), "files that use each other in a circle: {large:#?}");
 }
@@ -108,7 +108,7 @@ fn uses_match_the_compiler() {
         ("b", "use crate::a::Deep;\nfn f() { crate::c::g(); }\nmod tests {\n use crate::a;\n}\n"),
         ("c", "use std::fs;\n"),
     ];
-    let sources = Sources::of(files.map(|(module, code)| (path(module), code.to_owned())));
+    let sources = Sources::from_files(files.map(|(module, code)| (path(module), code.to_owned())));
     let uses: Vec<_> = sources
         .uses()
         .map(|(file, used)| {

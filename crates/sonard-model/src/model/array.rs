@@ -6,7 +6,7 @@ use rand::Rng;
 
 use super::{
     ModelError, Options, Prediction, Simulator, TooCostly,
-    crosstalk::{OtherFirings, turns_heard},
+    crosstalk::{OtherFirings, crosstalk_slots},
     paths::{PathEngine, TransducerPose},
 };
 use crate::{
@@ -128,7 +128,7 @@ impl ArrayModel {
     /// Number of earlier slots whose firings a ranger may receive in a round; `None` without
     /// crosstalk.
     #[must_use]
-    pub fn turns_heard(&self) -> Option<usize> {
+    pub fn crosstalk_slots(&self) -> Option<usize> {
         self.bare.crosstalk.as_ref().map(|crosstalk| crosstalk.slots_back)
     }
 }
@@ -151,7 +151,7 @@ impl Crosstalk {
         let receiver = simulator.receiver();
         let absorption_np_per_m = simulator.path_settings().absorption_np_per_m;
         let slot_m = array.interval_ms * 1e-3 * receiver.sound_speed_m_s;
-        let slots_back = turns_heard(receiver, absorption_np_per_m, slot_m);
+        let slots_back = crosstalk_slots(receiver, absorption_np_per_m, slot_m);
         if slots_back == 0 && !array.fires_together() {
             return None;
         }

@@ -96,6 +96,6 @@ impl Arrivals for ConeArrivals<'_> {
     /// # Panics
     /// If `arrival` is not one of this direction.
     fn arrival(&self, direction_rad: f64, _sound: &PulseArrival) -> Arrival {
-        self.nearest(direction_rad).expect("a sound was heard in this direction")
+        self.nearest(direction_rad).expect("an arrival in this direction")
     }
 }

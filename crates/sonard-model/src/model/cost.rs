@@ -44,10 +44,10 @@ impl SearchPart {
 /// Error of a search that exceeds its effort limit: there are too many paths.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[error(
-    "there are too many echo paths here to find them all, most of them {}: shorten max-range (it is {} m), \
-     give max-order or a smaller one{}, raise the threshold or `weakest`, or leave out what can't matter",
+    "too many echo paths, most of them {}: reduce max-range (currently {} m), set or reduce max-order{}, \
+     raise the threshold or `weakest`, or remove objects that cannot matter",
     part.description(), max_path_m / 2.0,
-    if *double_diffraction { ", leave out double-diffraction" } else { "" }
+    if *double_diffraction { ", disable double-diffraction" } else { "" }
 )]
 pub struct TooCostly {
     /// Part of the search with the largest effort.

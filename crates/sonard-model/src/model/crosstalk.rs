@@ -23,7 +23,7 @@ const MAX_SLOTS: usize = 64;
 
 /// Number of earlier slots whose strongest sound, with `absorption_np_per_m` of the air off one
 /// perfect wall, can still pass a receiver's threshold. Each slot is `slot_m` of path earlier.
-pub(super) fn turns_heard(receiver: &Receiver, absorption_np_per_m: f64, slot_m: f64) -> usize {
+pub(super) fn crosstalk_slots(receiver: &Receiver, absorption_np_per_m: f64, slot_m: f64) -> usize {
     let [from_us, until_us] = [receiver.blanking_us, receiver.window_us()];
     let is_detectable = |turns: &usize| {
         (0..=WINDOW_SAMPLES).any(|sample| {
@@ -120,7 +120,7 @@ impl MixedArrivals<'_> {
         let mut all: Vec<(f64, Origin)> =
             own.iter().map(|arrival| (arrival.length_m, (None, *arrival))).collect();
         for (number, stray) in self.strays.iter().enumerate() {
-            let apparent = stray.paths.listen().map(|arrival| {
+            let apparent = stray.paths.arrivals().map(|arrival| {
                 let apparent_m = arrival.length_m - stray.ahead_m;
                 (apparent_m, (Some(number), arrival))
             });
@@ -201,9 +201,9 @@ mod tests {
             };
             let count = (1..).take_while(|turns| most(f64::from(*turns)) >= 0.02).count();
             assert_eq!(count, expected, "{absorption} {slot_m}");
-            assert_eq!(turns_heard(&receiver, absorption, slot_m), expected);
+            assert_eq!(crosstalk_slots(&receiver, absorption, slot_m), expected);
         }
-        assert_eq!(turns_heard(&receiver, 5.0, 1.0), 0);
-        assert_eq!(turns_heard(&receiver, 0.0, 1e-3), MAX_SLOTS);
+        assert_eq!(crosstalk_slots(&receiver, 5.0, 1.0), 0);
+        assert_eq!(crosstalk_slots(&receiver, 0.0, 1e-3), MAX_SLOTS);
     }
 }

@@ -31,8 +31,8 @@ pub enum ModelError {
     Sensor(#[from] SensorError),
     /// A transducer in the floor or above the ceiling.
     #[error(
-        "the transducer's height is {z_m} m, outside the scene's {level} at {level_z_m} m: choose one between floor \
-         and ceiling"
+        "the transducer's height is {z_m} m, outside the scene's {level} at {level_z_m} m: it must be between \
+         floor and ceiling"
     )]
     SensorHeight {
         /// Height of the transducer, metres.

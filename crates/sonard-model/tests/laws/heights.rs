@@ -35,14 +35,14 @@ fn upside_down() {
 fn full_height_equals_no_limits() {
     on_worlds_with_heights("all the way", |world, random| {
         let limits = world.heights.map(|heights| heights.limits_z_m);
-        let mut told = world.clone();
-        for z_m in told.walls.iter_mut().map(|wall| &mut wall.z_m) {
+        let mut explicit = world.clone();
+        for z_m in explicit.walls.iter_mut().map(|wall| &mut wall.z_m) {
             *z_m = z_m.or(limits.filter(|_| random.random()));
         }
-        for z_m in told.rounds.iter_mut().map(|round| &mut round.z_m) {
+        for z_m in explicit.rounds.iter_mut().map(|round| &mut round.z_m) {
             *z_m = z_m.or(limits.filter(|_| random.random()));
         }
-        let lists = [world, &told].map(|world| world.echoes(&settings()));
+        let lists = [world, &explicit].map(|world| world.echoes(&settings()));
         assert_same(&lists[0], &lists[1], &settings(), AS_IS);
     });
 }

@@ -42,9 +42,9 @@ fn law_of_reflection() {
         on_random_worlds(name, kind, |world, _| {
             for echo in world.echoes(&settings()) {
                 let line = polyline(world, &echo);
-                for (turn, met) in line.windows(3).zip(echo.path.interactions.iter()) {
-                    let Mechanism::Reflection(surface) = met.mechanism else { continue };
-                    let normal = normal_at(world, surface, met.point);
+                for (turn, interaction) in line.windows(3).zip(echo.path.interactions.iter()) {
+                    let Mechanism::Reflection(surface) = interaction.mechanism else { continue };
+                    let normal = normal_at(world, surface, interaction.point);
                     let [to, from] = [turn[1] - turn[0], turn[2] - turn[1]].map(DVec2::normalize);
                     let mirrored = to - 2.0 * to.dot(normal) * normal;
                     assert!(mirrored.distance(from) < 1e-5, "{echo:?} at {surface:?}");

@@ -106,8 +106,8 @@ const TRIES: usize = 200;
 
 /// Number of scenes for each law.
 pub(crate) fn cases() -> u64 {
-    let asked = std::env::var("SONARD_LAWS").ok().and_then(|count| count.parse().ok());
-    asked.unwrap_or(200)
+    let requested = std::env::var("SONARD_LAWS").ok().and_then(|count| count.parse().ok());
+    requested.unwrap_or(200)
 }
 
 /// Generator of a law's scene.
@@ -123,19 +123,19 @@ pub(crate) fn on_random_worlds(law: &str, kind: Kind, check: impl Fn(&World, &mu
     for case in 0..cases() {
         let mut random = generator(law, case);
         let world = World::random(kind, &mut random);
-        let _told = Told { law, case, world: &world };
+        let _report = FailureReport { law, case, world: &world };
         check(&world, &mut random);
     }
 }
 
 /// Prints the scene on a panic.
-struct Told<'a> {
+struct FailureReport<'a> {
     law: &'a str,
     case: u64,
     world: &'a World,
 }
 
-impl Drop for Told<'_> {
+impl Drop for FailureReport<'_> {
     fn drop(&mut self) {
         if std::thread::panicking() {
             let World { ends, .. } = self.world;
@@ -268,7 +268,7 @@ impl World {
             builder = builder
                 .rough_material(&material, wall.reflectance, wall.roughness)
                 .walls(&id, &ends, &material);
-            builder = standing(builder, wall.z_m);
+            builder = with_limits(builder, wall.z_m);
         }
         for (number, round) in self.rounds.iter().enumerate() {
             let material = format!("n{number}");
@@ -279,7 +279,7 @@ impl World {
                 round.radius_m,
                 &material,
             );
-            builder = standing(builder, round.z_m);
+            builder = with_limits(builder, round.z_m);
         }
         if let Some(heights) = self.heights {
             let [floor_z_m, ceiling_z_m] = heights.limits_z_m;
@@ -326,7 +326,7 @@ impl Heights {
     }
 }
 
-fn standing(builder: SceneBuilder, z_m: Option<[f64; 2]>) -> SceneBuilder {
+fn with_limits(builder: SceneBuilder, z_m: Option<[f64; 2]>) -> SceneBuilder {
     match z_m {
         Some([bottom_z_m, top_z_m]) => builder.standing_from(bottom_z_m, top_z_m),
         None => builder,

@@ -28,11 +28,11 @@ impl Sources {
     pub(crate) fn read(source: &Path) -> Self {
         let mut files = Vec::new();
         collect(source, source, &mut files);
-        Self::of(files)
+        Self::from_files(files)
     }
 
     /// Collects the references of files by module.
-    pub(crate) fn of(files: impl IntoIterator<Item = (Module, String)>) -> Self {
+    pub(crate) fn from_files(files: impl IntoIterator<Item = (Module, String)>) -> Self {
         let references: BTreeMap<_, _> =
             files.into_iter().map(|(module, text)| (module, references(&code(&text)))).collect();
         let known: BTreeSet<Module> = references.keys().cloned().collect();

@@ -206,12 +206,12 @@ impl FanRay {
     fn over(
         origin: DVec2,
         departure_rad: f64,
-        met: &[Reflector],
+        surfaces: &[Reflector],
         reflectors: &Reflectors,
     ) -> Option<(Self, Vec<DVec2>)> {
         let mut ray = Self::new(origin, departure_rad);
-        let mut points = Vec::with_capacity(met.len() + 1);
-        for &reflector in met {
+        let mut points = Vec::with_capacity(surfaces.len() + 1);
+        for &reflector in surfaces {
             ray.turn(&reflectors.intersect(ray.origin, ray.direction, reflector)?, reflectors);
             points.push(ray.origin);
         }
@@ -288,11 +288,11 @@ impl FanCandidate {
         let mut points = Vec::new();
         let mut turn_rad = 0.0;
         for _ in 0..MAX_STEPS {
-            let Some((ray, met)) = over(leaves_rad + turn_rad) else {
+            let Some((ray, reflected)) = over(leaves_rad + turn_rad) else {
                 turn_rad *= 0.5;
                 continue;
             };
-            points = met;
+            points = reflected;
             leaves_rad += turn_rad;
             let aim = ray.aim(end - ray.origin);
             if aim.offset_m.abs() < EXACT_M {

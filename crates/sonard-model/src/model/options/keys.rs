@@ -62,7 +62,7 @@ pub struct OptionKeys {
 
 /// A setting that belongs to a different engine than the selected one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
-#[error("{option} is nothing that the engine {} knows", engine.name())]
+#[error("{option} is not an option of the engine {}", engine.name())]
 pub struct ForeignOption {
     /// Name of the setting, as in [`OptionKeys`].
     pub option: &'static str,
@@ -77,7 +77,7 @@ impl ForeignOption {
     #[must_use]
     pub fn help(&self) -> String {
         let of: Vec<_> = self.of.iter().map(|engine| engine.name()).collect();
-        format!("leave it out, or choose the engine {}", of.join(" or "))
+        format!("remove it, or use the engine {}", of.join(" or "))
     }
 }
 
@@ -235,7 +235,7 @@ mod tests {
             }
         }
         let error = everything(EngineKind::Cone).options().expect_err("others' options");
-        assert_eq!(error.to_string(), "response is nothing that the engine cone knows");
-        assert_eq!(error.help(), "leave it out, or choose the engine paths");
+        assert_eq!(error.to_string(), "response is not an option of the engine cone");
+        assert_eq!(error.help(), "remove it, or use the engine paths");
     }
 }

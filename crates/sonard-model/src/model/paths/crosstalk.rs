@@ -49,7 +49,7 @@ impl PathEngine {
 impl CrosstalkPaths<'_> {
     /// Arrivals at the receiver, shortest path first, as in
     /// [`Arrivals::listen`](crate::model::Arrivals::listen).
-    pub(crate) fn listen(&self) -> impl Iterator<Item = PulseArrival> {
+    pub(crate) fn arrivals(&self) -> impl Iterator<Item = PulseArrival> {
         let floor = self.found.paths.plan.settings.floor;
         self.found.echoes.iter().zip(0..).filter_map(move |(echo, index)| {
             let [out, back] = [

@@ -160,7 +160,7 @@ mod tests {
         let beam = BeamPattern::new(&sensor, 343.0);
         let envelope = PatternEnvelope::new(&beam);
         let floor = 0.001;
-        let mut heard = 0;
+        let mut detectable = 0;
         for (apart_deg, amplitude) in
             [(0.0, 0.9), (10.0, 0.9), (25.0, 0.5), (-40.0, 0.9), (70.0, 1.0), (5.0, 0.0011)]
         {
@@ -185,19 +185,19 @@ mod tests {
                     let direction_rad = (f64::from(at) * 0.1).to_radians();
                     let one_way = |end: f64| beam.one_way(wrap_pi(end - direction_rad));
                     if amplitude * one_way(departure_rad) * one_way(arrival_rad) >= floor {
-                        heard += 1;
-                        let mut told = 0;
+                        detectable += 1;
+                        let mut visits = 0;
                         index.near(direction_rad, u32::MAX, |entry, off_rad| {
-                            told += 1;
+                            visits += 1;
                             let off = wrap_pi(direction_rad - middle_deg.to_radians());
                             assert!(entry.echo == 7 && (off_rad - off).abs() < 1e-9);
                         });
-                        assert_eq!(told, 1, "{apart_deg} {amplitude} {middle_deg} at {at}");
+                        assert_eq!(visits, 1, "{apart_deg} {amplitude} {middle_deg} at {at}");
                     }
                 }
             }
         }
-        assert!(heard > 5000, "{heard}");
+        assert!(detectable > 5000, "{detectable}");
         // The bound is useful: far off the axis nothing is visited.
         let narrow = DirectionIndex::new(&[]);
         narrow.near(0.0, u32::MAX, |_, _| panic!("nothing is there"));

@@ -230,14 +230,15 @@ impl<'a> PathArrivals<'a> {
     /// Image of the face over a multiple echo.
     fn multiple_image(&self, multiple: &MultipleEcho) -> Image {
         let FoundEchoes { paths, traced, echoes, .. } = &self.found;
-        let met = multiple.paths.iter().map(|path| &echoes[path.echo as usize]);
+        let parts = multiple.paths.iter().map(|path| &echoes[path.echo as usize]);
         let passages = multiple.paths.len() - 1;
-        met.map(|echo| match echo.via.kind() {
-            PathKind::Specular => Some(paths.reflection_count(traced, echo)),
-            PathKind::Diffracted | PathKind::Scattered => None,
-        })
-        .try_fold(passages, |met, more| Some(met + more?))
-        .map_or(Image::Lost, mirrored)
+        parts
+            .map(|echo| match echo.via.kind() {
+                PathKind::Specular => Some(paths.reflection_count(traced, echo)),
+                PathKind::Diffracted | PathKind::Scattered => None,
+            })
+            .try_fold(passages, |sum, count| Some(sum + count?))
+            .map_or(Image::Lost, mirrored)
     }
 }
 

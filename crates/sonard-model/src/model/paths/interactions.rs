@@ -101,7 +101,7 @@ impl Paths {
             bounces == 0 || {
                 let contacts = self.contacts(traced, echo, traced.ends[1]);
                 let is_mirror =
-                    |met: &&(DVec2, Mechanism)| matches!(met.1, Mechanism::Reflection(_));
+                    |contact: &&(DVec2, Mechanism)| matches!(contact.1, Mechanism::Reflection(_));
                 settings.allows(bounces + contacts.iter().filter(is_mirror).count() as u16)
             }
         });
@@ -237,10 +237,10 @@ impl Stretch<'_> {
         let plan_m: f64 = legs_m().sum();
         let mut bounces = heights.bounces(self.climb_m, self.bounces).peekable();
         let mut along_m = 0.0;
-        for ((from, leg_m), (to, met)) in starts.clone().zip(legs_m()).zip(ends()) {
+        for ((from, leg_m), (to, mechanism)) in starts.clone().zip(legs_m()).zip(ends()) {
             // In the corner of a wall and the floor both coincide; the wall is then listed first.
             let is_before =
-                |share: f64| met.is_none() || share * plan_m < along_m + leg_m - COINCIDENT_M;
+                |share: f64| mechanism.is_none() || share * plan_m < along_m + leg_m - COINCIDENT_M;
             while let Some(bounce) = bounces.next_if(|bounce| is_before(bounce.share)) {
                 let leg_share = (bounce.share * plan_m - along_m) / leg_m.max(f64::MIN_POSITIVE);
                 interactions.push(Interaction {
@@ -251,7 +251,11 @@ impl Stretch<'_> {
             }
             along_m += leg_m;
             let z_m = z_m(along_m / plan_m);
-            interactions.extend(met.map(|mechanism| Interaction { mechanism, point: to, z_m }));
+            interactions.extend(mechanism.map(|mechanism| Interaction {
+                mechanism,
+                point: to,
+                z_m,
+            }));
         }
         interactions
     }

@@ -85,8 +85,8 @@ impl Rays {
                 let leg = tracer.leg(contact_rad);
                 let mut contacts = wall_contacts(&self.beams, plan, leg, points[0]);
                 let first = Reflector::Cylinder(tracer.view.cylinder);
-                let met = [first].into_iter().chain(tracer.surfaces.iter().copied());
-                contacts.extend(points.into_iter().zip(met.map(Mechanism::Reflection)));
+                let surfaces = [first].into_iter().chain(tracer.surfaces.iter().copied());
+                contacts.extend(points.into_iter().zip(surfaces.map(Mechanism::Reflection)));
                 contacts
             }),
         }

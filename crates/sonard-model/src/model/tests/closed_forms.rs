@@ -93,7 +93,7 @@ fn free_end_matches_kuc_siegel() {
                 diffractors(&arrival.path)[..]
                     == [Diffractor::Upright(Edge { wall: 0, at_b: false })]
             })
-            .expect("the end is heard");
+            .expect("an echo of the end");
         let wavelength_m = Air::default().sound_speed_m_s() / 49.4e3;
         let expected = 1.0 / (std::f64::consts::TAU * (range_m / wavelength_m).sqrt());
         close(found.length_m, 2.0 * range_m, 1e-9, "length");

@@ -53,8 +53,8 @@ fn model(array: RangerArray, scene: &Scene, options: PathOptions) -> ArrayModel 
     ArrayModel::new(Arc::new(array), scene, &sensor, air(), options.into()).expect("right options")
 }
 
-fn heard(model: &ArrayModel, pose: Pose, firing: usize) -> Prediction {
-    model.at(pose).expect("a stand").ping_in_round(firing).expect("few paths")
+fn predict(model: &ArrayModel, pose: Pose, firing: usize) -> Prediction {
+    model.at(pose).expect("a pose").ping_in_round(firing).expect("few paths")
 }
 
 const ORIGIN: Pose = Pose { x_m: 0.0, y_m: 0.0, heading_deg: 0.0 };
@@ -67,7 +67,7 @@ const ORIGIN: Pose = Pose { x_m: 0.0, y_m: 0.0, heading_deg: 0.0 };
 fn ghost_of_the_previous_slot() {
     let array = side_by_side(&[0.1, -0.1], 10.0, Vec::new());
     let model = model(array, &wall(3.0), PathOptions::default());
-    let prediction = heard(&model, ORIGIN, 1);
+    let prediction = predict(&model, ORIGIN, 1);
     let length_m = 2.0 * f64::hypot(3.0, 0.1);
     assert_eq!(prediction.status, PingStatus::Echo);
     let range_m = prediction.range_m.expect("a range");
@@ -89,12 +89,12 @@ fn ghost_of_the_previous_slot() {
 fn ghost_of_its_own_last_round() {
     let array = side_by_side(&[0.0], 10.0, Vec::new());
     let scene = wall(3.0);
-    let prediction = heard(&model(array.clone(), &scene, PathOptions::default()), ORIGIN, 0);
+    let prediction = predict(&model(array.clone(), &scene, PathOptions::default()), ORIGIN, 0);
     let range_m = prediction.range_m.expect("a ghost");
     assert!((range_m - 1.3).abs() < 1e-9, "{range_m}");
     assert_eq!(prediction.crosstalk, Some(OtherFiring { ranger: 0, before_us: 10_000.0 }));
     let alone = PathOptions { without_crosstalk: true, ..PathOptions::default() };
-    let prediction = heard(&model(array, &scene, alone), ORIGIN, 0);
+    let prediction = predict(&model(array, &scene, alone), ORIGIN, 0);
     assert_eq!((prediction.status, prediction.crosstalk), (PingStatus::NoEcho, None));
 }
 
@@ -108,7 +108,7 @@ fn simultaneous_firing() {
     let mut array = side_by_side(&[0.1, -0.1], 100.0, together);
     let both = model(array.clone(), &wall(3.0), PathOptions::default());
     for firing in [0, 1] {
-        let prediction = heard(&both, ORIGIN, firing);
+        let prediction = predict(&both, ORIGIN, firing);
         assert!((prediction.range_m.expect("a wall") - 3.0).abs() < 1e-9);
         assert_eq!(prediction.crosstalk, None);
     }
@@ -119,7 +119,7 @@ fn simultaneous_firing() {
     );
     array.rangers[1].bearing_deg = -away_rad.to_degrees();
     let turned = model(array, &wall(3.0), PathOptions::default());
-    let prediction = heard(&turned, ORIGIN, 1);
+    let prediction = predict(&turned, ORIGIN, 1);
     assert_eq!(prediction.crosstalk, Some(OtherFiring { ranger: 0, before_us: 0.0 }));
     let range_m = prediction.range_m.expect("the wall");
     assert!((range_m - f64::hypot(3.0, 0.1)).abs() < 1e-9, "{range_m}");
@@ -132,13 +132,13 @@ fn direct_path_of_facing_rangers() {
     let mut array = side_by_side(&[0.0, 0.0], 50.0, together);
     (array.rangers[1].x_m, array.rangers[1].bearing_deg) = (2.0, 180.0);
     let open = Scene::builder("open").build().expect("a scene");
-    let prediction = heard(&model(array.clone(), &open, PathOptions::default()), ORIGIN, 1);
+    let prediction = predict(&model(array.clone(), &open, PathOptions::default()), ORIGIN, 1);
     assert!((prediction.range_m.expect("the other") - 1.0).abs() < 1e-9);
     let arrival = prediction.arrival.expect("an arrival");
     assert!(arrival.path.interactions.is_empty());
     assert!((arrival.amplitude - 1.0).abs() < 1e-9, "{}", arrival.amplitude);
     let between = model(array, &wall(1.5), PathOptions::default());
-    let prediction = heard(&between, ORIGIN, 1);
+    let prediction = predict(&between, ORIGIN, 1);
     assert_eq!(prediction.crosstalk, None);
     assert!((prediction.range_m.expect("the wall") - 0.5).abs() < 1e-9);
 }
@@ -155,12 +155,12 @@ fn direct_path_by_the_floor() {
             wall_m.map_or_else(|| Scene::builder("open").build().expect("a scene"), wall);
         scene.floor_z_m = Some(0.0);
         let model = model(array.clone(), &scene, PathOptions::default());
-        let stand = model.at(ORIGIN).expect("a stand");
-        let others = stand.others(1, 1).expect("crosstalk");
+        let placed = model.at(ORIGIN).expect("a pose");
+        let others = placed.others(1, 1).expect("crosstalk");
         let engine = others.engine;
         let (_, transmitter) = others.firings[0];
         let paths = engine.aimed([transmitter, others.receiver], 10.0, 1e-9).expect("few paths");
-        let lengths_m: Vec<f64> = paths.listen().map(|arrival| arrival.length_m).collect();
+        let lengths_m: Vec<f64> = paths.arrivals().map(|arrival| arrival.length_m).collect();
         let straight = lengths_m.iter().any(|length_m| (length_m - 2.0).abs() < 1e-9);
         let by_floor = lengths_m.iter().any(|length_m| (length_m - 5.0_f64.sqrt()).abs() < 1e-9);
         // A wall of unlimited height hides both.
@@ -184,18 +184,20 @@ fn ghosts_equal_a_longer_window() {
     let mut ghosts = 0;
     for step in 0..40 {
         let pose = Pose { x_m: 1.5, y_m: 1.5, heading_deg: 9.0 * f64::from(step) };
-        let stand = model.at(pose).expect("a stand");
-        let others = stand.others(0, 0).expect("crosstalk");
+        let placed = model.at(pose).expect("a pose");
+        let others = placed.others(0, 0).expect("crosstalk");
         let [(_, transmitter), ..] = others.firings[..] else { panic!("an earlier one") };
         let paths = others.engine.aimed([transmitter, others.receiver], 8.0, others.engine.floor());
         let paths = paths.expect("few paths");
-        let strays: Vec<_> = paths.listen().collect();
+        let strays: Vec<_> = paths.arrivals().collect();
         let all = single.at(pose.position()).arrivals(pose.direction_rad(0.0)).expect("few paths");
         // Strays exclude multiple echoes by the transducer's face, and rough walls scatter to the
         // ranger itself alone.
         let is_listed = |path: &crate::model::Path| {
             path.kind() != crate::reading::PathKind::Scattered
-                && path.mechanisms().all(|met| met != crate::model::Mechanism::Transducer)
+                && path
+                    .mechanisms()
+                    .all(|mechanism| mechanism != crate::model::Mechanism::Transducer)
         };
         for arrival in
             all.iter().filter(|arrival| arrival.length_m < 8.0 && is_listed(&arrival.path))
@@ -234,18 +236,18 @@ proptest! {
             |ranger: &MountedRanger| scene.check_pose(&ranger.pose_on(&ORIGIN)).is_ok();
         prop_assume!(array.rangers.iter().all(can_stand));
         let model = model(array, &scene, PathOptions::default());
-        let stand = model.at(ORIGIN).expect("a stand");
-        let heard = |firing: usize| {
-            let others = stand.others(firing, firing).expect("crosstalk");
+        let placed = model.at(ORIGIN).expect("a pose");
+        let received = |firing: usize| {
+            let others = placed.others(firing, firing).expect("crosstalk");
             let (_, transmitter) = others.firings[0];
             let ends = [transmitter, others.receiver];
             let paths = others.engine.aimed(ends, 6.0, others.engine.floor());
             let paths = paths.expect("few paths");
-            let mut told: Vec<_> = paths.listen().map(|arrival| (arrival, paths.arrival(&arrival))).collect();
-            told.retain(|(arrival, _)| arrival.amplitude > 1e-4);
-            told
+            let mut arrivals: Vec<_> = paths.arrivals().map(|arrival| (arrival, paths.arrival(&arrival))).collect();
+            arrivals.retain(|(arrival, _)| arrival.amplitude > 1e-4);
+            arrivals
         };
-        let (there, back) = (heard(1), heard(0));
+        let (there, back) = (received(1), received(0));
         prop_assert_eq!(there.len(), back.len());
         for (one, path) in &there {
             let same = back.iter().any(|(other, reverse)| {

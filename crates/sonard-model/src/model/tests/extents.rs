@@ -20,24 +20,25 @@ struct Run {
 /// Walls and edges of a path.
 fn names(simulator: &Simulator, arrival: &Arrival) -> String {
     let scene = simulator.scene();
-    let name = |met: Mechanism| match met {
+    let name = |mechanism: Mechanism| match mechanism {
         Mechanism::Diffraction(diffractor) => format!("edge {}", diffractor.name(scene)),
-        _ => met.name(scene),
+        _ => mechanism.name(scene),
     };
     arrival.path.mechanisms().map(name).collect::<Vec<_>>().join(", ")
 }
 
 fn runs(simulator: &Simulator, readings: &[(f64, Prediction)]) -> Vec<Run> {
     let by = |prediction: &Prediction| {
-        let heard = prediction.status == PingStatus::Echo;
-        let arrival = prediction.arrival.as_ref().filter(|_| heard)?;
+        let has_echo = prediction.status == PingStatus::Echo;
+        let arrival = prediction.arrival.as_ref().filter(|_| has_echo)?;
         Some(names(simulator, arrival))
     };
     let mut runs: Vec<Run> = Vec::new();
     let mut last = None;
     // Begins at an azimuth without echo, so that no run is cut in two at 0.
-    let silent = readings.iter().position(|(_, p)| by(p).is_none()).expect("a silent azimuth");
-    for (azimuth_deg, prediction) in readings[silent..].iter().chain(&readings[..silent]) {
+    let start =
+        readings.iter().position(|(_, p)| by(p).is_none()).expect("an azimuth without echo");
+    for (azimuth_deg, prediction) in readings[start..].iter().chain(&readings[..start]) {
         let here = by(prediction);
         match (&here, &last) {
             (Some(name), Some(before)) if name == before => {

@@ -127,7 +127,9 @@ fn field(walls: &[Wall], at: DVec2, direction_deg: f64) -> num_complex::Complex6
     arrivals(scene(walls.to_vec()), EngineKind::Paths.options(), at, direction_deg)
         .iter()
         // The face reflects strong sound only, which begins and ends.
-        .filter(|arrival| arrival.path.mechanisms().all(|met| met != Mechanism::Transducer))
+        .filter(|arrival| {
+            arrival.path.mechanisms().all(|mechanism| mechanism != Mechanism::Transducer)
+        })
         .map(|arrival| {
             let phase_rad = arrival.phase_rad - wave_number_per_m * arrival.length_m;
             num_complex::Complex64::from_polar(arrival.amplitude, phase_rad)

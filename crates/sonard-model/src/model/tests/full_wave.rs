@@ -92,11 +92,11 @@ impl Score {
             // A decibel above the threshold may be below it there.
             (None, PingStatus::Echo) if found.margin_db.expect("a margin") > 1.0 => {
                 self.disagree += 1;
-                println!("{what}: heard by {:?} dB, not in the reference", found.margin_db);
+                println!("{what}: echo by {:?} dB, not in the reference", found.margin_db);
             }
             (Some(_), _) => {
                 self.disagree += 1;
-                println!("{what}: silent by {:?} dB, not in the reference", found.margin_db);
+                println!("{what}: no echo by {:?} dB, unlike the reference", found.margin_db);
             }
             (None, _) => {}
         }

@@ -31,7 +31,7 @@ fn length_m(points: &[DVec3]) -> f64 {
 }
 
 fn is_round(path: &Path) -> bool {
-    path.reflectors().any(|met| matches!(met, Reflector::Cylinder(_)))
+    path.reflectors().any(|reflector| matches!(reflector, Reflector::Cylinder(_)))
 }
 
 /// A scene with the walls that the engine uses, whose nearly square corners are exactly square.
@@ -253,7 +253,7 @@ struct Counts {
 
 impl Counts {
     fn add(&mut self, path: &Path) {
-        let of_floor = |met| matches!(met, Reflector::Floor | Reflector::Ceiling);
+        let of_floor = |reflector| matches!(reflector, Reflector::Floor | Reflector::Ceiling);
         let floor = path.reflectors().any(of_floor);
         let diffractors = diffractors(path);
         let level =
@@ -273,7 +273,7 @@ impl Counts {
         let Self { mirrored, round, floor, scattered, upright, level, level_by_floor, twice } =
             *self;
         let all = [mirrored, round, floor, scattered, upright, level, level_by_floor, twice];
-        assert!(all.into_iter().all(|met| met >= count), "{self:?}");
+        assert!(all.into_iter().all(|found| found >= count), "{self:?}");
     }
 }
 
@@ -296,7 +296,7 @@ fn shipped_scenes_obey_the_laws() {
                 for direction in 0..63 {
                     for arrival in point.arrivals(0.1 * f64::from(direction)).expect("few paths") {
                         check_arrival(&simulator, &arrival, pose.position(), &mut fan_rounds);
-                        let face = |met| met == Mechanism::Transducer;
+                        let face = |mechanism| mechanism == Mechanism::Transducer;
                         multiple += usize::from(arrival.path.mechanisms().any(face));
                         checked += 1;
                     }
@@ -323,7 +323,8 @@ fn check_arrival(simulator: &Simulator, arrival: &Arrival, at: DVec2, fan_rounds
     let drawn = simulator.scene();
     let plan = Room { scene: drawn.ray_plan().scene(drawn), z_m: None };
     let off_m = || length_m(&points(path, ends, None)) - arrival.length_m;
-    let round = path.reflectors().filter(|met| matches!(met, Reflector::Cylinder(_))).count();
+    let round =
+        path.reflectors().filter(|reflector| matches!(reflector, Reflector::Cylinder(_))).count();
     match (simulator.options().engine.kind(), round) {
         (EngineKind::Paths, _) => {
             let room = Room::new(simulator.scene(), simulator.sensor_z_m());
@@ -332,14 +333,16 @@ fn check_arrival(simulator: &Simulator, arrival: &Arrival, at: DVec2, fan_rounds
         // The fan's ray represents a neighbour that may pass a corner on its other side. Lengths
         // over a cylinder are approximate, by the curvature of the front, where the points are
         // exact; over two, neighbours diverge too fast to be found.
-        (EngineKind::Fan, 0 | 1) if path.interactions.iter().all(|met| plan.is_on_wall(met)) => {
+        (EngineKind::Fan, 0 | 1)
+            if path.interactions.iter().all(|interaction| plan.is_on_wall(interaction)) =>
+        {
             assert!(round > 0 || off_m().abs() < 1e-9, "{} {arrival:?}", off_m());
             let points = points(path, ends, None);
             let last = path.interactions.len() - 1;
-            for (place, met) in path.interactions.iter().enumerate() {
+            for (place, interaction) in path.interactions.iter().enumerate() {
                 let legs = [1, 2].map(|to| points[place + to] - points[place + to - 1]);
                 let is_listed = legs.iter().all(|leg| leg.length() > SHORT_M);
-                let off = plan.off_law(met, legs.map(DVec3::normalize_or_zero));
+                let off = plan.off_law(interaction, legs.map(DVec3::normalize_or_zero));
                 let is_lawful = !is_listed || off < 1e-6;
                 let may_miss = round > 0 && place == last;
                 assert!(is_lawful || may_miss, "{off} {arrival:?}");
@@ -348,7 +351,9 @@ fn check_arrival(simulator: &Simulator, arrival: &Arrival, at: DVec2, fan_rounds
                 }
             }
         }
-        (EngineKind::Fan, _) => assert!(path.interactions.iter().all(|met| met.z_m.is_none())),
+        (EngineKind::Fan, _) => {
+            assert!(path.interactions.iter().all(|interaction| interaction.z_m.is_none()))
+        }
         // The nearest hit, mirror or not.
         (EngineKind::Cone, _) => {
             assert!(off_m().abs() < 1e-9, "{} {arrival:?}", off_m());

@@ -158,8 +158,8 @@ fn finer_fan_reads_the_same() {
 }
 
 fn met_round_body(prediction: &Prediction) -> bool {
-    let mut met = prediction.arrival.iter().flat_map(|arrival| arrival.path.reflectors());
-    met.any(|reflector| matches!(reflector, Reflector::Cylinder(_)))
+    let mut reflectors = prediction.arrival.iter().flat_map(|arrival| arrival.path.reflectors());
+    reflectors.any(|reflector| matches!(reflector, Reflector::Cylinder(_)))
 }
 
 fn range_differs(one: &Prediction, other: &Prediction, tolerance_m: f64) -> bool {
@@ -180,7 +180,7 @@ fn absorption_in_decibels() {
         let direction_rad = f64::from(direction_deg).to_radians();
         let all = lossless.arrivals(direction_rad).expect("few paths");
         for arrival in lossy.arrivals(direction_rad).expect("few paths") {
-            let twin = all.iter().find(|twin| twin.path == arrival.path).expect("heard before");
+            let twin = all.iter().find(|twin| twin.path == arrival.path).expect("a lossless echo");
             let left = 10f64.powf(-decibels_per_m * arrival.length_m / 20.0);
             close(arrival.amplitude, twin.amplitude * left, 1e-9, "amplitude");
         }
@@ -207,12 +207,12 @@ proptest! {
             max_range_m: Some(2.5),
             ..FanOptions { ray_spacing_deg: 0.5, ..BARE }.into()
         };
-        let hear = |reflectance| arrivals(scene(walls(reflectance)), options, DVec2::ZERO, direction_deg);
-        let bright = hear(1.0);
+        let arrivals_with = |reflectance| arrivals(scene(walls(reflectance)), options, DVec2::ZERO, direction_deg);
+        let bright = arrivals_with(1.0);
         for arrival in &bright {
             prop_assert!(arrival.amplitude <= 1.0 + 1e-6, "{arrival:?}");
         }
-        for arrival in hear(dull) {
+        for arrival in arrivals_with(dull) {
             let twin = bright.iter().find(|twin| twin.path == arrival.path);
             prop_assert!(twin.is_some_and(|twin| twin.amplitude >= arrival.amplitude - 1e-12), "{arrival:?}");
         }

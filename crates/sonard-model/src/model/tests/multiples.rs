@@ -16,8 +16,11 @@ fn arrivals_include_the_beam() {
         let direction_rad = direction_deg.to_radians();
         let point = simulator.at(DVec2::new(0.0, 0.2));
         for arrival in point.arrivals(direction_rad).expect("few paths") {
-            let returns =
-                arrival.path.mechanisms().filter(|met| *met == Mechanism::Transducer).count();
+            let returns = arrival
+                .path
+                .mechanisms()
+                .filter(|mechanism| *mechanism == Mechanism::Transducer)
+                .count();
             let one_way = |end_rad: f64| {
                 simulator.beam().one_way(crate::geometry::wrap_pi(end_rad - direction_rad))
             };
@@ -43,16 +46,19 @@ fn length_is_that_of_all_rounds() {
     let mirrored: Vec<_> = arrivals
         .iter()
         .filter(|arrival| {
-            arrival.path.mechanisms().all(|met| !matches!(met, Mechanism::Diffraction(_)))
+            arrival
+                .path
+                .mechanisms()
+                .all(|mechanism| !matches!(mechanism, Mechanism::Diffraction(_)))
         })
         .collect();
     assert!(mirrored.len() >= 2, "{mirrored:?}");
-    for (arrival, ways) in mirrored.iter().zip(1..) {
-        assert!((arrival.length_m - f64::from(ways)).abs() < 1e-9, "{arrival:?}");
+    for (arrival, rounds) in mirrored.iter().zip(1..) {
+        assert!((arrival.length_m - f64::from(rounds)).abs() < 1e-9, "{arrival:?}");
         assert!(
             arrival.departure_rad.abs() < 1e-9 && arrival.arrival_rad.abs() < 1e-9,
             "{arrival:?}"
         );
-        assert_eq!(arrival.path.interactions.len(), 2 * ways as usize - 1);
+        assert_eq!(arrival.path.interactions.len(), 2 * rounds as usize - 1);
     }
 }

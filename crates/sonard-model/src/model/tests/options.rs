@@ -24,15 +24,15 @@ fn values_out_of_range_are_named() {
         let scene = Arc::new(shipped_scene("simple-room"));
         let sensor = Sensor::preset("senscomp-6500").expect("a preset");
         let made = Simulator::new(scene, sensor, Air::default(), options);
-        let said = made.err().map(|error| error.to_string());
+        let message = made.err().map(|error| error.to_string());
         match wrong {
             Some(name) => {
                 assert!(
-                    said.as_ref().is_some_and(|said| said.contains(name)),
-                    "{options:?}: {said:?}"
+                    message.as_ref().is_some_and(|message| message.contains(name)),
+                    "{options:?}: {message:?}"
                 );
             }
-            None => assert_eq!(said, None, "{options:?}"),
+            None => assert_eq!(message, None, "{options:?}"),
         }
     }
 }

@@ -42,7 +42,7 @@ fn walls_of(simulator: &Simulator, prediction: &Prediction) -> Vec<String> {
 }
 
 fn names(simulator: &Simulator, arrival: &Arrival) -> Vec<String> {
-    arrival.path.mechanisms().map(|met| met.name(simulator.scene())).collect()
+    arrival.path.mechanisms().map(|mechanism| mechanism.name(simulator.scene())).collect()
 }
 
 fn length_m(prediction: &Prediction) -> f64 {
@@ -244,9 +244,10 @@ fn body_removes_the_false_wall() {
         let ahead = &readings[0];
         assert_eq!(ahead.status, PingStatus::MinRange, "{ahead:?}");
         let path = &ahead.arrival.as_ref().expect("what sounded").path;
-        let at_body = path.reflectors().filter(|met| *met == Reflector::Cylinder(0)).count();
+        let at_body =
+            path.reflectors().filter(|mechanism| *mechanism == Reflector::Cylinder(0)).count();
         assert!(
-            at_body >= 2 || path.mechanisms().any(|met| met == Mechanism::Transducer),
+            at_body >= 2 || path.mechanisms().any(|mechanism| mechanism == Mechanism::Transducer),
             "{path:?}"
         );
     }

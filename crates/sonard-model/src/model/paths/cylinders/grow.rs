@@ -219,8 +219,8 @@ impl<'a> TubeGrower<'a> {
         }
         self.follow_part(tube, &tracer, &mut hits, [from, last]);
         for (cylinder, span) in hits.parts() {
-            let met = self.half_path(tube, &tracer, cylinder, span);
-            self.half_paths.extend(met);
+            let half_path = self.half_path(tube, &tracer, cylinder, span);
+            self.half_paths.extend(half_path);
         }
     }
 

@@ -69,15 +69,15 @@ impl<'a> Hits<'a> {
     /// increasing contact.
     pub(crate) fn lets_pass(&mut self, part: AngleSpan, middle: &Front) -> bool {
         let at = 0.5 * (part.from_rad + part.to_rad);
-        let is_met = |hit: &&mut ArcHit| hit.span.from_rad < at && at < hit.span.to_rad;
-        let mut met: SmallVec<[(f64, &mut ArcHit); 2]> = self
+        let is_reached = |hit: &&mut ArcHit| hit.span.from_rad < at && at < hit.span.to_rad;
+        let mut reached: SmallVec<[(f64, &mut ArcHit); 2]> = self
             .arcs
             .iter_mut()
-            .filter(is_met)
+            .filter(is_reached)
             .map(|hit| (middle.onto(hit.circle).0.length_m, hit))
             .collect();
-        met.sort_by(|a, b| a.0.total_cmp(&b.0));
-        for (_, hit) in met {
+        reached.sort_by(|a, b| a.0.total_cmp(&b.0));
+        for (_, hit) in reached {
             match hit.seen.last_mut() {
                 Some(last) if last.to_rad == part.from_rad => last.to_rad = part.to_rad,
                 _ => hit.seen.push(part),

@@ -65,9 +65,9 @@ pub(crate) enum OneWay {
 /// Returns the surfaces up to a link, in the order in which a ray hits them.
 pub(crate) fn surfaces_to(links: &[SurfaceLink], mut link: u32) -> Surfaces {
     let mut surfaces = Surfaces::new();
-    while let Some(met) = links.get(link as usize) {
-        surfaces.push(met.surface);
-        link = met.before;
+    while let Some(hit) = links.get(link as usize) {
+        surfaces.push(hit.surface);
+        link = hit.before;
     }
     surfaces.reverse();
     surfaces

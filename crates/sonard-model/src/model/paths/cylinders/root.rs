@@ -105,14 +105,14 @@ mod tests {
 
     #[test]
     fn zeros_take_few_steps() {
-        let asked = Cell::new(0);
+        let calls = Cell::new(0);
         let cube = |x: f64| {
-            asked.set(asked.get() + 1);
+            calls.set(calls.get() + 1);
             (x.powi(3) - 2.0, 3.0 * x * x)
         };
         let found = zero_between(ends([0.0, 2.0], cube), 1e-13, cube);
         assert!((found - 2_f64.cbrt()).abs() < 1e-13, "{found}");
-        assert!(asked.get() <= 12, "{} steps", asked.get());
+        assert!(calls.get() <= 12, "{} steps", calls.get());
         // A falling function, whose slope is misleading: bisection keeps the zero between the ends.
         let falls =
             |x: f64| (-(40.0 * (x - 0.3)).atan(), -40.0 / (1.0 + (40.0 * (x - 0.3)).powi(2)));

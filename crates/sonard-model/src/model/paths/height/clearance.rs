@@ -41,16 +41,16 @@ impl Heights {
         let straight_z = |along_m: f64| self.z_m + ends.rise_m * along_m / plan_m;
         let mut along_m = 0.0;
         let mut left_contacts = contacts.len();
-        for ((from, left), (to, met)) in points().zip(points().skip(1)) {
+        for ((from, departed), (to, arrived)) in points().zip(points().skip(1)) {
             let leg_m = from.distance(to);
             let z_at = |share: f64| straight_z(along_m + share * leg_m);
-            if self.is_blocked(cylinders, [from, to], [left, met], z_at) {
+            if self.is_blocked(cylinders, [from, to], [departed, arrived], z_at) {
                 return false;
             }
             left_contacts = left_contacts.saturating_sub(1);
             let is_level_edge = ends.end.is_none() && left_contacts == 0;
             let z_m = self.folded_m(z_at(1.0));
-            if !is_level_edge && met.is_some_and(|met| !holds(self.limits(met), z_m)) {
+            if !is_level_edge && arrived.is_some_and(|arrived| !holds(self.limits(arrived), z_m)) {
                 return false;
             }
             along_m += leg_m;

@@ -84,7 +84,8 @@ impl Heights {
         }
     }
 
-    /// Returns an image by its number in [`PathEcho::image`](crate::model::paths::echo::PathEcho::image).
+    /// Returns an image by its number in
+    /// [`PathEcho::image`](crate::model::paths::echo::PathEcho::image).
     pub(crate) fn image(&self, number: u16) -> VerticalImage {
         number.checked_sub(1).map_or(VerticalImage::NONE, |image| self.images[image as usize])
     }

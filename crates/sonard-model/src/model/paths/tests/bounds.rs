@@ -104,9 +104,12 @@ fn error_names_the_excess() {
     let mirrors = Settings { edge_law: None, ..settings() };
     let of_beams = refused(&ring(60), mirrors, steps);
     assert_eq!(of_beams.part, SearchPart::Beams);
-    let said = of_beams.to_string();
-    assert!(said.contains("wall to wall") && said.contains("max-range (it is 10.7 m)"), "{said}");
-    assert!(!said.contains("double-diffraction"), "{said}");
+    let message = of_beams.to_string();
+    assert!(
+        message.contains("wall to wall") && message.contains("max-range (currently 10.7 m)"),
+        "{message}"
+    );
+    assert!(!message.contains("double-diffraction"), "{message}");
     let double = Settings { double_diffraction: true, max_path_m: 6.0, ..settings() };
     assert!(refused(&star(200), double.clone(), steps).to_string().contains("double-diffraction"));
     // Memory is limited as work is.

@@ -21,7 +21,10 @@ fn mirrored(point: &ObservationPoint, pose: &Pose, azimuth_deg: f64) -> Vec<Arri
     arrivals.retain(|arrival| {
         arrival.path.kind() == PathKind::Specular
             && arrival.amplitude > 0.02
-            && arrival.path.mechanisms().all(|met| met != crate::model::Mechanism::Transducer)
+            && arrival
+                .path
+                .mechanisms()
+                .all(|mechanism| mechanism != crate::model::Mechanism::Transducer)
     });
     arrivals
 }

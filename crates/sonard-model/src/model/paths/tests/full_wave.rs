@@ -58,11 +58,11 @@ impl Chain {
                 };
                 let paths = Paths::new(&plan, settings);
                 let (traced, echoes) = paths.trace(at, at, None).expect("few paths");
-                let heard = |echo: &PathEcho| EchoPulse {
+                let pulse = |echo: &PathEcho| EchoPulse {
                     echo: paths.path(&traced, echo),
                     edge: single::view(&paths.plan, &traced.out, traced.back(), echo),
                 };
-                (f, echoes.iter().map(heard).collect())
+                (f, echoes.iter().map(pulse).collect())
             })
             .collect();
         let (c, f0) = (reference.c, reference.f0);
@@ -104,12 +104,12 @@ impl Chain {
 
     /// Field of each echo at each frequency, weighted by the aperture facing `azimuth_rad`.
     fn spectrum(&self, azimuth_rad: f64) -> Vec<(f64, Vec<Complex64>)> {
-        let weighed = |f: f64, heard: &EchoPulse| {
-            let EchoPulse { echo, .. } = heard;
-            Complex64::from_polar(echo.amplitude, echo.phase_rad) * self.beam(f, heard, azimuth_rad)
+        let weighed = |f: f64, pulse: &EchoPulse| {
+            let EchoPulse { echo, .. } = pulse;
+            Complex64::from_polar(echo.amplitude, echo.phase_rad) * self.beam(f, pulse, azimuth_rad)
         };
         let at = |(f, echoes): &(f64, Vec<EchoPulse>)| {
-            (*f, echoes.iter().map(|heard| weighed(*f, heard)).collect())
+            (*f, echoes.iter().map(|pulse| weighed(*f, pulse)).collect())
         };
         self.echoes.iter().map(at).collect()
     }
@@ -118,7 +118,7 @@ impl Chain {
     /// the largest there.
     fn peaks(&self, azimuth_rad: f64) -> Vec<(f64, f64, bool)> {
         let spectrum = self.spectrum(azimuth_rad);
-        let lengths: Vec<f64> = self.echoes[0].1.iter().map(|heard| heard.echo.length_m).collect();
+        let lengths: Vec<f64> = self.echoes[0].1.iter().map(|pulse| pulse.echo.length_m).collect();
         let middle = &spectrum[spectrum.len() / 2].1;
         let Some(first) = lengths.first() else { return Vec::new() };
         let count = ((lengths[lengths.len() - 1] - first + 0.1) / STEP_M) as usize;
@@ -131,7 +131,7 @@ impl Chain {
             .collect();
         (1..count)
             .filter(|&i| heights[i] > heights[i - 1] && heights[i] >= heights[i + 1])
-            .filter(|&i| heights[i] > 0.01 && stands_out(&heights, i))
+            .filter(|&i| heights[i] > 0.01 && is_prominent(&heights, i))
             .map(|i| {
                 let strongest = (0..lengths.len())
                     .filter(|&e| (lengths[e] - place(i)).abs() < 0.015)
@@ -170,7 +170,7 @@ fn taper(off_rad: f64) -> f64 {
 }
 
 /// The reference lists maxima whose prominence is more than 0.002 and 3 %.
-fn stands_out(heights: &[f64], i: usize) -> bool {
+fn is_prominent(heights: &[f64], i: usize) -> bool {
     let valley = |side: &mut dyn Iterator<Item = &f64>| {
         side.take_while(|&&h| h <= heights[i]).copied().fold(f64::INFINITY, f64::min)
     };

@@ -123,8 +123,8 @@ fn images_by_the_floor() {
             assert!(off < 0.003, "{z_m}: {echo:?} {exact} {off}");
             let floors = usize::from(out_below) + usize::from(back_below);
             assert_eq!(reflectors(&echo.path), vec![Reflector::Floor; floors]);
-            let met: Vec<_> = echo.path.mechanisms().collect();
-            assert_eq!(met[usize::from(out_below)], top_of(0), "{echo:?}");
+            let mechanisms: Vec<_> = echo.path.mechanisms().collect();
+            assert_eq!(mechanisms[usize::from(out_below)], top_of(0), "{echo:?}");
         }
     }
     // On the floor itself the ranger is its own image: four times the edge's field.
@@ -168,8 +168,9 @@ fn slantwise_at_a_high_wall() {
         for echo in found {
             assert!((echo.amplitude / amplitude - 1.0).abs() < 0.03, "{echo:?} {amplitude}");
             let (floor, high) = (Mechanism::Reflection(floor), Mechanism::Reflection(high));
-            let met: Vec<_> = echo.path.mechanisms().filter(|met| *met != floor).collect();
-            assert!(met == [top_of(1), high] || met == [high, top_of(1)], "{echo:?}");
+            let mechanisms: Vec<_> =
+                echo.path.mechanisms().filter(|mechanism| *mechanism != floor).collect();
+            assert!(mechanisms == [top_of(1), high] || mechanisms == [high, top_of(1)], "{echo:?}");
             assert_eq!(echo.path.order(), 1 + floors);
         }
     }
@@ -202,7 +203,7 @@ fn furnished() -> Scene {
 }
 
 /// Length, amplitude and phase of echoes by level edges, and both directions in a frame.
-fn answers(echoes: &[EchoPath], turn: impl Fn(f64) -> f64) -> Vec<[f64; 7]> {
+fn summaries(echoes: &[EchoPath], turn: impl Fn(f64) -> f64) -> Vec<[f64; 7]> {
     let mut found: Vec<[f64; 7]> = echoes
         .iter()
         .filter(|echo| is_by_level_edge(echo) && echo.amplitude > 2e-3)
@@ -237,14 +238,14 @@ fn in_the_room(z_m: f64) -> Settings {
 #[test]
 fn ends_are_interchangeable() {
     let paths = Paths::new(&furnished(), in_the_room(0.77));
-    let there = answers(&paths.enumerate_between(T, R).expect("few paths"), |angle| angle);
+    let there = summaries(&paths.enumerate_between(T, R).expect("few paths"), |angle| angle);
     let mut back = paths.enumerate_between(R, T).expect("few paths");
     for echo in &mut back {
         std::mem::swap(&mut echo.departure_rad, &mut echo.arrival_rad);
         echo.rise_rad.reverse();
     }
     assert!(there.len() > 30, "{}", there.len());
-    assert_same(&there, &answers(&back, |angle| angle));
+    assert_same(&there, &summaries(&back, |angle| angle));
     // From one place each path arrives in both directions.
     let here = paths.enumerate(T).expect("few paths");
     let mut reverse = here.clone();
@@ -252,14 +253,14 @@ fn ends_are_interchangeable() {
         std::mem::swap(&mut echo.departure_rad, &mut echo.arrival_rad);
         echo.rise_rad.reverse();
     }
-    assert_same(&answers(&here, |angle| angle), &answers(&reverse, |angle| angle));
+    assert_same(&summaries(&here, |angle| angle), &summaries(&reverse, |angle| angle));
 }
 
 #[test]
 fn rigid_motions_change_nothing() {
     let plain =
         Paths::new(&furnished(), in_the_room(0.77)).enumerate_between(T, R).expect("few paths");
-    let plain = answers(&plain, |angle| angle);
+    let plain = summaries(&plain, |angle| angle);
     let frame = DVec2::from_angle(0.83);
     let moved = |p: DVec2| DVec2::new(7.0, -3.0) + frame.rotate(p);
     let mirrored = |p: DVec2| DVec2::new(-p.x, p.y);
@@ -272,8 +273,8 @@ fn rigid_motions_change_nothing() {
             .enumerate_between(place(T), place(R))
             .expect("few paths")
     };
-    assert_same(&plain, &answers(&at(&moved), |angle| angle - 0.83));
-    assert_same(&plain, &answers(&at(&mirrored), |angle| PI - angle));
+    assert_same(&plain, &summaries(&at(&moved), |angle| angle - 0.83));
+    assert_same(&plain, &summaries(&at(&mirrored), |angle| PI - angle));
     // Upside down, too.
     let mut room = furnished();
     for limits in room.walls.iter_mut().filter_map(|wall| wall.z_m.as_mut()) {
@@ -285,7 +286,7 @@ fn rigid_motions_change_nothing() {
     for echo in &mut turned {
         echo.rise_rad = echo.rise_rad.map(|rise| -rise);
     }
-    assert_same(&plain, &answers(&turned, |angle| angle));
+    assert_same(&plain, &summaries(&turned, |angle| angle));
 }
 
 /// Each edge of a plate that floats at the ranger's height returns an echo, at the same time.
@@ -376,8 +377,8 @@ fn passing_over_is_continuous() {
     let mut room = scene(&[[-9.0, 0.6, 9.0, 0.6], [-9.0, 1.5, 9.0, 1.5]]);
     room.floor_z_m = Some(0.0);
     room.walls[0].z_m = Some([0.0, 0.3]);
-    let [here, beside] = [DVec2::ZERO, DVec2::new(0.5, -0.35)];
-    let apart = jumps(&room, [0.3137, 1.4], [here, beside]);
+    let [here, there] = [DVec2::ZERO, DVec2::new(0.5, -0.35)];
+    let apart = jumps(&room, [0.3137, 1.4], [here, there]);
     assert!(apart.len() >= 2, "{apart:?}");
     for (z_m, alone, jump) in apart {
         assert!(alone > 0.3 && jump < 1e-3, "a jump of {jump} for {alone} at {z_m}");

@@ -134,8 +134,8 @@ fn floor_and_ceiling() {
     let apart_m = T.distance(R);
     let found = |echoes: Vec<EchoPath>| -> Vec<f64> {
         let upright = echoes.iter().filter(|echo| {
-            let met = reflectors(&echo.path);
-            met.iter().all(|met| matches!(met, Reflector::Floor | Reflector::Ceiling))
+            let surfaces = reflectors(&echo.path);
+            surfaces.iter().all(|surface| matches!(surface, Reflector::Floor | Reflector::Ceiling))
         });
         upright.map(|echo| echo.length_m).collect()
     };

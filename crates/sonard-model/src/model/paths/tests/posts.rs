@@ -21,9 +21,9 @@ fn field(paths: &Paths, ends: [DVec2; 2], length_m: f64) -> Complex64 {
     let k = paths.plan.settings.wave_number_per_m;
     let echoes = paths.enumerate_between(ends[0], ends[1]).expect("few paths");
     let echo = |echo: &EchoPath| {
-        let beside = length_m / echo.length_m;
+        let relative = length_m / echo.length_m;
         Complex64::from_polar(
-            beside * echo.amplitude,
+            relative * echo.amplitude,
             echo.phase_rad + k * (length_m - echo.length_m),
         )
     };
@@ -48,8 +48,8 @@ fn field_matches_exact_series() {
             let between_rad = transmitter.angle_to(receiver);
             let by_m = 0.6 + 0.9;
             let round = series(radius_m, k, [0.6, 0.9], between_rad);
-            let beside = straight_m / by_m * Complex64::cis(k * (straight_m - by_m));
-            worst = worst.max((found - 1.0 - beside * round).norm());
+            let relative = straight_m / by_m * Complex64::cis(k * (straight_m - by_m));
+            worst = worst.max((found - 1.0 - relative * round).norm());
         }
     }
     assert!(worst < 0.01, "{worst}");

@@ -81,7 +81,7 @@ fn materials_of_floor_and_ceiling() {
     let echoes =
         Paths::new(&room, settings.clone()).enumerate(DVec2::new(0.4, 0.25)).expect("few paths");
     for echo in &echoes {
-        let gains = echo.path.reflectors().map(|met| match met {
+        let gains = echo.path.reflectors().map(|reflector| match reflector {
             Reflector::Floor => 0.5,
             Reflector::Ceiling => 0.81,
             _ => 0.8,
@@ -102,8 +102,9 @@ fn materials_of_floor_and_ceiling() {
         .enumerate(DVec2::new(0.4, 0.25))
         .expect("few paths");
     let strong = all.iter().filter(|echo| {
-        let hits =
-            |level| reflectors(&echo.path).iter().filter(|met| **met == level).count() as i32;
+        let hits = |level| {
+            reflectors(&echo.path).iter().filter(|reflector| **reflector == level).count() as i32
+        };
         let left = 0.5_f64.powi(hits(Reflector::Floor)) * 0.81_f64.powi(hits(Reflector::Ceiling));
         echo.amplitude * left >= 0.02
     });
@@ -118,7 +119,7 @@ fn tilted_beam_finds_the_floor() {
     room.floor_z_m = Some(0.0);
     let sensor = Sensor::preset("senscomp-6500").expect("a preset");
     let beam = BeamPattern::new(&sensor, 343.99);
-    let heard = |tilt_rad: f64, walls: &[Reflector]| {
+    let amplitude_at = |tilt_rad: f64, walls: &[Reflector]| {
         let settings = Settings { tilt_rad, floor: 1e-6, ..at_height(h) };
         let engine = PathEngine::new(&room, beam.clone(), None, settings);
         let place = engine.arrivals_at(DVec2::ZERO).expect("few paths");
@@ -127,13 +128,13 @@ fn tilted_beam_finds_the_floor() {
     };
     let (wall, corner) = ([Reflector::Wall(0)], [Reflector::Wall(0), Reflector::Floor]);
     let below = (h / d).atan();
-    assert!((heard(0.0, &wall) - 1.0).abs() < 1e-9);
-    assert!((heard(0.0, &corner) - beam.one_way(below).powi(2)).abs() < 1e-9);
-    assert!((heard(-0.05, &corner) - beam.one_way(below - 0.05).powi(2)).abs() < 1e-9);
-    assert!((heard(-0.05, &wall) - beam.one_way(0.05).powi(2)).abs() < 1e-9);
-    assert_eq!(heard(0.0, &[Reflector::Floor]), 0.0);
-    assert!((heard(-FRAC_PI_2, &[Reflector::Floor]) - 1.0).abs() < 1e-9);
-    assert!(heard(-FRAC_PI_4, &[Reflector::Floor]) < 0.01);
+    assert!((amplitude_at(0.0, &wall) - 1.0).abs() < 1e-9);
+    assert!((amplitude_at(0.0, &corner) - beam.one_way(below).powi(2)).abs() < 1e-9);
+    assert!((amplitude_at(-0.05, &corner) - beam.one_way(below - 0.05).powi(2)).abs() < 1e-9);
+    assert!((amplitude_at(-0.05, &wall) - beam.one_way(0.05).powi(2)).abs() < 1e-9);
+    assert_eq!(amplitude_at(0.0, &[Reflector::Floor]), 0.0);
+    assert!((amplitude_at(-FRAC_PI_2, &[Reflector::Floor]) - 1.0).abs() < 1e-9);
+    assert!(amplitude_at(-FRAC_PI_4, &[Reflector::Floor]) < 0.01);
 }
 
 /// Without heights nothing changes, at any height of the ranger.
@@ -153,28 +154,28 @@ fn low_wall_blocks_below_its_edge() {
     let mut room = scene(&[[-9.0, 0.6, 9.0, 0.6], [-9.0, 1.5, 9.0, 1.5]]);
     room.walls[0].z_m = Some([0.0, 0.3]);
     let (low, high, floor) = (Reflector::Wall(0), Reflector::Wall(1), Reflector::Floor);
-    let met = |room: &Scene, z_m: f64| {
+    let paths_from = |room: &Scene, z_m: f64| {
         let settings = Settings { max_order: Some(2), ..at_height(z_m) };
-        let mut met: Vec<_> = Paths::new(room, settings)
+        let mut paths_from: Vec<_> = Paths::new(room, settings)
             .enumerate(DVec2::ZERO)
             .expect("few paths")
             .into_iter()
             .map(|echo| reflectors(&echo.path).to_vec())
             .collect();
-        met.sort();
-        met
+        paths_from.sort();
+        paths_from
     };
     // All sound at the ranger's height.
-    assert_eq!(met(&room, 0.2), [[low]]);
-    assert_eq!(met(&room, 0.4), [[high]]);
+    assert_eq!(paths_from(&room, 0.2), [[low]]);
+    assert_eq!(paths_from(&room, 0.4), [[high]]);
     // With a floor, the path by floor and wall hits the wall at its foot.
     room.floor_z_m = Some(0.0);
     let low_again = vec![low, floor];
-    assert_eq!(met(&room, 0.2), [vec![low], low_again.clone(), vec![floor]]);
+    assert_eq!(paths_from(&room, 0.2), [vec![low], low_again.clone(), vec![floor]]);
     // From 0.4 the corner of low wall and floor is visible, and the high one's is hidden.
-    assert_eq!(met(&room, 0.4), [low_again, vec![high], vec![floor]]);
+    assert_eq!(paths_from(&room, 0.4), [low_again, vec![high], vec![floor]]);
     // From 0.7 the path to the far corner and back is at 0.42 over the low wall.
-    let all = met(&room, 0.7);
+    let all = paths_from(&room, 0.7);
     assert!(all.contains(&vec![high, floor]), "{all:?}");
 }
 

@@ -122,7 +122,7 @@ impl Sketch {
                 let [a, b] = self.walls[wall].map(|end| match end {
                     At::Corner(corner) if hand.is_shaky => self.corners[corner],
                     At::Corner(corner) => corners[corner],
-                    At::Wall(..) => unreachable!("partitions stand on outer walls"),
+                    At::Wall(..) => unreachable!("partitions end on outer walls"),
                 });
                 a.lerp(b, share) + if hand.is_shaky { off() } else { DVec2::ZERO }
             }

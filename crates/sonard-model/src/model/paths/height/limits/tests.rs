@@ -50,16 +50,16 @@ fn climbs_match_brute_force() {
         let heights = heights(place);
         for stretch in [[-0.1, 0.15], [0.35, 0.5], [0.9, 1.1], [-0.3, -0.2]] {
             let spans = heights.unfolded([stretch], highest_m);
-            let mut stands = 0;
+            let mut count = 0;
             for step in -3999..4000 {
                 let climb_m = 1e-3 * f64::from(step) + 3e-4;
                 let z_m = heights.folded_m(0.4 + climb_m);
                 let is_there = stretch[0] <= z_m && z_m <= stretch[1];
-                stands += usize::from(is_there);
+                count += usize::from(is_there);
                 let is_in = spans.iter().any(|[from, to]| (*from..=*to).contains(&climb_m));
                 assert_eq!(is_there, is_in, "{place:?} {stretch:?} {climb_m}");
             }
-            assert!(stands > 90, "{place:?} {stretch:?}: {stands}");
+            assert!(count > 90, "{place:?} {stretch:?}: {count}");
         }
     }
 }
