@@ -107,7 +107,7 @@ impl ArrayModel {
         Ok(ArrayAtPose { model: self, pose, own })
     }
 
-    /// Returns the array.
+    /// Returns the array of rangers.
     #[must_use]
     pub const fn array(&self) -> &Arc<RangerArray> {
         &self.array
@@ -163,7 +163,7 @@ impl Crosstalk {
 }
 
 impl ArrayAtPose<'_> {
-    /// Returns the array.
+    /// Returns the array of rangers.
     #[must_use]
     pub fn array(&self) -> &RangerArray {
         &self.model.array

@@ -42,7 +42,7 @@ pub(super) fn crosstalk_slots(receiver: &Receiver, absorption_np_per_m: f64, slo
 pub(super) struct OtherFirings<'a> {
     /// Engine for sufficiently long paths.
     pub(super) engine: &'a PathEngine,
-    /// Receiving ranger.
+    /// Pose of the receiving ranger.
     pub(super) receiver: TransducerPose,
     pub(super) sound_speed_m_s: f64,
     /// Length of the receive window there and back, metres.

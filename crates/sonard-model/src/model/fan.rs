@@ -59,7 +59,7 @@ pub struct FanSettings {
     pub spacing_rad: f64,
     /// Half the width of the transducer's face, metres.
     pub half_face_m: f64,
-    /// Wavelength, metres.
+    /// Wavelength of the carrier, metres.
     pub wavelength_m: f64,
     /// Absorption of the air, decibels per metre.
     pub absorption_db_per_m: f64,

@@ -41,7 +41,7 @@ pub(super) struct ReachEstimate(AtomicU64);
 /// Arrivals between a transmitter and a receiver, as far as they were requested.
 pub(super) struct LazyArrivals<'a> {
     engine: &'a dyn Engine,
-    /// Transmitter and receiver.
+    /// Positions of transmitter and receiver (world, metres).
     at: [DVec2; 2],
     max_path_m: f64,
     /// Steps from near to far.
@@ -111,7 +111,7 @@ impl<'a> LazyArrivals<'a> {
         Self { engine, at, max_path_m, steps, whole, first, enough, needed_m, expected }
     }
 
-    /// Returns all arrivals.
+    /// Returns all arrivals, from a complete search.
     pub(super) fn whole(&self) -> Result<&(dyn Arrivals + 'a), TooCostly> {
         let [transmitter, receiver] = self.at;
         let find = || {

@@ -274,7 +274,7 @@ impl<'a> ObservationPoint<'a> {
 /// Arrivals of a firing, as input for receivers.
 pub struct FiringArrivals<'a> {
     firing: DirectedArrivals<'a>,
-    /// Shortest path first.
+    /// Arrivals, shortest path first.
     arrivals: &'a [PulseArrival],
     /// Length there and back up to which the arrivals are known, metres.
     reach_m: f64,

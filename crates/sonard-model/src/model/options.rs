@@ -9,7 +9,7 @@ mod keys;
 
 pub use keys::{ForeignOption, OptionKeys};
 
-/// Simulation engine.
+/// Simulation engine that finds the echoes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[cfg_attr(feature = "clap", derive(clap::ValueEnum))]
 #[serde(rename_all = "snake_case")]

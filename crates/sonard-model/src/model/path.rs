@@ -36,7 +36,7 @@ pub enum Mechanism {
     Diffraction(Diffractor),
     /// Diffuse scattering by the roughness of a wall.
     Scattering {
-        /// Index into `scene.walls`.
+        /// Index of the wall in `scene.walls`.
         wall: u32,
     },
     /// Return from the face of the transducer, which sends an echo out once more.
@@ -46,9 +46,9 @@ pub enum Mechanism {
 /// A surface of the scene that reflects.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Reflector {
-    /// `scene.walls[i]`.
+    /// A wall: `scene.walls[i]`.
     Wall(u32),
-    /// `scene.cylinders[i]`.
+    /// A cylinder: `scene.cylinders[i]`.
     Cylinder(u32),
     /// The floor of a scene with heights.
     Floor,
@@ -63,14 +63,14 @@ pub enum Diffractor {
     Upright(Edge),
     /// A level edge of a wall that ends below the ceiling or above the floor.
     Level {
-        /// Index into `scene.walls`.
+        /// Index of the wall in `scene.walls`.
         wall: u32,
         /// `true` for the wall's upper edge, `false` for its lower edge.
         is_upper: bool,
     },
     /// A thin cylinder, which scatters as a whole.
     Post {
-        /// Index into `scene.cylinders`.
+        /// Index of the cylinder in `scene.cylinders`.
         cylinder: u32,
     },
 }
@@ -78,7 +78,7 @@ pub enum Diffractor {
 /// An end of a wall.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Edge {
-    /// Index into `scene.walls`.
+    /// Index of the wall in `scene.walls`.
     pub wall: u32,
     /// `true` for end `b`, `false` for end `a`.
     pub at_b: bool,

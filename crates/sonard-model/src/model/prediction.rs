@@ -1,4 +1,4 @@
-//! Predicted readings.
+//! Predicted reading of a firing.
 
 use smallvec::SmallVec;
 

@@ -26,7 +26,7 @@ use settings::{fan_settings, path_settings};
 /// Errors in sensor, scene or options that prevent a simulator.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum ModelError {
-    /// Invalid sensor data.
+    /// The sensor data are invalid.
     #[error("sensor: {0}")]
     Sensor(#[from] SensorError),
     /// A transducer in the floor or above the ceiling.
@@ -37,7 +37,7 @@ pub enum ModelError {
     SensorHeight {
         /// Height of the transducer, metres.
         z_m: f64,
-        /// "floor" or "ceiling".
+        /// Name of the limit: "floor" or "ceiling".
         level: &'static str,
         /// Height of that floor or ceiling, metres.
         level_z_m: f64,
@@ -200,13 +200,13 @@ impl Simulator {
         &self.ranger.beam
     }
 
-    /// Returns the sensor.
+    /// Returns the sensor whose readings are predicted.
     #[must_use]
     pub const fn sensor(&self) -> &Sensor {
         &self.ranger.sensor
     }
 
-    /// Returns the air.
+    /// Returns the air of the scene.
     #[must_use]
     pub const fn air(&self) -> &Air {
         &self.ranger.air
@@ -229,7 +229,7 @@ impl Simulator {
         Some(self.ranger.path_engine(&self.scene, None, settings))
     }
 
-    /// Returns the scene.
+    /// Returns the scene of the predictions.
     #[must_use]
     pub const fn scene(&self) -> &Arc<Scene> {
         &self.scene
@@ -246,7 +246,7 @@ impl Simulator {
         LazyArrivals::new(self.engine.as_ref(), at, 2.0 * receiver.max_range_m, expected)
     }
 
-    /// Returns the options.
+    /// Returns the options of the model.
     #[must_use]
     pub const fn options(&self) -> &Options {
         &self.ranger.options

@@ -66,14 +66,14 @@ pub struct OptionKeys {
 pub struct ForeignOption {
     /// Name of the setting, as in [`OptionKeys`].
     pub option: &'static str,
-    /// Selected engine.
+    /// Engine that was selected.
     pub engine: EngineKind,
     /// Engines with this setting.
     pub of: &'static [EngineKind],
 }
 
 impl ForeignOption {
-    /// Suggested correction.
+    /// Returns a suggested correction.
     #[must_use]
     pub fn help(&self) -> String {
         let of: Vec<_> = self.of.iter().map(|engine| engine.name()).collect();

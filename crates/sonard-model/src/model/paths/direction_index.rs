@@ -12,7 +12,7 @@ const BINS: usize = 360;
 /// Echoes by the azimuth of their maximum amplitude.
 #[derive(Debug, Default)]
 pub(crate) struct DirectionIndex {
-    /// Sorted by bin.
+    /// Entries, sorted by bin.
     entries: Vec<DirectionEntry>,
     /// Index in `entries` where each bin begins, and the end of the last.
     bins: Vec<u32>,

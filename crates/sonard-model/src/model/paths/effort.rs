@@ -16,7 +16,7 @@ pub(crate) struct Bound {
     pub(crate) bytes: u64,
 }
 
-/// About two seconds.
+/// Default limit: about two seconds.
 pub(crate) const BOUND: Bound = Bound { steps: 50_000_000, bytes: 300_000_000 };
 
 /// Effort of a search so far.

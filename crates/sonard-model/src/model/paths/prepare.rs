@@ -30,7 +30,7 @@ pub struct Paths {
 }
 
 impl Paths {
-    /// Prepares a scene.
+    /// Prepares a scene with the settings of the search.
     #[must_use]
     pub fn new(scene: &Scene, settings: Settings) -> Self {
         let drawn = scene.floor_plan();

@@ -14,7 +14,7 @@ use crate::geometry::DVec2;
 /// The variants of [`Via`](super::echo::Via) number its parts.
 #[derive(Debug)]
 pub(super) struct Traced {
-    /// Transmitter and receiver.
+    /// Positions of transmitter and receiver (world, metres).
     pub(super) ends: [DVec2; 2],
     /// Rays from the transmitter.
     pub(super) out: Rays,

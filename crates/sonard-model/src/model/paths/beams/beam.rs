@@ -1,4 +1,4 @@
-//! Beams and rays.
+//! Beams, rays, and the geometry of a reflected beam.
 
 use crate::{
     geometry::{DVec2, Mirror},

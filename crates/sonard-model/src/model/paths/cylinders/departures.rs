@@ -1,4 +1,4 @@
-//! Directions of departure.
+//! Directions of departure of a half-path.
 
 use crate::geometry::{DVec2, turn_rad, wrap_pi};
 

@@ -18,7 +18,7 @@ pub(crate) const MIN_COSINE: f64 = 1e-9;
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Front {
     pub(crate) origin: DVec2,
-    /// Unit vector.
+    /// Direction of the ray, a unit vector.
     pub(crate) along: DVec2,
     /// Length of the path so far, metres.
     pub(crate) length_m: f64,

@@ -26,7 +26,7 @@ pub(crate) struct Tracer<'a> {
     pub(crate) plan: &'a TracingPlan,
     pub(crate) view: &'a LitCylinder,
     pub(crate) surfaces: &'a [Reflector],
-    /// The same surfaces, with consecutive walls combined.
+    /// `surfaces` with consecutive walls combined.
     hops: SmallVec<[Hop; 4]>,
 }
 

@@ -73,7 +73,7 @@ pub(crate) struct LevelDiffraction {
 pub(crate) struct LevelEdgeBeams<'a> {
     start: DVec2,
     beams: &'a Beams,
-    /// Sorted by wall.
+    /// Illuminated parts, sorted by wall.
     lit: Vec<LitWall>,
 }
 
@@ -151,7 +151,7 @@ fn is_same(
 /// Pairs beams at one level edge.
 struct LevelSearch<'a> {
     scene: LevelScene<'a>,
-    /// Transmitter and receiver.
+    /// Beams from transmitter and receiver.
     ends: [&'a LevelEdgeBeams<'a>; 2],
     edge: LevelEdge,
 }

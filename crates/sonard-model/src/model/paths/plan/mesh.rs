@@ -19,7 +19,7 @@ pub(crate) struct Mesh {
     across: Vec<[u32; 3]>,
     /// Walls above or below another one at the same place, by [`between`] its ends.
     stacked: HashMap<[u32; 2], Vec<u32>>,
-    /// One triangle at each point.
+    /// Index of a triangle at each point.
     near: RTree<GeomWithData<[f64; 2], u32>>,
 }
 

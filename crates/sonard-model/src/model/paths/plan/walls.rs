@@ -1,4 +1,4 @@
-//! Walls as mirrors.
+//! Walls as mirrors: reflectance, loss and scattering.
 
 use crate::{
     geometry::{DVec2, Mirror},

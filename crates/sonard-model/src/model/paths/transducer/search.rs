@@ -60,7 +60,7 @@ impl SequenceSearch {
         }
     }
 
-    /// Returns all sequences.
+    /// Runs the search and returns all sequences.
     pub(crate) fn run(mut self) -> Vec<MultipleEcho> {
         for (at, leaving) in self.weights.clone().into_iter().enumerate() {
             let first = self.weights.len() + at;
