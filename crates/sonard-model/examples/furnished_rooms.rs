@@ -1,5 +1,5 @@
-//! Cost of a scan in random furnished rooms: `cargo run --release -p sonard-model --example
-//! furnished_rooms -- COUNT SEED [FIRST]`.
+//! Cost of a scan in random furnished rooms:
+//! `cargo run --release -p sonard-model --example furnished_rooms -- COUNT SEED [FIRST]`.
 //!
 //! Each room has four or six walls, a floor and a ceiling, low and high boxes at any angle, hanging
 //! shelves, tables on legs, and surfaces that reflect from half to 0.99 of the amplitude. From a

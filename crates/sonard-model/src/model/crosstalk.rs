@@ -1,9 +1,10 @@
 //! Crosstalk: reception of other firings by a ranger of an array.
 //!
-//! A sound that left `before` seconds earlier and has run `L` arrives as an echo of length `L - c
-//! before` would. The current gain is that of the echo, and compensates its spreading, not the
-//! larger spreading of the sound: relative to its own amplitude the sound is weaker by `(L - c
-//! before) / L`. Both bursts begin with the same phase, so the carriers also add up by that length.
+//! A sound that left `before` seconds earlier and has run `L` arrives as an echo of length
+//! `L - c before` would. The current gain is that of the echo, and compensates its spreading, not
+//! the larger spreading of the sound: relative to its own amplitude the sound is weaker by
+//! `(L - c before) / L`. Both bursts begin with the same phase, so the carriers also add up by that
+//! length.
 
 use super::{
     cost::TooCostly,
@@ -25,12 +26,12 @@ const MAX_SLOTS: usize = 64;
 /// perfect wall, can still pass a receiver's threshold. Each slot is `slot_m` of path earlier.
 pub(super) fn crosstalk_slots(receiver: &Receiver, absorption_np_per_m: f64, slot_m: f64) -> usize {
     let [from_us, until_us] = [receiver.blanking_us, receiver.window_us()];
-    let is_detectable = |turns: &usize| {
+    let is_detectable = |slots: &usize| {
         (0..=WINDOW_SAMPLES).any(|sample| {
             let share = f64::from(sample) / f64::from(WINDOW_SAMPLES);
             let at_us = from_us + share * (until_us - from_us);
             let apparent_m = at_us * 1e-6 * receiver.sound_speed_m_s;
-            let length_m = apparent_m + *turns as f64 * slot_m;
+            let length_m = apparent_m + *slots as f64 * slot_m;
             let amplitude = apparent_m / length_m * (-absorption_np_per_m * length_m).exp();
             amplitude >= receiver.threshold_at(at_us)
         })
@@ -64,7 +65,7 @@ impl<'a> OtherFirings<'a> {
         self.firings.is_empty()
     }
 
-    /// Sound received before an echo of a length there and back, metres, arrives.
+    /// Returns the sound of the other firings that arrives within a length there and back, metres.
     fn within(&self, length_m: f64) -> Result<Vec<StraySound<'a>>, TooCostly> {
         let received = |&(firing, transmitter): &(OtherFiring, TransducerPose)| {
             let ahead_m = firing.before_us * 1e-6 * self.sound_speed_m_s;
@@ -77,19 +78,19 @@ impl<'a> OtherFirings<'a> {
         self.firings.iter().map(received).collect()
     }
 
-    /// Finds the result of a firing. `listen` receives the sound of others up to a length, metres,
+    /// Finds the result of a firing. `predict` receives the sound of others up to a length, metres,
     /// and returns its result together with the length up to which it depends on that sound.
     pub(super) fn resolve<T>(
         &self,
         mut needed_m: f64,
-        mut listen: impl FnMut(&MixedArrivals<'_>) -> Result<(T, f64), TooCostly>,
+        mut predict: impl FnMut(&MixedArrivals<'_>) -> Result<(T, f64), TooCostly>,
     ) -> Result<T, TooCostly> {
         loop {
             let known_m = if needed_m < self.window_m { needed_m } else { f64::INFINITY };
             let strays = self.within(known_m.min(self.window_m))?;
-            let (received, then_m) = listen(&MixedArrivals { strays: &strays, known_m })?;
+            let (result, then_m) = predict(&MixedArrivals { strays: &strays, known_m })?;
             if then_m <= known_m {
-                return Ok(received);
+                return Ok(result);
             }
             needed_m = f64::INFINITY;
         }
@@ -181,8 +182,8 @@ mod tests {
     use super::*;
     use crate::acoustics::{Gain, Sensor};
 
-    /// Of `n` turns back, of `t` of path each, the strongest sound appears at length `h` where `1 /
-    /// h - 1 / (h + n t)` is the absorption.
+    /// Of `n` turns back, of `t` of path each, the strongest sound appears at length `h` where
+    /// `1 / h - 1 / (h + n t)` is the absorption.
     #[test]
     fn slots_are_limited_by_absorption() {
         let sensor = Sensor {

@@ -74,14 +74,20 @@ pub trait Arrivals: Send + Sync {
     /// the engine finds them.
     fn listen(&self, direction_rad: f64, arrivals: &mut Vec<PulseArrival>);
 
-    /// As [`listen`](Self::listen), limited to arrivals up to a length there and back, in metres.
-    fn listen_within(&self, direction_rad: f64, length_m: f64, arrivals: &mut Vec<PulseArrival>) {
+    /// As [`listen`](Self::listen), limited to arrivals up to a length
+    /// there and back, in metres.
+    fn collect_arrivals_within(
+        &self,
+        direction_rad: f64,
+        length_m: f64,
+        arrivals: &mut Vec<PulseArrival>,
+    ) {
         self.listen(direction_rad, arrivals);
         arrivals.retain(|arrival| arrival.length_m <= length_m);
     }
 
-    /// [`arrival`](Self::arrival) for a result of [`listen_within`](Self::listen_within) with this
-    /// length.
+    /// As [`arrival`](Self::arrival), for a result of
+    /// [`collect_arrivals_within`](Self::collect_arrivals_within) with this length.
     fn arrival_within(
         &self,
         direction_rad: f64,
@@ -91,8 +97,8 @@ pub trait Arrivals: Send + Sync {
         self.arrival(direction_rad, arrival)
     }
 
-    /// [`incident`](Self::incident) for a result of [`listen_within`](Self::listen_within) with
-    /// this length.
+    /// As [`incident`](Self::incident), for a result of
+    /// [`collect_arrivals_within`](Self::collect_arrivals_within) with this length.
     fn incident_within(
         &self,
         direction_rad: f64,
@@ -102,12 +108,13 @@ pub trait Arrivals: Send + Sync {
         self.incident(direction_rad, arrival)
     }
 
-    /// Returns the full description of an arrival that [`listen`](Self::listen) returned for the
-    /// same direction.
+    /// Returns the full description of an arrival that
+    /// [`listen`](Self::listen) returned for the same direction.
     fn arrival(&self, direction_rad: f64, arrival: &PulseArrival) -> Arrival;
 
-    /// Returns the incidence of an arrival that [`listen`](Self::listen) returned for the same
-    /// direction. The full response of the face needs it for each arrival of a firing.
+    /// Returns the incidence of an arrival that [`listen`](Self::listen)
+    /// returned for the same direction. The full response of the face needs it for each arrival of
+    /// a firing.
     fn incident(&self, direction_rad: f64, arrival: &PulseArrival) -> Incident {
         let arrival = self.arrival(direction_rad, arrival);
         let image = match arrival.path.kind() {

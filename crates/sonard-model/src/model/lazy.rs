@@ -75,7 +75,7 @@ pub(super) struct NearArrivals<'a> {
 
 impl Arrivals for NearArrivals<'_> {
     fn listen(&self, direction_rad: f64, arrivals: &mut Vec<PulseArrival>) {
-        self.arrivals.listen_within(direction_rad, self.reach_m, arrivals);
+        self.arrivals.collect_arrivals_within(direction_rad, self.reach_m, arrivals);
     }
 
     fn arrival(&self, direction_rad: f64, arrival: &PulseArrival) -> Arrival {
@@ -127,12 +127,12 @@ impl<'a> LazyArrivals<'a> {
         }
     }
 
-    /// Returns the result of `listen` for the shortest echoes that decide it, and these echoes.
-    /// `listen` receives the arrivals with the length, in metres, up to which all are known, and
+    /// Returns the result of `predict` for the shortest echoes that decide it, and these echoes.
+    /// `predict` receives the arrivals with the length, in metres, up to which all are known, and
     /// also returns the length that would have been enough, if any was.
     pub(super) fn nearest<T>(
         &self,
-        mut listen: impl FnMut(&NearArrivals) -> (T, Option<f64>),
+        mut predict: impl FnMut(&NearArrivals) -> (T, Option<f64>),
     ) -> Result<(T, NearArrivals<'_>), TooCostly> {
         let record = |needed_m: f64| {
             let enough = self.steps.iter().position(|step| step.reach_m > needed_m);
@@ -143,14 +143,14 @@ impl<'a> LazyArrivals<'a> {
         for (at, step) in self.steps.iter().enumerate().skip(begin) {
             let Some(arrivals) = self.reaching(at)? else { break };
             let near = NearArrivals { arrivals, reach_m: step.reach_m };
-            let (result, needed_m) = listen(&near);
+            let (result, needed_m) = predict(&near);
             if let Some(needed_m) = needed_m {
                 record(needed_m);
                 return Ok((result, near));
             }
         }
         let whole = NearArrivals { arrivals: self.whole()?, reach_m: f64::INFINITY };
-        let (result, needed_m) = listen(&whole);
+        let (result, needed_m) = predict(&whole);
         record(needed_m.unwrap_or(f64::INFINITY));
         Ok((result, whole))
     }

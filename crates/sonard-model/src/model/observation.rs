@@ -45,11 +45,11 @@ impl<'a> ObservationPoint<'a> {
     /// When there are more paths than can be found within bounds of work and memory, here and in
     /// all methods below.
     pub fn ping(&self, direction_rad: f64) -> Result<Prediction, TooCostly> {
-        self.listen(self.simulator.receiver(), direction_rad, Latch::First)
+        self.predict(self.simulator.receiver(), direction_rad, Latch::First)
     }
 
     /// Evaluates a firing with any receivers: the simulator's own with other thresholds, for a
-    /// firing of higher or lower sensitivity than usual. The arrivals are found once. `listen` may
+    /// firing of higher or lower sensitivity than usual. The arrivals are found once. `detect` may
     /// be called again with more arrivals, and its last result counts.
     ///
     /// # Errors
@@ -57,9 +57,9 @@ impl<'a> ObservationPoint<'a> {
     pub fn hear<T>(
         &self,
         direction_rad: f64,
-        listen: impl FnMut(&FiringArrivals) -> T,
+        detect: impl FnMut(&FiringArrivals) -> T,
     ) -> Result<T, TooCostly> {
-        self.evaluate_needed(direction_rad, listen).map(|(result, _)| result)
+        self.evaluate_needed(direction_rad, detect).map(|(result, _)| result)
     }
 
     /// Predicts the reading of a firing whose receiver is re-armed after each echo, up to eight
@@ -68,21 +68,21 @@ impl<'a> ObservationPoint<'a> {
     /// # Errors
     /// As [`Self::ping`].
     pub fn ping_rearmed(&self, direction_rad: f64) -> Result<Prediction, TooCostly> {
-        self.listen(self.simulator.receiver(), direction_rad, Latch::Rearmed)
+        self.predict(self.simulator.receiver(), direction_rad, Latch::Rearmed)
     }
 
-    fn listen(
+    fn predict(
         &self,
         receiver: &Receiver,
         direction_rad: f64,
         latch: Latch,
     ) -> Result<Prediction, TooCostly> {
-        self.listen_alone(receiver, direction_rad, latch).map(|(prediction, _)| prediction)
+        self.predict_alone(receiver, direction_rad, latch).map(|(prediction, _)| prediction)
     }
 
     /// Predicts a reading, and returns the length there and back up to which arrivals affect it,
     /// metres.
-    fn listen_alone(
+    fn predict_alone(
         &self,
         receiver: &Receiver,
         direction_rad: f64,
@@ -93,12 +93,12 @@ impl<'a> ObservationPoint<'a> {
         })
     }
 
-    /// Returns the result of `listen` once enough arrivals are known, and the length there and back
+    /// Returns the result of `detect` once enough arrivals are known, and the length there and back
     /// up to which they affect it, metres.
     fn evaluate_needed<T>(
         &self,
         direction_rad: f64,
-        mut listen: impl FnMut(&FiringArrivals) -> T,
+        mut detect: impl FnMut(&FiringArrivals) -> T,
     ) -> Result<(T, f64), TooCostly> {
         let mut arrivals = Vec::with_capacity(USUAL_ARRIVALS);
         self.at(direction_rad, |all| {
@@ -110,7 +110,7 @@ impl<'a> ObservationPoint<'a> {
                     reach_m: near.reach_m,
                     needed_m: Cell::new(Some(0.0)),
                 };
-                let result = listen(&firing);
+                let result = detect(&firing);
                 let needed_m = firing.needed_m.get();
                 ((result, needed_m.unwrap_or(f64::INFINITY)), needed_m)
             })?;
@@ -125,14 +125,14 @@ impl<'a> ObservationPoint<'a> {
         others: &OtherFirings,
     ) -> Result<Prediction, TooCostly> {
         let receiver = self.simulator.receiver();
-        let (alone, needed_m) = self.listen_alone(receiver, direction_rad, Latch::First)?;
+        let (alone, needed_m) = self.predict_alone(receiver, direction_rad, Latch::First)?;
         if others.is_empty() {
             return Ok(alone);
         }
-        others.resolve(needed_m, |mixed| self.listen_among(direction_rad, mixed))
+        others.resolve(needed_m, |mixed| self.predict_among(direction_rad, mixed))
     }
 
-    fn listen_among(
+    fn predict_among(
         &self,
         direction_rad: f64,
         mixed: &MixedArrivals,
@@ -250,7 +250,7 @@ impl<'a> ObservationPoint<'a> {
         self.firing(direction_rad, |firing| firing.from.arrival(direction_rad, arrival))
     }
 
-    /// Calls `visit` with a firing that has all echoes at the transducer's position for a direction.
+    /// Calls `visit` with all arrivals at the transducer's position for a direction.
     fn firing<T>(
         &self,
         direction_rad: f64,
@@ -298,12 +298,12 @@ impl FiringArrivals<'_> {
     }
 
     /// Evaluates receivers that differ from `receiver` in their thresholds only.
-    pub fn listen<T>(&self, receiver: &Receiver, listen: impl FnOnce(&mut Listening) -> T) -> T {
+    pub fn listen<T>(&self, receiver: &Receiver, detect: impl FnOnce(&mut Listening) -> T) -> T {
         let incident = |arrival: &PulseArrival| Some(self.firing.incident(arrival));
         let incident: &dyn Fn(&PulseArrival) -> Option<Incident> =
             if receiver.asks_incidents() { &incident } else { &|_| None };
         let mut listening = receiver.listen(self.reach_m, self.arrivals, incident);
-        let result = listen(&mut listening);
+        let result = detect(&mut listening);
         self.needs(listening.needed_m());
         result
     }

@@ -24,10 +24,10 @@
 //! (wall a first, or wall b first). Beams are therefore closed: a ray within a nanometre of a
 //! border counts as inside, and such an echo is found on both sides with the same length, departure
 //! and arrival. Only one ray leaves in a given direction, so two echoes that agree in all three are
-//! one, and one is kept. The same rule covers joints of collinear walls and all corners of `pi /
-//! m`. An echo at the very end of a wall counts as visible; the echo of the edge, which is minus
-//! half of it there, takes that into account. Corners that are right-angled except for rounded
-//! coordinates are made exact beforehand, with all other repairs of a drawn floor plan
+//! one, and one is kept. The same rule covers joints of collinear walls and all corners of
+//! `pi / m`. An echo at the very end of a wall counts as visible; the echo of the edge, which is
+//! minus half of it there, takes that into account. Corners that are right-angled except for
+//! rounded coordinates are made exact beforehand, with all other repairs of a drawn floor plan
 //! ([`FloorPlan`](crate::scene::FloorPlan)).
 //!
 //! # Pairs
@@ -41,7 +41,8 @@
 //!
 //! Free ends and corners other than `pi / m` diffract sound (`diffraction`): all echoes with one
 //! diffraction and any reflections before and after, and on request
-//! ([`Settings::double_diffraction`]) with two. The strength is that of [`crate::acoustics::edge`].
+//! ([`Settings::double_diffraction`]) with two. The strength is that of
+//! [`crate::acoustics::edge`].
 //!
 //! # Cylinders
 //!
@@ -123,4 +124,4 @@ pub(super) use crosstalk::{CrosstalkPaths, TransducerPose};
 pub use engine::PathEngine;
 pub use interactions::EchoPath;
 pub use prepare::Paths;
-pub use settings::{REPEATED_CONTACTS_ABOVE, Settings, usual_z_m};
+pub use settings::{DEFAULT_REPEATED_CONTACT_RATIO, Settings, usual_z_m};

@@ -110,8 +110,8 @@ fn any_direction(random: &mut impl Rng) -> f64 {
 /// Lengths from each image of the transmitter to the receiver (Allen and Berkley).
 fn lattice(size: DVec2, [transmitter, receiver]: [DVec2; 2], max_path_m: f64) -> Vec<f64> {
     let images = |side: f64, at: f64| {
-        let most = (max_path_m / (2.0 * side)).ceil() as i32 + 1;
-        let all = (-most..=most).flat_map(move |m| {
+        let bound = (max_path_m / (2.0 * side)).ceil() as i32 + 1;
+        let all = (-bound..=bound).flat_map(move |m| {
             let shift = 2.0 * f64::from(m) * side;
             [shift + at, shift - at]
         });
@@ -173,12 +173,12 @@ fn higher_order_only_adds() {
         (WITH_HEIGHTS_AND_LEGS_PAIR, "order heights"),
     ] {
         on_random_worlds(name, kind, |world, random| {
-            let most = random.random_range(0..5);
-            let low = Settings { max_order: Some(most), ..settings() };
+            let bound = random.random_range(0..5);
+            let low = Settings { max_order: Some(bound), ..settings() };
             let up_to: Vec<_> = world
                 .echoes(&settings())
                 .into_iter()
-                .filter(|echo| echo.path.order() <= usize::from(most))
+                .filter(|echo| echo.path.order() <= usize::from(bound))
                 .collect();
             assert_same(&world.echoes(&low), &up_to, &low, AS_IS);
         });

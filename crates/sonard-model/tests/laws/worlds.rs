@@ -9,7 +9,7 @@ use rand_pcg::Pcg64;
 use sonard_model::{
     acoustics::edge::EdgeLaw,
     geometry::{DVec2, distance_to_segment},
-    model::paths::{EchoPath, Paths, REPEATED_CONTACTS_ABOVE, Settings},
+    model::paths::{DEFAULT_REPEATED_CONTACT_RATIO, EchoPath, Paths, Settings},
     scene::{Scene, SceneBuilder},
 };
 
@@ -155,7 +155,7 @@ pub(crate) fn settings() -> Settings {
         max_path_m: 5.0,
         max_order: None,
         floor: 0.01,
-        repeated_contacts_above: REPEATED_CONTACTS_ABOVE,
+        repeated_contacts_above: DEFAULT_REPEATED_CONTACT_RATIO,
         crowded_m: 0.0,
         edge_law: Some(EdgeLaw::Utd),
         double_diffraction: false,

@@ -43,8 +43,8 @@ impl<'a> FanArrivals<'a> {
         let mut candidates: Vec<FanCandidate> = closest.0.into_values().collect();
         // Ties (a corner's two orders) are broken by the surfaces, so that results do not depend on
         // the order of a hash table.
-        candidates.sort_by(|one, other| {
-            one.length_m.total_cmp(&other.length_m).then_with(|| one.key.cmp(&other.key))
+        candidates.sort_by(|first, second| {
+            first.length_m.total_cmp(&second.length_m).then_with(|| first.key.cmp(&second.key))
         });
         let weighings = candidates.iter().map(FanCandidate::weighing).collect();
         Self { fan, position, candidates, weighings }

@@ -1,8 +1,9 @@
 //! Crosstalk: the path search between two transducers, weighted with the beam pattern of each about
 //! its own axis.
 //!
-//! Includes the direct path between both ([`Settings::direct`](super::Settings::direct)), which a
-//! ranger's own echoes do not have. Multiple reflections between the faces of an array are omitted.
+//! Includes the direct path between both ([`Settings::direct`](super::Settings::direct)),
+//! which a ranger's own echoes do not have. Multiple reflections between the faces of an array are
+//! omitted.
 
 use super::{
     engine::PathEngine,
@@ -62,8 +63,8 @@ impl CrosstalkPaths<'_> {
             let [leaving, arriving] = ends.map(|angle| self.engine.beam.one_way(angle));
             let EchoPulse { length_m, phase_rad, gain } = self.found.pulse(index);
             let amplitude = gain * echo.amplitude * leaving * arriving;
-            let most = self.engine.upper_bound(echo.amplitude, amplitude, &ends);
-            (most >= floor).then_some(PulseArrival { length_m, amplitude, phase_rad, index })
+            let bound = self.engine.upper_bound(echo.amplitude, amplitude, &ends);
+            (bound >= floor).then_some(PulseArrival { length_m, amplitude, phase_rad, index })
         })
     }
 

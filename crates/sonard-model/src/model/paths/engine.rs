@@ -146,7 +146,7 @@ impl<'a> PathArrivals<'a> {
                     entry.reach_rad = PI;
                 }
                 let reach_deg = entry.reach_rad.to_degrees();
-                let index = REACHES_DEG.iter().position(|most| reach_deg <= *most);
+                let index = REACHES_DEG.iter().position(|bound| reach_deg <= *bound);
                 entries[index.unwrap_or(REACHES_DEG.len() - 1)].push(entry);
             }
         }
@@ -244,10 +244,15 @@ impl<'a> PathArrivals<'a> {
 
 impl Arrivals for PathArrivals<'_> {
     fn listen(&self, direction_rad: f64, arrivals: &mut Vec<PulseArrival>) {
-        self.listen_within(direction_rad, f64::INFINITY, arrivals);
+        self.collect_arrivals_within(direction_rad, f64::INFINITY, arrivals);
     }
 
-    fn listen_within(&self, direction_rad: f64, length_m: f64, arrivals: &mut Vec<PulseArrival>) {
+    fn collect_arrivals_within(
+        &self,
+        direction_rad: f64,
+        length_m: f64,
+        arrivals: &mut Vec<PulseArrival>,
+    ) {
         arrivals.clear();
         let direction_rad = wrap_pi(direction_rad);
         let FoundEchoes { paths, echoes, .. } = &self.found;

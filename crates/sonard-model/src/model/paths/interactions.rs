@@ -211,15 +211,15 @@ impl Paths {
     fn by_two_edges(&self, traced: &Traced, path: &DoubleDiffraction) -> Contacts {
         let DoubleDiffraction { points: [first, second], leg, out, back } = *path;
         let diffractors = [first, second].map(|point| self.upright_diffractor(point));
-        let [Some(one), Some(other)] = diffractors else { return Contacts::new() };
+        let [Some(a), Some(b)] = diffractors else { return Contacts::new() };
         let (there, here) = (&traced.out, traced.back());
         let between = &self.edge_to_edge.at(&self.plan, first).beams;
         let leg = RayLeg::from(&between.to_edges[leg as usize].1);
-        let mut contacts = there.contacts(&self.plan, there.to_edge(out), one.0);
-        contacts.push(one);
-        contacts.extend(wall_contacts(between, &self.plan, leg, other.0));
-        contacts.push(other);
-        let back = here.contacts(&self.plan, here.to_edge(back), other.0);
+        let mut contacts = there.contacts(&self.plan, there.to_edge(out), a.0);
+        contacts.push(a);
+        contacts.extend(wall_contacts(between, &self.plan, leg, b.0));
+        contacts.push(b);
+        let back = here.contacts(&self.plan, here.to_edge(back), b.0);
         contacts.extend(back.into_iter().rev());
         contacts
     }

@@ -51,24 +51,25 @@ pub(crate) struct TwoWayBound {
     steps: Vec<f64>,
     /// Lower limit of the bound: an echo may also be needed as a part of a multiple echo by the
     /// transducer's face.
-    least: f64,
+    minimum: f64,
 }
 
 impl TwoWayBound {
-    pub(crate) fn new(envelope: &PatternEnvelope, least: f64) -> Self {
+    pub(crate) fn new(envelope: &PatternEnvelope, minimum: f64) -> Self {
         let one_way = &envelope.0;
         // Off the axis by this many steps on one side, and by the rest (rounded down) on the other.
         let best = |apart: usize| {
-            let halves = (0..=apart).map(|one| one_way[one] * one_way[(apart - one).max(1) - 1]);
+            let halves =
+                (0..=apart).map(|first| one_way[first] * one_way[(apart - first).max(1) - 1]);
             halves.fold(0.0, f64::max)
         };
         // A margin of a thousandth in each factor, for values between the samples.
-        Self { steps: (0..ENVELOPE_STEPS).map(|apart| 1.002 * best(apart)).collect(), least }
+        Self { steps: (0..ENVELOPE_STEPS).map(|apart| 1.002 * best(apart)).collect(), minimum }
     }
 
     /// Returns the bound for directions `apart_rad` apart, from 0 to pi.
     pub(crate) fn at(&self, apart_rad: f64) -> f64 {
         let step = (apart_rad / PI * ENVELOPE_STEPS as f64) as usize;
-        self.steps[step.min(ENVELOPE_STEPS - 1)].max(self.least)
+        self.steps[step.min(ENVELOPE_STEPS - 1)].max(self.minimum)
     }
 }

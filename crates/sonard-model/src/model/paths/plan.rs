@@ -44,8 +44,8 @@ pub(crate) struct TracingPlan {
 
 impl TracingPlan {
     /// Returns a copy with a new effort counter, for one search.
-    pub(crate) fn for_search(&self, most: Bound) -> Self {
-        Self { effort: Arc::new(Effort::new(most)), ..self.clone() }
+    pub(crate) fn for_search(&self, bound: Bound) -> Self {
+        Self { effort: Arc::new(Effort::new(bound)), ..self.clone() }
     }
 
     /// Returns a copy for paths up to a length, metres, which is at most the one it was prepared

@@ -6,9 +6,9 @@
 //! conserved, and with `s` towards 0 a mirror remains.
 //!
 //! A patch that fills the solid angle `W` around the ranger, at `b` from its normal, receives the
-//! share `W / (4 pi)` of a source and returns to a receiver at `r` an intensity of `cos b / (pi
-//! r^2)` of that. Relative to a head-on mirror at the same range, `1 / (4 pi (2 r)^2)` of the
-//! source, this is
+//! share `W / (4 pi)` of a source and returns to a receiver at `r` an intensity of
+//! `cos b / (pi r^2)` of that. Relative to a head-on mirror at the same range, `1 / (4 pi (2 r)^2)`
+//! of the source, this is
 //!
 //! ```text
 //! 4 / pi  s R^2  cos b  W.
@@ -69,7 +69,8 @@ pub(super) fn echoes(plan: &TracingPlan, lit: &[LitWall]) -> (Vec<PathEcho>, Vec
     let mut parts: Vec<LitPart> = lit.iter().filter_map(|span| LitPart::new(plan, span)).collect();
     group(&mut parts, &LitPart::surface, 0, &mut |parts| {
         parts.sort_by(|a, b| a.from_m.total_cmp(&b.from_m));
-        for side_by_side in parts.chunk_by(|one, next| (next.from_m - one.to_m).abs() <= TIE_M) {
+        for side_by_side in parts.chunk_by(|first, next| (next.from_m - first.to_m).abs() <= TIE_M)
+        {
             if plan.effort.is_over() {
                 break;
             }
@@ -130,9 +131,9 @@ impl<'a> LitPart<'a> {
 /// head-on. All beams of a surface ([`LitPart::surface`]) have the same result.
 fn is_viable(settings: &Settings, beam: &RayBeam, wall_mirror: &WallMirror, height_m: f64) -> bool {
     let share = share(wall_mirror, 1.0, PATCH_RAD, settings);
-    let most = beam.gain * beam.gain * share.sqrt() * settings.air_gain(2.0 * height_m);
+    let bound = beam.gain * beam.gain * share.sqrt() * settings.air_gain(2.0 * height_m);
     // Patches may be larger than that by rounding.
-    1.001 * most >= settings.floor && 2.0 * height_m <= 1.001 * settings.max_path_m
+    1.001 * bound >= settings.floor && 2.0 * height_m <= 1.001 * settings.max_path_m
 }
 
 /// Calls `each` for groups of items that agree, except for rounding, in all figures from index
@@ -148,7 +149,7 @@ fn group<T, const N: usize>(
     }
     let figure = |item: &T| figures(item)[from];
     items.sort_by(|a, b| figure(a).total_cmp(&figure(b)));
-    let same = |one: &T, next: &T| figure(next) - figure(one) <= TIE_M;
+    let same = |first: &T, next: &T| figure(next) - figure(first) <= TIE_M;
     items.chunk_by_mut(same).for_each(|items| group(items, figures, from + 1, each));
 }
 

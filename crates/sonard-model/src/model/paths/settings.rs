@@ -4,7 +4,7 @@ use crate::acoustics::edge::EdgeLaw;
 
 /// Usual [`Settings::repeated_contacts_above`]: with the weakest 20 dB below the threshold, down to
 /// the threshold itself. In a room with a round body their number grows a hundredfold per 20 dB.
-pub const REPEATED_CONTACTS_ABOVE: f64 = 10.0;
+pub const DEFAULT_REPEATED_CONTACT_RATIO: f64 = 10.0;
 
 /// Limits of the path search, and the physics along paths.
 #[derive(Debug, Clone, PartialEq)]
@@ -16,7 +16,7 @@ pub struct Settings {
     /// Weakest amplitude, before the beam pattern, relative to a head-on, rigid wall.
     pub floor: f64,
     /// Floor, relative to `floor`, of echoes that touch cylinders more than once, or a cylinder and
-    /// an upright edge; see [`REPEATED_CONTACTS_ABOVE`]. 1 treats them like all others.
+    /// an upright edge; see [`DEFAULT_REPEATED_CONTACT_RATIO`]. 1 treats them like all others.
     pub repeated_contacts_above: f64,
     /// Longest path, metres, up to which these echoes are also followed down to `floor`: all
     /// earlier arrivals may still overlap when the receiver opens.
@@ -52,7 +52,7 @@ pub fn usual_z_m(floor_z_m: Option<f64>, ceiling_z_m: Option<f64>) -> f64 {
 
 impl Settings {
     pub(crate) fn allows(&self, order: u16) -> bool {
-        self.max_order.is_none_or(|most| order <= most)
+        self.max_order.is_none_or(|bound| order <= bound)
     }
 
     /// Length of air, metres, that leaves a share `gain` of the amplitude; 0 without absorption.

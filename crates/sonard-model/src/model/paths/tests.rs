@@ -39,7 +39,7 @@ pub(in crate::model) const LOSSLESS: Settings = Settings {
     max_path_m: 20.0,
     max_order: None,
     floor: 1e-4,
-    repeated_contacts_above: REPEATED_CONTACTS_ABOVE,
+    repeated_contacts_above: DEFAULT_REPEATED_CONTACT_RATIO,
     crowded_m: 0.0,
     edge_law: None,
     double_diffraction: false,
@@ -101,9 +101,9 @@ fn polygon(corners: &[DVec2]) -> Scene {
 /// Vector to each image of the source in a box's lattice (Allen and Berkley), in the box's own
 /// frame.
 fn lattice(size: DVec2, at: DVec2, max_path_m: f64) -> Vec<DVec2> {
-    let most = |side: f64| (max_path_m / (2.0 * side)).ceil() as i32 + 1;
+    let bound = |side: f64| (max_path_m / (2.0 * side)).ceil() as i32 + 1;
     let images = |side: f64, at: f64| {
-        (-most(side)..=most(side)).flat_map(move |m| {
+        (-bound(side)..=bound(side)).flat_map(move |m| {
             let shift = 2.0 * f64::from(m) * side;
             [shift, shift - 2.0 * at]
         })

@@ -52,8 +52,8 @@ pub(super) fn path_settings(
         max_path_m: 2.0 * receiver.max_range_m,
         max_order: options.max_order.map(|order| order.try_into().unwrap_or(u16::MAX)),
         floor: receiver.threshold * 10f64.powf(-PATHS_KEPT_DB / 20.0),
-        repeated_contacts_above: paths::REPEATED_CONTACTS_ABOVE,
-        crowded_m: crowded_m(receiver),
+        repeated_contacts_above: paths::DEFAULT_REPEATED_CONTACT_RATIO,
+        crowded_m: unrestricted_m(receiver),
         edge_law: Some(law),
         double_diffraction: options.double_diffraction,
         absorption_np_per_m: absorption_db_per_m(sensor, air, options.lossless) / (20.0 * LOG10_E),
@@ -67,7 +67,7 @@ pub(super) fn path_settings(
 
 /// Length of path at which the first echo can be detected, metres. For a long blanking it is
 /// limited, since near a round body the number of paths multiplies with every metre.
-fn crowded_m(receiver: &Receiver) -> f64 {
+fn unrestricted_m(receiver: &Receiver) -> f64 {
     let opens_us = receiver.blanking_us + receiver.integration_us;
     (opens_us * 1e-6 * receiver.sound_speed_m_s).min(1.0)
 }
@@ -107,7 +107,7 @@ mod tests {
         let preset = Sensor::preset("senscomp-6500").expect("a preset");
         let of = |blanking_us: f64| {
             let sensor = Sensor { blanking_us, integration_us: 60.0, ..preset.clone() };
-            crowded_m(&Receiver::new(&sensor, 340.0))
+            unrestricted_m(&Receiver::new(&sensor, 340.0))
         };
         assert!((of(2380.0) - 0.8296).abs() < 1e-9, "{}", of(2380.0));
         assert_eq!(of(5000.0), 1.0);

@@ -47,9 +47,9 @@ fn room() -> (Vec<Wall>, DVec2) {
 
 /// Beams at which `changed` differs from `meant` by more than `bound_m`.
 fn differing(changed: &[Prediction], meant: &[Prediction], bound_m: f64) -> Vec<usize> {
-    let differs = |(one, other): (&Prediction, &Prediction)| {
-        let apart_m = one.range_m.zip(other.range_m).map(|(a, b)| (a - b).abs());
-        one.status != other.status || apart_m.is_some_and(|apart_m| apart_m > bound_m)
+    let differs = |(first, second): (&Prediction, &Prediction)| {
+        let apart_m = first.range_m.zip(second.range_m).map(|(a, b)| (a - b).abs());
+        first.status != second.status || apart_m.is_some_and(|apart_m| apart_m > bound_m)
     };
     (0..meant.len()).filter(|&beam| differs((&changed[beam], &meant[beam]))).collect()
 }

@@ -2,8 +2,8 @@
 //! tests/peers/full_wave.py): the receiver's first crossing on the sum of all echoes, and the
 //! height of the envelope peak that crosses.
 //!
-//! The figures, reflected and diffracted echoes separately: `cargo test --lib tests::full_wave --
-//! --nocapture`
+//! The figures, reflected and diffracted echoes separately:
+//! `cargo test --lib tests::full_wave -- --nocapture`
 
 use super::{
     reference::{Crossing, Reference, ReferenceScene},

@@ -162,10 +162,10 @@ fn met_round_body(prediction: &Prediction) -> bool {
     reflectors.any(|reflector| matches!(reflector, Reflector::Cylinder(_)))
 }
 
-fn range_differs(one: &Prediction, other: &Prediction, tolerance_m: f64) -> bool {
-    match (one.range_m, other.range_m) {
+fn range_differs(a: &Prediction, b: &Prediction, tolerance_m: f64) -> bool {
+    match (a.range_m, b.range_m) {
         (Some(one_m), Some(other_m)) => (one_m - other_m).abs() > tolerance_m,
-        (one, other) => one.is_some() != other.is_some(),
+        (a, b) => a.is_some() != b.is_some(),
     }
 }
 

@@ -68,7 +68,7 @@ fn trace(set_up: &str) -> (Vec<SeenPeak>, Prediction) {
 }
 
 fn strongest(peaks: &[SeenPeak]) -> &SeenPeak {
-    peaks.iter().max_by(|one, other| one.1.total_cmp(&other.1)).expect("a peak")
+    peaks.iter().max_by(|first, second| first.1.total_cmp(&second.1)).expect("a peak")
 }
 
 /// Figure 2 (a): only the transmission.

@@ -14,7 +14,8 @@ pub(crate) struct RayBeam {
     pub(crate) right: DVec2,
     /// Counter-clockwise border, any length.
     pub(crate) left: DVec2,
-    /// Rotation back to the start's own frame, together with `mirrored`; see [`RayBeam::departure`].
+    /// Rotation back to the start's own frame, together with `mirrored`; see
+    /// [`RayBeam::departure`].
     pub(crate) turn: DVec2,
     /// Product of the reflectances.
     pub(crate) gain: f64,
@@ -206,7 +207,7 @@ mod tests {
         let rotor = DVec2::from_angle(std::f64::consts::PI);
         let behind = beam(10.0, 30.0).reflected(&mirror, rotor);
         assert_eq!((behind.image, behind.order, behind.mirrored), (DVec2::new(7.0, 2.0), 2, true));
-        let off = |one: DVec2, deg: f64| one.distance(2.0 * DVec2::from_angle(deg.to_radians()));
+        let off = |a: DVec2, deg: f64| a.distance(2.0 * DVec2::from_angle(deg.to_radians()));
         assert!(off(behind.right, 150.0) < 1e-12 && off(behind.left, 170.0) < 1e-12, "{behind:?}");
         let left = behind.departure(DVec2::from_angle(160_f64.to_radians()));
         assert!(left.distance(DVec2::from_angle(20_f64.to_radians())) < 1e-12, "{left}");

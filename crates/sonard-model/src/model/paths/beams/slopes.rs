@@ -92,11 +92,11 @@ impl Slopes {
     }
 
     /// Returns the union of two sets.
-    pub(crate) fn union(&mut self, one: u32, other: u32) -> u32 {
-        if one == other || one == ALL_SLOPES || other == ALL_SLOPES {
-            return if one == other { one } else { ALL_SLOPES };
+    pub(crate) fn union(&mut self, a: u32, b: u32) -> u32 {
+        if a == b || a == ALL_SLOPES || b == ALL_SLOPES {
+            return if a == b { a } else { ALL_SLOPES };
         }
-        let both = [self.spans(one), self.spans(other)].concat();
+        let both = [self.spans(a), self.spans(b)].concat();
         self.add(&united(both))
     }
 

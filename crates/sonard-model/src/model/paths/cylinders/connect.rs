@@ -130,9 +130,9 @@ impl<'a> Connector<'a> {
         let is_repeated = out.all[group.half_paths[0] as usize].level > 0;
         let min_m = group.min_m + back.min_m;
         let floor = self.plan.settings.contact_floor(is_repeated, min_m).powi(2);
-        let most = group.max_strength.with(&back.max_strength);
-        most * self.max_pattern_power() >= floor
-            && most * self.pattern_power(&group.departures, &back.departures) >= floor
+        let bound = group.max_strength.with(&back.max_strength);
+        bound * self.max_pattern_power() >= floor
+            && bound * self.pattern_power(&group.departures, &back.departures) >= floor
     }
 
     /// Connects a half-path to others; with `once`, only to those whose number is not smaller.
@@ -151,18 +151,20 @@ impl<'a> Connector<'a> {
         };
         let mut tracer = None;
         for group in groups {
-            let (most, least) = (half_path.strength.with(&group.max_strength), floor(group.min_m));
+            let (bound, min_power) =
+                (half_path.strength.with(&group.max_strength), floor(group.min_m));
             // In any direction: a cheap test before the one that depends on directions.
-            let may_pass = most * self.max_pattern_power() >= least
-                && most * self.pattern_power(&half_path.departures, &group.departures) >= least;
+            let may_pass = bound * self.max_pattern_power() >= min_power
+                && bound * self.pattern_power(&half_path.departures, &group.departures)
+                    >= min_power;
             if !may_pass {
                 continue;
             }
             for &other in group.half_paths.iter().filter(|&&other| !once || other >= number) {
                 let other = &back.all[other as usize];
                 // Sorted by decreasing `x`, so the bound of all later ones decreases too.
-                let most = Strength { x: other.strength.x, ..group.max_strength };
-                if half_path.strength.with(&most) < least {
+                let bound = Strength { x: other.strength.x, ..group.max_strength };
+                if half_path.strength.with(&bound) < min_power {
                     break;
                 }
                 if !self.plan.effort.step(SearchPart::Cylinders, 1) {
@@ -183,8 +185,8 @@ impl<'a> Connector<'a> {
     }
 
     /// Upper bound of the two-way pattern's power for echoes with these departures.
-    fn pattern_power(&self, one: &Departures, other: &Departures) -> f64 {
-        self.bound.map_or(1.0, |bound| bound.at(one.gap_rad(other)).powi(2))
+    fn pattern_power(&self, a: &Departures, b: &Departures) -> f64 {
+        self.bound.map_or(1.0, |bound| bound.at(a.gap_rad(b)).powi(2))
     }
 
     /// Upper bound of the two-way pattern's power over all directions.
@@ -195,12 +197,12 @@ impl<'a> Connector<'a> {
     /// Cheap tests: returns `false` if two half-paths cannot give an echo.
     fn may_connect(&self, out: &HalfPath, back: &HalfPath, floor: f64) -> bool {
         let [[a, b], [c, d]] = [&out.ends, &back.ends];
-        let most = out.strength.with(&back.strength);
+        let bound = out.strength.with(&back.strength);
         a.slope + c.slope < SLACK
             && b.slope + d.slope > -SLACK
-            && most * self.max_pattern_power() >= floor
+            && bound * self.max_pattern_power() >= floor
             && overlap(&out.ends, &back.ends).is_some()
-            && most * self.pattern_power(&out.departures, &back.departures) >= floor
+            && bound * self.pattern_power(&out.departures, &back.departures) >= floor
             && self.plan.settings.allows(out.order + back.order + 1)
     }
 
@@ -210,12 +212,12 @@ impl<'a> Connector<'a> {
         let circle = &self.plan.cylinders.circles[out.half_path.cylinder as usize];
         let gain = out.half_path.gain * back.half_path.gain * circle.gain;
         let (contacts, angle_rad) = stationary_contact(out, back, circle.radius_m)?;
-        let [one, other] = &contacts;
+        let [a, b] = &contacts;
         let off =
             |contact: &Contact| circle.radius_m * contact.slope * (angle_rad - contact.angle_rad);
-        let length_m = one.length_m + off(one) + other.length_m + off(other);
+        let length_m = a.length_m + off(a) + b.length_m + off(b);
         let amplitude = self.amplitude(&contacts, circle, gain);
-        let departures = [out.departure(one.at_rad), back.departure(other.at_rad)];
+        let departures = [out.departure(a.at_rad), back.departure(b.at_rad)];
         let pattern_gain =
             self.bound.map_or(1.0, |bound| bound.at(turn_rad(departures[0], departures[1]).abs()));
         let floor = settings.contact_floor(out.half_path.level > 0, length_m);
@@ -223,7 +225,7 @@ impl<'a> Connector<'a> {
         fits.then_some(ConnectedPair {
             cylinder: out.half_path.cylinder,
             own_reverse: std::ptr::eq(out.half_path, back.half_path),
-            rays: [(out.half_path, one), (back.half_path, other)].map(|(half_path, contact)| {
+            rays: [(out.half_path, a), (back.half_path, b)].map(|(half_path, contact)| {
                 CylinderRay {
                     view: half_path.view,
                     link: half_path.link,
@@ -231,7 +233,7 @@ impl<'a> Connector<'a> {
                 }
             }),
             angle_rad,
-            legs: [out.leg(one.at_rad), back.leg(other.at_rad)],
+            legs: [out.leg(a.at_rad), back.leg(b.at_rad)],
             echo: PathEcho {
                 length_m,
                 amplitude,
@@ -249,12 +251,12 @@ impl<'a> Connector<'a> {
 
     /// Amplitude of an echo with these contacts: `sqrt(L / w)` by the equation of
     /// [`strength`](super::strength), times the losses at surfaces and in air.
-    fn amplitude(&self, [one, other]: &[Contact; 2], circle: &PlanCircle, gain: f64) -> f64 {
-        let length_m = one.length_m + other.length_m;
-        let cosine = 0.5 * (one.cosine + other.cosine);
-        let width_m = one.growth * other.width_m
-            + one.width_m * other.growth
-            + 2.0 * one.width_m * other.width_m / (circle.radius_m * cosine);
+    fn amplitude(&self, [a, b]: &[Contact; 2], circle: &PlanCircle, gain: f64) -> f64 {
+        let length_m = a.length_m + b.length_m;
+        let cosine = 0.5 * (a.cosine + b.cosine);
+        let width_m = a.growth * b.width_m
+            + a.width_m * b.growth
+            + 2.0 * a.width_m * b.width_m / (circle.radius_m * cosine);
         gain * self.plan.settings.air_gain(length_m) * (length_m / width_m).sqrt()
     }
 

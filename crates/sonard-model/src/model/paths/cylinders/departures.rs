@@ -10,9 +10,9 @@ pub(crate) struct Departures {
 }
 
 impl Departures {
-    pub(crate) fn between(one: DVec2, other: DVec2) -> Self {
-        let half_rad = 0.5 * turn_rad(one, other);
-        Self { middle_rad: wrap_pi(one.to_angle() + half_rad), half_rad: half_rad.abs() }
+    pub(crate) fn between(a: DVec2, b: DVec2) -> Self {
+        let half_rad = 0.5 * turn_rad(a, b);
+        Self { middle_rad: wrap_pi(a.to_angle() + half_rad), half_rad: half_rad.abs() }
     }
 
     /// Smallest angle between directions of both intervals, radians.

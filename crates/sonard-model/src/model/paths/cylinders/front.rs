@@ -75,9 +75,9 @@ impl Front {
     }
 
     /// Reflects the front at the outside of a circle, by the mirror equation in the plane of
-    /// incidence (for instance Keller and Lewis 1995): the curvature of the front grows by `2 / (r
-    /// cos i)`. With `width_m` equal on both sides of the surface, `growth` (curvature times width)
-    /// grows by `2 w / (r cos i)`.
+    /// incidence (for instance Keller and Lewis 1995): the curvature of the front grows by
+    /// `2 / (r cos i)`. With `width_m` equal on both sides of the surface, `growth` (curvature
+    /// times width) grows by `2 w / (r cos i)`.
     pub(crate) fn off_circle(&self, circle: &PlanCircle) -> Self {
         let (hit, normal, cosine) = self.onto(circle);
         Self {

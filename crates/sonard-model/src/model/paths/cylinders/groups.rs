@@ -32,11 +32,11 @@ impl HalfPathGroups {
         let keyed =
             |(half_path, index): (&HalfPath, u32)| (key(half_path), half_path.strength.x, index);
         let mut order: Vec<((usize, i64), f64, u32)> = all.iter().zip(0..).map(keyed).collect();
-        order.sort_unstable_by(|one, other| {
-            let by_x = other.1.total_cmp(&one.1);
-            one.0.cmp(&other.0).then(by_x).then(one.2.cmp(&other.2))
+        order.sort_unstable_by(|a, b| {
+            let by_x = b.1.total_cmp(&a.1);
+            a.0.cmp(&b.0).then(by_x).then(a.2.cmp(&b.2))
         });
-        for group in order.chunk_by(|one, other| one.0 == other.0) {
+        for group in order.chunk_by(|a, b| a.0 == b.0) {
             let (cylinder, _) = group[0].0;
             if by_cylinder.len() <= cylinder {
                 by_cylinder.resize_with(cylinder + 1, Vec::new);

@@ -259,13 +259,13 @@ impl<'a> TubeGrower<'a> {
             let [a, b] = self.side_of(tube.triangle, side as usize);
             distance_to_segment(self.target, a, b)
         });
-        let length_m = tube.least(|front| front.length_m);
+        let length_m = tube.min_of(|front| front.length_m);
         let min_m = length_m + left_m;
         if min_m > settings.max_path_m {
             return false;
         }
-        let width_m = tube.least(|front| front.width_m);
-        let growth = tube.least(|front| front.growth);
+        let width_m = tube.min_of(|front| front.width_m);
+        let growth = tube.min_of(|front| front.growth);
         let spread = [length_m, width_m, growth];
         let strength = Strength::new(tube.gain, spread, self.radius_m, &self.plan.settings);
         strength.with(&tube.partner) >= settings.contact_floor(true, min_m).powi(2)

@@ -113,9 +113,10 @@ impl TubeGrower<'_> {
         let borders = [from_rad, to_rad].map(|at| tracer.front(at));
         let middle = tracer.front(0.5 * (from_rad + to_rad));
         let hits = [&borders[0], &borders[1], &middle].map(|front| front.onto(circle));
-        let least =
+        let min_of =
             |of: fn(&Front) -> f64| hits.iter().map(|hit| of(&hit.0)).fold(f64::MAX, f64::min);
-        let spread = [least(|hit| hit.length_m), least(|hit| hit.width_m), least(|hit| hit.growth)];
+        let spread =
+            [min_of(|hit| hit.length_m), min_of(|hit| hit.width_m), min_of(|hit| hit.growth)];
         let strength = Strength::new(tube.gain, spread, self.radius_m, settings);
         let min_m = spread[0] + self.back_m(circle);
         let is_viable = strength.with(&tube.partner) >= settings.contact_floor(true, min_m).powi(2)

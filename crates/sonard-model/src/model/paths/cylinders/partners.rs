@@ -34,8 +34,8 @@ impl Partners {
             }
         }
         let Some(bound) = bound else {
-            let most = own.into_iter().fold(Strength::default(), Strength::max);
-            return Self(vec![most; BINS]);
+            let max_value = own.into_iter().fold(Strength::default(), Strength::max);
+            return Self(vec![max_value; BINS]);
         };
         let width_rad = TAU / BINS as f64;
         let pattern_power: Vec<f64> = (0..=BINS / 2)

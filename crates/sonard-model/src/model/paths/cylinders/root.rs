@@ -124,10 +124,10 @@ mod tests {
     fn no_sign_change_returns_nearer_end() {
         let never = |_: f64| -> (f64, f64) { panic!("nothing to look for") };
         let of = |value: f64| move |_: f64| (value, 1.0);
-        let [one, _] = ends([1.0, 2.0], of(0.5));
+        let [a, _] = ends([1.0, 2.0], of(0.5));
         let [low, _] = ends([1.0, 2.0], of(-3.0));
         let [[_, far], [_, near]] = [3.0, -0.5].map(|value| ends([1.0, 2.0], of(value)));
-        assert_eq!(zero_between([one, far], 1e-9, never), 1.0);
+        assert_eq!(zero_between([a, far], 1e-9, never), 1.0);
         assert_eq!(zero_between([low, near], 1e-9, never), 2.0);
     }
 }

@@ -48,11 +48,11 @@ pub(crate) fn overlap(a: &[Contact; 2], b: &[Contact; 2]) -> Option<AngleOverlap
 /// to the angle where the parabolas cancel. Invariant: the angle stays between `low` and `high`,
 /// which both half-paths reach.
 pub(crate) fn stationary_contact(
-    one: &HalfPathTracer,
-    other: &HalfPathTracer,
+    first: &HalfPathTracer,
+    second: &HalfPathTracer,
     radius_m: f64,
 ) -> Option<([Contact; 2], f64)> {
-    let [a, b] = [&one.half_path.ends, &other.half_path.ends];
+    let [a, b] = [&first.half_path.ends, &second.half_path.ends];
     let AngleOverlap { middles: [middle, others], turn, low, high } = overlap(a, b)?;
     // Cubics through the ends as initial guess.
     let sum = |angle: f64| {
@@ -63,8 +63,8 @@ pub(crate) fn stationary_contact(
     let start = zero_near([sum(low), sum(high)]).max(low).min(high);
     let mut at = [guess(a, start), guess(b, start - turn)];
     for _ in 0..MAX_STEPS {
-        let p = one.contact(at[0], middle);
-        let mut q = other.contact(at[1], others);
+        let p = first.contact(at[0], middle);
+        let mut q = second.contact(at[1], others);
         q.angle_rad += turn;
         let derivatives = [&p, &q].map(|contact| slope_derivative(contact, radius_m));
         let sum = derivatives[0] * p.angle_rad + derivatives[1] * q.angle_rad - p.slope - q.slope;
@@ -75,24 +75,24 @@ pub(crate) fn stationary_contact(
             let is_inside = (best - angle).abs() * radius_m <= TIE_M;
             return is_inside.then_some(([p, q], angle));
         }
-        at[0] = step(one.half_path, &p, angle);
-        at[1] = step(other.half_path, &q, angle);
+        at[0] = step(first.half_path, &p, angle);
+        at[1] = step(second.half_path, &q, angle);
     }
-    within(one, other, [low, high], [middle, others, turn], radius_m)
+    within(first, second, [low, high], [middle, others, turn], radius_m)
 }
 
 /// Finds the stationary contact by bracketed steps between `low` and `high`, for the few angles
 /// between which Newton's steps oscillate.
 fn within(
-    one: &HalfPathTracer,
-    other: &HalfPathTracer,
+    first: &HalfPathTracer,
+    second: &HalfPathTracer,
     [low, high]: [f64; 2],
     [middle, others, turn]: [f64; 3],
     radius_m: f64,
 ) -> Option<([Contact; 2], f64)> {
     let at = |angle: f64| {
-        let p = one.contact_at(angle, middle);
-        let mut q = other.contact_at(angle - turn, others);
+        let p = first.contact_at(angle, middle);
+        let mut q = second.contact_at(angle - turn, others);
         q.angle_rad += turn;
         [p, q]
     };

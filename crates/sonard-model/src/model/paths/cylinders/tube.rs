@@ -70,7 +70,7 @@ impl Tube {
     }
 
     /// Minimum over the borders.
-    pub(crate) fn least(&self, of: impl Fn(&Front) -> f64) -> f64 {
+    pub(crate) fn min_of(&self, of: impl Fn(&Front) -> f64) -> f64 {
         of(&self.borders[0]).min(of(&self.borders[1]))
     }
 }
@@ -86,8 +86,8 @@ pub(crate) fn split(
 ) {
     let [from, to] = tube.borders;
     let middle = |front: &Front| front.origin - circle.center;
-    let is_wider = |one: DVec2, other: DVec2, cosine: f64| {
-        one.dot(other) < cosine * (one.length_squared() * other.length_squared()).sqrt()
+    let is_wider = |a: DVec2, b: DVec2, cosine: f64| {
+        a.dot(b) < cosine * (a.length_squared() * b.length_squared()).sqrt()
     };
     let turns = is_wider(middle(&from), middle(&to), MAX_TURN_COSINES[0]);
     let is_wide = turns || is_wider(from.along, to.along, MAX_TURN_COSINES[1]);
@@ -165,6 +165,6 @@ mod tests {
     #[test]
     fn cosines_match_the_angle() {
         let of = [0.7, 1.4].map(f64::cos);
-        assert!(of.iter().zip(MAX_TURN_COSINES).all(|(one, other)| (one - other).abs() < 1e-15));
+        assert!(of.iter().zip(MAX_TURN_COSINES).all(|(a, b)| (a - b).abs() < 1e-15));
     }
 }

@@ -165,10 +165,10 @@ impl DoubleSearch<'_> {
         };
         let (from_outs, from_backs) = (passed(0, outs), passed(1, backs));
         let norm = |field: &Passed| field.iter().map(|part| part.norm()).sum::<f64>();
-        let most = from_backs.iter().map(norm).fold(0.0, f64::max) * pair.ray.gain;
+        let bound = from_backs.iter().map(norm).fold(0.0, f64::max) * pair.ray.gain;
         for (out, from_out) in outs.iter().zip(&from_outs) {
             let raised = self.plan.raised.by_edges(out.length_m + leg_m + back.length_m);
-            if norm(from_out) * most * raised < self.settings.floor {
+            if norm(from_out) * bound * raised < self.settings.floor {
                 continue;
             }
             for (back, from_back) in backs.iter().zip(&from_backs) {
@@ -198,8 +198,8 @@ impl DoubleSearch<'_> {
         let gain = pair.ray.gain * settings.air_gain(length_m);
         let amplitude = gain * field.norm();
         let order = out.ray.order + pair.ray.order + back.ray.order;
-        let most = amplitude * self.plan.raised.by_edges(length_m);
-        if most < floor(settings, out, back, length_m) || !settings.allows(order) {
+        let bound = amplitude * self.plan.raised.by_edges(length_m);
+        if bound < floor(settings, out, back, length_m) || !settings.allows(order) {
             return;
         }
         self.plan.effort.keep::<(PathEcho, PathEcho, DoubleDiffraction)>(1);
@@ -230,13 +230,13 @@ impl DoubleSearch<'_> {
         });
         // Seen from the far end left is right, and through an odd number of mirrors right is left.
         let is_turned = ray.order.is_multiple_of(2);
-        let fits = |one: &Facing, other: &Facing| match (one.flank, other.flank) {
+        let fits = |first: &Facing, second: &Facing| match (first.flank, second.flank) {
             (Flank::Open, _) | (_, Flank::Open) => true,
             (a, b) => (a == b) != is_turned,
         };
-        let pairs = here.iter().flat_map(|one| there.iter().map(move |other| [*one, *other]));
+        let pairs = here.iter().flat_map(|first| there.iter().map(move |second| [*first, *second]));
         pairs
-            .filter(|[one, other]| fits(one, other))
+            .filter(|[first, second]| fits(first, second))
             .map(|ends| EdgePassage { ends, share: self.share(&ends) })
             .collect()
     }

@@ -101,8 +101,8 @@ pub(crate) fn distance_parameter_m(one_m: f64, other_m: f64) -> f64 {
 }
 
 /// Returns `true` if two rays of equal length from one start leave in the same direction.
-pub(crate) fn is_same_departure(one: &UnfoldedRay, other: &UnfoldedRay) -> bool {
-    one.departure.distance_squared(other.departure) < SAME_RAD * SAME_RAD
+pub(crate) fn is_same_departure(a: &UnfoldedRay, b: &UnfoldedRay) -> bool {
+    a.departure.distance_squared(b.departure) < SAME_RAD * SAME_RAD
 }
 
 /// Amplitude floor of echoes of a length, out on one ray to an edge and back on one to the same or

@@ -77,8 +77,8 @@ impl FromEdge {
         };
         let mut found: Vec<(u32, UnfoldedRay, [bool; 2])> =
             rays.iter().map(|(edge, ray)| (*edge, *ray, side(ray).unwrap_or_default())).collect();
-        found.sort_by(|(one, a, _), (other, b, _)| {
-            one.cmp(other).then(a.run.length_squared().total_cmp(&b.run.length_squared()))
+        found.sort_by(|(first, a, _), (second, b, _)| {
+            first.cmp(second).then(a.run.length_squared().total_cmp(&b.run.length_squared()))
         });
         let mut flanks: Vec<[bool; 2]> = Vec::with_capacity(found.len());
         for (edge, ray, sides) in found {

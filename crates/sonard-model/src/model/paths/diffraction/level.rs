@@ -23,13 +23,13 @@
 //! # Strength
 //!
 //! The wall is thin: across the edge it is a half plane below an upper edge or above a lower one.
-//! With legs `s' = p' / sin b` and `s = p / sin b`, Kouyoumjian and Pathak's coefficient is `1 /
-//! sin b` of the head-on one at the distance parameter `L = s' s sin^2 b / (s' + s)`. The field
-//! relative to a head-on wall's is that times `sqrt((s' + s) / (s' s)) = sin b / sqrt(L)`, so it
-//! equals the head-on one at `L = p' p sin b / (p' + p)`. It takes over by halves where the wall's
-//! own echo ends, and where sound that passes over the wall begins to be blocked: when the ranger
-//! rises past an edge, nothing jumps. The laws without an aspect are for head-on sound and have no
-//! slant; they receive the same `L`, by which they also grow as `1 / sqrt(sin b)`.
+//! With legs `s' = p' / sin b` and `s = p / sin b`, Kouyoumjian and Pathak's coefficient is
+//! `1 / sin b` of the head-on one at the distance parameter `L = s' s sin^2 b / (s' + s)`. The
+//! field relative to a head-on wall's is that times `sqrt((s' + s) / (s' s)) = sin b / sqrt(L)`, so
+//! it equals the head-on one at `L = p' p sin b / (p' + p)`. It takes over by halves where the
+//! wall's own echo ends, and where sound that passes over the wall begins to be blocked: when the
+//! ranger rises past an edge, nothing jumps. The laws without an aspect are for head-on sound and
+//! have no slant; they receive the same `L`, by which they also grow as `1 / sqrt(sin b)`.
 //!
 //! Paths by cylinders to a level edge, the end points of level edges, and double diffraction are
 //! omitted. Where sound grazes an edge both on its way out and on its way back, as it does straight
@@ -100,7 +100,7 @@ pub(crate) fn echoes(
     back: Option<&LevelEdgeBeams>,
 ) -> (Vec<PathEcho>, Vec<LevelDiffraction>) {
     let mut all: Vec<(PathEcho, LevelDiffraction)> = Vec::new();
-    for outs in out.lit.chunk_by(|one, other| one.wall == other.wall) {
+    for outs in out.lit.chunk_by(|a, b| a.wall == b.wall) {
         let wall = outs[0].wall;
         let backs = back.map(|back| of_wall(&back.lit, wall));
         for (rise_m, is_upper) in scene.heights.level_edges(wall) {
@@ -114,7 +114,7 @@ pub(crate) fn echoes(
                     search.pairs_between(&outs, &edge.beams(scene, beams, backs))
                 }
             };
-            found.sort_by(|(one, _), (other, _)| one.length_m.total_cmp(&other.length_m));
+            found.sort_by(|(a, _), (b, _)| a.length_m.total_cmp(&b.length_m));
             drop_repeats(&mut found, |(echo, _)| echo.length_m, is_same);
             all.append(&mut found);
         }
@@ -137,13 +137,13 @@ fn of_wall(lit: &[LitWall], wall: u32) -> &[LitWall] {
 
 /// Returns `true` for the two copies of a path that hits a level edge on the border of two beams.
 fn is_same(
-    (one, path): &(PathEcho, LevelDiffraction),
-    (other, its_path): &(PathEcho, LevelDiffraction),
+    (first, path): &(PathEcho, LevelDiffraction),
+    (second, its_path): &(PathEcho, LevelDiffraction),
 ) -> bool {
     let is_near = |a: DVec2, b: DVec2| a.distance_squared(b) < SAME_RAD * SAME_RAD;
     let first_leg_m = |path: &LevelDiffraction| path.legs[0].run.length();
-    is_near(one.departure, other.departure)
-        && is_near(one.arrival, other.arrival)
+    is_near(first.departure, second.departure)
+        && is_near(first.arrival, second.arrival)
         && path.images == its_path.images
         && (first_leg_m(path) - first_leg_m(its_path)).abs() < SAME_M
 }

@@ -181,9 +181,9 @@ impl Heights {
         plan.pieces.iter().filter_map(others).collect()
     }
 
-    fn are_apart(&self, one: u32, other: u32) -> bool {
-        let [one, other] = [one, other].map(|wall| self.walls[wall as usize]);
-        one.zip(other).is_some_and(|([a, b], [c, d])| b <= c || d <= a)
+    fn are_apart(&self, first: u32, second: u32) -> bool {
+        let [first, second] = [first, second].map(|wall| self.walls[wall as usize]);
+        first.zip(second).is_some_and(|([a, b], [c, d])| b <= c || d <= a)
     }
 
     /// Heights above the ranger of the level edges of a wall with limits, metres, each with `true`
@@ -235,8 +235,8 @@ impl Heights {
     /// floor and ceiling as windows.
     ///
     /// Folded, the heights between the two are an interval. Its ends are the folded ends, or floor
-    /// and ceiling where the path turns at one of their images in between. Images of each are `2
-    /// (ceiling - floor)` apart.
+    /// and ceiling where the path turns at one of their images in between. Images of each are
+    /// `2 (ceiling - floor)` apart.
     pub(crate) fn blocks(&self, limits: Option<[f64; 2]>, straight_m: [f64; 2]) -> bool {
         let Some([from_m, to_m]) = limits else { return true };
         let [low_m, high_m] = [straight_m[0].min(straight_m[1]), straight_m[0].max(straight_m[1])];

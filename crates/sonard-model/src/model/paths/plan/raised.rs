@@ -64,6 +64,6 @@ impl Raised {
     }
 }
 
-fn pairwise_max(one: [f64; 2], other: [f64; 2]) -> [f64; 2] {
-    [one[0].max(other[0]), one[1].max(other[1])]
+fn pairwise_max(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
+    [a[0].max(b[0]), a[1].max(b[1])]
 }

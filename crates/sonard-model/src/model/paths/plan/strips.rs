@@ -86,11 +86,11 @@ impl<'a> Chains<'a> {
             let last = pieces[pieces.len() - 1];
             let next = match self.around[at as usize][..] {
                 [_] => return Some((at, pieces)),
-                [one, other] => {
-                    if one == last {
-                        other
+                [a, b] => {
+                    if a == last {
+                        b
                     } else {
-                        one
+                        a
                     }
                 }
                 _ => return None,

@@ -79,9 +79,9 @@ const AT_ONCE: u64 = 1_000_000;
 #[test]
 fn low_boxes_are_searched_fully() {
     let boxes = [(DVec2::new(1.1, 1.0), 0.3), (DVec2::new(2.7, 1.9), 0.8)];
-    for (boxes, most) in [(&boxes[..1], 6_000_000), (&boxes, 15_000_000)] {
+    for (boxes, bound) in [(&boxes[..1], 6_000_000), (&boxes, 15_000_000)] {
         let (found, steps) = searched(&with_boxes(boxes), DVec2::new(2.0, 0.7), settings());
-        assert!(found.is_ok_and(|count| count > 1000) && steps < most, "{steps}");
+        assert!(found.is_ok_and(|count| count > 1000) && steps < bound, "{steps}");
     }
 }
 

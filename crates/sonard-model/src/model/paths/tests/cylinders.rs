@@ -249,8 +249,8 @@ fn edge_by_way_of_cylinder() {
 /// The very numerous echoes of more than one contact are followed below the threshold only until
 /// the receiver opens. With all of them one firing in thirty, 85 mm in front of a wall and next to
 /// a round body, would read differently. With none it were one in eight, mostly the minimum range
-/// instead of an echo slightly beyond it. The readings: `cargo test --lib omitted_weak --
-/// --nocapture`.
+/// instead of an echo slightly beyond it. The readings:
+/// `cargo test --lib omitted_weak -- --nocapture`.
 #[test]
 fn omitted_weak_echoes_are_harmless() {
     let text = crate::scene::shipped::text("simple-room-robot").expect("shipped");

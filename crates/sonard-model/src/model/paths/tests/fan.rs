@@ -29,10 +29,10 @@ fn mirrored(point: &ObservationPoint, pose: &Pose, azimuth_deg: f64) -> Vec<Arri
     arrivals
 }
 
-fn is_same(one: &Arrival, other: &Arrival) -> bool {
-    (one.length_m - other.length_m).abs() < 1e-3
-        && wrap_pi(one.departure_rad - other.departure_rad).abs() < 0.01
-        && (one.amplitude / other.amplitude - 1.0).abs() < 0.05
+fn is_same(a: &Arrival, b: &Arrival) -> bool {
+    (a.length_m - b.length_m).abs() < 1e-3
+        && wrap_pi(a.departure_rad - b.departure_rad).abs() < 0.01
+        && (a.amplitude / b.amplitude - 1.0).abs() < 0.05
 }
 
 /// Number of echoes of `paths`, of those that the fan finds, and of the fan's additional ones.

@@ -39,8 +39,8 @@ impl Spot {
 /// ```
 ///
 /// for `exp(+i omega t)`, with Hankel's function of the second kind and the distance `R` from it.
-/// The whole line would be `exp(-i k R) / R`. That term counts where a straight path exists (`m >
-/// 0`), and the rest is the edge's. In pairs: straight part, edge's part.
+/// The whole line would be `exp(-i k R) / R`. That term counts where a straight path exists
+/// (`m > 0`), and the rest is the edge's. In pairs: straight part, edge's part.
 pub(super) fn macdonald(source: Spot, place: Spot) -> [[Complex64; 2]; 2] {
     [-1.0, 1.0].map(|sign| {
         let turned_rad = place.around_rad + sign * source.around_rad;
@@ -55,8 +55,8 @@ pub(super) fn macdonald(source: Spot, place: Spot) -> [[Complex64; 2]; 2] {
     })
 }
 
-/// The integral from `m` on, down the slope from the edge's path: at `sqrt(R^2 + u^2) = edge - i
-/// t^2 / k` it decreases as `exp(-t^2)`.
+/// The integral from `m` on, down the slope from the edge's path: at
+/// `sqrt(R^2 + u^2) = edge - i t^2 / k` it decreases as `exp(-t^2)`.
 fn tail(m: f64, edge_m: f64) -> Complex64 {
     const STEPS: i32 = 20_000;
     const TO: f64 = 6.0;

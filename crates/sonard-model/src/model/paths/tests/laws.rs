@@ -75,8 +75,8 @@ fn rigid_motions_change_nothing() {
         let there =
             Paths::new(&scene(&walls), settings()).enumerate(to(AT.x, AT.y)).expect("few paths");
         assert_eq!(here.len(), there.len());
-        for (one, other) in here.iter().zip(&there) {
-            assert!((one.length_m - other.length_m).abs() < 1e-9);
+        for (first, second) in here.iter().zip(&there) {
+            assert!((first.length_m - second.length_m).abs() < 1e-9);
         }
         let sum = |echoes: &[EchoPath]| echoes.iter().map(|e| e.amplitude).sum::<f64>();
         assert!((sum(&here) - sum(&there)).abs() < 1e-6);

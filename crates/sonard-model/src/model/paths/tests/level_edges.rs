@@ -219,9 +219,9 @@ fn summaries(echoes: &[EchoPath], turn: impl Fn(f64) -> f64) -> Vec<[f64; 7]> {
     found
 }
 
-fn assert_same(one: &[[f64; 7]], other: &[[f64; 7]]) {
-    assert_eq!(one.len(), other.len());
-    for (a, b) in one.iter().zip(other) {
+fn assert_same(first: &[[f64; 7]], second: &[[f64; 7]]) {
+    assert_eq!(first.len(), second.len());
+    for (a, b) in first.iter().zip(second) {
         let off = a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
         assert!(off < 1e-6, "{a:?} {b:?}");
     }

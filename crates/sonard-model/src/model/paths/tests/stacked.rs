@@ -85,7 +85,7 @@ fn adjoining_walls_are_one() {
     let lengths = |echoes: &[EchoPath]| echoes.iter().map(|echo| echo.length_m).collect::<Vec<_>>();
     let (whole, halves) = (lengths(&whole), lengths(&halves));
     assert_eq!(whole.len(), halves.len());
-    for (one, other) in whole.iter().zip(&halves) {
-        assert!((one - other).abs() < 1e-9, "{one} {other}");
+    for (a, b) in whole.iter().zip(&halves) {
+        assert!((a - b).abs() < 1e-9, "{a} {b}");
     }
 }

@@ -61,6 +61,6 @@ fn no_double_diffraction() {
     let double = Settings { double_diffraction: true, ..settings() };
     let strip = [[-0.002, 0.0, 0.002, 0.0]];
     let at = DVec2::new(0.2, 0.4);
-    let [one, two] = [settings(), double].map(|settings| field(&strip, at, &settings));
-    assert!((one - two).abs() < 1e-12, "{one} {two}");
+    let [single, twice] = [settings(), double].map(|settings| field(&strip, at, &settings));
+    assert!((single - twice).abs() < 1e-12, "{single} {twice}");
 }

@@ -89,8 +89,8 @@ fn field(plan: &Scene, paths: &Paths, source: DVec2, at: DVec2) -> Complex64 {
 /// Comparison with boundary integrals (tests/peers/two_edges.py). In the shadow of a thick wall
 /// there is no field without double diffraction. With it the field is right to 2 %, or to 15 %
 /// where both edges are nearly in line with the transmitter. Behind two blades it removes most of
-/// the error; the rest comes from below, around four edges. The figures: `cargo test --lib
-/// two_edges -- --nocapture`
+/// the error; the rest comes from below, around four edges. The figures:
+/// `cargo test --lib two_edges -- --nocapture`
 #[test]
 fn two_edges_match_boundary_integrals() {
     let vectors = Vectors::load();
@@ -296,8 +296,8 @@ fn longer_search_adds_longer_paths() {
         echoes.into_iter().map(|echo| echo.length_m).collect::<Vec<_>>()
     };
     // Out to one edge, on to the other, and back; the reverse has the same length.
-    let (one, other) = (DVec2::new(4.0, 0.3), DVec2::new(3.0, -4.0));
-    let length_m = one.length() + one.distance(other) + other.length();
+    let (a, b) = (DVec2::new(4.0, 0.3), DVec2::new(3.0, -4.0));
+    let length_m = a.length() + a.distance(b) + b.length();
     let near = found(14.0);
     assert_eq!(near.iter().filter(|found| (**found - length_m).abs() < 1e-9).count(), 2);
     assert_eq!(near, found(100.0));

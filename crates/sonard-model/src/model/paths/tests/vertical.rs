@@ -205,10 +205,9 @@ fn low_cylinder_hides_only_behind() {
 fn corners_of_low_walls() {
     for turn in 0..12 {
         let frame = DVec2::from_angle(0.5 * f64::from(turn));
-        let [corner, one, other] =
+        let [corner, a, b] =
             [DVec2::ZERO, DVec2::new(-1.0, 0.0), DVec2::new(0.0, 1.0)].map(|p| frame.rotate(p));
-        let mut plan =
-            scene(&[[one.x, one.y, corner.x, corner.y], [corner.x, corner.y, other.x, other.y]]);
+        let mut plan = scene(&[[a.x, a.y, corner.x, corner.y], [corner.x, corner.y, b.x, b.y]]);
         plan.floor_z_m = Some(0.0);
         let settings = Settings { edge_law: Some(EdgeLaw::Utd), ..at_height(0.3) };
         let level = |plan: &Scene, at: DVec2| -> Vec<f64> {

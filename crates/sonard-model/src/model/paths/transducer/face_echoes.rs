@@ -55,9 +55,9 @@ impl FaceEchoes {
         let mut entries = Vec::new();
         for (echo, index) in far() {
             // Upper bound, with the face in the direction of departure.
-            let most = best.after(&face, echo.length_m, echo.amplitude);
-            let reach_rad = envelope.reach_rad(floor / most);
-            if most < floor || reach_rad == 0.0 {
+            let bound = best.after(&face, echo.length_m, echo.amplitude);
+            let reach_rad = envelope.reach_rad(floor / bound);
+            if bound < floor || reach_rad == 0.0 {
                 continue;
             }
             let leaves_rad = echo.departure.to_angle();

@@ -72,8 +72,8 @@ impl SequenceSearch {
     }
 
     /// Ends a sequence of paths, and extends it. `strength` is its field over its spreading, one
-    /// over metres: `1/L1 S1 1/L2 S2 ... 1/Ln`, to which a last path adds `S 1/L (L1 + L2 + ... +
-    /// L)`.
+    /// over metres: `1/L1 S1 1/L2 S2 ... 1/Ln`, to which a last path adds
+    /// `S 1/L (L1 + L2 + ... + L)`.
     ///
     /// The search ends as soon as no last path could lift the field above the floor. The disc's
     /// strength bounds each further reflection, so all omitted sequences stay below.

@@ -98,8 +98,8 @@ fn wall_matches_kirchhoff() {
 fn reflectance_and_turning() {
     let dull = Disc { face: Face { reflectance: 0.5, ..DISC.face }, ..DISC };
     let (bright, dull) = (before_a_wall(DISC, 0.3, 0.0), before_a_wall(dull, 0.3, 0.0));
-    for ((one, other), reflections) in bright.iter().zip(&dull).zip(1..) {
-        assert!((other.amplitude / one.amplitude - 0.5_f64.powi(reflections)).abs() < 1e-12);
+    for ((a, b), reflections) in bright.iter().zip(&dull).zip(1..) {
+        assert!((b.amplitude / a.amplitude - 0.5_f64.powi(reflections)).abs() < 1e-12);
     }
     let turned = before_a_wall(DISC, 0.3, 6_f64.to_radians());
     assert!(turned[0].amplitude < 0.3 * bright[0].amplitude);

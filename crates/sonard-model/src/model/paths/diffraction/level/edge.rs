@@ -127,8 +127,8 @@ impl EdgeBeam<'_> {
         let nearest_m = (low_m - self.foot_m).max(self.foot_m - high_m).max(0.0);
         let [near_m, far_m] =
             [nearest_m, lateral_m[0].max(lateral_m[1])].map(|m| m.hypot(self.before_m));
-        let [one, other] = [near_m, far_m].map(|run_m| self.climb_m / run_m);
-        [one.min(other), one.max(other)]
+        let [a, b] = [near_m, far_m].map(|run_m| self.climb_m / run_m);
+        [a.min(b), a.max(b)]
     }
 
     /// Returns `true` if the slopes of the beam include a ray to a position along the wall's line.
