@@ -77,7 +77,7 @@ impl ForeignOption {
     #[must_use]
     pub fn help(&self) -> String {
         let of: Vec<_> = self.of.iter().map(|engine| engine.name()).collect();
-        format!("remove it, or use the engine {}", of.join(" or "))
+        format!("remove it, or choose the engine {}", of.join(" or "))
     }
 }
 
@@ -236,6 +236,6 @@ mod tests {
         }
         let error = everything(EngineKind::Cone).options().expect_err("others' options");
         assert_eq!(error.to_string(), "response is not an option of the engine cone");
-        assert_eq!(error.help(), "remove it, or use the engine paths");
+        assert_eq!(error.help(), "remove it, or choose the engine paths");
     }
 }

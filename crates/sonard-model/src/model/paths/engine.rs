@@ -21,7 +21,8 @@ use crate::{
 
 /// Exact engine: echo paths, a beam pattern and a reflecting transducer face.
 ///
-/// [`Settings::floor`] is also the smallest amplitude that [`Arrivals::listen`] returns.
+/// [`Settings::floor`] is also the smallest amplitude that
+/// [`Arrivals::listen`] returns.
 #[derive(Debug)]
 pub struct PathEngine {
     pub(super) paths: Paths,

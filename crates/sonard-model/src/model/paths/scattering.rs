@@ -16,9 +16,9 @@
 //!
 //! In the plan a wall is a row of patches of an angle `da` each, as high as the beam: `W` is `da`
 //! times the integral of the two-way pattern's square over the rise
-//! ([`Settings::scatter_height_rad`]). Patches are small compared with beam and pulse. Each has its
-//! own echo and phase. Uniformly distributed phases, as those of a rough surface, let the powers of
-//! neighbours add.
+//! ([`Settings::scatter_height_rad`]). Patches are small compared with beam and pulse.
+//! Each has its own echo and phase. Uniformly distributed phases, as those of a rough
+//! surface, let the powers of neighbours add.
 //!
 //! Paths that return along themselves are followed, mirrors on the path included. Multiple
 //! scattering is omitted.

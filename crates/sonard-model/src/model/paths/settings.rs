@@ -2,8 +2,9 @@
 
 use crate::acoustics::edge::EdgeLaw;
 
-/// Usual [`Settings::repeated_contacts_above`]: with the weakest 20 dB below the threshold, down to
-/// the threshold itself. In a room with a round body their number grows a hundredfold per 20 dB.
+/// Usual [`Settings::repeated_contacts_above`]: with the weakest 20 dB below the threshold,
+/// down to the threshold itself. In a room with a round body their number grows a hundredfold per
+/// 20 dB.
 pub const DEFAULT_REPEATED_CONTACT_RATIO: f64 = 10.0;
 
 /// Limits of the path search, and the physics along paths.
@@ -29,7 +30,8 @@ pub struct Settings {
     pub absorption_np_per_m: f64,
     /// Wave number `2 pi f / c`, radians per metre.
     pub wave_number_per_m: f64,
-    /// Height of the transducer in a scene with heights, metres; `None`: see [`usual_z_m`].
+    /// Height of the transducer in a scene with heights, metres;
+    /// `None`: see [`usual_z_m`].
     pub sensor_z_m: Option<f64>,
     /// Elevation of the transducer's axis, radians.
     pub tilt_rad: f64,

@@ -60,9 +60,9 @@ fn predict(model: &ArrayModel, pose: Pose, firing: usize) -> Prediction {
 const ORIGIN: Pose = Pose { x_m: 0.0, y_m: 0.0, heading_deg: 0.0 };
 
 /// Two sonars 0.2 m apart in front of a wall at 3 m. They fire alternately every 10 ms. At 10 ms s1
-/// receives the sound that s0 sent at 0, over 2 x sqrt(9 + 0.01) = 6.00333 m, as an echo of 6.00333
-/// - 3.4 = 2.60333 m: range 1.30167 m. Its own echo comes after its window of 1.7 m. Both ends of
-/// the path are atan(0.1 / 3) off the axes, and the gain compensates 2.60333 of the 6.00333 m.
+/// receives the sound that s0 sent at 0, over 2 x sqrt(9 + 0.01) = 6.00333 m. It appears as an echo
+/// of 2.60333 m (3.4 m less): range 1.30167 m. Its own echo comes after its window of 1.7 m. Both
+/// ends of the path are atan(0.1 / 3) off the axes, and the gain compensates 2.60333 of 6.00333 m.
 #[test]
 fn ghost_of_the_previous_slot() {
     let array = side_by_side(&[0.1, -0.1], 10.0, Vec::new());

@@ -352,7 +352,7 @@ fn check_arrival(simulator: &Simulator, arrival: &Arrival, at: DVec2, fan_rounds
             }
         }
         (EngineKind::Fan, _) => {
-            assert!(path.interactions.iter().all(|interaction| interaction.z_m.is_none()))
+            assert!(path.interactions.iter().all(|interaction| interaction.z_m.is_none()));
         }
         // The nearest hit, mirror or not.
         (EngineKind::Cone, _) => {

@@ -33,7 +33,7 @@ pub(super) struct LevelEdge {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct EdgeBeam<'a> {
     pub(super) lit: &'a LitWall,
-    /// Counted as in [`PathEcho::image`].
+    /// Counted as in [`PathEcho::image`](crate::model::paths::echo::PathEcho::image).
     pub(super) image: u16,
     /// Reflections at walls, floor and ceiling.
     pub(super) order: u16,
