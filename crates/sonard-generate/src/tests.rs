@@ -295,7 +295,7 @@ fn faults_name_file_line_field_and_what_would_be_right() {
             "[[scene]]",
             "[model]\naperture_deg = 2\n[[scene]]",
             "set.toml:7:16: model.aperture_deg",
-            "nothing that the engine paths knows",
+            "not an option of the engine paths",
             "cone",
         ),
         (

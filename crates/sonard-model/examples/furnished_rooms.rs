@@ -1,10 +1,11 @@
-//! What a scan costs in random furnished rooms:
+//! Cost of a scan in random furnished rooms:
 //! `cargo run --release -p sonard-model --example furnished_rooms -- COUNT SEED [FIRST]`.
 //!
-//! Each room has four or six walls, a floor and a ceiling, low and high boxes turned any way, shelves that
-//! hang, tables on legs, and surfaces that reflect from half to 0.99 of the amplitude. From a random place
-//! in it the ranger takes a scan of 400 azimuths to its full range, on one core. Printed are the times of
-//! scans on that core, the preparing of the scene included, and the most memory that the process ever held.
+//! Each room has four or six walls, a floor and a ceiling, low and high boxes at any angle, hanging
+//! shelves, tables on legs, and surfaces that reflect from half to 0.99 of the amplitude. From a
+//! random place in it the ranger takes a scan of 400 azimuths to its full range, on one core. The
+//! output has the times of scans on that core, including the preparation of the scene, and the peak
+//! memory of the process.
 
 use std::{error::Error, fs, sync::Arc, time::Instant};
 
@@ -18,21 +19,21 @@ use sonard_model::{
     scene::{Scene, SceneBuilder},
 };
 
-/// Slower scans are named, so that one can be run again by itself.
+/// Slower scans are named, so that each can be repeated alone.
 const SLOW_S: f64 = 0.5;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let mut arguments = std::env::args().skip(1).map(|argument| argument.parse::<u64>());
     let mut next = |usual| arguments.next().unwrap_or(Ok(usual));
     let (count, seed, first) = (next(100)?, next(1)?, next(0)?);
-    let (mut seconds, mut echoes_heard, mut refused) = (Vec::new(), 0, 0);
+    let (mut seconds, mut echo_count, mut rejected) = (Vec::new(), 0, 0);
     for room in first..first + count {
-        // A generator for each room, so that each can be made by itself.
+        // A generator for each room, so that each can be reproduced alone.
         let mut rng = Pcg64::new(seed.into(), room.into());
         let (scene, pose) = furnished_room(&mut rng)?;
         let (begin, begin_s) = (Instant::now(), processor_s());
         let echoes = scan(&scene, &pose);
-        // Other programs may have had the core in between.
+        // Other programs may have used the core in between.
         let taken_s = match (begin_s, processor_s()) {
             (Some(begin_s), Some(end_s)) => end_s - begin_s,
             _ => begin.elapsed().as_secs_f64(),
@@ -43,9 +44,9 @@ fn main() -> Result<(), Box<dyn Error>> {
         }
         seconds.push(taken_s);
         match echoes {
-            Ok(count) => echoes_heard += count,
+            Ok(count) => echo_count += count,
             Err(error) => {
-                refused += 1;
+                rejected += 1;
                 println!("room {room}: {error}");
             }
         }
@@ -53,18 +54,18 @@ fn main() -> Result<(), Box<dyn Error>> {
     seconds.sort_by(f64::total_cmp);
     let share = |share: f64| 1e3 * seconds[((seconds.len() - 1) as f64 * share) as usize];
     println!(
-        "{} rooms, seed {seed}: {echoes_heard} echoes, {refused} refused; median {:.1} ms, 95 % {:.1} ms, worst {:.1} ms; \
-         most memory {} MB",
+        "{} rooms, seed {seed}: {echo_count} echoes, {rejected} rejected; median {:.1} ms, 95 % {:.1} ms, worst {:.1} ms; \
+         peak memory {} MB",
         seconds.len(),
         share(0.5),
         share(0.95),
         share(1.0),
-        most_memory_mb().map_or("unknown".into(), |mb| mb.to_string())
+        peak_memory_mb().map_or("unknown".into(), |mb| mb.to_string())
     );
     Ok(())
 }
 
-/// How many of 400 firings are answered.
+/// Number of 400 firings with an echo.
 fn scan(scene: &Scene, pose: &Pose) -> Result<usize, Box<dyn Error>> {
     let sensor = Sensor::preset("senscomp-6500")?;
     let simulator =
@@ -73,15 +74,15 @@ fn scan(scene: &Scene, pose: &Pose) -> Result<usize, Box<dyn Error>> {
     Ok(predictions.iter().filter(|prediction| prediction.range_m.is_some()).count())
 }
 
-/// Processor time of this thread so far, where the system says it.
+/// Processor time of this thread so far, where the system provides it.
 fn processor_s() -> Option<f64> {
     let status = fs::read_to_string("/proc/thread-self/schedstat").ok()?;
     let nanoseconds: f64 = status.split_whitespace().next()?.parse().ok()?;
     Some(1e-9 * nanoseconds)
 }
 
-/// The most that this process ever held, where the system says it.
-fn most_memory_mb() -> Option<u64> {
+/// Peak memory of this process, where the system provides it.
+fn peak_memory_mb() -> Option<u64> {
     let status = fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
     let kilobytes: u64 = line.split_whitespace().next()?.parse().ok()?;

@@ -1,8 +1,8 @@
-//! The layers that ARCHITECTURE.md states for the modules of each crate, held against the code: a module
-//! uses those below it, no other of its own layer, and none above. And files of a folder that use each other in
-//! a circle, of which there may be a few at a time.
+//! Layers that ARCHITECTURE.md lists for the modules of each crate, compared with the code. A
+//! module uses those below it, no other of its own layer, and none above. Files of a folder may
+//! form import circles of a few files at most.
 //!
-//! Between crates the compiler holds that; within one, `use` may go anywhere.
+//! Between crates the compiler enforces this; within a crate, `use` is unrestricted.
 
 #[path = "layers/sources.rs"]
 mod sources;
@@ -15,17 +15,17 @@ use std::{
 
 use sources::{Module, Sources};
 
-/// The heading of the table in ARCHITECTURE.md.
+/// Heading of the table in ARCHITECTURE.md.
 const HEADING: &str = "### Layers within a crate";
 
-/// Files that may use each other in a circle, at most: a type, its parts and what makes it.
-const MOST_IN_A_CIRCLE: usize = 3;
+/// Maximum number of files in a circle of imports: a type, its parts and its builder.
+const MAX_CIRCLE: usize = 3;
 
 fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
 }
 
-/// For each source folder of the table the layer of each module, counted from the lowest.
+/// Layer of each module for each source folder of the table, counted from the lowest.
 fn stated() -> Vec<(String, BTreeMap<String, usize>)> {
     let text = fs::read_to_string(root().join("ARCHITECTURE.md")).expect("ARCHITECTURE.md");
     let (_, section) = text.split_once(HEADING).expect("the section about layers");
@@ -45,7 +45,7 @@ fn stated() -> Vec<(String, BTreeMap<String, usize>)> {
     .collect()
 }
 
-/// A folder of the table as the crate it is in and the module that it is there.
+/// Splits a folder of the table into its crate and its module there.
 fn module(folder: &str) -> (PathBuf, Module) {
     let (source, inner) = match folder.split_once("src/") {
         Some((before, inner)) => (format!("{before}src"), inner),
@@ -58,7 +58,7 @@ fn module(folder: &str) -> (PathBuf, Module) {
 }
 
 #[test]
-fn modules_use_only_what_is_below_them() {
+fn modules_use_lower_layers() {
     let stated = stated();
     assert!(stated.len() >= 4, "the table of layers was not read: {stated:?}");
     let mut faults = BTreeSet::new();
@@ -91,13 +91,13 @@ fn no_large_circle_of_files() {
     let large: Vec<_> = crates
         .iter()
         .flat_map(|source| Sources::read(source).circles())
-        .filter(|circle| circle.len() > MOST_IN_A_CIRCLE)
+        .filter(|circle| circle.len() > MAX_CIRCLE)
         .collect();
     assert!(large.is_empty(), "files that use each other in a circle: {large:#?}");
 }
 
 #[test]
-fn uses_are_read_as_the_compiler_does() {
+fn uses_match_the_compiler() {
     let files = [
         ("", "mod a;\npub mod b;\n"),
         (
@@ -108,7 +108,7 @@ fn uses_are_read_as_the_compiler_does() {
         ("b", "use crate::a::Deep;\nfn f() { crate::c::g(); }\nmod tests {\n use crate::a;\n}\n"),
         ("c", "use std::fs;\n"),
     ];
-    let sources = Sources::of(files.map(|(module, code)| (path(module), code.to_owned())));
+    let sources = Sources::from_files(files.map(|(module, code)| (path(module), code.to_owned())));
     let uses: Vec<_> = sources
         .uses()
         .map(|(file, used)| {
@@ -125,9 +125,9 @@ fn path(module: &str) -> Module {
     module.split("::").filter(|name| !name.is_empty()).map(str::to_owned).collect()
 }
 
-/// One style of module files: `foo.rs` beside the folder `foo`.
+/// One style of module files: `foo.rs` next to the folder `foo`.
 #[test]
-fn a_module_is_a_file_beside_its_folder() {
+fn no_mod_rs_files() {
     fn look(folder: &Path, found: &mut Vec<PathBuf>) {
         for entry in fs::read_dir(folder).expect("a source folder") {
             let path = entry.expect("an entry").path();
@@ -147,7 +147,8 @@ fn a_module_is_a_file_beside_its_folder() {
     assert!(found.is_empty(), "foo.rs, not foo/mod.rs: {found:?}");
 }
 
-/// Files and folders of the repository that a document names in backticks: a known first folder, no placeholder.
+/// Files and folders of the repository that a document names in backticks: a known first folder, no
+/// placeholder.
 fn named_paths(document: &str) -> BTreeSet<String> {
     const FIRST: [&str; 12] = [
         "benches/",
@@ -172,7 +173,7 @@ fn named_paths(document: &str) -> BTreeSet<String> {
 }
 
 #[test]
-fn documents_name_paths_that_exist() {
+fn documented_paths_exist() {
     let mut missing = Vec::new();
     for document in ["ARCHITECTURE.md", "CONTRIBUTING.md", "docs/life-of-an-echo.md"] {
         let text = fs::read_to_string(root().join(document)).expect("a document");

@@ -66,7 +66,7 @@ fn wrong_configurations_end_with_the_place_and_a_way_out() {
         (
             "[model]\nray_spacing_deg = 0.1\n",
             &port[..],
-            &["s.toml:2:19", "ray_spacing_deg is nothing that", "choose the engine fan"],
+            &["s.toml:2:19", "ray_spacing_deg is not an option", "choose the engine fan"],
         ),
         ("[model]\nsensor = \"hc\"\n", &port[..], &["presets"]),
         ("", &[][..], &["device.port is not set", "--mock"]),

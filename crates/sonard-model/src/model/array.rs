@@ -6,8 +6,8 @@ use rand::Rng;
 
 use super::{
     ModelError, Options, Prediction, Simulator, TooCostly,
-    crosstalk::{Others, turns_heard},
-    paths::{Aimed, PathEngine},
+    crosstalk::{OtherFirings, crosstalk_slots},
+    paths::{PathEngine, TransducerPose},
 };
 use crate::{
     acoustics::{Air, Mounting, ReceiverNoise, Sensor},
@@ -16,38 +16,39 @@ use crate::{
     scene::Scene,
 };
 
-/// Predicts what the rangers of an array read, each from its own place on the robot.
+/// Model of an array: predicts the reading of each ranger from its own place on the robot.
 ///
-/// A robot's body, the array's or the scene's, turns and moves with the robot, so that it needs
-/// another model for each pose; without one, poses share it. Rangers of different heights have a model
-/// each.
+/// A robot's body, the array's or the scene's, turns and moves with the robot, so it needs a
+/// separate model for each pose; without one, poses share a model. Rangers at different heights
+/// have a model each.
 ///
 /// # Crosstalk
 ///
-/// In a round ([`ArrayAtPose::ping_in_round`]) a ranger also receives the sound of those that fire in the same turn
-/// and of turns before, as far back as a perfect wall's echo could pass the threshold; with the engine `paths`
-/// alone, and unless [`PathOptions::without_crosstalk`](super::PathOptions::without_crosstalk) leaves it out. The
-/// robot is taken to stand still meanwhile, another ranger's sound to leave at the height of the one that listens.
-/// What rough walls scatter from one to another is left out.
+/// In a round ([`ArrayAtPose::ping_in_round`]) a ranger also receives the sound of those that fire
+/// in the same slot and in earlier slots, as far back as a perfect wall's echo could pass the
+/// threshold. This requires the engine `paths`, and is disabled by
+/// [`PathOptions::without_crosstalk`](super::PathOptions::without_crosstalk). The robot is assumed
+/// to be stationary meanwhile, and another ranger's sound to leave at the height of the receiving
+/// one. Scattering by rough walls from one ranger to another is omitted.
 pub struct ArrayModel {
     array: Arc<RangerArray>,
     scene: Arc<Scene>,
-    /// Of the scene without a robot's body.
-    bare: Models,
-    /// The heights that rangers have, each once.
+    /// Models of the scene without a robot's body.
+    bare: ArrayModels,
+    /// Distinct heights of the rangers.
     heights: Vec<Option<f64>>,
 }
 
-/// Models of a scene: of rangers at each of the heights.
-struct Models {
+/// Models of a scene, one for rangers at each of the heights.
+struct ArrayModels {
     simulators: Vec<Simulator>,
     crosstalk: Option<Crosstalk>,
 }
 
 struct Crosstalk {
-    /// Turns back that are listened for.
-    turns_back: usize,
-    /// For paths as long, at each height.
+    /// Number of earlier slots that are included.
+    slots_back: usize,
+    /// Engines for paths of that length, at each height.
     engines: Vec<PathEngine>,
 }
 
@@ -55,13 +56,13 @@ struct Crosstalk {
 pub struct ArrayAtPose<'a> {
     model: &'a ArrayModel,
     pose: Pose,
-    /// With the body among the reflectors, where there is one.
-    own: Option<Models>,
+    /// Models with the body among the reflectors, if there is one.
+    own: Option<ArrayModels>,
 }
 
 impl ArrayModel {
-    /// For an array of rangers of one kind in a scene. A ranger listens until the next one fires,
-    /// so ranges end where sound needs longer than that.
+    /// Creates the model of an array of rangers of one kind in a scene. A ranger receives until the
+    /// next one fires, so the maximum range is limited by that interval.
     ///
     /// # Errors
     /// When the sensor's data or an option are out of range.
@@ -72,9 +73,9 @@ impl ArrayModel {
         air: Air,
         options: Options,
     ) -> Result<Self, ModelError> {
-        let wanted_m = options.max_range_m.unwrap_or(sensor.max_range_m);
-        let heard_m = air.sound_speed_m_s() * array.interval_ms * 1e-3 / 2.0;
-        let options = Options { max_range_m: Some(wanted_m.min(heard_m)), ..options };
+        let requested_m = options.max_range_m.unwrap_or(sensor.max_range_m);
+        let interval_m = air.sound_speed_m_s() * array.interval_ms * 1e-3 / 2.0;
+        let options = Options { max_range_m: Some(requested_m.min(interval_m)), ..options };
         let mut heights: Vec<Option<f64>> = Vec::new();
         for ranger in &array.rangers {
             if !heights.contains(&ranger.z_m) {
@@ -87,51 +88,52 @@ impl ArrayModel {
             Simulator::new(Arc::clone(&scene), Sensor { mounting, ..sensor.clone() }, air, options)
         };
         let simulators = heights.iter().map(simulator).collect::<Result<_, _>>()?;
-        let bare = Models::new(&array, simulators);
+        let bare = ArrayModels::new(&array, simulators);
         Ok(Self { array, scene, bare, heights })
     }
 
-    /// The array at a pose.
+    /// Returns the array at a pose.
     ///
     /// # Errors
-    /// Never with a model that could be made.
+    /// Never for a model that was created successfully.
     pub fn at(&self, pose: Pose) -> Result<ArrayAtPose<'_>, ModelError> {
         let mut own = None;
         if self.scene.robot.is_some() {
             let scene = Arc::new(self.scene.with_robot_at(&pose));
             let around = |simulator: &Simulator| simulator.in_scene(Arc::clone(&scene));
             let simulators = self.bare.simulators.iter().map(around).collect::<Result<_, _>>()?;
-            own = Some(Models::new(&self.array, simulators));
+            own = Some(ArrayModels::new(&self.array, simulators));
         }
         Ok(ArrayAtPose { model: self, pose, own })
     }
 
-    /// The array.
+    /// Returns the array of rangers.
     #[must_use]
     pub const fn array(&self) -> &Arc<RangerArray> {
         &self.array
     }
 
-    /// The scene, with the robot's body apart.
+    /// Returns the scene, with the robot's body separate.
     #[must_use]
     pub const fn scene(&self) -> &Arc<Scene> {
         &self.scene
     }
 
-    /// A model of one of its rangers: sensor, air, settings and records are those of all.
+    /// Returns a model of one of the rangers: sensor, air, settings and records are common to all.
     #[must_use]
     pub fn simulator(&self) -> &Simulator {
         &self.bare.simulators[0]
     }
 
-    /// How many turns back firings are that a ranger may receive in a round; `None` where there is no crosstalk.
+    /// Number of earlier slots whose firings a ranger may receive in a round; `None` without
+    /// crosstalk.
     #[must_use]
-    pub fn turns_heard(&self) -> Option<usize> {
-        self.bare.crosstalk.as_ref().map(|crosstalk| crosstalk.turns_back)
+    pub fn crosstalk_slots(&self) -> Option<usize> {
+        self.bare.crosstalk.as_ref().map(|crosstalk| crosstalk.slots_back)
     }
 }
 
-impl Models {
+impl ArrayModels {
     fn new(array: &RangerArray, simulators: Vec<Simulator>) -> Self {
         let crosstalk = Crosstalk::new(array, &simulators);
         Self { simulators, crosstalk }
@@ -139,7 +141,7 @@ impl Models {
 }
 
 impl Crosstalk {
-    /// `None` where there can't be any, or it is left out.
+    /// Returns `None` if there is no crosstalk, or it is disabled.
     fn new(array: &RangerArray, simulators: &[Simulator]) -> Option<Self> {
         let simulator = simulators.first()?;
         let options = simulator.options().engine.paths()?;
@@ -148,32 +150,32 @@ impl Crosstalk {
         }
         let receiver = simulator.receiver();
         let absorption_np_per_m = simulator.path_settings().absorption_np_per_m;
-        let turn_m = array.interval_ms * 1e-3 * receiver.sound_speed_m_s;
-        let turns_back = turns_heard(receiver, absorption_np_per_m, turn_m);
-        if turns_back == 0 && !array.fires_together() {
+        let slot_m = array.interval_ms * 1e-3 * receiver.sound_speed_m_s;
+        let slots_back = crosstalk_slots(receiver, absorption_np_per_m, slot_m);
+        if slots_back == 0 && !array.fires_together() {
             return None;
         }
-        let longest_m = 2.0 * receiver.max_range_m + turns_back as f64 * turn_m;
+        let longest_m = 2.0 * receiver.max_range_m + slots_back as f64 * slot_m;
         let engine = |simulator: &Simulator| simulator.stray_engine(longest_m);
         let engines = simulators.iter().map(engine).collect::<Option<_>>()?;
-        Some(Self { turns_back, engines })
+        Some(Self { slots_back, engines })
     }
 }
 
 impl ArrayAtPose<'_> {
-    /// The array.
+    /// Returns the array of rangers.
     #[must_use]
     pub fn array(&self) -> &RangerArray {
         &self.model.array
     }
 
-    /// The robot's pose.
+    /// Returns the robot's pose.
     #[must_use]
     pub const fn pose(&self) -> &Pose {
         &self.pose
     }
 
-    /// The reading of a ranger that fires alone, by its index in the array.
+    /// Predicts the reading of a ranger that fires alone, by its index in the array.
     ///
     /// # Errors
     /// When there are more paths than can be found within bounds of work and memory.
@@ -182,8 +184,8 @@ impl ArrayAtPose<'_> {
         self.simulator(ranger).at(pose.position()).ping(pose.direction_rad(0.0))
     }
 
-    /// The reading of a firing of a round, counted from 0 as in [`RangerArray::round`], with the sound of the others
-    /// in its ear.
+    /// Predicts the reading of a firing of a round, counted from 0 as in [`RangerArray::round`],
+    /// with crosstalk from the others.
     ///
     /// # Errors
     /// As [`Self::ping`].
@@ -198,7 +200,8 @@ impl ArrayAtPose<'_> {
         point.ping_among(pose.direction_rad(0.0), &others)
     }
 
-    /// The same in noise: the same generator in the same state gives the same reading.
+    /// Predicts the reading of a firing of a round with receiver noise. The same generator in the
+    /// same state gives the same reading.
     ///
     /// # Errors
     /// As [`Self::ping`].
@@ -221,7 +224,7 @@ impl ArrayAtPose<'_> {
         }
     }
 
-    /// The model that a ranger's predictions are to be put into words with.
+    /// Returns the model with which a ranger's predictions are to be described.
     #[must_use]
     pub fn simulator(&self, ranger: usize) -> &Simulator {
         &self.models().simulators[self.height(ranger)]
@@ -232,18 +235,18 @@ impl ArrayAtPose<'_> {
         ranger.unwrap_or_else(|| panic!("a round has no firing {firing}"))
     }
 
-    /// The firings whose sound a ranger may receive in one of its own; `None` without crosstalk.
-    pub(super) fn others(&self, ranger: usize, firing: usize) -> Option<Others<'_>> {
+    /// Firings whose sound a ranger may receive in one of its own; `None` without crosstalk.
+    pub(super) fn others(&self, ranger: usize, firing: usize) -> Option<OtherFirings<'_>> {
         let crosstalk = self.models().crosstalk.as_ref()?;
         let simulator = self.simulator(ranger);
         let aimed = |ranger: usize, end: usize| {
             let pose = self.mounted(ranger);
             let direction_rad = pose.direction_rad(0.0);
             let places = simulator.sensor().mounting.places(pose.position(), direction_rad);
-            Aimed { place: places[end], direction_rad }
+            TransducerPose { place: places[end], direction_rad }
         };
-        let firings = self.model.array.others(firing, crosstalk.turns_back);
-        Some(Others {
+        let firings = self.model.array.others(firing, crosstalk.slots_back);
+        Some(OtherFirings {
             engine: &crosstalk.engines[self.height(ranger)],
             receiver: aimed(ranger, 1),
             sound_speed_m_s: simulator.sound_speed_m_s(),
@@ -252,7 +255,7 @@ impl ArrayAtPose<'_> {
         })
     }
 
-    fn models(&self) -> &Models {
+    fn models(&self) -> &ArrayModels {
         self.own.as_ref().unwrap_or(&self.model.bare)
     }
 

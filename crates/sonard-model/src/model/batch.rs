@@ -1,4 +1,4 @@
-//! Many poses at once.
+//! Predictions for many poses at once.
 
 use rayon::prelude::*;
 
@@ -6,11 +6,11 @@ use super::{Prediction, Simulator, TooCostly};
 use crate::{geometry::Pose, plan::ScanPlan};
 
 impl Simulator {
-    /// [`predict`](Self::predict) for each pose, on all cores; the results are those of one core, in
-    /// the order of the poses.
+    /// [`predict`](Self::predict) for each pose, on all cores; the results equal those of one core,
+    /// in the order of the poses.
     ///
-    /// The scene is the same for all poses: a robot's body has to stand in it already, so for poses
-    /// of a robot make a simulator each.
+    /// The scene is the same for all poses and has to contain a robot's body already, so poses of a
+    /// robot need a simulator each.
     ///
     /// # Errors
     /// When there are more paths than can be found within bounds of work and memory, at any pose.
@@ -35,7 +35,7 @@ mod tests {
     };
 
     #[test]
-    fn many_poses_give_what_each_gives_alone_in_their_order() {
+    fn batch_equals_single_poses() {
         let text = shipped::text("two-surface-room").expect("shipped");
         let scene = Arc::new(Scene::from_json(text).expect("a scene"));
         let sensor = Sensor::preset("senscomp-6500").expect("a preset");
@@ -55,7 +55,7 @@ mod tests {
     }
 
     #[test]
-    fn the_model_can_be_shared_between_threads() {
+    fn simulator_is_send_and_sync() {
         const fn shared<T: Send + Sync>() {}
         shared::<Scene>();
         shared::<Sensor>();

@@ -1,4 +1,4 @@
-//! The naive model: the nearest hit of a few rays within an aperture.
+//! Naive model: the nearest hit of a few rays within an aperture.
 
 use std::sync::Arc;
 
@@ -14,11 +14,11 @@ use crate::{
 /// Angle between rays, degrees.
 const SPACING_DEG: f64 = 1.0;
 
-/// One ray a degree within the aperture, and the nearest hit of all of them: Arrabales' simulated
-/// sonar array, and what most robot simulators do.
+/// Cone model with one ray per degree within the aperture and the nearest hit of all: Arrabales'
+/// simulated sonar array, and the usual model of robot simulators.
 ///
-/// No mirror reflection, no beam pattern, no absorption: whatever is hit answers with amplitude
-/// 1. Noise, if wanted, is the caller's to add.
+/// It has no mirror reflection, no beam pattern and no absorption: any hit returns an echo of
+/// amplitude 1. Noise, if required, is added by the caller.
 #[derive(Debug)]
 pub struct Cone {
     reflectors: Reflectors,
@@ -27,7 +27,7 @@ pub struct Cone {
 }
 
 impl Cone {
-    /// For a scene and a full aperture in degrees.
+    /// Creates the model for a scene and a full aperture in degrees.
     #[must_use]
     pub fn new(scene: &Scene, aperture_deg: f64) -> Self {
         let gaps = (aperture_deg / SPACING_DEG + 1e-9).floor();
@@ -62,7 +62,7 @@ impl ConeArrivals<'_> {
             .offsets_rad
             .iter()
             .filter_map(cast)
-            .min_by(|one, other| one.0.distance_m.total_cmp(&other.0.distance_m))?;
+            .min_by(|a, b| a.0.distance_m.total_cmp(&b.0.distance_m))?;
         Some(Arrival {
             length_m: 2.0 * hit.distance_m,
             amplitude: 1.0,
@@ -96,6 +96,6 @@ impl Arrivals for ConeArrivals<'_> {
     /// # Panics
     /// If `arrival` is not one of this direction.
     fn arrival(&self, direction_rad: f64, _sound: &PulseArrival) -> Arrival {
-        self.nearest(direction_rad).expect("a sound was heard in this direction")
+        self.nearest(direction_rad).expect("an arrival in this direction")
     }
 }

@@ -1,11 +1,11 @@
-//! The refusal of a search for echo paths that would cost more than it may.
+//! Error of a search for echo paths that exceeds its effort limit.
 
 use thiserror::Error;
 
-/// A part of the search, by which its effort is counted.
+/// Part of the search whose effort is counted separately.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SearchPart {
-    /// Beams that walls return.
+    /// Beams reflected by walls.
     Beams,
     /// Rays by way of cylinders.
     Cylinders,
@@ -29,7 +29,7 @@ impl SearchPart {
         Self::Images,
     ];
 
-    const fn in_words(self) -> &'static str {
+    const fn description(self) -> &'static str {
         match self {
             Self::Beams => "reflections from wall to wall",
             Self::Cylinders => "paths by way of cylinders",
@@ -41,19 +41,19 @@ impl SearchPart {
     }
 }
 
-/// A search that would cost more than it may: there are too many paths.
+/// Error of a search that exceeds its effort limit: there are too many paths.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[error(
-    "there are too many echo paths here to find them all, most of them {}: shorten max-range (it is {} m), \
-     give max-order or a smaller one{}, raise the threshold or `weakest`, or leave out what can't matter",
-    part.in_words(), max_path_m / 2.0,
-    if *double_diffraction { ", leave out double-diffraction" } else { "" }
+    "too many echo paths, most of them {}: reduce max-range (currently {} m), set or reduce max-order{}, \
+     raise the threshold or `weakest`, or remove objects that cannot matter",
+    part.description(), max_path_m / 2.0,
+    if *double_diffraction { ", disable double-diffraction" } else { "" }
 )]
 pub struct TooCostly {
-    /// What cost most.
+    /// Part of the search with the largest effort.
     pub part: SearchPart,
-    /// The longest path that was asked for, there and back, metres.
+    /// Longest requested path, there and back, metres.
     pub max_path_m: f64,
-    /// Whether paths by two edges were asked for.
+    /// `true` if paths by two edges were requested.
     pub double_diffraction: bool,
 }

@@ -10,36 +10,36 @@ use crate::{
 /// An echo at the transducer's face.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Arrival {
-    /// Length of the path there and back, metres; by a post that of its pulse, which comes by the surface, while
-    /// `path` runs to the axis.
+    /// Length of the path there and back, metres. For a post it is that of its pulse, which returns
+    /// by the surface, while `path` runs to the axis.
     pub length_m: f64,
-    /// Strength after gain compensation and the beam pattern on departure and arrival; a head-on, perfectly
-    /// reflecting wall without absorption gives 1.
+    /// Strength after gain compensation and the beam pattern on departure and arrival; a head-on,
+    /// perfectly reflecting wall without absorption gives 1.
     pub amplitude: f64,
-    /// The same before the beam pattern.
+    /// Strength before the beam pattern.
     pub path_amplitude: f64,
-    /// Phase of the carrier beside that of the path's length, for `exp(+i omega t)`, radians: what an edge
-    /// adds. Mirror reflections add none.
+    /// Phase of the carrier relative to that of the path's length, for `exp(+i omega t)`, radians;
+    /// caused by edges. Mirror reflections add none.
     pub phase_rad: f64,
     /// World direction of departure, radians counter-clockwise from +x.
     pub departure_rad: f64,
-    /// World direction of arrival, from the ranger towards where the echo comes from, radians.
+    /// World direction of arrival, from the ranger towards the origin of the echo, radians.
     pub arrival_rad: f64,
-    /// Its interactions, in order.
+    /// Interactions along the path, in order.
     pub path: Path,
 }
 
 /// Finds echo paths in a scene.
 pub trait Engine: Send + Sync {
-    /// The arrivals at an observation point (world, metres), for a transducer that sends and receives
-    /// there.
+    /// Returns the arrivals at an observation point (world, metres), for a transducer that sends
+    /// and receives there.
     ///
     /// # Errors
     /// When there are more paths than can be found within bounds of work and memory.
     fn arrivals_at<'a>(&'a self, position: DVec2) -> Result<Box<dyn Arrivals + 'a>, TooCostly>;
 
-    /// The same for a transmitter and a receiver apart; engines that know one point only take
-    /// the middle.
+    /// Returns the arrivals for a separate transmitter and receiver. Engines limited to one point
+    /// use the middle.
     ///
     /// # Errors
     /// As [`Self::arrivals_at`].
@@ -51,8 +51,8 @@ pub trait Engine: Send + Sync {
         self.arrivals_at(0.5 * (transmitter + receiver))
     }
 
-    /// The same of paths up to a length there and back alone, in metres, between transmitter and
-    /// receiver; `None` from engines that would gain nothing by it.
+    /// Returns the arrivals between transmitter and receiver up to a length there and back, in
+    /// metres; `None` from engines that save nothing by it.
     ///
     /// # Errors
     /// As [`Self::arrivals_at`].
@@ -65,22 +65,29 @@ pub trait Engine: Send + Sync {
     }
 }
 
-/// The arrivals at an observation point, in all directions.
+/// Arrivals at an observation point, in all directions.
 ///
 /// The paths depend on the point only, so they are found once and serve all directions.
 pub trait Arrivals: Send + Sync {
-    /// Replaces `arrivals` with what a firing in world direction `direction_rad` brings back,
-    /// shortest path first, weighted with the beam pattern; also arrivals too weak to be detected,
-    /// as far as the engine knows them.
+    /// Replaces `arrivals` with those of a firing in world direction `direction_rad`, shortest path
+    /// first, weighted with the beam pattern. Includes arrivals too weak to be detected, as far as
+    /// the engine finds them.
     fn listen(&self, direction_rad: f64, arrivals: &mut Vec<PulseArrival>);
 
-    /// The same of arrivals up to a length there and back alone, in metres.
-    fn listen_within(&self, direction_rad: f64, length_m: f64, arrivals: &mut Vec<PulseArrival>) {
+    /// As [`listen`](Self::listen), limited to arrivals up to a length
+    /// there and back, in metres.
+    fn collect_arrivals_within(
+        &self,
+        direction_rad: f64,
+        length_m: f64,
+        arrivals: &mut Vec<PulseArrival>,
+    ) {
         self.listen(direction_rad, arrivals);
         arrivals.retain(|arrival| arrival.length_m <= length_m);
     }
 
-    /// [`arrival`](Self::arrival) of one that [`listen_within`](Self::listen_within) gave for this length.
+    /// As [`arrival`](Self::arrival), for a result of
+    /// [`collect_arrivals_within`](Self::collect_arrivals_within) with this length.
     fn arrival_within(
         &self,
         direction_rad: f64,
@@ -90,7 +97,8 @@ pub trait Arrivals: Send + Sync {
         self.arrival(direction_rad, arrival)
     }
 
-    /// [`incident`](Self::incident) of one that [`listen_within`](Self::listen_within) gave for this length.
+    /// As [`incident`](Self::incident), for a result of
+    /// [`collect_arrivals_within`](Self::collect_arrivals_within) with this length.
     fn incident_within(
         &self,
         direction_rad: f64,
@@ -100,11 +108,13 @@ pub trait Arrivals: Send + Sync {
         self.incident(direction_rad, arrival)
     }
 
-    /// The full account of an arrival that [`listen`](Self::listen) gave for the same direction.
+    /// Returns the full description of an arrival that
+    /// [`listen`](Self::listen) returned for the same direction.
     fn arrival(&self, direction_rad: f64, arrival: &PulseArrival) -> Arrival;
 
-    /// The incidence of an arrival that [`listen`](Self::listen) gave for the same direction: what the
-    /// full response of the face asks of each arrival of a firing.
+    /// Returns the incidence of an arrival that [`listen`](Self::listen)
+    /// returned for the same direction. The full response of the face needs it for each arrival of
+    /// a firing.
     fn incident(&self, direction_rad: f64, arrival: &PulseArrival) -> Incident {
         let arrival = self.arrival(direction_rad, arrival);
         let image = match arrival.path.kind() {
@@ -123,7 +133,7 @@ pub trait Arrivals: Send + Sync {
         }
     }
 
-    /// All arrivals of a firing in full, shortest path first.
+    /// Returns all arrivals of a firing in full, shortest path first.
     fn arrivals(&self, direction_rad: f64) -> Vec<Arrival> {
         let mut arrivals = Vec::new();
         self.listen(direction_rad, &mut arrivals);
@@ -131,7 +141,7 @@ pub trait Arrivals: Send + Sync {
     }
 }
 
-/// The image of the transducer's face over a number of mirrors.
+/// Image of the transducer's face over a number of mirrors.
 pub(super) const fn mirrored(count: usize) -> Image {
     if count.is_multiple_of(2) { Image::Upright } else { Image::Swapped }
 }

@@ -1,8 +1,8 @@
 //! Echo paths from one transducer position, computed lazily by range.
 //!
-//! The number of echo paths grows with the square of their length, and most firings are answered
-//! by a short one. So the short paths are found first, and longer ones only once a firing
-//! turns out to depend on them: what is read is the same.
+//! The number of echo paths grows with the square of their length, and most firings are decided by
+//! a short one. The short paths are therefore found first, and longer ones only once a firing turns
+//! out to depend on them. The readings are the same.
 
 use std::sync::{
     OnceLock,
@@ -20,60 +20,62 @@ use crate::{
     geometry::DVec2,
 };
 
-/// Reach of all steps but the last, beside the longest path. What is found in one step is
-/// found again in the next, at about a quarter of its work; beside a round body at more.
+/// Reach of all steps but the last, as shares of the longest path. The paths of one step are found
+/// again in the next, at about a quarter of its work; near a round body at more.
 const REACHES: [f64; 3] = [0.125, 0.25, 0.5];
 
-/// A search goes so much farther than the last one had to.
+/// Factor by which a search reaches beyond the last one's requirement.
 const AHEAD: f64 = 1.1;
 
-/// From this part of the longest path on a search goes all the way.
+/// Share of the longest path from which on a search is complete.
 const NEARLY_ALL: f64 = 0.8;
 
-/// What a search came to.
-type Found<'a> = Box<dyn Arrivals + 'a>;
+/// Result of a search.
+type SearchResult<'a> = Box<dyn Arrivals + 'a>;
 
-/// How far the last observation point had to search, there and back: the next one begins with a search as far. Only
-/// what is searched for in vain depends on it.
+/// Length there and back that the last observation point required: the next one begins with a
+/// search of that length. It only affects unnecessary work.
 #[derive(Debug, Default)]
-pub(super) struct Expected(AtomicU64);
+pub(super) struct ReachEstimate(AtomicU64);
 
-/// Arrivals between a transmitter and a receiver, as far as they were asked for.
+/// Arrivals between a transmitter and a receiver, as far as they were requested.
 pub(super) struct LazyArrivals<'a> {
     engine: &'a dyn Engine,
-    /// Transmitter and receiver.
+    /// Positions of transmitter and receiver (world, metres).
     at: [DVec2; 2],
     max_path_m: f64,
-    /// From near to far.
-    steps: SmallVec<[Step<'a>; 4]>,
-    whole: OnceLock<Result<Found<'a>, TooCostly>>,
-    /// Which of the steps is searched first, if it is not nearer than what is asked for; their number for the whole.
+    /// Steps from near to far.
+    steps: SmallVec<[SearchStep<'a>; 4]>,
+    whole: OnceLock<Result<SearchResult<'a>, TooCostly>>,
+    /// Index of the step that is searched first, unless a farther one is requested; the number of
+    /// steps means a complete search.
     first: usize,
-    /// Which of the steps, from near to whole, would have settled the last firing: the next one
-    /// looks beside it and is likely to need the same. The answer does not depend on it.
+    /// Index of the step, from near to complete, that would have decided the last firing. The next
+    /// firing has a similar direction and is likely to need the same. The result does not depend on
+    /// it.
     enough: AtomicUsize,
-    /// The length that settled all firings, metres, as bits, by which positive numbers sort.
+    /// Length that decided all firings, metres, as bits, which sort like the positive numbers.
     needed_m: AtomicU64,
-    expected: &'a Expected,
+    expected: &'a ReachEstimate,
 }
 
 /// A search up to a length.
-struct Step<'a> {
+struct SearchStep<'a> {
     reach_m: f64,
-    /// Found at the first call; `None` from an engine that finds all at once.
-    found: OnceLock<Result<Option<Found<'a>>, TooCostly>>,
+    /// Result of the first call; `None` from an engine that finds all paths at once.
+    found: OnceLock<Result<Option<SearchResult<'a>>, TooCostly>>,
 }
 
-/// Arrivals up to a length, of a search that went so far or farther.
-pub(super) struct Near<'a> {
+/// Arrivals up to a length, from a search of at least that length.
+pub(super) struct NearArrivals<'a> {
     arrivals: &'a dyn Arrivals,
-    /// Length there and back up to which all are known, metres.
+    /// Length there and back up to which all arrivals are known, metres.
     pub(super) reach_m: f64,
 }
 
-impl Arrivals for Near<'_> {
+impl Arrivals for NearArrivals<'_> {
     fn listen(&self, direction_rad: f64, arrivals: &mut Vec<PulseArrival>) {
-        self.arrivals.listen_within(direction_rad, self.reach_m, arrivals);
+        self.arrivals.collect_arrivals_within(direction_rad, self.reach_m, arrivals);
     }
 
     fn arrival(&self, direction_rad: f64, arrival: &PulseArrival) -> Arrival {
@@ -90,10 +92,10 @@ impl<'a> LazyArrivals<'a> {
         engine: &'a dyn Engine,
         at: [DVec2; 2],
         max_path_m: f64,
-        expected: &'a Expected,
+        expected: &'a ReachEstimate,
     ) -> Self {
-        let step = |reach_m: f64| Step { reach_m, found: OnceLock::new() };
-        let mut steps: SmallVec<[Step; 4]> =
+        let step = |reach_m: f64| SearchStep { reach_m, found: OnceLock::new() };
+        let mut steps: SmallVec<[SearchStep; 4]> =
             REACHES.iter().map(|reach| step(reach * max_path_m)).collect();
         let ahead_m = AHEAD * f64::from_bits(expected.0.load(Ordering::Relaxed));
         let first = if ahead_m > NEARLY_ALL * max_path_m {
@@ -109,7 +111,7 @@ impl<'a> LazyArrivals<'a> {
         Self { engine, at, max_path_m, steps, whole, first, enough, needed_m, expected }
     }
 
-    /// All arrivals.
+    /// Returns all arrivals, from a complete search.
     pub(super) fn whole(&self) -> Result<&(dyn Arrivals + 'a), TooCostly> {
         let [transmitter, receiver] = self.at;
         let find = || {
@@ -125,14 +127,14 @@ impl<'a> LazyArrivals<'a> {
         }
     }
 
-    /// The result of `listen` for the shortest echoes that settle it, and these. It is told up to
-    /// which length, in metres, all echoes are known, and says which length would have been
-    /// enough, if any was.
+    /// Returns the result of `predict` for the shortest echoes that decide it, and these echoes.
+    /// `predict` receives the arrivals with the length, in metres, up to which all are known, and
+    /// also returns the length that would have been enough, if any was.
     pub(super) fn nearest<T>(
         &self,
-        mut listen: impl FnMut(&Near) -> (T, Option<f64>),
-    ) -> Result<(T, Near<'_>), TooCostly> {
-        let settled = |needed_m: f64| {
+        mut predict: impl FnMut(&NearArrivals) -> (T, Option<f64>),
+    ) -> Result<(T, NearArrivals<'_>), TooCostly> {
+        let record = |needed_m: f64| {
             let enough = self.steps.iter().position(|step| step.reach_m > needed_m);
             self.enough.store(enough.unwrap_or(self.steps.len()), Ordering::Relaxed);
             self.needed_m.fetch_max(needed_m.max(0.0).to_bits(), Ordering::Relaxed);
@@ -140,21 +142,21 @@ impl<'a> LazyArrivals<'a> {
         let begin = self.enough.load(Ordering::Relaxed);
         for (at, step) in self.steps.iter().enumerate().skip(begin) {
             let Some(arrivals) = self.reaching(at)? else { break };
-            let near = Near { arrivals, reach_m: step.reach_m };
-            let (heard, needed_m) = listen(&near);
+            let near = NearArrivals { arrivals, reach_m: step.reach_m };
+            let (result, needed_m) = predict(&near);
             if let Some(needed_m) = needed_m {
-                settled(needed_m);
-                return Ok((heard, near));
+                record(needed_m);
+                return Ok((result, near));
             }
         }
-        let whole = Near { arrivals: self.whole()?, reach_m: f64::INFINITY };
-        let (heard, needed_m) = listen(&whole);
-        settled(needed_m.unwrap_or(f64::INFINITY));
-        Ok((heard, whole))
+        let whole = NearArrivals { arrivals: self.whole()?, reach_m: f64::INFINITY };
+        let (result, needed_m) = predict(&whole);
+        record(needed_m.unwrap_or(f64::INFINITY));
+        Ok((result, whole))
     }
 
-    /// Arrivals at least up to the reach of a step: those that are known, or those of a search that goes as far as
-    /// expected. `None` from an engine that finds all at once.
+    /// Returns arrivals at least up to the reach of a step: the known ones, or those of a search up
+    /// to the expected length. `None` from an engine that finds all paths at once.
     fn reaching(&self, step: usize) -> Result<Option<&(dyn Arrivals + 'a)>, TooCostly> {
         let is_known = |at: &usize| matches!(self.steps[*at].found.get(), Some(Ok(_)));
         if let Some(known) = (step..self.steps.len()).find(is_known) {
@@ -163,19 +165,20 @@ impl<'a> LazyArrivals<'a> {
         if let Some(Ok(whole)) = self.whole.get() {
             return Ok(Some(whole.as_ref()));
         }
-        // What is expected may be more than can be found here, and is not asked for yet.
+        // The expected length may exceed the effort limit here, and is not requested yet.
         self.search(step.max(self.first)).or_else(|_| self.search(step))
     }
 
-    /// All arrivals up to the reach of a step.
+    /// Returns all arrivals up to the reach of a step.
     fn search(&self, step: usize) -> Result<Option<&(dyn Arrivals + 'a)>, TooCostly> {
-        let Some(Step { reach_m, found }) = self.steps.get(step) else {
+        let Some(SearchStep { reach_m, found }) = self.steps.get(step) else {
             return self.whole().map(Some);
         };
         let found = found.get_or_init(|| self.engine.arrivals_within(self.at, *reach_m));
-        // Whoever asks knows nothing of steps: what is too far is the range that was asked for.
-        let asked = |error: &TooCostly| TooCostly { max_path_m: self.max_path_m, ..error.clone() };
-        Ok(found.as_ref().map_err(asked)?.as_deref())
+        // Steps are internal: the error names the requested range instead of the step's.
+        let requested =
+            |error: &TooCostly| TooCostly { max_path_m: self.max_path_m, ..error.clone() };
+        Ok(found.as_ref().map_err(requested)?.as_deref())
     }
 }
 

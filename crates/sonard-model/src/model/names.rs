@@ -1,19 +1,20 @@
-//! Names of what a path meets: ids of the scene, and words for what has no id.
+//! Names of reflectors and diffractors: ids of the scene, and fixed names for objects without an
+//! id.
 
 use super::{Diffractor, Edge, Mechanism, Reflector};
 use crate::scene::Scene;
 
-/// The name of the transducer's own face on a path.
+/// Name of the transducer's own face on a path.
 pub const FACE_NAME: &str = "transducer";
-/// The same of a room's floor and ceiling.
+/// Names of a room's floor and ceiling.
 const FLOOR: &str = "floor";
 const CEILING: &str = "ceiling";
 
 impl Reflector {
-    /// Its name in a scene: the id of a wall or cylinder, `floor` or `ceiling`.
+    /// Name in a scene: the id of a wall or cylinder, `floor` or `ceiling`.
     ///
     /// # Panics
-    /// If it is of another scene.
+    /// If the reflector is of another scene.
     #[must_use]
     pub fn name(self, scene: &Scene) -> String {
         match self {
@@ -26,10 +27,11 @@ impl Reflector {
 }
 
 impl Mechanism {
-    /// What it is done by, in a scene: a [`Reflector`]'s name, a [`Diffractor`]'s, or [`FACE_NAME`].
+    /// Name of the object in a scene: that of the [`Reflector`], of the [`Diffractor`], or
+    /// [`FACE_NAME`].
     ///
     /// # Panics
-    /// If it is of another scene.
+    /// If the mechanism is of another scene.
     #[must_use]
     pub fn name(self, scene: &Scene) -> String {
         match self {
@@ -42,11 +44,11 @@ impl Mechanism {
 }
 
 impl Diffractor {
-    /// Its name in a scene: `WALL.a` and `WALL.b` are the upright edges at the ends of a wall, `WALL.top`
-    /// and `WALL.bottom` the level ones; a thin cylinder has its id.
+    /// Name in a scene: `WALL.a` and `WALL.b` are the upright edges at the ends of a wall,
+    /// `WALL.top` and `WALL.bottom` the level ones; a thin cylinder has its id.
     ///
     /// # Panics
-    /// If it is of another scene.
+    /// If the diffractor is of another scene.
     #[must_use]
     pub fn name(self, scene: &Scene) -> String {
         let (wall, end) = match self {

@@ -6,7 +6,7 @@ use rand::Rng;
 
 use super::{
     cost::TooCostly,
-    crosstalk::{Medley, Others, Sorted},
+    crosstalk::{MergedArrivals, MixedArrivals, OtherFirings},
     engine::{Arrival, Arrivals},
     lazy::LazyArrivals,
     prediction::Prediction,
@@ -19,16 +19,16 @@ use crate::{
     geometry::DVec2,
 };
 
-/// A point from which firings are predicted; [`Simulator::at`] makes it.
+/// A point from which firings are predicted; created by [`Simulator::at`].
 pub struct ObservationPoint<'a> {
     simulator: &'a Simulator,
     position: DVec2,
-    /// Of a transducer on the axis, which stays where it is when it turns; one beside the axis is
-    /// somewhere else at each azimuth.
+    /// Arrivals of a transducer on the axis, whose position is independent of the azimuth. `None`
+    /// for one off the axis, which is at a different point at each azimuth.
     axis: Option<LazyArrivals<'a>>,
 }
 
-/// A firing that hears more has to make room for them.
+/// Initial capacity; a firing with more arrivals reallocates.
 const USUAL_ARRIVALS: usize = 64;
 
 impl<'a> ObservationPoint<'a> {
@@ -38,142 +38,147 @@ impl<'a> ObservationPoint<'a> {
         Self { simulator, position, axis }
     }
 
-    /// The reading of a firing in a world direction, radians counter-clockwise from +x: the first
-    /// echo, which latches ECHO.
+    /// Predicts the reading of a firing in a world direction, radians counter-clockwise from +x:
+    /// the first echo, which latches ECHO.
     ///
     /// # Errors
-    /// When there are more paths than can be found within bounds of work and memory, here and in all that follows.
+    /// When there are more paths than can be found within bounds of work and memory, here and in
+    /// all methods below.
     pub fn ping(&self, direction_rad: f64) -> Result<Prediction, TooCostly> {
-        self.listen(self.simulator.receiver(), direction_rad, Latch::First)
+        self.predict(self.simulator.receiver(), direction_rad, Latch::First)
     }
 
-    /// Has a firing listened to by any receivers: the simulator's own with other thresholds, for what a firing is that
-    /// was more or less sensitive than usual. Its arrivals are found once; `listen` may be called again with more of
-    /// them, and its last result counts.
+    /// Evaluates a firing with any receivers: the simulator's own with other thresholds, for a
+    /// firing of higher or lower sensitivity than usual. The arrivals are found once. `detect` may
+    /// be called again with more arrivals, and its last result counts.
     ///
     /// # Errors
     /// As [`Self::ping`].
     pub fn hear<T>(
         &self,
         direction_rad: f64,
-        listen: impl FnMut(&FiringArrivals) -> T,
+        detect: impl FnMut(&FiringArrivals) -> T,
     ) -> Result<T, TooCostly> {
-        self.heard(direction_rad, listen).map(|(heard, _)| heard)
+        self.evaluate_needed(direction_rad, detect).map(|(result, _)| result)
     }
 
-    /// The same with the receiver made ready again after each echo, up to eight times.
+    /// Predicts the reading of a firing whose receiver is re-armed after each echo, up to eight
+    /// times.
     ///
     /// # Errors
     /// As [`Self::ping`].
     pub fn ping_rearmed(&self, direction_rad: f64) -> Result<Prediction, TooCostly> {
-        self.listen(self.simulator.receiver(), direction_rad, Latch::Rearmed)
+        self.predict(self.simulator.receiver(), direction_rad, Latch::Rearmed)
     }
 
-    fn listen(
+    fn predict(
         &self,
         receiver: &Receiver,
         direction_rad: f64,
         latch: Latch,
     ) -> Result<Prediction, TooCostly> {
-        self.listen_alone(receiver, direction_rad, latch).map(|(prediction, _)| prediction)
+        self.predict_alone(receiver, direction_rad, latch).map(|(prediction, _)| prediction)
     }
 
-    /// The same, and up to which length there and back arrivals matter to it, metres.
-    fn listen_alone(
+    /// Predicts a reading, and returns the length there and back up to which arrivals affect it,
+    /// metres.
+    fn predict_alone(
         &self,
         receiver: &Receiver,
         direction_rad: f64,
         latch: Latch,
     ) -> Result<(Prediction, f64), TooCostly> {
-        self.heard(direction_rad, |firing| firing.prediction(firing.detect(receiver, latch, 0.0)))
+        self.evaluate_needed(direction_rad, |firing| {
+            firing.prediction(firing.detect(receiver, latch, 0.0))
+        })
     }
 
-    /// What `listen` tells once it has enough of the arrivals, and up to which length there and back they matter,
-    /// metres.
-    fn heard<T>(
+    /// Returns the result of `detect` once enough arrivals are known, and the length there and back
+    /// up to which they affect it, metres.
+    fn evaluate_needed<T>(
         &self,
         direction_rad: f64,
-        mut listen: impl FnMut(&FiringArrivals) -> T,
+        mut detect: impl FnMut(&FiringArrivals) -> T,
     ) -> Result<(T, f64), TooCostly> {
         let mut arrivals = Vec::with_capacity(USUAL_ARRIVALS);
         self.at(direction_rad, |all| {
-            let ((heard, needed_m), _) = all.nearest(|near| {
+            let ((result, needed_m), _) = all.nearest(|near| {
                 near.listen(direction_rad, &mut arrivals);
                 let firing = FiringArrivals {
-                    firing: Firing { from: near, direction_rad },
+                    firing: DirectedArrivals { from: near, direction_rad },
                     arrivals: &arrivals,
                     reach_m: near.reach_m,
                     needed_m: Cell::new(Some(0.0)),
                 };
-                let heard = listen(&firing);
+                let result = detect(&firing);
                 let needed_m = firing.needed_m.get();
-                ((heard, needed_m.unwrap_or(f64::INFINITY)), needed_m)
+                ((result, needed_m.unwrap_or(f64::INFINITY)), needed_m)
             })?;
-            Ok((heard, needed_m))
+            Ok((result, needed_m))
         })
     }
 
-    /// The same with the sound of other firings beside it.
+    /// Predicts the reading of a firing with crosstalk from other firings.
     pub(super) fn ping_among(
         &self,
         direction_rad: f64,
-        others: &Others,
+        others: &OtherFirings,
     ) -> Result<Prediction, TooCostly> {
         let receiver = self.simulator.receiver();
-        let (alone, needed_m) = self.listen_alone(receiver, direction_rad, Latch::First)?;
-        if others.is_silent() {
+        let (alone, needed_m) = self.predict_alone(receiver, direction_rad, Latch::First)?;
+        if others.is_empty() {
             return Ok(alone);
         }
-        others.settle(needed_m, |medley| self.listen_among(direction_rad, medley))
+        others.resolve(needed_m, |mixed| self.predict_among(direction_rad, mixed))
     }
 
-    fn listen_among(
+    fn predict_among(
         &self,
         direction_rad: f64,
-        medley: &Medley,
+        mixed: &MixedArrivals,
     ) -> Result<(Prediction, f64), TooCostly> {
         let (receiver, mut own) = (self.simulator.receiver(), Vec::new());
         self.at(direction_rad, |all| {
             let ((detection, sorted, needed_m), near) = all.nearest(|near| {
                 near.listen(direction_rad, &mut own);
-                let sorted = medley.sorted(&own);
-                let firing = Firing { from: near, direction_rad };
+                let sorted = mixed.sorted(&own);
+                let firing = DirectedArrivals { from: near, direction_rad };
                 let incident = |arrival: &PulseArrival| {
-                    Some(medley.incident(&sorted, arrival, |own| firing.incident(own)))
+                    Some(mixed.incident(&sorted, arrival, |own| firing.incident(own)))
                 };
-                let known_m = near.reach_m.min(medley.known_m);
+                let known_m = near.reach_m.min(mixed.known_m);
                 let (detection, needed_m) =
                     receiver.detect_within(known_m, &sorted.arrivals, &incident, Latch::First, 0.0);
                 ((detection, sorted, needed_m.unwrap_or(f64::INFINITY)), needed_m)
             })?;
-            let firing = Firing { from: &near, direction_rad };
-            Ok((firing.prediction_among(detection, medley, &sorted), needed_m))
+            let firing = DirectedArrivals { from: &near, direction_rad };
+            Ok((firing.prediction_among(detection, mixed, &sorted), needed_m))
         })
     }
 
-    /// [`ping_in_noise`](Self::ping_in_noise) with the sound of other firings beside it.
+    /// As [`ping_in_noise`](Self::ping_in_noise), with crosstalk from other firings.
     pub(super) fn ping_among_in_noise(
         &self,
         direction_rad: f64,
-        others: &Others,
+        others: &OtherFirings,
         noise: &ReceiverNoise,
         rng: &mut impl Rng,
     ) -> Result<Prediction, TooCostly> {
         let receiver = self.simulator.receiver();
-        others.settle(f64::INFINITY, |medley| {
-            let heard = self.firing(direction_rad, |firing| {
-                let sorted = medley.sorted(&firing.arrivals());
+        others.resolve(f64::INFINITY, |mixed| {
+            let result = self.firing(direction_rad, |firing| {
+                let sorted = mixed.sorted(&firing.arrivals());
                 let incident = |arrival: &PulseArrival| {
-                    Some(medley.incident(&sorted, arrival, |own| firing.incident(own)))
+                    Some(mixed.incident(&sorted, arrival, |own| firing.incident(own)))
                 };
                 let detection = receiver.detect_in_noise(&sorted.arrivals, &incident, noise, rng);
-                firing.prediction_among(detection, medley, &sorted)
+                firing.prediction_among(detection, mixed, &sorted)
             })?;
-            Ok((heard, f64::INFINITY))
+            Ok((result, f64::INFINITY))
         })
     }
 
-    /// The same by all echoes at once, however far they come from.
+    /// Predicts a reading from all echoes at once, regardless of their length.
     #[cfg(test)]
     pub(super) fn ping_by_all(
         &self,
@@ -187,8 +192,8 @@ impl<'a> ObservationPoint<'a> {
         })
     }
 
-    /// [`ping_rearmed`](Self::ping_rearmed) in noise: the same generator in the same state gives
-    /// the same reading.
+    /// [`ping_rearmed`](Self::ping_rearmed) with receiver noise: the same generator in the same
+    /// state gives the same reading.
     ///
     /// # Errors
     /// As [`Self::ping`].
@@ -205,9 +210,9 @@ impl<'a> ObservationPoint<'a> {
         })
     }
 
-    /// The trace of a firing as an oscilloscope would show it, up to a range in metres, in steps of so many
-    /// microseconds; each [`EnvelopePeak`](crate::acoustics::EnvelopePeak) can be named with
-    /// [`arrival`](Self::arrival).
+    /// Computes the trace of a firing as on an oscilloscope, up to a range in metres, in steps of
+    /// `step_us` microseconds. Each [`EnvelopePeak`](crate::acoustics::EnvelopePeak) can be
+    /// identified with [`arrival`](Self::arrival).
     ///
     /// # Errors
     /// As [`Self::ping`].
@@ -225,7 +230,7 @@ impl<'a> ObservationPoint<'a> {
         })
     }
 
-    /// Every echo of a firing in a world direction, detected or not, shortest path first.
+    /// Returns every echo of a firing in a world direction, detected or not, shortest path first.
     ///
     /// # Errors
     /// As [`Self::ping`].
@@ -233,7 +238,7 @@ impl<'a> ObservationPoint<'a> {
         self.firing(direction_rad, |firing| firing.from.arrivals(direction_rad))
     }
 
-    /// The full account of an arrival of a firing in the same direction.
+    /// Returns the full description of an arrival of a firing in the same direction.
     ///
     /// # Errors
     /// As [`Self::ping`].
@@ -245,39 +250,42 @@ impl<'a> ObservationPoint<'a> {
         self.firing(direction_rad, |firing| firing.from.arrival(direction_rad, arrival))
     }
 
-    /// Fires with all echoes from where the transducer is when it looks into a direction.
+    /// Calls `visit` with all arrivals at the transducer's position for a direction.
     fn firing<T>(
         &self,
         direction_rad: f64,
-        tell: impl FnOnce(&Firing) -> T,
+        visit: impl FnOnce(&DirectedArrivals) -> T,
     ) -> Result<T, TooCostly> {
-        self.at(direction_rad, |all| Ok(tell(&Firing { from: all.whole()?, direction_rad })))
+        self.at(direction_rad, |all| {
+            Ok(visit(&DirectedArrivals { from: all.whole()?, direction_rad }))
+        })
     }
 
-    /// Goes where the transducer is when it looks into a direction.
-    fn at<T>(&self, direction_rad: f64, tell: impl FnOnce(&LazyArrivals) -> T) -> T {
+    /// Calls `visit` with the arrivals at the transducer's position for a direction.
+    fn at<T>(&self, direction_rad: f64, visit: impl FnOnce(&LazyArrivals) -> T) -> T {
         if let Some(all) = &self.axis {
-            return tell(all);
+            return visit(all);
         }
         let mounting = &self.simulator.sensor().mounting;
-        tell(&self.simulator.arrivals_between(mounting.places(self.position, direction_rad)))
+        visit(&self.simulator.arrivals_between(mounting.places(self.position, direction_rad)))
     }
 }
 
-/// A firing's arrivals, for receivers to listen to.
+/// Arrivals of a firing, as input for receivers.
 pub struct FiringArrivals<'a> {
-    firing: Firing<'a>,
-    /// Shortest path first.
+    firing: DirectedArrivals<'a>,
+    /// Arrivals, shortest path first.
     arrivals: &'a [PulseArrival],
-    /// Up to which length there and back they are known, metres.
+    /// Length there and back up to which the arrivals are known, metres.
     reach_m: f64,
-    /// Up to which they matter to what was asked, if they are known so far.
+    /// Length up to which they affect the results so far; `None` if that exceeds the known length.
     needed_m: Cell<Option<f64>>,
 }
 
 impl FiringArrivals<'_> {
-    /// What a receiver detects that is ready from the end of blanking on, or from `ready_us` microseconds after firing
-    /// if that is later: for one that is known not to have been raised before, because a more sensitive one was not.
+    /// Returns the detection of a receiver that is ready from the end of blanking on, or from
+    /// `ready_us` microseconds after firing if that is later. The latter is for a receiver that
+    /// cannot have triggered before, because a more sensitive one did not.
     #[must_use]
     pub fn detect(&self, receiver: &Receiver, latch: Latch, ready_us: f64) -> Detection {
         let incident = |arrival: &PulseArrival| Some(self.firing.incident(arrival));
@@ -289,43 +297,43 @@ impl FiringArrivals<'_> {
         detection
     }
 
-    /// Listens with receivers that have a threshold of their own each, and are otherwise this one.
-    pub fn listen<T>(&self, receiver: &Receiver, listen: impl FnOnce(&mut Listening) -> T) -> T {
+    /// Evaluates receivers that differ from `receiver` in their thresholds only.
+    pub fn listen<T>(&self, receiver: &Receiver, detect: impl FnOnce(&mut Listening) -> T) -> T {
         let incident = |arrival: &PulseArrival| Some(self.firing.incident(arrival));
         let incident: &dyn Fn(&PulseArrival) -> Option<Incident> =
             if receiver.asks_incidents() { &incident } else { &|_| None };
         let mut listening = receiver.listen(self.reach_m, self.arrivals, incident);
-        let heard = listen(&mut listening);
+        let result = detect(&mut listening);
         self.needs(listening.needed_m());
-        heard
+        result
     }
 
-    /// Takes down up to which length arrivals mattered to one more answer.
+    /// Records the length up to which arrivals affected one more result.
     fn needs(&self, needed_m: Option<f64>) {
         let both = self.needed_m.get().zip(needed_m);
         self.needed_m.set(both.map(|(one_m, other_m)| one_m.max(other_m)));
     }
 
-    /// The full account of one of the arrivals.
+    /// Returns the full description of one of the arrivals.
     #[must_use]
     pub fn arrival(&self, arrival: &PulseArrival) -> Arrival {
         self.firing.from.arrival(self.firing.direction_rad, arrival)
     }
 
-    /// A detection as a reading, with the path of its arrival.
+    /// Converts a detection to a reading, with the path of its arrival.
     #[must_use]
     pub fn prediction(&self, detection: Detection) -> Prediction {
         self.firing.prediction(detection)
     }
 }
 
-/// The arrivals at a point in a direction.
-struct Firing<'a> {
+/// Arrivals at a point in a direction.
+struct DirectedArrivals<'a> {
     from: &'a dyn Arrivals,
     direction_rad: f64,
 }
 
-impl Firing<'_> {
+impl DirectedArrivals<'_> {
     fn arrivals(&self) -> Vec<PulseArrival> {
         let mut arrivals = Vec::new();
         self.from.listen(self.direction_rad, &mut arrivals);
@@ -352,12 +360,12 @@ impl Firing<'_> {
     fn prediction_among(
         &self,
         mut detection: Detection,
-        medley: &Medley,
-        sorted: &Sorted,
+        mixed: &MixedArrivals,
+        sorted: &MergedArrivals,
     ) -> Prediction {
         let cause = detection.arrival.take();
         let (arrival, crosstalk) = cause
-            .map(|arrival| medley.arrival(sorted, &arrival, (self.from, self.direction_rad)))
+            .map(|arrival| mixed.arrival(sorted, &arrival, (self.from, self.direction_rad)))
             .unzip();
         Prediction { arrival, crosstalk: crosstalk.flatten(), ..self.prediction(detection) }
     }

@@ -1,4 +1,4 @@
-//! Settings of the model: those that every engine knows, and those of one engine each.
+//! Settings of the model: common ones, and those of each engine.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -9,7 +9,7 @@ mod keys;
 
 pub use keys::{ForeignOption, OptionKeys};
 
-/// How echoes are found.
+/// Simulation engine that finds the echoes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[cfg_attr(feature = "clap", derive(clap::ValueEnum))]
 #[serde(rename_all = "snake_case")]
@@ -19,18 +19,18 @@ pub enum EngineKind {
     Paths,
     /// Rays with mirror reflections and diffraction, after Dudek, Jenkin, Milios and Wilkes.
     Fan,
-    /// Nearest hit of one ray a degree.
+    /// Nearest hit of one ray per degree.
     Cone,
 }
 
-/// Settings of the model; what is `None` comes from the sensor or the engine.
+/// Settings of the model; a `None` is replaced by the value of the sensor or the engine.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Options {
-    /// How echoes are found, with what only that engine knows.
+    /// Engine and its own settings.
     pub engine: EngineOptions,
-    /// Half the longest path listened for, metres.
+    /// Maximum range, metres: half the longest path that is received.
     pub max_range_m: Option<f64>,
-    /// Least amplitude detected, relative to a head-on, perfectly reflecting wall.
+    /// Detection threshold, relative to a head-on, perfectly reflecting wall.
     pub threshold: Option<f64>,
 }
 
@@ -48,45 +48,45 @@ pub enum EngineOptions {
 /// Settings of the engine `paths`.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct PathOptions {
-    /// How the face answers to a pulse; without it, the sensor's way.
+    /// Aperture response; `None` for the sensor's.
     pub response: Option<Response>,
-    /// Detect one sound at a time, and time it by its path alone
-    /// ([`Combining::Ideal`](crate::acoustics::Combining::Ideal)). The other engines know no phases
-    /// and always do.
+    /// Ideal receiver without interference and time walk
+    /// ([`Combining::Ideal`](crate::acoustics::Combining::Ideal)). The other engines have no phases
+    /// and always use it.
     pub ideal_receiver: bool,
-    /// Leave out the absorption of the air.
+    /// Disables the absorption of the air.
     pub lossless: bool,
-    /// Most mirror reflections on a path; without it, as many as can matter.
+    /// Maximum number of mirror reflections on a path; `None` for all that can matter.
     pub max_order: Option<u32>,
-    /// What edges send back; without it, the sensor's law.
+    /// Edge diffraction model; `None` for the sensor's.
     pub edge_law: Option<EdgeLawKind>,
-    /// Also sound that bends at two edges.
+    /// Adds paths diffracted at two edges.
     pub double_diffraction: bool,
-    /// Leave out what an array's ranger receives of other firings than its own.
+    /// Disables crosstalk between the rangers of an array.
     pub without_crosstalk: bool,
 }
 
 /// Settings of the engine `fan`, whose edges follow Kuc and Siegel's law.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FanOptions {
-    /// Leave out the absorption of the air.
+    /// Disables the absorption of the air.
     pub lossless: bool,
-    /// Most mirror reflections on a path; without it, as many as can matter.
+    /// Maximum number of mirror reflections on a path; `None` for all that can matter.
     pub max_order: Option<u32>,
     /// Angle between the rays, degrees. The default reads the same as a finer fan in every shipped
-    /// scene as long as no round body is met (there is a test).
+    /// scene as long as no round body is hit (there is a test).
     pub ray_spacing_deg: f64,
 }
 
-/// Settings of the engine `cone`, which knows neither air nor reflections.
+/// Settings of the engine `cone`, which has neither air nor reflections.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct ConeOptions {
-    /// Full aperture, degrees; without it, the sensor's two-way -6 dB width.
+    /// Full aperture, degrees; `None` for the sensor's two-way -6 dB width.
     pub aperture_deg: Option<f64>,
 }
 
 impl EngineKind {
-    /// Its name in records and on the command line.
+    /// Name in records and on the command line.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -96,7 +96,7 @@ impl EngineKind {
         }
     }
 
-    /// The engine with its defaults.
+    /// Returns the engine with its default settings.
     #[must_use]
     pub fn options(self) -> EngineOptions {
         match self {
@@ -108,7 +108,7 @@ impl EngineKind {
 }
 
 impl EngineOptions {
-    /// Which engine.
+    /// Returns the kind of engine.
     #[must_use]
     pub const fn kind(&self) -> EngineKind {
         match self {
@@ -118,7 +118,7 @@ impl EngineOptions {
         }
     }
 
-    /// The settings of `paths`, the only engine that knows phases; `None` for another one.
+    /// Returns the settings of `paths`, the only engine with phases; `None` for another engine.
     pub(super) const fn paths(&self) -> Option<&PathOptions> {
         match self {
             Self::Paths(paths) => Some(paths),
@@ -181,7 +181,7 @@ impl From<ConeOptions> for Options {
     }
 }
 
-/// An option that is out of its range.
+/// An option outside its range.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct OutOfRange {
     pub(super) option: &'static str,
@@ -190,7 +190,7 @@ pub(super) struct OutOfRange {
 }
 
 impl Options {
-    /// Checks that every figure is in its range.
+    /// Checks that every value is in its range.
     pub(super) fn check(&self) -> Result<(), OutOfRange> {
         if let Some(range_m) = self.max_range_m {
             within("max_range_m", range_m, [0.01, 100.0], "from 0.01 to 100 metres")?;

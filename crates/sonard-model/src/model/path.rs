@@ -1,41 +1,42 @@
-//! Propagation paths: what the sound interacts with between transmitter and receiver.
+//! Propagation paths: interactions of the sound between transmitter and receiver.
 
 use std::sync::Arc;
 
 use crate::{geometry::DVec2, reading::PathKind};
 
-/// A propagation path: its interactions in the order in which the sound meets them.
+/// A propagation path: its interactions in the order in which the sound reaches them.
 ///
-/// From transmitter over all points to receiver it runs straight from each to the next.
+/// The path is straight from the transmitter to the first point, from each point to the next, and
+/// to the receiver.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Path {
-    /// From the transmitter to the receiver. Firings from a point in several directions share those of the paths they have
-    /// in common.
+    /// Interactions from the transmitter to the receiver. Firings from a point in several
+    /// directions share those of their common paths.
     pub interactions: Arc<[Interaction]>,
 }
 
 /// A point where the sound changes its direction.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Interaction {
-    /// The mechanism that changes it.
+    /// Mechanism of the change.
     pub mechanism: Mechanism,
-    /// Its point in the plan (world, metres).
+    /// Point in the plan (world, metres).
     pub point: DVec2,
-    /// At which height, metres; `None` in a scene without floor and ceiling, and from engines that know
-    /// no heights.
+    /// Height, metres; `None` in a scene without floor and ceiling, and from engines without
+    /// heights.
     pub z_m: Option<f64>,
 }
 
-/// A change of the direction of propagation, and the part of the scene that makes it.
+/// A change of the direction of propagation, and the part of the scene that causes it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Mechanism {
-    /// Mirror reflection (by engine [`Cone`](super::Cone), which knows no mirrors: the nearest hit).
+    /// Mirror reflection (by engine [`Cone`](super::Cone), which has no mirrors: the nearest hit).
     Reflection(Reflector),
     /// Diffraction at an edge.
     Diffraction(Diffractor),
     /// Diffuse scattering by the roughness of a wall.
     Scattering {
-        /// Index into `scene.walls`.
+        /// Index of the wall in `scene.walls`.
         wall: u32,
     },
     /// Return from the face of the transducer, which sends an echo out once more.
@@ -45,31 +46,31 @@ pub enum Mechanism {
 /// A surface of the scene that reflects.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Reflector {
-    /// `scene.walls[i]`.
+    /// A wall: `scene.walls[i]`.
     Wall(u32),
-    /// `scene.cylinders[i]`.
+    /// A cylinder: `scene.cylinders[i]`.
     Cylinder(u32),
     /// The floor of a scene with heights.
     Floor,
-    /// Its ceiling.
+    /// The ceiling of a scene with heights.
     Ceiling,
 }
 
-/// An edge of a scene, or what diffracts as one.
+/// An edge of a scene, or an object that diffracts like an edge.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Diffractor {
-    /// An upright one: where walls end or meet.
+    /// An upright edge: where walls end or join.
     Upright(Edge),
-    /// A level one of a wall that ends below the ceiling or above the floor.
+    /// A level edge of a wall that ends below the ceiling or above the floor.
     Level {
-        /// Index into `scene.walls`.
+        /// Index of the wall in `scene.walls`.
         wall: u32,
-        /// Whether it is the wall's upper one (else the lower).
+        /// `true` for the wall's upper edge, `false` for its lower edge.
         is_upper: bool,
     },
     /// A thin cylinder, which scatters as a whole.
     Post {
-        /// Index into `scene.cylinders`.
+        /// Index of the cylinder in `scene.cylinders`.
         cylinder: u32,
     },
 }
@@ -77,33 +78,34 @@ pub enum Diffractor {
 /// An end of a wall.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Edge {
-    /// Index into `scene.walls`.
+    /// Index of the wall in `scene.walls`.
     pub wall: u32,
-    /// Whether it is end `b` (else `a`).
+    /// `true` for end `b`, `false` for end `a`.
     pub at_b: bool,
 }
 
 impl Path {
-    /// Its kind, in one word: scattering if any wall scatters it, else diffraction if
+    /// Kind of the path in one word: scattering if any wall scatters it, otherwise diffraction if
     /// any edge diffracts it.
     #[must_use]
     pub fn kind(&self) -> PathKind {
         kind(self.mechanisms())
     }
 
-    /// Number of mirror reflections, at walls, cylinders, floor and ceiling. Diffraction and scattering
-    /// do not count, and neither does the transducer's face: a few wavelengths wide, it is no mirror.
+    /// Number of mirror reflections, at walls, cylinders, floor and ceiling. Diffraction and
+    /// scattering do not count, and neither does the transducer's face: a few wavelengths wide, it
+    /// is no mirror.
     #[must_use]
     pub fn order(&self) -> usize {
         self.reflectors().count()
     }
 
-    /// Its mechanisms, in order.
+    /// Mechanisms of the path, in order.
     pub fn mechanisms(&self) -> impl DoubleEndedIterator<Item = Mechanism> {
         self.interactions.iter().map(|interaction| interaction.mechanism)
     }
 
-    /// Its mirror reflections, in order.
+    /// Mirror reflections of the path, in order.
     pub fn reflectors(&self) -> impl DoubleEndedIterator<Item = Reflector> {
         self.mechanisms().filter_map(|mechanism| match mechanism {
             Mechanism::Reflection(reflector) => Some(reflector),
@@ -111,7 +113,7 @@ impl Path {
         })
     }
 
-    /// The edges that diffract it, in order.
+    /// Edges that diffract the path, in order.
     pub fn diffractors(&self) -> impl DoubleEndedIterator<Item = Diffractor> {
         self.mechanisms().filter_map(|mechanism| match mechanism {
             Mechanism::Diffraction(diffractor) => Some(diffractor),
@@ -119,14 +121,15 @@ impl Path {
         })
     }
 
-    /// The path as a line in the plan, from a transmitter to a receiver at these places.
+    /// Returns the path as a line in the plan, between a transmitter and a receiver at these
+    /// places.
     #[must_use]
     pub fn polyline(&self, [transmitter, receiver]: [DVec2; 2]) -> Vec<DVec2> {
         let points = self.interactions.iter().map(|interaction| interaction.point);
         std::iter::once(transmitter).chain(points).chain([receiver]).collect()
     }
 
-    /// The same path from the receiver to the transmitter.
+    /// Returns the path from the receiver to the transmitter.
     #[must_use]
     pub fn reversed(&self) -> Self {
         Self { interactions: self.interactions.iter().rev().copied().collect() }
@@ -143,8 +146,8 @@ pub(super) fn kind(mechanisms: impl Iterator<Item = Mechanism>) -> PathKind {
 }
 
 impl Mechanism {
-    /// The wall or cylinder at whose surface or edge it happens, floor or ceiling; `None` for the
-    /// transducer.
+    /// Wall or cylinder at whose surface or edge the mechanism acts, floor or ceiling; `None` for
+    /// the transducer.
     #[must_use]
     pub const fn surface(self) -> Option<Reflector> {
         match self {

@@ -1,4 +1,4 @@
-//! The nearest reflector along a ray.
+//! Ray casting: nearest reflector along a ray.
 
 use crate::{
     geometry::DVec2,
@@ -6,36 +6,37 @@ use crate::{
     scene::{Cylinder, FloorPlan, Material, Scene},
 };
 
-/// A ray starts this far off the surface it leaves, metres, so as not to meet it again.
+/// Offset of a ray from the surface it leaves, metres, to avoid hitting the same surface.
 const START_M: f64 = 1e-9;
 /// Walls that share an end leave no gap between them at this size, metres.
 const JOINT_M: f64 = 1e-12;
 
-/// A point where a ray meets a reflector.
+/// Intersection of a ray with a reflector.
 #[derive(Debug, Clone, Copy)]
 pub struct Hit {
-    /// From the ray's origin, metres.
+    /// Distance from the ray's origin, metres.
     pub distance_m: f64,
-    /// The reflector.
+    /// The reflector that was hit.
     pub(super) reflector: Reflector,
-    /// Unit normal of the surface there; out of a cylinder, to either side of a wall.
+    /// Unit normal of the surface there: outward on a cylinder, to either side on a wall.
     pub(super) normal: DVec2,
-    /// From the nearer end of the wall, metres, negative beyond it; endless on a cylinder.
+    /// Distance from the nearer end of the wall, metres, negative beyond it; infinite on a
+    /// cylinder.
     pub(super) from_end_m: f64,
 }
 
-/// A scene's reflectors, ready for ray casts.
+/// Reflectors of a scene, prepared for ray casting.
 #[derive(Debug)]
 pub struct Reflectors {
-    /// By wall, from end to end.
-    walls: Vec<Segment>,
-    /// What of each wall no other one covers.
-    segments: Vec<(u32, Segment)>,
-    circles: Vec<Circle>,
+    /// Segments by wall, from end to end.
+    walls: Vec<WallSegment>,
+    /// Parts of each wall that no other wall covers.
+    segments: Vec<(u32, WallSegment)>,
+    circles: Vec<CylinderCircle>,
 }
 
 #[derive(Debug)]
-struct Segment {
+struct WallSegment {
     start: DVec2,
     along: DVec2,
     length_m: f64,
@@ -43,31 +44,31 @@ struct Segment {
 }
 
 #[derive(Debug)]
-struct Circle {
+struct CylinderCircle {
     center: DVec2,
     radius_m: f64,
     mirror: f64,
 }
 
 impl Reflectors {
-    /// Those of a scene and its plan.
+    /// Prepares the reflectors of a scene and its floor plan.
     #[must_use]
     pub fn new(scene: &Scene, plan: &FloorPlan) -> Self {
         let mirror = |wall: u32| mirrored(&scene.walls[wall as usize].material);
         let walls = plan.walls.iter().zip(0..);
         let stretches = plan.stretches();
         Self {
-            walls: walls.map(|(&ends, wall)| Segment::new(ends, mirror(wall))).collect(),
+            walls: walls.map(|(&ends, wall)| WallSegment::new(ends, mirror(wall))).collect(),
             segments: stretches
                 .into_iter()
-                .map(|(wall, ends)| (wall, Segment::new(ends, mirror(wall))))
+                .map(|(wall, ends)| (wall, WallSegment::new(ends, mirror(wall))))
                 .collect(),
-            circles: scene.cylinders.iter().map(Circle::new).collect(),
+            circles: scene.cylinders.iter().map(CylinderCircle::new).collect(),
         }
     }
 
-    /// The nearest reflector from `origin` along the unit vector `direction`, leaving out the
-    /// one it starts on: a ray never meets the same flat wall twice in a row.
+    /// Finds the nearest reflector from `origin` along the unit vector `direction`, except the one
+    /// it starts on: a ray never hits the same flat wall twice in a row.
     pub fn nearest(
         &self,
         origin: DVec2,
@@ -83,22 +84,22 @@ impl Reflectors {
         for (wall, segment) in &self.segments {
             let reflector = Reflector::Wall(*wall);
             if leaving != Some(reflector)
-                && let Some(hit) = segment.meet(origin, direction, reflector)
+                && let Some(hit) = segment.intersect(origin, direction, reflector)
             {
                 keep(hit);
             }
         }
         for (circle, index) in self.circles.iter().zip(0..) {
-            if let Some(hit) = circle.meet(origin, direction, Reflector::Cylinder(index)) {
+            if let Some(hit) = circle.intersect(origin, direction, Reflector::Cylinder(index)) {
                 keep(hit);
             }
         }
         best
     }
 
-    /// The hit of a ray on one of the reflectors, walls taken without their ends and others out of the way;
+    /// Intersects a ray with one of the reflectors, walls as infinite lines and all others ignored;
     /// `None` if it is parallel to the wall or misses the cylinder.
-    pub(super) fn meet(
+    pub(super) fn intersect(
         &self,
         origin: DVec2,
         direction: DVec2,
@@ -106,16 +107,16 @@ impl Reflectors {
     ) -> Option<Hit> {
         match reflector {
             Reflector::Wall(index) => {
-                self.walls[index as usize].meet_line(origin, direction, reflector)
+                self.walls[index as usize].intersect_line(origin, direction, reflector)
             }
             Reflector::Cylinder(index) => {
-                self.circles[index as usize].meet(origin, direction, reflector)
+                self.circles[index as usize].intersect(origin, direction, reflector)
             }
             Reflector::Floor | Reflector::Ceiling => None,
         }
     }
 
-    /// Whether nothing stands between two points; what touches `to` does not count.
+    /// Returns `true` if nothing is between two points; an object that touches `to` does not count.
     pub(super) fn sees(&self, from: DVec2, to: DVec2) -> bool {
         let run = to - from;
         let distance_m = run.length();
@@ -123,7 +124,7 @@ impl Reflectors {
             .is_none_or(|hit| hit.distance_m > distance_m - 1e-7)
     }
 
-    /// Amplitude that a reflector mirrors, 0 to 1.
+    /// Reflectance of the amplitude, 0 to 1.
     pub(super) fn mirror(&self, reflector: Reflector) -> f64 {
         match reflector {
             Reflector::Wall(index) => self.walls[index as usize].mirror,
@@ -140,49 +141,49 @@ impl Reflectors {
         }
     }
 
-    /// The point of an edge.
+    /// Returns the point of an edge.
     pub(super) fn edge_point(&self, edge: Edge) -> DVec2 {
         let segment = &self.walls[edge.wall as usize];
         if edge.at_b { segment.start + segment.length_m * segment.along } else { segment.start }
     }
 }
 
-/// Amplitude mirrored by a material. Roughness is a share of the energy, hence the root; what
-/// it scatters is lost to the ray engines.
+/// Reflectance of a material. Roughness is a share of the energy, hence the root; the ray engines
+/// lose the scattered part.
 fn mirrored(material: &Material) -> f64 {
     material.reflectance * (1.0 - material.roughness).sqrt()
 }
 
-impl Segment {
+impl WallSegment {
     fn new((a, b): (DVec2, DVec2), mirror: f64) -> Self {
         let run = b - a;
         let length_m = run.length();
         Self { start: a, along: run / length_m, length_m, mirror }
     }
 
-    fn meet(&self, origin: DVec2, direction: DVec2, reflector: Reflector) -> Option<Hit> {
-        self.meet_line(origin, direction, reflector)
+    fn intersect(&self, origin: DVec2, direction: DVec2, reflector: Reflector) -> Option<Hit> {
+        self.intersect_line(origin, direction, reflector)
             .filter(|hit| hit.distance_m > START_M && hit.from_end_m >= -JOINT_M)
     }
 
-    /// The same on the line through it, ahead or behind.
-    fn meet_line(&self, origin: DVec2, direction: DVec2, reflector: Reflector) -> Option<Hit> {
+    /// Intersects the line through the segment, ahead or behind.
+    fn intersect_line(&self, origin: DVec2, direction: DVec2, reflector: Reflector) -> Option<Hit> {
         let slant = direction.perp_dot(self.along);
         if slant.abs() < 1e-15 {
             return None;
         }
         let to_start = self.start - origin;
-        let place_m = to_start.perp_dot(direction) / slant;
+        let position_m = to_start.perp_dot(direction) / slant;
         Some(Hit {
             distance_m: to_start.perp_dot(self.along) / slant,
             reflector,
             normal: self.along.perp(),
-            from_end_m: place_m.min(self.length_m - place_m),
+            from_end_m: position_m.min(self.length_m - position_m),
         })
     }
 }
 
-impl Circle {
+impl CylinderCircle {
     fn new(cylinder: &Cylinder) -> Self {
         Self {
             center: cylinder.center,
@@ -191,7 +192,7 @@ impl Circle {
         }
     }
 
-    fn meet(&self, origin: DVec2, direction: DVec2, reflector: Reflector) -> Option<Hit> {
+    fn intersect(&self, origin: DVec2, direction: DVec2, reflector: Reflector) -> Option<Hit> {
         let to_center = self.center - origin;
         let foot_m = to_center.dot(direction);
         let offset_m = to_center.perp_dot(direction);

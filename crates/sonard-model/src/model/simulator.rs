@@ -1,4 +1,4 @@
-//! Engine and receiver joined: what the ranger reads.
+//! Simulator: joins an engine and a receiver to predict readings.
 
 use std::sync::Arc;
 
@@ -7,7 +7,7 @@ use thiserror::Error;
 use super::{
     Cone, Engine, EngineOptions, Fan, ObservationPoint, Options, Prediction,
     cost::TooCostly,
-    lazy::{Expected, LazyArrivals},
+    lazy::{LazyArrivals, ReachEstimate},
     options::OutOfRange,
     paths::{self, PathEngine},
 };
@@ -23,36 +23,36 @@ mod settings;
 pub use settings::receiver;
 use settings::{fan_settings, path_settings};
 
-/// An error in sensor, scene or options that prevents a simulator.
+/// Errors in sensor, scene or options that prevent a simulator.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum ModelError {
-    /// The sensor's data make no sense.
+    /// The sensor data are invalid.
     #[error("sensor: {0}")]
     Sensor(#[from] SensorError),
     /// A transducer in the floor or above the ceiling.
     #[error(
-        "the transducer's height is {z_m} m, outside the scene's {level} at {level_z_m} m: choose one between floor \
-         and ceiling"
+        "the transducer's height is {z_m} m, outside the scene's {level} at {level_z_m} m: it must be between \
+         floor and ceiling"
     )]
     SensorHeight {
-        /// The transducer's, metres.
+        /// Height of the transducer, metres.
         z_m: f64,
-        /// "floor" or "ceiling".
+        /// Name of the limit: "floor" or "ceiling".
         level: &'static str,
-        /// Its height, metres.
+        /// Height of that floor or ceiling, metres.
         level_z_m: f64,
     },
-    /// There are more echo paths than can be found.
+    /// More echo paths than can be found.
     #[error(transparent)]
     TooCostly(#[from] TooCostly),
     /// An option out of range.
     #[error("{option} is {value}: it must be {expected}")]
     Option {
-        /// Which option.
+        /// Name of the option.
         option: &'static str,
-        /// What it holds.
+        /// Value of the option.
         value: f64,
-        /// What would be right.
+        /// Valid range, in words.
         expected: &'static str,
     },
 }
@@ -60,23 +60,23 @@ pub enum ModelError {
 /// Predicts readings in a scene.
 pub struct Simulator {
     scene: Arc<Scene>,
-    ranger: Ranger,
+    ranger: RangerSetup,
     engine: Box<dyn Engine>,
 }
 
-/// What predictions depend on besides the scene.
+/// All inputs of predictions except the scene.
 #[derive(Clone)]
-struct Ranger {
+struct RangerSetup {
     sensor: Sensor,
     air: Air,
     options: Options,
     receiver: Receiver,
     beam: BeamPattern,
     scatter_height_rad: f64,
-    expected: Arc<Expected>,
+    expected: Arc<ReachEstimate>,
 }
 
-impl Ranger {
+impl RangerSetup {
     fn simulator(self, scene: Arc<Scene>) -> Result<Simulator, ModelError> {
         check_height(&scene, &self.sensor)?;
         let engine = self.engine(&scene);
@@ -128,7 +128,7 @@ fn check_height(scene: &Scene, sensor: &Sensor) -> Result<(), ModelError> {
 }
 
 impl Simulator {
-    /// For a scene, a sensor in some air, and options.
+    /// Creates a simulator for a scene, a sensor in some air, and options.
     ///
     /// # Errors
     /// When the sensor's data or an option are out of range.
@@ -148,12 +148,12 @@ impl Simulator {
         let beam = BeamPattern::new(&sensor, receiver.sound_speed_m_s);
         let scatter_height_rad = beam.two_way_power_rad();
         let expected = Arc::default();
-        Ranger { sensor, air, options, receiver, beam, scatter_height_rad, expected }
+        RangerSetup { sensor, air, options, receiver, beam, scatter_height_rad, expected }
             .simulator(scene)
     }
 
-    /// The same ranger in another scene. Its receiver and its beam pattern, which take longer to make than a room's
-    /// plan, are taken over.
+    /// Returns the same ranger in another scene. Its receiver and its beam pattern, which take
+    /// longer to compute than a room's floor plan, are reused.
     ///
     /// # Errors
     /// When the transducer would be in the floor or above the ceiling.
@@ -168,7 +168,7 @@ impl Simulator {
         ObservationPoint::new(self, position)
     }
 
-    /// A reading for each firing of a checked plan, in the order of its indices.
+    /// Predicts a reading for each firing of a checked plan, in the order of its indices.
     ///
     /// # Errors
     /// When there are more paths than can be found within bounds of work and memory.
@@ -182,78 +182,78 @@ impl Simulator {
         Ok(predictions)
     }
 
-    /// Speed of sound, metres a second.
+    /// Speed of sound, metres per second.
     #[must_use]
     pub fn sound_speed_m_s(&self) -> f64 {
         self.ranger.receiver.sound_speed_m_s
     }
 
-    /// The receiver in force: the sensor's, with the options applied.
+    /// Returns the effective receiver: the sensor's, with the options applied.
     #[must_use]
     pub const fn receiver(&self) -> &Receiver {
         &self.ranger.receiver
     }
 
-    /// The beam pattern of the sensor in the air.
+    /// Returns the beam pattern of the sensor in the air.
     #[must_use]
     pub const fn beam(&self) -> &BeamPattern {
         &self.ranger.beam
     }
 
-    /// The sensor.
+    /// Returns the sensor whose readings are predicted.
     #[must_use]
     pub const fn sensor(&self) -> &Sensor {
         &self.ranger.sensor
     }
 
-    /// The air.
+    /// Returns the air of the scene.
     #[must_use]
     pub const fn air(&self) -> &Air {
         &self.ranger.air
     }
 
-    /// Settings of [`paths::Paths`] for this sensor, air and options; for another engine with the defaults
-    /// of `paths`.
+    /// Returns the settings of [`paths::Paths`] for this sensor, air and options; for another
+    /// engine with the defaults of `paths`.
     #[must_use]
     pub fn path_settings(&self) -> paths::Settings {
         let options = self.ranger.options.engine.paths().copied().unwrap_or_default();
-        let Ranger { sensor, air, receiver, scatter_height_rad, .. } = &self.ranger;
+        let RangerSetup { sensor, air, receiver, scatter_height_rad, .. } = &self.ranger;
         path_settings(sensor, air, &options, receiver, *scatter_height_rad)
     }
 
-    /// An engine for sound of other transducers that arrives while this one listens, up to a length of path in
-    /// metres; `None` if the simulator's own is not `paths`.
+    /// Returns an engine for crosstalk from other transducers, up to a length of path in metres;
+    /// `None` if the simulator's own engine is not `paths`.
     pub(super) fn stray_engine(&self, max_path_m: f64) -> Option<PathEngine> {
         self.ranger.options.engine.paths()?;
         let settings = paths::Settings { max_path_m, direct: true, ..self.path_settings() };
         Some(self.ranger.path_engine(&self.scene, None, settings))
     }
 
-    /// The scene.
+    /// Returns the scene of the predictions.
     #[must_use]
     pub const fn scene(&self) -> &Arc<Scene> {
         &self.scene
     }
 
-    /// The height of the transducer, metres; `None` in a scene without floor and ceiling.
+    /// Height of the transducer, metres; `None` in a scene without floor and ceiling.
     #[must_use]
     pub fn sensor_z_m(&self) -> Option<f64> {
         sensor_z_m(&self.scene, &self.ranger.sensor)
     }
 
     pub(super) fn arrivals_between(&self, at: [DVec2; 2]) -> LazyArrivals<'_> {
-        let Ranger { receiver, expected, .. } = &self.ranger;
+        let RangerSetup { receiver, expected, .. } = &self.ranger;
         LazyArrivals::new(self.engine.as_ref(), at, 2.0 * receiver.max_range_m, expected)
     }
 
-    /// The options.
+    /// Returns the options of the model.
     #[must_use]
     pub const fn options(&self) -> &Options {
         &self.ranger.options
     }
 }
 
-/// The height of a transducer in a scene, metres; `None` in one without floor and ceiling.
+/// Height of a transducer in a scene, metres; `None` in a scene without floor and ceiling.
 #[must_use]
 pub fn sensor_z_m(scene: &Scene, sensor: &Sensor) -> Option<f64> {
     let (floor_z_m, ceiling_z_m) = (scene.floor_z_m, scene.ceiling_z_m);
@@ -266,7 +266,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_transducer_outside_floor_and_ceiling_is_refused() {
+    fn height_outside_room_is_rejected() {
         let mut room = Scene::builder("room").build().expect("an empty room");
         let made = |room: &Scene, z_m: f64| {
             let mut sensor = Sensor::preset("senscomp-6500").expect("a preset");

@@ -1,4 +1,4 @@
-//! The engines against closed forms, laws, and the phenomena of Dudek, Jenkin, Milios and Wilkes.
+//! Tests of the engines: closed forms, laws, and the phenomena of Dudek, Jenkin, Milios and Wilkes.
 
 mod array;
 mod closed_forms;
@@ -70,12 +70,12 @@ fn of_kind(arrivals: &[Arrival], kind: PathKind) -> impl Iterator<Item = &Arriva
     arrivals.iter().filter(move |arrival| arrival.path.kind() == kind)
 }
 
-/// A path's mirror reflections, in order.
+/// Mirror reflections of a path, in order.
 pub(in crate::model) fn reflectors(path: &Path) -> Vec<Reflector> {
     path.reflectors().collect()
 }
 
-/// The edges that diffract it, in order.
+/// Edges that diffract a path, in order.
 pub(in crate::model) fn diffractors(path: &Path) -> Vec<Diffractor> {
     path.diffractors().collect()
 }

@@ -1,4 +1,4 @@
-//! Listings of echoes, compared.
+//! Comparison of echo listings.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -10,44 +10,44 @@ use sonard_model::{
     },
 };
 
-/// What two listings of the same echoes may differ by, beside rounding.
+/// Permitted differences between two listings of the same echoes, apart from rounding.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Turned {
-    /// Directions of the second listing are these, radians; `None`: they are not compared.
+    /// Map of the directions of the second listing, radians; `None` if they are not compared.
     pub(crate) direction: Option<fn(f64, f64) -> f64>,
     pub(crate) by_rad: f64,
-    /// Whether up is down in the second listing.
+    /// `true` if up is down in the second listing.
     pub(crate) is_upside_down: bool,
 }
 
-/// Directions are as they are.
+/// Unchanged directions.
 pub(crate) const AS_IS: Turned =
     Turned { direction: Some(|direction, _| direction), by_rad: 0.0, is_upside_down: false };
 
-/// Whether two echoes are the same: length to 0.1 um, field to 1e-5, directions to a microradian.
-fn is_same(one: &EchoPath, other: &EchoPath, turned: Turned) -> bool {
+/// Returns `true` if two echoes are equal: length to 0.1 um, field to 1e-5, directions to a
+/// microradian.
+fn is_same(a: &EchoPath, b: &EchoPath, turned: Turned) -> bool {
     let field = |echo: &EchoPath| {
         let (sine, cosine) = echo.phase_rad.sin_cos();
         echo.amplitude * DVec2::new(cosine, sine)
     };
     // Straight up and down there is no direction in the plan.
-    let is_upright = one.rise_rad.iter().all(|rise_rad| rise_rad.abs() > FRAC_PI_2 - 1e-6);
-    let looks = |one: f64, other: f64| {
-        let is_along =
-            |to: fn(f64, f64) -> f64| wrap_pi(to(one, turned.by_rad) - other).abs() < 1e-6;
+    let is_upright = a.rise_rad.iter().all(|rise_rad| rise_rad.abs() > FRAC_PI_2 - 1e-6);
+    let looks = |a: f64, b: f64| {
+        let is_along = |to: fn(f64, f64) -> f64| wrap_pi(to(a, turned.by_rad) - b).abs() < 1e-6;
         is_upright || turned.direction.is_none_or(is_along)
     };
     let up = if turned.is_upside_down { -1.0 } else { 1.0 };
-    let climbs = |end: usize| (up * one.rise_rad[end] - other.rise_rad[end]).abs() < 1e-6;
-    (one.length_m - other.length_m).abs() < 1e-7
+    let climbs = |end: usize| (up * a.rise_rad[end] - b.rise_rad[end]).abs() < 1e-6;
+    (a.length_m - b.length_m).abs() < 1e-7
         && climbs(0)
         && climbs(1)
-        && field(one).distance(field(other)) < 1e-5 * one.amplitude
-        && looks(one.departure_rad, other.departure_rad)
-        && looks(one.arrival_rad, other.arrival_rad)
+        && field(a).distance(field(b)) < 1e-5 * a.amplitude
+        && looks(a.departure_rad, b.departure_rad)
+        && looks(a.arrival_rad, b.arrival_rad)
 }
 
-/// Every echo of a listing that is not at its very limits is in another one.
+/// Asserts that every echo of a listing that is not at its very limits is in another one.
 #[track_caller]
 pub(crate) fn assert_has_all(
     all: &[EchoPath],
@@ -61,28 +61,23 @@ pub(crate) fn assert_has_all(
     }
 }
 
-/// Two listings have the same echoes, apart from those at their very limits.
+/// Asserts that two listings have the same echoes, apart from those at their very limits.
 #[track_caller]
-pub(crate) fn assert_same(
-    one: &[EchoPath],
-    other: &[EchoPath],
-    settings: &Settings,
-    turned: Turned,
-) {
-    assert_has_all(other, one, settings, turned);
+pub(crate) fn assert_same(a: &[EchoPath], b: &[EchoPath], settings: &Settings, turned: Turned) {
+    assert_has_all(b, a, settings, turned);
     let back = Turned { by_rad: -turned.by_rad, ..turned };
-    assert_has_all(one, other, settings, back);
+    assert_has_all(a, b, settings, back);
     let count = |echoes: &[EchoPath]| echoes.iter().filter(|e| is_well_within(e, settings)).count();
-    let slack = one.iter().chain(other).filter(|e| !is_well_within(e, settings)).count();
-    assert!(count(one).abs_diff(count(other)) <= slack, "some are listed twice");
+    let slack = a.iter().chain(b).filter(|e| !is_well_within(e, settings)).count();
+    assert!(count(a).abs_diff(count(b)) <= slack, "some are listed twice");
 }
 
-/// Whether an echo is above the floor that holds for it and within reach by more than rounding.
+/// Returns `true` if an echo is above its floor and within reach by more than rounding.
 pub(crate) fn is_well_within(echo: &EchoPath, settings: &Settings) -> bool {
     echo.amplitude > 1.0001 * floor_of(echo, settings) && echo.length_m < settings.max_path_m - 1e-6
 }
 
-/// The floor down to which all echoes of such paths are listed.
+/// Amplitude floor of the listing for such paths.
 pub(crate) fn floor_of(echo: &EchoPath, settings: &Settings) -> f64 {
     let is_round = |m: &Mechanism| matches!(m, Mechanism::Reflection(Reflector::Cylinder(_)));
     let is_bend = |m: &Mechanism| matches!(m, Mechanism::Diffraction(_));
@@ -93,6 +88,6 @@ pub(crate) fn floor_of(echo: &EchoPath, settings: &Settings) -> f64 {
 }
 
 fn nearest<'a>(all: &'a [EchoPath], echo: &EchoPath) -> Option<&'a EchoPath> {
-    let off = |other: &&EchoPath| (other.length_m - echo.length_m).abs();
-    all.iter().min_by(|one, other| off(one).total_cmp(&off(other)))
+    let off = |second: &&EchoPath| (second.length_m - echo.length_m).abs();
+    all.iter().min_by(|first, second| off(first).total_cmp(&off(second)))
 }

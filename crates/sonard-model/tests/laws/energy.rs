@@ -1,4 +1,4 @@
-//! How strong echoes are.
+//! Strength of echoes.
 
 use rand::RngExt;
 use sonard_model::{
@@ -12,7 +12,7 @@ use crate::{
 };
 
 #[test]
-fn no_mirrored_echo_is_stronger_than_its_source() {
+fn mirrored_echoes_gain_nothing() {
     on_random_worlds("strength", WITH_LEGS_PAIR, |world, _| {
         let lossless = Settings { absorption_np_per_m: 0.0, max_path_m: 3.0, ..settings() };
         let rigid = world.with_reflectance(|_| 1.0);
@@ -23,7 +23,7 @@ fn no_mirrored_echo_is_stronger_than_its_source() {
     });
 }
 
-/// Each mirrored echo of a listing is in a louder one, no weaker.
+/// Asserts that each mirrored echo of a listing is in a stronger one, no weaker.
 #[track_caller]
 fn assert_no_weaker(louder: &[EchoPath], fainter: &[EchoPath]) {
     for echo in fainter.iter().filter(|echo| echo.path.kind() == PathKind::Specular) {
@@ -37,10 +37,10 @@ fn assert_no_weaker(louder: &[EchoPath], fainter: &[EchoPath]) {
     }
 }
 
-/// Of diffracted paths it may: an edge of an absorbing wall sends back more where a mirror's share would be
-/// taken away.
+/// Diffracted paths may weaken: an edge of an absorbing wall returns more where a mirror's share
+/// would be subtracted.
 #[test]
-fn more_reflectance_never_weakens_a_path_without_diffraction() {
+fn reflectance_never_weakens_mirrors() {
     on_random_worlds("reflectance", WITH_LEGS, |world, random| {
         let by = random.random_range(0.7..1.0);
         let dull = world.with_reflectance(|reflectance| by * reflectance);
@@ -49,7 +49,7 @@ fn more_reflectance_never_weakens_a_path_without_diffraction() {
 }
 
 #[test]
-fn air_that_absorbs_more_weakens_every_path_by_its_length() {
+fn absorption_grows_with_length() {
     on_random_worlds("air", WITH_LEGS_PAIR, |world, random| {
         let more_np_per_m = random.random_range(0.0..0.3);
         let own = settings();

@@ -1,4 +1,4 @@
-//! Which echoes are listed: each once, none missing, backwards as forwards.
+//! Completeness of listings: each echo once, none missing, backwards as forwards.
 
 use rand::{Rng, RngExt};
 use sonard_model::{
@@ -11,13 +11,13 @@ use crate::{
     worlds::*,
 };
 
-/// The same world with transmitter and receiver in each other's places.
+/// Swaps transmitter and receiver.
 fn swapped(world: &World) -> World {
     let [transmitter, receiver] = world.ends;
     World { ends: [receiver, transmitter], ..world.clone() }
 }
 
-/// Listed from the other end.
+/// Lists echoes from the other end.
 fn from_the_other_end(mut echoes: Vec<EchoPath>) -> Vec<EchoPath> {
     for echo in &mut echoes {
         std::mem::swap(&mut echo.departure_rad, &mut echo.arrival_rad);
@@ -27,7 +27,7 @@ fn from_the_other_end(mut echoes: Vec<EchoPath>) -> Vec<EchoPath> {
 }
 
 #[test]
-fn transmitter_and_receiver_can_change_places() {
+fn ends_are_interchangeable() {
     for (kind, name) in [
         (FURNISHED_PAIR, "swap"),
         (WITH_LEGS_PAIR, "swap legs"),
@@ -42,7 +42,7 @@ fn transmitter_and_receiver_can_change_places() {
 }
 
 #[test]
-fn from_one_place_every_path_is_listed_backwards_too() {
+fn reverse_paths_are_listed() {
     for (kind, name) in [
         (FURNISHED, "backwards"),
         (WITH_LEGS, "backwards legs"),
@@ -55,9 +55,10 @@ fn from_one_place_every_path_is_listed_backwards_too() {
     }
 }
 
-/// A room of four right angles: every image of the transmitter in the lattice is heard, and nothing else.
+/// A room of four right angles: every image of the transmitter in the lattice is received, and
+/// nothing else.
 #[test]
-fn before_the_walls_of_a_rectangle_a_pair_hears_every_image() {
+fn pair_in_a_rectangle() {
     let listed = Settings {
         max_path_m: 6.0,
         floor: 1e-4,
@@ -79,8 +80,8 @@ fn before_the_walls_of_a_rectangle_a_pair_hears_every_image() {
     }
 }
 
-/// A rigid rectangle anywhere, with an `hc-sr04` 3 to 12 cm before one of its walls; also its size and the
-/// places of both ends in its own frame.
+/// A rigid rectangle anywhere, with an `hc-sr04` 3 to 12 cm in front of one of its walls; also its
+/// size and the places of both ends in its own frame.
 fn rectangle(random: &mut impl Rng) -> (World, DVec2, [DVec2; 2]) {
     let size = DVec2::new(random.random_range(0.5..4.0), random.random_range(0.5..4.0));
     let from_wall_m = random.random_range(0.03..0.12);
@@ -106,11 +107,11 @@ fn any_direction(random: &mut impl Rng) -> f64 {
     random.random_range(0.0..std::f64::consts::TAU)
 }
 
-/// Lengths from each image of the transmitter to the receiver, as Allen and Berkley have them.
+/// Lengths from each image of the transmitter to the receiver (Allen and Berkley).
 fn lattice(size: DVec2, [transmitter, receiver]: [DVec2; 2], max_path_m: f64) -> Vec<f64> {
     let images = |side: f64, at: f64| {
-        let most = (max_path_m / (2.0 * side)).ceil() as i32 + 1;
-        let all = (-most..=most).flat_map(move |m| {
+        let bound = (max_path_m / (2.0 * side)).ceil() as i32 + 1;
+        let all = (-bound..=bound).flat_map(move |m| {
             let shift = 2.0 * f64::from(m) * side;
             [shift + at, shift - at]
         });
@@ -126,7 +127,7 @@ fn lattice(size: DVec2, [transmitter, receiver]: [DVec2; 2], max_path_m: f64) ->
 }
 
 #[test]
-fn a_longer_range_only_adds() {
+fn longer_range_only_adds() {
     for (kind, name) in [
         (FURNISHED_PAIR, "range"),
         (WITH_LEGS, "range legs"),
@@ -145,7 +146,7 @@ fn a_longer_range_only_adds() {
 }
 
 #[test]
-fn a_lower_floor_only_adds_and_that_of_repeated_contacts_and_edges_by_cylinders_is_ten_times_it() {
+fn lower_floor_only_adds() {
     for (kind, name) in [
         (FURNISHED_PAIR, "floor"),
         (WITH_LEGS, "floor legs"),
@@ -165,19 +166,19 @@ fn a_lower_floor_only_adds_and_that_of_repeated_contacts_and_edges_by_cylinders_
 }
 
 #[test]
-fn a_higher_order_only_adds() {
+fn higher_order_only_adds() {
     for (kind, name) in [
         (FURNISHED_PAIR, "order"),
         (WITH_LEGS, "order legs"),
         (WITH_HEIGHTS_AND_LEGS_PAIR, "order heights"),
     ] {
         on_random_worlds(name, kind, |world, random| {
-            let most = random.random_range(0..5);
-            let low = Settings { max_order: Some(most), ..settings() };
+            let bound = random.random_range(0..5);
+            let low = Settings { max_order: Some(bound), ..settings() };
             let up_to: Vec<_> = world
                 .echoes(&settings())
                 .into_iter()
-                .filter(|echo| echo.path.order() <= usize::from(most))
+                .filter(|echo| echo.path.order() <= usize::from(bound))
                 .collect();
             assert_same(&world.echoes(&low), &up_to, &low, AS_IS);
         });

@@ -1,7 +1,7 @@
-//! Laws of the exact engine, held on random scenes: what every listing of echo paths obeys, whatever the scene.
+//! Laws of the exact engine on random scenes: properties of every listing of echo paths.
 //!
-//! Each law runs on 200 scenes, or on as many as `SONARD_LAWS` says; scene `n` of a law is always the same, and
-//! a failure names it. A law that has an exception says so in its name.
+//! Each law runs on 200 scenes, or on the number in `SONARD_LAWS`. Scene `n` of a law is always the
+//! same, and a failure names it. A law that has an exception mentions it in its name.
 
 mod compare;
 mod energy;

@@ -1,4 +1,4 @@
-//! Every path that is listed is one that sound can take.
+//! Every listed path is physically possible.
 
 use rand::RngExt;
 use sonard_model::{
@@ -12,7 +12,7 @@ use sonard_model::{
 
 use crate::worlds::*;
 
-/// Slack for touching, metres.
+/// Tolerance for touching, metres.
 const TOUCH_M: f64 = 1e-7;
 
 fn polyline(world: &World, echo: &EchoPath) -> Vec<DVec2> {
@@ -20,7 +20,7 @@ fn polyline(world: &World, echo: &EchoPath) -> Vec<DVec2> {
 }
 
 #[test]
-fn paths_are_as_long_as_their_legs_and_leave_and_arrive_along_them() {
+fn lengths_and_directions_of_legs() {
     for (kind, name) in [(FURNISHED, "length"), (WITH_LEGS_PAIR, "length legs")] {
         on_random_worlds(name, kind, |world, _| {
             for echo in world.echoes(&settings()) {
@@ -37,14 +37,14 @@ fn paths_are_as_long_as_their_legs_and_leave_and_arrive_along_them() {
 }
 
 #[test]
-fn reflections_obey_the_mirror_law() {
+fn law_of_reflection() {
     for (kind, name) in [(FURNISHED_PAIR, "mirror law"), (WITH_LEGS, "mirror law legs")] {
         on_random_worlds(name, kind, |world, _| {
             for echo in world.echoes(&settings()) {
                 let line = polyline(world, &echo);
-                for (turn, met) in line.windows(3).zip(echo.path.interactions.iter()) {
-                    let Mechanism::Reflection(surface) = met.mechanism else { continue };
-                    let normal = normal_at(world, surface, met.point);
+                for (turn, interaction) in line.windows(3).zip(echo.path.interactions.iter()) {
+                    let Mechanism::Reflection(surface) = interaction.mechanism else { continue };
+                    let normal = normal_at(world, surface, interaction.point);
                     let [to, from] = [turn[1] - turn[0], turn[2] - turn[1]].map(DVec2::normalize);
                     let mirrored = to - 2.0 * to.dot(normal) * normal;
                     assert!(mirrored.distance(from) < 1e-5, "{echo:?} at {surface:?}");
@@ -54,7 +54,7 @@ fn reflections_obey_the_mirror_law() {
     }
 }
 
-/// The normal of a surface at a point, which must be on it.
+/// Normal of a surface at a point, which must be on it.
 fn normal_at(world: &World, surface: Reflector, at: DVec2) -> DVec2 {
     match surface {
         Reflector::Wall(wall) => {
@@ -75,7 +75,7 @@ fn normal_at(world: &World, surface: Reflector, at: DVec2) -> DVec2 {
 }
 
 #[test]
-fn paths_run_clear_of_cylinders_but_posts_and_of_walls_wider_than_a_wavelength() {
+fn paths_are_clear_of_obstacles() {
     let crowded = Kind { partitions: 0, rounds: 3, ..FURNISHED };
     let deep = Settings { floor: 0.004, max_path_m: 3.0, ..settings() };
     for (kind, name, settings) in [
@@ -92,9 +92,9 @@ fn paths_run_clear_of_cylinders_but_posts_and_of_walls_wider_than_a_wavelength()
     }
 }
 
-/// Three cylinders in the open, of which each hides some of the others.
+/// Three cylinders in the open, each of which hides some of the others.
 #[test]
-fn paths_by_three_cylinders_run_clear_of_them() {
+fn paths_by_three_cylinders() {
     let listed = Settings { floor: 1e-3, absorption_np_per_m: 0.0, max_path_m: 8.0, ..settings() };
     for case in 0..cases() {
         let mut random = generator("three", case);
@@ -116,7 +116,7 @@ fn paths_by_three_cylinders_run_clear_of_them() {
     }
 }
 
-/// No wall is crossed between the ends of a leg but a narrow one, and no cylinder entered.
+/// Between the ends of a leg no wall is crossed except a narrow one, and no cylinder entered.
 #[track_caller]
 fn assert_clear(world: &World, [from, to]: [DVec2; 2], echo: &EchoPath) {
     let (run, length_m) = (to - from, from.distance(to));
@@ -125,14 +125,13 @@ fn assert_clear(world: &World, [from, to]: [DVec2; 2], echo: &EchoPath) {
         let across = run.perp_dot(b - a);
         let share = (a - from).perp_dot(b - a) / across;
         let along = (a - from).perp_dot(run) / across;
-        // A tie or more off both ends of the leg, and of the wall.
-        // Sound goes round a narrow strip.
+        // A tie or more off both ends of the leg, and of the wall. Sound passes a narrow strip.
         let is_strip = a.distance(b) < STRIP_M;
         let inside = |share: f64, of_m: f64| (TOUCH_M..of_m - TOUCH_M).contains(&(share * of_m));
         let crosses = !is_strip && inside(share, length_m) && inside(along, a.distance(b));
         assert!(!crosses, "{echo:?} crosses wall {number} of {}", world.text());
     }
-    // It goes round a post, too.
+    // Sound passes a post, too.
     let most_m = MOST_KA / settings().wave_number_per_m;
     let thick = |round: &&Round| round.radius_m > most_m;
     for (number, round) in world.rounds.iter().filter(thick).enumerate() {

@@ -1,4 +1,4 @@
-//! Rough walls, whose patches scatter with phases of their own.
+//! Rough walls, whose patches scatter with individual phases.
 
 use rand::RngExt;
 use sonard_model::{geometry::DVec2, model::paths::Settings};
@@ -21,13 +21,14 @@ fn listed() -> Settings {
     Settings { edge_law: None, floor: 0.005, max_path_m: 4.0, ..settings() }
 }
 
-/// What is compared: the last patches before the longest range may be cut there, by a hand's breadth.
+/// Settings of the comparison: the last patches before the maximum range may be cut there, by a
+/// hand's breadth.
 fn compared() -> Settings {
     Settings { max_path_m: 3.9, ..listed() }
 }
 
 #[test]
-fn the_speckle_of_rough_walls_is_the_same_in_pieces() {
+fn speckle_ignores_splits() {
     on_random_worlds("rough split", ROUGH, |world, random| {
         let pieces = world.split(random);
         let lists = [world, &pieces].map(|world| world.echoes(&listed()));
@@ -36,7 +37,7 @@ fn the_speckle_of_rough_walls_is_the_same_in_pieces() {
 }
 
 #[test]
-fn the_speckle_of_rough_walls_is_the_same_in_another_order_and_from_other_ends() {
+fn speckle_ignores_order_and_ends() {
     on_random_worlds("rough reorder", ROUGH, |world, random| {
         let other = world.reordered(random);
         let lists = [world, &other].map(|world| world.echoes(&listed()));
@@ -45,7 +46,7 @@ fn the_speckle_of_rough_walls_is_the_same_in_another_order_and_from_other_ends()
 }
 
 #[test]
-fn the_speckle_of_rough_walls_moves_and_turns_with_them_but_a_mirrored_wall_has_its_own() {
+fn speckle_moves_but_not_mirrors() {
     on_random_worlds("rough move", ROUGH, |world, random| {
         let by_rad = any_angle(random);
         let shift = DVec2::new(random.random_range(-5.0..5.0), 1.0);
@@ -57,7 +58,7 @@ fn the_speckle_of_rough_walls_moves_and_turns_with_them_but_a_mirrored_wall_has_
 }
 
 #[test]
-fn what_stands_behind_closed_rough_walls_is_not_heard() {
+fn hidden_behind_rough_walls() {
     on_random_worlds("rough hide", ROUGH, |world, random| {
         let more = world.with_hidden(random);
         let lists = [world, &more].map(|world| world.echoes(&listed()));

@@ -1,4 +1,4 @@
-//! What does not change when the world is moved, or described in other words.
+//! Invariance under motions of the world, and under different descriptions.
 
 use rand::RngExt;
 use sonard_model::geometry::DVec2;
@@ -9,7 +9,7 @@ use crate::{
 };
 
 #[test]
-fn moving_the_world_changes_nothing() {
+fn moving_changes_nothing() {
     for (kind, name) in
         [(FURNISHED, "move"), (WITH_LEGS_PAIR, "move legs"), (WITH_HEIGHTS, "move heights")]
     {
@@ -24,7 +24,7 @@ fn moving_the_world_changes_nothing() {
 }
 
 #[test]
-fn turning_the_world_turns_the_directions() {
+fn turning_turns_directions() {
     for (kind, name) in
         [(FURNISHED_PAIR, "turn"), (WITH_LEGS, "turn legs"), (WITH_HEIGHTS, "turn heights")]
     {
@@ -40,7 +40,7 @@ fn turning_the_world_turns_the_directions() {
 }
 
 #[test]
-fn a_mirrored_world_mirrors_the_directions() {
+fn mirroring_mirrors_directions() {
     for (kind, name) in
         [(FURNISHED_PAIR, "mirror"), (WITH_LEGS, "mirror legs"), (WITH_HEIGHTS, "mirror heights")]
     {
@@ -53,9 +53,9 @@ fn a_mirrored_world_mirrors_the_directions() {
     }
 }
 
-/// Everything larger, and the wavelength with it.
+/// Scales everything, including the wavelength.
 #[test]
-fn a_larger_world_with_a_longer_wavelength_is_the_same_world() {
+fn scaling_with_the_wavelength() {
     on_random_worlds("scale", WITH_LEGS_PAIR, |world, random| {
         let by = random.random_range(0.5..2.0);
         let mut there = world.clone().moved(|p| by * p);
@@ -72,7 +72,7 @@ fn a_larger_world_with_a_longer_wavelength_is_the_same_world() {
 }
 
 #[test]
-fn splitting_walls_changes_nothing() {
+fn splitting_changes_nothing() {
     for (kind, name) in
         [(FURNISHED, "split"), (WITH_LEGS_PAIR, "split legs"), (WITH_HEIGHTS, "split heights")]
     {
@@ -85,7 +85,7 @@ fn splitting_walls_changes_nothing() {
 }
 
 #[test]
-fn walls_in_another_order_and_from_their_other_ends_are_the_same_walls() {
+fn wall_order_and_ends_are_ignored() {
     for (kind, name) in [
         (FURNISHED_PAIR, "reorder"),
         (WITH_LEGS, "reorder legs"),
@@ -100,7 +100,7 @@ fn walls_in_another_order_and_from_their_other_ends_are_the_same_walls() {
 }
 
 #[test]
-fn what_stands_behind_closed_walls_is_not_heard() {
+fn hidden_behind_closed_walls() {
     for (kind, name) in
         [(FURNISHED, "hide"), (WITH_LEGS_PAIR, "hide legs"), (WITH_HEIGHTS, "hide heights")]
     {

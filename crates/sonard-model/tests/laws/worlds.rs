@@ -9,7 +9,7 @@ use rand_pcg::Pcg64;
 use sonard_model::{
     acoustics::edge::EdgeLaw,
     geometry::{DVec2, distance_to_segment},
-    model::paths::{EchoPath, Paths, REPEATED_CONTACTS_ABOVE, Settings},
+    model::paths::{DEFAULT_REPEATED_CONTACT_RATIO, EchoPath, Paths, Settings},
     scene::{Scene, SceneBuilder},
 };
 
@@ -19,7 +19,7 @@ pub(crate) struct Wall {
     pub(crate) ends: [DVec2; 2],
     pub(crate) reflectance: f64,
     pub(crate) roughness: f64,
-    /// From one height to another; `None`: from floor to ceiling.
+    /// Lower and upper end; `None` from floor to ceiling.
     pub(crate) z_m: Option<[f64; 2]>,
 }
 
@@ -29,16 +29,16 @@ pub(crate) struct Round {
     pub(crate) center: DVec2,
     pub(crate) radius_m: f64,
     pub(crate) reflectance: f64,
-    /// From one height to another; `None`: from floor to ceiling.
+    /// Lower and upper end; `None` from floor to ceiling.
     pub(crate) z_m: Option<[f64; 2]>,
 }
 
-/// What is below and above, and at which height the transducers are between.
+/// Floor and ceiling, and the height of the transducers between them.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Heights {
-    /// Of floor and ceiling.
+    /// Reflectances of floor and ceiling.
     pub(crate) limits_z_m: [f64; 2],
-    /// Of floor and ceiling.
+    /// Roughnesses of floor and ceiling.
     pub(crate) reflectance: [f64; 2],
     pub(crate) sensor_z_m: f64,
 }
@@ -50,23 +50,23 @@ pub(crate) struct World {
     pub(crate) rounds: Vec<Round>,
     /// Transmitter and receiver.
     pub(crate) ends: [DVec2; 2],
-    /// `None`: everything is in the plane.
+    /// `None` for a planar scene.
     pub(crate) heights: Option<Heights>,
 }
 
-/// What a world is made of.
+/// Contents of a world.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Kind {
-    /// Walls that stand in the room.
+    /// Number of walls inside the room.
     pub(crate) partitions: usize,
-    /// Walls of less than a wavelength.
+    /// Number of walls of less than a wavelength.
     pub(crate) strips: usize,
     pub(crate) rounds: usize,
-    /// Of all walls.
+    /// Roughness of all walls.
     pub(crate) roughness: f64,
-    /// Whether transmitter and receiver stand apart.
+    /// `true` for a separate transmitter and receiver.
     pub(crate) is_pair: bool,
-    /// Whether there are floor and ceiling, and things that end below or above.
+    /// `true` for a world with floor and ceiling, and objects that end below or above.
     pub(crate) has_heights: bool,
 }
 
@@ -79,36 +79,38 @@ pub(crate) const FURNISHED: Kind = Kind {
     is_pair: false,
     has_heights: false,
 };
-/// The same with a transmitter and a receiver.
+/// A furnished room with a transmitter and a receiver.
 pub(crate) const FURNISHED_PAIR: Kind = Kind { is_pair: true, ..FURNISHED };
 /// A room with walls and legs in it.
 pub(crate) const WITH_LEGS: Kind = Kind { partitions: 1, rounds: 3, ..FURNISHED };
-/// The same with a transmitter and a receiver.
+/// A room with walls and legs in it, and with a transmitter and a receiver.
 pub(crate) const WITH_LEGS_PAIR: Kind = Kind { is_pair: true, ..WITH_LEGS };
 
 /// A room with floor, ceiling, and low and hanging walls.
 pub(crate) const WITH_HEIGHTS: Kind =
     Kind { partitions: 2, strips: 0, has_heights: true, ..FURNISHED };
-/// The same with a transmitter and a receiver, and cylinders.
+/// A room with floor, ceiling, low and hanging walls and cylinders, and with a transmitter and a
+/// receiver.
 pub(crate) const WITH_HEIGHTS_AND_LEGS_PAIR: Kind =
     Kind { partitions: 1, rounds: 2, is_pair: true, ..WITH_HEIGHTS };
 
-/// Nothing stands closer to anything else, metres: far above the ties of geometry, and a pose has to be off walls.
+/// Minimum distance between objects, metres: far above the ties of geometry, and a pose has to be
+/// off walls.
 const GAP_M: f64 = 0.04;
 
-/// Walls shorter than this are narrow strips, which sound goes round: less than a wavelength.
+/// Walls shorter than this are narrow strips, which sound passes: less than a wavelength.
 pub(crate) const STRIP_M: f64 = 0.0065;
 
-/// Tries until something finds a place.
+/// Maximum number of tries to find a free place.
 const TRIES: usize = 200;
 
-/// Number of scenes that each law is tried on.
+/// Number of scenes for each law.
 pub(crate) fn cases() -> u64 {
-    let asked = std::env::var("SONARD_LAWS").ok().and_then(|count| count.parse().ok());
-    asked.unwrap_or(200)
+    let requested = std::env::var("SONARD_LAWS").ok().and_then(|count| count.parse().ok());
+    requested.unwrap_or(200)
 }
 
-/// The generator of a law's scene.
+/// Generator of a law's scene.
 pub(crate) fn generator(law: &str, case: u64) -> Pcg64 {
     let seed = law.bytes().fold(case, |seed, byte| {
         (seed ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3).rotate_left(5)
@@ -116,24 +118,24 @@ pub(crate) fn generator(law: &str, case: u64) -> Pcg64 {
     Pcg64::seed_from_u64(seed)
 }
 
-/// Tries a law on its scenes; a failure says which one it was.
+/// Runs a law on its scenes; a failure names the scene.
 pub(crate) fn on_random_worlds(law: &str, kind: Kind, check: impl Fn(&World, &mut Pcg64)) {
     for case in 0..cases() {
         let mut random = generator(law, case);
         let world = World::random(kind, &mut random);
-        let _told = Told { law, case, world: &world };
+        let _report = FailureReport { law, case, world: &world };
         check(&world, &mut random);
     }
 }
 
-/// Says on a panic on which scene it was.
-struct Told<'a> {
+/// Prints the scene on a panic.
+struct FailureReport<'a> {
     law: &'a str,
     case: u64,
     world: &'a World,
 }
 
-impl Drop for Told<'_> {
+impl Drop for FailureReport<'_> {
     fn drop(&mut self) {
         if std::thread::panicking() {
             let World { ends, .. } = self.world;
@@ -147,13 +149,13 @@ impl Drop for Told<'_> {
     }
 }
 
-/// What is listed: paths to 5 m by UTD, whose air takes what it usually does.
+/// Settings of the listings: paths to 5 m by UTD, with usual absorption in air.
 pub(crate) fn settings() -> Settings {
     Settings {
         max_path_m: 5.0,
         max_order: None,
         floor: 0.01,
-        repeated_contacts_above: REPEATED_CONTACTS_ABOVE,
+        repeated_contacts_above: DEFAULT_REPEATED_CONTACT_RATIO,
         crowded_m: 0.0,
         edge_law: Some(EdgeLaw::Utd),
         double_diffraction: false,
@@ -167,7 +169,7 @@ pub(crate) fn settings() -> Settings {
 }
 
 impl World {
-    /// A room of four walls at some angle, with what `kind` says in it.
+    /// A room of four walls at some angle, with the contents of `kind`.
     pub(crate) fn random(kind: Kind, random: &mut Pcg64) -> Self {
         let size = DVec2::new(random.random_range(1.0..4.0), random.random_range(1.0..4.0));
         let mut off = || random.random_range(-0.15..0.15);
@@ -189,7 +191,7 @@ impl World {
             DVec2::new(random.random_range(0.0..size.x), random.random_range(0.0..size.y))
         };
         for number in 0..kind.rounds {
-            // Posts, as chair legs are, and bodies.
+            // Posts, such as chair legs, and bodies.
             let radius_m =
                 random.random_range(if number % 3 == 2 { 0.004..0.016 } else { 0.018..0.2 });
             let found = (0..TRIES).map(|_| place(random)).find(|at| world.is_free(*at, radius_m));
@@ -218,7 +220,7 @@ impl World {
         world.moved(|p| p.rotate(DVec2::from_angle(turn)) + shift)
     }
 
-    /// Puts transmitter and receiver where nothing else is.
+    /// Puts transmitter and receiver at free places.
     fn place_ends(&mut self, kind: Kind, size: DVec2, random: &mut Pcg64) {
         let apart_m = if kind.is_pair { 0.026 } else { 0.0 };
         loop {
@@ -231,7 +233,7 @@ impl World {
         }
     }
 
-    /// Whether a point is within the first four walls.
+    /// Returns `true` if a point is within the first four walls.
     fn is_inside(&self, at: DVec2) -> bool {
         self.walls[..4].iter().all(|wall| {
             let [a, b] = wall.ends;
@@ -239,25 +241,25 @@ impl World {
         })
     }
 
-    /// Whether a disc is in the room and off everything.
+    /// Returns `true` if a disc is in the room and off everything.
     fn is_free(&self, at: DVec2, radius_m: f64) -> bool {
         let walls = self.walls.iter().map(|w| distance_to_segment(at, w.ends[0], w.ends[1]));
         let rounds = self.rounds.iter().map(|round| at.distance(round.center) - round.radius_m);
         self.is_inside(at) && walls.chain(rounds).all(|off_m| off_m > radius_m + GAP_M)
     }
 
-    /// Whether a wall is in the room and off everything.
+    /// Returns `true` if a wall is in the room and off everything.
     fn has_room_for(&self, [a, b]: [DVec2; 2]) -> bool {
         let steps = (a.distance(b) / (0.5 * GAP_M)).ceil();
         (0..=steps as u32).all(|step| self.is_free(a.lerp(b, f64::from(step) / steps), 0.0))
     }
 
-    /// As a scene.
+    /// Builds the scene.
     pub(crate) fn scene(&self) -> Scene {
         Scene::from_json(&self.text()).expect("a valid scene")
     }
 
-    /// As a scene file.
+    /// Writes the world as a scene file.
     pub(crate) fn text(&self) -> String {
         let mut builder = Scene::builder("random");
         for (number, wall) in self.walls.iter().enumerate() {
@@ -266,7 +268,7 @@ impl World {
             builder = builder
                 .rough_material(&material, wall.reflectance, wall.roughness)
                 .walls(&id, &ends, &material);
-            builder = standing(builder, wall.z_m);
+            builder = with_limits(builder, wall.z_m);
         }
         for (number, round) in self.rounds.iter().enumerate() {
             let material = format!("n{number}");
@@ -277,7 +279,7 @@ impl World {
                 round.radius_m,
                 &material,
             );
-            builder = standing(builder, round.z_m);
+            builder = with_limits(builder, round.z_m);
         }
         if let Some(heights) = self.heights {
             let [floor_z_m, ceiling_z_m] = heights.limits_z_m;
@@ -291,7 +293,7 @@ impl World {
         builder.text()
     }
 
-    /// All its echoes.
+    /// Lists all echoes.
     pub(crate) fn echoes(&self, settings: &Settings) -> Vec<EchoPath> {
         let [transmitter, receiver] = self.ends;
         let sensor_z_m = self.heights.map(|heights| heights.sensor_z_m);
@@ -324,14 +326,15 @@ impl Heights {
     }
 }
 
-fn standing(builder: SceneBuilder, z_m: Option<[f64; 2]>) -> SceneBuilder {
+fn with_limits(builder: SceneBuilder, z_m: Option<[f64; 2]>) -> SceneBuilder {
     match z_m {
         Some([bottom_z_m, top_z_m]) => builder.standing_from(bottom_z_m, top_z_m),
         None => builder,
     }
 }
 
-/// Whether a corner is so nearly right that it is made so before sound is traced, by moving it a little.
+/// Returns `true` if a corner is so nearly right that it is squared before tracing, by moving it
+/// slightly.
 fn is_nearly_right(corners: &[DVec2; 4]) -> bool {
     (0..4).any(|i| {
         let [a, b, c] = [0, 1, 2].map(|next| corners[(i + next) % 4]);
@@ -344,7 +347,7 @@ fn wall(ends: [DVec2; 2], kind: Kind, random: &mut Pcg64) -> Wall {
     Wall { ends, reflectance, roughness: kind.roughness, z_m: None }
 }
 
-/// A turn by an angle of the generator.
+/// A random angle.
 pub(crate) fn any_angle(random: &mut Pcg64) -> f64 {
     random.random_range(-PI..PI)
 }

@@ -1,4 +1,4 @@
-//! Which file of a crate uses which, read from its `use` lines and paths.
+//! Dependencies between the files of a crate, read from their `use` lines and paths.
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -9,17 +9,17 @@ use std::{
 /// A module by its path from the crate's root, which is empty.
 pub(crate) type Module = Vec<String>;
 
-/// The files of a crate.
+/// Files of a crate.
 #[derive(Default)]
 pub(crate) struct Sources {
-    /// What each uses, by module.
+    /// References of each file, by module.
     uses: BTreeMap<Module, BTreeSet<Module>>,
 }
 
-/// A path as it stands in a file.
+/// A path as written in a file.
 struct Reference {
     path: Module,
-    /// Whether it gives another module's item on to who uses this one.
+    /// `true` for a re-export of another module's item.
     re_exports: bool,
 }
 
@@ -28,11 +28,11 @@ impl Sources {
     pub(crate) fn read(source: &Path) -> Self {
         let mut files = Vec::new();
         collect(source, source, &mut files);
-        Self::of(files)
+        Self::from_files(files)
     }
 
-    /// Of files by module.
-    pub(crate) fn of(files: impl IntoIterator<Item = (Module, String)>) -> Self {
+    /// Collects the references of files by module.
+    pub(crate) fn from_files(files: impl IntoIterator<Item = (Module, String)>) -> Self {
         let references: BTreeMap<_, _> =
             files.into_iter().map(|(module, text)| (module, references(&code(&text)))).collect();
         let known: BTreeSet<Module> = references.keys().cloned().collect();
@@ -53,12 +53,12 @@ impl Sources {
         Self { uses: uses.collect() }
     }
 
-    /// Each file with the files it uses. What a file re-exports is used from where it is defined.
+    /// Each file with the files it uses. A re-exported item counts as used from its definition.
     pub(crate) fn uses(&self) -> impl Iterator<Item = (&Module, &BTreeSet<Module>)> {
         self.uses.iter()
     }
 
-    /// Files each of which uses, by way of others or not, all others.
+    /// Groups of files each of which uses, directly or indirectly, all others.
     pub(crate) fn circles(&self) -> Vec<Vec<String>> {
         let reached: BTreeMap<_, _> =
             self.uses.keys().map(|module| (module, self.reached_from(module))).collect();
@@ -101,13 +101,13 @@ fn collect(source: &Path, folder: &Path, found: &mut Vec<(Module, String)>) {
     }
 }
 
-/// The code of a file: without comments, and without what is compiled for tests only.
+/// Code of a file, without comments and test-only parts.
 fn code(text: &str) -> String {
     let lines = text.lines().take_while(|line| line.trim() != "mod tests {");
     lines.filter(|line| !line.trim_start().starts_with("//")).collect::<Vec<_>>().join("\n")
 }
 
-/// The paths that `use` lines name, and those elsewhere that begin with `crate`, `super` or `self`.
+/// Paths in `use` lines, and those elsewhere that begin with `crate`, `super` or `self`.
 fn references(code: &str) -> Vec<Reference> {
     let mut found = Vec::new();
     let mut rest = String::new();
@@ -136,13 +136,14 @@ fn references(code: &str) -> Vec<Reference> {
     found
 }
 
-/// Whether a statement that goes on with `use` so begins: alone on its line but for its visibility.
+/// Returns `true` if a statement that continues with `use` begins this way: alone on its line
+/// except for its visibility.
 fn ends_as_a_use(before: &str) -> bool {
     let line = before.rsplit('\n').next().unwrap_or_default().trim();
     line.is_empty() || line == "pub" || line.starts_with("pub(") && line.ends_with(')')
 }
 
-/// The paths of a `use` tree.
+/// Paths of a `use` tree.
 fn expanded(tree: &str) -> Vec<Module> {
     let names = |path: &str| -> Module {
         path.split("::")
@@ -160,7 +161,7 @@ fn expanded(tree: &str) -> Vec<Module> {
     inner.map(|inner| before.iter().cloned().chain(inner).collect()).collect()
 }
 
-/// The items of a group, which commas part.
+/// Items of a group, separated by commas.
 fn items(group: &str) -> Vec<&str> {
     let (mut depth, mut from, mut items) = (0, 0, Vec::new());
     for (at, c) in group.char_indices() {
@@ -179,7 +180,7 @@ fn items(group: &str) -> Vec<&str> {
     items
 }
 
-/// A path in a module from the crate's root; `None` for one into another crate.
+/// Path in a module from the crate's root; `None` for one into another crate.
 fn absolute(known: &BTreeSet<Module>, module: &Module, path: &Module) -> Option<Module> {
     let mut from = module.clone();
     let mut names = path.iter().peekable();
@@ -208,7 +209,7 @@ fn absolute(known: &BTreeSet<Module>, module: &Module, path: &Module) -> Option<
     Some(from)
 }
 
-/// The file that defines what a path names, through re-exports.
+/// Finds the file that defines the target of a path, through re-exports.
 fn defined_in(
     known: &BTreeSet<Module>,
     given_on: &BTreeMap<(Module, String), Option<Module>>,

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use super::{
     Fan,
-    ray::{Candidate, PathKey, Weighing},
+    ray::{FanCandidate, PathKey, Weighing},
 };
 use crate::{
     acoustics::PulseArrival,
@@ -16,8 +16,8 @@ pub(super) struct FanArrivals<'a> {
     fan: &'a Fan,
     position: DVec2,
     /// Shortest first, each path once.
-    candidates: Vec<Candidate>,
-    /// The part of them that weighting takes, close together in memory.
+    candidates: Vec<FanCandidate>,
+    /// Weighting data of the candidates, close together in memory.
     weighings: Vec<Weighing>,
 }
 
@@ -40,13 +40,13 @@ impl<'a> FanArrivals<'a> {
                 }
             }
         }
-        let mut candidates: Vec<Candidate> = closest.0.into_values().collect();
-        // Ties (a corner's two orders) are broken by what is met, so that results do not depend on
+        let mut candidates: Vec<FanCandidate> = closest.0.into_values().collect();
+        // Ties (a corner's two orders) are broken by the surfaces, so that results do not depend on
         // the order of a hash table.
-        candidates.sort_by(|one, other| {
-            one.length_m.total_cmp(&other.length_m).then_with(|| one.met.cmp(&other.met))
+        candidates.sort_by(|first, second| {
+            first.length_m.total_cmp(&second.length_m).then_with(|| first.key.cmp(&second.key))
         });
-        let weighings = candidates.iter().map(Candidate::weighing).collect();
+        let weighings = candidates.iter().map(FanCandidate::weighing).collect();
         Self { fan, position, candidates, weighings }
     }
 }
@@ -69,17 +69,17 @@ impl Arrivals for FanArrivals<'_> {
     }
 }
 
-/// Of the rays that took the same path, the one that passed closest.
+/// The closest ray to the receiver for each path.
 #[derive(Default)]
-struct Closest(HashMap<PathKey, Candidate>);
+struct Closest(HashMap<PathKey, FanCandidate>);
 
 impl Closest {
-    fn offer(&mut self, candidate: Candidate) {
-        match self.0.get_mut(&candidate.met) {
+    fn offer(&mut self, candidate: FanCandidate) {
+        match self.0.get_mut(&candidate.key) {
             Some(known) if candidate.miss_m < known.miss_m => *known = candidate,
             Some(_) => {}
             None => {
-                self.0.insert(candidate.met.clone(), candidate);
+                self.0.insert(candidate.key.clone(), candidate);
             }
         }
     }

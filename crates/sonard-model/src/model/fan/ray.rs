@@ -1,4 +1,4 @@
-//! One ray of the fan and what it brings to the receiver.
+//! A single ray of the fan and its arrivals at the receiver.
 
 use smallvec::SmallVec;
 
@@ -12,59 +12,60 @@ use crate::{
     },
 };
 
-/// A ray this close to a wall's end, metres, is dropped after the end has diffracted it: which
-/// of the walls that meet there it hits is a matter of rounding, and its neighbours tell.
-const VERTEX_M: f64 = 1e-7;
+/// Distance from a wall's end, metres, within which a ray is dropped after the end has diffracted
+/// it. The wall that it hits there is a matter of rounding, and its neighbours cover the
+/// reflection.
+const END_MARGIN_M: f64 = 1e-7;
 
-/// The ray to the receiver's centre (or to an edge) is found to within this, metres, in at most so many
-/// steps of Newton's method: one without curved surfaces, three with them.
+/// Accuracy of the ray to the receiver's centre (or to an edge), metres, and the maximum number of
+/// Newton steps: one without curved surfaces, three with them are usual.
 const EXACT_M: f64 = 1e-12;
-const MOST_STEPS: usize = 30;
+const MAX_STEPS: usize = 30;
 
-/// A ray, at the last surface it met.
+/// A ray, at the last surface that it hit.
 #[derive(Debug)]
-pub(super) struct Ray {
+pub(super) struct FanRay {
     origin: DVec2,
     direction: DVec2,
     departure_rad: f64,
     /// Length of the path so far, metres.
     travelled_m: f64,
-    /// Product of the mirrored amplitudes so far.
+    /// Product of the reflectances so far.
     gain: f64,
-    /// Distance to the neighbouring ray over the angle between them at departure, metres, and
-    /// its growth per metre: without curved surfaces `travelled_m` and 1.
+    /// Distance to the neighbouring ray per angle between them at departure, metres, and its growth
+    /// per metre. Without curved surfaces the values are `travelled_m` and 1.
     width_m: f64,
     growth: f64,
-    /// 1 as long as the neighbour to the left at departure is to the left, else -1.
+    /// 1 as long as the neighbour to the left at departure is to the left, otherwise -1.
     handedness: f64,
     walls: SmallVec<[Reflector; 4]>,
 }
 
 /// A path to the receiver, before the beam pattern.
 #[derive(Debug, Clone)]
-pub(super) struct Candidate {
+pub(super) struct FanCandidate {
     pub(super) length_m: f64,
     /// Amplitude without the beam pattern.
     pub(super) gain: f64,
     pub(super) departure_rad: f64,
     pub(super) arrival_rad: f64,
-    /// Distance at which the ray passed what it stands for: the receiver's centre, or the edge.
+    /// Distance at which the ray passed its target: the receiver's centre, or the edge.
     pub(super) miss_m: f64,
-    /// Which part of its half-length the receiver segment must show to the ray to be met.
+    /// Share of its half-length that the receiver segment must present to the ray for an arrival.
     pub(super) share: f64,
-    /// In which direction the ray itself leaves, radians.
+    /// Direction in which the ray itself leaves, radians.
     ray_departure_rad: f64,
-    pub(super) met: PathKey,
+    pub(super) key: PathKey,
 }
 
-/// The interactions of a path: reflectors, in order, and then perhaps an edge.
+/// Interactions of a path: reflectors, in order, and an optional edge.
 #[derive(Debug, Clone, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub(super) struct PathKey {
     reflectors: SmallVec<[Reflector; 4]>,
     edge: Option<Edge>,
 }
 
-impl Ray {
+impl FanRay {
     pub(super) fn new(origin: DVec2, departure_rad: f64) -> Self {
         Self {
             origin,
@@ -83,20 +84,24 @@ impl Ray {
         self.travelled_m
     }
 
-    /// The next leg: what it brings to a receiver at `position`, if it passes there, and where
-    /// it ends, if it meets something.
-    pub(super) fn advance(&self, fan: &Fan, position: DVec2) -> (Option<Candidate>, Option<Hit>) {
+    /// Traces the next leg: returns the arrival at a receiver at `position`, if the ray passes
+    /// there, and the hit at the end of the leg, if any.
+    pub(super) fn advance(
+        &self,
+        fan: &Fan,
+        position: DVec2,
+    ) -> (Option<FanCandidate>, Option<Hit>) {
         let leaving = self.walls.last().copied();
         let hit = fan.reflectors.nearest(self.origin, self.direction, leaving);
         let end_m = hit.map_or(f64::INFINITY, |hit| hit.distance_m);
         (self.receive(fan, position, end_m), hit)
     }
 
-    /// Meets the receiver, if it comes by on a leg that ends after `end_m`.
+    /// Returns the arrival at the receiver, if the ray passes it on a leg that ends after `end_m`.
     ///
-    /// The receiver is a segment across the azimuth as long as the face is wide plus the spacing
-    /// of the rays here; whether it is met at a given azimuth is asked later, by `share`.
-    fn receive(&self, fan: &Fan, position: DVec2, end_m: f64) -> Option<Candidate> {
+    /// The receiver is a segment across the azimuth as long as the face is wide plus the local
+    /// spacing of the rays; `share` later decides whether the ray hits it at a given azimuth.
+    fn receive(&self, fan: &Fan, position: DVec2, end_m: f64) -> Option<FanCandidate> {
         let to_center = position - self.origin;
         let foot_m = to_center.dot(self.direction);
         let target = self.aim(to_center);
@@ -110,7 +115,7 @@ impl Ray {
         if target.length_m > fan.settings.longest_m || gain < fan.settings.weakest {
             return None;
         }
-        Some(Candidate {
+        Some(FanCandidate {
             length_m: target.length_m,
             gain,
             departure_rad: self.departure_rad + self.handedness * target.departure_turn_rad(),
@@ -118,18 +123,18 @@ impl Ray {
             miss_m: target.offset_m.abs(),
             share: target.offset_m.abs() / half_m,
             ray_departure_rad: self.departure_rad,
-            met: PathKey { reflectors: self.walls.clone(), edge: None },
+            key: PathKey { reflectors: self.walls.clone(), edge: None },
         })
     }
 
-    /// Diffracted rays from the ends of the wall that are within one ray spacing of the hit,
-    /// each straight to the receiver if it can be seen from there.
+    /// Diffracted rays from the ends of the wall that are within one ray spacing of the hit, each
+    /// straight to the receiver if that is visible from there.
     pub(super) fn diffract(
         &self,
         hit: &Hit,
         fan: &Fan,
         position: DVec2,
-    ) -> SmallVec<[Candidate; 2]> {
+    ) -> SmallVec<[FanCandidate; 2]> {
         let Reflector::Wall(wall) = hit.reflector else { return SmallVec::new() };
         fan.wall_ends.known[wall as usize]
             .iter()
@@ -137,7 +142,7 @@ impl Ray {
             .collect()
     }
 
-    fn diffract_at(&self, edge: Edge, fan: &Fan, position: DVec2) -> Option<Candidate> {
+    fn diffract_at(&self, edge: Edge, fan: &Fan, position: DVec2) -> Option<FanCandidate> {
         let settings = &fan.settings;
         let point = fan.reflectors.edge_point(edge);
         let target = self.aim(point - self.origin);
@@ -156,7 +161,7 @@ impl Ray {
         if !matters || !fan.reflectors.sees(position, point) {
             return None;
         }
-        Some(Candidate {
+        Some(FanCandidate {
             length_m,
             gain,
             departure_rad: self.departure_rad + self.handedness * target.departure_turn_rad(),
@@ -164,16 +169,16 @@ impl Ray {
             miss_m: target.offset_m.abs(),
             share: 0.0,
             ray_departure_rad: self.departure_rad,
-            met: PathKey { reflectors: self.walls.clone(), edge: Some(edge) },
+            key: PathKey { reflectors: self.walls.clone(), edge: Some(edge) },
         })
     }
 
-    /// Leaves the surface it hit; `false` if the ray ends there.
+    /// Reflects the ray at a hit; returns `false` if the ray ends there.
     pub(super) fn reflect(&mut self, hit: &Hit, fan: &Fan) -> bool {
         let settings = &fan.settings;
         self.turn(hit, &fan.reflectors);
         let left = self.gain * settings.through_air(self.travelled_m);
-        hit.from_end_m > VERTEX_M
+        hit.from_end_m > END_MARGIN_M
             && self.walls.len() <= settings.max_order as usize
             && self.travelled_m <= settings.longest_m
             && left >= settings.weakest
@@ -195,24 +200,25 @@ impl Ray {
         self.walls.push(hit.reflector);
     }
 
-    /// The ray that leaves `origin` in a direction and meets these reflectors, as if walls had no ends, at
-    /// the last of them, and where it met them; `None` if it misses a cylinder.
+    /// Traces the ray that leaves `origin` in a direction over these reflectors, with walls as
+    /// infinite lines. Returns it at the last of them, with the points of reflection; `None` if it
+    /// misses a cylinder.
     fn over(
         origin: DVec2,
         departure_rad: f64,
-        met: &[Reflector],
+        surfaces: &[Reflector],
         reflectors: &Reflectors,
     ) -> Option<(Self, Vec<DVec2>)> {
         let mut ray = Self::new(origin, departure_rad);
-        let mut points = Vec::with_capacity(met.len() + 1);
-        for &reflector in met {
-            ray.turn(&reflectors.meet(ray.origin, ray.direction, reflector)?, reflectors);
+        let mut points = Vec::with_capacity(surfaces.len() + 1);
+        for &reflector in surfaces {
+            ray.turn(&reflectors.intersect(ray.origin, ray.direction, reflector)?, reflectors);
             points.push(ray.origin);
         }
         Some((ray, points))
     }
 
-    /// The neighbouring ray that passes exactly through a point at `run` from the origin.
+    /// Returns the neighbouring ray that passes exactly through a point at `run` from the origin.
     fn aim(&self, run: DVec2) -> Aim {
         let foot_m = run.dot(self.direction);
         let offset_m = self.direction.perp_dot(run);
@@ -226,19 +232,20 @@ impl Ray {
 }
 
 struct Aim {
-    /// From the source to the point, metres.
+    /// Length from the source to the point, metres.
     length_m: f64,
-    /// From the source along the ray itself, as far as abreast of the point, metres.
+    /// Length from the source along the ray itself to the foot of the perpendicular from the point,
+    /// metres.
     ray_m: f64,
-    /// Of the point from the ray, positive to the left, metres.
+    /// Distance of the point from the ray, positive to the left, metres.
     offset_m: f64,
     width_m: f64,
     radius_m: f64,
 }
 
 impl Aim {
-    /// Amplitude relative to a wave that met flat walls only: in the plane it spreads over
-    /// `width_m` where that one spreads over `ray_m`.
+    /// Amplitude relative to a wave over flat walls only, which spreads over `ray_m` in the plane
+    /// instead of `width_m`.
     fn tube_gain(&self) -> f64 {
         (self.ray_m / self.width_m.abs().max(1e-3)).sqrt()
     }
@@ -252,8 +259,8 @@ impl Aim {
     }
 }
 
-impl Candidate {
-    /// The arrival at a ranger at `position`, with the amplitude it has at some azimuth.
+impl FanCandidate {
+    /// Returns the arrival at a ranger at `position`, with its amplitude at some azimuth.
     pub(super) fn arrival(&self, fan: &Fan, position: DVec2, amplitude: f64) -> Arrival {
         Arrival {
             length_m: self.length_m,
@@ -266,24 +273,26 @@ impl Candidate {
         }
     }
 
-    /// The path of the neighbouring ray that this one stands for. By way of cylinders, where its length
-    /// comes from the curvature of the front, the points are more exact than that; where it passes a corner on
-    /// the other side, a point lies a little beyond the end of its wall. Where the neighbour that would come
-    /// back misses the cylinder (13 of a thousand in the shipped scenes), the last ray that met it is drawn, and the
-    /// last leg does not obey the law of mirrors.
+    /// Path of the neighbouring ray that this candidate represents. By way of cylinders, where the
+    /// length comes from the curvature of the front, the points are more exact than the length.
+    /// Where the neighbour passes a corner on its other side, a point lies slightly beyond the end
+    /// of its wall. Where the neighbour that would return misses the cylinder (13 of a thousand in
+    /// the shipped scenes), the last ray that hit it is used, and the last leg does not obey the
+    /// law of reflection.
     fn path(&self, reflectors: &Reflectors, position: DVec2) -> Path {
-        let diffractor = self.met.edge.map(|edge| (edge, reflectors.edge_point(edge)));
+        let diffractor = self.key.edge.map(|edge| (edge, reflectors.edge_point(edge)));
         let end = diffractor.map_or(position, |(_, point)| point);
-        let over = |leaves_rad| Ray::over(position, leaves_rad, &self.met.reflectors, reflectors);
+        let over =
+            |leaves_rad| FanRay::over(position, leaves_rad, &self.key.reflectors, reflectors);
         let mut leaves_rad = self.ray_departure_rad;
         let mut points = Vec::new();
         let mut turn_rad = 0.0;
-        for _ in 0..MOST_STEPS {
-            let Some((ray, met)) = over(leaves_rad + turn_rad) else {
+        for _ in 0..MAX_STEPS {
+            let Some((ray, reflected)) = over(leaves_rad + turn_rad) else {
                 turn_rad *= 0.5;
                 continue;
             };
-            points = met;
+            points = reflected;
             leaves_rad += turn_rad;
             let aim = ray.aim(end - ray.origin);
             if aim.offset_m.abs() < EXACT_M {
@@ -292,7 +301,7 @@ impl Candidate {
             turn_rad = ray.handedness * aim.departure_turn_rad();
         }
         let reflections =
-            self.met.reflectors.iter().copied().map(Mechanism::Reflection).zip(points);
+            self.key.reflectors.iter().copied().map(Mechanism::Reflection).zip(points);
         let diffractor = diffractor
             .map(|(edge, point)| (Mechanism::Diffraction(Diffractor::Upright(edge)), point));
         let interaction = |(mechanism, point)| Interaction { mechanism, point, z_m: None };
@@ -310,7 +319,7 @@ impl Candidate {
     }
 }
 
-/// The part of a candidate that weighting it with the beam pattern takes.
+/// Data of a candidate that are needed to weight it with the beam pattern.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Weighing {
     pub(super) length_m: f64,
@@ -321,11 +330,11 @@ pub(super) struct Weighing {
 }
 
 impl Weighing {
-    /// Amplitude at a transducer that faces this direction; 0 if the ray does not meet its face.
+    /// Amplitude at a transducer that points in this direction; 0 if the ray does not hit its face.
     pub(super) fn amplitude(&self, beam: &BeamPattern, facing: DVec2) -> f64 {
         let arriving = facing.dot(self.arrival);
-        // The segment turns with the transducer: seen at an angle it is shorter. Nothing leaves
-        // or arrives behind it.
+        // The segment turns with the transducer: seen at an angle it is shorter. Nothing leaves or
+        // arrives behind it.
         if arriving <= self.share || facing.dot(self.departure) <= 0.0 {
             return 0.0;
         }

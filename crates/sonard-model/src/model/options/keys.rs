@@ -1,4 +1,4 @@
-//! The settings of all engines side by side, as flags, configuration and records give them.
+//! Settings of all engines in one flat structure, as in flags, configuration and records.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -7,76 +7,77 @@ use thiserror::Error;
 use super::{ConeOptions, EngineKind, EngineOptions, FanOptions, Options, PathOptions};
 use crate::acoustics::{EdgeLawKind, Response};
 
-/// The settings of all engines side by side, as flags, configuration keys and records give them.
+/// Settings of all engines in one flat structure, as in flags, configuration keys and records.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[cfg_attr(feature = "clap", derive(clap::Args))]
 #[cfg_attr(feature = "clap", command(next_help_heading = "Model"))]
 #[serde(default)]
 pub struct OptionKeys {
-    /// How echoes are found.
+    /// Simulation engine.
     #[cfg_attr(feature = "clap", arg(long, value_enum, default_value_t))]
     pub engine: EngineKind,
-    /// Listen and predict up to this range, metres, instead of the sensor's.
+    /// Maximum range, metres, instead of the sensor's.
     #[cfg_attr(feature = "clap", arg(long = "max-range", value_name = "M"))]
     #[schemars(range(min = 0.1, max = 100), example = 4)]
     pub max_range_m: Option<f64>,
-    /// Least amplitude detected, instead of the sensor's; a head-on, perfect wall gives 1.
+    /// Detection threshold, instead of the sensor's; a head-on, perfect wall gives 1.
     #[cfg_attr(feature = "clap", arg(long, value_name = "T"))]
     #[schemars(range(min = 0.000_001, max = 1), example = 0.04)]
     pub threshold: Option<f64>,
-    /// How the face answers to a pulse, instead of the sensor's way; with paths.
+    /// Aperture response, instead of the sensor's (engine `paths` only).
     #[cfg_attr(feature = "clap", arg(long, value_enum))]
     #[schemars(example = &"full")]
     pub response: Option<Response>,
-    /// Detect one sound at a time and time it by its path alone; with paths, the others always do.
+    /// Ideal receiver: no interference, no time walk (engine `paths` only; the others always use
+    /// it).
     #[cfg_attr(feature = "clap", arg(long))]
     pub ideal_receiver: bool,
-    /// Leave out the absorption of the air; with paths and fan.
+    /// Disable the absorption of the air (engines `paths` and `fan`).
     #[cfg_attr(feature = "clap", arg(long))]
     pub lossless: bool,
-    /// Most mirror reflections on a path, if limited; with paths and fan.
+    /// Maximum number of mirror reflections on a path (engines `paths` and `fan`).
     #[cfg_attr(feature = "clap", arg(long, value_name = "N"))]
     #[schemars(range(min = 0, max = 65_535), example = 3)]
     pub max_order: Option<u32>,
-    /// Law of edge diffraction, if not the sensor's (or else utd); with paths.
+    /// Edge diffraction model, instead of the sensor's or utd (engine `paths` only).
     #[cfg_attr(feature = "clap", arg(long, value_enum, value_name = "LAW"))]
     #[schemars(example = &"kuc-siegel")]
     pub edge_law: Option<EdgeLawKind>,
-    /// Also find paths diffracted at two edges; with paths.
+    /// Find paths diffracted at two edges, too (engine `paths` only).
     #[cfg_attr(feature = "clap", arg(long))]
     pub double_diffraction: bool,
-    /// Leave out what a ranger of an array receives of other firings than its own; with paths, the others know no
-    /// crosstalk.
+    /// Disable crosstalk between the rangers of an array (engine `paths` only; the others have
+    /// none).
     #[cfg_attr(feature = "clap", arg(long))]
     pub without_crosstalk: bool,
-    /// Angle between the rays, degrees, instead of 0.05; with fan.
+    /// Angle between the rays, degrees, instead of 0.05 (engine `fan` only).
     #[cfg_attr(feature = "clap", arg(long, value_name = "DEG"))]
     #[schemars(range(min = 0.0001, max = 5), example = 0.1)]
     pub ray_spacing_deg: Option<f64>,
-    /// Full aperture, degrees, instead of the sensor's two-way -6 dB width; with cone.
+    /// Full aperture, degrees, instead of the sensor's two-way -6 dB width (engine `cone` only).
     #[cfg_attr(feature = "clap", arg(long, value_name = "DEG"))]
     #[schemars(range(min = 0, max = 180), example = 15)]
     pub aperture_deg: Option<f64>,
 }
 
-/// A setting of another engine than the one that is named.
+/// A setting that belongs to a different engine than the selected one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
-#[error("{option} is nothing that the engine {} knows", engine.name())]
+#[error("{option} is not an option of the engine {}", engine.name())]
 pub struct ForeignOption {
-    /// The setting, as in [`OptionKeys`].
+    /// Name of the setting, as in [`OptionKeys`].
     pub option: &'static str,
-    /// The engine that is named.
+    /// Engine that was selected.
     pub engine: EngineKind,
-    /// Those that know it.
+    /// Engines with this setting.
     pub of: &'static [EngineKind],
 }
 
 impl ForeignOption {
-    /// What would be right.
+    /// Returns a suggested correction.
     #[must_use]
     pub fn help(&self) -> String {
         let of: Vec<_> = self.of.iter().map(|engine| engine.name()).collect();
-        format!("leave it out, or choose the engine {}", of.join(" or "))
+        format!("remove it, or choose the engine {}", of.join(" or "))
     }
 }
 
@@ -111,21 +112,22 @@ impl From<&Options> for OptionKeys {
 }
 
 impl OptionKeys {
-    /// The options that are named.
+    /// Returns the options that are set.
     ///
     /// # Errors
-    /// The first one that the engine does not know.
+    /// The first option that the engine does not have.
     pub fn options(&self) -> Result<Options, ForeignOption> {
         let known = self.options_of_engine();
         let foreign =
-            OPTIONS.iter().find(|(option, of)| !of.contains(&self.engine) && self.gives(option));
+            OPTIONS.iter().find(|(option, of)| !of.contains(&self.engine) && self.is_set(option));
         match foreign {
             None => Ok(known),
             Some(&(option, of)) => Err(ForeignOption { option, engine: self.engine, of }),
         }
     }
 
-    /// The options that the engine knows; others are left out. Early logs have those of every engine.
+    /// Returns the options of the engine; others are ignored. Early logs contain those of every
+    /// engine.
     #[must_use]
     pub fn options_of_engine(&self) -> Options {
         let engine = match self.engine {
@@ -152,8 +154,8 @@ impl OptionKeys {
         Options { engine, max_range_m: self.max_range_m, threshold: self.threshold }
     }
 
-    /// Whether an option of [`OPTIONS`] is given.
-    fn gives(&self, option: &str) -> bool {
+    /// Returns `true` if an option of [`OPTIONS`] is set.
+    fn is_set(&self, option: &str) -> bool {
         match option {
             "response" => self.response.is_some(),
             "ideal_receiver" => self.ideal_receiver,
@@ -168,7 +170,7 @@ impl OptionKeys {
     }
 }
 
-/// The options that not every engine knows, and who does.
+/// Options that not every engine has, with the engines that have them.
 const OPTIONS: [(&str, &[EngineKind]); 9] = [
     ("response", &[EngineKind::Paths]),
     ("ideal_receiver", &[EngineKind::Paths]),
@@ -185,7 +187,7 @@ const OPTIONS: [(&str, &[EngineKind]); 9] = [
 mod tests {
     use super::*;
 
-    /// Every option given, for an engine.
+    /// Sets every option, for an engine.
     fn everything(engine: EngineKind) -> OptionKeys {
         OptionKeys {
             engine,
@@ -204,7 +206,7 @@ mod tests {
     }
 
     #[test]
-    fn what_an_engine_knows_survives_and_what_it_does_not_is_refused_by_name() {
+    fn foreign_options_are_rejected() {
         let engines = [EngineKind::Paths, EngineKind::Fan, EngineKind::Cone];
         for engine in engines {
             let own = OptionKeys::from(&everything(engine).options_of_engine());
@@ -213,12 +215,12 @@ mod tests {
                 (own.engine, own.max_range_m, own.threshold),
                 (engine, Some(4.0), Some(0.05))
             );
-            // Each option alone is either kept or refused.
+            // Each option alone is either kept or rejected.
             for (option, of) in OPTIONS {
                 let text = serde_json::to_value(everything(engine)).expect("JSON");
                 let one = serde_json::json!({ "engine": engine, option: text[option] });
                 let one: OptionKeys = serde_json::from_value(one).expect("keys");
-                assert!(one.gives(option), "{option}");
+                assert!(one.is_set(option), "{option}");
                 match one.options() {
                     Ok(options) => {
                         assert!(of.contains(&engine), "{option}");
@@ -233,7 +235,7 @@ mod tests {
             }
         }
         let error = everything(EngineKind::Cone).options().expect_err("others' options");
-        assert_eq!(error.to_string(), "response is nothing that the engine cone knows");
-        assert_eq!(error.help(), "leave it out, or choose the engine paths");
+        assert_eq!(error.to_string(), "response is not an option of the engine cone");
+        assert_eq!(error.help(), "remove it, or choose the engine paths");
     }
 }

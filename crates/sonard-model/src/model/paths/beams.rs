@@ -1,8 +1,9 @@
-//! Beams: all rays from an image of the start that met the same walls, and the tree of them.
+//! Beams (all rays from an image of the start that were reflected by the same walls) and their
+//! tree.
 //!
-//! A beam walks the mesh from triangle to triangle. At the far corner of a triangle it splits in two, at a
-//! wall it becomes a beam from the next image, and where it ends at the receiver, at an edge, at a cylinder
-//! or on a wall that other mechanisms ask about, the tree keeps it.
+//! A beam walks the mesh from triangle to triangle. At the far corner of a triangle it splits in
+//! two, at a wall it continues from the next image. The tree keeps a beam or ray that ends at the
+//! receiver, at an edge, at a cylinder or on a wall that other mechanisms use.
 
 mod beam;
 mod grow;
@@ -11,6 +12,6 @@ mod shade;
 mod slopes;
 mod tree;
 
-pub(crate) use beam::{Beam, Leg, Ray};
-pub(crate) use lit::{LitSpan, View};
+pub(crate) use beam::{RayBeam, RayLeg, UnfoldedRay};
+pub(crate) use lit::{LitCylinder, LitWall};
 pub(crate) use tree::Beams;

@@ -1,10 +1,11 @@
 //! Diffraction at edges.
 //!
-//! PulseArrival is diffracted by free ends of walls and by corners that are not `pi / m`. By reciprocity the paths
-//! back from an edge are the paths to it, so the one-way rays to each edge give all echoes with one diffraction
-//! and any reflections before and after: every ray out with every ray back ([`single`]). On request it is also
-//! followed from one upright edge to another ([`double`]). Walls that end below the ceiling or above the floor
-//! have level edges ([`level`]). How much comes back says [`crate::acoustics::edge`].
+//! Sound is diffracted by free ends of walls and by corners other than `pi / m`. By reciprocity the
+//! paths back from an edge are the paths to it. The one-way rays to each edge therefore give all
+//! echoes with one diffraction and any reflections before and after: every ray out with every ray
+//! back ([`single`]). On request rays are also followed from one upright edge to another
+//! ([`double`]). Walls that end below the ceiling or above the floor have level edges ([`level`]).
+//! The strength is that of [`crate::acoustics::edge`].
 
 pub(super) mod double;
 mod edge_ray;

@@ -1,35 +1,36 @@
-//! Echo paths as the mechanisms list them: length, field and directions, with a reference to what the
-//! mechanism keeps of the path itself.
+//! Echo paths as listed by the mechanisms: length, field and directions, with a reference to the
+//! mechanism's own record of the path.
 
 use super::tolerance::{SAME_M, SAME_RAD};
 use crate::{geometry::DVec2, reading::PathKind};
 
 /// An echo path before the beam pattern.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Echo {
+pub(crate) struct PathEcho {
     pub(crate) length_m: f64,
     pub(crate) amplitude: f64,
     pub(crate) phase_rad: f64,
-    /// Unit vector in which it leaves.
+    /// Unit vector of departure.
     pub(crate) departure: DVec2,
-    /// Unit vector towards where it comes from.
+    /// Unit vector towards the origin of the arriving sound.
     pub(crate) arrival: DVec2,
     /// Elevation of departure and arrival, radians.
     pub(crate) rise_rad: [f64; 2],
-    /// Its image by floor and ceiling, counted from 1; 0 for a path in the plan.
+    /// Image by floor and ceiling, counted from 1; 0 for a path in the plan.
     pub(crate) image: u16,
-    /// How steeply a path of the plan can climb, by the numbers in the beams from transmitter and from receiver.
+    /// Possible slopes of a path of the plan, by the numbers in the beams from transmitter and from
+    /// receiver.
     pub(crate) slopes: [u32; 2],
-    /// Whether it touches cylinders more than once, or a cylinder and an upright edge: see
+    /// `true` if the path touches cylinders more than once, or a cylinder and an upright edge: see
     /// [`Settings::contact_floor`](super::settings::Settings::contact_floor).
     pub(crate) is_repeated: bool,
     pub(crate) via: Via,
 }
 
-/// The mechanism of an echo, with its number among what that mechanism keeps.
+/// Mechanism of an echo, with its number in that mechanism's record.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Via {
-    /// Mirror reflections at walls alone; the node of the tree of beams at which its ray ends.
+    /// Mirror reflections at walls alone; the node of the tree of beams at which the ray ends.
     Walls { node: u32 },
     /// Diffraction at one upright edge; `out` and `back` number the rays to it from transmitter and
     /// receiver.
@@ -47,7 +48,7 @@ pub(crate) enum Via {
 }
 
 impl Via {
-    /// The kind of path.
+    /// Returns the kind of path.
     pub(crate) const fn kind(&self) -> PathKind {
         match self {
             Self::Edge { .. } | Self::Edges { .. } | Self::LevelEdge { .. } => PathKind::Diffracted,
@@ -58,8 +59,8 @@ impl Via {
 }
 
 impl Via {
-    /// Whether one leads out as the other leads back, on two rays. Of a transmitter in line with an edge and the wall
-    /// behind it both leave and arrive alike.
+    /// Returns `true` if one leads out as the other leads back, on two rays. For a transmitter in
+    /// line with an edge and the wall behind it, both leave and arrive alike.
     fn is_reverse(&self, other: &Self) -> bool {
         match (self, other) {
             (Self::Edge { out, back, .. }, Self::Edge { out: other_out, back: other_back, .. }) => {
@@ -70,32 +71,35 @@ impl Via {
     }
 }
 
-impl Echo {
-    /// Whether two echoes are one that touches a corner and was found on both sides of it.
+impl PathEcho {
+    /// Returns `true` for the two copies of an echo that touches a corner and was found on both
+    /// sides of it.
     pub(crate) fn is_same(&self, other: &Self) -> bool {
         self.departure.distance_squared(other.departure) < SAME_RAD * SAME_RAD
             && self.arrival.distance_squared(other.arrival) < SAME_RAD * SAME_RAD
             && self.image == other.image
             && std::mem::discriminant(&self.via) == std::mem::discriminant(&other.via)
-            // By two edges, and by level edges, there may be several paths of one length and the same
+            // By two edges, and by level edges, there may be several paths of one length and equal
             // directions; their mechanisms list each once.
             && !matches!(self.via, Via::Edges { .. } | Via::LevelEdge { .. })
             && !self.via.is_reverse(&other.via)
     }
 }
 
-/// Echoes by length, each once.
-pub(crate) fn sorted(echoes: &[Echo]) -> Vec<Echo> {
+/// Sorts echoes by length and drops repeats.
+pub(crate) fn sorted(echoes: &[PathEcho]) -> Vec<PathEcho> {
     // Lengths are positive, so their bits sort like the numbers; indices make it stable.
     let mut order: Vec<(u64, u32)> =
         echoes.iter().zip(0..).map(|(echo, index)| (echo.length_m.to_bits(), index)).collect();
     order.sort_unstable();
-    let mut sorted: Vec<Echo> = order.iter().map(|&(_, index)| echoes[index as usize]).collect();
-    drop_repeats(&mut sorted, |echo| echo.length_m, Echo::is_same);
+    let mut sorted: Vec<PathEcho> =
+        order.iter().map(|&(_, index)| echoes[index as usize]).collect();
+    drop_repeats(&mut sorted, |echo| echo.length_m, PathEcho::is_same);
     sorted
 }
 
-/// Keeps the first of items that are the same and within [`SAME_M`] in length. Sorted by length.
+/// Keeps the first of items that are the same and within [`SAME_M`] in length. The items must be
+/// sorted by length.
 pub(crate) fn drop_repeats<T: Copy>(
     items: &mut Vec<T>,
     length_m: impl Fn(&T) -> f64,

@@ -1,59 +1,64 @@
-//! What a search may cost, and the refusal of one that would cost more.
+//! Effort limits of a search, and the error for one that exceeds them.
 //!
-//! Work is counted in steps of some tens of nanoseconds, memory in bytes, by the mechanism that asks for
-//! them. Once either bound is passed every mechanism ends, and what was found is thrown away: an answer has
-//! all paths, or there is none.
+//! Work is counted in steps of some tens of nanoseconds, memory in bytes, separately for each
+//! mechanism. Once either limit is exceeded every mechanism ends and the result is discarded: a
+//! search returns all paths or none.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::settings::Settings;
 use crate::model::{SearchPart, TooCostly};
 
-/// The most that a search of one observation point may cost.
+/// Effort limit of the search of one observation point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Bound {
     pub(crate) steps: u64,
     pub(crate) bytes: u64,
 }
 
-/// Two seconds or so.
+/// Default limit: about two seconds.
 pub(crate) const BOUND: Bound = Bound { steps: 50_000_000, bytes: 300_000_000 };
 
-/// The effort of a search so far.
+/// Effort of a search so far.
 #[derive(Debug)]
 pub(crate) struct Effort {
-    most: Bound,
-    /// By part of the search.
+    limit: Bound,
+    /// Steps by part of the search.
     steps: [AtomicU64; SearchPart::ALL.len()],
     total: AtomicU64,
     bytes: AtomicU64,
 }
 
 impl Effort {
-    pub(crate) fn new(most: Bound) -> Self {
-        Self { most, steps: Default::default(), total: AtomicU64::new(0), bytes: AtomicU64::new(0) }
+    pub(crate) fn new(limit: Bound) -> Self {
+        Self {
+            limit,
+            steps: Default::default(),
+            total: AtomicU64::new(0),
+            bytes: AtomicU64::new(0),
+        }
     }
 
-    /// Counts steps; false once a bound is passed.
+    /// Counts steps; returns `false` once a limit is exceeded.
     pub(crate) fn step(&self, part: SearchPart, count: usize) -> bool {
         add(&self.steps[part as usize], count);
-        add(&self.total, count) <= self.most.steps && !self.is_over()
+        add(&self.total, count) <= self.limit.steps && !self.is_over()
     }
 
-    /// Counts what is kept of a number of items, twice for lists that grow.
+    /// Counts the memory of a number of kept items, doubled for growing lists.
     pub(crate) fn keep<T>(&self, count: usize) {
         add(&self.bytes, 2 * count * size_of::<T>());
     }
 
     pub(crate) fn is_over(&self) -> bool {
-        self.steps() > self.most.steps || self.bytes.load(Ordering::Relaxed) > self.most.bytes
+        self.steps() > self.limit.steps || self.bytes.load(Ordering::Relaxed) > self.limit.bytes
     }
 
     pub(crate) fn steps(&self) -> u64 {
         self.total.load(Ordering::Relaxed)
     }
 
-    /// The refusal, if a bound was passed.
+    /// Returns the error if a limit was exceeded.
     pub(crate) fn check(&self, settings: &Settings) -> Result<(), TooCostly> {
         if !self.is_over() {
             return Ok(());
@@ -65,7 +70,7 @@ impl Effort {
     }
 }
 
-/// One thread counts at a time, so that loading and storing is enough, and cheaper.
+/// Only one thread counts at a time, so a load and a store suffice, and are cheaper.
 fn add(counter: &AtomicU64, count: usize) -> u64 {
     let sum = counter.load(Ordering::Relaxed).saturating_add(count as u64);
     counter.store(sum, Ordering::Relaxed);

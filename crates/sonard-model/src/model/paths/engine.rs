@@ -1,15 +1,15 @@
-//! The exact engine: the echo paths of an observation point, weighed for an azimuth.
+//! Exact engine: the echo paths of an observation point, weighted for an azimuth.
 
 use std::f64::consts::PI;
 
 use super::{
-    direction_index::{DirectionIndex, Entry},
-    found::{Found, Heard},
+    direction_index::{DirectionEntry, DirectionIndex},
+    found::{EchoPulse, FoundEchoes},
     pattern::{PatternEnvelope, TwoWayBound},
-    plan::Plan,
+    plan::TracingPlan,
     prepare::Paths,
     settings::Settings,
-    transducer::{DirectedPath, FLOOR_ABOVE, FaceEchoes, MultipleEcho},
+    transducer::{DirectedPath, FaceEchoes, MULTIPLE_FLOOR_RATIO, MultipleEcho},
 };
 use crate::{
     acoustics::{BeamPattern, Disc, Image, Incidence, Incident, PulseArrival},
@@ -19,66 +19,72 @@ use crate::{
     scene::Scene,
 };
 
-/// The exact engine: echo paths, a beam pattern and a face that reflects.
+/// Exact engine: echo paths, a beam pattern and a reflecting transducer face.
 ///
-/// [`Settings::floor`] is also the weakest sound that [`Arrivals::listen`] gives.
+/// [`Settings::floor`] is also the smallest amplitude that
+/// [`Arrivals::listen`] returns.
 #[derive(Debug)]
 pub struct PathEngine {
     pub(super) paths: Paths,
     pub(super) beam: BeamPattern,
     pub(super) face: Option<Disc>,
     envelope: PatternEnvelope,
-    /// The bound by which echoes by cylinders are kept; all are where the axis is tilted, and may be nearer to
-    /// a rising path than its azimuth is.
+    /// Pattern bound for echoes by cylinders. `None` keeps all of them, as required for a tilted
+    /// axis, which may be nearer to a rising path than its azimuth is.
     bound: Option<TwoWayBound>,
     /// See [`Self::through_nulls`].
     through_nulls: bool,
 }
 
 impl PathEngine {
-    /// Prepares a scene for a ranger; without a face, sound passes it as if it were not there.
+    /// Prepares a scene for a ranger. Without a face, sound passes the transducer unhindered.
     #[must_use]
     pub fn new(scene: &Scene, beam: BeamPattern, face: Option<Disc>, settings: Settings) -> Self {
-        let envelope = PatternEnvelope::of(&beam);
-        let is_wanted = !scene.cylinders.is_empty() && settings.tilt_rad == 0.0;
-        // A path that the face reflects into another loses at least this.
-        let reflected = face.map_or(0.0, |face| 2.0 * face.face.reflectance / FLOOR_ABOVE);
-        let bound = is_wanted.then(|| TwoWayBound::of(&envelope, reflected));
+        let envelope = PatternEnvelope::new(&beam);
+        let needs_bound = !scene.cylinders.is_empty() && settings.tilt_rad == 0.0;
+        // Smallest loss of a path that the face reflects into another.
+        let reflected = face.map_or(0.0, |face| 2.0 * face.face.reflectance / MULTIPLE_FLOOR_RATIO);
+        let bound = needs_bound.then(|| TwoWayBound::new(&envelope, reflected));
         let paths = Paths::new(scene, settings);
         Self { paths, beam, face, envelope, bound, through_nulls: false }
     }
 
-    /// Gives also what a steady tone could not be heard of because it falls into a null of the beam
-    /// pattern: what the full response of the face to a pulse still hears.
+    /// Also returns arrivals in a null of the beam pattern, where a steady tone is not detectable
+    /// but the full response of the face to a pulse is.
     #[must_use]
     pub fn through_nulls(self, through_nulls: bool) -> Self {
         Self { through_nulls, ..self }
     }
 
-    /// Whether all sound stays in the plane of the scan.
+    /// Returns `true` if all sound stays in the plane of the scan.
     fn is_flat(&self) -> bool {
         self.paths.heights.images.is_empty() && self.paths.plan.settings.tilt_rad == 0.0
     }
 
-    /// The paths whose pulses have run up to a length, metres.
+    /// Returns the paths whose pulses have run up to a length, metres.
     pub(super) fn within(&self, length_m: f64) -> Paths {
-        let Plan { settings, corners, .. } = &self.paths.plan;
-        self.paths.within(settings.max_path_m.min(length_m + corners.most_lead_m))
+        let TracingPlan { settings, corners, .. } = &self.paths.plan;
+        self.paths.within(settings.max_path_m.min(length_m + corners.max_lead_m))
     }
 
-    /// The weakest sound that is told.
+    /// Smallest amplitude of an arrival.
     pub(crate) fn floor(&self) -> f64 {
         self.paths.plan.settings.floor
     }
 
-    /// The most that an echo's pulse may have, if a steady tone with the beam pattern at its ends, radians off the
-    /// axis, has `amplitude`.
-    pub(super) fn most(&self, path_amplitude: f64, amplitude: f64, ends_rad: &[f64; 2]) -> f64 {
+    /// Upper bound of an echo's pulse. `amplitude` is that of a steady tone with the beam pattern
+    /// at its ends, radians off the axis.
+    pub(super) fn upper_bound(
+        &self,
+        path_amplitude: f64,
+        amplitude: f64,
+        ends_rad: &[f64; 2],
+    ) -> f64 {
         if self.through_nulls { path_amplitude * self.envelope.beyond(ends_rad) } else { amplitude }
     }
 
-    /// Angle between the transducer's axis and a direction that is `azimuth_rad` beside it in the
-    /// plan and points up by `rise_rad`, radians.
+    /// Angle, radians, between the transducer's axis and a direction at `azimuth_rad` from it in
+    /// the plane and at an elevation of `rise_rad`.
     pub(super) fn off_axis(&self, azimuth_rad: f64, rise_rad: f64) -> f64 {
         let (tilt_sin, tilt_cos) = self.paths.plan.settings.tilt_rad.sin_cos();
         let (rise_sin, rise_cos) = rise_rad.sin_cos();
@@ -109,15 +115,15 @@ impl Engine for PathEngine {
     }
 }
 
-/// Widest reach of the entries of each index, degrees.
+/// Largest reach of the entries of each index, degrees.
 const REACHES_DEG: [f64; 5] = [6.0, 10.0, 16.0, 30.0, 180.0];
 
-/// The echo paths of an observation point, by direction.
+/// Echo paths of an observation point, by direction.
 struct PathArrivals<'a> {
     engine: &'a PathEngine,
-    /// By the engine's plan, perhaps up to a shorter length.
-    found: Found,
-    /// From narrow to wide reach: the many weak echoes are heard in few directions only.
+    /// Paths in the engine's floor plan, possibly up to a shorter length.
+    found: FoundEchoes,
+    /// From small to large reach: the many weak echoes are detectable in few directions only.
     indexes: [DirectionIndex; REACHES_DEG.len()],
     /// Echoes that the face can reflect.
     face_echoes: Option<FaceEchoes>,
@@ -129,23 +135,25 @@ impl<'a> PathArrivals<'a> {
         paths: Paths,
         [transmitter, receiver]: [DVec2; 2],
     ) -> Result<Self, TooCostly> {
-        let found = Found::between(paths, [transmitter, receiver], engine.bound.as_ref())?;
+        let found = FoundEchoes::between(paths, [transmitter, receiver], engine.bound.as_ref())?;
         let (settings, echoes) = (&found.paths.plan.settings, &found.echoes);
-        let mut entries: [Vec<Entry>; REACHES_DEG.len()] = Default::default();
+        let mut entries: [Vec<DirectionEntry>; REACHES_DEG.len()] = Default::default();
         for (echo, index) in echoes.iter().zip(0..) {
-            if let Some(mut entry) = Entry::of(echo, index, &engine.envelope, settings.floor) {
+            if let Some(mut entry) =
+                DirectionEntry::new(echo, index, &engine.envelope, settings.floor)
+            {
                 if settings.tilt_rad != 0.0 {
                     // A tilted axis may be nearer to a rising path than its azimuth is.
                     entry.reach_rad = PI;
                 }
                 let reach_deg = entry.reach_rad.to_degrees();
-                let index = REACHES_DEG.iter().position(|most| reach_deg <= *most);
+                let index = REACHES_DEG.iter().position(|bound| reach_deg <= *bound);
                 entries[index.unwrap_or(REACHES_DEG.len() - 1)].push(entry);
             }
         }
         let indexes = entries.map(|entries| DirectionIndex::new(&entries));
-        // Transmitter and receiver apart have a face each, and a tilted one turns sound up or down:
-        // what runs between them and the walls is left out.
+        // A separate transmitter and receiver have a face each, and a tilted face turns sound up or
+        // down. Multiple echoes between these and the walls are omitted.
         let faces_level = transmitter == receiver && settings.tilt_rad == 0.0;
         let face_echoes = engine
             .face
@@ -154,12 +162,12 @@ impl<'a> PathArrivals<'a> {
         Ok(Self { engine, found, indexes, face_echoes })
     }
 
-    /// Echoes by way of the face up to a length, metres, in a direction in (-pi, pi].
+    /// Multiple echoes by way of the face up to a length, metres, in a direction in (-pi, pi].
     fn multiple_echoes(&self, direction_rad: f64, length_m: f64) -> Vec<MultipleEcho> {
         let (beam, settings) = (&self.engine.beam, &self.found.paths.plan.settings);
-        let most_m = length_m.min(settings.max_path_m);
+        let max_m = length_m.min(settings.max_path_m);
         let found = |echoes: &FaceEchoes| {
-            echoes.multiple_echoes(direction_rad, beam, settings.floor, most_m)
+            echoes.multiple_echoes(direction_rad, beam, settings.floor, max_m)
         };
         self.face_echoes.as_ref().map_or_else(Vec::new, found)
     }
@@ -170,7 +178,7 @@ impl<'a> PathArrivals<'a> {
         multiple: &MultipleEcho,
         amplitude: f64,
     ) -> Arrival {
-        let Found { paths, traced, echoes, .. } = &self.found;
+        let FoundEchoes { paths, traced, echoes, .. } = &self.found;
         let run_through = |directed: &DirectedPath| {
             let echo = &echoes[directed.echo as usize];
             let path = paths.path(traced, echo).path;
@@ -199,7 +207,8 @@ impl<'a> PathArrivals<'a> {
         }
     }
 
-    /// A multiple echo's amplitude before the beam pattern, and the directions in which it leaves and comes back.
+    /// Amplitude of a multiple echo before the beam pattern, and its directions of departure and
+    /// arrival.
     fn multiple_ends(
         &self,
         direction_rad: f64,
@@ -219,29 +228,35 @@ impl<'a> PathArrivals<'a> {
         (amplitude / (leaving * arriving), ends_rad)
     }
 
-    /// The image of the face over a multiple echo.
+    /// Image of the face over a multiple echo.
     fn multiple_image(&self, multiple: &MultipleEcho) -> Image {
-        let Found { paths, traced, echoes, .. } = &self.found;
-        let met = multiple.paths.iter().map(|path| &echoes[path.echo as usize]);
+        let FoundEchoes { paths, traced, echoes, .. } = &self.found;
+        let parts = multiple.paths.iter().map(|path| &echoes[path.echo as usize]);
         let passages = multiple.paths.len() - 1;
-        met.map(|echo| match echo.via.kind() {
-            PathKind::Specular => Some(paths.mirrors_met(traced, echo)),
-            PathKind::Diffracted | PathKind::Scattered => None,
-        })
-        .try_fold(passages, |met, more| Some(met + more?))
-        .map_or(Image::Lost, mirrored)
+        parts
+            .map(|echo| match echo.via.kind() {
+                PathKind::Specular => Some(paths.reflection_count(traced, echo)),
+                PathKind::Diffracted | PathKind::Scattered => None,
+            })
+            .try_fold(passages, |sum, count| Some(sum + count?))
+            .map_or(Image::Lost, mirrored)
     }
 }
 
 impl Arrivals for PathArrivals<'_> {
     fn listen(&self, direction_rad: f64, arrivals: &mut Vec<PulseArrival>) {
-        self.listen_within(direction_rad, f64::INFINITY, arrivals);
+        self.collect_arrivals_within(direction_rad, f64::INFINITY, arrivals);
     }
 
-    fn listen_within(&self, direction_rad: f64, length_m: f64, arrivals: &mut Vec<PulseArrival>) {
+    fn collect_arrivals_within(
+        &self,
+        direction_rad: f64,
+        length_m: f64,
+        arrivals: &mut Vec<PulseArrival>,
+    ) {
         arrivals.clear();
         let direction_rad = wrap_pi(direction_rad);
-        let Found { paths, echoes, .. } = &self.found;
+        let FoundEchoes { paths, echoes, .. } = &self.found;
         let within = self.found.count_within(length_m) as u32;
         let (beam, floor) = (&self.engine.beam, paths.plan.settings.floor);
         let is_flat = self.engine.is_flat();
@@ -253,9 +268,9 @@ impl Arrivals for PathArrivals<'_> {
                     ends = [0, 1].map(|end| self.engine.off_axis(ends[end], rise_rad[end]));
                 }
                 let [leaving, arriving] = ends.map(|angle| beam.one_way(angle));
-                let Heard { length_m, phase_rad, gain } = self.found.heard(entry.echo);
+                let EchoPulse { length_m, phase_rad, gain } = self.found.pulse(entry.echo);
                 let amplitude = gain * entry.amplitude * leaving * arriving;
-                if self.engine.most(entry.amplitude, amplitude, &ends) >= floor {
+                if self.engine.upper_bound(entry.amplitude, amplitude, &ends) >= floor {
                     arrivals.push(PulseArrival {
                         length_m,
                         amplitude,
@@ -265,7 +280,8 @@ impl Arrivals for PathArrivals<'_> {
                 }
             });
         }
-        // Echoes are numbered by the lengths of their paths; multiple echoes come after all of them.
+        // Echoes are numbered by the lengths of their paths; multiple echoes come after all of
+        // them.
         arrivals.sort_unstable_by_key(|arrival| arrival.index);
         let multiple = self.multiple_echoes(direction_rad, length_m);
         if !multiple.is_empty() || self.found.is_reordered() {
@@ -320,26 +336,26 @@ mod tests {
         scene::{Scene, shipped},
     };
 
-    /// Who hears pulses is told also what a steady tone loses in a null of the beam, and nothing less of the rest.
+    /// With `through_nulls`, echoes in a null of the beam are added and all others are unchanged.
     #[test]
-    fn nulls_of_the_beam_hide_nothing_from_who_hears_through_them() {
+    fn through_nulls_only_adds() {
         let scene = Scene::from_json(shipped::text("two-surface-room").expect("shipped"));
         let scene = scene.expect("a scene");
         let sensor = Sensor::preset("senscomp-6500").expect("a preset");
         let settings = Settings { max_path_m: 3.0, floor: 2e-3, ..LOSSLESS };
-        let told = |through_nulls: bool, direction_rad: f64| {
+        let described = |through_nulls: bool, direction_rad: f64| {
             let beam = BeamPattern::new(&sensor, 343.0);
             let engine = PathEngine::new(&scene, beam, None, settings.clone());
             let engine = engine.through_nulls(through_nulls);
-            let mut told: Vec<PulseArrival> = Vec::new();
+            let mut described: Vec<PulseArrival> = Vec::new();
             let arrivals = engine.arrivals_at(DVec2::new(1.2, 0.9)).expect("few paths");
-            arrivals.listen(direction_rad, &mut told);
-            told.len()
+            arrivals.listen(direction_rad, &mut described);
+            described.len()
         };
         let mut more = 0;
         for at in 0..40 {
             let direction_rad = 0.15 * f64::from(at) - 3.0;
-            let [steady, through] = [false, true].map(|nulls| told(nulls, direction_rad));
+            let [steady, through] = [false, true].map(|nulls| described(nulls, direction_rad));
             assert!(through >= steady, "{direction_rad}: {through} of {steady}");
             more += through - steady;
         }

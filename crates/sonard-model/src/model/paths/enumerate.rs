@@ -1,10 +1,10 @@
-//! The echo paths of an observation point: every mechanism in its turn.
+//! Enumeration of the echo paths of an observation point: runs every mechanism in turn.
 
 use super::{
     beams::Beams,
     cylinders,
     diffraction::{double, level, single},
-    echo::{Echo, Via, sorted},
+    echo::{PathEcho, Via, sorted},
     height::VerticalImage,
     interactions::EchoPath,
     pattern::TwoWayBound,
@@ -21,7 +21,7 @@ use crate::{
 };
 
 impl Paths {
-    /// All echo paths of an observation point, shortest first.
+    /// Returns all echo paths of an observation point, shortest first.
     ///
     /// # Errors
     /// When there are too many.
@@ -29,8 +29,8 @@ impl Paths {
         self.enumerate_between(position, position)
     }
 
-    /// All echo paths from a transmitter to a receiver, shortest first, without the direct path
-    /// from one to the other.
+    /// Returns all echo paths from a transmitter to a receiver, shortest first, without the direct
+    /// path from one to the other.
     ///
     /// # Errors
     /// When there are too many.
@@ -42,7 +42,8 @@ impl Paths {
         self.each_between(transmitter, receiver, |paths| paths.collect())
     }
 
-    /// The same one by one: each takes up its place among all in full only while it is told.
+    /// Passes an iterator over all echo paths from a transmitter to a receiver to `visit`, shortest
+    /// first. Each full path exists only while it is visited.
     ///
     /// # Errors
     /// When there are too many.
@@ -50,20 +51,20 @@ impl Paths {
         &self,
         transmitter: DVec2,
         receiver: DVec2,
-        tell: impl FnOnce(&mut dyn ExactSizeIterator<Item = EchoPath>) -> T,
+        visit: impl FnOnce(&mut dyn ExactSizeIterator<Item = EchoPath>) -> T,
     ) -> Result<T, TooCostly> {
         let (traced, echoes) = self.trace(transmitter, receiver, None)?;
-        Ok(tell(&mut echoes.iter().map(|echo| self.path(&traced, echo))))
+        Ok(visit(&mut echoes.iter().map(|echo| self.path(&traced, echo))))
     }
 
-    /// The same, with what their paths are found from. With `bound`, echoes by cylinders only that can be
-    /// heard.
+    /// Searches for echo paths and returns them with the rays they are reconstructed from. With
+    /// `bound`, only detectable echoes by cylinders are included.
     pub(super) fn trace(
         &self,
         transmitter: DVec2,
         receiver: DVec2,
         bound: Option<&TwoWayBound>,
-    ) -> Result<(Traced, Vec<Echo>), TooCostly> {
+    ) -> Result<(Traced, Vec<PathEcho>), TooCostly> {
         let search = Self { plan: self.plan.for_search(self.bound), ..self.clone() };
         let found = search.trace_all(transmitter, receiver, bound);
         let settings = &self.plan.settings;
@@ -76,7 +77,7 @@ impl Paths {
         transmitter: DVec2,
         receiver: DVec2,
         bound: Option<&TwoWayBound>,
-    ) -> (Traced, Vec<Echo>) {
+    ) -> (Traced, Vec<PathEcho>) {
         let (mut traced, mut echoes) = self.trace_plan([transmitter, receiver], bound);
         if let Some(law) = self.plan.settings.edge_law {
             self.add_diffraction(law, &mut traced, &mut echoes);
@@ -90,13 +91,14 @@ impl Paths {
         (traced, sorted(&echoes))
     }
 
-    /// Echoes in the plan without diffraction: over walls alone, off rough walls and by way of cylinders.
-    fn trace_plan(&self, ends: [DVec2; 2], bound: Option<&TwoWayBound>) -> (Traced, Vec<Echo>) {
+    /// Finds echoes in the plan without diffraction: over walls alone, off rough walls and by way
+    /// of cylinders.
+    fn trace_plan(&self, ends: [DVec2; 2], bound: Option<&TwoWayBound>) -> (Traced, Vec<PathEcho>) {
         let plan = &self.plan;
         let [transmitter, receiver] = ends;
         let mut out = Beams::grow(plan, transmitter, receiver);
         let mut echoes = self.mirrored(&out);
-        // The rays back, as rays from the receiver, matter to edges and cylinders only.
+        // Rays back, traced from the receiver, are needed by edges and cylinders only.
         let needs_back = plan.settings.edge_law.is_some() || !plan.cylinders.is_empty();
         let apart = transmitter != receiver;
         let back = (apart && needs_back).then(|| Beams::grow(plan, receiver, transmitter));
@@ -118,13 +120,13 @@ impl Paths {
         (traced, echoes)
     }
 
-    /// Echoes over walls alone.
-    fn mirrored(&self, beams: &Beams) -> Vec<Echo> {
+    /// Returns the echoes over walls alone.
+    fn mirrored(&self, beams: &Beams) -> Vec<PathEcho> {
         let settings = &self.plan.settings;
         beams
             .to_receiver
             .iter()
-            .map(|ray| Echo {
+            .map(|ray| PathEcho {
                 length_m: ray.run.length(),
                 amplitude: ray.gain * settings.air_gain(ray.run.length()),
                 phase_rad: 0.0,
@@ -140,8 +142,8 @@ impl Paths {
             .collect()
     }
 
-    /// Echoes by one or two upright edges.
-    fn add_diffraction(&self, law: EdgeLaw, traced: &mut Traced, echoes: &mut Vec<Echo>) {
+    /// Adds the echoes by one or two upright edges.
+    fn add_diffraction(&self, law: EdgeLaw, traced: &mut Traced, echoes: &mut Vec<PathEcho>) {
         traced.out.sort_by_edge();
         traced.back.iter_mut().for_each(Rays::sort_by_edge);
         let (out, back) = (&traced.out, traced.back.as_ref());
@@ -151,8 +153,8 @@ impl Paths {
         traced.double = paths;
     }
 
-    /// Each echo of the plan also by way of floor and ceiling, and these by themselves.
-    fn add_images(&self, traced: &Traced, echoes: &mut Vec<Echo>) {
+    /// Adds each echo of the plan by way of floor and ceiling, and the echoes of these alone.
+    fn add_images(&self, traced: &Traced, echoes: &mut Vec<PathEcho>) {
         let [transmitter, receiver] = traced.ends;
         let settings = &self.plan.settings;
         let plan = echoes.len();
@@ -166,11 +168,11 @@ impl Paths {
                     echoes.extend(image.echo(&echoes[at], index, settings));
                 }
             }
-            // The straight path, where it is asked for, is one of the plan.
+            // The direct path, if requested, is one of the plan's echoes.
             if !settings.direct || transmitter == receiver {
                 echoes.extend(image.upright_echo(index, receiver - transmitter, settings));
             }
-            self.plan.effort.keep::<Echo>(echoes.len() - before);
+            self.plan.effort.keep::<PathEcho>(echoes.len() - before);
         }
         let mut number = 0;
         echoes.retain(|echo| {
@@ -182,15 +184,16 @@ impl Paths {
         });
     }
 
-    /// Echoes by level edges, which have their own images by floor and ceiling.
-    fn add_level_edges(&self, law: EdgeLaw, traced: &mut Traced, echoes: &mut Vec<Echo>) {
+    /// Adds the echoes by level edges, which have their own images by floor and ceiling.
+    fn add_level_edges(&self, law: EdgeLaw, traced: &mut Traced, echoes: &mut Vec<PathEcho>) {
         let lit = |rays: &mut Rays| std::mem::take(&mut rays.beams.below_level_edges);
         let (out_lit, back_lit) = (lit(&mut traced.out), traced.back.as_mut().map(lit));
         let [transmitter, receiver] = traced.ends;
-        let out = level::From::new(transmitter, &traced.out.beams, out_lit);
+        let out = level::LevelEdgeBeams::new(transmitter, &traced.out.beams, out_lit);
         let back = traced.back.as_ref().zip(back_lit);
-        let back = back.map(|(Rays { beams, .. }, lit)| level::From::new(receiver, beams, lit));
-        let scene = level::Surroundings { plan: &self.plan, heights: &self.heights, law };
+        let back =
+            back.map(|(Rays { beams, .. }, lit)| level::LevelEdgeBeams::new(receiver, beams, lit));
+        let scene = level::LevelScene { plan: &self.plan, heights: &self.heights, law };
         let (found, paths) = level::echoes(scene, &out, back.as_ref());
         echoes.extend(found);
         traced.level = paths;

@@ -1,18 +1,18 @@
-//! The interactions of echo paths: what they meet, in order, and where.
+//! Interactions of echo paths, in order, and their positions.
 //!
-//! An echo is kept by what the tracer needs to find its path again ([`Via`]): rays by their last node,
-//! edges, contacts with cylinders by their angle. In which order all is met follows from these alone (the
-//! ray out, the edge or the contact in the middle, the ray back in reverse), and where by unfolding: from
-//! the end of each ray backwards, from wall to wall. Heights come last. If floor and ceiling were
-//! windows, a path would rise evenly over its length in the plan; where it crosses one of their images,
-//! it is reflected by the real one.
+//! An echo stores what the tracer needs to reconstruct its path ([`Via`]): the last node of its
+//! rays, edges, and contacts with cylinders by their angle. The order of the interactions follows
+//! from these alone (the ray out, the edge or the contact in the middle, the ray back in reverse).
+//! Their positions follow by unfolding, from the end of each ray backwards, from wall to wall.
+//! Heights come last: with floor and ceiling as windows a path rises evenly over its length in the
+//! plan, and where it crosses one of their images the real surface reflects it.
 
 use super::{
-    beams::Leg,
-    cylinders::{Connection, OneWay},
+    beams::RayLeg,
+    cylinders::{MiddleContact, OneWay},
     diffraction::{double::DoubleDiffraction, level::LevelDiffraction},
-    echo::{Echo, Via},
-    height::{Ends, Heights},
+    echo::{PathEcho, Via},
+    height::{Heights, PathEnds},
     prepare::Paths,
     rays::{Contacts, Rays, end_of, wall_contacts},
     traced::Traced,
@@ -27,41 +27,42 @@ use crate::{
 pub struct EchoPath {
     /// Length there and back, metres.
     pub length_m: f64,
-    /// Reflectances, edge, curvature and absorption; a head-on, rigid wall without absorption
-    /// at the same range gives 1.
+    /// Product of reflectances, edge diffraction, curvature and absorption; a head-on, rigid wall
+    /// without absorption at the same range gives 1.
     pub amplitude: f64,
-    /// Phase beside that of the path's length, for `exp(+i omega t)`, radians: what an edge adds.
+    /// Phase relative to that of the path's length, for `exp(+i omega t)`, radians; caused by
+    /// edges.
     pub phase_rad: f64,
-    /// World direction in which the sound leaves, radians.
+    /// World direction of departure, radians.
     pub departure_rad: f64,
-    /// World direction towards where the sound comes from, radians.
+    /// World direction towards the origin of the arriving sound, radians.
     pub arrival_rad: f64,
     /// Elevation of departure and arrival, radians.
     pub rise_rad: [f64; 2],
-    /// Its interactions, in order.
+    /// Interactions along the path, in order.
     pub path: Path,
 }
 
-/// Effort of asking where a path runs, in steps.
-const STEPS_A_PATH: usize = 10;
+/// Effort of reconstructing a path, in steps.
+const STEPS_PER_PATH: usize = 10;
 
-/// Interactions within this length, metres, are met at once.
-const AT_ONCE_M: f64 = 1e-12;
+/// Length within which interactions coincide, metres.
+const COINCIDENT_M: f64 = 1e-12;
 
-/// A part of a path whose ends and contacts are known in the plan.
+/// A part of a path with known ends and contacts in the plan.
 struct Stretch<'a> {
     from: DVec2,
     contacts: &'a [(DVec2, Mechanism)],
     to: DVec2,
-    /// Height gained along it if floor and ceiling are windows, metres.
+    /// Height gained along it with floor and ceiling as windows, metres.
     climb_m: f64,
-    /// Reflections at floor and ceiling.
+    /// Number of reflections at floor and ceiling.
     bounces: u16,
 }
 
 impl Paths {
-    /// The full account of an echo.
-    pub(super) fn path(&self, traced: &Traced, echo: &Echo) -> EchoPath {
+    /// Returns the full description of an echo.
+    pub(super) fn path(&self, traced: &Traced, echo: &PathEcho) -> EchoPath {
         EchoPath {
             length_m: echo.length_m,
             amplitude: echo.amplitude,
@@ -74,14 +75,14 @@ impl Paths {
     }
 
     /// Number of mirror reflections of an echo that is neither diffracted nor scattered.
-    pub(super) fn mirrors_met(&self, traced: &Traced, echo: &Echo) -> usize {
+    pub(super) fn reflection_count(&self, traced: &Traced, echo: &PathEcho) -> usize {
         let (there, here) = (&traced.out, traced.back());
         let upright = match echo.via {
             Via::Walls { node } => {
-                there.order(&self.plan, OneWay::Walls(Leg { node, run: -echo.arrival }))
+                there.order(&self.plan, OneWay::Walls(RayLeg { node, run: -echo.arrival }))
             }
             Via::Cylinder { connection } => {
-                let Connection { out, back, .. } = traced.connections[connection as usize];
+                let MiddleContact { out, back, .. } = traced.connections[connection as usize];
                 there.order(&self.plan, out) + 1 + here.order(&self.plan, back)
             }
             _ => 0,
@@ -89,8 +90,8 @@ impl Paths {
         upright + usize::from(self.heights.image(echo.image).bounces)
     }
 
-    /// Leaves out echoes that floor and ceiling reflect too often.
-    pub(super) fn retain_allowed(&self, traced: &Traced, echoes: &mut Vec<Echo>) {
+    /// Removes echoes with too many reflections, those at floor and ceiling included.
+    pub(super) fn retain_allowed(&self, traced: &Traced, echoes: &mut Vec<PathEcho>) {
         let settings = &self.plan.settings;
         if settings.max_order.is_none() {
             return;
@@ -100,31 +101,31 @@ impl Paths {
             bounces == 0 || {
                 let contacts = self.contacts(traced, echo, traced.ends[1]);
                 let is_mirror =
-                    |met: &&(DVec2, Mechanism)| matches!(met.1, Mechanism::Reflection(_));
+                    |contact: &&(DVec2, Mechanism)| matches!(contact.1, Mechanism::Reflection(_));
                 settings.allows(bounces + contacts.iter().filter(is_mirror).count() as u16)
             }
         });
     }
 
-    /// Leaves out echoes whose path misses a wall above or below, or is barred by one.
-    pub(super) fn retain_clear(&self, traced: &Traced, echoes: &mut Vec<Echo>) {
+    /// Removes echoes whose path misses a wall above or below, or is blocked by one.
+    pub(super) fn retain_clear(&self, traced: &Traced, echoes: &mut Vec<PathEcho>) {
         let [start, target] = traced.ends;
-        let is_clear = |echo: &Echo| {
-            if !self.plan.effort.step(SearchPart::Images, STEPS_A_PATH) {
+        let is_clear = |echo: &PathEcho| {
+            if !self.plan.effort.step(SearchPart::Images, STEPS_PER_PATH) {
                 return false;
             }
             let rise_m = self.heights.image(echo.image).rise_m;
-            let ends = Ends { start, end: Some(target), rise_m };
+            let ends = PathEnds { start, end: Some(target), rise_m };
             let contacts = self.contacts(traced, echo, target);
             self.heights.is_path_clear(&self.plan.cylinders, &contacts, &ends)
         };
-        if self.heights.matter() {
+        if self.heights.need_checks() {
             echoes.retain(is_clear);
         }
     }
 
-    /// The interactions of an echo, in order.
-    fn interactions(&self, traced: &Traced, echo: &Echo) -> Vec<Interaction> {
+    /// Interactions of an echo, in order.
+    fn interactions(&self, traced: &Traced, echo: &PathEcho) -> Vec<Interaction> {
         let [from, to] = traced.ends;
         if let Via::LevelEdge { level } = echo.via {
             return self.by_level_edge(traced, &traced.level[level as usize]);
@@ -135,7 +136,8 @@ impl Paths {
         Stretch { from, contacts: &contacts, to, climb_m, bounces }.in_space(&self.heights)
     }
 
-    /// Out to the point of diffraction, and in reverse the ray from the receiver to there.
+    /// Interactions from the ray out to the point of diffraction, and from the receiver's ray in
+    /// reverse.
     fn by_level_edge(&self, traced: &Traced, level: &LevelDiffraction) -> Vec<Interaction> {
         let wall = level.wall;
         let rise_m = self.heights.edge_rise_m(wall, level.is_upper);
@@ -161,14 +163,14 @@ impl Paths {
         interactions
     }
 
-    /// The interactions of a path in the plan, from transmitter to receiver.
-    fn contacts(&self, traced: &Traced, echo: &Echo, target: DVec2) -> Contacts {
+    /// Interactions of a path in the plan, from transmitter to receiver.
+    fn contacts(&self, traced: &Traced, echo: &PathEcho, target: DVec2) -> Contacts {
         let (there, here) = (&traced.out, traced.back());
         match echo.via {
-            // A level edge has images by floor and ceiling of its own.
+            // A level edge has its own images by floor and ceiling.
             Via::Upright | Via::LevelEdge { .. } => Contacts::new(),
             Via::Walls { node } => {
-                let leg = Leg { node, run: -echo.arrival };
+                let leg = RayLeg { node, run: -echo.arrival };
                 wall_contacts(&there.beams, &self.plan, leg, target)
             }
             Via::Scatter { patch } => {
@@ -178,7 +180,7 @@ impl Paths {
                 self.out_and_back([(there, ray), (there, ray)], middle)
             }
             Via::Cylinder { connection } => {
-                let Connection { cylinder, angle_rad, out, back } =
+                let MiddleContact { cylinder, angle_rad, out, back } =
                     traced.connections[connection as usize];
                 let point = self.plan.cylinders.circles[cylinder as usize].point(angle_rad);
                 let middle = (point, Mechanism::Reflection(Reflector::Cylinder(cylinder)));
@@ -193,7 +195,7 @@ impl Paths {
         }
     }
 
-    /// Out on one ray to a point, and back in reverse on another that ends there.
+    /// Interactions out on one ray to a point, and back in reverse on another that ends there.
     fn out_and_back(&self, rays: [(&Rays, OneWay); 2], middle: (DVec2, Mechanism)) -> Contacts {
         let [mut out, back] = rays.map(|(rays, ray)| rays.contacts(&self.plan, ray, middle.0));
         out.push(middle);
@@ -209,22 +211,22 @@ impl Paths {
     fn by_two_edges(&self, traced: &Traced, path: &DoubleDiffraction) -> Contacts {
         let DoubleDiffraction { points: [first, second], leg, out, back } = *path;
         let diffractors = [first, second].map(|point| self.upright_diffractor(point));
-        let [Some(one), Some(other)] = diffractors else { return Contacts::new() };
+        let [Some(a), Some(b)] = diffractors else { return Contacts::new() };
         let (there, here) = (&traced.out, traced.back());
         let between = &self.edge_to_edge.at(&self.plan, first).beams;
-        let leg = Leg::from(&between.to_edges[leg as usize].1);
-        let mut contacts = there.contacts(&self.plan, there.to_edge(out), one.0);
-        contacts.push(one);
-        contacts.extend(wall_contacts(between, &self.plan, leg, other.0));
-        contacts.push(other);
-        let back = here.contacts(&self.plan, here.to_edge(back), other.0);
+        let leg = RayLeg::from(&between.to_edges[leg as usize].1);
+        let mut contacts = there.contacts(&self.plan, there.to_edge(out), a.0);
+        contacts.push(a);
+        contacts.extend(wall_contacts(between, &self.plan, leg, b.0));
+        contacts.push(b);
+        let back = here.contacts(&self.plan, here.to_edge(back), b.0);
         contacts.extend(back.into_iter().rev());
         contacts
     }
 }
 
 impl Stretch<'_> {
-    /// Its interactions with their heights, those at floor and ceiling among them.
+    /// Interactions with their heights, including those at floor and ceiling.
     fn in_space(&self, heights: &Heights) -> Vec<Interaction> {
         let mut interactions = Vec::with_capacity(self.contacts.len() + usize::from(self.bounces));
         let z_m = |share: f64| heights.z_at(share * self.climb_m);
@@ -235,10 +237,10 @@ impl Stretch<'_> {
         let plan_m: f64 = legs_m().sum();
         let mut bounces = heights.bounces(self.climb_m, self.bounces).peekable();
         let mut along_m = 0.0;
-        for ((from, leg_m), (to, met)) in starts.clone().zip(legs_m()).zip(ends()) {
-            // In the corner of a wall and the floor both are met at once; the wall then stands first.
+        for ((from, leg_m), (to, mechanism)) in starts.clone().zip(legs_m()).zip(ends()) {
+            // In the corner of a wall and the floor both coincide; the wall is then listed first.
             let is_before =
-                |share: f64| met.is_none() || share * plan_m < along_m + leg_m - AT_ONCE_M;
+                |share: f64| mechanism.is_none() || share * plan_m < along_m + leg_m - COINCIDENT_M;
             while let Some(bounce) = bounces.next_if(|bounce| is_before(bounce.share)) {
                 let leg_share = (bounce.share * plan_m - along_m) / leg_m.max(f64::MIN_POSITIVE);
                 interactions.push(Interaction {
@@ -249,7 +251,11 @@ impl Stretch<'_> {
             }
             along_m += leg_m;
             let z_m = z_m(along_m / plan_m);
-            interactions.extend(met.map(|mechanism| Interaction { mechanism, point: to, z_m }));
+            interactions.extend(mechanism.map(|mechanism| Interaction {
+                mechanism,
+                point: to,
+                z_m,
+            }));
         }
         interactions
     }

@@ -1,4 +1,4 @@
-//! The part of the work that depends on the scene alone.
+//! Preparation: the part of the work that depends on the scene alone.
 
 use std::sync::Arc;
 
@@ -7,8 +7,8 @@ use super::{
     effort::{BOUND, Bound, Effort},
     height::Heights,
     plan::{
-        Circle, Corners, Cylinders, Mesh, Plan, Raised, WallMirror, mirror_gain, scattered,
-        take_posts, take_strips,
+        Corners, Cylinders, Mesh, PlanCircle, Raised, TracingPlan, WallMirror, extract_posts,
+        extract_strips, mirror_gain, scattered,
     },
     settings::{Settings, usual_z_m},
 };
@@ -18,19 +18,19 @@ use crate::{
     scene::{Cylinder, FloorPlan, Scene},
 };
 
-/// A scene made ready for enumerating echo paths.
+/// A scene prepared for enumerating echo paths.
 #[derive(Debug, Clone)]
 pub struct Paths {
-    pub(super) plan: Plan,
+    pub(super) plan: TracingPlan,
     pub(super) heights: Arc<Heights>,
     /// Empty without double diffraction.
     pub(super) edge_to_edge: Arc<EdgeToEdge>,
-    /// The most that a search may cost.
+    /// Effort limit of a search.
     pub(super) bound: Bound,
 }
 
 impl Paths {
-    /// Prepares a scene.
+    /// Prepares a scene with the settings of the search.
     #[must_use]
     pub fn new(scene: &Scene, settings: Settings) -> Self {
         let drawn = scene.floor_plan();
@@ -49,38 +49,39 @@ impl Paths {
         }
     }
 
-    /// The same for paths up to a length, metres, which is at most the one it was prepared for.
+    /// Returns a copy for paths up to a length, metres, which is at most the one it was prepared
+    /// for.
     pub(super) fn within(&self, max_path_m: f64) -> Self {
         Self { plan: self.plan.within(max_path_m), ..self.clone() }
     }
 
-    /// The height of the transducer, metres; `None` in a scene without floor and ceiling.
+    /// Height of the transducer, metres; `None` in a scene without floor and ceiling.
     #[must_use]
     pub fn sensor_z_m(&self) -> Option<f64> {
         self.heights.z_at(0.0)
     }
 }
 
-/// The plan of what is at heights that matter.
-fn plan(scene: &Scene, drawn: &FloorPlan, heights: &Heights, settings: Settings) -> Plan {
-    let is_there = |wall: u32| heights.is_there(scene.walls[wall as usize].z_m);
+/// Prepares the floor plan of the objects at relevant heights.
+fn plan(scene: &Scene, drawn: &FloorPlan, heights: &Heights, settings: Settings) -> TracingPlan {
+    let is_there = |wall: u32| heights.is_relevant(scene.walls[wall as usize].z_m);
     let mut arrangement: Arrangement = drawn.of_walls(is_there);
     let segments: &[(DVec2, DVec2)] = &drawn.walls;
     let gains: Vec<_> = scene.walls.iter().map(|wall| mirror_gain(&wall.material)).collect();
     let climbs = heights.climbs(&settings);
-    let circle = |c: &Cylinder| Circle {
+    let circle = |c: &Cylinder| PlanCircle {
         center: c.center,
-        radius_m: if heights.is_there(c.z_m) { c.radius_m } else { 0.0 },
+        radius_m: if heights.is_relevant(c.z_m) { c.radius_m } else { 0.0 },
         gain: mirror_gain(&c.material),
         is_opaque: heights.is_opaque(c.z_m),
     };
-    let mut circles: Vec<Circle> = scene.cylinders.iter().map(circle).collect();
-    // Other laws know no aspect, and mirrors alone no edges.
+    let mut circles: Vec<PlanCircle> = scene.cylinders.iter().map(circle).collect();
+    // Other laws have no aspect, and mirrors alone no edges.
     let (mut strips, mut posts) = (Vec::new(), Vec::new());
     if settings.edge_law == Some(EdgeLaw::Utd) {
         let (lets_pass, k) = (|wall| climbs.of_wall(wall).is_some(), settings.wave_number_per_m);
-        strips = take_strips(&mut arrangement, &gains, lets_pass, k);
-        posts = take_posts(&mut arrangement, &mut circles, k);
+        strips = extract_strips(&mut arrangement, &gains, lets_pass, k);
+        posts = extract_posts(&mut arrangement, &mut circles, k);
     }
     let round = circles.iter().filter(|circle| circle.radius_m > 0.0);
     let extra: Vec<_> =
@@ -104,10 +105,10 @@ fn plan(scene: &Scene, drawn: &FloorPlan, heights: &Heights, settings: Settings)
         .edge_law
         .map(|law| Corners::new(&arrangement, segments, &gains, law, strips, posts));
     let images: Vec<_> = heights.images.iter().map(|image| [image.gain, image.rise_m]).collect();
-    Plan {
+    TracingPlan {
         walls: (0..segments.len()).map(wall).collect(),
         climbs: climbs.into(),
-        raised: Raised::of(&images, &settings).into(),
+        raised: Raised::new(&images, &settings).into(),
         corners: corners.unwrap_or_default().into(),
         cylinders: Cylinders::new(circles, mesh.as_ref()).into(),
         mesh: mesh.map(Arc::new),

@@ -1,21 +1,21 @@
-//! The rays from one start, over walls alone and by way of cylinders, and what they meet.
+//! Rays from one start, over walls alone and by way of cylinders, and their contacts.
 
 use smallvec::SmallVec;
 
 use super::{
-    beams::{Beams, Leg, Ray},
+    beams::{Beams, RayLeg, UnfoldedRay},
     cylinders::{CylinderRay, CylinderRays, OneWay, SpreadRay, Tracer, surfaces_to},
-    plan::Plan,
+    plan::TracingPlan,
 };
 use crate::{
     geometry::DVec2,
     model::{Mechanism, Reflector},
 };
 
-/// The interactions of a path in the plan, in order, before any height.
+/// Interactions of a path in the plan, in order, without heights.
 pub(super) type Contacts = SmallVec<[(DVec2, Mechanism); 8]>;
 
-/// The rays from one start.
+/// Rays from one start.
 #[derive(Debug, Default)]
 pub(super) struct Rays {
     pub(super) beams: Beams,
@@ -23,13 +23,13 @@ pub(super) struct Rays {
 }
 
 impl Rays {
-    /// Puts the rays to each edge side by side.
+    /// Groups the rays by edge.
     pub(super) fn sort_by_edge(&mut self) {
         self.beams.sort_by_edge();
         self.cylinders.to_edges.sort_by_key(|ray| ray.point);
     }
 
-    /// The edges that are met, each once; sorted by edge.
+    /// Edges that rays reach, each once; sorted by edge.
     pub(super) fn edges(&self) -> Vec<u32> {
         let to_edges = &self.beams.to_edges;
         let by_walls = to_edges.chunk_by(|a, b| a.0 == b.0).map(|rays| rays[0].0);
@@ -42,7 +42,8 @@ impl Rays {
         edges
     }
 
-    /// A ray to an edge by its number: those over walls alone first, then those by cylinders.
+    /// Returns a ray to an edge by its number: those over walls alone first, then those by
+    /// cylinders.
     pub(super) fn to_edge(&self, number: u32) -> OneWay {
         match (number as usize).checked_sub(self.beams.to_edges.len()) {
             None => OneWay::Walls((&self.beams.to_edges[number as usize].1).into()),
@@ -50,12 +51,13 @@ impl Rays {
         }
     }
 
-    /// A ray to an edge over walls alone, by its number.
-    pub(super) fn to_edge_by_walls(&self, number: u32) -> Option<&Ray> {
+    /// Returns a ray to an edge over walls alone, by its number.
+    pub(super) fn to_edge_by_walls(&self, number: u32) -> Option<&UnfoldedRay> {
         self.beams.to_edges.get(number as usize).map(|(_, ray)| ray)
     }
 
-    /// Rays by way of cylinders to an edge, and the number of the first; sorted by edge.
+    /// Rays by way of cylinders to an edge, and the number of the first; requires
+    /// [`Self::sort_by_edge`].
     pub(super) fn spread_to_edge(&self, point: u32) -> (u32, &[SpreadRay]) {
         let all = &self.cylinders.to_edges;
         let from = all.partition_point(|ray| ray.point < point);
@@ -63,8 +65,8 @@ impl Rays {
         ((self.beams.to_edges.len() + from) as u32, &all[from..from + count])
     }
 
-    /// Number of walls and cylinders that a ray met.
-    pub(super) fn order(&self, plan: &Plan, ray: OneWay) -> usize {
+    /// Number of walls and cylinders that reflected a ray.
+    pub(super) fn order(&self, plan: &TracingPlan, ray: OneWay) -> usize {
         let (leg, cylinders) = match ray {
             OneWay::Walls(leg) => (leg, 0),
             OneWay::Cylinders(number) => self.traced(plan, number, |tracer, contact_rad| {
@@ -74,8 +76,8 @@ impl Rays {
         cylinders + self.beams.walls_back(&plan.walls, leg).count()
     }
 
-    /// The interactions of a ray that ends at `end`, in order.
-    pub(super) fn contacts(&self, plan: &Plan, ray: OneWay, end: DVec2) -> Contacts {
+    /// Interactions of a ray that ends at `end`, in order.
+    pub(super) fn contacts(&self, plan: &TracingPlan, ray: OneWay, end: DVec2) -> Contacts {
         match ray {
             OneWay::Walls(leg) => wall_contacts(&self.beams, plan, leg, end),
             OneWay::Cylinders(number) => self.traced(plan, number, |tracer, contact_rad| {
@@ -83,27 +85,37 @@ impl Rays {
                 let leg = tracer.leg(contact_rad);
                 let mut contacts = wall_contacts(&self.beams, plan, leg, points[0]);
                 let first = Reflector::Cylinder(tracer.view.cylinder);
-                let met = [first].into_iter().chain(tracer.surfaces.iter().copied());
-                contacts.extend(points.into_iter().zip(met.map(Mechanism::Reflection)));
+                let surfaces = [first].into_iter().chain(tracer.surfaces.iter().copied());
+                contacts.extend(points.into_iter().zip(surfaces.map(Mechanism::Reflection)));
                 contacts
             }),
         }
     }
 
     /// Traces a ray by way of cylinders.
-    fn traced<T>(&self, plan: &Plan, number: u32, tell: impl FnOnce(&Tracer, f64) -> T) -> T {
+    fn traced<T>(
+        &self,
+        plan: &TracingPlan,
+        number: u32,
+        visit: impl FnOnce(&Tracer, f64) -> T,
+    ) -> T {
         let CylinderRay { view, link, contact_rad } = self.cylinders.rays[number as usize];
         let view = &self.beams.to_cylinders[view as usize];
         let surfaces = surfaces_to(&self.cylinders.links, link);
-        tell(&Tracer::new(plan, view, &surfaces), contact_rad)
+        visit(&Tracer::new(plan, view, &surfaces), contact_rad)
     }
 }
 
-/// The walls that a ray meets, in order, and where.
+/// Walls that a ray hits, in order, with the points.
 ///
-/// From its end backwards: the leg before a wall runs along the mirrored direction, from the last point to where
-/// it crosses the wall's line.
-pub(super) fn wall_contacts(beams: &Beams, plan: &Plan, leg: Leg, end: DVec2) -> Contacts {
+/// From its end backwards: the leg before a wall runs along the mirrored direction, from the last
+/// point to the intersection with the wall's line.
+pub(super) fn wall_contacts(
+    beams: &Beams,
+    plan: &TracingPlan,
+    leg: RayLeg,
+    end: DVec2,
+) -> Contacts {
     let (mut to, mut run) = (end, leg.run);
     let mut contacts: Contacts = beams
         .walls_back(&plan.walls, leg)
@@ -118,8 +130,8 @@ pub(super) fn wall_contacts(beams: &Beams, plan: &Plan, leg: Leg, end: DVec2) ->
     contacts
 }
 
-/// The end of a ray from `start` over walls.
-pub(super) fn end_of(beams: &Beams, plan: &Plan, leg: Leg, start: DVec2) -> DVec2 {
+/// End of a ray from `start` over walls.
+pub(super) fn end_of(beams: &Beams, plan: &TracingPlan, leg: RayLeg, start: DVec2) -> DVec2 {
     let walls: SmallVec<[u32; 8]> = beams.walls_back(&plan.walls, leg).collect();
     let mirror = |wall: &u32| plan.walls[*wall as usize].mirror;
     let image = walls.iter().rev().map(mirror).fold(start, |at, mirror| mirror.image(at));

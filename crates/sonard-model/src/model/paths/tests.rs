@@ -39,7 +39,7 @@ pub(in crate::model) const LOSSLESS: Settings = Settings {
     max_path_m: 20.0,
     max_order: None,
     floor: 1e-4,
-    repeated_contacts_above: REPEATED_CONTACTS_ABOVE,
+    repeated_contacts_above: DEFAULT_REPEATED_CONTACT_RATIO,
     crowded_m: 0.0,
     edge_law: None,
     double_diffraction: false,
@@ -52,14 +52,14 @@ pub(in crate::model) const LOSSLESS: Settings = Settings {
 };
 
 impl Paths {
-    /// The same with all beams followed at any height.
+    /// Follows all beams at any height.
     fn without_cuts(mut self) -> Self {
         let climbs = plan::Climbs { ends_beams: false, ..plan::Climbs::clone(&self.plan.climbs) };
         self.plan.climbs = climbs.into();
         Self { bound: effort::Bound { steps: u64::MAX, bytes: u64::MAX }, ..self }
     }
 
-    /// How many beams were turned by walls on the way out from a point.
+    /// Number of beams reflected by walls on the way out from a point.
     fn beams_from(&self, start: DVec2) -> usize {
         beams::Beams::grow(&self.plan, start, start).nodes.len()
     }
@@ -98,12 +98,12 @@ fn polygon(corners: &[DVec2]) -> Scene {
     scene(&walls)
 }
 
-/// Length and arrival of each image of the source in a box's lattice, as Allen and Berkley have
-/// it, in the box's own frame.
+/// Vector to each image of the source in a box's lattice (Allen and Berkley), in the box's own
+/// frame.
 fn lattice(size: DVec2, at: DVec2, max_path_m: f64) -> Vec<DVec2> {
-    let most = |side: f64| (max_path_m / (2.0 * side)).ceil() as i32 + 1;
+    let bound = |side: f64| (max_path_m / (2.0 * side)).ceil() as i32 + 1;
     let images = |side: f64, at: f64| {
-        (-most(side)..=most(side)).flat_map(move |m| {
+        (-bound(side)..=bound(side)).flat_map(move |m| {
             let shift = 2.0 * f64::from(m) * side;
             [shift, shift - 2.0 * at]
         })
@@ -116,7 +116,7 @@ fn lattice(size: DVec2, at: DVec2, max_path_m: f64) -> Vec<DVec2> {
 }
 
 #[test]
-fn in_rectangles_the_echoes_are_the_image_lattice() {
+fn rectangle_is_the_image_lattice() {
     let mut random = Pcg64::seed_from_u64(3);
     for case in 0..1000 {
         let size = DVec2::new(random.random_range(0.5..6.0), random.random_range(0.5..6.0));
@@ -132,7 +132,7 @@ fn in_rectangles_the_echoes_are_the_image_lattice() {
         let mut expected = lattice(size, at, LOSSLESS.max_path_m);
         expected.sort_by(|a, b| a.length().total_cmp(&b.length()));
         assert_eq!(echoes.len(), expected.len(), "case {case}: {size} at {at}");
-        // Each echo is one of the images, and no image twice.
+        // Each echo is one of the images, and no image occurs twice.
         for echo in &echoes {
             let seen = |image: &DVec2| {
                 let arrival = frame.rotate(*image).to_angle();

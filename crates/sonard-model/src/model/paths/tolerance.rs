@@ -1,7 +1,8 @@
-//! Tolerances: what counts as the same.
+//! Tolerances within which values count as equal.
 
-/// Rays this close to a corner pass through it, metres: on either side of it and over it. Above
-/// rounding (1e-14 over tens of metres), below anything that sound could tell.
+/// Distance, metres, within which a ray passes through a corner: on either side of it and over it.
+/// Larger than rounding errors (1e-14 over tens of metres), smaller than anything that sound could
+/// resolve.
 pub(crate) const TIE_M: f64 = 1e-9;
 
 /// Echoes that agree in length and both directions to within this are one, metres and radians.

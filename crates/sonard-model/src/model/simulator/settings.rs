@@ -7,17 +7,17 @@ use crate::{
     model::{FanOptions, FanSettings, Options, PathOptions, paths},
 };
 
-/// Paths this far below the threshold are given up, decibels: a silence is still explained by
-/// what came within that.
+/// Margin below the threshold at which paths are dropped, decibels: a missing echo is still
+/// explained by arrivals within it.
 const MARGIN_KEPT_DB: f64 = 40.0;
 
-/// The same for `paths`, which would find a great many more down there.
+/// The margin for `paths`, which would find a great many more weak paths.
 const PATHS_KEPT_DB: f64 = 20.0;
 
 /// Bozma and Kuc's scattering strength of the right-angled edge that they scanned.
 const SIGMA_E: f64 = 0.095;
 
-/// The sensor's receiver with the options applied. Only `paths` knows phases.
+/// Returns the sensor's receiver with the options applied. Only `paths` has phases.
 #[must_use]
 pub fn receiver(sensor: &Sensor, air: &Air, options: &Options) -> Receiver {
     let paths = options.engine.paths();
@@ -52,8 +52,8 @@ pub(super) fn path_settings(
         max_path_m: 2.0 * receiver.max_range_m,
         max_order: options.max_order.map(|order| order.try_into().unwrap_or(u16::MAX)),
         floor: receiver.threshold * 10f64.powf(-PATHS_KEPT_DB / 20.0),
-        repeated_contacts_above: paths::REPEATED_CONTACTS_ABOVE,
-        crowded_m: crowded_m(receiver),
+        repeated_contacts_above: paths::DEFAULT_REPEATED_CONTACT_RATIO,
+        crowded_m: unrestricted_m(receiver),
         edge_law: Some(law),
         double_diffraction: options.double_diffraction,
         absorption_np_per_m: absorption_db_per_m(sensor, air, options.lossless) / (20.0 * LOG10_E),
@@ -65,9 +65,9 @@ pub(super) fn path_settings(
     }
 }
 
-/// The length of path that sound has run when the first echo can be noticed, metres; with a long blanking less, since
-/// beside a round body there are many times more paths with every metre.
-fn crowded_m(receiver: &Receiver) -> f64 {
+/// Length of path at which the first echo can be detected, metres. For a long blanking it is
+/// limited, since near a round body the number of paths multiplies with every metre.
+fn unrestricted_m(receiver: &Receiver) -> f64 {
     let opens_us = receiver.blanking_us + receiver.integration_us;
     (opens_us * 1e-6 * receiver.sound_speed_m_s).min(1.0)
 }
@@ -100,13 +100,14 @@ pub(super) fn fan_settings(
 mod tests {
     use super::*;
 
-    /// 2380 us of blanking and an integration of 60 us are 0.83 m of path; of a long blanking a metre counts.
+    /// 2380 us of blanking and an integration of 60 us are 0.83 m of path; a long blanking counts
+    /// as a metre.
     #[test]
-    fn sound_is_crowded_until_the_receiver_can_notice_it() {
+    fn crowded_until_detection() {
         let preset = Sensor::preset("senscomp-6500").expect("a preset");
         let of = |blanking_us: f64| {
             let sensor = Sensor { blanking_us, integration_us: 60.0, ..preset.clone() };
-            crowded_m(&Receiver::new(&sensor, 340.0))
+            unrestricted_m(&Receiver::new(&sensor, 340.0))
         };
         assert!((of(2380.0) - 0.8296).abs() < 1e-9, "{}", of(2380.0));
         assert_eq!(of(5000.0), 1.0);

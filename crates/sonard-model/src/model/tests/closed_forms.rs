@@ -10,7 +10,7 @@ fn at_spacing(ray_spacing_deg: f64) -> Options {
 }
 
 #[test]
-fn a_wall_answers_from_the_foot_of_its_normal() {
+fn wall_head_on() {
     for spacing_deg in SPACINGS_DEG {
         let one_wall = scene(vec![wall("w", (1.3, -3.0), (1.3, 2.0), 0.8)]);
         let all = arrivals(one_wall, at_spacing(spacing_deg), DVec2::ZERO, 0.0);
@@ -24,7 +24,7 @@ fn a_wall_answers_from_the_foot_of_its_normal() {
 }
 
 #[test]
-fn a_wall_seen_aslant_is_weighted_twice_by_the_beam() {
+fn wall_aslant_has_two_way_beam() {
     let sensor = Sensor::preset("senscomp-6500").expect("a preset");
     let beam = BeamPattern::new(&sensor, Air::default().sound_speed_m_s());
     let one_wall = scene(vec![wall("w", (1.3, -3.0), (1.3, 2.0), 1.0)]);
@@ -40,7 +40,7 @@ fn a_wall_seen_aslant_is_weighted_twice_by_the_beam() {
 }
 
 #[test]
-fn a_right_angled_corner_answers_from_its_vertex() {
+fn right_angled_corner() {
     for spacing_deg in SPACINGS_DEG {
         let corner = vec![
             wall("east", (0.9, -0.7), (0.9, 2.0), 1.0),
@@ -51,7 +51,7 @@ fn a_right_angled_corner_answers_from_its_vertex() {
         let all = arrivals(scene(corner), at_spacing(spacing_deg), DVec2::ZERO, bearing_deg);
         let twice: Vec<_> =
             of_kind(&all, PathKind::Specular).filter(|a| reflectors(&a.path).len() == 2).collect();
-        // Either half of the beam meets the walls in its own order.
+        // Each half of the beam hits the walls in its own order.
         assert_eq!(twice.len(), 2, "{spacing_deg}");
         for arrival in twice {
             close(arrival.length_m, 2.0 * vertex.length(), 1e-9, "length");
@@ -62,7 +62,7 @@ fn a_right_angled_corner_answers_from_its_vertex() {
 }
 
 #[test]
-fn parallel_walls_answer_at_multiples_of_their_distance() {
+fn parallel_walls() {
     let pair = vec![
         wall("north", (-4.0, 0.5), (4.0, 0.5), 0.9),
         wall("south", (-4.0, -0.3), (4.0, -0.3), 0.9),
@@ -71,7 +71,7 @@ fn parallel_walls_answer_at_multiples_of_their_distance() {
         let options = Options { max_range_m: Some(2.0), ..at_spacing(spacing_deg) };
         let all = arrivals(scene(pair.clone()), options, DVec2::ZERO, 90.0);
         let found: Vec<_> = of_kind(&all, PathKind::Specular).collect();
-        // Odd orders that begin at the north wall; even ones come back from behind.
+        // Odd orders that begin at the north wall; even ones return from behind.
         assert_eq!(found.len(), 2, "{spacing_deg}: {found:?}");
         for (arrival, (order, length_m)) in found.iter().zip([(1, 1.0), (3, 2.6)]) {
             assert_eq!(reflectors(&arrival.path).len(), order);
@@ -82,9 +82,9 @@ fn parallel_walls_answer_at_multiples_of_their_distance() {
 }
 
 #[test]
-fn a_free_end_returns_kuc_and_siegels_share_of_a_plane() {
+fn free_end_matches_kuc_siegel() {
     for range_m in [0.3, 1.0, 2.5] {
-        // A wall seen under 60 degrees: its mirror echo leaves the beam, its near end stays.
+        // A wall at 60 degrees: its mirror echo leaves the beam, its near end stays.
         let end = (range_m, 0.0);
         let tilted = wall("w", end, (range_m + 0.5, 0.9), 1.0);
         let all = arrivals(scene(vec![tilted]), BARE, DVec2::ZERO, 0.0);
@@ -93,7 +93,7 @@ fn a_free_end_returns_kuc_and_siegels_share_of_a_plane() {
                 diffractors(&arrival.path)[..]
                     == [Diffractor::Upright(Edge { wall: 0, at_b: false })]
             })
-            .expect("the end is heard");
+            .expect("an echo of the end");
         let wavelength_m = Air::default().sound_speed_m_s() / 49.4e3;
         let expected = 1.0 / (std::f64::consts::TAU * (range_m / wavelength_m).sqrt());
         close(found.length_m, 2.0 * range_m, 1e-9, "length");
@@ -102,7 +102,7 @@ fn a_free_end_returns_kuc_and_siegels_share_of_a_plane() {
 }
 
 #[test]
-fn an_end_out_of_sight_is_silent() {
+fn hidden_end_has_no_echo() {
     let walls = vec![
         wall("hidden", (1.0, 0.0), (1.5, 0.4), 1.0),
         wall("screen", (0.5, -0.4), (0.5, 0.4), 1.0),
@@ -113,10 +113,10 @@ fn an_end_out_of_sight_is_silent() {
     assert!(of_kind(&all, PathKind::Diffracted).all(of_second));
 }
 
-/// A cylinder of radius r at distance d spreads a head-on echo to `sqrt(r / (r + d))` of a
-/// plane's at the same distance (wave front of radius d on a mirror of radius r).
+/// A cylinder of radius r at distance d spreads a head-on echo to `sqrt(r / (r + d))` of a plane's
+/// at the same distance (wave front of radius d on a mirror of radius r).
 #[test]
-fn a_cylinder_spreads_its_echo() {
+fn cylinder_spreads_its_echo() {
     for (radius_m, distance_m) in [(0.05, 0.6), (0.3, 1.0), (0.02, 2.0)] {
         let mut post = scene(Vec::new());
         post.cylinders = vec![cylinder((radius_m + distance_m, 0.0), radius_m)];
@@ -129,9 +129,9 @@ fn a_cylinder_spreads_its_echo() {
     }
 }
 
-/// In a rectangle every echo is an image source: the lattice gives them all.
+/// In a rectangle every echo is an image source of the lattice.
 #[test]
-fn a_rectangle_gives_the_image_lattice() {
+fn rectangle_is_the_image_lattice() {
     let (width_m, depth_m, x_m, y_m) = (1.1, 0.83, 0.37, 0.29);
     let room = vec![
         wall("south", (0.0, 0.0), (width_m, 0.0), 1.0),
@@ -156,7 +156,7 @@ fn a_rectangle_gives_the_image_lattice() {
             for (m, dy) in axis(depth_m, y_m).zip(0..).map(|(dy, m)| (m, dy)) {
                 let to_image = DVec2::new(dx, dy);
                 // The sound leaves towards the image mirrored back into the room: for an even
-                // number of mirrors along an axis it leaves the other way from where it arrives.
+                // number of mirrors along an axis it leaves opposite to its arrival.
                 let mirrored = |even: bool, d: f64| if even { -d } else { d };
                 let leaving = DVec2::new(mirrored(n % 2 == 0, dx), mirrored(m % 2 == 0, dy));
                 let ahead = |end: DVec2| end.angle_to(DVec2::from_angle(direction_rad)).abs() < 0.2;
@@ -179,7 +179,7 @@ fn a_rectangle_gives_the_image_lattice() {
 }
 
 #[test]
-fn the_cone_reads_the_nearest_hit_within_its_aperture() {
+fn cone_reads_the_nearest_hit() {
     let options = ConeOptions { aperture_deg: Some(15.0) };
     let one_wall = scene(vec![wall("w", (1.0, -3.0), (1.0, 3.0), 1.0)]);
     let simulator = simulator(one_wall, options);
@@ -195,7 +195,7 @@ fn the_cone_reads_the_nearest_hit_within_its_aperture() {
 
 /// Ranges are measured from the face, and from the middle of a pair.
 #[test]
-fn a_face_off_the_axis_sees_the_wall_from_where_it_is() {
+fn face_off_the_axis() {
     let room = || scene(vec![wall("north", (-9.0, 1.0), (9.0, 1.0), 1.0)]);
     let range_m = |mounting: crate::acoustics::Mounting, direction_deg: f64| {
         let mut sensor = Sensor::preset("senscomp-6500").expect("a preset");

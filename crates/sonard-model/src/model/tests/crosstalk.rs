@@ -1,4 +1,4 @@
-//! Sound of one ranger in another's ear, worked out by hand, and against single rangers.
+//! Crosstalk between rangers, computed by hand, and compared with single rangers.
 
 use std::sync::Arc;
 
@@ -26,7 +26,7 @@ fn wall(wall_m: f64) -> Scene {
     scene.build().expect("a scene")
 }
 
-/// Rangers that all look to +x, this far to the left.
+/// Rangers that all point to +x, at these offsets to the left.
 fn side_by_side(left_m: &[f64], interval_ms: f64, order: Vec<Turn>) -> RangerArray {
     let ranger = |(number, &y_m): (usize, &f64)| MountedRanger {
         id: format!("s{number}"),
@@ -53,21 +53,21 @@ fn model(array: RangerArray, scene: &Scene, options: PathOptions) -> ArrayModel 
     ArrayModel::new(Arc::new(array), scene, &sensor, air(), options.into()).expect("right options")
 }
 
-fn heard(model: &ArrayModel, pose: Pose, firing: usize) -> Prediction {
-    model.at(pose).expect("a stand").ping_in_round(firing).expect("few paths")
+fn predict(model: &ArrayModel, pose: Pose, firing: usize) -> Prediction {
+    model.at(pose).expect("a pose").ping_in_round(firing).expect("few paths")
 }
 
 const ORIGIN: Pose = Pose { x_m: 0.0, y_m: 0.0, heading_deg: 0.0 };
 
-/// Two sonars 0.2 m apart before a wall at 3 m. Both fire every 10 ms in turn: s1 at 10 ms hears what s0 sent at 0,
-/// over 2 x sqrt(9 + 0.01) = 6.00333 m, as an echo of 6.00333 - 3.4 = 2.60333 m: range 1.30167 m. Its own echo comes
-/// after its window of 1.7 m. Both the sound's ends are atan(0.1 / 3) off the axes, and the gain makes up for 2.60333
-/// of the 6.00333 m.
+/// Two sonars 0.2 m apart in front of a wall at 3 m. They fire alternately every 10 ms. At 10 ms s1
+/// receives the sound that s0 sent at 0, over 2 x sqrt(9 + 0.01) = 6.00333 m. It appears as an echo
+/// of 2.60333 m (3.4 m less): range 1.30167 m. Its own echo comes after its window of 1.7 m. Both
+/// ends of the path are atan(0.1 / 3) off the axes, and the gain compensates 2.60333 of 6.00333 m.
 #[test]
-fn a_sound_of_the_turn_before_reads_as_a_near_wall() {
+fn ghost_of_the_previous_slot() {
     let array = side_by_side(&[0.1, -0.1], 10.0, Vec::new());
     let model = model(array, &wall(3.0), PathOptions::default());
-    let prediction = heard(&model, ORIGIN, 1);
+    let prediction = predict(&model, ORIGIN, 1);
     let length_m = 2.0 * f64::hypot(3.0, 0.1);
     assert_eq!(prediction.status, PingStatus::Echo);
     let range_m = prediction.range_m.expect("a range");
@@ -80,34 +80,35 @@ fn a_sound_of_the_turn_before_reads_as_a_near_wall() {
     let expected = one_way * one_way * (length_m - 3.4) / length_m;
     let amplitude = prediction.amplitude.expect("an amplitude");
     assert!((amplitude - expected).abs() < 1e-9, "{amplitude} instead of {expected}");
-    // Left turn: to the point of the wall half way between both.
+    // Turned left: to the point of the wall half way between both.
     assert!((arrival.departure_rad - f64::atan2(-0.1, 3.0)).abs() < 1e-9);
     assert!((arrival.arrival_rad - f64::atan2(0.1, 3.0)).abs() < 1e-9);
 }
 
 #[test]
-fn its_own_sound_of_the_round_before_is_heard_too_and_crosstalk_can_be_left_out() {
+fn ghost_of_its_own_last_round() {
     let array = side_by_side(&[0.0], 10.0, Vec::new());
     let scene = wall(3.0);
-    let prediction = heard(&model(array.clone(), &scene, PathOptions::default()), ORIGIN, 0);
+    let prediction = predict(&model(array.clone(), &scene, PathOptions::default()), ORIGIN, 0);
     let range_m = prediction.range_m.expect("a ghost");
     assert!((range_m - 1.3).abs() < 1e-9, "{range_m}");
     assert_eq!(prediction.crosstalk, Some(OtherFiring { ranger: 0, before_us: 10_000.0 }));
     let alone = PathOptions { without_crosstalk: true, ..PathOptions::default() };
-    let prediction = heard(&model(array, &scene, alone), ORIGIN, 0);
+    let prediction = predict(&model(array, &scene, alone), ORIGIN, 0);
     assert_eq!((prediction.status, prediction.crosstalk), (PingStatus::NoEcho, None));
 }
 
-/// At once: by way of the wall the path from the other is longer than the own one, so each reads its own. Turned
-/// away until its beam pattern leaves a tenth of what the wall sends, s1 loses its own echo, which the pattern takes
-/// twice, but not the other's sound, which it takes once.
+/// Simultaneous firing: by way of the wall the path from the other is longer than the own one, so
+/// each reads its own. Turned away until its beam pattern leaves a tenth of the wall's echo, s1
+/// loses its own echo, to which the pattern applies twice, but not the other's sound, to which it
+/// applies once.
 #[test]
-fn of_rangers_that_fire_at_once_each_reads_the_other_where_its_own_echo_is_lost() {
+fn simultaneous_firing() {
     let together = vec![Turn::Together(vec!["s0".into(), "s1".into()])];
     let mut array = side_by_side(&[0.1, -0.1], 100.0, together);
     let both = model(array.clone(), &wall(3.0), PathOptions::default());
     for firing in [0, 1] {
-        let prediction = heard(&both, ORIGIN, firing);
+        let prediction = predict(&both, ORIGIN, firing);
         assert!((prediction.range_m.expect("a wall") - 3.0).abs() < 1e-9);
         assert_eq!(prediction.crosstalk, None);
     }
@@ -118,33 +119,33 @@ fn of_rangers_that_fire_at_once_each_reads_the_other_where_its_own_echo_is_lost(
     );
     array.rangers[1].bearing_deg = -away_rad.to_degrees();
     let turned = model(array, &wall(3.0), PathOptions::default());
-    let prediction = heard(&turned, ORIGIN, 1);
+    let prediction = predict(&turned, ORIGIN, 1);
     assert_eq!(prediction.crosstalk, Some(OtherFiring { ranger: 0, before_us: 0.0 }));
     let range_m = prediction.range_m.expect("the wall");
     assert!((range_m - f64::hypot(3.0, 0.1)).abs() < 1e-9, "{range_m}");
 }
 
-/// Two that face each other, 2 m apart, hear each other straight: half the way.
+/// Two that face each other, 2 m apart, receive each other directly: half the distance.
 #[test]
-fn facing_rangers_that_fire_at_once_hear_each_other_straight_unless_a_wall_stands_between() {
+fn direct_path_of_facing_rangers() {
     let together = vec![Turn::Together(vec!["s0".into(), "s1".into()])];
     let mut array = side_by_side(&[0.0, 0.0], 50.0, together);
     (array.rangers[1].x_m, array.rangers[1].bearing_deg) = (2.0, 180.0);
     let open = Scene::builder("open").build().expect("a scene");
-    let prediction = heard(&model(array.clone(), &open, PathOptions::default()), ORIGIN, 1);
+    let prediction = predict(&model(array.clone(), &open, PathOptions::default()), ORIGIN, 1);
     assert!((prediction.range_m.expect("the other") - 1.0).abs() < 1e-9);
     let arrival = prediction.arrival.expect("an arrival");
     assert!(arrival.path.interactions.is_empty());
     assert!((arrival.amplitude - 1.0).abs() < 1e-9, "{}", arrival.amplitude);
     let between = model(array, &wall(1.5), PathOptions::default());
-    let prediction = heard(&between, ORIGIN, 1);
+    let prediction = predict(&between, ORIGIN, 1);
     assert_eq!(prediction.crosstalk, None);
     assert!((prediction.range_m.expect("the wall") - 0.5).abs() < 1e-9);
 }
 
-/// Above a floor the straight path comes first and its mirror image by the floor after it.
+/// Above a floor the direct path comes first, followed by its mirror image by the floor.
 #[test]
-fn the_straight_path_has_images_by_floor_and_ceiling() {
+fn direct_path_by_the_floor() {
     let together = vec![Turn::Together(vec!["s0".into(), "s1".into()])];
     let mut array = side_by_side(&[0.0, 0.0], 100.0, together);
     (array.rangers[1].x_m, array.rangers[1].bearing_deg) = (2.0, 180.0);
@@ -154,23 +155,23 @@ fn the_straight_path_has_images_by_floor_and_ceiling() {
             wall_m.map_or_else(|| Scene::builder("open").build().expect("a scene"), wall);
         scene.floor_z_m = Some(0.0);
         let model = model(array.clone(), &scene, PathOptions::default());
-        let stand = model.at(ORIGIN).expect("a stand");
-        let others = stand.others(1, 1).expect("crosstalk");
+        let placed = model.at(ORIGIN).expect("a pose");
+        let others = placed.others(1, 1).expect("crosstalk");
         let engine = others.engine;
         let (_, transmitter) = others.firings[0];
         let paths = engine.aimed([transmitter, others.receiver], 10.0, 1e-9).expect("few paths");
-        let lengths_m: Vec<f64> = paths.listen().map(|arrival| arrival.length_m).collect();
+        let lengths_m: Vec<f64> = paths.arrivals().map(|arrival| arrival.length_m).collect();
         let straight = lengths_m.iter().any(|length_m| (length_m - 2.0).abs() < 1e-9);
         let by_floor = lengths_m.iter().any(|length_m| (length_m - 5.0_f64.sqrt()).abs() < 1e-9);
-        // A wall up to the sky hides both.
+        // A wall of unlimited height hides both.
         assert_eq!((straight, by_floor), (wall_m.is_none(), wall_m.is_none()), "{lengths_m:?}");
     }
 }
 
-/// A ghost is what the ranger alone would hear later, if it listened for as long: same paths, seemingly shorter, and
-/// weaker by the gain.
+/// A ghost is an echo that the ranger alone would detect later, with a longer window: same paths,
+/// apparently shorter, and weaker by the gain.
 #[test]
-fn a_ranger_alone_hears_of_its_last_firing_what_it_would_have_heard_by_listening_on() {
+fn ghosts_equal_a_longer_window() {
     let scene = Scene::from_json(crate::scene::shipped::text("mcgill-lab").expect("shipped"));
     let scene = scene.expect("a scene");
     let array = side_by_side(&[0.0], 12.0, Vec::new());
@@ -183,20 +184,23 @@ fn a_ranger_alone_hears_of_its_last_firing_what_it_would_have_heard_by_listening
     let mut ghosts = 0;
     for step in 0..40 {
         let pose = Pose { x_m: 1.5, y_m: 1.5, heading_deg: 9.0 * f64::from(step) };
-        let stand = model.at(pose).expect("a stand");
-        let others = stand.others(0, 0).expect("crosstalk");
+        let placed = model.at(pose).expect("a pose");
+        let others = placed.others(0, 0).expect("crosstalk");
         let [(_, transmitter), ..] = others.firings[..] else { panic!("an earlier one") };
         let paths = others.engine.aimed([transmitter, others.receiver], 8.0, others.engine.floor());
         let paths = paths.expect("few paths");
-        let strays: Vec<_> = paths.listen().collect();
+        let strays: Vec<_> = paths.arrivals().collect();
         let all = single.at(pose.position()).arrivals(pose.direction_rad(0.0)).expect("few paths");
-        // What comes back from the transducer's face once more is left out of strays, and rough walls scatter to
-        // the ranger itself alone.
-        let is_told = |path: &crate::model::Path| {
+        // Strays exclude multiple echoes by the transducer's face, and rough walls scatter to the
+        // ranger itself alone.
+        let is_listed = |path: &crate::model::Path| {
             path.kind() != crate::reading::PathKind::Scattered
-                && path.mechanisms().all(|met| met != crate::model::Mechanism::Transducer)
+                && path
+                    .mechanisms()
+                    .all(|mechanism| mechanism != crate::model::Mechanism::Transducer)
         };
-        for arrival in all.iter().filter(|arrival| arrival.length_m < 8.0 && is_told(&arrival.path))
+        for arrival in
+            all.iter().filter(|arrival| arrival.length_m < 8.0 && is_listed(&arrival.path))
         {
             let found = strays.iter().any(|stray| {
                 (stray.length_m - arrival.length_m).abs() < 1e-9
@@ -212,9 +216,9 @@ fn a_ranger_alone_hears_of_its_last_firing_what_it_would_have_heard_by_listening
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(40))]
 
-    /// Sound runs from one ranger to another as it runs back.
+    /// Paths between two rangers are reversible.
     #[test]
-    fn what_one_hears_of_another_the_other_hears_of_it(
+    fn crosstalk_is_reciprocal(
         places in prop::array::uniform2((0.4..2.6_f64, 0.4..2.1_f64, -180.0..180.0_f64)),
         tilted in prop::bool::ANY,
     ) {
@@ -232,18 +236,18 @@ proptest! {
             |ranger: &MountedRanger| scene.check_pose(&ranger.pose_on(&ORIGIN)).is_ok();
         prop_assume!(array.rangers.iter().all(can_stand));
         let model = model(array, &scene, PathOptions::default());
-        let stand = model.at(ORIGIN).expect("a stand");
-        let heard = |firing: usize| {
-            let others = stand.others(firing, firing).expect("crosstalk");
+        let placed = model.at(ORIGIN).expect("a pose");
+        let received = |firing: usize| {
+            let others = placed.others(firing, firing).expect("crosstalk");
             let (_, transmitter) = others.firings[0];
             let ends = [transmitter, others.receiver];
             let paths = others.engine.aimed(ends, 6.0, others.engine.floor());
             let paths = paths.expect("few paths");
-            let mut told: Vec<_> = paths.listen().map(|arrival| (arrival, paths.arrival(&arrival))).collect();
-            told.retain(|(arrival, _)| arrival.amplitude > 1e-4);
-            told
+            let mut arrivals: Vec<_> = paths.arrivals().map(|arrival| (arrival, paths.arrival(&arrival))).collect();
+            arrivals.retain(|(arrival, _)| arrival.amplitude > 1e-4);
+            arrivals
         };
-        let (there, back) = (heard(1), heard(0));
+        let (there, back) = (received(1), received(0));
         prop_assert_eq!(there.len(), back.len());
         for (one, path) in &there {
             let same = back.iter().any(|(other, reverse)| {

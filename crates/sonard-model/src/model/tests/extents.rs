@@ -1,4 +1,4 @@
-//! The angular extents of Bozma and Kuc's figure 13, by the full simulation of their scan.
+//! Angular extents of Bozma and Kuc's figure 13, by the full simulation of their scan.
 
 use super::*;
 use crate::{
@@ -9,35 +9,36 @@ use crate::{
 
 const STEP_DEG: f64 = 0.9;
 
-/// A run of readings by the same reflector: its mean azimuth and its extent, the first and last
-/// azimuth and half a step on each side, degrees.
+/// A run of readings by the same reflector: its mean azimuth and its extent, from the first to the
+/// last azimuth and half a step on each side, degrees.
 struct Run {
     by: String,
     middle_deg: f64,
     extent_deg: f64,
 }
 
-/// Walls and edges of its path.
+/// Walls and edges of a path.
 fn names(simulator: &Simulator, arrival: &Arrival) -> String {
     let scene = simulator.scene();
-    let name = |met: Mechanism| match met {
+    let name = |mechanism: Mechanism| match mechanism {
         Mechanism::Diffraction(diffractor) => format!("edge {}", diffractor.name(scene)),
-        _ => met.name(scene),
+        _ => mechanism.name(scene),
     };
     arrival.path.mechanisms().map(name).collect::<Vec<_>>().join(", ")
 }
 
 fn runs(simulator: &Simulator, readings: &[(f64, Prediction)]) -> Vec<Run> {
     let by = |prediction: &Prediction| {
-        let heard = prediction.status == PingStatus::Echo;
-        let arrival = prediction.arrival.as_ref().filter(|_| heard)?;
+        let has_echo = prediction.status == PingStatus::Echo;
+        let arrival = prediction.arrival.as_ref().filter(|_| has_echo)?;
         Some(names(simulator, arrival))
     };
     let mut runs: Vec<Run> = Vec::new();
     let mut last = None;
-    // From a silent azimuth on, so that no run is cut in two at 0.
-    let silent = readings.iter().position(|(_, p)| by(p).is_none()).expect("a silent azimuth");
-    for (azimuth_deg, prediction) in readings[silent..].iter().chain(&readings[..silent]) {
+    // Begins at an azimuth without echo, so that no run is cut in two at 0.
+    let start =
+        readings.iter().position(|(_, p)| by(p).is_none()).expect("an azimuth without echo");
+    for (azimuth_deg, prediction) in readings[start..].iter().chain(&readings[..start]) {
         let here = by(prediction);
         match (&here, &last) {
             (Some(name), Some(before)) if name == before => {
@@ -57,7 +58,7 @@ fn runs(simulator: &Simulator, readings: &[(f64, Prediction)]) -> Vec<Run> {
 
 /// Planes and the corner extend over 23.3 degrees, edges over 7.8 at 47 cm and 8.0 at 44 cm.
 #[test]
-fn planes_corners_and_edges_have_bozma_and_kucs_extents() {
+fn extents_match_bozma_kuc() {
     let scene = shipped_scene("plane-corner-edge");
     let pose = pose(&scene, "fig13");
     let sensor = Sensor::preset("bozma-kuc-60khz").expect("a preset");

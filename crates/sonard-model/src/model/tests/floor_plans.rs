@@ -1,4 +1,4 @@
-//! Floor plans as people draw them are read as they were meant.
+//! Hand-drawn floor plans read as intended.
 
 mod drawn;
 
@@ -14,10 +14,10 @@ use crate::{
     scene::DEFAULT_SNAP_M,
 };
 
-/// Every 4.5 degrees round the circle.
+/// Every 4.5 degrees around the circle.
 const PLAN: ScanPlan = ScanPlan { from_deg: 0.0, to_deg: 360.0, step_deg: 4.5, pings_per_stop: 1 };
 
-/// Plans of the property that is held in 50 of them, or in as many as this variable says.
+/// Environment variable with the number of plans in the property test; 50 by default.
 const MORE: &str = "SONARD_HAND_DRAWN_PLANS";
 
 fn readings(scene: &Scene, at: DVec2, engine: EngineKind) -> Vec<Prediction> {
@@ -31,7 +31,8 @@ fn readings(scene: &Scene, at: DVec2, engine: EngineKind) -> Vec<Prediction> {
         .expect("a plan that can be searched")
 }
 
-/// A room of 3 by 2 metres with a partition from one wall and a slanted screen; the ranger's place in it.
+/// A room of 3 by 2 metres with a partition from one wall and a slanted screen; the ranger's place
+/// in it.
 fn room() -> (Vec<Wall>, DVec2) {
     let walls = vec![
         wall("south", (0.0, 0.0), (3.0, 0.0), 0.9),
@@ -44,17 +45,17 @@ fn room() -> (Vec<Wall>, DVec2) {
     (walls, DVec2::new(1.21, 0.67))
 }
 
-/// Beams of which `changed` answers otherwise than `meant`, by more than `bound_m`.
+/// Beams at which `changed` differs from `meant` by more than `bound_m`.
 fn differing(changed: &[Prediction], meant: &[Prediction], bound_m: f64) -> Vec<usize> {
-    let differs = |(one, other): (&Prediction, &Prediction)| {
-        let apart_m = one.range_m.zip(other.range_m).map(|(a, b)| (a - b).abs());
-        one.status != other.status || apart_m.is_some_and(|apart_m| apart_m > bound_m)
+    let differs = |(first, second): (&Prediction, &Prediction)| {
+        let apart_m = first.range_m.zip(second.range_m).map(|(a, b)| (a - b).abs());
+        first.status != second.status || apart_m.is_some_and(|apart_m| apart_m > bound_m)
     };
     (0..meant.len()).filter(|&beam| differs((&changed[beam], &meant[beam]))).collect()
 }
 
 #[test]
-fn overshoots_and_gaps_of_corners_and_joints_change_nothing() {
+fn overshoots_and_gaps() {
     let (walls, at) = room();
     for engine in [EngineKind::Paths, EngineKind::Fan, EngineKind::Cone] {
         let meant = readings(&scene(walls.clone()), at, engine);
@@ -74,7 +75,7 @@ fn overshoots_and_gaps_of_corners_and_joints_change_nothing() {
 }
 
 #[test]
-fn walls_drawn_twice_split_turned_and_in_any_order_change_nothing() {
+fn duplicate_and_split_walls() {
     let (walls, at) = room();
     let mut random = Pcg64::seed_from_u64(5);
     for engine in [EngineKind::Paths, EngineKind::Fan, EngineKind::Cone] {
@@ -107,7 +108,7 @@ fn walls_drawn_twice_split_turned_and_in_any_order_change_nothing() {
 }
 
 #[test]
-fn which_of_two_materials_counts_does_not_depend_on_the_order() {
+fn material_ignores_order() {
     let (mut walls, at) = room();
     let soft = Material { reflectance: 0.2, roughness: 0.0 };
     walls.push(Wall { id: "curtain".into(), material: soft, ..walls[0].clone() });
@@ -120,13 +121,15 @@ fn which_of_two_materials_counts_does_not_depend_on_the_order() {
     assert_eq!(differing(&other, &one, 1e-9), [0; 0]);
 }
 
-/// The sum of all arrivals at a place, as one tone hears it.
+/// Sum of all arrivals at a place for a steady tone.
 fn field(walls: &[Wall], at: DVec2, direction_deg: f64) -> num_complex::Complex64 {
     let wave_number_per_m = std::f64::consts::TAU * 49_400.0 / 343.2;
     arrivals(scene(walls.to_vec()), EngineKind::Paths.options(), at, direction_deg)
         .iter()
-        // The face reflects what is strong enough, and that begins and ends.
-        .filter(|arrival| arrival.path.mechanisms().all(|met| met != Mechanism::Transducer))
+        // The face reflects strong sound only, which begins and ends.
+        .filter(|arrival| {
+            arrival.path.mechanisms().all(|mechanism| mechanism != Mechanism::Transducer)
+        })
         .map(|arrival| {
             let phase_rad = arrival.phase_rad - wave_number_per_m * arrival.length_m;
             num_complex::Complex64::from_polar(arrival.amplitude, phase_rad)
@@ -135,7 +138,7 @@ fn field(walls: &[Wall], at: DVec2, direction_deg: f64) -> num_complex::Complex6
 }
 
 #[test]
-fn a_joint_in_one_wall_is_no_edge_however_little_it_is_off() {
+fn joint_in_a_wall_is_no_edge() {
     for reflectance in [1.0, 0.6, 0.3] {
         let whole = [
             wall("w", (-1.0, 0.0), (1.0, 0.0), reflectance),
@@ -159,7 +162,7 @@ fn a_joint_in_one_wall_is_no_edge_however_little_it_is_off() {
 }
 
 #[test]
-fn two_materials_on_one_line_go_over_into_each_other() {
+fn materials_change_continuously() {
     let walls = |bend_m: f64| {
         [wall("a", (-1.0, 0.0), (0.0, 0.0), 1.0), wall("b", (0.0, 0.0), (1.0, bend_m), 0.3)]
     };
@@ -178,7 +181,7 @@ fn two_materials_on_one_line_go_over_into_each_other() {
 }
 
 #[test]
-fn squaring_a_corner_does_not_depend_on_how_a_wall_is_split() {
+fn squaring_ignores_splits() {
     let frame = DVec2::from_angle(0.317);
     let written = |x: f64, y: f64| {
         let at = (DVec2::new(x, y).rotate(frame) * 1e4).round() / 1e4;
@@ -210,7 +213,7 @@ fn squaring_a_corner_does_not_depend_on_how_a_wall_is_split() {
 }
 
 #[test]
-fn what_is_meant_to_be_there_stays() {
+fn intended_details_stay() {
     for walls in [
         // A gap that is an opening, a plate of 3 mm, and a wall shorter than the tolerance.
         vec![wall("a", (0.0, 0.0), (1.0, 0.0), 0.9), wall("b", (1.003, 0.0), (2.0, 0.0), 0.9)],
@@ -243,7 +246,7 @@ fn what_is_meant_to_be_there_stays() {
 }
 
 #[test]
-fn without_a_tolerance_the_plan_is_as_drawn() {
+fn zero_tolerance_changes_nothing() {
     let mut random = Pcg64::seed_from_u64(8);
     let (sketch, _) = Sketch::random(&mut random);
     let mut drawn = sketch.drawn(&Hand::shaky(&mut random));
@@ -252,7 +255,8 @@ fn without_a_tolerance_the_plan_is_as_drawn() {
     assert!(plan.walls.iter().zip(&drawn.walls).all(|(made, wall)| *made == (wall.a, wall.b)));
 }
 
-/// Whether readings of a beam are among those that the meant plan gives, moved by as much as the hand moves it.
+/// Returns `true` if the readings of a beam are among those of the intended plan, moved by as much
+/// as the hand moves it.
 fn is_explained(beam: usize, found: &[Prediction], versions: &[Vec<Prediction>]) -> bool {
     const ROOM_M: f64 = 2e-3;
     let same = versions.iter().filter(|version| version[beam].status == found[beam].status);
@@ -263,10 +267,11 @@ fn is_explained(beam: usize, found: &[Prediction], versions: &[Vec<Prediction>])
     (low - ROOM_M..=high + ROOM_M).contains(&range_m)
 }
 
-/// Plans drawn by hand read as the meant ones do, but for what the moved walls themselves change: that is in the
-/// readings of the same plan with its corners moved by as much and everything still joined.
+/// Hand-drawn plans read as the intended ones, except for effects of the moved walls themselves:
+/// those are in the readings of the intended plan with its corners moved by as much and all joints
+/// kept.
 #[test]
-fn plans_drawn_by_hand_read_as_meant() {
+fn hand_drawn_plans() {
     let plans = std::env::var(MORE).map_or(50, |count| count.parse().expect("a number of plans"));
     let mut random = Pcg64::seed_from_u64(2026);
     let (mut beams, mut first, mut wrong) = (0, 0, 0);
@@ -299,7 +304,7 @@ fn plans_drawn_by_hand_read_as_meant() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(300))]
 
-    /// The stage ends, keeps walls near where they were, and what comes out can be meshed and is stable.
+    /// The repair ends, keeps walls near their places, and its result can be meshed and is stable.
     #[test]
     fn any_segments_make_a_plan(
         ends in prop::collection::vec([0_i32..40, 0_i32..40, 0_i32..40, 0_i32..40], 1..40),

@@ -1,8 +1,8 @@
-//! Against the full-wave scans (tests/data/fullwave/README.md, and those of whole bodies by
-//! tests/peers/full_wave.py): the receiver's first crossing on the sum of all echoes, and the height of
-//! the envelope peak that crosses.
+//! Comparison with the full-wave scans (tests/data/fullwave/README.md, and those of whole bodies by
+//! tests/peers/full_wave.py): the receiver's first crossing on the sum of all echoes, and the
+//! height of the envelope peak that crosses.
 //!
-//! The figures, reflected and diffracted echoes apart:
+//! The figures, reflected and diffracted echoes separately:
 //! `cargo test --lib tests::full_wave -- --nocapture`
 
 use super::{
@@ -12,7 +12,7 @@ use super::{
 use crate::{acoustics::Sensor, model::Prediction, reading::PingStatus};
 
 impl Crossing {
-    /// Whether an echo grazes the threshold here.
+    /// Returns `true` if an echo grazes the threshold here.
     fn is_fragile(&self) -> bool {
         let (Some(low), Some(high)) = (self.range_unbiased_09tau, self.range_unbiased_11tau) else {
             return true;
@@ -70,13 +70,13 @@ impl Errors {
     }
 }
 
-/// What is scored of all scenes.
+/// Scores of all scenes.
 #[derive(Default)]
 struct Score {
     /// Reflected and diffracted.
     errors: [Errors; 2],
     fragile: usize,
-    /// Where one is silent and the other is not.
+    /// Beams where only one of both has an echo.
     disagree: usize,
 }
 
@@ -92,18 +92,18 @@ impl Score {
             // A decibel above the threshold may be below it there.
             (None, PingStatus::Echo) if found.margin_db.expect("a margin") > 1.0 => {
                 self.disagree += 1;
-                println!("{what}: heard by {:?} dB, not in the reference", found.margin_db);
+                println!("{what}: echo by {:?} dB, not in the reference", found.margin_db);
             }
             (Some(_), _) => {
                 self.disagree += 1;
-                println!("{what}: silent by {:?} dB, not in the reference", found.margin_db);
+                println!("{what}: no echo by {:?} dB, unlike the reference", found.margin_db);
             }
             (None, _) => {}
         }
     }
 
-    /// The envelope peak that crosses, against the reference's; not where it has several maxima, of which
-    /// `found` names the highest.
+    /// Compares the envelope peak that crosses with the reference's; not where it has several
+    /// maxima, of which `found` names the highest.
     fn height(&mut self, peaks: &[(f64, f64)], c: f64, found: &Prediction) {
         let Some(range_m) = found.range_m else { return };
         let since_s = |time_s: f64| time_s - 2.0 * range_m / c;
@@ -125,14 +125,14 @@ fn kind(found: &Prediction) -> usize {
 }
 
 #[test]
-fn ranges_are_those_of_the_full_wave_reference() {
+fn ranges_match_full_wave() {
     // The reference's own error bars are 0.5 mm, and 0.5 dB for the ends of plates.
     ranges_agree(&Reference::given(), false, 0.5);
 }
 
-/// Round whole bodies and in notches sound is diffracted twice too.
+/// Around whole bodies and in notches sound is also diffracted twice.
 #[test]
-fn ranges_of_whole_bodies_are_those_of_boundary_integrals() {
+fn ranges_match_boundary_integrals() {
     ranges_agree(&Reference::bodies(), true, 1.0);
 }
 

@@ -1,5 +1,5 @@
-//! Paths as their interactions: each runs straight from point to point, is as long as it says, and changes
-//! its direction by the law of what it meets.
+//! Paths as their interactions: each is straight from point to point, has the stated length, and
+//! changes its direction by the law of each interaction.
 
 use glam::DVec3;
 use rand::{RngExt, SeedableRng};
@@ -15,10 +15,10 @@ use crate::{
     },
 };
 
-/// Stretches shorter than this, metres, tell no direction.
+/// Length below which a leg has no reliable direction, metres.
 const SHORT_M: f64 = 1e-4;
 
-/// The points of a path in space; everything at the same height in a scene without heights.
+/// Points of a path in space; all at the same height in a scene without heights.
 fn points(path: &Path, ends: [DVec2; 2], z_m: Option<f64>) -> Vec<DVec3> {
     let end = |at: DVec2| at.extend(z_m.unwrap_or(0.0));
     let point = |at: &Interaction| at.point.extend(at.z_m.unwrap_or(0.0));
@@ -31,11 +31,10 @@ fn length_m(points: &[DVec3]) -> f64 {
 }
 
 fn is_round(path: &Path) -> bool {
-    path.reflectors().any(|met| matches!(met, Reflector::Cylinder(_)))
+    path.reflectors().any(|reflector| matches!(reflector, Reflector::Cylinder(_)))
 }
 
-/// A scene with its walls as the engine has them, which makes corners square that rounding made
-/// nearly so.
+/// A scene with the walls that the engine uses, whose nearly square corners are exactly square.
 struct Room {
     scene: Scene,
     z_m: Option<f64>,
@@ -46,7 +45,7 @@ impl Room {
         Self { scene: scene.floor_plan().scene(scene), z_m }
     }
 
-    /// Whether a path obeys the laws; `length_off_m` is what its length may differ by.
+    /// Checks that a path obeys the laws; `length_off_m` is the tolerance of its length.
     fn check(&self, path: &Path, ends: [DVec2; 2], stated_m: f64, length_off_m: f64) {
         let points = points(path, ends, self.z_m);
         let off_m = length_m(&points) - stated_m;
@@ -57,14 +56,14 @@ impl Room {
             let bound = if is_round(path) { 1e-5 } else { 1e-7 };
             let bound = bound / legs[0].length().min(legs[1].length()).min(1.0);
             let units = legs.map(DVec3::normalize_or_zero);
-            let is_told = legs.iter().all(|leg| leg.length() > SHORT_M);
-            let is_lawful = self.off_law(interaction, units) < if is_told { bound } else { 3.0 };
+            let is_listed = legs.iter().all(|leg| leg.length() > SHORT_M);
+            let is_lawful = self.off_law(interaction, units) < if is_listed { bound } else { 3.0 };
             assert!(is_lawful, "{at}: {} {path:?}", self.off_law(interaction, units));
             assert!(self.off_place_m(interaction, ends) < 1e-8, "{at}: {path:?}");
         }
     }
 
-    /// How far directions before and after a point are from the law of what is met there.
+    /// Deviation of the directions before and after a point from the law of the interaction.
     fn off_law(&self, interaction: &Interaction, [before, after]: [DVec3; 2]) -> f64 {
         let mirrored =
             |normal: DVec3| (before - 2.0 * before.dot(normal) * normal - after).length();
@@ -90,7 +89,7 @@ impl Room {
         }
     }
 
-    /// How far a point is from where it can be, metres.
+    /// Distance of a point from its wall, cylinder or edge, metres.
     fn off_place_m(&self, interaction: &Interaction, ends: [DVec2; 2]) -> f64 {
         let Interaction { mechanism, point, z_m } = *interaction;
         let off_wall_m = |index: u32| {
@@ -120,7 +119,7 @@ impl Room {
             Mechanism::Reflection(Reflector::Ceiling) => off_z_m(self.scene.ceiling_z_m),
             Mechanism::Diffraction(Diffractor::Upright(Edge { wall, at_b })) => {
                 let wall = &self.scene.walls[wall as usize];
-                // Where walls cross, the edge is called by the nearer end of one.
+                // Where walls cross, the edge is named by the nearer end of one.
                 let (near, far) = if at_b { (wall.b, wall.a) } else { (wall.a, wall.b) };
                 assert!(point.distance(near) <= point.distance(far), "{interaction:?}");
                 distance_to_segment(point, wall.a, wall.b)
@@ -133,7 +132,7 @@ impl Room {
         }
     }
 
-    /// Whether a point is not beyond the ends of its wall.
+    /// Returns `true` if a point is not beyond the ends of its wall.
     fn is_on_wall(&self, interaction: &Interaction) -> bool {
         let Some(Reflector::Wall(wall)) = interaction.mechanism.surface() else { return true };
         let wall = &self.scene.walls[wall as usize];
@@ -146,7 +145,7 @@ impl Room {
     }
 }
 
-/// A path of the exact engine also leaves and comes back as it says.
+/// Checks a path of the exact engine, whose departure and arrival must also agree.
 fn check_echo(room: &Room, echo: &EchoPath, ends: [DVec2; 2]) {
     let length_off_m = if is_round(&echo.path) { 1e-7 } else { 1e-9 };
     room.check(&echo.path, ends, echo.length_m, length_off_m);
@@ -164,7 +163,8 @@ fn check_echo(room: &Room, echo: &EchoPath, ends: [DVec2; 2]) {
     }
 }
 
-/// A scene of a few walls and round bodies, some rough, some low or hanging, with and without heights.
+/// A scene of a few walls and round bodies, some rough, some low or hanging, with and without
+/// heights.
 fn random_scene(rng: &mut Pcg64) -> Scene {
     let mut place =
         |size: f64| DVec2::new(rng.random::<f64>() - 0.5, rng.random::<f64>() - 0.5) * size;
@@ -198,7 +198,7 @@ fn random_scene(rng: &mut Pcg64) -> Scene {
 }
 
 #[test]
-fn paths_of_random_scenes_obey_the_laws_at_every_point() {
+fn random_scenes_obey_the_laws() {
     let mut rng = Pcg64::seed_from_u64(19);
     let (mut found, mut refused) = (Counts::default(), 0);
     for case in 0..100 {
@@ -222,8 +222,8 @@ fn paths_of_random_scenes_obey_the_laws_at_every_point() {
         };
         let paths = Paths::new(&scene, settings);
         let room = Room::new(&scene, paths.sensor_z_m());
-        // Mirrors that cross one another, low and high, between floor and ceiling: with double diffraction a scene can
-        // hold more paths than may be looked for, and is refused.
+        // Mirrors that cross one another, low and high, between floor and ceiling: with double
+        // diffraction a scene can have more paths than the limit, and is rejected.
         let Ok(echoes) = paths.enumerate_between(from, to) else {
             assert!(case % 3 == 0, "{case}");
             refused += 1;
@@ -238,7 +238,7 @@ fn paths_of_random_scenes_obey_the_laws_at_every_point() {
     found.assert_at_least(50);
 }
 
-/// How many paths met what.
+/// Number of paths by mechanism.
 #[derive(Debug, Default)]
 struct Counts {
     mirrored: usize,
@@ -253,7 +253,7 @@ struct Counts {
 
 impl Counts {
     fn add(&mut self, path: &Path) {
-        let of_floor = |met| matches!(met, Reflector::Floor | Reflector::Ceiling);
+        let of_floor = |reflector| matches!(reflector, Reflector::Floor | Reflector::Ceiling);
         let floor = path.reflectors().any(of_floor);
         let diffractors = diffractors(path);
         let level =
@@ -273,14 +273,14 @@ impl Counts {
         let Self { mirrored, round, floor, scattered, upright, level, level_by_floor, twice } =
             *self;
         let all = [mirrored, round, floor, scattered, upright, level, level_by_floor, twice];
-        assert!(all.into_iter().all(|met| met >= count), "{self:?}");
+        assert!(all.into_iter().all(|found| found >= count), "{self:?}");
     }
 }
 
-/// Every arrival of every engine in every shipped scene, in a few directions, those by way of the
-/// transducer's face included.
+/// Every arrival of every engine in every shipped scene, in a few directions, multiple echoes by
+/// the transducer's face included.
 #[test]
-fn paths_of_shipped_scenes_obey_the_laws_at_every_point() {
+fn shipped_scenes_obey_the_laws() {
     let [mut multiple, mut checked] = [0; 2];
     let mut fan_rounds = FanRounds::default();
     for name in shipped::names() {
@@ -296,7 +296,7 @@ fn paths_of_shipped_scenes_obey_the_laws_at_every_point() {
                 for direction in 0..63 {
                     for arrival in point.arrivals(0.1 * f64::from(direction)).expect("few paths") {
                         check_arrival(&simulator, &arrival, pose.position(), &mut fan_rounds);
-                        let face = |met| met == Mechanism::Transducer;
+                        let face = |mechanism| mechanism == Mechanism::Transducer;
                         multiple += usize::from(arrival.path.mechanisms().any(face));
                         checked += 1;
                     }
@@ -305,13 +305,13 @@ fn paths_of_shipped_scenes_obey_the_laws_at_every_point() {
         }
     }
     assert!(checked > 10_000 && multiple > 100, "{checked} {multiple}");
-    // Without them the law would be broken by 0.3 and more, where the bound is 1e-6.
+    // Without them the law would be violated by 0.3 and more, where the bound is 1e-6.
     let FanRounds { lawful, missed } = fan_rounds;
     assert!(lawful > 500 && 50 * missed < lawful, "{fan_rounds:?}");
 }
 
-/// Paths of the fan by one cylinder: those that obey the law of mirrors at each point, and those whose
-/// neighbour that would come back misses the cylinder, so that the last leg is not lawful.
+/// Paths of the fan by one cylinder: those that obey the law of reflection at each point, and those
+/// whose returning neighbour misses the cylinder, so that the last leg is not lawful.
 #[derive(Debug, Default)]
 struct FanRounds {
     lawful: usize,
@@ -323,24 +323,27 @@ fn check_arrival(simulator: &Simulator, arrival: &Arrival, at: DVec2, fan_rounds
     let drawn = simulator.scene();
     let plan = Room { scene: drawn.ray_plan().scene(drawn), z_m: None };
     let off_m = || length_m(&points(path, ends, None)) - arrival.length_m;
-    let round = path.reflectors().filter(|met| matches!(met, Reflector::Cylinder(_))).count();
+    let round =
+        path.reflectors().filter(|reflector| matches!(reflector, Reflector::Cylinder(_))).count();
     match (simulator.options().engine.kind(), round) {
         (EngineKind::Paths, _) => {
             let room = Room::new(simulator.scene(), simulator.sensor_z_m());
             room.check(path, ends, arrival.length_m, if round > 0 { 1e-7 } else { 1e-9 });
         }
-        // The fan's ray stands for a neighbour that may pass a corner on its other side. Lengths over a
-        // cylinder are approximate, by the curvature of the front, where the points are exact; over two,
-        // neighbours part too fast to be found.
-        (EngineKind::Fan, 0 | 1) if path.interactions.iter().all(|met| plan.is_on_wall(met)) => {
+        // The fan's ray represents a neighbour that may pass a corner on its other side. Lengths
+        // over a cylinder are approximate, by the curvature of the front, where the points are
+        // exact; over two, neighbours diverge too fast to be found.
+        (EngineKind::Fan, 0 | 1)
+            if path.interactions.iter().all(|interaction| plan.is_on_wall(interaction)) =>
+        {
             assert!(round > 0 || off_m().abs() < 1e-9, "{} {arrival:?}", off_m());
             let points = points(path, ends, None);
             let last = path.interactions.len() - 1;
-            for (place, met) in path.interactions.iter().enumerate() {
+            for (place, interaction) in path.interactions.iter().enumerate() {
                 let legs = [1, 2].map(|to| points[place + to] - points[place + to - 1]);
-                let is_told = legs.iter().all(|leg| leg.length() > SHORT_M);
-                let off = plan.off_law(met, legs.map(DVec3::normalize_or_zero));
-                let is_lawful = !is_told || off < 1e-6;
+                let is_listed = legs.iter().all(|leg| leg.length() > SHORT_M);
+                let off = plan.off_law(interaction, legs.map(DVec3::normalize_or_zero));
+                let is_lawful = !is_listed || off < 1e-6;
                 let may_miss = round > 0 && place == last;
                 assert!(is_lawful || may_miss, "{off} {arrival:?}");
                 if may_miss {
@@ -348,7 +351,9 @@ fn check_arrival(simulator: &Simulator, arrival: &Arrival, at: DVec2, fan_rounds
                 }
             }
         }
-        (EngineKind::Fan, _) => assert!(path.interactions.iter().all(|met| met.z_m.is_none())),
+        (EngineKind::Fan, _) => {
+            assert!(path.interactions.iter().all(|interaction| interaction.z_m.is_none()));
+        }
         // The nearest hit, mirror or not.
         (EngineKind::Cone, _) => {
             assert!(off_m().abs() < 1e-9, "{} {arrival:?}", off_m());
@@ -357,9 +362,9 @@ fn check_arrival(simulator: &Simulator, arrival: &Arrival, at: DVec2, fan_rounds
     }
 }
 
-/// Mirror reflections alone count; an edge, a patch of a rough wall and the face do not.
+/// Only mirror reflections count; an edge, a patch of a rough wall and the face do not.
 #[test]
-fn the_order_of_a_path_counts_mirror_reflections_only() {
+fn order_counts_mirrors_only() {
     let meets = |mechanisms: &[Mechanism]| Path {
         interactions: mechanisms
             .iter()

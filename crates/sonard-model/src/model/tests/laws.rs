@@ -32,8 +32,8 @@ fn moved(mut scene: Scene, to: impl Fn(DVec2) -> DVec2) -> Scene {
     scene
 }
 
-/// Loud arrivals by path. Faint ones, and paths that only graze the receiver, may come and go
-/// with the grid of rays, which is fixed in the world.
+/// Strong arrivals by path. Weak ones, and paths that only graze the receiver, may come and go with
+/// the grid of rays, which is fixed in the world.
 fn loud(scene: Scene, from: DVec2, direction_rad: f64) -> Vec<(Vec<Mechanism>, f64, f64)> {
     let options = Options { max_range_m: Some(2.0), ..BARE.into() };
     let simulator = simulator(scene, options);
@@ -45,7 +45,7 @@ fn loud(scene: Scene, from: DVec2, direction_rad: f64) -> Vec<(Vec<Mechanism>, f
         .filter(|arrival| arrival.amplitude > 0.05)
         .map(|arrival| (arrival.path.mechanisms().collect(), arrival.length_m, arrival.amplitude))
         .collect();
-    all.sort_by(|one, other| one.1.total_cmp(&other.1));
+    all.sort_by(|a, b| a.1.total_cmp(&b.1));
     all
 }
 
@@ -59,7 +59,7 @@ fn same(one: &[(Vec<Mechanism>, f64, f64)], other: &[(Vec<Mechanism>, f64, f64)]
 }
 
 #[test]
-fn moving_or_turning_everything_changes_nothing() {
+fn rigid_motions_change_nothing() {
     let (room, from) = room();
     for direction_deg in [10.0_f64, 140.0, 265.0] {
         let direction_rad = direction_deg.to_radians();
@@ -76,7 +76,7 @@ fn moving_or_turning_everything_changes_nothing() {
 }
 
 #[test]
-fn a_mirrored_scene_gives_mirrored_echoes() {
+fn mirrored_scene() {
     let (room, from) = room();
     let mirror = |p: DVec2| DVec2::new(-p.x, p.y);
     for direction_deg in [10.0_f64, 140.0, 265.0] {
@@ -89,7 +89,7 @@ fn a_mirrored_scene_gives_mirrored_echoes() {
 }
 
 #[test]
-fn paths_are_heard_in_the_same_order_as_the_appendix_says() {
+fn arrivals_match_the_appendix() {
     use crate::{
         acoustics::BeamPattern,
         model::{Engine as _, Fan, FanSettings},
@@ -126,10 +126,10 @@ fn paths_are_heard_in_the_same_order_as_the_appendix_says() {
     }
 }
 
-/// Flat walls only: exactly. Sound that meets a round body spreads so much that two rays which
-/// leave side by side soon meet different walls, and a fan of any spacing misses some paths.
+/// Flat walls only: exactly. Sound reflected by a round body spreads so much that two adjacent rays
+/// soon hit different walls, and a fan of any spacing misses some paths.
 #[test]
-fn a_finer_fan_reads_the_same_in_every_shipped_scene() {
+fn finer_fan_reads_the_same() {
     let plan = ScanPlan { step_deg: 1.8, ..ScanPlan::default() };
     for name in shipped::names() {
         let scene = shipped_scene(name);
@@ -158,19 +158,19 @@ fn a_finer_fan_reads_the_same_in_every_shipped_scene() {
 }
 
 fn met_round_body(prediction: &Prediction) -> bool {
-    let mut met = prediction.arrival.iter().flat_map(|arrival| arrival.path.reflectors());
-    met.any(|reflector| matches!(reflector, Reflector::Cylinder(_)))
+    let mut reflectors = prediction.arrival.iter().flat_map(|arrival| arrival.path.reflectors());
+    reflectors.any(|reflector| matches!(reflector, Reflector::Cylinder(_)))
 }
 
-fn range_differs(one: &Prediction, other: &Prediction, tolerance_m: f64) -> bool {
-    match (one.range_m, other.range_m) {
+fn range_differs(a: &Prediction, b: &Prediction, tolerance_m: f64) -> bool {
+    match (a.range_m, b.range_m) {
         (Some(one_m), Some(other_m)) => (one_m - other_m).abs() > tolerance_m,
-        (one, other) => one.is_some() != other.is_some(),
+        (a, b) => a.is_some() != b.is_some(),
     }
 }
 
 #[test]
-fn absorption_only_weakens_and_by_its_decibels() {
+fn absorption_in_decibels() {
     let (room, from) = room();
     let lossless = simulator(room.clone(), BARE);
     let lossy = simulator(room, FanOptions { lossless: false, ..BARE });
@@ -180,7 +180,7 @@ fn absorption_only_weakens_and_by_its_decibels() {
         let direction_rad = f64::from(direction_deg).to_radians();
         let all = lossless.arrivals(direction_rad).expect("few paths");
         for arrival in lossy.arrivals(direction_rad).expect("few paths") {
-            let twin = all.iter().find(|twin| twin.path == arrival.path).expect("heard before");
+            let twin = all.iter().find(|twin| twin.path == arrival.path).expect("a lossless echo");
             let left = 10f64.powf(-decibels_per_m * arrival.length_m / 20.0);
             close(arrival.amplitude, twin.amplitude * left, 1e-9, "amplitude");
         }
@@ -190,9 +190,9 @@ fn absorption_only_weakens_and_by_its_decibels() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(24))]
 
-    /// Nothing flat gives more than a head-on wall, and a duller wall never a louder echo.
+    /// Nothing flat exceeds a head-on wall, and a lower reflectance never gives a stronger echo.
     #[test]
-    fn amplitudes_are_bounded_and_grow_with_reflectance(
+    fn amplitude_grows_with_reflectance(
         ends in proptest::collection::vec(((-2.0..2.0f64, -2.0..2.0f64), (-2.0..2.0f64, -2.0..2.0f64)), 1..6),
         dull in 0.3..1.0f64,
         direction_deg in 0.0..360.0f64,
@@ -207,12 +207,12 @@ proptest! {
             max_range_m: Some(2.5),
             ..FanOptions { ray_spacing_deg: 0.5, ..BARE }.into()
         };
-        let hear = |reflectance| arrivals(scene(walls(reflectance)), options, DVec2::ZERO, direction_deg);
-        let bright = hear(1.0);
+        let arrivals_with = |reflectance| arrivals(scene(walls(reflectance)), options, DVec2::ZERO, direction_deg);
+        let bright = arrivals_with(1.0);
         for arrival in &bright {
             prop_assert!(arrival.amplitude <= 1.0 + 1e-6, "{arrival:?}");
         }
-        for arrival in hear(dull) {
+        for arrival in arrivals_with(dull) {
             let twin = bright.iter().find(|twin| twin.path == arrival.path);
             prop_assert!(twin.is_some_and(|twin| twin.amplitude >= arrival.amplitude - 1e-12), "{arrival:?}");
         }

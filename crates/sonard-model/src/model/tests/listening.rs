@@ -1,4 +1,4 @@
-//! A firing listened to once for all thresholds gives what each receiver detects by itself.
+//! Evaluating a firing once for all thresholds equals the detections of each receiver alone.
 
 use std::sync::Arc;
 
@@ -13,14 +13,15 @@ use crate::{
     scene::{Scene, shipped},
 };
 
-/// Thresholds from the lowest up, and some of them again after higher ones, decibels above the nominal one.
+/// Thresholds from the lowest up, and some of them again after higher ones, decibels above the
+/// nominal one.
 const BY_DB: [f64; 14] =
     [-12.0, -9.5, -7.0, -9.0, -4.1, -1.7, 2.3, -0.6, 0.0, 0.8, 6.2, 2.9, 10.4, 12.0];
 
-/// Ranges agree to rounding, which has a part of a nanometre where false position ends.
+/// Ranges agree to rounding, a fraction of a nanometre where false position ends.
 const SAME_M: f64 = 1e-9;
 
-/// How many detections were compared.
+/// Returns the number of compared detections.
 fn check(scene: &str, sensor: &str, max_range_m: f64) -> usize {
     let text = shipped::text(scene).expect("a shipped scene");
     let scene = Arc::new(Scene::from_json(text).expect("a valid scene"));
@@ -36,8 +37,8 @@ fn check(scene: &str, sensor: &str, max_range_m: f64) -> usize {
             let direction_rad = random.random_range(-3.1..3.1);
             let factors = BY_DB.map(|by_db| 10f64.powf(by_db / 20.0));
             let usual = simulator.receiver();
-            let together = point.hear(direction_rad, |ear| {
-                ear.listen(usual, |listening| {
+            let together = point.hear(direction_rad, |firing| {
+                firing.listen(usual, |listening| {
                     factors.map(|by| {
                         let rise = listening.rise(by, 0.0);
                         (rise, rise.map(|rise| listening.peak(&rise)))
@@ -49,7 +50,7 @@ fn check(scene: &str, sensor: &str, max_range_m: f64) -> usize {
                 let mut receiver = usual.clone();
                 receiver.threshold *= by;
                 let alone =
-                    point.hear(direction_rad, |ear| ear.detect(&receiver, Latch::First, 0.0));
+                    point.hear(direction_rad, |firing| firing.detect(&receiver, Latch::First, 0.0));
                 let alone = alone.expect("few paths");
                 let place = format!("{} {pose:?} {direction_rad} {by}", scene.name);
                 let status = rise.map_or(PingStatus::NoEcho, |rise| rise.status);
@@ -58,7 +59,7 @@ fn check(scene: &str, sensor: &str, max_range_m: f64) -> usize {
                     compared += 1;
                     continue;
                 };
-                // The same path may have another number in a search that went farther.
+                // The same path may have another number in a search of greater length.
                 let known = |arrival: PulseArrival| PulseArrival { index: 0, ..arrival };
                 assert_eq!(rise.arrival.map(known), alone.arrival.map(known), "{place}");
                 let off_m = rise.range_m - alone.range_m.expect("an echo");
@@ -74,7 +75,7 @@ fn check(scene: &str, sensor: &str, max_range_m: f64) -> usize {
 }
 
 #[test]
-fn one_hearing_detects_for_each_threshold_what_its_receiver_does() {
+fn all_thresholds_at_once() {
     let mut compared = 0;
     for (scene, _) in shipped::SCENES {
         compared += check(scene, "senscomp-6500", 4.0);

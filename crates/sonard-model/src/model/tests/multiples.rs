@@ -1,11 +1,11 @@
-//! Sound that the transducer's own face sends back.
+//! Multiple echoes by the transducer's own face.
 
 use super::*;
 use crate::model::Mechanism;
 
-/// What an arrival brings is its path's strength by the beam pattern at both of its ends.
+/// The amplitude of an arrival is its path's strength times the beam pattern at both of its ends.
 #[test]
-fn arrivals_are_paths_seen_by_the_beam() {
+fn arrivals_include_the_beam() {
     let room = scene(vec![
         wall("wall", (0.5, -3.0), (0.5, 3.0), 1.0),
         wall("far", (-1.0, -3.0), (2.0, 3.0), 0.9),
@@ -16,8 +16,11 @@ fn arrivals_are_paths_seen_by_the_beam() {
         let direction_rad = direction_deg.to_radians();
         let point = simulator.at(DVec2::new(0.0, 0.2));
         for arrival in point.arrivals(direction_rad).expect("few paths") {
-            let returns =
-                arrival.path.mechanisms().filter(|met| *met == Mechanism::Transducer).count();
+            let returns = arrival
+                .path
+                .mechanisms()
+                .filter(|mechanism| *mechanism == Mechanism::Transducer)
+                .count();
             let one_way = |end_rad: f64| {
                 simulator.beam().one_way(crate::geometry::wrap_pi(end_rad - direction_rad))
             };
@@ -33,26 +36,29 @@ fn arrivals_are_paths_seen_by_the_beam() {
     assert!(multiples > 1, "{multiples}");
 }
 
-/// Sound to and fro before one wall: `n` ways there and back are `n` times as long, and leave and come back along
-/// the wall's normal.
+/// Multiple echoes in front of one wall: `n` round trips are `n` times as long, and leave and
+/// return along the wall's normal.
 #[test]
-fn sound_to_and_fro_is_as_long_as_its_ways() {
+fn length_is_that_of_all_rounds() {
     let before = scene(vec![wall("wall", (0.5, -3.0), (0.5, 3.0), 1.0)]);
     let simulator = simulator(before, PathOptions { lossless: true, ..PathOptions::default() });
     let arrivals = simulator.at(DVec2::ZERO).arrivals(0.05).expect("few paths");
     let mirrored: Vec<_> = arrivals
         .iter()
         .filter(|arrival| {
-            arrival.path.mechanisms().all(|met| !matches!(met, Mechanism::Diffraction(_)))
+            arrival
+                .path
+                .mechanisms()
+                .all(|mechanism| !matches!(mechanism, Mechanism::Diffraction(_)))
         })
         .collect();
     assert!(mirrored.len() >= 2, "{mirrored:?}");
-    for (arrival, ways) in mirrored.iter().zip(1..) {
-        assert!((arrival.length_m - f64::from(ways)).abs() < 1e-9, "{arrival:?}");
+    for (arrival, rounds) in mirrored.iter().zip(1..) {
+        assert!((arrival.length_m - f64::from(rounds)).abs() < 1e-9, "{arrival:?}");
         assert!(
             arrival.departure_rad.abs() < 1e-9 && arrival.arrival_rad.abs() < 1e-9,
             "{arrival:?}"
         );
-        assert_eq!(arrival.path.interactions.len(), 2 * ways as usize - 1);
+        assert_eq!(arrival.path.interactions.len(), 2 * rounds as usize - 1);
     }
 }

@@ -1,9 +1,9 @@
-//! Figures of a model that are in no range.
+//! Model options outside their ranges.
 
 use super::*;
 
 #[test]
-fn figures_out_of_range_are_named() {
+fn values_out_of_range_are_named() {
     let fan = |ray_spacing_deg| Options::from(FanOptions { ray_spacing_deg, ..BARE });
     let cone = |aperture_deg| Options::from(ConeOptions { aperture_deg: Some(aperture_deg) });
     let usual = Options::default;
@@ -24,15 +24,15 @@ fn figures_out_of_range_are_named() {
         let scene = Arc::new(shipped_scene("simple-room"));
         let sensor = Sensor::preset("senscomp-6500").expect("a preset");
         let made = Simulator::new(scene, sensor, Air::default(), options);
-        let said = made.err().map(|error| error.to_string());
+        let message = made.err().map(|error| error.to_string());
         match wrong {
             Some(name) => {
                 assert!(
-                    said.as_ref().is_some_and(|said| said.contains(name)),
-                    "{options:?}: {said:?}"
+                    message.as_ref().is_some_and(|message| message.contains(name)),
+                    "{options:?}: {message:?}"
                 );
             }
-            None => assert_eq!(said, None, "{options:?}"),
+            None => assert_eq!(message, None, "{options:?}"),
         }
     }
 }

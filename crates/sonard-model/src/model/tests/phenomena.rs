@@ -1,4 +1,4 @@
-//! What the paper saw: the false lower wall, the minimum range, corners, a corridor.
+//! Phenomena of the paper: the false lower wall, the minimum range, corners, a corridor.
 
 use super::*;
 use crate::{
@@ -22,9 +22,9 @@ fn echo_m(readings: &[(f64, Prediction)], azimuth_deg: f64) -> Option<f64> {
     prediction.range_m.filter(|_| prediction.status == PingStatus::Echo)
 }
 
-/// Half an echo's path, which its range is checked against: a weak echo is late, one that only grazes
-/// the threshold by the whole rise of the pulse (five standard deviations of 22.7 us, 20 mm), and
-/// none is early by more than what others that begin with it add.
+/// Half an echo's path, compared with its range: a weak echo is late, one that only grazes the
+/// threshold by the whole rise of the pulse (five standard deviations of 22.7 us, 20 mm), and none
+/// is early by more than the contribution of others that begin with it.
 fn near_path(prediction: &Prediction) -> f64 {
     let range_m = prediction.range_m.expect("a range");
     let path_m = prediction.arrival.as_ref().expect("an echo").length_m / 2.0;
@@ -42,7 +42,7 @@ fn walls_of(simulator: &Simulator, prediction: &Prediction) -> Vec<String> {
 }
 
 fn names(simulator: &Simulator, arrival: &Arrival) -> Vec<String> {
-    arrival.path.mechanisms().map(|met| met.name(simulator.scene())).collect()
+    arrival.path.mechanisms().map(|mechanism| mechanism.name(simulator.scene())).collect()
 }
 
 fn length_m(prediction: &Prediction) -> f64 {
@@ -52,7 +52,7 @@ fn length_m(prediction: &Prediction) -> f64 {
 /// A peak of an echo trace: half its path (metres), height, walls.
 type SeenPeak = (f64, f64, Vec<String>);
 
-/// Echo traces of the set-ups of figure 1, looking straight ahead.
+/// Echo traces of the set-ups of figure 1, facing straight ahead.
 fn trace(set_up: &str) -> (Vec<SeenPeak>, Prediction) {
     let scene = shipped_scene("echo-traces");
     let pose = pose(&scene, set_up);
@@ -68,20 +68,20 @@ fn trace(set_up: &str) -> (Vec<SeenPeak>, Prediction) {
 }
 
 fn strongest(peaks: &[SeenPeak]) -> &SeenPeak {
-    peaks.iter().max_by(|one, other| one.1.total_cmp(&other.1)).expect("a peak")
+    peaks.iter().max_by(|first, second| first.1.total_cmp(&second.1)).expect("a peak")
 }
 
-/// Figure 2 (a): nothing but the transmission.
+/// Figure 2 (a): only the transmission.
 #[test]
-fn an_empty_environment_gives_no_echo() {
+fn empty_environment() {
     let (peaks, prediction) = trace("a");
     assert!(peaks.is_empty(), "{peaks:?}");
     assert_eq!((prediction.status, prediction.arrival), (PingStatus::NoEcho, None));
 }
 
-/// Figure 2 (b): one clean echo from a plate that is turned a little.
+/// Figure 2 (b): one clean echo from a slightly turned plate.
 #[test]
-fn a_turned_plate_gives_one_clean_echo() {
+fn turned_plate() {
     let (peaks, prediction) = trace("b");
     close(near_path(&prediction), 0.6 * 5f64.to_radians().cos(), 1e-3, "the plate");
     let (_, highest, walls) = strongest(&peaks);
@@ -94,7 +94,7 @@ fn a_turned_plate_gives_one_clean_echo() {
 /// Figure 2 (d): the strongest echo goes by the plate to the far object and back, and a weak early
 /// one comes straight from the plate.
 #[test]
-fn a_plate_at_45_degrees_shows_the_far_object() {
+fn plate_at_45_degrees() {
     let (peaks, prediction) = trace("d");
     close(near_path(&prediction), 1.8, 1e-3, "plate and far object");
     let (_, highest, walls) = strongest(&peaks);
@@ -109,7 +109,7 @@ fn a_plate_at_45_degrees_shows_the_far_object() {
 /// Figure 4: the wall near its perpendicular only, long readings beyond the critical angle, and an
 /// arc by the blackboard's protruding edge.
 #[test]
-fn the_laboratory_shows_walls_near_their_perpendiculars_and_the_blackboards_edge() {
+fn laboratory() {
     let (simulator, readings) = scan("mcgill-lab", "fig4", 5.0);
     for azimuth_deg in [85.0, 90.0, 95.0] {
         close(near_path(at(&readings, azimuth_deg)), 0.95, 1e-3, "the near wall");
@@ -119,7 +119,7 @@ fn the_laboratory_shows_walls_near_their_perpendiculars_and_the_blackboards_edge
         let range_m = at(&readings, azimuth_deg).range_m;
         assert!(range_m.is_none_or(|range_m| range_m > 2.0 * wall_m), "{azimuth_deg}: {range_m:?}");
     }
-    // The edge and the wall beside it make a corner 20 mm deep that sends everything back.
+    // The edge and the adjacent wall form a corner 20 mm deep that reflects everything back.
     let corner_m = DVec2::new(2.207 - 3.477, 0.95).length();
     for azimuth_deg in [140.0, 145.0] {
         let prediction = at(&readings, azimuth_deg);
@@ -129,9 +129,9 @@ fn the_laboratory_shows_walls_near_their_perpendiculars_and_the_blackboards_edge
     }
 }
 
-/// Figure 10: two arcs that do not meet, the lower wall's behind the upper one.
+/// Figure 10: two arcs that do not join, the lower wall's behind the upper one.
 #[test]
-fn an_oblique_corner_becomes_two_walls_that_do_not_meet() {
+fn oblique_corner() {
     let (simulator, readings) = scan("oblique-corner", "robot", 3.0);
     let seen = |wall: &str| {
         readings
@@ -147,7 +147,7 @@ fn an_oblique_corner_becomes_two_walls_that_do_not_meet() {
     assert!(start - end > 20.0, "a hole from {end} to {start}");
     let mut between = readings.iter().filter(|(at, _)| (end + 1.0..start - 1.0).contains(at));
     assert!(between.all(|(_, prediction)| prediction.status == PingStatus::NoEcho));
-    // In the direction of the lower arc's beginning the upper wall stands, and nearer.
+    // In the direction of the lower arc's beginning the upper wall is located, and nearer.
     let (azimuth_deg, range_m) = lower[0];
     let direction = DVec2::from_angle(azimuth_deg.to_radians());
     let (a, b) = (DVec2::new(-0.5993, 0.562), DVec2::new(-0.6374, -0.6374));
@@ -157,7 +157,7 @@ fn an_oblique_corner_becomes_two_walls_that_do_not_meet() {
 
 /// Figure 6: readings of one bounce, and between them readings of several.
 #[test]
-fn a_room_gives_single_and_multiple_bounces() {
+fn single_and_multiple_bounces() {
     let (simulator, readings) = scan("two-surface-room", "middle", 3.0);
     for (azimuth_deg, wall, range_m) in
         [(0.0, "east", 2.4), (90.0, "north", 2.0), (180.0, "west", 1.2), (270.0, "south", 1.0)]
@@ -169,15 +169,15 @@ fn a_room_gives_single_and_multiple_bounces() {
     let orders = readings.iter().map(|(_, p)| walls_of(&simulator, p).len());
     let several = orders.filter(|order| *order > 1).count();
     assert!(several > readings.len() / 3, "{several} of {}", readings.len());
-    // The concave corners are seen at their vertices.
+    // The concave corners appear at their vertices.
     let vertex = DVec2::new(-1.2, 2.0);
     let azimuth_deg = 3.0 * (vertex.to_angle().to_degrees() / 3.0).round();
     close(near_path(at(&readings, azimuth_deg)), vertex.length(), 1e-6, "the corner");
 }
 
-/// Figure 9: sound from the near wall passes the ranger, and the wall seems 827 mm away.
+/// Figure 9: sound from the near wall passes the ranger, and the wall appears 827 mm away.
 #[test]
-fn a_false_lower_wall_appears_at_827_mm() {
+fn false_lower_wall_at_827_mm() {
     let (simulator, readings) = scan("simple-room", "fig9", 0.9);
     for azimuth_deg in [262.8, 266.4, 270.0, 273.6, 277.2] {
         let range_m = echo_m(&readings, azimuth_deg).expect("an echo");
@@ -186,14 +186,14 @@ fn a_false_lower_wall_appears_at_827_mm() {
     let (_, straight) = readings.iter().find(|(at, _)| *at == 270.0).expect("a reading");
     assert_eq!(walls_of(&simulator, straight), ["south", "north", "south"]);
     close(length_m(straight), 1.654, 1e-6, "length");
-    // The corridor the robot believes in is twice as wide as the room is deep.
+    // The apparent corridor is twice as wide as the room is deep.
     let upper_m = echo_m(&readings, 90.0).expect("the upper wall");
     close(upper_m + 0.827, 2.0 * 0.742, 1e-3, "width");
 }
 
-/// Figure 7: the top wall's echo (794 mm of path) still arrivals when the receiver opens.
+/// Figure 7: the top wall's echo (794 mm of path) still arrives when the receiver opens.
 #[test]
-fn the_top_wall_is_read_as_minimum_range() {
+fn top_wall_is_minimum_range() {
     let (simulator, readings) = scan("simple-room", "fig7", 0.9);
     let (_, up) = readings.iter().find(|(at, _)| *at == 90.0).expect("a reading");
     assert_eq!(up.status, PingStatus::MinRange);
@@ -207,10 +207,10 @@ fn the_top_wall_is_read_as_minimum_range() {
 }
 
 /// Figure 7, on the right: the wall is 94 mm away and all its own echoes are over before the
-/// receiver opens, but the arrival runs to and fro between wall and face, and the fourth round is
-/// still there. The paper's model, whose ranger is transparent, was silent here.
+/// receiver opens. But the sound is reflected repeatedly between wall and face, and the fourth
+/// round is still arriving. The paper's model, whose ranger is transparent, had no echo here.
 #[test]
-fn the_near_wall_on_the_right_is_read_as_minimum_range() {
+fn near_wall_is_minimum_range() {
     let (simulator, readings) = scan("simple-room", "fig7", 0.9);
     let (_, right) = readings.iter().find(|(at, _)| *at == 0.0).expect("a reading");
     assert_eq!(right.status, PingStatus::MinRange);
@@ -226,11 +226,11 @@ fn the_near_wall_on_the_right_is_read_as_minimum_range() {
     assert!(near.len() >= 3, "{near:?}");
 }
 
-/// Figure 9 with a robot's body behind the ranger: the body is in the way of the arrival that
-/// passed the ranger, and what runs to and fro between body and wall still arrivals when the
-/// receiver opens. Where the false lower wall was, the minimum range is read.
+/// Figure 9 with a robot's body behind the ranger: the body blocks the sound that passed the
+/// ranger, and sound reflected repeatedly between body and wall still arrives when the receiver
+/// opens. Instead of the false lower wall, the minimum range is read.
 #[test]
-fn a_robots_body_turns_the_false_wall_into_minimum_range() {
+fn body_removes_the_false_wall() {
     let scene = shipped_scene("simple-room-robot");
     let pose = pose(&scene, "fig9");
     let plan = ScanPlan::default();
@@ -244,27 +244,30 @@ fn a_robots_body_turns_the_false_wall_into_minimum_range() {
         let ahead = &readings[0];
         assert_eq!(ahead.status, PingStatus::MinRange, "{ahead:?}");
         let path = &ahead.arrival.as_ref().expect("what sounded").path;
-        let at_body = path.reflectors().filter(|met| *met == Reflector::Cylinder(0)).count();
+        let at_body =
+            path.reflectors().filter(|mechanism| *mechanism == Reflector::Cylinder(0)).count();
         assert!(
-            at_body >= 2 || path.mechanisms().any(|met| met == Mechanism::Transducer),
+            at_body >= 2 || path.mechanisms().any(|mechanism| mechanism == Mechanism::Transducer),
             "{path:?}"
         );
     }
-    // Also looking at the body, from where what runs to and fro before it is heard as well.
+    // Also facing the body, from which the repeated reflections in front of it are received as
+    // well.
     let is_near = |reading: &&Prediction| reading.status == PingStatus::MinRange;
     let behind = &paths[100..300];
     assert!(behind.iter().filter(is_near).count() > 40);
-    // Whatever the fan reads so, the exact paths do too. Adding up, also those are heard that are below
-    // the threshold one by one: over half as many directions again.
+    // All such readings of the fan are also those of the exact paths. With interference, arrivals
+    // that are below the threshold individually are detected, too: over half as many directions
+    // again.
     let both = paths.iter().zip(&fan).filter(|(one, other)| is_near(one) && is_near(other)).count();
     let (more, fewer) = (paths.iter().filter(is_near).count(), fan.iter().filter(is_near).count());
     assert!(fewer > 90 && both * 50 >= fewer * 49, "{both} of {fewer}");
     assert!(more * 2 < fewer * 3, "{more} and {fewer}");
 }
 
-/// A post that is too thin and far away to be heard still explains the silence before it.
+/// A post that is too thin and far away to be detected still explains a missing echo.
 #[test]
-fn a_weak_post_explains_a_silence() {
+fn weak_post_explains_no_echo() {
     let mut post = scene(Vec::new());
     post.cylinders = vec![cylinder((5.0, 0.0), 0.01)];
     let simulator = simulator(post, Options::default());
@@ -279,9 +282,9 @@ fn a_weak_post_explains_a_silence() {
     assert!((lacks_db - expected_db).abs() < 4.0, "{lacks_db} instead of {expected_db}");
 }
 
-/// Figure 1 (c): a plate parallel to the transducer answers more than once.
+/// Figure 1 (c): a plate parallel to the transducer returns more than one echo.
 #[test]
-fn a_plate_before_the_transducer_answers_in_a_train() {
+fn plate_returns_an_echo_train() {
     let scene = shipped_scene("echo-traces");
     let pose = pose(&scene, "c");
     let simulator = simulator(scene, Options::default());
@@ -305,7 +308,7 @@ fn a_plate_before_the_transducer_answers_in_a_train() {
 
 /// Figure 12: an arc around the corner's vertex, and a hole on each side of it.
 #[test]
-fn a_corner_becomes_an_arc_between_holes() {
+fn right_angled_corner_is_an_arc() {
     let (_, readings) = scan("right-angle-corner", "robot", 0.9);
     let vertex = DVec2::new(-0.8, -0.65);
     let bearing_deg = vertex.to_angle().to_degrees() + 360.0;
@@ -326,10 +329,10 @@ fn a_corner_becomes_an_arc_between_holes() {
     close(near_path(at(&readings, 270.0)), 0.65, 1e-6, "south wall");
 }
 
-/// A corridor, the ranger beside one wall: side walls right at the perpendicular, silence or
-/// phantoms ahead and behind, never the wall the beam points at.
+/// A corridor, the ranger near one wall: side walls are right at the perpendicular, missing echoes
+/// or phantoms ahead and behind, never the wall on the beam axis.
 #[test]
-fn a_corridor_is_right_at_the_perpendicular_only() {
+fn corridor() {
     let (_, readings) = scan("corridor", "beside-wall", 0.9);
     close(near_path(at(&readings, 90.0)), 1.3, 1e-6, "north wall");
     close(near_path(at(&readings, 270.0)), 0.5, 1e-6, "south wall");

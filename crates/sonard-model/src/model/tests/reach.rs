@@ -1,4 +1,4 @@
-//! Paths up to a length give what all paths give.
+//! Paths up to a length give the same results as all paths.
 
 use std::sync::Arc;
 
@@ -12,14 +12,14 @@ use crate::{
     scene::{Scene, shipped},
 };
 
-/// Pings of one point, by the nearest echoes that settle them, beside pings by all echoes.
+/// Compares pings of one point by the nearest deciding echoes with pings by all echoes.
 fn check(scene: &str, sensor: &str, options: Options) {
     let text = shipped::text(scene).expect("a shipped scene");
     let scene = Arc::new(Scene::from_json(text).expect("a valid scene"));
     let sensor = Sensor::preset(sensor).expect("a preset");
     let simulator = Simulator::new(scene.clone(), sensor, Air::default(), options).expect("valid");
     let mut random = Pcg64::seed_from_u64(5);
-    // Twice: the second time it is searched at once as far as it had to be before.
+    // Twice: the second search begins with the length required before.
     for pose in scene.poses.values().flat_map(|pose| [pose; 2]) {
         let off = DVec2::new(random.random_range(-0.02..0.02), random.random_range(-0.02..0.02));
         let point = simulator.at(pose.position() + off);
@@ -42,7 +42,7 @@ fn check(scene: &str, sensor: &str, options: Options) {
 }
 
 #[test]
-fn the_nearest_echoes_settle_what_all_of_them_would() {
+fn nearest_echoes_suffice() {
     for scene in [
         "simple-room",
         "corridor",

@@ -1,5 +1,5 @@
-//! The full-wave reference scans (tests/data/fullwave/README.md), and more of the same kind, of whole
-//! bodies, by boundary integrals (tests/peers/full_wave.py).
+//! Full-wave reference scans (tests/data/fullwave/README.md), and further ones of whole bodies by
+//! boundary integrals (tests/peers/full_wave.py).
 
 use std::collections::BTreeMap;
 

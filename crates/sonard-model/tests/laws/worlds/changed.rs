@@ -1,4 +1,4 @@
-//! A random scene otherwise: moved, cut, in another order, with more in it.
+//! Variants of a random scene: moved, cut, in another order, with additional objects.
 
 use rand::{RngExt, seq::SliceRandom};
 use rand_pcg::Pcg64;
@@ -7,7 +7,7 @@ use sonard_model::geometry::DVec2;
 use super::{Heights, Round, Wall, World};
 
 impl World {
-    /// The same with every point moved by a motion that keeps lengths.
+    /// Moves every point by a motion that keeps lengths.
     pub(crate) fn moved(mut self, to: impl Fn(DVec2) -> DVec2) -> Self {
         for wall in &mut self.walls {
             wall.ends = wall.ends.map(&to);
@@ -18,7 +18,7 @@ impl World {
         Self { ends: self.ends.map(to), ..self }
     }
 
-    /// The same with every wall in two or three pieces.
+    /// Splits every wall into two or three pieces.
     pub(crate) fn split(&self, random: &mut Pcg64) -> Self {
         let mut walls = Vec::new();
         for wall in &self.walls {
@@ -33,7 +33,7 @@ impl World {
         Self { walls, ..self.clone() }
     }
 
-    /// The same in another order, and walls from their other ends.
+    /// Reorders the walls and swaps their ends.
     pub(crate) fn reordered(&self, random: &mut Pcg64) -> Self {
         let mut world = self.clone();
         world.walls.shuffle(random);
@@ -46,7 +46,7 @@ impl World {
         world
     }
 
-    /// The same with walls and cylinders behind its own outer walls.
+    /// Adds walls and cylinders behind the outer walls.
     pub(crate) fn with_hidden(&self, random: &mut Pcg64) -> Self {
         let mut world = self.clone();
         let middle = self.walls[..4].iter().map(|wall| 0.25 * wall.ends[0]).sum::<DVec2>();
@@ -66,7 +66,7 @@ impl World {
         world
     }
 
-    /// The same with every height moved.
+    /// Moves every height.
     pub(crate) fn with_heights(&self, to: impl Fn(f64) -> f64) -> Self {
         let mut world = self.clone();
         let moved = |z_m: [f64; 2]| {
@@ -88,7 +88,7 @@ impl World {
         world
     }
 
-    /// The same with every surface's reflectance changed.
+    /// Changes every surface's reflectance.
     pub(crate) fn with_reflectance(&self, of: impl Fn(f64) -> f64) -> Self {
         let mut world = self.clone();
         world.walls.iter_mut().for_each(|wall| wall.reflectance = of(wall.reflectance));

@@ -1,4 +1,4 @@
-//! Beams and rays.
+//! Beams, rays, and the geometry of a reflected beam.
 
 use crate::{
     geometry::{DVec2, Mirror},
@@ -7,69 +7,70 @@ use crate::{
 
 /// All rays from an image of the start between two directions, in one triangle.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Beam {
+pub(crate) struct RayBeam {
     /// Mirror image of the start.
     pub(crate) image: DVec2,
-    /// Its clockwise border, any length.
+    /// Clockwise border, any length.
     pub(crate) right: DVec2,
-    /// Its counter-clockwise border, any length.
+    /// Counter-clockwise border, any length.
     pub(crate) left: DVec2,
-    /// With `mirrored`, the rotation back to the start's own frame: see [`Beam::departure`].
+    /// Rotation back to the start's own frame, together with `mirrored`; see
+    /// [`RayBeam::departure`].
     pub(crate) turn: DVec2,
     /// Product of the reflectances.
     pub(crate) gain: f64,
-    /// Paths longer than this are too weak, metres.
-    pub(crate) audible_m: f64,
-    /// The node of its last reflection, for [`super::Beams::walls_back`].
+    /// Length beyond which paths are too weak, metres.
+    pub(crate) detectable_m: f64,
+    /// Node of the last reflection, for [`super::Beams::walls_back`].
     pub(crate) node: u32,
     pub(crate) triangle: u32,
-    /// The side it came in by.
+    /// Side through which the beam entered the triangle.
     pub(crate) side: u8,
-    /// Whether it was reflected an odd number of times.
+    /// `true` after an odd number of reflections.
     pub(crate) mirrored: bool,
-    /// Whether rays at the transducer's own height, which do not climb, come so far.
+    /// `true` if rays at the transducer's own height, which do not climb, reach this triangle.
     pub(crate) is_level: bool,
     pub(crate) order: u16,
-    /// How steeply its rays can climb, by number in [`super::Beams::slopes`].
+    /// Possible slopes of the rays, by number in [`super::Beams::slopes`].
     pub(crate) slopes: u32,
 }
 
 /// A path by mirror reflections, unfolded: a straight ray from an image of the start.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Ray {
-    /// From the image to the end, metres.
+pub(crate) struct UnfoldedRay {
+    /// Vector from the image to the end, metres.
     pub(crate) run: DVec2,
-    /// Unit vector in which it leaves.
+    /// Unit vector of departure.
     pub(crate) departure: DVec2,
     pub(crate) gain: f64,
     pub(crate) node: u32,
     pub(crate) order: u16,
-    /// See [`Beam::slopes`].
+    /// Possible slopes; see [`RayBeam::slopes`].
     pub(crate) slopes: u32,
 }
 
-/// A ray from the start by what its walls follow from.
+/// Minimal description of a ray from the start, from which its walls are reconstructed.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Leg {
+pub(crate) struct RayLeg {
     pub(crate) node: u32,
     pub(crate) run: DVec2,
 }
 
-impl From<&Ray> for Leg {
-    fn from(ray: &Ray) -> Self {
+impl From<&UnfoldedRay> for RayLeg {
+    fn from(ray: &UnfoldedRay) -> Self {
         Self { node: ray.node, run: ray.run }
     }
 }
 
-impl Beam {
-    /// The direction in which a ray left that now runs along `direction`.
+impl RayBeam {
+    /// Direction in which a ray left the start that now runs along `direction`.
     pub(crate) fn departure(&self, direction: DVec2) -> DVec2 {
         let direction =
             if self.mirrored { DVec2::new(direction.x, -direction.y) } else { direction };
         self.turn.rotate(direction)
     }
 
-    /// The beam behind a mirror, as far as geometry goes.
+    /// Returns the beam behind a mirror: geometry only, without gain and node.
     pub(crate) fn reflected(&self, mirror: &Mirror, rotor: DVec2) -> Self {
         Self {
             image: mirror.image(self.image),
@@ -82,10 +83,10 @@ impl Beam {
         }
     }
 
-    /// The ray of this beam to a point.
-    pub(crate) fn ray_to(&self, point: DVec2) -> Ray {
+    /// Returns the ray of this beam to a point.
+    pub(crate) fn ray_to(&self, point: DVec2) -> UnfoldedRay {
         let run = point - self.image;
-        Ray {
+        UnfoldedRay {
             run,
             departure: self.departure(run.normalize_or_zero()),
             gain: self.gain,
@@ -95,20 +96,20 @@ impl Beam {
         }
     }
 
-    /// Whether the ray towards `run` is in the beam, borders included. A beam without borders is
-    /// the one that starts in all directions.
+    /// Returns `true` if the ray towards `run` is in the beam, borders included. A beam without
+    /// borders is the initial one, which covers all directions.
     pub(crate) fn holds(&self, run: DVec2) -> bool {
         if self.right == DVec2::ZERO {
             return true;
         }
-        // Within less than half a turn a ray is less than a right angle from the nearer border. Each is asked by
-        // itself: of a sum the longer one would decide.
+        // Within less than half a turn a ray is less than a right angle from the nearer border.
+        // Each border is tested separately: in a sum the longer one would decide.
         let is_ahead = run.dot(self.right) > 0.0 || run.dot(self.left) > 0.0;
         is_ahead && reaches(self.right, run) && reaches(run, self.left)
     }
 
-    /// Merges a beam that leaves the start beside this one (`next` is counter-clockwise of it there)
-    /// and has come to the same image through the same side; false if it is not so.
+    /// Merges the neighbouring beam `next`, which left the start counter-clockwise of this one, if
+    /// it has reached the same image through the same side. Returns `false` if the beams differ.
     pub(crate) fn merge(&mut self, next: &Self) -> bool {
         let same = self.triangle == next.triangle
             && self.side == next.side
@@ -132,14 +133,15 @@ impl Beam {
     }
 }
 
-/// Whether `v` is counter-clockwise of the ray along `border`, or its end within [`TIE_M`] of it.
+/// Returns `true` if `v` is counter-clockwise of the ray along `border`, or its end within
+/// [`TIE_M`] of that ray.
 pub(crate) fn reaches(border: DVec2, v: DVec2) -> bool {
     let cross = border.perp_dot(v);
-    // |cross| / |border| is the distance; with the shorter of the two it needs no third case.
+    // |cross| / |border| is the distance; with the shorter of the two no third case is needed.
     cross >= 0.0 || cross * cross <= TIE_M * TIE_M * border.length_squared().min(v.length_squared())
 }
 
-/// Whether `v` is counter-clockwise of the ray along `border` by more than [`TIE_M`].
+/// Returns `true` if `v` is counter-clockwise of the ray along `border` by more than [`TIE_M`].
 pub(crate) fn reaches_well(border: DVec2, v: DVec2) -> bool {
     !reaches(v, border)
 }
@@ -148,15 +150,15 @@ pub(crate) fn reaches_well(border: DVec2, v: DVec2) -> bool {
 mod tests {
     use super::*;
 
-    fn beam(right: f64, left: f64) -> Beam {
+    fn beam(right: f64, left: f64) -> RayBeam {
         let turn = |deg: f64| 2.0 * DVec2::from_angle(deg.to_radians());
-        Beam {
+        RayBeam {
             image: DVec2::new(1.0, 2.0),
             right: turn(right),
             left: turn(left),
             turn: DVec2::X,
             gain: 0.8,
-            audible_m: 10.0,
+            detectable_m: 10.0,
             node: 0,
             triangle: 3,
             side: 1,
@@ -168,29 +170,29 @@ mod tests {
     }
 
     #[test]
-    fn beams_side_by_side_are_one() {
+    fn adjacent_beams_merge() {
         let mut first = beam(10.0, 30.0);
         assert!(first.merge(&beam(30.0, 45.0)));
         assert_eq!((first.right, first.left), (beam(10.0, 45.0).right, beam(10.0, 45.0).left));
-        // Seen in a mirror the next one counter-clockwise lies clockwise.
-        let mirrored = |right, left| Beam { mirrored: true, ..beam(right, left) };
+        // In a mirror the next beam counter-clockwise lies clockwise.
+        let mirrored = |right, left| RayBeam { mirrored: true, ..beam(right, left) };
         let mut first = mirrored(30.0, 45.0);
         assert!(first.merge(&mirrored(10.0, 30.0)));
         assert_eq!((first.right, first.left), (beam(10.0, 45.0).right, beam(10.0, 45.0).left));
     }
 
     #[test]
-    fn beams_that_differ_stay_two() {
+    fn different_beams_stay_apart() {
         let next = beam(30.0, 45.0);
         for other in [
             beam(31.0, 45.0),
             beam(210.0, 225.0),
-            Beam { gain: 0.81, ..next },
-            Beam { gain: 0.4, ..next },
-            Beam { triangle: 4, ..next },
-            Beam { side: 2, ..next },
-            Beam { is_level: false, ..next },
-            Beam { image: DVec2::new(1.0, 2.001), ..next },
+            RayBeam { gain: 0.81, ..next },
+            RayBeam { gain: 0.4, ..next },
+            RayBeam { triangle: 4, ..next },
+            RayBeam { side: 2, ..next },
+            RayBeam { is_level: false, ..next },
+            RayBeam { image: DVec2::new(1.0, 2.001), ..next },
         ] {
             let mut first = beam(10.0, 30.0);
             assert!(!first.merge(&other), "{other:?}");
@@ -199,13 +201,13 @@ mod tests {
     }
 
     #[test]
-    fn a_mirror_turns_a_beam_and_remembers_where_it_left() {
+    fn reflection_keeps_departure() {
         let mirror = Mirror { normal: DVec2::X, offset_m: 4.0 };
-        // Reflected at x = 4, a ray's angle is taken from half a turn.
+        // Reflected at x = 4, a ray's angle is subtracted from half a turn.
         let rotor = DVec2::from_angle(std::f64::consts::PI);
         let behind = beam(10.0, 30.0).reflected(&mirror, rotor);
         assert_eq!((behind.image, behind.order, behind.mirrored), (DVec2::new(7.0, 2.0), 2, true));
-        let off = |one: DVec2, deg: f64| one.distance(2.0 * DVec2::from_angle(deg.to_radians()));
+        let off = |a: DVec2, deg: f64| a.distance(2.0 * DVec2::from_angle(deg.to_radians()));
         assert!(off(behind.right, 150.0) < 1e-12 && off(behind.left, 170.0) < 1e-12, "{behind:?}");
         let left = behind.departure(DVec2::from_angle(160_f64.to_radians()));
         assert!(left.distance(DVec2::from_angle(20_f64.to_radians())) < 1e-12, "{left}");

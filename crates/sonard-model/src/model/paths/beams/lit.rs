@@ -1,22 +1,22 @@
-//! Surfaces that beams light.
+//! Surfaces that beams illuminate.
 
-use super::beam::Beam;
-use crate::model::paths::plan::Span;
+use super::beam::RayBeam;
+use crate::model::paths::plan::AngleSpan;
 
-/// A beam that meets a cylinder, all of it.
+/// A beam, all of which hits one cylinder.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct View {
+pub(crate) struct LitCylinder {
     pub(crate) cylinder: u32,
-    /// The part of the surface that it lights, radians.
-    pub(crate) span: Span,
-    pub(crate) beam: Beam,
+    /// Illuminated part of the surface, radians.
+    pub(crate) span: AngleSpan,
+    pub(crate) beam: RayBeam,
 }
 
-/// A beam that meets a wall, and the part of the wall that it lights.
+/// A beam that hits a wall, and the part of the wall that it illuminates.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct LitSpan {
-    pub(crate) beam: Beam,
+pub(crate) struct LitWall {
+    pub(crate) beam: RayBeam,
     pub(crate) wall: u32,
-    /// From and to where along the wall's line, metres.
+    /// Interval along the wall's line, metres.
     pub(crate) span_m: [f64; 2],
 }

@@ -5,30 +5,30 @@ use std::f64::consts::TAU;
 use smallvec::{SmallVec, smallvec};
 
 use super::{
-    beam::{Beam, reaches_well},
-    lit::View,
+    beam::{RayBeam, reaches_well},
+    lit::LitCylinder,
 };
 use crate::{
     geometry::{DVec2, turn_rad},
-    model::paths::plan::{Circle, Cylinders, Span, SurfaceArc},
+    model::paths::plan::{AngleSpan, Cylinders, PlanCircle, SurfaceArc},
 };
 
-/// The parts of a beam that pass the cylinders in its triangle, from right to left. The parts that are
-/// taken from it go to `views`.
+/// Returns the parts of a beam that pass the cylinders in its triangle, from right to left. The
+/// parts that the cylinders cut out go to `views`.
 ///
-/// Invariant: the parts that pass and the parts taken by opaque cylinders together are the beam, each of its
-/// rays in one of them. Ties go to both neighbours.
+/// Invariant: the passing parts and the parts cut out by opaque cylinders together are the beam,
+/// each of its rays in one of them. Ties go to both neighbours.
 pub(crate) fn shade(
     cylinders: &Cylinders,
-    beam: &Beam,
-    views: &mut Vec<View>,
-) -> SmallVec<[Beam; 2]> {
+    beam: &RayBeam,
+    views: &mut Vec<LitCylinder>,
+) -> SmallVec<[RayBeam; 2]> {
     let mut left = smallvec![*beam];
     let mut arcs: SmallVec<[SurfaceArc; 4]> = cylinders.in_triangle(beam.triangle).into();
-    // Of two circles that do not overlap, a ray meets the one first that has the smaller
-    // power: the line of equal power lies between them.
+    // Of two circles that do not overlap, a ray first hits the one with the smaller power: the line
+    // of equal power lies between them.
     let power = |arc: &SurfaceArc| cylinders.circles[arc.cylinder as usize].power(beam.image);
-    arcs.sort_by(|one, other| power(one).total_cmp(&power(other)));
+    arcs.sort_by(|a, b| power(a).total_cmp(&power(b)));
     for arc in &arcs {
         let circle = &cylinders.circles[arc.cylinder as usize];
         left = left.iter().flat_map(|beam| shade_by_arc(circle, beam, arc, views)).collect();
@@ -36,21 +36,22 @@ pub(crate) fn shade(
     left
 }
 
-/// The parts of a beam that pass an arc of a circle, from right to left.
+/// Returns the parts of a beam that pass an arc of a circle, from right to left.
 fn shade_by_arc(
-    circle: &Circle,
-    beam: &Beam,
+    circle: &PlanCircle,
+    beam: &RayBeam,
     arc: &SurfaceArc,
-    views: &mut Vec<View>,
-) -> SmallVec<[Beam; 2]> {
+    views: &mut Vec<LitCylinder>,
+) -> SmallVec<[RayBeam; 2]> {
     let Some(lit) = lit_by(circle, beam) else { return smallvec![*beam] };
     let mut passing = SmallVec::new();
     let mut rest = *beam;
-    // From right to left angles on the circle fall.
+    // From right to left, angles on the circle decrease.
     for span in lit.common(&arc.span).into_iter().rev() {
         let [mut left, mut right] =
             [span.from_rad, span.to_rad].map(|at| circle.point(at) - beam.image);
-        // At the ends of what is lit, the beam's own borders are exact where they are within a tie.
+        // At the ends of the illuminated part, the beam's own borders are exact where they are
+        // within a tie.
         if span.to_rad == lit.to_rad && !reaches_well(beam.right, right) {
             right = beam.right;
         }
@@ -60,11 +61,11 @@ fn shade_by_arc(
         if !reaches_well(right, left) {
             continue;
         }
-        let beam = Beam { right, left, ..rest };
-        views.push(View { cylinder: arc.cylinder, span, beam });
+        let beam = RayBeam { right, left, ..rest };
+        views.push(LitCylinder { cylinder: arc.cylinder, span, beam });
         if circle.is_opaque {
             if reaches_well(rest.right, right) {
-                passing.push(Beam { left: right, ..rest });
+                passing.push(RayBeam { left: right, ..rest });
             }
             rest.right = left;
         }
@@ -75,11 +76,12 @@ fn shade_by_arc(
     passing
 }
 
-/// The part of a circle that a beam lights, as far as its triangle is not asked.
+/// Part of a circle that a beam illuminates, regardless of the beam's triangle.
 ///
-/// By the law of sines a ray at `off` from the axis (image to centre, at distance `d`) meets the circle of
-/// radius `r` at `off - asin(d sin off / r)` around the centre from the image's direction.
-fn lit_by(circle: &Circle, beam: &Beam) -> Option<Span> {
+/// By the law of sines a ray at `off` from the axis (image to centre, at distance `d`) hits the
+/// circle of radius `r` at `off - asin(d sin off / r)` around the centre from the image's
+/// direction.
+fn lit_by(circle: &PlanCircle, beam: &RayBeam) -> Option<AngleSpan> {
     let to_image = beam.image - circle.center;
     let sine = circle.radius_m / to_image.length();
     if sine >= 1.0 {
@@ -89,17 +91,17 @@ fn lit_by(circle: &Circle, beam: &Beam) -> Option<Span> {
     let off_axis = |border: DVec2| turn_rad(-to_image, border);
     let (mut right, mut left) = (off_axis(beam.right), off_axis(beam.left));
     if right > left {
-        // The beam holds the direction away from the circle, and one side of it at most.
+        // The beam contains the direction away from the circle, and at most one side of the circle.
         if left > -tangent_rad { right -= TAU } else { left += TAU }
     }
     if right >= tangent_rad || left <= -tangent_rad {
         return None;
     }
-    // A ray off the axis to the left meets the circle on the clockwise side of the image.
+    // A ray off the axis to the left hits the circle on the clockwise side of the image.
     let around_rad = |off: f64| {
         let off = off.clamp(-tangent_rad, tangent_rad);
         off - (off.sin() / sine).clamp(-1.0, 1.0).asin()
     };
     let middle = to_image.to_angle();
-    Some(Span { from_rad: middle + around_rad(left), to_rad: middle + around_rad(right) })
+    Some(AngleSpan { from_rad: middle + around_rad(left), to_rad: middle + around_rad(right) })
 }

@@ -1,11 +1,12 @@
-//! Slopes: how steeply rays of a beam can climb, after the low and hanging walls that it met and passed.
+//! Slopes: possible climb of a beam's rays after the low and hanging walls that it hit or passed.
 //!
-//! Beams are traced in the plan, where a wall that ends below the ceiling both reflects and lets pass. But a
-//! ray climbs evenly if floor and ceiling are windows, and at one distance a slope leads either to such a
-//! wall or past it. A beam therefore keeps the slopes that all it met and passed leave to its rays; without
-//! one it ends. So the number of beams grows as in space, and does not double at each low wall. The distance
-//! to a wall differs from ray to ray of a beam, so the slopes kept are some more than those of its rays:
-//! what is listed is asked again, at its own slope.
+//! Beams are traced in the plan, where a wall that ends below the ceiling both reflects and lets
+//! pass. With floor and ceiling treated as windows a ray climbs evenly, so at a given distance its
+//! slope leads either to such a wall or past it. A beam therefore keeps the set of slopes that
+//! remain possible, and ends when the set is empty. The number of beams then grows as in space and
+//! does not double at each low wall. The distance to a wall differs between the rays of a beam, so
+//! the kept set is slightly larger than that of its rays; listed paths are checked again at their
+//! own slope.
 
 use std::ops::Range;
 
@@ -13,49 +14,50 @@ use smallvec::SmallVec;
 
 use crate::model::paths::plan::{ALL_SLOPES, united};
 
-/// Distances to walls may be off by this much where walls were snapped and rays run on ties, metres.
+/// Tolerance of distances to walls, for snapped walls and rays on ties, metres.
 const LOOSE_M: f64 = 1e-5;
 
-/// Sets of slopes (metres climbed a metre of the plan), by number.
+/// Numbered sets of slopes (metres of climb per metre in the plan).
 #[derive(Debug, Default)]
 pub(crate) struct Slopes {
-    /// From set 1 on.
+    /// Ranges in `spans` of set 1 onwards.
     sets: Vec<Range<u32>>,
     spans: Vec<[f64; 2]>,
 }
 
-const EACH: [[f64; 2]; 1] = [[f64::NEG_INFINITY, f64::INFINITY]];
+const FULL_RANGE: [[f64; 2]; 1] = [[f64::NEG_INFINITY, f64::INFINITY]];
 
 impl Slopes {
-    /// A set: closed intervals, rising and apart.
+    /// Intervals of a set: closed, ascending and disjoint.
     fn spans(&self, set: u32) -> &[[f64; 2]] {
         (set as usize)
             .checked_sub(1)
             .and_then(|index| self.sets.get(index))
-            .map_or(&EACH, |set| &self.spans[set.start as usize..set.end as usize])
+            .map_or(&FULL_RANGE, |set| &self.spans[set.start as usize..set.end as usize])
     }
 
-    /// How many intervals are kept, and sets, of half an interval each.
+    /// Memory in use, in intervals; a set counts as half an interval.
     pub(crate) fn kept(&self) -> usize {
         self.spans.len() + self.sets.len() / 2
     }
 
-    /// Whether a set has a slope from `low` to `high`.
+    /// Returns `true` if a set has a slope from `low` to `high`.
     pub(crate) fn any_in(&self, set: u32, [low, high]: [f64; 2]) -> bool {
         let spans = self.spans(set);
         let next = spans.partition_point(|span| span[1] < low);
         spans.get(next).is_some_and(|span| span[0] <= high)
     }
 
-    /// Whether a ray that gains so much height over so much of the plan is in a set, metres.
+    /// Returns `true` if a set has the slope of a ray that climbs `climb_m` over `run_m` of the
+    /// plan.
     pub(crate) fn holds(&self, set: u32, climb_m: f64, run_m: f64) -> bool {
         let slope = climb_m / run_m;
         set == ALL_SLOPES || slope.is_nan() || self.any_in(set, [slope; 2])
     }
 
-    /// Those of a set that climb to one of `climbs` at some distance, and no steeper than `steepest`; `None` if
-    /// there are none.
-    pub(crate) fn reaching(
+    /// Intersects a set with the slopes that lead to one of `climbs` at a distance in range, no
+    /// steeper than `steepest`. Returns the number of the result, `None` if it is empty.
+    pub(crate) fn narrow(
         &mut self,
         set: u32,
         climbs: &[[f64; 2]],
@@ -69,7 +71,8 @@ impl Slopes {
         for &[low_m, high_m] in climbs {
             let low = (low_m / if low_m < 0.0 { near_m } else { far_m }).max(-steepest);
             let high = (high_m / if high_m < 0.0 { far_m } else { near_m }).min(steepest);
-            // Both ends rise from one climb to the next; what lies below is behind all that follow.
+            // Both ends ascend from one climb to the next; spans below this one are behind all that
+            // follow.
             while old.get(at).is_some_and(|span| span[1] < low) {
                 at += 1;
             }
@@ -88,12 +91,12 @@ impl Slopes {
         Some(if left[..] == *old { set } else { self.add(&left) })
     }
 
-    /// The slopes of either set.
-    pub(crate) fn either(&mut self, one: u32, other: u32) -> u32 {
-        if one == other || one == ALL_SLOPES || other == ALL_SLOPES {
-            return if one == other { one } else { ALL_SLOPES };
+    /// Returns the union of two sets.
+    pub(crate) fn union(&mut self, a: u32, b: u32) -> u32 {
+        if a == b || a == ALL_SLOPES || b == ALL_SLOPES {
+            return if a == b { a } else { ALL_SLOPES };
         }
-        let both = [self.spans(one), self.spans(other)].concat();
+        let both = [self.spans(a), self.spans(b)].concat();
         self.add(&united(both))
     }
 

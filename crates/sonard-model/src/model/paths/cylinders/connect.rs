@@ -1,16 +1,16 @@
-//! Echoes that touch cylinders: two half-paths, connected where they meet.
+//! Echoes that touch cylinders: two half-paths, connected at a common contact.
 //!
-//! The path of an echo read backwards is a path too (reciprocity). So an echo of `n` contacts with cylinders
-//! is found from half-paths of half as many: one to its middle contact from the start and one from the
-//! receiver, as in bidirectional tracing. What is followed that way is the square root of what one-way search
-//! would have to follow, since behind each contact there are several times more paths.
+//! The path of an echo read backwards is a path too (reciprocity). An echo of `n` contacts with
+//! cylinders is therefore found from half-paths of half as many: one to its middle contact from the
+//! start and one from the receiver, as in bidirectional tracing. The number of half-paths is the
+//! square root of what a one-way search would follow, since each contact multiplies the paths.
 //!
 //! A middle contact has as many cylinders before it as after it, or one more.
 
 use super::{
     contact::Contact,
     departures::Departures,
-    groups::{Group, Groups},
+    groups::{HalfPathGroup, HalfPathGroups},
     half_path::{DIRECT, HalfPath, HalfPathTracer},
     rays::{CylinderRay, CylinderRays, OneWay},
     stationary::{SLACK, overlap, stationary_contact},
@@ -21,58 +21,57 @@ use crate::{
     model::{
         SearchPart,
         paths::{
-            beams::{Leg, View},
-            echo::{Echo, Via},
+            beams::{LitCylinder, RayLeg},
+            echo::{PathEcho, Via},
             pattern::TwoWayBound,
-            plan::{Circle, Plan},
+            plan::{PlanCircle, TracingPlan},
         },
     },
 };
 
-/// Effort of finding where two half-paths meet, in steps of a beam.
-const STEPS_A_PAIR: usize = 32;
+/// Effort of connecting two half-paths, in steps of a beam.
+const STEPS_PER_PAIR: usize = 32;
 
-/// The contact in the middle of an echo path.
+/// Contact in the middle of an echo path.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Connection {
+pub(crate) struct MiddleContact {
     pub(crate) cylinder: u32,
-    /// Angle of the contact around its centre, radians.
+    /// Angle of the contact around the cylinder's centre, radians.
     pub(crate) angle_rad: f64,
-    /// From the transmitter to there.
+    /// Path from the transmitter to the contact.
     pub(crate) out: OneWay,
-    /// From the receiver to there, in its own tree if it has one.
+    /// Path from the receiver to the contact, in the receiver's own tree if there is one.
     pub(crate) back: OneWay,
 }
 
-/// Connects half-paths.
 pub(crate) struct Connector<'a> {
-    plan: &'a Plan,
+    plan: &'a TracingPlan,
     bound: Option<&'a TwoWayBound>,
-    pub(crate) connections: Vec<Connection>,
-    pub(crate) echoes: Vec<Echo>,
+    pub(crate) connections: Vec<MiddleContact>,
+    pub(crate) echoes: Vec<PathEcho>,
 }
 
-/// The half-paths from one start.
+/// Half-paths from one start.
 pub(crate) struct HalfPaths<'a> {
-    pub(crate) views: &'a [View],
+    pub(crate) views: &'a [LitCylinder],
     pub(crate) all: &'a [HalfPath],
-    /// The store for rays of echoes.
+    /// Destination of the rays of echoes.
     pub(crate) rays: &'a mut CylinderRays,
 }
 
-/// The half-paths from one start, sorted.
-struct Sorted<'a> {
-    views: &'a [View],
+/// Half-paths from one start, grouped.
+struct GroupedHalfPaths<'a> {
+    views: &'a [LitCylinder],
     all: &'a [HalfPath],
-    groups: Groups,
+    groups: HalfPathGroups,
 }
 
 impl<'a> Connector<'a> {
-    pub(crate) fn new(plan: &'a Plan, bound: Option<&'a TwoWayBound>) -> Self {
+    pub(crate) fn new(plan: &'a TracingPlan, bound: Option<&'a TwoWayBound>) -> Self {
         Self { plan, bound, connections: Vec::new(), echoes: Vec::new() }
     }
 
-    /// All echoes between the half-paths from a start and those from another, or from the same.
+    /// Connects the half-paths from a start to those from another start, or to each other.
     pub(crate) fn connect(&mut self, out: &mut HalfPaths, back: Option<&mut HalfPaths>) {
         let outs = self.sorted(out);
         match back {
@@ -91,14 +90,14 @@ impl<'a> Connector<'a> {
         }
     }
 
-    fn sorted<'b>(&self, from: &HalfPaths<'b>) -> Sorted<'b> {
-        let groups = Groups::of(from.all, self.plan.cylinders.circles.len());
-        Sorted { views: from.views, all: from.all, groups }
+    fn sorted<'b>(&self, from: &HalfPaths<'b>) -> GroupedHalfPaths<'b> {
+        let groups = HalfPathGroups::new(from.all, self.plan.cylinders.circles.len());
+        GroupedHalfPaths { views: from.views, all: from.all, groups }
     }
 
-    /// Echoes out on half-paths from the transmitter and back on those from the receiver; from one start
-    /// each pair once.
-    fn pairs(&self, out: &Sorted, back: Option<&Sorted>) -> Vec<Pair> {
+    /// Finds echoes out on half-paths from the transmitter and back on those from the receiver;
+    /// from one start each pair once.
+    fn pairs(&self, out: &GroupedHalfPaths, back: Option<&GroupedHalfPaths>) -> Vec<ConnectedPair> {
         let mut found = Vec::new();
         let other = back.unwrap_or(out);
         for (key, outs) in out.groups.by_cylinder.iter().enumerate() {
@@ -108,10 +107,12 @@ impl<'a> Connector<'a> {
                 let Some(backs) = other.groups.by_cylinder.get(key) else { continue };
                 let once = is_level && back.is_none();
                 for group in outs {
-                    let backs: Vec<&Group> =
-                        backs.iter().filter(|back| self.may_meet_any(out, group, back)).collect();
+                    let backs: Vec<&HalfPathGroup> = backs
+                        .iter()
+                        .filter(|back| self.may_connect_any(out, group, back))
+                        .collect();
                     for &half_path in &group.half_paths {
-                        self.partners_of(out, half_path, other, &backs, once, &mut found);
+                        self.connect_partners(out, half_path, other, &backs, once, &mut found);
                     }
                 }
             }
@@ -119,108 +120,112 @@ impl<'a> Connector<'a> {
         found
     }
 
-    /// Whether any half-path of a group can give an echo with any of another.
-    fn may_meet_any(&self, out: &Sorted, group: &Group, back: &Group) -> bool {
+    /// Returns `true` if any half-path of a group can give an echo with any of another.
+    fn may_connect_any(
+        &self,
+        out: &GroupedHalfPaths,
+        group: &HalfPathGroup,
+        back: &HalfPathGroup,
+    ) -> bool {
         let is_repeated = out.all[group.half_paths[0] as usize].level > 0;
-        let least_m = group.least_m + back.least_m;
-        let floor = self.plan.settings.contact_floor(is_repeated, least_m).powi(2);
-        let most = group.most.with(&back.most);
-        most * self.most_heard() >= floor
-            && most * self.heard(&group.departures, &back.departures) >= floor
+        let min_m = group.min_m + back.min_m;
+        let floor = self.plan.settings.contact_floor(is_repeated, min_m).powi(2);
+        let bound = group.max_strength.with(&back.max_strength);
+        bound * self.max_pattern_power() >= floor
+            && bound * self.pattern_power(&group.departures, &back.departures) >= floor
     }
 
-    /// Connects a half-path to others; with `once`, only with those whose number is not smaller.
-    fn partners_of(
+    /// Connects a half-path to others; with `once`, only to those whose number is not smaller.
+    fn connect_partners(
         &self,
-        out: &Sorted,
+        out: &GroupedHalfPaths,
         number: u32,
-        back: &Sorted,
-        groups: &[&Group],
+        back: &GroupedHalfPaths,
+        groups: &[&HalfPathGroup],
         once: bool,
-        found: &mut Vec<Pair>,
+        found: &mut Vec<ConnectedPair>,
     ) {
         let half_path = &out.all[number as usize];
         let floor = |other_m: f64| {
-            self.plan
-                .settings
-                .contact_floor(half_path.level > 0, half_path.least_m + other_m)
-                .powi(2)
+            self.plan.settings.contact_floor(half_path.level > 0, half_path.min_m + other_m).powi(2)
         };
         let mut tracer = None;
         for group in groups {
-            let (most, least) = (half_path.strength.with(&group.most), floor(group.least_m));
-            // In whatever directions: a cheap test before the one that asks for them.
-            let is_loud = most * self.most_heard() >= least
-                && most * self.heard(&half_path.departures, &group.departures) >= least;
-            if !is_loud {
+            let (bound, min_power) =
+                (half_path.strength.with(&group.max_strength), floor(group.min_m));
+            // In any direction: a cheap test before the one that depends on directions.
+            let may_pass = bound * self.max_pattern_power() >= min_power
+                && bound * self.pattern_power(&half_path.departures, &group.departures)
+                    >= min_power;
+            if !may_pass {
                 continue;
             }
             for &other in group.half_paths.iter().filter(|&&other| !once || other >= number) {
                 let other = &back.all[other as usize];
-                // Sorted by falling `x`: the bound of all that follow falls with it.
-                let most = Strength { x: other.strength.x, ..group.most };
-                if half_path.strength.with(&most) < least {
+                // Sorted by decreasing `x`, so the bound of all later ones decreases too.
+                let bound = Strength { x: other.strength.x, ..group.max_strength };
+                if half_path.strength.with(&bound) < min_power {
                     break;
                 }
                 if !self.plan.effort.step(SearchPart::Cylinders, 1) {
                     return;
                 }
-                if self.may_meet(half_path, other, floor(other.least_m)) {
+                if self.may_connect(half_path, other, floor(other.min_m)) {
                     let tracer = tracer.get_or_insert_with(|| {
                         HalfPathTracer::new(self.plan, out.views, half_path)
                     });
                     let other = HalfPathTracer::new(self.plan, back.views, other);
-                    self.plan.effort.step(SearchPart::Cylinders, STEPS_A_PAIR);
+                    self.plan.effort.step(SearchPart::Cylinders, STEPS_PER_PAIR);
                     let pair = self.pair(tracer, &other);
-                    self.plan.effort.keep::<(Pair, Echo, Echo)>(pair.iter().len());
+                    self.plan.effort.keep::<(ConnectedPair, PathEcho, PathEcho)>(pair.iter().len());
                     found.extend(pair);
                 }
             }
         }
     }
 
-    /// Most of the power that is heard of echoes that leave and come back like this.
-    fn heard(&self, one: &Departures, other: &Departures) -> f64 {
-        self.bound.map_or(1.0, |bound| bound.at(one.gap_rad(other)).powi(2))
+    /// Upper bound of the two-way pattern's power for echoes with these departures.
+    fn pattern_power(&self, a: &Departures, b: &Departures) -> f64 {
+        self.bound.map_or(1.0, |bound| bound.at(a.gap_rad(b)).powi(2))
     }
 
-    /// The most that it is in any directions.
-    fn most_heard(&self) -> f64 {
+    /// Upper bound of the two-way pattern's power over all directions.
+    fn max_pattern_power(&self) -> f64 {
         self.bound.map_or(1.0, |bound| bound.at(0.0).powi(2))
     }
 
-    /// Cheap tests: whether two half-paths can give an echo at all.
-    fn may_meet(&self, out: &HalfPath, back: &HalfPath, floor: f64) -> bool {
+    /// Cheap tests: returns `false` if two half-paths cannot give an echo.
+    fn may_connect(&self, out: &HalfPath, back: &HalfPath, floor: f64) -> bool {
         let [[a, b], [c, d]] = [&out.ends, &back.ends];
-        let most = out.strength.with(&back.strength);
+        let bound = out.strength.with(&back.strength);
         a.slope + c.slope < SLACK
             && b.slope + d.slope > -SLACK
-            && most * self.most_heard() >= floor
+            && bound * self.max_pattern_power() >= floor
             && overlap(&out.ends, &back.ends).is_some()
-            && most * self.heard(&out.departures, &back.departures) >= floor
+            && bound * self.pattern_power(&out.departures, &back.departures) >= floor
             && self.plan.settings.allows(out.order + back.order + 1)
     }
 
-    /// The echo out on one half-path and back on another, if there is one.
-    fn pair(&self, out: &HalfPathTracer, back: &HalfPathTracer) -> Option<Pair> {
+    /// Returns the echo out on one half-path and back on another, if there is one.
+    fn pair(&self, out: &HalfPathTracer, back: &HalfPathTracer) -> Option<ConnectedPair> {
         let settings = &self.plan.settings;
         let circle = &self.plan.cylinders.circles[out.half_path.cylinder as usize];
         let gain = out.half_path.gain * back.half_path.gain * circle.gain;
         let (contacts, angle_rad) = stationary_contact(out, back, circle.radius_m)?;
-        let [one, other] = &contacts;
+        let [a, b] = &contacts;
         let off =
             |contact: &Contact| circle.radius_m * contact.slope * (angle_rad - contact.angle_rad);
-        let length_m = one.length_m + off(one) + other.length_m + off(other);
+        let length_m = a.length_m + off(a) + b.length_m + off(b);
         let amplitude = self.amplitude(&contacts, circle, gain);
-        let departures = [out.departure(one.at_rad), back.departure(other.at_rad)];
-        let heard =
+        let departures = [out.departure(a.at_rad), back.departure(b.at_rad)];
+        let pattern_gain =
             self.bound.map_or(1.0, |bound| bound.at(turn_rad(departures[0], departures[1]).abs()));
         let floor = settings.contact_floor(out.half_path.level > 0, length_m);
-        let fits = length_m <= settings.max_path_m && amplitude * heard >= floor;
-        fits.then_some(Pair {
+        let fits = length_m <= settings.max_path_m && amplitude * pattern_gain >= floor;
+        fits.then_some(ConnectedPair {
             cylinder: out.half_path.cylinder,
             own_reverse: std::ptr::eq(out.half_path, back.half_path),
-            rays: [(out.half_path, one), (back.half_path, other)].map(|(half_path, contact)| {
+            rays: [(out.half_path, a), (back.half_path, b)].map(|(half_path, contact)| {
                 CylinderRay {
                     view: half_path.view,
                     link: half_path.link,
@@ -228,8 +233,8 @@ impl<'a> Connector<'a> {
                 }
             }),
             angle_rad,
-            legs: [out.leg(one.at_rad), back.leg(other.at_rad)],
-            echo: Echo {
+            legs: [out.leg(a.at_rad), back.leg(b.at_rad)],
+            echo: PathEcho {
                 length_m,
                 amplitude,
                 phase_rad: 0.0,
@@ -245,25 +250,25 @@ impl<'a> Connector<'a> {
     }
 
     /// Amplitude of an echo with these contacts: `sqrt(L / w)` by the equation of
-    /// [`strength`](super::strength), times what surfaces and air leave.
-    fn amplitude(&self, [one, other]: &[Contact; 2], circle: &Circle, gain: f64) -> f64 {
-        let length_m = one.length_m + other.length_m;
-        let cosine = 0.5 * (one.cosine + other.cosine);
-        let width_m = one.growth * other.width_m
-            + one.width_m * other.growth
-            + 2.0 * one.width_m * other.width_m / (circle.radius_m * cosine);
+    /// [`strength`](super::strength), times the losses at surfaces and in air.
+    fn amplitude(&self, [a, b]: &[Contact; 2], circle: &PlanCircle, gain: f64) -> f64 {
+        let length_m = a.length_m + b.length_m;
+        let cosine = 0.5 * (a.cosine + b.cosine);
+        let width_m = a.growth * b.width_m
+            + a.width_m * b.growth
+            + 2.0 * a.width_m * b.width_m / (circle.radius_m * cosine);
         gain * self.plan.settings.air_gain(length_m) * (length_m / width_m).sqrt()
     }
 
-    fn push(&mut self, pair: &Pair, [out, back]: [OneWay; 2], both_ways: bool) {
+    fn push(&mut self, pair: &ConnectedPair, [out, back]: [OneWay; 2], both_ways: bool) {
         let connection =
-            Connection { cylinder: pair.cylinder, angle_rad: pair.angle_rad, out, back };
+            MiddleContact { cylinder: pair.cylinder, angle_rad: pair.angle_rad, out, back };
         let number = self.connections.len() as u32;
         self.connections.push(connection);
-        self.echoes.push(Echo { via: Via::Cylinder { connection: number }, ..pair.echo });
+        self.echoes.push(PathEcho { via: Via::Cylinder { connection: number }, ..pair.echo });
         if both_ways {
-            self.connections.push(Connection { out: back, back: out, ..connection });
-            self.echoes.push(Echo {
+            self.connections.push(MiddleContact { out: back, back: out, ..connection });
+            self.echoes.push(PathEcho {
                 departure: pair.echo.arrival,
                 arrival: pair.echo.departure,
                 slopes: [pair.echo.slopes[1], pair.echo.slopes[0]],
@@ -274,21 +279,22 @@ impl<'a> Connector<'a> {
     }
 }
 
-/// An echo out of two half-paths.
-struct Pair {
+/// An echo composed of two half-paths.
+struct ConnectedPair {
     cylinder: u32,
-    /// Whether it comes back as it went.
+    /// `true` if the path returns along itself.
     own_reverse: bool,
-    /// Its rays to the cylinder, by way of others or direct.
+    /// Rays to the cylinder, by way of others or direct.
     rays: [CylinderRay; 2],
-    /// From the start to their first cylinders.
-    legs: [Leg; 2],
+    /// Legs from the start to the first cylinders.
+    legs: [RayLeg; 2],
     angle_rad: f64,
-    echo: Echo,
+    echo: PathEcho,
 }
 
-impl Pair {
-    /// Its half from one of its ends; a ray by way of other cylinders is kept among the `rays` from there.
+impl ConnectedPair {
+    /// Returns the half from one end. A ray by way of other cylinders is added to the `rays` from
+    /// there.
     fn half(&self, end: usize, rays: &mut CylinderRays) -> OneWay {
         if self.rays[end].link == DIRECT {
             return OneWay::Walls(self.legs[end]);

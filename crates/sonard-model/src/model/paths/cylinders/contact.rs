@@ -1,23 +1,23 @@
-//! Rays where they meet cylinders.
+//! Rays at their contacts with cylinders.
 
 use super::front::Front;
 use crate::{
     geometry::{DVec2, wrap_pi},
-    model::paths::plan::Circle,
+    model::paths::plan::PlanCircle,
 };
 
-/// A ray where it meets a cylinder.
+/// A ray at its contact with a cylinder.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Contact {
-    /// Its contact with its first cylinder, radians.
+    /// Contact with the ray's first cylinder, radians.
     pub(crate) at_rad: f64,
-    /// Its contact with this one: angle around the centre, radians.
+    /// Contact with this cylinder: angle around the centre, radians.
     pub(crate) angle_rad: f64,
-    /// Derivative of `angle_rad` by `at_rad`.
-    pub(crate) angle_rate: f64,
+    /// Derivative of `angle_rad` with respect to `at_rad`.
+    pub(crate) angle_derivative: f64,
     /// Sine of the angle of incidence, positive for a ray that runs counter-clockwise.
     pub(crate) slope: f64,
-    /// Its cosine.
+    /// Cosine of the angle of incidence.
     pub(crate) cosine: f64,
     pub(crate) length_m: f64,
     pub(crate) width_m: f64,
@@ -25,11 +25,12 @@ pub(crate) struct Contact {
 }
 
 impl Contact {
-    /// The contact of a ray that leaves its last surface like this with a circle. `mirrored` as in
-    /// [`Tube`](super::tube::Tube); its angle is less than half a turn from `near_rad`.
-    pub(crate) fn of(
+    /// Computes the contact with a circle of a ray that leaves its last surface as `front`.
+    /// `mirrored` is as in [`Tube`](super::tube::Tube); the angle is less than half a turn from
+    /// `near_rad`.
+    pub(crate) fn from_front(
         front: &Front,
-        circle: &Circle,
+        circle: &PlanCircle,
         mirrored: bool,
         at_rad: f64,
         near_rad: f64,
@@ -37,21 +38,23 @@ impl Contact {
         Self::at(front.onto(circle), circle, mirrored, at_rad, near_rad)
     }
 
-    /// The same of a ray at the circle, with the normal there and the cosine of the angle of incidence.
+    /// Computes the contact of a ray at the circle, from the normal there and the cosine of the
+    /// angle of incidence.
     pub(crate) fn at(
         (hit, normal, cosine): (Front, DVec2, f64),
-        circle: &Circle,
+        circle: &PlanCircle,
         mirrored: bool,
         at_rad: f64,
         near_rad: f64,
     ) -> Self {
         let angle_rad = near_rad + wrap_pi(normal.to_angle() - near_rad);
-        // Counter-clockwise is to the right for one who looks at the surface.
+        // Seen towards the surface, counter-clockwise is to the right.
         let sense = if mirrored { 1.0 } else { -1.0 };
         Self {
             at_rad,
             angle_rad,
-            angle_rate: sense * hit.width_m * hit.rate / (circle.radius_m * cosine),
+            angle_derivative: sense * hit.width_m * hit.departure_per_contact
+                / (circle.radius_m * cosine),
             slope: normal.perp_dot(hit.along),
             cosine,
             length_m: hit.length_m,

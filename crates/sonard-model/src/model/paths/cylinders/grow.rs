@@ -1,16 +1,16 @@
-//! Tubes of rays, from their first cylinder on.
+//! Tubes of rays, from their first cylinder onwards.
 //!
-//! A beam that meets a cylinder has no image behind it any more. What is left of it is a tube:
-//! the rays between two border rays, each known by where it touched the first cylinder. Cylinders
-//! are convex, so the rays of a tube spread and never cross: seen from any point they pass by in
-//! order. So the tube walks the mesh as a beam does, and where a beam finds by a sign on which
-//! side of a corner a ray passes, a tube finds the one ray through it as the zero of a monotone
-//! function. Corners, the tangents of other cylinders, and walls split it; each ray from the start
-//! is in exactly one tube, as it is in one beam.
+//! A beam that hits a cylinder has no image behind it any more. It continues as a tube: the rays
+//! between two border rays, each identified by its contact with the first cylinder. Cylinders are
+//! convex, so the rays of a tube spread and never cross: seen from any point they pass in order. A
+//! tube therefore walks the mesh as a beam does. A beam determines by a sign on which side of a
+//! corner a ray passes; a tube finds the one ray through the corner as the zero of a monotone
+//! function. Corners, the tangents of other cylinders, and walls split a tube. Each ray from the
+//! start is in exactly one tube, as it is in one beam.
 //!
-//! Tubes end as half-paths at the next cylinder, out of which echoes are made, and from
-//! which the next level of tubes begins; and they hold rays to edges. They are followed as long as
-//! one of both can still be heard.
+//! Tubes end as half-paths at the next cylinder, from which echoes are composed and the next level
+//! of tubes begins. They also contain rays to edges. Tubes are followed as long as either can still
+//! be detected.
 
 use smallvec::SmallVec;
 
@@ -18,10 +18,10 @@ use super::{
     departures::Departures,
     front::Front,
     half_path::{DIRECT, HalfPath},
-    meet::Hits,
+    hits::Hits,
     partners::Partners,
-    rays::{CylinderRay, CylinderRays, FIRST, Link, SpreadRay, Surfaces, surfaces_to},
-    strength::{LOUDER, Strength},
+    rays::{CylinderRay, CylinderRays, FIRST, SpreadRay, SurfaceLink, Surfaces, surfaces_to},
+    strength::{POWER_MARGIN, Strength},
     tracer::Tracer,
     tube::{Tube, ray_through, split},
 };
@@ -30,37 +30,38 @@ use crate::{
     model::{
         Reflector, SearchPart,
         paths::{
-            beams::{Beams, Ray, View},
-            plan::{Circle, Plan, Side, Span},
+            beams::{Beams, LitCylinder, UnfoldedRay},
+            plan::{AngleSpan, PlanCircle, TracingPlan, TriangleSide},
         },
     },
 };
 
 /// Effort of a tube in a triangle, in steps of a beam.
-const STEPS_A_TUBE: usize = 16;
+const STEPS_PER_TUBE: usize = 16;
 
-/// An edge sends back as much as a mirror at most: half of each of two images whose boundaries lie together.
-const EDGE_MOST: f64 = 1.0;
+/// Largest gain of an edge: that of a mirror, half of each of two images whose boundaries coincide.
+const MAX_EDGE_GAIN: f64 = 1.0;
 
-/// Follows the tubes from one start, level by level: a tube of level `n` has met `n` cylinders.
+/// Traces the tubes from one start, level by level: a tube of level `n` has touched `n` cylinders.
 pub(crate) struct TubeGrower<'a> {
-    pub(crate) plan: &'a Plan,
+    pub(crate) plan: &'a TracingPlan,
     target: DVec2,
-    views: &'a [View],
+    views: &'a [LitCylinder],
     rays: CylinderRays,
     waiting: Vec<Tube>,
-    /// All so far, those of the last level at the end.
+    /// All half-paths so far, those of the last level at the end.
     pub(crate) half_paths: Vec<HalfPath>,
     /// Index at which the last level begins.
     last: usize,
     pub(crate) has_edges: bool,
-    /// Largest cylinder, metres.
+    /// Radius of the largest cylinder, metres.
     pub(crate) radius_m: f64,
 }
 
 impl<'a> TubeGrower<'a> {
-    /// For the beams that met cylinders, and echoes to `target`. Has the half-paths of level 0.
-    pub(crate) fn new(plan: &'a Plan, beams: &'a Beams, target: DVec2) -> Self {
+    /// Creates a grower with the half-paths of level 0, for the beams that hit cylinders and echoes
+    /// to `target`.
+    pub(crate) fn new(plan: &'a TracingPlan, beams: &'a Beams, target: DVec2) -> Self {
         let radii = plan.cylinders.circles.iter().map(|circle| circle.radius_m);
         let mut grower = Self {
             plan,
@@ -70,7 +71,7 @@ impl<'a> TubeGrower<'a> {
             waiting: Vec::new(),
             half_paths: Vec::new(),
             last: 0,
-            // Where beams find none, tubes are not followed for them.
+            // Where beams find no edge, tubes are not followed to edges.
             has_edges: !beams.to_edges.is_empty(),
             radius_m: radii.fold(0.0, f64::max),
         };
@@ -80,13 +81,13 @@ impl<'a> TubeGrower<'a> {
         grower
     }
 
-    /// The half-paths of the last level.
+    /// Half-paths of the last level.
     pub(crate) fn last_level(&self) -> &[HalfPath] {
         &self.half_paths[self.last..]
     }
 
-    /// Follows the half-paths of the last level on to those of the next one, as far as there are
-    /// partners for them. False if there are none left.
+    /// Extends the half-paths of the last level to those of the next one, as far as there are
+    /// partners for them. Returns `false` if none are left.
     pub(crate) fn grow(&mut self, partners: &Partners) -> bool {
         let level = self.last..self.half_paths.len();
         self.last = self.half_paths.len();
@@ -102,20 +103,20 @@ impl<'a> TubeGrower<'a> {
         self.last < self.half_paths.len() && !self.plan.effort.is_over()
     }
 
-    /// The rays that the tubes found, and the half-paths.
+    /// Returns the rays that the tubes found, and the half-paths.
     pub(crate) fn finish(self) -> (CylinderRays, Vec<HalfPath>) {
         (self.rays, self.half_paths)
     }
 
-    /// The half-path of a beam that comes straight to a cylinder.
+    /// Adds the half-path of a beam that reaches a cylinder directly.
     fn begin(&mut self, index: u32) {
-        let View { cylinder, span, beam } = self.views[index as usize];
+        let LitCylinder { cylinder, span, beam } = self.views[index as usize];
         if !self.plan.settings.allows(beam.order + 1) {
             return;
         }
         let tracer = Tracer::new(self.plan, &self.views[index as usize], &[]);
         let ends = [span.from_rad, span.to_rad];
-        // As they leave: before its first cylinder a ray has no front.
+        // The rays as they leave: before its first cylinder a ray has no front.
         let borders = ends.map(|at| tracer.front(at));
         let circle = tracer.circle();
         let nearest_rad = (beam.image - circle.center).to_angle();
@@ -145,29 +146,29 @@ impl<'a> TubeGrower<'a> {
                 tracer.departure(span.from_rad),
                 tracer.departure(span.to_rad),
             ),
-            least_m: length_m,
-            strength: Strength::of(beam.gain, one_way, self.radius_m, &self.plan.settings),
+            min_m: length_m,
+            strength: Strength::new(beam.gain, one_way, self.radius_m, &self.plan.settings),
         });
     }
 
-    /// Sends what a half-path's cylinder reflects on as tubes, if it is worth it.
+    /// Starts tubes from the reflection at a half-path's cylinder, if they can still give an echo.
     fn launch(&mut self, index: usize, partners: &Partners) {
         let half_path = &self.half_paths[index];
         let partner = partners.best(&half_path.departures);
         let order = half_path.order + 1;
         let circle = &self.plan.cylinders.circles[half_path.cylinder as usize];
-        let floor = self.plan.settings.contact_floor(true, half_path.least_m + self.back_m(circle));
-        let is_heard = half_path.strength.with(&partner) >= floor.powi(2)
+        let floor = self.plan.settings.contact_floor(true, half_path.min_m + self.back_m(circle));
+        let may_be_detected = half_path.strength.with(&partner) >= floor.powi(2)
             && self.plan.settings.allows(order + 1);
         // An edge adds no order.
-        if !(is_heard || self.has_edges && self.plan.settings.allows(order)) {
+        if !(may_be_detected || self.has_edges && self.plan.settings.allows(order)) {
             return;
         }
         let surface = Reflector::Cylinder(half_path.cylinder);
         let (link, borders) = if half_path.link == DIRECT {
             (FIRST, half_path.borders)
         } else {
-            self.rays.links.push(Link { surface, before: half_path.link });
+            self.rays.links.push(SurfaceLink { surface, before: half_path.link });
             let borders = half_path.borders.map(|border| self.plan.reflect(&border, surface));
             (self.rays.links.len() as u32 - 1, borders)
         };
@@ -194,19 +195,20 @@ impl<'a> TubeGrower<'a> {
         split(&tube, &tracer, circle, 0, partners, &mut self.waiting);
     }
 
-    /// Takes a tube through its triangle: what is in it, what it meets there, where it leaves.
+    /// Takes a tube through its triangle: splits it, records its hits and follows the parts that
+    /// leave.
     fn follow(&mut self, tube: &Tube) {
-        if !self.plan.effort.step(SearchPart::Cylinders, STEPS_A_TUBE) || !self.is_worth(tube) {
+        if !self.plan.effort.step(SearchPart::Cylinders, STEPS_PER_TUBE) || !self.is_viable(tube) {
             return;
         }
         let surfaces = surfaces_to(&self.rays.links, tube.link);
         let view = &self.views[tube.view as usize];
         let tracer = Tracer::new(self.plan, view, &surfaces);
-        let mut cuts: SmallVec<[f64; 8]> = self.meet_corners(tube, &tracer);
-        let mut hits = Hits::of(tube, &tracer);
+        let mut cuts: SmallVec<[f64; 8]> = self.split_at_corners(tube, &tracer);
+        let mut hits = Hits::new(tube, &tracer);
         cuts.extend(hits.cuts());
         cuts.sort_by(f64::total_cmp);
-        let Span { from_rad, to_rad } = tube.span;
+        let AngleSpan { from_rad, to_rad } = tube.span;
         let [mut from, last] = [(from_rad, tube.borders[0]), (to_rad, tube.borders[1])];
         for &at in cuts.iter().filter(|&&at| from_rad < at && at < to_rad) {
             if at > from.0 {
@@ -216,13 +218,14 @@ impl<'a> TubeGrower<'a> {
             }
         }
         self.follow_part(tube, &tracer, &mut hits, [from, last]);
-        for (cylinder, span) in hits.met() {
-            let met = self.half_path(tube, &tracer, cylinder, span);
-            self.half_paths.extend(met);
+        for (cylinder, span) in hits.parts() {
+            let half_path = self.half_path(tube, &tracer, cylinder, span);
+            self.half_paths.extend(half_path);
         }
     }
 
-    /// Follows the part of a tube between two rays, by their contacts, all of which meets the same.
+    /// Follows the part of a tube between two rays, all of which hits the same surfaces. The rays
+    /// are given by their first contacts.
     fn follow_part(
         &mut self,
         tube: &Tube,
@@ -230,11 +233,11 @@ impl<'a> TubeGrower<'a> {
         hits: &mut Hits,
         [from, to]: [(f64, Front); 2],
     ) {
-        let span = Span { from_rad: from.0, to_rad: to.0 };
+        let span = AngleSpan { from_rad: from.0, to_rad: to.0 };
         if span.to_rad <= span.from_rad {
             return;
         }
-        // As long as nothing cuts a tube its middle stays the same.
+        // While nothing cuts a tube its middle ray stays the same.
         let is_whole = (span.from_rad, span.to_rad) == (tube.span.from_rad, tube.span.to_rad);
         let known = tube.middle.filter(|_| is_whole);
         let middle = known.unwrap_or_else(|| tracer.front(0.5 * (span.from_rad + span.to_rad)));
@@ -245,46 +248,48 @@ impl<'a> TubeGrower<'a> {
         }
     }
 
-    /// Whether an echo of the tube can still be short and strong enough.
+    /// Returns `true` if an echo of the tube can still be short and strong enough.
     ///
-    /// The least of length, width and growth of its borders is the least of all its rays (to within
-    /// [`LOUDER`]), and with the best partner left it bounds every echo ([`strength`](super::strength)).
-    fn is_worth(&self, tube: &Tube) -> bool {
+    /// The minima of length, width and growth over its borders are those over all its rays (to
+    /// within [`POWER_MARGIN`]). With the best remaining partner they bound every echo
+    /// ([`strength`](super::strength)).
+    fn is_viable(&self, tube: &Tube) -> bool {
         let settings = &self.plan.settings;
         let left_m = tube.side.map_or(0.0, |side| {
             let [a, b] = self.side_of(tube.triangle, side as usize);
             distance_to_segment(self.target, a, b)
         });
-        let length_m = tube.least(|front| front.length_m);
-        let least_m = length_m + left_m;
-        if least_m > settings.max_path_m {
+        let length_m = tube.min_of(|front| front.length_m);
+        let min_m = length_m + left_m;
+        if min_m > settings.max_path_m {
             return false;
         }
-        let width_m = tube.least(|front| front.width_m);
-        let growth = tube.least(|front| front.growth);
+        let width_m = tube.min_of(|front| front.width_m);
+        let growth = tube.min_of(|front| front.growth);
         let spread = [length_m, width_m, growth];
-        let strength = Strength::of(tube.gain, spread, self.radius_m, &self.plan.settings);
-        strength.with(&tube.partner) >= settings.contact_floor(true, least_m).powi(2)
-            || self.has_edges && self.is_worth_an_edge(tube.gain, spread, least_m)
+        let strength = Strength::new(tube.gain, spread, self.radius_m, &self.plan.settings);
+        strength.with(&tube.partner) >= settings.contact_floor(true, min_m).powi(2)
+            || self.has_edges && self.is_viable_at_edge(tube.gain, spread, min_m)
     }
 
-    /// Whether an edge could send back enough of rays that have spread so, in echoes of at least a length there and
-    /// back, all of which the air takes its part of. With any partner the power is at most `L / w + 1 / g` of a
-    /// mirror's, by the same reasoning as for half-paths ([`strength`](super::strength)).
-    pub(crate) fn is_worth_an_edge(
+    /// Returns `true` if an edge can return enough of rays with this spreading, in echoes of at
+    /// least `min_m` there and back, including the loss in air. With any partner the power is at
+    /// most `L / w + 1 / g` of a mirror's, by the same reasoning as for half-paths
+    /// ([`strength`](super::strength)).
+    pub(crate) fn is_viable_at_edge(
         &self,
         gain: f64,
         [length_m, width_m, growth]: [f64; 3],
-        least_m: f64,
+        min_m: f64,
     ) -> bool {
         let settings = &self.plan.settings;
-        let loss = EDGE_MOST * gain * settings.air_gain(least_m);
-        LOUDER * loss * loss * (length_m / width_m + 1.0 / growth)
-            >= settings.contact_floor(true, least_m).powi(2)
+        let loss = MAX_EDGE_GAIN * gain * settings.air_gain(min_m);
+        POWER_MARGIN * loss * loss * (length_m / width_m + 1.0 / growth)
+            >= settings.contact_floor(true, min_m).powi(2)
     }
 
     /// Length of the shortest path back from a cylinder, metres.
-    pub(crate) fn back_m(&self, circle: &Circle) -> f64 {
+    pub(crate) fn back_m(&self, circle: &PlanCircle) -> f64 {
         (self.target.distance(circle.center) - circle.radius_m).max(0.0)
     }
 
@@ -293,8 +298,9 @@ impl<'a> TubeGrower<'a> {
         [side, (side + 1) % 3].map(|corner| mesh.corner(triangle, corner))
     }
 
-    /// Rays to the corners of the tube's triangle that are edges, and where corners split it.
-    fn meet_corners(&mut self, tube: &Tube, tracer: &Tracer) -> SmallVec<[f64; 8]> {
+    /// Adds rays to the corners of the tube's triangle that are edges, and returns where corners
+    /// split it.
+    fn split_at_corners(&mut self, tube: &Tube, tracer: &Tracer) -> SmallVec<[f64; 8]> {
         let Some(mesh) = &self.plan.mesh else { return SmallVec::new() };
         let corners = mesh.triangles[tube.triangle as usize].corners;
         let far = tube.side.map(|side| (side as usize + 2) % 3);
@@ -308,22 +314,22 @@ impl<'a> TubeGrower<'a> {
             cuts.push(at);
             let is_hidden = || self.plan.cylinders.hide_in(tube.triangle, front.origin, point);
             if self.has_edges && !is_hidden() {
-                self.meet_edge(tube, tracer, corner, at, &front.moved(front.ahead_m(point)));
+                self.add_ray_to_edge(tube, tracer, corner, at, &front.moved(front.ahead_m(point)));
             }
         }
         cuts
     }
 
-    fn meet_edge(&mut self, tube: &Tube, tracer: &Tracer, point: u32, at: f64, end: &Front) {
+    fn add_ray_to_edge(&mut self, tube: &Tube, tracer: &Tracer, point: u32, at: f64, end: &Front) {
         let spread = [end.length_m, end.width_m, end.growth];
-        let least_m = end.length_m + end.origin.distance(self.target);
-        let is_worth = || self.is_worth_an_edge(tube.gain, spread, least_m);
-        if !self.plan.corners.answers(point, end.along) || !is_worth() {
+        let min_m = end.length_m + end.origin.distance(self.target);
+        let is_viable = || self.is_viable_at_edge(tube.gain, spread, min_m);
+        if !self.plan.corners.diffracts(point, end.along) || !is_viable() {
             return;
         }
         let rays = &mut self.rays.rays;
         rays.push(CylinderRay { view: tube.view, link: tube.link, contact_rad: at });
-        let ray = Ray {
+        let ray = UnfoldedRay {
             run: end.length_m * end.along,
             departure: tracer.departure(at),
             gain: tube.gain,
@@ -340,7 +346,7 @@ impl<'a> TubeGrower<'a> {
         let borders = tube.borders.map(|border| self.plan.reflect(&border, surface));
         let middle = tube.middle.map(|middle| self.plan.reflect(&middle, surface));
         let links = &mut self.rays.links;
-        links.push(Link { surface, before: tube.link });
+        links.push(SurfaceLink { surface, before: tube.link });
         Tube {
             link: links.len() as u32 - 1,
             mirrored: !tube.mirrored,
@@ -352,7 +358,7 @@ impl<'a> TubeGrower<'a> {
         }
     }
 
-    /// Sends a part on through the side by which its middle ray leaves.
+    /// Continues a part through the side by which its middle ray leaves.
     fn leave(&mut self, tube: &Tube, middle: &Front) {
         let Some(mesh) = &self.plan.mesh else { return };
         let triangle = &mesh.triangles[tube.triangle as usize];
@@ -360,7 +366,7 @@ impl<'a> TubeGrower<'a> {
             let [a, b] = self.side_of(tube.triangle, side);
             let outward = -(b - a).perp();
             let slant = outward.dot(middle.along);
-            // A ray that starts on a side by rounding outside leaves by it at once.
+            // A ray that, by rounding, starts outside a side leaves by it at once.
             if slant > 0.0 {
                 (outward.dot(a - middle.origin) / slant).max(0.0)
             } else {
@@ -372,10 +378,10 @@ impl<'a> TubeGrower<'a> {
             return;
         };
         match triangle.sides[side] {
-            Side::Open { triangle, side } => {
+            TriangleSide::Open { triangle, side } => {
                 self.waiting.push(Tube { triangle, side: Some(side), ..*tube });
             }
-            Side::Wall(wall) => {
+            TriangleSide::Wall(wall) => {
                 if self.plan.settings.allows(tube.order + 1) {
                     let stacked = mesh.stacked(tube.triangle, side).iter().copied();
                     for wall in std::iter::once(wall).chain(stacked) {
@@ -389,7 +395,7 @@ impl<'a> TubeGrower<'a> {
                     self.waiting.push(Tube { triangle, side: Some(side), ..*tube });
                 }
             }
-            Side::Outside => {}
+            TriangleSide::Outside => {}
         }
     }
 }

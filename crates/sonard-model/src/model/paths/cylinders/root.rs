@@ -1,6 +1,6 @@
 //! Zeros of monotone functions.
 
-/// The cubic with these values and slopes at two arguments (Hermite's), at another one.
+/// Evaluates the cubic (Hermite) with these values and slopes at two arguments.
 pub(crate) fn cubic([from, to]: [f64; 2], values: [f64; 2], slopes: [f64; 2], at: f64) -> f64 {
     let width = to - from;
     let share = (at - from) / width;
@@ -11,16 +11,16 @@ pub(crate) fn cubic([from, to]: [f64; 2], values: [f64; 2], slopes: [f64; 2], at
     straight + share * rest * bends
 }
 
-/// An end between which a zero is looked for.
+/// An end of the interval in which a zero is searched.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct End {
     pub(crate) at: f64,
-    /// Value and slope of the function there.
+    /// Value and slope of the function at `at`.
     pub(crate) value: f64,
     pub(crate) slope: f64,
 }
 
-/// Where a monotone function has its zero, roughly: by the cubic of its inverse.
+/// Approximate zero of a monotone function, by the cubic of its inverse.
 pub(crate) fn zero_near([from, to]: [End; 2]) -> f64 {
     let ends = [from.at, to.at];
     let slopes = [from.slope.recip(), to.slope.recip()];
@@ -31,15 +31,15 @@ pub(crate) fn zero_near([from, to]: [End; 2]) -> f64 {
     (from.at * to.value - to.at * from.value) / (to.value - from.value)
 }
 
-/// Steps at most; ten are usual.
-const MOST_STEPS: usize = 100;
+/// Maximum number of steps; ten are usual.
+const MAX_STEPS: usize = 100;
 
-/// Zero of a monotone function between two arguments where it has values whose signs
-/// differ (else the end that is closer to zero), to within `exact` of the function. `f` gives value
-/// and slope: Newton's method, kept between the arguments by halving.
+/// Finds the zero of a monotone function between two arguments with values of opposite sign
+/// (otherwise returns the end that is closer to zero), to within `exact` of the function. `f`
+/// returns value and slope. Newton's method, kept between the arguments by bisection.
 ///
-/// Invariant: the zero lies between `low` and `high`, at which the function has opposite signs; both only
-/// approach each other.
+/// Invariant: the zero lies between `low` and `high`, at which the function has opposite signs;
+/// both only approach each other.
 pub(crate) fn zero_between(
     ends: [End; 2],
     exact: f64,
@@ -51,7 +51,7 @@ pub(crate) fn zero_between(
         return if at_low.abs() <= at_high.abs() { low } else { high };
     }
     let mut at = zero_near(ends);
-    for _ in 0..MOST_STEPS {
+    for _ in 0..MAX_STEPS {
         if !(low < at && at < high) {
             at = 0.5 * (low + high);
             if at <= low || at >= high {
@@ -90,30 +90,30 @@ mod tests {
     }
 
     #[test]
-    fn a_cubic_is_told_by_its_ends() {
+    fn cubic_interpolates_its_ends() {
         let of = |x: f64| 2.0 * x.powi(3) - x * x + 3.0;
         let slope = |x: f64| 6.0 * x * x - 2.0 * x;
         let (at, values, slopes) = ([-1.0, 2.0], [-1.0, 2.0].map(of), [-1.0, 2.0].map(slope));
         for x in [-1.0, -0.3, 0.0, 1.1, 2.0] {
             assert!((cubic(at, values, slopes, x) - of(x)).abs() < 1e-12, "{x}");
         }
-        // What runs out of its ends is left for the straight line.
+        // A cubic that leaves its ends is replaced by the straight line.
         let steep =
             [End { at: 0.0, value: -1.0, slope: 1e-3 }, End { at: 1.0, value: 1.0, slope: 1.0 }];
         assert_eq!(zero_near(steep), 0.5);
     }
 
     #[test]
-    fn zeros_are_found_in_few_steps() {
-        let asked = Cell::new(0);
+    fn zeros_take_few_steps() {
+        let calls = Cell::new(0);
         let cube = |x: f64| {
-            asked.set(asked.get() + 1);
+            calls.set(calls.get() + 1);
             (x.powi(3) - 2.0, 3.0 * x * x)
         };
         let found = zero_between(ends([0.0, 2.0], cube), 1e-13, cube);
         assert!((found - 2_f64.cbrt()).abs() < 1e-13, "{found}");
-        assert!(asked.get() <= 12, "{} steps", asked.get());
-        // One that falls, and whose slope leads astray: halving keeps it between the ends.
+        assert!(calls.get() <= 12, "{} steps", calls.get());
+        // A falling function, whose slope is misleading: bisection keeps the zero between the ends.
         let falls =
             |x: f64| (-(40.0 * (x - 0.3)).atan(), -40.0 / (1.0 + (40.0 * (x - 0.3)).powi(2)));
         let found = zero_between(ends([0.0, 1.0], falls), 1e-12, falls);
@@ -121,13 +121,13 @@ mod tests {
     }
 
     #[test]
-    fn without_a_change_of_sign_it_is_the_end_nearer_to_zero() {
+    fn no_sign_change_returns_nearer_end() {
         let never = |_: f64| -> (f64, f64) { panic!("nothing to look for") };
         let of = |value: f64| move |_: f64| (value, 1.0);
-        let [one, _] = ends([1.0, 2.0], of(0.5));
+        let [a, _] = ends([1.0, 2.0], of(0.5));
         let [low, _] = ends([1.0, 2.0], of(-3.0));
         let [[_, far], [_, near]] = [3.0, -0.5].map(|value| ends([1.0, 2.0], of(value)));
-        assert_eq!(zero_between([one, far], 1e-9, never), 1.0);
+        assert_eq!(zero_between([a, far], 1e-9, never), 1.0);
         assert_eq!(zero_between([low, near], 1e-9, never), 2.0);
     }
 }

@@ -1,53 +1,53 @@
-//! The search for echoes by way of cylinders.
+//! Search for echoes by way of cylinders.
 
 use super::{
-    connect::{Connection, Connector, HalfPaths},
+    connect::{Connector, HalfPaths, MiddleContact},
     grow::TubeGrower,
     partners::Partners,
     rays::CylinderRays,
 };
 use crate::{
     geometry::DVec2,
-    model::paths::{beams::Beams, echo::Echo, pattern::TwoWayBound, plan::Plan},
+    model::paths::{beams::Beams, echo::PathEcho, pattern::TwoWayBound, plan::TracingPlan},
 };
 
 /// Echoes by way of cylinders, and rays to edges.
 #[derive(Default)]
-pub(crate) struct Found {
-    pub(crate) echoes: Vec<Echo>,
-    /// By number in [`Via::Cylinder`](crate::model::paths::echo::Via::Cylinder).
-    pub(crate) connections: Vec<Connection>,
-    /// From the transmitter.
+pub(crate) struct CylinderEchoes {
+    pub(crate) echoes: Vec<PathEcho>,
+    /// Connections by number in [`Via::Cylinder`](crate::model::paths::echo::Via::Cylinder).
+    pub(crate) connections: Vec<MiddleContact>,
+    /// Rays from the transmitter.
     pub(crate) out: CylinderRays,
-    /// From the receiver, if it is somewhere else.
+    /// Rays from the receiver, if it is at a different point.
     pub(crate) back: CylinderRays,
 }
 
-/// Echoes that touch cylinders, and rays by way of them to edges. With `bound`, only echoes that can be
-/// heard.
+/// Finds echoes that touch cylinders, and rays by way of cylinders to edges. With `bound`, only
+/// echoes that can be detected.
 ///
-/// Level by level on both ends in turn: half-paths are followed on as long as the last level of the other end
-/// has partners for them, for an echo has as many cylinders before its middle contact as after it, or one
-/// more.
+/// Both ends grow level by level in turn. Half-paths are extended as long as the last level of the
+/// other end has partners for them, since an echo has as many cylinders before its middle contact
+/// as after it, or one more.
 pub(crate) fn trace(
-    plan: &Plan,
+    plan: &TracingPlan,
     out: &Beams,
     back: Option<&Beams>,
     [transmitter, receiver]: [DVec2; 2],
     bound: Option<&TwoWayBound>,
-) -> Found {
+) -> CylinderEchoes {
     if plan.cylinders.is_empty() {
-        return Found::default();
+        return CylinderEchoes::default();
     }
     let mut outs = TubeGrower::new(plan, out, receiver);
     let mut backs = back.map(|beams| TubeGrower::new(plan, beams, transmitter));
     loop {
-        let partners = Partners::of(outs.last_level(), bound);
+        let partners = Partners::from_half_paths(outs.last_level(), bound);
         let more = match &mut backs {
             None => outs.grow(&partners),
             Some(backs) => {
-                let others = Partners::of(backs.last_level(), bound);
-                // Both, always.
+                let others = Partners::from_half_paths(backs.last_level(), bound);
+                // `|` instead of `||`: both have to grow.
                 outs.grow(&others) | backs.grow(&partners)
             }
         };
@@ -67,5 +67,5 @@ pub(crate) fn trace(
     connector.connect(&mut outs, backs.as_mut());
     let Connector { connections, echoes, .. } = connector;
     let back = from_receiver.map(|(rays, _)| rays).unwrap_or_default();
-    Found { echoes, connections, out: out_rays, back }
+    CylinderEchoes { echoes, connections, out: out_rays, back }
 }

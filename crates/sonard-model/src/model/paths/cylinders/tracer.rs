@@ -4,46 +4,48 @@ use smallvec::SmallVec;
 
 use super::{
     contact::Contact,
-    front::{Front, LEAST_COSINE},
+    front::{Front, MIN_COSINE},
 };
 use crate::{
     geometry::{DVec2, Mirror},
     model::{
         Reflector,
         paths::{
-            beams::{Leg, View},
-            plan::{Circle, Plan},
+            beams::{LitCylinder, RayLeg},
+            plan::{PlanCircle, TracingPlan},
         },
     },
 };
 
-/// Follows rays of one beam by way of its cylinder and other surfaces.
+/// Traces rays of one beam by way of its cylinder and further surfaces.
 ///
-/// A ray is known by its contact with the first cylinder alone (the angle around the centre): from the beam's
-/// image straight there, and from there by reflection off `surfaces` in order.
+/// A ray is identified by its contact with the first cylinder alone (the angle around the centre):
+/// from the beam's image straight to the contact, and from there by reflection off `surfaces` in
+/// order.
 pub(crate) struct Tracer<'a> {
-    pub(crate) plan: &'a Plan,
-    pub(crate) view: &'a View,
+    pub(crate) plan: &'a TracingPlan,
+    pub(crate) view: &'a LitCylinder,
     pub(crate) surfaces: &'a [Reflector],
-    /// The same surfaces, walls one after the other as one.
+    /// `surfaces` with consecutive walls combined.
     hops: SmallVec<[Hop; 4]>,
 }
 
-/// What a ray meets after its first cylinder.
+/// Next surface or surfaces after the first cylinder.
 #[derive(Debug, Clone, Copy)]
 enum Hop {
     Cylinder(u32),
-    /// Walls, up to `last`.
+    /// Consecutive walls, up to `last`.
     Walls {
         images: Images,
         last: u32,
     },
 }
 
-/// Mirror images by several walls: a turn, perhaps with a mirror, and a shift.
+/// Combined mirror image of several walls: a rotation, possibly with a reflection, and a
+/// translation.
 #[derive(Debug, Clone, Copy)]
 struct Images {
-    /// Those of the unit vectors, and of the origin.
+    /// Images of the unit vectors and of the origin.
     x: DVec2,
     y: DVec2,
     origin: DVec2,
@@ -52,7 +54,7 @@ struct Images {
 impl Images {
     const NONE: Self = Self { x: DVec2::X, y: DVec2::Y, origin: DVec2::ZERO };
 
-    /// By one more wall.
+    /// Appends the image by one more wall.
     fn by(self, mirror: &Mirror) -> Self {
         let Self { x, y, origin } = self;
         Self { x: mirror.turn(x), y: mirror.turn(y), origin: mirror.image(origin) }
@@ -67,7 +69,7 @@ impl Images {
     }
 }
 
-fn hops(plan: &Plan, surfaces: &[Reflector]) -> SmallVec<[Hop; 4]> {
+fn hops(plan: &TracingPlan, surfaces: &[Reflector]) -> SmallVec<[Hop; 4]> {
     let mut hops = SmallVec::new();
     for &surface in surfaces {
         match (surface, hops.last_mut()) {
@@ -87,13 +89,18 @@ fn hops(plan: &Plan, surfaces: &[Reflector]) -> SmallVec<[Hop; 4]> {
 }
 
 impl<'a> Tracer<'a> {
-    pub(crate) fn new(plan: &'a Plan, view: &'a View, surfaces: &'a [Reflector]) -> Self {
+    pub(crate) fn new(
+        plan: &'a TracingPlan,
+        view: &'a LitCylinder,
+        surfaces: &'a [Reflector],
+    ) -> Self {
         Self { plan, view, surfaces, hops: hops(plan, surfaces) }
     }
 
-    /// The ray as it leaves its last surface.
+    /// Computes the ray as it leaves its last surface.
     ///
-    /// Over walls it is straight in their images; where it crosses the last one it is in the plan again.
+    /// Over walls the ray is straight in their images; where it crosses the last one it is in the
+    /// plan again.
     pub(crate) fn front(&self, contact_rad: f64) -> Front {
         let mut front = self.first(contact_rad);
         for hop in &self.hops {
@@ -113,7 +120,7 @@ impl<'a> Tracer<'a> {
         front
     }
 
-    /// Its contacts with the surfaces, the first cylinder included.
+    /// Contact points with the surfaces, the first cylinder included.
     pub(crate) fn contacts(&self, contact_rad: f64) -> Vec<DVec2> {
         let mut front = self.first(contact_rad);
         let mut contacts = vec![front.origin];
@@ -124,18 +131,18 @@ impl<'a> Tracer<'a> {
         contacts
     }
 
-    /// From the beam's image to the first contact.
-    pub(crate) fn leg(&self, contact_rad: f64) -> Leg {
+    /// Leg from the beam's image to the first contact.
+    pub(crate) fn leg(&self, contact_rad: f64) -> RayLeg {
         let run = self.circle().point(contact_rad) - self.view.beam.image;
-        Leg { node: self.view.beam.node, run }
+        RayLeg { node: self.view.beam.node, run }
     }
 
-    /// The direction in which the ray leaves the start.
+    /// Direction in which the ray leaves the start.
     pub(crate) fn departure(&self, contact_rad: f64) -> DVec2 {
         self.view.beam.departure(self.leg(contact_rad).run.normalize_or_zero())
     }
 
-    /// The ray where it meets the first cylinder.
+    /// Computes the contact with the first cylinder.
     pub(crate) fn first_contact(&self, contact_rad: f64) -> Contact {
         let normal = DVec2::from_angle(contact_rad);
         let circle = self.circle();
@@ -145,16 +152,17 @@ impl<'a> Tracer<'a> {
         Contact {
             at_rad: contact_rad,
             angle_rad: contact_rad,
-            angle_rate: 1.0,
+            angle_derivative: 1.0,
             slope: normal.perp_dot(along),
-            cosine: (-normal.dot(along)).max(LEAST_COSINE),
+            cosine: (-normal.dot(along)).max(MIN_COSINE),
             length_m,
             width_m: length_m,
             growth: 1.0,
         }
     }
 
-    /// The ray as it leaves the first cylinder, by the mirror equation for a front of radius `length_m`.
+    /// Computes the ray as it leaves the first cylinder, by the mirror equation for a front of
+    /// radius `length_m`.
     fn first(&self, contact_rad: f64) -> Front {
         let circle = self.circle();
         let normal = DVec2::from_angle(contact_rad);
@@ -162,18 +170,18 @@ impl<'a> Tracer<'a> {
         let run = hit - self.view.beam.image;
         let length_m = run.length();
         let along = run / length_m;
-        let cosine = (-normal.dot(along)).max(LEAST_COSINE);
+        let cosine = (-normal.dot(along)).max(MIN_COSINE);
         Front {
             origin: hit,
             along: along + 2.0 * cosine * normal,
             length_m,
             width_m: length_m,
             growth: 1.0 + 2.0 * length_m / (circle.radius_m * cosine),
-            rate: circle.radius_m * cosine / length_m,
+            departure_per_contact: circle.radius_m * cosine / length_m,
         }
     }
 
-    pub(crate) fn circle(&self) -> &'a Circle {
+    pub(crate) fn circle(&self) -> &'a PlanCircle {
         &self.plan.cylinders.circles[self.view.cylinder as usize]
     }
 }

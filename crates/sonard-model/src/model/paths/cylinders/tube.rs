@@ -1,4 +1,4 @@
-//! One tube, and the rays in it.
+//! A single tube and its rays.
 
 use super::{
     departures::Departures,
@@ -11,58 +11,57 @@ use super::{
 use crate::{
     geometry::DVec2,
     model::paths::{
-        plan::{Circle, Span},
+        plan::{AngleSpan, PlanCircle},
         tolerance::TIE_M,
     },
 };
 
-/// Rays to edges and borders between tubes are found to within this, metres: far below what counts
-/// as a tie.
+/// Accuracy of rays to edges and of borders between tubes, metres: far below the width of a tie.
 const EXACT_M: f64 = 1e-12;
 
-/// A tube's part of a cylinder is split until it turns the rays by no more than twice 0.7 radians: the cosines of
-/// that and of twice that.
-const MOST_TURN_COSINES: [f64; 2] = [0.764_842_187_284_488_5, 0.169_967_142_900_241];
+/// A tube's part of a cylinder is split until it turns the rays by no more than twice 0.7 radians.
+/// The values are the cosines of that angle and of twice that angle.
+const MAX_TURN_COSINES: [f64; 2] = [0.764_842_187_284_488_5, 0.169_967_142_900_241];
 
-/// Halvings of a tube at a cylinder, at most: what grazes it is then too weak.
-const MOST_HALVINGS: u32 = 12;
+/// Maximum number of halvings of a tube at a cylinder; rays closer to grazing are too weak.
+const MAX_HALVINGS: u32 = 12;
 
-/// Rays between two, all of which have met the same surfaces.
+/// Rays between two border rays, all reflected by the same surfaces.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Tube {
     pub(crate) view: u32,
     pub(crate) link: u32,
-    /// The contact of its borders with the first cylinder, in growing order.
-    pub(crate) span: Span,
-    /// The borders as they leave the last surface, in the same order.
+    /// Contacts of the borders with the first cylinder, in increasing order.
+    pub(crate) span: AngleSpan,
+    /// Borders as they leave the last surface, in the same order.
     pub(crate) borders: [Front; 2],
-    /// The ray in the middle of its contacts, if it is known.
+    /// Ray in the middle of the contacts, if computed.
     pub(crate) middle: Option<Front>,
-    /// Whether the ray at `from_rad` is the left border.
+    /// `true` if the ray at `from_rad` is the left border.
     pub(crate) mirrored: bool,
     pub(crate) triangle: u32,
-    /// The side it came in by, if it did not start here.
+    /// Side through which the tube entered, `None` if it started here.
     pub(crate) side: Option<u8>,
     pub(crate) gain: f64,
     pub(crate) order: u16,
-    /// Cylinders met.
+    /// Number of cylinders touched.
     pub(crate) level: u16,
-    /// The best that its half-paths can be connected to.
+    /// Best partner that the tube's half-paths can be connected to.
     pub(crate) partner: Strength,
 }
 
 impl Tube {
-    /// The borders, the right one first.
+    /// Borders, the right one first.
     pub(crate) fn in_order(&self) -> [&Front; 2] {
         let [from, to] = &self.borders;
         if self.mirrored { [to, from] } else { [from, to] }
     }
 
     pub(crate) fn halves(&self, at_rad: f64, front: Front) -> [Self; 2] {
-        let Span { from_rad, to_rad } = self.span;
+        let AngleSpan { from_rad, to_rad } = self.span;
         let [from, to] = self.borders;
         let part = |from_rad, to_rad, borders| Self {
-            span: Span { from_rad, to_rad },
+            span: AngleSpan { from_rad, to_rad },
             borders,
             middle: None,
             ..*self
@@ -70,30 +69,30 @@ impl Tube {
         [part(from_rad, at_rad, [from, front]), part(at_rad, to_rad, [front, to])]
     }
 
-    /// The least of its borders.
-    pub(crate) fn least(&self, of: impl Fn(&Front) -> f64) -> f64 {
+    /// Minimum over the borders.
+    pub(crate) fn min_of(&self, of: impl Fn(&Front) -> f64) -> f64 {
         of(&self.borders[0]).min(of(&self.borders[1]))
     }
 }
 
-/// Puts a tube that has just met a circle in parts that turn little.
+/// Splits a tube that has just hit a circle into parts that turn little.
 pub(crate) fn split(
     tube: &Tube,
     tracer: &Tracer,
-    circle: &Circle,
+    circle: &PlanCircle,
     halvings: u32,
     partners: &Partners,
     waiting: &mut Vec<Tube>,
 ) {
     let [from, to] = tube.borders;
     let middle = |front: &Front| front.origin - circle.center;
-    let is_wider = |one: DVec2, other: DVec2, cosine: f64| {
-        one.dot(other) < cosine * (one.length_squared() * other.length_squared()).sqrt()
+    let is_wider = |a: DVec2, b: DVec2, cosine: f64| {
+        a.dot(b) < cosine * (a.length_squared() * b.length_squared()).sqrt()
     };
-    let turns = is_wider(middle(&from), middle(&to), MOST_TURN_COSINES[0]);
-    let is_wide = turns || is_wider(from.along, to.along, MOST_TURN_COSINES[1]);
-    let Span { from_rad, to_rad } = tube.span;
-    if halvings < MOST_HALVINGS && is_wide {
+    let turns = is_wider(middle(&from), middle(&to), MAX_TURN_COSINES[0]);
+    let is_wide = turns || is_wider(from.along, to.along, MAX_TURN_COSINES[1]);
+    let AngleSpan { from_rad, to_rad } = tube.span;
+    if halvings < MAX_HALVINGS && is_wide {
         let half = 0.5 * (from_rad + to_rad);
         for part in tube.halves(half, tracer.front(half)) {
             split(&part, tracer, circle, halvings + 1, partners, waiting);
@@ -104,29 +103,29 @@ pub(crate) fn split(
     }
 }
 
-/// The contact of the ray of a tube that passes a point at `offset_m` to its right.
+/// Contact of the ray that passes a point at `offset_m` to its right.
 ///
-/// The offset of a point is monotone in the contact, because rays of a tube never cross. Its slope is the
-/// distance between neighbouring rays abreast of the point, `width + growth * ahead`, times the angle between
-/// them at departure over that between their contacts (`rate`).
+/// The offset of a point is monotone in the contact, because rays of a tube never cross. Its slope
+/// is the distance between neighbouring rays next to the point, `width + growth * ahead`, times the
+/// angle between them at departure per angle between their contacts (`departure_per_contact`).
 pub(crate) fn ray_past(tube: &Tube, tracer: &Tracer, point: DVec2, offset_m: f64) -> f64 {
     front_past(tube, tracer, point, offset_m).0
 }
 
-/// The same with the ray.
+/// As [`ray_past`], together with the ray.
 pub(crate) fn front_past(
     tube: &Tube,
     tracer: &Tracer,
     point: DVec2,
     offset_m: f64,
 ) -> (f64, Front) {
-    let Span { from_rad, to_rad } = tube.span;
+    let AngleSpan { from_rad, to_rad } = tube.span;
     let [from, to] = &tube.borders;
     // Farther along the first contact's surface a ray is farther to the left.
     let sense = if tube.mirrored { 1.0 } else { -1.0 };
     let passes = |front: &Front| {
         let width_m = front.width_m + front.growth * front.ahead_m(point);
-        (front.offset_m(point) - offset_m, sense * front.rate * width_m)
+        (front.offset_m(point) - offset_m, sense * front.departure_per_contact * width_m)
     };
     let end = |at: f64, front: &Front| {
         let (value, slope) = passes(front);
@@ -148,7 +147,7 @@ pub(crate) fn front_past(
     (at, front)
 }
 
-/// The ray of the tube through a point; `None` if the point is beside it.
+/// Ray of the tube through a point; `None` if the point is outside the tube.
 pub(crate) fn ray_through(tube: &Tube, tracer: &Tracer, point: DVec2) -> Option<(f64, Front)> {
     let [right, left] = tube.in_order();
     let is_between = right.offset_m(point) >= -TIE_M && left.offset_m(point) <= TIE_M;
@@ -164,8 +163,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn cosines_are_those_of_the_angle() {
+    fn cosines_match_the_angle() {
         let of = [0.7, 1.4].map(f64::cos);
-        assert!(of.iter().zip(MOST_TURN_COSINES).all(|(one, other)| (one - other).abs() < 1e-15));
+        assert!(of.iter().zip(MAX_TURN_COSINES).all(|(a, b)| (a - b).abs() < 1e-15));
     }
 }

@@ -1,33 +1,33 @@
 //! Double diffraction: sound from one upright edge to another.
 //!
-//! The rays from edge to edge depend on the scene alone: a beams of beams from each edge that is met,
-//! grown when it is first asked for and kept for all observation points. Each ray out to one edge, each on
-//! from there to another (or by walls back to the same) and each back from that is an echo; what
-//! it is the reverse of is another.
+//! The rays from edge to edge depend on the scene alone. A tree of beams from each edge in use is
+//! grown on first use and kept for all observation points. An echo consists of a ray out to one
+//! edge, a ray on from there to another edge (or by walls back to the same) and a ray back from
+//! that edge. Its reverse is another echo.
 //!
 //! # Strength
 //!
-//! Over legs `s'`, `t`, `s` the wave that left the first edge is cylindrical about it in the plan, and
-//! what the second edge makes of that is a coefficient of its own (Kouyoumjian and Pathak 1974, whose
-//! section on ray-optical fields takes any such wave):
+//! Over legs `s'`, `t`, `s` the wave that left the first edge is cylindrical about it in the plan.
+//! The second edge diffracts that wave with a coefficient of its own (Kouyoumjian and Pathak 1974,
+//! whose section on ray-optical fields admits any such wave):
 //!
 //! ```text
 //! D1 D2 / sqrt(s' t s)      with D1 at L1 = s' t / (s' + t), D2 at L2 = t s / (t + s)
 //! ```
 //!
-//! beside a straight path's `1 / sqrt(s' + t + s)`; upright, where the front's other radius goes on
-//! growing, spreading adds the same to both. It reads the same backwards. The product holds while
-//! neither edge lies in the other's transition region: where transmitter (or receiver) and both
-//! edges are nearly in line, what comes to the second edge is no ray-optical field, and the product
-//! errs by some decibels there.
+//! compared with a straight path's `1 / sqrt(s' + t + s)`. In the upright direction, where the
+//! front's other radius keeps growing, spreading adds the same to both. The expression is symmetric
+//! under reversal. The product holds while neither edge lies in the other's transition region.
+//! Where transmitter (or receiver) and both edges are nearly in line, the field at the second edge
+//! is not ray-optical, and the product errs by some decibels.
 //!
 //! # Along a wall
 //!
-//! Two ends of one wall see each other along its faces. On a rigid face what comes along it is the
-//! incident wave and its mirror image in one, of which the second coefficient counts each: half of it
-//! is incident (the same, section on grazing incidence). Of a face with reflectance `R` the share is
-//! `1 / (1 + R)`. A free-standing plate has two such paths, one on each side, of one length, and
-//! they are one echo.
+//! Two ends of one wall see each other along its faces. On a rigid face the wave along it is the
+//! incident wave and its mirror image in one, and the second coefficient counts each: half of it is
+//! incident (same paper, section on grazing incidence). For a face with reflectance `R` the share
+//! is `1 / (1 + R)`. A free-standing plate has two such paths, one on each side and of equal
+//! length, and they are one echo.
 
 use num_complex::Complex64;
 use smallvec::SmallVec;
@@ -41,43 +41,44 @@ use crate::{
     model::{
         SearchPart,
         paths::{
-            beams::Ray,
-            echo::{Echo, Via},
-            plan::{Corner, Facing, Flank, Plan},
+            beams::UnfoldedRay,
+            echo::{PathEcho, Via},
+            plan::{Facing, Flank, PlanCorner, TracingPlan},
             rays::Rays,
             settings::Settings,
         },
     },
 };
 
-/// Past the width of a tie at a boundary, radians.
+/// Offset beyond the width of a tie at a boundary, radians.
 const INTO_SHADOW_RAD: f64 = 2e-9;
 
 /// A path by two edges.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct DoubleDiffraction {
-    /// The edges' points, in order.
+    /// Points of the edges, in order.
     pub(crate) points: [u32; 2],
-    /// The ray from one to the other, in the first one's tree of [`EdgeToEdge`].
+    /// Ray between the edges, in the first edge's tree of [`EdgeToEdge`].
     pub(crate) leg: u32,
     /// Rays to the first edge and, from the receiver, to the second; see [`Rays::to_edge`].
     pub(crate) out: u32,
     pub(crate) back: u32,
 }
 
-/// All echoes with two diffractions, and their paths, by number in [`Via::Edges`]. The rays are sorted by edge.
+/// Finds all echoes with two diffractions and their paths, by number in [`Via::Edges`]. The rays
+/// must be sorted by edge.
 pub(crate) fn echoes(
-    plan: &Plan,
+    plan: &TracingPlan,
     edge_to_edge: &EdgeToEdge,
     law: EdgeLaw,
     out: &Rays,
     back: Option<&Rays>,
-) -> (Vec<Echo>, Vec<DoubleDiffraction>) {
+) -> (Vec<PathEcho>, Vec<DoubleDiffraction>) {
     if !plan.settings.double_diffraction {
         return Default::default();
     }
     let mut search =
-        Search { plan, settings: &plan.settings, law, paths: Vec::new(), echoes: Vec::new() };
+        DoubleSearch { plan, settings: &plan.settings, law, paths: Vec::new(), echoes: Vec::new() };
     let outs = rays_to_edges(plan, out);
     let apart = back.map(|back| rays_to_edges(plan, back));
     let backs = apart.as_ref().unwrap_or(&outs);
@@ -100,8 +101,11 @@ pub(crate) fn echoes(
     (search.echoes, search.paths)
 }
 
-/// The edges that rays come to, and the rays to each.
-fn rays_to_edges<'a>(plan: &'a Plan, rays: &'a Rays) -> Vec<(u32, &'a Corner, Vec<EdgeRay<'a>>)> {
+/// Returns the edges that rays reach, and the rays to each.
+fn rays_to_edges<'a>(
+    plan: &'a TracingPlan,
+    rays: &'a Rays,
+) -> Vec<(u32, &'a PlanCorner, Vec<EdgeRay<'a>>)> {
     let known = |point| Some((point, plan.corners.corner(point)?));
     let edges = rays.edges().into_iter().filter_map(known);
     edges.map(|(point, corner)| (point, corner, EdgeRay::all(corner, rays, point))).collect()
@@ -111,40 +115,40 @@ fn rays_to_edges<'a>(plan: &'a Plan, rays: &'a Rays) -> Vec<(u32, &'a Corner, Ve
 struct EdgePair<'a> {
     points: [u32; 2],
     leg: u32,
-    ray: &'a Ray,
+    ray: &'a UnfoldedRay,
     /// See [`FromEdge`](super::edge_to_edge::FromEdge).
     flanks: [bool; 2],
 }
 
 /// Connects rays out, from edge to edge and back.
-struct Search<'a> {
-    plan: &'a Plan,
+struct DoubleSearch<'a> {
+    plan: &'a TracingPlan,
     settings: &'a Settings,
     law: EdgeLaw,
     paths: Vec<DoubleDiffraction>,
-    echoes: Vec<Echo>,
+    echoes: Vec<PathEcho>,
 }
 
 /// Departure and arrival of the ray between two edges, on one of its sides.
-struct Passage {
+struct EdgePassage {
     ends: [Facing; 2],
     /// Share of the wave along a face that counts as incident.
     share: f64,
 }
 
-/// The diffracted field of a ray on each passage; nothing where it is not in the same air.
+/// Diffracted field of a ray on each passage; zero in a different sector of air.
 type Passed = SmallVec<[Complex64; 2]>;
 
-impl Search<'_> {
-    /// Out to one corner, on to the other, and back from there. False if the ray between them, and
-    /// with it all longer ones, is too long.
+impl DoubleSearch<'_> {
+    /// Connects rays out to one corner, on to the other, and back from there. Returns `false` if
+    /// the ray between them, and with it all longer ones, is too long.
     ///
-    /// The field is `sum of share D1 D2` over the passages, times spreading. Each factor is worked out once
-    /// for each ray out and each ray back, and only their products for each pair of them.
+    /// The field is `sum of share D1 D2` over the passages, times spreading. Each factor is
+    /// computed once for each ray out and each ray back, and only their products for each pair.
     fn connect(
         &mut self,
         pair: &EdgePair,
-        corners: [&Corner; 2],
+        corners: [&PlanCorner; 2],
         [outs, backs]: [&[EdgeRay]; 2],
     ) -> bool {
         let leg_m = pair.ray.run.length();
@@ -161,10 +165,10 @@ impl Search<'_> {
         };
         let (from_outs, from_backs) = (passed(0, outs), passed(1, backs));
         let norm = |field: &Passed| field.iter().map(|part| part.norm()).sum::<f64>();
-        let most = from_backs.iter().map(norm).fold(0.0, f64::max) * pair.ray.gain;
+        let bound = from_backs.iter().map(norm).fold(0.0, f64::max) * pair.ray.gain;
         for (out, from_out) in outs.iter().zip(&from_outs) {
             let raised = self.plan.raised.by_edges(out.length_m + leg_m + back.length_m);
-            if norm(from_out) * most * raised < self.settings.floor {
+            if norm(from_out) * bound * raised < self.settings.floor {
                 continue;
             }
             for (back, from_back) in backs.iter().zip(&from_backs) {
@@ -194,12 +198,12 @@ impl Search<'_> {
         let gain = pair.ray.gain * settings.air_gain(length_m);
         let amplitude = gain * field.norm();
         let order = out.ray.order + pair.ray.order + back.ray.order;
-        let most = amplitude * self.plan.raised.by_edges(length_m);
-        if most < floor(settings, out, back, length_m) || !settings.allows(order) {
+        let bound = amplitude * self.plan.raised.by_edges(length_m);
+        if bound < floor(settings, out, back, length_m) || !settings.allows(order) {
             return;
         }
-        self.plan.effort.keep::<(Echo, Echo, DoubleDiffraction)>(1);
-        self.echoes.push(Echo {
+        self.plan.effort.keep::<(PathEcho, PathEcho, DoubleDiffraction)>(1);
+        self.echoes.push(PathEcho {
             length_m,
             amplitude,
             phase_rad: field.arg(),
@@ -215,8 +219,8 @@ impl Search<'_> {
         self.paths.push(DoubleDiffraction { points, leg, out: out.number, back: back.number });
     }
 
-    /// The sides on which a ray runs from one corner to another: one, or along a wall's faces two.
-    fn passages(&self, pair: &EdgePair, corners: [&Corner; 2]) -> SmallVec<[Passage; 2]> {
+    /// Sides on which a ray runs from one corner to another: one, or two along a wall's faces.
+    fn passages(&self, pair: &EdgePair, corners: [&PlanCorner; 2]) -> SmallVec<[EdgePassage; 2]> {
         let ray = pair.ray;
         let [mut here, there] = [corners[0].facings(ray.departure), corners[1].facings(-ray.run)];
         here.retain(|facing| match facing.flank {
@@ -226,18 +230,18 @@ impl Search<'_> {
         });
         // Seen from the far end left is right, and through an odd number of mirrors right is left.
         let is_turned = ray.order.is_multiple_of(2);
-        let fits = |one: &Facing, other: &Facing| match (one.flank, other.flank) {
+        let fits = |first: &Facing, second: &Facing| match (first.flank, second.flank) {
             (Flank::Open, _) | (_, Flank::Open) => true,
             (a, b) => (a == b) != is_turned,
         };
-        let pairs = here.iter().flat_map(|one| there.iter().map(move |other| [*one, *other]));
+        let pairs = here.iter().flat_map(|first| there.iter().map(move |second| [*first, *second]));
         pairs
-            .filter(|[one, other]| fits(one, other))
-            .map(|ends| Passage { ends, share: self.share(&ends) })
+            .filter(|[first, second]| fits(first, second))
+            .map(|ends| EdgePassage { ends, share: self.share(&ends) })
             .collect()
     }
 
-    /// Of the wave along a wall's face, the share that counts as incident: see the module's description.
+    /// Share of the wave along a wall's face that counts as incident; see the module's description.
     fn share(&self, ends: &[Facing; 2]) -> f64 {
         let along = ends.iter().filter_map(|end| end.face_reflectance);
         let (count, sum) = along.fold((0.0, 0.0), |(n, sum), r| (n + 1.0, sum + r));
@@ -249,24 +253,24 @@ impl Search<'_> {
         }
     }
 
-    /// An edge's coefficient over the root of its distance parameter, between a ray and one end of
-    /// each passage, with what the walls on the ray leave.
+    /// Coefficient of an edge over the root of its distance parameter, between a ray and one end of
+    /// each passage, including the reflection losses of the ray.
     fn passed(
         &self,
-        corner: &Corner,
+        corner: &PlanCorner,
         end: usize,
         ray: &EdgeRay,
-        passages: &[Passage],
+        passages: &[EdgePassage],
         leg_m: f64,
     ) -> Passed {
         let distance_m = distance_parameter_m(ray.radius_m, leg_m);
-        let through = |passage: &Passage| {
+        let through = |passage: &EdgePassage| {
             let facing = &passage.ends[end];
             if facing.sector != ray.sector {
                 return Complex64::ZERO;
             }
-            // Where a ray goes on along the wall the near end counts as in the shadow: what the far
-            // end sends straight on is not counted there either.
+            // A ray that continues along the wall counts as in the shadow of the near end. The far
+            // end does not count the straight continuation either.
             let in_rad = match facing.flank {
                 Flank::Open => ray.from_rad,
                 Flank::Left => ray.from_rad + INTO_SHADOW_RAD,
@@ -280,7 +284,7 @@ impl Search<'_> {
     }
 }
 
-/// The legs' spreading beside a straight path's and the roots of the distance parameters:
+/// Spreading of the legs compared with a straight path and the roots of the distance parameters:
 /// `sqrt(L1 L2 (s' + t + s) / (w' t w))` for rays that cylinders have widened to `w'` and `w`.
 fn spreading(out: &EdgeRay, back: &EdgeRay, leg_m: f64) -> f64 {
     let distance_m = |ray: &EdgeRay| distance_parameter_m(ray.radius_m, leg_m);

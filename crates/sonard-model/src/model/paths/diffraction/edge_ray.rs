@@ -1,10 +1,10 @@
-//! Rays to an upright edge, as the edge sees them.
+//! Rays to an upright edge, in the edge's coordinates.
 
 use crate::model::paths::{
-    beams::Ray,
+    beams::UnfoldedRay,
     cylinders::SpreadRay,
     echo::drop_repeats,
-    plan::{ALL_SLOPES, Corner},
+    plan::{ALL_SLOPES, PlanCorner},
     rays::Rays,
     settings::Settings,
     tolerance::{SAME_M, SAME_RAD},
@@ -13,27 +13,33 @@ use crate::model::paths::{
 /// A ray to an edge.
 #[derive(Clone, Copy)]
 pub(crate) struct EdgeRay<'a> {
-    pub(crate) ray: &'a Ray,
-    /// See [`Rays::to_edge`].
+    pub(crate) ray: &'a UnfoldedRay,
+    /// Number as in [`Rays::to_edge`].
     pub(crate) number: u32,
     pub(crate) length_m: f64,
-    /// Width of the ray tube at the edge, metres: without cylinders its length.
+    /// Width of the ray tube at the edge, metres; the ray's length without cylinders.
     pub(crate) width_m: f64,
-    /// Radius of curvature of the wave front at the edge, metres: without cylinders its length.
+    /// Radius of curvature of the wave front at the edge, metres; the ray's length without
+    /// cylinders.
     pub(crate) radius_m: f64,
-    /// Whether it comes by way of a cylinder.
+    /// `true` for a ray by way of a cylinder.
     pub(crate) is_spread: bool,
-    /// The sector of air between the edge's walls that it comes in.
+    /// Sector of air between the edge's walls in which the ray arrives.
     pub(crate) sector: usize,
     /// Direction from the edge towards the source, from the sector's first wall, radians.
     pub(crate) from_rad: f64,
-    /// How steeply it can climb; see [`Ray::slopes`].
+    /// Possible slopes; see [`UnfoldedRay::slopes`].
     pub(crate) slopes: u32,
 }
 
 impl<'a> EdgeRay<'a> {
-    /// `None` for a ray along a wall, and in a sector that sends nothing back.
-    fn new(corner: &Corner, ray: &'a Ray, number: u32, spread: Option<&SpreadRay>) -> Option<Self> {
+    /// Returns `None` for a ray along a wall, and in a sector that diffracts nothing back.
+    fn new(
+        corner: &PlanCorner,
+        ray: &'a UnfoldedRay,
+        number: u32,
+        spread: Option<&SpreadRay>,
+    ) -> Option<Self> {
         let (sector, from_rad) = corner.sector(-ray.run)?;
         let length_m = ray.run.length();
         let slopes = ray.slopes;
@@ -43,13 +49,13 @@ impl<'a> EdgeRay<'a> {
         Some(Self { ray, number, length_m, width_m, radius_m, is_spread, sector, from_rad, slopes })
     }
 
-    /// A ray over walls alone.
-    pub(crate) fn by_walls(corner: &Corner, ray: &'a Ray, number: u32) -> Option<Self> {
+    /// Creates an edge ray over walls alone.
+    pub(crate) fn by_walls(corner: &PlanCorner, ray: &'a UnfoldedRay, number: u32) -> Option<Self> {
         Self::new(corner, ray, number, None)
     }
 
-    /// The rays to an edge, by length, each once.
-    pub(crate) fn all(corner: &Corner, rays: &'a Rays, point: u32) -> Vec<Self> {
+    /// Returns the rays to an edge, by length, without repeats.
+    pub(crate) fn all(corner: &PlanCorner, rays: &'a Rays, point: u32) -> Vec<Self> {
         let (first, by_walls) = rays.beams.rays_to_edge(point);
         let (first_spread, spread) = rays.spread_to_edge(point);
         let by_walls = (first..)
@@ -65,13 +71,15 @@ impl<'a> EdgeRay<'a> {
         all
     }
 
-    /// Whether two are one ray that touches a corner on its path and was found on both sides of it.
+    /// Returns `true` for the two copies of a ray that touches a corner and was found on both sides
+    /// of it.
     fn is_same(&self, other: &Self) -> bool {
         is_same_departure(self.ray, other.ray)
     }
 }
 
-/// Lets a ray that was found on both sides of a corner climb as on either side. Sorted by length.
+/// Removes the slope limits of a ray that was found on both sides of a corner with different
+/// slopes. The rays must be sorted by length.
 fn free_repeats(rays: &mut [EdgeRay]) {
     for at in 1..rays.len() {
         let ray = rays[at];
@@ -86,19 +94,19 @@ fn free_repeats(rays: &mut [EdgeRay]) {
     }
 }
 
-/// Kouyoumjian and Pathak's distance parameter of a front of one radius that goes on from an edge for
-/// the other, metres.
+/// Kouyoumjian and Pathak's distance parameter, metres, of a front of radius `a_m` that continues
+/// from an edge for `b_m`.
 pub(crate) fn distance_parameter_m(one_m: f64, other_m: f64) -> f64 {
     one_m * other_m / (one_m + other_m)
 }
 
-/// Whether two rays from one start, of one length, leave it in one direction.
-pub(crate) fn is_same_departure(one: &Ray, other: &Ray) -> bool {
-    one.departure.distance_squared(other.departure) < SAME_RAD * SAME_RAD
+/// Returns `true` if two rays of equal length from one start leave in the same direction.
+pub(crate) fn is_same_departure(a: &UnfoldedRay, b: &UnfoldedRay) -> bool {
+    a.departure.distance_squared(b.departure) < SAME_RAD * SAME_RAD
 }
 
-/// The weakest echo that is asked for of those of a length, out on one ray to an edge and back on one to the same or
-/// another.
+/// Amplitude floor of echoes of a length, out on one ray to an edge and back on one to the same or
+/// another edge.
 pub(crate) fn floor(settings: &Settings, out: &EdgeRay, back: &EdgeRay, length_m: f64) -> f64 {
     settings.contact_floor(out.is_spread || back.is_spread, length_m)
 }

@@ -1,4 +1,4 @@
-//! The rays from each upright edge to others.
+//! Rays from each upright edge to others.
 
 use std::sync::{Arc, OnceLock};
 
@@ -6,37 +6,37 @@ use smallvec::SmallVec;
 
 use super::edge_ray::is_same_departure;
 use crate::model::paths::{
-    beams::{Beams, Ray},
+    beams::{Beams, UnfoldedRay},
     effort::{BOUND, Effort},
-    plan::{ALONG_RAD, Mesh, Plan},
+    plan::{ALONG_RAD, Mesh, TracingPlan},
     settings::Settings,
     tolerance::SAME_M,
 };
 
-/// Trees of beams from the edges of a scene, by point. A tree is grown when it is first asked for, for the
+/// Trees of beams from the edges of a scene, by point. A tree is grown on first use, for the
 /// longest paths that the scene was prepared for, and serves all observation points.
 #[derive(Debug)]
 pub(crate) struct EdgeToEdge {
     from: Vec<OnceLock<FromEdge>>,
-    /// The triangles around each point and which corner of each it is, counter-clockwise.
+    /// Triangles around each point with the index of their corner there, counter-clockwise.
     around: Vec<SmallVec<[(u32, u8); 6]>>,
     max_path_m: f64,
-    /// Of all trees together: they are kept.
+    /// Total effort of all trees, because they are kept.
     pub(crate) effort: Arc<Effort>,
 }
 
-/// The rays from an edge to edges.
+/// Rays from an edge to edges.
 #[derive(Debug)]
 pub(crate) struct FromEdge {
-    /// Its `to_edges` lie side by side by edge, shortest first.
+    /// Beams from the edge; `to_edges` is grouped by edge, shortest first.
     pub(crate) beams: Beams,
-    /// Of each ray, whether it left in the air on its left and on its right: along a wall it may have
-    /// gone on one side only.
+    /// For each ray, the presence of air on its left and on its right: along a wall a ray may have
+    /// left on one side only.
     pub(crate) flanks: Vec<[bool; 2]>,
 }
 
 impl Default for EdgeToEdge {
-    /// Without any edge.
+    /// Creates an empty set.
     fn default() -> Self {
         let effort = Arc::new(Effort::new(BOUND));
         Self { from: Vec::new(), around: Vec::new(), max_path_m: 0.0, effort }
@@ -50,10 +50,10 @@ impl EdgeToEdge {
         Self { from, around: mesh.around_points(), max_path_m: settings.max_path_m, effort }
     }
 
-    /// The rays from an edge to edges.
-    pub(crate) fn at(&self, plan: &Plan, point: u32) -> &FromEdge {
+    /// Returns the rays from an edge to edges.
+    pub(crate) fn at(&self, plan: &TracingPlan, point: u32) -> &FromEdge {
         let grow = || {
-            let plan = Plan { effort: self.effort.clone(), ..plan.within(self.max_path_m) };
+            let plan = TracingPlan { effort: self.effort.clone(), ..plan.within(self.max_path_m) };
             FromEdge::grow(&plan, point, &self.around[point as usize])
         };
         self.from[point as usize].get_or_init(grow)
@@ -61,29 +61,29 @@ impl EdgeToEdge {
 }
 
 impl FromEdge {
-    fn grow(plan: &Plan, point: u32, around: &[(u32, u8)]) -> Self {
+    fn grow(plan: &TracingPlan, point: u32, around: &[(u32, u8)]) -> Self {
         let mut beams = Beams::grow_from_corner(plan, point, around);
         let rays = std::mem::take(&mut beams.to_edges);
-        let side = |ray: &Ray| {
+        let side = |ray: &UnfoldedRay| {
             let (triangle, corner) = *around.get(beams.root_slot(&plan.walls, ray.into()))?;
             let mesh = plan.mesh.as_ref()?;
             let at = mesh.corner(triangle, corner as usize);
-            // What runs along its right border has it on the left.
+            // A ray along the right border of its triangle has the triangle on the left.
             Some([1, 2].map(|next| {
                 let border = mesh.corner(triangle, (corner as usize + next) % 3) - at;
                 let off_m = border.perp_dot(ray.departure).abs();
                 border.dot(ray.departure) > 0.0 && off_m <= ALONG_RAD * border.length()
             }))
         };
-        let mut found: Vec<(u32, Ray, [bool; 2])> =
+        let mut found: Vec<(u32, UnfoldedRay, [bool; 2])> =
             rays.iter().map(|(edge, ray)| (*edge, *ray, side(ray).unwrap_or_default())).collect();
-        found.sort_by(|(one, a, _), (other, b, _)| {
-            one.cmp(other).then(a.run.length_squared().total_cmp(&b.run.length_squared()))
+        found.sort_by(|(first, a, _), (second, b, _)| {
+            first.cmp(second).then(a.run.length_squared().total_cmp(&b.run.length_squared()))
         });
         let mut flanks: Vec<[bool; 2]> = Vec::with_capacity(found.len());
         for (edge, ray, sides) in found {
             match known(&beams.to_edges, edge, &ray) {
-                // One that touches a corner, or runs along a wall, is found on both sides of it.
+                // A ray that touches a corner, or runs along a wall, is found on both sides of it.
                 Some(index) => {
                     let known = &mut flanks[index];
                     *known = [known[0] | sides[0], known[1] | sides[1]];
@@ -98,8 +98,8 @@ impl FromEdge {
     }
 }
 
-/// The index of a ray among those known already, which are sorted by edge and length.
-fn known(rays: &[(u32, Ray)], edge: u32, ray: &Ray) -> Option<usize> {
+/// Index of a ray among those already known, which are sorted by edge and length.
+fn known(rays: &[(u32, UnfoldedRay)], edge: u32, ray: &UnfoldedRay) -> Option<usize> {
     let length_m = ray.run.length();
     rays.iter()
         .enumerate()

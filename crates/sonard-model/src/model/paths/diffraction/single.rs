@@ -1,4 +1,4 @@
-//! Echoes that one upright edge diffracts.
+//! Echoes with one diffraction at an upright edge.
 
 use num_complex::Complex64;
 
@@ -8,19 +8,24 @@ use crate::{
     model::{
         SearchPart,
         paths::{
-            echo::{Echo, Via},
+            echo::{PathEcho, Via},
             effort::Effort,
-            plan::{Corner, Plan},
+            plan::{PlanCorner, TracingPlan},
             rays::Rays,
             settings::Settings,
         },
     },
 };
 
-/// All echoes with one diffraction: out on one ray to an edge, back on another or the same. The rays are
-/// sorted by edge.
-pub(crate) fn echoes(plan: &Plan, law: EdgeLaw, out: &Rays, back: Option<&Rays>) -> Vec<Echo> {
-    let search = Search { law, plan, settings: &plan.settings, effort: &plan.effort };
+/// Finds all echoes with one diffraction: out on one ray to an edge, back on another or the same.
+/// The rays must be sorted by edge.
+pub(crate) fn echoes(
+    plan: &TracingPlan,
+    law: EdgeLaw,
+    out: &Rays,
+    back: Option<&Rays>,
+) -> Vec<PathEcho> {
+    let search = SingleSearch { law, plan, settings: &plan.settings, effort: &plan.effort };
     let mut echoes = Vec::new();
     for point in out.edges() {
         let Some(corner) = plan.corners.corner(point) else { continue };
@@ -36,12 +41,17 @@ pub(crate) fn echoes(plan: &Plan, law: EdgeLaw, out: &Rays, back: Option<&Rays>)
     echoes
 }
 
-/// The aspect of the edge of an echo with one diffraction, from where the echo begins and ends; `None` of
-/// other echoes, by way of a cylinder, of a narrow strip or a post, and by laws that know no aspect.
-pub(crate) fn view(plan: &Plan, out: &Rays, back: &Rays, echo: &Echo) -> Option<EdgeView> {
+/// Aspect of the edge of an echo with one diffraction, seen from the path's ends. `None` for other
+/// echoes, by way of a cylinder, for a narrow strip or a post, and for laws without an aspect.
+pub(crate) fn view(
+    plan: &TracingPlan,
+    out: &Rays,
+    back: &Rays,
+    echo: &PathEcho,
+) -> Option<EdgeView> {
     let Via::Edge { point, out: there, back: here } = echo.via else { return None };
     let is_utd = plan.settings.edge_law == Some(EdgeLaw::Utd);
-    let is_edge = |corner: &&Corner| is_utd && !corner.is_whole();
+    let is_edge = |corner: &&PlanCorner| is_utd && !corner.is_whole();
     let corner = plan.corners.corner(point).filter(is_edge)?;
     let rays = [out.to_edge_by_walls(there)?, back.to_edge_by_walls(here)?];
     let [out, back] = rays.map(|ray| EdgeRay::by_walls(corner, ray, 0));
@@ -55,9 +65,10 @@ pub(crate) fn view(plan: &Plan, out: &Rays, back: &Rays, echo: &Echo) -> Option<
     })
 }
 
-/// By how much the pulse of an echo comes earlier than along its path, metres: by the surface of a post, to whose axis
-/// paths are told. 0 of other echoes, and by way of cylinders.
-pub(crate) fn lead_m(plan: &Plan, out: &Rays, back: &Rays, echo: &Echo) -> f64 {
+/// Distance, metres, by which the pulse of an echo arrives earlier than along its path. The surface
+/// of a post reflects, but path lengths are to its axis. 0 for other echoes, and by way of
+/// cylinders.
+pub(crate) fn lead_m(plan: &TracingPlan, out: &Rays, back: &Rays, echo: &PathEcho) -> f64 {
     let Via::Edge { point, out: there, back: here } = echo.via else { return 0.0 };
     let lead = || {
         let corner = plan.corners.corner(point).filter(|corner| corner.is_whole())?;
@@ -68,17 +79,17 @@ pub(crate) fn lead_m(plan: &Plan, out: &Rays, back: &Rays, echo: &Echo) -> f64 {
     lead().unwrap_or(0.0)
 }
 
-/// Pairs of rays at one edge.
-struct Search<'a> {
+/// Pairs rays at one edge.
+struct SingleSearch<'a> {
     law: EdgeLaw,
-    plan: &'a Plan,
+    plan: &'a TracingPlan,
     settings: &'a Settings,
     effort: &'a Effort,
 }
 
-impl Search<'_> {
-    /// Out on one ray and back on another or the same: each pair in both directions.
-    fn pairs(&self, corner: &Corner, point: u32, rays: &[EdgeRay], echoes: &mut Vec<Echo>) {
+impl SingleSearch<'_> {
+    /// Adds echoes out on one ray and back on another or the same: each pair in both directions.
+    fn pairs(&self, corner: &PlanCorner, point: u32, rays: &[EdgeRay], echoes: &mut Vec<PathEcho>) {
         for (i, out) in rays.iter().enumerate() {
             for (j, back) in rays.iter().enumerate().skip(i) {
                 // Sorted by length.
@@ -89,7 +100,7 @@ impl Search<'_> {
                 }
                 let Some(echo) = self.echo(corner, point, out, back) else { continue };
                 if i != j {
-                    echoes.push(Echo {
+                    echoes.push(PathEcho {
                         departure: echo.arrival,
                         arrival: echo.departure,
                         slopes: [back.slopes, out.slopes],
@@ -102,13 +113,13 @@ impl Search<'_> {
         }
     }
 
-    /// Out on a ray from the transmitter and back on one from the receiver.
+    /// Adds echoes out on a ray from the transmitter and back on one from the receiver.
     fn pairs_between(
         &self,
-        corner: &Corner,
+        corner: &PlanCorner,
         point: u32,
         [outs, backs]: [&[EdgeRay]; 2],
-        echoes: &mut Vec<Echo>,
+        echoes: &mut Vec<PathEcho>,
     ) {
         for out in outs {
             for back in backs {
@@ -122,10 +133,16 @@ impl Search<'_> {
         }
     }
 
-    fn echo(&self, corner: &Corner, point: u32, out: &EdgeRay, back: &EdgeRay) -> Option<Echo> {
+    fn echo(
+        &self,
+        corner: &PlanCorner,
+        point: u32,
+        out: &EdgeRay,
+        back: &EdgeRay,
+    ) -> Option<PathEcho> {
         let field = self.field(corner, out, back)?;
-        self.effort.keep::<Echo>(2);
-        Some(Echo {
+        self.effort.keep::<PathEcho>(2);
+        Some(PathEcho {
             length_m: out.length_m + back.length_m,
             amplitude: field.norm(),
             phase_rad: field.arg(),
@@ -139,12 +156,12 @@ impl Search<'_> {
         })
     }
 
-    /// Relative field of the echo out and back on two rays, `None` if it is below the floor and by way of floor and
-    /// ceiling, too.
+    /// Relative field of the echo out and back on two rays. `None` if it is below the floor, also
+    /// by way of floor and ceiling.
     ///
-    /// Cheapest test first: what walls and air leave of a mirror's echo, then the law's bound at this aspect,
-    /// then the law.
-    fn field(&self, corner: &Corner, out: &EdgeRay, back: &EdgeRay) -> Option<Complex64> {
+    /// Cheapest test first: a mirror's echo after the losses at walls and in air, then the law's
+    /// bound at this aspect, then the law.
+    fn field(&self, corner: &PlanCorner, out: &EdgeRay, back: &EdgeRay) -> Option<Complex64> {
         let Self { law, settings, .. } = self;
         if out.sector != back.sector || !settings.allows(out.ray.order + back.ray.order) {
             return None;
@@ -154,7 +171,8 @@ impl Search<'_> {
         let floor = floor(settings, out, back, length_m) / self.plan.raised.by_edge(length_m);
         let aspect = aspect(out, back);
         let strength = strength * spreading(out, back, &aspect);
-        // No law gives more than a wall's echo and the images that its edge replaces; right before it a post may.
+        // No law exceeds a wall's echo and the images that its edge replaces; right before it a
+        // post may.
         if !corner.is_whole() && 2.0 * strength < floor {
             return None;
         }
@@ -167,7 +185,7 @@ impl Search<'_> {
     }
 }
 
-/// In on one ray, out on another.
+/// Aspect of an edge, in on one ray and out on another.
 fn aspect(out: &EdgeRay, back: &EdgeRay) -> Aspect {
     Aspect {
         in_rad: out.from_rad,
@@ -176,10 +194,10 @@ fn aspect(out: &EdgeRay, back: &EdgeRay) -> Aspect {
     }
 }
 
-/// The share that cylinders on the path leave of the field at an edge, beside fronts that flat walls
-/// turned: these fall by `sqrt((s + s') / (s s'))`, and the distance parameter of the
-/// transition is that of the fronts' radii of curvature in the plan (Kouyoumjian and Pathak
-/// 1974, equations (24) and (33), whose other radius, along the edge, no cylinder changes).
+/// Factor of the field at an edge due to cylinders on the path, relative to fronts that only flat
+/// walls turned: those decrease by `sqrt((s + s') / (s s'))`. The distance parameter of the
+/// transition is that of the fronts' radii of curvature in the plan (Kouyoumjian and Pathak 1974,
+/// equations (24) and (33); their other radius, along the edge, is not changed by cylinders).
 fn spreading(out: &EdgeRay, back: &EdgeRay, aspect: &Aspect) -> f64 {
     let length_m = out.length_m + back.length_m;
     (aspect.distance_m * length_m / (out.width_m * back.width_m)).sqrt()

@@ -1,4 +1,4 @@
-//! Whether a path of the plan, at its heights, meets what it is reflected by and nothing else.
+//! Clearance: a path of the plan, at its heights, has to hit its reflectors and nothing else.
 
 use rstar::AABB;
 
@@ -11,25 +11,25 @@ use crate::{
     },
 };
 
-/// Beginning and end of a path, or of a part of one.
-pub(crate) struct Ends {
+/// Start and end of a path, or of a part of one.
+pub(crate) struct PathEnds {
     pub(crate) start: DVec2,
     /// `None` for a part that ends at its last contact, the level edge of a wall.
     pub(crate) end: Option<DVec2>,
-    /// Height gained along it, if floor and ceiling are windows, metres.
+    /// Height gained along the path with floor and ceiling as windows, metres.
     pub(crate) rise_m: f64,
 }
 
 impl Heights {
-    /// Whether a path meets its contacts where they stand, and nothing else.
+    /// Returns `true` if a path hits its contacts within their heights, and nothing else.
     ///
-    /// If floor and ceiling were windows its height would grow evenly with its length in the plan; the
+    /// With floor and ceiling as windows the height grows evenly with the length in the plan; the
     /// real height is that one, folded back between them.
     pub(crate) fn is_path_clear(
         &self,
         cylinders: &Cylinders,
         contacts: &[(DVec2, Mechanism)],
-        ends: &Ends,
+        ends: &PathEnds,
     ) -> bool {
         let points = || {
             let first = [(ends.start, None)].into_iter();
@@ -41,16 +41,16 @@ impl Heights {
         let straight_z = |along_m: f64| self.z_m + ends.rise_m * along_m / plan_m;
         let mut along_m = 0.0;
         let mut left_contacts = contacts.len();
-        for ((from, left), (to, met)) in points().zip(points().skip(1)) {
+        for ((from, departed), (to, arrived)) in points().zip(points().skip(1)) {
             let leg_m = from.distance(to);
             let z_at = |share: f64| straight_z(along_m + share * leg_m);
-            if self.is_barred(cylinders, [from, to], [left, met], z_at) {
+            if self.is_blocked(cylinders, [from, to], [departed, arrived], z_at) {
                 return false;
             }
             left_contacts = left_contacts.saturating_sub(1);
             let is_level_edge = ends.end.is_none() && left_contacts == 0;
             let z_m = self.folded_m(z_at(1.0));
-            if !is_level_edge && met.is_some_and(|met| !holds(self.limits(met), z_m)) {
+            if !is_level_edge && arrived.is_some_and(|arrived| !holds(self.limits(arrived), z_m)) {
                 return false;
             }
             along_m += leg_m;
@@ -58,9 +58,9 @@ impl Heights {
         true
     }
 
-    /// Whether something with limits stands in a leg between two surfaces, whose height (as if floor
-    /// and ceiling were windows) is given for each share of it.
-    fn is_barred(
+    /// Returns `true` if an object with limited height blocks a leg between two surfaces. `z_at`
+    /// gives the height, with floor and ceiling as windows, for each share of the leg.
+    fn is_blocked(
         &self,
         cylinders: &Cylinders,
         [from, to]: [DVec2; 2],
@@ -72,14 +72,14 @@ impl Heights {
             let (wall, ends) = near.data;
             !own.contains(&Some(Reflector::Wall(wall)))
                 && crossing(from, to, ends)
-                    .is_some_and(|share| self.stands_at(wall, self.folded_m(z_at(share))))
+                    .is_some_and(|share| self.blocks_at(wall, self.folded_m(z_at(share))))
         });
         let by_cylinder = || {
             cylinders.circles.iter().zip(0..).any(|(circle, cylinder)| {
                 !circle.is_opaque
                     && !own.contains(&Some(Reflector::Cylinder(cylinder)))
                     && circle.chord(from, to).is_some_and(|chord| {
-                        self.bars(self.cylinders[cylinder as usize], chord.map(&z_at))
+                        self.blocks(self.cylinders[cylinder as usize], chord.map(&z_at))
                     })
             })
         };
@@ -87,8 +87,8 @@ impl Heights {
     }
 }
 
-/// The crossing of the leg from `from` to `to` with a segment, as a share of the leg; none at its very ends,
-/// where it comes to a corner of which that segment is the other wall.
+/// Intersection of the leg from `from` to `to` with a segment, as a share of the leg. `None` at the
+/// very ends of the leg, where it reaches a corner whose other wall is that segment.
 fn crossing(from: DVec2, to: DVec2, [a, b]: [DVec2; 2]) -> Option<f64> {
     let (run, along) = (to - from, b - a);
     let slant = run.perp_dot(along);

@@ -1,36 +1,37 @@
 //! Floor and ceiling as mirrors.
 //!
-//! Between floor and ceiling, at `a` above the floor in a room of height `H`, the images of the
-//! ranger stand at `2 m H` and `2 m H - 2 a` above it (Allen and Berkley's lattice, in one
-//! dimension), and each path of length `L` in the plan is also heard over `sqrt(L^2 + dz^2)`. A wall
-//! at `d` and the floor, `h` below, make a corner that answers from `sqrt(d^2 + h^2)`.
+//! Let the ranger be at `a` above the floor in a room of height `H`. Its images are at `2 m H` and
+//! `2 m H - 2 a` above it (Allen and Berkley's lattice, in one dimension), and each path of length
+//! `L` in the plan also arrives over `sqrt(L^2 + dz^2)`. A wall at `d` and the floor, `h` below,
+//! form a corner that returns an echo from `sqrt(d^2 + h^2)`.
 //!
-//! What the plan says of amplitudes stays: cylinders spread sound in the plan alone. Of an edge,
-//! Kouyoumjian and Pathak's coefficient grows by `1 / sin b` for a ray that is `b` off the
-//! edge's direction, and the field by the square root of that; the small part of it that shifts the
-//! transition (its distance parameter falls by `sin b`) is left out. At two edges it grows twice.
+//! The plan's amplitudes remain valid: cylinders spread sound in the plan alone. At an edge,
+//! Kouyoumjian and Pathak's coefficient grows by `1 / sin b` for a ray that is `b` off the edge's
+//! direction, and the field by the square root of that. The small part of it that shifts the
+//! transition (its distance parameter decreases by `sin b`) is omitted. At two edges it grows
+//! twice.
 
 use crate::{
     geometry::DVec2,
     model::paths::{
-        echo::{Echo, Via},
+        echo::{PathEcho, Via},
         plan::ALL_SLOPES,
         settings::Settings,
     },
 };
 
-/// An image of the ranger below the floor or above the ceiling.
+/// Image of the ranger below the floor or above the ceiling.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct VerticalImage {
     /// Height above the ranger, metres.
     pub(crate) rise_m: f64,
-    /// Reflections at floor and ceiling.
+    /// Number of reflections at floor and ceiling.
     pub(crate) bounces: u16,
-    /// The factor that these leave of the amplitude.
+    /// Amplitude factor of these reflections.
     pub(crate) gain: f64,
 }
 
-/// Floor or ceiling.
+/// Floor or ceiling as a mirror.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct HorizontalMirror {
     pub(crate) z_m: f64,
@@ -38,8 +39,8 @@ pub(crate) struct HorizontalMirror {
     pub(crate) gain: f64,
 }
 
-/// The images within reach that give an echo above the floor of the settings; the ranger itself is
-/// not among them.
+/// Returns the images within reach whose echo is above the floor of the settings, without the
+/// ranger itself.
 pub(crate) fn images(
     floor: Option<HorizontalMirror>,
     ceiling: Option<HorizontalMirror>,
@@ -53,7 +54,7 @@ pub(crate) fn images(
         [floor, ceiling].map(|level| level.map_or(1.0, |level| level.gain));
     let mut images = Vec::new();
     let mut add = |rise_m: f64, bounces: u16| {
-        // In turn, beginning with the one that is nearer on the path there.
+        // Alternating, beginning with the surface that is nearer on the path out.
         let (first, second) = (i32::from(bounces.div_ceil(2)), i32::from(bounces / 2));
         let (floors, ceilings) = if rise_m < 0.0 { (first, second) } else { (second, first) };
         let gain = at_floor.powi(floors) * at_ceiling.powi(ceilings);
@@ -85,17 +86,23 @@ impl VerticalImage {
     /// The ranger itself.
     pub(crate) const NONE: Self = Self { rise_m: 0.0, bounces: 0, gain: 1.0 };
 
-    /// Height gained by a ray from this image to a point at a height above the ranger, if floor and ceiling
-    /// are windows, metres: each reflection at one of them turns it.
+    /// Height, metres, gained by a ray from this image to a point at a height above the ranger,
+    /// with floor and ceiling as windows: each reflection at one of them reverses it.
     pub(crate) fn climb_m(&self, rise_m: f64) -> f64 {
         let below_m = rise_m - self.rise_m;
         if self.bounces.is_multiple_of(2) { below_m } else { -below_m }
     }
 
-    /// An echo of the plan by way of this image, which is number `index`; `None` if it is too long
-    /// or too weak.
-    pub(crate) fn echo(&self, plan: &Echo, index: u16, settings: &Settings) -> Option<Echo> {
-        // What is scattered goes straight back; level edges have their own images by floor and ceiling.
+    /// Returns an echo of the plan by way of this image, which is number `index`; `None` if it is
+    /// too long or too weak.
+    pub(crate) fn echo(
+        &self,
+        plan: &PathEcho,
+        index: u16,
+        settings: &Settings,
+    ) -> Option<PathEcho> {
+        // Scattered sound returns along its own path; level edges have their own images by floor
+        // and ceiling.
         if matches!(plan.via, Via::Scatter { .. } | Via::LevelEdge { .. }) {
             return None;
         }
@@ -109,12 +116,12 @@ impl VerticalImage {
         let amplitude =
             plan.amplitude * self.gain * bending * settings.air_gain(length_m - plan.length_m);
         let leaves_rad = self.rise_m.atan2(plan.length_m);
-        // After an even number of reflections it still runs as it left, and comes from the
-        // other side.
+        // After an even number of reflections the ray runs as it left, and arrives from the
+        // opposite side.
         let comes_rad = if self.bounces.is_multiple_of(2) { -leaves_rad } else { leaves_rad };
         let floor = settings.contact_floor(plan.is_repeated, length_m);
         let fits = length_m <= settings.max_path_m && amplitude >= floor;
-        fits.then_some(Echo {
+        fits.then_some(PathEcho {
             length_m,
             amplitude,
             rise_rad: [leaves_rad, comes_rad],
@@ -123,15 +130,16 @@ impl VerticalImage {
         })
     }
 
-    /// The path by floor and ceiling alone, to a receiver that is `apart` from the transmitter.
+    /// Returns the path by floor and ceiling alone, to a receiver that is `apart` from the
+    /// transmitter.
     pub(crate) fn upright_echo(
         &self,
         index: u16,
         apart: DVec2,
         settings: &Settings,
-    ) -> Option<Echo> {
+    ) -> Option<PathEcho> {
         let along = apart.try_normalize().unwrap_or(DVec2::X);
-        let nowhere = Echo {
+        let nowhere = PathEcho {
             length_m: apart.length(),
             amplitude: 1.0,
             phase_rad: 0.0,

@@ -1,9 +1,9 @@
 //! Walls and cylinders that do not reach from floor to ceiling.
 //!
-//! Without floor and ceiling all sound stays at the ranger's height, and what does not stand there
-//! is not there. With them a path has a height at each point. Beams then both turn at such a wall
-//! and pass it, and a path counts if it meets its walls where they stand and the others where they
-//! do not. What their level edges diffract is listed by itself
+//! Without floor and ceiling all sound stays at the ranger's height, and objects at other heights
+//! are ignored. With them a path has a height at each point. Beams then both reflect at such a wall
+//! and pass it. A path counts if it hits its walls within their heights and passes the others
+//! outside theirs. Diffraction at their level edges is listed separately
 //! ([`diffraction`](crate::model::paths::diffraction)).
 
 use std::collections::HashMap;
@@ -32,26 +32,26 @@ use crate::{
 pub(crate) struct Heights {
     floor_z_m: Option<f64>,
     ceiling_z_m: Option<f64>,
-    /// The ranger's.
+    /// Height of the ranger.
     pub(crate) z_m: f64,
-    /// By wall and by cylinder, from and to where; without limits `None`.
+    /// Lower and upper limit by wall and by cylinder; `None` without limits.
     walls: Vec<Option<[f64; 2]>>,
     pub(crate) cylinders: Vec<Option<[f64; 2]>>,
     /// Walls with limits, with their ends in the plan.
     pub(crate) limited: RTree<Limited>,
-    /// The ranger's by floor and ceiling; none in a scene in the plane.
+    /// Images of the ranger by floor and ceiling; empty in a planar scene.
     pub(crate) images: Vec<VerticalImage>,
 }
 
-/// This close to the level edge of a wall sound counts as meeting it and as passing it, metres: twice what it is
-/// asked by in the end.
+/// Distance from the level edge of a wall within which sound counts both as hitting and as passing
+/// it, metres: twice the tolerance of the final check.
 const NEAR_EDGE_M: f64 = 2.0 * TIE_M;
 
 /// A wall with limits, in the box around it.
 pub(crate) type Limited = GeomWithData<Rectangle<[f64; 2]>, (u32, [DVec2; 2])>;
 
 impl Heights {
-    /// For walls with these ends in the plan, and a ranger at a height.
+    /// Collects the heights for walls with these ends in the plan, and a ranger at a height.
     pub(crate) fn new(
         scene: &Scene,
         segments: &[(DVec2, DVec2)],
@@ -84,35 +84,36 @@ impl Heights {
         }
     }
 
-    /// An image by its number in [`Echo::image`](crate::model::paths::echo::Echo::image).
+    /// Returns an image by its number in
+    /// [`PathEcho::image`](crate::model::paths::echo::PathEcho::image).
     pub(crate) fn image(&self, number: u16) -> VerticalImage {
         number.checked_sub(1).map_or(VerticalImage::NONE, |image| self.images[image as usize])
     }
 
-    /// Whether paths have different heights along them.
+    /// Returns `true` if paths may have different heights along them.
     pub(crate) fn rises(&self) -> bool {
         self.floor_z_m.is_some() || self.ceiling_z_m.is_some()
     }
 
-    /// Whether what stands between such heights can matter at all.
-    pub(crate) fn is_there(&self, limits: Option<[f64; 2]>) -> bool {
+    /// Returns `true` if an object with these limits can affect any path.
+    pub(crate) fn is_relevant(&self, limits: Option<[f64; 2]>) -> bool {
         self.rises() || holds(limits, self.z_m)
     }
 
-    /// Whether nothing passes a cylinder with such limits.
+    /// Returns `true` if no sound passes above or below a cylinder with these limits.
     pub(crate) fn is_opaque(&self, limits: Option<[f64; 2]>) -> bool {
         !(self.rises() && limits.is_some())
     }
 
-    /// By wall the climbs at which sound meets and passes it; none where no path rises.
+    /// Climbs by wall at which sound hits and passes it; empty if no path rises.
     pub(crate) fn climbs(&self, settings: &Settings) -> Climbs {
         if !self.rises() {
             return Climbs::default();
         }
-        // A path to a level edge ends up to so much beside the image that it runs to.
-        let beside = |limits: &[f64; 2]| limits.map(|z_m| (z_m - self.z_m).abs());
-        let beside_m = self.walls.iter().flatten().flat_map(beside).fold(0.0, f64::max);
-        let highest_m = beside_m + settings.max_path_m;
+        // A path to a level edge ends up to this far from the height of its image.
+        let offsets_m = |limits: &[f64; 2]| limits.map(|z_m| (z_m - self.z_m).abs());
+        let lateral_m = self.walls.iter().flatten().flat_map(offsets_m).fold(0.0, f64::max);
+        let highest_m = lateral_m + settings.max_path_m;
         let of_wall = |limits: &[f64; 2]| {
             let [lower, upper] = self.has_edges(*limits);
             let [from_m, to_m] = [limits[0] + NEAR_EDGE_M, limits[1] - NEAR_EDGE_M];
@@ -120,28 +121,29 @@ impl Heights {
             let above = upper.then_some([to_m, f64::INFINITY]);
             let passed = [below, above].into_iter().flatten();
             WallClimbs {
-                met: self.unfolded([[limits[0] - NEAR_EDGE_M, limits[1] + NEAR_EDGE_M]], highest_m),
+                hit: self.unfolded([[limits[0] - NEAR_EDGE_M, limits[1] + NEAR_EDGE_M]], highest_m),
                 passed: self.unfolded(passed, highest_m),
             }
         };
         let images = [VerticalImage::NONE].iter().chain(&self.images);
         let mut highest: Vec<[f64; 2]> =
-            images.map(|image| [image.gain, image.rise_m.abs() + beside_m]).collect();
-        highest.sort_by(|one, other| other[0].total_cmp(&one[0]));
-        let mut most_m = 0.0_f64;
+            images.map(|image| [image.gain, image.rise_m.abs() + lateral_m]).collect();
+        highest.sort_by(|a, b| b[0].total_cmp(&a[0]));
+        let mut max_m = 0.0_f64;
         for [_, climb_m] in &mut highest {
-            most_m = most_m.max(*climb_m);
-            *climb_m = most_m;
+            max_m = max_m.max(*climb_m);
+            *climb_m = max_m;
         }
         let walls = self.walls.iter().map(|limits| limits.as_ref().map(of_wall)).collect();
         Climbs { ends_beams: true, walls, highest }
     }
 
-    /// The climbs up to `highest_m`, up or down, that end within one of these stretches of height.
+    /// Returns the climbs up to `highest_m`, up or down, that end within one of these ranges of
+    /// height.
     fn unfolded(&self, stretches: impl IntoIterator<Item = [f64; 2]>, highest_m: f64) -> Spans {
         let ends = [self.floor_z_m, self.ceiling_z_m];
         let [low_m, high_m] = [ends[0].unwrap_or(f64::MIN), ends[1].unwrap_or(f64::MAX)];
-        // Mirrored at one of them, the heights repeat themselves after both.
+        // Mirrored at one of them, the heights repeat with the period of both.
         let mirror_m = ends[0].or(ends[1]).unwrap_or(self.z_m);
         let period_m = 2.0 * (high_m - low_m);
         let turns = if period_m.is_finite() { (highest_m / period_m).ceil() as i32 + 1 } else { 0 };
@@ -160,8 +162,8 @@ impl Heights {
         united(near.map(|span| span.map(|end| end.clamp(-highest_m, highest_m))).collect())
     }
 
-    /// Walls that stand above or below the one that the plan knows at the same place, by [`between`] their
-    /// ends. Of walls that share heights there the one given first counts.
+    /// Walls above or below the wall in the floor plan at the same place, by [`between`] their
+    /// ends. Of walls with overlapping heights there, the first one counts.
     pub(crate) fn stacked(&self, plan: &Arrangement) -> HashMap<[u32; 2], Vec<u32>> {
         if !self.rises() {
             return HashMap::new();
@@ -179,13 +181,13 @@ impl Heights {
         plan.pieces.iter().filter_map(others).collect()
     }
 
-    fn are_apart(&self, one: u32, other: u32) -> bool {
-        let [one, other] = [one, other].map(|wall| self.walls[wall as usize]);
-        one.zip(other).is_some_and(|([a, b], [c, d])| b <= c || d <= a)
+    fn are_apart(&self, first: u32, second: u32) -> bool {
+        let [first, second] = [first, second].map(|wall| self.walls[wall as usize]);
+        first.zip(second).is_some_and(|([a, b], [c, d])| b <= c || d <= a)
     }
 
-    /// Heights above the ranger of the level edges of a wall with limits, metres, and whether each is its
-    /// upper one. Where it stands on the floor or reaches the ceiling it has none.
+    /// Heights above the ranger of the level edges of a wall with limits, metres, each with `true`
+    /// for the upper one. At the floor and at the ceiling there is no edge.
     pub(crate) fn level_edges(&self, wall: u32) -> impl Iterator<Item = (f64, bool)> {
         let limits = self.walls[wall as usize].unwrap_or_default();
         let has = self.has_edges(limits);
@@ -199,22 +201,23 @@ impl Heights {
         limits[usize::from(is_upper)] - self.z_m
     }
 
-    /// Whether what stands between such heights ends above the floor, and below the ceiling.
+    /// Returns for these limits whether they end above the floor, and below the ceiling.
     fn has_edges(&self, [from_m, to_m]: [f64; 2]) -> [bool; 2] {
         let lower = self.floor_z_m.is_none_or(|floor| from_m > floor);
         let upper = self.ceiling_z_m.is_none_or(|ceiling| to_m < ceiling);
         [lower, upper]
     }
 
-    /// Whether paths have to be asked where they meet things.
-    pub(crate) fn matter(&self) -> bool {
+    /// Returns `true` if paths have to be checked against limited heights.
+    pub(crate) fn need_checks(&self) -> bool {
         let low_round = self.cylinders.iter().any(Option::is_some);
         self.rises() && (low_round || self.limited.size() > 0)
     }
 
-    /// Whether a wall with limits bars what crosses its line at a height. On its level edge it does not:
-    /// there the whole path counts, and the diffracted field, which is minus half of it, is added.
-    pub(crate) fn stands_at(&self, wall: u32, z_m: f64) -> bool {
+    /// Returns `true` if a wall with limits blocks a crossing of its line at a height. On its level
+    /// edge it does not: there the whole path counts, and the diffracted field, which is minus half
+    /// of it, is added.
+    pub(crate) fn blocks_at(&self, wall: u32, z_m: f64) -> bool {
         let [from_m, to_m] = self.walls[wall as usize].unwrap_or_default();
         let [lower, upper] = self.has_edges([from_m, to_m]);
         (!lower || z_m > from_m + TIE_M) && (!upper || z_m < to_m - TIE_M)
@@ -228,16 +231,16 @@ impl Heights {
         }
     }
 
-    /// Whether something between such heights is met between two heights of a path that would be
-    /// there if floor and ceiling were windows.
+    /// Returns `true` if an object with these limits is hit between two heights of a path, with
+    /// floor and ceiling as windows.
     ///
-    /// Folded, the heights between the two are an interval: its ends are the folded ends, or floor and
-    /// ceiling where the path turns at one of their images in between. Images of each lie `2 (ceiling - floor)`
-    /// apart.
-    pub(crate) fn bars(&self, limits: Option<[f64; 2]>, straight_m: [f64; 2]) -> bool {
+    /// Folded, the heights between the two are an interval. Its ends are the folded ends, or floor
+    /// and ceiling where the path turns at one of their images in between. Images of each are
+    /// `2 (ceiling - floor)` apart.
+    pub(crate) fn blocks(&self, limits: Option<[f64; 2]>, straight_m: [f64; 2]) -> bool {
         let Some([from_m, to_m]) = limits else { return true };
         let [low_m, high_m] = [straight_m[0].min(straight_m[1]), straight_m[0].max(straight_m[1])];
-        // Where it turns at floor and ceiling in between.
+        // Turns at floor and ceiling in between.
         let images = [self.floor_z_m, self.ceiling_z_m].into_iter().flatten();
         let turns = images.filter(|&at| {
             let period = match (self.floor_z_m, self.ceiling_z_m) {
@@ -258,17 +261,17 @@ impl Heights {
         low_m <= to_m && high_m >= from_m
     }
 
-    /// The height of a path that would have climbed so far if floor and ceiling were windows, metres;
-    /// `None` without either.
+    /// Height, metres, of a path after a climb with floor and ceiling as windows; `None` without
+    /// either.
     pub(crate) fn z_at(&self, climbed_m: f64) -> Option<f64> {
         self.rises().then(|| self.folded_m(self.z_m + climbed_m))
     }
 
-    /// The reflections of a path that climbs so far if floor and ceiling are windows, metres, in `count`
-    /// reflections; downwards it comes to the floor first.
+    /// Reflections of a path that climbs this far, metres, with floor and ceiling as windows, in
+    /// `count` reflections; a descending path reaches the floor first.
     ///
-    /// With the first surface `h` away and a room of height `H`, reflection `n` (from 0) is at the share
-    /// `(h + n H) / |climb|` of the path's length, because the unfolded path climbs evenly.
+    /// With the first surface `h` away and a room of height `H`, reflection `n` (from 0) is at the
+    /// share `(h + n H) / |climb|` of the path's length, because the unfolded path climbs evenly.
     pub(crate) fn bounces(&self, climb_m: f64, count: u16) -> impl Iterator<Item = Bounce> {
         let mut surfaces =
             [(Reflector::Floor, self.floor_z_m), (Reflector::Ceiling, self.ceiling_z_m)];
@@ -285,7 +288,7 @@ impl Heights {
         })
     }
 
-    /// The height of a path that would be at `z_m` if floor and ceiling were windows.
+    /// Height of a path that is at `z_m` with floor and ceiling as windows.
     pub(crate) fn folded_m(&self, z_m: f64) -> f64 {
         match (self.floor_z_m, self.ceiling_z_m) {
             (None, None) => z_m,
@@ -300,22 +303,22 @@ impl Heights {
     }
 }
 
-/// Floor or ceiling, if there is one.
+/// Floor or ceiling as a mirror, if there is one.
 fn mirror(z_m: Option<f64>, material: &Material) -> Option<HorizontalMirror> {
     Some(HorizontalMirror { z_m: z_m?, gain: mirror_gain(material) })
 }
 
 /// A reflection at floor or ceiling.
 pub(crate) struct Bounce {
-    /// After which share of the path's length.
+    /// Position as a share of the path's length.
     pub(crate) share: f64,
     pub(crate) surface: Reflector,
     pub(crate) z_m: f64,
 }
 
-/// Whether something between such heights stands at a height.
+/// Returns `true` if a height is within the limits.
 pub(crate) fn holds(limits: Option<[f64; 2]>, z_m: f64) -> bool {
-    // On the very end counts as met; the echo of a level edge knows that.
+    // The very end counts as a hit; the echo of a level edge takes that into account.
     limits.is_none_or(|[from, to]| (from - TIE_M..=to + TIE_M).contains(&z_m))
 }
 

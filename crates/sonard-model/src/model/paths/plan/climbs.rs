@@ -1,56 +1,59 @@
-//! Climbs: the heights at which sound meets a wall that ends below the ceiling or above the floor, and those
-//! at which it passes such a wall.
+//! Climbs: heights at which sound hits a wall that ends below the ceiling or above the floor, and
+//! heights at which it passes such a wall.
 //!
-//! If floor and ceiling were windows the height of a path would grow evenly with its length in the plan, and
-//! a wall would stand once at its own height and again at each of its images by floor and ceiling. So what a
-//! ray can meet follows from one number, its slope.
+//! With floor and ceiling as windows the height of a path grows evenly with its length in the plan.
+//! A wall is then at its own height once and again at each of its images by floor and ceiling. The
+//! walls that a ray can hit therefore follow from one number, its slope.
 
-/// The number of the set of all slopes.
+/// Number of the set of all slopes.
 pub(crate) const ALL_SLOPES: u32 = 0;
 
-/// Heights above the transducer if floor and ceiling are windows, metres: closed, rising and apart.
+/// Heights above the transducer with floor and ceiling as windows, metres: closed intervals,
+/// ascending and disjoint.
 pub(crate) type Spans = Vec<[f64; 2]>;
 
-/// Of a wall that ends below the ceiling or above the floor.
+/// Climbs at a wall that ends below the ceiling or above the floor.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct WallClimbs {
-    /// Where it reflects.
-    pub(crate) met: Spans,
-    /// Where sound goes on behind it.
+    /// Climbs at which the wall reflects.
+    pub(crate) hit: Spans,
+    /// Climbs at which sound passes the wall.
     pub(crate) passed: Spans,
 }
 
-/// The walls with limits of a scene, around a transducer.
+/// Climbs at the walls with limits of a scene, around a transducer.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Climbs {
-    /// Whether beams end where none of their rays stands at the right height; else only paths are asked.
+    /// `true` if beams end where none of their rays is at the right height; otherwise only paths
+    /// are checked.
     pub(crate) ends_beams: bool,
-    /// By wall; `None` of one without limits. Empty in a scene without floor and ceiling.
+    /// Climbs by wall; `None` without limits. Empty in a scene without floor and ceiling.
     pub(crate) walls: Vec<Option<WallClimbs>>,
-    /// By falling gain what floor and ceiling leave, and the highest climb with that much or more, metres.
+    /// Amplitude factors of floor and ceiling, decreasing, each with the highest climb that has at
+    /// least this factor, metres.
     pub(crate) highest: Vec<[f64; 2]>,
 }
 
 impl Climbs {
-    /// Of a wall with limits.
+    /// Climbs at a wall with limits.
     pub(crate) fn of_wall(&self, wall: u32) -> Option<&WallClimbs> {
         self.walls.get(wall as usize)?.as_ref()
     }
 
-    /// Whether level sound meets a wall.
-    pub(crate) fn meets_level(&self, wall: u32) -> bool {
-        self.of_wall(wall).is_none_or(|climbs| is_level_in(&climbs.met))
+    /// Returns `true` if level sound hits a wall.
+    pub(crate) fn is_hit_by_level(&self, wall: u32) -> bool {
+        self.of_wall(wall).is_none_or(|climbs| is_level_in(&climbs.hit))
     }
 
-    /// Whether level sound passes a wall with limits.
-    pub(crate) fn passes_level(&self, wall: u32) -> bool {
+    /// Returns `true` if level sound passes a wall with limits.
+    pub(crate) fn is_passed_by_level(&self, wall: u32) -> bool {
         self.of_wall(wall).is_some_and(|climbs| is_level_in(&climbs.passed))
     }
 
-    /// The highest climb after which floor and ceiling leave at least the share `least_gain` of the amplitude,
-    /// metres.
-    pub(crate) fn highest_m(&self, least_gain: f64) -> f64 {
-        let count = self.highest.partition_point(|[gain, _]| *gain >= least_gain);
+    /// Highest climb, metres, after which floor and ceiling leave at least the share `min_gain`
+    /// of the amplitude.
+    pub(crate) fn highest_m(&self, min_gain: f64) -> f64 {
+        let count = self.highest.partition_point(|[gain, _]| *gain >= min_gain);
         count.checked_sub(1).map_or(0.0, |last| self.highest[last][1])
     }
 }
@@ -59,9 +62,9 @@ fn is_level_in(spans: &Spans) -> bool {
     spans.iter().any(|[from_m, to_m]| *from_m <= 0.0 && 0.0 <= *to_m)
 }
 
-/// What two lists of intervals cover together, as [`Spans`].
+/// Union of the intervals of a list, as [`Spans`].
 pub(crate) fn united(mut spans: Vec<[f64; 2]>) -> Spans {
-    spans.sort_by(|one, other| one[0].total_cmp(&other[0]));
+    spans.sort_by(|a, b| a[0].total_cmp(&b[0]));
     let mut united: Spans = Vec::with_capacity(spans.len());
     for [from, to] in spans {
         match united.last_mut() {

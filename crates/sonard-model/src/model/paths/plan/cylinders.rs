@@ -7,46 +7,47 @@ use smallvec::SmallVec;
 use super::mesh::Mesh;
 use crate::{geometry::DVec2, model::paths::tolerance::TIE_M};
 
-/// The cylinders of a scene and the triangles they reach into.
+/// Cylinders of a scene and the triangles they reach into.
 #[derive(Debug, Default)]
 pub(crate) struct Cylinders {
-    pub(crate) circles: Vec<Circle>,
-    /// By triangle; empty without cylinders.
+    pub(crate) circles: Vec<PlanCircle>,
+    /// Arcs by triangle; empty without cylinders.
     by_triangle: Vec<SmallVec<[SurfaceArc; 1]>>,
 }
 
 /// A cylinder in the plan.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Circle {
+pub(crate) struct PlanCircle {
     pub(crate) center: DVec2,
-    /// Without size for a cylinder that is not at the ranger's height: the others keep their numbers.
+    /// Zero for a cylinder that is not at the ranger's height, so that the others keep their
+    /// numbers.
     pub(crate) radius_m: f64,
     /// See [`super::mirror_gain`].
     pub(crate) gain: f64,
-    /// Whether no sound passes above or below.
+    /// `true` if no sound passes above or below.
     pub(crate) is_opaque: bool,
 }
 
-/// The part of a cylinder's surface that is in a triangle.
+/// Part of a cylinder's surface within a triangle.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct SurfaceArc {
     pub(crate) cylinder: u32,
-    pub(crate) span: Span,
+    pub(crate) span: AngleSpan,
 }
 
-/// Counter-clockwise from one angle to another, at most a turn.
+/// Interval of angles, counter-clockwise, at most a turn.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Span {
+pub(crate) struct AngleSpan {
     pub(crate) from_rad: f64,
     pub(crate) to_rad: f64,
 }
 
-/// Spans shorter than this are empty, radians.
-const LEAST_RAD: f64 = 1e-12;
+/// Length below which spans count as empty, radians.
+const MIN_SPAN_RAD: f64 = 1e-12;
 
 impl Cylinders {
-    /// Finds the triangles of each.
-    pub(crate) fn new(circles: Vec<Circle>, mesh: Option<&Mesh>) -> Self {
+    /// Assigns the arcs of all circles to triangles.
+    pub(crate) fn new(circles: Vec<PlanCircle>, mesh: Option<&Mesh>) -> Self {
         let mut by_triangle = Vec::new();
         if let Some(mesh) = mesh.filter(|_| !circles.is_empty()) {
             by_triangle.resize(mesh.triangles.len(), SmallVec::new());
@@ -73,17 +74,17 @@ impl Cylinders {
         self.by_triangle.get(triangle as usize).map_or(&[], |arcs| arcs)
     }
 
-    /// Whether a cylinder stands across the straight line between two points of a triangle.
+    /// Returns `true` if a cylinder blocks the straight line between two points of a triangle.
     pub(crate) fn hide_in(&self, triangle: u32, from: DVec2, to: DVec2) -> bool {
         let mut circles = self.in_triangle(triangle).iter().map(|arc| arc.cylinder as usize);
-        circles.any(|at| self.circles[at].is_opaque && self.circles[at].meets(from, to))
+        circles.any(|at| self.circles[at].is_opaque && self.circles[at].is_crossed(from, to))
     }
 }
 
-/// The parts of a circle that no opaque one covers. Of two at the same place the first one is there.
-fn free_spans(circles: &[Circle], number: u32) -> Vec<Span> {
+/// Parts of a circle that no opaque one covers. Of two identical circles the first one counts.
+fn free_spans(circles: &[PlanCircle], number: u32) -> Vec<AngleSpan> {
     let circle = &circles[number as usize];
-    let mut free = vec![Span { from_rad: -PI, to_rad: PI }];
+    let mut free = vec![AngleSpan { from_rad: -PI, to_rad: PI }];
     for (other, index) in circles.iter().zip(0..) {
         if index != number && other.is_opaque && other.radius_m > 0.0 {
             match circle.outside(other, index < number) {
@@ -97,8 +98,8 @@ fn free_spans(circles: &[Circle], number: u32) -> Vec<Span> {
     free
 }
 
-impl Span {
-    /// The common part of two spans, in this one's turns.
+impl AngleSpan {
+    /// Intersection of two spans, in the turns of `self`.
     pub(crate) fn common(&self, other: &Self) -> SmallVec<[Self; 2]> {
         let turn = ((self.from_rad - other.from_rad) / TAU).floor();
         [turn - 1.0, turn, turn + 1.0, turn + 2.0]
@@ -107,42 +108,42 @@ impl Span {
                 from_rad: self.from_rad.max(other.from_rad + turn * TAU),
                 to_rad: self.to_rad.min(other.to_rad + turn * TAU),
             })
-            .filter(|common| common.to_rad - common.from_rad > LEAST_RAD)
+            .filter(|common| common.to_rad - common.from_rad > MIN_SPAN_RAD)
             .collect()
     }
 }
 
-impl Circle {
-    /// The point of the surface at an angle around the centre.
+impl PlanCircle {
+    /// Returns the point of the surface at an angle around the centre.
     pub(crate) fn point(&self, angle_rad: f64) -> DVec2 {
         self.center + self.radius_m * DVec2::from_angle(angle_rad)
     }
 
-    /// The square of the length of a tangent from a point.
+    /// Power of a point: the square of the length of a tangent from it.
     pub(crate) fn power(&self, point: DVec2) -> f64 {
         point.distance_squared(self.center) - self.radius_m * self.radius_m
     }
 
-    /// The part that is outside another circle, `None` if none is; of two that are the same the one that
-    /// does not `yield`.
-    fn outside(&self, other: &Self, yields: bool) -> Option<Span> {
+    /// Part that is outside another circle, `None` if none is. Of two identical circles the one
+    /// that `yields` is covered.
+    fn outside(&self, other: &Self, yields: bool) -> Option<AngleSpan> {
         let apart = other.center - self.center;
         let apart_m = apart.length();
         if apart_m <= other.radius_m - self.radius_m {
             let is_same = apart_m == 0.0 && other.radius_m == self.radius_m;
-            return (is_same && !yields).then_some(Span { from_rad: -PI, to_rad: PI });
+            return (is_same && !yields).then_some(AngleSpan { from_rad: -PI, to_rad: PI });
         }
         if apart_m >= self.radius_m + other.radius_m || apart_m <= self.radius_m - other.radius_m {
-            return Some(Span { from_rad: -PI, to_rad: PI });
+            return Some(AngleSpan { from_rad: -PI, to_rad: PI });
         }
-        // By the law of cosines, to where both cross.
+        // By the law of cosines, to the intersections of both.
         let (r, reach) = (self.radius_m, other.radius_m);
         let half_rad = ((apart_m * apart_m + r * r - reach * reach) / (2.0 * apart_m * r)).acos();
         let middle = apart.to_angle();
-        Some(Span { from_rad: middle + half_rad, to_rad: middle - half_rad + TAU })
+        Some(AngleSpan { from_rad: middle + half_rad, to_rad: middle - half_rad + TAU })
     }
 
-    fn spans_in(&self, mesh: &Mesh, triangle: u32) -> SmallVec<[Span; 1]> {
+    fn spans_in(&self, mesh: &Mesh, triangle: u32) -> SmallVec<[AngleSpan; 1]> {
         let mut cuts: SmallVec<[f64; 6]> = SmallVec::new();
         for side in 0..3 {
             let (a, b) = (mesh.corner(triangle, side), mesh.corner(triangle, (side + 1) % 3));
@@ -159,17 +160,17 @@ impl Circle {
         cuts.sort_by(f64::total_cmp);
         let Some(&first) = cuts.first() else {
             let whole = mesh.holds(triangle, self.point(0.0));
-            return whole.then_some(Span { from_rad: -PI, to_rad: PI }).into_iter().collect();
+            return whole.then_some(AngleSpan { from_rad: -PI, to_rad: PI }).into_iter().collect();
         };
         let ends = cuts.iter().copied().skip(1).chain([first + TAU]);
         cuts.iter()
             .zip(ends)
-            .map(|(&from_rad, to_rad)| Span { from_rad, to_rad })
+            .map(|(&from_rad, to_rad)| AngleSpan { from_rad, to_rad })
             .filter(|span| mesh.holds(triangle, self.point(0.5 * (span.from_rad + span.to_rad))))
             .collect()
     }
 
-    /// Between which shares of the straight line from one point to another it is inside.
+    /// Interval inside the circle, as shares of the straight line from one point to another.
     pub(crate) fn chord(&self, from: DVec2, to: DVec2) -> Option<[f64; 2]> {
         let run = to - from;
         let middle = (self.center - from).dot(run) / run.length_squared();
@@ -180,7 +181,7 @@ impl Circle {
         (half_m > TIE_M && ends[0] < ends[1]).then_some(ends)
     }
 
-    fn meets(&self, from: DVec2, to: DVec2) -> bool {
+    fn is_crossed(&self, from: DVec2, to: DVec2) -> bool {
         let run = to - from;
         let nearest = ((self.center - from).dot(run) / run.length_squared()).clamp(0.0, 1.0);
         (from + nearest * run).distance(self.center) < self.radius_m - TIE_M
@@ -193,26 +194,27 @@ mod tests {
 
     use super::*;
 
-    fn circle(x: f64, y: f64, radius_m: f64) -> Circle {
-        Circle { center: DVec2::new(x, y), radius_m, gain: 1.0, is_opaque: true }
+    fn circle(x: f64, y: f64, radius_m: f64) -> PlanCircle {
+        PlanCircle { center: DVec2::new(x, y), radius_m, gain: 1.0, is_opaque: true }
     }
 
-    /// Lengths of the free parts and whether a direction is in one.
-    fn free(circles: &[Circle], number: u32) -> (f64, impl Fn(f64) -> bool) {
+    /// Total length of the free parts, and a test whether a direction is in one.
+    fn free(circles: &[PlanCircle], number: u32) -> (f64, impl Fn(f64) -> bool) {
         let spans = free_spans(circles, number);
         let length_rad = spans.iter().map(|span| span.to_rad - span.from_rad).sum();
         let holds = move |angle: f64| {
-            let within =
-                |span: &Span| (angle - span.from_rad).rem_euclid(TAU) < span.to_rad - span.from_rad;
+            let within = |span: &AngleSpan| {
+                (angle - span.from_rad).rem_euclid(TAU) < span.to_rad - span.from_rad
+            };
             spans.iter().any(within)
         };
         (length_rad, holds)
     }
 
-    /// Two circles of radius 1 whose centres are the root of 2 apart cross at 45 degrees off the line
-    /// between them: a quarter of each is in the other.
+    /// Two circles of radius 1 whose centres are the root of 2 apart cross at 45 degrees off the
+    /// line between them: a quarter of each is inside the other.
     #[test]
-    fn what_another_cylinder_covers_is_not_free() {
+    fn overlapping_cylinders() {
         let pair = [circle(1.0, 1.0, 1.0), circle(2.0, 2.0, 1.0)];
         for (number, covered_rad) in [(0, PI / 4.0), (1, -0.75 * PI)] {
             let (length_rad, holds) = free(&pair, number);
@@ -224,7 +226,7 @@ mod tests {
                 assert!(holds(covered_rad + off_rad), "{number} {off_rad}");
             }
         }
-        // Of unlike ones: 3, 4 and 5 make a right angle where they cross.
+        // Circles of different radii: 3, 4 and 5 form a right angle where they cross.
         let unlike = [circle(0.0, 0.0, 3.0), circle(5.0, 0.0, 4.0)];
         let half_rad = (3.0_f64 / 5.0).acos();
         assert!((free(&unlike, 0).0 - (TAU - 2.0 * half_rad)).abs() < 1e-9);
@@ -232,26 +234,27 @@ mod tests {
     }
 
     #[test]
-    fn cylinders_apart_and_within_each_other() {
-        let whole = |circles: &[Circle], number| (free(circles, number).0 - TAU).abs() < 1e-9;
+    fn disjoint_and_nested_cylinders() {
+        let whole = |circles: &[PlanCircle], number| (free(circles, number).0 - TAU).abs() < 1e-9;
         let apart = [circle(0.0, 0.0, 1.0), circle(3.0, 0.0, 1.0)];
         assert!(whole(&apart, 0) && whole(&apart, 1));
         let within = [circle(0.0, 0.0, 1.0), circle(0.2, 0.0, 0.5)];
         assert!(whole(&within, 0) && free(&within, 1).0 == 0.0);
-        // Of two that are one the first is there; one that lets sound pass or has no size covers nothing.
+        // Of two identical circles the first counts; one that lets sound pass or has no size covers
+        // nothing.
         let same = [circle(0.0, 0.0, 1.0), circle(0.0, 0.0, 1.0)];
         assert!(whole(&same, 0) && free(&same, 1).0 == 0.0);
-        let low = Circle { is_opaque: false, ..circle(1.0, 0.0, 1.0) };
+        let low = PlanCircle { is_opaque: false, ..circle(1.0, 0.0, 1.0) };
         assert!(whole(&[circle(0.0, 0.0, 1.0), low, circle(0.5, 0.0, 0.0)], 0));
     }
 
     #[test]
-    fn tangents_and_chords_are_euclids() {
+    fn tangents_and_chords() {
         let round = circle(1.0, 2.0, 3.0);
-        // A tangent of 4 from 5 away; from within the power is negative.
+        // A tangent of 4 from 5 away; from inside the power is negative.
         assert_eq!(round.power(DVec2::new(6.0, 2.0)), 16.0);
         assert_eq!(round.power(DVec2::new(1.0, 1.0)), -8.0);
-        // 10 long and 2.4 beside the middle: half the chord is 1.8, about its middle.
+        // 10 long at 2.4 from the middle: half the chord is 1.8, about its middle.
         let chord = round.chord(DVec2::new(-4.0, 4.4), DVec2::new(6.0, 4.4)).expect("it cuts");
         assert!((chord[0] - 0.32).abs() < 1e-12 && (chord[1] - 0.68).abs() < 1e-12, "{chord:?}");
         assert_eq!(round.chord(DVec2::new(-4.0, 5.1), DVec2::new(6.0, 5.1)), None);

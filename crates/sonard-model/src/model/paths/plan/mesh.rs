@@ -1,5 +1,5 @@
-//! A scene's floor plan as triangles: whoever walks from triangle to triangle meets walls in
-//! the order in which sound meets them.
+//! Triangle mesh of a scene's floor plan: a walk from triangle to triangle reaches walls in the
+//! order in which sound does.
 
 use std::collections::HashMap;
 
@@ -15,36 +15,36 @@ pub(crate) struct Mesh {
     /// Wall ends and crossings, then the corners of the box.
     pub(crate) points: Vec<DVec2>,
     pub(crate) triangles: Vec<Triangle>,
-    /// For each triangle what is behind its sides, walls or not; `u32::MAX` at the box.
+    /// Triangle behind each side, wall or not; `u32::MAX` at the box.
     across: Vec<[u32; 3]>,
-    /// Walls that stand above or below another at the same place, by [`between`] its ends.
+    /// Walls above or below another one at the same place, by [`between`] its ends.
     stacked: HashMap<[u32; 2], Vec<u32>>,
-    /// Some triangle at each point.
+    /// Index of a triangle at each point.
     near: RTree<GeomWithData<[f64; 2], u32>>,
 }
 
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Triangle {
-    /// Indices of its corners, counter-clockwise.
+    /// Indices of the corners, counter-clockwise.
     pub(crate) corners: [u32; 3],
     /// Side `i` goes from corner `i` to corner `i + 1`.
-    pub(crate) sides: [Side; 3],
+    pub(crate) sides: [TriangleSide; 3],
 }
 
-/// The other side of a triangle's side.
+/// Neighbour at a triangle's side.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Side {
+pub(crate) enum TriangleSide {
     /// Another triangle, through its side of that number.
     Open { triangle: u32, side: u8 },
     /// A wall, by its index.
     Wall(u32),
-    /// The end of the box.
+    /// The border of the box.
     Outside,
 }
 
 impl Mesh {
-    /// Triangulates the walls in a box that is `margin_m` wider than they are. `None` if there
-    /// are no walls and `extra` points, which the box has to hold too.
+    /// Triangulates the walls in a box that is `margin_m` wider than they are. Returns `None` if
+    /// there are no walls and no `extra` points, which the box has to contain too.
     pub(crate) fn new(
         plan: &Arrangement,
         stacked: HashMap<[u32; 2], Vec<u32>>,
@@ -70,7 +70,7 @@ impl Mesh {
         Some(Self { points, triangles, across, stacked, near })
     }
 
-    /// The triangle behind a side, wall or not, and which of its sides that is.
+    /// Returns the triangle behind a side, wall or not, and the index of the side there.
     pub(crate) fn beyond(&self, triangle: u32, side: usize) -> Option<(u32, u8)> {
         let other = *self.across[triangle as usize].get(side)?;
         let end = self.triangles[triangle as usize].corners[(side + 1) % 3];
@@ -79,7 +79,7 @@ impl Mesh {
         Some((other, side as u8))
     }
 
-    /// The walls that stand above or below the one in a side.
+    /// Walls above or below the one in a side.
     pub(crate) fn stacked(&self, triangle: u32, side: usize) -> &[u32] {
         if self.stacked.is_empty() {
             return &[];
@@ -89,18 +89,20 @@ impl Mesh {
         self.stacked.get(&between(ends)).map_or(&[], Vec::as_slice)
     }
 
-    /// A corner of a triangle.
+    /// Returns a corner of a triangle.
     pub(crate) fn corner(&self, triangle: u32, corner: usize) -> DVec2 {
         self.points[self.triangles[triangle as usize].corners[corner] as usize]
     }
 
-    /// The triangle a point is in (one of them if it is on a side); `None` outside the box.
+    /// Returns the triangle that contains a point (one of them if it is on a side); `None` outside
+    /// the box.
     ///
-    /// Walks from a triangle at the nearest corner through sides that the point is beyond, by exact signs.
+    /// Walks from a triangle at the nearest corner through sides that the point is beyond, by exact
+    /// signs.
     pub(crate) fn locate(&self, point: DVec2) -> Option<u32> {
         let mut at = self.near.nearest_neighbor(point.to_array())?.data;
-        // In a Delaunay mesh such a walk ends; walls disturb this one, so it may circle, in which
-        // case the slow way decides.
+        // In a Delaunay mesh such a walk ends. The constraints of the walls may make it circle, in
+        // which case a linear search decides.
         for _ in 0..self.triangles.len() {
             let Some(side) = (0..3).find(|&side| self.is_beyond(at, side, point)) else {
                 return Some(at);
@@ -113,12 +115,12 @@ impl Mesh {
         (0..self.triangles.len() as u32).find(|&triangle| self.holds(triangle, point))
     }
 
-    /// Whether a point is in a triangle, sides included.
+    /// Returns `true` if a point is in a triangle, sides included.
     pub(crate) fn holds(&self, triangle: u32, point: DVec2) -> bool {
         !(0..3).any(|side| self.is_beyond(triangle, side, point))
     }
 
-    /// Triangles that have points within `radius_m` of `center`.
+    /// Returns the triangles that have points within `radius_m` of `center`.
     pub(crate) fn triangles_near(&self, center: DVec2, radius_m: f64) -> Vec<u32> {
         let Some(first) = self.locate(center) else { return Vec::new() };
         let mut found = vec![first];
@@ -137,7 +139,7 @@ impl Mesh {
         found
     }
 
-    /// The triangles around each point, counter-clockwise, and which of their corners it is.
+    /// Triangles around each point, counter-clockwise, each with the index of that corner.
     pub(crate) fn around_points(&self) -> Vec<SmallVec<[(u32, u8); 6]>> {
         let mut around: Vec<SmallVec<[(u32, u8); 6]>> = vec![SmallVec::new(); self.points.len()];
         for (triangle, index) in self.triangles.iter().zip(0..) {
@@ -168,16 +170,16 @@ fn triangulate(points: &[DVec2], plan: &Arrangement) -> Cdt {
     let vertices = points.iter().map(|p| Point2::new(p.x, p.y)).collect();
     let edges = plan.pieces.iter().map(|piece| piece.ends.map(|end| end as usize)).collect();
     // Pieces touch at their ends only, and coordinates of a checked scene are finite, so neither
-    // conflicts nor errors are left to come.
+    // conflicts nor errors are possible.
     Cdt::try_bulk_load_cdt(vertices, edges, |_| debug_assert!(false, "walls cross"))
         .unwrap_or_default()
 }
 
 type Edge<'a> = spade::handles::DirectedEdgeHandle<'a, Point2<f64>, (), spade::CdtEdge<()>, ()>;
 
-/// The triangle behind an edge.
+/// Returns the triangle behind an edge.
 fn behind(edge: Edge) -> u32 {
-    // Inner faces are numbered from 1; face 0 is what lies outside.
+    // Inner faces are numbered from 1; face 0 is the outside.
     edge.rev().face().as_inner().map_or(u32::MAX, |face| face.index() as u32 - 1)
 }
 
@@ -189,12 +191,12 @@ fn triangles(cdt: &Cdt, plan: &Arrangement) -> Vec<Triangle> {
         if edge.is_constraint_edge()
             && let Some(&wall) = wall_of.get(&between(ends))
         {
-            return Side::Wall(wall);
+            return TriangleSide::Wall(wall);
         }
-        let Some(face) = edge.rev().face().as_inner() else { return Side::Outside };
+        let Some(face) = edge.rev().face().as_inner() else { return TriangleSide::Outside };
         let back = edge.rev().fix();
         let slot = face.adjacent_edges().iter().position(|other| other.fix() == back);
-        Side::Open { triangle: behind(edge), side: slot.map_or(0, |slot| slot as u8) }
+        TriangleSide::Open { triangle: behind(edge), side: slot.map_or(0, |slot| slot as u8) }
     };
     cdt.inner_faces()
         .map(|face| {
@@ -220,31 +222,31 @@ mod tests {
     }
 
     #[test]
-    fn sides_lead_back() {
+    fn sides_are_mutual() {
         let mesh = mesh(&[[0.0, 0.0, 1.0, 0.0], [0.3, -1.0, 0.4, 2.0], [3.0, 0.5, 3.0, 0.9]]);
         let mut walls = 0;
         for (triangle, index) in mesh.triangles.iter().zip(0..) {
             for (i, side) in triangle.sides.iter().enumerate() {
                 match *side {
-                    Side::Open { triangle: other, side } => {
+                    TriangleSide::Open { triangle: other, side } => {
                         let back = mesh.triangles[other as usize].sides[side as usize];
-                        assert_eq!(back, Side::Open { triangle: index, side: i as u8 });
+                        assert_eq!(back, TriangleSide::Open { triangle: index, side: i as u8 });
                         let ends = [triangle.corners[i], triangle.corners[(i + 1) % 3]];
                         let other = mesh.triangles[other as usize].corners;
                         let side = side as usize;
                         assert_eq!(ends, [other[(side + 1) % 3], other[side]]);
                     }
-                    Side::Wall(_) => walls += 1,
-                    Side::Outside => {}
+                    TriangleSide::Wall(_) => walls += 1,
+                    TriangleSide::Outside => {}
                 }
             }
         }
-        // Two crossing walls in two pieces each and a lone one, seen from both sides.
+        // Two crossing walls in two pieces each and a separate one, seen from both sides.
         assert_eq!(walls, 2 * 5);
     }
 
     #[test]
-    fn locate_finds_the_triangle_also_on_sides_and_behind_walls() {
+    fn locate_on_sides_and_behind_walls() {
         let mesh = mesh(&[[0.0, 0.0, 1.0, 0.0], [1.0, 0.0, 1.0, 1.0], [0.2, 0.2, 0.5, 0.7]]);
         for i in 0..40 {
             for j in 0..40 {

@@ -1,36 +1,36 @@
-//! Thin cylinders of the floor plan, which sound goes round: they scatter as a whole from their axes.
+//! Thin cylinders of the floor plan, which sound passes: they scatter as a whole from their axes.
 
-use super::Circle;
+use super::PlanCircle;
 use crate::{
     acoustics::edge::Post,
     geometry::{Arrangement, DVec2},
 };
 
-/// A cylinder is a post if its surface is this many of its radii, or more, from every wall and every other cylinder:
-/// sound that runs to and fro between them is left out.
+/// Minimum distance, in radii of a post, from its surface to every wall and every other cylinder:
+/// multiple reflections between them are omitted.
 const GAP_RADII: f64 = 4.0;
 
-/// A thin cylinder in the plan.
+/// A thin cylinder in the floor plan.
 #[derive(Debug)]
 pub(crate) struct PlanPost {
-    /// The point of its axis.
+    /// Point of the axis.
     pub(crate) point: u32,
     pub(crate) cylinder: u32,
     pub(crate) post: Post,
 }
 
-/// Takes thin cylinders out of those that have a surface, which leaves them without size, and gives the plan a point
-/// at the axis of each.
-pub(crate) fn take_posts(
+/// Removes thin cylinders from `circles`, where they remain with radius 0, and adds a point at the
+/// axis of each to the floor plan.
+pub(crate) fn extract_posts(
     plan: &mut Arrangement,
-    circles: &mut [Circle],
+    circles: &mut [PlanCircle],
     wave_number_per_m: f64,
 ) -> Vec<PlanPost> {
     let ends = |end: u32| plan.points[end as usize];
     let walls: Vec<[DVec2; 2]> = plan.pieces.iter().map(|piece| piece.ends.map(ends)).collect();
     let thin = circles.iter().zip(0..).filter_map(|(circle, cylinder)| {
         let post = Post::new(circle.radius_m, circle.gain, wave_number_per_m)?;
-        stands_free(circle, cylinder, circles, &walls).then_some((cylinder, post))
+        is_isolated(circle, cylinder, circles, &walls).then_some((cylinder, post))
     });
     let thin: Vec<(u32, Post)> = thin.collect();
     let add = |(cylinder, post): (u32, Post)| {
@@ -42,7 +42,12 @@ pub(crate) fn take_posts(
     thin.into_iter().map(add).collect()
 }
 
-fn stands_free(circle: &Circle, number: u32, circles: &[Circle], walls: &[[DVec2; 2]]) -> bool {
+fn is_isolated(
+    circle: &PlanCircle,
+    number: u32,
+    circles: &[PlanCircle],
+    walls: &[[DVec2; 2]],
+) -> bool {
     let gap_m = GAP_RADII * circle.radius_m;
     let far_from_circles = circles.iter().zip(0..).all(|(other, index)| {
         let apart_m = circle.center.distance(other.center);
@@ -62,18 +67,18 @@ fn stands_free(circle: &Circle, number: u32, circles: &[Circle], walls: &[[DVec2
 mod tests {
     use super::*;
 
-    fn thin(x: f64, radius_m: f64) -> Circle {
-        Circle { center: DVec2::new(x, 0.0), radius_m, gain: 1.0, is_opaque: true }
+    fn thin(x: f64, radius_m: f64) -> PlanCircle {
+        PlanCircle { center: DVec2::new(x, 0.0), radius_m, gain: 1.0, is_opaque: true }
     }
 
-    /// Four radii of the thin one, from surface to surface, from cylinders and from walls.
+    /// Four radii of the thin cylinder, from surface to surface, from cylinders and from walls.
     #[test]
-    fn thin_cylinders_that_stand_free_are_posts() {
+    fn thin_free_cylinders_are_posts() {
         let wave_number_per_m = std::f64::consts::TAU * 49_400.0 / 343.2;
-        let taken = |others: &[Circle], walls: &[(DVec2, DVec2)]| {
+        let taken = |others: &[PlanCircle], walls: &[(DVec2, DVec2)]| {
             let mut circles = [&[thin(0.0, 0.004)], others].concat();
             let mut plan = Arrangement::of(walls);
-            let posts = take_posts(&mut plan, &mut circles, wave_number_per_m);
+            let posts = extract_posts(&mut plan, &mut circles, wave_number_per_m);
             for post in &posts {
                 assert_eq!(
                     plan.points[post.point as usize],

@@ -1,27 +1,29 @@
-//! By how much floor and ceiling can raise the echoes of upright edges above what the plan says of them.
+//! Gain by which floor and ceiling can raise the echoes of upright edges above those in the plan.
 
 use crate::model::paths::settings::Settings;
 
-/// The shortest length that is told apart, metres: below what a ranger has between its face and anything.
+/// Shortest tabulated length, metres: below the distance from a ranger's face to anything.
 const SHORTEST_M: f64 = 1e-3;
 
-/// One length over the next.
+/// Ratio of consecutive lengths.
 const RATIO: f64 = 1.1;
 
-/// Bounds for the echoes that the images of an echo of the plan by upright edges can have, over that echo, by its
-/// length.
+/// Upper bounds, by length, for the ratio of an echo by floor and ceiling to the echo of the plan
+/// by upright edges that it is an image of.
 ///
-/// A steep path gains at an edge by its slant (see [`height`](crate::model::paths::height)), perhaps more than air, floor
-/// and ceiling take from it: then an image is listed of what is too weak itself.
+/// A steep path gains at an edge by its slant (see [`height`](crate::model::paths::height)),
+/// possibly more than air, floor and ceiling take from it. Then an image of an echo that is itself
+/// too weak is listed.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Raised {
-    /// From [`SHORTEST_M`] on, each [`RATIO`] times longer: by one edge, and by two. None rises.
+    /// Bounds by one edge and by two, from [`SHORTEST_M`] onwards, each [`RATIO`] times longer.
+    /// None increases with length.
     by_length: Vec<[f64; 2]>,
 }
 
 impl Raised {
-    /// Of images with these gains and heights above the ranger, metres.
-    pub(crate) fn of(images: &[[f64; 2]], settings: &Settings) -> Self {
+    /// Tabulates the bounds of images with these gains and heights above the ranger, metres.
+    pub(crate) fn new(images: &[[f64; 2]], settings: &Settings) -> Self {
         let longest = (settings.max_path_m / SHORTEST_M).max(1.0);
         let count = longest.log(RATIO) as i32 + 1;
         let bounds = |number: i32| {
@@ -32,22 +34,22 @@ impl Raised {
                 let gain = gain * settings.air_gain(to_m.hypot(rise_m) - to_m);
                 [gain * slant.sqrt(), gain * slant]
             };
-            images.iter().map(raised).fold([1.0_f64; 2], most)
+            images.iter().map(raised).fold([1.0_f64; 2], pairwise_max)
         };
         let mut by_length: Vec<[f64; 2]> = (0..count).map(bounds).collect();
         for number in (1..by_length.len()).rev() {
-            by_length[number - 1] = most(by_length[number - 1], by_length[number]);
+            by_length[number - 1] = pairwise_max(by_length[number - 1], by_length[number]);
         }
         let is_needed = by_length.first() != Some(&[1.0; 2]);
         Self { by_length: if is_needed { by_length } else { Vec::new() } }
     }
 
-    /// For an echo of a length by one edge, at least 1.
+    /// Bound for an echo of a length by one edge, at least 1.
     pub(crate) fn by_edge(&self, length_m: f64) -> f64 {
         self.at(length_m)[0]
     }
 
-    /// The same by two edges.
+    /// Bound for an echo of a length by two edges, at least 1.
     pub(crate) fn by_edges(&self, length_m: f64) -> f64 {
         self.at(length_m)[1]
     }
@@ -62,6 +64,6 @@ impl Raised {
     }
 }
 
-fn most(one: [f64; 2], other: [f64; 2]) -> [f64; 2] {
-    [one[0].max(other[0]), one[1].max(other[1])]
+fn pairwise_max(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
+    [a[0].max(b[0]), a[1].max(b[1])]
 }

@@ -1,4 +1,5 @@
-//! Narrow strips of the floor plan: free-standing walls of a wavelength or less, which scatter from their middles.
+//! Narrow strips of the floor plan: free-standing walls of a wavelength or less, which scatter from
+//! their middles.
 
 use std::f64::consts::TAU;
 
@@ -9,40 +10,40 @@ use crate::{
     geometry::{Arrangement, DVec2, turn_rad},
 };
 
-/// Pieces of a wall that go on straight to within this are one, radians.
+/// Bend within which consecutive pieces of a wall are one, radians.
 const STRAIGHT_RAD: f64 = 1e-6;
 
-/// A narrow strip in the plan.
+/// A narrow strip in the floor plan.
 #[derive(Debug)]
 pub(crate) struct PlanStrip {
-    /// The point of its middle.
+    /// Point of the middle.
     pub(crate) point: u32,
-    /// The first of its walls.
+    /// First of the strip's walls.
     pub(crate) wall: u32,
     pub(crate) along: DVec2,
     pub(crate) strip: Strip,
 }
 
-/// Takes strips out of a plan, which keeps a point in the middle of each: sound goes round them. `gains` are the
-/// walls' reflectances; walls that sound passes above or below stay.
-pub(crate) fn take_strips(
+/// Removes strips from a floor plan, where a point in the middle of each remains: sound passes
+/// them. `gains` are the walls' reflectances. Walls that sound passes above or below are kept.
+pub(crate) fn extract_strips(
     plan: &mut Arrangement,
     gains: &[f64],
     lets_pass: impl Fn(u32) -> bool,
     wave_number_per_m: f64,
 ) -> Vec<PlanStrip> {
-    let most_m = TAU * MOST_WAVELENGTHS / wave_number_per_m;
-    let chains = Chains::of(plan);
+    let max_m = TAU * MOST_WAVELENGTHS / wave_number_per_m;
+    let chains = Chains::new(plan);
     let mut taken = vec![false; plan.pieces.len()];
     let mut strips = Vec::new();
     for from in 0..plan.points.len() as u32 {
-        let Some((to, pieces)) = chains.from(from, most_m) else { continue };
+        let Some((to, pieces)) = chains.from(from, max_m) else { continue };
         let walls = pieces.iter().map(|&piece| plan.pieces[piece as usize].segment);
         let Some(wall) = walls.clone().min() else { continue };
         let gain = gains[wall as usize];
         let is_one = walls.clone().all(|w| gains[w as usize] == gain && !lets_pass(w));
         let [a, b] = [from, to].map(|end| plan.points[end as usize]);
-        // Each is found from both ends.
+        // Each strip is found from both ends.
         let strip =
             (from < to && is_one).then(|| Strip::new(a.distance(b), gain, wave_number_per_m));
         if let Some(strip) = strip.flatten() {
@@ -59,15 +60,15 @@ pub(crate) fn take_strips(
     strips.into_iter().map(add).collect()
 }
 
-/// Pieces that go on in line from a free end to another.
+/// Collinear chains of pieces from one free end to another.
 struct Chains<'a> {
     plan: &'a Arrangement,
-    /// By point, the pieces that end there.
+    /// Pieces that end at each point.
     around: Vec<SmallVec<[u32; 2]>>,
 }
 
 impl<'a> Chains<'a> {
-    fn of(plan: &'a Arrangement) -> Self {
+    fn new(plan: &'a Arrangement) -> Self {
         let mut around = vec![SmallVec::new(); plan.points.len()];
         for (piece, number) in plan.pieces.iter().zip(0..) {
             piece.ends.iter().for_each(|&end| around[end as usize].push(number));
@@ -75,21 +76,21 @@ impl<'a> Chains<'a> {
         Self { plan, around }
     }
 
-    /// The other free end of what begins with one at a point, and the pieces between, if it is no longer than
-    /// `most_m`.
-    fn from(&self, point: u32, most_m: f64) -> Option<(u32, SmallVec<[u32; 2]>)> {
+    /// Follows the chain that begins at a free end. Returns the other free end and the pieces
+    /// between, if the chain is no longer than `max_m`.
+    fn from(&self, point: u32, max_m: f64) -> Option<(u32, SmallVec<[u32; 2]>)> {
         let [first] = self.around[point as usize][..] else { return None };
         let mut pieces: SmallVec<[u32; 2]> = SmallVec::from_slice(&[first]);
         let mut at = self.other_end(first, point);
-        while self.position(point).distance(self.position(at)) <= most_m {
+        while self.position(point).distance(self.position(at)) <= max_m {
             let last = pieces[pieces.len() - 1];
             let next = match self.around[at as usize][..] {
                 [_] => return Some((at, pieces)),
-                [one, other] => {
-                    if one == last {
-                        other
+                [a, b] => {
+                    if a == last {
+                        b
                     } else {
-                        one
+                        a
                     }
                 }
                 _ => return None,

@@ -1,4 +1,4 @@
-//! Round bodies beside walls, between which sound runs to and fro.
+//! Round bodies near walls, with repeated reflections between the two.
 
 use std::f64::consts::PI;
 
@@ -13,7 +13,8 @@ fn body(center: DVec2, radius_m: f64) -> Cylinder {
     Cylinder { id: Arc::from("body"), center, radius_m, material, z_m: None }
 }
 
-/// A room of 0.928 m by 0.742 m with a body a hand's width from one wall and all but touching another.
+/// A room of 0.928 m by 0.742 m with a body a hand's width from one wall and nearly touching
+/// another.
 fn narrow_room() -> Scene {
     let mut room =
         polygon(&[[0.0, 0.0], [0.928, 0.0], [0.928, 0.742], [0.0, 0.742]].map(DVec2::from_array));
@@ -21,17 +22,17 @@ fn narrow_room() -> Scene {
     room
 }
 
-/// Along the normal between wall and body, `n` contacts with the body: width and growth go through
-/// the same flight and turn each time, whose matrix has a closed-form power.
+/// Along the normal between wall and body, with `n` contacts with the body, width and growth
+/// undergo the same flight and reflection each time. The matrix of a round has a closed-form power.
 #[test]
-fn rounds_between_body_and_wall_spread_as_the_power_of_one_round() {
+fn rounds_spread_as_matrix_power() {
     let (gap, height, r) = (0.095, 0.085, 0.15);
     let mut plan = scene(&[[-30.0, 0.0, 30.0, 0.0]]);
     plan.cylinders = vec![body(DVec2::new(0.0, gap + r), r)];
     let settings = Settings { max_path_m: 4.0, floor: 1e-5, ..LOSSLESS };
     let echoes = Paths::new(&plan, settings).enumerate(DVec2::new(0.0, height)).expect("few paths");
 
-    // Off the body, over to the wall and back: `w += D g`, then `g += 2 w / r`.
+    // From the body to the wall and back: `w += D g`, then `g += 2 w / r`.
     let flight = 2.0 * gap;
     let round = [[1.0, flight], [2.0 / r, 1.0 + 2.0 * flight / r]];
     let mu = (1.0 + flight / r).acosh();
@@ -64,7 +65,7 @@ fn rounds_between_body_and_wall_spread_as_the_power_of_one_round() {
     assert_eq!(seen, 27);
 }
 
-/// A ray that runs through the room by itself.
+/// Traces a ray through the room independently of the engine.
 fn crossings(room: &Scene, from: DVec2, angle: f64, reach_m: f64, at: DVec2, radius_m: f64) -> u32 {
     let round = &room.cylinders[0];
     let size = DVec2::new(0.928, 0.742);
@@ -103,11 +104,11 @@ fn crossings(room: &Scene, from: DVec2, angle: f64, reach_m: f64, at: DVec2, rad
     count
 }
 
-/// Energy: of rays sent out at random, as many come by as the strengths of all echoes together say.
-/// A path whose rays have spread to `w` for each radian brings `2 rho / w` of a radian to a place of
-/// radius `rho`.
+/// Energy: of rays sent out at random, as many pass by as the strengths of all echoes together
+/// predict. A path whose rays have spread to `w` per radian sends `2 rho / w` of a radian to a
+/// target of radius `rho`.
 #[test]
-fn echoes_bring_as_much_energy_as_random_rays_do() {
+fn energy_equals_random_rays() {
     const RAYS: u32 = 600_000;
     let (from, at, reach_m, radius_m) = (DVec2::new(0.3, 0.2), DVec2::new(0.25, 0.5), 1.9, 0.005);
     let room = narrow_room();
@@ -125,7 +126,7 @@ fn echoes_bring_as_much_energy_as_random_rays_do() {
 }
 
 #[test]
-fn paths_by_a_body_run_backwards_from_receiver_to_transmitter() {
+fn body_paths_are_reciprocal() {
     let paths = Paths::new(&narrow_room(), Settings { max_path_m: 2.5, floor: 1e-3, ..LOSSLESS });
     let (t, r) = (DVec2::new(0.3, 0.2), DVec2::new(0.774, 0.05));
     let (there, back) = (
@@ -145,9 +146,9 @@ fn paths_by_a_body_run_backwards_from_receiver_to_transmitter() {
     }
 }
 
-/// The number of contacts is bounded by what can be heard, not by a constant.
+/// The number of contacts is limited by detectability, not by a constant.
 #[test]
-fn contacts_go_on_as_long_as_they_are_heard() {
+fn contacts_end_with_detectability() {
     let most = |floor: f64| {
         let paths = Paths::new(&narrow_room(), Settings { max_path_m: 3.0, floor, ..LOSSLESS });
         let at_body = |echo: &EchoPath| {

@@ -1,4 +1,4 @@
-//! Searches end: with all paths, or with a refusal that says what there is too much of.
+//! Searches end: with all paths, or with an error that names the excessive part.
 
 use super::*;
 use crate::model::{
@@ -6,7 +6,7 @@ use crate::model::{
     paths::effort::{BOUND, Bound},
 };
 
-/// As for `senscomp-6500` to its full range.
+/// Settings as for `senscomp-6500` at its full range.
 fn settings() -> Settings {
     Settings {
         max_path_m: 21.4,
@@ -42,7 +42,7 @@ fn with_boxes(boxes: &[(DVec2, f64)]) -> Scene {
     with_heights(scene(&walls), low)
 }
 
-/// So many low walls around a place, in no order.
+/// A number of low walls around a place, in no order.
 fn ring(count: usize) -> Scene {
     let wall = |at: usize| {
         let angle = TAU * at as f64 / count as f64;
@@ -53,7 +53,7 @@ fn ring(count: usize) -> Scene {
     with_heights(scene(&(0..count).map(wall).collect::<Vec<_>>()), 0..count)
 }
 
-/// A star of so many corners around a place.
+/// A star of this many corners around a place.
 fn star(corners: usize) -> Scene {
     let corner = |at: usize| {
         let out_m = if at.is_multiple_of(2) { 2.0 } else { 1.2 };
@@ -62,7 +62,7 @@ fn star(corners: usize) -> Scene {
     scene(&closed(&(0..corners).map(corner).collect::<Vec<_>>()))
 }
 
-/// The number of paths, if there are not too many, and the steps that it took to know.
+/// Number of paths, unless there are too many, and the steps of the search.
 fn searched(room: &Scene, at: DVec2, settings: Settings) -> (Result<usize, TooCostly>, u64) {
     let paths = Paths::new(room, settings);
     let search = Paths { plan: paths.plan.for_search(paths.bound), ..paths.clone() };
@@ -73,20 +73,20 @@ fn searched(room: &Scene, at: DVec2, settings: Settings) -> (Result<usize, TooCo
     (check.map(|()| echoes.len()), steps)
 }
 
-/// What one mechanism may count at once.
+/// Largest count of one mechanism at once.
 const AT_ONCE: u64 = 1_000_000;
 
 #[test]
-fn rooms_with_low_boxes_are_searched_to_their_end() {
+fn low_boxes_are_searched_fully() {
     let boxes = [(DVec2::new(1.1, 1.0), 0.3), (DVec2::new(2.7, 1.9), 0.8)];
-    for (boxes, most) in [(&boxes[..1], 6_000_000), (&boxes, 15_000_000)] {
+    for (boxes, bound) in [(&boxes[..1], 6_000_000), (&boxes, 15_000_000)] {
         let (found, steps) = searched(&with_boxes(boxes), DVec2::new(2.0, 0.7), settings());
-        assert!(found.is_ok_and(|count| count > 1000) && steps < most, "{steps}");
+        assert!(found.is_ok_and(|count| count > 1000) && steps < bound, "{steps}");
     }
 }
 
 #[test]
-fn crowded_scenes_are_answered_or_refused_within_the_bound() {
+fn effort_limit_holds() {
     let double = Settings { double_diffraction: true, ..settings() };
     for (room, settings) in [(ring(60), settings()), (star(200), double)] {
         let (found, steps) = searched(&room, DVec2::new(0.1, 0.05), settings);
@@ -95,7 +95,7 @@ fn crowded_scenes_are_answered_or_refused_within_the_bound() {
 }
 
 #[test]
-fn a_refusal_names_what_there_is_too_much_of() {
+fn error_names_the_excess() {
     let refused = |room: &Scene, settings: Settings, bound: Bound| {
         let paths = Paths { bound, ..Paths::new(room, settings) };
         paths.enumerate(DVec2::new(0.1, 0.05)).expect_err("too many paths")
@@ -104,12 +104,15 @@ fn a_refusal_names_what_there_is_too_much_of() {
     let mirrors = Settings { edge_law: None, ..settings() };
     let of_beams = refused(&ring(60), mirrors, steps);
     assert_eq!(of_beams.part, SearchPart::Beams);
-    let said = of_beams.to_string();
-    assert!(said.contains("wall to wall") && said.contains("max-range (it is 10.7 m)"), "{said}");
-    assert!(!said.contains("double-diffraction"), "{said}");
+    let message = of_beams.to_string();
+    assert!(
+        message.contains("wall to wall") && message.contains("max-range (currently 10.7 m)"),
+        "{message}"
+    );
+    assert!(!message.contains("double-diffraction"), "{message}");
     let double = Settings { double_diffraction: true, max_path_m: 6.0, ..settings() };
     assert!(refused(&star(200), double.clone(), steps).to_string().contains("double-diffraction"));
-    // Memory counts as work does.
+    // Memory is limited as work is.
     let bytes = Bound { bytes: 10_000, ..BOUND };
     assert!(Paths::new(&ring(60), settings()).bound == BOUND);
     refused(&ring(60), settings(), bytes);

@@ -4,7 +4,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 
 use super::*;
 
-/// Two walls from the origin, `opening_rad` apart, long enough to have no ends.
+/// Two walls from the origin, `opening_rad` apart, effectively infinite.
 fn dihedral(opening_rad: f64, turn_rad: f64) -> Scene {
     let end = |angle: f64| 60.0 * DVec2::from_angle(turn_rad + angle);
     let (a, b) = (end(0.0), end(opening_rad));
@@ -12,7 +12,7 @@ fn dihedral(opening_rad: f64, turn_rad: f64) -> Scene {
 }
 
 #[test]
-fn a_wall_answers_over_twice_its_distance_with_its_reflectance() {
+fn wall_head_on() {
     let mut wall = scene(&[[-1.0, 0.5, 4.0, 0.5]]);
     wall.walls[0].material = Material { reflectance: 0.9, roughness: 0.19 };
     let settings = Settings { absorption_np_per_m: 0.2, ..LOSSLESS };
@@ -22,17 +22,17 @@ fn a_wall_answers_over_twice_its_distance_with_its_reflectance() {
         assert_eq!(echoes.len(), 1);
         assert!((echoes[0].length_m - 1.4).abs() < 1e-12);
         assert!((echoes[0].departure_rad + side * FRAC_PI_2).abs() < 1e-12);
-        // Roughness takes a share of the energy, so 0.9 times 0.9 of the amplitude is left.
+        // Roughness takes a share of the energy, so 0.9 times 0.9 of the amplitude remains.
         assert!((echoes[0].amplitude - 0.81 * f64::exp(-0.28)).abs() < 1e-12);
     }
-    // Beside the wall, nothing answers but its end.
+    // Past the end of the wall, only that end returns an echo.
     assert!(
         Paths::new(&wall, settings).enumerate(DVec2::new(-1.2, 0.0)).expect("few paths").is_empty()
     );
 }
 
 #[test]
-fn a_right_angled_corner_answers_once_from_its_vertex() {
+fn right_angled_corner_has_one_echo() {
     for turn in [0.0, 0.3, 1.234, 4.0] {
         let at = 0.8 * DVec2::from_angle(turn + 0.61);
         let settings = Settings { max_path_m: 10.0, edge_law: Some(EdgeLaw::Utd), ..LOSSLESS };
@@ -46,10 +46,11 @@ fn a_right_angled_corner_answers_once_from_its_vertex() {
     }
 }
 
-/// In a dihedral of `opening` the images of a source at `angle` stand at `2 N opening +- angle`;
-/// those less than half a turn away are seen, and one exactly half a turn away through the vertex.
+/// In a dihedral of `opening` the images of a source at `angle` are at `2 N opening +- angle`.
+/// Those less than half a turn away are visible, and one exactly half a turn away through the
+/// vertex.
 #[test]
-fn dihedrals_have_their_circle_of_images() {
+fn dihedral_images() {
     for opening_deg in [22.5, 30.0, 36.0, 45.0, 50.0, 60.0, 72.0, 80.0, 90.0, 100.0, 135.0, 170.0] {
         let opening = f64::to_radians(opening_deg);
         for share in [0.21, 0.37, 0.83] {
@@ -81,7 +82,7 @@ fn dihedrals_have_their_circle_of_images() {
 }
 
 #[test]
-fn joints_of_a_straight_wall_neither_hide_nor_double_nor_bend() {
+fn straight_joints_are_invisible() {
     // The foot of the normal is exactly on a joint.
     let wall = scene(&[[-3.0, 0.0, 0.25, 0.0], [0.25, 0.0, 0.3, 0.0], [0.3, 0.0, 4.0, 0.0]]);
     let settings = Settings { edge_law: Some(EdgeLaw::Utd), max_path_m: 4.0, ..LOSSLESS };
@@ -94,7 +95,7 @@ fn joints_of_a_straight_wall_neither_hide_nor_double_nor_bend() {
 }
 
 #[test]
-fn on_the_foot_of_its_normal_the_end_of_a_wall_is_half_a_wall() {
+fn wall_end_is_half_a_wall() {
     let wall = scene(&[[0.0, 0.0, 9.0, 0.0]]);
     let settings = Settings { edge_law: Some(EdgeLaw::Utd), max_path_m: 4.0, ..LOSSLESS };
     let echoes = Paths::new(&wall, settings).enumerate(DVec2::new(0.0, 0.5)).expect("few paths");
@@ -104,8 +105,8 @@ fn on_the_foot_of_its_normal_the_end_of_a_wall_is_half_a_wall() {
 }
 
 #[test]
-fn an_edge_seen_along_its_wall_answers() {
-    // Face on to the end of a plate: only the near end is seen.
+fn edge_along_its_wall() {
+    // Facing the end of a plate: only the near end is visible.
     let wall = scene(&[[0.0, 0.0, 1.0, 0.0]]);
     let settings = Settings { edge_law: Some(EdgeLaw::KucSiegel), ..LOSSLESS };
     let echoes = Paths::new(&wall, settings).enumerate(DVec2::new(-0.5, 0.0)).expect("few paths");

@@ -1,4 +1,4 @@
-//! What the sound that creeps round a cylinder would add.
+//! Contribution of the creeping wave around a cylinder.
 
 use num_complex::Complex64;
 
@@ -22,7 +22,7 @@ fn over_mirror(ka: f64) -> f64 {
 /// At 49.4 kHz a leg of 2 cm has a `ka` of 9.05. Between 8 and 10 the creeping wave beats with the
 /// mirror's echo.
 #[test]
-fn what_creeps_round_a_chair_leg_is_34_decibels_below_the_mirror() {
+fn creeping_wave_is_34_db_down() {
     let beats = |from: f64, to: f64| {
         let steps = (0..=400).map(|i| over_mirror(from + (to - from) * f64::from(i) / 400.0));
         steps.fold((f64::INFINITY, 0.0_f64), |(low, high), level| (low.min(level), high.max(level)))

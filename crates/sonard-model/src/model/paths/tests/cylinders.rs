@@ -1,4 +1,4 @@
-//! Cylinders: what they reflect, spread and hide.
+//! Cylinders: reflection, spreading and shadow.
 
 use std::f64::consts::TAU;
 
@@ -20,7 +20,7 @@ fn cylinder(x: f64, y: f64, radius_m: f64) -> Cylinder {
 }
 
 #[test]
-fn a_cylinder_answers_from_its_nearest_point_and_spreads() {
+fn nearest_point_and_spreading() {
     let mut plan = scene(&[]);
     plan.cylinders = vec![cylinder(1.0, 2.0, 0.3)];
     let at = DVec2::new(2.5, 0.0);
@@ -33,7 +33,7 @@ fn a_cylinder_answers_from_its_nearest_point_and_spreads() {
 }
 
 #[test]
-fn a_cylinder_hides_the_wall_behind_it() {
+fn cylinder_hides_the_wall() {
     let mut plan = scene(&[[-5.0, 3.0, 5.0, 3.0]]);
     plan.cylinders = vec![cylinder(0.0, 1.5, 0.2)];
     let settings = Settings { max_order: Some(1), ..LOSSLESS };
@@ -49,7 +49,7 @@ fn a_cylinder_hides_the_wall_behind_it() {
 /// Paths from wall to cylinder and back: the reflected path is the shortest one over points of
 /// both, found here by searching.
 #[test]
-fn echoes_between_cylinder_and_walls_take_the_shortest_way() {
+fn shortest_path_by_wall() {
     let mut plan = scene(&[[-5.0, 0.0, 5.0, 0.0]]);
     plan.cylinders = vec![cylinder(0.9, 0.8, 0.25)];
     let at = DVec2::new(-0.4, 0.5);
@@ -71,7 +71,7 @@ fn echoes_between_cylinder_and_walls_take_the_shortest_way() {
         let same = echoes.iter().filter(|echo| (echo.length_m - length_m).abs() < 1e-8).count();
         assert_eq!(same, count, "{length_m} m");
     }
-    // And those that touch the cylinder again and again: to and fro between the two.
+    // And the paths that touch the cylinder repeatedly, back and forth between the two.
     let once = echoes.iter().filter(|echo| {
         let is_round = |r: &&Reflector| matches!(r, Reflector::Cylinder(_));
         reflectors(&echo.path).iter().filter(is_round).count() < 2
@@ -79,8 +79,8 @@ fn echoes_between_cylinder_and_walls_take_the_shortest_way() {
     assert_eq!(once.count(), 5);
 }
 
-/// The length of the shortest path that touches the given circles and lines in turn, by moving
-/// each contact in turn to where it is shortest.
+/// Length of the shortest path that touches the given circles and lines in turn, found by moving
+/// each contact in turn to its optimum.
 fn shortest(
     start: DVec2,
     surfaces: &[Reflector],
@@ -130,7 +130,7 @@ fn shortest(
 }
 
 #[test]
-fn echoes_by_two_cylinders_take_the_shortest_way() {
+fn shortest_path_by_two_cylinders() {
     let mut plan = scene(&[[-3.0, -0.9, 3.0, -0.9]]);
     plan.cylinders = vec![cylinder(1.0, 0.3, 0.25), cylinder(-0.9, 0.6, 0.35)];
     let at = DVec2::new(0.1, -0.2);
@@ -156,9 +156,9 @@ fn echoes_by_two_cylinders_take_the_shortest_way() {
     }
 }
 
-/// Rays beside an echo's own diverge by the amount that its amplitude says.
+/// Rays next to an echo's own diverge by the amount that its amplitude implies.
 #[test]
-fn cylinders_spread_sound_as_rays_beside_it_diverge() {
+fn spreading_equals_ray_divergence() {
     let mut plan = scene(&[]);
     plan.cylinders = vec![cylinder(0.8, 0.3, 0.25), cylinder(-0.9, 0.1, 0.35)];
     let at = DVec2::new(0.1, 0.0);
@@ -166,7 +166,8 @@ fn cylinders_spread_sound_as_rays_beside_it_diverge() {
         .enumerate(at)
         .expect("few paths");
     let echo = echoes.iter().find(|echo| reflectors(&echo.path).len() == 2).expect("by both");
-    // A ray of its own: on to the first and the second circle, and to abreast of the start.
+    // An independent ray: to the first and the second circle, and to the foot of the perpendicular
+    // from the start.
     let trace = |angle: f64| {
         let (mut p, mut d) = (at, DVec2::from_angle(angle));
         for wall in &reflectors(&echo.path) {
@@ -187,9 +188,9 @@ fn cylinders_spread_sound_as_rays_beside_it_diverge() {
     assert!((echo.amplitude / expected - 1.0).abs() < 1e-6, "{} {expected}", echo.amplitude);
 }
 
-/// Round a cylinder with a very large radius everything is as before a wall.
+/// A cylinder with a very large radius acts as a wall.
 #[test]
-fn a_huge_cylinder_is_a_wall() {
+fn huge_cylinder_is_a_wall() {
     let mut round = scene(&[[-1.5, 1.0, 1.0, 1.0], [1.0, 1.0, 1.3, 0.4]]);
     round.cylinders = vec![cylinder(0.0, -1e5, 1e5)];
     let flat = scene(&[[-1.5, 1.0, 1.0, 1.0], [1.0, 1.0, 1.3, 0.4], [-60.0, 0.0, 60.0, 0.0]]);
@@ -198,7 +199,7 @@ fn a_huge_cylinder_is_a_wall() {
     let at = DVec2::new(0.2, 0.35);
     let all = |plan: &Scene| Paths::new(plan, settings.clone()).enumerate(at).expect("few paths");
     let (round, flat) = (all(&round), all(&flat));
-    // Ways by more than one contact are followed down to ten times the floor.
+    // Paths by more than one contact are followed down to ten times the floor.
     let at_round = |echo: &&EchoPath| {
         reflectors(&echo.path).iter().filter(|wall| **wall == Reflector::Wall(2)).count()
     };
@@ -215,9 +216,9 @@ fn a_huge_cylinder_is_a_wall() {
     }
 }
 
-/// An edge that a cylinder reflects to: length and path are those of the shortest path.
+/// An edge behind a reflection at a cylinder: length and path are those of the shortest path.
 #[test]
-fn edges_answer_by_way_of_cylinders() {
+fn edge_by_way_of_cylinder() {
     let mut plan = scene(&[[0.0, 1.2, 2.0, 1.2]]);
     plan.cylinders = vec![cylinder(-1.0, 0.3, 0.3)];
     let at = DVec2::new(0.0, 0.0);
@@ -245,12 +246,13 @@ fn edges_answer_by_way_of_cylinders() {
     }
 }
 
-/// Echoes of more than one contact, of which there are very many, are followed below the threshold only
-/// until the receiver opens. With all of them one firing in thirty, 85 mm before a wall and beside a
-/// round body, would read otherwise; with none it were one in eight, mostly the minimum range for an
-/// echo a little beyond it. The readings: `cargo test --lib left_out -- --nocapture`.
+/// The very numerous echoes of more than one contact are followed below the threshold only until
+/// the receiver opens. With all of them one firing in thirty, 85 mm in front of a wall and next to
+/// a round body, would read differently. With none it were one in eight, mostly the minimum range
+/// instead of an echo slightly beyond it. The readings:
+/// `cargo test --lib omitted_weak -- --nocapture`.
 #[test]
-fn few_readings_depend_on_what_is_left_out_below_the_threshold() {
+fn omitted_weak_echoes_are_harmless() {
     let text = crate::scene::shipped::text("simple-room-robot").expect("shipped");
     let room = Scene::from_json(text).expect("valid");
     let sensor = Sensor::preset("senscomp-6500").expect("a preset");
@@ -284,9 +286,9 @@ fn few_readings_depend_on_what_is_left_out_below_the_threshold() {
     assert!(30 * differ.len() <= all, "{} of {all}", differ.len());
 }
 
-/// Where the order allows one reflection alone, nothing is followed from one cylinder to the next.
+/// With an order limit of one reflection, nothing is followed from one cylinder to the next.
 #[test]
-fn what_the_order_forbids_is_not_searched() {
+fn order_limits_the_search() {
     let at = DVec2::new(0.1, -0.2);
     let mut plan = scene(&[]);
     plan.cylinders = vec![cylinder(1.0, 0.3, 0.25), cylinder(-0.9, 0.6, 0.35)];

@@ -1,4 +1,4 @@
-//! The fan of rays finds the same echoes as its spacing shrinks.
+//! The fan of rays converges to the same echoes as its spacing decreases.
 
 use super::*;
 use crate::{
@@ -8,31 +8,34 @@ use crate::{
     scene::shipped,
 };
 
-/// Engines of the same ranger in a scene.
+/// A simulator with one of the engines for the same ranger in a scene.
 fn simulator(scene: &Arc<Scene>, engine: EngineOptions) -> Simulator {
     let options = Options { max_range_m: Some(2.5), ..engine.into() };
     let sensor = Sensor::preset("senscomp-6500").expect("a preset");
     Simulator::new(scene.clone(), sensor, Air::default(), options).expect("valid options")
 }
 
-/// Mirror echoes over the threshold; the fan's ranger is transparent.
+/// Mirror echoes above the threshold; the fan's ranger is transparent.
 fn mirrored(point: &ObservationPoint, pose: &Pose, azimuth_deg: f64) -> Vec<Arrival> {
     let mut arrivals = point.arrivals(pose.direction_rad(azimuth_deg)).expect("few paths");
     arrivals.retain(|arrival| {
         arrival.path.kind() == PathKind::Specular
             && arrival.amplitude > 0.02
-            && arrival.path.mechanisms().all(|met| met != crate::model::Mechanism::Transducer)
+            && arrival
+                .path
+                .mechanisms()
+                .all(|mechanism| mechanism != crate::model::Mechanism::Transducer)
     });
     arrivals
 }
 
-fn is_same(one: &Arrival, other: &Arrival) -> bool {
-    (one.length_m - other.length_m).abs() < 1e-3
-        && wrap_pi(one.departure_rad - other.departure_rad).abs() < 0.01
-        && (one.amplitude / other.amplitude - 1.0).abs() < 0.05
+fn is_same(a: &Arrival, b: &Arrival) -> bool {
+    (a.length_m - b.length_m).abs() < 1e-3
+        && wrap_pi(a.departure_rad - b.departure_rad).abs() < 0.01
+        && (a.amplitude / b.amplitude - 1.0).abs() < 0.05
 }
 
-/// Of the echoes of `paths`, how many the fan finds; and of the fan's, how many `paths` has not.
+/// Number of echoes of `paths`, of those that the fan finds, and of the fan's additional ones.
 fn agreement(scene: &Arc<Scene>, pose: &Pose, ray_spacing_deg: f64) -> (usize, usize, usize) {
     let exact = simulator(scene, EngineOptions::default());
     let fan = simulator(scene, FanOptions { ray_spacing_deg, ..FanOptions::default() }.into());
@@ -49,7 +52,7 @@ fn agreement(scene: &Arc<Scene>, pose: &Pose, ray_spacing_deg: f64) -> (usize, u
 }
 
 #[test]
-fn the_fan_converges_to_the_exact_paths_in_every_shipped_scene() {
+fn converges_to_exact_paths() {
     let (mut all, mut found, mut more) = (0, 0, 0);
     for name in shipped::names() {
         let scene = Scene::from_json(shipped::text(name).expect("shipped")).expect("valid");
@@ -62,8 +65,8 @@ fn the_fan_converges_to_the_exact_paths_in_every_shipped_scene() {
             assert!(steps[0].1 <= steps[1].1 && steps[1].1 <= steps[2].1, "{name}, {pose_name}");
             let finest = steps[2];
             if round {
-                // Rays that graze a cylinder spread so much that even these are far apart, and
-                // the fan's face is wide: it hears sound past the body that its middle does not.
+                // Rays that graze a cylinder spread so much that even these are far apart, and the
+                // fan's face is wide: it detects sound past the body that its middle does not.
                 assert!(finest.1 as f64 >= 0.98 * finest.0 as f64, "{name}, {pose_name}");
                 continue;
             }

@@ -1,7 +1,7 @@
-//! Against full-wave scans (tests/data/fullwave/README.md): their short-pulse arrivals.
+//! Comparison with full-wave scans (tests/data/fullwave/README.md): their short-pulse arrivals.
 //!
-//! The echo paths are put through the reference's own line aperture and short pulse, at each
-//! frequency of its band, so what is compared is the paths and their amplitudes alone.
+//! The echo paths are combined with the reference's own line aperture and short pulse, at each
+//! frequency of its band, so only the paths and their amplitudes are compared.
 
 use num_complex::Complex64;
 
@@ -9,12 +9,12 @@ use super::*;
 use crate::{
     acoustics::edge::EdgeView,
     model::{
-        paths::{diffraction::single, echo::Echo},
+        paths::{diffraction::single, echo::PathEcho},
         tests::reference::{Reference, ReferenceScene},
     },
 };
 
-/// Standard deviation of the band, and the part of it that counts, hertz.
+/// Standard deviation of the band, and its significant half width, hertz.
 const BAND_SIGMA_HZ: f64 = 7000.0;
 const BAND_HZ: f64 = 20_000.0;
 
@@ -25,17 +25,17 @@ const STEP_M: f64 = 0.0007;
 /// Points of the aperture.
 const POINTS: i32 = 16;
 
-/// The paths at each of the band's frequencies, from a place.
+/// Paths from a place at each of the band's frequencies.
 struct Chain {
     c: f64,
     f0: f64,
     half_width_m: f64,
-    /// By frequency: the echoes, always the same ones.
-    echoes: Vec<(f64, Vec<Heard>)>,
+    /// Echoes by frequency, always the same ones.
+    echoes: Vec<(f64, Vec<EchoPulse>)>,
 }
 
-/// An echo, and how its edge looks from the face.
-struct Heard {
+/// An echo, and the aspect of its edge from the face.
+struct EchoPulse {
     echo: EchoPath,
     edge: Option<EdgeView>,
 }
@@ -58,21 +58,21 @@ impl Chain {
                 };
                 let paths = Paths::new(&plan, settings);
                 let (traced, echoes) = paths.trace(at, at, None).expect("few paths");
-                let heard = |echo: &Echo| Heard {
+                let pulse = |echo: &PathEcho| EchoPulse {
                     echo: paths.path(&traced, echo),
                     edge: single::view(&paths.plan, &traced.out, traced.back(), echo),
                 };
-                (f, echoes.iter().map(heard).collect())
+                (f, echoes.iter().map(pulse).collect())
             })
             .collect();
         let (c, f0) = (reference.c, reference.f0);
         Self { c, f0, half_width_m: reference.piston_half_width_m, echoes }
     }
 
-    /// The beam of the line aperture on both ways, facing `azimuth_rad`: every point of it sends
-    /// to every point of it. Far away that is `sin(x)/x` twice; at these ranges the front's
-    /// curvature still fills the pattern's nulls (Fresnel's approximation).
-    fn beam(&self, f: f64, Heard { echo, edge }: &Heard, azimuth_rad: f64) -> Complex64 {
+    /// Two-way beam of the line aperture facing `azimuth_rad`: every point of it sends to every
+    /// point of it. Far away that is `sin(x)/x` twice; at these ranges the front's curvature still
+    /// fills the pattern's nulls (Fresnel's approximation).
+    fn beam(&self, f: f64, EchoPulse { echo, edge }: &EchoPulse, azimuth_rad: f64) -> Complex64 {
         let (leaving, arriving) =
             (echo.departure_rad - azimuth_rad, echo.arrival_rad - azimuth_rad);
         let taper = taper(leaving) * taper(arriving);
@@ -80,8 +80,8 @@ impl Chain {
             return Complex64::ZERO;
         }
         let k = TAU * f / self.c;
-        // Seen through an odd number of mirrors the aperture is mirrored; an edge forgets where
-        // on the aperture the arrival left, but looks otherwise from each place.
+        // Seen through an odd number of mirrors the aperture is mirrored. An edge loses the place
+        // of departure on the aperture, but has a different aspect from each place.
         let bent = echo.path.kind() == PathKind::Diffracted;
         let side = if reflectors(&echo.path).len() % 2 == 1 { -1.0 } else { 1.0 };
         let point = |i: i32| self.half_width_m * (f64::from(2 * i + 1) / f64::from(POINTS) - 1.0);
@@ -102,23 +102,23 @@ impl Chain {
         sum * taper / f64::from(POINTS * POINTS)
     }
 
-    /// Field of each echo at each frequency, as the aperture facing `azimuth_rad` weighs it.
+    /// Field of each echo at each frequency, weighted by the aperture facing `azimuth_rad`.
     fn spectrum(&self, azimuth_rad: f64) -> Vec<(f64, Vec<Complex64>)> {
-        let weighed = |f: f64, heard: &Heard| {
-            let Heard { echo, .. } = heard;
-            Complex64::from_polar(echo.amplitude, echo.phase_rad) * self.beam(f, heard, azimuth_rad)
+        let weighed = |f: f64, pulse: &EchoPulse| {
+            let EchoPulse { echo, .. } = pulse;
+            Complex64::from_polar(echo.amplitude, echo.phase_rad) * self.beam(f, pulse, azimuth_rad)
         };
-        let at = |(f, echoes): &(f64, Vec<Heard>)| {
-            (*f, echoes.iter().map(|heard| weighed(*f, heard)).collect())
+        let at = |(f, echoes): &(f64, Vec<EchoPulse>)| {
+            (*f, echoes.iter().map(|pulse| weighed(*f, pulse)).collect())
         };
         self.echoes.iter().map(at).collect()
     }
 
-    /// Maxima of the short pulse's envelope: length, amplitude, and whether an edge's share is
+    /// Maxima of the short pulse's envelope: length, amplitude, and `true` if an edge's share is
     /// the largest there.
     fn peaks(&self, azimuth_rad: f64) -> Vec<(f64, f64, bool)> {
         let spectrum = self.spectrum(azimuth_rad);
-        let lengths: Vec<f64> = self.echoes[0].1.iter().map(|heard| heard.echo.length_m).collect();
+        let lengths: Vec<f64> = self.echoes[0].1.iter().map(|pulse| pulse.echo.length_m).collect();
         let middle = &spectrum[spectrum.len() / 2].1;
         let Some(first) = lengths.first() else { return Vec::new() };
         let count = ((lengths[lengths.len() - 1] - first + 0.1) / STEP_M) as usize;
@@ -131,7 +131,7 @@ impl Chain {
             .collect();
         (1..count)
             .filter(|&i| heights[i] > heights[i - 1] && heights[i] >= heights[i + 1])
-            .filter(|&i| heights[i] > 0.01 && stands_out(&heights, i))
+            .filter(|&i| heights[i] > 0.01 && is_prominent(&heights, i))
             .map(|i| {
                 let strongest = (0..lengths.len())
                     .filter(|&e| (lengths[e] - place(i)).abs() < 0.015)
@@ -159,7 +159,7 @@ impl Chain {
     }
 }
 
-/// No radiation to the rear: full within 75 degrees of the axis, nothing beyond 105.
+/// No radiation to the rear: full within 75 degrees of the axis, none beyond 105.
 fn taper(off_rad: f64) -> f64 {
     let off_deg = crate::geometry::wrap_pi(off_rad).abs().to_degrees();
     match off_deg {
@@ -170,7 +170,7 @@ fn taper(off_rad: f64) -> f64 {
 }
 
 /// The reference lists maxima whose prominence is more than 0.002 and 3 %.
-fn stands_out(heights: &[f64], i: usize) -> bool {
+fn is_prominent(heights: &[f64], i: usize) -> bool {
     let valley = |side: &mut dyn Iterator<Item = &f64>| {
         side.take_while(|&&h| h <= heights[i]).copied().fold(f64::INFINITY, f64::min)
     };
@@ -224,8 +224,8 @@ fn compare(reference: &Reference, name: &str, double_diffraction: bool) -> [Erro
                 .iter()
                 .filter(|peak| (peak.0 - length_m).abs() < 0.012)
                 .min_by(|a, b| (a.0 - length_m).abs().total_cmp(&(b.0 - length_m).abs()));
-            // Close to the level where the reference stops listing, one may list what the other
-            // does not.
+            // Close to the level where the reference stops listing, one may list echoes that the
+            // other does not.
             let Some(&(at, height, bent)) = found else {
                 assert!(amplitude < 0.013, "{name}, {}: {amplitude} missing", beam.azimuth);
                 continue;
@@ -250,13 +250,13 @@ fn compare(reference: &Reference, name: &str, double_diffraction: bool) -> [Erro
 }
 
 #[test]
-fn arrivals_are_those_of_the_full_wave_reference() {
+fn arrivals_match_full_wave() {
     arrivals_agree(&Reference::given(), false);
 }
 
-/// Round whole bodies and in notches sound is diffracted twice too.
+/// Around whole bodies and in notches sound is also diffracted twice.
 #[test]
-fn arrivals_from_whole_bodies_are_those_of_boundary_integrals() {
+fn arrivals_match_boundary_integrals() {
     arrivals_agree(&Reference::bodies(), true);
 }
 

@@ -1,4 +1,4 @@
-//! Level edges beside the exact field of a rigid half plane.
+//! Level edges compared with the exact field of a rigid half plane.
 
 use std::f64::consts::{FRAC_PI_4, PI};
 
@@ -11,10 +11,10 @@ use super::{
 
 pub(super) const K: f64 = LOSSLESS.wave_number_per_m;
 
-/// Far below everything: a floor makes heights count, and its echoes are out of reach.
+/// Far below everything: a floor enables heights, and its echoes are out of reach.
 const DEEP_M: f64 = -50.0;
 
-/// A place around an edge: off it, around it from the face, and along it.
+/// A place around an edge: distance, angle from the face, and position along it.
 #[derive(Clone, Copy)]
 pub(super) struct Spot {
     pub(super) off_m: f64,
@@ -23,23 +23,24 @@ pub(super) struct Spot {
 }
 
 impl Spot {
-    /// Beside the upper edge of a wall along x through the origin; the wall's face looks to -y.
+    /// Next to the upper edge of a wall along x through the origin; the wall's face points to -y.
     pub(super) fn above(place: DVec2, above_m: f64) -> Self {
         let around_rad = (-place.y).atan2(-above_m).rem_euclid(TAU);
         Self { off_m: place.y.hypot(above_m), around_rad, along_m: place.x }
     }
 }
 
-/// What a rigid half plane makes of a point source: Macdonald's solution (Proc. London Math. Soc. 14,
-/// 1915), of the source and of its image in the plane each
+/// Field of a point source at a rigid half plane: Macdonald's solution (Proc. London Math. Soc. 14,
+/// 1915), for the source and for its image in the plane each
 ///
 /// ```text
-/// -(i k / 2) int_{-m}^inf H1(k sqrt(R^2 + u^2)) / sqrt(R^2 + u^2) du      m = 2 sqrt(r r') cos((p -+ p') / 2)
+/// -(i k / 2) int_{-m}^inf H1(k sqrt(R^2 + u^2)) / sqrt(R^2 + u^2) du
+/// m = 2 sqrt(r r') cos((p -+ p') / 2)
 /// ```
 ///
-/// for `exp(+i omega t)`, with Hankel's function of the second kind and the distance `R` from it. All of
-/// the line would be `exp(-i k R) / R`; that part of it counts to which a straight path leads (`m > 0`), and
-/// what is left is the edge's. In pairs: straight part, edge's part.
+/// for `exp(+i omega t)`, with Hankel's function of the second kind and the distance `R` from it.
+/// The whole line would be `exp(-i k R) / R`. That term counts where a straight path exists
+/// (`m > 0`), and the rest is the edge's. In pairs: straight part, edge's part.
 pub(super) fn macdonald(source: Spot, place: Spot) -> [[Complex64; 2]; 2] {
     [-1.0, 1.0].map(|sign| {
         let turned_rad = place.around_rad + sign * source.around_rad;
@@ -54,8 +55,8 @@ pub(super) fn macdonald(source: Spot, place: Spot) -> [[Complex64; 2]; 2] {
     })
 }
 
-/// The same from `m` on, down the slope from the edge's path: at `sqrt(R^2 + u^2) = edge - i t^2 / k` it
-/// falls as `exp(-t^2)`.
+/// The integral from `m` on, down the slope from the edge's path: at
+/// `sqrt(R^2 + u^2) = edge - i t^2 / k` it decreases as `exp(-t^2)`.
 fn tail(m: f64, edge_m: f64) -> Complex64 {
     const STEPS: i32 = 20_000;
     const TO: f64 = 6.0;
@@ -78,10 +79,10 @@ fn hankel(z: Complex64) -> Complex64 {
     (2.0 / (PI * z)).sqrt() * (-i * (z - 3.0 * FRAC_PI_4)).exp() * series
 }
 
-/// On the edge a half plane changes nothing, far in its shadow nothing is heard, and the edge's part goes
-/// over into Keller's.
+/// On the edge a half plane changes nothing, far in its shadow there is no field, and the edge's
+/// part approaches Keller's.
 #[test]
-fn the_exact_field_has_its_limits() {
+fn exact_field_limits() {
     let source = Spot { off_m: 0.9, around_rad: 1.1, along_m: 0.0 };
     let near = Spot { off_m: 1e-12, around_rad: 2.0, along_m: 0.6 };
     let all: Complex64 = macdonald(source, near).iter().flatten().sum();
@@ -97,15 +98,15 @@ fn the_exact_field_has_its_limits() {
     assert!(macdonald(source, dark).iter().all(|part| part[0] == Complex64::ZERO));
 }
 
-/// Keller's coefficient of a rigid half plane over the root of the distance parameter (1962, equation
-/// (14), there for the plane's other sign).
+/// Keller's coefficient of a rigid half plane over the root of the distance parameter (1962,
+/// equation (14), there for the plane's other sign).
 pub(super) fn keller([in_rad, out_rad]: [f64; 2], distance_m: f64) -> f64 {
     let share = |angle_rad: f64| 1.0 / (0.5 * angle_rad).cos();
     let shares = share(out_rad - in_rad) + share(out_rad + in_rad);
     shares.abs() / (2.0 * (TAU * K * distance_m).sqrt())
 }
 
-/// A wall along x, so long that it has no ends, up to 0 above a deep floor.
+/// A wall along x, effectively infinite, up to 0 above a deep floor.
 fn half_plane() -> Scene {
     let mut plan = scene(&[[-40.0, 0.0, 40.0, 0.0]]);
     plan.floor_z_m = Some(DEEP_M);
@@ -113,10 +114,10 @@ fn half_plane() -> Scene {
     plan
 }
 
-/// Straight way, mirrored path and level edge together, for oblique pairs on one side of the wall and on both,
-/// through all boundaries: off by 3e-5 of the straight sound at most.
+/// Direct path, mirrored path and level edge together, for oblique pairs on one side of the wall
+/// and on both, through all boundaries: off by 3e-5 of the direct sound at most.
 #[test]
-fn over_a_half_plane_the_field_is_macdonalds() {
+fn field_matches_macdonald() {
     let source = DVec2::new(0.2, -0.8);
     for target in [
         DVec2::new(0.2, -0.5),

@@ -1,4 +1,4 @@
-//! What holds in any scene.
+//! Laws that hold in any scene.
 
 use std::f64::consts::PI;
 
@@ -34,7 +34,7 @@ fn settings() -> Settings {
 const AT: DVec2 = DVec2::new(1.3, 0.6);
 
 #[test]
-fn every_way_can_be_run_through_backwards() {
+fn paths_are_reciprocal() {
     let echoes = Paths::new(&scene(&clutter()), settings()).enumerate(AT).expect("few paths");
     assert!(echoes.len() > 100, "{}", echoes.len());
     for echo in &echoes {
@@ -56,7 +56,7 @@ fn wrap(angle: f64) -> f64 {
 }
 
 #[test]
-fn turning_moving_and_mirroring_the_world_changes_nothing() {
+fn rigid_motions_change_nothing() {
     let here = Paths::new(&scene(&clutter()), settings()).enumerate(AT).expect("few paths");
     for (turn, shift, mirrored) in
         [(0.7, DVec2::new(31.0, -8.0), false), (PI, DVec2::ZERO, true), (4.4, DVec2::X, true)]
@@ -75,8 +75,8 @@ fn turning_moving_and_mirroring_the_world_changes_nothing() {
         let there =
             Paths::new(&scene(&walls), settings()).enumerate(to(AT.x, AT.y)).expect("few paths");
         assert_eq!(here.len(), there.len());
-        for (one, other) in here.iter().zip(&there) {
-            assert!((one.length_m - other.length_m).abs() < 1e-9);
+        for (first, second) in here.iter().zip(&there) {
+            assert!((first.length_m - second.length_m).abs() < 1e-9);
         }
         let sum = |echoes: &[EchoPath]| echoes.iter().map(|e| e.amplitude).sum::<f64>();
         assert!((sum(&here) - sum(&there)).abs() < 1e-6);
@@ -84,7 +84,7 @@ fn turning_moving_and_mirroring_the_world_changes_nothing() {
 }
 
 #[test]
-fn each_echo_of_a_seen_wall_turns_with_the_world() {
+fn echoes_turn_with_the_world() {
     let turn = 0.7;
     let rotor = DVec2::from_angle(turn);
     let walls: Vec<_> = clutter()
@@ -107,7 +107,7 @@ fn each_echo_of_a_seen_wall_turns_with_the_world() {
 }
 
 #[test]
-fn no_echo_gains_energy_and_more_loss_leaves_less() {
+fn no_energy_gain() {
     let lossless = Settings { absorption_np_per_m: 0.0, ..settings() };
     let loud = Paths::new(&scene(&clutter()), lossless).enumerate(AT).expect("few paths");
     assert!(loud.iter().all(|echo| echo.amplitude <= 1.0 + 1e-12));
@@ -133,7 +133,7 @@ fn no_echo_gains_energy_and_more_loss_leaves_less() {
 }
 
 #[test]
-fn a_lower_floor_or_a_longer_path_only_adds() {
+fn wider_limits_only_add() {
     let plan = scene(&clutter());
     let few = Paths::new(&plan, settings()).enumerate(AT).expect("few paths");
     let more = Settings { floor: 2e-4, max_path_m: 11.0, ..settings() };
@@ -144,10 +144,10 @@ fn a_lower_floor_or_a_longer_path_only_adds() {
     assert!(many.len() > few.len());
 }
 
-/// Opens a corner from 80 to 100 degrees: two echoes through both walls turn into none. With the
+/// Opens a corner from 80 to 100 degrees: two echoes through both walls become none. With the
 /// edge's share, nothing jumps.
 #[test]
-fn a_corner_that_opens_changes_its_echo_gradually() {
+fn opening_corner_is_continuous() {
     let (range, k) = (0.8, LOSSLESS.wave_number_per_m);
     let field = |opening_deg: f64| {
         let opening = opening_deg.to_radians();
@@ -180,7 +180,7 @@ fn a_corner_that_opens_changes_its_echo_gradually() {
 }
 
 #[test]
-fn places_on_walls_joints_and_outside_are_harmless() {
+fn degenerate_places() {
     let plan = scene(&clutter());
     let paths = Paths::new(&plan, settings());
     for at in [DVec2::ZERO, DVec2::new(1.55, 0.1), DVec2::new(1e4, 0.0), DVec2::new(1.9, 0.9)] {

@@ -18,7 +18,7 @@ pub(super) fn is_by_level_edge(echo: &EchoPath) -> bool {
     matches!(diffractors(&echo.path)[..], [Diffractor::Level { .. }])
 }
 
-/// Pressure of an echo beside a source's at 1 m.
+/// Pressure of an echo relative to a source's at 1 m.
 pub(super) fn pressure(echo: &EchoPath) -> Complex64 {
     Complex64::from_polar(echo.amplitude / echo.length_m, echo.phase_rad - K * echo.length_m)
 }
@@ -31,7 +31,7 @@ fn low_wall() -> Scene {
     plan
 }
 
-/// The upper edge of a wall, as what bends a path.
+/// Diffraction at the upper edge of a wall.
 fn top_of(wall: u32) -> Mechanism {
     Mechanism::Diffraction(Diffractor::Level { wall, is_upper: true })
 }
@@ -43,7 +43,7 @@ fn by_level_edges(plan: &Scene, at: DVec2, z_m: f64) -> Vec<EchoPath> {
 }
 
 #[test]
-fn the_upper_edge_of_a_low_wall_answers_from_the_foot_of_the_perpendicular() {
+fn upper_edge_of_a_low_wall() {
     for (z_m, exact) in [(0.9, 3e-3), (1.3, 3e-3), (0.5, 3e-2)] {
         let mut found = by_level_edges(&low_wall(), DVec2::new(0.4, 0.0), z_m);
         found.retain(|echo| !reflectors(&echo.path).contains(&Reflector::Floor));
@@ -56,7 +56,7 @@ fn the_upper_edge_of_a_low_wall_answers_from_the_foot_of_the_perpendicular() {
         let keller = keller([1_f64.atan2(0.3 - z_m); 2], 0.5 * distance_m);
         assert!((found[0].amplitude / keller - 1.0).abs() < exact, "{z_m}: {found:?} {keller}");
     }
-    // Not beyond the wall's end, and not over a wall as high as the ranger.
+    // No echo beyond the wall's end, and none over a wall as high as the ranger.
     assert!(by_level_edges(&low_wall(), DVec2::new(2.1, 0.0), 0.9).is_empty());
     let mut hidden = low_wall();
     hidden.walls.push(Wall {
@@ -75,11 +75,11 @@ fn the_upper_edge_of_a_low_wall_answers_from_the_foot_of_the_perpendicular() {
 
 /// The ranger rises past the edge: the wall's echo ends, and with the edge's nothing jumps.
 #[test]
-fn a_wall_ends_gradually_at_its_upper_edge() {
+fn upper_edge_is_continuous() {
     let field = |z_m: f64| {
         let settings = Settings { max_path_m: 2.3, ..at_height(z_m) };
         let echoes = Paths::new(&low_wall(), settings).enumerate(DVec2::ZERO).expect("few paths");
-        // Without what comes by the floor.
+        // Without arrivals by the floor.
         let level =
             echoes.iter().filter(|echo| !reflectors(&echo.path).contains(&Reflector::Floor));
         level
@@ -97,7 +97,7 @@ fn a_wall_ends_gradually_at_its_upper_edge() {
 
 /// Out or back by the floor: the edge's own field between the two images' heights.
 #[test]
-fn by_the_floor_a_level_edge_is_seen_from_an_image() {
+fn images_by_the_floor() {
     let (d, top) = (0.9, 0.35);
     let mut room = scene(&[[-40.0, 0.0, 40.0, 0.0]]);
     room.floor_z_m = Some(0.0);
@@ -123,8 +123,8 @@ fn by_the_floor_a_level_edge_is_seen_from_an_image() {
             assert!(off < 0.003, "{z_m}: {echo:?} {exact} {off}");
             let floors = usize::from(out_below) + usize::from(back_below);
             assert_eq!(reflectors(&echo.path), vec![Reflector::Floor; floors]);
-            let met: Vec<_> = echo.path.mechanisms().collect();
-            assert_eq!(met[usize::from(out_below)], top_of(0), "{echo:?}");
+            let mechanisms: Vec<_> = echo.path.mechanisms().collect();
+            assert_eq!(mechanisms[usize::from(out_below)], top_of(0), "{echo:?}");
         }
     }
     // On the floor itself the ranger is its own image: four times the edge's field.
@@ -138,10 +138,11 @@ fn by_the_floor_a_level_edge_is_seen_from_an_image() {
     assert!((all.norm() / expected - 1.0).abs() < 0.02, "{} {expected}", all.norm());
 }
 
-/// Where a low wall meets a high one, its level edge goes on in the mirror: the path out straight and back by
-/// the high wall is diffracted in the corner, slantwise, and with the floor on one leg beside it.
+/// Where a low wall joins a high one, its level edge continues in the mirror. The path out straight
+/// and back by the high wall is diffracted in the corner, slantwise, and with the floor on one leg
+/// next to it.
 #[test]
-fn beside_a_high_wall_a_level_edge_answers_slantwise() {
+fn slantwise_at_a_high_wall() {
     let (x, d, z_m, top) = (0.5, 1.0, 0.6, 0.3);
     let mut room = scene(&[[0.0, -3.0, 0.0, 3.0], [0.0, 0.0, 4.0, 0.0]]);
     room.floor_z_m = Some(0.0);
@@ -167,16 +168,17 @@ fn beside_a_high_wall_a_level_edge_answers_slantwise() {
         for echo in found {
             assert!((echo.amplitude / amplitude - 1.0).abs() < 0.03, "{echo:?} {amplitude}");
             let (floor, high) = (Mechanism::Reflection(floor), Mechanism::Reflection(high));
-            let met: Vec<_> = echo.path.mechanisms().filter(|met| *met != floor).collect();
-            assert!(met == [top_of(1), high] || met == [high, top_of(1)], "{echo:?}");
+            let mechanisms: Vec<_> =
+                echo.path.mechanisms().filter(|mechanism| *mechanism != floor).collect();
+            assert!(mechanisms == [top_of(1), high] || mechanisms == [high, top_of(1)], "{echo:?}");
             assert_eq!(echo.path.order(), 1 + floors);
         }
     }
     assert_eq!(slant.len(), 4, "{slant:#?}");
-    // By the floor it bends beside the corner, nearer to the foot of the shorter leg.
-    let place_m = x * (below - above) / (below + above);
+    // By the floor it bends next to the corner, nearer to the foot of the shorter leg.
+    let position_m = x * (below - above) / (below + above);
     let side = slant.iter().find(|e| e.path.order() == 2).expect("one by the floor");
-    let direct_rad = d.atan2(place_m - x);
+    let direct_rad = d.atan2(position_m - x);
     let ends = [side.departure_rad, side.arrival_rad];
     assert!(ends.iter().any(|end_rad| (end_rad - direct_rad).abs() < 1e-9), "{side:?}");
 }
@@ -200,8 +202,8 @@ fn furnished() -> Scene {
     room
 }
 
-/// Length, amplitude and phase of what level edges diffract, and both directions in a frame.
-fn answers(echoes: &[EchoPath], turn: impl Fn(f64) -> f64) -> Vec<[f64; 7]> {
+/// Length, amplitude and phase of echoes by level edges, and both directions in a frame.
+fn summaries(echoes: &[EchoPath], turn: impl Fn(f64) -> f64) -> Vec<[f64; 7]> {
     let mut found: Vec<[f64; 7]> = echoes
         .iter()
         .filter(|echo| is_by_level_edge(echo) && echo.amplitude > 2e-3)
@@ -217,9 +219,9 @@ fn answers(echoes: &[EchoPath], turn: impl Fn(f64) -> f64) -> Vec<[f64; 7]> {
     found
 }
 
-fn assert_same(one: &[[f64; 7]], other: &[[f64; 7]]) {
-    assert_eq!(one.len(), other.len());
-    for (a, b) in one.iter().zip(other) {
+fn assert_same(first: &[[f64; 7]], second: &[[f64; 7]]) {
+    assert_eq!(first.len(), second.len());
+    for (a, b) in first.iter().zip(second) {
         let off = a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
         assert!(off < 1e-6, "{a:?} {b:?}");
     }
@@ -228,37 +230,37 @@ fn assert_same(one: &[[f64; 7]], other: &[[f64; 7]]) {
 const T: DVec2 = DVec2::new(0.13, -0.21);
 const R: DVec2 = DVec2::new(-0.35, 0.17);
 
-/// Weaker ones are not compared, so that none is lost on the floor of the settings.
+/// Weaker echoes are not compared, so that none is lost at the floor of the settings.
 fn in_the_room(z_m: f64) -> Settings {
     Settings { max_path_m: 5.0, floor: 1e-3, ..at_height(z_m) }
 }
 
 #[test]
-fn receiver_and_transmitter_may_change_places() {
+fn ends_are_interchangeable() {
     let paths = Paths::new(&furnished(), in_the_room(0.77));
-    let there = answers(&paths.enumerate_between(T, R).expect("few paths"), |angle| angle);
+    let there = summaries(&paths.enumerate_between(T, R).expect("few paths"), |angle| angle);
     let mut back = paths.enumerate_between(R, T).expect("few paths");
     for echo in &mut back {
         std::mem::swap(&mut echo.departure_rad, &mut echo.arrival_rad);
         echo.rise_rad.reverse();
     }
     assert!(there.len() > 30, "{}", there.len());
-    assert_same(&there, &answers(&back, |angle| angle));
-    // From one place each path is heard in both directions.
+    assert_same(&there, &summaries(&back, |angle| angle));
+    // From one place each path arrives in both directions.
     let here = paths.enumerate(T).expect("few paths");
     let mut reverse = here.clone();
     for echo in &mut reverse {
         std::mem::swap(&mut echo.departure_rad, &mut echo.arrival_rad);
         echo.rise_rad.reverse();
     }
-    assert_same(&answers(&here, |angle| angle), &answers(&reverse, |angle| angle));
+    assert_same(&summaries(&here, |angle| angle), &summaries(&reverse, |angle| angle));
 }
 
 #[test]
-fn a_room_moved_turned_and_mirrored_answers_the_same() {
+fn rigid_motions_change_nothing() {
     let plain =
         Paths::new(&furnished(), in_the_room(0.77)).enumerate_between(T, R).expect("few paths");
-    let plain = answers(&plain, |angle| angle);
+    let plain = summaries(&plain, |angle| angle);
     let frame = DVec2::from_angle(0.83);
     let moved = |p: DVec2| DVec2::new(7.0, -3.0) + frame.rotate(p);
     let mirrored = |p: DVec2| DVec2::new(-p.x, p.y);
@@ -271,8 +273,8 @@ fn a_room_moved_turned_and_mirrored_answers_the_same() {
             .enumerate_between(place(T), place(R))
             .expect("few paths")
     };
-    assert_same(&plain, &answers(&at(&moved), |angle| angle - 0.83));
-    assert_same(&plain, &answers(&at(&mirrored), |angle| PI - angle));
+    assert_same(&plain, &summaries(&at(&moved), |angle| angle - 0.83));
+    assert_same(&plain, &summaries(&at(&mirrored), |angle| PI - angle));
     // Upside down, too.
     let mut room = furnished();
     for limits in room.walls.iter_mut().filter_map(|wall| wall.z_m.as_mut()) {
@@ -284,12 +286,12 @@ fn a_room_moved_turned_and_mirrored_answers_the_same() {
     for echo in &mut turned {
         echo.rise_rad = echo.rise_rad.map(|rise| -rise);
     }
-    assert_same(&plain, &answers(&turned, |angle| angle));
+    assert_same(&plain, &summaries(&turned, |angle| angle));
 }
 
-/// Each end of a plate that floats at the ranger's height answers, at the same time.
+/// Each edge of a plate that floats at the ranger's height returns an echo, at the same time.
 #[test]
-fn both_level_edges_of_a_plate_diffract() {
+fn both_edges_of_a_plate() {
     let mut plan = low_wall();
     plan.walls[0].z_m = Some([0.6, 1.2]);
     let found = by_level_edges(&plan, DVec2::ZERO, 0.9);
@@ -297,12 +299,13 @@ fn both_level_edges_of_a_plate_diffract() {
     assert_eq!(near.count(), 2, "{found:?}");
 }
 
-/// A wall that another one touches is cut there, and where its level edge answers from the cut it does so once.
+/// A wall that another one touches is cut there. Where its level edge diffracts at the cut it does
+/// so once.
 #[test]
-fn a_level_edge_in_pieces_is_one() {
+fn pieces_are_one_edge() {
     let whole = by_level_edges(&low_wall(), DVec2::new(0.25, 0.0), 0.9);
     let mut cut = low_wall();
-    // Ends behind the wall where the perpendicular meets it, so low that it hides nothing.
+    // Ends behind the wall at the foot of the perpendicular, so low that it hides nothing.
     cut.walls.push(Wall {
         a: DVec2::new(0.25, 1.0),
         b: DVec2::new(0.3, 1.4),
@@ -314,13 +317,13 @@ fn a_level_edge_in_pieces_is_one() {
     assert_eq!(pieces.len(), whole.len(), "{pieces:#?}");
 }
 
-/// The heights at which mirrored paths begin or end, and how far the sum of all sound jumps there.
+/// Heights at which mirrored paths begin or end, and the jump of the sum of all sound there.
 fn jumps(plan: &Scene, heights_m: [f64; 2], [from, to]: [DVec2; 2]) -> Vec<(f64, f64, f64)> {
     let echoes = |z_m: f64| {
         let settings = Settings { max_order: Some(2), floor: 1e-6, ..at_height(z_m) };
         Paths::new(plan, settings).enumerate_between(from, to).expect("few paths")
     };
-    // Long paths fade, so that none comes into reach at once.
+    // Long paths fade, so that none enters the reach at once.
     let fade = |length_m: f64| 0.5 + 0.5 * (PI * (length_m / 6.0).min(1.0)).cos();
     let sum = |echoes: &[EchoPath]| -> Complex64 {
         echoes
@@ -366,16 +369,16 @@ fn jumps(plan: &Scene, heights_m: [f64; 2], [from, to]: [DVec2; 2]) -> Vec<(f64,
     found
 }
 
-/// Where sound begins to pass over a low wall, on its way out or back, by the floor or not, level edges take over
-/// by halves. What grazes the wall both ways at once would be diffracted twice there, and what is left of its jump
-/// is of that size (0.04 of 0.5).
+/// Where sound begins to pass over a low wall, on its way out or back, by the floor or not, level
+/// edges take over by halves. Sound that grazes the wall both ways at once would be diffracted
+/// twice there, and the remaining jump is of that size (0.04 of 0.5).
 #[test]
-fn sound_over_a_low_wall_begins_gradually() {
+fn passing_over_is_continuous() {
     let mut room = scene(&[[-9.0, 0.6, 9.0, 0.6], [-9.0, 1.5, 9.0, 1.5]]);
     room.floor_z_m = Some(0.0);
     room.walls[0].z_m = Some([0.0, 0.3]);
-    let [here, beside] = [DVec2::ZERO, DVec2::new(0.5, -0.35)];
-    let apart = jumps(&room, [0.3137, 1.4], [here, beside]);
+    let [here, there] = [DVec2::ZERO, DVec2::new(0.5, -0.35)];
+    let apart = jumps(&room, [0.3137, 1.4], [here, there]);
     assert!(apart.len() >= 2, "{apart:?}");
     for (z_m, alone, jump) in apart {
         assert!(alone > 0.3 && jump < 1e-3, "a jump of {jump} for {alone} at {z_m}");

@@ -1,4 +1,5 @@
-//! Low, hanging and high walls among each other: beams end where no ray of theirs stands at the right height.
+//! Low, hanging and high walls in combination: beams end where none of their rays is at the right
+//! height.
 
 use super::*;
 use crate::scene::Cylinder;
@@ -53,19 +54,19 @@ fn furnished(random: &mut Pcg64) -> Scene {
 }
 
 /// Length, strength and directions, in an order that rounding does not change.
-fn told(echoes: &[EchoPath]) -> Vec<[f64; 6]> {
-    let tell = |echo: &EchoPath| {
+fn summary(echoes: &[EchoPath]) -> Vec<[f64; 6]> {
+    let row = |echo: &EchoPath| {
         let [leaves_rad, comes_rad] = echo.rise_rad;
         [echo.length_m, echo.amplitude, echo.departure_rad, echo.arrival_rad, leaves_rad, comes_rad]
     };
-    let mut told: Vec<_> = echoes.iter().map(tell).collect();
+    let mut summary: Vec<_> = echoes.iter().map(row).collect();
     let rounded = |echo: &[f64; 6]| echo.map(|value| (value * 1e7).round() as i64);
-    told.sort_by_key(rounded);
-    told
+    summary.sort_by_key(rounded);
+    summary
 }
 
 #[test]
-fn no_echo_is_lost_with_the_beams_that_end_by_their_heights() {
+fn height_cuts_lose_no_echo() {
     let mut random = Pcg64::seed_from_u64(7);
     let [mut echoes, mut cut, mut uncut] = [0; 3];
     for case in 0..60 {
@@ -87,7 +88,7 @@ fn no_echo_is_lost_with_the_beams_that_end_by_their_heights() {
         let paths = Paths::new(&room, settings);
         let all = paths.clone().without_cuts();
         let [found, expected] = [&paths, &all]
-            .map(|paths| told(&paths.enumerate_between(from, to).expect("few paths")));
+            .map(|paths| summary(&paths.enumerate_between(from, to).expect("few paths")));
         assert_eq!(found.len(), expected.len(), "case {case}: {from} {to} {room:?}");
         for (one, other) in found.iter().zip(&expected) {
             let is_same = one.iter().zip(other).all(|(a, b)| (a - b).abs() < 1e-6);

@@ -1,4 +1,4 @@
-//! Transmitter and receiver apart.
+//! Separate transmitter and receiver.
 
 use super::*;
 use crate::{model::Reflector, scene::Cylinder};
@@ -6,12 +6,12 @@ use crate::{model::Reflector, scene::Cylinder};
 const T: DVec2 = DVec2::new(0.3, 0.2);
 const R: DVec2 = DVec2::new(0.7, 0.25);
 
-/// With echoes by several contacts as far as all others.
+/// Settings with echoes by several contacts down to the common floor.
 fn to_the_floor() -> Settings {
     Settings { repeated_contacts_above: 1.0, ..LOSSLESS }
 }
 
-/// A wall whose end both see, and a cylinder.
+/// A wall whose end is visible from both, and a cylinder.
 fn plan() -> Scene {
     let mut plan = scene(&[[-5.0, -0.4, 5.0, -0.4], [0.4, 1.5, 0.4, 3.0]]);
     plan.cylinders = vec![Cylinder {
@@ -25,7 +25,7 @@ fn plan() -> Scene {
 }
 
 #[test]
-fn lengths_are_those_of_both_halves() {
+fn lengths_of_both_halves() {
     let settings =
         Settings { max_path_m: 6.0, edge_law: Some(EdgeLaw::Utd), floor: 1e-5, ..LOSSLESS };
     let echoes = Paths::new(&plan(), settings).enumerate_between(T, R).expect("few paths");
@@ -60,12 +60,12 @@ fn lengths_are_those_of_both_halves() {
             .collect();
         assert_eq!(found.len(), 1, "{walls:?} {expected}: {echoes:#?}");
     }
-    // The straight path from one to the other is no echo.
+    // The direct path from one to the other is no echo.
     assert!(echoes.iter().all(|echo| echo.length_m > T.distance(R) + 1e-6));
 }
 
 #[test]
-fn the_same_way_back_from_receiver_to_transmitter() {
+fn paths_are_reciprocal() {
     let settings =
         Settings { max_path_m: 6.0, edge_law: Some(EdgeLaw::Utd), floor: 1e-4, ..to_the_floor() };
     let paths = Paths::new(&plan(), settings);
@@ -89,7 +89,7 @@ fn the_same_way_back_from_receiver_to_transmitter() {
 }
 
 #[test]
-fn a_pair_in_one_place_is_one_transducer() {
+fn coincident_pair() {
     let settings =
         Settings { max_path_m: 5.0, edge_law: Some(EdgeLaw::Utd), floor: 1e-3, ..LOSSLESS };
     let paths = Paths::new(&plan(), settings);
@@ -105,9 +105,9 @@ fn a_pair_in_one_place_is_one_transducer() {
     }
 }
 
-/// One wall, and a pair of transducers that stands closer to it than to the point at which its beam was cut.
+/// One wall, and a pair of transducers closer to it than to the point at which its beam was cut.
 #[test]
-fn a_pair_hears_the_wall_before_it_wherever_it_stands_along_it() {
+fn wall_in_front_of_a_pair() {
     let wall = scene(&[[-1.0, 0.0, 1.0, 0.0]]);
     let paths = Paths::new(&wall, Settings { max_path_m: 8.0, ..LOSSLESS });
     for step in -9..=9 {
@@ -124,9 +124,9 @@ fn a_pair_hears_the_wall_before_it_wherever_it_stands_along_it() {
     }
 }
 
-/// Straight up to the ceiling and down to the other one: half of the way apart beside the height.
+/// Straight up to the ceiling and down to the other: half the separation against the height.
 #[test]
-fn a_pair_hears_floor_and_ceiling_between_it() {
+fn floor_and_ceiling() {
     let mut room = scene(&[[-9.0, 5.0, 9.0, 5.0]]);
     (room.floor_z_m, room.ceiling_z_m) = (Some(0.0), Some(2.5));
     let settings = Settings { max_path_m: 6.0, sensor_z_m: Some(0.9), ..LOSSLESS };
@@ -134,8 +134,8 @@ fn a_pair_hears_floor_and_ceiling_between_it() {
     let apart_m = T.distance(R);
     let found = |echoes: Vec<EchoPath>| -> Vec<f64> {
         let upright = echoes.iter().filter(|echo| {
-            let met = reflectors(&echo.path);
-            met.iter().all(|met| matches!(met, Reflector::Floor | Reflector::Ceiling))
+            let surfaces = reflectors(&echo.path);
+            surfaces.iter().all(|surface| matches!(surface, Reflector::Floor | Reflector::Ceiling))
         });
         upright.map(|echo| echo.length_m).collect()
     };
@@ -153,9 +153,9 @@ fn a_pair_hears_floor_and_ceiling_between_it() {
     }
 }
 
-/// Diffracted paths end where all do.
+/// Diffracted paths end at the same length as all others.
 #[test]
-fn no_path_of_a_pair_is_too_long() {
+fn maximum_length_holds() {
     let max_path_m = 3.4;
     let all = Settings { max_path_m: 8.0, edge_law: Some(EdgeLaw::Utd), floor: 1e-5, ..LOSSLESS };
     let all = Paths::new(&plan(), all).enumerate_between(T, R).expect("few paths");

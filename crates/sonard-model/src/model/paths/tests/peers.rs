@@ -14,7 +14,7 @@ struct Vectors {
 struct Case {
     corners: Vec<[f64; 2]>,
     at: [f64; 2],
-    /// Order and place of each image that is seen.
+    /// Order and place of each visible image.
     images: Vec<(usize, f64, f64)>,
 }
 
@@ -22,7 +22,7 @@ struct Case {
 const CLOSE_M: f64 = 1e-4;
 
 #[test]
-fn in_random_polygons_the_images_are_those_of_pyroomacoustics() {
+fn images_match_pyroomacoustics() {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/data/peers/image_sources.json");
     let text = std::fs::read_to_string(path).expect("vectors");
     let vectors: Vectors = serde_json::from_str(&text).expect("vectors");

@@ -1,4 +1,4 @@
-//! Thin cylinders, which sound goes round.
+//! Thin cylinders, which sound passes.
 
 use std::f64::consts::PI;
 
@@ -16,23 +16,24 @@ fn settings() -> Settings {
     Settings { floor: 1e-9, edge_law: Some(EdgeLaw::Utd), max_path_m: 5.0, ..LOSSLESS }
 }
 
-/// Everything that arrives, beside the field of a head-on wall over `length_m`.
+/// Sum of all arrivals, relative to the field of a head-on wall over `length_m`.
 fn field(paths: &Paths, ends: [DVec2; 2], length_m: f64) -> Complex64 {
     let k = paths.plan.settings.wave_number_per_m;
     let echoes = paths.enumerate_between(ends[0], ends[1]).expect("few paths");
     let echo = |echo: &EchoPath| {
-        let beside = length_m / echo.length_m;
+        let relative = length_m / echo.length_m;
         Complex64::from_polar(
-            beside * echo.amplitude,
+            relative * echo.amplitude,
             echo.phase_rad + k * (length_m - echo.length_m),
         )
     };
     echoes.iter().map(echo).sum()
 }
 
-/// Straight sound and post together, across the shadow and all round, against the exact series.
+/// Direct sound and post together, across the shadow and all around, compared with the exact
+/// series.
 #[test]
-fn behind_and_beside_a_post_is_the_field_of_the_exact_series() {
+fn field_matches_exact_series() {
     let k = LOSSLESS.wave_number_per_m;
     let transmitter = DVec2::new(-0.6, 0.0);
     let mut worst: f64 = 0.0;
@@ -47,16 +48,17 @@ fn behind_and_beside_a_post_is_the_field_of_the_exact_series() {
             let between_rad = transmitter.angle_to(receiver);
             let by_m = 0.6 + 0.9;
             let round = series(radius_m, k, [0.6, 0.9], between_rad);
-            let beside = straight_m / by_m * Complex64::cis(k * (straight_m - by_m));
-            worst = worst.max((found - 1.0 - beside * round).norm());
+            let relative = straight_m / by_m * Complex64::cis(k * (straight_m - by_m));
+            worst = worst.max((found - 1.0 - relative * round).norm());
         }
     }
     assert!(worst < 0.01, "{worst}");
 }
 
-/// A leg of 2 cm half way to a wall takes a part of its echo, wherever it is: no jump where it comes into the line.
+/// A leg of 2 cm half way to a wall removes a part of its echo, at any position: no jump where it
+/// enters the line.
 #[test]
-fn a_leg_before_a_wall_takes_a_part_of_its_echo_and_no_more() {
+fn leg_shadows_part_of_an_echo() {
     let wall = [2.0, -3.0, 2.0, 3.0];
     let at = DVec2::ZERO;
     let level = |leg_y_m: f64| {
@@ -64,7 +66,7 @@ fn a_leg_before_a_wall_takes_a_part_of_its_echo_and_no_more() {
         scene.cylinders = vec![post(DVec2::new(1.0, leg_y_m), 0.01)];
         let paths = Paths::new(&scene, settings());
         let echoes = paths.enumerate(at).expect("few paths");
-        // The pulses of the others are over, or not there yet.
+        // The pulses of the others have ended, or have not begun.
         let near = echoes.into_iter().filter(|echo| (3.9..4.1).contains(&echo.length_m));
         let k = LOSSLESS.wave_number_per_m;
         let sum = near.map(|e| Complex64::from_polar(e.amplitude, e.phase_rad - k * e.length_m));
@@ -80,9 +82,9 @@ fn a_leg_before_a_wall_takes_a_part_of_its_echo_and_no_more() {
     assert!((level(0.0) - expected).abs() < 1e-3, "{} {expected}", level(0.0));
 }
 
-/// Near a wall, or a thick one, a cylinder is what it was: a mirror with a shadow.
+/// Near a wall, or thick, a cylinder remains a mirror with a shadow.
 #[test]
-fn a_cylinder_beside_a_wall_or_a_thick_one_is_no_post() {
+fn thick_or_near_is_no_post() {
     for (center, radius_m, is_post) in [
         ((1.0, 0.0), 0.01, true),
         ((1.95, 0.0), 0.01, true),

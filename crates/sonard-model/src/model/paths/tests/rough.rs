@@ -10,8 +10,7 @@ use crate::{
 
 const HEIGHT_RAD: f64 = 0.16;
 
-/// Power of what a long wall at 1 m scatters towards a ranger that looks `aside_rad` past its
-/// normal.
+/// Power that a long wall at 1 m scatters towards a ranger that points `aside_rad` past its normal.
 fn power(reflectance: f64, roughness: f64, aside_rad: f64, sensor: &Sensor) -> (f64, f64) {
     let mut plan = scene(&[[-40.0, 1.0, 40.0, 1.0]]);
     plan.walls[0].material = Material { reflectance, roughness };
@@ -26,9 +25,9 @@ fn power(reflectance: f64, roughness: f64, aside_rad: f64, sensor: &Sensor) -> (
     (of(PathKind::Specular), of(PathKind::Scattered))
 }
 
-/// The patches together are Lambert's law over the beam.
+/// The patches together follow Lambert's law over the beam.
 #[test]
-fn the_patches_of_a_wall_add_up_to_lamberts_law() {
+fn patches_add_up_to_lambert() {
     let sensor = Sensor::preset("senscomp-6500").expect("a preset");
     let beam = BeamPattern::new(&sensor, 343.99);
     for aside_deg in [0.0_f64, 30.0, 60.0] {
@@ -47,7 +46,7 @@ fn the_patches_of_a_wall_add_up_to_lamberts_law() {
 }
 
 #[test]
-fn a_rough_wall_is_seen_aslant_and_a_smooth_one_is_not() {
+fn only_rough_walls_echo_aslant() {
     let sensor = Sensor::preset("senscomp-6500").expect("a preset");
     let loud = |roughness: f64| power(0.9, roughness, 1.0, &sensor).1.sqrt() > sensor.threshold;
     assert!(loud(0.6));

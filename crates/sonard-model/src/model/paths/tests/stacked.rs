@@ -35,7 +35,7 @@ fn echoes(room: &Scene, z_m: f64, edge_law: Option<EdgeLaw>) -> Vec<EchoPath> {
 }
 
 #[test]
-fn each_is_met_at_its_own_height() {
+fn each_at_its_own_height() {
     let room = room_with(&[SILL, LINTEL]);
     for (z_m, first, length_m) in [(0.5, 0, 3.0), (1.1, 3, 6.0), (2.0, 1, 3.0)] {
         let ahead: Vec<_> = echoes(&room, z_m, None)
@@ -48,7 +48,7 @@ fn each_is_met_at_its_own_height() {
 }
 
 #[test]
-fn which_is_named_first_does_not_matter() {
+fn order_does_not_matter() {
     let [one, other] = [[SILL, LINTEL], [LINTEL, SILL]].map(|heights| room_with(&heights));
     for z_m in [0.5, 1.1, 2.0] {
         let laws = [None, Some(EdgeLaw::Utd)];
@@ -79,13 +79,13 @@ fn which_is_named_first_does_not_matter() {
 }
 
 #[test]
-fn two_without_a_gap_mirror_as_one() {
+fn adjoining_walls_are_one() {
     let [whole, halves] = [vec![[0.0, 2.5]], vec![[0.0, 1.0], [1.0, 2.5]]]
         .map(|heights| echoes(&room_with(&heights), 1.1, None));
     let lengths = |echoes: &[EchoPath]| echoes.iter().map(|echo| echo.length_m).collect::<Vec<_>>();
     let (whole, halves) = (lengths(&whole), lengths(&halves));
     assert_eq!(whole.len(), halves.len());
-    for (one, other) in whole.iter().zip(&halves) {
-        assert!((one - other).abs() < 1e-9, "{one} {other}");
+    for (a, b) in whole.iter().zip(&halves) {
+        assert!((a - b).abs() < 1e-9, "{a} {b}");
     }
 }

@@ -4,7 +4,7 @@ use num_complex::Complex64;
 
 use super::*;
 
-/// The echoes of a wall alone, all together, from 0.5 m off its middle.
+/// Sum of the echoes of an isolated wall, from 0.5 m off its middle.
 fn field(walls: &[[f64; 4]], at: DVec2, settings: &Settings) -> f64 {
     let echoes = Paths::new(&scene(walls), settings.clone()).enumerate(at).expect("few paths");
     let k = settings.wave_number_per_m;
@@ -16,10 +16,10 @@ fn settings() -> Settings {
     Settings { floor: 1e-9, edge_law: Some(EdgeLaw::Utd), max_path_m: 3.0, ..LOSSLESS }
 }
 
-/// Levels of a boundary integral in the plane, as in `acoustics::edge::strip`: a hair of 0.14 mm, a quarter, a half
-/// and a whole wavelength.
+/// Levels of a boundary integral in the plane, as in `acoustics::edge::strip`: a hair of 0.14 mm, a
+/// quarter, a half and a whole wavelength.
 #[test]
-fn a_narrow_wall_answers_as_a_boundary_integral_has_it() {
+fn strip_matches_boundary_integral() {
     let wavelength_m = TAU / LOSSLESS.wave_number_per_m;
     for (wavelengths, levels) in [
         (0.0202, [0.000168, 0.000126]),
@@ -42,9 +42,9 @@ fn a_narrow_wall_answers_as_a_boundary_integral_has_it() {
     }
 }
 
-/// Before a wall a hair is hardly there, wherever the mirror's point is.
+/// In front of a wall a hair is negligible, wherever the mirror's point is.
 #[test]
-fn a_hair_before_a_wall_changes_nothing() {
+fn hair_is_negligible() {
     let wall = [-2.0, 1.0, 2.0, 1.0];
     let settings = Settings { max_path_m: 2.2, ..settings() };
     let empty = field(&[wall], DVec2::ZERO, &settings);
@@ -55,12 +55,12 @@ fn a_hair_before_a_wall_changes_nothing() {
     }
 }
 
-/// With two diffractions as without: a strip's own field has what runs along it.
+/// Equal with one and two diffractions: a strip's own field includes the sound along it.
 #[test]
-fn a_narrow_wall_has_no_double_diffraction_of_its_own() {
+fn no_double_diffraction() {
     let double = Settings { double_diffraction: true, ..settings() };
     let strip = [[-0.002, 0.0, 0.002, 0.0]];
     let at = DVec2::new(0.2, 0.4);
-    let [one, two] = [settings(), double].map(|settings| field(&strip, at, &settings));
-    assert!((one - two).abs() < 1e-12, "{one} {two}");
+    let [single, twice] = [settings(), double].map(|settings| field(&strip, at, &settings));
+    assert!((single - twice).abs() < 1e-12, "{single} {twice}");
 }

@@ -51,7 +51,7 @@ impl Case {
         scene(&walls)
     }
 
-    /// Relative errors of the field, each with the share that single diffraction and mirrors make.
+    /// Relative errors of the field, each with the share of single diffraction and mirrors.
     fn errors(&self, settings: &Settings) -> Vec<(DVec2, f64, f64)> {
         let plan = self.plan();
         let paths = Paths::new(&plan, settings.clone());
@@ -66,7 +66,7 @@ impl Case {
     }
 }
 
-/// Field at a receiver over that of a cylindrical wave at 1 m, the straight path included.
+/// Field at a receiver over that of a cylindrical wave at 1 m, the direct path included.
 fn field(plan: &Scene, paths: &Paths, source: DVec2, at: DVec2) -> Complex64 {
     let k = paths.plan.settings.wave_number_per_m;
     let wave = |length_m: f64, amplitude: f64, phase_rad: f64| {
@@ -86,13 +86,13 @@ fn field(plan: &Scene, paths: &Paths, source: DVec2, at: DVec2) -> Complex64 {
     if is_hidden { bent } else { bent + wave(source.distance(at), 1.0, 0.0) }
 }
 
-/// Against boundary integrals (tests/peers/two_edges.py). In the shadow of a thick wall there is
-/// nothing without double diffraction, and with it the field is right to 2 %, or where both edges are
-/// all but in line with the transmitter to 15 %. Behind two blades it takes away most of the error; what
-/// is left comes from below, round four edges. The figures:
+/// Comparison with boundary integrals (tests/peers/two_edges.py). In the shadow of a thick wall
+/// there is no field without double diffraction. With it the field is right to 2 %, or to 15 %
+/// where both edges are nearly in line with the transmitter. Behind two blades it removes most of
+/// the error; the rest comes from below, around four edges. The figures:
 /// `cargo test --lib two_edges -- --nocapture`
 #[test]
-fn the_field_behind_two_edges_is_that_of_boundary_integrals() {
+fn two_edges_match_boundary_integrals() {
     let vectors = Vectors::load();
     for case in &vectors.cases {
         let [once, twice] = [false, true].map(|double| {
@@ -144,7 +144,7 @@ fn bent_twice(echoes: Vec<EchoPath>) -> Vec<EchoPath> {
 
 /// Two parallel screens with their free ends side by side, and the product written out.
 #[test]
-fn between_two_free_ends_it_is_the_product_of_their_coefficients() {
+fn product_of_coefficients() {
     let plan = scene(&[[0.0, 0.0, 0.0, -3.0], [0.5, 0.2, 0.5, -3.0]]);
     let (from, to) = (DVec2::new(-0.6, -0.5), DVec2::new(0.9, -0.4));
     let echoes =
@@ -182,7 +182,7 @@ fn between_two_free_ends_it_is_the_product_of_their_coefficients() {
 
 /// A room with a plate and a box, by walls and by cylinder, also between two places.
 #[test]
-fn each_way_can_be_run_through_backwards() {
+fn paths_are_reciprocal() {
     let mut plan = scene(&[
         [-1.5, -1.0, 1.5, -1.0],
         [-0.3, 0.6, 0.2, 0.7],
@@ -226,10 +226,10 @@ fn each_way_can_be_run_through_backwards() {
     }
 }
 
-/// A receiver that comes out of the shadow of a second edge: the echo of the first begins, and that
-/// of both jumps by as much.
+/// A receiver that leaves the shadow of a second edge: the echo of the first begins, and that of
+/// both jumps by as much.
 #[test]
-fn where_the_second_edge_ceases_to_hide_the_first_nothing_jumps() {
+fn leaving_the_shadow_is_continuous() {
     let plan = scene(&[[0.0, 0.0, 0.0, -3.0], [0.5, 0.2, 0.5, -3.0]]);
     let from = DVec2::new(-0.6, -0.8);
     let k = LOSSLESS.wave_number_per_m;
@@ -240,15 +240,15 @@ fn where_the_second_edge_ceases_to_hide_the_first_nothing_jumps() {
         let at = |i: i32| {
             let angle = edge.to_angle() + 0.001 * f64::from(i - 60);
             let to = edge + 0.6 * DVec2::from_angle(angle);
-            // Only what goes over the ends, with the phase of the path along the edges taken off.
-            let least_m = from.length() + edge.length() + 0.6;
+            // Only sound over the ends, without the phase of the path along the edges.
+            let min_m = from.length() + edge.length() + 0.6;
             let near = paths.enumerate_between(from, to).expect("few paths");
             near.iter()
                 .filter(|echo| {
-                    reflectors(&echo.path).is_empty() && (echo.length_m - least_m).abs() < 1e-2
+                    reflectors(&echo.path).is_empty() && (echo.length_m - min_m).abs() < 1e-2
                 })
                 .map(|echo| {
-                    let phase = echo.phase_rad - k * (echo.length_m - least_m);
+                    let phase = echo.phase_rad - k * (echo.length_m - min_m);
                     Complex64::from_polar(echo.amplitude, phase)
                 })
                 .sum()
@@ -265,7 +265,7 @@ fn where_the_second_edge_ceases_to_hide_the_first_nothing_jumps() {
 
 /// Both faces of a plate carry sound from end to end; it is one echo, and off by default.
 #[test]
-fn a_plate_is_crossed_from_end_to_end() {
+fn along_a_plate() {
     let plan = scene(&[[-0.15, 0.6, 0.15, 0.6]]);
     let at = DVec2::new(0.02, 0.0);
     let echoes = bent_twice(Paths::new(&plan, double()).enumerate(at).expect("few paths"));
@@ -278,9 +278,10 @@ fn a_plate_is_crossed_from_end_to_end() {
     assert!(bent_twice(Paths::new(&plan, single).enumerate(at).expect("few paths")).is_empty());
 }
 
-/// Edges some metres apart are found if the whole path is short enough: no factor of its length counts twice.
+/// Edges some metres apart are found if the whole path is short enough: no factor of its length
+/// counts twice.
 #[test]
-fn a_longer_search_adds_no_shorter_path_by_two_edges() {
+fn longer_search_adds_longer_paths() {
     let plan = scene(&[[4.0, 0.3, 5.5, 1.8], [3.0, -4.0, 4.5, -5.5]]);
     let found = |max_path_m: f64| {
         let settings = Settings {
@@ -294,9 +295,9 @@ fn a_longer_search_adds_no_shorter_path_by_two_edges() {
         echoes.retain(|echo| echo.length_m <= 14.0 && diffractors(&echo.path).len() == 2);
         echoes.into_iter().map(|echo| echo.length_m).collect::<Vec<_>>()
     };
-    // Out to one edge, on to the other, and back; the other way round it is as long.
-    let (one, other) = (DVec2::new(4.0, 0.3), DVec2::new(3.0, -4.0));
-    let length_m = one.length() + one.distance(other) + other.length();
+    // Out to one edge, on to the other, and back; the reverse has the same length.
+    let (a, b) = (DVec2::new(4.0, 0.3), DVec2::new(3.0, -4.0));
+    let length_m = a.length() + a.distance(b) + b.length();
     let near = found(14.0);
     assert_eq!(near.iter().filter(|found| (**found - length_m).abs() < 1e-9).count(), 2);
     assert_eq!(near, found(100.0));

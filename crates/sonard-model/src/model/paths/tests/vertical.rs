@@ -13,7 +13,7 @@ fn at_height(z_m: f64) -> Settings {
 }
 
 #[test]
-fn a_wall_and_the_floor_answer_from_their_corner() {
+fn wall_and_floor_corner() {
     let (d, h) = (0.8, 0.35);
     let mut room = scene(&[[-9.0, d, 9.0, d]]);
     room.floor_z_m = Some(0.0);
@@ -33,7 +33,7 @@ fn a_wall_and_the_floor_answer_from_their_corner() {
 
 /// A box: the images are the lattice in three dimensions.
 #[test]
-fn in_a_box_the_echoes_are_the_lattice_in_space() {
+fn box_is_the_image_lattice() {
     let size = [1.3, 0.9, 1.1];
     let at = [0.4, 0.25, 0.3];
     let corners =
@@ -65,9 +65,9 @@ fn in_a_box_the_echoes_are_the_lattice_in_space() {
     }
 }
 
-/// Each reflection leaves what its material does, in the wall-floor corner and on any path.
+/// Each reflection leaves its material's share, in the wall-floor corner and on any path.
 #[test]
-fn floor_and_ceiling_leave_what_their_materials_do() {
+fn materials_of_floor_and_ceiling() {
     let corners = [[0.0, 0.0], [1.3, 0.0], [1.3, 0.9], [0.0, 0.9]].map(DVec2::from_array);
     let mut room = polygon(&corners);
     (room.floor_z_m, room.ceiling_z_m) = (Some(0.0), Some(1.1));
@@ -81,7 +81,7 @@ fn floor_and_ceiling_leave_what_their_materials_do() {
     let echoes =
         Paths::new(&room, settings.clone()).enumerate(DVec2::new(0.4, 0.25)).expect("few paths");
     for echo in &echoes {
-        let gains = echo.path.reflectors().map(|met| match met {
+        let gains = echo.path.reflectors().map(|reflector| match reflector {
             Reflector::Floor => 0.5,
             Reflector::Ceiling => 0.81,
             _ => 0.8,
@@ -92,7 +92,7 @@ fn floor_and_ceiling_leave_what_their_materials_do() {
     let corner =
         echoes.iter().find(|e| reflectors(&e.path)[..] == [Reflector::Wall(3), Reflector::Floor]);
     assert!((corner.expect("the corner").amplitude - 0.4).abs() < 1e-12);
-    // None is left out but for its weakness.
+    // Only weak echoes are omitted.
     let rigid = Scene {
         floor_material: Material::RIGID,
         ceiling_material: Material::RIGID,
@@ -102,8 +102,9 @@ fn floor_and_ceiling_leave_what_their_materials_do() {
         .enumerate(DVec2::new(0.4, 0.25))
         .expect("few paths");
     let strong = all.iter().filter(|echo| {
-        let hits =
-            |level| reflectors(&echo.path).iter().filter(|met| **met == level).count() as i32;
+        let hits = |level| {
+            reflectors(&echo.path).iter().filter(|reflector| **reflector == level).count() as i32
+        };
         let left = 0.5_f64.powi(hits(Reflector::Floor)) * 0.81_f64.powi(hits(Reflector::Ceiling));
         echo.amplitude * left >= 0.02
     });
@@ -112,13 +113,13 @@ fn floor_and_ceiling_leave_what_their_materials_do() {
 
 /// The weight is the beam pattern's at the angle in space.
 #[test]
-fn the_beam_is_weighed_in_space_and_a_tilt_finds_the_floor() {
+fn tilted_beam_finds_the_floor() {
     let (d, h) = (2.0, 0.3);
     let mut room = scene(&[[-9.0, d, 9.0, d]]);
     room.floor_z_m = Some(0.0);
     let sensor = Sensor::preset("senscomp-6500").expect("a preset");
     let beam = BeamPattern::new(&sensor, 343.99);
-    let heard = |tilt_rad: f64, walls: &[Reflector]| {
+    let amplitude_at = |tilt_rad: f64, walls: &[Reflector]| {
         let settings = Settings { tilt_rad, floor: 1e-6, ..at_height(h) };
         let engine = PathEngine::new(&room, beam.clone(), None, settings);
         let place = engine.arrivals_at(DVec2::ZERO).expect("few paths");
@@ -127,18 +128,18 @@ fn the_beam_is_weighed_in_space_and_a_tilt_finds_the_floor() {
     };
     let (wall, corner) = ([Reflector::Wall(0)], [Reflector::Wall(0), Reflector::Floor]);
     let below = (h / d).atan();
-    assert!((heard(0.0, &wall) - 1.0).abs() < 1e-9);
-    assert!((heard(0.0, &corner) - beam.one_way(below).powi(2)).abs() < 1e-9);
-    assert!((heard(-0.05, &corner) - beam.one_way(below - 0.05).powi(2)).abs() < 1e-9);
-    assert!((heard(-0.05, &wall) - beam.one_way(0.05).powi(2)).abs() < 1e-9);
-    assert_eq!(heard(0.0, &[Reflector::Floor]), 0.0);
-    assert!((heard(-FRAC_PI_2, &[Reflector::Floor]) - 1.0).abs() < 1e-9);
-    assert!(heard(-FRAC_PI_4, &[Reflector::Floor]) < 0.01);
+    assert!((amplitude_at(0.0, &wall) - 1.0).abs() < 1e-9);
+    assert!((amplitude_at(0.0, &corner) - beam.one_way(below).powi(2)).abs() < 1e-9);
+    assert!((amplitude_at(-0.05, &corner) - beam.one_way(below - 0.05).powi(2)).abs() < 1e-9);
+    assert!((amplitude_at(-0.05, &wall) - beam.one_way(0.05).powi(2)).abs() < 1e-9);
+    assert_eq!(amplitude_at(0.0, &[Reflector::Floor]), 0.0);
+    assert!((amplitude_at(-FRAC_PI_2, &[Reflector::Floor]) - 1.0).abs() < 1e-9);
+    assert!(amplitude_at(-FRAC_PI_4, &[Reflector::Floor]) < 0.01);
 }
 
-/// Without heights nothing changes, at whatever height the ranger is said to be.
+/// Without heights nothing changes, at any height of the ranger.
 #[test]
-fn a_scene_in_the_plane_stays_in_the_plane() {
+fn planar_scene_ignores_height() {
     let plan = scene(&[[-1.0, 0.5, 4.0, 0.5], [0.3, -1.0, 4.0, 0.2]]);
     let settings = Settings { edge_law: Some(EdgeLaw::Utd), ..LOSSLESS };
     let flat = Paths::new(&plan, settings.clone()).enumerate(DVec2::ZERO).expect("few paths");
@@ -147,40 +148,40 @@ fn a_scene_in_the_plane_stays_in_the_plane() {
     assert!(flat.len() > 3);
 }
 
-/// A low wall before a high one: seen below its upper edge, passed above it.
+/// A low wall in front of a high one: visible below its upper edge, passed above it.
 #[test]
-fn a_low_wall_is_missed_above_and_bars_the_way_below() {
+fn low_wall_blocks_below_its_edge() {
     let mut room = scene(&[[-9.0, 0.6, 9.0, 0.6], [-9.0, 1.5, 9.0, 1.5]]);
     room.walls[0].z_m = Some([0.0, 0.3]);
     let (low, high, floor) = (Reflector::Wall(0), Reflector::Wall(1), Reflector::Floor);
-    let met = |room: &Scene, z_m: f64| {
+    let paths_from = |room: &Scene, z_m: f64| {
         let settings = Settings { max_order: Some(2), ..at_height(z_m) };
-        let mut met: Vec<_> = Paths::new(room, settings)
+        let mut paths_from: Vec<_> = Paths::new(room, settings)
             .enumerate(DVec2::ZERO)
             .expect("few paths")
             .into_iter()
             .map(|echo| reflectors(&echo.path).to_vec())
             .collect();
-        met.sort();
-        met
+        paths_from.sort();
+        paths_from
     };
     // All sound at the ranger's height.
-    assert_eq!(met(&room, 0.2), [[low]]);
-    assert_eq!(met(&room, 0.4), [[high]]);
-    // With a floor, the path by floor and wall meets the wall at its foot.
+    assert_eq!(paths_from(&room, 0.2), [[low]]);
+    assert_eq!(paths_from(&room, 0.4), [[high]]);
+    // With a floor, the path by floor and wall hits the wall at its foot.
     room.floor_z_m = Some(0.0);
     let low_again = vec![low, floor];
-    assert_eq!(met(&room, 0.2), [vec![low], low_again.clone(), vec![floor]]);
-    // From 0.4 the corner of low wall and floor is in sight, and the high one's is hidden.
-    assert_eq!(met(&room, 0.4), [low_again, vec![high], vec![floor]]);
-    // From 0.7 the arrival on its way to the far corner and back is at 0.42 over the low wall.
-    let all = met(&room, 0.7);
+    assert_eq!(paths_from(&room, 0.2), [vec![low], low_again.clone(), vec![floor]]);
+    // From 0.4 the corner of low wall and floor is visible, and the high one's is hidden.
+    assert_eq!(paths_from(&room, 0.4), [low_again, vec![high], vec![floor]]);
+    // From 0.7 the path to the far corner and back is at 0.42 over the low wall.
+    let all = paths_from(&room, 0.7);
     assert!(all.contains(&vec![high, floor]), "{all:?}");
 }
 
-/// A low post hides what is behind it from a ranger at its height, not from one above.
+/// A low post hides objects behind it from a ranger at its height, not from one above.
 #[test]
-fn a_low_cylinder_hides_only_what_is_behind_it() {
+fn low_cylinder_hides_only_behind() {
     let mut plan = scene(&[[-2.0, 2.0, 2.0, 2.0]]);
     (plan.floor_z_m, plan.ceiling_z_m) = (Some(0.0), Some(2.5));
     plan.cylinders = vec![crate::scene::Cylinder {
@@ -199,15 +200,14 @@ fn a_low_cylinder_hides_only_what_is_behind_it() {
     assert_eq!(level(0.6), [Reflector::Wall(0)]);
 }
 
-/// The far wall of a corner is touched there by what comes to it, and is not in its way.
+/// A path to a corner touches the far wall there, which does not block it.
 #[test]
-fn corners_of_low_walls_answer_as_those_of_high_ones() {
+fn corners_of_low_walls() {
     for turn in 0..12 {
         let frame = DVec2::from_angle(0.5 * f64::from(turn));
-        let [corner, one, other] =
+        let [corner, a, b] =
             [DVec2::ZERO, DVec2::new(-1.0, 0.0), DVec2::new(0.0, 1.0)].map(|p| frame.rotate(p));
-        let mut plan =
-            scene(&[[one.x, one.y, corner.x, corner.y], [corner.x, corner.y, other.x, other.y]]);
+        let mut plan = scene(&[[a.x, a.y, corner.x, corner.y], [corner.x, corner.y, b.x, b.y]]);
         plan.floor_z_m = Some(0.0);
         let settings = Settings { edge_law: Some(EdgeLaw::Utd), ..at_height(0.3) };
         let level = |plan: &Scene, at: DVec2| -> Vec<f64> {
@@ -225,7 +225,7 @@ fn corners_of_low_walls_answer_as_those_of_high_ones() {
             let high = level(&plan, at);
             plan.walls.iter_mut().for_each(|wall| wall.z_m = Some([0.0, 0.5]));
             let low = level(&plan, at);
-            // No path round or over a wall that sound does not pass at this height.
+            // No path around or over a wall that sound does not pass at this height.
             assert!(high.iter().any(|length_m| (length_m - 1.0).abs() < 1e-9), "{high:?}");
             assert_eq!(low.len(), high.len(), "{low:?} {high:?}");
         }

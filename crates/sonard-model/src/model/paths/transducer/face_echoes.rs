@@ -1,4 +1,4 @@
-//! The echo paths of an observation point that the face can reflect.
+//! Echo paths of an observation point that the face can reflect.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -6,61 +6,62 @@ use num_complex::Complex64;
 use smallvec::SmallVec;
 
 use super::{
-    bound::Best,
+    bound::BestLastPath,
     face_path::{DirectedPath, FacePath, MultipleEcho},
-    search::Search,
+    search::SequenceSearch,
 };
 use crate::{
     acoustics::{BeamPattern, Disc},
     model::paths::{
-        direction_index::{DirectionIndex, Entry, wrap_once},
-        echo::Echo,
+        direction_index::{DirectionEntry, DirectionIndex, wrap_once},
+        echo::PathEcho,
         pattern::PatternEnvelope,
         settings::Settings,
         tolerance::SAME_RAD,
     },
 };
 
-/// Multiple echoes are listed from this much above the weakest echo of the search, which lies 20 dB below
-/// the threshold: only those that can be detected. There are a great many of the others.
-pub(crate) const FLOOR_ABOVE: f64 = 10.0;
+/// Ratio of the weakest multiple echo to the weakest echo of the search, which is 20 dB below the
+/// threshold: only multiple echoes that can be detected are listed. There are a great many weaker
+/// ones.
+pub(crate) const MULTIPLE_FLOOR_RATIO: f64 = 10.0;
 
 /// Echo paths from the face to the face.
 pub(crate) struct FaceEchoes {
     face: Disc,
     paths: Vec<FacePath>,
-    /// By direction of departure.
+    /// Index by direction of departure.
     departures: DirectionIndex,
 }
 
 impl FaceEchoes {
     pub(crate) fn new(
         face: Disc,
-        echoes: &[Echo],
+        echoes: &[PathEcho],
         envelope: &PatternEnvelope,
         settings: &Settings,
     ) -> Self {
-        let floor = FLOOR_ABOVE * settings.floor;
-        // A wall nearer than that is not one to see the disc's zones from.
+        let floor = MULTIPLE_FLOOR_RATIO * settings.floor;
+        // A nearer wall is not in the far field of the disc's zones.
         let far = || {
-            let far = |(echo, _): &(&Echo, u32)| {
+            let far = |(echo, _): &(&PathEcho, u32)| {
                 let is_level = echo.rise_rad == [0.0; 2];
                 echo.length_m > 2.0 * face.face.radius_m && is_level
             };
             echoes.iter().zip(0..).filter(far)
         };
-        let best = Best::of(far().map(|(echo, _)| (echo.length_m, echo.amplitude)));
+        let best = BestLastPath::from_paths(far().map(|(echo, _)| (echo.length_m, echo.amplitude)));
         let mut paths = Vec::new();
         let mut entries = Vec::new();
         for (echo, index) in far() {
-            // What it can at most become, when the face looks into its departure.
-            let most = best.after(&face, echo.length_m, echo.amplitude);
-            let reach_rad = envelope.reach_rad(floor / most);
-            if most < floor || reach_rad == 0.0 {
+            // Upper bound, with the face in the direction of departure.
+            let bound = best.after(&face, echo.length_m, echo.amplitude);
+            let reach_rad = envelope.reach_rad(floor / bound);
+            if bound < floor || reach_rad == 0.0 {
                 continue;
             }
             let leaves_rad = echo.departure.to_angle();
-            entries.push(Entry {
+            entries.push(DirectionEntry {
                 middle_rad: leaves_rad,
                 half_rad: 0.0,
                 amplitude: echo.amplitude,
@@ -80,17 +81,17 @@ impl FaceEchoes {
         Self { face, paths, departures: DirectionIndex::new(&entries) }
     }
 
-    /// All multiple echoes up to a length, metres, with at least one reflection at the face, which looks into
-    /// `direction_rad`; `floor` is the weakest echo of the search.
+    /// Returns all multiple echoes up to a length, metres, with at least one reflection at the
+    /// face, which points in `direction_rad`; `floor` is the weakest echo of the search.
     pub(crate) fn multiple_echoes(
         &self,
         direction_rad: f64,
         beam: &BeamPattern,
         floor: f64,
-        most_m: f64,
+        max_m: f64,
     ) -> Vec<MultipleEcho> {
-        let floor = FLOOR_ABOVE * floor;
-        let within = self.paths.partition_point(|path| path.length_m < most_m) as u32;
+        let floor = MULTIPLE_FLOOR_RATIO * floor;
+        let within = self.paths.partition_point(|path| path.length_m < max_m) as u32;
         let mut near: SmallVec<[(&FacePath, f64); 16]> = SmallVec::new();
         self.departures.near(direction_rad, within, |entry, _| {
             let path = &self.paths[entry.echo as usize];
@@ -100,8 +101,9 @@ impl FaceEchoes {
                 near.push((path, entry.amplitude * beam.one_way(leaves_rad)));
             }
         });
-        // Each needs another that it can be followed by.
-        let best = Best::of(near.iter().map(|(out, leaving)| (out.length_m, *leaving)));
+        // Each path needs another one that can follow it.
+        let best =
+            BestLastPath::from_paths(near.iter().map(|(out, leaving)| (out.length_m, *leaving)));
         near.retain(|(out, leaving)| best.after(&self.face, out.length_m, *leaving) >= floor);
         if near.is_empty() {
             return Vec::new();
@@ -112,6 +114,6 @@ impl FaceEchoes {
             (FacePath { leaves_rad, returns_rad, ..*path }, leaving)
         };
         let outs: SmallVec<[(FacePath, f64); 16]> = near.iter().map(turned).collect();
-        Search::new(self.face, &outs, floor, most_m).run()
+        SequenceSearch::new(self.face, &outs, floor, max_m).run()
     }
 }

@@ -1,42 +1,42 @@
-//! The search for sequences of paths with the face between them.
+//! Search for sequences of paths with the face between them.
 
 use num_complex::Complex64;
 use smallvec::{SmallVec, smallvec};
 
 use super::{
-    bound::Best,
+    bound::BestLastPath,
     face_path::{DirectedPath, FacePath, MultipleEcho},
 };
 use crate::acoustics::{Disc, FaceAspect};
 
-/// Sequences longer than this in all would not be told apart any more.
-const MOST_PATHS: usize = 32;
+/// Maximum number of paths of a sequence; longer ones can no longer be resolved.
+const MAX_PATHS: usize = 32;
 
-/// More multiple echoes than this come only from a face that all but touches several walls, where rays
-/// no longer say much; the search ends there.
-const MOST_ECHOES: usize = 4096;
+/// Maximum number of multiple echoes. Only a face that nearly touches several walls exceeds it,
+/// where rays lose their meaning; the search ends there.
+const MAX_ECHOES: usize = 4096;
 
-/// Sequences of paths, each longer one from a shorter one.
-pub(crate) struct Search {
+/// Sequences of paths, each longer one built from a shorter one.
+pub(crate) struct SequenceSearch {
     face: Disc,
     floor: f64,
-    /// The longest that is asked for, metres.
-    most_m: f64,
-    best: Best,
-    /// The paths out run backwards, which a sequence may end with, and then the paths out themselves.
+    /// Maximum length, metres.
+    max_m: f64,
+    best: BestLastPath,
+    /// Reversed paths, which can end a sequence, followed by the paths out themselves.
     paths: Vec<FacePath>,
-    /// Each ending's weight by the beam pattern.
+    /// Weight of each ending by the beam pattern.
     weights: Vec<f64>,
-    /// Paths that leave or come back within the beam, by their index.
+    /// Indices of the paths that leave or return within the beam.
     middles: Vec<usize>,
-    /// The reflection at the disc from each path into each, once it is known: sequences meet the same pairs
-    /// again and again.
+    /// Cache of the reflection at the disc from each path into each: sequences contain the same
+    /// pairs repeatedly.
     reflections_m: Vec<Option<Complex64>>,
     found: Vec<MultipleEcho>,
 }
 
-impl Search {
-    pub(crate) fn new(face: Disc, outs: &[(FacePath, f64)], floor: f64, most_m: f64) -> Self {
+impl SequenceSearch {
+    pub(crate) fn new(face: Disc, outs: &[(FacePath, f64)], floor: f64, max_m: f64) -> Self {
         let backwards = |(path, _): &(FacePath, f64)| FacePath {
             path: DirectedPath { echo: path.path.echo, reversed: !path.own_reverse },
             leaves_rad: path.returns_rad,
@@ -48,8 +48,10 @@ impl Search {
         Self {
             face,
             floor,
-            most_m,
-            best: Best::of(outs.iter().map(|(out, weight)| (out.length_m, *weight))),
+            max_m,
+            best: BestLastPath::from_paths(
+                outs.iter().map(|(out, weight)| (out.length_m, *weight)),
+            ),
             paths: outs.iter().map(backwards).chain(outs.iter().map(|(out, _)| *out)).collect(),
             weights: outs.iter().map(|(_, weight)| *weight).collect(),
             middles: (0..count).chain(others).collect(),
@@ -58,7 +60,7 @@ impl Search {
         }
     }
 
-    /// All sequences.
+    /// Runs the search and returns all sequences.
     pub(crate) fn run(mut self) -> Vec<MultipleEcho> {
         for (at, leaving) in self.weights.clone().into_iter().enumerate() {
             let first = self.weights.len() + at;
@@ -69,11 +71,12 @@ impl Search {
         self.found
     }
 
-    /// Ends a sequence of paths, and goes on with it. `strength` is its field over its spreading,
-    /// one over metres: `1/L1 S1 1/L2 S2 ... 1/Ln`, to which a last path adds `S 1/L (L1 + L2 + ... + L)`.
+    /// Ends a sequence of paths, and extends it. `strength` is its field over its spreading, one
+    /// over metres: `1/L1 S1 1/L2 S2 ... 1/Ln`, to which a last path adds
+    /// `S 1/L (L1 + L2 + ... + L)`.
     ///
-    /// Given up as soon as no last path could lift the field above the floor; the disc's strength bounds each
-    /// further reflection, so what is given up stays below.
+    /// The search ends as soon as no last path could lift the field above the floor. The disc's
+    /// strength bounds each further reflection, so all omitted sequences stay below.
     fn extend(
         &mut self,
         paths: &SmallVec<[DirectedPath; 4]>,
@@ -83,14 +86,14 @@ impl Search {
     ) {
         let disc_m = self.face.strength_m();
         let bound = strength.norm() * disc_m;
-        let too_many = paths.len() >= MOST_PATHS || self.found.len() >= MOST_ECHOES;
-        if too_many || bound * self.best.beside(length_m) < self.floor {
+        let too_many = paths.len() >= MAX_PATHS || self.found.len() >= MAX_ECHOES;
+        if too_many || bound * self.best.last_factor(length_m) < self.floor {
             return;
         }
         for at in 0..self.weights.len() {
             let (end, weight) = (self.paths[at], self.weights[at]);
             let total_m = length_m + end.length_m;
-            if bound * weight / end.length_m * total_m < self.floor || total_m > self.most_m {
+            if bound * weight / end.length_m * total_m < self.floor || total_m > self.max_m {
                 continue;
             }
             let field = strength
@@ -109,8 +112,8 @@ impl Search {
             let middle = self.paths[at];
             let total_m = length_m + middle.length_m;
             let per_m = middle.amplitude / middle.length_m;
-            if bound * per_m * disc_m * self.best.beside(total_m) < self.floor
-                || total_m >= self.most_m
+            if bound * per_m * disc_m * self.best.last_factor(total_m) < self.floor
+                || total_m >= self.max_m
             {
                 continue;
             }

@@ -7,7 +7,7 @@ use crate::{
     acoustics::{BeamPattern, Disc, Face, Sensor},
     geometry::DVec2,
     model::paths::{
-        echo::{Echo, Via},
+        echo::{PathEcho, Via},
         pattern::PatternEnvelope,
         settings::Settings,
     },
@@ -38,7 +38,7 @@ fn settings(max_path_m: f64) -> Settings {
 
 /// Multiple echoes between a face and one head-on wall, by number of paths from 2.
 fn before_a_wall(disc: Disc, path_m: f64, direction_rad: f64) -> Vec<MultipleEcho> {
-    let echo = Echo {
+    let echo = PathEcho {
         length_m: path_m,
         amplitude: 1.0,
         phase_rad: 0.0,
@@ -52,14 +52,14 @@ fn before_a_wall(disc: Disc, path_m: f64, direction_rad: f64) -> Vec<MultipleEch
     };
     let beam = BeamPattern::new(&Sensor::preset("senscomp-6500").expect("a preset"), 343.99);
     let mut multiple_echoes =
-        FaceEchoes::new(disc, &[echo], &PatternEnvelope::of(&beam), &settings(4.5 * path_m))
+        FaceEchoes::new(disc, &[echo], &PatternEnvelope::new(&beam), &settings(4.5 * path_m))
             .multiple_echoes(direction_rad, &beam, settings(0.0).floor, 4.5 * path_m);
     multiple_echoes.sort_by(|a, b| a.length_m.total_cmp(&b.length_m));
     multiple_echoes
 }
 
-/// The middle of the field that has run `paths` times between a point on a disc's axis, an
-/// endless wall and the disc: Kirchhoff's integral, reflection by reflection.
+/// Middle of the field that has run `paths` times between a point on a disc's axis, an infinite
+/// wall and the disc: Kirchhoff's integral, reflection by reflection.
 fn kirchhoff(path_m: f64, paths: usize) -> f64 {
     const RINGS: usize = 120;
     let k = DISC.wave_number_per_m;
@@ -82,7 +82,7 @@ fn kirchhoff(path_m: f64, paths: usize) -> f64 {
 }
 
 #[test]
-fn multiple_echoes_before_a_wall_follow_kirchhoffs_integral() {
+fn wall_matches_kirchhoff() {
     for (path_m, most_db) in [(0.188, [0.1, 2.1, 3.9]), (0.4, [0.1, 0.6, 1.15])] {
         let multiple_echoes = before_a_wall(DISC, path_m, 0.0);
         assert_eq!(multiple_echoes.len(), 3);
@@ -95,11 +95,11 @@ fn multiple_echoes_before_a_wall_follow_kirchhoffs_integral() {
 }
 
 #[test]
-fn each_reflection_costs_the_faces_reflectance_and_turning_away_the_rest() {
+fn reflectance_and_turning() {
     let dull = Disc { face: Face { reflectance: 0.5, ..DISC.face }, ..DISC };
     let (bright, dull) = (before_a_wall(DISC, 0.3, 0.0), before_a_wall(dull, 0.3, 0.0));
-    for ((one, other), reflections) in bright.iter().zip(&dull).zip(1..) {
-        assert!((other.amplitude / one.amplitude - 0.5_f64.powi(reflections)).abs() < 1e-12);
+    for ((a, b), reflections) in bright.iter().zip(&dull).zip(1..) {
+        assert!((b.amplitude / a.amplitude - 0.5_f64.powi(reflections)).abs() < 1e-12);
     }
     let turned = before_a_wall(DISC, 0.3, 6_f64.to_radians());
     assert!(turned[0].amplitude < 0.3 * bright[0].amplitude);

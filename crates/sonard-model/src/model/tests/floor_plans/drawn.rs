@@ -1,40 +1,40 @@
-//! Random floor plans, as they were meant and as a hand draws them.
+//! Random floor plans, as intended and as drawn by hand.
 
 use std::f64::consts::TAU;
 
 use super::*;
 
-/// How far a hand misses, metres: a corner, and past a corner or short of it.
+/// Errors of a hand, metres: at a corner, and past a corner or short of it.
 const OFF_M: f64 = 5e-4;
 
-/// A floor plan by who meets whom.
+/// A floor plan by its joints.
 pub(super) struct Sketch {
     corners: Vec<DVec2>,
     walls: Vec<[At; 2]>,
 }
 
-/// Where a wall ends.
+/// End of a wall.
 #[derive(Clone, Copy)]
 enum At {
     Corner(usize),
-    /// On a wall, at a share of it.
+    /// On a wall, at a share of its length.
     Wall(usize, f64),
 }
 
-/// How a plan is drawn.
+/// Style of drawing.
 pub(super) struct Hand {
     random: Option<Pcg64>,
-    /// Whether each wall is drawn by itself; else its ends are where they meet others.
+    /// `true` if each wall is drawn separately; otherwise its ends are at the joints.
     is_shaky: bool,
 }
 
 impl Hand {
-    /// Draws what is meant.
+    /// Draws the intended plan.
     pub(super) fn steady() -> Self {
         Self { random: None, is_shaky: false }
     }
 
-    /// Misses corners, and everything still meets.
+    /// Misses corners, but keeps all joints.
     pub(super) fn careful(random: &mut impl Rng) -> Self {
         Self { random: Some(Pcg64::from_rng(random)), is_shaky: false }
     }
@@ -46,7 +46,8 @@ impl Hand {
 }
 
 impl Sketch {
-    /// A room with partitions, boxes in it and at its wall, and a second room beyond a shared wall; and a place for the ranger.
+    /// A room with partitions, boxes in it and at its wall, and a second room beyond a shared wall;
+    /// and a place for the ranger.
     pub(super) fn random(random: &mut impl Rng) -> (Self, DVec2) {
         let size = DVec2::new(random.random_range(2.0..4.0), random.random_range(1.5..3.0));
         let skew = random.random_range(-0.2..0.2);
@@ -102,7 +103,7 @@ impl Sketch {
             .extend((0..count).map(|i| [i, (i + 1) % count].map(|at| At::Corner(first + at))));
     }
 
-    /// The scene that a hand makes of it.
+    /// Scene as drawn by a hand.
     pub(super) fn drawn(&self, hand: &Hand) -> Scene {
         let mut random = hand.random.clone();
         let mut off = || match &mut random {
@@ -121,7 +122,7 @@ impl Sketch {
                 let [a, b] = self.walls[wall].map(|end| match end {
                     At::Corner(corner) if hand.is_shaky => self.corners[corner],
                     At::Corner(corner) => corners[corner],
-                    At::Wall(..) => unreachable!("partitions stand on outer walls"),
+                    At::Wall(..) => unreachable!("partitions end on outer walls"),
                 });
                 a.lerp(b, share) + if hand.is_shaky { off() } else { DVec2::ZERO }
             }

@@ -1,4 +1,4 @@
-//! Heights of paths that turn at floor and ceiling, against tries.
+//! Heights of paths that turn at floor and ceiling, compared with brute force.
 
 use super::*;
 
@@ -14,7 +14,7 @@ fn heights((floor_z_m, ceiling_z_m, z_m): (Option<f64>, Option<f64>, f64)) -> He
     Heights { floor_z_m, ceiling_z_m, z_m, ..Heights::default() }
 }
 
-/// A ball that bounces between floor and ceiling, step by step.
+/// Height of a ball that bounces between floor and ceiling, step by step.
 fn bounced(place: (Option<f64>, Option<f64>, f64), z_m: f64) -> f64 {
     let (floor, ceiling, start_m) = place;
     let (mut at_m, mut ahead) = (start_m, (z_m - start_m).signum() * 1e-4);
@@ -29,7 +29,7 @@ fn bounced(place: (Option<f64>, Option<f64>, f64), z_m: f64) -> f64 {
 }
 
 #[test]
-fn a_path_turns_at_floor_and_ceiling() {
+fn paths_fold_at_floor_and_ceiling() {
     for place in PLACES {
         let heights = heights(place);
         for step in -40..=40 {
@@ -42,33 +42,33 @@ fn a_path_turns_at_floor_and_ceiling() {
     assert!((heights(PLACES[0]).z_at(1.0).expect("a height") - 0.8).abs() < 1e-12);
 }
 
-/// The climbs at which a path is at a wall, and those between which one bars, are found by trying.
+/// The climbs at which a path is at a wall are found by brute force.
 #[test]
-fn climbs_to_heights_are_all_those_that_end_there() {
+fn climbs_match_brute_force() {
     let highest_m = 4.0;
     for &place in &PLACES[..3] {
         let heights = heights(place);
         for stretch in [[-0.1, 0.15], [0.35, 0.5], [0.9, 1.1], [-0.3, -0.2]] {
             let spans = heights.unfolded([stretch], highest_m);
-            let mut stands = 0;
+            let mut count = 0;
             for step in -3999..4000 {
                 let climb_m = 1e-3 * f64::from(step) + 3e-4;
                 let z_m = heights.folded_m(0.4 + climb_m);
                 let is_there = stretch[0] <= z_m && z_m <= stretch[1];
-                stands += usize::from(is_there);
+                count += usize::from(is_there);
                 let is_in = spans.iter().any(|[from, to]| (*from..=*to).contains(&climb_m));
                 assert_eq!(is_there, is_in, "{place:?} {stretch:?} {climb_m}");
             }
-            assert!(stands > 90, "{place:?} {stretch:?}: {stands}");
+            assert!(count > 90, "{place:?} {stretch:?}: {count}");
         }
     }
 }
 
 #[test]
-fn what_a_path_passes_between_two_heights_bars_it() {
+fn blocking_between_two_heights() {
     for place in PLACES {
         let heights = heights(place);
-        assert!(heights.bars(None, [0.3, 0.4]), "what has no limits is everywhere");
+        assert!(heights.blocks(None, [0.3, 0.4]), "what has no limits is everywhere");
         let [low_m, high_m] = [place.0.unwrap_or(-1.0), place.1.unwrap_or(2.0)];
         let stretches = [[low_m, low_m + 0.1], [0.35, 0.5], [high_m - 0.1, high_m]];
         for (from, to) in
@@ -79,17 +79,17 @@ fn what_a_path_passes_between_two_heights_bars_it() {
                     let z_m = heights.folded_m(from + f64::from(step) / 4000.0 * (to - from));
                     stretch[0] <= z_m && z_m <= stretch[1]
                 });
-                let found = heights.bars(Some(stretch), [from, to]);
+                let found = heights.blocks(Some(stretch), [from, to]);
                 assert_eq!(found, meets, "{place:?} {stretch:?} {from} {to}");
             }
         }
     }
 }
 
-/// Between a floor 0.7 m below and a ceiling 0.7 m above, of a path that would climb 3.5 m: after a fifth of it,
-/// three fifths, and at its end.
+/// Between a floor 0.7 m below and a ceiling 0.7 m above, of a path that climbs 3.5 m unfolded:
+/// after a fifth, three fifths, and at its end.
 #[test]
-fn bounces_divide_a_path_evenly() {
+fn bounces_divide_paths_evenly() {
     let heights = heights(PLACES[0]);
     for (climb_m, first) in [(3.5, Reflector::Ceiling), (-3.5, Reflector::Floor)] {
         let found: Vec<_> = heights.bounces(climb_m, 3).collect();
