@@ -11,13 +11,14 @@ command -v mdbook >/dev/null || { echo "docs/build.sh: mdbook is missing: cargo 
 book=target/book
 rm -rf "$book"
 mkdir -p "$book/src"
-git ls-files -z '*.md' docs/pictures docs/wiring arrays config examples python/gallery scenes sensors systemd LICENSE-* |
+git ls-files -z '*.md' docs/pictures docs/wiring arrays config crates/sonard-model/src/lib.rs examples python/gallery \
+  scenes sensors systemd 'LICENSE-*' |
   xargs -0 cp --parents -t "$book/src"
 # Paths from docs/ become paths from the top folder.
 sed -E 's#\]\(#](docs/#; s#\]\(docs/\.\./#](#' docs/SUMMARY.md >"$book/src/SUMMARY.md"
 rm "$book/src/docs/SUMMARY.md"
 # There the table of contents is the sidebar.
-sed -i 's#\[The book\](docs/SUMMARY.md)#The book#' "$book/src/README.md"
+sed -i -E 's#\[([^]]*)\]\(docs/SUMMARY.md\)#\1#' "$book/src/README.md" "$book/src/CONTRIBUTING.md"
 mdbook build docs
 # Every local link of every page has a file.
 python3 docs/check_html.py "$book/html"
