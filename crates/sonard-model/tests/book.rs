@@ -1,5 +1,5 @@
-//! The book of docs/: its table of contents names each page once, and links and anchors of all documents resolve.
-//! mdBook itself is not needed (docs/build.sh).
+//! The book of docs/: its table of contents names each page once, and links, anchors and named
+//! paths of all documents resolve. mdBook itself is not needed (docs/build.sh).
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -136,6 +136,44 @@ fn links_and_anchors_resolve() {
     }
     assert!(broken.is_empty(), "{broken:#?}");
     assert!(count > 200, "{count} links were found");
+}
+
+/// Names of paths that are no files of the repository.
+const NO_FILES: [&str; 1] = ["scenes/SHA256.json"];
+
+/// Paths of the repository that a document names in backticks.
+fn named_paths(text: &str) -> Vec<String> {
+    let folders: Vec<String> = fs::read_dir(root())
+        .expect("the repository")
+        .map(|entry| entry.expect("an entry"))
+        .filter(|entry| entry.path().is_dir())
+        .map(|entry| format!("{}/", entry.file_name().display()))
+        .filter(|folder| !folder.starts_with('.') && folder != "target/")
+        .collect();
+    let prose: Vec<_> = prose(text).collect();
+    let joined = prose.join("\n");
+    let spans = joined.split('`').skip(1).step_by(2);
+    let paths = spans.filter(|span| {
+        let is_path = folders.iter().any(|folder| span.starts_with(folder));
+        let is_pattern = span.contains(['{', '<', ' ', '*']) || span.contains("NAME");
+        is_path && !is_pattern && !NO_FILES.contains(span)
+    });
+    paths.map(str::to_owned).collect()
+}
+
+#[test]
+fn named_paths_exist() {
+    let (mut missing, mut count) = (Vec::new(), 0);
+    for document in pages().into_iter().chain([PathBuf::from("README.md")]) {
+        for path in named_paths(&text(&document)) {
+            count += 1;
+            if !root().join(&path).exists() {
+                missing.push(format!("{}: {path}", document.display()));
+            }
+        }
+    }
+    assert!(missing.is_empty(), "{missing:#?}");
+    assert!(count > 60, "{count} paths were found");
 }
 
 /// The introduction stays short.
