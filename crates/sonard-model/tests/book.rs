@@ -29,7 +29,7 @@ fn normalized(path: &Path) -> PathBuf {
         match part {
             Component::CurDir => {}
             Component::ParentDir => {
-                assert!(parts.pop().is_some(), "{path:?} leaves the repository")
+                assert!(parts.pop().is_some(), "{path:?} leaves the repository");
             }
             part => parts.push(part),
         }
