@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""The tables of docs/reality.md, measured anew.
+"""Prints the tables of docs/evidence/arena.md, bench.md and corridor.md.
 
     python3 docs/reality SONARD DATA OUT [PART...]
 
-SONARD is the built program, DATA the folder with the measurements (docs/reality.md says where they are from), OUT a
+SONARD is the built program, DATA the folder with the measurements (docs/reality-method.md has their sources), OUT a
 folder for logs, calibrations and pictures. PART is one of arena, bench, corridor; all of them without it. Needs nothing
-but Python, and takes some minutes. Tables are printed as they stand in docs/reality.md.
+but Python, and takes some minutes. Tables are printed as Markdown.
 """
 
 import sys

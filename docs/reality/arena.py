@@ -35,7 +35,7 @@ def main(work):
         imported(work, name, of, start)
     calibrate(work, start)
     sensor = work.path("calibrated", "sensor.json")
-    own, as_fitted = "threshold and mounting of its own", "the sensor as fitted"
+    own, as_fitted = "own threshold and mounting", "the sensor as fitted"
     ways = {own: OF_ITS_OWN, as_fitted: ()}
     placed = {(name, way): located(work, name, sensor, *options) for name in groups for way, options in ways.items()}
     courses = {(name, way): along_course(work, of, sensor, options)
@@ -71,7 +71,7 @@ def calibrate(work, sensor):
                        "--out", work.path("calibrated"), "--force", "--json")
     rows = [[line["name"], "%.5g" % line["prior"], "%.5g" % line["value"], "%.2g" % line["sigma"]]
             for line in lines if "scan" not in line]
-    table(["", "was", "is", "standard deviation"], rows)
+    table(["", "initial", "estimate", "standard deviation"], rows)
     with open(work.path("calibrated", "report.md")) as file:
         print("\n".join(line for line in file.read().splitlines() if "explained" in line or "told apart" in line) + "\n")
 
@@ -151,9 +151,9 @@ def by_run(work, sweeps, placed, courses, sensor):
                      "%s of %d" % (share(count["near"], count["echo"]), count["echo"]),
                      share(count["unheard"], count["echo"]),
                      "%s of %d" % (share(count["agreed"], count["silent"]), count["silent"]), count["body"]])
-    table(["run", "threshold and place ahead, medians", "located within 10 cm and 10 degrees",
+    table(["run", "threshold and offset ahead, medians", "located within 10 cm and 10 degrees",
            "right pose only in a later answer", "located along the course",
-           "echoes within 3 cm", "not heard", "silences predicted", "of the body"], rows)
+           "echoes within 3 cm", "missed echoes", "missing echoes predicted", "of the body"], rows)
 
 
 def by_model(work, sweeps, found, along, as_fitted, sensor):
@@ -172,7 +172,7 @@ def by_model(work, sweeps, found, along, as_fitted, sensor):
     ):
         count = scores(work, poses, of, options)["all"]
         rows.append([title, share(count["near"], count["echo"]), share(count["agreed"], count["silent"])])
-    table(["", "echoes within 3 cm", "silences predicted"], rows)
+    table(["", "echoes within 3 cm", "missing echoes predicted"], rows)
 
 
 def by_range(work, found, sensor):

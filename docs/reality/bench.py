@@ -165,7 +165,7 @@ def aimed_at(work, target, points, sensors):
         heard = {distance_m: before(work, distance_m, target, sensor) for distance_m in half_deg}
         off = [arc(readings)[0] - half_deg[distance_m] for distance_m, readings in heard.items() if readings]
         silent = len(half_deg) - len(off)
-        cells.append("%.1f° (mean %+.1f)%s" % (rms(off), mean(off), ", not heard at %d" % silent if silent else ""))
+        cells.append("%.1f° (mean %+.1f)%s" % (rms(off), mean(off), ", no echo at %d" % silent if silent else ""))
     told = "%.0f to %.0f°" % (min(half_deg.values()), max(half_deg.values()))
     return [target.replace("_", " "), len(points), told, *cells]
 

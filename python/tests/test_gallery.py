@@ -50,7 +50,7 @@ def test_the_gallery_runs(script: Path, tmp_path: Path) -> None:
         assert (tmp_path / f"{script.stem}.png").stat().st_size > 10_000
 
 
-@pytest.mark.parametrize("page", ["README.md", "python/README.md", "docs/python.md"])
+@pytest.mark.parametrize("page", ["python/README.md", "docs/python.md"])
 def test_examples_of_the_documentation_run_as_pasted(page: str, tmp_path: Path) -> None:
     text = (REPOSITORY / page).read_text()
     blocks = re.findall(r"^```python\n(.*?)^```", text, re.MULTILINE | re.DOTALL)

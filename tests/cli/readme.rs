@@ -1,6 +1,10 @@
 //! Commands of the documents, run as pasted in an empty folder.
+//!
+//! Blocks marked `sh` in README.md and in the pages of the book (docs/) are run, less the lines of [`EXCEPTIONS`]. Blocks
+//! marked `sh,ignore` are not; the line before them says why, as `<!-- not run: REASON -->`.
 
 use std::{
+    collections::BTreeSet,
     env, fs,
     path::{Path, PathBuf},
     process::{Command, Stdio},
@@ -8,11 +12,56 @@ use std::{
 
 use crate::common::{run, stderr};
 
-const README: &str = include_str!("../../README.md");
-const COPYING_LOGS: &str = include_str!("../../docs/copying-logs.md");
+/// Starts of lines that build, install, or need hardware, data of others or the rights of root.
+const EXCEPTIONS: [&str; 9] = [
+    "cargo ",
+    "./test.sh",
+    "docs/build.sh",
+    "packaging/build.sh",
+    "pip ",
+    "python3 docs/",
+    "sudo ",
+    "sudoedit ",
+    "web/build.sh",
+];
 
-/// Starts of lines that build, install, or need hardware or the rights of root.
-const EXCEPTIONS: [&str; 5] = ["cargo ", "./test.sh", "pip ", "sudo ", "sudoedit "];
+/// Languages of blocks. Others, such as `bash`, could hide commands from this test.
+const LANGUAGES: [&str; 8] = ["", "ini", "json", "python", "sh", "sh,ignore", "sql", "toml"];
+
+/// Bound of the running time of a block, so that a program that stays in the foreground fails its test.
+const MAX_BLOCK_S: u32 = 200;
+
+/// Folder of the book.
+fn book() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("docs")
+}
+
+/// Path of README.md within docs/.
+const README: &str = "../README.md";
+
+/// Text of a page of the book, by its path within docs/.
+fn page(name: &str) -> String {
+    fs::read_to_string(book().join(name)).unwrap_or_else(|error| panic!("{name}: {error}"))
+}
+
+/// Paths of all pages within docs/.
+fn all_pages() -> Vec<String> {
+    fn collect(folder: &Path, pages: &mut Vec<String>) {
+        for entry in fs::read_dir(folder).expect("a folder") {
+            let path = entry.expect("an entry").path();
+            if path.is_dir() {
+                collect(&path, pages);
+            } else if path.extension().is_some_and(|extension| extension == "md") {
+                let name = path.strip_prefix(book()).expect("within the book");
+                pages.push(name.to_str().expect("a plain path").to_owned());
+            }
+        }
+    }
+    let mut pages = Vec::new();
+    collect(&book(), &mut pages);
+    pages.sort();
+    pages
+}
 
 /// Shell blocks of a document without the lines of [`EXCEPTIONS`].
 fn shell_blocks(document: &str) -> Vec<String> {
@@ -21,7 +70,8 @@ fn shell_blocks(document: &str) -> Vec<String> {
         let block = rest.split("```").next().unwrap_or_default();
         block.lines().filter(exception).map(|line| format!("{line}\n")).collect()
     };
-    document.split("```sh\n").skip(1).map(block).collect()
+    let blocks = document.split("```sh\n").skip(1).map(block);
+    blocks.filter(|block: &String| !block.trim().is_empty()).collect()
 }
 
 /// Runs a block in `folder` with `sonard` on the path; its background processes end with it.
@@ -29,8 +79,8 @@ fn run_block(block: &str, folder: &Path) {
     let program = Path::new(env!("CARGO_BIN_EXE_sonard")).parent().expect("a folder");
     let path = format!("{}:{}", program.display(), env::var("PATH").unwrap_or_default());
     let script = format!("set -e\ntrap 'kill $(jobs -p) 2>/dev/null || true' EXIT\n{block}");
-    let output = Command::new("bash")
-        .args(["-c", &script])
+    let output = Command::new("timeout")
+        .args([&MAX_BLOCK_S.to_string(), "bash", "-c", &script])
         .current_dir(folder)
         .env("PATH", &path)
         .env("NO_COLOR", "1")
@@ -41,6 +91,88 @@ fn run_block(block: &str, folder: &Path) {
     assert!(!err.contains("panicked"), "{block}\n{err}");
 }
 
+/// Runs the blocks of a document in one empty folder.
+fn run_document(document: &str) -> tempfile::TempDir {
+    require("curl");
+    let folder = tempfile::tempdir().expect("a folder");
+    shell_blocks(document).iter().for_each(|block| run_block(block, folder.path()));
+    folder
+}
+
+/// A test for each page, so that they run in parallel.
+macro_rules! pages {
+    ($($test:ident: $page:literal,)*) => {
+        /// Pages with commands that are run, by their paths within docs/.
+        const PAGES: &[&str] = &[$($page),*];
+
+        mod pages {
+            $(
+                #[test]
+                fn $test() {
+                    super::run_document(&super::page($page));
+                }
+            )*
+        }
+    };
+}
+
+pages! {
+    api: "api.md",
+    arrays: "arrays.md",
+    calibration: "calibration.md",
+    collection: "collection.md",
+    command_line: "command-line.md",
+    compare: "compare.md",
+    configuration: "configuration.md",
+    daemon: "daemon.md",
+    engines: "engines.md",
+    export: "export.md",
+    first_scan: "first-scan.md",
+    generate: "generate.md",
+    import: "import.md",
+    localisation: "localisation.md",
+    log: "log.md",
+    mapping: "mapping.md",
+    mock: "mock.md",
+    model: "model.md",
+    reality: "reality.md",
+}
+
+/// The page that a test of its own runs.
+const COPYING_LOGS: &str = "copying-logs.md";
+
+#[test]
+fn all_pages_with_commands_are_run() {
+    let with_commands =
+        all_pages().into_iter().filter(|name| !shell_blocks(&page(name)).is_empty());
+    let mut expected: Vec<_> = PAGES.iter().copied().chain([COPYING_LOGS]).collect();
+    expected.sort_unstable();
+    assert_eq!(with_commands.collect::<Vec<_>>(), expected, "the list of this test");
+}
+
+#[test]
+fn ignored_blocks_state_a_reason() {
+    let mut faults = Vec::new();
+    for name in all_pages().into_iter().chain([README.to_owned()]) {
+        let text = page(&name);
+        let (mut within, mut before) = (false, "");
+        for line in text.lines() {
+            if let Some(language) = line.trim_start().strip_prefix("```") {
+                let reason = before.strip_prefix("<!-- not run: ").unwrap_or_default();
+                if !within && !LANGUAGES.contains(&language) {
+                    faults.push(format!("{name}: a block of language {language}"));
+                }
+                if !within && language == "sh,ignore" && !reason.ends_with(" -->") {
+                    faults.push(format!("{name}: no reason before a block that is not run"));
+                }
+                within = !within;
+            }
+            before = line;
+        }
+    }
+    assert!(faults.is_empty(), "{faults:#?}");
+}
+
 /// Panics unless `program`, of the Debian package of that name, can be run.
 fn require(program: &str) {
     let version = Command::new(program).arg("--version").stdout(Stdio::null()).status();
@@ -48,22 +180,20 @@ fn require(program: &str) {
 }
 
 #[test]
-fn every_command_of_the_readme_runs_as_pasted() {
-    require("curl");
-    let folder = tempfile::tempdir().expect("a folder");
-    let (mut commands, mut verbs) = (0, Vec::new());
-    for block in shell_blocks(README) {
-        let of_sonard = block.lines().filter(|line| line.starts_with("sonard "));
-        verbs.extend(of_sonard.filter_map(|line| line.split(' ').nth(1).map(str::to_owned)));
-        commands += block.lines().filter(|line| !line.trim().is_empty()).count();
-        run_block(&block, folder.path());
-    }
-    verbs.sort();
-    verbs.dedup();
-    assert!(commands > 40 && verbs.len() > 17, "{commands} lines of {verbs:?}");
-    for file in ["out/fig7/scan.png", "path.png", "plan.png", "map/map.yaml", "array.png"] {
+fn readme() {
+    let folder = run_document(&page(README));
+    for file in ["out/fig7/scan.png", "path.png"] {
         assert!(fs::metadata(folder.path().join(file)).is_ok_and(|file| file.len() > 0), "{file}");
     }
+}
+
+/// The tour shows most verbs.
+#[test]
+fn verbs_of_the_tour() {
+    let text = page("first-scan.md");
+    let lines = text.lines().filter(|line| line.starts_with("sonard "));
+    let verbs: BTreeSet<_> = lines.filter_map(|line| line.split(' ').nth(1)).collect();
+    assert!(verbs.len() >= 12, "{verbs:?}");
 }
 
 /// Logs in a folder, ordered by name.
@@ -76,10 +206,10 @@ fn logs_in(folder: &Path) -> Vec<PathBuf> {
 }
 
 #[test]
-fn logs_are_copied_by_rsync_as_documented() {
+fn copying_logs() {
     require("rsync");
     let folder = tempfile::tempdir().expect("a folder");
-    let blocks = shell_blocks(COPYING_LOGS);
+    let blocks = shell_blocks(&page(COPYING_LOGS));
     let [first, again] = &blocks[..] else { panic!("{blocks:?}") };
     run_block(first, folder.path());
     run_block(again, folder.path());
@@ -124,9 +254,12 @@ fn logs_are_copied_by_rsync_as_documented() {
 }
 
 #[test]
-fn what_curl_is_asked_to_do_works_in_old_ones() {
+fn curl_options_of_old_versions() {
     // --json came with 7.82; Debian 11 has 7.74.
-    for (name, text) in [("README.md", README), ("run.rs", include_str!("../../src/cli/run.rs"))] {
+    let help = ("run.rs".to_owned(), include_str!("../../src/cli/run.rs").to_owned());
+    let names = all_pages().into_iter().chain([README.to_owned()]);
+    let documents = names.map(|name| (name.clone(), page(&name)));
+    for (name, text) in documents.chain([help]) {
         let newer = text.lines().find(|line| line.contains("curl") && line.contains("--json"));
         assert_eq!(newer, None, "{name}");
     }
