@@ -1,21 +1,22 @@
-//! What the motor turns in and the ranger listens to.
+//! Environment of the board: motor position and echoes.
 
 use firmware_protocol::messages::limits::{TICK_HZ, WINDOW_TICKS_MAX};
 use sonard::mock::World;
 
 use crate::CYCLES_PER_TICK;
 
-/// The world outside the board's pins.
+/// Environment of the board beyond its pins.
 pub trait Surroundings {
-    /// One pulse of the motor: 1 or -1.
+    /// Turns the motor by `steps`, with sign.
     fn turn(&mut self, steps: i32);
-    /// How far the motor really is from the index, steps.
+    /// Actual position of the motor relative to the index, steps.
     fn steps_from_index(&self) -> i32;
-    /// The ranger fires: when echoes come, cycles after INIT rose, in order.
+    /// Fires the ranger; returns the arrival times of the echoes in cycles after INIT rose, in
+    /// ascending order.
     fn fire(&mut self) -> Vec<u64>;
 }
 
-/// The mock's world.
+/// Environment simulated by the mock.
 impl Surroundings for World {
     fn turn(&mut self, steps: i32) {
         World::turn(self, steps);
@@ -26,17 +27,17 @@ impl Surroundings for World {
     }
 
     fn fire(&mut self) -> Vec<u64> {
-        let heard = World::fire(self, WINDOW_TICKS_MAX, TICK_HZ);
-        heard.iter().map(|&ticks| u64::from(ticks) * CYCLES_PER_TICK).collect()
+        let echoes = World::fire(self, WINDOW_TICKS_MAX, TICK_HZ);
+        echoes.iter().map(|&ticks| u64::from(ticks) * CYCLES_PER_TICK).collect()
     }
 }
 
-/// Echoes on order, to the cycle.
+/// Environment with prescribed echoes, accurate to the cycle.
 #[derive(Debug, Clone, Default)]
 pub struct Commanded {
-    /// When echoes come, cycles after INIT rose.
+    /// Arrival times of the echoes, cycles after INIT rose.
     pub echoes: Vec<u64>,
-    /// Where the motor is, steps from the index.
+    /// Position of the motor, steps from the index.
     pub step: i32,
 }
 

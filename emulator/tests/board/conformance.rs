@@ -1,4 +1,4 @@
-//! What every board must do, the firmware's machine code does too.
+//! Conformance tests on the firmware's machine code.
 
 use crate::common::{commanded, config, elf};
 use firmware_protocol::conformance_tests;
