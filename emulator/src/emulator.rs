@@ -9,7 +9,8 @@ use crate::rig::{
     HEARTBEAT, Rig, heartbeat, on_binh, on_blnk, on_init, on_sent, on_sleep, on_step, send_byte,
 };
 use crate::{
-    CYCLES_PER_US, Commanded, HZ, Module, MotorLimits, Surroundings, firmware, motor::Motor, sys,
+    CYCLES_PER_US, Environment, HZ, Module, MotorLimits, ScriptedEnvironment, firmware,
+    motor::Motor, sys,
 };
 
 const fn ioctl(name: [u8; 4]) -> u32 {
@@ -102,7 +103,7 @@ impl Emulator {
     pub fn new(
         elf: &Path,
         config: &Config,
-        surroundings: Box<dyn Surroundings>,
+        environment: Box<dyn Environment>,
     ) -> Result<Self, String> {
         let mut firmware = firmware::read(elf)?;
         // SAFETY: calls in the order required by simavr; every pointer is checked or owned, and the
@@ -124,7 +125,7 @@ impl Emulator {
                 index_pin: pin(PORT_C, 0),
                 emergency_pin: pin(PORT_C, 1),
                 uart_in: pin(UART, 0),
-                surroundings,
+                environment,
                 steps_per_revolution: config.steps_per_revolution.into(),
                 module: Module::default(),
                 init: false,
@@ -340,8 +341,8 @@ impl Emulator {
     }
 
     /// Replaces the environment of the board.
-    pub fn set_surroundings(&mut self, surroundings: Box<dyn Surroundings>) {
-        self.rig.surroundings = surroundings;
+    pub fn set_environment(&mut self, environment: Box<dyn Environment>) {
+        self.rig.environment = environment;
     }
 }
 
@@ -375,8 +376,8 @@ impl DeviceUnderTest for Emulator {
     fn set_echoes(&mut self, after_us: &[f64]) {
         let cycles = |us: &f64| (us * CYCLES_PER_US as f64).round() as u64;
         let echoes = after_us.iter().map(cycles).collect();
-        let step = self.rig.surroundings.steps_from_index();
-        self.set_surroundings(Box::new(Commanded { echoes, step }));
+        let step = self.rig.environment.steps_from_index();
+        self.set_environment(Box::new(ScriptedEnvironment { echoes, step }));
     }
 
     fn take_firings(&mut self) -> usize {

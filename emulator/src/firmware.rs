@@ -11,7 +11,8 @@ use crate::{HZ, sys};
 #[expect(unsafe_code, reason = "simavr is C")]
 pub(crate) fn read(elf: &Path) -> Result<sys::elf_firmware_t, String> {
     let path = CString::new(elf.as_os_str().as_encoded_bytes()).map_err(|e| e.to_string())?;
-    // SAFETY: the structure is plain data, for which zeros are valid; both pointers are valid during the call.
+    // SAFETY: the structure is plain data, for which zeros are valid; both pointers are valid
+    // during the call.
     let mut firmware = unsafe {
         let mut firmware: sys::elf_firmware_t = std::mem::zeroed();
         if sys::elf_read_firmware(path.as_ptr(), &raw mut firmware) != 0 {

@@ -16,20 +16,20 @@
 #![cfg(feature = "simavr")]
 
 mod emulator;
+mod environment;
 mod firmware;
 mod module;
 mod motor;
 mod rig;
 mod serve;
-mod surroundings;
 mod sys;
 
 pub use emulator::{Crash, Emulator, Reset};
+pub use environment::{Environment, ScriptedEnvironment};
 pub use firmware_protocol::conformance::BenchError;
 pub use module::Module;
 pub use motor::MotorLimits;
 pub use serve::serve;
-pub use surroundings::{Commanded, Surroundings};
 
 /// Board and host machine, connected by a serial line.
 pub type Bench = firmware_protocol::conformance::Bench<Emulator>;

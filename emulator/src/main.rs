@@ -11,7 +11,7 @@ use std::{
     },
 };
 
-use board_config::{ALWAYS, Config};
+use board_config::{BASE_CAPABILITIES, Config};
 use clap::Parser;
 use firmware_protocol::messages::Capabilities;
 use rand::{RngExt as _, SeedableRng as _};
@@ -152,7 +152,9 @@ fn config(args: &Args) -> Config {
     Config {
         serial: *b"EMU-000001",
         steps_per_revolution: args.steps_per_revolution,
-        capabilities: ALWAYS.with(Capabilities::INDEX_SENSOR).with(Capabilities::EMULATED),
+        capabilities: BASE_CAPABILITIES
+            .with(Capabilities::INDEX_SENSOR)
+            .with(Capabilities::EMULATED),
         options: 0,
     }
 }

@@ -173,7 +173,7 @@ mod tests {
         let position = final_position(2_000, 3_000, 60_000);
         assert!(position < 1_990, "{position}");
         assert_eq!((2_000 - position) % 4, 0);
-        // More than the holding torque from release.
+        // More than the holding torque from rest.
         assert_ne!(final_position(400, 10_000, 200_000), 400);
     }
 

@@ -2,7 +2,7 @@
 
 use std::{collections::VecDeque, ffi::c_void, ptr::NonNull};
 
-use crate::{HZ, Module, Surroundings, motor::Motor, sys};
+use crate::{Environment, HZ, Module, motor::Motor, sys};
 
 /// Duration of a byte in simavr, cycles: eleven bits, with a start bit, eight data bits and two
 /// stop bits.
@@ -24,7 +24,7 @@ pub(crate) struct Rig {
     pub(crate) index_pin: *mut sys::avr_irq_t,
     pub(crate) emergency_pin: *mut sys::avr_irq_t,
     pub(crate) uart_in: *mut sys::avr_irq_t,
-    pub(crate) surroundings: Box<dyn Surroundings>,
+    pub(crate) environment: Box<dyn Environment>,
     pub(crate) steps_per_revolution: i32,
     pub(crate) module: Module,
     pub(crate) init: bool,
@@ -80,7 +80,7 @@ impl Rig {
         if high {
             self.follow();
             self.init_rises.push(now);
-            let echoes = self.surroundings.fire();
+            let echoes = self.environment.fire();
             self.module.fire(now, &echoes);
         } else {
             self.module.reset();
@@ -138,7 +138,7 @@ impl Rig {
 
     fn turn(&mut self, steps: i32) {
         if steps != 0 {
-            self.surroundings.turn(steps);
+            self.environment.turn(steps);
             self.refresh_inputs();
         }
     }
@@ -147,7 +147,7 @@ impl Rig {
     /// pull-ups overwrites them.
     #[expect(unsafe_code, reason = "simavr is C")]
     pub(crate) fn refresh_inputs(&mut self) {
-        let from_index = self.surroundings.steps_from_index().rem_euclid(self.steps_per_revolution);
+        let from_index = self.environment.steps_from_index().rem_euclid(self.steps_per_revolution);
         let levels =
             [(self.index_pin, from_index >= INDEX_WIDTH), (self.emergency_pin, self.emergency)];
         for (bit, (pin, level)) in levels.into_iter().enumerate() {

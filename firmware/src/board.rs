@@ -16,7 +16,7 @@ const BYTES_PER_ROUND: u8 = 16;
 /// Ticks beyond which a deadline is left to the clock's overflow, which wakes the chip every 33 ms.
 const MAX_ALARM_TICKS: u32 = 50_000;
 
-/// Option bit, also read by the interrupt handler of the handle_emergency stop.
+/// Option bit, also read by the interrupt handler of the emergency stop.
 const EMERGENCY_FITTED: u8 = 0x80;
 
 /// At a fixed address, so that the compiler can access it directly: on the stack the code is half
@@ -249,7 +249,7 @@ fn handle_emergency(device: &mut Device) {
     device.handle_emergency_stop(clock::now());
 }
 
-/// Handles PCINT1, a change of the handle_emergency stop: the pins immediately, the machine in the next
+/// Handles PCINT1, a change of the emergency stop: the pins immediately, the machine in the next
 /// iteration.
 #[unsafe(no_mangle)]
 extern "avr-interrupt" fn __vector_4() {

@@ -2,12 +2,12 @@
 
 use std::path::PathBuf;
 
-use board_config::{ALWAYS, Config};
+use board_config::{BASE_CAPABILITIES, Config};
 /// Settings of the conformance scenarios.
 pub use firmware_protocol::conformance::scenarios::SETTINGS;
 use firmware_protocol::host::{Command, HostEvent};
 use firmware_protocol::messages::{Capabilities, Reading, Settings};
-use sonard_emulator::{Bench, Commanded, Emulator, Surroundings};
+use sonard_emulator::{Bench, Emulator, Environment, ScriptedEnvironment};
 
 /// Path of the firmware built by `firmware/test.sh`.
 pub fn elf() -> PathBuf {
@@ -27,7 +27,7 @@ pub fn config() -> Config {
     Config {
         serial: *b"EMU-000001",
         steps_per_revolution: 400,
-        capabilities: ALWAYS
+        capabilities: BASE_CAPABILITIES
             .with(Capabilities::INDEX_SENSOR)
             .with(Capabilities::EMERGENCY_STOP)
             .with(Capabilities::EMULATED),
@@ -35,13 +35,13 @@ pub fn config() -> Config {
     }
 }
 
-pub fn commanded(echoes: &[u64]) -> Commanded {
-    Commanded { echoes: echoes.to_vec(), step: 0 }
+pub fn scripted(echoes: &[u64]) -> ScriptedEnvironment {
+    ScriptedEnvironment { echoes: echoes.to_vec(), step: 0 }
 }
 
 /// Booted board and a host that has not sent anything.
-pub fn bench(surroundings: impl Surroundings + 'static) -> Bench {
-    let emulator = Emulator::new(&elf(), &config(), Box::new(surroundings)).expect("a firmware");
+pub fn bench(environment: impl Environment + 'static) -> Bench {
+    let emulator = Emulator::new(&elf(), &config(), Box::new(environment)).expect("a firmware");
     let mut bench = Bench::new(emulator);
     // Bytes sent before the receiver is enabled are lost, as on the board.
     bench.run(0.05).expect("boots");
@@ -49,8 +49,8 @@ pub fn bench(surroundings: impl Surroundings + 'static) -> Bench {
 }
 
 /// Booted board that is identified, configured and homed.
-pub fn ready(surroundings: impl Surroundings + 'static, settings: Settings) -> Bench {
-    let mut bench = bench(surroundings);
+pub fn ready(environment: impl Environment + 'static, settings: Settings) -> Bench {
+    let mut bench = bench(environment);
     for command in [Command::Identify, Command::Configure(settings), Command::Home] {
         bench.perform(command, 20.0).expect("gets ready");
     }

@@ -1,6 +1,6 @@
 //! Times of flight, accurate to the tick of 0.5 us.
 
-use crate::common::{SETTINGS, commanded, readings, ready};
+use crate::common::{SETTINGS, readings, ready, scripted};
 use firmware_protocol::host::Command;
 use firmware_protocol::messages::{Blanking, ReadingStatus, Settings};
 use sonard_emulator::{CYCLES_PER_TICK, HZ};
@@ -16,14 +16,14 @@ const SHORT: Settings = Settings {
 
 #[test]
 fn accurate_at_all_phases() {
-    let mut bench = ready(commanded(&[]), SHORT);
+    let mut bench = ready(scripted(&[]), SHORT);
     bench.device.take_init_rises();
     // Odd, so that the delays cover all eight phases of a tick.
     let stride = 301;
     let (mut pings, mut phases, mut worst) = (0, [0_u32; 8], 0.0_f64);
     let mut after = MS;
     while after <= 60 * MS {
-        bench.device.set_surroundings(Box::new(commanded(&[after])));
+        bench.device.set_environment(Box::new(scripted(&[after])));
         let events = bench.perform(Command::Ping, 2.0).expect("pings");
         let reading = readings(&events)[0];
         assert_eq!(reading.echoes.len(), 1, "{after} cycles: {reading:?}");
@@ -43,7 +43,7 @@ fn accurate_at_all_phases() {
 
 #[test]
 fn firing_time_matches_init() {
-    let mut bench = ready(commanded(&[5 * MS]), SETTINGS);
+    let mut bench = ready(scripted(&[5 * MS]), SETTINGS);
     bench.device.take_init_rises();
     let mut offsets = Vec::new();
     for _ in 0..50 {
@@ -61,7 +61,7 @@ fn firing_time_matches_init() {
 fn fires_once_at_any_count() {
     // Near a wrap of the 16-bit counter a compare unit might match twice.
     let quick = Settings { window_ticks: 2_000, ..SHORT };
-    let mut bench = ready(commanded(&[MS / 2 + 100]), quick);
+    let mut bench = ready(scripted(&[MS / 2 + 100]), quick);
     bench.device.take_init_rises();
     let mut near_wrap = 0;
     for _ in 0..2_000 {
@@ -77,14 +77,14 @@ fn fires_once_at_any_count() {
 #[test]
 fn multiple_echoes_accurate() {
     let many = Settings { max_echoes: 8, ..SHORT };
-    let mut bench = ready(commanded(&[]), many);
+    let mut bench = ready(scripted(&[]), many);
     let mut worst = 0.0_f64;
     for round in 0..200_u64 {
         // Further apart than the BLNK pulse, at varying phases.
         let echoes: Vec<u64> = (0..8)
             .map(|k| 2 * MS + round * 1_003 + k * (MS + 37 * round) + (round * k) % 8)
             .collect();
-        bench.device.set_surroundings(Box::new(commanded(&echoes)));
+        bench.device.set_environment(Box::new(scripted(&echoes)));
         let events = bench.perform(Command::Ping, 2.0).expect("pings");
         let reading = readings(&events)[0];
         assert_eq!(reading.echoes.len(), 8, "{echoes:?}: {reading:?}");
@@ -100,18 +100,18 @@ fn multiple_echoes_accurate() {
 #[test]
 fn limits_echoes_and_window() {
     let two = Settings { max_echoes: 2, ..SETTINGS };
-    let mut bench = ready(commanded(&[4 * MS, 6 * MS, 8 * MS]), two);
+    let mut bench = ready(scripted(&[4 * MS, 6 * MS, 8 * MS]), two);
     let events = bench.perform(Command::Ping, 2.0).expect("pings");
     assert_eq!(readings(&events)[0].echoes[..], [8_000, 12_000]);
     // The window is 24 ms.
-    bench.device.set_surroundings(Box::new(commanded(&[25 * MS])));
+    bench.device.set_environment(Box::new(scripted(&[25 * MS])));
     let events = bench.perform(Command::Ping, 2.0).expect("pings");
     assert_eq!(readings(&events)[0].status, ReadingStatus::NoEcho);
 }
 
 #[test]
 fn short_blanking() {
-    let near = commanded(&[MS + MS / 2]);
+    let near = scripted(&[MS + MS / 2]);
     let mut bench = ready(near.clone(), SETTINGS);
     let events = bench.perform(Command::Ping, 2.0).expect("pings");
     assert_eq!(readings(&events)[0].status, ReadingStatus::NoEcho);
@@ -122,7 +122,7 @@ fn short_blanking() {
 
 #[test]
 fn stuck_echo_is_module_fault() {
-    let mut bench = ready(commanded(&[5 * MS]), SETTINGS);
+    let mut bench = ready(scripted(&[5 * MS]), SETTINGS);
     bench.device.take_init_rises();
     bench.device.stick_echo(true);
     let events = bench.perform(Command::Ping, 2.0).expect("reports a module fault");

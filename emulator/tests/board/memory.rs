@@ -2,7 +2,7 @@
 
 use std::process::Command as Process;
 
-use crate::common::{SETTINGS, commanded, elf, ready};
+use crate::common::{SETTINGS, elf, ready, scripted};
 use firmware_protocol::host::Command;
 use firmware_protocol::messages::{Blanking, Settings, Sweep};
 use rand::{Rng as _, SeedableRng as _};
@@ -37,7 +37,7 @@ fn deepest_stack() -> usize {
         ..SETTINGS
     };
     let echoes: Vec<u64> = (2..10).map(|ms| ms * HZ / 1000).collect();
-    let mut bench = ready(commanded(&echoes), many);
+    let mut bench = ready(scripted(&echoes), many);
     let plan =
         Sweep { sweep: 1, first_step: 0, stride: 9, stops: 60, pings_per_stop: 2, lease_ms: 2_000 };
     let mut random = rand_pcg::Pcg64::seed_from_u64(3);

@@ -1,11 +1,11 @@
 //! Motor: steps counted at the pins, times compared with the trapezoid, index, brake.
 
-use crate::common::{SETTINGS, commanded, ready};
+use crate::common::{SETTINGS, ready, scripted};
 use firmware_protocol::host::{Command, HostEvent, Outcome};
 use firmware_protocol::messages::Settings;
 use rand::{RngExt as _, SeedableRng as _};
 use sonard::motion::Trapezoid;
-use sonard_emulator::{Commanded, HZ};
+use sonard_emulator::{HZ, ScriptedEnvironment};
 
 const QUICK: Settings =
     Settings { speed: 4_000, acceleration: 200_000, settle_ticks: 0, ..SETTINGS };
@@ -13,7 +13,7 @@ const QUICK: Settings =
 #[test]
 fn random_moves_are_exact() {
     let mut random = rand_pcg::Pcg64::seed_from_u64(4);
-    let mut bench = ready(commanded(&[]), QUICK);
+    let mut bench = ready(scripted(&[]), QUICK);
     let home = bench.device.steps();
     let mut step = 0_i32;
     let mut moved = 0;
@@ -50,7 +50,7 @@ fn duration_s(pulses: &[u64], acceleration: u32) -> f64 {
 fn pulses_are_trapezoidal() {
     for (speed, acceleration) in [(800, 40_000), (2_000, 10_000), (10_000, 200_000), (100, 500)] {
         let motion = Settings { speed, acceleration, ..QUICK };
-        let mut bench = ready(commanded(&[]), motion);
+        let mut bench = ready(scripted(&[]), motion);
         let mut at = 0;
         for steps in [1, 2, 3, 4, 5, 8, 17, 100, 399, -1, -2, -250] {
             bench.device.take_pulses();
@@ -74,7 +74,7 @@ fn pulses_are_trapezoidal() {
 #[test]
 fn stop_keeps_position() {
     let slow = Settings { speed: 1_000, acceleration: 5_000, ..SETTINGS };
-    let mut bench = ready(commanded(&[]), slow);
+    let mut bench = ready(scripted(&[]), slow);
     for wait_s in [0.001, 0.02, 0.1, 0.5] {
         bench.perform(Command::MoveTo { step: 0 }, 60.0).expect("moves");
         let home = bench.device.steps();
@@ -100,14 +100,14 @@ fn stop_keeps_position() {
 #[test]
 fn homes_from_everywhere() {
     for start in [0, 1, 3, 4, 5, 57, 199, 200, 201, 396, 399, -1, -130] {
-        let outside = Commanded { echoes: vec![], step: start };
+        let outside = ScriptedEnvironment { echoes: vec![], step: start };
         let mut bench = ready(outside, QUICK);
         let turned = bench.device.steps();
         assert_eq!((i64::from(start) + turned).rem_euclid(400), 0, "from {start}");
         assert!(turned.abs() <= 400, "from {start}: the cable was wound by {turned} steps");
         // The motor is turned by hand: the counter is at 50, the motor at 47.
         bench.perform(Command::MoveTo { step: 50 }, 10.0).expect("moves");
-        bench.device.set_surroundings(Box::new(Commanded { echoes: vec![], step: 47 }));
+        bench.device.set_environment(Box::new(ScriptedEnvironment { echoes: vec![], step: 47 }));
         let events = bench.perform(Command::Home, 20.0).expect("homes");
         assert!(
             events.contains(&HostEvent::Done(Outcome::Homed { drift_steps: 3 })),

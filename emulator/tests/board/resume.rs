@@ -4,7 +4,7 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use crate::common::{SETTINGS, commanded, config, elf};
+use crate::common::{SETTINGS, config, elf, scripted};
 use firmware_protocol::host::HostConfig;
 use firmware_protocol::messages::Settings;
 use sonard::geometry::Pose;
@@ -35,7 +35,7 @@ fn scan(dips_at: &[usize]) -> (ScanSummary, Vec<Record>) {
     let (stopped, dips_at) = (Arc::clone(&stop), dips_at.to_vec());
     let board = std::thread::spawn(move || {
         let mut emulator =
-            Emulator::new(&elf(), &config(), Box::new(commanded(&[5 * MS]))).expect("a firmware");
+            Emulator::new(&elf(), &config(), Box::new(scripted(&[5 * MS]))).expect("a firmware");
         let mut fired = 0;
         let mut dips = dips_at.iter().copied().peekable();
         serve(&mut emulator, &pty, &stopped, |emulator| {

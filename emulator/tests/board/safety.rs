@@ -1,6 +1,6 @@
 //! Behaviour on faults of the line, the host and the chip.
 
-use crate::common::{SETTINGS, commanded, readings, ready};
+use crate::common::{SETTINGS, readings, ready, scripted};
 use firmware_protocol::host::{Command, HostError, HostEvent, Outcome};
 use firmware_protocol::messages::{FaultKind, ResetCause, Settings, Status, Sweep};
 use rand::{Rng as _, RngExt as _, SeedableRng as _};
@@ -19,7 +19,7 @@ const LONG: Sweep = Sweep {
 
 /// Bench in the middle of a sweep.
 fn sweeping() -> Bench {
-    let mut bench = ready(commanded(&[5 * MS]), SETTINGS);
+    let mut bench = ready(scripted(&[5 * MS]), SETTINGS);
     bench.start(Command::Sweep(LONG)).expect("begins");
     bench.run(1.0).expect("sweeps");
     assert!(readings(bench.events()).len() > 10);
@@ -59,7 +59,7 @@ fn reset_cause(bench: &mut Bench) -> ResetCause {
 #[test]
 fn survives_a_minute_of_noise() {
     let mut random = rand_pcg::Pcg64::seed_from_u64(9);
-    let mut bench = ready(commanded(&[5 * MS]), SETTINGS);
+    let mut bench = ready(scripted(&[5 * MS]), SETTINGS);
     // A frame to damage: a request of the host, captured from the line.
     bench.host.start(bench.device.now_us(), Command::Status).expect("begins");
     let frame = bench.host.poll_transmit().expect("a frame").to_vec();
@@ -110,7 +110,7 @@ fn survives_a_minute_of_noise() {
 
 #[test]
 fn sweep_survives_noise() {
-    let mut bench = ready(commanded(&[5 * MS]), SETTINGS);
+    let mut bench = ready(scripted(&[5 * MS]), SETTINGS);
     let mut random = rand_pcg::Pcg64::seed_from_u64(2);
     bench.start(Command::Sweep(Sweep { stops: 100, ..LONG })).expect("begins");
     for _ in 0..200 {
@@ -179,7 +179,7 @@ fn watchdog_restarts_hang() {
 
 #[test]
 fn boot_numbers_are_unique() {
-    let mut bench = ready(commanded(&[]), SETTINGS);
+    let mut bench = ready(scripted(&[]), SETTINGS);
     let mut boots = vec![bench.host.identity().expect("known").boot];
     for _ in 0..40 {
         bench.perform(Command::Reset, 5.0).expect("restarts");
@@ -211,7 +211,7 @@ fn emergency_stop() {
 
 #[test]
 fn releases_idle_coils() {
-    let mut bench = ready(commanded(&[]), Settings { hold_s: 2, ..SETTINGS });
+    let mut bench = ready(scripted(&[]), Settings { hold_s: 2, ..SETTINGS });
     bench.run(1.5).expect("runs");
     assert!(bench.device.holds_coils());
     bench.run(1.0).expect("runs");

@@ -1,6 +1,6 @@
 //! Environment of the chip: a motor with limits, and supply dips.
 
-use crate::common::{SETTINGS, commanded, readings, ready};
+use crate::common::{SETTINGS, readings, ready, scripted};
 use firmware_protocol::host::{Command, HostError, HostEvent, Outcome};
 use firmware_protocol::messages::{ResetCause, Settings, Sweep};
 use sonard_emulator::{Bench, BenchError, HZ, MotorLimits};
@@ -9,7 +9,7 @@ const MS: u64 = HZ / 1000;
 
 /// Drift in steps measured by homing after nearly three revolutions with the given profile.
 fn drift_after_move(speed: u16, acceleration: u32) -> i32 {
-    let mut bench = ready(commanded(&[]), Settings { speed, acceleration, ..SETTINGS });
+    let mut bench = ready(scripted(&[]), Settings { speed, acceleration, ..SETTINGS });
     bench.device.set_motor(Some(MotorLimits::typical()));
     bench.perform(Command::MoveTo { step: 1_150 }, 20.0).expect("reports the target");
     // Slowly, so that the search itself misses no steps.
@@ -47,7 +47,7 @@ fn cause(bench: &mut Bench) -> ResetCause {
 #[test]
 fn dip_restarts_with_cause() {
     for milliseconds in [1, 20, 700] {
-        let mut bench = ready(commanded(&[5 * MS]), SETTINGS);
+        let mut bench = ready(scripted(&[5 * MS]), SETTINGS);
         let old = bench.host.identity().expect("known").boot;
         let plan = Sweep {
             sweep: 1,

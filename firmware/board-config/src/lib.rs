@@ -20,7 +20,7 @@ pub const OPTION_REVERSED: u8 = 1;
 pub const OPTION_INDEX_HIGH: u8 = 2;
 
 /// Capabilities of every board, regardless of its EEPROM.
-pub const ALWAYS: Capabilities = Capabilities::SHORT_BLANKING
+pub const BASE_CAPABILITIES: Capabilities = Capabilities::SHORT_BLANKING
     .with(Capabilities::MULTIPLE_ECHOES)
     .with(Capabilities::COIL_RELEASE);
 
@@ -31,7 +31,7 @@ pub struct Config {
     pub serial: [u8; 10],
     /// Steps per revolution, including microstepping and gears.
     pub steps_per_revolution: u16,
-    /// Capabilities of the fitted equipment, including [`ALWAYS`].
+    /// Capabilities of the fitted equipment, including [`BASE_CAPABILITIES`].
     pub capabilities: Capabilities,
     /// Combination of `OPTION_*` bits.
     pub options: u8,
@@ -42,7 +42,7 @@ impl Config {
     pub const UNSET: Self = Self {
         serial: *b"UNO-NO-SER",
         steps_per_revolution: 400,
-        capabilities: ALWAYS,
+        capabilities: BASE_CAPABILITIES,
         options: 0,
     };
 
@@ -87,7 +87,8 @@ impl Config {
         Self {
             serial: [s0, s1, s2, s3, s4, s5, s6, s7, s8, s9],
             steps_per_revolution: u16::from_le_bytes([steps_low, steps_high]),
-            capabilities: Capabilities(u16::from_le_bytes([can_low, can_high])).with(ALWAYS),
+            capabilities: Capabilities(u16::from_le_bytes([can_low, can_high]))
+                .with(BASE_CAPABILITIES),
             options,
         }
     }
@@ -100,7 +101,7 @@ mod tests {
     const FITTED: Config = Config {
         serial: *b"LAB-000042",
         steps_per_revolution: 3200,
-        capabilities: ALWAYS.with(Capabilities::INDEX_SENSOR),
+        capabilities: BASE_CAPABILITIES.with(Capabilities::INDEX_SENSOR),
         options: OPTION_REVERSED,
     };
 

@@ -2,7 +2,7 @@
 
 use std::process::ExitCode;
 
-use board_config::{ALWAYS, Config, OPTION_INDEX_HIGH, OPTION_REVERSED};
+use board_config::{BASE_CAPABILITIES, Config, OPTION_INDEX_HIGH, OPTION_REVERSED};
 use firmware_protocol::messages::Capabilities;
 
 const USAGE: &str = "\
@@ -34,7 +34,7 @@ fn config(mut words: impl Iterator<Item = String>) -> Result<Config, String> {
     if serial.is_empty() || serial.len() > 10 || !printable {
         return Err(format!("{serial:?} is not a serial number (1 to 10 printable characters)"));
     }
-    let mut config = Config { serial: [0; 10], capabilities: ALWAYS, ..Config::UNSET };
+    let mut config = Config { serial: [0; 10], capabilities: BASE_CAPABILITIES, ..Config::UNSET };
     config.serial[..serial.len()].copy_from_slice(serial.as_bytes());
     for word in words {
         let fit = |config: &mut Config, capability| {

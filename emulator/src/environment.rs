@@ -6,7 +6,7 @@ use sonard::mock::World;
 use crate::CYCLES_PER_TICK;
 
 /// Environment of the board beyond its pins.
-pub trait Surroundings {
+pub trait Environment {
     /// Turns the motor by `steps`, with sign.
     fn turn(&mut self, steps: i32);
     /// Actual position of the motor relative to the index, steps.
@@ -17,7 +17,7 @@ pub trait Surroundings {
 }
 
 /// Environment simulated by the mock.
-impl Surroundings for World {
+impl Environment for World {
     fn turn(&mut self, steps: i32) {
         World::turn(self, steps);
     }
@@ -34,14 +34,14 @@ impl Surroundings for World {
 
 /// Environment with prescribed echoes, accurate to the cycle.
 #[derive(Debug, Clone, Default)]
-pub struct Commanded {
+pub struct ScriptedEnvironment {
     /// Arrival times of the echoes, cycles after INIT rose.
     pub echoes: Vec<u64>,
     /// Position of the motor, steps from the index.
     pub step: i32,
 }
 
-impl Surroundings for Commanded {
+impl Environment for ScriptedEnvironment {
     fn turn(&mut self, steps: i32) {
         self.step += steps;
     }
