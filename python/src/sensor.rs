@@ -64,7 +64,7 @@ impl Sensor {
     #[pyo3(signature = (**values))]
     fn replace(&self, py: Python<'_>, values: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
         let Some(values) = values else { return Ok(Self { sensor: self.sensor.clone() }) };
-        let given: Value = parsed(py, &json::text_of(values)?)?;
+        let given: Value = parsed(py, &json::to_text(values)?)?;
         let mut data: Value = parsed(py, &self.to_json(py)?)?;
         let schema = schemars::schema_for!(acoustics::Sensor);
         let known = schema.get("properties").and_then(Value::as_object);

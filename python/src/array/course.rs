@@ -105,7 +105,7 @@ impl Course {
         py: Python<'py>,
         times_s: &Bound<'py, PyAny>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let (times_s, shape) = arrays::any(times_s)?;
+        let (times_s, shape) = arrays::flattened(times_s)?;
         if let Some(at) = times_s.iter().position(|time_s| time_s.is_nan()) {
             let message = format!("times_s[{at}] is nan");
             return Err(PyValueError::new_err(message));
