@@ -1,4 +1,4 @@
-//! Bindings to libsimavr.
+//! Generates bindings to libsimavr.
 
 use std::error::Error;
 
@@ -14,7 +14,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let simavr = pkg_config::Config::new().atleast_version("1.6").probe("simavr").map_err(|error| {
         format!("libsimavr is missing (apt-get install libsimavr-dev libelf-dev libclang-dev): {error}")
     })?;
-    // simavr uses it without saying so.
+    // simavr depends on libelf without declaring it.
     println!("cargo:rustc-link-lib=elf");
     let include = simavr.include_paths.iter().map(|path| format!("-I{}", path.display()));
     bindgen::Builder::default()

@@ -1,4 +1,4 @@
-//! The chip, and what its pins are wired to.
+//! Emulated chip with its connected devices.
 
 use std::{collections::VecDeque, ffi::c_void, fmt, path::Path, ptr::NonNull};
 
@@ -6,10 +6,11 @@ use board_config::Config;
 use firmware_protocol::conformance::DeviceUnderTest;
 
 use crate::rig::{
-    HEARTBEAT, Rig, feed, heartbeat, keep_on, on_binh, on_blnk, on_init, on_sent, on_step,
+    HEARTBEAT, Rig, heartbeat, on_binh, on_blnk, on_init, on_sent, on_sleep, on_step, send_byte,
 };
 use crate::{
-    CYCLES_PER_US, Commanded, HZ, Module, MotorLimits, Surroundings, firmware, motor::Motor, sys,
+    CYCLES_PER_US, Environment, HZ, Module, MotorLimits, ScriptedEnvironment, firmware,
+    motor::Motor, sys,
 };
 
 const fn ioctl(name: [u8; 4]) -> u32 {
@@ -23,7 +24,7 @@ const PORT_C: u32 = ioctl(*b"iogC");
 const PORT_D: u32 = ioctl(*b"iogD");
 
 const RAM_START: usize = 0x100;
-/// What memory holds before anything is written to it.
+/// Initial content of the memory, to measure the depth of the stack.
 const PAINT: u8 = 0xa5;
 const DDRB: usize = 0x24;
 const MCUSR: usize = 0x54;
@@ -31,23 +32,23 @@ const INIT_BIT: u8 = 1 << 1;
 const STATE_DONE: i32 = 6;
 const STATE_CRASHED: i32 = 7;
 
-/// Why a chip restarts, as MCUSR tells it.
+/// Cause of a reset, as reported in MCUSR.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Reset {
-    /// Power came on.
+    /// Power was switched on.
     PowerOn = 1,
-    /// The reset pin.
+    /// The reset pin was pulled low.
     External = 2,
-    /// The supply sagged.
+    /// The supply voltage dropped.
     BrownOut = 4,
 }
 
-/// The firmware panicked or ran into nowhere.
+/// Crash of the firmware: a panic, or execution outside the program.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Crash {
     /// Program counter, bytes.
     pub pc: u32,
-    /// Cycle.
+    /// Time of the crash, cycles.
     pub at: u64,
 }
 
@@ -59,7 +60,7 @@ impl fmt::Display for Crash {
 
 impl std::error::Error for Crash {}
 
-/// An ATmega328P that runs the firmware, with everything wired to it.
+/// ATmega328P that runs the firmware, with all connected devices.
 pub struct Emulator {
     rig: Box<Rig>,
 }
@@ -74,16 +75,17 @@ impl fmt::Debug for Emulator {
     }
 }
 
-/// Gives a fresh chip its serial line's settings and its EEPROM.
+/// Sets the UART flags and the EEPROM of a new chip.
 ///
 /// # Safety
-/// `avr` is a chip that was made and initialised.
+///
+/// `avr` must be a created and initialised chip.
 unsafe fn configure(avr: NonNull<sys::avr_t>, config: &Config) {
     let mut flags = 0_u32;
     let mut image = config.encode();
     let mut eeprom =
         sys::avr_eeprom_desc_t { ee: image.as_mut_ptr(), offset: 0, size: image.len() as u32 };
-    // SAFETY: both calls copy what they are given.
+    // SAFETY: both calls copy their arguments.
     unsafe {
         sys::avr_ioctl(avr.as_ptr(), UART_SET_FLAGS, (&raw mut flags).cast());
         sys::avr_ioctl(avr.as_ptr(), EEPROM_SET, (&raw mut eeprom).cast());
@@ -91,27 +93,29 @@ unsafe fn configure(avr: NonNull<sys::avr_t>, config: &Config) {
 }
 
 impl Emulator {
-    /// A chip with the firmware `elf` and an EEPROM that holds `config`, before its first
+    /// Creates a chip with the firmware `elf` and the EEPROM content `config`, before its first
     /// instruction.
     ///
     /// # Errors
-    /// When the file is no firmware.
+    ///
+    /// Returns an error if the file is not a firmware.
     #[expect(unsafe_code, reason = "simavr is C")]
     pub fn new(
         elf: &Path,
         config: &Config,
-        surroundings: Box<dyn Surroundings>,
+        environment: Box<dyn Environment>,
     ) -> Result<Self, String> {
         let mut firmware = firmware::read(elf)?;
-        // SAFETY: simavr's own order of calls; every pointer is checked or its own, and the rig
-        // outlives the chip, whose timers and notifications end with it.
+        // SAFETY: calls in the order required by simavr; every pointer is checked or owned, and the
+        // rig outlives the chip, whose timers and notifications end with it.
         unsafe {
             let avr = sys::avr_make_mcu_by_name(firmware.mmcu.as_ptr());
-            let mut avr = NonNull::new(avr).ok_or("this simavr knows no ATmega328P")?;
+            let mut avr = NonNull::new(avr)
+                .ok_or("this version of simavr does not support the ATmega328P")?;
             sys::avr_init(avr.as_ptr());
             sys::avr_load_firmware(avr.as_ptr(), &raw mut firmware);
             avr.as_mut().frequency = HZ as u32;
-            avr.as_mut().sleep = Some(keep_on);
+            avr.as_mut().sleep = Some(on_sleep);
             avr.as_mut().set_log(0);
             configure(avr, config);
             let pin = |port, bit| sys::avr_io_getirq(avr.as_ptr(), port, bit);
@@ -121,7 +125,7 @@ impl Emulator {
                 index_pin: pin(PORT_C, 0),
                 emergency_pin: pin(PORT_C, 1),
                 uart_in: pin(UART, 0),
-                surroundings,
+                environment,
                 steps_per_revolution: config.steps_per_revolution.into(),
                 module: Module::default(),
                 init: false,
@@ -134,7 +138,7 @@ impl Emulator {
                 to_chip: VecDeque::new(),
                 sending: false,
                 from_chip: Vec::new(),
-                beat: 0,
+                last_heartbeat: 0,
             });
             let user = (&raw mut *rig).cast::<c_void>();
             let hook = |pin, handler| sys::avr_irq_register_notify(pin, Some(handler), user);
@@ -152,19 +156,19 @@ impl Emulator {
         }
     }
 
-    /// Cycles since power came on.
+    /// Cycles since power-on.
     #[must_use]
     pub fn cycle(&self) -> u64 {
         self.rig.now()
     }
 
-    /// Microseconds since power came on.
+    /// Microseconds since power-on.
     #[must_use]
     pub fn now_us(&self) -> u64 {
         self.cycle() / CYCLES_PER_US
     }
 
-    /// Bytes for the chip; they go over the line one after the other.
+    /// Sends bytes to the chip; they are transmitted over the line in sequence.
     #[expect(unsafe_code, reason = "simavr is C")]
     pub fn send(&mut self, bytes: &[u8]) {
         self.rig.to_chip.extend(bytes);
@@ -173,32 +177,33 @@ impl Emulator {
             let user = (&raw mut *self.rig).cast::<c_void>();
             // SAFETY: the rig lives as long as the chip.
             unsafe {
-                sys::avr_cycle_timer_register(self.rig.avr.as_ptr(), 1, Some(feed), user);
+                sys::avr_cycle_timer_register(self.rig.avr.as_ptr(), 1, Some(send_byte), user);
             }
         }
     }
 
-    /// What the chip has sent since the last call.
+    /// Returns the bytes sent by the chip since the last call.
     pub fn received(&mut self) -> Vec<u8> {
         std::mem::take(&mut self.rig.from_chip)
     }
 
-    /// Whether [`Self::received`] would give anything.
+    /// Returns `true` if [`Self::received`] would return bytes.
     #[must_use]
     pub fn has_received(&self) -> bool {
         !self.rig.from_chip.is_empty()
     }
 
-    /// Bytes that are still on their way to the chip.
+    /// Number of bytes still in transit to the chip.
     #[must_use]
     pub fn unsent(&self) -> usize {
         self.rig.to_chip.len()
     }
 
-    /// Runs until `done`, at most `cycles`; tells whether it was done.
+    /// Runs until `done` returns `true`, for at most `cycles`; returns whether it did.
     ///
     /// # Errors
-    /// [`Crash`].
+    ///
+    /// Returns a [`Crash`] of the firmware.
     pub fn run_until(
         &mut self,
         cycles: u64,
@@ -214,10 +219,11 @@ impl Emulator {
         Ok(false)
     }
 
-    /// Runs so many cycles.
+    /// Runs the chip for `cycles`.
     ///
     /// # Errors
-    /// [`Crash`].
+    ///
+    /// Returns a [`Crash`] of the firmware.
     pub fn run(&mut self, cycles: u64) -> Result<(), Crash> {
         self.run_until(cycles, |_| false).map(drop)
     }
@@ -226,12 +232,12 @@ impl Emulator {
     fn instruction(&mut self) -> Result<(), Crash> {
         // SAFETY: the chip was initialised.
         let state = unsafe { sys::avr_run(self.rig.avr.as_ptr()) };
-        if self.cycle() > self.rig.beat + 4 * HEARTBEAT {
-            self.rig.start_again();
+        if self.cycle() > self.rig.last_heartbeat + 4 * HEARTBEAT {
+            self.rig.restart_timers();
         }
         let data = self.rig.data();
         if self.rig.init && data[DDRB] & INIT_BIT == 0 {
-            // A reset lets go of the pins without a word; the resistor pulls INIT low.
+            // A reset releases the pins without notification; the resistor pulls INIT low.
             self.rig.set_init(false);
         }
         if state == STATE_DONE || state == STATE_CRASHED {
@@ -240,31 +246,32 @@ impl Emulator {
         Ok(())
     }
 
-    /// Restarts the chip.
+    /// Resets the chip, with the given cause in MCUSR.
     #[expect(unsafe_code, reason = "simavr is C")]
     pub fn reset(&mut self, cause: Reset) {
         // SAFETY: the chip was initialised.
         unsafe { sys::avr_reset(self.rig.avr.as_ptr()) };
         self.rig.data_mut()[MCUSR] = cause as u8;
         self.rig.set_init(false);
-        self.rig.start_again();
+        self.rig.restart_timers();
     }
 
-    /// The supply sags for so long: the chip stands still, its pins let go, and then it restarts.
+    /// Drops the supply for the given time: the chip stops, its pins are released, and then it
+    /// restarts.
     #[expect(unsafe_code, reason = "simavr is C")]
     pub fn dip(&mut self, milliseconds: u64) {
         self.reset(Reset::BrownOut);
-        // SAFETY: the chip was initialised. Its clock stands while time passes.
+        // SAFETY: the chip was initialised. Its clock is stopped while time passes.
         unsafe { self.rig.avr.as_mut() }.cycle += milliseconds * 1_000 * CYCLES_PER_US;
-        self.rig.start_again();
+        self.rig.restart_timers();
     }
 
-    /// Gives the motor limits, or none: then it follows whatever the pulses ask of it.
+    /// Sets the limits of the motor; without limits it follows every pulse.
     pub fn set_motor(&mut self, limits: Option<MotorLimits>) {
         self.rig.motor.set_limits(limits);
     }
 
-    /// Makes the firmware hang with interrupts on: an instruction that jumps to itself.
+    /// Makes the firmware hang with interrupts enabled: an instruction that jumps to itself.
     #[expect(unsafe_code, reason = "simavr is C")]
     pub fn hang(&mut self) {
         const JUMP_TO_ITSELF: [u8; 2] = [0xff, 0xcf];
@@ -283,43 +290,43 @@ impl Emulator {
         self.rig.refresh_inputs();
     }
 
-    /// ECHO hangs high, as when the module has no power.
+    /// Holds ECHO high, as when the module has no power.
     pub fn stick_echo(&mut self, stuck: bool) {
         self.rig.stuck_echo = stuck;
-        self.rig.show_echo();
+        self.rig.update_echo_pin();
     }
 
-    /// When INIT rose, cycles, since the last call.
+    /// Returns the times at which INIT rose since the last call, cycles.
     pub fn take_init_rises(&mut self) -> Vec<u64> {
         std::mem::take(&mut self.rig.init_rises)
     }
 
-    /// When STEP rose, cycles, since the last call.
+    /// Returns the times at which STEP rose since the last call, cycles.
     pub fn take_pulses(&mut self) -> Vec<u64> {
         std::mem::take(&mut self.rig.pulses)
     }
 
-    /// Pulses forward less pulses back, with the coils held, since power came on.
+    /// Net pulses since power-on while the coils were energised.
     #[must_use]
     pub fn steps(&self) -> i64 {
         self.rig.steps
     }
 
-    /// Whether INIT is high.
+    /// Returns `true` while INIT is high.
     #[must_use]
     pub fn is_firing(&self) -> bool {
         self.rig.init
     }
 
-    /// Whether the motor's coils have current.
+    /// Returns `true` while the motor's coils carry current.
     #[must_use]
     pub fn holds_coils(&self) -> bool {
         self.rig.holds_coils()
     }
 
-    /// The deepest the stack has been since power came on, bytes: what is no longer painted above
-    /// the longest stretch of memory that still is. (The pointer itself can't be watched: a
-    /// function changes it one byte after the other.)
+    /// Maximum depth of the stack since power-on, bytes: the memory above the longest run of
+    /// unchanged bytes. (The stack pointer cannot be watched: a function changes it one byte at a
+    /// time.)
     #[must_use]
     pub fn stack_bytes(&self) -> usize {
         let memory = &self.rig.data()[RAM_START..];
@@ -333,16 +340,16 @@ impl Emulator {
         memory.len() - end
     }
 
-    /// Puts the board into another world.
-    pub fn set_surroundings(&mut self, surroundings: Box<dyn Surroundings>) {
-        self.rig.surroundings = surroundings;
+    /// Replaces the environment of the board.
+    pub fn set_environment(&mut self, environment: Box<dyn Environment>) {
+        self.rig.environment = environment;
     }
 }
 
 impl Drop for Emulator {
     #[expect(unsafe_code, reason = "simavr is C")]
     fn drop(&mut self) {
-        // SAFETY: nobody uses the chip afterwards. simavr frees what it made.
+        // SAFETY: the chip is not used afterwards. simavr frees its own allocations.
         unsafe { sys::avr_terminate(self.rig.avr.as_ptr()) };
     }
 }
@@ -369,8 +376,8 @@ impl DeviceUnderTest for Emulator {
     fn set_echoes(&mut self, after_us: &[f64]) {
         let cycles = |us: &f64| (us * CYCLES_PER_US as f64).round() as u64;
         let echoes = after_us.iter().map(cycles).collect();
-        let step = self.rig.surroundings.steps_from_index();
-        self.set_surroundings(Box::new(Commanded { echoes, step }));
+        let step = self.rig.environment.steps_from_index();
+        self.set_environment(Box::new(ScriptedEnvironment { echoes, step }));
     }
 
     fn take_firings(&mut self) -> usize {

@@ -1,41 +1,42 @@
-//! The firmware's machine code in an emulated ATmega328P, wired to a ranging module, a stepper
-//! and a serial line.
+//! Emulation of an ATmega328P that runs the firmware's machine code, connected to a ranging module,
+//! a stepper and a serial line.
 //!
-//! [`Emulator`] is deterministic: its clock is the chip's, and nothing happens unless it is run.
-//! [`Bench`] sets the host's machine on the other end of its line. The program `sonard-emulator`
-//! plays it on a pty at the pace of the wall clock.
+//! [`Emulator`] is deterministic: its clock is the chip's, and time passes only while it is run.
+//! [`Bench`] connects the host machine to its line. The program `sonard-emulator` serves it on a
+//! pty in real time.
 //!
-//! What it models: every instruction with its cycles, both timers' units that the firmware
-//! uses, the UART (a byte takes 11 bits, as simavr has it), the EEPROM, the watchdog; the module's
-//! blanking, latch and re-arming ([`Module`]); the motor's rotor, if it is given limits
-//! ([`MotorLimits`]); dips of the supply that restart the chip ([`Emulator::dip`]). What it does
-//! not: voltages, and simavr's own limits: its UART takes the next byte only a byte's time after
-//! the last was read, so that some 200 bytes in a row at line speed overrun it; interrupts begin at
-//! instruction boundaries, so an echo may be seen up to two cycles late.
+//! Modelled: every instruction with its cycles; the timer units used by the firmware; the UART (a
+//! byte takes 11 bits, as in simavr), the EEPROM and the watchdog; blanking, latch and re-arming of
+//! the module ([`Module`]); the motor's rotor, if it has limits ([`MotorLimits`]); supply dips that
+//! restart the chip ([`Emulator::dip`]).
+//!
+//! Not modelled: voltages. simavr has limits of its own. Its UART accepts the next byte only one
+//! byte time after the last was read, so about 200 consecutive bytes at line speed overrun it.
+//! Interrupts start at instruction boundaries, so an echo may be detected up to two cycles late.
 #![cfg(feature = "simavr")]
 
 mod emulator;
+mod environment;
 mod firmware;
 mod module;
 mod motor;
 mod rig;
 mod serve;
-mod surroundings;
 mod sys;
 
 pub use emulator::{Crash, Emulator, Reset};
+pub use environment::{Environment, ScriptedEnvironment};
 pub use firmware_protocol::conformance::BenchError;
 pub use module::Module;
 pub use motor::MotorLimits;
 pub use serve::serve;
-pub use surroundings::{Commanded, Surroundings};
 
-/// The board and the host machine, joined by its line.
+/// Board and host machine, connected by a serial line.
 pub type Bench = firmware_protocol::conformance::Bench<Emulator>;
 
-/// Clock of the chip.
+/// Clock rate of the chip, Hz.
 pub const HZ: u64 = 16_000_000;
-/// Cycles of a device tick.
+/// Cycles per device tick.
 pub const CYCLES_PER_TICK: u64 = HZ / firmware_protocol::messages::limits::TICK_HZ as u64;
-/// Cycles of a microsecond.
+/// Cycles per microsecond.
 pub const CYCLES_PER_US: u64 = HZ / 1_000_000;

@@ -1,4 +1,4 @@
-//! `sonard-emulator`: plays the firmware on a pty, at the pace of the wall clock.
+//! `sonard-emulator`: serves the emulated board on a pty in real time.
 
 use std::{
     error::Error,
@@ -11,7 +11,7 @@ use std::{
     },
 };
 
-use board_config::{ALWAYS, Config};
+use board_config::{BASE_CAPABILITIES, Config};
 use clap::Parser;
 use firmware_protocol::messages::Capabilities;
 use rand::{RngExt as _, SeedableRng as _};
@@ -27,8 +27,8 @@ use sonard_model::{
 
 /// Run the firmware's machine code in an emulated Arduino Uno, with its serial line on a pty.
 ///
-/// The ranger hears what the model says for the scene. The board says of itself that it is
-/// emulated, so every log taken from it does too. It runs until it is interrupted.
+/// The echoes come from the model of the scene. The board identifies itself as emulated, so every
+/// log recorded from it is marked accordingly. Runs until interrupted.
 #[derive(Debug, Parser)]
 #[command(version, after_help = EXAMPLE)]
 struct Args {
@@ -38,23 +38,23 @@ struct Args {
     /// Pose of the ranger: X,Y,DEG (metres, degrees) or the name of a pose in the scene
     #[arg(long, value_name = "POSE", allow_hyphen_values = true)]
     pose: String,
-    /// Make this symbolic link to the pty
+    /// Create this symbolic link to the pty
     #[arg(long, value_name = "PATH")]
     link: Option<PathBuf>,
-    /// The firmware [default: firmware/target/avr-none/release/sonard-firmware.elf, here or in a
+    /// Firmware file [default: firmware/target/avr-none/release/sonard-firmware.elf, here or in a
     /// folder above this program]
     #[arg(long, value_name = "ELF", env = "SONARD_FIRMWARE")]
     elf: Option<PathBuf>,
-    /// Sensor preset, or a file with a sensor's data
+    /// Sensor preset, or a sensor file
     #[arg(long, value_name = "NAME|FILE", default_value = "senscomp-6500")]
     sensor: String,
-    /// From firing until the receiver listens, microseconds [default: the sensor's]
+    /// Time from firing to the end of the receiver's blanking, microseconds [default: the sensor's]
     #[arg(long, value_name = "US")]
     blanking_us: Option<f64>,
     /// Air temperature, degrees Celsius
     #[arg(long, value_name = "C", default_value_t = 20.0, allow_negative_numbers = true)]
     temperature_c: f64,
-    /// The same, in place of --temperature-c
+    /// Air temperature, degrees Celsius, in place of --temperature-c
     #[arg(long, value_name = "C", allow_negative_numbers = true, hide = true)]
     truth_temperature_c: Option<f64>,
     /// Relative humidity, percent
@@ -63,19 +63,19 @@ struct Args {
     /// Static pressure, kilopascals
     #[arg(long, value_name = "KPA", default_value_t = 101.325)]
     pressure_kpa: f64,
-    /// How far the transducer is turned on the motor's shaft, degrees
+    /// Mounting offset of the transducer on the motor's shaft, degrees
     #[arg(long, value_name = "DEG", default_value_t = 0.0, allow_negative_numbers = true)]
     mounting_offset_deg: f64,
-    /// The motor follows whatever is asked of it, instead of missing steps beyond its torque
+    /// Let the motor follow every pulse, instead of missing steps beyond its torque
     #[arg(long)]
     tireless_motor: bool,
-    /// Probability for each firing that the supply sags and the chip restarts
+    /// Probability of a supply dip at each firing, which restarts the chip
     #[arg(long, value_name = "P", default_value_t = 0.0, value_parser = probability)]
     dips: f64,
-    /// End when standard input closes: with the program that started this one
+    /// End when standard input closes: together with the program that started this one
     #[arg(long)]
     attached: bool,
-    /// How long the supply sags, milliseconds
+    /// Duration of a supply dip, milliseconds
     #[arg(long, value_name = "MS", default_value_t = 20)]
     dip_ms: u64,
     /// Standard deviation of the range noise, millimetres
@@ -84,7 +84,7 @@ struct Args {
     /// Seed of the noise
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// Motor steps a revolution
+    /// Motor steps per revolution
     #[arg(long, value_name = "N", default_value_t = 400, value_parser = clap::value_parser!(u16).range(4..=12_800))]
     steps_per_revolution: u16,
 }
@@ -96,7 +96,7 @@ Example:
 
 fn main() -> ExitCode {
     let args = Args::parse();
-    match play(&args) {
+    match run(&args) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("sonard-emulator: {error}");
@@ -105,7 +105,7 @@ fn main() -> ExitCode {
     }
 }
 
-fn play(args: &Args) -> Result<(), Box<dyn Error>> {
+fn run(args: &Args) -> Result<(), Box<dyn Error>> {
     let mut emulator = Emulator::new(&elf(args)?, &config(args), Box::new(world(args)?))?;
     emulator.set_motor((!args.tireless_motor).then(MotorLimits::typical));
     let pty = Pty::open(args.link.as_deref())?;
@@ -116,7 +116,7 @@ fn play(args: &Args) -> Result<(), Box<dyn Error>> {
     if args.attached {
         let stop = Arc::clone(&stop);
         std::thread::spawn(move || {
-            // Nothing is expected there but its end.
+            // No input is expected, only its end.
             drop(io::copy(&mut io::stdin(), &mut io::sink()));
             stop.store(true, Ordering::Relaxed);
         });
@@ -126,16 +126,16 @@ fn play(args: &Args) -> Result<(), Box<dyn Error>> {
         emulator.take_pulses();
         firings += fired;
         if (0..fired).any(|_| random.random_bool(args.dips)) {
-            // Whoever started it may not read any more.
-            drop(writeln!(io::stdout(), "the supply sags at firing {firings}"));
+            // Standard output may be closed.
+            drop(writeln!(io::stdout(), "supply dip at firing {firings}"));
             emulator.dip(args.dip_ms);
         }
     })
     .map_err(|error| error as Box<dyn Error>)
 }
 
-/// The firmware: where it was said to be, or where its build leaves it, as seen from here or from
-/// this program.
+/// Path of the firmware: the option, or the output of the firmware's build, relative to the current
+/// folder or to a folder above this program.
 fn elf(args: &Args) -> Result<PathBuf, String> {
     if let Some(elf) = &args.elf {
         return Ok(elf.clone());
@@ -144,7 +144,7 @@ fn elf(args: &Args) -> Result<PathBuf, String> {
     let program = std::env::current_exe().unwrap_or_default();
     let above = program.ancestors().map(|folder| folder.join(built));
     std::iter::once(built.to_path_buf()).chain(above).find(|elf| elf.exists()).ok_or_else(|| {
-        format!("{} is missing: build it with firmware/test.sh, or give --elf", built.display())
+        format!("{} is missing: build it with firmware/test.sh, or use --elf", built.display())
     })
 }
 
@@ -152,7 +152,9 @@ fn config(args: &Args) -> Config {
     Config {
         serial: *b"EMU-000001",
         steps_per_revolution: args.steps_per_revolution,
-        capabilities: ALWAYS.with(Capabilities::INDEX_SENSOR).with(Capabilities::EMULATED),
+        capabilities: BASE_CAPABILITIES
+            .with(Capabilities::INDEX_SENSOR)
+            .with(Capabilities::EMULATED),
         options: 0,
     }
 }
@@ -161,7 +163,9 @@ fn world(args: &Args) -> Result<World, Box<dyn Error>> {
     let text = match std::fs::read_to_string(&args.scene) {
         Ok(text) => text,
         Err(error) => shipped::text(&args.scene)
-            .ok_or_else(|| format!("{}: {error}, and no shipped scene of that name", args.scene))?
+            .ok_or_else(|| {
+                format!("{}: {error}, and there is no shipped scene of that name", args.scene)
+            })?
             .to_owned(),
     };
     let scene = Scene::from_json(&text).map_err(|error| format!("{}: {error}", args.scene))?;
@@ -187,6 +191,10 @@ fn world(args: &Args) -> Result<World, Box<dyn Error>> {
 }
 
 fn probability(text: &str) -> Result<f64, String> {
-    let value: f64 = text.parse().map_err(|_| "a probability, 0 to 1".to_owned())?;
-    if (0.0..=1.0).contains(&value) { Ok(value) } else { Err("a probability, 0 to 1".into()) }
+    let value: f64 = text.parse().map_err(|_| "must be a probability, 0 to 1".to_owned())?;
+    if (0.0..=1.0).contains(&value) {
+        Ok(value)
+    } else {
+        Err("must be a probability, 0 to 1".into())
+    }
 }

@@ -1,13 +1,13 @@
-//! The SensComp 6500 ranging module, as seen at its pins.
+//! SensComp 6500 ranging module, modelled at its pins.
 
 use crate::HZ;
 
-/// Blanking of the module when BINH does not end it: 2.38 ms.
+/// Internal blanking of the module, cycles: 2.38 ms unless BINH ends it.
 const INTERNAL_BLANKING: u64 = HZ / 100_000 * 238;
-/// How long an echo lasts: the 16 cycles at 49.4 kHz that were sent.
+/// Duration of an echo, cycles: the 16 periods of 49.4 kHz that were transmitted.
 const PULSE: u64 = HZ * 16 / 49_400;
 
-/// The module: INIT, BINH and BLNK in, ECHO out. Times are cycles of the chip's clock.
+/// Ranging module with inputs INIT, BINH and BLNK, and output ECHO. Times are cycles of the chip.
 #[derive(Debug, Clone, Default)]
 pub struct Module {
     fired_at: Option<u64>,
@@ -18,7 +18,7 @@ pub struct Module {
 }
 
 impl Module {
-    /// INIT rose; `echoes` come so many cycles later.
+    /// Handles the rise of INIT; `echoes` are arrival times in cycles after it.
     pub fn fire(&mut self, now: u64, echoes: &[u64]) {
         self.arrivals = echoes.iter().map(|after| now + after).collect();
         self.unblanked_at = now + INTERNAL_BLANKING;
@@ -26,31 +26,31 @@ impl Module {
         self.echo = false;
     }
 
-    /// INIT fell: everything begins anew, and ECHO is low.
-    pub fn rest(&mut self) {
+    /// Handles the fall of INIT: resets the module, and ECHO is low.
+    pub fn reset(&mut self) {
         *self = Self { blanked_again: self.blanked_again, ..Self::default() };
     }
 
-    /// BINH rose: the receiver listens from now on.
+    /// Handles the rise of BINH, which ends the blanking.
     pub fn end_blanking(&mut self, now: u64) {
         self.unblanked_at = self.unblanked_at.min(now);
-        self.look(now);
+        self.update(now);
     }
 
-    /// BLNK rose, which lowers ECHO and keeps it low, or fell.
+    /// Handles a change of BLNK; while high it keeps ECHO low.
     pub fn blank(&mut self, now: u64, blanked: bool) {
         self.blanked_again = blanked;
         if blanked {
             self.echo = false;
         }
-        self.look(now);
+        self.update(now);
     }
 
-    /// Time has passed. ECHO latches when an echo is there and the receiver listens.
-    pub fn look(&mut self, now: u64) {
-        let listens = self.fired_at.is_some() && !self.blanked_again && now >= self.unblanked_at;
-        let heard = self.arrivals.iter().any(|&at| (at..at + PULSE).contains(&now));
-        self.echo |= listens && heard;
+    /// Advances the time. ECHO is latched if an echo is present and the receiver is not blanked.
+    pub fn update(&mut self, now: u64) {
+        let enabled = self.fired_at.is_some() && !self.blanked_again && now >= self.unblanked_at;
+        let present = self.arrivals.iter().any(|&at| (at..at + PULSE).contains(&now));
+        self.echo |= enabled && present;
     }
 
     /// Level of ECHO.
@@ -59,9 +59,9 @@ impl Module {
         self.echo
     }
 
-    /// When to look again.
+    /// Time of the next possible change of ECHO, cycles.
     #[must_use]
-    pub fn next_look(&self, now: u64) -> Option<u64> {
+    pub fn next_update(&self, now: u64) -> Option<u64> {
         self.fired_at?;
         let blanking = std::iter::once(self.unblanked_at);
         self.arrivals.iter().copied().chain(blanking).filter(|&at| at > now).min()
@@ -75,26 +75,26 @@ mod tests {
     const MS: u64 = HZ / 1000;
 
     fn at(module: &mut Module, now: u64) -> bool {
-        module.look(now);
+        module.update(now);
         module.echo()
     }
 
     #[test]
-    fn it_is_deaf_while_blanked_and_latches_until_init_falls() {
+    fn blanks_then_latches() {
         let mut module = Module::default();
         module.fire(0, &[MS, 5 * MS]);
         assert!(!at(&mut module, MS), "blanked");
-        assert!(!at(&mut module, 3 * MS), "that echo has passed");
+        assert!(!at(&mut module, 3 * MS), "the echo has passed");
         assert!(!at(&mut module, 5 * MS - 1));
         assert!(at(&mut module, 5 * MS));
         assert!(at(&mut module, 50 * MS), "latched");
-        module.rest();
+        module.reset();
         assert!(!module.echo());
-        assert_eq!(module.next_look(0), None);
+        assert_eq!(module.next_update(0), None);
     }
 
     #[test]
-    fn binh_shortens_blanking_and_an_echo_already_there_is_heard_then() {
+    fn binh_ends_blanking() {
         let mut module = Module::default();
         module.fire(0, &[MS]);
         module.end_blanking(MS + PULSE / 2);
@@ -102,7 +102,7 @@ mod tests {
         let mut module = Module::default();
         module.fire(0, &[MS]);
         module.end_blanking(MS + PULSE);
-        assert!(!module.echo(), "too late for it");
+        assert!(!module.echo(), "the echo has passed");
     }
 
     #[test]
@@ -112,7 +112,7 @@ mod tests {
         assert!(at(&mut module, 5 * MS));
         module.blank(5 * MS + 100, true);
         assert!(!module.echo());
-        assert!(!at(&mut module, 6 * MS), "held blank over the second");
+        assert!(!at(&mut module, 6 * MS), "blanked during the second echo");
         module.blank(6 * MS + PULSE, false);
         assert!(!module.echo());
         assert!(at(&mut module, 7 * MS));

@@ -1,4 +1,4 @@
-//! The stepper's rotor, which follows the field only as far as its torque goes.
+//! Rotor of the stepper, which follows the field only within its torque.
 //!
 //! The rotor is a mass on the field's spring (P. Acarnley, "Stepping Motors: a guide to theory and
 //! practice", 4th ed., chapters 4 and 5; T. Kenjo and A. Sugawara, "Stepping Motors and their
@@ -9,48 +9,48 @@
 //! a(x') = a0 / sqrt(1 + (x' / c)^2)
 //! ```
 //!
-//! `a0` is holding torque over inertia, `c` the corner at which the current no longer rises in the
-//! time of a step (a coil with resistance and inductance at a fixed voltage), `f` the friction, `v`
-//! the field's speed, `w^2 = a0 pi / 2`, and `z` the damping, which the coils' voltage makes too:
-//! it and the spring together are at most `a(x')`. Two steps of lag or
-//! lead turn the torque around: then the rotor falls into the next place that looks the same to
-//! the coils, and four steps are missed.
+//! `a0` is the holding torque over inertia and `c` the corner speed, at which the current no longer
+//! rises within a step (a coil with resistance and inductance at a fixed voltage). `f` is the
+//! friction, `v` the speed of the field, `w^2 = a0 pi / 2`, and `z` the damping. The voltage of the
+//! coils also produces the damping: damping and spring together are at most `a(x')`. A lag or lead
+//! of two steps reverses the torque: the rotor then falls into the next equivalent position of the
+//! field, and four steps are missed.
 //!
-//! The numbers of [`MotorLimits::typical`] are an assumption, not a measured motor.
+//! The numbers of [`MotorLimits::typical`] are assumptions, not measured on a motor.
 
 use std::f64::consts::FRAC_PI_2;
 
 use crate::HZ;
 
-/// Steps after which the coils' field is the same again.
+/// Period of the coils' field, steps.
 const CYCLE_STEPS: f64 = 4.0;
-/// Step of the integration, cycles: 20 us, a hundredth of the rotor's own period or less.
+/// Time step of the integration, cycles: 20 us, at most a hundredth of the rotor's own period.
 const STEP_CYCLES: u64 = HZ / 50_000;
-/// A field that has not moved for so long stands, cycles.
-const STANDS_CYCLES: u64 = HZ / 20;
+/// Time without a pulse after which the field is at rest, cycles.
+const REST_CYCLES: u64 = HZ / 20;
 
-/// What a motor and its load can do.
+/// Limits of a motor and its load.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MotorLimits {
     /// Holding torque over inertia, steps/s^2.
     pub acceleration: f64,
-    /// Speed at which the torque has fallen to 0.71 of that, steps/s.
+    /// Speed at which the torque has fallen to 0.71 of the holding torque, steps/s.
     pub corner_speed: f64,
-    /// Friction, as a part of the holding torque.
+    /// Friction, as a fraction of the holding torque.
     pub friction: f64,
-    /// Damping ratio of small swings about a step.
+    /// Damping ratio of small oscillations about a step.
     pub damping: f64,
 }
 
 impl MotorLimits {
-    /// A 0.4 N m motor of 400 steps a revolution that turns a transducer and its mount
-    /// (1e-4 kg m^2 in all) at a driver's 12 V.
+    /// Limits of a 0.4 N m motor with 400 steps per revolution that turns a transducer and its
+    /// mount (1e-4 kg m^2 in total) with a driver at 12 V.
     #[must_use]
     pub const fn typical() -> Self {
         Self { acceleration: 250_000.0, corner_speed: 1_500.0, friction: 0.1, damping: 0.3 }
     }
 
-    /// The largest steady speed, steps/s: there the torque has fallen to the friction.
+    /// Maximum steady speed, steps/s, at which the torque has fallen to the friction.
     #[must_use]
     pub fn pull_out_speed(&self) -> f64 {
         self.corner_speed * (self.friction.powi(-2) - 1.0).max(0.0).sqrt()
@@ -61,12 +61,12 @@ impl MotorLimits {
     }
 }
 
-/// A rotor in the field of its coils. Times are cycles.
+/// Rotor in the field of its coils. Times are in cycles.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Motor {
-    /// `None`: it follows whatever the field does.
+    /// Limits of the motor; `None` for a rotor that follows the field exactly.
     limits: Option<MotorLimits>,
-    /// Where the coils would have it, steps.
+    /// Position of the field, steps.
     field: f64,
     rotor: f64,
     speed: f64,
@@ -78,30 +78,30 @@ pub(crate) struct Motor {
 impl Motor {
     pub(crate) fn set_limits(&mut self, limits: Option<MotorLimits>) {
         self.limits = limits;
-        self.rest();
+        self.release();
     }
 
-    /// The coils lost their current: friction holds the rotor where it is.
-    pub(crate) const fn rest(&mut self) {
+    /// Handles the loss of coil current: friction holds the rotor in place.
+    pub(crate) const fn release(&mut self) {
         (self.rotor, self.speed, self.field_speed) = (self.field, 0.0, 0.0);
     }
 
-    /// The field goes on by one step; tells how many steps the rotor's place has changed.
+    /// Advances the field by a step; returns the change of the rotor's position in steps.
     pub(crate) fn pulse(&mut self, now: u64, step: i32) -> i32 {
         let slipped = self.follow(now);
         self.field += f64::from(step);
         let pause = (now - self.pulsed).max(1);
         self.field_speed =
-            if pause < STANDS_CYCLES { f64::from(step) * HZ as f64 / pause as f64 } else { 0.0 };
+            if pause < REST_CYCLES { f64::from(step) * HZ as f64 / pause as f64 } else { 0.0 };
         self.pulsed = now;
         step + slipped
     }
 
-    /// Lets time pass; tells how many steps the rotor has slipped.
+    /// Advances the time; returns the steps by which the rotor has slipped.
     pub(crate) fn follow(&mut self, now: u64) -> i32 {
         let Some(limits) = self.limits else { return 0 };
-        while self.now < now && !self.stands() {
-            if self.now > self.pulsed + STANDS_CYCLES {
+        while self.now < now && !self.is_at_rest() {
+            if self.now > self.pulsed + REST_CYCLES {
                 self.field_speed = 0.0;
             }
             let cycles = STEP_CYCLES.min(now - self.now);
@@ -114,7 +114,7 @@ impl Motor {
         slipped as i32
     }
 
-    fn stands(&self) -> bool {
+    fn is_at_rest(&self) -> bool {
         self.field_speed == 0.0 && self.speed.abs() < 1.0 && (self.rotor - self.field).abs() < 0.2
     }
 
@@ -123,9 +123,9 @@ impl Motor {
         let spring = torque * ((self.field - self.rotor) * FRAC_PI_2).sin();
         let swing = (limits.acceleration * FRAC_PI_2).sqrt();
         let damping = 2.0 * limits.damping * swing * (self.speed - self.field_speed);
-        // The coils give no more than their torque, whatever for.
+        // The coils cannot exceed their torque, for spring and damping together.
         self.speed += (spring - damping).clamp(-torque, torque) * seconds;
-        // Friction takes speed away, but never turns it round.
+        // Friction reduces the speed, but never reverses it.
         let friction = limits.friction * limits.acceleration * seconds;
         self.speed -= self.speed.clamp(-friction, friction);
         self.rotor += self.speed * seconds;
@@ -141,53 +141,57 @@ mod tests {
     const LIMITS: MotorLimits =
         MotorLimits { acceleration: 100_000.0, corner_speed: 1_000.0, friction: 0.1, damping: 0.3 };
 
-    /// Where the rotor is after a move of so many steps.
-    fn turned(steps: i32, speed: u16, acceleration: u32) -> i32 {
+    /// Final position of the rotor after a move of `steps`.
+    fn final_position(steps: i32, speed: u16, acceleration: u32) -> i32 {
         let mut motor = Motor { limits: Some(LIMITS), ..Motor::default() };
         let motion = Trapezoid::new(steps, speed, acceleration);
-        let mut place = 0;
+        let mut position = 0;
         for number in 1..=steps.unsigned_abs() {
             let at = HZ + (motion.pulse_s(number) * HZ as f64) as u64;
-            place += motor.pulse(at, steps.signum());
+            position += motor.pulse(at, steps.signum());
         }
-        place + motor.follow(HZ * 60)
+        position + motor.follow(HZ * 60)
     }
 
     #[test]
-    fn a_move_within_its_torque_is_exact() {
+    fn exact_within_torque() {
         for (speed, acceleration) in [(100, 2_000), (800, 20_000), (1_500, 10_000), (4_000, 4_000)]
         {
             for steps in [1, 2, 5, 400, -400, 2_000] {
-                assert_eq!(turned(steps, speed, acceleration), steps, "{speed} {acceleration}");
+                assert_eq!(
+                    final_position(steps, speed, acceleration),
+                    steps,
+                    "{speed} {acceleration}"
+                );
             }
         }
     }
 
     #[test]
-    fn beyond_it_steps_are_missed_four_at_a_time() {
-        // At 3,000 steps/s the torque is 0.32 of the holding torque, and 0.7 are asked for.
-        let place = turned(2_000, 3_000, 60_000);
-        assert!(place < 1_990, "{place}");
-        assert_eq!((2_000 - place) % 4, 0);
+    fn misses_multiples_of_four() {
+        // At 3,000 steps/s the torque is 0.32 of the holding torque, and 0.7 are required.
+        let position = final_position(2_000, 3_000, 60_000);
+        assert!(position < 1_990, "{position}");
+        assert_eq!((2_000 - position) % 4, 0);
         // More than the holding torque from rest.
-        assert_ne!(turned(400, 10_000, 200_000), 400);
+        assert_ne!(final_position(400, 10_000, 200_000), 400);
     }
 
     #[test]
-    fn the_largest_steady_speed_is_where_friction_takes_all_torque() {
+    fn pull_out_speed_is_the_limit() {
         let limit = LIMITS.pull_out_speed();
         assert!((limit - 1_000.0 * 99_f64.sqrt()).abs() < 1e-6);
         let below = (0.8 * limit) as u16;
-        assert_eq!(turned(60_000, below, 1_000), 60_000);
+        assert_eq!(final_position(60_000, below, 1_000), 60_000);
         let above = (1.2 * limit) as u16;
-        assert_ne!(turned(90_000, above, 1_000), 90_000);
+        assert_ne!(final_position(90_000, above, 1_000), 90_000);
     }
 
     #[test]
-    fn without_limits_it_follows_everything() {
+    fn unlimited_follows_exactly() {
         let mut motor = Motor::default();
-        let place: i32 = (1..=1_000).map(|n| motor.pulse(n, -1)).sum();
-        assert_eq!(place, -1_000);
+        let position: i32 = (1..=1_000).map(|n| motor.pulse(n, -1)).sum();
+        assert_eq!(position, -1_000);
         assert_eq!(motor.follow(HZ), 0);
     }
 }

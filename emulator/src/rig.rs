@@ -1,14 +1,15 @@
-//! What the chip's pins are wired to, and the callbacks through which simavr tells of them.
+//! Wiring of the chip's pins, and the callbacks that simavr invokes for them.
 
 use std::{collections::VecDeque, ffi::c_void, ptr::NonNull};
 
-use crate::{HZ, Module, Surroundings, motor::Motor, sys};
+use crate::{Environment, HZ, Module, motor::Motor, sys};
 
-/// simavr takes eleven bits for a byte: start, eight, and what it believes are two stop bits.
+/// Duration of a byte in simavr, cycles: eleven bits, with a start bit, eight data bits and two
+/// stop bits.
 const BYTE_CYCLES: u64 = 11 * 136;
-/// A sleeping chip is woken so often at least, so that the caller keeps control.
+/// Maximum interval at which a sleeping chip is woken, so that the caller keeps control, cycles.
 pub(crate) const HEARTBEAT: u64 = HZ / 10_000;
-/// Steps for which the index sensor is on.
+/// Width of the index, steps.
 const INDEX_WIDTH: i32 = 4;
 const PINC: usize = 0x26;
 const DDRD: usize = 0x2a;
@@ -16,14 +17,14 @@ const PORTD: usize = 0x2b;
 const DIR_BIT: u8 = 1 << 5;
 const ENABLE_BIT: u8 = 1 << 6;
 
-/// What simavr's callbacks touch; in a box, because they keep its address.
+/// State accessed by simavr's callbacks. Boxed, because they keep its address.
 pub(crate) struct Rig {
     pub(crate) avr: NonNull<sys::avr_t>,
     pub(crate) echo_pin: *mut sys::avr_irq_t,
     pub(crate) index_pin: *mut sys::avr_irq_t,
     pub(crate) emergency_pin: *mut sys::avr_irq_t,
     pub(crate) uart_in: *mut sys::avr_irq_t,
-    pub(crate) surroundings: Box<dyn Surroundings>,
+    pub(crate) environment: Box<dyn Environment>,
     pub(crate) steps_per_revolution: i32,
     pub(crate) module: Module,
     pub(crate) init: bool,
@@ -36,14 +37,14 @@ pub(crate) struct Rig {
     pub(crate) to_chip: VecDeque<u8>,
     pub(crate) sending: bool,
     pub(crate) from_chip: Vec<u8>,
-    /// When the heartbeat came last.
-    pub(crate) beat: u64,
+    /// Cycle of the last heartbeat.
+    pub(crate) last_heartbeat: u64,
 }
 
 impl Rig {
     #[expect(unsafe_code, reason = "simavr is C")]
     pub(crate) fn chip(&self) -> &sys::avr_t {
-        // SAFETY: made in `Emulator::new`, freed in its `drop`.
+        // SAFETY: created in `Emulator::new`, freed in its `drop`.
         unsafe { self.avr.as_ref() }
     }
 
@@ -57,7 +58,7 @@ impl Rig {
     #[expect(unsafe_code, reason = "simavr is C")]
     pub(crate) fn data_mut(&mut self) -> &mut [u8] {
         let chip = self.chip();
-        // SAFETY: as in `data`; the rig is borrowed for as long.
+        // SAFETY: as in `data`; the rig is borrowed for the same time.
         unsafe { std::slice::from_raw_parts_mut(chip.data, usize::from(chip.ramend) + 1) }
     }
 
@@ -79,74 +80,80 @@ impl Rig {
         if high {
             self.follow();
             self.init_rises.push(now);
-            let echoes = self.surroundings.fire();
+            let echoes = self.environment.fire();
             self.module.fire(now, &echoes);
         } else {
-            self.module.rest();
+            self.module.reset();
         }
-        self.show_echo();
+        self.update_echo_pin();
     }
 
-    /// A reset has taken every timer out of simavr. Bytes on their way are lost.
+    /// Restores the timers after a reset, which removes them from simavr. Bytes in transit are
+    /// lost.
     #[expect(unsafe_code, reason = "simavr is C")]
-    pub(crate) fn start_again(&mut self) {
+    pub(crate) fn restart_timers(&mut self) {
         self.to_chip.clear();
         self.sending = false;
-        self.beat = self.now();
+        self.last_heartbeat = self.now();
         let user = (&raw mut *self).cast::<c_void>();
-        // SAFETY: the rig is in its box and outlives the timer.
+        // SAFETY: the rig is boxed and outlives the timer.
         unsafe {
             let avr = self.avr.as_ptr();
             sys::avr_cycle_timer_cancel(avr, Some(heartbeat), user);
-            sys::avr_cycle_timer_cancel(avr, Some(feed), user);
+            sys::avr_cycle_timer_cancel(avr, Some(send_byte), user);
             sys::avr_cycle_timer_register(avr, HEARTBEAT, Some(heartbeat), user);
         }
     }
 
-    /// Puts ECHO on its pin, and looks again when something may change.
+    /// Sets the level of ECHO, and schedules its next possible change.
     #[expect(unsafe_code, reason = "simavr is C")]
-    pub(crate) fn show_echo(&mut self) {
+    pub(crate) fn update_echo_pin(&mut self) {
         let level = self.module.echo() || self.stuck_echo;
         let now = self.now();
         let user = (&raw mut *self).cast::<c_void>();
-        // SAFETY: the rig is in its box and outlives the timer.
+        // SAFETY: the rig is boxed and outlives the timer.
         unsafe {
             sys::avr_raise_irq(self.echo_pin, level.into());
-            sys::avr_cycle_timer_cancel(self.avr.as_ptr(), Some(look), user);
-            if let Some(at) = self.module.next_look(now) {
-                sys::avr_cycle_timer_register(self.avr.as_ptr(), at - now, Some(look), user);
+            sys::avr_cycle_timer_cancel(self.avr.as_ptr(), Some(update_module), user);
+            if let Some(at) = self.module.next_update(now) {
+                sys::avr_cycle_timer_register(
+                    self.avr.as_ptr(),
+                    at - now,
+                    Some(update_module),
+                    user,
+                );
             }
         }
     }
 
-    /// The rotor goes where the field draws it.
+    /// Advances the rotor, if the coils carry current.
     pub(crate) fn follow(&mut self) {
         if self.holds_coils() {
             let slipped = self.motor.follow(self.now());
             self.turn(slipped);
         } else {
-            self.motor.rest();
+            self.motor.release();
         }
     }
 
     fn turn(&mut self, steps: i32) {
         if steps != 0 {
-            self.surroundings.turn(steps);
+            self.environment.turn(steps);
             self.refresh_inputs();
         }
     }
 
-    /// Index sensor and emergency stop, where they are not what they should be: the chip's own
-    /// pull-ups write over them when they are switched on.
+    /// Sets the levels of index sensor and emergency stop where they differ: enabling the chip's
+    /// pull-ups overwrites them.
     #[expect(unsafe_code, reason = "simavr is C")]
     pub(crate) fn refresh_inputs(&mut self) {
-        let from_index = self.surroundings.steps_from_index().rem_euclid(self.steps_per_revolution);
+        let from_index = self.environment.steps_from_index().rem_euclid(self.steps_per_revolution);
         let levels =
             [(self.index_pin, from_index >= INDEX_WIDTH), (self.emergency_pin, self.emergency)];
         for (bit, (pin, level)) in levels.into_iter().enumerate() {
             if (self.data()[PINC] >> bit & 1 != 0) != level {
-                // There and back, because after a reset simavr's pin and its register differ, and
-                // it passes on only what changes the pin.
+                // Toggles twice, because after a reset simavr's pin and its register differ, and it
+                // forwards only changes of the pin.
                 // SAFETY: a pin of the chip.
                 unsafe {
                     sys::avr_raise_irq(pin, (!level).into());
@@ -158,11 +165,12 @@ impl Rig {
 }
 
 /// # Safety
-/// `user` is the rig, and nobody else holds it: simavr calls one handler at a time, from within
-/// `avr_run` or from a method of the emulator that is done with its borrow.
+///
+/// `user` must be the rig, and not referenced elsewhere: simavr calls one handler at a time, from
+/// within `avr_run` or from a method of the emulator that has ended its borrow.
 #[expect(unsafe_code, reason = "simavr is C")]
 unsafe fn rig<'a>(user: *mut c_void) -> &'a mut Rig {
-    // SAFETY: as the caller promises.
+    // SAFETY: guaranteed by the caller.
     unsafe { &mut *user.cast::<Rig>() }
 }
 
@@ -187,13 +195,13 @@ on_pin!(on_binh, |rig, high| {
     if high {
         let now = rig.now();
         rig.module.end_blanking(now);
-        rig.show_echo();
+        rig.update_echo_pin();
     }
 });
 on_pin!(on_blnk, |rig, high| {
     let now = rig.now();
     rig.module.blank(now, high);
-    rig.show_echo();
+    rig.update_echo_pin();
 });
 on_pin!(on_step, |rig, high| {
     if high {
@@ -215,17 +223,21 @@ pub(crate) unsafe extern "C" fn on_sent(_: *mut sys::avr_irq_t, value: u32, user
 }
 
 #[expect(unsafe_code, reason = "simavr is C")]
-pub(crate) unsafe extern "C" fn look(_: *mut sys::avr_t, when: u64, user: *mut c_void) -> u64 {
+pub(crate) unsafe extern "C" fn update_module(
+    _: *mut sys::avr_t,
+    when: u64,
+    user: *mut c_void,
+) -> u64 {
     // SAFETY: registered with the rig.
     let rig = unsafe { rig(user) };
-    rig.module.look(when);
+    rig.module.update(when);
     // SAFETY: a pin of the chip.
     unsafe { sys::avr_raise_irq(rig.echo_pin, (rig.module.echo() || rig.stuck_echo).into()) };
-    rig.module.next_look(when).unwrap_or(0)
+    rig.module.next_update(when).unwrap_or(0)
 }
 
 #[expect(unsafe_code, reason = "simavr is C")]
-pub(crate) unsafe extern "C" fn feed(_: *mut sys::avr_t, when: u64, user: *mut c_void) -> u64 {
+pub(crate) unsafe extern "C" fn send_byte(_: *mut sys::avr_t, when: u64, user: *mut c_void) -> u64 {
     // SAFETY: registered with the rig.
     let rig = unsafe { rig(user) };
     let Some(byte) = rig.to_chip.pop_front() else {
@@ -243,10 +255,10 @@ pub(crate) unsafe extern "C" fn heartbeat(_: *mut sys::avr_t, when: u64, user: *
     let rig = unsafe { rig(user) };
     rig.follow();
     rig.refresh_inputs();
-    rig.beat = when;
+    rig.last_heartbeat = when;
     when + HEARTBEAT
 }
 
-/// The caller does the pacing: a sleeping chip costs nothing.
+/// Does nothing on sleep: the caller does the pacing.
 #[expect(unsafe_code, reason = "simavr is C")]
-pub(crate) unsafe extern "C" fn keep_on(_: *mut sys::avr_t, _: u64) {}
+pub(crate) unsafe extern "C" fn on_sleep(_: *mut sys::avr_t, _: u64) {}

@@ -1,4 +1,4 @@
-//! Plays the firmware on a pty, at the pace of the wall clock.
+//! Runs the emulator on a pty in real time.
 
 use std::{
     error::Error,
@@ -11,13 +11,14 @@ use sonard_device::link::Pty;
 
 use crate::{CYCLES_PER_US, Emulator};
 
-/// How much device time passes between two looks at the pty.
+/// Device time between two polls of the pty.
 const SLICE: Duration = Duration::from_micros(500);
 
-/// Plays until `stop` is set, and hands the emulator to `each` after every slice of time.
+/// Runs the emulator until `stop` is set, and calls `each` after every slice of time.
 ///
 /// # Errors
-/// When the firmware crashes or the pty fails.
+///
+/// Returns an error if the firmware crashes or the pty fails.
 pub fn serve(
     emulator: &mut Emulator,
     pty: &Pty,
@@ -35,7 +36,7 @@ pub fn serve(
             Err(error) if error.kind() == io::ErrorKind::WouldBlock => {}
             Err(error) => return Err(error.into()),
         }
-        speak(pty, &emulator.received())?;
+        transmit(pty, &emulator.received())?;
         let device = Duration::from_micros(emulator.now_us()) - began;
         let ahead = device.saturating_sub(started.elapsed());
         if !ahead.is_zero() {
@@ -46,8 +47,8 @@ pub fn serve(
     Ok(())
 }
 
-/// A serial line loses what nobody reads; so does a full pty.
-fn speak(pty: &Pty, bytes: &[u8]) -> io::Result<()> {
+/// Writes to the pty; drops the bytes if it is full, like a serial line without a reader.
+fn transmit(pty: &Pty, bytes: &[u8]) -> io::Result<()> {
     if bytes.is_empty() {
         return Ok(());
     }

@@ -1,19 +1,19 @@
-//! The device machine: decides everything the device does, and does nothing itself.
+//! Device state machine: makes every decision of the device and performs no I/O.
 //!
-//! A board (or a mock) feeds it bytes, the time in ticks of 0.5 us and what its motor and ranger
-//! report, and carries out what it asks for:
+//! A board (or a mock) passes it received bytes, the time in ticks of 0.5 us and the events of
+//! motor and ranger, and carries out the requested actions:
 //!
 //! ```text
 //! loop {
-//!     handle_* with whatever happened, and the time;
+//!     handle_* for each event, with the time;
 //!     while let Some(action) = poll_action()  { carry it out }
-//!     write poll_transmit() to the line, as far as it takes bytes;
-//!     sleep until something happens or poll_timeout(), then handle_timeout;
+//!     write poll_transmit() to the line, as far as there is room;
+//!     sleep until the next event or poll_timeout(), then handle_timeout;
 //! }
 //! ```
 //!
-//! The clock has 32 bits and wraps. A timeout that comes early or twice does no harm. Nothing
-//! here allocates, panics or waits.
+//! The clock has 32 bits and wraps. A timeout that comes early or twice is harmless. The machine
+//! does not allocate, panic or wait.
 
 mod actions;
 mod board;
@@ -31,48 +31,49 @@ pub use timers::DeviceTimer;
 
 use crate::frame::{FrameDecoder, LinkCounters, RawFrame, Received, count};
 use crate::messages::{FaultKind, NakReason, Request, Settings, Sweep, SweepState, Wire as _};
-use actions::Pending;
-use ring::Ring;
+use actions::PendingActions;
+use ring::ReadingRing;
 use timers::Timers;
 use transmit::Outbox;
 
-/// The device's half of the protocol. See the [module](self) for how to drive it.
+/// Device side of the protocol. See the [module](self) for how to drive it.
 #[derive(Debug, Clone)]
 pub struct Device {
     board: Board,
     now: u32,
     decoder: FrameDecoder,
     counters: LinkCounters,
-    last: Option<Accepted>,
+    last: Option<AcceptedRequest>,
     settings: Option<Settings>,
-    /// Where the motor stands, or stood before the present move. Steps.
+    /// Position of the motor, or its position before the current move. Steps from home.
     step: i32,
     homed: bool,
-    /// The motor was turned, or held for Home, since its coils were let go.
+    /// The coils may carry current: set by motion or Home, cleared by a release.
     holds_coils: bool,
     fault: Option<FaultKind>,
     phase: Phase,
-    /// Number of the request that `phase` serves.
+    /// Number of the request served by `phase`.
     phase_seq: u16,
-    run: Run,
-    ring: Ring,
+    run: SweepRun,
+    ring: ReadingRing,
     timers: Timers,
-    pending: Pending,
+    pending: PendingActions,
     outbox: Outbox,
 }
 
-/// The last numbered request, and what was answered.
+/// Last numbered request, and the reply to it.
 #[derive(Debug, Clone, Copy)]
-struct Accepted {
+struct AcceptedRequest {
     seq: u16,
     crc: u32,
-    /// `None` while it runs, and for questions, which are simply answered anew.
-    answer: Option<Answer>,
+    /// `None` while the request is in progress, and for queries, which are evaluated again when
+    /// repeated.
+    answer: Option<CompactReply>,
 }
 
-/// A reply, as small as possible: it is encoded when it is sent.
+/// Reply in compact form; encoded when it is sent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Answer {
+enum CompactReply {
     Identity,
     Ack,
     Nak(NakReason),
@@ -80,7 +81,7 @@ enum Answer {
     Homed {
         drift_steps: i32,
     },
-    /// The one reading in the ring.
+    /// The only reading in the ring.
     Ping,
     Alive {
         ticks: u32,
@@ -88,45 +89,45 @@ enum Answer {
     Status {
         ticks: u32,
     },
-    /// Unasked: the reading of a beam.
+    /// Event: the reading of a beam.
     Beam(u16),
-    /// Unasked.
+    /// Event: the device stopped by itself.
     Fault(FaultKind),
-    /// Unasked.
+    /// Event: the sweep ended.
     SweepDone,
 }
 
-/// What the device is doing.
+/// Current operation of the device.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Phase {
     Idle,
     Homing,
-    /// A MoveTo.
+    /// Serving a MoveTo.
     Moving {
         target: i32,
     },
-    /// A Stop, until the motor stands.
+    /// Serving a Stop, until the motor is at rest.
     Stopping,
-    /// A Ping or a Sweep.
-    Beam(Beam),
+    /// Serving a Ping or a Sweep.
+    Beam(BeamPhase),
 }
 
-/// Where the present beam is.
+/// Progress of the current beam.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Beam {
-    /// Turning to its position.
+enum BeamPhase {
+    /// Moving to the beam's position.
     Moving { target: i32 },
-    /// For the motor to rest, for the interval to pass, or for room in the ring.
+    /// Waiting for settling time, interval or room in the ring.
     Waiting,
-    /// Fired.
+    /// Fired; the listening window is open.
     Listening,
 }
 
-/// The latest Sweep or Ping. A Ping is a sweep with number 0 and one beam that does not move.
+/// Latest Sweep or Ping. A Ping is a sweep with number 0 and a single beam at the present position.
 #[derive(Debug, Clone, Copy)]
-struct Run {
+struct SweepRun {
     plan: Sweep,
-    /// Number of the request it came with.
+    /// Number of the request that started the run.
     seq: u16,
     beams: u16,
     fired: u16,
@@ -134,7 +135,7 @@ struct Run {
 }
 
 impl Device {
-    /// A device that has just booted. It announces itself with an Identity.
+    /// Creates a device that has just booted. Its first transmission is an Identity.
     #[must_use]
     pub fn new(board: Board) -> Self {
         let board = Board { boot: board.boot.max(1), ..board };
@@ -151,18 +152,18 @@ impl Device {
             fault: None,
             phase: Phase::Idle,
             phase_seq: 0,
-            run: Run::none(),
-            ring: Ring::new(),
+            run: SweepRun::none(),
+            ring: ReadingRing::new(),
             timers: Timers::default(),
-            pending: Pending::default(),
+            pending: PendingActions::default(),
             outbox: Outbox::new(),
         }
     }
 
-    /// A byte came from the host.
+    /// Processes a byte received from the host.
     pub fn handle_byte(&mut self, now: u32, byte: u8) {
         self.now = now;
-        if self.pending.has(Pending::RESET) {
+        if self.pending.has(PendingActions::RESET) {
             return;
         }
         match self.decoder.push(byte) {
@@ -177,51 +178,53 @@ impl Device {
         }
     }
 
-    /// Bytes came from the host.
+    /// Processes bytes received from the host.
     pub fn handle_bytes(&mut self, now: u32, bytes: &[u8]) {
         for &byte in bytes {
             self.handle_byte(now, byte);
         }
     }
 
-    /// The UART reported an error (framing, overrun): what is being received is dropped.
+    /// Discards the frame being received, after an error reported by the UART (framing, overrun).
     pub fn handle_line_error(&mut self, now: u32) {
         self.now = now;
-        self.decoder.damage();
+        self.decoder.discard_frame();
     }
 
-    /// The motor stands at `step`, after [`Action::Move`] or [`Action::StopMotion`].
+    /// Reports that the motor is at rest at `step`, after [`Action::Move`] or
+    /// [`Action::StopMotion`].
     pub fn handle_moved(&mut self, now: u32, step: i32) {
         self.now = now;
-        self.motor_stands(step);
+        self.motor_stopped(step);
     }
 
-    /// Homing ended. The value is where the index was found against where it was expected, in
-    /// steps: 0 the first time and on a board without an index sensor.
+    /// Reports the end of homing. The value is the actual minus the expected position of the index,
+    /// in steps: 0 the first time and on a board without an index sensor.
     pub fn handle_homed(&mut self, now: u32, outcome: Result<i32, HomeError>) {
         self.now = now;
         self.homing_ended(outcome);
     }
 
-    /// The listening window of [`Action::Fire`] is over, or the module could not be fired.
+    /// Reports the end of the listening window of [`Action::Fire`], or that the module could not be
+    /// fired.
     pub fn handle_echoes(&mut self, now: u32, report: &EchoReport) {
         self.now = now;
-        self.beam_heard(report);
+        self.beam_measured(report);
     }
 
-    /// The emergency stop was pressed.
+    /// Reports that the emergency stop was pressed.
     pub fn handle_emergency_stop(&mut self, now: u32) {
         self.now = now;
         self.halt(FaultKind::EmergencyStop);
     }
 
-    /// The board found that the motor does not follow.
+    /// Reports that the motor does not follow its commands.
     pub fn handle_motion_fault(&mut self, now: u32) {
         self.now = now;
         self.halt(FaultKind::MotionFault);
     }
 
-    /// Time has passed. Call at [`Device::poll_timeout`], or at any other time.
+    /// Advances the time. Call at [`Device::poll_timeout`]; further calls are harmless.
     pub fn handle_timeout(&mut self, now: u32) {
         self.now = now;
         timers::expire(&mut self.timers.settle, now);
@@ -235,20 +238,21 @@ impl Device {
         self.try_fire();
     }
 
-    /// The next timer, and when it ends on the device clock (ticks, wrapping).
+    /// Returns the timer that expires first, and its deadline on the device clock (ticks,
+    /// wrapping).
     #[must_use]
     pub fn poll_timeout(&self) -> Option<(DeviceTimer, u32)> {
         self.timers.earliest(self.now)
     }
 
-    /// When the running sweep's lease ends, ticks; `None` without one. For a simulation that must
-    /// not let time jump past the host's patience.
+    /// Deadline of the running sweep's lease, ticks; `None` without a sweep. A simulation uses it
+    /// to limit jumps of its clock to what the host's timeouts allow.
     #[must_use]
     pub const fn lease_ends(&self) -> Option<u32> {
         self.timers.lease
     }
 
-    /// What is to be done now. Call until `None`.
+    /// Returns the next action to carry out. Call until `None`.
     pub fn poll_action(&mut self) -> Option<Action> {
         self.next_action()
     }
@@ -264,12 +268,12 @@ impl Device {
         written
     }
 
-    /// The next byte for the host, for a board that sends them one by one.
+    /// Returns the next byte for the host, for a board that sends bytes individually.
     pub fn poll_byte(&mut self) -> Option<u8> {
         self.next_byte()
     }
 
-    /// What was dropped since boot.
+    /// Counts of frames dropped since boot.
     #[must_use]
     pub const fn counters(&self) -> &LinkCounters {
         &self.counters

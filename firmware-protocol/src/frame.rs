@@ -1,7 +1,7 @@
 //! Frames: `COBS(header, body, CRC-32) 0x00`, in both directions.
 //!
-//! At most [`PAYLOAD_MAX`] bytes before stuffing, so a frame is one COBS block and stuffing
-//! costs exactly one byte. The CRC is the one of zlib, little-endian, over header and body.
+//! A frame has at most [`PAYLOAD_MAX`] bytes before stuffing, so it is a single COBS block and
+//! stuffing costs exactly one byte. The CRC is that of zlib, little-endian, over header and body.
 
 mod decoder;
 mod encoder;
@@ -12,35 +12,36 @@ pub use encoder::{Frame, TooLong};
 
 use crc::{CRC_32_ISO_HDLC, Crc, NoTable};
 
-/// Bytes of a frame before stuffing, at most: header, body and CRC.
+/// Maximum number of bytes of a frame before stuffing: header, body and CRC.
 pub const PAYLOAD_MAX: usize = 64;
-/// Bytes of the header: boot nonce and sequence number, both `u16` little-endian.
+/// Length of the header in bytes: boot nonce and sequence number, both `u16` little-endian.
 pub const HEADER_LEN: usize = 4;
-/// Bytes of the CRC at the end.
+/// Length of the trailing CRC in bytes.
 pub const CRC_LEN: usize = 4;
-/// Bytes of the encoded message, at most.
+/// Maximum number of bytes of an encoded message.
 pub const BODY_MAX: usize = PAYLOAD_MAX - HEADER_LEN - CRC_LEN;
-/// Bytes of a frame on the wire, at most: the code byte, the payload, the delimiter.
+/// Maximum number of bytes of a frame on the wire: code byte, payload and delimiter.
 pub const FRAME_MAX: usize = PAYLOAD_MAX + 2;
-/// The byte between frames. It never occurs inside one.
+/// Byte that separates frames and never occurs inside one.
 pub const DELIMITER: u8 = 0;
 
-/// The header of every message, in both directions. Its layout is frozen.
+/// Header of every message, in both directions. The layout is frozen.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Header {
-    /// The device's boot nonce, or [`Header::BOOT_UNKNOWN`] from a host that has not met the device.
+    /// Boot nonce of the device, or [`Header::BOOT_UNKNOWN`] from a host that has not identified
+    /// the device.
     pub boot: u16,
-    /// The request's number; a reply repeats the number of its request, an event that of the
-    /// operation it belongs to (or 0).
+    /// Number of the request. A reply repeats the number of its request; an event carries that of
+    /// the operation it belongs to, or 0.
     pub seq: u16,
 }
 
 impl Header {
-    /// The boot nonce of a host that does not know the device's.
+    /// Boot nonce sent by a host that does not know the device's nonce.
     pub const BOOT_UNKNOWN: u16 = 0;
 }
 
-/// CRC-32 as zlib computes it. Bit by bit: a table would cost a microcontroller 1 KB of RAM.
+/// Computes the CRC-32 of zlib, bit by bit: a table would cost a microcontroller 1 KB of RAM.
 #[must_use]
 pub fn crc32(bytes: &[u8]) -> u32 {
     Crc::<u32, NoTable>::new(&CRC_32_ISO_HDLC).checksum(bytes)

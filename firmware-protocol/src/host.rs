@@ -1,20 +1,21 @@
-//! The host machine: the one owner of waiting and retrying.
+//! Host state machine: the only owner of waiting and retrying.
 //!
-//! It is told what to do ([`Host::start`]), fed with bytes and the time in us of any clock that
-//! does not jump, and says what to send and what came of it:
+//! The caller starts commands with [`Host::start`] and passes received bytes and the time in us of
+//! any monotonic clock. The machine returns frames to send and events:
 //!
 //! ```text
 //! loop {
-//!     start / handle_* with whatever happened, and the time;
+//!     start / handle_* for each event, with the time;
 //!     while let Some(frame) = poll_transmit() { write it, at once }
 //!     while let Some(event) = poll_event()    { act on it }
 //!     wait for bytes until poll_timeout(), then handle_timeout;
 //! }
 //! ```
 //!
-//! A timeout that comes early or twice does no harm. Before [`HostEvent::Failed`] a device that
-//! still answers and may be at work is stopped; after it the host does nothing more by itself: one
-//! that does not answer is ended by the sweep's lease.
+//! A timeout that comes early or twice is harmless. If a command fails while the device still
+//! replies and may be active, the host first sends Stop and then reports [`HostEvent::Failed`].
+//! After that event the host sends nothing by itself. A device that does not reply is stopped by
+//! the lease of its sweep.
 
 mod board;
 mod config;
@@ -23,49 +24,50 @@ mod event;
 mod exchange;
 mod firings;
 mod receive;
-mod sense;
 mod stats;
 mod sweep;
 mod track;
+mod validate;
 
 pub use board::{BoardChange, Serial};
 pub use config::{
-    ACKNOWLEDGEMENTS_A_RING, ATTEMPTS, Command, HostConfig, INITIAL_MARGIN_US, KEEP_ALIVES_A_LEASE,
-    MAX_MARGIN_US, MIN_MARGIN_US, OVERRUNS, READINGS_AHEAD, SEQ_GAP_MAX, STOP_ATTEMPTS, StartError,
+    ACKNOWLEDGEMENTS_PER_RING, ATTEMPTS, Command, HostConfig, INITIAL_MARGIN_US,
+    KEEP_ALIVES_PER_LEASE, MAX_MARGIN_US, MIN_MARGIN_US, OVERRUNS, READINGS_AHEAD, SEQ_GAP_MAX,
+    STOP_ATTEMPTS, StartError,
 };
 pub use event::{HostError, HostEvent, Outcome};
-pub use sense::{IdentityFault, ReadingFault, ReplyFault};
 pub use stats::LinkStats;
+pub use validate::{IdentityFault, ReadingFault, ReplyFault};
 
 use heapless::Deque;
 
 use crate::frame::{Frame, FrameDecoder, Received};
 use crate::messages::{Identity, Reply, Request, Settings};
 use deadline::Margin;
-use exchange::{Exchange, Numbers};
+use exchange::{Numbers, OpenRequest};
 use firings::DeviceTime;
 use track::Track;
 
-/// Events kept until they are polled. Readings that find no place count as lost on the line, and
-/// are sent again.
+/// Capacity of the event queue. Readings that do not fit count as lost on the line and are
+/// requested again.
 const EVENTS: usize = 64;
-/// Places that readings leave free for events that come once.
+/// Places reserved for events that are reported only once.
 const EVENTS_RESERVED: usize = 16;
 
-/// Everything the host may wait for.
+/// Timers of the host.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum HostTimer {
-    /// The reply to a request; then it is sent again.
+    /// Waiting for the reply to a request; the request is then repeated.
     Reply,
-    /// The end of something long that the device has begun; then it is asked again.
+    /// Waiting for the final reply after Started; the request is then repeated.
     Completion,
-    /// The next sign of life during a sweep, well within its lease.
+    /// Next KeepAlive of a sweep, well within its lease.
     KeepAlive,
-    /// The next reading of a sweep; then the device is asked where it is.
+    /// Waiting for the next reading of a sweep; KeepAlive then queries the progress.
     Progress,
 }
 
-/// The host's half of the protocol. See the [module](self) for how to drive it.
+/// Host side of the protocol. See the [module](self) for how to drive it.
 #[derive(Debug, Clone)]
 pub struct Host {
     config: HostConfig,
@@ -75,31 +77,31 @@ pub struct Host {
     margin: Margin,
     numbers: Numbers,
     identity: Option<Identity>,
-    /// Survives a hangup, so that a restart meanwhile is noticed.
+    /// Boot nonce of the device. Kept after a hangup to detect a restart in the meantime.
     boot: Option<u16>,
-    /// The boot before: its frames are late copies.
+    /// Preceding boot nonce, whose frames are late copies.
     previous_boot: Option<u16>,
-    /// Who was met last. Survives hangup and restart, so that another board is noticed.
-    met: Option<Identity>,
-    /// What the device was last set to.
+    /// Last identified device. Kept after hangup and restart to detect a different board.
+    last_identity: Option<Identity>,
+    /// Current settings of the device.
     settings: Option<Settings>,
-    /// Where the ranger points, as far as known.
+    /// Position of the motor, if known.
     step: Option<i32>,
     job: Option<Command>,
-    exchange: Option<Exchange>,
+    exchange: Option<OpenRequest>,
     outgoing: Option<Frame>,
     track: Option<Track>,
-    /// Bytes and right frames received when the job began.
+    /// Bytes and valid frames received before the start of the command.
     received_before: (u64, u64),
-    /// When the last right frame came.
-    heard_us: Option<u64>,
-    /// Why the command fails as soon as the device has been stopped.
+    /// Time of the last valid frame.
+    last_frame_us: Option<u64>,
+    /// Error to report once the device has been stopped.
     giving_up: Option<HostError>,
     device_time: DeviceTime,
 }
 
 impl Host {
-    /// A host that knows no device yet.
+    /// Creates a host without an identified device.
     #[must_use]
     pub fn new(config: HostConfig) -> Self {
         Self {
@@ -111,7 +113,7 @@ impl Host {
             identity: None,
             boot: None,
             previous_boot: None,
-            met: None,
+            last_identity: None,
             settings: None,
             step: None,
             job: None,
@@ -119,18 +121,18 @@ impl Host {
             outgoing: None,
             track: None,
             received_before: (0, 0),
-            heard_us: None,
+            last_frame_us: None,
             giving_up: None,
             device_time: DeviceTime::default(),
             config,
         }
     }
 
-    /// Begins a command. Its end is an event.
+    /// Starts a command. Its end is reported as an event.
     ///
     /// # Errors
     ///
-    /// [`StartError`] if it cannot begin now; nothing was changed then.
+    /// [`StartError`] if the command cannot start now; the state is then unchanged.
     pub fn start(&mut self, now_us: u64, command: Command) -> Result<(), StartError> {
         self.check_start(&command)?;
         if let Command::Sweep(plan) = command {
@@ -166,9 +168,13 @@ impl Host {
             return Ok(());
         }
         if self.identity.is_none() {
-            // After a hangup or a restart it was met, and has to be met again.
-            let met = self.met.is_some();
-            return Err(if met { StartError::Restarted } else { StartError::NotIdentified });
+            // Identified before, then invalidated by a hangup or a restart.
+            let was_identified = self.last_identity.is_some();
+            return Err(if was_identified {
+                StartError::Restarted
+            } else {
+                StartError::NotIdentified
+            });
         }
         let needs_settings =
             !matches!(command, Command::Configure(_) | Command::Status | Command::Reset);
@@ -178,7 +184,7 @@ impl Host {
         Ok(())
     }
 
-    /// Bytes came from the device.
+    /// Processes bytes received from the device.
     pub fn handle_bytes(&mut self, now_us: u64, bytes: &[u8]) {
         self.stats.bytes_received += bytes.len() as u64;
         for &byte in bytes {
@@ -196,7 +202,7 @@ impl Host {
             Received::Dropped(reason) => self.stats.dropped.count(reason),
             Received::Frame(raw) => {
                 self.stats.frames_received += 1;
-                self.heard_us = Some(now_us);
+                self.last_frame_us = Some(now_us);
                 let (header, wire_len) = (raw.header, raw.wire_len);
                 match Reply::decode(raw.body) {
                     Ok(Reply::Identity(identity)) => {
@@ -204,15 +210,15 @@ impl Host {
                     }
                     Ok(reply) => self.handle_reply(now_us, header, &reply, wire_len),
                     Err(_) => {
-                        let stranger = crate::messages::ProtocolId::peek(raw.body);
-                        self.handle_undecodable(stranger);
+                        let device_version = crate::messages::ProtocolId::peek(raw.body);
+                        self.handle_undecodable(device_version);
                     }
                 }
             }
         }
     }
 
-    /// Time has passed. Call at [`Host::poll_timeout`], or at any other time.
+    /// Advances the time. Call at [`Host::poll_timeout`]; further calls are harmless.
     pub fn handle_timeout(&mut self, now_us: u64) {
         if self.exchange.as_ref().is_some_and(|exchange| exchange.deadline_us <= now_us) {
             self.retry(now_us);
@@ -220,7 +226,8 @@ impl Host {
         self.continue_sweep(now_us);
     }
 
-    /// The line was closed: what is under way fails, and the device must be identified anew.
+    /// Reports that the line was closed: the command in progress fails, and the device must be
+    /// identified again.
     pub fn handle_hangup(&mut self, _now_us: u64) {
         self.decoder = FrameDecoder::new();
         self.identity = None;
@@ -230,7 +237,7 @@ impl Host {
         }
     }
 
-    /// The next timer, and when it ends (us).
+    /// Returns the next timer and its deadline, us.
     #[must_use]
     pub fn poll_timeout(&self) -> Option<(HostTimer, u64)> {
         if let Some(exchange) = &self.exchange {
@@ -245,7 +252,8 @@ impl Host {
         })
     }
 
-    /// The next frame to write to the line. It counts as sent at the time of the call before.
+    /// Returns the next frame to write to the line. It counts as sent at the time of the preceding
+    /// call.
     pub fn poll_transmit(&mut self) -> Option<Frame> {
         let frame = self.outgoing.take()?;
         self.stats.frames_sent += 1;
@@ -253,32 +261,32 @@ impl Host {
         Some(frame)
     }
 
-    /// The next thing to know.
+    /// Returns the next event.
     pub fn poll_event(&mut self) -> Option<HostEvent> {
         self.events.pop_front()
     }
 
-    /// Whether a command is under way.
+    /// Returns `true` while a command is in progress.
     #[must_use]
     pub const fn is_busy(&self) -> bool {
         self.job.is_some()
     }
 
-    /// The device, once identified and until hangup or restart.
+    /// Identity of the device; `None` before Identify and after a hangup or restart.
     #[must_use]
     pub const fn identity(&self) -> Option<&Identity> {
         self.identity.as_ref()
     }
 
-    /// Numbers about the link.
+    /// Statistics of the link.
     #[must_use]
     pub const fn stats(&self) -> &LinkStats {
         &self.stats
     }
 
-    /// Reports something that must not be lost; places are reserved for it.
+    /// Queues an event that must not be lost; places are reserved for these.
     fn report(&mut self, event: HostEvent) {
-        // Cannot fail while the caller polls events at all: there is one command at a time.
+        // Cannot fail while the caller polls events: a single command is in progress at a time.
         let _ = self.events.push_back(event);
     }
 
@@ -292,7 +300,7 @@ impl Host {
     }
 
     fn fail(&mut self, error: HostError) {
-        // Whatever became of the Stop, the command fails for its own cause.
+        // Regardless of the outcome of the Stop, the command fails for its original cause.
         let error = self.giving_up.take().unwrap_or(error);
         self.end_job();
         self.report(HostEvent::Failed(error));

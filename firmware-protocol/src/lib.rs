@@ -1,17 +1,18 @@
-//! The wire protocol of the sonard ranger, and the state machines of both its ends.
+//! Wire protocol of the sonard ranger, and the state machines of both of its ends.
 //!
-//! Bytes from the line go through a [`frame::FrameDecoder`], which finds frames whose CRC is
-//! right; a body is a [`messages::Request`] or a [`messages::Reply`]; the machines act on them:
+//! [`frame::FrameDecoder`] extracts frames with a valid CRC from the byte stream of the line. A
+//! frame body is a [`messages::Request`] or a [`messages::Reply`]. Two state machines act on them:
 //!
-//! - [`device::Device`] decides everything that a device does. The firmware, the emulator and
-//!   the mock differ only in who carries out its actions and who tells it the time.
+//! - [`device::Device`] makes every decision of the device. The firmware, the emulator and the mock
+//!   differ only in how they carry out its actions and where they take the time from.
 //! - [`host::Host`] turns one command at a time into requests, repeats them, repairs sweeps and
-//!   reports what came of it. It alone waits and retries.
+//!   reports results. Only the host waits and retries.
 //!
-//! Neither reads a clock, touches a line, allocates or uses floating point, so two of them can
-//! be joined in virtual time, where an hour of bad line takes milliseconds.
+//! Neither machine reads a clock, touches a line, allocates or uses floating point. A test can
+//! therefore join the two in virtual time, where an hour on a bad line takes milliseconds.
 //!
-//! `PROTOCOL.md` beside this crate describes the bytes for writers of other clients.
+//! `PROTOCOL.md`, next to this crate's `Cargo.toml`, specifies the bytes for authors of other
+//! clients.
 #![no_std]
 
 #[cfg(feature = "conformance")]

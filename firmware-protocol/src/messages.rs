@@ -1,7 +1,7 @@
-//! Every message of the protocol, in one table each way.
+//! Message tables of the protocol, one for each direction.
 //!
-//! Bodies are postcard encodings: the code of the variant, then the fields in order, with
-//! `u16`, `u32` as varints and `i16`, `i32` as zigzag varints. `PROTOCOL.md` spells it out.
+//! Bodies are postcard encodings: the code of the variant, then the fields in order, with `u16`,
+//! `u32` as varints and `i16`, `i32` as zigzag varints. `PROTOCOL.md` specifies the details.
 
 mod codes;
 mod echoes;
@@ -21,106 +21,107 @@ pub use wire::{Reader, Wire, Writer};
 
 use table::wire_enum;
 
-/// Version of the protocol: counts up with every change that is not only an addition.
+/// Version of the protocol, incremented with every incompatible change.
 pub const PROTOCOL_VERSION: u8 = 1;
 
-/// The protocol this crate speaks.
+/// Protocol version and schema implemented by this crate.
 pub const PROTOCOL: ProtocolId = ProtocolId { version: PROTOCOL_VERSION, schema: SCHEMA_HASH };
 
-/// Hash of all names, codes, fields and types below: two builds with the same hash encode alike.
+/// Hash of all names, codes, fields and types below. Two builds with equal hashes use the same
+/// encoding.
 pub const SCHEMA_HASH: u32 = schema_hash();
 
 wire_enum! {
-    /// Host to device.
+    /// Message from the host to the device.
     ///
-    /// [`Identify`](Self::Identify), [`Stop`](Self::Stop) and [`Reset`](Self::Reset) keep code
-    /// and form for ever, whatever the version.
+    /// [`Identify`](Self::Identify), [`Stop`](Self::Stop) and [`Reset`](Self::Reset) keep code and
+    /// form in every version.
     pub enum Request {
-        /// Who are you? Always answered, never numbered.
+        /// Requests the [`Identity`]. Always answered, never numbered.
         0 Identify,
-        /// Stop motion and firing; the position is kept.
+        /// Stops motion and firing; the position is kept.
         1 Stop,
-        /// Restart the device.
+        /// Restarts the device; position and settings are lost.
         2 Reset,
-        /// Settings for motion and ranging; needed after each boot.
+        /// Sets motion and ranging parameters; required after each boot.
         3 Configure(Settings),
-        /// Find the index, or take the present position for zero.
+        /// Searches for the index, or defines the present position as zero.
         4 Home,
-        /// Turn to an absolute position.
+        /// Moves to an absolute position.
         5 MoveTo {
-            /// Steps from home.
+            /// Target position, steps from home.
             step: i32,
         },
-        /// Fire once where the ranger points now.
+        /// Fires once in the present direction.
         6 Ping,
-        /// Fire at each stop of a plan, without the host.
+        /// Fires at each stop of a plan, without further requests.
         7 Sweep(Sweep),
-        /// Send readings of a sweep again.
+        /// Requests readings of a sweep again.
         8 Resend {
-            /// Which sweep.
+            /// Number of the sweep.
             sweep: u16,
-            /// Lowest index the host lacks; everything below is acknowledged.
+            /// Lowest index that the host lacks; all lower beams are acknowledged.
             first: u16,
-            /// How many, from `first` on.
+            /// Number of readings, starting with `first`.
             count: u8,
         },
-        /// I am here, and I have everything below `next`.
+        /// Renews the lease and acknowledges all beams below `next`.
         9 KeepAlive {
-            /// Which sweep.
+            /// Number of the sweep.
             sweep: u16,
-            /// Lowest index the host lacks.
+            /// Lowest index that the host lacks.
             next: u16,
         },
-        /// What are you doing?
+        /// Requests the device [`Status`].
         10 Status,
     }
 }
 
 wire_enum! {
-    /// Device to host: replies, and events that nobody asked for.
+    /// Message from the device to the host: a reply, or an event sent without a request.
     ///
-    /// [`Identity`](Self::Identity) keeps its code and the fields of [`ProtocolId`] and
-    /// [`FirmwareVersion`] at its front for ever; [`Ack`](Self::Ack) keeps its code.
+    /// [`Identity`](Self::Identity) keeps its code and starts with the fields of [`ProtocolId`] and
+    /// [`FirmwareVersion`] in every version; [`Ack`](Self::Ack) keeps its code.
     pub enum Reply {
-        /// Answer to Identify, and announced once after each boot.
+        /// Reply to Identify, also sent once after each boot.
         0 Identity(Identity),
-        /// Done.
+        /// Request completed successfully.
         1 Ack,
-        /// Not done.
+        /// Request rejected or failed.
         2 Nak {
-            /// Why not.
+            /// Reason of the rejection.
             reason: NakReason,
         },
-        /// Accepted and under way; the final reply follows.
+        /// Request accepted and in progress; the final reply follows.
         3 Started,
         /// Final reply to Home.
         4 Homed {
-            /// Where the index was found against where it was expected, steps; 0 the first time.
+            /// Actual minus expected position of the index, steps; 0 the first time.
             drift_steps: i32,
         },
-        /// One firing: reply to Ping, or an event of a sweep.
+        /// Result of one firing: reply to Ping, or event of a sweep.
         5 Reading(Reading),
         /// Reply to KeepAlive, and to Resend after the readings.
         6 Alive(Alive),
-        /// A sweep ended and all its readings were sent.
+        /// End of a sweep, after all of its readings were sent.
         7 SweepDone(SweepDone),
         /// Reply to Status.
         8 StatusReport(Status),
-        /// The device stopped by itself; home again.
+        /// Fault that stopped the device; homing is required.
         9 Fault {
-            /// Why.
+            /// Cause of the stop.
             kind: FaultKind,
         },
     }
 }
 
-/// A body that is no message of this version.
+/// Error for a body that is not a message of this protocol version.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Undecodable;
 
 impl core::fmt::Display for Undecodable {
     fn fmt(&self, formatter: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        formatter.write_str("no message of this protocol version")
+        formatter.write_str("not a message of this protocol version")
     }
 }
 
@@ -131,12 +132,13 @@ impl Request {
     ///
     /// # Errors
     ///
-    /// [`Undecodable`] for an unknown code, a field out of its type's range, missing or further bytes.
+    /// [`Undecodable`] for an unknown code, a field out of its type's range, missing or excess
+    /// bytes.
     pub fn decode(body: &[u8]) -> Result<Self, Undecodable> {
         decode_exactly(body)
     }
 
-    /// Whether code and form are the same in every version.
+    /// Returns `true` if code and form are the same in every protocol version.
     #[must_use]
     pub const fn is_frozen(&self) -> bool {
         matches!(self, Self::Identify | Self::Stop | Self::Reset)
@@ -148,8 +150,8 @@ impl Reply {
     ///
     /// # Errors
     ///
-    /// [`Undecodable`] for an unknown code, a field out of its type's range, missing or further
-    /// bytes. An Identity of another version may still tell its version: [`ProtocolId::peek`].
+    /// [`Undecodable`] for an unknown code, a field out of its type's range, missing or excess
+    /// bytes. [`ProtocolId::peek`] may still decode the version in an Identity of another version.
     pub fn decode(body: &[u8]) -> Result<Self, Undecodable> {
         decode_exactly(body)
     }
@@ -161,7 +163,7 @@ fn decode_exactly<M: Wire>(body: &[u8]) -> Result<M, Undecodable> {
 }
 
 impl ProtocolId {
-    /// Reads the frozen front of an Identity of any version; `None` if `body` is none.
+    /// Decodes the frozen first fields of an Identity of any version; `None` if `body` is not one.
     #[must_use]
     pub fn peek(body: &[u8]) -> Option<(Self, FirmwareVersion)> {
         let mut input = Reader::new(body);
@@ -169,7 +171,7 @@ impl ProtocolId {
         let mut front = (Self::BLANK, FirmwareVersion::BLANK);
         front.0.read(&mut input);
         front.1.read(&mut input);
-        (code == 0 && input.is_right()).then_some(front)
+        (code == 0 && input.is_valid()).then_some(front)
     }
 }
 

@@ -1,5 +1,5 @@
-//! Both machines on a line without faults: nothing waits for the link, and single faults put
-//! in by hand have exactly the effect that the protocol says.
+//! Both machines on a line without faults: no beam waits for the link. Single injected faults have
+//! exactly the specified effect.
 
 mod world;
 
@@ -13,7 +13,7 @@ use world::settings;
 use world::sim::Sim;
 
 #[test]
-fn the_link_is_never_on_the_critical_path() {
+fn no_beam_waits_for_the_link() {
     let settings = settings();
     let mut sim = ready(settings);
     sim.idle(100_000).expect("no hang");
@@ -30,7 +30,7 @@ fn the_link_is_never_on_the_critical_path() {
     check_costs(&before, sim.host.stats());
 }
 
-/// 400 readings of up to three echoes, and few words from the host.
+/// Traffic of 400 readings with up to three echoes, and few requests from the host.
 fn check_costs(before: &LinkStats, after: &LinkStats) {
     let received = after.bytes_received - before.bytes_received;
     let sent = after.bytes_sent - before.bytes_sent;
@@ -43,7 +43,7 @@ fn check_costs(before: &LinkStats, after: &LinkStats) {
 }
 
 #[test]
-fn eight_echoes_and_short_windows_do_not_fill_the_ring() {
+fn ring_suffices_for_eight_echoes() {
     let settings = Settings { max_echoes: 8, window_ticks: 20_000, settle_ticks: 0, ..settings() };
     let mut sim = ready(settings);
     let events = sim.run(Command::Sweep(Sweep { stride: 0, ..plan(1, 200) })).expect("ends");
@@ -56,7 +56,7 @@ fn eight_echoes_and_short_windows_do_not_fill_the_ring() {
 }
 
 #[test]
-fn the_interval_between_firings_is_kept() {
+fn keeps_min_interval() {
     let settings = Settings { min_interval_ticks: 100_000, ..settings() };
     let mut sim = ready(settings);
     sim.run(Command::Sweep(plan(5, 3))).expect("ends");
@@ -69,7 +69,7 @@ fn the_interval_between_firings_is_kept() {
 }
 
 #[test]
-fn clock_samples_tell_the_device_clock() {
+fn clock_samples_are_accurate() {
     let mut sim = ready(settings());
     let events = sim.run(Command::Sweep(plan(100, 1))).expect("ends");
     let mut samples = 0;
@@ -86,7 +86,7 @@ fn clock_samples_tell_the_device_clock() {
 }
 
 #[test]
-fn a_closed_line_fails_at_once_and_the_device_is_met_again() {
+fn hangup_fails_then_identifies() {
     let mut sim = ready(settings());
     sim.start(Command::MoveTo { step: 300 });
     let now = sim.now_us();
@@ -100,14 +100,14 @@ fn a_closed_line_fails_at_once_and_the_device_is_met_again() {
 }
 
 #[test]
-fn a_dead_line_fails_without_an_answer() {
+fn dead_line_reports_no_answer() {
     let mut sim = Sim::new(3, BAUD, Faults { frame_lost_one_in: 1, ..Faults::default() });
     let events = sim.run(Command::Identify).expect("ends");
     assert_eq!(events, [HostEvent::Failed(HostError::NoAnswer { attempts: ATTEMPTS })]);
 }
 
 #[test]
-fn a_device_that_speaks_something_else_is_told_apart() {
+fn detects_foreign_device() {
     let mut sim = Sim::new(3, BAUD, Faults { frame_lost_one_in: 1, ..Faults::default() });
     sim.start(Command::Identify);
     let now = sim.now_us();
@@ -117,7 +117,7 @@ fn a_device_that_speaks_something_else_is_told_apart() {
     assert!(matches!(last, HostEvent::Failed(HostError::NotADevice { bytes: 41 })), "{last:?}");
 }
 
-/// Retries are idempotent: the same bytes, three times, execute once.
+/// Repetitions are idempotent: the same bytes, sent three times, are executed once.
 #[test]
 fn repeated_requests_execute_once() {
     let mut sim = ready(settings());
@@ -144,13 +144,13 @@ fn repeated_requests_execute_once() {
         }
     }
     let after = (sim.world.homings, sim.world.moves.len(), sim.world.firings.len());
-    // The sweep turns back from step 40, then to steps 1 and 2.
+    // The sweep moves back from step 40, then to steps 1 and 2.
     assert_eq!(after, (before.0 + 1, before.1 + 1 + 3, before.2 + 1 + 3));
 }
 
-/// An ATmega328P has 2 KB of RAM, and the firmware 1.2 KB of it for everything.
+/// An ATmega328P has 2 KB of RAM, of which the firmware uses 1.2 KB in total.
 #[test]
-fn the_device_machine_is_small() {
+fn device_fits_in_ram() {
     let size = size_of::<Device>();
     println!("Device: {size} bytes");
     assert!(size <= 600, "{size} bytes");

@@ -1,5 +1,4 @@
-//! `PROTOCOL.md` must say what the code does: its tables, limits and examples are read here
-//! and compared.
+//! Comparison of the tables, limits and examples in `PROTOCOL.md` with the code.
 
 mod samples;
 
@@ -14,7 +13,7 @@ use firmware_protocol::messages::{
 
 const DOCUMENT: &str = include_str!("../PROTOCOL.md");
 
-/// The rows of the table that follows the line `title`, as trimmed cells.
+/// Returns the rows of the table after the line `title`, as trimmed cells.
 fn table(title: &str) -> Vec<Vec<&'static str>> {
     let mut lines = DOCUMENT.lines().skip_while(|line| *line != title);
     assert!(lines.next().is_some(), "no table {title}");
@@ -54,14 +53,14 @@ fn check_variants(title: &str, variants: &[Variant], with_fields: bool) {
 }
 
 #[test]
-fn messages_are_as_documented() {
+fn messages_match() {
     check_variants("### Requests", Request::VARIANTS, true);
     check_variants("### Replies", Reply::VARIANTS, true);
     check_variants("Blanking", Blanking::VARIANTS, true);
 }
 
 #[test]
-fn codes_are_as_documented() {
+fn codes_match() {
     check_variants("ReadingStatus", ReadingStatus::VARIANTS, false);
     check_variants("SweepState", SweepState::VARIANTS, false);
     check_variants("DeviceState", DeviceState::VARIANTS, false);
@@ -71,7 +70,7 @@ fn codes_are_as_documented() {
 }
 
 #[test]
-fn records_are_as_documented() {
+fn records_match() {
     for (title, fields) in [
         ("ProtocolId", ProtocolId::FIELDS),
         ("FirmwareVersion", FirmwareVersion::FIELDS),
@@ -92,7 +91,7 @@ fn records_are_as_documented() {
 }
 
 #[test]
-fn capabilities_are_as_documented() {
+fn capabilities_match() {
     let documented: Vec<_> = table("### Capabilities")
         .iter()
         .map(|row| (row[0].parse::<u16>().expect("a number"), row[1]))
@@ -102,7 +101,7 @@ fn capabilities_are_as_documented() {
 }
 
 #[test]
-fn limits_are_as_documented() {
+fn limits_match() {
     let coded = [
         ("TICK_HZ", i64::from(limits::TICK_HZ)),
         ("POSITION_MAX", i64::from(limits::POSITION_MAX)),
@@ -130,15 +129,14 @@ fn limits_are_as_documented() {
 }
 
 #[test]
-fn timers_are_as_documented() {
+fn timers_match() {
     let device =
         [DeviceTimer::Settle, DeviceTimer::MinInterval, DeviceTimer::Lease, DeviceTimer::Hold];
-    let of_host =
-        [HostTimer::Reply, HostTimer::Completion, HostTimer::KeepAlive, HostTimer::Progress];
+    let host = [HostTimer::Reply, HostTimer::Completion, HostTimer::KeepAlive, HostTimer::Progress];
     let coded: Vec<_> = device
         .iter()
         .map(|timer| (format!("{timer:?}"), "device"))
-        .chain(of_host.iter().map(|timer| (format!("{timer:?}"), "host")))
+        .chain(host.iter().map(|timer| (format!("{timer:?}"), "host")))
         .collect();
     let documented: Vec<_> =
         table("## Timers").iter().map(|row| (row[0].to_string(), row[1])).collect();
@@ -146,7 +144,7 @@ fn timers_are_as_documented() {
 }
 
 #[test]
-fn timer_constants_are_as_documented() {
+fn timer_constants_match() {
     let coded = [
         ("ATTEMPTS", u32::from(host::ATTEMPTS)),
         ("OVERRUNS", u32::from(host::OVERRUNS)),
@@ -154,8 +152,8 @@ fn timer_constants_are_as_documented() {
         ("INITIAL_MARGIN_US", host::INITIAL_MARGIN_US),
         ("MIN_MARGIN_US", host::MIN_MARGIN_US),
         ("MAX_MARGIN_US", host::MAX_MARGIN_US),
-        ("KEEP_ALIVES_A_LEASE", u32::from(host::KEEP_ALIVES_A_LEASE)),
-        ("ACKNOWLEDGEMENTS_A_RING", u32::from(host::ACKNOWLEDGEMENTS_A_RING)),
+        ("KEEP_ALIVES_PER_LEASE", u32::from(host::KEEP_ALIVES_PER_LEASE)),
+        ("ACKNOWLEDGEMENTS_PER_RING", u32::from(host::ACKNOWLEDGEMENTS_PER_RING)),
         ("READINGS_AHEAD", u32::from(host::READINGS_AHEAD)),
         ("SEQ_GAP_MAX", u32::from(host::SEQ_GAP_MAX)),
     ];
@@ -166,9 +164,9 @@ fn timer_constants_are_as_documented() {
     assert_eq!(documented, coded);
 }
 
-/// Each name of a fault is one of the code's, and the other way round: a new one needs its row.
+/// Every fault in the code has a row in the document, and every row a fault in the code.
 #[test]
-fn what_a_host_refuses_is_as_documented() {
+fn faults_match() {
     let names = |title| table(title).iter().map(|row| row[0].to_owned()).collect::<Vec<_>>();
     let name = |fault: &dyn core::fmt::Debug| {
         format!("{fault:?}").split([' ', '{']).next().expect("a name").to_owned()
@@ -184,7 +182,7 @@ fn what_a_host_refuses_is_as_documented() {
     let reading = [
         ReadingFault::EchoMissing,
         ReadingFault::EchoUnexpected { echoes: 1 },
-        ReadingFault::TooManyEchoes { echoes: 1, asked: 0 },
+        ReadingFault::TooManyEchoes { echoes: 1, requested: 0 },
         ReadingFault::EchoAfterWindow { ticks: 1, window: 0 },
         ReadingFault::EchoesOutOfOrder,
         ReadingFault::FiredTooEarly { ticks: 1 },
@@ -197,23 +195,23 @@ fn what_a_host_refuses_is_as_documented() {
     ];
     let coded: Vec<_> = identity.iter().map(|fault| name(fault)).collect();
     assert_eq!(names("An Identity (the device is not used):"), coded);
-    let title = "A reading (in a sweep the beam counts as lost, is not asked for again, and the \
-                 sweep goes on; a Ping fails):";
+    let title = "A reading (in a sweep the beam counts as lost, is not requested again, and the \
+                 sweep continues; a Ping fails):";
     let coded: Vec<_> = reading.iter().map(|fault| name(fault)).collect();
     assert_eq!(names(title), coded);
     let coded: Vec<_> = reply.iter().map(|fault| name(fault)).collect();
-    assert_eq!(names("An answer (the command fails; a sweep is stopped first):"), coded);
+    assert_eq!(names("A reply to a command (the command fails; a sweep is stopped first):"), coded);
 }
 
 #[test]
-fn version_and_schema_are_as_documented() {
+fn version_and_schema_match() {
     let line = format!("Version {PROTOCOL_VERSION}, schema `{SCHEMA_HASH:08x}`.");
-    assert!(DOCUMENT.contains(&line), "the document should say: {line}");
+    assert!(DOCUMENT.contains(&line), "the document should contain: {line}");
 }
 
-/// The blocks marked `hex`: a line that names a sample and its header, a line of bytes.
+/// Checks the blocks marked `hex`: a line that names a sample and its header, then a line of bytes.
 #[test]
-fn examples_are_as_documented() {
+fn examples_match() {
     let mut examples = 0;
     let mut inside = false;
     let mut lines = DOCUMENT.lines();

@@ -1,4 +1,4 @@
-//! Frames and messages against anything that a line may deliver.
+//! Frames and messages against arbitrary input from a line.
 
 mod samples;
 
@@ -14,7 +14,7 @@ use proptest::prelude::*;
 
 type Found = (Header, Vec<u8>);
 
-/// Feeds `bytes`; gives the frames and the reasons for what was dropped.
+/// Decodes `bytes`; returns the frames and the reasons of drops.
 fn feed(decoder: &mut FrameDecoder, bytes: &[u8]) -> (Vec<Found>, Vec<DropReason>) {
     let (mut frames, mut drops) = (Vec::new(), Vec::new());
     for &byte in bytes {
@@ -31,8 +31,8 @@ fn decode(bytes: &[u8]) -> Vec<Found> {
     feed(&mut FrameDecoder::new(), bytes).0
 }
 
-/// A frame around any body, stuffed by the cobs crate: an independent encoder.
-fn frame_of(payload: &[u8]) -> Vec<u8> {
+/// Frame with an arbitrary payload, stuffed by the cobs crate: an independent encoder.
+fn stuffed_frame(payload: &[u8]) -> Vec<u8> {
     let mut bytes = payload.to_vec();
     bytes.extend(crc32(payload).to_le_bytes());
     let mut stuffed = vec![0; cobs::max_encoding_length(bytes.len())];
@@ -68,7 +68,7 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 2_000, ..ProptestConfig::default() })]
 
     #[test]
-    fn decoders_survive_any_bytes(bytes in prop::collection::vec(any::<u8>(), 0..300)) {
+    fn decoders_accept_any_bytes(bytes in prop::collection::vec(any::<u8>(), 0..300)) {
         decode(&bytes);
         let _ = Request::decode(&bytes);
         let _ = Reply::decode(&bytes);
@@ -76,7 +76,7 @@ proptest! {
     }
 
     #[test]
-    fn what_decodes_encodes_to_something_that_decodes_alike(
+    fn decoding_round_trips(
         body in prop::collection::vec(any::<u8>(), 1..56),
     ) {
         let header = Header { boot: 1, seq: 2 };
@@ -91,7 +91,7 @@ proptest! {
     }
 
     #[test]
-    fn readings_come_back_and_are_short(reading in any_reading(), boot: u16, seq: u16) {
+    fn readings_round_trip(reading in any_reading(), boot: u16, seq: u16) {
         let header = Header { boot, seq };
         let frame = Frame::encode(header, &Reply::Reading(reading)).expect("fits");
         prop_assert!(frame.len() <= FRAME_MAX);
@@ -105,16 +105,16 @@ proptest! {
     }
 
     #[test]
-    fn stuffing_agrees_with_the_cobs_crate(
+    fn decodes_cobs_frames(
         payload in prop::collection::vec(prop_oneof![Just(0), any::<u8>()], 5..=60),
     ) {
-        let found = decode(&frame_of(&payload));
+        let found = decode(&stuffed_frame(&payload));
         prop_assert_eq!(found.len(), 1);
         prop_assert_eq!(&found[0].1[..], &payload[4..]);
     }
 
     #[test]
-    fn our_stuffing_is_what_the_cobs_crate_reads(reading in any_reading(), seq: u16) {
+    fn cobs_decodes_our_frames(reading in any_reading(), seq: u16) {
         let frame = Frame::encode(Header { boot: 0, seq }, &Reply::Reading(reading)).expect("fits");
         let mut payload = vec![0; frame.len()];
         let report = cobs::decode(&frame[..frame.len() - 1], &mut payload);
@@ -122,9 +122,9 @@ proptest! {
         prop_assert_eq!(&payload[2..4], &seq.to_le_bytes());
     }
 
-    /// Whatever the tail of a run of bytes that is too long looks like, it is no frame.
+    /// No tail of an overlong byte sequence is read as a frame.
     #[test]
-    fn an_oversize_tail_is_never_a_frame(
+    fn overlong_tail_is_no_frame(
         junk in prop::collection::vec(1..=255_u8, 67..200),
         reading in any_reading(),
     ) {
@@ -138,9 +138,9 @@ proptest! {
         prop_assert_eq!(found.len(), 1, "must be in step again");
     }
 
-    /// CRC-32 finds every burst of up to 32 bits in frames this short.
+    /// CRC-32 detects every burst of up to 32 bits in frames this short.
     #[test]
-    fn bursts_within_the_payload_never_pass(
+    fn detects_bursts(
         payload in prop::collection::vec(any::<u8>(), 5..=60),
         start in 0_usize..512,
         pattern in 1..=u32::MAX,
@@ -161,9 +161,10 @@ proptest! {
         prop_assert_ne!(crc32(&changed[..covered]), u32::from_le_bytes(crc));
     }
 
-    /// Flips anywhere on the wire, code bytes and delimiter included, never give another message.
+    /// Bit flips anywhere on the wire, code bytes and delimiter included, never produce another
+    /// message.
     #[test]
-    fn flipped_frames_are_dropped(
+    fn drops_flipped_frames(
         reading in any_reading(),
         flips in prop::collection::btree_set(0_usize..8 * FRAME_MAX, 1..=3),
     ) {
@@ -184,12 +185,12 @@ proptest! {
 }
 
 #[test]
-fn the_crc_is_the_one_of_zlib() {
+fn crc_matches_zlib() {
     assert_eq!(crc32(b"123456789"), 0xcbf4_3926);
 }
 
 #[test]
-fn every_single_and_double_flip_of_a_reading_is_found() {
+fn detects_all_double_flips() {
     let reading = samples::reading(ReadingStatus::Echo, &[9_652]);
     let frame = Frame::encode(Header { boot: 1, seq: 2 }, &Reply::Reading(reading)).expect("fits");
     let bits = frame.len() * 8;
@@ -225,9 +226,9 @@ fn extremes_fit() {
     assert!(eight.len() <= FRAME_MAX, "{} bytes", eight.len());
 }
 
-/// The longest encoding of each field, so that no message of any value can be too long.
+/// Sums the longest encoding of each field: no value of any message can exceed a frame.
 #[test]
-fn no_message_can_be_too_long() {
+fn all_messages_fit() {
     for fields in [
         firmware_protocol::messages::Identity::FIELDS,
         Settings::FIELDS,
@@ -237,12 +238,12 @@ fn no_message_can_be_too_long() {
         SweepDone::FIELDS,
         Status::FIELDS,
     ] {
-        let longest: usize = fields.iter().map(|field| longest_of(field.kind)).sum();
+        let longest: usize = fields.iter().map(|field| longest_encoding(field.kind)).sum();
         assert!(4 + 1 + longest + 4 <= PAYLOAD_MAX, "{fields:?} takes up to {longest} bytes");
     }
 }
 
-fn longest_of(kind: &str) -> usize {
+fn longest_encoding(kind: &str) -> usize {
     match kind.replace(' ', "").as_str() {
         "u8" | "bool" => 1,
         "u16" | "i16" | "Capabilities" => 3,
@@ -260,7 +261,7 @@ fn longest_of(kind: &str) -> usize {
 }
 
 #[test]
-fn further_bytes_are_an_error_but_for_an_identity_of_another_version() {
+fn rejects_excess_bytes() {
     for (name, request) in samples::requests() {
         let mut body = postcard_body(&request);
         body.push(0);
@@ -281,11 +282,11 @@ fn postcard_body<M: serde::Serialize>(message: &M) -> Vec<u8> {
 }
 
 #[test]
-fn a_line_error_drops_the_frame_it_hits() {
+fn line_error_drops_frame() {
     let frame = Frame::encode(Header { boot: 1, seq: 2 }, &Reply::Ack).expect("fits");
     let mut decoder = FrameDecoder::new();
     feed(&mut decoder, &frame[..4]);
-    decoder.damage();
+    decoder.discard_frame();
     let (found, drops) = feed(&mut decoder, &frame[4..]);
     assert_eq!((found, drops), (vec![], vec![DropReason::Line]));
     assert_eq!(feed(&mut decoder, &frame).0.len(), 1);

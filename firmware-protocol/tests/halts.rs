@@ -1,4 +1,4 @@
-//! What ends or holds motion and firing: Stop, Reset, leases, the emergency stop, a full ring.
+//! Ends and pauses of motion and firing: Stop, Reset, leases, the emergency stop, a full ring.
 
 mod world;
 
@@ -11,32 +11,32 @@ use world::settings;
 use world::sim::Sim;
 
 #[test]
-fn coils_are_released_also_where_no_index_was_found() {
+fn hold_expires_without_index() {
     let mut sim = Sim::new(7, BAUD, Faults::default());
     sim.world.index_missing = true;
     sim.run(Command::Identify).expect("ends");
     sim.run(Command::Configure(Settings { hold_s: 3, ..settings() })).expect("ends");
     sim.idle(4_000_000).expect("no hang");
-    assert_eq!(sim.world.coils_released, 0, "nobody gave them current");
+    assert_eq!(sim.world.coils_released, 0, "the coils carry no current yet");
     let events = sim.run(Command::Home).expect("ends");
-    let refused = HostError::Refused(NakReason::IndexNotFound);
-    assert_eq!(events.last(), Some(&HostEvent::Failed(refused)));
+    let rejected = HostError::Refused(NakReason::IndexNotFound);
+    assert_eq!(events.last(), Some(&HostEvent::Failed(rejected)));
     sim.idle(10_000_000).expect("no hang");
     assert_eq!(sim.world.coils_released, 1);
-    let told = sim
+    let faults = sim
         .events
         .iter()
         .filter(|(_, event)| matches!(event, HostEvent::Fault(FaultKind::HoldExpired)));
-    assert_eq!(told.count(), 1, "once");
+    assert_eq!(faults.count(), 1, "once");
 }
 
 #[test]
-fn a_silent_host_ends_the_sweep() {
+fn lease_ends_sweep() {
     let mut sim = ready(settings());
     sim.start(Command::Sweep(plan(400, 1)));
     sim.idle(300_000).expect("no hang");
     let cut_at = sim.now_ns;
-    // From here on nothing from the host arrives.
+    // From here on the device receives nothing from the host.
     sim.up = world::line::Line::new(
         u64::from(BAUD),
         Faults { frame_lost_one_in: 1, ..Faults::default() },
@@ -61,11 +61,11 @@ fn a_silent_host_ends_the_sweep() {
         .events
         .iter()
         .any(|(_, event)| matches!(event, HostEvent::Failed(HostError::LeaseExpired)));
-    assert!(failed, "the host must learn why");
+    assert!(failed, "the host must report the cause");
 }
 
 #[test]
-fn idle_coils_are_released_when_the_host_is_gone() {
+fn hold_expires_without_requests() {
     let mut sim = ready(Settings { hold_s: 3, ..settings() });
     sim.idle(2_900_000).expect("no hang");
     assert_eq!(sim.world.coils_released, 0);
@@ -79,7 +79,7 @@ fn idle_coils_are_released_when_the_host_is_gone() {
 }
 
 #[test]
-fn stop_ends_a_sweep_and_keeps_the_position() {
+fn stop_during_sweep() {
     let mut sim = ready(settings());
     sim.start(Command::Sweep(plan(400, 1)));
     sim.idle(500_000).expect("no hang");
@@ -101,7 +101,7 @@ fn stop_ends_a_sweep_and_keeps_the_position() {
 }
 
 #[test]
-fn stop_in_mid_move_keeps_the_position() {
+fn stop_during_move() {
     let mut sim = ready(settings());
     sim.start(Command::MoveTo { step: 4_000 });
     sim.idle(700_000).expect("no hang");
@@ -112,7 +112,7 @@ fn stop_in_mid_move_keeps_the_position() {
 }
 
 #[test]
-fn the_emergency_stop_names_itself_and_home_clears_it() {
+fn home_clears_emergency_stop() {
     let mut sim = ready(settings());
     sim.emergency_at_ns = Some(sim.now_ns + 400_000_000);
     let events = sim.run(Command::Sweep(plan(400, 1))).expect("ends");
@@ -126,7 +126,7 @@ fn the_emergency_stop_names_itself_and_home_clears_it() {
 }
 
 #[test]
-fn reset_restarts_the_device_once() {
+fn reset_restarts_once() {
     let mut sim = ready(settings());
     let boot = sim.world.boot;
     let events = sim.run(Command::Reset).expect("ends");
@@ -138,7 +138,7 @@ fn reset_restarts_the_device_once() {
 }
 
 #[test]
-fn the_device_holds_when_nobody_acknowledges_and_goes_on_when_somebody_does() {
+fn holds_until_acknowledged() {
     let mut sim = ready(Settings { max_echoes: 8, ..settings() });
     let seq = 30_000_u16
         .wrapping_add(sim.host.identity().and_then(|identity| identity.last_seq).unwrap_or(0));
@@ -153,7 +153,7 @@ fn the_device_holds_when_nobody_acknowledges_and_goes_on_when_somebody_does() {
     let header = |seq| Header { boot: sim.world.boot, seq };
     let start = Frame::encode(header(seq), &Request::Sweep(plan)).expect("fits");
     let next = Request::KeepAlive { sweep: 5, next: 100 };
-    let go_on = Frame::encode(header(seq.wrapping_add(1)), &next).expect("fits");
+    let acknowledge = Frame::encode(header(seq.wrapping_add(1)), &next).expect("fits");
     let before = sim.world.firings.len();
     let ticks = sim.world.ticks();
     sim.world.device.handle_bytes(ticks, &start);
@@ -161,13 +161,13 @@ fn the_device_holds_when_nobody_acknowledges_and_goes_on_when_somebody_does() {
     let held = sim.world.firings.len() - before;
     assert!((8..60).contains(&held), "held after {held} beams");
     let ticks = sim.world.ticks();
-    sim.world.device.handle_bytes(ticks, &go_on);
+    sim.world.device.handle_bytes(ticks, &acknowledge);
     sim.idle(1_000_000).expect("no hang");
-    assert!(sim.world.firings.len() - before > held, "did not go on");
+    assert!(sim.world.firings.len() - before > held, "did not continue");
 }
 
 #[test]
-fn what_is_acknowledged_before_it_was_sent_is_sent_all_the_same() {
+fn premature_ack_drops_nothing() {
     let mut sim = ready(settings());
     let seq = 30_000_u16
         .wrapping_add(sim.host.identity().and_then(|identity| identity.last_seq).unwrap_or(0));
@@ -182,6 +182,6 @@ fn what_is_acknowledged_before_it_was_sent_is_sent_all_the_same() {
         sim.world.device.handle_bytes(ticks, &acknowledged);
         sim.idle(5_000).expect("no hang");
     }
-    // The host knows nothing of this sweep, and counts each of its readings as a copy.
+    // The host does not know this sweep, and counts each of its readings as a duplicate.
     assert_eq!(sim.host.stats().duplicates, 6);
 }

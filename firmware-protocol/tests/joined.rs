@@ -1,8 +1,8 @@
-//! Both machines joined on a line that loses, changes, doubles and delays bytes, with a device
-//! that restarts and a line that is cut, thousands of times over.
+//! Both machines joined on a line that loses, alters, duplicates and delays bytes, with a device
+//! that restarts and a line that is cut, in thousands of runs.
 //!
-//! A failing run prints its seed; `JOINED_SEED=<seed> cargo test --test joined` runs it alone,
-//! `JOINED_RUNS=<n>` changes how many are run.
+//! A failing run prints its seed. `JOINED_SEED=<seed> cargo test --test joined` repeats that run
+//! alone, `JOINED_RUNS=<n>` sets the number of runs.
 
 mod world;
 
@@ -16,7 +16,7 @@ use world::sim::Sim;
 
 const RUNS: u64 = 10_000;
 
-/// What came of all runs, so that the test can tell that it tested something.
+/// Totals of all runs, which show that the test covered enough.
 #[derive(Debug, Default)]
 struct Tally {
     sweeps_complete: u64,
@@ -30,7 +30,7 @@ struct Tally {
 }
 
 #[test]
-fn every_sweep_ends_whole_or_with_its_cause() {
+fn every_sweep_completes_or_fails() {
     let mut tally = Tally::default();
     if let Some(seed) = number_from_env("JOINED_SEED") {
         run(seed, &mut tally);
@@ -59,7 +59,7 @@ fn number_from_env(name: &str) -> Option<u64> {
     std::env::var(name).ok()?.parse().ok()
 }
 
-/// One life of a host and a device: a few commands, some of them failing.
+/// Session of a host and a device: a few commands, some of which fail.
 fn run(seed: u64, tally: &mut Tally) {
     let mut random = Random::new(seed);
     let baud = random.pick(&[38_400, 115_200, 500_000]);
@@ -80,7 +80,7 @@ fn run(seed: u64, tally: &mut Tally) {
         }
     }
     let stats = sim.host.stats();
-    assert_eq!(stats.refused, 0, "the device tells the truth");
+    assert_eq!(stats.refused, 0, "a valid reply was rejected");
     tally.repaired += stats.repaired;
     tally.duplicates += stats.duplicates;
     tally.retries += stats.retries;
@@ -110,7 +110,7 @@ fn cause_trouble(sim: &mut Sim, random: &mut Random) {
     }
 }
 
-/// Identify, configure and home, as far as needed; `false` if the line did not allow it.
+/// Identifies, configures and homes, as far as needed; returns `false` if the line prevented it.
 fn prepare(sim: &mut Sim, random: &mut Random, tally: &mut Tally) -> bool {
     if sim.host.identity().is_none() && !succeeds(sim, Command::Identify, tally) {
         return false;
@@ -124,7 +124,7 @@ fn prepare(sim: &mut Sim, random: &mut Random, tally: &mut Tally) -> bool {
     succeeds(sim, Command::Configure(settings), tally) && check_home(sim, tally)
 }
 
-/// Runs a command that fires nothing.
+/// Runs a command that must not fire.
 fn succeeds(sim: &mut Sim, command: Command, tally: &mut Tally) -> bool {
     let fired = sim.world.firings.len();
     let events = sim.run(command).expect("ends");
@@ -201,7 +201,7 @@ fn check_sweep(sim: &mut Sim, random: &mut Random, tally: &mut Tally) {
     tally.sweeps_complete += u64::from(complete);
     tally.sweeps_failed += u64::from(!complete);
     if complete {
-        assert_eq!(sim.world.firings.len() - before, usize::from(beams), "one firing a beam");
+        assert_eq!(sim.world.firings.len() - before, usize::from(beams), "one firing per beam");
     }
     quiet(sim, complete);
     assert!(sim.world.firings.len() - before <= usize::from(beams), "a beam was fired twice");
@@ -219,7 +219,7 @@ fn check_beams(
     for (reading, _) in readings(events) {
         assert!(reading.index < beams);
         assert_eq!(Some(reading.step), plan.step_of(reading.index));
-        assert!(seen.insert(reading.index), "beam {} came twice", reading.index);
+        assert!(seen.insert(reading.index), "beam {} was delivered twice", reading.index);
         check_reading(sim, before, &reading);
         let number = before + usize::from(reading.index);
         assert_eq!(sim.world.firings[number].fired_ticks, reading.fired_ticks, "beams mixed up");
@@ -235,12 +235,12 @@ fn check_beams(
     }
 }
 
-/// The reading must be one that was physically taken since firing number `first`.
+/// Checks that the reading was physically measured since firing number `first`.
 fn check_reading(sim: &Sim, first: usize, reading: &Reading) {
     let firing = sim.world.firings[first..]
         .iter()
         .find(|firing| firing.fired_ticks == reading.fired_ticks)
-        .expect("a reading that nobody took");
+        .expect("a reading without a firing");
     assert_eq!(firing.step, reading.step, "taken elsewhere");
     assert_eq!(firing.echoes, reading.echoes.to_vec(), "echoes of another firing");
 }
@@ -255,7 +255,7 @@ fn readings(events: &[HostEvent]) -> Vec<(Reading, bool)> {
         .collect()
 }
 
-/// After a failure: stop, and wait until leases and late copies are over.
+/// After a failure: stops, and waits until leases and late copies have expired.
 fn quiet(sim: &mut Sim, succeeded: bool) {
     if !succeeded {
         sim.run(Command::Stop).expect("ends");
@@ -269,7 +269,7 @@ fn finish(sim: &mut Sim) -> Vec<HostEvent> {
     sim.events[first..].iter().map(|(_, event)| *event).collect()
 }
 
-/// Every command ends with one event, the last but for news.
+/// Returns the single event that ends a command.
 fn only_end(events: &[HostEvent]) -> &HostEvent {
     let ends: Vec<_> = events
         .iter()

@@ -1,16 +1,16 @@
-//! The device machine runs where nobody could read a panic message: it must not be able to.
+//! The device machine runs where a panic message cannot be read, so it must not be able to panic.
 #![cfg(all(target_os = "linux", target_env = "gnu"))]
 
 use std::path::Path;
 use std::process::Command;
 
 #[test]
-fn the_device_machine_links_without_a_panic_handler() {
+fn links_without_panic_handler() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("no-panic");
     let output = Command::new("sh")
         .arg(folder.join("check.sh"))
         .env("CARGO_TARGET_DIR", Path::new(env!("CARGO_TARGET_TMPDIR")).join("no-panic"))
-        // The flags of the program under test are its own.
+        // The program under test sets its own flags.
         .env_remove("CARGO_ENCODED_RUSTFLAGS")
         .output()
         .expect("sh runs");

@@ -1,7 +1,7 @@
 //! Golden frames: `vectors/<name>.txt` holds one sample of every message, in hex.
 //!
-//! `UPDATE_VECTORS=1 cargo test -p firmware-protocol --test vectors` writes them anew, which is
-//! right only together with a new protocol version.
+//! `UPDATE_VECTORS=1 cargo test -p firmware-protocol --test vectors` regenerates them, which is
+//! correct only together with a new protocol version.
 
 mod samples;
 
@@ -27,7 +27,7 @@ fn hex(bytes: &[u8]) -> String {
     text
 }
 
-/// The text of a vector: what it is, the body, the frame.
+/// Text of a vector: description, body and frame.
 fn vector(direction: &str, message: &str, frame: &Frame) -> String {
     let mut decoder = FrameDecoder::new();
     for &byte in frame.iter() {
@@ -59,7 +59,7 @@ fn all() -> Vec<(String, String)> {
 }
 
 #[test]
-fn frames_are_as_they_were() {
+fn frames_match_vectors() {
     let update = std::env::var_os("UPDATE_VECTORS").is_some();
     for (name, text) in all() {
         let path = folder().join(format!("{name}.txt"));
@@ -73,7 +73,7 @@ fn frames_are_as_they_were() {
 }
 
 #[test]
-fn no_vector_is_left_over() {
+fn no_unused_vectors() {
     let mut files: Vec<_> = std::fs::read_dir(folder())
         .expect("the folder is there")
         .map(|entry| entry.expect("readable").file_name().into_string().expect("a name"))

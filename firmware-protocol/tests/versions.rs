@@ -1,4 +1,4 @@
-//! A host and a device that do not speak the same version, or have not the same memory.
+//! Host and device with different protocol versions or different numbering.
 
 mod samples;
 mod world;
@@ -10,7 +10,7 @@ use firmware_protocol::messages::{
     FirmwareVersion, Identity, NakReason, PROTOCOL, ProtocolId, Reply, Request,
 };
 
-/// A frame around any body.
+/// Frame with an arbitrary body.
 fn raw_frame(header: Header, body: &[u8]) -> Vec<u8> {
     let mut payload = [header.boot.to_le_bytes(), header.seq.to_le_bytes()].concat();
     payload.extend(body);
@@ -33,7 +33,7 @@ fn decode(bytes: &[u8]) -> Vec<(Header, Vec<u8>)> {
     found
 }
 
-/// Starts Identify; gives the host and the header of its request.
+/// Starts Identify; returns the host and the header of its request.
 fn identifying() -> (Host, Header) {
     let mut host = Host::new(HostConfig::new(115_200, 1));
     host.start(0, Command::Identify).expect("free");
@@ -51,20 +51,20 @@ fn check_wrong_version(body: &[u8], theirs: ProtocolId) {
     let error = HostError::WrongVersion { ours: PROTOCOL, theirs, firmware };
     assert_eq!(host.poll_event(), Some(HostEvent::Failed(error)));
     let text = error.to_string();
-    assert!(text.contains(&format!("speaks protocol {}", theirs.version)), "{text}");
-    assert!(text.contains(&format!("this sonard speaks {}", PROTOCOL.version)), "{text}");
+    assert!(text.contains(&format!("has protocol {}", theirs.version)), "{text}");
+    assert!(text.contains(&format!("this sonard has {}", PROTOCOL.version)), "{text}");
 }
 
 #[test]
-fn another_version_is_told_from_the_front_of_its_identity() {
+fn reports_other_version() {
     let theirs = ProtocolId { version: 9, schema: 5 };
-    // Shorter, and longer with what a later version may say.
+    // Shorter than this version's Identity, and longer with fields of a later version.
     check_wrong_version(&[0, 9, 5, 2, 3, 4], theirs);
     check_wrong_version(&[0, 9, 5, 2, 3, 4, 250, 251, 252, 253, 254, 255, 255], theirs);
 }
 
 #[test]
-fn another_schema_of_the_same_version_is_told_too() {
+fn reports_other_schema() {
     let theirs = ProtocolId { version: PROTOCOL.version, schema: 5 };
     let firmware = FirmwareVersion { major: 2, minor: 3, patch: 4 };
     let identity = Identity { protocol: theirs, firmware, ..samples::identity() };
@@ -73,7 +73,7 @@ fn another_schema_of_the_same_version_is_told_too() {
     check_wrong_version(body, theirs);
 }
 
-/// Feeds `frame` to the device and reads all that it has to say.
+/// Passes `frame` to the device and returns all of its replies.
 fn exchange(device: &mut Device, frame: &[u8]) -> Vec<(Header, Reply)> {
     device.handle_bytes(0, frame);
     let mut out = [0; 512];
@@ -91,7 +91,7 @@ fn device() -> Device {
     device
 }
 
-/// The frozen requests, as bytes that no later version may change.
+/// Frozen requests as literal bytes, which no later version may change.
 #[test]
 fn frozen_requests_work_from_bytes() {
     let mut device = device();
@@ -101,40 +101,40 @@ fn frozen_requests_work_from_bytes() {
     let replies = exchange(&mut device, &raw_frame(unknown, &[1]));
     assert_eq!(replies, [(Header { boot: 7, seq: 77 }, Reply::Ack)]);
     let replies = exchange(&mut device, &raw_frame(unknown, &[2]));
-    let refused = Reply::Nak { reason: NakReason::WrongBoot };
-    assert_eq!(replies, [(Header { boot: 7, seq: 77 }, refused)], "Reset needs the nonce");
-    let right = Header { boot: 7, seq: 77 };
-    assert_eq!(exchange(&mut device, &raw_frame(right, &[2])), [(right, Reply::Ack)]);
+    let rejected = Reply::Nak { reason: NakReason::WrongBoot };
+    assert_eq!(replies, [(Header { boot: 7, seq: 77 }, rejected)], "Reset needs the nonce");
+    let known = Header { boot: 7, seq: 77 };
+    assert_eq!(exchange(&mut device, &raw_frame(known, &[2])), [(known, Reply::Ack)]);
 }
 
 #[test]
-fn an_unknown_request_is_refused() {
+fn rejects_unknown_request() {
     let mut device = device();
     let header = Header { boot: 7, seq: 1 };
-    let refused = Reply::Nak { reason: NakReason::UnknownRequest };
-    assert_eq!(exchange(&mut device, &raw_frame(header, &[99])), [(header, refused)]);
+    let rejected = Reply::Nak { reason: NakReason::UnknownRequest };
+    assert_eq!(exchange(&mut device, &raw_frame(header, &[99])), [(header, rejected)]);
     assert_eq!(device.counters().undecodable, 1);
 }
 
 #[test]
-fn numbers_tell_new_repeated_and_old_requests_apart() {
+fn classifies_sequence_numbers() {
     let mut device = device();
     let header = |seq| Header { boot: 7, seq };
     let send = |device: &mut Device, seq, request| {
         exchange(device, &Frame::encode(header(seq), &request).expect("fits"))
     };
-    let refused = Reply::Nak { reason: NakReason::NotConfigured };
-    assert_eq!(send(&mut device, 65_535, Request::Home), [(header(65_535), refused)]);
-    assert_eq!(send(&mut device, 65_535, Request::Home), [(header(65_535), refused)]);
+    let rejected = Reply::Nak { reason: NakReason::NotConfigured };
+    assert_eq!(send(&mut device, 65_535, Request::Home), [(header(65_535), rejected)]);
+    assert_eq!(send(&mut device, 65_535, Request::Home), [(header(65_535), rejected)]);
     let reused = Reply::Nak { reason: NakReason::SequenceReused };
     assert_eq!(send(&mut device, 65_535, Request::Ping), [(header(65_535), reused)]);
-    assert_eq!(send(&mut device, 3, Request::Ping), [(header(3), refused)], "numbers wrap");
+    assert_eq!(send(&mut device, 3, Request::Ping), [(header(3), rejected)], "numbers wrap");
     assert_eq!(send(&mut device, 65_535, Request::Home), [], "an old duplicate");
     assert_eq!(device.counters().stale, 1);
 }
 
 #[test]
-fn a_host_takes_another_number_when_its_own_is_taken() {
+fn host_renumbers_on_reuse() {
     let mut sim = world::sim::Sim::new(11, 115_200, world::line::Faults::default());
     sim.run(Command::Identify).expect("ends");
     sim.host.start(sim.now_us(), Command::Configure(world::settings())).expect("free");

@@ -1,4 +1,4 @@
-//! The main loop: tells the device machine what happened, does what it asks for, and sleeps.
+//! Main loop: passes events to the device machine, carries out its actions, and sleeps.
 
 use core::mem::MaybeUninit;
 
@@ -7,53 +7,53 @@ use firmware_protocol::device::{Action, Board, Device, within_half_a_turn};
 use firmware_protocol::messages::{Capabilities, FirmwareVersion};
 
 use crate::clock::{self, Purpose};
-use crate::hardware::{Alone, alone, enable_interrupts, feed_watchdog};
+use crate::hardware::{CriticalSection, critical_section, enable_interrupts, feed_watchdog};
 use crate::home::Homing;
 use crate::{OPTIONS, boot, motion, pins, ranger, serial, store};
 
-/// Bytes given to the machine before the rest of the world gets its turn.
-const BYTES_A_ROUND: u8 = 16;
-/// A deadline further away than this is left to the clock's overflow, which wakes every 33 ms.
-const FAR: u32 = 50_000;
+/// Maximum number of bytes processed per iteration.
+const BYTES_PER_ROUND: u8 = 16;
+/// Ticks beyond which a deadline is left to the clock's overflow, which wakes the chip every 33 ms.
+const MAX_ALARM_TICKS: u32 = 50_000;
 
-/// Among the options, which the handler of the emergency stop sees too.
+/// Option bit, also read by the interrupt handler of the emergency stop.
 const EMERGENCY_FITTED: u8 = 0x80;
 
-/// In a place of its own, so that the compiler can address it directly: on the stack the same
-/// code takes half as much again.
+/// At a fixed address, so that the compiler can access it directly: on the stack the code is half
+/// as large again.
 static mut DEVICE: MaybeUninit<Device> = MaybeUninit::uninit();
 
-struct Rig {
+struct MainLoop {
     index: Option<bool>,
-    can_stop: bool,
+    has_emergency_stop: bool,
     revolution: u16,
     homing: Option<Homing>,
-    /// Whether a homing has been done, so that the next can tell the drift.
-    known: bool,
+    /// `true` after a homing, so that the next one can measure the drift.
+    was_homed: bool,
     pressed: bool,
-    /// Something stopped the device by itself: the light blinks until it is homed.
+    /// `true` from a stop by the device itself until homing: the light blinks.
     alarmed: bool,
 }
 
 pub fn run() -> ! {
-    let mut rig = start();
-    // SAFETY: `start` has written it, and nobody else holds it.
+    let mut main_loop = start();
+    // SAFETY: written by `start`, and not referenced elsewhere.
     let device = unsafe { (*(&raw mut DEVICE)).assume_init_mut() };
     boot::start_watchdog();
     enable_interrupts();
     loop {
         feed_watchdog();
-        rig.round(device);
-        rig.show();
-        if clock_is_set(device) {
-            clock::rest();
+        main_loop.run_once(device);
+        main_loop.update_light();
+        if arm_alarm(device) {
+            clock::sleep_until_event();
         }
     }
 }
 
-/// Reads the EEPROM and makes the machine. Apart from the loop, whose stack this would burden.
+/// Reads the EEPROM and creates the machine. Not part of the loop, to limit its stack.
 #[inline(never)]
-fn start() -> Rig {
+fn start() -> MainLoop {
     let config = store::config();
     let board = Board {
         boot: store::next_boot(),
@@ -63,86 +63,87 @@ fn start() -> Rig {
         capabilities: config.capabilities,
         reset_cause: boot::reset_cause(),
     };
-    // SAFETY: before the loop that uses it.
+    // SAFETY: called before the loop that uses it.
     unsafe { (*(&raw mut DEVICE)).write(Device::new(board)) };
-    Rig::new(&config)
+    MainLoop::new(&config)
 }
 
-impl Rig {
+impl MainLoop {
     fn new(config: &Config) -> Self {
-        let can_stop = config.capabilities.has(Capabilities::EMERGENCY_STOP);
-        let fitted = if can_stop { EMERGENCY_FITTED } else { 0 };
-        alone(|alone| *OPTIONS.get(alone) = config.options & !EMERGENCY_FITTED | fitted);
+        let has_emergency_stop = config.capabilities.has(Capabilities::EMERGENCY_STOP);
+        let fitted = if has_emergency_stop { EMERGENCY_FITTED } else { 0 };
+        critical_section(|cs| *OPTIONS.get(cs) = config.options & !EMERGENCY_FITTED | fitted);
         let has_index = config.capabilities.has(Capabilities::INDEX_SENSOR);
         Self {
             index: has_index.then_some(config.options & OPTION_INDEX_HIGH != 0),
-            can_stop,
+            has_emergency_stop,
             revolution: config.steps_per_revolution,
             homing: None,
-            known: false,
+            was_homed: false,
             pressed: false,
             alarmed: false,
         }
     }
 
     #[inline(never)]
-    /// Everything that may have happened, once.
-    fn round(&mut self, device: &mut Device) {
-        // The lease first: a beam that ends after it must not be followed by another.
-        on_time(device);
+    /// Processes all events once.
+    fn run_once(&mut self, device: &mut Device) {
+        // The lease comes first: after it has expired, no beam may follow.
+        handle_timeout(device);
         self.watch_emergency(device);
-        listen(device);
-        if let Some(arrival) = motion::take_arrival() {
-            self.arrived(device, &arrival);
+        report_echoes(device);
+        if let Some(end) = motion::take_move_end() {
+            self.move_ended(device, &end);
         }
-        self.act(device);
-        for _ in 0..BYTES_A_ROUND {
-            if serial::take_damage() {
+        self.perform_actions(device);
+        for _ in 0..BYTES_PER_ROUND {
+            if serial::take_line_error() {
                 device.handle_line_error(clock::now());
             }
             let Some(byte) = serial::receive() else { break };
-            on_byte(device, byte);
-            self.act(device);
+            handle_byte(device, byte);
+            self.perform_actions(device);
         }
-        speak(device);
-        // A restart waits until its acknowledgement is out.
-        self.act(device);
+        transmit(device);
+        // A restart waits until its acknowledgement has been sent.
+        self.perform_actions(device);
     }
 
     fn watch_emergency(&mut self, device: &mut Device) {
-        let pressed = self.can_stop && pins::emergency();
+        let pressed = self.has_emergency_stop && pins::emergency();
         if pressed && !self.pressed {
             pins::make_safe();
-            emergency(device);
+            handle_emergency(device);
         }
         self.pressed = pressed;
     }
 
     #[inline(never)]
-    fn arrived(&mut self, device: &mut Device, arrival: &motion::Arrival) {
+    fn move_ended(&mut self, device: &mut Device, end: &motion::MoveEnd) {
         let Some(homing) = &mut self.homing else {
-            return moved(device, arrival.position);
+            return handle_moved(device, end.position);
         };
-        if let Some(outcome) = homing.arrived(arrival) {
+        if let Some(outcome) = homing.move_ended(end) {
             self.homing = None;
-            let known = core::mem::replace(&mut self.known, outcome.is_ok());
+            let was_homed = core::mem::replace(&mut self.was_homed, outcome.is_ok());
             self.alarmed = outcome.is_err();
-            let drift = |seen| if known { within_half_a_turn(seen, self.revolution) } else { 0 };
-            homed(device, outcome.map(drift));
+            let drift =
+                |seen| if was_homed { within_half_a_turn(seen, self.revolution) } else { 0 };
+            handle_homed(device, outcome.map(drift));
         }
     }
 
     #[inline(never)]
-    fn act(&mut self, device: &mut Device) {
+    fn perform_actions(&mut self, device: &mut Device) {
         while let Some(action) = device.poll_action() {
             if self.pressed && is_dangerous(&action) {
-                emergency(device);
+                handle_emergency(device);
                 continue;
             }
             match action {
                 Action::Home { speed, acceleration } => self.home(device, speed, acceleration),
                 Action::Move { target, speed, acceleration } => {
-                    motion::turn(target, speed, acceleration, None);
+                    motion::move_to(target, speed, acceleration, None);
                 }
                 Action::StopMotion => {
                     self.homing = None;
@@ -150,7 +151,7 @@ impl Rig {
                 }
                 Action::ReleaseCoils => {
                     self.homing = None;
-                    self.known = false;
+                    self.was_homed = false;
                     self.alarmed = true;
                     motion::release();
                 }
@@ -165,96 +166,97 @@ impl Rig {
 
     fn home(&mut self, device: &mut Device, speed: u16, acceleration: u32) {
         if let Some(on) = self.index {
-            self.homing = Some(Homing::begin(speed, acceleration, self.revolution, on));
+            self.homing = Some(Homing::start(speed, acceleration, self.revolution, on));
         } else {
-            // Holds the motor where it is: that is zero now.
+            // Energises the motor at its present position, which becomes zero.
             pins::enable::low();
             motion::set_zero();
             self.alarmed = false;
-            homed(device, Ok(0));
+            handle_homed(device, Ok(0));
         }
     }
 
-    /// Steady while at work, blinking while the position is lost to a fault, else off.
-    fn show(&self) {
-        let on = if self.alarmed {
-            clock::blink()
-        } else {
-            motion::is_turning() || ranger::is_listening()
-        };
+    /// Updates the light: on while active, blinking while the position is lost after a fault, else
+    /// off.
+    fn update_light(&self) {
+        let on =
+            if self.alarmed { clock::blink() } else { motion::is_moving() || ranger::is_ranging() };
         if on { pins::light::high() } else { pins::light::low() }
     }
 }
 
-/// Turns the motor or fires.
+/// Returns `true` for actions that move the motor or fire.
 const fn is_dangerous(action: &Action) -> bool {
     matches!(action, Action::Home { .. } | Action::Move { .. } | Action::Fire { .. })
 }
 
 #[inline(never)]
-/// Whether the machine's next deadline will wake the chip; if not, it has come already.
-fn clock_is_set(device: &Device) -> bool {
+/// Returns `false` if the machine's next deadline has passed; otherwise ensures that the chip wakes
+/// in time.
+fn arm_alarm(device: &Device) -> bool {
     let Some((_, at)) = device.poll_timeout() else { return true };
     let now = clock::now();
     if clock::is_past(now, at) {
         return false;
     }
-    // A pulse or the end of a window uses the alarm, and wakes soon enough.
-    if at.wrapping_sub(now) < FAR && !motion::is_turning() && !ranger::is_listening() {
-        alone(|alone| clock::set_alarm(alone, Purpose::Wake, at));
+    // A step pulse or the end of a window uses the alarm, and wakes the chip early enough.
+    if at.wrapping_sub(now) < MAX_ALARM_TICKS && !motion::is_moving() && !ranger::is_ranging() {
+        critical_section(|cs| clock::set_alarm(cs, Purpose::Wake, at));
     }
     true
 }
 
 #[inline(never)]
-fn speak(device: &mut Device) {
+fn transmit(device: &mut Device) {
     while serial::has_room() {
         let Some(byte) = device.poll_byte() else { return };
         serial::send(byte);
     }
 }
 
-// Each verb of the machine once, and apart: inlined into the loop they take twice the room.
+// Each method of the machine is called from one place, out of line: inlined into the loop they
+// would take twice the space.
 
 #[inline(never)]
-fn on_time(device: &mut Device) {
+fn handle_timeout(device: &mut Device) {
     device.handle_timeout(clock::now());
 }
 
 #[inline(never)]
-fn on_byte(device: &mut Device, byte: u8) {
+fn handle_byte(device: &mut Device, byte: u8) {
     device.handle_byte(clock::now(), byte);
 }
 
 #[inline(never)]
-fn moved(device: &mut Device, position: i32) {
+fn handle_moved(device: &mut Device, position: i32) {
     device.handle_moved(clock::now(), position);
 }
 
 #[inline(never)]
-fn homed(device: &mut Device, outcome: Result<i32, firmware_protocol::device::HomeError>) {
+fn handle_homed(device: &mut Device, outcome: Result<i32, firmware_protocol::device::HomeError>) {
     device.handle_homed(clock::now(), outcome);
 }
 
 #[inline(never)]
-fn listen(device: &mut Device) {
+fn report_echoes(device: &mut Device) {
     if let Some(report) = ranger::take_report() {
         device.handle_echoes(clock::now(), report);
     }
 }
 
 #[inline(never)]
-fn emergency(device: &mut Device) {
+fn handle_emergency(device: &mut Device) {
     device.handle_emergency_stop(clock::now());
 }
 
-/// PCINT1: the emergency stop changed. The pins at once, the machine when the loop comes round.
+/// Handles PCINT1, a change of the emergency stop: the pins immediately, the machine in the next
+/// iteration.
 #[unsafe(no_mangle)]
 extern "avr-interrupt" fn __vector_4() {
     // SAFETY: an interrupt handler.
-    let alone = &unsafe { Alone::in_interrupt() };
-    if *OPTIONS.get(alone) & EMERGENCY_FITTED != 0 && pins::emergency() {
+    let cs = &unsafe { CriticalSection::in_interrupt() };
+    if *OPTIONS.get(cs) & EMERGENCY_FITTED != 0 && pins::emergency() {
         pins::make_safe();
     }
-    clock::wake(alone);
+    clock::wake(cs);
 }

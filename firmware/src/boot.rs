@@ -1,15 +1,15 @@
-//! Why the chip started, and the watchdog.
+//! Cause of the last reset, and the watchdog.
 
 use core::arch::global_asm;
 use core::mem::MaybeUninit;
 
 use firmware_protocol::messages::ResetCause;
 
-use crate::hardware::{WDTCSR, alone, feed_watchdog};
+use crate::hardware::{WDTCSR, critical_section, feed_watchdog};
 
-// Runs before memory is set up, and so must the watchdog be put off: after a reset by it, it
-// keeps running with its shortest time. The cause is in MCUSR, or, where the Optiboot loader
-// has read and cleared that, in r2.
+// Runs before memory is initialised, and so must disabling the watchdog: after a watchdog reset it
+// keeps running with its shortest timeout. The cause is in MCUSR, or in r2 if the Optiboot loader
+// has read and cleared MCUSR.
 global_asm!(
     ".section .init3, \"ax\", @progbits",
     "in r24, 0x34",
@@ -32,7 +32,7 @@ const EXTERNAL: u8 = 1 << 1;
 const BROWN_OUT: u8 = 1 << 2;
 const WATCHDOG: u8 = 1 << 3;
 
-/// What the restart that a host asks for leaves behind: it goes through the watchdog.
+/// Marker left by a requested restart, which uses the watchdog.
 const REQUESTED: u16 = 0x5e7a;
 
 #[unsafe(link_section = ".noinit")]
@@ -42,7 +42,7 @@ static mut NOTE: MaybeUninit<u16> = MaybeUninit::uninit();
 
 pub fn reset_cause() -> ResetCause {
     // SAFETY: FLAGS was written above; NOTE may hold anything, but it does hold something:
-    // memory that no compiler has put away. Nobody else uses either.
+    // memory that the compiler does not place. No other code uses either.
     let (flags, note) = unsafe {
         let note = (&raw const NOTE).cast::<u16>();
         let pair = ((&raw const FLAGS).cast::<u8>().read_volatile(), note.read_volatile());
@@ -62,21 +62,21 @@ pub fn reset_cause() -> ResetCause {
     }
 }
 
-/// From here on the chip restarts when the main loop does not come round within 0.25 s.
+/// Starts the watchdog: the chip restarts unless the main loop runs at least every 0.25 s.
 pub fn start_watchdog() {
     feed_watchdog();
-    alone(|_| {
+    critical_section(|_| {
         WDTCSR.write(0x18);
         WDTCSR.write(0x0c);
     });
 }
 
-/// Restarts through the watchdog, after the line has drained.
+/// Restarts through the watchdog, after the serial line has drained.
 pub fn restart() -> ! {
     // SAFETY: as above.
     unsafe { (&raw mut NOTE).cast::<u16>().write_volatile(REQUESTED) };
     loop {
-        // Interrupts go on: they empty the line.
+        // Interrupts stay enabled: they drain the line.
         core::hint::spin_loop();
     }
 }

@@ -1,11 +1,12 @@
-//! The few registers of the ATmega328P that are used, by address, and the interrupt flag.
+//! Registers of the ATmega328P that the firmware uses, by address, and the interrupt flag.
 //!
-//! By hand, because generating every register of the chip takes minutes of each clean build.
+//! They are written by hand, because generating every register of the chip takes minutes of each
+//! clean build.
 
 use core::arch::{asm, global_asm};
 use core::cell::UnsafeCell;
 
-/// A register at a fixed address.
+/// Register at a fixed address.
 #[derive(Clone, Copy)]
 pub struct Register(u8);
 
@@ -42,13 +43,13 @@ pub const UDR0: Register = Register(0xc6);
 impl Register {
     #[inline(always)]
     pub fn read(self) -> u8 {
-        // SAFETY: the constants above are the only registers there are.
+        // SAFETY: the constants above are the only registers that exist.
         unsafe { (self.0 as *const u8).read_volatile() }
     }
 
     #[inline(always)]
     pub fn write(self, value: u8) {
-        // SAFETY: as in `read`; none of them moves memory.
+        // SAFETY: as in `read`; no register affects memory.
         unsafe { (self.0 as *mut u8).write_volatile(value) }
     }
 
@@ -57,62 +58,63 @@ impl Register {
         self.read() & bits != 0
     }
 
-    /// A pair of registers, low byte first, which latches the high one.
+    /// Reads a pair of registers; reading the low byte latches the high byte.
     #[inline(always)]
-    pub fn read_pair(self, _: &Alone) -> u16 {
-        // SAFETY: as in `read`. The compiler loads the low byte of a pair first, as this family
-        // of chips wants it, and stores the high one first.
+    pub fn read_pair(self, _: &CriticalSection) -> u16 {
+        // SAFETY: as in `read`. The compiler loads the low byte of a pair first, as these chips
+        // require.
         unsafe { (self.0 as *const u16).read_volatile() }
     }
 
-    /// A pair of registers, high byte first: the low one takes both over.
+    /// Writes a pair of registers, high byte first: writing the low byte transfers both.
     #[inline(always)]
-    pub fn write_pair(self, _: &Alone, value: u16) {
+    pub fn write_pair(self, _: &CriticalSection, value: u16) {
         let [low, high] = value.to_le_bytes();
         Self(self.0 + 1).write(high);
         self.write(low);
     }
 
-    /// Sets bits; not atomic.
+    /// Sets bits. Not atomic.
     #[inline(always)]
-    pub fn set(self, _: &Alone, bits: u8) {
+    pub fn set(self, _: &CriticalSection, bits: u8) {
         self.write(self.read() | bits);
     }
 
-    /// Clears bits; not atomic.
+    /// Clears bits. Not atomic.
     #[inline(always)]
-    pub fn clear(self, _: &Alone, bits: u8) {
+    pub fn clear(self, _: &CriticalSection, bits: u8) {
         self.write(self.read() & !bits);
     }
 }
 
-/// Shows that no interrupt can come in between.
-pub struct Alone(());
+/// Token that proves that interrupts are disabled.
+pub struct CriticalSection(());
 
-impl Alone {
+impl CriticalSection {
     /// # Safety
-    /// Only in an interrupt handler: there the flag is off.
+    ///
+    /// Must be called in an interrupt handler only, where interrupts are disabled.
     pub const unsafe fn in_interrupt() -> Self {
         Self(())
     }
 }
 
-/// Does `work` with interrupts off, and puts the flag back as it was.
+/// Runs `work` with interrupts disabled, then restores the interrupt flag.
 #[inline(always)]
-pub fn alone<R>(work: impl FnOnce(&Alone) -> R) -> R {
+pub fn critical_section<R>(work: impl FnOnce(&CriticalSection) -> R) -> R {
     let flags: u8;
-    // SAFETY: restored below; the blocks are barriers for memory.
+    // SAFETY: restored below; the blocks are memory barriers.
     unsafe { asm!("in {}, 0x3f", "cli", out(reg) flags) };
-    let result = work(&Alone(()));
-    // SAFETY: what was read above.
+    let result = work(&CriticalSection(()));
+    // SAFETY: restores the value read above.
     unsafe { asm!("out 0x3f, {}", in(reg) flags) };
     result
 }
 
-/// Something that interrupt handlers and the main loop share.
+/// Value shared by interrupt handlers and the main loop.
 pub struct Shared<T>(UnsafeCell<T>);
 
-// SAFETY: only reached with an `Alone`, on a chip with one core.
+// SAFETY: accessed only with a `CriticalSection`, on a single-core chip.
 unsafe impl<T> Sync for Shared<T> {}
 
 impl<T> Shared<T> {
@@ -120,12 +122,12 @@ impl<T> Shared<T> {
         Self(UnsafeCell::new(value))
     }
 
-    /// The value. The caller must let go of it before asking for it again, which everybody here
-    /// does by asking once in a function.
+    /// Returns the value. The reference must be dropped before the next call for the same value:
+    /// each function calls this once.
     #[inline(always)]
     #[expect(clippy::mut_from_ref, reason = "interrupts are off while the token lives")]
-    pub fn get<'a>(&'a self, _: &'a Alone) -> &'a mut T {
-        // SAFETY: nobody else runs, and nobody here asks twice at a time.
+    pub fn get<'a>(&'a self, _: &'a CriticalSection) -> &'a mut T {
+        // SAFETY: no other code runs, and no function calls this twice at a time.
         unsafe { &mut *self.0.get() }
     }
 }
@@ -133,12 +135,12 @@ impl<T> Shared<T> {
 impl<T: Copy> Shared<T> {
     #[inline(always)]
     pub fn read(&self) -> T {
-        alone(|alone| *self.get(alone))
+        critical_section(|cs| *self.get(cs))
     }
 }
 
-/// Lets interrupts in and sleeps until one came. One block, because only the instruction right
-/// behind `sei` is sure to come before the interrupt that is to end the sleep.
+/// Enables interrupts and sleeps until one occurs. A single block, because only the instruction
+/// after `sei` is guaranteed to run before the interrupt that ends the sleep.
 #[inline(always)]
 pub fn sleep() {
     // SAFETY: idle mode was chosen at boot.
@@ -147,7 +149,7 @@ pub fn sleep() {
 
 #[inline(always)]
 pub fn enable_interrupts() {
-    // SAFETY: every handler is ready when this is called.
+    // SAFETY: all handlers are initialised when this is called.
     unsafe { asm!("sei") }
 }
 
@@ -163,13 +165,13 @@ pub fn feed_watchdog() {
     unsafe { asm!("wdr") }
 }
 
-/// Sleeps with whatever interrupts there are.
+/// Sleeps with the current interrupt flag.
 pub fn halt() {
     // SAFETY: always sound.
     unsafe { asm!("sleep") }
 }
 
-// In place of the compiler's own, which are fast and take half a kilobyte.
+// Replacements of the compiler's own functions, which are fast and take half a kilobyte.
 global_asm!(
     ".section .text.memory, \"ax\", @progbits",
     ".global memcpy",

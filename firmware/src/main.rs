@@ -1,8 +1,8 @@
 //! Firmware of the sonard ranger: an ATmega328P (Arduino Uno), a SensComp 6500 module, a stepper.
 //!
-//! Only pins, timers and the serial line are here. What the device does is decided by
-//! [`firmware_protocol::device::Device`], the same code as in the mock: `board` feeds it with what happens
-//! and carries out what it asks for.
+//! Only pins, timers and the serial line are handled here. Every decision is made by
+//! [`firmware_protocol::device::Device`], the state machine that the mock uses, too: `board` passes
+//! it events and carries out its actions.
 #![no_std]
 #![no_main]
 #![feature(abi_avr_interrupt, asm_experimental_arch)]
@@ -22,7 +22,7 @@ use board_config::OPTION_REVERSED;
 
 static OPTIONS: hardware::Shared<u8> = hardware::Shared::new(0);
 
-/// Whether the motor is built in the other way round.
+/// Returns `true` if the motor is mounted in the opposite direction.
 fn is_reversed() -> bool {
     OPTIONS.read() & OPTION_REVERSED != 0
 }
@@ -36,8 +36,8 @@ extern "C" fn main() -> ! {
     board::run()
 }
 
-/// Nothing here panics, but if it did: everything safe, then the watchdog restarts the chip.
-/// Sleeping with interrupts off is what the emulator takes for a crash.
+/// Makes the pins safe and waits for the watchdog to restart the chip. No code here panics, but the
+/// language requires a handler. The emulator treats sleep with interrupts off as a crash.
 #[panic_handler]
 fn panic(_: &core::panic::PanicInfo<'_>) -> ! {
     hardware::disable_interrupts();

@@ -1,26 +1,27 @@
-//! The stepper: one pulse an alarm, with constant acceleration up to a largest speed and back.
+//! Stepper driver: one pulse per alarm, with constant acceleration up to a maximum speed and back.
 //!
-//! A motor that gains speed evenly from rest passes the middle between two steps `k - 1` and
-//! `k` at `sqrt((2k - 1) / a)`: then pulse `k` comes. So the first comes after `sqrt(1 / a)`, the
-//! pause after pulse `k` is `(sqrt(2k + 1) - sqrt(2k - 1)) * sqrt(1 / a)`, and slowing down mirrors it,
-//! with `sqrt(1 / a)` from the last pulse to the stand. A single step takes `2 sqrt(1 / a)`.
+//! A motor that accelerates uniformly from rest at `a` passes the middle between two steps `k - 1`
+//! and `k` at `sqrt((2k - 1) / a)`: pulse `k` is output at that time. So the first pulse follows
+//! after `sqrt(1 / a)`, and the pause after pulse `k` is
+//! `(sqrt(2k + 1) - sqrt(2k - 1)) * sqrt(1 / a)`. Deceleration mirrors this, with `sqrt(1 / a)`
+//! from the last pulse to rest. A single step takes `2 sqrt(1 / a)`.
 //!
-//! From one pause to the next: `d(k) = d(k - 1) * (4k - 3) / (4k - 1)`, right to 0.2 % from
-//! the fourth on (the ratio of the roots is `sqrt(1 - 1 / k)` but for terms of `1 / k^3`).
+//! The recurrence of the pauses is `d(k) = d(k - 1) * (4k - 3) / (4k - 1)`, accurate to 0.2 % from
+//! the fourth on (the ratio of the roots is `sqrt(1 - 1 / k)` except for terms of `1 / k^3`).
 
 use core::arch::asm;
 
 use crate::clock::{self, Purpose};
-use crate::hardware::{Alone, Shared, alone};
+use crate::hardware::{CriticalSection, Shared, critical_section};
 use crate::pins;
 
-/// Pauses are kept in eighths of a tick.
-const EIGHTHS_A_SECOND: u32 = 16_000_000;
-/// Of a motor that gets ever faster: so many pulses at most.
-const RAMP_MAX: u16 = u16::MAX - 1;
+/// Unit of pauses: eighths of a tick.
+const EIGHTHS_PER_SECOND: u32 = 16_000_000;
+/// Maximum number of pulses in a ramp.
+const MAX_RAMP: u16 = u16::MAX - 1;
 
-static MOTION: Shared<Motion> = Shared::new(Motion {
-    phase: Phase::Standing,
+static STEPPER: Shared<Stepper> = Shared::new(Stepper {
+    phase: MotionPhase::AtRest,
     position: 0,
     forward: true,
     left: 0,
@@ -34,176 +35,177 @@ static MOTION: Shared<Motion> = Shared::new(Motion {
     seen: None,
 });
 
-struct Motion {
-    phase: Phase,
-    /// Steps.
+struct Stepper {
+    phase: MotionPhase,
+    /// Position, steps.
     position: i32,
     forward: bool,
-    /// Pulses still to come.
+    /// Pulses left in the move.
     left: u32,
-    /// Pulses that braking to a stand takes now.
+    /// Pulses required to brake to rest from the present speed.
     ramp: u16,
-    /// After pulse number `ramp` of a start, eighths of a tick.
+    /// Pause after pulse number `ramp` of an acceleration, eighths of a tick.
     pause: u32,
-    /// From rest to the first pulse.
+    /// Pause from rest to the first pulse.
     first: u32,
-    /// At the largest speed.
+    /// Pause at the maximum speed.
     cruise: u32,
     due: u32,
     eighths: u8,
-    /// Brake when the index reads so.
+    /// Level of the index sensor at which to brake.
     watch: Option<bool>,
-    /// Where it did.
+    /// Position at which that level was detected.
     seen: Option<i32>,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Phase {
-    Standing,
-    Turning,
-    /// Stands; nobody has asked yet.
-    Arrived,
+enum MotionPhase {
+    AtRest,
+    Moving,
+    /// At rest; the result has not been taken.
+    Ended,
 }
 
-/// What came of a move.
-pub struct Arrival {
+/// Result of a move.
+pub struct MoveEnd {
     pub position: i32,
-    /// Where the watched index was seen.
+    /// Position at which the awaited sensor level was detected.
     pub seen: Option<i32>,
 }
 
-/// Holds the motor and turns it to `target`; with `watch`, until the index sensor reads so.
-pub fn turn(target: i32, speed: u16, acceleration: u32, watch: Option<bool>) {
+/// Energises the motor and moves it to `target`; with `watch`, brakes as soon as the index sensor
+/// has that level.
+pub fn move_to(target: i32, speed: u16, acceleration: u32, watch: Option<bool>) {
     // sqrt(1 / a) in eighths of a tick: 128 sqrt(a) has 16 bits.
-    let first = divide(128 * EIGHTHS_A_SECOND, root(acceleration << 14).max(1).into());
-    let cruise = divide(EIGHTHS_A_SECOND, speed.max(1).into());
+    let first = divide(128 * EIGHTHS_PER_SECOND, root(acceleration << 14).max(1).into());
+    let cruise = divide(EIGHTHS_PER_SECOND, speed.max(1).into());
     pins::enable::low();
-    alone(|alone| {
-        let motion = MOTION.get(alone);
-        let distance = target.wrapping_sub(motion.position);
-        motion.forward = distance >= 0;
-        if motion.forward != crate::is_reversed() {
+    critical_section(|cs| {
+        let stepper = STEPPER.get(cs);
+        let distance = target.wrapping_sub(stepper.position);
+        stepper.forward = distance >= 0;
+        if stepper.forward != crate::is_reversed() {
             pins::dir::high();
         } else {
             pins::dir::low();
         }
-        motion.left = distance.unsigned_abs();
-        motion.first = first;
-        motion.cruise = cruise;
-        motion.ramp = 0;
-        motion.pause = first;
-        motion.watch = watch;
-        motion.seen = None;
-        motion.phase = Phase::Turning;
-        motion.due = clock::now_alone(alone);
-        motion.eighths = 0;
-        motion.wait(alone, first);
+        stepper.left = distance.unsigned_abs();
+        stepper.first = first;
+        stepper.cruise = cruise;
+        stepper.ramp = 0;
+        stepper.pause = first;
+        stepper.watch = watch;
+        stepper.seen = None;
+        stepper.phase = MotionPhase::Moving;
+        stepper.due = clock::read_clock(cs);
+        stepper.eighths = 0;
+        stepper.wait(cs, first);
     });
 }
 
-/// Brakes, if it turns; [`take_arrival`] tells where it came to stand, in any case.
+/// Brakes if the motor moves. In any case [`take_move_end`] returns the final position.
 pub fn brake() {
-    alone(|alone| {
-        let motion = MOTION.get(alone);
-        if motion.phase == Phase::Turning {
-            motion.brake();
+    critical_section(|cs| {
+        let stepper = STEPPER.get(cs);
+        if stepper.phase == MotionPhase::Moving {
+            stepper.brake();
         } else {
-            motion.phase = Phase::Arrived;
+            stepper.phase = MotionPhase::Ended;
         }
     });
 }
 
-/// Stops dead and lets go of the coils.
+/// Stops at once and releases the coils.
 pub fn release() {
     pins::enable::high();
-    alone(|alone| {
-        let motion = MOTION.get(alone);
-        if motion.phase == Phase::Turning {
-            clock::cancel_alarm(alone);
+    critical_section(|cs| {
+        let stepper = STEPPER.get(cs);
+        if stepper.phase == MotionPhase::Moving {
+            clock::cancel_alarm(cs);
         }
-        motion.phase = Phase::Standing;
+        stepper.phase = MotionPhase::AtRest;
     });
 }
 
-pub fn is_turning() -> bool {
-    alone(|alone| MOTION.get(alone).phase == Phase::Turning)
+pub fn is_moving() -> bool {
+    critical_section(|cs| STEPPER.get(cs).phase == MotionPhase::Moving)
 }
 
-/// The end of the last move, once.
-pub fn take_arrival() -> Option<Arrival> {
-    alone(|alone| {
-        let motion = MOTION.get(alone);
-        if motion.phase != Phase::Arrived {
+/// Returns the result of the last move once.
+pub fn take_move_end() -> Option<MoveEnd> {
+    critical_section(|cs| {
+        let stepper = STEPPER.get(cs);
+        if stepper.phase != MotionPhase::Ended {
             return None;
         }
-        motion.phase = Phase::Standing;
-        Some(Arrival { position: motion.position, seen: motion.seen })
+        stepper.phase = MotionPhase::AtRest;
+        Some(MoveEnd { position: stepper.position, seen: stepper.seen })
     })
 }
 
 pub fn position() -> i32 {
-    alone(|alone| MOTION.get(alone).position)
+    critical_section(|cs| STEPPER.get(cs).position)
 }
 
-/// The present position is zero from now on.
+/// Defines the present position as zero.
 pub fn set_zero() {
-    alone(|alone| MOTION.get(alone).position = 0);
+    critical_section(|cs| STEPPER.get(cs).position = 0);
 }
 
-/// The present position is `steps` less from now on.
+/// Subtracts `steps` from the present position.
 pub fn shift_zero(steps: i32) {
-    alone(|alone| {
-        let motion = MOTION.get(alone);
-        motion.position = motion.position.wrapping_sub(steps);
+    critical_section(|cs| {
+        let stepper = STEPPER.get(cs);
+        stepper.position = stepper.position.wrapping_sub(steps);
     });
 }
 
-/// The alarm: the next pulse, or the stand after the last.
-pub fn step(alone: &Alone) {
-    let motion = MOTION.get(alone);
+/// Handles the alarm: the next pulse, or the end of the move after the last one.
+pub fn step(cs: &CriticalSection) {
+    let stepper = STEPPER.get(cs);
     // The motor has had the whole pause to reach its position.
-    if motion.watch.is_some_and(|level| pins::index() == level) {
-        motion.seen = Some(motion.position);
-        motion.brake();
+    if stepper.watch.is_some_and(|level| pins::index() == level) {
+        stepper.seen = Some(stepper.position);
+        stepper.brake();
     }
-    if motion.left == 0 {
-        motion.phase = Phase::Arrived;
-        clock::cancel_alarm(alone);
-        clock::wake(alone);
+    if stepper.left == 0 {
+        stepper.phase = MotionPhase::Ended;
+        clock::cancel_alarm(cs);
+        clock::wake(cs);
         return;
     }
-    // High while the next pause is computed: more than the 2 us that drivers ask for.
+    // High while the next pause is computed: longer than the 2 us required by drivers.
     pins::step::high();
-    let change = if motion.forward { 1 } else { -1 };
-    motion.position = motion.position.wrapping_add(change);
-    motion.left -= 1;
-    let pause = motion.next_pause();
-    motion.wait(alone, pause);
+    let change = if stepper.forward { 1 } else { -1 };
+    stepper.position = stepper.position.wrapping_add(change);
+    stepper.left -= 1;
+    let pause = stepper.next_pause();
+    stepper.wait(cs, pause);
     pins::step::low();
 }
 
-impl Motion {
+impl Stepper {
     #[inline(never)]
     fn brake(&mut self) {
         self.left = self.left.min(u32::from(self.ramp));
         self.watch = None;
     }
 
-    fn wait(&mut self, alone: &Alone, pause: u32) {
+    fn wait(&mut self, cs: &CriticalSection, pause: u32) {
         let eighths = pause + u32::from(self.eighths);
         self.eighths = (eighths & 7) as u8;
         self.due = self.due.wrapping_add(eighths >> 3);
-        clock::set_alarm(alone, Purpose::Step, self.due);
+        clock::set_alarm(cs, Purpose::Step, self.due);
     }
 
-    /// The pause after a pulse, when `left` more are to come.
+    /// Computes the pause after a pulse, with `left` pulses to follow.
     fn next_pause(&mut self) -> u32 {
         let ramp = u32::from(self.ramp);
         if self.left < ramp {
-            return self.slower();
+            return self.decelerate();
         }
-        if self.left > ramp && self.ramp < RAMP_MAX {
-            let mut pause = early(self.first, self.ramp + 1);
+        if self.left > ramp && self.ramp < MAX_RAMP {
+            let mut pause = initial_pause(self.first, self.ramp + 1);
             if pause == 0 {
                 pause = self.pause - divide(2 * self.pause, 4 * ramp + 3);
             }
@@ -211,8 +213,8 @@ impl Motion {
                 self.pause = pause;
                 self.ramp += 1;
                 if self.left == ramp + 1 {
-                    // Half way between an even number of pulses: the pause has two halves that
-                    // both belong to the fastest part.
+                    // Half way between an even number of pulses: both halves of the pause belong to
+                    // the fastest part.
                     return pause + divide(pause, 8 * (ramp + 1));
                 }
                 return pause;
@@ -222,10 +224,10 @@ impl Motion {
         self.pause.max(self.cruise)
     }
 
-    fn slower(&mut self) -> u32 {
+    fn decelerate(&mut self) -> u32 {
         self.ramp -= 1;
         let ramp = u32::from(self.ramp);
-        let mut pause = early(self.first, self.ramp);
+        let mut pause = initial_pause(self.first, self.ramp);
         if pause == 0 {
             pause = self.pause + divide(2 * self.pause, 4 * ramp + 1);
         }
@@ -234,9 +236,9 @@ impl Motion {
     }
 }
 
-/// The first pauses, which the recurrence does not give: `sqrt(2k + 1) - sqrt(2k - 1)` in 2048ths.
-/// 0 for later ones.
-fn early(first: u32, ramp: u16) -> u32 {
+/// First pauses, for which the recurrence is inaccurate: `sqrt(2k + 1) - sqrt(2k - 1)` in 2048ths.
+/// Returns 0 for later ones.
+fn initial_pause(first: u32, ramp: u16) -> u32 {
     let share = match ramp {
         0 => return first,
         1 => 1_499,
@@ -248,27 +250,27 @@ fn early(first: u32, ramp: u16) -> u32 {
     (first >> 4) * share >> 7
 }
 
-/// The integer part of the square root.
+/// Integer part of the square root.
 fn root(value: u32) -> u16 {
     let mut root = 0_u16;
     let mut bit = 0x8000_u16;
     while bit != 0 {
-        let tried = root | bit;
-        if u32::from(tried) * u32::from(tried) <= value {
-            root = tried;
+        let candidate = root | bit;
+        if u32::from(candidate) * u32::from(candidate) <= value {
+            root = candidate;
         }
         bit >>= 1;
     }
     root
 }
 
-/// `value / by`, bit by bit: the compiler's own division takes a kilobyte. 40 us.
+/// Computes `value / by` bit by bit in 40 us: the compiler's division takes a kilobyte.
 #[inline(never)]
 fn divide(value: u32, by: u32) -> u32 {
     let halves = |value: u32| (value as u16, (value >> 16) as u16);
     let ((mut low, mut high), (by_low, by_high)) = (halves(value), halves(by));
-    // SAFETY: arithmetic on its own registers. The quotient comes in below as the value goes
-    // out above, into the rest.
+    // SAFETY: arithmetic on its own registers. Quotient bits are shifted in from below while the
+    // value is shifted out into the remainder.
     unsafe {
         asm!(
             "ldi {count}, 32",

@@ -1,5 +1,5 @@
-//! Which pin is what. STEP and DIR keep away from PD2 and PD3, whose external interrupts the
-//! emulator would poll on every cycle.
+//! Pin assignment. STEP and DIR avoid PD2 and PD3, whose external interrupts the emulator would
+//! poll on every cycle.
 //!
 //! | pin | Arduino | |
 //! | --- | --- | --- |
@@ -12,12 +12,12 @@
 //! | PC1 | A1 | emergency stop, in, pulled up; closed to ground unless pressed |
 //! | PD4 | D4 | STEP |
 //! | PD5 | D5 | DIR |
-//! | PD6 | D6 | ENABLE, low holds the motor |
+//! | PD6 | D6 | ENABLE, low energises the motor |
 
 use crate::hardware::{DDRB, DDRD, PCICR, PCMSK1, PINB, PINC, PORTB, PORTC, PORTD};
 use core::arch::asm;
 
-/// An output that is switched with one instruction, so that nothing can come in between.
+/// Defines an output that is switched atomically, with a single instruction.
 macro_rules! output {
     ($(#[$meta:meta])* $name:ident, $port:literal, $bit:literal) => {
         $(#[$meta])*
@@ -44,7 +44,7 @@ output!(light, "0x05", "5");
 output!(step, "0x0b", "4");
 output!(dir, "0x0b", "5");
 output!(
-    /// Low holds the motor.
+    /// Low energises the motor.
     enable,
     "0x0b",
     "6"
@@ -54,7 +54,7 @@ const ECHO: u8 = 1;
 const INDEX: u8 = 1;
 const EMERGENCY: u8 = 2;
 
-/// Coils off and everything low, before the pins become outputs.
+/// Initialises the pins: coils off and all outputs low, before the pins become outputs.
 pub fn set_up() {
     PORTB.write(0);
     DDRB.write(0b10_1110);
@@ -66,7 +66,7 @@ pub fn set_up() {
     PCICR.write(0b10);
 }
 
-/// Nothing fires and nothing turns. Harmless at any time.
+/// Ends firing and motion. Harmless at any time.
 pub fn make_safe() {
     crate::hardware::TCCR1A.write(0);
     init::low();
@@ -86,7 +86,7 @@ pub fn index() -> bool {
     PINC.has(INDEX)
 }
 
-/// Pressed, or its wire broken.
+/// Returns `true` if the emergency stop is pressed or its wire is broken.
 #[inline(always)]
 pub fn emergency() -> bool {
     PINC.has(EMERGENCY)

@@ -1,51 +1,52 @@
-//! The ranging module: fires it, listens, and shortens or repeats its listening.
+//! Ranging module: firing, recording of echoes, blanking control.
 //!
-//! INIT is raised by the timer itself, ECHO is timed by the timer itself, so neither depends on
-//! what the program does meanwhile.
+//! The timer hardware raises INIT and captures ECHO, so neither time depends on the program.
 
 use firmware_protocol::device::EchoReport;
 use firmware_protocol::messages::{Blanking, Echoes, ReadingStatus};
 
 use crate::clock::{self, Purpose};
-use crate::hardware::{Alone, ICR1, OCR1A, Shared, TCCR1A, TCCR1C, TCNT1, alone};
+use crate::hardware::{
+    CriticalSection, ICR1, OCR1A, Shared, TCCR1A, TCCR1C, TCNT1, critical_section,
+};
 use crate::pins;
 
-/// From the order to fire until INIT rises, ticks.
+/// Ticks from the command to fire until INIT rises.
 const LEAD: u16 = 32;
-/// How long BLNK is held, ticks: at least 0.44 ms, so that the echo just heard has passed.
+/// Duration of a BLNK pulse, ticks: at least 0.44 ms, so that the recorded echo has passed.
 const BLNK_TICKS: u32 = 1_000;
 
 const RAISE_AT_MATCH: u8 = 0b1100_0000;
 const LOWER_AT_MATCH: u8 = 0b1000_0000;
 const MATCH_NOW: u8 = 0b1000_0000;
 
-static LISTENING: Shared<Listening> = Shared::new(Listening::none());
+static RANGING: Shared<RangingState> = Shared::new(RangingState::none());
 
-struct Listening {
-    phase: Phase,
+struct RangingState {
+    phase: RangingPhase,
     report: EchoReport,
     window: u32,
-    /// When BINH is to rise, ticks after firing; 0 for never, or when it has.
+    /// Ticks from firing until BINH rises; 0 for never, or after it has risen.
     binh_after: u16,
-    /// When BLNK is to fall.
+    /// Time at which BLNK falls.
     blnk_until: Option<u32>,
     max_echoes: u8,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd)]
-enum Phase {
+enum RangingPhase {
     Idle,
     Listening,
-    /// The window is over; nobody has asked for the echoes.
+    /// The window is over; the report has not been taken.
     Over,
     /// ECHO was high, so the module was not fired.
     Stuck,
 }
 
-impl Listening {
+impl RangingState {
     const fn none() -> Self {
         Self {
-            phase: Phase::Idle,
+            phase: RangingPhase::Idle,
             report: EchoReport {
                 fired_ticks: 0,
                 status: ReadingStatus::Echo,
@@ -58,8 +59,8 @@ impl Listening {
         }
     }
 
-    /// Sets the alarm for whatever comes next.
-    fn schedule(&self, alone: &Alone) {
+    /// Sets the alarm for the next event.
+    fn schedule(&self, cs: &CriticalSection) {
         let mut after = self.window;
         if self.binh_after != 0 {
             after = after.min(u32::from(self.binh_after));
@@ -67,54 +68,55 @@ impl Listening {
         if let Some(until) = self.blnk_until {
             after = after.min(until.wrapping_sub(self.report.fired_ticks));
         }
-        clock::set_alarm(alone, Purpose::Listen, self.report.fired_ticks.wrapping_add(after));
+        clock::set_alarm(cs, Purpose::Ranging, self.report.fired_ticks.wrapping_add(after));
     }
 }
 
-/// Fires, and listens for `window` ticks.
+/// Fires, and records echoes for `window` ticks.
 pub fn fire(window: u32, max_echoes: u8, blanking: Blanking) {
     let binh_after = match blanking {
         Blanking::Internal => 0,
         Blanking::Short { ticks } => ticks,
     };
-    alone(|alone| {
-        let listening = LISTENING.get(alone);
-        *listening = Listening { window, binh_after, max_echoes, ..Listening::none() };
+    critical_section(|cs| {
+        let ranging = RANGING.get(cs);
+        *ranging = RangingState { window, binh_after, max_echoes, ..RangingState::none() };
         if pins::echo() {
-            listening.report.fired_ticks = clock::now_alone(alone);
-            listening.phase = Phase::Stuck;
-            clock::wake(alone);
+            ranging.report.fired_ticks = clock::read_clock(cs);
+            ranging.phase = RangingPhase::Stuck;
+            clock::wake(cs);
             return;
         }
-        listening.report.fired_ticks = raise_init(alone);
-        listening.phase = Phase::Listening;
-        listening.schedule(alone);
+        ranging.report.fired_ticks = raise_init(cs);
+        ranging.phase = RangingPhase::Listening;
+        ranging.schedule(cs);
     });
 }
 
-/// Lets the compare unit raise INIT, then hands the pin over to the port; tells when it rose.
-fn raise_init(alone: &Alone) -> u32 {
-    let mut at = (clock::now_alone(alone) as u16).wrapping_add(LEAD);
-    // The emulator's compare unit drops the pin when the counter wraps, so the hand-over must
-    // not fall there; the chip does not mind.
+/// Raises INIT with the compare unit, then hands the pin over to the port. Returns the time of the
+/// rise.
+fn raise_init(cs: &CriticalSection) -> u32 {
+    let mut at = (clock::read_clock(cs) as u16).wrapping_add(LEAD);
+    // The emulator's compare unit drops the pin when the counter wraps, so the hand-over must not
+    // occur there. The chip has no such limit.
     if at > u16::MAX - LEAD {
         at = at.wrapping_add(2 * LEAD);
     }
-    OCR1A.write_pair(alone, at);
+    OCR1A.write_pair(cs, at);
     TCCR1A.write(RAISE_AT_MATCH);
-    while (TCNT1.read_pair(alone).wrapping_sub(at) as i16) < 2 {}
+    while (TCNT1.read_pair(cs).wrapping_sub(at) as i16) < 2 {}
     pins::init::high();
     TCCR1A.write(0);
-    // The pin follows at the tick after the match.
-    clock::extend(alone, at).wrapping_add(1)
+    // The pin changes one tick after the match.
+    clock::extend(cs, at).wrapping_add(1)
 }
 
-/// Takes INIT away and makes everything as before firing.
-fn lower_init(alone: &Alone) {
-    // The emulator's compare unit raises the pin if the counter wraps while it is to lower it.
-    while TCNT1.read_pair(alone) > u16::MAX - 4 {}
-    // The compare unit keeps the level of its last match, and would show it as soon as it gets
-    // the pin back: it is set low first, while INIT is still high.
+/// Lowers INIT and restores the state before firing.
+fn lower_init(cs: &CriticalSection) {
+    // The emulator's compare unit raises the pin if the counter wraps while lowering is armed.
+    while TCNT1.read_pair(cs) > u16::MAX - 4 {}
+    // The compare unit keeps the level of its last match and would output it when connected to the
+    // pin again. It is set low first, while INIT is still high.
     TCCR1A.write(LOWER_AT_MATCH);
     TCCR1C.write(MATCH_NOW);
     pins::init::low();
@@ -123,79 +125,79 @@ fn lower_init(alone: &Alone) {
     pins::blnk::low();
 }
 
-/// Takes INIT away and forgets the firing.
+/// Lowers INIT and discards the firing.
 pub fn abort() {
-    alone(|alone| {
-        let listening = LISTENING.get(alone);
-        if listening.phase == Phase::Listening {
-            clock::cancel_alarm(alone);
-            lower_init(alone);
+    critical_section(|cs| {
+        let ranging = RANGING.get(cs);
+        if ranging.phase == RangingPhase::Listening {
+            clock::cancel_alarm(cs);
+            lower_init(cs);
         }
-        listening.phase = Phase::Idle;
+        ranging.phase = RangingPhase::Idle;
     });
 }
 
-pub fn is_listening() -> bool {
-    alone(|alone| LISTENING.get(alone).phase == Phase::Listening)
+pub fn is_ranging() -> bool {
+    critical_section(|cs| RANGING.get(cs).phase == RangingPhase::Listening)
 }
 
-/// What was heard, once, after the window; to be let go of before the next firing.
+/// Returns the result once, after the window. The reference must be dropped before the next firing.
 pub fn take_report() -> Option<&'static EchoReport> {
-    alone(|alone| {
-        let listening = LISTENING.get(alone);
-        if listening.phase < Phase::Over {
+    critical_section(|cs| {
+        let ranging = RANGING.get(cs);
+        if ranging.phase < RangingPhase::Over {
             return None;
         }
-        if listening.phase == Phase::Stuck {
-            listening.report.status = ReadingStatus::ModuleFault;
+        if ranging.phase == RangingPhase::Stuck {
+            ranging.report.status = ReadingStatus::ModuleFault;
         }
-        listening.phase = Phase::Idle;
-        // SAFETY: nobody writes to it before the next firing.
-        Some(unsafe { &*(&raw const listening.report) })
+        ranging.phase = RangingPhase::Idle;
+        // SAFETY: not written before the next firing.
+        Some(unsafe { &*(&raw const ranging.report) })
     })
 }
 
-/// The alarm that [`Listening::schedule`] has set.
-pub fn alarm(alone: &Alone, now: u32) {
-    let listening = LISTENING.get(alone);
-    let after = now.wrapping_sub(listening.report.fired_ticks);
-    if after >= listening.window {
-        lower_init(alone);
-        listening.phase = Phase::Over;
-        clock::cancel_alarm(alone);
-        clock::wake(alone);
+/// Handles the alarm set by [`RangingState::schedule`].
+pub fn alarm(cs: &CriticalSection, now: u32) {
+    let ranging = RANGING.get(cs);
+    let after = now.wrapping_sub(ranging.report.fired_ticks);
+    if after >= ranging.window {
+        lower_init(cs);
+        ranging.phase = RangingPhase::Over;
+        clock::cancel_alarm(cs);
+        clock::wake(cs);
         return;
     }
-    if listening.binh_after != 0 && after >= u32::from(listening.binh_after) {
+    if ranging.binh_after != 0 && after >= u32::from(ranging.binh_after) {
         pins::binh::high();
-        listening.binh_after = 0;
+        ranging.binh_after = 0;
     }
-    if listening.blnk_until.is_some_and(|until| clock::is_past(now, until)) {
+    if ranging.blnk_until.is_some_and(|until| clock::is_past(now, until)) {
         pins::blnk::low();
-        listening.blnk_until = None;
+        ranging.blnk_until = None;
     }
-    listening.schedule(alone);
+    ranging.schedule(cs);
 }
 
-/// TIMER1_CAPT: ECHO rose.
+/// Handles TIMER1_CAPT, a rising edge of ECHO.
 #[unsafe(no_mangle)]
 extern "avr-interrupt" fn __vector_10() {
     // SAFETY: an interrupt handler.
-    let alone = &unsafe { Alone::in_interrupt() };
-    let captured = clock::extend(alone, ICR1.read_pair(alone));
-    let listening = LISTENING.get(alone);
-    let after = captured.wrapping_sub(listening.report.fired_ticks);
-    if listening.phase != Phase::Listening || after > listening.window {
+    let cs = &unsafe { CriticalSection::in_interrupt() };
+    let captured = clock::extend(cs, ICR1.read_pair(cs));
+    let ranging = RANGING.get(cs);
+    let after = captured.wrapping_sub(ranging.report.fired_ticks);
+    if ranging.phase != RangingPhase::Listening || after > ranging.window {
         return;
     }
-    let echoes = &mut listening.report.echoes;
-    if echoes.len() < usize::from(listening.max_echoes)
+    let echoes = &mut ranging.report.echoes;
+    if echoes.len() < usize::from(ranging.max_echoes)
         && echoes.push(after).is_ok()
-        && echoes.len() < usize::from(listening.max_echoes)
+        && echoes.len() < usize::from(ranging.max_echoes)
     {
-        // Lowers ECHO and keeps the module deaf until the same echo has passed.
+        // Lowers ECHO and blanks the receiver until this echo has passed.
         pins::blnk::high();
-        listening.blnk_until = Some(captured.wrapping_add(BLNK_TICKS));
-        listening.schedule(alone);
+        ranging.blnk_until = Some(captured.wrapping_add(BLNK_TICKS));
+        ranging.schedule(cs);
     }
 }

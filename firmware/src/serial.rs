@@ -1,9 +1,12 @@
-//! The serial line: 115200 bit/s, bytes by interrupts through two small rings.
+//! Serial line: 115200 bit/s, interrupt-driven with two small ring buffers.
 
 use crate::clock;
-use crate::hardware::{Alone, Shared, UBRR0L, UCSR0A, UCSR0B, UCSR0C, UDR0, alone};
+use crate::hardware::{
+    CriticalSection, Shared, UBRR0L, UCSR0A, UCSR0B, UCSR0C, UDR0, critical_section,
+};
 
-/// Room for what comes in while the main loop checks a frame (0.6 ms, 7 bytes) and builds one.
+/// Capacity for bytes that arrive while the main loop checks a frame (0.6 ms, 7 bytes) and encodes
+/// one.
 const IN: usize = 64;
 const OUT: usize = 32;
 
@@ -11,20 +14,20 @@ const DOUBLE_SPEED: u8 = 1 << 1;
 const OVERRUN: u8 = 1 << 3;
 const FRAMING: u8 = 1 << 4;
 const RECEIVER_AND_SENDER: u8 = 0b1001_1000;
-const ROOM_INTERRUPT: u8 = 1 << 5;
+const SEND_INTERRUPT: u8 = 1 << 5;
 
-static RECEIVED: Shared<Ring<IN>> = Shared::new(Ring::new());
-static TO_SEND: Shared<Ring<OUT>> = Shared::new(Ring::new());
-/// The UART, or a full ring, lost something.
-static DAMAGED: Shared<bool> = Shared::new(false);
+static RECEIVED: Shared<ByteRing<IN>> = Shared::new(ByteRing::new());
+static TO_SEND: Shared<ByteRing<OUT>> = Shared::new(ByteRing::new());
+/// Set when the UART or a full buffer has lost a byte.
+static LINE_ERROR: Shared<bool> = Shared::new(false);
 
-struct Ring<const N: usize> {
+struct ByteRing<const N: usize> {
     bytes: [u8; N],
     first: u8,
     len: u8,
 }
 
-impl<const N: usize> Ring<N> {
+impl<const N: usize> ByteRing<N> {
     const fn new() -> Self {
         Self { bytes: [0; N], first: 0, len: 0 }
     }
@@ -48,7 +51,8 @@ impl<const N: usize> Ring<N> {
     }
 }
 
-/// 115200 bit/s with the finer divider (2.1 % fast, which every UART takes), 8N1.
+/// Starts the UART: 115200 bit/s with the double-speed divider (2.1 % fast, within the tolerance of
+/// every UART), 8N1.
 pub fn start() {
     UBRR0L.write(16);
     UCSR0A.write(DOUBLE_SPEED);
@@ -56,26 +60,26 @@ pub fn start() {
     UCSR0B.write(RECEIVER_AND_SENDER);
 }
 
-/// The next byte from the host.
+/// Returns the next byte from the host.
 pub fn receive() -> Option<u8> {
-    alone(|alone| RECEIVED.get(alone).pop())
+    critical_section(|cs| RECEIVED.get(cs).pop())
 }
 
-/// Whether bytes were lost since the last call.
-pub fn take_damage() -> bool {
-    alone(|alone| core::mem::replace(DAMAGED.get(alone), false))
+/// Returns `true` if bytes were lost since the last call.
+pub fn take_line_error() -> bool {
+    critical_section(|cs| core::mem::replace(LINE_ERROR.get(cs), false))
 }
 
-/// Whether a byte can be sent now.
+/// Returns `true` if the send buffer has room.
 pub fn has_room() -> bool {
-    alone(|alone| usize::from(TO_SEND.get(alone).len) < OUT)
+    critical_section(|cs| usize::from(TO_SEND.get(cs).len) < OUT)
 }
 
-/// Sends a byte; the caller has asked for the room.
+/// Sends a byte; the caller has checked [`has_room`].
 pub fn send(byte: u8) {
-    alone(|alone| {
-        TO_SEND.get(alone).push(byte);
-        UCSR0B.set(alone, ROOM_INTERRUPT);
+    critical_section(|cs| {
+        TO_SEND.get(cs).push(byte);
+        UCSR0B.set(cs, SEND_INTERRUPT);
     });
 }
 
@@ -83,27 +87,27 @@ pub fn send(byte: u8) {
 #[unsafe(no_mangle)]
 extern "avr-interrupt" fn __vector_18() {
     // SAFETY: an interrupt handler.
-    let alone = &unsafe { Alone::in_interrupt() };
+    let cs = &unsafe { CriticalSection::in_interrupt() };
     // The status belongs to the byte that is read next.
-    let damaged = UCSR0A.has(OVERRUN | FRAMING);
+    let line_error = UCSR0A.has(OVERRUN | FRAMING);
     let byte = UDR0.read();
-    if damaged || !RECEIVED.get(alone).push(byte) {
-        *DAMAGED.get(alone) = true;
+    if line_error || !RECEIVED.get(cs).push(byte) {
+        *LINE_ERROR.get(cs) = true;
     }
-    clock::wake(alone);
+    clock::wake(cs);
 }
 
 /// USART_UDRE
 #[unsafe(no_mangle)]
 extern "avr-interrupt" fn __vector_19() {
     // SAFETY: an interrupt handler.
-    let alone = &unsafe { Alone::in_interrupt() };
-    let ring = TO_SEND.get(alone);
+    let cs = &unsafe { CriticalSection::in_interrupt() };
+    let ring = TO_SEND.get(cs);
     match ring.pop() {
         Some(byte) => UDR0.write(byte),
-        None => UCSR0B.clear(alone, ROOM_INTERRUPT),
+        None => UCSR0B.clear(cs, SEND_INTERRUPT),
     }
     if usize::from(ring.len) < OUT / 2 {
-        clock::wake(alone);
+        clock::wake(cs);
     }
 }

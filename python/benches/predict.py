@@ -1,7 +1,7 @@
-"""How fast readings are beside Rust's own: `python python/benches/predict.py`, with the package installed.
+"""Speed of predictions compared with Rust: `python python/benches/predict.py`, with the package installed.
 
-Prints readings a second for 400 scans of 400 beams in `simple-room`, and the ratio to `Simulator::predict_many`
-in the same process, run in turn; of each the best of seven counts, because other programs run on a computer, too.
+Prints readings per second for 400 scans of 400 beams in `simple-room`, and the ratio to `Simulator::predict_many`
+in the same process, run alternately. The best of seven runs counts, because other programs use the computer, too.
 """
 
 import time
@@ -28,7 +28,7 @@ def main() -> None:
 
     rounds = [(here(), _seconds_of_predict_many(model, poses)) for _ in range(7)]
     python_s, rust_s = (min(times) for times in zip(*rounds, strict=True))
-    print(f"{len(poses)} scans: {len(poses) * 400 / python_s:,.0f} readings a second, {rust_s / python_s:.2f} of what Rust has")
+    print(f"{len(poses)} scans: {len(poses) * 400 / python_s:,.0f} readings per second, {rust_s / python_s:.2f} of the speed of Rust")
 
 
 if __name__ == "__main__":

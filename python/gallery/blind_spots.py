@@ -1,4 +1,4 @@
-"""Where a ranger that looks all around sees the wall nearest to it, and where mirrors fool it."""
+"""Map of the beams that measure the nearest wall, and of those that measure a multiple reflection."""
 
 import sys
 
@@ -23,12 +23,12 @@ poses = np.column_stack([places, np.zeros(len(places))])
 azimuths_deg = np.arange(0, 360, 5.0)
 readings = model.predict(poses, azimuths_deg)
 
-# How far off a reading is from what a laser would say at that place, at most: the share of beams that are long.
+# Fraction of the beams with a longer range than an ideal laser at the same pose.
 simple = sonard.Model(scene, engine="cone", aperture_deg=0.0, max_range_m=6.0).predict(poses, azimuths_deg)
 long = readings["range_m"] > simple["range_m"] + 0.1
 share = np.full(free.shape, np.nan)
 share[free] = long.mean(axis=1)
-print(f"{readings.size} readings at {len(places)} places: {long.mean():.0%} come from beyond what stands ahead")
+print(f"{readings.size} readings at {len(places)} places: {long.mean():.0%} are longer than the distance straight ahead")
 
 try:
     import matplotlib
@@ -39,6 +39,6 @@ except ImportError:
     sys.exit(0)
 
 plt.imshow(share, origin="lower", extent=(0, 4, 0, 3))
-plt.colorbar(label="share of beams that read too long")
+plt.colorbar(label="fraction of beams with too long a range")
 plt.plot(*scene.walls.transpose(2, 1, 0), "k")
 plt.savefig(sys.argv[1] if len(sys.argv) > 1 else "blind_spots.png")

@@ -1,4 +1,4 @@
-"""A scan of a small room: what the ranger reads, and what there is."""
+"""Scan of a small room: predicted readings and actual walls."""
 
 import sys
 
@@ -15,7 +15,7 @@ echoes = readings["status"] == sonard.Status.ECHO
 directions = np.radians(heading + np.arange(400) * 0.9)[echoes]
 ranges_m = readings["range_m"][echoes]
 points = np.column_stack([x + ranges_m * np.cos(directions), y + ranges_m * np.sin(directions)])
-print(f"{echoes.sum()} of {readings.size} firings are answered, {(scene.clearance_m(points) < 0.02).sum()} by the wall ahead")
+print(f"{echoes.sum()} of {readings.size} firings return an echo, {(scene.clearance_m(points) < 0.02).sum()} of them from the wall ahead")
 
 try:
     import matplotlib

@@ -1,11 +1,11 @@
-"""From sweeps to a map: a benchmark for learners, with two baselines.
+"""Occupancy maps from sweeps: a benchmark for machine learning, with two baselines.
 
-The data are fixed (learn_occupancy.toml, made here; another file may be named): 24 furnished rooms with ten sweeps each, of
-400 readings. The task is to say of each cell of a room how likely something is there, from the sweeps of that room alone. The metric is the average
-precision of occupied cells among those that are known, each room by itself, and the mean over the rooms of the last shard,
-which no learner may have seen. Cells that nobody can reach from the places of the sweeps do not count.
+The data are fixed (learn_occupancy.toml, generated here; another file may be given): 24 furnished rooms with ten sweeps
+each, of 400 readings. The task is to predict the probability that a cell of a room is occupied, from the sweeps of that room
+alone. The metric is the average precision of occupied cells among the known cells of each room, averaged over the rooms of
+the last shard, which must not be used for training. Cells that are unreachable from the poses of the sweeps do not count.
 
-Baselines: the map of `sonard map`, and a small gradient boosting on what the sweeps say of a cell.
+Baselines: the map of `sonard map`, and a small gradient boosting on features of the sweeps at a cell.
 """
 
 import os
@@ -33,7 +33,7 @@ Table = dict[str, list[float]]
 
 
 class Room:
-    """The sweeps of a room, and its map as it should be."""
+    """Sweeps of a room, and its true map."""
 
     def __init__(self, readings: Table, truth: Table) -> None:
         column = {name: np.array(values, dtype=float) for name, values in readings.items() if name != "status"}
@@ -67,7 +67,7 @@ def score(room: Room, occupancy: Array) -> float:
 
 
 def mapped(room: Room, folder: Path) -> Array:
-    """What `sonard map` makes of the sweeps."""
+    """Returns the map of `sonard map` for the sweeps."""
     table, log = folder / "room.csv", folder / "room.jsonl"
     columns = ["x_m", "y_m", "heading_deg", "azimuth_deg", "range_m"]
     rows = np.column_stack([room.table[name] for name in columns])
@@ -81,16 +81,16 @@ def mapped(room: Room, folder: Path) -> Array:
 
 
 def features(room: Room) -> Array:
-    """What each sweep says of each cell, over all sweeps: shape (cells, features)."""
+    """Features of each cell, over all sweeps: shape (cells, features)."""
     centres = room.centres()
     off_m = centres[:, None, :] - room.places[None, :, :2]
     distance_m = np.hypot(off_m[..., 0], off_m[..., 1])
     azimuth_deg = np.degrees(np.arctan2(off_m[..., 1], off_m[..., 0])) - room.places[None, :, 2]
     beam = np.round(azimuth_deg / STEP_DEG).astype(int) % 400
     sweep = np.arange(len(room.places))[None, :]
-    # How much farther a beam and those beside it heard something than the cell is.
-    beside = np.stack([room.ranges_m[sweep, (beam + turn) % 400] for turn in range(-NEAR_BEAMS, NEAR_BEAMS + 1)])
-    beyond_m = np.clip(beside - distance_m, -REACH_M, REACH_M)
+    # Range of the beam and of its neighbours minus the distance of the cell.
+    neighbours = np.stack([room.ranges_m[sweep, (beam + turn) % 400] for turn in range(-NEAR_BEAMS, NEAR_BEAMS + 1)])
+    beyond_m = np.clip(neighbours - distance_m, -REACH_M, REACH_M)
     straight_m, nearest_m = beyond_m[NEAR_BEAMS], np.abs(beyond_m).min(axis=0)
     passed, hit = (beyond_m.min(axis=0) > 0.15), (np.abs(straight_m) < 0.1)
     by_distance = np.argsort(distance_m, axis=1)[:, :3]
@@ -112,9 +112,9 @@ def features(room: Room) -> Array:
 
 def learned(train: list[Room]) -> sklearn.ensemble.HistGradientBoostingClassifier:
     known = [room.truth <= OCCUPIED for room in train]
-    said = np.concatenate([features(room)[of] for room, of in zip(train, known)])
+    inputs = np.concatenate([features(room)[of] for room, of in zip(train, known)])
     truth = np.concatenate([room.truth[of] == OCCUPIED for room, of in zip(train, known)])
-    return sklearn.ensemble.HistGradientBoostingClassifier(random_state=0).fit(said, truth)
+    return sklearn.ensemble.HistGradientBoostingClassifier(random_state=0).fit(inputs, truth)
 
 
 folder = Path("learn-occupancy")
@@ -129,7 +129,7 @@ scores = {
     "gradient boosting": [score(room, model.predict_proba(features(room))[:, 1]) for room in test],
 }
 for name, of_rooms in scores.items():
-    print(f"{name:18} average precision {np.mean(of_rooms):.3f}  ({', '.join(f'{one:.2f}' for one in of_rooms)})")
+    print(f"{name:18} average precision {np.mean(of_rooms):.3f}  ({', '.join(f'{value:.2f}' for value in of_rooms)})")
 means = {name: np.mean(of_rooms) for name, of_rooms in scores.items()}
-assert means["chance"] < 0.6 * means["sonard map"], "a map says more than nothing"
-assert means["sonard map"] < means["gradient boosting"], "and who has seen such rooms more than a map"
+assert means["chance"] < 0.6 * means["sonard map"], "the map must be better than chance"
+assert means["sonard map"] < means["gradient boosting"], "learning must be better than the map"

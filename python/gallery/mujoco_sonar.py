@@ -1,7 +1,7 @@
-"""A sonar in MuJoCo, beside MuJoCo's own rangefinder, which is one ray.
+"""Sonar in MuJoCo, compared with MuJoCo's own rangefinder, which is a single ray.
 
-A robot drives along a wall that it looks at aslant. The ray meets the wall straight ahead; the sonar hears what its beam is
-square to, or nothing at all. A `user` sensor holds the sonar's reading: MuJoCo asks a callback for it at each step.
+A robot drives along a wall at an oblique angle. The ray hits the wall straight ahead; the sonar detects surfaces
+perpendicular to its beam, or nothing at all. A `user` sensor provides the reading: MuJoCo invokes a callback at each step.
 """
 
 import mujoco
@@ -54,7 +54,7 @@ sonar = world.sensor("sonar").adr[0]
 
 
 def pose_of(data: mujoco.MjData) -> tuple[float, float, float]:
-    """Where the sonar stands and points: a rangefinder looks along its site's z axis."""
+    """Pose of the sonar: a rangefinder points along the z axis of its site."""
     x, y = data.site_xpos[site, :2]
     ahead = data.site_xmat[site].reshape(3, 3)[:, 2]
     return float(x), float(y), float(np.degrees(np.arctan2(ahead[1], ahead[0])))
@@ -76,11 +76,11 @@ try:
         if step % 20 == 0:
             mujoco.mj_forward(world, data)
             rows.append((data.site_xpos[site, 0], data.sensordata[ray], data.sensordata[sonar]))
-            # What the sensor holds is what the model says at that pose.
+            # The sensor contains the prediction of the model at that pose.
             assert data.sensordata[sonar] == model.predict(pose_of(data), [0.0])["range_m"][0]
 finally:
     mujoco.set_mjcb_sensor(None)
 for x, ray_m, sonar_m in rows:
-    heard = f"{sonar_m:.3f} m" if np.isfinite(sonar_m) else "nothing"
-    print(f"x {x:.2f} m: the ray {ray_m:.3f} m, the sonar {heard}")
-assert any(abs(ray_m - sonar_m) > 0.05 for _, ray_m, sonar_m in rows), "a sonar is no ray"
+    reading = f"{sonar_m:.3f} m" if np.isfinite(sonar_m) else "no echo"
+    print(f"x {x:.2f} m: the ray {ray_m:.3f} m, the sonar {reading}")
+assert any(abs(ray_m - sonar_m) > 0.05 for _, ray_m, sonar_m in rows), "the sonar never differs from the ray"

@@ -1,4 +1,4 @@
-"""Image sources of a box-shaped room, by sonard and by pyroomacoustics: the same, and how long each takes.
+"""Image sources of a box-shaped room by sonard and by pyroomacoustics: agreement and computing time.
 
 Needs ``pip install pyroomacoustics``.
 """
@@ -14,7 +14,7 @@ import sonard
 
 
 def by_sonard(size: list[float], place: list[float], order: int) -> tuple[NDArray[np.float64], float]:
-    """Places of the images of a source at the receiver's own place, and seconds."""
+    """Returns the image sources of a source at the position of the receiver, and the computing time in seconds."""
     width, depth, *height = size
     scene = sonard.Scene.from_points(
         [[0.0, 0.0], [width, 0.0], [width, depth], [0.0, depth]],
@@ -22,7 +22,7 @@ def by_sonard(size: list[float], place: list[float], order: int) -> tuple[NDArra
         floor_z_m=0.0 if height else None,
         ceiling_z_m=height[0] if height else None,
     )
-    # In the plane of the scan alone the ranger has no height.
+    # In a two-dimensional scene the ranger has no height.
     sensor = sonard.Sensor.preset("senscomp-6500")
     if height:
         sensor = sensor.replace(mounting={"z_m": place[2]})
@@ -35,13 +35,13 @@ def by_sonard(size: list[float], place: list[float], order: int) -> tuple[NDArra
 
 
 def image(path: sonard.Path, place: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Where the sound seems to come from: as far as it went, in the direction of what it met last."""
+    """Position of an image source: at the length of the path, in the direction of its last interaction."""
     towards = path.points[-1] - place
     return np.asarray(place + path.length_m * towards / np.linalg.norm(towards))
 
 
 def by_pyroomacoustics(size: list[float], place: list[float], order: int) -> tuple[NDArray[np.float64], float]:
-    """The same."""
+    """Returns the image sources and the computing time in seconds, as `by_sonard` does."""
     room: Any = pra.ShoeBox(size, max_order=order, materials=pra.Material(0.0))
     room.add_source(place)
     room.add_microphone(place)
@@ -53,7 +53,7 @@ def by_pyroomacoustics(size: list[float], place: list[float], order: int) -> tup
 
 
 def in_order(points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The points in an order that does not depend on whose they are."""
+    """Sorts the points, for a comparison independent of their order."""
     return points[np.lexsort(np.round(points, 6).T)]
 
 

@@ -1,4 +1,4 @@
-"""A robot that lost its way finds it by one sweep of its sonar."""
+"""Global localisation of a robot from a single sweep of its sonar."""
 
 import sys
 

@@ -1,13 +1,13 @@
-//! The air.
+//! Python class for the state of the air.
 
 use std::hash::{DefaultHasher, Hash as _, Hasher as _};
 
 use pyo3::prelude::*;
-use sonard_model::acoustics::{self, AirError as Refused};
+use sonard_model::acoustics::{self, AirError as ModelAirError};
 
-use crate::error::{AirError, refuse};
+use crate::error::{AirError, new_error};
 
-/// The state of the air, and with it the speed of sound and how much sound the air absorbs.
+/// State of the air, which determines the speed of sound and the absorption.
 ///
 /// Parameters
 /// ----------
@@ -18,8 +18,8 @@ use crate::error::{AirError, refuse};
 /// pressure_kpa : float
 ///     Static pressure, kilopascals, 60 to 110.
 /// sound_speed_m_s : float, optional
-///     Metres a second, 200 to 500, in place of the one that follows from the air; absorption still follows
-///     from the air.
+///     Speed of sound, metres per second, 200 to 500, which replaces the computed one. The
+///     absorption still follows from the state of the air.
 #[pyclass(frozen, module = "sonard")]
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Air {
@@ -38,16 +38,16 @@ impl Air {
         pressure_kpa: f64,
         sound_speed_m_s: Option<f64>,
     ) -> PyResult<Self> {
-        let made = acoustics::Air::new(temperature_c, humidity_percent, pressure_kpa);
-        let made = made.and_then(|air| match sound_speed_m_s {
+        let air = acoustics::Air::new(temperature_c, humidity_percent, pressure_kpa);
+        let air = air.and_then(|air| match sound_speed_m_s {
             None => Ok(air),
             Some(speed_m_s) => air.with_sound_speed(speed_m_s),
         });
-        let refused = |error: Refused| refuse::<AirError>(py, &error.to_string(), "");
-        Ok(Self { air: made.map_err(refused)?, given_m_s: sound_speed_m_s })
+        let to_exception = |error: ModelAirError| new_error::<AirError>(py, &error.to_string(), "");
+        Ok(Self { air: air.map_err(to_exception)?, given_m_s: sound_speed_m_s })
     }
 
-    /// Degrees Celsius.
+    /// Temperature, degrees Celsius.
     #[getter]
     fn temperature_c(&self) -> f64 {
         self.air.temperature_c()
@@ -65,13 +65,13 @@ impl Air {
         self.air.pressure_kpa()
     }
 
-    /// Speed of sound, metres a second: the one given, else Cramer's (1993).
+    /// Speed of sound, metres per second: the given one, else by Cramer (1993).
     #[getter]
     fn sound_speed_m_s(&self) -> f64 {
         self.air.sound_speed_m_s()
     }
 
-    /// Absorption of a tone of that frequency in hertz, decibels a metre (ISO 9613-1).
+    /// Absorption of a tone of the given frequency in hertz, decibels per metre (ISO 9613-1).
     fn absorption_db_per_m(&self, frequency_hz: f64) -> f64 {
         self.air.absorption_db_per_m(frequency_hz)
     }

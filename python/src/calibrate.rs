@@ -1,4 +1,4 @@
-//! What sensor, air, scene and poses explain readings best.
+//! Fits sensor, air, scene and poses to measured readings.
 
 use std::{collections::BTreeMap, sync::Arc};
 
@@ -14,11 +14,11 @@ use sonard::{
 use sonard_model::geometry::Pose;
 
 use crate::{
-    arrays::{self, Poses},
-    error::{LogError, OptionError, SonardError, refuse},
+    arrays::{self, PoseArray},
+    error::{LogError, OptionError, SonardError, new_error},
     log::{Scan, scans_of},
     model::Model,
-    options::word,
+    options::parse_name,
     path::result,
     pool::pool,
     scene::Scene,
@@ -26,36 +26,40 @@ use crate::{
     sensor::Sensor,
 };
 
-/// What is fitted without a word, as by the command.
-const USUAL: [&str; 3] = ["pose", "air", "threshold"];
+/// Parameter groups fitted by default, as by the command.
+const DEFAULT_FIT: [&str; 3] = ["pose", "air", "threshold"];
 
-/// Fits sensor, air, scene and poses to what was measured, as ``sonard calibrate`` does.
+/// Fits sensor, air, scene and poses to measured readings, as ``sonard calibrate`` does.
 ///
-/// Starts from what is believed, with a doubt about each parameter, and finds the values with which the model explains
-/// the readings best. What the readings can't tell stays where it was.
+/// Starts from the prior values, each with a standard deviation, and finds the values that maximise
+/// the posterior probability of the readings. Parameters that the readings do not determine keep
+/// their prior values.
 ///
 /// Parameters
 /// ----------
 /// scans : Log, Scan or sequence of them
-///     Sweeps of one ranger on a stepper; those that can't be used are left out with a warning.
+///     Sweeps of a single ranger on a stepper. Unusable scans are skipped with a warning.
 /// model : Model, optional
-///     What is believed: scene, sensor, air and options; without it what the scans say, which must be of one scene and
-///     sensor.
+///     Prior values: scene, sensor, air and options. Defaults to those of the scans, which must
+///     have the same scene and sensor.
 /// fit : sequence of str
-///     What to fit: ``"pose"`` (of each scan), ``"heading"`` and ``"gear"`` of the stepper, ``"mounting"``, ``"height"``,
-///     ``"air"`` (speed of sound), ``"delay"``, ``"threshold"``, ``"rise"`` (of the threshold with range), ``"beam"``,
-///     ``"skirts"``, ``"pulse"`` (how fast it rises), ``"materials"``, ``"roughness"``, ``"walls"``;
-///     ``sonard calibrate --help`` tells of each.
+///     Parameter groups to fit: ``"pose"`` (of each scan), ``"heading"`` and ``"gear"`` of the
+///     stepper, ``"mounting"``, ``"height"``, ``"air"`` (speed of sound), ``"delay"``,
+///     ``"threshold"``, ``"rise"`` (of the threshold with range), ``"beam"``, ``"skirts"`` (side
+///     lobes), ``"pulse"`` (rise time), ``"materials"``, ``"roughness"``, ``"walls"``; ``sonard
+///     calibrate --help`` describes them.
 /// priors : dict of str to float, optional
-///     Standard deviation of what is believed of a parameter, by the name that its estimate has, in its unit; the
-///     command's without it.
+///     Standard deviation of the prior of a parameter, in its unit, by the name of its estimate.
+///     Defaults to that of the command.
 /// poses : array_like, shape (scans, 3), optional
-///     Where the ranger is believed to have stood: x and y (metres) and heading (degrees); the scans' own without it.
+///     Prior poses of the ranger: x and y (metres) and heading (degrees). Default to those of the
+///     scans.
 /// widest_m : float
 ///     Largest initial error of predicted ranges, metres, 0.005 to 1.
 /// search : {'thorough', 'quick', 'furnished'}
-///     How much to search: 'quick' is four to ten times as fast and misses the likeliest explanation more often; 'furnished' searches
-///     thoroughly, and things that the scene lacks may answer or hide many beams in a row.
+///     Effort of the search: 'quick' is four to ten times as fast and misses the best explanation
+///     more often. 'furnished' searches thoroughly and allows objects that are missing in the scene
+///     to reflect or shadow many adjacent beams.
 ///
 /// Returns
 /// -------
@@ -64,9 +68,9 @@ const USUAL: [&str; 3] = ["pose", "air", "threshold"];
 /// Raises
 /// ------
 /// LogError
-///     If no scan can be used, or they are not of one scene and sensor.
+///     If no scan can be used, or the scans differ in scene or sensor.
 /// OptionError
-///     If something can't be fitted.
+///     If a requested parameter cannot be fitted.
 #[pyfunction]
 #[expect(clippy::too_many_arguments, reason = "they are keywords where they are used")]
 #[pyo3(signature = (scans, model = None, *, fit = None, priors = None, poses = None, widest_m = 0.1,
@@ -86,45 +90,43 @@ pub(crate) fn calibrate<'py>(
         let message = format!("widest_m is {widest_m}: it must be from 0.005 to 1");
         return Err(PyValueError::new_err(message));
     }
-    let names = fit.unwrap_or_else(|| USUAL.map(str::to_owned).to_vec());
+    let names = fit.unwrap_or_else(|| DEFAULT_FIT.map(str::to_owned).to_vec());
     let groups =
-        names.iter().map(|name| word(py, "fit", name)).collect::<PyResult<Vec<Group>>>()?;
+        names.iter().map(|name| parse_name(py, "fit", name)).collect::<PyResult<Vec<Group>>>()?;
     let scans = scans_of(scans)?;
     let sweeps = sweeps(py, &scans, poses)?;
-    let believed = match model {
+    let prior = match model {
         Some(model) => model.get().world(),
         None => common_world(py, &scans)?,
     };
-    let given: Vec<(String, f64)> = priors.unwrap_or_default().into_iter().collect();
-    let priors = inverse::priors(&groups, &given, &believed, sweeps.len());
+    let sigmas: Vec<(String, f64)> = priors.unwrap_or_default().into_iter().collect();
+    let priors = inverse::priors(&groups, &sigmas, &prior, sweeps.len());
     let priors =
-        priors.map_err(|error| refuse::<OptionError>(py, &error.to_string(), &error.help()))?;
-    let what = Fit { search: word(py, "search", search)?, ..Fit::usual(priors, widest_m) };
+        priors.map_err(|error| new_error::<OptionError>(py, &error.to_string(), &error.help()))?;
+    let settings =
+        Fit { search: parse_name(py, "search", search)?, ..Fit::usual(priors, widest_m) };
     let pool = pool(py, None)?;
-    let fitted = py.detach(|| pool.install(|| inverse::fit(&believed, &sweeps, &what)));
+    let fitted = py.detach(|| pool.install(|| inverse::fit(&prior, &sweeps, &settings)));
     let fitted = fitted.map_err(|error| {
-        let help = "see that poses are in the scene, and fit fewer parameters";
-        refuse::<SonardError>(py, &error.to_string(), help)
+        let help = "check that the poses are inside the scene, or fit fewer parameters";
+        new_error::<SonardError>(py, &error.to_string(), help)
     })?;
     if fitted.is_doubtful() {
         let share = 100.0 * (1.0 - fitted.errors.explained());
-        warn(
-            py,
-            &format!("{share:.0} % of the readings are not explained: is the scene the right one?"),
-        )?;
+        warn(py, &format!("{share:.0} % of the readings are not explained: check the scene"))?;
     }
-    let told = fitted.told(&believed, &sweeps, &what);
-    Found { believed, sweeps, fitted, told }.into_python(py)
+    let report = fitted.told(&prior, &sweeps, &settings);
+    FitResult { prior, sweeps, fitted, report }.into_python(py)
 }
 
-/// The scans that are of one ranger at one place, from the poses given or their own.
+/// Extracts sweeps of a single ranger from the scans, with the given poses or their own.
 fn sweeps(
     py: Python<'_>,
     scans: &[Py<Scan>],
     poses: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<Vec<Sweep>> {
-    let poses = poses.map(Poses::of).transpose()?;
-    if let Some(Poses { shape, .. }) = &poses
+    let poses = poses.map(PoseArray::from_python).transpose()?;
+    if let Some(PoseArray { shape, .. }) = &poses
         && **shape != [scans.len()]
     {
         let shape = PyTuple::new(py, [&**shape, &[3]].concat())?;
@@ -136,9 +138,9 @@ fn sweeps(
     let is_finite =
         |pose: &Pose| [pose.x_m, pose.y_m, pose.heading_deg].iter().all(|n| n.is_finite());
     if let Some(at) =
-        poses.as_ref().and_then(|poses| poses.list.iter().position(|one| !is_finite(one)))
+        poses.as_ref().and_then(|poses| poses.list.iter().position(|pose| !is_finite(pose)))
     {
-        return Err(PyValueError::new_err(format!("poses[{at}]: its numbers must be finite")));
+        return Err(PyValueError::new_err(format!("poses[{at}]: values must be finite")));
     }
     let mut sweeps = Vec::new();
     for (at, scan) in scans.iter().enumerate() {
@@ -147,17 +149,17 @@ fn sweeps(
                 let pose = poses.as_ref().map_or(sweep.pose, |poses| poses.list[at]);
                 sweeps.push(Sweep { pose, ..sweep });
             }
-            Err(error) => warn(py, &format!("{error}; it is left out"))?,
+            Err(error) => warn(py, &format!("{error}; scan skipped"))?,
         }
     }
     if sweeps.is_empty() {
-        let help = "give scans of a ranger on a stepper";
-        return Err(refuse::<LogError>(py, "there is no sweep to fit to", help));
+        let help = "pass scans of a ranger on a stepper";
+        return Err(new_error::<LogError>(py, "no sweep to fit", help));
     }
     Ok(sweeps)
 }
 
-/// What all scans that can be used were predicted with.
+/// Returns the model shared by all usable scans.
 fn common_world(py: Python<'_>, scans: &[Py<Scan>]) -> PyResult<World> {
     let mut known: Option<(World, &Arc<Session>)> = None;
     for scan in scans.iter().map(Py::get).filter(|scan| Sweep::of(scan.view()).is_ok()) {
@@ -170,32 +172,33 @@ fn common_world(py: Python<'_>, scans: &[Py<Scan>]) -> PyResult<World> {
             None => known = Some((own, session)),
             Some((first, _)) => {
                 if first.sensor != own.sensor || first.scene.sha256 != own.scene.sha256 {
-                    let message = "the scans are of different sensors or scenes";
-                    let help = "calibrate what belongs together, or give a model";
-                    return Err(refuse::<LogError>(py, message, help));
+                    let message = "the scans have different sensors or scenes";
+                    let help =
+                        "calibrate scans of the same sensor and scene together, or pass a model";
+                    return Err(new_error::<LogError>(py, message, help));
                 }
             }
         }
     }
-    let none = || refuse::<LogError>(py, "there is no sweep to fit to", "");
+    let none = || new_error::<LogError>(py, "no sweep to fit", "");
     known.map(|(world, _)| world).ok_or_else(none)
 }
 
-/// What came of a fit.
-struct Found {
-    /// What was started from.
-    believed: World,
+/// Result of a fit.
+struct FitResult {
+    /// Prior values.
+    prior: World,
     sweeps: Vec<Sweep>,
     fitted: Fitted,
-    told: Vec<Told>,
+    report: Vec<Told>,
 }
 
-impl Found {
+impl FitResult {
     fn into_python(self, py: Python<'_>) -> PyResult<Bound<'_, PyAny>> {
         let Fitted { world, poses, errors, .. } = &self.fitted;
-        let estimates = self.told.iter().map(|told| {
-            let scan = told.scan.map(|scan| scan.to_string());
-            let Told { name, value, change, sigma, low, high, prior, prior_sigma, .. } = told;
+        let estimates = self.report.iter().map(|parameter| {
+            let scan = parameter.scan.map(|scan| scan.to_string());
+            let Told { name, value, change, sigma, low, high, prior, prior_sigma, .. } = parameter;
             let fields = (
                 name,
                 scan,
@@ -206,13 +209,13 @@ impl Found {
                 *high,
                 *prior,
                 *prior_sigma,
-                told.identified,
-                told.at_limit,
+                parameter.identified,
+                parameter.at_limit,
             );
             result(py, "Estimate", fields)
         });
         let estimates = PyTuple::new(py, estimates.collect::<PyResult<Vec<_>>>()?)?;
-        let count = self.told.len();
+        let count = self.report.len();
         let fields = PyDict::new(py);
         fields.set_item("estimates", estimates)?;
         fields.set_item("covariance", arrays::shaped(py, self.covariance(), &[count, count])?)?;
@@ -237,24 +240,26 @@ impl Found {
         py.import("sonard._results")?.getattr("Calibration")?.call((), Some(&fields))
     }
 
-    /// Of the values that are told, to first order: what is a logarithm in the fit is none there.
+    /// Covariance of the reported values, to first order, including those that are fitted as
+    /// logarithms.
     fn covariance(&self) -> Vec<f64> {
         let of_fit = &self.fitted.covariance;
-        let scale = |at: usize| self.told[at].sigma / of_fit[(at, at)].sqrt();
-        let places = 0..self.told.len();
-        let entry = |one: usize, other: usize| of_fit[(one, other)] * scale(one) * scale(other);
-        places
+        let scale = |at: usize| self.report[at].sigma / of_fit[(at, at)].sqrt();
+        let indices = 0..self.report.len();
+        let entry = |row: usize, column: usize| of_fit[(row, column)] * scale(row) * scale(column);
+        indices
             .clone()
-            .flat_map(|one| places.clone().map(move |other| (one, other)))
-            .map(|(one, other)| entry(one, other))
+            .flat_map(|row| indices.clone().map(move |column| (row, column)))
+            .map(|(row, column)| entry(row, column))
             .collect()
     }
 
-    /// The world that was found, without what a model does not know: delay and stepper.
+    /// Model with the fitted values, without those that a model does not contain: delay and
+    /// stepper.
     fn model(&self, py: Python<'_>) -> PyResult<Model> {
         let world = &self.fitted.world;
         let scene = Scene::from_json(py, &world.scene.rewritten())?;
-        let sensor = Sensor { sensor: self.fitted.sensor(&self.believed.sensor) };
-        Model::of(py, Py::new(py, scene)?, Py::new(py, sensor)?, world.air.into(), world.options)
+        let sensor = Sensor { sensor: self.fitted.sensor(&self.prior.sensor) };
+        Model::build(py, Py::new(py, scene)?, Py::new(py, sensor)?, world.air.into(), world.options)
     }
 }

@@ -1,4 +1,4 @@
-//! Errors of the library as exceptions, with the same words.
+//! Python exceptions for the errors of the library, with the same messages.
 
 use std::{io, path::PathBuf};
 
@@ -17,58 +17,58 @@ create_exception!(
     sonard,
     SonardError,
     PyValueError,
-    "What the model refuses. The attribute `help` says what would be right."
+    "Input rejected by the model. The attribute `help` describes valid input."
 );
 create_exception!(
     sonard,
     SceneError,
     SonardError,
-    "A scene that can't be used. `line` and `column` (from 1) say where in its text, `path` which value, as \
+    "Invalid scene. `line` and `column` (from 1) locate the error in the text, `path` names the value, e.g. \
      `walls[2].to`."
 );
 create_exception!(
     sonard,
     PoseError,
     SonardError,
-    "A pose at which no ranger can stand. `index` is its place among those given, a tuple."
+    "Pose at which no ranger can be placed. `index` is its index in the given array, a tuple."
 );
-create_exception!(sonard, SensorError, SonardError, "A sensor's data that make no sense.");
+create_exception!(sonard, SensorError, SonardError, "Invalid sensor data.");
+create_exception!(sonard, ArrayError, SonardError, "Invalid data of an array or a course.");
 create_exception!(
     sonard,
-    ArrayError,
+    AirError,
     SonardError,
-    "An array's or a course's data that make no sense."
+    "State of the air outside the range of the formulas."
 );
-create_exception!(sonard, AirError, SonardError, "Air that the formulas do not cover.");
 create_exception!(
     sonard,
     OptionError,
     SonardError,
-    "An option out of range, or one that the engine does not know."
+    "Option out of range, or not supported by the engine."
 );
 create_exception!(
     sonard,
     LogError,
     SonardError,
-    "A log that can't be read, or that lacks what is asked of it."
+    "Log that cannot be read or lacks required records."
 );
 create_exception!(
     sonard,
     TooManyPathsError,
     SonardError,
-    "More echo paths than can be found within bounds of work and memory."
+    "Number of echo paths exceeds the limits of computation and memory."
 );
 
-/// An exception with what would be right.
-pub(crate) fn refuse<E: PyTypeInfo>(py: Python<'_>, message: &str, help: &str) -> PyErr {
-    let words = if help.is_empty() { message.to_owned() } else { format!("{message}: {help}") };
-    let error = PyErr::from_type(E::type_object(py), words);
-    tell(py, &error, "help", help);
+/// Creates an exception with the attribute `help`, a description of valid input.
+pub(crate) fn new_error<E: PyTypeInfo>(py: Python<'_>, message: &str, help: &str) -> PyErr {
+    let text = if help.is_empty() { message.to_owned() } else { format!("{message}: {help}") };
+    let error = PyErr::from_type(E::type_object(py), text);
+    set_attribute(py, &error, "help", help);
     error
 }
 
-/// Sets an attribute of an exception; one that can't be set is left out.
-pub(crate) fn tell<'py, T: IntoPyObject<'py>>(
+/// Sets an attribute of an exception, ignoring failures.
+pub(crate) fn set_attribute<'py, T: IntoPyObject<'py>>(
     py: Python<'py>,
     error: &PyErr,
     name: &str,
@@ -77,7 +77,7 @@ pub(crate) fn tell<'py, T: IntoPyObject<'py>>(
     error.value(py).setattr(name, value).ok();
 }
 
-/// A fault of a scene, with its place in the text where the user wrote that.
+/// Converts an error in a scene; line and column are set only if the user passed the text.
 pub(crate) fn scene(py: Python<'_>, error: &scene::SceneError, text_is_given: bool) -> PyErr {
     let place = match &*error.path {
         "" => String::new(),
@@ -85,40 +85,40 @@ pub(crate) fn scene(py: Python<'_>, error: &scene::SceneError, text_is_given: bo
     };
     let message =
         if text_is_given { error.to_string() } else { format!("{place}{}", error.message()) };
-    let exception = refuse::<SceneError>(py, &message, &error.help());
+    let exception = new_error::<SceneError>(py, &message, &error.help());
     let line = text_is_given.then_some(error.line);
-    tell(py, &exception, "line", line);
-    tell(py, &exception, "column", line.map(|_| error.column));
-    tell(py, &exception, "path", shown(&error.path));
+    set_attribute(py, &exception, "line", line);
+    set_attribute(py, &exception, "column", line.map(|_| error.column));
+    set_attribute(py, &exception, "path", shown(&error.path));
     exception
 }
 
-/// A pose that is refused, by its place among those given.
+/// Converts an invalid pose, with its index in the given array.
 pub(crate) fn pose(py: Python<'_>, index: &[usize], error: &scene::PoseError) -> PyErr {
-    pose_in_words(py, index, &error.to_string(), &error.help())
+    pose_error(py, index, &error.to_string(), &error.help())
 }
 
-/// A pose of an array's robot that is refused, likewise.
+/// Converts an invalid pose of an array's robot, with its index in the given array.
 pub(crate) fn array_pose(py: Python<'_>, index: &[usize], error: &array::ArrayPoseError) -> PyErr {
-    pose_in_words(py, index, &error.to_string(), &error.help())
+    pose_error(py, index, &error.to_string(), &error.help())
 }
 
-fn pose_in_words(py: Python<'_>, index: &[usize], words: &str, help: &str) -> PyErr {
+fn pose_error(py: Python<'_>, index: &[usize], text: &str, help: &str) -> PyErr {
     let place = match index {
         [] => String::new(),
         _ => format!("poses{index:?}: "),
     };
-    let exception = refuse::<PoseError>(py, &format!("{place}{words}"), help);
-    tell(py, &exception, "index", pyo3::types::PyTuple::new(py, index).ok());
+    let exception = new_error::<PoseError>(py, &format!("{place}{text}"), help);
+    set_attribute(py, &exception, "index", pyo3::types::PyTuple::new(py, index).ok());
     exception
 }
 
-/// Data of an array that are refused.
+/// Converts an error in the data of an array.
 pub(crate) fn array(py: Python<'_>, error: &array::ArrayError) -> PyErr {
-    refuse::<ArrayError>(py, &error.to_string(), &error.help())
+    new_error::<ArrayError>(py, &error.to_string(), &error.help())
 }
 
-/// Data of a sensor that are refused.
+/// Converts an error in the data of a sensor.
 pub(crate) fn sensor(py: Python<'_>, error: &acoustics::SensorError) -> PyErr {
     let help = match error {
         acoustics::SensorError::Form { .. } => {
@@ -126,40 +126,42 @@ pub(crate) fn sensor(py: Python<'_>, error: &acoustics::SensorError) -> PyErr {
         }
         acoustics::SensorError::Figure { .. } | acoustics::SensorError::UnknownPreset { .. } => "",
     };
-    refuse::<SensorError>(py, &error.to_string(), help)
+    new_error::<SensorError>(py, &error.to_string(), help)
 }
 
-/// A model that can't be made.
+/// Converts an error in the parameters of a model.
 pub(crate) fn model(py: Python<'_>, error: &model::ModelError) -> PyErr {
     match error {
         model::ModelError::Sensor(error) => sensor(py, error),
         model::ModelError::TooCostly(error) => too_costly(py, error),
-        model::ModelError::SensorHeight { .. } => refuse::<SensorError>(py, &error.to_string(), ""),
-        model::ModelError::Option { .. } => refuse::<OptionError>(py, &error.to_string(), ""),
+        model::ModelError::SensorHeight { .. } => {
+            new_error::<SensorError>(py, &error.to_string(), "")
+        }
+        model::ModelError::Option { .. } => new_error::<OptionError>(py, &error.to_string(), ""),
     }
 }
 
-/// A search that would cost too much.
+/// Converts an error of a search that exceeds its limits.
 pub(crate) fn too_costly(py: Python<'_>, error: &model::TooCostly) -> PyErr {
-    refuse::<TooManyPathsError>(py, &error.to_string(), "")
+    new_error::<TooManyPathsError>(py, &error.to_string(), "")
 }
 
-/// A file that can't be read, as `open` would say it.
+/// Converts an error of reading a file, as raised by `open`.
 pub(crate) fn unreadable(py: Python<'_>, path: PathBuf, error: &io::Error) -> PyErr {
-    match number_and_words(py, error) {
-        Some((number, words)) => PyOSError::new_err((number, words, path.into_os_string())),
+    match errno_and_text(py, error) {
+        Some((number, text)) => PyOSError::new_err((number, text, path.into_os_string())),
         None => PyOSError::new_err(format!("{}: {error}", path.display())),
     }
 }
 
-fn number_and_words(py: Python<'_>, error: &io::Error) -> Option<(i32, String)> {
+fn errno_and_text(py: Python<'_>, error: &io::Error) -> Option<(i32, String)> {
     let number = error.raw_os_error().or_else(|| match error.kind() {
-        // The library says this one by itself.
+        // The error number that the library reports without the operating system.
         io::ErrorKind::IsADirectory => {
             py.import("errno").ok()?.getattr("EISDIR").ok()?.extract().ok()
         }
         _ => None,
     })?;
-    let words = py.import("os").ok()?.call_method1("strerror", (number,)).ok()?;
-    Some((number, words.extract().ok()?))
+    let text = py.import("os").ok()?.call_method1("strerror", (number,)).ok()?;
+    Some((number, text.extract().ok()?))
 }

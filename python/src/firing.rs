@@ -1,4 +1,4 @@
-//! Many readings at once, on many threads.
+//! Batches of readings on many threads.
 
 use numpy::PyArray1;
 use pyo3::{exceptions::PyMemoryError, prelude::*, types::PyTuple};
@@ -7,29 +7,29 @@ use sonard_model::model::ModelError;
 
 use crate::{arrays::READING_WORDS, error, pool::pool};
 
-/// Stands that a thread predicts before signals are looked at.
-const STANDS_AT_ONCE: usize = 64;
+/// Number of poses that a thread predicts between checks for signals.
+const POSES_PER_BATCH: usize = 64;
 
-/// The words of so many readings at each stand, one stand after the other; `fire` fills the row of one. The
-/// interpreter's lock is free meanwhile, and an interrupt ends it.
+/// Computes a table with `each` readings at each of the poses `poses`; `fire` fills the row of a
+/// pose. The interpreter lock is released during the computation, and an interrupt ends it.
 pub(crate) fn table<S: Sync>(
     py: Python<'_>,
-    stands: &[S],
+    poses: &[S],
     each: usize,
     threads: Option<usize>,
     fire: impl Fn(&S, &mut [f64]) -> Result<(), ModelError> + Sync,
 ) -> PyResult<Vec<f64>> {
     let pool = pool(py, threads)?;
     let words = READING_WORDS * each;
-    let mut table = empty(words, stands.len())?;
+    let mut table = zeroed(words, poses.len())?;
     if words == 0 {
         return Ok(table);
     }
-    let at_once = STANDS_AT_ONCE * pool.current_num_threads();
-    for (stands, rows) in stands.chunks(at_once).zip(table.chunks_mut(at_once * words)) {
+    let at_once = POSES_PER_BATCH * pool.current_num_threads();
+    for (poses, rows) in poses.chunks(at_once).zip(table.chunks_mut(at_once * words)) {
         let done = py.detach(|| {
-            let pairs = stands.par_iter().zip(rows.par_chunks_mut(words));
-            pool.install(|| pairs.try_for_each(|(stand, row)| fire(stand, row)))
+            let pairs = poses.par_iter().zip(rows.par_chunks_mut(words));
+            pool.install(|| pairs.try_for_each(|(pose, row)| fire(pose, row)))
         });
         done.map_err(|error| error::model(py, &error))?;
         py.check_signals()?;
@@ -37,7 +37,7 @@ pub(crate) fn table<S: Sync>(
     Ok(table)
 }
 
-/// Such a table as an array of readings.
+/// Converts such a table to an array of readings.
 pub(crate) fn shaped<'py>(
     py: Python<'py>,
     table: Vec<f64>,
@@ -48,7 +48,7 @@ pub(crate) fn shaped<'py>(
     readings.call_method1("reshape", (PyTuple::new(py, shape)?,))
 }
 
-fn empty(words: usize, poses: usize) -> PyResult<Vec<f64>> {
+fn zeroed(words: usize, poses: usize) -> PyResult<Vec<f64>> {
     let mut table = Vec::new();
     let reserved = words.checked_mul(poses).map(|length| (length, table.try_reserve_exact(length)));
     match reserved {
@@ -57,7 +57,7 @@ fn empty(words: usize, poses: usize) -> PyResult<Vec<f64>> {
             Ok(table)
         }
         _ => Err(PyMemoryError::new_err(format!(
-            "no memory for {poses} poses of {} readings: give fewer poses at once",
+            "not enough memory for {poses} poses with {} readings each: pass fewer poses per call",
             words / READING_WORDS
         ))),
     }

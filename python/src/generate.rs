@@ -1,4 +1,4 @@
-//! Data sets.
+//! Generation of data sets.
 
 use std::path::PathBuf;
 
@@ -9,29 +9,28 @@ use sonard::{
 };
 
 use crate::{
-    error::{SonardError, refuse, unreadable},
+    error::{SonardError, new_error, unreadable},
     pool::pool,
 };
 
-/// Makes the data set of a specification, or a part of it, as ``sonard generate`` does: shards that are there are left
-/// out, and the bytes of others are the same whoever makes them.
+/// Generates the data set of a specification, or a part of it, as ``sonard generate`` does.
+/// Existing shards are kept. The bytes of a shard do not depend on the program that generates it.
 ///
 /// Parameters
 /// ----------
 /// spec : path
 ///     The specification, TOML, or ``spec.json`` of a set.
-/// out : path
+///     Specification, TOML, or ``spec.json`` of a data set.
 ///     Folder of the set.
-/// part : tuple of int, optional
-///     ``(i, n)``: every n-th shard from the i-th on, i from 1; without it all.
-/// threads : int, optional
-///     Shards at once; without it as many as there are cores.
+///     Folder of the data set.
+///     ``(i, n)``: every n-th shard from the i-th on, i from 1. Defaults to all shards.
+///     Shards generated simultaneously. Defaults to the number of cores.
 ///
 /// Returns
 /// -------
 /// dict
-///     ``made``, ``were_there``: shards; ``sha256``, ``readings``, ``bytes`` of the set, or ``None`` while shards are
-///     missing.
+///     ``made`` and ``were_there``: numbers of shards; ``sha256``, ``readings``, ``bytes`` of the
+///     data set, or ``None`` while shards are missing.
 #[pyfunction]
 #[pyo3(signature = (spec, out, *, part = None, threads = None))]
 pub(crate) fn generate<'py>(
@@ -42,8 +41,8 @@ pub(crate) fn generate<'py>(
     threads: Option<usize>,
 ) -> PyResult<Bound<'py, PyDict>> {
     let (number, of) = part.unwrap_or((1, 1));
-    let part =
-        Part::new(number, of).map_err(|error| refuse::<SonardError>(py, &error.to_string(), ""))?;
+    let part = Part::new(number, of)
+        .map_err(|error| new_error::<SonardError>(py, &error.to_string(), ""))?;
     let pool = pool(py, threads)?;
     let made = py.detach(move || {
         let generator = DataSet::read_specification(&spec, &|_| {})?;
@@ -51,20 +50,20 @@ pub(crate) fn generate<'py>(
         let made = pool.install(|| set.make_part(part, &|_| {}))?;
         Ok((made, set.seal()?))
     });
-    let (made, whole) = made.map_err(|error| refused(py, error))?;
-    let told = PyDict::new(py);
-    told.set_item("made", made.made)?;
-    told.set_item("were_there", made.were_there)?;
+    let (made, whole) = made.map_err(|error| to_exception(py, error))?;
+    let summary = PyDict::new(py);
+    summary.set_item("made", made.made)?;
+    summary.set_item("were_there", made.were_there)?;
     let totals = whole.as_ref().map(|manifest| &manifest.totals);
-    told.set_item("sha256", whole.as_ref().map(|manifest| &*manifest.sha256))?;
-    told.set_item("readings", totals.map(|totals| totals.rows.get(&Table::Readings)))?;
-    told.set_item("bytes", totals.map(|totals| totals.bytes))?;
-    Ok(told)
+    summary.set_item("sha256", whole.as_ref().map(|manifest| &*manifest.sha256))?;
+    summary.set_item("readings", totals.map(|totals| totals.rows.get(&Table::Readings)))?;
+    summary.set_item("bytes", totals.map(|totals| totals.bytes))?;
+    Ok(summary)
 }
 
-fn refused(py: Python<'_>, error: DataSetError) -> PyErr {
+fn to_exception(py: Python<'_>, error: DataSetError) -> PyErr {
     match error {
         DataSetError::Io { path, source, .. } => unreadable(py, path, &source),
-        error => refuse::<SonardError>(py, &error.to_string(), &error.help()),
+        error => new_error::<SonardError>(py, &error.to_string(), &error.help()),
     }
 }

@@ -1,6 +1,6 @@
-//! The package `sonard` for Python: the crates of the pure part behind NumPy arrays.
+//! Python package `sonard`: the simulation crates with NumPy arrays as input and output.
 //!
-//! What a user sees is described in `package/sonard/__init__.pyi`; `stubtest` holds the two together.
+//! The interface is described in `package/sonard/__init__.pyi`; `stubtest` compares the two.
 
 mod air;
 mod array;

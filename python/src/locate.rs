@@ -1,4 +1,4 @@
-//! Where scans were taken.
+//! Localisation of sweeps in a scene.
 
 use std::collections::BTreeMap;
 
@@ -8,36 +8,38 @@ use sonard_model::{geometry::Pose, reading::PingStatus};
 use uuid::Uuid;
 
 use crate::{
-    error::{LogError, OptionError, SonardError, refuse},
+    error::{LogError, OptionError, SonardError, new_error},
     json,
     log::Scan,
     model::Model,
-    options::word,
+    options::parse_name,
     pool::pool,
-    readings::Heard,
+    readings::BeamReadings,
     sense::warn,
 };
 
-/// Finds where a sweep was taken, without a guess.
+/// Finds the pose of a sweep without an initial guess.
 ///
-/// Predicts what would be read on a grid of places when it is made; ``locate`` then looks up and improves what fits.
+/// The constructor predicts the readings on a grid of positions; ``locate`` then searches the grid
+/// and refines the best matches.
 ///
 /// Parameters
 /// ----------
 /// model : Model
-///     With the scene to locate in.
+///     Model with the scene to locate in.
 /// spacing_m : float, optional
-///     Spacing of the grid, metres, 0.01 to 2; without it 0.05 in small scenes to 0.1.
+///     Spacing of the grid, metres, 0.01 to 2. Defaults to 0.05 in small scenes, up to 0.1 in
+///     others.
 /// fit : sequence of str, optional
-///     What is fitted to each sweep besides its pose, as ``calibrate`` names it: ``"threshold"`` for a ranger of the same
-///     kind as the model's, but not the same.
+///     Parameters to fit to each sweep in addition to its pose, named as for ``calibrate``:
+///     ``"threshold"`` for another unit of the model's sensor.
 /// priors : dict of str to float, optional
-///     Standard deviation of what is believed of a parameter that is fitted; see ``calibrate``.
+///     Standard deviation of the prior of a fitted parameter; see ``calibrate``.
 ///
 /// Raises
 /// ------
 /// OptionError
-///     If something can't be fitted.
+///     If a requested parameter cannot be fitted.
 #[pyclass(frozen, module = "sonard")]
 pub(crate) struct Locator {
     model: Py<Model>,
@@ -48,7 +50,7 @@ pub(crate) struct Locator {
     priors: BTreeMap<String, f64>,
 }
 
-/// What a locator is made of again.
+/// Arguments of the constructor, for pickling.
 type Arguments = (Py<Model>, f64, Vec<String>, BTreeMap<String, f64>);
 
 #[pymethods]
@@ -69,29 +71,32 @@ impl Locator {
             return Err(PyValueError::new_err(message));
         }
         let (fit, priors) = (fit.unwrap_or_default(), priors.unwrap_or_default());
-        let besides = besides(py, &fit, &priors, &world)?;
+        let extra_priors = extra_priors(py, &fit, &priors, &world)?;
         let pool = pool(py, None)?;
         let atlas = py.detach(|| pool.install(|| inverse::Atlas::new(&world, spacing_m)));
-        let atlas = atlas.map_err(|error| refuse::<SonardError>(py, &error.to_string(), ""))?;
-        Ok(Self { model, world, atlas: atlas.fitting(besides), spacing_m, fit, priors })
+        let atlas = atlas.map_err(|error| new_error::<SonardError>(py, &error.to_string(), ""))?;
+        Ok(Self { model, world, atlas: atlas.fitting(extra_priors), spacing_m, fit, priors })
     }
 
-    /// The poses that explain a sweep, most probable first.
+    /// Poses that explain a sweep, most probable first.
     ///
     /// Parameters
     /// ----------
     /// readings : Scan or array_like, shape (beams,)
-    ///     Of one place: a scan of a log, readings as ``Model.predict`` gives them, or ranges in metres, ``inf`` for a
-    ///     silence and ``nan`` for what was not measured.
+    ///     Sweep from a single position: a scan of a log, readings as returned by
+    ///     ``Model.predict``, or ranges in metres, with ``inf`` for no echo and ``nan`` for a
+    ///     missing measurement.
     /// azimuths_deg : array_like, shape (beams,), optional
-    ///     Where they were fired, degrees; without it 400 azimuths from 0 to 359.1. A scan has its own.
+    ///     Azimuths of the beams, degrees. Default to 400 azimuths from 0 to 359.1, or to those of
+    ///     the scan.
     ///
     /// Returns
     /// -------
     /// list of dict
-    ///     ``x_m``, ``y_m``, ``heading_deg``, ``probability``, ``sigma_x_m``, ``sigma_y_m``, ``sigma_heading_deg``
-    ///     and ``explained``, the share of the readings that the pose explains; of a locator with ``fit`` also ``besides``,
-    ///     a list of dict with ``name``, ``value`` and ``sigma``.
+    ///     ``x_m``, ``y_m``, ``heading_deg``, ``probability``, ``sigma_x_m``, ``sigma_y_m``,
+    ///     ``sigma_heading_deg`` and ``explained``, the fraction of the readings that the pose
+    ///     explains. With ``fit`` also ``besides``, a list of dict with ``name``, ``value`` and
+    ///     ``sigma``.
     #[pyo3(signature = (readings, azimuths_deg = None))]
     fn locate<'py>(
         &self,
@@ -104,13 +109,13 @@ impl Locator {
         let found = py.detach(|| {
             pool.install(|| {
                 let modes = inverse::locate(&self.world, &self.atlas, &sweep)?;
-                let doubts = inverse::doubts(&self.world, &self.atlas, &sweep, &modes);
-                Ok::<_, inverse::FitError>((modes, doubts))
+                let diagnoses = inverse::doubts(&self.world, &self.atlas, &sweep, &modes);
+                Ok::<_, inverse::FitError>((modes, diagnoses))
             })
         });
-        let (modes, doubts) =
-            found.map_err(|error| refuse::<SonardError>(py, &error.to_string(), ""))?;
-        doubts.iter().try_for_each(|doubt| warn(py, &doubt.to_string()))?;
+        let (modes, diagnoses) =
+            found.map_err(|error| new_error::<SonardError>(py, &error.to_string(), ""))?;
+        diagnoses.iter().try_for_each(|diagnosis| warn(py, &diagnosis.to_string()))?;
         json::to_python(py, &modes)
     }
 
@@ -133,29 +138,29 @@ impl Locator {
     ) -> PyResult<inverse::Sweep> {
         if let Ok(scan) = readings.cast::<Scan>() {
             if azimuths_deg.is_some() {
-                return Err(PyValueError::new_err("azimuths_deg: a scan has its own"));
+                return Err(PyValueError::new_err("azimuths_deg must be omitted for a scan"));
             }
             return inverse::Sweep::of(scan.get().view())
-                .map_err(|error| refuse::<LogError>(py, &error.to_string(), ""));
+                .map_err(|error| new_error::<LogError>(py, &error.to_string(), ""));
         }
-        let heard = Heard::of(readings, azimuths_deg)?;
+        let given = BeamReadings::from_python(readings, azimuths_deg)?;
         let us_per_m = 2e6 / self.world.air.sound_speed_m_s();
-        let beams: Vec<inverse::Beam> = heard
+        let beams: Vec<inverse::Beam> = given
             .beams
             .into_iter()
             .filter_map(|(azimuth_deg, status, range_m)| {
-                let heard = match status {
+                let outcome = match status {
                     PingStatus::Echo => inverse::Heard::Echo { tof_us: range_m * us_per_m },
                     PingStatus::NoEcho => inverse::Heard::Silence,
                     PingStatus::MinRange => inverse::Heard::Near,
                     _ => return None,
                 };
-                Some(inverse::Beam { azimuth_deg, heard })
+                Some(inverse::Beam { azimuth_deg, heard: outcome })
             })
             .collect();
-        if beams.len() < LEAST_BEAMS {
+        if beams.len() < MIN_BEAMS {
             return Err(PyValueError::new_err(format!(
-                "{} of the readings say something: at least {LEAST_BEAMS} are needed",
+                "{} usable readings: at least {MIN_BEAMS} are required",
                 beams.len()
             )));
         }
@@ -164,18 +169,19 @@ impl Locator {
     }
 }
 
-/// The parameters that are fitted besides a pose, with what is believed of them.
-fn besides(
+/// Returns the priors of the parameters that are fitted in addition to a pose.
+fn extra_priors(
     py: Python<'_>,
     fit: &[String],
     priors: &BTreeMap<String, f64>,
     world: &inverse::World,
 ) -> PyResult<Vec<inverse::Prior>> {
-    let groups = fit.iter().map(|name| word(py, "fit", name)).collect::<PyResult<Vec<Group>>>()?;
+    let groups =
+        fit.iter().map(|name| parse_name(py, "fit", name)).collect::<PyResult<Vec<Group>>>()?;
     let given: Vec<(String, f64)> = priors.clone().into_iter().collect();
     let found = inverse::priors(&groups, &given, world, 1);
-    found.map_err(|error| refuse::<OptionError>(py, &error.to_string(), &error.help()))
+    found.map_err(|error| new_error::<OptionError>(py, &error.to_string(), &error.help()))
 }
 
-/// Fewer say too little about three values of a pose.
-const LEAST_BEAMS: usize = 8;
+/// Minimum number of beams that determine the three values of a pose.
+const MIN_BEAMS: usize = 8;

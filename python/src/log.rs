@@ -1,4 +1,4 @@
-//! Logs.
+//! Python classes for logs.
 
 mod table;
 
@@ -23,60 +23,61 @@ pub(crate) use table::{logged_dtype, shaped_readings};
 use crate::{
     air::Air,
     array::{ArrayModel, RangerArray},
-    error::{self, LogError, refuse},
+    error::{self, LogError, new_error},
     json,
     model::Model,
     scene::{PoseTuple, Scene, tuple_of},
     sensor::Sensor,
 };
 
-/// A log as it was read.
+/// Content of a log file.
 pub(crate) struct LogData {
     path: PathBuf,
     scans: Vec<ScanView>,
     damaged: Vec<(u64, String)>,
 }
 
-/// The scans of a log, in the order in which they begin; ``read_log`` makes it.
+/// Scans of a log, in the order in which they begin; created by ``read_log``.
 ///
-/// ``len(log)``, ``log[0]`` and ``for scan in log`` do what they do with a list.
+/// Supports ``len(log)``, ``log[0]`` and ``for scan in log`` like a list.
 #[pyclass(frozen, module = "sonard")]
 pub(crate) struct Log {
     data: Arc<LogData>,
 }
 
-/// One scan of a log, with its session.
+/// Scan of a log, with its session.
 #[pyclass(frozen, module = "sonard")]
 pub(crate) struct Scan {
     log: Py<Log>,
     at: usize,
 }
 
-/// Reads a log, as ``sonard scan``, ``sonard simulate`` and the daemon write it.
+/// Reads a log written by ``sonard scan``, ``sonard simulate`` or the daemon.
 ///
-/// Lines that hold no record are left out; ``log.damaged`` names them.
+/// Lines without a valid record are skipped; ``log.damaged`` lists them.
 ///
 /// Parameters
 /// ----------
 /// path : str or path-like
-///     The file.
+///     Path of the file.
 ///
 /// Raises
 /// ------
 /// LogError
-///     If the file is no log, or holds no record at all.
+///     If the file is not a log, or contains no record.
 #[pyfunction]
 pub(crate) fn read_log(py: Python<'_>, path: PathBuf) -> PyResult<Log> {
-    // The library takes a dash for standard input.
+    // The library interprets a dash as standard input.
     let path = absolute(&path).unwrap_or(path);
     match py.detach(|| load(&path)) {
         Ok(data) if data.scans.is_empty() && !data.damaged.is_empty() => {
             let (line, fault) = &data.damaged[0];
-            let message = format!("{} holds no record: line {line}: {fault}", path.display());
-            Err(refuse::<LogError>(
+            let message =
+                format!("{} contains no valid record: line {line}: {fault}", path.display());
+            Err(new_error::<LogError>(
                 py,
                 &message,
-                "give a log of `sonard scan` or `sonard simulate`",
+                "pass a log of `sonard scan` or `sonard simulate`",
             ))
         }
         Ok(data) => Ok(Log { data: Arc::new(data) }),
@@ -88,7 +89,7 @@ pub(crate) fn read_log(py: Python<'_>, path: PathBuf) -> PyResult<Log> {
                 StoreError::NoLog { kind, .. } => kind.instead_of_a_log(),
                 _ => "",
             };
-            Err(refuse::<LogError>(py, &error.to_string(), help))
+            Err(new_error::<LogError>(py, &error.to_string(), help))
         }
     }
 }
@@ -102,19 +103,19 @@ fn load(path: &Path) -> Result<LogData, StoreError> {
 
 #[pymethods]
 impl Log {
-    /// The file that it was read from.
+    /// Path of the file.
     #[getter]
     fn path(&self) -> &Path {
         &self.data.path
     }
 
-    /// Lines that hold no record: their numbers, from 1, and why.
+    /// Lines without a valid record: their numbers, from 1, and the reasons.
     #[getter]
     fn damaged(&self) -> Vec<(u64, String)> {
         self.data.damaged.clone()
     }
 
-    /// The readings of all scans together, as of ``Scan.readings``.
+    /// Readings of all scans, as for ``Scan.readings``.
     #[getter]
     fn readings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         shaped_readings(py, self.data.scans.iter().enumerate())
@@ -134,9 +135,7 @@ impl Log {
         let at = at.and_then(|at| usize::try_from(at).ok()).filter(|at| *at < count);
         match at {
             Some(at) => Ok(Scan { log: slf.clone().unbind(), at }),
-            None => {
-                Err(PyIndexError::new_err(format!("there is no scan {index}: the log has {count}")))
-            }
+            None => Err(PyIndexError::new_err(format!("no scan {index}: the log has {count}"))),
         }
     }
 
@@ -157,117 +156,119 @@ impl Log {
 
 #[pymethods]
 impl Scan {
-    /// Its identifier.
+    /// Identifier of the scan.
     #[getter]
     fn id(&self) -> String {
         self.view().scan.to_string()
     }
 
-    /// Where it was taken: x and y (metres) and heading (degrees); ``None`` if the log does not say.
+    /// Pose of the scan: x and y (metres) and heading (degrees); ``None`` if the log lacks it.
     #[getter]
     fn pose(&self) -> Option<PoseTuple> {
         self.view().pose().as_ref().map(tuple_of)
     }
 
-    /// Where its readings come from: ``"hardware"``, ``"mock"``, ``"simulated"``, ``"imported"``, ...; ``None``
-    /// without a session.
+    /// Origin of the readings: ``"hardware"``, ``"mock"``, ``"simulated"``, ``"imported"``, ...;
+    /// ``None`` without a session.
     #[getter]
     fn provenance<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let of: Option<Provenance> = self.view().session.as_ref().map(|session| session.provenance);
-        json::to_python(py, &of)
+        let provenance: Option<Provenance> =
+            self.view().session.as_ref().map(|session| session.provenance);
+        json::to_python(py, &provenance)
     }
 
-    /// The session's record as a dict, as docs/log.md describes it; ``None`` if the log lacks it.
+    /// Record of the session as a dict, as described in docs/log.md; ``None`` if the log lacks it.
     #[getter]
     fn session<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         json::to_python(py, &self.view().session.as_deref())
     }
 
-    /// The record of its beginning as a dict (pose, plan, time, ...); ``None`` if the log lacks it.
+    /// Record of the scan's start as a dict (pose, plan, time, ...); ``None`` if the log lacks it.
     #[getter]
     fn start<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         json::to_python(py, &self.view().start)
     }
 
-    /// The record of its end as a dict; ``None`` of a scan that did not end.
+    /// Record of the scan's end as a dict; ``None`` for a scan that did not end.
     #[getter]
     fn end<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         json::to_python(py, &self.view().end)
     }
 
-    /// Events while it was taken, as dicts.
+    /// Events during the scan, as dicts.
     #[getter]
     fn events<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         json::to_python(py, &self.view().events)
     }
 
-    /// Its readings in the order of the log: array of dtype LOGGED, shape (readings,).
+    /// Readings in the order of the log: array of dtype LOGGED, shape (readings,).
     ///
-    /// Fields: ``scan`` (place of the scan in the log) and ``index`` (in the plan); ``status`` and ``sim_status``
-    /// (see ``Status``; 255 without a prediction); ``azimuth_deg``; ``x_m``, ``y_m``, ``heading_deg`` of the pose;
-    /// ``range_m``, ``tof_us``, ``amplitude``, ``margin_db``; the prediction beside it, ``sim_range_m``,
-    /// ``sim_amplitude``, ``sim_margin_db``; ``residual_m`` (measured less predicted); ``confidence``; ``time``
-    /// (datetime64[ns], UTC). As in predictions, ranges and times of flight of silences are ``inf``, and what
-    /// there is none of is ``nan`` or ``NaT``.
+    /// Fields: ``scan`` (index of the scan in the log) and ``index`` (in the plan); ``status`` and
+    /// ``sim_status`` (see ``Status``; 255 without a prediction); ``azimuth_deg``; ``x_m``,
+    /// ``y_m``, ``heading_deg`` of the pose; ``range_m``, ``tof_us``, ``amplitude``, ``margin_db``;
+    /// the logged prediction, ``sim_range_m``, ``sim_amplitude``, ``sim_margin_db``; ``residual_m``
+    /// (measured minus predicted); ``confidence``; ``time`` (datetime64[ns], UTC). As in
+    /// predictions, ranges and times of flight without an echo are ``inf``, and missing values are
+    /// ``nan`` or ``NaT``.
     #[getter]
     fn readings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         shaped_readings(py, [(self.at, self.view())])
     }
 
-    /// The sensor of its session.
+    /// Sensor of the session.
     #[getter]
     fn sensor(&self, py: Python<'_>) -> PyResult<Sensor> {
         Ok(Sensor { sensor: self.session_of(py)?.sensor.clone() })
     }
 
-    /// The air of its session.
+    /// Air of the session.
     #[getter]
     fn air(&self, py: Python<'_>) -> PyResult<Air> {
         let air = acoustics::Air::try_from(&self.session_of(py)?.air);
-        let air = air.map_err(|error| refuse::<LogError>(py, &error.to_string(), ""))?;
+        let air = air.map_err(|error| new_error::<LogError>(py, &error.to_string(), ""))?;
         Ok(air.into())
     }
 
-    /// The scene that was predicted in, as the log holds it; ``None`` if none was.
+    /// Scene used for the predictions, as logged; ``None`` without predictions.
     #[getter]
     fn scene(&self, py: Python<'_>) -> PyResult<Option<Scene>> {
         let scene = logged_scene(self.session_of(py)?, &self.log.get().data.path);
         let scene = scene.map_err(|error| {
-            refuse::<LogError>(py, &error.to_string(), "give a scene of your own to the model")
+            new_error::<LogError>(py, &error.to_string(), "pass a scene to the model")
         })?;
         Ok(scene.map(|scene| Scene { scene: Arc::new(scene) }))
     }
 
-    /// The model of its session: its scene, sensor, air and options.
+    /// Creates the model of the session: its scene, sensor, air and options.
     ///
     /// Parameters
     /// ----------
     /// scene : Scene or str, optional
-    ///     A scene in place of the log's.
+    ///     Scene that replaces the logged one.
     #[pyo3(signature = (scene = None))]
     pub(crate) fn model(
         &self,
         py: Python<'_>,
         scene: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Model> {
-        let scene = self.scene_meant(py, scene)?;
+        let scene = self.scene_or_logged(py, scene)?;
         let sensor = Py::new(py, self.sensor(py)?)?;
-        Model::of(py, scene, sensor, self.air(py)?, self.options(py)?)
+        Model::build(py, scene, sensor, self.air(py)?, self.options(py)?)
     }
 
-    /// The array of its session; ``None`` of a ranger on a stepper.
+    /// Array of the session; ``None`` for a ranger on a stepper.
     #[getter]
     fn array(&self, py: Python<'_>) -> PyResult<Option<RangerArray>> {
         let array = self.session_of(py)?.array.as_ref();
         array.map(|array| RangerArray::checked(py, array.clone())).transpose()
     }
 
-    /// The model of its session's array: its scene, sensor, air and options.
+    /// Creates the model of the session's array: its scene, sensor, air and options.
     ///
     /// Parameters
     /// ----------
     /// scene : Scene or str, optional
-    ///     A scene in place of the log's.
+    ///     Scene that replaces the logged one.
     #[pyo3(signature = (scene = None))]
     fn array_model(
         &self,
@@ -275,13 +276,13 @@ impl Scan {
         scene: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<ArrayModel> {
         let none = || {
-            let help = "of a ranger on a stepper: scan.model()";
-            refuse::<LogError>(py, "the scan is of no array", help)
+            let help = "use scan.model() for a ranger on a stepper";
+            new_error::<LogError>(py, "the scan is not from an array", help)
         };
         let array = Py::new(py, self.array(py)?.ok_or_else(none)?)?;
-        let scene = self.scene_meant(py, scene)?;
+        let scene = self.scene_or_logged(py, scene)?;
         let sensor = Py::new(py, self.sensor(py)?)?;
-        ArrayModel::of(py, scene, array, sensor, self.air(py)?, self.options(py)?)
+        ArrayModel::build(py, scene, array, sensor, self.air(py)?, self.options(py)?)
     }
 
     fn __repr__(&self) -> String {
@@ -304,31 +305,35 @@ impl Scan {
         &self.log.get().data.scans[self.at]
     }
 
-    /// The scene given, else the log's.
-    fn scene_meant(&self, py: Python<'_>, given: Option<&Bound<'_, PyAny>>) -> PyResult<Py<Scene>> {
+    /// Returns the given scene, or else the logged one.
+    fn scene_or_logged(
+        &self,
+        py: Python<'_>,
+        given: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Py<Scene>> {
         if let Some(given) = given {
-            return crate::scene::meant(given);
+            return crate::scene::resolve(given);
         }
-        let help = "give one of your own: scan.model(scene)";
-        let none = || refuse::<LogError>(py, "the log holds no scene", help);
+        let help = "pass a scene: scan.model(scene)";
+        let none = || new_error::<LogError>(py, "the log contains no scene", help);
         Py::new(py, self.scene(py)?.ok_or_else(none)?)
     }
 
     fn options(&self, py: Python<'_>) -> PyResult<Options> {
         let Some(model) = &self.session_of(py)?.model else { return Ok(Options::default()) };
         model.options().ok_or_else(|| {
-            let message = format!("the log's model ({}) can't be set up again", model.engine);
-            refuse::<LogError>(py, &message, "make a Model of your own")
+            let message = format!("the logged model ({}) cannot be reconstructed", model.engine);
+            new_error::<LogError>(py, &message, "create a Model explicitly")
         })
     }
 
     pub(crate) fn session_of(&self, py: Python<'_>) -> PyResult<&Session> {
-        let none = || refuse::<LogError>(py, "the log lacks the session of this scan", "");
+        let none = || new_error::<LogError>(py, "the log lacks the session of this scan", "");
         self.view().session.as_deref().ok_or_else(none)
     }
 }
 
-/// Scans that were given as a log, a scan, or a sequence of these.
+/// Collects scans from a log, a scan, or a sequence of these.
 pub(crate) fn scans_of(given: &Bound<'_, PyAny>) -> PyResult<Vec<Py<Scan>>> {
     if let Ok(scan) = given.cast::<Scan>() {
         return Ok(vec![scan.clone().unbind()]);
@@ -341,7 +346,7 @@ pub(crate) fn scans_of(given: &Bound<'_, PyAny>) -> PyResult<Vec<Py<Scan>>> {
     let Ok(parts) = given.try_iter() else {
         let kind = given.get_type();
         return Err(PyTypeError::new_err(format!(
-            "scans is a {kind}: give a Log, a Scan or a list of them"
+            "scans is a {kind}: must be a Log, a Scan or a list of them"
         )));
     };
     let mut scans = Vec::new();
@@ -349,7 +354,9 @@ pub(crate) fn scans_of(given: &Bound<'_, PyAny>) -> PyResult<Vec<Py<Scan>>> {
         let part = part?;
         if !part.is_instance_of::<Scan>() && !part.is_instance_of::<Log>() {
             let kind = part.get_type();
-            return Err(PyTypeError::new_err(format!("scans holds a {kind}: give Logs and Scans")));
+            return Err(PyTypeError::new_err(format!(
+                "scans contains a {kind}: must contain Logs and Scans only"
+            )));
         }
         scans.extend(scans_of(&part)?);
     }

@@ -1,4 +1,4 @@
-//! Occupancy grids of scans.
+//! Occupancy grids from scans.
 
 use pyo3::{exceptions::PyValueError, prelude::*};
 use sonard::{
@@ -13,35 +13,35 @@ use sonard_model::geometry::DVec2;
 
 use crate::{
     arrays,
-    error::{LogError, SonardError, refuse},
+    error::{LogError, SonardError, new_error},
     log::{Scan, scans_of},
     path::result,
     sense::warn,
 };
 
-/// Makes an occupancy grid of scans, each taken at its pose.
+/// Computes an occupancy grid from scans, each at its logged pose.
 ///
 /// Parameters
 /// ----------
 /// scans : Log, Scan or sequence of them
-///     Of one sensor; scans that can't be used are left out with a warning.
+///     Scans of a single sensor; unusable scans are skipped with a warning.
 /// resolution_m : float
 ///     Side of a cell, metres.
 /// region : tuple of float, optional
-///     What to map, x0, y0, x1, y1 in metres; without it around what was seen.
+///     Region of the map, x0, y0, x1, y1 in metres. Defaults to the region observed by the scans.
 /// silent_beyond_m : float, optional
-///     Ranges beyond this are taken for silence, metres; without it the sensor's, at most 5.
+///     Ranges beyond this count as no echo, metres. Defaults to the range of the sensor, at most 5.
 /// feature_prediction : bool
-///     Whether readings that predicted walls contradict count less.
+///     Reduce the weight of readings that contradict predicted walls.
 /// extend_m : float
-///     How far walls are extended beyond their observed part, metres.
+///     Length by which walls are extended beyond their observed part, metres.
 /// least_confidence : float
-///     Readings of less confidence are left out; 0.5 is full confidence.
+///     Minimum confidence of the readings used; 0.5 is full confidence.
 ///
 /// Returns
 /// -------
 /// Map
-///     What ``sonard map`` makes of the same scans.
+///     Same result as ``sonard map`` for these scans.
 #[pyfunction]
 #[pyo3(name = "map", signature = (scans, *, resolution_m = 0.05, region = None, silent_beyond_m = None, feature_prediction = true, extend_m = 2.0, least_confidence = 0.48))]
 #[expect(clippy::too_many_arguments, reason = "they are keywords where they are used")]
@@ -69,13 +69,13 @@ pub(crate) fn make_map<'py>(
     let scans = scans_of(scans)?;
     let (sweeps, session) = sweeps(py, &scans)?;
     let extents = Extents::of_session(session)
-        .map_err(|error| refuse::<LogError>(py, &format!("session: {error}"), ""))?;
+        .map_err(|error| new_error::<LogError>(py, &format!("session: {error}"), ""))?;
     let shape = mapping
         .shape(&sweeps, mapping.max_range_m(&extents))
-        .map_err(|error| refuse::<SonardError>(py, &error.to_string(), ""))?;
-    let of_array = session.array.is_some();
+        .map_err(|error| new_error::<SonardError>(py, &error.to_string(), ""))?;
+    let is_array = session.array.is_some();
     let grid = py.detach(|| {
-        let mut mapper = Mapper::new(&mapping, Grid::new(shape), extents, of_array, sweeps.len());
+        let mut mapper = Mapper::new(&mapping, Grid::new(shape), extents, is_array, sweeps.len());
         sweeps.iter().for_each(|sweep| drop(mapper.add(sweep)));
         mapper.finish()
     });
@@ -85,7 +85,7 @@ pub(crate) fn make_map<'py>(
     result(py, "Map", (occupancy, origin_m, shape.resolution_m))
 }
 
-/// Refuses what is no length or confidence; some may be 0.
+/// Rejects invalid lengths and confidences; some may be 0.
 fn checked(values: [Option<f64>; 4]) -> PyResult<()> {
     let above_0 = f64::MIN_POSITIVE;
     let names = [
@@ -94,8 +94,8 @@ fn checked(values: [Option<f64>; 4]) -> PyResult<()> {
         ("extend_m", 0.0),
         ("least_confidence", 0.0),
     ];
-    for ((name, least), value) in names.into_iter().zip(values) {
-        if let Some(value) = value.filter(|value| !(least..=1e6).contains(value)) {
+    for ((name, min), value) in names.into_iter().zip(values) {
+        if let Some(value) = value.filter(|value| !(min..=1e6).contains(value)) {
             return Err(PyValueError::new_err(format!(
                 "{name} is {value}: it must be greater than 0"
             )));
@@ -104,7 +104,7 @@ fn checked(values: [Option<f64>; 4]) -> PyResult<()> {
     Ok(())
 }
 
-/// The sweeps of scans that can be mapped, and the session of the first.
+/// Extracts the usable sweeps of the scans, and the session of the first.
 fn sweeps<'a>(py: Python<'_>, scans: &'a [Py<Scan>]) -> PyResult<(Vec<Sweep>, &'a Session)> {
     let (mut sweeps, mut first): (Vec<Sweep>, Option<&Scan>) = (Vec::new(), None);
     for scan in scans {
@@ -112,12 +112,12 @@ fn sweeps<'a>(py: Python<'_>, scans: &'a [Py<Scan>]) -> PyResult<(Vec<Sweep>, &'
         match Sweep::of(view) {
             Ok(sweep) => sweeps.push(sweep),
             Err(error) => {
-                warn(py, &format!("scan {} is left out: {error}", view.scan))?;
+                warn(py, &format!("scan {} skipped: {error}", view.scan))?;
                 continue;
             }
         }
         first.get_or_insert(scan.get());
     }
-    let none = || refuse::<LogError>(py, "there is no scan with its session and pose to map", "");
+    let none = || new_error::<LogError>(py, "no scan with session and pose to map", "");
     Ok((sweeps, first.ok_or_else(none)?.session_of(py)?))
 }

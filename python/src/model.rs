@@ -1,4 +1,4 @@
-//! The model.
+//! Python class for the model of a ranger.
 
 mod parts;
 pub(crate) mod predict;
@@ -15,52 +15,57 @@ use sonard_model::{
 
 use crate::{
     air::Air,
-    options::{self, Words},
-    pool::OfProcess,
+    options::{self, NamedOptions},
+    pool::PerProcess,
     scene::{self, Scene},
     sensor::{self, Sensor},
 };
 
-/// Predicts what a ranger reads in a scene.
+/// Predicts the readings of a ranger in a scene.
 ///
 /// Parameters
 /// ----------
 /// scene : Scene or str
-///     The scene, or the name of a shipped one.
+///     Scene, or the name of a shipped one.
 /// sensor : Sensor or str
-///     The ranger, or the name of a preset.
+///     Sensor, or the name of a preset.
 /// air : Air, optional
-///     The air; 20 degrees Celsius, 50 percent and one atmosphere without it.
+///     State of the air. Defaults to 20 degrees Celsius, 50 percent and one atmosphere.
 /// engine : str
-///     ``"paths"``: exact echo paths, all of them; ``"fan"``: rays with mirror reflections and diffraction, after
-///     Dudek, Jenkin, Milios and Wilkes; ``"cone"``: nearest hit of one ray a degree.
+///     ``"paths"``: exact echo paths, all of them; ``"fan"``: rays with mirror reflections and
+///     diffraction, after Dudek, Jenkin, Milios and Wilkes; ``"cone"``: nearest intersection of one
+///     ray per degree.
 /// max_range_m : float, optional
-///     Listen and predict up to this range, metres, in place of the sensor's.
+///     Maximum range of listening window and prediction, metres, in place of the sensor's.
 /// threshold : float, optional
-///     Least amplitude detected, in place of the sensor's; a head-on, perfect wall gives 1.
+///     Detection threshold, in place of the sensor's, relative to the amplitude of a head-on,
+///     perfect wall.
 /// response : {"stationary", "full"}, optional
-///     How the face answers to a pulse, in place of the sensor's way; with ``paths``.
+///     Aperture response of the transducer's face to a pulse, in place of the sensor's; with
+///     ``paths``.
 /// ideal_receiver : bool
-///     Detect one sound at a time and time it by its path alone; with ``paths``, the others always do.
+///     Ideal receiver without interference and time walk; with ``paths``. The other engines always
+///     use it.
 /// lossless : bool
-///     Leave out the absorption of the air; with ``paths`` and ``fan``.
+///     Omit the absorption of the air; with ``paths`` and ``fan``.
 /// max_order : int, optional
-///     Most mirror reflections on a path, in place of as many as can matter; with ``paths`` and ``fan``.
+///     Maximum number of mirror reflections on a path. Unlimited by default, as far as a path can
+///     be detected; with ``paths`` and ``fan``.
 /// edge_law : {"utd", "kuc-siegel", "bozma-kuc"}, optional
-///     How edges diffract, in place of the sensor's law; with ``paths``.
+///     Edge diffraction model, in place of the sensor's; with ``paths``.
 /// double_diffraction : bool
-///     Also find paths diffracted at two edges; with ``paths``.
+///     Include paths diffracted at two edges; with ``paths``.
 /// ray_spacing_deg : float, optional
-///     Angle between the rays, degrees, in place of 0.05; with ``fan``.
+///     Angle between the rays, degrees. Defaults to 0.05; with ``fan``.
 /// aperture_deg : float, optional
-///     Full aperture, degrees, in place of the sensor's two-way -6 dB width; with ``cone``.
+///     Full aperture, degrees. Defaults to the sensor's two-way -6 dB width; with ``cone``.
 #[pyclass(frozen, module = "sonard")]
 pub(crate) struct Model {
     scene: Py<Scene>,
     sensor: Py<Sensor>,
     air: Air,
     options: Options,
-    simulator: OfProcess<Simulator>,
+    simulator: PerProcess<Simulator>,
 }
 
 #[pymethods]
@@ -86,7 +91,7 @@ impl Model {
         ray_spacing_deg: Option<f64>,
         aperture_deg: Option<f64>,
     ) -> PyResult<Self> {
-        let words = Words { engine, response, edge_law };
+        let named = NamedOptions { engine, response, edge_law };
         let keys = OptionKeys {
             max_range_m,
             threshold,
@@ -98,92 +103,94 @@ impl Model {
             aperture_deg,
             ..OptionKeys::default()
         };
-        let options = options::options(py, &words, keys)?;
-        let scene = scene::meant(scene)?;
+        let options = options::options(py, &named, keys)?;
+        let scene = scene::resolve(scene)?;
         let sensor = match sensor {
-            Some(sensor) => sensor::meant(sensor)?,
+            Some(sensor) => sensor::resolve(sensor)?,
             None => sensor::default(py)?,
         };
         let air = air.map_or_else(|| acoustics::Air::default().into(), |air| *air.get());
-        Self::of(py, scene, sensor, air, options)
+        Self::build(py, scene, sensor, air, options)
     }
 
-    /// The scene.
+    /// Scene of the model.
     #[getter]
     fn scene(&self, py: Python<'_>) -> Py<Scene> {
         self.scene.clone_ref(py)
     }
 
-    /// The ranger.
+    /// Sensor of the model.
     #[getter]
     fn sensor(&self, py: Python<'_>) -> Py<Sensor> {
         self.sensor.clone_ref(py)
     }
 
-    /// The air.
+    /// State of the air.
     #[getter]
     fn air(&self) -> Air {
         self.air
     }
 
-    /// How echoes are found: ``"paths"``, ``"fan"`` or ``"cone"``.
+    /// Simulation engine: ``"paths"``, ``"fan"`` or ``"cone"``.
     #[getter]
     fn engine(&self) -> &'static str {
         self.options.engine.kind().name()
     }
 
-    /// The options that are given, by name.
+    /// Options other than the defaults, by name.
     #[getter]
     fn options<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         options::given(py, &self.options)
     }
 
-    /// Speed of sound, metres a second.
+    /// Speed of sound, metres per second.
     #[getter]
     fn sound_speed_m_s(&self) -> f64 {
         self.air.air.sound_speed_m_s()
     }
 
-    /// Farthest range that is listened for, metres.
+    /// Maximum range, at the end of the listening window, metres.
     #[getter]
     fn max_range_m(&self, py: Python<'_>) -> PyResult<f64> {
         Ok(self.simulator(py)?.receiver().max_range_m)
     }
 
-    /// Nearest range that can be read, at the end of blanking, metres.
+    /// Minimum range, at the end of the blanking, metres.
     #[getter]
     fn min_range_m(&self, py: Python<'_>) -> PyResult<f64> {
         Ok(self.simulator(py)?.receiver().min_range_m())
     }
 
-    /// Predicted readings of all poses and azimuths.
+    /// Predicts the readings of all poses and azimuths.
     ///
-    /// The interpreter's lock is free meanwhile, and an interrupt (Ctrl-C) ends it.
+    /// Releases the interpreter lock during the computation; an interrupt (Ctrl-C) ends it.
     ///
     /// Parameters
     /// ----------
     /// poses : array_like, shape (..., 3)
-    ///     Where the ranger's rotation axis stands and where azimuth 0 points: x and y in metres, heading in
-    ///     degrees counter-clockwise from +x, -360 to 360.
+    ///     Positions of the ranger's rotation axis and directions of azimuth 0: x and y in metres,
+    ///     heading in degrees counter-clockwise from +x, -360 to 360.
     /// azimuths_deg : array_like, shape (beams,), optional
-    ///     Where to fire, degrees counter-clockwise from the heading; without it 400 azimuths from 0 to 359.1.
+    ///     Azimuths of the firings, degrees counter-clockwise from the heading. Default to 400
+    ///     azimuths from 0 to 359.1.
     /// threads : int, optional
-    ///     Threads to predict on, 1 to 1024; without it what the environment variable ``RAYON_NUM_THREADS`` says,
-    ///     else one for each core. Results do not depend on it.
+    ///     Number of threads, 1 to 1024. Defaults to the environment variable
+    ///     ``RAYON_NUM_THREADS``, else to the number of cores. The results do not depend on it.
     ///
     /// Returns
     /// -------
     /// ndarray of dtype READING, shape (..., beams)
-    ///     Fields ``status`` (uint8, see ``Status``), ``range_m``, ``amplitude``, ``margin_db`` and ``tof_us``
-    ///     (float64). Of a silence ``range_m`` and ``tof_us`` are ``inf``, and ``margin_db`` says what it lacked;
-    ///     what there is none of is ``nan``.
+    ///     Fields ``status`` (uint8, see ``Status``), ``range_m``, ``amplitude``, ``margin_db`` and
+    ///     ``tof_us`` (float64). Without an echo ``range_m`` and ``tof_us`` are ``inf``, and
+    ///     ``margin_db`` is the level of the strongest candidate relative to the threshold. Missing
+    ///     values are ``nan``.
     ///
     /// Raises
     /// ------
     /// PoseError
-    ///     If no ranger can stand at one of the poses; nothing is predicted then.
+    ///     If no ranger can be placed at one of the poses; nothing is predicted then.
     /// TooManyPathsError
-    ///     If there are more echo paths than can be found within bounds of work and memory.
+    ///     If the number of echo paths exceeds the limits of computation and memory.
     #[pyo3(signature = (poses, azimuths_deg = None, threads = None))]
     fn predict<'py>(
         &self,
@@ -195,21 +202,22 @@ impl Model {
         predict::predict(self, py, poses, azimuths_deg, threads)
     }
 
-    /// Predicted readings of a ranger that moves: one firing at each pose.
+    /// Predicts the readings of a moving ranger: one firing at each pose.
     ///
     /// Parameters
     /// ----------
     /// poses : array_like, shape (..., 3)
-    ///     Where the ranger's rotation axis stands at each firing, as of ``predict``.
+    ///     Pose of the ranger's rotation axis at each firing, as for ``predict``.
     /// azimuths_deg : array_like, shape (...)
-    ///     Where it fires there, degrees counter-clockwise from the heading; what can be broadcast is.
+    ///     Azimuth of each firing, degrees counter-clockwise from the heading. Broadcast to the
+    ///     shape of the poses.
     /// threads : int, optional
-    ///     As of ``predict``.
+    ///     As for ``predict``.
     ///
     /// Returns
     /// -------
     /// ndarray of dtype READING, shape (...)
-    ///     As of ``predict``. Each firing costs what a pose costs there.
+    ///     As for ``predict``. Each firing costs as much as a pose there.
     #[pyo3(signature = (poses, azimuths_deg, threads = None))]
     fn fire<'py>(
         &self,
@@ -221,14 +229,14 @@ impl Model {
         predict::fire(self, py, poses, azimuths_deg, threads)
     }
 
-    /// One predicted reading with the path of its sound.
+    /// Predicts a single reading with its propagation path.
     ///
     /// Parameters
     /// ----------
     /// pose : array_like, shape (3,)
     ///     x and y (metres) and heading (degrees).
     /// azimuth_deg : float
-    ///     Where the ranger looks, degrees counter-clockwise from the heading.
+    ///     Azimuth of the firing, degrees counter-clockwise from the heading.
     #[pyo3(signature = (pose, azimuth_deg = 0.0))]
     fn reading<'py>(
         &self,
@@ -238,21 +246,24 @@ impl Model {
         single::reading(self, pose, azimuth_deg)
     }
 
-    /// Every propagation path of echoes at a place, shortest first.
+    /// Computes all propagation paths of echoes at a position, shortest first.
     ///
     /// Parameters
     /// ----------
     /// pose : array_like, shape (3,)
-    ///     x and y (metres) and heading (degrees), which matters where a robot's body turns with it.
+    ///     x and y (metres) and heading (degrees), which matters only if the scene contains a
+    ///     robot's body.
     /// weakest : float
-    ///     Paths weaker than this are left out, 0.000001 to 1; a head-on, perfect wall gives 1. Those that touch
-    ///     cylinders more than once, or a cylinder and an edge, are listed from ten times this.
+    ///     Minimum amplitude of the paths, 0.000001 to 1, relative to a head-on, perfect wall.
+    ///     Paths that touch cylinders more than once, or a cylinder and an edge, are listed from
+    ///     ten times this amplitude.
     ///
     /// Returns
     /// -------
     /// list of Path
-    ///     A path that can be run through in both directions is there twice, with departure and arrival swapped.
-    ///     The amplitude knows no beam pattern: it is what the echo would be if the ranger faced it.
+    ///     A path that can be traversed in both directions is listed twice, with departure and
+    ///     arrival swapped. The amplitude excludes the beam pattern: it is the echo of a ranger
+    ///     that faces the path.
     #[pyo3(signature = (pose, weakest = 0.001))]
     fn paths<'py>(
         &self,
@@ -262,18 +273,18 @@ impl Model {
         single::paths(self, pose, weakest)
     }
 
-    /// What an oscilloscope would show of one firing.
+    /// Computes the signal of a firing against time, as on an oscilloscope.
     ///
     /// Parameters
     /// ----------
     /// pose : array_like, shape (3,)
     ///     x and y (metres) and heading (degrees).
     /// azimuth_deg : float
-    ///     Where the ranger looks, degrees counter-clockwise from the heading.
+    ///     Azimuth of the firing, degrees counter-clockwise from the heading.
     /// until_m : float, optional
-    ///     Up to this range, metres; without it as far as is listened.
+    ///     End of the trace as a range, metres. Defaults to the maximum range.
     /// step_us : float
-    ///     Spacing of the samples, microseconds, 1 to 1000.
+    ///     Sampling interval, microseconds, 1 to 1000.
     #[pyo3(signature = (pose, azimuth_deg = 0.0, until_m = None, step_us = 5.0))]
     fn trace<'py>(
         &self,
@@ -294,7 +305,7 @@ impl Model {
         &self,
         py: Python<'py>,
     ) -> PyResult<(Bound<'py, PyTuple>, Bound<'py, PyDict>)> {
-        let made_of = (self.scene(py), self.sensor(py), self.air, self.engine());
-        Ok((made_of.into_pyobject(py)?, self.options(py)?))
+        let arguments = (self.scene(py), self.sensor(py), self.air, self.engine());
+        Ok((arguments.into_pyobject(py)?, self.options(py)?))
     }
 }

@@ -1,4 +1,4 @@
-//! Options of models, as keywords.
+//! Options of models, as keyword arguments.
 
 use pyo3::{
     prelude::*,
@@ -8,29 +8,33 @@ use serde::de::DeserializeOwned;
 use sonard_model::model::{OptionKeys, Options};
 
 use crate::{
-    error::{OptionError, refuse},
+    error::{OptionError, new_error},
     json,
 };
 
-/// Options that are given as words.
-pub(crate) struct Words<'a> {
+/// Options whose values are names.
+pub(crate) struct NamedOptions<'a> {
     pub(crate) engine: &'a str,
     pub(crate) response: Option<&'a str>,
     pub(crate) edge_law: Option<&'a str>,
 }
 
-/// Options of keywords.
-pub(crate) fn options(py: Python<'_>, words: &Words<'_>, keys: OptionKeys) -> PyResult<Options> {
+/// Converts keyword arguments to options.
+pub(crate) fn options(
+    py: Python<'_>,
+    named: &NamedOptions<'_>,
+    keys: OptionKeys,
+) -> PyResult<Options> {
     let keys = OptionKeys {
-        engine: word(py, "engine", words.engine)?,
-        response: words.response.map(|name| word(py, "response", name)).transpose()?,
-        edge_law: words.edge_law.map(|name| word(py, "edge_law", name)).transpose()?,
+        engine: parse_name(py, "engine", named.engine)?,
+        response: named.response.map(|name| parse_name(py, "response", name)).transpose()?,
+        edge_law: named.edge_law.map(|name| parse_name(py, "edge_law", name)).transpose()?,
         ..keys
     };
-    keys.options().map_err(|error| refuse::<OptionError>(py, &error.to_string(), &error.help()))
+    keys.options().map_err(|error| new_error::<OptionError>(py, &error.to_string(), &error.help()))
 }
 
-/// The keywords that are given, without the engine.
+/// Returns the options other than the defaults, without the engine.
 pub(crate) fn given<'py>(py: Python<'py>, options: &Options) -> PyResult<Bound<'py, PyDict>> {
     let keys = json::to_python(py, &OptionKeys::from(options))?;
     let given = PyDict::new(py);
@@ -43,7 +47,7 @@ pub(crate) fn given<'py>(py: Python<'py>, options: &Options) -> PyResult<Bound<'
     Ok(given)
 }
 
-/// The engine and the keywords given, as a representation ends.
+/// Formats the engine and the other options for a representation.
 pub(crate) fn shown(py: Python<'_>, options: &Options) -> PyResult<String> {
     let given = given(py, options)?;
     let given = given.iter().map(|(name, value)| {
@@ -53,8 +57,13 @@ pub(crate) fn shown(py: Python<'_>, options: &Options) -> PyResult<String> {
     Ok(format!("engine '{}'{given}", options.engine.kind().name()))
 }
 
-/// A setting that has names for values.
-pub(crate) fn word<T: DeserializeOwned>(py: Python<'_>, option: &str, name: &str) -> PyResult<T> {
-    serde_json::from_value(name.into())
-        .map_err(|error| refuse::<OptionError>(py, &format!("{option} is `{name}`: {error}"), ""))
+/// Parses the name of an option's value.
+pub(crate) fn parse_name<T: DeserializeOwned>(
+    py: Python<'_>,
+    option: &str,
+    name: &str,
+) -> PyResult<T> {
+    serde_json::from_value(name.into()).map_err(|error| {
+        new_error::<OptionError>(py, &format!("{option} is `{name}`: {error}"), "")
+    })
 }

@@ -1,4 +1,5 @@
-//! Propagation paths, and single readings with theirs, as the classes of `package/sonard/_results.py`.
+//! Conversion of propagation paths and single readings to the classes of
+//! `package/sonard/_results.py`.
 
 use pyo3::{prelude::*, types::PyTuple};
 use sonard_model::{
@@ -10,7 +11,7 @@ use sonard_model::{
 
 use crate::{arrays, status};
 
-/// A class of `_results`, made with its fields in order.
+/// Creates an instance of a class in `_results`, with its fields in order.
 pub(crate) fn result<'py>(
     py: Python<'py>,
     class: &str,
@@ -19,7 +20,7 @@ pub(crate) fn result<'py>(
     py.import("sonard._results")?.getattr(class)?.call1(fields)
 }
 
-/// The way that sound took.
+/// Propagation path, ready for conversion to Python.
 pub(crate) struct PathResult {
     kind: PathKind,
     order: usize,
@@ -34,38 +35,41 @@ pub(crate) struct PathResult {
 }
 
 impl PathResult {
-    pub(crate) fn of_arrival(scene: &Scene, arrival: &Arrival) -> Self {
+    pub(crate) fn from_arrival(scene: &Scene, arrival: &Arrival) -> Self {
         Self {
             length_m: arrival.length_m,
             amplitude: arrival.path_amplitude,
             phase_rad: arrival.phase_rad,
             departure_rad: arrival.departure_rad,
             arrival_rad: arrival.arrival_rad,
-            ..Self::of(scene, &arrival.path)
+            ..Self::from_path(scene, &arrival.path)
         }
     }
 
-    pub(crate) fn of_echo(scene: &Scene, echo: &EchoPath) -> Self {
+    pub(crate) fn from_echo(scene: &Scene, echo: &EchoPath) -> Self {
         Self {
             length_m: echo.length_m,
             amplitude: echo.amplitude,
             phase_rad: echo.phase_rad,
             departure_rad: echo.departure_rad,
             arrival_rad: echo.arrival_rad,
-            ..Self::of(scene, &echo.path)
+            ..Self::from_path(scene, &echo.path)
         }
     }
 
-    /// What a path meets; the figures are the caller's.
-    fn of(scene: &Scene, path: &model::Path) -> Self {
-        let met = &path.interactions;
-        let has_heights = met.iter().any(|met| met.z_m.is_some());
+    /// Converts the interactions of a path; the caller sets the numerical fields.
+    fn from_path(scene: &Scene, path: &model::Path) -> Self {
+        let interactions = &path.interactions;
+        let has_heights = interactions.iter().any(|interaction| interaction.z_m.is_some());
         let columns = if has_heights { 3 } else { 2 };
-        let point = |met: &model::Interaction| {
-            let at = [met.point.x, met.point.y, met.z_m.unwrap_or(f64::NAN)];
+        let point = |interaction: &model::Interaction| {
+            let at =
+                [interaction.point.x, interaction.point.y, interaction.z_m.unwrap_or(f64::NAN)];
             at.into_iter().take(columns)
         };
-        let name = |met: &model::Interaction| (word(met.mechanism), met.mechanism.name(scene));
+        let name = |interaction: &model::Interaction| {
+            (mechanism_name(interaction.mechanism), interaction.mechanism.name(scene))
+        };
         Self {
             kind: path.kind(),
             order: path.order(),
@@ -74,8 +78,8 @@ impl PathResult {
             phase_rad: f64::NAN,
             departure_rad: f64::NAN,
             arrival_rad: f64::NAN,
-            interactions: met.iter().map(name).collect(),
-            points: met.iter().flat_map(point).collect(),
+            interactions: interactions.iter().map(name).collect(),
+            points: interactions.iter().flat_map(point).collect(),
             columns,
         }
     }
@@ -102,7 +106,7 @@ impl PathResult {
     }
 }
 
-const fn word(mechanism: Mechanism) -> &'static str {
+const fn mechanism_name(mechanism: Mechanism) -> &'static str {
     match mechanism {
         Mechanism::Reflection(_) => "reflection",
         Mechanism::Diffraction(_) => "diffraction",
@@ -111,12 +115,13 @@ const fn word(mechanism: Mechanism) -> &'static str {
     }
 }
 
-/// From 0 to 360, and never a negative zero.
+/// Converts to degrees from 0 to 360, never a negative zero.
 fn degrees(angle_rad: f64) -> f64 {
     wrap_360(angle_rad.to_degrees()) + 0.0
 }
 
-/// A prediction as a `Reading`, of a ranger's own sound or of another's.
+/// Converts a prediction to a `Reading`; `crosstalk` is the id of another ranger that transmitted
+/// the sound.
 pub(crate) fn reading<'py>(
     py: Python<'py>,
     scene: &Scene,
@@ -124,7 +129,7 @@ pub(crate) fn reading<'py>(
     crosstalk: Option<&str>,
 ) -> PyResult<Bound<'py, PyAny>> {
     let arrival = predicted.arrival.as_ref();
-    let path = arrival.map(|arrival| PathResult::of_arrival(scene, arrival).into_python(py));
+    let path = arrival.map(|arrival| PathResult::from_arrival(scene, arrival).into_python(py));
     let fields = (
         status::member(py, predicted.status)?,
         predicted.range_m,

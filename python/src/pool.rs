@@ -1,42 +1,45 @@
-//! The threads that predictions run on.
+//! Thread pool of the predictions.
 
 use std::sync::{Arc, Mutex, PoisonError};
 
 use pyo3::{exceptions::PyValueError, prelude::*};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
-/// Most threads that can be asked for.
-const MOST: usize = 1024;
+/// Maximum number of threads.
+const MAX_THREADS: usize = 1024;
 
-/// The pool that was used last.
-struct Held {
+/// Most recently used pool.
+struct CachedPool {
     process: u32,
     threads: Option<usize>,
     pool: Arc<ThreadPool>,
 }
 
-static HELD: Mutex<Option<Held>> = Mutex::new(None);
+static CACHED_POOL: Mutex<Option<CachedPool>> = Mutex::new(None);
 
-/// A pool of so many threads of this process; without a number, as many as `RAYON_NUM_THREADS` says, else one
-/// for each core.
+/// Returns a pool with the given number of threads for this process. The number defaults to
+/// `RAYON_NUM_THREADS`, else to the number of cores.
 ///
-/// A forked child has none of its parent's threads: whatever waits for them waits for ever. So it gets a pool of
-/// its own, and the parent's is forgotten there, because dropping it would wait too. The lock is only held
-/// together with the interpreter's, without which no thread forks, so that no child finds it taken.
+/// A forked child has none of its parent's threads, so waiting for them would never end. The child
+/// therefore gets a pool of its own and leaks the parent's, because dropping that would wait, too.
+/// The lock is held only together with the interpreter lock, without which no thread forks, so no
+/// child inherits a locked mutex.
 pub(crate) fn pool(_py: Python<'_>, threads: Option<usize>) -> PyResult<Arc<ThreadPool>> {
-    if threads.is_some_and(|count| !(1..=MOST).contains(&count)) {
+    if threads.is_some_and(|count| !(1..=MAX_THREADS).contains(&count)) {
         let count = threads.unwrap_or_default();
-        return Err(PyValueError::new_err(format!("threads is {count}: it must be 1 to {MOST}")));
+        return Err(PyValueError::new_err(format!(
+            "threads is {count}: it must be 1 to {MAX_THREADS}"
+        )));
     }
     let process = std::process::id();
-    let mut held = HELD.lock().unwrap_or_else(PoisonError::into_inner);
-    match held.take() {
-        Some(known) if known.process == process && known.threads == threads => {
-            let pool = known.pool.clone();
-            *held = Some(known);
+    let mut cached = CACHED_POOL.lock().unwrap_or_else(PoisonError::into_inner);
+    match cached.take() {
+        Some(entry) if entry.process == process && entry.threads == threads => {
+            let pool = entry.pool.clone();
+            *cached = Some(entry);
             return Ok(pool);
         }
-        Some(known) if known.process != process => std::mem::forget(known),
+        Some(entry) if entry.process != process => std::mem::forget(entry),
         _ => {}
     }
     let pool = ThreadPoolBuilder::new()
@@ -45,33 +48,34 @@ pub(crate) fn pool(_py: Python<'_>, threads: Option<usize>) -> PyResult<Arc<Thre
         .build()
         .map_err(|error| PyValueError::new_err(format!("no threads to predict on: {error}")))?;
     let pool = Arc::new(pool);
-    *held = Some(Held { process, threads, pool: pool.clone() });
+    *cached = Some(CachedPool { process, threads, pool: pool.clone() });
     Ok(pool)
 }
 
-/// Something that threads share, made anew in a forked child: a parent's thread may have held a lock in it.
-pub(crate) struct OfProcess<T> {
-    held: Mutex<(u32, Arc<T>)>,
+/// Value shared by threads and created again in a forked child, because a thread of the parent may
+/// have held a lock in it.
+pub(crate) struct PerProcess<T> {
+    cached: Mutex<(u32, Arc<T>)>,
 }
 
-impl<T> OfProcess<T> {
+impl<T> PerProcess<T> {
     pub(crate) fn new(value: T) -> Self {
-        Self { held: Mutex::new((std::process::id(), Arc::new(value))) }
+        Self { cached: Mutex::new((std::process::id(), Arc::new(value))) }
     }
 
-    /// This process's own, with `make` for a child's first use. As above, the lock is only held together with
-    /// the interpreter's.
+    /// Returns the value of this process; `make` creates it on the first use in a child. As above,
+    /// the lock is held only together with the interpreter lock.
     pub(crate) fn get<E>(
         &self,
         _py: Python<'_>,
         make: impl FnOnce() -> Result<T, E>,
     ) -> Result<Arc<T>, E> {
         let process = std::process::id();
-        let mut held = self.held.lock().unwrap_or_else(PoisonError::into_inner);
-        if held.0 != process {
-            let parents = std::mem::replace(&mut *held, (process, Arc::new(make()?)));
+        let mut cached = self.cached.lock().unwrap_or_else(PoisonError::into_inner);
+        if cached.0 != process {
+            let parents = std::mem::replace(&mut *cached, (process, Arc::new(make()?)));
             std::mem::forget(parents);
         }
-        Ok(held.1.clone())
+        Ok(cached.1.clone())
     }
 }

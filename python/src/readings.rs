@@ -1,19 +1,19 @@
-//! Readings that a user gives.
+//! Conversion of readings passed by the user.
 
 use pyo3::{exceptions::PyValueError, prelude::*};
 use sonard_model::reading::PingStatus;
 
 use crate::{arrays, model::predict::full_turn, status};
 
-/// Readings of one place.
-pub(crate) struct Heard {
-    /// Azimuth in degrees, what became of the firing, and the range in metres if it has one.
+/// Readings from a single position.
+pub(crate) struct BeamReadings {
+    /// Azimuth in degrees, status, and range in metres if the status is an echo.
     pub(crate) beams: Vec<(f64, PingStatus, f64)>,
 }
 
-impl Heard {
-    /// Of an array of readings with `status` and `range_m`, or of ranges alone.
-    pub(crate) fn of(
+impl BeamReadings {
+    /// Converts an array of readings with `status` and `range_m`, or an array of ranges.
+    pub(crate) fn from_python(
         readings: &Bound<'_, PyAny>,
         azimuths_deg: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
@@ -23,7 +23,7 @@ impl Heard {
         let (ranges_m, statuses) = if has_fields {
             let ranges_m = arrays::list(&array.get_item("range_m")?, "readings")?;
             let codes = arrays::list(&array.get_item("status")?, "readings")?;
-            (ranges_m, codes.into_iter().map(|code| status::of_code(code as u8)).collect())
+            (ranges_m, codes.into_iter().map(|code| status::from_code(code as u8)).collect())
         } else {
             let ranges_m = arrays::list(&array, "readings")?;
             let statuses = ranges_m.iter().map(|range_m| status_of(*range_m)).collect();
@@ -36,7 +36,7 @@ impl Heard {
         };
         if azimuths_deg.len() != ranges_m.len() {
             return Err(PyValueError::new_err(format!(
-                "{} readings, but {} azimuths_deg: give one for each",
+                "{} readings, but {} azimuths_deg: the lengths must be equal",
                 ranges_m.len(),
                 azimuths_deg.len()
             )));
@@ -52,7 +52,7 @@ impl Heard {
     }
 }
 
-/// What a range says alone: infinite for a silence; of what is no range nothing is known.
+/// Status of a bare range: infinite for no echo; `None` for an invalid range.
 fn status_of(range_m: f64) -> Option<PingStatus> {
     if range_m == f64::INFINITY {
         return Some(PingStatus::NoEcho);

@@ -1,4 +1,4 @@
-//! Scenes.
+//! Python class for scenes.
 
 mod grid;
 mod points;
@@ -25,45 +25,47 @@ use sonard_model::{
 
 use crate::{
     arrays,
-    error::{self, SceneError, refuse},
+    error::{self, SceneError, new_error},
 };
-use points::{MATERIAL, Rest};
+use points::{MATERIAL, OtherParts};
 
-/// Walls and cylinders of some material, with named poses.
+/// Walls and cylinders with materials, and named poses.
 ///
-/// ``Scene.shipped("simple-room")``, ``Scene.from_points(corners)``, ``Scene.from_shapes(polygons)``,
-/// ``Scene.from_grid(map)``, ``Scene.from_json(text)`` and ``Scene.load(path)`` make one. Lengths are metres.
+/// Created by ``Scene.shipped("simple-room")``, ``Scene.from_points(corners)``,
+/// ``Scene.from_shapes(polygons)``, ``Scene.from_grid(map)``, ``Scene.from_json(text)`` and
+/// ``Scene.load(path)``. Lengths are in metres.
 #[pyclass(frozen, module = "sonard")]
 pub(crate) struct Scene {
     pub(crate) scene: Arc<scene::Scene>,
 }
 
-/// Pose as Python has it: x, y (metres) and heading (degrees).
+/// Pose in Python: x, y (metres) and heading (degrees).
 pub(crate) type PoseTuple = (f64, f64, f64);
 
 #[pymethods]
 impl Scene {
-    /// A room from its corners.
+    /// Creates a room from its corners.
     ///
     /// Parameters
     /// ----------
     /// points : array_like, shape (n, 2)
-    ///     Corners of the walls in their order, x and y in metres. A last corner that is the first again is let
-    ///     pass.
+    ///     Corners of the walls in sequence, x and y in metres. The last corner may repeat the
+    ///     first.
     /// closed : bool
-    ///     Whether a wall leads from the last corner back to the first.
+    ///     Add a wall from the last corner to the first.
     /// obstacles : sequence of array_like, each of shape (m, 2)
-    ///     Closed outlines that stand in the room.
+    ///     Closed outlines of obstacles in the room.
     /// cylinders : array_like, shape (k, 3), optional
-    ///     Upright round bodies: x, y and radius, metres.
+    ///     Upright cylinders: x, y and radius, metres.
     /// reflectance : float
-    ///     Amplitude of the mirror reflection relative to the incident wave, 0 to 1, of everything.
+    ///     Amplitude of the mirror reflection relative to the incident wave, 0 to 1, of all
+    ///     surfaces.
     /// roughness : float
-    ///     Share of what is not absorbed that is scattered in place of mirrored, 0 to 1.
+    ///     Fraction of the reflected energy that is scattered instead of mirrored, 0 to 1.
     /// floor_z_m, ceiling_z_m : float, optional
-    ///     Heights, metres, both or none; without them the scene is a plane.
+    ///     Heights, metres. Pass both or neither; without them the scene is two-dimensional.
     /// name : str
-    ///     The scene's name.
+    ///     Name of the scene.
     #[staticmethod]
     #[pyo3(signature = (points, *, closed = true, obstacles = None, cylinders = None, reflectance = 0.97, roughness = 0.0, floor_z_m = None, ceiling_z_m = None, name = "scene"))]
     #[expect(clippy::too_many_arguments, reason = "they are keywords where they are used")]
@@ -81,21 +83,22 @@ impl Scene {
     ) -> PyResult<Self> {
         let empty = scene::Scene::builder(name).rough_material(MATERIAL, reflectance, roughness);
         let builder = points::with_outlines(empty, points, closed, obstacles)?;
-        let rest = Rest { cylinders, heights_m: [floor_z_m, ceiling_z_m] };
-        Ok(Self { scene: Arc::new(rest.built(py, builder)?) })
+        let others = OtherParts { cylinders, heights_m: [floor_z_m, ceiling_z_m] };
+        Ok(Self { scene: Arc::new(others.build(py, builder)?) })
     }
 
-    /// A scene from shapes as shapely, geopandas, fiona or GeoJSON have them: walls along lines and around polygons and
-    /// their holes. A polygon is a room, or what stands in one; which follows from where it lies.
+    /// Creates a scene from shapes as in shapely, geopandas, fiona or GeoJSON: walls along lines
+    /// and around polygons and their holes. The positions of the polygons determine which are rooms
+    /// and which are obstacles.
     ///
     /// Parameters
     /// ----------
     /// shapes : object, or sequence of them
-    ///     What has ``__geo_interface__`` or ``coords``, or a mapping as in GeoJSON: LineString, LinearRing, Polygon,
-    ///     MultiLineString, MultiPolygon, GeometryCollection, Feature or FeatureCollection; x and y in metres. Heights of
-    ///     points are left out.
+    ///     Object with ``__geo_interface__`` or ``coords``, or a mapping as in GeoJSON: LineString,
+    ///     LinearRing, Polygon, MultiLineString, MultiPolygon, GeometryCollection, Feature or
+    ///     FeatureCollection; x and y in metres. Heights of points are ignored.
     /// cylinders, reflectance, roughness, floor_z_m, ceiling_z_m, name
-    ///     As of ``from_points``.
+    ///     As for ``from_points``.
     #[staticmethod]
     #[pyo3(signature = (shapes, *, cylinders = None, reflectance = 0.97, roughness = 0.0, floor_z_m = None, ceiling_z_m = None, name = "scene"))]
     #[expect(clippy::too_many_arguments, reason = "they are keywords where they are used")]
@@ -111,24 +114,28 @@ impl Scene {
     ) -> PyResult<Self> {
         let empty = scene::Scene::builder(name).rough_material(MATERIAL, reflectance, roughness);
         let builder = shapes::with_shapes(empty, shapes)?;
-        let rest = Rest { cylinders, heights_m: [floor_z_m, ceiling_z_m] };
-        Ok(Self { scene: Arc::new(rest.built(py, builder)?) })
+        let others = OtherParts { cylinders, heights_m: [floor_z_m, ceiling_z_m] };
+        Ok(Self { scene: Arc::new(others.build(py, builder)?) })
     }
 
-    /// The walls that a map of ROS's map_server shows, traced as lines: what ``sonard scene from-grid`` makes of it.
+    /// Traces the walls of a map of ROS's map_server as lines, like ``sonard scene from-grid``.
     ///
     /// Parameters
     /// ----------
     /// path : str or path-like
-    ///     Its description (YAML), or the folder of map.yaml; beside it the image, PGM or PNG.
+    ///     Description of the map (YAML), or the folder of map.yaml; the image, PGM or PNG, is
+    ///     expected next to it.
     /// tolerance_m : float, optional
-    ///     How far a wall may be off the sides of the cells that it stands for, metres; one and a half cells without it.
+    ///     Maximum distance of a wall from the sides of the traced cells, metres. Defaults to one
+    ///     and a half cells.
     /// least_m : float, optional
-    ///     What is less around is left out, metres; four cells without it.
+    ///     Minimum perimeter of an outline, metres; shorter ones are dropped. Defaults to four
+    ///     cells.
     /// reflectance : float
-    ///     Amplitude of the mirror reflection relative to the incident wave, 0 to 1, of everything.
+    ///     Amplitude of the mirror reflection relative to the incident wave, 0 to 1, of all
+    ///     surfaces.
     /// name : str, optional
-    ///     The scene's name; the file's without it.
+    ///     Name of the scene. Defaults to that of the file.
     #[staticmethod]
     #[pyo3(signature = (path, *, tolerance_m = None, least_m = None, reflectance = 0.97, name = None))]
     fn from_grid(
@@ -144,7 +151,7 @@ impl Scene {
         Ok(Self { scene: Arc::new(scene) })
     }
 
-    /// A scene from the text of a scene file (``sonard scene schema`` describes it).
+    /// Creates a scene from the text of a scene file (described by ``sonard scene schema``).
     #[staticmethod]
     pub(crate) fn from_json(py: Python<'_>, text: &str) -> PyResult<Self> {
         let scene =
@@ -152,7 +159,7 @@ impl Scene {
         Ok(Self { scene: Arc::new(scene) })
     }
 
-    /// A scene from a file.
+    /// Creates a scene from a file.
     #[staticmethod]
     fn load(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
         let text =
@@ -160,12 +167,12 @@ impl Scene {
         Self::from_json(py, &text)
     }
 
-    /// A scene that comes with the package, by its name.
+    /// Returns a shipped scene by its name.
     #[staticmethod]
     fn shipped(py: Python<'_>, name: &str) -> PyResult<Self> {
         let Some(text) = shipped::text(name) else {
-            let message = format!("there is no shipped scene `{name}`");
-            return Err(refuse::<SceneError>(
+            let message = format!("unknown shipped scene `{name}`");
+            return Err(new_error::<SceneError>(
                 py,
                 &message,
                 &suggest(name, &names(), "shipped scenes"),
@@ -174,25 +181,25 @@ impl Scene {
         Self::from_json(py, text)
     }
 
-    /// The names of the scenes that come with the package.
+    /// Names of the shipped scenes.
     #[staticmethod]
     fn shipped_names() -> Vec<String> {
         names()
     }
 
-    /// The scene's name.
+    /// Name of the scene.
     #[getter]
     fn name(&self) -> &str {
         &self.scene.name
     }
 
-    /// Where its dimensions come from.
+    /// Source of the dimensions.
     #[getter]
     fn source(&self) -> Option<&str> {
         self.scene.source.as_deref()
     }
 
-    /// The walls' ends, metres: array of shape (walls, 2, 2), last axis x and y.
+    /// Ends of the walls, metres: array of shape (walls, 2, 2), last axis x and y.
     #[getter]
     fn walls<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let walls = &self.scene.walls;
@@ -200,13 +207,13 @@ impl Scene {
         arrays::shaped(py, ends.collect(), &[walls.len(), 2, 2])
     }
 
-    /// The walls' names, in the order of ``walls``.
+    /// Names of the walls, in the order of ``walls``.
     #[getter]
     fn wall_ids(&self) -> Vec<String> {
         self.scene.walls.iter().map(|wall| wall.id.to_string()).collect()
     }
 
-    /// Upright round bodies, metres: array of shape (cylinders, 3) of x, y and radius.
+    /// Upright cylinders, metres: array of shape (cylinders, 3) of x, y and radius.
     #[getter]
     fn cylinders<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let cylinders = &self.scene.cylinders;
@@ -214,19 +221,19 @@ impl Scene {
         arrays::shaped(py, numbers.collect(), &[cylinders.len(), 3])
     }
 
-    /// The cylinders' names, in the order of ``cylinders``.
+    /// Names of the cylinders, in the order of ``cylinders``.
     #[getter]
     fn cylinder_ids(&self) -> Vec<String> {
         self.scene.cylinders.iter().map(|cylinder| cylinder.id.to_string()).collect()
     }
 
-    /// Height of the floor, metres; ``None`` in a scene in the plane.
+    /// Height of the floor, metres; ``None`` in a two-dimensional scene.
     #[getter]
     fn floor_z_m(&self) -> Option<f64> {
         self.scene.floor_z_m
     }
 
-    /// Height of the ceiling, metres.
+    /// Height of the ceiling, metres; ``None`` in a two-dimensional scene.
     #[getter]
     fn ceiling_z_m(&self) -> Option<f64> {
         self.scene.ceiling_z_m
@@ -238,13 +245,15 @@ impl Scene {
         self.scene.poses.iter().map(|(name, pose)| (name.clone(), tuple_of(pose))).collect()
     }
 
-    /// The pose of that name, or the one written ``X,Y,DEG``, as x, y (metres) and heading (degrees).
+    /// Returns the named pose, or the pose written as ``X,Y,DEG``: x, y (metres) and heading
+    /// (degrees).
     fn pose(&self, py: Python<'_>, spec: &str) -> PyResult<PoseTuple> {
         let pose = self.scene.pose(spec).map_err(|error| error::pose(py, &[], &error))?;
         Ok(tuple_of(&pose))
     }
 
-    /// At which places a ranger can stand: in the room, in no body, a millimetre off every surface.
+    /// Checks at which positions a ranger can be placed: in the room, outside every body, at least
+    /// a millimetre from every surface.
     ///
     /// Parameters
     /// ----------
@@ -261,12 +270,12 @@ impl Scene {
     ) -> PyResult<Bound<'py, PyAny>> {
         let (places, shape) = arrays::points(places, "places")?;
         let scene = &self.scene;
-        let stand: Vec<bool> = py.detach(|| scene.can_stand(&places));
-        PyArray1::from_vec(py, stand).call_method1("reshape", (PyTuple::new(py, shape)?,))
+        let free: Vec<bool> = py.detach(|| scene.can_stand(&places));
+        PyArray1::from_vec(py, free).call_method1("reshape", (PyTuple::new(py, shape)?,))
     }
 
-    /// Distance of places (shape (..., 2), metres) from the nearest wall or cylinder, metres (shape (...));
-    /// negative inside a cylinder, infinite in an empty scene.
+    /// Distance of positions (shape (..., 2), metres) from the nearest wall or cylinder, metres
+    /// (shape (...)); negative inside a cylinder, infinite in an empty scene.
     fn clearance_m<'py>(
         &self,
         py: Python<'py>,
@@ -279,12 +288,12 @@ impl Scene {
         arrays::shaped(py, distances_m, &shape)
     }
 
-    /// The text of its scene file.
+    /// Text of the scene file.
     fn to_json(&self) -> &str {
         &self.scene.text
     }
 
-    /// SHA-256 of that text, hexadecimal: what logs name the scene by.
+    /// SHA-256 of that text, hexadecimal, by which logs identify the scene.
     #[getter]
     fn sha256(&self) -> &str {
         &self.scene.sha256
@@ -318,24 +327,24 @@ pub(crate) const fn tuple_of(pose: &Pose) -> PoseTuple {
     (pose.x_m, pose.y_m, pose.heading_deg)
 }
 
-/// Whether a number is in a range.
-fn between(name: &str, value: f64, [least, most]: [f64; 2]) -> PyResult<()> {
-    if (least..=most).contains(&value) {
+/// Checks that a number is in a range.
+fn check_range(name: &str, value: f64, [min, max]: [f64; 2]) -> PyResult<()> {
+    if (min..=max).contains(&value) {
         return Ok(());
     }
-    let message = format!("{name} is {value}: it must be from {least} to {most}");
+    let message = format!("{name} is {value}: it must be from {min} to {max}");
     Err(PyValueError::new_err(message))
 }
 
-/// The scene meant by a `Scene` or by a shipped one's name.
-pub(crate) fn meant(given: &Bound<'_, PyAny>) -> PyResult<Py<Scene>> {
+/// Resolves a `Scene` or the name of a shipped scene.
+pub(crate) fn resolve(given: &Bound<'_, PyAny>) -> PyResult<Py<Scene>> {
     if let Ok(scene) = given.cast::<Scene>() {
         return Ok(scene.clone().unbind());
     }
     let Ok(name) = given.extract::<String>() else {
         let kind = given.get_type();
         return Err(PyTypeError::new_err(format!(
-            "scene is a {kind}: give a Scene or the name of a shipped one"
+            "scene is a {kind}: must be a Scene or the name of a shipped one"
         )));
     };
     Py::new(given.py(), Scene::shipped(given.py(), &name)?)

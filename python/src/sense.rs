@@ -1,4 +1,4 @@
-//! What scans say beside predictions, and of features.
+//! Comparison of scans with predictions, and feature extraction.
 
 use pyo3::{
     exceptions::{PyUserWarning, PyValueError},
@@ -11,13 +11,13 @@ use sonard::{
 use uuid::Uuid;
 
 use crate::{
-    error::{LogError, refuse},
+    error::{LogError, new_error},
     json,
     log::{Scan, scans_of},
     pool::pool,
 };
 
-/// Sets the readings of scans beside the predictions that the log holds.
+/// Compares the readings of scans with the logged predictions.
 ///
 /// Parameters
 /// ----------
@@ -26,8 +26,9 @@ use crate::{
 /// Returns
 /// -------
 /// dict
-///     As ``sonard compare --json`` prints it: counts of beams by verdict, how many pairs of echoes agree, residuals
-///     in metres, and ``explanations``, what would explain the readings better.
+///     As printed by ``sonard compare --json``: counts of beams by class, number of agreeing pairs
+///     of echoes, residuals in metres, and ``explanations``, changes of the model that would fit
+///     the readings better.
 #[pyfunction]
 pub(crate) fn compare<'py>(
     py: Python<'py>,
@@ -46,21 +47,22 @@ pub(crate) fn compare<'py>(
     json::to_python(py, &compared)
 }
 
-/// Tells planes, corners and edges apart in scans of one ranger on a stepper, after Bozma and Kuc.
+/// Classifies planes, corners and edges in scans of a ranger on a stepper, after Bozma and Kuc.
 ///
 /// Parameters
 /// ----------
 /// scans : Log, Scan or sequence of them
-///     From one place or more; scans that can't be used are left out with a warning.
+///     Scans from one or more positions; unusable scans are skipped with a warning.
 /// min_confidence : float
-///     Nothing less probable than this is named, 0 to 1.
+///     Minimum probability of a reported feature, 0 to 1.
 /// depth_tolerance_m : float
-///     How far a reading may be from its arc's mean, metres.
+///     Tolerance of a reading from the mean of its arc, metres.
 ///
 /// Returns
 /// -------
 /// list of dict
-///     As ``sonard interpret --json`` prints them: ``kind``, ``x_m``, ``y_m``, ``confidence``, ``reason``, ...
+///     As printed by ``sonard interpret --json``: ``kind``, ``x_m``, ``y_m``, ``confidence``,
+///     ``reason``, ...
 #[pyfunction]
 #[pyo3(name = "interpret", signature = (scans, *, min_confidence = 0.9, depth_tolerance_m = 0.01))]
 pub(crate) fn find_features<'py>(
@@ -69,11 +71,11 @@ pub(crate) fn find_features<'py>(
     min_confidence: f64,
     depth_tolerance_m: f64,
 ) -> PyResult<Bound<'py, PyAny>> {
-    for (name, value, most) in
+    for (name, value, max) in
         [("min_confidence", min_confidence, 1.0), ("depth_tolerance_m", depth_tolerance_m, 1e3)]
     {
-        if !(0.0..=most).contains(&value) {
-            let message = format!("{name} is {value}: it must be from 0 to {most}");
+        if !(0.0..=max).contains(&value) {
+            let message = format!("{name} is {value}: it must be from 0 to {max}");
             return Err(PyValueError::new_err(message));
         }
     }
@@ -83,33 +85,33 @@ pub(crate) fn find_features<'py>(
     for scan in &scans {
         let (scan, view) = (scan.get(), scan.get().view());
         if view.is_of_array() {
-            let help = "arcs need one ranger that turns";
-            return Err(refuse::<LogError>(
+            let help = "arcs require a single rotating ranger";
+            return Err(new_error::<LogError>(
                 py,
-                &format!("scan {} is of an array", view.scan),
+                &format!("scan {} is from an array", view.scan),
                 help,
             ));
         }
         match interpret::Sweep::of(view) {
             Ok(sweep) => sweeps.push((view.scan, sweep)),
             Err(error) => {
-                warn(py, &format!("scan {} is left out: {error}", view.scan))?;
+                warn(py, &format!("scan {} skipped: {error}", view.scan))?;
                 continue;
             }
         }
         let known = *first.get_or_insert(scan);
         if known.session_of(py)?.sensor != scan.session_of(py)?.sensor {
-            let help = "interpret the scans of each sensor by themselves";
-            let message = "the scans are of different sensors, whose arcs differ";
-            return Err(refuse::<LogError>(py, message, help));
+            let help = "interpret the scans of each sensor separately";
+            let message = "the scans have different sensors, whose arcs differ";
+            return Err(new_error::<LogError>(py, message, help));
         }
     }
     let Some(first) = first else {
-        let message = "there is no scan with its session to interpret";
-        return Err(refuse::<LogError>(py, message, ""));
+        let message = "no scan with session to interpret";
+        return Err(new_error::<LogError>(py, message, ""));
     };
     let extents = Extents::of_session(first.session_of(py)?)
-        .map_err(|error| refuse::<LogError>(py, &format!("session: {error}"), ""))?;
+        .map_err(|error| new_error::<LogError>(py, &format!("session: {error}"), ""))?;
     let settings =
         interpret::Settings { min_confidence, depth_tolerance_m, ..interpret::Settings::default() };
     let pool = pool(py, None)?;
@@ -118,8 +120,8 @@ pub(crate) fn find_features<'py>(
     json::to_python(py, &features)
 }
 
-/// Warns as of whoever called.
+/// Issues a warning attributed to the caller.
 pub(crate) fn warn(py: Python<'_>, message: &str) -> PyResult<()> {
-    let words = std::ffi::CString::new(message).unwrap_or_default();
-    PyErr::warn(py, &py.get_type::<PyUserWarning>(), &words, 1)
+    let text = std::ffi::CString::new(message).unwrap_or_default();
+    PyErr::warn(py, &py.get_type::<PyUserWarning>(), &text, 1)
 }

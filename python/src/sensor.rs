@@ -1,4 +1,4 @@
-//! Sensors.
+//! Python class for sensors.
 
 use std::{
     fs,
@@ -15,14 +15,14 @@ use serde_json::Value;
 use sonard_model::{acoustics, scene::suggest};
 
 use crate::{
-    error::{self, SensorError, refuse},
+    error::{self, SensorError, new_error},
     json,
 };
 
-/// A ranger's data: transducer, pulse, amplifier, threshold and where it is mounted.
+/// Data of a ranger: transducer, pulse, amplifier, threshold and mounting.
 ///
-/// ``Sensor.preset("senscomp-6500")``, ``Sensor.from_json(text)`` and ``Sensor.load(path)`` make one;
-/// ``sensor.replace(threshold=0.02)`` one with other figures.
+/// Created by ``Sensor.preset("senscomp-6500")``, ``Sensor.from_json(text)`` and
+/// ``Sensor.load(path)``; ``sensor.replace(threshold=0.02)`` returns a modified copy.
 #[pyclass(frozen, module = "sonard")]
 pub(crate) struct Sensor {
     pub(crate) sensor: acoustics::Sensor,
@@ -30,19 +30,19 @@ pub(crate) struct Sensor {
 
 #[pymethods]
 impl Sensor {
-    /// A sensor that comes with the package, by its name.
+    /// Returns a shipped sensor by its name.
     #[staticmethod]
     pub(crate) fn preset(py: Python<'_>, name: &str) -> PyResult<Self> {
         named(py, name).map(|sensor| Self { sensor })
     }
 
-    /// The names of the presets, the default one first.
+    /// Names of the presets, the default one first.
     #[staticmethod]
     fn preset_names() -> Vec<&'static str> {
         acoustics::Sensor::preset_names().collect()
     }
 
-    /// A sensor from the text of a data file.
+    /// Creates a sensor from the text of a data file.
     #[staticmethod]
     pub(crate) fn from_json(py: Python<'_>, text: &str) -> PyResult<Self> {
         let sensor =
@@ -50,7 +50,7 @@ impl Sensor {
         Ok(Self { sensor })
     }
 
-    /// A sensor from a data file.
+    /// Creates a sensor from a data file.
     #[staticmethod]
     pub(crate) fn load(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
         let text =
@@ -58,12 +58,13 @@ impl Sensor {
         Self::from_json(py, &text)
     }
 
-    /// The same sensor with other figures, by the names of the data file; those of ``mounting``, ``aperture``,
-    /// ``pulse``, ``face`` and ``gain`` are given as a dict, of which ``mounting`` may leave out what stays.
-    #[pyo3(signature = (**figures))]
-    fn replace(&self, py: Python<'_>, figures: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
-        let Some(figures) = figures else { return Ok(Self { sensor: self.sensor.clone() }) };
-        let given: Value = parsed(py, &json::text_of(figures)?)?;
+    /// Returns a copy with other values, named as in the data file. Values of ``mounting``,
+    /// ``aperture``, ``pulse``, ``face`` and ``gain`` are dicts; that of ``mounting`` may omit
+    /// unchanged entries.
+    #[pyo3(signature = (**values))]
+    fn replace(&self, py: Python<'_>, values: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
+        let Some(values) = values else { return Ok(Self { sensor: self.sensor.clone() }) };
+        let given: Value = parsed(py, &json::to_text(values)?)?;
         let mut data: Value = parsed(py, &self.to_json(py)?)?;
         let schema = schemars::schema_for!(acoustics::Sensor);
         let known = schema.get("properties").and_then(Value::as_object);
@@ -72,8 +73,8 @@ impl Sensor {
         for (name, value) in given.as_object().into_iter().flatten() {
             if !known.contains(name) {
                 return Err(PyTypeError::new_err(format!(
-                    "a sensor has no figure `{name}`: {}",
-                    suggest(name, &known, "figures")
+                    "unknown sensor value `{name}`: {}",
+                    suggest(name, &known, "values")
                 )));
             }
             match (name.as_str(), value, &mut data["mounting"]) {
@@ -83,26 +84,26 @@ impl Sensor {
                 _ => data[name] = value.clone(),
             }
         }
-        // What a preset leaves out reads as its default; null is no value of a sensor's file.
+        // Omitted values of a preset are defaults; null is not a valid value in a sensor file.
         if let Some(data) = data.as_object_mut() {
             data.retain(|_, value| !value.is_null());
         }
         Self::from_json(py, &data.to_string())
     }
 
-    /// The text of its data file.
+    /// Text of the data file.
     fn to_json(&self, py: Python<'_>) -> PyResult<String> {
         serde_json::to_string_pretty(&self.sensor)
-            .map_err(|error| refuse::<SensorError>(py, &error.to_string(), ""))
+            .map_err(|error| new_error::<SensorError>(py, &error.to_string(), ""))
     }
 
-    /// The preset's name.
+    /// Name of the preset.
     #[getter]
     fn name(&self) -> &str {
         &self.sensor.name
     }
 
-    /// What it is, in a sentence.
+    /// Description in a sentence.
     #[getter]
     fn description(&self) -> &str {
         &self.sensor.description
@@ -114,43 +115,43 @@ impl Sensor {
         self.sensor.frequency_hz
     }
 
-    /// From firing until the receiver listens, microseconds.
+    /// Time from firing to the end of the blanking, microseconds.
     #[getter]
     fn blanking_us(&self) -> f64 {
         self.sensor.blanking_us
     }
 
-    /// The same when the blanking is shortened by hand, microseconds.
+    /// Time from firing to the end of the shortened blanking, microseconds.
     #[getter]
     fn short_blanking_us(&self) -> Option<f64> {
         self.sensor.short_blanking_us
     }
 
-    /// After an echo, how long the detector is held before it can report another, microseconds.
+    /// Hold time of the detector after an echo, before it can report another, microseconds.
     #[getter]
     fn rearm_us(&self) -> f64 {
         self.sensor.rearm_us
     }
 
-    /// How long an echo has to stay above the threshold to be taken for one, microseconds.
+    /// Minimum time above the threshold for the detection of an echo, microseconds.
     #[getter]
     fn integration_us(&self) -> f64 {
         self.sensor.integration_us
     }
 
-    /// Farthest range it is made for, metres.
+    /// Maximum specified range, metres.
     #[getter]
     fn max_range_m(&self) -> f64 {
         self.sensor.max_range_m
     }
 
-    /// Least amplitude that is detected; a head-on, perfectly reflecting wall gives 1.
+    /// Detection threshold, relative to the amplitude of a head-on, perfectly reflecting wall.
     #[getter]
     fn threshold(&self) -> f64 {
         self.sensor.threshold
     }
 
-    /// How long the pulse lasts, microseconds.
+    /// Duration of the pulse, microseconds.
     #[getter]
     fn pulse_us(&self) -> f64 {
         self.sensor.pulse_s() * 1e6
@@ -168,43 +169,44 @@ impl Sensor {
         json::to_python(py, &self.sensor.aperture)
     }
 
-    /// Face and housing as a reflector; ``None``: sound passes the ranger as if it were not there.
+    /// Face and housing as a reflector; ``None`` if the ranger is transparent to sound.
     #[getter]
     fn face<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         json::to_python(py, &self.sensor.face)
     }
 
-    /// Where it sits on the rotation axis, metres and degrees, as in the data file.
+    /// Mounting on the rotation axis, metres and degrees, as in the data file.
     #[getter]
     fn mounting<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         json::to_python(py, &self.sensor.mounting)
     }
 
-    /// What it sends, as in the data file.
+    /// Transmitted pulse, as in the data file.
     #[getter]
     fn pulse<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         json::to_python(py, &self.sensor.pulse)
     }
 
-    /// How the amplifier follows the spreading of the sound, as in the data file.
+    /// Gain against time, which compensates the spreading of the sound, as in the data file.
     #[getter]
     fn gain<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         json::to_python(py, &self.sensor.gain)
     }
 
-    /// How the face answers to a pulse: ``"stationary"`` or ``"full"``.
+    /// Aperture response of the face to a pulse: ``"stationary"`` or ``"full"``.
     #[getter]
     fn response<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         json::to_python(py, &self.sensor.response)
     }
 
-    /// What edges send back: ``"utd"``, ``"kuc-siegel"``, ``"bozma-kuc"``, or ``None`` for ``"utd"``.
+    /// Edge diffraction model: ``"utd"``, ``"kuc-siegel"``, ``"bozma-kuc"``, or ``None`` for
+    /// ``"utd"``.
     #[getter]
     fn edge_law<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         json::to_python(py, &self.sensor.edge_law)
     }
 
-    /// For each figure, by its name, where it comes from.
+    /// Sources of the values, by name.
     #[getter]
     fn sources(&self) -> std::collections::BTreeMap<String, String> {
         self.sensor.sources.clone()
@@ -231,29 +233,29 @@ impl Sensor {
 }
 
 fn parsed(py: Python<'_>, text: &str) -> PyResult<Value> {
-    serde_json::from_str(text).map_err(|error| refuse::<SensorError>(py, &error.to_string(), ""))
+    serde_json::from_str(text).map_err(|error| new_error::<SensorError>(py, &error.to_string(), ""))
 }
 
-/// A preset by its name.
+/// Returns a preset by its name.
 fn named(py: Python<'_>, name: &str) -> PyResult<acoustics::Sensor> {
     acoustics::Sensor::preset(name).map_err(|error| error::sensor(py, &error))
 }
 
-/// The sensor meant by a `Sensor` or by a preset's name.
-pub(crate) fn meant(given: &Bound<'_, PyAny>) -> PyResult<Py<Sensor>> {
+/// Resolves a `Sensor` or the name of a preset.
+pub(crate) fn resolve(given: &Bound<'_, PyAny>) -> PyResult<Py<Sensor>> {
     if let Ok(sensor) = given.cast::<Sensor>() {
         return Ok(sensor.clone().unbind());
     }
     let Ok(name) = given.extract::<String>() else {
         let kind = given.get_type();
         return Err(PyTypeError::new_err(format!(
-            "sensor is a {kind}: give a Sensor or a preset's name"
+            "sensor is a {kind}: must be a Sensor or the name of a preset"
         )));
     };
     Py::new(given.py(), Sensor { sensor: named(given.py(), &name)? })
 }
 
-/// The sensor that is meant when none is named.
+/// Returns the default sensor.
 pub(crate) fn default(py: Python<'_>) -> PyResult<Py<Sensor>> {
     let name = acoustics::Sensor::preset_names().next().unwrap_or_default();
     Py::new(py, Sensor { sensor: named(py, name)? })

@@ -1,4 +1,4 @@
-//! The signal of a firing against time, as the classes of `package/sonard/_results.py`.
+//! Conversion of the signal of a firing to the classes of `package/sonard/_results.py`.
 
 use pyo3::{prelude::*, types::PyTuple};
 use sonard_model::{
@@ -12,14 +12,14 @@ use crate::{
     path::{PathResult, result},
 };
 
-/// A trace with the path of each of its peaks.
+/// Trace with the path of each of its peaks.
 pub(crate) struct TraceResult {
     trace: EchoTrace,
     paths: Vec<PathResult>,
 }
 
 impl TraceResult {
-    pub(crate) fn at(
+    pub(crate) fn compute(
         scene: &Scene,
         point: &ObservationPoint<'_>,
         direction_rad: f64,
@@ -29,7 +29,7 @@ impl TraceResult {
         let trace = point.trace(direction_rad, until_m, step_us)?;
         let path = |peak: &EnvelopePeak| {
             let arrival = point.arrival(direction_rad, &peak.arrival)?;
-            Ok(PathResult::of_arrival(scene, &arrival))
+            Ok(PathResult::from_arrival(scene, &arrival))
         };
         let paths = trace.peaks.iter().map(path).collect::<Result<_, _>>()?;
         Ok(Self { trace, paths })

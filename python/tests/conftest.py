@@ -1,4 +1,4 @@
-"""What the tests share."""
+"""Fixtures shared by the tests."""
 
 import json
 import os
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 import sonard
 
-# A change is judged by the same random cases as the one before it; HYPOTHESIS_PROFILE=default draws others.
+# Uses the same random cases in every run; HYPOTHESIS_PROFILE=default draws new ones.
 settings.register_profile("same", derandomize=True)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "same"))
 
@@ -27,7 +27,7 @@ Command = Callable[..., list[dict[str, Any]]]
 
 @pytest.fixture(scope="session")
 def command() -> Command:
-    """Runs the command `sonard` and gives what it printed, line by line."""
+    """Runs the command `sonard` and returns its output as a list of JSON lines."""
 
     def run(*arguments: object) -> list[dict[str, Any]]:
         done = subprocess.run([PROGRAM, *map(str, arguments)], capture_output=True, text=True, check=False)
@@ -43,7 +43,7 @@ def room() -> sonard.Scene:
 
 
 def places_in(scene: sonard.Scene, count: int, seed: int = 1) -> NDArray[np.float64]:
-    """Random poses at which a ranger can stand, shape (count, 3)."""
+    """Random poses at which a ranger can be placed, shape (count, 3)."""
     rng = np.random.default_rng(seed)
     ends = scene.walls.reshape(-1, 2)
     places = np.empty((0, 2))

@@ -1,4 +1,4 @@
-"""Arrays of rangers: readings are those of `sonard simulate --array`, to the bit, and so are those of robots that move."""
+"""Arrays of rangers at rest and in motion, compared bit by bit with `sonard simulate --array`."""
 
 import copy
 import json
@@ -20,7 +20,7 @@ from .test_processes import in_a_fork_of
 from .test_readings import assert_same, logged
 
 LAB = sonard.Scene.shipped("mcgill-lab")
-# Two rangers that fire at once and hear each other, and a third.
+# Two rangers that fire simultaneously and receive each other, and a third.
 PAIR = json.dumps(
     {
         "name": "pair",
@@ -39,7 +39,7 @@ PAIR = json.dumps(
 
 
 def logged_firings(records: list[dict[str, Any]], array: sonard.RangerArray, beams: int) -> NDArray[np.void]:
-    """The readings of a log as the model's array, with whose sound they are."""
+    """Returns the readings of a log as an array of the model, with their source rangers."""
     plain = logged(records, beams)
     whole = np.empty(plain.shape, sonard.ARRAY_READING)
     for field in sonard.READING.names or ():
@@ -56,8 +56,8 @@ def assert_equal(found: NDArray[np.void], expected: NDArray[np.void]) -> None:
     np.testing.assert_array_equal(found["crosstalk"], expected["crosstalk"])
 
 
-def standing(scene: sonard.Scene, array: sonard.RangerArray, count: int, seed: int) -> NDArray[np.float64]:
-    """Random poses at which a robot with that array can stand with each of its rangers, whichever way it looks."""
+def random_poses(scene: sonard.Scene, array: sonard.RangerArray, count: int, seed: int) -> NDArray[np.float64]:
+    """Random poses at which a robot with that array can be placed at any heading."""
     model = sonard.ArrayModel(scene, array, max_range_m=0.3, without_crosstalk=True)
     found = np.empty((0, 3))
     for pose in places_in(scene, 400, seed):
@@ -79,9 +79,9 @@ def as_course(poses: NDArray[np.float64], folder: Path) -> Path:
 
 @pytest.mark.parametrize("name", sonard.RangerArray.preset_names())
 @pytest.mark.parametrize("rounds", [1, 2])
-def test_presets_read_as_the_command_says(name: str, rounds: int, command: Command, tmp_path: Path) -> None:
+def test_presets_match_command(name: str, rounds: int, command: Command, tmp_path: Path) -> None:
     array = sonard.RangerArray.preset(name)
-    poses = standing(LAB, array, 2, seed=7)
+    poses = random_poses(LAB, array, 2, seed=7)
     assert len(poses) == 2
     course = as_course(poses, tmp_path)
     records = command("simulate", "--scene", "mcgill-lab", "--array", name, "--poses", course, "--rounds", rounds)
@@ -90,11 +90,11 @@ def test_presets_read_as_the_command_says(name: str, rounds: int, command: Comma
     beams = rounds * len(array.round)
     assert found.shape == (2, beams) and found.dtype == sonard.ARRAY_READING and found.flags.aligned
     assert_equal(found, logged_firings(records, array, beams))
-    # Each firing from where the robot stood then, as a robot that moves would have it.
+    # Each firing from the pose of the robot at that time, as for a moving robot.
     pings = [record for record in records if record["type"] == "ping"]
     starts = {record["scan"]: record["pose"] for record in records if record["type"] == "scan_start"}
-    stood = [ping.get("pose") or starts[ping["scan"]] for ping in pings]
-    each = np.array([[pose["x_m"], pose["y_m"], pose["heading_deg"]] for pose in stood]).reshape(2, beams, 3)
+    taken_at = [ping.get("pose") or starts[ping["scan"]] for ping in pings]
+    each = np.array([[pose["x_m"], pose["y_m"], pose["heading_deg"]] for pose in taken_at]).reshape(2, beams, 3)
     assert_equal(model.fire(each), found)
     assert [ping["ranger"] for ping in pings[:beams]] == array.round * rounds
 
@@ -109,7 +109,7 @@ def test_presets_read_as_the_command_says(name: str, rounds: int, command: Comma
     ),
     seed=st.integers(0, 1000),
 )
-def test_rangers_that_hear_each_other_read_as_the_command_says(
+def test_crosstalk_matches_command(
     interval_ms: float,
     rounds: int,
     options: dict[str, Any],
@@ -122,7 +122,7 @@ def test_rangers_that_hear_each_other_read_as_the_command_says(
     (folder / "pair.json").write_text(text)
     array = sonard.RangerArray.load(folder / "pair.json")
     scene = sonard.Scene.shipped("two-surface-room")
-    poses = standing(scene, array, 2, seed)
+    poses = random_poses(scene, array, 2, seed)
     arguments: list[object] = ["simulate", "--scene", "two-surface-room", "--array", folder / "pair.json"]
     arguments += ["--poses", as_course(poses, folder), "--rounds", rounds]
     for name, value in options.items():
@@ -133,15 +133,15 @@ def test_rangers_that_hear_each_other_read_as_the_command_says(
         assert (found["crosstalk"] == -1).all()
 
 
-def test_crosstalk_is_said_to_be_whose_it_is() -> None:
+def test_crosstalk_source() -> None:
     scene = sonard.Scene.shipped("two-surface-room")
     array = sonard.RangerArray.from_json(PAIR)
     model = sonard.ArrayModel(scene, array, threshold=0.005)
-    poses = standing(scene, array, 40, seed=3)
+    poses = random_poses(scene, array, 40, seed=3)
     found = model.predict(poses)
-    heard = np.argwhere(found["crosstalk"] >= 0)
-    assert len(heard) > 0
-    at, firing = heard[0]
+    received = np.argwhere(found["crosstalk"] >= 0)
+    assert len(received) > 0
+    at, firing = received[0]
     reading = model.reading(poses[at], int(firing))
     assert reading.crosstalk == array.ids[found["crosstalk"][at, firing]]
     assert reading.range_m == found["range_m"][at, firing] and f"sound of {reading.crosstalk}" in repr(reading)
@@ -150,7 +150,7 @@ def test_crosstalk_is_said_to_be_whose_it_is() -> None:
     assert alone.reading(poses[at]).crosstalk is None
 
 
-def test_a_moving_ranger_reads_what_one_that_stands_there_does(room: sonard.Scene) -> None:
+def test_fire_matches_predict(room: sonard.Scene) -> None:
     model = sonard.Model(room, max_range_m=3.0)
     poses = places_in(room, 12).reshape(3, 4, 3)
     azimuths_deg = np.array([0.0, 33.3, 180.0, 270.9])
@@ -167,7 +167,7 @@ def test_a_moving_ranger_reads_what_one_that_stands_there_does(room: sonard.Scen
     assert caught.value.index == (1, 0)
 
 
-def test_a_course_is_driven_firing_by_firing(command: Command) -> None:
+def test_course_matches_command(command: Command) -> None:
     course = sonard.Course([[2.0, 1.5, 0.0], [2.6, 1.5, 350.0]], speed_m_s=0.5)
     assert course.duration_s == pytest.approx(1.2) and len(course) == 2 and repr(course) == "<Course of 2 poses in 1.2 s>"
     np.testing.assert_allclose(course.poses_at([-1, 0.6, 9]), [[2, 1.5, 0], [2.3, 1.5, 355], [2.6, 1.5, 350]])
@@ -189,7 +189,7 @@ def test_a_course_is_driven_firing_by_firing(command: Command) -> None:
     poses=st.lists(st.tuples(st.floats(-50, 50), st.floats(-50, 50), st.floats(-360, 360)), min_size=1, max_size=6),
     waits_s=st.lists(st.floats(0.01, 100), min_size=6, max_size=6),
 )
-def test_a_course_is_at_its_poses_at_their_times(poses: list[tuple[float, float, float]], waits_s: list[float]) -> None:
+def test_course_interpolation(poses: list[tuple[float, float, float]], waits_s: list[float]) -> None:
     course = sonard.Course(poses, np.cumsum(waits_s)[: len(poses)])
     assert course.times_s[0] == 0 and (np.diff(course.times_s) > 0).all()
     np.testing.assert_allclose(course.poses_at(course.times_s)[..., :2], course.poses[..., :2], atol=1e-9)
@@ -199,7 +199,7 @@ def test_a_course_is_at_its_poses_at_their_times(poses: list[tuple[float, float,
     assert pickle.loads(pickle.dumps(course)) == course
 
 
-def test_a_course_is_read_from_the_daemons_file(tmp_path: Path) -> None:
+def test_course_file(tmp_path: Path) -> None:
     path = as_course(np.array([[2.0, 1.5, 0.0], [2.6, 1.5, 30.0]]), tmp_path)
     assert sonard.Course.load(path, 0.5) == sonard.Course([[2, 1.5, 0], [2.6, 1.5, 30]], speed_m_s=0.5)
     path.write_text('{"x_m": 1}\n')
@@ -209,7 +209,7 @@ def test_a_course_is_read_from_the_daemons_file(tmp_path: Path) -> None:
         sonard.Course.load(tmp_path / "none")
 
 
-def test_an_array_says_what_it_is(tmp_path: Path) -> None:
+def test_array_properties(tmp_path: Path) -> None:
     array = sonard.RangerArray.preset("ring-12")
     assert array.name == "ring-12" and len(array.ids) == 12 and array.round == [id for turn in array.turns for id in turn]
     assert repr(array).startswith("<RangerArray 'ring-12': 12 rangers '") and array.description
@@ -218,7 +218,7 @@ def test_an_array_says_what_it_is(tmp_path: Path) -> None:
     assert isinstance(array.sources, dict) and array.sensor in sonard.Sensor.preset_names()
     on = array.poses_on([[1.0, 2.0, 90.0]])
     assert on.shape == (1, 12, 3)
-    # The first ranger is ahead of a robot that looks up.
+    # The first ranger is in front of a robot with heading +y.
     np.testing.assert_allclose(on[0, 0], [1.0, 2.0 + array.mounts[0, 0], 90.0], atol=1e-12)
     for again in [pickle.loads(pickle.dumps(array)), copy.deepcopy(array), sonard.RangerArray.from_json(array.to_json())]:
         assert again == array and hash(again) == hash(array)
@@ -229,7 +229,7 @@ def test_an_array_says_what_it_is(tmp_path: Path) -> None:
     np.testing.assert_allclose(pair.firing_times_s(2), [0, 0, 0.03, 0.06, 0.06, 0.09])
 
 
-def test_a_model_of_an_array_survives_pickling() -> None:
+def test_pickling() -> None:
     model = sonard.ArrayModel(LAB, "pioneer-8", "pioneer", sonard.Air(5.0), max_range_m=2.0, without_crosstalk=True)
     assert repr(model) == (
         "<ArrayModel of 'pioneer-8' in 'mcgill-lab', engine 'paths', max_range_m=2.0, without_crosstalk=True>"
@@ -242,7 +242,7 @@ def test_a_model_of_an_array_survives_pickling() -> None:
     assert in_a_fork_of(lambda: model.predict(pose).tobytes()) == model.predict(pose).tobytes()
 
 
-def test_a_logs_array_reads_the_same_again(command: Command, tmp_path: Path) -> None:
+def test_logged_array(command: Command, tmp_path: Path) -> None:
     log = tmp_path / "ring.jsonl"
     command(
         *["simulate", "--scene", "mcgill-lab", "--array", "ring-12", "--pose", "fig4", "--rounds", 2, "-o", log],
@@ -256,16 +256,16 @@ def test_a_logs_array_reads_the_same_again(command: Command, tmp_path: Path) -> 
     for found in [model.predict(scan.pose, 2), model.fire(poses)]:
         for field in ["status", "range_m", "tof_us", "amplitude", "margin_db"]:
             np.testing.assert_array_equal(found[field], readings[field], field)
-    # One of its rangers alone, on a stepper.
+    # A single ranger of the array, on a stepper.
     assert set(pickle.loads(pickle.dumps(scan.model())).options) == {"max_range_m"}
     command("simulate", "--scene", "mcgill-lab", "--pose", "fig4", "--step-deg", 9, "-o", tmp_path / "one.jsonl")
     alone = sonard.read_log(tmp_path / "one.jsonl")[0]
     assert alone.array is None
-    with pytest.raises(sonard.LogError, match="of no array"):
+    with pytest.raises(sonard.LogError, match="not from an array"):
         alone.array_model()
 
 
-def test_what_is_refused_says_why() -> None:
+def test_error_messages() -> None:
     model = sonard.ArrayModel("simple-room", "pioneer-8")
     with pytest.raises(sonard.PoseError, match=r"poses\[1\]: ranger \w+ of the array") as pose:
         model.predict([[0.4, 0.37, 0], [0.8, 0.37, 0]])
@@ -281,7 +281,7 @@ def test_what_is_refused_says_why() -> None:
         (lambda: sonard.RangerArray.preset("pioneer-9"), sonard.ArrayError, "did you mean `pioneer-"),
         (lambda: sonard.RangerArray.from_json("{"), sonard.ArrayError, "line 1"),
         (lambda: sonard.RangerArray.from_json(PAIR.replace("30", "0")), sonard.ArrayError, "interval_ms is 0"),
-        (lambda: sonard.ArrayModel("simple-room", nonsense), TypeError, "give a RangerArray"),
+        (lambda: sonard.ArrayModel("simple-room", nonsense), TypeError, "must be a RangerArray"),
         (lambda: sonard.ArrayModel("simple-room", "ring-12", engine=nonsense), TypeError, "str"),
         (lambda: sonard.Course([]), sonard.ArrayError, "no pose"),
         (lambda: sonard.Course([[0, 0, 0], [1, 0, 0]], [1, 1]), sonard.ArrayError, r"poses[1]: time_s 1 is not after the previous one, 1"),

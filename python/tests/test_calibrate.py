@@ -1,4 +1,4 @@
-"""Calibration is that of the command, and finds what a log was made with."""
+"""Calibration compared with the command and with the true values of a log."""
 
 import json
 import pickle
@@ -19,7 +19,7 @@ BELIEVED = (0.774, 0.085, 90.0)
 
 @pytest.fixture(scope="module")
 def log(command: Command, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A sweep in warmer air and from elsewhere than is believed."""
+    """Log of a sweep in warmer air and at another pose than the prior."""
     path = tmp_path_factory.mktemp("calibrate") / "room.jsonl"
     pose = ",".join(map(str, TRUE_POSE))
     command("simulate", "--scene", "simple-room", "--pose", pose, "--temperature-c", 15, "--max-range", 3, "-o", path)
@@ -37,7 +37,7 @@ def as_line(estimate: sonard.Estimate) -> dict[str, Any]:
     return {name: getattr(estimate, name) for name in fields}
 
 
-def test_a_calibration_is_that_of_the_command(
+def test_matches_command(
     log: Path, found: sonard.Calibration, command: Command, tmp_path: Path
 ) -> None:
     out = tmp_path / "fitted"
@@ -52,7 +52,7 @@ def test_a_calibration_is_that_of_the_command(
     assert found.poses.tolist() == [[pose["x_m"], pose["y_m"], pose["heading_deg"]]]
 
 
-def test_what_a_log_was_made_with_is_found(log: Path, found: sonard.Calibration) -> None:
+def test_recovers_true_values(log: Path, found: sonard.Calibration) -> None:
     truth = dict(zip(["x_m", "y_m", "heading_deg"], TRUE_POSE, strict=True))
     for name, value in truth.items():
         estimate = found[name]
@@ -61,7 +61,7 @@ def test_what_a_log_was_made_with_is_found(log: Path, found: sonard.Calibration)
     assert found.explained > 0.9 and found.sigma_m < 0.005 and found.readings > 300
     assert (found.delay_m, found.heading_zero_deg, found.gear) == (0.0, 0.0, 1.0)
     assert found.log_posterior <= found.log_likelihood
-    # The model that was found reads as the log does, better than the one that was believed.
+    # The fitted model reproduces the log better than the prior one.
     scan = sonard.read_log(log)[0]
 
     def off_m(model: sonard.Model, pose: Any) -> float:
@@ -72,7 +72,7 @@ def test_what_a_log_was_made_with_is_found(log: Path, found: sonard.Calibration)
     assert off_m(found.model, found.poses[0]) < 0.1 * off_m(scan.model(), BELIEVED)
 
 
-def test_the_covariance_is_of_the_values(found: sonard.Calibration) -> None:
+def test_covariance(found: sonard.Calibration) -> None:
     sigmas = np.array([estimate.sigma for estimate in found.estimates])
     assert found.covariance.shape == (5, 5)
     np.testing.assert_allclose(np.sqrt(np.diag(found.covariance)), sigmas, rtol=1e-12)
@@ -80,17 +80,17 @@ def test_the_covariance_is_of_the_values(found: sonard.Calibration) -> None:
     assert (np.linalg.eigvalsh(found.covariance / np.outer(sigmas, sigmas)) > 0).all()
 
 
-def test_a_calibration_survives_pickling(found: sonard.Calibration) -> None:
+def test_pickling(found: sonard.Calibration) -> None:
     again = pickle.loads(pickle.dumps(found))
     assert repr(again) == repr(found) and again.sensor == found.sensor and again.scene == found.scene
     np.testing.assert_array_equal(again.covariance, found.covariance)
-    said = re.fullmatch(rf"<Estimate x_m of {found.scans[0][:8]}: (\S+) ± (\S+)>", repr(found["x_m"]))
-    assert said and abs(float(said[1]) - 0.8) < 6 * float(said[2]) < 0.01
-    with pytest.raises(KeyError, match="was not fitted: there are heading_deg, sound_speed"):
+    match = re.fullmatch(rf"<Estimate x_m of {found.scans[0][:8]}: (\S+) ± (\S+)>", repr(found["x_m"]))
+    assert match and abs(float(match[1]) - 0.8) < 6 * float(match[2]) < 0.01
+    with pytest.raises(KeyError, match="was not fitted; fitted: heading_deg, sound_speed"):
         found["gear"]
 
 
-def test_priors_hold_what_they_say(log: Path, command: Command) -> None:
+def test_priors(log: Path, command: Command) -> None:
     scans = sonard.read_log(log)
     lines = command("calibrate", log, "--fit", "pose,materials,gear", "--prior", "gear=0.000001", "--prior", "x_m=0.03", "--json")
     found = sonard.calibrate(scans, fit=["pose", "materials", "gear"], priors={"gear": 1e-6, "x_m": 0.03})
@@ -100,7 +100,7 @@ def test_priors_hold_what_they_say(log: Path, command: Command) -> None:
 
 
 @pytest.mark.parametrize("search", ["thorough", "furnished"])
-def test_searches_are_those_of_the_command(
+def test_searches_match_command(
     log: Path, command: Command, search: Literal["thorough", "furnished"]
 ) -> None:
     scans = sonard.read_log(log)
@@ -110,7 +110,7 @@ def test_searches_are_those_of_the_command(
     assert [as_line(estimate) for estimate in found.estimates] == lines
 
 
-def test_what_can_not_be_fitted_says_why(log: Path, command: Command, tmp_path: Path) -> None:
+def test_error_messages(log: Path, command: Command, tmp_path: Path) -> None:
     scans = sonard.read_log(log)
     for kind, words, options in [
         (sonard.OptionError, "`y` is not fitted", {"priors": {"y": 0.1}}),
@@ -123,7 +123,7 @@ def test_what_can_not_be_fitted_says_why(log: Path, command: Command, tmp_path: 
         (TypeError, "str", {"fit": "pose"}),
         (ValueError, "widest_m is 0", {"widest_m": 0.0}),
         (ValueError, r"poses has the shape (2, 3): it must be (1, 3)", {"poses": [BELIEVED] * 2}),
-        (ValueError, "poses[0]: its numbers must be finite", {"poses": [(0.8, np.inf, 0.0)]}),
+        (ValueError, "poses[0]: values must be finite", {"poses": [(0.8, np.inf, 0.0)]}),
     ]:
         with pytest.raises(kind) as caught:
             sonard.calibrate(scans, **options)  # type: ignore[arg-type]
@@ -138,5 +138,5 @@ def test_what_can_not_be_fitted_says_why(log: Path, command: Command, tmp_path: 
         sonard.calibrate([scans, sonard.read_log(other)])
     ring = tmp_path / "ring.jsonl"
     command("simulate", "--scene", "two-surface-room", "--pose", "middle", "--array", "pioneer-8", "-o", ring)
-    with pytest.warns(UserWarning, match="of an array.*left out"), pytest.raises(sonard.LogError, match="no sweep"):
+    with pytest.warns(UserWarning, match="of an array.*skipped"), pytest.raises(sonard.LogError, match="no sweep"):
         sonard.calibrate(sonard.read_log(ring))

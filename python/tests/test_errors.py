@@ -1,4 +1,4 @@
-"""Errors are exceptions with the library's words."""
+"""Exceptions have the messages of the library."""
 
 import pickle
 from collections.abc import Callable
@@ -40,7 +40,7 @@ REFUSED: list[tuple[Callable[[], Any], type[Exception], str]] = [
     (lambda: sonard.Model("simple-room", engine="ray"), sonard.OptionError, "expected one of `paths`"),  # type: ignore[arg-type]
     (lambda: sonard.Model("simple-room", max_range_m=0), sonard.OptionError, "max_range_m is 0"),
     (lambda: sonard.Model("simple-room", max_rang_m=1), TypeError, "max_rang_m"),  # type: ignore[call-arg]
-    (lambda: sonard.Model(3), TypeError, "give a Scene or the name of a shipped one"),  # type: ignore[arg-type]
+    (lambda: sonard.Model(3), TypeError, "must be a Scene or the name of a shipped one"),  # type: ignore[arg-type]
     (
         lambda: sonard.Model("mcgill-lab", max_range_m=100, lossless=True, threshold=1e-6).predict([2, 1.5, 0]),
         sonard.TooManyPathsError,
@@ -50,7 +50,7 @@ REFUSED: list[tuple[Callable[[], Any], type[Exception], str]] = [
 
 
 @pytest.mark.parametrize("number", range(len(REFUSED)))
-def test_what_is_refused_says_why(number: int) -> None:
+def test_error_messages(number: int) -> None:
     call, kind, words = REFUSED[number]
     with pytest.raises(kind) as caught:
         call()
@@ -59,7 +59,7 @@ def test_what_is_refused_says_why(number: int) -> None:
     assert str(again) == str(caught.value) and vars(again) == vars(caught.value)
 
 
-def test_an_exception_tells_its_place() -> None:
+def test_error_location() -> None:
     with pytest.raises(sonard.PoseError) as pose:
         MODEL.predict(np.array([[[0.4, 0.3, 0], [0.4, 0.3, 0]], [[0.4, 0.3, 0], [9, 9, 0]]]))
     assert pose.value.index == (1, 1) and "spans x 0 to 0.928 m" in pose.value.help
@@ -70,7 +70,7 @@ def test_an_exception_tells_its_place() -> None:
     assert isinstance(scene.value, sonard.SonardError) and isinstance(scene.value, ValueError)
 
 
-def test_a_file_that_is_not_there_is_an_os_error(tmp_path: Path) -> None:
+def test_missing_file(tmp_path: Path) -> None:
     for load in [sonard.Scene.load, sonard.Sensor.load]:
         with pytest.raises(FileNotFoundError) as caught:
             load(tmp_path / "nothing.json")

@@ -1,4 +1,4 @@
-"""Every script of the gallery and every example of the documentation runs."""
+"""Runs every script of the gallery and every example of the documentation."""
 
 import doctest
 import os
@@ -19,7 +19,7 @@ SCRIPTS = sorted(GALLERY.glob("*.py"))
 
 
 def options(script: Path, folder: Path) -> list[str]:
-    """A data set of as many rooms as it takes to see that the script runs; GALLERY=full makes that which is told of."""
+    """Reduced data set, sufficient to run the script; GALLERY=full generates the documented one."""
     spec = script.with_suffix(".toml")
     if os.environ.get("GALLERY") == "full" or not spec.exists():
         return []
@@ -38,31 +38,31 @@ def run(program: list[str], folder: Path) -> str:
 
 
 @pytest.mark.parametrize("script", SCRIPTS, ids=lambda script: script.stem)
-def test_the_gallery_runs(script: Path, tmp_path: Path) -> None:
+def test_gallery_scripts(script: Path, tmp_path: Path) -> None:
     needs = set(re.findall(r"^import (\w+)", script.read_text(), re.MULTILINE))
     lacking = [name for name in needs if find_spec(name) is None]
     if lacking:
         pytest.skip(f"{lacking} is not installed here")
-    said = run([str(script), *options(script, tmp_path)], tmp_path)
-    assert said.strip()
-    print(said)
+    output = run([str(script), *options(script, tmp_path)], tmp_path)
+    assert output.strip()
+    print(output)
     if "savefig" in script.read_text() and find_spec("matplotlib"):
         assert (tmp_path / f"{script.stem}.png").stat().st_size > 10_000
 
 
 @pytest.mark.parametrize("page", ["python/README.md", "docs/python.md"])
-def test_examples_of_the_documentation_run_as_pasted(page: str, tmp_path: Path) -> None:
+def test_documentation_examples(page: str, tmp_path: Path) -> None:
     text = (REPOSITORY / page).read_text()
     blocks = re.findall(r"^```python\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
     assert blocks
     program = "\n".join(blocks)
     if "matplotlib" in program and not find_spec("matplotlib"):
         pytest.skip("matplotlib is not installed here")
-    said = run(["-c", program], tmp_path)
+    output = run(["-c", program], tmp_path)
     expected = re.findall(r"^# (<.*)$", program, re.MULTILINE)
-    assert [line for line in said.splitlines() if line.startswith("<")] == expected
+    assert [line for line in output.splitlines() if line.startswith("<")] == expected
 
 
-def test_the_docstring_is_true() -> None:
+def test_module_docstring() -> None:
     failed, tried = doctest.testmod(sonard)
     assert (failed, tried > 4) == (0, True)

@@ -1,4 +1,4 @@
-"""Data sets by Python are those of the command."""
+"""Data sets compared with those of the command."""
 
 import subprocess
 from pathlib import Path
@@ -30,7 +30,7 @@ def files(folder: Path) -> dict[str, bytes]:
     return {str(path.relative_to(folder)): path.read_bytes() for path in sorted(folder.rglob("*")) if path.is_file()}
 
 
-def test_parts_make_the_same_bytes_as_the_command(tmp_path: Path) -> None:
+def test_parts_match_command(tmp_path: Path) -> None:
     spec = tmp_path / "spec.toml"
     spec.write_text(SPEC)
     subprocess.run([PROGRAM, "generate", spec, "--out", tmp_path / "command", "--shard", "1/1"], check=True)
@@ -41,7 +41,7 @@ def test_parts_make_the_same_bytes_as_the_command(tmp_path: Path) -> None:
     assert files(tmp_path / "set") == files(tmp_path / "command")
 
 
-def test_faults_are_exceptions_with_the_same_words(tmp_path: Path) -> None:
+def test_error_messages(tmp_path: Path) -> None:
     spec = tmp_path / "spec.toml"
     spec.write_text(SPEC.replace("poses = 3", "pose = 3"))
     with pytest.raises(sonard.SonardError, match=r"spec.toml:6:1: set.pose: unknown field `pose`") as raised:

@@ -1,4 +1,4 @@
-"""Logs, and what scans say."""
+"""Logs, and results computed from scans."""
 
 import json
 import pickle
@@ -14,7 +14,7 @@ from .conftest import Command
 
 @pytest.fixture(scope="module")
 def course(command: Command, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A log of two scans."""
+    """Log of two scans."""
     folder = tmp_path_factory.mktemp("logs")
     poses = folder / "poses.csv"
     poses.write_text("x_m,y_m,heading_deg\n2,1.5,0\n2.6,1.5,30\n")
@@ -25,7 +25,7 @@ def course(command: Command, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def compared(command: Command, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A log of readings with noise beside predictions."""
+    """Log of noisy readings with predictions."""
     folder = tmp_path_factory.mktemp("compared")
     plain, both = folder / "plain.jsonl", folder / "both.jsonl"
     command("simulate", "--scene", "simple-room", "--pose", "fig7", "--jitter-us", 5, "-o", plain)
@@ -33,7 +33,7 @@ def compared(command: Command, tmp_path_factory: pytest.TempPathFactory) -> Path
     return both
 
 
-def test_a_log_is_its_records(course: Path) -> None:
+def test_records(course: Path) -> None:
     log = sonard.read_log(course)
     records = [json.loads(line) for line in course.read_text().splitlines()]
     pings = [record for record in records if record["type"] == "ping"]
@@ -53,7 +53,7 @@ def test_a_log_is_its_records(course: Path) -> None:
         assert row["sim_status"] == 255 and np.isnan(row["sim_range_m"]) and np.isnat(row["time"])
 
 
-def test_the_model_of_a_log_reads_the_same_again(course: Path) -> None:
+def test_logged_model(course: Path) -> None:
     for scan in sonard.read_log(course):
         assert scan.provenance == "simulated" and scan.session is not None and scan.start is not None
         assert scan.session["sensor"]["name"] == scan.sensor.name == "senscomp-6500"
@@ -68,7 +68,7 @@ def test_the_model_of_a_log_reads_the_same_again(course: Path) -> None:
         assert scan.end is not None and scan.events == []
 
 
-def test_logs_survive_pickling(course: Path) -> None:
+def test_pickling(course: Path) -> None:
     log = sonard.read_log(course)
     assert repr(pickle.loads(pickle.dumps(log))) == repr(log)
     assert repr(pickle.loads(pickle.dumps(log[-1]))) == repr(log[1]) != repr(log[0])
@@ -78,7 +78,7 @@ def test_logs_survive_pickling(course: Path) -> None:
         log[-3]
 
 
-def test_damage_is_named_and_left_out(course: Path, tmp_path: Path) -> None:
+def test_damaged_lines(course: Path, tmp_path: Path) -> None:
     lines = course.read_text().splitlines(keepends=True)
     damaged = tmp_path / "damaged.jsonl"
     damaged.write_text("".join([*lines[:5], '{"type": "ping", "scan": 3}\n', *lines[5:9], lines[9][:20]]))
@@ -99,7 +99,7 @@ def test_damage_is_named_and_left_out(course: Path, tmp_path: Path) -> None:
         sonard.read_log(tmp_path)
 
 
-def test_a_comparison_is_that_of_the_command(compared: Path, command: Command) -> None:
+def test_compare_matches_command(compared: Path, command: Command) -> None:
     (expected,) = command("compare", compared, "--json")
     log = sonard.read_log(compared)
     found = sonard.compare(log)
@@ -112,7 +112,7 @@ def test_a_comparison_is_that_of_the_command(compared: Path, command: Command) -
     assert abs(np.median(np.abs(residuals_m)) - found["median_abs_residual_m"]) < 1e-12
 
 
-def test_features_are_those_of_the_command(command: Command, tmp_path: Path) -> None:
+def test_interpret_matches_command(command: Command, tmp_path: Path) -> None:
     log = tmp_path / "one.jsonl"
     command("simulate", "--scene", "plane-corner-edge", "--pose", "fig13", "--sensor", "bozma-kuc-60khz", "-o", log)
     expected = command("interpret", log, "--json")
@@ -120,22 +120,22 @@ def test_features_are_those_of_the_command(command: Command, tmp_path: Path) -> 
     assert found == expected and {feature["kind"] for feature in found} >= {"edge", "unresolved"}
     with pytest.raises(ValueError, match="min_confidence is 2"):
         sonard.interpret(sonard.read_log(log), min_confidence=2)
-    with pytest.raises(TypeError, match="give a Log"):
+    with pytest.raises(TypeError, match="must be a Log"):
         sonard.interpret(3)  # type: ignore[arg-type]
-    with pytest.raises(sonard.LogError, match="there is no scan"):
+    with pytest.raises(sonard.LogError, match="no scan"):
         sonard.interpret([])
 
 
-def test_an_array_has_no_arcs(command: Command, tmp_path: Path) -> None:
+def test_interpret_rejects_arrays(command: Command, tmp_path: Path) -> None:
     log = tmp_path / "array.jsonl"
     command("simulate", "--array", "pioneer-8", "--scene", "mcgill-lab", "--pose", "fig4", "-o", log)
     scan = sonard.read_log(log)[0]
     assert scan.readings.size == 8 and scan.session is not None and scan.session["array"]["name"] == "pioneer-8"
-    with pytest.raises(sonard.LogError, match="arcs need one ranger that turns"):
+    with pytest.raises(sonard.LogError, match="arcs require a single rotating ranger"):
         sonard.interpret(scan)
 
 
-def test_a_sweep_is_located(command: Command, tmp_path: Path) -> None:
+def test_locate(command: Command, tmp_path: Path) -> None:
     log = tmp_path / "room.jsonl"
     command("simulate", "--scene", "two-surface-room", "--pose", "1.2,1,30", "--max-range", 3, "-o", log)
     expected = command("locate", log, "--json")
@@ -145,23 +145,23 @@ def test_a_sweep_is_located(command: Command, tmp_path: Path) -> None:
     assert found == [{name: mode[name] for name in found[0]} for mode in expected]
     best = found[0]
     assert np.hypot(best["x_m"] - 1.2, best["y_m"] - 1.0) < 0.01 and abs(best["heading_deg"] - 30) < 1
-    # The same as arrays, with and without their status.
+    # The same readings as arrays, with and without status.
     readings = scan.readings
     for given in [readings, np.where(readings["status"] == sonard.Status.MIN_RANGE, np.nan, readings["range_m"])]:
         again = locator.locate(given, readings["azimuth_deg"])[0]
         assert abs(again["x_m"] - best["x_m"]) < 1e-6
-    with pytest.raises(ValueError, match="give one for each"):
+    with pytest.raises(ValueError, match="lengths must be equal"):
         locator.locate(readings, [0.0])
     with pytest.raises(ValueError, match="at least 8"):
         locator.locate(np.full(400, np.nan))
     assert repr(pickle.loads(pickle.dumps(locator))) == repr(locator)
 
 
-def test_a_sweep_tells_how_sensitive_its_ranger_was() -> None:
+def test_locate_fits_threshold() -> None:
     usual = sonard.Sensor.preset("senscomp-6500")
-    # Half as sensitive as is believed: 6 dB.
-    deaf = usual.replace(threshold=2 * usual.threshold)
-    scan = sonard.Model("simple-room", deaf, max_range_m=3).predict([0.3, 0.3, 20.0])
+    # Half the sensitivity of the prior: 6 dB.
+    insensitive = usual.replace(threshold=2 * usual.threshold)
+    scan = sonard.Model("simple-room", insensitive, max_range_m=3).predict([0.3, 0.3, 20.0])
     model = sonard.Model("simple-room", usual, max_range_m=3)
     locator = sonard.Locator(model, fit=["threshold"], priors={"threshold_db": 4.0})
     (threshold,) = locator.locate(scan)[0]["besides"]
@@ -175,20 +175,20 @@ def test_a_sweep_tells_how_sensitive_its_ranger_was() -> None:
 
 
 @pytest.mark.parametrize("feature_prediction", [True, False])
-def test_a_map_is_that_of_the_command(
+def test_map_matches_command(
     course: Path, feature_prediction: bool, command: Command, tmp_path: Path
 ) -> None:
     switch = "on" if feature_prediction else "off"
-    (said,) = command("map", course, "--out", tmp_path / "map", "--feature-prediction", switch, "--json")
+    (summary,) = command("map", course, "--out", tmp_path / "map", "--feature-prediction", switch, "--json")
     made = sonard.map(sonard.read_log(course), feature_prediction=feature_prediction)
     rows, columns = made.occupancy.shape
-    assert (columns, rows) == (said["width"], said["height"]) and made.resolution_m == said["resolution_m"]
-    assert list(made.origin_m) == said["origin_m"] and made.extent[0] == made.origin_m[0]
-    assert (made.occupancy > 0.65).sum() == said["occupied_cells"] > 100
-    assert (made.occupancy < 0.196).sum() == said["free_cells"] > 100
+    assert (columns, rows) == (summary["width"], summary["height"]) and made.resolution_m == summary["resolution_m"]
+    assert list(made.origin_m) == summary["origin_m"] and made.extent[0] == made.origin_m[0]
+    assert (made.occupancy > 0.65).sum() == summary["occupied_cells"] > 100
+    assert (made.occupancy < 0.196).sum() == summary["free_cells"] > 100
     header, _, pixels = (tmp_path / "map/map.pgm").read_bytes().partition(b"255\n")
     image = np.frombuffer(pixels, np.uint8).reshape(rows, columns)[::-1].astype(float)
-    # Bright is free, and a picture begins above.
+    # Bright is free, and the first row of the image is the top one.
     assert np.abs((255 - image) / 255 - made.occupancy).max() < 0.01
     small = sonard.map(sonard.read_log(course), region=(0.0, 0.0, 1.0, 2.0), resolution_m=0.1)
     assert small.occupancy.shape == (20, 10)

@@ -19,7 +19,7 @@ MODEL = sonard.Model("simple-room")
 FIG9 = (0.774, 0.085, 0.0)
 
 
-def test_paths_are_those_of_the_command(command: Command) -> None:
+def test_paths_match_command(command: Command) -> None:
     for name, pose in [("simple-room", "fig9"), ("mcgill-lab", "fig4"), ("echo-traces", "d")]:
         scene = sonard.Scene.shipped(name)
         model = sonard.Model(scene, max_range_m=3.0)
@@ -30,11 +30,11 @@ def test_paths_are_those_of_the_command(command: Command) -> None:
             for field in ["kind", "order", "length_m", "amplitude", "phase_deg", "departure_deg", "arrival_deg"]:
                 assert getattr(path, field) == line[field]
             assert path.range_m == line["length_m"] / 2
-            assert list(path.interactions) == [(met["kind"], met["id"]) for met in line["interactions"]]
-            np.testing.assert_allclose(path.points, [met["point"] for met in line["interactions"]], atol=1e-6)
+            assert list(path.interactions) == [(item["kind"], item["id"]) for item in line["interactions"]]
+            np.testing.assert_allclose(path.points, [item["point"] for item in line["interactions"]], atol=1e-6)
 
 
-def test_a_trace_is_that_of_the_command(command: Command) -> None:
+def test_trace_matches_command(command: Command) -> None:
     (line,) = command(
         "trace", "--scene", "echo-traces", "--pose", "d", "--until", 3, "--step-us", 20, "--json"
     )
@@ -43,22 +43,22 @@ def test_a_trace_is_that_of_the_command(command: Command) -> None:
     for field in ["t_us", "envelope", "threshold", "gain_db"]:
         np.testing.assert_array_equal(getattr(trace, field), line[field])
     np.testing.assert_array_equal(trace.echoes_us, line["detection"]["tof_us"])
-    for peak, told in zip(trace.peaks, line["peaks"], strict=True):
-        assert (peak.tof_us, peak.peak_us, peak.peak) == (told["tof_us"], told["peak_us"], told["peak"])
-        assert peak.path.length_m == told["path"]["length_m"]
+    for peak, expected in zip(trace.peaks, line["peaks"], strict=True):
+        assert (peak.tof_us, peak.peak_us, peak.peak) == (expected["tof_us"], expected["peak_us"], expected["peak"])
+        assert peak.path.length_m == expected["path"]["length_m"]
 
 
-def test_a_reading_says_its_path() -> None:
+def test_reading_has_path() -> None:
     reading = MODEL.reading(FIG9, 270.0)
     assert repr(reading) == "<Reading ECHO at 0.8282 m, margin 29.3 dB, by south, north, south>"
     assert reading.path is not None and reading.path.order == 3
     assert reading.status is sonard.Status.ECHO
-    silence = sonard.Model("simple-room", threshold=1.0, max_range_m=0.5).reading((0.4, 0.3, 20.0))
-    assert silence.range_m is None and silence.tof_us is None
-    assert silence.status is sonard.Status.NO_ECHO
+    no_echo = sonard.Model("simple-room", threshold=1.0, max_range_m=0.5).reading((0.4, 0.3, 20.0))
+    assert no_echo.range_m is None and no_echo.tof_us is None
+    assert no_echo.status is sonard.Status.NO_ECHO
 
 
-def test_a_room_from_points_is_read_by_hand() -> None:
+def test_room_by_hand() -> None:
     corners = np.array([[0, 0], [4, 0], [4, 3], [0, 3]])
     scene = sonard.Scene.from_points(corners, name="hall", cylinders=[[3.0, 2.5, 0.1]])
     assert scene == sonard.Scene.from_points([*corners, corners[0]], name="hall", cylinders=[[3.0, 2.5, 0.1]])
@@ -66,7 +66,7 @@ def test_a_room_from_points_is_read_by_hand() -> None:
     np.testing.assert_array_equal(scene.walls[:, 1], np.roll(corners, -1, axis=0))
     assert repr(scene) == "<Scene 'hall': 4 walls, 1 cylinders>" and len(scene.wall_ids) == 4
     readings = sonard.Model(scene).predict([1.0, 1.0, 0.0], [0.0, 90.0])
-    # A weak echo passes the threshold a little late.
+    # A weak echo crosses the threshold slightly later (time walk).
     assert 3.0 <= readings["range_m"][0] < 3.005 and 2.0 <= readings["range_m"][1] < 2.005
     np.testing.assert_array_equal(scene.can_stand([[1.0, 1.0], [5.0, 1.0], [3.0, 2.5]]), [True, False, False])
     np.testing.assert_allclose(scene.clearance_m([[[1.0, 1.0], [3.0, 2.5]]]), np.array([[1.0, -0.1]]))
@@ -77,7 +77,7 @@ def test_a_room_from_points_is_read_by_hand() -> None:
     assert sonard.Model(tall).paths([1, 1, 0])[0].points.shape[1] == 3
 
 
-def test_a_scene_file_is_read_as_its_text(tmp_path: Path) -> None:
+def test_scene_file(tmp_path: Path) -> None:
     scene = sonard.Scene.shipped("corridor")
     file = tmp_path / "corridor.json"
     file.write_text(scene.to_json())
@@ -87,14 +87,14 @@ def test_a_scene_file_is_read_as_its_text(tmp_path: Path) -> None:
     assert scene.pose("1,0.5,90") == (1, 0.5, 90)
 
 
-def test_a_sensor_with_other_figures(tmp_path: Path) -> None:
+def test_sensor_replace(tmp_path: Path) -> None:
     sensor = MODEL.sensor
     assert sensor.name == "senscomp-6500" and sensor == sonard.Sensor.preset("senscomp-6500")
     other = sensor.replace(threshold=0.5, mounting={"z_m": 1.0}, edge_law="kuc-siegel")
     assert (other.threshold, other.mounting["z_m"], other.edge_law) == (0.5, 1.0, "kuc-siegel")
     assert other.aperture == sensor.aperture and other != sensor and other.replace() == other
     assert other.replace(mounting={"left_m": 0.1}).mounting["z_m"] == 1.0
-    # Figures that the preset's file leaves out are known, too.
+    # Values that the preset's file omits are accepted, too.
     stepped = sensor.replace(range_step_m=0.01, integration_us=50.0)
     assert stepped.integration_us == 50.0 and json.loads(stepped.to_json())["range_step_m"] == 0.01
     file = tmp_path / "sensor.json"
@@ -103,7 +103,7 @@ def test_a_sensor_with_other_figures(tmp_path: Path) -> None:
     assert sonard.Model("simple-room", other).sensor.threshold == 0.5
 
 
-def test_the_air_gives_the_speed_of_sound() -> None:
+def test_air() -> None:
     assert abs(sonard.Air().sound_speed_m_s - 343.99) < 0.005  # Cramer's table.
     assert abs(sonard.Air().absorption_db_per_m(50e3) - 1.661) < 5e-4  # ISO 9613-1.
     assert sonard.Air(sound_speed_m_s=340.0).sound_speed_m_s == 340.0
@@ -119,7 +119,7 @@ def test_the_air_gives_the_speed_of_sound() -> None:
         sonard.Scene.shipped("mcgill-lab"),
     ],
 )
-def test_values_survive_pickling(value: Any) -> None:
+def test_pickling_values(value: Any) -> None:
     for again in [pickle.loads(pickle.dumps(value)), copy.copy(value), copy.deepcopy(value)]:
         assert again == value and hash(again) == hash(value) and repr(again) == repr(value)
 
@@ -133,7 +133,7 @@ def test_values_survive_pickling(value: Any) -> None:
         sonard.Model("simple-room", response="full", edge_law="bozma-kuc", max_order=3, lossless=True),
     ],
 )
-def test_a_model_survives_pickling(model: sonard.Model) -> None:
+def test_pickling_model(model: sonard.Model) -> None:
     for again in [pickle.loads(pickle.dumps(model)), copy.deepcopy(model)]:
         assert (again.scene, again.sensor, again.air) == (model.scene, model.sensor, model.air)
         assert (again.engine, again.options, repr(again)) == (model.engine, model.options, repr(model))
@@ -141,7 +141,7 @@ def test_a_model_survives_pickling(model: sonard.Model) -> None:
         assert model.predict(pose).tobytes() == again.predict(pose).tobytes()
 
 
-def test_answers_survive_pickling() -> None:
+def test_pickling_results() -> None:
     path = MODEL.paths(FIG9)[5]
     reading, trace = MODEL.reading(FIG9), MODEL.trace(FIG9, until_m=1.0)
     for value in [path, reading, trace, trace.peaks[0]]:
@@ -164,7 +164,7 @@ NONSENSE = st.one_of(
 
 @settings(max_examples=200, deadline=None)
 @given(poses=NONSENSE, azimuths_deg=NONSENSE, threads=st.one_of(st.none(), st.integers(-2, 2)))
-def test_nonsense_is_refused_or_read(poses: Any, azimuths_deg: Any, threads: Any) -> None:
+def test_arbitrary_arguments(poses: Any, azimuths_deg: Any, threads: Any) -> None:
     try:
         readings = MODEL.predict(poses, azimuths_deg, threads)
     except (TypeError, ValueError, OverflowError):
@@ -174,7 +174,7 @@ def test_nonsense_is_refused_or_read(poses: Any, azimuths_deg: Any, threads: Any
 
 @settings(max_examples=100, deadline=None)
 @given(points=NONSENSE, closed=st.booleans(), cylinders=NONSENSE, reflectance=st.floats())
-def test_a_scene_of_nonsense_is_refused_or_made(points: Any, closed: bool, cylinders: Any, reflectance: float) -> None:
+def test_arbitrary_scenes(points: Any, closed: bool, cylinders: Any, reflectance: float) -> None:
     try:
         scene = sonard.Scene.from_points(points, closed=closed, cylinders=cylinders, reflectance=reflectance)
     except (TypeError, ValueError):
@@ -184,7 +184,7 @@ def test_a_scene_of_nonsense_is_refused_or_made(points: Any, closed: bool, cylin
 
 @settings(max_examples=100, deadline=None)
 @given(text=st.text(max_size=30))
-def test_texts_of_nonsense_are_refused(text: str) -> None:
+def test_arbitrary_texts(text: str) -> None:
     for read in [sonard.Scene.from_json, sonard.Sensor.from_json]:
         with pytest.raises(sonard.SonardError):
             read(text)

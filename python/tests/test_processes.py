@@ -25,16 +25,16 @@ POSES = places_in(SCENE, 20)
 PATIENCE_S = 60
 
 
-def in_a_fork_of(ask: Callable[[], bytes]) -> bytes:
-    """What a forked child answers."""
+def in_a_fork_of(compute: Callable[[], bytes]) -> bytes:
+    """Returns the result of `compute` in a forked child."""
     context = multiprocessing.get_context("fork")
     queue = context.Queue()
 
     def answer(queue: "multiprocessing.Queue[bytes]") -> None:
-        queue.put(ask())
+        queue.put(compute())
 
     with warnings.catch_warnings():
-        # Python says that forks of threaded programs may hang: this one must not.
+        # Python warns that forks of threaded programs may hang: this one must not.
         warnings.simplefilter("ignore", DeprecationWarning)
         child = context.Process(target=answer, args=(queue,))
         child.start()
@@ -49,14 +49,14 @@ def fork_and_predict() -> bytes:
     return in_a_fork_of(lambda: MODEL.predict(POSES).tobytes())
 
 
-def test_a_fork_after_use_does_not_hang() -> None:
+def test_fork_after_use() -> None:
     expected = MODEL.predict(POSES, threads=2).tobytes()
     for _ in range(5):
         assert fork_and_predict() == expected
     assert MODEL.predict(POSES).tobytes() == expected
 
 
-def test_a_fork_while_others_predict_does_not_hang() -> None:
+def test_fork_during_prediction() -> None:
     expected = MODEL.predict(POSES).tobytes()
     done = threading.Event()
 
@@ -76,18 +76,18 @@ def test_a_fork_while_others_predict_does_not_hang() -> None:
             other.join()
 
 
-def test_a_spawned_process_gets_the_model_by_pickle() -> None:
+def test_spawned_process() -> None:
     with multiprocessing.get_context("spawn").Pool(1) as pool:
         assert pool.apply(MODEL.predict, (POSES,)).tobytes() == MODEL.predict(POSES).tobytes()
 
 
-def test_threads_share_a_model() -> None:
+def test_threads_share_model() -> None:
     expected = [MODEL.predict(pose).tobytes() for pose in POSES]
     with ThreadPoolExecutor(8) as pool:
         assert [found.tobytes() for found in pool.map(MODEL.predict, POSES)] == expected
 
 
-def test_other_threads_run_meanwhile() -> None:
+def test_releases_interpreter_lock() -> None:
     ticks = 0
     done = threading.Event()
 
@@ -103,13 +103,13 @@ def test_other_threads_run_meanwhile() -> None:
         MODEL.predict(POSES, threads=1)
     done.set()
     counting.join()
-    # With the interpreter's lock held there would be one at each return: a dozen or two.
+    # With the interpreter lock held there would be one at each return: a dozen or two.
     assert ticks > 60
 
 
-def test_an_interrupt_ends_a_long_prediction() -> None:
+def test_interrupt() -> None:
     program = (
-        # In a script that runs in the background it would be ignored.
+        # A script that runs in the background would ignore it.
         "import sonard, numpy, signal, sys\n"
         "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
         "poses = numpy.tile([0.4, 0.3, 0.0], (200_000, 1))\n"
@@ -136,7 +136,7 @@ def resident_bytes() -> int:
 
 
 @pytest.mark.skipif(not os.path.exists("/proc/self/statm"), reason="memory is read from Linux's /proc")
-def test_memory_is_flat_over_a_million_readings() -> None:
+def test_memory_is_constant() -> None:
     def use(times: int) -> None:
         for _ in range(times):
             readings = MODEL.predict(POSES)
@@ -154,8 +154,8 @@ def test_memory_is_flat_over_a_million_readings() -> None:
     assert resident_bytes() - before < 4 << 20
 
 
-def test_what_does_not_fit_into_memory_is_an_exception() -> None:
-    # A view of one pose, so that only the answer is large.
+def test_memory_error() -> None:
+    # A view of a single pose, so that only the result is large.
     poses = np.broadcast_to([0.4, 0.3, 0.0], (1_000_000, 3))
-    with pytest.raises(MemoryError, match="give fewer poses at once"):
+    with pytest.raises(MemoryError, match="pass fewer poses per call"):
         MODEL.predict(poses, np.zeros(50_000_000))

@@ -1,4 +1,4 @@
-"""Readings are those of the command `sonard simulate`, to the bit."""
+"""Readings compared bit by bit with those of the command `sonard simulate`."""
 
 import json
 from typing import Any
@@ -16,7 +16,7 @@ STATUSES = {status.name.lower(): status.value for status in sonard.Status}
 
 
 def logged(records: list[dict[str, Any]], beams: int) -> np.ndarray[Any, Any]:
-    """The readings of a log as the model's array."""
+    """Returns the readings of a log as an array of the model."""
     pings = [record for record in records if record["type"] == "ping"]
     array = np.empty(len(pings), sonard.READING)
     for row, ping in zip(array, pings, strict=True):
@@ -35,7 +35,7 @@ def assert_same(found: np.ndarray[Any, Any], expected: np.ndarray[Any, Any]) -> 
 
 
 @pytest.mark.parametrize("name", sonard.Scene.shipped_names())
-def test_every_shipped_pose_reads_as_the_command_says(name: str, command: Command) -> None:
+def test_shipped_poses_match_command(name: str, command: Command) -> None:
     scene = sonard.Scene.shipped(name)
     model = sonard.Model(scene, max_range_m=5.0)
     azimuths_deg = np.round(np.arange(100) * 3.6, 9)
@@ -47,7 +47,7 @@ def test_every_shipped_pose_reads_as_the_command_says(name: str, command: Comman
         assert_same(model.predict([pose], azimuths_deg), logged(records, 100))
 
 
-def test_a_full_turn_is_the_default_of_both(command: Command, room: sonard.Scene) -> None:
+def test_default_is_full_turn(command: Command, room: sonard.Scene) -> None:
     records = command("simulate", "--scene", "simple-room", "--pose", "fig9")
     assert_same(sonard.Model(room).predict([room.poses["fig9"]]), logged(records, 400))
 
@@ -84,7 +84,7 @@ COMMON = st.fixed_dictionaries(
     temperature_c=st.floats(-20, 50),
     seed=st.integers(0, 2**32),
 )
-def test_any_model_reads_as_the_command_says(
+def test_any_model_matches_command(
     scene: str,
     sensor: str,
     engine: dict[str, Any],
@@ -104,7 +104,7 @@ def test_any_model_reads_as_the_command_says(
         model = sonard.Model(scene, sensor, sonard.Air(temperature_c), **options)
         found = model.predict(poses, np.round(np.arange(40) * 9.0, 9))
     except sonard.PoseError:
-        assert "robot" in scene  # Its body needs more room than a ranger.
+        assert "robot" in scene  # The body requires more room than a ranger.
         return
     arguments: list[object] = ["simulate", "--scene", scene, "--poses", course, "--sensor", sensor]
     arguments += [f"--temperature-c={temperature_c}", "--step-deg", 9]
@@ -117,7 +117,7 @@ def test_any_model_reads_as_the_command_says(
 
 @settings(max_examples=50, deadline=None)
 @given(shape=st.lists(st.integers(0, 3), max_size=3), beams=st.integers(0, 5), threads=st.integers(1, 3))
-def test_shapes_and_threads_change_no_reading(shape: list[int], beams: int, threads: int) -> None:
+def test_shapes_and_threads(shape: list[int], beams: int, threads: int) -> None:
     scene = sonard.Scene.shipped("simple-room")
     model = sonard.Model(scene, max_range_m=2.0)
     poses = places_in(scene, int(np.prod(shape, dtype=int))).reshape(*shape, 3) if 0 not in shape else np.empty((*shape, 3))
@@ -133,10 +133,10 @@ def test_shapes_and_threads_change_no_reading(shape: list[int], beams: int, thre
                 assert alone.range_m == found[index][beam]["range_m"]
 
 
-def test_a_silence_is_infinite_and_says_what_it_lacked(room: sonard.Scene) -> None:
+def test_no_echo_fields(room: sonard.Scene) -> None:
     readings = sonard.Model(room, threshold=1.0).predict(room.poses["fig7"])
-    silent = readings["status"] == sonard.Status.NO_ECHO
-    assert silent.any()
-    assert np.isposinf(readings["range_m"][silent]).all() and np.isposinf(readings["tof_us"][silent]).all()
-    assert np.nanmax(readings["margin_db"][silent]) < 0
-    assert np.isfinite(readings["range_m"][~silent]).all()
+    no_echo = readings["status"] == sonard.Status.NO_ECHO
+    assert no_echo.any()
+    assert np.isposinf(readings["range_m"][no_echo]).all() and np.isposinf(readings["tof_us"][no_echo]).all()
+    assert np.nanmax(readings["margin_db"][no_echo]) < 0
+    assert np.isfinite(readings["range_m"][~no_echo]).all()

@@ -25,7 +25,7 @@ def polygon(*rings: list[tuple[float, float]]) -> dict[str, Any]:
     return {"type": "Polygon", "coordinates": [closed(ring) for ring in rings]}
 
 
-def test_a_polygon_with_a_hole_is_a_room_with_an_obstacle() -> None:
+def test_polygon_with_hole() -> None:
     scene = sonard.Scene.from_shapes(polygon(HALL, DESK))
     expected = sonard.Scene.from_points(HALL, obstacles=[DESK])
     np.testing.assert_array_equal(scene.walls, expected.walls)
@@ -37,20 +37,20 @@ def test_a_polygon_with_a_hole_is_a_room_with_an_obstacle() -> None:
 
 
 class Geo:
-    """What has only ``__geo_interface__``."""
+    """Object with ``__geo_interface__`` only."""
 
     def __init__(self, geo: dict[str, Any]) -> None:
         self.__geo_interface__ = geo
 
 
 class Coords:
-    """What has only ``coords``."""
+    """Object with ``coords`` only."""
 
     def __init__(self, coords: Any) -> None:
         self.coords = coords
 
 
-def test_all_ways_of_giving_lines_are_one() -> None:
+def test_equivalent_line_inputs() -> None:
     line = [(0.0, 0.0), (4.0, 0.0), (4.0, 3.0)]
     expected = sonard.Scene.from_points(line, closed=False).walls
     geo = {"type": "LineString", "coordinates": line}
@@ -77,7 +77,7 @@ def test_all_ways_of_giving_lines_are_one() -> None:
     assert many.name == "both" and len(many.walls) == 8 and many.wall_ids[4] == "polygon-1.0"
 
 
-def test_shapely_and_its_own_scenes_agree() -> None:
+def test_shapely_matches_points() -> None:
     shapely = pytest.importorskip("shapely")
     room = shapely.Polygon(HALL, [DESK])
     np.testing.assert_array_equal(sonard.Scene.from_shapes(room).walls, sonard.Scene.from_shapes(polygon(HALL, DESK)).walls)
@@ -93,9 +93,9 @@ def test_shapely_and_its_own_scenes_agree() -> None:
     agree = scene.can_stand(places) == inside
     assert (agree | near).all() and inside.sum() > 100
     for empty in [shapely.Polygon(), shapely.GeometryCollection(), []]:
-        with pytest.raises(ValueError, match="shapes have no line"):
+        with pytest.raises(ValueError, match="shapes contain no line"):
             sonard.Scene.from_shapes(empty)
-    with pytest.raises(ValueError, match=r"shapes\[1\] is a Point, along which there is no wall: give its buffer"):
+    with pytest.raises(ValueError, match=r"shapes\[1\] is a Point, which has no wall: pass its buffer"):
         sonard.Scene.from_shapes([room, shapely.Point(1, 1)])
 
 
@@ -105,7 +105,7 @@ def test_shapely_and_its_own_scenes_agree() -> None:
     turn=st.floats(0, 6.28),
     holes=st.integers(0, 2),
 )
-def test_any_star_of_shapely_keeps_its_corners(sizes: list[float], turn: float, holes: int) -> None:
+def test_shapely_keeps_corners(sizes: list[float], turn: float, holes: int) -> None:
     shapely = pytest.importorskip("shapely")
     angles = turn + np.linspace(0, 2 * np.pi, len(sizes), endpoint=False)
     outer = np.column_stack([np.cos(angles), np.sin(angles)]) * np.array(sizes)[:, None]
@@ -116,7 +116,7 @@ def test_any_star_of_shapely_keeps_its_corners(sizes: list[float], turn: float, 
 
 
 class Endless:
-    """A list in itself, as nothing sane is."""
+    """Iterable that contains itself."""
 
     def __iter__(self) -> Iterator[Any]:
         yield self
@@ -125,7 +125,7 @@ class Endless:
 @pytest.mark.parametrize(
     ("make", "kind", "words"),
     [
-        (lambda: 3, TypeError, "shapes is a <class 'int'>: give shapes"),
+        (lambda: 3, TypeError, "shapes is a <class 'int'>: must be shapes"),
         (lambda: "POLYGON ((0 0, 1 0, 1 1))", TypeError, "shapes is a <class 'str'>"),
         (lambda: [HALL], TypeError, "shapes[0][0][0] is a <class 'float'>"),
         (lambda: {"coordinates": []}, ValueError, "without a type"),
@@ -139,14 +139,14 @@ class Endless:
         (lambda: Endless(), ValueError, "more than 32 deep"),
     ],
 )
-def test_what_is_no_shape_is_refused(make: Callable[[], Any], kind: type[Exception], words: str) -> None:
+def test_invalid_shapes(make: Callable[[], Any], kind: type[Exception], words: str) -> None:
     with pytest.raises(kind) as caught:
         sonard.Scene.from_shapes(make())
     assert words in str(caught.value)
 
 
 def write_map(folder: Path, pixels: np.ndarray[Any, np.dtype[np.uint8]]) -> Path:
-    """A map of cells of 5 cm."""
+    """Writes a map with cells of 5 cm."""
     folder.mkdir()
     rows, columns = pixels.shape
     (folder / "map.pgm").write_bytes(f"P5\n{columns} {rows}\n255\n".encode() + pixels.tobytes())
@@ -156,7 +156,7 @@ def write_map(folder: Path, pixels: np.ndarray[Any, np.dtype[np.uint8]]) -> Path
     return folder
 
 
-def test_a_map_becomes_the_scene_that_the_command_makes(command: Command, tmp_path: Path) -> None:
+def test_map_matches_command(command: Command, tmp_path: Path) -> None:
     pixels = np.full((60, 80), 254, np.uint8)
     pixels[[0, 1, -2, -1]] = pixels[:, [0, 1, -2, -1]] = 0
     pixels[20:30, 30:50] = 0
@@ -173,9 +173,9 @@ def test_a_map_becomes_the_scene_that_the_command_makes(command: Command, tmp_pa
     assert scene.name == "office" and scene.can_stand([[0.0, 3.0], [1.0, 3.75]]).tolist() == [True, False]
 
 
-def test_a_map_that_is_none_is_refused(tmp_path: Path) -> None:
+def test_invalid_maps(tmp_path: Path) -> None:
     folder = write_map(tmp_path / "empty", np.full((20, 20), 254, np.uint8))
-    with pytest.raises(sonard.SceneError, match="no wall is found in it") as caught:
+    with pytest.raises(sonard.SceneError, match="the map contains no wall") as caught:
         sonard.Scene.from_grid(folder)
     assert "occupied cells" in caught.value.help
     with pytest.raises(ValueError, match="least_m is -1"):

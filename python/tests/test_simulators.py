@@ -1,4 +1,4 @@
-"""Examples whose simulators are not here run with stand-ins for the modules of these."""
+"""Runs examples for simulators that are not installed, with substitutes for their modules."""
 
 import runpy
 import sys
@@ -13,12 +13,12 @@ import sonard
 from .conftest import REPOSITORY
 
 SIMULATORS = REPOSITORY / "examples/simulators"
-# By the wall, in the middle, and outside.
+# Near the wall, in the middle, and outside.
 PLACES = [(0.774, 0.085), (0.3, 0.4), (9.0, 9.0)]
 
 
 def module(monkeypatch: pytest.MonkeyPatch, name: str, **what: Any) -> ModuleType:
-    """A module of that name with these members."""
+    """Installs a module with the given name and members."""
     made = ModuleType(name)
     made.__dict__.update(what)
     monkeypatch.setitem(sys.modules, name, made)
@@ -32,7 +32,7 @@ def scene_file(tmp_path: Path, room: sonard.Scene) -> Path:
     return path
 
 
-def test_the_controller_for_webots(
+def test_webots_controller(
     monkeypatch: pytest.MonkeyPatch, scene_file: Path, capsys: pytest.CaptureFixture[str], room: sonard.Scene
 ) -> None:
     places = iter(PLACES)
@@ -61,14 +61,14 @@ def test_the_controller_for_webots(
     module(monkeypatch, "controller", Robot=Robot)
     monkeypatch.setattr(sys, "argv", ["webots_sonar.py", str(scene_file)])
     runpy.run_path(str(SIMULATORS / "webots_sonar.py"), run_name="__main__")
-    said = capsys.readouterr().out.splitlines()
+    output = capsys.readouterr().out.splitlines()
     model = sonard.Model(room)
-    assert said[:2] == [f"1.00 s: {model.reading((*place, 0.0))}" for place in PLACES[:2]]
-    assert len(said) == 3
-    assert said[2].startswith("no reading: ")
+    assert output[:2] == [f"1.00 s: {model.reading((*place, 0.0))}" for place in PLACES[:2]]
+    assert len(output) == 3
+    assert output[2].startswith("no reading: ")
 
 
-def test_the_system_for_gazebo(monkeypatch: pytest.MonkeyPatch, scene_file: Path, room: sonard.Scene) -> None:
+def test_gazebo_system(monkeypatch: pytest.MonkeyPatch, scene_file: Path, room: sonard.Scene) -> None:
     places = iter(PLACES)
     published: list[Any] = []
 
@@ -106,10 +106,10 @@ def test_the_system_for_gazebo(monkeypatch: pytest.MonkeyPatch, scene_file: Path
         info = SimpleNamespace(paused=False, sim_time=SimpleNamespace(total_seconds=lambda: time_s))
         system.post_update(info, None)
     ranges = sonard.Model(room).predict([(*place, 0.0) for place in PLACES[:2]], [0.0])["range_m"]
-    # Between two periods, and where no ranger can stand, nothing is published.
+    # Between two periods, and at poses where no ranger can be placed, nothing is published.
     assert [list(message.ranges) for message in published] == [[float(one)] for one in ranges[:, 0]]
 
 
-def test_the_examples_are_told_of() -> None:
-    told = (SIMULATORS / "README.md").read_text()
-    assert all(f"`{path.name}`" in told for path in SIMULATORS.glob("*.py"))
+def test_examples_are_documented() -> None:
+    text = (SIMULATORS / "README.md").read_text()
+    assert all(f"`{path.name}`" in text for path in SIMULATORS.glob("*.py"))

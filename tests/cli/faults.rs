@@ -229,7 +229,7 @@ fn another_board_ends_the_session_by_the_name_of_the_difference() {
     // As it stands without the lines that a terminal breaks it into.
     let said = stderr(&output).replace('│', " ");
     let said = said.split_whitespace().collect::<Vec<_>>().join(" ");
-    assert!(said.contains("800 steps a revolution, not 400"), "{said}");
+    assert!(said.contains("800 steps per revolution, not 400"), "{said}");
     let log = Log::read(&folder.path().join("scan.jsonl"));
     log.assert_each_beam_once(400);
     assert!(log.end()["missing"].as_u64() > Some(0));

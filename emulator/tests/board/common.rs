@@ -1,15 +1,15 @@
-//! What the tests share.
+//! Helpers shared by the tests.
 
 use std::path::PathBuf;
 
-use board_config::{ALWAYS, Config};
-/// Those of the scenarios that every board goes through.
+use board_config::{BASE_CAPABILITIES, Config};
+/// Settings of the conformance scenarios.
 pub use firmware_protocol::conformance::scenarios::SETTINGS;
 use firmware_protocol::host::{Command, HostEvent};
 use firmware_protocol::messages::{Capabilities, Reading, Settings};
-use sonard_emulator::{Bench, Commanded, Emulator, Surroundings};
+use sonard_emulator::{Bench, Emulator, Environment, ScriptedEnvironment};
 
-/// The firmware, as `test.sh` builds it.
+/// Path of the firmware built by `firmware/test.sh`.
 pub fn elf() -> PathBuf {
     let path = std::env::var_os("SONARD_FIRMWARE").map_or_else(
         || {
@@ -22,12 +22,12 @@ pub fn elf() -> PathBuf {
     path
 }
 
-/// A board with everything fitted.
+/// Configuration of a board with everything fitted.
 pub fn config() -> Config {
     Config {
         serial: *b"EMU-000001",
         steps_per_revolution: 400,
-        capabilities: ALWAYS
+        capabilities: BASE_CAPABILITIES
             .with(Capabilities::INDEX_SENSOR)
             .with(Capabilities::EMERGENCY_STOP)
             .with(Capabilities::EMULATED),
@@ -35,22 +35,22 @@ pub fn config() -> Config {
     }
 }
 
-pub fn commanded(echoes: &[u64]) -> Commanded {
-    Commanded { echoes: echoes.to_vec(), step: 0 }
+pub fn scripted(echoes: &[u64]) -> ScriptedEnvironment {
+    ScriptedEnvironment { echoes: echoes.to_vec(), step: 0 }
 }
 
-/// A board that has booted, and a host that has not spoken to it.
-pub fn bench(surroundings: impl Surroundings + 'static) -> Bench {
-    let emulator = Emulator::new(&elf(), &config(), Box::new(surroundings)).expect("a firmware");
+/// Booted board and a host that has not sent anything.
+pub fn bench(environment: impl Environment + 'static) -> Bench {
+    let emulator = Emulator::new(&elf(), &config(), Box::new(environment)).expect("a firmware");
     let mut bench = Bench::new(emulator);
-    // What is sent before the receiver is on is lost, as on the board.
+    // Bytes sent before the receiver is enabled are lost, as on the board.
     bench.run(0.05).expect("boots");
     bench
 }
 
-/// The same, identified, set up and at home.
-pub fn ready(surroundings: impl Surroundings + 'static, settings: Settings) -> Bench {
-    let mut bench = bench(surroundings);
+/// Booted board that is identified, configured and homed.
+pub fn ready(environment: impl Environment + 'static, settings: Settings) -> Bench {
+    let mut bench = bench(environment);
     for command in [Command::Identify, Command::Configure(settings), Command::Home] {
         bench.perform(command, 20.0).expect("gets ready");
     }

@@ -1,7 +1,7 @@
-//! What every board must do, the firmware's machine code does too.
+//! Conformance tests on the firmware's machine code.
 
-use crate::common::{commanded, config, elf};
+use crate::common::{config, elf, scripted};
 use firmware_protocol::conformance_tests;
 use sonard_emulator::Emulator;
 
-conformance_tests!(Emulator::new(&elf(), &config(), Box::new(commanded(&[]))).expect("a firmware"));
+conformance_tests!(Emulator::new(&elf(), &config(), Box::new(scripted(&[]))).expect("a firmware"));

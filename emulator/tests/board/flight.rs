@@ -1,12 +1,12 @@
-//! Times of flight, to the tick of 0.5 us.
+//! Times of flight, accurate to the tick of 0.5 us.
 
-use crate::common::{SETTINGS, commanded, readings, ready};
+use crate::common::{SETTINGS, readings, ready, scripted};
 use firmware_protocol::host::Command;
 use firmware_protocol::messages::{Blanking, ReadingStatus, Settings};
 use sonard_emulator::{CYCLES_PER_TICK, HZ};
 
 const MS: u64 = HZ / 1000;
-/// So that echoes from 1 ms on are heard: the module's own blanking takes 2.38 ms.
+/// Settings for echoes from 1 ms on: the internal blanking takes 2.38 ms.
 const SHORT: Settings = Settings {
     window_ticks: 124_000,
     blanking: Blanking::Short { ticks: 1_000 },
@@ -15,15 +15,15 @@ const SHORT: Settings = Settings {
 };
 
 #[test]
-fn from_1_to_60_ms_at_every_phase_of_the_prescaler_within_a_tick() {
-    let mut bench = ready(commanded(&[]), SHORT);
+fn accurate_at_all_phases() {
+    let mut bench = ready(scripted(&[]), SHORT);
     bench.device.take_init_rises();
-    // Odd, so that the delays run through all eight phases of a tick.
+    // Odd, so that the delays cover all eight phases of a tick.
     let stride = 301;
     let (mut pings, mut phases, mut worst) = (0, [0_u32; 8], 0.0_f64);
     let mut after = MS;
     while after <= 60 * MS {
-        bench.device.set_surroundings(Box::new(commanded(&[after])));
+        bench.device.set_environment(Box::new(scripted(&[after])));
         let events = bench.perform(Command::Ping, 2.0).expect("pings");
         let reading = readings(&events)[0];
         assert_eq!(reading.echoes.len(), 1, "{after} cycles: {reading:?}");
@@ -42,8 +42,8 @@ fn from_1_to_60_ms_at_every_phase_of_the_prescaler_within_a_tick() {
 }
 
 #[test]
-fn the_time_of_firing_is_the_devices_own_time_of_init() {
-    let mut bench = ready(commanded(&[5 * MS]), SETTINGS);
+fn firing_time_matches_init() {
+    let mut bench = ready(scripted(&[5 * MS]), SETTINGS);
     bench.device.take_init_rises();
     let mut offsets = Vec::new();
     for _ in 0..50 {
@@ -51,17 +51,17 @@ fn the_time_of_firing_is_the_devices_own_time_of_init() {
         let rise = bench.device.take_init_rises()[0];
         let ticks = (rise / CYCLES_PER_TICK) as u32;
         offsets.push(readings(&events)[0].fired_ticks.wrapping_sub(ticks) as i32);
-        // Another place on the 16-bit counter each time, its turns included.
+        // Another value of the 16-bit counter each time, including wraps.
         bench.run(0.000_7 * f64::from(offsets.len() as u32)).expect("waits");
     }
     assert!(offsets.iter().all(|&offset| offset == offsets[0]), "{offsets:?}");
 }
 
 #[test]
-fn every_place_of_the_counter_fires_once() {
-    // Firing near a wrap of the 16-bit counter is where a compare unit could be seen twice.
+fn fires_once_at_any_count() {
+    // Near a wrap of the 16-bit counter a compare unit might match twice.
     let quick = Settings { window_ticks: 2_000, ..SHORT };
-    let mut bench = ready(commanded(&[MS / 2 + 100]), quick);
+    let mut bench = ready(scripted(&[MS / 2 + 100]), quick);
     bench.device.take_init_rises();
     let mut near_wrap = 0;
     for _ in 0..2_000 {
@@ -71,20 +71,20 @@ fn every_place_of_the_counter_fires_once() {
         let place = rises[0] / CYCLES_PER_TICK % 65_536;
         near_wrap += u32::from(!(600..64_936).contains(&place));
     }
-    assert!(near_wrap > 0, "some of them near the wrap");
+    assert!(near_wrap > 0, "no firing near the wrap");
 }
 
 #[test]
-fn several_echoes_come_within_two_ticks() {
+fn multiple_echoes_accurate() {
     let many = Settings { max_echoes: 8, ..SHORT };
-    let mut bench = ready(commanded(&[]), many);
+    let mut bench = ready(scripted(&[]), many);
     let mut worst = 0.0_f64;
     for round in 0..200_u64 {
-        // Further apart than BLNK takes, at phases that change.
+        // Further apart than the BLNK pulse, at varying phases.
         let echoes: Vec<u64> = (0..8)
             .map(|k| 2 * MS + round * 1_003 + k * (MS + 37 * round) + (round * k) % 8)
             .collect();
-        bench.device.set_surroundings(Box::new(commanded(&echoes)));
+        bench.device.set_environment(Box::new(scripted(&echoes)));
         let events = bench.perform(Command::Ping, 2.0).expect("pings");
         let reading = readings(&events)[0];
         assert_eq!(reading.echoes.len(), 8, "{echoes:?}: {reading:?}");
@@ -98,20 +98,20 @@ fn several_echoes_come_within_two_ticks() {
 }
 
 #[test]
-fn only_as_many_echoes_as_asked_for_and_none_behind_the_window() {
+fn limits_echoes_and_window() {
     let two = Settings { max_echoes: 2, ..SETTINGS };
-    let mut bench = ready(commanded(&[4 * MS, 6 * MS, 8 * MS]), two);
+    let mut bench = ready(scripted(&[4 * MS, 6 * MS, 8 * MS]), two);
     let events = bench.perform(Command::Ping, 2.0).expect("pings");
     assert_eq!(readings(&events)[0].echoes[..], [8_000, 12_000]);
     // The window is 24 ms.
-    bench.device.set_surroundings(Box::new(commanded(&[25 * MS])));
+    bench.device.set_environment(Box::new(scripted(&[25 * MS])));
     let events = bench.perform(Command::Ping, 2.0).expect("pings");
     assert_eq!(readings(&events)[0].status, ReadingStatus::NoEcho);
 }
 
 #[test]
-fn internal_blanking_keeps_the_module_deaf_and_a_short_one_does_not() {
-    let near = commanded(&[MS + MS / 2]);
+fn short_blanking() {
+    let near = scripted(&[MS + MS / 2]);
     let mut bench = ready(near.clone(), SETTINGS);
     let events = bench.perform(Command::Ping, 2.0).expect("pings");
     assert_eq!(readings(&events)[0].status, ReadingStatus::NoEcho);
@@ -121,11 +121,11 @@ fn internal_blanking_keeps_the_module_deaf_and_a_short_one_does_not() {
 }
 
 #[test]
-fn a_module_whose_echo_hangs_high_is_not_fired() {
-    let mut bench = ready(commanded(&[5 * MS]), SETTINGS);
+fn stuck_echo_is_module_fault() {
+    let mut bench = ready(scripted(&[5 * MS]), SETTINGS);
     bench.device.take_init_rises();
     bench.device.stick_echo(true);
-    let events = bench.perform(Command::Ping, 2.0).expect("is told");
+    let events = bench.perform(Command::Ping, 2.0).expect("reports a module fault");
     assert_eq!(readings(&events)[0].status, ReadingStatus::ModuleFault);
     assert!(bench.device.take_init_rises().is_empty());
     bench.device.stick_echo(false);

@@ -1,5 +1,5 @@
-//! The board as its machine code makes it. One test binary: its tests run beside each other, and
-//! all of it is linked once.
+//! Tests of the board's machine code. A single test binary: its tests run in parallel, and
+//! everything is linked once.
 
 mod common;
 mod conformance;

@@ -1,18 +1,18 @@
-//! Flash and memory of the firmware against its limits, with the stack as deep as it gets.
+//! Flash and memory of the firmware compared with their limits, at the maximum depth of the stack.
 
 use std::process::Command as Process;
 
-use crate::common::{SETTINGS, commanded, elf, ready};
+use crate::common::{SETTINGS, elf, ready, scripted};
 use firmware_protocol::host::Command;
 use firmware_protocol::messages::{Blanking, Settings, Sweep};
 use rand::{Rng as _, SeedableRng as _};
 use sonard_emulator::HZ;
 
-/// Half of what the chip has, so that there is room for what comes.
+/// Half of the chip's flash, to leave room for extensions.
 const FLASH_MAX: u32 = 16 * 1024;
 const MEMORY_MAX: usize = 1_200;
 
-/// Bytes of text, data and bss.
+/// Sizes of text, data and bss, bytes.
 fn sizes() -> (u32, u32, u32) {
     let output = Process::new("avr-size").arg(elf()).output().expect("avr-size (binutils-avr)");
     let text = String::from_utf8(output.stdout).expect("text");
@@ -27,7 +27,7 @@ fn sizes() -> (u32, u32, u32) {
     (fields[0], fields[1], fields[2])
 }
 
-/// Everything that goes deep, at once: a sweep with eight echoes, resends, noise on the line.
+/// Combines everything that uses the stack: a sweep with eight echoes, resends, noise on the line.
 fn deepest_stack() -> usize {
     let many = Settings {
         max_echoes: 8,
@@ -37,7 +37,7 @@ fn deepest_stack() -> usize {
         ..SETTINGS
     };
     let echoes: Vec<u64> = (2..10).map(|ms| ms * HZ / 1000).collect();
-    let mut bench = ready(commanded(&echoes), many);
+    let mut bench = ready(scripted(&echoes), many);
     let plan =
         Sweep { sweep: 1, first_step: 0, stride: 9, stops: 60, pings_per_stop: 2, lease_ms: 2_000 };
     let mut random = rand_pcg::Pcg64::seed_from_u64(3);
@@ -56,7 +56,7 @@ fn deepest_stack() -> usize {
 }
 
 #[test]
-fn flash_and_memory_are_within_their_limits() {
+fn flash_and_memory_within_limits() {
     let (text, data, bss) = sizes();
     let flash = text + data;
     let fixed = (data + bss) as usize;

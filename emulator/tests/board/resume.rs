@@ -1,10 +1,10 @@
-//! The real scanner on the emulated board, through a pty and at the pace of the wall clock: a
-//! supply that sags in the middle of a sweep costs time, but no beam.
+//! Real scanner on the emulated board, through a pty in real time. A supply dip during a sweep
+//! costs time, but no beam.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use crate::common::{SETTINGS, commanded, config, elf};
+use crate::common::{SETTINGS, config, elf, scripted};
 use firmware_protocol::host::HostConfig;
 use firmware_protocol::messages::Settings;
 use sonard_device::{
@@ -19,16 +19,16 @@ const MS: u64 = HZ / 1000;
 const BEAMS: u32 = 60;
 
 #[derive(Default)]
-struct Kept(Vec<Record>);
+struct Records(Vec<Record>);
 
-impl Sink for Kept {
+impl Sink for Records {
     fn record(&mut self, record: &Record) -> Result<(), SinkError> {
         self.0.push(record.clone());
         Ok(())
     }
 }
 
-/// A scan of [`BEAMS`] beams on a board whose supply sags at these firings.
+/// Scan of [`BEAMS`] beams on a board whose supply dips at the given firings.
 fn scan(dips_at: &[usize]) -> (ScanSummary, Vec<Record>) {
     let pty = Pty::open(None).expect("a pty");
     let port = pty.path().display().to_string();
@@ -36,7 +36,7 @@ fn scan(dips_at: &[usize]) -> (ScanSummary, Vec<Record>) {
     let (stopped, dips_at) = (Arc::clone(&stop), dips_at.to_vec());
     let board = std::thread::spawn(move || {
         let mut emulator =
-            Emulator::new(&elf(), &config(), Box::new(commanded(&[5 * MS]))).expect("a firmware");
+            Emulator::new(&elf(), &config(), Box::new(scripted(&[5 * MS]))).expect("a firmware");
         let mut fired = 0;
         let mut dips = dips_at.iter().copied().peekable();
         serve(&mut emulator, &pty, &stopped, |emulator| {
@@ -45,16 +45,16 @@ fn scan(dips_at: &[usize]) -> (ScanSummary, Vec<Record>) {
                 emulator.dip(20);
             }
         })
-        .expect("plays");
+        .expect("serves");
     });
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build();
-    let taken = runtime.expect("a runtime").block_on(take(&port));
+    let result = runtime.expect("a runtime").block_on(record_scan(&port));
     stop.store(true, Ordering::Relaxed);
-    board.join().expect("the board plays to its end");
-    taken
+    board.join().expect("the board runs to its end");
+    result
 }
 
-async fn take(port: &str) -> (ScanSummary, Vec<Record>) {
+async fn record_scan(port: &str) -> (ScanSummary, Vec<Record>) {
     let line = link::open(port).expect("opens");
     let config = HostConfig { max_attempts: 7, ..HostConfig::new(link::BAUD, 1) };
     let mut ranger = Ranger::meet(Driver::new(line, config)).await.expect("answers");
@@ -68,13 +68,13 @@ async fn take(port: &str) -> (ScanSummary, Vec<Record>) {
         blanking_us: 2_380.0,
         predictions: Vec::new(),
     };
-    let mut kept = Kept::default();
-    let summary = ranger.scan(&job, &mut kept, std::future::pending()).await.expect("scans");
-    (summary, kept.0)
+    let mut records = Records::default();
+    let summary = ranger.scan(&job, &mut records, std::future::pending()).await.expect("scans");
+    (summary, records.0)
 }
 
 #[test]
-fn a_dip_in_a_sweep_is_noticed_marked_and_made_good() {
+fn dip_loses_no_beam() {
     let (summary, records) = scan(&[20, 35]);
     assert_eq!(summary.restarts, 2);
     assert_eq!((summary.end.beams, summary.end.missing), (BEAMS, 0));
@@ -100,11 +100,11 @@ fn a_dip_in_a_sweep_is_noticed_marked_and_made_good() {
     let resumed = marks(EventKind::Reconnected);
     assert_eq!(resumed.len(), 2, "{records:?}");
     assert!(resumed.iter().all(|detail| detail.contains("BrownOut")), "{resumed:?}");
-    assert_eq!(summary.end.home_drift_steps, Some(0), "it went home after each restart");
+    assert_eq!(summary.end.home_drift_steps, Some(0), "homed after each restart");
 }
 
 #[test]
-fn without_a_dip_nothing_is_marked() {
+fn no_events_without_dip() {
     let (summary, records) = scan(&[]);
     assert_eq!((summary.restarts, summary.end.beams), (0, BEAMS));
     assert!(!records.iter().any(|record| matches!(record, Record::Event(_))));

@@ -1,6 +1,6 @@
-//! What happens when something goes wrong: on the line, with the host, with the chip.
+//! Behaviour on faults of the line, the host and the chip.
 
-use crate::common::{SETTINGS, commanded, readings, ready};
+use crate::common::{SETTINGS, readings, ready, scripted};
 use firmware_protocol::host::{Command, HostError, HostEvent, Outcome};
 use firmware_protocol::messages::{FaultKind, ResetCause, Settings, Status, Sweep};
 use rand::{Rng as _, RngExt as _, SeedableRng as _};
@@ -17,16 +17,16 @@ const LONG: Sweep = Sweep {
     lease_ms: LEASE_MS,
 };
 
-/// In the middle of a sweep.
+/// Bench in the middle of a sweep.
 fn sweeping() -> Bench {
-    let mut bench = ready(commanded(&[5 * MS]), SETTINGS);
+    let mut bench = ready(scripted(&[5 * MS]), SETTINGS);
     bench.start(Command::Sweep(LONG)).expect("begins");
     bench.run(1.0).expect("sweeps");
     assert!(readings(bench.events()).len() > 10);
     bench
 }
 
-/// No firing and no current from now on.
+/// Asserts that from now on there is neither firing nor coil current.
 fn assert_safe(bench: &mut Bench) {
     assert!(!bench.device.is_firing());
     assert!(!bench.device.holds_coils());
@@ -57,10 +57,10 @@ fn reset_cause(bench: &mut Bench) -> ResetCause {
 }
 
 #[test]
-fn noise_at_line_speed_for_a_minute_never_wedges_it() {
+fn survives_a_minute_of_noise() {
     let mut random = rand_pcg::Pcg64::seed_from_u64(9);
-    let mut bench = ready(commanded(&[5 * MS]), SETTINGS);
-    // Frames to damage: what the host says to begin a sweep, caught on the line.
+    let mut bench = ready(scripted(&[5 * MS]), SETTINGS);
+    // A frame to damage: a request of the host, captured from the line.
     bench.host.start(bench.device.now_us(), Command::Status).expect("begins");
     let frame = bench.host.poll_transmit().expect("a frame").to_vec();
     bench.device.send(&frame);
@@ -70,11 +70,11 @@ fn noise_at_line_speed_for_a_minute_never_wedges_it() {
         let mut bytes = Vec::new();
         while bytes.len() < 10_000 {
             match (second + random.random_range(0..6)) % 6 {
-                // Anything, with and without delimiters.
+                // Random bytes, with and without delimiters.
                 0 => bytes.extend((0..200).map(|_| random.random::<u8>())),
                 1 => bytes.extend((0..300).map(|_| random.random_range(1..=255_u8))),
                 2 => bytes.extend([0; 50]),
-                // A right frame, cut, changed, and again and again as it was.
+                // A valid frame, truncated, altered, and repeated unchanged.
                 3 => bytes.extend(&frame[..random.random_range(0..frame.len())]),
                 4 => {
                     let mut changed = frame.clone();
@@ -93,7 +93,8 @@ fn noise_at_line_speed_for_a_minute_never_wedges_it() {
         }
         assert!(bench.device.take_init_rises().is_empty(), "noise fired it");
         if second % 10 == 9 {
-            // A frame of noise may still be open: its end is lost, the next frame is right.
+            // A frame of noise may still be incomplete: it is terminated first, so the next frame
+            // is valid.
             bench.device.send(&[0]);
             bench.device.run(10 * MS).expect("runs");
             bench.device.received();
@@ -103,13 +104,13 @@ fn noise_at_line_speed_for_a_minute_never_wedges_it() {
             assert!(took_us < 20_000, "answered Identify after {took_us} us");
         }
     }
-    let events = bench.perform(Command::Ping, 2.0).expect("works as ever");
+    let events = bench.perform(Command::Ping, 2.0).expect("pings");
     assert_eq!(readings(&events)[0].echoes[..], [10_000]);
 }
 
 #[test]
-fn a_sweep_goes_on_through_noise_between_its_frames() {
-    let mut bench = ready(commanded(&[5 * MS]), SETTINGS);
+fn sweep_survives_noise() {
+    let mut bench = ready(scripted(&[5 * MS]), SETTINGS);
     let mut random = rand_pcg::Pcg64::seed_from_u64(2);
     bench.start(Command::Sweep(Sweep { stops: 100, ..LONG })).expect("begins");
     for _ in 0..200 {
@@ -126,13 +127,14 @@ fn a_sweep_goes_on_through_noise_between_its_frames() {
 }
 
 #[test]
-fn a_dead_host_ends_the_firing_within_the_lease() {
+fn lease_stops_firing() {
     let mut bench = sweeping();
     bench.device.take_init_rises();
     let died = bench.device.cycle();
     bench.alive = false;
     bench.run(2.0).expect("runs");
-    let last = bench.device.take_init_rises().last().copied().expect("it went on for a while");
+    let last =
+        bench.device.take_init_rises().last().copied().expect("fires until the lease expires");
     let lease = u64::from(LEASE_MS) * MS;
     assert!(last > died && last - died <= lease, "{} ms", (last - died) / MS);
     assert_safe(&mut bench);
@@ -143,8 +145,8 @@ fn a_dead_host_ends_the_firing_within_the_lease() {
 }
 
 #[test]
-fn a_reset_in_the_middle_is_noticed_and_the_device_can_be_used_again() {
-    for (cause, told) in
+fn detects_reset_during_sweep() {
+    for (cause, reported) in
         [(Reset::External, ResetCause::External), (Reset::BrownOut, ResetCause::BrownOut)]
     {
         let mut bench = sweeping();
@@ -155,15 +157,15 @@ fn a_reset_in_the_middle_is_noticed_and_the_device_can_be_used_again() {
         let new = old + 1;
         assert!(bench.events().contains(&HostEvent::Rebooted { old, new }), "{cause:?}");
         assert_eq!(bench.take_events(), Err(BenchError::Host(HostError::Rebooted)));
-        assert_eq!(reset_cause(&mut bench), told);
+        assert_eq!(reset_cause(&mut bench), reported);
         for command in [Command::Configure(SETTINGS), Command::Home, Command::Ping] {
-            bench.perform(command, 20.0).expect("goes on");
+            bench.perform(command, 20.0).expect("continues");
         }
     }
 }
 
 #[test]
-fn a_firmware_that_hangs_is_restarted_by_the_watchdog() {
+fn watchdog_restarts_hang() {
     let mut bench = sweeping();
     bench.device.hang();
     bench.alive = false;
@@ -176,8 +178,8 @@ fn a_firmware_that_hangs_is_restarted_by_the_watchdog() {
 }
 
 #[test]
-fn a_restart_on_request_says_so_and_every_boot_has_its_own_number() {
-    let mut bench = ready(commanded(&[]), SETTINGS);
+fn boot_numbers_are_unique() {
+    let mut bench = ready(scripted(&[]), SETTINGS);
     let mut boots = vec![bench.host.identity().expect("known").boot];
     for _ in 0..40 {
         bench.perform(Command::Reset, 5.0).expect("restarts");
@@ -188,7 +190,7 @@ fn a_restart_on_request_says_so_and_every_boot_has_its_own_number() {
 }
 
 #[test]
-fn the_emergency_stop_ends_everything_at_once_and_keeps_it_so() {
+fn emergency_stop() {
     for wait_s in [0.0, 0.003, 0.013, 0.017, 0.023] {
         let mut bench = sweeping();
         bench.run(wait_s).expect("runs");
@@ -208,8 +210,8 @@ fn the_emergency_stop_ends_everything_at_once_and_keeps_it_so() {
 }
 
 #[test]
-fn idle_coils_are_released_after_silence() {
-    let mut bench = ready(commanded(&[]), Settings { hold_s: 2, ..SETTINGS });
+fn releases_idle_coils() {
+    let mut bench = ready(scripted(&[]), Settings { hold_s: 2, ..SETTINGS });
     bench.run(1.5).expect("runs");
     assert!(bench.device.holds_coils());
     bench.run(1.0).expect("runs");

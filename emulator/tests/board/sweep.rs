@@ -1,4 +1,4 @@
-//! Whole sweeps over the emulated line, with the real host machine.
+//! Complete sweeps over the emulated line, with the real host machine.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -17,7 +17,7 @@ use sonard_model::{
 
 fn world() -> World {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenes/simple-room.json");
-    let scene = Scene::from_json(&std::fs::read_to_string(path).expect("a scene")).expect("right");
+    let scene = Scene::from_json(&std::fs::read_to_string(path).expect("a scene")).expect("valid");
     let pose = scene.pose("fig9").expect("a pose");
     let sensor = Sensor::preset("senscomp-6500").expect("a sensor");
     let simulator = Simulator::new(
@@ -34,12 +34,12 @@ fn world() -> World {
 const PLAN: Sweep =
     Sweep { sweep: 1, first_step: 0, stride: 1, stops: 400, pings_per_stop: 1, lease_ms: 2_000 };
 
-/// Four metres there and back at 343.4 m/s, and 5 ms of rest.
+/// Settings for a range of four metres at 343.4 m/s, and a settling time of 5 ms.
 const FOUR_METRES: Settings =
     Settings { window_ticks: 46_600, settle_ticks: 10_000, max_echoes: 3, ..SETTINGS };
 
 #[test]
-fn a_sweep_of_400_beams_takes_what_physics_takes() {
+fn duration_is_near_minimum() {
     let mut bench = ready(world(), FOUR_METRES);
     bench.device.take_init_rises();
     let before = bench.bytes;
@@ -47,7 +47,7 @@ fn a_sweep_of_400_beams_takes_what_physics_takes() {
     let mut readings = readings(&events);
     readings.sort_by_key(|reading| reading.index);
     assert_eq!(readings.len(), 400);
-    assert_eq!(bench.device.take_init_rises().len(), 400, "one firing for a beam");
+    assert_eq!(bench.device.take_init_rises().len(), 400, "one firing per beam");
     let (first, last) = (readings[0], readings[399]);
     let span = last.fired_ticks.wrapping_sub(first.fired_ticks) + FOUR_METRES.window_ticks;
     let duration_s = f64::from(span) / f64::from(TICK_HZ);
@@ -56,15 +56,15 @@ fn a_sweep_of_400_beams_takes_what_physics_takes() {
     println!("{duration_s:.4} s, limit {limit:.4} s, ratio {:.4}", duration_s / limit);
     println!("{to_device} bytes to the device, {from_device} from it");
     assert!(duration_s <= 1.02 * limit, "{duration_s} s, limit {limit} s");
-    assert!(duration_s >= limit, "{duration_s} s is less than there can be: {limit} s");
+    assert!(duration_s >= limit, "{duration_s} s is less than the minimum of {limit} s");
 }
 
 #[test]
-fn every_reading_is_what_the_world_says_for_its_step() {
+fn readings_match_world() {
     let mut bench = ready(world(), FOUR_METRES);
     let events = bench.perform(Command::Sweep(PLAN), 60.0).expect("sweeps");
     let mut world = world();
-    let mut heard = 0;
+    let mut detected = 0;
     let mut readings = readings(&events);
     readings.sort_by_key(|reading| reading.index);
     for reading in readings {
@@ -75,9 +75,9 @@ fn every_reading_is_what_the_world_says_for_its_step() {
         if let Some(first) = first {
             assert!(reading.echoes[0].abs_diff(*first) <= 1, "{reading:?} {expected:?}");
             assert_eq!(reading.status, ReadingStatus::Echo);
-            heard += 1;
+            detected += 1;
         }
         world.turn(1);
     }
-    assert!(heard > 300, "{heard} beams heard something");
+    assert!(detected > 300, "{detected} beams with an echo");
 }

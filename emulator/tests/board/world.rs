@@ -1,18 +1,18 @@
-//! The world around the chip: a motor with limits, and a supply that sags.
+//! Environment of the chip: a motor with limits, and supply dips.
 
-use crate::common::{SETTINGS, commanded, readings, ready};
+use crate::common::{SETTINGS, readings, ready, scripted};
 use firmware_protocol::host::{Command, HostError, HostEvent, Outcome};
 use firmware_protocol::messages::{ResetCause, Settings, Sweep};
 use sonard_emulator::{Bench, BenchError, HZ, MotorLimits};
 
 const MS: u64 = HZ / 1000;
 
-/// Nearly three turns at such a speed, and then home: how many steps the motor was off.
-fn drift_after_a_turn(speed: u16, acceleration: u32) -> i32 {
-    let mut bench = ready(commanded(&[]), Settings { speed, acceleration, ..SETTINGS });
+/// Drift in steps measured by homing after nearly three revolutions with the given profile.
+fn drift_after_move(speed: u16, acceleration: u32) -> i32 {
+    let mut bench = ready(scripted(&[]), Settings { speed, acceleration, ..SETTINGS });
     bench.device.set_motor(Some(MotorLimits::typical()));
-    bench.perform(Command::MoveTo { step: 1_150 }, 20.0).expect("moves, as far as it knows");
-    // Slowly, so that the search itself misses nothing.
+    bench.perform(Command::MoveTo { step: 1_150 }, 20.0).expect("reports the target");
+    // Slowly, so that the search itself misses no steps.
     bench.perform(Command::Configure(SETTINGS), 2.0).expect("is set");
     let events = bench.perform(Command::Home, 20.0).expect("homes");
     let drift = events.iter().find_map(|event| match event {
@@ -23,20 +23,20 @@ fn drift_after_a_turn(speed: u16, acceleration: u32) -> i32 {
 }
 
 #[test]
-fn a_motor_within_its_torque_misses_nothing_and_beyond_it_home_tells() {
+fn drift_beyond_torque() {
     for (speed, acceleration) in [(800, 40_000), (2_000, 40_000), (4_000, 20_000)] {
-        assert_eq!(drift_after_a_turn(speed, acceleration), 0, "{speed} {acceleration}");
+        assert_eq!(drift_after_move(speed, acceleration), 0, "{speed} {acceleration}");
     }
     for (speed, acceleration) in [(6_000, 150_000), (10_000, 200_000)] {
-        let drift = drift_after_a_turn(speed, acceleration);
+        let drift = drift_after_move(speed, acceleration);
         assert_ne!(drift, 0, "{speed} {acceleration}");
         assert_eq!(drift % 4, 0, "{speed} {acceleration}: {drift}");
     }
 }
 
 #[test]
-fn every_run_is_the_same() {
-    assert_eq!(drift_after_a_turn(10_000, 200_000), drift_after_a_turn(10_000, 200_000));
+fn runs_are_deterministic() {
+    assert_eq!(drift_after_move(10_000, 200_000), drift_after_move(10_000, 200_000));
 }
 
 fn cause(bench: &mut Bench) -> ResetCause {
@@ -45,9 +45,9 @@ fn cause(bench: &mut Bench) -> ResetCause {
 }
 
 #[test]
-fn a_dip_of_the_supply_restarts_it_with_another_number_and_its_cause() {
+fn dip_restarts_with_cause() {
     for milliseconds in [1, 20, 700] {
-        let mut bench = ready(commanded(&[5 * MS]), SETTINGS);
+        let mut bench = ready(scripted(&[5 * MS]), SETTINGS);
         let old = bench.host.identity().expect("known").boot;
         let plan = Sweep {
             sweep: 1,
@@ -69,7 +69,7 @@ fn a_dip_of_the_supply_restarts_it_with_another_number_and_its_cause() {
         assert_eq!(cause(&mut bench), ResetCause::BrownOut);
         assert_ne!(bench.host.identity().expect("known").boot, old);
         for command in [Command::Configure(SETTINGS), Command::Home, Command::Ping] {
-            bench.perform(command, 20.0).expect("goes on");
+            bench.perform(command, 20.0).expect("continues");
         }
     }
 }

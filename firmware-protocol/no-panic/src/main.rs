@@ -1,6 +1,5 @@
-//! Calls every verb of the device machine. If one of them could panic, the panic handler would
-//! stay in the program, and linking would fail for the function that it calls and nobody
-//! defines.
+//! Program that calls every method of the device machine. If any of them could panic, the panic
+//! handler would remain in the program, and linking would fail because its callee is undefined.
 #![no_std]
 #![no_main]
 
@@ -22,7 +21,7 @@ fn panic(_: &PanicInfo<'_>) -> ! {
     unsafe { the_device_machine_can_panic() }
 }
 
-/// Where a program without a runtime begins.
+/// Entry point of a program without a runtime.
 #[unsafe(no_mangle)]
 pub extern "C" fn _start() -> ! {
     let mut device = Device::new(black_box(Board {

@@ -1,4 +1,4 @@
-//! A board and the real host machine, joined by a line, in the board's own time.
+//! Board and real host machine, connected by a line, in the board's own time.
 
 extern crate std;
 
@@ -8,33 +8,34 @@ use std::vec::Vec;
 use super::DeviceUnderTest;
 use crate::host::{Command, Host, HostConfig, HostError, HostEvent, StartError};
 
-/// How often the host looks at its line: as an operating system would hand bytes over.
-const LOOK_US: u64 = 200;
+/// Interval at which the host polls its line, like an operating system that delivers bytes in
+/// blocks.
+const POLL_US: u64 = 200;
 
-/// A board and a host.
+/// Board connected to a host.
 #[derive(Debug)]
 pub struct Bench<D> {
-    /// The board.
+    /// Board under test.
     pub device: D,
-    /// The host.
+    /// Host machine connected to the board.
     pub host: Host,
-    /// Whether the host is alive; a dead one neither sends nor hears.
+    /// `false` for a host that neither sends nor receives.
     pub alive: bool,
-    /// Bytes that went over the line, to the device and from it.
+    /// Bytes transferred to the device and from the device.
     pub bytes: (u64, u64),
     events: Vec<HostEvent>,
 }
 
-/// A command that did not finish.
+/// Failure of a command on the bench.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum BenchError<E> {
-    /// It was not begun.
+    /// The host machine did not start the command.
     NotStarted(StartError),
-    /// The host gave up.
+    /// The command failed on the host.
     Host(HostError),
     /// The board crashed.
     Device(E),
-    /// Nothing came of it in the time given.
+    /// The command did not end within the time limit.
     TimedOut,
 }
 
@@ -52,17 +53,18 @@ impl<E: fmt::Debug> fmt::Display for BenchError<E> {
 impl<E: fmt::Debug> core::error::Error for BenchError<E> {}
 
 impl<D: DeviceUnderTest> Bench<D> {
-    /// A bench with a host that knows nothing; the board has just got its power.
+    /// Creates a bench with a new host; the board has just been powered on.
     #[must_use]
     pub fn new(device: D) -> Self {
         let host = Host::new(HostConfig::new(115_200, 1));
         Self { device, host, alive: true, bytes: (0, 0), events: Vec::new() }
     }
 
-    /// Begins a command, and gives the events up to its end.
+    /// Runs a command and returns the events up to its end.
     ///
     /// # Errors
-    /// When it fails, or has not ended after `limit_s` seconds of device time.
+    /// Returns an error if the command fails, or has not ended after `limit_s` seconds of device
+    /// time.
     pub fn perform(
         &mut self,
         command: Command,
@@ -74,36 +76,36 @@ impl<D: DeviceUnderTest> Bench<D> {
             if self.device.now_us() > end_us {
                 return Err(BenchError::TimedOut);
             }
-            self.turn()?;
+            self.poll_once()?;
         }
         self.take_events()
     }
 
-    /// Begins a command.
+    /// Starts a command.
     ///
     /// # Errors
-    /// When the host machine refuses it.
+    /// Returns an error if the host machine rejects the command.
     pub fn start(&mut self, command: Command) -> Result<(), BenchError<D::Error>> {
         self.events.clear();
         self.host.start(self.device.now_us(), command).map_err(BenchError::NotStarted)
     }
 
-    /// Lets so much device time pass.
+    /// Advances the device time by `seconds`.
     ///
     /// # Errors
-    /// When the board crashes.
+    /// Returns an error if the board crashes.
     pub fn run(&mut self, seconds: f64) -> Result<(), BenchError<D::Error>> {
         let end_us = self.device.now_us() + us(seconds);
         while self.device.now_us() < end_us {
-            self.turn()?;
+            self.poll_once()?;
         }
         Ok(())
     }
 
-    /// The events so far.
+    /// Returns the events so far and clears them.
     ///
     /// # Errors
-    /// When one of them is a failure.
+    /// Returns an error if one of the events is a failure.
     pub fn take_events(&mut self) -> Result<Vec<HostEvent>, BenchError<D::Error>> {
         let failed = self.events.iter().find_map(|event| match event {
             HostEvent::Failed(error) => Some(BenchError::Host(*error)),
@@ -115,19 +117,19 @@ impl<D: DeviceUnderTest> Bench<D> {
         }
     }
 
-    /// What happened so far, failures included.
+    /// Returns the events so far, including failures.
     #[must_use]
     pub fn events(&self) -> &[HostEvent] {
         &self.events
     }
 
-    fn turn(&mut self) -> Result<(), BenchError<D::Error>> {
+    fn poll_once(&mut self) -> Result<(), BenchError<D::Error>> {
         let now_us = self.device.now_us();
-        let said = self.device.receive();
+        let received = self.device.receive();
         if self.alive {
-            if !said.is_empty() {
-                self.bytes.1 += said.len() as u64;
-                self.host.handle_bytes(now_us, &said);
+            if !received.is_empty() {
+                self.bytes.1 += received.len() as u64;
+                self.host.handle_bytes(now_us, &received);
             }
             if self.host.poll_timeout().is_some_and(|(_, at_us)| at_us <= now_us) {
                 self.host.handle_timeout(now_us);
@@ -138,7 +140,7 @@ impl<D: DeviceUnderTest> Bench<D> {
             }
             self.events.extend(core::iter::from_fn(|| self.host.poll_event()));
         }
-        self.device.run(LOOK_US).map_err(BenchError::Device)
+        self.device.run(POLL_US).map_err(BenchError::Device)
     }
 }
 

@@ -1,4 +1,4 @@
-//! The scenarios, each on a bench of its own. They panic where a board does wrong.
+//! Test scenarios, each on a bench of its own. They panic if the board violates the protocol.
 #![expect(clippy::missing_panics_doc, reason = "panicking is what a test is for")]
 
 extern crate std;
@@ -15,7 +15,7 @@ use crate::messages::{
     Settings, Sweep,
 };
 
-/// 24 ms of listening, 2 ms of rest.
+/// Settings with a window of 24 ms and a settling time of 2 ms.
 pub const SETTINGS: Settings = Settings {
     window_ticks: 48_000,
     min_interval_ticks: 0,
@@ -28,13 +28,11 @@ pub const SETTINGS: Settings = Settings {
 };
 const SWEEP: Sweep =
     Sweep { sweep: 1, first_step: 0, stride: 1, stops: 40, pings_per_stop: 1, lease_ms: 500 };
-/// Time to boot.
+/// Time allowed for booting, s.
 pub(super) const BOOT_S: f64 = 0.1;
 
-/// Identity comes unasked after power-on, and again for each Identify.
-pub fn it_announces_itself_once_and_answers_identify_at_once(
-    mut bench: Bench<impl DeviceUnderTest>,
-) {
+/// The board sends its Identity after power-on, and again for each Identify.
+pub fn announces_and_identifies(mut bench: Bench<impl DeviceUnderTest>) {
     bench.device.run(100_000).expect("boots");
     let announced = replies(&bench.device.receive());
     let [(_, Reply::Identity(identity))] = announced[..] else {
@@ -43,25 +41,25 @@ pub fn it_announces_itself_once_and_answers_identify_at_once(
     assert_ne!(identity.boot, 0);
     assert_eq!(identity.tick_hz, crate::messages::limits::TICK_HZ);
     assert!(identity.steps_per_revolution > 0);
-    let asked_us = bench.device.now_us();
+    let sent_us = bench.device.now_us();
     bench.device.send(&frame(0, 0, &Request::Identify));
     bench.device.run(20_000).expect("runs");
-    assert!(bench.device.now_us() - asked_us < 40_000);
+    assert!(bench.device.now_us() - sent_us < 40_000);
     let answer = replies(&bench.device.receive());
     assert_eq!(answer.len(), 1, "{answer:?}");
     assert_eq!(answer[0].1, Reply::Identity(identity));
 }
 
-/// Settings before pings and homing, homing before moves and sweeps.
-pub fn what_must_come_first_must_come_first(mut bench: Bench<impl DeviceUnderTest>) {
+/// Configure is required before Ping and Home, and Home before MoveTo and Sweep.
+pub fn enforces_command_order(mut bench: Bench<impl DeviceUnderTest>) {
     let boot = identify(&mut bench).boot;
-    let ask = |bench: &mut Bench<_>, seq, request| answer(bench, boot, seq, &request);
+    let query = |bench: &mut Bench<_>, seq, request| answer(bench, boot, seq, &request);
     let refused = |reason| Reply::Nak { reason };
-    assert_eq!(ask(&mut bench, 1, Request::Ping), refused(NakReason::NotConfigured));
-    assert_eq!(ask(&mut bench, 2, Request::Home), refused(NakReason::NotConfigured));
-    assert_eq!(ask(&mut bench, 3, Request::Configure(SETTINGS)), Reply::Ack);
-    assert_eq!(ask(&mut bench, 4, Request::MoveTo { step: 3 }), refused(NakReason::NotHomed));
-    assert_eq!(ask(&mut bench, 5, Request::Sweep(SWEEP)), refused(NakReason::NotHomed));
+    assert_eq!(query(&mut bench, 1, Request::Ping), refused(NakReason::NotConfigured));
+    assert_eq!(query(&mut bench, 2, Request::Home), refused(NakReason::NotConfigured));
+    assert_eq!(query(&mut bench, 3, Request::Configure(SETTINGS)), Reply::Ack);
+    assert_eq!(query(&mut bench, 4, Request::MoveTo { step: 3 }), refused(NakReason::NotHomed));
+    assert_eq!(query(&mut bench, 5, Request::Sweep(SWEEP)), refused(NakReason::NotHomed));
     assert_eq!(answer(&mut bench, boot.wrapping_add(1), 6, &Request::Ping), {
         refused(NakReason::WrongBoot)
     });
@@ -69,8 +67,8 @@ pub fn what_must_come_first_must_come_first(mut bench: Bench<impl DeviceUnderTes
     assert_eq!(bench.device.motor_steps(), 0);
 }
 
-/// Each limit has its own reason.
-pub fn settings_beyond_the_limits_are_refused_by_name(mut bench: Bench<impl DeviceUnderTest>) {
+/// Each limit is rejected with its own reason.
+pub fn rejects_invalid_settings(mut bench: Bench<impl DeviceUnderTest>) {
     let boot = identify(&mut bench).boot;
     let wrong = [
         (Settings { window_ticks: 10, ..SETTINGS }, NakReason::WindowOutOfRange),
@@ -86,15 +84,19 @@ pub fn settings_beyond_the_limits_are_refused_by_name(mut bench: Bench<impl Devi
         (Settings { hold_s: u16::MAX, ..SETTINGS }, NakReason::HoldOutOfRange),
     ];
     for (seq, (settings, reason)) in (1..).zip(wrong) {
-        let told = answer(&mut bench, boot, seq, &Request::Configure(settings));
-        assert_eq!(told, Reply::Nak { reason }, "{settings:?}");
+        let reply = answer(&mut bench, boot, seq, &Request::Configure(settings));
+        assert_eq!(reply, Reply::Nak { reason }, "{settings:?}");
     }
-    let told = answer(&mut bench, boot, 20, &Request::Ping);
-    assert_eq!(told, Reply::Nak { reason: NakReason::NotConfigured }, "none of them was taken");
+    let reply = answer(&mut bench, boot, 20, &Request::Ping);
+    assert_eq!(
+        reply,
+        Reply::Nak { reason: NakReason::NotConfigured },
+        "none of the settings was accepted"
+    );
 }
 
-/// Times of flight over the module's whole range.
-pub fn an_echo_is_timed_from_the_rise_of_init(mut bench: Bench<impl DeviceUnderTest>) {
+/// Times of flight over the whole range of the module.
+pub fn times_echo_from_init(mut bench: Bench<impl DeviceUnderTest>) {
     ready(&mut bench, SETTINGS);
     bench.device.take_firings();
     for tenth in 26..200_u32 {
@@ -107,27 +109,27 @@ pub fn an_echo_is_timed_from_the_rise_of_init(mut bench: Bench<impl DeviceUnderT
     assert_eq!(bench.device.take_firings(), 174, "one firing for each ping");
 }
 
-/// Up to eight, in order; a board that can't is refused more than one.
-pub fn several_echoes_come_in_order_where_the_board_can_tell_them(
-    mut bench: Bench<impl DeviceUnderTest>,
-) {
+/// Up to eight echoes are reported in order; other boards reject more than one.
+pub fn reports_multiple_echoes(mut bench: Bench<impl DeviceUnderTest>) {
     let capabilities = ready(&mut bench, SETTINGS).capabilities;
-    let many = Command::Configure(Settings { max_echoes: 4, ..SETTINGS });
+    let multiple = Command::Configure(Settings { max_echoes: 4, ..SETTINGS });
     if !capabilities.has(Capabilities::MULTIPLE_ECHOES) {
-        let refused = bench.perform(many, 2.0).expect_err("is refused");
+        let refused = bench.perform(multiple, 2.0).expect_err("is refused");
         let reason = NakReason::EchoesOutOfRange;
-        assert!(matches!(refused, BenchError::Host(HostError::Refused(told)) if told == reason));
+        assert!(
+            matches!(refused, BenchError::Host(HostError::Refused(actual)) if actual == reason)
+        );
         return;
     }
-    bench.perform(many, 2.0).expect("is set");
+    bench.perform(multiple, 2.0).expect("is set");
     let echoes = [4_000.0, 6_500.5, 9_000.0, 15_000.5, 20_000.0];
     bench.device.set_echoes(&echoes);
     let reading = ping(&mut bench);
     assert_echoes(&bench, &reading, &echoes[..4]);
 }
 
-/// An echo that comes too late, and none at all.
-pub fn an_echo_behind_the_window_is_none(mut bench: Bench<impl DeviceUnderTest>) {
+/// An echo after the window, or none at all, is reported as no echo.
+pub fn ignores_echo_after_window(mut bench: Bench<impl DeviceUnderTest>) {
     ready(&mut bench, SETTINGS);
     for echoes in [&[25_000.0][..], &[]] {
         bench.device.set_echoes(echoes);
@@ -136,8 +138,8 @@ pub fn an_echo_behind_the_window_is_none(mut bench: Bench<impl DeviceUnderTest>)
     }
 }
 
-/// There and back, near and far.
-pub fn the_motor_turns_by_exactly_what_was_asked(mut bench: Bench<impl DeviceUnderTest>) {
+/// Moves in both directions, short and long.
+pub fn moves_exact_steps(mut bench: Bench<impl DeviceUnderTest>) {
     ready(&mut bench, SETTINGS);
     let home = bench.device.motor_steps();
     for step in [1, 0, -1, 2, 400, 399, -250, 17, 1_000, 0] {
@@ -149,8 +151,8 @@ pub fn the_motor_turns_by_exactly_what_was_asked(mut bench: Bench<impl DeviceUnd
     }
 }
 
-/// A sweep on its own, with two pings at each stop.
-pub fn a_sweep_fires_once_at_each_beam(mut bench: Bench<impl DeviceUnderTest>) {
+/// A sweep with two pings at each stop.
+pub fn sweep_fires_each_beam_once(mut bench: Bench<impl DeviceUnderTest>) {
     ready(&mut bench, SETTINGS);
     bench.device.set_echoes(&[5_000.0]);
     bench.device.take_firings();
@@ -168,14 +170,12 @@ pub fn a_sweep_fires_once_at_each_beam(mut bench: Bench<impl DeviceUnderTest>) {
     assert_eq!(bench.device.take_firings(), 24);
     assert_eq!(bench.device.motor_steps() - home, 10 - 33);
     let span = readings[23].fired_ticks.wrapping_sub(readings[0].fired_ticks);
-    // 23 windows, 11 moves of three steps and 11 rests; nothing else may take long.
+    // 23 windows, 11 moves of three steps and 11 settling times; nothing else may take long.
     assert!((1_150_000..2_600_000).contains(&span), "{span} ticks");
 }
 
-/// The reply of a Ping is lost; the host asks again, with the same bytes.
-pub fn a_repeated_request_is_answered_again_and_not_done_twice(
-    mut bench: Bench<impl DeviceUnderTest>,
-) {
+/// The reply to a Ping is lost, and the host repeats the request with the same bytes.
+pub fn repeated_request_runs_once(mut bench: Bench<impl DeviceUnderTest>) {
     let boot = identify(&mut bench).boot;
     assert_eq!(answer(&mut bench, boot, 1, &Request::Configure(SETTINGS)), Reply::Ack);
     bench.device.take_firings();
@@ -197,17 +197,17 @@ pub fn a_repeated_request_is_answered_again_and_not_done_twice(
     assert_eq!(bench.device.take_firings(), 1);
 }
 
-/// A number belongs to the request it came with first.
-pub fn the_same_number_on_another_request_is_refused(mut bench: Bench<impl DeviceUnderTest>) {
+/// A sequence number belongs to the first request that used it.
+pub fn rejects_reused_sequence(mut bench: Bench<impl DeviceUnderTest>) {
     let boot = identify(&mut bench).boot;
     assert_eq!(answer(&mut bench, boot, 1, &Request::Configure(SETTINGS)), Reply::Ack);
-    let told = answer(&mut bench, boot, 1, &Request::Ping);
-    assert_eq!(told, Reply::Nak { reason: NakReason::SequenceReused });
+    let reply = answer(&mut bench, boot, 1, &Request::Ping);
+    assert_eq!(reply, Reply::Nak { reason: NakReason::SequenceReused });
     assert_eq!(bench.device.take_firings(), 0);
 }
 
-/// Cut frames, changed frames, too many bytes without an end.
-pub fn after_noise_it_answers_at_once(mut bench: Bench<impl DeviceUnderTest>) {
+/// Truncated frames, altered frames, and too many bytes without a delimiter.
+pub fn recovers_after_noise(mut bench: Bench<impl DeviceUnderTest>) {
     let boot = identify(&mut bench).boot;
     let right = frame(boot, 1, &Request::Configure(SETTINGS));
     let mut changed = right.clone();
@@ -216,16 +216,16 @@ pub fn after_noise_it_answers_at_once(mut bench: Bench<impl DeviceUnderTest>) {
     for (seq, noise) in (10..).zip(noises) {
         bench.device.send(noise);
         bench.device.run(40_000).expect("runs");
-        // Whatever is still open ends here.
+        // Terminates the incomplete frame.
         bench.device.send(&[0]);
         bench.device.run(5_000).expect("runs");
         bench.device.receive();
-        let told = answer(&mut bench, boot, seq, &Request::Status);
-        assert!(matches!(told, Reply::StatusReport(_)), "{told:?}");
-        let Reply::StatusReport(status) = told else { continue };
-        assert!(!status.configured, "noise is no request");
+        let reply = answer(&mut bench, boot, seq, &Request::Status);
+        assert!(matches!(reply, Reply::StatusReport(_)), "{reply:?}");
+        let Reply::StatusReport(status) = reply else { continue };
+        assert!(!status.configured, "noise must not be read as a request");
     }
-    // The host machine takes over the numbering.
+    // The host machine continues the numbering.
     identify(&mut bench);
     let status = status(&mut bench);
     let damaged = status.dropped_checksum + status.dropped_stuffing;
@@ -233,8 +233,8 @@ pub fn after_noise_it_answers_at_once(mut bench: Bench<impl DeviceUnderTest>) {
     assert!(damaged >= 3 && flooded >= 1, "{status:?}");
 }
 
-/// For a while the host hears nothing: the device holds when its memory is full.
-pub fn readings_that_were_lost_are_told_again(mut bench: Bench<impl DeviceUnderTest>) {
+/// The host receives nothing for a while, and the device holds when its ring is full.
+pub fn resends_lost_readings(mut bench: Bench<impl DeviceUnderTest>) {
     ready(&mut bench, SETTINGS);
     bench.device.set_echoes(&[5_000.0]);
     bench.device.take_firings();
@@ -250,18 +250,18 @@ pub fn readings_that_were_lost_are_told_again(mut bench: Bench<impl DeviceUnderT
     indices.sort_unstable();
     assert_eq!(indices, (0..SWEEP.stops).collect::<Vec<_>>());
     let repaired = |event: &&HostEvent| matches!(event, HostEvent::Reading { repaired: true, .. });
-    assert!(events.iter().filter(repaired).count() > 5, "none had to be told again");
+    assert!(events.iter().filter(repaired).count() > 5, "no reading was resent");
     assert_eq!(bench.device.take_firings(), usize::from(SWEEP.stops));
 }
 
-/// The lease: no firing and no current after it.
-pub fn a_silent_host_ends_the_firing_within_the_lease(mut bench: Bench<impl DeviceUnderTest>) {
+/// After the lease there is neither firing nor current.
+pub fn lease_stops_firing(mut bench: Bench<impl DeviceUnderTest>) {
     ready(&mut bench, SETTINGS);
     bench.start(Command::Sweep(Sweep { stops: 2_000, ..SWEEP })).expect("begins");
     bench.run(0.3).expect("sweeps");
     bench.alive = false;
     bench.run(0.4).expect("runs");
-    assert!(bench.device.take_firings() > 5, "it goes on for a while");
+    assert!(bench.device.take_firings() > 5, "fires until the lease expires");
     bench.run(0.11).expect("runs");
     bench.device.take_firings();
     bench.run(1.0).expect("runs");
@@ -274,18 +274,18 @@ pub fn a_silent_host_ends_the_firing_within_the_lease(mut bench: Bench<impl Devi
     assert_eq!((status.fault, status.homed), (Some(FaultKind::LeaseExpired), false));
 }
 
-/// A stop in a move and in a sweep: the motor stands, and where it stands is known.
-pub fn a_stop_keeps_the_position(mut bench: Bench<impl DeviceUnderTest>) {
+/// Stop during a move and during a sweep: the motor comes to rest at a known position.
+pub fn stop_keeps_position(mut bench: Bench<impl DeviceUnderTest>) {
     ready(&mut bench, SETTINGS);
     let home = bench.device.motor_steps();
     bench.start(Command::MoveTo { step: 3_000 }).expect("begins");
     bench.run(0.5).expect("moves");
     bench.start(Command::Stop).expect("begins");
     bench.run(1.0).expect("stops");
-    let stood = bench.device.motor_steps() - home;
-    assert!((100..1_000).contains(&stood), "{stood} steps");
-    let told = status(&mut bench);
-    assert_eq!((i64::from(told.step), told.homed), (stood, true));
+    let stopped_at = bench.device.motor_steps() - home;
+    assert!((100..1_000).contains(&stopped_at), "{stopped_at} steps");
+    let report = status(&mut bench);
+    assert_eq!((i64::from(report.step), report.homed), (stopped_at, true));
     bench.start(Command::Sweep(SWEEP)).expect("begins");
     bench.run(1.0).expect("sweeps");
     bench.start(Command::Stop).expect("begins");
@@ -296,8 +296,8 @@ pub fn a_stop_keeps_the_position(mut bench: Bench<impl DeviceUnderTest>) {
     assert_eq!(i64::from(status(&mut bench).step), bench.device.motor_steps() - home);
 }
 
-/// The hold time: a motor that nobody asks for anything gets no current for ever.
-pub fn idle_coils_are_let_go_after_silence(mut bench: Bench<impl DeviceUnderTest>) {
+/// After the hold time an idle motor carries no current.
+pub fn releases_idle_coils(mut bench: Bench<impl DeviceUnderTest>) {
     ready(&mut bench, Settings { hold_s: 1, ..SETTINGS });
     bench.run(0.8).expect("runs");
     assert!(bench.device.holds_coils());
@@ -306,10 +306,8 @@ pub fn idle_coils_are_let_go_after_silence(mut bench: Bench<impl DeviceUnderTest
     assert_eq!(status(&mut bench).fault, Some(FaultKind::HoldExpired));
 }
 
-/// Reset: acknowledged, then everything anew.
-pub fn a_restart_on_request_has_a_new_number_and_forgets_everything(
-    mut bench: Bench<impl DeviceUnderTest>,
-) {
+/// Reset is acknowledged, then clears the whole state.
+pub fn reset_clears_state(mut bench: Bench<impl DeviceUnderTest>) {
     let before = ready(&mut bench, SETTINGS);
     bench.perform(Command::Reset, 5.0).expect("restarts");
     let after = identify(&mut bench);

@@ -1,4 +1,4 @@
-//! Steps that the scenarios share.
+//! Steps shared by the scenarios.
 
 extern crate std;
 
@@ -25,11 +25,11 @@ pub(super) fn identify(bench: &mut Bench<impl DeviceUnderTest>) -> Identity {
 
 pub(super) fn status(bench: &mut Bench<impl DeviceUnderTest>) -> Status {
     let events = bench.perform(Command::Status, 2.0).expect("answers");
-    let told = events.iter().find_map(|event| match event {
+    let found = events.iter().find_map(|event| match event {
         HostEvent::Done(Outcome::Status(status)) => Some(*status),
         _ => None,
     });
-    told.expect("a status")
+    found.expect("a status")
 }
 
 pub(super) fn ping(bench: &mut Bench<impl DeviceUnderTest>) -> Reading {
@@ -68,7 +68,8 @@ pub(super) fn frame(boot: u16, seq: u16, request: &Request) -> Vec<u8> {
     Frame::encode(Header { boot, seq }, request).expect("fits").to_vec()
 }
 
-/// What came over the line, with the numbers they answer. Anything that is no frame is an error.
+/// Decodes the bytes of a board into replies and their sequence numbers. Panics on an invalid
+/// frame.
 pub(super) fn replies(bytes: &[u8]) -> Vec<(u16, Reply)> {
     let mut decoder = FrameDecoder::new();
     let mut replies = Vec::new();
@@ -78,26 +79,26 @@ pub(super) fn replies(bytes: &[u8]) -> Vec<(u16, Reply)> {
                 let reply = Reply::decode(frame.body).expect("a reply");
                 replies.push((frame.header.seq, reply));
             }
-            Received::Dropped(reason) => panic!("the device sent something else: {reason:?}"),
+            Received::Dropped(reason) => panic!("the device sent an invalid frame: {reason:?}"),
             Received::Nothing | Received::Empty => {}
         }
     }
     replies
 }
 
-/// Sends a request past the host machine, and gives the reply to it.
+/// Sends a request directly, without the host machine, and returns the reply.
 pub(super) fn answer(
     bench: &mut Bench<impl DeviceUnderTest>,
     boot: u16,
     seq: u16,
     request: &Request,
 ) -> Reply {
-    // Numbers far from those of the host machine, which counts from a random one.
+    // Offset from the numbers of the host machine, which start at a random one.
     let seq = bench.host.identity().and_then(|known| known.last_seq).unwrap_or(0).wrapping_add(seq);
     bench.device.receive();
     bench.device.send(&frame(boot, seq, request));
     bench.device.run(30_000).expect("runs");
     let replies = replies(&bench.device.receive());
-    let told = replies.iter().find(|(answered, _)| *answered == seq);
-    told.unwrap_or_else(|| panic!("no answer to {request:?}, number {seq}: {replies:?}")).1
+    let found = replies.iter().find(|(answered, _)| *answered == seq);
+    found.unwrap_or_else(|| panic!("no reply to {request:?}, number {seq}: {replies:?}")).1
 }

@@ -1,16 +1,16 @@
-//! What the board still has to do.
+//! Actions that the board has not polled yet.
 
-use super::{Action, Beam, Device, Phase};
+use super::{Action, BeamPhase, Device, Phase};
 
-/// Actions not yet polled, one bit each, in the order they are handed out.
+/// Actions not yet polled, one bit each, in the order in which they are returned.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(super) struct Pending(u8);
+pub(super) struct PendingActions(u8);
 
-impl Pending {
+impl PendingActions {
     pub(super) const ABORT_FIRE: Self = Self(1);
     pub(super) const STOP_MOTION: Self = Self(1 << 1);
     pub(super) const RELEASE_COILS: Self = Self(1 << 2);
-    /// What the present phase asks for: Home, Move or Fire.
+    /// Action of the current phase: Home, Move or Fire.
     pub(super) const PHASE: Self = Self(1 << 3);
     pub(super) const RESET: Self = Self(1 << 4);
 
@@ -18,7 +18,7 @@ impl Pending {
         self.0 |= action.0;
     }
 
-    /// Clears `action`; tells whether it was pending.
+    /// Clears `action` and returns `true` if it was pending.
     pub(super) fn take(&mut self, action: Self) -> bool {
         let pending = self.has(action);
         self.0 &= !action.0;
@@ -33,36 +33,37 @@ impl Pending {
 impl Device {
     #[inline(never)]
     pub(super) fn next_action(&mut self) -> Option<Action> {
-        if self.pending.take(Pending::ABORT_FIRE) {
+        if self.pending.take(PendingActions::ABORT_FIRE) {
             return Some(Action::AbortFire);
         }
-        if self.pending.take(Pending::STOP_MOTION) {
+        if self.pending.take(PendingActions::STOP_MOTION) {
             return Some(Action::StopMotion);
         }
-        if self.pending.take(Pending::RELEASE_COILS) {
+        if self.pending.take(PendingActions::RELEASE_COILS) {
             return Some(Action::ReleaseCoils);
         }
-        if self.pending.take(Pending::PHASE) {
+        if self.pending.take(PendingActions::PHASE) {
             return self.phase_action();
         }
-        (self.outbox.is_empty() && self.pending.take(Pending::RESET)).then_some(Action::Reset)
+        (self.outbox.is_empty() && self.pending.take(PendingActions::RESET))
+            .then_some(Action::Reset)
     }
 
     fn phase_action(&mut self) -> Option<Action> {
         let settings = self.settings?;
-        self.holds_coils |= !matches!(self.phase, Phase::Beam(Beam::Listening));
+        self.holds_coils |= !matches!(self.phase, Phase::Beam(BeamPhase::Listening));
         let (speed, acceleration) = (settings.speed, settings.acceleration);
         match self.phase {
             Phase::Homing => Some(Action::Home { speed, acceleration }),
-            Phase::Moving { target } | Phase::Beam(Beam::Moving { target }) => {
+            Phase::Moving { target } | Phase::Beam(BeamPhase::Moving { target }) => {
                 Some(Action::Move { target, speed, acceleration })
             }
-            Phase::Beam(Beam::Listening) => Some(Action::Fire {
+            Phase::Beam(BeamPhase::Listening) => Some(Action::Fire {
                 window_ticks: settings.window_ticks,
                 max_echoes: settings.max_echoes,
                 blanking: settings.blanking,
             }),
-            Phase::Idle | Phase::Stopping | Phase::Beam(Beam::Waiting) => None,
+            Phase::Idle | Phase::Stopping | Phase::Beam(BeamPhase::Waiting) => None,
         }
     }
 }

@@ -1,80 +1,81 @@
-//! What the device machine and the board say to each other.
+//! Types exchanged between the device state machine and the board.
 
 use crate::messages::{Blanking, Capabilities, Echoes, FirmwareVersion, ReadingStatus, ResetCause};
 
 /// Properties of the board, known at boot.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Board {
-    /// A number that no earlier boot had (best: a counter in EEPROM). 0 is taken for 1.
+    /// Number that differs from that of all earlier boots (best: a counter in EEPROM). 0 is
+    /// replaced by 1.
     pub boot: u16,
-    /// Firmware version.
+    /// Version of the firmware.
     pub firmware: FirmwareVersion,
-    /// Serial number.
+    /// Serial number, unique to the board.
     pub serial: [u8; 10],
-    /// Steps a revolution, with microstepping and gears counted in.
+    /// Steps per revolution, including microstepping and gears.
     pub steps_per_revolution: u16,
-    /// What the board can do.
+    /// Features of the board.
     pub capabilities: Capabilities,
-    /// Why it booted.
+    /// Cause of the last reset.
     pub reset_cause: ResetCause,
 }
 
-/// An action that the board must carry out now. Actions are to be carried out in the order they come.
+/// Action that the board must carry out immediately. Actions are carried out in the order received.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Action {
-    /// Search the index and end on it, at the position that is zero from then on; without an
-    /// index sensor, do nothing. Then call [`super::Device::handle_homed`].
+    /// Searches for the index and ends on it; that position is zero from then on. Without an index
+    /// sensor nothing moves. Then call [`super::Device::handle_homed`].
     Home {
-        /// Largest speed, steps/s.
+        /// Maximum speed of the move, steps/s.
         speed: u16,
-        /// Acceleration, steps/s^2.
+        /// Acceleration and deceleration, steps/s^2.
         acceleration: u32,
     },
-    /// Turn to `target`. When the motor stands, call [`super::Device::handle_moved`].
+    /// Moves to `target`. When the motor is at rest, call [`super::Device::handle_moved`].
     Move {
-        /// Steps from home.
+        /// Target position, steps from home.
         target: i32,
-        /// Largest speed, steps/s.
+        /// Maximum speed of the move, steps/s.
         speed: u16,
-        /// Acceleration, steps/s^2.
+        /// Acceleration and deceleration, steps/s^2.
         acceleration: u32,
     },
-    /// Brake as fast as the acceleration allows. When the motor stands, call
-    /// [`super::Device::handle_moved`] with where it stands: once, for the stop and what it
-    /// stopped together.
+    /// Brakes as fast as the acceleration allows. When the motor is at rest, call
+    /// [`super::Device::handle_moved`] with its position: once, for the stop and the interrupted
+    /// move together.
     StopMotion,
-    /// Stop the motor at once, if it turns, and let go of its coils. Nothing is reported.
+    /// Stops the motor at once, if it turns, and releases its coils. No call follows.
     ReleaseCoils,
-    /// Fire and listen for the whole window, then call [`super::Device::handle_echoes`].
+    /// Fires and records echoes for the whole window, then calls [`super::Device::handle_echoes`].
     Fire {
-        /// Listening time, ticks after firing.
+        /// Listening window, ticks after firing.
         window_ticks: u32,
-        /// Echoes to wait for, at most.
+        /// Maximum number of echoes to wait for.
         max_echoes: u8,
-        /// How long the receiver stays deaf.
+        /// Receiver blanking after firing.
         blanking: Blanking,
     },
-    /// Take INIT away and forget the firing. Nothing is reported.
+    /// Deasserts INIT and discards the firing. No call follows.
     AbortFire,
-    /// Let the serial line drain, then restart.
+    /// Waits until the serial line has drained, then restarts.
     Reset,
 }
 
-/// The outcome of one [`Action::Fire`].
+/// Result of one [`Action::Fire`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct EchoReport {
     /// Device clock when INIT rose, ticks.
     pub fired_ticks: u32,
-    /// What the board saw. [`ReadingStatus::Echo`] without an echo counts as
+    /// Outcome of the firing. [`ReadingStatus::Echo`] without an echo is treated as
     /// [`ReadingStatus::NoEcho`].
     pub status: ReadingStatus,
     /// Echo times, ticks after firing.
     pub echoes: Echoes,
 }
 
-/// The reason why homing failed.
+/// Reason for a failure of homing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum HomeError {
-    /// The index was not found within the search.
+    /// The index was not found during the search.
     IndexNotFound,
 }

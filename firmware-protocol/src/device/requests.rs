@@ -1,50 +1,53 @@
-//! Which requests are carried out, which are answered from memory, which are refused.
+//! Request handling: execution, replies to repetitions, rejection.
 
-use super::actions::Pending;
+use super::actions::PendingActions;
 use super::settings::{check_plan, check_settings, check_step};
-use super::{Accepted, Answer, Beam, Device, Phase, Run};
+use super::{AcceptedRequest, BeamPhase, CompactReply, Device, Phase, SweepRun};
 use crate::frame::{Header, count};
 use crate::messages::{NakReason, Request, Settings, Sweep, SweepState};
 
-/// What became of a request: an answer at once, or one that follows when it is done.
-enum Outcome {
-    Done(Answer),
+/// Result of accepting a request.
+enum Disposition {
+    /// Completed; the reply is stored for repetitions.
+    Done(CompactReply),
+    /// In progress; the final reply follows.
     Running,
-    /// A question: answered, and answered anew if it is repeated.
-    Told(Answer),
+    /// Reply to a query, which is evaluated again when the request is repeated.
+    Query(CompactReply),
 }
 
 impl Device {
-    /// A frame with a right CRC came in; `request` is `None` if its body is no request.
+    /// Handles a frame with a valid CRC; `request` is `None` if its body is not a request.
     pub(super) fn handle_frame(&mut self, header: Header, crc: u32, request: Option<&Request>) {
         let Some(request) = request else {
             count(&mut self.counters.undecodable);
-            self.outbox.answer(header.seq, Answer::Nak(NakReason::UnknownRequest));
+            self.outbox.answer(header.seq, CompactReply::Nak(NakReason::UnknownRequest));
             return;
         };
         let addressed = header.boot == self.board.boot;
         if addressed {
-            self.host_is_alive();
+            self.renew_timers();
         }
         match request {
-            Request::Identify => self.outbox.answer(header.seq, Answer::Identity),
-            Request::Stop if !addressed => self.stop_for_stranger(header.seq),
+            Request::Identify => self.outbox.answer(header.seq, CompactReply::Identity),
+            Request::Stop if !addressed => self.stop_unnumbered(header.seq),
             _ if !addressed => {
                 count(&mut self.counters.stale);
-                self.outbox.answer(header.seq, Answer::Nak(NakReason::WrongBoot));
+                self.outbox.answer(header.seq, CompactReply::Nak(NakReason::WrongBoot));
             }
             _ => self.handle_numbered(header.seq, crc, request),
         }
     }
 
-    /// Serial arithmetic on the number tells new requests, repeated ones and old duplicates apart.
+    /// Distinguishes new requests, repetitions and old duplicates by serial arithmetic on the
+    /// number.
     fn handle_numbered(&mut self, seq: u16, crc: u32, request: &Request) {
         let Some(last) = self.last else {
             return self.accept(seq, crc, request);
         };
         match seq.wrapping_sub(last.seq) {
             0 if crc != last.crc => {
-                self.outbox.answer(seq, Answer::Nak(NakReason::SequenceReused));
+                self.outbox.answer(seq, CompactReply::Nak(NakReason::SequenceReused));
             }
             0 => self.repeat(last, request),
             1..0x8000 => self.accept(seq, crc, request),
@@ -52,29 +55,29 @@ impl Device {
         }
     }
 
-    fn repeat(&mut self, last: Accepted, request: &Request) {
+    fn repeat(&mut self, last: AcceptedRequest, request: &Request) {
         match last.answer {
             Some(answer) => self.outbox.answer(last.seq, answer),
-            None if may_be_done_twice(request) => self.accept(last.seq, last.crc, request),
+            None if is_idempotent(request) => self.accept(last.seq, last.crc, request),
             None if self.phase != Phase::Idle && self.phase_seq == last.seq => {
-                self.outbox.answer(last.seq, Answer::Started);
+                self.outbox.answer(last.seq, CompactReply::Started);
             }
-            None => self.outbox.answer(last.seq, Answer::Nak(NakReason::Stopped)),
+            None => self.outbox.answer(last.seq, CompactReply::Nak(NakReason::Stopped)),
         }
     }
 
     fn accept(&mut self, seq: u16, crc: u32, request: &Request) {
-        self.last = Some(Accepted { seq, crc, answer: None });
+        self.last = Some(AcceptedRequest { seq, crc, answer: None });
         match self.perform(seq, request) {
-            Ok(Outcome::Done(answer)) => self.conclude(seq, answer),
-            Ok(Outcome::Told(answer)) => self.outbox.answer(seq, answer),
-            Ok(Outcome::Running) => self.outbox.answer(seq, Answer::Started),
-            Err(reason) => self.conclude(seq, Answer::Nak(reason)),
+            Ok(Disposition::Done(answer)) => self.conclude(seq, answer),
+            Ok(Disposition::Query(answer)) => self.outbox.answer(seq, answer),
+            Ok(Disposition::Running) => self.outbox.answer(seq, CompactReply::Started),
+            Err(reason) => self.conclude(seq, CompactReply::Nak(reason)),
         }
     }
 
-    /// Sends the final reply to request `seq`, and remembers it as long as `seq` is the last.
-    pub(super) fn conclude(&mut self, seq: u16, answer: Answer) {
+    /// Sends the final reply to request `seq`, and stores it while `seq` is the latest number.
+    pub(super) fn conclude(&mut self, seq: u16, answer: CompactReply) {
         if let Some(last) = &mut self.last
             && last.seq == seq
         {
@@ -83,14 +86,14 @@ impl Device {
         self.outbox.answer(seq, answer);
     }
 
-    fn perform(&mut self, seq: u16, request: &Request) -> Result<Outcome, NakReason> {
+    fn perform(&mut self, seq: u16, request: &Request) -> Result<Disposition, NakReason> {
         match request {
-            Request::Identify => Ok(Outcome::Told(Answer::Identity)),
+            Request::Identify => Ok(Disposition::Query(CompactReply::Identity)),
             Request::Stop => Ok(self.stop(seq)),
             Request::Reset => Ok(self.reset()),
             &Request::Resend { sweep, first, count } => Ok(self.resend(sweep, first, count)),
             &Request::KeepAlive { sweep, next } => Ok(self.keep_alive(sweep, next)),
-            Request::Status => Ok(Outcome::Told(Answer::Status { ticks: self.now })),
+            Request::Status => Ok(Disposition::Query(CompactReply::Status { ticks: self.now })),
             _ if self.phase != Phase::Idle => Err(NakReason::Busy),
             Request::Configure(settings) => self.configure(settings),
             Request::Home => self.home(seq),
@@ -100,138 +103,140 @@ impl Device {
         }
     }
 
-    /// A Stop from a host that does not know the boot nonce is obeyed all the same, but leaves
-    /// the numbering alone.
-    fn stop_for_stranger(&mut self, seq: u16) {
+    /// Obeys a Stop from a host that does not know the boot nonce, without affecting the numbering.
+    fn stop_unnumbered(&mut self, seq: u16) {
         match self.stop(seq) {
-            Outcome::Done(answer) | Outcome::Told(answer) => self.outbox.answer(seq, answer),
-            Outcome::Running => self.outbox.answer(seq, Answer::Started),
+            Disposition::Done(answer) | Disposition::Query(answer) => {
+                self.outbox.answer(seq, answer);
+            }
+            Disposition::Running => self.outbox.answer(seq, CompactReply::Started),
         }
     }
 
-    fn stop(&mut self, seq: u16) -> Outcome {
+    fn stop(&mut self, seq: u16) -> Disposition {
         let turning = self.interrupt();
         self.end_run(SweepState::Stopped);
         if turning {
             self.enter(Phase::Stopping, seq);
-            Outcome::Running
+            Disposition::Running
         } else {
             self.rest();
-            Outcome::Done(Answer::Ack)
+            Disposition::Done(CompactReply::Ack)
         }
     }
 
-    fn reset(&mut self) -> Outcome {
+    fn reset(&mut self) -> Disposition {
         self.interrupt();
         self.release_coils();
         self.homed = false;
         self.end_run(SweepState::Stopped);
         self.rest();
-        self.pending.add(Pending::RESET);
-        Outcome::Done(Answer::Ack)
+        self.pending.add(PendingActions::RESET);
+        Disposition::Done(CompactReply::Ack)
     }
 
-    fn resend(&mut self, sweep: u16, first: u16, count: u8) -> Outcome {
+    fn resend(&mut self, sweep: u16, first: u16, count: u8) -> Disposition {
         if sweep == self.run.plan.sweep {
             self.acknowledge(first);
             self.outbox.resend(first, count);
             self.try_fire();
         }
-        Outcome::Told(Answer::Alive { ticks: self.now })
+        Disposition::Query(CompactReply::Alive { ticks: self.now })
     }
 
-    fn keep_alive(&mut self, sweep: u16, next: u16) -> Outcome {
+    fn keep_alive(&mut self, sweep: u16, next: u16) -> Disposition {
         if sweep == self.run.plan.sweep {
             self.acknowledge(next);
             self.try_fire();
         }
-        Outcome::Told(Answer::Alive { ticks: self.now })
+        Disposition::Query(CompactReply::Alive { ticks: self.now })
     }
 
-    /// Nobody can have what was never sent: it is kept, whatever is acknowledged.
+    /// Acknowledges beams below `next`, except those never sent, which no host can have received.
     fn acknowledge(&mut self, next: u16) {
         self.ring.acknowledge(self.outbox.sent().min(next));
     }
 
-    fn configure(&mut self, settings: &Settings) -> Result<Outcome, NakReason> {
+    fn configure(&mut self, settings: &Settings) -> Result<Disposition, NakReason> {
         check_settings(settings, self.board.capabilities)?;
         self.settings = Some(*settings);
         self.rest();
-        Ok(Outcome::Done(Answer::Ack))
+        Ok(Disposition::Done(CompactReply::Ack))
     }
 
-    fn home(&mut self, seq: u16) -> Result<Outcome, NakReason> {
-        self.configured()?;
+    fn home(&mut self, seq: u16) -> Result<Disposition, NakReason> {
+        self.require_settings()?;
         self.homed = false;
         self.enter(Phase::Homing, seq);
-        self.pending.add(Pending::PHASE);
-        Ok(Outcome::Running)
+        self.pending.add(PendingActions::PHASE);
+        Ok(Disposition::Running)
     }
 
-    fn move_to(&mut self, seq: u16, step: i32) -> Result<Outcome, NakReason> {
-        self.configured()?;
+    fn move_to(&mut self, seq: u16, step: i32) -> Result<Disposition, NakReason> {
+        self.require_settings()?;
         check_step(step)?;
-        self.at_home()?;
+        self.require_homed()?;
         if step == self.step {
-            return Ok(Outcome::Done(Answer::Ack));
+            return Ok(Disposition::Done(CompactReply::Ack));
         }
         self.enter(Phase::Moving { target: step }, seq);
-        self.pending.add(Pending::PHASE);
-        Ok(Outcome::Running)
+        self.pending.add(PendingActions::PHASE);
+        Ok(Disposition::Running)
     }
 
-    fn ping(&mut self, seq: u16) -> Result<Outcome, NakReason> {
-        self.configured()?;
-        self.begin_run(Run::ping(seq, self.step));
-        Ok(Outcome::Running)
+    fn ping(&mut self, seq: u16) -> Result<Disposition, NakReason> {
+        self.require_settings()?;
+        self.begin_run(SweepRun::ping(seq, self.step));
+        Ok(Disposition::Running)
     }
 
-    fn sweep(&mut self, seq: u16, plan: &Sweep) -> Result<Outcome, NakReason> {
-        self.configured()?;
+    fn sweep(&mut self, seq: u16, plan: &Sweep) -> Result<Disposition, NakReason> {
+        self.require_settings()?;
         let beams = check_plan(plan)?;
-        self.at_home()?;
-        self.begin_run(Run::sweep(seq, *plan, beams));
-        Ok(Outcome::Done(Answer::Ack))
+        self.require_homed()?;
+        self.begin_run(SweepRun::sweep(seq, *plan, beams));
+        Ok(Disposition::Done(CompactReply::Ack))
     }
 
-    fn configured(&self) -> Result<(), NakReason> {
+    fn require_settings(&self) -> Result<(), NakReason> {
         self.settings.map(|_| ()).ok_or(NakReason::NotConfigured)
     }
 
-    fn at_home(&self) -> Result<(), NakReason> {
+    fn require_homed(&self) -> Result<(), NakReason> {
         if self.homed { Ok(()) } else { Err(NakReason::NotHomed) }
     }
 
-    /// Begins a phase that serves request `seq`.
+    /// Enters a phase that serves request `seq`.
     pub(super) fn enter(&mut self, phase: Phase, seq: u16) {
         self.phase = phase;
         self.phase_seq = seq;
     }
 
-    /// Takes back what is under way. Tells whether the motor turns and has been asked to stop.
+    /// Cancels the operation in progress. Returns `true` if the motor turns and was commanded to
+    /// stop.
     fn interrupt(&mut self) -> bool {
-        let unpolled = self.pending.take(Pending::PHASE);
+        let unpolled = self.pending.take(PendingActions::PHASE);
         match self.phase {
-            Phase::Homing | Phase::Moving { .. } | Phase::Beam(Beam::Moving { .. }) => {
+            Phase::Homing | Phase::Moving { .. } | Phase::Beam(BeamPhase::Moving { .. }) => {
                 if !unpolled {
-                    self.pending.add(Pending::STOP_MOTION);
+                    self.pending.add(PendingActions::STOP_MOTION);
                 }
                 !unpolled
             }
-            Phase::Beam(Beam::Listening) => {
+            Phase::Beam(BeamPhase::Listening) => {
                 if !unpolled {
-                    self.pending.add(Pending::ABORT_FIRE);
+                    self.pending.add(PendingActions::ABORT_FIRE);
                 }
                 false
             }
             Phase::Stopping => true,
-            Phase::Idle | Phase::Beam(Beam::Waiting) => false,
+            Phase::Idle | Phase::Beam(BeamPhase::Waiting) => false,
         }
     }
 }
 
-/// Questions change nothing, and who stops twice stands.
-const fn may_be_done_twice(request: &Request) -> bool {
+/// Returns `true` for requests whose repetition may be executed again without effect.
+const fn is_idempotent(request: &Request) -> bool {
     matches!(
         request,
         Request::Stop | Request::Resend { .. } | Request::KeepAlive { .. } | Request::Status

@@ -1,30 +1,30 @@
-//! Readings that the host has not acknowledged, packed.
+//! Packed storage for unacknowledged readings.
 //!
-//! A reading is kept as ticks at firing (4 bytes), status and number of echoes (1 byte) and 3
-//! bytes an echo. Sweep, index and step follow from the plan.
+//! A reading takes 4 bytes for the ticks at firing, 1 byte for status and number of echoes, and 3
+//! bytes per echo. Sweep, index and step follow from the plan.
 
 use crate::messages::limits::{MAX_ECHOES, RING_BYTES, kept_bytes};
 use crate::messages::{ReadingStatus, Wire as _, Writer};
 
-/// Offsets are `u8` and wrap by themselves, so they always lie inside.
+/// Size of the ring. Offsets are `u8` and wrap at this size, so they are always valid.
 const CAPACITY: usize = RING_BYTES as usize;
 const _: () = assert!(CAPACITY == 1 << u8::BITS);
 
-/// A reading in the ring, where it is. What follows from the plan is not kept.
+/// Reading in the ring, decoded on access. Values that follow from the plan are not stored.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Kept<'a> {
-    ring: &'a Ring,
+pub(super) struct StoredReading<'a> {
+    ring: &'a ReadingRing,
     at: u8,
 }
 
-/// Its echoes, written as [`Echoes`] are.
+/// Echoes of a stored reading, encoded like [`crate::messages::Echoes`].
 #[derive(Debug, Clone, Copy)]
-pub(super) struct KeptEchoes<'a>(Kept<'a>);
+pub(super) struct StoredEchoes<'a>(StoredReading<'a>);
 
 #[derive(Debug, Clone)]
-pub(super) struct Ring {
+pub(super) struct ReadingRing {
     bytes: [u8; CAPACITY],
-    /// Where the oldest reading begins.
+    /// Offset of the oldest reading.
     oldest: u8,
     used: u16,
     /// Index of the oldest reading.
@@ -32,29 +32,29 @@ pub(super) struct Ring {
     count: u16,
 }
 
-impl Ring {
+impl ReadingRing {
     pub(super) const fn new() -> Self {
         Self { bytes: [0; CAPACITY], oldest: 0, used: 0, first: 0, count: 0 }
     }
 
-    /// Forgets everything; the next reading has index 0.
+    /// Removes all readings; the next one has index 0.
     pub(super) fn clear(&mut self) {
         self.used = 0;
         self.first = 0;
         self.count = 0;
     }
 
-    /// Index of the oldest reading kept.
+    /// Index of the oldest stored reading.
     pub(super) const fn first(&self) -> u16 {
         self.first
     }
 
-    /// Whether a reading of up to `max_echoes` echoes fits.
+    /// Returns `true` if a reading with up to `max_echoes` echoes fits.
     pub(super) const fn has_room(&self, max_echoes: u8) -> bool {
         self.used + kept_bytes(max_echoes) <= RING_BYTES
     }
 
-    /// Keeps a reading; the caller has made sure of the room.
+    /// Stores a reading; the caller has checked [`Self::has_room`].
     pub(super) fn push(&mut self, fired_ticks: u32, status: ReadingStatus, echoes: &[u32]) {
         let mut cursor = self.oldest.wrapping_add(low_byte(self.used));
         self.put(&mut cursor, fired_ticks, 4);
@@ -67,7 +67,7 @@ impl Ring {
         self.count = self.count.wrapping_add(1);
     }
 
-    /// Drops all readings below index `next`, as far as there are any.
+    /// Removes all readings below index `next`.
     pub(super) fn acknowledge(&mut self, next: u16) {
         while self.count > 0 && self.first < next {
             let size = kept_bytes(self.echo_count_at(self.oldest));
@@ -78,14 +78,14 @@ impl Ring {
         }
     }
 
-    /// The reading of beam `index`, if it is kept.
-    pub(super) fn get(&self, index: u16) -> Option<Kept<'_>> {
+    /// Returns the reading of beam `index`, if stored.
+    pub(super) fn get(&self, index: u16) -> Option<StoredReading<'_>> {
         let behind = index.checked_sub(self.first).filter(|&behind| behind < self.count)?;
         let mut at = self.oldest;
         for _ in 0..behind {
             at = at.wrapping_add(low_byte(kept_bytes(self.echo_count_at(at))));
         }
-        Some(Kept { ring: self, at })
+        Some(StoredReading { ring: self, at })
     }
 
     fn echo_count_at(&self, start: u8) -> u8 {
@@ -96,13 +96,13 @@ impl Ring {
         self.bytes[usize::from(offset)]
     }
 
-    /// Three bytes, lowest first.
+    /// Reads three bytes, lowest first.
     fn three_at(&self, offset: u8) -> u32 {
         let byte = |behind| self.at(offset.wrapping_add(behind));
         u32::from_le_bytes([byte(0), byte(1), byte(2), 0])
     }
 
-    /// The lowest bytes of `value`, lowest first.
+    /// Writes the lowest `bytes` bytes of `value`, lowest first.
     #[inline(never)]
     fn put(&mut self, cursor: &mut u8, mut value: u32, bytes: u8) {
         for _ in 0..bytes {
@@ -114,7 +114,7 @@ impl Ring {
     }
 }
 
-impl<'a> Kept<'a> {
+impl<'a> StoredReading<'a> {
     /// Ticks at firing.
     pub(super) fn fired_ticks(self) -> u32 {
         let top = self.ring.at(self.at.wrapping_add(3));
@@ -125,14 +125,14 @@ impl<'a> Kept<'a> {
         unpack(self.ring.at(self.at.wrapping_add(4))).0
     }
 
-    pub(super) const fn echoes(self) -> KeptEchoes<'a> {
-        KeptEchoes(self)
+    pub(super) const fn echoes(self) -> StoredEchoes<'a> {
+        StoredEchoes(self)
     }
 }
 
-impl KeptEchoes<'_> {
+impl StoredEchoes<'_> {
     pub(super) fn put(self, out: &mut Writer<'_>) {
-        let Self(Kept { ring, at }) = self;
+        let Self(StoredReading { ring, at }) = self;
         let echo_count = ring.echo_count_at(at);
         out.byte(echo_count);
         let mut cursor = at.wrapping_add(5);
@@ -143,7 +143,7 @@ impl KeptEchoes<'_> {
     }
 }
 
-/// Status in the upper, number of echoes in the lower half.
+/// Packs status (upper half) and number of echoes (lower half).
 const fn pack(status: ReadingStatus, echo_count: u8) -> u8 {
     (status as u8) << 4 | echo_count
 }
@@ -159,13 +159,12 @@ const fn unpack(byte: u8) -> (ReadingStatus, u8) {
     (status, if echo_count > MAX_ECHOES { MAX_ECHOES } else { echo_count })
 }
 
-/// Offsets count modulo 256.
+/// Truncates to an offset, modulo 256.
 const fn low_byte(value: u16) -> u8 {
     value as u8
 }
 
 #[expect(clippy::cast_possible_truncation, reason = "a list of echoes has at most eight")]
-/// A list of echoes has at most eight.
 const fn low_byte_of_len(len: usize) -> u8 {
     len as u8
 }
@@ -179,14 +178,14 @@ mod tests {
 
     use proptest::prelude::*;
 
-    use super::{Kept, Ring};
+    use super::{ReadingRing, StoredReading};
     use crate::messages::limits::{MAX_ECHOES, WINDOW_TICKS_MAX, readings_in};
     use crate::messages::{Echoes, ReadingStatus, Wire as _, Writer};
 
-    /// Ticks at firing, status, and the bytes of the echoes.
-    type Told = (u32, ReadingStatus, Vec<u8>);
+    /// Ticks at firing, status, and the encoded echoes.
+    type Decoded = (u32, ReadingStatus, Vec<u8>);
 
-    fn written(put: impl FnOnce(&mut Writer<'_>)) -> Vec<u8> {
+    fn encode(put: impl FnOnce(&mut Writer<'_>)) -> Vec<u8> {
         let mut bytes = [0; 64];
         let mut out = Writer::new(&mut bytes);
         put(&mut out);
@@ -194,27 +193,26 @@ mod tests {
         bytes[..usize::from(len)].to_vec()
     }
 
-    /// What was kept is what a list of the same echoes says.
-    fn told(kept: Kept<'_>) -> Told {
-        (kept.fired_ticks(), kept.status(), written(|out| kept.echoes().put(out)))
+    /// Decodes a stored reading.
+    fn decode(kept: StoredReading<'_>) -> Decoded {
+        (kept.fired_ticks(), kept.status(), encode(|out| kept.echoes().put(out)))
     }
 
-    /// Keeps a reading made of `number`, and tells what it must read as.
-    fn push(ring: &mut Ring, number: u32, echo_count: u8) -> Told {
+    /// Stores a reading derived from `number` and returns the expected decoding.
+    fn push(ring: &mut ReadingRing, number: u32, echo_count: u8) -> Decoded {
         let first = number / 7 % (WINDOW_TICKS_MAX - 8);
         let ticks: Vec<u32> = (first..).take(echo_count.into()).collect();
         let status = [ReadingStatus::Echo, ReadingStatus::StepDoubtful][(number % 2) as usize];
         ring.push(number, status, &ticks);
-        (number, status, written(|out| Echoes::from_ticks(&ticks).put(out)))
+        (number, status, encode(|out| Echoes::from_ticks(&ticks).put(out)))
     }
 
     proptest! {
-        /// The ring against a queue that is never short of room.
         #[test]
-        fn keeps_what_a_queue_keeps(
+        fn matches_a_queue(
             operations in prop::collection::vec((any::<bool>(), any::<u32>(), 0..=MAX_ECHOES), 1..400),
         ) {
-            let mut ring = Ring::new();
+            let mut ring = ReadingRing::new();
             let mut queue = VecDeque::new();
             let mut first = 0_u16;
             for (keep, number, echo_count) in operations {
@@ -229,7 +227,7 @@ mod tests {
                 }
                 prop_assert_eq!(ring.first(), first);
                 for (index, expected) in (first..).zip(&queue) {
-                    prop_assert_eq!(ring.get(index).map(told), Some(expected.clone()));
+                    prop_assert_eq!(ring.get(index).map(decode), Some(expected.clone()));
                 }
                 let end = first + u16::try_from(queue.len()).expect("small");
                 prop_assert!(ring.get(end).is_none());
@@ -238,16 +236,16 @@ mod tests {
     }
 
     #[test]
-    fn holds_as_many_as_the_host_reckons_with() {
+    fn capacity_matches_host() {
         for echo_count in 0..=MAX_ECHOES {
-            let mut ring = Ring::new();
+            let mut ring = ReadingRing::new();
             let mut count = 0;
             while ring.has_room(echo_count) {
                 push(&mut ring, count, echo_count);
                 count += 1;
             }
             assert_eq!(count, u32::from(readings_in(256, echo_count)));
-            assert!(count <= 64, "the host remembers 64 beams out of order");
+            assert!(count <= 64, "the host accepts 64 beams out of order");
         }
     }
 }

@@ -1,14 +1,14 @@
-//! Moving, firing, listening: the course of moves, pings and sweeps.
+//! Sequence of moves, firings and listening windows in moves, pings and sweeps.
 
-use super::actions::Pending;
+use super::actions::PendingActions;
 use super::timers::ticks_until;
-use super::{Answer, Beam, Device, EchoReport, HomeError, Phase, Run};
+use super::{BeamPhase, CompactReply, Device, EchoReport, HomeError, Phase, SweepRun};
 use crate::messages::limits::TICK_HZ;
 use crate::messages::{FaultKind, NakReason, ReadingStatus, Sweep, SweepState};
 
 const TICKS_PER_MS: u32 = TICK_HZ / 1_000;
 
-impl Run {
+impl SweepRun {
     pub(super) const fn none() -> Self {
         let plan =
             Sweep { sweep: 0, first_step: 0, stride: 0, stops: 0, pings_per_stop: 1, lease_ms: 0 };
@@ -37,46 +37,46 @@ impl Run {
 }
 
 impl Device {
-    pub(super) fn begin_run(&mut self, run: Run) {
+    pub(super) fn begin_run(&mut self, run: SweepRun) {
         self.run = run;
         self.ring.clear();
         self.outbox.begin_run();
         if !run.is_ping() {
             self.arm_lease();
         }
-        self.enter(Phase::Beam(Beam::Waiting), run.seq);
+        self.enter(Phase::Beam(BeamPhase::Waiting), run.seq);
         self.next_beam();
     }
 
-    /// Turns to the next beam, or ends the run after the last.
+    /// Moves to the next beam, or ends the run after the last.
     fn next_beam(&mut self) {
         if self.run.fired >= self.run.beams {
             return self.finish_run();
         }
         let target = self.run.plan.step_of(self.run.fired).unwrap_or(self.step);
         if target == self.step {
-            self.phase = Phase::Beam(Beam::Waiting);
+            self.phase = Phase::Beam(BeamPhase::Waiting);
             self.try_fire();
         } else {
-            self.phase = Phase::Beam(Beam::Moving { target });
-            self.pending.add(Pending::PHASE);
+            self.phase = Phase::Beam(BeamPhase::Moving { target });
+            self.pending.add(PendingActions::PHASE);
         }
     }
 
     fn finish_run(&mut self) {
         if self.run.is_ping() {
-            self.conclude(self.phase_seq, Answer::Ping);
+            self.conclude(self.phase_seq, CompactReply::Ping);
         }
         self.end_run(SweepState::Complete);
         self.rest();
     }
 
-    /// Fires, if a beam waits and nothing is in its way: rest, interval, room for the reading.
+    /// Fires if a beam is waiting and settling time, interval and ring capacity allow it.
     pub(super) fn try_fire(&mut self) {
         let Some(settings) = self.settings else {
             return;
         };
-        let free = self.phase == Phase::Beam(Beam::Waiting)
+        let free = self.phase == Phase::Beam(BeamPhase::Waiting)
             && self.timers.settle.is_none()
             && self.timers.min_interval.is_none();
         if !free {
@@ -87,20 +87,21 @@ impl Device {
             return;
         }
         self.run.state = SweepState::Running;
-        self.phase = Phase::Beam(Beam::Listening);
-        self.pending.add(Pending::PHASE);
-        // As long as the board has not said when it fired.
+        self.phase = Phase::Beam(BeamPhase::Listening);
+        self.pending.add(PendingActions::PHASE);
+        // Valid until the board reports the actual time of firing.
         self.timers.min_interval = armed(self.now, settings.min_interval_ticks);
     }
 
-    pub(super) fn beam_heard(&mut self, report: &EchoReport) {
-        let (Phase::Beam(Beam::Listening), Some(settings)) = (self.phase, self.settings) else {
+    pub(super) fn beam_measured(&mut self, report: &EchoReport) {
+        let (Phase::Beam(BeamPhase::Listening), Some(settings)) = (self.phase, self.settings)
+        else {
             return;
         };
         let next_fire = report.fired_ticks.wrapping_add(settings.min_interval_ticks);
         self.timers.min_interval = (ticks_until(self.now, next_fire) > 0).then_some(next_fire);
-        let wanted = report.echoes.len().min(usize::from(settings.max_echoes));
-        let echoes = report.echoes.get(..wanted).unwrap_or_default();
+        let count = report.echoes.len().min(usize::from(settings.max_echoes));
+        let echoes = report.echoes.get(..count).unwrap_or_default();
         let status = match report.status {
             ReadingStatus::Echo | ReadingStatus::NoEcho if !self.homed => {
                 ReadingStatus::StepDoubtful
@@ -113,28 +114,32 @@ impl Device {
         self.next_beam();
     }
 
-    pub(super) fn motor_stands(&mut self, step: i32) {
+    pub(super) fn motor_stopped(&mut self, step: i32) {
         match self.phase {
-            Phase::Moving { target } | Phase::Beam(Beam::Moving { target }) if step != target => {
+            Phase::Moving { target } | Phase::Beam(BeamPhase::Moving { target })
+                if step != target =>
+            {
                 self.halt(FaultKind::MotionFault);
             }
             Phase::Moving { .. } => {
                 self.moved_to(step);
-                self.conclude(self.phase_seq, Answer::Ack);
+                self.conclude(self.phase_seq, CompactReply::Ack);
                 self.rest();
             }
-            Phase::Beam(Beam::Moving { .. }) => {
+            Phase::Beam(BeamPhase::Moving { .. }) => {
                 self.moved_to(step);
-                self.phase = Phase::Beam(Beam::Waiting);
+                self.phase = Phase::Beam(BeamPhase::Waiting);
                 self.try_fire();
             }
             Phase::Stopping => {
-                self.pending.take(Pending::STOP_MOTION);
+                self.pending.take(PendingActions::STOP_MOTION);
                 self.moved_to(step);
-                self.conclude(self.phase_seq, Answer::Ack);
+                self.conclude(self.phase_seq, CompactReply::Ack);
                 self.rest();
             }
-            Phase::Idle | Phase::Homing | Phase::Beam(Beam::Waiting | Beam::Listening) => {}
+            Phase::Idle
+            | Phase::Homing
+            | Phase::Beam(BeamPhase::Waiting | BeamPhase::Listening) => {}
         }
     }
 
@@ -144,11 +149,11 @@ impl Device {
                 self.homed = true;
                 self.fault = None;
                 self.moved_to(0);
-                self.conclude(self.phase_seq, Answer::Homed { drift_steps });
+                self.conclude(self.phase_seq, CompactReply::Homed { drift_steps });
                 self.rest();
             }
             (Phase::Homing, Err(HomeError::IndexNotFound)) => {
-                self.conclude(self.phase_seq, Answer::Nak(NakReason::IndexNotFound));
+                self.conclude(self.phase_seq, CompactReply::Nak(NakReason::IndexNotFound));
                 self.rest();
             }
             _ => {}
@@ -161,19 +166,19 @@ impl Device {
             self.settings.and_then(|settings| armed(self.now, settings.settle_ticks));
     }
 
-    /// Everything stops at once, the coils are let go, and the position is not known any more.
+    /// Stops all activity, releases the coils and discards the position.
     pub(super) fn halt(&mut self, kind: FaultKind) {
-        self.pending.take(Pending::PHASE);
-        self.pending.take(Pending::STOP_MOTION);
-        if self.phase == Phase::Beam(Beam::Listening) {
-            self.pending.add(Pending::ABORT_FIRE);
+        self.pending.take(PendingActions::PHASE);
+        self.pending.take(PendingActions::STOP_MOTION);
+        if self.phase == Phase::Beam(BeamPhase::Listening) {
+            self.pending.add(PendingActions::ABORT_FIRE);
         }
         self.release_coils();
         let running = core::mem::replace(&mut self.phase, Phase::Idle);
         match running {
-            Phase::Homing | Phase::Moving { .. } => self.refuse_running(kind),
-            Phase::Beam(_) if self.run.is_ping() => self.refuse_running(kind),
-            Phase::Stopping => self.conclude(self.phase_seq, Answer::Ack),
+            Phase::Homing | Phase::Moving { .. } => self.reject_running(kind),
+            Phase::Beam(_) if self.run.is_ping() => self.reject_running(kind),
+            Phase::Stopping => self.conclude(self.phase_seq, CompactReply::Ack),
             Phase::Beam(_) | Phase::Idle => {}
         }
         self.end_run(match kind {
@@ -189,19 +194,19 @@ impl Device {
 
     pub(super) fn release_coils(&mut self) {
         self.holds_coils = false;
-        self.pending.add(Pending::RELEASE_COILS);
+        self.pending.add(PendingActions::RELEASE_COILS);
     }
 
-    fn refuse_running(&mut self, kind: FaultKind) {
+    fn reject_running(&mut self, kind: FaultKind) {
         let reason = match kind {
             FaultKind::EmergencyStop => NakReason::EmergencyStop,
             FaultKind::MotionFault => NakReason::MotionFault,
             FaultKind::LeaseExpired | FaultKind::HoldExpired => NakReason::Stopped,
         };
-        self.conclude(self.phase_seq, Answer::Nak(reason));
+        self.conclude(self.phase_seq, CompactReply::Nak(reason));
     }
 
-    /// Ends the sweep or ping that is under way, if any.
+    /// Ends the sweep or ping in progress, if any.
     pub(super) fn end_run(&mut self, state: SweepState) {
         if self.run.state.is_running() {
             self.run.state = state;
@@ -212,14 +217,14 @@ impl Device {
         }
     }
 
-    /// Nothing is under way any more; held coils are watched.
+    /// Returns to idle, and starts the hold timer if the coils carry current.
     pub(super) fn rest(&mut self) {
         self.phase = Phase::Idle;
         self.arm_hold();
     }
 
-    /// A request addressed to this boot came in.
-    pub(super) fn host_is_alive(&mut self) {
+    /// Renews lease and hold timer after a request addressed to this boot.
+    pub(super) fn renew_timers(&mut self) {
         if self.timers.lease.is_some() {
             self.arm_lease();
         }
@@ -240,7 +245,7 @@ impl Device {
     }
 }
 
-/// A deadline `ticks` from now; none if that is at once.
+/// Deadline `ticks` from now; `None` for 0 ticks.
 const fn armed(now: u32, ticks: u32) -> Option<u32> {
     if ticks == 0 { None } else { Some(now.wrapping_add(ticks)) }
 }

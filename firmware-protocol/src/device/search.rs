@@ -1,68 +1,68 @@
-//! Finding the index, for boards that have a sensor for it. Position zero is the step at which
-//! the sensor comes on in the forward direction, whatever side it was reached from.
+//! Index search, for boards with an index sensor. Position zero is the step at which the sensor
+//! switches on in the forward direction, regardless of the direction of approach.
 //!
-//! Half a turn forwards, then at most a whole one backwards: the cable is never wound further
-//! than half a turn from where it was.
+//! The search moves half a turn forwards, then at most a whole turn backwards. The cable is never
+//! wound further than half a turn from its initial state.
 
 use super::HomeError;
 
-/// A search under way.
+/// Index search in progress.
 #[derive(Debug, Clone, Copy)]
 pub struct IndexSearch {
-    leg: Leg,
-    /// Steps a revolution.
+    leg: SearchLeg,
+    /// Steps per revolution.
     revolution: u16,
     seen: i32,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Leg {
-    /// Forwards to where the index comes on: position zero.
+enum SearchLeg {
+    /// Forwards until the sensor switches on: position zero.
     Ahead,
     /// Backwards, to find the index at all.
     Back,
-    /// Backwards out of the index.
+    /// Backwards until the sensor switches off.
     Out,
     /// Forwards again: the index must be near.
     Final,
-    /// To where it was seen.
+    /// Back to the detected position.
     Return,
 }
 
 impl IndexSearch {
-    /// Begins with the sensor on or off. Turn first as [`Self::turn`] says.
+    /// Starts a search with the sensor on or off. The first move is that of [`Self::turn`].
     #[must_use]
     pub const fn begin(at_index: bool, revolution: u16) -> Self {
-        Self { leg: if at_index { Leg::Out } else { Leg::Ahead }, revolution, seen: 0 }
+        Self { leg: if at_index { SearchLeg::Out } else { SearchLeg::Ahead }, revolution, seen: 0 }
     }
 
-    /// What to turn to from step `here`, and what to watch the sensor for meanwhile: brake as
-    /// soon as it is on (`true`) or off. Then comes [`Self::arrived`].
+    /// Target of the next move from step `here`, and the sensor level to brake at: on (`true`),
+    /// off, or none. Call [`Self::arrived`] after the move.
     #[must_use]
     pub fn turn(&self, here: i32) -> (i32, Option<bool>) {
         let revolution = i32::from(self.revolution);
         match self.leg {
-            Leg::Ahead | Leg::Final => (here.wrapping_add(revolution / 2), Some(true)),
-            Leg::Back => (here.wrapping_sub(revolution), Some(true)),
-            Leg::Out => (here.wrapping_sub(revolution / 2), Some(false)),
-            Leg::Return => (self.seen, None),
+            SearchLeg::Ahead | SearchLeg::Final => (here.wrapping_add(revolution / 2), Some(true)),
+            SearchLeg::Back => (here.wrapping_sub(revolution), Some(true)),
+            SearchLeg::Out => (here.wrapping_sub(revolution / 2), Some(false)),
+            SearchLeg::Return => (self.seen, None),
         }
     }
 
-    /// The last turn ended; `seen`: where the sensor became what it was watched for. `None` while
-    /// there is another turn, then where the index is, in the coordinates so far, which begin
-    /// there from now on.
+    /// Processes the end of a move; `seen` is the step at which the sensor reached the level of
+    /// [`Self::turn`]. Returns `None` if another move follows, else the position of the index in
+    /// the present coordinates. That position becomes zero.
     pub fn arrived(&mut self, seen: Option<i32>) -> Option<Result<i32, HomeError>> {
         self.leg = match (self.leg, seen) {
-            (Leg::Return, _) => return Some(Ok(self.seen)),
-            (Leg::Ahead | Leg::Final, Some(seen)) => {
+            (SearchLeg::Return, _) => return Some(Ok(self.seen)),
+            (SearchLeg::Ahead | SearchLeg::Final, Some(seen)) => {
                 self.seen = seen;
-                Leg::Return
+                SearchLeg::Return
             }
-            (Leg::Ahead, None) => Leg::Back,
-            (Leg::Back, Some(_)) => Leg::Out,
-            (Leg::Out, Some(_)) => Leg::Final,
-            (Leg::Back | Leg::Out | Leg::Final, None) => {
+            (SearchLeg::Ahead, None) => SearchLeg::Back,
+            (SearchLeg::Back, Some(_)) => SearchLeg::Out,
+            (SearchLeg::Out, Some(_)) => SearchLeg::Final,
+            (SearchLeg::Back | SearchLeg::Out | SearchLeg::Final, None) => {
                 return Some(Err(HomeError::IndexNotFound));
             }
         };
@@ -70,12 +70,13 @@ impl IndexSearch {
     }
 }
 
-/// The same angle within half a turn of zero: the index comes once a turn.
+/// Returns the equivalent angle within half a turn of zero, as the index occurs once per
+/// revolution.
 #[must_use]
 pub fn within_half_a_turn(steps: i32, revolution: u16) -> i32 {
     let revolution = i32::from(revolution);
     let mut near = steps;
-    // No division: a microcontroller has none, and there are few turns.
+    // Subtracts, because the microcontroller has no division and there are few turns.
     while revolution > 0 && near > revolution / 2 {
         near = near.wrapping_sub(revolution);
     }

@@ -1,4 +1,4 @@
-//! Which settings, positions and plans the device accepts.
+//! Validation of settings, positions and plans.
 
 use crate::messages::limits::{
     ACCELERATION_MAX, HOLD_S_MAX, INTERVAL_TICKS_MAX, LEASE_MS_MIN, MAX_ECHOES, POSITION_MAX,
@@ -7,14 +7,14 @@ use crate::messages::limits::{
 };
 use crate::messages::{Blanking, Capabilities, NakReason, Settings, Sweep};
 
-/// Checks settings against the limits and the board's capabilities.
+/// Checks settings against the limits and the capabilities of the board.
 #[inline(never)]
 pub(super) fn check_settings(
     settings: &Settings,
     capabilities: Capabilities,
 ) -> Result<(), NakReason> {
     let max_echoes = if capabilities.has(Capabilities::MULTIPLE_ECHOES) { MAX_ECHOES } else { 1 };
-    // One after the other: as a table this is larger than a microcontroller can afford.
+    // Individual comparisons: as a table this code is too large for a microcontroller.
     if settings.window_ticks < WINDOW_TICKS_MIN || settings.window_ticks > WINDOW_TICKS_MAX {
         return Err(NakReason::WindowOutOfRange);
     }
@@ -27,7 +27,7 @@ pub(super) fn check_settings(
     if settings.max_echoes == 0 || settings.max_echoes > max_echoes {
         return Err(NakReason::EchoesOutOfRange);
     }
-    if !blanking_is_right(settings, capabilities) {
+    if !is_blanking_valid(settings, capabilities) {
         return Err(NakReason::BlankingOutOfRange);
     }
     if settings.speed == 0 || settings.speed > SPEED_MAX {
@@ -42,7 +42,7 @@ pub(super) fn check_settings(
     Ok(())
 }
 
-fn blanking_is_right(settings: &Settings, capabilities: Capabilities) -> bool {
+fn is_blanking_valid(settings: &Settings, capabilities: Capabilities) -> bool {
     match settings.blanking {
         Blanking::Internal => true,
         Blanking::Short { ticks } => {
@@ -53,7 +53,7 @@ fn blanking_is_right(settings: &Settings, capabilities: Capabilities) -> bool {
     }
 }
 
-/// Checks a position.
+/// Checks a position against [`POSITION_MAX`].
 #[inline(never)]
 pub(super) fn check_step(step: i32) -> Result<(), NakReason> {
     if (-POSITION_MAX..=POSITION_MAX).contains(&step) {
@@ -63,7 +63,7 @@ pub(super) fn check_step(step: i32) -> Result<(), NakReason> {
     }
 }
 
-/// Checks a plan; gives its number of beams.
+/// Checks a plan and returns its number of beams.
 #[inline(never)]
 pub(super) fn check_plan(plan: &Sweep) -> Result<u16, NakReason> {
     let beams = plan.beams().filter(|_| plan.sweep != 0).ok_or(NakReason::SweepOutOfRange)?;

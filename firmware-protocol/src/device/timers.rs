@@ -1,19 +1,19 @@
-//! The device's timers, on a clock of 32 bits that wraps.
+//! Timers of the device, on a wrapping 32-bit clock.
 
-/// Everything the device may wait for.
+/// Timers of the device.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum DeviceTimer {
-    /// The rest after a move, before firing.
+    /// Settling time between a move and firing.
     Settle,
-    /// The least time from firing to firing.
+    /// Minimum time between firings.
     MinInterval,
-    /// A sweep ends when the host is silent for longer.
+    /// End of a sweep whose host sends nothing.
     Lease,
-    /// Idle coils are released when the host is silent for longer.
+    /// Release of idle coils while the host sends nothing.
     Hold,
 }
 
-/// Deadlines in ticks; each lies less than half a turn of the clock ahead.
+/// Deadlines in ticks; each is less than half a turn of the clock ahead.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Timers {
     pub(super) settle: Option<u32>,
@@ -23,21 +23,21 @@ pub(super) struct Timers {
 }
 
 impl Timers {
-    /// The timer that ends first, seen from `now`.
+    /// Returns the timer that expires first after `now`.
     pub(super) fn earliest(&self, now: u32) -> Option<(DeviceTimer, u32)> {
         let mut first = None;
-        sooner(now, &mut first, DeviceTimer::Settle, self.settle);
-        sooner(now, &mut first, DeviceTimer::MinInterval, self.min_interval);
-        sooner(now, &mut first, DeviceTimer::Lease, self.lease);
-        sooner(now, &mut first, DeviceTimer::Hold, self.hold);
+        replace_if_earlier(now, &mut first, DeviceTimer::Settle, self.settle);
+        replace_if_earlier(now, &mut first, DeviceTimer::MinInterval, self.min_interval);
+        replace_if_earlier(now, &mut first, DeviceTimer::Lease, self.lease);
+        replace_if_earlier(now, &mut first, DeviceTimer::Hold, self.hold);
         first
     }
 }
 
-/// Puts `timer` in the place of `first` if it ends before it.
-// Not inlined, as `expire`: four copies of either are much for a microcontroller.
+/// Replaces `first` by `timer` if that expires earlier.
+// Not inlined, like `expire`: four copies of either are too large for a microcontroller.
 #[inline(never)]
-fn sooner(
+fn replace_if_earlier(
     now: u32,
     first: &mut Option<(DeviceTimer, u32)>,
     timer: DeviceTimer,
@@ -50,17 +50,17 @@ fn sooner(
     }
 }
 
-/// Whether `slot` holds a deadline that has passed; if so it is cleared.
+/// Clears `slot` and returns `true` if its deadline has passed.
 #[inline(never)]
 pub(super) fn expire(slot: &mut Option<u32>, now: u32) -> bool {
-    let over = slot.is_some_and(|at| ticks_until(now, at) <= 0);
-    if over {
+    let expired = slot.is_some_and(|at| ticks_until(now, at) <= 0);
+    if expired {
         *slot = None;
     }
-    over
+    expired
 }
 
-/// Ticks from `now` to `at`; negative if `at` has passed.
+/// Ticks from `now` until `at`; negative if `at` has passed.
 #[expect(clippy::cast_possible_wrap, reason = "serial arithmetic on a clock that wraps")]
 pub(super) const fn ticks_until(now: u32, at: u32) -> i32 {
     at.wrapping_sub(now) as i32

@@ -1,6 +1,6 @@
-//! What the device still has to say. Frames are built one at a time, when the line is free.
+//! Transmit queue. Frames are encoded individually, when the line is free.
 
-use super::{Answer, Beam, Device, Phase};
+use super::{BeamPhase, CompactReply, Device, Phase};
 use crate::frame::{Frame, Header};
 use crate::messages::table::{code_of, put_record};
 use crate::messages::{
@@ -8,10 +8,10 @@ use crate::messages::{
     SweepState, Wire as _, Writer, limits,
 };
 
-/// Frames not yet begun, and the one on its way.
+/// Frames to be encoded, and the frame in transmission.
 #[derive(Debug, Clone)]
 pub(super) struct Outbox {
-    answer: Option<(u16, Answer)>,
+    answer: Option<(u16, CompactReply)>,
     announce: bool,
     fault: Option<FaultKind>,
     sweep_done: bool,
@@ -19,7 +19,7 @@ pub(super) struct Outbox {
     sent: u16,
     resend_next: u16,
     resend_left: u8,
-    /// On its way, or empty.
+    /// Frame in transmission, or empty.
     frame: Frame,
 }
 
@@ -37,8 +37,9 @@ impl Outbox {
         }
     }
 
-    /// Answers request `seq`. The host has one request open, so the newest answer counts.
-    pub(super) fn answer(&mut self, seq: u16, answer: Answer) {
+    /// Queues the reply to request `seq`. The host has a single open request, so a newer reply
+    /// replaces an older one.
+    pub(super) fn answer(&mut self, seq: u16, answer: CompactReply) {
         self.answer = Some((seq, answer));
     }
 
@@ -66,14 +67,14 @@ impl Outbox {
         self.resend_left = count;
     }
 
-    /// Whether nothing of importance is left to send.
+    /// Returns `true` if neither a reply nor the announcement is left to send.
     pub(super) fn is_empty(&self) -> bool {
         self.frame.is_empty() && self.answer.is_none() && !self.announce
     }
 }
 
 impl Device {
-    /// The next byte for the host.
+    /// Returns the next byte for the host.
     pub(super) fn next_byte(&mut self) -> Option<u8> {
         if self.outbox.frame.is_empty() && !self.next_frame() {
             return None;
@@ -81,26 +82,26 @@ impl Device {
         self.outbox.frame.pop()
     }
 
-    /// Builds the next frame, if there is one. Answers first, so that requests are quick; then
-    /// readings in order; the end after the last.
+    /// Encodes the next frame, if there is one: replies first for a short round trip, then readings
+    /// in order, and the end of the sweep after the last reading.
     fn next_frame(&mut self) -> bool {
         if let Some((seq, answer)) = self.outbox.answer
             && !self.must_wait_for_resend(answer)
         {
             self.outbox.answer = None;
-            return self.say(seq, answer);
+            return self.encode_frame(seq, answer);
         }
         if core::mem::take(&mut self.outbox.announce) {
-            return self.say(0, Answer::Identity);
+            return self.encode_frame(0, CompactReply::Identity);
         }
         if let Some(kind) = self.outbox.fault.take() {
-            return self.say(0, Answer::Fault(kind));
+            return self.encode_frame(0, CompactReply::Fault(kind));
         }
         self.next_event()
     }
 
-    fn must_wait_for_resend(&self, answer: Answer) -> bool {
-        matches!(answer, Answer::Alive { .. }) && self.outbox.resend_left > 0
+    fn must_wait_for_resend(&self, answer: CompactReply) -> bool {
+        matches!(answer, CompactReply::Alive { .. }) && self.outbox.resend_left > 0
     }
 
     fn next_event(&mut self) -> bool {
@@ -108,30 +109,32 @@ impl Device {
             let index = self.outbox.resend_next;
             self.outbox.resend_left = self.outbox.resend_left.wrapping_sub(1);
             self.outbox.resend_next = index.wrapping_add(1);
-            // What was never sent comes in its turn.
-            if index < self.outbox.sent && self.say(self.run.seq, Answer::Beam(index)) {
+            // Beams never sent follow in their regular order.
+            if index < self.outbox.sent
+                && self.encode_frame(self.run.seq, CompactReply::Beam(index))
+            {
                 return true;
             }
         }
         if let Some((seq, answer)) = self.outbox.answer.take() {
-            return self.say(seq, answer);
+            return self.encode_frame(seq, answer);
         }
         let index = self.outbox.sent.max(self.ring.first());
         if !self.run.is_ping() && index < self.run.fired {
             self.outbox.sent = index.wrapping_add(1);
-            return self.say(self.run.seq, Answer::Beam(index));
+            return self.encode_frame(self.run.seq, CompactReply::Beam(index));
         }
         if core::mem::take(&mut self.outbox.sweep_done) {
-            return self.say(self.run.seq, Answer::SweepDone);
+            return self.encode_frame(self.run.seq, CompactReply::SweepDone);
         }
         false
     }
 
-    /// Builds a frame; false if there is nothing to say it about any more.
-    // Not inlined, as its parts: all frames are built in one place, beside the machine that they
-    // tell of, and each part has a small frame of its own on a microcontroller's stack.
+    /// Encodes a frame; returns `false` if its subject is no longer stored.
+    // Not inlined, nor are its parts: all frames are built in a single buffer, and each part has a
+    // small stack frame of its own on the microcontroller.
     #[inline(never)]
-    fn say(&mut self, seq: u16, answer: Answer) -> bool {
+    fn encode_frame(&mut self, seq: u16, answer: CompactReply) -> bool {
         let mut frame = Frame::EMPTY;
         let Some(body_len) = self.put(answer, frame.body()) else {
             return false;
@@ -143,27 +146,27 @@ impl Device {
     }
 
     #[inline(never)]
-    fn put(&self, answer: Answer, mut body: Writer<'_>) -> Option<u8> {
+    fn put(&self, answer: CompactReply, mut body: Writer<'_>) -> Option<u8> {
         let out = &mut body;
         match answer {
-            Answer::Identity => self.put_identity(out),
-            Answer::Ack => Reply::Ack.put(out),
-            Answer::Nak(reason) => Reply::Nak { reason }.put(out),
-            Answer::Started => Reply::Started.put(out),
-            Answer::Homed { drift_steps } => Reply::Homed { drift_steps }.put(out),
-            Answer::Ping => self.put_reading(0, out)?,
-            Answer::Beam(index) => self.put_reading(index, out)?,
-            Answer::Fault(kind) => Reply::Fault { kind }.put(out),
-            Answer::SweepDone => self.put_sweep_done(out),
-            Answer::Alive { ticks } => self.put_alive(ticks, out),
-            Answer::Status { ticks } => self.put_status(ticks, out),
+            CompactReply::Identity => self.put_identity(out),
+            CompactReply::Ack => Reply::Ack.put(out),
+            CompactReply::Nak(reason) => Reply::Nak { reason }.put(out),
+            CompactReply::Started => Reply::Started.put(out),
+            CompactReply::Homed { drift_steps } => Reply::Homed { drift_steps }.put(out),
+            CompactReply::Ping => self.put_reading(0, out)?,
+            CompactReply::Beam(index) => self.put_reading(index, out)?,
+            CompactReply::Fault(kind) => Reply::Fault { kind }.put(out),
+            CompactReply::SweepDone => self.put_sweep_done(out),
+            CompactReply::Alive { ticks } => self.put_alive(ticks, out),
+            CompactReply::Status { ticks } => self.put_status(ticks, out),
         }
         body.finish()
     }
 
     #[inline(never)]
     fn put_reading(&self, index: u16, out: &mut Writer<'_>) -> Option<()> {
-        let kept = self.ring.get(index)?;
+        let stored = self.ring.get(index)?;
         let plan = &self.run.plan;
         let step = plan.step_of(index)?;
         out.byte(const { code_of(Reply::VARIANTS, "Reading") });
@@ -173,9 +176,9 @@ impl Device {
                 sweep: plan.sweep,
                 index: index,
                 step: step,
-                fired_ticks: kept.fired_ticks(),
-                status: kept.status(),
-                echoes: kept.echoes(),
+                fired_ticks: stored.fired_ticks(),
+                status: stored.status(),
+                echoes: stored.echoes(),
             }
         );
         Some(())
@@ -255,8 +258,12 @@ impl Device {
             Phase::Homing => DeviceState::Homing,
             Phase::Moving { .. } => DeviceState::Moving,
             Phase::Stopping => DeviceState::Stopping,
-            Phase::Beam(Beam::Moving { .. } | Beam::Waiting | Beam::Listening) => {
-                if self.run.is_ping() { DeviceState::Pinging } else { DeviceState::Sweeping }
+            Phase::Beam(BeamPhase::Moving { .. } | BeamPhase::Waiting | BeamPhase::Listening) => {
+                if self.run.is_ping() {
+                    DeviceState::Pinging
+                } else {
+                    DeviceState::Sweeping
+                }
             }
         }
     }

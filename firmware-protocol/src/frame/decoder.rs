@@ -1,70 +1,70 @@
-//! Reading frames byte by byte from a line that may lose, change or add bytes.
+//! Frame decoder for a byte stream whose bytes may be lost, altered or inserted.
 
 use super::{CRC_LEN, DELIMITER, HEADER_LEN, Header, PAYLOAD_MAX, crc32};
 
-/// Finds frames in a stream of bytes.
+/// Extracts frames from a byte stream.
 ///
-/// Unstuffs while bytes come in, so it holds one payload and nothing else. After any fault it
-/// drops everything up to the next delimiter: the tail of a frame that was too long is never
-/// taken for a frame.
+/// Unstuffs while bytes arrive, so the decoder stores a single payload and nothing else. After any
+/// error it drops everything up to the next delimiter: the tail of an overlong frame is never read
+/// as a frame.
 #[derive(Debug, Clone)]
 pub struct FrameDecoder {
     payload: [u8; PAYLOAD_MAX],
     len: u8,
     /// Bytes left in the current COBS block.
     run: u8,
-    state: State,
+    state: DecoderState,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum State {
+enum DecoderState {
     /// Before the first code byte of a frame.
     Between,
     Inside,
-    /// Until the next delimiter.
+    /// Discarding bytes up to the next delimiter.
     Dropping(DropReason),
 }
 
-/// The event that a byte completed.
+/// Event completed by a byte.
 #[derive(Debug, PartialEq, Eq)]
 pub enum Received<'a> {
-    /// Nothing yet.
+    /// The frame is incomplete.
     Nothing,
-    /// A frame whose CRC is right. The message inside is not looked at.
+    /// A frame with a valid CRC. The message inside is not decoded.
     Frame(RawFrame<'a>),
-    /// Two delimiters with nothing between: harmless.
+    /// Two delimiters in a row, which is harmless.
     Empty,
-    /// The end of something that was no frame.
+    /// End of a byte sequence that was not a valid frame.
     Dropped(DropReason),
 }
 
-/// A frame with a right CRC.
+/// Frame with a valid CRC.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct RawFrame<'a> {
     /// Boot nonce and sequence number.
     pub header: Header,
-    /// The encoded message, one byte at least.
+    /// Encoded message, at least one byte.
     pub body: &'a [u8],
-    /// The CRC, which tells a repeated request from another one with the same number.
+    /// CRC, which distinguishes a repeated request from a different one with the same number.
     pub crc: u32,
-    /// Bytes on the wire, with code byte and delimiter.
+    /// Bytes on the wire, including code byte and delimiter.
     pub wire_len: u8,
 }
 
-/// The reason why bytes were dropped.
+/// Reason for dropping received bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum DropReason {
-    /// The delimiter came inside a COBS block.
+    /// Delimiter inside a COBS block.
     Stuffing,
     /// More than [`PAYLOAD_MAX`] bytes without a delimiter.
     TooLong,
-    /// The CRC is wrong, or there are too few bytes for header, message and CRC.
+    /// Wrong CRC, or too few bytes for header, message and CRC.
     Checksum,
-    /// The line reported an error of its own (framing, overrun).
+    /// Error reported by the line driver (framing, overrun).
     Line,
 }
 
-/// Counts of what a receiver dropped, by kind. Counters stop at their largest value.
+/// Counts of dropped or ignored frames, by reason. Counters saturate at `u16::MAX`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct LinkCounters {
     /// Frames with a wrong CRC or too short for one.
@@ -73,13 +73,13 @@ pub struct LinkCounters {
     pub stuffing: u16,
     /// Runs of more bytes than a frame may have.
     pub too_long: u16,
-    /// Frames hit by an error that the line itself reported.
+    /// Frames affected by an error that the line driver reported.
     pub line: u16,
-    /// Right frames with a message that this version does not know.
+    /// Valid frames with a message unknown to this version.
     pub undecodable: u16,
-    /// Right messages that came too late: old duplicates, or from before a restart.
+    /// Valid messages that arrived too late: old duplicates, or from before a restart.
     pub stale: u16,
-    /// Empty frames (delimiters in a row). Not a fault.
+    /// Empty frames (consecutive delimiters). Not an error.
     pub empty: u16,
 }
 
@@ -96,7 +96,7 @@ impl LinkCounters {
     }
 }
 
-/// Counts up to the largest value, and stays there.
+/// Increments a counter, saturating at `u16::MAX`.
 // Not inlined: there are many counters.
 #[inline(never)]
 pub(crate) fn count(counter: &mut u16) {
@@ -110,39 +110,39 @@ impl Default for FrameDecoder {
 }
 
 impl FrameDecoder {
-    /// A decoder between frames.
+    /// Creates a decoder in the state between two frames.
     #[must_use]
     pub const fn new() -> Self {
-        Self { payload: [0; PAYLOAD_MAX], len: 0, run: 0, state: State::Between }
+        Self { payload: [0; PAYLOAD_MAX], len: 0, run: 0, state: DecoderState::Between }
     }
 
-    /// Takes the next byte from the line.
+    /// Processes the next byte from the line.
     pub fn push(&mut self, byte: u8) -> Received<'_> {
         if byte == DELIMITER {
             return self.end();
         }
         match self.state {
-            State::Between => {
+            DecoderState::Between => {
                 self.len = 0;
                 self.run = byte.wrapping_sub(1);
-                self.state = State::Inside;
+                self.state = DecoderState::Inside;
             }
-            State::Inside if self.run == 0 => {
+            DecoderState::Inside if self.run == 0 => {
                 self.append(DELIMITER);
                 self.run = byte.wrapping_sub(1);
             }
-            State::Inside => {
+            DecoderState::Inside => {
                 self.append(byte);
                 self.run = self.run.wrapping_sub(1);
             }
-            State::Dropping(_) => {}
+            DecoderState::Dropping(_) => {}
         }
         Received::Nothing
     }
 
-    /// The line reported an error: what is being received is dropped up to the next delimiter.
-    pub fn damage(&mut self) {
-        self.state = State::Dropping(DropReason::Line);
+    /// Discards the frame being received, after an error reported by the line driver.
+    pub fn discard_frame(&mut self) {
+        self.state = DecoderState::Dropping(DropReason::Line);
     }
 
     fn append(&mut self, byte: u8) {
@@ -150,17 +150,17 @@ impl FrameDecoder {
             *slot = byte;
             self.len = self.len.wrapping_add(1);
         } else {
-            self.state = State::Dropping(DropReason::TooLong);
+            self.state = DecoderState::Dropping(DropReason::TooLong);
         }
     }
 
     fn end(&mut self) -> Received<'_> {
-        let state = core::mem::replace(&mut self.state, State::Between);
+        let state = core::mem::replace(&mut self.state, DecoderState::Between);
         match state {
-            State::Between => Received::Empty,
-            State::Dropping(reason) => Received::Dropped(reason),
-            State::Inside if self.run != 0 => Received::Dropped(DropReason::Stuffing),
-            State::Inside => match self.check() {
+            DecoderState::Between => Received::Empty,
+            DecoderState::Dropping(reason) => Received::Dropped(reason),
+            DecoderState::Inside if self.run != 0 => Received::Dropped(DropReason::Stuffing),
+            DecoderState::Inside => match self.check() {
                 Some(frame) => Received::Frame(frame),
                 None => Received::Dropped(DropReason::Checksum),
             },

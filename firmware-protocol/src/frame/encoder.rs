@@ -1,34 +1,33 @@
-//! Building frames, in place and without a second buffer.
+//! Frame encoder, in place and without a second buffer.
 
 use core::ops::{Deref, Range};
 
 use super::{CRC_LEN, DELIMITER, FRAME_MAX, HEADER_LEN, Header, PAYLOAD_MAX, crc32};
 use crate::messages::{Wire, Writer};
 
-/// A frame ready to be written to the line.
-///
-/// Reads as a byte slice.
+/// Frame ready to be written to the line; dereferences to a byte slice.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Frame {
-    /// A delimiter, the code byte, the payload, a delimiter.
+    /// Leading delimiter, code byte, payload, trailing delimiter.
     bytes: [u8; FRAME_MAX + 1],
-    /// Where reading begins: 0 with the leading delimiter, else 1.
+    /// Index of the first byte to send: 0 with the leading delimiter, else 1.
     start: u8,
     end: u8,
     crc: u32,
 }
 
-/// A message whose encoding is over [`super::BODY_MAX`] bytes. No message of the protocol is.
+/// Error for a message whose encoding exceeds [`super::BODY_MAX`] bytes. No message of the protocol
+/// does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct TooLong;
 
-/// Where the header begins in the buffer: behind the leading delimiter and the code byte.
+/// Index of the header in the buffer: after the leading delimiter and the code byte.
 const PAYLOAD_AT: usize = 2;
-/// Where the message is.
+/// Range of the message in the buffer.
 const BODY: Range<usize> = PAYLOAD_AT + HEADER_LEN..PAYLOAD_AT + PAYLOAD_MAX - CRC_LEN;
 
 impl Frame {
-    /// Encodes `message` behind `header`.
+    /// Encodes `header` and `message`.
     ///
     /// # Errors
     ///
@@ -42,16 +41,16 @@ impl Frame {
         Ok(frame)
     }
 
-    /// No bytes at all.
+    /// Frame without any bytes.
     pub(crate) const EMPTY: Self =
         Self { bytes: [DELIMITER; FRAME_MAX + 1], start: 0, end: 0, crc: 0 };
 
-    /// Where the message is to be written.
+    /// Returns a writer for the message body.
     pub(crate) fn body(&mut self) -> Writer<'_> {
         Writer::new(self.bytes.get_mut(BODY).unwrap_or_default())
     }
 
-    /// Puts header, CRC and stuffing around a message of `body_len` bytes.
+    /// Completes a frame whose message has `body_len` bytes: header, CRC and stuffing.
     #[inline(never)]
     pub(crate) fn close(&mut self, header: Header, body_len: u8) -> Result<(), TooLong> {
         let bytes = &mut self.bytes;
@@ -68,25 +67,24 @@ impl Frame {
         Ok(())
     }
 
-    /// Whether no bytes are left.
     pub(crate) const fn is_empty(&self) -> bool {
         self.start == self.end
     }
 
-    /// Takes the first byte away.
+    /// Removes and returns the first byte.
     pub(crate) fn pop(&mut self) -> Option<u8> {
         let byte = self.bytes.get(usize::from(self.start)).filter(|_| !self.is_empty())?;
         self.start = self.start.wrapping_add(1);
         Some(*byte)
     }
 
-    /// The same with a delimiter in front as well, which ends whatever noise came before.
+    /// Returns the frame with a delimiter in front, which terminates any preceding noise.
     #[must_use]
     pub const fn with_leading_delimiter(self) -> Self {
         Self { start: 0, ..self }
     }
 
-    /// The CRC the frame carries.
+    /// CRC of the frame.
     #[must_use]
     pub const fn crc(&self) -> u32 {
         self.crc
@@ -106,8 +104,8 @@ fn put(bytes: &mut [u8], at: usize, value: [u8; 4]) -> Result<(), TooLong> {
     Ok(())
 }
 
-/// COBS in place: the first byte of `block` is free for the first code; each zero becomes the
-/// distance to the next. Right for blocks under 254 bytes.
+/// Applies COBS in place. The first byte of `block` is reserved for the first code; each zero
+/// becomes the distance to the next. Valid for blocks shorter than 254 bytes.
 fn stuff(block: &mut [u8]) {
     let mut distance: u8 = 1;
     let Some((code, payload)) = block.split_first_mut() else {

@@ -1,72 +1,72 @@
-//! Whether a device that answers is the board it was: the one place where that is decided.
+//! Comparison of identities: decides whether a device is still the same board.
 
 use core::fmt;
 
 use crate::messages::{Capabilities, FirmwareVersion, Identity, ProtocolId};
 
-/// In what a board differs from the one before. A restart alone is no difference.
+/// Difference between a board and the preceding one. A restart alone is no difference.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum BoardChange {
-    /// Another serial number.
+    /// The serial numbers differ.
     Serial {
-        /// Before.
-        was: [u8; 10],
-        /// Now.
-        is: [u8; 10],
+        /// Serial number in the previous identity.
+        old: [u8; 10],
+        /// Serial number in the new identity.
+        new: [u8; 10],
     },
-    /// It can do other things, or is no longer (or not before) hardware.
+    /// Other features, or a change between hardware and simulation.
     Capabilities {
-        /// Before.
-        was: Capabilities,
-        /// Now.
-        is: Capabilities,
+        /// Features in the previous identity.
+        old: Capabilities,
+        /// Features in the new identity.
+        new: Capabilities,
     },
     /// Another motor: the same step is another azimuth.
     StepsPerRevolution {
-        /// Before.
-        was: u16,
-        /// Now.
-        is: u16,
+        /// Steps per revolution in the previous identity.
+        old: u16,
+        /// Steps per revolution in the new identity.
+        new: u16,
     },
-    /// Another clock.
+    /// The clock rates of the devices differ.
     TickRate {
-        /// Before, ticks a second.
-        was: u32,
-        /// Now, ticks a second.
-        is: u32,
+        /// Ticks per second in the previous identity.
+        old: u32,
+        /// Ticks per second in the new identity.
+        new: u32,
     },
-    /// Another firmware.
+    /// The versions of the firmware differ.
     Firmware {
-        /// Before.
-        was: FirmwareVersion,
-        /// Now.
-        is: FirmwareVersion,
+        /// Firmware version in the previous identity.
+        old: FirmwareVersion,
+        /// Firmware version in the new identity.
+        new: FirmwareVersion,
     },
-    /// Another protocol.
+    /// The protocol versions or schemas differ.
     Protocol {
-        /// Before.
-        was: ProtocolId,
-        /// Now.
-        is: ProtocolId,
+        /// Protocol in the previous identity.
+        old: ProtocolId,
+        /// Protocol in the new identity.
+        new: ProtocolId,
     },
-    /// It keeps more or fewer readings.
+    /// The capacities for unacknowledged readings differ.
     RingBytes {
-        /// Before, bytes.
-        was: u16,
-        /// Now, bytes.
-        is: u16,
+        /// Capacity in bytes in the previous identity.
+        old: u16,
+        /// Capacity in bytes in the new identity.
+        new: u16,
     },
 }
 
 impl BoardChange {
-    /// The first difference that matters between two identities; `None` if the same board told
-    /// both, whether it restarted in between or not.
+    /// Returns the first relevant difference between two identities; `None` for the same board,
+    /// whether or not it restarted in between.
     #[must_use]
-    pub fn between(was: &Identity, is: &Identity) -> Option<Self> {
+    pub fn between(old: &Identity, new: &Identity) -> Option<Self> {
         macro_rules! first_difference {
             ($($field:ident $change:ident),+) => {
-                $(if was.$field != is.$field {
-                    return Some(Self::$change { was: was.$field, is: is.$field });
+                $(if old.$field != new.$field {
+                    return Some(Self::$change { old: old.$field, new: new.$field });
                 })+
             };
         }
@@ -86,44 +86,44 @@ impl BoardChange {
 impl fmt::Display for BoardChange {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Serial { was, is } => {
-                write!(formatter, "its serial number is {}, not {}", Serial(is), Serial(was))
+            Self::Serial { old, new } => {
+                write!(formatter, "its serial number is {}, not {}", Serial(new), Serial(old))
             }
-            Self::Capabilities { was, is } => {
-                formatter.write_str("it can do other things:")?;
+            Self::Capabilities { old, new } => {
+                formatter.write_str("its capabilities differ:")?;
                 for (bit, name) in Capabilities::NAMES {
-                    match (was.has(bit), is.has(bit)) {
+                    match (old.has(bit), new.has(bit)) {
                         (false, true) => write!(formatter, " +{name}")?,
                         (true, false) => write!(formatter, " -{name}")?,
                         _ => {}
                     }
                 }
-                write!(formatter, " ({:04x}, not {:04x})", is.0, was.0)
+                write!(formatter, " ({:04x}, not {:04x})", new.0, old.0)
             }
-            Self::StepsPerRevolution { was, is } => {
-                write!(formatter, "its motor has {is} steps a revolution, not {was}")
+            Self::StepsPerRevolution { old, new } => {
+                write!(formatter, "its motor has {new} steps per revolution, not {old}")
             }
-            Self::TickRate { was, is } => {
-                write!(formatter, "its clock has {is} ticks a second, not {was}")
+            Self::TickRate { old, new } => {
+                write!(formatter, "its clock has {new} ticks per second, not {old}")
             }
-            Self::Firmware { was, is } => write!(
+            Self::Firmware { old, new } => write!(
                 formatter,
                 "its firmware is {}.{}.{}, not {}.{}.{}",
-                is.major, is.minor, is.patch, was.major, was.minor, was.patch
+                new.major, new.minor, new.patch, old.major, old.minor, old.patch
             ),
-            Self::Protocol { was, is } => write!(
+            Self::Protocol { old, new } => write!(
                 formatter,
-                "it speaks protocol {} ({:08x}), not {} ({:08x})",
-                is.version, is.schema, was.version, was.schema
+                "its protocol is version {} ({:08x}), not {} ({:08x})",
+                new.version, new.schema, old.version, old.schema
             ),
-            Self::RingBytes { was, is } => {
-                write!(formatter, "it keeps {is} bytes of readings, not {was}")
+            Self::RingBytes { old, new } => {
+                write!(formatter, "its reading buffer has {new} bytes, not {old}")
             }
         }
     }
 }
 
-/// A serial number for people: as text if it is text, else in hexadecimal.
+/// Formats a serial number: as text if it is printable ASCII, else in hexadecimal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Serial<'a>(pub &'a [u8; 10]);
 

@@ -1,50 +1,51 @@
-//! What a host is told at the start, and what it can be asked to do.
+//! Configuration and commands of the host.
 
 use crate::messages::{Settings, Sweep};
 
-/// How often a request is sent before the device counts as gone: some nine seconds, in which a
-/// board that the opening of its port has reset is long awake.
+/// Transmissions of a request before the device counts as absent: about nine seconds, longer than a
+/// board needs to boot after a reset caused by opening its port.
 pub const ATTEMPTS: u8 = 7;
-/// How often the time that its work takes may pass while a device says that it is at it.
+/// Times that the expected duration of the work may pass while a device still replies Started.
 pub const OVERRUNS: u8 = 3;
-/// How often the Stop is sent that ends a device which the host gives up on.
+/// Transmissions of the Stop after the host has given up on a request.
 pub const STOP_ATTEMPTS: u8 = 3;
-/// What a reply may take beyond the time of bytes and work before that was measured, us.
+/// Margin of a reply beyond the time of bytes and work, before the first sample, us.
 pub const INITIAL_MARGIN_US: u32 = 200_000;
-/// Least such margin once measured, us.
+/// Minimum margin beyond the mean, us.
 pub const MIN_MARGIN_US: u32 = 20_000;
-/// Largest such margin, repetitions counted in, us.
+/// Maximum margin, including the back-off of repetitions, us.
 pub const MAX_MARGIN_US: u32 = 2_000_000;
-/// A sweep's host speaks at least so many times a lease.
-pub const KEEP_ALIVES_A_LEASE: u8 = 3;
-/// It acknowledges readings so many times while the device's memory for them fills.
-pub const ACKNOWLEDGEMENTS_A_RING: u8 = 4;
-/// Readings that it takes ahead of the lowest one that it lacks.
+/// Minimum number of requests that a host sends per lease during a sweep.
+pub const KEEP_ALIVES_PER_LEASE: u8 = 3;
+/// Number of acknowledgements while the device's ring of readings fills.
+pub const ACKNOWLEDGEMENTS_PER_RING: u8 = 4;
+/// Number of readings accepted ahead of the lowest missing one.
 pub const READINGS_AHEAD: u8 = 64;
-/// A host goes on at most so many numbers behind the last one that the device accepted.
+/// Maximum number by which a host starts ahead of the last sequence number that the device
+/// accepted.
 pub const SEQ_GAP_MAX: u16 = 256;
 
-/// Facts and limits that the host machine cannot find out by itself.
+/// Parameters that the host machine cannot determine by itself.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct HostConfig {
-    /// Speed of the line, bit/s; a byte takes ten bits.
+    /// Bit rate of the line, bit/s; a byte takes ten bits.
     pub baud: u32,
-    /// Any number that differs from run to run: where sequence and sweep numbers begin.
+    /// Number that differs between runs: seed of sequence and sweep numbers.
     pub seed: u32,
-    /// How often a request is sent before the device counts as gone.
+    /// Transmissions of a request before the device counts as absent.
     pub max_attempts: u8,
-    /// How often the time that its work takes may pass while a device says that it is at it.
+    /// Times that the expected duration of the work may pass while a device still replies Started.
     pub max_overruns: u8,
-    /// What a reply may take beyond the time of bytes and motion, before that was measured, us.
+    /// Margin of a reply beyond the time of bytes and work, before the first sample, us.
     pub initial_margin_us: u32,
-    /// Least such margin however quick the replies are, us.
+    /// Minimum margin beyond the mean, us.
     pub min_margin_us: u32,
-    /// Largest such margin however slow the replies are, us.
+    /// Maximum margin, including the back-off of repetitions, us.
     pub max_margin_us: u32,
 }
 
 impl HostConfig {
-    /// Values that suit a USB serial adapter.
+    /// Creates a configuration that suits a USB serial adapter.
     #[must_use]
     pub const fn new(baud: u32, seed: u32) -> Self {
         Self {
@@ -59,54 +60,58 @@ impl HostConfig {
     }
 }
 
-/// A command to the host machine, one at a time; [`Command::Stop`] may come in between.
+/// Command to the host machine, one at a time; only [`Command::Stop`] may interrupt another
+/// command.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Command {
-    /// Meet the device. Ends with [`super::HostEvent::Identified`].
+    /// Identifies the device. Ends with [`super::HostEvent::Identified`].
     Identify,
-    /// Set up motion and ranging.
+    /// Sets motion and ranging parameters.
     Configure(Settings),
-    /// Find home.
+    /// Searches for the home position.
     Home,
-    /// Turn to a position, steps from home.
+    /// Moves to a position, steps from home.
     MoveTo {
-        /// Steps from home.
+        /// Target position, steps from home.
         step: i32,
     },
-    /// Fire once. A [`super::HostEvent::Reading`] comes before the end.
+    /// Fires once. A [`super::HostEvent::Reading`] precedes the end.
     Ping,
-    /// Fire along a plan. The number in [`Sweep::sweep`] is filled in by the host. Ends with
+    /// Executes a plan of beams. The host assigns the number [`Sweep::sweep`]. Ends with
     /// [`super::HostEvent::SweepDone`].
     Sweep(Sweep),
-    /// Ask what the device is doing.
+    /// Queries the state of the device.
     Status,
-    /// Stop whatever is under way.
+    /// Stops the command in progress.
     Stop,
-    /// Restart the device. Identify afterwards.
+    /// Restarts the device. Identify must follow.
     Reset,
 }
 
-/// The reason why a command was not started.
+/// Reason for not starting a command.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum StartError {
-    /// Another one is under way.
+    /// Another command is in progress.
     Busy,
-    /// Identify first.
+    /// Identify is required first.
     NotIdentified,
-    /// The device restarted, or the line was closed, since it was identified: identify it again.
+    /// The device restarted, or the line was closed, since the last Identify. Identify is required
+    /// again.
     Restarted,
-    /// Configure first, so that the host can compute how long things take.
+    /// Configure is required first, because the host derives its timeouts from the settings.
     NotConfigured,
-    /// The plan has no beams, or more than a sweep may have.
+    /// The plan has no beams, or more than the maximum.
     EmptySweep,
 }
 
 impl core::fmt::Display for StartError {
     fn fmt(&self, formatter: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         formatter.write_str(match self {
-            Self::Busy => "another command is under way",
+            Self::Busy => "another command is in progress",
             Self::NotIdentified => "the device has not been identified",
-            Self::Restarted => "the device restarted meanwhile",
+            Self::Restarted => {
+                "the device restarted or the line was closed since it was identified"
+            }
             Self::NotConfigured => "the device has not been configured",
             Self::EmptySweep => "a sweep must have 1 to 65535 beams",
         })

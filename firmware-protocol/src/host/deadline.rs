@@ -1,4 +1,4 @@
-//! How long things may take. Integers only; times in us.
+//! Durations of transmissions and of the device's work. Integers only; times in us.
 
 use super::HostConfig;
 use crate::frame::FRAME_MAX;
@@ -9,23 +9,23 @@ const TICKS_PER_US: u64 = limits::TICK_HZ as u64 / US_PER_S;
 /// Start bit, eight data bits, stop bit.
 const BITS_PER_BYTE: u64 = 10;
 
-/// Time that `bytes` bytes take at `baud` bit/s, rounded up.
+/// Transmission time of `bytes` bytes at `baud` bit/s, us, rounded up.
 pub(super) fn wire_us(bytes: usize, baud: u32) -> u64 {
     (bytes as u64 * BITS_PER_BYTE * US_PER_S).div_ceil(u64::from(baud.max(1)))
 }
 
-/// Time of the longest frame.
+/// Transmission time of the longest frame, us.
 pub(super) fn longest_frame_us(baud: u32) -> u64 {
     wire_us(FRAME_MAX, baud)
 }
 
-/// Device ticks in us, rounded up.
+/// Converts device ticks to us, rounded up.
 pub(super) fn ticks_us(ticks: u32) -> u64 {
     u64::from(ticks).div_ceil(TICKS_PER_US)
 }
 
-/// Time to turn by `steps` with a trapezoid of speeds from rest to rest: `2 sqrt(d / a)` if the
-/// speed `v` is not reached, else `d / v + v / a`.
+/// Time of a move by `steps` from rest to rest with a trapezoidal speed profile, us:
+/// `2 sqrt(d / a)` if the speed `v` is not reached, else `d / v + v / a`.
 pub(super) fn slew_us(steps: u32, settings: &Settings) -> u64 {
     let distance = u64::from(steps);
     let speed = u64::from(settings.speed.max(1));
@@ -37,16 +37,16 @@ pub(super) fn slew_us(steps: u32, settings: &Settings) -> u64 {
     }
 }
 
-/// Time of one beam: rest, the interval since the firing before, the listening window.
+/// Time of a beam, us: the longer of settling time and minimum interval, plus the window.
 pub(super) fn beam_us(settings: &Settings) -> u64 {
     let apart = settings.settle_ticks.max(settings.min_interval_ticks);
     ticks_us(apart) + ticks_us(settings.window_ticks)
 }
 
-/// What replies take beyond the time of bytes and work, estimated as in RFC 6298.
+/// Estimator of the reply time beyond bytes and work, as in RFC 6298.
 #[derive(Debug, Clone)]
 pub(super) struct Margin {
-    /// Smoothed mean and deviation, us, once there was a sample.
+    /// Smoothed mean and deviation, us; `None` before the first sample.
     estimate: Option<(u64, u64)>,
     initial_us: u64,
     min_us: u64,
@@ -64,7 +64,7 @@ impl Margin {
         }
     }
 
-    /// Takes in a sample. Those of requests that were sent more than once must be left out.
+    /// Adds a sample. Samples of repeated requests must be excluded.
     pub(super) fn sample(&mut self, us: u64) {
         self.estimate = Some(match self.estimate {
             None => (us, us / 2),
@@ -74,7 +74,7 @@ impl Margin {
         });
     }
 
-    /// The margin for attempt `attempt` (1 for the first): doubled with each further one.
+    /// Margin for attempt `attempt` (1 for the first), us: doubled with each further attempt.
     pub(super) fn us(&self, attempt: u8) -> u64 {
         let base = match self.estimate {
             None => self.initial_us,
@@ -104,13 +104,13 @@ mod tests {
     }
 
     #[test]
-    fn bytes_take_ten_bits() {
+    fn byte_takes_ten_bits() {
         assert_eq!(wire_us(1, 1_000_000), 10);
         assert_eq!(wire_us(66, 115_200), 5_730);
     }
 
     #[test]
-    fn slewing_follows_the_trapezoid() {
+    fn slew_is_trapezoidal() {
         // 100 steps at 1000 steps/s^2 never reach 1000 steps/s: 2 sqrt(0.1) s.
         assert_eq!(slew_us(100, &settings(1_000, 1_000)), 632_456);
         // 3000 steps do: 3 s at speed, and 1 s more for both ramps.
@@ -121,7 +121,7 @@ mod tests {
     }
 
     #[test]
-    fn margins_follow_what_replies_take() {
+    fn margin_follows_rfc_6298() {
         let config = HostConfig::new(115_200, 1);
         let mut margin = Margin::new(&config);
         assert_eq!(margin.us(1), 200_000);

@@ -1,4 +1,4 @@
-//! What the host machine reports.
+//! Events and errors reported by the host machine.
 
 use core::fmt;
 
@@ -7,147 +7,148 @@ use crate::messages::{
     FaultKind, FirmwareVersion, Identity, NakReason, ProtocolId, Reading, Status, SweepState,
 };
 
-/// An event of the host machine. Every command ends with exactly one of
+/// Event of the host machine. Every command ends with exactly one of
 /// [`Identified`](Self::Identified), [`Done`](Self::Done), [`SweepDone`](Self::SweepDone) or
-/// [`Failed`](Self::Failed); a sweep that Stop ends counts together with that Stop.
+/// [`Failed`](Self::Failed). A sweep ended by Stop counts together with that Stop.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum HostEvent {
-    /// Identify succeeded.
+    /// Identify succeeded; this is the device.
     Identified(Identity),
-    /// A command succeeded.
+    /// Another command succeeded.
     Done(Outcome),
-    /// One firing. Each beam of a sweep comes exactly once, not always in order.
+    /// Result of one firing. Each beam of a sweep is reported exactly once, not always in order.
     Reading {
-        /// The reading, checked against the plan.
+        /// Reading, checked against the plan.
         reading: Reading,
-        /// Whether it was lost on the line at first and sent again.
+        /// `true` if the reading was lost on the line at first and sent again.
         repaired: bool,
     },
-    /// A beam of a sweep whose reading makes no sense. It is not asked for again, and not
+    /// Invalid reading of a sweep. The beam is not requested again, and its reading is not
     /// delivered.
     ReadingRefused {
-        /// What was told.
+        /// Reading as received.
         reading: Reading,
-        /// What is wrong with it.
+        /// Rule that the reading violates.
         fault: ReadingFault,
     },
-    /// A sweep ended: every beam was delivered or refused, or it was stopped by [`super::Command::Stop`].
+    /// End of a sweep: every beam was delivered or rejected, or [`super::Command::Stop`] ended it.
     SweepDone {
-        /// Its number.
+        /// Number of the sweep.
         sweep: u16,
-        /// Readings delivered.
+        /// Number of readings delivered.
         delivered: u16,
-        /// [`SweepState::Complete`] or [`SweepState::Stopped`].
+        /// Final state: [`SweepState::Complete`] or [`SweepState::Stopped`].
         end: SweepState,
     },
-    /// A pair of clocks, for a fit.
+    /// Pair of host and device times, for clock fitting.
     ClockSample {
-        /// When the request was handed out, us.
+        /// Time when the request was handed out, us.
         sent_us: u64,
-        /// When the reply had come in, us.
+        /// Time when the reply had arrived, us.
         received_us: u64,
-        /// Device clock when the request had come in, ticks (wrapping).
+        /// Device clock when the request had arrived, ticks (wrapping).
         device_ticks: u32,
-        /// Whether the request was sent more than once, so that the pair may be wrong.
+        /// `true` if the request was sent more than once, so that the pair may be wrong.
         retried: bool,
     },
-    /// The device stopped by itself. A command under way fails apart from this.
+    /// The device stopped by itself. A command in progress fails with a separate event.
     Fault(FaultKind),
-    /// The device restarted: position and settings are gone. Identify, configure, home.
+    /// The device restarted and lost position and settings. Identify, Configure and Home are
+    /// required.
     Rebooted {
-        /// The boot nonce known so far.
+        /// Last known boot nonce.
         old: u16,
-        /// The new one.
+        /// Boot nonce of the restarted device.
         new: u16,
     },
-    /// A command failed for good.
+    /// A command failed and has ended.
     Failed(HostError),
 }
 
-/// The result of a successful command.
+/// Result of a successful command.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Outcome {
-    /// Configure was accepted.
+    /// The settings were accepted.
     Configured,
-    /// Home was found.
+    /// The home position was found.
     Homed {
-        /// Where the index was found against where it was expected, steps.
+        /// Actual minus expected position of the index, steps.
         drift_steps: i32,
     },
-    /// MoveTo arrived.
+    /// The target of MoveTo was reached.
     Moved {
-        /// Steps from home.
+        /// Position reached, steps from home.
         step: i32,
     },
     /// The Ping's reading was delivered.
     Pinged,
-    /// What the device is doing.
+    /// State of the device.
     Status(Status),
-    /// Everything stands.
+    /// Motion and firing have stopped.
     Stopped,
-    /// The device restarts, or has restarted.
+    /// The device is restarting or has restarted.
     Reset,
 }
 
-/// The reason why a command failed.
+/// Reason for the failure of a command.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum HostError {
-    /// Nothing came back.
+    /// No bytes were received.
     NoAnswer {
-        /// How often the request was sent.
+        /// Number of transmissions.
         attempts: u8,
     },
-    /// Bytes came back, but never a frame: another speed, or another device.
+    /// Bytes were received but no valid frame: another bit rate, or another device.
     NotADevice {
-        /// Bytes received meanwhile.
+        /// Bytes received since the start of the command.
         bytes: u64,
     },
-    /// The device speaks another version of the protocol.
+    /// The protocol version or schema of the device differs.
     WrongVersion {
-        /// What this host speaks.
+        /// Protocol of this host.
         ours: ProtocolId,
-        /// What the device speaks.
+        /// Protocol of the device.
         theirs: ProtocolId,
-        /// The device's firmware.
+        /// Firmware version of the device.
         firmware: FirmwareVersion,
     },
-    /// What the device says of itself makes no sense.
+    /// The identity of the device is invalid.
     WrongIdentity(IdentityFault),
-    /// The device refused.
+    /// The device rejected the request.
     Refused(NakReason),
-    /// The device restarted meanwhile.
+    /// The device restarted during the command.
     Rebooted,
     /// The line was closed.
     Hangup,
-    /// The device heard nothing for longer than the sweep's lease, and ended it.
+    /// The sweep ended because the device received nothing for longer than its lease.
     LeaseExpired,
-    /// The emergency stop ended it.
+    /// The emergency stop ended the command.
     EmergencyStop,
     /// The motor did not reach a position.
     MotionFault,
-    /// Somebody else stopped it.
+    /// The device reports a stop that this host did not request.
     Stopped,
-    /// The device answers, but does not get on with its work.
+    /// The device replies but makes no progress.
     Stalled {
-        /// Beams fired so far.
+        /// Number of beams fired so far.
         fired: u16,
     },
-    /// The device says again and again that it is at it, for longer than its work can take.
+    /// The device repeatedly replies Started, for longer than the work can take.
     Overrun {
-        /// How long it was waited for, ms.
+        /// Time since the request, ms.
         waited_ms: u32,
     },
-    /// The device does not know the sweep (any more).
+    /// The device no longer stores the sweep.
     SweepLost,
-    /// The reading of a Ping makes no sense; it was not delivered.
+    /// The reading of a Ping is invalid; it was not delivered.
     SenselessReading(ReadingFault),
-    /// An answer makes no sense.
+    /// A reply is invalid.
     SenselessReply(ReplyFault),
-    /// A reading does not fit the plan; it was not delivered.
+    /// A reading does not match the plan; it was not delivered.
     WrongReading {
-        /// Its index.
+        /// Index of the reading.
         index: u16,
-        /// Its position, steps.
+        /// Position of the reading, steps.
         step: i32,
         /// The position planned for that index, steps.
         planned: Option<i32>,
@@ -158,15 +159,15 @@ impl fmt::Display for HostError {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::NoAnswer { attempts } => {
-                write!(formatter, "the device did not answer {attempts} attempts")
+                write!(formatter, "no reply from the device after {attempts} attempts")
             }
             Self::NotADevice { bytes } => write!(
                 formatter,
-                "{bytes} bytes came back but no frame: wrong baud rate, or not a sonard device"
+                "received {bytes} bytes but no valid frame: wrong baud rate, or not a sonard device"
             ),
             Self::WrongVersion { ours, theirs, firmware } => write!(
                 formatter,
-                "wrong version: the device (firmware {}.{}.{}) speaks protocol {} ({:08x}), this sonard speaks {} ({:08x})",
+                "wrong version: the device (firmware {}.{}.{}) has protocol {} ({:08x}), this sonard has {} ({:08x})",
                 firmware.major,
                 firmware.minor,
                 firmware.patch,
@@ -176,28 +177,31 @@ impl fmt::Display for HostError {
                 ours.schema,
             ),
             Self::WrongIdentity(fault) => {
-                write!(formatter, "what the device says of itself makes no sense: {fault}")
+                write!(formatter, "the identity of the device is invalid: {fault}")
             }
-            Self::Refused(reason) => write!(formatter, "the device refused: {reason}"),
+            Self::Refused(reason) => write!(formatter, "the device rejected the request: {reason}"),
             Self::Rebooted => formatter.write_str("the device restarted"),
             Self::Hangup => formatter.write_str("the line was closed"),
             Self::LeaseExpired => write!(formatter, "{}", FaultKind::LeaseExpired),
             Self::EmergencyStop => write!(formatter, "{}", FaultKind::EmergencyStop),
             Self::MotionFault => write!(formatter, "{}", FaultKind::MotionFault),
-            Self::Stopped => formatter.write_str("it was stopped"),
+            Self::Stopped => formatter.write_str("the operation was stopped"),
             Self::Stalled { fired } => {
-                write!(formatter, "the device answers but makes no progress after {fired} beams")
+                write!(formatter, "the device replies but makes no progress after {fired} beams")
             }
             Self::Overrun { waited_ms } => {
-                write!(formatter, "the device says after {waited_ms} ms that it is still at it")
+                write!(
+                    formatter,
+                    "the device still reports the request as in progress after {waited_ms} ms"
+                )
             }
             Self::SenselessReading(fault) => {
-                write!(formatter, "the device told of a reading that makes no sense: {fault}")
+                write!(formatter, "invalid reading: {fault}")
             }
             Self::SenselessReply(fault) => {
-                write!(formatter, "the device told what makes no sense: {fault}")
+                write!(formatter, "invalid reply: {fault}")
             }
-            Self::SweepLost => formatter.write_str("the device does not know the sweep any more"),
+            Self::SweepLost => formatter.write_str("the device no longer stores the sweep"),
             Self::WrongReading { index, step, planned } => match planned {
                 Some(planned) => write!(
                     formatter,

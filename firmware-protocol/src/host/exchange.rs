@@ -1,4 +1,4 @@
-//! One request at a time: numbering, deadlines, repeating.
+//! OpenRequest of a request and its reply: numbering, deadlines, repetition.
 
 use super::config::{SEQ_GAP_MAX, STOP_ATTEMPTS};
 use super::deadline::{beam_us, longest_frame_us, slew_us, wire_us};
@@ -6,23 +6,23 @@ use super::{Command, Host, HostError};
 use crate::frame::{Frame, Header};
 use crate::messages::{Request, Settings};
 
-/// The request that waits for its reply.
+/// Request that waits for its reply.
 #[derive(Debug, Clone)]
-pub(super) struct Exchange {
+pub(super) struct OpenRequest {
     pub(super) request: Request,
     pub(super) seq: u16,
-    /// When it was sent for the first time.
+    /// Time of the first transmission, us.
     pub(super) sent_us: u64,
     pub(super) attempts: u8,
-    /// The device has said that it is at it.
+    /// `true` after the device has replied Started.
     pub(super) started: bool,
-    /// How often the time of its work has passed since then.
+    /// Number of times that the expected duration of the work has passed.
     overruns: u8,
     pub(super) deadline_us: u64,
     frame: Frame,
 }
 
-/// Where sequence and sweep numbers come from.
+/// Generator of sequence and sweep numbers.
 #[derive(Debug, Clone)]
 pub(super) struct Numbers {
     seq: u16,
@@ -38,7 +38,7 @@ impl Numbers {
         numbers
     }
 
-    /// Marsaglia's xorshift; only has to differ from run to run.
+    /// Returns a number from Marsaglia's xorshift, which only has to differ between runs.
     fn random(&mut self) -> u16 {
         self.random ^= self.random << 13;
         self.random ^= self.random >> 17;
@@ -51,15 +51,15 @@ impl Numbers {
         self.seq
     }
 
-    /// A sweep number, never 0.
+    /// Returns the next sweep number, never 0.
     pub(super) fn next_sweep(&mut self) -> u16 {
         self.sweep = self.sweep.wrapping_add(1).max(1);
         self.sweep
     }
 
-    /// Goes on behind the last number that the device accepted, from whatever host. The gap
-    /// keeps clear of requests of an earlier host that may still be on their way.
-    pub(super) fn follow(&mut self, last_seq: u16) {
+    /// Continues after the last number that the device accepted, from any host. The random gap
+    /// avoids numbers of requests from an earlier host that may still be in transit.
+    pub(super) fn continue_from(&mut self, last_seq: u16) {
         if !(1..0x8000).contains(&self.seq.wrapping_sub(last_seq)) {
             self.seq = last_seq.wrapping_add(self.random() % SEQ_GAP_MAX);
         }
@@ -74,13 +74,13 @@ impl Host {
         }
         let seq = self.numbers.next_seq();
         let boot = self.identity.as_ref().map_or(Header::BOOT_UNKNOWN, |identity| identity.boot);
-        // Every request fits a frame; there is a test.
+        // Every request fits into a frame: checked by a test.
         let Ok(frame) = Frame::encode(Header { boot, seq }, &request) else {
             return;
         };
         let first = self.stats.frames_sent == 0 || matches!(request, Request::Identify);
         let frame = if first { frame.with_leading_delimiter() } else { frame };
-        let exchange = Exchange {
+        let exchange = OpenRequest {
             request,
             seq,
             sent_us: now_us,
@@ -93,7 +93,7 @@ impl Host {
         self.transmit(now_us, exchange);
     }
 
-    fn transmit(&mut self, now_us: u64, mut exchange: Exchange) {
+    fn transmit(&mut self, now_us: u64, mut exchange: OpenRequest) {
         exchange.deadline_us = now_us + self.reply_time_us(&exchange);
         self.outgoing = Some(exchange.frame);
         self.exchange = Some(exchange);
@@ -102,14 +102,14 @@ impl Host {
         }
     }
 
-    /// No reply in time: sends the same bytes again, or gives up.
+    /// Repeats the same bytes after a timeout, or gives up.
     pub(super) fn retry(&mut self, now_us: u64) {
         let Some(mut exchange) = self.exchange.take() else {
             return;
         };
         exchange.overruns += u8::from(exchange.started);
         if self.is_exhausted(&exchange) {
-            return self.give_up_on(now_us, &exchange);
+            return self.give_up(now_us, &exchange);
         }
         exchange.attempts += 1;
         exchange.started = false;
@@ -118,13 +118,13 @@ impl Host {
         self.transmit(now_us, exchange);
     }
 
-    /// The number was taken: the same request under the next one.
+    /// Repeats the request with the next number, because the number was already in use.
     pub(super) fn renumber(&mut self, now_us: u64) {
         let Some(exchange) = self.exchange.take() else {
             return;
         };
         if self.is_exhausted(&exchange) {
-            return self.give_up_on(now_us, &exchange);
+            return self.give_up(now_us, &exchange);
         }
         self.stats.retries += 1;
         self.send(now_us, exchange.request);
@@ -133,7 +133,7 @@ impl Host {
         }
     }
 
-    fn is_exhausted(&self, exchange: &Exchange) -> bool {
+    fn is_exhausted(&self, exchange: &OpenRequest) -> bool {
         let attempts = if self.giving_up.is_some() {
             STOP_ATTEMPTS.min(self.config.max_attempts)
         } else {
@@ -142,19 +142,19 @@ impl Host {
         exchange.attempts >= attempts || exchange.overruns >= self.config.max_overruns
     }
 
-    /// The exchange came to nothing. A device that has said something since it began may still be
-    /// at work.
-    fn give_up_on(&mut self, now_us: u64, exchange: &Exchange) {
-        let error = self.gave_up(now_us, exchange);
-        if self.heard_us.is_some_and(|heard_us| heard_us >= exchange.sent_us) {
-            self.give_up(now_us, error);
+    /// Ends a failed exchange. A device that replied since the first transmission may still be
+    /// active and is stopped.
+    fn give_up(&mut self, now_us: u64, exchange: &OpenRequest) {
+        let error = self.exhausted_error(now_us, exchange);
+        if self.last_frame_us.is_some_and(|last_frame_us| last_frame_us >= exchange.sent_us) {
+            self.stop_and_fail(now_us, error);
         } else {
             self.fail(error);
         }
     }
 
-    /// Ends the command by an error, and before that whatever the device is at.
-    pub(super) fn give_up(&mut self, now_us: u64, error: HostError) {
+    /// Fails the command, after stopping the device if that may be active.
+    pub(super) fn stop_and_fail(&mut self, now_us: u64, error: HostError) {
         let at_work = matches!(
             self.job,
             Some(Command::Sweep(_) | Command::Home | Command::MoveTo { .. } | Command::Ping)
@@ -167,7 +167,7 @@ impl Host {
         self.send(now_us, Request::Stop);
     }
 
-    fn gave_up(&self, now_us: u64, exchange: &Exchange) -> HostError {
+    fn exhausted_error(&self, now_us: u64, exchange: &OpenRequest) -> HostError {
         let (bytes, frames) = self.received_before;
         let bytes = self.stats.bytes_received - bytes;
         if exchange.started {
@@ -180,7 +180,7 @@ impl Host {
         }
     }
 
-    /// The device is at it: now its work counts, not the line.
+    /// Restarts the deadline after Started: from now on the work counts, not the line.
     pub(super) fn started(&mut self, now_us: u64) {
         let Some(exchange) = &self.exchange else {
             return;
@@ -194,9 +194,9 @@ impl Host {
         }
     }
 
-    /// Until a reply must have come: both frames, one that the device was just sending, what it
-    /// was asked to send first, and the margin.
-    fn reply_time_us(&self, exchange: &Exchange) -> u64 {
+    /// Time until the reply must have arrived, us: both frames, a frame that the device may be
+    /// sending, the readings that precede the reply, and the margin.
+    fn reply_time_us(&self, exchange: &OpenRequest) -> u64 {
         let longest = longest_frame_us(self.config.baud);
         let before = match exchange.request {
             Request::Resend { count, .. } => u64::from(count) * longest,
@@ -205,13 +205,13 @@ impl Host {
         let bytes = wire_us(exchange.frame.len(), self.config.baud) + 2 * longest + before;
         let mut margin = self.margin.us(exchange.attempts);
         if let Some(track) = &self.track {
-            // Backing off must not let the lease run out.
+            // The back-off must not let the lease expire.
             margin = margin.min((track.lease_us / 4).max(self.margin.us(1)));
         }
         bytes + margin
     }
 
-    /// How long the device works on a request that it has begun.
+    /// Expected duration of the work on a request, us.
     fn work_us(&self, request: &Request) -> u64 {
         let Some(settings) = &self.settings else {
             return 0;
@@ -232,13 +232,14 @@ impl Host {
         }
     }
 
-    /// A reply to the open request came in: times it, if it can be told which sending it answers.
+    /// Adds the reply time to the margin estimate, if the reply belongs to a single transmission.
     pub(super) fn time_reply(&mut self, now_us: u64, wire_len: u8) {
         let Some(exchange) = &self.exchange else {
             return;
         };
-        let clear = exchange.attempts == 1 && !matches!(exchange.request, Request::Resend { .. });
-        if clear && !exchange.started {
+        let unambiguous =
+            exchange.attempts == 1 && !matches!(exchange.request, Request::Resend { .. });
+        if unambiguous && !exchange.started {
             let baud = self.config.baud;
             let on_wire = wire_us(exchange.frame.len() + usize::from(wire_len), baud);
             let taken = now_us.saturating_sub(exchange.sent_us);
@@ -246,7 +247,7 @@ impl Host {
         }
     }
 
-    /// The open request, if `seq` is its number.
+    /// Returns the open request if `seq` is its number.
     pub(super) fn request_with(&self, seq: u16) -> Option<Request> {
         self.exchange.as_ref().filter(|exchange| exchange.seq == seq).map(|open| open.request)
     }
@@ -260,7 +261,7 @@ impl Host {
     }
 }
 
-/// From full speed to rest.
+/// Braking time from full speed to rest, us.
 fn braking_us(settings: &Settings) -> u64 {
     u64::from(settings.speed) * 1_000_000 / u64::from(settings.acceleration.max(1))
 }

@@ -1,4 +1,4 @@
-//! When beams can have been fired, on the device's clock, which wraps.
+//! Plausibility of firing times on the wrapping clock of the device.
 
 use super::ReadingFault;
 use super::config::READINGS_AHEAD;
@@ -6,49 +6,51 @@ use super::deadline::{beam_us, slew_us, ticks_us};
 use crate::messages::limits::TICK_HZ;
 use crate::messages::{Reading, ReadingStatus, Settings, Sweep};
 
-/// Ticks that can't be mistaken for some that are a turn of the clock away: a quarter of a turn.
+/// Longest interval that cannot be confused across a wrap: a quarter of the clock's period, ticks.
 const NEAR_TICKS: u64 = 1 << 30;
 const TICKS_PER_US: u64 = TICK_HZ as u64 / 1_000_000;
-/// A device's clock may run fast by one part in so many.
-const RATE_ERROR_ONE_IN: u64 = 50;
-/// Firings remembered: as many as may come out of order, and as many before them.
-const REMEMBERED: usize = 2 * READINGS_AHEAD as usize;
+/// Tolerated rate error of the device clock, as the reciprocal of a fraction.
+const MAX_RATE_ERROR_RECIPROCAL: u64 = 50;
+/// Number of firings stored: the out-of-order window, and the same number before it.
+const STORED: usize = 2 * READINGS_AHEAD as usize;
 
-/// The device's clock as it was told last.
+/// Last reported value of the device clock.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct DeviceTime {
-    /// When the question was sent, us, and what the clock showed after that.
-    told: Option<(u64, u32)>,
+    /// Time of the request, us, and a clock value reported after it.
+    last: Option<(u64, u32)>,
 }
 
 impl DeviceTime {
-    pub(super) const fn told(&mut self, sent_us: u64, ticks: u32) {
-        self.told = Some((sent_us, ticks));
+    pub(super) const fn record(&mut self, sent_us: u64, ticks: u32) {
+        self.last = Some((sent_us, ticks));
     }
 
-    /// The device restarted, or begins something that may take longer than a turn of its clock.
+    /// Discards the value after a restart, or before an operation that may exceed the clock's
+    /// period.
     pub(super) const fn forget(&mut self) {
-        self.told = None;
+        self.last = None;
     }
 
-    /// Nothing that is asked for now is done before the device's clock shows this.
+    /// Earliest device clock at which a request sent now can be executed.
     pub(super) fn floor(&self, now_us: u64) -> Option<u32> {
-        let (sent_us, ticks) = self.told?;
+        let (sent_us, ticks) = self.last?;
         let elapsed = now_us.saturating_sub(sent_us).saturating_mul(TICKS_PER_US);
         (elapsed < NEAR_TICKS).then_some(ticks)
     }
 
-    /// Refuses what was fired later than now, and than the host may have missed time by.
+    /// Rejects a firing later than now, plus the time that the host may have been suspended.
     pub(super) fn check_past(
         &self,
         now_us: u64,
         fired_ticks: u32,
         slack_us: u64,
     ) -> Result<(), ReadingFault> {
-        let Some((sent_us, ticks)) = self.told else { return Ok(()) };
+        let Some((sent_us, ticks)) = self.last else { return Ok(()) };
         let elapsed = now_us.saturating_sub(sent_us).saturating_mul(TICKS_PER_US);
         let slack = slack_us.saturating_mul(TICKS_PER_US);
-        let latest = elapsed.saturating_add(elapsed / RATE_ERROR_ONE_IN).saturating_add(slack);
+        let latest =
+            elapsed.saturating_add(elapsed / MAX_RATE_ERROR_RECIPROCAL).saturating_add(slack);
         let after = fired_ticks.wrapping_sub(ticks).cast_signed();
         match u64::try_from(after) {
             Ok(after) if latest < NEAR_TICKS && after > latest => {
@@ -60,56 +62,58 @@ impl DeviceTime {
     }
 }
 
-/// Refuses what was fired before `floor`.
+/// Rejects a firing before `floor`.
 pub(super) fn check_after(floor: Option<u32>, fired_ticks: u32) -> Result<(), ReadingFault> {
     floor.map_or(Ok(()), |floor| check_delay(floor, fired_ticks, 0))
 }
 
-fn check_delay(earlier: u32, later: u32, least: u64) -> Result<(), ReadingFault> {
+fn check_delay(earlier: u32, later: u32, min_delay: u64) -> Result<(), ReadingFault> {
     let delay = i64::from(later.wrapping_sub(earlier).cast_signed());
-    let lacking = i64::try_from(least).unwrap_or(i64::MAX).saturating_sub(delay);
+    let lacking = i64::try_from(min_delay).unwrap_or(i64::MAX).saturating_sub(delay);
     if lacking <= 0 {
         return Ok(());
     }
     Err(ReadingFault::FiredTooEarly { ticks: u32::try_from(lacking).unwrap_or(u32::MAX) })
 }
 
-/// When the beams of a sweep were fired.
+/// Times at which the beams of a sweep were fired.
 #[derive(Debug, Clone)]
-pub(super) struct Firings {
+pub(super) struct FiringTimes {
     settings: Settings,
-    /// Device time before the sweep, and where the motor stood.
+    /// Device clock before the sweep, ticks, and position of the motor at that time.
     floor: Option<(u32, i32)>,
-    known: [Option<Firing>; REMEMBERED],
+    known: [Option<FiringTime>; STORED],
 }
 
 #[derive(Debug, Clone, Copy)]
-struct Firing {
+struct FiringTime {
     index: u16,
     ticks: u32,
-    /// The module was fired, and listened to.
-    listened: bool,
+    /// `true` if the module was fired, so that a listening window followed.
+    window_open: bool,
 }
 
-impl Firings {
+impl FiringTimes {
     pub(super) const fn new(settings: Settings, floor: Option<(u32, i32)>) -> Self {
-        Self { settings, floor, known: [None; REMEMBERED] }
+        Self { settings, floor, known: [None; STORED] }
     }
 
-    /// Remembers a reading that was taken.
+    /// Stores the time of an accepted reading.
     pub(super) fn keep(&mut self, reading: &Reading) {
-        let slot = self.known.get_mut(usize::from(reading.index) % REMEMBERED);
+        let slot = self.known.get_mut(usize::from(reading.index) % STORED);
         if let Some(slot) = slot {
-            *slot = Some(Firing::of(reading));
+            *slot = Some(FiringTime::from_reading(reading));
         }
     }
 
-    /// Checks a reading against those before and after it.
+    /// Checks a reading against the nearest stored readings before and after it.
     pub(super) fn check(&self, plan: &Sweep, reading: &Reading) -> Result<(), ReadingFault> {
-        let this = Firing::of(reading);
+        let this = FiringTime::from_reading(reading);
         let known = || self.known.iter().flatten();
-        let before = known().filter(|one| one.index < this.index).max_by_key(|one| one.index);
-        let after = known().filter(|one| one.index > this.index).min_by_key(|one| one.index);
+        let before =
+            known().filter(|firing| firing.index < this.index).max_by_key(|firing| firing.index);
+        let after =
+            known().filter(|firing| firing.index > this.index).min_by_key(|firing| firing.index);
         match before {
             Some(before) => self.check_pair(plan, *before, this)?,
             None => self.check_first(plan, this)?,
@@ -117,34 +121,39 @@ impl Firings {
         after.map_or(Ok(()), |after| self.check_pair(plan, this, *after))
     }
 
-    fn check_first(&self, plan: &Sweep, this: Firing) -> Result<(), ReadingFault> {
+    fn check_first(&self, plan: &Sweep, this: FiringTime) -> Result<(), ReadingFault> {
         let Some((floor, from)) = self.floor else { return Ok(()) };
-        let way_us = slew_us(plan.first_step.abs_diff(from), &self.settings);
+        let slew_us = slew_us(plan.first_step.abs_diff(from), &self.settings);
         let beams = u64::from(this.index) + 1;
-        let longest = self.longest_us(plan, beams).saturating_add(way_us);
+        let longest = self.longest_us(plan, beams).saturating_add(slew_us);
         if longest.saturating_mul(TICKS_PER_US) > NEAR_TICKS {
             return Ok(());
         }
         check_delay(floor, this.ticks, 0)
     }
 
-    /// From beam to beam pass at least the interval, and after one that was fired its window; and
-    /// at another stop the rest.
-    fn check_pair(&self, plan: &Sweep, earlier: Firing, later: Firing) -> Result<(), ReadingFault> {
+    /// Checks the time between two beams: at least the interval, or the window after a firing; at
+    /// another stop also the settling time.
+    fn check_pair(
+        &self,
+        plan: &Sweep,
+        earlier: FiringTime,
+        later: FiringTime,
+    ) -> Result<(), ReadingFault> {
         let beams = u64::from(later.index.saturating_sub(earlier.index));
         if self.longest_us(plan, beams).saturating_mul(TICKS_PER_US) > NEAR_TICKS {
             return Ok(());
         }
         let Settings { window_ticks, min_interval_ticks, settle_ticks, .. } = self.settings;
         let moved = plan.step_of(earlier.index) != plan.step_of(later.index);
-        let busy = if earlier.listened { u64::from(window_ticks) } else { 0 }
+        let busy = if earlier.window_open { u64::from(window_ticks) } else { 0 }
             + if moved { u64::from(settle_ticks) } else { 0 };
         let interval = u64::from(min_interval_ticks);
-        let least = busy.max(interval) + beams.saturating_sub(1) * interval;
-        check_delay(earlier.ticks, later.ticks, least)
+        let min_delay = busy.max(interval) + beams.saturating_sub(1) * interval;
+        check_delay(earlier.ticks, later.ticks, min_delay)
     }
 
-    /// More than so many beams take.
+    /// Upper bound of the time of `beams` beams, us.
     fn longest_us(&self, plan: &Sweep, beams: u64) -> u64 {
         let turn_us = slew_us(plan.stride.unsigned_abs().into(), &self.settings);
         let settle_us = ticks_us(self.settings.settle_ticks);
@@ -153,16 +162,16 @@ impl Firings {
     }
 }
 
-impl Firing {
-    const fn of(reading: &Reading) -> Self {
-        let listened = !matches!(reading.status, ReadingStatus::ModuleFault);
-        Self { index: reading.index, ticks: reading.fired_ticks, listened }
+impl FiringTime {
+    const fn from_reading(reading: &Reading) -> Self {
+        let window_open = !matches!(reading.status, ReadingStatus::ModuleFault);
+        Self { index: reading.index, ticks: reading.fired_ticks, window_open }
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{DeviceTime, Firings};
+    use super::{DeviceTime, FiringTimes};
     use crate::host::ReadingFault;
     use crate::messages::{Blanking, Echoes, Reading, ReadingStatus, Settings, Sweep};
 
@@ -195,44 +204,44 @@ mod tests {
     }
 
     #[test]
-    fn beams_follow_one_another_by_interval_window_and_rest() {
+    fn interval_window_and_settling() {
         // Over a wrap of the clock.
         let start = u32::MAX - 30_000;
-        let mut firings = Firings::new(SETTINGS, Some((start, 0)));
+        let mut firings = FiringTimes::new(SETTINGS, Some((start, 0)));
         let at = |after: u32| start.wrapping_add(after);
         assert_eq!(firings.check(&PLAN, &reading(0, start.wrapping_sub(7))), early(7));
         assert_eq!(firings.check(&PLAN, &reading(0, at(0))), Ok(()));
         firings.keep(&reading(0, at(0)));
-        // The same stop: the interval counts. The next: window and rest.
+        // At the same stop the interval counts, at the next one window and settling time.
         assert_eq!(firings.check(&PLAN, &reading(1, at(49_999))), early(1));
         assert_eq!(firings.check(&PLAN, &reading(1, at(50_000))), Ok(()));
         firings.keep(&reading(1, at(50_000)));
         assert_eq!(firings.check(&PLAN, &reading(2, at(109_999))), early(1));
         assert_eq!(firings.check(&PLAN, &reading(2, at(110_000))), Ok(()));
-        // One that comes late must fit between its neighbours.
+        // A late reading must fit between its neighbours.
         firings.keep(&reading(4, at(300_000)));
         assert_eq!(firings.check(&PLAN, &reading(3, at(240_000))), Ok(()));
         assert_eq!(firings.check(&PLAN, &reading(3, at(240_001))), early(1));
-        // Two beams before it, so an interval earlier still.
+        // Two beams earlier, hence another interval earlier.
         assert_eq!(firings.check(&PLAN, &reading(2, at(190_000))), Ok(()));
         assert_eq!(firings.check(&PLAN, &reading(2, at(190_001))), early(1));
     }
 
     #[test]
-    fn what_may_take_a_turn_of_the_clock_is_not_judged_by_it() {
+    fn unchecked_across_clock_period() {
         let slow = Settings { speed: 1, ..SETTINGS };
         let far = Sweep { stride: 30_000, ..PLAN };
-        let mut firings = Firings::new(slow, Some((1_000, 0)));
+        let mut firings = FiringTimes::new(slow, Some((1_000, 0)));
         firings.keep(&reading(0, 2_000));
         assert_eq!(firings.check(&far, &reading(2, 1_500)), Ok(()));
     }
 
     #[test]
-    fn nothing_is_fired_in_the_future() {
+    fn rejects_future_firing() {
         let mut time = DeviceTime::default();
         assert_eq!(time.check_past(5_000_000, 77, 0), Ok(()));
-        time.told(1_000_000, u32::MAX);
-        // One second later the clock shows two million ticks more, or two percent above that.
+        time.record(1_000_000, u32::MAX);
+        // One second later the clock has advanced by two million ticks, plus at most two percent.
         assert_eq!(time.check_past(2_000_000, 2_039_999, 0), Ok(()));
         let ahead = ReadingFault::FiredInFuture { ticks: 50_000 };
         assert_eq!(time.check_past(2_000_000, 2_049_999, 0), Err(ahead));

@@ -1,7 +1,7 @@
-//! What replies and events mean.
+//! Handling of replies and events.
 
 use super::firings::check_after;
-use super::sense::{check_drift, check_echoes, check_identity};
+use super::validate::{check_drift, check_echoes, check_identity};
 use super::{
     BoardChange, Host, HostError, HostEvent, IdentityFault, Outcome, ReadingFault, ReplyFault,
 };
@@ -12,11 +12,11 @@ use crate::messages::{
     Request, Status,
 };
 
-/// A computer may have been away for so long without knowing while a Ping was under way, us.
+/// Maximum time that a computer may have been suspended unnoticed during a Ping, us.
 const PING_SLACK_US: u64 = 2_000_000;
 
 impl Host {
-    /// An Identity: the answer to Identify, or a device that announces its restart.
+    /// Handles an Identity: the reply to Identify, or the announcement of a device that has booted.
     pub(super) fn handle_identity(
         &mut self,
         now_us: u64,
@@ -36,7 +36,7 @@ impl Host {
         }
         let identifying = self.exchange.as_ref().filter(|open| open.request == Request::Identify);
         if identifying.is_some() {
-            // It has just booted, so it may have missed the question.
+            // The device has just booted and may have missed the request.
             if let Some(open) = &mut self.exchange {
                 open.deadline_us = now_us;
             }
@@ -45,7 +45,7 @@ impl Host {
         }
     }
 
-    /// Whether a board that announces itself under the known nonce is another one all the same.
+    /// Returns `true` if a board announces itself with the known nonce but another identity.
     fn is_other_board(&self, header: Header, announced: &Identity) -> bool {
         let known = self.identity.as_ref().filter(|known| known.boot == header.boot);
         known.is_some_and(|known| BoardChange::between(known, announced).is_some())
@@ -58,7 +58,9 @@ impl Host {
 
     fn identified(&mut self, identity: &Identity) {
         let new = identity.boot;
-        let other = self.met.is_some_and(|met| BoardChange::between(&met, identity).is_some());
+        let other = self
+            .last_identity
+            .is_some_and(|last_identity| BoardChange::between(&last_identity, identity).is_some());
         if let Some(old) = self.boot
             && (old != new || other)
         {
@@ -70,20 +72,23 @@ impl Host {
         }
         self.boot = Some(new);
         self.identity = Some(*identity);
-        self.met = Some(*identity);
+        self.last_identity = Some(*identity);
         if let Some(last_seq) = identity.last_seq {
-            self.numbers.follow(last_seq);
+            self.numbers.continue_from(last_seq);
         }
         self.end_job();
         self.report(HostEvent::Identified(*identity));
     }
 
-    /// A right frame that is no message of this version.
-    pub(super) fn handle_undecodable(&mut self, stranger: Option<(ProtocolId, FirmwareVersion)>) {
+    /// Handles a valid frame that contains no message of this version.
+    pub(super) fn handle_undecodable(
+        &mut self,
+        device_version: Option<(ProtocolId, FirmwareVersion)>,
+    ) {
         self.stats.dropped.undecodable = self.stats.dropped.undecodable.saturating_add(1);
         let identifying =
             self.exchange.as_ref().is_some_and(|open| open.request == Request::Identify);
-        match stranger {
+        match device_version {
             Some((PROTOCOL, _)) if identifying => self.wrong_identity(IdentityFault::Form),
             Some((theirs, firmware)) if identifying => self.wrong_version(theirs, firmware),
             _ => {}
@@ -102,7 +107,7 @@ impl Host {
         wire_len: u8,
     ) {
         let request = self.request_with(header.seq);
-        if !self.is_present_boot(header, reply, request) {
+        if !self.is_current_boot(header, reply, request) {
             return;
         }
         match *reply {
@@ -110,11 +115,11 @@ impl Host {
             Reply::SweepDone(done) => self.handle_sweep_done(now_us, &done),
             Reply::Fault { kind } => {
                 self.step = None;
-                // However many come, what ends a command finds its place.
+                // The queue keeps places free for events that end a command.
                 if self.has_room_for_reading() {
                     self.report(HostEvent::Fault(kind));
                 }
-                self.ask_soon(now_us);
+                self.query_soon(now_us);
             }
             _ => match request {
                 Some(request) => self.handle_answer(now_us, &request, reply, wire_len),
@@ -123,14 +128,14 @@ impl Host {
         }
     }
 
-    /// Tells frames of the present boot from late copies, and notices a restart.
-    fn is_present_boot(&mut self, header: Header, reply: &Reply, request: Option<Request>) -> bool {
-        let present = match &self.identity {
+    /// Distinguishes frames of the current boot from late copies, and detects a restart.
+    fn is_current_boot(&mut self, header: Header, reply: &Reply, request: Option<Request>) -> bool {
+        let current = match &self.identity {
             Some(identity) => identity.boot == header.boot,
             // A Stop before Identify.
             None => request == Some(Request::Stop),
         };
-        if present {
+        if current {
             return true;
         }
         let answers = request.is_some() && !matches!(reply, Reply::Reading(_));
@@ -143,7 +148,7 @@ impl Host {
     }
 
     fn is_new_boot(&self, boot: u16) -> bool {
-        // No device has boot 0: a frame that says so proves nothing.
+        // No device has boot 0, so a frame with it proves nothing.
         boot != Header::BOOT_UNKNOWN
             && self.identity.as_ref().is_some_and(|identity| identity.boot != boot)
             && self.previous_boot != Some(boot)
@@ -161,7 +166,7 @@ impl Host {
         }
         self.report(HostEvent::Rebooted { old, new });
         if stopped {
-            // Nothing turns after a restart.
+            // After a restart the motor is at rest.
             self.finish(Outcome::Stopped);
         } else if self.job.is_some() {
             self.fail(HostError::Rebooted);
@@ -181,12 +186,12 @@ impl Host {
         self.stats.dropped.stale = self.stats.dropped.stale.saturating_add(1);
     }
 
-    /// A reply that carries the number of the open request.
+    /// Handles a reply with the number of the open request.
     fn handle_answer(&mut self, now_us: u64, request: &Request, reply: &Reply, wire_len: u8) {
         match (*reply, *request) {
             (Reply::Nak { reason: NakReason::SequenceReused }, _) => self.renumber(now_us),
             (Reply::Nak { reason }, Request::KeepAlive { .. } | Request::Resend { .. }) => {
-                self.give_up(now_us, HostError::Refused(reason));
+                self.stop_and_fail(now_us, HostError::Refused(reason));
             }
             (Reply::Nak { reason }, _) => self.fail(HostError::Refused(reason)),
             (Reply::Started, _) if self.is_started() => self.count_stale(),
@@ -234,9 +239,9 @@ impl Host {
     }
 
     fn handle_homed(&mut self, drift_steps: i32) {
-        let sense = self.identity.as_ref().map(|identity| check_drift(drift_steps, identity));
-        match sense {
-            Some(Err(fault)) => self.refuse_reply(fault),
+        let checked = self.identity.as_ref().map(|identity| check_drift(drift_steps, identity));
+        match checked {
+            Some(Err(fault)) => self.reject_reply(fault),
             _ => {
                 self.step = Some(0);
                 self.finish(Outcome::Homed { drift_steps });
@@ -245,7 +250,7 @@ impl Host {
     }
 
     fn handle_ping(&mut self, now_us: u64, reading: &Reading) {
-        // Without a place for it, the request is repeated and the device answers from memory.
+        // Without a free place the request is repeated, and the device sends its stored reply.
         if !self.has_room_for_reading() {
             return;
         }
@@ -268,18 +273,18 @@ impl Host {
         if planned != Some(step) {
             return Err(HostError::WrongReading { index, step, planned });
         }
-        let sense = || {
+        let check = || {
             if let Some(settings) = &self.settings {
                 check_echoes(reading, settings)?;
             }
-            let asked_us = self.exchange.as_ref().map_or(now_us, |open| open.sent_us);
-            check_after(self.device_time.floor(asked_us), reading.fired_ticks)?;
+            let sent_us = self.exchange.as_ref().map_or(now_us, |open| open.sent_us);
+            check_after(self.device_time.floor(sent_us), reading.fired_ticks)?;
             self.check_past(now_us, reading, PING_SLACK_US)
         };
-        sense().map_err(HostError::SenselessReading)
+        check().map_err(HostError::SenselessReading)
     }
 
-    /// Refuses a reading from the future, if the device's clock does not jump.
+    /// Rejects a reading from the future, unless the device's clock jumps.
     pub(super) fn check_past(
         &self,
         now_us: u64,
@@ -299,7 +304,7 @@ impl Host {
     fn handle_status(&mut self, now_us: u64, status: &Status, wire_len: u8) {
         let step = status.step;
         if status.homed && !(-POSITION_MAX..=POSITION_MAX).contains(&step) {
-            return self.refuse_reply(ReplyFault::Position { step });
+            return self.reject_reply(ReplyFault::Position { step });
         }
         self.time_reply(now_us, wire_len);
         self.step = status.homed.then_some(step);
@@ -307,7 +312,7 @@ impl Host {
         self.finish(Outcome::Status(*status));
     }
 
-    fn refuse_reply(&mut self, fault: ReplyFault) {
+    fn reject_reply(&mut self, fault: ReplyFault) {
         self.stats.refused += 1;
         self.fail(HostError::SenselessReply(fault));
     }
@@ -315,7 +320,7 @@ impl Host {
     pub(super) fn report_clock(&mut self, now_us: u64, device_ticks: u32) {
         let Some(open) = &self.exchange else { return };
         let (sent_us, retried) = (open.sent_us, open.attempts > 1);
-        self.device_time.told(sent_us, device_ticks);
+        self.device_time.record(sent_us, device_ticks);
         if self.has_room_for_reading() {
             let received_us = now_us;
             self.report(HostEvent::ClockSample { sent_us, received_us, device_ticks, retried });

@@ -1,28 +1,28 @@
-//! Numbers about the link.
+//! Statistics of the link.
 
 use crate::frame::LinkCounters;
 
-/// Counts of the link since the host machine was made.
+/// Counters of the link since the creation of the host machine.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct LinkStats {
     /// Bytes handed out for sending.
     pub bytes_sent: u64,
-    /// Bytes received.
+    /// Bytes received, valid or not.
     pub bytes_received: u64,
-    /// Frames handed out for sending, with those sent again.
+    /// Frames handed out for sending, including repetitions.
     pub frames_sent: u64,
-    /// Frames received whose CRC was right.
+    /// Frames received with a valid CRC.
     pub frames_received: u64,
-    /// Requests sent again because no reply came in time.
+    /// Requests repeated because no reply arrived in time.
     pub retries: u64,
-    /// Readings delivered.
+    /// Readings delivered as events.
     pub readings: u64,
-    /// Readings that were lost at first.
+    /// Readings that were lost at first and sent again.
     pub repaired: u64,
-    /// Readings that came more than once.
+    /// Readings received more than once.
     pub duplicates: u64,
-    /// Readings, and identities or answers, that made no sense and were refused.
+    /// Invalid readings, identities and replies.
     pub refused: u64,
-    /// What was dropped on receiving.
+    /// Frames dropped on reception.
     pub dropped: LinkCounters,
 }

@@ -1,10 +1,10 @@
-//! Keeping a sweep alive and its readings whole.
+//! Sweep supervision: keep-alive, acknowledgement and repair of lost readings.
 
-use super::config::ACKNOWLEDGEMENTS_A_RING;
+use super::config::ACKNOWLEDGEMENTS_PER_RING;
 use super::deadline::{beam_us, longest_frame_us, slew_us};
-use super::firings::Firings;
-use super::sense::check_echoes;
+use super::firings::FiringTimes;
 use super::track::{Reception, Track};
+use super::validate::check_echoes;
 use super::{Command, Host, HostError, HostEvent, ReadingFault, StartError};
 use crate::messages::limits::readings_in;
 use crate::messages::{Alive, Reading, Request, Sweep, SweepDone, SweepState};
@@ -20,29 +20,29 @@ impl Host {
         self.giving_up = None;
         self.received_before = (self.stats.bytes_received, self.stats.frames_received);
         let floor = self.device_time.floor(now_us).zip(self.step);
-        let firings = Firings::new(*settings, floor);
-        let acknowledge_after = kept / u16::from(ACKNOWLEDGEMENTS_A_RING);
+        let firings = FiringTimes::new(*settings, floor);
+        let acknowledge_after = kept / u16::from(ACKNOWLEDGEMENTS_PER_RING);
         self.track = Some(Track::new(plan, beams, firings, acknowledge_after, now_us));
         self.send(now_us, Request::Sweep(plan));
         self.expect_progress(now_us);
         Ok(())
     }
 
-    /// A reading of a sweep came in.
+    /// Handles a reading of a sweep.
     pub(super) fn handle_beam(&mut self, now_us: u64, reading: &Reading) {
         let Some(track) = self.track.as_ref().filter(|track| track.plan.sweep == reading.sweep)
         else {
             self.stats.duplicates += 1;
             return;
         };
-        match track.place(reading) {
-            Err(error) => self.give_up(now_us, error),
+        match track.classify(reading) {
+            Err(error) => self.stop_and_fail(now_us, error),
             Ok(Reception::Duplicate) => self.stats.duplicates += 1,
             Ok(Reception::Beyond) => {}
             Ok(Reception::New { repaired }) if self.has_room_for_reading() => {
                 match self.check_beam(now_us, track, reading) {
                     Ok(()) => self.deliver(reading, repaired),
-                    Err(fault) => self.refuse(reading, fault),
+                    Err(fault) => self.reject(reading, fault),
                 }
                 self.beam_settled(now_us);
             }
@@ -59,7 +59,7 @@ impl Host {
         if let Some(settings) = &self.settings {
             check_echoes(reading, settings)?;
         }
-        // A computer that was away for less than the lease takes time for the past.
+        // A computer suspended for less than the lease takes the present for the past.
         self.check_past(now_us, reading, track.lease_us)?;
         track.firings.check(&track.plan, reading)
     }
@@ -74,8 +74,8 @@ impl Host {
         self.report(HostEvent::Reading { reading: *reading, repaired });
     }
 
-    /// The beam is done with: asked for again, the device would tell the same.
-    fn refuse(&mut self, reading: &Reading, fault: ReadingFault) {
+    /// Rejects a reading. Its beam is settled: a repetition would have the same content.
+    fn reject(&mut self, reading: &Reading, fault: ReadingFault) {
         if let Some(track) = &mut self.track {
             track.settle(reading.index);
         }
@@ -85,7 +85,7 @@ impl Host {
 
     fn beam_settled(&mut self, now_us: u64) {
         self.expect_progress(now_us);
-        // A reading proves that the plan was accepted, whatever became of the Ack.
+        // A reading proves that the plan was accepted, even if the Ack was lost.
         if self.exchange.as_ref().is_some_and(|open| matches!(open.request, Request::Sweep(_))) {
             self.exchange = None;
         }
@@ -95,60 +95,60 @@ impl Host {
         let Some(track) = self.track.as_mut().filter(|track| track.plan.sweep == done.sweep) else {
             return;
         };
-        let sense = track.check(done.fired, done.fired, done.end == SweepState::Complete);
-        track.learn(done.fired, done.fired);
+        let progress = track.check(done.fired, done.fired, done.end == SweepState::Complete);
+        track.update(done.fired, done.fired);
         if self.is_stopping() {
             return;
         }
-        match (sense, end_error(done.end)) {
+        match (progress, end_error(done.end)) {
             (Err(error), _) | (Ok(()), Some(error)) => self.sweep_failed(now_us, error),
             (Ok(()), None) => self.continue_sweep(now_us),
         }
     }
 
-    /// The answer to KeepAlive or Resend: how far the device is.
+    /// Handles the reply to KeepAlive or Resend, which reports the device's progress.
     pub(super) fn handle_alive(&mut self, now_us: u64, alive: &Alive, wire_len: u8) {
         self.time_reply(now_us, wire_len);
         self.report_clock(now_us, alive.ticks);
         self.exchange = None;
         let Some(track) = &mut self.track else { return };
         if alive.sweep != track.plan.sweep {
-            return self.give_up(now_us, HostError::SweepLost);
+            return self.stop_and_fail(now_us, HostError::SweepLost);
         }
         let complete = alive.state == SweepState::Complete;
         if let Err(error) = track.check(alive.sent, alive.fired, complete) {
             return self.sweep_failed(now_us, error);
         }
-        track.learn(alive.sent, alive.fired);
+        track.update(alive.sent, alive.fired);
         if let Some(error) = end_error(alive.state) {
             return self.sweep_failed(now_us, error);
         }
         self.count_stall(now_us);
     }
 
-    /// Answers without anything new, when something new was due, end the sweep at last.
+    /// Counts replies without progress while progress is due, and ends the sweep after too many.
     fn count_stall(&mut self, now_us: u64) {
         let Some(track) = &mut self.track else { return };
         let due = track.missing().is_some() || track.progress_at_us <= now_us;
-        if core::mem::take(&mut track.moved_on) || !due {
+        if core::mem::take(&mut track.progressed) || !due {
             return;
         }
         track.stalls = track.stalls.saturating_add(1);
         let (stalls, fired) = (track.stalls, track.fired);
         if stalls > self.config.max_attempts {
-            self.give_up(now_us, HostError::Stalled { fired });
+            self.stop_and_fail(now_us, HostError::Stalled { fired });
         } else {
             self.expect_progress(now_us);
         }
     }
 
-    /// A device that ended the sweep by itself is at nothing any more.
+    /// Fails the command. A device that ended the sweep by itself needs no Stop.
     fn sweep_failed(&mut self, now_us: u64, error: HostError) {
         self.stats.refused += u64::from(matches!(error, HostError::SenselessReply(_)));
-        if has_ended(&error) { self.fail(error) } else { self.give_up(now_us, error) }
+        if has_ended(&error) { self.fail(error) } else { self.stop_and_fail(now_us, error) }
     }
 
-    /// Sends what the sweep needs, once nothing else is open.
+    /// Sends the next request of the sweep, unless one is open.
     pub(super) fn continue_sweep(&mut self, now_us: u64) {
         let Some(track) = &self.track else { return };
         if self.is_stopping() {
@@ -178,14 +178,14 @@ impl Host {
         }
     }
 
-    /// Asks at the next occasion how far the device is.
-    pub(super) fn ask_soon(&mut self, now_us: u64) {
+    /// Schedules a progress query for the next occasion.
+    pub(super) fn query_soon(&mut self, now_us: u64) {
         if let Some(track) = &mut self.track {
             track.keep_alive_at_us = now_us;
         }
     }
 
-    /// Stop was obeyed; a sweep that was under way ends with what came in.
+    /// Handles the Ack of Stop; a sweep in progress ends with the readings received so far.
     pub(super) fn stopped(&mut self) {
         let track = self.track.take();
         self.step = None;
@@ -200,7 +200,7 @@ impl Host {
         self.finish(super::Outcome::Stopped);
     }
 
-    /// Computes when the next reading must have come in.
+    /// Computes the time by which the next reading must have arrived.
     fn expect_progress(&mut self, now_us: u64) {
         let (Some(track), Some(settings)) = (&self.track, &self.settings) else {
             return;
@@ -231,7 +231,8 @@ const fn has_ended(error: &HostError) -> bool {
     )
 }
 
-/// What a sweep's end means to a host that did not ask for it; `None` if it is no failure.
+/// Returns the error for a sweep that ended without a Stop from this host; `None` if it did not
+/// fail.
 const fn end_error(state: SweepState) -> Option<HostError> {
     match state {
         SweepState::Running | SweepState::Holding | SweepState::Complete => None,

@@ -1,53 +1,53 @@
-//! Which beams of a sweep have come in.
+//! Progress of a sweep: which beams have arrived.
 
-use super::config::{KEEP_ALIVES_A_LEASE, READINGS_AHEAD};
-use super::firings::Firings;
+use super::config::{KEEP_ALIVES_PER_LEASE, READINGS_AHEAD};
+use super::firings::FiringTimes;
 use super::{HostError, ReplyFault};
 use crate::messages::{Reading, Sweep};
 
-/// Readings that may be known out of order, at most: more than the device can keep.
+/// Maximum number of readings accepted out of order: more than the device can store.
 const WINDOW: u16 = READINGS_AHEAD as u16;
 const _: () = assert!(READINGS_AHEAD as u32 == u64::BITS);
 
-/// The sweep under way, as the host sees it.
+/// Sweep in progress, as known to the host.
 #[derive(Debug, Clone)]
 pub(super) struct Track {
     pub(super) plan: Sweep,
     pub(super) beams: u16,
-    pub(super) firings: Firings,
-    /// Lowest index lacking.
+    pub(super) firings: FiringTimes,
+    /// Lowest missing index.
     pub(super) next: u16,
-    /// Bit `i` set: `next + i` is there.
+    /// Bit `i` set: beam `next + i` has arrived.
     seen: u64,
     pub(super) delivered: u16,
-    /// Everything below was sent by the device at least once.
+    /// All lower beams were sent by the device at least once.
     sent: u16,
-    /// Beams fired, as far as known.
+    /// Number of beams fired, as far as known.
     pub(super) fired: u16,
-    /// Readings since the device was last told what is there.
+    /// Readings since the last acknowledgement.
     pub(super) unacknowledged: u16,
-    /// Tell it after so many.
+    /// Number of readings after which an acknowledgement is due.
     pub(super) acknowledge_after: u16,
     pub(super) lease_us: u64,
     pub(super) keep_alive_at_us: u64,
     pub(super) progress_at_us: u64,
-    /// Answers in a row without anything new.
+    /// Consecutive replies without progress.
     pub(super) stalls: u8,
-    /// Something new since the last answer.
-    pub(super) moved_on: bool,
+    /// `true` if there was progress since the last reply.
+    pub(super) progressed: bool,
 }
 
-/// What a reading is to the sweep.
+/// Classification of a received reading.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Reception {
-    /// Not seen before.
+    /// Not received before.
     New {
-        /// Whether it was lost at first.
+        /// `true` if the reading was lost at first.
         repaired: bool,
     },
-    /// There already.
+    /// Already received.
     Duplicate,
-    /// Too far ahead to remember; the device will send it again.
+    /// Beyond the window; the device will send the reading again.
     Beyond,
 }
 
@@ -55,7 +55,7 @@ impl Track {
     pub(super) fn new(
         plan: Sweep,
         beams: u16,
-        firings: Firings,
+        firings: FiringTimes,
         acknowledge_after: u16,
         now_us: u64,
     ) -> Self {
@@ -75,12 +75,12 @@ impl Track {
             keep_alive_at_us: now_us,
             progress_at_us: now_us,
             stalls: 0,
-            moved_on: true,
+            progressed: true,
         }
     }
 
-    /// Checks a reading against the plan and tells its place. Changes nothing.
-    pub(super) fn place(&self, reading: &Reading) -> Result<Reception, HostError> {
+    /// Checks a reading against the plan and classifies it, without changing the state.
+    pub(super) fn classify(&self, reading: &Reading) -> Result<Reception, HostError> {
         let index = reading.index;
         let planned = self.plan.step_of(index).filter(|_| index < self.beams);
         if planned != Some(reading.step) {
@@ -101,18 +101,18 @@ impl Track {
         self.settle(reading.index);
     }
 
-    /// Marks beam `index` as done with.
+    /// Marks beam `index` as settled: delivered or rejected.
     pub(super) fn settle(&mut self, index: u16) {
         self.seen |= 1_u64.checked_shl(u32::from(index.wrapping_sub(self.next))).unwrap_or(0);
         let complete = self.seen.trailing_ones();
         self.seen = self.seen.checked_shr(complete).unwrap_or(0);
         self.next = self.next.saturating_add(u16::try_from(complete).unwrap_or(0));
         self.unacknowledged = self.unacknowledged.saturating_add(1);
-        self.learn(index.saturating_add(1), index.saturating_add(1));
-        self.progress();
+        self.update(index.saturating_add(1), index.saturating_add(1));
+        self.mark_progress();
     }
 
-    /// Checks what the device tells of its progress.
+    /// Checks the progress reported by the device.
     pub(super) fn check(&self, sent: u16, fired: u16, complete: bool) -> Result<(), HostError> {
         let beams = self.beams;
         if sent <= fired && fired <= beams && (!complete || fired == beams) {
@@ -121,21 +121,21 @@ impl Track {
         Err(HostError::SenselessReply(ReplyFault::Progress { fired, sent, beams }))
     }
 
-    /// The device has sent everything below `sent` and fired `fired` beams.
-    pub(super) fn learn(&mut self, sent: u16, fired: u16) {
+    /// Records that the device has sent all beams below `sent` and fired `fired` beams.
+    pub(super) fn update(&mut self, sent: u16, fired: u16) {
         self.sent = self.sent.max(sent.min(self.beams));
         if fired > self.fired {
             self.fired = fired.min(self.beams);
-            self.progress();
+            self.mark_progress();
         }
     }
 
-    fn progress(&mut self) {
+    fn mark_progress(&mut self) {
         self.stalls = 0;
-        self.moved_on = true;
+        self.progressed = true;
     }
 
-    /// The first beams that were sent but are not there: index of the first, and how many.
+    /// First gap in the beams sent so far: lowest index and number of beams.
     pub(super) fn missing(&self) -> Option<(u16, u8)> {
         let known = self.sent.checked_sub(self.next).filter(|&known| known > 0)?;
         let hole = self.seen.trailing_zeros();
@@ -147,9 +147,9 @@ impl Track {
         self.next == self.beams
     }
 
-    /// A frame goes out, which renews the lease.
+    /// Records the transmission of a frame, which renews the lease.
     pub(super) fn frame_sent(&mut self, now_us: u64) {
-        self.keep_alive_at_us = now_us + self.lease_us / u64::from(KEEP_ALIVES_A_LEASE);
+        self.keep_alive_at_us = now_us + self.lease_us / u64::from(KEEP_ALIVES_PER_LEASE);
         self.unacknowledged = 0;
     }
 }

@@ -1,23 +1,24 @@
-//! Reasons, states and kinds: enums that are one byte on the wire.
+//! Reasons, states and kinds: enums encoded in one byte.
 
 use core::fmt;
 
 use super::table::wire_enum;
 
 wire_enum! {
-    /// The reason why the device refused a request.
+    /// Reason for rejecting a request, or for its failure.
     pub enum NakReason {
-        /// Something is under way; only Stop, Identify, KeepAlive, Resend and Status are served.
+        /// Another operation is in progress; only Stop, Identify, KeepAlive, Resend and Status are
+        /// served.
         0 Busy,
-        /// The request was meant for a device that has restarted since (or for another one).
+        /// The header has another boot nonce: the device has restarted since, or is another device.
         1 WrongBoot,
-        /// This sequence number was already used by another request: take a new one.
+        /// The sequence number was already used by another request: send it with a new one.
         2 SequenceReused,
-        /// The CRC is right, but this version knows no such request.
+        /// The CRC is valid, but this version has no such request.
         3 UnknownRequest,
-        /// Configure first.
+        /// Configure is required first.
         4 NotConfigured,
-        /// Home first.
+        /// Homing is required first.
         5 NotHomed,
         /// The position is out of range.
         6 PositionOutOfRange,
@@ -27,7 +28,8 @@ wire_enum! {
         8 IntervalOutOfRange,
         /// The settling time is out of range.
         9 SettleOutOfRange,
-        /// The number of echoes is out of range, or above one and the board can tell only the first.
+        /// The number of echoes is out of range, or above one on a board that reports only the
+        /// first.
         10 EchoesOutOfRange,
         /// The blanking is out of range or longer than the window, or the board cannot set it.
         11 BlankingOutOfRange,
@@ -37,13 +39,13 @@ wire_enum! {
         13 AccelerationOutOfRange,
         /// The holding time is out of range.
         14 HoldOutOfRange,
-        /// The sweep has number 0, no beams, or more than a sweep may have.
+        /// The sweep has number 0, no beams, or more than the maximum.
         15 SweepOutOfRange,
         /// The lease is too short.
         16 LeaseOutOfRange,
-        /// The index sensor was not found within the search.
+        /// The index sensor was not found during the search.
         17 IndexNotFound,
-        /// Stopped before it was done.
+        /// Stopped before completion.
         18 Stopped,
         /// The emergency stop was pressed.
         19 EmergencyStop,
@@ -53,15 +55,15 @@ wire_enum! {
 }
 
 wire_enum! {
-    /// The reason why the device stopped by itself. The coils are released and the position is unknown.
+    /// Reason for a stop by the device itself. The coils are released and the position is unknown.
     pub enum FaultKind {
-        /// The host was silent for longer than the sweep's lease.
+        /// The host sent nothing for longer than the sweep's lease.
         0 LeaseExpired,
         /// The emergency stop was pressed.
         1 EmergencyStop,
         /// The motor did not reach the position.
         2 MotionFault,
-        /// The host was silent for longer than idle coils may be held.
+        /// The host sent nothing for longer than idle coils may be held.
         3 HoldExpired,
     }
 }
@@ -69,17 +71,17 @@ wire_enum! {
 wire_enum! {
     /// State of the device's latest sweep.
     pub enum SweepState {
-        /// There was none since boot.
+        /// No sweep since boot.
         0 None,
-        /// Under way.
+        /// In progress.
         1 Running,
-        /// Under way, but waiting for the host to acknowledge readings.
+        /// In progress, waiting for the host to acknowledge readings.
         2 Holding,
         /// Every beam was fired.
         3 Complete,
         /// Ended by a Stop.
         4 Stopped,
-        /// Ended because the host was silent for longer than the lease.
+        /// Ended because the host sent nothing for longer than the lease.
         5 LeaseExpired,
         /// Ended by the emergency stop.
         6 EmergencyStop,
@@ -91,13 +93,13 @@ wire_enum! {
 wire_enum! {
     /// State of the device.
     pub enum DeviceState {
-        /// Nothing.
+        /// No operation in progress.
         0 Idle,
-        /// Searching the index.
+        /// Searching for the index.
         1 Homing,
         /// Turning to a position.
         2 Moving,
-        /// Coming to a stand after a Stop.
+        /// Braking to rest after a Stop.
         3 Stopping,
         /// Serving a Ping.
         4 Pinging,
@@ -107,39 +109,39 @@ wire_enum! {
 }
 
 wire_enum! {
-    /// The outcome of one firing.
+    /// Outcome of one firing.
     pub enum ReadingStatus {
         /// At least one echo.
         0 Echo,
-        /// None within the window.
+        /// No echo within the window.
         1 NoEcho,
         /// The ECHO line was high before firing, so the module was not fired.
         2 ModuleFault,
-        /// Echoes as measured, but the position is not certain.
+        /// Echoes as measured, but the position is uncertain.
         3 StepDoubtful,
     }
 }
 
 wire_enum! {
-    /// The cause of the device's boot.
+    /// Cause of the last reset.
     pub enum ResetCause {
-        /// The board cannot tell.
+        /// The board cannot determine the cause.
         0 Unknown,
-        /// Power came on.
+        /// Power was switched on.
         1 PowerOn,
         /// The reset pin: a button, or a host that opened the port.
         2 External,
-        /// The supply sagged.
+        /// The supply voltage dropped.
         3 BrownOut,
-        /// The watchdog: the firmware hung.
+        /// The watchdog expired: the firmware was stuck.
         4 Watchdog,
-        /// The host asked for it.
+        /// Reset was requested by the host.
         5 Requested,
     }
 }
 
 impl SweepState {
-    /// Whether the sweep is still going on.
+    /// Returns `true` while the sweep is in progress.
     #[must_use]
     pub const fn is_running(self) -> bool {
         matches!(self, Self::Running | Self::Holding)
@@ -151,8 +153,8 @@ impl fmt::Display for NakReason {
         formatter.write_str(match self {
             Self::Busy => "the device is busy",
             Self::WrongBoot => "the device has restarted",
-            Self::SequenceReused => "the sequence number was used before",
-            Self::UnknownRequest => "the device knows no such request",
+            Self::SequenceReused => "the sequence number is already in use",
+            Self::UnknownRequest => "the device does not know this request",
             Self::NotConfigured => "the device is not configured",
             Self::NotHomed => "the device is not homed",
             Self::PositionOutOfRange => "the position is more than 1000000 steps from home",
@@ -160,10 +162,10 @@ impl fmt::Display for NakReason {
             Self::IntervalOutOfRange => "the minimum interval must be at most 8388 ms",
             Self::SettleOutOfRange => "the settling time must be at most 8388 ms",
             Self::EchoesOutOfRange => {
-                "the number of echoes must be 1 to 8, and 1 on a board without multiple echoes"
+                "the number of echoes must be 1 to 8, and 1 on a board that reports only the first echo"
             }
             Self::BlankingOutOfRange => {
-                "short blanking must be 0.5 ms to 2.38 ms, shorter than the window, and needs a board that can set it"
+                "short blanking must be 0.5 ms to 2.38 ms, shorter than the window, and is not supported by every board"
             }
             Self::SpeedOutOfRange => "the speed must be 1 to 10000 steps/s",
             Self::AccelerationOutOfRange => "the acceleration must be 1 to 200000 steps/s^2",
@@ -171,7 +173,7 @@ impl fmt::Display for NakReason {
             Self::SweepOutOfRange => "a sweep must have a number and 1 to 65535 beams",
             Self::LeaseOutOfRange => "the lease must be at least 100 ms",
             Self::IndexNotFound => "the index sensor was not found",
-            Self::Stopped => "it was stopped",
+            Self::Stopped => "the operation was stopped",
             Self::EmergencyStop => "the emergency stop was pressed",
             Self::MotionFault => "the motor did not reach the position",
         })
@@ -181,10 +183,10 @@ impl fmt::Display for NakReason {
 impl fmt::Display for FaultKind {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         formatter.write_str(match self {
-            Self::LeaseExpired => "the host was silent for longer than the sweep's lease",
+            Self::LeaseExpired => "the host sent nothing for longer than the sweep's lease",
             Self::EmergencyStop => "the emergency stop was pressed",
             Self::MotionFault => "the motor did not reach the position",
-            Self::HoldExpired => "the host was silent for longer than idle coils may be held",
+            Self::HoldExpired => "the host sent nothing for longer than idle coils may be held",
         })
     }
 }

@@ -1,4 +1,4 @@
-//! A short list of echo times.
+//! List of echo times with a fixed capacity.
 
 use core::fmt;
 use core::ops::Deref;
@@ -12,7 +12,7 @@ use super::wire::{Reader, Wire, Writer};
 
 /// Up to [`MAX_ECHOES`] echo times, ticks after firing, each at most [`WINDOW_TICKS_MAX`].
 ///
-/// Reads as a slice. On the wire: the number of echoes, then each as a varint.
+/// Dereferences to a slice. On the wire: the number of echoes, then each as a varint.
 #[derive(Clone, Copy, Default)]
 pub struct Echoes {
     len: u8,
@@ -20,28 +20,28 @@ pub struct Echoes {
 }
 
 impl Echoes {
-    /// No echoes.
+    /// Creates an empty list.
     #[must_use]
     pub const fn new() -> Self {
         Self { len: 0, ticks: [0; MAX_ECHOES as usize] }
     }
 
-    /// The first [`MAX_ECHOES`] of `ticks` that are within range.
+    /// Creates a list of the first [`MAX_ECHOES`] of `ticks` that are within range.
     #[must_use]
     pub fn from_ticks(ticks: &[u32]) -> Self {
         let mut echoes = Self::new();
         for &tick in ticks {
-            // Those that do not fit are meant to be left out.
+            // Echoes beyond the capacity are dropped on purpose.
             let _ = echoes.push(tick);
         }
         echoes
     }
 
-    /// Adds an echo, ticks after firing.
+    /// Adds an echo, in ticks after firing.
     ///
     /// # Errors
     ///
-    /// Gives `ticks` back if the list is full or the time over [`WINDOW_TICKS_MAX`].
+    /// Returns `ticks` if the list is full or the time exceeds [`WINDOW_TICKS_MAX`].
     pub fn push(&mut self, ticks: u32) -> Result<(), u32> {
         match self.ticks.get_mut(usize::from(self.len)) {
             Some(slot) if ticks <= WINDOW_TICKS_MAX => {
@@ -96,7 +96,7 @@ impl Wire for Echoes {
         for _ in 0..input.code() {
             let mut ticks = 0;
             ticks.read(input);
-            if !input.is_right() || self.push(ticks).is_err() {
+            if !input.is_valid() || self.push(ticks).is_err() {
                 return input.fail();
             }
         }

@@ -1,4 +1,4 @@
-//! Records that messages carry.
+//! Records carried by messages.
 
 use super::codes::{DeviceState, FaultKind, ReadingStatus, ResetCause, SweepState};
 use super::echoes::Echoes;
@@ -6,11 +6,11 @@ use super::table::{wire_enum, wire_struct};
 use super::wire::{Reader, Wire, Writer};
 
 wire_struct! {
-    /// Protocol version of a device. The front of every Identity, frozen.
+    /// Protocol version of a device: the first field of every Identity, frozen.
     pub struct ProtocolId {
-        /// Counts up with incompatible changes.
+        /// Incremented with incompatible changes.
         version: u8,
-        /// Hash over the message tables.
+        /// Hash of the message tables.
         schema: u32,
     }
 }
@@ -18,11 +18,11 @@ wire_struct! {
 wire_struct! {
     /// Version of the firmware. Frozen.
     pub struct FirmwareVersion {
-        /// Incompatible changes.
+        /// Incremented with incompatible changes.
         major: u8,
-        /// Additions.
+        /// Incremented with additions.
         minor: u8,
-        /// Repairs.
+        /// Incremented with corrections.
         patch: u8,
     }
 }
@@ -30,25 +30,25 @@ wire_struct! {
 wire_struct! {
     /// Identity of the device. `protocol` and `firmware` come first in every version.
     pub struct Identity {
-        /// Protocol spoken.
+        /// Protocol version and schema of the device.
         protocol: ProtocolId,
-        /// Firmware version.
+        /// Version of the firmware.
         firmware: FirmwareVersion,
-        /// Serial number: ten bytes that no other board has.
+        /// Serial number: ten bytes, unique to the board.
         serial: [u8; 10],
-        /// Boot nonce: another one after each restart, never 0.
+        /// Boot nonce: differs after each restart, never 0.
         boot: u16,
         /// Number of the last request that the device accepted since boot.
         last_seq: Option<u16>,
-        /// Device ticks a second.
+        /// Device ticks per second.
         tick_hz: u32,
-        /// Steps a revolution.
+        /// Steps per revolution, including microstepping and gears.
         steps_per_revolution: u16,
-        /// What the board can do.
+        /// Features of the board.
         capabilities: Capabilities,
-        /// Bytes kept for unacknowledged readings.
+        /// Capacity for unacknowledged readings, bytes.
         ring_bytes: u16,
-        /// Why it booted.
+        /// Cause of the last reset.
         reset_cause: ResetCause,
     }
 }
@@ -70,24 +70,24 @@ impl Wire for Capabilities {
 }
 
 impl Capabilities {
-    /// Homes on an index sensor; without it, Home takes the present position for zero.
+    /// Homes on an index sensor. Without the sensor, Home defines the present position as zero.
     pub const INDEX_SENSOR: Self = Self(1);
     /// Can shorten the module's blanking.
     pub const SHORT_BLANKING: Self = Self(1 << 1);
-    /// Can tell more than the first echo.
+    /// Can report more than the first echo.
     pub const MULTIPLE_ECHOES: Self = Self(1 << 2);
     /// Has an emergency stop.
     pub const EMERGENCY_STOP: Self = Self(1 << 3);
     /// Can release the motor's coils.
     pub const COIL_RELEASE: Self = Self(1 << 4);
-    /// Its clock jumps: good for intervals between firings, not for the time of day.
+    /// Has a clock that jumps: valid for intervals between firings, not for the time of day.
     pub const VIRTUAL_CLOCK: Self = Self(1 << 13);
-    /// The firmware's machine code, but in an emulator.
+    /// Runs the firmware's machine code in an emulator.
     pub const EMULATED: Self = Self(1 << 14);
-    /// No hardware: the echoes come from a model.
+    /// Simulates all echoes with a model; there is no hardware.
     pub const SIMULATED: Self = Self(1 << 15);
 
-    /// All of them, by name.
+    /// All capability bits with their names.
     pub const NAMES: [(Self, &str); 8] = [
         (Self::INDEX_SENSOR, "INDEX_SENSOR"),
         (Self::SHORT_BLANKING, "SHORT_BLANKING"),
@@ -99,13 +99,13 @@ impl Capabilities {
         (Self::SIMULATED, "SIMULATED"),
     ];
 
-    /// Whether all of `wanted` are there.
+    /// Returns `true` if all bits of `required` are set.
     #[must_use]
-    pub const fn has(self, wanted: Self) -> bool {
-        self.0 & wanted.0 == wanted.0
+    pub const fn has(self, required: Self) -> bool {
+        self.0 & required.0 == required.0
     }
 
-    /// Both together.
+    /// Returns the union of both sets of features.
     #[must_use]
     pub const fn with(self, other: Self) -> Self {
         Self(self.0 | other.0)
@@ -113,67 +113,67 @@ impl Capabilities {
 }
 
 wire_struct! {
-    /// Settings of motion and listening. See [`super::limits`] for the ranges.
+    /// Motion and ranging parameters. See [`super::limits`] for the ranges.
     pub struct Settings {
         /// Listening time after each firing, ticks.
         window_ticks: u32,
-        /// Least time from firing to firing, ticks.
+        /// Minimum time between firings, ticks.
         min_interval_ticks: u32,
-        /// Rest between the end of a move and firing, ticks.
+        /// Settling time between the end of a move and firing, ticks.
         settle_ticks: u32,
-        /// Echoes to report for each firing.
+        /// Maximum number of echoes reported for each firing.
         max_echoes: u8,
-        /// How long the receiver stays deaf after firing.
+        /// Receiver blanking after firing.
         blanking: Blanking,
-        /// Largest speed, steps/s.
+        /// Maximum speed of moves, steps/s.
         speed: u16,
         /// Acceleration and deceleration, steps/s^2.
         acceleration: u32,
-        /// Idle coils are released after this long without a word from the host, s; 0 for never.
+        /// Time without a request after which idle coils are released, s; 0 for never.
         hold_s: u16,
     }
 }
 
 wire_enum! {
-    /// How long the receiver is disabled after firing.
+    /// Time during which the receiver is blanked after firing.
     pub enum Blanking {
-        /// As long as the module does by itself (2.38 ms).
+        /// Internal blanking of the module (2.38 ms).
         0 Internal,
-        /// Shortened by the board.
+        /// Blanking shortened by the board.
         1 Short {
-            /// Ticks after firing.
+            /// End of the blanking, ticks after firing.
             ticks: u16,
         },
     }
 }
 
 wire_struct! {
-    /// A plan of beams that the device carries out alone. Beam `index` is ping
+    /// Plan of beams that the device executes on its own. Beam `index` is ping
     /// `index % pings_per_stop` at stop `index / pings_per_stop`.
     pub struct Sweep {
         /// Number of the sweep, chosen by the host, not 0.
         sweep: u16,
         /// Position of the first stop, steps.
         first_step: i32,
-        /// From stop to stop, steps.
+        /// Steps from stop to stop.
         stride: i16,
-        /// Number of stops.
+        /// Number of stops in the sweep.
         stops: u16,
         /// Firings at each stop.
         pings_per_stop: u8,
-        /// The sweep ends when the host is silent for longer, ms.
+        /// Time without a request after which the sweep ends, ms.
         lease_ms: u16,
     }
 }
 
 impl Sweep {
-    /// Number of beams; `None` if none or more than a sweep may have.
+    /// Number of beams; `None` if 0 or above [`super::limits::BEAMS_MAX`].
     #[must_use]
     pub fn beams(&self) -> Option<u16> {
         self.stops.checked_mul(u16::from(self.pings_per_stop)).filter(|&beams| beams > 0)
     }
 
-    /// Position of beam `index`, steps; `None` if out of the range of `i32` or without pings.
+    /// Position of beam `index`, steps; `None` if it overflows `i32` or there are no pings.
     #[must_use]
     pub fn step_of(&self, index: u16) -> Option<i32> {
         let stop = index.checked_div(u16::from(self.pings_per_stop))?;
@@ -182,17 +182,17 @@ impl Sweep {
 }
 
 wire_struct! {
-    /// One firing.
+    /// Result of one firing.
     pub struct Reading {
-        /// The sweep it belongs to; 0 for a Ping.
+        /// Number of the sweep; 0 for a Ping.
         sweep: u16,
-        /// Which beam of the sweep.
+        /// Index of the beam in the sweep.
         index: u16,
-        /// Position, steps.
+        /// Position, steps from home.
         step: i32,
         /// Device clock at firing, ticks.
         fired_ticks: u32,
-        /// What became of it.
+        /// Outcome of the firing.
         status: ReadingStatus,
         /// Echo times, ticks after firing.
         echoes: Echoes,
@@ -202,49 +202,49 @@ wire_struct! {
 wire_struct! {
     /// Progress of the device's latest sweep.
     pub struct Alive {
-        /// Device clock when the request came in, ticks.
+        /// Device clock when the request arrived, ticks.
         ticks: u32,
-        /// The latest sweep; 0 if there was none.
+        /// Number of the latest sweep; 0 without one.
         sweep: u16,
         /// Beams fired.
         fired: u16,
-        /// Beams reported at least once: what the host lacks below this was lost.
+        /// Number of beams reported at least once: any lower beam that the host lacks was lost.
         sent: u16,
-        /// How far it is.
+        /// State of the sweep.
         state: SweepState,
     }
 }
 
 wire_struct! {
-    /// The end of a sweep.
+    /// Message that ends a sweep.
     pub struct SweepDone {
-        /// Which sweep.
+        /// Number of the sweep.
         sweep: u16,
-        /// Beams fired.
+        /// Number of beams fired.
         fired: u16,
-        /// How it ended.
+        /// State in which the sweep ended.
         end: SweepState,
     }
 }
 
 wire_struct! {
-    /// Everything about the device that a host may want to see.
+    /// State of the device and its error counters.
     pub struct Status {
-        /// Device clock when the request came in, ticks.
+        /// Device clock when the request arrived, ticks.
         ticks: u32,
-        /// What it is doing.
+        /// Current activity of the device.
         state: DeviceState,
-        /// Whether Configure was done since boot.
+        /// `true` if Configure was received since boot.
         configured: bool,
-        /// Whether the position is known.
+        /// `true` if the position is known.
         homed: bool,
         /// Position, steps from home.
         step: i32,
-        /// The latest sweep; 0 if there was none.
+        /// Number of the latest sweep; 0 without one.
         sweep: u16,
-        /// Beams of it that were fired.
+        /// Number of beams fired in the latest sweep.
         fired: u16,
-        /// Why the device last stopped by itself, until it is homed again.
+        /// Reason for the last stop by the device itself; cleared by homing.
         fault: Option<FaultKind>,
         /// Frames dropped since boot: wrong CRC or too short for one.
         dropped_checksum: u16,
@@ -254,7 +254,7 @@ wire_struct! {
         dropped_too_long: u16,
         /// Frames dropped since boot: the line reported an error.
         dropped_line: u16,
-        /// Right frames with an unknown request since boot.
+        /// Valid frames with an unknown request since boot.
         undecodable: u16,
         /// Old duplicates and requests from before the restart, since boot.
         stale: u16,

@@ -1,30 +1,29 @@
-//! The macros behind the message tables, and the hash over them.
+//! Macros behind the message tables, and the schema hash.
 //!
-//! Each message is written once. From that one text come the Rust type, its encoding,
-//! a description that the protocol document is compared with, and the schema hash.
+//! Each message is written once. The macros derive from it the Rust type, the encoding, a
+//! description to compare with the protocol document, and the schema hash.
 
-/// One variant of a message or code enum: its code, its name, and its fields as
-/// `name: type` separated by `, ` (a bare type stands for the fields of that record).
+/// Variant of a message or code enum: code, name and fields.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Variant {
-    /// Number on the wire.
+    /// Code on the wire.
     pub code: u8,
     /// Name in the code and in the document.
     pub name: &'static str,
-    /// Fields in wire order.
+    /// Fields in wire order; a variant that carries a record has one field without a name.
     pub fields: &'static [Field],
 }
 
-/// One field of a message or record.
+/// Field of a message or record.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Field {
-    /// Name, or empty for a variant that carries a whole record.
+    /// Name; empty for a variant that carries a whole record.
     pub name: &'static str,
-    /// Rust type, which fixes the encoding.
+    /// Rust type, which determines the encoding.
     pub kind: &'static str,
 }
 
-/// Defines an enum whose variants are numbered on the wire in the order written.
+/// Defines an enum whose variants are numbered on the wire in source order.
 macro_rules! wire_enum {
     (
         $(#[$meta:meta])*
@@ -47,7 +46,7 @@ macro_rules! wire_enum {
         }
 
         impl $name {
-            /// Codes, names and fields in wire order.
+            /// Codes, names and fields of the variants, in wire order.
             pub const VARIANTS: &'static [$crate::messages::Variant] = &[
                 $($crate::messages::Variant {
                     code: $code,
@@ -67,10 +66,11 @@ macro_rules! wire_enum {
             const BLANK: Self = $crate::messages::table::first_unit!(
                 $($variant $(($record))? $({ $($field)+ })?),+);
 
-            // Where the variant is known, nothing is left of the others.
+            // With the variant known, the compiler drops the others.
             #[inline(always)]
             fn put(&self, out: &mut $crate::messages::Writer<'_>) {
-                // Apart from the fields, so that it is one byte that is already there.
+                // The code is written separately from the fields: it is the discriminant byte in
+                // memory.
                 out.byte(match self {
                     $(Self::$variant $(($crate::messages::table::any!($record)))? $({ $($field: _),+ })? => $code),+
                 });
@@ -114,7 +114,7 @@ macro_rules! wire_enum {
     };
 }
 
-/// Defines a record: a struct whose fields are encoded in the order written.
+/// Defines a record: a struct whose fields are encoded in source order.
 macro_rules! wire_struct {
     (
         $(#[$meta:meta])*
@@ -129,7 +129,7 @@ macro_rules! wire_struct {
         }
 
         impl $name {
-            /// Names and types in wire order.
+            /// Names and types of the fields, in wire order.
             pub const FIELDS: &'static [$crate::messages::Field] = &[
                 $($crate::messages::Field {
                     name: stringify!($field),
@@ -152,7 +152,7 @@ macro_rules! wire_struct {
     };
 }
 
-/// Names the record of a variant in a pattern and in an expression alike.
+/// Names the record of a variant, in patterns and in expressions.
 macro_rules! bind {
     ($name:ident $record:ty) => {
         $name
@@ -166,16 +166,16 @@ macro_rules! any {
     };
 }
 
-/// The first variant without fields.
+/// Selects the first variant without fields.
 macro_rules! first_unit {
     ($variant:ident $(, $($rest:tt)*)?) => { Self::$variant };
     ($variant:ident ($($fields:tt)*), $($rest:tt)*) => { $crate::messages::table::first_unit!($($rest)*) };
     ($variant:ident {$($fields:tt)*}, $($rest:tt)*) => { $crate::messages::table::first_unit!($($rest)*) };
 }
 
-/// Writes a record field by field, each read where it is when its turn comes: a record that is
-/// first made and then written passes through a microcontroller's stack byte by byte. The
-/// fields stand in the record's own order.
+/// Writes a record field by field, each evaluated when its turn comes, in declaration order. A
+/// record that is built first and then written would pass through a microcontroller's stack byte by
+/// byte.
 macro_rules! put_record {
     ($out:expr, $record:ident { $($field:ident: $value:expr),+ $(,)? }) => {{
         const _: () = $crate::messages::table::assert_order(
@@ -186,7 +186,7 @@ macro_rules! put_record {
 
 pub(crate) use {any, bind, first_unit, put_record, wire_enum, wire_struct};
 
-/// Codes must count up from 0, because postcard numbers variants so.
+/// Asserts that codes count up from 0, as postcard numbers variants.
 pub(crate) const fn assert_codes(variants: &[Variant]) {
     let mut index = 0;
     while index < variants.len() {
@@ -195,7 +195,7 @@ pub(crate) const fn assert_codes(variants: &[Variant]) {
     }
 }
 
-/// Names must be those of the fields, in their order.
+/// Asserts that `names` are the names of `fields`, in the same order.
 pub(crate) const fn assert_order(fields: &[Field], names: &[&str]) {
     assert!(fields.len() == names.len(), "every field once");
     let mut index = 0;
@@ -211,16 +211,16 @@ pub(crate) const fn assert_order(fields: &[Field], names: &[&str]) {
     }
 }
 
-/// The code of variant `name`.
+/// Returns the code of variant `name`.
 pub(crate) const fn code_of(variants: &[Variant], name: &str) -> u8 {
     let mut index = 0;
     while index < variants.len() {
-        let (this, wanted) = (variants[index].name.as_bytes(), name.as_bytes());
+        let (candidate, target) = (variants[index].name.as_bytes(), name.as_bytes());
         let mut at = 0;
-        while at < this.len() && at < wanted.len() && this[at] == wanted[at] {
+        while at < candidate.len() && at < target.len() && candidate[at] == target[at] {
             at += 1;
         }
-        if at == this.len() && at == wanted.len() {
+        if at == candidate.len() && at == target.len() {
             return variants[index].code;
         }
         index += 1;
@@ -228,7 +228,7 @@ pub(crate) const fn code_of(variants: &[Variant], name: &str) -> u8 {
     panic!("no such variant")
 }
 
-/// FNV-1a, 32 bits, over names and types of the tables.
+/// Offset basis of FNV-1a with 32 bits.
 pub(crate) const HASH_START: u32 = 0x811c_9dc5;
 
 pub(crate) const fn hash_enum(mut hash: u32, name: &str, variants: &[Variant]) -> u32 {
@@ -253,7 +253,7 @@ pub(crate) const fn hash_struct(mut hash: u32, name: &str, fields: &[Field]) -> 
     hash
 }
 
-/// Spaces are left out: how a compiler prints a type must not change the hash.
+/// Hashes `text` without spaces, because the compiler's formatting of types must not matter.
 const fn hash_text(mut hash: u32, text: &str) -> u32 {
     let bytes = text.as_bytes();
     let mut index = 0;

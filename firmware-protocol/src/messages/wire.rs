@@ -1,20 +1,20 @@
-//! The bytes of messages: postcard's format, written and read without it.
+//! Encoding of messages in postcard's format, without the postcard crate.
 //!
-//! On the microcontroller postcard and serde's generated code would take four kilobytes more
-//! than this. `tests/wire.rs` holds the two equal, on every message and on arbitrary bytes.
+//! On the microcontroller, postcard and serde's generated code would take four kilobytes more than
+//! this module. `tests/wire.rs` checks that both agree, on every message and on arbitrary bytes.
 
-/// A value that can be encoded in a message.
+/// Value that can be encoded in a message.
 pub trait Wire: Sized {
-    /// Appends the encoding.
+    /// Appends the encoding to `out`.
     fn put(&self, out: &mut Writer<'_>);
-    /// Reads a value in the place of this one. What is there after a fault is of no meaning: see
+    /// Decodes a value into `self`. After an error the content is meaningless: see
     /// [`Reader::is_done`].
-    // In place, because a value that is returned passes through a microcontroller's registers.
+    // In place, because a returned value passes through a microcontroller's registers.
     fn read(&mut self, input: &mut Reader<'_>);
-    /// What to read over.
+    /// Initial value to decode into.
     const BLANK: Self;
 
-    /// Reads a value that fills `body` exactly; false if there is none.
+    /// Decodes a value that fills `body` exactly; returns `false` on failure.
     fn read_exactly(&mut self, body: &[u8]) -> bool {
         let mut input = Reader::new(body);
         self.read(&mut input);
@@ -22,31 +22,31 @@ pub trait Wire: Sized {
     }
 }
 
-/// Writes into a buffer; what does not fit is remembered, not written.
+/// Writer into a fixed buffer; records an overflow instead of writing past the end.
 #[derive(Debug)]
 pub struct Writer<'a> {
-    room: &'a mut [u8],
+    buffer: &'a mut [u8],
     len: u8,
     overflowed: bool,
 }
 
 impl<'a> Writer<'a> {
-    /// Writes from the beginning of `room`.
-    pub const fn new(room: &'a mut [u8]) -> Self {
-        Self { room, len: 0, overflowed: false }
+    /// Creates a writer at the start of `buffer`.
+    pub const fn new(buffer: &'a mut [u8]) -> Self {
+        Self { buffer, len: 0, overflowed: false }
     }
 
-    /// Bytes written; `None` if not all had room.
+    /// Returns the number of bytes written; `None` after an overflow.
     #[must_use]
     pub const fn finish(self) -> Option<u8> {
         if self.overflowed { None } else { Some(self.len) }
     }
 
     /// Appends one byte.
-    // Not inlined, as are the other small parts: every field of every message calls it.
+    // Not inlined, like the other small functions: every field of every message calls it.
     #[inline(never)]
     pub fn byte(&mut self, byte: u8) {
-        match self.room.get_mut(usize::from(self.len)) {
+        match self.buffer.get_mut(usize::from(self.len)) {
             Some(slot) if self.len < u8::MAX => {
                 *slot = byte;
                 self.len += 1;
@@ -55,7 +55,7 @@ impl<'a> Writer<'a> {
         }
     }
 
-    /// Appends 7 bits a byte, lowest first, the top bit set in all but the last.
+    /// Appends `value` with 7 bits per byte, lowest first, the top bit set in all but the last.
     #[inline(never)]
     fn varint(&mut self, mut value: u32) {
         while value > 0x7f {
@@ -66,7 +66,7 @@ impl<'a> Writer<'a> {
     }
 }
 
-/// Reads from a body. After the first fault it stays failed and gives zeros.
+/// Reader of a message body. After the first error it stays failed and returns zeros.
 #[derive(Debug)]
 pub struct Reader<'a> {
     rest: &'a [u8],
@@ -74,30 +74,30 @@ pub struct Reader<'a> {
 }
 
 impl<'a> Reader<'a> {
-    /// Reads `body` from the beginning.
+    /// Creates a reader at the start of `body`.
     #[must_use]
     pub const fn new(body: &'a [u8]) -> Self {
         Self { rest: body, failed: false }
     }
 
-    /// Whether everything read was right.
+    /// Returns `true` if everything read so far was valid.
     #[must_use]
-    pub const fn is_right(&self) -> bool {
+    pub const fn is_valid(&self) -> bool {
         !self.failed
     }
 
-    /// Whether everything read was right, and nothing is left.
+    /// Returns `true` if everything read was valid and no bytes are left.
     #[must_use]
     pub const fn is_done(&self) -> bool {
         !self.failed && self.rest.is_empty()
     }
 
-    /// What was read cannot be.
+    /// Marks the input as invalid.
     pub const fn fail(&mut self) {
         self.failed = true;
     }
 
-    /// The next byte.
+    /// Reads the next byte.
     #[inline(never)]
     pub fn byte(&mut self) -> u8 {
         match self.rest.split_first() {
@@ -112,7 +112,7 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// The code of a variant.
+    /// Reads the code of a variant.
     pub fn code(&mut self) -> u8 {
         let code = self.varint(5, 0x0f);
         if code > 0x7f {
@@ -121,7 +121,7 @@ impl<'a> Reader<'a> {
         low_byte(code)
     }
 
-    /// A varint of at most `max_len` bytes, the last of them at most `last_max`.
+    /// Reads a varint of at most `max_len` bytes, the last of which is at most `last_max`.
     #[inline(never)]
     fn varint(&mut self, max_len: u8, last_max: u8) -> u32 {
         let mut value = 0;
@@ -239,10 +239,10 @@ impl<T: Wire> Wire for Option<T> {
     }
 
     fn read(&mut self, input: &mut Reader<'_>) {
-        let mut there = false;
-        there.read(input);
+        let mut present = false;
+        present.read(input);
         *self = None;
-        if there {
+        if present {
             self.insert(T::BLANK).read(input);
         }
     }
@@ -264,12 +264,12 @@ impl<const N: usize> Wire for [u8; N] {
     }
 }
 
-#[expect(clippy::cast_possible_truncation, reason = "the lowest byte is what is wanted")]
+#[expect(clippy::cast_possible_truncation, reason = "only the lowest byte is needed")]
 const fn low_byte(value: u32) -> u8 {
     value as u8
 }
 
-#[expect(clippy::cast_possible_truncation, reason = "a varint of three bytes was checked to fit")]
+#[expect(clippy::cast_possible_truncation, reason = "the varint was checked to fit")]
 const fn low_half(value: u32) -> u16 {
     value as u16
 }

@@ -1,4 +1,4 @@
-//! One sample of every message, with the extremes where length matters.
+//! One sample of every message, with extreme values where the length matters.
 #![allow(dead_code, unreachable_pub, reason = "each test file uses a part")]
 
 use firmware_protocol::messages::{

@@ -1,8 +1,8 @@
-//! A serial line in virtual time: bytes take their time, and may be lost, changed or doubled.
+//! Serial line in virtual time, with transmission times and lost, altered or duplicated bytes.
 
 use std::collections::VecDeque;
 
-/// A small generator, so that a seed fixes a run.
+/// Small random generator, so that a seed determines a run.
 #[derive(Debug, Clone)]
 pub struct Random(u64);
 
@@ -11,7 +11,7 @@ impl Random {
         Self(seed)
     }
 
-    /// splitmix64.
+    /// Returns the next number of splitmix64.
     pub fn next(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = self.0;
@@ -20,12 +20,12 @@ impl Random {
         z ^ (z >> 31)
     }
 
-    /// 0 to `bound` - 1.
+    /// Returns a number from 0 to `bound` - 1.
     pub fn below(&mut self, bound: u64) -> u64 {
         ((u128::from(self.next()) * u128::from(bound)) >> 64) as u64
     }
 
-    /// True once in `one_in` times; never for 0.
+    /// Returns `true` once in `one_in` calls on average; never for 0.
     pub fn once_in(&mut self, one_in: u64) -> bool {
         one_in != 0 && self.below(one_in) == 0
     }
@@ -35,31 +35,31 @@ impl Random {
     }
 }
 
-/// How bad a line is. "One in" counts; 0 for never.
+/// Fault rates of a line, each as the mean number of units per fault; 0 for never.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Faults {
     pub byte_lost_one_in: u64,
     pub byte_changed_one_in: u64,
     pub byte_doubled_one_in: u64,
-    /// A frame comes a second time, later.
+    /// Frame delivered a second time, later.
     pub frame_doubled_one_in: u64,
-    /// A whole frame is lost.
+    /// Loss of a whole frame.
     pub frame_lost_one_in: u64,
-    /// How much later than the first, at most, us.
+    /// Maximum delay of late copies and stalls, us.
     pub delay_max_us: u64,
-    /// The line stands still for as long.
+    /// Pause of the transmission.
     pub stall_one_in: u64,
 }
 
-/// One direction of a line.
+/// Single direction of a line.
 #[derive(Debug)]
 pub struct Line {
     byte_ns: u64,
     faults: Faults,
     random: Random,
-    /// Bytes on their way, with arrival time in ns, in order.
+    /// Bytes in transit, with arrival time in ns, in order.
     bytes: VecDeque<(u64, u8)>,
-    /// Copies of frames that come later, in order of arrival.
+    /// Late copies of frames, with arrival time in ns.
     late: Vec<(u64, Vec<u8>)>,
     free_at_ns: u64,
     frame: Vec<u8>,
@@ -80,12 +80,12 @@ impl Line {
         }
     }
 
-    /// When the sender may put in the next byte.
+    /// Time at which the sender may transmit the next byte, ns.
     pub fn free_at(&self) -> u64 {
         self.free_at_ns
     }
 
-    /// Puts bytes in at `now_ns`; they follow those under way.
+    /// Transmits bytes from `now_ns` on, after those in transit.
     pub fn send(&mut self, now_ns: u64, bytes: &[u8]) {
         for &byte in bytes {
             self.carried += 1;
@@ -110,15 +110,15 @@ impl Line {
         if self.random.once_in(self.faults.frame_lost_one_in) {
             return;
         }
-        // The bytes arrive back to back, the last one when the sender has sent it.
+        // The bytes arrive back to back, the last one at the end of its transmission.
         let begin = self.free_at_ns - self.byte_ns * (frame.len() as u64 - 1);
         for (index, byte) in frame.into_iter().enumerate() {
             let at = begin + index as u64 * self.byte_ns;
-            self.damage(at, byte);
+            self.inject_faults(at, byte);
         }
     }
 
-    fn damage(&mut self, at: u64, byte: u8) {
+    fn inject_faults(&mut self, at: u64, byte: u8) {
         let faults = self.faults;
         if self.random.once_in(faults.byte_lost_one_in) {
             return;
@@ -134,15 +134,15 @@ impl Line {
         }
     }
 
-    /// When the next byte arrives, ns.
+    /// Arrival time of the next byte, ns.
     pub fn next_arrival(&self) -> Option<u64> {
         let late = self.late.iter().map(|(at, _)| *at).min();
         let next = self.bytes.front().map(|(at, _)| *at);
         [late, next].into_iter().flatten().min()
     }
 
-    /// Takes the bytes that have arrived by `now_ns`. Late copies come between other bytes, and
-    /// may break a frame apart.
+    /// Returns the bytes that have arrived by `now_ns`. Late copies are inserted between other
+    /// bytes and may split a frame.
     pub fn arrived(&mut self, now_ns: u64) -> Vec<u8> {
         let mut out = Vec::new();
         while let Some(&(at, byte)) = self.bytes.front()
@@ -164,7 +164,7 @@ impl Line {
         out
     }
 
-    /// The line is cut: what is on it is gone.
+    /// Cuts the line: bytes in transit are lost.
     pub fn cut(&mut self) {
         self.bytes.clear();
         self.late.clear();

@@ -1,7 +1,7 @@
-//! A motor, a ranger and a board in virtual time, around the real device machine.
+//! Motor, ranger and board in virtual time, around the real device machine.
 //!
-//! Every firing gets echoes that tell its position and its number, so that a reading paired
-//! with the wrong firing shows.
+//! The echoes of every firing encode its position and number, so that a reading assigned to the
+//! wrong firing is detected.
 #![allow(dead_code, unreachable_pub, reason = "each test file uses a part")]
 
 pub mod line;
@@ -13,7 +13,7 @@ use firmware_protocol::messages::{
     Blanking, Capabilities, Echoes, FirmwareVersion, ReadingStatus, ResetCause, Settings,
 };
 
-/// One physical firing.
+/// Firing of the simulated ranger.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Firing {
     pub step: i32,
@@ -28,16 +28,16 @@ enum Job {
     Fire { window_ticks: u32, max_echoes: u8 },
 }
 
-/// The board: carries out the device's actions and calls it back.
+/// Simulated board: carries out the device's actions and calls it back.
 #[derive(Debug, Clone)]
 pub struct World {
     pub device: Device,
     /// Device time in ticks, not wrapped.
     pub clock: u64,
-    /// What the device's 32-bit clock showed at `clock` 0.
+    /// Value of the device's 32-bit clock at `clock` 0.
     pub clock_offset: u32,
     pub boot: u16,
-    /// Where the motor stands.
+    /// Position of the motor, steps.
     pub step: i32,
     pub firings: Vec<Firing>,
     pub homings: u32,
@@ -79,9 +79,9 @@ pub fn settings() -> Settings {
     }
 }
 
-/// Echoes within the window that nobody else has: the number of the firing and its position are in
-/// them.
-pub fn echoes_of(number: usize, step: i32, window_ticks: u32, max_echoes: u8) -> Vec<u32> {
+/// Returns echoes within the window that are unique to a firing: they encode its number and
+/// position.
+pub fn encode_echoes(number: usize, step: i32, window_ticks: u32, max_echoes: u8) -> Vec<u32> {
     let count = usize::from(max_echoes).min(number % 4).min(3);
     let number = number as u32;
     let third = window_ticks / 3;
@@ -115,12 +115,12 @@ impl World {
         }
     }
 
-    /// The device's clock.
+    /// Value of the device's clock, ticks.
     pub fn ticks(&self) -> u32 {
         (self.clock as u32).wrapping_add(self.clock_offset)
     }
 
-    /// A restart: the motor stays where it is, everything else is new.
+    /// Restarts the board: the motor keeps its position, all other state is new.
     pub fn reboot(&mut self) {
         self.boot = self.boot.wrapping_add(1).max(1);
         self.device = Device::new(board(self.boot));
@@ -128,13 +128,13 @@ impl World {
         self.ranger = None;
     }
 
-    /// Sets the clock forward; nothing may be due before.
+    /// Advances the clock; nothing may be due in between.
     pub fn advance(&mut self, clock: u64) {
         assert!(clock >= self.clock);
         self.clock = clock;
     }
 
-    /// When the board has to do something next, unwrapped.
+    /// Time of the next event of the board, not wrapped, ticks.
     pub fn next_event(&self) -> Option<u64> {
         let timer = self.device.poll_timeout().map(|(_, at)| {
             let ahead = at.wrapping_sub(self.ticks()) as i32;
@@ -145,13 +145,13 @@ impl World {
         [timer, motion, ranger].into_iter().flatten().min()
     }
 
-    /// Carries out what is due and what the device asks for.
+    /// Carries out everything that is due and the actions of the device.
     pub fn settle(&mut self) {
         if self.motion.as_ref().is_some_and(|(_, at, _)| *at <= self.clock) {
             self.motion_ends();
         }
         if self.ranger.as_ref().is_some_and(|(_, at, _)| *at <= self.clock) {
-            self.listening_ends();
+            self.window_ends();
         }
         if self.device.poll_timeout().is_some() {
             self.device.handle_timeout(self.ticks());
@@ -191,7 +191,7 @@ impl World {
                 self.firings.push(Firing {
                     step: self.step,
                     fired_ticks: self.ticks(),
-                    echoes: echoes_of(number, self.step, window_ticks, max_echoes),
+                    echoes: encode_echoes(number, self.step, window_ticks, max_echoes),
                 });
                 self.ranger = Some((self.clock, end, Job::Fire { window_ticks, max_echoes }));
             }
@@ -206,7 +206,7 @@ impl World {
         }
     }
 
-    /// Constant speed: the device does not care how the board turns.
+    /// Duration at constant speed, ticks: the device does not depend on the speed profile.
     pub fn turning(&self, steps: u32) -> u64 {
         u64::from(steps) * 2_000_000 / self.speed
     }
@@ -242,7 +242,7 @@ impl World {
         }
     }
 
-    fn listening_ends(&mut self) {
+    fn window_ends(&mut self) {
         let Some((_, _, Job::Fire { .. })) = self.ranger.take() else {
             return;
         };

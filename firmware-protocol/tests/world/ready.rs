@@ -1,4 +1,4 @@
-//! A homed ranger on a line without faults, and what tests ask of it.
+//! Homed ranger on a line without faults, and helpers of the tests.
 
 use firmware_protocol::host::{Command, HostEvent};
 use firmware_protocol::messages::{Settings, Sweep};

@@ -1,4 +1,4 @@
-//! Host, line, device and world, joined; time jumps from one thing that happens to the next.
+//! Joint simulation of host, line, device and board; time jumps from event to event.
 
 use firmware_protocol::host::{Command, Host, HostConfig, HostEvent};
 
@@ -7,10 +7,10 @@ use super::line::{Faults, Line, Random};
 
 const NS_PER_TICK: u64 = 500;
 const NS_PER_US: u64 = 1_000;
-/// A UART hands over a few bytes at a time.
+/// Maximum number of bytes that a UART accepts at a time.
 const FIFO: usize = 8;
 
-/// Both machines and everything between.
+/// Both machines and everything in between.
 pub struct Sim {
     pub host: Host,
     pub world: World,
@@ -18,18 +18,19 @@ pub struct Sim {
     pub down: Line,
     pub now_ns: u64,
     pub events: Vec<(u64, HostEvent)>,
-    /// The device restarts then.
+    /// Time at which the device restarts.
     pub reboot_at_ns: Option<u64>,
-    /// The line is cut then.
+    /// Time at which the line is cut.
     pub hangup_at_ns: Option<u64>,
-    /// The emergency stop is pressed then.
+    /// Time at which the emergency stop is pressed.
     pub emergency_at_ns: Option<u64>,
-    /// After a restart the device is deaf for a while, as in a boot loader.
-    deaf_until_ns: u64,
+    /// End of the time after a restart during which the device receives nothing, as in a boot
+    /// loader.
+    booting_until_ns: u64,
     pub iterations: u64,
 }
 
-/// Ran out of time or of patience: a hang.
+/// Simulation error: the time or iteration limit was reached.
 #[derive(Debug)]
 pub struct Hang;
 
@@ -49,7 +50,7 @@ impl Sim {
             reboot_at_ns: None,
             hangup_at_ns: None,
             emergency_at_ns: None,
-            deaf_until_ns: 0,
+            booting_until_ns: 0,
             iterations: 0,
         }
     }
@@ -63,7 +64,7 @@ impl Sim {
         self.host.start(now, command).expect("free and prepared");
     }
 
-    /// Runs `command` to its end; gives the events since its beginning.
+    /// Runs `command` to its end and returns the events since its start.
     pub fn run(&mut self, command: Command) -> Result<Vec<HostEvent>, Hang> {
         let first = self.events.len();
         self.start(command);
@@ -71,7 +72,7 @@ impl Sim {
         Ok(self.events[first..].iter().map(|(_, event)| *event).collect())
     }
 
-    /// Lets time pass.
+    /// Advances the time.
     pub fn idle(&mut self, us: u64) -> Result<(), Hang> {
         let end = self.now_ns + us * NS_PER_US;
         self.run_while_until(|_| true, end)
@@ -108,9 +109,9 @@ impl Sim {
     }
 
     fn step(&mut self) {
-        self.happen();
+        self.trigger_events();
         let to_device = self.up.arrived(self.now_ns);
-        if self.now_ns >= self.deaf_until_ns {
+        if self.now_ns >= self.booting_until_ns {
             self.world.device.handle_bytes(self.world.ticks(), &to_device);
         }
         self.world.settle();
@@ -131,12 +132,12 @@ impl Sim {
         }
     }
 
-    fn happen(&mut self) {
+    fn trigger_events(&mut self) {
         let now = self.now_ns;
         let due = |at: &mut Option<u64>| at.take_if(|at| *at <= now).is_some();
         if due(&mut self.reboot_at_ns) {
             self.world.reboot();
-            self.deaf_until_ns = now + 50_000_000;
+            self.booting_until_ns = now + 50_000_000;
         }
         if due(&mut self.emergency_at_ns) {
             let ticks = self.world.ticks();
@@ -158,7 +159,7 @@ impl Sim {
                 return;
             }
             self.down.send(self.now_ns, &fifo[..count]);
-            // A Reset may wait for the line.
+            // A Reset may wait until the line has drained.
             self.world.settle();
         }
     }

@@ -1,52 +1,52 @@
-//! What the EEPROM of a board holds. One text for the firmware, which reads it, and for whoever
-//! writes it: the tool `eeprom-image` and the emulator.
+//! Layout of a board's EEPROM, shared by the firmware, which reads it, and by its writers: the tool
+//! `eeprom-image` and the emulator.
 #![cfg_attr(not(test), no_std)]
 
 use firmware_protocol::{frame::crc32, messages::Capabilities};
 
-/// Bytes of the configuration, from address 0 on.
+/// Length of the configuration at address 0, bytes.
 pub const CONFIG_BYTES: usize = 20;
-/// Where the boot counters begin.
+/// Address of the first boot counter.
 pub const BOOT_AT: u16 = 64;
-/// Boot counters, one after the other, so that each is written once in so many boots: an EEPROM
-/// cell lasts 100,000 writes, this lasts 1.6 million boots.
+/// Number of boot counters, written in turn to spread the wear: an EEPROM cell lasts 100,000
+/// writes, so the counters last 1.6 million boots.
 pub const BOOT_SLOTS: u16 = 16;
-/// Bytes of a boot counter: the number, then its complement.
+/// Length of a boot counter, bytes: the number, then its complement.
 pub const BOOT_BYTES: u16 = 4;
 
-/// Turns the motor's sense of direction round.
+/// Option bit: reverses the direction of the motor.
 pub const OPTION_REVERSED: u8 = 1;
-/// The index sensor is high at the index, instead of low.
+/// Option bit: the index sensor is high at the index, instead of low.
 pub const OPTION_INDEX_HIGH: u8 = 2;
 
-/// What every board can do, whatever its EEPROM says.
-pub const ALWAYS: Capabilities = Capabilities::SHORT_BLANKING
+/// Capabilities of every board, regardless of its EEPROM.
+pub const BASE_CAPABILITIES: Capabilities = Capabilities::SHORT_BLANKING
     .with(Capabilities::MULTIPLE_ECHOES)
     .with(Capabilities::COIL_RELEASE);
 
-/// What is fitted, and whose it is.
+/// Equipment and identity of a board.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Config {
-    /// Serial number.
+    /// Serial number, unique to the board.
     pub serial: [u8; 10],
-    /// Steps a revolution, with microstepping and gears counted in.
+    /// Steps per revolution, including microstepping and gears.
     pub steps_per_revolution: u16,
-    /// What is fitted besides [`ALWAYS`].
+    /// Capabilities of the fitted equipment, including [`BASE_CAPABILITIES`].
     pub capabilities: Capabilities,
-    /// `OPTION_*` bits.
+    /// Combination of `OPTION_*` bits.
     pub options: u8,
 }
 
 impl Config {
-    /// A board whose EEPROM nobody has written.
+    /// Configuration of a board with an unwritten EEPROM.
     pub const UNSET: Self = Self {
         serial: *b"UNO-NO-SER",
         steps_per_revolution: 400,
-        capabilities: ALWAYS,
+        capabilities: BASE_CAPABILITIES,
         options: 0,
     };
 
-    /// The bytes at address 0: fields, one byte of zero, CRC-32.
+    /// Encodes the configuration for address 0: fields, a zero byte, CRC-32.
     #[must_use]
     pub fn encode(&self) -> [u8; CONFIG_BYTES] {
         let mut bytes = [0; CONFIG_BYTES];
@@ -59,7 +59,7 @@ impl Config {
         bytes
     }
 
-    /// Reads what [`Self::encode`] wrote; [`Self::UNSET`] if it is anything else.
+    /// Decodes the result of [`Self::encode`]; returns [`Self::UNSET`] for invalid data.
     #[must_use]
     pub fn decode(bytes: &[u8; CONFIG_BYTES]) -> Self {
         let Some((fields, crc)) = bytes.split_last_chunk::<4>() else { return Self::UNSET };
@@ -87,7 +87,8 @@ impl Config {
         Self {
             serial: [s0, s1, s2, s3, s4, s5, s6, s7, s8, s9],
             steps_per_revolution: u16::from_le_bytes([steps_low, steps_high]),
-            capabilities: Capabilities(u16::from_le_bytes([can_low, can_high])).with(ALWAYS),
+            capabilities: Capabilities(u16::from_le_bytes([can_low, can_high]))
+                .with(BASE_CAPABILITIES),
             options,
         }
     }
@@ -100,17 +101,17 @@ mod tests {
     const FITTED: Config = Config {
         serial: *b"LAB-000042",
         steps_per_revolution: 3200,
-        capabilities: ALWAYS.with(Capabilities::INDEX_SENSOR),
+        capabilities: BASE_CAPABILITIES.with(Capabilities::INDEX_SENSOR),
         options: OPTION_REVERSED,
     };
 
     #[test]
-    fn what_is_written_is_read() {
+    fn decodes_its_encoding() {
         assert_eq!(Config::decode(&FITTED.encode()), FITTED);
     }
 
     #[test]
-    fn any_flipped_bit_and_a_blank_chip_give_the_defaults() {
+    fn invalid_data_is_unset() {
         for bit in 0..CONFIG_BYTES * 8 {
             let mut bytes = FITTED.encode();
             bytes[bit / 8] ^= 1 << (bit % 8);

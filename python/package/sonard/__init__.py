@@ -1,4 +1,4 @@
-"""Physical model of ultrasonic rangers: what a sonar reads in a scene, and by which path.
+"""Physical model of ultrasonic rangers: predicts the readings of a sonar in a scene, with their propagation paths.
 
 >>> import sonard
 >>> scene = sonard.Scene.shipped("simple-room")
@@ -9,7 +9,7 @@
 >>> str(model.reading(scene.poses["fig9"], 270.0).path)
 'south, north, south'
 
-All lengths are metres, angles degrees counter-clockwise, times microseconds, as the names say.
+Lengths are in metres, angles in degrees counter-clockwise, times in microseconds, as indicated by the names.
 """
 
 from ._sonard import (
@@ -46,7 +46,7 @@ from ._sonard import map as map
 from ._results import Calibration, Estimate, Map, Path, Peak, Reading, Trace
 from ._status import Status
 
-# Not `map`, which a star import would put in place of Python's.
+# Without `map`, which would replace the built-in function in a star import.
 __all__ = [
     "ARRAY_READING",
     "LOGGED",

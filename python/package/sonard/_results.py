@@ -1,4 +1,4 @@
-"""What the model answers beside arrays: plain, immutable, picklable."""
+"""Results of the model other than arrays: plain, immutable, picklable classes."""
 
 from __future__ import annotations
 
@@ -14,30 +14,30 @@ from ._status import Status
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Path:
-    """The way that sound took from the transmitter to the receiver; ``str(path)`` says what it met."""
+    """Propagation path from the transmitter to the receiver; ``str(path)`` lists its interactions."""
 
     kind: Literal["specular", "diffracted", "scattered"]
     """Mirror reflections only, diffraction at an edge (once or twice), or scattering by a rough wall."""
     order: int
     """Number of mirror reflections."""
     length_m: float
-    """Length there and back, metres."""
+    """Total length of the path, metres."""
     amplitude: float
     """Amplitude before the beam pattern; a head-on, perfectly reflecting wall gives 1."""
     phase_deg: float
-    """Phase beside that of the length, degrees: what edges add."""
+    """Phase in addition to that of the length, degrees: the contribution of edges."""
     departure_deg: float
-    """Direction in which the sound leaves, degrees in the world, counter-clockwise from +x, 0 to 360."""
+    """Direction of departure, degrees in the world, counter-clockwise from +x, 0 to 360."""
     arrival_deg: float
-    """Direction from the ranger towards where the sound comes from, likewise."""
+    """Direction of arrival, from the ranger towards the incoming sound, degrees as for ``departure_deg``."""
     interactions: tuple[tuple[Literal["reflection", "diffraction", "scattering", "transducer"], str], ...]
-    """What the sound meets, in order: the kind, and the name of the wall, cylinder or edge."""
+    """Interactions in order: kind, and name of the wall, cylinder or edge."""
     points: NDArray[np.float64]
-    """Where it meets them, metres: shape (interactions, 2), or (interactions, 3) in a scene with heights."""
+    """Points of the interactions, metres: shape (interactions, 2), or (interactions, 3) in a scene with heights."""
 
     @property
     def range_m(self) -> float:
-        """Half the length, metres: the range at which a strong echo of it is read."""
+        """Half the length, metres: the measured range of a strong echo on this path."""
         return self.length_m / 2
 
     def __str__(self) -> str:
@@ -49,22 +49,22 @@ class Path:
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Reading:
-    """A single predicted reading with its path."""
+    """Single predicted reading with its path."""
 
     status: Status
-    """What became of the firing."""
+    """Outcome of the firing."""
     range_m: float | None
-    """Range, metres; ``None`` of a silence."""
+    """Range, metres; ``None`` without an echo."""
     amplitude: float | None
-    """The most that the envelope reached with the echo; a head-on, perfectly reflecting wall gives 1."""
+    """Peak of the envelope at the echo, relative to a head-on, perfectly reflecting wall."""
     margin_db: float | None
-    """The same above the threshold in force, decibels; negative of a silence: what it lacked."""
+    """Peak level above the threshold, decibels; negative without an echo, for the strongest candidate."""
     tof_us: float | None
-    """When ECHO rises, microseconds after firing; ``None`` of a silence."""
+    """Time at which ECHO rises, microseconds after firing; ``None`` without an echo."""
     path: Path | None
-    """The path of the echo; of a silence that of the candidate that came closest, if there was any."""
+    """Path of the echo; without an echo that of the strongest candidate, if there is one."""
     crosstalk: str | None = None
-    """The ranger of an array whose sound it was, if not its own; the path begins at that one."""
+    """Ranger of an array that transmitted the detected sound, if not the ranger itself; the path begins there."""
 
     def __repr__(self) -> str:
         at = "" if self.range_m is None else f" at {self.range_m:.4f} m"
@@ -76,16 +76,16 @@ class Reading:
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Peak:
-    """The envelope of one arrival in a trace."""
+    """Envelope of a single arrival in a trace."""
 
     tof_us: float
-    """When it arrives by the length of its path, microseconds after firing."""
+    """Time of arrival by the path length, microseconds after firing."""
     peak_us: float
-    """When its envelope is largest, microseconds after firing."""
+    """Time of the envelope's peak, microseconds after firing."""
     peak: float
-    """The most of its envelope; a head-on, perfectly reflecting wall gives 1."""
+    """Peak of the envelope, relative to a head-on, perfectly reflecting wall."""
     path: Path
-    """Its path."""
+    """Propagation path of the arrival."""
 
     def __repr__(self) -> str:
         return f"<Peak {self.peak:.4f}, arrives at {self.tof_us:.1f} us: {self.path}>"
@@ -93,20 +93,20 @@ class Peak:
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Trace:
-    """What an oscilloscope would show of one firing."""
+    """Signal of a firing against time, as on an oscilloscope."""
 
     t_us: NDArray[np.float64]
     """Times of the samples after firing, microseconds: shape (samples,)."""
     envelope: NDArray[np.float64]
     """Envelope of all arrivals together after gain compensation: shape (samples,)."""
     threshold: NDArray[np.float64]
-    """Least envelope that the detector notices then: shape (samples,)."""
+    """Detection threshold at each sample: shape (samples,)."""
     gain_db: NDArray[np.float64]
-    """Gain, decibels above what makes up for the spreading from a wall at 1 m: shape (samples,)."""
+    """Gain, decibels relative to the gain that compensates the spreading from a wall at 1 m: shape (samples,)."""
     echoes_us: NDArray[np.float64]
-    """Moments at which ECHO rises where it is made ready again, microseconds after firing: shape (0 to 8,)."""
+    """Times at which ECHO rises if it is re-armed after each echo, microseconds after firing: shape (0 to 8,)."""
     peaks: tuple[Peak, ...]
-    """The envelope of each arrival, shortest path first."""
+    """Envelopes of the individual arrivals, shortest path first."""
 
     def __repr__(self) -> str:
         until_us = self.t_us[-1] if self.t_us.size else 0.0
@@ -115,10 +115,10 @@ class Trace:
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Map:
-    """An occupancy grid."""
+    """Occupancy grid of a region."""
 
     occupancy: NDArray[np.float64]
-    """Probability that a cell is occupied, 0.5 where nothing is known: shape (rows, columns), from the lower left."""
+    """Probability that a cell is occupied, 0.5 for unknown cells: shape (rows, columns), from the lower left."""
     origin_m: tuple[float, float]
     """Lower left corner of the first cell, x and y in metres."""
     resolution_m: float
@@ -126,7 +126,7 @@ class Map:
 
     @property
     def extent(self) -> tuple[float, float, float, float]:
-        """Left, right, bottom and top, metres: what ``matplotlib``'s ``imshow(..., origin="lower")`` takes."""
+        """Left, right, bottom and top, metres, as for ``matplotlib``'s ``imshow(..., origin="lower")``."""
         (x, y), (rows, columns) = self.origin_m, self.occupancy.shape
         return x, x + columns * self.resolution_m, y, y + rows * self.resolution_m
 
@@ -137,31 +137,31 @@ class Map:
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Estimate:
-    """A figure that was fitted."""
+    """Fitted parameter with its uncertainty."""
 
     name: str
-    """What it is: ``"x_m"``, ``"sound_speed"``, ``"reflectance brick"``, ``"wall north"``, ..."""
+    """Name of the parameter: ``"x_m"``, ``"sound_speed"``, ``"reflectance brick"``, ``"wall north"``, ..."""
     scan: str | None
-    """The scan that it is of alone, if it is of one."""
+    """Scan that the parameter belongs to; ``None`` for a parameter shared by all scans."""
     value: float
-    """The value found, in the unit that the name says; of ``"sound_speed"`` metres a second, of a wall metres along its
-    normal, of ``"aperture"`` metres, of a reflectance the share of the amplitude."""
+    """Estimate, in the unit given by the name. The unit of ``"sound_speed"`` is metres per second, that of a wall metres
+    along its normal, that of ``"aperture"`` metres, that of a reflectance the ratio of amplitudes."""
     change: float
-    """Less what it was."""
+    """Estimate minus prior value."""
     sigma: float
-    """Standard deviation."""
+    """Standard deviation of the estimate."""
     low: float
-    """95 percent lie from here ..."""
+    """Lower limit of the 95 percent interval."""
     high: float
-    """... to here."""
+    """Upper limit of the 95 percent interval."""
     prior: float
-    """What it was."""
+    """Prior value of the parameter."""
     prior_sigma: float
-    """Standard deviation of what was believed."""
+    """Standard deviation of the prior."""
     identified: bool
-    """Whether the readings say more about it than was believed."""
+    """``True`` if the readings determine the parameter better than the prior."""
     at_limit: bool
-    """Whether it would go on if it could: the value is the least or the largest there is."""
+    """``True`` if the estimate is at the minimum or maximum of the parameter."""
 
     def __repr__(self) -> str:
         of = "" if self.scan is None else f" of {self.scan[:8]}"
@@ -171,58 +171,58 @@ class Estimate:
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Calibration:
-    """What ``calibrate`` found."""
+    """Result of ``calibrate``."""
 
     estimates: tuple[Estimate, ...]
-    """Each figure that was fitted."""
+    """Fitted parameters."""
     covariance: NDArray[np.float64]
-    """Covariance of their values, to first order, in the products of their units: shape (estimates, estimates)."""
+    """Covariance of the estimates, to first order, in the products of their units: shape (estimates, estimates)."""
     model: Model
-    """Scene, sensor, air and options as they were found; delay and stepper, which a model does not know, are below."""
+    """Model with the fitted scene, sensor, air and options; without delay and stepper, which are separate fields."""
     poses: NDArray[np.float64]
-    """Where the scans were taken, x and y in metres, heading in degrees: shape (scans, 3)."""
+    """Fitted poses of the scans, x and y in metres, heading in degrees: shape (scans, 3)."""
     scans: tuple[str, ...]
-    """The scans that were used."""
+    """Identifiers of the scans used."""
     delay_m: float
-    """What is added to every range, metres."""
+    """Offset added to every range, metres."""
     heading_zero_deg: float
-    """What is added to every azimuth, degrees."""
+    """Offset added to every azimuth, degrees."""
     gear: float
-    """What every azimuth is multiplied with before."""
+    """Factor applied to every azimuth before the offset."""
     readings: int
-    """How many readings were used."""
+    """Number of readings used."""
     explained: float
-    """The share of them that is explained."""
+    """Fraction of the readings that are explained."""
     sigma_m: float
     """Standard deviation of the ranges about the model's, metres."""
     sigma_db: float
-    """Standard deviation of the strengths, decibels."""
+    """Standard deviation of the levels about the model's, decibels."""
     log_likelihood: float
     """Natural logarithm of the likelihood of all readings."""
     log_posterior: float
-    """The same with the priors."""
+    """Natural logarithm of the posterior density, up to a constant."""
 
     @property
     def scene(self) -> Scene:
-        """The scene as it was found."""
+        """Fitted scene."""
         return self.model.scene
 
     @property
     def sensor(self) -> Sensor:
-        """The sensor as it was found, ``NAME-calibrated`` where it differs."""
+        """Fitted sensor, named ``NAME-calibrated`` if it differs from the prior one."""
         return self.model.sensor
 
     @property
     def air(self) -> Air:
-        """The air as it was found."""
+        """Fitted state of the air."""
         return self.model.air
 
     def __getitem__(self, name: str) -> Estimate:
-        """The estimate of that name; of several, one for each scan, the first."""
+        """Returns the estimate of the given name; the first one if there is one for each scan."""
         for estimate in self.estimates:
             if estimate.name == name:
                 return estimate
-        raise KeyError(f"{name!r} was not fitted: there are {', '.join(sorted({one.name for one in self.estimates}))}")
+        raise KeyError(f"{name!r} was not fitted; fitted: {', '.join(sorted({item.name for item in self.estimates}))}")
 
     def __repr__(self) -> str:
         return (

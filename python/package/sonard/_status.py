@@ -2,16 +2,16 @@ from enum import IntEnum
 
 
 class Status(IntEnum):
-    """What became of a firing: the values of the field ``status`` of readings.
+    """Outcome of a firing: the values of the field ``status`` of readings.
 
     ``ECHO``: an echo passed the threshold after blanking.
-    ``NO_ECHO``: the listening window ended without one.
-    ``MIN_RANGE``: sound was already there when blanking ended; something is closer than can be measured.
+    ``NO_ECHO``: the listening window ended without an echo.
+    ``MIN_RANGE``: an echo was present at the end of the blanking; the target is closer than the minimum range.
     ``LINK_LOST``: the reading never arrived from the device.
-    ``STEP_DOUBTFUL``: measured, but the motor may not have been where the step says.
+    ``STEP_DOUBTFUL``: measured, but the position of the motor is uncertain.
     ``MODULE_FAULT``: the module could not be fired; its ECHO line was stuck.
 
-    The model predicts the first three; the others are of measured logs.
+    The model predicts the first three; the others occur in measured logs only.
     """
 
     ECHO = 0

@@ -1,4 +1,4 @@
-//! The model of an array of rangers.
+//! Python class for the model of an array of rangers.
 
 use std::{path::Path, sync::Arc};
 
@@ -13,35 +13,37 @@ use sonard_model::{
     scene as model_scene,
 };
 
-use super::{RangerArray, meant, predict};
+use super::{RangerArray, predict, resolve};
 use crate::{
     air::Air,
     arrays, error,
-    options::{self, Words},
+    options::{self, NamedOptions},
     path,
-    pool::OfProcess,
+    pool::PerProcess,
     scene::{self, Scene},
     sensor::{self, Sensor},
 };
 
-/// Predicts what the rangers of an array read in a scene, with crosstalk: rangers that fire at once, or before the
-/// sound of an earlier turn has died away, hear one another.
+/// Predicts the readings of the rangers of an array in a scene, including crosstalk: rangers that
+/// fire simultaneously, or before the sound of an earlier firing slot has decayed, receive each
+/// other's sound.
 ///
 /// Parameters
 /// ----------
 /// scene : Scene or str
-///     The scene, or the name of a shipped one.
+///     Scene, or the name of a shipped one.
 /// array : RangerArray or str
-///     The array, or the name of a preset.
+///     Array, or the name of a preset.
 /// sensor : Sensor or str, optional
-///     The kind of its rangers; the array's own without it.
+///     Kind of the rangers. Defaults to that of the array.
 /// air : Air, optional
-///     The air; 20 degrees Celsius, 50 percent and one atmosphere without it.
+///     State of the air. Defaults to 20 degrees Celsius, 50 percent and one atmosphere.
 /// engine, max_range_m, threshold, response, ideal_receiver, lossless, max_order, edge_law, double_diffraction, \
 /// ray_spacing_deg, aperture_deg
-///     As of ``Model``. No ranger listens for longer than the array's interval.
+///     As for ``Model``. The listening window of a ranger is at most the interval of the array.
 /// without_crosstalk : bool
-///     Leave out what a ranger receives of other firings than its own; with ``paths``, the others know none.
+///     Ignore the sound of other rangers' firings; with ``paths``. The other engines never include
+///     it.
 #[pyclass(frozen, module = "sonard")]
 pub(crate) struct ArrayModel {
     scene: Py<Scene>,
@@ -49,7 +51,7 @@ pub(crate) struct ArrayModel {
     sensor: Py<Sensor>,
     air: Air,
     options: Options,
-    model: OfProcess<model::ArrayModel>,
+    model: PerProcess<model::ArrayModel>,
 }
 
 #[pymethods]
@@ -76,7 +78,7 @@ impl ArrayModel {
         ray_spacing_deg: Option<f64>,
         aperture_deg: Option<f64>,
     ) -> PyResult<Self> {
-        let words = Words { engine, response, edge_law };
+        let named = NamedOptions { engine, response, edge_law };
         let keys = OptionKeys {
             max_range_m,
             threshold,
@@ -89,88 +91,91 @@ impl ArrayModel {
             aperture_deg,
             ..OptionKeys::default()
         };
-        let options = options::options(py, &words, keys)?;
-        let (scene, array) = (scene::meant(scene)?, meant(array)?);
+        let options = options::options(py, &named, keys)?;
+        let (scene, array) = (scene::resolve(scene)?, resolve(array)?);
         let sensor = match sensor {
-            Some(sensor) => sensor::meant(sensor)?,
+            Some(sensor) => sensor::resolve(sensor)?,
             None => Py::new(py, own_sensor(py, &array.get().array.sensor)?)?,
         };
         let air = air.map_or_else(|| acoustics::Air::default().into(), |air| *air.get());
-        Self::of(py, scene, array, sensor, air, options)
+        Self::build(py, scene, array, sensor, air, options)
     }
 
-    /// The scene.
+    /// Scene of the model.
     #[getter]
     fn scene(&self, py: Python<'_>) -> Py<Scene> {
         self.scene.clone_ref(py)
     }
 
-    /// The array.
+    /// Array of the model.
     #[getter]
     fn array(&self, py: Python<'_>) -> Py<RangerArray> {
         self.array.clone_ref(py)
     }
 
-    /// The kind of its rangers.
+    /// Kind of the rangers.
     #[getter]
     fn sensor(&self, py: Python<'_>) -> Py<Sensor> {
         self.sensor.clone_ref(py)
     }
 
-    /// The air.
+    /// State of the air.
     #[getter]
     fn air(&self) -> Air {
         self.air
     }
 
-    /// How echoes are found: ``"paths"``, ``"fan"`` or ``"cone"``.
+    /// Simulation engine: ``"paths"``, ``"fan"`` or ``"cone"``.
     #[getter]
     fn engine(&self) -> &'static str {
         self.options.engine.kind().name()
     }
 
-    /// The options that are given, by name.
+    /// Options other than the defaults, by name.
     #[getter]
     fn options<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         options::given(py, &self.options)
     }
 
-    /// Speed of sound, metres a second.
+    /// Speed of sound, metres per second.
     #[getter]
     fn sound_speed_m_s(&self) -> f64 {
         self.air.air.sound_speed_m_s()
     }
 
-    /// Farthest range that is listened for, metres.
+    /// Maximum range, at the end of the listening window, metres.
     #[getter]
     fn max_range_m(&self, py: Python<'_>) -> PyResult<f64> {
         Ok(self.simulated(py)?.simulator().receiver().max_range_m)
     }
 
-    /// Predicted readings of whole rounds at each pose of the robot.
+    /// Predicts the readings of complete rounds at each pose of the robot.
     ///
-    /// The interpreter's lock is free meanwhile, and an interrupt (Ctrl-C) ends it.
+    /// Releases the interpreter lock during the computation; an interrupt (Ctrl-C) ends it.
     ///
     /// Parameters
     /// ----------
     /// poses : array_like, shape (..., 3)
-    ///     Where the robot stands: x and y in metres, heading in degrees counter-clockwise from +x, -360 to 360.
+    ///     Poses of the robot: x and y in metres, heading in degrees counter-clockwise from +x,
+    ///     -360 to 360.
     /// rounds : int
-    ///     Rounds at each pose, 1 to 200, between which the robot turns in place: of an even ring, so that directions
-    ///     are spread evenly.
+    ///     Rounds at each pose, 1 to 200. The robot turns in place between rounds, so that the
+    ///     directions of a regular ring are spread evenly.
     /// threads : int, optional
-    ///     As of ``Model.predict``. Results do not depend on it.
+    ///     As for ``Model.predict``. The results do not depend on it.
     ///
     /// Returns
     /// -------
     /// ndarray of dtype ARRAY_READING, shape (..., rounds * firings)
-    ///     In the order of ``array.round``. As of ``Model.predict``, with ``crosstalk`` (int16): the ranger whose sound it
-    ///     was, an index into ``array.ids``; -1 if its own.
+    ///     In the order of ``array.round``. As for ``Model.predict``, with ``crosstalk`` (int16):
+    ///     index into ``array.ids`` of the ranger that transmitted the detected sound; -1 for the
+    ///     ranger itself.
     ///
     /// Raises
     /// ------
     /// PoseError
-    ///     If the robot or one of its rangers can't stand at one of the poses; nothing is predicted then.
+    ///     If the robot or a ranger cannot be placed at one of the poses; nothing is predicted
+    ///     then.
     #[pyo3(signature = (poses, rounds = 1, threads = None))]
     fn predict<'py>(
         &self,
@@ -182,23 +187,23 @@ impl ArrayModel {
         predict::predict(self, py, poses, rounds, threads)
     }
 
-    /// Predicted readings of a robot that moves: one firing at each pose.
+    /// Predicts the readings of a moving robot: one firing at each pose.
     ///
-    /// ``model.fire(course.poses_at(model.array.firing_times_s(rounds)))`` drives a ``Course``. Each ranger is predicted as if
-    /// the robot had stood there for a while.
+    /// ``model.fire(course.poses_at(model.array.firing_times_s(rounds)))`` follows a ``Course``.
+    /// Each firing is predicted as if the robot had been at rest at its pose.
     ///
     /// Parameters
     /// ----------
     /// poses : array_like, shape (..., n, 3)
-    ///     The robot's at each firing; along the axis before the last the firings of a round follow each other, over and
-    ///     over again.
+    ///     Pose of the robot at each firing. Along the second-last axis the firings of a round
+    ///     follow each other, cyclically.
     /// threads : int, optional
-    ///     As of ``Model.predict``.
+    ///     As for ``Model.predict``.
     ///
     /// Returns
     /// -------
     /// ndarray of dtype ARRAY_READING, shape (..., n)
-    ///     As of ``predict``.
+    ///     As for ``predict``.
     #[pyo3(signature = (poses, threads = None))]
     fn fire<'py>(
         &self,
@@ -209,14 +214,14 @@ impl ArrayModel {
         predict::fire(self, py, poses, threads)
     }
 
-    /// One predicted reading with the path of its sound.
+    /// Predicts a single reading with its propagation path.
     ///
     /// Parameters
     /// ----------
     /// pose : array_like, shape (3,)
-    ///     The robot's: x and y (metres) and heading (degrees).
+    ///     Pose of the robot: x and y (metres) and heading (degrees).
     /// firing : int
-    ///     Which of a round, from 0: an index into ``array.round``.
+    ///     Number of the firing in a round, from 0: an index into ``array.round``.
     #[pyo3(signature = (pose, firing = 0))]
     fn reading<'py>(
         &self,
@@ -240,8 +245,8 @@ impl ArrayModel {
             Ok::<_, ModelError>((Arc::clone(here.simulator(ranger).scene()), reading))
         });
         let (scene, reading) = found.map_err(|error| error::model(py, &error))?;
-        let other = reading.crosstalk.map(|other| &*rangers.rangers[other.ranger].id);
-        path::reading(py, &scene, &reading, other)
+        let source = reading.crosstalk.map(|other| &*rangers.rangers[other.ranger].id);
+        path::reading(py, &scene, &reading, source)
     }
 
     fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
@@ -256,13 +261,13 @@ impl ArrayModel {
         &self,
         py: Python<'py>,
     ) -> PyResult<(Bound<'py, PyTuple>, Bound<'py, PyDict>)> {
-        let made_of = (self.scene(py), self.array(py), self.sensor(py), self.air, self.engine());
-        Ok((made_of.into_pyobject(py)?, self.options(py)?))
+        let arguments = (self.scene(py), self.array(py), self.sensor(py), self.air, self.engine());
+        Ok((arguments.into_pyobject(py)?, self.options(py)?))
     }
 }
 
 impl ArrayModel {
-    pub(crate) fn of(
+    pub(crate) fn build(
         py: Python<'_>,
         scene: Py<Scene>,
         array: Py<RangerArray>,
@@ -270,15 +275,15 @@ impl ArrayModel {
         air: Air,
         options: Options,
     ) -> PyResult<Self> {
-        let make = || made(scene.get(), array.get(), sensor.get(), air, options);
+        let make = || build_model(scene.get(), array.get(), sensor.get(), air, options);
         let model = py.detach(make).map_err(|error| error::model(py, &error))?;
-        Ok(Self { scene, array, sensor, air, options, model: OfProcess::new(model) })
+        Ok(Self { scene, array, sensor, air, options, model: PerProcess::new(model) })
     }
 
-    /// The model of this process.
+    /// Returns the model of this process.
     pub(super) fn simulated(&self, py: Python<'_>) -> PyResult<Arc<model::ArrayModel>> {
         let Self { scene, array, sensor, air, options, .. } = self;
-        let make = || made(scene.get(), array.get(), sensor.get(), *air, *options);
+        let make = || build_model(scene.get(), array.get(), sensor.get(), *air, *options);
         self.model.get(py, make).map_err(|error| error::model(py, &error))
     }
 
@@ -286,13 +291,13 @@ impl ArrayModel {
         &self.array.get().array
     }
 
-    /// The scene without the robot's body.
+    /// Returns the scene without the robot's body.
     pub(super) fn bare_scene(&self) -> &model_scene::Scene {
         &self.scene.get().scene
     }
 }
 
-fn made(
+fn build_model(
     scene: &Scene,
     array: &RangerArray,
     sensor: &Sensor,
@@ -303,7 +308,8 @@ fn made(
     model::ArrayModel::new(array, scene, sensor, air.air, options)
 }
 
-/// The sensor that an array names: a file, or a preset; a file of that name wins, as with the command.
+/// Returns the sensor that an array names: a file, or a preset. An existing file takes precedence,
+/// as for the command.
 fn own_sensor(py: Python<'_>, name: &str) -> PyResult<Sensor> {
     match Path::new(name).is_file() {
         true => Sensor::load(py, name.into()),

@@ -1,4 +1,4 @@
-//! Readings of many poses of a robot with an array.
+//! Batch prediction for a robot with an array.
 
 use pyo3::prelude::*;
 use sonard_model::{
@@ -8,14 +8,14 @@ use sonard_model::{
 
 use super::{ArrayModel, checked_rounds};
 use crate::{
-    arrays::{self, Poses, READING_WORDS},
+    arrays::{self, PoseArray, READING_WORDS},
     error, firing,
 };
 
-/// Firings of a round one after the other, from a pose.
+/// Consecutive firings of a round from a pose.
 struct FiringPose {
     pose: Pose,
-    /// Place in the round of the first of them.
+    /// Index of the first firing in the round.
     first: usize,
 }
 
@@ -26,38 +26,39 @@ pub(super) fn predict<'py>(
     rounds: u32,
     threads: Option<usize>,
 ) -> PyResult<Bound<'py, PyAny>> {
-    let poses = Poses::of(poses)?;
+    let poses = PoseArray::from_python(poses)?;
     let rounds = checked_rounds(rounds)?;
     let array = model.rangers();
-    let stands: Vec<Pose> = poses.list.iter().flat_map(|pose| array.turned(pose, rounds)).collect();
-    checked(model, py, &stands, |at| poses.index(at / rounds as usize))?;
-    let stands: Vec<FiringPose> =
-        stands.into_iter().map(|pose| FiringPose { pose, first: 0 }).collect();
+    let firing_poses: Vec<Pose> =
+        poses.list.iter().flat_map(|pose| array.turned(pose, rounds)).collect();
+    checked(model, py, &firing_poses, |at| poses.index(at / rounds as usize))?;
+    let firing_poses: Vec<FiringPose> =
+        firing_poses.into_iter().map(|pose| FiringPose { pose, first: 0 }).collect();
     let firings = array.round().count();
     let mut shape = poses.shape;
     shape.push(firings * rounds as usize);
-    readings(model, py, &stands, firings, threads, shape)
+    readings(model, py, &firing_poses, firings, threads, shape)
 }
 
-/// One firing a pose.
+/// Predicts one firing per pose.
 pub(super) fn fire<'py>(
     model: &ArrayModel,
     py: Python<'py>,
     poses: &Bound<'py, PyAny>,
     threads: Option<usize>,
 ) -> PyResult<Bound<'py, PyAny>> {
-    let poses = Poses::of(poses)?;
+    let poses = PoseArray::from_python(poses)?;
     checked(model, py, &poses.list, |at| poses.index(at))?;
     // A single pose is that of the first firing.
     let along = poses.shape.last().copied().unwrap_or(1).max(1);
     let firings = model.rangers().round().count();
-    let stand =
+    let firing_pose =
         |(at, pose): (usize, &Pose)| FiringPose { pose: *pose, first: at % along % firings };
-    let stands: Vec<FiringPose> = poses.list.iter().enumerate().map(stand).collect();
-    readings(model, py, &stands, 1, threads, poses.shape)
+    let firing_poses: Vec<FiringPose> = poses.list.iter().enumerate().map(firing_pose).collect();
+    readings(model, py, &firing_poses, 1, threads, poses.shape)
 }
 
-/// Whether the robot can stand everywhere.
+/// Checks that the robot can be placed at every pose.
 fn checked(
     model: &ArrayModel,
     py: Python<'_>,
@@ -72,25 +73,25 @@ fn checked(
 fn readings<'py>(
     model: &ArrayModel,
     py: Python<'py>,
-    stands: &[FiringPose],
+    firing_poses: &[FiringPose],
     each: usize,
     threads: Option<usize>,
     shape: Vec<usize>,
 ) -> PyResult<Bound<'py, PyAny>> {
     let simulated = model.simulated(py)?;
-    let fire = |stand: &FiringPose, row: &mut [f64]| fire_at(&simulated, stand, row);
-    let table = firing::table(py, stands, each, threads, fire)?;
+    let fire = |firing_pose: &FiringPose, row: &mut [f64]| fire_at(&simulated, firing_pose, row);
+    let table = firing::table(py, firing_poses, each, threads, fire)?;
     firing::shaped(py, table, arrays::array_reading_dtype(py)?, shape)
 }
 
 fn fire_at(
     model: &model::ArrayModel,
-    stand: &FiringPose,
+    firing_pose: &FiringPose,
     row: &mut [f64],
 ) -> Result<(), ModelError> {
-    let here = model.at(stand.pose)?;
-    for (firing, words) in (stand.first..).zip(row.chunks_exact_mut(READING_WORDS)) {
-        words.copy_from_slice(&arrays::words_of_array(&here.ping_in_round(firing)?));
+    let here = model.at(firing_pose.pose)?;
+    for (firing, words) in (firing_pose.first..).zip(row.chunks_exact_mut(READING_WORDS)) {
+        words.copy_from_slice(&arrays::encode_array_reading(&here.ping_in_round(firing)?));
     }
     Ok(())
 }

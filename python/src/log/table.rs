@@ -1,4 +1,4 @@
-//! The readings of logs as an array.
+//! Readings of logs as a NumPy array.
 
 use numpy::PyArray1;
 use pyo3::prelude::*;
@@ -6,7 +6,7 @@ use sonard::scan::{Ping, PingStatus, ScanView};
 
 use crate::{arrays, status};
 
-/// Numbers of a logged reading, behind its scan, index and statuses.
+/// Numbers of a logged reading, after its scan, index and statuses.
 const NUMBERS: [&str; 14] = [
     "azimuth_deg",
     "x_m",
@@ -24,35 +24,35 @@ const NUMBERS: [&str; 14] = [
     "time",
 ];
 
-/// Words of eight bytes that a logged reading takes.
+/// Size of a logged reading in words of eight bytes.
 const WORDS: usize = 2 + NUMBERS.len();
 
-/// The status of a prediction that is not there.
+/// Status code of a missing prediction.
 const NO_PREDICTION: u8 = 255;
 
-/// The type of a logged reading in an array.
+/// NumPy dtype of a logged reading.
 pub(crate) fn logged_dtype(py: Python<'_>) -> PyResult<Bound<'_, PyAny>> {
-    let heads =
+    let leading =
         [("scan", "u4", 0), ("index", "u4", 4), ("status", "u1", 8), ("sim_status", "u1", 9)];
     let format = |name| if name == "time" { "M8[ns]" } else { "f8" };
     let numbers = NUMBERS.iter().enumerate().map(|(at, name)| (*name, format(*name), 8 * (at + 2)));
-    let all: Vec<(&str, &str, usize)> = heads.into_iter().chain(numbers).collect();
+    let all: Vec<(&str, &str, usize)> = leading.into_iter().chain(numbers).collect();
     arrays::dtype(py, &all, 8 * WORDS)
 }
 
-/// The readings of some scans, each with its place in the log.
+/// Converts the readings of scans, each with its index in the log.
 pub(crate) fn shaped_readings<'a, 'py>(
     py: Python<'py>,
     scans: impl IntoIterator<Item = (usize, &'a ScanView)>,
 ) -> PyResult<Bound<'py, PyAny>> {
     let mut words = Vec::new();
     for (at, scan) in scans {
-        scan.pings.iter().for_each(|ping| words.extend(words_of(at, scan, ping)));
+        scan.pings.iter().for_each(|ping| words.extend(encode_reading(at, scan, ping)));
     }
     PyArray1::from_vec(py, words).call_method1("view", (logged_dtype(py)?,))
 }
 
-fn words_of(at: usize, scan: &ScanView, ping: &Ping) -> [f64; WORDS] {
+fn encode_reading(at: usize, scan: &ScanView, ping: &Ping) -> [f64; WORDS] {
     let mut head = [0; 8];
     head[..4].copy_from_slice(&(at as u32).to_ne_bytes());
     head[4..].copy_from_slice(&ping.index.to_ne_bytes());
@@ -64,7 +64,7 @@ fn words_of(at: usize, scan: &ScanView, ping: &Ping) -> [f64; WORDS] {
 
     let time_ns = ping.time.and_then(|time| i64::try_from(time.as_nanosecond()).ok());
     let number = |value: Option<f64>| value.unwrap_or(f64::NAN);
-    let none = silence(Some(ping.status));
+    let none = missing_range(Some(ping.status));
     [
         f64::from_bits(u64::from_ne_bytes(head)),
         f64::from_bits(u64::from_ne_bytes(statuses)),
@@ -76,18 +76,18 @@ fn words_of(at: usize, scan: &ScanView, ping: &Ping) -> [f64; WORDS] {
         ping.tof_us.unwrap_or(none),
         number(ping.amplitude),
         number(ping.margin_db),
-        sim.and_then(|sim| sim.range_m).unwrap_or(silence(sim.map(|sim| sim.status))),
+        sim.and_then(|sim| sim.range_m).unwrap_or(missing_range(sim.map(|sim| sim.status))),
         number(sim.and_then(|sim| sim.amplitude)),
         number(sim.and_then(|sim| sim.margin_db)),
         number(ping.residual_m),
         number(ping.confidence),
-        // NumPy takes the least integer for no time.
+        // NumPy uses the smallest integer for a missing time.
         f64::from_bits(time_ns.unwrap_or(i64::MIN).cast_unsigned()),
     ]
 }
 
-/// What stands for the range of a firing without one.
-const fn silence(status: Option<PingStatus>) -> f64 {
+/// Value of a missing range: infinite without an echo, else not a number.
+const fn missing_range(status: Option<PingStatus>) -> f64 {
     match status {
         Some(PingStatus::NoEcho) => f64::INFINITY,
         _ => f64::NAN,

@@ -1,4 +1,4 @@
-//! What a model is made of, and the simulators made from it.
+//! Components of a model, and the simulators built from them.
 
 use std::sync::Arc;
 
@@ -12,9 +12,9 @@ use sonard_model::{
 };
 
 use super::Model;
-use crate::{air::Air, arrays, error, pool::OfProcess, scene::Scene, sensor::Sensor};
+use crate::{air::Air, arrays, error, pool::PerProcess, scene::Scene, sensor::Sensor};
 
-/// What a simulator is made of.
+/// Components of a simulator.
 pub(super) struct Parts<'a> {
     pub(super) scene: &'a Arc<model_scene::Scene>,
     pub(super) sensor: &'a acoustics::Sensor,
@@ -27,7 +27,7 @@ impl Parts<'_> {
         Simulator::new(self.scene.clone(), self.sensor.clone(), self.air, self.options)
     }
 
-    /// With the robot's body at a pose.
+    /// Builds the simulator with the robot's body at a pose.
     pub(super) fn simulator_at(&self, pose: &Pose) -> Result<Simulator, ModelError> {
         let scene = Arc::new(self.scene.with_robot_at(pose));
         Simulator::new(scene, self.sensor.clone(), self.air, self.options)
@@ -35,7 +35,7 @@ impl Parts<'_> {
 }
 
 impl Model {
-    pub(crate) fn of(
+    pub(crate) fn build(
         py: Python<'_>,
         scene: Py<Scene>,
         sensor: Py<Sensor>,
@@ -43,17 +43,17 @@ impl Model {
         mut options: Options,
     ) -> PyResult<Self> {
         if let EngineOptions::Paths(paths) = &mut options.engine {
-            // A ranger alone has none.
+            // A single ranger has no crosstalk.
             paths.without_crosstalk = false;
         }
-        let (of, kind) = (&scene.get().scene, &sensor.get().sensor);
-        let parts = Parts { scene: of, sensor: kind, air: air.air, options };
+        let (plain, kind) = (&scene.get().scene, &sensor.get().sensor);
+        let parts = Parts { scene: plain, sensor: kind, air: air.air, options };
         let simulator =
             py.detach(|| parts.simulator()).map_err(|error| error::model(py, &error))?;
-        Ok(Self { scene, sensor, air, options, simulator: OfProcess::new(simulator) })
+        Ok(Self { scene, sensor, air, options, simulator: PerProcess::new(simulator) })
     }
 
-    /// What readings are explained by.
+    /// Returns the input of a fit.
     pub(crate) fn world(&self) -> World {
         let Parts { scene, sensor, air, options } = self.parts();
         World::new(scene.clone(), sensor.clone(), air, options)
@@ -68,22 +68,22 @@ impl Model {
         }
     }
 
-    /// The simulator of the scene without a robot's body.
+    /// Returns the simulator of the scene without a robot's body.
     pub(super) fn simulator(&self, py: Python<'_>) -> PyResult<Arc<Simulator>> {
-        let made = self.simulator.get(py, || self.parts().simulator());
-        made.map_err(|error| error::model(py, &error))
+        let simulator = self.simulator.get(py, || self.parts().simulator());
+        simulator.map_err(|error| error::model(py, &error))
     }
 
-    /// The simulator for a pose.
+    /// Returns the simulator for a pose.
     pub(super) fn simulator_at(&self, py: Python<'_>, pose: &Pose) -> PyResult<Arc<Simulator>> {
         if self.parts().scene.robot.is_none() {
             return self.simulator(py);
         }
-        let made = py.detach(|| self.parts().simulator_at(pose));
-        made.map(Arc::new).map_err(|error| error::model(py, &error))
+        let simulator = py.detach(|| self.parts().simulator_at(pose));
+        simulator.map(Arc::new).map_err(|error| error::model(py, &error))
     }
 
-    /// The one pose that is given, if a ranger can stand there.
+    /// Converts a single pose and checks that a ranger can be placed there.
     pub(super) fn checked(&self, given: &Bound<'_, PyAny>) -> PyResult<Pose> {
         let pose = arrays::one_pose(given)?;
         let checked = self.parts().scene.check_pose(&pose);

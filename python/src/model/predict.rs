@@ -1,4 +1,4 @@
-//! Readings of many poses.
+//! Batch prediction for a ranger.
 
 use std::{sync::Arc, time::Instant};
 
@@ -11,13 +11,13 @@ use sonard_model::{
 
 use super::{Model, parts::Parts};
 use crate::{
-    arrays::{self, Poses, READING_WORDS},
+    arrays::{self, PoseArray, READING_WORDS},
     error, firing,
     pool::pool,
 };
 
 /// Largest magnitude of an azimuth, degrees.
-const MOST_AZIMUTH_DEG: f64 = 1e6;
+const MAX_AZIMUTH_DEG: f64 = 1e6;
 
 pub(super) fn predict<'py>(
     model: &Model,
@@ -26,17 +26,17 @@ pub(super) fn predict<'py>(
     azimuths_deg: Option<&Bound<'py, PyAny>>,
     threads: Option<usize>,
 ) -> PyResult<Bound<'py, PyAny>> {
-    let poses = Poses::of(poses)?;
+    let poses = PoseArray::from_python(poses)?;
     let azimuths_deg = azimuths_deg.map_or_else(|| Ok(full_turn()), checked_azimuths)?;
-    let stands = Stands::checked(model, py, &poses)?;
-    let fire = |pose: &Pose, row: &mut [f64]| stands.fire(pose, &azimuths_deg, row);
+    let simulators = PoseSimulators::checked(model, py, &poses)?;
+    let fire = |pose: &Pose, row: &mut [f64]| simulators.fire(pose, &azimuths_deg, row);
     let table = firing::table(py, &poses.list, azimuths_deg.len(), threads, fire)?;
     let mut shape = poses.shape;
     shape.push(azimuths_deg.len());
     firing::shaped(py, table, arrays::reading_dtype(py)?, shape)
 }
 
-/// One reading a pose.
+/// Predicts one reading per pose.
 pub(super) fn fire<'py>(
     model: &Model,
     py: Python<'py>,
@@ -44,27 +44,27 @@ pub(super) fn fire<'py>(
     azimuths_deg: &Bound<'py, PyAny>,
     threads: Option<usize>,
 ) -> PyResult<Bound<'py, PyAny>> {
-    let poses = Poses::of(poses)?;
+    let poses = PoseArray::from_python(poses)?;
     let shape = PyTuple::new(py, &poses.shape)?;
-    let spread = py.import("numpy")?.call_method1("broadcast_to", (azimuths_deg, shape))?;
-    let azimuths_deg = checked_azimuths(&spread.call_method1("reshape", (-1,))?)?;
-    let stands = Stands::checked(model, py, &poses)?;
+    let broadcast = py.import("numpy")?.call_method1("broadcast_to", (azimuths_deg, shape))?;
+    let azimuths_deg = checked_azimuths(&broadcast.call_method1("reshape", (-1,))?)?;
+    let simulators = PoseSimulators::checked(model, py, &poses)?;
     let firings: Vec<(Pose, f64)> = poses.list.iter().copied().zip(azimuths_deg).collect();
     let fire = |(pose, azimuth_deg): &(Pose, f64), row: &mut [f64]| {
-        stands.fire(pose, &[*azimuth_deg], row)
+        simulators.fire(pose, &[*azimuth_deg], row)
     };
     let table = firing::table(py, &firings, 1, threads, fire)?;
     firing::shaped(py, table, arrays::reading_dtype(py)?, poses.shape)
 }
 
-/// The models of poses at which the ranger can stand.
-struct Stands<'a> {
+/// Simulators for poses at which the ranger can be placed.
+struct PoseSimulators<'a> {
     parts: Parts<'a>,
     shared: Arc<Simulator>,
 }
 
-impl<'a> Stands<'a> {
-    fn checked(model: &'a Model, py: Python<'_>, poses: &Poses) -> PyResult<Self> {
+impl<'a> PoseSimulators<'a> {
+    fn checked(model: &'a Model, py: Python<'_>, poses: &PoseArray) -> PyResult<Self> {
         let parts = model.parts();
         let checked = py.detach(|| parts.scene.check_poses(&poses.list));
         checked.map_err(|(at, error)| error::pose(py, &poses.index(at), &error))?;
@@ -79,7 +79,7 @@ impl<'a> Stands<'a> {
     }
 }
 
-/// The azimuths of a scan that was asked nothing else.
+/// Azimuths of a default scan.
 pub(crate) fn full_turn() -> Vec<f64> {
     let plan = ScanPlan::default();
     (0..plan.stops()).map(|stop| plan.azimuth_deg(stop)).collect()
@@ -96,7 +96,7 @@ fn checked_azimuths(given: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
     }
 }
 
-/// World direction of an azimuth at a pose, radians.
+/// Direction of an azimuth in the world at a pose, radians.
 pub(super) fn direction_rad(pose: &Pose, azimuth_deg: f64) -> PyResult<f64> {
     if is_azimuth(azimuth_deg) {
         return Ok(pose.direction_rad(azimuth_deg));
@@ -106,7 +106,7 @@ pub(super) fn direction_rad(pose: &Pose, azimuth_deg: f64) -> PyResult<f64> {
 }
 
 fn is_azimuth(azimuth_deg: f64) -> bool {
-    azimuth_deg.abs() <= MOST_AZIMUTH_DEG
+    azimuth_deg.abs() <= MAX_AZIMUTH_DEG
 }
 
 fn fire_all(
@@ -118,13 +118,13 @@ fn fire_all(
     let point = simulator.at(pose.position());
     for (azimuth_deg, words) in azimuths_deg.iter().zip(row.chunks_exact_mut(READING_WORDS)) {
         let prediction = point.ping(pose.direction_rad(*azimuth_deg))?;
-        words.copy_from_slice(&arrays::words_of(&prediction));
+        words.copy_from_slice(&arrays::encode_reading(&prediction));
     }
     Ok(())
 }
 
-/// Seconds that the library's `predict_many` takes for full turns at some poses, on threads as above: what
-/// `benches/predict.py` holds `predict` against.
+/// Measures the time of the library's `predict_many` for default scans at some poses, in seconds,
+/// as a reference for `benches/predict.py`.
 #[pyfunction]
 #[pyo3(name = "_seconds_of_predict_many", signature = (model, poses, threads = None))]
 pub(crate) fn seconds_of_predict_many(
@@ -133,7 +133,7 @@ pub(crate) fn seconds_of_predict_many(
     poses: &Bound<'_, PyAny>,
     threads: Option<usize>,
 ) -> PyResult<f64> {
-    let poses = Poses::of(poses)?;
+    let poses = PoseArray::from_python(poses)?;
     let simulator = model.get().simulator(py)?;
     let pool = pool(py, threads)?;
     let took = py.detach(|| {

@@ -1,4 +1,4 @@
-//! Single places and firings.
+//! Predictions for a single pose.
 
 use pyo3::{exceptions::PyValueError, prelude::*};
 use sonard_model::model::paths as model_paths;
@@ -42,7 +42,7 @@ pub(super) fn paths<'py>(
         let settings = model_paths::Settings { floor: weakest, ..simulator.path_settings() };
         let paths = model_paths::Paths::new(simulator.scene(), settings);
         paths.each_between(pose.position(), pose.position(), |echoes| {
-            echoes.map(|echo| PathResult::of_echo(simulator.scene(), &echo)).collect::<Vec<_>>()
+            echoes.map(|echo| PathResult::from_echo(simulator.scene(), &echo)).collect::<Vec<_>>()
         })
     });
     let found = found.map_err(|error| error::too_costly(py, &error))?;
@@ -61,17 +61,17 @@ pub(super) fn trace<'py>(
     let direction_rad = predict::direction_rad(&pose, azimuth_deg)?;
     let simulator = model.simulator_at(py, &pose)?;
     let until_m = until_m.unwrap_or(simulator.receiver().max_range_m);
-    for (name, value, [least, most]) in
+    for (name, value, [min, max]) in
         [("until_m", until_m, [0.05, 100.0]), ("step_us", step_us, [1.0, 1000.0])]
     {
-        if !(least..=most).contains(&value) {
-            let message = format!("{name} is {value}: it must be from {least} to {most}");
+        if !(min..=max).contains(&value) {
+            let message = format!("{name} is {value}: it must be from {min} to {max}");
             return Err(PyValueError::new_err(message));
         }
     }
     let trace = py.detach(|| {
         let point = simulator.at(pose.position());
-        TraceResult::at(simulator.scene(), &point, direction_rad, until_m, step_us)
+        TraceResult::compute(simulator.scene(), &point, direction_rad, until_m, step_us)
     });
     trace.map_err(|error| error::too_costly(py, &error))?.into_python(py)
 }

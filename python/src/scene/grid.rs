@@ -6,8 +6,8 @@ use pyo3::prelude::*;
 use sonard::grid_file::{self, GridFileError, GridFileFault};
 use sonard_model::scene;
 
-use super::between;
-use crate::error::{self, SceneError, refuse};
+use super::check_range;
+use crate::error::{self, SceneError, new_error};
 
 pub(super) fn traced(
     py: Python<'_>,
@@ -18,23 +18,23 @@ pub(super) fn traced(
     name: Option<&str>,
 ) -> PyResult<scene::Scene> {
     for (name, value) in [("tolerance_m", tolerance_m), ("least_m", least_m)] {
-        between(name, value.unwrap_or_default(), [0.0, 1e6])?;
+        check_range(name, value.unwrap_or_default(), [0.0, 1e6])?;
     }
     let found = py.detach(|| grid_file::read_walls(path, tolerance_m, least_m, |_| {}));
-    let (found, _) = found.map_err(|error| unusable(py, &error))?;
+    let (found, _) = found.map_err(|error| to_exception(py, &error))?;
     if found.is_empty() {
         let help =
-            "give a map with occupied cells (above 0.65) beside free ones, or a smaller least_m";
-        let message = format!("{}: no wall is found in it", path.display());
-        return Err(refuse::<SceneError>(py, &message, help));
+            "use a map with occupied cells (above 0.65) next to free ones, or a smaller least_m";
+        let message = format!("{}: the map contains no wall", path.display());
+        return Err(new_error::<SceneError>(py, &message, help));
     }
     let stem = path.file_stem().map(|stem| stem.to_string_lossy()).unwrap_or_default();
     let name = name.unwrap_or(&stem);
-    let built = found.scene(if name.is_empty() { "scene" } else { name }, reflectance).build();
-    built.map_err(|error| error::scene(py, &error, false))
+    let scene = found.scene(if name.is_empty() { "scene" } else { name }, reflectance).build();
+    scene.map_err(|error| error::scene(py, &error, false))
 }
 
-fn unusable(py: Python<'_>, error: &GridFileError) -> PyErr {
+fn to_exception(py: Python<'_>, error: &GridFileError) -> PyErr {
     match &error.fault {
         GridFileFault::Disk(source) | GridFileFault::Image(source) => {
             error::unreadable(py, error.path.clone(), source)
@@ -42,6 +42,6 @@ fn unusable(py: Python<'_>, error: &GridFileError) -> PyErr {
         GridFileFault::IsImage
         | GridFileFault::Map(_)
         | GridFileFault::Png(_)
-        | GridFileFault::Turned(_) => refuse::<SceneError>(py, &error.to_string(), error.help()),
+        | GridFileFault::Turned(_) => new_error::<SceneError>(py, &error.to_string(), error.help()),
     }
 }

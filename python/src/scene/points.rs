@@ -1,4 +1,4 @@
-//! Scenes from arrays of points, and what scenes from code have in common.
+//! Scenes from arrays of points, and parts shared with other sources.
 
 use pyo3::{exceptions::PyValueError, prelude::*};
 use sonard_model::{
@@ -8,18 +8,18 @@ use sonard_model::{
 
 use crate::{arrays, error};
 
-/// The material of scenes that are made.
+/// Material of all surfaces.
 pub(super) const MATERIAL: &str = "wall";
 
-/// What a scene has beside its outlines.
-pub(super) struct Rest<'a, 'py> {
+/// Parts of a scene other than its outlines.
+pub(super) struct OtherParts<'a, 'py> {
     pub(super) cylinders: Option<&'a Bound<'py, PyAny>>,
     pub(super) heights_m: [Option<f64>; 2],
 }
 
-impl Rest<'_, '_> {
-    /// Puts it into a scene and makes that.
-    pub(super) fn built(
+impl OtherParts<'_, '_> {
+    /// Adds the parts to a scene and builds it.
+    pub(super) fn build(
         &self,
         py: Python<'_>,
         mut builder: SceneBuilder,
@@ -38,7 +38,7 @@ impl Rest<'_, '_> {
             [None, None] => {}
             _ => {
                 return Err(PyValueError::new_err(
-                    "give floor_z_m and ceiling_z_m, or none of them",
+                    "pass both floor_z_m and ceiling_z_m, or neither",
                 ));
             }
         }
@@ -46,7 +46,7 @@ impl Rest<'_, '_> {
     }
 }
 
-/// Walls along the outlines of a room and of what stands in it.
+/// Adds walls along the outlines of a room and of its obstacles.
 pub(super) fn with_outlines(
     mut builder: SceneBuilder,
     points: &Bound<'_, PyAny>,
@@ -62,7 +62,7 @@ pub(super) fn with_outlines(
     Ok(builder)
 }
 
-/// Walls along an outline that was given as an array.
+/// Adds walls along an outline given as an array.
 fn with_outline(
     builder: SceneBuilder,
     id: &str,

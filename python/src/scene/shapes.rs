@@ -1,4 +1,4 @@
-//! Outlines from shapes of other packages: what shapely, geopandas, fiona and GeoJSON have in common.
+//! Outlines from shapes of other packages: shapely, geopandas, fiona and GeoJSON.
 
 use pyo3::{
     exceptions::{PyTypeError, PyValueError},
@@ -10,46 +10,47 @@ use sonard_model::scene::SceneBuilder;
 use super::points::MATERIAL;
 use crate::arrays::Numbers;
 
-/// Collections in collections are followed so far.
-const DEEPEST: usize = 32;
+/// Maximum depth of nested collections.
+const MAX_DEPTH: usize = 32;
 
-/// Walls along some shapes.
+/// Adds walls along the outlines of shapes.
 pub(super) fn with_shapes(
     builder: SceneBuilder,
     given: &Bound<'_, PyAny>,
 ) -> PyResult<SceneBuilder> {
-    let mut outlines = Outlines::default();
+    let mut outlines = ShapeOutlines::default();
     outlines.gather(given, "shapes", 0)?;
     if outlines.found.is_empty() {
-        return Err(PyValueError::new_err("shapes have no line: give lines or polygons"));
+        return Err(PyValueError::new_err("shapes contain no line: pass lines or polygons"));
     }
-    Ok(outlines.found.into_iter().fold(builder, |builder, Outline { id, corners, is_closed }| {
-        match is_closed {
+    Ok(outlines.found.into_iter().fold(
+        builder,
+        |builder, ShapeOutline { id, corners, is_closed }| match is_closed {
             true => builder.room(&id, &corners, MATERIAL),
             false => builder.walls(&id, &corners, MATERIAL),
-        }
-    }))
+        },
+    ))
 }
 
-struct Outline {
+struct ShapeOutline {
     id: String,
     corners: Vec<[f64; 2]>,
     is_closed: bool,
 }
 
-/// What was found so far.
+/// Outlines collected so far.
 #[derive(Default)]
-struct Outlines {
-    found: Vec<Outline>,
+struct ShapeOutlines {
+    found: Vec<ShapeOutline>,
     lines: usize,
     polygons: usize,
 }
 
-impl Outlines {
-    /// Whatever a shape is: `name` is what messages call it.
+impl ShapeOutlines {
+    /// Collects the outlines of any shape; `name` identifies it in messages.
     fn gather(&mut self, given: &Bound<'_, PyAny>, name: &str, depth: usize) -> PyResult<()> {
-        if depth > DEEPEST {
-            let message = format!("{name}: collections in collections, more than {DEEPEST} deep");
+        if depth > MAX_DEPTH {
+            let message = format!("{name}: nested collections, more than {MAX_DEPTH} deep");
             return Err(PyValueError::new_err(message));
         }
         if let Ok(mapping) = given.cast::<PyMapping>() {
@@ -68,7 +69,7 @@ impl Outlines {
         let Some(items) = items else {
             let kind = given.get_type();
             return Err(PyTypeError::new_err(format!(
-                "{name} is a {kind}: give shapes with __geo_interface__ or coords, or a list of them"
+                "{name} is a {kind}: must be shapes with __geo_interface__ or coords, or a list of them"
             )));
         };
         for (number, item) in items.enumerate() {
@@ -77,10 +78,10 @@ impl Outlines {
         Ok(())
     }
 
-    /// A geometry or feature as GeoJSON has it.
+    /// Collects the outlines of a GeoJSON geometry or feature.
     fn geo(&mut self, geo: &Bound<'_, PyMapping>, name: &str, depth: usize) -> PyResult<()> {
         let Ok(kind) = geo.get_item("type").and_then(|kind| kind.extract::<String>()) else {
-            let message = format!("{name} is a mapping without a type: give it as GeoJSON has it");
+            let message = format!("{name} is a mapping without a type: must be GeoJSON");
             return Err(PyValueError::new_err(message));
         };
         match kind.as_str() {
@@ -99,13 +100,13 @@ impl Outlines {
                 if geometry.is_none() { Ok(()) } else { self.gather(&geometry, name, depth + 1) }
             }
             "Point" | "MultiPoint" => Err(PyValueError::new_err(format!(
-                "{name} is a {kind}, along which there is no wall: give its buffer, or cylinders"
+                "{name} is a {kind}, which has no wall: pass its buffer, or cylinders"
             ))),
             _ => Err(PyValueError::new_err(format!("{name} is a `{kind}`, which has no outline"))),
         }
     }
 
-    /// One that comes back to where it began is closed.
+    /// Collects a line, which is closed if it ends at its start.
     fn line(&mut self, given: &Bound<'_, PyAny>, name: &str) -> PyResult<()> {
         let corners = corners(given, name)?;
         let is_closed = corners.len() > 3 && corners.first() == corners.last();
@@ -115,7 +116,7 @@ impl Outlines {
         Ok(())
     }
 
-    /// Its outer ring, and its holes.
+    /// Collects the outer ring of a polygon and its holes.
     fn polygon(&mut self, rings: &Bound<'_, PyAny>, name: &str) -> PyResult<()> {
         let polygon = format!("polygon-{}", self.polygons);
         self.polygons += 1;
@@ -129,19 +130,19 @@ impl Outlines {
         Ok(())
     }
 
-    /// What is empty is none.
+    /// Stores an outline unless it is empty.
     fn keep(&mut self, id: String, mut corners: Vec<[f64; 2]>, is_closed: bool) {
         corners.dedup();
         if is_closed && corners.len() > 1 && corners.first() == corners.last() {
             corners.pop();
         }
         if !corners.is_empty() {
-            self.found.push(Outline { id, corners, is_closed });
+            self.found.push(ShapeOutline { id, corners, is_closed });
         }
     }
 }
 
-/// Hands over each part of a shape with its name.
+/// Calls `take` for each part of a shape, with the name of the part.
 fn each<'py>(
     parts: &Bound<'py, PyAny>,
     name: &str,
@@ -150,7 +151,7 @@ fn each<'py>(
     parts.try_iter()?.enumerate().try_for_each(|(at, part)| take(&part?, &format!("{name}[{at}]")))
 }
 
-/// Rows of x and y; heights are left out.
+/// Converts rows of x and y; heights are ignored.
 fn corners(given: &Bound<'_, PyAny>, name: &str) -> PyResult<Vec<[f64; 2]>> {
     let list = given
         .py()

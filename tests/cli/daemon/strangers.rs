@@ -45,7 +45,7 @@ fn sessions_of_readings(log: &Log) -> BTreeSet<String> {
 #[test]
 fn a_board_that_comes_back_as_another_begins_a_session_of_its_own() {
     for (lie, kind, said) in [
-        ("other-steps", "MOCK-00001 mock 800", "800 steps a revolution, not 400"),
+        ("other-steps", "MOCK-00001 mock 800", "800 steps per revolution, not 400"),
         ("other-serial", "OTHER-0002 mock 400", "OTHER-0002, not MOCK-00001"),
         ("emulator", "MOCK-00001 emulator 400", "-SIMULATED"),
     ] {

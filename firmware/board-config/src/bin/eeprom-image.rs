@@ -2,18 +2,18 @@
 
 use std::process::ExitCode;
 
-use board_config::{ALWAYS, Config, OPTION_INDEX_HIGH, OPTION_REVERSED};
+use board_config::{BASE_CAPABILITIES, Config, OPTION_INDEX_HIGH, OPTION_REVERSED};
 use firmware_protocol::messages::Capabilities;
 
 const USAGE: &str = "\
 usage: eeprom-image SERIAL [steps=N] [index] [index-high] [emergency-stop] [reversed]
 
   SERIAL           serial number, 1 to 10 printable characters
-  steps=N          steps a revolution, with microstepping and gears (default 400)
+  steps=N          steps per revolution, with microstepping and gears (default 400)
   index            an index sensor is fitted, low at the index
   index-high       an index sensor is fitted, high at the index
   emergency-stop   an emergency stop is fitted, closed to ground unless pressed
-  reversed         the motor turns the other way";
+  reversed         the motor is mounted in the opposite direction";
 
 fn main() -> ExitCode {
     match config(std::env::args().skip(1)) {
@@ -21,8 +21,8 @@ fn main() -> ExitCode {
             print!("{}", intel_hex(&config.encode()));
             ExitCode::SUCCESS
         }
-        Err(wrong) => {
-            eprintln!("eeprom-image: {wrong}\n\n{USAGE}");
+        Err(error) => {
+            eprintln!("eeprom-image: {error}\n\n{USAGE}");
             ExitCode::from(2)
         }
     }
@@ -32,12 +32,14 @@ fn config(mut words: impl Iterator<Item = String>) -> Result<Config, String> {
     let serial = words.next().ok_or("no serial number")?;
     let printable = serial.bytes().all(|byte| byte.is_ascii_graphic());
     if serial.is_empty() || serial.len() > 10 || !printable {
-        return Err(format!("{serial:?} is no serial number"));
+        return Err(format!("{serial:?} is not a serial number (1 to 10 printable characters)"));
     }
-    let mut config = Config { serial: [0; 10], capabilities: ALWAYS, ..Config::UNSET };
+    let mut config = Config { serial: [0; 10], capabilities: BASE_CAPABILITIES, ..Config::UNSET };
     config.serial[..serial.len()].copy_from_slice(serial.as_bytes());
     for word in words {
-        let fit = |config: &mut Config, what| config.capabilities = config.capabilities.with(what);
+        let fit = |config: &mut Config, capability| {
+            config.capabilities = config.capabilities.with(capability)
+        };
         match word.as_str() {
             "index" => fit(&mut config, Capabilities::INDEX_SENSOR),
             "index-high" => {
@@ -50,14 +52,14 @@ fn config(mut words: impl Iterator<Item = String>) -> Result<Config, String> {
                 let steps = word.strip_prefix("steps=").and_then(|steps| steps.parse().ok());
                 config.steps_per_revolution = steps
                     .filter(|steps| (4..=12_800).contains(steps))
-                    .ok_or(format!("{word:?} is not understood (steps are 4 to 12800)"))?;
+                    .ok_or(format!("unknown argument {word:?} (steps must be 4 to 12800)"))?;
             }
         }
     }
     Ok(config)
 }
 
-/// One record a line of 16 bytes, then the end.
+/// Encodes one record per 16 bytes, then the end record.
 fn intel_hex(bytes: &[u8]) -> String {
     let mut text = String::new();
     for (line, chunk) in bytes.chunks(16).enumerate() {

@@ -1,17 +1,17 @@
-//! Draws the wiring diagram, `docs/wiring/wiring.svg`, to standard output.
+//! Draws the wiring diagram `docs/wiring/wiring.svg` to standard output.
 
 use std::fmt::Write as _;
 
 const WIDTH: i32 = 1120;
 const HEIGHT: i32 = 700;
 
-/// One wire between a pin of the Uno and what is beside it.
-struct Wire {
+/// Connection between a pin of the Uno and a neighbouring device.
+struct Connection {
     y: i32,
     device: &'static str,
     uno: &'static str,
     colour: &'static str,
-    /// Written along the wire.
+    /// Label along the connection.
     part: &'static str,
 }
 
@@ -21,15 +21,15 @@ const fn wire(
     uno: &'static str,
     colour: &'static str,
     part: &'static str,
-) -> Wire {
-    Wire { y, device, uno, colour, part }
+) -> Connection {
+    Connection { y, device, uno, colour, part }
 }
 
 const SIGNAL: &str = "#1f6fb2";
 const GROUND: &str = "#333333";
 const POWER: &str = "#c0392b";
 
-const LEFT: [Wire; 6] = [
+const LEFT: [Connection; 6] = [
     wire(150, "INIT", "D9", SIGNAL, "10 kΩ to GND"),
     wire(195, "ECHO", "D8", SIGNAL, "4.7 kΩ to +5 V"),
     wire(240, "BINH", "D10", SIGNAL, ""),
@@ -37,14 +37,14 @@ const LEFT: [Wire; 6] = [
     wire(330, "GND", "GND", GROUND, "short and thick"),
     wire(375, "V+", "", POWER, "1000 µF to GND, at the module"),
 ];
-const DRIVER: [Wire; 5] = [
+const DRIVER: [Connection; 5] = [
     wire(150, "STEP", "D4", SIGNAL, ""),
     wire(195, "DIR", "D5", SIGNAL, ""),
     wire(240, "ENABLE", "D6", SIGNAL, "10 kΩ to +5 V"),
     wire(285, "GND", "GND", GROUND, ""),
     wire(330, "VDD", "5V", POWER, ""),
 ];
-const SWITCHES: [Wire; 2] = [
+const SWITCHES: [Connection; 2] = [
     wire(450, "index sensor", "A0", SIGNAL, "low at the index"),
     wire(500, "emergency stop", "A1", SIGNAL, "opens when pressed"),
 ];
@@ -73,11 +73,11 @@ fn drawing() -> String {
     block(&mut svg, 470, 110, 180, 430, "Arduino Uno");
     block(&mut svg, 880, 110, 200, 250, "stepper driver");
     block(&mut svg, 880, 410, 200, 130, "switches to GND");
-    for wire in &LEFT {
-        draw(&mut svg, wire, 240, 470, true);
+    for connection in &LEFT {
+        draw(&mut svg, connection, 240, 470, true);
     }
-    for wire in DRIVER.iter().chain(&SWITCHES) {
-        draw(&mut svg, wire, 650, 880, false);
+    for connection in DRIVER.iter().chain(&SWITCHES) {
+        draw(&mut svg, connection, 650, 880, false);
     }
     block(&mut svg, 40, 470, 200, 70, "transducer");
     line(&mut svg, 140, 410, 140, 470, POWER);
@@ -97,11 +97,11 @@ fn drawing() -> String {
     svg
 }
 
-fn draw(svg: &mut String, wire: &Wire, from: i32, to: i32, device_left: bool) {
-    let y = wire.y;
-    let supply = wire.uno.is_empty();
+fn draw(svg: &mut String, connection: &Connection, from: i32, to: i32, device_left: bool) {
+    let y = connection.y;
+    let supply = connection.uno.is_empty();
     let end = if supply { from + 60 } else { to };
-    line(svg, from, y, end, y, wire.colour);
+    line(svg, from, y, end, y, connection.colour);
     if supply {
         text(svg, end + 8, y + 5, "start", 14, "+5 V, 2.5 A");
     }
@@ -110,11 +110,11 @@ fn draw(svg: &mut String, wire: &Wire, from: i32, to: i32, device_left: bool) {
     } else {
         (to + 10, "start", from - 10, "end")
     };
-    text(svg, device_x, y + 5, device_anchor, 15, wire.device);
-    text(svg, uno_x, y + 5, uno_anchor, 15, wire.uno);
-    if !wire.part.is_empty() {
+    text(svg, device_x, y + 5, device_anchor, 15, connection.device);
+    text(svg, uno_x, y + 5, uno_anchor, 15, connection.uno);
+    if !connection.part.is_empty() {
         let above = if supply { y + 25 } else { y - 8 };
-        text(svg, from + 14, above, "start", 13, wire.part);
+        text(svg, from + 14, above, "start", 13, connection.part);
     }
 }
 
@@ -134,11 +134,11 @@ fn line(svg: &mut String, x1: i32, y1: i32, x2: i32, y2: i32, colour: &str) {
     );
 }
 
-fn text(svg: &mut String, x: i32, y: i32, anchor: &str, size: i32, words: &str) {
+fn text(svg: &mut String, x: i32, y: i32, anchor: &str, size: i32, label: &str) {
     let _ = writeln!(
         svg,
         "<text x=\"{x}\" y=\"{y}\" text-anchor=\"{anchor}\" font-size=\"{size}\" \
-         fill=\"#1b2733\">{words}</text>"
+         fill=\"#1b2733\">{label}</text>"
     );
 }
 
@@ -147,10 +147,10 @@ mod tests {
     use super::drawing;
 
     #[test]
-    fn the_picture_in_the_documents_is_this_drawing() {
+    fn diagram_is_current() {
         assert!(
             drawing() == include_str!("../../../../docs/wiring/wiring.svg"),
-            "docs/wiring/wiring.svg is behind: docs/wiring/README.md has the command that makes it"
+            "docs/wiring/wiring.svg is outdated: see docs/wiring/README.md for the command"
         );
     }
 }

@@ -1,4 +1,4 @@
-//! Arbitrary well-formed replies: whatever a device says, the host believes nothing that can't be.
+//! Arbitrary well-formed replies: for any input the host accepts only plausible content.
 
 use std::collections::BTreeMap;
 
@@ -10,12 +10,12 @@ use firmware_protocol::messages::{
 };
 use proptest::prelude::*;
 
-use super::{BEAM, BEGAN, BOOT, IDENTITY, SETTINGS, Stranger};
+use super::{BEAM, BEGAN, BOOT, IDENTITY, RogueDevice, SETTINGS};
 
-/// Which number a reply bears.
+/// Sequence number of a reply.
 #[derive(Debug, Clone, Copy)]
 enum Number {
-    Asked,
+    LastRequest,
     Sweep,
     Any(u16),
 }
@@ -47,7 +47,7 @@ fn reading(sweeps: BoxedStrategy<u16>) -> impl Strategy<Value = Reading> {
 }
 
 fn reply() -> impl Strategy<Value = Reply> {
-    // 0 stands for the sweep that was asked for: its number is put in when it is told.
+    // 0 is replaced by the number of the requested sweep before sending.
     let sweeps = || prop_oneof![9 => Just(0_u16), 1 => any::<u16>()].boxed();
     let state = || {
         prop::sample::select(vec![
@@ -103,8 +103,8 @@ fn reply() -> impl Strategy<Value = Reply> {
     ]
 }
 
-/// What may be told of a sweep's beams, whatever was said, checked without the host's own code.
-fn assert_sense(events: &[HostEvent]) {
+/// Checks the accepted beams of a sweep for plausibility, without the host's own code.
+fn assert_plausible(events: &[HostEvent]) {
     let mut fired: BTreeMap<u16, (u32, bool)> = BTreeMap::new();
     for event in events {
         let HostEvent::Reading { reading, .. } = event else { continue };
@@ -117,29 +117,29 @@ fn assert_sense(events: &[HostEvent]) {
             ReadingStatus::StepDoubtful => {}
             _ => assert!(echoes.is_empty(), "{reading:?}"),
         }
-        let listened = status != ReadingStatus::ModuleFault;
-        assert!(fired.insert(index, (fired_ticks, listened)).is_none(), "beam {index} twice");
+        let window_open = status != ReadingStatus::ModuleFault;
+        assert!(fired.insert(index, (fired_ticks, window_open)).is_none(), "beam {index} twice");
         let since = fired_ticks.wrapping_sub(BEGAN).cast_signed();
         assert!(since >= 0, "before the sweep: {reading:?}");
     }
     for (earlier, later) in fired.values().zip(fired.values().skip(1)) {
         let apart = later.0.wrapping_sub(earlier.0).cast_signed();
-        let least = if earlier.1 { 50_000 } else { 50_000.max(SETTINGS.settle_ticks as i32) };
-        assert!(apart >= least, "{fired:?}");
+        let min = if earlier.1 { 50_000 } else { 50_000.max(SETTINGS.settle_ticks as i32) };
+        assert!(apart >= min, "{fired:?}");
     }
 }
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(2_000))]
 
-    /// Whatever a device says, the host takes nothing that makes no sense, and comes to an end
-    /// once the device says no more.
+    /// For any replies, the host accepts only plausible readings, and the command ends once the
+    /// device falls quiet.
     #[test]
-    fn no_reply_makes_a_host_believe_what_cannot_be(
+    fn accepts_only_plausible_readings(
         replies in prop::collection::vec(
             (
                 prop_oneof![
-                    5 => Just(Number::Asked),
+                    5 => Just(Number::LastRequest),
                     5 => Just(Number::Sweep),
                     1 => any::<u16>().prop_map(Number::Any),
                 ],
@@ -150,8 +150,8 @@ proptest! {
             1..60,
         ),
     ) {
-        let mut stranger = Stranger::sweeping();
-        let (sweep, sweep_seq) = stranger.sweep();
+        let mut rogue = RogueDevice::sweeping();
+        let (sweep, sweep_seq) = rogue.sweep();
         for (number, boot, mut reply, wait) in replies {
             match &mut reply {
                 Reply::Reading(reading) if reading.sweep == 0 => reading.sweep = sweep,
@@ -160,48 +160,48 @@ proptest! {
                 _ => {}
             }
             if wait {
-                stranger.wait();
+                rogue.wait();
             }
             let seq = match number {
-                Number::Asked => stranger.last().0.seq,
+                Number::LastRequest => rogue.last_request().0.seq,
                 Number::Sweep => sweep_seq,
                 Number::Any(seq) => seq,
             };
-            stranger.say_all(&[(Header { boot, seq }, reply)]);
+            rogue.send_all(&[(Header { boot, seq }, reply)]);
         }
-        assert_sense(&stranger.events);
-        let quiet_us = stranger.now_us;
-        while stranger.host.is_busy() {
-            prop_assert!(stranger.wait(), "busy, and waits for nothing");
-            prop_assert!(stranger.now_us - quiet_us < 60_000_000, "never ends");
+        assert_plausible(&rogue.events);
+        let silent_since_us = rogue.now_us;
+        while rogue.host.is_busy() {
+            prop_assert!(rogue.wait(), "busy, and waits for nothing");
+            prop_assert!(rogue.now_us - silent_since_us < 60_000_000, "never ends");
         }
-        let ends = stranger.events.iter().filter(|event| {
+        let ends = rogue.events.iter().filter(|event| {
             matches!(event, HostEvent::Failed(_) | HostEvent::SweepDone { .. })
         });
-        prop_assert_eq!(ends.count(), 1, "{:?}", stranger.events);
+        prop_assert_eq!(ends.count(), 1, "{:?}", rogue.events);
     }
 
-    /// The same of Identify.
+    /// For any Identity, the host accepts only plausible ones.
     #[test]
-    fn no_identity_is_taken_that_cannot_be(
+    fn accepts_only_valid_identities(
         identities in prop::collection::vec(
             (any::<u16>(), any::<u32>(), any::<u16>(), any::<u16>(), any::<u16>(), any::<bool>()),
             1..20,
         ),
     ) {
-        for (boot, tick_hz, steps_per_revolution, capabilities, ring_bytes, right) in identities {
-            let mut stranger = Stranger::new();
-            stranger.boot = if right { boot } else { BOOT };
-            let tick_hz = if right { 2_000_000 } else { tick_hz };
+        for (boot, tick_hz, steps_per_revolution, capabilities, ring_bytes, matching) in identities {
+            let mut rogue = RogueDevice::new();
+            rogue.boot = if matching { boot } else { BOOT };
+            let tick_hz = if matching { 2_000_000 } else { tick_hz };
             let capabilities = Capabilities(capabilities);
-            let told = Identity {
+            let identity = Identity {
                 boot, tick_hz, steps_per_revolution, capabilities, ring_bytes, ..IDENTITY
             };
-            stranger.run(Command::Identify, Reply::Identity(told));
-            let least = if capabilities.has(Capabilities::MULTIPLE_ECHOES) { 29 } else { 8 };
-            let sound = boot != 0 && boot == stranger.boot && tick_hz == 2_000_000
-                && steps_per_revolution > 0 && ring_bytes >= least;
-            prop_assert_eq!(stranger.host.identity().is_some(), sound, "{:?}", told);
+            rogue.run(Command::Identify, Reply::Identity(identity));
+            let min = if capabilities.has(Capabilities::MULTIPLE_ECHOES) { 29 } else { 8 };
+            let valid = boot != 0 && boot == rogue.boot && tick_hz == 2_000_000
+                && steps_per_revolution > 0 && ring_bytes >= min;
+            prop_assert_eq!(rogue.host.identity().is_some(), valid, "{:?}", identity);
         }
     }
 }

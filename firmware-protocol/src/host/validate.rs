@@ -1,4 +1,5 @@
-//! What a host must not believe, each with its name: "What a host must refuse" in PROTOCOL.md.
+//! Validation of device replies: one error variant for each rule in PROTOCOL.md, "What a host must
+//! refuse".
 
 use core::fmt;
 
@@ -6,104 +7,104 @@ use crate::frame::Header;
 use crate::messages::limits::{self, kept_bytes};
 use crate::messages::{Capabilities, Identity, Reading, ReadingStatus, Settings};
 
-/// The reason why an Identity is refused.
+/// Reason for rejecting an Identity.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum IdentityFault {
-    /// It says this host's version, but is not of its form.
+    /// Version and schema match those of this host, but the fields are invalid.
     Form,
-    /// The boot nonce is 0, which stands for "not known".
+    /// The boot nonce is 0, which means "not known".
     BootZero,
-    /// The boot nonce is not that of its own frame.
+    /// The boot nonce differs from that of the frame's header.
     BootNotOfFrame {
-        /// In the frame's header.
+        /// Boot nonce in the header of the frame.
         frame: u16,
-        /// In the Identity.
+        /// Boot nonce in the Identity.
         identity: u16,
     },
-    /// The clock does not tick as the protocol says.
+    /// The clock rate differs from that of the protocol.
     TickRate {
-        /// Ticks a second that it claims.
+        /// Reported clock rate, ticks per second.
         tick_hz: u32,
     },
-    /// A motor without steps.
+    /// The motor has 0 steps per revolution.
     NoSteps,
-    /// There is no room for the largest reading that the board may be asked for.
+    /// The ring is smaller than the largest reading of the board.
     RingTooSmall {
-        /// Room that it claims, bytes.
+        /// Reported capacity for readings, bytes.
         ring_bytes: u16,
-        /// Room that such a reading takes, bytes.
+        /// Storage for the largest reading, bytes.
         needed: u16,
     },
 }
 
-/// The reason why a reading is refused. Its place in the plan is another matter:
+/// Reason for rejecting the content of a reading. A reading that does not match the plan is a
 /// [`super::HostError::WrongReading`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ReadingFault {
-    /// It says Echo and has none.
+    /// Status Echo without an echo.
     EchoMissing,
-    /// It says that nothing was heard, or that the module was not fired, and has echoes.
+    /// Status NoEcho or ModuleFault with echoes.
     EchoUnexpected {
-        /// How many.
+        /// Number of echoes reported.
         echoes: u8,
     },
-    /// More echoes than were asked for.
+    /// More echoes than requested.
     TooManyEchoes {
-        /// How many.
+        /// Number of echoes reported.
         echoes: u8,
-        /// How many were asked for, at most.
-        asked: u8,
+        /// Requested maximum number of echoes.
+        requested: u8,
     },
-    /// An echo after the listening window.
+    /// Echo after the listening window.
     EchoAfterWindow {
-        /// Its time, ticks after firing.
+        /// Time of the echo, ticks after firing.
         ticks: u32,
-        /// The window, ticks.
+        /// Length of the window, ticks.
         window: u32,
     },
-    /// Echoes that do not follow one another.
+    /// Echo times that do not increase.
     EchoesOutOfOrder,
-    /// Fired before it can have been: before the request, or sooner after another beam than window,
-    /// rest and interval allow.
+    /// Fired too early: before the request, or sooner after another beam than window, settling time
+    /// and interval allow.
     FiredTooEarly {
-        /// By so many ticks.
+        /// Time by which the firing is too early, ticks.
         ticks: u32,
     },
-    /// Fired at a time that has not come yet.
+    /// Fired in the future.
     FiredInFuture {
-        /// Ticks ahead of the device's own clock, as it told it.
+        /// Time ahead of the last reported device clock, ticks.
         ticks: u32,
     },
 }
 
-/// The reason why the answer to a command is refused.
+/// Reason for rejecting the reply to a command.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ReplyFault {
-    /// Home found the index farther from where it was expected than it can be.
+    /// Homed with a larger drift than possible.
     Drift {
-        /// Told, steps.
+        /// Drift reported by Home, steps.
         drift_steps: i32,
     },
-    /// A position that the motor can't have.
+    /// Position outside the range of the motor.
     Position {
-        /// Told, steps from home.
+        /// Reported position, steps from home.
         step: i32,
     },
-    /// More beams sent than fired, or more fired than asked for, or an end before the last beam.
+    /// More beams sent than fired, more fired than requested, or an end before the last beam.
     Progress {
-        /// Beams fired, as told.
+        /// Reported number of beams fired.
         fired: u16,
-        /// Beams sent, as told.
+        /// Reported number of beams sent.
         sent: u16,
-        /// Beams asked for.
+        /// Number of beams requested.
         beams: u16,
     },
 }
 
-/// Checks what a device says of itself.
+/// Checks the identity of a device.
 pub(super) fn check_identity(header: Header, identity: &Identity) -> Result<(), IdentityFault> {
-    let many = identity.capabilities.has(Capabilities::MULTIPLE_ECHOES);
-    let needed = kept_bytes(if many { limits::MAX_ECHOES } else { 1 });
+    let multiple_echoes = identity.capabilities.has(Capabilities::MULTIPLE_ECHOES);
+    let needed = kept_bytes(if multiple_echoes { limits::MAX_ECHOES } else { 1 });
     let Identity { boot, tick_hz, steps_per_revolution, ring_bytes, .. } = *identity;
     if boot == Header::BOOT_UNKNOWN {
         Err(IdentityFault::BootZero)
@@ -120,10 +121,10 @@ pub(super) fn check_identity(header: Header, identity: &Identity) -> Result<(), 
     }
 }
 
-/// Checks status and echoes against each other and against what was asked for.
+/// Checks status and echoes against each other and against the settings.
 pub(super) fn check_echoes(reading: &Reading, settings: &Settings) -> Result<(), ReadingFault> {
     let count = u8::try_from(reading.echoes.len()).unwrap_or(u8::MAX);
-    let (asked, window) = (settings.max_echoes, settings.window_ticks);
+    let (requested, window) = (settings.max_echoes, settings.window_ticks);
     match reading.status {
         ReadingStatus::Echo if count == 0 => return Err(ReadingFault::EchoMissing),
         ReadingStatus::NoEcho | ReadingStatus::ModuleFault if count > 0 => {
@@ -131,8 +132,8 @@ pub(super) fn check_echoes(reading: &Reading, settings: &Settings) -> Result<(),
         }
         _ => {}
     }
-    if count > asked {
-        return Err(ReadingFault::TooManyEchoes { echoes: count, asked });
+    if count > requested {
+        return Err(ReadingFault::TooManyEchoes { echoes: count, requested });
     }
     if !reading.echoes.is_sorted_by(|earlier, later| earlier < later) {
         return Err(ReadingFault::EchoesOutOfOrder);
@@ -143,29 +144,37 @@ pub(super) fn check_echoes(reading: &Reading, settings: &Settings) -> Result<(),
     }
 }
 
-/// Checks where Home says that the index was: nearer than any other turn's, and without a sensor
-/// just where the motor stands.
+/// Checks the drift reported by Home: at most half a revolution, and 0 without an index sensor.
 pub(super) fn check_drift(drift_steps: i32, identity: &Identity) -> Result<(), ReplyFault> {
     let has_index = identity.capabilities.has(Capabilities::INDEX_SENSOR);
-    let most = if has_index { u32::from(identity.steps_per_revolution).div_ceil(2) } else { 0 };
-    if drift_steps.unsigned_abs() <= most { Ok(()) } else { Err(ReplyFault::Drift { drift_steps }) }
+    let max_drift =
+        if has_index { u32::from(identity.steps_per_revolution).div_ceil(2) } else { 0 };
+    if drift_steps.unsigned_abs() <= max_drift {
+        Ok(())
+    } else {
+        Err(ReplyFault::Drift { drift_steps })
+    }
 }
 
 impl fmt::Display for IdentityFault {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Form => formatter.write_str("it has not the form of its version"),
+            Self::Form => formatter.write_str("its fields are invalid for its version"),
             Self::BootZero => formatter.write_str("its boot nonce is 0"),
             Self::BootNotOfFrame { frame, identity } => {
                 write!(formatter, "its boot nonce is {identity:04x} in a frame of {frame:04x}")
             }
             Self::TickRate { tick_hz } => {
-                write!(formatter, "its clock has {tick_hz} ticks a second, not {}", limits::TICK_HZ)
+                write!(
+                    formatter,
+                    "its clock has {tick_hz} ticks per second, not {}",
+                    limits::TICK_HZ
+                )
             }
-            Self::NoSteps => formatter.write_str("its motor has 0 steps a revolution"),
+            Self::NoSteps => formatter.write_str("its motor has 0 steps per revolution"),
             Self::RingTooSmall { ring_bytes, needed } => write!(
                 formatter,
-                "it keeps {ring_bytes} bytes of readings, and one reading may take {needed}"
+                "its reading buffer has {ring_bytes} bytes, and one reading may take {needed}"
             ),
         }
     }
@@ -174,22 +183,22 @@ impl fmt::Display for IdentityFault {
 impl fmt::Display for ReadingFault {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::EchoMissing => formatter.write_str("it says that there was an echo, without one"),
+            Self::EchoMissing => formatter.write_str("status is echo, but there are no echoes"),
             Self::EchoUnexpected { echoes } => {
-                write!(formatter, "it says that there was no echo, with {echoes}")
+                write!(formatter, "status is no echo, but the echo count is {echoes}")
             }
-            Self::TooManyEchoes { echoes, asked } => {
-                write!(formatter, "{echoes} echoes where {asked} were asked for")
+            Self::TooManyEchoes { echoes, requested } => {
+                write!(formatter, "{echoes} echoes, but at most {requested} were requested")
             }
             Self::EchoAfterWindow { ticks, window } => {
-                write!(formatter, "an echo after {ticks} ticks in a window of {window}")
+                write!(formatter, "echo after {ticks} ticks, beyond the window of {window}")
             }
-            Self::EchoesOutOfOrder => formatter.write_str("echoes out of order"),
+            Self::EchoesOutOfOrder => formatter.write_str("echo times do not increase"),
             Self::FiredTooEarly { ticks } => {
-                write!(formatter, "fired {ticks} ticks before it can have been")
+                write!(formatter, "fired {ticks} ticks too early")
             }
             Self::FiredInFuture { ticks } => {
-                write!(formatter, "fired {ticks} ticks from now")
+                write!(formatter, "fired {ticks} ticks in the future")
             }
         }
     }
@@ -199,13 +208,16 @@ impl fmt::Display for ReplyFault {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Drift { drift_steps } => {
-                write!(formatter, "home {drift_steps} steps from where it was expected")
+                write!(formatter, "home is {drift_steps} steps from its expected position")
             }
             Self::Position { step } => {
-                write!(formatter, "a position {step} steps from home")
+                write!(formatter, "position {step} steps from home, which is out of range")
             }
             Self::Progress { fired, sent, beams } => {
-                write!(formatter, "{fired} beams fired and {sent} sent of {beams}")
+                write!(
+                    formatter,
+                    "inconsistent progress: {fired} beams fired, {sent} sent, {beams} requested"
+                )
             }
         }
     }
@@ -228,10 +240,10 @@ mod tests {
     };
 
     #[test]
-    fn status_and_echoes_must_agree() {
+    fn status_agrees_with_echoes() {
         use ReadingStatus::{Echo, ModuleFault, NoEcho, StepDoubtful};
         let late = ReadingFault::EchoAfterWindow { ticks: 48_001, window: 48_000 };
-        for (status, echoes, verdict) in [
+        for (status, echoes, expected) in [
             (Echo, &[9_000][..], Ok(())),
             (Echo, &[9_000, 48_000], Ok(())),
             (NoEcho, &[], Ok(())),
@@ -241,7 +253,7 @@ mod tests {
             (Echo, &[], Err(ReadingFault::EchoMissing)),
             (NoEcho, &[9_000], Err(ReadingFault::EchoUnexpected { echoes: 1 })),
             (ModuleFault, &[9_000], Err(ReadingFault::EchoUnexpected { echoes: 1 })),
-            (Echo, &[1, 2, 3], Err(ReadingFault::TooManyEchoes { echoes: 3, asked: 2 })),
+            (Echo, &[1, 2, 3], Err(ReadingFault::TooManyEchoes { echoes: 3, requested: 2 })),
             (Echo, &[9_000, 9_000], Err(ReadingFault::EchoesOutOfOrder)),
             (StepDoubtful, &[9_000, 8_000], Err(ReadingFault::EchoesOutOfOrder)),
             (Echo, &[48_001], Err(late)),
@@ -254,7 +266,7 @@ mod tests {
                 status,
                 echoes: Echoes::from_ticks(echoes),
             };
-            assert_eq!(check_echoes(&reading, &SETTINGS), verdict, "{reading:?}");
+            assert_eq!(check_echoes(&reading, &SETTINGS), expected, "{reading:?}");
         }
     }
 }

@@ -1,7 +1,7 @@
-//! A device made of nothing but well-formed replies, true or not, against the host machine.
+//! Device that sends arbitrary well-formed replies, valid or not, to the host machine.
 #![allow(unreachable_pub, reason = "a test file's part")]
 
-mod made_up;
+mod arbitrary;
 
 use firmware_protocol::frame::{Frame, FrameDecoder, Header, Received};
 use firmware_protocol::host::{Command, Host, HostConfig, HostEvent};
@@ -23,15 +23,15 @@ pub const SETTINGS: Settings = Settings {
 };
 pub const PLAN: Sweep =
     Sweep { sweep: 0, first_step: 0, stride: 1, stops: 12, pings_per_stop: 1, lease_ms: 1_000 };
-/// Device time when the sweep begins.
+/// Device clock at the start of the sweep, ticks.
 pub const BEGAN: u32 = u32::MAX - 100_000;
-/// From beam to beam, ticks.
+/// Ticks from beam to beam.
 pub const BEAM: u32 = 60_000;
 
 pub const IDENTITY: Identity = Identity {
     protocol: PROTOCOL,
     firmware: FirmwareVersion { major: 0, minor: 1, patch: 0 },
-    serial: *b"STRANGER-1",
+    serial: *b"ROGUE-0001",
     boot: BOOT,
     last_seq: None,
     tick_hz: 2_000_000,
@@ -41,46 +41,46 @@ pub const IDENTITY: Identity = Identity {
     reset_cause: ResetCause::PowerOn,
 };
 
-/// The host, and what it said last.
-pub struct Stranger {
+/// Host under test, and the requests and events that it has produced.
+pub struct RogueDevice {
     pub host: Host,
     pub now_us: u64,
     pub boot: u16,
-    /// Header and request of every frame the host sent.
-    pub asked: Vec<(Header, Request)>,
+    /// Header and request of every frame sent by the host.
+    pub requests: Vec<(Header, Request)>,
     pub events: Vec<HostEvent>,
 }
 
-impl Stranger {
+impl RogueDevice {
     pub fn new() -> Self {
         let host = Host::new(HostConfig::new(115_200, 7));
-        Self { host, now_us: 0, boot: BOOT, asked: Vec::new(), events: Vec::new() }
+        Self { host, now_us: 0, boot: BOOT, requests: Vec::new(), events: Vec::new() }
     }
 
-    /// Identified, configured, homed, and asked for its clock.
+    /// Identified, configured and homed, with a reported device clock.
     pub fn homed() -> Self {
-        let mut stranger = Self::new();
-        stranger.run(Command::Identify, Reply::Identity(IDENTITY));
-        stranger.run(Command::Configure(SETTINGS), Reply::Ack);
-        stranger.run(Command::Home, Reply::Homed { drift_steps: 0 });
+        let mut rogue = Self::new();
+        rogue.run(Command::Identify, Reply::Identity(IDENTITY));
+        rogue.run(Command::Configure(SETTINGS), Reply::Ack);
+        rogue.run(Command::Home, Reply::Homed { drift_steps: 0 });
         let status = Status { ticks: BEGAN, homed: true, configured: true, ..Status::BLANK };
-        stranger.run(Command::Status, Reply::StatusReport(status));
-        assert!(!stranger.host.is_busy(), "{:?}", stranger.events);
-        stranger.events.clear();
-        stranger
+        rogue.run(Command::Status, Reply::StatusReport(status));
+        assert!(!rogue.host.is_busy(), "{:?}", rogue.events);
+        rogue.events.clear();
+        rogue
     }
 
-    /// In a sweep that was acknowledged.
+    /// Sweep in progress, acknowledged.
     pub fn sweeping() -> Self {
-        let mut stranger = Self::homed();
-        stranger.run(Command::Sweep(PLAN), Reply::Ack);
-        stranger
+        let mut rogue = Self::homed();
+        rogue.run(Command::Sweep(PLAN), Reply::Ack);
+        rogue
     }
 
-    /// Begins a command and answers its request.
+    /// Starts a command and replies to its request.
     pub fn run(&mut self, command: Command, reply: Reply) {
         self.begin(command);
-        self.answer(reply);
+        self.reply(reply);
     }
 
     pub fn begin(&mut self, command: Command) {
@@ -88,23 +88,23 @@ impl Stranger {
         self.exchange();
     }
 
-    /// What the host asked last.
-    pub fn last(&self) -> (Header, Request) {
-        *self.asked.last().expect("the host has said something")
+    /// Last request of the host.
+    pub fn last_request(&self) -> (Header, Request) {
+        *self.requests.last().expect("a request was sent")
     }
 
-    /// Answers what the host asked last.
-    pub fn answer(&mut self, reply: Reply) {
-        let seq = self.last().0.seq;
-        self.say(seq, reply);
+    /// Replies to the last request.
+    pub fn reply(&mut self, reply: Reply) {
+        let seq = self.last_request().0.seq;
+        self.send(seq, reply);
     }
 
-    pub fn say(&mut self, seq: u16, reply: Reply) {
-        self.say_all(&[(Header { boot: self.boot, seq }, reply)]);
+    pub fn send(&mut self, seq: u16, reply: Reply) {
+        self.send_all(&[(Header { boot: self.boot, seq }, reply)]);
     }
 
-    /// All in one piece.
-    pub fn say_all(&mut self, replies: &[(Header, Reply)]) {
+    /// Sends all replies in a single block of bytes.
+    pub fn send_all(&mut self, replies: &[(Header, Reply)]) {
         let mut bytes = Vec::new();
         for (header, reply) in replies {
             bytes.extend_from_slice(&Frame::encode(*header, reply).expect("fits"));
@@ -114,8 +114,7 @@ impl Stranger {
         self.exchange();
     }
 
-    /// Lets time pass until the host asks for something or comes to an end; false if it waits for
-    /// nothing.
+    /// Advances the time to the next timeout of the host; returns `false` if there is none.
     pub fn wait(&mut self) -> bool {
         let Some((_, at_us)) = self.host.poll_timeout() else { return false };
         self.now_us = self.now_us.max(at_us);
@@ -129,7 +128,7 @@ impl Stranger {
             let mut decoder = FrameDecoder::new();
             for &byte in &*frame {
                 if let Received::Frame(raw) = decoder.push(byte) {
-                    self.asked.push((raw.header, Request::decode(raw.body).expect("a request")));
+                    self.requests.push((raw.header, Request::decode(raw.body).expect("a request")));
                 }
             }
         }
@@ -138,16 +137,16 @@ impl Stranger {
         }
     }
 
-    /// Sweep number and sequence number of the sweep that was asked for.
+    /// Sweep number and sequence number of the requested sweep.
     pub fn sweep(&self) -> (u16, u16) {
-        let found = self.asked.iter().rev().find_map(|(header, request)| match request {
+        let found = self.requests.iter().rev().find_map(|(header, request)| match request {
             Request::Sweep(plan) => Some((plan.sweep, header.seq)),
             _ => None,
         });
-        found.expect("a sweep was asked for")
+        found.expect("a sweep was requested")
     }
 
-    /// A true reading of beam `index`.
+    /// Valid reading of beam `index`.
     pub fn reading(&self, index: u16) -> Reading {
         Reading {
             sweep: self.sweep().0,
@@ -159,21 +158,21 @@ impl Stranger {
         }
     }
 
-    /// Tells of a beam, some time after it was fired.
-    pub fn tell(&mut self, reading: Reading) {
+    /// Sends a reading some time after it was fired.
+    pub fn send_reading(&mut self, reading: Reading) {
         self.now_us += u64::from(BEAM) / 2;
         let seq = self.sweep().1;
-        self.say(seq, Reply::Reading(reading));
+        self.send(seq, Reply::Reading(reading));
     }
 
-    /// Answers KeepAlive and Resend as a device that has sent `sent` beams.
+    /// Replies to KeepAlive or Resend like a device that has sent `sent` beams.
     pub fn alive(&mut self, sent: u16, state: SweepState) {
         let sweep = self.sweep().0;
         let ticks = BEGAN.wrapping_add(u32::from(sent) * BEAM);
-        self.answer(Reply::Alive(Alive { ticks, sweep, fired: sent, sent, state }));
+        self.reply(Reply::Alive(Alive { ticks, sweep, fired: sent, sent, state }));
     }
 
-    pub fn asks_to_stop(&self) -> bool {
-        self.asked.iter().any(|(_, request)| *request == Request::Stop)
+    pub fn received_stop(&self) -> bool {
+        self.requests.iter().any(|(_, request)| *request == Request::Stop)
     }
 }
