@@ -29,6 +29,6 @@ done
 timeout 60 chromium --headless --no-sandbox --disable-gpu --user-data-dir="$work/profile" --virtual-time-budget=5000 --dump-dom \
   "http://$address/" >"$work/page" 2>"$work/chromium" || fail "chromium: $(tail -n 5 "$work/chromium")"
 grep -q 'id="link"[^>]*>ready<' "$work/page" || fail "the page does not show the link: $(grep -o 'id="link"[^<]*<' "$work/page")"
-grep -Eq 'id="which"[^>]*>[^<]*400 of 400' "$work/page" ||
-  fail "the page does not show the scan: $(grep -o 'id="which"[^<]*<' "$work/page")"
+grep -Eq 'id="scan-label"[^>]*>[^<]*400 of 400' "$work/page" ||
+  fail "the page does not show the scan: $(grep -o 'id="scan-label"[^<]*<' "$work/page")"
 printf 'the page shows link and scan\n'

@@ -1,6 +1,5 @@
 #!/usr/bin/env bash
-# Gets what bundles the playground and checks its types (esbuild and TypeScript, from npm) into target/tools.
-# Neither is part of this repository.
+# Installs esbuild and TypeScript from npm into target/tools, to bundle the playground and check its types.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 packages=(esbuild@0.25.11 typescript@5.9.3)

@@ -1,31 +1,30 @@
-// The engines side by side: what each would have the ranger read, and what it misses.
+// Engines side by side, each with its differences from the exact paths.
 
 import { Plan } from "../../crates/sonard-daemon/src/server/page/plan.js";
 import { Scan } from "../../crates/sonard-daemon/src/server/page/scan.js";
-import { setText } from "../../crates/sonard-daemon/src/server/page/words.js";
+import { setText } from "../../crates/sonard-daemon/src/server/page/format.js";
 
-/** Ranges agree within so much, metres, or that share: what the module is made for. */
+/** Tolerance of agreement: 10 mm or 1 % of the range, whichever is larger. */
 const AGREE_M = 0.01;
 const AGREE_SHARE = 0.01;
-/** Verdicts in words, of what another engine misses. */
+/** Names of missed readings by mark, singular and plural. */
 const KINDS = {
   direct: ["direct echo", "direct echoes"],
   multiple: ["multiple reflection", "multiple reflections"],
   edge: ["edge", "edges"],
-  min_range: ["nearest range", "nearest ranges"],
-  silent: ["silence", "silences"],
+  min_range: ["minimum-range reading", "minimum-range readings"],
 };
 
 export class SideBySide {
   /**
-   * @param {HTMLElement} place with a figure for each engine
+   * @param {HTMLElement} place element with a figure for each engine
    * @param {(index: number) => void} onPick
    */
   constructor(place, onPick) {
     this.figures = [...place.querySelectorAll("figure")].map((figure) => ({
       name: /** @type {import("./engine.js").EngineName} */ (figure.dataset.engine),
-      plan: new Plan(figure.querySelector(".stage"), onPick, `What the engine ${figure.dataset.engine} reads`),
-      words: /** @type {HTMLElement} */ (figure.querySelector(".misses")),
+      plan: new Plan(figure.querySelector(".stage"), onPick, `Readings of the engine ${figure.dataset.engine}`),
+      caption: /** @type {HTMLElement} */ (figure.querySelector(".misses")),
     }));
     /** @type {Map<string, Scan>} */
     this.scans = new Map();
@@ -46,49 +45,51 @@ export class SideBySide {
     this.scans.set(engine, scan);
     const figure = this.figures.find(({ name }) => name === engine);
     if (!figure) return;
-    figure.plan.view.what = "room";
+    figure.plan.view.mode = "room";
     figure.plan.scan = scan;
     figure.plan.selected = selected ? (scan.beams.get(selected.index) ?? null) : null;
     figure.plan.redraw(palette);
-    this.tell();
+    this.updateCaptions();
   }
 
-  /** What each engine misses of the exact paths. */
-  tell() {
+  updateCaptions() {
     const exact = this.scans.get("paths");
-    for (const { name, words } of this.figures) {
+    for (const { name, caption } of this.figures) {
       const scan = this.scans.get(name);
-      if (scan && exact) setText(words, name === "paths" ? heard(exact) : misses(scan, exact));
+      if (scan && exact) setText(caption, name === "paths" ? echoCount(exact) : differences(scan, exact));
     }
   }
 }
 
 /** @param {Scan} exact */
-function heard(exact) {
+function echoCount(exact) {
   const echoes = [...exact.beams.values()].filter((ping) => ping.range_m !== null).length;
-  return `Hears something in ${echoes} of ${exact.beams.size} beams.`;
+  return `${echoes} of ${exact.beams.size} beams with an echo.`;
 }
 
 /**
  * @param {Scan} scan
  * @param {Scan} exact
  */
-function misses(scan, exact) {
+function differences(scan, exact) {
   /** @type {Map<string, number>} */
   const missed = new Map();
-  let same = 0;
+  let agreeing = 0;
   for (const ping of exact.beams.values()) {
     const other = scan.beams.get(ping.index);
     if (!other) continue;
-    if (agrees(ping.range_m, other.range_m)) same++;
+    if (agrees(ping.range_m, other.range_m)) agreeing++;
     else missed.set(ping.mark, (missed.get(ping.mark) ?? 0) + 1);
   }
-  const parts = Object.entries(KINDS).flatMap(([kind, [one, many]]) => {
-    const count = missed.get(kind);
-    return count ? [`${count} ${count === 1 ? one : many}`] : [];
+  const misses = Object.entries(KINDS).flatMap(([kind, [singular, plural]]) => {
+    const number = missed.get(kind);
+    return number ? [`${number} ${number === 1 ? singular : plural}`] : [];
   });
-  const all = `Reads the same in ${same} of ${exact.beams.size} beams.`;
-  return parts.length ? `${all} Misses ${parts.join(", ")}.` : all;
+  const parts = [`Agrees in ${agreeing} of ${exact.beams.size} beams`];
+  if (misses.length) parts.push(`misses ${misses.join(", ")}`);
+  const falseEchoes = missed.get("no_echo");
+  if (falseEchoes) parts.push(`${falseEchoes} false echo${falseEchoes === 1 ? "" : "es"}`);
+  return `${parts.join("; ")}.`;
 }
 
 /**

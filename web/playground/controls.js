@@ -1,15 +1,15 @@
-// Sensor, air and walls: each control sets one thing of what is shown, and says it with its unit.
+// Controls of sensor, air and walls; each sets one value of the state and shows it with its unit.
 
-import { decibels } from "../../crates/sonard-daemon/src/server/page/words.js";
+import { decibels } from "../../crates/sonard-daemon/src/server/page/format.js";
 
 /** @param {string} id */
 const byId = (id) => /** @type {any} */ (document.getElementById(id));
 
 /** @typedef {import("./state.js").State} State */
 
-/** Controls by id: the key of the state, and its words. @type {Record<string, [keyof State, (value: number) => string]>} */
+/** Sliders by id: key of the state, and text of its value. @type {Record<string, [keyof State, (value: number) => string]>} */
 const NUMBERS = {
-  threshold: ["threshold_db", (db) => (db === 0 ? "its own" : decibels(db).replace(".0", ""))],
+  threshold: ["threshold_db", (db) => (db === 0 ? "default" : decibels(db).replace(".0", ""))],
   reach: ["reach_m", (m) => `${m.toFixed(1)} m`],
   temperature: ["temperature_c", (c) => `${c} °C`.replace("-", "−")],
   humidity: ["humidity_percent", (percent) => `${percent} %`],
@@ -34,7 +34,7 @@ export class Controls {
     for (const key of ["reflectance", "roughness"]) {
       byId(key).addEventListener("input", () => this.setWalls(key, Number(byId(key).value)));
     }
-    byId("in-space").addEventListener("change", () => this.setHeights());
+    byId("use-3d").addEventListener("change", () => this.setHeights());
     for (const id of ["ceiling", "height"]) byId(id).addEventListener("input", () => this.setHeights());
   }
 
@@ -44,22 +44,22 @@ export class Controls {
   }
 
   /**
-   * Of the chosen material, or of all.
+   * Changes the selected material, or all.
    * @param {string} key
    * @param {number} value
    */
   setWalls(key, value) {
     const scene = structuredClone(this.state.scene);
-    const chosen = byId("material").value;
+    const selected = byId("material").value;
     for (const [name, material] of Object.entries(scene.materials)) {
-      if (chosen === "" || chosen === name) /** @type {any} */ (material)[key] = value;
+      if (selected === "" || selected === name) /** @type {any} */ (material)[key] = value;
     }
     this.change({ scene });
   }
 
   setHeights() {
     const scene = structuredClone(this.state.scene);
-    if (!byId("in-space").checked) {
+    if (!byId("use-3d").checked) {
       delete scene.floor_z_m;
       delete scene.ceiling_z_m;
       for (const thing of [...(scene.walls ?? []), ...(scene.cylinders ?? [])]) delete thing.z_m;
@@ -68,17 +68,17 @@ export class Controls {
     scene.floor_z_m ??= 0;
     const floor = scene.floor_z_m;
     scene.ceiling_z_m = floor + Number(byId("ceiling").value);
-    const most = scene.ceiling_z_m - 0.05;
-    this.change({ scene, height_m: Math.min(most, floor + Number(byId("height").value)) });
+    const max_m = scene.ceiling_z_m - 0.05;
+    this.change({ scene, height_m: Math.min(max_m, floor + Number(byId("height").value)) });
   }
 
   /** @param {State} state */
   show(state) {
     this.state = state;
-    for (const [id, [key, words]] of Object.entries(NUMBERS)) {
+    for (const [id, [key, format]] of Object.entries(NUMBERS)) {
       const value = Number(state[key]);
       setValue(id, value);
-      say(id, words(value));
+      setLabel(id, format(value));
     }
     for (const id of /** @type {const} */ (["sensor", "engine", "gain"])) setValue(id, state[id]);
     setValue("step", state.step_deg);
@@ -92,31 +92,31 @@ export class Controls {
     const list = byId("material");
     if (list.dataset.names !== names.join()) {
       list.dataset.names = names.join();
-      const chosen = list.value;
+      const selected = list.value;
       const entries = names.length === 1 ? names : ["", ...names];
       list.replaceChildren(...entries.map((name) => new Option(name || "all materials", names.length === 1 ? "" : name)));
-      if (names.includes(chosen)) list.value = chosen;
+      if (names.includes(selected)) list.value = selected;
     }
     const material = scene.materials[list.value || names[0]];
     for (const key of /** @type {const} */ (["reflectance", "roughness"])) {
       setValue(key, material?.[key] ?? 0);
-      say(key, (material?.[key] ?? 0).toFixed(2));
+      setLabel(key, (material?.[key] ?? 0).toFixed(2));
     }
   }
 
   /** @param {State} state */
   showHeights({ scene, height_m }) {
-    const is = scene.floor_z_m !== undefined || scene.ceiling_z_m !== undefined;
-    byId("in-space").checked = is;
-    byId("heights").hidden = !is;
-    if (!is) return;
+    const has3d = scene.floor_z_m !== undefined || scene.ceiling_z_m !== undefined;
+    byId("use-3d").checked = has3d;
+    byId("heights").hidden = !has3d;
+    if (!has3d) return;
     const floor = scene.floor_z_m ?? 0;
     const ceiling = (scene.ceiling_z_m ?? floor + 2.4) - floor;
     setValue("ceiling", ceiling);
-    say("ceiling", `${ceiling.toFixed(1)} m`);
+    setLabel("ceiling", `${ceiling.toFixed(1)} m`);
     const height = height_m === null ? ceiling / 2 : height_m - floor;
     setValue("height", height);
-    say("height", `${height.toFixed(2)} m`);
+    setLabel("height", `${height.toFixed(2)} m`);
   }
 }
 
@@ -132,7 +132,7 @@ function setValue(id, value) {
  * @param {string} id
  * @param {string} text
  */
-function say(id, text) {
+function setLabel(id, text) {
   const output = byId(id).nextElementSibling;
   if (output.textContent !== text) output.textContent = text;
   byId(id).setAttribute("aria-valuetext", text);

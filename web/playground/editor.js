@@ -1,15 +1,15 @@
-// Drawing a room: corners and pillars as handles on the plan, walls by clicks.
+// Room editor: corners and pillars are handles on the plan; walls are added by clicks.
 
-import { Handle } from "../../crates/sonard-daemon/src/server/page/handles.js";
-import { addPillar, addWall, cornersOf, emptyRoom, moveCorner, removeCorner } from "./room.js";
+import { Handle } from "../../crates/sonard-daemon/src/server/page/drag-handles.js";
+import { addPillar, addWall, cornersOf, newRoom, moveCorner, removeCorner } from "./room.js";
 import { rounded } from "../../crates/sonard-daemon/src/server/page/ranger.js";
 
 /** @param {string} id */
 const byId = (id) => /** @type {HTMLButtonElement} */ (document.getElementById(id));
 
-/** A click so near to a corner means the corner, pixels. */
+/** Snap distance to corners, pixels. */
 const SNAP_PX = 14;
-const MOST_UNDO = 50;
+const MAX_UNDO = 50;
 
 /** @typedef {import("./room.js").Point} Point */
 
@@ -17,7 +17,7 @@ export class Editor {
   /**
    * @param {HTMLElement} stage
    * @param {any} view of the plan
-   * @param {(scene: import("./room.js").SceneFile, kept: boolean) => void} onScene
+   * @param {(scene: import("./room.js").SceneFile, final: boolean) => void} onScene
    * @param {(pose: import("./engine.js").Pose) => void} onPose
    */
   constructor(stage, view, onScene, onPose) {
@@ -26,25 +26,25 @@ export class Editor {
     this.onScene = onScene;
     this.open = false;
     /** @type {import("./room.js").SceneFile} */
-    this.scene = emptyRoom();
+    this.scene = newRoom();
     /** @type {Handle[]} */
     this.handles = [];
-    /** Where the next wall begins. @type {Point | null} */
+    /** Start of the next wall. @type {Point | null} */
     this.from = null;
     this.adding = false;
-    /** @type {string[]} */
-    this.before = [];
-    /** The scene as it was when a handle was taken hold of: corners that meet while one passes are not joined. */
-    this.grabbed = /** @type {import("./room.js").SceneFile | null} */ (null);
+    /** JSON of earlier scenes, for undo. @type {string[]} */
+    this.undoStack = [];
+    /** Scene at the start of a drag. Edits start from it, so that a corner dragged across another is not joined with it. */
+    this.dragStart = /** @type {import("./room.js").SceneFile | null} */ (null);
     byId("edit").addEventListener("click", () => this.toggle(!this.open));
     byId("add-wall").addEventListener("click", () => this.add(!this.adding));
     byId("add-pillar").addEventListener("click", () => this.change((scene) => addPillar(scene, this.middle())));
     byId("new-room").addEventListener("click", () => {
-      const room = emptyRoom();
-      this.remember();
+      const room = newRoom();
+      this.saveForUndo();
       onPose(room.poses?.start ?? { x_m: 1, y_m: 1, heading_deg: 0 });
       this.onScene(room, true);
-      this.view.show(this.view.what);
+      this.view.show(this.view.mode);
     });
     byId("undo").addEventListener("click", () => this.undo());
     stage.addEventListener("click", (event) => this.click(event), { capture: true });
@@ -69,47 +69,48 @@ export class Editor {
     this.stage.classList.toggle("adding", adding);
   }
 
-  /** Sets the handles where corners and pillars are. @param {import("./room.js").SceneFile} scene */
+  /** Places handles at corners and pillars. @param {import("./room.js").SceneFile} scene */
   show(scene) {
     this.scene = scene;
-    if (this.grabbed) return;
-    const things = this.open ? this.things() : [];
-    while (this.handles.length > things.length) this.handles.pop()?.remove();
-    things.forEach((thing, i) => {
+    if (this.dragStart) return;
+    const items = this.open ? this.items() : [];
+    while (this.handles.length > items.length) this.handles.pop()?.remove();
+    items.forEach((item, i) => {
       const handle = (this.handles[i] ??= this.handle(i));
-      handle.button.classList.toggle("corner", !thing.pillar);
-      handle.button.classList.toggle("pillar", thing.pillar);
-      handle.place(thing.at, `${thing.pillar ? "Pillar" : "Corner"} at ${thing.at.map((m) => m.toFixed(2)).join(", ")} m`);
+      handle.button.classList.toggle("corner", !item.pillar);
+      handle.button.classList.toggle("pillar", item.pillar);
+      handle.place(item.at, `${item.pillar ? "Pillar" : "Corner"} at (${item.at.map((m) => m.toFixed(2)).join(", ")}) m`);
     });
   }
 
-  things() {
+  /** Corners, then pillars. */
+  items() {
     const corners = cornersOf(this.scene).map((corner) => ({ at: corner.at, pillar: false, corner }));
     const pillars = (this.scene.cylinders ?? []).map((cylinder) => ({ at: cylinder.center, pillar: true, cylinder }));
     return [...corners, ...pillars];
   }
 
-  /** @param {number} place among the things */
-  handle(place) {
+  /** @param {number} index of the item */
+  handle(index) {
     return new Handle(
       this.stage,
       {
         name: "Corner",
         className: "",
         onMove: (at, handle) => {
-          if (!this.grabbed) this.remember();
-          this.grabbed ??= this.scene;
+          if (!this.dragStart) this.saveForUndo();
+          this.dragStart ??= this.scene;
           handle.place(at);
-          this.move(this.grabbed, place, at);
+          this.move(this.dragStart, index, at);
         },
         onDone: () => {
-          this.grabbed = null;
+          this.dragStart = null;
           this.onScene(this.scene, true);
         },
         onKey: (key) => {
           if (key === "Escape") this.add(false);
           if (key !== "Delete" && key !== "Backspace") return false;
-          this.remove(place);
+          this.remove(index);
           return true;
         },
       },
@@ -118,36 +119,36 @@ export class Editor {
   }
 
   /**
-   * @param {import("./room.js").SceneFile} grabbed
-   * @param {number} place
+   * @param {import("./room.js").SceneFile} start
+   * @param {number} index
    * @param {Point} at
    */
-  move(grabbed, place, at) {
-    const scene = structuredClone(grabbed);
+  move(start, index, at) {
+    const scene = structuredClone(start);
     const corners = cornersOf(scene);
-    if (place < corners.length) moveCorner(corners[place], at);
+    if (index < corners.length) moveCorner(corners[index], at);
     else {
-      const cylinder = scene.cylinders?.[place - corners.length];
+      const cylinder = scene.cylinders?.[index - corners.length];
       if (cylinder) cylinder.center = [rounded(at[0], 2), rounded(at[1], 2)];
     }
     this.onScene(scene, false);
   }
 
-  /** @param {number} place */
-  remove(place) {
+  /** @param {number} index */
+  remove(index) {
     this.change((scene) => {
       const corners = cornersOf(scene);
-      if (place < corners.length) removeCorner(scene, corners[place]);
-      else scene.cylinders?.splice(place - corners.length, 1);
+      if (index < corners.length) removeCorner(scene, corners[index]);
+      else scene.cylinders?.splice(index - corners.length, 1);
     });
-    (this.handles[place] ?? this.handles.at(-1))?.button.focus();
+    (this.handles[index] ?? this.handles.at(-1))?.button.focus();
   }
 
-  /** A click where a wall is to begin or end. @param {MouseEvent} event */
+  /** Starts or ends a wall at a click. @param {MouseEvent} event */
   click(event) {
     if (!this.adding) return;
     const box = this.stage.getBoundingClientRect();
-    const at = this.nearCorner([event.clientX - box.left, event.clientY - box.top]);
+    const at = this.snap([event.clientX - box.left, event.clientY - box.top]);
     event.stopPropagation();
     event.preventDefault();
     const from = this.from;
@@ -156,7 +157,7 @@ export class Editor {
   }
 
   /** @param {Point} px @returns {Point} */
-  nearCorner(px) {
+  snap(px) {
     for (const { at } of cornersOf(this.scene)) {
       const [x, y] = this.view.px(at);
       if (Math.hypot(x - px[0], y - px[1]) < SNAP_PX) return [at[0], at[1]];
@@ -167,21 +168,21 @@ export class Editor {
 
   /** @param {(scene: import("./room.js").SceneFile) => void} edit */
   change(edit) {
-    this.remember();
+    this.saveForUndo();
     const scene = structuredClone(this.scene);
     edit(scene);
     this.onScene(scene, true);
   }
 
-  remember() {
-    this.before.push(JSON.stringify(this.scene));
-    if (this.before.length > MOST_UNDO) this.before.shift();
+  saveForUndo() {
+    this.undoStack.push(JSON.stringify(this.scene));
+    if (this.undoStack.length > MAX_UNDO) this.undoStack.shift();
     byId("undo").disabled = false;
   }
 
   undo() {
-    const scene = this.before.pop();
-    byId("undo").disabled = this.before.length === 0;
+    const scene = this.undoStack.pop();
+    byId("undo").disabled = this.undoStack.length === 0;
     if (scene) this.onScene(JSON.parse(scene), true);
   }
 

@@ -1,7 +1,7 @@
-// The model: requests and answers as JSON through the memory of the WebAssembly module.
+// Bindings of the WebAssembly module: requests and responses are JSON in its memory.
 
 /**
- * A reading as the daemon's API tells it, without its path.
+ * Reading in the format of the daemon's API, without its path.
  * @typedef {{index: number, azimuth_deg: number, status: string, range_m: number | null, tof_us: number | null,
  *   amplitude?: number, margin_db?: number, residual_m: number | null, verdict: string, mark?: string,
  *   viewpoint: Viewpoint | null, sim?: Sim | null, ranger?: string, pose?: Pose, path?: Path | null}} Reading
@@ -32,8 +32,8 @@
  * @typedef {{message: string, help: string, line?: number}} Problem
  */
 
-/** What the model refuses, in its own words. */
-export class Refused extends Error {
+/** Request rejected by the model. */
+export class ModelError extends Error {
   /** @param {Problem} problem */
   constructor(problem) {
     super(problem.message);
@@ -43,15 +43,15 @@ export class Refused extends Error {
 
 export class Engine {
   /** @param {BufferSource} bytes */
-  static async of(bytes) {
-    // The module imports nothing: it reaches neither page nor network, only what it is handed.
+  static async load(bytes) {
+    // The module imports nothing, so it can reach neither page nor network.
     const { instance } = await WebAssembly.instantiate(bytes, {});
     return new Engine(/** @type {any} */ (instance.exports));
   }
 
   /**
-   * @param {{memory: WebAssembly.Memory, request: (bytes: number) => number, answer: () => number,
-   *   answered: () => number}} exports
+   * @param {{memory: WebAssembly.Memory, request_buffer: (bytes: number) => number, handle_request: () => number,
+   *   response: () => number}} exports
    */
   constructor(exports) {
     this.exports = exports;
@@ -60,37 +60,37 @@ export class Engine {
   }
 
   /**
-   * The text of an answer.
+   * Sends a request and returns the response as text.
    * @param {object} request
    */
-  text(request) {
+  requestText(request) {
     const bytes = this.encoder.encode(JSON.stringify(request));
-    const place = this.exports.request(bytes.length);
-    new Uint8Array(this.exports.memory.buffer, place, bytes.length).set(bytes);
-    const length = this.exports.answer();
-    // Memory may have grown, and moved, while the answer was made.
-    const answer = new Uint8Array(this.exports.memory.buffer, this.exports.answered(), length);
-    const text = this.decoder.decode(answer);
-    if (text.startsWith('{"refused":')) throw new Refused(JSON.parse(text).refused);
+    const address = this.exports.request_buffer(bytes.length);
+    new Uint8Array(this.exports.memory.buffer, address, bytes.length).set(bytes);
+    const length = this.exports.handle_request();
+    // `memory.buffer` is a new object if the memory grew meanwhile.
+    const response = new Uint8Array(this.exports.memory.buffer, this.exports.response(), length);
+    const text = this.decoder.decode(response);
+    if (text.startsWith('{"error":')) throw new ModelError(JSON.parse(text).error);
     return text;
   }
 
   /** @param {object} request */
-  ask(request) {
-    return JSON.parse(this.text(request));
+  request(request) {
+    return JSON.parse(this.requestText(request));
   }
 
   /** @returns {{scenes: {name: string, text: string}[], sensors: Sensor[]}} */
-  shipped() {
-    return this.ask({ ask: "shipped" });
+  listPresets() {
+    return this.request({ type: "list_presets" });
   }
 
   /**
    * @param {Settings} settings
    * @returns {{plan: FloorPlan, half_beam_deg: number}}
    */
-  set(settings) {
-    return this.ask({ ask: "set", settings });
+  configure(settings) {
+    return this.request({ type: "configure", settings });
   }
 
   /**
@@ -100,17 +100,17 @@ export class Engine {
    * @param {number | null} measured
    * @returns {{start: object, session: object, beams: number}}
    */
-  stand(engine, pose, plan, measured) {
-    return this.ask({ ask: "stand", engine, pose, plan, measured });
+  startSweep(engine, pose, plan, measured) {
+    return this.request({ type: "start_sweep", engine, pose, plan, measured });
   }
 
   /**
-   * The text of the next readings: they are many, and are read where they are shown.
+   * Returns the next readings as text, which the page parses.
    * @param {EngineName} engine
    * @param {number} count
    */
-  more(engine, count) {
-    return this.text({ ask: "more", engine, count });
+  nextReadings(engine, count) {
+    return this.requestText({ type: "next_readings", engine, count });
   }
 
   /**
@@ -118,7 +118,7 @@ export class Engine {
    * @param {number} index
    */
   beam(engine, index) {
-    return this.text({ ask: "beam", engine, index });
+    return this.requestText({ type: "beam", engine, index });
   }
 
   /**
@@ -126,7 +126,7 @@ export class Engine {
    * @param {Pose} pose
    * @returns {{scans: LoggedScan[]}}
    */
-  log(text, pose) {
-    return this.ask({ ask: "log", text, pose });
+  loadLog(text, pose) {
+    return this.request({ type: "load_log", text, pose });
   }
 }

@@ -1,9 +1,9 @@
-// Rooms, logs and tables of readings as files: opened, dropped, saved.
+// Files: rooms, logs and tables of readings can be opened or dropped; rooms can be saved.
 
 import { textOf } from "./room.js";
 
-/** A longer file would not fit into memory several times over, bytes. */
-const MOST_BYTES = 50 << 20;
+/** Maximum file size, bytes: several copies must fit into memory. */
+const MAX_BYTES = 50 << 20;
 
 /** @param {string} id */
 const byId = (id) => /** @type {any} */ (document.getElementById(id));
@@ -11,10 +11,10 @@ const byId = (id) => /** @type {any} */ (document.getElementById(id));
 export class Files {
   /**
    * @param {{room: (scene: import("./room.js").SceneFile) => void, log: (text: string) => void,
-   *   refused: (problem: import("./engine.js").Problem) => void}} uses
+   *   onError: (problem: import("./engine.js").Problem) => void}} callbacks
    */
-  constructor(uses) {
-    this.uses = uses;
+  constructor(callbacks) {
+    this.callbacks = callbacks;
     byId("load").addEventListener("click", () => byId("file").click());
     byId("file").addEventListener("change", () => {
       const [file] = byId("file").files;
@@ -38,14 +38,14 @@ export class Files {
 
   /** @param {File} file */
   async open(file) {
-    if (file.size > MOST_BYTES) {
-      const message = `${file.name} is longer than ${MOST_BYTES >> 20} MB`;
-      return this.uses.refused({ message, help: "`sonard compare` takes logs of any length" });
+    if (file.size > MAX_BYTES) {
+      const message = `${file.name} is larger than ${MAX_BYTES >> 20} MB`;
+      return this.callbacks.onError({ message, help: "use `sonard compare`, which reads logs of any length" });
     }
     const text = await file.text();
     const scene = sceneIn(text);
-    if (scene) this.uses.room(scene);
-    else this.uses.log(text);
+    if (scene) this.callbacks.room(scene);
+    else this.callbacks.log(text);
   }
 
   /** @param {import("./room.js").SceneFile} scene */
@@ -58,7 +58,7 @@ export class Files {
   }
 }
 
-/** A scene, if the text is one object with materials. @param {string} text */
+/** Returns the scene if the text is a JSON object with materials, else `null`. @param {string} text */
 function sceneIn(text) {
   try {
     const value = JSON.parse(text);

@@ -1,16 +1,15 @@
-// The page's side of the model: one worker, which is asked for one view at a time.
+// Client of the model's worker, which computes one view at a time.
 
 /**
- * What is to be shown: settings, where the ranger stands, and by which engines; the first one is the
- * one that a log's readings and the selected beam are of.
+ * View to show: settings, pose and engines. Measured readings and the selected beam belong to the first engine.
  * @typedef {import("./engine.js").EngineName} EngineName
  * @typedef {{id: number, settings: import("./engine.js").Settings, pose: import("./engine.js").Pose,
  *   plan: import("./engine.js").ScanPlan, engines: EngineName[], measured: number | null, beam: number | null}} View
  */
 
-/** A view that is not done by then gives way to the next one. */
-const PATIENCE_MS = 250;
-/** A search that is silent for so long is given up with its worker when something else is wanted. */
+/** Time after which an unfinished view is replaced by the next one. */
+const REPLACE_AFTER_MS = 250;
+/** Time without messages after which the worker is restarted if another view waits. */
 const STUCK_MS = 4000;
 
 export class Model {
@@ -24,105 +23,92 @@ export class Model {
     this.address = URL.createObjectURL(new Blob([script], { type: "text/javascript" }));
     this.onMessage = onMessage;
     this.id = 0;
-    this.began = 0;
-    this.heard = 0;
-    this.waiting = 0;
-    this.watching = 0;
-    /** @type {View | null} */
-    this.busy = null;
-    /** @type {View | null} */
+    /** Times of the last view sent and the last message received. */
+    this.startedAt = 0;
+    this.lastMessageAt = 0;
+    this.replaceTimer = 0;
+    this.stuckTimer = 0;
+    /** View being computed. @type {View | null} */
+    this.current = null;
+    /** View that waits. @type {View | null} */
     this.next = null;
     /** @type {{text: string, pose: object} | null} */
     this.log = null;
-    /** @type {Map<number, {done: (answer: any) => void, failed: (problem: any) => void}>} */
-    this.questions = new Map();
-    this.worker = this.start();
+    /** @type {Map<number, {done: (response: any) => void, failed: (problem: any) => void}>} */
+    this.pending = new Map();
+    this.worker = this.startWorker();
   }
 
-  start() {
+  startWorker() {
     const worker = new Worker(this.address);
-    worker.onmessage = ({ data }) => this.take(data);
-    worker.postMessage({ kind: "begin", bytes: this.bytes });
-    this.heard = performance.now();
+    worker.onmessage = ({ data }) => this.handleMessage(data);
+    worker.postMessage({ kind: "init", bytes: this.bytes });
+    this.lastMessageAt = performance.now();
     return worker;
   }
 
   /**
-   * Shows a view as soon as the one before is done, or has taken long.
+   * Shows a view once the current one is done or has taken too long.
    * @param {Omit<View, "id">} view
    */
   show(view) {
     this.next = { id: ++this.id, ...view };
-    if (!this.busy) return this.send();
-    clearTimeout(this.waiting);
-    const since = performance.now() - this.began;
-    this.waiting = setTimeout(() => this.overtake(), Math.max(0, PATIENCE_MS - since));
+    if (!this.current) return this.send();
+    clearTimeout(this.replaceTimer);
+    const elapsed_ms = performance.now() - this.startedAt;
+    this.replaceTimer = setTimeout(() => this.replace(), Math.max(0, REPLACE_AFTER_MS - elapsed_ms));
   }
 
   send() {
-    clearTimeout(this.waiting);
-    [this.busy, this.next, this.began] = [this.next, null, performance.now()];
-    if (this.busy) this.worker.postMessage({ kind: "view", view: this.busy });
+    clearTimeout(this.replaceTimer);
+    [this.current, this.next, this.startedAt] = [this.next, null, performance.now()];
+    if (this.current) this.worker.postMessage({ kind: "view", view: this.current });
   }
 
-  overtake() {
+  replace() {
     if (!this.next) return;
     this.send();
-    this.watch();
-  }
-
-  /** A worker that does not answer is deep in a search: another one takes its place. */
-  watch() {
-    clearTimeout(this.watching);
-    this.watching = setTimeout(() => {
-      if (!this.busy || this.heard > this.began) return;
-      this.restart();
+    // A worker that sends nothing is in a long search and is replaced.
+    clearTimeout(this.stuckTimer);
+    this.stuckTimer = setTimeout(() => {
+      if (this.current && this.lastMessageAt <= this.startedAt) this.restart(this.next ?? this.current);
     }, STUCK_MS);
   }
 
-  restart() {
+  /** Replaces the worker, reloads the log and shows a view. @param {View | null} view */
+  restart(view) {
     this.worker.terminate();
-    this.worker = this.start();
-    const view = this.next ?? this.busy;
-    if (this.log) this.worker.postMessage({ kind: "log", id: 0, ...this.log });
-    [this.busy, this.next] = [null, view];
-    this.send();
+    this.worker = this.startWorker();
+    if (this.log) this.worker.postMessage({ kind: "load_log", id: 0, ...this.log });
+    [this.current, this.next] = [null, view];
+    if (view) this.send();
   }
 
   /**
-   * @param {{kind: string, [key: string]: any}} question
+   * @param {{kind: string, [key: string]: any}} message
    * @returns {Promise<any>}
    */
-  ask(question) {
+  request(message) {
     const id = ++this.id;
-    if (question.kind === "log") this.log = { text: question.text, pose: question.pose };
-    this.worker.postMessage({ ...question, id });
-    return new Promise((done, failed) => this.questions.set(id, { done, failed }));
+    if (message.kind === "load_log") this.log = { text: message.text, pose: message.pose };
+    this.worker.postMessage({ ...message, id });
+    return new Promise((done, failed) => this.pending.set(id, { done, failed }));
   }
 
   /** @param {any} message */
-  take(message) {
-    this.heard = performance.now();
-    const question = this.questions.get(message.id);
-    if (question) {
-      this.questions.delete(message.id);
-      return message.kind === "answer" ? question.done(message.answer) : question.failed(message.problem);
+  handleMessage(message) {
+    this.lastMessageAt = performance.now();
+    const request = this.pending.get(message.id);
+    if (request) {
+      this.pending.delete(message.id);
+      return message.kind === "response" ? request.done(message.response) : request.failed(message.problem);
     }
-    if (message.id !== this.busy?.id) return;
-    const over = message.kind === "done" || message.kind === "refused";
-    if (over) this.busy = null;
+    if (message.id !== this.current?.id) return;
+    const finished = message.kind === "done" || message.kind === "error";
+    if (finished) this.current = null;
     this.onMessage(message);
-    if (message.problem?.broken) return this.broken();
-    if (over && this.next) this.send();
-  }
-
-  /** After a breakdown the module's memory is not to be trusted. */
-  broken() {
-    const next = this.next;
-    this.worker.terminate();
-    this.worker = this.start();
-    if (this.log) this.worker.postMessage({ kind: "log", id: 0, ...this.log });
-    [this.busy, this.next] = [null, next];
-    if (next) this.send();
+    // After a trap the module's memory may be inconsistent.
+    if (message.problem?.broken) return this.restart(this.next);
+    if (finished && this.next) this.send();
   }
 }

@@ -1,4 +1,4 @@
-// The room in the project's scene format, and what is drawn in it.
+// Editing of a room in the project's scene format.
 
 import { rounded } from "../../crates/sonard-daemon/src/server/page/ranger.js";
 
@@ -10,11 +10,11 @@ import { rounded } from "../../crates/sonard-daemon/src/server/page/ranger.js";
  * @typedef {{name: string, source?: string, materials: Record<string, import("./engine.js").Material>,
  *   walls?: Wall[], cylinders?: Cylinder[], poses?: Record<string, import("./engine.js").Pose>,
  *   floor_z_m?: number, ceiling_z_m?: number, robot?: object}} SceneFile
- * @typedef {{at: Point, places: Point[]}} Corner
+ * @typedef {{at: Point, vertices: Point[]}} Corner
  */
 
-/** A room to begin with. */
-export function emptyRoom() {
+/** Rectangular room to start with. */
+export function newRoom() {
   const corners = /** @type {Point[]} */ ([[0, 0], [3, 0], [3, 2], [0, 2]]);
   const names = ["south", "east", "north", "west"];
   /** @type {SceneFile} */
@@ -28,10 +28,10 @@ export function emptyRoom() {
   return scene;
 }
 
-/** The text of a scene's file. @param {SceneFile} scene */
+/** Text of a scene file. @param {SceneFile} scene */
 export const textOf = (scene) => `${JSON.stringify(scene, null, 2)}\n`;
 
-/** Corners: points that walls begin, end or bend at; one that walls share is one. @param {SceneFile} scene */
+/** Corners: vertices of walls, where vertices at the same position form one corner. @param {SceneFile} scene */
 export function cornersOf(scene) {
   /** @type {Map<string, Corner>} */
   const corners = new Map();
@@ -40,8 +40,8 @@ export function cornersOf(scene) {
     for (const point of points) {
       if (!point) continue;
       const name = point.map((value) => rounded(value, 4)).join();
-      const corner = corners.get(name) ?? { at: point, places: [] };
-      corner.places.push(point);
+      const corner = corners.get(name) ?? { at: point, vertices: [] };
+      corner.vertices.push(point);
       corners.set(name, corner);
     }
   }
@@ -49,21 +49,21 @@ export function cornersOf(scene) {
 }
 
 /**
- * Moves a corner, and all walls that meet there.
+ * Moves a corner with all walls connected to it.
  * @param {Corner} corner
  * @param {Point} to
  */
 export function moveCorner(corner, [x, y]) {
-  for (const place of corner.places) [place[0], place[1]] = [rounded(x, 2), rounded(y, 2)];
+  for (const vertex of corner.vertices) [vertex[0], vertex[1]] = [rounded(x, 2), rounded(y, 2)];
 }
 
 /**
- * Takes away the walls that meet at a corner.
+ * Removes a corner with all walls connected to it.
  * @param {SceneFile} scene
  * @param {Corner} corner
  */
 export function removeCorner(scene, corner) {
-  const own = (/** @type {Point | undefined} */ point) => point !== undefined && corner.places.includes(point);
+  const own = (/** @type {Point | undefined} */ point) => point !== undefined && corner.vertices.includes(point);
   scene.walls = (scene.walls ?? []).filter((wall) => {
     if (!wall.polyline) return !own(wall.from) && !own(wall.to);
     wall.polyline = wall.polyline.filter((point) => !own(point));

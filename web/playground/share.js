@@ -1,11 +1,11 @@
-// A view as a link: all of it, squeezed, after the `#`. Nothing of it goes to any server.
+// A view as a link: compressed into the fragment, which browsers do not send to servers.
 
-import { stateFrom } from "./state.js";
+import { parseState } from "./state.js";
 
-/** What a link may unpack to, bytes. */
-const MOST_BYTES = 4 << 20;
+/** Maximum decompressed size of a link, bytes. */
+const MAX_BYTES = 4 << 20;
 
-/** Shows a link to a view, to be copied. @param {object} view */
+/** Shows the link to a view in a dialog. @param {object} view */
 export async function showLink(view) {
   const dialog = /** @type {HTMLDialogElement} */ (document.getElementById("shared"));
   const address = /** @type {HTMLInputElement} */ (document.getElementById("address"));
@@ -14,7 +14,7 @@ export async function showLink(view) {
   copy.textContent = "Copy";
   copy.onclick = async () => {
     address.select();
-    // Browsers that let no page write there copy what is selected.
+    // Where the page may not write to the clipboard, the selection is copied.
     await navigator.clipboard?.writeText(address.value).catch(() => document.execCommand("copy"));
     copy.textContent = "Copied";
   };
@@ -25,7 +25,7 @@ export async function showLink(view) {
 /** @param {object} view */
 async function pack(view) {
   const text = new Blob([JSON.stringify(view)]).stream();
-  const bytes = await gather(text.pipeThrough(new CompressionStream("deflate-raw")), MOST_BYTES);
+  const bytes = await readAll(text.pipeThrough(new CompressionStream("deflate-raw")), MAX_BYTES);
   const letters = Array.from(bytes, (byte) => String.fromCharCode(byte)).join("");
   return btoa(letters).replaceAll("+", "-").replaceAll("/", "_").replaceAll("=", "");
 }
@@ -33,24 +33,24 @@ async function pack(view) {
 /** @param {string} packed */
 async function unpack(packed) {
   const letters = atob(packed.replaceAll("-", "+").replaceAll("_", "/"));
-  const squeezed = Uint8Array.from(letters, (letter) => letter.charCodeAt(0));
-  return JSON.parse(new TextDecoder().decode(await unsqueeze(squeezed, "deflate-raw", MOST_BYTES)));
+  const compressed = Uint8Array.from(letters, (letter) => letter.charCodeAt(0));
+  return JSON.parse(new TextDecoder().decode(await decompress(compressed, "deflate-raw", MAX_BYTES)));
 }
 
 /**
  * @param {Uint8Array<ArrayBuffer>} bytes
  * @param {CompressionFormat} format
- * @param {number} most
+ * @param {number} max_bytes
  */
-export function unsqueeze(bytes, format, most) {
-  return gather(new Blob([bytes]).stream().pipeThrough(new DecompressionStream(format)), most);
+export function decompress(bytes, format, max_bytes) {
+  return readAll(new Blob([bytes]).stream().pipeThrough(new DecompressionStream(format)), max_bytes);
 }
 
 /**
  * @param {ReadableStream<Uint8Array<ArrayBuffer>>} stream
- * @param {number} most
+ * @param {number} max_bytes
  */
-async function gather(stream, most) {
+async function readAll(stream, max_bytes) {
   const reader = stream.getReader();
   const pieces = [];
   let length = 0;
@@ -58,16 +58,16 @@ async function gather(stream, most) {
     const { value, done } = await reader.read();
     if (done) break;
     length += value.length;
-    if (length > most) throw new RangeError("there is too much in it");
+    if (length > max_bytes) throw new RangeError("decompressed data exceeds the limit");
     pieces.push(value);
   }
   return new Uint8Array(await new Blob(pieces).arrayBuffer());
 }
 
-/** The view in a link, or `null`. @param {string} packed */
+/** Returns the view in a link, or `null` if the link is invalid. @param {string} packed */
 export async function stateFromLink(packed) {
   try {
-    return stateFrom(await unpack(packed));
+    return parseState(await unpack(packed));
   } catch {
     return null;
   }

@@ -1,4 +1,4 @@
-// What is shown, and the settings that the model is asked with.
+// State of the page, and its conversion to settings of the model.
 
 import { textOf } from "./room.js";
 
@@ -10,7 +10,7 @@ import { textOf } from "./room.js";
  */
 
 /** @returns {Omit<State, "scene" | "pose">} */
-export const usual = () => ({
+export const defaultState = () => ({
   sensor: "senscomp-6500",
   threshold_db: 0,
   gain: "own",
@@ -26,34 +26,34 @@ export const usual = () => ({
   fit: "room",
 });
 
-/** What the gain is instead of the sensor's own. */
+/** Gains that replace the sensor's own. */
 const GAINS = {
   flat: { kind: "compensating", exponent: 0, air: false },
   air: { kind: "compensating", exponent: 0, air: true },
 };
 
 /**
- * Settings as the model takes them; `known` has sensors by name, `air` what a log says of the air besides.
+ * Converts the state to settings of the model; `known` has sensors by name, `air` has further parameters of a log's air.
  * @param {State} state
  * @param {Map<string, import("./engine.js").Sensor>} known
  * @param {import("./engine.js").Air | null} air
  * @returns {import("./engine.js").Settings}
  */
 export function settingsOf(state, known, air) {
-  const own = /** @type {import("./engine.js").Sensor} */ (known.get(state.sensor) ?? known.get("senscomp-6500"));
+  const preset = /** @type {import("./engine.js").Sensor} */ (known.get(state.sensor) ?? known.get("senscomp-6500"));
   /** @type {any} */
-  const sensor = structuredClone(own);
+  const sensor = structuredClone(preset);
   if (state.gain !== "own") sensor.gain = GAINS[state.gain];
   if (state.height_m !== null) sensor.mounting = { ...sensor.mounting, z_m: state.height_m };
-  const threshold = Math.min(1, Math.max(1e-6, own.threshold * 10 ** (state.threshold_db / 20)));
-  // Named poses play no part in readings; walls that are being drawn may run through one.
+  const threshold = Math.min(1, Math.max(1e-6, preset.threshold * 10 ** (state.threshold_db / 20)));
+  // Named poses do not affect readings, and a wall being drawn may pass through one, which the model would reject.
   const { poses, ...scene } = state.scene;
   return {
     scene: textOf(scene),
     sensor,
     air: { ...air, temperature_c: state.temperature_c, humidity_percent: state.humidity_percent },
     options: {
-      max_range_m: Math.min(state.reach_m, own.max_range_m),
+      max_range_m: Math.min(state.reach_m, preset.max_range_m),
       threshold: state.threshold_db === 0 ? null : threshold,
     },
   };
@@ -63,19 +63,19 @@ export function settingsOf(state, known, air) {
 export const planOf = (state) => ({ from_deg: 0, to_deg: 360, step_deg: state.step_deg, pings_per_stop: 1 });
 
 /**
- * A view from a link: what is strange in it is left out.
- * @param {any} given
+ * Parses the view of a link; entries of the wrong type are replaced by defaults.
+ * @param {any} value
  * @returns {State | null}
  */
-export function stateFrom(given) {
-  const numbers = (/** @type {any} */ pose) => ["x_m", "y_m", "heading_deg"].every((key) => Number.isFinite(pose?.[key]));
-  if (typeof given?.scene !== "object" || !given.scene?.materials || !numbers(given.pose)) return null;
-  const known = /** @type {any} */ (usual());
-  for (const key of Object.keys(known)) {
-    const same = typeof given[key] === typeof known[key];
-    const maybe = (key === "beam" || key === "height_m") && (given[key] === null || Number.isFinite(given[key]));
-    if (same || maybe) known[key] = given[key];
+export function parseState(value) {
+  const isPose = (/** @type {any} */ pose) => ["x_m", "y_m", "heading_deg"].every((key) => Number.isFinite(pose?.[key]));
+  if (typeof value?.scene !== "object" || !value.scene?.materials || !isPose(value.pose)) return null;
+  const state = /** @type {any} */ (defaultState());
+  for (const key of Object.keys(state)) {
+    const sameType = typeof value[key] === typeof state[key];
+    const nullable = (key === "beam" || key === "height_m") && (value[key] === null || Number.isFinite(value[key]));
+    if (sameType || nullable) state[key] = value[key];
   }
-  const { x_m, y_m, heading_deg } = given.pose;
-  return { ...known, scene: given.scene, pose: { x_m, y_m, heading_deg } };
+  const { x_m, y_m, heading_deg } = value.pose;
+  return { ...state, scene: value.scene, pose: { x_m, y_m, heading_deg } };
 }

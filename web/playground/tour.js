@@ -1,6 +1,6 @@
-// The tour's card: its steps, and what is said instead where something else is shown.
+// Card of the tour: its current step, or a text about a view outside the tour.
 
-import { setText } from "../../crates/sonard-daemon/src/server/page/words.js";
+import { setText } from "../../crates/sonard-daemon/src/server/page/format.js";
 import { STEPS } from "./steps.js";
 
 /** @param {string} id */
@@ -11,34 +11,34 @@ export class Tour {
   constructor(onStep) {
     this.onStep = onStep;
     this.step = -1;
-    byId("tour-back").addEventListener("click", () => this.go(this.step - 1));
-    byId("tour-next").addEventListener("click", () => this.go(this.step + 1));
+    byId("tour-back").addEventListener("click", () => this.goTo(this.step - 1));
+    byId("tour-next").addEventListener("click", () => this.goTo(this.step + 1));
   }
 
-  /** @param {number} to */
-  go(to) {
-    this.step = to;
-    this.onStep(STEPS[to]);
-    this.say(STEPS[to].title, `${to + 1} of ${STEPS.length}`, STEPS[to].text);
-  }
-
-  /**
-   * Something else is shown; the tour goes on where it was.
-   * @param {string} title
-   * @param {string} text
-   */
-  leave(title, text) {
-    this.say(title, this.step + 1 < STEPS.length ? "the tour goes on with Next" : "", text);
+  /** @param {number} step */
+  goTo(step) {
+    this.step = step;
+    this.onStep(STEPS[step]);
+    this.show(STEPS[step].title, `${step + 1} of ${STEPS.length}`, STEPS[step].text);
   }
 
   /**
+   * Shows a view outside the tour; Next continues with the following step.
    * @param {string} title
-   * @param {string} about
    * @param {string} text
    */
-  say(title, about, text) {
+  pause(title, text) {
+    this.show(title, this.step + 1 < STEPS.length ? "press Next to continue the tour" : "", text);
+  }
+
+  /**
+   * @param {string} title
+   * @param {string} position
+   * @param {string} text
+   */
+  show(title, position, text) {
     setText(byId("tour-title"), title);
-    setText(byId("tour-count"), about);
+    setText(byId("tour-count"), position);
     setText(byId("tour-text"), text);
     byId("tour-back").disabled = this.step < 1;
     byId("tour-next").disabled = this.step + 1 >= STEPS.length;

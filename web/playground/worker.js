@@ -1,59 +1,60 @@
-// The model at work beside the page: the last view that was asked for, piece by piece.
+// Worker that runs the model: computes the latest requested view in slices, so that a newer view can replace it.
 
-import { Engine, Refused } from "./engine.js";
+import { Engine, ModelError } from "./engine.js";
 
-/** A piece of work is to take about so long: then somebody may want something else. */
-const PIECE_MS = 20;
+/** Target duration of a slice. */
+const SLICE_MS = 20;
 
 /** @type {Promise<Engine>} */
 let engine;
-/** @type {import("./model.js").View | null} */
-let wanted = null;
+/** Latest requested view. @type {import("./model.js").View | null} */
+let requested = null;
 let working = false;
-let set = "";
+/** JSON of the settings that the engine is configured with; empty if unknown. */
+let configured = "";
 
 /** @param {object} message */
-const tell = (message) => postMessage(message);
+const send = (message) => postMessage(message);
 
 addEventListener("message", ({ data }) => {
-  if (data.kind === "begin") engine = Engine.of(data.bytes);
+  if (data.kind === "init") engine = Engine.load(data.bytes);
   else if (data.kind === "view") show(data.view);
-  else if (data.kind === "log") answer(data.id, (model) => model.log(data.text, data.pose));
-  else if (data.kind === "shipped") answer(data.id, (model) => model.shipped());
-  else if (data.kind === "memory") answer(data.id, (model) => ({ bytes: model.exports.memory.buffer.byteLength }));
-  else if (data.kind === "ask") {
-    // Whatever is asked may set the model otherwise than the page did.
-    set = "";
-    answer(data.id, (model) => model.ask(data.request));
+  else if (data.kind === "load_log") respond(data.id, (model) => model.loadLog(data.text, data.pose));
+  else if (data.kind === "list_presets") respond(data.id, (model) => model.listPresets());
+  else if (data.kind === "memory") respond(data.id, (model) => ({ bytes: model.exports.memory.buffer.byteLength }));
+  else if (data.kind === "request") {
+    // A raw request may change the engine's settings.
+    configured = "";
+    respond(data.id, (model) => model.request(data.request));
   }
 });
 
 /**
  * @param {number} id
- * @param {(model: Engine) => object} ask
+ * @param {(model: Engine) => object} compute
  */
-async function answer(id, ask) {
+async function respond(id, compute) {
   try {
-    tell({ kind: "answer", id, answer: ask(await engine) });
+    send({ kind: "response", id, response: compute(await engine) });
   } catch (error) {
-    tell({ kind: "refused", id, problem: problemOf(error) });
+    send({ kind: "error", id, problem: problemOf(error) });
   }
 }
 
 /** @param {import("./model.js").View} view */
 async function show(view) {
-  wanted = view;
+  requested = view;
   if (working) return;
   working = true;
-  while (wanted) {
-    const now = wanted;
+  while (requested) {
+    const current = requested;
     try {
-      await work(await engine, now);
+      await compute(await engine, current);
     } catch (error) {
-      if (!(error instanceof Refused)) set = "";
-      tell({ kind: "refused", id: now.id, problem: problemOf(error) });
+      if (!(error instanceof ModelError)) configured = "";
+      send({ kind: "error", id: current.id, problem: problemOf(error) });
     }
-    if (wanted === now) wanted = null;
+    if (requested === current) requested = null;
   }
   working = false;
 }
@@ -62,28 +63,28 @@ async function show(view) {
  * @param {Engine} model
  * @param {import("./model.js").View} view
  */
-async function work(model, view) {
+async function compute(model, view) {
   const settings = JSON.stringify(view.settings);
-  if (settings !== set) {
-    set = "";
-    tell({ kind: "plan", id: view.id, ...model.set(view.settings) });
-    set = settings;
+  if (settings !== configured) {
+    configured = "";
+    send({ kind: "plan", id: view.id, ...model.configure(view.settings) });
+    configured = settings;
   }
   for (const name of view.engines) {
     const measured = name === view.engines[0] ? view.measured : null;
-    const { start, session, beams } = model.stand(name, view.pose, view.plan, measured);
-    tell({ kind: "begun", id: view.id, engine: name, start, session, beams });
+    const { start, session, beams } = model.startSweep(name, view.pose, view.plan, measured);
+    send({ kind: "sweep_started", id: view.id, engine: name, start, session, beams });
     if (!(await sweep(model, view, name, beams))) return;
-    // The selected beam is of the first engine, and comes before the others' sweeps.
+    // The selected beam belongs to the first engine and is sent before the other sweeps.
     if (name !== view.engines[0] || view.beam === null) continue;
-    tell({ kind: "beam", id: view.id, text: model.beam(name, Math.min(view.beam, beams - 1)) });
-    if (!(await goesOn(view))) return;
+    send({ kind: "beam", id: view.id, text: model.beam(name, Math.min(view.beam, beams - 1)) });
+    if (!(await isCurrent(view))) return;
   }
-  tell({ kind: "done", id: view.id });
+  send({ kind: "done", id: view.id });
 }
 
 /**
- * Whether it came to its end.
+ * Computes a sweep; resolves to `false` if another view replaced it.
  * @param {Engine} model
  * @param {import("./model.js").View} view
  * @param {import("./engine.js").EngineName} name
@@ -92,33 +93,32 @@ async function work(model, view) {
 async function sweep(model, view, name, beams) {
   let [left, count] = [beams, 32];
   while (left > 0) {
-    const began = performance.now();
+    const started = performance.now();
     const texts = [];
-    while (left > 0 && performance.now() - began < PIECE_MS) {
-      const since = performance.now();
-      texts.push(model.more(name, count));
+    while (left > 0 && performance.now() - started < SLICE_MS) {
+      const before = performance.now();
+      texts.push(model.nextReadings(name, count));
       left -= Math.min(left, count);
-      const took = performance.now() - since;
-      count = took > PIECE_MS ? Math.max(1, count >> 1) : took < PIECE_MS / 4 ? Math.min(2 * count, 512) : count;
+      const duration_ms = performance.now() - before;
+      count = duration_ms > SLICE_MS ? Math.max(1, count >> 1) : duration_ms < SLICE_MS / 4 ? Math.min(2 * count, 512) : count;
     }
-    tell({ kind: "readings", id: view.id, engine: name, texts, left });
-    if (left > 0 && !(await goesOn(view))) return false;
+    send({ kind: "readings", id: view.id, engine: name, texts, left });
+    if (left > 0 && !(await isCurrent(view))) return false;
   }
   return true;
 }
 
-/** Lets messages in; whether the view is wanted still. */
 const channel = new MessageChannel();
-/** @param {import("./model.js").View} view */
-function goesOn(view) {
+/** Yields to incoming messages; resolves to `true` if the view is still the requested one. @param {import("./model.js").View} view */
+function isCurrent(view) {
   return new Promise((done) => {
-    channel.port1.onmessage = () => done(wanted === view);
+    channel.port1.onmessage = () => done(requested === view);
     channel.port2.postMessage(null);
   });
 }
 
 /** @param {any} error */
 function problemOf(error) {
-  if (error instanceof Refused) return error.problem;
-  return { message: `The model broke down: ${error.message}`, help: "load the page again", broken: true };
+  if (error instanceof ModelError) return error.problem;
+  return { message: `Model failure: ${error.message}`, help: "reload the page", broken: true };
 }

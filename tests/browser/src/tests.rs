@@ -1,4 +1,4 @@
-//! The live page and the playground in Chromium.
+//! Tests of the live page and the playground in Chromium.
 
 mod live_page;
 mod playground;

@@ -1,4 +1,4 @@
-//! One beam: its echo trace, and the paths of all that the model hears.
+//! Details of one beam: echo trace, and the propagation paths of its predicted arrivals.
 
 use serde::Serialize;
 use sonard_interpret::compare::JudgedPing;
@@ -8,41 +8,42 @@ use sonard_model::{
 };
 use sonard_records::{PeakLine, PlanPoint, TraceLine};
 
-use crate::{Refusal, sweep::Sweep};
+use crate::{RequestError, sweep::Sweep};
 
-/// The trace goes so far beyond what was heard or predicted, metres.
-const BEYOND_M: f64 = 0.5;
-/// Spacing of the trace's points, microseconds: a period of the carrier.
+/// Length of the trace beyond the measured or predicted range.
+const TRACE_MARGIN_M: f64 = 0.5;
+/// Spacing of the trace's samples: about one period of the carrier.
 const STEP_US: f64 = 20.0;
 
-/// A beam with all that the model knows about it.
+/// Reading of a beam with its prediction.
 #[derive(Debug, Serialize)]
 pub(crate) struct Beam {
-    /// The reading, and what explains it.
+    /// Reading with its annotations.
     reading: JudgedPing,
-    /// The path of its sound in the plan: the transmitter, each interaction, the receiver.
+    /// Propagation path of the reading: transmitter, interactions, receiver.
     polyline: Option<Vec<PlanPoint>>,
-    /// What the model hears, in order of time, faint sounds included.
+    /// Predicted arrivals in order of time, including those below the threshold.
     peaks: Vec<PeakLine>,
     trace: TraceLine,
 }
 
 impl Beam {
-    /// A beam of a sweep.
-    pub(crate) fn of(sweep: &mut Sweep, index: u32) -> Result<Self, Refusal> {
-        let place = sweep.place_of(index)?;
-        let reading = sweep.judged(place)?;
+    /// Computes the details of a beam of a sweep.
+    pub(crate) fn new(sweep: &mut Sweep, index: u32) -> Result<Self, RequestError> {
+        let position = sweep.position_of(index)?;
+        let reading = sweep.annotated(position)?;
         let ping = &reading.ping;
-        let heard_m = [ping.range_m, ping.sim.as_ref().and_then(|sim| sim.range_m)];
-        let heard_m = heard_m.into_iter().flatten().fold(0.0, f64::max);
-        let listen = |simulator: &Simulator, point: &ObservationPoint<'_>, axis: &Pose| {
-            let most_m = simulator.receiver().max_range_m;
-            let until_m = if heard_m > 0.0 { most_m.min(heard_m + BEYOND_M) } else { most_m };
+        let ranges_m = [ping.range_m, ping.sim.as_ref().and_then(|sim| sim.range_m)];
+        let farthest_m = ranges_m.into_iter().flatten().fold(0.0, f64::max);
+        let compute = |simulator: &Simulator, point: &ObservationPoint<'_>, axis: &Pose| {
+            let max_m = simulator.receiver().max_range_m;
+            let until_m =
+                if farthest_m > 0.0 { max_m.min(farthest_m + TRACE_MARGIN_M) } else { max_m };
             let trace = point.trace(axis.direction_rad(0.0), until_m, STEP_US)?;
             let peaks = PeakLine::of_trace(simulator, point, axis, &trace)?;
             Ok::<_, TooCostly>((peaks, TraceLine::of(simulator, &trace, STEP_US)))
         };
-        let (peaks, trace) = sweep.look(ping, listen)?.transpose()?.unwrap_or_default();
+        let (peaks, trace) = sweep.observe(ping, compute)?.transpose()?.unwrap_or_default();
         let viewpoint = reading.beside.viewpoint;
         let line = reading.ping.sound_path().zip(viewpoint);
         let line = line.map(|(path, viewpoint)| path.polyline(viewpoint.ends()));

@@ -1,71 +1,72 @@
-//! The model for the playground: a scene, a sensor, some air and a pose go in as JSON, readings, paths and
-//! echo traces come out as JSON.
+//! WebAssembly bindings of the acoustic model for the playground.
 //!
-//! Built for `wasm32-unknown-unknown` it is a module that imports nothing: it can compute and
-//! nothing else. It exports three functions. [`request`] gives room for the text of a [`Request`],
-//! [`answer`] answers it and says how long the answer is, and [`answered`] says where the answer stands until the
-//! next one. In place of bindings made by a tool these are few enough to be written by hand, in
-//! `web/playground/engine.js`.
+//! Requests and responses are JSON: a scene, a sensor, air and a pose go in; readings, propagation
+//! paths and echo traces come out.
 //!
-//! A refusal is an answer, too: `{"refused": {"message": ..., "help": ...}}`.
+//! Built for `wasm32-unknown-unknown`, the module imports nothing, so it can only compute. It
+//! exports three functions, called by `web/playground/engine.js`: [`request_buffer`] reserves
+//! memory for the JSON of a [`Request`], [`handle_request`] processes it and returns the length of
+//! the response, and [`response`] returns the response's address, valid until the next request.
+//!
+//! Errors are responses too: `{"error": {"message": ..., "help": ...}}`.
 
-// Modules are `foo.rs` beside `foo/`.
+// Modules are `foo.rs` next to `foo/`.
 #![warn(clippy::mod_module_files)]
 
 mod beam;
-mod desk;
+mod dispatch;
+mod error;
 mod log;
-mod refusal;
+mod observation_cache;
 mod request;
 mod setup;
-mod standing;
 mod sweep;
 
 use std::cell::RefCell;
 
-pub use desk::Desk;
-pub use refusal::Refusal;
+pub use dispatch::Dispatcher;
+pub use error::RequestError;
 pub use request::Request;
 
-/// What the page and the model hand each other.
+/// State shared by the exported functions.
 #[derive(Default)]
-struct Counter {
-    desk: Desk,
+struct Module {
+    dispatcher: Dispatcher,
     request: Vec<u8>,
-    answer: String,
+    response: String,
 }
 
 thread_local! {
-    static COUNTER: RefCell<Counter> = RefCell::default();
+    static MODULE: RefCell<Module> = RefCell::default();
 }
 
-/// Makes room for a request of so many bytes, and says where.
-// SAFETY: the name is exported by nothing else in the module.
+/// Reserves a request buffer of the given size in bytes, and returns its address.
+// SAFETY: no other item of the module exports this name.
 #[allow(unsafe_code)]
 #[unsafe(no_mangle)]
-pub extern "C" fn request(bytes: usize) -> *mut u8 {
-    COUNTER.with_borrow_mut(|counter| {
-        counter.request.clear();
-        counter.request.resize(bytes, 0);
-        counter.request.as_mut_ptr()
+pub extern "C" fn request_buffer(bytes: usize) -> *mut u8 {
+    MODULE.with_borrow_mut(|module| {
+        module.request.clear();
+        module.request.resize(bytes, 0);
+        module.request.as_mut_ptr()
     })
 }
 
-/// Answers the request that was written there; the length of the answer, bytes.
-// SAFETY: as above.
+/// Processes the request in the buffer, and returns the length of the response in bytes.
+// SAFETY: no other item of the module exports this name.
 #[allow(unsafe_code)]
 #[unsafe(no_mangle)]
-pub extern "C" fn answer() -> usize {
-    COUNTER.with_borrow_mut(|Counter { desk, request, answer }| {
-        *answer = desk.answer(request);
-        answer.len()
+pub extern "C" fn handle_request() -> usize {
+    MODULE.with_borrow_mut(|Module { dispatcher, request, response }| {
+        *response = dispatcher.handle(request);
+        response.len()
     })
 }
 
-/// Where the last answer is: UTF-8, JSON.
-// SAFETY: as above.
+/// Address of the last response: JSON, UTF-8.
+// SAFETY: no other item of the module exports this name.
 #[allow(unsafe_code)]
 #[unsafe(no_mangle)]
-pub extern "C" fn answered() -> *const u8 {
-    COUNTER.with_borrow(|counter| counter.answer.as_ptr())
+pub extern "C" fn response() -> *const u8 {
+    MODULE.with_borrow(|module| module.response.as_ptr())
 }

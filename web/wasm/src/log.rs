@@ -1,4 +1,4 @@
-//! Logs and tables of readings, read for their scans.
+//! Scans of logs and of tables of readings.
 
 use std::io::{self, Cursor, Read};
 
@@ -13,31 +13,30 @@ use sonard_records::{
     AirRecord, FaultKind, ModelRecord, Provenance, Record, ScanPlan, ScanView, Session, decode_line,
 };
 
-use crate::Refusal;
+use crate::RequestError;
 
-/// A scan of a file, with what is to be known to show it as it was taken.
+/// Description of a scan in a file, with the settings it was recorded with.
 #[derive(Debug, Serialize)]
-pub(crate) struct Found<'a> {
+pub(crate) struct LoggedScan<'a> {
     time: Option<Timestamp>,
     pose: Option<Pose>,
     plan: Option<ScanPlan>,
     readings: usize,
     provenance: Option<Provenance>,
-    /// Its sensor's data.
     sensor: Option<&'a Sensor>,
     air: Option<AirRecord>,
-    /// Its model and settings.
+    /// Engine and options of the recorded predictions.
     model: Option<&'a ModelRecord>,
-    /// Text of its scene's file.
+    /// Text of the scene file.
     scene: Option<&'a str>,
 }
 
-impl<'a> Found<'a> {
-    pub(crate) fn of(view: &'a ScanView) -> Self {
+impl<'a> From<&'a ScanView> for LoggedScan<'a> {
+    fn from(view: &'a ScanView) -> Self {
         let start = view.start.as_ref();
         let session = view.session.as_deref();
         let air = session.map(|session| match start.and_then(|start| start.air) {
-            // What was known when the scan began.
+            // The scan's own measurement takes precedence over the session's.
             Some(air) => AirRecord {
                 temperature_c: air.temperature_c,
                 sound_speed_m_s: air.sound_speed_m_s,
@@ -59,26 +58,28 @@ impl<'a> Found<'a> {
     }
 }
 
-/// The scans of a file: JSON Lines of this program, or what `sonard import` reads without being told more.
-pub(crate) fn scans(text: &str, pose: Pose) -> Result<Vec<ScanView>, Refusal> {
+/// Reads the scans of a file: a log in JSON Lines, or a table that `sonard import` reads without
+/// options.
+pub(crate) fn scans(text: &str, pose: Pose) -> Result<Vec<ScanView>, RequestError> {
     let first = text.lines().find(|line| !line.trim().is_empty()).unwrap_or_default();
     let records = match decode_line(first.as_bytes()) {
-        Ok(_) => own(text)?,
+        Ok(_) => decode_log(text)?,
         Err(fault) if fault.kind == FaultKind::UnsupportedFormat => {
-            return Err(Refusal::new(&fault.to_string(), "drop a log of this version"));
+            return Err(RequestError::new(&fault.to_string(), "use a log of this version"));
         }
-        Err(_) => foreign(text, pose)?,
+        Err(_) => import_table(text, pose)?,
     };
     let scans: Vec<_> =
         ScanView::from_records(records).into_iter().filter(|scan| !scan.pings.is_empty()).collect();
     if scans.is_empty() {
-        return Err(Refusal::new("there is no reading in it", "drop a log or a table of readings"));
+        let help = "open a log or a table of readings";
+        return Err(RequestError::new("the file contains no readings", help));
     }
     Ok(scans)
 }
 
-/// A last line without an end is one that was being written.
-fn own(text: &str) -> Result<Vec<Record>, Refusal> {
+/// Decodes a log. An invalid last line without line end is incomplete and therefore skipped.
+fn decode_log(text: &str) -> Result<Vec<Record>, RequestError> {
     let lines = text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty());
     let mut records = Vec::new();
     for (number, line) in lines {
@@ -87,14 +88,14 @@ fn own(text: &str) -> Result<Vec<Record>, Refusal> {
             Err(_) if !text.ends_with('\n') && text.ends_with(line) => break,
             Err(error) => {
                 let message = format!("line {}: {error}", number + 1);
-                return Err(Refusal::new(&message, "`sonard log repair` keeps what is whole"));
+                return Err(RequestError::new(&message, "repair the log with `sonard log repair`"));
             }
         }
     }
     Ok(records)
 }
 
-fn foreign(text: &str, pose: Pose) -> Result<Vec<Record>, Refusal> {
+fn import_table(text: &str, pose: Pose) -> Result<Vec<Record>, RequestError> {
     let (sensor, air) = (Sensor::preset("senscomp-6500")?, Air::default());
     let taken = Taken {
         sha256: String::new(),

@@ -1,4 +1,4 @@
-//! What the page asks.
+//! Requests of the page.
 
 use serde::Deserialize;
 use sonard_model::{
@@ -8,67 +8,65 @@ use sonard_model::{
     plan::ScanPlan,
 };
 
-/// A question of the page.
+/// Request of the page, tagged by `type`.
 #[derive(Debug, Deserialize)]
-#[serde(tag = "ask", rename_all = "snake_case", deny_unknown_fields)]
+#[serde(tag = "type", rename_all = "snake_case", deny_unknown_fields)]
 pub enum Request {
-    /// Which scenes and sensors come along.
-    Shipped,
-    /// Takes settings; tells the floor plan.
-    Set {
-        /// All of them.
+    /// Lists the built-in scenes and sensor presets.
+    ListPresets,
+    /// Sets scene, sensor, air and options; returns the floor plan.
+    Configure {
+        /// Settings, all of which are replaced.
         settings: Box<Settings>,
     },
-    /// Begins a sweep of an engine in place of its last one; tells how it starts.
-    Stand {
-        /// Whose.
+    /// Starts a sweep, replacing the engine's running one; returns its session and start records.
+    StartSweep {
+        /// Engine that computes the sweep.
         engine: EngineKind,
-        /// Where the ranger stands.
+        /// Pose of the robot.
         pose: Pose,
-        /// What it measures.
+        /// Azimuths of a simulated sweep.
         plan: ScanPlan,
-        /// The scan of the log whose readings stand beside the model's, by its number.
+        /// Number of the logged scan whose readings are compared with predictions, if any.
         #[serde(default)]
         measured: Option<usize>,
     },
-    /// The next readings of an engine's sweep.
-    More {
-        /// Whose.
+    /// Returns the next readings of an engine's sweep.
+    NextReadings {
+        /// Engine of the sweep.
         engine: EngineKind,
-        /// At most so many.
+        /// Maximum number of readings.
         count: usize,
     },
-    /// One beam of an engine's sweep: its echo trace, and the paths of all it hears.
+    /// Returns echo trace and arrivals of one beam of an engine's sweep.
     Beam {
-        /// Whose.
+        /// Engine of the sweep.
         engine: EngineKind,
-        /// Its number.
+        /// Index of the beam.
         index: u32,
     },
-    /// Reads a log, or a table of readings; tells its scans.
-    Log {
-        /// All of the file.
+    /// Loads a log or a table of readings; returns its scans.
+    LoadLog {
+        /// Content of the file.
         text: String,
-        /// Where a table's readings were taken, if it does not say so itself.
+        /// Pose of readings in a table without poses.
         pose: Pose,
     },
 }
 
-/// What readings depend on besides the pose.
+/// Settings of the model apart from the pose.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Settings {
     /// Text of a scene file.
     pub(crate) scene: String,
-    /// The sensor.
     pub(crate) sensor: SensorChoice,
-    /// The air.
     pub(crate) air: AirChoice,
-    /// Of each engine what it knows of them; `engine` means nothing here.
+    /// Options of all engines, each of which uses those it supports; `engine` is ignored.
     pub(crate) options: OptionKeys,
 }
 
-/// A sensor by name, or its data.
+/// Sensor by preset name or by its parameters.
 #[derive(Debug, Deserialize)]
 #[serde(untagged)]
 pub(crate) enum SensorChoice {
@@ -76,19 +74,19 @@ pub(crate) enum SensorChoice {
     Data(Box<Sensor>),
 }
 
-/// The state of the air.
+/// State of the air.
 #[derive(Debug, Clone, Copy, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct AirChoice {
     pub(crate) temperature_c: f64,
     pub(crate) humidity_percent: f64,
-    #[serde(default = "usual_pressure_kpa")]
+    #[serde(default = "standard_pressure_kpa")]
     pub(crate) pressure_kpa: f64,
-    /// Given by hand instead of computed.
+    /// Explicit speed of sound, which replaces the computed one.
     #[serde(default)]
     pub(crate) sound_speed_m_s: Option<f64>,
 }
 
-const fn usual_pressure_kpa() -> f64 {
+const fn standard_pressure_kpa() -> f64 {
     101.325
 }

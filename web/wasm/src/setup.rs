@@ -1,4 +1,4 @@
-//! Settings in force: the scene, and a simulator for each engine that was asked for.
+//! Configured settings with one simulator per engine, created on first use.
 
 use std::{
     collections::{BTreeMap, btree_map::Entry},
@@ -13,24 +13,25 @@ use sonard_model::{
 };
 
 use crate::{
-    Refusal,
+    RequestError,
     request::{AirChoice, SensorChoice, Settings},
 };
 
-/// Settings, and what was made of them so far.
+/// Configured settings and the simulators created from them.
 pub(crate) struct Setup {
     pub(crate) scene: Arc<Scene>,
     sensor: Sensor,
     air: Air,
     options: OptionKeys,
-    /// By the engine's name. Kept while only the scene changes: receiver and beam pattern take longer to make
-    /// than a room's plan.
+    /// Simulators by engine name. They are kept while only the scene changes, because creating
+    /// receiver and beam pattern takes longer than preparing a scene.
     simulators: BTreeMap<&'static str, Arc<Simulator>>,
 }
 
 impl Setup {
-    /// Of settings; what an earlier setup made of the same sensor, air and options is taken over.
-    pub(crate) fn new(settings: &Settings, before: Option<Self>) -> Result<Self, Refusal> {
+    /// Creates a setup, reusing the simulators of the previous one if sensor, air and options are
+    /// unchanged.
+    pub(crate) fn new(settings: &Settings, previous: Option<Self>) -> Result<Self, RequestError> {
         let scene = Arc::new(Scene::from_json(&settings.scene)?);
         let sensor = match &settings.sensor {
             SensorChoice::Preset(name) => Sensor::preset(name)?,
@@ -40,36 +41,39 @@ impl Setup {
         let air = air(&settings.air)?;
         let options = settings.options;
         let mut setup = Self { scene, sensor, air, options, simulators: BTreeMap::new() };
-        if let Some(before) = before
-            && (&before.sensor, before.air, before.options)
+        if let Some(previous) = previous
+            && (&previous.sensor, previous.air, previous.options)
                 == (&setup.sensor, setup.air, setup.options)
         {
-            for (name, simulator) in before.simulators {
+            for (name, simulator) in previous.simulators {
                 let simulator = simulator.in_scene(Arc::clone(&setup.scene))?;
                 setup.simulators.insert(name, Arc::new(simulator));
             }
         }
-        // What is wrong with sensor and options is found now, not with the first sweep.
+        // Invalid sensors and options are reported now, not with the first sweep.
         setup.simulator(EngineKind::Paths)?;
         Ok(setup)
     }
 
-    /// The simulator of an engine in the scene without the robot that carries the ranger.
-    pub(crate) fn simulator(&mut self, engine: EngineKind) -> Result<Arc<Simulator>, Refusal> {
+    /// Simulator of an engine in the scene without the body of the robot.
+    pub(crate) fn simulator(&mut self, engine: EngineKind) -> Result<Arc<Simulator>, RequestError> {
         match self.simulators.entry(engine.name()) {
-            Entry::Occupied(made) => Ok(Arc::clone(made.get())),
-            Entry::Vacant(place) => {
+            Entry::Occupied(entry) => Ok(Arc::clone(entry.get())),
+            Entry::Vacant(entry) => {
                 let options = OptionKeys { engine, ..self.options }.options_of_engine();
                 let scene = Arc::clone(&self.scene);
-                let made = Simulator::new(scene, self.sensor.clone(), self.air, options)?;
-                Ok(Arc::clone(place.insert(Arc::new(made))))
+                let simulator = Simulator::new(scene, self.sensor.clone(), self.air, options)?;
+                Ok(Arc::clone(entry.insert(Arc::new(simulator))))
             }
         }
     }
 }
 
-/// A simulator with the scene's robot at a pose, if the scene has one.
-pub(crate) fn around(simulator: &Arc<Simulator>, robot: &Pose) -> Result<Arc<Simulator>, Refusal> {
+/// Adds the body of the scene's robot at a pose, if the scene has one.
+pub(crate) fn with_robot(
+    simulator: &Arc<Simulator>,
+    robot: &Pose,
+) -> Result<Arc<Simulator>, RequestError> {
     if simulator.scene().robot.is_none() {
         return Ok(Arc::clone(simulator));
     }
@@ -77,11 +81,10 @@ pub(crate) fn around(simulator: &Arc<Simulator>, robot: &Pose) -> Result<Arc<Sim
     Ok(Arc::new(simulator.in_scene(Arc::new(scene))?))
 }
 
-/// The air that was chosen.
-pub(crate) fn air(choice: &AirChoice) -> Result<Air, Refusal> {
+fn air(choice: &AirChoice) -> Result<Air, RequestError> {
     let air = Air::new(choice.temperature_c, choice.humidity_percent, choice.pressure_kpa)?;
     Ok(match choice.sound_speed_m_s {
         None => air,
-        Some(given) => air.with_sound_speed(given)?,
+        Some(speed) => air.with_sound_speed(speed)?,
     })
 }

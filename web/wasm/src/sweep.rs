@@ -1,4 +1,4 @@
-//! A sweep, told piece by piece.
+//! Sweeps, computed in parts.
 
 use std::sync::Arc;
 
@@ -12,28 +12,29 @@ use sonard_model::{
 use sonard_records::{Ping, PingStatus, ScanStart, ScanView, Session, SimRecord};
 use uuid::Uuid;
 
-use crate::{Refusal, setup::around, standing::Standing};
+use crate::{RequestError, observation_cache::ObservationCache, setup::with_robot};
 
-/// Readings of an engine at a pose.
+/// Sweep of an engine at a pose.
 pub(crate) struct Sweep {
     simulator: Arc<Simulator>,
-    /// Session, start, and the firings: of a log as they were measured, else as they are planned.
+    /// Session and start records, and the pings: measured ones of a log, or planned ones without
+    /// readings.
     pub(crate) view: ScanView,
     is_measured: bool,
     next: usize,
-    standing: Option<Standing>,
+    cache: Option<ObservationCache>,
 }
 
 impl Sweep {
-    /// What the model alone reads.
-    pub(crate) fn modelled(
+    /// Starts a simulated sweep.
+    pub(crate) fn simulated(
         simulator: Arc<Simulator>,
         pose: Pose,
         plan: ScanPlan,
-    ) -> Result<Self, Refusal> {
+    ) -> Result<Self, RequestError> {
         plan.check()?;
         let (scan, time) = (Uuid::nil(), Timestamp::UNIX_EPOCH);
-        let firing = |index| {
+        let planned = |index| {
             let azimuth_deg = plan.azimuth_deg(index / plan.pings_per_stop.max(1));
             Ping::new(scan, index, azimuth_deg, PingStatus::NoEcho)
         };
@@ -41,14 +42,14 @@ impl Sweep {
             scan,
             session: Some(Arc::new(session(&simulator))),
             start: Some(ScanStart::new(scan, time, pose, plan)),
-            pings: (0..plan.beams()).map(firing).collect(),
+            pings: (0..plan.beams()).map(planned).collect(),
             events: Vec::new(),
             end: None,
         };
-        Ok(Self { simulator, view, is_measured: false, next: 0, standing: None })
+        Ok(Self { simulator, view, is_measured: false, next: 0, cache: None })
     }
 
-    /// What was measured, beside what the model reads if the ranger stood at a pose.
+    /// Starts a sweep that compares the readings of a logged scan with predictions at a pose.
     pub(crate) fn measured(simulator: Arc<Simulator>, pose: Pose, log: &ScanView) -> Self {
         let mut view = ScanView { events: Vec::new(), ..log.clone() };
         if let Some(start) = &mut view.start {
@@ -57,80 +58,80 @@ impl Sweep {
         let array = log.session.as_ref().and_then(|session| session.array.clone());
         let session = Session { array, ..session(&simulator) };
         view.session = Some(Arc::new(session));
-        Self { simulator, view, is_measured: true, next: 0, standing: None }
+        Self { simulator, view, is_measured: true, next: 0, cache: None }
     }
 
-    /// The next readings, at most so many.
-    pub(crate) fn more(&mut self, count: usize) -> Result<Vec<JudgedPing>, Refusal> {
-        let last = self.view.pings.len().min(self.next + count);
-        let readings = (self.next..last).map(|place| self.reading(place)).collect();
-        self.next = last;
+    /// Computes the next readings, at most `count`.
+    pub(crate) fn next_readings(&mut self, count: usize) -> Result<Vec<JudgedPing>, RequestError> {
+        let end = self.view.pings.len().min(self.next + count);
+        let readings = (self.next..end).map(|position| self.reading(position)).collect();
+        self.next = end;
         readings
     }
 
-    /// How many are to come.
-    pub(crate) fn left(&self) -> usize {
+    /// Number of readings not yet computed.
+    pub(crate) fn remaining(&self) -> usize {
         self.view.pings.len() - self.next
     }
 
-    /// One reading without its path, which [`beam`](crate::beam) tells.
-    fn reading(&mut self, place: usize) -> Result<JudgedPing, Refusal> {
-        let mut judged = self.judged(place)?;
-        judged.ping.path = None;
-        if let Some(sim) = &mut judged.ping.sim {
+    /// Annotated reading without its path, which is part of [`Beam`](crate::beam::Beam).
+    fn reading(&mut self, position: usize) -> Result<JudgedPing, RequestError> {
+        let mut reading = self.annotated(position)?;
+        reading.ping.path = None;
+        if let Some(sim) = &mut reading.ping.sim {
             sim.path = None;
         }
-        Ok(judged)
+        Ok(reading)
     }
 
-    /// One reading with what explains it. What the model alone reads is explained by the model.
-    pub(crate) fn judged(&mut self, place: usize) -> Result<JudgedPing, Refusal> {
-        let firing = self.view.pings[place].clone();
-        let (scan, index, azimuth_deg) = (firing.scan, firing.index, firing.azimuth_deg);
+    /// Reading with prediction and verdict. A simulated reading is classified by its own path.
+    pub(crate) fn annotated(&mut self, position: usize) -> Result<JudgedPing, RequestError> {
+        let ping = self.view.pings[position].clone();
+        let (scan, index, azimuth_deg) = (ping.scan, ping.index, ping.azimuth_deg);
         let predict = |simulator: &Simulator, point: &ObservationPoint<'_>, axis: &Pose| {
             let prediction = point.ping(axis.direction_rad(0.0))?;
-            let alone = Ping::simulated(simulator, scan, index, azimuth_deg, &prediction);
-            Ok::<_, TooCostly>((SimRecord::of(simulator, &prediction), alone))
+            let simulated = Ping::simulated(simulator, scan, index, azimuth_deg, &prediction);
+            Ok::<_, TooCostly>((SimRecord::of(simulator, &prediction), simulated))
         };
-        let Some((sim, alone)) = self.look(&firing, predict)?.transpose()? else {
-            return Ok(JudgedPing::of(firing, &self.view));
+        let Some((sim, simulated)) = self.observe(&ping, predict)?.transpose()? else {
+            return Ok(JudgedPing::of(ping, &self.view));
         };
         if self.is_measured {
-            let residual_m = firing.range_m.zip(sim.range_m).map(|(range, sim)| range - sim);
-            return Ok(JudgedPing::of(Ping { sim: Some(sim), residual_m, ..firing }, &self.view));
+            let residual_m = ping.range_m.zip(sim.range_m).map(|(range, sim)| range - sim);
+            return Ok(JudgedPing::of(Ping { sim: Some(sim), residual_m, ..ping }, &self.view));
         }
-        let verdict = Word::of(&Ping { sim: Some(sim), ..alone.clone() });
-        let mut judged = JudgedPing::of(alone, &self.view);
-        judged.beside.verdict = verdict;
-        Ok(judged)
+        let verdict = Word::of(&Ping { sim: Some(sim), ..simulated.clone() });
+        let mut reading = JudgedPing::of(simulated, &self.view);
+        reading.beside.verdict = verdict;
+        Ok(reading)
     }
 
-    /// Where a beam stands in the sweep.
-    pub(crate) fn place_of(&self, index: u32) -> Result<usize, Refusal> {
-        let place = self.view.pings.iter().position(|ping| ping.index == index);
-        place.ok_or_else(|| Refusal::new(&format!("the sweep has no beam {index}"), ""))
+    /// Position of a beam in the sweep.
+    pub(crate) fn position_of(&self, index: u32) -> Result<usize, RequestError> {
+        let position = self.view.pings.iter().position(|ping| ping.index == index);
+        position.ok_or_else(|| RequestError::new(&format!("the sweep has no beam {index}"), ""))
     }
 
-    /// Looks from where a firing was taken along its axis; `None` if its log does not say where.
-    pub(crate) fn look<T>(
+    /// Calls a function with the observation point and axis of a ping; returns `None` if the log
+    /// has no pose for it.
+    pub(crate) fn observe<T>(
         &mut self,
-        firing: &Ping,
-        see: impl FnOnce(&Simulator, &ObservationPoint<'_>, &Pose) -> T,
-    ) -> Result<Option<T>, Refusal> {
-        let Some(robot) = firing.pose.or_else(|| self.view.pose()) else { return Ok(None) };
-        let Some(axis) = firing.axis(self.view.session.as_deref(), &robot) else { return Ok(None) };
-        let there = self.standing.take().filter(|standing| standing.is_at(&robot, &axis));
-        let standing = match there {
-            Some(standing) => standing,
-            None => Standing::new(around(&self.simulator, &robot)?, robot, axis),
+        ping: &Ping,
+        compute: impl FnOnce(&Simulator, &ObservationPoint<'_>, &Pose) -> T,
+    ) -> Result<Option<T>, RequestError> {
+        let Some(robot) = ping.pose.or_else(|| self.view.pose()) else { return Ok(None) };
+        let Some(axis) = ping.axis(self.view.session.as_deref(), &robot) else { return Ok(None) };
+        let cache = match self.cache.take().filter(|cache| cache.is_at(&robot, &axis)) {
+            Some(cache) => cache,
+            None => ObservationCache::new(with_robot(&self.simulator, &robot)?, robot, axis),
         };
-        let seen = standing.look(|simulator, point| see(simulator, point, &axis));
-        self.standing = Some(standing);
-        Ok(Some(seen))
+        let result = cache.with(|simulator, point| compute(simulator, point, &axis));
+        self.cache = Some(cache);
+        Ok(Some(result))
     }
 }
 
-/// A session of the simulator, without the text of its scene, which the page has.
+/// Session of a simulator, without the scene's text, which the page has.
 fn session(simulator: &Simulator) -> Session {
     Session { scene_text: None, ..Session::simulated(simulator, Timestamp::UNIX_EPOCH) }
 }

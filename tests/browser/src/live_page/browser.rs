@@ -1,4 +1,4 @@
-//! A real browser, Chromium without a window, driven through its WebDriver.
+//! Headless Chromium, driven through WebDriver.
 
 use std::{
     fs,
@@ -17,10 +17,10 @@ use hyper_util::client::legacy::connect::HttpConnector;
 use serde_json::{Value, json};
 use tokio::runtime::Runtime;
 
-/// One browser at a time: they want a processor each.
-static TURN: Mutex<()> = Mutex::new(());
+/// Allows one browser at a time, because each needs a processor.
+static EXCLUSIVE: Mutex<()> = Mutex::new(());
 
-/// A window to look through.
+/// Size and colour scheme of a window.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Screen {
     pub(crate) name: &'static str,
@@ -36,13 +36,13 @@ pub(crate) const PHONE: Screen =
     Screen { name: "phone", size: (390, 844), phone: true, dark: false };
 pub(crate) const PHONE_DARK: Screen = Screen { name: "phone-dark", dark: true, ..PHONE };
 
-/// A page in a browser.
+/// Browser with one page.
 pub(crate) struct Browser {
     runtime: Runtime,
     client: Option<Client>,
     driver: Child,
     base: String,
-    _turn: MutexGuard<'static, ()>,
+    _exclusive: MutexGuard<'static, ()>,
 }
 
 impl Browser {
@@ -51,24 +51,25 @@ impl Browser {
         Self::open_at(&format!("http://{address}/"), screen)
     }
 
-    /// Opens a page by its address, of a file for instance.
+    /// Opens a page by its URL, which may be a file's.
     pub(crate) fn open_at(address: &str, screen: Screen) -> Self {
-        let turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
+        let exclusive = EXCLUSIVE.lock().unwrap_or_else(PoisonError::into_inner);
         let (driver, port) = start_driver();
         let runtime = Runtime::new().expect("threads");
         let mut builder = ClientBuilder::new(HttpConnector::new());
         builder.capabilities(capabilities().as_object().expect("an object").clone());
         let driver_address = format!("http://127.0.0.1:{port}");
         let connecting = builder.connect(&driver_address);
-        let client = runtime.block_on(connecting).expect("Chromium starts; is `chromium` there?");
+        let client =
+            runtime.block_on(connecting).expect("Chromium starts; is `chromium` installed?");
         let base = address.to_owned();
-        let browser = Self { runtime, client: Some(client), driver, base, _turn: turn };
+        let browser = Self { runtime, client: Some(client), driver, base, _exclusive: exclusive };
         browser.look_through(screen);
         browser.go();
         browser
     }
 
-    /// Loads the page, again if it is there.
+    /// Loads or reloads the page.
     pub(crate) fn go(&self) {
         self.wait_for(self.client().goto(&self.base));
     }
@@ -88,19 +89,19 @@ impl Browser {
         );
     }
 
-    /// The value of an expression on the page.
+    /// Value of an expression on the page.
     pub(crate) fn eval(&self, expression: &str) -> Value {
         self.wait_for(self.client().execute(&format!("return {expression}"), Vec::new()))
     }
 
-    /// Waits until what was changed before is drawn: texts and canvases follow with the next frame.
+    /// Waits until earlier changes are drawn; texts and canvases are updated in the next frame.
     pub(crate) fn until_drawn(&self) {
         self.eval(
             "new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))",
         );
     }
 
-    /// The text of the first element of a selector, as it is drawn.
+    /// Text of the first element that matches a selector, after the next frame.
     pub(crate) fn text(&self, selector: &str) -> String {
         self.until_drawn();
         let text = self.eval(&format!("document.querySelector('{selector}').textContent"));
@@ -124,7 +125,7 @@ impl Browser {
         self.wait_for(self.find(selector).click());
     }
 
-    /// Clicks at a share of an element's width and height.
+    /// Clicks at a fraction of an element's width and height.
     pub(crate) fn click_at(&self, selector: &str, across: f64, down: f64) {
         let script = format!(
             "(() => {{ const e = document.querySelector('{selector}'); \
@@ -139,18 +140,18 @@ impl Browser {
         }
     }
 
-    /// Types into an element, as a person would: it gets the focus first.
+    /// Focuses an element and types into it.
     pub(crate) fn type_into(&self, selector: &str, keys: &str) {
         self.wait_for(self.find(selector).send_keys(keys));
     }
 
-    /// Presses a key, wherever the focus is.
+    /// Presses a key in the focused element.
     pub(crate) fn press(&self, key: char) {
         let focused = self.wait_for(self.client().active_element());
         self.wait_for(focused.send_keys(&key.to_string()));
     }
 
-    /// A command of the DevTools protocol.
+    /// Executes a command of the DevTools protocol.
     pub(crate) fn devtools(&self, method: &'static str, params: &Value) -> Value {
         let command = DriverCommand {
             path: "goog/cdp/execute",
@@ -159,7 +160,7 @@ impl Browser {
         self.wait_for(self.client().issue_cmd(command))
     }
 
-    /// What is to be seen, as `target/page/NAME.png`.
+    /// Saves a screenshot as `target/page/NAME.png`.
     pub(crate) fn picture(&self, name: &str) -> PathBuf {
         let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).with_file_name("page");
         fs::create_dir_all(&folder).expect("the target folder");
@@ -169,13 +170,13 @@ impl Browser {
         file
     }
 
-    /// An element as it is to be seen, PNG.
+    /// Screenshot of an element, PNG.
     pub(crate) fn picture_of(&self, selector: &str) -> Vec<u8> {
         self.wait_for(self.find(selector).screenshot())
     }
 
-    /// Everything that the console shows as a warning or an error since the last look.
-    pub(crate) fn complaints(&self) -> Vec<String> {
+    /// Warnings and errors on the console since the last call.
+    pub(crate) fn warnings(&self) -> Vec<String> {
         let entries = self.log("browser");
         let serious = entries
             .iter()
@@ -183,23 +184,23 @@ impl Browser {
         serious.map(|entry| entry["message"].as_str().unwrap_or_default().to_owned()).collect()
     }
 
-    /// Addresses asked for since the last look that are not the daemon's.
-    pub(crate) fn strangers(&self) -> Vec<String> {
-        let mut asked = 0;
-        let mut strangers = Vec::new();
+    /// Addresses requested since the last call that are not below the page's base address.
+    pub(crate) fn foreign_requests(&self) -> Vec<String> {
+        let mut requests = 0;
+        let mut foreign = Vec::new();
         for entry in self.log("performance") {
             let text = entry["message"].as_str().unwrap_or_default();
             let message: Value = serde_json::from_str(text).expect("JSON");
             let url = &message["message"]["params"]["request"]["url"];
             if let Some(url) = url.as_str() {
-                asked += 1;
+                requests += 1;
                 if !url.starts_with(&self.base) {
-                    strangers.push(url.to_owned());
+                    foreign.push(url.to_owned());
                 }
             }
         }
-        assert!(asked > 0, "the log shows no request at all");
-        strangers
+        assert!(requests > 0, "the log contains no requests");
+        foreign
     }
 
     fn log(&self, kind: &'static str) -> Vec<Value> {
@@ -231,7 +232,7 @@ impl Drop for Browser {
     }
 }
 
-/// A command of ChromeDriver's that WebDriver does not have.
+/// ChromeDriver command that is not part of WebDriver.
 #[derive(Debug)]
 struct DriverCommand {
     path: &'static str,
@@ -252,7 +253,7 @@ impl WebDriverCompatibleCommand for DriverCommand {
     }
 }
 
-/// Starts ChromeDriver on a port of its choice.
+/// Starts ChromeDriver on a free port.
 fn start_driver() -> (Child, u16) {
     let mut driver = Command::new("chromedriver")
         .arg("--port=0")
@@ -260,15 +261,15 @@ fn start_driver() -> (Child, u16) {
         .stderr(Stdio::null())
         .spawn()
         .expect(
-            "the page is tested in Chromium: apt-get install chromium chromium-driver, or leave it \
-             out with `PAGE=0 ./test.sh` or `cargo test -- --skip live_page::`",
+            "the page is tested in Chromium: apt-get install chromium chromium-driver, or skip it \
+             with `PAGE=0 ./test.sh` or `cargo test -- --skip live_page::`",
         );
     let lines = BufReader::new(driver.stdout.take().expect("piped")).lines();
-    let told = lines.map_while(Result::ok).find_map(|line| {
+    let port = lines.map_while(Result::ok).find_map(|line| {
         let (_, port) = line.split_once("successfully on port ")?;
         port.trim_end_matches('.').parse().ok()
     });
-    (driver, told.expect("it says on which port it listens"))
+    (driver, port.expect("ChromeDriver prints its port"))
 }
 
 fn capabilities() -> Value {
@@ -279,7 +280,7 @@ fn capabilities() -> Value {
         "--force-color-profile=srgb",
         "--hide-scrollbars",
     ];
-    // Chromium's sandbox refuses to run as root, as which containers and CI run.
+    // Chromium's sandbox does not run as root, which containers and CI use.
     if rustix::process::geteuid().is_root() {
         arguments.push("--no-sandbox");
     }

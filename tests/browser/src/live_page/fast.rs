@@ -1,4 +1,4 @@
-//! Large scans and many scans, and figures of drawing time, memory and CPU time (`figures_`).
+//! Performance with large scans and many scans; measurements of drawing time, memory and CPU time.
 
 use serde_json::{Value, json};
 
@@ -9,10 +9,10 @@ use super::{
 };
 use sonard_test_support::daemon::write_scans;
 
-/// Redraws that are timed.
+/// Number of timed redraws.
 const TIMES: usize = 200;
 
-/// Milliseconds from a gesture to the frame that shows it, sorted.
+/// Times from a gesture to its frame, milliseconds, sorted.
 fn gestures(browser: &Browser, count: usize) -> Vec<f64> {
     let script = format!(
         "import('/page/main.js').then(async ({{plan}}) => {{ \
@@ -30,7 +30,7 @@ fn gestures(browser: &Browser, count: usize) -> Vec<f64> {
     times
 }
 
-/// Milliseconds that drawing everything takes by itself, sorted.
+/// Times of full redraws, milliseconds, sorted.
 fn redraws(browser: &Browser, count: usize) -> Vec<f64> {
     let times = browser.eval(&format!(
         "import('/page/main.js').then(({{plan}}) => Array.from({{length: {count}}}, () => {{ \
@@ -47,13 +47,13 @@ fn p95(sorted: &[f64]) -> f64 {
 }
 
 #[test]
-#[ignore = "prints figures"]
-fn figures_of_drawing_and_memory() {
+#[ignore = "prints measurements"]
+fn measure_drawing_and_memory() {
     let folder = tempfile::tempdir().expect("a folder");
     write_scans(&folder.path().join("log"), 1, 400);
     let (_daemon, address) = daemon(folder.path(), "127.0.0.1:0", &[]);
     let browser = Browser::open(&address, DESK);
-    browser.until("document.getElementById('which').textContent.includes('400 of 400')");
+    browser.until("document.getElementById('scan-label').textContent.includes('400 of 400')");
     let (drawing, frames) = (redraws(&browser, TIMES), gestures(&browser, TIMES));
     println!(
         "400 beams: drawn in {:.1} ms (95th percentile; median {:.1} ms), from a gesture to its frame {:.1} ms",
@@ -61,7 +61,7 @@ fn figures_of_drawing_and_memory() {
         drawing[TIMES / 2],
         p95(&frames)
     );
-    // The time line's row of all beams is open: it keeps most.
+    // The section of scans over time stores the most data.
     browser.eval("document.getElementById('over-time').open = true");
     sweep(&browser, 220);
     let before = heap(&browser);
@@ -71,10 +71,10 @@ fn figures_of_drawing_and_memory() {
     assert_clean(&browser);
 }
 
-/// Lets the page take in sweeps, as its stream brings them.
+/// Feeds scans to the page as records of its stream.
 fn sweep(browser: &Browser, count: usize) {
     browser.eval(&format!(
-        "import('/page/main.js').then(async ({{plan, take}}) => {{ \
+        "import('/page/main.js').then(async ({{plan, handleRecord: take}}) => {{ \
            const {{start, beams}} = plan.scan; const pings = [...beams.values()]; \
            for (let i = 0; i < {count}; i++) {{ \
              const scan = crypto.randomUUID(); const time = new Date().toISOString(); \
@@ -92,12 +92,12 @@ fn heap(browser: &Browser) -> f64 {
 }
 
 #[test]
-fn the_page_stays_usable_with_65535_beams_and_with_10000_scans() {
+fn large_scans_and_many_scans() {
     let folder = tempfile::tempdir().expect("a folder");
     write_scans(&folder.path().join("log"), 1, 65_535);
     let (many, address) = daemon(folder.path(), "127.0.0.1:0", &[]);
     let browser = Browser::open(&address, DESK);
-    browser.until("document.getElementById('which').textContent.includes('65535 of 65535')");
+    browser.until("document.getElementById('scan-label').textContent.includes('65535 of 65535')");
     let (drawing, frames) = (redraws(&browser, 10), gestures(&browser, 50));
     println!(
         "65,535 beams: drawn in {:.0} ms, from a gesture to its frame {:.1} ms (95th percentile)",
@@ -105,7 +105,7 @@ fn the_page_stays_usable_with_65535_beams_and_with_10000_scans() {
         p95(&frames)
     );
     browser.click_at("#over", 0.5, 0.3);
-    assert!(browser.text("#beam-now").starts_with("beam "), "{}", browser.text("#beam-now"));
+    assert!(browser.text("#beam-label").starts_with("beam "), "{}", browser.text("#beam-label"));
     drop((browser, many));
     let folder = tempfile::tempdir().expect("a folder");
     write_scans(&folder.path().join("log"), 10_000, 4);
@@ -119,66 +119,66 @@ fn the_page_stays_usable_with_65535_beams_and_with_10000_scans() {
            while (line.max === before) await new Promise((done) => setTimeout(done, 5)); } \
          return performance.now() - began; })()",
     );
-    println!("10,000 scans: all of the time line in {took_ms} ms");
+    println!("10,000 scans: whole time line in {took_ms} ms");
     assert_eq!(browser.eval("document.getElementById('scrub').max"), "9999");
     assert_clean(&browser);
 }
 
-/// Seconds for which the page's work is added up.
-const WATCHED_S: f64 = 5.0;
+/// Duration of a CPU time measurement.
+const MEASURED_S: f64 = 5.0;
 
 #[test]
-#[ignore = "prints figures"]
-fn figures_of_cpu() {
+#[ignore = "prints measurements"]
+fn measure_cpu_time() {
     let folder = tempfile::tempdir().expect("a folder");
     write_scans(&folder.path().join("log"), 1, 400);
     let (_daemon, address) = daemon(folder.path(), "127.0.0.1:0", &[]);
     let browser = Browser::open(&address, DESK);
-    browser.until("document.getElementById('which').textContent.includes('400 of 400')");
+    browser.until("document.getElementById('scan-label').textContent.includes('400 of 400')");
     browser.devtools("Performance.enable", &json!({}));
     let idle = share_of_a_core(&browser, "setTimeout(done, wait_ms)");
-    // As many as an ordinary ranger brings, and as many as a fast one to a metre.
-    let [usual, fast] = [25, 200].map(|rate| {
+    // Rates of a typical ranger, and of a fast one limited to a metre.
+    let [typical, fast] = [25, 200].map(|rate| {
         let feed = format!(
-            "import('/page/main.js').then(({{plan, take}}) => {{ \
+            "import('/page/main.js').then(({{plan, handleRecord: take}}) => {{ \
                const {{start, beams}} = plan.scan; const pings = [...beams.values()]; \
-               const scan = crypto.randomUUID(); let told = 0; const began = performance.now(); \
+               const scan = crypto.randomUUID(); let sent = 0; const began = performance.now(); \
                take({{...start, type: 'scan_start', scan, time: new Date().toISOString()}}); \
-               const tell = () => {{ \
+               const send = () => {{ \
                  const passed_ms = performance.now() - began; \
-                 while (told < {rate} * passed_ms / 1000) \
-                   take({{...pings[told++ % pings.length], type: 'ping', scan}}); \
-                 if (passed_ms < wait_ms) setTimeout(tell, 5); else done(told); }}; \
-               tell(); }})"
+                 while (sent < {rate} * passed_ms / 1000) \
+                   take({{...pings[sent++ % pings.length], type: 'ping', scan}}); \
+                 if (passed_ms < wait_ms) setTimeout(send, 5); else done(sent); }}; \
+               send(); }})"
         );
         share_of_a_core(&browser, &feed)
     });
     println!(
-        "the page takes {:.1} % of a core at rest, {:.0} % at 25 readings a second, {:.0} % at 200",
+        "CPU time of the page: {:.1} % of a core idle, {:.0} % at 25 readings/s, {:.0} % at 200",
         100.0 * idle,
-        100.0 * usual,
+        100.0 * typical,
         100.0 * fast
     );
     assert_clean(&browser);
 }
 
-/// The page's work while a script runs that ends `wait_ms` later by `done`: tasks of its main thread over the time that
-/// passed.
+/// Share of time that the main thread is busy while a script runs, which calls `done` after
+/// `wait_ms`.
 fn share_of_a_core(browser: &Browser, script: &str) -> f64 {
     let before = metrics(browser);
-    let wait_ms = 1e3 * WATCHED_S;
+    let wait_ms = 1e3 * MEASURED_S;
     browser.eval(&format!("new Promise((done) => {{ const wait_ms = {wait_ms}; {script}; }})"));
     let after = metrics(browser);
     (after[0] - before[0]) / (after[1] - before[1])
 }
 
-/// Seconds of work, and of the clock.
+/// Busy time and clock, seconds.
 fn metrics(browser: &Browser) -> [f64; 2] {
-    let told = browser.devtools("Performance.getMetrics", &json!({}));
-    let of = |name: &str| {
-        let metrics = told["metrics"].as_array().expect("metrics");
+    let reply = browser.devtools("Performance.getMetrics", &json!({}));
+    let value_of = |name: &str| {
+        let metrics = reply["metrics"].as_array().expect("metrics");
         let found = metrics.iter().find(|metric| metric["name"] == name);
         found.and_then(|metric| metric["value"].as_f64()).expect("a number")
     };
-    ["TaskDuration", "Timestamp"].map(of)
+    ["TaskDuration", "Timestamp"].map(value_of)
 }

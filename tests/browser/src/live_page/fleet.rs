@@ -1,4 +1,4 @@
-//! The page of all robots in a real browser.
+//! Tests of the fleet page.
 
 use super::{
     accessible::axe,
@@ -8,7 +8,7 @@ use super::{
 use sonard_test_support::{fleet::Fleet, wait_until};
 
 #[test]
-fn each_robot_has_its_card_and_a_change_is_seen_on_the_page() {
+fn cards_show_state_changes() {
     let folder = tempfile::tempdir().expect("a folder");
     let mut fleet = Fleet::start(folder.path());
     let address = fleet.asking.address();
@@ -16,9 +16,10 @@ fn each_robot_has_its_card_and_a_change_is_seen_on_the_page() {
     browser.until("document.getElementById('link').textContent === 'ready'");
     assert_eq!(browser.eval("document.getElementById('fleet').hidden"), false);
     browser.click("#fleet");
-    browser.until("document.getElementById('summary').textContent === '3 of 3 robots well'");
+    browser.until("document.getElementById('summary').textContent === '3 of 3 healthy'");
     browser.until("document.querySelectorAll('#robots canvas:not([hidden])').length === 3");
-    let names = "[...document.querySelectorAll('#robots h2')].map((one) => one.textContent).join()";
+    let names =
+        "[...document.querySelectorAll('#robots h2')].map((title) => title.textContent).join()";
     assert_eq!(browser.eval(names), "kiwi,mango,lime");
     let lime = format!("http://{}/", fleet.robots[2].as_ref().expect("it runs").address());
     assert_eq!(browser.eval("document.querySelector('#robots li:last-child a').href"), *lime);
@@ -35,7 +36,7 @@ fn each_robot_has_its_card_and_a_change_is_seen_on_the_page() {
     fleet.robots[1].take().expect("it runs").kill();
     let summary = "document.getElementById('summary').textContent";
     wait_until("the killed one on the page", || {
-        browser.eval(summary).as_str().is_some_and(|text| text.contains("silent: mango"))
+        browser.eval(summary).as_str().is_some_and(|text| text.contains("offline: mango"))
     });
 
     for screen in [DESK, DESK_DARK, PHONE, PHONE_DARK] {
@@ -43,13 +44,18 @@ fn each_robot_has_its_card_and_a_change_is_seen_on_the_page() {
         browser.until("new Promise((done) => setTimeout(() => done(true), 300))");
         browser.picture(&format!("fleet-{}", screen.name));
         let [wide, window] = ["document.documentElement.scrollWidth", "innerWidth"];
-        assert_eq!(browser.eval(wide), browser.eval(window), "{} scrolls sideways", screen.name);
+        assert_eq!(
+            browser.eval(wide),
+            browser.eval(window),
+            "{}: horizontal scrolling",
+            screen.name
+        );
         assert_eq!(axe(&browser), Vec::<String>::new(), "{}", screen.name);
     }
     assert_clean(&browser);
 }
 
-/// Points of the last robot's floor plan that are drawn on.
+/// Number of painted pixels of the last robot's floor plan.
 fn drawn(browser: &Browser) -> u64 {
     let count = browser.eval(
         "(() => { const c = document.querySelector('#robots li:last-child canvas'); \

@@ -1,7 +1,7 @@
 //! Pictures of the workbench for the documentation.
 
 use super::{
-    OVER, assert_clean,
+    COMPLETE, assert_clean,
     browser::{Browser, Screen},
     pointer::{drag, place},
     scan_once,
@@ -12,7 +12,7 @@ const TOKEN: &str = "0123456789abcdef0123456789abcdef";
 const WIDE: Screen = Screen { name: "wide", size: (1280, 1010), phone: false, dark: false };
 
 #[test]
-fn pictures_of_overlays_and_preview_are_made() {
+fn overlays_and_preview() {
     let folder = tempfile::tempdir().expect("a folder");
     let file = write_token(folder.path(), TOKEN);
     let setting = format!("server.token_file={}", file.display());
@@ -24,13 +24,13 @@ fn pictures_of_overlays_and_preview_are_made() {
     let browser = Browser::open(&daemon.address(), WIDE);
     browser.eval(&format!("sessionStorage.setItem('sonard-token', '{TOKEN}')"));
     scan_once(&daemon);
-    browser.until(OVER);
+    browser.until(COMPLETE);
     browser.click("#pin");
     let there = r#"{"x_m":1.2,"y_m":1.0,"heading_deg":0}"#;
     assert_eq!(daemon.send("PUT", "/v1/pose", there).status, 202);
     scan_once(&daemon);
-    browser.until("document.getElementById('which').textContent.startsWith('live')");
-    browser.until(OVER);
+    browser.until("document.getElementById('scan-label').textContent.startsWith('live')");
+    browser.until(COMPLETE);
     browser.eval(
         "(() => { const s = document.getElementById('beam'); s.value = 100; \
          s.dispatchEvent(new Event('input')); })()",
@@ -49,7 +49,7 @@ fn pictures_of_overlays_and_preview_are_made() {
     for id in ["pin", "show-map", "show-lines", "show-features", "change"] {
         browser.click(&format!("#{id}"));
     }
-    browser.until("document.getElementById('next-now').textContent.includes('expects')");
+    browser.until("document.getElementById('next-status').textContent.startsWith('Preview (')");
     let at = place(&browser, ".ranger", 0.5, 0.5);
     drag(&browser, at, [at[0] + 90.0, at[1] - 50.0]);
     settle();

@@ -1,13 +1,13 @@
-//! Mouse and fingers on a page.
+//! Mouse and touch input.
 
 use serde_json::json;
 
 use super::browser::Browser;
 
-/// A place on the page, pixels.
+/// Point on the page, pixels.
 pub(crate) type Place = [f64; 2];
 
-/// Where a share of an element's width and height is, with the element in sight.
+/// Point at a fraction of an element's width and height, after scrolling it into view.
 pub(crate) fn place(browser: &Browser, selector: &str, across: f64, down: f64) -> Place {
     let at = browser.eval(&format!(
         "(() => {{ const e = document.querySelector('{selector}'); \
@@ -17,7 +17,7 @@ pub(crate) fn place(browser: &Browser, selector: &str, across: f64, down: f64) -
     [0, 1].map(|axis| at[axis].as_f64().expect("a number"))
 }
 
-/// Turns the wheel; away from the hand is below zero.
+/// Turns the wheel; negative values scroll up.
 pub(crate) fn wheel(browser: &Browser, [x, y]: Place, by: f64) {
     let event = json!({"type": "mouseWheel", "x": x, "y": y, "deltaX": 0, "deltaY": by});
     browser.devtools("Input.dispatchMouseEvent", &event);
@@ -27,7 +27,7 @@ pub(crate) fn click(browser: &Browser, at: Place) {
     drag(browser, at, at);
 }
 
-/// Presses the mouse at one place and lets it go at another.
+/// Drags with the left mouse button.
 pub(crate) fn drag(browser: &Browser, from: Place, to: Place) {
     let middle = [0, 1].map(|axis| (from[axis] + to[axis]) / 2.0);
     for (kind, [x, y]) in [
@@ -44,7 +44,7 @@ pub(crate) fn drag(browser: &Browser, from: Place, to: Place) {
     }
 }
 
-/// Moves fingers from places to others, all at once.
+/// Moves several fingers at once, each from one point to another.
 pub(crate) fn touch(browser: &Browser, fingers: &[[Place; 2]]) {
     for (kind, share) in [("touchStart", 0.0), ("touchMove", 0.5), ("touchMove", 1.0)] {
         let along = |[from, to]: &[Place; 2]| {

@@ -1,9 +1,9 @@
-//! The view of the floor plan, moved and zoomed, and lengths in it: by the same module on both pages.
+//! Pan, zoom and length measurement on the floor plan, which both pages share.
 
 use fantoccini::key::Key;
 
 use super::{
-    OVER, assert_clean,
+    COMPLETE, assert_clean,
     browser::{Browser, DESK, PHONE},
     daemon,
     pointer::{click, drag, place, touch, wheel},
@@ -13,39 +13,39 @@ use super::{
 const LIVE: &str = "import('/page/main.js').then(({plan}) => plan)";
 
 #[test]
-fn the_plan_is_moved_and_zoomed_with_wheel_mouse_fingers_and_keys_and_measured() {
+fn pan_zoom_and_measure() {
     let folder = tempfile::tempdir().expect("a folder");
     let (daemon, address) = daemon(folder.path(), "127.0.0.1:0", &[]);
     let browser = Browser::open(&address, DESK);
     scan_once(&daemon);
-    browser.until(OVER);
+    browser.until(COMPLETE);
     check_view(&browser, LIVE);
     assert_clean(&browser);
 }
 
 #[test]
-fn a_new_sweep_fades_the_one_before_until_it_is_over() {
+fn previous_scan_is_faded() {
     let folder = tempfile::tempdir().expect("a folder");
     let (daemon, address) = daemon(folder.path(), "127.0.0.1:0", &[]);
     let browser = Browser::open(&address, DESK);
-    let faded = || super::drawn_points(&browser, "under") + faint_points(&browser);
+    let faded = || super::drawn_pixels(&browser, "under") + faint_pixels(&browser);
     scan_once(&daemon);
-    browser.until(OVER);
+    browser.until(COMPLETE);
     assert_eq!(faded(), 0);
     scan_once(&daemon);
     browser.until("document.getElementById('progress').value > 5");
     assert!(faded() > 100, "{}", faded());
-    assert!(browser.text("#legend").contains("reading of the sweep before"));
-    browser.until(OVER);
+    assert!(browser.text("#legend").contains("previous scan"));
+    browser.until(COMPLETE);
     assert_eq!(faded(), 0);
     assert_clean(&browser);
 }
 
-fn faint_points(browser: &Browser) -> u64 {
-    super::count_points(browser, "under", "d[i + 3] > 20")
+fn faint_pixels(browser: &Browser) -> u64 {
+    super::count_pixels(browser, "under", "d[i + 3] > 20")
 }
 
-/// Scale, origin, and whether somebody moved it.
+/// Scale, origin, and whether the view was moved.
 fn view(browser: &Browser, plan: &str) -> ([f64; 3], bool) {
     browser.until_drawn();
     let view =
@@ -53,7 +53,7 @@ fn view(browser: &Browser, plan: &str) -> ([f64; 3], bool) {
     ([0, 1, 2].map(|i| view[i].as_f64().expect("a number")), view[3] == true)
 }
 
-/// Everything that can be done to the view of a page whose plan is what an expression promises.
+/// Checks all operations on the view of a plan, which is given as an expression for a promise.
 pub(crate) fn check_view(browser: &Browser, plan: &str) {
     let (fitted, moved) = view(browser, plan);
     assert!(!moved);
@@ -67,9 +67,9 @@ pub(crate) fn check_view(browser: &Browser, plan: &str) {
     browser.look_through(DESK);
 }
 
-/// The wheel zooms about the mouse; a drag moves, and selects no beam.
+/// The wheel zooms about the pointer; a drag pans and selects no beam.
 fn check_mouse(browser: &Browser, plan: &str, fitted: [f64; 3]) {
-    let selected = browser.text("#beam-now");
+    let selected = browser.text("#beam-label");
     let at = place(browser, "#over", 0.3, 0.4);
     let corner = place(browser, "#over", 0.0, 0.0);
     wheel(browser, at, -400.0);
@@ -78,13 +78,13 @@ fn check_mouse(browser: &Browser, plan: &str, fitted: [f64; 3]) {
     let under = |x0: f64, scale: f64, axis: usize| (at[axis] - corner[axis] - x0) / scale;
     for (axis, now, before) in [(0, x0, fitted[1]), (1, y0, fitted[2])] {
         let off = under(now, scale, axis) - under(before, fitted[0], axis);
-        assert!(off.abs() * scale < 1.5, "what is under the mouse moved by {off} m");
+        assert!(off.abs() * scale < 1.5, "the point under the mouse moved by {off} m");
     }
     drag(browser, at, [at[0] + 60.0, at[1] - 30.0]);
     let ([still, right, up], _) = view(browser, plan);
     assert!((right - x0 - 60.0).abs() < 1.0 && (up - y0 + 30.0).abs() < 1.0, "{right} {up}");
     assert!((still - scale).abs() < 1e-9);
-    assert_eq!(browser.text("#beam-now"), selected, "a drag is no click");
+    assert_eq!(browser.text("#beam-label"), selected, "a drag is no click");
     wheel(browser, at, 3000.0);
     assert!(view(browser, plan).0[0] < scale);
 }
@@ -115,13 +115,13 @@ fn check_buttons(browser: &Browser, plan: &str, fitted: [f64; 3]) {
     assert_eq!(view(browser, plan), (fitted, false));
 }
 
-/// Lengths by clicks and by keys; the ends of walls attract.
+/// Lengths are measured by clicks and by keys; points snap to wall ends.
 fn check_lengths(browser: &Browser, plan: &str) {
-    let told = || browser.text(".measured");
+    let output = || browser.text(".measured");
     browser.click(".tools [aria-label=\"Measure a length\"]");
-    let selected = browser.text("#beam-now");
+    let selected = browser.text("#beam-label");
     let corner = place(browser, "#over", 0.0, 0.0);
-    // The ends of the first wall, each three pixels beside it.
+    // Clicks three pixels from each end of the first wall.
     let wall = browser.eval(&format!(
         "({plan}).then(({{view, scene}}) => [scene.walls[0].from, scene.walls[0].to]\
          .flatMap((end) => view.px(end)))"
@@ -135,9 +135,9 @@ fn check_lengths(browser: &Browser, plan: &str) {
          scene.walls[0].to[i] - scene.walls[0].from[i])))"
     ));
     let length_m = length_m.as_f64().expect("metres");
-    assert!(told().starts_with(&format!("{length_m:.4} m")), "{} and not {length_m}", told());
+    assert!(output().starts_with(&format!("{length_m:.4} m")), "{} and not {length_m}", output());
     assert!(browser.text("#legend").contains("measured length"));
-    assert_eq!(browser.text("#beam-now"), selected, "no beam is selected meanwhile");
+    assert_eq!(browser.text("#beam-label"), selected, "no beam is selected meanwhile");
     browser.eval("document.getElementById('stage').focus()");
     for key in [Key::Escape.into(), 'm', Key::Enter.into()] {
         browser.press(key);
@@ -147,15 +147,15 @@ fn check_lengths(browser: &Browser, plan: &str) {
     }
     browser.press(Key::Enter.into());
     let ([scale, ..], _) = view(browser, plan);
-    let by_keys: f64 = told().split(' ').next().and_then(|m| m.parse().ok()).expect("metres");
-    // Each end may have been attracted.
-    assert!((by_keys * scale - 200.0).abs() < 20.0, "{}: {by_keys} m", told());
+    let by_keys: f64 = output().split(' ').next().and_then(|m| m.parse().ok()).expect("metres");
+    // Each end may have snapped.
+    assert!((by_keys * scale - 200.0).abs() < 20.0, "{}: {by_keys} m", output());
     browser.press(Key::Escape.into());
     assert_eq!(browser.eval("document.querySelector('.measured').hidden"), true);
     assert!(!browser.text("#legend").contains("measured length"));
 }
 
-/// One finger leaves the view to the page until two have moved it.
+/// One finger scrolls the page until two fingers have moved the view.
 fn check_fingers(browser: &Browser, plan: &str) {
     let [x, y] = place(browser, "#over", 0.72, 0.75);
     let (fitted, _) = view(browser, plan);

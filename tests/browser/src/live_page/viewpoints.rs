@@ -1,4 +1,4 @@
-//! Each reading on the floor plan is drawn from where it was taken.
+//! Readings on the floor plan are drawn from their viewpoints.
 
 use std::{fs, path::Path};
 
@@ -27,12 +27,12 @@ fn distance([x, y]: Point, [u, v]: Point) -> f64 {
     (x - u).hypot(y - v)
 }
 
-/// Where a reading was taken.
+/// Position of a reading's viewpoint.
 fn place(reading: &Value) -> Point {
     ["x_m", "y_m"].map(|axis| reading["viewpoint"][axis].as_f64().expect("a figure"))
 }
 
-/// Where a reading's range ends, by what the API says.
+/// End of a reading's range, from the API's viewpoint.
 fn end(reading: &Value) -> Option<Point> {
     let range_m = reading["range_m"].as_f64()?;
     let direction_deg = reading["viewpoint"]["direction_deg"].as_f64().expect("a direction");
@@ -41,64 +41,65 @@ fn end(reading: &Value) -> Option<Point> {
     Some([x_m + range_m * cos, y_m + range_m * sin])
 }
 
-/// An expression of the page's plan.
-fn of_plan(browser: &Browser, expression: &str) -> Value {
+/// Value of an expression with the page's `plan`.
+fn eval_plan(browser: &Browser, expression: &str) -> Value {
     browser.eval(&format!("import('/page/main.js').then(({{plan}}) => {expression})"))
 }
 
-/// Where points of the floor are on the stage, pixels.
+/// Converts points of the floor to pixels of the stage.
 fn pixels(browser: &Browser, points: &[Point]) -> Vec<Point> {
-    let asked = of_plan(browser, &format!("{}.map((at) => plan.view.px(at))", json!(points)));
-    asked.as_array().expect("points").iter().map(point).collect()
+    let points = eval_plan(browser, &format!("{}.map((at) => plan.view.px(at))", json!(points)));
+    points.as_array().expect("points").iter().map(point).collect()
 }
 
-/// Whether there is paint on a layer within two pixels of each point of the floor; those beyond the view
-/// count as painted.
+/// Returns for each point of the floor whether a layer is painted within two pixels of it. Points
+/// outside the view count as painted.
 fn painted(browser: &Browser, layer: &str, points: &[Point]) -> Vec<bool> {
-    let answer = of_plan(
+    let reply = eval_plan(
         browser,
         &format!(
             "(() => {{ const c = document.getElementById('{layer}'); \
              const copy = new OffscreenCanvas(c.width, c.height); \
-             const look = copy.getContext('2d', {{willReadFrequently: true}}); \
-             look.drawImage(c, 0, 0); \
+             const c2d = copy.getContext('2d', {{willReadFrequently: true}}); \
+             c2d.drawImage(c, 0, 0); \
              return {}.map((at) => {{ const px = plan.view.px(at); \
-               if (plan.view.isBeyond(px)) return true; \
+               if (plan.view.isOutside(px)) return true; \
                const [x, y] = px.map((v) => Math.round(v * devicePixelRatio) - 2); \
-               return look.getImageData(x, y, 5, 5).data.some((v, i) => i % 4 === 3 && v > 128); \
+               return c2d.getImageData(x, y, 5, 5).data.some((v, i) => i % 4 === 3 && v > 128); \
              }}); }})()",
             json!(points)
         ),
     );
-    answer.as_array().expect("a list").iter().map(|one| one == true).collect()
+    reply.as_array().expect("a list").iter().map(|painted| painted == true).collect()
 }
 
-/// That every reading has its mark where it was heard, and that a click on it selects it.
-fn check_marks(browser: &Browser, whole: &Value) {
-    let readings = whole["pings"].as_array().expect("readings");
-    let heard: Vec<(&Value, Point)> =
+/// Checks that every reading has a mark at its range, and that a click on the mark selects it.
+fn check_marks(browser: &Browser, scan: &Value) {
+    let readings = scan["pings"].as_array().expect("readings");
+    let echoes: Vec<(&Value, Point)> =
         readings.iter().filter_map(|reading| Some((reading, end(reading)?))).collect();
-    assert!(heard.len() > 5, "{} readings", heard.len());
-    let ends: Vec<Point> = heard.iter().map(|(_, at)| *at).collect();
-    for ((reading, _), drawn) in heard.iter().zip(painted(browser, "marks", &ends)) {
+    assert!(echoes.len() > 5, "{} readings", echoes.len());
+    let ends: Vec<Point> = echoes.iter().map(|(_, at)| *at).collect();
+    for ((reading, _), drawn) in echoes.iter().zip(painted(browser, "marks", &ends)) {
         assert!(drawn, "nothing is drawn at the end of {reading}");
     }
     let size = browser.eval("[document.getElementById('stage').clientWidth, document.getElementById('stage').clientHeight]");
     let [width, height] = point(&size);
-    // One that no other reading is drawn beside.
+    // Picks a mark without others nearby.
     let at = pixels(browser, &ends);
-    let alone = |i: &usize| {
+    let isolated = |i: &usize| {
         let inside = at[*i][0] > 30.0 && at[*i][1] > 30.0 && at[*i][0] < width - 30.0;
         inside && (0..at.len()).all(|j| j == *i || distance(at[*i], at[j]) > 30.0)
     };
-    let chosen = (0..at.len()).rev().find(alone).expect("one that stands alone");
+    let chosen = (0..at.len()).rev().find(isolated).expect("an isolated mark");
     browser.click_at("#over", at[chosen][0] / width, at[chosen][1] / height);
-    let now = browser.text("#beam-now");
-    let beam = format!("beam {}", heard[chosen].0["index"]);
+    let now = browser.text("#beam-label");
+    let beam = format!("beam {}", echoes[chosen].0["index"]);
     assert!(now.starts_with(&format!("{beam},")), "{now} and not {beam}");
 }
 
-/// That the path of a beam's sound is drawn from its transducer and back, and is as long as was heard.
+/// Checks that a beam's propagation path is drawn, starts and ends at the transducer, and is twice
+/// the range long.
 fn check_path(browser: &Browser, reading: &Value) {
     browser.eval(&format!(
         "(() => {{ const s = document.getElementById('beam'); s.value = {}; \
@@ -107,9 +108,10 @@ fn check_path(browser: &Browser, reading: &Value) {
     ));
     browser.until("document.querySelectorAll('.peaks [aria-pressed=true]').length === 1");
     let path: Vec<Point> =
-        of_plan(browser, "plan.path").as_array().expect("a path").iter().map(point).collect();
-    for side in [path[0], path[path.len() - 1]] {
-        assert!(distance(side, place(reading)) < 1e-9, "{side:?} is not where {reading} was taken");
+        eval_plan(browser, "plan.path").as_array().expect("a path").iter().map(point).collect();
+    for terminal in [path[0], path[path.len() - 1]] {
+        let off_m = distance(terminal, place(reading));
+        assert!(off_m < 1e-9, "{terminal:?} is not the viewpoint of {reading}");
     }
     let length_m: f64 = path.windows(2).map(|leg| distance(leg[0], leg[1])).sum();
     let late_m = reading["range_m"].as_f64().expect("a range") - length_m / 2.0;
@@ -119,40 +121,40 @@ fn check_path(browser: &Browser, reading: &Value) {
         .map(|leg| [0, 1].map(|axis| 0.7 * leg[0][axis] + 0.3 * leg[1][axis]))
         .collect();
     assert!(painted(browser, "over", &along).into_iter().all(|drawn| drawn), "{path:?}");
-    // So is the ray, from the transducer on.
+    // The ray starts at the transducer.
     let [x_m, y_m] = place(reading);
     let direction_deg = reading["viewpoint"]["direction_deg"].as_f64().expect("a direction");
     let (sin, cos) = direction_deg.to_radians().sin_cos();
-    let scale = of_plan(browser, "plan.view.scale").as_f64().expect("pixels a metre");
+    let scale = eval_plan(browser, "plan.view.scale").as_f64().expect("pixels per metre");
     let on_ray = |pixels: f64| [x_m + pixels / scale * cos, y_m + pixels / scale * sin];
-    // Of a dashed line, one of two points is drawn.
+    // At least one of several points of a dashed line is painted.
     let drawn = painted(browser, "over", &[on_ray(40.0), on_ray(44.0), on_ray(48.0)]);
     assert!(drawn.contains(&true), "no ray from {x_m}, {y_m}");
 }
 
-fn heard(whole: &Value) -> impl Iterator<Item = &Value> {
-    whole["pings"].as_array().expect("readings").iter().filter(|ping| ping["range_m"].is_f64())
+fn with_range(scan: &Value) -> impl Iterator<Item = &Value> {
+    scan["pings"].as_array().expect("readings").iter().filter(|ping| ping["range_m"].is_f64())
 }
 
 #[test]
-fn each_sonar_of_an_array_has_its_readings_its_face_and_its_paths() {
+fn array_readings_start_at_sonars() {
     let folder = tempfile::tempdir().expect("a folder");
     let daemon = start_array(folder.path(), &FAN);
     daemon.wait_for_scans(1);
     let browser = Browser::open(&daemon.address(), DESK);
-    let whole = show_log(&daemon, &browser, "");
-    check_marks(&browser, &whole);
+    let scan = show_log(&daemon, &browser, "");
+    check_marks(&browser, &scan);
     let places: Vec<Point> =
-        whole["pings"].as_array().expect("readings").iter().map(place).collect();
+        scan["pings"].as_array().expect("readings").iter().map(place).collect();
     assert!(painted(&browser, "marks", &places).into_iter().all(|drawn| drawn), "eight faces");
-    for reading in heard(&whole).take(4) {
+    for reading in with_range(&scan).take(4) {
         check_path(&browser, reading);
     }
-    assert!(browser.text("#beam-now").contains(", s"), "the sonar is named");
+    assert!(browser.text("#beam-label").contains(", s"), "the sonar is named");
 }
 
 #[test]
-fn a_transducer_ahead_of_its_axis_has_its_readings_and_its_paths() {
+fn offset_transducer() {
     let folder = tempfile::tempdir().expect("a folder");
     let plan = ["--set", "plan.step_deg=18", "--set", "model.max_range_m=4"];
     let daemon = start_ahead(folder.path(), &[&plan[..], &CONE].concat());
@@ -160,27 +162,27 @@ fn a_transducer_ahead_of_its_axis_has_its_readings_and_its_paths() {
     assert_eq!(daemon.send("POST", "/v1/start", r#"{"scans":1}"#).status, 202);
     daemon.wait_for_scans(1);
     let browser = Browser::open(&daemon.address(), DESK);
-    let whole = show_log(&daemon, &browser, "");
-    check_marks(&browser, &whole);
-    for reading in heard(&whole).take(4) {
+    let scan = show_log(&daemon, &browser, "");
+    check_marks(&browser, &scan);
+    for reading in with_range(&scan).take(4) {
         check_path(&browser, reading);
     }
 }
 
 #[test]
-fn readings_of_a_robot_that_moved_are_drawn_from_where_it_was() {
+fn readings_of_a_moving_robot() {
     let folder = tempfile::tempdir().expect("a folder");
     write_turned_ring(folder.path());
     let daemon = start_array(folder.path(), &FAN);
     daemon.wait_for_scans(1);
     let browser = Browser::open(&daemon.address(), DESK);
-    let whole = show_log(&daemon, &browser, "20260101");
-    let moved = whole["pings"].as_array().expect("readings").iter();
+    let scan = show_log(&daemon, &browser, "20260101");
+    let moved = scan["pings"].as_array().expect("readings").iter();
     assert_eq!(moved.filter(|ping| ping["pose"].is_object()).count(), 24, "two rounds of three");
-    check_marks(&browser, &whole);
+    check_marks(&browser, &scan);
 }
 
-/// A ring of twelve that is turned in place and fired three times, in the log folder.
+/// Writes a log of a ring of twelve sonars that is turned in place and fired three times.
 fn write_turned_ring(folder: &Path) {
     let log = folder.join("log");
     fs::create_dir_all(&log).expect("there is room");
@@ -188,6 +190,6 @@ fn write_turned_ring(folder: &Path) {
     let ring = ["simulate", "--array", "ring-12", "--rounds", "3", "--scene", "two-surface-room"];
     let further =
         ["--pose", "1.2,1,30", "--max-range", "4", "--output", log.to_str().expect("plain")];
-    let made = run(&[&ring[..], &further].concat());
-    assert!(made.status.success(), "{}", stderr(&made));
+    let output = run(&[&ring[..], &further].concat());
+    assert!(output.status.success(), "{}", stderr(&output));
 }

@@ -1,4 +1,4 @@
-//! The page as a place to work: past scans, downloads, echo traces, overlays, and what is to be changed.
+//! Workbench: past scans, downloads, echo traces, overlays, and the settings of the next scan.
 
 use std::path::Path;
 
@@ -6,9 +6,9 @@ use fantoccini::key::Key;
 use serde_json::{Value, json};
 
 use super::{
-    OVER, assert_clean,
+    COMPLETE, assert_clean,
     browser::{Browser, DESK},
-    daemon, drawn_points,
+    daemon, drawn_pixels,
     pointer::{drag, place},
     scan_once,
 };
@@ -19,31 +19,31 @@ use sonard_test_support::{
 
 const TOKEN: &str = "0123456789abcdef0123456789abcdef";
 
-/// A page of a daemon that has taken two scans, and its daemon.
+/// Starts a daemon, records two scans, and opens its page.
 fn with_two_scans(folder: &Path, further: &[&str]) -> (Daemon, Browser) {
     let (daemon, address) = daemon(folder, "127.0.0.1:0", further);
     assert_eq!(daemon.send("POST", "/v1/start", r#"{"scans":2}"#).status, 202);
     daemon.wait_for_scans(2);
     let browser = Browser::open(&address, DESK);
     browser.until("document.querySelectorAll('#scans-list button').length === 2");
-    browser.until("document.getElementById('which').textContent.includes('100 of 100')");
+    browser.until("document.getElementById('scan-label').textContent.includes('100 of 100')");
     (daemon, browser)
 }
 
-/// A page whose sensor somebody who has the token is about to change, and its daemon.
-fn about_to_change(folder: &Path) -> (Daemon, Browser) {
+/// Starts a daemon and opens its page with the token and the settings in edit mode.
+fn editing_settings(folder: &Path) -> (Daemon, Browser) {
     let file = write_token(folder, TOKEN);
     let setting = format!("server.token_file={}", file.display());
     let (daemon, address) = daemon(folder, "127.0.0.1:0", &["--set", &setting]);
     let browser = Browser::open(&address, DESK);
     browser.eval(&format!("sessionStorage.setItem('sonard-token', '{TOKEN}')"));
-    has(&browser, "#next-table", "senscomp-6500");
+    until_has(&browser, "#next-table", "senscomp-6500");
     browser.click("#change");
-    has(&browser, "#next-now", "The model expects 100 beams");
+    until_has(&browser, "#next-status", "Preview (100 beams)");
     (daemon, browser)
 }
 
-fn choose(browser: &Browser, index: u32) {
+fn select_beam(browser: &Browser, index: u32) {
     browser.eval(&format!(
         "(() => {{ const s = document.getElementById('beam'); s.value = {index}; \
          s.dispatchEvent(new Event('input')); }})()"
@@ -51,48 +51,49 @@ fn choose(browser: &Browser, index: u32) {
     browser.until("document.querySelectorAll('.peaks [aria-pressed=true]').length === 1");
 }
 
-fn has(browser: &Browser, selector: &str, words: &str) {
-    browser.until(&format!("document.querySelector({selector:?}).textContent.includes({words:?})"));
+/// Waits until an element contains a text.
+fn until_has(browser: &Browser, selector: &str, text: &str) {
+    browser.until(&format!("document.querySelector({selector:?}).textContent.includes({text:?})"));
 }
 
 #[test]
-fn scans_are_scrubbed_through_by_time_also_those_of_long_ago() {
+fn time_line_reaches_old_scans() {
     let folder = tempfile::tempdir().expect("a folder");
     write_scans(&folder.path().join("log"), 620, 10);
     let (_daemon, address) = daemon(folder.path(), "127.0.0.1:0", &[]);
     let browser = Browser::open(&address, DESK);
-    let most = |count: u32| format!("document.getElementById('scrub').max === '{}'", count - 1);
-    browser.until(&most(50));
-    assert!(drawn_points(&browser, "time-line") > 500);
+    let known = |count: u32| format!("document.getElementById('scrub').max === '{}'", count - 1);
+    browser.until(&known(50));
+    assert!(drawn_pixels(&browser, "time-line") > 500);
     browser.eval("document.getElementById('scrub').focus()");
     browser.press(Key::Left.into());
-    has(&browser, "#scrub-now", "scan 49 of 50");
+    until_has(&browser, "#scrub-label", "scan 49 of 50");
     browser.until("document.querySelector('#live').ariaPressed === 'false'");
-    browser.until("document.getElementById('which').textContent.includes('10 of 10')");
+    browser.until("document.getElementById('scan-label').textContent.includes('10 of 10')");
     browser.click("#older");
-    browser.until(&most(550));
+    browser.until(&known(550));
     browser.click("#older");
-    browser.until(&most(620));
+    browser.until(&known(620));
     assert_eq!(browser.eval("document.getElementById('older').disabled"), true);
-    // The first of all, by one key; the list follows.
+    // Home selects the first scan; the list follows.
     browser.eval("document.getElementById('scrub').focus()");
     browser.press(Key::Home.into());
-    has(&browser, "#scrub-now", "scan 1 of 620");
+    until_has(&browser, "#scrub-label", "scan 1 of 620");
     let first = "[data-scan=\"00000000-0000-0000-0000-000000000001\"]";
     browser.until(&format!("document.querySelector('{first}')?.ariaPressed === 'true'"));
     assert_eq!(browser.eval("document.querySelectorAll('#scans-list button').length"), 50);
-    let spoken = browser.eval("document.getElementById('scrub').getAttribute('aria-valuetext')");
-    assert_eq!(spoken, json!(browser.text("#scrub-now")));
+    let value = browser.eval("document.getElementById('scrub').getAttribute('aria-valuetext')");
+    assert_eq!(value, json!(browser.text("#scrub-label")));
     browser.click("#live");
-    has(&browser, "#scrub-now", "scan 620 of 620");
+    until_has(&browser, "#scrub-label", "scan 620 of 620");
     assert_clean(&browser);
 }
 
 #[test]
-fn scan_log_and_pictures_are_downloaded() {
+fn downloads() {
     let folder = tempfile::tempdir().expect("a folder");
     let (daemon, browser) = with_two_scans(folder.path(), &[]);
-    choose(&browser, 75);
+    select_beam(&browser, 75);
     browser.eval(
         "(() => { globalThis.saved = []; const make = URL.createObjectURL; \
          URL.createObjectURL = (blob) => { saved.push(blob); return make(blob); }; \
@@ -114,7 +115,7 @@ fn scan_log_and_pictures_are_downloaded() {
     assert!(save("svg").ends_with(".svg"));
     let svg = text();
     for drawn in
-        ["simple-room", "MOCK, not hardware", "multiple reflection (", "path of its sound", "north"]
+        ["simple-room", "MOCK, not hardware", "multiple reflection (", "propagation path", "north"]
     {
         assert!(svg.contains(drawn), "{drawn} is not in the picture");
     }
@@ -133,26 +134,26 @@ fn scan_log_and_pictures_are_downloaded() {
 }
 
 #[test]
-fn the_selected_beam_has_its_echo_trace_and_its_ranges_over_time() {
+fn echo_trace_and_ranges_over_time() {
     let folder = tempfile::tempdir().expect("a folder");
     let (_daemon, browser) = with_two_scans(folder.path(), &[]);
     assert_eq!(browser.eval("document.getElementById('trace').hidden"), true);
-    choose(&browser, 75);
+    select_beam(&browser, 75);
     browser.until("document.getElementById('trace').width > 0");
-    let drawn = drawn_points(&browser, "trace");
-    assert!(drawn > 600, "{drawn} points");
-    // A sound is chosen by its place in the trace, too.
-    let chosen = || browser.text(".peaks [aria-pressed=true]");
-    let before = chosen();
+    let drawn = drawn_pixels(&browser, "trace");
+    assert!(drawn > 600, "{drawn} pixels");
+    // A click in the trace selects the nearest arrival.
+    let selected = || browser.text(".peaks [aria-pressed=true]");
+    let previous = selected();
     browser.click_at("#trace", 0.22, 0.85);
     browser.until(&format!(
-        "document.querySelector('.peaks [aria-pressed=true]').textContent !== {before:?}"
+        "document.querySelector('.peaks [aria-pressed=true]').textContent !== {previous:?}"
     ));
     browser.click("#over-time summary");
-    has(&browser, "#series-now", "Beam 75 in 2 scans: mean 0.82");
-    assert!(drawn_points(&browser, "waterfall") > 1000);
-    assert!(drawn_points(&browser, "series") > 20);
-    // A click in it selects beam and scan.
+    until_has(&browser, "#series-label", "Beam 75 in 2 scans: mean 0.82");
+    assert!(drawn_pixels(&browser, "waterfall") > 1000);
+    assert!(drawn_pixels(&browser, "series") > 20);
+    // A click in the waterfall selects beam and scan.
     browser.click_at("#waterfall", 0.5, 0.1);
     browser.until("document.querySelector('#live').ariaPressed === 'false'");
     browser.until("Number(document.getElementById('beam').value) !== 75");
@@ -162,50 +163,50 @@ fn the_selected_beam_has_its_echo_trace_and_its_ranges_over_time() {
 }
 
 #[test]
-fn a_second_scan_map_lines_and_features_lie_under_the_readings() {
+fn overlays() {
     let folder = tempfile::tempdir().expect("a folder");
     let (_daemon, browser) = with_two_scans(folder.path(), &[]);
-    let legend = |words: &str| browser.text("#legend").contains(words);
-    for (kind, words, layer) in [
+    let legend = |label: &str| browser.text("#legend").contains(label);
+    for (kind, label, layer) in [
         ("map", "map: free", "under"),
         ("lines", "fitted line", "under"),
         ("features", "plane (P)", "over"),
     ] {
-        assert!(!legend(words));
-        let drawn = || super::count_points(&browser, layer, "d[i + 3] > 20");
+        assert!(!legend(label));
+        let drawn = || super::count_pixels(&browser, layer, "d[i + 3] > 20");
         let bare = drawn();
         browser.click(&format!("#show-{kind}"));
-        has(&browser, "#legend", words);
+        until_has(&browser, "#legend", label);
         assert!(drawn() > bare, "{kind}");
         browser.click(&format!("#show-{kind}"));
         browser
-            .until(&format!("!document.getElementById('legend').textContent.includes({words:?})"));
+            .until(&format!("!document.getElementById('legend').textContent.includes({label:?})"));
     }
     browser.click("#pin");
-    has(&browser, "#second-now", "Choose another");
+    until_has(&browser, "#pinned-status", "Choose another");
     browser.click("#scans-list li:nth-child(2) button");
-    has(&browser, "#second-now", "100 beams with a range in both, median difference");
-    has(&browser, "#legend", "reading of the pinned scan");
-    let as_way = |way: &str| {
+    until_has(&browser, "#pinned-status", "100 beams in common, median difference");
+    until_has(&browser, "#legend", "pinned scan");
+    let set_mode = |mode: &str| {
         browser.eval(&format!(
-            "(() => {{ const s = document.getElementById('second-as'); s.value = {way:?}; \
+            "(() => {{ const s = document.getElementById('pinned-mode'); s.value = {mode:?}; \
              s.dispatchEvent(new Event('change')); }})()"
         ));
     };
-    as_way("average");
-    has(&browser, "#legend", "average of both scans");
+    set_mode("average");
+    until_has(&browser, "#legend", "average of both scans");
     assert_eq!(browser.text("#residuals h2"), "Residual");
-    as_way("difference");
-    has(&browser, "#legend", "from the pinned scan to this one");
+    set_mode("difference");
+    until_has(&browser, "#legend", "shift since the pinned scan");
     assert_eq!(browser.text("#residuals h2"), "Difference");
     browser.click("#pin");
-    browser.until("document.getElementById('second-now').hidden");
+    browser.until("document.getElementById('pinned-status').hidden");
     assert_eq!(browser.text("#residuals h2"), "Residual");
     assert_clean(&browser);
 }
 
 #[test]
-fn the_robot_is_dragged_previewed_and_moved_with_the_token() {
+fn robot_is_moved() {
     let folder = tempfile::tempdir().expect("a folder");
     let file = write_token(folder.path(), TOKEN);
     let setting = format!("server.token_file={}", file.display());
@@ -213,17 +214,17 @@ fn the_robot_is_dragged_previewed_and_moved_with_the_token() {
         daemon(folder.path(), "127.0.0.1:0", &["--set", &setting, "--set", "plan.step_deg=1.8"]);
     let browser = Browser::open(&address, DESK);
     scan_once(&daemon);
-    browser.until(OVER);
+    browser.until(COMPLETE);
     browser.eval(&format!("sessionStorage.setItem('sonard-token', '{TOKEN}')"));
-    has(&browser, "#next-table", "0.774");
+    until_has(&browser, "#next-table", "0.774");
     browser.click("#change");
-    has(&browser, "#next-now", "The model expects 200 beams");
-    has(&browser, "#legend", "what the model expects of the next scan");
-    let stood = daemon.status()["pose"].clone();
+    until_has(&browser, "#next-status", "Preview (200 beams)");
+    until_has(&browser, "#legend", "preview of the next scan");
+    let initial = daemon.status()["pose"].clone();
     let x_m = || {
         browser.eval("Number(document.getElementById('next-x_m').value)").as_f64().expect("metres")
     };
-    // With the mouse, to the left; then a key.
+    // By mouse, then by key.
     let at = place(&browser, ".ranger", 0.5, 0.5);
     drag(&browser, at, [at[0] - 30.0, at[1]]);
     let dragged = x_m();
@@ -231,7 +232,7 @@ fn the_robot_is_dragged_previewed_and_moved_with_the_token() {
     browser.eval("document.querySelector('.ranger').focus()");
     browser.press(Key::Up.into());
     browser.until("Math.abs(Number(document.getElementById('next-y_m').value) - 0.095) < 0.002");
-    // By its field, too; where it can't stand that is said, and it is not applied.
+    // By its field; an invalid pose has no preview and is not applied.
     let type_x = |text: &str| {
         browser.eval(&format!(
             "(() => {{ const f = document.getElementById('next-x_m'); f.value = {text:?}; \
@@ -239,33 +240,32 @@ fn the_robot_is_dragged_previewed_and_moved_with_the_token() {
         ));
     };
     type_x("99");
-    has(&browser, "#next-now", "No preview");
-    assert_eq!(daemon.status()["pose"], stood, "nothing is changed yet");
+    until_has(&browser, "#next-status", "Preview unavailable");
+    assert_eq!(daemon.status()["pose"], initial, "nothing is changed yet");
     type_x("0.5");
-    has(&browser, "#next-now", "The model expects 200 beams");
+    until_has(&browser, "#next-status", "Preview (200 beams)");
     browser.click("#apply");
-    has(&browser, "#summary", "Taken in: pose");
+    until_has(&browser, "#summary", "Applied: pose");
     wait_until("the pose", || daemon.status()["pose"]["x_m"] == 0.5);
     browser.until("document.querySelector('.ranger').hidden");
-    // While a scan is under way the change is pending.
+    // During a scan the change is pending.
     scan_once(&daemon);
     browser.until("document.getElementById('progress').value > 5");
     browser.click("#change");
-    has(&browser, "#next-now", "The model expects 200 beams");
+    until_has(&browser, "#next-status", "Preview (200 beams)");
     type_x("0.6");
-    has(&browser, "#next-now", "The model expects 200 beams");
+    until_has(&browser, "#next-status", "Preview (200 beams)");
     browser.click("#apply");
     browser.until("document.querySelector('#next-table .pending')?.textContent === '0.6'");
-    let refused = |text: &String| text.contains("409");
     let other: Vec<String> =
-        browser.complaints().into_iter().filter(|text| !refused(text)).collect();
-    assert_eq!(other, Vec::<String>::new(), "besides the browser's note of the refusal");
+        browser.warnings().into_iter().filter(|text| !text.contains("409")).collect();
+    assert_eq!(other, Vec::<String>::new(), "apart from the browser's message about status 409");
 }
 
 #[test]
-fn the_sensor_is_changed_and_its_effect_is_seen_before() {
+fn sensor_change_is_previewed() {
     let folder = tempfile::tempdir().expect("a folder");
-    let (daemon, browser) = about_to_change(folder.path());
+    let (daemon, browser) = editing_settings(folder.path());
     let enter = |id: &str, value: &str| {
         browser.eval(&format!(
             "(() => {{ const f = document.getElementById('next-{id}'); f.value = {value:?}; \
@@ -274,60 +274,61 @@ fn the_sensor_is_changed_and_its_effect_is_seen_before() {
     };
     let shown = |id: &str| browser.eval(&format!("document.getElementById('next-{id}').value"));
     enter("threshold", "0.9");
-    has(&browser, "#next-now", "of them otherwise than if nothing is changed");
-    has(&browser, "#next-now", "silent");
-    // A preset brings its own figures; this device can't be so near.
+    until_has(&browser, "#next-status", "beams would change");
+    until_has(&browser, "#next-status", "no echo");
+    // A preset has its own parameters; its blanking is too short for this device.
     enter("name", "hc-sr04");
     browser.until("document.getElementById('next-blanking_us').value === '117'");
     assert_eq!(shown("threshold"), daemon.get("/v1/sensors").json()[5]["threshold"].to_string());
-    has(&browser, "#next-now", "otherwise than");
+    until_has(&browser, "#next-status", "would change");
     browser.click("#apply");
-    has(&browser, "#next-now", "Refused, the sensor: the device's shortest blanking is 500 us");
+    until_has(&browser, "#next-status", "Sensor not changed: ");
+    let rejection = browser.text("#next-status");
+    assert!(rejection.contains("blanking") && rejection.contains("500 us"), "{rejection}");
     enter("name", "senscomp-6500");
     enter("gain", "compensating");
     enter("threshold", "0.05");
-    has(&browser, "#next-now", "The model expects 100 beams");
+    until_has(&browser, "#next-status", "Preview (100 beams)");
     browser.click("#apply");
-    has(&browser, "#summary", "Taken in: sensor");
+    until_has(&browser, "#summary", "Applied: sensor");
     let sensor = daemon.status()["sensor"].clone();
     assert_eq!(
         (&sensor["threshold"], &sensor["gain"]["kind"]),
         (&json!(0.05), &json!("compensating"))
     );
-    has(&browser, "#next-table", "as it spreads");
-    let refused = |text: &String| text.contains("409");
+    until_has(&browser, "#next-table", "compensates spreading loss");
     let other: Vec<String> =
-        browser.complaints().into_iter().filter(|text| !refused(text)).collect();
-    assert_eq!(other, Vec::<String>::new(), "besides the browser's note of the refusal");
+        browser.warnings().into_iter().filter(|text| !text.contains("409")).collect();
+    assert_eq!(other, Vec::<String>::new(), "apart from the browser's message about status 409");
 }
 
 #[test]
-fn a_refusal_stays_to_be_read_when_a_preview_comes_after_it() {
+fn late_preview_keeps_the_rejection() {
     let folder = tempfile::tempdir().expect("a folder");
-    let (_daemon, browser) = about_to_change(folder.path());
-    // Previews are answered once somebody lets them.
+    let (_daemon, browser) = editing_settings(folder.path());
+    // Delays the responses to preview requests until `release` is called.
     browser.eval(
-        "(() => { const asked = window.fetch; window.answered = 0; \
-         const held = new Promise((done) => (window.letGo = done)); \
-         window.fetch = async (url, ...rest) => { const answer = await asked(url, ...rest); \
-         if (String(url).includes('preview')) { await held; window.answered += 1; } \
-         return answer; }; })()",
+        "(() => { const original = window.fetch; window.responses = 0; \
+         const released = new Promise((done) => (window.release = done)); \
+         window.fetch = async (url, ...rest) => { const response = await original(url, ...rest); \
+         if (String(url).includes('preview')) { await released; window.responses += 1; } \
+         return response; }; })()",
     );
     browser.eval(
         "(() => { const f = document.getElementById('next-name'); f.value = 'hc-sr04'; \
          f.dispatchEvent(new Event('input')); })()",
     );
     browser.click("#apply");
-    has(&browser, "#next-now", "Refused, the sensor");
-    browser.eval("window.letGo()");
-    browser.until("window.answered > 0");
+    until_has(&browser, "#next-status", "Sensor not changed");
+    browser.eval("window.release()");
+    browser.until("window.responses > 0");
     browser.until_drawn();
-    has(&browser, "#next-now", "Refused, the sensor");
-    has(&browser, "#next-table", "senscomp-6500");
+    until_has(&browser, "#next-status", "Sensor not changed");
+    until_has(&browser, "#next-table", "senscomp-6500");
 }
 
 #[test]
-fn an_array_is_drawn_from_its_sonars_moved_and_previewed() {
+fn array_is_moved() {
     let folder = tempfile::tempdir().expect("a folder");
     let file = write_token(folder.path(), TOKEN);
     let setting = format!("server.token_file={}", file.display());
@@ -335,19 +336,19 @@ fn an_array_is_drawn_from_its_sonars_moved_and_previewed() {
     let daemon = start_array(folder.path(), &further);
     let browser = Browser::open(&daemon.address(), DESK);
     browser.eval(&format!("sessionStorage.setItem('sonard-token', '{TOKEN}')"));
-    has(&browser, "#legend", "transducer");
+    until_has(&browser, "#legend", "transducer");
     assert!(browser.text("#conditions").contains("8 rangers"), "{}", browser.text("#conditions"));
     browser.click("#change");
-    has(&browser, "#next-now", "The model expects 8 beams");
-    has(&browser, "#legend", "what the model expects of the next scan");
+    until_has(&browser, "#next-status", "Preview (8 beams)");
+    until_has(&browser, "#legend", "preview of the next scan");
     assert_eq!(browser.eval("document.getElementById('next-from_deg').closest('tr').hidden"), true);
-    let stood = daemon.status()["pose"]["x_m"].as_f64().expect("metres");
+    let before_m = daemon.status()["pose"]["x_m"].as_f64().expect("metres");
     browser.eval("document.querySelector('.ranger').focus()");
     browser.press(Key::Left.into());
-    has(&browser, "#next-now", "The model expects 8 beams");
+    until_has(&browser, "#next-status", "Preview (8 beams)");
     browser.click("#apply");
-    has(&browser, "#summary", "Taken in: pose");
-    let stands = daemon.status()["pose"]["x_m"].as_f64().expect("metres");
-    assert!((stood - stands - 0.01).abs() < 1e-6, "{stood} and {stands}");
+    until_has(&browser, "#summary", "Applied: pose");
+    let after_m = daemon.status()["pose"]["x_m"].as_f64().expect("metres");
+    assert!((before_m - after_m - 0.01).abs() < 1e-6, "{before_m} and {after_m}");
     assert_clean(&browser);
 }

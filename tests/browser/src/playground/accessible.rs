@@ -1,13 +1,13 @@
-//! For everybody: names for screen readers, contrast, small screens, light and dark.
+//! Accessibility: names for screen readers, contrast, small screens, light and dark scheme.
 
-use super::{assert_clean, open, set, settled};
+use super::{assert_clean, open, set, wait_until_idle};
 use crate::live_page::{
     accessible::{axe, nameless},
     browser::{DESK, DESK_DARK, PHONE, PHONE_DARK},
 };
 
 #[test]
-fn everything_has_a_name_and_fits_on_desk_and_phone_in_light_and_dark() {
+fn playground_is_accessible() {
     let browser = open(DESK);
     set(&browser, "compare", "true");
     browser.click("#edit");
@@ -15,14 +15,14 @@ fn everything_has_a_name_and_fits_on_desk_and_phone_in_light_and_dark() {
         browser.look_through(screen);
         browser.eval("scrollTo(0, 0)");
         browser.until("new Promise((done) => setTimeout(() => done(true), 300))");
-        settled(&browser);
+        wait_until_idle(&browser);
         browser.picture(&format!("playground-all-{}", screen.name));
         let wide = browser.eval("document.documentElement.scrollWidth");
-        assert_eq!(wide, browser.eval("innerWidth"), "{}: it scrolls sideways", screen.name);
+        assert_eq!(wide, browser.eval("innerWidth"), "{}: horizontal scrolling", screen.name);
         assert_eq!(nameless(&browser), Vec::<String>::new(), "{}", screen.name);
-        // axe-core itself asks for the style sheets, which the policy refuses.
+        // axe-core requests the style sheets, which the policy blocks.
         assert_clean(&browser);
         assert_eq!(axe(&browser), Vec::<String>::new(), "{}", screen.name);
-        browser.complaints();
+        browser.warnings();
     }
 }

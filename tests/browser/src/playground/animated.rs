@@ -1,4 +1,4 @@
-//! Pictures joined to one that moves.
+//! Animated PNG from a series of pictures.
 
 use std::{
     collections::HashMap,
@@ -11,11 +11,12 @@ use png::{BitDepth, BlendOp, ColorType, Decoder, DisposeOp, Encoder, Transformat
 
 type Colour = [u8; 3];
 
-/// Colours of the picture; the one after them is that of the frame before.
+/// Size of the palette; the entry after it is transparent and keeps the previous frame's pixel.
 const COLOURS: usize = 255;
 
-/// Writes PNGs of one size as an animated PNG that begins anew for ever: each with how long it stands, milliseconds.
-/// It has the colours that are used most, and of each frame after the first what differs from the one before.
+/// Writes PNGs of equal size, each with its duration in milliseconds, as an endless animated PNG.
+/// The palette contains the most frequent colours; each frame after the first stores only changed
+/// pixels.
 pub(super) fn write(file: &Path, frames: &[(Vec<u8>, u16)]) {
     let pictures: Vec<([u32; 2], Vec<Colour>)> =
         frames.iter().map(|(png, _)| decode(png)).collect();
@@ -25,7 +26,8 @@ pub(super) fn write(file: &Path, frames: &[(Vec<u8>, u16)]) {
     let mut indices: Vec<Vec<u8>> = Vec::new();
     for (size, picture) in &pictures {
         assert_eq!(*size, [width, height], "all frames are of one size");
-        let index = |colour| *nearest.entry(colour).or_insert_with(|| place(&palette, colour));
+        let index =
+            |colour| *nearest.entry(colour).or_insert_with(|| nearest_index(&palette, colour));
         indices.push(picture.iter().copied().map(index).collect());
     }
     let out = BufWriter::new(File::create(file).expect("there is room"));
@@ -42,14 +44,14 @@ pub(super) fn write(file: &Path, frames: &[(Vec<u8>, u16)]) {
     encoder.set_compression(png::Compression::High);
     let mut writer = encoder.write_header().expect("a file");
     writer.set_dispose_op(DisposeOp::None).expect("animated");
-    for (at, (_, stands_ms)) in frames.iter().enumerate() {
-        writer.set_frame_delay(*stands_ms, 1000).expect("animated");
+    for (at, (_, duration_ms)) in frames.iter().enumerate() {
+        writer.set_frame_delay(*duration_ms, 1000).expect("animated");
         writer
             .set_blend_op(if at == 0 { BlendOp::Source } else { BlendOp::Over })
             .expect("animated");
-        let before = at.checked_sub(1).map(|before| &indices[before]);
-        let changed = |(place, index): (usize, &u8)| match before {
-            Some(before) if before[place] == *index => COLOURS as u8,
+        let previous = at.checked_sub(1).map(|previous| &indices[previous]);
+        let changed = |(position, index): (usize, &u8)| match previous {
+            Some(previous) if previous[position] == *index => COLOURS as u8,
             _ => *index,
         };
         let data: Vec<u8> = indices[at].iter().enumerate().map(changed).collect();
@@ -65,12 +67,12 @@ fn decode(png: &[u8]) -> ([u32; 2], Vec<Colour>) {
     let mut bytes = vec![0; reader.output_buffer_size().expect("a size")];
     let info = reader.next_frame(&mut bytes).expect("its picture");
     let samples = info.color_type.samples();
-    assert!(samples >= 3, "a picture of a page has colours");
+    assert!(samples >= 3, "a screenshot has colours");
     let colours = bytes.chunks_exact(samples).map(|pixel| [pixel[0], pixel[1], pixel[2]]);
     ([info.width, info.height], colours.collect())
 }
 
-/// The colours that are used most.
+/// Most frequent colours.
 fn palette(pictures: &[([u32; 2], Vec<Colour>)]) -> Vec<Colour> {
     let mut counts: HashMap<Colour, usize> = HashMap::new();
     for colour in pictures.iter().flat_map(|(_, picture)| picture) {
@@ -78,16 +80,16 @@ fn palette(pictures: &[([u32; 2], Vec<Colour>)]) -> Vec<Colour> {
     }
     let mut colours: Vec<(usize, Colour)> =
         counts.into_iter().map(|(colour, count)| (count, colour)).collect();
-    colours.sort_unstable_by(|one, other| other.cmp(one));
+    colours.sort_unstable_by(|a, b| b.cmp(a));
     colours.truncate(COLOURS);
     colours.into_iter().map(|(_, colour)| colour).collect()
 }
 
-/// Of the colour that is nearest.
-fn place(palette: &[Colour], colour: Colour) -> u8 {
-    let off = |other: &Colour| -> u32 {
-        other.iter().zip(colour).map(|(one, other)| u32::from(one.abs_diff(other)).pow(2)).sum()
+/// Index of the nearest colour of the palette.
+fn nearest_index(palette: &[Colour], colour: Colour) -> u8 {
+    let distance = |entry: &Colour| -> u32 {
+        entry.iter().zip(colour).map(|(a, b)| u32::from(a.abs_diff(b)).pow(2)).sum()
     };
-    let nearest = palette.iter().enumerate().min_by_key(|(_, other)| off(other));
+    let nearest = palette.iter().enumerate().min_by_key(|(_, entry)| distance(entry));
     nearest.map_or(0, |(at, _)| at as u8)
 }

@@ -1,4 +1,4 @@
-//! What the page reads is what the program reads.
+//! The page's readings equal the program's.
 
 use std::{fmt::Write as _, fs};
 
@@ -10,27 +10,27 @@ use sonard::{
     scene::{Scene, shipped},
 };
 
-use super::{open, told};
+use super::{eval_json, open};
 use crate::live_page::browser::{Browser, DESK};
 use sonard_test_support::{run, stderr};
 
-/// Poses tried in each scene: `SONARD_PLAYGROUND_POSES` for more.
+/// Poses per scene; `SONARD_PLAYGROUND_POSES` sets another number.
 const POSES: usize = 6;
 const STEP_DEG: f64 = 7.2;
-/// Beams of a full turn.
+/// Beams per sweep.
 const BEAMS: usize = 50;
-const REACH_M: f64 = 4.0;
-const SAME_M: f64 = 1e-9;
+const MAX_RANGE_M: f64 = 4.0;
+const TOLERANCE_M: f64 = 1e-9;
 
 #[test]
-fn readings_are_those_of_the_program_in_every_shipped_scene() {
+fn readings_equal_the_programs() {
     let browser = open(DESK);
-    let wanted = std::env::var("SONARD_PLAYGROUND_POSES").ok();
-    let count = wanted.and_then(|count| count.parse().ok()).unwrap_or(POSES);
+    let requested = std::env::var("SONARD_PLAYGROUND_POSES").ok();
+    let count = requested.and_then(|count| count.parse().ok()).unwrap_or(POSES);
     let folder = tempfile::tempdir().expect("a folder");
     let mut compared = 0;
-    let mut most_m: f64 = 0.0;
-    let mut apart: Vec<String> = Vec::new();
+    let mut max_m: f64 = 0.0;
+    let mut different: Vec<String> = Vec::new();
     for (name, text) in shipped::SCENES {
         let poses = poses(&Scene::from_json(text).expect("shipped"), count);
         let course = folder.path().join("course.csv");
@@ -41,19 +41,20 @@ fn readings_are_those_of_the_program_in_every_shipped_scene() {
         fs::write(&course, lines).expect("there is room");
         for (engine, poses) in [("paths", &poses[..]), ("fan", &poses[..1]), ("cone", &poses[..1])]
         {
-            let own = of_program(name, engine, &course.display().to_string());
-            for (pose, own) in poses.iter().zip(own.chunks(BEAMS)) {
-                let page = of_page(&browser, text, engine, pose);
-                assert_eq!(page.len(), own.len(), "{name} {pose:?}");
-                for (page, own) in page.iter().zip(own) {
-                    assert_eq!(page["status"], own["status"], "{name} {engine} {pose:?}: {own}");
-                    let [page_m, own_m] = [page, own].map(|ping| ping["range_m"].as_f64());
-                    assert_eq!(page_m.is_some(), own_m.is_some(), "{name} {pose:?}: {own}");
-                    if let Some((page_m, own_m)) = page_m.zip(own_m) {
-                        let off_m = (page_m - own_m).abs();
-                        most_m = most_m.max(off_m);
-                        if off_m > SAME_M {
-                            apart.push(format!("{name} {engine} {pose:?}: {page_m} and {own_m}"));
+            let expected = program_readings(name, engine, &course.display().to_string());
+            for (pose, expected) in poses.iter().zip(expected.chunks(BEAMS)) {
+                let actual = page_readings(&browser, text, engine, pose);
+                assert_eq!(actual.len(), expected.len(), "{name} {pose:?}");
+                for (actual, expected) in actual.iter().zip(expected) {
+                    let context = format!("{name} {engine} {pose:?}");
+                    assert_eq!(actual["status"], expected["status"], "{context}: {expected}");
+                    let [a, b] = [actual, expected].map(|ping| ping["range_m"].as_f64());
+                    assert_eq!(a.is_some(), b.is_some(), "{context}: {expected}");
+                    if let Some((a, b)) = a.zip(b) {
+                        let off_m = (a - b).abs();
+                        max_m = max_m.max(off_m);
+                        if off_m > TOLERANCE_M {
+                            different.push(format!("{context}: {a} and {b}"));
                         }
                     }
                     compared += 1;
@@ -62,14 +63,14 @@ fn readings_are_those_of_the_program_in_every_shipped_scene() {
         }
     }
     println!(
-        "{compared} readings of {count} poses a scene: {} apart by more than {SAME_M:e} m, the most by {most_m:e} m",
-        apart.len()
+        "{compared} readings, {count} poses per scene: {} differ by more than {TOLERANCE_M:e} m, at most by {max_m:e} m",
+        different.len()
     );
-    assert_eq!(apart, Vec::<String>::new());
+    assert_eq!(different, Vec::<String>::new());
     assert!(compared > 9 * count * BEAMS);
 }
 
-/// Where a ranger can stand, drawn by a seed.
+/// Random valid poses, with a fixed seed.
 fn poses(scene: &Scene, count: usize) -> Vec<Pose> {
     let mut rng = Pcg64Mcg::seed_from_u64(18);
     let middle = scene.poses.values().next().expect("a pose").position();
@@ -84,27 +85,28 @@ fn poses(scene: &Scene, count: usize) -> Vec<Pose> {
     candidates.take(200_000).filter(|pose| scene.check_pose(pose).is_ok()).take(count).collect()
 }
 
-fn of_program(scene: &str, engine: &str, course: &str) -> Vec<Value> {
-    let (step, reach) = (STEP_DEG.to_string(), REACH_M.to_string());
+fn program_readings(scene: &str, engine: &str, course: &str) -> Vec<Value> {
+    let (step, max_range) = (STEP_DEG.to_string(), MAX_RANGE_M.to_string());
     let simulate = ["simulate", "--scene", scene, "--poses", course, "--engine", engine];
-    let output = run(&[&simulate[..], &["--step-deg", &step, "--max-range", &reach]].concat());
+    let output = run(&[&simulate[..], &["--step-deg", &step, "--max-range", &max_range]].concat());
     assert!(output.status.success(), "{}", stderr(&output));
     let text = String::from_utf8(output.stdout).expect("UTF-8");
     let records = text.lines().map(|line| serde_json::from_str::<Value>(line).expect("JSON"));
     records.filter(|record| record["type"] == "ping").collect()
 }
 
-fn of_page(browser: &Browser, scene: &str, engine: &str, pose: &Pose) -> Vec<Value> {
+fn page_readings(browser: &Browser, scene: &str, engine: &str, pose: &Pose) -> Vec<Value> {
     let settings = json!({
-        "scene": scene, "sensor": "senscomp-6500", "options": {"max_range_m": REACH_M},
+        "scene": scene, "sensor": "senscomp-6500", "options": {"max_range_m": MAX_RANGE_M},
         "air": {"temperature_c": 20, "humidity_percent": 50},
     });
     let plan = json!({"from_deg": 0, "to_deg": 360, "step_deg": STEP_DEG, "pings_per_stop": 1});
-    let ask = |request: Value| {
-        told(browser, &format!("playground.ask({{kind: 'ask', request: {request}}})"))
+    let send = |request: Value| {
+        let message = format!("{{kind: 'request', request: {request}}}");
+        eval_json(browser, &format!("playground.request({message})"))
     };
-    ask(json!({"ask": "set", "settings": settings}));
-    ask(json!({"ask": "stand", "engine": engine, "pose": pose, "plan": plan}));
-    let told = ask(json!({"ask": "more", "engine": engine, "count": 1000}));
-    told["readings"].as_array().expect("readings").clone()
+    send(json!({"type": "configure", "settings": settings}));
+    send(json!({"type": "start_sweep", "engine": engine, "pose": pose, "plan": plan}));
+    let response = send(json!({"type": "next_readings", "engine": engine, "count": 1000}));
+    response["readings"].as_array().expect("readings").clone()
 }

@@ -1,18 +1,18 @@
-//! How long it takes from a move of the ranger to the picture, and what stays afterwards.
+//! Measurements of drawing time, memory and idle CPU time.
 
 use std::time::Duration;
 
 use serde_json::{Value, json};
 
-use super::{open, set, told};
+use super::{eval_json, open, set};
 use crate::live_page::browser::{Browser, DESK};
 
-/// Moves of the ranger that are timed.
+/// Number of timed moves of the ranger.
 const MOVES: usize = 200;
 
 #[test]
-#[ignore = "prints figures"]
-fn figures_of_drawing_and_memory() {
+#[ignore = "prints measurements"]
+fn measure_drawing_and_memory() {
     let browser = open(DESK);
     set(&browser, "scene", "simple-room");
     let before = memory(&browser);
@@ -20,12 +20,12 @@ fn figures_of_drawing_and_memory() {
     times.sort_by(f64::total_cmp);
     let (median, p95) = (times[MOVES / 2], times[MOVES * 95 / 100]);
     println!(
-        "400 beams in simple-room, from the move to the picture: median {median:.1} ms, 95th percentile {p95:.1} ms"
+        "400 beams in simple-room, from move to picture: median {median:.1} ms, 95th percentile {p95:.1} ms"
     );
     println!(
-        "heap of the page before and after {MOVES} sweeps, memory of the model: {before:?}, {after:?} bytes"
+        "page heap and model memory before and after {MOVES} sweeps: {before:?}, {after:?} bytes"
     );
-    // A page that nobody touches does nothing.
+    // An idle page uses no CPU time.
     let busy_s = |browser: &Browser| {
         let metrics = browser.devtools("Performance.getMetrics", &json!({}));
         let metrics = metrics["metrics"].as_array().expect("metrics").clone();
@@ -39,18 +39,18 @@ fn figures_of_drawing_and_memory() {
     println!("busy for {:.1} % while idle", 50.0 * idle_s);
 }
 
-/// How long each picture took, milliseconds.
+/// Time of each picture, milliseconds.
 fn move_about(browser: &Browser) -> Vec<f64> {
-    let times = told(
+    let times = eval_json(
         browser,
         &format!(
-            "(async () => {{ const {{took, change, idle}} = playground; \
+            "(async () => {{ const {{times_ms, change, idle}} = playground; \
              const frame = () => new Promise((done) => requestAnimationFrame(done)); \
              for (let i = 0; i < {MOVES}; i++) {{ \
                const at = 0.3 + 0.2 * Math.sin(0.05 * i); \
                change({{pose: {{x_m: at, y_m: 0.35 + 0.1 * Math.cos(0.05 * i), heading_deg: i}}}}, true); \
                do {{ await frame(); }} while (!idle()); }} \
-             return took.slice(-{MOVES}); }})()"
+             return times_ms.slice(-{MOVES}); }})()"
         ),
     );
     let times: Vec<f64> =
@@ -59,10 +59,10 @@ fn move_about(browser: &Browser) -> Vec<f64> {
     times
 }
 
-/// Bytes that the page's scripts hold, and that the model has.
+/// Heap of the page and memory of the model, bytes.
 fn memory(browser: &Browser) -> [f64; 2] {
     browser.devtools("HeapProfiler.collectGarbage", &json!({}));
     let heap = browser.devtools("Runtime.getHeapUsage", &json!({}));
-    let model = told(browser, "playground.ask({kind: 'memory'})");
+    let model = eval_json(browser, "playground.request({kind: 'memory'})");
     [&heap["usedSize"], &model["bytes"]].map(|bytes| bytes.as_f64().expect("a number"))
 }

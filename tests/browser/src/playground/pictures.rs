@@ -2,25 +2,25 @@
 
 use std::{fs, path::Path};
 
-use super::{animated, assert_clean, open, set, settled, told};
+use super::{animated, assert_clean, eval_json, open, set, wait_until_idle};
 use crate::live_page::browser::{DESK, PHONE_DARK, Screen};
 
-/// Wide enough for two columns, of which the left one is shown.
+/// Minimum width with two columns, of which the left one is recorded.
 const NARROW: Screen = Screen { name: "narrow", size: (940, 900), phone: false, dark: false };
-/// Frames of the animated picture, and how far apart they are.
+/// Number and interval of the animation's frames.
 const FRAMES: u32 = 36;
 const FRAME_MS: u16 = 130;
-/// What README.md may load for it, bytes.
-const MOST_BYTES: u64 = 600_000;
+/// Maximum size of the animation in README.md.
+const MAX_BYTES: u64 = 600_000;
 
 const DESK_WIDE: Screen = Screen { name: "desk", size: (1280, 1010), phone: false, dark: false };
 
 #[test]
-fn pictures_of_desk_phone_and_engines_are_made() {
+fn desk_phone_and_engines() {
     let browser = open(DESK_WIDE);
     browser.click("#tour-next");
-    settled(&browser);
-    browser.until("document.getElementById('summary').textContent.includes('all 400')");
+    wait_until_idle(&browser);
+    browser.until("document.getElementById('summary').textContent.includes('400 beams with')");
     browser.picture("playground-desk");
     browser.look_through(PHONE_DARK);
     browser.until("new Promise((done) => setTimeout(() => done(true), 400))");
@@ -33,12 +33,12 @@ fn pictures_of_desk_phone_and_engines_are_made() {
     assert_clean(&browser);
 }
 
-/// The ranger is drawn away from the near wall, until it hears it.
+/// Moves the ranger away from the near wall until it detects the wall directly.
 #[test]
-fn an_animated_picture_of_the_false_wall_is_made() {
+fn false_wall_animation() {
     let browser = open(NARROW);
     browser.click("#tour-next");
-    settled(&browser);
+    wait_until_idle(&browser);
     let mut frames = Vec::new();
     for frame in 0..=FRAMES {
         let share = f64::from(frame) / f64::from(FRAMES);
@@ -47,25 +47,25 @@ fn an_animated_picture_of_the_false_wall_is_made() {
             0.774 - 0.25 * share,
             0.085 + 0.45 * share
         );
-        told(&browser, &format!("playground.change({{pose: {pose}}}, true)"));
-        settled(&browser);
+        eval_json(&browser, &format!("playground.change({{pose: {pose}}}, true)"));
+        wait_until_idle(&browser);
         if frame == 0 || frame == FRAMES {
-            // What is said once it rests.
+            // The summary follows after a delay.
             browser.until("new Promise((done) => setTimeout(() => done(true), 600))");
         }
         browser.until_drawn();
-        let stands_ms = if frame == 0 || frame == FRAMES { 1800 } else { FRAME_MS };
-        frames.push((browser.picture_of(".floor"), stands_ms));
+        let duration_ms = if frame == 0 || frame == FRAMES { 1800 } else { FRAME_MS };
+        frames.push((browser.picture_of(".floor"), duration_ms));
     }
-    let first = told(&browser, "playground.scan().beams.get(300).range_m").as_f64();
+    let first = eval_json(&browser, "playground.scan().beams.get(300).range_m").as_f64();
     assert!(
         first.is_some_and(|range_m| (range_m - 0.535).abs() < 0.01),
         "{first:?}: the near wall"
     );
     let file = Path::new(env!("CARGO_TARGET_TMPDIR")).with_file_name("page/playground.png");
     animated::write(&file, &frames);
-    let bytes = fs::metadata(&file).expect("it was made").len();
+    let bytes = fs::metadata(&file).expect("the animation").len();
     println!("{}: {} frames, {bytes} bytes", file.display(), frames.len());
-    assert!(bytes < MOST_BYTES, "{bytes} bytes");
+    assert!(bytes < MAX_BYTES, "{bytes} bytes");
     assert_clean(&browser);
 }

@@ -1,13 +1,15 @@
-// The daemon's API: requests with the token, and the live stream that mends itself.
+// Client of the daemon's HTTP API: authorized requests, and a live stream that reconnects.
 
-const TOKEN = "sonard-token";
-const FIRST_WAIT_MS = 500;
-const LONGEST_WAIT_MS = 5000;
-// The stream shows a sign of life every 15 s.
-const SILENCE_MS = 40000;
+import { sentences } from "./format.js";
 
-/** An answer that is not the one hoped for, in the daemon's own words. */
-export class Refused extends Error {
+const TOKEN_KEY = "sonard-token";
+const MIN_BACKOFF_MS = 500;
+const MAX_BACKOFF_MS = 5000;
+/** Timeout of the live stream, which sends a keep-alive every 15 s. */
+const STREAM_TIMEOUT_MS = 40000;
+
+/** Error response of the daemon, with its message and advice. */
+export class ApiError extends Error {
   constructor(status, problem) {
     super(problem.error);
     this.status = status;
@@ -15,77 +17,80 @@ export class Refused extends Error {
   }
 }
 
-let wake = () => {};
-let asking = null;
-let declined = false;
+/** Ends the current back-off. */
+let retryNow = () => {};
+/** Open token dialog, shared by all requests that wait for it. */
+let prompt = null;
+/** Whether the last token dialog was cancelled; reads then fail without another dialog. */
+let cancelled = false;
 
 /** @typedef {{method?: string, body?: object, signal?: AbortSignal}} Request */
 
-/** The JSON of an answer; asks for the token where one is wanted. @param {string} path @param {Request} [request] */
-export const ask = async (path, request = {}) => (await answerTo(path, request)).json();
+/** Returns the JSON of a response; opens the token dialog on 401. @param {string} path @param {Request} [request] */
+export const requestJson = async (path, request = {}) => (await fetchAuthorized(path, request)).json();
 
-/** An answer as a file. @param {string} path @returns {Promise<Blob>} */
-export const askFile = async (path) => (await answerTo(path, {})).blob();
+/** Returns the body of a response as a file. @param {string} path @returns {Promise<Blob>} */
+export const requestFile = async (path) => (await fetchAuthorized(path, {})).blob();
 
 /** @param {string} path @param {Request} request */
-async function answerTo(path, { method = "GET", body, signal } = {}) {
+async function fetchAuthorized(path, { method = "GET", body, signal } = {}) {
   for (;;) {
     const response = await send(path, { method, body, signal });
     if (response.ok || (path === "/v1/health" && response.status === 503)) return response;
-    const refused = await refusal(response);
-    const wants = refused.status === 401 && (method !== "GET" || !declined);
-    if (!wants || !(await askToken(refused))) throw refused;
+    const error = await errorOf(response);
+    const needsToken = error.status === 401 && (method !== "GET" || !cancelled);
+    if (!needsToken || !(await promptForToken(error))) throw error;
   }
 }
 
-/** Follows a stream of events for ever; `onState` hears whether it is there. */
-export async function follow(path, onLine, onState) {
-  let wait = FIRST_WAIT_MS;
+/** Follows an event stream forever, reconnecting with back-off; `onState` receives `true` on connect and `false` on loss. */
+export async function subscribe(path, onLine, onState) {
+  let backoff_ms = MIN_BACKOFF_MS;
   for (;;) {
     const stop = new AbortController();
     try {
       const response = await send(path, { signal: stop.signal });
-      if (!response.ok) throw await refusal(response);
-      wait = FIRST_WAIT_MS;
+      if (!response.ok) throw await errorOf(response);
+      backoff_ms = MIN_BACKOFF_MS;
       onState(true);
       await readEvents(response.body, onLine, stop);
     } catch (/** @type {any} */ error) {
-      if (error instanceof Refused && error.status === 401 && !declined) await askToken(error);
+      if (error instanceof ApiError && error.status === 401 && !cancelled) await promptForToken(error);
     }
     onState(false);
     await new Promise((/** @type {(value?: any) => void} */ done) => {
-      wake = done;
-      setTimeout(done, wait);
+      retryNow = done;
+      setTimeout(done, backoff_ms);
     });
-    wait = Math.min(2 * wait, LONGEST_WAIT_MS);
+    backoff_ms = Math.min(2 * backoff_ms, MAX_BACKOFF_MS);
   }
 }
 
-/** Tries the stream again at once: the daemon is known to be back. */
-export const hurry = () => wake();
+/** Reconnects the stream without waiting for the back-off. */
+export const reconnectNow = () => retryNow();
 
 /** @param {string} path @param {Request} request */
 function send(path, { method = "GET", body, signal } = {}) {
   /** @type {Record<string, string>} */
   const headers = {};
-  const token = sessionStorage.getItem(TOKEN);
+  const token = sessionStorage.getItem(TOKEN_KEY);
   if (token) headers.Authorization = `Bearer ${token}`;
   if (body !== undefined) headers["Content-Type"] = "application/json";
   const text = body === undefined ? undefined : JSON.stringify(body);
   return fetch(path, { method, headers, body: text, signal, cache: "no-store" });
 }
 
-async function refusal(response) {
+async function errorOf(response) {
   const problem = await response.json().catch(() => ({}));
-  return new Refused(response.status, { error: problem.error ?? response.statusText, help: problem.help ?? "" });
+  return new ApiError(response.status, { error: problem.error ?? response.statusText, help: problem.help ?? "" });
 }
 
 async function readEvents(body, onLine, stop) {
   const reader = body.pipeThrough(new TextDecoderStream()).getReader();
   let rest = "";
   for (;;) {
-    const silence = setTimeout(() => stop.abort(), SILENCE_MS);
-    const { value, done } = await reader.read().finally(() => clearTimeout(silence));
+    const timeout = setTimeout(() => stop.abort(), STREAM_TIMEOUT_MS);
+    const { value, done } = await reader.read().finally(() => clearTimeout(timeout));
     if (done) return;
     const lines = (rest + value).split("\n");
     rest = lines.pop();
@@ -93,15 +98,15 @@ async function readEvents(body, onLine, stop) {
   }
 }
 
-/** Asks for the token, once however many requests want it; whether there is one now. */
-function askToken(refused) {
-  asking ??= showDialog(refused).finally(() => (asking = null));
-  return asking;
+/** Opens the token dialog, or joins the open one; resolves to `true` if a token was entered. */
+function promptForToken(error) {
+  prompt ??= showDialog(error).finally(() => (prompt = null));
+  return prompt;
 }
 
-function showDialog(refused) {
+function showDialog(error) {
   const [dialog, input] = ["token", "token-text"].map((id) => /** @type {any} */ (document.getElementById(id)));
-  document.getElementById("token-why").textContent = `The daemon says: ${refused.message}.`;
+  document.getElementById("token-why").textContent = sentences(error.message);
   input.value = "";
   dialog.returnValue = "";
   dialog.showModal();
@@ -109,11 +114,11 @@ function showDialog(refused) {
     dialog.addEventListener(
       "close",
       () => {
-        const given = dialog.returnValue === "use" && input.value.trim() !== "";
-        if (given) sessionStorage.setItem(TOKEN, input.value.trim());
+        const entered = dialog.returnValue === "ok" && input.value.trim() !== "";
+        if (entered) sessionStorage.setItem(TOKEN_KEY, input.value.trim());
         input.value = "";
-        declined = !given;
-        done(given);
+        cancelled = !entered;
+        done(entered);
       },
       { once: true },
     );

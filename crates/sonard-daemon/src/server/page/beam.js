@@ -1,170 +1,167 @@
-// The panel of the selected beam: its reading at once, its echoes and the model's paths when they
-// have been told.
+// Panel of the selected beam: the reading, then its measured echoes and predicted arrivals once they are loaded.
 
 import { MARKS } from "./verdicts.js";
-import * as words from "./words.js";
+import * as format from "./format.js";
 
-// Somebody who holds an arrow key down passes over beams.
-const PAUSE_MS = 120;
-// A beam that is read anew all the time is asked about only so often: the model takes its time.
-const ANEW_MS = 2000;
+/** Delay before details are requested, so that a held arrow key does not request every beam it passes. */
+const REQUEST_DELAY_MS = 120;
+/** Minimum interval between requests for the same beam, which the model computes each time. */
+const REFRESH_INTERVAL_MS = 2000;
 
 export class BeamPanel {
   /**
-   * Calls `onPath(points)` when the path of some sound is to be drawn. `askAbout(ping, signal)` gets the
-   * details of a reading; without it whoever has them calls `showDetails`.
+   * `onPath(points)` is called with the propagation path to draw. `fetchDetails(ping, signal)` loads the details
+   * of a reading; without it the owner calls `showDetails`.
    */
-  constructor(panel, onPath, askAbout = null) {
+  constructor(panel, onPath, fetchDetails = null) {
     this.panel = panel;
     this.onPath = onPath;
-    this.askAbout = askAbout;
+    this.fetchDetails = fetchDetails;
     this.request = new AbortController();
     this.facts = document.createElement("div");
     this.details = document.createElement("div");
     this.ping = null;
-    this.asking = false;
-    this.asked = 0;
+    this.loading = false;
+    this.requestedAt = 0;
   }
 
   clear() {
     this.request.abort();
-    [this.ping, this.asking] = [null, false];
-    const hint = document.createElement("p");
-    hint.className = "hint";
-    hint.textContent = "Click a beam on the plan or the residuals, or move the slider with the arrow keys.";
-    this.panel.replaceChildren(hint);
+    [this.ping, this.loading] = [null, false];
+    this.panel.replaceChildren(note("Click a beam on the plan or the residuals, or move the slider with the arrow keys."));
   }
 
-  /** Shows a reading; details of the same beam's reading of before stay until those of this one are known. */
+  /** Shows a reading. Details of the beam's previous reading stay until the new ones are loaded. */
   show(ping) {
-    const anew = ping.index === this.ping?.index;
+    const sameBeam = ping.index === this.ping?.index;
     this.ping = ping;
     this.facts.replaceChildren(...reading(ping));
-    if (!anew) this.details.replaceChildren();
+    if (!sameBeam) this.details.replaceChildren();
     this.panel.replaceChildren(this.facts, this.details);
-    if (this.askAbout && (!anew || !this.asking)) this.learn(anew ? this.asked + ANEW_MS - performance.now() : 0);
+    if (this.fetchDetails && (!sameBeam || !this.loading)) {
+      this.load(sameBeam ? this.requestedAt + REFRESH_INTERVAL_MS - performance.now() : 0);
+    }
   }
 
-  /** Asks the daemon about the reading, after a pause, and about the one that has come meanwhile. */
-  async learn(pause_ms) {
+  /** Loads the details of the current reading after a delay, and again if another reading arrives meanwhile. */
+  async load(delay_ms) {
     this.request.abort();
     this.request = new AbortController();
     const { signal } = this.request;
-    this.asking = true;
-    await new Promise((done) => setTimeout(done, Math.max(PAUSE_MS, pause_ms)));
+    this.loading = true;
+    await new Promise((done) => setTimeout(done, Math.max(REQUEST_DELAY_MS, delay_ms)));
     if (signal.aborted) return;
-    this.asked = performance.now();
+    this.requestedAt = performance.now();
     const { scan } = this.ping;
     try {
-      const beam = await this.askAbout(this.ping, signal);
+      const beam = await this.fetchDetails(this.ping, signal);
       this.onPath(beam.polyline);
       this.showDetails(beam);
     } catch (/** @type {any} */ error) {
-      if (!signal.aborted) this.details.replaceChildren(note(`The daemon did not tell more: ${error.message}`));
+      if (!signal.aborted) this.details.replaceChildren(note(format.failure("No details", error)));
     }
     if (signal.aborted) return;
-    this.asking = false;
-    if (this.ping.scan !== scan) this.learn(ANEW_MS);
+    this.loading = false;
+    if (this.ping.scan !== scan) this.load(REFRESH_INTERVAL_MS);
   }
 
-  /** Echoes and paths; of readings of the model alone, which have no echoes, paths. */
+  /** Shows measured echoes and predicted arrivals; a simulated reading has no echo list. */
   showDetails(beam) {
-    const heard = beam.echoes ? echoes(beam) : [];
-    this.details.replaceChildren(...heard, ...this.peaks(beam));
+    this.details.replaceChildren(...(beam.echoes ? echoes(beam) : []), ...this.arrivals(beam));
   }
 
-  /** What the model hears; each sound draws its path. */
-  peaks(beam) {
+  /** Predicted arrivals; a click on one draws its propagation path. */
+  arrivals(beam) {
     if (beam.lacks) return [note(`No paths: ${beam.lacks}.`)];
     const list = document.createElement("ul");
     list.className = "peaks";
     const peaks = beam.peaks ?? [];
-    const drawn = drawnOf(peaks, beam);
-    for (const peak of peaks) list.append(this.peak(peak, peak === drawn, list));
-    if (!list.children.length) return [heading("What the model hears"), note("nothing that comes near the threshold")];
-    return [heading("What the model hears: range, over the threshold, path"), list];
+    const drawn = peakOfReading(peaks, beam);
+    for (const peak of peaks) list.append(this.arrival(peak, peak === drawn, list));
+    if (!list.children.length) return [heading("Predicted arrivals"), note("no arrival near the threshold")];
+    return [heading("Predicted arrivals: range, level above threshold, path"), list];
   }
 
-  peak(peak, drawn, list) {
+  arrival(peak, drawn, list) {
     const item = document.createElement("li");
     const button = item.appendChild(document.createElement("button"));
     button.type = "button";
     button.ariaPressed = String(drawn);
-    const texts = [words.metres(peak.range_m), words.decibels(peak.margin_db), words.path(peak.path)];
+    const texts = [format.metres(peak.range_m), format.decibels(peak.margin_db), format.interactions(peak.path)];
     for (const text of texts) button.appendChild(document.createElement("span")).textContent = text;
     button.addEventListener("click", () => {
-      for (const other of list.querySelectorAll("button")) other.ariaPressed = String(other === button);
+      for (const sibling of list.querySelectorAll("button")) sibling.ariaPressed = String(sibling === button);
       this.onPath(peak.polyline);
     });
     return item;
   }
 }
 
-/** Which of the model's sounds the path of a beam's reading is: as many points, each within a millimetre;
- * of several, the one that meets the same in the same order. */
-function drawnOf(peaks, { polyline, reading }) {
-  const near = (points) => points.every(([x, y], i) => Math.hypot(x - polyline[i][0], y - polyline[i][1]) < 1e-3);
-  const same = peaks.filter((peak) => peak.polyline.length === polyline?.length && near(peak.polyline));
-  const named = words.path(reading.path ?? reading.sim?.path);
-  return same.find((peak) => words.path(peak.path) === named) ?? same[0];
+/** Arrival whose path is the reading's: as many vertices, each within a millimetre. If several match, the one
+ * with the same interactions in the same order is returned. */
+function peakOfReading(peaks, { polyline, reading }) {
+  const isNear = (points) => points.every(([x, y], i) => Math.hypot(x - polyline[i][0], y - polyline[i][1]) < 1e-3);
+  const matches = peaks.filter((peak) => peak.polyline.length === polyline?.length && isNear(peak.polyline));
+  const label = format.pathLabel(reading.path ?? reading.sim?.path);
+  return matches.find((peak) => format.pathLabel(peak.path) === label) ?? matches[0];
 }
 
-/** A reading in one line, as the slider says it. */
-export function inWords(ping) {
-  const parts = [`beam ${ping.index}${ranger(ping)}, azimuth ${words.degrees(ping.azimuth_deg)}`, MARKS[ping.mark].words];
-  if (ping.range_m !== null) parts.push(words.metres(ping.range_m));
-  if (ping.sim?.range_m != null) parts.push(`model ${words.metres(ping.sim.range_m)}`);
+/** One-line description of a reading, as shown next to the slider and read out by screen readers. */
+export function describeReading(ping) {
+  const parts = [`beam ${ping.index}${ranger(ping)}, azimuth ${format.degrees(ping.azimuth_deg)}`, MARKS[ping.mark].label];
+  if (ping.range_m !== null) parts.push(format.metres(ping.range_m));
+  if (ping.sim?.range_m != null) parts.push(`predicted ${format.metres(ping.sim.range_m)}`);
   return parts.join(", ");
 }
 
 const ranger = (ping) => (ping.ranger ? `, ${ping.ranger}` : "");
 
-function place(viewpoint) {
-  if (!viewpoint) return "its scan does not say where";
+function viewpointFacts(viewpoint) {
+  if (!viewpoint) return [["Position", "unknown (not in the log)"]];
   const { x_m, y_m, direction_deg } = viewpoint;
-  return `${x_m.toFixed(3)}, ${y_m.toFixed(3)} m, looking to ${words.degrees(direction_deg)}`;
+  return [["Position", `(${x_m.toFixed(3)}, ${y_m.toFixed(3)}) m`], ["Beam direction", format.degrees(direction_deg)]];
 }
 
 function reading(ping) {
   const title = document.createElement("p");
   title.className = "reading";
   const about = document.createElement("small");
-  about.textContent = ` ${MARKS[ping.mark].words}`;
-  title.append(ping.range_m === null ? "no range" : words.metres(ping.range_m), about);
+  about.textContent = ` ${MARKS[ping.mark].label}`;
+  title.append(ping.range_m === null ? "no range" : format.metres(ping.range_m), about);
   const list = document.createElement("dl");
   list.className = "facts";
   const facts = [
-    ["Beam", `${ping.index}${ranger(ping)} at ${words.degrees(ping.azimuth_deg)}`],
-    ["Taken from", place(ping.viewpoint)],
+    ["Beam", `${ping.index}${ranger(ping)} at ${format.degrees(ping.azimuth_deg)}`],
+    ...viewpointFacts(ping.viewpoint),
     ["Time of flight", ping.tof_us === null ? "–" : `${ping.tof_us.toFixed(1)} µs`],
   ];
   if (ping.sim) {
     facts.push(
-      ["Model", ping.sim.range_m === null ? ping.sim.status.replace("_", " ") : words.metres(ping.sim.range_m)],
-      ["Residual", words.millimetres(ping.residual_m)],
-      ["Over the threshold", ping.sim.margin_db === null ? "–" : words.decibels(ping.sim.margin_db)],
-      ["Path", words.path(ping.sim.path)],
+      ["Predicted range", ping.sim.range_m === null ? ping.sim.status.replace("_", " ") : format.metres(ping.sim.range_m)],
+      ["Residual", format.millimetres(ping.residual_m)],
+      ["Level above threshold", ping.sim.margin_db === null ? "–" : format.decibels(ping.sim.margin_db)],
+      ["Path", format.pathLabel(ping.sim.path)],
     );
   } else if (ping.path) {
-    facts.push(["Over the threshold", words.decibels(ping.margin_db)], ["Path", words.path(ping.path)]);
+    facts.push(["Level above threshold", format.decibels(ping.margin_db)], ["Path", format.pathLabel(ping.path)]);
   }
   const crosstalk = ping.crosstalk ?? ping.sim?.crosstalk;
-  if (crosstalk) facts.push(["Crosstalk", words.crosstalk(crosstalk)]);
-  if (ping.repaired) facts.push(["Line", "fetched again after the line lost it"]);
-  words.facts(list, facts);
+  if (crosstalk) facts.push(["Crosstalk", format.crosstalkLabel(crosstalk)]);
+  if (ping.repaired) facts.push(["Serial link", "reading re-requested after a line error"]);
+  format.showFacts(list, facts);
   return [title, list];
 }
 
 function echoes({ echoes }) {
-  if (!echoes.length) return [heading("Echoes heard"), note("none")];
+  if (!echoes.length) return [heading("Measured echoes"), note("none")];
   const list = document.createElement("ol");
   list.className = "echoes";
   for (const [i, echo] of echoes.entries()) {
     const time = echo.tof_us === null ? "" : `, ${echo.tof_us.toFixed(1)} µs`;
     list.appendChild(document.createElement("li")).textContent =
-      `${i + 1}. ${words.metres(echo.range_m)}${time} (${echo.ticks} ticks)`;
+      `${i + 1}. ${format.metres(echo.range_m)}${time} (${echo.ticks} ticks)`;
   }
-  return [heading("Echoes heard"), list];
+  return [heading("Measured echoes"), list];
 }
 
 function heading(text) {

@@ -1,21 +1,22 @@
-// Start and stop.
+// Start and stop buttons.
 
-import { ask } from "./api.js";
+import { requestJson } from "./api.js";
+import { count, failure } from "./format.js";
 
-/** `say` shows a sentence to everybody, also to those who listen. */
-export function control(form, stop, say) {
-  const order = async (path, body, done) => {
+/** Connects the form and the stop button; `announce` shows a sentence in the live region. */
+export function addControls(form, stop, announce) {
+  const post = async (path, body, done) => {
     try {
-      await ask(path, { method: "POST", body });
-      say(done);
+      await requestJson(path, { method: "POST", body });
+      announce(done);
     } catch (/** @type {any} */ error) {
-      say(error.status ? `Refused: ${error.message}. ${error.help}` : "The daemon does not answer.");
+      announce(failure("Rejected", error));
     }
   };
   form.addEventListener("submit", (event) => {
     event.preventDefault();
     const scans = Number(form.elements.scans.value);
-    order("/v1/start", { scans }, scans === 1 ? "One scan asked for." : `${scans} scans asked for.`);
+    post("/v1/start", { scans }, `${count(scans, "scan")} requested`);
   });
-  stop.addEventListener("click", () => order("/v1/stop", {}, "Stopped: no scan begins until the next start."));
+  stop.addEventListener("click", () => post("/v1/stop", {}, "Scanning stopped."));
 }

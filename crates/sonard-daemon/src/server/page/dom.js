@@ -1,7 +1,7 @@
-// Elements of the page, made in place.
+// Creation of page elements.
 
 /**
- * An element with properties and children.
+ * Creates an element with properties and children.
  * @param {string} name
  * @param {object} [properties]
  * @param {(Node | string)[]} children

@@ -1,24 +1,24 @@
-// What was found in a scan, on the floor plan: occupancy, fitted lines, and planes, corners and edges.
+// Interpretation results on the floor plan: occupancy map, fitted lines, and features (planes, corners, edges).
 
-import { circle, line } from "./pens.js";
+import { circle, line } from "./layers.js";
 
-/** Shades of the map; cells of one shade beside each other are drawn as one. */
+/** Number of grey levels of the map; adjacent cells of equal level are drawn as one rectangle. */
 const SHADES = 6;
 const LETTERS = { plane: "P", corner: "C", edge: "E", unresolved: "?" };
 
-/** @param {any} layer @param {any} plan @param {any} found @param {Set<string>} wanted */
-export function drawFindings(layer, plan, found, wanted) {
-  if (wanted.has("map") && found.map) drawMap(layer, plan, found.map);
-  if (wanted.has("lines")) for (const one of found.lines) drawLine(layer, plan, one);
+/** @param {any} layer @param {any} plan @param {any} found @param {Set<string>} enabled */
+export function drawFindings(layer, plan, found, enabled) {
+  if (enabled.has("map") && found.map) drawMap(layer, plan, found.map);
+  if (enabled.has("lines")) for (const segment of found.lines) drawLine(layer, plan, segment);
 }
 
-/** Above the readings: their letters are to be read. @param {any} layer @param {any} plan @param {any} found */
+/** Draws features above the readings, so that their letters stay legible. @param {any} layer @param {any} plan @param {any} found */
 export function drawFeatures(layer, plan, found) {
-  for (const one of found.features) drawFeature(layer, plan, one);
+  for (const feature of found.features) drawFeature(layer, plan, feature);
 }
 
 function drawMap(layer, { view, palette }, { origin: [x0, y0], resolution_m, width, cells }) {
-  // From free, below zero, to occupied.
+  // Below zero: free; above zero: occupied.
   const shade = (percent) => (percent < 0 ? 0 : Math.round(((percent - 50) / 50) * SHADES));
   for (let row = 0; row * width < cells.length; row++) {
     for (let from = 0; from < width; ) {
@@ -28,7 +28,7 @@ function drawMap(layer, { view, palette }, { origin: [x0, y0], resolution_m, wid
       while (to < width && shade(cells[at + to]) === now) to++;
       if (now) {
         const c = layer.pen(now > 0 ? "occupied" : "free", palette);
-        // On whole pixels: cells neither overlap nor leave gaps.
+        // Rounded to whole pixels, so that cells neither overlap nor leave gaps.
         const [x, y] = view.px([x0 + from * resolution_m, y0 + (row + 1) * resolution_m]).map(Math.round);
         const [right, low] = view.px([x0 + to * resolution_m, y0 + row * resolution_m]).map(Math.round);
         c.globalAlpha = ((now > 0 ? 0.6 : 0.3) * Math.abs(now)) / SHADES;
@@ -49,7 +49,7 @@ function drawLine(layer, { view, palette }, { from, to, confidence }) {
 
 function drawFeature(layer, { view, palette }, { kind, at }) {
   const px = view.px(at);
-  if (view.isBeyond(px)) return;
+  if (view.isOutside(px)) return;
   const c = layer.pen("feature", palette);
   const ink = c.fillStyle;
   c.fillStyle = palette["--panel"];

@@ -1,23 +1,23 @@
-// All robots that this daemon asks: a card each, with its state, its last scan and what is wrong.
+// Fleet page: one card per robot with its state, last scan and problems.
 
-import { ask } from "./api.js";
+import { requestJson } from "./api.js";
 import { make } from "./dom.js";
 import { drawGrid, drawScaleBar } from "./ground.js";
-import { disc, drawPose, Layer, line } from "./pens.js";
+import { disc, drawPose, Layer, line } from "./layers.js";
 import { colours } from "./verdicts.js";
 import { View } from "./view.js";
-import * as words from "./words.js";
+import * as format from "./format.js";
 
-const EVERY_MS = 1000;
+const POLL_INTERVAL_MS = 1000;
 const byId = (/** @type {string} */ id) => /** @type {any} */ (document.getElementById(id));
 
-/** Lamp and words of how a robot is, where it does not say itself. */
+/** Lamp and text of the states in which a robot sends no report of its own. */
 const STATES = {
-  unasked: ["wait", "not asked yet"],
-  silent: ["bad", "silent"],
-  refusing: ["bad", "refuses to answer"],
-  strange: ["bad", "no daemon answers there"],
-  other_robot: ["bad", "another robot answers"],
+  unasked: ["wait", "not polled yet"],
+  silent: ["bad", "offline"],
+  refusing: ["bad", "access denied"],
+  strange: ["bad", "unreachable"],
+  other_robot: ["bad", "different robot at this address"],
 };
 
 let palette = colours();
@@ -28,17 +28,17 @@ class Card {
   constructor() {
     this.title = make("h2");
     this.state = make("p", { className: "state" });
-    this.wrong = make("p", { className: "wrong" });
+    this.problems = make("p", { className: "problems" });
     this.canvas = make("canvas", { role: "img" });
     this.facts = make("dl", { className: "facts" });
-    this.item = make("li", {}, this.title, this.state, this.wrong, this.canvas, this.facts);
+    this.item = make("li", {}, this.title, this.state, this.problems, this.canvas, this.facts);
     this.layer = new Layer(this.canvas);
     this.view = new View();
-    /** The scan that is drawn, as JSON. */
+    /** JSON of the drawn scan. */
     this.drawn = "";
     /** @type {any} */
     this.picture = null;
-    /** Name, and address of its own page. @type {string | null} */
+    /** Name, and address of the robot's own page. @type {string | null} */
     this.name = null;
     this.page = null;
     new ResizeObserver(() => this.resize()).observe(this.canvas);
@@ -52,11 +52,11 @@ class Card {
       this.title.replaceChildren(robot.page ? make("a", { href: robot.page, rel: "noreferrer" }, name) : name);
     }
     this.item.dataset.lamp = lamp;
-    words.setText(this.state, robot.state === "well" ? state : `${state}, ${since(robot.since)}`);
-    words.setText(this.wrong, robot.wrong.join("; "));
-    this.wrong.hidden = robot.wrong.length === 0;
-    this.item.classList.toggle("old", !isHeard(robot));
-    words.facts(this.facts, facts(robot));
+    format.setText(this.state, robot.state === "well" ? state : `${state} since ${format.time(robot.since)}`);
+    format.setText(this.problems, robot.wrong.join("; "));
+    this.problems.hidden = robot.wrong.length === 0;
+    this.item.classList.toggle("stale", !isReporting(robot));
+    format.showFacts(this.facts, facts(robot));
     this.draw(robot.report?.last_scan?.picture ?? null, name);
   }
 
@@ -72,7 +72,7 @@ class Card {
     if (text === this.drawn) return;
     [this.drawn, this.picture] = [text, picture];
     this.canvas.hidden = !picture;
-    this.canvas.ariaLabel = picture ? `Floor plan: the last scan of ${name}, ${words.count(picture.points_m.length, "reading")}` : "No scan";
+    this.canvas.ariaLabel = picture ? `Floor plan: last scan of ${name}, ${format.count(picture.points_m.length, "reading")}` : "No scan";
     this.redraw();
   }
 
@@ -92,39 +92,40 @@ class Card {
   }
 }
 
-/** Whether it says itself how it is. */
-const isHeard = ({ state }) => state === "well" || state === "not_well";
+/** Returns `true` if the state comes from the robot's own report. */
+const isReporting = ({ state }) => state === "well" || state === "not_well";
 
-/** What the robot says of its ranger, if it was heard just now. */
+/** Lamp and text of a robot. */
 function stateOf({ state, report }) {
   if (STATES[state]) return STATES[state];
-  const [lamp, text] = words.state(report.link);
+  const [lamp, text] = format.linkState(report.link);
   return state === "not_well" ? ["bad", text] : [lamp, text];
 }
 
 function facts(robot) {
   const { report, address, heard_s } = robot;
-  if (!report) return [["Asked at", address]];
+  if (!report) return [["Address", address]];
   const { scan, last_reading_age_s, last_scan, provenance } = report;
   const share = last_scan?.agree_fraction ?? null;
-  const off_m = last_scan?.median_abs_residual_m ?? null;
+  const residual_m = last_scan?.median_abs_residual_m ?? null;
   return [
-    ["Readings", words.provenance(provenance) ?? (provenance ? "hardware" : "–")],
-    ["Scan", !isHeard(robot) ? "–" : scan ? `${scan.done} of ${words.count(scan.beams, "beam")}` : "none under way"],
+    ["Readings", format.provenanceLabel(provenance) ?? (provenance ? "hardware" : "–")],
+    ["Scan", !isReporting(robot) ? "–" : scan ? `${scan.done} of ${format.count(scan.beams, "beam")}` : "none running"],
     ["Last reading", last_reading_age_s === null ? "–" : `${ago(last_reading_age_s + heard_s)} ago`],
-    ["Last scan", last_scan ? words.clock(last_scan.ended) : "–"],
-    ["Agreement", share === null ? "–" : `${(100 * share).toFixed(0)} %, half within ${(1e3 * off_m).toFixed(0)} mm`],
+    ["Last scan", last_scan ? format.clock(last_scan.ended) : "–"],
+    ["Agreement", share === null ? "–" : `${(100 * share).toFixed(0)} %`],
+    ["Median residual", residual_m === null ? "–" : `${(1e3 * residual_m).toFixed(1)} mm`],
     ["Missing beams", last_scan ? `${last_scan.missing}` : "–"],
-    ["Heard", `${ago(heard_s)} ago, at ${address}`],
+    ["Last contact", `${ago(heard_s)} ago`],
+    ["Address", address],
   ];
 }
 
-/** An age in seconds, in words that do not change with every look. */
+/** Age as text, coarse enough not to change with every poll. */
 function ago(s) {
   return s < 5 ? "under 5 s" : s < 120 ? `${s.toFixed(0)} s` : s < 7200 ? `${(s / 60).toFixed(0)} min` : `${(s / 3600).toFixed(0)} h`;
 }
 
-const since = (time) => `since ${new Date(time).toLocaleTimeString(undefined, { hour12: false })}`;
 
 function show({ robots }) {
   while (cards.length < robots.length) cards.push(new Card());
@@ -133,32 +134,32 @@ function show({ robots }) {
     if (!cards[i].item.isConnected) byId("robots").append(cards[i].item);
     cards[i].show(robot);
   });
-  words.setText(byId("summary"), inWords(robots));
+  format.setText(byId("summary"), summaryText(robots));
 }
 
-/** Who is well and who is not; read out when it changes. */
-function inWords(robots) {
-  const named = (wanted) => robots.filter(wanted).map(({ robot, address }) => robot ?? address);
-  const well = named(({ state }) => state === "well").length;
-  const parts = [`${well} of ${words.count(robots.length, "robot")} well`];
-  const silent = named(({ state }) => state === "silent");
-  if (silent.length) parts.push(`silent: ${silent.join(", ")}`);
-  const others = named(({ state }) => state !== "well" && state !== "silent" && state !== "unasked");
-  if (others.length) parts.push(`not well: ${others.join(", ")}`);
+/** Healthy, offline and faulty robots; a live region that screen readers read when it changes. */
+function summaryText(robots) {
+  const namesOf = (filter) => robots.filter(filter).map(({ robot, address }) => robot ?? address);
+  const healthy = namesOf(({ state }) => state === "well").length;
+  const parts = [`${healthy} of ${robots.length} healthy`];
+  const offline = namesOf(({ state }) => state === "silent");
+  if (offline.length) parts.push(`offline: ${offline.join(", ")}`);
+  const faulty = namesOf(({ state }) => state !== "well" && state !== "silent" && state !== "unasked");
+  if (faulty.length) parts.push(`fault: ${faulty.join(", ")}`);
   return parts.join("; ");
 }
 
 function showTrouble(text) {
   byId("trouble").hidden = !text;
-  words.setText(byId("trouble"), text);
+  format.setText(byId("trouble"), text);
 }
 
-async function look() {
+async function poll() {
   try {
-    show(await ask("/v1/fleet", { signal: AbortSignal.timeout(5 * EVERY_MS) }));
+    show(await requestJson("/v1/fleet", { signal: AbortSignal.timeout(5 * POLL_INTERVAL_MS) }));
     showTrouble("");
   } catch (/** @type {any} */ error) {
-    showTrouble(error.status ? `The daemon refuses: ${error.message}. ${error.help}` : "The daemon that asks the robots does not answer. What is shown is what was known last.");
+    showTrouble(error.status ? format.failure("Rejected", error) : "No connection to the daemon; retrying. Showing the last known state.");
   }
 }
 
@@ -168,6 +169,6 @@ matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
 });
 
 for (;;) {
-  if (!document.hidden) await look();
-  await new Promise((done) => setTimeout(done, EVERY_MS));
+  if (!document.hidden) await poll();
+  await new Promise((done) => setTimeout(done, POLL_INTERVAL_MS));
 }

@@ -1,9 +1,9 @@
-// The lowest layer of the floor plan: grid, scale and scene.
+// Bottom layer of the floor plan: grid, scale bar and scene.
 
-import { circle, line } from "./pens.js";
+import { circle, line } from "./layers.js";
 
-/** Rooms with more walls than this are drawn without their names. */
-const MOST_NAMES = 24;
+/** Maximum number of walls whose names are drawn. */
+const MAX_NAMES = 24;
 const NAME_PX = 11;
 const FONT = "system-ui, sans-serif";
 
@@ -30,7 +30,7 @@ export function drawGrid(layer, view, palette) {
   c.stroke();
 }
 
-/** In the corner, on a ground of its own. */
+/** Draws the scale bar in the lower left corner, on an opaque background. */
 export function drawScaleBar({ c }, view, palette) {
   const step = gridStep(64 / view.scale);
   const length = step * view.scale;
@@ -40,7 +40,7 @@ export function drawScaleBar({ c }, view, palette) {
   c.setLineDash([]);
   c.fillStyle = palette["--panel"];
   c.fillRect(x - 6, y - 14, length + 20 + c.measureText(text).width, 22);
-  c.strokeStyle = c.fillStyle = palette["--quiet"];
+  c.strokeStyle = c.fillStyle = palette["--muted"];
   c.lineWidth = 1.5;
   line(c, [[x, y - 4], [x, y], [x + length, y], [x + length, y - 4]]);
   c.textAlign = "left";
@@ -56,10 +56,10 @@ export function drawScene(layer, view, palette, { walls, cylinders }) {
     circle(layer.pen(material.roughness > 0 ? "rough" : "wall", palette), view.px(center), radius_m * view.scale);
   }
   layer.c.setLineDash([]);
-  if (walls.length <= MOST_NAMES) walls.forEach((wall) => drawName(layer.c, view, palette, wall));
+  if (walls.length <= MAX_NAMES) walls.forEach((wall) => drawName(layer.c, view, palette, wall));
 }
 
-/** A wall's name beside its middle, on the side away from the middle of the view. */
+/** Draws a wall's name next to its midpoint, on the side facing away from the centre of the view. */
 function drawName(c, view, palette, { id, from, to }) {
   const [[x, y], [u, v]] = [view.px(from), view.px(to)];
   const length = Math.hypot(u - x, v - y);
@@ -70,17 +70,17 @@ function drawName(c, view, palette, { id, from, to }) {
   if (nx * (view.width / 2 - mx) + ny * (view.height / 2 - my) > 0) [nx, ny] = [-nx, -ny];
   c.save();
   c.translate(mx + NAME_PX * nx, my + NAME_PX * ny);
-  const turn = Math.atan2(v - y, u - x);
-  c.rotate(Math.abs(turn) > Math.PI / 2 ? turn - Math.sign(turn) * Math.PI : turn);
-  c.fillStyle = palette["--quiet"];
+  const angle = Math.atan2(v - y, u - x);
+  c.rotate(Math.abs(angle) > Math.PI / 2 ? angle - Math.sign(angle) * Math.PI : angle);
+  c.fillStyle = palette["--muted"];
   c.textAlign = "center";
   c.textBaseline = "middle";
   c.fillText(id, 0, 0);
   c.restore();
 }
 
-/** The round length that is `least` or more: 1, 2 or 5 times a power of ten. */
-function gridStep(least) {
-  const power = 10 ** Math.floor(Math.log10(least));
-  return [1, 2, 5, 10].map((n) => n * power).find((step) => step >= least);
+/** Smallest length of at least `min` that is 1, 2 or 5 times a power of ten. */
+function gridStep(min) {
+  const power = 10 ** Math.floor(Math.log10(min));
+  return [1, 2, 5, 10].map((n) => n * power).find((step) => step >= min);
 }

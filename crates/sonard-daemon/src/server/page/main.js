@@ -1,61 +1,64 @@
-// Puts the page together: the live scan or a past one on plan, strip, table and panel.
+// Entry point of the live page: connects the live stream and the log with plan, residuals, table and panels.
 
-import { ask, follow, hurry } from "./api.js";
-import { BeamPanel, inWords } from "./beam.js";
-import { control } from "./control.js";
-import { downloads } from "./download.js";
+import { reconnectNow, requestJson, subscribe } from "./api.js";
+import { BeamPanel, describeReading } from "./beam.js";
+import { addControls } from "./control.js";
+import { addDownloads } from "./download.js";
 import { Explanations } from "./explanations.js";
 import { History } from "./history.js";
-import { Next } from "./next.js";
+import { NextScan } from "./next-scan.js";
 import { Overlays } from "./overlays.js";
 import { Plan } from "./plan.js";
 import { Scan } from "./scan.js";
-import { watch } from "./status.js";
+import { pollStatus } from "./status.js";
 import { Strip } from "./strip.js";
 import { Summary } from "./summary.js";
 import { BeamTable } from "./table.js";
 import { addTools } from "./tools.js";
 import { EchoTrace } from "./trace.js";
-import { colours, legend } from "./verdicts.js";
+import { colours, updateLegend } from "./verdicts.js";
 import { Waterfall } from "./waterfall.js";
-import { clock, count, setText } from "./words.js";
+import { clock, count, setText } from "./format.js";
 
 const byId = (/** @type {string} */ id) => /** @type {any} */ (document.getElementById(id));
 const slider = byId("beam");
 
 let palette = colours();
-/** The scan under way or the last one, whatever is shown. */
+/** Running or last scan, whichever scan is shown. */
 let live = null;
 let session = null;
-/** What is shown: `live`, or one of the logs. */
+/** Shown scan: `live`, or one of the log. */
 let shown = null;
+/** Selected reading. */
 let selected = null;
 let changed = false;
-/** A scan whose beginning was not heard, and which the log was asked for. */
-let unheard = null;
-let catching = null;
-let again = false;
+/** Scan whose `scan_start` was missed, and which was therefore requested from the log. */
+let missed = null;
+/** Request of the newest scan from the log, and whether to repeat it afterwards. */
+let catchingUp = null;
+let repeatCatchUp = false;
 
-const words = "Floor plan with the readings of the scan; the table of beams has the same in words";
-export const plan = new Plan(byId("stage"), select, words);
+const label = "Floor plan with the readings of the scan. The table of beams lists the same readings.";
+export const plan = new Plan(byId("stage"), select, label);
 addTools(plan, () => (changed = true));
 const strip = new Strip(byId("residuals"), select);
 const table = new BeamTable(byId("table"));
-/** What the daemon told last of the selected beam. */
+/** Details of the selected beam. */
 let beam = null;
 const panel = new BeamPanel(byId("beam-panel"), showPath, async ({ scan, index }, signal) => {
-  beam = await ask(`/v1/scans/${scan}/beams/${index}`, { signal });
+  beam = await requestJson(`/v1/scans/${scan}/beams/${index}`, { signal });
   return beam;
 });
-// A sound that is chosen in the trace is chosen in the list, too.
+// An arrival picked in the trace is selected in the list.
 const trace = new EchoTrace(byId("trace"), (peak) => byId("beam-panel").querySelectorAll(".peaks button")[beam.peaks.indexOf(peak)]?.click());
 const summary = new Summary(byId("summary"));
 const history = new History(
   { list: byId("scans-list"), line: byId("scan-line"), live: byId("live"), replay: byId("replay"), speed: byId("speed") },
-  (scan, trouble) => {
+  (id) => live?.id === id && live.running,
+  (scan, error) => {
     show(scan ?? live);
-    if (trouble) summary.say(trouble);
-    else if (shown) summary.shows(shown);
+    if (error) summary.set(error);
+    else if (shown) summary.showScan(shown);
   },
 );
 const waterfall = new Waterfall(byId("over-time"), {
@@ -66,38 +69,38 @@ const waterfall = new Waterfall(byId("over-time"), {
     select(index);
   },
 });
-const say = (text) => summary.answer(text);
-control(byId("control"), byId("stop"), say);
-const overlays = new Overlays(byId("overlays"), plan, strip, say);
-const next = new Next(byId("next"), plan, say);
-const explanations = new Explanations(byId("better"), plan, {
+const announce = (text) => summary.setResult(text);
+addControls(byId("control"), byId("stop"), announce);
+const overlays = new Overlays(byId("overlays"), plan, strip, announce);
+const nextScan = new NextScan(byId("next"), plan, announce);
+const explanations = new Explanations(byId("hypotheses"), plan, {
   show: (id) => history.show(id),
-  propose: (change) => next.propose(change),
+  propose: (change) => nextScan.propose(change),
 });
-downloads(byId("downloads"), plan, { scan: () => shown, log: (id) => history.logOf(id), say });
+addDownloads(byId("downloads"), plan, { scan: () => shown, log: (id) => history.logOf(id), announce });
 
-/** Shows a scan, or the same one anew. */
+/** Shows a scan, or redraws the shown one. */
 function show(scan) {
-  const another = scan?.id !== shown?.id;
+  const isOther = scan?.id !== shown?.id;
   shown = scan;
   for (const view of [plan, strip, table]) view.scan = scan;
   if (scan && !scan.replayed) waterfall.add(scan, [...scan.beams.values()]);
   if (scan) scan.added = [];
   plan.latest = null;
-  if (another) keepSelection();
-  overlays.tell();
-  explanations.mark();
+  if (isOther) keepSelection();
+  overlays.update();
+  explanations.redraw();
   redraw();
   loadScene();
 }
 
-/** The selected beam stays selected in another scan. Until that has read it, its reading of before stays. */
+/** Keeps the selected beam in another scan. Its previous reading stays until the running scan replaces it. */
 function keepSelection() {
   if (!selected) return;
   const ping = shown?.beams.get(selected.index);
-  if (ping) choose(ping);
-  else if (!shown?.underWay || selected.index >= shown.planned) deselect();
-  else tellSelected();
+  if (ping) selectReading(ping);
+  else if (!shown?.running || selected.index >= shown.planned) deselect();
+  else updateSelectionText();
 }
 
 function redraw() {
@@ -107,57 +110,57 @@ function redraw() {
   history.line.redraw(palette);
   waterfall.redrawSoon(palette);
   table.redraw();
-  tell();
+  updateTexts();
 }
 
-/** Takes up what came in since the last frame. */
+/** Draws the readings received since the last frame. */
 function frame() {
   if (shown?.added.length) {
     const added = shown.added.splice(0);
     for (const view of [plan, strip, table]) view.addReadings(added);
     waterfall.add(shown, added);
-    const anew = selected && added.findLast((ping) => ping.index === selected.index);
-    if (anew && anew !== selected) choose(anew);
+    const updated = selected && added.findLast((ping) => ping.index === selected.index);
+    if (updated && updated !== selected) selectReading(updated);
     changed = true;
   }
-  if (changed) tell();
+  if (changed) updateTexts();
   changed = false;
   requestAnimationFrame(frame);
 }
 
-/** The texts around the plan. */
-function tell() {
-  legend(byId("legend"), shown?.counts ?? new Map(), plan.pens(), palette);
-  const { beyond, unplaced } = plan.notShown();
+/** Updates the texts around the plan. */
+function updateTexts() {
+  updateLegend(byId("legend"), shown?.counts ?? new Map(), plan.pens(), palette);
+  const { outside, unplaced } = plan.hiddenCounts();
   const parts = [];
-  if (beyond) parts.push(`${count(beyond, "reading")} beyond the view: arrows on its border`);
-  if (unplaced) parts.push(`${count(unplaced, "reading")} from an unknown place: not drawn`);
-  setText(byId("beyond"), parts.join("; "));
+  if (outside) parts.push(`${count(outside, "reading")} outside the view (arrows at the edge)`);
+  if (unplaced) parts.push(`${count(unplaced, "reading")} not drawn: position unknown`);
+  setText(byId("out-of-view"), parts.join("; "));
   const progress = byId("progress");
-  progress.hidden = !shown?.underWay;
-  if (!shown) return setText(byId("which"), "no scan yet");
+  progress.hidden = !shown?.running;
+  if (!shown) return setText(byId("scan-label"), "no scan yet");
   progress.max = shown.planned;
   progress.value = shown.beams.size;
-  const when = shown === live && shown.underWay ? "live" : clock(shown.start.time);
-  setText(byId("which"), `${when} · ${shown.beams.size} of ${count(shown.planned, "beam")}`);
-  const other = shown.session?.scene && !plan.sceneFits();
-  byId("stage").title = other ? `Taken in the scene ${shown.session.scene.name}, which its log does not hold: no walls are drawn` : "";
+  const when = shown === live && shown.running ? "live" : clock(shown.start.time);
+  setText(byId("scan-label"), `${when} · ${shown.beams.size} of ${count(shown.planned, "beam")}`);
+  const sceneMissing = shown.session?.scene && !plan.sceneFits();
+  byId("stage").title = sceneMissing ? `No walls drawn: the scene ${shown.session.scene.name} of this scan is not in its log.` : "";
   slider.max = Math.max(0, shown.planned - 1);
-  slider.disabled = shown.beams.size === 0 && !shown.before;
+  slider.disabled = shown.beams.size === 0 && !shown.previous;
 }
 
 function select(index) {
   const ping = shown?.nearest(index);
-  if (ping) choose(ping);
+  if (ping) selectReading(ping);
 }
 
-function choose(ping) {
-  // The path of the reading before is that of this one, until the daemon says otherwise.
+function selectReading(ping) {
+  // The path of the beam's previous reading stays until the new one is loaded.
   const same = selected?.index === ping.index && JSON.stringify(selected.viewpoint) === JSON.stringify(ping.viewpoint);
   const path = same ? plan.path : null;
   selected = ping;
   slider.value = ping.index;
-  tellSelected();
+  updateSelectionText();
   plan.select(ping, path);
   strip.select(ping);
   table.select(ping);
@@ -166,26 +169,26 @@ function choose(ping) {
   changed = true;
 }
 
-/** Draws the path of a sound, and its place in the echo trace. */
+/** Draws a propagation path and marks its arrival in the echo trace. */
 function showPath(path) {
   byId("trace").hidden = !beam?.trace;
   plan.select(selected, path);
-  const same = JSON.stringify(path);
-  trace.show(beam?.trace ? beam : null, beam?.peaks?.find(({ polyline }) => JSON.stringify(polyline) === same) ?? null);
+  const key = JSON.stringify(path);
+  trace.show(beam?.trace ? beam : null, beam?.peaks?.find(({ polyline }) => JSON.stringify(polyline) === key) ?? null);
   changed = true;
 }
 
-function tellSelected() {
-  const text = `${inWords(selected)}${selected.scan === shown.id ? "" : ", in the scan before"}`;
+function updateSelectionText() {
+  const text = `${describeReading(selected)}${selected.scan === shown.id ? "" : ", previous scan"}`;
   slider.setAttribute("aria-valuetext", text);
-  setText(byId("beam-now"), text);
+  setText(byId("beam-label"), text);
 }
 
 function deselect() {
   selected = null;
   slider.value = 0;
   slider.removeAttribute("aria-valuetext");
-  setText(byId("beam-now"), "none selected");
+  setText(byId("beam-label"), "none selected");
   plan.select(null);
   strip.selected = null;
   waterfall.select(null);
@@ -195,33 +198,33 @@ function deselect() {
   changed = true;
 }
 
-/** A scan that begins, and the one before it for what it has not read yet. */
-function begin(start) {
+/** Creates the scan that starts, with the last one as its previous scan. */
+function startScan(start) {
   const scan = new Scan(start, session);
-  scan.underWay = true;
-  if (live?.planned === scan.planned) scan.before = live;
-  if (live) live.before = null;
+  scan.running = true;
+  if (live?.planned === scan.planned) scan.previous = live;
+  if (live) live.previous = null;
   return scan;
 }
 
-/** Takes in a record of the stream. */
-export function take(record) {
+/** Handles a record of the live stream. */
+export function handleRecord(record) {
   switch (record.type) {
     case "session":
       session = record;
       loadScene();
       break;
     case "scan_start":
-      live = begin(record);
+      live = startScan(record);
       if (history.shown === null) {
         show(live);
-        summary.began(live);
+        summary.scanStarted(live);
       }
       break;
     case "ping":
       if (live?.id === record.scan) live.add(record);
-      else if (unheard !== record.scan) {
-        unheard = record.scan;
+      else if (missed !== record.scan) {
+        missed = record.scan;
         catchUp();
       }
       break;
@@ -230,65 +233,65 @@ export function take(record) {
       live.finish(record);
       changed = true;
       if (shown === live) {
-        // A view that was kept wide for readings that did not come again shrinks now.
+        // The view may shrink now: while the scan was running it only grew.
         overlays.redraw();
-        summary.ended(live);
+        summary.scanEnded(live);
       }
       history.refreshSoon();
       break;
     case "event":
-      summary.event(record);
+      summary.showEvent(record);
       break;
     case "dropped":
-      // This page was too slow: the log has what it missed.
+      // The page read too slowly; the log has the dropped readings.
       catchUp();
       break;
   }
 }
 
-/** Gets from the log what was not heard live; asked while it does, it does so once more. */
+/** Reads from the log what the stream missed; repeated once if called again meanwhile. */
 function catchUp() {
-  again = catching !== null;
-  catching ??= readNewest().finally(() => {
-    catching = null;
-    if (again) catchUp();
+  repeatCatchUp = catchingUp !== null;
+  catchingUp ??= readNewest().finally(() => {
+    catchingUp = null;
+    if (repeatCatchUp) catchUp();
   });
 }
 
-/** All of the newest scan so far. */
+/** Reads the newest scan from the log and merges it with the readings of the stream. */
 async function readNewest() {
   await Promise.all([loadScene(), history.refresh()]);
   const newest = history.scans[0]?.scan;
   if (!newest) return;
-  const asked = Promise.all([ask(`/v1/scans/${newest}`), ask("/v1/status")]);
-  const [whole, status] = await asked.catch(() => []);
-  if (!whole?.start) return;
-  const heard = live;
-  // A scan that began while the log was read is newer than what was read.
-  if (heard && heard.id !== newest && Date.parse(heard.start.time) > Date.parse(whole.start.time)) return;
-  session = whole.session ?? session;
-  live = Scan.of(whole);
-  if (heard?.id === newest) {
-    // What came by the stream while the log was read.
-    for (const ping of heard.beams.values()) if (!live.beams.has(ping.index)) live.add(ping);
-    if (heard.end && !live.end) live.finish(heard.end);
+  const requests = Promise.all([requestJson(`/v1/scans/${newest}`), requestJson("/v1/status")]);
+  const [record, status] = await requests.catch(() => []);
+  if (!record?.start) return;
+  const streamed = live;
+  // A scan that started while the log was read is newer than the log's.
+  if (streamed && streamed.id !== newest && Date.parse(streamed.start.time) > Date.parse(record.start.time)) return;
+  session = record.session ?? session;
+  live = Scan.fromJson(record);
+  if (streamed?.id === newest) {
+    // Readings streamed while the log was read.
+    for (const ping of streamed.beams.values()) if (!live.beams.has(ping.index)) live.add(ping);
+    if (streamed.end && !live.end) live.finish(streamed.end);
   }
-  // One that a killed daemon left in the log has no end and is not under way either.
-  live.underWay = !live.end && status.scan?.scan === live.id;
+  // A scan without end may also be left over from a killed daemon.
+  live.running = !live.end && status.scan?.scan === live.id;
   if (history.shown === null) {
     show(live);
-    summary.shows(live);
+    summary.showScan(live);
   }
 }
 
-/** The floor plan of the scan shown: of the scene in force, or of the one in its log. */
+/** Loads the scene of the shown scan: the current one, or the one in the scan's log. */
 async function loadScene() {
   const scan = shown;
-  const taken = scan?.session?.scene?.sha256;
-  if (taken && taken === plan.scene?.sha256) return;
+  const recorded = scan?.session?.scene?.sha256;
+  if (recorded && recorded === plan.scene?.sha256) return;
   const unknown = (error) => (error.status === 404 ? null : undefined);
-  let scene = await ask("/v1/scene").catch(unknown);
-  if (taken && scene?.sha256 !== taken) scene = (await ask(`/v1/scans/${scan.id}/scene`).catch(unknown)) ?? scene;
+  let scene = await requestJson("/v1/scene").catch(unknown);
+  if (recorded && scene?.sha256 !== recorded) scene = (await requestJson(`/v1/scans/${scan.id}/scene`).catch(unknown)) ?? scene;
   if (scene === undefined || scan !== shown || scene?.sha256 === plan.scene?.sha256) return;
   plan.scene = scene;
   changed = true;
@@ -309,27 +312,27 @@ matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
   redraw();
 });
 
-tell();
-let answered = true;
+updateTexts();
+let connected = true;
 let version = null;
-watch((status, health) => {
-  // Another version of the daemon brings its own page.
+pollStatus((status, health) => {
+  // Another version of the daemon serves another page.
   if (version && status && status.sonard !== version) location.reload();
   version ??= status?.sonard;
-  // A daemon that is back after a restart has news, whether or not the stream noticed.
-  if (status && !answered) {
-    hurry();
+  // After a restart of the daemon the log may have new scans, even if the stream did not break.
+  if (status && !connected) {
+    reconnectNow();
     catchUp();
   }
-  answered = status !== null;
-  if (status) next.tell(status);
-  if (health) explanations.tell(health);
+  connected = status !== null;
+  if (status) nextScan.update(status);
+  if (health) explanations.update(health);
 });
-follow("/v1/live/records?format=sse&verdicts=true", take, (there) => {
-  if (there) return catchUp();
-  // Whether its scan goes on, the daemon says when it is back.
-  if (live?.underWay && shown === live) summary.lost(live);
-  if (live) live.underWay = false;
+subscribe("/v1/live/records?format=sse&verdicts=true", handleRecord, (streaming) => {
+  if (streaming) return catchUp();
+  // The state of the scan is unknown until the stream is back.
+  if (live?.running && shown === live) summary.connectionLost(live);
+  if (live) live.running = false;
   plan.drawOver();
   changed = true;
 });

@@ -1,35 +1,35 @@
-// Measures lengths on the floor plan: from one click to the next, or by keys. Ends of walls and readings attract.
+// Length measurement on the floor plan, by two clicks or by keys. Points snap to wall ends and readings.
 
-import { drawLength, line } from "./pens.js";
-import { setText } from "./words.js";
+import { drawLength, line } from "./layers.js";
+import { setText } from "./format.js";
 
-/** So near to something a click means it, pixels. */
+/** Snap distance, pixels. */
 const SNAP_PX = 9;
 const STEP_PX = 10;
 const KEYS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
-const HINT = "Click two points, or place them with arrow keys and Enter; Escape ends";
+const HINT = "Click two points, or place them with arrow keys and Enter. Escape ends.";
 
 export class Measure {
   /**
    * @param {any} plan
-   * @param {HTMLElement} place where the length is told
+   * @param {HTMLElement} output element that shows the length
    * @param {(on: boolean) => void} onToggle
    */
-  constructor(plan, place, onToggle) {
+  constructor(plan, output, onToggle) {
     this.plan = plan;
-    this.place = place;
+    this.output = output;
     this.onToggle = onToggle;
     this.on = false;
-    /** Ends, metres. @type {number[][]} */
+    /** End points placed so far, metres. @type {number[][]} */
     this.ends = [];
-    /** Where the next end would be, pixels. @type {number[] | null} */
+    /** Position of the next end point, pixels. @type {number[] | null} */
     this.cursor = null;
   }
 
   toggle(on = !this.on) {
     [this.on, this.ends, this.cursor] = [on, [], null];
-    this.place.hidden = !on;
-    setText(this.place, on ? HINT : "");
+    this.output.hidden = !on;
+    setText(this.output, on ? HINT : "");
     this.onToggle(on);
     this.redraw();
   }
@@ -43,7 +43,7 @@ export class Measure {
   click(px) {
     if (this.ends.length === 2) this.ends = [];
     this.ends.push(this.plan.snap(px, SNAP_PX));
-    setText(this.place, this.ends.length === 2 ? this.inWords() : "From here to …");
+    setText(this.output, this.ends.length === 2 ? this.describe() : "Choose the second point");
     this.redraw();
   }
 
@@ -53,7 +53,7 @@ export class Measure {
     if (this.ends.length === 1) this.redraw();
   }
 
-  /** Whether a key was for it. @param {KeyboardEvent} event */
+  /** Handles a key; returns `false` if the key has no meaning here. @param {KeyboardEvent} event */
   key({ key, shiftKey }) {
     const { width, height } = this.plan.view;
     const cursor = this.cursor ?? [width / 2, height / 2];
@@ -68,11 +68,12 @@ export class Measure {
     return true;
   }
 
-  inWords() {
+  /** Length, direction and components as text. */
+  describe() {
     const [[x, y], [u, v]] = this.ends;
     const signed = (m) => `${m < 0 ? "−" : "+"}${Math.abs(m).toFixed(3)}`;
-    const turn = (Math.atan2(v - y, u - x) * 180) / Math.PI;
-    return `${Math.hypot(u - x, v - y).toFixed(4)} m at ${((turn + 360) % 360).toFixed(1)}°: x ${signed(u - x)}, y ${signed(v - y)} m`;
+    const direction_deg = (Math.atan2(v - y, u - x) * 180) / Math.PI;
+    return `${Math.hypot(u - x, v - y).toFixed(4)} m at ${((direction_deg + 360) % 360).toFixed(1)}°: x ${signed(u - x)}, y ${signed(v - y)} m`;
   }
 
   /** @param {any} layer @param {any} palette */
@@ -91,7 +92,7 @@ export class Measure {
   }
 }
 
-/** Words on a ground of their own. */
+/** Draws text on an opaque background. */
 function drawLabel(c, [x, y], text, palette) {
   c.font = "600 12px system-ui, sans-serif";
   const half = c.measureText(text).width / 2 + 4;

@@ -1,26 +1,26 @@
-// The floor plan on four layers: ground (grid, walls), under (the sweep before), marks (readings, drawn as they
-// come), and above them what changes with every beam (robot, sweep, selection, path of the sound, lengths).
+// Floor plan on four layers: ground (grid, walls), under (previous scan, overlays), marks (readings, drawn as they
+// arrive), and over (robot, current beam, selection, propagation path, lengths), which changes with every beam.
 
 import { make } from "./dom.js";
 import { Gestures } from "./gestures.js";
 import { drawGrid, drawScaleBar, drawScene } from "./ground.js";
-import { arrow, circle, drawPose, Layer, line, PEN_NAMES } from "./pens.js";
-import { place, Sketch } from "./sketch.js";
+import { arrow, circle, drawPose, Layer, line, PEN_NAMES } from "./layers.js";
+import { positionOf, Sketch } from "./sketch.js";
 import { View } from "./view.js";
-import { inWorld, offDirection } from "./viewpoint.js";
+import { angleOffAxis, robotToWorld } from "./viewpoint.js";
 
 const HIT_PX = 24;
-const TURN = Math.PI / 180;
-/** More readings than this are not drawn anew with every frame of a gesture, but moved, and drawn when it rests. */
-const MANY = 4000;
+const RAD_PER_DEG = Math.PI / 180;
+/** Number of readings above which a gesture moves the layers and redraws them only after it rests. */
+const MAX_REDRAWN_READINGS = 4000;
 const REST_MS = 120;
 const LAYERS = ["ground", "under", "marks", "over"];
 
 export class Plan {
-  /** Calls `onPick(index)` when somebody clicks at a beam. `words` says what the plan is of. */
-  constructor(stage, onPick, words) {
+  /** `onPick(index)` is called with the clicked beam; `label` is the accessible name of the plan. */
+  constructor(stage, onPick, label) {
     this.stage = stage;
-    this.words = words;
+    this.label = label;
     /** @type {Layer[]} */
     this.layers = [];
     for (const name of LAYERS) this.addLayer(name);
@@ -28,11 +28,12 @@ export class Plan {
     this.under = this.layers[1];
     this.marks = this.layers[2];
     this.over = this.layers[3];
-    /** The next frame that draws a moved view, and the rest after which all is drawn. @type {number | null} */
+    /** Frame in which a moved view is drawn. @type {number | null} */
     this.moving = null;
+    /** Timer of the full redraw after a gesture. */
     this.resting = 0;
     this.view = new View();
-    /** While somebody drags something the view stays. */
+    /** Suspends automatic fitting while a handle is dragged. */
     this.held = false;
     this.scene = null;
     this.scan = null;
@@ -40,12 +41,12 @@ export class Plan {
     this.latest = null;
     this.path = null;
     this.palette = null;
-    /** Scene and pose that the view was fitted to. */
+    /** Key of the scene and pose that the view was fitted to. */
     this.fitted = "";
     this.onPick = onPick;
-    /** The measuring tool, where there is one. */
+    /** Measuring tool, if the page has one. */
     this.measure = null;
-    /** What else is drawn, under the readings and over them. @type {{drawUnder?: Function, drawOver?: Function}[]} */
+    /** Objects that draw below or above the readings. @type {{drawUnder?: Function, drawOver?: Function}[]} */
     this.overlays = [];
     this.onView = () => {};
     new ResizeObserver(() => this.resize()).observe(stage);
@@ -58,17 +59,17 @@ export class Plan {
     });
   }
 
-  /** The layer above all others; of the page's main plan they bear their names. */
+  /** Adds a layer on top of the others. Layers of the page's main plan have their name as the element's id. */
   addLayer(name) {
-    const picture = name === "over";
-    const canvas = make("canvas", { className: name, ...(picture ? { role: "img", ariaLabel: this.words } : { ariaHidden: "true" }) });
+    const isTop = name === "over";
+    const canvas = make("canvas", { className: name, ...(isTop ? { role: "img", ariaLabel: this.label } : { ariaHidden: "true" }) });
     if (this.stage.id) canvas.id = name;
     this.stage.append(canvas);
     this.layers.push(new Layer(canvas));
     return this.layers.at(-1);
   }
 
-  /** Everything anew: another scene, scan, size or style. */
+  /** Redraws all layers after a change of scene, scan, size or style. */
   redraw(palette = this.palette) {
     this.palette = palette;
     if (!this.view.width) return;
@@ -81,11 +82,11 @@ export class Plan {
     this.onView();
   }
 
-  /** Somebody moved the view: once a frame it is drawn. */
+  /** Redraws a moved view, at most once per frame. */
   moveView() {
     this.moving ??= requestAnimationFrame(() => {
       this.moving = null;
-      if (this.readings().length + this.beforeReadings().length <= MANY) return this.redraw();
+      if (this.readings().length + this.previousReadings().length <= MAX_REDRAWN_READINGS) return this.redraw();
       this.drawGround();
       for (const layer of [this.under, this.marks]) layer.shift(this.view);
       this.drawOver();
@@ -94,16 +95,16 @@ export class Plan {
     });
   }
 
-  /** Readings that came since the last frame. */
+  /** Draws the readings received since the last frame. */
   addReadings(pings) {
     if (!this.view.width) return;
     this.latest = pings.at(-1) ?? this.latest;
-    if (pings.some((ping) => this.widens(ping))) return this.redraw();
+    if (pings.some((ping) => this.growsFor(ping))) return this.redraw();
     this.drawReadings(pings);
     this.drawOver();
   }
 
-  /** Marks a beam, with the path of its sound once that is known. */
+  /** Marks a beam, and its propagation path if that is loaded. */
   select(ping, path = null) {
     this.selected = ping;
     this.path = path;
@@ -117,15 +118,15 @@ export class Plan {
     if (this.palette) this.redraw();
   }
 
-  /** Shows the room alone, the readings around it as well, or all. */
-  show(what) {
-    this.view.show(what);
+  /** Fits the view: "room", "near" (room and readings around it) or "all". */
+  show(mode) {
+    this.view.show(mode);
     this.redraw();
   }
 
-  /** Whether a key was for the plan. @param {KeyboardEvent} event */
+  /** Handles a key; returns `false` if the key has no meaning here. @param {KeyboardEvent} event */
   key({ key }) {
-    if (key === "0" || key === "Home") this.show(this.view.what);
+    if (key === "0" || key === "Home") this.show(this.view.mode);
     else if (key.toLowerCase() === "m" && this.measure) this.measure.toggle();
     else return false;
     return true;
@@ -135,9 +136,9 @@ export class Plan {
     return this.scan ? [...this.scan.beams.values()] : [];
   }
 
-  /** Of the sweep before, while the next one is under way. */
-  beforeReadings() {
-    return this.scan?.before ? [...this.scan.before.beams.values()] : [];
+  /** Readings of the previous scan while the next one is running. */
+  previousReadings() {
+    return this.scan?.previous ? [...this.scan.previous.beams.values()] : [];
   }
 
   fit() {
@@ -147,65 +148,65 @@ export class Plan {
     if (pose) room.push([pose.x_m, pose.y_m]);
     const readings = this.readings();
     for (const { viewpoint } of readings) if (viewpoint) room.push([viewpoint.x_m, viewpoint.y_m]);
-    const ends = readings.map((ping) => place(ping)).filter((end) => end !== null);
-    // While readings come in, the view only widens, from one scan of a place to the next as well.
-    const where = `${this.scene?.sha256} ${JSON.stringify(pose)}`;
-    const grow = this.scan?.underWay && where === this.fitted;
-    this.fitted = where;
+    const ends = readings.map((ping) => positionOf(ping)).filter((end) => end !== null);
+    // While readings arrive the view only grows, also from one scan to the next at the same pose.
+    const key = `${this.scene?.sha256} ${JSON.stringify(pose)}`;
+    const grow = this.scan?.running && key === this.fitted;
+    this.fitted = key;
     if (room.length === 1) room.push(...[[-1, -1], [1, 1]].map(([x, y]) => [room[0][0] + x, room[0][1] + y]));
     this.view.fit(room, ends, grow);
   }
 
-  /** Ends of the scene's walls, metres. */
+  /** End points of the scene's walls, metres. */
   corners() {
     return (this.scene?.walls ?? []).flatMap(({ from, to }) => [from, to]);
   }
 
-  /** The end of a wall that is nearest to a pixel, at most so far from it; else the reading; else the point there. */
-  snap(px, most_px) {
+  /** Snaps a pixel to the nearest wall end within `max_px`, else to the nearest reading; returns world coordinates, metres. */
+  snap(px, max_px) {
     const nearestOf = (points) => {
-      let [best, nearest] = [null, most_px];
+      let [best, nearest_px] = [null, max_px];
       for (const point of points) {
         const [x, y] = this.view.px(point);
-        const off = Math.hypot(x - px[0], y - px[1]);
-        if (off < nearest) [best, nearest] = [point, off];
+        const distance_px = Math.hypot(x - px[0], y - px[1]);
+        if (distance_px < nearest_px) [best, nearest_px] = [point, distance_px];
       }
       return best;
     };
-    const ends = () => this.readings().map((ping) => place(ping)).filter((end) => end !== null);
+    const ends = () => this.readings().map((ping) => positionOf(ping)).filter((end) => end !== null);
     return nearestOf(this.corners()) ?? nearestOf(ends()) ?? this.view.world(px);
   }
 
-  /** Whether a reading is out of the view that the view would widen for. */
-  widens(ping) {
-    const at = place(ping);
+  /** Returns `true` if the view has to grow for a reading. */
+  growsFor(ping) {
+    const at = positionOf(ping);
     return at !== null && this.view.wouldGrow(at);
   }
 
-  /** How many readings lie beyond the view, and how many are from a place that is not known. */
-  notShown() {
+  /** Numbers of readings outside the view, and of readings whose viewpoint is unknown. */
+  hiddenCounts() {
     const readings = this.view.width ? this.readings() : [];
-    const ends = readings.map((ping) => place(ping)).filter((end) => end !== null);
-    const beyond = ends.filter((end) => this.view.isBeyond(this.view.px(end))).length;
-    return { beyond, unplaced: readings.filter((ping) => !ping.viewpoint).length };
+    const ends = readings.map((ping) => positionOf(ping)).filter((end) => end !== null);
+    const outside = ends.filter((end) => this.view.isOutside(this.view.px(end))).length;
+    return { outside, unplaced: readings.filter((ping) => !ping.viewpoint).length };
   }
 
-  /** Names of the pens that something is drawn with. */
+  /** Names of the pens in use. */
   pens() {
     return PEN_NAMES.filter((name) => this.layers.some((layer) => layer.used.has(name)));
   }
 
-  /** Whether the scan was taken in the scene that is known. */
+  /** Returns `true` if the loaded scene is the one that the scan was recorded in. */
   sceneFits() {
-    const taken = this.scan?.session?.scene?.sha256;
-    return this.scene && (!taken || taken === this.scene.sha256);
+    const recorded = this.scan?.session?.scene?.sha256;
+    return this.scene && (!recorded || recorded === this.scene.sha256);
   }
 
-  /** All layers on another canvas, for a picture. */
+  /** Draws all layers on one canvas context, for a picture. */
   drawOn(c) {
     const own = [this.ground, this.under, this.marks, this.over];
     const all = new Layer(null, c);
-    // They lie on one another.
+    // The shared context accumulates the layers.
     all.clear = () => {};
     this.ground = this.under = this.marks = this.over = all;
     this.drawGround();
@@ -227,13 +228,13 @@ export class Plan {
     drawScaleBar(ground, view, palette);
   }
 
-  /** The sweep before fades behind the one that comes in. */
+  /** Draws the previous scan, faded, and the overlays below the readings. */
   drawUnder() {
     this.under.clear(this.view);
-    const before = this.scan?.before;
-    if (before) {
+    const previous = this.scan?.previous;
+    if (previous) {
       this.under.c.globalAlpha = 0.45;
-      this.sketch(this.under, before).dots(this.beforeReadings(), "before");
+      this.sketch(this.under, previous).dots(this.previousReadings(), "previous");
       this.under.c.globalAlpha = 1;
     }
     for (const overlay of this.overlays) overlay.drawUnder?.(this.under, this);
@@ -253,37 +254,37 @@ export class Plan {
 
   drawScan() {
     this.drawRobot((this.latest ?? this.readings().at(-1))?.pose ?? this.scan.start.pose);
-    if (this.scan.underWay && this.latest?.viewpoint) this.drawRay("newest", this.latest);
+    if (this.scan.running && this.latest?.viewpoint) this.drawRay("newest", this.latest);
     if (!this.selected?.viewpoint) return;
     this.drawRay("direction", this.selected);
     if (this.path) this.drawPath();
-    const at = place(this.selected);
+    const at = positionOf(this.selected);
     if (at) circle(this.over.pen("selected", this.palette), this.view.px(at), 8);
   }
 
-  /** The robot's body, which the array has, or else the scene. */
+  /** Draws the robot's body, as defined by the array or else by the scene, with its pose. */
   drawRobot(pose, robot = "robot", heading = "pose") {
-    const own = this.scan.session?.array?.body?.shape;
-    const scenes = this.sceneFits() ? this.scene.robot : null;
-    const body = own ? (own.circle ?? { outline: own.outline }) : scenes;
-    const world = (point) => this.view.px(inWorld(pose, point));
+    const ofArray = this.scan.session?.array?.body?.shape;
+    const ofScene = this.sceneFits() ? this.scene.robot : null;
+    const body = ofArray ? (ofArray.circle ?? { outline: ofArray.outline }) : ofScene;
+    const toPixels = (point) => this.view.px(robotToWorld(pose, point));
     if (body) {
       const c = this.over.pen(robot, this.palette);
-      if (body.center) circle(c, world(body.center), body.radius_m * this.view.scale);
-      else line(c, [...body.outline, body.outline[0]].map(world));
+      if (body.center) circle(c, toPixels(body.center), body.radius_m * this.view.scale);
+      else line(c, [...body.outline, body.outline[0]].map(toPixels));
     }
-    drawPose(this.over.pen(heading, this.palette), world([0, 0]), -pose.heading_deg * TURN);
+    drawPose(this.over.pen(heading, this.palette), toPixels([0, 0]), -pose.heading_deg * RAD_PER_DEG);
   }
 
   drawRay(pen, ping) {
     const sketch = this.sketch(this.over);
     line(this.over.pen(pen, this.palette), [sketch.from(ping), sketch.ray(ping).end]);
     const { x_m, y_m } = ping.pose ?? this.scan.start.pose;
-    const off_m = Math.hypot(ping.viewpoint.x_m - x_m, ping.viewpoint.y_m - y_m);
-    if (off_m > 1e-3) sketch.transducer(ping);
+    const offset_m = Math.hypot(ping.viewpoint.x_m - x_m, ping.viewpoint.y_m - y_m);
+    if (offset_m > 1e-3) sketch.transducer(ping);
   }
 
-  /** The path of the sound, with an arrow on each of its legs. */
+  /** Draws the propagation path, with an arrow on each leg. */
   drawPath() {
     const points = this.path.map((point) => this.view.px(point));
     const c = this.over.pen("path", this.palette);
@@ -296,22 +297,22 @@ export class Plan {
     }
   }
 
-  /** The beam nearest to a click: by its mark, else by its direction. */
+  /** Picks the beam whose mark is nearest to a click, else the one whose direction is. */
   pick([x, y]) {
-    let [best, nearest] = [null, HIT_PX];
+    let [best, nearest_px] = [null, HIT_PX];
     for (const ping of this.readings()) {
-      const at = place(ping);
+      const at = positionOf(ping);
       if (!at) continue;
       const [u, v] = this.view.px(at);
-      const distance = Math.hypot(u - x, v - y);
-      if (distance < nearest) [best, nearest] = [ping, distance];
+      const distance_px = Math.hypot(u - x, v - y);
+      if (distance_px < nearest_px) [best, nearest_px] = [ping, distance_px];
     }
-    best ??= this.towards(this.view.world([x, y]));
+    best ??= this.beamTowards(this.view.world([x, y]));
     if (best) this.onPick(best.index);
   }
 
-  towards(point) {
-    const off = ({ viewpoint }) => (viewpoint ? offDirection(viewpoint, point) : Infinity);
-    return this.readings().reduce((one, other) => (one && off(one) <= off(other) ? one : other), null);
+  beamTowards(point) {
+    const deviation = ({ viewpoint }) => (viewpoint ? angleOffAxis(viewpoint, point) : Infinity);
+    return this.readings().reduce((a, b) => (a && deviation(a) <= deviation(b) ? a : b), null);
   }
 }

@@ -1,20 +1,20 @@
-// Readings drawn on the floor plan, each from its own viewpoint.
+// Readings on the floor plan, each drawn from its own viewpoint.
 
-import { arrow, disc, drawFace } from "./pens.js";
+import { arrow, disc, drawFace } from "./layers.js";
 import { MARKS, draw } from "./verdicts.js";
 import { pointAt } from "./viewpoint.js";
 
 const MARK_PX = 3;
-const TURN = Math.PI / 180;
-/** Half the angle of an arc that stands for the nearest range of a ranger that does not turn, degrees. */
+const RAD_PER_DEG = Math.PI / 180;
+/** Half-angle of the minimum-range arc of a fixed ranger, degrees. */
 const ARC_DEG = 8;
-/** Half the width of a transducer's face as it is drawn, metres. */
+/** Half-width of the transducer symbol, metres. */
 const FACE_M = 0.02;
-/** Of more readings than this, those that would lie on one another are drawn once. */
-const MANY = 5000;
+/** Number of readings above which marks of the same kind on the same pixel are drawn once. */
+const MAX_OVERDRAWN_READINGS = 5000;
 
-/** Where a range along a beam ends, metres; by itself its reading's. `null` if it is not known. */
-export function place({ viewpoint, range_m }, m = range_m) {
+/** Position of a range along a beam, by default of the reading's own range, metres; `null` if unknown. */
+export function positionOf({ viewpoint, range_m }, m = range_m) {
   return viewpoint && m !== null ? pointAt(viewpoint, m) : null;
 }
 
@@ -25,94 +25,94 @@ export class Sketch {
     this.view = view;
     this.palette = palette;
     this.scan = scan;
-    /** What was drawn where, of many readings. @type {Set<string> | null} */
-    this.taken = scan.beams.size > MANY ? new Set() : null;
+    /** Kind and pixel of each drawn mark, for large scans. @type {Set<string> | null} */
+    this.occupied = scan.beams.size > MAX_OVERDRAWN_READINGS ? new Set() : null;
   }
 
-  /** What was read stands above what the model says. */
+  /** Draws measured readings above predicted ones. */
   readings(pings) {
     const placed = pings.filter((ping) => ping.viewpoint);
-    this.nearest(placed);
+    this.minRangeArcs(placed);
     for (const ping of placed) {
       if (ping.ranger) this.transducer(ping);
-      if (ping.sim?.range_m != null) this.mark("model", ping, ping.sim.range_m);
+      if (ping.sim?.range_m != null) this.mark("prediction", ping, ping.sim.range_m);
     }
     for (const ping of placed) {
-      if (MARKS[ping.mark].shape === "tick") this.silence(ping);
+      if (MARKS[ping.mark].shape === "tick") this.tick(ping);
       else this.mark(ping.mark, ping, ping.range_m);
     }
   }
 
-  /** Readings as dots of a pen, whatever they are. */
+  /** Draws readings of any kind as dots of one pen. */
   dots(pings, pen) {
     const c = this.layer.pen(pen, this.palette);
     for (const ping of pings) {
-      const at = place(ping);
+      const at = positionOf(ping);
       if (!at) continue;
       const px = this.view.px(at);
-      if (!this.view.isBeyond(px) && this.isFree(pen, px)) disc(c, px, 2);
+      if (!this.view.isOutside(px) && this.isFree(pen, px)) disc(c, px, 2);
     }
   }
 
   mark(mark, ping, range_m) {
-    const at = this.view.px(place(ping, range_m));
+    const at = this.view.px(positionOf(ping, range_m));
     const colour = this.palette[MARKS[mark].colour];
-    if (!this.view.isBeyond(at)) {
+    if (!this.view.isOutside(at)) {
       if (this.isFree(mark, at)) draw(this.layer.c, mark, ...at, MARK_PX, colour);
       return;
     }
-    if (mark === "model") return;
-    // Beyond the view: an arrow on its border says that there is something, in the colour of its mark.
+    if (mark === "prediction") return;
+    // Readings outside the view appear as arrows at its edge, in the colour of their mark.
     const { end, turn } = this.ray(ping);
-    if (!this.isFree("beyond", end)) return;
-    const c = this.layer.pen("beyond", this.palette);
+    if (!this.isFree("outside", end)) return;
+    const c = this.layer.pen("outside", this.palette);
     c.fillStyle = colour;
     arrow(c, end, turn, [3, 5, 2.4]);
   }
 
-  /** On the border of the view, in the beam's direction. */
-  silence(ping) {
+  /** Draws a reading without range at the edge of the view, in the beam's direction. */
+  tick(ping) {
     const { end, turn } = this.ray(ping);
     if (this.isFree(ping.mark, end)) draw(this.layer.c, ping.mark, ...end, MARK_PX, this.palette[MARKS[ping.mark].colour], turn);
   }
 
-  /** Nothing nearer is heard: a piece of arc round each transducer, as wide as one step of the plan. */
-  nearest(pings) {
+  /** Draws the minimum range (blanking) as an arc around each transducer, as wide as one step of the sweep. */
+  minRangeArcs(pings) {
     const { session, start } = this.scan;
     if (!session || !pings.length) return;
-    const near_px = ((session.sensor.blanking_us * 1e-6 * session.air.sound_speed_m_s) / 2) * this.view.scale;
+    const radius_px = ((session.sensor.blanking_us * 1e-6 * session.air.sound_speed_m_s) / 2) * this.view.scale;
     const c = this.layer.pen("blanking", this.palette);
     for (const ping of pings) {
-      const half = TURN * (ping.ranger ? ARC_DEG : Math.min(ARC_DEG, start.plan.step_deg / 2));
+      const half = RAD_PER_DEG * (ping.ranger ? ARC_DEG : Math.min(ARC_DEG, start.plan.step_deg / 2));
       const { turn } = this.ray(ping);
       const [x, y] = this.from(ping);
-      if (!this.isFree("blanking", [x + near_px * Math.cos(turn), y + near_px * Math.sin(turn)])) continue;
+      if (!this.isFree("blanking", [x + radius_px * Math.cos(turn), y + radius_px * Math.sin(turn)])) continue;
       c.beginPath();
-      c.arc(x, y, near_px, turn - half, turn + half);
+      c.arc(x, y, radius_px, turn - half, turn + half);
       c.stroke();
     }
   }
 
   transducer(ping) {
-    const c = this.layer.pen("face", this.palette);
+    const c = this.layer.pen("transducer", this.palette);
     drawFace(c, this.from(ping), this.ray(ping).turn, Math.max(3, FACE_M * this.view.scale));
   }
 
-  /** Where a reading was taken, pixels. */
+  /** Viewpoint of a reading, pixels. */
   from({ viewpoint: { x_m, y_m } }) {
     return this.view.px([x_m, y_m]);
   }
 
-  /** Where a beam leaves the view, pixels, and its direction there, radians clockwise from the right. */
+  /** Point at which a beam leaves the view, pixels, and its direction, radians clockwise from the right. */
   ray(ping) {
-    const turn = -ping.viewpoint.direction_deg * TURN;
+    const turn = -ping.viewpoint.direction_deg * RAD_PER_DEG;
     return { end: this.view.border(this.from(ping), turn), turn };
   }
 
-  /** Whether nothing of the kind was drawn there; of few readings always. */
+  /** Returns `true`, and marks the pixel as occupied, unless a mark of the kind is already there; always `true` for small scans. */
   isFree(kind, [x, y]) {
-    if (!this.taken) return true;
-    const before = this.taken.size;
-    return this.taken.add(`${kind} ${Math.round(x)} ${Math.round(y)}`).size > before;
+    if (!this.occupied) return true;
+    const size = this.occupied.size;
+    return this.occupied.add(`${kind} ${Math.round(x)} ${Math.round(y)}`).size > size;
   }
 }

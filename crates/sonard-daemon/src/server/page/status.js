@@ -1,26 +1,26 @@
-// What the daemon says of itself, once a second while somebody looks.
+// Status and health of the daemon, polled once per second while the page is visible.
 
-import { ask } from "./api.js";
-import * as words from "./words.js";
+import { requestJson } from "./api.js";
+import * as format from "./format.js";
 
-const EVERY_MS = 1000;
-/** When it answered last. */
-let answered = null;
+const POLL_INTERVAL_MS = 1000;
+/** Time of the last successful poll. */
+let lastContact = null;
 const byId = (/** @type {string} */ id) => /** @type {any} */ (document.getElementById(id));
 
-/** Asks for ever; `onStatus` gets status and health each time, or `null` when there is no answer. */
-export async function watch(onStatus) {
+/** Polls forever; `onStatus` receives status and health, or `null` if the daemon does not respond. */
+export async function pollStatus(onStatus) {
   for (;;) {
-    if (!document.hidden) await look(onStatus);
-    await new Promise((done) => setTimeout(done, EVERY_MS));
+    if (!document.hidden) await poll(onStatus);
+    await new Promise((done) => setTimeout(done, POLL_INTERVAL_MS));
   }
 }
 
-async function look(onStatus) {
+async function poll(onStatus) {
   try {
-    const signal = AbortSignal.timeout(5 * EVERY_MS);
-    const [status, health] = await Promise.all([ask("/v1/status", { signal }), ask("/v1/health", { signal })]);
-    answered = new Date();
+    const signal = AbortSignal.timeout(5 * POLL_INTERVAL_MS);
+    const [status, health] = await Promise.all([requestJson("/v1/status", { signal }), requestJson("/v1/health", { signal })]);
+    lastContact = new Date();
     show(status, health);
     onStatus(status, health);
   } catch (/** @type {any} */ error) {
@@ -30,16 +30,16 @@ async function look(onStatus) {
 }
 
 function show(status, health) {
-  const [lamp, text] = words.state(status.link.state);
+  const [lamp, text] = format.linkState(status.link.state);
   setLamp(byId("link"), lamp, text);
   showProvenance(status.provenance);
   const { air, plan, pose } = status;
   const age = air.age_s === null ? "" : `, ${air.age_s.toFixed(0)} s old`;
-  words.facts(byId("conditions"), [
+  format.showFacts(byId("conditions"), [
     ["Air", `${air.temperature_c.toFixed(1)} °C${air.stale ? " STALE" : ""}${age}, ${air.humidity_percent.toFixed(0)} %, ${air.sound_speed_m_s.toFixed(2)} m/s`],
-    status.simulation ? ["Array", array(status.simulation)] : ["Plan", azimuths(plan)],
-    ["Pose", `${pose.x_m.toFixed(3)}, ${pose.y_m.toFixed(3)} m, ${pose.heading_deg}°`],
-    ["Scans", mode(status.scanning)],
+    status.simulation ? ["Array", array(status.simulation)] : ["Sweep", azimuths(plan)],
+    ["Pose", poseText(pose)],
+    ["Mode", mode(status.scanning)],
     ...pending(status.pending),
     ...restart(status.configuration),
   ]);
@@ -47,93 +47,92 @@ function show(status, health) {
   showHealth(status, health);
 }
 
+const poseText = ({ x_m, y_m, heading_deg }) => `(${x_m.toFixed(3)}, ${y_m.toFixed(3)}) m, heading ${heading_deg}°`;
+
 function azimuths({ from_deg, to_deg, step_deg, pings_per_stop }) {
-  return `${from_deg}° to ${to_deg}°, every ${step_deg}°${pings_per_stop > 1 ? `, ${pings_per_stop} pings` : ""}`;
+  return `${from_deg}° to ${to_deg}°, step ${step_deg}°${pings_per_stop > 1 ? `, ${pings_per_stop} pings per step` : ""}`;
 }
 
 function array({ array, readings, driving }) {
-  return `${array}, ${words.count(readings.length, "ranger")}${driving ? ", driving" : ""}`;
+  return `${array}, ${format.count(readings.length, "ranger")}${driving ? ", driving" : ""}`;
 }
 
-/** What counts from the next scan on, if anything does. */
+/** Settings that take effect with the next scan. */
 function pending({ plan, pose, scene, air, setup }) {
   const parts = [];
-  if (plan) parts.push(`plan ${azimuths(plan)}`);
-  if (pose) parts.push(`pose ${pose.x_m.toFixed(3)}, ${pose.y_m.toFixed(3)} m, ${pose.heading_deg}°`);
+  if (plan) parts.push(`sweep ${azimuths(plan)}`);
+  if (pose) parts.push(`pose ${poseText(pose)}`);
   if (scene) parts.push(`scene ${scene.name}`);
   if (air) parts.push(`air ${air.temperature_c.toFixed(1)} °C`);
   if (setup) parts.push("sensor, model or motion");
-  return parts.length > 0 ? [["From the next scan on", parts.join("; ")]] : [];
+  return parts.length > 0 ? [["Next scan", parts.join("; ")]] : [];
 }
 
-/** Keys of a changed configuration that wait. */
+/** Keys of a changed configuration that need a restart. */
 const restart = ({ needs_restart }) => (needs_restart.length ? [["After a restart", needs_restart.join(", ")]] : []);
 
 function mode({ mode, paused, requested, next_in_s }) {
-  const parts = [mode.replaceAll("_", " ").replaceAll("-", " ")];
-  if (paused) parts.push("stopped");
-  if (requested) parts.push(`${requested} asked for`);
+  const parts = [];
+  if (requested) parts.push(`${format.count(requested, "scan")} requested`);
   if (!paused && next_in_s !== null && next_in_s > 0) parts.push(`next in ${next_in_s.toFixed(0)} s`);
-  return parts.join(", ");
+  return [`${mode.replaceAll("_", " ").replaceAll("-", " ")}${paused ? " (paused)" : ""}`, ...parts].join(", ");
 }
 
-/** What a person should know about, if anything; read out once, so without a countdown. */
+/** Problems that need attention. Contains no countdown, because screen readers read every change. */
 function trouble({ link, log, configuration }) {
-  const [lamp, text] = words.state(link.state);
+  const [lamp, text] = format.linkState(link.state);
   const parts = [];
-  if (lamp === "bad") parts.push(`Ranger: ${text}. ${link.trouble ?? ""}`);
-  if (log.error) parts.push(`Log: ${log.error}. No scan begins until it can be written.`);
-  if (configuration.error) parts.push(`The configuration was refused: ${configuration.error}`);
-  return parts.join(" ");
+  if (lamp === "bad") parts.push(`Ranger: ${text}`, link.trouble);
+  if (log.error) parts.push(`Log: ${log.error}`, "Scanning is suspended until the log is writable");
+  if (configuration.error) parts.push(`Configuration rejected: ${configuration.error}`);
+  return format.sentences(...parts);
 }
 
 function showHealth(status, health) {
   const { line, scans, clock } = health;
-  const text = health.healthy ? "All is well." : `Not well: ${health.reasons.join("; ")}.`;
+  const text = health.healthy ? "Healthy" : `Problems: ${health.reasons.join("; ")}`;
   setLamp(byId("healthy"), health.healthy ? "good" : "bad", text);
   const device = status.device;
-  const parts = (figure, unit, digits = 1) => (figure === null ? "–" : `${figure.toFixed(digits)} ${unit}`);
-  words.facts(byId("health"), [
-    ["Device", device ? `${device.serial}, firmware ${device.firmware}` : status.simulation ? "none: the model plays" : "–"],
+  const quantity = (figure, unit, digits = 1) => (figure === null ? "–" : `${figure.toFixed(digits)} ${unit}`);
+  format.showFacts(byId("health"), [
+    ["Device", device ? `${device.serial}, firmware ${device.firmware}` : status.simulation ? "none (simulation)" : "–"],
     ["Port", port(status.link)],
-    ["Scans in all", `${scans.completed} whole, ${scans.stopped} stopped, ${scans.failed} given up`],
-    ["Beams in all", `${scans.beams} measured, ${scans.missing} missing`],
-    ["Line", `${line.crc_errors} checksum errors, ${line.framing_errors} framing errors`],
-    ["Repairs", `${line.retries} retries, ${line.repaired} readings fetched again`],
-    ["Losses", `${line.losses} of the link, ${scans.restarts} restarts survived`],
-    ["Clock", `${parts(clock.drift_ppm, "ppm")} drift, ${parts(clock.sigma_us, "µs")} sigma`],
-    ["Log", status.log.file ? `${status.log.file.split("/").at(-1)}, ${status.log.waiting} waiting` : "–"],
-    ["Records", `${status.log.written} written, ${status.log.synced} on the disk`],
+    ["Scans", `${scans.completed} completed, ${scans.stopped} stopped, ${scans.failed} failed`],
+    ["Beams", `${scans.beams} measured, ${scans.missing} missing`],
+    ["Serial link", `${line.crc_errors} checksum errors, ${line.framing_errors} framing errors`],
+    ["Repairs", `${line.retries} retries, ${line.repaired} readings re-requested`],
+    ["Losses", `${format.count(line.losses, "disconnect")}, ${format.count(scans.restarts, "device reset")}`],
+    ["Clock", `${quantity(clock.drift_ppm, "ppm")} drift, ${quantity(clock.sigma_us, "µs")} sigma`],
+    ["Log", status.log.file ? `${status.log.file.split("/").at(-1)}, ${status.log.waiting} queued` : "–"],
+    ["Records", `${status.log.written} written, ${status.log.synced} synced`],
     ["Clients", `${status.subscribers.now}, ${status.subscribers.dropped_readings} readings dropped`],
-    ["Running", `sonard ${status.sonard}, ${running(status.uptime_s)}`],
+    ["Version", `${status.sonard}, up ${uptime(status.uptime_s)}`],
   ]);
 }
 
 const port = ({ port, retry_in_s }) => (retry_in_s === null ? port || "–" : `${port}, next try in ${retry_in_s.toFixed(1)} s`);
-const running = (s) => (s < 120 ? `${s.toFixed(0)} s` : s < 7200 ? `${(s / 60).toFixed(0)} min` : `${(s / 3600).toFixed(1)} h`);
+const uptime = (s) => (s < 120 ? `${s.toFixed(0)} s` : s < 7200 ? `${(s / 60).toFixed(0)} min` : `${(s / 3600).toFixed(1)} h`);
 
 function showProvenance(name) {
   const badge = byId("provenance");
-  const text = words.provenance(name);
+  const text = format.provenanceLabel(name);
   badge.hidden = !text;
-  words.setText(badge, text ?? "");
+  format.setText(badge, text ?? "");
 }
 
 function showLost(error) {
-  setLamp(byId("link"), "bad", "daemon not answering");
-  const since = answered ? ` since ${answered.toLocaleTimeString()}` : "";
-  setLamp(byId("healthy"), "bad", `The daemon is not answering${since}.`);
-  const refused = error.status ? `The daemon refuses: ${error.message}. ${error.help}` : "";
-  showTrouble(refused || "The daemon does not answer. Trying again; what is shown is what was known last.");
+  setLamp(byId("link"), "bad", "daemon not responding");
+  setLamp(byId("healthy"), "bad", `Daemon not responding${lastContact ? ` since ${format.time(lastContact)}` : ""}`);
+  showTrouble(error.status ? format.failure("Rejected", error) : "No connection to the daemon; retrying. Showing the last known state.");
 }
 
 function showTrouble(text) {
-  const place = byId("trouble");
-  place.hidden = !text;
-  words.setText(place, text);
+  const element = byId("trouble");
+  element.hidden = !text;
+  format.setText(element, text);
 }
 
 function setLamp(element, lamp, text) {
   if (element.dataset.lamp !== lamp) element.dataset.lamp = lamp;
-  words.setText(element, text);
+  format.setText(element, text);
 }

@@ -1,31 +1,31 @@
-// The residuals of a scan against azimuth, measured minus model.
+// Residuals of a scan versus azimuth: measured minus predicted range.
 
 import { make } from "./dom.js";
-import { upright } from "./pens.js";
+import { drawVertical } from "./layers.js";
 import { MARKS, draw } from "./verdicts.js";
 
 const LEFT = 46, RIGHT = 10, TOP = 8, BOTTOM = 20;
 const SCALES_MM = [5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000];
 const AGREE_MM = 10;
-const WORDS = "measured minus model in mm, against azimuth; shaded where 10 mm or less; the upright line is the selected beam";
+const CAPTION = "measured − predicted (mm) vs azimuth; band ±10 mm; line: selected beam";
 
 export class Strip {
-  /** Calls `onPick(index)` when somebody clicks at a beam. */
+  /** `onPick(index)` is called with the clicked beam. */
   constructor(section, onPick) {
-    const canvas = make("canvas", { id: "strip", role: "img", ariaLabel: `Residual: ${WORDS}` });
+    const canvas = make("canvas", { id: "strip", role: "img", ariaLabel: `Residual: ${CAPTION}` });
     this.title = make("h2", { textContent: "Residual" });
-    this.words = make("p", { textContent: WORDS });
-    section.append(make("div", { className: "head" }, this.title, this.words), canvas);
+    this.caption = make("p", { textContent: CAPTION });
+    section.append(make("div", { className: "head" }, this.title, this.caption), canvas);
     this.c = canvas.getContext("2d");
     this.width = 0;
     this.height = 0;
     this.palette = null;
-    /** The largest residual that the scale shows, millimetres. */
-    this.most = SCALES_MM[0];
+    /** Full scale, millimetres. */
+    this.max_mm = SCALES_MM[0];
     this.scan = null;
     this.selected = null;
     this.onPick = onPick;
-    /** Metres to be drawn of a reading, or `null`. @param {any} ping */
+    /** Plotted value of a reading, metres, or `null`. @param {any} ping */
     this.valueOf = (ping) => ping.residual_m;
     new ResizeObserver(() => this.resize()).observe(canvas);
     canvas.addEventListener("click", (event) => this.pick(event.offsetX));
@@ -48,27 +48,27 @@ export class Strip {
     this.c.clearRect(0, 0, this.width, this.height);
     this.drawAxes();
     for (const ping of this.drawn()) this.drawResidual(ping);
-    if (this.selected) upright(this.c, this.x(this.selected.azimuth_deg), [TOP, this.height - BOTTOM], this.palette["--ray"]);
+    if (this.selected) drawVertical(this.c, this.x(this.selected.azimuth_deg), [TOP, this.height - BOTTOM], this.palette["--ray"]);
   }
 
-  /** Readings that came since the last frame. */
+  /** Draws the readings received since the last frame. */
   addReadings(pings) {
     if (!this.width) return;
     const fresh = pings.filter((ping) => this.valueOf(ping) !== null);
-    if (fresh.some((ping) => Math.abs(1e3 * this.valueOf(ping)) > this.most)) return this.redraw();
+    if (fresh.some((ping) => Math.abs(1e3 * this.valueOf(ping)) > this.max_mm)) return this.redraw();
     for (const ping of fresh) this.drawResidual(ping);
   }
 
-  /** Readings that have something to be drawn. */
+  /** Readings with a value. */
   drawn() {
     return [...(this.scan?.beams.values() ?? [])].filter((ping) => this.valueOf(ping) !== null);
   }
 
-  /** From the next time on it is drawn, shows something else of readings, with a title and words; the residual without. */
-  show(valueOf = (ping) => ping.residual_m, title = "Residual", words = WORDS) {
+  /** Sets the plotted value, by default the residual; takes effect with the next redraw. */
+  show(valueOf = (ping) => ping.residual_m, title = "Residual", caption = CAPTION) {
     this.valueOf = valueOf;
-    [this.title.textContent, this.words.textContent] = [title, words];
-    this.c.canvas.ariaLabel = `${title}: ${words}`;
+    [this.title.textContent, this.caption.textContent] = [title, caption];
+    this.c.canvas.ariaLabel = `${title}: ${caption}`;
   }
 
   select(ping) {
@@ -76,11 +76,11 @@ export class Strip {
     this.redraw();
   }
 
-  /** The scale that nineteen of twenty residuals fit in; the others are drawn at its end. */
+  /** Chooses the smallest scale that holds 95 % of the residuals; the others are clipped to its ends. */
   setScale() {
     const sizes = this.drawn().map((ping) => Math.abs(1e3 * this.valueOf(ping))).sort((a, b) => a - b);
-    const wanted = sizes.length ? sizes[Math.floor(0.95 * (sizes.length - 1))] : 0;
-    this.most = SCALES_MM.find((scale) => scale >= wanted) ?? SCALES_MM.at(-1);
+    const p95_mm = sizes.length ? sizes[Math.floor(0.95 * (sizes.length - 1))] : 0;
+    this.max_mm = SCALES_MM.find((scale) => scale >= p95_mm) ?? SCALES_MM.at(-1);
   }
 
   get plan() {
@@ -94,24 +94,24 @@ export class Strip {
   }
 
   y(mm) {
-    const share = Math.max(-1, Math.min(1, mm / this.most));
+    const share = Math.max(-1, Math.min(1, mm / this.max_mm));
     return TOP + ((1 - share) / 2) * (this.height - TOP - BOTTOM);
   }
 
   drawAxes() {
     const c = this.c;
     const right = this.width - RIGHT;
-    // Within this band ranges agree (or within 1 % of the range, if that is more).
+    // Ranges agree within this band, or within 1 % of the range if that is more.
     const [top, bottom] = [this.y(AGREE_MM), this.y(-AGREE_MM)];
     c.fillStyle = this.palette["--grid"];
     c.fillRect(LEFT, top, right - LEFT, bottom - top);
     c.strokeStyle = this.palette["--rule"];
-    c.fillStyle = this.palette["--quiet"];
+    c.fillStyle = this.palette["--muted"];
     c.lineWidth = 1;
     c.font = "11px system-ui, sans-serif";
     c.textAlign = "right";
     c.textBaseline = "middle";
-    for (const mm of [-this.most, 0, this.most]) {
+    for (const mm of [-this.max_mm, 0, this.max_mm]) {
       const y = Math.round(this.y(mm)) + 0.5;
       c.beginPath();
       c.moveTo(LEFT, y);
@@ -138,7 +138,7 @@ export class Strip {
   pick(x) {
     const pings = [...(this.scan?.beams.values() ?? [])];
     if (!pings.length) return;
-    const off = (ping) => Math.abs(this.x(ping.azimuth_deg) - x);
-    this.onPick(pings.reduce((one, other) => (off(other) < off(one) ? other : one)).index);
+    const distance = (ping) => Math.abs(this.x(ping.azimuth_deg) - x);
+    this.onPick(pings.reduce((a, b) => (distance(b) < distance(a) ? b : a)).index);
   }
 }

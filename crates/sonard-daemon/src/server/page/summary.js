@@ -1,62 +1,64 @@
-// What is said: in a line under the plan, read out by screen readers. Never once a beam.
+// Live region below the plan's title, read out by screen readers; updated per scan or event, never per beam.
 
-import { count, setText } from "./words.js";
+import { count, sentences, setText } from "./format.js";
 
-/** For so long an answer stands, however fast scans follow each other. */
-const ANSWER_MS = 3000;
+/** Minimum display time of the result of an action, however fast scans follow each other. */
+const RESULT_MS = 3000;
 
 export class Summary {
-  constructor(place) {
-    this.place = place;
+  constructor(element) {
+    this.element = element;
+    /** Runs while the result of an action is shown. */
     this.timer = null;
-    this.news = null;
+    /** Latest news of the scan, deferred until the timer ends. */
+    this.pending = null;
   }
 
-  say(text) {
+  /** Shows a text at once. */
+  set(text) {
     clearTimeout(this.timer);
     this.timer = null;
-    setText(this.place, text);
+    setText(this.element, text);
   }
 
-  /** What came of something that was asked for on this page; news of scans waits behind it. */
-  answer(text) {
-    this.say(text);
-    this.news = null;
+  /** Shows the result of an action on this page; news of scans is deferred meanwhile. */
+  setResult(text) {
+    this.set(text);
+    this.pending = null;
     this.timer = setTimeout(() => {
       this.timer = null;
-      if (this.news !== null) this.say(this.news);
-    }, ANSWER_MS);
+      if (this.pending !== null) this.set(this.pending);
+    }, RESULT_MS);
   }
 
-  tell(text) {
-    if (this.timer === null) this.say(text);
-    else this.news = text;
+  setNews(text) {
+    if (this.timer === null) this.set(text);
+    else this.pending = text;
   }
 
-  began(scan) {
-    this.tell(`A scan of ${count(scan.planned, "beam")} is under way.`);
+  scanStarted(scan) {
+    this.setNews(`Scanning ${count(scan.planned, "beam")}`);
   }
 
-  ended(scan) {
-    this.tell(`Scan over: ${scan.inWords()}.`);
+  scanEnded(scan) {
+    this.setNews(sentences(scan.isStopped ? scan.summary() : `Scan complete: ${scan.summary()}`));
   }
 
-  /** The daemon is gone, and with it what it might say of the scan. */
-  lost(scan) {
-    this.tell(`Heard last of the scan: ${scan.inWords()}. Whether it goes on is not known.`);
+  connectionLost(scan) {
+    this.setNews(`Connection lost during this scan (${count(scan.beams.size, "beam")} received).`);
   }
 
-  /** Counts of a scan under way would be out of date at once: they stand above the plan. */
-  shows(scan) {
-    if (scan.replayed) this.say(`Replay of a scan of ${count(scan.planned, "beam")}.`);
-    else if (scan.underWay) this.began(scan);
-    else this.say(`${scan.end ? "" : "Not ended: "}${scan.inWords()}.`);
+  /** Shows a scan of the log. Running scans are summarized without counts, which are above the plan. */
+  showScan(scan) {
+    if (scan.replayed) this.set(`Replaying ${count(scan.planned, "beam")}`);
+    else if (scan.running) this.scanStarted(scan);
+    else this.set(sentences(`${scan.end ? "" : "Incomplete: "}${scan.summary()}`));
   }
 
-  event({ kind, detail }) {
-    // An explanation is of the last scan, which nobody knows by its id.
-    const of = /^scan [0-9a-f-]{36}: /;
-    if (kind === "explanation") this.tell(`The last scan is ${detail.replace(of, "")}.`);
-    else this.tell(`${kind.replaceAll("_", " ")}: ${detail}`);
+  showEvent({ kind, detail }) {
+    // Explanations refer to the last scan by its identifier, which users do not see.
+    const scanId = /^scan [0-9a-f-]{36}: /;
+    if (kind === "explanation") this.setNews(sentences(`Last scan: ${detail.replace(scanId, "")}`));
+    else this.setNews(`${kind.replaceAll("_", " ")}: ${detail}`);
   }
 }

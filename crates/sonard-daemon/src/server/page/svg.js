@@ -1,9 +1,9 @@
-// A canvas context that writes SVG: as much of one as the plan is drawn with.
+// Canvas-like context that writes SVG; implements the subset of the API that the plan uses.
 
 const RIGHT = { left: "start", center: "middle", right: "end" };
 const BASE = { middle: "central", alphabetic: "alphabetic" };
 
-/** Coordinates to a fiftieth of a pixel. @param {number} value */
+/** Rounds a coordinate to 1/50 pixel. @param {number} value */
 const n = (value) => String(Math.round(50 * value) / 50);
 /** @param {string} text */
 const escaped = (text) => text.replace(/[&<>"]/g, (letter) => `&#${letter.charCodeAt(0)};`);
@@ -32,15 +32,15 @@ export class SvgContext {
     this.transform = "";
   }
 
-  /** The picture's file. @param {string} title */
+  /** Text of the SVG file. @param {string} title */
   file(title) {
     const { width, height } = this;
     const head = `<svg xmlns="http://www.w3.org/2000/svg" width="${n(width)}" height="${n(height)}" viewBox="0 0 ${n(width)} ${n(height)}">`;
     return `${head}<title>${escaped(title)}</title>\n${this.parts.join("\n")}\n</svg>\n`;
   }
 
-  /** What is drawn within is cut off at a box's border. @param {number[]} box @param {() => void} draw */
-  within([x, y, width, height], draw) {
+  /** Draws into a nested viewport, clipped at a box. @param {number[]} box @param {() => void} draw */
+  clipped([x, y, width, height], draw) {
     this.parts.push(`<svg x="${n(x)}" y="${n(y)}" width="${n(width)}" height="${n(height)}">`);
     draw();
     this.parts.push("</svg>");
@@ -82,14 +82,14 @@ export class SvgContext {
     this.path += `${this.path ? "L" : "M"}${n(x)} ${n(y)}`;
   }
 
-  /** Clockwise from one direction to another, as on a canvas. */
+  /** Arc, clockwise as on a canvas. */
   arc(x, y, r, from, to) {
     const end = (turn) => `${n(x + r * Math.cos(turn))} ${n(y + r * Math.sin(turn))}`;
-    const whole = to - from >= 2 * Math.PI - 1e-9;
+    const isFullCircle = to - from >= 2 * Math.PI - 1e-9;
     this.path += `${this.path ? "L" : "M"}${end(from)}`;
-    // An arc that ends where it begins would be none.
-    if (whole) this.path += `A${n(r)} ${n(r)} 0 0 1 ${end(from + Math.PI)}`;
-    this.path += `A${n(r)} ${n(r)} 0 ${!whole && to - from > Math.PI ? 1 : 0} 1 ${end(to)}`;
+    // SVG omits an arc whose end equals its start, so a full circle takes two.
+    if (isFullCircle) this.path += `A${n(r)} ${n(r)} 0 0 1 ${end(from + Math.PI)}`;
+    this.path += `A${n(r)} ${n(r)} 0 ${!isFullCircle && to - from > Math.PI ? 1 : 0} 1 ${end(to)}`;
   }
 
   stroke() {

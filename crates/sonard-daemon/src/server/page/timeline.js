@@ -1,9 +1,9 @@
-// The scans of the logs as a time line: one upright line each, and a slider that goes through them.
+// Time line of the logs: one bar per scan, and a slider.
 
-import { clock, count, setText } from "./words.js";
+import { clock, count, setText } from "./format.js";
 import { make } from "./dom.js";
 
-/** As far as a slider's thumb stays from its ends, pixels. */
+/** Distance between the ends of a slider and the centre of its thumb, pixels. */
 const INSET = 8;
 const HEIGHT = 40, FOOT = 14;
 const LABEL_PX = 74;
@@ -12,29 +12,31 @@ const FONT = "11px system-ui, sans-serif";
 export class TimeLine {
   /**
    * @param {HTMLElement} place
+   * @param {(id: string) => boolean} isRunning
    * @param {(scan: any) => void} onScrub
    * @param {() => void} onOlder
    */
-  constructor(place, onScrub, onOlder) {
+  constructor(place, isRunning, onScrub, onOlder) {
+    this.isRunning = isRunning;
     this.canvas = make("canvas", { id: "time-line", ariaHidden: "true" });
     this.slider = make("input", { type: "range", id: "scrub", min: "0", max: "0", step: "1", ariaLabel: "Scan, from the oldest to the newest", disabled: true });
-    this.told = make("output", { id: "scrub-now", textContent: "no scan yet" });
-    this.older = make("button", { type: "button", id: "older", textContent: "Older", disabled: true });
-    place.append(this.canvas, this.slider, make("p", {}, this.told, this.older));
+    this.label = make("output", { id: "scrub-label", textContent: "no scan yet" });
+    this.older = make("button", { type: "button", id: "older", textContent: "Load older", disabled: true });
+    place.append(this.canvas, this.slider, make("p", {}, this.label, this.older));
     /** Oldest first. @type {any[]} */
     this.scans = [];
     this.shown = null;
     this.palette = null;
     this.slider.addEventListener("input", () => {
       const scan = this.scans[this.slider.value];
-      this.tell(scan);
+      this.updateLabel(scan);
       if (scan) onScrub(scan);
     });
     this.older.addEventListener("click", onOlder);
     new ResizeObserver(() => this.redraw()).observe(this.canvas);
   }
 
-  /** @param {any[]} scans newest first @param {string | null} shown its id; `null` for what is live @param {boolean} more whether there may be older ones */
+  /** @param {any[]} scans newest first @param {string | null} shown id of the shown scan; `null` for the live one @param {boolean} more set if the log may have older scans */
   show(scans, shown, more) {
     this.scans = scans.toReversed();
     this.shown = shown;
@@ -43,15 +45,15 @@ export class TimeLine {
     this.older.disabled = !more;
     const at = shown === null ? scans.length - 1 : this.scans.findIndex(({ scan }) => scan === shown);
     this.slider.value = at < 0 ? 0 : at;
-    this.tell(this.scans[at]);
+    this.updateLabel(this.scans[at]);
     this.redraw();
   }
 
-  tell(scan) {
-    if (!scan) return setText(this.told, this.scans.length ? "a scan that is not in the list" : "no scan yet");
+  updateLabel(scan) {
+    if (!scan) return setText(this.label, this.scans.length ? "scan not in the list" : "no scan yet");
     const at = this.scans.indexOf(scan) + 1;
-    const text = `scan ${at} of ${this.scans.length}, ${clock(scan.time)}, ${scan.end ? count(scan.end.beams, "beam") : "not ended"}`;
-    setText(this.told, text);
+    const text = `scan ${at} of ${this.scans.length}, ${clock(scan.time)}, ${scan.end ? count(scan.end.beams, "beam") : this.isRunning(scan.scan) ? "running" : "incomplete"}`;
+    setText(this.label, text);
     this.slider.setAttribute("aria-valuetext", text);
   }
 
@@ -69,20 +71,20 @@ export class TimeLine {
     this.drawTimes(c, x, width);
     let last = -1;
     scans.forEach((scan, i) => {
-      // Of scans that share a pixel the first one is drawn.
+      // The first of several scans on the same pixel is drawn.
       if (Math.round(x(i)) === last && scan.scan !== this.shown) return;
       last = Math.round(x(i));
-      const whole = scan.end && scan.end.missing === 0;
+      const isComplete = scan.end && scan.end.missing === 0;
       const share = scan.end ? scan.end.beams / Math.max(1, scan.end.beams + scan.end.missing) : 0.5;
       const high = Math.max(0.15, share) * (HEIGHT - FOOT - 4);
-      c.fillStyle = palette[scan.scan === this.shown ? "--path" : whole ? "--direct" : scan.end ? "--unexplained" : "--wait"];
+      c.fillStyle = palette[scan.scan === this.shown ? "--path" : isComplete ? "--direct" : scan.end ? "--disagrees" : "--wait"];
       c.fillRect(x(i) - thick / 2, HEIGHT - FOOT - high, thick, high);
     });
   }
 
-  /** The hour, or the day, where there is room to say it. */
+  /** Draws time labels, with the date where it changes, as far as there is room. */
   drawTimes(c, x, width) {
-    c.fillStyle = this.palette["--quiet"];
+    c.fillStyle = this.palette["--muted"];
     [c.font, c.textBaseline] = [FONT, "alphabetic"];
     let [free, day] = [0, ""];
     this.scans.forEach(({ time }, i) => {

@@ -1,11 +1,11 @@
-// The buttons on the floor plan: zoom, fit, measure.
+// Toolbar of the floor plan: zoom, fit, measure.
 
 import { Measure } from "./measure.js";
 import { make } from "./dom.js";
 
-const KEYS = "arrow keys move it, plus and minus zoom, 0 fits it, M measures";
+const KEYS = "arrow keys pan, plus and minus zoom, 0 fits the view, M measures";
 
-/** Puts them on the stage of a plan. `onMove` hears of every other view. */
+/** Adds the toolbar to a plan; `onMove` is called after each change of the view. */
 export function addTools(plan, onMove) {
   const { stage, view } = plan;
   const middle = () => [view.width / 2, view.height / 2];
@@ -13,20 +13,20 @@ export function addTools(plan, onMove) {
     view.zoom(factor, middle());
     plan.moveView();
   };
-  const button = (text, name, doing) => {
-    const made = make("button", { type: "button", textContent: text, ariaLabel: name, title: name });
-    made.addEventListener("click", doing);
-    return made;
+  const button = (text, name, onClick) => {
+    const element = make("button", { type: "button", textContent: text, ariaLabel: name, title: name });
+    element.addEventListener("click", onClick);
+    return element;
   };
-  const fit = button("Fit", "Fit the view", () => plan.show(view.what));
+  const fit = button("Fit", "Fit the view", () => plan.show(view.mode));
   const ruler = button("Measure", "Measure a length", () => plan.measure.toggle());
-  const told = make("output", { className: "measured", hidden: true });
+  const output = make("output", { className: "measured", hidden: true });
   const bar = make("div", { className: "tools" }, button("+", "Zoom in", () => zoom(1.5)), button("−", "Zoom out", () => zoom(1 / 1.5)), fit, ruler);
   bar.role = "toolbar";
   bar.ariaLabel = "View of the plan";
-  stage.append(bar, told);
+  stage.append(bar, output);
   ruler.ariaPressed = "false";
-  plan.measure = new Measure(plan, told, (on) => {
+  plan.measure = new Measure(plan, output, (on) => {
     ruler.ariaPressed = String(on);
     stage.classList.toggle("measuring", on);
   });

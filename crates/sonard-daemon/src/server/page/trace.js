@@ -1,9 +1,11 @@
-// The echo trace of a beam, as an oscilloscope would show it: envelope and threshold against range, in decibels.
+// Echo trace of a beam: predicted envelope and detection threshold (dB) versus range, with measured echoes.
 
-import { arrow, upright } from "./pens.js";
+import { arrow, drawVertical } from "./layers.js";
+
+/** @import { Beam, Peak, Trace } from "../../../web/playground/engine.js" */
 
 const LEFT = 44, RIGHT = 10, TOP = 18, BOTTOM = 24;
-const TOP_DB = 6, LEAST_DB = -60;
+const MAX_DB = 6, MIN_DB = -60;
 const STEPS_M = [0.05, 0.1, 0.2, 0.5, 1, 2, 5];
 const HIT_PX = 20;
 const FONT = "11px system-ui, sans-serif";
@@ -11,17 +13,17 @@ const FONT = "11px system-ui, sans-serif";
 export class EchoTrace {
   /**
    * @param {HTMLCanvasElement} canvas
-   * @param {(peak: import("../../../web/playground/engine.js").Peak) => void} onPick
+   * @param {(peak: Peak) => void} onPick
    */
   constructor(canvas, onPick) {
     this.canvas = canvas;
     this.c = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d"));
     this.width = 0;
     this.height = 0;
-    /** @type {import("../../../web/playground/engine.js").Beam | null} */
+    /** @type {Beam | null} */
     this.beam = null;
-    /** @type {import("../../../web/playground/engine.js").Peak | null} */
-    this.chosen = null;
+    /** @type {Peak | null} */
+    this.selected = null;
     /** @type {Record<string, string> | null} */
     this.palette = null;
     this.onPick = onPick;
@@ -30,11 +32,11 @@ export class EchoTrace {
   }
 
   /**
-   * @param {import("../../../web/playground/engine.js").Beam | null} beam
-   * @param {import("../../../web/playground/engine.js").Peak | null} chosen
+   * @param {Beam | null} beam
+   * @param {Peak | null} selected
    */
-  show(beam, chosen = null) {
-    [this.beam, this.chosen] = [beam, chosen];
+  show(beam, selected = null) {
+    [this.beam, this.selected] = [beam, selected];
     this.redraw();
   }
 
@@ -60,23 +62,23 @@ export class EchoTrace {
     for (const peak of peaks) this.drawPeak(palette, peak);
     for (const echo of this.beam.echoes ?? []) this.drawEcho(palette, echo);
     if (reading.range_m !== null) this.drawRange(reading.range_m, palette["--wall"]);
-    this.drawWords(palette);
+    this.drawLegend(palette);
   }
 
-  get until_m() {
+  get max_m() {
     const trace = this.beam?.trace;
     return trace ? Math.max(trace.envelope.length - 1, 1) * trace.step_us * trace.m_per_us || 1 : 1;
   }
 
   /** @param {number} m */
   x(m) {
-    return LEFT + (m / this.until_m) * (this.width - LEFT - RIGHT);
+    return LEFT + (m / this.max_m) * (this.width - LEFT - RIGHT);
   }
 
   /** @param {number} level of amplitude */
   y(level) {
-    const db = level > 0 ? Math.max(LEAST_DB, Math.min(TOP_DB, 20 * Math.log10(level))) : LEAST_DB;
-    return TOP + ((TOP_DB - db) / (TOP_DB - LEAST_DB)) * (this.height - TOP - BOTTOM);
+    const db = level > 0 ? Math.max(MIN_DB, Math.min(MAX_DB, 20 * Math.log10(level))) : MIN_DB;
+    return TOP + ((MAX_DB - db) / (MAX_DB - MIN_DB)) * (this.height - TOP - BOTTOM);
   }
 
   /** @param {Record<string, string>} palette */
@@ -89,7 +91,7 @@ export class EchoTrace {
     c.textBaseline = "middle";
     c.textAlign = "right";
     c.strokeStyle = palette["--grid"];
-    c.fillStyle = palette["--quiet"];
+    c.fillStyle = palette["--muted"];
     for (const db of [0, -20, -40, -60]) {
       const y = Math.round(this.y(10 ** (db / 20))) + 0.5;
       c.beginPath();
@@ -98,9 +100,9 @@ export class EchoTrace {
       c.stroke();
       c.fillText(db ? `−${-db}` : "0 dB", LEFT - 5, y);
     }
-    const step = STEPS_M.find((m) => this.until_m / m <= Math.max(2, (right - LEFT) / 52)) ?? 5;
+    const step = STEPS_M.find((m) => this.max_m / m <= Math.max(2, (right - LEFT) / 52)) ?? 5;
     c.textAlign = "center";
-    for (let i = 0; i * step <= this.until_m + 1e-9; i++) {
+    for (let i = 0; i * step <= this.max_m + 1e-9; i++) {
       const [x, m] = [this.x(i * step), i * step];
       if (x < right - 14) c.fillText(String(Number(m.toFixed(2))), x, this.height - 10);
     }
@@ -110,17 +112,17 @@ export class EchoTrace {
 
   /**
    * @param {Record<string, string>} palette
-   * @param {import("../../../web/playground/engine.js").Trace} trace
+   * @param {Trace} trace
    */
   drawBlanking(palette, trace) {
     const { c } = this;
     const end = Math.min(this.x(trace.blanking_us * trace.m_per_us), this.width - RIGHT);
     c.fillStyle = palette["--grid"];
     c.fillRect(LEFT, TOP, end - LEFT, this.height - TOP - BOTTOM);
-    if (end - LEFT < 40) return;
-    c.fillStyle = palette["--quiet"];
+    if (end - LEFT < 60) return;
+    c.fillStyle = palette["--muted"];
     c.textAlign = "left";
-    c.fillText("deaf", LEFT + 4, this.height - BOTTOM - 8);
+    c.fillText("blanking", LEFT + 4, TOP + 8);
   }
 
   /**
@@ -142,15 +144,15 @@ export class EchoTrace {
 
   /**
    * @param {Record<string, string>} palette
-   * @param {import("../../../web/playground/engine.js").Peak} peak
+   * @param {Peak} peak
    */
   drawPeak(palette, peak) {
     const { c } = this;
     const x = this.x(peak.range_m);
     if (x > this.width - RIGHT) return;
-    const chosen = peak === this.chosen;
-    c.fillStyle = palette[chosen ? "--path" : "--quiet"];
-    const half = chosen ? 5 : 3;
+    const selected = peak === this.selected;
+    c.fillStyle = palette[selected ? "--path" : "--muted"];
+    const half = selected ? 5 : 3;
     c.beginPath();
     c.moveTo(x, this.height - BOTTOM);
     c.lineTo(x - half, this.height - BOTTOM + 2 * half);
@@ -161,10 +163,10 @@ export class EchoTrace {
   /** @param {number} range_m @param {string} colour */
   drawRange(range_m, colour) {
     const x = this.x(range_m);
-    if (x <= this.width - RIGHT) upright(this.c, x, [TOP, this.height - BOTTOM], colour);
+    if (x <= this.width - RIGHT) drawVertical(this.c, x, [TOP, this.height - BOTTOM], colour);
   }
 
-  /** What the ranger's comparator told, above the trace. @param {Record<string, string>} palette @param {{range_m: number | null}} echo */
+  /** Draws an echo measured by the comparator, above the trace. @param {Record<string, string>} palette @param {{range_m: number | null}} echo */
   drawEcho(palette, { range_m }) {
     const x = range_m === null ? Infinity : this.x(range_m);
     if (x > this.width - RIGHT) return;
@@ -172,21 +174,21 @@ export class EchoTrace {
     arrow(this.c, [x, TOP + 4], Math.PI / 2, [5, 4, 4]);
   }
 
-  /** What each line is. @param {Record<string, string>} palette */
-  drawWords(palette) {
+  /** @param {Record<string, string>} palette */
+  drawLegend(palette) {
     const { c } = this;
-    const words = [
+    const entries = [
       ["envelope", "--direct"],
       ["threshold", "--min-range"],
       ["reading", "--wall"],
     ];
-    if (this.beam?.echoes?.length) words.push(["echoes", "--ray"]);
+    if (this.beam?.echoes?.length) entries.push(["echoes", "--ray"]);
     c.textAlign = "left";
     let x = LEFT;
-    for (const [text, colour] of words) {
+    for (const [text, colour] of entries) {
       c.fillStyle = palette[colour];
       c.fillRect(x, 8, 12, 2);
-      c.fillStyle = palette["--quiet"];
+      c.fillStyle = palette["--muted"];
       c.fillText(text, x + 16, 9);
       x += 28 + c.measureText(text).width;
     }
@@ -194,11 +196,11 @@ export class EchoTrace {
 
   /** @param {number} x */
   pick(x) {
-    const off = (/** @type {import("../../../web/playground/engine.js").Peak} */ peak) => Math.abs(this.x(peak.range_m) - x);
+    const distance = (/** @type {Peak} */ peak) => Math.abs(this.x(peak.range_m) - x);
     const nearest = (this.beam?.peaks ?? []).reduce(
-      (one, other) => (one && off(one) <= off(other) ? one : other),
-      /** @type {import("../../../web/playground/engine.js").Peak | null} */ (null),
+      (a, b) => (a && distance(a) <= distance(b) ? a : b),
+      /** @type {Peak | null} */ (null),
     );
-    if (nearest && off(nearest) <= HIT_PX) this.onPick(nearest);
+    if (nearest && distance(nearest) <= HIT_PX) this.onPick(nearest);
   }
 }

@@ -1,30 +1,30 @@
-// What each reading is drawn as, and the legend. The words, shapes and hues are those of `sonard plot`.
+// Marks of readings by verdict, and the legend. Labels, shapes and hues follow `sonard plot`.
 
-import { drawSample, penWords } from "./pens.js";
+import { drawSample, penLabel } from "./layers.js";
 
-/** Marks by name: words of the legend, shape, and the style's colour. */
+/** Marks by name: legend label, shape, and colour (custom property of the style sheet). */
 export const MARKS = {
-  echo: { words: "echo, no model", shape: "dot", colour: "--direct" },
-  direct: { words: "direct echo", shape: "dot", colour: "--direct" },
-  multiple: { words: "multiple reflection", shape: "square", colour: "--multiple" },
-  edge: { words: "edge", shape: "triangle", colour: "--edge-mark" },
-  min_range: { words: "minimum range", shape: "diamond", colour: "--min-range" },
-  unexplained: { words: "unexplained", shape: "cross", colour: "--unexplained" },
-  silent: { words: "silent", shape: "tick", colour: "--silent" },
-  silent_unexplained: { words: "silent, model hears", shape: "tick", colour: "--unexplained" },
-  lost: { words: "no valid reading", shape: "tick", colour: "--lost" },
-  model: { words: "model", shape: "ring", colour: "--model" },
+  echo: { label: "echo, no prediction", shape: "dot", colour: "--direct" },
+  direct: { label: "direct echo", shape: "dot", colour: "--direct" },
+  multiple: { label: "multiple reflection", shape: "square", colour: "--multiple" },
+  edge: { label: "edge", shape: "triangle", colour: "--edge-mark" },
+  min_range: { label: "minimum range", shape: "diamond", colour: "--min-range" },
+  unexplained: { label: "disagrees with model", shape: "cross", colour: "--disagrees" },
+  no_echo: { label: "no echo", shape: "tick", colour: "--no-echo" },
+  missed_echo: { label: "missed echo", shape: "tick", colour: "--disagrees" },
+  invalid: { label: "invalid reading", shape: "tick", colour: "--invalid" },
+  prediction: { label: "prediction", shape: "ring", colour: "--model" },
 };
 
-/** The mark of a reading, by the verdict that the daemon gave. */
+/** Mark of a reading, from its status and the daemon's verdict. */
 export function markOf(ping) {
-  const heard = ping.range_m !== null && (ping.status === "echo" || ping.status === "min_range");
-  if (heard) return ping.verdict in MARKS ? ping.verdict : ping.status === "echo" ? "echo" : "min_range";
-  if (ping.status !== "no_echo") return "lost";
-  return ping.verdict === "unexplained" ? "silent_unexplained" : "silent";
+  const hasRange = ping.range_m !== null && (ping.status === "echo" || ping.status === "min_range");
+  if (hasRange) return ping.verdict in MARKS ? ping.verdict : ping.status === "echo" ? "echo" : "min_range";
+  if (ping.status !== "no_echo") return "invalid";
+  return ping.verdict === "unexplained" ? "missed_echo" : "no_echo";
 }
 
-/** Draws a mark of half-width r at x, y; `direction` is the way outward of a tick, radians. */
+/** Draws a mark of half-width r at x, y; `direction` is the outward direction of a tick, radians. */
 export function draw(c, mark, x, y, r, colour, direction = -Math.PI / 2) {
   c.fillStyle = c.strokeStyle = colour;
   c.beginPath();
@@ -64,7 +64,7 @@ export function draw(c, mark, x, y, r, colour, direction = -Math.PI / 2) {
   }
 }
 
-/** The style's colours, by name; read anew when the style changes. */
+/** Colours of the style sheet by custom property, read on first use; created again when the colour scheme changes. */
 export function colours() {
   const style = getComputedStyle(document.documentElement);
   return new Proxy({}, {
@@ -75,25 +75,25 @@ export function colours() {
   });
 }
 
-/** Names of the marks that occur, in the order of the legend. @param {Map<string, number>} counts */
+/** Names of the marks in use, in the order of the legend. @param {Map<string, number>} counts */
 export const marksIn = (counts) => Object.keys(MARKS).filter((name) => counts.get(name));
 
-/** A mark as the legend shows it, in a field of 24 by 16 pixels. */
+/** Draws a mark's legend symbol, 24 by 16 pixels. */
 export function drawMark(c, name, palette) {
   draw(c, name, 12, MARKS[name].shape === "tick" ? 2 : 8, 4, palette[MARKS[name].colour]);
 }
 
-/** Fills the legend with the marks that occur and their numbers, and with the pens that are drawn with. */
-export function legend(list, counts, pens, palette) {
+/** Updates the legend: marks in use with their counts, then pens in use. */
+export function updateLegend(list, counts, pens, palette) {
   const marks = marksIn(counts);
   const names = [...marks, ...pens];
-  const same = names.length === list.children.length && names.every((name, i) => list.children[i].dataset.sign === name);
+  const same = names.length === list.children.length && names.every((name, i) => list.children[i].dataset.name === name);
   if (!same || list.palette !== palette) {
     list.palette = palette;
     list.replaceChildren(...marks.map((name) => markEntry(name, palette)), ...pens.map((name) => penEntry(name, palette)));
   }
   marks.forEach((name, i) => {
-    const text = name === "model" ? MARKS[name].words : `${MARKS[name].words} (${counts.get(name)})`;
+    const text = name === "prediction" ? MARKS[name].label : `${MARKS[name].label} (${counts.get(name)})`;
     const label = list.children[i].lastChild;
     if (label.data !== text) label.data = text;
   });
@@ -104,19 +104,19 @@ function markEntry(name, palette) {
 }
 
 function penEntry(name, palette) {
-  return entry(name, (c) => drawSample(c, name, palette), penWords(name));
+  return entry(name, (c) => drawSample(c, name, palette), penLabel(name));
 }
 
-function entry(name, sign, text) {
+function entry(name, drawSymbol, text) {
   const item = document.createElement("li");
-  item.dataset.sign = name;
+  item.dataset.name = name;
   const sample = item.appendChild(document.createElement("canvas"));
   sample.ariaHidden = "true";
   sample.width = 24 * devicePixelRatio;
   sample.height = 16 * devicePixelRatio;
   const c = sample.getContext("2d");
   c.scale(devicePixelRatio, devicePixelRatio);
-  sign(c);
+  drawSymbol(c);
   item.append(text);
   return item;
 }

@@ -1,59 +1,61 @@
-// Scans over time: a waterfall of all beams, a row a scan, and the ranges of the selected beam as a series.
+// Scans over time: waterfall of all beams, one row per scan, and the ranges of the selected beam as a series.
 
 import { make } from "./dom.js";
-import { upright } from "./pens.js";
-import { clock, count, degrees, metres, setText } from "./words.js";
+import { drawVertical } from "./layers.js";
+import { clock, count, degrees, metres, setText } from "./format.js";
 
-/** Rows that are kept, and columns: beams beyond those share one. */
-const ROWS = 200, COLUMNS = 1024;
-/** Scans of the log that rows are made of when somebody looks, and the most beams of them. */
-const PAST = 40, PAST_BEAMS = 4000;
+/** Maximum numbers of rows and columns; adjacent beams share a column if a scan has more. */
+const MAX_ROWS = 200, MAX_COLUMNS = 1024;
+/** Scans loaded from the log when the section is opened, and the maximum number of beams of such a scan. */
+const MAX_LOADED = 40, MAX_LOADED_BEAMS = 4000;
 const ROW_PX = 4, LEFT = 46, RIGHT = 10, FOOT = 18;
 const SERIES_PX = 110, TOP = 8;
 const FONT = "11px system-ui, sans-serif";
-/** From near to far: dark to light, told apart also without colours. */
-const RAMP = [[68, 1, 84], [59, 82, 139], [33, 145, 140], [94, 201, 98], [253, 231, 37]];
+/** Viridis, from near (dark) to far (light); monotonic in lightness, so it needs no colour vision. */
+const COLOUR_MAP = [[68, 1, 84], [59, 82, 139], [33, 145, 140], [94, 201, 98], [253, 231, 37]];
 
 export class Waterfall {
   /**
    * @param {HTMLDetailsElement} details
-   * @param {{get: (id: string) => Promise<any>, known: () => any[], onPick: (scan: string, index: number) => void}} uses
+   * @param {{get: (id: string) => Promise<any>, known: () => any[], onPick: (scan: string, index: number) => void}} callbacks
    */
-  constructor(details, uses) {
-    this.uses = uses;
+  constructor(details, callbacks) {
+    this.callbacks = callbacks;
     this.details = details;
-    this.canvas = make("canvas", { id: "waterfall", role: "img", ariaLabel: "Ranges of all beams, a row a scan, the newest above" });
+    this.canvas = make("canvas", { id: "waterfall", role: "img", ariaLabel: "Ranges of all beams, one row per scan, newest on top" });
     this.series = make("canvas", { id: "series", role: "img", ariaLabel: "Ranges of the selected beam over time" });
-    this.told = make("p", { id: "series-now", className: "hint" });
-    details.append(make("summary", { textContent: "Scans over time" }), make("p", { className: "ramp hint" }), this.canvas, this.told, this.series);
+    this.caption = make("p", { className: "hint" });
+    this.label = make("p", { id: "series-label", className: "hint" });
+    details.append(make("summary", { textContent: "Scans over time" }), this.caption, this.canvas, this.label, this.series);
     /** Newest first. @type {{id: string, time: number, planned: number, ranges: Float32Array, plan: any}[]} */
     this.rows = [];
     this.selected = null;
     this.palette = null;
-    this.most_m = 1;
-    this.filling = false;
-    this.due = null;
-    details.addEventListener("toggle", () => this.fill());
+    /** Range at the light end of the colour map, metres. */
+    this.max_m = 1;
+    this.loading = false;
+    this.redrawTimer = null;
+    details.addEventListener("toggle", () => this.load());
     this.canvas.addEventListener("click", (event) => this.pick([event.offsetX, event.offsetY]));
     new ResizeObserver(() => this.redrawSoon()).observe(details);
   }
 
-  /** A scan that begins, or that the log has. @param {any} scan @returns {any} */
+  /** Row of a scan, inserted by time if missing. @param {any} scan @returns {any} */
   row(scan) {
-    const known = this.rows.find(({ id }) => id === scan.id);
-    if (known) return known;
-    const ranges = new Float32Array(Math.min(COLUMNS, Math.max(1, scan.planned))).fill(NaN);
+    const existing = this.rows.find(({ id }) => id === scan.id);
+    if (existing) return existing;
+    const ranges = new Float32Array(Math.min(MAX_COLUMNS, Math.max(1, scan.planned))).fill(NaN);
     const row = { id: scan.id, time: Date.parse(scan.start.time), planned: scan.planned, ranges, plan: scan.start.plan };
-    const place = this.rows.findIndex(({ time }) => time <= row.time);
-    this.rows.splice(place < 0 ? this.rows.length : place, 0, row);
-    this.rows.length = Math.min(this.rows.length, ROWS);
+    const at = this.rows.findIndex(({ time }) => time <= row.time);
+    this.rows.splice(at < 0 ? this.rows.length : at, 0, row);
+    this.rows.length = Math.min(this.rows.length, MAX_ROWS);
     return row;
   }
 
   /** @param {any} scan @param {any[]} pings */
   add(scan, pings) {
     const { ranges, planned } = this.row(scan);
-    // Silence is a range beyond all others.
+    // A reading without echo is stored as infinity, a missing one as NaN.
     for (const { index, range_m } of pings) ranges[Math.floor((index / planned) * ranges.length)] = range_m ?? Infinity;
     this.redrawSoon();
   }
@@ -63,41 +65,40 @@ export class Waterfall {
     this.redrawSoon();
   }
 
-  /** Scans of before, one after the other, while somebody looks. */
-  async fill() {
+  /** Loads past scans one after the other while the section is open. */
+  async load() {
     this.redrawSoon();
-    if (this.filling || !this.details.open) return;
-    this.filling = true;
-    for (const { scan, end } of this.uses.known().slice(0, PAST)) {
-      const known = this.rows.some(({ id }) => id === scan);
+    if (this.loading || !this.details.open) return;
+    this.loading = true;
+    for (const { scan: id, end } of this.callbacks.known().slice(0, MAX_LOADED)) {
       if (!this.details.open) break;
-      if (known || !end || end.beams > PAST_BEAMS) continue;
-      const whole = await this.uses.get(scan).catch(() => null);
-      if (whole) this.add(whole, [...whole.beams.values()]);
+      if (this.rows.some((row) => row.id === id) || !end || end.beams > MAX_LOADED_BEAMS) continue;
+      const scan = await this.callbacks.get(id).catch(() => null);
+      if (scan) this.add(scan, [...scan.beams.values()]);
     }
-    this.filling = false;
+    this.loading = false;
   }
 
   /** @param {any} [palette] */
   redrawSoon(palette = this.palette) {
     this.palette = palette;
     if (!this.details.open || !palette) return;
-    this.due ??= setTimeout(() => {
-      this.due = null;
+    this.redrawTimer ??= setTimeout(() => {
+      this.redrawTimer = null;
       this.redraw();
     }, 100);
   }
 
   redraw() {
-    const farthest = this.rows.flatMap(({ ranges }) => ranges.reduce((most, m) => (m > most && m < Infinity ? m : most), 0));
-    this.most_m = Math.max(0.5, ...farthest);
-    setText(this.details.querySelector(".ramp"), `a row a scan, the newest above; dark is near, light is ${metres(this.most_m)}, empty is silent`);
+    const farthest = this.rows.flatMap(({ ranges }) => ranges.reduce((max, m) => (m > max && m < Infinity ? m : max), 0));
+    this.max_m = Math.max(0.5, ...farthest);
+    setText(this.caption, `one row per scan, newest on top; colour: range, dark 0 m to light ${metres(this.max_m)}; blank: no echo`);
     const c = this.size(this.canvas, ROW_PX * Math.max(8, this.rows.length) + FOOT);
     this.drawRows(c);
     this.drawSeries(this.size(this.series, SERIES_PX));
   }
 
-  /** The context of a canvas that is made so high. */
+  /** Sets the height of a canvas and returns its context. */
   size(canvas, height) {
     canvas.style.height = `${height}px`;
     this.width = canvas.clientWidth;
@@ -120,7 +121,7 @@ export class Waterfall {
       c.drawImage(image, LEFT, i * ROW_PX, across, ROW_PX);
     });
     const bottom = ROW_PX * Math.max(8, this.rows.length);
-    c.fillStyle = this.palette["--quiet"];
+    c.fillStyle = this.palette["--muted"];
     const [newest] = this.rows;
     if (!newest) return c.fillText("no scan yet", LEFT, 10);
     const { from_deg, to_deg } = newest.plan;
@@ -130,14 +131,14 @@ export class Waterfall {
     }
     c.textAlign = "right";
     for (let i = 0; i < this.rows.length; i += 10) c.fillText(i ? `−${i}` : "newest", LEFT - 4, i * ROW_PX + 6);
-    if (this.selected) upright(c, this.x(this.selected.index, newest.planned), [0, bottom], this.palette["--path"]);
+    if (this.selected) drawVertical(c, this.x(this.selected.index, newest.planned), [0, bottom], this.palette["--path"]);
   }
 
-  /** Of a range; nothing is drawn where nothing was measured or heard. @returns {number[]} */
+  /** Colour of a range; transparent if the reading is missing or without echo. @returns {number[]} */
   colour(range_m) {
     if (!(range_m < Infinity)) return [0, 0, 0, 0];
-    const at = Math.min(0.9999, range_m / this.most_m) * (RAMP.length - 1);
-    const [from, to] = [RAMP[Math.floor(at)], RAMP[Math.floor(at) + 1]];
+    const at = Math.min(0.9999, range_m / this.max_m) * (COLOUR_MAP.length - 1);
+    const [from, to] = [COLOUR_MAP[Math.floor(at)], COLOUR_MAP[Math.floor(at) + 1]];
     return [...from.map((value, i) => value + (at % 1) * (to[i] - value)), 255];
   }
 
@@ -145,7 +146,7 @@ export class Waterfall {
     return LEFT + ((index + 0.5) / planned) * (this.width - LEFT - RIGHT);
   }
 
-  /** The selected beam's range in each row that has the same plan as the newest. */
+  /** Range of the selected beam in each row with as many beams as the newest, oldest first. */
   values() {
     const [newest] = this.rows;
     if (!this.selected || !newest) return [];
@@ -156,53 +157,52 @@ export class Waterfall {
 
   drawSeries(c) {
     const values = this.values();
-    const heard = values.filter(({ m }) => m < Infinity);
-    setText(this.told, this.inWords(values, heard));
-    if (!heard.length) return;
-    const all = heard.map(({ m }) => m);
-    const [least, most] = [Math.min(...all), Math.max(...all)];
-    const room = Math.max(0.001, 0.1 * (most - least));
-    const [low, high] = [least - room, most + room];
+    const ranges = values.map(({ m }) => m).filter((m) => m < Infinity);
+    setText(this.label, this.seriesText(values, ranges));
+    if (!ranges.length) return;
+    const [min, max] = [Math.min(...ranges), Math.max(...ranges)];
+    const margin = Math.max(0.001, 0.1 * (max - min));
+    const [low, high] = [min - margin, max + margin];
     const y = (m) => TOP + ((high - m) / (high - low)) * (SERIES_PX - TOP - FOOT);
     const x = (i) => LEFT + ((i + 0.5) / values.length) * (this.width - LEFT - RIGHT);
     c.strokeStyle = this.palette["--rule"];
-    c.fillStyle = this.palette["--quiet"];
+    c.fillStyle = this.palette["--muted"];
     c.textAlign = "right";
-    for (const m of [least, most]) {
+    for (const m of [min, max]) {
       c.beginPath();
       c.moveTo(LEFT, y(m));
       c.lineTo(this.width - RIGHT, y(m));
       c.stroke();
-      if (m === least || most - least > 0) c.fillText(m.toFixed(4), LEFT - 4, y(m));
+      if (m === min || max - min > 0) c.fillText(m.toFixed(4), LEFT - 4, y(m));
     }
     values.forEach(({ m }, i) => {
-      c.fillStyle = this.palette[m < Infinity ? "--direct" : "--silent"];
+      c.fillStyle = this.palette[m < Infinity ? "--direct" : "--no-echo"];
       c.beginPath();
       c.arc(x(i), m < Infinity ? y(m) : SERIES_PX - FOOT - 3, 2.4, 0, 2 * Math.PI);
       c.fill();
     });
-    c.fillStyle = this.palette["--quiet"];
+    c.fillStyle = this.palette["--muted"];
     c.textAlign = "left";
     c.fillText(clock(values[0].time), LEFT, SERIES_PX - FOOT / 2);
     c.textAlign = "right";
     if (values.length > 1) c.fillText(clock(values.at(-1).time), this.width - RIGHT, SERIES_PX - FOOT / 2);
   }
 
-  inWords(values, heard) {
+  seriesText(values, ranges) {
     if (!this.selected) return "Select a beam to see its ranges over time.";
     const name = `Beam ${this.selected.index} in ${count(values.length, "scan")}`;
-    if (!heard.length) return `${name}: no range.`;
-    const mean = heard.reduce((sum, { m }) => sum + m, 0) / heard.length;
-    const sigma = Math.sqrt(heard.reduce((sum, { m }) => sum + (m - mean) ** 2, 0) / Math.max(1, heard.length - 1));
-    const silent = values.length - heard.length;
-    return `${name}: mean ${metres(mean)}, standard deviation ${(1e3 * sigma).toFixed(2)} mm${silent ? `, silent in ${silent}` : ""}.`;
+    if (!ranges.length) return `${name}: no range.`;
+    const mean_m = ranges.reduce((sum, m) => sum + m, 0) / ranges.length;
+    const sigma_m = Math.sqrt(ranges.reduce((sum, m) => sum + (m - mean_m) ** 2, 0) / Math.max(1, ranges.length - 1));
+    const without = values.length - ranges.length;
+    return `${name}: mean ${metres(mean_m)}, standard deviation ${(1e3 * sigma_m).toFixed(2)} mm${without ? `, no echo in ${without}` : ""}.`;
   }
 
-  /** The scan of a row, and the beam of a column. */
+  /** Picks the scan of a row and the beam of a column. */
   pick([x, y]) {
     const row = this.rows[Math.floor(y / ROW_PX)];
     if (!row) return;
     const share = Math.max(0, Math.min(0.9999, (x - LEFT) / (this.width - LEFT - RIGHT)));
-    this.uses.onPick(row.id, Math.floor(share * row.planned));
+    this.callbacks.onPick(row.id, Math.floor(share * row.planned));
   }
 }

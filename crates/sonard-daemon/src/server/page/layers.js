@@ -1,38 +1,38 @@
-// Lines and signs of the floor plan, each with its words in the legend. What is drawn with a pen is
-// noted for its layer, so that the legend has everything that is drawn and nothing else.
+// Canvas layers of the floor plan, and the pens to draw on them. Each layer records the pens used since it was
+// cleared, so that the legend lists exactly what is drawn.
 
-/** Colours are the style's names; widths and dashes are pixels. */
+/** Pens by name: legend label, colour (custom property of the style sheet), width and dash in pixels, legend symbol. */
 const PENS = {
-  wall: { words: "wall", colour: "--wall", width: 2 },
-  rough: { words: "rough wall", colour: "--wall", width: 2, dash: [4, 4] },
-  robot: { words: "robot", colour: "--edge", width: 1.5 },
-  pose: { words: "pose and heading", colour: "--ink", width: 1.5, sign: "pose" },
-  face: { words: "transducer", colour: "--ink", width: 2, sign: "face" },
-  blanking: { words: "nearest range that is heard", colour: "--min-range", width: 1, sign: "arc" },
-  newest: { words: "direction of the newest reading", colour: "--quiet", width: 1.2, dash: [2, 5] },
-  direction: { words: "direction of the selected beam", colour: "--ray", width: 1.2, dash: [6, 4] },
-  selected: { words: "selected reading", colour: "--ray", width: 2, sign: "ring" },
-  path: { words: "path of its sound", colour: "--path", width: 1.8, sign: "leg" },
-  fan: { words: "arc of a reading: within the beam, so far away", colour: "--quiet", width: 1.2, sign: "arc" },
-  before: { words: "reading of the sweep before", colour: "--silent", width: 1, sign: "dot" },
-  measure: { words: "measured length", colour: "--good", width: 1.6, sign: "length" },
-  second: { words: "reading of the pinned scan", colour: "--wait", width: 1.2, sign: "dot" },
-  average: { words: "average of both scans", colour: "--good", width: 1.2, sign: "dot" },
-  difference: { words: "from the pinned scan to this one", colour: "--bad", width: 1.6 },
-  occupied: { words: "map: occupied", colour: "--ink", width: 1, sign: "cell" },
-  free: { words: "map: free", colour: "--direct", width: 1, sign: "cell" },
-  found: { words: "fitted line", colour: "--good", width: 3 },
-  feature: { words: "plane (P), corner (C), edge (E), unresolved (?)", colour: "--min-range", width: 1.5, sign: "ring" },
-  preview: { words: "what the model expects of the next scan", colour: "--good", width: 1.3, sign: "square" },
-  better: { words: "where it would be by the chosen explanation", colour: "--bad", width: 2, dash: [7, 3] },
-  beyond: { words: "reading beyond the view", colour: "--ink", width: 1, sign: "arrow" },
+  wall: { label: "wall", colour: "--wall", width: 2 },
+  rough: { label: "rough wall", colour: "--wall", width: 2, dash: [4, 4] },
+  robot: { label: "robot", colour: "--border", width: 1.5 },
+  pose: { label: "pose and heading", colour: "--ink", width: 1.5, symbol: "pose" },
+  transducer: { label: "transducer", colour: "--ink", width: 2, symbol: "face" },
+  blanking: { label: "minimum range (blanking)", colour: "--min-range", width: 1, symbol: "arc" },
+  newest: { label: "current beam", colour: "--muted", width: 1.2, dash: [2, 5] },
+  direction: { label: "direction of the selected beam", colour: "--ray", width: 1.2, dash: [6, 4] },
+  selected: { label: "selected reading", colour: "--ray", width: 2, symbol: "ring" },
+  path: { label: "propagation path", colour: "--path", width: 1.8, symbol: "leg" },
+  arc: { label: "arc: possible positions of the reflector", colour: "--muted", width: 1.2, symbol: "arc" },
+  previous: { label: "previous scan", colour: "--no-echo", width: 1, symbol: "dot" },
+  measure: { label: "measured length", colour: "--good", width: 1.6, symbol: "length" },
+  pinned: { label: "pinned scan", colour: "--wait", width: 1.2, symbol: "dot" },
+  average: { label: "average of both scans", colour: "--good", width: 1.2, symbol: "dot" },
+  difference: { label: "shift since the pinned scan", colour: "--bad", width: 1.6 },
+  occupied: { label: "map: occupied", colour: "--ink", width: 1, symbol: "cell" },
+  free: { label: "map: free", colour: "--direct", width: 1, symbol: "cell" },
+  found: { label: "fitted line", colour: "--good", width: 3 },
+  feature: { label: "plane (P), corner (C), edge (E), unresolved (?)", colour: "--min-range", width: 1.5, symbol: "ring" },
+  preview: { label: "preview of the next scan", colour: "--good", width: 1.3, symbol: "square" },
+  hypothesis: { label: "position under the selected hypothesis", colour: "--bad", width: 2, dash: [7, 3] },
+  outside: { label: "outside the view", colour: "--ink", width: 1, symbol: "arrow" },
 };
 
-/** Names in the order of the legend. */
+/** Pen names in the order of the legend. */
 export const PEN_NAMES = Object.keys(PENS);
-export const penWords = (name) => PENS[name].words;
+export const penLabel = (name) => PENS[name].label;
 
-/** A canvas, or a picture in the making, and what has been drawn on it since it was cleared. */
+/** Drawing surface (canvas or picture export) with the set of pens used since it was cleared. */
 export class Layer {
   /** @param {HTMLCanvasElement | null} canvas @param {any} c */
   constructor(canvas, c = canvas.getContext("2d")) {
@@ -51,22 +51,22 @@ export class Layer {
     this.c.setTransform(scale, 0, 0, scale, 0, 0);
   }
 
-  /** What is drawn from now on is drawn in this view. @param {any} view */
+  /** Clears the layer and records the view of the drawing that follows. @param {any} view */
   clear(view) {
     this.used.clear();
     this.c.clearRect(0, 0, this.width, this.height);
-    this.drawnIn = { scale: view.scale, x0: view.x0, y0: view.y0 };
+    this.drawnView = { scale: view.scale, x0: view.x0, y0: view.y0 };
     if (this.canvas?.style.transform) this.canvas.style.transform = "";
   }
 
-  /** Moves what is drawn to where it is in the view now, until it is drawn anew. @param {any} view */
+  /** Moves and scales the existing drawing to the current view with a CSS transform, until the next redraw. @param {any} view */
   shift({ scale, x0, y0 }) {
-    const by = scale / this.drawnIn.scale;
-    const [dx, dy] = [x0 - by * this.drawnIn.x0, y0 - by * this.drawnIn.y0];
+    const by = scale / this.drawnView.scale;
+    const [dx, dy] = [x0 - by * this.drawnView.x0, y0 - by * this.drawnView.y0];
     this.canvas.style.transform = `matrix(${by}, 0, 0, ${by}, ${dx}, ${dy})`;
   }
 
-  /** The context, set to draw with a pen. */
+  /** Selects a pen and returns the context. */
   pen(name, palette) {
     this.used.add(name);
     return setPen(this.c, name, palette);
@@ -88,8 +88,8 @@ export function line(c, points) {
   c.stroke();
 }
 
-/** An upright line of a plot. @param {CanvasRenderingContext2D} c @param {number} x @param {number[]} between @param {string} colour */
-export function upright(c, x, [top, bottom], colour) {
+/** Vertical cursor line of a plot. @param {CanvasRenderingContext2D} c @param {number} x @param {number[]} between @param {string} colour */
+export function drawVertical(c, x, [top, bottom], colour) {
   c.setLineDash([]);
   c.lineWidth = 1.4;
   c.strokeStyle = colour;
@@ -115,7 +115,7 @@ export function disc(c, [x, y], radius) {
   c.fill();
 }
 
-/** A line with a stroke across each end. @param {CanvasRenderingContext2D} c @param {number[]} from @param {number[]} to */
+/** Line with a perpendicular stroke at each end. @param {CanvasRenderingContext2D} c @param {number[]} from @param {number[]} to */
 export function drawLength(c, from, to) {
   const turn = Math.atan2(to[1] - from[1], to[0] - from[0]);
   line(c, [from, to]);
@@ -123,7 +123,7 @@ export function drawLength(c, from, to) {
 }
 
 /**
- * A filled triangle with its tip `tip` pixels ahead of a point, `turn` radians clockwise from the right.
+ * Filled triangle with its tip `tip` pixels ahead of a point; `turn` in radians clockwise from the right.
  * @param {CanvasRenderingContext2D} c
  * @param {number[]} at
  * @param {number} turn
@@ -138,14 +138,14 @@ export function arrow(c, [x, y], turn, [tip, back, half]) {
   c.fill();
 }
 
-/** Where a robot stands and where it heads. @param {CanvasRenderingContext2D} c @param {number[]} at @param {number} turn */
+/** Position circle with a heading line. @param {CanvasRenderingContext2D} c @param {number[]} at @param {number} turn */
 export function drawPose(c, [x, y], turn) {
   circle(c, [x, y], 4);
   line(c, [[x, y], [x + 15 * Math.cos(turn), y + 15 * Math.sin(turn)]]);
 }
 
 /**
- * A transducer's face, across its direction, `half` pixels to each side.
+ * Transducer face, perpendicular to its direction; `half` is half its width in pixels.
  * @param {CanvasRenderingContext2D} c
  * @param {number[]} at
  * @param {number} turn
@@ -156,10 +156,10 @@ export function drawFace(c, [x, y], turn, half) {
   line(c, [[x - dx, y - dy], [x + dx, y + dy]]);
 }
 
-/** A pen as the legend shows it, in a field of 24 by 16 pixels. */
+/** Draws a pen's legend symbol, 24 by 16 pixels. */
 export function drawSample(c, name, palette) {
   setPen(c, name, palette);
-  switch (PENS[name].sign) {
+  switch (PENS[name].symbol) {
     case "pose":
       return drawPose(c, [6, 8], 0);
     case "face":

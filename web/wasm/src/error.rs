@@ -1,4 +1,4 @@
-//! Why a request can't be answered.
+//! Errors of requests.
 
 use serde::Serialize;
 use sonard_import::ImportError;
@@ -9,52 +9,52 @@ use sonard_model::{
     scene::{PoseError, SceneError},
 };
 
-/// What is wrong, and what would be right.
+/// Error response to a request.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Refusal {
-    /// What is wrong.
+pub struct RequestError {
+    /// Cause of the error.
     pub message: String,
-    /// What to do about it; empty where the message says it.
+    /// Advice how to correct the request; empty if the message contains it.
     pub help: String,
-    /// Where in a scene's text, counted from 1.
+    /// Line of the scene file, counted from 1.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub line: Option<usize>,
 }
 
-impl Refusal {
+impl RequestError {
     pub(crate) fn new(message: &(impl ToString + ?Sized), help: impl Into<String>) -> Self {
         Self { message: message.to_string(), help: help.into(), line: None }
     }
 }
 
-impl From<SceneError> for Refusal {
+impl From<SceneError> for RequestError {
     fn from(error: SceneError) -> Self {
         Self { line: Some(error.line), ..Self::new(&error, error.help()) }
     }
 }
 
-impl From<PoseError> for Refusal {
+impl From<PoseError> for RequestError {
     fn from(error: PoseError) -> Self {
         Self::new(&error, error.help())
     }
 }
 
-impl From<ImportError> for Refusal {
+impl From<ImportError> for RequestError {
     fn from(error: ImportError) -> Self {
         Self::new(&error, error.help())
     }
 }
 
-impl From<TooCostly> for Refusal {
+impl From<TooCostly> for RequestError {
     fn from(error: TooCostly) -> Self {
-        Self::new(&error, "listen less far, or take another engine")
+        Self::new(&error, "reduce the maximum range, or choose another engine")
     }
 }
 
-/// Those whose message says what would be right.
-macro_rules! plain {
+/// Conversions of errors whose messages contain the advice.
+macro_rules! without_help {
     ($($error:ty),*) => {
-        $(impl From<$error> for Refusal {
+        $(impl From<$error> for RequestError {
             fn from(error: $error) -> Self {
                 Self::new(&error, "")
             }
@@ -62,4 +62,4 @@ macro_rules! plain {
     };
 }
 
-plain!(AirError, SensorError, ModelError, PlanError, std::io::Error);
+without_help!(AirError, SensorError, ModelError, PlanError, std::io::Error);

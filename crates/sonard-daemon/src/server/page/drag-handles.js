@@ -1,6 +1,6 @@
-// Handles on the floor plan: buttons that are dragged with mouse or finger, or moved with the arrow keys.
+// Handles on the floor plan: buttons moved by mouse, finger or arrow keys.
 
-/** What an arrow key moves by, metres; with shift ten times as much. */
+/** Step of an arrow key, metres; ten times as much with shift. */
 const STEP_M = 0.01;
 const KEYS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
 
@@ -10,23 +10,23 @@ export class Handle {
   /**
    * @param {HTMLElement} stage
    * @param {{name: string, className: string, onMove: (at: Point, handle: Handle) => void, onDone?: () => void,
-   *   onKey?: (key: string, shift: boolean) => boolean, onFocus?: () => void}} uses
+   *   onKey?: (key: string, shift: boolean) => boolean, onFocus?: () => void}} options
    * @param {{px: (at: Point) => Point, world: (px: Point) => Point}} view
    */
-  constructor(stage, uses, view) {
-    this.uses = uses;
+  constructor(stage, options, view) {
+    this.options = options;
     this.view = view;
     this.stage = stage;
     /** @type {Point} */
     this.at = [0, 0];
     this.button = document.createElement("button");
     this.button.type = "button";
-    this.button.className = `handle ${uses.className}`;
-    this.button.ariaLabel = uses.name;
+    this.button.className = `handle ${options.className}`;
+    this.button.ariaLabel = options.name;
     stage.append(this.button);
     this.button.addEventListener("pointerdown", (event) => this.grab(event));
     this.button.addEventListener("keydown", (event) => this.key(event));
-    if (uses.onFocus) this.button.addEventListener("focus", uses.onFocus);
+    if (options.onFocus) this.button.addEventListener("focus", options.onFocus);
   }
 
   /**
@@ -37,9 +37,9 @@ export class Handle {
     this.at = at;
     const [x, y] = this.view.px(at);
     const [width, height] = [this.stage.clientWidth, this.stage.clientHeight];
-    // What is beyond the view can be fetched from its border.
-    const within = (/** @type {number} */ value, /** @type {number} */ most) => Math.max(0, Math.min(most, value));
-    this.button.style.transform = `translate(${within(x, width)}px, ${within(y, height)}px)`;
+    // Handles outside the view stay reachable at its edge.
+    const clamp = (/** @type {number} */ value, /** @type {number} */ max) => Math.max(0, Math.min(max, value));
+    this.button.style.transform = `translate(${clamp(x, width)}px, ${clamp(y, height)}px)`;
     if (name && this.button.ariaLabel !== name) this.button.ariaLabel = name;
   }
 
@@ -50,14 +50,14 @@ export class Handle {
     const [x, y] = this.view.px(this.at);
     const [dx, dy] = [event.clientX - x, event.clientY - y];
     const move = (/** @type {PointerEvent} */ moved) => {
-      this.uses.onMove(this.view.world([moved.clientX - dx, moved.clientY - dy]), this);
+      this.options.onMove(this.view.world([moved.clientX - dx, moved.clientY - dy]), this);
     };
     const end = () => {
       this.button.removeEventListener("pointermove", move);
-      this.button.classList.remove("held");
-      this.uses.onDone?.();
+      this.button.classList.remove("dragged");
+      this.options.onDone?.();
     };
-    this.button.classList.add("held");
+    this.button.classList.add("dragged");
     this.button.addEventListener("pointermove", move);
     this.button.addEventListener("lostpointercapture", end, { once: true });
   }
@@ -65,13 +65,13 @@ export class Handle {
   /** @param {KeyboardEvent} event */
   key(event) {
     if (event.ctrlKey || event.metaKey || event.altKey) return;
-    if (this.uses.onKey?.(event.key, event.shiftKey)) return event.preventDefault();
+    if (this.options.onKey?.(event.key, event.shiftKey)) return event.preventDefault();
     const along = KEYS[/** @type {keyof typeof KEYS} */ (event.key)];
     if (!along) return;
     event.preventDefault();
     const step = STEP_M * (event.shiftKey ? 10 : 1);
-    this.uses.onMove([this.at[0] + step * along[0], this.at[1] + step * along[1]], this);
-    this.uses.onDone?.();
+    this.options.onMove([this.at[0] + step * along[0], this.at[1] + step * along[1]], this);
+    this.options.onDone?.();
   }
 
   remove() {
