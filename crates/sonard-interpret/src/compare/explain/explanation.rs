@@ -1,4 +1,4 @@
-//! What is found, and what it is found from.
+//! Reported changes, and the linearized pairs that they are estimated from.
 
 use std::fmt;
 
@@ -6,47 +6,47 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use sonard_model::geometry::DVec2;
 
-/// A change that would explain readings better.
+/// Change of the model that would fit the readings better.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Explanation {
-    /// What changes: `pose`, `heading`, `sound_speed`, `range_offset`, `threshold`, `wall ID`, or `together` for
-    /// pose, heading and speed of sound at once.
+    /// Changed quantity: `pose`, `heading`, `sound_speed`, `range_offset`, `threshold`, `wall ID`,
+    /// or `together` for pose, heading and speed of sound at once.
     pub change: String,
-    /// By how much.
+    /// Estimated values of the change.
     pub estimates: Vec<Estimate>,
-    /// What the log-likelihood of all readings gains, natural units.
+    /// Gain in log-likelihood of all readings, nats.
     pub gain: f64,
-    /// Readings that it explains and that were not explained before: residuals within twice the spread; of a
-    /// threshold, silences and echoes.
+    /// Readings explained by the change and not before: residuals within twice the standard
+    /// deviation; for a threshold, echoes and missing echoes.
     pub explains: u32,
 }
 
-/// A value that a change would have.
+/// Estimated value of a change.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Estimate {
-    /// What of.
+    /// Estimated quantity, with its unit.
     pub name: Quantity,
-    /// How much is to be added.
+    /// Value to be added to the current one.
     pub value: f64,
-    /// Its standard deviation.
+    /// Standard deviation of the value.
     pub sigma: f64,
 }
 
-/// A quantity that a change alters, with its unit.
+/// Quantity altered by a change, with its unit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Quantity {
-    /// Place of the ranger, metres.
+    /// Position of the ranger along x, metres.
     XM,
-    /// The same along y.
+    /// Position of the ranger along y, metres.
     YM,
-    /// Where it looks, degrees counter-clockwise.
+    /// Heading of the ranger, degrees counter-clockwise.
     HeadingDeg,
-    /// Of the speed of sound.
+    /// Relative change of the speed of sound, percent.
     Percent,
-    /// Metres: of a wall, positive away from where the ranger is; of a range, what is to be added to each.
+    /// Offset, metres: of a wall, positive away from the ranger; of a range, added to each reading.
     OffsetM,
-    /// Decibels.
+    /// Detection threshold, decibels.
     ThresholdDb,
 }
 
@@ -69,7 +69,7 @@ impl fmt::Display for Estimate {
             Quantity::OffsetM => write!(f, "{:+.0} mm +- {:.1}", 1e3 * value, 1e3 * sigma),
             Quantity::HeadingDeg => write!(f, "{value:+.2} degrees +- {sigma:.2}"),
             Quantity::ThresholdDb => write!(f, "{value:+.1} dB +- {sigma:.1}"),
-            // The speed of sound grows with the root of the absolute temperature.
+            // The speed of sound is proportional to the square root of the absolute temperature.
             Quantity::Percent => {
                 let warmer_c = 2.0 * value / 100.0 * 293.0;
                 write!(f, "{value:+.2} % +- {sigma:.2} (air {warmer_c:+.1} C)")
@@ -78,13 +78,13 @@ impl fmt::Display for Estimate {
     }
 }
 
-/// A reading with its prediction, as far as changes move it.
+/// Reading with the derivatives of its predicted range.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Pair {
+pub(super) struct LinearizedPair {
     pub(super) measured_m: f64,
     pub(super) residual_m: f64,
-    /// What the predicted range gains where the transducer moves by a metre along x and y.
-    pub(super) by_place: DVec2,
-    /// The same where walls move away: places in the list of names.
-    pub(super) by_wall: Vec<(u16, f64)>,
+    /// Derivative of the predicted range with respect to the transducer position, m/m.
+    pub(super) d_position: DVec2,
+    /// Derivatives with respect to outward wall displacements, m/m, by index into the wall names.
+    pub(super) d_walls: Vec<(u16, f64)>,
 }

@@ -1,18 +1,18 @@
-//! Which regions are planes, corners and edges.
+//! Classification of regions as planes, corners and edges.
 
 use uuid::Uuid;
 
 use super::{
     Extents, Feature, FeatureKind, Probabilities, Reason, Settings, Sweep, UniformSum,
     arc::Arc,
-    belief::{TurnLikelihood, probabilities},
-    next::propose,
+    next_view::propose,
+    posterior::{TurnLikelihood, probabilities},
     regions,
     sweep::merge_repeats,
 };
 use sonard_model::geometry::{DVec2, wrap_pi};
 
-/// Standard deviations that count as certainty where there is noise.
+/// Standard deviations taken as certainty in the presence of noise.
 const CERTAIN: f64 = 2.58;
 
 /// Rounding of angles, degrees.
@@ -21,8 +21,8 @@ pub(super) const ROUNDING_DEG: f64 = 1e-9;
 /// Interprets scans taken with one sensor from one place or more.
 ///
 /// `scans` are the sweeps with the ids of their scans, in the order they were taken; `extents`
-/// is the sensor's. An element that was seen in several scans is one feature, of the first; repeats
-/// from one pose are one scan, of the first as well.
+/// are those of the sensor. An element detected in several scans is one feature of the first;
+/// repeated scans from one pose are merged into the first as well.
 #[must_use]
 pub fn interpret(scans: &[(Uuid, Sweep)], extents: &Extents, settings: &Settings) -> Vec<Feature> {
     let scans = &merge_repeats(scans);
@@ -42,37 +42,37 @@ pub fn interpret(scans: &[(Uuid, Sweep)], extents: &Extents, settings: &Settings
         if taken[at] {
             continue;
         }
-        let verdict = Verdict::of(at, &arcs, &places, &mut taken, extents, settings);
-        features.push(verdict.feature(&arcs[at], scans, extents, settings));
+        let class = ArcClass::classify(at, &arcs, &places, &mut taken, extents, settings);
+        features.push(class.feature(&arcs[at], scans, extents, settings));
         sources.push(&arcs[at]);
     }
     propose(&sources, &mut features, extents, settings);
     features
 }
 
-/// What a second place tells about an arc.
+/// Observation of an arc from a second position.
 #[derive(Debug, Clone, Copy)]
-struct Second {
+struct Reobservation {
     arc: usize,
     scan: usize,
     beta_deg: f64,
     beta_corner_deg: f64,
     /// Likelihoods of beta for a plane, and for a corner or edge.
     likelihood: TurnLikelihood,
-    /// Whether the two can be told apart from there (25).
+    /// Whether plane and corner are distinguishable from there (25).
     decides: bool,
 }
 
-/// What is found about an arc.
-struct Verdict {
+/// Classification of an arc.
+struct ArcClass {
     reason: Option<Reason>,
     probabilities: Probabilities,
-    second: Option<Second>,
+    second: Option<Reobservation>,
 }
 
-impl Verdict {
-    /// Looks at an arc and at those of other scans that are of the same element, which it takes.
-    fn of(
+impl ArcClass {
+    /// Classifies an arc, and marks as taken the arcs of the same element in other scans.
+    fn classify(
         at: usize,
         arcs: &[Arc],
         places: &[DVec2],
@@ -88,13 +88,13 @@ impl Verdict {
                 second: None,
             };
         }
-        let (mut seconds, mut why_not) = (Vec::new(), None);
+        let (mut seconds, mut failure) = (Vec::new(), None);
         for (scan, &place) in places.iter().enumerate().filter(|(scan, _)| *scan != arc.scan) {
-            let Some(expected) = Expected::at(arc, place) else { continue };
+            let Some(expected) = ExpectedView::at(arc, place) else { continue };
             match expected.find(arc, scan, arcs, taken, extents, settings) {
                 Ok(Some(second)) => seconds.push(second),
                 Ok(None) => {}
-                Err(reason) => why_not = Some(reason),
+                Err(reason) => failure = Some(reason),
             }
         }
         for second in &seconds {
@@ -108,7 +108,7 @@ impl Verdict {
                 .partial_cmp(&(b.decides, b.beta_corner_deg))
                 .unwrap_or(std::cmp::Ordering::Equal)
         });
-        let reason = open_reason(&probabilities, hidden_by, second.as_ref(), why_not, settings);
+        let reason = open_reason(&probabilities, hidden_by, second.as_ref(), failure, settings);
         Self { reason, probabilities, second }
     }
 
@@ -146,21 +146,21 @@ impl Verdict {
     }
 }
 
-/// Where an element should be found from another place.
-pub(super) struct Expected {
-    /// From a plane, and from a corner or edge, metres.
+/// ExpectedView observation of an element from another position.
+pub(super) struct ExpectedView {
+    /// Ranges of a plane, and of a corner or edge, metres.
     ranges_m: [f64; 2],
     /// Change of direction of a corner or edge, degrees, 0 or more (22a, for any direction of
     /// travel).
     pub(super) beta_corner_deg: f64,
-    /// 1 if a corner's direction turns clockwise, else -1.
+    /// 1 if the direction of a corner turns clockwise, else -1.
     side: f64,
-    /// By how much an error of the direction from the first place moves that of a corner from
-    /// this one.
+    /// Factor by which an error of the direction from the first position affects that of a corner
+    /// from this one.
     gain: f64,
 }
 
-impl Expected {
+impl ExpectedView {
     pub(super) fn at(arc: &Arc, place: DVec2) -> Option<Self> {
         let (range_m, point) = (arc.region.range_m?, arc.point()?);
         let travel = place - arc.from;
@@ -176,12 +176,12 @@ impl Expected {
         })
     }
 
-    /// The arc of the same element in another scan; `None` if that scan has nothing there and the
-    /// element may still be known from one scan.
+    /// Finds the arc of the same element in another scan. `None` if that scan has no such arc
+    /// because the element is out of range there.
     ///
-    /// A plane is seen in the same direction from everywhere; corners and edges stay where they are
-    /// (figure 6). What lies from the one prediction to the other, and as far beyond as errors
-    /// reach, may be it.
+    /// A plane is seen in the same direction from everywhere; corners and edges have a fixed
+    /// position (figure 6). Arcs between the two predictions, extended by the possible errors, are
+    /// candidates.
     fn find(
         &self,
         arc: &Arc,
@@ -190,7 +190,7 @@ impl Expected {
         taken: &[bool],
         extents: &Extents,
         settings: &Settings,
-    ) -> Result<Option<Second>, Reason> {
+    ) -> Result<Option<Reobservation>, Reason> {
         let mut fitting = Vec::new();
         let mut faulty = None;
         for (index, other) in arcs.iter().enumerate().filter(|(_, other)| other.scan == scan) {
@@ -204,17 +204,17 @@ impl Expected {
             );
             let beta_deg = self.beta_deg(arc, other);
             let corner_deg = self.beta_corner_deg;
-            let least_deg = match arc.is_edge() {
+            let min_deg = match arc.is_edge() {
                 true => corner_deg - as_corner.reach(CERTAIN),
                 false => -as_plane.reach(CERTAIN),
             };
-            let most_deg = corner_deg + as_corner.reach(CERTAIN);
-            if !(least_deg - ROUNDING_DEG..=most_deg + ROUNDING_DEG).contains(&beta_deg) {
+            let max_deg = corner_deg + as_corner.reach(CERTAIN);
+            if !(min_deg - ROUNDING_DEG..=max_deg + ROUNDING_DEG).contains(&beta_deg) {
                 continue;
             }
             match other.fault() {
                 Some(reason) => faulty = Some(reason),
-                None if other.is_edge() == arc.is_edge() => fitting.push(Second {
+                None if other.is_edge() == arc.is_edge() => fitting.push(Reobservation {
                     arc: index,
                     scan,
                     beta_deg,
@@ -237,11 +237,12 @@ impl Expected {
         }
     }
 
-    /// Errors of `beta` if the element is a plane, and if it is a corner or edge, for the gaps
-    /// and the deviation of the borders with which the other place sees it.
+    /// Errors of `beta` for a plane, and for a corner or edge, given the gaps and the standard
+    /// deviation of the borders in the second scan.
     ///
-    /// The paper's density (23) is both, for it takes the corner's expected `beta` as given; it
-    /// follows from the measured direction, which counts where the other place is much nearer.
+    /// The paper's density (23) serves both, since it takes the expected `beta` of a corner as
+    /// given. That follows from the measured direction, whose error matters where the second
+    /// position is much nearer.
     fn errors(
         &self,
         arc: &Arc,
@@ -255,9 +256,9 @@ impl Expected {
         })
     }
 
-    /// The least `beta` of a corner that tells it from a plane, if the place sees the element as
-    /// the first did, degrees: (25), and with noise what their section IX asks for.
-    pub(super) fn least_beta_deg(&self, arc: &Arc, settings: &Settings) -> f64 {
+    /// Minimum `beta` of a corner that separates it from a plane, if the second position sees the
+    /// element as the first did, degrees: (25), and with noise the extension of section IX.
+    pub(super) fn min_beta_deg(&self, arc: &Arc, settings: &Settings) -> f64 {
         let as_before = (arc.region.gaps_deg, arc.border_sigma_deg);
         let [as_plane, as_corner] = self.errors(arc, as_before, settings.noise.heading_deg);
         apart(&as_plane, &as_corner)
@@ -265,8 +266,8 @@ impl Expected {
 
     fn range_fits(&self, other: &Arc, tolerance_m: f64) -> bool {
         let [plane_m, point_m] = self.ranges_m;
-        let wanted = plane_m.min(point_m) - tolerance_m..=plane_m.max(point_m) + tolerance_m;
-        other.region.range_m.is_some_and(|range_m| wanted.contains(&range_m))
+        let expected = plane_m.min(point_m) - tolerance_m..=plane_m.max(point_m) + tolerance_m;
+        other.region.range_m.is_some_and(|range_m| expected.contains(&range_m))
     }
 
     fn beta_deg(&self, arc: &Arc, other: &Arc) -> f64 {
@@ -282,32 +283,34 @@ impl Expected {
     }
 }
 
-/// How far apart two values must be for their errors never to meet.
-fn apart(one: &UniformSum, other: &UniformSum) -> f64 {
-    one.reach(CERTAIN) + other.reach(CERTAIN)
+/// Distance between two values beyond which their errors never overlap.
+fn apart(a: &UniformSum, b: &UniformSum) -> f64 {
+    a.reach(CERTAIN) + b.reach(CERTAIN)
 }
 
-/// Why the kind stays open, if it does.
+/// Reason why the class stays open, if it does.
 fn open_reason(
     probabilities: &Probabilities,
     hidden_by: usize,
-    second: Option<&Second>,
-    why_not: Option<Reason>,
+    second: Option<&Reobservation>,
+    failure: Option<Reason>,
     settings: &Settings,
 ) -> Option<Reason> {
     let Probabilities { plane, corner, edge, other } = *probabilities;
-    let least = settings.min_confidence;
+    let min_confidence = settings.min_confidence;
     let odd = if hidden_by > 0 { Reason::Reflections } else { Reason::Extent };
-    if edge >= least {
+    if edge >= min_confidence {
         return None;
     }
     match second {
         _ if other > 0.5 => Some(odd),
-        _ if second.is_none() && plane + corner < least * (1.0 - other) => Some(Reason::Extent),
-        None => Some(why_not.unwrap_or(Reason::SecondPosition)),
+        _ if second.is_none() && plane + corner < min_confidence * (1.0 - other) => {
+            Some(Reason::Extent)
+        }
+        None => Some(failure.unwrap_or(Reason::SecondPosition)),
         Some(second) if !second.decides => Some(Reason::Translation),
-        Some(_) if plane.max(corner) >= least => None,
-        Some(_) if other > 1.0 - least => Some(odd),
+        Some(_) if plane.max(corner) >= min_confidence => None,
+        Some(_) if other > 1.0 - min_confidence => Some(odd),
         Some(_) => Some(Reason::Ambiguous),
     }
 }
@@ -316,20 +319,20 @@ fn open_reason(
 mod tests {
     use super::*;
 
-    fn reason(said: [f64; 4], hidden_by: usize) -> Option<Reason> {
-        let [plane, corner, edge, other] = said;
+    fn reason(probabilities: [f64; 4], hidden_by: usize) -> Option<Reason> {
+        let [plane, corner, edge, other] = probabilities;
         let probabilities = Probabilities { plane, corner, edge, other };
         open_reason(&probabilities, hidden_by, None, None, &Settings::default())
     }
 
     #[test]
-    fn what_stays_open_says_why() {
-        // What lies behind a nearer wall came by way of it; else its extent is odd.
+    fn open_classes_have_a_reason() {
+        // An arc behind a nearer wall is a multiple reflection; otherwise its extent is odd.
         assert_eq!(reason([0.2, 0.1, 0.0, 0.7], 0), Some(Reason::Extent));
         assert_eq!(reason([0.2, 0.1, 0.0, 0.7], 1), Some(Reason::Reflections));
         assert_eq!(reason([0.2, 0.1, 0.0, 0.7], 3), Some(Reason::Reflections));
         assert_eq!(reason([0.0, 0.0, 0.99, 0.01], 1), None);
-        // Between an edge and the others its extent has to decide, and between these another place.
+        // The extent separates an edge from the others; a second position separates the others.
         assert_eq!(reason([0.3, 0.2, 0.5, 0.0], 2), Some(Reason::Extent));
         assert_eq!(reason([0.6, 0.39, 0.0, 0.01], 0), Some(Reason::SecondPosition));
     }

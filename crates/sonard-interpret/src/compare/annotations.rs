@@ -1,4 +1,4 @@
-//! What is told beside a reading, where its record alone does not say it.
+//! Annotations that the API adds to the record of a reading.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -7,38 +7,39 @@ use sonard_records::{Ping, ScanView};
 
 use super::{NotCompared, Verdict, judge};
 
-/// A reading and what is told beside it.
+/// Reading with its annotations.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct JudgedPing {
-    /// The reading.
+    /// Record of the reading.
     #[serde(flatten)]
     pub ping: Ping,
-    /// What explains it, and where its transducer was.
+    /// Classification and viewpoint.
     #[serde(flatten)]
     pub beside: Beside,
 }
 
-/// What the API adds to a reading's record.
+/// Annotations that the API adds to the record of a reading.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Beside {
-    /// What explains the reading.
+    /// Classification against the prediction.
     pub verdict: Word,
-    /// Where its transducer was when it fired, and where it pointed; `null` if its scan does not say.
+    /// Position and direction of the transducer at the time of firing; `null` if the scan record
+    /// lacks them.
     pub viewpoint: Option<Viewpoint>,
 }
 
-/// The verdict on a reading, or the reason why there is none.
+/// Verdict on a reading, or the reason why there is none.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(untagged)]
 pub enum Word {
-    /// Compared with the prediction.
+    /// Compared with the prediction, with this verdict.
     Compared(Verdict),
-    /// Not compared, and why.
+    /// Excluded from the comparison for this reason.
     NotCompared(NotCompared),
 }
 
 impl JudgedPing {
-    /// A reading of a scan.
+    /// Annotates a reading of a scan.
     #[must_use]
     pub fn of(ping: Ping, scan: &ScanView) -> Self {
         let beside = Beside::of(&ping, Some(scan));
@@ -47,7 +48,7 @@ impl JudgedPing {
 }
 
 impl Beside {
-    /// What is told of a reading of a scan. Of the scan, only session and start are looked at.
+    /// Annotations of a reading; only session and start of the scan are used.
     #[must_use]
     pub fn of(ping: &Ping, scan: Option<&ScanView>) -> Self {
         let viewpoint = scan.filter(|scan| scan.scan == ping.scan);
@@ -57,7 +58,7 @@ impl Beside {
 }
 
 impl Word {
-    /// What explains this reading.
+    /// Classifies a reading against its prediction.
     #[must_use]
     pub fn of(ping: &Ping) -> Self {
         judge(ping).verdict.map_or_else(Self::NotCompared, Self::Compared)

@@ -1,48 +1,47 @@
-//! Where to scan from next, so that planes and corners can be told apart.
+//! Proposal of the next scan position that separates planes from corners.
 
 use std::cmp::Reverse;
 
 use super::{
     Extents, Feature, NextPosition, Reason, Settings,
     arc::Arc,
-    differentiate::{Expected, ROUNDING_DEG},
+    classify::{ExpectedView, ROUNDING_DEG},
 };
 use sonard_model::geometry::{DVec2, wrap_360};
 
-/// Directions of travel that are tried beside those that are best for one element.
+/// Number of directions of travel tried, in addition to those best for one element.
 const DIRECTIONS: usize = 36;
 
-/// And lengths, as parts of what the element that needs most needs in its best direction.
+/// Lengths of travel tried, relative to the longest one needed in an element's best direction.
 const LENGTHS: [f64; 6] = [0.5, 0.7, 1.0, 1.4, 2.0, 2.8];
 
-/// A place closer than this to something seen is not proposed, metres beyond the least range.
+/// Clearance to detected elements beyond the minimum range, metres.
 const CLEARANCE_M: f64 = 0.05;
 
-/// The shortest translation that tells plane from corner for certain at a range, metres (25);
-/// `reach_deg` is the error of `beta` that is not exceeded: one step where there is no noise.
+/// Minimum translation that separates plane from corner with certainty at a range, metres (25);
+/// `reach_deg` is the bound on the error of `beta`: one step without noise.
 #[must_use]
 pub fn least_translation_m(range_m: f64, reach_deg: f64) -> f64 {
     range_m * (2.0 * reach_deg).to_radians().sin()
 }
 
-/// Least width of a plane that is seen from both ends of a translation, metres (27).
+/// Minimum width of a plane detected from both ends of a translation, metres (27).
 #[must_use]
 pub fn least_plane_m(range_m: f64, delta_m: f64, half_width_m: f64) -> f64 {
     let share = (delta_m / range_m).min(1.0);
     delta_m * (1.0 - share * share).sqrt() + 2.0 * half_width_m
 }
 
-/// Least length of each side of a corner that is seen apart from its sides, metres (26), (28).
+/// Minimum length of each side of a corner that is resolved from its ends, metres (26), (28).
 #[must_use]
 pub fn least_corner_m(half_beam_deg: f64, half_width_m: f64) -> f64 {
     half_width_m / (2.0 * half_beam_deg).to_radians().sin()
 }
 
-/// Puts the next position into each feature that one would decide.
+/// Sets the next position of each feature that a further scan would decide.
 ///
-/// The first scan's open features are shared out: the position that decides most of them, then
-/// the one that decides most of the rest, and so on. Of positions that decide as many, the one
-/// with the shortest way.
+/// Open features of the first scan are assigned greedily: first the position that decides most of
+/// them, then the one that decides most of the rest, and so on. Ties go to the shortest travel.
 pub(super) fn propose(
     arcs: &[&Arc],
     features: &mut [Feature],
@@ -81,17 +80,17 @@ struct Planner<'a> {
 }
 
 impl Planner<'_> {
-    /// For each open element the two directions `theta_N +- arccos(Delta / r)` with the length
-    /// that decides it, and a fan of places all round.
+    /// Candidate positions: for each open element the two directions `theta_N +- arccos(Delta / r)`
+    /// with the length that decides it, and a fan of positions all around.
     fn candidates(&self, open: &[usize]) -> Vec<DVec2> {
         let (mut places, mut lengths_m) = (Vec::new(), Vec::new());
         for &index in open {
             let arc = self.arcs[index];
             let Some(range_m) = arc.region.range_m else { continue };
-            let Some(here) = Expected::at(arc, arc.from) else { continue };
-            let least_deg = here.least_beta_deg(arc, self.settings);
-            let least_m = least_translation_m(range_m, least_deg / 2.0);
-            let delta_m = self.settings.translation_margin * least_m;
+            let Some(here) = ExpectedView::at(arc, arc.from) else { continue };
+            let min_deg = here.min_beta_deg(arc, self.settings);
+            let min_m = least_translation_m(range_m, min_deg / 2.0);
+            let delta_m = self.settings.translation_margin * min_m;
             let gamma_rad = (delta_m / range_m).clamp(-1.0, 1.0).acos();
             for direction in [arc.bearing_rad + gamma_rad, arc.bearing_rad - gamma_rad] {
                 places.push(arc.from + delta_m * DVec2::from_angle(direction));
@@ -111,25 +110,25 @@ impl Planner<'_> {
         places
     }
 
-    /// Whether nothing that was seen is too near the place to be seen from there.
+    /// Returns `true` if no detected element is below the minimum range from the position.
     fn is_free(&self, place: DVec2) -> bool {
-        let least_m = self.extents.min_range_m + CLEARANCE_M;
+        let min_m = self.extents.min_range_m + CLEARANCE_M;
         self.arcs
             .iter()
             .filter(|arc| arc.scan == self.scan)
-            .filter_map(|arc| Expected::at(arc, place))
-            .all(|expected| expected.ranges_m().iter().all(|range_m| *range_m >= least_m))
+            .filter_map(|arc| ExpectedView::at(arc, place))
+            .all(|expected| expected.ranges_m().iter().all(|range_m| *range_m >= min_m))
     }
 
-    /// Which of the open elements a scan from the place decides.
+    /// Open elements that a scan from the position decides.
     fn decided(&self, place: DVec2, open: &[usize]) -> Vec<usize> {
         let margin = self.settings.translation_margin;
         let decides = |index: &usize| {
             let arc = self.arcs[*index];
-            Expected::at(arc, place).is_some_and(|expected| {
+            ExpectedView::at(arc, place).is_some_and(|expected| {
                 !expected.is_out_of_reach(self.extents)
                     && expected.beta_corner_deg
-                        >= margin * expected.least_beta_deg(arc, self.settings) - ROUNDING_DEG
+                        >= margin * expected.min_beta_deg(arc, self.settings) - ROUNDING_DEG
             })
         };
         open.iter().copied().filter(decides).collect()
