@@ -112,7 +112,7 @@ fn region<'a>(stops: impl IntoIterator<Item = &'a Stop>, scene: Option<&Scene>) 
 fn floor(plan: &Plan, number: usize, stops: &[Stop], scene: Option<&Scene>) -> Layer {
     let mut inside =
         Layer::new("inside").clipped(&format!("exploration-window-{number}"), plan.panel);
-    let mut views = Layer::new("laser-views").with("fill", theme::SILENT).with("fill-opacity", 0.3);
+    let mut views = Layer::new("laser-views").with("fill", theme::NO_ECHO).with("fill-opacity", 0.3);
     // A full turn at every stop would cover everything: its latest is enough.
     let turns = stops.iter().all(|stop| stop.sonar.is_none());
     let first = if turns { stops.len().saturating_sub(1) } else { 0 };
@@ -153,13 +153,13 @@ fn entries<'a>(stops: impl IntoIterator<Item = &'a Stop>) -> Vec<Entry> {
     let lines: Vec<_> = stops.into_iter().flat_map(|stop| &stop.lines).collect();
     let way = Sample::Line { colour: theme::ORANGE, width_px: 1.4, dash: "none" };
     let wall = Sample::Line { colour: theme::WALL, width_px: theme::WALL_PX, dash: "none" };
-    let dot = Sample::Mark { shape: Shape::Dot, colour: theme::SILENT };
+    let dot = Sample::Mark { shape: Shape::Dot, colour: theme::NO_ECHO };
     let others = [
         Entry::new(dot, "confirmed end"),
         Entry::new(way, "way and stops"),
         Entry::new(wall, "wall"),
         Entry::new(
-            Sample::Mark { shape: Shape::Square, colour: theme::SILENT },
+            Sample::Mark { shape: Shape::Square, colour: theme::NO_ECHO },
             "seen by the laser",
         ),
     ];

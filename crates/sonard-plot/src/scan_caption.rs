@@ -1,31 +1,31 @@
-//! What stands above a picture of scans: scene, pose, sensor, air, engine, provenance, counts.
+//! Caption of a picture of scans: scene, pose, sensor, air, engine, provenance, counts.
 
 use sonard_interpret::compare::compare;
 use sonard_model::{geometry::Pose, scene::Scene};
 use sonard_records::{EventKind, Provenance, ScanView, Session};
 
-/// Title: the scene and the place in it.
+/// Title with the scene and the pose in it.
 pub(super) fn title(views: &[ScanView], scene: Option<&Scene>) -> String {
     let logged = views.iter().find_map(|view| view.session.as_ref()?.scene.as_ref());
-    let place = scene.map(|scene| scene.name.as_str()).or(logged.map(|scene| scene.name.as_str()));
-    let place = place.unwrap_or("scan without a scene");
+    let name = scene.map(|scene| scene.name.as_str()).or(logged.map(|scene| scene.name.as_str()));
+    let name = name.unwrap_or("scan without a scene");
     let poses: Vec<Pose> = distinct_poses(views);
     match poses.as_slice() {
-        [] => format!("{place}, pose unknown"),
-        [pose] => match named(pose, scene) {
-            Some(name) => format!("{place}, pose {name}"),
-            None => format!("{place} at ({:.3}, {:.3}) m", pose.x_m, pose.y_m),
+        [] => format!("{name}, pose unknown"),
+        [pose] => match pose_name(pose, scene) {
+            Some(pose_name) => format!("{name}, pose {pose_name}"),
+            None => format!("{name} at ({:.3}, {:.3}) m", pose.x_m, pose.y_m),
         },
-        many => format!("{place}, {} poses", many.len()),
+        many => format!("{name}, {} poses", many.len()),
     }
 }
 
-/// What the readings are, in a few words; `None` for readings of a real ranger.
+/// Provenance of the readings as a short label; `None` if all are from hardware.
 pub(super) fn badge(views: &[ScanView]) -> Option<&'static str> {
     badge_among(views.iter().filter_map(|view| Some(view.session.as_ref()?.provenance)))
 }
 
-/// The same for readings of several sources: those that are made up must not pass for measured.
+/// Badge for readings of several sources: any source other than hardware takes precedence.
 #[must_use]
 pub fn badge_among(sources: impl IntoIterator<Item = Provenance>) -> Option<&'static str> {
     let mut hardware = None;
@@ -38,8 +38,7 @@ pub fn badge_among(sources: impl IntoIterator<Item = Provenance>) -> Option<&'st
     badge_of(hardware)
 }
 
-/// The words that every picture of readings has in its corner, unless a real ranger took them; for
-/// readings of which nothing is known, that.
+/// Badge in the corner of every picture of readings: their provenance, `None` for hardware.
 #[must_use]
 pub fn badge_of(provenance: Option<Provenance>) -> Option<&'static str> {
     match provenance {
@@ -53,7 +52,7 @@ pub fn badge_of(provenance: Option<Provenance>) -> Option<&'static str> {
     }
 }
 
-/// The lines under the title.
+/// Lines below the title.
 pub(super) fn lines(views: &[ScanView]) -> Vec<String> {
     let mut lines = Vec::new();
     if let Some(view) = views.first() {
@@ -78,12 +77,12 @@ pub(super) fn lines(views: &[ScanView]) -> Vec<String> {
     lines
 }
 
-/// Where the ranger stood, if the log says so in numbers.
+/// Pose of the ranger, if logged with finite numbers.
 pub(super) fn pose_of(view: &ScanView) -> Option<Pose> {
     view.pose().filter(|pose| pose.position().is_finite() && pose.heading_deg.is_finite())
 }
 
-/// Poses of the scans, each once.
+/// Distinct poses of the scans.
 fn distinct_poses(views: &[ScanView]) -> Vec<Pose> {
     let mut poses: Vec<Pose> = Vec::new();
     for pose in views.iter().filter_map(pose_of) {
@@ -108,7 +107,7 @@ const fn kind(kind: EventKind) -> &'static str {
     }
 }
 
-fn named<'a>(pose: &Pose, scene: Option<&'a Scene>) -> Option<&'a str> {
+fn pose_name<'a>(pose: &Pose, scene: Option<&'a Scene>) -> Option<&'a str> {
     let poses = &scene?.poses;
     poses.iter().find(|(_, known)| *known == pose).map(|(name, _)| name.as_str())
 }
@@ -155,7 +154,7 @@ fn counts(views: &[ScanView]) -> String {
             parts.push(format!("{duration_s:.1} s"));
         }
     } else {
-        parts.push("scan not finished".into());
+        parts.push("scan incomplete".into());
     }
     if let Some(start) = views.first().and_then(|view| view.start.as_ref()) {
         parts.push(format!("{:.0}", start.time));
@@ -163,21 +162,21 @@ fn counts(views: &[ScanView]) -> String {
     parts.join(" \u{b7} ")
 }
 
-/// How measured and predicted ranges agree, where both are there.
+/// Agreement of measured and predicted ranges, where both exist.
 fn agreement(views: &[ScanView]) -> Option<String> {
     let (found, _) = compare(views);
     let percent = 100.0 * found.agree_fraction?;
     Some(format!(
-        "{} of {} echoes heard by both agree with the model ({percent:.1} %) \u{b7} distance: \
-         median {}, nine in ten within {}",
-        found.agree,
+        "of {} echoes present in both, {} agree ({percent:.1} %) \u{b7} |residual|: median {}, \
+         90 % within {}",
         found.both_echo,
+        found.agree,
         length(found.median_abs_residual_m?),
         length(found.p90_abs_residual_m?)
     ))
 }
 
-/// A length in the unit that suits it.
+/// Formats a length with a suitable unit.
 fn length(length_m: f64) -> String {
     match length_m {
         m if m < 0.1 => format!("{:.1} mm", 1e3 * m),

@@ -1,5 +1,4 @@
-//! What a reader must find on a picture: whose the readings are, what the axes mean, and names that stand
-//! free of walls.
+//! Legibility of pictures: provenance badges, axis titles, and names clear of walls.
 
 use resvg::{tiny_skia::Pixmap, usvg::roxmltree};
 use sonard_interpret::interpret::grid::{Grid, GridShape};
@@ -18,12 +17,12 @@ fn texts(svg: &str) -> Vec<String> {
 }
 
 #[test]
-fn the_way_of_a_beam_says_whose_the_reading_is() {
+fn path_of_a_beam_has_a_badge() {
     let scene = room();
     let pose = scene.poses["fig9"];
-    let way = |provenance| {
+    let draw = |provenance| {
         let view = PathView {
-            title: "a way".into(),
+            title: "a path".into(),
             lines: Vec::new(),
             badge: badge_of(Some(provenance)),
             scene: &scene,
@@ -35,27 +34,27 @@ fn the_way_of_a_beam_says_whose_the_reading_is() {
         };
         draw_path(&view).to_svg()
     };
-    assert!(way(Provenance::Mock).contains("MOCK, not hardware"));
-    assert!(way(Provenance::Emulator).contains("EMULATOR, not hardware"));
-    assert!(!way(Provenance::Hardware).contains("class=\"provenance\""));
+    assert!(draw(Provenance::Mock).contains("MOCK, not hardware"));
+    assert!(draw(Provenance::Emulator).contains("EMULATOR, not hardware"));
+    assert!(!draw(Provenance::Hardware).contains("class=\"provenance\""));
 }
 
 #[test]
-fn made_up_readings_among_measured_ones_are_said() {
-    let of = |provenance: Provenance| {
+fn mixed_scans_have_a_badge() {
+    let scan = |provenance: Provenance| {
         let mut scan = scan_of_room(room().poses["fig9"], 9.0, 1);
         let mut session = scan.session.as_deref().expect("a session").clone();
         session.provenance = provenance;
         scan.session = Some(std::sync::Arc::new(session));
         scan
     };
-    let scans = [of(Provenance::Hardware), of(Provenance::Mock)];
+    let scans = [scan(Provenance::Hardware), scan(Provenance::Mock)];
     assert!(draw_scans(&scans, None).to_svg().contains("MOCK, not hardware"));
     assert!(!draw_scans(&scans[..1], None).to_svg().contains("class=\"provenance\""));
 }
 
 #[test]
-fn what_scans_and_methods_come_to_says_whose_the_readings_are() {
+fn series_and_convergence_have_a_badge() {
     let some = [Provenance::Hardware, Provenance::Mock, Provenance::Hardware];
     let series = |sources: &[Provenance]| {
         let badge = badge_among(sources.iter().copied());
@@ -70,18 +69,18 @@ fn what_scans_and_methods_come_to_says_whose_the_readings_are() {
 }
 
 #[test]
-fn plans_beside_each_other_have_all_their_lines_in_the_legend() {
+fn side_by_side_legend_is_complete() {
     let scene = room();
     let scan = scan_of_room(scene.poses["fig9"], 9.0, 1);
     let svg = draw_side_by_side(&[scan.clone(), scan], Some(&scene)).to_svg();
-    let said = texts(&svg);
-    for words in ["blind within", "wall, reflectance"] {
-        assert!(said.iter().any(|text| text.starts_with(words)), "{words}: {said:?}");
+    let shown = texts(&svg);
+    for label in ["minimum range (blanking)", "wall, reflectance"] {
+        assert!(shown.iter().any(|text| text.starts_with(label)), "{label}: {shown:?}");
     }
 }
 
 #[test]
-fn a_map_has_a_frame_round_its_cells_and_a_badge() {
+fn map_has_frame_and_badge() {
     let shape = GridShape::covering(DVec2::ZERO, DVec2::new(2.0, 1.0), 0.05).expect("a shape");
     let grid = Grid::new(shape);
     let draw = |badge| {
@@ -103,7 +102,7 @@ fn a_map_has_a_frame_round_its_cells_and_a_badge() {
 }
 
 #[test]
-fn a_residual_axis_says_where_it_is_logarithmic() {
+fn residual_axis_states_logarithmic_scale() {
     let scan = scan_of_room(room().poses["fig9"], 0.9, 1);
     let mut close = scan.clone();
     close.pings.retain(|ping| {
@@ -114,6 +113,6 @@ fn a_residual_axis_says_where_it_is_logarithmic() {
     assert!(texts(&svg).iter().any(|text| text.contains("logarithmic beyond")), "{svg}");
     assert!(svg.contains("class=\"band\""));
     let svg = draw_residuals(&[close], None).to_svg();
-    assert!(texts(&svg).contains(&"measured \u{2212} model, mm".to_owned()));
-    assert!(!svg.contains("class=\"band\""), "a band over everything says nothing");
+    assert!(texts(&svg).contains(&"measured \u{2212} predicted, mm".to_owned()));
+    assert!(!svg.contains("class=\"band\""), "a band over everything carries no information");
 }
