@@ -1,8 +1,9 @@
-//! The last tenths of a standard deviation: where readings are likeliest by predictions that are made anew.
+//! Refinement by random search with exact predictions, over the last tenths of a standard
+//! deviation.
 //!
-//! Which arrival a weak echo is of, and how strong overlapping ones are together, changes from one tenth of a millimetre to
-//! the next. A linearisation knows nothing of that, so a fit that goes by it ends about where it should, and no nearer:
-//! from there no step of Levenberg's and Marquardt's is any better, though some place beside is.
+//! The arrival of a weak echo, and the level of overlapping ones, change within tenths of a
+//! millimetre. A linearization does not capture that: no further Levenberg-Marquardt step improves
+//! the optimum, although some point nearby is better.
 
 use nalgebra::{Cholesky, DVector};
 use rand::SeedableRng as _;
@@ -10,28 +11,29 @@ use rand_distr::{Distribution as _, StandardNormal};
 use rand_pcg::Pcg64;
 
 use super::{
-    FitError, Settled, State,
-    journal::{Found, listed},
+    FitError, Fitter, Optimum,
+    checkpoint::{Found, listed},
     one_of_many,
 };
 use crate::{candidates::Phases, likelihood::ErrorModel};
 
-/// Places on each side along the directions that are held least, and how far apart, in standard deviations.
+/// Scan points on each side along the weakly constrained directions, and their distance in standard
+/// deviations.
 const SCANNED: (i32, f64) = (4, 1.0);
-/// Predictions that are made about the best of them.
+/// Number of random trials about the best of them.
 const TRIED: usize = 60;
-/// More than polishing an end makes it likelier, as a logarithm.
+/// Upper bound on the gain in log-posterior by refinement.
 pub(super) const FAR_BELOW: f64 = 30.0;
-/// Steps to begin with, in standard deviations, and what becomes of them after one that is better, and one that is not:
-/// as large as lets one in five be better (Rechenberg's rule for an evolution strategy of one parent and one child).
+/// Initial step in standard deviations, and its factors after success and failure, for a success
+/// rate of one in five (Rechenberg's rule for an evolution strategy of one parent and one child).
 const STEP: f64 = 0.4;
 const GROWS: f64 = 1.5;
 const SHRINKS: f64 = 0.9;
 
-impl State<'_> {
-    /// The likeliest place of some that are tried about an end with phases, in steps that spread as its covariance does.
-    /// Without phases nothing changes so quickly: where readings are far likelier so, the end stays where it is.
-    pub(super) fn polished(&mut self, end: Settled) -> Result<Settled, FitError> {
+impl Fitter<'_> {
+    /// Refines an optimum with phases by random steps distributed as its covariance. Without phases
+    /// the posterior is smooth: if that is far likelier, the optimum is returned unchanged.
+    pub(super) fn polished(&mut self, end: Optimum) -> Result<Optimum, FitError> {
         if self.is_beyond_phases(&end.errors) {
             return Ok(end);
         }
@@ -47,7 +49,7 @@ impl State<'_> {
         if from.value < end.value - FAR_BELOW {
             return Ok(end);
         }
-        let found = self.found(|state| state.polish(from));
+        let found = self.found(|fitter| fitter.polish(from));
         let (values, errors, log_posterior) = match one_of_many(found)? {
             Some(Found::End { values, errors, log_posterior }) => (values, errors, log_posterior),
             Some(_) => return Err(FitError::OtherFit),
@@ -57,10 +59,10 @@ impl State<'_> {
             return Ok(end);
         }
         let values = DVector::from_vec(values);
-        Ok(Settled { value: log_posterior, values, errors, phases: Phases::Known })
+        Ok(Optimum { value: log_posterior, values, errors, phases: Phases::Known })
     }
 
-    fn polish(&mut self, end: &Settled) -> Result<Found, FitError> {
+    fn polish(&mut self, end: &Optimum) -> Result<Found, FitError> {
         (self.values, self.phases) = (end.values.clone(), end.phases);
         let linear = self.linear()?;
         let mut errors = self.spread(&linear, &end.errors);
@@ -77,7 +79,7 @@ impl State<'_> {
             let normal = self.still().map(|_: f64| StandardNormal.sample(&mut rng));
             let longer: f64 = StandardNormal.sample(&mut rng);
             self.values = self.limited(&best.1 + step * longer.exp() * (&root * normal));
-            // There may be nothing to predict with, as within a wall.
+            // Prediction may fail, as within a wall.
             let Some(linear) = one_of_many(self.linear())? else { continue };
             let value = self.value(&linear, &errors);
             if value > best.0 {
@@ -96,8 +98,8 @@ impl State<'_> {
         Ok(Found::End { values: listed(&values), errors, log_posterior })
     }
 
-    /// The likeliest of some places along the directions that are held least, farther off than polishing goes, each
-    /// improved once.
+    /// Best of some points along the weakly constrained directions, beyond the reach of the random
+    /// steps, each improved once.
     fn scanned(
         &mut self,
         mut best: (f64, DVector<f64>),
@@ -105,7 +107,7 @@ impl State<'_> {
     ) -> Result<(f64, DVector<f64>), FitError> {
         let (places, apart) = SCANNED;
         let about = best.1.clone();
-        for (direction, sigma) in self.doubtful(&about, errors, Phases::Known)? {
+        for (direction, sigma) in self.weak_directions(&about, errors, Phases::Known)? {
             for place in (-places..=places).filter(|place| *place != 0) {
                 let by = f64::from(place) * apart * sigma;
                 self.values = self.limited(&about + by * &direction);
@@ -118,7 +120,7 @@ impl State<'_> {
         Ok(best)
     }
 
-    /// How likely it is after one improvement from where it stands.
+    /// Log-posterior after one improvement from the current values.
     fn value_improved(&mut self, errors: &ErrorModel) -> Result<f64, FitError> {
         let linear = self.linear()?;
         self.improve(&linear, errors)?;

@@ -1,4 +1,4 @@
-//! What is usually done with ranges, to be compared with.
+//! Standard range-based localization methods for comparison.
 
 use rand::RngExt as _;
 use rand_pcg::Pcg64;
@@ -10,21 +10,21 @@ use sonard_model::{
 
 use crate::rooms::readings;
 
-/// Directions of a place, 3 degrees apart.
+/// Directions per position, 3 degrees apart.
 const DIRECTIONS: usize = 120;
 const STEP_DEG: f64 = 360.0 / DIRECTIONS as f64;
 const SPACING_M: f64 = 0.1;
-/// Poses of the grid that are improved.
-const IMPROVED: usize = 4;
-/// Steps of a pattern search, metres and degrees, halved so often.
+/// Number of grid poses that are refined.
+const REFINED: usize = 4;
+/// Initial steps of the pattern search, metres and degrees, and number of halvings.
 const SEARCH: (f64, f64, u32) = (0.05, 1.5, 5);
 
-/// Ranges by direction, metres; none where nothing comes back.
+/// Ranges by direction, metres; `None` without a return.
 type Ranges = Vec<Option<f64>>;
-/// Logarithm of the likelihood of what was read where a range is expected.
+/// Log-likelihood of a reading for an expected range.
 pub(crate) type Likelihood<'a> = &'a dyn Fn(Option<f64>, Option<f64>) -> f64;
 
-/// Ranges to the nearest hit, on a grid of places.
+/// Ranges to the nearest hit on a grid of positions.
 pub(crate) struct Grid {
     simulator: Simulator,
     sound_speed_m_s: f64,
@@ -33,60 +33,58 @@ pub(crate) struct Grid {
 }
 
 impl Grid {
-    /// Of a world of nearest hits.
+    /// Grid of nearest hits in a world.
     pub(crate) fn new(world: &World, reach_m: f64) -> Self {
         let origin = Pose { x_m: 0.0, y_m: 0.0, heading_deg: 0.0 };
         let simulator = world.simulator(&origin).expect("a world");
         let sound_speed_m_s = simulator.sound_speed_m_s();
         let mut grid = Self { simulator, sound_speed_m_s, reach_m, places: Vec::new() };
-        grid.places = standing(world).map(|at| (at, grid.expected(at))).collect();
+        grid.places = free_positions(world).map(|at| (at, grid.expected(at))).collect();
         grid
     }
 
     fn expected(&self, at: DVec2) -> Ranges {
         let point = self.simulator.at(at);
-        let of = |direction: usize| {
+        let range_m = |direction: usize| {
             let read = point.ping((direction as f64 * STEP_DEG).to_radians()).ok()?;
             read.range_m.filter(|range_m| *range_m < self.reach_m)
         };
-        (0..DIRECTIONS).map(of).collect()
+        (0..DIRECTIONS).map(range_m).collect()
     }
 
     /// Azimuths and ranges of a sweep.
-    pub(crate) fn heard(&self, sweep: &Sweep) -> Vec<(f64, Option<f64>)> {
-        let of = |beam: &sonard_inverse::Beam| {
+    pub(crate) fn readings(&self, sweep: &Sweep) -> Vec<(f64, Option<f64>)> {
+        let reading = |beam: &sonard_inverse::Beam| {
             (beam.azimuth_deg, beam.heard.range_m(self.sound_speed_m_s))
         };
-        sweep.beams.iter().filter(|beam| beam.heard != Heard::Near).map(of).collect()
+        sweep.beams.iter().filter(|beam| beam.heard != Heard::Near).map(reading).collect()
     }
 
-    /// The likeliest pose: of the grid's four best, improved.
-    pub(crate) fn located(
+    /// Most likely pose after refinement of the four best grid poses.
+    pub(crate) fn locate(
         &self,
-        heard: &[(f64, Option<f64>)],
+        measured: &[(f64, Option<f64>)],
         likelihood: Likelihood<'_>,
     ) -> Option<Pose> {
         let mut best: Vec<(f64, Pose)> = Vec::new();
         for (at, expected) in &self.places {
-            let of_turn = |turn: usize| {
+            let by_turn = |turn: usize| {
                 let pose = Pose { x_m: at.x, y_m: at.y, heading_deg: turn as f64 * STEP_DEG };
-                (value(expected, heard, pose.heading_deg, likelihood), pose)
+                (value(expected, measured, pose.heading_deg, likelihood), pose)
             };
-            best.extend(
-                (0..DIRECTIONS).map(of_turn).max_by(|one, other| one.0.total_cmp(&other.0)),
-            );
+            best.extend((0..DIRECTIONS).map(by_turn).max_by(|a, b| a.0.total_cmp(&b.0)));
         }
-        best.sort_by(|one, other| other.0.total_cmp(&one.0));
-        let improved =
-            best.into_iter().take(IMPROVED).map(|from| self.improved(from, heard, likelihood));
-        improved.max_by(|one, other| one.0.total_cmp(&other.0)).map(|(_, pose)| pose)
+        best.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let refined =
+            best.into_iter().take(REFINED).map(|from| self.refined(from, measured, likelihood));
+        refined.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, pose)| pose)
     }
 
-    /// Steps to whichever neighbour is likelier, and halves the steps where none is.
-    fn improved(
+    /// Pattern search: moves to a more likely neighbour, or halves the steps.
+    fn refined(
         &self,
         (mut likely, mut pose): (f64, Pose),
-        heard: &[(f64, Option<f64>)],
+        measured: &[(f64, Option<f64>)],
         likelihood: Likelihood<'_>,
     ) -> (f64, Pose) {
         let (mut step_m, mut step_deg, halvings) = SEARCH;
@@ -101,9 +99,9 @@ impl Grid {
                 });
                 let tried = near.map(|near| {
                     let expected = self.expected(near.position());
-                    (value(&expected, heard, near.heading_deg, likelihood), near)
+                    (value(&expected, measured, near.heading_deg, likelihood), near)
                 });
-                match tried.max_by(|one, other| one.0.total_cmp(&other.0)) {
+                match tried.max_by(|a, b| a.0.total_cmp(&b.0)) {
                     Some(better) if better.0 > likely => (likely, pose) = better,
                     _ => break,
                 }
@@ -114,8 +112,8 @@ impl Grid {
     }
 }
 
-/// Where a ranger can stand with something about it.
-fn standing(world: &World) -> impl Iterator<Item = DVec2> + '_ {
+/// Free positions with clearance for a ranger.
+fn free_positions(world: &World) -> impl Iterator<Item = DVec2> + '_ {
     let ends = || world.scene.walls.iter().flat_map(|wall| [wall.a, wall.b]);
     let low = ends().fold(DVec2::INFINITY, DVec2::min);
     let high = ends().fold(DVec2::NEG_INFINITY, DVec2::max);
@@ -132,19 +130,19 @@ fn standing(world: &World) -> impl Iterator<Item = DVec2> + '_ {
 
 fn value(
     expected: &Ranges,
-    heard: &[(f64, Option<f64>)],
+    measured: &[(f64, Option<f64>)],
     heading_deg: f64,
     likelihood: Likelihood<'_>,
 ) -> f64 {
-    let of = |&(azimuth_deg, read): &(f64, Option<f64>)| {
+    let log_likelihood = |&(azimuth_deg, read): &(f64, Option<f64>)| {
         let direction =
             ((azimuth_deg + heading_deg) / STEP_DEG).round().rem_euclid(DIRECTIONS as f64);
         likelihood(expected[direction as usize % DIRECTIONS], read)
     };
-    heard.iter().map(of).sum()
+    measured.iter().map(log_likelihood).sum()
 }
 
-/// A normal density of 5 cm about the nearest hit, with a floor.
+/// Normal density around the nearest hit with a standard deviation of 5 cm and a floor.
 pub(crate) fn nearest_hit(expected: Option<f64>, read: Option<f64>) -> f64 {
     match (expected, read) {
         (Some(expected), Some(read)) => (normal(read - expected, 0.05) + 0.05).ln(),
@@ -157,25 +155,25 @@ fn normal(off: f64, sigma: f64) -> f64 {
     (-0.5 * (off / sigma).powi(2)).exp() / (sigma * std::f64::consts::TAU.sqrt())
 }
 
-/// The four components of Thrun, Burgard and Fox.
+/// Beam model with the four components of Thrun, Burgard and Fox.
 pub(crate) struct BeamModel {
-    /// Shares of hits, of what is nearer than expected, of silences, of anything.
+    /// Weights of hits, short readings, no echo, and random readings.
     shares: [f64; 4],
     sigma_m: f64,
-    /// How fast what is nearer gets rarer, a metre.
+    /// Decay rate of short readings, 1/m.
     rate_per_m: f64,
     reach_m: f64,
 }
 
 impl BeamModel {
-    /// The likeliest for sweeps at known poses (expectation and maximisation).
-    pub(crate) fn learned(grid: &Grid, trained: &[(Pose, Sweep)]) -> Self {
-        let pairs: Vec<(Option<f64>, Option<f64>)> = trained
+    /// Maximum-likelihood components for sweeps at known poses (expectation maximization).
+    pub(crate) fn learned(grid: &Grid, training: &[(Pose, Sweep)]) -> Self {
+        let pairs: Vec<(Option<f64>, Option<f64>)> = training
             .iter()
             .flat_map(|(pose, sweep)| {
                 let expected = grid.expected(pose.position());
                 let heading_deg = pose.heading_deg;
-                grid.heard(sweep).into_iter().map(move |(azimuth_deg, read)| {
+                grid.readings(sweep).into_iter().map(move |(azimuth_deg, read)| {
                     let direction = ((azimuth_deg + heading_deg) / STEP_DEG).round();
                     (expected[direction.rem_euclid(DIRECTIONS as f64) as usize % DIRECTIONS], read)
                 })
@@ -218,14 +216,14 @@ impl BeamModel {
             return [if expected.is_none() { hit } else { 0.0 }, 0.0, none, 0.0];
         };
         let expected_m = expected.unwrap_or(self.reach_m);
-        let of_hit = expected.map_or(0.0, |expected| normal(read - expected, self.sigma_m));
+        let hit_density = expected.map_or(0.0, |expected| normal(read - expected, self.sigma_m));
         let norm = 1.0 - (-self.rate_per_m * expected_m).exp();
         let of_short = if read < expected_m {
             self.rate_per_m * (-self.rate_per_m * read).exp() / norm.max(1e-9)
         } else {
             0.0
         };
-        [hit * of_hit, short * of_short, 0.0, any / self.reach_m]
+        [hit * hit_density, short * of_short, 0.0, any / self.reach_m]
     }
 
     pub(crate) fn log_likelihood(&self, expected: Option<f64>, read: Option<f64>) -> f64 {
@@ -233,55 +231,55 @@ impl BeamModel {
     }
 }
 
-/// Histograms of the ranges that were read at each place of the grid.
+/// Histograms of the ranges measured at each grid position.
 pub(crate) struct Histograms {
     learned: Vec<(DVec2, [f64; BINS], Ranges)>,
 }
 
 const BIN_M: f64 = 0.25;
-/// To 4 m, and silences.
+/// Number of bins: to 4 m, and one for no echo.
 const BINS: usize = 17;
 
 impl Histograms {
-    /// From one sweep at each place.
+    /// Histograms of one sweep at each position.
     pub(crate) fn learned(world: &World, grid: &Grid, rng: &mut Pcg64) -> Self {
         let learned = grid.places.iter().filter_map(|(at, _)| {
             let heading_deg = rng.random_range(-180.0..180.0);
             let pose = Pose { x_m: at.x, y_m: at.y, heading_deg };
             let beams = readings(world, &pose, 0.0, rng)?;
             let mut ranges: Ranges = vec![None; DIRECTIONS];
-            let mut heard = Vec::new();
+            let mut measured = Vec::new();
             for beam in beams.into_iter().filter(|beam| beam.heard != Heard::Near) {
                 let read = beam.heard.range_m(grid.sound_speed_m_s);
                 let direction = ((beam.azimuth_deg + heading_deg) / STEP_DEG).round();
                 ranges[direction.rem_euclid(DIRECTIONS as f64) as usize % DIRECTIONS] = read;
-                heard.push((beam.azimuth_deg, read));
+                measured.push((beam.azimuth_deg, read));
             }
-            Some((*at, histogram(&heard), ranges))
+            Some((*at, histogram(&measured), ranges))
         });
         Self { learned: learned.collect() }
     }
 
-    /// The place most alike, by chi squared, and the turn at which its ranges fit best.
-    pub(crate) fn located(&self, heard: &[(f64, Option<f64>)]) -> Option<Pose> {
-        let here = histogram(heard);
-        let unlike = |of: &[f64; BINS]| -> f64 {
-            let part = |(one, other): (&f64, &f64)| (one - other).powi(2) / (one + other).max(1e-9);
+    /// Most similar position by chi squared, and the rotation with the best fit of the ranges.
+    pub(crate) fn locate(&self, measured: &[(f64, Option<f64>)]) -> Option<Pose> {
+        let here = histogram(measured);
+        let difference = |of: &[f64; BINS]| -> f64 {
+            let part = |(a, b): (&f64, &f64)| (a - b).powi(2) / (a + b).max(1e-9);
             here.iter().zip(of).map(part).sum()
         };
         let (at, _, ranges) =
-            self.learned.iter().min_by(|one, other| unlike(&one.1).total_cmp(&unlike(&other.1)))?;
-        let likely = |turn: usize| value(ranges, heard, turn as f64 * STEP_DEG, &nearest_hit);
-        let turn = (0..DIRECTIONS).max_by(|one, other| likely(*one).total_cmp(&likely(*other)))?;
+            self.learned.iter().min_by(|a, b| difference(&a.1).total_cmp(&difference(&b.1)))?;
+        let likely = |turn: usize| value(ranges, measured, turn as f64 * STEP_DEG, &nearest_hit);
+        let turn = (0..DIRECTIONS).max_by(|a, b| likely(*a).total_cmp(&likely(*b)))?;
         Some(Pose { x_m: at.x, y_m: at.y, heading_deg: wrap_180(turn as f64 * STEP_DEG) })
     }
 }
 
-fn histogram(heard: &[(f64, Option<f64>)]) -> [f64; BINS] {
+fn histogram(measured: &[(f64, Option<f64>)]) -> [f64; BINS] {
     let mut counts = [0.0; BINS];
-    for (_, read) in heard {
+    for (_, read) in measured {
         let bin = read.map_or(BINS - 1, |range_m| ((range_m / BIN_M) as usize).min(BINS - 2));
-        counts[bin] += 1.0 / heard.len() as f64;
+        counts[bin] += 1.0 / measured.len() as f64;
     }
     counts
 }

@@ -1,25 +1,27 @@
-//! Where a fit goes next: turns that are tried out, and steps of Levenberg and Marquardt.
+//! Steps of a fit: trial rotations, and Levenberg-Marquardt steps.
 
 use nalgebra::{Cholesky, DVector};
 
-use super::{FitError, State};
+use super::{FitError, Fitter};
 use crate::{
     likelihood::ErrorModel,
-    linear::{Curve, Linear},
+    linear::{Derivatives, LinearizedModel},
     parameter::Parameter,
 };
 
-/// Decibels of the threshold that are tried for each degree of turn: what two-way beams fall by near the ends of arcs.
+/// Threshold change tried per degree of rotation, decibels: the slope of two-way beams near the
+/// ends of arcs.
 const THRESHOLD_OF_TURN: f64 = 1.5;
-/// Steps on one linearisation.
+/// Maximum number of steps on one linearization.
 const STEPS: usize = 12;
-/// How much stiffer a combination is that is held than anything else.
+/// Stiffness of a held combination relative to the stiffest parameter.
 const STIFF: f64 = 1e3;
 
-impl State<'_> {
-    /// Turns each sweep whose heading is in doubt to where it fits best as a whole, in so many steps to both sides:
-    /// headings move no path of a transducer on the axis, only the ends of arcs, which say little from afar. Of a
-    /// single sweep the threshold, which moves all ends of arcs too, is tried with it.
+impl Fitter<'_> {
+    /// Rotates each sweep with a fitted heading to its best value in discrete steps on either side.
+    /// A heading changes no path of an on-axis transducer, only the ends of arcs, which carry
+    /// little information from afar. For a single sweep the threshold, which shifts all ends, is
+    /// varied as well.
     pub(super) fn turn(
         &mut self,
         errors: &ErrorModel,
@@ -27,8 +29,9 @@ impl State<'_> {
         steps: i32,
     ) -> Result<bool, FitError> {
         let (world, poses) = (self.moved_world()?, self.poses());
-        let place = |wanted: &Parameter| self.parameters.iter().position(|of| **of == *wanted);
-        let threshold = place(&Parameter::Threshold).filter(|_| self.sweeps.len() == 1);
+        let index =
+            |parameter: &Parameter| self.parameters.iter().position(|of| **of == *parameter);
+        let threshold = index(&Parameter::Threshold).filter(|_| self.sweeps.len() == 1);
         let step_db = THRESHOLD_OF_TURN * step_deg;
         let thresholds_db: Vec<f64> = match threshold {
             Some(_) => (-2..=2).map(|step| f64::from(step) * step_db).collect(),
@@ -39,14 +42,21 @@ impl State<'_> {
             let Parameter::Heading(sweep) = *self.parameters[at] else { continue };
             let turns: Vec<f64> = (-steps..=steps).map(|step| f64::from(step) * step_deg).collect();
             let (sweep, pose) = (&self.sweeps[sweep], &poses[sweep]);
-            let tried =
-                Linear::turned(&self.models, &world, sweep, pose, &turns, &thresholds_db, errors)?;
+            let tried = LinearizedModel::turned(
+                &self.models,
+                &world,
+                sweep,
+                pose,
+                &turns,
+                &thresholds_db,
+                errors,
+            )?;
             let cost =
                 |at: usize, by: f64| 0.5 * self.precision(at) * (self.values[at] + by).powi(2);
             let value = |&(by, db, likely): &(f64, f64, f64)| {
                 likely - cost(at, by) - threshold.map_or(0.0, |threshold| cost(threshold, db))
             };
-            let best = tried.iter().max_by(|one, other| value(one).total_cmp(&value(other)));
+            let best = tried.iter().max_by(|a, b| value(a).total_cmp(&value(b)));
             if let Some(&(by, db, _)) = best {
                 changes.push((at, by));
                 changes.extend(threshold.map(|threshold| (threshold, db)));
@@ -56,10 +66,10 @@ impl State<'_> {
         Ok(changes.iter().any(|(_, by)| *by != 0.0))
     }
 
-    /// Goes where the linearisation is best, within what it holds for. Gives the largest step, as a share of that.
+    /// Optimizes on the linearization within its limits; returns the largest step relative to them.
     pub(super) fn improve(
         &mut self,
-        linear: &Linear,
+        linear: &LinearizedModel,
         errors: &ErrorModel,
     ) -> Result<f64, FitError> {
         let mut change = self.still();
@@ -91,14 +101,19 @@ impl State<'_> {
         Ok(largest)
     }
 
-    /// The largest part of a change, as a share of what its parameter may be moved at a time.
+    /// Largest component of a change, relative to the maximum step of its parameter.
     pub(super) fn largest_share(&self, change: &DVector<f64>) -> f64 {
         let shares = change.iter().zip(&self.parameters).map(|(by, of)| by.abs() / of.step());
         shares.fold(0.0, f64::max)
     }
 
-    /// Solves the damped normal equations; what stands at its limit and would go past it is held.
-    fn step(&self, curve: &Curve, change: &DVector<f64>, damping: f64) -> Option<DVector<f64>> {
+    /// Solves the damped normal equations with active bound constraints.
+    fn step(
+        &self,
+        curve: &Derivatives,
+        change: &DVector<f64>,
+        damping: f64,
+    ) -> Option<DVector<f64>> {
         let mut normal = curve.information.clone();
         let mut right = curve.gradient.clone();
         for at in 0..right.len() {
@@ -113,9 +128,9 @@ impl State<'_> {
             right -= STIFF * stiffest * held.dot(change) * held;
         }
         for at in 0..right.len() {
-            let (least, most) = self.limits_of_change(at);
+            let (min, max) = self.limits_of_change(at);
             let is_held =
-                (change[at] <= least && right[at] < 0.0) || (change[at] >= most && right[at] > 0.0);
+                (change[at] <= min && right[at] < 0.0) || (change[at] >= max && right[at] > 0.0);
             if is_held {
                 normal.row_mut(at).fill(0.0);
                 normal.column_mut(at).fill(0.0);
@@ -125,18 +140,18 @@ impl State<'_> {
         Some(Cholesky::new(normal)?.solve(&right))
     }
 
-    /// No further than linearisation and limits allow.
+    /// Clamps a change to the validity of the linearization and to the bounds.
     fn bounded(&self, change: &DVector<f64>) -> DVector<f64> {
         let bounded = change.iter().enumerate().map(|(at, by)| {
-            let (step, (least, most)) = (self.parameters[at].step(), self.limits_of_change(at));
-            by.clamp(least.max(-step), most.min(step))
+            let (step, (min, max)) = (self.parameters[at].step(), self.limits_of_change(at));
+            by.clamp(min.max(-step), max.min(step))
         });
         DVector::from_iterator(change.len(), bounded)
     }
 
-    /// How far a parameter can go from where it stands.
+    /// Bounds on the change of a parameter from its current value.
     fn limits_of_change(&self, at: usize) -> (f64, f64) {
-        let (least, most) = self.start.limits(self.parameters[at]);
-        (least - self.values[at], most - self.values[at])
+        let (min, max) = self.start.limits(self.parameters[at]);
+        (min - self.values[at], max - self.values[at])
     }
 }

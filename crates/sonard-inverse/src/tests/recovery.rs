@@ -1,4 +1,4 @@
-//! Parameters and poses that are found again from what they predict.
+//! Recovery of parameters and poses from simulated readings.
 
 use rand::{RngExt as _, SeedableRng as _};
 use rand_pcg::Pcg64;
@@ -16,11 +16,11 @@ use crate::{
     fit_from, locate, priors,
 };
 
-/// A sweep as a world has it, with noise, said to be from another pose.
+/// Simulated sweep with noise, and with an initial pose.
 pub(super) fn sweep(
     world: &World,
     pose: &Pose,
-    believed: &Pose,
+    initial: &Pose,
     beams: u32,
     noise: TofNoise,
     seed: u64,
@@ -34,33 +34,33 @@ pub(super) fn sweep(
         let read = point.ping(world.direction_rad(pose, azimuth_deg)).expect("paths");
         let late_us = noise.sample_us(&mut rng);
         let tof_us = |range_m: f64| (range_m + world.delay_m) * us_per_m + late_us;
-        let heard = match (read.status, read.range_m) {
+        let outcome = match (read.status, read.range_m) {
             (PingStatus::Echo, Some(range_m)) => Heard::Echo { tof_us: tof_us(range_m) },
             (PingStatus::NoEcho, _) => Heard::Silence,
             (PingStatus::MinRange, _) => Heard::Near,
             _ => return None,
         };
-        Some(Beam { azimuth_deg, heard })
+        Some(Beam { azimuth_deg, heard: outcome })
     });
-    Sweep { scan: Uuid::nil(), pose: *believed, beams: beams.collect() }
+    Sweep { scan: Uuid::nil(), pose: *initial, beams: beams.collect() }
 }
 
-/// Where a ranger is believed to have stood that stood 5 cm and 6 cm beside it, and 5 degrees off.
-fn beside(pose: &Pose) -> Pose {
+/// Initial pose with an error of 5 cm, 6 cm and 5 degrees.
+fn displaced(pose: &Pose) -> Pose {
     Pose { x_m: pose.x_m + 0.05, y_m: pose.y_m - 0.06, heading_deg: pose.heading_deg + 5.0 }
 }
 
 #[test]
-fn pose_air_and_threshold_come_back() {
+fn pose_air_and_threshold() {
     let here = world("simple-room", "senscomp-6500");
     let pose = first_pose(&here.scene);
     let mut truth = here.changed(&[(&Parameter::Threshold, 4.0)]).expect("a world");
-    // Colder air swallows less, too: taken for as warm as it was, it bends the threshold.
+    // Colder air absorbs less: with an assumed temperature it would bias the threshold.
     truth.air = Air::new(10.0, 50.0, 101.325).expect("air");
     let faster = truth.air.sound_speed_m_s() / here.air.sound_speed_m_s() - 1.0;
-    let believed = beside(&pose);
+    let initial = displaced(&pose);
     let noise = TofNoise::of_range_mm(1.0, truth.air.sound_speed_m_s());
-    let sweep = sweep(&truth, &pose, &believed, 400, noise, 1);
+    let sweep = sweep(&truth, &pose, &initial, 400, noise, 1);
     let of = |parameter, sigma| Prior { parameter, sigma };
     let what = Fit {
         priors: vec![
@@ -87,7 +87,7 @@ fn pose_air_and_threshold_come_back() {
 }
 
 #[test]
-fn the_roughness_of_a_wall_comes_back() {
+fn wall_roughness() {
     let text = r#"{"name": "yard", "materials": {"brick": {"reflectance": 0.9, "roughness": 0.2}},
         "walls": [{"id": "w", "polyline": [[0, 0], [3, 0], [3, 2], [0, 2]], "closed": true, "material": "brick"}]}"#;
     let mut here = world("simple-room", "senscomp-6500");
@@ -98,25 +98,27 @@ fn the_roughness_of_a_wall_comes_back() {
     let truth = here.changed(&[(&roughness, 0.15)]).expect("a world");
     assert_eq!(truth.scene.walls[0].material, truth.scene.materials["brick"]);
     let noise = TofNoise::of_range_mm(1.0, truth.air.sound_speed_m_s());
-    // From two places: what one sweep says of scattered sound, a shift of phases says as well.
+    // From two positions: for a single sweep, phases could explain scattered sound as well.
     let other = Pose { x_m: 2.0, y_m: 1.3, heading_deg: 0.0 };
     let sweeps = [pose, other].map(|pose| sweep(&truth, &pose, &pose, 240, noise, 3));
     let given = [("roughness brick".to_owned(), 0.3)];
     let priors = priors(&[Group::Roughness], &given, &here, 2).expect("it is fitted");
     let what = Fit::usual(priors, 0.02);
     let fitted = fit(&here, &sweeps, &what).expect("a fit");
-    let told = &fitted.told(&here, &sweeps, &what)[0];
-    assert!((told.value - 0.35).abs() < 2.0 * told.sigma && told.identified, "{told:?}");
+    let report = &fitted.told(&here, &sweeps, &what)[0];
+    assert!((report.value - 0.35).abs() < 2.0 * report.sigma && report.identified, "{report:?}");
     let scene = &fitted.world.scene;
-    assert!((scene.walls[0].material.roughness - told.value).abs() < 1e-12, "{:?}", scene.walls[0]);
+    let found = scene.walls[0].material.roughness;
+    assert!((found - report.value).abs() < 1e-12, "{:?}", scene.walls[0]);
 }
 
-/// Two walls that meet hardly hold the speed of sound: only weak echoes of their ends do, which other arrivals explain as
-/// well a few centimetres on. A fit may end in any of these explanations, but its intervals must say so. (Four trials of
-/// the example `trials` in which they once did not.)
+/// Two joined walls hardly constrain the speed of sound: only weak echoes of their ends do, which
+/// other arrivals explain as well a few centimetres away. A fit may end in any of these
+/// explanations, but its intervals must cover the truth. (Four trials of the example `trials` that
+/// once failed.)
 #[test]
-fn what_several_places_explain_is_not_told_for_sure() {
-    let doubtful = [
+fn ambiguous_positions_have_wide_intervals() {
+    let ambiguous = [
         (
             "right-angle-corner",
             0,
@@ -144,7 +146,7 @@ fn what_several_places_explain_is_not_told_for_sure() {
     ];
     let (mut fits, mut wrong) = (0, 0);
     for (trial, seed) in
-        doubtful.into_iter().flat_map(|trial| (1..=3).map(move |seed| (trial, seed)))
+        ambiguous.into_iter().flat_map(|trial| (1..=3).map(move |seed| (trial, seed)))
     {
         let Misjudged { here, sweep, what, expected } = misjudged(trial, seed);
         let fitted = fit(&here, &[sweep], &what).expect("a fit");
@@ -156,15 +158,16 @@ fn what_several_places_explain_is_not_told_for_sure() {
         fits += 1;
         wrong += u32::from(off.any(|sigmas| sigmas > 6.0));
     }
-    // Ten of them are where nothing is searched beside the place where a fit ends, and four where little is.
+    // Without restarts ten of them fail, and with few restarts four.
     assert_eq!(wrong, 0, "of {fits}");
 }
 
-/// Where a wall, the place and the speed of sound make up for each other, and where few echoes are heard, which a less sensitive
-/// ranger elsewhere would hear as well: a fit ends where one does that begins at the truth, or somewhere likelier. (Six
-/// trials of the example `trials` in which it did not, each with two drawings of the noise.)
+/// Where a wall, the position and the speed of sound compensate each other, and where echoes are
+/// few, so that a less sensitive ranger elsewhere would fit: a fit ends at the optimum reached from
+/// the truth, or at a likelier one. (Six trials of the example `trials` that once failed, each with
+/// two noise seeds.)
 #[test]
-fn a_place_on_a_ridge_is_found() {
+fn position_on_a_ridge() {
     const LIKELIER: f64 = 5.0;
     let on_ridges = [
         (
@@ -221,15 +224,16 @@ fn a_place_on_a_ridge_is_found() {
     assert!(missed.is_empty(), "{missed:?}");
 }
 
-/// A trial of the example `trials`: scene, the wall that is elsewhere, the place, and what leads from what is believed to the truth.
+/// Trial of the example `trials`: scene, displaced wall, pose, and changes from the initial values
+/// to the truth.
 type Trial = (&'static str, usize, [f64; 3], [f64; 6]);
 
-/// A sweep and what is believed of its world.
+/// Sweep with its initial world and settings.
 struct Misjudged {
     here: World,
     sweep: Sweep,
     what: Fit,
-    /// What leads to the truth, by parameter.
+    /// Changes to the truth, by parameter.
     expected: [f64; 6],
 }
 
@@ -247,22 +251,22 @@ fn misjudged((scene, wall, [x_m, y_m, heading_deg], expected): Trial, seed: u64)
     let changes: Vec<_> = parameters.iter().map(|(of, _)| of).zip(expected).collect();
     let truth = here.changed(&changes).expect("a world");
     let pose = Pose { x_m, y_m, heading_deg };
-    let believed = Pose {
+    let initial = Pose {
         x_m: x_m - expected[0],
         y_m: y_m - expected[1],
         heading_deg: heading_deg - expected[2],
     };
     let noise = TofNoise::of_range_mm(1.0, truth.air.sound_speed_m_s());
-    let sweep = sweep(&truth, &pose, &believed, 400, noise, seed);
+    let sweep = sweep(&truth, &pose, &initial, 400, noise, seed);
     let priors = parameters.map(|(parameter, sigma)| Prior { parameter, sigma });
     let what = Fit::usual(priors.into(), 0.15);
     Misjudged { here, sweep, what, expected }
 }
 
-/// Two legs and a bin that the scene lacks answer or hide what a fifth of the beams would hear: taken for the walls, they would
-/// move the place by centimetres and the threshold by decibels.
+/// Two legs and a bin that the scene lacks return or hide the echoes of a fifth of the beams. Taken
+/// for walls, they would displace the pose by centimetres and the threshold by decibels.
 #[test]
-fn what_the_scene_lacks_bends_nothing() {
+fn missing_objects_bias_nothing() {
     let here = world("simple-room", "senscomp-6500");
     let pose = first_pose(&here.scene);
     let mut scene = Scene::clone(&here.scene);
@@ -276,9 +280,9 @@ fn what_the_scene_lacks_bends_nothing() {
     }
     let furnished = World { scene: scene.into(), ..here.clone() };
     let truth = furnished.changed(&[(&Parameter::Threshold, 3.0)]).expect("a world");
-    let believed = beside(&pose);
+    let initial = displaced(&pose);
     let noise = TofNoise::of_range_mm(1.0, truth.air.sound_speed_m_s());
-    let sweep = sweep(&truth, &pose, &believed, 400, noise, 1);
+    let sweep = sweep(&truth, &pose, &initial, 400, noise, 1);
     let priors = [
         (Parameter::X(0), 0.06),
         (Parameter::Y(0), 0.06),
@@ -297,10 +301,11 @@ fn what_the_scene_lacks_bends_nothing() {
     assert!(fitted.estimates[0].sigma < 3e-3, "{:?}", fitted.estimates);
 }
 
-/// Believed on the axis, a face is 20 mm behind and 28 mm aside, which turns what it hears of corners by a degree: predictions
-/// from the axis, with paths longer to first order, would have the heading a degree off, six standard deviations.
+/// Assumed on the axis, the transducer is 20 mm behind and 28 mm aside, which rotates arcs of
+/// corners by a degree. Predictions from the axis with first-order path corrections would have the
+/// heading a degree off, six standard deviations.
 #[test]
-fn a_face_beside_the_axis_is_found_with_its_heading() {
+fn mounting_offset_and_heading() {
     let here = world("simple-room", "senscomp-6500");
     let pose = first_pose(&here.scene);
     let changes = [
@@ -313,9 +318,9 @@ fn a_face_beside_the_axis_is_found_with_its_heading() {
     ];
     let of_sensor: Vec<_> = changes[3..].iter().map(|(of, by, _)| (of, *by)).collect();
     let truth = here.changed(&of_sensor).expect("a world");
-    let believed = beside(&pose);
+    let initial = displaced(&pose);
     let noise = TofNoise::of_range_mm(1.0, truth.air.sound_speed_m_s());
-    let sweep = sweep(&truth, &pose, &believed, 200, noise, 1);
+    let sweep = sweep(&truth, &pose, &initial, 200, noise, 1);
     let priors = changes.clone().map(|(parameter, _, sigma)| Prior { parameter, sigma }).into();
     let what = Fit { search: Search::Thorough, ..Fit::usual(priors, 0.1) };
     let fitted = fit(&here, &[sweep], &what).expect("a fit");
@@ -326,17 +331,17 @@ fn a_face_beside_the_axis_is_found_with_its_heading() {
     assert!(fitted.estimates[2].sigma < 0.4, "{:?}", fitted.estimates);
 }
 
-/// How fast pulses rise is in how late the ends of arcs are: a ranger whose band is taken for three fifths of what it is, in a
-/// room, with its pose and threshold in doubt.
+/// The rise time of pulses affects the time walk at the ends of arcs: the bandwidth is assumed 40 %
+/// too narrow, in a room, with pose and threshold uncertain.
 #[test]
-fn the_band_of_a_pulse_is_found_by_its_time_walk() {
+fn bandwidth_by_time_walk() {
     let mut there = world("simple-room", "lego-nxt");
     // On its axis, where all directions share their paths.
     (there.sensor.range_step_m, there.sensor.mounting) = (0.0, Mounting::default());
     let pose = first_pose(&there.scene);
-    let believed =
+    let initial =
         Pose { x_m: pose.x_m + 0.01, y_m: pose.y_m - 0.01, heading_deg: pose.heading_deg + 1.0 };
-    let sweep = sweep(&there, &pose, &believed, 240, TofNoise::NONE, 1);
+    let sweep = sweep(&there, &pose, &initial, 240, TofNoise::NONE, 1);
     let mut here = there.clone();
     let too_narrow = 0.6_f64;
     here.sensor.pulse.widen_band(too_narrow);
@@ -353,10 +358,10 @@ fn the_band_of_a_pulse_is_found_by_its_time_walk() {
     assert_eq!(sensor.pulse.bandwidth_hz(), band.value);
 }
 
-/// Held to a threshold that is 9 dB too high, a fit would have it fall with the range, which no receiver's does: it
-/// stops where there is no rise, with an interval that begins there, and says so.
+/// For a threshold that is 9 dB too high, the fit would prefer one that falls with range, which is
+/// impossible. It stops at zero slope, with an interval that starts there, and reports the limit.
 #[test]
-fn what_would_go_past_its_limit_is_held_there_and_told() {
+fn value_at_a_limit_is_reported() {
     let mut here = world("simple-room", "senscomp-6500");
     let pose = first_pose(&here.scene);
     let sweeps = [sweep(&here, &pose, &pose, 400, TofNoise::NONE, 1)];
@@ -373,24 +378,26 @@ fn what_would_go_past_its_limit_is_held_there_and_told() {
     };
     let fitted = fit(&here, &sweeps, &what).expect("a fit");
     assert_eq!(fitted.world.sensor.threshold_rise_db_per_m, 0.0);
-    let told = &fitted.told(&here, &sweeps, &what)[0];
-    assert!(told.at_limit && told.value == 0.0 && told.low == 0.0, "{told:?}");
-    assert!(told.sigma > 0.0 && told.high > 0.0 && told.remark() == "at its limit", "{told:?}");
+    let report = &fitted.told(&here, &sweeps, &what)[0];
+    assert!(report.at_limit && report.value == 0.0 && report.low == 0.0, "{report:?}");
+    assert!(report.sigma > 0.0 && report.high > 0.0, "{report:?}");
+    assert_eq!(report.remark(), "at its limit");
 }
 
-/// A ranger that tells whole centimetres is not believed to the millimetre where several readings happen to be alike.
+/// A ranger that reports whole centimetres is not trusted to the millimetre where readings
+/// coincide.
 #[test]
-fn steps_of_the_range_are_part_of_its_spread() {
+fn quantization_bounds_the_scatter() {
     const STEP_M: f64 = 0.01;
     let mut here = world("simple-room", "hc-sr04");
     here.sensor.range_step_m = STEP_M;
-    // By data sheets it hears so much of the room that its place is known to 2 mm.
+    // By data sheet it detects enough of the room for a position uncertainty of 2 mm.
     here.sensor.aperture = Aperture::Piston { radius_m: 0.0065, skirts_db: None };
     here.sensor.threshold = 0.094;
     let pose = first_pose(&here.scene);
-    let believed =
+    let initial =
         Pose { x_m: pose.x_m + 0.03, y_m: pose.y_m - 0.02, heading_deg: pose.heading_deg };
-    let sweep = sweep(&here, &pose, &believed, 120, TofNoise::NONE, 1);
+    let sweep = sweep(&here, &pose, &initial, 120, TofNoise::NONE, 1);
     let of = |parameter, sigma| Prior { parameter, sigma };
     let what = Fit {
         priors: vec![
@@ -414,7 +421,7 @@ fn steps_of_the_range_are_part_of_its_spread() {
 }
 
 #[test]
-fn a_sweep_is_found_without_a_guess() {
+fn sweep_is_located_globally() {
     let here = world("simple-room", "senscomp-6500");
     let atlas = Atlas::new(&here, 0.1).expect("an atlas");
     let mut rng = Pcg64::seed_from_u64(3);
@@ -439,11 +446,11 @@ fn a_sweep_is_found_without_a_guess() {
     }
 }
 
-/// Behind the furniture of `plane-corner-edge`, where most directions are empty while other places have something on all
-/// sides; before two walls, so near to one of them that its echo falls into the blanking, and where 33 of 400 beams hear
-/// anything.
+/// Behind the furniture of `plane-corner-edge`, in open surroundings while other positions are
+/// enclosed; and in front of two walls, so near to one of them that its echo falls into the
+/// blanking interval, with 33 of 400 beams detecting anything.
 #[test]
-fn a_sweep_is_found_where_a_robot_hardly_ever_is() {
+fn sweep_is_located_at_unlikely_positions() {
     for (scene, x_m, y_m, heading_deg) in [
         ("plane-corner-edge", 0.506, -1.266, -139.0),
         ("plane-corner-edge", -1.030, -0.253, -50.7),
@@ -461,17 +468,17 @@ fn a_sweep_is_found_where_a_robot_hardly_ever_is() {
     }
 }
 
-/// A ranger that is less sensitive than the one of the sensor's file, which says that far more would be heard.
+/// A ranger less sensitive than that of the sensor file, by which far more would be detected.
 #[test]
-fn a_sweep_of_another_specimen_is_found_with_its_threshold() {
+fn another_unit_is_located_with_its_threshold() {
     const LESS_DB: f64 = 8.0;
-    let (mut here, mut deaf) = (world("mcgill-lab", "hc-sr04"), world("mcgill-lab", "hc-sr04"));
-    (here.options.max_range_m, deaf.options.max_range_m) = (Some(4.0), Some(4.0));
-    deaf.sensor.threshold *= 10f64.powf(LESS_DB / 20.0);
+    let (mut here, mut weak) = (world("mcgill-lab", "hc-sr04"), world("mcgill-lab", "hc-sr04"));
+    (here.options.max_range_m, weak.options.max_range_m) = (Some(4.0), Some(4.0));
+    weak.sensor.threshold *= 10f64.powf(LESS_DB / 20.0);
     let pose = Pose { x_m: 1.0, y_m: 1.0, heading_deg: 25.0 };
     let noise = TofNoise::of_range_mm(1.0, here.air.sound_speed_m_s());
     let unknown = Pose { x_m: 0.0, y_m: 0.0, heading_deg: 0.0 };
-    let swept = sweep(&deaf, &pose, &unknown, 120, noise, 5);
+    let swept = sweep(&weak, &pose, &unknown, 120, noise, 5);
     let atlas = Atlas::new(&here, 0.1).expect("an atlas");
     let sensitivity = Prior { parameter: Parameter::Threshold, sigma: 6.0 };
     let poses = [Parameter::X(0), Parameter::Heading(0)];
@@ -479,10 +486,10 @@ fn a_sweep_of_another_specimen_is_found_with_its_threshold() {
     let atlas = atlas.fitting(priors.into_iter().chain([sensitivity]).collect());
     let modes = locate(&here, &atlas, &swept).expect("modes");
     assert_found(&modes[..1], &pose);
-    let [told] = &modes[0].besides[..] else { panic!("{modes:?}") };
-    assert_eq!(told.name, "threshold_db");
-    let off_db = told.value - 20.0 * deaf.sensor.threshold.log10();
-    assert!(off_db.abs() < 1.0 && told.sigma < 1.0, "{told:?}: {off_db}");
+    let [nuisance] = &modes[0].besides[..] else { panic!("{modes:?}") };
+    assert_eq!(nuisance.name, "threshold_db");
+    let off_db = nuisance.value - 20.0 * weak.sensor.threshold.log10();
+    assert!(off_db.abs() < 1.0 && nuisance.sigma < 1.0, "{nuisance:?}: {off_db}");
 }
 
 fn assert_found(modes: &[Mode], pose: &Pose) {

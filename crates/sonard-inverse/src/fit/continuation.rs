@@ -1,35 +1,37 @@
-//! The way to where a fit ends: from wide spreads of readings to the ones that they have.
+//! Continuation: annealing of the error model from wide to the observed scatter.
 
 use nalgebra::DVector;
 
 use super::{
-    FitError, Search, Settled, State,
-    journal::{Found, listed},
+    FitError, Fitter, Optimum, Search,
+    checkpoint::{Found, listed},
     one_of_many,
 };
-use crate::{candidates::Phases, likelihood::ErrorModel, linear::Linear, watch::Progress};
+use crate::{
+    candidates::Phases, likelihood::ErrorModel, linear::LinearizedModel, progress::Progress,
+};
 
-/// Spreads that a fit goes through, as shares of the widest, with the spread of the threshold, decibels: from so wide
-/// that it finds its way to what readings really spread by.
+/// Stages: standard deviation of ranges relative to the widest, and of the threshold, decibels. The
+/// first is wide enough for convergence, the last near the observed scatter.
 pub(super) const STAGES: [(f64, f64); 5] =
     [(1.0, 6.0), (0.5, 5.0), (0.25, 4.0), (0.12, 3.0), (0.06, 2.5)];
-/// Steps at the end: as many where phases are asked for next, and as many as are tried where they are not.
+/// Number of final steps if phases follow, and maximum number otherwise.
 const FIRST_STEPS: usize = 4;
 const LAST_STEPS: usize = 12;
-/// What becomes of a step that makes readings less likely, and how short it may become, as a share of
+/// Reduction factor of a step that lowers the likelihood, and its minimum length relative to
 /// [`Parameter::step`](crate::parameter::Parameter::step).
 const SHORTER: f64 = 0.3;
-const LEAST_STEP: f64 = 0.003;
-/// As much likelier, as a logarithm, is a place that is worth a step.
-const LEAST_GAIN: f64 = 1e-3;
-/// Turns that are tried at each of them, degrees, and how many to both sides.
+const MIN_STEP: f64 = 0.003;
+/// Minimum gain in log-posterior of an accepted step.
+const MIN_GAIN: f64 = 1e-3;
+/// Rotations tried at each stage: step in degrees, and number on either side.
 const TURNS: [(f64, i32); STAGES.len()] = [(1.5, 8), (1.5, 8), (1.0, 10), (0.75, 12), (0.5, 10)];
 
-/// Ranges that are missed by more than this, in wavelengths, say nothing of phases.
+/// Range error in wavelengths above which phases carry no information.
 const MISSED: f64 = 0.5;
 
-impl State<'_> {
-    /// Goes from spread to spread, by some of the stages.
+impl Fitter<'_> {
+    /// Runs some stages of the continuation.
     pub(super) fn approach(
         &mut self,
         errors: &mut ErrorModel,
@@ -37,7 +39,7 @@ impl State<'_> {
     ) -> Result<(), FitError> {
         for stage in stages {
             let from = *errors;
-            let found = self.found(|state| state.narrowed(from, stage))?;
+            let found = self.found(|fitter| fitter.narrowed(from, stage))?;
             let Found::Spread { values, errors: narrowed, is_last } = found else {
                 return Err(FitError::OtherFit);
             };
@@ -49,13 +51,13 @@ impl State<'_> {
         Ok(())
     }
 
-    /// Where it goes with the spread of a stage.
+    /// Runs one stage.
     fn narrowed(&mut self, mut errors: ErrorModel, stage: usize) -> Result<Found, FitError> {
         let ((share, sigma_db), (step_deg, steps)) = (STAGES[stage], TURNS[stage]);
         self.watch.progress(Progress::Approaching { spread: stage + 1, of: STAGES.len() });
         let steps = steps.min((self.fit.widest_turn_deg / step_deg) as i32);
-        // Never narrower than what readings really spread by: else those few that happen to agree would be
-        // believed and all others taken for clutter.
+        // Never narrower than the observed scatter: otherwise a few readings that happen to agree
+        // would dominate, and all others count as clutter.
         let linear = self.linear()?;
         let spread = self.spread(&linear, &errors);
         errors.sigma_m = (self.fit.widest_m * share).max(spread.sigma_m.min(errors.sigma_m));
@@ -69,34 +71,34 @@ impl State<'_> {
                 break;
             }
         }
-        // What the readings spread by is reached, and nothing moves: narrower it does not get.
+        // The observed scatter is reached and nothing moves: narrower stages change nothing.
         let is_last = !is_turned && moved < 0.02 && errors.sigma_m > self.fit.widest_m * share;
         Ok(Found::Spread { values: listed(&self.values), errors, is_last })
     }
 
-    /// Where it stands, as likely as that is.
-    pub(super) fn value(&self, linear: &Linear, errors: &ErrorModel) -> f64 {
+    /// Log-posterior at the current values.
+    pub(super) fn value(&self, linear: &LinearizedModel, errors: &ErrorModel) -> f64 {
         linear.log_likelihood(&self.still(), errors) + self.log_prior(&self.values)
     }
 
-    /// Settles without phases, and with them where ranges tell any; the likelier one counts.
-    pub(super) fn settle(&mut self, errors: ErrorModel) -> Result<Settled, FitError> {
+    /// Converges without phases, and with them if ranges allow it; returns the likelier optimum.
+    pub(super) fn settle(&mut self, errors: ErrorModel) -> Result<Optimum, FitError> {
         let without = self.settled(errors)?;
         self.with_phases(without)
     }
 
-    /// Whether ranges are missed by so much that lengths can't tell phases, as those of a room that was measured with a tape.
+    /// Returns `true` if ranges are too uncertain for phases, as in a room measured with a tape.
     pub(super) fn is_beyond_phases(&self, errors: &ErrorModel) -> bool {
         self.missed_wavelengths(errors) > MISSED
     }
 
-    /// By how much ranges are missed, in wavelengths.
+    /// Range error in wavelengths.
     pub(super) fn missed_wavelengths(&self, errors: &ErrorModel) -> f64 {
         errors.sigma_m * self.start.sensor.frequency_hz / self.start.air.sound_speed_m_s()
     }
 
-    /// The likelier of two ends: without phases, and the one with them that follows from it.
-    pub(super) fn with_phases(&mut self, without: Settled) -> Result<Settled, FitError> {
+    /// Likelier of an optimum without phases and the one with phases that follows from it.
+    pub(super) fn with_phases(&mut self, without: Optimum) -> Result<Optimum, FitError> {
         if self.is_beyond_phases(&without.errors) {
             return Ok(without);
         }
@@ -105,11 +107,11 @@ impl State<'_> {
         Ok(if with.value > without.value { with } else { without })
     }
 
-    /// Finds the spread and the values in turn, as long as both get likelier.
-    pub(super) fn settled(&mut self, from: ErrorModel) -> Result<Settled, FitError> {
+    /// Alternates between error model and values until the log-posterior converges.
+    pub(super) fn settled(&mut self, from: ErrorModel) -> Result<Optimum, FitError> {
         let phases = self.phases;
-        match self.found(|state| state.likeliest_here(from))? {
-            Found::End { values, errors, log_posterior } => Ok(Settled {
+        match self.found(|fitter| fitter.likeliest_here(from))? {
+            Found::End { values, errors, log_posterior } => Ok(Optimum {
                 value: log_posterior,
                 values: DVector::from_vec(values),
                 errors,
@@ -119,11 +121,11 @@ impl State<'_> {
         }
     }
 
-    /// By exact predictions, where those from the axis have led: a thorough search polishes by them, a quick one makes a step. All
-    /// that follow are exact, too.
-    pub(super) fn exactly(&mut self, end: Settled) -> Result<Settled, FitError> {
+    /// Repeats an on-axis optimum with exact predictions: a thorough search refines it, a quick one
+    /// makes one step. All later predictions are exact as well.
+    pub(super) fn exactly(&mut self, end: Optimum) -> Result<Optimum, FitError> {
         (self.values, self.phases) = (end.values.clone(), end.phases);
-        // Where it stands, which need not be where it began.
+        // The mounting may have changed since the start.
         if self.world()?.sensor.mounting.is_on_axis() {
             return Ok(end);
         }
@@ -131,7 +133,7 @@ impl State<'_> {
         if self.fit.search == Search::Quick {
             let exact = self.linear()?;
             self.improve(&exact, &end.errors)?;
-            return Ok(Settled { values: self.values.clone(), ..end });
+            return Ok(Optimum { values: self.values.clone(), ..end });
         }
         let settled = self.settled(end.errors)?;
         self.polished(settled)
@@ -143,25 +145,25 @@ impl State<'_> {
         let mut best = (self.value(&linear, &errors), self.values.clone());
         let mut step = self.step_from(&linear, &errors)?;
         for number in 0..LAST_STEPS {
-            // What is found without phases need not be the last word: with them it is another place that is likeliest.
+            // Without phases the optimum is preliminary: with them another point is likelier.
             let is_final = self.is_beyond_phases(&errors);
             if number >= FIRST_STEPS && !is_final {
                 break;
             }
             self.values = self.limited(&best.1 + &step);
-            // There may be nothing to predict with, as within a wall.
+            // Prediction may fail, as within a wall.
             let linear = one_of_many(self.linear())?;
             let there = linear.map(|linear| {
                 let spread = self.spread(&linear, &errors);
                 (self.value(&linear, &spread), spread, linear)
             });
             match there {
-                Some((value, spread, linear)) if value > best.0 + LEAST_GAIN => {
+                Some((value, spread, linear)) if value > best.0 + MIN_GAIN => {
                     (best, errors) = ((value, self.values.clone()), spread);
                     step = self.step_from(&linear, &errors)?;
                 }
-                // Too far: the predictions there are not those of the linearisation.
-                _ if is_final && self.largest_share(&step) >= LEAST_STEP => step *= SHORTER,
+                // Too far: outside the validity of the linearization.
+                _ if is_final && self.largest_share(&step) >= MIN_STEP => step *= SHORTER,
                 _ => break,
             }
         }
@@ -169,10 +171,10 @@ impl State<'_> {
         Ok(Found::End { values: listed(&self.values), errors, log_posterior: best.0 })
     }
 
-    /// Where the linearisation is best from here.
+    /// Optimal step of the linearization from the current values.
     fn step_from(
         &mut self,
-        linear: &Linear,
+        linear: &LinearizedModel,
         errors: &ErrorModel,
     ) -> Result<DVector<f64>, FitError> {
         let from = self.values.clone();

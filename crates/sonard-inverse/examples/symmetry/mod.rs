@@ -1,10 +1,10 @@
-//! Poses that no sweep can tell from each other.
+//! Poses that are indistinguishable by any sweep.
 
 use sonard_inverse::World;
 use sonard_model::geometry::{DVec2, Pose, wrap_180};
 
-/// A pose, and where the same is read since the scene is the same turned by half: as right an answer as itself.
-pub(crate) fn images(truth: &World, pose: &Pose) -> Vec<Pose> {
+/// Pose and, in a scene with point symmetry, its equally correct counterpart.
+pub(crate) fn equivalent_poses(truth: &World, pose: &Pose) -> Vec<Pose> {
     let ends = || truth.scene.walls.iter().flat_map(|wall| [wall.a, wall.b]);
     let low = ends().fold(DVec2::INFINITY, DVec2::min);
     let high = ends().fold(DVec2::NEG_INFINITY, DVec2::max);

@@ -1,44 +1,44 @@
-//! What the searches of a fit came to, so that one that was stopped can go on.
+//! Checkpoints: results of the searches of a fit, so that a stopped one can be resumed.
 //!
-//! A fit is a sequence of searches, each of which follows from what those before it came to and from nothing else. Given
-//! what the first ones came to, it leaves these out and ends where it would have ended anyway, to the last bit.
+//! A fit is a sequence of searches, each of which depends only on the results of those before it. A
+//! resumed fit skips the recorded searches and reproduces the uninterrupted result bit by bit.
 
 use nalgebra::DVector;
 use serde::{Deserialize, Serialize};
 
-use super::{FitError, State};
+use super::{FitError, Fitter};
 use crate::likelihood::ErrorModel;
 
-/// What a search of a fit came to.
+/// Result of one search of a fit.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "search", rename_all = "snake_case", deny_unknown_fields)]
 pub enum Found {
-    /// A spread of readings, on the way from wide ones to those that they have.
+    /// Stage of the continuation from a wide to the observed error model.
     Spread {
         /// Changes of the parameters since the start, each in its unit.
         values: Vec<f64>,
-        /// How readings spread about it.
+        /// Fitted error model.
         errors: ErrorModel,
-        /// Whether narrower spreads are left out.
+        /// Whether narrower stages are skipped.
         is_last: bool,
     },
-    /// The end of such a way.
+    /// Optimum at the end of a continuation.
     End {
         /// Changes of the parameters since the start, each in its unit.
         values: Vec<f64>,
-        /// How readings spread about it.
+        /// Fitted error model.
         errors: ErrorModel,
-        /// Log-likelihood of all readings with the priors.
+        /// Log-likelihood plus log-prior.
         log_posterior: f64,
     },
-    /// A place beside the end.
+    /// Improved start near the optimum.
     Place {
         /// Changes of the parameters since the start, each in its unit.
         values: Vec<f64>,
-        /// Log-posterior with spreads by which places are told apart.
+        /// Log-posterior with the error model for comparison of starts.
         log_posterior: f64,
     },
-    /// Nothing: there was nothing to predict with, or readings did not hold the parameters.
+    /// Failed search: nothing to predict with, or a singular information matrix.
     Nothing,
 }
 
@@ -53,14 +53,14 @@ impl Found {
     }
 }
 
-impl State<'_> {
-    /// What the next search comes to, if that is not known yet.
+impl Fitter<'_> {
+    /// Runs the next search, or replays its recorded result.
     pub(super) fn found(
         &mut self,
         search: impl FnOnce(&mut Self) -> Result<Found, FitError>,
     ) -> Result<Found, FitError> {
         match self.known.next() {
-            // It fails again as it did, and says why.
+            // A recorded failure is repeated to obtain its error.
             Some(Found::Nothing) => search(self),
             Some(found) if found.values().len() == self.parameters.len() => Ok(found.clone()),
             Some(_) => Err(FitError::OtherFit),
@@ -77,7 +77,7 @@ impl State<'_> {
     }
 }
 
-/// As a search remembers them.
+/// Values as a serializable list.
 pub(super) fn listed(values: &DVector<f64>) -> Vec<f64> {
     values.iter().copied().collect()
 }

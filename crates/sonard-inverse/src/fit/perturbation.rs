@@ -1,71 +1,72 @@
-//! Other places to begin from: a fit ends in the next best explanation, which need not be the best.
+//! Restarts by perturbation: a fit ends in a local optimum, which need not be the global one.
 //!
-//! Where readings hold something little, a fit may go past the answer and settle where other arrivals explain the same
-//! readings about as well: a weak echo that is told late for one of a path that is shorter, a wall for the next. So the
-//! directions that are held least are searched beside where it ended. What is likelier there is followed, and what
-//! is nearly as likely widens the intervals.
+//! Along weakly constrained directions a fit may pass the answer, and converge where other arrivals
+//! explain the readings about as well: a delayed weak echo as one of a shorter path, a wall as its
+//! neighbour. So these directions are searched about the optimum. Likelier points are followed, and
+//! nearly as likely ones widen the intervals.
 
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 use super::{
-    FitError, Search, Settled, State,
-    journal::{Found, listed},
+    FitError, Fitter, Optimum, Search,
+    checkpoint::{Found, listed},
+    continuation::STAGES,
     one_of_many,
-    polish::FAR_BELOW,
-    settle::STAGES,
+    refine::FAR_BELOW,
 };
 use crate::{
     candidates::Phases,
-    likelihood::{ErrorModel, READINGS_OF_ARC},
-    watch::Progress,
+    likelihood::{ErrorModel, READINGS_PER_ARC},
+    progress::Progress,
 };
 
-/// Directions that are searched.
+/// Number of directions searched.
 const DIRECTIONS: usize = 2;
-/// Places on each side, and how far apart, in standard deviations of what a rough look leaves in doubt.
+/// Points on each side, and their distance in standard deviations of the rough information.
 const PLACES: (i32, f64) = (6, 0.5);
-/// A rough look: spread of ranges, metres, of the threshold, decibels, and the share of clutter.
+/// Rough error model: standard deviation of ranges, metres, of the threshold, decibels, and
+/// clutter.
 pub(super) const ROUGH: (f64, f64, f64) = (0.03, 3.0, 0.05);
-/// A close one, by which places are told apart.
+/// Error model for the comparison of points.
 pub(super) const CLOSE: (f64, f64, f64) = (0.005, 1.5, 0.03);
-/// Directions of less doubt than this share of what was believed are held well enough.
-const LEAST_SHARE: f64 = 0.1;
-/// Places that are followed to their ends, and the stage that these begin with.
+/// Fraction of the prior standard deviation below which a direction counts as constrained.
+const MIN_SHARE: f64 = 0.1;
+/// Number of points followed to their optima, and their first stage.
 const FOLLOWED: usize = 2;
 const STAGE: usize = STAGES.len() - 1;
-/// Places from which a thorough fit goes on to where it ends, how many of them are left by way of that stage, too, and how
-/// many of these ends are polished.
+/// Number of points followed by a thorough fit, of those also followed from that stage, and of
+/// optima refined.
 const ENDS: usize = 8;
 const STAGED: usize = 2;
 const POLISHED: usize = 3;
-/// Ends from elsewhere that are polished where a sweep heard little.
+/// Number of multi-start optima refined for a sweep with few echoes.
 const POLISHED_OPEN: usize = 6;
 
-/// Somewhere beside the end of a fit.
-pub(super) struct Place {
+/// Point near an optimum.
+pub(super) struct StartPoint {
     pub(super) values: DVector<f64>,
-    /// Log-posterior with spreads by which places are told apart.
+    /// Log-posterior with the error model for comparison.
     pub(super) value: f64,
 }
 
-impl Settled {
-    fn place(&self) -> Place {
-        Place { values: self.values.clone(), value: self.value }
+impl Optimum {
+    fn place(&self) -> StartPoint {
+        StartPoint { values: self.values.clone(), value: self.value }
     }
 }
 
-impl State<'_> {
-    /// The likeliest end of all beginnings, and what the other places add to the variances of its values. Where there
-    /// is nothing to predict, as within a wall, there is no other beginning.
-    pub(super) fn likeliest(&mut self) -> Result<(Settled, DVector<f64>), FitError> {
+impl Fitter<'_> {
+    /// Best optimum over all starts, and the additional variances due to the others. If prediction
+    /// fails, as within a wall, there is no other start.
+    pub(super) fn likeliest(&mut self) -> Result<(Optimum, DVector<f64>), FitError> {
         let mut best = self.attempt(self.still(), 0)?;
-        let mut seen: Vec<Place> = vec![best.place()];
-        if self.is_astray(&best) || self.hears_little() {
+        let mut seen: Vec<StartPoint> = vec![best.place()];
+        if self.is_astray(&best) || self.has_few_echoes() {
             let mut ends = self.ends_from_elsewhere()?;
-            ends.sort_by(|one, other| other.value.total_cmp(&one.value));
+            ends.sort_by(|a, b| b.value.total_cmp(&a.value));
             for (number, end) in ends.into_iter().enumerate() {
                 seen.push(end.place());
-                if number < POLISHED_OPEN && self.hears_little() {
+                if number < POLISHED_OPEN && self.has_few_echoes() {
                     keep_likelier(&mut best, one_of_many(self.polished(end))?);
                 } else {
                     keep_likelier(&mut best, Some(end));
@@ -77,8 +78,8 @@ impl State<'_> {
             for place in places.iter().take(FOLLOWED) {
                 keep_likelier(&mut best, one_of_many(self.attempt(place.values.clone(), STAGE))?);
             }
-            let beside = self.beside(&best, &places)?;
-            return Ok((best, beside));
+            let variances = self.variances_of_others(&best, &places)?;
+            return Ok((best, variances));
         }
         best = self.polished(best)?;
         let places = self.places(&best)?;
@@ -89,14 +90,14 @@ impl State<'_> {
             }
         }
         best = self.along_ridges(best)?;
-        let beside = self.beside_thoroughly(&best, &places, &seen)?;
-        Ok((best, beside))
+        let variances = self.variances_of_all(&best, &places, &seen)?;
+        Ok((best, variances))
     }
 
-    /// Where fits end that begin in some places: the likeliest, each once.
-    fn ends(&mut self, best: &Settled, places: &[Place]) -> Result<Vec<Settled>, FitError> {
+    /// Distinct optima reached from some points, likeliest first.
+    fn ends(&mut self, best: &Optimum, places: &[StartPoint]) -> Result<Vec<Optimum>, FitError> {
         let close = widened(&best.errors, CLOSE);
-        let mut tried: Vec<Settled> = Vec::new();
+        let mut tried: Vec<Optimum> = Vec::new();
         for (number, place) in places.iter().take(ENDS).enumerate() {
             (self.values, self.phases) = (place.values.clone(), Phases::Unknown);
             let end = self.settled(close).and_then(|end| self.with_phases(end));
@@ -105,10 +106,10 @@ impl State<'_> {
                 tried.extend(one_of_many(self.attempt(place.values.clone(), STAGE))?);
             }
         }
-        tried.sort_by(|one, other| other.value.total_cmp(&one.value));
-        let mut ends: Vec<Settled> = Vec::new();
+        tried.sort_by(|a, b| b.value.total_cmp(&a.value));
+        let mut ends: Vec<Optimum> = Vec::new();
         for end in tried {
-            let is_apart = |other: &Settled| self.is_apart(&end.values, &other.values);
+            let is_apart = |other: &Optimum| self.is_apart(&end.values, &other.values);
             if ends.iter().chain([best]).all(is_apart) {
                 ends.push(end);
             }
@@ -117,12 +118,12 @@ impl State<'_> {
         Ok(ends)
     }
 
-    /// Where a fit ends that begins there, with the spreads from this stage on.
+    /// Optimum reached from a start, by continuation from a given stage.
     pub(super) fn attempt(
         &mut self,
         start: DVector<f64>,
         stage: usize,
-    ) -> Result<Settled, FitError> {
+    ) -> Result<Optimum, FitError> {
         (self.values, self.phases) = (start, Phases::Unknown);
         let mut errors = self.rough_errors();
         errors.sigma_m *= STAGES[stage].0;
@@ -130,15 +131,16 @@ impl State<'_> {
         self.settle(errors)
     }
 
-    /// Places along the directions that are held least beside where a fit ended, each improved; the likeliest first, and
-    /// one of those that are the same.
-    fn places(&mut self, end: &Settled) -> Result<Vec<Place>, FitError> {
+    /// Distinct points along the weakly constrained directions about an optimum, each improved;
+    /// likeliest first.
+    fn places(&mut self, end: &Optimum) -> Result<Vec<StartPoint>, FitError> {
         let close = widened(&end.errors, CLOSE);
         let (places, apart) = PLACES;
-        let mut tried: Vec<Place> = Vec::new();
-        let doubtful = self.doubtful(&end.values, &widened(&end.errors, ROUGH), Phases::Unknown)?;
-        let (mut number, of) = (0, doubtful.len() * 2 * places as usize);
-        for (direction, sigma) in doubtful {
+        let mut tried: Vec<StartPoint> = Vec::new();
+        let weak =
+            self.weak_directions(&end.values, &widened(&end.errors, ROUGH), Phases::Unknown)?;
+        let (mut number, of) = (0, weak.len() * 2 * places as usize);
+        for (direction, sigma) in weak {
             for place in (-places..=places).filter(|place| *place != 0) {
                 number += 1;
                 let by = f64::from(place) * apart * sigma;
@@ -149,37 +151,41 @@ impl State<'_> {
         Ok(self.distinct(tried, &[&end.values]))
     }
 
-    /// A place that is improved, which of so many; nothing if there is nothing to predict with.
+    /// Improves a start and reports progress; `None` if prediction fails.
     pub(super) fn place(
         &mut self,
         start: DVector<f64>,
         errors: &ErrorModel,
         (place, of): (usize, usize),
-    ) -> Result<Option<Place>, FitError> {
-        self.place_by(|state| {
-            state.watch.progress(Progress::Searching { place, of });
-            state.improved(start, errors)
+    ) -> Result<Option<StartPoint>, FitError> {
+        self.place_by(|fitter| {
+            fitter.watch.progress(Progress::Searching { place, of });
+            fitter.improved(start, errors)
         })
     }
 
-    /// The place that a search comes to; nothing if there is nothing to predict with.
+    /// Point found by a search; `None` if prediction fails.
     pub(super) fn place_by(
         &mut self,
         search: impl FnOnce(&mut Self) -> Result<Found, FitError>,
-    ) -> Result<Option<Place>, FitError> {
+    ) -> Result<Option<StartPoint>, FitError> {
         match one_of_many(self.found(search))? {
             None => Ok(None),
             Some(Found::Place { values, log_posterior: value }) => {
-                Ok(Some(Place { values: DVector::from_vec(values), value }))
+                Ok(Some(StartPoint { values: DVector::from_vec(values), value }))
             }
             Some(_) => Err(FitError::OtherFit),
         }
     }
 
-    /// Places that are apart from each other and from those known, the likeliest first.
-    pub(super) fn distinct(&self, mut tried: Vec<Place>, known: &[&DVector<f64>]) -> Vec<Place> {
-        tried.sort_by(|one, other| other.value.total_cmp(&one.value));
-        let mut places: Vec<Place> = Vec::new();
+    /// Points distinct from each other and from known ones, likeliest first.
+    pub(super) fn distinct(
+        &self,
+        mut tried: Vec<StartPoint>,
+        known: &[&DVector<f64>],
+    ) -> Vec<StartPoint> {
+        tried.sort_by(|a, b| b.value.total_cmp(&a.value));
+        let mut places: Vec<StartPoint> = Vec::new();
         for place in tried {
             let known = places.iter().map(|other| &other.values).chain(known.iter().copied());
             if known.into_iter().all(|other| self.is_apart(&place.values, other)) {
@@ -189,7 +195,7 @@ impl State<'_> {
         places
     }
 
-    /// Where it is likelier near a place.
+    /// Improves a start by two sets of steps.
     fn improved(&mut self, start: DVector<f64>, errors: &ErrorModel) -> Result<Found, FitError> {
         self.values = start;
         for _ in 0..2 {
@@ -201,9 +207,12 @@ impl State<'_> {
         Ok(Found::Place { values: listed(&self.values), log_posterior })
     }
 
-    /// What variances gain because the values may be those of other places, which explain the readings nearly as
-    /// well.
-    fn beside(&mut self, best: &Settled, places: &[Place]) -> Result<DVector<f64>, FitError> {
+    /// Additional variances due to other points that explain the readings nearly as well.
+    fn variances_of_others(
+        &mut self,
+        best: &Optimum,
+        places: &[StartPoint],
+    ) -> Result<DVector<f64>, FitError> {
         (self.values, self.phases) = (best.values.clone(), Phases::Unknown);
         let linear = self.linear()?;
         let of_best = self.value(&linear, &widened(&best.errors, CLOSE));
@@ -211,23 +220,23 @@ impl State<'_> {
         Ok(self.spread_of(best, others.collect()))
     }
 
-    /// As `beside`, of a thorough fit: other ends count, too, and each place once.
-    fn beside_thoroughly(
+    /// Additional variances of a thorough fit: distinct points and other optima.
+    fn variances_of_all(
         &mut self,
-        best: &Settled,
-        places: &[Place],
-        ends: &[Place],
+        best: &Optimum,
+        places: &[StartPoint],
+        ends: &[StartPoint],
     ) -> Result<DVector<f64>, FitError> {
         (self.values, self.phases) = (best.values.clone(), Phases::Unknown);
         let close = widened(&best.errors, CLOSE);
         let linear = self.linear()?;
         let of_best = self.value(&linear, &close);
-        // What is best with the spreads that readings have need not be so with wider ones: what is near it is the same place.
+        // The optimum differs slightly with a wider error model; points near either are the same.
         let home = match one_of_many(self.improved(best.values.clone(), &close))? {
             Some(Found::Place { values, log_posterior }) if log_posterior > of_best => {
-                Place { values: DVector::from_vec(values), value: log_posterior }
+                StartPoint { values: DVector::from_vec(values), value: log_posterior }
             }
-            _ => Place { values: best.values.clone(), value: of_best },
+            _ => StartPoint { values: best.values.clone(), value: of_best },
         };
         let places = places.iter().map(|place| (place, home.value));
         let ends = ends.iter().map(|end| (end, best.value));
@@ -242,20 +251,20 @@ impl State<'_> {
         Ok(self.spread_of(best, others))
     }
 
-    /// Variances about the best of other values with their odds.
-    fn spread_of(&self, best: &Settled, others: Vec<(&DVector<f64>, f64)>) -> DVector<f64> {
+    /// Variances about the best values of other values weighted by their odds.
+    fn spread_of(&self, best: &Optimum, others: Vec<(&DVector<f64>, f64)>) -> DVector<f64> {
         let all: f64 = 1.0 + others.iter().map(|(_, odds)| odds).sum::<f64>();
-        let mut beside = self.still();
+        let mut variances = self.still();
         for (values, odds) in others {
             let away = values - &best.values;
-            beside += away.component_mul(&away) * (odds / all);
+            variances += away.component_mul(&away) * (odds / all);
         }
-        beside
+        variances
     }
 
-    /// The directions, in the parameters' units, in which readings that spread so much leave the most in doubt beside
-    /// what was believed, with the standard deviation in each.
-    pub(super) fn doubtful(
+    /// Weakly constrained directions, in the parameters' units, with their standard deviations: the
+    /// largest eigenvalues of the posterior covariance relative to the prior.
+    pub(super) fn weak_directions(
         &mut self,
         about: &DVector<f64>,
         errors: &ErrorModel,
@@ -265,11 +274,11 @@ impl State<'_> {
         let curve = self.linear()?.curve(&self.still(), errors);
         let covariance = self.covariance(curve.information).ok_or(FitError::Degenerate)?;
         let sigmas = self.prior_sigmas();
-        let believed = DMatrix::from_diagonal(&sigmas.map(f64::recip));
-        let of = SymmetricEigen::new(&believed * covariance * &believed);
+        let prior = DMatrix::from_diagonal(&sigmas.map(f64::recip));
+        let of = SymmetricEigen::new(&prior * covariance * &prior);
         let mut order: Vec<usize> = (0..sigmas.len()).collect();
-        order.sort_by(|one, other| of.eigenvalues[*other].total_cmp(&of.eigenvalues[*one]));
-        order.retain(|&at| of.eigenvalues[at] > LEAST_SHARE * LEAST_SHARE);
+        order.sort_by(|a, b| of.eigenvalues[*b].total_cmp(&of.eigenvalues[*a]));
+        order.retain(|&at| of.eigenvalues[at] > MIN_SHARE * MIN_SHARE);
         let direction = |at: usize| {
             (of.eigenvectors.column(at).component_mul(&sigmas), of.eigenvalues[at].sqrt())
         };
@@ -285,21 +294,21 @@ impl State<'_> {
 
     pub(super) fn limited(&self, mut values: DVector<f64>) -> DVector<f64> {
         for (value, parameter) in values.iter_mut().zip(&self.parameters) {
-            let (least, most) = self.start.limits(parameter);
-            *value = value.clamp(least, most);
+            let (min, max) = self.start.limits(parameter);
+            *value = value.clamp(min, max);
         }
         values
     }
 
-    /// Whether a fit from one of two places would hardly end as from the other.
-    pub(super) fn is_apart(&self, one: &DVector<f64>, other: &DVector<f64>) -> bool {
-        (one - other).component_div(&self.prior_sigmas()).amax() > 0.5 * LEAST_SHARE
+    /// Returns `true` if fits from two points would probably end in different optima.
+    pub(super) fn is_apart(&self, a: &DVector<f64>, b: &DVector<f64>) -> bool {
+        (a - b).component_div(&self.prior_sigmas()).amax() > 0.5 * MIN_SHARE
     }
 }
 
-/// Of a place, beside another one that is as likely as `of` or more; at most one.
+/// Odds of a point relative to another one, at most one.
 fn odds(value: f64, of: f64) -> f64 {
-    ((value - of) / READINGS_OF_ARC).min(0.0).exp()
+    ((value - of) / READINGS_PER_ARC).min(0.0).exp()
 }
 
 pub(super) fn widened(
@@ -314,7 +323,7 @@ pub(super) fn widened(
     }
 }
 
-pub(super) fn keep_likelier(best: &mut Settled, end: Option<Settled>) {
+pub(super) fn keep_likelier(best: &mut Optimum, end: Option<Optimum>) {
     if let Some(end) = end
         && end.value > best.value
     {

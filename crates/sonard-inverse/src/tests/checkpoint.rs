@@ -1,4 +1,4 @@
-//! Fits that are stopped and go on.
+//! Checkpointing and cancellation.
 
 use std::sync::{
     Mutex,
@@ -12,21 +12,21 @@ use sonard_model::{
     model::{ConeOptions, EngineOptions, Options},
 };
 
-use super::{first_pose, found::sweep, world};
+use super::{first_pose, recovery::sweep, world};
 use crate::{
     Atlas, AtlasError, ErrorModel, Fit, FitError, Fitted, Found, Heard, Parameter, Prior, Sweep,
     Unwatched, Watch, World, fit_watched, locate_watched,
 };
 
-/// Keeps what is found, and stops when there is so much.
-struct Keeper {
+/// Observer that records results, and cancels after a number of them.
+struct Recorder {
     found: Mutex<Vec<Found>>,
-    most: usize,
+    max: usize,
 }
 
-impl Keeper {
-    fn until(most: usize) -> Self {
-        Self { found: Mutex::default(), most }
+impl Recorder {
+    fn until(max: usize) -> Self {
+        Self { found: Mutex::default(), max }
     }
 
     fn found(self) -> Vec<Found> {
@@ -34,18 +34,18 @@ impl Keeper {
     }
 }
 
-impl Watch for Keeper {
+impl Watch for Recorder {
     fn found(&self, found: &Found) {
         self.found.lock().expect("no panic").push(found.clone());
     }
 
     fn stops(&self) -> bool {
-        self.found.lock().expect("no panic").len() >= self.most
+        self.found.lock().expect("no panic").len() >= self.max
     }
 }
 
-/// Few readings of a corner by the engine that is quickest, so that a fit is short, of which one in four is of somebody who walks about, so that it begins
-/// anew from elsewhere.
+/// Short fit: few readings of a corner by the fastest engine, one in four of a person who walks
+/// about, so that it restarts elsewhere.
 fn short(parameters: &[(Parameter, f64)]) -> (World, Vec<Sweep>, Fit) {
     let mut here = world("right-angle-corner", "senscomp-6500");
     here.options = Options {
@@ -54,10 +54,10 @@ fn short(parameters: &[(Parameter, f64)]) -> (World, Vec<Sweep>, Fit) {
         ..Options::default()
     };
     let pose = first_pose(&here.scene);
-    let believed = Pose { x_m: pose.x_m + 0.05, ..pose };
+    let initial = Pose { x_m: pose.x_m + 0.05, ..pose };
     let truth = here.changed(&[(&Parameter::Threshold, 2.0)]).expect("a world");
     let noise = TofNoise::of_range_mm(1.0, truth.air.sound_speed_m_s());
-    let mut sweep = sweep(&truth, &pose, &believed, 24, noise, 2);
+    let mut sweep = sweep(&truth, &pose, &initial, 24, noise, 2);
     let late_us = [700.0, 2900.0, 1300.0].into_iter().cycle();
     for (beam, late_us) in sweep.beams.iter_mut().step_by(4).zip(late_us) {
         beam.heard = Heard::Echo { tof_us: 3000.0 + late_us };
@@ -72,7 +72,7 @@ fn short(parameters: &[(Parameter, f64)]) -> (World, Vec<Sweep>, Fit) {
 const PLACE: [(Parameter, f64); 3] =
     [(Parameter::X(0), 0.1), (Parameter::Y(0), 0.1), (Parameter::Threshold, 6.0)];
 
-/// All figures of an answer, as the bits that they are.
+/// All values of a result as bits.
 fn bits(fitted: &Fitted) -> Vec<u64> {
     let of = fitted.estimates.iter().flat_map(|estimate| [estimate.change, estimate.sigma]);
     let errors = &fitted.errors;
@@ -82,45 +82,45 @@ fn bits(fitted: &Fitted) -> Vec<u64> {
     of.chain(further).chain(poses).chain(covariance).map(f64::to_bits).collect()
 }
 
-/// Stops a fit at every so many searches, and goes on from each.
-fn stop_and_go_on(parameters: &[(Parameter, f64)], every: usize) {
+/// Cancels a fit after every `every`-th search, and resumes from each checkpoint.
+fn cancel_and_resume(parameters: &[(Parameter, f64)], every: usize) {
     let (here, sweeps, what) = short(parameters);
-    let keeper = Keeper::until(usize::MAX);
+    let keeper = Recorder::until(usize::MAX);
     let whole = fit_watched(&here, &sweeps, &what, &[], &keeper).expect("a fit");
     let all = keeper.found();
     let count = |kind: fn(&Found) -> bool| all.iter().filter(|found| kind(found)).count();
-    // It begins anew, looks at places along two directions, and follows the best.
+    // Restarts, searches along two directions, and follows the best.
     assert!(count(|found| matches!(found, Found::End { .. })) >= 6, "{all:?}");
     assert!(count(|found| matches!(found, Found::Place { .. } | Found::Nothing)) >= 12, "{all:?}");
     (0..all.len()).into_par_iter().step_by(every).for_each(|cut| {
-        let keeper = Keeper::until(cut);
+        let keeper = Recorder::until(cut);
         let stopped = fit_watched(&here, &sweeps, &what, &[], &keeper);
         assert_eq!(stopped.err(), Some(FitError::Stopped), "{cut}");
         let known = keeper.found();
         assert_eq!(known, all[..cut], "{cut}");
-        let keeper = Keeper::until(usize::MAX);
+        let keeper = Recorder::until(usize::MAX);
         let again = fit_watched(&here, &sweeps, &what, &known, &keeper).expect("a fit");
         assert_eq!(bits(&again), bits(&whole), "{cut}");
         assert_eq!(keeper.found(), all[cut..], "{cut}");
     });
-    let nothing_left = Keeper::until(usize::MAX);
+    let nothing_left = Recorder::until(usize::MAX);
     let again = fit_watched(&here, &sweeps, &what, &all, &nothing_left).expect("a fit");
     assert_eq!(bits(&again), bits(&whole));
     assert_eq!(nothing_left.found(), []);
 }
 
 #[test]
-fn a_fit_that_was_stopped_at_any_search_goes_on_to_the_same_answer() {
-    stop_and_go_on(&PLACE, 1);
+fn resumed_fit_is_bit_identical() {
+    cancel_and_resume(&PLACE, 1);
 }
 
 #[test]
-fn so_does_one_that_turns_its_sweep() {
-    stop_and_go_on(&[&PLACE[..], &[(Parameter::Heading(0), 8.0)]].concat(), 13);
+fn resumed_fit_with_heading_is_bit_identical() {
+    cancel_and_resume(&[&PLACE[..], &[(Parameter::Heading(0), 8.0)]].concat(), 13);
 }
 
 #[test]
-fn what_another_fit_found_is_refused() {
+fn foreign_checkpoint_is_rejected() {
     let (here, sweeps, what) = short(&PLACE);
     let errors = ErrorModel::rough(0.1, 6.0, 5.0);
     let place = Found::Place { values: vec![0.0; 3], log_posterior: 0.0 };
@@ -131,26 +131,26 @@ fn what_another_fit_found_is_refused() {
     }
 }
 
-/// Counts how often it is asked, and stops at the last time.
-struct Impatient {
-    asked: AtomicUsize,
-    most: usize,
+/// Observer that counts polls, and cancels after a number of them.
+struct Canceller {
+    polls: AtomicUsize,
+    max: usize,
 }
 
-impl Watch for Impatient {
+impl Watch for Canceller {
     fn stops(&self) -> bool {
-        self.asked.fetch_add(1, Ordering::Relaxed) >= self.most
+        self.polls.fetch_add(1, Ordering::Relaxed) >= self.max
     }
 }
 
 #[test]
-fn a_search_for_poses_ends_when_nobody_waits_for_it() {
+fn search_for_poses_is_cancelled() {
     let (here, sweeps, _) = short(&PLACE);
     let atlas = Atlas::new(&here, 0.3).expect("an atlas");
-    for most in [0, 3, 20] {
-        let watch = || Impatient { asked: AtomicUsize::new(0), most };
+    for max in [0, 3, 20] {
+        let watch = || Canceller { polls: AtomicUsize::new(0), max };
         let modes = locate_watched(&here, &atlas, &sweeps[0], &watch());
-        assert_eq!(modes.err(), Some(FitError::Stopped), "{most}");
-        assert_eq!(Atlas::watched(&here, 0.3, &watch()).err(), Some(AtlasError::Stopped), "{most}");
+        assert_eq!(modes.err(), Some(FitError::Stopped), "{max}");
+        assert_eq!(Atlas::watched(&here, 0.3, &watch()).err(), Some(AtlasError::Stopped), "{max}");
     }
 }

@@ -1,4 +1,4 @@
-//! What a fit found, as figures that people and files have.
+//! Report of a fit, in the units used in files.
 
 use nalgebra::DMatrix;
 use serde::Serialize;
@@ -7,43 +7,42 @@ use uuid::Uuid;
 
 use crate::{
     fit::{Estimate, Fit, Fitted, Prior, Search},
-    groups::name,
     parameter::Parameter,
+    parameter_groups::name,
     sweep::Sweep,
     world::World,
 };
 
-/// An estimate as the value of a figure: what is a logarithm or a share in a fit is told as what it makes of the
-/// figure that files have.
+/// Estimate in the unit used in files; logarithms and relative changes of the fit are converted.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Told {
-    /// What it is.
+    /// Name of the parameter.
     pub name: String,
-    /// Of which scan, if it is of one alone.
+    /// Scan id, for a parameter of a single sweep.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub scan: Option<Uuid>,
-    /// The value found.
+    /// Estimated value in the parameter's unit.
     pub value: f64,
-    /// Less what it was.
+    /// Change from the initial value.
     pub change: f64,
-    /// Standard deviation.
+    /// Posterior standard deviation.
     pub sigma: f64,
-    /// 95 % lie from here
+    /// Lower end of the 95 % interval.
     pub low: f64,
-    /// to here.
+    /// Upper end of the 95 % interval.
     pub high: f64,
-    /// What it was.
+    /// Initial value, the prior mean.
     pub prior: f64,
-    /// How sure that was.
+    /// Standard deviation of the prior.
     pub prior_sigma: f64,
-    /// Whether the readings say more than was believed.
+    /// Whether the readings constrain the parameter beyond its prior.
     pub identified: bool,
-    /// Whether it would go on if it could: the value is the least or the largest there is.
+    /// Whether the value is at a physical limit.
     pub at_limit: bool,
 }
 
 impl Told {
-    /// What besides its figures has to be said of it.
+    /// Remark for a report.
     #[must_use]
     pub const fn remark(&self) -> &'static str {
         match (self.at_limit, self.identified) {
@@ -53,7 +52,7 @@ impl Told {
         }
     }
 
-    /// Its name, with the beginning of the scan's.
+    /// Name, with the beginning of the scan id.
     #[must_use]
     pub fn title(&self) -> String {
         match self.scan {
@@ -64,7 +63,8 @@ impl Told {
 }
 
 impl Fit {
-    /// With these priors, from predictions that may be off by so much at first, metres; the rest as usual.
+    /// Settings for priors and an initial standard deviation of ranges, metres; others are
+    /// defaults.
     #[must_use]
     pub const fn usual(priors: Vec<Prior>, widest_m: f64) -> Self {
         Self {
@@ -78,24 +78,24 @@ impl Fit {
     }
 }
 
-/// How far off headings may be, degrees: one and a half times what is assumed of them.
+/// Maximum initial error of headings, degrees: 1.5 times the default prior.
 const WIDEST_TURN_DEG: f64 = 12.0;
-/// Standard deviations to both sides that hold 95 %.
+/// Half width of the 95 % interval, standard deviations.
 const HALF_WIDTH: f64 = 1.959_964;
-/// Correlation from which on two estimates can hardly be told apart.
-const HARDLY_TOLD_APART: f64 = 0.95;
-/// What sums of changes are off by, beside a limit.
+/// Correlation above which two estimates are hardly separable.
+const MAX_CORRELATION: f64 = 0.95;
+/// Tolerance for values at a limit.
 const ROUNDING: f64 = 1e-9;
 
 impl Fitted {
-    /// The estimates as figures, in the order of the priors; `world` is the one that was started from.
+    /// Reports the estimates in the order of the priors; `world` is the initial one.
     #[must_use]
     pub fn told(&self, world: &World, sweeps: &[Sweep], fit: &Fit) -> Vec<Told> {
         let of = |(prior, estimate): (&Prior, &Estimate)| {
             let parameter = &prior.parameter;
             let value = |by: f64| value(world, sweeps, parameter, by);
-            let (least, most) = world.limits(parameter);
-            let possible = |by: f64| value(by.clamp(least, most));
+            let (min, max) = world.limits(parameter);
+            let possible = |by: f64| value(by.clamp(min, max));
             let half_width = HALF_WIDTH * estimate.sigma;
             let per_unit = |sigma: f64| {
                 0.5 * (value(estimate.change + sigma) - value(estimate.change - sigma)).abs()
@@ -111,38 +111,38 @@ impl Fitted {
                 prior: value(0.0),
                 prior_sigma: per_unit(prior.sigma),
                 identified: estimate.identified,
-                at_limit: estimate.change < least + ROUNDING || estimate.change > most - ROUNDING,
+                at_limit: estimate.change < min + ROUNDING || estimate.change > max - ROUNDING,
             }
         };
         fit.priors.iter().zip(&self.estimates).map(of).collect()
     }
 
-    /// Whether a good part of the readings is not explained.
+    /// Returns `true` if more than 30 % of the readings are not explained.
     #[must_use]
     pub const fn is_doubtful(&self) -> bool {
         self.errors.explained() < 0.7
     }
 
-    /// Correlations of the estimates, in the order of the priors, -1 to 1.
+    /// Correlation matrix of the estimates, in the order of the priors.
     #[must_use]
     pub fn correlations(&self) -> DMatrix<f64> {
         let sigma = self.covariance.diagonal().map(f64::sqrt);
         self.covariance.component_div(&(&sigma * sigma.transpose()))
     }
 
-    /// Pairs of estimates, by their places, that can hardly be told apart, with their correlation; the closest first.
+    /// Index pairs of strongly correlated estimates with their correlation, strongest first.
     #[must_use]
     pub fn hardly_told_apart(&self) -> Vec<(usize, usize, f64)> {
         let all = self.correlations();
-        let pairs = (0..all.nrows()).flat_map(|one| (0..one).map(move |other| (other, one)));
-        let told = pairs.map(|(other, one)| (other, one, all[(one, other)]));
-        let mut found: Vec<_> = told.filter(|(.., of)| of.abs() > HARDLY_TOLD_APART).collect();
-        found.sort_by(|one, other| other.2.abs().total_cmp(&one.2.abs()));
+        let pairs = (0..all.nrows()).flat_map(|row| (0..row).map(move |column| (column, row)));
+        let correlated = pairs.map(|(column, row)| (column, row, all[(row, column)]));
+        let mut found: Vec<_> = correlated.filter(|(.., of)| of.abs() > MAX_CORRELATION).collect();
+        found.sort_by(|a, b| b.2.abs().total_cmp(&a.2.abs()));
         found
     }
 
-    /// The sensor that was found, under a name of its own where it differs from the one that was started from, with
-    /// the source of each figure that does.
+    /// Calibrated sensor. If it differs from the initial one, it has a name of its own and a source
+    /// for each changed value.
     #[must_use]
     pub fn sensor(&self, started_from: &Sensor) -> Sensor {
         let mut sensor = self.world.sensor.clone();
@@ -168,7 +168,7 @@ impl Fitted {
     }
 }
 
-/// What a parameter's figure is after a change.
+/// Value of a parameter after a change, in the unit used in files.
 fn value(world: &World, sweeps: &[Sweep], parameter: &Parameter, by: f64) -> f64 {
     let pose = |at: usize| sweeps.get(at).map(|sweep| sweep.pose);
     let mounting = &world.sensor.mounting;

@@ -1,4 +1,4 @@
-//! What to fit, by names that people use, and what is believed of it beforehand.
+//! Parameter groups by user-facing names, with default priors.
 
 use serde::{Deserialize, Serialize};
 use sonard_model::acoustics::Aperture;
@@ -6,75 +6,75 @@ use thiserror::Error;
 
 use crate::{fit::Prior, parameter::Parameter, world::World};
 
-/// Parameters that go together.
+/// Group of parameters that are fitted together.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "clap", derive(clap::ValueEnum))]
 #[serde(rename_all = "lowercase")]
 pub enum Group {
-    /// Where the ranger stood and looked, in each scan.
+    /// Pose of the ranger in each scan.
     Pose,
-    /// Zero of the stepper.
+    /// Azimuth zero of the stepper.
     Heading,
-    /// Gear of the stepper.
+    /// Gear ratio error of the stepper.
     Gear,
-    /// Where the face is on the axis.
+    /// Transducer offset from the axis.
     Mounting,
-    /// How high.
+    /// Transducer height above the floor.
     Height,
-    /// Speed of sound.
+    /// Speed of sound in air.
     Air,
-    /// Constant delay.
+    /// Constant offset of all ranges.
     Delay,
-    /// Threshold of the receiver.
+    /// Detection threshold of the receiver.
     Threshold,
-    /// How the threshold rises with range.
+    /// Slope of the threshold with range.
     Rise,
-    /// Width of the beam.
+    /// Width of the main lobe.
     Beam,
-    /// How fast a pulse rises: the band of transducer and receiver.
+    /// Rise time of a pulse: bandwidth of transducer and receiver.
     Pulse,
-    /// Skirts of the beam.
+    /// Side-lobe floor of the beam.
     Skirts,
-    /// Reflectances.
+    /// Reflectance of each material.
     Materials,
-    /// Roughnesses.
+    /// Roughness of each material.
     Roughness,
-    /// Places of walls.
+    /// Position of each wall.
     Walls,
 }
 
-/// A group of parameters that cannot be fitted.
+/// Invalid selection of parameters or priors.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 pub enum GroupError {
-    /// A height in the plane.
+    /// Height in a scene without floor and ceiling.
     #[error("height: the scene has neither floor nor ceiling")]
     NoHeight,
-    /// Skirts of a beam that has none.
+    /// Side-lobe floor of an aperture without one.
     #[error("skirts: the aperture of {sensor} has none")]
     NoSkirts {
-        /// The sensor's name.
+        /// Name of the sensor.
         sensor: String,
     },
-    /// A prior of what is not fitted.
+    /// Prior of a parameter that is not fitted.
     #[error("`{name}` is not fitted")]
     NotFitted {
-        /// The name given.
+        /// Name that was given.
         name: String,
-        /// Those that are.
+        /// Names of the fitted parameters.
         fitted: Vec<String>,
     },
-    /// A doubt that is none.
+    /// Invalid standard deviation.
     #[error("the prior of {name} is {sigma}: it must be a number greater than 0")]
     Sigma {
-        /// Which parameter.
+        /// Name of the parameter.
         name: String,
-        /// What was given, as text.
+        /// Given value, as text.
         sigma: String,
     },
 }
 
 impl GroupError {
-    /// What would be right.
+    /// Hint for a correction.
     #[must_use]
     pub fn help(&self) -> String {
         match self {
@@ -83,17 +83,16 @@ impl GroupError {
                 "give the sensor's file a piston with skirts_db to begin with, such as -12"
                     .to_owned()
             }
-            Self::NotFitted { fitted, .. } => format!("these are: {}", fitted.join(", ")),
+            Self::NotFitted { fitted, .. } => format!("fitted parameters: {}", fitted.join(", ")),
             Self::Sigma { .. } => {
-                "give the standard deviation of what is believed, in the parameter's unit"
-                    .to_owned()
+                "give the prior standard deviation, in the parameter's unit".to_owned()
             }
         }
     }
 }
 
-/// The doubt that is assumed where none is given, in the parameter's unit.
-const fn usual_sigma(parameter: &Parameter) -> f64 {
+/// Default prior standard deviation, in the parameter's unit.
+const fn default_sigma(parameter: &Parameter) -> f64 {
     match parameter {
         Parameter::X(_) | Parameter::Y(_) | Parameter::Height => 0.1,
         Parameter::Heading(_) | Parameter::HeadingZero => 8.0,
@@ -109,7 +108,7 @@ const fn usual_sigma(parameter: &Parameter) -> f64 {
     }
 }
 
-/// The name that a parameter has for people: walls by theirs.
+/// User-facing name of a parameter; walls are named by their id.
 #[must_use]
 pub fn name(parameter: &Parameter, world: &World) -> String {
     match parameter {
@@ -121,11 +120,12 @@ pub fn name(parameter: &Parameter, world: &World) -> String {
     }
 }
 
-/// All parameters of some groups for so many sweeps, each with the doubt given for its [`name`], else with the usual
-/// one.
+/// Priors of all parameters of some groups for a number of sweeps. Standard deviations are those
+/// given by [`name`], else the defaults.
 ///
 /// # Errors
-/// A prior for what is not fitted or that is none, or what makes no sense in the scene.
+/// Prior of a parameter that is not fitted, invalid standard deviation, or a group that does not
+/// apply.
 pub fn priors(
     groups: &[Group],
     given: &[(String, f64)],
@@ -139,19 +139,19 @@ pub fn priors(
         }
     }
     let mut names: Vec<String> = all.iter().map(|parameter| name(parameter, world)).collect();
-    for (wanted, sigma) in given {
-        if !names.contains(wanted) {
+    for (given_name, sigma) in given {
+        if !names.contains(given_name) {
             names.sort();
             names.dedup();
-            return Err(GroupError::NotFitted { name: wanted.clone(), fitted: names });
+            return Err(GroupError::NotFitted { name: given_name.clone(), fitted: names });
         }
         if !(sigma.is_finite() && *sigma > 0.0) {
-            return Err(GroupError::Sigma { name: wanted.clone(), sigma: sigma.to_string() });
+            return Err(GroupError::Sigma { name: given_name.clone(), sigma: sigma.to_string() });
         }
     }
     let with_prior = |(parameter, title): (Parameter, &String)| {
         let sigma = given.iter().find(|(name, _)| name == title).map(|(_, sigma)| *sigma);
-        Prior { sigma: sigma.unwrap_or_else(|| usual_sigma(&parameter)), parameter }
+        Prior { sigma: sigma.unwrap_or_else(|| default_sigma(&parameter)), parameter }
     };
     Ok(all.into_iter().zip(&names).map(with_prior).collect())
 }

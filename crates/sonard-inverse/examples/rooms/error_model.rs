@@ -1,10 +1,10 @@
-//! The spread of the readings of `rooms`, as fits and bounds are given it.
+//! Error model of the readings of `rooms`, as input of fits and bounds.
 
 use sonard_inverse::ErrorModel;
 
 use crate::rooms::NOISE_MM;
 
-pub(crate) const SPREAD: ErrorModel = ErrorModel {
+pub(crate) const ERRORS: ErrorModel = ErrorModel {
     sigma_m: NOISE_MM * 1e-3,
     tail_share: 0.1,
     tail_ratio: 2.0,

@@ -1,46 +1,48 @@
-//! Arcs that the scene does not explain: consecutive readings of something that it lacks.
+//! Outlier arcs: consecutive readings of an object that the scene lacks.
 //!
-//! A chair leg, a person or the robot's own body answers tens of beams in a row with nearly equal ranges, and hides what is
-//! behind it. Charged one by one, as if each had come from nowhere, such readings would bend whatever parameter explains
-//! some of them. So each reading of a sweep has a hidden state that is kept from beam to beam more often than it changes:
-//! of the scene, or of something else. The likelihood of a sweep sums over all sequences of states by the forward
-//! recursion of a hidden Markov model, and the backward recursion gives each reading's posterior probability of being of
-//! the scene (Rabiner, "A tutorial on hidden Markov models", Proc. IEEE 77, 1989, section III).
+//! A chair leg, a person or the robot's own body returns tens of beams in a row with nearly equal
+//! ranges, and hides what is behind it. As independent outliers, such readings would bias whatever
+//! parameter explains some of them. So each reading of a sweep has a hidden state that persists
+//! from beam to beam: scene or outlier. The likelihood of a sweep sums over all state sequences by
+//! the forward recursion of a hidden Markov model. The backward recursion gives each reading's
+//! posterior probability of the scene state (Rabiner, "A tutorial on hidden Markov models", Proc.
+//! IEEE 77, 1989, section III).
 
-use crate::{likelihood::ErrorModel, sweep::Outcome};
+use crate::{likelihood::ErrorModel, sweep::RangeOutcome};
 
-/// A reading, as likely as each state makes it.
+/// Reading with its emission density in the scene state.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Emission {
-    pub(crate) heard: Outcome,
-    /// Density if it is of the scene.
+    pub(crate) measured: RangeOutcome,
+    /// Density in the scene state.
     pub(crate) of_scene: f64,
 }
 
-/// What a sweep's readings say about the states of its beams.
+/// Posterior of the states of a sweep.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct States {
+pub(crate) struct StatePosterior {
     pub(crate) log_likelihood: f64,
-    /// By beam, the posterior probability that its reading is of the scene.
+    /// Posterior probability of the scene state, by beam.
     pub(crate) of_scene: Vec<f64>,
-    pub(crate) counts: Counts,
+    pub(crate) counts: OutlierCounts,
 }
 
 /// Expected numbers of beams.
 #[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct Counts {
-    /// All.
+pub(crate) struct OutlierCounts {
+    /// Total number of beams.
     pub(crate) all: f64,
-    /// Of something else than the scene.
+    /// Beams in outlier arcs.
     pub(crate) of_else: f64,
-    /// Silent ones of these.
+    /// Beams without echo in outlier arcs.
     pub(crate) silent_of_else: f64,
-    /// Those after which an arc of something else goes on, and those after which it ends.
+    /// Transitions within an outlier arc.
     pub(crate) staying: f64,
+    /// Transitions from an outlier arc to the scene.
     pub(crate) leaving: f64,
 }
 
-impl std::ops::AddAssign for Counts {
+impl std::ops::AddAssign for OutlierCounts {
     fn add_assign(&mut self, other: Self) {
         self.all += other.all;
         self.of_else += other.of_else;
@@ -50,31 +52,32 @@ impl std::ops::AddAssign for Counts {
     }
 }
 
-/// Probabilities of both states, of the scene and of something else.
-type Both = [f64; 2];
+/// Probabilities of the scene and the outlier state.
+type StatePair = [f64; 2];
 
-/// Log-likelihood of a sweep's readings, in the order of their directions.
+/// Log-likelihood of the readings of a sweep, in order of direction.
 pub(crate) fn log_likelihood(readings: impl Iterator<Item = Emission>, errors: &ErrorModel) -> f64 {
     Forward::new(readings, errors).map(|step| step.norm.ln()).sum()
 }
 
-/// The same with what the readings say about each state.
-pub(crate) fn states(readings: &[Emission], errors: &ErrorModel) -> States {
+/// Log-likelihood and state posteriors of the readings of a sweep (forward-backward algorithm).
+pub(crate) fn states(readings: &[Emission], errors: &ErrorModel) -> StatePosterior {
     if errors.arcs == 0.0 {
         return alone(readings);
     }
-    let steps: Vec<Step> = Forward::new(readings.iter().copied(), errors).collect();
+    let steps: Vec<ForwardStep> = Forward::new(readings.iter().copied(), errors).collect();
     let changes = errors.changes();
-    let mut counts = Counts { all: readings.len() as f64, ..Counts::default() };
+    let mut counts = OutlierCounts { all: readings.len() as f64, ..OutlierCounts::default() };
     let mut of_scene = vec![0.0; readings.len()];
-    // Probability of all later readings by the state of this one, over their probability after the earlier ones.
-    let mut later: Both = [1.0, 1.0];
+    // Density of all later readings given the state of this one, normalized by the forward pass.
+    let mut later: StatePair = [1.0, 1.0];
     for at in (0..steps.len()).rev() {
-        let Step { states, .. } = steps[at];
+        let ForwardStep { states, .. } = steps[at];
         let of_else = states[1] * later[1];
         of_scene[at] = states[0] * later[0];
         counts.of_else += of_else;
-        counts.silent_of_else += if readings[at].heard == Outcome::Silence { of_else } else { 0.0 };
+        counts.silent_of_else +=
+            if readings[at].measured == RangeOutcome::NoEcho { of_else } else { 0.0 };
         let Some(before) = at.checked_sub(1) else { break };
         let (before, own) = (steps[before].states, steps[at]);
         let pass = |from: usize, to: usize| {
@@ -85,36 +88,36 @@ pub(crate) fn states(readings: &[Emission], errors: &ErrorModel) -> States {
         later = [0, 1].map(|from| pass(from, 0) + pass(from, 1));
     }
     let log_likelihood = steps.iter().map(|step| step.norm.ln()).sum();
-    States { log_likelihood, of_scene, counts }
+    StatePosterior { log_likelihood, of_scene, counts }
 }
 
-/// The same where nothing is looked for but the scene.
-fn alone(readings: &[Emission]) -> States {
-    States {
+/// Result without outlier arcs: all readings in the scene state.
+fn alone(readings: &[Emission]) -> StatePosterior {
+    StatePosterior {
         log_likelihood: readings.iter().map(|reading| reading.of_scene.ln()).sum(),
         of_scene: vec![1.0; readings.len()],
-        counts: Counts { all: readings.len() as f64, ..Counts::default() },
+        counts: OutlierCounts { all: readings.len() as f64, ..OutlierCounts::default() },
     }
 }
 
-/// A beam of the forward recursion.
+/// ForwardStep of the forward recursion.
 #[derive(Debug, Clone, Copy)]
-struct Step {
-    /// Probabilities of its states, given its reading and those before it.
-    states: Both,
-    /// Density of its reading, given those before it.
+struct ForwardStep {
+    /// State probabilities, given this reading and all before.
+    states: StatePair,
+    /// Density of the reading, given those before it.
     norm: f64,
-    /// Density of its reading, by the state before it and its own.
-    densities: [Both; 2],
+    /// Density of the reading, by the previous and the current state.
+    densities: [StatePair; 2],
 }
 
-/// The forward recursion.
+/// Forward recursion over the readings.
 struct Forward<'a, I> {
     readings: I,
     errors: &'a ErrorModel,
-    changes: [Both; 2],
-    /// The beam before, with its states.
-    before: Option<(Emission, Both)>,
+    changes: [StatePair; 2],
+    /// Previous beam with its state probabilities.
+    before: Option<(Emission, StatePair)>,
 }
 
 impl<'a, I: Iterator<Item = Emission>> Forward<'a, I> {
@@ -124,15 +127,15 @@ impl<'a, I: Iterator<Item = Emission>> Forward<'a, I> {
 }
 
 impl<I: Iterator<Item = Emission>> Iterator for Forward<'_, I> {
-    type Item = Step;
+    type Item = ForwardStep;
 
-    fn next(&mut self) -> Option<Step> {
+    fn next(&mut self) -> Option<ForwardStep> {
         let reading = self.readings.next()?;
-        let first = self.errors.of_else(None, reading.heard);
+        let first = self.errors.of_else(None, reading.measured);
         let densities = match self.before {
             None => [[reading.of_scene, first]; 2],
             Some((before, _)) => {
-                let follows = self.errors.of_else(Some(before.heard), reading.heard);
+                let follows = self.errors.of_else(Some(before.measured), reading.measured);
                 [[reading.of_scene, first], [reading.of_scene, follows]]
             }
         };
@@ -148,7 +151,7 @@ impl<I: Iterator<Item = Emission>> Iterator for Forward<'_, I> {
         let norm = both[0] + both[1];
         let states = both.map(|of| of / norm);
         self.before = Some((reading, states));
-        Some(Step { states, norm, densities })
+        Some(ForwardStep { states, norm, densities })
     }
 }
 
@@ -157,26 +160,27 @@ mod tests {
     use super::*;
 
     const fn echo(range_m: f64, of_scene: f64) -> Emission {
-        Emission { heard: Outcome::Echo { range_m }, of_scene }
+        Emission { measured: RangeOutcome::Echo { range_m }, of_scene }
     }
 
-    /// Two silences, an arc at 0.7 m, echoes that the scene makes likely, and two of something near.
+    /// Two beams without echo, an arc at 0.7 m, scene echoes, and two targets below the minimum
+    /// range.
     fn readings() -> Vec<Emission> {
-        let without = |heard: Outcome, of_scene: f64| Emission { heard, of_scene };
+        let without = |measured: RangeOutcome, of_scene: f64| Emission { measured, of_scene };
         vec![
-            without(Outcome::Silence, 0.9),
-            without(Outcome::Silence, 0.01),
+            without(RangeOutcome::NoEcho, 0.9),
+            without(RangeOutcome::NoEcho, 0.01),
             echo(0.7, 1e-4),
             echo(0.702, 3.0),
             echo(0.699, 1e-3),
             echo(1.4, 300.0),
             echo(1.41, 0.2),
-            without(Outcome::Near, 0.02),
-            without(Outcome::Near, 0.7),
+            without(RangeOutcome::BelowMinRange, 0.02),
+            without(RangeOutcome::BelowMinRange, 0.7),
         ]
     }
 
-    /// The probability of the readings with one sequence of states.
+    /// Joint density of the readings and one state sequence.
     fn joint(readings: &[Emission], is_else: &[bool], errors: &ErrorModel) -> f64 {
         let changes = errors.changes();
         let mut joint = 1.0;
@@ -189,15 +193,17 @@ mod tests {
             };
             joint *= match (own, before) {
                 (0, _) => readings[at].of_scene,
-                (_, Some(1)) => errors.of_else(Some(readings[at - 1].heard), readings[at].heard),
-                _ => errors.of_else(None, readings[at].heard),
+                (_, Some(1)) => {
+                    errors.of_else(Some(readings[at - 1].measured), readings[at].measured)
+                }
+                _ => errors.of_else(None, readings[at].measured),
             };
         }
         joint
     }
 
     #[test]
-    fn recursions_sum_over_all_sequences_of_states() {
+    fn recursions_sum_over_all_sequences() {
         let readings = readings();
         let errors = ErrorModel { arc_beams: 3.0, ..ErrorModel::rough(0.002, 1.0, 4.0) };
         let (mut all, mut staying, mut leaving) = (0.0, 0.0, 0.0);
@@ -223,14 +229,14 @@ mod tests {
         }
         assert!((states.counts.staying - staying / all).abs() < 1e-12, "{:?}", states.counts);
         assert!((states.counts.leaving - leaving / all).abs() < 1e-12, "{:?}", states.counts);
-        // The arc is of something else, the echo that fits to the millimetre is not.
+        // The arc is an outlier, the echo that fits to the millimetre is not.
         assert!(states.of_scene[2] < 0.01 && states.of_scene[5] > 0.9, "{:?}", states.of_scene);
     }
 
-    /// Also of a whole sweep that the scene explains nowhere, which an arc of something else would explain 10^1000 times as
-    /// well.
+    /// Holds for a whole sweep that the scene does not explain, although an outlier arc would be
+    /// 10^1000 times as likely.
     #[test]
-    fn without_arcs_every_reading_stands_alone() {
+    fn readings_are_independent_without_arcs() {
         let errors = ErrorModel::rough(0.002, 1.0, 4.0).without_arcs();
         let one_arc = vec![echo(0.7, 1e-4); 400];
         for readings in [readings(), one_arc] {
@@ -243,9 +249,9 @@ mod tests {
         }
     }
 
-    /// The same sweep with arcs: all of it is of one, and nothing overflows.
+    /// A sweep that is a single outlier arc does not overflow.
     #[test]
-    fn a_sweep_may_be_one_arc() {
+    fn whole_sweep_can_be_an_arc() {
         let errors = ErrorModel { arcs: 1e-3, ..ErrorModel::rough(0.002, 1.0, 4.0) };
         let states = states(&[echo(0.7, 1e-4); 400], &errors);
         assert!((states.counts.of_else - 400.0).abs() < 1e-3, "{:?}", states.counts);

@@ -1,4 +1,4 @@
-//! What may be wrong with readings that a scene does not explain.
+//! Diagnosis of a sweep that the scene does not explain.
 
 use std::fmt;
 
@@ -6,28 +6,28 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    atlas::Atlas,
+    coarse_grid::Atlas,
     locate::Mode,
     sweep::{Beam, Heard, Sweep},
     world::World,
 };
 
-/// A likely fault of a sweep.
+/// Likely cause of a poor fit of a sweep.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub enum Doubt {
-    /// The scene explains few of the readings, whatever is done to them: it is of another place, or of another time.
+    /// Scene that explains few of the readings whatever is changed: another place, or another time.
     OtherPlace {
-        /// Share of the readings that are explained.
+        /// Fraction of the readings that are explained.
         explained: f64,
     },
-    /// They would fit if azimuths were counted the other way round.
+    /// Azimuths recorded clockwise instead of counter-clockwise.
     Clockwise,
-    /// They would fit if azimuths were radians.
+    /// Azimuths recorded in radians instead of degrees.
     Radians,
-    /// They would fit if ranges were in another unit.
+    /// Ranges in another unit.
     Unit {
-        /// What ranges are to be multiplied with.
+        /// Factor that converts the ranges.
         factor: f64,
     },
 }
@@ -42,11 +42,11 @@ impl fmt::Display for Doubt {
                 100.0 * explained
             ),
             Self::Clockwise => f.write_str(
-                "the readings fit far better with azimuths counted the other way round: are they clockwise?",
+                "the readings fit far better with reversed azimuths: are they clockwise?",
             ),
-            Self::Radians => {
-                f.write_str("the readings fit far better with azimuths in radians: are they no degrees?")
-            }
+            Self::Radians => f.write_str(
+                "the readings fit far better with azimuths in radians: are they not in degrees?",
+            ),
             Self::Unit { factor } => write!(
                 f,
                 "the readings fit far better with ranges multiplied by {factor}: are they in another unit?"
@@ -55,18 +55,18 @@ impl fmt::Display for Doubt {
     }
 }
 
-/// Below this share of explained readings something is wrong.
-const FEW: f64 = 0.7;
-/// What is wrong must make the first look's cost this much smaller.
+/// Fraction of explained readings below which a sweep is diagnosed.
+const MIN_EXPLAINED: f64 = 0.7;
+/// Maximum cost of the coarse match after a correction, relative to that before.
 const FAR_BETTER: f32 = 0.6;
-/// Units that ranges are mixed up in: centimetres, millimetres, inches and feet, there and back.
+/// Factors of unit errors: centimetres, millimetres, inches, feet, and two-way ranges.
 const FACTORS: [f64; 8] = [0.01, 100.0, 0.001, 1000.0, 0.0254, 0.3048, 0.5, 2.0];
 
-/// What may be wrong with a sweep whose best pose explains little of it; nothing of others.
+/// Diagnoses a sweep whose best pose explains little of it; empty for others.
 #[must_use]
 pub fn doubts(world: &World, atlas: &Atlas, sweep: &Sweep, modes: &[Mode]) -> Vec<Doubt> {
     let explained = modes.iter().map(|mode| mode.explained).fold(0.0, f64::max);
-    if explained >= FEW {
+    if explained >= MIN_EXPLAINED {
         return Vec::new();
     }
     let cost = |sweep: &Sweep| {
@@ -91,9 +91,9 @@ pub fn doubts(world: &World, atlas: &Atlas, sweep: &Sweep, modes: &[Mode]) -> Ve
     };
     let tried = [(Doubt::Clockwise, turned(-1.0)), (Doubt::Radians, turned(1f64.to_degrees()))];
     let units = FACTORS.map(|factor| (Doubt::Unit { factor }, scaled(factor)));
-    let best = tried.into_iter().chain(units).min_by(|one, other| one.1.total_cmp(&other.1));
+    let best = tried.into_iter().chain(units).min_by(|a, b| a.1.total_cmp(&b.1));
     match best {
-        Some((doubt, cost)) if cost < FAR_BETTER * now => vec![doubt],
+        Some((cause, cost)) if cost < FAR_BETTER * now => vec![cause],
         _ => vec![Doubt::OtherPlace { explained }],
     }
 }

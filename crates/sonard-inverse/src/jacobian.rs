@@ -1,7 +1,7 @@
-//! What could have been reported of each firing, and how that moves with the parameters.
+//! ThresholdCandidate readings of each firing, with their Jacobian.
 
 mod firing;
-mod known;
+mod path_jacobian;
 
 use std::{
     cell::LazyCell,
@@ -19,43 +19,43 @@ use sonard_model::{
 };
 
 use self::{
-    firing::{Firing, Flanks, amplitude, level_db},
-    known::{KnownPaths, Moved, PathRates},
+    firing::{FiringGeometry, PatternSlopes, amplitude, level_db},
+    path_jacobian::{PathCache, PathDerivative, PathJacobian},
 };
 use crate::{
-    candidates::{Candidate, Candidates, Listener, Phases, SPAN_DB},
-    judged::{Judged, Possible, Rates},
+    candidates::{CandidateList, Phases, SPAN_DB, ThresholdCandidate, ThresholdScan},
+    likelihood_terms::{CandidateReading, ReadingModel, SparseRow},
     motion::Motion,
     parameter::Parameter,
-    sweep::{Beam, Outcome, Sweep},
-    walk::TimeWalk,
+    sweep::{Beam, RangeOutcome, Sweep},
+    time_walk::TimeWalk,
     world::World,
 };
 
-/// Step of the directions that turned sweeps share, degrees.
+/// Angular grid shared by rotated sweeps, degrees.
 const GRID_DEG: f64 = 0.5;
-/// Natural logarithm of how much wider and narrower a band is tried, for the difference: so much that the steps of a pulse's table
-/// do not show.
+/// Bandwidth change of the central difference, natural logarithm: large enough to hide the steps of
+/// the pulse table.
 const BY_BAND: f64 = 0.02;
 
-/// Predicts sweeps in a world, with what they gain for each unit of the parameters.
-pub(crate) struct RateFinder<'a> {
+/// Predicts sweeps in a world with their derivatives by the parameters.
+pub(crate) struct JacobianBuilder<'a> {
     world: &'a World,
     parameters: &'a [&'a Parameter],
-    /// By parameter, what moves whichever way the transducer looks.
+    /// Motion that is independent of the beam direction, by parameter.
     steady: Vec<Option<Motion>>,
-    /// By parameter, the beam pattern slightly changed by it, if it is about the beam, and by how much.
+    /// Beam pattern after a small change, and the change, by parameter of the beam.
     changed_beams: Vec<Option<(BeamPattern, f64)>>,
     /// Time walk with a slightly narrower and a slightly wider band, if that is a parameter.
     other_bands: Option<[TimeWalk; 2]>,
     reference_m_s: f64,
     phases: Phases,
-    /// Thresholds that are looked at, decibels to both sides of the nominal one.
+    /// Range of thresholds scanned, decibels on either side of the nominal one.
     span_db: f64,
 }
 
-impl<'a> RateFinder<'a> {
-    /// Ranges are in metres at `reference_m_s`.
+impl<'a> JacobianBuilder<'a> {
+    /// Predictor for the world; ranges are in metres at `reference_m_s`.
     pub(crate) fn new(
         world: &'a World,
         parameters: &'a [&'a Parameter],
@@ -77,20 +77,20 @@ impl<'a> RateFinder<'a> {
         }
     }
 
-    /// The same for thresholds that vary by a standard deviation in decibels and are not changed: what only others
-    /// would report is left out.
+    /// Limits the scan to thresholds within the given standard deviation in decibels, for
+    /// evaluation without a change of the threshold.
     pub(crate) fn with_threshold_spread(self, sigma_db: f64) -> Self {
-        /// Beyond so many standard deviations there is less than 2e-12.
+        /// The probability beyond so many standard deviations is below 2e-12.
         const SIGMAS: f64 = 7.0;
         Self { span_db: SPAN_DB.min(SIGMAS * sigma_db), ..self }
     }
 
-    /// How many parameters there are.
+    /// Number of parameters.
     pub(crate) const fn parameters(&self) -> usize {
         self.parameters.len()
     }
 
-    /// The firings of the sweep with this number.
+    /// Readings of a sweep with their candidates; `number` is its index.
     pub(crate) fn sweep(
         &self,
         simulator: &Simulator,
@@ -98,25 +98,26 @@ impl<'a> RateFinder<'a> {
         number: usize,
         sweep: &Sweep,
         pose: &Pose,
-    ) -> Result<Vec<Judged>, TooCostly> {
-        let listener = Listener::new(simulator.receiver(), self.phases, self.span_db);
+    ) -> Result<Vec<ReadingModel>, TooCostly> {
+        let listener = ThresholdScan::new(simulator.receiver(), self.phases, self.span_db);
         let concerns = |parameter: &Parameter| parameter.sweep().is_none_or(|of| of == number);
         let all = self.parameters.iter().zip(0u32..);
         let concerning: Vec<u32> =
             all.filter(|(parameter, _)| concerns(parameter)).map(|(_, at)| at).collect();
-        let mut known = KnownPaths::new(self, concerning);
-        let mut judged = Vec::with_capacity(sweep.beams.len());
+        let mut known = PathCache::new(self, concerning);
+        let mut readings = Vec::with_capacity(sweep.beams.len());
         for beam in &sweep.beams {
             let direction_rad = self.world.direction_rad(pose, beam.azimuth_deg);
-            let firing = Firing::new(simulator, pose, direction_rad, beam);
+            let firing = FiringGeometry::new(simulator, pose, direction_rad, beam);
             let possible = self.all_possible(&listener, point, &firing, &mut known)?;
-            judged.push(Judged { heard: beam.heard.outcome(self.reference_m_s), possible });
+            readings
+                .push(ReadingModel { measured: beam.heard.outcome(self.reference_m_s), possible });
         }
-        Ok(judged)
+        Ok(readings)
     }
 
-    /// What each beam of a sweep could have been after turns by so many degrees, up to half a step of [`GRID_DEG`]:
-    /// directions are predicted once for all beams that come to look there. A robot's body stays as it stands.
+    /// Readings of a sweep after each of some rotations, rounded to [`GRID_DEG`]: each direction is
+    /// predicted once for all beams. The robot's body is not rotated.
     pub(crate) fn turned(
         &self,
         simulator: &Simulator,
@@ -124,75 +125,81 @@ impl<'a> RateFinder<'a> {
         sweep: &Sweep,
         pose: &Pose,
         turns_deg: &[f64],
-    ) -> Result<Vec<Vec<Judged>>, TooCostly> {
-        let listener = Listener::new(simulator.receiver(), self.phases, self.span_db);
+    ) -> Result<Vec<Vec<ReadingModel>>, TooCostly> {
+        let listener = ThresholdScan::new(simulator.receiver(), self.phases, self.span_db);
         let all: Vec<u32> = (0..self.parameters.len() as u32).collect();
-        let mut paths = KnownPaths::new(self, all);
-        let mut known: HashMap<i64, SmallVec<[Possible; 2]>> = HashMap::new();
-        let mut judged = |beam: &Beam, by_deg: f64| {
+        let mut paths = PathCache::new(self, all);
+        let mut known: HashMap<i64, SmallVec<[CandidateReading; 2]>> = HashMap::new();
+        let mut readings = |beam: &Beam, by_deg: f64| {
             let direction_rad = self.world.direction_rad(pose, beam.azimuth_deg);
             let place = (wrap_360(direction_rad.to_degrees() + by_deg) / GRID_DEG).round() as i64;
             let possible = match known.entry(place) {
                 Entry::Occupied(known) => known.get().clone(),
                 Entry::Vacant(unknown) => {
                     let direction_rad = (place as f64 * GRID_DEG).to_radians();
-                    let firing = Firing::new(simulator, pose, direction_rad, beam);
+                    let firing = FiringGeometry::new(simulator, pose, direction_rad, beam);
                     let possible = self.all_possible(&listener, point, &firing, &mut paths)?;
                     unknown.insert(possible).clone()
                 }
             };
-            Ok(Judged { heard: beam.heard.outcome(self.reference_m_s), possible })
+            Ok(ReadingModel { measured: beam.heard.outcome(self.reference_m_s), possible })
         };
         let mut turned =
-            |by_deg: &f64| sweep.beams.iter().map(|beam| judged(beam, *by_deg)).collect();
+            |by_deg: &f64| sweep.beams.iter().map(|beam| readings(beam, *by_deg)).collect();
         turns_deg.iter().map(&mut turned).collect()
     }
 
     fn all_possible(
         &self,
-        listener: &Listener,
+        listener: &ThresholdScan,
         point: &ObservationPoint,
-        firing: &Firing,
-        known: &mut KnownPaths,
-    ) -> Result<SmallVec<[Possible; 2]>, TooCostly> {
-        let mut found = Candidates::new();
+        firing: &FiringGeometry,
+        known: &mut PathCache,
+    ) -> Result<SmallVec<[CandidateReading; 2]>, TooCostly> {
+        let mut found = CandidateList::new();
         listener.candidates(point, firing.direction_rad, &mut found)?;
         Ok(found.iter().map(|candidate| self.possible(candidate, firing, known)).collect())
     }
 
-    fn possible(&self, candidate: &Candidate, firing: &Firing, known: &mut KnownPaths) -> Possible {
+    fn possible(
+        &self,
+        candidate: &ThresholdCandidate,
+        firing: &FiringGeometry,
+        known: &mut PathCache,
+    ) -> CandidateReading {
         let stretch = self.stretch(firing);
-        let mut possible = Possible {
+        let mut possible = CandidateReading {
             outcome: match candidate.range_m {
                 Some(range_m) if !candidate.is_near => {
-                    Outcome::Echo { range_m: stretch * range_m + self.world.delay_m }
+                    RangeOutcome::Echo { range_m: stretch * range_m + self.world.delay_m }
                 }
-                Some(_) => Outcome::Near,
-                None => Outcome::Silence,
+                Some(_) => RangeOutcome::BelowMinRange,
+                None => RangeOutcome::NoEcho,
             },
-            range_rates: Rates::new(),
+            range_rates: SparseRow::new(),
             margin_db: candidate.margin_db,
             until_db: candidate.until_db,
-            until_rates: Rates::new(),
+            until_rates: SparseRow::new(),
             spread_db: candidate.spread_db,
             further_reflections: candidate.arrival.as_ref().map_or(0.0, further_reflections),
         };
         let Some(arrival) = &candidate.arrival else { return possible };
-        let path = known.of(arrival, firing);
-        if let Some((longer_m, louder_db)) = self.beside_axis(arrival, path, firing) {
-            if let Outcome::Echo { range_m } = &mut possible.outcome {
+        let path = known.get(arrival, firing);
+        if let Some((longer_m, louder_db)) = self.off_axis(arrival, path, firing) {
+            if let RangeOutcome::Echo { range_m } = &mut possible.outcome {
                 *range_m += 0.5 * stretch * longer_m;
             }
             possible.until_db += louder_db;
         }
         if let Some(predicted_m) = candidate.range_m {
-            let told = (predicted_m, candidate.margin_db);
-            // A threshold alone, as turned sweeps are asked about, needs none.
+            let evaluated = (predicted_m, candidate.margin_db);
+            // The threshold, the only parameter of rotated sweeps, needs no slopes.
             let is_sharp = candidate.is_of_one && self.phases == Phases::Known;
-            let flanks = LazyCell::new(|| Flanks::of(arrival, firing, is_sharp));
+            let flanks = LazyCell::new(|| PatternSlopes::new(arrival, firing, is_sharp));
             for &(at, steady) in &path.steady {
                 let moved = self.moved(at, steady, path, firing);
-                let (by_range, by_db) = self.rates(at, &moved, (arrival, told), firing, &flanks);
+                let (by_range, by_db) =
+                    self.rates(at, &moved, (arrival, evaluated), firing, &flanks);
                 let has_range = by_range != 0.0 && !candidate.is_near;
                 possible.range_rates.extend(has_range.then_some((at, by_range)));
                 possible.until_rates.extend((by_db != 0.0).then_some((at, by_db)));
@@ -201,8 +208,14 @@ impl<'a> RateFinder<'a> {
         possible
     }
 
-    /// What a path gains with a parameter, if in all directions it gains so much with it.
-    fn moved(&self, at: u32, steady: Moved, path: &PathRates, firing: &Firing) -> Moved {
+    /// Derivative of a path by a parameter, given its direction-independent part.
+    fn moved(
+        &self,
+        at: u32,
+        steady: PathDerivative,
+        path: &PathJacobian,
+        firing: &FiringGeometry,
+    ) -> PathDerivative {
         let parameter = self.parameters[at as usize];
         let turning = match &self.steady[at as usize] {
             Some(_) => None,
@@ -211,21 +224,20 @@ impl<'a> RateFinder<'a> {
         turning.map_or(steady, |motion| path.moved(firing, &motion))
     }
 
-    /// What an arrival's range and its margin above the threshold, which are told as they are, gain with a parameter by which
-    /// its path moves so, metres and decibels for each unit.
+    /// Derivatives of an arrival's range and margin by a parameter, metres and decibels per unit.
     ///
-    /// That a stronger echo is also earlier (time walk) comes on top, once it is known how thresholds vary: see
-    /// [`Possible::rates_with_walk`].
+    /// Time walk, the earlier detection of a stronger echo, is added by
+    /// [`CandidateReading::rates_with_walk`] once the threshold variation is known.
     fn rates(
         &self,
         at: u32,
-        moved: &Moved,
+        moved: &PathDerivative,
         (arrival, (predicted_m, margin_db)): (&Arrival, (f64, f64)),
-        firing: &Firing,
-        flanks: &LazyCell<Flanks, impl FnOnce() -> Flanks>,
+        firing: &FiringGeometry,
+        flanks: &LazyCell<PatternSlopes, impl FnOnce() -> PatternSlopes>,
     ) -> (f64, f64) {
         let stretch = self.stretch(firing);
-        // A transducer that turns has all directions turn back beside its axis.
+        // A rotating transducer rotates all directions backwards relative to its axis.
         let turned_back = |by_rad: f64| moved.turned_rad.map(|rad| rad - by_rad);
         let turned_rad = match self.parameters[at as usize] {
             Parameter::SoundSpeed => return (-stretch * predicted_m, 0.0),
@@ -247,8 +259,8 @@ impl<'a> RateFinder<'a> {
         (0.5 * stretch * moved.longer_m, moved.louder_db + by_directions_db)
     }
 
-    /// What an arrival's level gains with a parameter of the beam, decibels for each unit.
-    fn by_beam_db(&self, at: u32, arrival: &Arrival, firing: &Firing) -> f64 {
+    /// Derivative of an arrival's level by a parameter of the beam, decibels per unit.
+    fn by_beam_db(&self, at: u32, arrival: &Arrival, firing: &FiringGeometry) -> f64 {
         self.changed_beams[at as usize].as_ref().map_or(0.0, |(pattern, by)| {
             let gain =
                 |off_rad| amplitude(pattern, off_rad) / amplitude(firing.simulator.beam(), off_rad);
@@ -256,8 +268,8 @@ impl<'a> RateFinder<'a> {
         })
     }
 
-    /// What the range of a lone echo gains with the width of the band: its pulse rises faster, so that it is less late. How far it
-    /// reaches above the threshold is by its peak, which stays.
+    /// Derivative of the range of an isolated echo by the bandwidth: its pulse rises faster. The
+    /// margin is determined by the peak, which is unchanged.
     fn earlier_m(&self, margin_db: f64) -> f64 {
         let moving = self.other_bands.as_ref().filter(|_| margin_db.is_finite());
         moving.map_or(0.0, |bands| {
@@ -266,23 +278,24 @@ impl<'a> RateFinder<'a> {
         })
     }
 
-    /// What a predicted range is longer at the speed of sound that ranges are told at.
-    fn stretch(&self, firing: &Firing) -> f64 {
+    /// Ratio of the reference speed of sound to that of the prediction.
+    fn stretch(&self, firing: &FiringGeometry) -> f64 {
         self.reference_m_s / firing.simulator.sound_speed_m_s()
     }
 
-    /// How ranges that a receiver tells move with the threshold.
+    /// Time walk of the ranges of a receiver.
     pub(crate) fn time_walk(&self, receiver: &Receiver) -> TimeWalk {
         time_walk(receiver, self.world, self.reference_m_s / receiver.sound_speed_m_s)
     }
 
-    /// What a path from the axis gains where the face is beside it: in length, to first order, and by the beam pattern in
-    /// the directions in which it leaves and comes then, decibels. `None` where it was found from the face.
-    fn beside_axis(
+    /// First-order correction of a path found from the axis for the transducer offset: length,
+    /// metres, and level by the beam pattern, decibels. `None` for a path found from the transducer
+    /// itself.
+    fn off_axis(
         &self,
         arrival: &Arrival,
-        path: &PathRates,
-        firing: &Firing,
+        path: &PathJacobian,
+        firing: &FiringGeometry,
     ) -> Option<(f64, f64)> {
         let mounting = &self.world.sensor.mounting;
         if mounting.is_on_axis() || !firing.simulator.sensor().mounting.is_on_axis() {
@@ -298,16 +311,16 @@ impl<'a> RateFinder<'a> {
     }
 }
 
-/// Mirror reflections of an arrival after its first.
+/// Number of mirror reflections of an arrival after its first.
 fn further_reflections(arrival: &Arrival) -> f64 {
     arrival.path.order().saturating_sub(1) as f64
 }
 
-/// The beam pattern slightly changed by a parameter, if it is about the beam, and by how much.
+/// Beam pattern after a small change of a parameter of the beam, and the change.
 fn changed_beam(world: &World, parameter: &Parameter) -> Option<(BeamPattern, f64)> {
     let by = match parameter {
         Parameter::Aperture => 0.01,
-        // Downwards, where there is always room.
+        // Downwards, which is always possible.
         Parameter::Skirts => -0.1,
         _ => return None,
     };
@@ -327,20 +340,20 @@ fn other_bands(world: &World, parameters: &[&Parameter]) -> Option<[TimeWalk; 2]
 }
 
 fn time_walk(receiver: &Receiver, world: &World, stretch: f64) -> TimeWalk {
-    TimeWalk::of(receiver, receiver.sound_speed_m_s / world.sensor.frequency_hz, stretch)
+    TimeWalk::new(receiver, receiver.sound_speed_m_s / world.sensor.frequency_hz, stretch)
 }
 
-/// What the strength of a path gains with a parameter of a material, decibels for each unit; 0 for others.
+/// Derivative of the level of a path by a parameter of a material, decibels per unit; 0 for others.
 pub(crate) fn material_rate_db(parameter: &Parameter, scene: &Scene, path: &Path) -> f64 {
-    /// Where a material hardly mirrors or scatters, a little more is many decibels, which no step would hold.
-    const LEAST_SHARE: f64 = 0.02;
+    /// Minimum fraction for the derivative: near zero, a small change is many decibels.
+    const MIN_SHARE: f64 = 0.02;
     let (Parameter::Reflectance(name) | Parameter::Roughness(name)) = parameter else { return 0.0 };
     let Some(material) = scene.materials.get(name) else { return 0.0 };
     let [by_mirror, by_scattering] = match parameter {
-        // Both have shares of the same energy, which are roots in the amplitude.
+        // Both share the energy; amplitudes are square roots.
         Parameter::Roughness(_) => {
             let scattered = material.roughness;
-            [-0.5 / (1.0 - scattered).max(LEAST_SHARE), 0.5 / scattered.max(LEAST_SHARE)]
+            [-0.5 / (1.0 - scattered).max(MIN_SHARE), 0.5 / scattered.max(MIN_SHARE)]
         }
         _ => [1.0, 1.0],
     };

@@ -1,16 +1,17 @@
-//! Time walk, and at which thresholds a reading is told that varies with them.
+//! Time walk, and its expectation over varying thresholds.
 
 use sonard_model::acoustics::Receiver;
 
-/// Margins that are tabulated, decibels: beyond the last a pulse rises where it begins.
-const MOST_DB: f64 = 60.0;
-/// Steps of the table, in the root of the margin: at its top a pulse is flat, and its rise takes any time.
+/// Maximum tabulated margin, decibels: above it a pulse is detected at its onset.
+const MAX_DB: f64 = 60.0;
+/// Number of table steps, in the square root of the margin: the time walk diverges at margin 0,
+/// where the top of a pulse is flat.
 const STEPS: usize = 256;
-/// Standard deviations of the threshold beyond which nothing is asked about limits.
+/// Threshold limits beyond this many standard deviations are ignored.
 const AMPLE: f64 = 5.0;
-/// Of the standard deviation of ranges: so little time walk is not looked at closely.
+/// Time walk below this fraction of the range error is not integrated.
 const NEGLIGIBLE: f64 = 0.2;
-/// Places on one side of the middle of an interval from -1 to 1, and weights, of Gauss' and Legendre's rule of twelve.
+/// Positive nodes and weights of the 12-point Gauss-Legendre rule on [-1, 1].
 const PLACES: [(f64, f64); 6] = [
     (0.125_233_408_511_468_9, 0.249_147_045_813_402_8),
     (0.367_831_498_998_180_2, 0.233_492_536_538_354_8),
@@ -20,11 +21,11 @@ const PLACES: [(f64, f64); 6] = [
     (0.981_560_634_246_719_3, 0.047_175_336_386_511_8),
 ];
 
-/// Ranges that are missed by more than this, in wavelengths, are not known so well that what moves them by tenths of a
-/// millimetre could be believed, or phases far off.
+/// Range error in wavelengths above which time walk of tenths of a millimetre, or remote phase
+/// matches, are not trusted.
 pub(crate) const WELL_KNOWN: f64 = 0.35;
 
-/// By how much later a lone echo is told (time walk) that reaches less far above the threshold at which it is lost.
+/// Time walk of an isolated echo as a function of its margin above the detection limit.
 #[derive(Debug, Clone)]
 pub(crate) struct TimeWalk {
     late_m: Vec<f64>,
@@ -32,44 +33,45 @@ pub(crate) struct TimeWalk {
 }
 
 impl TimeWalk {
-    /// Of a receiver that hears a wavelength, in ranges that are told `stretch` times as long.
-    pub(crate) fn of(receiver: &Receiver, wavelength_m: f64, stretch: f64) -> Self {
-        let root = |step: usize| step as f64 * MOST_DB.sqrt() / STEPS as f64;
+    /// Tabulates a receiver's time walk at a wavelength, for ranges scaled by `stretch`.
+    pub(crate) fn new(receiver: &Receiver, wavelength_m: f64, stretch: f64) -> Self {
+        let root = |step: usize| step as f64 * MAX_DB.sqrt() / STEPS as f64;
         let lost_db = receiver.least_margin_db();
         let late_m = |step: usize| stretch * receiver.time_walk_m(lost_db + root(step).powi(2));
         Self { late_m: (0..=STEPS).map(late_m).collect(), wavelength_m }
     }
 
-    /// Whether ranges with a standard deviation, metres, say how strong echoes are.
+    /// Returns `true` if ranges with a standard deviation, metres, carry information on levels.
     pub(crate) fn is_believed(&self, sigma_m: f64) -> bool {
         sigma_m < WELL_KNOWN * self.wavelength_m
     }
 
-    /// That far below the threshold at which it is lost, decibels: metres, and what it gains with each decibel more.
+    /// Time walk `margin_db` above the detection limit: range error in metres, and derivative in
+    /// m/dB.
     pub(crate) fn at(&self, margin_db: f64) -> [f64; 2] {
-        let per_root = STEPS as f64 / MOST_DB.sqrt();
-        let root = margin_db.clamp(0.0, MOST_DB).sqrt();
+        let per_root = STEPS as f64 / MAX_DB.sqrt();
+        let root = margin_db.clamp(0.0, MAX_DB).sqrt();
         let place = root * per_root;
         let below = (place as usize).min(STEPS - 1);
         let [low_m, high_m] = [self.late_m[below], self.late_m[below + 1]];
         let late_m = low_m + (place - below as f64) * (high_m - low_m);
-        // Of the root, whose own rate has no limit at 0.
+        // Chain rule for the square root, whose derivative diverges at 0.
         let slope = (high_m - low_m) * per_root / (2.0 * root.max(0.5 / per_root));
-        [late_m, if margin_db < MOST_DB { slope } else { 0.0 }]
+        [late_m, if margin_db < MAX_DB { slope } else { 0.0 }]
     }
 
-    /// How late an echo is expected to be that is told by thresholds between two limits, and reaches `until_db`, the upper one,
-    /// above the usual one: of those that vary by a standard deviation. What moves ranges by a small part of `sigma_m` is
-    /// hardly looked at.
+    /// Expected time walk of an echo reported between two threshold limits, the upper one being its
+    /// detection limit `until_db` above the nominal threshold, for a standard deviation of the
+    /// threshold. Effects much smaller than `sigma_m` are approximated.
     pub(crate) fn expected(
         &self,
         [from_db, until_db]: [f64; 2],
         sigma_db: f64,
         sigma_m: f64,
-    ) -> Late {
+    ) -> ExpectedWalk {
         if until_db > AMPLE * sigma_db && from_db < -AMPLE * sigma_db {
             let [mean_m, by_until_m] = self.at(until_db);
-            return Late { mean_m, sigma_m: (by_until_m * sigma_db).abs(), by_until_m };
+            return ExpectedWalk { mean_m, sigma_m: (by_until_m * sigma_db).abs(), by_until_m };
         }
         let [strongest_db, weakest_db] = likely_limits([from_db, until_db].map(|db| db / sigma_db))
             .map(|threshold| until_db - sigma_db * threshold)
@@ -77,16 +79,16 @@ impl TimeWalk {
         let [[latest_m, _], [earliest_m, _]] = [weakest_db, strongest_db].map(|db| self.at(db));
         if latest_m - earliest_m < NEGLIGIBLE * sigma_m {
             let [mean_m, by_until_m] = self.at(0.5 * (weakest_db + strongest_db));
-            return Late { mean_m, sigma_m: 0.0, by_until_m };
+            return ExpectedWalk { mean_m, sigma_m: 0.0, by_until_m };
         }
         self.summed(until_db, sigma_db, [weakest_db, strongest_db])
     }
 
-    /// By sums over margins: in steps of their root, of which time walk is smooth (Gauss and Legendre).
-    fn summed(&self, until_db: f64, sigma_db: f64, margins_db: [f64; 2]) -> Late {
+    /// Gauss-Legendre integral over the square root of the margin, in which time walk is smooth.
+    fn summed(&self, until_db: f64, sigma_db: f64, margins_db: [f64; 2]) -> ExpectedWalk {
         let [low, high] = margins_db.map(f64::sqrt);
-        let [most, least] = margins_db.map(|margin_db| (until_db - margin_db) / sigma_db);
-        let densest = 0.0_f64.max(least).min(most);
+        let [max, min] = margins_db.map(|margin_db| (until_db - margin_db) / sigma_db);
+        let densest = 0.0_f64.max(min).min(max);
         let mut sums = [0.0; 5];
         for (place, weight) in PLACES {
             for sign in [-1.0, 1.0] {
@@ -94,7 +96,7 @@ impl TimeWalk {
                 let margin_db = root * root;
                 let [late_m, _] = self.at(margin_db);
                 let deviate = (until_db - margin_db) / sigma_db;
-                // Beside the densest, which no quotient of two sums depends on.
+                // Relative to the maximum density, which cancels in the ratios.
                 let density = (0.5 * (densest * densest - deviate * deviate)).exp();
                 let weight = weight * root * density;
                 let of = [1.0, late_m, late_m * late_m, margin_db, late_m * margin_db];
@@ -103,7 +105,7 @@ impl TimeWalk {
         }
         let [all, ..] = sums;
         let [_, mean_m, square, margin_db, product] = sums.map(|sum| sum / all);
-        Late {
+        ExpectedWalk {
             mean_m,
             sigma_m: (square - mean_m * mean_m).max(0.0).sqrt(),
             // The derivative of the mean of a truncated normal distribution: a covariance.
@@ -112,28 +114,29 @@ impl TimeWalk {
     }
 }
 
-/// How late echoes are expected to be.
+/// Expected time walk.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Late {
-    /// Mean and standard deviation, metres.
+pub(crate) struct ExpectedWalk {
+    /// Mean, metres.
     pub(crate) mean_m: f64,
+    /// Standard deviation, metres.
     pub(crate) sigma_m: f64,
-    /// What the mean gains with each decibel that they reach higher.
+    /// Derivative of the mean by the detection limit, m/dB.
     pub(crate) by_until_m: f64,
 }
 
-/// The part of what is between two limits where a standard normal deviate is likely to be: all but 1e-4 of it.
+/// Part of an interval that contains all but 1e-4 of a standard normal deviate within it.
 fn likely_limits([from, until]: [f64; 2]) -> [f64; 2] {
-    /// Twice the logarithm of how much fainter the density is at the ends of the part than at its densest.
+    /// Twice the log-ratio of the maximum density to that at the ends of the part.
     const FAINT: f64 = 19.0;
-    /// Where a density is as much fainter than at a limit on its own side.
+    /// Deviate at which the density is lower by that ratio than at a limit.
     fn beyond(limit: f64) -> f64 {
         (limit * limit + FAINT).sqrt()
     }
     let low = -beyond((-until).max(0.0));
     let high = beyond(from.max(0.0));
     let high = high.min(until);
-    // What is overtaken by what comes before it has no room left.
+    // An empty interval collapses to its upper limit.
     [low.max(from).min(high), high]
 }
 
@@ -143,11 +146,11 @@ mod tests {
 
     use super::*;
 
-    /// However far from the usual one thresholds have to be: close to where they are most likely.
+    /// Holds for limits far from the nominal threshold: the result is close to the likeliest ones.
     #[test]
-    fn what_is_unlikely_is_expected_too() {
+    fn unlikely_limits_have_an_expectation() {
         let sensor = Sensor::preset("senscomp-6500").expect("a preset");
-        let walk = TimeWalk::of(&Receiver::new(&sensor, 343.0), 7e-3, 1.0);
+        let walk = TimeWalk::new(&Receiver::new(&sensor, 343.0), 7e-3, 1.0);
         let mut last_m = f64::INFINITY;
         for until_db in [-40.0, -5.0, -1.0, -0.3, 0.0, 0.1, 0.4, 2.0, 30.0] {
             let late = walk.expected([f64::NEG_INFINITY, until_db], 0.1, 1e-6);
@@ -155,7 +158,7 @@ mod tests {
             assert!(late.by_until_m < 0.0 && late.by_until_m > -0.1, "{until_db}: {late:?}");
             last_m = late.mean_m;
         }
-        // Between limits that leave no room, at the upper one.
+        // An empty interval is evaluated at its upper limit.
         let late = walk.expected([1.0, 0.5], 0.1, 1e-6);
         assert!((late.mean_m - walk.at(0.0)[0]).abs() < 1e-9, "{late:?}");
     }
@@ -170,7 +173,7 @@ mod tests {
             let [all, likely] = [[from, until], [low, high]].map(|[a, b]| up_to(b) - up_to(a));
             assert!(from <= low && high <= until, "{from} {until}: {low} {high}");
             assert!((likely / all - 1.0).abs() < 1e-4, "{from} {until}: {low} {high}");
-            // And on the other side.
+            // And mirrored.
             let [other_low, other_high] = likely_limits([-until, -from]);
             assert!((other_low + high).abs() < 1e-12 && (other_high + low).abs() < 1e-12);
         }
