@@ -79,7 +79,7 @@ fn pictures_and_ways_are_drawn_and_wrong_input_is_refused() {
     ])
     .success();
     let text = std::fs::read_to_string(&svg).expect("the picture");
-    assert!(text.contains("south, north, south") && text.contains("threshold in force"));
+    assert!(text.contains("south, north, south") && text.contains("detection threshold"));
     sonard(&["simulate", "--scene", "simple-room", "--pose", "fig9", "-o", &log]).success();
     sonard(&["plot", &log, "--azimuth-deg", "270", "-o", &way]).success();
     let text = std::fs::read_to_string(&way).expect("the picture");

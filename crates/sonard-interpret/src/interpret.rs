@@ -1,35 +1,38 @@
-//! Making sense of scans.
+//! Interpretation of scans: features, maps and confidences.
 //!
-//! [`interpret`] tells planes, corners and edges apart after O. Bozma and R. Kuc, "Building a
-//! sonar map in a specular environment using a single mobile sensor", IEEE PAMI 13 (1991). Its
-//! steps: a scan's beams ([`Sweep`]) fall into [`Region`]s of constant depth; a region's angular
-//! extent against what the sensor allows ([`Extents`]) says edge or not; the same element seen
-//! from a second place says plane or corner; [`UniformSum`] is the density of the errors, from
-//! which every verdict has its probability.
+//! [`interpret`] classifies planes, corners and edges after O. Bozma and R. Kuc, "Building a
+//! sonar map in a specular environment using a single mobile sensor", IEEE PAMI 13 (1991):
 //!
-//! [`prediction`] gives each reading a confidence, and [`grid`] makes maps of readings with
-//! poses and says how good they are.
+//! 1. The beams of a scan ([`Sweep`]) are segmented into [`Region`]s of constant depth.
+//! 2. The angular extent of a region, compared with the sensor's ([`Extents`]), separates edges
+//!    from planes and corners.
+//! 3. The same element observed from a second position separates planes from corners.
+//!
+//! [`UniformSum`] is the density of the errors, from which every class gets its probability.
+//!
+//! [`prediction`] assigns a confidence to each reading, and [`grid`] builds and scores maps of
+//! readings with poses.
 
 mod arc;
-mod belief;
+mod classify;
 mod density;
-mod differentiate;
 mod extent;
 mod feature;
 pub mod grid;
 pub mod lines;
 pub mod mapping;
-mod next;
+mod next_view;
+mod posterior;
 pub mod prediction;
 mod region;
 mod sweep;
 #[cfg(test)]
 mod tests;
 
+pub use classify::interpret;
 pub use density::UniformSum;
-pub use differentiate::interpret;
 pub use extent::{ExtentError, Extents};
 pub use feature::{Feature, FeatureKind, NextPosition, Noise, Probabilities, Reason, Settings};
-pub use next::{least_corner_m, least_plane_m, least_translation_m};
+pub use next_view::{least_corner_m, least_plane_m, least_translation_m};
 pub use region::{Region, Side, regions};
 pub use sweep::{Beam, Heard, Sweep, SweepError};

@@ -1,28 +1,31 @@
-//! How often a sweep is located without a guess, beside what is usually done with ranges.
+//! Global localization of a sweep compared with standard range-based methods.
 //!
-//! `cargo run --release -p sonard-inverse --example baselines -- COUNT [SEED] [SCENE...]` draws COUNT places in each scene
-//! (all shipped ones, if none is named) and locates a sweep of 400 beams from each, read to 4 m with noise of 1 mm and the
-//! far tail of `TofNoise`, by
+//! `cargo run --release -p sonard-inverse --example baselines -- COUNT [SEED] [SCENE...]` draws
+//! COUNT positions in each scene (all shipped ones by default) and locates a sweep of 400 beams
+//! from each. Ranges reach 4 m, with noise of 1 mm and the far tail of `TofNoise`. The methods:
 //!
 //! - `locate` of this crate;
-//! - nearest hit: ranges to the nearest hit within the beam, with a spread of 5 cm and a floor for what differs;
-//! - beam model: the same with the four components of Thrun, Burgard and Fox (Probabilistic Robotics, section 6.3: hit,
-//!   short, none, random), whose shares and spread are learned from twenty sweeps at known poses in the same scene;
-//! - histogram: the place whose learned histogram of ranges (25 cm, silences apart) is most alike, as in place
-//!   recognition, from one sweep at each place of the grid; the heading by the turn at which the ranges fit best.
+//! - nearest hit: ranges to the nearest hit within the beam, with a standard deviation of 5 cm and
+//!   a floor for outliers;
+//! - beam model: the four components of Thrun, Burgard and Fox (Probabilistic Robotics, section
+//!   6.3: hit, short, none, random), with weights and widths learned from twenty sweeps at known
+//!   poses in the same scene;
+//! - histogram: the position with the most similar learned histogram of ranges (25 cm bins, and one
+//!   for no echo), as in place recognition, from one sweep at each grid position; the heading is
+//!   the rotation with the best fit of the ranges.
 //!
-//! All have the same grid (0.1 m, 3 degrees); the second and third improve its four best poses by a pattern search.
-//! Prints which share of the first answers is within 2 cm and 1 degree, and within 10 cm and 10 degrees, and the median time on
-//! one core. Where a scene is the same turned by half, either pose is right.
+//! All methods use the same grid (0.1 m, 3 degrees); the second and third refine the four best
+//! poses by a pattern search. The output is the fraction of first answers within 2 cm and 1 degree,
+//! and within 10 cm and 10 degrees, and the median time on one core. In a scene with point symmetry
+//! either pose is correct.
 
-mod beside;
-mod images;
+mod methods;
 mod rooms;
+mod symmetry;
 
 use std::{sync::Arc, time::Instant};
 
-use beside::{BeamModel, Grid, Histograms, nearest_hit};
-use images::images;
+use methods::{BeamModel, Grid, Histograms, nearest_hit};
 use rand::SeedableRng as _;
 use rand_pcg::Pcg64;
 use rooms::{place, readings};
@@ -33,10 +36,11 @@ use sonard_model::{
     model::{EngineKind, Options},
     scene::{Scene, shipped},
 };
+use symmetry::equivalent_poses;
 use uuid::Uuid;
 
 const REACH_M: f64 = 4.0;
-const TRAINED_ON: usize = 20;
+const TRAINING_SWEEPS: usize = 20;
 const NAMES: [&str; 4] = ["locate", "nearest hit", "beam model", "histogram"];
 
 fn main() {
@@ -63,7 +67,7 @@ fn world_of(name: &str, engine: EngineKind) -> World {
     World::new(scene, sensor, Air::default(), options)
 }
 
-/// What one way to locate came to.
+/// Result of one localization method.
 #[derive(Default)]
 struct Tally {
     near: u32,
@@ -85,8 +89,9 @@ fn compared_in(name: &str, count: u64, seed: u64) {
         Some((pose, Sweep { scan: Uuid::nil(), pose: unknown, beams }))
     };
     let grid = Grid::new(&world_of(name, EngineKind::Cone), REACH_M);
-    let trained: Vec<(Pose, Sweep)> = (0..TRAINED_ON).filter_map(|_| taken(&mut rng)).collect();
-    let beam_model = BeamModel::learned(&grid, &trained);
+    let training: Vec<(Pose, Sweep)> =
+        (0..TRAINING_SWEEPS).filter_map(|_| taken(&mut rng)).collect();
+    let beam_model = BeamModel::learned(&grid, &training);
     let histograms = Histograms::learned(&world, &grid, &mut rng);
     let mut tallies: [Tally; NAMES.len()] = Default::default();
     for _ in 0..count {
@@ -95,38 +100,38 @@ fn compared_in(name: &str, count: u64, seed: u64) {
             let modes = locate(&world, &atlas, &sweep).ok()?;
             modes.first().map(|m| Pose { x_m: m.x_m, y_m: m.y_m, heading_deg: m.heading_deg })
         };
-        let (heard, right) = (grid.heard(&sweep), images(&world, &pose));
-        let ways: [&dyn Fn() -> Option<Pose>; NAMES.len()] = [
+        let (measured, right) = (grid.readings(&sweep), equivalent_poses(&world, &pose));
+        let methods: [&dyn Fn() -> Option<Pose>; NAMES.len()] = [
             &by_crate,
-            &|| grid.located(&heard, &nearest_hit),
-            &|| grid.located(&heard, &|expected, read| beam_model.log_likelihood(expected, read)),
-            &|| histograms.located(&heard),
+            &|| grid.locate(&measured, &nearest_hit),
+            &|| grid.locate(&measured, &|expected, read| beam_model.log_likelihood(expected, read)),
+            &|| histograms.locate(&measured),
         ];
-        for (tally, way) in tallies.iter_mut().zip(ways) {
+        for (tally, method) in tallies.iter_mut().zip(methods) {
             let began = Instant::now();
-            let found = way();
+            let found = method();
             tally.times_s.push(began.elapsed().as_secs_f64());
             tally.near +=
                 u32::from(found.is_some_and(|found| is_within(&found, &right, 0.02, 1.0)));
             tally.far += u32::from(found.is_some_and(|found| is_within(&found, &right, 0.1, 10.0)));
         }
     }
-    for (way, mut tally) in NAMES.into_iter().zip(tallies) {
+    for (method, mut tally) in NAMES.into_iter().zip(tallies) {
         tally.times_s.sort_by(f64::total_cmp);
         let of = tally.times_s.len();
         let share = |part: u32| format!("{:.0} %", 100.0 * f64::from(part) / of.max(1) as f64);
         let median_s = tally.times_s.get(of / 2).copied().unwrap_or(0.0);
         println!(
-            "{name:24} {way:12} {:>8} {:>8} {median_s:>10.3}",
+            "{name:24} {method:12} {:>8} {:>8} {median_s:>10.3}",
             share(tally.near),
             share(tally.far)
         );
     }
 }
 
-fn is_within(found: &Pose, right: &[Pose], most_m: f64, most_deg: f64) -> bool {
+fn is_within(found: &Pose, right: &[Pose], max_m: f64, max_deg: f64) -> bool {
     right.iter().any(|pose| {
-        found.position().distance(pose.position()) < most_m
-            && wrap_180(found.heading_deg - pose.heading_deg).abs() < most_deg
+        found.position().distance(pose.position()) < max_m
+            && wrap_180(found.heading_deg - pose.heading_deg).abs() < max_deg
     })
 }

@@ -1,18 +1,18 @@
-//! How often a robot knows where it is along a course, alone by each sweep and with odometry between them.
+//! Localization along a course, from single sweeps and with odometry between them.
 //!
-//! `cargo run --release -p sonard-inverse --example courses -- COUNT [SEED] [BEAMS] [SCENE...]` drives COUNT courses of
-//! eight sweeps in each scene (all shipped ones, if none is named), up to half a metre from one to the next, with odometry
-//! that is off by 5 % and 5 degrees a metre; before the fifth sweep the robot is carried elsewhere. Right is the first
-//! answer within 2 cm and 1 degree of the truth (10 cm and 5 degrees with fewer than 100 beams); where a scene is the same
-//! turned by half, either pose is. Prints the shares of sweeps
-//! that are right, and of courses that are right again within so many sweeps after the robot was carried.
+//! `cargo run --release -p sonard-inverse --example courses -- COUNT [SEED] [BEAMS] [SCENE...]`
+//! drives COUNT courses of eight sweeps in each scene (all shipped ones by default), up to half a
+//! metre apart. Odometry errors are 5 % and 5 degrees per metre; before the fifth sweep the robot
+//! is kidnapped. A first answer within 2 cm and 1 degree of the truth is correct (10 cm and 5
+//! degrees with fewer than 100 beams); in a scene with point symmetry either pose is. The output is
+//! the fraction of correct sweeps, and of courses that recover within a number of sweeps after the
+//! kidnapping.
 
-mod images;
 mod rooms;
+mod symmetry;
 
 use std::sync::Arc;
 
-use images::images;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_distr::{Distribution as _, StandardNormal};
 use rand_pcg::Pcg64;
@@ -24,6 +24,7 @@ use sonard_model::{
     model::Options,
     scene::{Scene, shipped},
 };
+use symmetry::equivalent_poses;
 use uuid::Uuid;
 
 const SWEEPS: usize = 8;
@@ -46,13 +47,13 @@ fn main() {
     }
 }
 
-/// What came of the courses in a scene.
+/// Results of the courses in a scene.
 #[derive(Default)]
 struct Tally {
     sweeps: u32,
     alone: u32,
     course: u32,
-    /// Courses that were right again at the first sweep after the robot was carried, at one of two, of three.
+    /// Courses that recovered at the first, second and third sweep after the kidnapping.
     again: [u32; SWEEPS - CARRIED - 1],
     courses: u32,
 }
@@ -102,7 +103,7 @@ fn drive(world: &World, atlas: &Atlas, beams: usize, rng: &mut Pcg64, tally: &mu
             pose: told,
             beams: all.into_iter().step_by(every).collect(),
         };
-        let right = images(world, &pose);
+        let right = equivalent_poses(world, &pose);
         let is_right = |modes: &[Mode]| {
             let found = modes.first();
             found.is_some_and(|mode| right.iter().any(|pose| is_there(mode, pose, beams)))
@@ -121,7 +122,7 @@ fn drive(world: &World, atlas: &Atlas, beams: usize, rng: &mut Pcg64, tally: &mu
     tally.courses += 1;
 }
 
-/// Half a metre on at the most, with what odometry makes of it.
+/// Drives at most half a metre, with odometry errors.
 fn next(scene: &Scene, pose: &Pose, told: &Pose, rng: &mut Pcg64) -> (Pose, Pose) {
     for _ in 0..100 {
         let (ahead_m, turn_deg) = (rng.random_range(0.1..LEG_M), rng.random_range(-90.0..90.0));
@@ -139,7 +140,7 @@ fn next(scene: &Scene, pose: &Pose, told: &Pose, rng: &mut Pcg64) -> (Pose, Pose
     (*pose, *told)
 }
 
-/// Turns, and drives where it then looks.
+/// Turns and drives ahead.
 fn moved(pose: &Pose, ahead_m: f64, turn_deg: f64) -> Pose {
     let heading_deg = wrap_180(pose.heading_deg + turn_deg);
     let at = pose.position() + ahead_m * DVec2::from_angle(heading_deg.to_radians());

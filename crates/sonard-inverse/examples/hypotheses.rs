@@ -1,15 +1,16 @@
-//! What one hypothesis of a sweep's pose costs, with derivatives by x, y and heading.
+//! Cost of one pose hypothesis of a sweep, with derivatives by x, y and heading.
 //!
-//! `cargo run --release -p sonard-inverse --example hypotheses` predicts 400 beams from many places of each scene, one
-//! place after the other on one core, and prints the median of the readings alone and of what a hypothesis takes. Names
-//! of scenes as arguments choose among them.
+//! `cargo run --release -p sonard-inverse --example hypotheses` predicts 400 beams from many
+//! positions in each scene, sequentially on one core. The output is the median time of the
+//! predictions alone and of a hypothesis. Scene names as arguments select among the scenes.
 
+#[path = "rooms/error_model.rs"]
+mod error_model;
 mod rooms;
-#[path = "rooms/spread.rs"]
-mod spread;
 
 use std::{hint::black_box, sync::Arc, time::Instant};
 
+use error_model::ERRORS;
 use rand::SeedableRng as _;
 use rand_pcg::Pcg64;
 use rooms::{place, readings};
@@ -20,15 +21,14 @@ use sonard_model::{
     model::Options,
     scene::{Scene, shipped},
 };
-use spread::SPREAD;
 use uuid::Uuid;
 
-/// Scenes, and how far they are looked at, metres.
+/// Scenes with their maximum ranges, metres.
 const TO_M: [(&str, f64); 4] =
     [("simple-room", 4.0), ("simple-room", 10.7), ("simple-room-robot", 4.0), ("mcgill-lab", 10.7)];
-/// Places in each.
+/// Positions per scene.
 const PLACES: usize = 41;
-/// At each of them.
+/// Repetitions per position.
 const RUNS: u32 = 9;
 
 fn main() {
@@ -46,7 +46,7 @@ fn main() {
     }
 }
 
-/// Median milliseconds of a sweep's readings alone and of its likelihood with derivatives.
+/// Median time of a sweep's predictions alone and of its likelihood with derivatives, milliseconds.
 fn times(name: &str, to_m: f64) -> Option<(f64, f64)> {
     let scene = Arc::new(Scene::from_json(shipped::text(name)?).ok()?);
     let sensor = Sensor::preset("senscomp-6500").ok()?;
@@ -72,14 +72,14 @@ fn times(name: &str, to_m: f64) -> Option<(f64, f64)> {
             Some(())
         })?);
         whole.push(best_ms(|| {
-            black_box(hypotheses.log_likelihood(&sweep, &off, &SPREAD).ok()?);
+            black_box(hypotheses.log_likelihood(&sweep, &off, &ERRORS).ok()?);
             Some(())
         })?);
     }
     Some((median(alone), median(whole)))
 }
 
-/// The best of several runs, milliseconds: what others on the computer take is left out.
+/// Minimum time of several runs, milliseconds, to exclude other load on the computer.
 fn best_ms(mut run: impl FnMut() -> Option<()>) -> Option<f64> {
     let mut best = f64::INFINITY;
     for _ in 0..RUNS {

@@ -1,11 +1,13 @@
-//! How often a sweep is located without a guess, and how long that takes.
+//! Success rate and duration of global localization of a sweep.
 //!
-//! `cargo run --release -p sonard-inverse --example locations -- COUNT [SEED] [BEAMS] [SCENE...]` draws COUNT places in
-//! each scene (all shipped ones, if none is named) and locates a sweep of 400 beams from each, read to 4 m with noise of 1 mm
-//! and the far tail of `TofNoise`. Right is a listed pose within 2 cm and 1 degree of the truth (10 cm and 5 degrees with
-//! fewer than 100 beams); told is one that is right, or that says itself that it is not known so well and holds the truth
-//! within the 95 % that it states; sure is one that is right and has most of the probability. Prints all as shares, and
-//! times of one core, in which nothing else that the machine does counts.
+//! `cargo run --release -p sonard-inverse --example locations -- COUNT [SEED] [BEAMS] [SCENE...]`
+//! draws COUNT positions in each scene (all shipped ones by default) and locates a sweep of 400
+//! beams from each. Ranges reach 4 m, with noise of 1 mm and the far tail of `TofNoise`. A listed
+//! pose within 2 cm and 1 degree of the truth is correct (10 cm and 5 degrees with fewer than 100
+//! beams). A listed pose is consistent if it is correct, or has a large standard deviation and a 95
+//! % interval that contains the truth. A pose is confident if it is correct and has most of the
+//! probability. The output gives all three as fractions, and CPU times of one core without other
+//! processes.
 
 mod rooms;
 
@@ -96,7 +98,7 @@ fn located_in(name: &str, count: u64, seed: u64, beams: usize) {
     );
 }
 
-/// As near as it has to be, metres and degrees.
+/// Tolerance of a correct pose, metres and degrees.
 const fn near(beams: usize) -> (f64, f64) {
     if beams < 100 { (0.1, 5.0) } else { (0.02, 1.0) }
 }
@@ -111,7 +113,7 @@ fn is_there(mode: &Mode, pose: &Pose, beams: usize) -> bool {
     x_m.hypot(y_m) < most_m && turned_deg.abs() < most_deg
 }
 
-/// Whether a pose says that it is not known so well, and holds the truth within what it states.
+/// Checks that an uncertain pose contains the truth in its 95 % interval.
 fn is_told(mode: &Mode, pose: &Pose, beams: usize) -> bool {
     // Each of three is within so many standard deviations in 98.3 % of cases, all in 95 %.
     const SIGMAS: f64 = 2.39;
@@ -125,7 +127,7 @@ fn is_told(mode: &Mode, pose: &Pose, beams: usize) -> bool {
         && within(turned_deg, mode.sigma_heading_deg)
 }
 
-/// Time that the threads of this program had on a processor, seconds; where that is not told, by the clock.
+/// CPU time of this process, seconds; wall time where the system lacks it.
 fn cpu_s() -> f64 {
     static BEGAN: LazyLock<Instant> = LazyLock::new(Instant::now);
     let of = |task: std::io::Result<std::fs::DirEntry>| -> Option<f64> {

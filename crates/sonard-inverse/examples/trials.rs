@@ -1,68 +1,76 @@
-//! How well parameters are found again in simulation, beside the bound of Cramer and Rao.
+//! Accuracy of estimated parameters in simulation, compared with the Cramer-Rao bound.
 //!
-//! `cargo run --release -p sonard-inverse --example trials -- COUNT [SEED] [MINUTES] [mounting] [furniture] [bodiless] [quick] [each]`
-//! draws COUNT worlds: a shipped scene, a place in it, and what is wrong with what is believed of it (pose by up to 10 cm
-//! and 8 degrees, air by 8 degrees Celsius, a wall by 5 cm, threshold by 6 dB; with `mounting` the face by 3 cm ahead and
-//! aside, with `furniture` five round things that the scene lacks). Readings have noise of 1 mm with the far tail of
-//! `TofNoise`, and thresholds that vary by 0.5 dB from firing to firing. None is begun after so many minutes. Prints for each parameter the root mean square of the errors, the
-//! same as a multiple of the bound and of the standard deviations told, the median of that and of the standard deviations told, the share of 95 % intervals
-//! that hold the truth, the same of parameters that readings say more of than was believed, with how many these are (what is left at its prior is
-//! drawn from as wide an interval, which holds it always), and how many trials went wrong with a small interval (beyond six standard deviations).
+//! ```text
+//! cargo run --release -p sonard-inverse --example trials -- \
+//!     COUNT [SEED] [MINUTES] [mounting] [furniture] [bodiless] [quick] [each]
+//! ```
 //!
-//! Each trial is fitted a second time from the truth. Where that ends in the same place, the bound tells how far off an
-//! estimate should be. Where it ends elsewhere and is likelier, the search failed; where it is less likely, the readings
-//! mislead whoever believes them. The table is printed for all trials, and for those that ended where the truth's own fit
-//! does. `each` prints a line for every trial, `at=N` runs that one alone; `bodiless` leaves out scenes with a robot's body, and `quick`
-//! fits as `sonard calibrate --search quick` does.
+//! draws COUNT worlds: a shipped scene, a position in it, and initial errors (pose up to 10 cm and
+//! 8 degrees, air 8 degrees Celsius, a wall 5 cm, threshold 6 dB; with `mounting` the transducer
+//! face 3 cm ahead and to the side, with `furniture` five cylinders missing in the scene). Readings
+//! have noise of 1 mm with the far tail of `TofNoise`, and thresholds that vary by 0.5 dB between
+//! firings. No trial starts after MINUTES.
+//!
+//! The output gives for each parameter the root mean square error; its ratios to the bound and to
+//! the estimated standard deviation; the medians of that ratio and of the standard deviations; the
+//! fraction of 95 % intervals that contain the truth; the same fraction of the identified
+//! parameters with their number (an unidentified parameter is drawn from as wide an interval as its
+//! prior, which always contains it); and the number of failed trials with a small interval (errors
+//! beyond six standard deviations).
+//!
+//! Each trial is fitted a second time from the truth. If both fits agree, the bound predicts the
+//! error of an estimate. If the first ends elsewhere with a lower posterior, the search failed;
+//! with a higher one, the readings are misleading. The table covers all trials, and those whose
+//! fits agree. `each` prints a line per trial, `at=N` runs a single trial; `bodiless` omits scenes
+//! with a robot body, and `quick` fits as `sonard calibrate --search quick` does.
 
+#[path = "rooms/error_model.rs"]
+mod error_model;
+mod perturbed;
 mod rooms;
-#[path = "rooms/spread.rs"]
-mod spread;
-mod wrong;
 
 use std::time::{Duration, Instant};
 
+use error_model::ERRORS;
+use perturbed::{Kinds, PerturbedWorld};
 use rayon::prelude::*;
 use rooms::{BEAMS, NOISE_MM};
 use sonard_inverse::{Parameter, Search, bound, fit, fit_from};
-use spread::SPREAD;
-use wrong::{Kinds, Wrong};
 
-/// What a trial found of a parameter.
+/// Estimate of one parameter in a trial.
 #[derive(Clone)]
-struct Found {
+struct ParameterError {
     name: String,
     error: f64,
     sigma: f64,
     is_identified: bool,
-    /// Of the readings as they are, furniture left out.
+    /// Bound for the actual readings, with the furniture missing in the model.
     bound: f64,
-    /// Of those that there would be without furniture.
-    unhindered: f64,
+    /// Bound for the readings without furniture.
+    unobstructed: f64,
 }
 
 struct Trial {
     number: u64,
     scene: &'static str,
-    found: Vec<Found>,
-    took_s: f64,
+    found: Vec<ParameterError>,
+    duration_s: f64,
     explained: f64,
-    /// By how much the logarithm of the posterior is higher where the fit ended than where one ends that begins at the
-    /// truth.
-    likelier: f64,
-    /// Whether both ended in the same place.
+    /// Log-posterior of this fit minus that of the fit from the truth.
+    log_ratio: f64,
+    /// Agreement of both fits.
     is_same: bool,
 }
 
-/// Ends this near to each other are the same: in standard deviations that the truth's own fit tells.
+/// Maximum distance of equal optima, in standard deviations of the fit from the truth.
 const SAME: f64 = 4.0;
 
 fn main() {
     let words: Vec<String> = std::env::args().skip(1).collect();
     let numbers: Vec<u64> = words.iter().filter_map(|text| text.parse().ok()).collect();
-    let number = |at: usize, usual: u64| numbers.get(at).copied().unwrap_or(usual);
+    let number = |at: usize, default: u64| numbers.get(at).copied().unwrap_or(default);
     let (count, seed, minutes) = (number(0, 50), number(1, 1), number(2, 1_000_000));
-    let has = |wanted: &str| words.iter().any(|word| word == wanted);
+    let has = |flag: &str| words.iter().any(|word| word == flag);
     let kinds = Kinds {
         mounting: has("mounting"),
         furniture: has("furniture"),
@@ -70,9 +78,9 @@ fn main() {
         search: has("quick").then_some(Search::Quick),
     };
     let alone = words.iter().find_map(|word| word.strip_prefix("at=")?.parse().ok());
-    let wanted = alone.map_or(0..count, |at: u64| at..at + 1);
+    let numbers_to_run = alone.map_or(0..count, |at: u64| at..at + 1);
     let (began, is_each) = (Instant::now(), has("each") || alone.is_some());
-    let trials: Vec<Trial> = wanted
+    let trials: Vec<Trial> = numbers_to_run
         .into_par_iter()
         .filter(|_| began.elapsed() < Duration::from_secs(60 * minutes))
         .filter_map(|at| {
@@ -87,59 +95,61 @@ fn main() {
 }
 
 fn trial(number: u64, seed: u64, kinds: Kinds) -> Option<Trial> {
-    let wrong = Wrong::drawn(seed.wrapping_mul(1_000_003) + number, kinds)?;
-    let there = std::slice::from_ref(&wrong.there);
-    let bounds = bound(&wrong.truth, there, &wrong.fit, &SPREAD).ok()?;
-    let unhindered = std::slice::from_ref(&wrong.unhindered);
-    let unhindered = bound(&wrong.truth, unhindered, &wrong.fit, &SPREAD).ok()?;
+    let perturbed = PerturbedWorld::random(seed.wrapping_mul(1_000_003) + number, kinds)?;
+    let true_sweeps = std::slice::from_ref(&perturbed.true_sweep);
+    let bounds = bound(&perturbed.truth, true_sweeps, &perturbed.fit, &ERRORS).ok()?;
+    let unobstructed_sweeps = std::slice::from_ref(&perturbed.unobstructed);
+    let unobstructed =
+        bound(&perturbed.truth, unobstructed_sweeps, &perturbed.fit, &ERRORS).ok()?;
     let began = Instant::now();
-    let here = std::slice::from_ref(&wrong.here);
-    let fitted = fit(&wrong.believed, here, &wrong.fit).ok()?;
-    let took_s = began.elapsed().as_secs_f64();
-    let of_truth = fit_from(&wrong.believed, here, &wrong.fit, &wrong.expected, &SPREAD).ok()?;
-    let both = fitted.estimates.iter().zip(&of_truth.estimates);
-    let is_same =
-        both.clone().all(|(one, other)| (one.change - other.change).abs() < SAME * other.sigma);
-    let found = wrong.fit.priors.iter().enumerate().map(|(at, prior)| Found {
+    let assumed_sweeps = std::slice::from_ref(&perturbed.assumed_sweep);
+    let fitted = fit(&perturbed.assumed, assumed_sweeps, &perturbed.fit).ok()?;
+    let duration_s = began.elapsed().as_secs_f64();
+    let from_truth =
+        fit_from(&perturbed.assumed, assumed_sweeps, &perturbed.fit, &perturbed.expected, &ERRORS)
+            .ok()?;
+    let both = fitted.estimates.iter().zip(&from_truth.estimates);
+    let is_same = both.clone().all(|(a, b)| (a.change - b.change).abs() < SAME * b.sigma);
+    let found = perturbed.fit.priors.iter().enumerate().map(|(at, prior)| ParameterError {
         name: match &prior.parameter {
             Parameter::Wall(_) => "wall".to_owned(),
             other => other.to_string(),
         },
-        error: fitted.estimates[at].change - wrong.expected[at],
+        error: fitted.estimates[at].change - perturbed.expected[at],
         sigma: fitted.estimates[at].sigma,
         is_identified: fitted.estimates[at].identified,
         bound: bounds[at],
-        unhindered: unhindered[at],
+        unobstructed: unobstructed[at],
     });
     Some(Trial {
         number,
-        scene: wrong.scene,
+        scene: perturbed.scene,
         found: found.collect(),
-        took_s,
+        duration_s,
         explained: fitted.errors.explained(),
-        likelier: fitted.log_posterior - of_truth.log_posterior,
+        log_ratio: fitted.log_posterior - from_truth.log_posterior,
         is_same,
     })
 }
 
 fn print(trials: &[Trial]) {
     println!("{} trials, {BEAMS} beams, noise {NOISE_MM} mm", trials.len());
-    let mut times: Vec<f64> = trials.iter().map(|trial| trial.took_s).collect();
+    let mut times: Vec<f64> = trials.iter().map(|trial| trial.duration_s).collect();
     times.sort_by(f64::total_cmp);
     if let Some(median) = times.get(times.len() / 2) {
-        println!("a fit took {median:.2} s (median), {:.2} s (most)", times[times.len() - 1]);
+        println!("a fit took {median:.2} s (median), {:.2} s (maximum)", times[times.len() - 1]);
     }
     table(&trials.iter().collect::<Vec<_>>());
     let (same, other): (Vec<&Trial>, Vec<&Trial>) = trials.iter().partition(|trial| trial.is_same);
-    let (likelier, less): (Vec<&Trial>, Vec<&Trial>) =
-        other.iter().copied().partition(|trial| trial.likelier > 0.0);
+    let (log_ratio, less): (Vec<&Trial>, Vec<&Trial>) =
+        other.iter().copied().partition(|trial| trial.log_ratio > 0.0);
     println!("\n{} ended where the truth's own fit does:", same.len());
     table(&same);
-    let mut by: Vec<f64> = likelier.iter().map(|trial| trial.likelier).collect();
+    let mut by: Vec<f64> = log_ratio.iter().map(|trial| trial.log_ratio).collect();
     by.sort_by(f64::total_cmp);
     println!(
-        "\n{} ended elsewhere where the posterior is higher, its logarithm by {:.1} (median), {:.1} (most)",
-        likelier.len(),
+        "\n{} ended elsewhere where the posterior is higher, its logarithm by {:.1} (median), {:.1} (maximum)",
+        log_ratio.len(),
         by.get(by.len() / 2).copied().unwrap_or(0.0),
         by.last().copied().unwrap_or(0.0)
     );
@@ -165,11 +175,11 @@ fn table(trials: &[&Trial]) {
         "sigma/b.",
         "95 % hold",
         "identified hold",
-        "wrong"
+        "failed"
     );
     let names = trials.first().map_or(0, |trial| trial.found.len());
     for at in 0..names {
-        let of: Vec<&Found> = trials.iter().map(|trial| &trial.found[at]).collect();
+        let of: Vec<&ParameterError> = trials.iter().map(|trial| &trial.found[at]).collect();
         let count = of.len() as f64;
         let rms = |of: &mut dyn Iterator<Item = f64>| {
             (of.map(|error| error * error).sum::<f64>() / count).sqrt()
@@ -179,22 +189,22 @@ fn table(trials: &[&Trial]) {
             sizes.sort_by(f64::total_cmp);
             sizes[sizes.len() / 2]
         };
-        let holds = |of: &[&Found]| {
+        let holds = |of: &[&ParameterError]| {
             let holding = of.iter().filter(|found| found.error.abs() < 1.96 * found.sigma);
             100.0 * holding.count() as f64 / of.len().max(1) as f64
         };
-        let identified: Vec<&Found> =
+        let identified: Vec<&ParameterError> =
             of.iter().copied().filter(|found| found.is_identified).collect();
-        let wrong = of.iter().filter(|found| found.error.abs() > 6.0 * found.sigma).count();
+        let failed = of.iter().filter(|found| found.error.abs() > 6.0 * found.sigma).count();
         println!(
-            "{:16} {:10.5} {:10.2} {:10.2} {:10.2} {:10.2} {:10.2} {:7.1} % {:7.1} % of {:4} {wrong:8}",
+            "{:16} {:10.5} {:10.2} {:10.2} {:10.2} {:10.2} {:10.2} {:7.1} % {:7.1} % of {:4} {failed:8}",
             of[0].name,
             rms(&mut of.iter().map(|found| found.error)),
             rms(&mut of.iter().map(|found| found.error / found.bound)),
             rms(&mut of.iter().map(|found| found.error / found.sigma)),
-            // Of a normal distribution as many standard deviations.
+            // 0.6745 converts the median of a normal distribution to its standard deviation.
             median(&mut of.iter().map(|found| found.error / found.bound)) / 0.6745,
-            median(&mut of.iter().map(|found| found.error / found.unhindered)) / 0.6745,
+            median(&mut of.iter().map(|found| found.error / found.unobstructed)) / 0.6745,
             median(&mut of.iter().map(|found| found.sigma / found.bound)),
             holds(&of),
             holds(&identified),
@@ -204,7 +214,7 @@ fn table(trials: &[&Trial]) {
 }
 
 fn line(trial: &Trial) -> String {
-    let of = |found: &Found| {
+    let of = |found: &ParameterError| {
         format!(
             "{} {:.4} ({:.1} sigma, {:.1} bounds)",
             found.name,
@@ -220,8 +230,8 @@ fn line(trial: &Trial) -> String {
         trial.scene,
         100.0 * trial.explained,
         if trial.is_same { "same" } else { "other" },
-        trial.likelier,
-        trial.took_s,
+        trial.log_ratio,
+        trial.duration_s,
         all.join(", ")
     )
 }

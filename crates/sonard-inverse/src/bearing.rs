@@ -1,4 +1,4 @@
-//! How the directions in which a path leaves and comes back change where the world or the transducer moves.
+//! Derivatives of the departure and arrival directions of a path.
 
 use smallvec::SmallVec;
 use sonard_model::{
@@ -9,60 +9,64 @@ use sonard_model::{
 
 use crate::motion::Motion;
 
-/// Below this much of a bend no point is held in its place, reciprocal metres.
-const LEAST_BEND: f64 = 1e-9;
-/// Points nearer than this are one, metres: a transducer that leans on a wall.
-const LEAST_LEG_M: f64 = 1e-6;
+/// Curvature below which a point is not constrained, reciprocal metres.
+const MIN_BEND: f64 = 1e-9;
+/// Minimum distance of distinct points, metres; smaller for a transducer touching a wall.
+const MIN_LEG_M: f64 = 1e-6;
 
-/// What a path's two directions, of departure and of arrival, gain where its ends and what it meets move.
+/// Derivatives of a path's departure and arrival directions with respect to motion of its ends and
+/// of the scene.
 ///
-/// A path is stationary in its points (Fermat). One on a wall or a cylinder moves along it by `s`, by as much as
-/// keeps `dL/ds = t . (u_in - u_out)` zero: `H ds = -r`, with the Hessian of the length by all points (tridiagonal, because a
-/// point has two neighbours) and `r` what `dL/ds` gains by what moves explicitly. An end's direction turns by how far the
-/// next point moves across it. So that each parameter costs a sum over what it moves, `H` is solved once, for the two
-/// directions (their adjoints). Floor and ceiling bend no path in the plan. Held to finite differences in the tests, 1e-4.
+/// A path is stationary in its points (Fermat). A point on a wall or a cylinder moves along it by
+/// `s` such that `dL/ds = t . (u_in - u_out)` stays zero: `H ds = -r`. Here `H` is the Hessian of
+/// the length (tridiagonal, because a point has two neighbours), and `r` the change of `dL/ds` by
+/// explicit motion. The direction at an end rotates by the transverse motion of the next point. `H`
+/// is solved once for the two adjoint vectors, so each parameter costs only a sum over the moved
+/// points. Floor and ceiling don't bend a path in the plan. Tests verify finite differences to
+/// 1e-4.
 pub(crate) struct Bearing {
-    points: SmallVec<[Point; 4]>,
-    legs: SmallVec<[Leg; 5]>,
+    points: SmallVec<[PathVertex; 4]>,
+    legs: SmallVec<[PathLeg; 5]>,
 }
 
-/// Where a path meets something, in the plan.
-struct Point {
+/// Interaction point of a path, in the plan.
+struct PathVertex {
     mechanism: Mechanism,
     at: DVec2,
-    /// Along what it meets, if the path's point is free to move there.
+    /// Tangent of the surface, if the point can slide along it.
     along: Option<DVec2>,
-    /// What the directions of departure and of arrival gain with `-dL/ds` there.
+    /// Adjoints: derivatives of the departure and arrival directions with respect to `-dL/ds`.
     adjoint: DVec2,
 }
 
-/// From one point to the next, or from or to an end.
+/// PathLeg between neighbouring points, or between a point and an end.
 #[derive(Clone, Copy)]
-struct Leg {
+struct PathLeg {
     unit: DVec2,
     length_m: f64,
 }
 
-impl Leg {
+impl PathLeg {
     fn new(from: DVec2, to: DVec2) -> Self {
-        let length_m = from.distance(to).max(LEAST_LEG_M);
+        let length_m = from.distance(to).max(MIN_LEG_M);
         Self { unit: (to - from) / length_m, length_m }
     }
 
-    /// What its unit vector gains where its second end moves, less its first.
+    /// Change of the unit vector for a relative displacement of the ends.
     fn turn(&self, by: DVec2) -> DVec2 {
         (by - self.unit.dot(by) * self.unit) / self.length_m
     }
 }
 
 impl Bearing {
-    /// Of a path between transmitter and receiver; `None` if it has no direction that follows from what it meets.
+    /// Prepares a path between transmitter and receiver; `None` if its points don't fix its
+    /// directions.
     pub(crate) fn new(path: &Path, ends: [DVec2; 2], scene: &Scene) -> Option<Self> {
-        let mut points: SmallVec<[Point; 4]> = SmallVec::new();
-        for met in path.interactions.iter() {
-            let along = match met.mechanism {
+        let mut points: SmallVec<[PathVertex; 4]> = SmallVec::new();
+        for interaction in path.interactions.iter() {
+            let along = match interaction.mechanism {
                 Mechanism::Reflection(Reflector::Floor | Reflector::Ceiling) => continue,
-                // Which strip of a rough wall is heard follows from the beam, and not from where it is.
+                // The strip of a rough wall follows the beam, not the transducer.
                 Mechanism::Scattering { .. } => return None,
                 Mechanism::Reflection(Reflector::Wall(wall))
                 | Mechanism::Diffraction(Diffractor::Level { wall, .. }) => {
@@ -71,30 +75,31 @@ impl Bearing {
                 }
                 Mechanism::Reflection(Reflector::Cylinder(cylinder)) => {
                     let center = scene.cylinders.get(cylinder as usize)?.center;
-                    Some((met.point - center).normalize_or_zero().perp())
+                    Some((interaction.point - center).normalize_or_zero().perp())
                 }
                 Mechanism::Diffraction(_) | Mechanism::Transducer => None,
             };
-            points.push(Point {
-                mechanism: met.mechanism,
-                at: met.point,
+            points.push(PathVertex {
+                mechanism: interaction.mechanism,
+                at: interaction.point,
                 along,
                 adjoint: DVec2::ZERO,
             });
         }
         let places = || {
-            let met = points.iter().map(|point| point.at);
-            std::iter::once(ends[0]).chain(met).chain([ends[1]])
+            let inner = points.iter().map(|point| point.at);
+            std::iter::once(ends[0]).chain(inner).chain([ends[1]])
         };
-        let legs = places().zip(places().skip(1)).map(|(from, to)| Leg::new(from, to)).collect();
+        let legs =
+            places().zip(places().skip(1)).map(|(from, to)| PathLeg::new(from, to)).collect();
         let mut bearing = Self { points, legs };
         bearing.solve(scene)?;
         Some(bearing)
     }
 
-    /// What the directions of departure and of arrival gain for each unit of a parameter that moves scene and transducer
-    /// so, radians.
-    pub(crate) fn rates(&self, scene: &Scene, motion: &Motion) -> [f64; 2] {
+    /// Derivatives of the departure and arrival directions with respect to a parameter with the
+    /// given motion, radians per unit.
+    pub(crate) fn derivatives(&self, scene: &Scene, motion: &Motion) -> [f64; 2] {
         let last = self.points.len() - 1;
         let velocity =
             |at: usize| motion.of_plan(scene, self.points[at].mechanism, self.points[at].at);
@@ -118,19 +123,20 @@ impl Bearing {
         rates.to_array()
     }
 
-    /// What the direction of departure gains where the first point moves, and that of arrival where the last one does.
+    /// Derivatives of the departure direction by the first point, and of the arrival direction by
+    /// the last.
     fn across(&self) -> [DVec2; 2] {
         let [leaves, comes] = [self.legs[0], self.legs[self.legs.len() - 1]];
-        // An arrival's direction is told towards where the sound comes from, against its way.
+        // The arrival direction points back to the source, against the propagation.
         [leaves.unit.perp() / leaves.length_m, -comes.unit.perp() / comes.length_m]
     }
 
-    /// Finds the adjoints: Gauss' elimination of a tridiagonal matrix (Thomas), with a right side for each direction, in
-    /// which fixed points have a row of their own that says nothing.
+    /// Solves for the adjoints with the Thomas algorithm for tridiagonal matrices, with one right
+    /// side per direction. Fixed points have an identity row.
     fn solve(&mut self, scene: &Scene) -> Option<()> {
         let last = self.points.len().checked_sub(1)?;
         let [leaves, comes] = self.across();
-        // Of the row before: its diagonal and right sides, once those before it are eliminated, and what couples it.
+        // Per row: eliminated diagonal and right sides, and the coupling to the next row.
         let mut rows: SmallVec<[(f64, DVec2, f64); 4]> = SmallVec::new();
         for (at, point) in self.points.iter().enumerate() {
             let Some(along) = point.along else {
@@ -152,7 +158,7 @@ impl Bearing {
                 diagonal -= coupled * coupled / pivot;
                 right -= coupled / pivot * before;
             }
-            if diagonal < LEAST_BEND {
+            if diagonal < MIN_BEND {
                 return None;
             }
             rows.push((diagonal, right, beyond));
@@ -165,8 +171,8 @@ impl Bearing {
         Some(())
     }
 
-    /// What a curved surface adds to the second derivative of the length: by the arc of a circle a point leaves its tangent
-    /// towards the centre.
+    /// Contribution of a curved surface to the second derivative of the length: on a circle a point
+    /// leaves the tangent towards the centre.
     fn bend(&self, scene: &Scene, at: usize) -> f64 {
         let point = &self.points[at];
         let Mechanism::Reflection(Reflector::Cylinder(cylinder)) = point.mechanism else {

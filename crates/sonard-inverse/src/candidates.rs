@@ -1,4 +1,4 @@
-//! What a receiver could have reported of one firing.
+//! ThresholdCandidate readings of one firing as a function of the detection threshold.
 
 use smallvec::SmallVec;
 use sonard_model::{
@@ -7,130 +7,131 @@ use sonard_model::{
     reading::PingStatus,
 };
 
-/// Thresholds that are looked at, decibels to both sides of the nominal one.
+/// Range of thresholds scanned, decibels on either side of the nominal one.
 pub(crate) const SPAN_DB: f64 = 12.0;
-/// Least step from one to the next, decibels.
+/// Minimum step between thresholds, decibels.
 const STEP_DB: f64 = 0.25;
-/// So far below where it is lost an echo is told that only lower thresholds than the usual one report, decibels.
+/// Distance below its detection limit at which an echo is evaluated if only lower thresholds than
+/// the nominal one report it, decibels.
 const BELOW_DB: f64 = 0.3;
-/// Just above where an echo is lost.
+/// Offset just above a detection limit, decibels.
 const ABOVE_DB: f64 = 0.02;
-/// Margin below which time walk is not followed, decibels.
-const LEAST_MARGIN_DB: f64 = 0.1;
-/// Later than time walk explains by this much is another rise of the envelope, metres.
+/// Minimum margin for the evaluation of time walk, decibels.
+const MIN_MARGIN_DB: f64 = 0.1;
+/// Delay beyond the time walk that indicates another rise of the envelope, metres.
 const JUMP_M: f64 = 0.003;
-/// More than this many changes of the first echo are not followed.
-const MOST: usize = 48;
+/// Maximum number of candidates per firing.
+const MAX_CANDIDATES: usize = 48;
 
-/// Whether it is known with which phases arrivals meet.
+/// Knowledge of the relative phases of arrivals.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Phases {
-    /// Walls and ranger are known to a small part of a wavelength.
+    /// Coherent sum: geometry is known to a small fraction of a wavelength.
     Known,
-    /// They are not: what overlaps adds up by its power, as it does on average.
+    /// Incoherent sum: overlapping arrivals add by power, as on average.
     Unknown,
 }
 
-/// The first echo for a range of thresholds.
+/// First echo for an interval of thresholds.
 #[derive(Debug, Clone)]
-pub(crate) struct Candidate {
-    /// What is read, metres; `None` of silence.
+pub(crate) struct ThresholdCandidate {
+    /// ReportedRise range, metres; `None` without echo.
     pub(crate) range_m: Option<f64>,
-    /// Whether it sounded already at the end of blanking, so that its range is the least.
+    /// Whether the signal is present at the end of blanking, so that the minimum range is reported.
     pub(crate) is_near: bool,
-    /// The echo that raised ECHO.
+    /// Arrival that triggers ECHO.
     pub(crate) arrival: Option<Arrival>,
-    /// Up to this threshold, decibels above the nominal one.
+    /// Upper end of the interval, decibels above the nominal threshold.
     pub(crate) until_db: f64,
-    /// By how much that may be off, because it is not known with which phase its arrival meets others: a standard
-    /// deviation, decibels.
+    /// Standard deviation of that end due to unknown phases, decibels.
     pub(crate) spread_db: f64,
-    /// How far its envelope reaches above the threshold that its range is told at, decibels; infinite where that moves with
-    /// no threshold, as of silence and of what is there at the end of blanking.
+    /// Margin of the envelope above the threshold at which the range is evaluated, decibels;
+    /// infinite if the range does not depend on the threshold (no echo, minimum range).
     pub(crate) margin_db: f64,
-    /// Whether how far it reaches is its arrival's strength, and next to nothing is added or taken by what sounds beside it.
+    /// Whether the envelope is dominated by the arrival itself.
     pub(crate) is_of_one: bool,
 }
 
-/// The readings of a firing from the lowest threshold up; the last holds for all thresholds above.
-pub(crate) type Candidates = SmallVec<[Candidate; 3]>;
+/// CandidateList of a firing from the lowest threshold up; the last holds for all higher
+/// thresholds.
+pub(crate) type CandidateList = SmallVec<[ThresholdCandidate; 3]>;
 
-/// Asks the model what a receiver would report at thresholds other than its own.
-pub(crate) struct Listener {
+/// Scan of a simulated receiver over thresholds.
+pub(crate) struct ThresholdScan {
     receiver: Receiver,
-    /// How far a lone echo has to reach above the threshold to be told, decibels.
-    least_margin_db: f64,
-    /// Thresholds that are looked at, decibels to both sides of the nominal one.
+    /// Minimum margin of an isolated echo for detection, decibels.
+    min_margin_db: f64,
+    /// Range of thresholds scanned, decibels on either side of the nominal one.
     span_db: f64,
-    /// What the lowest and the highest of them are multiplied with.
+    /// Amplitude factors of the lowest and the highest threshold.
     ends: [f64; 2],
 }
 
-/// What a receiver with some threshold reports.
-struct Reported {
+/// Detection by a receiver at one threshold.
+struct ReportedRise {
     rise: Rise,
-    /// The threshold, decibels above the nominal one.
+    /// Threshold, decibels above the nominal one.
     by_db: f64,
-    /// The most of its envelope.
+    /// Peak of the envelope.
     peak: f64,
-    /// The threshold up to which that reaches, decibels above the nominal one.
+    /// Threshold up to which the peak reaches, decibels above the nominal one.
     reaches_db: f64,
-    /// Whether nothing else sounds with its arrival.
+    /// Whether no other arrival overlaps.
     is_lone: bool,
 }
 
-impl Reported {
+impl ReportedRise {
     fn is_of_one(&self) -> bool {
-        /// Of its arrival's strength.
-        const BESIDE: f64 = 0.1;
-        let of = |arrival: &PulseArrival| (self.peak / arrival.amplitude - 1.0).abs() < BESIDE;
+        /// Maximum relative contribution of other arrivals.
+        const OTHERS: f64 = 0.1;
+        let of = |arrival: &PulseArrival| (self.peak / arrival.amplitude - 1.0).abs() < OTHERS;
         self.is_lone || self.rise.arrival.as_ref().is_some_and(of)
     }
 }
 
-impl Listener {
-    /// For thresholds up to `span_db` decibels to both sides of the nominal one.
+impl ThresholdScan {
+    /// Scan of thresholds up to `span_db` decibels on either side of the nominal one.
     pub(crate) fn new(receiver: &Receiver, phases: Phases, span_db: f64) -> Self {
-        // Steps in which ranges are told, and whole cycles, would hide how they move.
+        // Quantized ranges, and whole cycles, would hide derivatives.
         let mut receiver = receiver.clone();
         (receiver.range_step_m, receiver.detector) = (0.0, Detector::Envelope);
         if phases == Phases::Unknown && receiver.combining == Combining::Coherent {
             receiver.combining = Combining::Incoherent;
         }
-        let least_margin_db = receiver.least_margin_db();
-        Self { receiver, least_margin_db, span_db, ends: [-span_db, span_db].map(factor) }
+        let min_margin_db = receiver.least_margin_db();
+        Self { receiver, min_margin_db, span_db, ends: [-span_db, span_db].map(factor) }
     }
 
-    /// All that a firing could come to, in the place of what was there.
+    /// Collects all candidates of a firing into `found`.
     pub(crate) fn candidates(
         &self,
         point: &ObservationPoint,
         direction_rad: f64,
-        found: &mut Candidates,
+        found: &mut CandidateList,
     ) -> Result<(), TooCostly> {
         point.hear(direction_rad, |firing| {
             found.clear();
-            firing.listen(&self.receiver, |listening| self.rising(firing, listening, found));
+            firing.listen(&self.receiver, |listening| self.scan(firing, listening, found));
         })
     }
 
-    /// From the lowest threshold up. A higher one is passed no earlier, so that time runs forward, too.
-    fn rising(&self, firing: &FiringArrivals, listening: &mut Listening, found: &mut Candidates) {
-        let mut last: Option<Reported> = None;
+    /// Scans upwards. A higher threshold is crossed no earlier, so time runs forward as well.
+    fn scan(&self, firing: &FiringArrivals, listening: &mut Listening, found: &mut CandidateList) {
+        let mut last: Option<ReportedRise> = None;
         let (mut by_db, mut ready_us) = (-self.span_db, 0.0);
-        while by_db < self.span_db && found.len() < MOST {
+        while by_db < self.span_db && found.len() < MAX_CANDIDATES {
             let Some(rise) = listening.rise(self.factor(by_db), ready_us) else {
-                // And nothing by a receiver that is less sensitive.
-                found.push(Candidate::silence(self.span_db));
+                // No echo at any higher threshold.
+                found.push(ThresholdCandidate::no_echo(self.span_db));
                 return;
             };
             ready_us = rise.passed_us;
             let first = Self::reported(listening, rise, by_db);
-            let (next, until_db) = self.told_where_likely(listening, first, ready_us);
+            let (next, until_db) = self.at_likely_threshold(listening, first, ready_us);
             by_db = until_db.max(next.by_db + STEP_DB) + ABOVE_DB;
-            let is_same = |last: &Reported| self.is_same(last, &next.rise, next.by_db);
+            let is_same = |last: &ReportedRise| self.is_same(last, &next.rise, next.by_db);
             match found.last_mut() {
-                Some(known) if last.as_ref().is_some_and(is_same) => known.go_on(until_db, &next),
+                Some(known) if last.as_ref().is_some_and(is_same) => known.extend(until_db, &next),
                 _ => {
                     found.push(self.candidate(firing, &next, until_db));
                     last = Some(next);
@@ -139,14 +140,15 @@ impl Listener {
         }
     }
 
-    /// A rise as it is at the usual threshold, if that reports it, and else near the highest that does (the nearer to the usual
-    /// one, the likelier), with the threshold at which it is lost.
-    fn told_where_likely(
+    /// Evaluates a rise at the nominal threshold if that reports it, else near the highest one that
+    /// does, since thresholds near the nominal one are likelier. Returns its detection limit as
+    /// well.
+    fn at_likely_threshold(
         &self,
         listening: &mut Listening,
-        first: Reported,
+        first: ReportedRise,
         ready_us: f64,
-    ) -> (Reported, f64) {
+    ) -> (ReportedRise, f64) {
         let until_db = self.lost(listening, &first, ready_us);
         let at_db = (until_db - BELOW_DB).min(0.0);
         if first.by_db >= at_db {
@@ -156,63 +158,69 @@ impl Listener {
         let Some(rise) = rise.filter(|rise| self.is_same(&first, rise, at_db)) else {
             return (first, until_db);
         };
-        let told = match self.is_asked_again(until_db) {
+        let evaluated = match self.needs_peak(until_db) {
             true => Self::reported(listening, rise, at_db),
-            false => Reported { rise, by_db: at_db, ..first },
+            false => ReportedRise { rise, by_db: at_db, ..first },
         };
-        // The threshold in force drifts while an echo rises: where it is told late it is known better how far it reaches.
-        let until_db = if told.is_lone { self.lost(listening, &told, ready_us) } else { until_db };
-        (told, until_db)
+        // The effective threshold drifts while an echo rises: a later evaluation is more accurate.
+        let until_db =
+            if evaluated.is_lone { self.lost(listening, &evaluated, ready_us) } else { until_db };
+        (evaluated, until_db)
     }
 
-    fn candidate(&self, firing: &FiringArrivals, told: &Reported, until_db: f64) -> Candidate {
-        let rise = &told.rise;
-        Candidate {
+    fn candidate(
+        &self,
+        firing: &FiringArrivals,
+        reported: &ReportedRise,
+        until_db: f64,
+    ) -> ThresholdCandidate {
+        let rise = &reported.rise;
+        ThresholdCandidate {
             range_m: Some(rise.range_m),
             is_near: rise.status == PingStatus::MinRange,
             arrival: rise.arrival.map(|arrival| firing.arrival(&arrival)),
             until_db,
-            spread_db: self.spread_db(told),
+            spread_db: self.spread_db(reported),
             margin_db: match rise.status {
-                PingStatus::Echo => until_db - told.by_db,
+                PingStatus::Echo => until_db - reported.by_db,
                 _ => f64::INFINITY,
             },
-            is_of_one: told.is_of_one(),
+            is_of_one: reported.is_of_one(),
         }
     }
 
-    /// A rise that was just told at a threshold, with how far its envelope reaches.
-    fn reported(listening: &mut Listening, rise: Rise, by_db: f64) -> Reported {
+    /// Rise detected at a threshold, with the reach of its envelope.
+    fn reported(listening: &mut Listening, rise: Rise, by_db: f64) -> ReportedRise {
         let (peak, margin_db) = listening.peak(&rise);
         let (reaches_db, is_lone) = (by_db + margin_db.max(0.0), listening.is_lone());
-        Reported { rise, by_db, peak, reaches_db, is_lone }
+        ReportedRise { rise, by_db, peak, reaches_db, is_lone }
     }
 
-    /// Whether how far the envelope of a rise reaches, which is reported up to a threshold, is wanted any more: for its
-    /// spread, or for what is reported at higher thresholds.
-    fn is_asked_again(&self, until_db: f64) -> bool {
+    /// Returns `true` if the peak of a rise detected up to a threshold is still needed: for its
+    /// phase spread, or for higher thresholds.
+    fn needs_peak(&self, until_db: f64) -> bool {
         self.receiver.combining == Combining::Incoherent || until_db < self.span_db
     }
 
-    /// By how much the strength of an arrival may be off that meets others with unknown phases. Of two sounds whose
-    /// amplitudes have the ratio `r`, the sum's level spreads by 6.1 `r` decibels for small `r` and by 7.8 for 1, once
-    /// all phases are equally likely.
-    fn spread_db(&self, Reported { rise, peak, .. }: &Reported) -> f64 {
+    /// Standard deviation of the level due to unknown phases of overlapping arrivals. For two with
+    /// amplitude ratio `r` and uniform phases, the level of the sum has 6.1 `r` decibels for small
+    /// `r`, and 7.8 for 1.
+    fn spread_db(&self, ReportedRise { rise, peak, .. }: &ReportedRise) -> f64 {
         const DB_OF_RATIO: f64 = 6.5;
         if self.receiver.combining != Combining::Incoherent {
             return 0.0;
         }
-        let beside = rise.arrival.map_or(0.0, |arrival| (peak / arrival.amplitude).powi(2) - 1.0);
-        DB_OF_RATIO * beside.clamp(0.0, 1.0).sqrt()
+        let others = rise.arrival.map_or(0.0, |arrival| (peak / arrival.amplitude).powi(2) - 1.0);
+        DB_OF_RATIO * others.clamp(0.0, 1.0).sqrt()
     }
 
-    /// The threshold at which what is reported no longer is. The peak of its envelope says so, unless another arrival
-    /// follows so closely that the peak is that one's.
-    fn lost(&self, listening: &mut Listening, reported: &Reported, ready_us: f64) -> f64 {
-        let Reported { by_db: from_db, reaches_db, is_lone, .. } = *reported;
+    /// Detection limit of a reported rise: the peak of its envelope, unless another arrival follows
+    /// so closely that the peak belongs to that one.
+    fn lost(&self, listening: &mut Listening, reported: &ReportedRise, ready_us: f64) -> f64 {
+        let ReportedRise { by_db: from_db, reaches_db, is_lone, .. } = *reported;
         let span_db = self.span_db;
         if is_lone {
-            return (reaches_db - self.least_margin_db).max(from_db);
+            return (reaches_db - self.min_margin_db).max(from_db);
         }
         let beyond_db = if reaches_db < span_db { reaches_db - STEP_DB } else { span_db };
         if beyond_db <= from_db {
@@ -228,31 +236,32 @@ impl Listener {
         }
     }
 
-    /// Whether two rises are the same rise of the envelope, the second at a higher threshold: of the same arrival, and
-    /// no later than that arrival takes to rise further. Where arrivals overlap the first may fade before the next one
-    /// drives the envelope on, and a little more of threshold makes the echo centimetres later.
-    fn is_same(&self, reported: &Reported, higher: &Rise, higher_db: f64) -> bool {
-        let one = &reported.rise;
-        let is_same_arrival = match (&one.arrival, &higher.arrival) {
-            (Some(one), Some(other)) => (one.length_m - other.length_m).abs() < 1e-6,
+    /// Returns `true` if two rises, the second at a higher threshold, are the same rise of the
+    /// envelope: of the same arrival, and not later than its time walk. Overlapping arrivals may
+    /// fade before the next one continues the envelope; then a slightly higher threshold delays the
+    /// echo by centimetres.
+    fn is_same(&self, reported: &ReportedRise, higher: &Rise, higher_db: f64) -> bool {
+        let lower = &reported.rise;
+        let is_same_arrival = match (&lower.arrival, &higher.arrival) {
+            (Some(a), Some(b)) => (a.length_m - b.length_m).abs() < 1e-6,
             (None, None) => true,
             _ => false,
         };
-        if one.status != higher.status || !is_same_arrival {
+        if lower.status != higher.status || !is_same_arrival {
             return false;
         }
-        let later_m = higher.range_m - one.range_m;
+        let later_m = higher.range_m - lower.range_m;
         if later_m < JUMP_M {
             return true;
         }
-        // At the very top, where a pulse is flat, its rise takes any time.
+        // At its very top a pulse is flat, and its time walk is unbounded.
         let walk_m = |by_db: f64| {
-            self.receiver.time_walk_m((reported.reaches_db - by_db).max(LEAST_MARGIN_DB))
+            self.receiver.time_walk_m((reported.reaches_db - by_db).max(MIN_MARGIN_DB))
         };
         later_m - (walk_m(higher_db) - walk_m(reported.by_db)) < JUMP_M
     }
 
-    /// What the threshold is multiplied with where it is higher by so many decibels.
+    /// Amplitude factor of a threshold shift in decibels.
     fn factor(&self, by_db: f64) -> f64 {
         let [lowest, highest] = self.ends;
         match by_db / self.span_db {
@@ -263,10 +272,10 @@ impl Listener {
     }
 }
 
-impl Candidate {
-    /// Its rise is reported up to another threshold, too, and told as it is there unless only thresholds above the usual one
-    /// report that.
-    fn go_on(&mut self, until_db: f64, Reported { rise, by_db, .. }: &Reported) {
+impl ThresholdCandidate {
+    /// Extends the interval to a higher threshold; the range is evaluated there unless only
+    /// thresholds above the nominal one report it.
+    fn extend(&mut self, until_db: f64, ReportedRise { rise, by_db, .. }: &ReportedRise) {
         let last_db = self.until_db;
         self.until_db = last_db.max(until_db);
         if *by_db <= 0.0 && self.margin_db.is_finite() {
@@ -276,8 +285,8 @@ impl Candidate {
         }
     }
 
-    /// For all thresholds that are higher still.
-    const fn silence(until_db: f64) -> Self {
+    /// ThresholdCandidate without echo, for all higher thresholds.
+    const fn no_echo(until_db: f64) -> Self {
         let (range_m, arrival) = (None, None);
         Self {
             range_m,
@@ -291,7 +300,8 @@ impl Candidate {
     }
 }
 
-/// Where, between a threshold at which something is and a higher one at which it is not, it ends, to a step.
+/// Bisects the end of a condition between a threshold where it holds and a higher one where it
+/// fails.
 fn last_of(from_db: f64, beyond_db: f64, mut is_there: impl FnMut(f64) -> bool) -> f64 {
     let (mut low, mut high) = (from_db, beyond_db);
     while high - low > STEP_DB {

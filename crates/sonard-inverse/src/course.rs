@@ -1,4 +1,4 @@
-//! Where a robot is along its way: what each sweep says, weighed by what odometry says between them.
+//! Tracking of a robot from sweep to sweep with odometry.
 
 use std::{f64::consts::TAU, sync::Arc};
 
@@ -8,22 +8,22 @@ use sonard_model::{
 };
 
 use crate::{
-    atlas::Atlas,
+    coarse_grid::Atlas,
     fit::FitError,
     locate::{Mode, explaining, modes},
+    progress::{Unwatched, Watch},
     sweep::Sweep,
-    watch::{Unwatched, Watch},
     world::World,
 };
 
 /// Error model of odometry.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Odometry {
-    /// Standard deviation of the place for each metre driven, metres.
+    /// Standard deviation of the position per metre driven, metres.
     pub drift_m_per_m: f64,
-    /// Standard deviation of the heading for each metre driven, degrees.
+    /// Standard deviation of the heading per metre driven, degrees.
     pub drift_deg_per_m: f64,
-    /// Probability that the robot was carried elsewhere from one sweep to the next, 0 to 1.
+    /// Kidnap probability between sweeps, 0 to 1.
     pub carried: f64,
 }
 
@@ -33,34 +33,35 @@ impl Default for Odometry {
     }
 }
 
-/// What odometry is off by at least, metres and degrees, and for each degree turned.
-const LEAST_DRIFT: (f64, f64) = (0.01, 1.0);
+/// Minimum standard deviations of odometry, metres and degrees.
+const MIN_DRIFT: (f64, f64) = (0.01, 1.0);
+/// Standard deviation of the heading per degree turned.
 const DRIFT_OF_TURN: f64 = 0.03;
 
-/// Follows a robot from sweep to sweep.
+/// Tracker of a robot from sweep to sweep.
 ///
-/// A filter over the poses that explain each sweep (a hidden Markov model whose states are [`Mode`]s): a pose is as
-/// probable as it explains the sweep, times how well it goes with a pose of the sweep before and the way between them. Where
-/// the robot may have been carried, all poses are as good as any other before they are asked. In another scene than that of
-/// the sweep before nothing is known, as at the beginning.
+/// Filter over the poses that explain each sweep (a hidden Markov model whose states are
+/// [`Mode`]s). The weight of a pose is its evidence, times its compatibility with a pose of the
+/// previous sweep and the odometry in between. After a kidnapping all poses are equally likely a
+/// priori. In a different scene than that of the previous sweep the filter is reset.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Course {
     odometry: Odometry,
-    last: Option<Last>,
+    last: Option<LastSweep>,
 }
 
-/// The last sweep.
+/// Previous sweep.
 #[derive(Debug, Clone, PartialEq)]
-struct Last {
+struct LastSweep {
     scene: Arc<Scene>,
-    /// Odometry's pose.
-    told: Pose,
-    /// Where it was taken.
+    /// Pose by odometry.
+    odometry: Pose,
+    /// Posterior poses.
     modes: Vec<Mode>,
 }
 
-/// Where a sweep should have been taken, by a pose of the one before and odometry.
-struct Expected {
+/// Pose predicted from a mode of the previous sweep and odometry.
+struct PredictedPose {
     probability: f64,
     pose: Pose,
     sigma_m: f64,
@@ -68,17 +69,17 @@ struct Expected {
 }
 
 impl Course {
-    /// At its beginning, where nothing is known.
+    /// Tracker without prior knowledge.
     #[must_use]
     pub const fn new(odometry: Odometry) -> Self {
         Self { odometry, last: None }
     }
 
-    /// Finds where the next sweep was taken, whose `pose` is what odometry says, in a frame of its own: all poses that
-    /// explain it, most probable first, with this sweep and all before.
+    /// Locates the next sweep, whose `pose` is given by odometry in an arbitrary frame. Returns all
+    /// poses that explain the sweep, most probable first, given this sweep and all before.
     ///
     /// # Errors
-    /// When there is nothing to predict with.
+    /// Invalid world.
     pub fn next(
         &mut self,
         world: &World,
@@ -88,7 +89,7 @@ impl Course {
         self.next_watched(world, atlas, sweep, &Unwatched)
     }
 
-    /// The same, until `watch` stops it.
+    /// Locates like [`next`](Self::next), with cancellation by `watch`.
     ///
     /// # Errors
     /// As [`next`](Self::next), and [`FitError::Stopped`].
@@ -106,15 +107,16 @@ impl Course {
         let modes = modes(&found, world, atlas, |mode| self.log_prior(mode, &expected, volume));
         if !modes.is_empty() {
             let (scene, modes) = (Arc::clone(&world.scene), modes.clone());
-            self.last = Some(Last { scene, told: sweep.pose, modes });
+            self.last = Some(LastSweep { scene, odometry: sweep.pose, modes });
         }
         Ok(modes)
     }
 
-    /// Where the modes of the last sweep have come by what odometry says now.
-    fn expected(&self, scene: &Arc<Scene>, now: &Pose) -> Vec<Expected> {
-        let is_same = |last: &&Last| Arc::ptr_eq(&last.scene, scene) || last.scene == *scene;
-        let Some(Last { told: then, modes, .. }) = self.last.as_ref().filter(is_same) else {
+    /// Modes of the last sweep propagated by odometry.
+    fn expected(&self, scene: &Arc<Scene>, now: &Pose) -> Vec<PredictedPose> {
+        let is_same = |last: &&LastSweep| Arc::ptr_eq(&last.scene, scene) || last.scene == *scene;
+        let Some(LastSweep { odometry: then, modes, .. }) = self.last.as_ref().filter(is_same)
+        else {
             return Vec::new();
         };
         let driven = DVec2::from_angle(-then.heading_deg.to_radians())
@@ -123,7 +125,7 @@ impl Course {
         modes.iter().map(|mode| self.moved(mode, driven, turned_deg)).collect()
     }
 
-    fn moved(&self, mode: &Mode, driven: DVec2, turned_deg: f64) -> Expected {
+    fn moved(&self, mode: &Mode, driven: DVec2, turned_deg: f64) -> PredictedPose {
         let distance_m = driven.length();
         let to = DVec2::from_angle(mode.heading_deg.to_radians()).rotate(driven);
         let pose = Pose {
@@ -132,29 +134,25 @@ impl Course {
             heading_deg: wrap_180(mode.heading_deg + turned_deg),
         };
         let aside_m = distance_m * mode.sigma_heading_deg.to_radians();
-        let sigma_m = norm([
-            mode.sigma_m(),
-            aside_m,
-            self.odometry.drift_m_per_m * distance_m,
-            LEAST_DRIFT.0,
-        ]);
+        let sigma_m =
+            norm([mode.sigma_m(), aside_m, self.odometry.drift_m_per_m * distance_m, MIN_DRIFT.0]);
         let sigma_deg = norm([
             mode.sigma_heading_deg,
             self.odometry.drift_deg_per_m * distance_m,
             DRIFT_OF_TURN * turned_deg,
-            LEAST_DRIFT.1,
+            MIN_DRIFT.1,
         ]);
-        Expected { probability: mode.probability, pose, sigma_m, sigma_deg }
+        PredictedPose { probability: mode.probability, pose, sigma_m, sigma_deg }
     }
 
-    /// Logarithm of how much more probable a pose is beforehand than if nothing were known, where poses fill a volume of
-    /// so many square metres times degrees.
-    fn log_prior(&self, mode: &Mode, expected: &[Expected], volume: f64) -> f64 {
+    /// Log-ratio of the prior density of a pose to a uniform density over a volume in square metres
+    /// times degrees.
+    fn log_prior(&self, mode: &Mode, expected: &[PredictedPose], volume: f64) -> f64 {
         if expected.is_empty() {
             return 0.0;
         }
         let at = DVec2::new(mode.x_m, mode.y_m);
-        let density = |expected: &Expected| {
+        let density = |expected: &PredictedPose| {
             let sigma_m = expected.sigma_m.hypot(mode.sigma_m());
             let sigma_deg = expected.sigma_deg.hypot(mode.sigma_heading_deg);
             let off_m = at.distance(expected.pose.position());

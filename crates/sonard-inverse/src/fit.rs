@@ -1,14 +1,14 @@
-//! The most likely values of parameters, and how sure they are.
+//! Maximum a posteriori estimation of parameters, with uncertainties.
 
-mod elsewhere;
-mod journal;
-mod polish;
-mod restart;
-mod ridge;
-mod settle;
-mod shorter;
-mod spread;
-mod step;
+mod checkpoint;
+mod continuation;
+mod lm_step;
+mod local;
+mod multistart;
+mod perturbation;
+mod profile;
+mod refine;
+mod scale;
 
 use std::{rc::Rc, slice};
 
@@ -19,123 +19,123 @@ use thiserror::Error;
 
 use crate::{
     candidates::Phases,
+    jacobian::JacobianBuilder,
     likelihood::ErrorModel,
-    linear::Linear,
+    linear::LinearizedModel,
     parameter::Parameter,
-    rates::RateFinder,
+    progress::{Unwatched, Watch},
     sweep::Sweep,
-    watch::{Unwatched, Watch},
-    world::{Models, World, WorldError},
+    world::{SimulatorSet, World, WorldError},
 };
-pub use journal::Found;
-pub use shorter::fit_from;
-pub(crate) use shorter::{Approached, approach, fit_near};
+pub use checkpoint::Found;
+pub use local::fit_from;
+pub(crate) use local::{RoughFit, approach, fit_near};
 
-/// A parameter to fit, with its prior.
+/// Parameter to fit, with its prior.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Prior {
-    /// Which.
+    /// Parameter to be fitted.
     pub parameter: Parameter,
-    /// Standard deviation of what is believed, about the value that is started from; in its unit.
+    /// Prior standard deviation about the initial value, in the parameter's unit.
     pub sigma: f64,
 }
 
-/// What to fit.
+/// Settings of a fit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Fit {
     /// Parameters with their priors.
     pub priors: Vec<Prior>,
-    /// Spread of ranges to begin with, metres: as far off as predictions may be.
+    /// Initial standard deviation of ranges, metres: the maximum error of predictions.
     pub widest_m: f64,
-    /// As far off as headings may be, degrees.
+    /// Maximum initial error of headings, degrees.
     pub widest_turn_deg: f64,
-    /// Least spread of ranges that is believed, metres.
+    /// Minimum standard deviation of ranges, metres.
     pub least_sigma_m: f64,
-    /// Least spread of the threshold that is believed, decibels.
+    /// Minimum standard deviation of the threshold, decibels.
     pub least_sigma_db: f64,
-    /// How much is searched.
+    /// Search effort and outlier model.
     pub search: Search,
 }
 
-/// How much is searched, and for what. A quick search of simulated sweeps ends somewhere less likely in one case of ten. Things
-/// that the scene lacks are no default, because they explain too much where the model misses by centimetres what one wall answers,
-/// or where a beam's edge is fitted.
+/// Search effort, and outlier model. A quick search of simulated sweeps ends in a less likely
+/// optimum in one case of ten. Outlier arcs are not the default: they explain too much where the
+/// model errs by centimetres on a wall, or where the edge of a beam is fitted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[cfg_attr(feature = "clap", derive(clap::ValueEnum))]
 #[serde(rename_all = "lowercase")]
 pub enum Search {
-    /// A few places beside the likeliest one: four to ten times as fast
+    /// Few restarts near the optimum: four to ten times as fast
     Quick,
-    /// Many places, and each to its end
+    /// Many restarts, each refined
     #[default]
     Thorough,
-    /// As thoroughly, and things that the scene lacks may answer or hide many beams in a row
+    /// Many restarts, with objects missing in the scene that return or hide many beams in a row
     Furnished,
 }
 
-/// A value found.
+/// Estimate of one parameter.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Estimate {
-    /// What the parameter is to be changed by, in its unit.
+    /// Change of the parameter from its initial value, in its unit.
     pub change: f64,
-    /// Standard deviation of it, with other values that explain the readings nearly as well.
+    /// Standard deviation, including other optima that explain the readings nearly as well.
     pub sigma: f64,
-    /// Whether the readings say more about it than was believed beforehand.
+    /// Whether the readings constrain the parameter to less than half its prior standard deviation.
     pub identified: bool,
 }
 
-/// What came of a fit.
+/// Result of a fit.
 #[derive(Debug, Clone)]
 pub struct Fitted {
-    /// In the order of the parameters.
+    /// Estimates in the order of the parameters.
     pub estimates: Vec<Estimate>,
-    /// Covariance of the changes, in their order, about this explanation of the readings alone.
+    /// Covariance of the changes about this optimum alone, in the order of the parameters.
     pub covariance: DMatrix<f64>,
-    /// The world with all changes made.
+    /// World with all changes applied.
     pub world: World,
-    /// The poses of the sweeps.
+    /// Poses of the sweeps.
     pub poses: Vec<Pose>,
-    /// How readings spread about it.
+    /// Error model at the optimum.
     pub errors: ErrorModel,
-    /// Log-likelihood of all readings, and how many there are.
+    /// Log-likelihood of all readings.
     pub log_likelihood: f64,
-    /// How many readings there are.
+    /// Number of readings in the fit.
     pub readings: usize,
-    /// Log-likelihood with the priors.
+    /// Log-likelihood plus log-prior at the optimum.
     pub log_posterior: f64,
 }
 
-/// Why a fit failed.
+/// Failure of a fit.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum FitError {
-    /// There is nothing to predict with.
+    /// Invalid world or pose.
     #[error(transparent)]
     World(#[from] WorldError),
-    /// Nothing to fit.
+    /// No parameters or no sweeps.
     #[error("there is no parameter to fit, or no sweep to fit it to")]
     Nothing,
-    /// The numbers don't hold.
-    #[error("the readings don't hold the parameters: their information can't be inverted")]
+    /// Singular information matrix: some parameters are unconstrained.
+    #[error("the readings don't constrain the parameters: the information matrix is singular")]
     Degenerate,
-    /// Whoever watches it wants it no longer.
+    /// Cancelled by the observer.
     #[error("stopped on request")]
     Stopped,
-    /// What was given as known is of another fit.
-    #[error("what is known of this fit was found by another one")]
+    /// Checkpoint of a different fit.
+    #[error("the saved progress belongs to another fit")]
     OtherFit,
 }
 
 impl FitError {
-    /// Whether it is about all that is searched, and not only about one beginning among others.
+    /// Returns `true` if the error ends the whole fit, not only one start among several.
     pub(crate) const fn ends_all(&self) -> bool {
         matches!(self, Self::Stopped | Self::OtherFit)
     }
 }
 
-/// What came of one beginning among others, which may have come to nothing.
+/// Ignores failures of one start among several.
 ///
 /// # Errors
-/// What is about all of them.
+/// Errors that end the whole fit.
 pub(crate) fn one_of_many<T>(result: Result<T, FitError>) -> Result<Option<T>, FitError> {
     match result {
         Ok(found) => Ok(Some(found)),
@@ -144,31 +144,31 @@ pub(crate) fn one_of_many<T>(result: Result<T, FitError>) -> Result<Option<T>, F
     }
 }
 
-/// Where a fit stands.
-struct State<'a> {
+/// State of a running fit.
+struct Fitter<'a> {
     fit: &'a Fit,
     watch: &'a dyn Watch,
-    /// What the next searches came to, if it goes on from there.
+    /// Recorded results of the next searches, when resumed.
     known: slice::Iter<'a, Found>,
     start: &'a World,
     sweeps: &'a [Sweep],
     parameters: Vec<&'a Parameter>,
     /// Changes since the start.
     values: DVector<f64>,
-    /// Of the world as it was last asked for, with the transducer on the axis.
-    models: Models,
+    /// Simulators of the current world, with the transducer on the axis.
+    models: SimulatorSet,
     phases: Phases,
-    /// Whether predictions are made with the transducer where it is, and not on the axis.
+    /// Whether predictions use the actual transducer position instead of the axis.
     is_exact: bool,
-    /// A combination of the parameters that steps leave as it is.
+    /// LinearizedModel combination of the parameters held constant by steps.
     held: Option<DVector<f64>>,
-    /// The predictions that were made last, and where.
-    last: Option<(DVector<f64>, Phases, Rc<Linear>)>,
+    /// Most recent linearization and its point.
+    last: Option<(DVector<f64>, Phases, Rc<LinearizedModel>)>,
 }
 
-/// Where a fit is likeliest, by predictions with phases that are known or not.
-struct Settled {
-    /// Log-likelihood of all readings with the priors.
+/// Optimum of a fit, with known or unknown phases.
+struct Optimum {
+    /// Log-posterior.
     value: f64,
     /// Changes since the start.
     values: DVector<f64>,
@@ -176,27 +176,28 @@ struct Settled {
     phases: Phases,
 }
 
-/// Doubt of a threshold that is not fitted, decibels.
+/// Standard deviation of a threshold that is not fitted, decibels.
 const NOT_FITTED_DB: f64 = 0.5;
 
-/// Fits parameters to sweeps, from a world that is believed.
+/// Fits parameters to sweeps, from an initial world.
 ///
-/// Maximises the likelihood of all readings times the priors: Levenberg's and Marquardt's steps on a linearisation of
-/// all that each reading could have been, and new predictions after each set of them, with spreads that shrink from
-/// `widest_m` to what the readings have. On the way arrivals add up by their powers, because a pose that is a tenth of
-/// a wavelength off has other phases; at the end with their phases, if readings are likelier so.
+/// Maximizes the posterior by Levenberg-Marquardt steps on a linearization of all candidate
+/// readings, with new predictions after each set of steps. The error model is annealed from
+/// `widest_m` to the observed scatter. Arrivals first add by power, because a pose error of a tenth
+/// of a wavelength changes the phases; at the end coherently, if that is likelier.
 ///
 /// # Errors
-/// When the world can't be predicted in, or the readings don't hold the parameters.
+/// Invalid world, or readings that don't constrain the parameters.
 pub fn fit(world: &World, sweeps: &[Sweep], fit: &Fit) -> Result<Fitted, FitError> {
     fit_watched(world, sweeps, fit, &[], &Unwatched)
 }
 
-/// The same, and tells `watch` how far it has come and what it found. Goes on from what is `known`: what the same fit
-/// found when it was stopped, in that order.
+/// Fits like [`fit`], reports progress and intermediate results to `watch`, and resumes from
+/// `known`: the results of an earlier, stopped run of the same fit, in order.
 ///
 /// # Errors
-/// As [`fit`]; [`FitError::Stopped`] if `watch` wants it, [`FitError::OtherFit`] if what is known does not go with it.
+/// As [`fit`]; [`FitError::Stopped`] if cancelled, [`FitError::OtherFit`] if `known` does not
+/// match.
 pub fn fit_watched(
     world: &World,
     sweeps: &[Sweep],
@@ -204,15 +205,15 @@ pub fn fit_watched(
     known: &[Found],
     watch: &dyn Watch,
 ) -> Result<Fitted, FitError> {
-    let models = Models::of(&world.with_face_on_axis())?;
-    let mut state = State::new(models, world, sweeps, fit, watch)?;
-    state.known = known.iter();
-    let (best, beside) = state.likeliest()?;
-    state.end(best, &beside)
+    let models = SimulatorSet::new(&world.with_face_on_axis())?;
+    let mut fitter = Fitter::new(models, world, sweeps, fit, watch)?;
+    fitter.known = known.iter();
+    let (best, beside) = fitter.likeliest()?;
+    fitter.end(best, &beside)
 }
 
-/// Standard deviations that no unbiased estimate from such readings can fall below (Cramer and Rao), where `world` and
-/// the sweeps' poses are the truth and readings spread as `errors` says; with what is known beforehand.
+/// Cramer-Rao bounds on the standard deviations of unbiased estimates, including the priors.
+/// `world` and the sweeps' poses are the truth, and readings scatter as given by `errors`.
 ///
 /// # Errors
 /// As [`fit`].
@@ -222,18 +223,18 @@ pub fn bound(
     fit: &Fit,
     errors: &ErrorModel,
 ) -> Result<Vec<f64>, FitError> {
-    let models = Models::of(&world.with_face_on_axis())?;
-    let mut state = State::new(models, world, sweeps, fit, &Unwatched)?;
-    state.phases = Phases::Known;
-    state.be_exact();
-    let curve = state.linear()?.curve(&state.still(), errors);
-    let covariance = state.covariance(curve.information).ok_or(FitError::Degenerate)?;
+    let models = SimulatorSet::new(&world.with_face_on_axis())?;
+    let mut fitter = Fitter::new(models, world, sweeps, fit, &Unwatched)?;
+    fitter.phases = Phases::Known;
+    fitter.be_exact();
+    let curve = fitter.linear()?.curve(&fitter.still(), errors);
+    let covariance = fitter.covariance(curve.information).ok_or(FitError::Degenerate)?;
     Ok((0..fit.priors.len()).map(|at| covariance[(at, at)].sqrt()).collect())
 }
 
-impl<'a> State<'a> {
+impl<'a> Fitter<'a> {
     fn new(
-        models: Models,
+        models: SimulatorSet,
         start: &'a World,
         sweeps: &'a [Sweep],
         fit: &'a Fit,
@@ -263,11 +264,11 @@ impl<'a> State<'a> {
     fn rough_errors(&self) -> ErrorModel {
         let World { options, sensor, .. } = self.start;
         let reach_m = options.max_range_m.unwrap_or(sensor.max_range_m);
-        let errors = ErrorModel::rough(self.fit.widest_m, settle::STAGES[0].1, reach_m);
+        let errors = ErrorModel::rough(self.fit.widest_m, continuation::STAGES[0].1, reach_m);
         if self.fit.search == Search::Furnished { errors } else { errors.without_arcs() }
     }
 
-    /// Least spread of ranges that is believed, metres: that of steps in which they are told is theirs at least.
+    /// Minimum standard deviation of ranges, metres; at least that of their quantization.
     fn least_sigma_m(&self) -> f64 {
         self.fit.least_sigma_m.max(self.start.sensor.range_step_m / 12f64.sqrt())
     }
@@ -306,8 +307,8 @@ impl<'a> State<'a> {
         self.start.changed(&self.changes(&self.values))
     }
 
-    /// Predictions where it stands, with the transducer on the axis unless exact ones are wanted.
-    fn linear(&mut self) -> Result<Rc<Linear>, FitError> {
+    /// Linearization at the current values, with the transducer on the axis unless exact.
+    fn linear(&mut self) -> Result<Rc<LinearizedModel>, FitError> {
         if let Some((values, phases, linear)) = &self.last
             && (values, *phases) == (&self.values, self.phases)
         {
@@ -324,18 +325,18 @@ impl<'a> State<'a> {
         Ok(linear)
     }
 
-    /// Has predictions made with the transducer where it is from here on.
+    /// Switches to predictions with the actual transducer position.
     fn be_exact(&mut self) {
         (self.is_exact, self.last) = (true, None);
     }
 
-    fn about(&self, models: &Models, world: &World) -> Result<Linear, FitError> {
+    fn about(&self, models: &SimulatorSet, world: &World) -> Result<LinearizedModel, FitError> {
         let reference_m_s = self.start.air.sound_speed_m_s();
-        let rates = RateFinder::new(world, &self.parameters, reference_m_s, self.phases);
-        Ok(Linear::about(models, &rates, self.sweeps, &self.poses())?)
+        let rates = JacobianBuilder::new(world, &self.parameters, reference_m_s, self.phases);
+        Ok(LinearizedModel::about(models, &rates, self.sweeps, &self.poses())?)
     }
 
-    /// The world where it stands, with its models; before each prediction.
+    /// World at the current values, with updated simulators; called before each prediction.
     fn moved_world(&mut self) -> Result<World, FitError> {
         if self.watch.stops() {
             return Err(FitError::Stopped);
@@ -354,16 +355,17 @@ impl<'a> State<'a> {
         values.iter().enumerate().map(of).sum()
     }
 
-    /// What came of it, where it settled; other places add so much to the variances.
-    fn end(mut self, best: Settled, beside: &DVector<f64>) -> Result<Fitted, FitError> {
-        let Settled { values, phases, errors, .. } = self.exactly(best)?;
+    /// Result at an optimum; other optima add `beside` to the variances.
+    fn end(mut self, best: Optimum, beside: &DVector<f64>) -> Result<Fitted, FitError> {
+        let Optimum { values, phases, errors, .. } = self.exactly(best)?;
         (self.values, self.phases) = (values, phases);
         let linear = self.linear()?;
         let curve = linear.curve(&self.still(), &errors.for_information());
         let mut covariance =
             self.covariance(curve.information.clone()).ok_or(FitError::Degenerate)?;
         let log_likelihood = linear.log_likelihood(&self.still(), &errors);
-        // Ranges depend on the threshold, too, by their time walk; where no rate says so its doubt comes on top.
+        // Ranges depend on the threshold by time walk; if not in the Jacobian, its uncertainty is
+        // added.
         let threshold = self.parameters.iter().position(|of| **of == Parameter::Threshold);
         let is_in_rates = threshold.is_some() && linear.is_walk_believed(&errors);
         if !is_in_rates {

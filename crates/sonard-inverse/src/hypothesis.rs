@@ -1,54 +1,55 @@
-//! How likely readings are under one hypothesis, for samplers and optimisers of one's own.
+//! Log-likelihood of readings under one hypothesis, for external samplers and optimizers.
 
 use nalgebra::{DMatrix, DVector};
 use sonard_model::geometry::Pose;
 
 use crate::{
     candidates::Phases,
+    jacobian::JacobianBuilder,
     likelihood::ErrorModel,
-    linear::Linear,
+    linear::LinearizedModel,
     parameter::Parameter,
-    rates::RateFinder,
     sweep::Sweep,
-    world::{Models, World, WorldError},
+    world::{SimulatorSet, World, WorldError},
 };
 
-/// A world that is asked how likely sweeps are from poses in it. What poses have in common (scene and beam pattern) is
-/// prepared once.
+/// Evaluator of the log-likelihood of sweeps from poses in a world. Scene and beam pattern are
+/// prepared once for all poses.
 ///
-/// Arrivals meet with the phases that the model tells. A transducer beside its axis has its paths found from the axis
-/// and made longer to first order, as [`fit`](crate::fit) has them on its way.
+/// Arrivals add coherently. For a transducer off its axis, paths are found from the axis and
+/// corrected to first order, as in the first stages of [`fit`](crate::fit).
 pub struct Hypotheses {
     world: World,
     parameters: Vec<Parameter>,
-    models: Models,
+    models: SimulatorSet,
 }
 
-/// The log-likelihood of readings, and how it changes with the parameters.
+/// Log-likelihood of readings with its derivatives.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LogLikelihood {
-    /// Of the readings.
+    /// Log-likelihood of the sweeps, nats.
     pub value: f64,
-    /// Its derivative by each parameter.
+    /// Gradient with respect to the parameters.
     pub gradient: DVector<f64>,
-    /// Fisher's information about the parameters.
+    /// Fisher information matrix of the parameters.
     pub information: DMatrix<f64>,
 }
 
 impl Hypotheses {
-    /// A world, and the parameters that derivatives are by. Those of single sweeps are of sweep 0.
+    /// Evaluator for a world and the parameters of the derivatives. Sweep parameters refer to sweep
+    /// 0.
     ///
     /// # Errors
-    /// When sensor, air or options make no sense.
+    /// Invalid sensor, air or options.
     pub fn new(world: World, parameters: Vec<Parameter>) -> Result<Self, WorldError> {
-        let models = Models::of(&world.with_face_on_axis())?;
+        let models = SimulatorSet::new(&world.with_face_on_axis())?;
         Ok(Self { world, parameters, models })
     }
 
-    /// How likely a sweep is from a pose, whatever pose it says itself.
+    /// Log-likelihood of a sweep from a pose; the pose of the sweep itself is ignored.
     ///
     /// # Errors
-    /// When there are more paths than can be found.
+    /// More paths than can be found.
     pub fn log_likelihood(
         &self,
         sweep: &Sweep,
@@ -57,9 +58,9 @@ impl Hypotheses {
     ) -> Result<LogLikelihood, WorldError> {
         let parameters: Vec<&Parameter> = self.parameters.iter().collect();
         let reference_m_s = self.world.air.sound_speed_m_s();
-        let rates = RateFinder::new(&self.world, &parameters, reference_m_s, Phases::Known)
+        let rates = JacobianBuilder::new(&self.world, &parameters, reference_m_s, Phases::Known)
             .with_threshold_spread(errors.sigma_db);
-        let linear = Linear::about(
+        let linear = LinearizedModel::about(
             &self.models,
             &rates,
             std::slice::from_ref(sweep),

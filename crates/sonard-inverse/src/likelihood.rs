@@ -1,54 +1,59 @@
-//! How likely a reading is, given what the receiver could have reported.
+//! Error model of readings.
 
 use std::f64::consts::{FRAC_1_SQRT_2, TAU};
 
 use serde::{Deserialize, Serialize};
 
-use crate::sweep::Outcome;
+use crate::sweep::RangeOutcome;
 
-/// Readings that share what the model misses of an arc, and so count as one where explanations are weighed against each
-/// other: taken for independent they would make sure of what they can't tell.
-pub(crate) const READINGS_OF_ARC: f64 = 8.0;
+/// Effective number of correlated readings.
+///
+/// Adjacent beams share the model error of their arc, so hypothesis weights use `log_likelihood /
+/// READINGS_PER_ARC`; treating them as independent makes posterior odds overconfident.
+pub(crate) const READINGS_PER_ARC: f64 = 8.0;
 
-/// The spread of readings about what is predicted.
+/// Error model: scatter of readings about predictions, with outliers.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ErrorModel {
     /// Standard deviation of the range of an echo, metres.
     pub sigma_m: f64,
-    /// Share of echoes in the far tail, 0 to 1.
+    /// Fraction of echoes in the far tail, 0 to 1.
     pub tail_share: f64,
-    /// Mean extra range of those, as a multiple of `sigma_m`.
+    /// Mean excess range of those, as a multiple of `sigma_m`.
     pub tail_ratio: f64,
-    /// Standard deviation of the threshold from firing to firing, decibels; it also has to cover by how much the
-    /// model misses strengths.
+    /// Standard deviation of the threshold from firing to firing, decibels; includes level errors
+    /// of the model.
     pub sigma_db: f64,
-    /// Standard deviation that each mirror reflection after the first adds to the strength of an echo, decibels, where no wall
-    /// is quite flat or square to the next.
+    /// Standard deviation added to the level of an echo by each mirror reflection after the first,
+    /// decibels, because walls are neither flat nor square.
     #[serde(default)]
     pub sigma_db_per_reflection: f64,
-    /// Share of single readings that nothing explains, of those that are not in arcs of something else.
+    /// Fraction of single outliers among readings outside outlier arcs.
     pub clutter: f64,
-    /// Share of readings in arcs of what the scene lacks: people, furniture, the robot itself. None are looked for if it is 0.
+    /// Fraction of readings in arcs of objects that the scene lacks: people, furniture, the robot
+    /// itself. 0 disables the outlier state.
     pub arcs: f64,
-    /// How long such arcs are on average, in readings.
+    /// Mean length of such arcs, readings.
     pub arc_beams: f64,
-    /// Share of all those that are silences.
+    /// Fraction of all outliers without echo.
     pub clutter_silent: f64,
-    /// Where their echoes lie, metres: anywhere up to here.
+    /// Maximum range of outliers, metres; their density is uniform.
     pub clutter_m: f64,
 }
 
-/// Share of the readings within an arc that are as the one before: silent too, or at nearly its range.
+/// Fraction of readings within an arc that resemble the preceding one: no echo as well, or a
+/// similar range.
 const ALIKE: f64 = 0.85;
-/// How much the ranges of one differ, metres, on average; and by how many standard deviations of ranges that are told apart.
+/// Mean range difference within an arc, metres.
 const ARC_M: f64 = 0.01;
+/// Minimum of that difference, in standard deviations of ranges.
 const ARC_SIGMAS: f64 = 3.0;
-/// Share of what is no silence that is nearer than the least range.
+/// Fraction of outliers with an echo that are below the minimum range.
 const NEAR: f64 = 0.1;
 
 impl ErrorModel {
-    /// Spread as of a first look: centimetres, some decibels, one reading in ten unexplained.
+    /// Initial error model: centimetres, some decibels, one outlier in ten readings.
     #[must_use]
     pub const fn rough(sigma_m: f64, sigma_db: f64, reach_m: f64) -> Self {
         Self {
@@ -65,19 +70,20 @@ impl ErrorModel {
         }
     }
 
-    /// The same without arcs: single readings alone may be unexplained, and so they stay. Poses are weighed against each other
-    /// so, each of which would have what it does not explain for arcs of something else.
+    /// Error model without outlier arcs, only with single outliers. Used for the comparison of
+    /// poses, which would otherwise absorb everything unexplained into arcs.
     pub(crate) const fn without_arcs(self) -> Self {
         Self { arcs: 0.0, ..self }
     }
 
-    /// The same with another standard deviation of ranges; the far tail keeps its length.
+    /// Error model with another standard deviation of ranges; the far tail keeps its length.
     pub(crate) fn with_range_spread(self, sigma_m: f64) -> Self {
         Self { sigma_m, tail_ratio: self.tail_ratio * self.sigma_m / sigma_m, ..self }
     }
 
-    /// Density of the error of a range (measured less predicted, metres), and its derivative: normal, or later by an
-    /// exponentially distributed excess (`TofNoise`), whose density is the convolution of both.
+    /// Density of a range error (measured minus predicted, metres), and its derivative: normal, or
+    /// with an exponentially distributed excess (`TofNoise`), whose density is the convolution of
+    /// both.
     pub(crate) fn range(&self, error_m: f64) -> [f64; 2] {
         let Self { sigma_m, tail_share, .. } = *self;
         let normal = (-0.5 * (error_m / sigma_m).powi(2)).exp() / (sigma_m * TAU.sqrt());
@@ -91,18 +97,18 @@ impl ErrorModel {
         ]
     }
 
-    /// The same for what readings say about parameters. Of a threshold that hardly varies only those tell that happen to lie
-    /// there, which are too few to say how much others would: so it counts as one that varies.
+    /// Error model for the information matrix. If the threshold hardly varies, only the few
+    /// readings right at it are informative; so a minimum variation is assumed.
     pub(crate) fn for_information(self) -> Self {
-        const LEAST_DB: f64 = 0.5;
-        Self { sigma_db: self.sigma_db.max(LEAST_DB), ..self }
+        const MIN_DB: f64 = 0.5;
+        Self { sigma_db: self.sigma_db.max(MIN_DB), ..self }
     }
 
-    /// What the range of an echo that is explained says about where it was expected, as Fisher's information: a little
-    /// less than of normal errors alone.
+    /// Fisher information of the range of an inlier echo on its expectation; slightly less than
+    /// that of normal errors alone.
     pub(crate) fn range_information(&self) -> f64 {
         const STEPS: i32 = 200;
-        // From five standard deviations before to ten and more tails after.
+        // From five standard deviations before to ten, plus tails, after.
         let step_m = self.sigma_m * (10.0 + 10.0 * self.tail_ratio) / f64::from(STEPS);
         let at = |step: i32| {
             let [density, slope] = self.range(f64::from(step) * step_m - 5.0 * self.sigma_m);
@@ -111,41 +117,45 @@ impl ErrorModel {
         (0..=STEPS).map(at).sum::<f64>() * step_m
     }
 
-    /// Share of readings that the scene explains, 0 to 1.
+    /// Prior probability that the scene explains a reading, 0 to 1.
     #[must_use]
     pub const fn explained(&self) -> f64 {
         (1.0 - self.arcs) * (1.0 - self.clutter)
     }
 
-    /// Density of a reading that nothing explains: of a range in metres, or the probability of one without.
-    pub(crate) fn of_clutter(&self, heard: Outcome) -> f64 {
-        match heard {
-            Outcome::Echo { .. } => (1.0 - self.clutter_silent) / self.clutter_m,
-            Outcome::Silence => self.clutter_silent,
-            Outcome::Near => (1.0 - self.clutter_silent) * NEAR,
+    /// Density of a single outlier: of a range in metres, or the probability of a reading without
+    /// one.
+    pub(crate) fn of_clutter(&self, outcome: RangeOutcome) -> f64 {
+        match outcome {
+            RangeOutcome::Echo { .. } => (1.0 - self.clutter_silent) / self.clutter_m,
+            RangeOutcome::NoEcho => self.clutter_silent,
+            RangeOutcome::BelowMinRange => (1.0 - self.clutter_silent) * NEAR,
         }
     }
 
-    /// The same within an arc of something that the scene lacks, by the reading before if it was of that, too.
-    pub(crate) fn of_else(&self, before: Option<Outcome>, heard: Outcome) -> f64 {
-        let anywhere = self.of_clutter(heard);
-        let alike = match (before, heard) {
+    /// Density of a reading in the outlier state, given the preceding reading if in that state,
+    /// too.
+    pub(crate) fn of_else(&self, before: Option<RangeOutcome>, outcome: RangeOutcome) -> f64 {
+        let anywhere = self.of_clutter(outcome);
+        let alike = match (before, outcome) {
             (None, _) => return anywhere,
-            (Some(Outcome::Silence), Outcome::Silence) | (Some(Outcome::Near), Outcome::Near) => {
-                1.0
-            }
-            (Some(Outcome::Echo { range_m: before_m }), Outcome::Echo { range_m: heard_m }) => {
-                // Ranges that are not told apart yet can't be told to be alike: as long as predictions may be far off, what
-                // they say is not outdone by what any arc says of itself.
+            (Some(RangeOutcome::NoEcho), RangeOutcome::NoEcho)
+            | (Some(RangeOutcome::BelowMinRange), RangeOutcome::BelowMinRange) => 1.0,
+            (
+                Some(RangeOutcome::Echo { range_m: before_m }),
+                RangeOutcome::Echo { range_m: measured_m },
+            ) => {
+                // Ranges within the range error can't be recognized as similar: while predictions
+                // may be far off, an outlier arc must not dominate them by its self-similarity.
                 let width_m = ARC_M.hypot(ARC_SIGMAS * self.sigma_m);
-                (-(heard_m - before_m).abs() / width_m).exp() / (2.0 * width_m)
+                (-(measured_m - before_m).abs() / width_m).exp() / (2.0 * width_m)
             }
             _ => 0.0,
         };
         ALIKE * alike + (1.0 - ALIKE) * anywhere
     }
 
-    /// Probabilities of the next reading's state, of the scene or of something else, after each of them.
+    /// Transition probabilities between the scene and the outlier state.
     pub(crate) fn changes(&self) -> [[f64; 2]; 2] {
         let leaves = 1.0 / self.arc_beams;
         let enters = (leaves * self.arcs / (1.0 - self.arcs)).min(0.5);
@@ -163,12 +173,12 @@ fn exponentially_modified(error_m: f64, sigma_m: f64, tail_m: f64) -> f64 {
     0.5 / tail_m * (0.5 * ratio * ratio - error_m / tail_m).exp() * libm::erfc(late)
 }
 
-/// The standard normal distribution: its integral up to a value.
+/// Standard normal cumulative distribution function.
 pub(crate) fn normal_up_to(value: f64) -> f64 {
     0.5 * libm::erfc(-value * FRAC_1_SQRT_2)
 }
 
-/// Its density.
+/// Standard normal density.
 pub(crate) fn normal_density(value: f64) -> f64 {
     (-0.5 * value * value).exp() / TAU.sqrt()
 }
@@ -178,7 +188,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_density_of_errors_integrates_to_one_and_has_its_derivative() {
+    fn density_integrates_to_one() {
         let model = ErrorModel::rough(0.002, 2.0, 5.0);
         let step_m = 1e-5;
         let errors = (-4000..12_000).map(|at| f64::from(at) * step_m);
@@ -192,10 +202,10 @@ mod tests {
         let normal = ErrorModel { tail_share: 0.0, ..model };
         let [with_tail, without] =
             [model, normal].map(|model| model.range_information() * model.sigma_m.powi(2));
-        // Five standard deviations leave out 2e-5.
+        // The integration limit of five standard deviations omits 2e-5.
         assert!((without - 1.0).abs() < 1e-4, "{without}");
         assert!((0.7..0.95).contains(&with_tail), "{with_tail}");
-        // Far before the predicted range it must neither overflow nor be no number.
+        // Far before the predicted range it must neither overflow nor be NaN.
         assert!(model.range(-5.0)[0] == 0.0 && model.range(5.0)[0].is_finite());
     }
 }

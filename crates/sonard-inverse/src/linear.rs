@@ -1,52 +1,52 @@
-//! All readings beside what could have been reported, to first order about a hypothesis.
+//! Likelihood of all readings, linearized about a hypothesis.
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use sonard_model::geometry::Pose;
 
 use crate::{
-    arcs::{self, Counts, Emission, States},
     candidates::Phases,
-    judged::{Judged, Rates, Terms},
+    jacobian::JacobianBuilder,
     likelihood::ErrorModel,
+    likelihood_terms::{LikelihoodTerms, ReadingModel, SparseRow},
+    outlier_hmm::{self, Emission, OutlierCounts, StatePosterior},
     parameter::Parameter,
-    rates::RateFinder,
-    sweep::{Outcome, Sweep},
-    walk::TimeWalk,
-    world::{Models, World, WorldError},
+    sweep::{RangeOutcome, Sweep},
+    time_walk::TimeWalk,
+    world::{SimulatorSet, World, WorldError},
 };
 
-/// All readings, about one hypothesis.
+/// Linearized model of all readings about a hypothesis.
 #[derive(Debug, Clone)]
-pub(crate) struct Linear {
-    /// By sweep, in the order of its directions.
-    sweeps: Vec<Vec<Judged>>,
-    /// How many parameters there are.
+pub(crate) struct LinearizedModel {
+    /// Readings by sweep, in order of direction.
+    sweeps: Vec<Vec<ReadingModel>>,
+    /// Number of parameters.
     count: usize,
     walk: TimeWalk,
 }
 
 /// Log-likelihood with its gradient and curvature.
 #[derive(Debug, Clone)]
-pub(crate) struct Curve {
+pub(crate) struct Derivatives {
     pub(crate) value: f64,
     pub(crate) gradient: DVector<f64>,
-    /// Fisher's information: of ranges as Gauss and Newton have it, of thresholds what a reading is expected to say. What
-    /// single surprising readings seem to say would make far too sure.
+    /// Fisher information: Gauss-Newton for ranges, and expected information for thresholds. The
+    /// observed information of single surprising readings would be overconfident.
     pub(crate) information: DMatrix<f64>,
-    /// What the gradient would gain by each decibel that the threshold is wrong, because of time walk.
+    /// Derivative of the gradient by a threshold error in decibels, due to time walk.
     pub(crate) walk: DVector<f64>,
 }
 
-impl Linear {
-    /// Predicts all sweeps, each from its pose, by models of the world that the rates are found in.
+impl LinearizedModel {
+    /// Predicts all sweeps from their poses, by simulators of the world of the Jacobian.
     ///
-    /// A transducer beside its axis has paths of its own in each direction, some hundred times more work. If the models
-    /// have it on the axis, the paths are found once, from there, and made longer to first order: a millimetre off for
-    /// one that is 3 cm beside it and half a metre before a wall.
+    /// A transducer off its axis has separate paths in each direction, some hundred times more
+    /// work. If the simulators have it on the axis, paths are found once and corrected to first
+    /// order: the error is a millimetre for an offset of 3 cm at half a metre from a wall.
     pub(crate) fn about(
-        models: &Models,
-        rates: &RateFinder,
+        models: &SimulatorSet,
+        rates: &JacobianBuilder,
         sweeps: &[Sweep],
         poses: &[Pose],
     ) -> Result<Self, WorldError> {
@@ -57,18 +57,18 @@ impl Linear {
         };
         let (count, walk) = (rates.parameters(), rates.time_walk(models.receiver()));
         if let ([sweep], [pose]) = (sweeps, poses) {
-            // Another thread would take longer to wake up than most sweeps take.
+            // Waking another thread takes longer than most sweeps.
             return Ok(Self { sweeps: vec![of((0, (sweep, pose)))?], count, walk });
         }
-        let sweeps: Result<Vec<Vec<Judged>>, WorldError> =
+        let sweeps: Result<Vec<Vec<ReadingModel>>, WorldError> =
             sweeps.par_iter().zip(poses).enumerate().map(of).collect();
         Ok(Self { sweeps: sweeps?, count, walk })
     }
 
-    /// Log-likelihoods of one sweep from a pose turned by so many degrees each and at thresholds higher by so many
-    /// decibels each: the turn, the threshold, and how likely that is.
+    /// Log-likelihoods of one sweep for combinations of rotations in degrees and threshold changes
+    /// in decibels: rotation, threshold change, log-likelihood.
     pub(crate) fn turned(
-        models: &Models,
+        models: &SimulatorSet,
         world: &World,
         sweep: &Sweep,
         pose: &Pose,
@@ -78,12 +78,12 @@ impl Linear {
     ) -> Result<Vec<(f64, f64, f64)>, WorldError> {
         let parameters = [&Parameter::Threshold];
         let rates =
-            RateFinder::new(world, &parameters, world.air.sound_speed_m_s(), Phases::Unknown);
+            JacobianBuilder::new(world, &parameters, world.air.sound_speed_m_s(), Phases::Unknown);
         let turned = models.at(pose, |simulator, point| {
             Ok(rates.turned(simulator, point, sweep, pose, turns_deg)?)
         })?;
         let walk = rates.time_walk(models.receiver());
-        let likely = |(beams, &turn_deg): (Vec<Judged>, &f64)| {
+        let likely = |(beams, &turn_deg): (Vec<ReadingModel>, &f64)| {
             let (sweeps, count) = (vec![beams], parameters.len());
             let linear = Self { sweeps, count, walk: walk.clone() };
             let at = |db: f64| linear.log_likelihood(&DVector::from_element(1, db), errors);
@@ -94,16 +94,17 @@ impl Linear {
 
     /// Log-likelihood of all readings after a change of the parameters.
     pub(crate) fn log_likelihood(&self, change: &DVector<f64>, errors: &ErrorModel) -> f64 {
-        let of = |sweep: &Vec<Judged>| {
-            let emission = |beam: &Judged| emission(beam, &beam.terms(change, errors, &self.walk));
-            arcs::log_likelihood(sweep.iter().map(emission), errors)
+        let of = |sweep: &Vec<ReadingModel>| {
+            let emission =
+                |beam: &ReadingModel| emission(beam, &beam.terms(change, errors, &self.walk));
+            outlier_hmm::log_likelihood(sweep.iter().map(emission), errors)
         };
         self.sweeps.iter().map(of).sum()
     }
 
-    /// The same with what it takes to improve it.
-    pub(crate) fn curve(&self, change: &DVector<f64>, errors: &ErrorModel) -> Curve {
-        let mut curve = Curve {
+    /// Log-likelihood after a change of the parameters, with gradient and information.
+    pub(crate) fn curve(&self, change: &DVector<f64>, errors: &ErrorModel) -> Derivatives {
+        let mut curve = Derivatives {
             value: 0.0,
             gradient: DVector::zeros(self.count),
             information: DMatrix::zeros(self.count, self.count),
@@ -111,7 +112,7 @@ impl Linear {
         };
         let of_range = errors.range_information();
         for sweep in &self.sweeps {
-            let (terms, states) = self.beside_else(sweep, change, errors);
+            let (terms, states) = self.with_states(sweep, change, errors);
             curve.value += states.log_likelihood;
             for ((beam, terms), of_scene) in sweep.iter().zip(&terms).zip(states.of_scene) {
                 curve.add(beam, terms, of_scene, of_range, errors);
@@ -120,67 +121,68 @@ impl Linear {
         curve
     }
 
-    /// What there is to estimate the spread of readings from.
+    /// Statistics for the estimation of the error model.
     pub(crate) fn residuals(&self, errors: &ErrorModel) -> Residuals {
         let still = DVector::zeros(self.count);
         let mut found = Residuals::default();
         for sweep in &self.sweeps {
-            let (terms, states) = self.beside_else(sweep, &still, errors);
+            let (terms, states) = self.with_states(sweep, &still, errors);
             found.counts += states.counts;
             for ((beam, terms), of_scene) in sweep.iter().zip(&terms).zip(states.of_scene) {
                 let unexplained = of_scene * terms.unexplained;
                 found.unexplained += unexplained;
                 found.silent_unexplained +=
-                    if beam.heard == Outcome::Silence { unexplained } else { 0.0 };
+                    if beam.measured == RangeOutcome::NoEcho { unexplained } else { 0.0 };
                 found.of_ranges.extend(beam.residual(terms, of_scene));
             }
         }
         found
     }
 
-    /// Whether ranges are known so well that their time walk is in the rates.
+    /// Returns `true` if ranges are accurate enough for time walk to be in the Jacobian.
     pub(crate) fn is_walk_believed(&self, errors: &ErrorModel) -> bool {
         self.walk.is_believed(errors.sigma_m)
     }
 
-    /// How many readings there are.
+    /// Number of readings.
     pub(crate) fn len(&self) -> usize {
         self.sweeps.iter().map(Vec::len).sum()
     }
 
-    /// The readings of a sweep if they are of the scene, and whether they are.
-    fn beside_else(
+    /// Likelihood terms of a sweep, and the posterior of its states.
+    fn with_states(
         &self,
-        sweep: &[Judged],
+        sweep: &[ReadingModel],
         change: &DVector<f64>,
         errors: &ErrorModel,
-    ) -> (Vec<Terms>, States) {
-        let terms: Vec<Terms> =
+    ) -> (Vec<LikelihoodTerms>, StatePosterior) {
+        let terms: Vec<LikelihoodTerms> =
             sweep.iter().map(|beam| beam.terms(change, errors, &self.walk)).collect();
         let emissions: Vec<Emission> =
             sweep.iter().zip(&terms).map(|(beam, terms)| emission(beam, terms)).collect();
-        (terms, arcs::states(&emissions, errors))
+        (terms, outlier_hmm::states(&emissions, errors))
     }
 }
 
-/// What the readings are off by, and how many are not of the scene.
+/// Residuals and outlier statistics.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Residuals {
-    /// Ranges of echoes, as differences from the likeliest explanation, with the probability that it is the right one.
+    /// Residuals of echoes from their likeliest candidate, with its posterior probability.
     pub(crate) of_ranges: Vec<(f64, f64)>,
-    /// Expected number of single readings that nothing explains, and of those that are silences.
+    /// ExpectedRange number of single outliers.
     pub(crate) unexplained: f64,
+    /// ExpectedRange number of single outliers without echo.
     pub(crate) silent_unexplained: f64,
-    /// Expected numbers of readings in arcs of something else.
-    pub(crate) counts: Counts,
+    /// ExpectedRange numbers of readings in outlier arcs.
+    pub(crate) counts: OutlierCounts,
 }
 
-impl Curve {
-    /// What a reading adds that is of the scene with some probability.
+impl Derivatives {
+    /// Adds a reading with a probability of the scene state.
     fn add(
         &mut self,
-        beam: &Judged,
-        terms: &Terms,
+        beam: &ReadingModel,
+        terms: &LikelihoodTerms,
         of_scene: f64,
         of_range: f64,
         errors: &ErrorModel,
@@ -203,14 +205,14 @@ impl Curve {
     }
 }
 
-const fn emission(beam: &Judged, terms: &Terms) -> Emission {
-    Emission { heard: beam.heard, of_scene: terms.density }
+const fn emission(beam: &ReadingModel, terms: &LikelihoodTerms) -> Emission {
+    Emission { measured: beam.measured, of_scene: terms.density }
 }
 
-fn add_outer(to: &mut DMatrix<f64>, rates: &Rates, weight: f64) {
-    for &(one, by) in rates {
-        for &(other, beside) in rates {
-            to[(one as usize, other as usize)] += weight * by * beside;
+fn add_outer(to: &mut DMatrix<f64>, rates: &SparseRow, weight: f64) {
+    for &(row, by_row) in rates {
+        for &(column, by_column) in rates {
+            to[(row as usize, column as usize)] += weight * by_row * by_column;
         }
     }
 }

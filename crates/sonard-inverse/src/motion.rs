@@ -1,4 +1,5 @@
-//! How the length of a propagation path changes where the world or the transducer moves.
+//! Derivative of the length of a propagation path with respect to motion of the scene or
+//! transducer.
 
 use glam::DVec3;
 use sonard_model::{
@@ -7,21 +8,21 @@ use sonard_model::{
     scene::Scene,
 };
 
-/// Velocities of what sound meets, as one parameter grows: metres for each unit of it.
+/// Velocities of the scene and transducer with respect to one parameter, metres per unit.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Motion {
-    /// Of transmitter and receiver, in the plane.
+    /// Velocities of transmitter and receiver, in the plane.
     pub transducer: [DVec2; 2],
-    /// Of both, upwards.
+    /// Upward velocity of both.
     pub up: f64,
-    /// Of walls' ends, by their index in the scene.
+    /// Velocities of the ends of walls, by their index in the scene.
     pub walls: Vec<(u32, [DVec2; 2])>,
-    /// Of cylinders' axes, and the growth of their radii.
+    /// Velocities of the axes of cylinders, and the growth of their radii.
     pub cylinders: Vec<(u32, DVec2, f64)>,
 }
 
 impl Motion {
-    /// A transducer that moves as a whole.
+    /// Motion of the transducer as a whole.
     #[must_use]
     pub fn of_transducer(velocity: DVec2) -> Self {
         Self { transducer: [velocity; 2], ..Self::default() }
@@ -31,13 +32,13 @@ impl Motion {
         self.walls.iter().find(|moved| moved.0 == wall).map_or([DVec2::ZERO; 2], |moved| moved.1)
     }
 
-    /// Velocity and growth of a cylinder that moves.
+    /// Velocity and growth of a moving cylinder.
     fn of_cylinder(&self, cylinder: u32) -> Option<(DVec2, f64)> {
         let moved = self.cylinders.iter().find(|moved| moved.0 == cylinder);
         moved.map(|&(_, velocity, growth)| (velocity, growth))
     }
 
-    /// Velocity of the point of a wall that is nearest to `point`.
+    /// Velocity of the point of a wall nearest to `point`.
     fn on_wall(&self, scene: &Scene, wall: u32, point: DVec2) -> DVec2 {
         let [at_a, at_b] = self.of_wall(wall);
         let Some(wall) = scene.walls.get(wall as usize) else { return DVec2::ZERO };
@@ -46,15 +47,15 @@ impl Motion {
         at_a.lerp(at_b, share)
     }
 
-    fn of(&self, scene: &Scene, mechanism: Mechanism, point: DVec2) -> DVec3 {
+    fn velocity(&self, scene: &Scene, mechanism: Mechanism, point: DVec2) -> DVec3 {
         let up = if mechanism == Mechanism::Transducer { self.up } else { 0.0 };
         self.of_plan(scene, mechanism, point).extend(up)
     }
 
-    /// Velocity of what a path meets at a point, in the plan.
+    /// Velocity of the surface at an interaction point, in the plan.
     pub(crate) fn of_plan(&self, scene: &Scene, mechanism: Mechanism, point: DVec2) -> DVec2 {
-        let stands = self.walls.is_empty() && self.cylinders.is_empty();
-        if stands && mechanism != Mechanism::Transducer {
+        let is_fixed = self.walls.is_empty() && self.cylinders.is_empty();
+        if is_fixed && mechanism != Mechanism::Transducer {
             return DVec2::ZERO;
         }
         match mechanism {
@@ -66,7 +67,7 @@ impl Motion {
             Mechanism::Diffraction(Diffractor::Upright(Edge { wall, at_b })) => {
                 self.of_wall(wall)[usize::from(at_b)]
             }
-            // The length that it is told with runs to its axis.
+            // The logged path length extends to the axis of the post.
             Mechanism::Diffraction(Diffractor::Post { cylinder }) => {
                 self.of_cylinder(cylinder).map_or(DVec2::ZERO, |(velocity, _)| velocity)
             }
@@ -82,7 +83,7 @@ impl Motion {
         }
     }
 
-    /// How a wall turns that a path meets, radians for each unit.
+    /// Rotation of the wall at an interaction, radians per unit.
     pub(crate) fn turn_of(&self, scene: &Scene, mechanism: Mechanism) -> f64 {
         let (Mechanism::Reflection(Reflector::Wall(wall))
         | Mechanism::Diffraction(Diffractor::Level { wall, .. })) = mechanism
@@ -95,19 +96,20 @@ impl Motion {
     }
 }
 
-/// What the length of a path there and back gains, metres, for each unit of a parameter that moves the scene and
-/// the transducer so; `ends` are transmitter and receiver, at the height `z_m` in a scene with heights.
+/// Derivative of the two-way length of a path with respect to a parameter that moves the scene and
+/// the transducer, metres per unit; `ends` are transmitter and receiver, at the height `z_m` in a
+/// scene with heights.
 ///
-/// A path is stationary in the points of its interactions (Fermat), so only what moves by itself counts:
-/// `dL = sum dp . (u_in - u_out)` with the unit directions of propagation before and after each point, and
-/// `-u . dx` for an end that sound leaves, or comes back to, from the direction `u`. Held to finite differences
-/// in the tests, relative to a metre for each unit: 1e-5.
+/// A path is stationary in the points of its interactions (Fermat), so only explicit motion counts:
+/// `dL = sum dp . (u_in - u_out)` with the unit directions of propagation before and after each
+/// point, and `-u . dx` for an end with departure or arrival direction `u`. Tests verify finite
+/// differences to 1e-5, relative to a metre per unit.
 #[must_use]
 pub fn length_rate(path: &Path, ends: [DVec2; 2], z_m: f64, scene: &Scene, motion: &Motion) -> f64 {
-    let met = &path.interactions;
-    let point = |at: usize| met[at].point.extend(met[at].z_m.unwrap_or(z_m));
+    let interactions = &path.interactions;
+    let point = |at: usize| interactions[at].point.extend(interactions[at].z_m.unwrap_or(z_m));
     let (Some(last), [transmitter, receiver]) =
-        (met.len().checked_sub(1), ends.map(|end| end.extend(z_m)))
+        (interactions.len().checked_sub(1), ends.map(|end| end.extend(z_m)))
     else {
         return 0.0;
     };
@@ -115,8 +117,8 @@ pub fn length_rate(path: &Path, ends: [DVec2; 2], z_m: f64, scene: &Scene, motio
     let velocity = |velocity: DVec2| velocity.extend(motion.up);
     let mut rate = -toward(transmitter, point(0)).dot(velocity(motion.transducer[0]))
         - toward(receiver, point(last)).dot(velocity(motion.transducer[1]));
-    for (at, interaction) in met.iter().enumerate() {
-        let velocity = motion.of(scene, interaction.mechanism, interaction.point);
+    for (at, interaction) in interactions.iter().enumerate() {
+        let velocity = motion.velocity(scene, interaction.mechanism, interaction.point);
         if velocity == DVec3::ZERO {
             continue;
         }

@@ -1,51 +1,52 @@
-//! What can be fitted.
+//! Parameters that can be fitted.
 
 use std::fmt;
 
-/// One number that predictions depend on, told as a difference from the world that is started from.
+/// Parameter of the predictions, as a change relative to the initial world.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub enum Parameter {
-    /// Where the ranger stood in a sweep, by the sweep's place in the list: x, metres.
+    /// Ranger position along x in a sweep, by its index in the list, metres.
     X(usize),
-    /// The same along y, metres.
+    /// Ranger position along y in a sweep, metres.
     Y(usize),
-    /// Where its azimuth 0 pointed, degrees.
+    /// World direction of azimuth 0 in a sweep, degrees.
     Heading(usize),
-    /// Azimuth that the stepper's zero is off by, in all sweeps, degrees.
+    /// Azimuth offset of the stepper's zero, common to all sweeps, degrees.
     HeadingZero,
-    /// Share by which the stepper turns further than it says.
+    /// Relative error of the stepper's gear ratio.
     Gear,
-    /// Transducer farther ahead of the axis, metres.
+    /// Transducer offset ahead of the axis, metres.
     Ahead,
-    /// Transducer farther left of the axis, metres.
+    /// Transducer offset to the left of the axis, metres.
     Left,
-    /// Transducer higher, metres.
+    /// Transducer height above the floor, metres.
     Height,
-    /// Share by which sound is faster.
+    /// Relative change of the speed of sound.
     SoundSpeed,
-    /// What is added to every range, metres: a constant delay.
+    /// Constant delay, as a range offset in metres.
     Delay,
-    /// Higher threshold, decibels.
+    /// Detection threshold of the receiver, decibels.
     Threshold,
-    /// Threshold that rises faster with the range, decibels a metre.
+    /// Slope of the threshold with range, dB/m.
     ThresholdRise,
-    /// Natural logarithm of how much wider the radiating face is; a wider one has a narrower beam.
+    /// Natural logarithm of the aperture's width ratio; a wider aperture has a narrower beam.
     Aperture,
-    /// Natural logarithm of how much wider the band of transducer and receiver is; a wider one lets pulses rise faster.
+    /// Natural logarithm of the bandwidth ratio of transducer and receiver; a wider band shortens
+    /// the rise of pulses.
     Bandwidth,
-    /// Stronger skirts of the beam, decibels; only of a piston that has some.
+    /// Level of the side-lobe floor, decibels; only for a piston that has one.
     Skirts,
-    /// Natural logarithm of how much more a material reflects.
+    /// Natural logarithm of a material's reflectance ratio.
     Reflectance(String),
-    /// Larger share of what a material gives back that it scatters.
+    /// Change of the fraction of reflected energy that a material scatters.
     Roughness(String),
-    /// A wall farther along its normal, which is left of the way from its first to its second end, by its index in
-    /// the scene; metres.
+    /// Displacement of a wall along its normal, to the left from its first to its second end, by
+    /// its index in the scene; metres.
     Wall(usize),
 }
 
 impl Parameter {
-    /// The sweep that it is of alone.
+    /// Index of the sweep, for a parameter of a single sweep.
     #[must_use]
     pub const fn sweep(&self) -> Option<usize> {
         match self {
@@ -54,7 +55,7 @@ impl Parameter {
         }
     }
 
-    /// How far it may be moved at a time before predictions have to be made again, in its unit.
+    /// Maximum step between predictions, in the parameter's unit.
     pub(crate) const fn step(&self) -> f64 {
         match self {
             Self::X(_) | Self::Y(_) | Self::Ahead | Self::Left | Self::Wall(_) | Self::Height => {

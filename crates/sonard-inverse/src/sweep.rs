@@ -1,27 +1,27 @@
-//! Readings of one scan, as far as they say something about the world.
+//! Readings of one scan, prepared for fits.
 
 use sonard_model::geometry::Pose;
 use sonard_records::{PingStatus, ScanView};
 use thiserror::Error;
 use uuid::Uuid;
 
-/// The readings of a ranger on a stepper, taken from one place.
+/// Readings of a ranger on a stepper from one position.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sweep {
-    /// The scan that they are of.
+    /// Scan of the readings.
     pub scan: Uuid,
-    /// Where the ranger is believed to have stood.
+    /// Initial pose of the ranger.
     pub pose: Pose,
-    /// Its firings; those that say nothing are left out.
+    /// Firings with a valid outcome.
     pub beams: Vec<Beam>,
 }
 
-/// A firing.
+/// Firing with its outcome.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Beam {
-    /// Where the stepper pointed, degrees counter-clockwise from the heading.
+    /// Azimuth of the stepper, degrees counter-clockwise from the heading.
     pub azimuth_deg: f64,
-    /// What came back.
+    /// Outcome of the firing.
     pub heard: Heard,
 }
 
@@ -31,22 +31,22 @@ impl Beam {
     }
 }
 
-/// The outcome of a firing, as fits use it.
+/// Outcome of a firing with its time of flight.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Heard {
-    /// The first echo so long after firing, microseconds.
+    /// First echo after firing.
     Echo {
-        /// Time of flight.
+        /// Time of flight, microseconds.
         tof_us: f64,
     },
-    /// Nothing within the listening window.
+    /// No echo within the measurement window.
     Silence,
-    /// Something sounded already when the receiver began to listen: it is nearer than the least range.
+    /// Target below the minimum range: signal present at the end of blanking.
     Near,
 }
 
 impl Heard {
-    /// The range of an echo where sound is so fast, metres.
+    /// Range of an echo for a speed of sound, metres.
     #[must_use]
     pub fn range_m(&self, sound_speed_m_s: f64) -> Option<f64> {
         match self {
@@ -55,73 +55,71 @@ impl Heard {
         }
     }
 
-    pub(crate) fn outcome(&self, sound_speed_m_s: f64) -> Outcome {
+    pub(crate) fn outcome(&self, sound_speed_m_s: f64) -> RangeOutcome {
         match (self, self.range_m(sound_speed_m_s)) {
-            (_, Some(range_m)) => Outcome::Echo { range_m },
-            (Self::Near, None) => Outcome::Near,
-            (_, None) => Outcome::Silence,
+            (_, Some(range_m)) => RangeOutcome::Echo { range_m },
+            (Self::Near, None) => RangeOutcome::BelowMinRange,
+            (_, None) => RangeOutcome::NoEcho,
         }
     }
 }
 
-/// What a firing came to or could have come to, with an echo's range at the reference speed of sound.
+/// Measured or predicted outcome, with ranges at the reference speed of sound.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum Outcome {
-    /// An echo
+pub(crate) enum RangeOutcome {
+    /// Echo with a range.
     Echo {
-        /// from there, metres.
+        /// Range, metres.
         range_m: f64,
     },
-    /// As [`Heard::Silence`].
-    Silence,
-    /// As [`Heard::Near`].
-    Near,
+    /// No echo, as [`Heard::Silence`].
+    NoEcho,
+    /// Target below the minimum range, as [`Heard::Near`].
+    BelowMinRange,
 }
 
-impl Outcome {
-    /// Of an echo.
+impl RangeOutcome {
+    /// Range of an echo, metres.
     pub(crate) const fn range_m(&self) -> Option<f64> {
         match *self {
             Self::Echo { range_m } => Some(range_m),
-            Self::Silence | Self::Near => None,
+            Self::NoEcho | Self::BelowMinRange => None,
         }
     }
 }
 
-/// Why a scan can't be used.
+/// Reason why a scan can't be used.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 pub enum SweepError {
-    /// The log lacks what says where and how it was taken.
-    #[error("scan {0}: the log lacks its beginning or its session")]
+    /// Missing start or session record.
+    #[error("scan {0}: the log lacks its start or its session")]
     Incomplete(Uuid),
-    /// Rangers at fixed bearings.
-    #[error("scan {0} is of an array: only the sweeps of one ranger on a stepper can be used")]
+    /// Scan of an array.
+    #[error("scan {0} is of an array: only sweeps of one ranger on a stepper can be used")]
     OfArray(Uuid),
-    /// The robot moved.
-    #[error("scan {0}: the ranger was moved while it was taken")]
+    /// Robot moved during the scan.
+    #[error("scan {0}: the ranger was moved during the scan")]
     Moved(Uuid),
-    /// Not enough of it.
-    #[error(
-        "scan {scan}: {beams} of its readings say something: at least {LEAST_BEAMS} are needed"
-    )]
+    /// Too few valid readings.
+    #[error("scan {scan}: {beams} valid readings, but at least {MIN_BEAMS} are needed")]
     TooFew {
-        /// Which scan.
+        /// Id of the scan.
         scan: Uuid,
-        /// How many do.
+        /// Number of valid readings.
         beams: usize,
     },
 }
 
-/// Fewer say too little about three values of a pose.
-const LEAST_BEAMS: usize = 8;
-/// Less than this share of echoes is little.
+/// Minimum number of readings for the three parameters of a pose.
+const MIN_BEAMS: usize = 8;
+/// Fraction of echoes below which echoes are few.
 const FEW_ECHOES: f64 = 0.12;
 
 impl Sweep {
-    /// The readings of a logged scan.
+    /// Readings of a logged scan.
     ///
     /// # Errors
-    /// When it is not of one ranger at one place.
+    /// Scan of an array, of a moving robot, or incomplete.
     pub fn of(scan: &ScanView) -> Result<Self, SweepError> {
         let id = scan.scan;
         let (Some(pose), Some(session)) = (scan.pose(), &scan.session) else {
@@ -152,14 +150,15 @@ impl Sweep {
                 Some(Beam { azimuth_deg: ping.azimuth_deg, heard })
             })
             .collect();
-        if beams.len() < LEAST_BEAMS {
+        if beams.len() < MIN_BEAMS {
             return Err(SweepError::TooFew { scan: id, beams: beams.len() });
         }
         Ok(Self { scan: id, pose, beams })
     }
 
-    /// Whether it heard so little, as of one wall or edge, that it may have been taken from many places.
-    pub(crate) fn hears_little(&self) -> bool {
+    /// Returns `true` if the sweep has so few echoes, as of one wall or edge, that it fits many
+    /// poses.
+    pub(crate) fn has_few_echoes(&self) -> bool {
         let echoes = self.beams.iter().filter(|beam| beam.is_echo()).count() as f64;
         echoes < FEW_ECHOES * self.beams.len() as f64
     }

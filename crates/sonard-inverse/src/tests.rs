@@ -1,13 +1,13 @@
-//! Held to the model itself: what it predicts is what has to be found again.
+//! Parameters and poses recovered from simulated readings.
 
 mod candidates;
+mod checkpoint;
 mod coarse;
 mod course;
 mod derivatives;
-mod found;
 mod margins;
 mod near;
-mod stopped;
+mod recovery;
 mod thresholds;
 
 use std::sync::Arc;
@@ -30,15 +30,15 @@ fn world(scene: &str, sensor: &str) -> World {
     World::new(shipped(scene), sensor, Air::default(), Options::default())
 }
 
-/// By how much thresholds vary from firing to firing, decibels.
+/// Standard deviation of the threshold from firing to firing, decibels.
 const SIGMA_DB: f64 = 0.5;
 
-/// How readings by such thresholds spread, that reach so far.
+/// Error model of readings with such thresholds, up to a maximum range.
 fn as_read(reach_m: f64) -> ErrorModel {
     ErrorModel { clutter: 1e-3, arcs: 0.0, ..ErrorModel::rough(1e-3, SIGMA_DB, reach_m) }
 }
 
-/// A world of one wall, so many metres ahead.
+/// World with a single wall at a distance in metres.
 fn before_a_wall(at_m: f64, reach_m: f64) -> World {
     let text = format!(
         r#"{{"name": "wall", "materials": {{"wood": {{"reflectance": 0.8}}}},

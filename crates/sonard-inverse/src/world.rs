@@ -1,4 +1,4 @@
-//! Everything that predictions depend on, and what becomes of it when parameters change.
+//! World that predictions depend on, and its changes by parameters.
 
 use std::{collections::BTreeMap, sync::Arc};
 
@@ -17,63 +17,63 @@ use crate::{
     walls::{self, moved_ends},
 };
 
-/// A scene, a sensor in some air, and the stepper that turns it.
+/// Scene, sensor, air and stepper.
 #[derive(Debug, Clone)]
 pub struct World {
-    /// The scene.
+    /// Scene of the predictions.
     pub scene: Arc<Scene>,
-    /// The sensor.
+    /// Sensor of the ranger.
     pub sensor: Sensor,
-    /// The air.
+    /// Properties of the air.
     pub air: Air,
-    /// The model.
+    /// Options of the simulator.
     pub options: Options,
-    /// What is added to every range, metres.
+    /// Offset added to every range, metres.
     pub delay_m: f64,
-    /// What is added to every azimuth, degrees.
+    /// Offset added to every azimuth, degrees.
     pub heading_zero_deg: f64,
-    /// What every azimuth is multiplied with.
+    /// Factor applied to every azimuth.
     pub gear: f64,
 }
 
-/// An error in a world, or in a pose in it.
+/// Invalid world, or invalid pose in it.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum WorldError {
-    /// Its sensor or options make no sense.
+    /// Invalid sensor or options.
     #[error(transparent)]
     Model(#[from] ModelError),
     /// More paths than can be found.
     #[error(transparent)]
     TooCostly(#[from] TooCostly),
-    /// The ranger can't stand there.
+    /// Pose outside the free space.
     #[error(transparent)]
     Pose(#[from] PoseError),
-    /// Air that there is not.
+    /// Air outside the valid ranges.
     #[error("air: {0}")]
     Air(#[from] sonard_model::acoustics::AirError),
 }
 
-/// A pose for what does not depend on it.
+/// Arbitrary pose, for what does not depend on it.
 const ANYWHERE: Pose = Pose { x_m: 0.0, y_m: 0.0, heading_deg: 0.0 };
 
 impl World {
-    /// A world with a range without delay and an exact stepper. A threshold among the options becomes the sensor's, so that
-    /// predictions follow it.
+    /// World without range delay and with an exact stepper. A threshold among the options replaces
+    /// the sensor's, so that it can be fitted.
     #[must_use]
     pub fn new(scene: Arc<Scene>, mut sensor: Sensor, air: Air, mut options: Options) -> Self {
         sensor.threshold = options.threshold.take().unwrap_or(sensor.threshold);
         Self { scene, sensor, air, options, delay_m: 0.0, heading_zero_deg: 0.0, gear: 1.0 }
     }
 
-    /// The model of this world around a robot.
+    /// Simulator of the world with the robot's body at a pose.
     ///
     /// # Errors
-    /// When sensor, air or options make no sense.
+    /// Invalid sensor, air or options.
     pub fn simulator(&self, robot: &Pose) -> Result<Simulator, WorldError> {
         Ok(Simulator::new(self.scene_around(robot), self.sensor.clone(), self.air, self.options)?)
     }
 
-    /// The scene with a robot's body, if it has one.
+    /// Scene with the robot's body, if it has one.
     fn scene_around(&self, robot: &Pose) -> Arc<Scene> {
         match self.scene.robot {
             Some(_) => Arc::new(self.scene.with_robot_at(robot)),
@@ -81,7 +81,7 @@ impl World {
         }
     }
 
-    /// The same with the transducer on the axis, where all directions share their paths.
+    /// World with the transducer on the axis, where all directions share their paths.
     #[must_use]
     pub(crate) fn with_face_on_axis(&self) -> Self {
         let mut world = self.clone();
@@ -90,23 +90,23 @@ impl World {
         world
     }
 
-    /// The world direction of a firing, radians.
+    /// World direction of a firing, radians.
     #[must_use]
     pub fn direction_rad(&self, pose: &Pose, azimuth_deg: f64) -> f64 {
         pose.direction_rad(self.heading_zero_deg + self.gear * azimuth_deg)
     }
 
-    /// The world with its parameters changed by so much; those of single sweeps leave it as it is.
+    /// World after changes of its parameters; those of single sweeps are ignored.
     ///
     /// # Errors
-    /// When the air would be none.
+    /// Air outside the valid ranges.
     pub fn changed(&self, changes: &[(&Parameter, f64)]) -> Result<Self, WorldError> {
         let mut world = self.clone();
         let mut offsets_m = Vec::new();
         let mut materials: BTreeMap<&str, Material> = BTreeMap::new();
         for &(parameter, by) in changes {
-            let (least, most) = self.limits(parameter);
-            let by = by.clamp(least, most);
+            let (min, max) = self.limits(parameter);
+            let by = by.clamp(min, max);
             match parameter {
                 Parameter::X(_) | Parameter::Y(_) | Parameter::Heading(_) => {}
                 Parameter::HeadingZero => world.heading_zero_deg += by,
@@ -134,7 +134,7 @@ impl World {
                 Parameter::Reflectance(name) | Parameter::Roughness(name) => {
                     if let Some(material) = self.scene.materials.get(name) {
                         let new = materials.entry(name).or_insert(*material);
-                        // Rounding may go past a limit.
+                        // Rounding may exceed a limit.
                         match parameter {
                             Parameter::Roughness(_) => {
                                 new.roughness = (material.roughness + by).clamp(0.0, 1.0);
@@ -152,51 +152,50 @@ impl World {
         Ok(world)
     }
 
-    /// The least and the largest change of a parameter that there can be: no threshold falls with the range, no skirts
-    /// are louder than the axis, and no material gives back more than it gets, or scatters more than that.
+    /// Minimum and maximum change of a parameter: the threshold does not fall with range, the
+    /// side-lobe floor is not above the axis, and no material reflects or scatters more than it
+    /// receives.
     #[must_use]
     pub fn limits(&self, parameter: &Parameter) -> (f64, f64) {
-        let (least, most) = (f64::NEG_INFINITY, f64::INFINITY);
+        let (min, max) = (f64::NEG_INFINITY, f64::INFINITY);
         match parameter {
-            Parameter::ThresholdRise => (-self.sensor.threshold_rise_db_per_m, most),
+            Parameter::ThresholdRise => (-self.sensor.threshold_rise_db_per_m, max),
             Parameter::Skirts => match self.sensor.aperture {
-                Aperture::Piston { skirts_db: Some(db), .. } => (least, -db),
-                _ => (least, most),
+                Aperture::Piston { skirts_db: Some(db), .. } => (min, -db),
+                _ => (min, max),
             },
             Parameter::Reflectance(name) => {
                 let known = self.scene.materials.get(name);
-                (least, known.map_or(most, |material| -material.reflectance.ln()))
+                (min, known.map_or(max, |material| -material.reflectance.ln()))
             }
             Parameter::Roughness(name) => {
                 let known = self.scene.materials.get(name);
-                known.map_or((least, most), |material| {
-                    (-material.roughness, 1.0 - material.roughness)
-                })
+                known.map_or((min, max), |material| (-material.roughness, 1.0 - material.roughness))
             }
-            _ => (least, most),
+            _ => (min, max),
         }
     }
 
-    /// The height of the transducer, metres; `None` in a scene without floor and ceiling.
+    /// Height of the transducer, metres; `None` in a scene without floor and ceiling.
     #[must_use]
     pub fn sensor_z_m(&self) -> Option<f64> {
         sonard_model::model::sensor_z_m(&self.scene, &self.sensor)
     }
 
-    /// How the world moves with a parameter, if that is the same whichever way the transducer looks.
+    /// Motion by a parameter, if independent of the beam direction.
     pub(crate) fn steady_motion(&self, parameter: &Parameter) -> Option<Motion> {
         match parameter {
             Parameter::X(_) => Some(self.with_body(DVec2::X)),
             Parameter::Y(_) => Some(self.with_body(DVec2::Y)),
             Parameter::Height => Some(Motion { up: 1.0, ..Motion::default() }),
             Parameter::Wall(wall) => {
-                Some(Motion { walls: walls::rates(&self.scene, *wall), ..Motion::default() })
+                Some(Motion { walls: walls::velocities(&self.scene, *wall), ..Motion::default() })
             }
             _ => None,
         }
     }
 
-    /// How the transducer moves with a parameter in a firing at an azimuth; `None` where that changes no length.
+    /// Motion of the transducer by a parameter for a firing; `None` if it changes no length.
     pub(crate) fn turning_motion(
         &self,
         parameter: &Parameter,
@@ -215,7 +214,7 @@ impl World {
         }
     }
 
-    /// The transducer's own motion as it turns, where it is not on the axis.
+    /// Motion of an off-axis transducer by a rotation.
     fn turned(&self, direction_rad: f64, by_rad: f64) -> Option<Motion> {
         let mounting = &self.sensor.mounting;
         if mounting.is_on_axis() {
@@ -225,7 +224,7 @@ impl World {
         Some(Motion { transducer: places.map(|place| by_rad * place.perp()), ..Motion::default() })
     }
 
-    /// The robot's body moves along.
+    /// Motion of the transducer together with the robot's body.
     fn with_body(&self, velocity: DVec2) -> Motion {
         let mut motion = Motion::of_transducer(velocity);
         if let Some(robot) = &self.scene.robot {
@@ -241,23 +240,23 @@ impl World {
     }
 }
 
-/// The models of a world at any poses: one for all, unless a robot's body moves along.
+/// Simulators of a world at any pose: a single one, unless a robot's body moves along.
 #[derive(Clone)]
-pub(crate) struct Models {
+pub(crate) struct SimulatorSet {
     world: World,
     anywhere: Arc<Simulator>,
 }
 
-impl Models {
-    pub(crate) fn of(world: &World) -> Result<Self, WorldError> {
+impl SimulatorSet {
+    pub(crate) fn new(world: &World) -> Result<Self, WorldError> {
         Ok(Self { world: world.clone(), anywhere: Arc::new(world.simulator(&ANYWHERE)?) })
     }
 
-    /// Those of another world, which may have the ranger in common, and the scene.
+    /// Simulators of another world, sharing whatever it has in common with this one.
     pub(crate) fn changed_to(&self, world: &World) -> Result<Self, WorldError> {
         let World { scene, sensor, air, options, .. } = &self.world;
         if *sensor != world.sensor || *air != world.air || *options != world.options {
-            return Self::of(world);
+            return Self::new(world);
         }
         let anywhere = match Arc::ptr_eq(scene, &world.scene) {
             true => Arc::clone(&self.anywhere),
@@ -266,16 +265,16 @@ impl Models {
         Ok(Self { world: world.clone(), anywhere })
     }
 
-    /// The receiver that all poses have in common.
+    /// Receiver, which is common to all poses.
     pub(crate) fn receiver(&self) -> &Receiver {
         self.anywhere.receiver()
     }
 
-    /// Asks the model of a robot at a pose what is heard there.
+    /// Evaluates the simulator with the robot at a pose.
     pub(crate) fn at<T>(
         &self,
         pose: &Pose,
-        ask: impl FnOnce(&Simulator, &ObservationPoint) -> Result<T, WorldError>,
+        evaluate: impl FnOnce(&Simulator, &ObservationPoint) -> Result<T, WorldError>,
     ) -> Result<T, WorldError> {
         let own;
         let simulator = match self.world.scene.robot {
@@ -285,7 +284,7 @@ impl Models {
                 &own
             }
         };
-        ask(simulator, &simulator.at(pose.position()))
+        evaluate(simulator, &simulator.at(pose.position()))
     }
 }
 
@@ -296,7 +295,7 @@ fn scale_aperture(aperture: &mut Aperture, by: f64) {
         Aperture::Gaussian { half_angle_deg, .. } => *half_angle_deg /= by,
         Aperture::Table { points, .. } => {
             points.iter_mut().for_each(|point| point.angle_deg = (point.angle_deg / by).min(180.0));
-            // What no longer fits in front and behind is cut off.
+            // Points that no longer fit between front and back are removed.
             let fits = 1 + points.iter().take_while(|point| point.angle_deg < 180.0).count();
             points.truncate(fits);
             if let Some(last) = points.last_mut() {

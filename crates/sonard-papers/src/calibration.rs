@@ -1,9 +1,9 @@
-//! Reliability of the probabilities of [`interpret`]: of the arcs that it calls an edge with
-//! a probability of 0.9, are nine in ten edges?
+//! Calibration of the probabilities of [`interpret`].
 //!
-//! Made-up rooms are read by the model with the sensor's whole receiver, from a random place, and from
-//! the place that the interpretation proposes next. The model knows by which path each sound came, and
-//! so what each arc is of.
+//! Probabilities are calibrated if nine in ten of the arcs classified as an edge with probability
+//! 0.9 are edges. The model simulates scans of random rooms with the sensor's complete receiver,
+//! from a random position and from the next position that the interpretation proposes. The path of
+//! each predicted echo gives the true cause of each arc.
 
 use std::{f64::consts::TAU, sync::Arc};
 
@@ -23,43 +23,43 @@ use uuid::Uuid;
 use crate::trial::random_room;
 use sonard_interpret::interpret::{Extents, Feature, Probabilities, Settings, Sweep, interpret};
 
-/// How many boxes and partitions the rooms have, one after the other.
+/// Boxes and partitions of successive rooms.
 const ROOMS: [(usize, usize); 4] = [(0, 0), (3, 0), (0, 1), (2, 2)];
 
-/// How close to a wall a scan is taken, metres.
+/// Minimum distance of a scan position from walls, metres.
 const CLEARANCE_M: f64 = 0.35;
 
 /// Standard deviation of a range, metres.
 const RANGE_SIGMA_M: f64 = 0.002;
 
-/// A sound off two walls that is as long as the way to where they meet, to this, is of that corner,
+/// Tolerance of the path length by which a second-order reflection is attributed to a corner,
 /// metres.
 const CORNER_M: f64 = 0.005;
 
-/// The true cause of an arc.
+/// True cause of an arc.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Truth {
-    /// A wall.
+    /// Reflection from a wall.
     Plane,
-    /// A corner seen from inside.
+    /// Reflection from a concave corner.
     Corner,
-    /// An edge.
+    /// Diffraction at a convex edge.
     Edge,
-    /// Anything else.
+    /// Any other path, or no path.
     Other,
 }
 
-/// An arc: what was said of it, and what it is.
+/// Arc with its class probabilities and its true cause.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Judged {
-    /// What was said.
+    /// Class probabilities that the interpretation assigned.
     pub said: Probabilities,
-    /// What it is.
+    /// True cause from the predicted paths.
     pub truth: Truth,
 }
 
 impl Judged {
-    /// Each of the four probabilities, and whether it came true.
+    /// Predicted probability of each class, and its occurrence.
     fn claims(&self) -> [(f64, bool); 4] {
         let Probabilities { plane, corner, edge, other } = self.said;
         [
@@ -71,36 +71,36 @@ impl Judged {
     }
 }
 
-/// Claims of about one probability.
+/// Predictions whose probabilities lie in one interval.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Bin {
-    /// How many.
+    /// Number of predictions in the bin.
     pub count: usize,
-    /// Mean probability that was claimed.
+    /// Mean predicted probability in the bin.
     pub claimed: f64,
-    /// Share that came true.
+    /// Observed frequency of the predicted classes.
     pub came_true: f64,
 }
 
-/// A reliability diagram's figures.
+/// Statistics of a reliability diagram.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Reliability {
-    /// Ten bins of equal width.
+    /// Ten bins of width 0.1 in the predicted probability.
     pub bins: [Bin; 10],
-    /// Expected calibration error: the mean distance of claim and share over all claims (Naeini,
-    /// Cooper and Hauskrecht, AAAI 2015).
+    /// Expected calibration error: mean absolute difference of mean predicted probability and
+    /// observed frequency, weighted by the bins' counts (Naeini, Cooper and Hauskrecht, AAAI 2015).
     pub expected_error: f64,
-    /// Mean squared distance of a claim from what is (Brier), 0 to 1.
+    /// Brier score: mean squared difference of predicted probability and outcome, 0 to 1.
     pub brier: f64,
 }
 
 impl Reliability {
-    /// Over every claim about every arc.
+    /// Statistics of all four class probabilities of all arcs.
     #[must_use]
-    pub fn of(judged: &[Judged]) -> Self {
+    pub fn of(arcs: &[Judged]) -> Self {
         let mut bins = [Bin::default(); 10];
         let mut brier = 0.0;
-        for (claimed, came_true) in judged.iter().flat_map(Judged::claims) {
+        for (claimed, came_true) in arcs.iter().flat_map(Judged::claims) {
             let truth = f64::from(u8::from(came_true));
             let bin = &mut bins[((10.0 * claimed) as usize).min(9)];
             bin.count += 1;
@@ -108,7 +108,7 @@ impl Reliability {
             bin.came_true += truth;
             brier += (claimed - truth).powi(2);
         }
-        let all = (4 * judged.len()).max(1) as f64;
+        let all = (4 * arcs.len()).max(1) as f64;
         let mut expected_error = 0.0;
         for bin in bins.iter_mut().filter(|bin| bin.count > 0) {
             expected_error += (bin.claimed - bin.came_true).abs() / all;
@@ -119,12 +119,12 @@ impl Reliability {
     }
 }
 
-/// Interprets one made-up room, number `number` of those of a seed, as `sensor` reads it from one place
-/// and, where a next one is proposed within the room, from that as well. Arcs by which nothing can be
-/// told (covered, cut off, too near) are left out, and so are rooms with more paths than the model can find.
+/// Classifies the arcs of one random room and pairs them with their true causes.
 ///
-/// # Panics
-/// Never: with a sensor whose data make no sense there is just nothing to judge.
+/// The room is number `number` of those of a seed. `sensor` scans it from a random position and, if
+/// the interpretation proposes a next position within the room, from there too. Arcs without class
+/// probabilities (masked, truncated, too close) are omitted. The result is empty for an invalid
+/// sensor and for a room with more paths than the model can find.
 #[must_use]
 pub fn judge_room(seed: u64, number: u64, sensor: &Sensor, settings: &Settings) -> Vec<Judged> {
     let mut rng = Pcg64::seed_from_u64(seed.wrapping_mul(1_000_003) ^ number);
@@ -136,12 +136,12 @@ pub fn judge_room(seed: u64, number: u64, sensor: &Sensor, settings: &Settings) 
     let Ok(simulator) = Simulator::new(Arc::new(scene), sensor, air, Options::default()) else {
         return Vec::new();
     };
-    let Ok(scan) = take(&simulator, place, 1, &mut rng) else { return Vec::new() };
+    let Ok(scan) = simulate_scan(&simulator, place, 1, &mut rng) else { return Vec::new() };
     let mut scans = vec![scan];
     let mut found = features(&scans, &extents, settings);
     let next = found.iter().find_map(|feature| feature.next).map(|n| DVec2::new(n.x_m, n.y_m));
-    if let Some(next) = next.filter(|next| is_way(simulator.scene(), place, *next)) {
-        let Ok(scan) = take(&simulator, next, 2, &mut rng) else { return Vec::new() };
+    if let Some(next) = next.filter(|next| is_free_segment(simulator.scene(), place, *next)) {
+        let Ok(scan) = simulate_scan(&simulator, next, 2, &mut rng) else { return Vec::new() };
         scans.push(scan);
         found = features(&scans, &extents, settings);
     }
@@ -150,34 +150,34 @@ pub fn judge_room(seed: u64, number: u64, sensor: &Sensor, settings: &Settings) 
         let truth = truth(feature, scan, simulator.scene())?;
         Some(Judged { said: feature.probabilities, truth })
     };
-    let told = |feature: &&Feature| feature.probabilities != Probabilities::default();
-    found.iter().filter(told).filter_map(truth).collect()
+    let is_classified = |feature: &&Feature| feature.probabilities != Probabilities::default();
+    found.iter().filter(is_classified).filter_map(truth).collect()
 }
 
-/// A place in the room: some strides from where it is known that nothing stands.
+/// Position in the room after a random walk from its free start pose.
 fn wander(scene: &Scene, rng: &mut impl Rng) -> DVec2 {
     let mut at = scene.poses.get("start").map_or(DVec2::ZERO, Pose::position);
     for _ in 0..20 {
         let stride = rng.random_range(0.3..3.0) * DVec2::from_angle(rng.random_range(0.0..TAU));
-        if is_way(scene, at, at + stride) {
+        if is_free_segment(scene, at, at + stride) {
             at += stride;
         }
     }
     at
 }
 
-/// Whether a robot can go straight from one place to another and stand there.
-fn is_way(scene: &Scene, from: DVec2, to: DVec2) -> bool {
+/// Checks that the straight segment crosses no wall and ends at [`CLEARANCE_M`] from all of them.
+fn is_free_segment(scene: &Scene, from: DVec2, to: DVec2) -> bool {
     let crosses = |a: DVec2, b: DVec2| {
-        let apart = |p: DVec2, q: DVec2, r: DVec2, s: DVec2| {
+        let separates = |p: DVec2, q: DVec2, r: DVec2, s: DVec2| {
             (q - p).perp_dot(r - p) * (q - p).perp_dot(s - p) <= 0.0
         };
-        apart(a, b, from, to) && apart(from, to, a, b)
+        separates(a, b, from, to) && separates(from, to, a, b)
     };
     scene.clearance_m(to) >= CLEARANCE_M && !scene.walls.iter().any(|wall| crosses(wall.a, wall.b))
 }
 
-fn take(
+fn simulate_scan(
     simulator: &Simulator,
     at: DVec2,
     number: u128,
@@ -199,7 +199,7 @@ fn features(scans: &[ScanView], extents: &Extents, settings: &Settings) -> Vec<F
     interpret(&sweeps, extents, settings)
 }
 
-/// What most of an arc's echoes are of.
+/// Most frequent cause of the echoes of an arc.
 fn truth(feature: &Feature, scan: &ScanView, scene: &Scene) -> Option<Truth> {
     let [first, last] = feature.beams;
     let within = |index: u32| match first <= last {
@@ -210,7 +210,7 @@ fn truth(feature: &Feature, scan: &ScanView, scene: &Scene) -> Option<Truth> {
     let mut votes = [0_usize; 4];
     for ping in scan.pings.iter().filter(|ping| within(ping.index)) {
         if ping.status == PingStatus::Echo {
-            votes[of_ping(ping, scene, from) as usize] += 1;
+            votes[ping_truth(ping, scene, from) as usize] += 1;
         }
     }
     [Truth::Plane, Truth::Corner, Truth::Edge, Truth::Other]
@@ -218,7 +218,7 @@ fn truth(feature: &Feature, scan: &ScanView, scene: &Scene) -> Option<Truth> {
         .max_by_key(|truth| votes[*truth as usize])
 }
 
-fn of_ping(ping: &Ping, scene: &Scene, from: DVec2) -> Truth {
+fn ping_truth(ping: &Ping, scene: &Scene, from: DVec2) -> Truth {
     let Some(path) = &ping.path else { return Truth::Other };
     let to_corner = || {
         let ends = scene.walls.iter().flat_map(|wall| [wall.a, wall.b]);

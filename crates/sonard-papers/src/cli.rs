@@ -30,10 +30,10 @@ const EXIT_CODES: &str = "Exit codes: 0 done, 1 stopped before everything was ex
 
 #[derive(Debug, Subcommand)]
 enum Verb {
-    /// Measure maps, interpretations and explorations with the metrics of the papers
+    /// Evaluate maps, interpretations and explorations with the metrics of the papers
     #[command(subcommand)]
     Benchmark(benchmark::Verb),
-    /// Let a simulated robot explore a scene and map it with lines
+    /// Explore a scene with a simulated robot and map it with lines
     #[command(long_about = explore::ABOUT)]
     Explore(explore::Args),
 }

@@ -1,10 +1,10 @@
-//! Exploring a scene with sonar, laser, or laser just in time.
+//! Exploration of a scene with sonar, laser, or just-in-time sensing.
 //!
 //! After G. Dudek, P. Freedman and I. Rekleitis, "Just-in-time sensing: efficiently combining sonar
 //! and laser range data for exploring unknown worlds", ICRA 1996. [`explore`] leads a [`Robot`]
-//! round the nearest object at about a metre and on to the next, and makes a map of lines
-//! ([`lines`](sonard_interpret::interpret::lines)) of what it senses; it knows nothing else.
-//! [`SimulatedRobot`] moves through a scene and hears it by the model.
+//! round the nearest object at about a metre and then to the next. Its measurements are the only
+//! input of the line map ([`lines`](sonard_interpret::interpret::lines)). [`SimulatedRobot`] moves
+//! through a scene and measures it by the model.
 
 mod follow;
 mod ground;
@@ -30,19 +30,19 @@ use sonard_model::geometry::{DVec2, Pose};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Sensing {
-    /// Sonar only.
+    /// Sonar readings without the laser.
     Sonar,
-    /// Laser only: all around at each stop.
+    /// Laser only: a full turn at each stop.
     Laser,
-    /// Sonar, and at ends of lines one shot of the laser.
+    /// Sonar, and one laser shot at each line end.
     JustInTime,
 }
 
 impl Sensing {
-    /// All three, in the order in which they are compared.
+    /// All variants in the order of comparison tables.
     pub const ALL: [Self; 3] = [Self::Sonar, Self::Laser, Self::JustInTime];
 
-    /// Its name in records and on the command line.
+    /// Name in records and on the command line.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -56,17 +56,17 @@ impl Sensing {
 /// Settings of an exploration.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ExploreSettings {
-    /// Distance from the object that is followed, metres.
+    /// Distance from the followed object, metres.
     pub standoff_m: f64,
-    /// From stop to stop with sonar, metres at most.
+    /// Maximum distance between stops with sonar, metres.
     pub sonar_stride_m: f64,
-    /// The same with the laser only, which sees farther, metres.
+    /// Maximum distance between stops with the laser only, which has a longer range, metres.
     pub laser_stride_m: f64,
-    /// The robot keeps its centre this far from what it knows, metres.
+    /// Minimum distance of the robot's centre from known obstacles, metres.
     pub keep_off_m: f64,
-    /// Give up after so many stops.
+    /// Maximum number of stops.
     pub most_stops: usize,
-    /// How the map is made.
+    /// Settings of the line map.
     pub map: LineMapSettings,
 }
 
@@ -78,9 +78,9 @@ impl Default for ExploreSettings {
             laser_stride_m: 1.0,
             keep_off_m: 0.28,
             most_stops: 400,
-            // Between where a wall is followed to and what the laser sees of its corner there is
-            // a gap; the robot knows that it is one wall.
-            // Where the laser saw a corner, what sonar says of it is too short for a line.
+            // `gap_m`: sonar follows a wall only up to a gap before the corner that the laser
+            // measures, and both parts are one wall. `least_length_m`: sonar lines at a corner that
+            // the laser measured are too short for walls.
             map: LineMapSettings {
                 contradicts_m: 0.03,
                 sonar: FitSettings { least_length_m: 0.15, ..FitSettings::default() },
@@ -91,56 +91,56 @@ impl Default for ExploreSettings {
     }
 }
 
-/// Task of the robot when it came to a stop.
+/// Purpose of a stop.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Task {
-    /// Looking round for the first time.
+    /// First measurement at the start pose.
     Begin,
-    /// Going to the nearest reading, with nothing on the map yet.
+    /// Drive towards the nearest reading while the map is empty.
     Approach,
-    /// Following a line to its end.
+    /// Drive along a line to its end.
     Follow,
-    /// Looking at what is behind the end of a line.
+    /// Drive round the end of a line to observe its other side.
     Round,
 }
 
-/// One stop of an exploration.
+/// Stop of an exploration with its measurements.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Stop {
-    /// Where the robot believed to be.
+    /// Pose by the robot's odometry.
     pub pose: Pose,
-    /// What it had come for.
+    /// Purpose of the stop.
     pub task: Task,
-    /// The end of the line in question.
+    /// Line end that the stop was planned for.
     pub target: Option<DVec2>,
-    /// What its sonars read there.
+    /// Sonar readings; `None` with the laser only.
     pub sonar: Option<Sweep>,
-    /// What its laser saw there.
+    /// Laser scans taken at the stop.
     pub laser: Vec<LaserScan>,
-    /// The map after that.
+    /// Map after these measurements.
     pub lines: Vec<MapLine>,
 }
 
-/// An exploration.
+/// Complete record of an exploration.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Exploration {
-    /// Its stops, in order.
+    /// Stops in order of time.
     pub stops: Vec<Stop>,
-    /// Shots of the laser.
+    /// Number of laser shots.
     pub laser_shots: u32,
-    /// Readings of the sonars.
+    /// Number of sonar readings.
     pub sonar_readings: usize,
-    /// Way driven, metres, as the robot counts it.
+    /// Distance driven by odometry, metres.
     pub travel_m: f64,
-    /// How often the robot ran into something.
+    /// Number of collisions with obstacles.
     pub bumps: u32,
-    /// Whether nothing was left to explore; if not, it ran out of stops.
+    /// Whether everything was explored before the maximum number of stops.
     pub finished: bool,
 }
 
 impl Exploration {
-    /// The map at its end.
+    /// Final map, empty before the first stop.
     #[must_use]
     pub fn lines(&self) -> &[MapLine] {
         self.stops.last().map_or(&[], |stop| &stop.lines)

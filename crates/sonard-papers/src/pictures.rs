@@ -1,4 +1,4 @@
-//! Pictures of explorations and of reliability.
+//! Pictures of explorations and reliability diagrams.
 
 mod exploration;
 mod reliability;
@@ -12,12 +12,12 @@ mod tests {
     use crate::calibration::{Bin, Reliability};
 
     #[test]
-    fn reliability_marks_every_bin_with_claims() {
+    fn every_filled_bin_has_a_mark() {
         let mut bins = [Bin::default(); 10];
         bins[0] = Bin { count: 90, claimed: 0.02, came_true: 0.03 };
         bins[9] = Bin { count: 10, claimed: 0.97, came_true: 0.9 };
         let reliability = Reliability { bins, expected_error: 0.016, brier: 0.03 };
-        let svg = draw_reliability("claims", &[], &reliability).to_svg();
-        assert_eq!(svg.matches("claims of 0.").count(), 2, "{svg}");
+        let svg = draw_reliability("reliability", &[], &reliability).to_svg();
+        assert_eq!(svg.matches("mean predicted probability 0.").count(), 2, "{svg}");
     }
 }

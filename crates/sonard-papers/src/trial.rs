@@ -1,8 +1,8 @@
-//! Maps made of readings that the model makes: how well does a way of mapping do?
+//! Evaluation of mapping methods with simulated readings.
 //!
-//! A robot wanders through a scene; at each place it takes a set of readings, with an array of
-//! rangers or as a stepper's scan. The readings make a map without and with Feature Prediction, and both
-//! are scored against the ideal map.
+//! A robot drives at random through a scene. At each position it takes a set of readings with an
+//! array of rangers or a stepper. The readings are mapped without and with Feature Prediction, and
+//! both maps are scored against the ideal map.
 
 mod rooms;
 #[cfg(test)]
@@ -32,7 +32,7 @@ use sonard_records::PingStatus;
 /// Arrangement of the readings of a set.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Arrangement {
-    /// One round of an array's rangers.
+    /// Single round of an array's rangers.
     Ring(Box<RangerArray>),
     /// A full turn in steps of 0.9 degrees.
     Stepper,
@@ -43,64 +43,65 @@ pub enum Arrangement {
 pub struct TrialSettings {
     /// Side of a cell, metres.
     pub resolution_m: f64,
-    /// Sets of readings taken.
+    /// Number of sets of readings.
     pub places: usize,
-    /// From one to the next, metres.
+    /// Distance between successive positions, metres.
     pub stride_m: f64,
-    /// How far the robot stays from walls, metres.
+    /// Minimum distance of the robot from walls, metres.
     pub clearance_m: f64,
-    /// How readings are arranged.
+    /// Arrangement of the readings in a set.
     pub arrangement: Arrangement,
     /// Standard deviation of a range, metres.
     pub range_sigma_m: f64,
     /// Exponent of Feature Prediction's confidence with distance.
     pub exponent: f64,
-    /// How far Feature Prediction takes walls to go on, metres.
+    /// Extension of predicted walls in Feature Prediction, metres.
     pub extend_m: f64,
-    /// How Feature Prediction's confidences are used.
+    /// Use of the confidences of Feature Prediction.
     pub trust: Trust,
 }
 
-/// A robot's readings in a scene.
+/// Readings of a robot along a course through a scene.
 #[derive(Debug, Clone)]
 pub struct Course {
-    /// The map as it should be.
+    /// Ideal map of the scene.
     pub ideal: Grid,
-    /// What was read, in order.
+    /// Sets of readings in order of time.
     pub sweeps: Vec<Sweep>,
 }
 
-/// The same course mapped without and with Feature Prediction.
+/// Maps of one course without and with Feature Prediction.
 #[derive(Debug, Clone)]
 pub struct Trial {
-    /// Maps without and with it.
+    /// Maps without and with Feature Prediction.
     pub maps: [Grid; 2],
-    /// Their scores.
+    /// Scores of both maps.
     pub scores: [MapScore; 2],
 }
 
 impl Course {
-    /// Sends a robot through a scene from a place in it; `None` if it can't move there.
+    /// Simulates a robot that drives through a scene from a start position; `None` if it can't move
+    /// there.
     ///
     /// # Errors
-    /// When there are more paths than the model can find.
+    /// [`TooCostly`] for more paths than the model can find.
     pub fn through(
         simulator: &Simulator,
         start: DVec2,
         settings: &TrialSettings,
         rng: &mut impl Rng,
     ) -> Result<Option<Self>, TooCostly> {
-        let Some((ideal, poses)) = way(simulator.scene(), start, settings, rng) else {
+        let Some((ideal, poses)) = plan_course(simulator.scene(), start, settings, rng) else {
             return Ok(None);
         };
         let sweeps = poses.iter().map(|pose| read(simulator, pose, settings, rng));
         Ok(Some(Self { sweeps: sweeps.collect::<Result<_, _>>()?, ideal }))
     }
 
-    /// Maps the course with both ways and scores the maps.
+    /// Maps the course with both methods and scores the maps.
     ///
     /// # Errors
-    /// Never with an ideal map of this course's shape.
+    /// [`ScoreError`] if the shape of `ideal` was changed after construction.
     pub fn map(
         &self,
         extents: &Extents,
@@ -133,8 +134,8 @@ impl Course {
     }
 }
 
-/// The map of a scene as it should be, and poses on a way through it.
-fn way(
+/// Ideal map of a scene, and poses of a course through it.
+fn plan_course(
     scene: &Scene,
     start: DVec2,
     settings: &TrialSettings,
@@ -149,7 +150,7 @@ fn way(
     Some((ideal, poses))
 }
 
-/// A way through free space that keeps clear of walls, turning where it can't go on.
+/// Random course through free space with a minimum clearance, turning at obstacles.
 fn wander(
     scene: &Scene,
     ideal: &Grid,
@@ -161,7 +162,7 @@ fn wander(
         let reached = ideal.shape().index_at(at).is_some_and(|cell| ideal.probability(cell) < 0.5);
         reached && scene.clearance_m(at) >= settings.clearance_m
     };
-    // A named place may be closer to a wall than the robot may go: begin as near as it may.
+    // The start may lack the clearance: the nearest position with clearance replaces it.
     let mut at = (0..400)
         .map(|i| start + 0.01 * f64::from(i) * DVec2::from_angle(2.4 * f64::from(i)))
         .find(|place| is_free(*place))?;
@@ -184,14 +185,15 @@ fn wander(
     Some(poses)
 }
 
-/// A set of readings at a pose.
+/// Simulates a set of readings at a pose.
 fn read(
     simulator: &Simulator,
     pose: &Pose,
     settings: &TrialSettings,
     rng: &mut impl Rng,
 ) -> Result<Sweep, TooCostly> {
-    let mut heard = |prediction: &Prediction| hear(prediction, settings.range_sigma_m, rng);
+    let mut reading =
+        |prediction: &Prediction| simulate_reading(prediction, settings.range_sigma_m, rng);
     let (mut beams, step_deg): (Vec<Beam>, f64) = match &settings.arrangement {
         Arrangement::Ring(array) => {
             let beam = |(index, at): (u32, usize)| {
@@ -200,7 +202,7 @@ fn read(
                     (ranger.azimuth_deg(), DVec2::new(ranger.x_m, ranger.y_m));
                 let mounted = ranger.pose_on(pose);
                 let point = simulator.at(mounted.position());
-                let heard = heard(&point.ping(mounted.direction_rad(0.0))?);
+                let heard = reading(&point.ping(mounted.direction_rad(0.0))?);
                 Ok(Beam { azimuth_deg, index, heard, mount })
             };
             let beams = (0..).zip(array.round()).map(beam);
@@ -210,7 +212,7 @@ fn read(
             let point = simulator.at(pose.position());
             let beam = |index: u32| {
                 let azimuth_deg = 0.9 * f64::from(index);
-                let heard = heard(&point.ping(pose.direction_rad(azimuth_deg))?);
+                let heard = reading(&point.ping(pose.direction_rad(azimuth_deg))?);
                 Ok(Beam { azimuth_deg, index, heard, mount: DVec2::ZERO })
             };
             ((0..400).map(beam).collect::<Result<_, TooCostly>>()?, 0.9)
@@ -221,11 +223,11 @@ fn read(
     Ok(Sweep { pose: *pose, step_deg, beams, closed })
 }
 
-/// Rangers of a ring are so far apart that each counts by itself, degrees.
+/// Angular step of a ring, degrees: larger than a beam, so that each ranger forms its own region.
 const RING_STEP_DEG: f64 = 25.0;
 
-/// One reading by the model, its range with noise.
-pub(crate) fn hear(prediction: &Prediction, sigma_m: f64, rng: &mut impl Rng) -> Heard {
+/// Reading of a prediction with range noise.
+pub(crate) fn simulate_reading(prediction: &Prediction, sigma_m: f64, rng: &mut impl Rng) -> Heard {
     match (prediction.status, prediction.range_m) {
         (PingStatus::Echo, Some(range_m)) => {
             let unit: f64 = StandardNormal.sample(rng);

@@ -1,4 +1,4 @@
-//! The program `sonard-papers`.
+//! Runs of the program `sonard-papers`.
 
 use std::{
     fs,
@@ -21,7 +21,7 @@ fn stderr(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
-/// A room of 4 m by 3.2 m with a way round a pillar.
+/// Room of 4 m by 3.2 m with free floor around a pillar.
 const ROOM: &str = r#"{"name":"gallery","materials":{"m":{"reflectance":0.95}},"walls":[
     {"id":"room","polyline":[[0,0],[4,0],[4,3.2],[0,3.2]],"closed":true,"material":"m"},
     {"id":"pillar","polyline":[[1.8,1.4],[2.2,1.4],[2.2,1.8],[1.8,1.8]],"closed":true,"material":"m"}],
@@ -32,7 +32,7 @@ fn json_lines(text: &str) -> Vec<Value> {
 }
 
 #[test]
-fn a_room_is_explored_and_what_was_seen_can_be_mapped_again() {
+fn exploration_writes_its_files() {
     let folder = TempDir::new().expect("a temporary folder");
     let path = |name: &str| folder.path().join(name).to_str().expect("plain path").to_owned();
     let (room, out) = (path("room.json"), path("out"));
@@ -57,36 +57,36 @@ fn a_room_is_explored_and_what_was_seen_can_be_mapped_again() {
     assert_eq!(&read("stage-2.png")[..4], b"\x89PNG");
     assert!(read("exploration.svg").starts_with(b"<svg"));
 
-    // Scans of the laser, the input of `sonard lines --laser`.
+    // Laser scans, the input of `sonard lines --laser`.
     let laser = String::from_utf8(read("laser.jsonl")).expect("text");
     let scans: Vec<LaserScan> = laser
         .lines()
         .map(|line| serde_json::from_str(line).expect("a scan of the laser"))
         .collect();
-    assert!(scans.iter().any(|scan| scan.returns.iter().any(|one| one.range_m.is_some())));
+    assert!(scans.iter().any(|scan| scan.returns.iter().any(|reading| reading.range_m.is_some())));
 }
 
 #[test]
-fn the_same_seed_gives_the_same_exploration() {
-    let of = |seed: &str| {
+fn exploration_depends_on_the_seed() {
+    let explore = |seed: &str| {
         let scene = ["explore", "--scene", "two-surface-room", "--pose", "middle", "--json"];
         let further = ["--sonar-range", "3.2", "--sensing", "laser", "--odometry-noise", "0.01"];
         let output = run(&[&scene[..], &further, &["--seed", seed]].concat());
         assert!(output.status.success(), "{}", stderr(&output));
         output.stdout
     };
-    assert_eq!(of("3"), of("3"));
-    assert_ne!(of("3"), of("4"));
+    assert_eq!(explore("3"), explore("3"));
+    assert_ne!(explore("3"), explore("4"));
 }
 
 #[test]
-fn the_benchmark_has_every_room_in_its_table() {
+fn explore_table_has_every_room() {
     let arguments =
         ["benchmark", "explore", "--rooms", "2", "--sonar-range", "3.2", "--most-stops", "60"];
     let output = run(&arguments);
     assert!(output.status.success(), "{}", stderr(&output));
     let table = String::from_utf8_lossy(&output.stdout).into_owned();
-    for words in ["sonar", "laser", "just-in-time", "not finished", "all"] {
+    for words in ["sonar", "laser", "just-in-time", "incomplete", "all"] {
         assert!(table.contains(words), "{words}: {table}");
     }
     let output = run(&[&arguments[..], &["--json"]].concat());
@@ -96,7 +96,7 @@ fn the_benchmark_has_every_room_in_its_table() {
 }
 
 #[test]
-fn wrong_input_is_refused_with_what_would_be_right() {
+fn wrong_input_names_the_valid_range() {
     let scene = ["explore", "--scene", "simple-room"];
     for (further, words) in [
         (&["--pose", "fig9"][..], "farther from it"),
@@ -112,7 +112,7 @@ fn wrong_input_is_refused_with_what_would_be_right() {
 }
 
 #[test]
-fn maps_have_the_same_table_for_the_same_seed() {
+fn map_table_is_reproducible() {
     let arguments = ["benchmark", "map", "--maps", "3", "--places", "8", "--seed", "7"];
     let [first, second] = [run(&arguments), run(&arguments)];
     assert!(first.status.success(), "{}", stderr(&first));
@@ -127,13 +127,13 @@ fn maps_have_the_same_table_for_the_same_seed() {
 fn reliability_has_a_picture() {
     let folder = TempDir::new().expect("a temporary folder");
     let picture = folder.path().join("reliability.svg");
-    let output = run(&["benchmark", "interpret", "--trials", "2", "-o", path_of(&picture)]);
+    let output = run(&["benchmark", "interpret", "--trials", "2", "-o", path_text(&picture)]);
     assert!(output.status.success(), "{}", stderr(&output));
     assert!(String::from_utf8_lossy(&output.stdout).contains("expected calibration error"));
     assert!(fs::read(&picture).expect("written").starts_with(b"<svg"));
 }
 
-fn path_of(path: &Path) -> &str {
+fn path_text(path: &Path) -> &str {
     path.to_str().expect("a plain path")
 }
 
@@ -149,18 +149,18 @@ fn write_map(folder: &Path) {
 }
 
 #[test]
-fn ideal_map_scores_full_marks() {
+fn ideal_map_has_a_perfect_score() {
     let folder = TempDir::new().expect("a temporary folder");
     let [map, ideal] = ["map", "ideal"].map(|name| folder.path().join(name));
     write_map(&map);
-    let (map, ideal) = (path_of(&map), path_of(&ideal));
+    let (map, ideal) = (path_text(&map), path_text(&ideal));
     let output = run(&["benchmark", "score", map, "simple-room", "--save-ideal", ideal]);
     assert!(output.status.success(), "{}", stderr(&output));
     let output = run(&["benchmark", "score", ideal, "simple-room", "--json"]);
     let score: Value = serde_json::from_slice(&output.stdout).expect("one object");
     assert_eq!(score["map_score_percent"].as_f64(), Some(0.0), "{score}");
     for (arguments, words) in [
-        (["nowhere", "simple-room", "--spacing", "1"], "map.yaml beside map.pgm"),
+        (["nowhere", "simple-room", "--spacing", "1"], "map.yaml next to map.pgm"),
         ([map, "simple-rom", "--spacing", "1"], "simple-room"),
         ([map, "simple-room", "--spacing", "0"], "greater than 0"),
     ] {
@@ -176,8 +176,8 @@ fn inputs_are_never_replaced() {
     let map = folder.path().join("map");
     write_map(&map);
     let before = fs::read(map.join("map.pgm")).expect("a file");
-    let arguments = ["benchmark", "score", path_of(&map), "simple-room", "--save-ideal"];
-    for further in [&[path_of(&map)][..], &[path_of(&map), "--force"]] {
+    let arguments = ["benchmark", "score", path_text(&map), "simple-room", "--save-ideal"];
+    for further in [&[path_text(&map)][..], &[path_text(&map), "--force"]] {
         let output = run(&[&arguments[..], further].concat());
         assert_eq!(output.status.code(), Some(2), "{}", stderr(&output));
         assert!(stderr(&output).contains("is an input"), "{}", stderr(&output));
@@ -185,7 +185,7 @@ fn inputs_are_never_replaced() {
     assert_eq!(fs::read(map.join("map.pgm")).expect("a file"), before);
     let picture = folder.path().join("a.svg");
     fs::write(&picture, "mine").expect("written");
-    let interpret = ["benchmark", "interpret", "--trials", "1", "-o", path_of(&picture)];
+    let interpret = ["benchmark", "interpret", "--trials", "1", "-o", path_text(&picture)];
     assert_eq!(run(&interpret).status.code(), Some(2));
     assert_eq!(fs::read_to_string(&picture).expect("a file"), "mine");
     assert!(run(&[&interpret[..], &["--force"]].concat()).status.success());

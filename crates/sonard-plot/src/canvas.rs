@@ -1,7 +1,7 @@
-//! Marks on the page, in pixels from its upper left corner.
+//! Drawing primitives, in pixels from the upper left corner of the page.
 //!
-//! Everything drawn goes through here: coordinates that are no numbers or far off the page, and
-//! characters that XML does not allow, stop at this door.
+//! All output passes through here: coordinates that are not finite or far off the page, and
+//! characters that XML does not allow, are replaced.
 
 use std::fmt::Write as _;
 
@@ -13,10 +13,10 @@ use svg::node::{
 use super::theme;
 use sonard_model::geometry::DVec2;
 
-/// A point on the page, pixels, y down.
+/// Point on the page, pixels, y down.
 pub type Px = DVec2;
 
-/// A rectangle on the page.
+/// Rectangle on the page.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Rect {
     /// Left edge, px.
@@ -30,7 +30,7 @@ pub struct Rect {
 }
 
 impl Rect {
-    /// Rectangle of an upper left corner and a size, px.
+    /// Rectangle from its upper left corner and size, px.
     pub fn new(left: f64, top: f64, width: f64, height: f64) -> Self {
         Self { left, top, right: left + width, bottom: top + height }
     }
@@ -72,7 +72,7 @@ impl Rect {
     }
 }
 
-/// Which part of a text stands at the point given.
+/// Alignment of a text relative to its position.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Anchor {
     /// Text begins at the point.
@@ -83,7 +83,7 @@ pub enum Anchor {
     End,
 }
 
-/// Shapes of marks; each kind of reading has its own.
+/// Shape of a mark; each kind of reading has its own.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Shape {
     /// Filled circle.
@@ -98,30 +98,30 @@ pub enum Shape {
     Cross,
 }
 
-/// A group of marks that share attributes.
+/// Group of marks that share attributes.
 #[derive(Debug, Clone)]
 pub struct Layer {
     group: Group,
 }
 
 impl Layer {
-    /// A layer that can be found by its class.
+    /// Empty layer with a class.
     pub fn new(class: &str) -> Self {
         Self { group: Group::new().set("class", class) }
     }
 
-    /// Sets an attribute that its marks inherit.
+    /// Sets an attribute inherited by the marks.
     pub fn with(mut self, name: &str, value: impl Into<svg::node::Value>) -> Self {
         self.group = self.group.set(name, value);
         self
     }
 
-    /// Lines of this colour and width, no filling.
+    /// Sets colour and width of lines, without fill.
     pub fn stroked(self, colour: &str, width_px: f64) -> Self {
         self.with("stroke", colour).with("stroke-width", width_px).with("fill", "none")
     }
 
-    /// Texts with a white rim, to be read over marks and lines.
+    /// Adds a white outline to texts, for legibility over marks and lines.
     pub fn haloed(self) -> Self {
         self.with("stroke", theme::PAPER)
             .with("stroke-width", 3.0)
@@ -180,7 +180,7 @@ impl Layer {
         self.node(rect);
     }
 
-    /// Open lines through the points of each run, as one path; runs of one point are left out.
+    /// Adds open polylines as one path; runs of a single point are skipped.
     pub fn runs<R: AsRef<[Px]>>(&mut self, runs: impl IntoIterator<Item = R>) {
         let mut data = String::new();
         for run in runs {
@@ -194,17 +194,17 @@ impl Layer {
         }
     }
 
-    /// A closed shape.
+    /// Adds a closed polygon.
     pub fn polygon(&mut self, points: &[Px]) {
         self.node(closed(points));
     }
 
-    /// A closed shape with a text that a viewer shows when it is pointed at.
+    /// Adds a closed polygon with a tooltip.
     pub fn polygon_with_hint(&mut self, points: &[Px], hint: &str) {
         self.node(with_hint(closed(points).into(), hint));
     }
 
-    /// A mark of about this radius, with a text that a viewer shows when it is pointed at.
+    /// Adds a mark of approximately this radius, with an optional tooltip.
     pub fn mark(&mut self, shape: Shape, at: Px, radius_px: f64, hint: Option<&str>) {
         let node = mark(shape, at, radius_px);
         self.node(match hint {
@@ -213,12 +213,12 @@ impl Layer {
         });
     }
 
-    /// A line of text; `at` is on its base line.
+    /// Adds a line of text; `at` is on its baseline.
     pub fn text(&mut self, at: Px, anchor: Anchor, size_px: f64, text: &str) {
         self.node(text_element(at, anchor, size_px, text));
     }
 
-    /// A line of text turned about `at` by so many degrees clockwise.
+    /// Adds a line of text rotated about `at`, degrees clockwise.
     pub fn turned_text(&mut self, at: Px, turn_deg: f64, size_px: f64, text: &str) {
         let mut element = text_element(at, Anchor::Middle, size_px, text);
         let turn = format!("rotate({} {} {})", tidy(turn_deg), tidy(at.x), tidy(at.y));
@@ -226,7 +226,7 @@ impl Layer {
         self.node(element);
     }
 
-    /// Shows only what lies inside `rect` of everything in this layer.
+    /// Clips the layer to `rect`.
     pub fn clipped(mut self, id: &str, rect: Rect) -> Self {
         let window = Rectangle::new()
             .set("x", tidy(rect.left))
@@ -309,17 +309,17 @@ fn trace(data: &mut String, points: &[Px]) {
     }
 }
 
-/// Hundredths of a pixel, within reach of the page: renderers count in 32 bits.
+/// Rounds to hundredths of a pixel and limits the magnitude: renderers use 32-bit coordinates.
 fn tidy(value: f64) -> f64 {
     const FAR_PX: f64 = 1e5;
     if value.is_nan() {
         return -FAR_PX;
     }
-    // Adding zero makes -0 plain.
+    // Adding zero turns -0 into 0.
     (value.clamp(-FAR_PX, FAR_PX) * 100.0).round() / 100.0 + 0.0
 }
 
-/// The text without what XML 1.0 has no place for, even escaped.
+/// Replaces characters that XML 1.0 does not allow, even escaped.
 fn printable(text: &str) -> String {
     text.chars()
         .map(|c| match c {
@@ -330,12 +330,12 @@ fn printable(text: &str) -> String {
         .collect()
 }
 
-/// About how wide a text is. Viewers choose the font, so this errs to the wide side.
+/// Approximate width of a text. Viewers choose the font, so this is an upper estimate.
 pub fn text_width_px(text: &str, size_px: f64) -> f64 {
     textwrap::core::display_width(text) as f64 * size_px * 0.52
 }
 
-/// The text in lines that fit the width.
+/// Wraps a text into lines that fit the width.
 pub fn wrap(text: &str, size_px: f64, width_px: f64) -> Vec<String> {
     let columns = (width_px / (size_px * 0.52)).max(8.0) as usize;
     textwrap::wrap(text, columns).into_iter().map(std::borrow::Cow::into_owned).collect()

@@ -1,18 +1,18 @@
-//! The lines above a picture.
+//! Caption above a picture.
 
 use super::{
     canvas::{Anchor, Layer, Px, Rect, text_width_px, wrap},
     theme,
 };
 
-/// Draws a title, a badge at its right and the lines under it, each wrapped to the page; returns
-/// the layer and the y coordinate below them.
+/// Draws a title, a badge to its right and the lines below, each wrapped to the page. Returns
+/// the layer and the y coordinate below it.
 pub fn draw(title: &str, badge: Option<&str>, lines: &[String]) -> (Layer, f64) {
     let width_px = theme::PAGE_PX - 2.0 * theme::MARGIN_PX;
     let badge_px = badge.map_or(0.0, |text| text_width_px(text, theme::TEXT_PX) + 40.0);
     let mut layer = Layer::new("caption");
     let mut y = theme::MARGIN_PX;
-    // The bundled font is a light one: an outline makes the title stand out.
+    // The bundled font is light: an outline makes the title bold.
     let mut heading = Layer::new("title").with("stroke", theme::INK).with("stroke-width", 0.45);
     for line in wrap(title, theme::TITLE_PX, width_px - badge_px) {
         y += theme::TITLE_PX;
@@ -30,7 +30,7 @@ pub fn draw(title: &str, badge: Option<&str>, lines: &[String]) -> (Layer, f64) 
     (layer, y + 6.0)
 }
 
-/// A framed note in the upper right corner.
+/// Draws a framed note in the upper right corner.
 fn draw_badge(text: &str) -> Layer {
     let width = text_width_px(text, theme::TEXT_PX) + 16.0;
     let left = theme::PAGE_PX - theme::MARGIN_PX - width;
@@ -39,12 +39,12 @@ fn draw_badge(text: &str) -> Layer {
     let mut back = Layer::new("frame").stroked(theme::VERMILLION, 1.4);
     back.rect(frame, 4.0);
     layer.add(back);
-    let mut words = Layer::new("words")
+    let mut label = Layer::new("label")
         .with("fill", theme::VERMILLION)
         .with("stroke", theme::VERMILLION)
         .with("stroke-width", 0.35);
     let base = Px::new(frame.center().x, frame.bottom - 7.5);
-    words.text(base, Anchor::Middle, theme::TEXT_PX, text);
-    layer.add(words);
+    label.text(base, Anchor::Middle, theme::TEXT_PX, text);
+    layer.add(label);
     layer
 }

@@ -1,10 +1,9 @@
-//! The floor plan with each reading in the colour of its confidence.
+//! Floor plan with the readings coloured by confidence.
 
 use super::{
     canvas::{Layer, Shape},
-    keys,
     legend::{Entry, Sample},
-    overlay,
+    legend_entries, overlay,
     picture::Picture,
     plan::Plan,
     theme,
@@ -12,42 +11,43 @@ use super::{
 use sonard_model::scene::Scene;
 use sonard_records::{Ping, PingStatus, ScanView};
 
-/// Classes of confidence, the highest first: from where, what it is called, shape and colour.
-/// 0.48 is what `sonard map` asks for; 0.25 is the least of a feature that should have been heard.
+/// Classes of confidence, highest first: lower limit, label, shape and colour. 0.48 is the default
+/// of `sonard map`; 0.25 is the minimum for a feature that should have been detected.
 const CLASSES: [(f64, &str, Shape, &str); 4] = [
-    (0.48, "0.48 to 0.5: believed", Shape::Dot, theme::BLUE),
+    (0.48, "0.48 to 0.5: trusted", Shape::Dot, theme::BLUE),
     (0.40, "0.40 to 0.48", Shape::Triangle, theme::GREEN),
     (0.25, "0.25 to 0.40", Shape::Diamond, theme::ORANGE),
-    (0.0, "below 0.25: contradicted", Shape::Square, theme::VERMILLION),
+    (0.0, "below 0.25: contradicted by a predicted feature", Shape::Square, theme::VERMILLION),
 ];
 
-/// Draws the readings that have a range by the confidence that Feature Prediction gave them
-/// (`sonard log annotate`); those without one stay small and grey.
+/// Draws the readings with a range by their confidence from Feature Prediction (`sonard log
+/// annotate`); those without confidence stay small and grey.
 #[must_use]
 pub fn draw_confidence(scans: &[ScanView], scene: Option<&Scene>) -> Picture {
-    let heard: Vec<Vec<(usize, &Ping)>> = scans.iter().map(classed).collect();
-    let counts = |class: usize| heard.iter().flatten().filter(|(of, _)| *of == class).count();
-    let classes = CLASSES.iter().enumerate().map(|(class, (_, words, shape, colour))| {
+    let classified: Vec<Vec<(usize, &Ping)>> = scans.iter().map(classify).collect();
+    let count = |class: usize| classified.iter().flatten().filter(|(of, _)| *of == class).count();
+    let classes = CLASSES.iter().enumerate().map(|(class, (_, label, shape, colour))| {
         let sample = Sample::Mark { shape: *shape, colour };
-        Entry::new(sample, format!("{words} ({})", counts(class)))
+        Entry::new(sample, format!("{label} ({})", count(class)))
     });
     let entries: Vec<Entry> =
-        classes.chain(scene.map(keys::materials).into_iter().flatten()).collect();
-    let weighed = scans.iter().flat_map(|scan| &scan.pings).filter_map(|ping| ping.confidence);
-    let (sum, count) = weighed.fold((0.0, 0), |(sum, count), one| (sum + one, count + 1));
+        classes.chain(scene.map(legend_entries::materials).into_iter().flatten()).collect();
+    let confidences = scans.iter().flat_map(|scan| &scan.pings).filter_map(|ping| ping.confidence);
+    let (sum, count) =
+        confidences.fold((0.0, 0), |(sum, count), confidence| (sum + confidence, count + 1));
     let finding = if count == 0 {
-        "no reading has a confidence: `sonard log annotate` writes them".to_owned()
+        "no reading has a confidence: run `sonard log annotate`".to_owned()
     } else {
-        format!("confidence of {count} readings: {:.3} on average", sum / f64::from(count))
+        format!("mean confidence of {count} readings: {:.3}", sum / f64::from(count))
     };
     let draw = |plan: &Plan| {
-        scans.iter().zip(&heard).filter_map(|(scan, pings)| layer(plan, scan, pings)).collect()
+        scans.iter().zip(&classified).filter_map(|(scan, pings)| layer(plan, scan, pings)).collect()
     };
     overlay::draw(scans, scene, finding, &[], draw, |_| None, &entries)
 }
 
-/// Readings with a range and a confidence, each with its class.
-fn classed(scan: &ScanView) -> Vec<(usize, &Ping)> {
+/// PlottedScan with a range and a confidence, each with its class.
+fn classify(scan: &ScanView) -> Vec<(usize, &Ping)> {
     let class = |ping: &Ping| {
         let confidence = ping.confidence.filter(|_| ping.status == PingStatus::Echo)?;
         CLASSES.iter().position(|(from, ..)| confidence >= *from)
@@ -58,9 +58,9 @@ fn classed(scan: &ScanView) -> Vec<(usize, &Ping)> {
 fn layer(plan: &Plan, scan: &ScanView, pings: &[(usize, &Ping)]) -> Option<Layer> {
     scan.pose()?;
     let mut layer = Layer::new("confidences");
-    // The doubtful ones lie on top.
-    for (class, (_, words, shape, colour)) in CLASSES.iter().enumerate() {
-        let mut marks = Layer::new(words).with("fill", *colour);
+    // Low confidence is drawn on top.
+    for (class, (_, label, shape, colour)) in CLASSES.iter().enumerate() {
+        let mut marks = Layer::new(label).with("fill", *colour);
         for (_, ping) in pings.iter().filter(|(of, _)| *of == class) {
             let Some(range_m) = ping.range_m else { continue };
             let Some(viewpoint) = scan.viewpoint(ping) else { continue };

@@ -1,4 +1,4 @@
-//! Errors against the fineness of a method, both by powers of ten.
+//! Errors of a method against its resolution, on logarithmic axes.
 
 use super::{
     canvas::{Anchor, Layer, Px, Rect, Shape},
@@ -11,21 +11,21 @@ use super::{
 const PANEL_PX: f64 = 400.0;
 const MARK_PX: f64 = 4.0;
 
-/// How far below the least error the row of those without any stands, powers of ten.
-const ROW_BELOW: f64 = 0.35;
+/// Distance of the row of zero errors below the smallest error, decades.
+const ZERO_ROW_BELOW: f64 = 0.35;
 
-/// What one case errs by.
+/// Errors of one case as a function of resolution.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Convergence {
-    /// Its name in the legend.
+    /// Name in the legend.
     pub name: String,
-    /// Fineness and error, finest last or first; an error of 0 stands in a row of its own, others
-    /// have to be positive, as the fineness has.
+    /// Resolution and error, ordered by resolution. An error of 0 is drawn in a row of its own;
+    /// otherwise both must be positive.
     pub errors: Vec<[f64; 2]>,
 }
 
-/// Draws the error of each case against the fineness; the titles are those of the axes, with units, and
-/// `badge` says what the readings are ([`badge_of`](crate::badge_of)).
+/// Draws the error of each case against the resolution. The titles of both axes include units;
+/// `badge` states the provenance of the readings ([`badge_of`](crate::badge_of)).
 #[must_use]
 pub fn draw_convergence(
     title: &str,
@@ -37,7 +37,7 @@ pub fn draw_convergence(
     let (heading, top) = caption::draw(title, badge, lines);
     let (left, width) = (theme::MARGIN_PX + 62.0, theme::PAGE_PX - 2.0 * theme::MARGIN_PX - 80.0);
     let panel = Rect::new(left, top + 24.0, width, PANEL_PX);
-    let axes = Axes::around(panel, cases);
+    let axes = LogAxes::around(panel, cases);
     let mut page = Layer::new("convergence");
     page.add(heading);
     page.add(grid(&axes));
@@ -60,23 +60,23 @@ pub fn draw_convergence(
 const COLOURS: [&str; 6] =
     [theme::BLUE, theme::VERMILLION, theme::GREEN, theme::PURPLE, theme::ORANGE, theme::SKY];
 
-/// Both axes, in powers of ten.
-struct Axes {
+/// Logarithmic axes, in decades.
+struct LogAxes {
     panel: Rect,
     across: [f64; 2],
     up: [f64; 2],
-    /// Where errors of 0 stand.
-    none: f64,
+    /// Position of the row of zero errors.
+    zero_row: f64,
 }
 
-impl Axes {
+impl LogAxes {
     fn around(panel: Rect, cases: &[Convergence]) -> Self {
         let all = || cases.iter().flat_map(|case| &case.errors).copied();
         let across = span(all().map(|[at, _]| at));
         let up = span(all().map(|[_, error]| error));
-        let none = up[0] - ROW_BELOW;
+        let zero_row = up[0] - ZERO_ROW_BELOW;
         let across = [across[0] - 0.08, across[1] + 0.08];
-        Self { panel, across, up: [none - 0.15, up[1] + 0.15], none }
+        Self { panel, across, up: [zero_row - 0.15, up[1] + 0.15], zero_row }
     }
 
     fn x(&self, value: f64) -> f64 {
@@ -85,22 +85,22 @@ impl Axes {
     }
 
     fn y(&self, error: f64) -> f64 {
-        let power = if error > 0.0 { error.log10() } else { self.none };
+        let power = if error > 0.0 { error.log10() } else { self.zero_row };
         let share = (power - self.up[0]) / (self.up[1] - self.up[0]);
         self.panel.bottom - share.clamp(0.0, 1.0) * self.panel.height()
     }
 }
 
-/// The powers of ten of the least and the largest of the positive values; a decade when there are none.
+/// Decimal logarithms of the smallest and largest positive value; one decade if there are none.
 fn span(values: impl Iterator<Item = f64>) -> [f64; 2] {
     let powers = values.filter(|value| value.is_normal() && *value > 0.0).map(f64::log10);
-    let [least, most] = powers.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], power| {
+    let [min, max] = powers.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], power| {
         [low.min(power), high.max(power)]
     });
-    if least.is_finite() { [least, most.max(least + 0.1)] } else { [-1.0, 0.0] }
+    if min.is_finite() { [min, max.max(min + 0.1)] } else { [-1.0, 0.0] }
 }
 
-/// 1, 2 and 5 times each power of ten within.
+/// 1, 2 and 5 times each power of ten within the limits.
 fn round_values([from, to]: [f64; 2]) -> impl Iterator<Item = f64> {
     let decades = from.floor() as i32..=to.ceil() as i32;
     decades
@@ -108,7 +108,7 @@ fn round_values([from, to]: [f64; 2]) -> impl Iterator<Item = f64> {
         .filter(move |value| (from..=to).contains(&value.log10()))
 }
 
-fn grid(axes: &Axes) -> Layer {
+fn grid(axes: &LogAxes) -> Layer {
     let panel = axes.panel;
     let mut layer = Layer::new("axes");
     let mut lines = Layer::new("grid").stroked(theme::GRID, theme::HAIRLINE_PX);
@@ -119,7 +119,7 @@ fn grid(axes: &Axes) -> Layer {
         let place = Px::new(x, panel.bottom + 16.0);
         numbers.text(place, Anchor::Middle, theme::SMALL_PX, &value.to_string());
     }
-    let known = round_values([axes.none + ROW_BELOW - 0.01, axes.up[1]]);
+    let known = round_values([axes.zero_row + ZERO_ROW_BELOW - 0.01, axes.up[1]]);
     for value in known.chain([0.0]) {
         let y = axes.y(value);
         lines.line(Px::new(panel.left, y), Px::new(panel.right, y));
@@ -132,7 +132,7 @@ fn grid(axes: &Axes) -> Layer {
     layer
 }
 
-fn curve(axes: &Axes, case: &Convergence, colour: &'static str, dash: &'static str) -> Layer {
+fn curve(axes: &LogAxes, case: &Convergence, colour: &'static str, dash: &'static str) -> Layer {
     let drawn = case.errors.iter().filter(|[at, error]| *at > 0.0 && error.is_finite());
     let points: Vec<(Px, String)> = drawn
         .map(|&[at, error]| (Px::new(axes.x(at), axes.y(error)), format!("{at}: {error}")))
@@ -153,10 +153,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_error_is_drawn_and_those_of_nothing_stand_lowest() {
+    fn zero_errors_are_the_lowest_row() {
         let case =
             Convergence { name: "room".into(), errors: vec![[2.0, 0.3], [0.5, 0.004], [0.1, 0.0]] };
-        let axes = Axes::around(Rect::new(0.0, 0.0, 100.0, 100.0), std::slice::from_ref(&case));
+        let axes = LogAxes::around(Rect::new(0.0, 0.0, 100.0, 100.0), std::slice::from_ref(&case));
         assert!(axes.y(0.0) > axes.y(0.004) && axes.y(0.004) > axes.y(0.3));
         assert!(axes.x(0.1) < axes.x(0.5));
         let svg = draw_convergence("t", None, &[], ["spacing", "share"], &[case]).to_svg();

@@ -1,33 +1,33 @@
-//! An array's readings: a fan for each, from the ranger's own place. What was heard is somewhere on
-//! the arc; a silent one is an empty outline as far as the ranger listens.
+//! Fans for the readings of an array, each from its ranger's position. An echo lies somewhere on
+//! the arc; a reading without echo is an outline up to the maximum range.
 
 use super::{
     canvas::{Anchor, Layer, Px, Shape},
     floor::MIN_RANGE_DASH,
     plan::Plan,
-    readings::{Reading, Readings},
+    readings::{PlottedBeam, PlottedScan},
     theme,
 };
 use sonard_model::{geometry::DVec2, viewpoint::Viewpoint};
 
-/// An arc has so many pieces.
+/// Number of segments of an arc.
 const PIECES: i32 = 12;
 
-/// More fans than this are not named.
-const MOST_NAMED: usize = 24;
+/// Maximum number of fans with labels.
+const MAX_LABELLED: usize = 24;
 
-/// How an array's readings are drawn.
+/// Drawing style of an array's readings.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Fan {
-    /// Half the beam's width, radians: to where the sound that leaves is 6 dB weaker.
+pub(super) struct FanStyle {
+    /// Half width of the beam at -6 dB one-way, radians.
     pub(super) half_rad: f64,
-    /// How far the rangers listen, metres.
+    /// Maximum range, metres.
     pub(super) max_range_m: f64,
 }
 
-impl Fan {
-    /// Every fan, and a dot where its ranger is.
-    pub(super) fn draw(&self, plan: &Plan, scan: &Readings) -> Layer {
+impl FanStyle {
+    /// Draws every fan, with a dot at its ranger.
+    pub(super) fn draw(&self, plan: &Plan, scan: &PlottedScan) -> Layer {
         let mut layer = Layer::new("fans");
         let mut faces = Layer::new("faces").with("fill", theme::INK);
         for (beam, at) in scan.beams.iter().filter_map(|beam| Some((beam, beam.viewpoint?))) {
@@ -35,20 +35,20 @@ impl Fan {
             faces.mark(Shape::Dot, plan.px(at.position()), 1.6, None);
         }
         layer.add(faces);
-        if scan.beams.len() <= MOST_NAMED {
+        if scan.beams.len() <= MAX_LABELLED {
             layer.add(self.names(plan, scan));
         }
         layer
     }
 
-    /// Each ranger's name, in its fan.
-    fn names(&self, plan: &Plan, scan: &Readings) -> Layer {
+    /// Draws the name of each ranger in its fan.
+    fn names(&self, plan: &Plan, scan: &PlottedScan) -> Layer {
         let mut names = Layer::new("rangers").with("fill", theme::QUIET).haloed();
         for beam in &scan.beams {
             let (Some(viewpoint), Some(name)) = (&beam.viewpoint, &beam.ranger) else { continue };
             let range_m = beam.range_m.unwrap_or(self.max_range_m);
-            // Where the fan is wide enough, but not so far out that it leaves the picture; a silent
-            // one's nearer, where fewer other names are.
+            // Where the fan is wide enough, but still within the picture; closer for a fan without
+            // echo, where fewer other names are.
             let share = if beam.range_m.is_some() { 0.3 } else { 0.15 };
             let out_m = (0.6 * range_m).min(share * plan.view.size().min_element());
             let at = plan.px(viewpoint.point_at(out_m)) + Px::new(0.0, 4.0);
@@ -57,25 +57,25 @@ impl Fan {
         names
     }
 
-    fn fan(&self, plan: &Plan, beam: &Reading, from: &Viewpoint) -> Layer {
+    fn fan(&self, plan: &Plan, beam: &PlottedBeam, from: &Viewpoint) -> Layer {
         let colour = beam.kind.colour();
         let arc = self.arc(plan, from, beam.range_m.unwrap_or(self.max_range_m));
         let outline = [&[plan.px(from.position())], arc.as_slice()].concat();
         if beam.range_m.is_none() {
-            let mut silent = Layer::new("silent").stroked(colour, theme::HAIRLINE_PX);
-            silent.polygon_with_hint(&outline, &beam.hint);
-            return silent;
+            let mut empty = Layer::new("no-echo").stroked(colour, theme::HAIRLINE_PX);
+            empty.polygon_with_hint(&outline, &beam.hint);
+            return empty;
         }
-        let mut heard = Layer::new("heard").with("fill", colour).with("fill-opacity", 0.13);
-        heard.polygon_with_hint(&outline, &beam.hint);
+        let mut fan = Layer::new("echo").with("fill", colour).with("fill-opacity", 0.13);
+        fan.polygon_with_hint(&outline, &beam.hint);
         let mut rim = Layer::new("arc").stroked(colour, 2.2);
         rim.runs([arc]);
-        heard.add(rim);
-        heard
+        fan.add(rim);
+        fan
     }
 
-    /// The arcs within which nothing is measured.
-    pub(super) fn min_range(&self, plan: &Plan, scan: &Readings) -> Layer {
+    /// Draws the arcs of the minimum range.
+    pub(super) fn min_range(&self, plan: &Plan, scan: &PlottedScan) -> Layer {
         let mut layer = Layer::new("min-range")
             .stroked(theme::PURPLE, 1.0)
             .with("stroke-dasharray", MIN_RANGE_DASH);

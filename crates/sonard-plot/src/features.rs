@@ -1,13 +1,12 @@
-//! The floor plan with what a scan was interpreted as.
+//! Floor plan with the features found by the interpretation.
 
 use super::{
     canvas::{Anchor, Layer, Px, Shape},
-    keys,
     legend::{Entry, Sample},
-    overlay,
+    legend_entries, overlay,
     picture::Picture,
     plan::Plan,
-    theme, words,
+    scan_caption, theme,
 };
 use sonard_interpret::interpret::{Feature, FeatureKind};
 use sonard_model::{
@@ -19,20 +18,19 @@ use sonard_records::ScanView;
 const KINDS: [FeatureKind; 4] =
     [FeatureKind::Plane, FeatureKind::Corner, FeatureKind::Edge, FeatureKind::Unresolved];
 
-/// Draws what scans were interpreted as: each feature's arc in the colour and with the mark of
-/// its kind, on the floor plan with the readings as small dots; an arrow leads to the place that
-/// a next scan is proposed from.
+/// Draws the features found in scans: an arc and a mark in the style of its class for each, over
+/// the floor plan with the readings as small dots; lines lead to the proposed next poses.
 #[must_use]
 pub fn draw_features(scans: &[ScanView], scene: Option<&Scene>, features: &[Feature]) -> Picture {
     let over = |plan: &Plan| {
         let arcs = features.iter().map(|feature| arc(plan, scans, feature));
         arcs.chain([next_places(plan, scans, features)]).collect()
     };
-    let beside = |plan: &Plan| Some(names(plan, scene, scans, features));
-    overlay::draw(scans, scene, counts(features), &[], over, beside, &entries(features, scene))
+    let labels = |plan: &Plan| Some(names(plan, scene, scans, features));
+    overlay::draw(scans, scene, counts(features), &[], over, labels, &entries(features, scene))
 }
 
-/// How many of each kind there are.
+/// Number of features of each class.
 fn counts(features: &[Feature]) -> String {
     let parts: Vec<String> = KINDS
         .iter()
@@ -75,19 +73,19 @@ fn entries(features: &[Feature], scene: Option<&Scene>) -> Vec<Entry> {
     let kinds = present.map(|kind| {
         Entry::new(Sample::Mark { shape: shape(kind), colour: colour(kind) }, name(kind))
     });
-    let dot = Sample::Mark { shape: Shape::Dot, colour: theme::SILENT };
+    let dot = Sample::Mark { shape: Shape::Dot, colour: theme::NO_ECHO };
     let next = Sample::Line { colour: theme::ORANGE, width_px: 2.0, dash: "none" };
     let proposes = features.iter().any(|feature| feature.next.is_some());
     kinds
         .chain([Entry::new(dot, "reading")])
-        .chain(proposes.then(|| Entry::new(next, "way to the next scan")))
-        .chain(scene.map(keys::materials).into_iter().flatten())
+        .chain(proposes.then(|| Entry::new(next, "proposed next pose")))
+        .chain(scene.map(legend_entries::materials).into_iter().flatten())
         .collect()
 }
 
-/// Where the scan that a feature belongs to was taken.
+/// Pose of the scan that a feature belongs to.
 fn pose_of(scans: &[ScanView], feature: &Feature) -> Option<Pose> {
-    scans.iter().find(|scan| scan.scan == feature.scan).and_then(words::pose_of)
+    scans.iter().find(|scan| scan.scan == feature.scan).and_then(scan_caption::pose_of)
 }
 
 fn arc(plan: &Plan, scans: &[ScanView], feature: &Feature) -> Layer {
@@ -104,7 +102,7 @@ fn arc(plan: &Plan, scans: &[ScanView], feature: &Feature) -> Layer {
     layer
 }
 
-/// The feature's arc on the page; empty where only the direction is known.
+/// Arc of a feature on the page; empty where only the direction is known.
 fn arc_of(plan: &Plan, scans: &[ScanView], feature: &Feature) -> Vec<Px> {
     let (Some(pose), Some(range_m)) = (pose_of(scans, feature), feature.range_m) else {
         return Vec::new();
@@ -121,7 +119,7 @@ fn arc_of(plan: &Plan, scans: &[ScanView], feature: &Feature) -> Vec<Px> {
 fn hint(feature: &Feature) -> String {
     let reason = feature.reason.map(|reason| format!(" ({reason:?})")).unwrap_or_default();
     format!(
-        "{}{reason}: extent {:.1}\u{b0}, confidence {:.3}, something else {:.3}",
+        "{}{reason}: extent {:.1}\u{b0}, confidence {:.3}, other {:.3}",
         name(feature.kind),
         feature.extent_deg,
         feature.confidence,
@@ -129,7 +127,7 @@ fn hint(feature: &Feature) -> String {
     )
 }
 
-/// Extent and, where there is one, beta beside each mark.
+/// Draws class, extent and, if known, beta next to each mark.
 fn names(plan: &Plan, scene: Option<&Scene>, scans: &[ScanView], features: &[Feature]) -> Layer {
     let mut labels = plan.labels(scene);
     for feature in features {
@@ -141,7 +139,8 @@ fn names(plan: &Plan, scene: Option<&Scene>, scans: &[ScanView], features: &[Fea
             continue;
         };
         let at = plan.px(pose.point_at(feature.bearing_deg, range_m));
-        let beta = feature.beta_deg.map(|beta| format!(", \u{3b2} {:.1}\u{b0}", plain(beta, 10.0)));
+        let beta =
+            feature.beta_deg.map(|beta| format!(", \u{3b2} {:.1}\u{b0}", rounded(beta, 10.0)));
         let text = format!(
             "{} {:.1}\u{b0}{}",
             name(feature.kind),
@@ -172,8 +171,8 @@ fn names(plan: &Plan, scene: Option<&Scene>, scans: &[ScanView], features: &[Fea
     layer
 }
 
-/// Without a minus sign before a zero.
-fn plain(value: f64, digits: f64) -> f64 {
+/// Rounds, without a minus sign before zero.
+fn rounded(value: f64, digits: f64) -> f64 {
     (value * digits).round() / digits + 0.0
 }
 

@@ -1,4 +1,4 @@
-//! A room and scans of it for the tests of this module, made from its mirror images.
+//! Test room and scans of it, constructed from mirror images.
 
 use std::collections::BTreeMap;
 
@@ -21,7 +21,7 @@ const WIDTH_M: f64 = 0.928;
 const HEIGHT_M: f64 = 0.742;
 const SHELVING: Material = Material { reflectance: 0.98, roughness: 0.0 };
 
-/// The rigid room of Dudek, Jenkin, Milios and Wilkes, figures 7 to 9.
+/// Rigid room of Dudek, Jenkin, Milios and Wilkes, figures 7 to 9.
 pub(super) fn room() -> Scene {
     let corners = [(0.0, 0.0), (WIDTH_M, 0.0), (WIDTH_M, HEIGHT_M), (0.0, HEIGHT_M)];
     let names = ["south", "east", "north", "west"];
@@ -54,7 +54,7 @@ pub(super) fn room() -> Scene {
     }
 }
 
-/// The room with a rough cupboard and a table leg in it.
+/// Room with a rough cupboard and a table leg.
 pub(super) fn furnished_room() -> Scene {
     let mut scene = room();
     let rough = Material { reflectance: 0.7, roughness: 0.4 };
@@ -76,7 +76,7 @@ pub(super) fn furnished_room() -> Scene {
     scene
 }
 
-/// A scan of the room from its mirror images: measured (with noise) beside simulated.
+/// Scan of the room from its mirror images: measured (with noise) and simulated.
 pub(super) fn scan_of_room(pose: Pose, step_deg: f64, seed: u64) -> ScanView {
     let mut rng = rand_pcg::Pcg32::seed_from_u64(seed);
     let scan = Uuid::from_u128(u128::from(seed) + 1);
@@ -106,7 +106,7 @@ pub(super) fn scan_of_room(pose: Pose, step_deg: f64, seed: u64) -> ScanView {
     ScanView::from_records(records).remove(0)
 }
 
-/// The same scan as the model alone would log it.
+/// Scan as logged by the model alone.
 pub(super) fn simulated(mut view: ScanView) -> ScanView {
     let mut session = session();
     session.provenance = Provenance::Simulated;
@@ -125,7 +125,7 @@ pub(super) fn simulated(mut view: ScanView) -> ScanView {
     view
 }
 
-/// A session of the default ranger in ordinary air.
+/// Session of the default ranger in ordinary air.
 pub(super) fn session() -> Session {
     let air = Air::new(20.0, 50.0, 101.325).expect("ordinary air");
     Session {
@@ -146,7 +146,7 @@ pub(super) fn session() -> Session {
     }
 }
 
-/// First image of the ranger whose echo is loud enough, in the order of distance.
+/// First image of the ranger with an echo above the threshold, in order of distance.
 fn predict(pose: &Pose, azimuth_deg: f64) -> SimRecord {
     const THRESHOLD: f64 = 0.05;
     const BLANKING_M: f64 = 0.409;
@@ -161,11 +161,11 @@ fn predict(pose: &Pose, azimuth_deg: f64) -> SimRecord {
                 f64::from(n) * size + if n % 2 == 0 { at } else { size - at }
             };
             let image = DVec2::new(mirrored(i, pose.x_m, WIDTH_M), mirrored(k, pose.y_m, HEIGHT_M));
-            let way = image - pose.position();
-            let off = wrap_pi(way.y.atan2(way.x) - pose.direction_rad(azimuth_deg));
+            let ray = image - pose.position();
+            let off = wrap_pi(ray.y.atan2(ray.x) - pose.direction_rad(azimuth_deg));
             let pattern = (-4.0 * (off / 0.127_f64).powi(2)).exp();
-            let amplitude = pattern * 0.98_f64.powi(order as i32) * (-0.1 * way.length()).exp();
-            images.push((way.length(), amplitude, order));
+            let amplitude = pattern * 0.98_f64.powi(order as i32) * (-0.1 * ray.length()).exp();
+            images.push((ray.length(), amplitude, order));
         }
     }
     images.sort_by(|a, b| a.0.total_cmp(&b.0));

@@ -1,32 +1,31 @@
-//! A scan on the floor plan: rays and rings for the model, marks for the readings, and the rim
-//! for everything that has a direction only or lies beyond the view.
+//! Scan on the floor plan: rays and rings for the model, marks for the readings, and ticks or
+//! arrows on the border for readings without a range or outside the view.
 
 use super::{
     canvas::{Anchor, Layer, Px},
     labels::Labels,
     plan::Plan,
-    readings::{Kind, Reading, Readings},
+    readings::{PlottedBeam, PlottedScan, ReadingKind},
     theme,
 };
 use sonard_model::geometry::{DVec2, Pose, wrap_360};
 
-/// More rays than this are thinned out.
+/// Maximum number of rays; more are thinned out.
 const MAX_RAYS: usize = 120;
 const DOT_PX: f64 = 2.6;
 const RING_PX: f64 = 3.4;
 
-/// One scan and how it is drawn among others.
+/// Scan with its pose and floor plan.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Floor<'a> {
     pub(super) plan: &'a Plan,
     pub(super) pose: Pose,
-    pub(super) scan: &'a Readings,
+    pub(super) scan: &'a PlottedScan,
 }
 
 impl Floor<'_> {
-    /// Rays from the ranger to each predicted range, and a ring there; for a scan that the
-    /// model made, rays to its readings.
-    /// Of an array, fans to its readings.
+    /// Draws rays from the ranger to each predicted range with a ring there; for a simulated scan,
+    /// rays to its readings; for an array, fans.
     pub(super) fn model(&self) -> Layer {
         if let (Some(fan), false) = (self.scan.fan, self.scan.has_model) {
             return fan.draw(self.plan, self.scan);
@@ -54,7 +53,7 @@ impl Floor<'_> {
         layer
     }
 
-    /// The circle within which nothing is measured.
+    /// Draws the circle of the minimum range.
     pub(super) fn min_range(&self) -> Layer {
         if let Some(fan) = self.scan.fan {
             return fan.min_range(self.plan, self.scan);
@@ -63,21 +62,21 @@ impl Floor<'_> {
             .stroked(theme::PURPLE, 1.0)
             .with("stroke-dasharray", MIN_RANGE_DASH);
         if let Some(range_m) = self.scan.min_range_m {
-            // A transducer beside its axis goes round it too.
+            // A transducer off the rotation axis travels around it.
             let axis = self.pose.position();
-            let from_axis_m = |beam: &Reading| beam.point(&self.pose, range_m).distance(axis);
+            let from_axis_m = |beam: &PlottedBeam| beam.point(&self.pose, range_m).distance(axis);
             let radius_m = self.scan.beams.first().map_or(range_m, from_axis_m);
             layer.circle(self.plan.px(axis), self.plan.length_px(radius_m));
         }
         layer
     }
 
-    /// A mark for each reading within the view.
+    /// Draws a mark for each reading within the view.
     pub(super) fn marks(&self, opacity: f64) -> Layer {
         let mut layer = Layer::new("readings").with("fill-opacity", opacity);
-        for kind in Kind::HEARD {
-            let mut marks = Layer::new(kind.words()).with("fill", kind.colour());
-            for (beam, at) in self.heard(kind).filter(|(_, at)| self.plan.panel.contains(*at)) {
+        for kind in ReadingKind::WITH_RANGE {
+            let mut marks = Layer::new(kind.label()).with("fill", kind.colour());
+            for (beam, at) in self.located(kind).filter(|(_, at)| self.plan.panel.contains(*at)) {
                 marks.mark(kind.shape(), at, DOT_PX, Some(&beam.hint));
             }
             layer.add(marks);
@@ -85,12 +84,12 @@ impl Floor<'_> {
         layer
     }
 
-    /// Short ticks on the panel's border in the direction of each silent beam.
-    pub(super) fn silent_ticks(&self) -> Layer {
-        let mut layer = Layer::new("unheard");
-        for kind in Kind::UNHEARD {
-            let mut ticks = Layer::new(kind.words()).stroked(kind.colour(), 1.3);
-            let length_px = if kind == Kind::Silent { 6.0 } else { 10.0 };
+    /// Draws short ticks on the panel's border in the direction of each beam without a range.
+    pub(super) fn border_ticks(&self) -> Layer {
+        let mut layer = Layer::new("no-range");
+        for kind in ReadingKind::WITHOUT_RANGE {
+            let mut ticks = Layer::new(kind.label()).stroked(kind.colour(), 1.3);
+            let length_px = if kind == ReadingKind::NoEcho { 6.0 } else { 10.0 };
             let beams = self.scan.beams.iter().filter(|beam| beam.kind == kind);
             let runs = beams.filter_map(|beam| {
                 let (at, outward) = self.rim(beam.ray(&self.pose))?;
@@ -102,11 +101,11 @@ impl Floor<'_> {
         layer
     }
 
-    /// Arrows on the border for readings beyond it, with their number and range.
-    pub(super) fn beyond(&self, labels: &mut Labels) -> Layer {
-        let mut layer = Layer::new("beyond").with("fill", theme::INK);
+    /// Draws arrows on the border for readings outside the view, with their number and range.
+    pub(super) fn outside(&self, labels: &mut Labels) -> Layer {
+        let mut layer = Layer::new("outside").with("fill", theme::INK);
         let mut texts = Layer::new("ranges").haloed();
-        for cluster in self.clusters_beyond() {
+        for cluster in self.clusters_outside() {
             let direction_rad = self.pose.direction_rad(cluster.azimuth_deg);
             let ray = (self.pose.position(), direction_rad);
             let Some((at, outward)) = self.rim(ray) else { continue };
@@ -115,40 +114,40 @@ impl Floor<'_> {
             let mut arrow = Layer::new("arrow").with("fill", cluster.colour());
             arrow.polygon(&[nose, tail + side, tail - side]);
             layer.add(arrow);
-            let words = cluster.words();
+            let text = cluster.label();
             let base = tail - 4.0 * outward + Px::new(0.0, 4.0 - 5.0 * outward.y);
             let anchor = match outward.x {
                 x if x > 0.35 => Anchor::End,
                 x if x < -0.35 => Anchor::Start,
                 _ => Anchor::Middle,
             };
-            if labels.place(base, anchor, theme::SMALL_PX, &words) {
-                texts.text(base, anchor, theme::SMALL_PX, &words);
+            if labels.place(base, anchor, theme::SMALL_PX, &text) {
+                texts.text(base, anchor, theme::SMALL_PX, &text);
             }
         }
         layer.add(texts);
         layer
     }
 
-    /// How many readings lie beyond the view.
-    pub(super) fn count_beyond(&self) -> usize {
-        self.clusters_beyond().iter().map(|cluster| cluster.count).sum()
+    /// Number of readings outside the view.
+    pub(super) fn count_outside(&self) -> usize {
+        self.clusters_outside().iter().map(|cluster| cluster.count).sum()
     }
 
-    fn heard(&self, kind: Kind) -> impl Iterator<Item = (&Reading, Px)> {
+    fn located(&self, kind: ReadingKind) -> impl Iterator<Item = (&PlottedBeam, Px)> {
         let of_kind = self.scan.beams.iter().filter(move |beam| beam.kind == kind);
         of_kind.filter_map(|beam| Some((beam, self.at(beam, beam.range_m?))))
     }
 
-    fn at(&self, beam: &Reading, range_m: f64) -> Px {
+    fn at(&self, beam: &PlottedBeam, range_m: f64) -> Px {
         self.plan.px(beam.point(&self.pose, range_m))
     }
 
-    /// Where a beam leaves the panel, and its direction on the page; `None` when the ranger
-    /// itself is outside.
-    fn rim(&self, (place, direction_rad): (DVec2, f64)) -> Option<(Px, Px)> {
+    /// Intersection of a beam with the border of the panel, and its direction on the page; `None`
+    /// if the ranger itself is outside.
+    fn rim(&self, (position, direction_rad): (DVec2, f64)) -> Option<(Px, Px)> {
         let panel = self.plan.panel;
-        let from = self.plan.px(place);
+        let from = self.plan.px(position);
         if !panel.contains(from) {
             return None;
         }
@@ -167,8 +166,8 @@ impl Floor<'_> {
         Some((from + distance * outward, outward))
     }
 
-    /// Readings beyond the view, gathered by direction.
-    fn clusters_beyond(&self) -> Vec<Cluster> {
+    /// PlottedScan outside the view, grouped by direction.
+    fn clusters_outside(&self) -> Vec<Cluster> {
         let mut clusters: Vec<Cluster> = Vec::new();
         for beam in &self.scan.beams {
             let Some(range_m) = beam.range_m else { continue };
@@ -177,7 +176,7 @@ impl Floor<'_> {
             }
             match clusters.last_mut() {
                 Some(last) if beam.azimuth_deg - last.from_deg < CLUSTER_DEG => {
-                    last.take(beam, range_m);
+                    last.extend(beam, range_m);
                 }
                 _ => clusters.push(Cluster::new(beam, range_m)),
             }
@@ -186,10 +185,10 @@ impl Floor<'_> {
     }
 }
 
-/// Dash pattern of the minimum range's circle.
+/// Dash pattern of the minimum-range circle.
 pub(super) const MIN_RANGE_DASH: &str = "5 4";
 
-/// No arrow stands for beams farther apart than this, degrees.
+/// Maximum angle spanned by one arrow, degrees.
 const CLUSTER_DEG: f64 = 15.0;
 
 #[derive(Debug)]
@@ -199,11 +198,11 @@ struct Cluster {
     count: usize,
     nearest_m: f64,
     farthest_m: f64,
-    kinds: Vec<Kind>,
+    kinds: Vec<ReadingKind>,
 }
 
 impl Cluster {
-    fn new(beam: &Reading, range_m: f64) -> Self {
+    fn new(beam: &PlottedBeam, range_m: f64) -> Self {
         Self {
             from_deg: beam.azimuth_deg,
             azimuth_deg: wrap_360(beam.azimuth_deg),
@@ -214,7 +213,7 @@ impl Cluster {
         }
     }
 
-    fn take(&mut self, beam: &Reading, range_m: f64) {
+    fn extend(&mut self, beam: &PlottedBeam, range_m: f64) {
         self.azimuth_deg = (self.from_deg + beam.azimuth_deg) / 2.0;
         self.count += 1;
         self.nearest_m = self.nearest_m.min(range_m);
@@ -222,13 +221,13 @@ impl Cluster {
         self.kinds.push(beam.kind);
     }
 
-    /// The colour of most of its readings.
+    /// Colour of the most frequent kind.
     fn colour(&self) -> &'static str {
-        let times = |kind: &Kind| self.kinds.iter().filter(|other| *other == kind).count();
+        let times = |kind: &ReadingKind| self.kinds.iter().filter(|k| *k == kind).count();
         self.kinds.iter().max_by_key(|kind| times(kind)).map_or(theme::INK, |kind| kind.colour())
     }
 
-    fn words(&self) -> String {
+    fn label(&self) -> String {
         let [near, far] = [self.nearest_m, self.farthest_m].map(metres);
         match (self.count, near == far) {
             (1, _) => format!("{near} m"),

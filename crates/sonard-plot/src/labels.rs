@@ -1,8 +1,8 @@
-//! Keeps texts from covering each other, and the walls.
+//! Label placement without overlap of other labels or walls.
 
 use super::canvas::{Anchor, Px, Rect, text_width_px};
 
-/// What is taken on a panel.
+/// Occupied areas and lines of a panel.
 #[derive(Debug, Clone)]
 pub(super) struct Labels {
     panel: Rect,
@@ -11,22 +11,22 @@ pub(super) struct Labels {
 }
 
 impl Labels {
-    /// Texts within this panel.
+    /// Empty panel.
     pub(super) fn new(panel: Rect) -> Self {
         Self { panel, taken: Vec::new(), lines: Vec::new() }
     }
 
-    /// Keeps a region free of texts.
+    /// Keeps a rectangle free of labels.
     pub(super) fn keep_free(&mut self, rect: Rect) {
         self.taken.push(rect);
     }
 
-    /// Keeps a line free of texts.
+    /// Keeps a line free of labels.
     pub(super) fn keep_off(&mut self, from: Px, to: Px) {
         self.lines.push((from, to));
     }
 
-    /// Takes the room of a text on the base line at `at`, unless some of it is taken.
+    /// Reserves the area of a text with its baseline at `at`; returns `false` if it is occupied.
     pub(super) fn place(&mut self, at: Px, anchor: Anchor, size_px: f64, text: &str) -> bool {
         let width = text_width_px(text, size_px);
         let left = match anchor {
@@ -35,21 +35,21 @@ impl Labels {
             Anchor::End => at.x - width,
         };
         let rect = Rect::new(left, at.y - 0.8 * size_px, width, 1.1 * size_px);
-        self.take(rect, 0.0, Px::new(rect.width(), rect.height()))
+        self.reserve(rect, 0.0, Px::new(rect.width(), rect.height()))
     }
 
-    /// The same for a text turned about its middle, which is at `at`.
+    /// Reserves the area of a text rotated about its middle at `at`; `false` if it is occupied.
     pub(super) fn place_turned(&mut self, at: Px, turn_deg: f64, size_px: f64, text: &str) -> bool {
         let (sin, cos) = turn_deg.to_radians().sin_cos();
         let (w, h) = (text_width_px(text, size_px), size_px);
         let width = w * cos.abs() + h * sin.abs();
         let height = w * sin.abs() + h * cos.abs();
         let around = Rect::new(at.x - width / 2.0, at.y - height / 2.0, width, height);
-        self.take(around, turn_deg, Px::new(w, h))
+        self.reserve(around, turn_deg, Px::new(w, h))
     }
 
-    /// Takes `around`, in which a text of a size lies turned about its middle.
-    fn take(&mut self, around: Rect, turn_deg: f64, size: Px) -> bool {
+    /// Reserves `around`, the bounding box of a text of a size rotated about its middle.
+    fn reserve(&mut self, around: Rect, turn_deg: f64, size: Px) -> bool {
         let back = Px::from_angle(-turn_deg.to_radians());
         let middle = around.center();
         let crossed = |&(from, to): &(Px, Px)| {
@@ -66,7 +66,7 @@ impl Labels {
     }
 }
 
-/// Whether a line passes through a rectangle about the origin (clipping after Liang and Barsky).
+/// Returns `true` if a segment crosses a rectangle centred on the origin (Liang-Barsky clipping).
 fn crosses(from: Px, to: Px, half: Px) -> bool {
     let along = to - from;
     let mut part = [0.0_f64, 1.0];
@@ -76,8 +76,8 @@ fn crosses(from: Px, to: Px, half: Px) -> bool {
                 return false;
             }
         } else {
-            let [one, other] = [(-half - at) / along, (half - at) / along];
-            part = [part[0].max(one.min(other)), part[1].min(one.max(other))];
+            let [a, b] = [(-half - at) / along, (half - at) / along];
+            part = [part[0].max(a.min(b)), part[1].min(a.max(b))];
         }
     }
     part[0] <= part[1]
@@ -88,16 +88,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_text_keeps_off_walls_but_may_stand_beside_them() {
+    fn text_avoids_walls() {
         let panel = Rect::new(0.0, 0.0, 200.0, 200.0);
         let mut labels = Labels::new(panel);
         labels.keep_off(Px::new(0.0, 0.0), Px::new(200.0, 200.0));
         let at = |x: f64, y: f64| Px::new(x, y);
         assert!(!labels.place(at(80.0, 100.0), Anchor::Start, 12.0, "a wall here"));
         assert!(labels.place(at(120.0, 50.0), Anchor::Start, 12.0, "none"));
-        // Along the wall, 10 pixels beside it.
-        let beside = at(100.0, 100.0) + 10.0 * Px::new(-1.0, 1.0).normalize();
-        assert!(labels.place_turned(beside, 45.0, 12.0, "along"));
+        // Parallel to the wall at a distance of 10 pixels.
+        let parallel = at(100.0, 100.0) + 10.0 * Px::new(-1.0, 1.0).normalize();
+        assert!(labels.place_turned(parallel, 45.0, 12.0, "along"));
         assert!(!labels.place_turned(at(50.0, 50.0), 45.0, 12.0, "over"));
     }
 }

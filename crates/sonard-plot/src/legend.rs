@@ -1,11 +1,11 @@
-//! Legends: samples of what is drawn, with words, in rows.
+//! Legends: rows of samples with their labels.
 
 use super::{
     canvas::{Anchor, Layer, Px, Rect, Shape, text_width_px},
     theme,
 };
 
-/// One entry.
+/// Legend entry.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Entry {
     /// Drawn sample.
@@ -14,7 +14,7 @@ pub struct Entry {
     pub text: String,
 }
 
-/// What stands before the words.
+/// Sample drawn before the label.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Sample {
     /// Mark of a reading.
@@ -43,7 +43,7 @@ pub enum Sample {
         /// Stroke.
         colour: &'static str,
     },
-    /// A framed area.
+    /// Framed area.
     Patch {
         /// Fill.
         colour: &'static str,

@@ -2,7 +2,7 @@
 //!
 //! Everything here is a pure function from data to a [`Picture`]; the caller writes it to a file.
 
-// Modules are `foo.rs` beside `foo/`.
+// Modules are `foo.rs` next to `foo/`.
 #![warn(clippy::mod_module_files)]
 
 mod animation;
@@ -13,9 +13,9 @@ mod convergence;
 mod fans;
 mod features;
 mod floor;
-mod keys;
 mod labels;
 pub mod legend;
+mod legend_entries;
 pub mod lines;
 mod map;
 mod materials;
@@ -28,6 +28,7 @@ mod readings;
 mod region;
 mod residuals;
 mod scan;
+mod scan_caption;
 mod scan_strips;
 mod scene;
 mod series;
@@ -36,12 +37,11 @@ mod strip;
 pub mod theme;
 pub mod ticks;
 mod trace;
-mod words;
 
 #[cfg(test)]
 mod fixtures;
 #[cfg(test)]
-mod legible;
+mod legibility;
 #[cfg(test)]
 mod tests;
 
@@ -56,8 +56,8 @@ pub use picture::{MAX_WIDTH_PX, Picture, PlotError};
 pub use polar::draw_polar;
 pub use residuals::draw_residuals;
 pub use scan::{draw_scan, draw_scans};
+pub use scan_caption::{badge_among, badge_of};
 pub use scene::draw_scene;
 pub use series::{Point, Series, draw_series};
 pub use side_by_side::draw_side_by_side;
 pub use trace::{TraceView, draw_trace};
-pub use words::{badge_among, badge_of};

@@ -1,10 +1,9 @@
-//! The floor plan with the lines fitted to scans.
+//! Floor plan with the lines fitted to scans.
 
 use super::{
     canvas::{Layer, Shape},
-    keys,
     legend::{Entry, Sample},
-    overlay,
+    legend_entries, overlay,
     picture::Picture,
     plan::Plan,
     theme,
@@ -16,19 +15,19 @@ use sonard_records::ScanView;
 const KINDS: [(LineKind, &str, &str); 3] = [
     (LineKind::Sonar, "sonar line", theme::BLUE),
     (LineKind::Laser, "laser line", theme::VERMILLION),
-    (LineKind::Complex, "complex line", theme::GREEN),
+    (LineKind::Complex, "line confirmed by laser", theme::GREEN),
 ];
 
-/// Draws a line map over the readings: lines in the colour of what they were made of, fainter the
-/// less confident they are; ends are dots where they are confirmed.
+/// Draws a line map over the readings: the colour of a line depends on its source, its opacity on
+/// the confidence; confirmed ends have dots.
 #[must_use]
 pub fn draw_lines(scans: &[ScanView], scene: Option<&Scene>, lines: &[MapLine]) -> Picture {
     let samples = entries(lines);
-    let dot = Sample::Mark { shape: Shape::Dot, colour: theme::SILENT };
+    let dot = Sample::Mark { shape: Shape::Dot, colour: theme::NO_ECHO };
     let entries: Vec<Entry> = samples
         .into_iter()
         .chain([Entry::new(dot, "reading")])
-        .chain(scene.map(keys::materials).into_iter().flatten())
+        .chain(scene.map(legend_entries::materials).into_iter().flatten())
         .collect();
     let finding = format!("{} lines", lines.len());
     let draw = |plan: &Plan| lines.iter().map(|line| layer(plan, line)).collect();
@@ -36,7 +35,7 @@ pub fn draw_lines(scans: &[ScanView], scene: Option<&Scene>, lines: &[MapLine]) 
     overlay::draw(scans, scene, finding, &ends, draw, |_| None, &entries)
 }
 
-/// A legend's entry for each kind of line that there is.
+/// Legend entries for the kinds of lines present.
 pub fn entries<'a>(lines: impl IntoIterator<Item = &'a MapLine>) -> Vec<Entry> {
     let present: Vec<LineKind> = lines.into_iter().map(|line| line.kind).collect();
     let kinds = KINDS.iter().filter(|(kind, ..)| present.contains(kind));
@@ -44,7 +43,7 @@ pub fn entries<'a>(lines: impl IntoIterator<Item = &'a MapLine>) -> Vec<Entry> {
     kinds.map(|(_, name, colour)| Entry::new(sample(colour), *name)).collect()
 }
 
-/// One line and its confirmed ends.
+/// Line with its confirmed ends.
 pub fn layer(plan: &Plan, line: &MapLine) -> Layer {
     let colour = KINDS
         .iter()

@@ -1,4 +1,4 @@
-//! Occupancy grids with what a reader needs: axes, scale, legend, and what the readings are.
+//! Occupancy grids with axes, scale, legend and provenance badge.
 
 use resvg::tiny_skia::{Pixmap, PremultipliedColorU8};
 
@@ -14,32 +14,32 @@ use super::{
 use sonard_interpret::interpret::grid::Grid;
 use sonard_model::{geometry::DVec2, scene::Scene};
 
-/// Cells get so many pixels where the picture does not become wider than this by it.
+/// Pixels per cell, as long as the picture stays within [`MAX_SIDE_PX`].
 const CELL_PX: f64 = 4.0;
-const MOST_PX: f64 = 4096.0;
+const MAX_SIDE_PX: f64 = 4096.0;
 
-/// A map to be drawn.
+/// Map with its caption and overlays.
 #[derive(Debug, Clone)]
 pub struct MapView<'a> {
-    /// Above the picture.
+    /// Title above the picture.
     pub title: String,
-    /// Under the title.
+    /// Lines below the title.
     pub lines: Vec<String>,
-    /// What the readings are, if not of a real ranger ([`badge_of`](crate::badge_of)).
+    /// Provenance of the readings, unless from hardware ([`badge_of`](crate::badge_of)).
     pub badge: Option<&'static str>,
-    /// The map.
+    /// Occupancy grid.
     pub grid: &'a Grid,
-    /// Walls to draw over it.
+    /// Scene whose walls are overlaid.
     pub scene: Option<&'a Scene>,
-    /// Where the robot went.
+    /// Trajectory of the robot, metres.
     pub way: &'a [DVec2],
 }
 
-/// A map as a PNG: free is white, occupied black, unknown grey; over it the walls of the scene, thin
-/// and blue, and the way of the robot, orange.
+/// Draws a map as a PNG: free is white, occupied black, unknown grey. Overlaid are the walls of the
+/// scene, thin and blue, and the trajectory of the robot, orange.
 ///
 /// # Errors
-/// When the image can't be made or encoded.
+/// Failure of rendering or encoding.
 pub fn draw_map(view: &MapView) -> Result<Vec<u8>, PlotError> {
     let (heading, top) = caption::draw(&view.title, view.badge, &view.lines);
     let (left, right) = (theme::MARGIN_PX + 38.0, theme::PAGE_PX - theme::MARGIN_PX);
@@ -47,7 +47,7 @@ pub fn draw_map(view: &MapView) -> Result<Vec<u8>, PlotError> {
     let height = Plan::height_for(&region, right - left, [160.0, 1400.0]);
     let plan = Plan::fit(region, Rect::new(left, top + 22.0, right - left, height));
     let below = Px::new(left, plan.panel.bottom + 24.0);
-    let (key, key_height) = legend::draw(&keys(view), below, right - left);
+    let (key, key_height) = legend::draw(&entries(view), below, right - left);
     let page_px = below.y + key_height + theme::MARGIN_PX / 2.0;
 
     let mut under = Layer::new("map");
@@ -57,7 +57,7 @@ pub fn draw_map(view: &MapView) -> Result<Vec<u8>, PlotError> {
     under.add(plan.scale_bar());
     let mut over = Layer::new("inside").clipped("map-window", plan.panel);
     over.add(walls(view, &plan));
-    over.add(way(view, &plan));
+    over.add(trajectory(view, &plan));
 
     let mut pixels =
         Picture::new(theme::PAGE_PX, page_px, under).to_pixels(width_px(view, &plan))?;
@@ -72,15 +72,15 @@ fn region(grid: &Grid) -> Bounds {
     Bounds { min: shape.origin, max: shape.origin + size }
 }
 
-/// So wide that cells can be told apart, within bounds.
+/// Width at which single cells are visible, within bounds.
 fn width_px(view: &MapView, plan: &Plan) -> u32 {
     let cell_px = plan.length_px(view.grid.shape().resolution_m);
-    let wanted = theme::PAGE_PX * (CELL_PX / cell_px).max(1.0);
-    let highest = MOST_PX * theme::PAGE_PX / (plan.panel.bottom + 100.0);
-    wanted.min(MOST_PX).min(highest.max(theme::PAGE_PX)).round() as u32
+    let desired = theme::PAGE_PX * (CELL_PX / cell_px).max(1.0);
+    let max_width = MAX_SIDE_PX * theme::PAGE_PX / (plan.panel.bottom + 100.0);
+    desired.min(MAX_SIDE_PX).min(max_width.max(theme::PAGE_PX)).round() as u32
 }
 
-/// Puts the cells into the panel, as grey as they are likely to be occupied.
+/// Paints the cells into the panel, darker for a higher probability of occupancy.
 fn paint(pixels: &mut Pixmap, grid: &Grid, plan: &Plan) {
     let (width, scale) = (pixels.width() as usize, f64::from(pixels.width()) / theme::PAGE_PX);
     let shape = grid.shape();
@@ -110,8 +110,8 @@ fn walls(view: &MapView, plan: &Plan) -> Layer {
 
 const WALL_PX: f64 = 1.2;
 
-fn way(view: &MapView, plan: &Plan) -> Layer {
-    let mut layer = Layer::new("way").stroked(theme::ORANGE, 1.4);
+fn trajectory(view: &MapView, plan: &Plan) -> Layer {
+    let mut layer = Layer::new("trajectory").stroked(theme::ORANGE, 1.4);
     let points: Vec<Px> =
         view.way.iter().filter(|at| at.is_finite()).map(|at| plan.px(*at)).collect();
     if let (Some(start), 1) = (points.first(), points.len()) {
@@ -121,7 +121,7 @@ fn way(view: &MapView, plan: &Plan) -> Layer {
     layer
 }
 
-fn keys(view: &MapView) -> Vec<Entry> {
+fn entries(view: &MapView) -> Vec<Entry> {
     let line = |colour, width_px| Sample::Line { colour, width_px, dash: "none" };
     let mut entries = vec![
         Entry::new(Sample::Patch { colour: theme::PAPER }, "free"),
@@ -132,10 +132,10 @@ fn keys(view: &MapView) -> Vec<Entry> {
         entries.push(Entry::new(line(theme::BLUE, WALL_PX), "walls of the scene"));
     }
     if !view.way.is_empty() {
-        entries.push(Entry::new(line(theme::ORANGE, 1.4), "way of the ranger"));
+        entries.push(Entry::new(line(theme::ORANGE, 1.4), "trajectory"));
     }
     entries
 }
 
-/// Of a cell at 0.5.
+/// Shade of a cell at probability 0.5.
 const UNKNOWN: &str = "#7f7f7f";

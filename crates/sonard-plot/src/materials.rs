@@ -1,14 +1,14 @@
-//! Which line style stands for which material.
+//! Line styles of materials.
 
 use super::theme;
 use sonard_model::scene::{Material, Scene};
 
-/// The materials of a scene, most mirror-like first.
+/// Materials of a scene, most specular first.
 #[derive(Debug, Clone)]
 pub(super) struct Materials(Vec<Material>);
 
 impl Materials {
-    pub(super) fn of(scene: &Scene) -> Self {
+    pub(super) fn from_scene(scene: &Scene) -> Self {
         let walls = scene.walls.iter().map(|wall| wall.material);
         let cylinders = scene.cylinders.iter().map(|cylinder| cylinder.material);
         let mut found: Vec<Material> = Vec::new();
@@ -23,7 +23,7 @@ impl Materials {
         Self(found)
     }
 
-    /// Dash pattern and material.
+    /// Dash patterns with their materials.
     pub(super) fn styles(&self) -> impl Iterator<Item = (&'static str, Material)> {
         self.0
             .iter()
@@ -31,7 +31,7 @@ impl Materials {
             .map(|(i, material)| (theme::WALL_DASHES[i % theme::WALL_DASHES.len()], *material))
     }
 
-    /// The legend's words for a material.
+    /// Legend label of a material.
     pub(super) fn describe(material: &Material) -> String {
         let roughness = if material.roughness > 0.0 {
             format!(", roughness {}", material.roughness)

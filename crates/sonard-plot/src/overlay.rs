@@ -1,4 +1,4 @@
-//! A floor plan with the readings as small dots, for what is found in them to be drawn over.
+//! Floor plan with the readings as small dots, as background of findings.
 
 use super::{
     canvas::{Layer, Px, Rect, Shape},
@@ -6,8 +6,8 @@ use super::{
     legend::{self, Entry},
     picture::Picture,
     plan::{Bounds, Plan},
-    readings::Readings,
-    region, theme, words,
+    readings::PlottedScan,
+    region, scan_caption, theme,
 };
 use sonard_model::{
     geometry::{DVec2, Pose},
@@ -15,28 +15,29 @@ use sonard_model::{
 };
 use sonard_records::ScanView;
 
-/// Around what was found, where nothing else is drawn, metres.
+/// Margin around findings if nothing else is drawn, metres.
 const MARGIN_M: f64 = 0.5;
 
-/// Draws scans small, in their scene; `finding` is a line under the title, `found` are places that
-/// must be in view, `over` draws clipped to the plan, `beside` over its frame.
+/// Draws scans as small dots in their scene. `finding` is a line below the title, `found` are
+/// points that must be in view, `over` is clipped to the plan, `labels` drawn over its frame.
 pub(super) fn draw(
     scans: &[ScanView],
     scene: Option<&Scene>,
     finding: String,
     found: &[DVec2],
     over: impl FnOnce(&Plan) -> Vec<Layer>,
-    beside: impl FnOnce(&Plan) -> Option<Layer>,
+    labels: impl FnOnce(&Plan) -> Option<Layer>,
     entries: &[Entry],
 ) -> Picture {
-    let readings: Vec<Readings> = scans.iter().map(Readings::of).collect();
-    let placed: Vec<(Pose, &Readings)> = scans
+    let readings: Vec<PlottedScan> = scans.iter().map(PlottedScan::from_scan).collect();
+    let placed: Vec<(Pose, &PlottedScan)> = scans
         .iter()
         .zip(&readings)
-        .filter_map(|(view, r)| Some((words::pose_of(view)?, r)))
+        .filter_map(|(view, r)| Some((scan_caption::pose_of(view)?, r)))
         .collect();
-    let lines = [words::lines(scans), vec![finding]].concat();
-    let (heading, top) = caption::draw(&words::title(scans, scene), words::badge(scans), &lines);
+    let lines = [scan_caption::lines(scans), vec![finding]].concat();
+    let (heading, top) =
+        caption::draw(&scan_caption::title(scans, scene), scan_caption::badge(scans), &lines);
     let around = match (placed.is_empty() && scene.is_none(), Bounds::around(found.iter().copied()))
     {
         (true, Some(around)) => around.grown(MARGIN_M),
@@ -57,7 +58,7 @@ pub(super) fn draw(
     page.add(heading);
     page.add(plan.frame());
     page.add(inside);
-    page.extend(beside(&plan));
+    page.extend(labels(&plan));
     page.add(plan.scale_bar());
     let below = Px::new(left, plan.panel.bottom + 24.0);
     let (key, key_height) = legend::draw(entries, below, right - left);
@@ -65,8 +66,8 @@ pub(super) fn draw(
     Picture::new(theme::PAGE_PX, below.y + key_height + theme::MARGIN_PX / 2.0, page)
 }
 
-fn dots(plan: &Plan, pose: &Pose, readings: &Readings) -> Layer {
-    let mut layer = Layer::new("readings").with("fill", theme::SILENT);
+fn dots(plan: &Plan, pose: &Pose, readings: &PlottedScan) -> Layer {
+    let mut layer = Layer::new("readings").with("fill", theme::NO_ECHO);
     for beam in &readings.beams {
         if let Some(range_m) = beam.range_m {
             let at = plan.px(beam.point(pose, range_m));

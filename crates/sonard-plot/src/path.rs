@@ -2,9 +2,10 @@
 
 use super::{
     canvas::{Anchor, Layer, Px, Rect},
-    caption, keys,
+    caption,
     labels::Labels,
     legend::{self, Entry, Sample},
+    legend_entries,
     picture::Picture,
     plan::{Bounds, Plan},
     theme,
@@ -14,31 +15,31 @@ use sonard_model::{
     scene::Scene,
 };
 
-/// A beam and the propagation path of its sound.
+/// Beam with the propagation path of its echo.
 #[derive(Debug, Clone)]
 pub struct PathView<'a> {
-    /// Above the picture.
+    /// Title above the picture.
     pub title: String,
-    /// Under the title: what was read, and by which path.
+    /// Lines below the title: reading and path.
     pub lines: Vec<String>,
-    /// What the readings are of, if not of a real ranger ([`badge_of`](crate::badge_of)).
+    /// Provenance of the readings, unless from hardware ([`badge_of`](crate::badge_of)).
     pub badge: Option<&'static str>,
-    /// The room, without the robot.
+    /// Scene without the robot.
     pub scene: &'a Scene,
-    /// Where the ranger stands.
+    /// Pose of the ranger.
     pub pose: Pose,
-    /// Where the transducer itself is; its heading is the direction it looks in.
+    /// Position of the transducer; its heading is the beam direction.
     pub looks: Pose,
-    /// That direction, degrees from the scan's heading.
+    /// Beam direction, degrees from the scan's heading.
     pub azimuth_deg: f64,
-    /// What was read, metres.
+    /// Reported range, metres.
     pub range_m: Option<f64>,
-    /// From the transmitter over each interaction to the receiver.
+    /// Points of the path from the transmitter over each interaction to the receiver, metres.
     pub points: Vec<DVec2>,
 }
 
-/// Draws the path of a beam's sound on the floor plan: reflections and edges numbered in order, an arrow
-/// on each stretch, and where the ranger believes the echo to be.
+/// Draws the propagation path of a beam on the floor plan: reflections and edges numbered in order,
+/// an arrow on each segment, the beam axis and the reported range.
 #[must_use]
 pub fn draw_path(view: &PathView) -> Picture {
     let (heading, top) = caption::draw(&view.title, view.badge, &view.lines);
@@ -61,13 +62,13 @@ pub fn draw_path(view: &PathView) -> Picture {
     page.add(plan.scale_bar());
     let below = Px::new(left, plan.panel.bottom + 24.0);
     let mut entries = vec![
-        Entry::new(line(theme::VERMILLION, "none"), "path of the sound"),
-        Entry::new(line(theme::SKY, "5 4"), "where the ranger looks"),
+        Entry::new(line(theme::VERMILLION, "none"), "propagation path"),
+        Entry::new(line(theme::SKY, "5 4"), "beam axis"),
     ];
     if view.range_m.is_some() {
-        entries.push(Entry::new(Sample::Ring { colour: theme::BLUE }, "where it reads an echo"));
+        entries.push(Entry::new(Sample::Ring { colour: theme::BLUE }, "reported range"));
     }
-    entries.extend(keys::materials(view.scene));
+    entries.extend(legend_entries::materials(view.scene));
     let (key, key_height) = legend::draw(&entries, below, right - left);
     page.add(key);
     Picture::new(theme::PAGE_PX, below.y + key_height + theme::MARGIN_PX / 2.0, page)
@@ -77,7 +78,7 @@ const fn line(colour: &'static str, dash: &'static str) -> Sample {
     Sample::Line { colour, width_px: 2.0, dash }
 }
 
-/// The path and the reading with some room around; of the room what is near.
+/// Bounds of the path and the reading with a margin, and of the near part of the room.
 fn region(view: &PathView) -> Bounds {
     let read = view.range_m.map(|range_m| view.looks.point_at(0.0, range_m));
     let here = [view.pose.position()].into_iter().chain(read).chain(view.points.iter().copied());
@@ -134,7 +135,7 @@ fn path(view: &PathView, plan: &Plan, labels: &mut Labels) -> Layer {
     layer
 }
 
-/// Stretches moved a little to their left, so that the path out and the path back can be told apart.
+/// Segments shifted slightly to their left, so that the path out and the path back are distinct.
 fn apart(points: &[Px]) -> Vec<(Px, Px)> {
     let shift = |from: Px, to: Px| -2.2 * (to - from).normalize_or_zero().perp();
     points

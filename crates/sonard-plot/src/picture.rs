@@ -1,4 +1,4 @@
-//! A finished picture and the formats it can be had in.
+//! Finished picture and its output formats.
 
 use std::sync::{Arc, LazyLock};
 
@@ -10,39 +10,39 @@ use thiserror::Error;
 
 use super::{canvas::Layer, theme};
 
-/// The widest PNG that is made, pixels.
+/// Maximum width of a PNG, pixels.
 pub const MAX_WIDTH_PX: u32 = 16_384;
 
-/// A drawing, ready to be written as SVG or PNG.
+/// Drawing, ready to be written as SVG or PNG.
 #[derive(Debug, Clone)]
 pub struct Picture {
     document: svg::Document,
 }
 
-/// Why a picture could not be turned into a PNG.
+/// Failure of the conversion to PNG.
 #[derive(Debug, Error)]
 pub enum PlotError {
-    /// Zero, or more than memory should be spent on.
+    /// Width of zero or beyond the memory limit.
     #[error("a width of {0} pixels cannot be drawn: choose 1 to {MAX_WIDTH_PX}")]
     Width(u32),
-    /// At this width the picture's height is more than memory should be spent on, or nothing.
+    /// Height of zero or beyond the memory limit at the requested width.
     #[error("at {width_px} pixels wide the picture would be {height_px} pixels high")]
     Height {
-        /// The width asked for, pixels.
+        /// Requested width, pixels.
         width_px: u32,
-        /// The height that follows, pixels.
+        /// Resulting height, pixels.
         height_px: f64,
     },
-    /// The rasteriser does not read the document.
-    #[error("the rasteriser refused the drawing: {0}")]
+    /// Document rejected by the rasterizer.
+    #[error("the rasterizer rejected the drawing: {0}")]
     Drawing(#[from] usvg::Error),
-    /// The image could not be encoded.
+    /// Failure of the PNG encoder.
     #[error("the image could not be encoded as PNG: {0}")]
     Encoding(String),
 }
 
 impl Picture {
-    /// A page of this height with the layer on it.
+    /// Page of the given size with a layer on it.
     pub fn new(width_px: f64, height_px: f64, content: Layer) -> Self {
         let page = svg::node::element::Rectangle::new()
             .set("width", width_px)
@@ -51,27 +51,27 @@ impl Picture {
         Self { document: document(width_px, height_px).add(page).add(content.into_group()) }
     }
 
-    /// The same without the white page, to be drawn over another.
+    /// Picture without a white page, to be drawn over another.
     pub(super) fn without_page(width_px: f64, height_px: f64, content: Layer) -> Self {
         Self { document: document(width_px, height_px).add(content.into_group()) }
     }
 
-    /// The picture as an SVG document.
+    /// Formats the picture as an SVG document.
     #[must_use]
     pub fn to_svg(&self) -> String {
         format!("{}\n", self.document)
     }
 
-    /// The picture as a PNG file, `width_px` wide and as high as its shape asks for.
+    /// Renders a PNG file, `width_px` wide with the height of the picture's aspect ratio.
     ///
     /// # Errors
-    /// When the size is out of bounds, or the rasteriser fails.
+    /// Size out of bounds, or a failure of the rasterizer.
     pub fn to_png(&self, width_px: u32) -> Result<Vec<u8>, PlotError> {
         let pixels = self.to_pixels(width_px)?;
         pixels.encode_png().map_err(|error| PlotError::Encoding(error.to_string()))
     }
 
-    /// The picture as pixels, the same size.
+    /// Renders pixels, `width_px` wide with the height of the picture's aspect ratio.
     pub(super) fn to_pixels(&self, width_px: u32) -> Result<tiny_skia::Pixmap, PlotError> {
         if !(1..=MAX_WIDTH_PX).contains(&width_px) {
             return Err(PlotError::Width(width_px));
@@ -88,7 +88,7 @@ impl Picture {
         Ok(pixels)
     }
 
-    /// Draws the picture over pixels, as wide as they are.
+    /// Draws the picture over pixels, scaled to their width.
     pub(super) fn draw_onto(&self, pixels: &mut tiny_skia::Pixmap) -> Result<(), PlotError> {
         let tree = self.tree()?;
         let scale = pixels.width() as f32 / tree.size().width();
@@ -103,7 +103,7 @@ impl Picture {
     }
 }
 
-/// An empty page with what all texts on it have in common.
+/// Empty page with the common text attributes.
 fn document(width_px: f64, height_px: f64) -> svg::Document {
     svg::Document::new()
         .set("viewBox", (0.0, 0.0, width_px, height_px))
@@ -114,7 +114,7 @@ fn document(width_px: f64, height_px: f64) -> svg::Document {
         .set("fill", theme::INK)
 }
 
-/// The bundled font, under its own name and as every generic family, so that a PNG looks the
+/// Bundled font, under its own name and as every generic family, so that a PNG looks the
 /// same on every machine.
 static FONTS: LazyLock<Arc<fontdb::Database>> = LazyLock::new(|| {
     let mut fonts = fontdb::Database::new();

@@ -1,5 +1,4 @@
-//! Floor plans: metres to pixels, and what every plan has on it: frame, grid, walls, poses and
-//! a scale bar.
+//! Floor plans: conversion of metres to pixels, frame, grid, walls, poses and scale bar.
 
 use super::{
     canvas::{Anchor, Layer, Px, Rect, text_width_px},
@@ -11,7 +10,7 @@ use sonard_model::{
     scene::Scene,
 };
 
-/// A region of the floor, metres.
+/// Region of the floor, metres.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bounds {
     /// Lower left corner, metres.
@@ -20,22 +19,22 @@ pub struct Bounds {
     pub max: DVec2,
 }
 
-/// What is farther from the origin than this is no place on any floor, metres; regions are reckoned with
-/// without overflow up to here.
-const FARTHEST_M: f64 = 1e100;
+/// Coordinates beyond this are ignored, metres; up to here sizes of regions do not overflow.
+const MAX_COORDINATE_M: f64 = 1e100;
 
 impl Bounds {
-    /// The smallest region around the points that are places at all; `None` without any.
+    /// Smallest region around the valid points; `None` without any.
     pub fn around(points: impl IntoIterator<Item = DVec2>) -> Option<Self> {
-        let is_place = |point: &DVec2| point.is_finite() && point.abs().max_element() < FARTHEST_M;
+        let is_valid =
+            |point: &DVec2| point.is_finite() && point.abs().max_element() < MAX_COORDINATE_M;
         points
             .into_iter()
-            .filter(is_place)
+            .filter(is_valid)
             .map(|point| Self { min: point, max: point })
             .reduce(|a, b| Self { min: a.min.min(b.min), max: a.max.max(b.max) })
     }
 
-    /// Walls and cylinders of a scene.
+    /// Bounds of the walls and cylinders of a scene.
     pub fn of_scene(scene: &Scene) -> Option<Self> {
         let ends = scene.walls.iter().flat_map(|wall| [wall.a, wall.b]);
         let discs = scene.cylinders.iter().flat_map(|cylinder| {
@@ -62,18 +61,18 @@ impl Bounds {
     }
 }
 
-/// A floor plan's place on the page.
+/// Placement of a floor plan on the page.
 #[derive(Debug, Clone, Copy)]
 pub struct Plan {
-    /// The panel, pixels.
+    /// Panel on the page, pixels.
     pub panel: Rect,
-    /// What is seen in it, metres.
+    /// Visible region, metres.
     pub view: Bounds,
     px_per_m: f64,
 }
 
 impl Plan {
-    /// Fits a region into a panel; what is left over at the sides is shown as well.
+    /// Fits a region into a panel; spare space at the sides extends the view.
     pub fn fit(region: Bounds, panel: Rect) -> Self {
         let size = region.size().max(DVec2::splat(1e-3));
         let px_per_m = (panel.width() / size.x).min(panel.height() / size.y);
@@ -82,30 +81,30 @@ impl Plan {
         Self { panel, view: Bounds { min: middle - half, max: middle + half }, px_per_m }
     }
 
-    /// Height of a panel so wide that shows the region without spare sides, within limits.
+    /// Height of a panel of this width that fits the region without spare space, within limits.
     pub fn height_for(region: &Bounds, width_px: f64, limits_px: [f64; 2]) -> f64 {
         let size = region.size().max(DVec2::splat(1e-3));
         (width_px * size.y / size.x).clamp(limits_px[0], limits_px[1]).round()
     }
 
-    /// Point of the page, px, of a point of the scene, metres.
+    /// Converts a point of the scene, metres, to the page, px.
     pub fn px(&self, at: DVec2) -> Px {
         let from_corner = (at - self.view.min) * self.px_per_m;
         Px::new(self.panel.left + from_corner.x, self.panel.bottom - from_corner.y)
     }
 
-    /// The place on the floor that a point of the page shows, metres.
+    /// Converts a point of the page, px, to the scene, metres.
     pub fn place(&self, at: Px) -> DVec2 {
         let from_corner = Px::new(at.x - self.panel.left, self.panel.bottom - at.y);
         self.view.min + from_corner / self.px_per_m
     }
 
-    /// Length on the page, px, of a length in the scene, metres.
+    /// Converts a length in the scene, metres, to the page, px.
     pub fn length_px(&self, length_m: f64) -> f64 {
         length_m * self.px_per_m
     }
 
-    /// Frame, grid and the coordinates along the left and lower side.
+    /// Draws frame, grid and the coordinates along the left and lower side.
     pub fn frame(&self) -> Layer {
         let mut layer = Layer::new("frame");
         let step = ticks::nice_step(self.panel.width() / self.px_per_m, self.panel.width() / 100.0);
@@ -122,8 +121,8 @@ impl Plan {
         for &y in &ys {
             let at = self.px(DVec2::new(0.0, y)).y;
             grid.line(Px::new(self.panel.left, at), Px::new(self.panel.right, at));
-            let beside = Px::new(self.panel.left - 5.0, at + 4.0);
-            numbers.text(beside, Anchor::End, theme::SMALL_PX, &ticks::label(y, step));
+            let left = Px::new(self.panel.left - 5.0, at + 4.0);
+            numbers.text(left, Anchor::End, theme::SMALL_PX, &ticks::label(y, step));
         }
         let mut border = Layer::new("border").stroked(theme::FRAME, 1.0);
         border.rect(self.panel, 0.0);
@@ -133,9 +132,9 @@ impl Plan {
         layer
     }
 
-    /// Walls and cylinders, their line style by material.
+    /// Draws walls and cylinders, in a line style by material.
     pub fn walls(&self, scene: &Scene) -> Layer {
-        let materials = super::materials::Materials::of(scene);
+        let materials = super::materials::Materials::from_scene(scene);
         let mut layer = Layer::new("walls")
             .stroked(theme::WALL, theme::WALL_PX)
             .with("stroke-linecap", "round");
@@ -145,7 +144,7 @@ impl Plan {
                 style.line(self.px(wall.a), self.px(wall.b));
             }
             for cylinder in scene.cylinders.iter().filter(|c| c.material == material) {
-                // A table leg must not shrink to nothing.
+                // Keep a table leg visible.
                 let radius_px = self.length_px(cylinder.radius_m).max(1.5);
                 style.circle(self.px(cylinder.center), radius_px);
             }
@@ -154,7 +153,7 @@ impl Plan {
         layer
     }
 
-    /// Room for texts in the panel, off the walls of a scene.
+    /// Label placement in the panel that avoids the walls of a scene.
     pub(crate) fn labels(&self, scene: Option<&Scene>) -> Labels {
         let mut labels = Labels::new(self.panel);
         for wall in scene.iter().flat_map(|scene| &scene.walls) {
@@ -171,7 +170,7 @@ impl Plan {
         labels
     }
 
-    /// The robot's body, if the scene has one, where it is with the ranger at `pose`.
+    /// Draws the robot's body, if the scene has one, for the ranger at `pose`.
     pub fn body(&self, scene: &Scene, pose: &Pose) -> Layer {
         let mut layer = Layer::new("robot").stroked(theme::FRAME, 1.6);
         let whole = scene.with_robot_at(pose);
@@ -184,7 +183,7 @@ impl Plan {
         layer
     }
 
-    /// Names of walls and cylinders, where there is room for them.
+    /// Draws the names of walls and cylinders where they fit.
     pub(crate) fn names(&self, scene: &Scene, labels: &mut Labels) -> Layer {
         let mut layer = Layer::new("names").with("fill", theme::QUIET).haloed();
         let middle = Bounds::of_scene(scene).map_or(DVec2::ZERO, |b| (b.min + b.max) / 2.0);
@@ -204,7 +203,7 @@ impl Plan {
                 .flat_map(|part| [1.0, -1.0].map(|side| a + part * along + 10.0 * side * outward));
             for at in places {
                 if labels.place_turned(at, turn_deg, theme::SMALL_PX, &wall.id) {
-                    // `at` is the middle of the text, its base line is a little lower.
+                    // The baseline is slightly below the middle of the text.
                     let lower = DVec2::from_angle(turn_deg.to_radians()).perp() * 4.0;
                     layer.turned_text(at + lower, turn_deg, theme::SMALL_PX, &wall.id);
                     break;
@@ -241,7 +240,7 @@ impl Plan {
         layer
     }
 
-    /// The ranger's place and heading.
+    /// Draws position and heading of the ranger.
     pub fn pose(&self, pose: &Pose) -> Layer {
         let mut layer = Layer::new("pose").stroked(theme::INK, 1.6);
         let at = self.px(pose.position());
@@ -258,7 +257,7 @@ impl Plan {
         layer
     }
 
-    /// A bar of a round length, above the panel's right end where it covers nothing.
+    /// Draws a bar of round length, above the panel's right end.
     pub fn scale_bar(&self) -> Layer {
         let length_m = ticks::nice_step(self.panel.width() / self.px_per_m, 9.0);
         let end = Px::new(self.panel.right, self.panel.top - 6.0);
@@ -274,7 +273,7 @@ impl Plan {
     }
 }
 
-/// Extends the region of the polyline that a short segment `id.N` belongs to.
+/// Extends the bounds of the polyline that a short segment `id.N` belongs to.
 fn note_group<'a>(groups: &mut Vec<(&'a str, Bounds)>, id: &'a str, a: DVec2, b: DVec2) {
     let name = id.rsplit_once('.').map_or(id, |(name, _)| name);
     match groups.iter_mut().find(|(known, _)| *known == name) {
@@ -283,10 +282,10 @@ fn note_group<'a>(groups: &mut Vec<(&'a str, Bounds)>, id: &'a str, a: DVec2, b:
     }
 }
 
-/// Turn of a text along this direction, degrees clockwise, so that it is never upside down.
+/// Rotation of a text along a direction, degrees clockwise, never upside down.
 fn upright_deg(along: Px) -> f64 {
     let turn = along.y.atan2(along.x).to_degrees();
-    // Exactly vertical walls read from below, like an axis title.
+    // Vertical text reads from below, like an axis title.
     if turn >= 89.9 {
         turn - 180.0
     } else if turn < -90.1 {
@@ -296,7 +295,7 @@ fn upright_deg(along: Px) -> f64 {
     }
 }
 
-/// The unit normal of a wall that points away from the middle of the room.
+/// Unit normal of a wall pointing away from the middle of the room.
 fn side_away_from(middle: Px, a: Px, b: Px) -> Px {
     let normal = (b - a).perp().normalize_or_zero();
     if normal.dot((a + b) / 2.0 - middle) < 0.0 { -normal } else { normal }

@@ -1,14 +1,15 @@
-//! Range against azimuth around the ranger.
+//! Polar plot of range against azimuth.
 
 use super::{
     canvas::{Anchor, Layer, Px},
-    caption, keys,
+    caption,
     labels::Labels,
-    legend,
+    legend, legend_entries,
     picture::Picture,
-    readings::{Kind, Readings},
+    readings::{PlottedScan, ReadingKind},
+    scan_caption,
     scan_strips::top_m,
-    theme, ticks, words,
+    theme, ticks,
 };
 use sonard_model::scene::Scene;
 use sonard_records::ScanView;
@@ -17,19 +18,22 @@ const RADIUS_PX: f64 = 310.0;
 const RING_PX: f64 = 3.4;
 const DOT_PX: f64 = 2.6;
 
-/// Draws scans around the ranger: the heading is up, azimuths run counter-clockwise, circles
-/// stand for ranges.
+/// Draws a polar plot of scans: the heading is up, azimuths are counter-clockwise, circles mark
+/// ranges.
 ///
-/// Silent beams are ticks on the rim, readings farther than the rim arrows. The scene only gives
-/// its name and that of the pose.
+/// Beams without a range are ticks on the rim, readings beyond the rim arrows. The scene only
+/// contributes its name and that of the pose.
 #[must_use]
 pub fn draw_polar(scans: &[ScanView], scene: Option<&Scene>) -> Picture {
-    let readings: Vec<Readings> = scans.iter().map(Readings::of).collect();
-    let (heading, top) =
-        caption::draw(&words::title(scans, scene), words::badge(scans), &words::lines(scans));
+    let readings: Vec<PlottedScan> = scans.iter().map(PlottedScan::from_scan).collect();
+    let (heading, top) = caption::draw(
+        &scan_caption::title(scans, scene),
+        scan_caption::badge(scans),
+        &scan_caption::lines(scans),
+    );
     let center = Px::new(theme::PAGE_PX / 2.0, top + 34.0 + RADIUS_PX);
     let polar = Polar { center, rim_m: top_m(&readings) };
-    let beyond = readings.iter().map(|scan| polar.beyond(scan).count()).sum();
+    let outside = readings.iter().map(|scan| polar.outside(scan).count()).sum();
 
     let mut page = Layer::new("polar");
     page.add(heading);
@@ -45,14 +49,14 @@ pub fn draw_polar(scans: &[ScanView], scene: Option<&Scene>) -> Picture {
     }
     let below = Px::new(theme::MARGIN_PX, center.y + RADIUS_PX + 40.0);
     let width = theme::PAGE_PX - 2.0 * theme::MARGIN_PX;
-    let (key, height) = legend::draw(&keys::all(&readings, None, beyond), below, width);
+    let (key, height) = legend::draw(&legend_entries::all(&readings, None, outside), below, width);
     page.add(key);
     Picture::new(theme::PAGE_PX, below.y + height + theme::MARGIN_PX / 2.0, page)
 }
 
 struct Polar {
     center: Px,
-    /// Range at the outermost circle, metres.
+    /// Range of the outermost circle, metres.
     rim_m: f64,
 }
 
@@ -94,7 +98,7 @@ impl Polar {
         layer
     }
 
-    /// Ranges of the circles, between two spokes.
+    /// Draws the ranges of the circles, between two spokes.
     fn numbers(&self) -> Layer {
         let mut layer = Layer::new("ranges").with("fill", theme::QUIET).haloed();
         let mut labels = Labels::new(super::canvas::Rect::new(
@@ -113,14 +117,14 @@ impl Polar {
         layer
     }
 
-    fn predictions(&self, scan: &Readings) -> Layer {
+    fn predictions(&self, scan: &PlottedScan) -> Layer {
         let mut layer = Layer::new("predictions");
         if let Some(range_m) = scan.min_range_m.filter(|range| *range <= self.rim_m) {
-            let mut blind = Layer::new("min-range")
+            let mut circle = Layer::new("min-range")
                 .stroked(theme::PURPLE, 1.0)
                 .with("stroke-dasharray", super::floor::MIN_RANGE_DASH);
-            blind.circle(self.center, RADIUS_PX * range_m / self.rim_m);
-            layer.add(blind);
+            circle.circle(self.center, RADIUS_PX * range_m / self.rim_m);
+            layer.add(circle);
         }
         let mut rings = Layer::new("model").stroked(theme::SKY, 1.0);
         for beam in &scan.beams {
@@ -132,10 +136,10 @@ impl Polar {
         layer
     }
 
-    fn marks(&self, scan: &Readings, opacity: f64) -> Layer {
+    fn marks(&self, scan: &PlottedScan, opacity: f64) -> Layer {
         let mut layer = Layer::new("readings").with("fill-opacity", opacity);
-        for kind in Kind::HEARD {
-            let mut marks = Layer::new(kind.words()).with("fill", kind.colour());
+        for kind in ReadingKind::WITH_RANGE {
+            let mut marks = Layer::new(kind.label()).with("fill", kind.colour());
             for beam in scan.beams.iter().filter(|beam| beam.kind == kind) {
                 if let Some(range_m) = beam.range_m.filter(|range| *range <= self.rim_m) {
                     let at = self.at(beam.azimuth_deg, range_m);
@@ -147,11 +151,11 @@ impl Polar {
         layer
     }
 
-    /// Ticks for silent beams, arrows for readings beyond the outermost circle.
-    fn rim(&self, scan: &Readings) -> Layer {
+    /// Draws ticks for beams without a range, arrows for readings beyond the outermost circle.
+    fn rim(&self, scan: &PlottedScan) -> Layer {
         let mut layer = Layer::new("rim");
-        for kind in Kind::UNHEARD {
-            let mut ticks = Layer::new(kind.words()).stroked(kind.colour(), 1.3);
+        for kind in ReadingKind::WITHOUT_RANGE {
+            let mut ticks = Layer::new(kind.label()).stroked(kind.colour(), 1.3);
             let beams = scan.beams.iter().filter(|beam| beam.kind == kind);
             ticks.runs(beams.map(|beam| {
                 let at = self.at(beam.azimuth_deg, self.rim_m);
@@ -159,7 +163,7 @@ impl Polar {
             }));
             layer.add(ticks);
         }
-        for (azimuth_deg, kind) in self.beyond(scan) {
+        for (azimuth_deg, kind) in self.outside(scan) {
             let nose = self.at(azimuth_deg, self.rim_m);
             let tail = nose - 9.0 * outward(azimuth_deg);
             let side = 3.5 * outward(azimuth_deg).perp();
@@ -170,13 +174,18 @@ impl Polar {
         layer
     }
 
-    fn beyond<'a>(&'a self, scan: &'a Readings) -> impl Iterator<Item = (f64, Kind)> + 'a {
-        let far = |beam: &&super::readings::Reading| beam.range_m.is_some_and(|r| r > self.rim_m);
+    fn outside<'a>(
+        &'a self,
+        scan: &'a PlottedScan,
+    ) -> impl Iterator<Item = (f64, ReadingKind)> + 'a {
+        let far = |beam: &&super::readings::PlottedBeam| {
+            beam.range_m.is_some_and(|range_m| range_m > self.rim_m)
+        };
         scan.beams.iter().filter(far).map(|beam| (beam.azimuth_deg, beam.kind))
     }
 }
 
-/// Unit vector on the page: up is azimuth 0, counter-clockwise is positive.
+/// Unit vector on the page for an azimuth: up is 0, counter-clockwise is positive.
 fn outward(azimuth_deg: f64) -> Px {
     let (sin, cos) = azimuth_deg.to_radians().sin_cos();
     Px::new(-sin, -cos)

@@ -1,8 +1,7 @@
-//! Readings as they are drawn: what each one is, whatever kind of log it came from. Where a
-//! prediction stands beside a reading, [`sonard_interpret::compare`] says what explains it, so that pictures
-//! and tables agree.
+//! PlottedScan prepared for drawing, from any kind of log. PlottedScan with a prediction are
+//! classified by [`sonard_interpret::compare`], so that pictures and tables agree.
 
-use super::{canvas::Shape, fans::Fan, theme};
+use super::{canvas::Shape, fans::FanStyle, theme};
 use sonard_interpret::compare::{Judged, Verdict, compare};
 use sonard_model::{
     acoustics::BeamPattern,
@@ -11,35 +10,35 @@ use sonard_model::{
 };
 use sonard_records::{PathKind, PathRecord, Ping, PingStatus, ScanView, Session};
 
-/// What a beam gave, as far as the model explains it.
+/// ReadingKind of a reading by its outcome and classification.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub(super) enum Kind {
-    /// An echo with no model beside it.
+pub(super) enum ReadingKind {
+    /// Echo without a prediction.
     Echo,
-    /// One mirror reflection.
+    /// Echo with at most one reflection.
     Direct,
-    /// Two or more.
+    /// Echo with two or more reflections.
     Multiple,
-    /// Bent at an edge.
+    /// Echo diffracted at an edge.
     Edge,
-    /// Sound was there when the receiver opened.
+    /// Target below the minimum range.
     MinRange,
-    /// Heard, but not by the model at this range.
+    /// Echo that disagrees with the model.
     Unexplained,
     /// No echo.
-    Silent,
-    /// No echo although the model gives one.
-    SilentUnexplained,
-    /// No reading, or none to be relied on.
-    Lost,
+    NoEcho,
+    /// No echo although the model predicts one.
+    MissedEcho,
+    /// Missing or invalid reading.
+    Invalid,
 }
 
-impl Kind {
-    /// Kinds that have a place on the floor plan.
-    pub(super) const HEARD: [Self; 6] =
+impl ReadingKind {
+    /// Kinds with a position on the floor plan.
+    pub(super) const WITH_RANGE: [Self; 6] =
         [Self::Echo, Self::Direct, Self::Multiple, Self::Edge, Self::MinRange, Self::Unexplained];
-    /// Kinds that have a direction only.
-    pub(super) const UNHEARD: [Self; 3] = [Self::Silent, Self::SilentUnexplained, Self::Lost];
+    /// Kinds with a direction only.
+    pub(super) const WITHOUT_RANGE: [Self; 3] = [Self::NoEcho, Self::MissedEcho, Self::Invalid];
 
     pub(super) const fn colour(self) -> &'static str {
         match self {
@@ -47,9 +46,9 @@ impl Kind {
             Self::Multiple => theme::VERMILLION,
             Self::Edge => theme::GREEN,
             Self::MinRange => theme::PURPLE,
-            Self::Unexplained | Self::SilentUnexplained => theme::INK,
-            Self::Silent => theme::SILENT,
-            Self::Lost => theme::ORANGE,
+            Self::Unexplained | Self::MissedEcho => theme::INK,
+            Self::NoEcho => theme::NO_ECHO,
+            Self::Invalid => theme::ORANGE,
         }
     }
 
@@ -63,56 +62,56 @@ impl Kind {
         }
     }
 
-    pub(super) const fn words(self) -> &'static str {
+    pub(super) const fn label(self) -> &'static str {
         match self {
             Self::Echo => "echo",
             Self::Direct => "direct echo",
             Self::Multiple => "multiple reflection",
             Self::Edge => "edge",
             Self::MinRange => "minimum range",
-            Self::Unexplained => "unexplained",
-            Self::Silent => "silent",
-            Self::SilentUnexplained => "silent, model hears",
-            Self::Lost => "no valid reading",
+            Self::Unexplained => "disagrees with model",
+            Self::NoEcho => "no echo",
+            Self::MissedEcho => "missed echo",
+            Self::Invalid => "invalid reading",
         }
     }
 }
 
-/// One beam.
+/// Beam prepared for drawing.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Reading {
+pub(super) struct PlottedBeam {
     /// Azimuth from the scan's heading, degrees.
     pub(super) azimuth_deg: f64,
-    /// Where it was taken from, if not all of the scan are from its pose.
+    /// Position and direction of the transducer, unless all beams start at the scan's pose.
     pub(super) viewpoint: Option<Viewpoint>,
-    /// Its name.
+    /// Name of the ranger.
     pub(super) ranger: Option<String>,
-    pub(super) kind: Kind,
-    /// Finite, not negative, and there exactly for the kinds that were heard.
+    pub(super) kind: ReadingKind,
+    /// Range, metres: finite, not negative, and present exactly for kinds with a range.
     pub(super) range_m: Option<f64>,
-    /// The prediction beside a measured reading, if it is a range.
+    /// Predicted range of a measured reading, metres.
     pub(super) model_range_m: Option<f64>,
     pub(super) residual_m: Option<f64>,
-    /// Amplitude above the threshold, decibels, of a reading that the model made.
+    /// Level above the threshold, decibels, of a simulated reading.
     pub(super) margin_db: Option<f64>,
-    /// The reading in words.
+    /// Tooltip.
     pub(super) hint: String,
 }
 
-/// The beams of a scan with what is common to them.
+/// Beams of a scan with their common properties.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Readings {
-    pub(super) beams: Vec<Reading>,
-    /// Range of the end of blanking, metres.
+pub(super) struct PlottedScan {
+    pub(super) beams: Vec<PlottedBeam>,
+    /// Range at the end of blanking, metres.
     pub(super) min_range_m: Option<f64>,
-    /// Whether predictions stand beside the readings.
+    /// Whether the readings have predictions.
     pub(super) has_model: bool,
-    /// How to draw readings of an array.
-    pub(super) fan: Option<Fan>,
+    /// Drawing style for an array.
+    pub(super) fan: Option<FanStyle>,
 }
 
-impl Reading {
-    /// The place at a range along the beam, for a scan at `pose`.
+impl PlottedBeam {
+    /// World position at a range along the beam, for a scan at `pose`.
     pub(super) fn point(&self, pose: &Pose, range_m: f64) -> DVec2 {
         match &self.viewpoint {
             Some(viewpoint) => viewpoint.point_at(range_m),
@@ -120,7 +119,7 @@ impl Reading {
         }
     }
 
-    /// Where the beam begins, and the world direction that it has, radians.
+    /// Origin of the beam, metres, and its world direction, radians.
     pub(super) fn ray(&self, pose: &Pose) -> (DVec2, f64) {
         match &self.viewpoint {
             Some(viewpoint) => (viewpoint.position(), viewpoint.direction_rad()),
@@ -129,25 +128,25 @@ impl Reading {
     }
 }
 
-impl Readings {
-    /// Every beam with a direction, by azimuth; of a beam logged twice the reading that counts.
-    pub(super) fn of(view: &ScanView) -> Self {
+impl PlottedScan {
+    /// Beams with a valid direction, by azimuth; of a beam logged twice the decisive reading.
+    pub(super) fn from_scan(view: &ScanView) -> Self {
         let min_range_m = view.session.as_deref().and_then(min_range_m);
-        let (_, judged) = compare(std::slice::from_ref(view));
+        let (_, classified) = compare(std::slice::from_ref(view));
         let has_one_place = view.has_one_place();
-        let seen = |judged: &Judged<'_>| {
-            let reading = reading(judged, min_range_m);
-            if has_one_place { reading } else { mounted(view, judged.ping, reading) }
+        let plotted = |classified: &Judged<'_>| {
+            let reading = reading(classified, min_range_m);
+            if has_one_place { reading } else { mounted(view, classified.ping, reading) }
         };
-        let finite = judged.iter().filter(|judged| judged.ping.azimuth_deg.is_finite());
-        let mut beams: Vec<_> = finite.map(seen).collect();
+        let finite = classified.iter().filter(|beam| beam.ping.azimuth_deg.is_finite());
+        let mut beams: Vec<_> = finite.map(plotted).collect();
         beams.sort_by(|a, b| a.azimuth_deg.total_cmp(&b.azimuth_deg));
         let has_model = view.pings.iter().any(|ping| ping.sim.is_some());
         let fan = view.session.as_deref().and_then(fan);
         Self { beams, min_range_m, has_model, fan }
     }
 
-    /// The beams of several scans as one.
+    /// Merges the beams of several scans.
     pub(super) fn merged<'a>(scans: impl IntoIterator<Item = &'a Self>) -> Self {
         let mut all = Self { beams: Vec::new(), min_range_m: None, has_model: false, fan: None };
         for scan in scans {
@@ -160,17 +159,17 @@ impl Readings {
         all
     }
 
-    pub(super) fn count(&self, kind: Kind) -> usize {
+    pub(super) fn count(&self, kind: ReadingKind) -> usize {
         self.beams.iter().filter(|beam| beam.kind == kind).count()
     }
 
-    /// Residuals that exist, with their azimuths.
+    /// Azimuths and residuals of the beams that have both ranges.
     pub(super) fn residuals(&self) -> impl Iterator<Item = (f64, f64)> {
         self.beams.iter().filter_map(|beam| beam.residual_m.map(|r| (beam.azimuth_deg, r)))
     }
 }
 
-/// Range at which the receiver opens; the model's setting goes before the sensor's.
+/// Range at the end of blanking; the model's setting overrides the sensor's.
 fn min_range_m(session: &Session) -> Option<f64> {
     let settings = session.model.as_ref().map(|model| &model.settings);
     let blanking_us = settings
@@ -179,8 +178,8 @@ fn min_range_m(session: &Session) -> Option<f64> {
     length(Some(session.air.sound_speed_m_s * blanking_us * 1e-6 / 2.0))
 }
 
-/// The beam's width and reach, for the session of an array.
-fn fan(session: &Session) -> Option<Fan> {
+/// Drawing style for the session of an array: beam width and maximum range.
+fn fan(session: &Session) -> Option<FanStyle> {
     session.array.as_ref()?;
     let (sensor, air) = (&session.sensor, &session.air);
     sensor.check().ok()?;
@@ -188,11 +187,11 @@ fn fan(session: &Session) -> Option<Fan> {
     let settings = session.model.as_ref().map(|model| &model.settings);
     let modelled_m = settings.and_then(|settings| settings.get("max_range_m")?.as_f64());
     let max_range_m = length(modelled_m).unwrap_or(sensor.max_range_m);
-    Some(Fan { half_rad: BeamPattern::new(sensor, speed_m_s).angle_at(0.5), max_range_m })
+    Some(FanStyle { half_rad: BeamPattern::new(sensor, speed_m_s).angle_at(0.5), max_range_m })
 }
 
-/// A reading of a scan with several places, with its viewpoint, and its azimuth as seen from the scan's pose.
-fn mounted(view: &ScanView, ping: &Ping, reading: Reading) -> Reading {
+/// PlottedBeam with its viewpoint, and its azimuth relative to the scan's pose.
+fn mounted(view: &ScanView, ping: &Ping, reading: PlottedBeam) -> PlottedBeam {
     let viewpoint = view.viewpoint(ping).filter(|viewpoint| {
         viewpoint.position().is_finite() && viewpoint.direction_deg.is_finite()
     });
@@ -202,11 +201,11 @@ fn mounted(view: &ScanView, ping: &Ping, reading: Reading) -> Reading {
         }
         _ => reading.azimuth_deg,
     };
-    Reading { azimuth_deg, viewpoint, ranger: ping.ranger.clone(), ..reading }
+    PlottedBeam { azimuth_deg, viewpoint, ranger: ping.ranger.clone(), ..reading }
 }
 
-fn reading(judged: &Judged<'_>, min_range_m: Option<f64>) -> Reading {
-    let ping = judged.ping;
+fn reading(classified: &Judged<'_>, min_range_m: Option<f64>) -> PlottedBeam {
+    let ping = classified.ping;
     let or_min_range = |status: PingStatus, range_m: Option<f64>| match status {
         PingStatus::Echo => length(range_m),
         PingStatus::MinRange => length(range_m).or(min_range_m),
@@ -215,48 +214,48 @@ fn reading(judged: &Judged<'_>, min_range_m: Option<f64>) -> Reading {
     let range_m = or_min_range(ping.status, ping.range_m);
     let model_range_m = ping.sim.as_ref().and_then(|sim| or_min_range(sim.status, sim.range_m));
     let kind = match range_m {
-        Some(_) => heard_kind(judged),
-        None => unheard_kind(judged),
+        Some(_) => kind_with_range(classified),
+        None => kind_without_range(classified),
     };
-    Reading {
+    PlottedBeam {
         azimuth_deg: ping.azimuth_deg,
         viewpoint: None,
         ranger: None,
         kind,
         range_m,
         model_range_m,
-        residual_m: judged.residual_m.filter(|_| range_m.is_some() && model_range_m.is_some()),
+        residual_m: classified.residual_m.filter(|_| range_m.is_some() && model_range_m.is_some()),
         margin_db: ping.margin_db.filter(|margin| margin.is_finite()),
         hint: hint(ping, kind, range_m, model_range_m),
     }
 }
 
-fn heard_kind(judged: &Judged<'_>) -> Kind {
-    match (judged.verdict, judged.ping.status) {
-        (Ok(Verdict::Direct), _) => Kind::Direct,
-        (Ok(Verdict::Multiple), _) => Kind::Multiple,
-        (Ok(Verdict::Edge), _) => Kind::Edge,
-        (Ok(Verdict::MinRange), _) | (Err(_), PingStatus::MinRange) => Kind::MinRange,
-        (Ok(Verdict::Unexplained | Verdict::Silent), _) => Kind::Unexplained,
-        // Nothing to compare with: what the model itself made has its path.
-        (Err(_), _) => judged.ping.path.as_ref().map_or(Kind::Echo, path_kind),
+fn kind_with_range(classified: &Judged<'_>) -> ReadingKind {
+    match (classified.verdict, classified.ping.status) {
+        (Ok(Verdict::Direct), _) => ReadingKind::Direct,
+        (Ok(Verdict::Multiple), _) => ReadingKind::Multiple,
+        (Ok(Verdict::Edge), _) => ReadingKind::Edge,
+        (Ok(Verdict::MinRange), _) | (Err(_), PingStatus::MinRange) => ReadingKind::MinRange,
+        (Ok(Verdict::Unexplained | Verdict::Silent), _) => ReadingKind::Unexplained,
+        // Without a comparison, a simulated reading still has its path.
+        (Err(_), _) => classified.ping.path.as_ref().map_or(ReadingKind::Echo, path_kind),
     }
 }
 
-fn unheard_kind(judged: &Judged<'_>) -> Kind {
-    match (judged.ping.status, judged.verdict) {
-        (PingStatus::NoEcho, Ok(Verdict::Unexplained)) => Kind::SilentUnexplained,
-        (PingStatus::NoEcho, _) => Kind::Silent,
-        // A range that is missing, or no reading at all.
-        _ => Kind::Lost,
+fn kind_without_range(classified: &Judged<'_>) -> ReadingKind {
+    match (classified.ping.status, classified.verdict) {
+        (PingStatus::NoEcho, Ok(Verdict::Unexplained)) => ReadingKind::MissedEcho,
+        (PingStatus::NoEcho, _) => ReadingKind::NoEcho,
+        // Missing range, or no reading at all.
+        _ => ReadingKind::Invalid,
     }
 }
 
-fn path_kind(path: &PathRecord) -> Kind {
+fn path_kind(path: &PathRecord) -> ReadingKind {
     match (path.kind, path.order) {
-        (PathKind::Diffracted, _) => Kind::Edge,
-        (PathKind::Specular | PathKind::Scattered, 0 | 1) => Kind::Direct,
-        (PathKind::Specular | PathKind::Scattered, _) => Kind::Multiple,
+        (PathKind::Diffracted, _) => ReadingKind::Edge,
+        (PathKind::Specular | PathKind::Scattered, 0 | 1) => ReadingKind::Direct,
+        (PathKind::Specular | PathKind::Scattered, _) => ReadingKind::Multiple,
     }
 }
 
@@ -264,17 +263,17 @@ fn length(range_m: Option<f64>) -> Option<f64> {
     range_m.filter(|range| range.is_finite() && *range >= 0.0)
 }
 
-fn hint(ping: &Ping, kind: Kind, range_m: Option<f64>, model_m: Option<f64>) -> String {
+fn hint(ping: &Ping, kind: ReadingKind, range_m: Option<f64>, model_m: Option<f64>) -> String {
     let ranger = ping.ranger.as_ref().map(|id| format!("{id}, ")).unwrap_or_default();
-    let mut words = format!("{ranger}{:.1}\u{b0} {}", ping.azimuth_deg, kind.words());
+    let mut text = format!("{ranger}{:.1}\u{b0} {}", ping.azimuth_deg, kind.label());
     if let Some(range) = range_m {
-        words += &format!(" {range:.3} m");
+        text += &format!(" {range:.3} m");
     }
     if let Some(model) = model_m {
-        words += &format!(", model {model:.3} m");
+        text += &format!(", predicted {model:.3} m");
     }
     if let Some(path) = ping.sound_path().filter(|path| !path.interactions.is_empty()) {
-        words += &format!(" by {}", path.in_words());
+        text += &format!(" via {}", path.in_words());
     }
-    words
+    text
 }

@@ -1,23 +1,23 @@
-//! How much of the floor a scan's plan shows.
+//! Region of the floor shown on a scan's plan.
 
-use super::{plan::Bounds, readings::Readings};
+use super::{plan::Bounds, readings::PlottedScan};
 use sonard_model::{
     geometry::{DVec2, Pose},
     scene::Scene,
 };
 
-/// How far the view may reach past the walls on each side, as a share of the room's size in that
-/// direction: the room's mirror image behind each wall still fits, and with it false walls such
+/// Maximum extension of the view past the walls on each side, relative to the room's size in that
+/// direction: the mirror image behind each wall still fits, and with it false walls such
 /// as in Dudek and others, figure 9.
 const MARGIN: f64 = 1.05;
-/// The same as a share of the longer side, for rooms that are long or a single wall.
-const LEAST_MARGIN: f64 = 0.3;
-/// Share of the readings that may be left beyond the view to keep the room large.
-const LEFT_OUT: f64 = 0.01;
+/// Minimum of that limit relative to the longer side, for long rooms or a single wall.
+const MIN_MARGIN: f64 = 0.3;
+/// Fraction of the readings that may remain outside the view to keep the room large.
+const OUTSIDE_FRACTION: f64 = 0.01;
 
-/// The region to show: the room and what readings are not too far outside it, or without a
-/// scene the bulk of the readings.
-pub(super) fn region(scans: &[(Pose, &Readings)], scene: Option<&Scene>) -> Bounds {
+/// Region to show: the room with the readings not too far outside it, or without a scene the bulk
+/// of the readings.
+pub(super) fn region(scans: &[(Pose, &PlottedScan)], scene: Option<&Scene>) -> Bounds {
     let points: Vec<DVec2> = scans.iter().flat_map(|(pose, scan)| points(pose, scan)).collect();
     let poses = || scans.iter().map(|(pose, _)| pose.position());
     let walls = scene.and_then(Bounds::of_scene);
@@ -35,8 +35,8 @@ pub(super) fn region(scans: &[(Pose, &Readings)], scene: Option<&Scene>) -> Boun
     region.grown(if size > 0.0 { 0.06 * size } else { 0.5 })
 }
 
-/// Places of readings and predictions.
-fn points<'a>(pose: &'a Pose, scan: &'a Readings) -> impl Iterator<Item = DVec2> + 'a {
+/// World positions of readings and predictions.
+fn points<'a>(pose: &'a Pose, scan: &'a PlottedScan) -> impl Iterator<Item = DVec2> + 'a {
     scan.beams
         .iter()
         .flat_map(|beam| {
@@ -48,17 +48,17 @@ fn points<'a>(pose: &'a Pose, scan: &'a Readings) -> impl Iterator<Item = DVec2>
         .filter(|point| point.is_finite())
 }
 
-/// A pose far outside its room is a mistake that must not shrink the room to a dot.
+/// Returns `false` for a pose so far outside its room that it would shrink the room to a dot.
 fn near(walls: &Bounds, at: DVec2) -> bool {
     let grown = walls.grown(walls.size().max_element());
     at.cmpge(grown.min).all() && at.cmple(grown.max).all()
 }
 
-/// Moves each side out to the readings beyond it, but for the last few and the far ones.
+/// Extends each side to the readings beyond it, except for a few and for distant ones.
 fn reach_out(room: Bounds, points: &[DVec2]) -> Bounds {
     let size = room.size();
-    let limit = (MARGIN * size).max(DVec2::splat(LEAST_MARGIN * size.max_element()));
-    let spare = (LEFT_OUT * points.len() as f64).ceil() as usize;
+    let limit = (MARGIN * size).max(DVec2::splat(MIN_MARGIN * size.max_element()));
+    let spare = (OUTSIDE_FRACTION * points.len() as f64).ceil() as usize;
     let side = |limit: f64, excess: &dyn Fn(&DVec2) -> f64| {
         let mut beyond: Vec<f64> =
             points.iter().map(excess).filter(|by| (0.0..=limit).contains(by)).collect();
@@ -72,11 +72,11 @@ fn reach_out(room: Bounds, points: &[DVec2]) -> Bounds {
     }
 }
 
-/// The readings within one and a half times the distance that nine in ten keep.
+/// Bounds of the readings within 1.5 times the 90th percentile of the distance.
 fn bulk(poses: Bounds, points: &[DVec2]) -> Bounds {
     let middle = (poses.min + poses.max) / 2.0;
     let mut distances: Vec<f64> = points.iter().map(|p| p.distance(middle)).collect();
     distances.sort_by(f64::total_cmp);
-    let Some(most) = distances.get(distances.len() * 9 / 10) else { return poses };
-    poses.including(points.iter().copied().filter(|p| p.distance(middle) <= 1.5 * most))
+    let Some(p90) = distances.get(distances.len() * 9 / 10) else { return poses };
+    poses.including(points.iter().copied().filter(|p| p.distance(middle) <= 1.5 * p90))
 }

@@ -1,64 +1,66 @@
-//! The main picture: a scan on the floor plan, with strips of range and residual.
+//! Main picture: a scan on the floor plan, with strips of range and residual.
 
 use super::{
     canvas::{Layer, Px, Rect},
     caption,
     floor::Floor,
-    keys, legend,
+    legend, legend_entries,
     picture::Picture,
     plan::Plan,
-    readings::Readings,
-    region, scan_strips,
+    readings::PlottedScan,
+    region, scan_caption, scan_strips,
     strip::AzimuthAxis,
-    theme, words,
+    theme,
 };
 use sonard_model::{geometry::Pose, scene::Scene};
 use sonard_records::ScanView;
 
-/// Draws a scan: on the left the floor plan with measured readings as marks (their shape and
-/// colour say what made them), predictions as rays ending in rings, silent beams as ticks on
-/// the border and readings beyond the view as arrows; on the right range and residual against
+/// Draws a scan. On the left is the floor plan: measured readings as marks whose shape and colour
+/// indicate their kind, predictions as rays ending in rings, beams without a range as ticks on the
+/// border and readings outside the view as arrows. On the right are range and residual against
 /// azimuth.
 ///
-/// Without predictions in the log there is no residual; a simulated log's own readings are the
-/// marks, with their margin above the threshold in the residual's place. Without a scene there
-/// are no walls.
+/// A simulated log has no residual: its own readings are the marks, with the level above the
+/// threshold in place of the residual. Without a scene there are no walls.
 #[must_use]
 pub fn draw_scan(scan: &ScanView, scene: Option<&Scene>) -> Picture {
     draw_scans(std::slice::from_ref(scan), scene)
 }
 
-/// Draws several scans over each other, so that it shows how well they repeat; caption and
+/// Draws several scans over each other to show their repeatability; caption and
 /// predictions are those of the first at each pose.
 #[must_use]
 pub fn draw_scans(scans: &[ScanView], scene: Option<&Scene>) -> Picture {
-    let readings: Vec<Readings> = scans.iter().map(Readings::of).collect();
-    let placed: Vec<(Pose, &Readings)> = scans
+    let readings: Vec<PlottedScan> = scans.iter().map(PlottedScan::from_scan).collect();
+    let placed: Vec<(Pose, &PlottedScan)> = scans
         .iter()
         .zip(&readings)
-        .filter_map(|(view, r)| Some((words::pose_of(view)?, r)))
+        .filter_map(|(view, r)| Some((scan_caption::pose_of(view)?, r)))
         .collect();
-    let title = words::title(scans, scene);
-    let (heading, top) = caption::draw(&title, words::badge(scans), &words::lines(scans));
+    let title = scan_caption::title(scans, scene);
+    let (heading, top) =
+        caption::draw(&title, scan_caption::badge(scans), &scan_caption::lines(scans));
 
     let region = region::region(&placed, scene);
     let layout = Layout::choose(&region, top + 22.0);
     let plan = Plan::fit(region, layout.plan);
-    let azimuths = AzimuthAxis::of(scans.first().and_then(|s| Some(&s.start.as_ref()?.plan)));
+    let azimuths =
+        AzimuthAxis::from_plan(scans.first().and_then(|s| Some(&s.start.as_ref()?.plan)));
 
     let mut page = Layer::new("scan");
     page.add(heading);
-    let (floor, beyond) = floor_plan(&plan, &placed, scene);
+    let (floor, outside) = floor_plan(&plan, &placed, scene);
     page.add(floor);
-    page.add(strips_beside(&layout.strips, azimuths, &readings));
+    page.add(strips(&layout.strips, azimuths, &readings));
     let below = Px::new(theme::MARGIN_PX, layout.bottom + 10.0);
     let width = theme::PAGE_PX - 2.0 * theme::MARGIN_PX;
-    let (entries, height) = legend::draw(&keys::all(&readings, scene, beyond), below, width);
+    let entries = legend_entries::all(&readings, scene, outside);
+    let (entries, height) = legend::draw(&entries, below, width);
     page.add(entries);
     Picture::new(theme::PAGE_PX, below.y + height + theme::MARGIN_PX / 2.0, page)
 }
 
-/// Where the panels are.
+/// Panels of the picture.
 struct Layout {
     plan: Rect,
     strips: [Rect; 2],
@@ -66,13 +68,17 @@ struct Layout {
 }
 
 impl Layout {
-    /// Strips beside the plan, or under it when the plan is long.
+    /// Strips to the right of the plan, or below it if the plan is long.
     fn choose(region: &super::plan::Bounds, top: f64) -> Self {
         let size = region.size();
-        if size.x > 2.0 * size.y { Self::stacked(region, top) } else { Self::beside(region, top) }
+        if size.x > 2.0 * size.y {
+            Self::stacked(region, top)
+        } else {
+            Self::in_columns(region, top)
+        }
     }
 
-    fn beside(region: &super::plan::Bounds, top: f64) -> Self {
+    fn in_columns(region: &super::plan::Bounds, top: f64) -> Self {
         let left = theme::MARGIN_PX + 36.0;
         let plan_width = 540.0;
         let height = Plan::height_for(region, plan_width, [430.0, 640.0]);
@@ -101,23 +107,23 @@ impl Layout {
     }
 }
 
-/// What was read at one pose.
+/// Scans from one pose.
 struct PosedScans<'a> {
     pose: Pose,
-    /// The scan whose predictions are shown.
-    first: &'a Readings,
-    /// The beams of all scans here.
-    all: Readings,
+    /// Scan whose predictions are shown.
+    first: &'a PlottedScan,
+    /// Beams of all scans from the pose.
+    all: PlottedScan,
 }
 
 impl<'a> PosedScans<'a> {
-    /// The scans by pose, in the order of the log.
-    fn gather(scans: &[(Pose, &'a Readings)]) -> Vec<Self> {
+    /// Groups scans by pose, in the order of the log.
+    fn gather(scans: &[(Pose, &'a PlottedScan)]) -> Vec<Self> {
         let mut by_pose: Vec<Self> = Vec::new();
         for &(pose, first) in scans {
             if by_pose.iter().all(|at_pose| at_pose.pose != pose) {
                 let here = scans.iter().filter(|(other, _)| *other == pose);
-                let all = Readings::merged(here.map(|(_, scan)| *scan));
+                let all = PlottedScan::merged(here.map(|(_, scan)| *scan));
                 by_pose.push(Self { pose, first, all });
             }
         }
@@ -133,8 +139,12 @@ impl<'a> PosedScans<'a> {
     }
 }
 
-/// The floor plan, and how many readings lie beyond it.
-fn floor_plan(plan: &Plan, scans: &[(Pose, &Readings)], scene: Option<&Scene>) -> (Layer, usize) {
+/// Floor plan, and the number of readings outside it.
+fn floor_plan(
+    plan: &Plan,
+    scans: &[(Pose, &PlottedScan)],
+    scene: Option<&Scene>,
+) -> (Layer, usize) {
     let by_pose = PosedScans::gather(scans);
     let mut inside = Layer::new("inside").clipped("plan-window", plan.panel);
     inside.extend(by_pose.iter().map(|at_pose| at_pose.predicted(plan).model()));
@@ -152,15 +162,15 @@ fn floor_plan(plan: &Plan, scans: &[(Pose, &Readings)], scene: Option<&Scene>) -
     layer.add(plan.frame());
     layer.add(inside);
     for floor in by_pose.iter().map(|at_pose| at_pose.measured(plan)) {
-        layer.add(floor.silent_ticks());
-        layer.add(floor.beyond(&mut labels));
+        layer.add(floor.border_ticks());
+        layer.add(floor.outside(&mut labels));
     }
     layer.extend(scene.map(|scene| plan.names(scene, &mut labels)));
     layer.add(plan.scale_bar());
-    (layer, by_pose.iter().map(|at_pose| at_pose.measured(plan).count_beyond()).sum())
+    (layer, by_pose.iter().map(|at_pose| at_pose.measured(plan).count_outside()).sum())
 }
 
-fn strips_beside(panels: &[Rect; 2], azimuths: AzimuthAxis, scans: &[Readings]) -> Layer {
+fn strips(panels: &[Rect; 2], azimuths: AzimuthAxis, scans: &[PlottedScan]) -> Layer {
     let mut layer = Layer::new("strips");
     let has_residuals = scans.iter().any(|scan| scan.residuals().next().is_some());
     let has_margins =

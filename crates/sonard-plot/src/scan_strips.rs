@@ -1,23 +1,29 @@
-//! The strips beside a scan: range, residual, margin.
+//! Strips of a scan: range, residual, and level above threshold.
 
 use super::{
     canvas::{Layer, Rect},
-    readings::{Kind, Reading, Readings},
-    strip::{AzimuthAxis, Scale, Strip},
+    readings::{PlottedBeam, PlottedScan, ReadingKind},
+    strip::{AzimuthAxis, AzimuthStrip, Scale},
     theme,
 };
 
 const MARK_PX: f64 = 2.1;
-/// Residuals up to this are on the linear part of the scale: the band in which a measured and
-/// a predicted reading always count as the same, millimetres.
+/// Linear part of the residual scale: the band in which a measured and a predicted range always
+/// agree, millimetres.
 const RESIDUAL_LINEAR_MM: f64 = 10.0;
 
-/// No residual scale is finer than this to either side, millimetres.
-const LEAST_SCALE_MM: f64 = 1.0;
+/// Minimum half range of the residual scale, millimetres.
+const MIN_SCALE_MM: f64 = 1.0;
 
-/// Range against azimuth: measured marks over the model's line.
-pub(super) fn range(panel: Rect, azimuths: AzimuthAxis, scans: &[Readings], last: bool) -> Layer {
-    let strip = Strip { panel, azimuths, scale: Scale::Linear { min: 0.0, max: top_m(scans) } };
+/// Range against azimuth: measured marks over the predicted line.
+pub(super) fn range(
+    panel: Rect,
+    azimuths: AzimuthAxis,
+    scans: &[PlottedScan],
+    last: bool,
+) -> Layer {
+    let scale = Scale::Linear { min: 0.0, max: top_m(scans) };
+    let strip = AzimuthStrip { panel, azimuths, scale };
     let mut layer = Layer::new("range-strip");
     layer.add(strip.frame("range, m", last));
     for scan in scans.iter().filter(|scan| scan.has_model) {
@@ -34,17 +40,17 @@ pub(super) fn range(panel: Rect, azimuths: AzimuthAxis, scans: &[Readings], last
 pub(super) fn residual(
     panel: Rect,
     azimuths: AzimuthAxis,
-    scans: &[Readings],
+    scans: &[PlottedScan],
     last: bool,
 ) -> Layer {
-    let strip = Strip { panel, azimuths, scale: residual_scale(scans) };
+    let strip = AzimuthStrip { panel, azimuths, scale: residual_scale(scans) };
     let mut layer = Layer::new("residual-strip");
-    // On the linear scale everything would lie in the band.
+    // A linear scale lies within the band entirely.
     let title = match strip.scale {
-        Scale::Linear { .. } => "measured \u{2212} model, mm",
+        Scale::Linear { .. } => "measured \u{2212} predicted, mm",
         Scale::SymLog { .. } => {
             layer.add(strip.band(-RESIDUAL_LINEAR_MM, RESIDUAL_LINEAR_MM));
-            "measured \u{2212} model, mm (logarithmic beyond \u{b1}10)"
+            "measured \u{2212} predicted, mm (logarithmic beyond \u{b1}10)"
         }
     };
     layer.add(strip.frame(title, last));
@@ -52,46 +58,55 @@ pub(super) fn residual(
     layer
 }
 
-/// Linear where every residual is within 10 mm; else logarithmic beyond that, wide enough for every
-/// residual up to 10 m; beyond there is an arrow.
-pub(super) fn residual_scale(scans: &[Readings]) -> Scale {
+/// Linear if every residual is within 10 mm; otherwise logarithmic beyond that, up to 10 m, with
+/// arrows for larger residuals.
+pub(super) fn residual_scale(scans: &[PlottedScan]) -> Scale {
     let largest_mm = scans
         .iter()
-        .flat_map(Readings::residuals)
+        .flat_map(PlottedScan::residuals)
         .map(|(_, residual_m)| 1e3 * residual_m.abs())
         .fold(0.0, f64::max);
     if largest_mm <= RESIDUAL_LINEAR_MM {
-        let max = (1.15 * largest_mm).max(LEAST_SCALE_MM);
+        let max = (1.15 * largest_mm).max(MIN_SCALE_MM);
         return Scale::Linear { min: -max, max };
     }
     let decades = (1.2 * largest_mm / RESIDUAL_LINEAR_MM).log10().clamp(1.0, 3.0);
     Scale::SymLog { threshold: RESIDUAL_LINEAR_MM, decades }
 }
 
-/// Amplitude above the threshold against azimuth, of readings that the model made.
-pub(super) fn margin(panel: Rect, azimuths: AzimuthAxis, scans: &[Readings], last: bool) -> Layer {
+/// Level above threshold against azimuth, of simulated readings.
+pub(super) fn margin(
+    panel: Rect,
+    azimuths: AzimuthAxis,
+    scans: &[PlottedScan],
+    last: bool,
+) -> Layer {
     let margins = scans.iter().flat_map(|scan| &scan.beams).filter_map(|beam| beam.margin_db);
     let (low, high) = margins
         .fold((-6.0, 12.0), |(low, high): (f64, f64), margin| (low.min(margin), high.max(margin)));
-    // The pattern's nulls go down without end; 40 dB below the threshold tell as much.
+    // The nulls of the beam pattern are unbounded; -40 dB is low enough.
     let scale = Scale::Linear { min: low.max(-40.0), max: 1.05 * high.min(120.0) };
-    let strip = Strip { panel, azimuths, scale };
+    let strip = AzimuthStrip { panel, azimuths, scale };
     let mut layer = Layer::new("margin-strip");
-    layer.add(strip.frame("amplitude above the threshold, dB", last));
+    layer.add(strip.frame("level above threshold, dB", last));
     layer.add(marks(&strip, scans, |beam| beam.margin_db));
     layer
 }
 
-fn marks(strip: &Strip, scans: &[Readings], value: impl Fn(&Reading) -> Option<f64>) -> Layer {
-    // Where many scans lie over each other, what they have in common shows through.
+fn marks(
+    strip: &AzimuthStrip,
+    scans: &[PlottedScan],
+    value: impl Fn(&PlottedBeam) -> Option<f64>,
+) -> Layer {
+    // Transparency shows what many overlaid scans have in common.
     let opacity = match scans.len() {
         0 | 1 => 1.0,
         2..=5 => 0.6,
         _ => 0.3,
     };
     let mut layer = Layer::new("readings").with("fill-opacity", opacity);
-    for kind in Kind::HEARD.into_iter().chain(Kind::UNHEARD) {
-        let mut marks = Layer::new(kind.words()).with("fill", kind.colour());
+    for kind in ReadingKind::WITH_RANGE.into_iter().chain(ReadingKind::WITHOUT_RANGE) {
+        let mut marks = Layer::new(kind.label()).with("fill", kind.colour());
         let beams = scans.iter().flat_map(|scan| &scan.beams).filter(|beam| beam.kind == kind);
         for beam in beams {
             if let Some(value) = value(beam) {
@@ -104,8 +119,8 @@ fn marks(strip: &Strip, scans: &[Readings], value: impl Fn(&Reading) -> Option<f
     layer
 }
 
-/// Upper end of the range axis: a few far readings must not flatten the rest.
-pub(super) fn top_m(scans: &[Readings]) -> f64 {
+/// Upper end of the range axis, not extended by a few far readings.
+pub(super) fn top_m(scans: &[PlottedScan]) -> f64 {
     let mut ranges: Vec<f64> = scans
         .iter()
         .flat_map(|scan| &scan.beams)
@@ -113,8 +128,8 @@ pub(super) fn top_m(scans: &[Readings]) -> f64 {
         .flatten()
         .collect();
     ranges.sort_by(f64::total_cmp);
-    let most = ranges.get(ranges.len() * 95 / 100).copied().unwrap_or(1.0);
+    let p95 = ranges.get(ranges.len() * 95 / 100).copied().unwrap_or(1.0);
     let farthest = ranges.last().copied().unwrap_or(1.0);
-    let top = if farthest <= 1.6 * most { farthest } else { 1.4 * most };
+    let top = if farthest <= 1.6 * p95 { farthest } else { 1.4 * p95 };
     if top > 0.0 { 1.06 * top } else { 1.0 }
 }

@@ -1,10 +1,10 @@
-//! The picture of a scene.
+//! Picture of a scene.
 
 use super::{
     canvas::{Anchor, Layer, Px, Rect},
-    caption, keys,
+    caption,
     labels::Labels,
-    legend,
+    legend, legend_entries,
     picture::Picture,
     plan::{Bounds, Plan},
     theme,
@@ -30,12 +30,13 @@ pub fn draw_scene(scene: &Scene) -> Picture {
     page.add(plan.names(scene, &mut labels));
     page.add(plan.scale_bar());
     let below = Px::new(left, plan.panel.bottom + 24.0);
-    let (entries, legend_height) = legend::draw(&keys::materials(scene), below, right - left);
+    let (entries, legend_height) =
+        legend::draw(&legend_entries::materials(scene), below, right - left);
     page.add(entries);
     Picture::new(theme::PAGE_PX, below.y + legend_height + theme::MARGIN_PX / 2.0, page)
 }
 
-/// Where the dimensions come from and what is approximate.
+/// Notes on sources, heights and approximations.
 fn notes(scene: &Scene) -> Vec<String> {
     let source = scene.source.iter().map(|source| format!("Source: {source}"));
     let heights = match (scene.floor_z_m, scene.ceiling_z_m) {
@@ -46,12 +47,12 @@ fn notes(scene: &Scene) -> Vec<String> {
             Some(format!("With {}", parts.into_iter().flatten().collect::<Vec<_>>().join(", ")))
         }
     };
-    let doubts = (!scene.approximate.is_empty())
+    let approximations = (!scene.approximate.is_empty())
         .then(|| format!("Approximate: {}", scene.approximate.join(" ")));
-    source.chain(heights).chain(doubts).collect()
+    source.chain(heights).chain(approximations).collect()
 }
 
-/// Everything drawn, with room around it; a metre square when there is nothing.
+/// Bounds of everything drawn, with a margin; a square metre if there is nothing.
 fn region(scene: &Scene) -> Bounds {
     let poses = scene.poses.values().flat_map(|pose| {
         let body = Bounds::of_scene(&scene.with_robot_at(pose)).map(|b| [b.min, b.max]);
@@ -73,7 +74,7 @@ fn poses(plan: &Plan, scene: &Scene, labels: &mut Labels) -> Layer {
         layer.add(plan.pose(pose));
         let at = plan.px(pose.position());
         labels.keep_free(Rect::new(at.x - 6.0, at.y - 6.0, 12.0, 12.0));
-        // The arrow's head, where it lies aside of the mark.
+        // The head of the arrow, which lies off the mark.
         let heading = pose.direction_rad(0.0);
         let head = at + 20.0 * Px::new(heading.cos(), -heading.sin());
         labels.keep_free(Rect::new(head.x - 5.0, head.y - 5.0, 10.0, 10.0));

@@ -1,5 +1,4 @@
-//! Quantities one above the other over the same axis: what drifted over days, what spread over
-//! azimuths.
+//! Quantities stacked over a common axis, such as drift over days or spread over azimuths.
 
 use super::{
     canvas::{Anchor, Layer, Px, Rect, Shape},
@@ -13,32 +12,33 @@ const STRIP_PX: f64 = 130.0;
 const BETWEEN_PX: f64 = 34.0;
 const MARK_PX: f64 = 3.0;
 
-/// One quantity.
+/// Quantity with its values and limits.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Series {
-    /// What it is, with its unit.
+    /// Name of the quantity, with its unit.
     pub title: String,
-    /// Its values, in any order.
+    /// Values, in any order.
     pub points: Vec<Point>,
-    /// Beyond these values something is wrong.
+    /// Lower and upper limit of valid values.
     pub limits: Option<[f64; 2]>,
 }
 
-/// One value.
+/// Value of a series.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Point {
-    /// Where on the common axis.
+    /// Position on the common axis.
     pub x: f64,
-    /// How much.
+    /// Value of the quantity.
     pub y: f64,
-    /// What a viewer shows at the mark.
+    /// Tooltip of the mark.
     pub hint: String,
-    /// Whether it does not count, and is drawn as a cross.
+    /// Whether the value is rejected, and drawn as a cross.
     pub aside: bool,
 }
 
-/// Draws quantities one above the other; `x_title` says what runs along, with its unit, and `badge` what
-/// the readings are, if not of a real ranger ([`badge_among`](crate::badge_among)).
+/// Draws quantities stacked over a common axis with the title `x_title`, including its unit.
+/// `badge` states the provenance of the readings, unless from hardware
+/// ([`badge_among`](crate::badge_among)).
 #[must_use]
 pub fn draw_series(
     title: &str,
@@ -67,8 +67,8 @@ pub fn draw_series(
     if strips.iter().flat_map(|strip| &strip.points).any(|point| point.aside) {
         let entry = |shape, colour, text| Entry::new(Sample::Mark { shape, colour }, text);
         let entries = [
-            entry(Shape::Dot, theme::BLUE, "counts"),
-            entry(Shape::Cross, theme::VERMILLION, "set aside"),
+            entry(Shape::Dot, theme::BLUE, "accepted"),
+            entry(Shape::Cross, theme::VERMILLION, "rejected"),
         ];
         let (key, height) = legend::draw(&entries, Px::new(left, bottom), width);
         page.add(key);
@@ -77,7 +77,7 @@ pub fn draw_series(
     Picture::new(theme::PAGE_PX, bottom + theme::MARGIN_PX / 2.0, page)
 }
 
-/// A range that is drawn from edge to edge.
+/// Interval drawn from edge to edge.
 #[derive(Debug, Clone, Copy)]
 struct Axis {
     from: f64,
@@ -85,7 +85,7 @@ struct Axis {
 }
 
 impl Axis {
-    /// The finite ones of some values, edge to edge; a unit when there is no range.
+    /// Interval of the finite values; of unit length if they are equal.
     fn over(values: impl Iterator<Item = f64>) -> Self {
         let none = Self { from: f64::INFINITY, to: f64::NEG_INFINITY };
         let all = values
@@ -98,7 +98,7 @@ impl Axis {
         }
     }
 
-    /// Around values with some room, and the limits if they are near.
+    /// Interval of the values with a margin, including nearby limits.
     fn around(strip: &Series) -> Self {
         let values = Self::over(strip.points.iter().map(|point| point.y));
         let span = values.to - values.from;
@@ -142,22 +142,22 @@ fn draw_strip(strip: &Series, panel: Rect, along: Axis, last: bool) -> Layer {
     for limit in strip.limits.into_iter().flatten().filter(shown) {
         limits.line(Px::new(panel.left, y(limit)), Px::new(panel.right, y(limit)));
     }
-    let mut counting = Layer::new("marks").with("fill", theme::BLUE).with("fill-opacity", 0.75);
-    let mut aside = Layer::new("aside").with("fill", theme::VERMILLION);
+    let mut accepted = Layer::new("marks").with("fill", theme::BLUE).with("fill-opacity", 0.75);
+    let mut rejected = Layer::new("rejected").with("fill", theme::VERMILLION);
     let drawn = strip.points.iter().filter(|point| point.x.is_finite() && point.y.is_finite());
     for point in drawn {
         let at = Px::new(x(point.x), y(point.y));
         let (marks, shape) = match point.aside {
-            false => (&mut counting, Shape::Dot),
-            true => (&mut aside, Shape::Cross),
+            false => (&mut accepted, Shape::Dot),
+            true => (&mut rejected, Shape::Cross),
         };
         marks.mark(shape, at, MARK_PX, Some(&point.hint));
     }
     let mut border = Layer::new("border").stroked(theme::FRAME, 1.0);
     border.rect(panel, 0.0);
-    layer.extend([grid, limits, border, counting, aside, numbers]);
+    layer.extend([grid, limits, border, accepted, rejected, numbers]);
     let title = match strip.points.is_empty() {
-        true => format!("{}: nothing known", strip.title),
+        true => format!("{}: no data", strip.title),
         false => strip.title.clone(),
     };
     layer.text(Px::new(panel.left, panel.top - 6.0), Anchor::Start, theme::TEXT_PX, &title);
@@ -180,19 +180,19 @@ mod tests {
     }
 
     #[test]
-    fn every_point_is_drawn_once_and_the_axis_holds_all_of_them() {
-        let of = series(&[20.0, 20.4, 21.2, 20.9]);
-        let axis = Axis::around(&of);
+    fn every_point_is_drawn_once() {
+        let full = series(&[20.0, 20.4, 21.2, 20.9]);
+        let axis = Axis::around(&full);
         assert!(axis.from < 19.5 && axis.to > 21.2, "{axis:?}");
-        let svg = draw_series("drift", None, &[], "hours", &[of, series(&[])]).to_svg();
+        let svg = draw_series("drift", None, &[], "hours", &[full, series(&[])]).to_svg();
         assert_eq!(svg.matches("<title>scan ").count(), 4);
-        for part in ["hours", "nothing known", "set aside"] {
+        for part in ["hours", "no data", "rejected"] {
             assert!(svg.contains(part), "{part}");
         }
     }
 
     #[test]
-    fn nothing_and_nonsense_are_drawn_too() {
+    fn degenerate_values_are_drawn() {
         for values in [&[][..], &[1.0], &[f64::NAN, 2.0], &[3.0, 3.0], &[f64::INFINITY]] {
             let svg = draw_series("drift", None, &["a line".into()], "hours", &[series(values)]);
             let svg = svg.to_svg();

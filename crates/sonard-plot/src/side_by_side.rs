@@ -1,37 +1,40 @@
-//! Scans of one place beside each other: what one engine sees and another does not.
+//! Scans of one position side by side, for comparison of engines.
 
 use super::{
     canvas::{Anchor, Layer, Px, Rect},
     caption,
     floor::Floor,
-    keys, legend,
+    legend, legend_entries,
     picture::Picture,
     plan::Plan,
-    readings::Readings,
-    region, theme, words,
+    readings::PlottedScan,
+    region, scan_caption, theme,
 };
 use sonard_interpret::compare::agrees;
 use sonard_model::{geometry::Pose, scene::Scene};
 use sonard_records::{Ping, PingStatus, ScanView};
 
-/// Most panels beside each other.
-const MOST: usize = 3;
+/// Maximum number of panels.
+const MAX_PANELS: usize = 3;
 
 const GAP_PX: f64 = 40.0;
 
 /// Draws each scan (the first three) on a floor plan of its own, under the name of its engine, with
-/// the number of its beams that differ from the first scan's: heard by one and not by the other, or
-/// ranges apart by more than [`agrees`] allows.
+/// the number of beams that differ from the first scan: an echo in only one of them, or ranges
+/// apart by more than [`agrees`] allows.
 #[must_use]
 pub fn draw_side_by_side(scans: &[ScanView], scene: Option<&Scene>) -> Picture {
-    let shown = &scans[..scans.len().min(MOST)];
-    let readings: Vec<Readings> = shown.iter().map(Readings::of).collect();
-    let (heading, top) =
-        caption::draw(&words::title(shown, scene), words::badge(shown), &[notes(shown)]);
-    let placed: Vec<(Pose, &Readings)> = shown
+    let shown = &scans[..scans.len().min(MAX_PANELS)];
+    let readings: Vec<PlottedScan> = shown.iter().map(PlottedScan::from_scan).collect();
+    let (heading, top) = caption::draw(
+        &scan_caption::title(shown, scene),
+        scan_caption::badge(shown),
+        &[notes(shown)],
+    );
+    let placed: Vec<(Pose, &PlottedScan)> = shown
         .iter()
         .zip(&readings)
-        .filter_map(|(view, r)| Some((words::pose_of(view)?, r)))
+        .filter_map(|(view, r)| Some((scan_caption::pose_of(view)?, r)))
         .collect();
     let region = region::region(&placed[..placed.len().min(1)], scene);
 
@@ -52,7 +55,7 @@ pub fn draw_side_by_side(scans: &[ScanView], scene: Option<&Scene>) -> Picture {
         page.add(titles);
     }
     let below = Px::new(theme::MARGIN_PX, top + 40.0 + height + 28.0);
-    let entries = keys::all(&readings, scene, 0);
+    let entries = legend_entries::all(&readings, scene, 0);
     let (key, key_height) = legend::draw(&entries, below, theme::PAGE_PX - 2.0 * theme::MARGIN_PX);
     page.add(key);
     Picture::new(theme::PAGE_PX, below.y + key_height + theme::MARGIN_PX / 2.0, page)
@@ -62,13 +65,13 @@ fn floor(
     plan: &Plan,
     number: usize,
     view: &ScanView,
-    scan: &Readings,
+    scan: &PlottedScan,
     scene: Option<&Scene>,
 ) -> Layer {
     let mut inside = Layer::new("inside").clipped(&format!("window-{number}"), plan.panel);
     let mut layer = Layer::new("floor-plan");
     layer.add(plan.frame());
-    let pose = words::pose_of(view);
+    let pose = scan_caption::pose_of(view);
     let floor = pose.map(|pose| Floor { plan, pose, scan });
     inside.extend(floor.map(|floor| floor.model()));
     inside.extend(scene.map(|scene| plan.walls(scene)));
@@ -77,13 +80,13 @@ fn floor(
     inside.extend(floor.map(|floor| floor.marks(1.0)));
     inside.extend(pose.map(|pose| plan.pose(&pose)));
     layer.add(inside);
-    layer.extend(floor.map(|floor| floor.silent_ticks()));
+    layer.extend(floor.map(|floor| floor.border_ticks()));
     layer
 }
 
 fn notes(scans: &[ScanView]) -> String {
     let beams = scans.first().map_or(0, |scan| scan.pings.len());
-    format!("{beams} beams each; the legend counts those of all")
+    format!("{beams} beams each; counts are totals of all panels")
 }
 
 fn engine(view: &ScanView) -> String {
@@ -91,23 +94,24 @@ fn engine(view: &ScanView) -> String {
     model.map_or_else(|| "measured".to_owned(), |model| model.engine.clone())
 }
 
-/// How many beams differ from the first scan's.
+/// Number of beams that differ from the first scan, as text.
 fn difference(first: &ScanView, other: &ScanView, number: usize) -> String {
     if number == 0 {
-        let heard = first.pings.iter().filter(|ping| ping.range_m.is_some()).count();
-        return format!("{heard} beams heard");
+        let echoes = first.pings.iter().filter(|ping| ping.range_m.is_some()).count();
+        return format!("{echoes} echoes");
     }
     let twin = |ping: &&Ping| first.pings.iter().find(|known| known.index == ping.index);
-    let wrong = other.pings.iter().filter(|ping| twin(ping).is_none_or(|known| !same(known, ping)));
-    let wrong = wrong.count();
-    let percent = 100.0 * wrong as f64 / other.pings.len().max(1) as f64;
-    format!("{wrong} beams differ from {} ({percent:.0} %)", engine(first))
+    let differing = other.pings.iter();
+    let differing = differing.filter(|ping| twin(ping).is_none_or(|known| !same(known, ping)));
+    let count = differing.count();
+    let percent = 100.0 * count as f64 / other.pings.len().max(1) as f64;
+    format!("{count} beams differ from {} ({percent:.0} %)", engine(first))
 }
 
-fn same(one: &Ping, other: &Ping) -> bool {
-    let heard = |ping: &Ping| ping.range_m.filter(|_| ping.status != PingStatus::NoEcho);
-    match (heard(one), heard(other)) {
-        (Some(one_m), Some(other_m)) => agrees(one_m, other_m),
+fn same(a: &Ping, b: &Ping) -> bool {
+    let echo_m = |ping: &Ping| ping.range_m.filter(|_| ping.status != PingStatus::NoEcho);
+    match (echo_m(a), echo_m(b)) {
+        (Some(a_m), Some(b_m)) => agrees(a_m, b_m),
         (None, None) => true,
         _ => false,
     }

@@ -1,4 +1,4 @@
-//! Strips: a quantity against azimuth.
+//! Strips of a quantity against azimuth.
 
 use super::{
     canvas::{Anchor, Layer, Px, Rect, Shape},
@@ -7,28 +7,28 @@ use super::{
 use sonard_model::geometry::wrap_360;
 use sonard_records::ScanPlan;
 
-/// The azimuths across a strip.
+/// Azimuth range of a strip.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct AzimuthAxis {
     pub(super) from_deg: f64,
     pub(super) to_deg: f64,
-    /// Between neighbouring beams.
+    /// Angle between neighbouring beams, degrees.
     pub(super) step_deg: f64,
 }
 
 impl AzimuthAxis {
-    /// The range of a plan; a full turn where there is none to be used.
-    pub(super) fn of(plan: Option<&ScanPlan>) -> Self {
+    /// Azimuth range of a plan; a full turn without a valid plan.
+    pub(super) fn from_plan(plan: Option<&ScanPlan>) -> Self {
         plan.filter(|plan| plan.check().is_ok()).map_or(
             Self { from_deg: 0.0, to_deg: 360.0, step_deg: 0.9 },
             |plan| Self { from_deg: plan.from_deg, to_deg: plan.to_deg, step_deg: plan.step_deg },
         )
     }
 
-    /// The azimuth counted on from the start of the axis.
+    /// Azimuth unwrapped from the start of the axis.
     pub(super) fn unwrapped(&self, azimuth_deg: f64) -> f64 {
         let along = wrap_360(azimuth_deg - self.from_deg);
-        // Rounding may put the first beam a hair below the start.
+        // Rounding may place the first beam slightly below the start.
         self.from_deg + if along > 360.0 - 1e-6 { 0.0 } else { along }
     }
 
@@ -42,7 +42,7 @@ impl AzimuthAxis {
     }
 }
 
-/// How a quantity becomes a height.
+/// Mapping of a quantity to a height.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Scale {
     /// From `min` to `max`.
@@ -53,7 +53,7 @@ pub(super) enum Scale {
 }
 
 impl Scale {
-    /// 0 at the lower end, 1 at the upper, beyond outside.
+    /// Fraction of the height: 0 at the lower end, 1 at the upper, beyond these outside.
     fn fraction(&self, value: f64) -> f64 {
         match *self {
             Self::Linear { min, max } => (value - min) / (max - min),
@@ -65,7 +65,7 @@ impl Scale {
         }
     }
 
-    /// Ticks and their labels.
+    /// Tick values and their labels.
     fn ticks(&self, height_px: f64) -> Vec<(f64, String)> {
         match *self {
             Self::Linear { min, max } => {
@@ -84,15 +84,15 @@ impl Scale {
     }
 }
 
-/// A strip's place and scales.
+/// Panel with its axes.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Strip {
+pub(super) struct AzimuthStrip {
     pub(super) panel: Rect,
     pub(super) azimuths: AzimuthAxis,
     pub(super) scale: Scale,
 }
 
-impl Strip {
+impl AzimuthStrip {
     pub(super) fn x(&self, azimuth_deg: f64) -> f64 {
         let axis = self.azimuths;
         let along = (axis.unwrapped(azimuth_deg) - axis.from_deg) / (axis.to_deg - axis.from_deg);
@@ -109,7 +109,7 @@ impl Strip {
         self.panel.width() * self.azimuths.step_deg / span
     }
 
-    /// Border, grid, title above, and numbers; azimuths below where wanted.
+    /// Draws border, grid, title above, and numbers; azimuths below on request.
     pub(super) fn frame(&self, title: &str, azimuth_title: bool) -> Layer {
         let Rect { left, top, right, bottom } = self.panel;
         let mut layer = Layer::new("frame");
@@ -132,8 +132,8 @@ impl Strip {
         }
         if azimuth_title {
             let middle = Px::new(self.panel.center().x, bottom + 32.0);
-            let words = "azimuth, counter-clockwise from the heading";
-            numbers.text(middle, Anchor::Middle, theme::SMALL_PX, words);
+            let text = "azimuth, counter-clockwise from the heading";
+            numbers.text(middle, Anchor::Middle, theme::SMALL_PX, text);
         }
         let mut border = Layer::new("border").stroked(theme::FRAME, 1.0);
         border.rect(self.panel, 0.0);
@@ -144,7 +144,7 @@ impl Strip {
         layer
     }
 
-    /// A grey band between two values.
+    /// Draws a shaded band between two values.
     pub(super) fn band(&self, low: f64, high: f64) -> Layer {
         let mut layer = Layer::new("band").with("fill", theme::SKY).with("fill-opacity", 0.22);
         let (top, bottom) = (self.y(high), self.y(low));
@@ -152,7 +152,7 @@ impl Strip {
         layer
     }
 
-    /// A mark for a value; an arrow at the end of the scale for one beyond it.
+    /// Draws a mark for a value, or an arrow at the end of the scale for one beyond it.
     pub(super) fn mark(
         &self,
         layer: &mut Layer,
@@ -177,8 +177,8 @@ impl Strip {
         }
     }
 
-    /// A line through values that follow each other closely, broken at silences and jumps;
-    /// `points` by azimuth on this axis.
+    /// Draws a line through closely spaced values, broken at gaps and jumps; `points` are sorted by
+    /// azimuth on this axis.
     pub(super) fn line(&self, layer: &mut Layer, points: &[(f64, f64)]) {
         let half = Px::new(self.beam_px() / 2.0, 0.0);
         let within = |at: Px| Px::new(at.x.clamp(self.panel.left, self.panel.right), at.y);
@@ -204,7 +204,7 @@ impl Strip {
         layer.runs(runs);
     }
 
-    /// Readings sorted as this axis runs.
+    /// Sorts readings along this axis.
     pub(super) fn sorted(&self, points: impl IntoIterator<Item = (f64, f64)>) -> Vec<(f64, f64)> {
         let mut points: Vec<_> = points.into_iter().collect();
         points

@@ -1,4 +1,4 @@
-//! What every picture must keep: well-formed, nothing lost, nothing that makes it panic.
+//! Invariants of every picture: well-formed, complete, and robust against any input.
 
 use proptest::prelude::*;
 use resvg::{
@@ -21,12 +21,12 @@ use sonard_records::{
     SimRecord,
 };
 
-/// Every kind of picture of these scans.
+/// Draws scans as every kind of picture.
 fn pictures(scans: &[ScanView], scene: Option<&Scene>) -> Vec<Picture> {
     vec![draw_scans(scans, scene), draw_polar(scans, scene), draw_residuals(scans, scene)]
 }
 
-/// Parses the SVG as a renderer does; gives the text for a closer look.
+/// Parses the SVG as a renderer does and returns its text.
 fn well_formed(picture: &Picture) -> String {
     let svg = picture.to_svg();
     usvg::Tree::from_str(&svg, &usvg::Options::default()).expect("a renderer reads it");
@@ -38,7 +38,7 @@ fn well_formed(picture: &Picture) -> String {
     svg
 }
 
-/// Number of marks (shapes with a hint) in the groups of this class inside `outer`.
+/// Number of marks (shapes with a tooltip) in the groups of a class inside `outer`.
 fn marks(svg: &str, outer: &str, class: &str) -> usize {
     let document = roxmltree::Document::parse(svg).expect("well-formed");
     document
@@ -50,7 +50,7 @@ fn marks(svg: &str, outer: &str, class: &str) -> usize {
         .count()
 }
 
-/// All text that is shown.
+/// All visible texts.
 fn texts(svg: &str) -> Vec<String> {
     let document = roxmltree::Document::parse(svg).expect("well-formed");
     let texts = document.descendants().filter(|node| node.has_tag_name("text"));
@@ -62,31 +62,32 @@ fn pose(name: &str) -> Pose {
 }
 
 #[test]
-fn every_reading_of_a_scan_is_a_mark_a_tick_or_an_arrow() {
+fn every_reading_is_drawn() {
     let scan = scan_of_room(pose("fig9"), 0.9, 1);
     let svg = well_formed(&draw_scan(&scan, Some(&room())));
-    let readings = readings::Readings::of(&scan);
-    let on_plan: usize =
-        readings::Kind::HEARD.iter().map(|kind| marks(&svg, "floor-plan", kind.words())).sum();
+    let readings = readings::PlottedScan::from_scan(&scan);
+    let count = |outer: &str| -> usize {
+        let kinds = readings::ReadingKind::WITH_RANGE.iter();
+        kinds.map(|kind| marks(&svg, outer, kind.label())).sum()
+    };
+    let on_plan = count("floor-plan");
     let legend = texts(&svg);
-    let beyond: usize = legend
+    let outside: usize = legend
         .iter()
-        .find_map(|text| text.strip_prefix("beyond the view (")?.strip_suffix(')'))
+        .find_map(|text| text.strip_prefix("outside the view (")?.strip_suffix(')'))
         .map_or(0, |n| n.parse().expect("a number"));
-    let heard = readings.beams.iter().filter(|beam| beam.range_m.is_some()).count();
-    assert!(on_plan > 100 && beyond > 0, "{on_plan} on the plan, {beyond} beyond");
-    assert_eq!(on_plan + beyond, heard);
-    // The strip beside the plan has them all.
-    let on_strip: usize =
-        readings::Kind::HEARD.iter().map(|kind| marks(&svg, "range-strip", kind.words())).sum();
-    assert_eq!(on_strip, heard);
+    let echoes = readings.beams.iter().filter(|beam| beam.range_m.is_some()).count();
+    assert!(on_plan > 100 && outside > 0, "{on_plan} on the plan, {outside} outside");
+    assert_eq!(on_plan + outside, echoes);
+    // The strip next to the plan has all of them.
+    assert_eq!(count("range-strip"), echoes);
 }
 
 #[test]
-fn the_false_wall_is_seen_and_one_phantom_does_not_shrink_the_room() {
+fn phantom_does_not_shrink_the_room() {
     let mut scan = scan_of_room(pose("fig9"), 0.9, 1);
     let view_of = |scan: &ScanView| {
-        let readings = readings::Readings::of(scan);
+        let readings = readings::PlottedScan::from_scan(scan);
         region::region(&[(pose("fig9"), &readings)], Some(&room()))
     };
     let before = view_of(&scan);
@@ -98,10 +99,10 @@ fn the_false_wall_is_seen_and_one_phantom_does_not_shrink_the_room() {
 }
 
 #[test]
-fn provenance_is_said_unless_it_is_hardware() {
+fn provenance_is_shown_unless_hardware() {
     let mut scan = scan_of_room(pose("fig7"), 4.5, 1);
-    let has = |scan: &ScanView, words: &str| {
-        let shown = |p: &Picture| texts(&well_formed(p)).iter().any(|text| text.contains(words));
+    let has = |scan: &ScanView, label: &str| {
+        let shown = |p: &Picture| texts(&well_formed(p)).iter().any(|text| text.contains(label));
         pictures(std::slice::from_ref(scan), Some(&room())).iter().all(shown)
     };
     assert!(has(&scan, "MOCK, not hardware"));
@@ -114,7 +115,7 @@ fn provenance_is_said_unless_it_is_hardware() {
 }
 
 #[test]
-fn a_simulated_log_shows_its_own_readings_and_margins() {
+fn simulated_log_shows_margins() {
     let scan = simulated(scan_of_room(pose("fig9"), 0.9, 1));
     let svg = well_formed(&draw_scan(&scan, Some(&room())));
     assert!(marks(&svg, "floor-plan", "multiple reflection") > 50);
@@ -123,7 +124,7 @@ fn a_simulated_log_shows_its_own_readings_and_margins() {
 }
 
 #[test]
-fn a_log_without_predictions_shows_plain_echoes() {
+fn log_without_predictions_shows_echoes() {
     let mut scan = scan_of_room(pose("fig9"), 0.9, 1);
     for ping in &mut scan.pings {
         (ping.sim, ping.residual_m) = (None, None);
@@ -136,7 +137,7 @@ fn a_log_without_predictions_shows_plain_echoes() {
 }
 
 #[test]
-fn overlaid_scans_show_all_their_marks() {
+fn overlaid_scans_show_all_marks() {
     let scans: Vec<ScanView> = (0..3).map(|seed| scan_of_room(pose("fig7"), 4.5, seed)).collect();
     let all = well_formed(&draw_scans(&scans, Some(&room())));
     let single: usize = scans
@@ -150,7 +151,7 @@ fn overlaid_scans_show_all_their_marks() {
 }
 
 #[test]
-fn png_has_the_size_asked_for_and_is_not_blank() {
+fn png_has_the_requested_size() {
     let picture = draw_scan(&scan_of_room(pose("fig9"), 0.9, 1), Some(&room()));
     for width_px in [1, 320, 1000] {
         let image = Pixmap::decode_png(&picture.to_png(width_px).expect("drawn")).expect("PNG");
@@ -169,7 +170,7 @@ fn png_has_the_size_asked_for_and_is_not_blank() {
 }
 
 #[test]
-fn names_are_escaped_wherever_they_stand() {
+fn names_are_escaped() {
     let hostile = "</text><script>&\"'\u{0}\u{1b}\u{fffe} x";
     let mut scene = furnished_room();
     scene.name = hostile.into();
@@ -193,17 +194,17 @@ fn names_are_escaped_wherever_they_stand() {
         let svg = well_formed(&picture);
         assert!(!svg.contains("<script"));
         let shown = texts(&svg).iter().any(|text| text.contains("</text><script>&\"'"));
-        assert!(shown, "the name is shown as it is");
+        assert!(shown, "the name is shown unchanged");
     }
 }
 
 #[test]
-fn a_scene_shows_walls_materials_poses_and_the_robot() {
+fn scene_shows_all_its_parts() {
     let mut scene = furnished_room();
     let svg = well_formed(&draw_scene(&scene));
     let shown = texts(&svg);
-    for words in ["south", "leg", "fig7", "fig9", "wall, reflectance 0.7, roughness 0.4"] {
-        assert!(shown.iter().any(|text| text == words), "{words} is missing in {shown:?}");
+    for label in ["south", "leg", "fig7", "fig9", "wall, reflectance 0.7, roughness 0.4"] {
+        assert!(shown.iter().any(|text| text == label), "{label} is missing in {shown:?}");
     }
     let document = roxmltree::Document::parse(&svg).expect("well-formed");
     let lines = document
@@ -222,7 +223,7 @@ fn a_scene_shows_walls_materials_poses_and_the_robot() {
 }
 
 #[test]
-fn empty_and_silent_scans_are_drawn() {
+fn empty_scans_are_drawn() {
     let whole = scan_of_room(pose("fig9"), 4.5, 1);
     let bare = ScanView {
         scan: Uuid::nil(),
@@ -233,8 +234,8 @@ fn empty_and_silent_scans_are_drawn() {
         end: None,
     };
     let one = ScanView { pings: whole.pings[..1].to_vec(), ..whole.clone() };
-    let mut silent = whole;
-    for ping in &mut silent.pings {
+    let mut no_echo = whole;
+    for ping in &mut no_echo.pings {
         (ping.status, ping.range_m, ping.residual_m, ping.sim) =
             (PingStatus::NoEcho, None, None, None);
     }
@@ -242,7 +243,7 @@ fn empty_and_silent_scans_are_drawn() {
     nothing.walls.clear();
     nothing.poses.clear();
     well_formed(&draw_scene(&nothing));
-    for scans in [vec![], vec![bare], vec![one], vec![silent]] {
+    for scans in [vec![], vec![bare], vec![one], vec![no_echo]] {
         for scene in [None, Some(&room()), Some(&nothing)] {
             for picture in pictures(&scans, scene) {
                 well_formed(&picture);
@@ -252,7 +253,7 @@ fn empty_and_silent_scans_are_drawn() {
     }
 }
 
-/// Numbers that logs should not hold, besides those that they do.
+/// Numbers, including ones that logs should not contain.
 fn any_number() -> impl Strategy<Value = f64> {
     prop_oneof![
         4 => 0.0..10.0_f64,
@@ -341,7 +342,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(128))]
 
     #[test]
-    fn no_scan_makes_a_picture_panic_or_break(
+    fn any_scan_is_drawn(
         scans in prop::collection::vec(any_scan(), 1..4),
         with_scene in any::<bool>(),
     ) {
@@ -352,7 +353,7 @@ proptest! {
     }
 
     #[test]
-    fn no_scene_makes_a_picture_panic_or_break(
+    fn any_scene_is_drawn(
         ends in prop::collection::vec([any_number(), any_number()], 4),
         name in any::<String>(),
     ) {

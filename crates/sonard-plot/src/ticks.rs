@@ -1,7 +1,7 @@
 //! Round numbers for axes and scale bars.
 
-/// 1, 2 or 5 times a power of ten: the smallest such step that cuts `span` into at most
-/// `parts`. 1 when there is no span.
+/// Smallest step of 1, 2 or 5 times a power of ten that divides `span` into at most `parts`; 1
+/// without a span.
 pub fn nice_step(span: f64, parts: f64) -> f64 {
     let raw = span / parts;
     if !raw.is_normal() || raw < 0.0 {
@@ -24,12 +24,12 @@ pub fn multiples(from: f64, to: f64, step: f64) -> impl Iterator<Item = f64> {
         .take_while(move |value| *value <= to + 1e-9 * step)
 }
 
-/// A multiple of `step` with as many decimals as the step needs.
+/// Formats a multiple of `step` with the decimals that the step needs.
 pub fn label(value: f64, step: f64) -> String {
     let decimals = (-step.log10().floor()).clamp(0.0, 9.0) as usize;
-    // Adding zero makes -0 plain.
+    // Adding zero turns -0 into 0.
     let text = format!("{:.decimals$}", value + 0.0);
-    // The minus sign proper is as wide as a digit.
+    // The minus sign is as wide as a digit, unlike the hyphen.
     text.replacen('-', "\u{2212}", 1)
 }
 
@@ -38,7 +38,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn steps_are_round_and_not_too_many() {
+    fn steps_are_round() {
         for (span, parts, step) in
             [(0.93, 5.0, 0.2), (360.0, 8.0, 50.0), (1.0, 10.0, 0.1), (7e6, 4.0, 2e6)]
         {
@@ -51,7 +51,7 @@ mod tests {
     }
 
     #[test]
-    fn multiples_include_both_ends_and_labels_have_the_steps_decimals() {
+    fn labels_have_the_decimals_of_the_step() {
         let labels: Vec<_> = multiples(-0.2, 0.4, 0.2).map(|v| label(v, 0.2)).collect();
         assert_eq!(labels, ["\u{2212}0.2", "0.0", "0.2", "0.4"]);
         assert_eq!(label(50.0, 50.0), "50");

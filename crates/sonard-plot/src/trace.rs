@@ -1,5 +1,5 @@
-//! The trace of one firing: what an oscilloscope shows at the amplifier, the envelope against the
-//! threshold, and ECHO.
+//! Trace of one firing: amplified signal as on an oscilloscope, envelope against threshold, and the
+//! ECHO output.
 
 use super::{
     canvas::{Anchor, Layer, Px, Rect, Shape},
@@ -11,64 +11,66 @@ use super::{
 };
 use sonard_model::acoustics::EchoTrace;
 
-/// Lowest level shown, decibels below a head-on wall.
+/// Minimum level shown, dB re head-on wall.
 const FLOOR_DB: f64 = -60.0;
 const TOP_DB: f64 = 10.0;
 
-/// Most peaks that get a number.
-const MOST_NAMED: usize = 12;
+/// Maximum number of numbered peaks.
+const MAX_NUMBERED: usize = 12;
 
-/// Peaks this far below the threshold get one only where they stand out, decibels.
-const NAMED_BELOW_DB: f64 = 12.0;
+/// Peaks farther below the threshold are numbered only if they are prominent, decibels.
+const NUMBERED_BELOW_DB: f64 = 12.0;
 
-/// A peak stands out where the envelope at its peak is at most this many times as high.
-const STANDS_OUT: f64 = 1.5;
+/// Maximum ratio of the envelope to a prominent peak at its time.
+const PROMINENT: f64 = 1.5;
 
-/// A firing to be drawn.
+/// Firing with its caption and the names of its peaks.
 #[derive(Debug, Clone)]
 pub struct TraceView<'a> {
-    /// Above the picture.
+    /// Title above the picture.
     pub title: String,
-    /// Under the title.
+    /// Lines below the title.
     pub lines: Vec<String>,
-    /// The firing.
+    /// Simulated trace.
     pub trace: &'a EchoTrace,
-    /// What each of its peaks is, in the same order.
+    /// Names of the peaks, in their order.
     pub names: Vec<String>,
-    /// From firing until the receiver listens, microseconds.
+    /// Time from firing to the end of blanking, microseconds.
     pub blanking_us: f64,
-    /// How long BLNK holds the detector after an echo, microseconds.
+    /// Duration of the BLNK pulse after an echo, microseconds.
     pub rearm_us: f64,
-    /// Speed of sound, metres a second.
+    /// Speed of sound, metres per second.
     pub sound_speed_m_s: f64,
 }
 
-/// Draws the trace of a firing: on top the signal as an oscilloscope shows it (the envelope on both
-/// sides of zero, as the carrier fills it), below its level with the threshold in force, the
-/// blanking and the moments at which ECHO rises; then the gain and ECHO itself. Numbers on the peaks
-/// stand for the paths listed below.
+/// Draws the trace of a firing. The first panel is the signal as on an oscilloscope (envelope on
+/// both sides of zero). The second has its level with the detection threshold, the blanking and the
+/// rising edges of ECHO. Gain and ECHO follow. Numbers on the peaks refer to the paths listed
+/// below.
 #[must_use]
 pub fn draw_trace(view: &TraceView) -> Picture {
     let (heading, top) =
         caption::draw(&view.title, Some("SIMULATED, nothing measured"), &view.lines);
-    let axes = Axes::new(view, top + 26.0);
-    let named = named(view);
+    let panels = TracePanels::new(view, top + 26.0);
+    let numbered = numbered(view);
     let mut page = Layer::new("trace");
     page.add(heading);
-    for layer in [axes.signal(view), axes.levels(view, &named), axes.gain(view), axes.echo(view)] {
+    for layer in
+        [panels.signal(view), panels.levels(view, &numbered), panels.gain(view), panels.echo(view)]
+    {
         page.add(layer);
     }
-    let below = Px::new(theme::MARGIN_PX, axes.echo.bottom + 52.0);
+    let below = Px::new(theme::MARGIN_PX, panels.echo.bottom + 52.0);
     let width = theme::PAGE_PX - 2.0 * theme::MARGIN_PX;
-    let (key, height) = legend::draw(&keys(), below, width);
+    let (key, height) = legend::draw(&legend_entries(), below, width);
     page.add(key);
-    let (list, bottom) = list(view, &named, below.y + height + 12.0);
+    let (list, bottom) = list(view, &numbered, below.y + height + 12.0);
     page.add(list);
     Picture::new(theme::PAGE_PX, bottom + theme::MARGIN_PX / 2.0, page)
 }
 
-/// A peak with a number: several sounds of the same name that come together are one.
-struct Named {
+/// Numbered peak; simultaneous arrivals of the same name are combined.
+struct NumberedPeak {
     peak: f64,
     peak_us: f64,
     tof_us: f64,
@@ -76,31 +78,32 @@ struct Named {
     count: usize,
 }
 
-/// The strongest peaks, in order of time.
-fn named(view: &TraceView) -> Vec<Named> {
+/// Strongest peaks, in order of time.
+fn numbered(view: &TraceView) -> Vec<NumberedPeak> {
     let floor = 10f64.powf(FLOOR_DB / 20.0);
-    let is_seen = |peak: f64, peak_us: f64| {
+    let is_visible = |peak: f64, peak_us: f64| {
         let points = &view.trace.points;
         let point = points.iter().find(|point| point.t_us >= peak_us).or(points.last());
         point.is_some_and(|point| {
-            peak >= point.threshold * 10f64.powf(-NAMED_BELOW_DB / 20.0)
-                || (peak > floor && point.envelope <= STANDS_OUT * peak)
+            peak >= point.threshold * 10f64.powf(-NUMBERED_BELOW_DB / 20.0)
+                || (peak > floor && point.envelope <= PROMINENT * peak)
         })
     };
-    let mut peaks: Vec<Named> = Vec::new();
+    let mut peaks: Vec<NumberedPeak> = Vec::new();
     for (found, name) in view.trace.peaks.iter().zip(&view.names) {
         let (peak, peak_us) = found.peak;
-        if !is_seen(peak, peak_us) {
+        if !is_visible(peak, peak_us) {
             continue;
         }
-        let same =
-            |known: &&mut Named| known.name == *name && (known.tof_us - found.tof_us).abs() < 1.0;
+        let same = |known: &&mut NumberedPeak| {
+            known.name == *name && (known.tof_us - found.tof_us).abs() < 1.0
+        };
         match peaks.iter_mut().find(same) {
             Some(known) => {
                 known.peak = known.peak.max(peak);
                 known.count += 1;
             }
-            None => peaks.push(Named {
+            None => peaks.push(NumberedPeak {
                 peak,
                 peak_us,
                 tof_us: found.tof_us,
@@ -109,13 +112,13 @@ fn named(view: &TraceView) -> Vec<Named> {
             }),
         }
     }
-    peaks.sort_by(|one, other| other.peak.total_cmp(&one.peak));
-    peaks.truncate(MOST_NAMED);
-    peaks.sort_by(|one, other| one.tof_us.total_cmp(&other.tof_us));
+    peaks.sort_by(|a, b| b.peak.total_cmp(&a.peak));
+    peaks.truncate(MAX_NUMBERED);
+    peaks.sort_by(|a, b| a.tof_us.total_cmp(&b.tof_us));
     peaks
 }
 
-struct Axes {
+struct TracePanels {
     signal: Rect,
     levels: Rect,
     gain: Rect,
@@ -124,7 +127,7 @@ struct Axes {
     sound_speed_m_s: f64,
 }
 
-impl Axes {
+impl TracePanels {
     fn new(view: &TraceView, top: f64) -> Self {
         let left = theme::MARGIN_PX + 46.0;
         let width = theme::PAGE_PX - theme::MARGIN_PX - left;
@@ -146,7 +149,7 @@ impl Axes {
         self.levels.bottom - share * self.levels.height()
     }
 
-    /// Border, title and vertical grid; numbers of the time below where wanted.
+    /// Draws border, title and vertical grid; times and ranges below on request.
     fn frame(&self, panel: Rect, title: &str, numbered: bool) -> Layer {
         let mut layer = Layer::new("frame");
         let mut grid = Layer::new("grid").stroked(theme::GRID, theme::HAIRLINE_PX);
@@ -165,9 +168,9 @@ impl Axes {
             }
         }
         if numbered {
-            let beside = |row: f64| Px::new(panel.left - 22.0, panel.bottom + row);
-            numbers.text(beside(15.0), Anchor::End, theme::SMALL_PX, "ms");
-            numbers.text(beside(30.0), Anchor::End, theme::SMALL_PX, "m");
+            let left = |row: f64| Px::new(panel.left - 22.0, panel.bottom + row);
+            numbers.text(left(15.0), Anchor::End, theme::SMALL_PX, "ms");
+            numbers.text(left(30.0), Anchor::End, theme::SMALL_PX, "m");
         }
         let mut border = Layer::new("border").stroked(theme::FRAME, 1.0);
         border.rect(panel, 0.0);
@@ -186,7 +189,7 @@ impl Axes {
         layer
     }
 
-    /// The envelope on both sides of zero, the transmission among it.
+    /// Draws the envelope on both sides of zero, including the transmit pulse.
     fn signal(&self, view: &TraceView) -> Layer {
         let panel = self.signal;
         let highest = view.trace.points.iter().map(|point| point.envelope).fold(1.0, f64::max);
@@ -194,7 +197,7 @@ impl Axes {
         let y = |amplitude: f64| middle - 0.47 * panel.height() * amplitude / highest;
         let mut layer = Layer::new("signal");
         layer.add(self.blanking(panel, view.blanking_us));
-        layer.add(self.frame(panel, "signal after the amplifier (compensated)", false));
+        layer.add(self.frame(panel, "amplified signal (gain-compensated)", false));
         let both_sides = |points: &[(f64, f64)]| {
             let upper = points.iter().map(|&(t_us, size)| Px::new(self.x(t_us), y(size)));
             let lower = points.iter().rev().map(|&(t_us, size)| Px::new(self.x(t_us), y(-size)));
@@ -204,21 +207,18 @@ impl Axes {
         sent.polygon(&both_sides(&view.trace.transmission));
         layer.add(sent);
         let points: Vec<_> = view.trace.points.iter().map(|p| (p.t_us, p.envelope)).collect();
-        let mut heard = Layer::new("envelope").with("fill", theme::BLUE);
-        heard.polygon(&both_sides(&points));
-        layer.add(heard);
+        let mut received = Layer::new("envelope").with("fill", theme::BLUE);
+        received.polygon(&both_sides(&points));
+        layer.add(received);
         layer
     }
 
-    fn levels(&self, view: &TraceView, named: &[Named]) -> Layer {
+    fn levels(&self, view: &TraceView, numbered: &[NumberedPeak]) -> Layer {
         let panel = self.levels;
         let mut layer = Layer::new("levels");
         layer.add(self.blanking(panel, view.blanking_us));
-        layer.add(self.frame(
-            panel,
-            "envelope and threshold in force, dB below a head-on wall",
-            false,
-        ));
+        let title = "echo envelope and detection threshold, dB re head-on wall";
+        layer.add(self.frame(panel, title, false));
         let mut grid = Layer::new("grid").stroked(theme::GRID, theme::HAIRLINE_PX);
         let mut numbers = Layer::new("numbers").with("fill", theme::QUIET);
         for db in ticks::multiples(FLOOR_DB, TOP_DB, 10.0) {
@@ -235,18 +235,18 @@ impl Axes {
         let points = &view.trace.points;
         let mut sent = Layer::new("transmission").stroked(theme::ORANGE, 1.6);
         sent.runs([run(&mut view.trace.transmission.iter().copied())]);
-        let mut heard = Layer::new("envelope").stroked(theme::BLUE, 1.4);
-        heard.runs([run(&mut points.iter().map(|p| (p.t_us, p.envelope)))]);
+        let mut received = Layer::new("envelope").stroked(theme::BLUE, 1.4);
+        received.runs([run(&mut points.iter().map(|p| (p.t_us, p.envelope)))]);
         let mut threshold = Layer::new("threshold").stroked(theme::VERMILLION, 1.2);
-        let listening = points.iter().filter(|p| p.t_us >= view.blanking_us);
-        threshold.runs([run(&mut listening.map(|p| (p.t_us, p.threshold)))]);
-        layer.extend([sent, heard, threshold]);
+        let active = points.iter().filter(|p| p.t_us >= view.blanking_us);
+        threshold.runs([run(&mut active.map(|p| (p.t_us, p.threshold)))]);
+        layer.extend([sent, received, threshold]);
         layer.add(self.rises(view));
-        layer.add(self.numbers(named));
+        layer.add(self.numbers(numbered));
         layer
     }
 
-    /// Triangles where ECHO rises.
+    /// Draws triangles at the rising edges of ECHO.
     fn rises(&self, view: &TraceView) -> Layer {
         let mut layer = Layer::new("rises").with("fill", theme::VERMILLION);
         for &echo_us in view.trace.detection.echoes_us.iter().filter(|us| **us <= self.until_us) {
@@ -259,13 +259,13 @@ impl Axes {
         layer
     }
 
-    fn numbers(&self, named: &[Named]) -> Layer {
+    fn numbers(&self, numbered: &[NumberedPeak]) -> Layer {
         let mut layer = Layer::new("numbers-of-peaks").haloed();
         let mut labels = Labels::new(self.levels);
-        for (number, peak) in (1..).zip(named) {
+        for (number, peak) in (1..).zip(numbered) {
             let text = format!("{number}");
             let at = Px::new(self.x(peak.peak_us), self.level_y(peak.peak) - 5.0);
-            // Beside each other, or one above the other.
+            // Next to each other, or stacked.
             let place = (0..8)
                 .flat_map(|row| [0.0, 12.0, -12.0].map(|x| at + Px::new(x, -14.0 * f64::from(row))))
                 .find(|place| labels.place(*place, Anchor::Middle, theme::SMALL_PX, &text));
@@ -279,7 +279,7 @@ impl Axes {
     fn gain(&self, view: &TraceView) -> Layer {
         let panel = self.gain;
         let mut layer = Layer::new("gain");
-        layer.add(self.frame(panel, "gain, dB above what a wall at 1 m needs", false));
+        layer.add(self.frame(panel, "gain, dB re 1 m", false));
         let (low, high) = (-15.0, 25.0);
         let y =
             |db: f64| panel.bottom - ((db - low) / (high - low)).clamp(0.0, 1.0) * panel.height();
@@ -299,7 +299,7 @@ impl Axes {
     fn echo(&self, view: &TraceView) -> Layer {
         let panel = self.echo;
         let mut layer = Layer::new("echo");
-        layer.add(self.frame(panel, "ECHO (BLNK makes it ready again after each)", true));
+        layer.add(self.frame(panel, "ECHO output (re-armed by BLNK)", true));
         let (low, high) = (panel.bottom - 5.0, panel.top + 5.0);
         let mut run = vec![Px::new(panel.left, low)];
         for &echo_us in view.trace.detection.echoes_us.iter().filter(|us| **us <= self.until_us) {
@@ -314,12 +314,12 @@ impl Axes {
     }
 }
 
-fn keys() -> Vec<Entry> {
+fn legend_entries() -> Vec<Entry> {
     let line = |colour| Sample::Line { colour, width_px: 2.0, dash: "none" };
     vec![
-        Entry::new(line(theme::ORANGE), "transmission (cut off)"),
-        Entry::new(line(theme::BLUE), "envelope of all sounds"),
-        Entry::new(line(theme::VERMILLION), "threshold in force"),
+        Entry::new(line(theme::ORANGE), "transmit pulse (clipped)"),
+        Entry::new(line(theme::BLUE), "echo envelope"),
+        Entry::new(line(theme::VERMILLION), "detection threshold"),
         Entry::new(
             Sample::Mark { shape: Shape::Triangle, colour: theme::VERMILLION },
             "ECHO rises",
@@ -328,11 +328,11 @@ fn keys() -> Vec<Entry> {
     ]
 }
 
-/// What the numbers stand for; returns the layer and where it ends.
-fn list(view: &TraceView, named: &[Named], top: f64) -> (Layer, f64) {
+/// Draws the list of the numbered paths; returns the layer and its lower end.
+fn list(view: &TraceView, numbered: &[NumberedPeak], top: f64) -> (Layer, f64) {
     let mut layer = Layer::new("paths");
     let mut y = top;
-    for (number, peak) in (1..).zip(named) {
+    for (number, peak) in (1..).zip(numbered) {
         y += theme::TEXT_PX + 4.0;
         let times = if peak.count > 1 { format!(" ({} paths)", peak.count) } else { String::new() };
         let range_m = view.sound_speed_m_s * peak.tof_us * 1e-6 / 2.0;
@@ -340,9 +340,9 @@ fn list(view: &TraceView, named: &[Named], top: f64) -> (Layer, f64) {
         let text = format!("{number}   {range_m:.3} m, {db:.1} dB: {}{times}", peak.name);
         layer.text(Px::new(theme::MARGIN_PX + 8.0, y), Anchor::Start, theme::TEXT_PX, &text);
     }
-    if named.is_empty() {
+    if numbered.is_empty() {
         y += theme::TEXT_PX + 4.0;
-        let text = "no sound comes near the threshold";
+        let text = "no arrival near the threshold";
         layer.text(Px::new(theme::MARGIN_PX + 8.0, y), Anchor::Start, theme::TEXT_PX, text);
     }
     (layer, y + 8.0)

@@ -7,7 +7,7 @@ fn scans() -> Vec<ScanView> {
     ScanView::from_records(LOG.lines().map(|line| decode_line(line.as_bytes()).expect("clean")))
 }
 
-/// A reading of the fixture with status and range of both sides set.
+/// Reading of the fixture with measured and simulated status and range replaced.
 fn ping(
     measured: (PingStatus, Option<f64>),
     simulated: Option<(PingStatus, Option<f64>)>,
@@ -28,11 +28,11 @@ fn ping(
 }
 
 #[test]
-fn each_pair_of_outcomes_has_its_verdict() {
+fn each_pair_of_outcomes_is_classified() {
     use PathKind::{Diffracted, Specular};
     use PingStatus::{Echo, LinkLost, MinRange, ModuleFault, NoEcho, StepDoubtful};
     use Verdict::{Direct, Edge, MinRange as Near, Multiple, Silent, Unexplained};
-    let (echo, silent) = ((Echo, Some(1.0)), (NoEcho, None));
+    let (echo, no_echo) = ((Echo, Some(1.0)), (NoEcho, None));
     let near = (MinRange, Some(0.41));
     for (measured, simulated, kind, order, expected) in [
         (echo, Some(echo), Specular, 1, Ok(Direct)),
@@ -48,10 +48,10 @@ fn each_pair_of_outcomes_has_its_verdict() {
         (near, Some((Echo, Some(0.415))), Specular, 1, Ok(Near)),
         ((Echo, Some(0.415)), Some(near), Specular, 1, Ok(Near)),
         (near, Some(echo), Specular, 1, Ok(Unexplained)),
-        (near, Some(silent), Specular, 1, Ok(Unexplained)),
-        (silent, Some(silent), Specular, 1, Ok(Silent)),
-        (silent, Some(echo), Specular, 1, Ok(Unexplained)),
-        (echo, Some(silent), Specular, 1, Ok(Unexplained)),
+        (near, Some(no_echo), Specular, 1, Ok(Unexplained)),
+        (no_echo, Some(no_echo), Specular, 1, Ok(Silent)),
+        (no_echo, Some(echo), Specular, 1, Ok(Unexplained)),
+        (echo, Some(no_echo), Specular, 1, Ok(Unexplained)),
         (echo, None, Specular, 1, Err(NotCompared::NoPrediction)),
         ((Echo, None), Some(echo), Specular, 1, Err(NotCompared::NoRange)),
         ((Echo, Some(f64::NAN)), Some(echo), Specular, 1, Err(NotCompared::NoRange)),
@@ -66,10 +66,10 @@ fn each_pair_of_outcomes_has_its_verdict() {
 }
 
 #[test]
-fn the_fixture_counts_as_it_should() {
+fn fixture_is_counted() {
     let scans = scans();
-    let (comparison, judged) = compare(&scans);
-    assert_eq!(judged.len(), 7);
+    let (comparison, classified) = compare(&scans);
+    assert_eq!(classified.len(), 7);
     let each_once =
         Counts { direct: 1, multiple: 1, edge: 1, min_range: 1, silent: 1, unexplained: 1 };
     assert_eq!(comparison.verdicts, each_once);
@@ -86,14 +86,14 @@ fn the_fixture_counts_as_it_should() {
 }
 
 #[test]
-fn nothing_to_compare_gives_nulls() {
+fn no_pairs_yield_nulls() {
     let mut scans = scans();
     for ping in &mut scans[0].pings {
         ping.sim = None;
     }
     let (comparison, _) = compare(&scans);
     assert_eq!((comparison.beams, comparison.agree_fraction), (0, None));
-    // The lost reading is lost first, and only then without a prediction.
+    // A lost reading counts as lost even without a prediction.
     let skipped = NotComparedCounts { link_lost: 1, no_prediction: 6, ..Default::default() };
     assert_eq!(comparison.not_compared, skipped);
     let json = serde_json::to_value(&comparison).expect("numbers");
@@ -104,20 +104,20 @@ fn nothing_to_compare_gives_nulls() {
 }
 
 #[test]
-fn of_a_beam_logged_twice_the_reading_that_came_through_counts() {
+fn last_received_reading_counts() {
     let mut scans = scans();
     let lost = scans[0].pings[6].clone();
     let mut fetched = scans[0].pings[0].clone();
     fetched.index = 6;
     // Lost, then fetched; and once more lost.
     scans[0].pings = vec![lost.clone(), fetched, lost];
-    let (comparison, judged) = compare(&scans);
+    let (comparison, classified) = compare(&scans);
     assert_eq!((comparison.beams, comparison.duplicates), (1, 2));
-    assert_eq!(judged[0].verdict, Ok(Verdict::Direct));
+    assert_eq!(classified[0].verdict, Ok(Verdict::Direct));
 }
 
 #[test]
-fn two_sessions_are_counted_together() {
+fn sessions_are_pooled() {
     let twice = LOG.replace("5a0e7f5e", "6b1f8a6f");
     let records = LOG.lines().chain(twice.lines());
     let records: Vec<Record> =
@@ -128,9 +128,9 @@ fn two_sessions_are_counted_together() {
 }
 
 proptest::proptest! {
-    /// Whatever the statuses and ranges, every beam is counted exactly once each way.
+    /// For any statuses and ranges, every beam is counted exactly once in each partition.
     #[test]
-    fn the_counts_add_up(
+    fn counts_add_up(
         sides in proptest::collection::vec((0..5_usize, 0..6_usize, 0.3..2.0_f64, 0.3..2.0_f64), 0..60)
     ) {
         use PingStatus::{Echo, LinkLost, MinRange, NoEcho, StepDoubtful};

@@ -1,43 +1,43 @@
-//! An arc of one scan, and what it says by itself.
+//! Arcs of one scan, and their classification from that scan alone.
 
 use sonard_model::geometry::{DVec2, wrap_pi};
 
 use super::{
     Extents, Reason, Region, Settings, Side, Sweep, UniformSum,
-    belief::{ExtentLikelihood, mean_density},
+    posterior::{ExtentLikelihood, mean_density},
 };
 
-/// An arc within this of the least range may be the rest of one of which the receiver, still shut,
-/// missed the loud part: a faint echo is read by as much too far, metres.
+/// Arcs within this distance of the minimum range may be the remainder of an arc whose loud part
+/// fell into the blanking interval: a faint echo is ranged too long by as much, metres.
 const LATE_M: f64 = 0.05;
 
-/// Planes farther from an arc's direction than this do not cross it, degrees.
+/// Planes farther than this from the direction of an arc do not cross it, degrees.
 const CROSSING_DEG: f64 = 85.0;
 
-/// A covered arc narrower than this may be anything, degrees.
-const LEAST_WALL_DEG: f64 = 8.0;
+/// Covered arcs narrower than this are not taken for walls, degrees.
+const MIN_WALL_DEG: f64 = 8.0;
 
-/// An arc must be this far behind a plane to be hidden by it, metres.
+/// Minimum distance behind a plane at which an arc counts as hidden, metres.
 const BEHIND_M: f64 = 0.05;
 
-/// An arc of one scan.
+/// Arc of one scan, with its geometry and likelihoods.
 #[derive(Debug, Clone)]
 pub(super) struct Arc {
-    /// Which scan.
+    /// Index of the scan.
     pub(super) scan: usize,
-    /// Where it was seen from, world, metres.
+    /// World position of the ranger, metres.
     pub(super) from: DVec2,
-    /// Heading there, degrees.
+    /// Heading of the robot, degrees.
     pub(super) heading_deg: f64,
     pub(super) region: Region,
-    /// World direction of its middle, radians.
+    /// World direction of the middle of the arc, radians.
     pub(super) bearing_rad: f64,
     /// Standard deviation of each border, degrees.
     pub(super) border_sigma_deg: f64,
-    /// What its extent says.
+    /// Likelihoods of the extent by class.
     pub(super) extent_likelihood: ExtentLikelihood,
-    /// So near the end of the blanking that it may be the rest of an arc that began within it.
-    is_rest: bool,
+    /// Close to the end of blanking: possibly the remainder of an arc that began within it.
+    is_remainder: bool,
 }
 
 impl Arc {
@@ -53,22 +53,19 @@ impl Arc {
         let border_sigma_deg = border.hypot(noise.azimuth_deg);
         let extent_likelihood = region.range_m.map_or(ExtentLikelihood::NONE, |range_m| {
             let error = UniformSum::of_extent(region.gaps_deg, border_sigma_deg);
-            let (seen_deg, least) = (region.extent_deg(), extents.least_heard(range_m));
-            let [edge_least, plane_least] = [least / extents.edge_level(range_m, 1.0), least];
-            let plane_corner = mean_density(
-                &error,
-                seen_deg,
-                settings.reflectance_range,
-                plane_least,
-                |strength| extents.plane_corner_deg(range_m, strength),
-            );
+            let (seen_deg, min_level) = (region.extent_deg(), extents.min_detected(range_m));
+            let [min_edge, min_plane] = [min_level / extents.edge_level(range_m, 1.0), min_level];
+            let plane_corner =
+                mean_density(&error, seen_deg, settings.reflectance_range, min_plane, |strength| {
+                    extents.plane_corner_deg(range_m, strength)
+                });
             let edge =
-                mean_density(&error, seen_deg, settings.sigma_e_range, edge_least, |strength| {
+                mean_density(&error, seen_deg, settings.sigma_e_range, min_edge, |strength| {
                     extents.edge_deg(range_m, strength)
                 });
             ExtentLikelihood::new(plane_corner, edge, extents.plane_corner_deg(range_m, 1.0))
         });
-        let is_rest = region.range_m.is_some_and(|m| m < extents.min_range_m + LATE_M);
+        let is_remainder = region.range_m.is_some_and(|m| m < extents.min_range_m + LATE_M);
         Self {
             scan,
             from: sweep.pose.position(),
@@ -77,31 +74,32 @@ impl Arc {
             region,
             border_sigma_deg,
             extent_likelihood,
-            is_rest,
+            is_remainder,
         }
     }
 
-    /// The middle of the arc, world, metres.
+    /// World position of the middle of the arc, metres.
     pub(super) fn point(&self) -> Option<DVec2> {
         let range_m = self.region.range_m?;
         Some(self.from + range_m * DVec2::from_angle(self.bearing_rad))
     }
 
-    /// Whether its extent is rather an edge's than a plane's or corner's (18).
+    /// Returns `true` if the extent fits an edge better than a plane or corner (18).
     pub(super) fn is_edge(&self) -> bool {
         self.extent_likelihood.edge > self.extent_likelihood.plane_corner
     }
 
-    /// How many nearer arcs of its scan would hide it if they were of walls that go on so far: one
-    /// whose plane crosses its direction nearer counts once, and twice if it lies in that direction
-    /// itself. Edges hide nothing; of an arc that something covers only as much as is seen counts.
+    /// Number of nearer arcs of the scan that would hide this one if they were extended walls. An
+    /// arc whose plane crosses this direction at a shorter range counts once, and twice if it lies
+    /// in that direction itself. Edges hide nothing; a partly covered arc counts by its visible
+    /// part.
     pub(super) fn hidden_by(&self, arcs: &[Self], min_range_m: f64) -> usize {
         let Some(range_m) = self.region.range_m else { return 0 };
         let hides = |other: &&Self| {
             let is_wall = if other.region.is_whole() {
                 !other.is_edge()
             } else {
-                other.region.extent_deg() >= LEAST_WALL_DEG
+                other.region.extent_deg() >= MIN_WALL_DEG
             };
             other.scan == self.scan && other.region.beams != self.region.beams && is_wall
         };
@@ -118,10 +116,10 @@ impl Arc {
             .sum()
     }
 
-    /// Why the arc by itself can't be told, if so.
+    /// Reason why the arc can't be classified by itself, if any.
     pub(super) fn fault(&self) -> Option<Reason> {
         let sides = self.region.sides;
-        if self.region.range_m.is_none() || self.is_rest {
+        if self.region.range_m.is_none() || self.is_remainder {
             Some(Reason::MinRange)
         } else if sides.contains(&Side::Covered) {
             Some(Reason::Interference)

@@ -1,43 +1,43 @@
-//! Densities of quantisation errors, with and without noise.
+//! Densities of quantization errors, with and without noise.
 
 use std::f64::consts::{PI, SQRT_2};
 
 use smallvec::SmallVec;
 
-/// Most uniform terms in a sum.
-const MOST_TERMS: usize = 4;
+/// Maximum number of uniform terms in a sum.
+const MAX_TERMS: usize = 4;
 
-/// A sum of independent errors: uniform ones of given widths, each about 0, and a Gaussian one.
+/// Sum of independent errors: uniform ones of given widths, each centred on 0, and a Gaussian one.
 ///
-/// Two widths of one step give the extent's error, Bozma and Kuc's density (19); four of half a
-/// step give that of `beta`, density (23). They treat noise as absent; the Gaussian term is the
-/// generalisation that their section IX asks for, and other widths serve borders at which
-/// beams are missing.
+/// Two widths of one step yield the error of the extent, Bozma and Kuc's density (19); four of
+/// half a step yield that of `beta`, density (23). The paper neglects noise; the Gaussian term is
+/// the generalization that its section IX calls for, and other widths serve borders with missing
+/// beams.
 #[derive(Debug, Clone, PartialEq)]
 pub struct UniformSum {
-    widths: SmallVec<[f64; MOST_TERMS]>,
+    widths: SmallVec<[f64; MAX_TERMS]>,
     sigma: f64,
 }
 
 impl UniformSum {
-    /// A sum of at most four uniform errors of these widths and a Gaussian one of standard
-    /// deviation `sigma`, all in one unit. Widths of 0 or less are left out; so is what follows
-    /// a fourth.
+    /// Sum of at most four uniform errors of these widths and a Gaussian one of standard
+    /// deviation `sigma`, all in one unit. Widths of 0 or less are ignored, as is everything
+    /// after the fourth.
     #[must_use]
     pub fn new(widths: &[f64], sigma: f64) -> Self {
-        let widths = widths.iter().copied().filter(|width| *width > 0.0).take(MOST_TERMS).collect();
+        let widths = widths.iter().copied().filter(|width| *width > 0.0).take(MAX_TERMS).collect();
         Self { widths, sigma: sigma.max(0.0) }
     }
 
     /// Error of an angular extent whose two borders lie in gaps of these widths between beams;
-    /// `sigma` is that of each border (19).
+    /// `sigma` is the standard deviation of each border (19).
     #[must_use]
     pub fn of_extent(gaps: [f64; 2], sigma: f64) -> Self {
         Self::new(&gaps, SQRT_2 * sigma)
     }
 
-    /// Error of `beta` from the gaps at the borders of both regions; `sigmas` are those of each
-    /// border in the two scans, and `heading` is that of the turn between them (23).
+    /// Error of `beta` from the gaps at the borders of both regions; `sigmas` are the standard
+    /// deviations of each border in the two scans, `heading` that of the turn between them (23).
     #[must_use]
     pub fn of_beta(gaps: [[f64; 2]; 2], sigmas: [f64; 2], heading: f64) -> Self {
         let [[a, b], [c, d]] = gaps.map(|pair| pair.map(|gap| gap / 2.0));
@@ -45,13 +45,13 @@ impl UniformSum {
         Self::new(&[a, b, c, d], (borders + heading.powi(2)).sqrt())
     }
 
-    /// The error that is never exceeded without noise, plus `z` standard deviations.
+    /// Largest possible error without noise, plus `z` standard deviations.
     #[must_use]
     pub fn reach(&self, z: f64) -> f64 {
         self.widths.iter().sum::<f64>() / 2.0 + z * self.sigma
     }
 
-    /// Probability density at an error. Without any error at all it is infinite at 0.
+    /// Probability density at an error; infinite at 0 if there is neither quantization nor noise.
     #[must_use]
     pub fn density(&self, error: f64) -> f64 {
         let Some(order) = self.widths.len().checked_sub(1) else { return self.normal(error) };
@@ -71,8 +71,8 @@ impl UniformSum {
         (self.spline(error, order) / factorial(order)).clamp(0.0, 1.0)
     }
 
-    /// The density is the difference, over every term's two ends, of the power that a sum of
-    /// steps integrates to; the Gaussian smooths that power.
+    /// Finite difference, over both ends of every term, of the integrated power of a step function;
+    /// the Gaussian smooths that power.
     fn spline(&self, error: f64, order: usize) -> f64 {
         let terms = self.widths.len();
         let product: f64 = self.widths.iter().product();

@@ -1,4 +1,4 @@
-//! How wide the arcs of planes, corners and edges are.
+//! Angular extents of the arcs of planes, corners and edges.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -7,12 +7,12 @@ use thiserror::Error;
 use sonard_model::acoustics::{Air, AirError, BeamPattern, Sensor, SensorError, edge::bozma_kuc};
 use sonard_records::Session;
 
-/// Angular extents that a sensor gives to planes, corners and edges (Bozma and Kuc, equations
+/// Angular extents that a sensor produces for planes, corners and edges (Bozma and Kuc, equations
 /// (7) and (15) to (17)).
 ///
-/// Their sensor's beam is Gaussian and its gain makes up for the air; here the beam is the
-/// sensor's own pattern, and where the air's absorption was not made up for, it counts. With
-/// the preset `bozma-kuc-60khz` and no absorption the figures are theirs.
+/// The paper's sensor has a Gaussian beam and a gain that compensates absorption. Here the beam is
+/// the sensor's own pattern, and uncompensated absorption is included. With the preset
+/// `bozma-kuc-60khz` and no absorption the values are those of the paper.
 #[derive(Debug, Clone)]
 pub struct Extents {
     beam: BeamPattern,
@@ -22,29 +22,29 @@ pub struct Extents {
     half_beam_rad: f64,
     absorption_db_per_m: f64,
     threshold_rise_db_per_m: f64,
-    /// Range of the end of blanking, metres.
+    /// Range at the end of blanking, metres.
     pub min_range_m: f64,
-    /// Farthest range listened to, metres.
+    /// Maximum range, metres.
     pub max_range_m: f64,
 }
 
-/// An error in a session's figures.
+/// Invalid sensor or air data of a session.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum ExtentError {
-    /// The sensor's data make no sense.
+    /// Invalid sensor data.
     #[error("sensor: {0}")]
     Sensor(#[from] SensorError),
-    /// The air's data make no sense.
+    /// Invalid air data.
     #[error("air: {0}")]
     Air(#[from] AirError),
 }
 
 impl Extents {
-    /// For a sensor in some air; `compensated`: the air's absorption is made up for even if the
-    /// sensor's gain is not said to do so.
+    /// Extents for a sensor in given air; `compensated` assumes that absorption is compensated
+    /// even if the sensor's gain does not.
     ///
     /// # Errors
-    /// When the sensor's data make no sense.
+    /// Invalid sensor data.
     pub fn new(sensor: &Sensor, air: &Air, compensated: bool) -> Result<Self, ExtentError> {
         sensor.check()?;
         let speed_m_s = air.sound_speed_m_s();
@@ -68,11 +68,11 @@ impl Extents {
         })
     }
 
-    /// As a log's session describes sensor and air, with the model's own threshold and
-    /// losslessness where it says so (a simulated log is all model).
+    /// Extents for the sensor and air of a logged session, with the threshold and losslessness of
+    /// the model where the session has them (a simulated log is all model).
     ///
     /// # Errors
-    /// When the session's figures make no sense.
+    /// Invalid sensor or air data.
     pub fn of_session(session: &Session) -> Result<Self, ExtentError> {
         let setting =
             |name: &str| session.model.as_ref().and_then(|model| model.settings.get(name));
@@ -85,50 +85,50 @@ impl Extents {
         Self::new(&sensor, &Air::try_from(&session.air)?, lossless)
     }
 
-    /// Extent of a plane or corner of this reflectance at a range, degrees (15).
+    /// Extent of a plane or corner of the given reflectance at a range, degrees (15).
     #[must_use]
     pub fn plane_corner_deg(&self, range_m: f64, reflectance: f64) -> f64 {
-        self.at_level_deg(self.heard_level(range_m, reflectance))
+        self.extent_at_level_deg(self.relative_level(range_m, reflectance))
     }
 
     /// Extent of an edge of scattering strength `sigma_e` at a range, degrees; 0 where it is not
-    /// heard (16).
+    /// detected (16).
     #[must_use]
     pub fn edge_deg(&self, range_m: f64, sigma_e: f64) -> f64 {
-        self.at_level_deg(self.heard_level(range_m, self.edge_level(range_m, sigma_e)))
+        self.extent_at_level_deg(self.relative_level(range_m, self.edge_level(range_m, sigma_e)))
     }
 
-    /// Echo of an edge relative to a perfect wall's (5).
+    /// Echo amplitude of an edge relative to a perfect wall (5).
     pub(super) fn edge_level(&self, range_m: f64, sigma_e: f64) -> f64 {
         bozma_kuc(range_m, sigma_e, self.far_field_m)
     }
 
-    /// The echo relative to a perfect wall's that is just heard at a range.
-    pub(super) fn least_heard(&self, range_m: f64) -> f64 {
-        self.threshold / self.heard_level(range_m, 1.0)
+    /// Minimum detectable echo amplitude at a range, relative to a perfect wall.
+    pub(super) fn min_detected(&self, range_m: f64) -> f64 {
+        self.threshold / self.relative_level(range_m, 1.0)
     }
 
-    /// The boundary between the extents of edges and those of planes and corners, degrees (17).
+    /// Boundary between the extents of edges and those of planes and corners, degrees (17).
     #[must_use]
     pub fn boundary_deg(&self, range_m: f64, sigma_e: f64) -> f64 {
         (self.edge_deg(range_m, sigma_e) + self.plane_corner_deg(range_m, 1.0)) / 2.0
     }
 
-    /// The range beyond which an edge is not heard where the air takes nothing, metres (7).
+    /// Maximum range at which an edge is detected without absorption, metres (7).
     #[must_use]
     pub fn edge_max_range_m(&self, sigma_e: f64) -> f64 {
         (sigma_e / self.threshold).powi(2) * self.far_field_m
     }
 
-    /// The step that tells edges from planes and corners without error, degrees (20).
+    /// Largest step that separates edges from planes and corners without error, degrees (20).
     #[must_use]
     pub fn largest_step_deg(&self, range_m: f64, sigma_e: f64) -> f64 {
         (self.plane_corner_deg(range_m, 1.0) - self.edge_deg(range_m, sigma_e)) / 2.0
     }
 
-    /// Standard deviation of a border of an arc of this extent, degrees, when the amplitude has
-    /// noise of standard deviation `noise` relative to a head-on perfect wall: the noise over
-    /// the slope of the amplitude where it crosses the threshold.
+    /// Standard deviation of a border of an arc of this extent, degrees, for amplitude noise of
+    /// standard deviation `noise` relative to a head-on perfect wall: the noise divided by the
+    /// slope of the amplitude at the threshold crossing.
     #[must_use]
     pub fn border_sigma_deg(&self, extent_deg: f64, noise: f64) -> f64 {
         let half_rad = (extent_deg / 2.0).to_radians();
@@ -139,17 +139,17 @@ impl Extents {
         let log_at = |theta: f64| 2.0 * self.beam.one_way(theta).max(f64::MIN_POSITIVE).ln();
         let slope = (log_at(half_rad - step_rad) - log_at(half_rad + step_rad)) / (2.0 * step_rad);
         let sigma_rad = noise / self.threshold / slope.max(f64::MIN_POSITIVE);
-        // No border can be further off than the arc is wide.
+        // The error of a border is limited by the width of the arc.
         sigma_rad.min(half_rad).to_degrees()
     }
 
-    /// The sensor's beam pattern.
+    /// Beam pattern of the sensor.
     #[must_use]
     pub const fn beam(&self) -> &BeamPattern {
         &self.beam
     }
 
-    /// Half the width of the sensor's face, metres.
+    /// Half width of the transducer's face, metres.
     #[must_use]
     pub const fn half_width_m(&self) -> f64 {
         self.half_width_m
@@ -167,15 +167,15 @@ impl Extents {
         self.far_field_m
     }
 
-    /// Level of an echo that is `level` relative to a perfect wall's, beside what the receiver notices at that range
-    /// as it does `threshold` at none.
-    fn heard_level(&self, range_m: f64, level: f64) -> f64 {
+    /// Amplitude `level` (relative to a perfect wall) reduced by absorption and by the rise of the
+    /// threshold over a range, for comparison with the threshold at zero range.
+    fn relative_level(&self, range_m: f64, level: f64) -> f64 {
         let loss_db_per_m = 2.0 * self.absorption_db_per_m + self.threshold_rise_db_per_m;
         level * 10_f64.powf(-loss_db_per_m * range_m / 20.0)
     }
 
-    /// Twice the angle at which the beam, out and back, takes `level` down to the threshold.
-    fn at_level_deg(&self, level: f64) -> f64 {
+    /// Extent within which the two-way beam pattern keeps `level` above the threshold, degrees.
+    fn extent_at_level_deg(&self, level: f64) -> f64 {
         if level <= self.threshold || !level.is_finite() {
             return 0.0;
         }

@@ -1,4 +1,4 @@
-//! What an interpretation says, and by which settings.
+//! Features found by the interpretation, and its settings.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -7,22 +7,22 @@ use uuid::Uuid;
 /// Settings of the interpretation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings {
-    /// Scattering strength of edges, for which the boundary is drawn. Bozma and Kuc found 0.095
+    /// Assumed scattering strength of edges, which sets the boundary. Bozma and Kuc measured 0.095
     /// for theirs.
     pub sigma_e: f64,
-    /// Least and greatest scattering strength that an edge may have. They found 0.035 to 0.10.
+    /// Minimum and maximum scattering strength of an edge. Bozma and Kuc measured 0.035 to 0.10.
     pub sigma_e_range: [f64; 2],
-    /// Least and greatest reflectance of planes and corners.
+    /// Minimum and maximum reflectance of planes and corners.
     pub reflectance_range: [f64; 2],
-    /// How far a reading may be from its region's mean, metres.
+    /// Maximum deviation of a reading from the mean of its region, metres.
     pub depth_tolerance_m: f64,
-    /// So many odd beams inside a region are passed over.
+    /// Maximum number of consecutive outliers bridged inside a region.
     pub most_holes: usize,
-    /// Noise beside the quantisation.
+    /// Noise in addition to the quantization.
     pub noise: Noise,
-    /// A kind less probable than this is not named.
+    /// Minimum probability for a feature to be classified.
     pub min_confidence: f64,
-    /// How much longer than the least that decides a proposed translation is.
+    /// Factor by which a proposed translation exceeds the minimum that decides.
     pub translation_margin: f64,
 }
 
@@ -41,74 +41,76 @@ impl Default for Settings {
     }
 }
 
-/// Standard deviations of what is not quantisation; 0 each by default, as in the paper.
+/// Standard deviations of the noise other than quantization; 0 each by default, as in the paper.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Noise {
-    /// Of an echo's amplitude, relative to a head-on, perfect wall (40 dB of SNR: 0.01).
+    /// Standard deviation of an echo's amplitude, relative to a head-on perfect wall (0.01 for an
+    /// SNR of 40 dB).
     pub amplitude: f64,
-    /// Of each beam's azimuth, degrees.
+    /// Standard deviation of the azimuth of each beam, degrees.
     pub azimuth_deg: f64,
-    /// Of the heading between two scans, degrees.
+    /// Standard deviation of the heading change between two scans, degrees.
     pub heading_deg: f64,
 }
 
-/// What an element of the floor plan is.
+/// Class of an element of the floor plan.
 #[derive(
     Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, JsonSchema,
 )]
 #[serde(rename_all = "snake_case")]
 pub enum FeatureKind {
-    /// A flat wall.
+    /// Flat wall.
     Plane,
-    /// Two walls seen from inside, at a right angle.
+    /// Concave right-angled corner of two walls.
     Corner,
-    /// Two walls seen from outside, or the end of one.
+    /// Convex corner of two walls, or the end of one.
     Edge,
-    /// One of these, or none: [`Reason`] says why that is open.
+    /// Undecided, for the given [`Reason`].
     Unresolved,
 }
 
-/// Why a feature is unresolved.
+/// Reason why a feature is unresolved.
 #[derive(
     Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, JsonSchema,
 )]
 #[serde(rename_all = "snake_case")]
 pub enum Reason {
-    /// A plane or a corner: a scan from another place decides.
+    /// Plane or corner, to be decided by a scan from a second position.
     SecondPosition,
-    /// The other place is too near to decide (25).
+    /// Second position too close to decide (25).
     Translation,
-    /// Not found again from the other place.
+    /// Element not found again from the second position.
     Lost,
-    /// From the other place several arcs may be it, or one that fits neither plane nor corner.
+    /// Several matching arcs from the second position, or one that fits neither plane nor corner.
     Ambiguous,
-    /// Something nearer covers a part of its arc.
+    /// Arc partly covered by a nearer target.
     Interference,
-    /// The scan, or what was measured of it, ends in its arc.
+    /// Arc cut off by the end of the scan, or of its valid readings.
     CutOff,
-    /// Its arc is as wide as that of neither an edge nor a plane or corner.
+    /// Extent that matches neither an edge nor a plane or corner.
     Extent,
-    /// It lies behind what may be walls, so the sound may have come by way of them.
+    /// Arc behind possible walls: a likely multiple reflection.
     Reflections,
-    /// Closer than can be measured.
+    /// Target below the minimum range.
     MinRange,
 }
 
-/// Probabilities of the three kinds and of something else; all 0 where the arc says nothing.
+/// Probabilities of the three classes and of other; all 0 for an arc without a range.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct Probabilities {
-    /// Of a plane.
+    /// Probability of a plane.
     pub plane: f64,
-    /// Of a corner.
+    /// Probability of a corner.
     pub corner: f64,
-    /// Of an edge.
+    /// Probability of an edge.
     pub edge: f64,
-    /// Of something else: sound by way of several walls or between a wall and the ranger, a round body.
+    /// Probability of other: multiple reflections, echoes between a wall and the ranger, round
+    /// bodies.
     pub other: f64,
 }
 
 impl Probabilities {
-    /// The likeliest of the three kinds and its probability.
+    /// Most probable of the three classes, with its probability.
     #[must_use]
     pub fn best(&self) -> (FeatureKind, f64) {
         [
@@ -122,49 +124,49 @@ impl Probabilities {
     }
 }
 
-/// One element of the floor plan, as its record.
+/// Record of one element of the floor plan.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Feature {
-    /// What it is.
+    /// Class of the element.
     pub kind: FeatureKind,
-    /// World x of the middle of its arc, metres; `None` where only the direction is known.
+    /// World x of the middle of the arc, metres; `None` where only the direction is known.
     pub x_m: Option<f64>,
-    /// World y of the middle of its arc, metres.
+    /// World y of the middle of the arc, metres.
     pub y_m: Option<f64>,
-    /// Direction of its arc's middle (`theta_N`), degrees counter-clockwise from the heading.
+    /// Direction of the middle of the arc (`theta_N`), degrees counter-clockwise from the heading.
     pub bearing_deg: f64,
-    /// Range, metres.
+    /// Median range, metres.
     pub range_m: Option<f64>,
-    /// Estimated angular extent of its arc, degrees (13).
+    /// Estimated angular extent of the arc, degrees (13).
     pub extent_deg: f64,
-    /// Change of `theta_N` from the place it was seen from to the other one (21), degrees,
-    /// counted so that a corner's is positive.
+    /// Change of `theta_N` from the first to the second position (21), degrees, positive for a
+    /// corner.
     pub beta_deg: Option<f64>,
-    /// Probability of the kind; for what is unresolved, of the likeliest one.
+    /// Probability of the class; for an unresolved feature, of the most probable one.
     pub confidence: f64,
-    /// Indices in the plan of the first and last beam of its arc.
+    /// Indices in the plan of the first and last beam of the arc.
     pub beams: [u32; 2],
-    /// Why it is unresolved.
+    /// Reason why the feature is unresolved.
     pub reason: Option<Reason>,
-    /// What the confidence is chosen from.
+    /// Probabilities of all classes.
     pub probabilities: Probabilities,
-    /// The extent that a plane or corner of reflectance 1 would have, degrees (15).
+    /// ExpectedView extent of a plane or corner of reflectance 1, degrees (15).
     pub extent_plane_corner_deg: Option<f64>,
-    /// The extent that an edge would have, degrees (16).
+    /// ExpectedView extent of an edge, degrees (16).
     pub extent_edge_deg: Option<f64>,
-    /// The boundary `b(r)` between the two, degrees (17).
+    /// Boundary `b(r)` between the two extents, degrees (17).
     pub boundary_deg: Option<f64>,
-    /// What `beta_deg` would be for a corner (22a); for a plane it would be 0.
+    /// ExpectedView `beta_deg` of a corner (22a); that of a plane is 0.
     pub beta_corner_deg: Option<f64>,
-    /// Where to scan from next to decide it.
+    /// Proposed position of the scan that decides the class.
     pub next: Option<NextPosition>,
-    /// The scan whose beams these are.
+    /// Scan of the beams.
     pub scan: Uuid,
-    /// The scan that it was found again in.
+    /// Scan in which the element was found again.
     pub second_scan: Option<Uuid>,
 }
 
-/// A place from which the next scan decides between plane and corner.
+/// Position from which the next scan decides between plane and corner.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct NextPosition {
     /// World x, metres.
@@ -175,10 +177,10 @@ pub struct NextPosition {
     pub direction_deg: f64,
     /// Length of travel, metres.
     pub delta_m: f64,
-    /// How many open features a scan from there decides.
+    /// Number of open features decided by a scan from there.
     pub decides: usize,
-    /// Least width of the element, if a plane, to be seen from both places, metres (27).
+    /// Minimum width of a plane to be detected from both positions, metres (27).
     pub least_plane_m: f64,
-    /// Least length of each side, if a corner, metres (26), (28).
+    /// Minimum length of each side of a corner, metres (26), (28).
     pub least_corner_m: f64,
 }

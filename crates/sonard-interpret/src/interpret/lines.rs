@@ -1,9 +1,9 @@
-//! Maps of line segments.
+//! Maps of line segments from sonar and laser scans.
 //!
 //! After G. Dudek, P. Freedman and I. Rekleitis, "Just-in-time sensing: efficiently combining
-//! sonar and laser range data for exploring unknown worlds", ICRA 1996: readings that can't be
-//! right are left out, the rest fall into clusters by the sphere-of-influence graph, segments are
-//! fitted to each, and segments of one wall are merged by what they were made of.
+//! sonar and laser range data for exploring unknown worlds", ICRA 1996. Implausible readings are
+//! discarded and the rest clustered by the sphere-of-influence graph. Segments are fitted to each
+//! cluster, and segments of one wall are merged according to their sources.
 
 mod cluster;
 mod error;
@@ -33,22 +33,22 @@ pub enum LineKind {
     Sonar,
     /// Laser readings only.
     Laser,
-    /// Both.
+    /// Sonar and laser readings.
     Complex,
 }
 
-/// A line of the map.
+/// Line segment of a map.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MapLine {
-    /// Its ends, metres.
+    /// End points, metres.
     pub ends: [DVec2; 2],
-    /// Which ends are confirmed: the wall does end there.
+    /// Confirmed ends: the wall does end there.
     pub terminal: [bool; 2],
-    /// What it was made of.
+    /// Source of the readings.
     pub kind: LineKind,
-    /// From 0 (a guess) to 1.
+    /// Confidence from 0 (a guess) to 1.
     pub confidence: f64,
-    /// Where the robot was when it saw it, metres.
+    /// Position of the robot at the time of detection, metres.
     pub seen_from: DVec2,
 }
 
@@ -59,24 +59,24 @@ impl MapLine {
         self.ends[0].distance(self.ends[1])
     }
 
-    /// From its first end to its second, a unit vector; zero for a line without length.
+    /// Unit vector from the first end to the second; zero for a line without length.
     #[must_use]
     pub fn direction(&self) -> DVec2 {
         (self.ends[1] - self.ends[0]).normalize_or_zero()
     }
 
-    /// Distance to the nearest point of it, metres.
+    /// Distance to the nearest point of the line, metres.
     #[must_use]
     pub fn distance_m(&self, point: DVec2) -> f64 {
         distance_to_segment(point, self.ends[0], self.ends[1])
     }
 
-    /// Where the lines through two segments cross, if their angle is at least `least_deg`.
+    /// Intersection of the lines through two segments, if their angle is at least `min_deg`.
     #[must_use]
-    pub fn meets(&self, other: &Self, least_deg: f64) -> Option<DVec2> {
+    pub fn meets(&self, other: &Self, min_deg: f64) -> Option<DVec2> {
         let (along, across) = (self.direction(), other.direction());
         let sine = along.perp_dot(across);
         let place_m = (other.ends[0] - self.ends[0]).perp_dot(across) / sine;
-        (sine.abs() >= least_deg.to_radians().sin()).then(|| self.ends[0] + place_m * along)
+        (sine.abs() >= min_deg.to_radians().sin()).then(|| self.ends[0] + place_m * along)
     }
 }

@@ -1,4 +1,4 @@
-//! An occupancy grid of scans: which cells, what a reading says of them, and how often it counts.
+//! Occupancy grids of scans: extent, sensor model and evidence weight.
 
 mod growing;
 
@@ -11,42 +11,43 @@ use super::{
 };
 use sonard_model::geometry::DVec2;
 
-/// Without a word on it, ranges beyond this are not mapped, metres.
+/// Default maximum range of mapped readings, metres.
 pub const MAX_RANGE_M: f64 = 5.0;
 
-/// Around what was seen, metres.
+/// Margin around the detected region, metres.
 const MARGIN_M: f64 = 0.5;
 
-/// From so many scans on each counts once.
+/// Number of scans from which each has a weight of one.
 const ENOUGH_SCANS: usize = 5;
 
-/// Settings of a map; what is `None` follows from the scans.
+/// Settings of a map; those that are `None` are derived from the scans.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Mapping {
     /// Side of a cell, metres.
     pub resolution_m: f64,
-    /// Lower left and upper right corner of what is mapped, metres; without it, around what was seen.
+    /// Lower left and upper right corner of the map, metres; defaults to the detected region.
     pub region: Option<[DVec2; 2]>,
-    /// Ranges beyond this are taken for silence, metres; without it the sensor's, at most [`MAX_RANGE_M`].
+    /// Ranges beyond this count as no echo, metres; defaults to the sensor's maximum range, at most
+    /// [`MAX_RANGE_M`].
     pub silent_beyond_m: Option<f64>,
-    /// Full beam width, degrees; without it that of a plane's arc, and of an array its usual one.
+    /// Full beam width, degrees; defaults to a plane's extent, for an array to its nominal width.
     pub beam_deg: Option<f64>,
-    /// Exponent of the confidence with the distance of a feature.
+    /// Exponent of the confidence as a function of the distance of a feature.
     pub exponent: f64,
-    /// How far walls are extended beyond their observed part, metres.
+    /// Assumed extension of walls beyond their observed part, metres.
     pub extend_m: f64,
-    /// Readings of less confidence are left out; 0.5 is full confidence.
+    /// Minimum confidence of a reading, at most 0.5 (full confidence); others are discarded.
     pub least_confidence: f64,
-    /// How often each scan counts; without it, so often that few scans decide their cells.
+    /// Weight of each scan; defaults to a weight at which few scans decide their cells.
     pub evidence: Option<u8>,
-    /// Whether readings that contradict predicted features count less.
+    /// Whether readings that contradict predicted features have less weight.
     pub predicts_features: bool,
-    /// Whether a reading says of cells what the sensor's beam pattern and threshold do, and not a Gaussian.
+    /// Whether the inverse sensor model uses the beam pattern and threshold instead of a Gaussian.
     pub is_physical: bool,
 }
 
 impl Default for Mapping {
-    /// What did best on made-up rooms.
+    /// Best settings found on random rooms.
     fn default() -> Self {
         Self {
             resolution_m: 0.05,
@@ -64,38 +65,39 @@ impl Default for Mapping {
 }
 
 impl Mapping {
-    /// Range up to which readings of a sensor are mapped, metres.
+    /// Maximum range of mapped readings of a sensor, metres.
     #[must_use]
     pub fn max_range_m(&self, extents: &Extents) -> f64 {
         self.silent_beyond_m.unwrap_or_else(|| extents.max_range_m.min(MAX_RANGE_M))
     }
 
-    /// The region asked for, else around poses and echoes within range.
+    /// Grid over the requested region, else around poses and echoes within range.
     ///
     /// # Errors
-    /// When that makes too many cells, or none.
+    /// Too many cells, or none.
     pub fn shape<'a>(
         &self,
         sweeps: impl IntoIterator<Item = &'a Sweep>,
         max_range_m: f64,
     ) -> Result<GridShape, GridError> {
         let [low, high] = self.region.unwrap_or_else(|| {
-            let seen = sweeps.into_iter().map(|sweep| seen(sweep, max_range_m)).reduce(both);
-            self.around(seen.unwrap_or([DVec2::ZERO, DVec2::ONE]))
+            let seen = sweeps.into_iter().map(|sweep| bounds(sweep, max_range_m)).reduce(union);
+            self.with_margin(seen.unwrap_or([DVec2::ZERO, DVec2::ONE]))
         });
         GridShape::covering(low, high, self.resolution_m)
     }
 
-    /// The region around what was seen, from corner to corner.
-    fn around(&self, [low, high]: [DVec2; 2]) -> [DVec2; 2] {
-        // Corners on whole cells, so that maps of one place lie on each other.
+    /// Region with its margin, from corner to corner.
+    fn with_margin(&self, [low, high]: [DVec2; 2]) -> [DVec2; 2] {
+        // Corners on whole cells, so that maps of one place are aligned.
         let cell = self.resolution_m;
         let low = ((low - MARGIN_M) / cell).floor() * cell;
         [low, ((high + MARGIN_M) / cell).ceil() * cell]
     }
 
-    /// How often each of so many scans counts. A reading's odds are set for maps of many scans: one
-    /// scan brings a cell before it from 0.5 to about 0.41, four to 0.19, which `map_server` calls free.
+    /// Weight of each of `scans` scans. The odds of a reading are set for maps of many scans: one
+    /// scan brings a cell before it from 0.5 to about 0.41, four to 0.19, which `map_server`
+    /// classifies as free.
     #[must_use]
     pub fn evidence(&self, scans: usize) -> u8 {
         self.evidence.unwrap_or(ENOUGH_SCANS.div_ceil(scans.clamp(1, ENOUGH_SCANS)) as u8)
@@ -126,48 +128,48 @@ impl Mapping {
     }
 }
 
-/// Lower left and upper right corner of where a scan's ranger stood and where it heard something within range.
-fn seen(sweep: &Sweep, max_range_m: f64) -> [DVec2; 2] {
+/// Bounding box of the ranger position and the echoes within range, lower left and upper right.
+fn bounds(sweep: &Sweep, max_range_m: f64) -> [DVec2; 2] {
     let echoes = sweep.beams.iter().filter_map(|beam| match beam.heard {
         Heard::Echo(m) if m <= max_range_m => Some(sweep.point(beam, m)),
         _ => None,
     });
-    let stood = sweep.pose.position();
-    echoes.map(|place| [place; 2]).fold([stood; 2], both)
+    let position = sweep.pose.position();
+    echoes.map(|echo| [echo; 2]).fold([position; 2], union)
 }
 
-/// The corners of two regions together.
-fn both([low, high]: [DVec2; 2], other: [DVec2; 2]) -> [DVec2; 2] {
+/// Bounding box of two boxes.
+fn union([low, high]: [DVec2; 2], other: [DVec2; 2]) -> [DVec2; 2] {
     [low.min(other[0]), high.max(other[1])]
 }
 
-/// A map in the making.
+/// Incremental construction of a map.
 #[derive(Debug)]
 pub struct Mapper {
     grid: Grid,
-    appraiser: Appraiser,
+    assessor: Assessor,
     evidence: u8,
 }
 
-/// What readings of a sensor say, and how far each is believed.
+/// Inverse sensor model and confidence assessment of a sensor.
 #[derive(Debug)]
-struct Appraiser {
+struct Assessor {
     model: BeamModel,
     predictor: Option<FeaturePrediction>,
     trust: Trust,
 }
 
-/// The result of adding a scan to a map.
+/// Result of adding a scan to a map.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Added {
-    /// Of its beams, where features are predicted.
+    /// Assessments of the beams, if features are predicted.
     pub assessments: Option<Vec<Assessment>>,
-    /// Readings left out for want of confidence.
+    /// Readings discarded for low confidence.
     pub left_out: usize,
 }
 
 impl Mapper {
-    /// Onto a grid, with so many scans to come of a sensor's extents; `of_array` of several at fixed bearings.
+    /// Mapper onto a grid, for an expected number of scans; `of_array` for several fixed rangers.
     #[must_use]
     pub fn new(
         mapping: &Mapping,
@@ -176,14 +178,14 @@ impl Mapper {
         of_array: bool,
         scans: usize,
     ) -> Self {
-        let appraiser = Appraiser::new(mapping, extents, of_array);
-        Self { grid, appraiser, evidence: mapping.evidence(scans) }
+        let assessor = Assessor::new(mapping, extents, of_array);
+        Self { grid, assessor, evidence: mapping.evidence(scans) }
     }
 
-    /// Adds a scan.
+    /// Adds a scan with its weight.
     pub fn add(&mut self, sweep: &Sweep) -> Added {
-        let assessments = self.appraiser.assess(sweep);
-        let Appraiser { model, trust, .. } = &self.appraiser;
+        let assessments = self.assessor.assess(sweep);
+        let Assessor { model, trust, .. } = &self.assessor;
         let mut left_out = 0;
         for _ in 0..self.evidence {
             left_out = self.grid.add(sweep, assessments.as_deref(), model, trust);
@@ -191,14 +193,14 @@ impl Mapper {
         Added { assessments, left_out }
     }
 
-    /// The map.
+    /// Returns the finished map.
     #[must_use]
     pub fn finish(self) -> Grid {
         self.grid
     }
 }
 
-impl Appraiser {
+impl Assessor {
     fn new(mapping: &Mapping, extents: Extents, of_array: bool) -> Self {
         let max_range_m = mapping.max_range_m(&extents);
         let (model, prediction) = mapping.beam(extents, max_range_m, of_array);
@@ -207,7 +209,7 @@ impl Appraiser {
         Self { model, predictor, trust }
     }
 
-    /// How far the readings of the next scan are believed.
+    /// Assesses the readings of the next scan.
     fn assess(&mut self, sweep: &Sweep) -> Option<Vec<Assessment>> {
         self.predictor.as_mut().map(|predictor| predictor.assess(sweep))
     }

@@ -1,10 +1,10 @@
-//! Feature Prediction: a confidence for every reading.
+//! Feature Prediction: confidence of each reading.
 //!
 //! After S. O'Sullivan and others' Feature Prediction: readings of a smooth wall far from its
-//! perpendicular are too long or missing. Where walls are is predicted from the readings that
-//! are right, and readings that such a wall contradicts lose confidence. It works on a ring of
-//! sonars as on a stepper's scan. Where the paper's scan lost a formula, this follows the text
-//! around it: the intervals given, and 0.5 as what changes nothing in a Bayesian update.
+//! perpendicular are too long or missing. Walls are predicted from correct readings, and readings
+//! contradicted by such a wall lose confidence. The method applies to a ring of sonars and to a
+//! stepper's scan. Where a formula is illegible in the available scan of the paper, this follows
+//! the surrounding text: the stated intervals, and 0.5 as neutral in a Bayesian update.
 
 mod confidence;
 mod line;
@@ -23,43 +23,46 @@ use sonard_model::geometry::{DVec2, wrap_pi};
 /// Settings of Feature Prediction.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PredictionSettings {
-    /// Full width of a beam, degrees: how wide a feature a reading makes.
+    /// Full width of a beam, degrees; sets the width of the feature of a reading.
     pub beam_deg: f64,
-    /// `omega`: a feature whose normal is within this of a beam's axis should be heard, degrees.
+    /// `omega`: maximum angle between a feature's normal and the axis of a beam that should detect
+    /// it, degrees.
     pub omega_deg: f64,
     /// Exponent of the confidence with regard to distance: 2, or 1 for the text's "directly
     /// proportional".
     pub exponent: f64,
-    /// Range that a silent beam stands for, metres.
+    /// Assumed range of a beam without echo, metres.
     pub max_range_m: f64,
-    /// Features closer than this along their normal may be one, metres.
+    /// Maximum distance along the normal between features that may be one, metres.
     pub near_m: f64,
-    /// And with a gap of at most this along them, metres.
+    /// Maximum gap between such features along the wall, metres.
     pub gap_m: f64,
-    /// A feature of one reading that is less confident than this is dropped.
+    /// Confidence below which a feature of a single reading is dropped.
     pub least_confidence: f64,
-    /// `T_d`: features last seen farther than this from the robot are forgotten, metres.
+    /// `T_d`: features last seen from farther than this are forgotten, metres.
     pub forget_m: f64,
     /// `T_L`: features shorter than this are dropped after a split, metres.
     pub least_length_m: f64,
-    /// A feature of several readings is taken to go on beyond its ends by this for beams that
-    /// could not hear it there, metres, unless it was split there ([`Self::end_m`]). The paper has no such thing (0):
-    /// its ring of wide beams sees more of a wall at once than a narrow one.
+    /// Assumed extension of a feature of several readings beyond its ends, for beams that could not
+    /// detect it there, metres; limited by [`Self::end_m`] where it was split. Not in the paper
+    /// (0): its ring of wide beams sees more of a wall at once than a narrow beam.
     pub extend_m: f64,
-    /// By how much both parts are shortened at a split, metres.
+    /// Length by which both parts are shortened at a split, metres.
     pub shorten_m: f64,
-    /// A feature whose normal is within this of a beam's axis is heard for certain: where it is not,
-    /// it is split, degrees. The paper takes `omega`; but at the edge of its arc a wall is as often
-    /// silent as heard, so that every wall would be split on both sides of its perpendicular.
+    /// Angle between a feature's normal and a beam's axis within which the feature is always
+    /// detected: otherwise it is split, degrees. The paper uses `omega`; but at the edge of its arc
+    /// a wall is detected only half of the time, so every wall would be split on both sides of its
+    /// perpendicular.
     pub heard_deg: f64,
-    /// How far a feature may still go on where it was split, metres. The less, the more right readings are
-    /// trusted on a long course; the more, the fewer false paths a map has: 0.2, 0.5 and 1 m give 87, 84 and
-    /// 78 % of them in the last fifty of 500 scans of an L-shaped room, and 43, 38 and 37 % false paths.
+    /// Maximum extension of a feature where it was split, metres. A smaller value trusts more
+    /// correct readings on a long course; a larger one reduces the false paths of a map. 0.2, 0.5
+    /// and 1 m trust 87, 84 and 78 % of them in the last fifty of 500 scans of an L-shaped room,
+    /// with 43, 38 and 37 % false paths.
     pub end_m: f64,
 }
 
 impl PredictionSettings {
-    /// The paper's, for a ring of sonars with 25 degrees of aperture.
+    /// The paper's settings, for a ring of sonars with 25 degrees of aperture.
     #[must_use]
     pub const fn ring(max_range_m: f64) -> Self {
         Self {
@@ -79,8 +82,8 @@ impl PredictionSettings {
         }
     }
 
-    /// For a stepper's scan by a sensor that gives planes arcs of this extent, degrees: a beam
-    /// hears a plane that is within half of it from its perpendicular.
+    /// Settings for a stepper's scan by a sensor with the given extent of planes, degrees: a beam
+    /// detects a plane within half of that from its perpendicular.
     #[must_use]
     pub fn stepper(plane_extent_deg: f64, max_range_m: f64) -> Self {
         let half_deg = plane_extent_deg / 2.0 + 1.0;
@@ -88,50 +91,50 @@ impl PredictionSettings {
     }
 }
 
-/// Trust in a reading.
+/// Confidence of a reading, and the range up to which it is certain.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Assessment {
-    /// 0 (not to be believed) to 0.5 (nothing speaks against it).
+    /// Confidence from 0 (rejected) to 0.5 (not contradicted).
     pub confidence: f64,
-    /// Distance to the nearest predicted feature that it did not report, metres: up to there the
-    /// reading is right in any case.
+    /// Distance to the nearest predicted feature that the reading contradicts, metres; up to there
+    /// the reading is correct in any case.
     pub clear_m: Option<f64>,
 }
 
-/// So many readings make a feature that may go on beyond what was seen of it.
+/// Minimum number of readings of a feature that may extend beyond its observed part.
 const EXTENDED_SUPPORT: f64 = 3.0;
 
-/// A reading that nothing speaks against.
+/// Assessment of a reading without contradiction.
 const NEUTRAL: Assessment = Assessment { confidence: 0.5, clear_m: None };
 
-/// Feature Prediction over the sets of readings of one robot.
+/// Feature Prediction over the scans of one robot.
 #[derive(Debug, Clone)]
 pub struct FeaturePrediction {
     settings: PredictionSettings,
-    /// The local map `L`.
+    /// Local map `L`.
     local: Vec<Line>,
 }
 
 impl FeaturePrediction {
-    /// With an empty local map.
+    /// Predictor with an empty local map.
     #[must_use]
     pub const fn new(settings: PredictionSettings) -> Self {
         Self { settings, local: Vec::new() }
     }
 
-    /// The features near the robot.
+    /// Features near the robot.
     #[must_use]
     pub fn local(&self) -> &[Line] {
         &self.local
     }
 
-    /// The assessment of each reading of a set, in the order of its beams: steps 1 to 6. The set's
-    /// features go into the local map.
+    /// Assesses each reading of a scan, in the order of its beams (steps 1 to 6), and adds the
+    /// features of the scan to the local map.
     pub fn assess(&mut self, sweep: &Sweep) -> Vec<Assessment> {
         let beams = self.beams(sweep);
         let robot = sweep.pose.position();
         let mut seen = self.predict(&beams);
-        self.drop_doubtful(&beams, &mut seen);
+        self.drop_contradicted(&beams, &mut seen);
         for line in &mut self.local {
             line.readings.clear();
         }
@@ -145,7 +148,7 @@ impl FeaturePrediction {
         assessments
     }
 
-    fn beams(&self, sweep: &Sweep) -> Vec<Ray> {
+    fn beams(&self, sweep: &Sweep) -> Vec<SonarBeam> {
         let half_rad = (self.settings.beam_deg / 2.0).to_radians();
         let sides = |axis_rad: f64| {
             [axis_rad, axis_rad - half_rad, axis_rad + half_rad].map(DVec2::from_angle)
@@ -155,25 +158,25 @@ impl FeaturePrediction {
             let (range_m, echo) = match beam.heard {
                 Heard::Echo(range_m) => (range_m.min(self.settings.max_range_m), true),
                 Heard::Silent => (self.settings.max_range_m, false),
-                // Something is there already: such a reading says nothing of what lies beyond.
+                // A reading below the minimum range carries no information on what lies beyond.
                 Heard::Near => (0.0, false),
             };
             let echo = echo && range_m < self.settings.max_range_m;
             let from = sweep.place(beam);
-            Ray { index: index as u32, from, axis_rad, sides: sides(axis_rad), range_m, echo }
+            SonarBeam { index: index as u32, from, axis_rad, sides: sides(axis_rad), range_m, echo }
         };
         sweep.beams.iter().enumerate().map(ray).collect()
     }
 
-    /// Steps 1 and 2: the sonar map `S`.
-    fn predict(&self, beams: &[Ray]) -> Vec<Line> {
+    /// Predicts the features of the scan (steps 1 and 2): the sonar map `S`.
+    fn predict(&self, beams: &[SonarBeam]) -> Vec<Line> {
         let half_rad = (self.settings.beam_deg / 2.0).to_radians();
         let omega_rad = self.settings.omega_deg.to_radians();
         let mut seen: Vec<Line> = Vec::new();
         for beam in beams.iter().filter(|beam| beam.echo) {
             let reading = (beam.index, beam.from, beam.axis_rad, beam.range_m);
-            let line = Line::of_reading(reading, half_rad, omega_rad);
-            // Neighbouring beams see the same wall, so the last features are the likely ones.
+            let line = Line::from_reading(reading, half_rad, omega_rad);
+            // Neighbouring beams see the same wall, so recent features are the likely matches.
             match seen.iter_mut().rev().find(|other| self.similar(other, &line)) {
                 Some(other) => other.merge(&line),
                 None => seen.push(line),
@@ -189,14 +192,14 @@ impl FeaturePrediction {
         merged
     }
 
-    fn similar(&self, one: &Line, other: &Line) -> bool {
-        one.is_similar(other, self.settings.near_m, self.settings.gap_m)
+    fn similar(&self, a: &Line, b: &Line) -> bool {
+        a.is_similar(b, self.settings.near_m, self.settings.gap_m)
     }
 
-    /// Step 3: what one beam alone saw, and what others speak against, goes.
-    fn drop_doubtful(&self, beams: &[Ray], seen: &mut Vec<Line>) {
+    /// Drops features of a single beam that others contradict (step 3).
+    fn drop_contradicted(&self, beams: &[SonarBeam], seen: &mut Vec<Line>) {
         let maps = [self.obstacles(seen), self.obstacles(&self.local)];
-        let doubtful: Vec<bool> = seen
+        let contradicted: Vec<bool> = seen
             .iter()
             .map(|line| {
                 let [only] = line.readings.as_slice() else { return false };
@@ -206,22 +209,22 @@ impl FeaturePrediction {
                 })
             })
             .collect();
-        let mut doubts = doubtful.into_iter();
-        seen.retain(|_| !doubts.next().unwrap_or(false));
+        let mut contradicted = contradicted.into_iter();
+        seen.retain(|_| !contradicted.next().unwrap_or(false));
     }
 
-    /// Step 4: a feature refines those of the local map that it may be one with, or joins it.
+    /// Merges a feature with all similar ones of the local map (step 4).
     ///
-    /// It may bring several together, such as the parts of one that was split between: left
-    /// side by side they would speak against a reading twice, and become more with every set.
+    /// It may reunite several, such as the parts of a split wall. Otherwise they would contradict
+    /// a reading twice, and multiply with every scan.
     fn keep(&mut self, mut line: Line, robot: DVec2) {
-        line.settle(robot);
+        line.fix(robot);
         let Self { settings, local } = self;
         let (near_m, gap_m) = (settings.near_m, settings.gap_m);
         while let Some(at) = local.iter().position(|old| old.is_similar(&line, near_m, gap_m)) {
             let mut old = local.swap_remove(at);
             old.merge(&line);
-            old.settle(robot);
+            old.fix(robot);
             line = old;
         }
         local.push(line);
@@ -231,8 +234,8 @@ impl FeaturePrediction {
         Obstacle::all(map, self.settings.extend_m)
     }
 
-    /// What a map's features make of a reading.
-    fn assessment(&self, beam: &Ray, map: &[Obstacle]) -> Assessment {
+    /// Assesses a reading against the features of a map.
+    fn assessment(&self, beam: &SonarBeam, map: &[Obstacle]) -> Assessment {
         let omega_rad = self.settings.omega_deg.to_radians();
         let (cos_omega, far_m) = (omega_rad.cos(), beam.range_m - self.settings.near_m);
         let mut assessment = NEUTRAL;
@@ -256,26 +259,26 @@ impl FeaturePrediction {
         assessment
     }
 
-    /// Step 6: features that should have been heard and were not are split there.
-    fn split_unseen(&mut self, beams: &[Ray]) {
+    /// Splits features that should have been detected and were not (step 6).
+    fn split_unseen(&mut self, beams: &[SonarBeam]) {
         let unsplit = std::mem::take(&mut self.local);
         for line in unsplit {
             self.split_from(beams, line);
         }
     }
 
-    /// Splits a feature at the first of the beams that should have heard it, and its parts at
-    /// those after that; what is left goes into the local map.
-    fn split_from(&mut self, beams: &[Ray], line: Line) {
-        let cos_heard = self.settings.heard_deg.to_radians().cos();
+    /// Splits a feature at the first beam that should have detected it, and its parts at later
+    /// ones; the remainders go into the local map.
+    fn split_from(&mut self, beams: &[SonarBeam], line: Line) {
+        let cos_detected = self.settings.heard_deg.to_radians().cos();
         let obstacle = Obstacle::new(&line, 0.0);
-        let unheard = |beam: &Ray| {
+        let missed = |beam: &SonarBeam| {
             let far_m = beam.range_m - self.settings.near_m;
             let crossing_m = obstacle.crossing_of_axis_m(beam, far_m)?;
-            let certain = obstacle.cos_to(beam.axis()) >= cos_heard;
+            let certain = obstacle.cos_to(beam.axis()) >= cos_detected;
             (certain && !line.explains(beam.index)).then(|| beam.from + crossing_m * beam.axis())
         };
-        let split = (1..).zip(beams).find_map(|(next, beam)| Some((next, unheard(beam)?)));
+        let split = (1..).zip(beams).find_map(|(next, beam)| Some((next, missed(beam)?)));
         let Some((next, at)) = split else {
             self.local.push(line);
             return;
@@ -289,25 +292,25 @@ impl FeaturePrediction {
     }
 }
 
-/// A beam in the world.
+/// Beam in world coordinates.
 #[derive(Debug, Clone)]
-struct Ray {
+struct SonarBeam {
     index: u32,
     from: DVec2,
     axis_rad: f64,
-    /// The axis and both sides.
+    /// Unit vectors along the axis and both sides.
     sides: [DVec2; 3],
     range_m: f64,
     echo: bool,
 }
 
-impl Ray {
+impl SonarBeam {
     const fn axis(&self) -> DVec2 {
         self.sides[0]
     }
 }
 
-/// The smaller angle between two directions, radians.
-pub(super) fn between_rad(one: f64, other: f64) -> f64 {
-    wrap_pi(one - other).abs()
+/// Smaller angle between two directions, radians.
+pub(super) fn between_rad(a: f64, b: f64) -> f64 {
+    wrap_pi(a - b).abs()
 }

@@ -1,59 +1,59 @@
-//! Regions of constant depth.
+//! Segmentation of scans into regions of constant depth.
 
 use super::{Heard, Settings, Sweep};
 use crate::compare::quantile;
 use sonard_model::geometry::wrap_360;
 
-/// The end of a region on one side.
+/// Boundary of a region on one side.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Side {
-    /// Silence or something farther: the element's own echo ended here.
+    /// Boundary of the element's own arc, next to no echo or something farther.
     Own,
-    /// Something nearer, whose echo came first.
+    /// Boundary by something nearer, whose echo arrived first.
     Covered,
-    /// The end of the scan, or of what was measured of it.
+    /// Boundary by the end of the scan, or of its valid readings.
     Cut,
 }
 
-/// Neighbouring beams with one range.
+/// Neighbouring beams of equal range.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Region {
-    /// Indices in the plan of its first and last beam, counter-clockwise.
+    /// Indices in the plan of the first and last beam, counter-clockwise.
     pub beams: [u32; 2],
-    /// Azimuths of its first and last beam, degrees; the last may be 360 or more.
+    /// Azimuths of the first and last beam, degrees; the last may be 360 or more.
     pub azimuths_deg: [f64; 2],
-    /// From the beam before the first one to it, and from the last to the one after it, degrees.
+    /// Angles from the preceding beam to the first, and from the last to the following, degrees.
     pub gaps_deg: [f64; 2],
-    /// What ends it on both sides.
+    /// Boundaries on both sides.
     pub sides: [Side; 2],
-    /// Median range, metres; `None`: sound was there when the receiver opened.
+    /// Median range, metres; `None` for a target below the minimum range.
     pub range_m: Option<f64>,
-    /// How many beams it has.
+    /// Number of beams.
     pub count: usize,
 }
 
 impl Region {
-    /// Azimuth of its middle, the estimate of `theta_N`, degrees in [0, 360) (10), (11).
+    /// Azimuth of the middle, the estimate of `theta_N`, degrees in [0, 360) (10), (11).
     #[must_use]
     pub fn bearing_deg(&self) -> f64 {
         let [start, end] = self.borders_deg();
         wrap_360((start + end) / 2.0)
     }
 
-    /// Its estimated angular extent, degrees (13).
+    /// Estimated angular extent, degrees (13).
     #[must_use]
     pub fn extent_deg(&self) -> f64 {
         let [start, end] = self.borders_deg();
         end - start
     }
 
-    /// Whether both borders are the element's own.
+    /// Returns `true` if both boundaries are the element's own.
     #[must_use]
     pub fn is_whole(&self) -> bool {
         self.sides == [Side::Own; 2]
     }
 
-    /// The middles of the gaps in which it begins and ends (11).
+    /// Middles of the gaps in which the region begins and ends (11).
     fn borders_deg(&self) -> [f64; 2] {
         let ([first, last], [before, after]) = (self.azimuths_deg, self.gaps_deg);
         [first - before / 2.0, last + after / 2.0]
@@ -62,8 +62,8 @@ impl Region {
 
 /// Finds the regions of constant depth of a scan, in order of azimuth.
 ///
-/// A beam belongs to a region when its range is within the settings' tolerance of the region's
-/// mean; a few odd beams inside one are passed over. Silence makes no region.
+/// A beam belongs to a region if its range is within the settings' tolerance of the region's
+/// mean; a few outliers inside are bridged. Beams without echo form no region.
 #[must_use]
 pub fn regions(sweep: &Sweep, settings: &Settings) -> Vec<Region> {
     let finder = Finder { sweep, tolerance_m: settings.depth_tolerance_m };
@@ -83,7 +83,7 @@ pub fn regions(sweep: &Sweep, settings: &Settings) -> Vec<Region> {
     found
 }
 
-/// Places of beams run on past the end of a closed sweep.
+/// Access to the beams of a sweep, with indices that wrap past the end of a closed one.
 struct Finder<'a> {
     sweep: &'a Sweep,
     tolerance_m: f64,
@@ -98,29 +98,29 @@ impl Finder<'_> {
         self.sweep.gap_before_deg(at % self.sweep.beams.len())
     }
 
-    /// Whether the beam does not go on from the one before it.
+    /// Returns `true` if the beam does not continue the region of the preceding one.
     fn begins(&self, at: usize) -> bool {
         let before = self.heard(at + self.sweep.beams.len() - 1);
         self.gap_before_deg(at).is_none() || !self.same(before, self.heard(at))
     }
 
-    fn same(&self, one: Heard, other: Heard) -> bool {
-        match (one, other) {
+    fn same(&self, a: Heard, b: Heard) -> bool {
+        match (a, b) {
             (Heard::Echo(a), Heard::Echo(b)) => (a - b).abs() <= self.tolerance_m,
             (Heard::Near, Heard::Near) | (Heard::Silent, Heard::Silent) => true,
             _ => false,
         }
     }
 
-    /// The last beam of the region that begins at `first`, among the next `most` beams.
-    fn last_of(&self, first: usize, most: usize, most_holes: usize) -> usize {
+    /// Last beam of the region that begins at `first`, among the next `count` beams.
+    fn last_of(&self, first: usize, count: usize, max_holes: usize) -> usize {
         let (mut last, mut at) = (first, first + 1);
         let (mut sum_m, mut members) = (0.0, 0.0);
         if let Heard::Echo(range_m) = self.heard(first) {
             (sum_m, members) = (range_m, 1.0);
         }
-        let bridged = if matches!(self.heard(first), Heard::Echo(_)) { most_holes } else { 0 };
-        while at < first + most && at - last <= bridged + 1 && self.gap_before_deg(at).is_some() {
+        let bridged = if matches!(self.heard(first), Heard::Echo(_)) { max_holes } else { 0 };
+        while at < first + count && at - last <= bridged + 1 && self.gap_before_deg(at).is_some() {
             let mean = match self.heard(first) {
                 Heard::Echo(_) => Heard::Echo(sum_m / members),
                 other => other,

@@ -1,4 +1,4 @@
-//! A scan's readings as one turn of beams, or as one round of an array's.
+//! Readings of a scan ordered by azimuth, for a stepper or an array.
 
 use std::collections::BTreeMap;
 
@@ -9,55 +9,55 @@ use crate::compare::quantile;
 use sonard_model::geometry::{DVec2, Pose, wrap_360};
 use sonard_records::{Ping, PingStatus, ScanView};
 
-/// Azimuths closer than this are one stop, degrees.
+/// Maximum azimuth difference of readings at one stop, degrees.
 const SAME_STOP_DEG: f64 = 1e-6;
 
-/// The outcome at one stop.
+/// Outcome of the measurement at one stop.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Heard {
-    /// An echo, at a range in metres.
+    /// Echo at a range in metres.
     Echo(f64),
-    /// Sound that was there when the receiver opened.
+    /// Target below the minimum range: sound arrived before the end of blanking.
     Near,
-    /// Nothing.
+    /// No echo within the maximum range.
     Silent,
 }
 
-/// One stop that was measured.
+/// Stop with a valid reading.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Beam {
     /// Azimuth, degrees in [0, 360).
     pub azimuth_deg: f64,
-    /// Index of its first reading in the plan.
+    /// Index in the plan of the first reading at the stop.
     pub index: u32,
-    /// What was heard.
+    /// Outcome of the measurement.
     pub heard: Heard,
-    /// Where the transducer was, metres ahead and to the left of the sweep's pose: zero for one on
-    /// a stepper.
+    /// Transducer position, metres ahead and to the left of the sweep's pose: zero for one on a
+    /// stepper.
     pub mount: DVec2,
 }
 
-/// The stops of one scan in order of azimuth, those without a usable reading left out.
+/// Stops of one scan in order of azimuth, without those that lack a valid reading.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sweep {
-    /// Where the ranger stood.
+    /// Pose of the ranger or robot.
     pub pose: Pose,
-    /// From stop to stop, degrees.
+    /// Angle between neighbouring stops, degrees.
     pub step_deg: f64,
-    /// The stops, in order of azimuth.
+    /// Stops, in order of azimuth.
     pub beams: Vec<Beam>,
-    /// Whether the last stop is a step or so before the first.
+    /// Whether the first stop follows the last one around the full turn.
     pub closed: bool,
 }
 
-/// A scan that cannot be interpreted.
+/// Scan that cannot be interpreted.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum SweepError {
-    /// The log does not say where the ranger stood.
+    /// Missing start record, and thus missing pose.
     #[error("its scan_start is missing, and with it the pose")]
     NoPose,
-    /// The pose is not finite.
-    #[error("scan_start: pose ({x_m}, {y_m}, {heading_deg}) must be of finite numbers")]
+    /// Pose that is not finite.
+    #[error("scan_start: pose ({x_m}, {y_m}, {heading_deg}) must consist of finite numbers")]
     BadPose {
         /// World x, metres.
         x_m: f64,
@@ -66,12 +66,12 @@ pub enum SweepError {
         /// Heading, degrees.
         heading_deg: f64,
     },
-    /// A reading of a ranger that nothing is known about.
-    #[error("beam {index} is of ranger {id}, which its session's array does not have")]
+    /// Reading of a ranger that is not in the session's array.
+    #[error("beam {index} belongs to ranger {id}, which is not in the array of the session")]
     UnknownRanger {
-        /// The reading.
+        /// Index of the reading.
         index: u32,
-        /// The ranger.
+        /// Id of the ranger.
         id: String,
     },
     /// Fewer than two stops.
@@ -80,18 +80,18 @@ pub enum SweepError {
 }
 
 impl Sweep {
-    /// The stops of a scan.
+    /// Collects the stops of a scan.
     ///
-    /// Readings lost on the line, of a doubtful step, of a module at fault, or of an echo without
-    /// a finite range count as not measured. Of several readings of one beam the last counts; of
+    /// Readings that are lost, of an uncertain step, of a faulty module, or echoes without a finite
+    /// range count as not measured. Of several readings of one beam the last one is used; of
     /// several beams at one stop the majority, with the median range.
     ///
-    /// Of an array, each beam has the place of its ranger, and a robot that moved meanwhile is
-    /// reckoned with.
+    /// For an array, each beam has the position of its ranger, including the motion of the robot
+    /// during the scan.
     ///
     /// # Errors
-    /// When the pose is missing, a ranger is not in the session's array, or there are fewer than
-    /// two usable stops.
+    /// The pose is missing or not finite, a ranger is not in the session's array, or there are
+    /// fewer than two usable stops.
     pub fn of(scan: &ScanView) -> Result<Self, SweepError> {
         let start = scan.start.as_ref().ok_or(SweepError::NoPose)?;
         let Pose { x_m, y_m, heading_deg } = start.pose;
@@ -110,25 +110,25 @@ impl Sweep {
             quantile(gaps.collect(), 0.5).unwrap_or(360.0)
         };
         let closing_deg = beams[0].azimuth_deg + 360.0 - beams[beams.len() - 1].azimuth_deg;
-        let closed = closing_deg < MOST_GAP_STEPS * step_deg && !scan.is_of_array();
+        let closed = closing_deg < MAX_GAP_STEPS * step_deg && !scan.is_of_array();
         Ok(Self { pose: start.pose, step_deg, beams, closed })
     }
 
-    /// Where a beam's transducer was, world, metres.
+    /// World position of a beam's transducer, metres.
     #[must_use]
     pub fn place(&self, beam: &Beam) -> DVec2 {
         let turn = DVec2::from_angle(self.pose.direction_rad(0.0));
         self.pose.position() + turn.rotate(beam.mount)
     }
 
-    /// The point at `range_m` along a beam, world, metres.
+    /// World position of the point at `range_m` along a beam, metres.
     #[must_use]
     pub fn point(&self, beam: &Beam, range_m: f64) -> DVec2 {
         let direction_rad = self.pose.direction_rad(beam.azimuth_deg);
         self.place(beam) + range_m * DVec2::from_angle(direction_rad)
     }
 
-    /// Degrees from the stop before to this one; `None` where it is too far to be a neighbour.
+    /// Angle from the preceding stop, degrees; `None` if that is too far to be a neighbour.
     pub(super) fn gap_before_deg(&self, at: usize) -> Option<f64> {
         let here = self.beams[at].azimuth_deg;
         let gap_deg = match at.checked_sub(1) {
@@ -136,12 +136,12 @@ impl Sweep {
             None if self.closed => here + 360.0 - self.beams[self.beams.len() - 1].azimuth_deg,
             None => return None,
         };
-        (gap_deg < MOST_GAP_STEPS * self.step_deg).then_some(gap_deg)
+        (gap_deg < MAX_GAP_STEPS * self.step_deg).then_some(gap_deg)
     }
 }
 
-/// Scans from one pose as one: at each stop the majority of the repeats, with the median of their
-/// ranges. Each has the place and the id of the first.
+/// Merges scans from one pose: at each stop the majority of the repeats, with the median of their
+/// ranges. The result has the position and id of the first.
 pub(super) fn merge_repeats(scans: &[(Uuid, Sweep)]) -> Vec<(Uuid, Sweep)> {
     let mut merged: Vec<(Uuid, Sweep)> = Vec::with_capacity(scans.len());
     for (at, (id, sweep)) in scans.iter().enumerate() {
@@ -154,7 +154,7 @@ pub(super) fn merge_repeats(scans: &[(Uuid, Sweep)]) -> Vec<(Uuid, Sweep)> {
         let mut beams: Vec<Beam> = repeats.iter().flat_map(|sweep| sweep.beams.clone()).collect();
         if repeats.len() > 1 {
             beams.sort_by(|a, b| a.azimuth_deg.total_cmp(&b.azimuth_deg));
-            beams = beams.chunk_by(same_stop).map(one_of_stop).collect();
+            beams = beams.chunk_by(same_stop).map(merge_stop).collect();
         }
         let closed = repeats.iter().any(|sweep| sweep.closed);
         merged.push((*id, Sweep { beams, closed, ..sweep.clone() }));
@@ -162,8 +162,8 @@ pub(super) fn merge_repeats(scans: &[(Uuid, Sweep)]) -> Vec<(Uuid, Sweep)> {
     merged
 }
 
-/// Neighbours may be this many steps apart: two lost readings in a row.
-const MOST_GAP_STEPS: f64 = 3.5;
+/// Maximum gap between neighbours, steps: two lost readings in a row.
+const MAX_GAP_STEPS: f64 = 3.5;
 
 fn stops(scan: &ScanView, pose: &Pose) -> Result<Vec<Beam>, SweepError> {
     let has_one_place = scan.has_one_place();
@@ -176,14 +176,14 @@ fn stops(scan: &ScanView, pose: &Pose) -> Result<Vec<Beam>, SweepError> {
     }
     let mut beams: Vec<Beam> = by_index.into_values().collect();
     beams.sort_by(|a, b| a.azimuth_deg.total_cmp(&b.azimuth_deg));
-    Ok(beams.chunk_by(same_stop).map(one_of_stop).collect())
+    Ok(beams.chunk_by(same_stop).map(merge_stop).collect())
 }
 
 fn same_stop(a: &Beam, b: &Beam) -> bool {
     (b.azimuth_deg - a.azimuth_deg).abs() < SAME_STOP_DEG && a.mount == b.mount
 }
 
-/// A beam with its transducer's place and direction as seen from the scan's pose.
+/// Beam with the position and direction of its transducer relative to the scan's pose.
 fn mounted(scan: &ScanView, ping: &Ping, beam: Beam, pose: &Pose) -> Result<Beam, SweepError> {
     let viewpoint = scan.viewpoint(ping).ok_or_else(|| SweepError::UnknownRanger {
         index: ping.index,
@@ -196,7 +196,7 @@ fn mounted(scan: &ScanView, ping: &Ping, beam: Beam, pose: &Pose) -> Result<Beam
 }
 
 fn beam(ping: &Ping) -> Option<Beam> {
-    let heard = match ping.status {
+    let outcome = match ping.status {
         PingStatus::Echo => Heard::Echo(ping.range_m.filter(|r| r.is_finite() && *r > 0.0)?),
         PingStatus::MinRange => Heard::Near,
         PingStatus::NoEcho => Heard::Silent,
@@ -204,13 +204,14 @@ fn beam(ping: &Ping) -> Option<Beam> {
     };
     let azimuth_deg = Some(ping.azimuth_deg).filter(|azimuth| azimuth.is_finite())?;
     let azimuth_deg = wrap_360(azimuth_deg);
-    Some(Beam { azimuth_deg, index: ping.index, heard, mount: DVec2::ZERO })
+    Some(Beam { azimuth_deg, index: ping.index, heard: outcome, mount: DVec2::ZERO })
 }
 
-fn one_of_stop(same: &[Beam]) -> Beam {
-    let count = |of: fn(&Heard) -> bool| same.iter().filter(|beam| of(&beam.heard)).count();
-    let near = count(|heard| matches!(heard, Heard::Near));
-    let silent = count(|heard| matches!(heard, Heard::Silent));
+fn merge_stop(same: &[Beam]) -> Beam {
+    let count =
+        |matches: fn(&Heard) -> bool| same.iter().filter(|beam| matches(&beam.heard)).count();
+    let near = count(|outcome| matches!(outcome, Heard::Near));
+    let no_echo = count(|outcome| matches!(outcome, Heard::Silent));
     let echoes: Vec<f64> = same
         .iter()
         .filter_map(|beam| match beam.heard {
@@ -218,13 +219,13 @@ fn one_of_stop(same: &[Beam]) -> Beam {
             _ => None,
         })
         .collect();
-    let heard = if near >= silent && near > echoes.len() {
+    let outcome = if near >= no_echo && near > echoes.len() {
         Heard::Near
-    } else if silent > echoes.len() {
+    } else if no_echo > echoes.len() {
         Heard::Silent
     } else {
         quantile(echoes, 0.5).map_or(Heard::Silent, Heard::Echo)
     };
     let index = same.iter().map(|beam| beam.index).min().unwrap_or_default();
-    Beam { heard, index, ..same[0] }
+    Beam { heard: outcome, index, ..same[0] }
 }

@@ -1,4 +1,4 @@
-//! Interpretation against the paper's figures, its densities, and random worlds.
+//! Interpretation against the paper's figures and densities, and on random worlds.
 
 mod degenerate;
 mod densities;
@@ -22,8 +22,8 @@ use sonard_model::{
 };
 use sonard_records::{ScanPlan, ScanView};
 
-/// The model as the paper has it: its sensor, whose gain makes up for the air and whose detector
-/// knows no time walk, and its edges.
+/// The paper's model: its sensor with a gain that compensates absorption, a detector without time
+/// walk, and its edges.
 fn simulator(scene: Arc<Scene>) -> Simulator {
     let sensor = Sensor::preset("bozma-kuc-60khz").expect("a preset");
     let options = PathOptions {

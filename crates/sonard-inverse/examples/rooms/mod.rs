@@ -1,4 +1,4 @@
-//! Sweeps as a world has them, from random places.
+//! Simulated sweeps from random positions.
 
 use rand::RngExt as _;
 use rand_distr::{Distribution as _, StandardNormal};
@@ -11,13 +11,13 @@ use sonard_model::{
     scene::Scene,
 };
 
-/// Beams of a sweep.
+/// Number of beams in a sweep.
 pub(crate) const BEAMS: u32 = 400;
-/// Spread of ranges, millimetres.
+/// Standard deviation of ranges, millimetres.
 pub(crate) const NOISE_MM: f64 = 1.0;
 
-/// A sweep with noise of ranges and its far tail, by a threshold that varies from firing to firing by a standard deviation
-/// in decibels.
+/// Sweep with range noise, its far tail, and a threshold that varies between firings with a
+/// standard deviation in decibels.
 pub(crate) fn readings(
     truth: &World,
     pose: &Pose,
@@ -53,7 +53,7 @@ fn threshold_factor(sigma_db: f64, rng: &mut Pcg64) -> f64 {
     10f64.powf(sigma_db * normal / 20.0)
 }
 
-/// A place with room about it, within the extent of the walls.
+/// Random position with clearance within the extent of the walls.
 pub(crate) fn place(scene: &Scene, rng: &mut Pcg64) -> Option<Pose> {
     let ends = || scene.walls.iter().flat_map(|wall| [wall.a, wall.b]);
     let low = ends().fold(DVec2::INFINITY, DVec2::min);

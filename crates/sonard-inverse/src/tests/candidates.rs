@@ -1,17 +1,18 @@
-//! What a receiver could report against what it reports.
+//! Threshold scan against the detections of a receiver.
 
 use super::{first_pose, world};
 use sonard_model::{acoustics::Latch, geometry::Pose};
 
 use crate::{
     World,
-    candidates::{Candidates, Listener, Phases, SPAN_DB},
+    candidates::{CandidateList, Phases, SPAN_DB, ThresholdScan},
 };
 
-/// Where arrivals overlap, the first may fade before the next one drives the envelope on, and a little more of threshold
-/// makes an echo centimetres later without another arrival. That is another reading.
+/// Where arrivals overlap, the first may fade before the next one continues the envelope, and a
+/// slightly higher threshold delays an echo by centimetres without another arrival. That is another
+/// candidate.
 #[test]
-fn an_echo_that_rises_in_two_steps_is_two_candidates() {
+fn two_step_rise_is_two_candidates() {
     let mut here = world("right-angle-corner", "senscomp-6500");
     here.sensor.threshold *= 0.5;
     let places = (-3..=3).map(|at| 0.1 * f64::from(at));
@@ -19,14 +20,14 @@ fn an_echo_that_rises_in_two_steps_is_two_candidates() {
     assert!(jumps > 10, "{jumps}");
 }
 
-/// Holds every jump of the range on the way from threshold to threshold to an end of a candidate; how many there are.
+/// Number of jumps of the range over thresholds, each of which must be at the end of a candidate.
 fn jumps_from(here: &World, x_m: f64) -> u32 {
     let pose = Pose { x_m, y_m: -0.3, heading_deg: 0.0 };
     let simulator = here.simulator(&pose).expect("a model");
     let point = simulator.at(pose.position());
-    let listener = Listener::new(simulator.receiver(), Phases::Known, SPAN_DB);
+    let listener = ThresholdScan::new(simulator.receiver(), Phases::Known, SPAN_DB);
     let mut receiver = simulator.receiver().clone();
-    let mut found = Candidates::new();
+    let mut found = CandidateList::new();
     let mut jumps = 0;
     for step in 0..400 {
         let direction_rad = (0.9 * f64::from(step)).to_radians();
@@ -39,7 +40,8 @@ fn jumps_from(here: &World, x_m: f64) -> u32 {
         for at in -40..40 {
             let by_db = 0.25 * f64::from(at);
             let Some((low_m, high_m)) = read_m(by_db).zip(read_m(by_db + 0.25)) else { continue };
-            // No lone pulse rises so slowly within a quarter of a decibel, but at its very top.
+            // No isolated pulse rises so slowly within a quarter of a decibel, except at its very
+            // top.
             if high_m - low_m > 0.015 {
                 jumps += 1;
                 let ends = found.iter().map(|candidate| candidate.until_db);
@@ -52,8 +54,8 @@ fn jumps_from(here: &World, x_m: f64) -> u32 {
 }
 
 #[test]
-fn at_each_threshold_the_candidate_is_what_a_receiver_with_it_reports() {
-    let (mut asked, mut wrong) = (0, 0);
+fn candidates_match_detections() {
+    let (mut compared, mut wrong) = (0, 0);
     for (scene, sensor) in
         [("simple-room", "senscomp-6500"), ("oblique-corner", "pioneer"), ("corridor", "hc-sr04")]
     {
@@ -61,9 +63,9 @@ fn at_each_threshold_the_candidate_is_what_a_receiver_with_it_reports() {
         let pose = first_pose(&here.scene);
         let simulator = here.simulator(&pose).expect("a model");
         let point = simulator.at(pose.position());
-        let listener = Listener::new(simulator.receiver(), Phases::Known, SPAN_DB);
+        let listener = ThresholdScan::new(simulator.receiver(), Phases::Known, SPAN_DB);
         let mut receiver = simulator.receiver().clone();
-        let mut found = Candidates::new();
+        let mut found = CandidateList::new();
         for step in 0..200 {
             let direction_rad = here.direction_rad(&pose, 1.8 * f64::from(step));
             listener.candidates(&point, direction_rad, &mut found).expect("paths");
@@ -73,18 +75,18 @@ fn at_each_threshold_the_candidate_is_what_a_receiver_with_it_reports() {
                     .hear(direction_rad, |ear| ear.detect(&receiver, Latch::First, 0.0))
                     .expect("paths");
                 let at = found.iter().position(|candidate| by_db < candidate.until_db);
-                let said = &found[at.unwrap_or(found.len() - 1)];
-                let off = match (said.range_m, read.range_m) {
+                let candidate = &found[at.unwrap_or(found.len() - 1)];
+                let off = match (candidate.range_m, read.range_m) {
                     (None, None) => 0.0,
-                    (Some(said_m), Some(read_m)) => (said_m - read_m).abs() - 0.04,
+                    (Some(candidate_m), Some(read_m)) => (candidate_m - read_m).abs() - 0.04,
                     _ => f64::INFINITY,
                 };
-                asked += 1;
+                compared += 1;
                 wrong += u32::from(off > 0.02);
                 if off > 0.02 {
                     eprintln!(
                         "{scene} {step} {by_db}: {:?} for {:?}; {:?}",
-                        said.range_m,
+                        candidate.range_m,
                         read.range_m,
                         found.iter().map(|c| (c.range_m, c.until_db)).collect::<Vec<_>>()
                     );
@@ -92,7 +94,7 @@ fn at_each_threshold_the_candidate_is_what_a_receiver_with_it_reports() {
             }
         }
     }
-    eprintln!("{wrong} of {asked}");
-    // Where echoes overlap, a peak may be of an arrival after the one that raised ECHO.
-    assert!(f64::from(wrong) < 0.005 * f64::from(asked), "{wrong} of {asked}");
+    eprintln!("{wrong} of {compared}");
+    // Where echoes overlap, the peak may belong to an arrival after the one that triggered ECHO.
+    assert!(f64::from(wrong) < 0.005 * f64::from(compared), "{wrong} of {compared}");
 }

@@ -1,18 +1,19 @@
-//! Readings that are too coarse to tell phases.
+//! Readings too coarse for phases.
 
 use sonard_model::acoustics::TofNoise;
 
-use super::{first_pose, found::sweep, world};
+use super::{first_pose, recovery::sweep, world};
 use crate::{Fit, Fitted, Parameter, Prior, fit};
 
-/// A pose that is believed 3 cm and 2 degrees beside the truth, fitted to readings with this noise: what is left of that.
+/// Fit of a pose with an initial error of 3 cm and 2 degrees to noisy readings, and its final
+/// error.
 fn fitted(noise_mm: f64) -> (Fitted, [f64; 3]) {
     let here = world("simple-room", "senscomp-6500");
     let pose = first_pose(&here.scene);
-    let mut believed = pose;
-    (believed.x_m, believed.heading_deg) = (pose.x_m + 0.03, pose.heading_deg - 2.0);
+    let mut initial = pose;
+    (initial.x_m, initial.heading_deg) = (pose.x_m + 0.03, pose.heading_deg - 2.0);
     let noise = TofNoise::of_range_mm(noise_mm, here.air.sound_speed_m_s());
-    let sweep = sweep(&here, &pose, &believed, 240, noise, 1);
+    let sweep = sweep(&here, &pose, &initial, 240, noise, 1);
     let of = |parameter, sigma| Prior { parameter, sigma };
     let priors = [(Parameter::X(0), 0.05), (Parameter::Y(0), 0.05), (Parameter::Heading(0), 4.0)];
     let what = Fit::usual(priors.map(|(parameter, sigma)| of(parameter, sigma)).into(), 0.06);
@@ -23,11 +24,11 @@ fn fitted(noise_mm: f64) -> (Fitted, [f64; 3]) {
 }
 
 #[test]
-fn strengths_of_further_reflections_are_doubtful_where_ranges_tell_no_phases() {
+fn reflections_add_level_uncertainty() {
     // Half a wavelength is 3.5 mm.
-    for (noise_mm, doubtful_db) in [(1.0, 0.0), (8.0, 1.5)] {
+    for (noise_mm, sigma_db) in [(1.0, 0.0), (8.0, 1.5)] {
         let (fitted, off) = fitted(noise_mm);
-        assert_eq!(fitted.errors.sigma_db_per_reflection, doubtful_db, "{:?}", fitted.errors);
+        assert_eq!(fitted.errors.sigma_db_per_reflection, sigma_db, "{:?}", fitted.errors);
         for (estimate, off) in fitted.estimates.iter().zip(off) {
             assert!(off.abs() < 3.0 * estimate.sigma && estimate.identified, "{estimate:?}: {off}");
         }

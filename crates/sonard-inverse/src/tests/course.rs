@@ -1,4 +1,4 @@
-//! A robot that drives on between sweeps.
+//! Tracking of a robot between sweeps.
 
 use std::sync::Arc;
 
@@ -9,10 +9,11 @@ use sonard_model::{
     scene::Scene,
 };
 
-use super::found::sweep;
+use super::recovery::sweep;
 use crate::{Atlas, Course, Mode, Odometry, Sweep, World, locate};
 
-/// A room whose ends look alike turned by half, with a short wall near its middle that does not.
+/// Room whose ends look alike when rotated by 180 degrees, with a short wall near its middle that
+/// breaks the symmetry.
 const ROOM: &str = r#"{"name": "long room", "materials": {"plaster": {"reflectance": 0.95}}, "walls": [
     {"id": "w", "polyline": [[0, 0], [5, 0], [5, 1], [0, 1]], "closed": true, "material": "plaster"},
     {"id": "stub", "from": [2.9, 1], "to": [2.9, 0.6], "material": "plaster"}]}"#;
@@ -26,24 +27,24 @@ fn long_room() -> (World, Atlas) {
     (world, atlas)
 }
 
-/// From one end to the middle, and on to the other end.
-const WAY: [(f64, f64, f64); 5] =
+/// Trajectory from one end over the middle to the other end.
+const TRAJECTORY: [(f64, f64, f64); 5] =
     [(0.6, 0.4, 10.0), (1.4, 0.5, -20.0), (2.2, 0.4, 5.0), (3.4, 0.35, 30.0), (4.4, 0.6, 80.0)];
 
 fn pose((x_m, y_m, heading_deg): (f64, f64, f64)) -> Pose {
     Pose { x_m, y_m, heading_deg }
 }
 
-/// A sweep with what odometry says in a frame that is turned and begins elsewhere, and drifts.
+/// Sweep with a pose by odometry that drifts, in a frame that is rotated and shifted.
 fn swept(world: &World, true_pose: &Pose, drift_m: f64, turn_deg: f64) -> Sweep {
     let at = DVec2::from_angle(turn_deg.to_radians()).rotate(true_pose.position());
-    let told = Pose {
+    let odometry = Pose {
         x_m: at.x + 7.0 + drift_m,
         y_m: at.y - 3.0,
         heading_deg: true_pose.heading_deg + turn_deg + 10.0 * drift_m,
     };
     let noise = TofNoise::of_range_mm(1.0, world.air.sound_speed_m_s());
-    sweep(world, true_pose, &told, 90, noise, 5)
+    sweep(world, true_pose, &odometry, 90, noise, 5)
 }
 
 fn is_there(mode: &Mode, pose: &Pose) -> bool {
@@ -52,15 +53,15 @@ fn is_there(mode: &Mode, pose: &Pose) -> bool {
 }
 
 #[test]
-fn what_looks_alike_is_told_apart_by_the_way_there() {
+fn symmetric_ends_are_separated_by_odometry() {
     let (world, atlas) = long_room();
     let mut course = Course::new(Odometry::default());
-    for (at, true_pose) in WAY.map(pose).iter().enumerate() {
+    for (at, true_pose) in TRAJECTORY.map(pose).iter().enumerate() {
         let sweep = swept(&world, true_pose, 0.01 * at as f64, 40.0);
         let modes = course.next(&world, &atlas, &sweep).expect("a model");
         let total: f64 = modes.iter().map(|mode| mode.probability).sum();
         assert!((total - 1.0).abs() < 1e-2, "{modes:?}");
-        if at == 0 || at == WAY.len() - 1 {
+        if at == 0 || at == TRAJECTORY.len() - 1 {
             let alone = locate(&world, &atlas, &sweep).expect("a model");
             let of = alone.iter().find(|mode| is_there(mode, true_pose)).expect("is listed");
             assert!((0.2..0.8).contains(&of.probability), "{at}: {alone:?}");
@@ -73,34 +74,34 @@ fn what_looks_alike_is_told_apart_by_the_way_there() {
 }
 
 #[test]
-fn a_robot_that_was_carried_elsewhere_is_found_again() {
+fn kidnapped_robot_is_relocalized() {
     let (world, atlas) = long_room();
     let mut course = Course::new(Odometry::default());
-    for true_pose in &WAY.map(pose)[..3] {
+    for true_pose in &TRAJECTORY.map(pose)[..3] {
         course.next(&world, &atlas, &swept(&world, true_pose, 0.0, 0.0)).expect("a model");
     }
-    let told = swept(&world, &pose(WAY[2]), 0.0, 0.0).pose;
+    let odometry = swept(&world, &pose(TRAJECTORY[2]), 0.0, 0.0).pose;
     let here = pose((3.6, 0.3, -70.0));
-    // Odometry says that it stayed.
-    let carried = Sweep { pose: told, ..swept(&world, &here, 0.0, 0.0) };
+    // Odometry reports no motion.
+    let carried = Sweep { pose: odometry, ..swept(&world, &here, 0.0, 0.0) };
     let modes = course.next(&world, &atlas, &carried).expect("a model");
     assert!(is_there(&modes[0], &here) && modes[0].probability > 0.9, "{modes:?}");
 }
 
 #[test]
-fn odometry_has_a_frame_of_its_own_and_counts_for_nothing_where_all_are_carried() {
+fn odometry_frame_is_arbitrary() {
     let (world, atlas) = long_room();
     let all_carried = Odometry { carried: 1.0, ..Odometry::default() };
     let mut courses = [Odometry::default(), Odometry::default(), all_carried].map(Course::new);
-    for true_pose in WAY.map(pose) {
+    for true_pose in TRAJECTORY.map(pose) {
         let turned = [0.0, 135.0, 0.0].map(|turn_deg| swept(&world, &true_pose, 0.0, turn_deg));
-        let [one, other, carried] = std::array::from_fn(|at| {
+        let [fixed, rotated, carried] = std::array::from_fn(|at| {
             courses[at].next(&world, &atlas, &turned[at]).expect("a model")
         });
-        assert_eq!(one.len(), other.len());
-        for (one, other) in one.iter().zip(&other) {
-            assert!((one.x_m - other.x_m).abs() < 1e-6, "{one:?} {other:?}");
-            assert!((one.probability - other.probability).abs() < 1e-6, "{one:?} {other:?}");
+        assert_eq!(fixed.len(), rotated.len());
+        for (a, b) in fixed.iter().zip(&rotated) {
+            assert!((a.x_m - b.x_m).abs() < 1e-6, "{a:?} {b:?}");
+            assert!((a.probability - b.probability).abs() < 1e-6, "{a:?} {b:?}");
         }
         let alone = locate(&world, &atlas, &turned[2]).expect("a model");
         assert!(
@@ -111,15 +112,15 @@ fn odometry_has_a_frame_of_its_own_and_counts_for_nothing_where_all_are_carried(
 }
 
 #[test]
-fn in_another_scene_a_course_begins_anew() {
+fn another_scene_resets_the_tracker() {
     let (world, atlas) = long_room();
     let other = Arc::new(Scene { name: "another".to_owned(), ..Scene::clone(&world.scene) });
     let elsewhere = World { scene: other, ..world.clone() };
     let mut course = Course::new(Odometry::default());
-    for true_pose in &WAY.map(pose)[..3] {
+    for true_pose in &TRAJECTORY.map(pose)[..3] {
         course.next(&world, &atlas, &swept(&world, true_pose, 0.0, 0.0)).expect("a model");
     }
-    let sweep = swept(&world, &pose(WAY[4]), 0.0, 0.0);
+    let sweep = swept(&world, &pose(TRAJECTORY[4]), 0.0, 0.0);
     let alone = locate(&world, &atlas, &sweep).expect("a model");
     assert_eq!(course.clone().next(&elsewhere, &atlas, &sweep), Ok(alone));
     assert!(course.next(&world, &atlas, &sweep).expect("a model")[0].probability > 0.99);

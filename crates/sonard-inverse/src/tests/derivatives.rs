@@ -1,4 +1,4 @@
-//! Derivatives of path lengths against finite differences.
+//! Derivatives of path lengths and directions against finite differences.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -10,21 +10,21 @@ use sonard_model::{
 
 use super::{first_pose, shipped, world};
 use crate::{
-    Motion, Parameter, World, bearing::Bearing, length_rate, rates::material_rate_db, walls,
+    Motion, Parameter, World, bearing::Bearing, jacobian::material_rate_db, length_rate, walls,
 };
 
-/// Half of the step of a difference, metres.
+/// Half step of a finite difference, metres.
 const BY_M: f64 = 1e-6;
 
 type Key = Vec<Mechanism>;
 
-/// The arrivals in a direction by what they met. Paths that meet the same things at other places are left out.
+/// Arrivals in a direction by their interactions; paths with identical interactions are omitted.
 fn arrivals(world: &World, pose: &Pose, direction_rad: f64) -> BTreeMap<Key, Arrival> {
     let simulator = world.simulator(pose).expect("a model");
     let (mut found, mut twice) = (BTreeMap::new(), BTreeSet::new());
     for arrival in simulator.at(pose.position()).arrivals(direction_rad).expect("paths") {
         let key: Key = arrival.path.mechanisms().collect();
-        // Scattering is by the strip of wall that the beam is on and not by a stationary point.
+        // Scattering depends on the strip of wall under the beam, not on a stationary point.
         let is_left_out = key.iter().any(|met| matches!(met, Mechanism::Scattering { .. }));
         if is_left_out || found.insert(key.clone(), arrival).is_some() {
             twice.insert(key);
@@ -36,7 +36,8 @@ fn arrivals(world: &World, pose: &Pose, direction_rad: f64) -> BTreeMap<Key, Arr
     found
 }
 
-/// Compares rates of all arrivals of some directions with differences between two worlds; gives how many.
+/// Compares derivatives with finite differences for all arrivals in some directions; returns their
+/// number.
 fn compare(
     name: &str,
     moved: impl Fn(f64) -> (World, Pose),
@@ -64,14 +65,14 @@ fn compare(
             assert!(error < 1e-5, "{name}: {rate} for {expected} of {key:?} at {azimuth_deg}");
             let directions = |of: &Arrival| [of.departure_rad, of.arrival_rad];
             let rates = Bearing::new(&arrival.path, ends, simulator.scene())
-                .map_or([0.0; 2], |bearing| bearing.rates(simulator.scene(), &motion));
+                .map_or([0.0; 2], |bearing| bearing.derivatives(simulator.scene(), &motion));
             for (end, rate) in rates.into_iter().enumerate() {
                 let [before, after] = [before, after].map(|of| directions(of)[end]);
                 let expected = wrap_pi(after - before) / (2.0 * BY_M);
                 let error = (rate - expected).abs();
-                let most = 1e-4 * expected.abs().max(1.0);
+                let tolerance = 1e-4 * expected.abs().max(1.0);
                 assert!(
-                    error < most,
+                    error < tolerance,
                     "{name}: turns {rate} for {expected} of {key:?} at {azimuth_deg}"
                 );
             }
@@ -82,17 +83,16 @@ fn compare(
 }
 
 fn at(scene: &str) -> (World, Pose) {
-    // To 3 m: in a room that is up to four reflections.
+    // Up to 3 m: up to four reflections in a room.
     let mut world = world(scene, "senscomp-6500");
     world.options.max_range_m = Some(3.0);
     let pose = first_pose(&shipped(scene));
     (world, Pose { heading_deg: 17.3, ..pose })
 }
 
-/// How strong each arrival is, and what that gains with the figures of its materials: mirrored and scattered sound, and
-/// such as met both.
+/// Derivatives of levels by material properties: reflected and scattered sound, and combinations.
 #[test]
-fn strengths_with_materials() {
+fn levels_by_materials() {
     let text = r#"{"name": "yard", "materials": {"brick": {"reflectance": 0.8, "roughness": 0.3},
         "glass": {"reflectance": 0.9}}, "walls": [
         {"id": "w", "polyline": [[0, 0], [3, 0], [3, 2]], "material": "brick"},
@@ -109,7 +109,7 @@ fn strengths_with_materials() {
         };
         arrivals.into_iter().map(|of| (key(&of), of)).collect::<BTreeMap<_, _>>()
     };
-    // Of mirrored arrivals and of those that were scattered.
+    // Numbers of reflected and of scattered arrivals.
     let mut compared = [0; 2];
     for name in ["brick", "glass"] {
         let of = |kind: fn(String) -> Parameter| kind(name.to_owned());
@@ -145,7 +145,7 @@ fn strengths_with_materials() {
 }
 
 #[test]
-fn places_of_the_ranger() {
+fn ranger_position() {
     let mut compared = 0;
     for scene in ["simple-room", "mcgill-lab", "oblique-corner", "corridor", "simple-room-robot"] {
         let (world, pose) = at(scene);
@@ -165,7 +165,7 @@ fn places_of_the_ranger() {
 }
 
 #[test]
-fn mountings() {
+fn mounting_and_heading() {
     let (mut world, pose) = at("simple-room");
     world.sensor.mounting.separation_m = 0.03;
     world.sensor.mounting.ahead_m = 0.04;
@@ -180,7 +180,7 @@ fn mountings() {
             },
         );
     }
-    // A thousandth of a degree for a metre: the step is the same share of each.
+    // A thousandth of a degree per metre: the step is the same fraction of each.
     let scaled = |by: f64| Pose { heading_deg: pose.heading_deg + by, ..pose };
     compared += compare(
         "heading",
@@ -193,7 +193,7 @@ fn mountings() {
 }
 
 #[test]
-fn heights_between_floor_and_ceiling() {
+fn transducer_height() {
     let (mut world, pose) = at("simple-room");
     let mut room = Scene::clone(&world.scene);
     (room.floor_z_m, room.ceiling_z_m) = (Some(0.0), Some(0.9));
@@ -202,7 +202,7 @@ fn heights_between_floor_and_ceiling() {
     let usual_z_m = world.sensor_z_m().expect("heights");
     let moved = |by: f64| world.changed(&[(&Parameter::Height, by)]).expect("a world");
     assert_eq!(moved(0.1).sensor_z_m(), Some(usual_z_m + 0.1));
-    // Off the middle, so that floor and ceiling are not alike.
+    // Off the middle, so that floor and ceiling differ.
     let compared = compare(
         "height",
         |by| (moved(0.1 + by), pose),
@@ -212,7 +212,7 @@ fn heights_between_floor_and_ceiling() {
 }
 
 #[test]
-fn walls_with_their_corners_and_edges() {
+fn walls_with_corners_and_edges() {
     let mut compared = 0;
     for scene in ["simple-room", "oblique-corner", "two-surface-room"] {
         let (world, pose) = at(scene);
@@ -228,7 +228,7 @@ fn walls_with_their_corners_and_edges() {
 }
 
 #[test]
-fn cylinders_that_move_or_grow() {
+fn moving_and_growing_cylinders() {
     let text = r#"{"name": "legs", "materials": {"wood": {"reflectance": 0.95}},
         "walls": [{"id": "w", "polyline": [[0, 0], [4, 0], [4, 3], [0, 3]], "closed": true, "material": "wood"}],
         "cylinders": [{"id": "c", "center": [2.5, 1.0], "radius_m": 0.1, "material": "wood"}],
@@ -260,7 +260,7 @@ fn cylinders_that_move_or_grow() {
 }
 
 #[test]
-fn a_wall_that_moves_takes_its_corners_along_their_other_walls() {
+fn displaced_wall_keeps_other_lines() {
     let scene = shipped("simple-room");
     for wall in 0..scene.walls.len() {
         let moved = walls::moved_ends(&scene, &[(wall, 0.05)]);

@@ -1,4 +1,4 @@
-//! What margins above the threshold, and ranges by their time walk, gain with the parameters, against finite differences.
+//! Derivatives of detection limits, and of ranges by time walk, against finite differences.
 
 use sonard_model::{
     acoustics::{Aperture, Pulse},
@@ -8,12 +8,13 @@ use sonard_model::{
 
 use super::world;
 use crate::{
-    Beam, Heard, Parameter, Sweep, World, candidates::Phases, judged::Possible, rates::RateFinder,
+    Beam, Heard, Parameter, Sweep, World, candidates::Phases, jacobian::JacobianBuilder,
+    likelihood_terms::CandidateReading,
 };
 
 const AT: Pose = Pose { x_m: 0.0, y_m: 0.0, heading_deg: 0.0 };
 
-/// A cheap ranger's world with one thing in it.
+/// World of a low-cost ranger with a single object.
 fn before(text: &str) -> World {
     let mut here = world("simple-room", "hc-sr04");
     here.scene = Scene::from_json(text).expect("a scene").into();
@@ -21,36 +22,36 @@ fn before(text: &str) -> World {
     here
 }
 
-/// Of beams 40 degrees to both sides of what is ahead, the first echo that each could be.
+/// First candidates of beams within 40 degrees on either side.
 fn first_possible(
     world: &World,
     pose: &Pose,
     parameters: &[Parameter],
     step_deg: usize,
-) -> Vec<Possible> {
+) -> Vec<CandidateReading> {
     let azimuths = (-40..=40).step_by(step_deg).map(f64::from);
     let beams = azimuths.map(|azimuth_deg| Beam { azimuth_deg, heard: Heard::Silence }).collect();
     let sweep = Sweep { scan: uuid::Uuid::nil(), pose: *pose, beams };
-    let asked: Vec<&Parameter> = parameters.iter().collect();
-    let finder = RateFinder::new(world, &asked, world.air.sound_speed_m_s(), Phases::Known);
+    let of: Vec<&Parameter> = parameters.iter().collect();
+    let builder = JacobianBuilder::new(world, &of, world.air.sound_speed_m_s(), Phases::Known);
     let simulator = world.simulator(pose).expect("a model");
-    let judged = finder.sweep(&simulator, &simulator.at(pose.position()), 0, &sweep, pose);
-    judged.expect("candidates").iter().map(|beam| beam.possible[0].clone()).collect()
+    let readings = builder.sweep(&simulator, &simulator.at(pose.position()), 0, &sweep, pose);
+    readings.expect("candidates").iter().map(|beam| beam.possible[0].clone()).collect()
 }
 
-/// Compares what margins gain with a parameter with the difference between worlds that are changed by `by` to both sides;
-/// `near` says how far off a rate may be.
+/// Compares derivatives of detection limits with differences between worlds changed by `by` either
+/// way; `near` is the tolerance for a derivative.
 fn compare(
     parameter: u32,
-    found: &[Possible],
-    [before, after]: [Vec<Possible>; 2],
+    found: &[CandidateReading],
+    [before, after]: [Vec<CandidateReading>; 2],
     by: f64,
     near: impl Fn(f64) -> f64,
 ) {
     let mut compared = 0;
     for ((here, before), after) in found.iter().zip(&before).zip(&after) {
         let rate = here.until_rates.iter().find(|(of, _)| *of == parameter).map_or(0.0, |of| of.1);
-        // Lost below the lowest threshold or kept above the highest, it has no margin to compare.
+        // An echo beyond the scanned thresholds has no limit to compare.
         if here.outcome.range_m().is_none() || here.until_db.abs() >= 11.0 {
             continue;
         }
@@ -61,15 +62,15 @@ fn compare(
     assert!(compared >= 6, "{parameter}: {compared}");
 }
 
-/// Parameters about sensor and materials: before one wall, where nothing overlaps.
+/// Sensor and material parameters, with a single wall and no overlap.
 #[test]
-fn with_sensor_and_material() {
+fn sensor_and_material() {
     let mut here = before(
         r#"{"name": "wall", "materials": {"wood": {"reflectance": 0.8}},
         "walls": [{"id": "w", "from": [1.2, -9], "to": [1.2, 9], "material": "wood"}]}"#,
     );
     here.sensor.aperture = Aperture::Piston { radius_m: 6e-3, skirts_db: Some(-10.0) };
-    // Within reach of the thresholds that are looked at, and so steep that time walk does not count.
+    // Within the scanned thresholds, and steep enough for time walk to be negligible.
     (here.sensor.threshold, here.sensor.threshold_rise_db_per_m) = (0.1, 3.0);
     here.sensor.pulse = Pulse::Burst { cycles: 8.0, bandwidth_hz: 7000.0 };
     let parameters = [
@@ -87,15 +88,17 @@ fn with_sensor_and_material() {
     }
 }
 
-/// A wider band makes weak echoes less late: before one wall, from its middle to the ends of its arc.
+/// A wider band reduces the time walk of weak echoes: a single wall, from the middle of its arc to
+/// the ends.
 #[test]
-fn with_the_band() {
+fn bandwidth() {
     let mut here = before(
         r#"{"name": "wall", "materials": {"wood": {"reflectance": 0.8}},
         "walls": [{"id": "w", "from": [1.2, -9], "to": [1.2, 9], "material": "wood"}]}"#,
     );
     here.sensor.threshold = 0.05;
-    // A chirp is summed in steps of an eightieth of its filter's width, which a difference of two would show.
+    // A chirp is summed in steps of an eightieth of its filter's width, which a difference would
+    // show.
     for pulse in
         [Pulse::Burst { cycles: 8.0, bandwidth_hz: 1500.0 }, Pulse::Gaussian { sigma_us: 100.0 }]
     {
@@ -112,29 +115,30 @@ fn with_the_band() {
             else {
                 continue;
             };
-            // Of what is heard at lower thresholds only, the range is told at another one in each world.
+            // Below the nominal threshold, each world evaluates the range at a different threshold.
             if here.until_db < 0.5 {
                 continue;
             }
             let rate = here.range_rates.first().map_or(0.0, |of| of.1);
             let expected = (after_m - before_m) / (2.0 * BY);
-            // The threshold in force changes while a weak echo rises, which time walk leaves out.
-            let most = 1e-5 + 4e-3 * rate.abs();
-            assert!((rate - expected).abs() < most, "{rate} for {expected} metres");
+            // The effective threshold changes while a weak echo rises, which is not in the time
+            // walk.
+            let tolerance = 1e-5 + 4e-3 * rate.abs();
+            assert!((rate - expected).abs() < tolerance, "{rate} for {expected} metres");
             rates.push(rate);
         }
         // Centimetres at the ends of the arc, a quarter of that at its middle.
         assert!(rates.len() > 10, "{}", rates.len());
-        let by_size = |one: &&f64, other: &&f64| one.abs().total_cmp(&other.abs());
-        let (least, most) = (rates.iter().min_by(by_size), rates.iter().max_by(by_size));
-        let (Some(&least), Some(&most)) = (least, most) else { unreachable!("some are compared") };
-        assert!(most < -0.01 && least > 0.4 * most, "{least} {most}");
+        let by_size = |a: &&f64, b: &&f64| a.abs().total_cmp(&b.abs());
+        let (min, max) = (rates.iter().min_by(by_size), rates.iter().max_by(by_size));
+        let (Some(&min), Some(&max)) = (min, max) else { unreachable!("some are compared") };
+        assert!(max < -0.01 && min > 0.4 * max, "{min} {max}");
     }
 }
 
-/// A pole has another bearing where the ranger moves aside, or turns.
+/// The direction of a pole changes as the ranger moves aside, or turns.
 #[test]
-fn with_the_bearing() {
+fn bearing() {
     let mut here = before(
         r#"{"name": "pole", "materials": {"steel": {"reflectance": 1.0}},
         "cylinders": [{"id": "p", "center": [1.2, 0.1], "radius_m": 0.03, "material": "steel"}]}"#,
@@ -144,7 +148,7 @@ fn with_the_bearing() {
     let at = |pose: Pose| first_possible(&here, &pose, &parameters, 2);
     let found = at(AT);
     let aside = |by: f64| at(Pose { y_m: by, ..AT });
-    // What it gains by being nearer is left out: 17 decibels a metre, of which a tenth is along the way aside.
+    // The effect of the range is omitted: 17 dB/m, of which a tenth is along the displacement.
     compare(0, &found, [-0.002, 0.002].map(aside), 0.002, |rate| 0.03 * rate.abs() + 2.0);
     let turned = |by: f64| at(Pose { heading_deg: by, ..AT });
     compare(1, &found, [-0.1, 0.1].map(turned), 0.1, |rate| 0.03 * rate.abs() + 0.02);

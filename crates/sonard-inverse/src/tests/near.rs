@@ -1,4 +1,4 @@
-//! Readings of a wall so near that its echo sounds already when the receiver begins to listen.
+//! Readings of a wall below the minimum range.
 
 use rand::SeedableRng as _;
 use rand_distr::{Distribution as _, Normal};
@@ -8,19 +8,20 @@ use sonard_model::{acoustics::Rise, geometry::Pose, reading::PingStatus};
 use super::{SIGMA_DB, as_read, before_a_wall};
 use crate::{Beam, Heard, Hypotheses, Parameter, Sweep, World};
 
-/// Just nearer than the least range of 0.41 m: straight on the echo is there already, aside it rises later.
+/// Just below the minimum range of 0.41 m: on the axis the echo falls into blanking, off it rises
+/// later.
 const WALL_M: f64 = 0.408;
 
 fn at(x_m: f64) -> Pose {
     Pose { x_m, y_m: 0.0, heading_deg: 0.0 }
 }
 
-/// Readings from the middle by thresholds that vary.
+/// Readings from the origin with varying thresholds.
 fn read(here: &World, rng: &mut Pcg64) -> Sweep {
     let normal = Normal::new(0.0, SIGMA_DB).expect("a distribution");
     let simulator = here.simulator(&at(0.0)).expect("a model");
     let point = simulator.at(at(0.0).position());
-    let mut heard = |azimuth_deg: f64| {
+    let mut outcome = |azimuth_deg: f64| {
         let factor = 10f64.powf(normal.sample(rng) / 20.0);
         let rise = point.hear(here.direction_rad(&at(0.0), azimuth_deg), |firing| {
             firing.listen(simulator.receiver(), |listening| listening.rise(factor, 0.0))
@@ -35,23 +36,24 @@ fn read(here: &World, rng: &mut Pcg64) -> Sweep {
     };
     let azimuths_deg = (-60..60).map(|at| 0.25 * f64::from(at));
     let beams =
-        azimuths_deg.map(|azimuth_deg| Beam { azimuth_deg, heard: heard(azimuth_deg) }).collect();
+        azimuths_deg.map(|azimuth_deg| Beam { azimuth_deg, heard: outcome(azimuth_deg) }).collect();
     Sweep { scan: uuid::Uuid::nil(), pose: at(0.0), beams }
 }
 
-/// Which of the beams of an arc's ends are too near is decided by the threshold, too: it is right on average only with them.
+/// The threshold affects which beams at the ends of an arc are below the minimum range: its score
+/// is unbiased only with them.
 #[test]
-fn thresholds_are_right_on_average_beside_what_is_too_near() {
+fn threshold_score_is_unbiased() {
     const SWEEPS: u32 = 200;
     let (here, errors) = (before_a_wall(WALL_M, 2.0), as_read(2.0));
-    let asked = Hypotheses::new(here.clone(), vec![Parameter::Threshold]).expect("a model");
+    let hypotheses = Hypotheses::new(here.clone(), vec![Parameter::Threshold]).expect("a model");
     let mut rng = Pcg64::seed_from_u64(5);
     let (mut sum, mut squares, mut without) = (0.0, 0.0, 0.0);
     let mut mixed = 0;
     for _ in 0..SWEEPS {
         let sweep = read(&here, &mut rng);
         let score = |sweep: &Sweep| {
-            asked.log_likelihood(sweep, &at(0.0), &errors).expect("paths").gradient[0]
+            hypotheses.log_likelihood(sweep, &at(0.0), &errors).expect("paths").gradient[0]
         };
         let score_of_all = score(&sweep);
         sum += score_of_all;
@@ -61,22 +63,23 @@ fn thresholds_are_right_on_average_beside_what_is_too_near() {
         mixed += near.len();
         without += score(&Sweep { beams: others, ..sweep.clone() });
     }
-    assert!(mixed > 1000, "{mixed} beams too near");
-    let [mean, beside] = [sum, without].map(|of| of / f64::from(SWEEPS));
+    assert!(mixed > 1000, "{mixed} beams below the minimum range");
+    let [mean, biased] = [sum, without].map(|of| of / f64::from(SWEEPS));
     let error = squares.sqrt() / f64::from(SWEEPS);
     assert!(mean.abs() < 4.0 * error, "{mean} +- {error}");
-    // Left out, they would make it seem higher than it is.
-    assert!(beside > 5.0 * error, "{beside} +- {error}");
+    // Without them the threshold would seem higher.
+    assert!(biased > 5.0 * error, "{biased} +- {error}");
 }
 
-/// And they say that there is something, and nothing farther off.
+/// They indicate that there is a target, and none farther off.
 #[test]
-fn what_is_too_near_is_of_a_near_wall() {
+fn minimum_range_constrains_the_wall() {
     let (here, errors) = (before_a_wall(WALL_M, 2.0), as_read(2.0));
     let mut read = read(&here, &mut Pcg64::seed_from_u64(6));
     read.beams.retain(|beam| beam.heard == Heard::Near);
-    let asked = Hypotheses::new(here, vec![Parameter::X(0)]).expect("a model");
-    let likely = |x_m: f64| asked.log_likelihood(&read, &at(x_m), &errors).expect("paths").value;
+    let hypotheses = Hypotheses::new(here, vec![Parameter::X(0)]).expect("a model");
+    let likely =
+        |x_m: f64| hypotheses.log_likelihood(&read, &at(x_m), &errors).expect("paths").value;
     let count = read.beams.len() as f64;
     assert!(likely(0.0) > -0.3 * count, "{} of {count}", likely(0.0));
     for farther_m in [0.01, 0.03, 0.1] {

@@ -7,13 +7,13 @@ use serde::Serialize;
 
 use super::{Failure, Outcome};
 
-/// A rule above, below and under the header.
+/// Table style with horizontal rules only.
 pub(crate) const RULED: TableStyle = TableStyle::new()
     .top_border(LineStyle::none().fill('─').junction('─'))
     .header_separator(LineStyle::none().fill('─').junction('─'))
     .bottom_border(LineStyle::none().fill('─').junction('─'));
 
-/// Prints records as JSON Lines, or as `table` formats them. A closed pipe is no failure.
+/// Prints records as JSON Lines, or formatted by `table`. A closed pipe is not an error.
 pub(crate) fn answer<T: Serialize>(
     json: bool,
     records: impl IntoIterator<Item = T>,

@@ -1,4 +1,4 @@
-//! `sonard-papers benchmark`.
+//! Command `sonard-papers benchmark` with its verbs.
 
 use super::{Outcome, interpret, map, rooms, score};
 
@@ -11,10 +11,10 @@ pub(crate) enum Verb {
     /// Compare a map with the ideal one
     #[command(long_about = score::ABOUT)]
     Score(score::Args),
-    /// Explore random rooms with sonar, laser, and laser just in time, and compare the maps
+    /// Explore random rooms with sonar, laser and just-in-time sensing, and compare the maps
     #[command(long_about = rooms::ABOUT)]
     Explore(rooms::Args),
-    /// Measure on random rooms how often the claims of `interpret` are true
+    /// Measure the calibration of the probabilities of `interpret` in random rooms
     #[command(long_about = interpret::ABOUT)]
     Interpret(interpret::Args),
 }

@@ -1,4 +1,4 @@
-//! `sonard-papers explore`.
+//! Command `sonard-papers explore` and its output files.
 
 use std::{
     io::{self, Write},
@@ -40,7 +40,7 @@ use super::{
 pub(crate) struct Args {
     #[command(flatten)]
     place: PlaceArgs,
-    /// Sensors that the map is made with
+    /// Sensors that the robot maps with
     #[arg(long, value_enum, default_value_t = SensingName::JustInTime)]
     sensing: SensingName,
     #[command(flatten)]
@@ -48,7 +48,7 @@ pub(crate) struct Args {
     /// Random seed; noise of ranges, laser and odometry
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// Output folder; the map, what the laser saw, the stops and pictures
+    /// Output folder for the map, the laser scans, the stops and pictures
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// JSON instead of text; one object
@@ -60,56 +60,56 @@ pub(crate) struct Args {
     acoustics: AcousticArgs,
 }
 
-/// The robot and how it explores.
+/// Robot and exploration strategy.
 #[derive(Debug, Clone, Copy, clap::Args)]
 #[command(next_help_heading = "Robot")]
 pub(crate) struct RobotArgs {
-    /// Arrangement of its sonars
+    /// Arrangement of the sonars
     #[arg(long, value_enum, default_value_t = RangerName::Ring)]
     ranger: RangerName,
-    /// Standard deviation of each drive's distance and turn, as a share of them
+    /// Standard deviation of each drive's distance and turn, relative to them
     #[arg(long, value_name = "SHARE", default_value_t = 0.0)]
     odometry_noise: f64,
-    /// Distance from the object that is followed, metres
+    /// Distance from the followed object, metres
     #[arg(long, value_name = "M", default_value_t = ExploreSettings::default().standoff_m)]
     standoff: f64,
-    /// Leave out sonar readings beyond this "logical" distance, metres
+    /// Discard sonar readings beyond this "logical" distance, metres
     #[arg(long, value_name = "M", default_value_t = ExploreSettings::default().map.logical_m)]
     logical: f64,
     /// Maximum range of the sonars, metres
     #[arg(long, value_name = "M", default_value_t = 8.0)]
     pub(crate) sonar_range: f64,
-    /// Give up after so many stops
+    /// Maximum number of stops
     #[arg(long, value_name = "N", default_value_t = ExploreSettings::default().most_stops)]
     most_stops: usize,
 }
 
-/// A [`Sensing`] on the command line.
+/// [`Sensing`] as a command-line value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 pub(crate) enum SensingName {
     /// Sonar only
     Sonar,
-    /// Laser only: all around at each stop
+    /// Laser only: a full turn at each stop
     Laser,
-    /// Sonar, and one shot of the laser at ends of lines
+    /// Sonar, and one laser shot at each line end
     JustInTime,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 enum RangerName {
-    /// Twelve sonars, turned in place for 180 readings
+    /// Twelve sonars, rotated in place for 180 readings
     Ring,
-    /// One ranger on a stepper, 400 readings
+    /// Single ranger on a stepper, 400 readings
     Stepper,
 }
 
 pub(crate) const ABOUT: &str = "\
-Let a simulated robot explore a scene and map it with lines.
+Explore a scene with a simulated robot and map it with lines.
 
 After G. Dudek, P. Freedman and I. Rekleitis, \"Just-in-time sensing\" (ICRA 1996): the robot follows the \
-nearest object at about a metre and goes on to the next in the order of their discovery. Sonar, simulated by the \
-model, finds walls; where it is ambiguous, at corners and ends of walls, a laser with a field of view of 25 \
-degrees is aimed at the end of the line and confirms it. The robot knows only what it sensed, and obstacles stop \
+nearest object at about a metre and continues with the next in the order of discovery. Sonar, simulated by the \
+model, detects walls; where it is ambiguous, at corners and ends of walls, a laser with a field of view of 25 \
+degrees is aimed at the end of the line and confirms it. The robot uses its measurements only, and obstacles stop \
 it.";
 
 const HELP: &str = "\
@@ -118,16 +118,16 @@ Examples:
   sonard-papers explore --scene mcgill-lab --pose fig4 --sensing sonar --json
   sonard-papers explore --scene my-room.json --pose 1,1,0 --odometry-noise 0.005
 
---out receives lines.jsonl (as `sonard lines --json`), laser.jsonl (one shot or turn a line, for `sonard \
+--out receives lines.jsonl (as `sonard lines --json`), laser.jsonl (one shot or turn per line, for `sonard \
 lines --laser`), stops.jsonl, exploration.svg and .png, stage-1.png to stage-4.png and exploration.apng, \
 an animation that browsers play.
 
-Map errors, in metres, each distance counting up to 0.5: the line error is the mean of how far the \
-map's lines are from walls and how far walls are from the map's lines (both along their length); the \
-endpoint error is the mean of how far ends of lines are from ends of walls and the other way round; \
+Map errors, in metres, with each distance limited to 0.5: the line error is the mean of the distances \
+of the map's lines from walls and of walls from the map's lines (both averaged along their length); the \
+endpoint error is the mean of the distances of line ends from wall ends and of wall ends from line ends; \
 the map error is the mean of the two.
-Exit codes: 0 done, 1 stopped before everything was explored, 2 wrong usage or input, 3 the disk gave \
-up.";
+Exit codes: 0 done, 1 stopped before everything was explored, 2 wrong usage or input, 3 write \
+error.";
 
 pub(crate) fn run(args: &Args) -> Outcome {
     let (scene, pose) = args.place.load()?;
@@ -145,7 +145,7 @@ pub(crate) fn run(args: &Args) -> Outcome {
     bar.finish_and_clear();
     let made = made?;
     let scene = simulator.scene();
-    let summary = Summary::of(scene, sensing, &made);
+    let summary = Summary::from_exploration(scene, sensing, &made);
     if let Some(folder) = &args.out {
         write_all((folder, args.overwrite), &made, sensing, scene)?;
     }
@@ -154,12 +154,12 @@ pub(crate) fn run(args: &Args) -> Outcome {
         return Ok(());
     }
     Err(Failure::Found(format!(
-        "{} stops were not enough to explore everything: see --most-stops",
+        "the exploration is incomplete after {} stops: see --most-stops",
         made.stops.len()
     )))
 }
 
-/// One exploration from a pose, counted in `bar`; the same seed gives the same.
+/// Explores from a pose with progress in `bar`. The result is reproducible for a seed.
 pub(crate) fn explored(
     (simulator, pose): (&Simulator, Pose),
     sensing: Sensing,
@@ -171,8 +171,8 @@ pub(crate) fn explored(
     let free_m = simulator.scene().clearance_m(pose.position());
     if free_m <= robot.radius_m {
         return Err(Failure::input(
-            format!("the robot's body, {} m in radius, does not fit at the pose", robot.radius_m),
-            format!("something is {free_m:.3} m from there: give a pose that is farther from it"),
+            format!("the robot's body of {} m radius does not fit at the pose", robot.radius_m),
+            format!("the nearest obstacle is at {free_m:.3} m: give a pose farther from it"),
         ));
     }
     let rng = Pcg64::seed_from_u64(seed);
@@ -182,7 +182,7 @@ pub(crate) fn explored(
         bar.set_message(format!("{:.0} m driven", so_far.travel_m));
     });
     match robot.refusal() {
-        Some(refusal) => Err(Failure::input(refusal, "see `sonard-papers explore --help`")),
+        Some(error) => Err(Failure::input(error, "see `sonard-papers explore --help`")),
         None => Ok(made),
     }
 }
@@ -198,16 +198,16 @@ impl SensingName {
 }
 
 impl RobotArgs {
-    /// Checked settings.
+    /// Validated settings of robot and exploration.
     pub(crate) fn settings(&self) -> Result<(RobotSettings, ExploreSettings), Failure> {
         let checks = [
             ("odometry-noise", self.odometry_noise, 0.0, 1.0),
             ("standoff", self.standoff, 0.4, 3.0),
             ("logical", self.logical, 0.5, 20.0),
         ];
-        for (option, value, least, most) in checks {
-            if !(least..=most).contains(&value) {
-                let help = format!("give a number from {least} to {most}");
+        for (option, value, min, max) in checks {
+            if !(min..=max).contains(&value) {
+                let help = format!("give a number from {min} to {max}");
                 return Err(Failure::input(format!("--{option} is {value}"), help));
             }
         }
@@ -230,7 +230,7 @@ impl RobotArgs {
     }
 }
 
-/// What is printed.
+/// Printed result of an exploration.
 #[derive(Debug, Serialize)]
 pub(crate) struct Summary {
     pub(crate) scene: String,
@@ -247,7 +247,7 @@ pub(crate) struct Summary {
 }
 
 impl Summary {
-    pub(crate) fn of(scene: &Scene, sensing: Sensing, made: &Exploration) -> Self {
+    pub(crate) fn from_exploration(scene: &Scene, sensing: Sensing, made: &Exploration) -> Self {
         Self {
             scene: scene.name.clone(),
             sensing,
@@ -265,7 +265,7 @@ impl Summary {
     fn print(&self, out: &mut impl Write) -> io::Result<()> {
         writeln!(
             out,
-            "{}: {} stops, {:.1} m, {} laser shots, {} sonar readings, ran into something {} times",
+            "{}: {} stops, {:.1} m, {} laser shots, {} sonar readings, {} collisions",
             self.sensing.name(),
             self.stops,
             self.travel_m,
@@ -275,7 +275,7 @@ impl Summary {
         )?;
         writeln!(
             out,
-            "{} lines; error of lines {:.1} mm, of endpoints {:.1} mm, of the map {:.1} mm",
+            "{} lines; line error {:.1} mm, endpoint error {:.1} mm, map error {:.1} mm",
             self.lines,
             1e3 * self.error.line_error_m,
             1e3 * self.error.endpoint_error_m,
@@ -284,14 +284,14 @@ impl Summary {
     }
 }
 
-/// How many pictures of the map in the making are written.
+/// Number of pictures of intermediate maps.
 const STAGES: usize = 4;
-/// Most pictures of the animation; of longer explorations some stops are skipped.
-const MOST_FRAMES: usize = 120;
+/// Maximum number of frames in the animation; longer explorations skip stops.
+const MAX_FRAMES: usize = 120;
 const FRAME_MS: u16 = 150;
 const FRAME_PX: u32 = 700;
 
-/// Files that an exploration leaves besides its stages.
+/// Output files of an exploration except its stages.
 const FILES: [&str; 6] = [
     "lines.jsonl",
     "laser.jsonl",
@@ -301,7 +301,7 @@ const FILES: [&str; 6] = [
     "exploration.apng",
 ];
 
-/// Checks that an exploration may be written into a folder.
+/// Checks all output files of an exploration in a folder.
 fn check_all(folder: &Path, overwrite: Overwrite) -> Outcome {
     FILES.iter().try_for_each(|name| overwrite.check(&folder.join(name)))
 }
@@ -315,7 +315,7 @@ pub(crate) fn write_all(
 ) -> Outcome {
     make_folder(folder)?;
     let save = |name: &str, bytes: &[u8]| overwrite.save(&folder.join(name), bytes);
-    let refuse = |error: PlotError| Failure::input(error, "this scene can't be drawn");
+    let reject = |error: PlotError| Failure::input(error, "this scene can't be drawn");
     save("lines.jsonl", &json_lines(made.lines().iter().map(line_record)))?;
     let laser = made.stops.iter().flat_map(|stop| &stop.laser).map(serde_json::to_value);
     save("laser.jsonl", &json_lines(laser.filter_map(Result::ok)))?;
@@ -323,17 +323,17 @@ pub(crate) fn write_all(
     let count = made.stops.len();
     let draw = |stops: usize| draw_exploration(made, stops, sensing, Some(scene));
     save("exploration.svg", draw(count).to_svg().as_bytes())?;
-    save("exploration.png", &draw(count).to_png(1000).map_err(refuse)?)?;
+    save("exploration.png", &draw(count).to_png(1000).map_err(reject)?)?;
     for stage in 1..=STAGES {
-        let png = draw((count * stage).div_ceil(STAGES)).to_png(1000).map_err(refuse)?;
+        let png = draw((count * stage).div_ceil(STAGES)).to_png(1000).map_err(reject)?;
         save(&format!("stage-{stage}.png"), &png)?;
     }
-    let every = count.div_ceil(MOST_FRAMES);
-    let shown: Vec<usize> =
+    let every = count.div_ceil(MAX_FRAMES);
+    let frame_stops: Vec<usize> =
         (1..=count).filter(|stop| (count - stop).is_multiple_of(every)).collect();
-    let bar = progress::bar(shown.len() as u64, "frames");
-    let frames = shown.iter().map(|stops| draw(*stops)).inspect(|_| bar.inc(1));
-    let animation = animate(frames, shown.len(), FRAME_PX, FRAME_MS).map_err(refuse)?;
+    let bar = progress::bar(frame_stops.len() as u64, "frames");
+    let frames = frame_stops.iter().map(|stops| draw(*stops)).inspect(|_| bar.inc(1));
+    let animation = animate(frames, frame_stops.len(), FRAME_PX, FRAME_MS).map_err(reject)?;
     bar.finish_and_clear();
     save("exploration.apng", &animation)
 }

@@ -8,7 +8,7 @@ pub(crate) type Outcome = Result<(), Failure>;
 /// Reason for an exit code other than 0.
 #[derive(Debug)]
 pub(crate) enum Failure {
-    /// Exit code 1: the experiment ran, but did not reach its end.
+    /// Exit code 1: experiment completed without reaching its goal.
     Found(String),
     /// Exit code 2: wrong usage or input, and its remedy.
     Input(String, String),

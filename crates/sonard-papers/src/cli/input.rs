@@ -15,7 +15,7 @@ use sonard_model::{
 
 use super::{Failure, output::note_input};
 
-/// Scene and pose.
+/// Options for scene and pose.
 #[derive(Debug, Clone, clap::Args)]
 pub(crate) struct PlaceArgs {
     /// Scene file, or name of a shipped scene (`sonard scene list`)
@@ -27,7 +27,7 @@ pub(crate) struct PlaceArgs {
 }
 
 impl PlaceArgs {
-    /// The scene, and a pose inside its room.
+    /// Loads the scene and a pose inside its room.
     pub(crate) fn load(&self) -> Result<(Scene, Pose), Failure> {
         let scene = load_scene(&self.scene)?;
         let reject = |error: PoseError| Failure::input(&error, error.help());
@@ -37,7 +37,7 @@ impl PlaceArgs {
     }
 }
 
-/// Sensor and air.
+/// Options for sensor and air.
 #[derive(Debug, Clone, clap::Args)]
 #[command(next_help_heading = "Sensor and air")]
 pub(crate) struct AcousticArgs {
@@ -114,12 +114,12 @@ pub(crate) fn load_sensor(name: &str) -> Result<Sensor, Failure> {
     })
 }
 
-/// Map of `sonard map`, by its folder or by its `.yaml` file.
+/// Reads a map of `sonard map` from its folder or its `.yaml` file.
 pub(crate) fn read_map(path: &Path) -> Result<Grid, Failure> {
     let reject = |path: &Path, error: &dyn std::fmt::Display| {
         Failure::input(
             format!("{}: {error}", path.display()),
-            "give a map as `sonard map` writes it: map.yaml beside map.pgm",
+            "give a map as `sonard map` writes it: map.yaml next to map.pgm",
         )
     };
     let yaml_path = if path.is_dir() { path.join("map.yaml") } else { path.to_path_buf() };

@@ -1,4 +1,4 @@
-//! `sonard-papers benchmark map`.
+//! Command `sonard-papers benchmark map` and its table.
 
 use std::{
     io::{self, Write},
@@ -39,7 +39,7 @@ use super::{
 #[derive(Debug, clap::Args)]
 #[command(after_help = HELP)]
 pub(crate) struct Args {
-    /// How many courses, each mapped without and with Feature Prediction
+    /// Number of courses, each mapped without and with Feature Prediction
     #[arg(long, value_name = "N", default_value_t = 128, value_parser = clap::value_parser!(u32).range(1..=100_000))]
     maps: u32,
     /// Random seed; rooms, courses and noise
@@ -54,25 +54,25 @@ pub(crate) struct Args {
     /// Treat ranges beyond this as no echo, metres [default: the sensor's, at most 5]
     #[arg(long, value_name = "M")]
     silent_beyond: Option<f64>,
-    /// Exponent of the confidence with the distance of the feature; the paper also says 1
+    /// Exponent of the confidence with the distance of the feature; the paper also uses 1
     #[arg(long, value_name = "E", default_value_t = 2.0)]
     exponent: f64,
-    /// How far walls are extended beyond their observed part, metres
+    /// Extension of walls beyond their observed part, metres
     #[arg(long, value_name = "M", default_value_t = Mapping::default().extend_m)]
     extend: f64,
-    /// Weigh whole readings, also what they say of the space before the feature, as the paper does
+    /// Weight complete readings, including their free space before the feature, as in the paper
     #[arg(long)]
     whole_readings: bool,
-    /// Leave readings of less confidence out; 0.5 is full confidence
+    /// Discard readings of lower confidence; 0.5 is full confidence
     #[arg(long, value_name = "C", default_value_t = Mapping::default().least_confidence)]
     least_confidence: f64,
-    /// Detect one sound at a time and time it by its path alone
+    /// Detect one arrival at a time and time it by its path alone
     #[arg(long)]
     ideal_receiver: bool,
-    /// JSON instead of text; one object for each course
+    /// JSON instead of text; one object per course
     #[arg(long)]
     json: bool,
-    /// Output folder; pictures of the maps: ideal, without, with
+    /// Output folder for pictures of the maps: ideal, without, with
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     #[command(flatten)]
@@ -82,37 +82,37 @@ pub(crate) struct Args {
 pub(crate) const ABOUT: &str = "\
 Map simulated courses without and with Feature Prediction, and score the maps.
 
-A robot wanders through shipped scenes and rooms made up at random, reading with a ring of seven \
-sonars (as the Pioneer 1) or a stepper; the model makes the readings. The maps are set beside \
-ideal ones by the four benchmarks of the Feature Prediction paper; the table gives the mean of \
+A robot drives at random through shipped scenes and random rooms, measuring with a ring of seven \
+sonars (as on the Pioneer 1) or a stepper; the model simulates the readings. The four benchmarks of the \
+Feature Prediction paper compare the maps with ideal ones; the table gives the mean of \
 each scene.";
 
 const HELP: &str = "\
 Examples:
   sonard-papers benchmark map                         128 courses; the same seed gives the same table
   sonard-papers benchmark map --maps 16 --out maps    and pictures of the maps
-  sonard-papers benchmark map --extend 0 --whole-readings --least-confidence 0     the paper's way, but for splits
+  sonard-papers benchmark map --extend 0 --whole-readings --least-confidence 0     as in the paper except wall splitting
 
 The benchmarks, in percent: correlation of the two maps (more is better); map score, the mean \
-squared difference of cells; the same of cells occupied in either map; and of the shortest ways \
-through the map's free space between places half a metre apart, how many run into an obstacle of \
+squared difference of cells; the same of cells occupied in either map; and the share of the shortest paths \
+through the map's free space between positions half a metre apart that hit an obstacle of \
 the ideal map.";
 
-/// The array of the Feature Prediction paper's robot.
+/// Array of the robot in the Feature Prediction paper.
 const RING: &str = "pioneer-7";
 
-/// Scenes that come with sonard, with the pose to begin at.
+/// Shipped scenes with their start poses.
 const SHIPPED: [(&str, &str); 4] = [
     ("mcgill-lab", "fig4"),
     ("corridor", "beside-wall"),
     ("two-surface-room", "middle"),
     ("simple-room", "fig7"),
 ];
-/// Made-up rooms: how many boxes and partitions.
-const MADE_UP: [(&str, usize, usize); 4] =
+/// Random rooms with their numbers of boxes and partitions.
+const RANDOM_ROOMS: [(&str, usize, usize); 4] =
     [("room", 0, 0), ("room with boxes", 3, 0), ("two rooms", 0, 1), ("three rooms, boxes", 2, 2)];
 
-/// A course's result.
+/// Scores of one course.
 #[derive(Debug, Clone, Serialize)]
 struct Row {
     scene: &'static str,
@@ -130,7 +130,7 @@ pub(crate) fn run(args: &Args) -> Outcome {
     answer(args.json, &rows, |out| print(out, &rows))
 }
 
-/// All courses, on as many threads as there are cores.
+/// Maps all courses in parallel.
 fn trials(args: &Args) -> Result<Vec<Row>, Failure> {
     let bar = progress::bar(u64::from(args.maps), "courses");
     let rows = (0..args.maps as usize)
@@ -141,9 +141,9 @@ fn trials(args: &Args) -> Result<Vec<Row>, Failure> {
     rows
 }
 
-/// One course: its scene, arrangement and random numbers follow from its number and the seed.
+/// Maps one course; its number and the seed determine scene, arrangement and random numbers.
 fn trial(args: &Args, course: usize) -> Result<Row, Failure> {
-    let refuse = |error: &dyn std::fmt::Display| {
+    let reject = |error: &dyn std::fmt::Display| {
         Failure::input(error.to_string(), "see `sonard-papers benchmark map --help`")
     };
     let mut rng = Pcg64::seed_from_u64(args.seed.wrapping_mul(1_000_003) ^ course as u64);
@@ -151,7 +151,7 @@ fn trial(args: &Args, course: usize) -> Result<Row, Failure> {
     let ring = (course / 8).is_multiple_of(2);
     let arrangement = match ring {
         true => {
-            let array = RangerArray::preset(RING).map_err(|error| refuse(&error))?;
+            let array = RangerArray::preset(RING).map_err(|error| reject(&error))?;
             Arrangement::Ring(Box::new(array))
         }
         false => Arrangement::Stepper,
@@ -167,9 +167,9 @@ fn trial(args: &Args, course: usize) -> Result<Row, Failure> {
         extend_m: args.extend,
         trust: Trust { least_confidence: args.least_confidence, keep_clear: !args.whole_readings },
     };
-    let sensor = Sensor::preset("senscomp-6500").map_err(|error| refuse(&error))?;
+    let sensor = Sensor::preset("senscomp-6500").map_err(|error| reject(&error))?;
     let air = Air::default();
-    let extents = Extents::new(&sensor, &air, false).map_err(|error| refuse(&error))?;
+    let extents = Extents::new(&sensor, &air, false).map_err(|error| reject(&error))?;
     let silent_beyond_m = args.silent_beyond.unwrap_or(sensor.max_range_m.min(MAX_RANGE_M));
     let options = Options {
         max_range_m: Some(silent_beyond_m),
@@ -178,16 +178,15 @@ fn trial(args: &Args, course: usize) -> Result<Row, Failure> {
         ..Options::default()
     };
     let simulator =
-        Simulator::new(Arc::new(scene), sensor, air, options).map_err(|error| refuse(&error))?;
-    let course_taken = Course::through(&simulator, start, &settings, &mut rng)
-        .map_err(|error| refuse(&error))?
-        .ok_or_else(|| refuse(&format!("{name}: there is no room for the robot to move")))?;
-    let trial =
-        course_taken.map(&extents, silent_beyond_m, &settings).map_err(|error| refuse(&error))?;
+        Simulator::new(Arc::new(scene), sensor, air, options).map_err(|error| reject(&error))?;
+    let driven = Course::through(&simulator, start, &settings, &mut rng)
+        .map_err(|error| reject(&error))?
+        .ok_or_else(|| reject(&format!("{name}: the scene has no free space for the robot")))?;
+    let trial = driven.map(&extents, silent_beyond_m, &settings).map_err(|error| reject(&error))?;
     let arrangement = if ring { "ring" } else { "stepper" };
     if let Some(folder) = &args.out {
         let stem = format!("{course:03}-{}-{arrangement}", name.replace([' ', ','], "-"));
-        save((folder, args.overwrite), &stem, simulator.scene(), &course_taken, &trial)?;
+        save((folder, args.overwrite), &stem, simulator.scene(), &driven, &trial)?;
     }
     let [without, with] = trial.scores;
     Ok(Row { scene: name, arrangement, course, without, with })
@@ -200,7 +199,7 @@ fn scene(number: usize, rng: &mut Pcg64) -> Result<(&'static str, Scene, DVec2),
         let pose = scene.pose(pose).map_err(|error| Failure::input(&error, error.help()))?;
         return Ok((name, scene, pose.position()));
     }
-    let (name, boxes, partitions) = MADE_UP[number - SHIPPED.len()];
+    let (name, boxes, partitions) = RANDOM_ROOMS[number - SHIPPED.len()];
     let scene = random_room(name, boxes, partitions, rng);
     let start = scene.poses.get("start").map_or(DVec2::ZERO, Pose::position);
     Ok((name, scene, start))
@@ -213,7 +212,7 @@ fn save(
     course: &Course,
     trial: &Trial,
 ) -> Outcome {
-    let way: Vec<DVec2> = course.sweeps.iter().map(|sweep| sweep.pose.position()).collect();
+    let trajectory: Vec<DVec2> = course.sweeps.iter().map(|sweep| sweep.pose.position()).collect();
     let pictures =
         [("ideal map", &course.ideal), ("without", &trial.maps[0]), ("with", &trial.maps[1])];
     for (kind, map) in pictures {
@@ -224,7 +223,7 @@ fn save(
             badge: badge_of(Some(Provenance::Simulated)),
             grid: map,
             scene: Some(scene),
-            way: &way,
+            way: &trajectory,
         };
         let png = draw_map(&view)
             .map_err(|error| Failure::input(error, "choose a coarser --resolution"))?;
@@ -252,26 +251,30 @@ fn print(out: &mut impl Write, rows: &[Row]) -> io::Result<()> {
     }
     groups.sort_by_key(|(_, arrangement)| *arrangement);
     for (scene, arrangement) in groups {
-        let of: Vec<&Row> =
+        let group: Vec<&Row> =
             rows.iter().filter(|r| r.scene == scene && r.arrangement == arrangement).collect();
-        table.add_row(line(scene, arrangement, &of));
+        table.add_row(line(scene, arrangement, &group));
     }
     for arrangement in ["ring", "stepper"] {
-        let of: Vec<&Row> = rows.iter().filter(|r| r.arrangement == arrangement).collect();
-        if !of.is_empty() {
-            table.add_row(line("all", arrangement, &of));
+        let group: Vec<&Row> = rows.iter().filter(|r| r.arrangement == arrangement).collect();
+        if !group.is_empty() {
+            table.add_row(line("all", arrangement, &group));
         }
     }
     table.add_row(line("all", "both", &rows.iter().collect::<Vec<_>>()));
     for column in table.column_iter_mut().skip(2) {
         column.set_cell_alignment(CellAlignment::Right);
     }
-    writeln!(out, "percent, without -> with Feature Prediction (change in points)\n{table}")
+    writeln!(
+        out,
+        "percent, without -> with Feature Prediction (change in percentage points)\n{table}"
+    )
 }
 
 fn line(scene: &str, arrangement: &str, rows: &[&Row]) -> Vec<String> {
-    let cell = |of: fn(&MapScore) -> Option<f64>| {
-        let mean = |side: fn(&Row) -> &MapScore| mean(rows.iter().filter_map(|row| of(side(row))));
+    let cell = |value: fn(&MapScore) -> Option<f64>| {
+        let mean =
+            |side: fn(&Row) -> &MapScore| mean(rows.iter().filter_map(|row| value(side(row))));
         change(mean(|row| &row.without), mean(|row| &row.with))
     };
     vec![
@@ -285,14 +288,14 @@ fn line(scene: &str, arrangement: &str, rows: &[&Row]) -> Vec<String> {
     ]
 }
 
-/// `None` of no values at all: a benchmark that no map of a scene has.
+/// Mean of values; `None` without any, as for a benchmark undefined in all maps of a scene.
 fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
     let (sum, count) = values.fold((0.0, 0_u32), |(sum, count), value| (sum + value, count + 1));
     (count > 0).then(|| sum / f64::from(count))
 }
 
-/// Two percentages, and what is between them in points: a ratio would mean nothing where a
-/// correlation is near 0 or negative.
+/// Formats two percentages and their difference in percentage points. A ratio is meaningless for a
+/// correlation near 0 or below.
 fn change(without: Option<f64>, with: Option<f64>) -> String {
     match (without, with) {
         (Some(without), Some(with)) => {
@@ -310,7 +313,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_change_is_told_in_points_and_what_no_map_has_is_a_dash() {
+    fn change_is_in_percentage_points() {
         assert_eq!(change(Some(27.0), Some(66.04)), "27.00 -> 66.04 (+39.0)");
         assert_eq!(change(Some(10.0), Some(-10.4)), "10.00 -> -10.40 (-20.4)");
         assert_eq!(change(None, mean([1.0, 2.0].into_iter())), "- -> 1.50");

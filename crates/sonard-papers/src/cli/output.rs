@@ -1,4 +1,4 @@
-//! Output files: written whole, and never over an input.
+//! Output files, written atomically and never over an input.
 
 use std::{
     fs, io,
@@ -19,7 +19,7 @@ use super::{Failure, Outcome};
 /// Device and inode of each file that this process reads.
 static INPUTS: Mutex<Vec<(u64, u64)>> = Mutex::new(Vec::new());
 
-/// Protects a file from being replaced by an output, under any name.
+/// Protects an input file from replacement by an output, under any of its names.
 pub(crate) fn note_input(path: &Path) {
     if let Ok(file) = fs::metadata(path) {
         INPUTS.lock().unwrap_or_else(PoisonError::into_inner).push((file.dev(), file.ino()));
@@ -35,19 +35,19 @@ pub(crate) struct Overwrite {
 }
 
 impl Overwrite {
-    /// Checks that a file may be written, before the experiment runs.
+    /// Checks an output path before the experiment runs.
     pub(crate) fn check(self, path: &Path) -> Outcome {
-        let Ok(there) = fs::metadata(path) else { return Ok(()) };
+        let Ok(existing) = fs::metadata(path) else { return Ok(()) };
         let inputs = INPUTS.lock().unwrap_or_else(PoisonError::into_inner);
-        if inputs.contains(&(there.dev(), there.ino())) {
+        if inputs.contains(&(existing.dev(), existing.ino())) {
             return Err(Failure::input(
                 format!("{} is an input of this command", path.display()),
                 "give another output",
             ));
         }
-        if !there.is_file() {
+        if !existing.is_file() {
             return Err(Failure::input(
-                format!("{} is no file", path.display()),
+                format!("{} is not a regular file", path.display()),
                 "give another output",
             ));
         }
@@ -60,7 +60,7 @@ impl Overwrite {
         Ok(())
     }
 
-    /// Writes a file: complete, or not at all.
+    /// Writes a file atomically.
     pub(crate) fn save(self, path: &Path, bytes: &[u8]) -> Outcome {
         self.check(path)?;
         let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
@@ -92,7 +92,7 @@ pub(crate) fn write_map(folder: &Path, grid: &Grid, overwrite: Overwrite) -> Out
     overwrite.save(&folder.join("map.yaml"), yaml.as_bytes())
 }
 
-/// Record of a map's line, as `sonard lines --json` prints it.
+/// JSON record of a map line in the format of `sonard lines --json`.
 pub(crate) fn line_record(line: &MapLine) -> serde_json::Value {
     let [a, b] = line.ends;
     serde_json::json!({
@@ -101,7 +101,7 @@ pub(crate) fn line_record(line: &MapLine) -> serde_json::Value {
     })
 }
 
-/// Picture files.
+/// Options for picture files.
 #[derive(Debug, clap::Args)]
 pub(crate) struct PictureArgs {
     /// Picture to write, .svg or .png (repeatable)
@@ -119,10 +119,10 @@ impl PictureArgs {
     /// Checks names and places before the experiment runs.
     pub(crate) fn check(&self) -> Outcome {
         for path in &self.output {
-            if !is_svg(path) && !has_ending(path, "png") {
+            if !is_svg(path) && !has_extension(path, "png") {
                 return Err(Failure::input(
-                    format!("{}: the ending names no picture format", path.display()),
-                    "let the name end in .svg or .png",
+                    format!("{}: unknown picture format", path.display()),
+                    "use the extension .svg or .png",
                 ));
             }
             self.overwrite.check(path)?;
@@ -145,9 +145,9 @@ impl PictureArgs {
 }
 
 fn is_svg(path: &Path) -> bool {
-    has_ending(path, "svg")
+    has_extension(path, "svg")
 }
 
-fn has_ending(path: &Path, ending: &str) -> bool {
-    path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case(ending))
+fn has_extension(path: &Path, expected: &str) -> bool {
+    path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case(expected))
 }

@@ -3,9 +3,9 @@
 use indicatif::{ProgressBar, ProgressStyle};
 
 /// Bar of a known number of `things`, a plural.
-pub(crate) fn bar(of: u64, things: &str) -> ProgressBar {
+pub(crate) fn bar(count: u64, things: &str) -> ProgressBar {
     let style = format!("{{bar:40}} {{pos}}/{{len}} {things}, {{eta}} left");
-    ProgressBar::new(of).with_style(styled(&style))
+    ProgressBar::new(count).with_style(styled(&style))
 }
 
 /// Spinner with the number of `things`, a plural, and a message.

@@ -1,4 +1,4 @@
-//! `sonard-papers benchmark explore`.
+//! Command `sonard-papers benchmark explore` and its table.
 
 use std::{
     io::{self, Write},
@@ -35,7 +35,7 @@ use super::{
 #[derive(Debug, clap::Args)]
 #[command(after_help = HELP)]
 pub(crate) struct Args {
-    /// How many rooms, each explored three times
+    /// Number of rooms, each explored three times
     #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     rooms: u32,
     /// Random seed; rooms and noise
@@ -43,10 +43,10 @@ pub(crate) struct Args {
     seed: u64,
     #[command(flatten)]
     robot: RobotArgs,
-    /// JSON instead of text; one object for each exploration
+    /// JSON instead of text; summary object per exploration
     #[arg(long)]
     json: bool,
-    /// Output folder; what `sonard-papers explore --out` writes, and a picture of each room's
+    /// Output folder for the files of `sonard-papers explore --out`, and a picture of each room's
     /// three maps
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -55,19 +55,19 @@ pub(crate) struct Args {
 }
 
 pub(crate) const ABOUT: &str = "\
-Explore random rooms with sonar, laser, and laser just in time, and compare the maps.
+Explore random rooms with sonar, laser and just-in-time sensing, and compare the maps.
 
-Each room is 6 to 8 m by 5 to 6.5 m with two or three objects in it, its walls at an odd angle. The \
-three robots begin at the same place; the table has every room, and the means.";
+Each room is 6 to 8 m by 5 to 6.5 m with two or three objects, its walls oblique to the axes. The \
+three robots start at the same pose; the table lists each room and the means.";
 
 const HELP: &str = "\
 Examples:
   sonard-papers benchmark explore                       ten rooms; the same seed gives the same table
-  sonard-papers benchmark explore --seed 2 --out rooms  others, with pictures
+  sonard-papers benchmark explore --seed 2 --out rooms  other rooms, with pictures
 
-For how map errors are counted see `sonard-papers explore --help`.";
+`sonard-papers explore --help` defines the map errors.";
 
-/// An exploration of the table.
+/// Row of the table.
 #[derive(Debug, Serialize)]
 struct Row {
     room: u32,
@@ -77,26 +77,26 @@ struct Row {
 
 pub(crate) fn run(args: &Args) -> Outcome {
     let bar = progress::bar(u64::from(args.rooms), "rooms");
-    let of_rooms: Result<Vec<Vec<Row>>, Failure> =
+    let rooms: Result<Vec<Vec<Row>>, Failure> =
         (0..args.rooms).into_par_iter().map(|number| room(args, number, &bar)).collect();
     bar.finish_and_clear();
-    let rows: Vec<Row> = of_rooms?.into_iter().flatten().collect();
+    let rows: Vec<Row> = rooms?.into_iter().flatten().collect();
     answer(args.json, &rows, |out| print(out, &rows))
 }
 
-/// One room, explored in each way.
+/// Explores summary room with each kind of sensing.
 fn room(args: &Args, number: u32, bar: &ProgressBar) -> Result<Vec<Row>, Failure> {
-    let refuse = |error: &dyn std::fmt::Display| {
+    let reject = |error: &dyn std::fmt::Display| {
         Failure::input(error.to_string(), "see `sonard-papers benchmark explore --help`")
     };
     let (robot, settings) = args.robot.settings()?;
     let seed = args.seed.wrapping_mul(1_000_003) ^ u64::from(number);
     let scene = gallery(&format!("room {}", number + 1), &mut Pcg64::seed_from_u64(seed));
     let pose = scene.poses["start"];
-    let sensor = Sensor::preset("senscomp-6500").map_err(|error| refuse(&error))?;
+    let sensor = Sensor::preset("senscomp-6500").map_err(|error| reject(&error))?;
     let options = Options { max_range_m: Some(args.robot.sonar_range), ..Options::default() };
     let simulator = Simulator::new(Arc::new(scene), sensor, Air::default(), options)
-        .map_err(|error| refuse(&error))?;
+        .map_err(|error| reject(&error))?;
     let scene = simulator.scene();
     let stops = ProgressBar::hidden();
     let explore = |sensing| {
@@ -112,13 +112,13 @@ fn room(args: &Args, number: u32, bar: &ProgressBar) -> Result<Vec<Row>, Failure
         }
         let all: Vec<(Sensing, &Exploration)> = made.iter().map(|(s, made)| (*s, made)).collect();
         let picture = draw_explorations(&all, Some(scene));
-        let png = picture.to_png(1200).map_err(|error| refuse(&error))?;
+        let png = picture.to_png(1200).map_err(|error| reject(&error))?;
         args.overwrite.save(&folder.join("maps.png"), &png)?;
     }
     bar.inc(1);
     let row = |(sensing, made): &(Sensing, Exploration)| Row {
         room: number + 1,
-        summary: Summary::of(scene, *sensing, made),
+        summary: Summary::from_exploration(scene, *sensing, made),
     };
     Ok(made.iter().map(row).collect())
 }
@@ -129,8 +129,8 @@ fn print(out: &mut impl Write, rows: &[Row]) -> io::Result<()> {
         "room",
         "sensing",
         "shots",
-        "way",
-        "bumps",
+        "distance",
+        "collisions",
         "line error",
         "endpoint error",
         "map error",
@@ -140,22 +140,26 @@ fn print(out: &mut impl Write, rows: &[Row]) -> io::Result<()> {
         table.add_row(line(&row.room.to_string(), row.summary.sensing, &[&row.summary]));
     }
     for sensing in Sensing::ALL {
-        let of: Vec<&Summary> =
-            rows.iter().map(|row| &row.summary).filter(|one| one.sensing == sensing).collect();
-        table.add_row(line("all", sensing, &of));
+        let group: Vec<&Summary> = rows
+            .iter()
+            .map(|row| &row.summary)
+            .filter(|summary| summary.sensing == sensing)
+            .collect();
+        table.add_row(line("all", sensing, &group));
     }
     for column in table.column_iter_mut().skip(2) {
         column.set_cell_alignment(CellAlignment::Right);
     }
     writeln!(out, "{table}")?;
-    let mean = |sensing, of: fn(&Summary) -> f64| {
-        let of_kind = rows.iter().map(|row| &row.summary).filter(|one| one.sensing == sensing);
-        mean(&of_kind.collect::<Vec<_>>(), of)
+    let mean = |sensing, value: fn(&Summary) -> f64| {
+        let group =
+            rows.iter().map(|row| &row.summary).filter(|summary| summary.sensing == sensing);
+        mean(&group.collect::<Vec<_>>(), value)
     };
-    let map = |sensing| mean(sensing, |one| one.error.map_error_m);
-    let shots = |sensing| mean(sensing, |one| f64::from(one.laser_shots));
-    // Where there was nothing to divide by there is no ratio.
-    let told = |text: String, ratio: f64| if ratio.is_finite() { text } else { "-".into() };
+    let map = |sensing| mean(sensing, |summary| summary.error.map_error_m);
+    let shots = |sensing| mean(sensing, |summary| f64::from(summary.laser_shots));
+    // A ratio to zero is undefined.
+    let finite = |text: String, ratio: f64| if ratio.is_finite() { text } else { "-".into() };
     let [of_shots, of_laser, of_sonar] = [
         100.0 * shots(Sensing::JustInTime) / shots(Sensing::Laser),
         100.0 * (map(Sensing::JustInTime) / map(Sensing::Laser) - 1.0),
@@ -163,30 +167,30 @@ fn print(out: &mut impl Write, rows: &[Row]) -> io::Result<()> {
     ];
     writeln!(
         out,
-        "just in time against laser only: {} of the shots, map error {}; against sonar only: map \
+        "just-in-time versus laser only: {} of the shots, map error {}; versus sonar only: map \
          error / {}",
-        told(format!("{of_shots:.1} %"), of_shots),
-        told(format!("{of_laser:+.0} %"), of_laser),
-        told(format!("{of_sonar:.0}"), of_sonar),
+        finite(format!("{of_shots:.1} %"), of_shots),
+        finite(format!("{of_laser:+.0} %"), of_laser),
+        finite(format!("{of_sonar:.0}"), of_sonar),
     )
 }
 
-fn mean(rows: &[&Summary], of: fn(&Summary) -> f64) -> f64 {
-    rows.iter().map(|row| of(row)).sum::<f64>() / rows.len() as f64
+fn mean(rows: &[&Summary], value: fn(&Summary) -> f64) -> f64 {
+    rows.iter().map(|row| value(row)).sum::<f64>() / rows.len() as f64
 }
 
-fn line(room: &str, sensing: Sensing, of: &[&Summary]) -> Vec<String> {
-    let millimetres = |error: fn(&Summary) -> f64| format!("{:.1} mm", 1e3 * mean(of, error));
-    let unfinished = of.iter().filter(|one| !one.finished).count();
+fn line(room: &str, sensing: Sensing, group: &[&Summary]) -> Vec<String> {
+    let millimetres = |error: fn(&Summary) -> f64| format!("{:.1} mm", 1e3 * mean(group, error));
+    let incomplete = group.iter().filter(|summary| !summary.finished).count();
     vec![
         room.into(),
         sensing.name().into(),
-        format!("{:.0}", mean(of, |one| f64::from(one.laser_shots))),
-        format!("{:.0} m", mean(of, |one| one.travel_m)),
-        format!("{:.0}", mean(of, |one| f64::from(one.bumps))),
-        millimetres(|one| one.error.line_error_m),
-        millimetres(|one| one.error.endpoint_error_m),
-        millimetres(|one| one.error.map_error_m),
-        if unfinished == 0 { String::new() } else { format!("{unfinished} not finished") },
+        format!("{:.0}", mean(group, |summary| f64::from(summary.laser_shots))),
+        format!("{:.0} m", mean(group, |summary| summary.travel_m)),
+        format!("{:.0}", mean(group, |summary| f64::from(summary.bumps))),
+        millimetres(|summary| summary.error.line_error_m),
+        millimetres(|summary| summary.error.endpoint_error_m),
+        millimetres(|summary| summary.error.map_error_m),
+        if incomplete == 0 { String::new() } else { format!("{incomplete} incomplete") },
     ]
 }

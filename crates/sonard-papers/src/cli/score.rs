@@ -1,4 +1,4 @@
-//! `sonard-papers benchmark score`.
+//! Command `sonard-papers benchmark score` and its output.
 
 use std::{
     io::{self, Write},
@@ -19,16 +19,16 @@ use super::{
 #[derive(Debug, clap::Args)]
 #[command(after_help = HELP)]
 pub(crate) struct Args {
-    /// The map: its .yaml, or the folder that holds map.yaml
+    /// Map: its .yaml file, or the folder with map.yaml
     #[arg(value_name = "MAP")]
     map: PathBuf,
-    /// What it should be: another map of the same region, or a scene file or a shipped scene's name
+    /// Ideal map of the same region, scene file, or name of a shipped scene
     #[arg(value_name = "IDEAL")]
     ideal: String,
-    /// From place to place of the lattice that ways are tried between, metres
+    /// Spacing of the lattice of path endpoints, metres
     #[arg(long, value_name = "M", default_value_t = PathSettings::default().spacing_m)]
     spacing: f64,
-    /// Also write the ideal map drawn from the scene into this folder
+    /// Also write the ideal map draw_ideal from the scene into this folder
     #[arg(long, value_name = "DIR")]
     save_ideal: Option<PathBuf>,
     /// JSON instead of text; one object
@@ -43,17 +43,17 @@ Compare a map with the ideal one.
 
 Four benchmarks, in percent. Correlation of the two maps' cells: more is better. Map score: the \
 squared difference of the cells, summed, over the number of cells: less is better. The same sum \
-over cells that are occupied in either map only. False-positive paths: of the shortest ways through \
-the map's free space between places on a lattice, how many run into an obstacle of the ideal map.
+over cells that are occupied in either map only. False-positive paths: share of the shortest paths through \
+the map's free space between points of a lattice that hit an obstacle of the ideal map.
 
-An ideal map is drawn from a scene on the map's own cells: walls are occupied, what can be reached \
+An ideal map is draw_ideal from a scene on the map's cells: walls are occupied, space reachable \
 from the scene's poses is free, the rest is unknown.";
 
 const HELP: &str = "\
 Examples:
   sonard-papers benchmark score map simple-room
   sonard-papers benchmark score map/map.yaml ideal/map.yaml --json
-Exit codes: 0 done, 2 wrong usage or input, 3 the disk gave up.";
+Exit codes: 0 done, 2 wrong usage or input, 3 write error.";
 
 pub(crate) fn run(args: &Args) -> Outcome {
     if !(args.spacing.is_finite() && args.spacing > 0.0) {
@@ -66,7 +66,7 @@ pub(crate) fn run(args: &Args) -> Outcome {
     let ideal = if is_map(Path::new(&args.ideal)) {
         read_map(Path::new(&args.ideal))?
     } else {
-        drawn(&args.ideal, *map.shape())?
+        draw_ideal(&args.ideal, *map.shape())?
     };
     if let Some(folder) = &args.save_ideal {
         write_map(folder, &ideal, args.overwrite)?;
@@ -78,18 +78,18 @@ pub(crate) fn run(args: &Args) -> Outcome {
     answer(args.json, [&found], |out| print(out, &found))
 }
 
-/// Whether a name is that of a map rather than of a scene.
+/// Whether a path names a map, not a scene.
 fn is_map(path: &Path) -> bool {
     let yaml = path.extension().is_some_and(|extension| extension == "yaml" || extension == "yml");
     yaml || path.join("map.yaml").is_file()
 }
 
-fn drawn(name: &str, shape: GridShape) -> Result<Grid, Failure> {
+fn draw_ideal(name: &str, shape: GridShape) -> Result<Grid, Failure> {
     let scene = load_scene(Path::new(name))?;
     let places: Vec<DVec2> = scene.poses.values().map(Pose::position).collect();
     if places.is_empty() {
         return Err(Failure::input(
-            format!("the scene {name} has no pose: what is free can't be told"),
+            format!("the scene {name} has no pose, so its free space is undefined"),
             "add a pose inside the room to the scene file",
         ));
     }

@@ -1,8 +1,8 @@
-//! Closest-object following.
+//! Closest-object following with line maps.
 
 use super::{
     Exploration, ExploreSettings, Sensing, Stop, Task,
-    ground::Ground,
+    ground::FloorGrid,
     objects::Objects,
     robot::{Drive, Robot},
 };
@@ -12,37 +12,36 @@ use sonard_interpret::interpret::{
 };
 use sonard_model::geometry::DVec2;
 
-/// The robot has arrived so close to where it wanted to go, metres.
+/// Distance from a goal that counts as arrival, metres.
 const ARRIVED_M: f64 = 0.12;
-/// Ends of lines so close are one end, metres.
+/// Maximum distance between observations of reading line end, metres.
 const SAME_END_M: f64 = 0.15;
-/// An end so close to another line goes on there, metres.
+/// Maximum distance of an end from a line that continues it, metres.
 const JOINED_M: f64 = 0.25;
-/// So many drives for one end are enough.
-const MOST_DRIVES: usize = 10;
-/// A corner is looked for within this beyond the end of a line, metres.
+/// Maximum number of drives for reading end.
+const MAX_DRIVES: usize = 10;
+/// Maximum distance of a corner beyond the end of a line, metres.
 const CORNER_REACH_M: f64 = 1.3;
-/// And lines turn there by at least this, degrees.
+/// Minimum angle between the lines of a corner, degrees.
 const CORNER_DEG: f64 = 25.0;
-/// What a corner returns looks like a line so long at most, metres,
+/// Maximum length of the line that a corner echo resembles, metres.
 const CORNER_ECHO_M: f64 = 0.6;
-/// turned against its walls by at least this, degrees.
+/// Minimum angle between the line of a corner echo and the walls, degrees.
 const SLANT_DEG: f64 = 25.0;
-/// A line of sonar that is shorter than this, by an end that the laser saw, is no wall of its own,
-/// metres.
-const LEAST_WALL_M: f64 = 0.4;
-/// No face is looked for behind the ends of shorter lines, metres.
-const LEAST_FACE_M: f64 = 0.3;
-/// The laser is aimed at nothing farther away, metres.
+/// Minimum length of a separate sonar wall next to an end measured by the laser, metres.
+const MIN_WALL_M: f64 = 0.4;
+/// Minimum length of a line whose ends are rounded to find further faces, metres.
+const MIN_FACE_M: f64 = 0.3;
+/// Maximum distance of a laser target, metres.
 const AIM_REACH_M: f64 = 2.5;
 
-/// Leads a robot round all it finds, and maps that.
+/// Explores and maps with closest-object following.
 ///
 /// The robot follows the nearest object at about [`standoff_m`](ExploreSettings::standoff_m),
-/// lengthening its line, until the line's end no longer moves. With sonar alone that is all there is
-/// to know of the end. The laser, just in time, is aimed at the corner with the next line or at the
-/// end itself, and makes it terminal. An object without open ends is done; the next is the one that
-/// was discovered first.
+/// lengthening its line, until the line's end no longer moves. With sonar only the end then remains
+/// as it is. In just-in-time sensing the laser is aimed at the corner with the next line or at the
+/// end, and makes it terminal. An object without open ends is finished. The objects follow in the
+/// order of discovery.
 #[must_use]
 pub fn explore(
     robot: &mut impl Robot,
@@ -52,7 +51,7 @@ pub fn explore(
     explore_watched(robot, sensing, settings, |_| {})
 }
 
-/// [`explore`], showing what is known after each stop.
+/// Explores as [`explore`] does, with a callback after each stop.
 #[must_use]
 pub fn explore_watched(
     robot: &mut impl Robot,
@@ -66,7 +65,7 @@ pub fn explore_watched(
         settings: *settings,
         map: LineMap::new(settings.map),
         objects: Objects::default(),
-        notes: Notes::default(),
+        history: History::default(),
         log: Exploration::default(),
     };
     explorer.stop(Task::Begin, None);
@@ -81,31 +80,31 @@ pub fn explore_watched(
     explorer.log
 }
 
-/// A place to look at something from.
+/// Position for the observation of a line end.
 #[derive(Debug, Clone, Copy)]
 struct Goal {
     task: Task,
-    /// What to look at: the end of a line.
+    /// End of the line to observe.
     target: DVec2,
-    /// Where from.
+    /// Position for the observation.
     view: DVec2,
-    /// First straight bit of the way there.
+    /// End of the first straight segment of the path to `view`.
     next: DVec2,
     cost: u32,
 }
 
-/// What was tried already.
+/// History of earlier goals.
 #[derive(Debug, Default)]
-struct Notes {
-    /// Ends of which no more can be known.
+struct History {
+    /// Line ends that need no further observation.
     done: Vec<DVec2>,
-    /// Ends behind which was looked.
+    /// Line ends whose other side has been observed.
     rounded: Vec<DVec2>,
-    /// Ends that drives were for.
+    /// Target of each drive.
     drives: Vec<DVec2>,
-    /// Where the robot ran into something.
+    /// Obstacle position of each collision.
     bumps: Vec<DVec2>,
-    /// The end that the last drive was for.
+    /// Target of the last drive.
     last: Option<DVec2>,
 }
 
@@ -115,12 +114,12 @@ struct Explorer<'a, R> {
     settings: ExploreSettings,
     map: LineMap,
     objects: Objects,
-    notes: Notes,
+    history: History,
     log: Exploration,
 }
 
 impl<R: Robot> Explorer<'_, R> {
-    /// Senses where the robot is.
+    /// Measures at the current pose and updates the map.
     fn stop(&mut self, task: Task, target: Option<DVec2>) {
         let (mut sonar, mut laser) = (None, Vec::new());
         if self.sensing == Sensing::Laser {
@@ -139,66 +138,66 @@ impl<R: Robot> Explorer<'_, R> {
         self.log.stops.push(Stop { pose, task, target, sonar, laser, lines });
     }
 
-    /// Drives towards a goal, senses, and looks closer once it is there.
+    /// Drives towards a goal, measures, and completes the goal on arrival.
     fn go(&mut self, goal: &Goal) {
         let from = self.robot.pose().position();
         let drive = self.robot.drive(goal.next);
         let at = self.robot.pose().position();
         self.log.travel_m += from.distance(at);
-        self.notes.last = Some(goal.target);
-        self.notes.drives.push(goal.target);
+        self.history.last = Some(goal.target);
+        self.history.drives.push(goal.target);
         if drive == Drive::Bumped {
             self.log.bumps += 1;
             let ahead = (goal.next - from).normalize_or_zero();
-            self.notes.bumps.push(at + self.settings.keep_off_m * ahead);
+            self.history.bumps.push(at + self.settings.keep_off_m * ahead);
         }
         self.stop(goal.task, Some(goal.target));
         if at.distance(goal.view) < ARRIVED_M {
-            self.settle(goal);
-        } else if count_near(&self.notes.drives, goal.target) > MOST_DRIVES {
+            self.complete(goal);
+        } else if count_near(&self.history.drives, goal.target) > MAX_DRIVES {
             self.close(goal);
         }
     }
 
-    /// The robot sees what it came for: decides on it.
-    fn settle(&mut self, goal: &Goal) {
+    /// Completes a goal in view, with laser shots in just-in-time sensing.
+    fn complete(&mut self, goal: &Goal) {
         if goal.task == Task::Follow && self.sensing == Sensing::JustInTime {
-            self.look_closer(goal.target);
+            self.confirm_end(goal.target);
         }
         self.close(goal);
     }
 
-    /// Leaves what is still open at a goal as it is.
+    /// Marks a goal as finished.
     fn close(&mut self, goal: &Goal) {
         match goal.task {
             Task::Follow => {
-                // An end that has moved on is another one.
+                // An end that has moved since is a new target.
                 if let Some((line, end)) = self.open_end_at(goal.target) {
-                    self.notes.done.push(line.ends[end]);
+                    self.history.done.push(line.ends[end]);
                 }
             }
-            _ => self.notes.rounded.push(goal.target),
+            _ => self.history.rounded.push(goal.target),
         }
     }
 
-    /// Aims the laser at the corner where an end may lie, and if that doesn't tell, at the end.
-    fn look_closer(&mut self, target: DVec2) {
+    /// Aims the laser at the possible corner beyond an end and, if the end stays open, at the end.
+    fn confirm_end(&mut self, target: DVec2) {
         for aim_at_corner in [true, false] {
             let Some((line, end)) = self.open_end_at(target) else { return };
             let corner = self.corner_beyond(&line, end).filter(|_| aim_at_corner);
             if corner.is_none() && aim_at_corner {
                 continue;
             }
-            let way = corner.unwrap_or(line.ends[end]) - self.robot.pose().position();
-            if way.length() < AIM_REACH_M {
-                let scan = self.robot.laser(way.to_angle());
+            let offset = corner.unwrap_or(line.ends[end]) - self.robot.pose().position();
+            if offset.length() < AIM_REACH_M {
+                let scan = self.robot.laser(offset.to_angle());
                 self.log.laser_shots += 1;
-                self.take_in(scan);
+                self.add_laser_scan(scan);
             }
         }
     }
 
-    fn take_in(&mut self, scan: LaserScan) {
+    fn add_laser_scan(&mut self, scan: LaserScan) {
         self.map.add_laser(&scan);
         let lines = self.map.lines().to_vec();
         self.objects.discover(&lines, scan.pose.position());
@@ -208,7 +207,7 @@ impl<R: Robot> Explorer<'_, R> {
         }
     }
 
-    /// The line with an open end at a place.
+    /// Finds the line whose open end is nearest to a target.
     fn open_end_at(&self, target: DVec2) -> Option<(MapLine, usize)> {
         let ends = self.map.lines().iter().flat_map(|line| [0, 1].map(|end| (*line, end)));
         ends.filter(|(line, end)| !line.terminal[*end])
@@ -218,11 +217,11 @@ impl<R: Robot> Explorer<'_, R> {
             .map(|(_, found)| found)
     }
 
-    /// Where the line through an end meets another line of the map, not far beyond it.
+    /// Finds the nearest corner of an extended line with another line of the map.
     fn corner_beyond(&self, line: &MapLine, end: usize) -> Option<DVec2> {
         let (tip, outwards) = outwards(line, end);
         let robot = self.robot.pose().position();
-        let meet = |other: &MapLine| {
+        let corner_with = |other: &MapLine| {
             let corner = line.meets(other, CORNER_DEG)?;
             let beyond_m = outwards.dot(corner - tip);
             let near = (-JOINED_M..CORNER_REACH_M).contains(&beyond_m)
@@ -230,17 +229,17 @@ impl<R: Robot> Explorer<'_, R> {
                 && corner.distance(robot) < AIM_REACH_M;
             near.then_some((beyond_m, corner))
         };
-        let corners = self.map.lines().iter().filter_map(meet);
+        let corners = self.map.lines().iter().filter_map(corner_with);
         corners.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, corner)| corner)
     }
 
-    /// The nearest thing to do at the object whose turn it is.
+    /// Selects the cheapest goal at the first object that has any.
     fn choose(&self) -> Option<Goal> {
         let robot = self.robot.pose().position();
         let lines = self.map.lines();
-        let trodden: Vec<DVec2> = self.log.stops.iter().map(|stop| stop.pose.position()).collect();
+        let visited: Vec<DVec2> = self.log.stops.iter().map(|stop| stop.pose.position()).collect();
         let keep_off_m = self.settings.keep_off_m;
-        let ground = Ground::around(robot, lines, &self.notes.bumps, &trodden, keep_off_m)?;
+        let ground = FloorGrid::around(robot, lines, &self.history.bumps, &visited, keep_off_m)?;
         if lines.is_empty() {
             return self.approach(&ground);
         }
@@ -248,53 +247,54 @@ impl<R: Robot> Explorer<'_, R> {
             let ends = object.iter().flat_map(|at| [0, 1].map(|end| (&lines[*at], end)));
             let goals = ends.filter_map(|(line, end)| self.goal(&ground, line, end));
             goals.min_by_key(|goal| {
-                // Going on is better than turning back for something a little nearer.
-                let goes_on = self.notes.last.is_some_and(|last| last.distance(goal.target) < 0.7);
-                goal.cost + if goes_on { 0 } else { 70 }
+                // Continuing is better than a return to a slightly nearer goal.
+                let continues =
+                    self.history.last.is_some_and(|last| last.distance(goal.target) < 0.7);
+                goal.cost + if continues { 0 } else { 70 }
             })
         })
     }
 
-    /// What there is to do at an end of a line.
-    fn goal(&self, ground: &Ground, line: &MapLine, end: usize) -> Option<Goal> {
+    /// Plans the goal at an end of a line; `None` if it needs no observation.
+    fn goal(&self, ground: &FloorGrid, line: &MapLine, end: usize) -> Option<Goal> {
         let (tip, outwards) = outwards(line, end);
         let left = outwards.perp();
         let inwards = if left.dot(line.seen_from - tip) >= 0.0 { left } else { -left };
         let is_open = !line.terminal[end]
-            && count_near(&self.notes.done, tip) == 0
+            && count_near(&self.history.done, tip) == 0
             && !self.is_known_end(line, tip);
         if self.is_corner_echo(line) {
             return None;
         }
         let (task, view) = if is_open {
-            (Task::Follow, self.view_of(ground, tip, outwards, inwards)?)
+            (Task::Follow, self.follow_view(ground, tip, outwards, inwards)?)
         } else {
             let is_joined = |other: &MapLine| other != line && other.distance_m(tip) < JOINED_M;
-            let is_face = line.length_m() >= LEAST_FACE_M
+            let is_face = line.length_m() >= MIN_FACE_M
                 && (line.terminal[end] || self.sensing == Sensing::Sonar);
             if !is_face
                 || self.map.lines().iter().any(is_joined)
-                || count_near(&self.notes.rounded, tip) > 0
+                || count_near(&self.history.rounded, tip) > 0
             {
                 return None;
             }
-            (Task::Round, view_round(ground, tip, outwards, inwards)?)
+            (Task::Round, round_view(ground, tip, outwards, inwards)?)
         };
         self.goal_at(ground, task, tip, view)
     }
 
-    /// Whether the laser has been at an end of a short sonar line already, for another line.
+    /// Whether the end of a short sonar line is a confirmed end of another line.
     fn is_known_end(&self, line: &MapLine, tip: DVec2) -> bool {
         let lines = self.map.lines().iter();
         let mut ends =
             lines.flat_map(|other| [0, 1].map(|end| (other.ends[end], other.terminal[end])));
         line.kind == LineKind::Sonar
-            && line.length_m() < LEAST_WALL_M
+            && line.length_m() < MIN_WALL_M
             && ends.any(|(end, terminal)| terminal && end.distance(tip) < JOINED_M)
     }
 
-    /// Whether a line is the "third wall" that a corner returns: short, by the end of a longer
-    /// line, and turned against it by about half a right angle.
+    /// Whether a line is the "third wall" that a corner echo produces: short, next to the end of a
+    /// longer line, and at about 45 degrees to it.
     fn is_corner_echo(&self, line: &MapLine) -> bool {
         let slant = SLANT_DEG.to_radians();
         let is_wall = |other: &MapLine| {
@@ -308,7 +308,7 @@ impl<R: Robot> Explorer<'_, R> {
             && self.map.lines().iter().any(is_wall)
     }
 
-    fn goal_at(&self, ground: &Ground, task: Task, target: DVec2, view: DVec2) -> Option<Goal> {
+    fn goal_at(&self, ground: &FloorGrid, task: Task, target: DVec2, view: DVec2) -> Option<Goal> {
         let stride_m = match self.sensing {
             Sensing::Laser => self.settings.laser_stride_m,
             _ => self.settings.sonar_stride_m,
@@ -318,11 +318,11 @@ impl<R: Robot> Explorer<'_, R> {
         Some(Goal { task, target, view, next, cost })
     }
 
-    /// A place beside the end of a line, if possible a standoff away from it and from all else, and
-    /// a little further on.
-    fn view_of(
+    /// Selects a position next to the end of a line and slightly beyond it, if possible at the
+    /// standoff from all obstacles.
+    fn follow_view(
         &self,
-        ground: &Ground,
+        ground: &FloorGrid,
         tip: DVec2,
         outwards: DVec2,
         inwards: DVec2,
@@ -341,8 +341,8 @@ impl<R: Robot> Explorer<'_, R> {
         })
     }
 
-    /// Towards the nearest reading of any kind, while the map is empty.
-    fn approach(&self, ground: &Ground) -> Option<Goal> {
+    /// Plans a drive towards the nearest reading, for an empty map.
+    fn approach(&self, ground: &FloorGrid) -> Option<Goal> {
         let stop = self.log.stops.last()?;
         let echoes = stop.sonar.iter().flat_map(|sweep| {
             sweep.beams.iter().filter_map(|beam| match beam.heard {
@@ -351,22 +351,22 @@ impl<R: Robot> Explorer<'_, R> {
             })
         });
         let seen = stop.laser.iter().flat_map(|scan| {
-            scan.returns
-                .iter()
-                .filter_map(|one| Some((one.range_m?, scan.pose.direction_rad(one.azimuth_deg))))
+            scan.returns.iter().filter_map(|reading| {
+                Some((reading.range_m?, scan.pose.direction_rad(reading.azimuth_deg)))
+            })
         });
         let (range_m, direction_rad) = echoes.chain(seen).min_by(|a, b| a.0.total_cmp(&b.0))?;
         let (robot, ray) = (stop.pose.position(), DVec2::from_angle(direction_rad));
         let target = robot + range_m * ray;
         let view = robot + (range_m - self.settings.standoff_m).clamp(0.0, 1.0) * ray;
-        let is_new = count_near(&self.notes.rounded, target) == 0;
+        let is_new = count_near(&self.history.rounded, target) == 0;
         is_new.then(|| self.goal_at(ground, Task::Approach, target, view)).flatten()
     }
 }
 
-/// A place from which a face that leaves a line at its end can be seen: beyond the end, and behind
-/// the line.
-fn view_round(ground: &Ground, tip: DVec2, outwards: DVec2, inwards: DVec2) -> Option<DVec2> {
+/// Selects a position beyond the end of a line and behind it, for the observation of adjacent
+/// faces.
+fn round_view(ground: &FloorGrid, tip: DVec2, outwards: DVec2, inwards: DVec2) -> Option<DVec2> {
     const PLACES_M: [(f64, f64); 4] = [(1.0, -0.3), (0.8, -0.3), (0.6, -0.2), (0.5, -0.5)];
     PLACES_M
         .iter()
@@ -374,12 +374,12 @@ fn view_round(ground: &Ground, tip: DVec2, outwards: DVec2, inwards: DVec2) -> O
         .find(|view| is_good(ground, *view, 0.45))
 }
 
-fn is_good(ground: &Ground, view: DVec2, clearance_m: f64) -> bool {
+fn is_good(ground: &FloorGrid, view: DVec2, clearance_m: f64) -> bool {
     ground.clearance_m(view).is_some_and(|free_m| free_m >= clearance_m)
         && ground.cost(view).is_some()
 }
 
-/// An end of a line and the direction in which the line would go on there.
+/// End of a line and the outward direction of the line there.
 fn outwards(line: &MapLine, end: usize) -> (DVec2, DVec2) {
     let along = line.direction();
     (line.ends[end], if end == 0 { -along } else { along })

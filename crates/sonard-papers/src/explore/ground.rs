@@ -1,4 +1,4 @@
-//! The floor as far as the robot knows it, and ways over it.
+//! Known floor around the robot, with paths over it.
 
 use std::collections::HashMap;
 
@@ -9,37 +9,37 @@ use sonard_model::geometry::DVec2;
 
 /// Side of a cell, metres.
 const CELL_M: f64 = 0.1;
-/// The floor is planned for as far as this around what is known, metres.
+/// Margin of the planning grid around known lines and positions, metres.
 const MARGIN_M: f64 = 1.5;
-/// Ways keep this far from what stands there, if they can, metres.
+/// Distance from obstacles below which paths cost more, metres.
 const COMFORT_M: f64 = 0.6;
-/// Around a place where it was the robot can always move, metres.
-const TRODDEN_M: f64 = 0.15;
+/// Radius around visited positions in which the floor is passable, metres.
+const VISITED_M: f64 = 0.15;
 
-/// What is known of the floor from a place on it: unknown floor is taken to be free.
-pub(super) struct Ground {
+/// Planning grid of the floor with shortest paths from the robot. Unknown floor counts as free.
+pub(super) struct FloorGrid {
     shape: GridShape,
-    /// Distance of each cell from what stands there, metres.
+    /// Distance of each cell from the nearest obstacle, metres.
     clearance_m: Vec<f64>,
     passable: Vec<bool>,
     start: usize,
-    /// For each cell that can be reached, the one before it and the cost of the way.
-    ways: HashMap<usize, (usize, u32)>,
+    /// Predecessor and path cost of each reachable cell.
+    paths: HashMap<usize, (usize, u32)>,
 }
 
-impl Ground {
-    /// With lines and points that stand in the way of a body of this radius, and places where the
-    /// robot has been; `None` if the floor is too large to plan for.
+impl FloorGrid {
+    /// Grid with lines and points as obstacles for a body of this radius. Visited positions stay
+    /// passable. `None` if the floor is too large for the grid.
     pub(super) fn around(
         robot: DVec2,
         lines: &[MapLine],
         obstacles: &[DVec2],
-        trodden: &[DVec2],
+        visited: &[DVec2],
         radius_m: f64,
     ) -> Option<Self> {
         let known = || {
             let ends = lines.iter().flat_map(|line| line.ends);
-            ends.chain(trodden.iter().copied()).chain([robot])
+            ends.chain(visited.iter().copied()).chain([robot])
         };
         let low = known().fold(robot, DVec2::min) - MARGIN_M;
         let high = known().fold(robot, DVec2::max) + MARGIN_M;
@@ -52,45 +52,45 @@ impl Ground {
                 walls.chain(points).fold(f64::INFINITY, f64::min)
             })
             .collect();
-        let was_there =
-            |at: DVec2| trodden.iter().chain([&robot]).any(|place| place.distance(at) < TRODDEN_M);
+        let was_visited =
+            |at: DVec2| visited.iter().chain([&robot]).any(|place| place.distance(at) < VISITED_M);
         let passable: Vec<bool> = clearance_m
             .iter()
             .enumerate()
-            .map(|(cell, free_m)| *free_m >= radius_m || was_there(center(&shape, cell)))
+            .map(|(cell, free_m)| *free_m >= radius_m || was_visited(center(&shape, cell)))
             .collect();
         let start = shape.index_at(robot)?;
-        let mut ground = Self { shape, clearance_m, passable, start, ways: HashMap::new() };
-        ground.ways = dijkstra_all(&start, |cell| ground.neighbours(*cell));
+        let mut ground = Self { shape, clearance_m, passable, start, paths: HashMap::new() };
+        ground.paths = dijkstra_all(&start, |cell| ground.neighbours(*cell));
         Some(ground)
     }
 
-    /// Cost of the way to a place, roughly its length in centimetres; `None` if there is none.
+    /// Path cost to a position, roughly its length in centimetres; `None` if unreachable.
     pub(super) fn cost(&self, to: DVec2) -> Option<u32> {
         let cell = self.shape.index_at(to)?;
-        if cell == self.start { Some(0) } else { self.ways.get(&cell).map(|(_, cost)| *cost) }
+        if cell == self.start { Some(0) } else { self.paths.get(&cell).map(|(_, cost)| *cost) }
     }
 
-    /// Distance of a place from what stands there, metres; `None` beyond the floor.
+    /// Distance of a position from the nearest obstacle, metres; `None` outside the grid.
     pub(super) fn clearance_m(&self, at: DVec2) -> Option<f64> {
         Some(self.clearance_m[self.shape.index_at(at)?])
     }
 
-    /// Where to drive to, straight and at most this far, on the way to a place.
-    pub(super) fn next(&self, robot: DVec2, to: DVec2, most_m: f64) -> Option<DVec2> {
+    /// Farthest point of the path to a position within `max_m` that a straight drive reaches.
+    pub(super) fn next(&self, robot: DVec2, to: DVec2, max_m: f64) -> Option<DVec2> {
         let cell = self.shape.index_at(to)?;
         if cell == self.start {
             return Some(to);
         }
-        self.ways.get(&cell)?;
-        let mut way: Vec<DVec2> =
-            build_path(&cell, &self.ways).into_iter().map(|at| center(&self.shape, at)).collect();
-        if let Some(last) = way.last_mut() {
+        self.paths.get(&cell)?;
+        let mut path: Vec<DVec2> =
+            build_path(&cell, &self.paths).into_iter().map(|at| center(&self.shape, at)).collect();
+        if let Some(last) = path.last_mut() {
             *last = to;
         }
-        let near = way.iter().skip(1).take_while(|at| at.distance(robot) <= most_m);
+        let near = path.iter().skip(1).take_while(|at| at.distance(robot) <= max_m);
         let straight = near.filter(|at| self.is_free(robot, **at)).last();
-        straight.or(way.get(1)).copied()
+        straight.or(path.get(1)).copied()
     }
 
     fn is_free(&self, from: DVec2, to: DVec2) -> bool {
@@ -103,8 +103,8 @@ impl Ground {
 
     fn neighbours(&self, cell: usize) -> Vec<(usize, u32)> {
         let (column, row) = ((cell % self.shape.width) as i64, (cell / self.shape.width) as i64);
-        let around = (-1..=1).flat_map(|dy| (-1..=1).map(move |dx| (dx, dy)));
-        around
+        let neighbourhood = (-1..=1).flat_map(|dy| (-1..=1).map(move |dx| (dx, dy)));
+        neighbourhood
             .filter(|step| *step != (0, 0))
             .filter_map(|(dx, dy)| {
                 let (x, y) = (usize::try_from(column + dx).ok()?, usize::try_from(row + dy).ok()?);

@@ -9,26 +9,26 @@ use sonard_model::{
     model::raycast::Reflectors,
 };
 
-/// A laser like the paper's BIRIS: a triangulating one, so that the error of its ranges grows with
-/// their square.
+/// Triangulating laser range finder like the paper's BIRIS. Its range error grows with the square
+/// of the range.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Laser {
     /// Field of view, degrees.
     pub field_deg: f64,
-    /// Readings across it.
+    /// Number of readings across the field.
     pub points: u32,
-    /// Share of the field without the artifacts that the paper saw at its sides.
+    /// Fraction of the field without the artifacts that the paper reports at its sides.
     pub usable: f64,
-    /// Standard deviation of a range of one metre, metres.
+    /// Standard deviation of the range at reading metre, metres.
     pub sigma_at_1_m: f64,
-    /// Nothing is seen beyond this, metres.
+    /// Maximum range of the laser, metres.
     pub max_range_m: f64,
 }
 
 impl Default for Laser {
-    /// 25 degrees, 512 points, useful to 3 to 4 m and accurate at 1.5 m as the paper says. It has no
-    /// figure for the noise: 1.5 mm at one metre (so 3.4 mm at 1.5 m and 24 mm at 4 m) is ours, and
-    /// so is the twelfth of the field that is lost.
+    /// Laser of the paper: 25 degrees, 512 points, useful to 3 to 4 m and accurate at 1.5 m. The
+    /// paper gives no noise; 1.5 mm at reading metre (3.4 mm at 1.5 m, 24 mm at 4 m) and the
+    /// unusable twelfth of the field are assumptions.
     fn default() -> Self {
         Self {
             field_deg: 25.0,
@@ -41,13 +41,13 @@ impl Default for Laser {
 }
 
 impl Laser {
-    /// How many shots a full turn takes.
+    /// Number of shots for a full turn.
     #[must_use]
     pub fn shots_per_turn(&self) -> u32 {
         (360.0 / (self.field_deg * self.usable)).ceil() as u32
     }
 
-    /// A shot from a pose along its heading.
+    /// Simulates a shot from a pose along its heading.
     pub(super) fn shoot(&self, room: &Reflectors, pose: Pose, rng: &mut impl Rng) -> LaserScan {
         let half_deg = self.field_deg * self.usable / 2.0;
         let count = (f64::from(self.points) * self.usable).max(2.0) as u32;
@@ -66,21 +66,21 @@ impl Laser {
     }
 }
 
-/// Shots of one place side by side as one scan: where two overlap, the later one counts. Each is
-/// given with the direction it looked into, degrees from the heading, in rising order.
-pub(super) fn side_by_side(pose: Pose, shots: &[(f64, LaserScan)]) -> LaserScan {
+/// Joins shots from reading pose into reading scan. In overlaps the later shot takes precedence.
+/// Each shot has its direction, degrees from the heading, in ascending order.
+pub(super) fn join_shots(pose: Pose, shots: &[(f64, LaserScan)]) -> LaserScan {
     let mut returns: Vec<LaserReturn> = Vec::new();
     for (direction_deg, shot) in shots {
-        let moved = shot
-            .returns
-            .iter()
-            .map(|one| LaserReturn { azimuth_deg: one.azimuth_deg + direction_deg, ..*one });
-        let from_deg = moved.clone().next().map_or(f64::MAX, |one| one.azimuth_deg);
-        returns.retain(|one| one.azimuth_deg < from_deg);
-        returns.extend(moved);
+        let rotated = shot.returns.iter().map(|reading| LaserReturn {
+            azimuth_deg: reading.azimuth_deg + direction_deg,
+            ..*reading
+        });
+        let from_deg = rotated.clone().next().map_or(f64::MAX, |reading| reading.azimuth_deg);
+        returns.retain(|reading| reading.azimuth_deg < from_deg);
+        returns.extend(rotated);
     }
-    // The last shot of a full turn may reach into the first.
-    let start_deg = returns.first().map_or(0.0, |one| one.azimuth_deg);
-    returns.retain(|one| one.azimuth_deg < start_deg + 360.0);
+    // The last shot of a full turn may overlap the first.
+    let start_deg = returns.first().map_or(0.0, |reading| reading.azimuth_deg);
+    returns.retain(|reading| reading.azimuth_deg < start_deg + 360.0);
     LaserScan { pose, returns }
 }

@@ -1,21 +1,21 @@
-//! Lines that belong to one object, and the order in which objects are explored.
+//! Objects as groups of lines, in the order of their exploration.
 
 use sonard_interpret::interpret::lines::MapLine;
 use sonard_model::geometry::DVec2;
 
-/// Lines closer than this are of one object, metres.
+/// Maximum distance between lines of one object, metres.
 const ONE_OBJECT_M: f64 = 0.35;
 
-/// Objects in the order in which they were discovered; within one stop the nearer comes first. That
-/// is a breadth-first search: an object seen from another one waits until that is explored.
+/// Objects in the order of their discovery, the nearest first within one stop. The order is a
+/// breadth-first search: the exploration of an object finishes before those discovered during it.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Objects {
-    /// A place on each.
+    /// Point on each object.
     anchors: Vec<DVec2>,
 }
 
 impl Objects {
-    /// Notes the objects of the map that are new.
+    /// Adds the new objects of the map.
     pub(super) fn discover(&mut self, lines: &[MapLine], robot: DVec2) {
         let nearest = |group: &[usize]| {
             group
@@ -32,7 +32,7 @@ impl Objects {
         self.anchors.extend(fresh);
     }
 
-    /// The lines of each object, in the order of their discovery, by their places in the map.
+    /// Indices of the map lines of each object, in the order of discovery.
     pub(super) fn in_order(&self, lines: &[MapLine]) -> Vec<Vec<usize>> {
         let mut groups = groups(lines);
         let discovered = |group: &Vec<usize>| {
@@ -53,25 +53,27 @@ fn nearest_point(line: &MapLine, to: DVec2) -> DVec2 {
     line.ends[0] + place_m * line.direction()
 }
 
-/// Lines that touch, or nearly so.
+/// Groups of lines closer than [`ONE_OBJECT_M`].
 fn groups(lines: &[MapLine]) -> Vec<Vec<usize>> {
     let mut group: Vec<usize> = (0..lines.len()).collect();
-    for one in 0..lines.len() {
-        for other in 0..one {
-            if group[one] != group[other] && are_near(&lines[one], &lines[other]) {
-                let (from, to) = (group[one].max(group[other]), group[one].min(group[other]));
+    for first in 0..lines.len() {
+        for second in 0..first {
+            if group[first] != group[second] && are_near(&lines[first], &lines[second]) {
+                let (from, to) = (group[first].max(group[second]), group[first].min(group[second]));
                 group.iter_mut().filter(|name| **name == from).for_each(|name| *name = to);
             }
         }
     }
-    let of = |name: usize| (0..lines.len()).filter(|at| group[*at] == name).collect::<Vec<_>>();
-    (0..lines.len()).map(of).filter(|group| !group.is_empty()).collect()
+    let members =
+        |name: usize| (0..lines.len()).filter(|at| group[*at] == name).collect::<Vec<_>>();
+    (0..lines.len()).map(members).filter(|group| !group.is_empty()).collect()
 }
 
-/// Whether an end of one line is near the other; lines of one map don't cross far from their ends.
-fn are_near(one: &MapLine, other: &MapLine) -> bool {
+/// Whether an end of one line is near the other line. Lines of one map do not cross far from their
+/// ends.
+fn are_near(a: &MapLine, b: &MapLine) -> bool {
     let off_m = |line: &MapLine, ends: [DVec2; 2]| {
         ends.map(|end| line.distance_m(end)).into_iter().fold(f64::INFINITY, f64::min)
     };
-    off_m(one, other.ends).min(off_m(other, one.ends)) < ONE_OBJECT_M
+    off_m(a, b.ends).min(off_m(b, a.ends)) < ONE_OBJECT_M
 }

@@ -1,4 +1,4 @@
-//! Explorations of scenes, and what a robot can and can't do.
+//! Explorations of scenes, and the simulated robot.
 
 use std::sync::Arc;
 
@@ -17,7 +17,7 @@ use sonard_model::{
 
 fn simulator(scene: Scene) -> Simulator {
     let sensor = Sensor::preset("senscomp-6500").expect("a preset");
-    // As the paper's, and by default those of `sonard-papers explore`.
+    // Range of the paper's sonars and default of `sonard-papers explore`.
     let options = Options { max_range_m: Some(8.0), ..Options::default() };
     Simulator::new(Arc::new(scene), sensor, Air::default(), options).expect("figures")
 }
@@ -40,7 +40,7 @@ const ROOM: &str =
 const MIDDLE: Pose = Pose { x_m: 2.0, y_m: 1.5, heading_deg: 30.0 };
 
 #[test]
-fn a_laser_sees_its_field_with_noise_that_grows_with_the_square_of_the_distance() {
+fn laser_noise_grows_quadratically() {
     let simulator = simulator(scene(ROOM));
     let laser = Laser { usable: 1.0, ..Laser::default() };
     let settings = RobotSettings { laser, ..RobotSettings::default() };
@@ -49,21 +49,22 @@ fn a_laser_sees_its_field_with_noise_that_grows_with_the_square_of_the_distance(
         let mut squares = Vec::new();
         for _ in 0..40 {
             let shot = robot.laser(direction_rad);
-            let [first, last] = [shot.returns[0], shot.returns[511]].map(|one| one.azimuth_deg);
+            let [first, last] =
+                [shot.returns[0], shot.returns[511]].map(|reading| reading.azimuth_deg);
             assert_eq!((shot.returns.len(), first, last), (512, -12.5, 12.5));
-            squares.extend(shot.returns.iter().map(|one| {
-                let true_m = distance_m / one.azimuth_deg.to_radians().cos();
-                ((one.range_m.expect("a wall") - true_m) / (true_m * true_m)).powi(2)
+            squares.extend(shot.returns.iter().map(|reading| {
+                let true_m = distance_m / reading.azimuth_deg.to_radians().cos();
+                ((reading.range_m.expect("a wall") - true_m) / (true_m * true_m)).powi(2)
             }));
         }
         let sigma = (squares.iter().sum::<f64>() / squares.len() as f64).sqrt();
-        // 20480 readings: the estimate's own deviation is half a percent.
+        // 20480 readings: the standard error of the estimate is half a percent.
         assert!((sigma / laser.sigma_at_1_m - 1.0).abs() < 0.02, "{distance_m} m: {sigma}");
     }
 }
 
 #[test]
-fn a_full_turn_of_the_laser_is_one_round_of_rising_azimuths() {
+fn laser_turn_has_rising_azimuths() {
     let simulator = simulator(scene(ROOM));
     let mut robot = SimulatedRobot::new(&simulator, MIDDLE, RobotSettings::default(), rng(2));
     let (turn, shots) = robot.laser_turn();
@@ -74,7 +75,7 @@ fn a_full_turn_of_the_laser_is_one_round_of_rising_azimuths() {
 }
 
 #[test]
-fn walls_stop_a_robot_at_its_radius() {
+fn walls_stop_robot_at_its_radius() {
     let simulator = simulator(scene(ROOM));
     let settings = RobotSettings::default();
     let mut robot = SimulatedRobot::new(&simulator, MIDDLE, settings, rng(3));
@@ -83,7 +84,7 @@ fn walls_stop_a_robot_at_its_radius() {
     assert_eq!(robot.drive(DVec2::new(9.0, 1.0)), Drive::Bumped);
     let clearance_m = simulator.scene().clearance_m(robot.truth().position());
     assert!((settings.radius_m..settings.radius_m + 0.06).contains(&clearance_m), "{clearance_m}");
-    // It can leave the wall, and go along it, but not through it.
+    // The robot can leave the wall and drive along it, but not through it.
     assert_eq!(robot.drive(robot.pose().position() + DVec2::new(0.0, 0.5)), Drive::There);
     for _ in 0..5 {
         robot.drive(robot.pose().position() + DVec2::new(0.5, 0.2));
@@ -93,22 +94,22 @@ fn walls_stop_a_robot_at_its_radius() {
 }
 
 #[test]
-fn odometry_noise_is_what_the_robot_does_not_know() {
+fn odometry_noise_is_hidden() {
     let simulator = simulator(scene(ROOM));
     let settings = RobotSettings { odometry_noise: 0.05, ..RobotSettings::default() };
     let mut robot = SimulatedRobot::new(&simulator, MIDDLE, settings, rng(4));
     for at in [[3.0, 1.5], [3.0, 1.0], [1.0, 1.0], [2.0, 1.5]] {
         robot.drive(at.into());
     }
-    assert!(robot.pose().position().distance(MIDDLE.position()) < 1e-9, "as it believes");
+    assert!(robot.pose().position().distance(MIDDLE.position()) < 1e-9, "by odometry");
     let off_m = robot.truth().position().distance(MIDDLE.position());
     assert!((0.005..0.8).contains(&off_m), "{off_m}");
 }
 
-/// A robot whose sensors see nothing.
-struct Blind(Pose);
+/// Robot whose sensors detect nothing.
+struct NoReadings(Pose);
 
-impl Robot for Blind {
+impl Robot for NoReadings {
     fn pose(&self) -> Pose {
         self.0
     }
@@ -127,9 +128,9 @@ impl Robot for Blind {
 }
 
 #[test]
-fn who_sees_nothing_has_nothing_to_explore() {
+fn empty_readings_end_the_exploration() {
     for sensing in Sensing::ALL {
-        let made = explore(&mut Blind(MIDDLE), sensing, &ExploreSettings::default());
+        let made = explore(&mut NoReadings(MIDDLE), sensing, &ExploreSettings::default());
         assert_eq!((made.stops.len(), made.lines().len(), made.finished), (1, 0, true));
     }
 }
@@ -148,7 +149,7 @@ fn explored(
 }
 
 #[test]
-fn an_exploration_can_be_repeated() {
+fn exploration_is_reproducible() {
     let simulator = simulator(scene(ROOM));
     let make = || explored(&simulator, MIDDLE, Sensing::JustInTime, 7).0;
     let made = make();
@@ -156,9 +157,9 @@ fn an_exploration_can_be_repeated() {
     assert_eq!(made, make());
 }
 
-/// The aims of issue and paper, on the ten rooms of `sonard-papers benchmark explore`.
+/// Claims of the paper in the ten rooms of `sonard-papers benchmark explore`.
 #[test]
-fn just_in_time_is_as_good_as_laser_only_with_a_quarter_of_its_shots() {
+fn just_in_time_matches_laser_only() {
     let rooms: Vec<[(Exploration, MapError); 2]> = (0..10_u64)
         .into_par_iter()
         .map(|room| {

@@ -1,4 +1,4 @@
-//! A robot's way through a scene and the map it makes.
+//! Picture of a robot's trajectory through a scene and its map.
 
 use crate::explore::{Exploration, Sensing, Stop};
 use sonard_interpret::interpret::lines::LaserScan;
@@ -13,17 +13,18 @@ use sonard_plot::{
     theme,
 };
 
-/// A laser's view is drawn as far as this, metres.
+/// Maximum range of the drawn laser fields of view, metres.
 const VIEW_M: f64 = 2.0;
-/// Of a laser's readings so many are drawn around its view.
+/// Number of readings that outline a laser field of view.
 const VIEW_POINTS: usize = 40;
 const GAP_PX: f64 = 40.0;
-/// Around walls and way, metres.
+/// Margin around walls and trajectory, metres.
 const MARGIN_M: f64 = 0.4;
 
-/// Draws an exploration up to its first `stops` stops: where the laser was used in grey, as in the
-/// figures of the just-in-time paper, the way in orange, and the map's lines by what they were made
-/// of, their confirmed ends as dots.
+/// Draws the first `stops` stops of an exploration.
+///
+/// Laser fields of view are grey, as in the figures of the just-in-time paper. The trajectory is
+/// orange. Map lines are styled by their kind, with confirmed endpoints as dots.
 #[must_use]
 pub fn draw_exploration(
     exploration: &Exploration,
@@ -33,9 +34,9 @@ pub fn draw_exploration(
 ) -> Picture {
     let shown = &exploration.stops[..stops.clamp(1, exploration.stops.len())];
     let name = scene.map_or("unknown", |scene| scene.name.as_str());
-    let title = format!("{name}, explored with {}", words(sensing));
+    let title = format!("{name}, explored with {}", sensing_label(sensing));
     let (heading, top) =
-        caption::draw(&title, Some("SIMULATED, nothing measured"), &[tally(shown)]);
+        caption::draw(&title, Some("SIMULATED, nothing measured"), &[statistics(shown)]);
     let region = region(&exploration.stops, scene);
     let (left, right) = (theme::MARGIN_PX + 38.0, theme::PAGE_PX - theme::MARGIN_PX);
     let height = Plan::height_for(&region, right - left, [320.0, 760.0]);
@@ -50,7 +51,7 @@ pub fn draw_exploration(
     Picture::new(theme::PAGE_PX, below.y + key_height + theme::MARGIN_PX / 2.0, page)
 }
 
-/// Draws finished explorations of one scene beside each other.
+/// Draws finished explorations of reading scene side by side.
 #[must_use]
 pub fn draw_explorations(made: &[(Sensing, &Exploration)], scene: Option<&Scene>) -> Picture {
     let name = scene.map_or("unknown", |scene| scene.name.as_str());
@@ -70,8 +71,8 @@ pub fn draw_explorations(made: &[(Sensing, &Exploration)], scene: Option<&Scene>
         page.add(floor(&plan, number, &exploration.stops, scene));
         let mut titles = Layer::new("sensing");
         let above = |rise: f64| Px::new(at, top + 40.0 - rise);
-        titles.text(above(24.0), Anchor::Start, theme::TEXT_PX, words(*sensing));
-        titles.text(above(7.0), Anchor::Start, theme::SMALL_PX, &tally(&exploration.stops));
+        titles.text(above(24.0), Anchor::Start, theme::TEXT_PX, sensing_label(*sensing));
+        titles.text(above(7.0), Anchor::Start, theme::SMALL_PX, &statistics(&exploration.stops));
         page.add(titles);
     }
     let below = Px::new(theme::MARGIN_PX, top + 40.0 + height + 28.0);
@@ -82,38 +83,39 @@ pub fn draw_explorations(made: &[(Sensing, &Exploration)], scene: Option<&Scene>
     Picture::new(theme::PAGE_PX, below.y + key_height + theme::MARGIN_PX / 2.0, page)
 }
 
-const fn words(sensing: Sensing) -> &'static str {
+const fn sensing_label(sensing: Sensing) -> &'static str {
     match sensing {
         Sensing::Sonar => "sonar only",
         Sensing::Laser => "laser only",
-        Sensing::JustInTime => "laser just in time",
+        Sensing::JustInTime => "just-in-time sensing",
     }
 }
 
-fn tally(stops: &[Stop]) -> String {
+fn statistics(stops: &[Stop]) -> String {
     let shots: usize = stops.iter().map(|stop| stop.laser.len()).sum();
     let lines = stops.last().map_or(0, |stop| stop.lines.len());
     let turns = stops.iter().all(|stop| stop.sonar.is_none());
-    let looks = if turns { "full turns" } else { "shots" };
-    format!("{} stops, {shots} {looks} of the laser, {lines} lines", stops.len())
+    let unit = if turns { "full turns" } else { "shots" };
+    format!("{} stops, {shots} laser {unit}, {lines} lines", stops.len())
 }
 
 fn region<'a>(stops: impl IntoIterator<Item = &'a Stop>, scene: Option<&Scene>) -> Bounds {
-    let way = Bounds::around(stops.into_iter().map(|stop| stop.pose.position()));
+    let trajectory = Bounds::around(stops.into_iter().map(|stop| stop.pose.position()));
     let walls = scene.and_then(Bounds::of_scene);
-    let both = match (walls, way) {
-        (Some(walls), Some(way)) => Some(walls.including([way.min, way.max])),
-        (walls, way) => walls.or(way),
+    let both = match (walls, trajectory) {
+        (Some(walls), Some(trajectory)) => Some(walls.including([trajectory.min, trajectory.max])),
+        (walls, trajectory) => walls.or(trajectory),
     };
     both.unwrap_or(Bounds { min: DVec2::ZERO, max: DVec2::ONE }).grown(MARGIN_M)
 }
 
-/// The floor plan with what was done up to the last of these stops.
+/// Floor plan with trajectory, laser fields of view and the map at the last stop.
 fn floor(plan: &Plan, number: usize, stops: &[Stop], scene: Option<&Scene>) -> Layer {
     let mut inside =
         Layer::new("inside").clipped(&format!("exploration-window-{number}"), plan.panel);
-    let mut views = Layer::new("laser-views").with("fill", theme::SILENT).with("fill-opacity", 0.3);
-    // A full turn at every stop would cover everything: its latest is enough.
+    let mut views =
+        Layer::new("laser-views").with("fill", theme::NO_ECHO).with("fill-opacity", 0.3);
+    // Full turns at every stop would cover the plan, so only the latest is drawn.
     let turns = stops.iter().all(|stop| stop.sonar.is_none());
     let first = if turns { stops.len().saturating_sub(1) } else { 0 };
     for scan in stops[first..].iter().flat_map(|stop| &stop.laser) {
@@ -121,13 +123,13 @@ fn floor(plan: &Plan, number: usize, stops: &[Stop], scene: Option<&Scene>) -> L
     }
     inside.add(views);
     inside.extend(scene.map(|scene| plan.walls(scene)));
-    let mut way = Layer::new("way").stroked(theme::ORANGE, 1.4);
-    way.runs([stops.iter().map(|stop| plan.px(stop.pose.position())).collect::<Vec<_>>()]);
+    let mut trajectory = Layer::new("trajectory").stroked(theme::ORANGE, 1.4);
+    trajectory.runs([stops.iter().map(|stop| plan.px(stop.pose.position())).collect::<Vec<_>>()]);
     let mut places = Layer::new("stops").with("fill", theme::ORANGE).with("stroke", "none");
     for stop in stops {
         places.mark(Shape::Dot, plan.px(stop.pose.position()), 2.2, None);
     }
-    inside.add(way);
+    inside.add(trajectory);
     inside.add(places);
     if let Some(last) = stops.last() {
         inside.extend(last.lines.iter().map(|line| lines::layer(plan, line)));
@@ -139,28 +141,28 @@ fn floor(plan: &Plan, number: usize, stops: &[Stop], scene: Option<&Scene>) -> L
     layer
 }
 
-/// Outline of what a laser saw.
+/// Outline of a laser field of view.
 fn view(plan: &Plan, scan: &LaserScan) -> Vec<Px> {
     let every = scan.returns.len().div_ceil(VIEW_POINTS * (1 + scan.returns.len() / 512)).max(1);
-    let rim = scan.returns.iter().step_by(every).map(|one| {
-        let range_m = one.range_m.map_or(VIEW_M, |range_m| range_m.min(VIEW_M));
-        plan.px(scan.pose.point_at(one.azimuth_deg, range_m))
+    let rim = scan.returns.iter().step_by(every).map(|reading| {
+        let range_m = reading.range_m.map_or(VIEW_M, |range_m| range_m.min(VIEW_M));
+        plan.px(scan.pose.point_at(reading.azimuth_deg, range_m))
     });
     std::iter::once(plan.px(scan.pose.position())).chain(rim).collect()
 }
 
 fn entries<'a>(stops: impl IntoIterator<Item = &'a Stop>) -> Vec<Entry> {
     let lines: Vec<_> = stops.into_iter().flat_map(|stop| &stop.lines).collect();
-    let way = Sample::Line { colour: theme::ORANGE, width_px: 1.4, dash: "none" };
+    let trajectory = Sample::Line { colour: theme::ORANGE, width_px: 1.4, dash: "none" };
     let wall = Sample::Line { colour: theme::WALL, width_px: theme::WALL_PX, dash: "none" };
-    let dot = Sample::Mark { shape: Shape::Dot, colour: theme::SILENT };
+    let dot = Sample::Mark { shape: Shape::Dot, colour: theme::NO_ECHO };
     let others = [
-        Entry::new(dot, "confirmed end"),
-        Entry::new(way, "way and stops"),
+        Entry::new(dot, "confirmed endpoint"),
+        Entry::new(trajectory, "trajectory and stops"),
         Entry::new(wall, "wall"),
         Entry::new(
-            Sample::Mark { shape: Shape::Square, colour: theme::SILENT },
-            "seen by the laser",
+            Sample::Mark { shape: Shape::Square, colour: theme::NO_ECHO },
+            "laser field of view",
         ),
     ];
     lines::entries(lines).into_iter().chain(others).collect()

@@ -1,4 +1,4 @@
-//! Reliability diagrams: how often claims came true, against how probable they were said to be.
+//! Reliability diagrams: observed frequency over mean predicted probability.
 
 use crate::calibration::{Bin, Reliability};
 use sonard_plot::{
@@ -12,8 +12,10 @@ use sonard_plot::{
 const SIDE_PX: f64 = 520.0;
 const COUNTS_PX: f64 = 110.0;
 
-/// Draws the share of claims that came true over their mean probability, with the counts below it. On
-/// the dashed line they come true as often as they say; below it too much is claimed.
+/// Draws the observed frequency over the mean predicted probability of each bin, with the counts
+/// below.
+///
+/// On the dashed line predictions are perfectly calibrated. Below it they are overconfident.
 #[must_use]
 pub fn draw_reliability(title: &str, lines: &[String], reliability: &Reliability) -> Picture {
     let (heading, top) = caption::draw(title, Some("SIMULATED, nothing measured"), lines);
@@ -27,10 +29,10 @@ pub fn draw_reliability(title: &str, lines: &[String], reliability: &Reliability
     page.add(bars(counts, &reliability.bins));
     let below = Px::new(left, counts.bottom + 50.0);
     let entries = [
-        Entry::new(Sample::Mark { shape: Shape::Dot, colour: theme::BLUE }, "claims of a tenth"),
+        Entry::new(Sample::Mark { shape: Shape::Dot, colour: theme::BLUE }, "bins of 0.1"),
         Entry::new(
             Sample::Line { colour: theme::QUIET, width_px: 1.2, dash: "6 4" },
-            "as often as said",
+            "perfectly calibrated",
         ),
     ];
     let (key, height) = legend::draw(&entries, below, SIDE_PX);
@@ -49,8 +51,8 @@ fn frame(panel: Rect) -> Layer {
     for part in ticks::multiples(0.0, 1.0, 0.2) {
         grid.line(at(panel, part, 0.0), at(panel, part, 1.0));
         grid.line(at(panel, 0.0, part), at(panel, 1.0, part));
-        let beside = at(panel, 0.0, part) + Px::new(-6.0, 4.0);
-        numbers.text(beside, Anchor::End, theme::SMALL_PX, &ticks::label(part, 0.1));
+        let label_at = at(panel, 0.0, part) + Px::new(-6.0, 4.0);
+        numbers.text(label_at, Anchor::End, theme::SMALL_PX, &ticks::label(part, 0.1));
     }
     let mut ideal = Layer::new("ideal").stroked(theme::QUIET, 1.2).with("stroke-dasharray", "6 4");
     ideal.line(at(panel, 0.0, 0.0), at(panel, 1.0, 1.0));
@@ -58,19 +60,19 @@ fn frame(panel: Rect) -> Layer {
     border.rect(panel, 0.0);
     layer.extend([grid, numbers, ideal, border]);
     let above = Px::new(panel.left, panel.top - 6.0);
-    layer.text(above, Anchor::Start, theme::TEXT_PX, "share of claims that came true");
+    layer.text(above, Anchor::Start, theme::TEXT_PX, "observed frequency");
     layer
 }
 
-/// Each bin at its mean claim, joined.
+/// Marks of the filled bins at their mean predicted probabilities, joined by a line.
 fn points(panel: Rect, bins: &[Bin]) -> Layer {
-    let seen: Vec<&Bin> = bins.iter().filter(|bin| bin.count > 0).collect();
+    let filled: Vec<&Bin> = bins.iter().filter(|bin| bin.count > 0).collect();
     let mut line = Layer::new("line").stroked(theme::BLUE, 1.4);
-    line.runs([seen.iter().map(|b| at(panel, b.claimed, b.came_true)).collect::<Vec<_>>()]);
+    line.runs([filled.iter().map(|b| at(panel, b.claimed, b.came_true)).collect::<Vec<_>>()]);
     let mut marks = Layer::new("bins").with("fill", theme::BLUE);
-    for bin in seen {
+    for bin in filled {
         let hint = format!(
-            "{} claims of {:.3} on the mean: {:.3} came true",
+            "{} predictions, mean predicted probability {:.3}, observed frequency {:.3}",
             bin.count, bin.claimed, bin.came_true
         );
         marks.mark(Shape::Dot, at(panel, bin.claimed, bin.came_true), 5.0, Some(&hint));
@@ -80,10 +82,10 @@ fn points(panel: Rect, bins: &[Bin]) -> Layer {
     layer
 }
 
-/// How many claims each bin has, on a logarithmic scale because most claims are near 0 or 1.
+/// Histogram of predictions on a logarithmic scale, because max are near 0 or 1.
 fn bars(panel: Rect, bins: &[Bin]) -> Layer {
-    let most = bins.iter().map(|bin| bin.count).max().unwrap_or(1).max(10) as f64;
-    let height = |count: f64| (1.0 + count).log10() / (1.0 + most).log10();
+    let max = bins.iter().map(|bin| bin.count).max().unwrap_or(1).max(10) as f64;
+    let height = |count: f64| (1.0 + count).log10() / (1.0 + max).log10();
     let mut layer = Layer::new("counts");
     let mut fill = Layer::new("bars").with("fill", theme::SKY);
     let mut numbers = Layer::new("numbers").with("fill", theme::QUIET);
@@ -100,11 +102,11 @@ fn bars(panel: Rect, bins: &[Bin]) -> Layer {
         numbers.text(below, Anchor::Middle, theme::SMALL_PX, &ticks::label(part, 0.1));
     }
     let middle = at(panel, 0.5, 0.0) + Px::new(0.0, 32.0);
-    numbers.text(middle, Anchor::Middle, theme::SMALL_PX, "probability claimed");
+    numbers.text(middle, Anchor::Middle, theme::SMALL_PX, "mean predicted probability");
     let mut border = Layer::new("border").stroked(theme::FRAME, 1.0);
     border.rect(panel, 0.0);
     layer.extend([fill, numbers, border]);
     let above = Px::new(panel.left, panel.top - 6.0);
-    layer.text(above, Anchor::Start, theme::TEXT_PX, "number of claims (height logarithmic)");
+    layer.text(above, Anchor::Start, theme::TEXT_PX, "count (logarithmic)");
     layer
 }

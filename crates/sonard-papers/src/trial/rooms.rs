@@ -1,4 +1,4 @@
-//! Rooms made up at random.
+//! Random rooms for simulated experiments.
 
 use std::collections::BTreeMap;
 
@@ -9,14 +9,14 @@ use sonard_model::{
     scene::{DEFAULT_SNAP_M, Material, Scene, Wall},
 };
 
-/// A rectangular room with `boxes` boxes and `partitions` partition walls in it, its walls turned
-/// against the axes, and the pose `start` where nothing stands.
+/// Rectangular room with up to `boxes` boxes and `partitions` partition walls, rotated against the
+/// axes, and the pose `start` in free space.
 pub fn random_room(name: &str, boxes: usize, partitions: usize, rng: &mut impl Rng) -> Scene {
     let size = DVec2::new(rng.random_range(3.5..6.5), rng.random_range(3.0..5.0));
     let turn = DVec2::from_angle(rng.random_range(-0.4..0.4));
     let material = Material { reflectance: rng.random_range(0.9..0.98), roughness: 0.0 };
     let start = DVec2::new(0.7, 0.7);
-    let mut room = Room::new(size, start);
+    let mut room = RoomBuilder::new(size, start);
     room.add_boxes(boxes, [0.15, 0.4], 0.6, rng);
     for number in 0..partitions {
         let x = size.x * (number as f64 + 1.0 + rng.random_range(-0.1..0.1))
@@ -27,64 +27,65 @@ pub fn random_room(name: &str, boxes: usize, partitions: usize, rng: &mut impl R
             _ => (DVec2::new(x, size.y), DVec2::new(x, size.y - long)),
         };
         let free = |at: &DVec2, r: f64| (at.x - x).abs() > r + 0.2;
-        if room.taken.iter().all(|(at, r)| free(at, *r)) {
+        if room.occupied.iter().all(|(at, r)| free(at, *r)) {
             room.outlines.push((format!("partition-{number}"), vec![a, b], false));
         }
     }
     room.scene(name, turn, material)
 }
 
-/// A room like a gallery's: two or three objects with way to walk round them at about a metre, and
-/// the pose `start` near a corner.
+/// Gallery-like room with two or three objects that a robot can round at about a metre, and the
+/// pose `start` near a corner.
 pub fn gallery(name: &str, rng: &mut impl Rng) -> Scene {
     let size = DVec2::new(rng.random_range(6.0..8.0), rng.random_range(5.0..6.5));
     let turn = DVec2::from_angle(rng.random_range(-0.4..0.4));
     let material = Material { reflectance: rng.random_range(0.9..0.98), roughness: 0.0 };
-    let mut room = Room::new(size, DVec2::new(1.1, 1.0));
+    let mut room = RoomBuilder::new(size, DVec2::new(1.1, 1.0));
     let boxes = rng.random_range(2..=3);
     room.add_boxes(boxes, [0.25, 0.6], 1.1, rng);
     room.scene(name, turn, material)
 }
 
-/// A room in the making, its first corner in the origin.
-struct Room {
+/// RoomBuilder under construction with its first corner at the origin.
+struct RoomBuilder {
     size: DVec2,
     start: DVec2,
-    /// Names and corners, and whether the last is joined to the first.
+    /// Name, corners and closure of each outline.
     outlines: Vec<(String, Vec<DVec2>, bool)>,
-    /// Circles in which something is already.
-    taken: Vec<(DVec2, f64)>,
+    /// Centre and radius of each occupied circle.
+    occupied: Vec<(DVec2, f64)>,
 }
 
-impl Room {
+impl RoomBuilder {
     fn new(size: DVec2, start: DVec2) -> Self {
         let outlines = vec![("room".to_owned(), corners(DVec2::ZERO, size, DVec2::X), true)];
-        Self { size, start, outlines, taken: vec![(start, 0.7)] }
+        Self { size, start, outlines, occupied: vec![(start, 0.7)] }
     }
 
-    /// Boxes with half sides in a range and a gap around them, metres, as far as there is room.
+    /// Adds boxes with half sides in a range and a gap around them, metres, as space permits.
     fn add_boxes(&mut self, count: usize, half_m: [f64; 2], gap_m: f64, rng: &mut impl Rng) {
-        let [least, most] = half_m;
+        let [min, max] = half_m;
         for number in 0..count {
-            let half = DVec2::new(rng.random_range(least..most), rng.random_range(least..most));
+            let half = DVec2::new(rng.random_range(min..max), rng.random_range(min..max));
             let reach = half.length();
             for _ in 0..50 {
-                let Self { size, taken, .. } = &self;
+                let Self { size, occupied, .. } = &self;
                 let at = DVec2::new(rng.random_range(0.0..size.x), rng.random_range(0.0..size.y));
-                let off_walls = at.min(*size - at).min_element() > reach + gap_m;
-                let apart = taken.iter().all(|(other, r)| at.distance(*other) > reach + r + gap_m);
-                if off_walls && apart {
-                    let turned = DVec2::from_angle(rng.random_range(0.0..1.5));
-                    let around = corners(-half, half, turned).iter().map(|c| *c + at).collect();
+                let clears_walls = at.min(*size - at).min_element() > reach + gap_m;
+                let is_clear =
+                    occupied.iter().all(|(other, r)| at.distance(*other) > reach + r + gap_m);
+                if clears_walls && is_clear {
+                    let direction = DVec2::from_angle(rng.random_range(0.0..1.5));
+                    let around = corners(-half, half, direction).iter().map(|c| *c + at).collect();
                     self.outlines.push((format!("box-{number}"), around, true));
-                    self.taken.push((at, reach));
+                    self.occupied.push((at, reach));
                     break;
                 }
             }
         }
     }
 
-    /// The room turned about the origin.
+    /// Scene of the room, rotated about the origin.
     fn scene(&self, name: &str, turn: DVec2, material: Material) -> Scene {
         let walls = self.outlines.iter().flat_map(|(id, points, closed)| {
             let ends = points.iter().zip(points.iter().cycle().skip(1));
@@ -121,7 +122,7 @@ impl Room {
     }
 }
 
-/// Corners of a rectangle whose first side has a direction.
+/// Corners of a rectangle, rotated to a direction of the first side.
 fn corners(low: DVec2, high: DVec2, turn: DVec2) -> Vec<DVec2> {
     [low, DVec2::new(high.x, low.y), high, DVec2::new(low.x, high.y)]
         .map(|corner| turn.rotate(corner))

@@ -1,4 +1,4 @@
-//! Made-up rooms, and a robot's way through one.
+//! Random rooms, and a robot's course through one.
 
 use std::sync::Arc;
 
@@ -15,21 +15,20 @@ use sonard_model::{
     scene::{Scene, Wall},
 };
 
-/// The walls of an outline.
-fn sides<'a>(scene: &'a Scene, of: &'a str) -> Vec<&'a Wall> {
-    let is_of = |wall: &&Wall| wall.id.split('.').next() == Some(of);
-    scene.walls.iter().filter(is_of).collect()
+fn sides<'a>(scene: &'a Scene, outline: &'a str) -> Vec<&'a Wall> {
+    let belongs = |wall: &&Wall| wall.id.split('.').next() == Some(outline);
+    scene.walls.iter().filter(belongs).collect()
 }
 
-fn apart_m(one: &Wall, other: &Wall) -> f64 {
-    let ends = |at: &Wall, of: &Wall| {
-        distance_to_segment(at.a, of.a, of.b).min(distance_to_segment(at.b, of.a, of.b))
+fn distance_m(first: &Wall, second: &Wall) -> f64 {
+    let ends = |from: &Wall, to: &Wall| {
+        distance_to_segment(from.a, to.a, to.b).min(distance_to_segment(from.b, to.a, to.b))
     };
-    ends(one, other).min(ends(other, one))
+    ends(first, second).min(ends(second, first))
 }
 
 #[test]
-fn boxes_leave_a_way_between_them_and_along_the_walls() {
+fn boxes_leave_free_passages() {
     let mut boxes = 0;
     for seed in 0..60 {
         let scene = random_room("r", 3, 0, &mut Pcg64::seed_from_u64(seed));
@@ -39,7 +38,7 @@ fn boxes_leave_a_way_between_them_and_along_the_walls() {
         for (at, one) in outlines.iter().enumerate() {
             assert!(one.is_empty() || one.len() == 4, "{seed}: {one:?}");
             let gaps = outlines[..at].iter().flatten();
-            let pairs = gaps.flat_map(|other| one.iter().map(|wall| apart_m(wall, other)));
+            let pairs = gaps.flat_map(|other| one.iter().map(|wall| distance_m(wall, other)));
             assert!(pairs.fold(f64::INFINITY, f64::min) > 0.6, "{seed}");
             if at > 0 {
                 boxes += usize::from(!one.is_empty());
@@ -54,7 +53,7 @@ fn boxes_leave_a_way_between_them_and_along_the_walls() {
 }
 
 #[test]
-fn partitions_divide_the_room_evenly_and_leave_a_way() {
+fn partitions_are_spaced_evenly() {
     let mut found = 0;
     for seed in 0..60 {
         let scene = random_room("r", 0, 2, &mut Pcg64::seed_from_u64(seed));
@@ -65,7 +64,8 @@ fn partitions_divide_the_room_evenly_and_leave_a_way() {
             let Some(wall) = sides(&scene, name).first().copied() else { continue };
             found += 1;
             let share = |at: DVec2, side: DVec2| at.dot(side) / side.length_squared();
-            // At a third and at two thirds, to a tenth of that; the one from below, the other from above.
+            // Nominally at a third and two thirds, within a tenth; alternately from below and
+            // above.
             let place = 3.0 * share(wall.a, along) - (number as f64 + 1.0);
             assert!(place.abs() <= 0.1 + 1e-9, "{seed} {name}: {place}");
             assert!((share(wall.a, up) - number as f64).abs() < 1e-9, "{seed} {name}");
@@ -77,7 +77,7 @@ fn partitions_divide_the_room_evenly_and_leave_a_way() {
 }
 
 #[test]
-fn a_robot_drives_where_it_looks_and_keeps_clear_of_walls() {
+fn robot_drives_ahead_clear_of_walls() {
     let text = sonard_model::scene::shipped::text("two-surface-room").expect("shipped");
     let scene = Arc::new(Scene::from_json(text).expect("a scene"));
     let sensor = Sensor::preset("senscomp-6500").expect("a preset");
@@ -100,7 +100,7 @@ fn a_robot_drives_where_it_looks_and_keeps_clear_of_walls() {
     let through = |start, rng: &mut Pcg64| {
         Course::through(&simulator, start, &settings, rng).expect("few paths")
     };
-    let course = through(DVec2::new(1.2, 1.0), &mut rng).expect("a way");
+    let course = through(DVec2::new(1.2, 1.0), &mut rng).expect("a course");
     assert_eq!(course.sweeps.len(), 60);
     let mut moves = 0;
     for pair in course.sweeps.windows(2) {
@@ -116,6 +116,6 @@ fn a_robot_drives_where_it_looks_and_keeps_clear_of_walls() {
         }
     }
     assert!(moves > 40, "{moves} moves");
-    // From within a wall's clearance it begins as near as it may; there is no way outside the room.
+    // A start within the clearance of a wall is moved to the nearest allowed position.
     assert!(through(DVec2::new(0.2, 0.2), &mut rng).is_some());
 }

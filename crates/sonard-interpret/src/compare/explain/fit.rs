@@ -1,121 +1,127 @@
-//! Robust fits of a change that moves predicted ranges in proportion.
+//! Robust fit of a change to which predicted ranges respond linearly.
 
 use glam::{DMat3, DVec3};
 
 use super::{
-    found::{Estimate, Quantity},
+    explanation::{Estimate, Quantity},
     likelihood::{SIGMA_M, densities, is_near, log_likelihood},
 };
 
-/// Spreads that the fit is made with in turn, metres: from wide, so that it finds its way, to the stated one.
-const SPREADS_M: [f64; 4] = [0.08, 0.04, 0.02, SIGMA_M];
-/// Steps with each.
-const STEPS: usize = 8;
-/// Standard deviation of what is believed beforehand of each value: metres, or a share of the speed of sound.
-const PRIOR: f64 = 0.3;
-/// Changes beyond these are not of first order, and need another prediction: metres, and a share of the speed of
-/// sound.
-const MOST: DVec3 = DVec3::new(0.15, 0.15, 0.06);
-/// Fewer pairs than this say nothing.
-const FEW: usize = 5;
+/// Standard deviations of the successive fits, metres: wide first for a large basin of
+/// convergence, then down to the stated one.
+const SIGMA_SCHEDULE_M: [f64; 4] = [0.08, 0.04, 0.02, SIGMA_M];
+/// Iterations with each standard deviation.
+const ITERATIONS: usize = 8;
+/// Prior standard deviation of each value: metres, or a fraction of the speed of sound.
+const PRIOR_SIGMA: f64 = 0.3;
+/// Limits of the first-order approximation: metres, metres, and a fraction of the speed of sound.
+const MAX_CHANGE: DVec3 = DVec3::new(0.15, 0.15, 0.06);
+/// Minimum number of pairs for a fit.
+const MIN_PAIRS: usize = 5;
 
-/// A residual, metres, and what the predicted range gains by each of three values: metres along x and y (or of another
-/// offset, in the place of x), and a share of the speed of sound.
-pub(super) type Moved = (f64, DVec3);
+/// Residual in metres, and gradient of the predicted range with respect to three values: metres
+/// along x and y (or another offset in place of x), and a fraction of the speed of sound.
+pub(super) type Linearized = (f64, DVec3);
 
-/// What came of a fit.
+/// Result of a fit.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Fit {
+pub(super) struct LinearFit {
     pub(super) value: DVec3,
     pub(super) sigma: DVec3,
-    /// In log-likelihood.
+    /// Gain in log-likelihood.
     pub(super) gain: f64,
-    /// Readings explained that were not before.
+    /// Readings explained by the change and not before.
     pub(super) explains: u32,
 }
 
-impl Fit {
-    /// One of its values; a share becomes percent.
+impl LinearFit {
+    /// Estimate of one of the values; a fraction becomes percent.
     pub(super) fn estimate(&self, name: Quantity, at: usize) -> Estimate {
         let scale = if at == 2 { 100.0 } else { 1.0 };
         Estimate { name, value: self.value[at] * scale, sigma: self.sigma[at] * scale }
     }
 
-    /// What is left of a residual.
-    pub(super) fn left_m(&self, (residual_m, gain): Moved) -> f64 {
-        residual_m - gain.dot(self.value)
+    /// Residual that remains after the fit, metres.
+    pub(super) fn remaining_m(&self, (residual_m, gradient): Linearized) -> f64 {
+        residual_m - gradient.dot(self.value)
     }
 }
 
-/// The change that explains the residuals best, where the predicted range grows by the gain times it. `None` if too
-/// few residuals depend on it, or it is too large for the first order.
+/// Fits the change that explains the residuals best, for predicted ranges that respond by
+/// gradient times change. `None` if too few residuals depend on the change, or if it exceeds the
+/// limits of the first order.
 ///
-/// Expectation-maximisation: each step weighs a residual by the share of its density that is explained, and solves
-/// the normal equations of the weighted least squares. The likelihood does not fall from step to step while the
-/// spread stays.
-pub(super) fn fit(all: impl Iterator<Item = Moved>) -> Option<Fit> {
-    let moved: Vec<Moved> = all.filter(|(_, gain)| gain.length_squared() > 1e-12).collect();
-    if moved.len() < FEW {
+/// Expectation-maximization: each step weighs a residual by its inlier probability and solves the
+/// normal equations of the weighted least squares. The likelihood does not decrease from step to
+/// step while the standard deviation stays the same.
+pub(super) fn fit(all: impl Iterator<Item = Linearized>) -> Option<LinearFit> {
+    let pairs: Vec<Linearized> =
+        all.filter(|(_, gradient)| gradient.length_squared() > 1e-12).collect();
+    if pairs.len() < MIN_PAIRS {
         return None;
     }
     let mut value = DVec3::ZERO;
-    let mut sums = Sums::default();
-    for spread_m in SPREADS_M {
-        for _ in 0..STEPS {
-            sums = Sums::of(&moved, value, spread_m);
-            value = sums.normal.inverse() * sums.right;
+    let mut equations = NormalEquations::default();
+    for sigma_m in SIGMA_SCHEDULE_M {
+        for _ in 0..ITERATIONS {
+            equations = NormalEquations::accumulate(&pairs, value, sigma_m);
+            value = equations.matrix.inverse() * equations.right;
         }
     }
-    if !value.abs().cmple(MOST).all() {
+    if !value.abs().cmple(MAX_CHANGE).all() {
         return None;
     }
-    let mut found = Fit { value, sigma: sums.sigma(), gain: 0.0, explains: 0 };
-    for &pair in &moved {
-        let left_m = found.left_m(pair);
-        found.gain += log_likelihood(left_m) - log_likelihood(pair.0);
-        found.explains += u32::from(is_near(left_m) && !is_near(pair.0));
+    let mut found = LinearFit { value, sigma: equations.sigma(), gain: 0.0, explains: 0 };
+    for &pair in &pairs {
+        let remaining_m = found.remaining_m(pair);
+        found.gain += log_likelihood(remaining_m) - log_likelihood(pair.0);
+        found.explains += u32::from(is_near(remaining_m) && !is_near(pair.0));
     }
     Some(found)
 }
 
-/// Sums of the normal equations.
+/// Normal equations of the weighted least squares.
 #[derive(Debug, Clone, Copy, Default)]
-struct Sums {
-    normal: DMat3,
+struct NormalEquations {
+    matrix: DMat3,
     right: DVec3,
-    /// Of weights, and of weighted squares of what is left.
+    /// Sum of weights.
     weights: f64,
+    /// Weighted sum of squared remaining residuals.
     squares: f64,
 }
 
-impl Sums {
-    fn of(moved: &[Moved], value: DVec3, spread_m: f64) -> Self {
-        // A value that no reading depends on stays at nothing.
+impl NormalEquations {
+    fn accumulate(pairs: &[Linearized], value: DVec3, sigma_m: f64) -> Self {
+        // The prior keeps a value at zero that no reading depends on.
         let mut sums = Self {
-            normal: DMat3::from_diagonal(DVec3::splat((spread_m / PRIOR).powi(2))),
+            matrix: DMat3::from_diagonal(DVec3::splat((sigma_m / PRIOR_SIGMA).powi(2))),
             right: DVec3::ZERO,
             weights: 0.0,
             squares: 0.0,
         };
-        for &(residual_m, gain) in moved {
-            let left_m = residual_m - gain.dot(value);
-            let [explained, other] = densities(left_m, spread_m);
-            let weight = explained / (explained + other);
-            let weighted = weight * gain;
-            sums.normal +=
-                DMat3::from_cols(weighted * gain.x, weighted * gain.y, weighted * gain.z);
+        for &(residual_m, gradient) in pairs {
+            let remaining_m = residual_m - gradient.dot(value);
+            let [inlier, outlier] = densities(remaining_m, sigma_m);
+            let weight = inlier / (inlier + outlier);
+            let weighted = weight * gradient;
+            sums.matrix += DMat3::from_cols(
+                weighted * gradient.x,
+                weighted * gradient.y,
+                weighted * gradient.z,
+            );
             sums.right += residual_m * weighted;
             sums.weights += weight;
-            sums.squares += weight * left_m * left_m;
+            sums.squares += weight * remaining_m * remaining_m;
         }
         sums
     }
 
-    /// Standard deviations, by how residuals really spread.
+    /// Standard deviations, scaled by the observed scatter of the residuals.
     fn sigma(&self) -> DVec3 {
         let variance = self.squares / self.weights.max(f64::MIN_POSITIVE);
-        let inverse = self.normal.inverse();
-        let of = |at: usize| (variance * inverse.col(at)[at]).max(0.0).sqrt();
-        DVec3::new(of(0), of(1), of(2))
+        let inverse = self.matrix.inverse();
+        let sigma = |at: usize| (variance * inverse.col(at)[at]).max(0.0).sqrt();
+        DVec3::new(sigma(0), sigma(1), sigma(2))
     }
 }

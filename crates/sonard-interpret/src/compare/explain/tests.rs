@@ -1,4 +1,4 @@
-//! Readings by a world that differs in one thing from the one they are predicted in.
+//! Recovery of one or more changes between the true world and the assumed one.
 
 mod closed_forms;
 
@@ -18,7 +18,7 @@ use uuid::Uuid;
 use super::Explanation;
 use crate::compare::{Comparison, compare};
 
-/// What readings are of.
+/// Conditions under which readings are simulated.
 #[derive(Clone)]
 struct World {
     scene: Scene,
@@ -28,7 +28,7 @@ struct World {
 }
 
 impl World {
-    fn believed() -> Self {
+    fn assumed() -> Self {
         let scene = Scene::from_json(shipped::text("two-surface-room").expect("shipped"));
         let scene = scene.expect("a scene");
         let pose = Pose { x_m: 1.3, y_m: 0.9, heading_deg: 20.0 };
@@ -49,17 +49,17 @@ impl World {
     }
 }
 
-/// Readings of one world, with another's predictions beside them; ranges are computed with the speed of sound that
-/// is believed.
-fn compared(truth: &World, believed: &World) -> Comparison {
+/// Readings of one world with the predictions of another; ranges are computed with the assumed
+/// speed of sound.
+fn compared(truth: &World, assumed: &World) -> Comparison {
     let (mut scan, _) = truth.scan();
-    let (predicted, simulator) = believed.scan();
-    let slower = believed.air.sound_speed_m_s() / truth.air.sound_speed_m_s();
-    let point = simulator.at(believed.pose.position());
+    let (predicted, simulator) = assumed.scan();
+    let slower = assumed.air.sound_speed_m_s() / truth.air.sound_speed_m_s();
+    let point = simulator.at(assumed.pose.position());
     for ping in &mut scan.pings {
         ping.range_m = ping.range_m.map(|range_m| range_m * slower);
         let prediction =
-            point.ping(believed.pose.direction_rad(ping.azimuth_deg)).expect("few paths");
+            point.ping(assumed.pose.direction_rad(ping.azimuth_deg)).expect("few paths");
         ping.sim = Some(SimRecord::of(&simulator, &prediction));
         (ping.path, ping.amplitude, ping.margin_db) = (None, None, None);
     }
@@ -73,118 +73,118 @@ fn named<'a>(comparison: &'a Comparison, change: &str) -> &'a Explanation {
     found.unwrap_or_else(|| panic!("no {change}: {:?}", comparison.explanations))
 }
 
-fn close(found: &Explanation, at: usize, wanted: f64, off: f64) {
+fn assert_close(found: &Explanation, at: usize, expected: f64, tolerance: f64) {
     let estimate = &found.estimates[at];
-    assert!((estimate.value - wanted).abs() < off, "{wanted}: {found:?}");
+    assert!((estimate.value - expected).abs() < tolerance, "{expected}: {found:?}");
 }
 
 #[test]
-fn readings_of_the_world_that_is_believed_need_no_explanation() {
-    let believed = World::believed();
-    assert_eq!(compared(&believed, &believed).explanations, []);
+fn identical_worlds_are_not_explained() {
+    let assumed = World::assumed();
+    assert_eq!(compared(&assumed, &assumed).explanations, []);
 }
 
 #[test]
-fn a_robot_that_stands_elsewhere_is_found() {
-    let believed = World::believed();
-    let mut truth = believed.clone();
+fn pose_offset_is_found() {
+    let assumed = World::assumed();
+    let mut truth = assumed.clone();
     (truth.pose.x_m, truth.pose.y_m) = (1.3 + 0.021, 0.9 - 0.034);
-    let comparison = compared(&truth, &believed);
+    let comparison = compared(&truth, &assumed);
     let best = &comparison.explanations[0];
     assert_eq!(best.change, "pose");
-    close(best, 0, 0.021, 0.003);
-    close(best, 1, -0.034, 0.003);
+    assert_close(best, 0, 0.021, 0.003);
+    assert_close(best, 1, -0.034, 0.003);
     assert!(best.explains > 50, "{best:?}");
 }
 
 #[test]
-fn a_robot_that_looks_elsewhere_is_found() {
-    let believed = World::believed();
-    let mut truth = believed.clone();
+fn heading_offset_is_found() {
+    let assumed = World::assumed();
+    let mut truth = assumed.clone();
     truth.pose.heading_deg += 2.0;
-    let comparison = compared(&truth, &believed);
+    let comparison = compared(&truth, &assumed);
     let best = &comparison.explanations[0];
     assert_eq!(best.change, "heading");
-    close(best, 0, 2.0, 0.3);
+    assert_close(best, 0, 2.0, 0.3);
 }
 
 #[test]
 fn colder_air_is_found() {
-    let believed = World::believed();
-    let truth = World { air: Air::new(14.0, 50.0, 101.325).expect("air"), ..believed.clone() };
-    let comparison = compared(&truth, &believed);
+    let assumed = World::assumed();
+    let truth = World { air: Air::new(14.0, 50.0, 101.325).expect("air"), ..assumed.clone() };
+    let comparison = compared(&truth, &assumed);
     let best = &comparison.explanations[0];
     assert_eq!(best.change, "sound_speed");
-    let slower = 100.0 * (truth.air.sound_speed_m_s() / believed.air.sound_speed_m_s() - 1.0);
-    close(best, 0, slower, 0.1);
+    let slower = 100.0 * (truth.air.sound_speed_m_s() / assumed.air.sound_speed_m_s() - 1.0);
+    assert_close(best, 0, slower, 0.1);
 }
 
 #[test]
-fn a_wall_that_stands_elsewhere_is_found() {
-    let believed = World::believed();
-    let mut truth = believed.clone();
+fn displaced_wall_is_found() {
+    let assumed = World::assumed();
+    let mut truth = assumed.clone();
     let wall = truth.scene.walls.iter().position(|wall| &*wall.id == "south").expect("a wall");
     let south = &mut truth.scene.walls[wall];
     (south.a.y, south.b.y) = (south.a.y - 0.049, south.b.y - 0.049);
-    // The walls beside it reach down to it.
+    // The adjacent walls are extended to it.
     let corners = [south.a, south.b];
     for wall in &mut truth.scene.walls {
         for end in [&mut wall.a, &mut wall.b] {
             if corners.iter().any(|corner| (*corner - *end).length() < 0.05) {
                 *end = corners
                     .into_iter()
-                    .min_by(|one, other| one.distance(*end).total_cmp(&other.distance(*end)))
+                    .min_by(|a, b| a.distance(*end).total_cmp(&b.distance(*end)))
                     .expect("two");
             }
         }
     }
-    let comparison = compared(&truth, &believed);
+    let comparison = compared(&truth, &assumed);
     let best = &comparison.explanations[0];
     assert_eq!(best.change, "wall south", "{:?}", comparison.explanations);
-    close(best, 0, 0.049, 0.004);
+    assert_close(best, 0, 0.049, 0.004);
 }
 
 #[test]
-fn a_ranger_that_hears_less_is_found() {
-    let mut believed = World::believed();
-    believed.sensor.threshold = 0.05;
-    let mut truth = believed.clone();
+fn higher_threshold_is_found() {
+    let mut assumed = World::assumed();
+    assumed.sensor.threshold = 0.05;
+    let mut truth = assumed.clone();
     truth.sensor.threshold *= 10.0_f64.powf(8.0 / 20.0);
-    let comparison = compared(&truth, &believed);
-    close(named(&comparison, "threshold"), 0, 8.0, 3.0);
+    let comparison = compared(&truth, &assumed);
+    assert_close(named(&comparison, "threshold"), 0, 8.0, 3.0);
 }
 
-/// What a user who measures a room gets wrong: two centimetres, two degrees, and five degrees of temperature. None of it
-/// explains the readings alone.
+/// Typical errors of a user who measures a room: two centimetres, two degrees, and five degrees
+/// Celsius. No single change explains the readings.
 #[test]
-fn a_place_a_heading_and_the_air_are_found_together() {
-    let believed = World::believed();
-    let mut truth = believed.clone();
+fn pose_heading_and_air_are_combined() {
+    let assumed = World::assumed();
+    let mut truth = assumed.clone();
     truth.air = Air::new(15.0, 50.0, 101.325).expect("air");
     truth.pose = Pose { x_m: 1.3 - 0.02, y_m: 0.9 + 0.015, heading_deg: 22.0 };
-    let comparison = compared(&truth, &believed);
+    let comparison = compared(&truth, &assumed);
     let best = &comparison.explanations[0];
     assert_eq!(best.change, "together", "{:?}", comparison.explanations);
-    close(best, 0, -0.02, 0.003);
-    close(best, 1, 0.015, 0.003);
-    close(best, 2, 2.0, 0.3);
-    let slower = 100.0 * (truth.air.sound_speed_m_s() / believed.air.sound_speed_m_s() - 1.0);
-    close(best, 3, slower, 0.1);
+    assert_close(best, 0, -0.02, 0.003);
+    assert_close(best, 1, 0.015, 0.003);
+    assert_close(best, 2, 2.0, 0.3);
+    let slower = 100.0 * (truth.air.sound_speed_m_s() / assumed.air.sound_speed_m_s() - 1.0);
+    assert_close(best, 3, slower, 0.1);
     assert!(best.explains > 200, "{best:?}");
 }
 
-/// A scan of another room is explained by nothing of this kind.
+/// A scan of another room is explained by no small change.
 #[test]
-fn a_scan_of_another_room_is_not_explained_away() {
-    let believed = World::believed();
-    let mut truth = believed.clone();
+fn other_room_is_not_explained() {
+    let assumed = World::assumed();
+    let mut truth = assumed.clone();
     truth.scene = Scene::from_json(shipped::text("mcgill-lab").expect("shipped")).expect("a scene");
     truth.pose = truth.scene.poses.values().next().copied().expect("a pose");
-    let comparison = compared(&truth, &believed);
+    let comparison = compared(&truth, &assumed);
     assert!(comparison.agree_fraction.expect("pairs") < 0.2);
     assert_eq!(comparison.explanations, []);
-    // A quarter turn is as much another room.
-    let turned = Pose { heading_deg: 110.0, ..believed.pose };
-    let comparison = compared(&World { pose: turned, ..believed.clone() }, &believed);
+    // A quarter turn is as bad as another room.
+    let turned = Pose { heading_deg: 110.0, ..assumed.pose };
+    let comparison = compared(&World { pose: turned, ..assumed.clone() }, &assumed);
     assert_eq!(comparison.explanations, []);
 }

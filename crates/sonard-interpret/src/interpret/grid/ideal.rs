@@ -1,10 +1,10 @@
-//! The map that a perfect surveyor would draw of a scene.
+//! Ideal map of a scene.
 
 use super::{Grid, GridShape};
 use sonard_model::{geometry::DVec2, scene::Scene};
 
-/// Draws a scene: cells that a wall or a cylinder touches are occupied, those that can be reached
-/// from one of `places` without crossing such cells are free, all others unknown.
+/// Rasterizes a scene: cells touched by a wall or a cylinder are occupied, cells reachable
+/// from one of `places` without crossing those are free, all others unknown.
 #[must_use]
 pub fn ideal(scene: &Scene, shape: GridShape, places: &[DVec2]) -> Grid {
     let mut cells = vec![0.5; shape.cells()];
@@ -32,8 +32,8 @@ pub fn ideal(scene: &Scene, shape: GridShape, places: &[DVec2]) -> Grid {
     Grid::of_probabilities(shape, &cells)
 }
 
-/// Marks the cells that a segment goes through; steps are short enough to leave no gap that a
-/// path by sides could slip through.
+/// Marks the cells crossed by a segment. Steps are short enough to leave no gap for a
+/// 4-connected path.
 fn draw_wall(shape: &GridShape, cells: &mut [f64], a: DVec2, b: DVec2) {
     let steps = (a.distance(b) / (0.1 * shape.resolution_m)).ceil().max(1.0);
     for step in 0..=steps as usize {

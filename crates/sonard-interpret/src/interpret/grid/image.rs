@@ -1,4 +1,4 @@
-//! Maps as the pair of files that ROS's map_server reads: an image and a description.
+//! Maps in the format of ROS's map_server: an image and a YAML description.
 
 use serde::{Deserialize, Deserializer, Serialize, de};
 use thiserror::Error;
@@ -6,7 +6,7 @@ use thiserror::Error;
 use super::{Grid, GridError, GridShape};
 use sonard_model::geometry::DVec2;
 
-/// The description, `map.yaml`.
+/// Description of a map, `map.yaml`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct MapYaml {
     /// File name of the image.
@@ -15,7 +15,7 @@ pub struct MapYaml {
     pub resolution: f64,
     /// Pose of the lower left corner: metres, metres, radians.
     pub origin: [f64; 3],
-    /// 0: dark is occupied.
+    /// 1 if the shades are inverted; 0: dark is occupied.
     #[serde(default, deserialize_with = "zero_or_one")]
     pub negate: u8,
     /// Occupied above this probability.
@@ -24,24 +24,24 @@ pub struct MapYaml {
     /// Free below this probability.
     #[serde(default = "free_thresh")]
     pub free_thresh: f64,
-    /// Meaning of a shade.
+    /// Interpretation of the shades.
     #[serde(default)]
     pub mode: MapMode,
-    /// True if shades are probabilities, to be taken as they are: of maps that this program wrote.
+    /// `true` if shades are probabilities to be used unchanged: in maps written by this program.
     #[serde(skip)]
     pub is_graded: bool,
 }
 
-/// Meaning of the shades of a map's image, by map_server.
+/// Interpretation of the shades of a map image by map_server.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum MapMode {
     /// Occupied above one threshold, free below the other, else unknown.
     #[default]
     Trinary,
-    /// The same, with probabilities between the thresholds.
+    /// Trinary, with probabilities between the thresholds.
     Scale,
-    /// The occupancy itself, 0 to 100; more is unknown.
+    /// Occupancy itself, 0 to 100; larger values are unknown.
     Raw,
 }
 
@@ -53,7 +53,7 @@ const fn free_thresh() -> f64 {
     0.196
 }
 
-/// 0 or 1, as a number or as `false` or `true`.
+/// Accepts 0 or 1, as a number or a boolean.
 fn zero_or_one<'de, D: Deserializer<'de>>(deserializer: D) -> Result<u8, D::Error> {
     let value = serde_json::Value::deserialize(deserializer)?;
     match value {
@@ -61,34 +61,34 @@ fn zero_or_one<'de, D: Deserializer<'de>>(deserializer: D) -> Result<u8, D::Erro
         serde_json::Value::Number(number) if number.as_f64().is_some() => {
             Ok(u8::from(number.as_f64() != Some(0.0)))
         }
-        other => Err(de::Error::custom(format!("negate is {other}, and should be 0 or 1"))),
+        other => Err(de::Error::custom(format!("negate is {other}, but must be 0 or 1"))),
     }
 }
 
-/// The mark of a description whose map has probabilities for shades.
+/// Comment that marks a description whose shades are probabilities.
 const GRADED: &str = "# shades are probabilities of being occupied: 1 - shade / 255";
 
-/// An error in the image of a map or its description.
+/// Error in the image of a map or its description.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum ImageError {
-    /// Not a PGM.
+    /// Invalid PGM.
     #[error("byte {at}: {what}")]
     Image {
-        /// Where in the file, from 0.
+        /// Byte offset in the file.
         at: usize,
-        /// What is wrong and what would be right.
+        /// Description of the error.
         what: &'static str,
     },
-    /// The description lacks a key or has a wrong value, with its line.
-    #[error("the description is no YAML of a map: {0}")]
+    /// Missing key or wrong value in the description, with its line.
+    #[error("invalid map description: {0}")]
     Yaml(String),
-    /// Such a grid can't be.
+    /// Invalid grid dimensions.
     #[error(transparent)]
     Grid(#[from] GridError),
 }
 
-/// The image: a pixel is `255 (1 - p)`, so that free is bright and occupied dark; the first row
-/// is the map's upper one.
+/// Encodes the map as a binary PGM: a pixel is `255 (1 - p)`, so free space is bright and
+/// occupied space dark; the first row is the top of the map.
 #[must_use]
 pub fn to_pgm(grid: &Grid) -> Vec<u8> {
     let shape = grid.shape();
@@ -102,20 +102,20 @@ pub fn to_pgm(grid: &Grid) -> Vec<u8> {
     bytes
 }
 
-/// A map from its image and description.
+/// Decodes a map from its image and description.
 ///
 /// # Errors
-/// When the image is no PGM, is cut off, or makes no grid.
+/// Not a PGM, truncated image, or invalid grid dimensions.
 pub fn from_pgm(bytes: &[u8], yaml: &MapYaml) -> Result<Grid, ImageError> {
     let (size, pixels) = pixels(bytes)?;
     from_pixels(size, &pixels, yaml)
 }
 
-/// A map from the shades of its image, 0 to 255 and `None` for what is transparent, row by row from the upper left one, and
-/// its description.
+/// Map from the shades of its image and its description. Shades are 0 to 255, `None` if
+/// transparent, row by row from the upper left.
 ///
 /// # Errors
-/// When they are too few for this width and height, or make no grid.
+/// Too few pixels for this width and height, or invalid grid dimensions.
 pub fn from_pixels(
     [width, height]: [usize; 2],
     pixels: &[Option<u8>],
@@ -133,7 +133,7 @@ pub fn from_pixels(
     })?;
     let dark_on_light = |pixel: u8| if yaml.negate == 0 { pixel } else { 255 - pixel };
     let is_of_map_saver =
-        pixels.iter().flatten().all(|pixel| OF_MAP_SAVER.contains(&dark_on_light(*pixel)));
+        pixels.iter().flatten().all(|pixel| MAP_SAVER.contains(&dark_on_light(*pixel)));
     let probability = |pixel: &Option<u8>| match pixel {
         Some(pixel) => yaml.probability(dark_on_light(*pixel), is_of_map_saver),
         None => 0.5,
@@ -143,34 +143,35 @@ pub fn from_pixels(
     Ok(Grid::of_probabilities(shape, &cells))
 }
 
-/// What map_saver of ROS writes: occupied, unknown and free. A map of probabilities has other shades.
-const OF_MAP_SAVER: [u8; 4] = [0, UNKNOWN, 254, 255];
+/// Shades written by ROS's map_saver: occupied, unknown and free. A map of probabilities has
+/// others.
+const MAP_SAVER: [u8; 4] = [0, UNKNOWN, 254, 255];
 const UNKNOWN: u8 = 205;
 
-/// Width and height, and the shades of a PGM, plain (P2) or binary (P5) (Netpbm, pgm(5)).
+/// Width, height and shades of a PGM, plain (P2) or binary (P5) (Netpbm, pgm(5)).
 fn pixels(bytes: &[u8]) -> Result<([usize; 2], Vec<Option<u8>>), ImageError> {
-    let refuse = |at, what| Err(ImageError::Image { at, what });
+    let reject = |at, what| Err(ImageError::Image { at, what });
     let is_plain = bytes.starts_with(b"P2");
     if !is_plain && !bytes.starts_with(b"P5") {
-        return refuse(
+        return reject(
             0,
             "a map's image must be a PGM, which begins with P5 or P2, or a PNG; convert others: `convert IMAGE map.pgm`",
         );
     }
     let mut at = 2;
     let mut next = || number(bytes, &mut at);
-    let (Some(width), Some(height), Some(most)) = (next(), next(), next()) else {
-        return refuse(at, "width, height and greatest value must follow P5 or P2");
+    let (Some(width), Some(height), Some(max)) = (next(), next(), next()) else {
+        return reject(at, "width, height and maximum value must follow P5 or P2");
     };
-    if width == 0 || height == 0 || width.saturating_mul(height) > super::MOST_CELLS as usize {
-        return refuse(at, "the image has no pixel, or too many");
+    if width == 0 || height == 0 || width.saturating_mul(height) > super::MAX_CELLS as usize {
+        return reject(at, "the image has no pixels, or too many");
     }
-    if !(1..=65_535).contains(&most) {
-        return refuse(at, "the greatest value must be from 1 to 65535");
+    if !(1..=65_535).contains(&max) {
+        return reject(at, "the maximum value must be from 1 to 65535");
     }
     let shade = |value: usize| {
-        let value = value.min(most);
-        Some(if most == 255 { value } else { (255 * value + most / 2) / most } as u8)
+        let value = value.min(max);
+        Some(if max == 255 { value } else { (255 * value + max / 2) / max } as u8)
     };
     let count = width * height;
     let mut shades = Vec::new();
@@ -178,14 +179,14 @@ fn pixels(bytes: &[u8]) -> Result<([usize; 2], Vec<Option<u8>>), ImageError> {
         while shades.len() < count {
             match number(bytes, &mut at) {
                 Some(value) => shades.push(shade(value)),
-                None => return refuse(at, "the image ends before its last pixel"),
+                None => return reject(at, "the image ends before its last pixel"),
             }
         }
         return Ok(([width, height], shades));
     }
-    // One blank ends the header.
+    // A single whitespace byte ends the header.
     let body = bytes.get(at + 1..).unwrap_or_default();
-    if most < 256 {
+    if max < 256 {
         shades.extend(body.iter().take(count).map(|value| shade(usize::from(*value))));
     } else {
         let pairs = body.chunks_exact(2).take(count);
@@ -194,7 +195,7 @@ fn pixels(bytes: &[u8]) -> Result<([usize; 2], Vec<Option<u8>>), ImageError> {
     Ok(([width, height], shades))
 }
 
-/// The next number of a PGM, behind blanks and comments.
+/// Next number of a PGM, after whitespace and comments.
 fn number(bytes: &[u8], at: &mut usize) -> Option<usize> {
     loop {
         match bytes.get(*at)? {
@@ -217,7 +218,7 @@ fn number(bytes: &[u8], at: &mut usize) -> Option<usize> {
 }
 
 impl MapYaml {
-    /// The description of a map whose image has this file name.
+    /// Description of a map with the given image file name.
     #[must_use]
     pub fn of(shape: &GridShape, image: &str) -> Self {
         Self {
@@ -232,7 +233,7 @@ impl MapYaml {
         }
     }
 
-    /// The probability of a cell of such a shade, dark for occupied.
+    /// Occupancy probability of a shade, dark for occupied.
     fn probability(&self, shade: u8, is_of_map_saver: bool) -> f64 {
         let dark = 1.0 - f64::from(shade) / 255.0;
         if self.mode == MapMode::Raw {
@@ -242,7 +243,7 @@ impl MapYaml {
             return 0.5;
         }
         if self.is_graded {
-            // 127 and 128 are the two sides of unknown.
+            // The two shades next to 0.5.
             return if matches!(shade, 127 | 128) { 0.5 } else { dark };
         }
         if dark > self.occupied_thresh {
@@ -256,7 +257,7 @@ impl MapYaml {
         }
     }
 
-    /// As text.
+    /// Formats the description as YAML.
     #[must_use]
     pub fn to_text(&self) -> String {
         let [x, y, turn] = self.origin;
@@ -273,17 +274,17 @@ impl MapYaml {
         )
     }
 
-    /// From text, YAML with the keys that map_server knows.
+    /// Parses a YAML description with the keys known to map_server.
     ///
     /// # Errors
-    /// When a key that is needed is missing or a value is not of its kind.
+    /// A required key is missing or a value has the wrong type.
     pub fn from_text(text: &str) -> Result<Self, ImageError> {
         let plain = text.trim_start_matches('\u{feff}');
         let read: Self =
             serde_saphyr::from_str(plain).map_err(|error| ImageError::Yaml(error.to_string()))?;
         let numbers = [read.resolution, read.occupied_thresh, read.free_thresh];
         if numbers.iter().chain(&read.origin).any(|number| !number.is_finite()) {
-            return Err(ImageError::Yaml("a number in it is not finite".to_owned()));
+            return Err(ImageError::Yaml("a number is not finite".to_owned()));
         }
         Ok(Self { is_graded: plain.lines().any(|line| line.trim() == GRADED), ..read })
     }

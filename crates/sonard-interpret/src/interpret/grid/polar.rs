@@ -1,44 +1,44 @@
-//! A set of readings by direction and distance from the ranger.
+//! Evidence of one scan by direction and distance from the ranger.
 
 use std::f64::consts::TAU;
 
-use super::{BeamModel, GridShape, MOST_LOG_ODDS, Told, Trust};
+use super::{BeamModel, GridShape, MAX_LOG_ODDS, ScanEvidence, Trust};
 use crate::interpret::{Beam, Heard, prediction::Assessment};
 use sonard_model::geometry::DVec2;
 
-/// Directions of the table: 0.75 degrees each, finer than the motor's steps.
+/// Number of directions: 0.75 degrees each, finer than the motor's steps.
 const DIRECTIONS: usize = 480;
 
-/// Ranges reach this many standard deviations beyond the reading.
+/// Extent of the occupied zone beyond the reading, in standard deviations.
 const REACH_SIGMAS: f64 = 3.0;
 
-/// What all readings of a set say together.
-pub(super) struct Table {
-    /// For each direction, distances from 0 in steps of a cell.
+/// Polar log-odds table of the readings of a scan.
+pub(super) struct PolarTable {
+    /// Log-odds by direction, then by distance in steps of a cell.
     log_odds: Vec<f32>,
     distances: usize,
-    /// For each direction the number of distances that something is said of.
+    /// Number of affected distances in each direction.
     reach: Vec<usize>,
     cell_m: f64,
-    /// Readings not believed.
-    pub(super) left_out: usize,
+    /// Readings discarded for low confidence.
+    pub(super) discarded: usize,
 }
 
-impl Table {
-    /// Of the readings of a set that were taken at one place on the robot.
-    pub(super) fn of(told: Told<'_>, mount: DVec2, cell_m: f64) -> Self {
-        let Told { sweep, assessments, model, trust } = told;
-        let longest_m = model.max_range_m() + 0.2;
-        let distances = (longest_m / cell_m).ceil() as usize + 1;
+impl PolarTable {
+    /// Table of the readings taken at one position on the robot.
+    pub(super) fn new(evidence: ScanEvidence<'_>, mount: DVec2, cell_m: f64) -> Self {
+        let ScanEvidence { sweep, assessments, model, trust } = evidence;
+        let max_m = model.max_range_m() + 0.2;
+        let distances = (max_m / cell_m).ceil() as usize + 1;
         let mut table = Self {
             log_odds: vec![0.0; DIRECTIONS * distances],
             distances,
             reach: vec![0; DIRECTIONS],
             cell_m,
-            left_out: 0,
+            discarded: 0,
         };
-        // Beams that overlap hear the same things: together they count as much as beams side by
-        // side.
+        // Overlapping beams detect the same targets: together they count as much as adjacent beams
+        // without overlap.
         let share = (sweep.step_deg / model.width_deg()).clamp(0.0, 1.0);
         let mut profiles = [vec![0.0; distances], vec![0.0; distances]];
         let here = |(_, beam): &(usize, &Beam)| beam.mount == mount;
@@ -50,12 +50,12 @@ impl Table {
                 Heard::Near => continue,
             };
             if assessment.is_some_and(|assessment| assessment.confidence < trust.least_confidence) {
-                table.left_out += 1;
+                table.discarded += 1;
                 if !trust.keep_clear {
                     continue;
                 }
             }
-            let reading = Reading { range_m, echo, share, assessment, trust };
+            let reading = WeightedReading { range_m, echo, share, assessment, trust };
             let axis_rad = sweep.pose.direction_rad(beam.azimuth_deg);
             table.add(&reading, axis_rad, model, &mut profiles);
         }
@@ -64,31 +64,32 @@ impl Table {
 
     fn add(
         &mut self,
-        reading: &Reading<'_>,
+        reading: &WeightedReading<'_>,
         axis_rad: f64,
         model: &BeamModel,
         [free, occupied]: &mut [Vec<f32>; 2],
     ) {
-        let said = model.say(reading.range_m, self.cell_m);
-        let end_m = reading.range_m + REACH_SIGMAS * said.range_sigma_m;
+        let profile = model.profile(reading.range_m, self.cell_m);
+        let end_m = reading.range_m + REACH_SIGMAS * profile.range_sigma_m;
         let count = ((end_m / self.cell_m).ceil() as usize).min(self.distances);
         for distance in 0..count {
             let distance_m = (distance as f64 + 0.5) * self.cell_m;
             let weight = reading.share * reading.weight(distance_m);
-            let off = (distance_m - reading.range_m) / said.range_sigma_m;
+            let off = (distance_m - reading.range_m) / profile.range_sigma_m;
             let there = if reading.echo { (-0.5 * off * off).exp() } else { 0.0 };
-            // Moravec and Elfes: the nearer the reading, the less sure that space is free.
+            // Moravec and Elfes: certainty of free space decreases towards the reading.
             let share = distance_m / reading.range_m;
             let before = (1.0 - share * share).max(0.0);
-            free[distance] = (weight * said.free * before) as f32;
-            occupied[distance] = (weight * said.occupied * there) as f32;
+            free[distance] = (weight * profile.free * before) as f32;
+            occupied[distance] = (weight * profile.occupied * there) as f32;
         }
         let bin_rad = TAU / DIRECTIONS as f64;
-        let first = ((axis_rad - said.half_rad) / bin_rad).ceil() as i64;
-        let last = ((axis_rad + said.half_rad) / bin_rad).floor() as i64;
+        let first = ((axis_rad - profile.half_rad) / bin_rad).ceil() as i64;
+        let last = ((axis_rad + profile.half_rad) / bin_rad).floor() as i64;
         for bin in first..=last.min(first + DIRECTIONS as i64 - 1) {
             let off_rad = bin as f64 * bin_rad - axis_rad;
-            let [of_free, of_occupied] = model.off_axis(off_rad, said.half_rad).map(|g| g as f32);
+            let [of_free, of_occupied] =
+                model.off_axis(off_rad, profile.half_rad).map(|weight| weight as f32);
             let direction = bin.rem_euclid(DIRECTIONS as i64) as usize;
             let row = &mut self.log_odds[direction * self.distances..][..count];
             for ((cell, free), occupied) in row.iter_mut().zip(&*free).zip(&*occupied) {
@@ -98,10 +99,10 @@ impl Table {
         }
     }
 
-    /// Adds each entry to the cells it is about, around `from`.
+    /// Adds each entry to its cells around `from`.
     ///
-    /// Cells are counted from the one of the world in which that is, so that each gets exactly the same whatever grid it
-    /// is part of.
+    /// Cells are indexed relative to the world cell that contains `from`, so that a cell receives
+    /// exactly the same value in every grid that contains it.
     pub(super) fn add_to(&self, shape: &GridShape, from: DVec2, cells: &mut [f32]) {
         let place = from / shape.resolution_m;
         if !place.is_finite() {
@@ -129,31 +130,30 @@ impl Table {
                 }
                 let turn = angle(dy, dx) * per_radian + 0.5 + DIRECTIONS as f32;
                 let direction = turn as usize % DIRECTIONS;
-                let said = self.log_odds[direction * self.distances + distance];
+                let change = self.log_odds[direction * self.distances + distance];
                 let cell = &mut line[column];
-                *cell = (*cell + said).clamp(-MOST_LOG_ODDS, MOST_LOG_ODDS);
+                *cell = (*cell + change).clamp(-MAX_LOG_ODDS, MAX_LOG_ODDS);
             }
         }
     }
 
-    /// Lower left and upper right corner of what something is said of, from the place of the
-    /// ranger, cells.
+    /// Lower left and upper right corner of the affected region relative to the ranger, cells.
     pub(super) fn box_in_cells(&self, resolution_m: f64) -> [DVec2; 2] {
         let bin_rad = TAU / DIRECTIONS as f64;
-        let told = self.reach.iter().enumerate().filter(|(_, reach)| **reach > 0);
-        let sides = told.flat_map(|(direction, reach)| {
+        let affected = self.reach.iter().enumerate().filter(|(_, reach)| **reach > 0);
+        let sides = affected.flat_map(|(direction, reach)| {
             let reach = *reach as f64 * self.cell_m / resolution_m;
-            // A direction's entry is for half a direction to each side of it.
+            // Each direction covers half a bin to either side.
             [-0.5, 0.5].map(|off| reach * DVec2::from_angle((direction as f64 + off) * bin_rad))
         });
         let corners = sides.fold([DVec2::ZERO; 2], |[low, high], at| [low.min(at), high.max(at)]);
-        // An arc reaches a little beyond its ends.
+        // An arc bulges slightly beyond its ends.
         [corners[0] - 1.0, corners[1] + 1.0]
     }
 }
 
-/// A reading and how far it is believed.
-struct Reading<'a> {
+/// WeightedReading with its confidence.
+struct WeightedReading<'a> {
     range_m: f64,
     echo: bool,
     share: f64,
@@ -161,8 +161,8 @@ struct Reading<'a> {
     trust: &'a Trust,
 }
 
-impl Reading<'_> {
-    /// What it counts at a distance: 1 where nothing speaks against it, 0 without confidence.
+impl WeightedReading<'_> {
+    /// Weight at a distance: 1 without contradiction, 0 without confidence.
     fn weight(&self, distance_m: f64) -> f64 {
         let Some(assessment) = self.assessment else { return 1.0 };
         if self.trust.keep_clear && assessment.clear_m.is_some_and(|clear_m| distance_m < clear_m) {
@@ -175,7 +175,7 @@ impl Reading<'_> {
     }
 }
 
-/// The angle of a vector, radians, to 0.0004: a hundredth of a table's direction.
+/// Angle of a vector, radians, accurate to 0.0004 (a hundredth of a table direction).
 ///
 /// Rational approximation of the arctangent on [0, 1] after S. Rajan and others, "Efficient
 /// approximations for the arctangent function", IEEE Signal Processing Magazine 23 (2006).
@@ -201,7 +201,7 @@ mod tests {
     use super::angle;
 
     #[test]
-    fn the_quick_angle_is_close_enough() {
+    fn fast_angle_is_accurate() {
         for i in -3600..3600 {
             let exact = f64::from(i) * 0.05_f64.to_radians();
             let quick = angle(exact.sin() as f32, exact.cos() as f32);

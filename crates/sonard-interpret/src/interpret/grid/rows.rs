@@ -1,26 +1,27 @@
-//! Corners of a chain of cells' sides, with walls along rows and columns kept where they are.
+//! Corners of a chain of cell sides, with walls along rows and columns kept in place.
 //!
-//! A slanting wall shows as stairs: runs of sides that go in two directions only, turn by turn. A thin wall's end, a notch or
-//! a jog does not. So only stairs of several steps are straightened.
+//! A slanting wall appears as stairs: runs of sides that alternate between two directions. The end
+//! of a thin wall, a notch or a jog does not. So only stairs of several steps are straightened.
 
 use sonard_model::geometry::DVec2;
 
 use super::trace::Node;
 
-/// Stairs have so many runs at least; fewer are a jog between two walls.
+/// Minimum number of runs in stairs; fewer are a jog between two walls.
 const MIN_RUNS: usize = 6;
-/// A run is a wall of its own if it is so long, in cells, and so much longer than its neighbours of the same direction.
+/// Minimum length of a run that is a wall of its own, cells.
 const LONG_CELLS: i64 = 10;
+/// Minimum length of such a run relative to its neighbours of the same direction.
 const LONGER: i64 = 3;
 
-/// A straight row of sides, from one corner to the next.
+/// Straight row of sides, from one corner to the next.
 #[derive(Debug, Clone, Copy)]
-struct Run {
+struct StraightRun {
     from: Node,
     to: Node,
 }
 
-impl Run {
+impl StraightRun {
     fn direction(self) -> Node {
         ((self.to.0 - self.from.0).signum(), (self.to.1 - self.from.1).signum())
     }
@@ -30,7 +31,7 @@ impl Run {
     }
 }
 
-/// The corners of a chain; `straighten` makes a line of the nodes of stairs, ends among them.
+/// Corners of a chain; `straighten` returns the line for the nodes of stairs, ends included.
 pub(super) fn corners(
     nodes: &[Node],
     is_closed: bool,
@@ -60,17 +61,17 @@ pub(super) fn corners(
     corners
 }
 
-/// The straight rows of a chain. A ring begins at its lowest corner on the left, so that no row is cut.
-fn runs(nodes: &[Node], is_closed: bool) -> Vec<Run> {
+/// Straight runs of a chain. A ring starts at its lowest, then leftmost corner, so no run is cut.
+fn runs(nodes: &[Node], is_closed: bool) -> Vec<StraightRun> {
     let mut nodes = nodes.to_vec();
     if is_closed {
         let lowest = (0..nodes.len()).min_by_key(|at| (nodes[*at].1, nodes[*at].0)).unwrap_or(0);
         nodes.rotate_left(lowest);
         nodes.extend(nodes.first().copied());
     }
-    let mut runs: Vec<Run> = Vec::new();
+    let mut runs: Vec<StraightRun> = Vec::new();
     for ends in nodes.windows(2) {
-        let side = Run { from: ends[0], to: ends[1] };
+        let side = StraightRun { from: ends[0], to: ends[1] };
         match runs.last_mut() {
             Some(run) if run.direction() == side.direction() => run.to = side.to,
             _ => runs.push(side),
@@ -79,8 +80,8 @@ fn runs(nodes: &[Node], is_closed: bool) -> Vec<Run> {
     runs
 }
 
-/// Runs that go in two directions only, none of them the opposite of the other.
-fn flights(runs: &[Run]) -> Vec<&[Run]> {
+/// DisjointSets of runs in at most two directions that are not opposite.
+fn flights(runs: &[StraightRun]) -> Vec<&[StraightRun]> {
     let mut flights = Vec::new();
     let mut begin = 0;
     for at in 0..runs.len() {
@@ -96,13 +97,13 @@ fn flights(runs: &[Run]) -> Vec<&[Run]> {
     flights
 }
 
-/// Parts between runs that are walls of their own, and these.
-fn split_at_walls(stairs: &[Run]) -> Vec<&[Run]> {
+/// Splits stairs at runs that are walls of their own; these are parts, too.
+fn split_at_walls(stairs: &[StraightRun]) -> Vec<&[StraightRun]> {
     let is_wall = |at: usize| {
         let own = stairs[at].cells();
-        let beside = [at.checked_sub(2), Some(at + 2)];
-        let beside = beside.into_iter().flatten().filter_map(|beside| stairs.get(beside));
-        let longest = beside.map(|run| run.cells()).max().unwrap_or(0);
+        let neighbours = [at.checked_sub(2), Some(at + 2)];
+        let neighbours = neighbours.into_iter().flatten().filter_map(|near| stairs.get(near));
+        let longest = neighbours.map(|run| run.cells()).max().unwrap_or(0);
         own >= LONG_CELLS && own >= LONGER * longest
     };
     let mut parts = Vec::new();
@@ -121,13 +122,13 @@ fn split_at_walls(stairs: &[Run]) -> Vec<&[Run]> {
 mod tests {
     use super::*;
 
-    /// A chain through these corners, and what becomes of it.
+    /// Corners found for a chain through the given corners.
     fn traced(corner_nodes: &[Node], is_closed: bool) -> Vec<(f64, f64)> {
         let mut nodes: Vec<Node> = Vec::new();
         let ends = corner_nodes.iter().copied().chain(is_closed.then_some(corner_nodes[0]));
         let ends: Vec<Node> = ends.collect();
         for pair in ends.windows(2) {
-            let run = Run { from: pair[0], to: pair[1] };
+            let run = StraightRun { from: pair[0], to: pair[1] };
             let (x, y) = run.direction();
             nodes.extend((0..run.cells()).map(|at| (pair[0].0 + at * x, pair[0].1 + at * y)));
         }
@@ -147,13 +148,13 @@ mod tests {
     }
 
     #[test]
-    fn thin_walls_notches_and_jogs_stay_where_they_are() {
+    fn thin_walls_and_notches_are_kept() {
         for ring in [
             // A wall of one cell.
             &[(0, 0), (20, 0), (20, 1), (0, 1)][..],
             // A notch of one cell in a wall.
             &[(0, 0), (30, 0), (30, 10), (16, 10), (16, 9), (15, 9), (15, 10), (0, 10)],
-            // A wall that goes on a cell aside.
+            // A wall that continues offset by one cell.
             &[(0, 0), (15, 0), (15, 1), (30, 1), (30, 12), (0, 12)],
         ] {
             let found = traced(ring, true);
@@ -164,7 +165,7 @@ mod tests {
     }
 
     #[test]
-    fn stairs_become_one_wall_between_walls_that_stay() {
+    fn stairs_become_one_wall() {
         let mut chain = vec![(0, 0), (40, 0)];
         for step in 0..8 {
             chain.extend([(40 + 2 * step, step + 1), (42 + 2 * step, step + 1)]);

@@ -1,4 +1,4 @@
-//! How good a map is: the four benchmarks that Feature Prediction was measured with.
+//! Map quality: the four benchmarks of the Feature Prediction paper.
 
 use std::{cmp::Reverse, collections::BinaryHeap};
 
@@ -7,35 +7,34 @@ use thiserror::Error;
 
 use super::{Grid, GridShape};
 
-/// The four benchmarks, each in percent.
+/// Results of the four benchmarks, each in percent.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct MapScore {
     /// Baron's correlation of the two maps, `(mean(M N) - mean(M) mean(N)) / (sigma(M)
-    /// sigma(N))`; more is better. `None` where a map is the same everywhere.
+    /// sigma(N))`; more is better. `None` for a constant map.
     pub correlation_percent: Option<f64>,
     /// Sum of squared differences (Martin and Moravec) over the number of cells; less is better.
     pub map_score_percent: f64,
-    /// The same sum over those cells only that are occupied (above 0.5) in one of the maps, still
-    /// over the number of all cells: the paper's figures, each below the one over all cells, fit
-    /// that reading.
+    /// Sum of squared differences over cells occupied (above 0.5) in either map, over the number of
+    /// all cells. The paper's figures fit that reading: each is below the one over all cells.
     pub map_score_occupied_percent: f64,
-    /// And over the number of those cells.
+    /// Sum of squared differences over cells occupied in either map, over the number of those.
     pub map_score_of_occupied_percent: Option<f64>,
-    /// Of the shortest ways through the map's free space between places on a lattice, how many
-    /// run into an obstacle of the ideal map; less is better. `None` without a way.
+    /// Fraction of the shortest paths through the map's free space, between points of a lattice,
+    /// that hit an obstacle of the ideal map; less is better. `None` without a path.
     pub false_positive_paths_percent: Option<f64>,
-    /// How many ways were tried.
+    /// Number of paths tried.
     pub paths: u64,
 }
 
-/// The paths that are tried.
+/// Settings of the path benchmark.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PathSettings {
-    /// From place to place of the lattice, metres.
+    /// Spacing of the lattice, metres.
     pub spacing_m: f64,
-    /// Most places that ways begin at.
+    /// Maximum number of start points.
     pub most_starts: usize,
-    /// Cells up to this probability are free; unknown ones (0.5) are not.
+    /// Cells below this probability are free; unknown ones (0.5) are not.
     pub free_below: f64,
 }
 
@@ -48,34 +47,34 @@ impl Default for PathSettings {
 /// Maps that cannot be compared.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum ScoreError {
-    /// They don't lie on each other.
+    /// Different position, size or resolution.
     #[error(
-        "the maps differ in place or fineness: {}x{} cells of {} m from ({}, {}) against {}x{} of \
-         {} m from ({}, {})",
-        one.width, one.height, one.resolution_m, one.origin.x, one.origin.y,
-        other.width, other.height, other.resolution_m, other.origin.x, other.origin.y
+        "the maps differ in position, size or resolution: {}x{} cells of {} m from ({}, {}) \
+         against {}x{} of {} m from ({}, {})",
+        map.width, map.height, map.resolution_m, map.origin.x, map.origin.y,
+        ideal.width, ideal.height, ideal.resolution_m, ideal.origin.x, ideal.origin.y
     )]
     Shape {
-        /// The map's.
-        one: GridShape,
-        /// The ideal's.
-        other: GridShape,
+        /// Shape of the map.
+        map: GridShape,
+        /// Shape of the ideal map.
+        ideal: GridShape,
     },
 }
 
-/// Sets a map beside the ideal one.
+/// Scores a map against the ideal one.
 ///
 /// # Errors
-/// When the two differ in place, size or resolution.
+/// Maps of different position, size or resolution.
 pub fn score(map: &Grid, ideal: &Grid, paths: &PathSettings) -> Result<MapScore, ScoreError> {
-    let (one, other) = (*map.shape(), *ideal.shape());
-    let near = |a: f64, b: f64| (a - b).abs() < 1e-6 * one.resolution_m;
-    let same = (one.width, one.height) == (other.width, other.height)
-        && near(one.resolution_m, other.resolution_m)
-        && near(one.origin.x, other.origin.x)
-        && near(one.origin.y, other.origin.y);
+    let (shape, expected) = (*map.shape(), *ideal.shape());
+    let near = |a: f64, b: f64| (a - b).abs() < 1e-6 * shape.resolution_m;
+    let same = (shape.width, shape.height) == (expected.width, expected.height)
+        && near(shape.resolution_m, expected.resolution_m)
+        && near(shape.origin.x, expected.origin.x)
+        && near(shape.origin.y, expected.origin.y);
     if !same {
-        return Err(ScoreError::Shape { one, other });
+        return Err(ScoreError::Shape { map: shape, ideal: expected });
     }
     let map: Vec<f64> = map.probabilities().collect();
     let ideal: Vec<f64> = ideal.probabilities().collect();
@@ -85,7 +84,7 @@ pub fn score(map: &Grid, ideal: &Grid, paths: &PathSettings) -> Result<MapScore,
     let occupied: Vec<(&f64, &f64)> =
         map.iter().zip(&ideal).filter(|(m, n)| **m > 0.5 || **n > 0.5).collect();
     let of_occupied: f64 = occupied.iter().copied().map(square).sum();
-    let (false_paths, tried) = false_paths(&one, &map, &ideal, paths);
+    let (false_paths, tried) = false_paths(&shape, &map, &ideal, paths);
     let share = |part: f64, whole: f64| (whole > 0.0).then(|| 100.0 * part / whole);
     Ok(MapScore {
         correlation_percent: correlation(&map, &ideal).map(|r| 100.0 * r),
@@ -97,22 +96,22 @@ pub fn score(map: &Grid, ideal: &Grid, paths: &PathSettings) -> Result<MapScore,
     })
 }
 
-fn correlation(one: &[f64], other: &[f64]) -> Option<f64> {
-    let count = one.len() as f64;
+fn correlation(map: &[f64], ideal: &[f64]) -> Option<f64> {
+    let count = map.len() as f64;
     let mean = |values: &[f64]| values.iter().sum::<f64>() / count;
-    let (a, b) = (mean(one), mean(other));
-    let (mut both, mut of_one, mut of_other) = (0.0, 0.0, 0.0);
-    for (m, n) in one.iter().zip(other) {
-        both += (m - a) * (n - b);
-        of_one += (m - a).powi(2);
-        of_other += (n - b).powi(2);
+    let (map_mean, ideal_mean) = (mean(map), mean(ideal));
+    let (mut covariance, mut map_variance, mut ideal_variance) = (0.0, 0.0, 0.0);
+    for (m, n) in map.iter().zip(ideal) {
+        covariance += (m - map_mean) * (n - ideal_mean);
+        map_variance += (m - map_mean).powi(2);
+        ideal_variance += (n - ideal_mean).powi(2);
     }
-    // A map that is the same everywhere has no deviation but rounding.
-    let deviates = of_one > 1e-12 * count && of_other > 1e-12 * count;
-    deviates.then(|| both / (of_one * of_other).sqrt())
+    // The variance of a constant map is a rounding error.
+    let varies = map_variance > 1e-12 * count && ideal_variance > 1e-12 * count;
+    varies.then(|| covariance / (map_variance * ideal_variance).sqrt())
 }
 
-/// How many of the ways run into something, and how many there are.
+/// Number of paths that hit an obstacle, and number of paths.
 fn false_paths(
     shape: &GridShape,
     map: &[f64],
@@ -132,50 +131,50 @@ fn false_paths(
     let every = lattice.len().div_ceil(settings.most_starts.max(1)).max(1);
     let (mut hit, mut tried) = (0, 0);
     for (number, &start) in lattice.iter().enumerate().step_by(every) {
-        let ways = Ways::from(shape, &free, &wall, start);
-        // Each pair once, unless it begins at one of the chosen starts only.
+        let paths = ShortestPaths::from_start(shape, &free, &wall, start);
+        // Count each pair once, unless only its end is among the chosen starts.
         for (other, &end) in lattice.iter().enumerate() {
-            if other != number && (other > number || other % every != 0) && ways.reached[end] {
+            if other != number && (other > number || other % every != 0) && paths.reached[end] {
                 tried += 1;
-                hit += u64::from(ways.hits[end]);
+                hit += u64::from(paths.hits[end]);
             }
         }
     }
     (hit, tried)
 }
 
-/// Shortest ways from one cell to all others through free space, by sides and corners.
-struct Ways {
+/// Shortest paths from one cell to all others through free space, 8-connected (Dijkstra).
+struct ShortestPaths {
     reached: Vec<bool>,
-    /// Whether the way to a cell goes through an obstacle of the ideal map.
+    /// Whether the path to a cell crosses an obstacle of the ideal map.
     hits: Vec<bool>,
 }
 
-impl Ways {
-    fn from(shape: &GridShape, free: &[bool], wall: &[bool], start: usize) -> Self {
+impl ShortestPaths {
+    fn from_start(shape: &GridShape, free: &[bool], wall: &[bool], start: usize) -> Self {
         let mut cost = vec![u32::MAX; free.len()];
-        let mut ways = Self { reached: vec![false; free.len()], hits: vec![false; free.len()] };
+        let mut paths = Self { reached: vec![false; free.len()], hits: vec![false; free.len()] };
         let mut open = BinaryHeap::from([Reverse((0_u32, start))]);
         cost[start] = 0;
-        ways.hits[start] = wall[start];
+        paths.hits[start] = wall[start];
         while let Some(Reverse((so_far, at))) = open.pop() {
-            if std::mem::replace(&mut ways.reached[at], true) {
+            if std::mem::replace(&mut paths.reached[at], true) {
                 continue;
             }
             for (next, step) in neighbours(shape, at) {
                 let reached = so_far + step;
                 if free[next] && reached < cost[next] {
                     cost[next] = reached;
-                    ways.hits[next] = ways.hits[at] || wall[next];
+                    paths.hits[next] = paths.hits[at] || wall[next];
                     open.push(Reverse((reached, next)));
                 }
             }
         }
-        ways
+        paths
     }
 }
 
-/// The cells around one with the length of the step, in fifths of a cell's side.
+/// Neighbouring cells with the length of the step, in fifths of a cell's side.
 fn neighbours(shape: &GridShape, at: usize) -> impl Iterator<Item = (usize, u32)> {
     let (width, height) = (shape.width as i64, shape.height as i64);
     let (column, row) = (at as i64 % width, at as i64 / width);

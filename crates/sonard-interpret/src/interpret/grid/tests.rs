@@ -1,4 +1,4 @@
-//! Grids, their files and their scores.
+//! Grids, their files and scores.
 
 use super::{
     BeamModel, GaussianBeam, Grid, GridError, GridShape, ImageError, MapYaml, PathSettings,
@@ -20,8 +20,8 @@ fn gaussian() -> BeamModel {
 }
 
 /// One beam along +x from (1, 2).
-fn beam(heard: Heard) -> Sweep {
-    let beams = vec![Beam { azimuth_deg: 0.0, index: 0, heard, mount: DVec2::ZERO }];
+fn beam(outcome: Heard) -> Sweep {
+    let beams = vec![Beam { azimuth_deg: 0.0, index: 0, heard: outcome, mount: DVec2::ZERO }];
     let pose = Pose { x_m: 1.0, y_m: 2.0, heading_deg: 0.0 };
     Sweep { pose, step_deg: 25.0, beams, closed: false }
 }
@@ -31,7 +31,7 @@ fn at(grid: &Grid, x: f64, y: f64) -> f64 {
 }
 
 #[test]
-fn an_echo_frees_what_is_before_it_and_fills_what_is_there() {
+fn echo_frees_before_and_fills_at_range() {
     let extents =
         Extents::new(&Sensor::preset("senscomp-6500").expect("a preset"), &Air::default(), false)
             .expect("figures");
@@ -41,32 +41,32 @@ fn an_echo_frees_what_is_before_it_and_fills_what_is_there() {
         assert!(at(&grid, 2.0, 2.0) < 0.5, "free before");
         assert!(at(&grid, 3.0, 2.0) > 0.5, "occupied there");
         assert_eq!(at(&grid, 4.0, 2.0), 0.5, "unknown behind");
-        assert_eq!(at(&grid, 2.0, 3.0), 0.5, "unknown beside");
+        assert_eq!(at(&grid, 2.0, 3.0), 0.5, "unknown off the beam");
         assert_eq!(at(&grid, 0.5, 2.0), 0.5, "unknown at the back");
     }
 }
 
 #[test]
-fn doubted_readings_count_up_to_what_contradicts_them_only() {
+fn low_confidence_keeps_cleared_space() {
     let assessment = Assessment { confidence: 0.1, clear_m: Some(1.0) };
-    let mut believed = Grid::new(shape(5.0, 0.05));
-    believed.add(&beam(Heard::Echo(2.0)), None, &gaussian(), &Trust::default());
+    let mut trusted = Grid::new(shape(5.0, 0.05));
+    trusted.add(&beam(Heard::Echo(2.0)), None, &gaussian(), &Trust::default());
     let add = |trust: Trust| {
         let mut grid = Grid::new(shape(5.0, 0.05));
-        let left_out = grid.add(&beam(Heard::Echo(2.0)), Some(&[assessment]), &gaussian(), &trust);
-        (grid, left_out)
+        let discarded = grid.add(&beam(Heard::Echo(2.0)), Some(&[assessment]), &gaussian(), &trust);
+        (grid, discarded)
     };
     let (kept, _) = add(Trust { least_confidence: 0.0, keep_clear: true });
-    assert_eq!(at(&kept, 1.5, 2.0), at(&believed, 1.5, 2.0));
-    assert!(at(&kept, 2.5, 2.0) > at(&believed, 2.5, 2.0));
-    let (dropped, left_out) = add(Trust { least_confidence: 0.3, keep_clear: true });
-    assert_eq!((left_out, at(&dropped, 2.5, 2.0)), (1, 0.5));
+    assert_eq!(at(&kept, 1.5, 2.0), at(&trusted, 1.5, 2.0));
+    assert!(at(&kept, 2.5, 2.0) > at(&trusted, 2.5, 2.0));
+    let (dropped, discarded) = add(Trust { least_confidence: 0.3, keep_clear: true });
+    assert_eq!((discarded, at(&dropped, 2.5, 2.0)), (1, 0.5));
     let (without, _) = add(Trust { least_confidence: 0.3, keep_clear: false });
     assert_eq!(without, Grid::new(shape(5.0, 0.05)));
 }
 
 #[test]
-fn poses_outside_and_without_place_change_nothing_or_what_they_reach() {
+fn scans_from_outside_reach_in() {
     let mut grid = Grid::new(shape(5.0, 0.05));
     let mut outside = beam(Heard::Echo(2.0));
     outside.pose.x_m = -1.0;
@@ -79,7 +79,7 @@ fn poses_outside_and_without_place_change_nothing_or_what_they_reach() {
 }
 
 #[test]
-fn impossible_grids_are_refused() {
+fn invalid_grids_are_rejected() {
     let covering = |side_m: f64, resolution_m: f64| {
         GridShape::covering(DVec2::ZERO, DVec2::splat(side_m), resolution_m)
     };
@@ -96,7 +96,7 @@ fn impossible_grids_are_refused() {
 }
 
 #[test]
-fn a_grid_holds_its_lower_and_left_border_and_not_the_others() {
+fn lower_and_left_border_belong_to_a_grid() {
     let shape = GridShape::covering(DVec2::new(-1.0, 2.0), DVec2::new(1.0, 3.0), 0.5);
     let shape = shape.expect("a grid");
     let index = |x: f64, y: f64| shape.index_at(DVec2::new(x, y));
@@ -110,53 +110,54 @@ fn a_grid_holds_its_lower_and_left_border_and_not_the_others() {
     assert_eq!(shape.center(3, 1), DVec2::new(0.75, 2.75));
 }
 
-/// At a metre in cells of 5 cm: a wall through a nearer cell is heard in twice the half extent of half a turn, if it
-/// reaches there; at the reading one of the arc's cells is the wall.
+/// At a metre in cells of 5 cm, a wall through a nearer cell is detected in twice the half extent
+/// out of half a turn, if it reaches there. At the reading, one of the cells of the arc is the
+/// wall.
 #[test]
-fn a_physical_reading_says_what_its_figures_do() {
+fn physical_profile_is_closed_form() {
     let sensor = Sensor::preset("senscomp-6500").expect("a preset");
     let extents = Extents::new(&sensor, &Air::default(), false).expect("figures");
     let extent_deg = extents.plane_corner_deg(1.0, 1.0);
     let beam = PhysicalBeam::new(extents.clone(), 5.0);
     let model = BeamModel::Physical(Box::new(beam));
-    let said = model.say(1.0, 0.05);
-    assert!((said.half_rad - (extent_deg / 2.0).to_radians()).abs() < 1e-12);
-    assert!((said.free.exp() - (1.0 - 0.8 * extent_deg / 180.0)).abs() < 1e-12, "{said:?}");
-    // Over half the arc the cells share the wall that is there for sure, beside the tenth that is wall anyway.
+    let profile = model.profile(1.0, 0.05);
+    assert!((profile.half_rad - (extent_deg / 2.0).to_radians()).abs() < 1e-12);
+    assert!((profile.free.exp() - (1.0 - 0.8 * extent_deg / 180.0)).abs() < 1e-12, "{profile:?}");
+    // The wall is shared by the cells of half the arc, in addition to the prior of a tenth.
     let cells = (extent_deg / 2.0).to_radians() / 0.05;
     let here = 0.1 + 0.9 / cells;
     let odds = here / (1.0 - here) / (0.1 / 0.9);
-    assert!((said.occupied.exp() - odds).abs() < 1e-9, "{said:?} {odds}");
+    assert!((profile.occupied.exp() - odds).abs() < 1e-9, "{profile:?} {odds}");
     // In cells of a centimetre the ring is four thick.
     let fine = 0.1 + 0.9 / (cells * 5.0 * 4.0);
     let odds = fine / (1.0 - fine) / (0.1 / 0.9);
-    assert!((model.say(1.0, 0.01).occupied.exp() - odds).abs() < 1e-9);
+    assert!((model.profile(1.0, 0.01).occupied.exp() - odds).abs() < 1e-9);
     let widest_deg = extents.plane_corner_deg(extents.min_range_m, 1.0);
     assert!((model.width_deg() - widest_deg).abs() < 1e-9);
-    // Two standard deviations at its edge.
+    // Two standard deviations at the edge of the beam.
     let [free, occupied] = gaussian().off_axis(0.1, 0.1);
     assert_eq!((free, occupied), ((-2.0_f64).exp(), (-2.0_f64).exp()));
 }
 
 #[test]
-fn the_pair_of_files_gives_the_map_back() {
+fn pgm_and_yaml_round_trip() {
     let mut grid = Grid::new(shape(3.0, 0.05));
     grid.add(&beam(Heard::Echo(1.0)), None, &gaussian(), &Trust::default());
     let yaml = MapYaml::of(grid.shape(), "map.pgm");
     let read = MapYaml::from_text(&yaml.to_text()).expect("a description");
     assert_eq!(read, yaml);
     let back = from_pgm(&to_pgm(&grid), &read).expect("a map");
-    for (one, other) in grid.probabilities().zip(back.probabilities()) {
-        assert!((one - other).abs() < 1.0 / 255.0, "{one} {other}");
+    for (a, b) in grid.probabilities().zip(back.probabilities()) {
+        assert!((a - b).abs() < 1.0 / 255.0, "{a} {b}");
     }
-    // A comment and a line more, as other programs write them.
+    // A comment and another line break, as other programs write them.
     let pgm = to_pgm(&grid);
     let other = [b"P5\n# made by hand\n60 60 255\n".as_slice(), &pgm[13..]].concat();
     assert_eq!(from_pgm(&other, &read).map(|grid| *grid.shape()), Ok(*back.shape()));
 }
 
 #[test]
-fn what_map_saver_writes_for_unknown_is_unknown_unless_the_map_has_other_shades() {
+fn map_saver_unknown_is_recognized() {
     let yaml = MapYaml::of(&shape(0.3, 0.1), "map.pgm");
     let unknown = |pixels: &[u8; 9]| {
         let pgm = [b"P5\n3 3\n255\n", &pixels[..]].concat();
@@ -166,7 +167,7 @@ fn what_map_saver_writes_for_unknown_is_unknown_unless_the_map_has_other_shades(
     assert!((unknown(&[0, 230, 254, 254, 205, 205, 205, 0, 0]) - 0.196).abs() < 1e-3);
 }
 
-/// A description of three columns and one row.
+/// Description of three columns and one row.
 fn described(more: &str) -> MapYaml {
     let text = format!("image: a.pgm\nresolution: 0.1\norigin: [0, 0, 0]\n{more}");
     MapYaml::from_text(&text).expect("a description")
@@ -179,15 +180,15 @@ fn row(yaml: &MapYaml, shades: &[u8]) -> Vec<f64> {
 }
 
 #[test]
-fn cells_are_what_the_files_own_thresholds_make_of_them() {
+fn thresholds_of_the_file_apply() {
     let near = |yaml: &str, shades: &[u8], expected: &[f64]| {
         let found = row(&described(yaml), shades);
         assert!(
-            found.iter().zip(expected).all(|(is, should)| (is - should).abs() < 5e-3),
+            found.iter().zip(expected).all(|(found, expected)| (found - expected).abs() < 5e-3),
             "{yaml}: {found:?}"
         );
     };
-    // 205 is 0.19608, not below 0.196; one other shade changes nothing elsewhere.
+    // 205 is 0.19608, not below 0.196; a fourth shade does not affect other cells.
     near("", &[0, 205, 254, 150], &[1.0, 0.5, 0.0, 0.5]);
     near("free_thresh: 0.25", &[0, 205, 254], &[1.0, 0.5, 0.0]);
     near("free_thresh: 0.25", &[0, 205, 254, 150], &[1.0, 0.0, 0.0, 0.5]);
@@ -200,12 +201,12 @@ fn cells_are_what_the_files_own_thresholds_make_of_them() {
 }
 
 #[test]
-fn descriptions_are_yaml_in_any_style() {
+fn descriptions_are_any_yaml() {
     for text in [
         "image: a.pgm\nresolution: 0.05\norigin: [1.0, 2.0, 0.5]\n",
         "image: a.pgm\nmode: trinary\nresolution: 0.05\norigin:\n- 1.0\n- 2.0\n- 0.5\n",
         "{image: a.pgm, resolution: 0.05, origin: [1, 2, 0.5], negate: 0, occupied_thresh: 0.65}",
-        "\u{feff}# by hand\r\nimage: \"a.pgm\"  # beside\r\nresolution: 5e-2\r\norigin: [ 1., 2., 0.5 ]\r\n",
+        "\u{feff}# by hand\r\nimage: \"a.pgm\"  # relative\r\nresolution: 5e-2\r\norigin: [ 1., 2., 0.5 ]\r\n",
     ] {
         let read = MapYaml::from_text(text).expect(text);
         assert_eq!(
@@ -218,7 +219,7 @@ fn descriptions_are_yaml_in_any_style() {
 }
 
 #[test]
-fn plain_images_and_other_greatest_values_are_the_same_map() {
+fn plain_and_16_bit_images_decode() {
     let yaml = described("");
     let expected = row(&yaml, &[0, 205, 255]);
     for image in [
@@ -230,14 +231,14 @@ fn plain_images_and_other_greatest_values_are_the_same_map() {
         let found: Vec<f64> = from_pgm(image, &yaml).expect("a map").probabilities().collect();
         assert_eq!(found.len(), 3);
         assert!(
-            found.iter().zip(&expected).all(|(is, should)| (is - should).abs() < 5e-3),
+            found.iter().zip(&expected).all(|(found, expected)| (found - expected).abs() < 5e-3),
             "{found:?}"
         );
     }
     for (image, part) in [
         (&b"P6\n1 1\n255\n"[..], "convert"),
         (b"P2 3 1 255 0 1", "last pixel"),
-        (b"P2 3 1 0 0 1 2", "greatest"),
+        (b"P2 3 1 0 0 1 2", "maximum"),
     ] {
         let error = from_pgm(image, &yaml).expect_err(part).to_string();
         assert!(error.contains(part), "{error}");
@@ -245,7 +246,7 @@ fn plain_images_and_other_greatest_values_are_the_same_map() {
 }
 
 #[test]
-fn damaged_files_are_named() {
+fn damaged_files_are_rejected() {
     let grid = Grid::new(shape(1.0, 0.1));
     let (pgm, yaml) = (to_pgm(&grid), MapYaml::of(grid.shape(), "map.pgm"));
     for cut in 0..pgm.len() {
@@ -274,7 +275,7 @@ fn room() -> (Scene, Grid) {
 }
 
 #[test]
-fn ideal_maps_are_closed() {
+fn ideal_map_is_closed() {
     let (_, ideal) = room();
     assert_eq!(at(&ideal, -0.3, 1.0), 0.5, "outside is unknown");
     assert_eq!(at(&ideal, 3.0, 2.5), 0.5, "behind the ledge too");
@@ -285,7 +286,7 @@ fn ideal_maps_are_closed() {
 }
 
 #[test]
-fn cylinders_are_drawn_where_they_stand() {
+fn cylinders_are_rasterized() {
     let (center, radius_m) = (DVec2::new(1.02, 0.7), 0.4);
     let text = r#"{"name": "c", "materials": {"m": {"reflectance": 1}},
         "cylinders": [{"id": "c", "center": [1.02, 0.7], "radius_m": 0.4, "material": "m"},
@@ -305,12 +306,12 @@ fn cylinders_are_drawn_where_they_stand() {
     }
     let disc_m2 = std::f64::consts::PI * radius_m * radius_m;
     assert!((walls as f64 * 0.0025 - disc_m2).abs() < 0.03 * disc_m2, "{walls}");
-    // All around can be reached.
+    // All free space is reachable.
     assert!(map.probabilities().all(|p| p != 0.5));
 }
 
 #[test]
-fn the_ideal_map_is_perfect_and_an_unknown_one_is_scored_by_hand() {
+fn ideal_and_unknown_maps_are_scored() {
     let (_, ideal) = room();
     let perfect = score(&ideal, &ideal, &PathSettings::default()).expect("one shape");
     assert!((perfect.correlation_percent.expect("it varies") - 100.0).abs() < 1e-9);
@@ -319,18 +320,18 @@ fn the_ideal_map_is_perfect_and_an_unknown_one_is_scored_by_hand() {
     assert!(perfect.paths > 100);
 
     let unknown = Grid::new(*ideal.shape());
-    let blind = score(&unknown, &ideal, &PathSettings::default()).expect("one shape");
-    assert_eq!((blind.correlation_percent, blind.false_positive_paths_percent), (None, None));
+    let blank = score(&unknown, &ideal, &PathSettings::default()).expect("one shape");
+    assert_eq!((blank.correlation_percent, blank.false_positive_paths_percent), (None, None));
     let cells = ideal.shape().cells() as f64;
     let known = ideal.probabilities().filter(|p| *p != 0.5).count() as f64;
     let walls = ideal.probabilities().filter(|p| *p > 0.5).count() as f64;
-    assert!((blind.map_score_percent - 25.0 * known / cells).abs() < 0.1);
-    assert!((blind.map_score_occupied_percent - 25.0 * walls / cells).abs() < 0.01);
+    assert!((blank.map_score_percent - 25.0 * known / cells).abs() < 0.1);
+    assert!((blank.map_score_occupied_percent - 25.0 * walls / cells).abs() < 0.01);
 }
 
 #[test]
-fn ways_through_a_wall_that_the_map_lacks_are_false() {
-    // Two rooms of equal size; the map does not know the wall between them.
+fn paths_through_a_missing_wall_are_false() {
+    // Two rooms of equal size; the map lacks the wall between them.
     let shape = shape(4.0, 0.1);
     let cells = |wall: bool| -> Vec<f64> {
         (0..shape.cells())
@@ -341,17 +342,18 @@ fn ways_through_a_wall_that_the_map_lacks_are_false() {
     let map = Grid::of_probabilities(shape, &cells(false));
     let settings = PathSettings { spacing_m: 1.0, most_starts: 100, free_below: 0.45 };
     let found = score(&map, &ideal, &settings).expect("one shape");
-    // 16 places, 8 on each side: 120 pairs, 64 of them across.
+    // 16 points, 8 on each side: 120 pairs, 64 of them across.
     assert_eq!(found.paths, 120);
     assert!(
-        (found.false_positive_paths_percent.expect("ways") - 100.0 * 64.0 / 120.0).abs() < 1e-9
+        (found.false_positive_paths_percent.expect("paths") - 100.0 * 64.0 / 120.0).abs() < 1e-9
     );
 }
 
 #[test]
-fn maps_of_different_places_are_not_compared() {
-    let one = Grid::new(shape(1.0, 0.1));
-    let other = Grid::new(shape(2.0, 0.1));
-    let error = score(&one, &other, &PathSettings::default()).expect_err("they differ").to_string();
+fn different_shapes_are_not_compared() {
+    let small = Grid::new(shape(1.0, 0.1));
+    let large = Grid::new(shape(2.0, 0.1));
+    let error =
+        score(&small, &large, &PathSettings::default()).expect_err("they differ").to_string();
     assert!(error.contains("10x10") && error.contains("20x20"), "{error}");
 }

@@ -1,14 +1,14 @@
-//! The walls of a map: where occupied and free cells meet, traced and straightened.
+//! Walls of a map: boundaries between occupied and free cells, traced and simplified.
 
 use std::collections::HashMap;
 
 use super::{Grid, rows};
 use sonard_model::geometry::{DVec2, distance_to_segment, enclosed_area};
 
-/// A line along walls, free space on its left.
+/// Polyline along walls, with free space on its left.
 #[derive(Debug, Clone, PartialEq)]
 pub struct WallLine {
-    /// Its corners, metres.
+    /// Corners, metres.
     pub corners: Vec<DVec2>,
     /// Whether a wall leads from the last corner back to the first.
     pub is_closed: bool,
@@ -21,20 +21,20 @@ pub struct TraceSettings {
     pub occupied: f64,
     /// Cells below this probability are free.
     pub free: f64,
-    /// Cells between occupied and free ones that are neither and are taken for free, at most, one behind the other: in
-    /// a sonar's map what is free fades out before walls.
+    /// Maximum number of consecutive undecided cells between occupied and free ones that count as
+    /// free: in a sonar map, free space fades out before walls.
     pub gap_cells: usize,
-    /// How far a cell's side may be off the wall that stands for it, metres: less than the root of two cells leaves steps
-    /// of walls that do not run along the rows.
+    /// Maximum distance of a cell side from the wall that represents it, metres. Less than the
+    /// diagonal of a cell leaves steps in walls that do not run along the rows.
     pub tolerance_m: f64,
-    /// Lines shorter than this are left out, metres: specks.
+    /// Minimum length of a line, metres; shorter ones are specks.
     pub least_m: f64,
-    /// Keep walls along the rows and columns of the cells where they are: only stairs become slanting walls.
+    /// Keep walls along rows and columns of cells in place: only stairs become slanting walls.
     pub keeps_rows: bool,
 }
 
 impl TraceSettings {
-    /// For a map of cells of this size.
+    /// Settings for a map with cells of this size.
     #[must_use]
     pub const fn of_cells(resolution_m: f64) -> Self {
         Self {
@@ -48,13 +48,14 @@ impl TraceSettings {
     }
 }
 
-/// A corner of cells: column and row of the cell that it is the lower left corner of.
+/// Corner of cells: column and row of the cell of which it is the lower left corner.
 pub(super) type Node = (i64, i64);
 
-/// The walls of a map.
+/// Traces the walls of a map.
 ///
-/// A wall is a boundary between cells that are occupied and cells that are free; where nothing is known behind a wall, it
-/// has one face. Occupied cells that touch by a corner hang together. The lines are straightened by the way of Douglas and Peucker.
+/// A wall is a boundary between occupied and free cells; with unknown cells behind it, it has a
+/// single face. Occupied cells that touch at a corner are connected. Lines are simplified with the
+/// Douglas-Peucker algorithm.
 #[must_use]
 pub fn trace(grid: &Grid, settings: &TraceSettings) -> Vec<WallLine> {
     let shape = grid.shape();
@@ -71,7 +72,7 @@ pub fn trace(grid: &Grid, settings: &TraceSettings) -> Vec<WallLine> {
             (false, false) => straightened(&points, settings.tolerance_m),
         };
         let length_m = (points.len() - usize::from(!is_closed)) as f64 * shape.resolution_m;
-        // Of a ring that is thinner than the tolerance nothing is left that encloses anything: it is a line.
+        // A ring thinner than the tolerance degenerates to a line without area.
         let is_ring = is_closed && line.len() > 2 && enclosed_area(&line) != 0.0;
         (length_m >= settings.least_m && line.len() > 1)
             .then_some(WallLine { corners: line, is_closed: is_ring })
@@ -79,7 +80,7 @@ pub fn trace(grid: &Grid, settings: &TraceSettings) -> Vec<WallLine> {
     lines.collect()
 }
 
-/// The sides of cells with an occupied cell on the right and a free one on the left, from node to node.
+/// Cell sides with an occupied cell on the right and a free one on the left, from node to node.
 fn sides(grid: &Grid, settings: &TraceSettings) -> Vec<(Node, Node)> {
     let shape = grid.shape();
     let (width, height) = (shape.width as i64, shape.height as i64);
@@ -92,21 +93,21 @@ fn sides(grid: &Grid, settings: &TraceSettings) -> Vec<(Node, Node)> {
     for row in 0..height {
         for column in (0..width).filter(|column| is_occupied((*column, row))) {
             let (left, right, below, above) = (column, column + 1, row, row + 1);
-            // Clockwise round the occupied cell, so that it is on the right.
+            // Clockwise around the occupied cell, so that it is on the right.
             let round = [
                 ((column - 1, row), (left, below), (left, above)),
                 ((column, row + 1), (left, above), (right, above)),
                 ((column + 1, row), (right, above), (right, below)),
                 ((column, row - 1), (right, below), (left, below)),
             ];
-            let beside_free = round.into_iter().filter(|(beside, ..)| is_free(*beside));
-            sides.extend(beside_free.map(|(_, from, to)| (from, to)));
+            let free_sides = round.into_iter().filter(|(neighbour, ..)| is_free(*neighbour));
+            sides.extend(free_sides.map(|(_, from, to)| (from, to)));
         }
     }
     sides
 }
 
-/// Of each cell whether it is free, or so few cells behind a free one without an occupied one between.
+/// Marks free cells, and undecided ones within `gap_cells` of a free one with no occupied between.
 fn free_cells(grid: &Grid, settings: &TraceSettings) -> Vec<bool> {
     let (width, cells) = (grid.shape().width, grid.shape().cells());
     let mut is_free: Vec<bool> =
@@ -116,17 +117,17 @@ fn free_cells(grid: &Grid, settings: &TraceSettings) -> Vec<bool> {
         let mut next = Vec::new();
         for cell in edge {
             let (column, row) = (cell % width, cell / width);
-            // Not by corners: walls of cells that touch by theirs have no holes.
-            let beside = [
+            // 4-connected: walls of cells that touch at corners have no holes.
+            let neighbours = [
                 (column > 0).then(|| cell - 1),
                 (column + 1 < width).then_some(cell + 1),
                 (row > 0).then(|| cell - width),
                 Some(cell + width).filter(|above| *above < cells),
             ];
-            for beside in beside.into_iter().flatten() {
-                if !is_free[beside] && grid.probability(beside) <= settings.occupied {
-                    is_free[beside] = true;
-                    next.push(beside);
+            for near in neighbours.into_iter().flatten() {
+                if !is_free[near] && grid.probability(near) <= settings.occupied {
+                    is_free[near] = true;
+                    next.push(near);
                 }
             }
         }
@@ -135,7 +136,7 @@ fn free_cells(grid: &Grid, settings: &TraceSettings) -> Vec<bool> {
     is_free
 }
 
-/// Sides joined end to end: nodes in their order, and whether the last is joined to the first.
+/// Joins sides end to end: ordered nodes, and whether the last connects to the first.
 fn chains(sides: &[(Node, Node)]) -> Vec<(Vec<Node>, bool)> {
     let mut leaving: HashMap<Node, Vec<usize>> = HashMap::new();
     let mut arriving: HashMap<Node, usize> = HashMap::new();
@@ -143,7 +144,7 @@ fn chains(sides: &[(Node, Node)]) -> Vec<(Vec<Node>, bool)> {
         leaving.entry(*from).or_default().push(index);
         *arriving.entry(*to).or_default() += 1;
     }
-    // Lines that begin somewhere are followed from there, rings from anywhere.
+    // Open lines are followed from their start, rings from anywhere.
     let is_start = |side: &(Node, Node)| {
         let (out, into) = (leaving[&side.0].len(), arriving.get(&side.0).copied().unwrap_or(0));
         out > into
@@ -178,12 +179,12 @@ fn chains(sides: &[(Node, Node)]) -> Vec<(Vec<Node>, bool)> {
     all
 }
 
-/// 1 to the left, 0 straight on, -1 to the right.
+/// Returns 1 for a left turn, 0 straight on, -1 for a right turn.
 fn turn(from: Node, at: Node, to: Node) -> i64 {
     ((at.0 - from.0) * (to.1 - at.1) - (at.1 - from.1) * (to.0 - at.0)).signum()
 }
 
-/// A ring, cut where it is widest, each half by itself.
+/// Simplifies a ring, cut at its widest into two halves.
 fn straightened_ring(points: &[DVec2], tolerance_m: f64) -> Vec<DVec2> {
     let middle = points.iter().sum::<DVec2>() / points.len() as f64;
     let farthest = |from: DVec2| {
@@ -194,17 +195,16 @@ fn straightened_ring(points: &[DVec2], tolerance_m: f64) -> Vec<DVec2> {
     };
     let first = farthest(middle);
     let turned: Vec<DVec2> = points[first..].iter().chain(&points[..=first]).copied().collect();
-    let other = farthest(points[first]);
-    let other = (other + points.len() - first) % points.len();
-    let mut ring = straightened(&turned[..=other], tolerance_m);
+    let opposite = farthest(points[first]);
+    let opposite = (opposite + points.len() - first) % points.len();
+    let mut ring = straightened(&turned[..=opposite], tolerance_m);
     ring.pop();
-    ring.extend(straightened(&turned[other..], tolerance_m));
+    ring.extend(straightened(&turned[opposite..], tolerance_m));
     ring.pop();
     ring
 }
 
-/// The fewest of the points, ends among them, that no point is farther from than the tolerance (Douglas and Peucker's
-/// way of finding them).
+/// Simplifies a polyline with the Douglas-Peucker algorithm, ends included.
 fn straightened(points: &[DVec2], tolerance_m: f64) -> Vec<DVec2> {
     let mut is_kept = vec![false; points.len()];
     let Some(last) = points.len().checked_sub(1) else { return Vec::new() };
@@ -241,7 +241,7 @@ mod tests {
     }
 
     #[test]
-    fn a_turned_room_with_a_box_is_found_again_to_a_cell() {
+    fn rotated_room_with_box_is_traced() {
         let turn = DVec2::from_angle(0.3);
         let turned =
             |corners: [[f64; 2]; 4]| corners.map(|corner| turn.rotate(corner.into()).into());
@@ -276,7 +276,7 @@ mod tests {
     }
 
     #[test]
-    fn a_wall_of_cells_that_touch_by_corners_has_no_holes_and_the_unknown_no_walls() {
+    fn diagonals_have_no_holes() {
         let shape = GridShape::covering(DVec2::ZERO, DVec2::splat(5.0), 1.0).expect("a grid");
         let mut cells = vec![0.0; 25];
         for at in 0..5 {
@@ -287,14 +287,14 @@ mod tests {
         let lines = trace(&Grid::of_probabilities(shape, &cells), &settings);
         // One line above the diagonal and one below.
         assert_eq!(lines.len(), 2, "{lines:#?}");
-        // Beside a wall nothing is known but on one side.
+        // A wall with unknown cells on one side has a single face.
         let mut cells = vec![0.5; 25];
         cells[10..15].fill(1.0);
         cells[15..25].fill(0.0);
         let lines = trace(&Grid::of_probabilities(shape, &cells), &settings);
         assert_eq!(lines.len(), 1);
         assert_eq!(lines[0].corners, [DVec2::new(0.0, 3.0), DVec2::new(5.0, 3.0)]);
-        // What fades out before a wall is free; what fades out farther away is no wall's.
+        // Cells that fade out before a wall are free; those fading farther away belong to no wall.
         let mut cells = vec![0.5; 25];
         cells[20..25].fill(1.0);
         cells[5..10].fill(0.2);
@@ -302,7 +302,7 @@ mod tests {
         cells[5..10].fill(0.5);
         cells[..5].fill(0.2);
         assert_eq!(trace(&Grid::of_probabilities(shape, &cells), &settings), []);
-        // A speck is left out where it is asked for.
+        // Specks are dropped on request.
         let mut cells = vec![0.0; 25];
         cells[12] = 1.0;
         let grid = Grid::of_probabilities(shape, &cells);

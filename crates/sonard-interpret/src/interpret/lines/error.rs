@@ -1,4 +1,4 @@
-//! How far a line map is from the walls.
+//! Error measures of a line map against the true walls.
 
 use serde::Serialize;
 
@@ -8,14 +8,14 @@ use sonard_model::{
     scene::Scene,
 };
 
-/// No distance counts as more than this, metres: a wall that is missing is no worse for being in a
-/// large room.
+/// Cap on every distance, metres: a missing wall counts the same in a large room as in a small
+/// one.
 pub const MOST_ERROR_M: f64 = 0.5;
 
-/// Lines are sampled at this distance, metres.
+/// Sampling distance along lines, metres.
 const SAMPLE_M: f64 = 0.02;
 
-/// Errors of a line map, metres. Each distance counts up to [`MOST_ERROR_M`].
+/// Errors of a line map, metres. Each distance is capped at [`MOST_ERROR_M`].
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct MapError {
     /// Mean of the line and the endpoint error.
@@ -24,18 +24,18 @@ pub struct MapError {
     pub line_error_m: f64,
     /// Mean of `false_end_m` and `missing_end_m`.
     pub endpoint_error_m: f64,
-    /// How far the map's lines are from walls, the mean over their length.
+    /// Mean distance of the map's lines from walls, over their length.
     pub false_m: f64,
-    /// How far the walls are from the map's lines, the mean over their length.
+    /// Mean distance of the walls from the map's lines, over their length.
     pub missing_m: f64,
-    /// How far the ends of the map's lines are from ends of walls.
+    /// Mean distance of the ends of the map's lines from ends of walls.
     pub false_end_m: f64,
-    /// How far the ends of walls are from ends of the map's lines.
+    /// Mean distance of the ends of walls from ends of the map's lines.
     pub missing_end_m: f64,
 }
 
-/// Sets a line map beside all walls of a scene. A cylinder counts where lines are too far from any
-/// wall, but has no ends and can't be missing.
+/// Compares a line map with all walls of a scene. Cylinders count as obstacles near a line, but
+/// have no ends and can't be missing.
 #[must_use]
 pub fn map_error(lines: &[MapLine], scene: &Scene) -> MapError {
     let of_lines: Vec<[DVec2; 2]> = lines.iter().map(|line| line.ends).collect();
@@ -69,7 +69,7 @@ fn nearest(segments: &[[DVec2; 2]], distance_m: impl Fn(&[DVec2; 2]) -> f64) -> 
     segments.iter().map(distance_m).fold(f64::INFINITY, f64::min)
 }
 
-/// Mean distance over the length of all segments.
+/// Mean capped distance over the length of all segments.
 fn mean_along(segments: &[[DVec2; 2]], distance_m: impl Fn(DVec2) -> f64) -> f64 {
     mean(segments.iter().flat_map(|[a, b]| {
         let parts = (a.distance(*b) / SAMPLE_M).ceil().max(1.0);
@@ -80,7 +80,7 @@ fn mean_along(segments: &[[DVec2; 2]], distance_m: impl Fn(DVec2) -> f64) -> f64
     }))
 }
 
-/// Mean of distances with weights, each at most [`MOST_ERROR_M`]; that, where there is none.
+/// Weighted mean of distances capped at [`MOST_ERROR_M`]; the cap itself if there is none.
 fn mean(distances: impl Iterator<Item = (f64, f64)>) -> f64 {
     let add = |(sum, whole): (f64, f64), (weight, distance_m): (f64, f64)| {
         (sum + weight * distance_m.min(MOST_ERROR_M), whole + weight)

@@ -2,14 +2,14 @@
 
 use sonard_model::geometry::DVec2;
 
-/// Settings of the fit of segments.
+/// Settings of the segment fit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FitSettings {
-    /// A point may be this far from its segment, metres.
+    /// Maximum distance of a point from its segment, metres.
     pub tolerance_m: f64,
-    /// A segment has at least so many points.
+    /// Minimum number of points of a segment.
     pub least_points: usize,
-    /// And at least this length, metres.
+    /// Minimum length of a segment, metres.
     pub least_length_m: f64,
 }
 
@@ -19,24 +19,24 @@ impl Default for FitSettings {
     }
 }
 
-/// A fitted segment.
+/// Segment fitted to points.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Segment {
-    /// Its ends, in the order of the points.
+    /// End points, in the order of the points.
     pub ends: [DVec2; 2],
-    /// Confidence from 0 to 1: `(1 - rms / tolerance) (1 - 2 / n)` for n points that are off by
+    /// Confidence from 0 to 1: `(1 - rms / tolerance) (1 - 2 / n)` for n points with deviation
     /// `rms`. The paper's own measure is in a report that it only cites.
     pub confidence: f64,
-    /// The first of the points it stands on, counted among those that are finite.
+    /// Index of the first supporting point, counted among the finite ones.
     pub from: usize,
-    /// How many points it stands on.
+    /// Number of supporting points.
     pub points: usize,
 }
 
-/// Fits segments to points in the order in which they lie along the walls (a scan's order).
+/// Fits segments to points in their order along the walls (the order of a scan).
 ///
-/// Split: a run whose farthest point from the line through its ends is off by more than the
-/// tolerance is cut there. Merge: neighbouring runs that one line fits are put together.
+/// Split: a run is cut at the point farthest from the line through its ends, if that deviates by
+/// more than the tolerance. Merge: neighbouring runs that fit a common line are joined.
 #[must_use]
 pub fn fit(points: &[DVec2], settings: &FitSettings) -> Vec<Segment> {
     let points: Vec<DVec2> = points.iter().copied().filter(|point| point.is_finite()).collect();
@@ -49,7 +49,7 @@ pub fn fit(points: &[DVec2], settings: &FitSettings) -> Vec<Segment> {
         .collect()
 }
 
-/// Notes where runs begin, in rising order.
+/// Collects the start indices of runs, in ascending order.
 fn split(points: &[DVec2], from: usize, settings: &FitSettings, cuts: &mut Vec<usize>) {
     let (Some(&first), Some(&last)) = (points.first(), points.last()) else { return };
     let along = (last - first).normalize_or_zero();
@@ -68,7 +68,7 @@ fn split(points: &[DVec2], from: usize, settings: &FitSettings, cuts: &mut Vec<u
     }
 }
 
-/// Runs from the cuts; neighbours that one line fits are one.
+/// Runs between the cuts; neighbours that fit a common line are joined.
 fn join(points: &[DVec2], cuts: &[usize], settings: &FitSettings) -> Vec<(usize, usize)> {
     let ends = cuts.iter().skip(1).copied().chain([points.len()]);
     let mut runs: Vec<(usize, usize)> = Vec::new();
@@ -107,7 +107,7 @@ fn segment(points: &[DVec2], from: usize, settings: &FitSettings) -> Option<Segm
     })
 }
 
-/// The line from which the squared distances are least: its middle and direction.
+/// Total-least-squares line: centroid and direction.
 fn line(points: &[DVec2]) -> (DVec2, DVec2) {
     let count = points.len().max(1) as f64;
     let middle = points.iter().sum::<DVec2>() / count;
@@ -118,6 +118,6 @@ fn line(points: &[DVec2]) -> (DVec2, DVec2) {
         xy += off.x * off.y;
         yy += off.y * off.y;
     }
-    // The main axis of the scatter is at half the angle of its second moment.
+    // The principal axis is at half the angle of the second moment.
     (middle, DVec2::from_angle((2.0 * xy).atan2(xx - yy) / 2.0))
 }

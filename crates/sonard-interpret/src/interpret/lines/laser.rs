@@ -1,4 +1,4 @@
-//! Segments of a laser scan, and which of their ends are the ends of what stands there.
+//! Segments of a laser scan, and confirmation of their ends.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -10,42 +10,42 @@ use sonard_model::geometry::{DVec2, Pose, wrap_360};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LaserScan {
-    /// Where it stood; azimuth 0 is its heading.
+    /// Pose of the laser; azimuth 0 is the heading.
     pub pose: Pose,
-    /// Its readings, counter-clockwise.
+    /// Readings, counter-clockwise.
     pub returns: Vec<LaserReturn>,
 }
 
-/// One reading of a laser.
+/// Reading of a laser scan.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LaserReturn {
-    /// Degrees counter-clockwise from the heading.
+    /// Azimuth, degrees counter-clockwise from the heading.
     pub azimuth_deg: f64,
-    /// Distance, metres; `null` where nothing came back.
+    /// Distance, metres; `null` without a return.
     pub range_m: Option<f64>,
 }
 
-/// So many readings beyond a segment's end say what is there.
+/// Number of readings beyond the end of a segment that are evaluated.
 const BEYOND: usize = 6;
-/// What is so much farther or nearer than the segment's line is something else, metres.
+/// Range difference from the line of a segment that indicates another object, metres.
 const JUMP_M: f64 = 0.10;
-/// Segments whose ends are so close meet in a corner, metres.
+/// Maximum distance between ends of segments that form a corner, metres.
 const CORNER_M: f64 = 0.10;
-/// And turn by at least this angle there, degrees.
+/// Minimum angle between the segments of a corner, degrees.
 const CORNER_DEG: f64 = 20.0;
 
 impl LaserScan {
-    /// Place of a reading in the world, metres; `None` for one without a range that can be.
+    /// World position of a reading, metres; `None` without a valid range.
     fn point(&self, at: usize) -> Option<DVec2> {
         let LaserReturn { azimuth_deg, range_m } = self.returns[at];
         let range_m = range_m.filter(|range_m| range_m.is_finite() && *range_m > 0.0)?;
         Some(self.pose.point_at(azimuth_deg, range_m)).filter(|point| point.is_finite())
     }
 
-    /// The segments seen nearer than the logical distance. An end is terminal if two segments meet
-    /// there in a corner, or if the readings beyond it come from farther away. It is not where the
-    /// field of view ends, or where something nearer hides the rest.
+    /// Segments within the logical distance. An end is terminal if two segments form a corner
+    /// there, or if the readings beyond it are farther away. It is not where the field of view
+    /// ends, or where something nearer hides the rest.
     #[must_use]
     pub fn lines(&self, settings: &LineMapSettings) -> Vec<MapLine> {
         let robot = self.pose.position();
@@ -74,14 +74,14 @@ impl LaserScan {
             }
         }
         join_corners(&mut lines);
-        // A bit between two corners that are one has nothing left.
+        // A short piece between two corners that coincide has no length left.
         lines.retain(|line| line.length_m() >= settings.laser.least_length_m);
         lines
     }
 
-    /// Whether the laser saw through a point, which is nearer than `reach_m`, to what is farther
-    /// away by more than `margin_m`. That is the paper's triangle between the robot and a segment,
-    /// for any shape of what was seen.
+    /// Returns `true` if the laser saw through a point within `reach_m` to something farther away
+    /// by more than `margin_m`. That generalizes the paper's triangle between the robot and a
+    /// segment to any shape.
     #[must_use]
     pub fn clears(&self, point: DVec2, reach_m: f64, margin_m: f64) -> bool {
         let off = point - self.pose.position();
@@ -91,16 +91,17 @@ impl LaserScan {
         }
         let turn_deg = off.to_angle().to_degrees() - self.pose.heading_deg - first.azimuth_deg;
         let azimuth_deg = first.azimuth_deg + wrap_360(turn_deg);
-        let next = self.returns.partition_point(|one| one.azimuth_deg < azimuth_deg);
-        let is_farther =
-            |one: &LaserReturn| one.range_m.is_none_or(|range_m| range_m > distance_m + margin_m);
+        let next = self.returns.partition_point(|reading| reading.azimuth_deg < azimuth_deg);
+        let is_farther = |reading: &LaserReturn| {
+            reading.range_m.is_none_or(|range_m| range_m > distance_m + margin_m)
+        };
         match self.returns.get(next.saturating_sub(1)..=next) {
             Some(around) if next > 0 => around.iter().all(is_farther),
             _ => false,
         }
     }
 
-    /// Whether most of the readings beyond one are from behind the line through `ends`.
+    /// Returns `true` if most readings beyond reading `at` are behind the line through `ends`.
     fn is_border(&self, at: usize, upwards: bool, ends: [DVec2; 2]) -> bool {
         let beyond = (1..=BEYOND).filter_map(|step| match upwards {
             true => Some(at + step).filter(|place| *place < self.returns.len()),
@@ -111,7 +112,7 @@ impl LaserScan {
         behind.len() == BEYOND && 2 * count > BEYOND
     }
 
-    /// Whether a reading is from behind a line that goes through the reading `known`.
+    /// Returns `true` if a reading is behind a line that passes through the reading `known`.
     fn is_behind(&self, at: usize, known: usize, [a, b]: [DVec2; 2]) -> bool {
         let LaserReturn { azimuth_deg, range_m } = self.returns[at];
         let Some(range_m) = range_m else { return true };
@@ -127,20 +128,20 @@ impl LaserScan {
     }
 }
 
-/// Lets segments whose ends meet at an angle end in the crossing of their lines.
+/// Extends segments whose ends form a corner to the intersection of their lines.
 fn join_corners(lines: &mut [MapLine]) {
-    for one in 1..lines.len() {
-        for other in 0..one {
+    for first in 1..lines.len() {
+        for second in 0..first {
             let pairs = [0, 1].into_iter().flat_map(|i| [0, 1].map(|j| (i, j)));
             for (i, j) in pairs {
-                let (a, b) = (lines[one].ends[i], lines[other].ends[j]);
-                let Some(corner) = lines[one].meets(&lines[other], CORNER_DEG) else { continue };
+                let (a, b) = (lines[first].ends[i], lines[second].ends[j]);
+                let Some(corner) = lines[first].meets(&lines[second], CORNER_DEG) else { continue };
                 if a.distance(b) < CORNER_M
                     && a.distance(corner) < CORNER_M
                     && b.distance(corner) < CORNER_M
                 {
-                    (lines[one].ends[i], lines[other].ends[j]) = (corner, corner);
-                    (lines[one].terminal[i], lines[other].terminal[j]) = (true, true);
+                    (lines[first].ends[i], lines[second].ends[j]) = (corner, corner);
+                    (lines[first].terminal[i], lines[second].terminal[j]) = (true, true);
                 }
             }
         }

@@ -1,4 +1,4 @@
-//! A map of lines that grows with every scan.
+//! Line map built incrementally from sonar and laser scans.
 
 use super::{FitSettings, LaserScan, LineKind, MapLine, MergeSettings, clusters, fit, merge};
 use crate::interpret::{Heard, Sweep};
@@ -7,31 +7,31 @@ use sonard_model::geometry::DVec2;
 /// Settings of a line map.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LineMapSettings {
-    /// Sonar readings beyond this "logical" distance are left out, metres.
+    /// "Logical" distance beyond which sonar readings are discarded, metres.
     pub logical_m: f64,
-    /// Radius of the circle around the robot in which objects are reliably known, metres.
+    /// Radius around the robot within which objects are reliably detected, metres.
     pub known_m: f64,
-    /// A later reading in such a circle contradicts it if it is farther than this from all that
-    /// was known there, metres.
+    /// Distance from everything detected within such a circle at which a later reading in it is
+    /// contradicted, metres.
     pub contradicts_m: f64,
-    /// Least radius of a sonar reading's circle of influence, metres.
+    /// Minimum radius of a sonar reading's circle of influence, metres.
     pub sonar_radius_m: f64,
-    /// The same of a laser reading, metres. The paper needs none, its readings being close to
-    /// each other; but noise makes pairs of readings that are closer still.
+    /// Minimum radius of a laser reading's circle of influence, metres. The paper needs none,
+    /// since its readings are dense; but noise produces pairs of readings that are closer still.
     pub laser_radius_m: f64,
-    /// Laser readings beyond this are too noisy for segments, metres.
+    /// Maximum range of laser readings for segments, metres; beyond it they are too noisy.
     pub laser_logical_m: f64,
-    /// Leave out sonar readings from behind what the laser saw, which the paper keeps, being of no
-    /// use to a robot before the wall.
+    /// Discard sonar readings from behind what the laser detected. The paper keeps them, but
+    /// they are of no use to a robot in front of the wall.
     pub opaque: bool,
-    /// A sonar line that a laser contradicts along so much of its length is dropped whole, and what
-    /// is left of one after a cut is kept from this length on, metres.
+    /// Contradicted length from which a sonar line is dropped entirely, and minimum length of
+    /// the remainder of a cut line, metres.
     pub least_rest_m: f64,
-    /// How sonar segments are fitted.
+    /// Fit of sonar segments.
     pub sonar: FitSettings,
-    /// How laser segments are fitted.
+    /// Fit of laser segments.
     pub laser: FitSettings,
-    /// Which lines are merged.
+    /// Merging of lines.
     pub merge: MergeSettings,
 }
 
@@ -53,38 +53,38 @@ impl Default for LineMapSettings {
     }
 }
 
-/// A map of lines.
+/// Map of line segments.
 #[derive(Debug, Clone, Default)]
 pub struct LineMap {
     settings: LineMapSettings,
     lines: Vec<MapLine>,
-    /// Places where the robot was, with the readings close to it there.
+    /// Past robot positions, each with the readings close to it.
     known: Vec<(DVec2, Vec<DVec2>)>,
-    /// What the laser saw: up to there nothing stands.
+    /// Laser scans: free space up to their readings.
     views: Vec<LaserScan>,
-    /// The segments in it: nothing can be sensed through them.
+    /// Laser segments, opaque to sonar.
     screens: Vec<[DVec2; 2]>,
 }
 
 impl LineMap {
-    /// An empty map.
+    /// Empty map.
     #[must_use]
     pub fn new(settings: LineMapSettings) -> Self {
         Self { settings, ..Self::default() }
     }
 
-    /// Its lines.
+    /// Line segments of the map.
     #[must_use]
     pub fn lines(&self) -> &[MapLine] {
         &self.lines
     }
 
-    /// Its lines, to confirm their ends.
+    /// Mutable line segments, to confirm their ends.
     pub fn lines_mut(&mut self) -> &mut [MapLine] {
         &mut self.lines
     }
 
-    /// Adds a sonar scan; returns how many readings the three rules left out.
+    /// Adds a sonar scan and returns the number of readings discarded by the three rules.
     pub fn add_sonar(&mut self, sweep: &Sweep) -> usize {
         let robot = sweep.pose.position();
         let echoes: Vec<DVec2> = sweep
@@ -96,16 +96,16 @@ impl LineMap {
             })
             .collect();
         let kept: Vec<DVec2> =
-            echoes.iter().copied().filter(|point| self.may_be(robot, *point)).collect();
+            echoes.iter().copied().filter(|point| self.is_plausible(robot, *point)).collect();
         let is_close = |point: &DVec2| point.distance(robot) <= self.settings.known_m;
         let close: Vec<DVec2> = kept.iter().copied().filter(is_close).collect();
         self.cut_around(robot, &close);
         self.known.push((robot, close));
-        let (fitted, radius_m) = (self.settings.sonar, self.settings.sonar_radius_m);
+        let (fit_settings, radius_m) = (self.settings.sonar, self.settings.sonar_radius_m);
         for cluster in clusters(&kept, radius_m) {
             let points: Vec<DVec2> = cluster.iter().map(|at| kept[*at]).collect();
-            for segment in fit(&points, &fitted) {
-                self.take_in(MapLine {
+            for segment in fit(&points, &fit_settings) {
+                self.insert(MapLine {
                     ends: segment.ends,
                     terminal: [false; 2],
                     kind: LineKind::Sonar,
@@ -117,21 +117,21 @@ impl LineMap {
         echoes.len() - kept.len()
     }
 
-    /// Adds what a laser saw; returns its segments.
+    /// Adds a laser scan and returns its segments.
     pub fn add_laser(&mut self, scan: &LaserScan) -> Vec<MapLine> {
         let seen = scan.lines(&self.settings);
         for line in &seen {
             self.screens.push(line.ends);
-            self.take_in(*line);
+            self.insert(*line);
         }
         self.views.push(scan.clone());
         self.cut_cleared(scan);
         seen
     }
 
-    /// The three rules: not beyond the logical distance, not against what is known around a place
-    /// where the robot was, not between the laser and what it saw; and not behind that either.
-    fn may_be(&self, robot: DVec2, point: DVec2) -> bool {
+    /// Applies the three rules: within the logical distance, consistent with readings around an
+    /// earlier robot position, and not in space cleared by the laser, nor behind its segments.
+    fn is_plausible(&self, robot: DVec2, point: DVec2) -> bool {
         let LineMapSettings { logical_m, known_m, contradicts_m, .. } = self.settings;
         let known = |(place, objects): &(DVec2, Vec<DVec2>)| {
             place.distance(point) < known_m
@@ -143,14 +143,14 @@ impl LineMap {
             && !self.is_cleared(robot, point)
     }
 
-    /// Whether the laser saw that nothing is at a point, or that it can't be sensed from a place.
+    /// Returns `true` if the laser cleared a point, or if it is hidden from a position.
     fn is_cleared(&self, from: DVec2, point: DVec2) -> bool {
         let LineMapSettings { contradicts_m, opaque, laser_logical_m, .. } = self.settings;
         self.views.iter().any(|view| view.clears(point, laser_logical_m, contradicts_m))
             || opaque && self.is_hidden(from, point)
     }
 
-    /// Whether a laser's segment, or a line confirmed at both ends, stands between two points.
+    /// Returns `true` if a laser segment or a line confirmed at both ends lies between two points.
     fn is_hidden(&self, from: DVec2, point: DVec2) -> bool {
         let is_whole = |line: &&MapLine| line.kind != LineKind::Sonar && line.terminal == [true; 2];
         let whole = self.lines.iter().filter(is_whole).map(|line| line.ends);
@@ -158,7 +158,7 @@ impl LineMap {
         screens.any(|screen| hides(screen, from, point, self.settings.contradicts_m))
     }
 
-    /// Cuts out of the sonar lines what the laser contradicts, now that it has seen this too.
+    /// Cuts out of the sonar lines everything that the latest laser scan contradicts.
     fn cut_cleared(&mut self, latest: &LaserScan) {
         let LineMapSettings { contradicts_m, laser_logical_m, least_rest_m, .. } = self.settings;
         let is_absent = |point| latest.clears(point, laser_logical_m, contradicts_m);
@@ -170,39 +170,39 @@ impl LineMap {
                 (absent + usize::from(is_absent(point)), count + 1)
             });
             let is_contradicted = absent as f64 * line.length_m() >= least_rest_m * count as f64;
-            if is_contradicted || self.is_told(line) {
+            if is_contradicted || self.is_redundant(line) {
                 return Vec::new();
             }
-            rests(line, least_rest_m, |point| !self.is_cleared(line.seen_from, point))
+            remainders(line, least_rest_m, |point| !self.is_cleared(line.seen_from, point))
         };
         self.lines = self.lines.iter().flat_map(cut).collect();
     }
 
-    /// Whether a sonar line lies on one that the laser saw, so that it tells nothing.
-    fn is_told(&self, line: &MapLine) -> bool {
+    /// Returns `true` if a sonar line coincides with one that the laser detected.
+    fn is_redundant(&self, line: &MapLine) -> bool {
         let better = self.lines.iter().filter(|other| other.kind != LineKind::Sonar);
         let near_m = self.settings.merge.distance_m;
         better.into_iter().any(|other| line.ends.iter().all(|end| other.distance_m(*end) < near_m))
     }
 
-    /// Cuts out of the sonar lines what lies close to the robot and isn't heard there.
-    fn cut_around(&mut self, robot: DVec2, heard: &[DVec2]) {
+    /// Cuts out of the sonar lines everything close to the robot that is not detected there.
+    fn cut_around(&mut self, robot: DVec2, detected: &[DVec2]) {
         let LineMapSettings { known_m, contradicts_m, least_rest_m, .. } = self.settings;
         let lines = std::mem::take(&mut self.lines);
         let cut = |line: MapLine| {
-            // Of a mirror-like wall only a part is heard; it speaks for the whole.
+            // Only a part of a specular wall returns an echo; it confirms the whole.
             let off_m = |point: &DVec2| line.direction().perp_dot(*point - line.ends[0]).abs();
-            let is_heard = heard.iter().any(|point| off_m(point) < contradicts_m);
-            if line.kind != LineKind::Sonar || is_heard || line.distance_m(robot) > known_m {
+            let is_detected = detected.iter().any(|point| off_m(point) < contradicts_m);
+            if line.kind != LineKind::Sonar || is_detected || line.distance_m(robot) > known_m {
                 return vec![line];
             }
-            rests(&line, least_rest_m, |point| point.distance(robot) > known_m)
+            remainders(&line, least_rest_m, |point| point.distance(robot) > known_m)
         };
         self.lines = lines.into_iter().flat_map(cut).collect();
     }
 
-    /// Merges a line with all that are one wall with it.
-    fn take_in(&mut self, mut line: MapLine) {
+    /// Inserts a line, merged with all lines of the same wall.
+    fn insert(&mut self, mut line: MapLine) {
         while let Some((at, merged)) = self
             .lines
             .iter()
@@ -224,9 +224,9 @@ fn samples(line: &MapLine) -> impl ExactSizeIterator<Item = DVec2> + use<> {
     (0..steps as usize + 1).map(move |step| a.lerp(b, step as f64 / steps))
 }
 
-/// What is left of a line where only some of its points are kept; not what is shorter than asked
-/// for, unless nothing was cut.
-fn rests(line: &MapLine, least_m: f64, keep: impl Fn(DVec2) -> bool) -> Vec<MapLine> {
+/// Pieces of a line at least `min_m` long whose points are all kept; the line itself if nothing
+/// is cut.
+fn remainders(line: &MapLine, min_m: f64, keep: impl Fn(DVec2) -> bool) -> Vec<MapLine> {
     let points: Vec<(usize, DVec2)> = samples(line).enumerate().collect();
     let last = points.len() - 1;
     let kept: Vec<(usize, DVec2)> = points.into_iter().filter(|(_, point)| keep(*point)).collect();
@@ -240,19 +240,19 @@ fn rests(line: &MapLine, least_m: f64, keep: impl Fn(DVec2) -> bool) -> Vec<MapL
             terminal: [line.terminal[0] && from == 0, line.terminal[1] && to == last],
             ..*line
         })
-        .filter(|rest| rest.length_m() >= least_m)
+        .filter(|rest| rest.length_m() >= min_m)
         .collect()
 }
 
-/// Whether a segment stands between two points, `margin_m` or more before the second; its outermost
-/// bits, as long as the margin, don't count.
+/// Returns `true` if a segment lies between two points, `margin_m` or more before the second. The
+/// outermost pieces of the segment, of the length of the margin, are ignored.
 fn hides([a, b]: [DVec2; 2], from: DVec2, point: DVec2, margin_m: f64) -> bool {
-    let (way, side) = (point - from, b - a);
-    let across = way.perp_dot(side);
-    let along_way = (a - from).perp_dot(side) / across;
-    let along_side_m = (a - from).perp_dot(way) / across * side.length();
+    let (ray, side) = (point - from, b - a);
+    let across = ray.perp_dot(side);
+    let along_ray = (a - from).perp_dot(side) / across;
+    let along_side_m = (a - from).perp_dot(ray) / across * side.length();
     let height_m = side.perp_dot(point - a).abs() / side.length();
-    (0.0..=1.0).contains(&along_way)
+    (0.0..=1.0).contains(&along_ray)
         && (margin_m..=side.length() - margin_m).contains(&along_side_m)
         && height_m > margin_m
 }

@@ -1,4 +1,4 @@
-//! Merging lines that are one wall.
+//! Merging of lines that belong to one wall.
 
 use super::{LineKind, MapLine};
 use sonard_model::geometry::DVec2;
@@ -6,34 +6,35 @@ use sonard_model::geometry::DVec2;
 /// Settings of the merging of lines.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MergeSettings {
-    /// Nearly parallel: at most this angle, degrees.
+    /// Maximum angle between nearly parallel lines, degrees.
     pub parallel_deg: f64,
-    /// The critical distance `d`, metres.
+    /// Critical distance `d`, metres.
     pub distance_m: f64,
-    /// Greatest gap along the wall, metres.
+    /// Maximum gap along the wall, metres.
     pub gap_m: f64,
 }
 
 impl Default for MergeSettings {
-    /// With the paper's 5 cm.
+    /// The paper's critical distance of 5 cm.
     fn default() -> Self {
         Self { parallel_deg: 10.0, distance_m: 0.05, gap_m: 0.15 }
     }
 }
 
-/// One line of two, if they are nearly parallel and close.
+/// Merges two lines if they are nearly parallel and close.
 ///
 /// A sonar line is projected onto a laser or complex one. Otherwise the new slope is
-/// `g m_i + (1 - g) m_j`, equation (1), where `m_i` is of the line with more length times
-/// confidence, `l f`, and `g = max(l1 / (l1 + l2) f1, l2 / (l1 + l2) f2)`; slopes are counted
-/// from line i, so that none is infinite. It goes through the crossing of the two, or else through
-/// the point between their nearest ends, weighted alike. A confirmed end stays one and stays
-/// where it is: a line with one goes through it, a line with two is the line between them. Of two
-/// that confirm the same end, the middle counts.
+/// `g m_i + (1 - g) m_j`, equation (1), where `m_i` belongs to the line with the larger product
+/// `l f` of length and confidence, and `g = max(l1 / (l1 + l2) f1, l2 / (l1 + l2) f2)`. Slopes are
+/// relative to line i, so that none is infinite. The result passes through the intersection of the
+/// two, or else through the point between their nearest ends, weighted by `g`.
+///
+/// A confirmed end keeps its position: a line with one passes through it, a line with two connects
+/// them. If both confirm the same end, the midpoint is used.
 #[must_use]
-pub fn merge(one: &MapLine, other: &MapLine, settings: &MergeSettings) -> Option<MapLine> {
+pub fn merge(a: &MapLine, b: &MapLine, settings: &MergeSettings) -> Option<MapLine> {
     let weight = |line: &MapLine| line.length_m() * line.confidence;
-    let (main, minor) = if weight(one) >= weight(other) { (one, other) } else { (other, one) };
+    let (main, minor) = if weight(a) >= weight(b) { (a, b) } else { (b, a) };
     if !are_close(main, minor, settings) {
         return None;
     }
@@ -56,7 +57,7 @@ fn are_close(main: &MapLine, minor: &MapLine, settings: &MergeSettings) -> bool 
     let places = minor.ends.map(|end| along.dot(end - main.ends[0]));
     let (low, high) = (places[0].min(places[1]), places[0].max(places[1]));
     let length_m = main.length_m();
-    // Where they lie beside each other, or else where they come nearest, they must be close.
+    // They must be close where they overlap, or else at their nearest ends.
     let from = low.clamp(0.0, length_m);
     let to = high.clamp(0.0, length_m);
     let offsets = minor.ends.map(|end| along.perp_dot(end - main.ends[0]));
@@ -70,7 +71,7 @@ fn are_close(main: &MapLine, minor: &MapLine, settings: &MergeSettings) -> bool 
     gap_m <= settings.gap_m && near(from) && near(to)
 }
 
-/// The sonar line on the better one: that one, longer where the sonar line reaches beyond it.
+/// Projects a sonar line onto a better one, extended where the sonar line reaches beyond it.
 fn project(sonar: &MapLine, better: &MapLine) -> MapLine {
     let weight = sonar.length_m() + better.length_m();
     let confidence =
@@ -78,7 +79,7 @@ fn project(sonar: &MapLine, better: &MapLine) -> MapLine {
     lay_on(better.ends[0], better.direction(), better, sonar, LineKind::Complex, confidence)
 }
 
-/// Both with their weights (1).
+/// Weighted combination of both lines (1).
 fn blend(main: &MapLine, minor: &MapLine) -> MapLine {
     let (l1, l2) = (main.length_m(), minor.length_m());
     let gamma = (l1 / (l1 + l2) * main.confidence).max(l2 / (l1 + l2) * minor.confidence);
@@ -97,33 +98,33 @@ fn blend(main: &MapLine, minor: &MapLine) -> MapLine {
     lay_on(through, turned, main, minor, kind, confidence)
 }
 
-/// Where two segments cross.
-fn crossing(one: &MapLine, other: &MapLine) -> Option<DVec2> {
-    let (u, v) = (one.ends[1] - one.ends[0], other.ends[1] - other.ends[0]);
+/// Intersection of two segments.
+fn crossing(a: &MapLine, b: &MapLine) -> Option<DVec2> {
+    let (u, v) = (a.ends[1] - a.ends[0], b.ends[1] - b.ends[0]);
     let across = u.perp_dot(v);
     if across == 0.0 {
         return None;
     }
-    let between = other.ends[0] - one.ends[0];
+    let between = b.ends[0] - a.ends[0];
     let (s, t) = (between.perp_dot(v) / across, between.perp_dot(u) / across);
     let inside = (0.0..=1.0).contains(&s) && (0.0..=1.0).contains(&t);
-    inside.then(|| one.ends[0] + s * u)
+    inside.then(|| a.ends[0] + s * u)
 }
 
-/// Ends confirmed twice are one end if they are so close, metres; else the outer one holds.
+/// Maximum distance of confirmed ends taken for one, metres; otherwise the outer one is used.
 const SAME_END_M: f64 = 0.15;
 
-/// A line through a point that reaches as far as two others do, or to their confirmed ends.
+/// Line through a point that reaches as far as two others do, or to their confirmed ends.
 fn lay_on(
     through: DVec2,
     along: DVec2,
-    one: &MapLine,
-    other: &MapLine,
+    first: &MapLine,
+    second: &MapLine,
     kind: LineKind,
     confidence: f64,
 ) -> MapLine {
     let place_m = |point: DVec2| along.dot(point - through);
-    let spans = [one, other].map(|line| {
+    let spans = [first, second].map(|line| {
         let mut ends = [0, 1].map(|end| (line.ends[end], line.terminal[end]));
         if place_m(ends[0].0) > place_m(ends[1].0) {
             ends.swap(0, 1);
@@ -131,30 +132,30 @@ fn lay_on(
         ends
     });
     let choose = |end: usize, outwards: f64| {
-        let [(a, a_holds), (b, b_holds)] = [spans[0][end], spans[1][end]];
+        let [(a, a_confirmed), (b, b_confirmed)] = [spans[0][end], spans[1][end]];
         let outer = if outwards * (place_m(a) - place_m(b)) > 0.0 { a } else { b };
-        match (a_holds, b_holds) {
+        match (a_confirmed, b_confirmed) {
             (true, false) => (a, true),
             (false, true) => (b, true),
             (true, true) if a.distance(b) < SAME_END_M => (a.midpoint(b), true),
             (both, _) => (outer, both),
         }
     };
-    let ((low, low_holds), (high, high_holds)) = (choose(0, -1.0), choose(1, 1.0));
-    // The line is shifted onto a confirmed end, if there is one.
-    let anchor = match (low_holds, high_holds) {
+    let ((low, low_confirmed), (high, high_confirmed)) = (choose(0, -1.0), choose(1, 1.0));
+    // A confirmed end anchors the line.
+    let anchor = match (low_confirmed, high_confirmed) {
         (true, _) => low,
         (_, true) => high,
         _ => through,
     };
-    let laid = |point: DVec2, holds: bool| {
-        if holds { point } else { anchor + along.dot(point - anchor) * along }
+    let placed = |point: DVec2, is_confirmed: bool| {
+        if is_confirmed { point } else { anchor + along.dot(point - anchor) * along }
     };
     MapLine {
-        ends: [laid(low, low_holds), laid(high, high_holds)],
-        terminal: [low_holds, high_holds],
+        ends: [placed(low, low_confirmed), placed(high, high_confirmed)],
+        terminal: [low_confirmed, high_confirmed],
         kind,
         confidence,
-        seen_from: one.seen_from,
+        seen_from: first.seen_from,
     }
 }

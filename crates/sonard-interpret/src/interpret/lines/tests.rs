@@ -1,4 +1,4 @@
-//! Clusters, fits and merging against what they are defined as.
+//! Clusters, fits and merging against their definitions.
 
 use std::collections::BTreeSet;
 
@@ -13,19 +13,19 @@ use super::{
 use crate::interpret::{Beam, Heard, Sweep};
 use sonard_model::geometry::{DVec2, Pose};
 
-/// The graph as it is defined, every pair looked at.
-fn by_definition(points: &[DVec2], least_m: f64) -> Vec<Vec<usize>> {
+/// Graph by definition, from all pairs.
+fn by_definition(points: &[DVec2], min_m: f64) -> Vec<Vec<usize>> {
     let radius = |at: usize| {
         let others = (0..points.len()).filter(|other| *other != at);
         let nearest = others.map(|other| points[at].distance(points[other]));
         let nearest_m = nearest.fold(f64::INFINITY, f64::min);
-        if nearest_m.is_finite() { nearest_m.max(least_m) } else { least_m }
+        if nearest_m.is_finite() { nearest_m.max(min_m) } else { min_m }
     };
     let mut group: Vec<usize> = (0..points.len()).collect();
-    for one in 0..points.len() {
-        for other in 0..one {
-            if points[one].distance(points[other]) <= radius(one) + radius(other) {
-                let (from, to) = (group[one].max(group[other]), group[one].min(group[other]));
+    for a in 0..points.len() {
+        for b in 0..a {
+            if points[a].distance(points[b]) <= radius(a) + radius(b) {
+                let (from, to) = (group[a].max(group[b]), group[a].min(group[b]));
                 group.iter_mut().filter(|g| **g == from).for_each(|g| *g = to);
             }
         }
@@ -36,18 +36,18 @@ fn by_definition(points: &[DVec2], least_m: f64) -> Vec<Vec<usize>> {
 
 proptest! {
     #[test]
-    fn clusters_are_the_components_of_the_graph(
+    fn clusters_are_graph_components(
         raw in prop::collection::vec((0..40_i32, 0..40_i32), 0..60),
-        least_m in 0.0..2.0_f64,
+        min_m in 0.0..2.0_f64,
     ) {
         let points: Vec<DVec2> =
             raw.iter().map(|(x, y)| DVec2::new(f64::from(*x), f64::from(*y).powf(1.1))).collect();
-        prop_assert_eq!(clusters(&points, least_m), by_definition(&points, least_m));
+        prop_assert_eq!(clusters(&points, min_m), by_definition(&points, min_m));
     }
 }
 
 #[test]
-fn no_point_and_points_without_place() {
+fn empty_and_non_finite_points() {
     assert!(clusters(&[], 0.1).is_empty());
     assert_eq!(clusters(&[DVec2::NAN, DVec2::ONE], 0.1), [[1]]);
     assert_eq!(clusters(&[DVec2::ONE; 5], 0.0), [[0, 1, 2, 3, 4]]);
@@ -58,7 +58,7 @@ fn along(a: DVec2, b: DVec2, count: usize) -> impl Iterator<Item = DVec2> {
 }
 
 #[test]
-fn a_corner_is_two_segments_and_noise_lowers_their_confidence() {
+fn corner_is_two_segments() {
     let corner = [DVec2::ZERO, DVec2::X, DVec2::ONE];
     let clean: Vec<DVec2> =
         along(corner[0], corner[1], 40).chain(along(corner[1], corner[2], 40)).collect();
@@ -82,7 +82,7 @@ fn a_corner_is_two_segments_and_noise_lowers_their_confidence() {
 }
 
 #[test]
-fn too_few_points_make_no_segment() {
+fn few_points_are_no_segment() {
     let settings = FitSettings::default();
     assert!(fit(&[], &settings).is_empty());
     assert!(fit(&[DVec2::ZERO, DVec2::X], &settings).is_empty());
@@ -119,7 +119,7 @@ fn slopes_blend_by_equation_1() {
 
 /// l1 = 2, f1 = 0.5; l2 = 1.5, f2 = 0.6: g = max(2 / 3.5 0.5, 1.5 / 3.5 0.6).
 #[test]
-fn the_weight_of_equation_1_is_a_share_of_both_lengths() {
+fn weight_of_equation_1_is_relative() {
     let main = line([0.0, 0.0], [2.0, 0.0], LineKind::Sonar, 0.5);
     let end = DVec2::new(2.0, 0.0) + 1.5 * DVec2::new(1.0, 0.04).normalize();
     let minor = line([2.0, 0.0], end.to_array(), LineKind::Sonar, 0.6);
@@ -130,9 +130,9 @@ fn the_weight_of_equation_1_is_a_share_of_both_lengths() {
     assert!((merged.confidence - 1.9 / 3.5).abs() < 1e-12, "{merged:?}");
 }
 
-/// Lines are held beside each other where both are: what lies beyond the end of one may be farther off.
+/// Distance is measured where the lines overlap: beyond the end of one, they may diverge.
 #[test]
-fn lines_are_close_where_they_lie_beside_each_other() {
+fn closeness_is_measured_on_the_overlap() {
     let wall = line([0.0, 0.0], [1.0, 0.0], LineKind::Sonar, 0.9);
     let slanted = |at_end_m: f64, beyond_m: f64| {
         line([0.5, 0.0], [1.0 + beyond_m, at_end_m * (0.5 + beyond_m) / 0.5], LineKind::Sonar, 0.5)
@@ -143,17 +143,17 @@ fn lines_are_close_where_they_lie_beside_each_other() {
 }
 
 #[test]
-fn crossing_lines_blend_through_their_crossing() {
-    let one = line([0.0, 0.0], [2.0, 0.0], LineKind::Laser, 1.0);
-    let other = line([0.5, -0.02], [1.5, 0.02], LineKind::Laser, 1.0);
-    let merged = merge(&one, &other, &MergeSettings::default()).expect("one wall");
+fn crossing_lines_keep_their_crossing() {
+    let level = line([0.0, 0.0], [2.0, 0.0], LineKind::Laser, 1.0);
+    let tilted = line([0.5, -0.02], [1.5, 0.02], LineKind::Laser, 1.0);
+    let merged = merge(&level, &tilted, &MergeSettings::default()).expect("one wall");
     let along = merged.ends[1] - merged.ends[0];
     assert!(along.perp_dot(DVec2::X - merged.ends[0]).abs() < 1e-9);
     assert_eq!(merged.kind, LineKind::Laser);
 }
 
 #[test]
-fn sonar_is_projected_onto_laser_and_confirmed_ends_stay() {
+fn sonar_is_projected_onto_laser() {
     let mut laser = line([0.0, 0.0], [1.0, 0.0], LineKind::Laser, 0.9);
     laser.terminal = [true, false];
     let sonar = line([-0.3, 0.03], [2.0, 0.02], LineKind::Sonar, 0.5);
@@ -169,7 +169,7 @@ fn sonar_is_projected_onto_laser_and_confirmed_ends_stay() {
 }
 
 #[test]
-fn lines_apart_or_across_stay_two() {
+fn distant_or_crossing_lines_stay_two() {
     let wall = line([0.0, 0.0], [1.0, 0.0], LineKind::Sonar, 0.9);
     for other in [
         line([0.0, 0.06], [1.0, 0.06], LineKind::Sonar, 0.9),
@@ -181,18 +181,18 @@ fn lines_apart_or_across_stay_two() {
     }
 }
 
-/// A scan that reads these points from a place.
+/// Sweep that reads the given points from a position.
 fn sweep(place: DVec2, points: &[DVec2]) -> Sweep {
     let beams = (0..).zip(points).map(|(index, point)| {
         let off = *point - place;
-        let (azimuth_deg, heard) = (off.to_angle().to_degrees(), Heard::Echo(off.length()));
-        Beam { azimuth_deg, index, heard, mount: DVec2::ZERO }
+        let (azimuth_deg, outcome) = (off.to_angle().to_degrees(), Heard::Echo(off.length()));
+        Beam { azimuth_deg, index, heard: outcome, mount: DVec2::ZERO }
     });
     let pose = Pose { x_m: place.x, y_m: place.y, heading_deg: 0.0 };
     Sweep { pose, step_deg: 0.9, beams: beams.collect(), closed: true }
 }
 
-/// A laser that sees these points from a place.
+/// Laser scan that reads the given points from a position.
 fn laser(place: DVec2, points: &[DVec2]) -> LaserScan {
     let pose = Pose { x_m: place.x, y_m: place.y, heading_deg: 0.0 };
     let mut returns: Vec<LaserReturn> = points
@@ -208,25 +208,25 @@ fn laser(place: DVec2, points: &[DVec2]) -> LaserScan {
 }
 
 #[test]
-fn the_three_rules_leave_out_what_cannot_be() {
+fn three_rules_discard_readings() {
     let mut map = LineMap::new(LineMapSettings::default());
     // Beyond the logical distance.
     assert_eq!(
         map.add_sonar(&sweep(DVec2::ZERO, &[DVec2::new(3.5, 0.0), DVec2::new(2.0, 0.0)])),
         1
     );
-    // Within half a metre of where the robot was, where nothing was seen.
+    // Within half a metre of an earlier robot position where nothing was detected.
     let later = [DVec2::new(0.2, 0.1), DVec2::new(0.8, 0.0)];
     assert_eq!(map.add_sonar(&sweep(DVec2::new(1.5, 0.0), &later)), 1);
-    // Between the laser and what it saw; what lies on that wall stays.
+    // Between the laser and its reading; points on that wall stay.
     let wall: Vec<DVec2> = along(DVec2::new(4.0, -1.0), DVec2::new(4.0, 1.0), 100).collect();
     map.add_laser(&laser(DVec2::new(2.5, 0.0), &wall));
-    let doubtful = [DVec2::new(3.5, 0.1), DVec2::new(3.98, 0.1), DVec2::new(3.5, 2.0)];
-    assert_eq!(map.add_sonar(&sweep(DVec2::new(2.5, 1.0), &doubtful)), 1);
+    let suspect = [DVec2::new(3.5, 0.1), DVec2::new(3.98, 0.1), DVec2::new(3.5, 2.0)];
+    assert_eq!(map.add_sonar(&sweep(DVec2::new(2.5, 1.0), &suspect)), 1);
 }
 
 #[test]
-fn a_wall_seen_from_two_places_is_one_line() {
+fn wall_from_two_positions_is_one_line() {
     let wall = |from: f64, to: f64| -> Vec<DVec2> {
         along(DVec2::new(from, 1.0), DVec2::new(to, 1.0), 60).collect()
     };
@@ -239,25 +239,25 @@ fn a_wall_seen_from_two_places_is_one_line() {
     assert!((line.length_m() - 2.4).abs() < 1e-6, "{line:?}");
 }
 
-/// A laser scan without noise of walls given by their ends, over a field in degrees.
+/// Noiseless laser scan of walls given by their ends, over a field of view in degrees.
 fn shot(place: DVec2, field_deg: [f64; 2], walls: &[[DVec2; 2]]) -> LaserScan {
     let returns = (0..512).map(|at| {
         let azimuth_deg = field_deg[0] + (field_deg[1] - field_deg[0]) * f64::from(at) / 511.0;
         let ray = DVec2::from_angle(azimuth_deg.to_radians());
-        let meet = |[a, b]: &[DVec2; 2]| {
+        let hit = |[a, b]: &[DVec2; 2]| {
             let (side, to_a) = (*b - *a, *a - place);
             let across = ray.perp_dot(side);
             let (range_m, share) = (to_a.perp_dot(side) / across, to_a.perp_dot(ray) / across);
             (range_m > 0.0 && (0.0..=1.0).contains(&share)).then_some(range_m)
         };
-        let range_m = walls.iter().filter_map(meet).min_by(f64::total_cmp);
+        let range_m = walls.iter().filter_map(hit).min_by(f64::total_cmp);
         LaserReturn { azimuth_deg, range_m }
     });
     let pose = Pose { x_m: place.x, y_m: place.y, heading_deg: 0.0 };
     LaserScan { pose, returns: returns.collect() }
 }
 
-/// Ends of the segments seen, and which are terminal, sorted by place along x then y.
+/// Ends of the detected segments with their terminal flags, sorted by x, then y.
 fn ends_of(scan: &LaserScan) -> Vec<(DVec2, bool)> {
     let lines = scan.lines(&LineMapSettings::default());
     let mut ends: Vec<(DVec2, bool)> = lines
@@ -269,18 +269,18 @@ fn ends_of(scan: &LaserScan) -> Vec<(DVec2, bool)> {
 }
 
 #[test]
-fn a_laser_confirms_borders_and_corners_but_not_its_own_field_nor_what_is_hidden() {
+fn laser_confirms_borders_and_corners() {
     let at = DVec2::new;
     let wall = [at(1.2, -2.0), at(1.2, 2.0)];
-    // The field ends on a wall: nothing is confirmed.
+    // The field of view ends on a wall: nothing is confirmed.
     let seen = ends_of(&shot(DVec2::ZERO, [-12.0, 12.0], &[wall]));
     assert_eq!(seen.iter().map(|end| end.1).collect::<Vec<_>>(), [false, false]);
-    // A wall that ends within the field, nothing behind it.
+    // A wall ends within the field of view, with nothing behind it.
     let seen = ends_of(&shot(DVec2::ZERO, [-12.0, 12.0], &[[at(1.2, -2.0), at(1.2, 0.1)]]));
     let (border, _) = seen.iter().find(|end| end.1).expect("a border");
     assert!(border.distance(at(1.2, 0.1)) < 1e-3, "{border}");
     assert_eq!(seen.iter().filter(|end| end.1).count(), 1);
-    // A corner, seen from within and from outside.
+    // A corner, from inside and from outside.
     let corner = at(1.2, 0.2);
     for side in [at(0.6, 0.2), at(1.8, 0.2)] {
         let seen = ends_of(&shot(
@@ -290,10 +290,10 @@ fn a_laser_confirms_borders_and_corners_but_not_its_own_field_nor_what_is_hidden
         ));
         let at_corner: Vec<_> = seen.iter().filter(|end| end.0.distance(corner) < 2e-3).collect();
         assert!(at_corner.iter().all(|end| end.1), "{seen:?}");
-        // The outer face is hidden by the wall itself: then the corner is a border.
+        // The wall itself hides the outer face: then the corner is a border.
         assert_eq!(at_corner.len(), if side.x < 1.2 { 2 } else { 1 }, "{seen:?}");
     }
-    // Something nearer hides the rest of a wall: the wall's end is open, that of the other is not.
+    // Something nearer hides the rest of a wall: only the end of the nearer object is confirmed.
     let seen = ends_of(&shot(DVec2::ZERO, [-12.0, 12.0], &[wall, [at(0.8, 0.0), at(0.8, 2.0)]]));
     let confirmed: Vec<_> = seen.iter().filter(|end| end.1).collect();
     assert_eq!(confirmed.len(), 1, "{seen:?}");
@@ -301,7 +301,7 @@ fn a_laser_confirms_borders_and_corners_but_not_its_own_field_nor_what_is_hidden
 }
 
 #[test]
-fn the_laser_cuts_what_sonar_only_thought() {
+fn laser_cuts_sonar_lines() {
     let at = DVec2::new;
     let mut map = LineMap::new(LineMapSettings::default());
     let phantom: Vec<DVec2> = along(at(1.0, -0.4), at(1.0, 0.4), 40).collect();
@@ -313,9 +313,9 @@ fn the_laser_cuts_what_sonar_only_thought() {
     assert_eq!(wall.kind, LineKind::Laser);
 }
 
-/// Of a line that nothing is heard of from close by, what is farther off stays.
+/// A line near which nothing is detected loses its part close to the robot.
 #[test]
-fn a_line_is_cut_where_the_robot_stands_and_hears_nothing() {
+fn line_without_echo_is_cut_near_the_robot() {
     let at = DVec2::new;
     let mut map = LineMap::new(LineMapSettings::default());
     let seen: Vec<DVec2> = along(at(-0.5, 1.0), at(2.0, 1.0), 100).collect();
@@ -330,12 +330,12 @@ fn a_line_is_cut_where_the_robot_stands_and_hears_nothing() {
 }
 
 #[test]
-fn a_line_between_two_confirmed_ends_goes_through_both() {
-    let mut one = line([0.0, 0.0], [1.0, 0.01], LineKind::Laser, 0.9);
-    one.terminal = [true, false];
-    let mut other = line([1.1, 0.0], [3.0, 0.02], LineKind::Laser, 0.8);
-    other.terminal = [false, true];
-    let merged = merge(&one, &other, &MergeSettings::default()).expect("one wall");
+fn two_confirmed_ends_fix_a_line() {
+    let mut near = line([0.0, 0.0], [1.0, 0.01], LineKind::Laser, 0.9);
+    near.terminal = [true, false];
+    let mut far = line([1.1, 0.0], [3.0, 0.02], LineKind::Laser, 0.8);
+    far.terminal = [false, true];
+    let merged = merge(&near, &far, &MergeSettings::default()).expect("one wall");
     assert_eq!(
         (merged.ends, merged.terminal),
         ([DVec2::ZERO, DVec2::new(3.0, 0.02)], [true, true])
@@ -343,7 +343,7 @@ fn a_line_between_two_confirmed_ends_goes_through_both() {
 }
 
 #[test]
-fn map_errors_are_what_they_say() {
+fn map_errors_match_closed_forms() {
     let text = r#"{"name":"t","materials":{"m":{"reflectance":0.9}},"walls":[
         {"id":"a","from":[0,0],"to":[2,0],"material":"m"}]}"#;
     let scene = sonard_model::scene::Scene::from_json(text).expect("a scene");
@@ -351,13 +351,13 @@ fn map_errors_are_what_they_say() {
     let right = line([0.0, 0.0], [2.0, 0.0], LineKind::Laser, 1.0);
     assert_eq!(error(&[right]).map_error_m, 0.0);
     assert_eq!(error(&[]).map_error_m, MOST_ERROR_M);
-    // Beside the wall by 1 cm, the whole of it.
-    let beside = error(&[line([0.0, 0.01], [2.0, 0.01], LineKind::Laser, 1.0)]);
+    // Offset from the wall by 1 cm over its whole length.
+    let offset = error(&[line([0.0, 0.01], [2.0, 0.01], LineKind::Laser, 1.0)]);
     assert!(
-        (beside.line_error_m - 0.01).abs() < 1e-12
-            && (beside.endpoint_error_m - 0.01).abs() < 1e-12
+        (offset.line_error_m - 0.01).abs() < 1e-12
+            && (offset.endpoint_error_m - 0.01).abs() < 1e-12
     );
-    // Half of the wall is missing: 0 to 0.5 m away over the first half metre, then 0.5 m.
+    // Half of the wall is missing: at 0 to 0.5 m over the first half metre, then at 0.5 m.
     let half = error(&[line([0.0, 0.0], [1.0, 0.0], LineKind::Laser, 1.0)]);
     assert_eq!(half.false_m, 0.0);
     assert!((half.missing_m - (0.5 * 0.25 + 0.5 * 0.5) / 2.0).abs() < 1e-3, "{half:?}");

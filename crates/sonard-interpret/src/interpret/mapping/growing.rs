@@ -1,106 +1,107 @@
-//! A map that is looked at while it grows.
+//! Map that grows with every scan.
 
 use thiserror::Error;
 
-use super::{Appraiser, ENOUGH_SCANS, Mapping, both, seen};
+use super::{Assessor, ENOUGH_SCANS, Mapping, bounds, union};
 use crate::interpret::{
     Extents, Sweep,
-    grid::{Grid, GridError, GridShape, Tiles, Told},
+    grid::{Grid, GridError, GridShape, ScanEvidence, Tiles},
     prediction::Assessment,
 };
 use sonard_model::geometry::DVec2;
 
-/// Cells that are kept for each that may be told: readings reach beyond what is told, which later scans may need.
-const KEPT_FOR_EACH: usize = 4;
+/// Stored cells per reported cell: readings extend beyond the reported region, which later scans
+/// may include.
+const STORED_PER_CELL: usize = 4;
 
-/// Predicted features that are kept, at most: some hundred bytes each.
-const MOST_FEATURES: usize = 4096;
+/// Maximum number of predicted features kept, some hundred bytes each.
+const MAX_FEATURES: usize = 4096;
 
-/// A map that grows scan by scan: after each it is, cell for cell, what a [`Mapper`](super::Mapper) makes of all scans
-/// so far around what was seen.
+/// Map that grows scan by scan. After each scan it equals, cell for cell, the map that a
+/// [`Mapper`](super::Mapper) builds from all scans so far around the detected region.
 ///
-/// What it costs does not grow with the scans, but with the place: up to four cells of four bytes for each that it may
-/// have, beside up to 4096 features and the first five scans.
+/// Memory is bounded by the extent, not by the number of scans: up to four cells of four bytes per
+/// allowed cell, up to 4096 features, and the first five scans.
 #[derive(Debug)]
 pub struct GrowingMap {
     mapping: Mapping,
     max_range_m: f64,
-    appraiser: Appraiser,
-    most_cells: usize,
+    assessor: Assessor,
+    max_cells: usize,
     scans: usize,
-    /// The first scans, as long as each counts less with every scan that comes.
+    /// First scans, kept while the weight of each decreases with every further scan.
     first: Vec<(Sweep, Option<Vec<Assessment>>)>,
-    /// Corners of what was seen.
+    /// Bounding box of the detected region.
     seen: Option<[DVec2; 2]>,
     tiles: Tiles,
 }
 
-/// The reason why a map stopped growing.
+/// Reason why a map stopped growing.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum GrowError {
-    /// There is no such grid.
+    /// Invalid grid dimensions.
     #[error(transparent)]
     Grid(#[from] GridError),
-    /// It is larger than it may be.
-    #[error("it would have more than {most} cells")]
+    /// Map larger than allowed.
+    #[error("the map would have more than {max} cells")]
     TooManyCells {
-        /// Cells that it may have.
-        most: usize,
+        /// Maximum number of cells.
+        max: usize,
     },
-    /// More walls are predicted than may be kept.
-    #[error("more than {MOST_FEATURES} walls are predicted around one place")]
+    /// More predicted walls than allowed.
+    #[error("more than {MAX_FEATURES} walls are predicted around one place")]
     TooManyFeatures,
 }
 
 impl GrowingMap {
-    /// Of readings of a sensor of these extents, `of_array` of several at fixed bearings; with at most so many cells. Of
-    /// the mapping's region it takes no notice.
+    /// Empty map for a sensor of these extents with a maximum number of cells; `of_array` for
+    /// several fixed rangers. The region of the settings is ignored.
     #[must_use]
-    pub fn new(mapping: Mapping, extents: Extents, of_array: bool, most_cells: usize) -> Self {
+    pub fn new(mapping: Mapping, extents: Extents, of_array: bool, max_cells: usize) -> Self {
         let mapping = Mapping { region: None, ..mapping };
         Self {
             max_range_m: mapping.max_range_m(&extents),
-            appraiser: Appraiser::new(&mapping, extents, of_array),
-            most_cells,
+            assessor: Assessor::new(&mapping, extents, of_array),
+            max_cells,
             scans: 0,
             first: Vec::new(),
             seen: None,
-            tiles: Tiles::new(mapping.resolution_m, KEPT_FOR_EACH * most_cells),
+            tiles: Tiles::new(mapping.resolution_m, STORED_PER_CELL * max_cells),
             mapping,
         }
     }
 
-    /// Adds a scan, and gives the map.
+    /// Adds a scan and returns the map.
     ///
     /// # Errors
-    /// When it gets larger than it may be, or the scan's place makes no grid; it is of no use from then on.
+    /// Map larger than allowed, or a pose without a valid grid; the map is unusable from then on.
     pub fn add(&mut self, sweep: Sweep) -> Result<Grid, GrowError> {
-        let seen = seen(&sweep, self.max_range_m);
-        let seen = self.seen.map_or(seen, |before| both(before, seen));
-        let [low, high] = self.mapping.around(seen);
+        let seen = bounds(&sweep, self.max_range_m);
+        let seen = self.seen.map_or(seen, |before| union(before, seen));
+        let [low, high] = self.mapping.with_margin(seen);
         let shape = GridShape::covering(low, high, self.mapping.resolution_m)?;
-        if shape.cells() > self.most_cells {
-            return Err(GrowError::TooManyCells { most: self.most_cells });
+        if shape.cells() > self.max_cells {
+            return Err(GrowError::TooManyCells { max: self.max_cells });
         }
         self.seen = Some(seen);
-        let assessments = self.appraiser.assess(&sweep);
+        let assessments = self.assessor.assess(&sweep);
         self.scans += 1;
         let times = self.mapping.evidence(self.scans);
         if self.scans > ENOUGH_SCANS {
-            self.tell(&sweep, assessments.as_deref(), times)?;
+            self.add_weighted(&sweep, assessments.as_deref(), times)?;
         } else {
             self.first.push((sweep, assessments));
-            self.tell_first(times)?;
+            self.rebuild_first(times)?;
         }
         Ok(self.tiles.part(shape))
     }
 
-    /// Tells all first scans anew, each so many times.
-    fn tell_first(&mut self, times: u8) -> Result<(), GrowError> {
+    /// Rebuilds the tiles from the first scans with a new weight.
+    fn rebuild_first(&mut self, times: u8) -> Result<(), GrowError> {
         self.tiles.clear();
         let first = std::mem::take(&mut self.first);
         for (sweep, assessments) in &first {
-            self.tell(sweep, assessments.as_deref(), times)?;
+            self.add_weighted(sweep, assessments.as_deref(), times)?;
         }
         if self.scans < ENOUGH_SCANS {
             self.first = first;
@@ -108,19 +109,19 @@ impl GrowingMap {
         Ok(())
     }
 
-    fn tell(
+    fn add_weighted(
         &mut self,
         sweep: &Sweep,
         assessments: Option<&[Assessment]>,
         times: u8,
     ) -> Result<(), GrowError> {
-        let Appraiser { model, trust, predictor } = &self.appraiser;
-        if predictor.as_ref().is_some_and(|predictor| predictor.local().len() > MOST_FEATURES) {
+        let Assessor { model, trust, predictor } = &self.assessor;
+        if predictor.as_ref().is_some_and(|predictor| predictor.local().len() > MAX_FEATURES) {
             return Err(GrowError::TooManyFeatures);
         }
         for _ in 0..times {
-            if !self.tiles.add(Told { sweep, assessments, model, trust }) {
-                return Err(GrowError::TooManyCells { most: self.most_cells });
+            if !self.tiles.add(ScanEvidence { sweep, assessments, model, trust }) {
+                return Err(GrowError::TooManyCells { max: self.max_cells });
             }
         }
         Ok(())
@@ -142,17 +143,17 @@ mod tests {
         Extents::new(&sensor, &Air::default(), false).expect("good figures")
     }
 
-    /// A turn in a round room, of a ranger that moves on and hears nothing, or something near, now and then.
+    /// Sweep in a round room by a moving ranger, with occasional missing or too near echoes.
     fn sweep(number: u32) -> Sweep {
         let along = f64::from(number);
         let beams = (0..100).map(|index| {
-            let heard = match (index + 7 * number) % 9 {
+            let outcome = match (index + 7 * number) % 9 {
                 0 => Heard::Silent,
                 1 => Heard::Near,
                 _ => Heard::Echo(1.5 + 0.8 * (0.13 * f64::from(index) + 0.7 * along).sin()),
             };
             let mount = if index % 2 == 0 { DVec2::ZERO } else { DVec2::new(0.1, -0.03) };
-            Beam { azimuth_deg: 3.6 * f64::from(index), index, heard, mount }
+            Beam { azimuth_deg: 3.6 * f64::from(index), index, heard: outcome, mount }
         });
         let (x_m, y_m) = (-3.0 + 0.61 * along, 0.4 * along.sin());
         let pose = Pose { x_m, y_m, heading_deg: 31.0 * along };
@@ -167,7 +168,7 @@ mod tests {
     }
 
     #[test]
-    fn after_each_scan_it_is_the_map_of_all_so_far() {
+    fn each_step_equals_a_full_rebuild() {
         let coarse = Mapping { resolution_m: 0.13, predicts_features: false, ..Mapping::default() };
         for (mapping, of_array) in [(Mapping::default(), false), (coarse, true)] {
             let mut growing = GrowingMap::new(mapping, extents(), of_array, 100_000);
@@ -183,15 +184,15 @@ mod tests {
     }
 
     #[test]
-    fn a_place_that_is_too_large_ends_it_with_what_is_kept_within_its_bound() {
+    fn too_large_a_place_ends_it() {
         let mut growing = GrowingMap::new(Mapping::default(), extents(), false, 10_000);
-        let came = (0..).map(|number| growing.add(sweep(number))).find_map(Result::err);
-        assert_eq!(came, Some(GrowError::TooManyCells { most: 10_000 }));
+        let error = (0..).map(|number| growing.add(sweep(number))).find_map(Result::err);
+        assert_eq!(error, Some(GrowError::TooManyCells { max: 10_000 }));
         assert!((1..=40_000).contains(&growing.tiles.kept()), "{}", growing.tiles.kept());
     }
 
     #[test]
-    fn rangers_that_were_all_over_the_place_in_one_scan_do_not_make_it_larger_than_it_may_be() {
+    fn scattered_rangers_stay_in_bounds() {
         let beams = (0..4096).map(|index| {
             let mount = DVec2::new(f64::from(index), 0.0) * 20.0;
             Beam { azimuth_deg: 1.0, index, heard: Heard::Silent, mount }
@@ -203,7 +204,7 @@ mod tests {
     }
 
     #[test]
-    fn places_that_no_grid_has_are_refused() {
+    fn invalid_poses_are_rejected() {
         let at = |x_m: f64| {
             let mut growing = GrowingMap::new(Mapping::default(), extents(), false, 100_000);
             growing.add(Sweep { pose: Pose { x_m, ..sweep(0).pose }, ..sweep(0) })
@@ -211,7 +212,7 @@ mod tests {
         for x_m in [1e300, f64::INFINITY, f64::NAN] {
             assert!(at(x_m).is_err(), "{x_m}");
         }
-        // Where numbers are coarser than rooms, whatever comes of it.
+        // Where floating-point spacing exceeds a room, any result is acceptable.
         drop(at(1e17));
     }
 }

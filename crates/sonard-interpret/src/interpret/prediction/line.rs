@@ -1,39 +1,39 @@
-//! A predicted feature: a straight piece of wall.
+//! Predicted feature: a straight section of wall.
 
 use super::between_rad;
 use sonard_model::geometry::{DVec2, wrap_pi};
 
-/// Normals this far apart may still be one wall's, radians: what a heading may be off.
+/// Tolerance between normals of one wall, radians, for errors of the heading.
 const NORMAL_TOLERANCE_RAD: f64 = 0.05;
 
-/// A straight piece of wall with the directions that its normal may have.
+/// Straight section of wall with the possible directions of its normal.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Line {
-    /// One end, metres.
+    /// Start point, metres.
     pub a: DVec2,
-    /// The other end, metres.
+    /// End point, metres.
     pub b: DVec2,
-    /// World direction of its normal away from the ranger, radians.
+    /// World direction of the normal away from the ranger, radians.
     pub normal_rad: f64,
-    /// How far the normal may be from that to both sides, radians.
+    /// Half width of the possible directions of the normal, radians.
     pub spread_rad: f64,
-    /// How many readings it stands on.
+    /// Number of supporting readings.
     pub support: f64,
-    /// Where the robot was when it was last seen.
+    /// Position of the robot at the last detection.
     pub seen_from: DVec2,
-    /// How far it may go on beyond `a` and `b`, metres: hardly where it was split, because it was not
-    /// heard where it should have been; without limit where nothing is known.
+    /// Maximum extension beyond `a` and `b`, metres: short where the wall was split for a missing
+    /// echo, infinite where nothing is known.
     pub may_go_on_m: [f64; 2],
-    /// Readings of the present set that it explains, in rising order.
+    /// Readings of the current scan that belong to the feature, in ascending order.
     pub readings: Vec<u32>,
-    /// Ranger and mean range, as long as it stands on one set of readings.
+    /// Ranger position and mean range, for a feature of a single scan.
     reference: Option<(DVec2, f64)>,
 }
 
 impl Line {
-    /// Across the beam at its reading, as long as the beam is wide there (step 1); its normal may
-    /// be off the beam's axis by what a feature that is heard may be.
-    pub(super) fn of_reading(
+    /// Feature of one reading, across its beam and as long as the beam is wide there (step 1); the
+    /// normal may deviate from the beam's axis by `spread_rad`.
+    pub(super) fn from_reading(
         (index, from, axis_rad, range_m): (u32, DVec2, f64, f64),
         half_rad: f64,
         spread_rad: f64,
@@ -60,12 +60,12 @@ impl Line {
         self.a.distance(self.b)
     }
 
-    /// Whether it stands on this reading of the present set.
+    /// Returns `true` if a reading of the current scan belongs to the feature.
     pub(super) fn explains(&self, reading: u32) -> bool {
         self.readings.binary_search(&reading).is_ok()
     }
 
-    /// Whether two may be the same wall: directions of the normal in common, and near (step 2).
+    /// Returns `true` if two features may be one wall: overlapping normals and close (step 2).
     pub(super) fn is_similar(&self, other: &Self, near_m: f64, gap_m: f64) -> bool {
         let apart_rad = between_rad(self.normal_rad, other.normal_rad);
         if apart_rad > self.spread_rad + other.spread_rad + NORMAL_TOLERANCE_RAD {
@@ -80,7 +80,7 @@ impl Line {
         (other_low - high).max(low - other_high) <= gap_m
     }
 
-    /// Takes `other` in: the directions they have in common, the mean place, the whole length.
+    /// Merges `other` in: common directions of the normal, mean position, total length.
     pub(super) fn merge(&mut self, other: &Self) {
         let (normal_rad, spread_rad) = self.common_normal(other);
         let normal = DVec2::from_angle(normal_rad);
@@ -96,10 +96,10 @@ impl Line {
         };
         let place = |along_m: f64| offset_m * normal + along_m * normal.perp();
         let [start, end] = [low.min(other_low), high.max(other_high)];
-        // What is known of where it ends holds for the whole, unless it was seen farther on.
-        let least = (low - self.may_go_on_m[0]).max(other_low - other.may_go_on_m[0]);
-        let most = (high + self.may_go_on_m[1]).min(other_high + other.may_go_on_m[1]);
-        self.may_go_on_m = [(start - least).max(0.0), (most - end).max(0.0)];
+        // Bounds on the extension apply to the whole, unless it was seen farther out.
+        let min_m = (low - self.may_go_on_m[0]).max(other_low - other.may_go_on_m[0]);
+        let max_m = (high + self.may_go_on_m[1]).min(other_high + other.may_go_on_m[1]);
+        self.may_go_on_m = [(start - min_m).max(0.0), (max_m - end).max(0.0)];
         (self.a, self.b) = (place(start), place(end));
         (self.normal_rad, self.spread_rad) = (normal_rad, spread_rad);
         self.support = support;
@@ -108,19 +108,19 @@ impl Line {
         self.readings.sort_unstable();
     }
 
-    /// From now on it stands where it is, whatever its normal is refined to.
-    pub(super) fn settle(&mut self, robot: DVec2) {
+    /// Fixes the position, whatever direction the normal is refined to later.
+    pub(super) fn fix(&mut self, robot: DVec2) {
         let normal = DVec2::from_angle(self.normal_rad);
         let (offset_m, [low, high]) = (self.offset_m(normal), self.span(normal));
         self.a = offset_m * normal + low * normal.perp();
         self.b = offset_m * normal + high * normal.perp();
         self.reference = None;
         self.seen_from = robot;
-        // What many readings agree on is not turned over by the next few.
+        // Bounded support keeps the feature adaptable without being overturned by a few readings.
         self.support = self.support.min(50.0);
     }
 
-    /// The parts on both sides of a point, each shortened there and known to end within `end_m`.
+    /// Parts on both sides of a point, each shortened there and extensible by at most `end_m`.
     pub(super) fn split(&self, at: DVec2, shorten_m: f64, end_m: f64) -> [Self; 2] {
         let along = (self.b - self.a).normalize_or_zero();
         let part = |a: DVec2, b: DVec2, may_go_on_m: [f64; 2]| {
@@ -135,8 +135,7 @@ impl Line {
         ]
     }
 
-    /// The middle of the directions that both normals may have, and half their width; between
-    /// the two where there is none.
+    /// Middle and half width of the common directions of both normals; the mean without overlap.
     fn common_normal(&self, other: &Self) -> (f64, f64) {
         let turn = wrap_pi(other.normal_rad - self.normal_rad);
         let low = (-self.spread_rad).max(turn - other.spread_rad);
@@ -145,8 +144,8 @@ impl Line {
         (wrap_pi(middle), ((high - low) / 2.0).max(0.0))
     }
 
-    /// Distance from the world's origin along a normal: an echo's wall is at the echo's range
-    /// along the wall's normal, whichever beam heard it.
+    /// Distance from the world's origin along a normal: the wall of an echo is at the echo's range
+    /// along the wall's normal, whichever beam detected it.
     fn offset_m(&self, normal: DVec2) -> f64 {
         match self.reference {
             Some((from, range_m)) => normal.dot(from) + range_m,
@@ -154,7 +153,7 @@ impl Line {
         }
     }
 
-    /// From where to where it reaches across a normal, metres.
+    /// Interval covered across a normal, metres.
     fn span(&self, normal: DVec2) -> [f64; 2] {
         let along = normal.perp();
         let (a, b) = (along.dot(self.a), along.dot(self.b));

@@ -1,4 +1,4 @@
-//! Feature Prediction on hand-made sets of readings.
+//! Feature Prediction on constructed scans.
 
 mod course;
 
@@ -8,7 +8,7 @@ use sonard_model::geometry::{DVec2, Pose};
 
 const MAX_RANGE_M: f64 = 5.0;
 
-/// A ring: azimuth and range, 0 for silence.
+/// Ring of readings: azimuth and range, 0 for no echo.
 fn ring(pose: Pose, readings: &[(f64, f64)]) -> Sweep {
     let beam = |(index, &(azimuth_deg, range_m)): (u32, &(f64, f64))| Beam {
         azimuth_deg,
@@ -27,7 +27,7 @@ fn prediction() -> FeaturePrediction {
 }
 
 #[test]
-fn confidences_have_the_ranges_that_the_text_gives() {
+fn confidences_are_within_stated_ranges() {
     assert_eq!((of_angle(0.0), of_angle(1.0)), (0.25, 0.5));
     assert_eq!((of_distance(0.0, 2.0), of_distance(1.0, 2.0)), (0.0, 0.5));
     assert_eq!(of_distance(0.5, 2.0), 0.125);
@@ -35,14 +35,14 @@ fn confidences_have_the_ranges_that_the_text_gives() {
     for confidence in [0.0, 0.1, 0.3, 0.5] {
         assert!((combine(0.5, confidence) - confidence).abs() < 1e-15, "0.5 is neutral");
     }
-    assert!(combine(0.3, 0.3) < 0.3, "two doubts are more than one");
+    assert!(combine(0.3, 0.3) < 0.3, "low confidences reinforce each other");
     assert_eq!(combine(0.0, 1.0), 0.5, "contradictions cancel");
 }
 
 #[test]
-fn figures_4_to_6_three_readings_of_a_wall_outvote_a_wrong_one() {
-    // The robot faces a wall 1 m ahead: sonars 2, 3 and 4 hear it, 0, 1 and 6 are silent, 5 hears
-    // something behind it.
+fn figures_4_to_6_are_reproduced() {
+    // The robot faces a wall 1 m ahead: sonars 2, 3 and 4 detect it, 0, 1 and 6 have no echo, 5
+    // detects something behind it.
     let readings = [
         (90.0, 0.0),
         (30.0, 0.0),
@@ -60,18 +60,21 @@ fn figures_4_to_6_three_readings_of_a_wall_outvote_a_wrong_one() {
     for neutral in [0, 2, 3, 4, 6] {
         assert_eq!(assessments[neutral].confidence, 0.5, "sonar {neutral}");
     }
-    for doubtful in [1, 5] {
-        assert!(assessments[doubtful].confidence < 0.5, "sonar {doubtful}: {assessments:?}");
-        let clear_m = assessments[doubtful].clear_m.expect("a crossing");
+    for contradicted in [1, 5] {
+        assert!(
+            assessments[contradicted].confidence < 0.5,
+            "sonar {contradicted}: {assessments:?}"
+        );
+        let clear_m = assessments[contradicted].clear_m.expect("a crossing");
         assert!((clear_m - 1.0).abs() < 0.1, "{clear_m}");
     }
 }
 
 #[test]
-fn a_wall_seen_before_speaks_against_readings_through_it() {
+fn earlier_wall_contradicts_readings() {
     let mut prediction = prediction();
     prediction.assess(&ring(ORIGIN, &[(15.0, 1.0), (0.0, 1.0), (345.0, 1.0)]));
-    // From beside the wall, looking along it at 60 degrees from its normal.
+    // From the side of the wall, looking along it at 60 degrees from its normal.
     let pose = Pose { x_m: 0.5, y_m: -0.9, heading_deg: 60.0 };
     let assessment = prediction.assess(&ring(pose, &[(0.0, 0.0)]))[0];
     let crossing_m = assessment.clear_m.expect("a crossing");
@@ -81,11 +84,11 @@ fn a_wall_seen_before_speaks_against_readings_through_it() {
 }
 
 #[test]
-fn an_unheard_wall_is_split_and_its_stubs_go() {
+fn undetected_wall_is_split() {
     let mut prediction = prediction();
     prediction.assess(&ring(ORIGIN, &[(15.0, 1.0), (0.0, 1.0), (345.0, 1.0)]));
     let before_m = prediction.local()[0].length_m();
-    // The wall should be heard straight ahead and is not: it was none there.
+    // The wall should be detected straight ahead and is not: there is none there.
     prediction.assess(&ring(ORIGIN, &[(0.0, 0.0)]));
     let parts = prediction.local();
     assert_eq!(parts.len(), 2, "{parts:?}");
@@ -98,36 +101,36 @@ fn an_unheard_wall_is_split_and_its_stubs_go() {
 }
 
 #[test]
-fn a_wall_does_not_go_on_where_it_was_not_heard() {
+fn split_wall_is_not_extended() {
     let settings = PredictionSettings { extend_m: 2.0, ..PredictionSettings::ring(MAX_RANGE_M) };
     let mut prediction = FeaturePrediction::new(settings);
     let wall = [(15.0, 1.0), (0.0, 1.0), (345.0, 1.0)];
-    // Looking along the wall, so that it would not be heard, through what may be its going on.
-    let beside = Pose { x_m: 0.0, y_m: 1.2, heading_deg: 35.0 };
+    // Looking along the wall, where it can't be detected, through its possible extension.
+    let aside = Pose { x_m: 0.0, y_m: 1.2, heading_deg: 35.0 };
     prediction.assess(&ring(ORIGIN, &wall));
-    assert!(prediction.assess(&ring(beside, &[(0.0, 3.0)]))[0].confidence < 0.48, "it may go on");
-    // Beyond its end nothing is heard where a wall would be: it ends.
+    assert!(prediction.assess(&ring(aside, &[(0.0, 3.0)]))[0].confidence < 0.48, "extended");
+    // Beyond its end there is no echo where a wall would be: it ends.
     let past_its_end = Pose { y_m: 0.45, ..ORIGIN };
     prediction.assess(&ring(past_its_end, &[(0.0, 3.0)]));
-    assert_eq!(prediction.assess(&ring(beside, &[(0.0, 3.0)]))[0].confidence, 0.5);
-    // The rest of it is seen again: it is known to end all the same.
+    assert_eq!(prediction.assess(&ring(aside, &[(0.0, 3.0)]))[0].confidence, 0.5);
+    // The remainder is detected again, and its end stays known.
     prediction.assess(&ring(Pose { y_m: -0.4, ..ORIGIN }, &wall));
-    assert_eq!(prediction.assess(&ring(beside, &[(0.0, 3.0)]))[0].confidence, 0.5);
+    assert_eq!(prediction.assess(&ring(aside, &[(0.0, 3.0)]))[0].confidence, 0.5);
 }
 
 #[test]
-fn a_wall_lost_and_seen_again_stays_one_feature() {
+fn wall_seen_again_stays_one_feature() {
     let mut prediction = prediction();
     for _ in 0..30 {
         prediction.assess(&ring(ORIGIN, &[(15.0, 1.0), (0.0, 1.0), (345.0, 1.0)]));
-        assert_eq!(prediction.local().len(), 1, "both parts are of the wall that is seen");
+        assert_eq!(prediction.local().len(), 1, "both parts belong to the detected wall");
         prediction.assess(&ring(ORIGIN, &[(0.0, 0.0)]));
-        assert_eq!(prediction.local().len(), 2, "it is split where it is not heard");
+        assert_eq!(prediction.local().len(), 2, "split where it is not detected");
     }
 }
 
 #[test]
-fn the_far_past_is_forgotten() {
+fn distant_features_are_forgotten() {
     let mut prediction = prediction();
     prediction.assess(&ring(ORIGIN, &[(0.0, 1.0)]));
     assert_eq!(prediction.local().len(), 1);
@@ -138,7 +141,7 @@ fn the_far_past_is_forgotten() {
 }
 
 #[test]
-fn a_stepper_arc_gives_the_wall_it_came_from() {
+fn stepper_arc_yields_its_wall() {
     let beams: Vec<(f64, f64)> = (-11..=11).map(|i| (f64::from(i) * 0.9 + 40.0, 1.5)).collect();
     let mut prediction = FeaturePrediction::new(PredictionSettings::stepper(20.7, MAX_RANGE_M));
     let assessments = prediction.assess(&ring(ORIGIN, &beams));
@@ -153,7 +156,7 @@ fn a_stepper_arc_gives_the_wall_it_came_from() {
 }
 
 #[test]
-fn nothing_and_near_readings_change_nothing() {
+fn empty_and_near_readings_are_neutral() {
     let mut prediction = prediction();
     assert_eq!(prediction.assess(&ring(ORIGIN, &[])), []);
     let mut near = ring(ORIGIN, &[(0.0, 1.0), (5.0, 0.0)]);

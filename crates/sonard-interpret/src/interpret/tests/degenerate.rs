@@ -1,4 +1,4 @@
-//! Input that holds nothing, or not enough.
+//! Empty or insufficient input.
 
 use uuid::Uuid;
 
@@ -20,7 +20,7 @@ fn fig13() -> ScanView {
 }
 
 #[test]
-fn too_little_is_said_so() {
+fn insufficient_scans_are_rejected() {
     let whole = fig13();
     assert_eq!(Sweep::of(&ScanView { start: None, ..whole.clone() }), Err(SweepError::NoPose));
     let one = ScanView { pings: whole.pings[..1].to_vec(), ..whole.clone() };
@@ -33,12 +33,12 @@ fn too_little_is_said_so() {
 }
 
 #[test]
-fn silence_has_no_features() {
-    let mut silent = fig13();
-    for ping in &mut silent.pings {
+fn no_echo_yields_no_features() {
+    let mut empty = fig13();
+    for ping in &mut empty.pings {
         (ping.status, ping.range_m) = (PingStatus::NoEcho, None);
     }
-    assert_eq!(features(&[silent], &Settings::default()), []);
+    assert_eq!(features(&[empty], &Settings::default()), []);
     assert_eq!(interpret(&[], &extents(), &Settings::default()), []);
 }
 
@@ -47,7 +47,7 @@ fn extents() -> Extents {
 }
 
 #[test]
-fn readings_that_are_no_numbers_count_as_lost() {
+fn non_finite_readings_count_as_lost() {
     let mut scan = fig13();
     let expected = features(std::slice::from_ref(&scan), &Settings::default()).len();
     scan.pings[5].range_m = Some(f64::NAN);
@@ -61,10 +61,10 @@ fn readings_that_are_no_numbers_count_as_lost() {
 }
 
 #[test]
-fn a_second_scan_from_the_same_place_does_not_decide() {
+fn same_position_does_not_decide() {
     let (one, mut two) = (fig13(), fig13());
     two.scan = Uuid::from_u128(2);
-    // Turned, or it would be a repeat.
+    // Rotated; otherwise it would be a repeat.
     two.start.as_mut().expect("a start").pose.heading_deg += 45.0;
     for ping in &mut two.pings {
         ping.azimuth_deg = wrap_360(ping.azimuth_deg - 45.0);
@@ -79,11 +79,11 @@ fn a_second_scan_from_the_same_place_does_not_decide() {
 }
 
 #[test]
-fn repeats_from_one_pose_are_one_scan() {
+fn repeats_are_merged() {
     let repeats = [1, 2, 3].map(|number| {
         let mut scan = fig13();
         scan.scan = Uuid::from_u128(number);
-        // Each has an odd reading of its own, in another arc.
+        // Each has an outlier in a different arc.
         let odd = &mut scan.pings[40 * number as usize];
         (odd.status, odd.range_m) = (PingStatus::Echo, Some(0.2));
         scan
@@ -98,7 +98,7 @@ fn repeats_from_one_pose_are_one_scan() {
 }
 
 #[test]
-fn a_circle_around_the_ranger_is_no_arc() {
+fn circle_around_the_ranger_is_no_arc() {
     let mut round = fig13();
     for ping in &mut round.pings {
         (ping.status, ping.range_m) = (PingStatus::Echo, Some(1.0));
@@ -112,7 +112,7 @@ fn a_circle_around_the_ranger_is_no_arc() {
 }
 
 #[test]
-fn a_part_of_a_turn_cuts_off_what_lies_at_its_ends() {
+fn partial_sweep_cuts_off_its_ends() {
     let mut part = fig13();
     part.pings.retain(|ping| ping.azimuth_deg < 75.0);
     let features = features(&[part], &Settings::default());
@@ -121,7 +121,7 @@ fn a_part_of_a_turn_cuts_off_what_lies_at_its_ends() {
 }
 
 #[test]
-fn what_covers_an_arc_is_noticed() {
+fn covered_arc_is_interference() {
     let mut covered = fig13();
     for ping in &mut covered.pings[90..100] {
         (ping.status, ping.range_m) = (PingStatus::Echo, Some(0.3));
@@ -131,9 +131,9 @@ fn what_covers_an_arc_is_noticed() {
     assert_eq!(plane.and_then(|plane| plane.reason), Some(Reason::Interference));
 }
 
-/// What a second place sees only in part decides nothing, and that is why.
+/// An arc partly covered from the second position decides nothing and is reported as such.
 #[test]
-fn what_is_covered_from_the_second_place_says_so() {
+fn covered_second_view_is_interference() {
     let text = shipped::text("plane-corner-edge").expect("shipped");
     let scene = std::sync::Arc::new(Scene::from_json(text).expect("a scene"));
     let simulator = simulator(scene.clone());
@@ -148,7 +148,7 @@ fn what_is_covered_from_the_second_place_says_so() {
     assert!(!seen.is_empty());
     let mut interfered = 0;
     for (plane, side) in seen.iter().flat_map(|plane| [(plane, 1.0), (plane, -1.0)]) {
-        // Something near stands before one end of it, as the second place sees it.
+        // A near object covers one end as seen from the second position.
         let mut covered = two.clone();
         let range_m = plane.range_m.expect("a range");
         let is_before = |ping: &sonard_records::Ping| {
@@ -161,7 +161,7 @@ fn what_is_covered_from_the_second_place_says_so() {
         let all = features(&[one.clone(), covered], &Settings::default());
         let again =
             all.iter().find(|feature| (feature.scan, feature.beams) == (plane.scan, plane.beams));
-        let again = again.expect("the first scan is as it was");
+        let again = again.expect("the first scan is unchanged");
         assert_ne!(again.kind, FeatureKind::Corner, "{again:?}");
         interfered += usize::from(again.reason == Some(Reason::Interference));
     }

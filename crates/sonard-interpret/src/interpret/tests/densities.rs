@@ -1,4 +1,4 @@
-//! The errors' densities: the paper's formulas, and what sampling gives.
+//! Error densities against the paper's formulas and against samples.
 
 use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, Normal};
@@ -9,13 +9,13 @@ use crate::interpret::UniformSum;
 /// Quantisation step, degrees.
 const STEP: f64 = 0.9;
 
-/// Kolmogorov and Smirnov's bound at a significance of 0.001, times the root of the sample size.
+/// Kolmogorov-Smirnov bound at a significance of 0.001, times the root of the sample size.
 const KS_BOUND: f64 = 1.95;
 
 const SAMPLES: usize = 20_000;
 
 #[test]
-fn extent_error_without_noise_is_the_triangle_of_equation_19() {
+fn extent_error_is_equation_19() {
     let error = UniformSum::of_extent([STEP; 2], 0.0);
     for i in -12..=12 {
         let x = f64::from(i) * 0.1;
@@ -26,7 +26,7 @@ fn extent_error_without_noise_is_the_triangle_of_equation_19() {
 }
 
 #[test]
-fn beta_error_without_noise_is_the_cubic_of_equation_23() {
+fn beta_error_is_equation_23() {
     let error = UniformSum::of_beta([[STEP; 2]; 2], [0.0; 2], 0.0);
     let d4 = STEP.powi(4);
     for i in -11..=11 {
@@ -44,7 +44,7 @@ fn beta_error_without_noise_is_the_cubic_of_equation_23() {
 }
 
 #[test]
-fn densities_integrate_to_their_distribution() {
+fn densities_integrate_to_cumulative() {
     for (widths, sigma) in
         [(&[0.9, 0.9][..], 0.4), (&[0.9, 1.8, 0.45, 0.45][..], 0.1), (&[][..], 0.3)]
     {
@@ -61,7 +61,7 @@ fn densities_integrate_to_their_distribution() {
     }
 }
 
-/// Greatest distance between the distribution of samples and a distribution.
+/// Kolmogorov-Smirnov distance between samples and a distribution.
 fn ks_distance(mut samples: Vec<f64>, cumulative: impl Fn(f64) -> f64) -> f64 {
     samples.sort_by(f64::total_cmp);
     let count = samples.len() as f64;
@@ -75,7 +75,8 @@ fn ks_distance(mut samples: Vec<f64>, cumulative: impl Fn(f64) -> f64) -> f64 {
         .fold(0.0, f64::max)
 }
 
-/// First and last beam on a grid of random phase that an arc reaches, whose borders are noisy.
+/// Middle and extent estimated from the first and last beam, on a grid of random phase, within an
+/// arc with noisy borders.
 fn estimate(rng: &mut Pcg64, middle: f64, extent: f64, sigma: f64) -> (f64, f64) {
     let noise = Normal::new(0.0, sigma).expect("a deviation");
     let start = middle - extent / 2.0 + noise.sample(rng);
@@ -91,26 +92,26 @@ fn sampled_errors_follow_the_densities() {
     let mut rng = Pcg64::seed_from_u64(19);
     let bound = KS_BOUND / (SAMPLES as f64).sqrt();
     for sigma in [0.0, 0.3] {
-        let (mut of_extent, mut of_beta) = (Vec::new(), Vec::new());
+        let (mut extent_errors, mut beta_errors) = (Vec::new(), Vec::new());
         for _ in 0..SAMPLES {
-            // The paper takes both borders' errors as independent, so the extent is random too.
-            let (extent, other) = (rng.random_range(15.0..25.0), rng.random_range(15.0..25.0));
-            let (one, seen) = estimate(&mut rng, 3.0, extent, sigma);
-            let (two, _) = estimate(&mut rng, 3.0, other, sigma);
-            of_extent.push(seen - extent);
-            of_beta.push(one - two);
+            // The paper assumes independent border errors, so the extent is random as well.
+            let (extent, second) = (rng.random_range(15.0..25.0), rng.random_range(15.0..25.0));
+            let (first_middle, estimated) = estimate(&mut rng, 3.0, extent, sigma);
+            let (second_middle, _) = estimate(&mut rng, 3.0, second, sigma);
+            extent_errors.push(estimated - extent);
+            beta_errors.push(first_middle - second_middle);
         }
         let extent_error = UniformSum::of_extent([STEP; 2], sigma);
         let beta_error = UniformSum::of_beta([[STEP; 2]; 2], [sigma; 2], 0.0);
-        let far = ks_distance(of_extent, |x| extent_error.cumulative(x));
+        let far = ks_distance(extent_errors, |x| extent_error.cumulative(x));
         assert!(far < bound, "extent, sigma {sigma}: {far} against {bound}");
-        let far = ks_distance(of_beta, |x| beta_error.cumulative(x));
+        let far = ks_distance(beta_errors, |x| beta_error.cumulative(x));
         assert!(far < bound, "beta, sigma {sigma}: {far} against {bound}");
     }
 }
 
 #[test]
-fn a_wrong_density_would_be_noticed() {
+fn wrong_density_is_detected() {
     let mut rng = Pcg64::seed_from_u64(23);
     let samples: Vec<f64> = (0..SAMPLES)
         .map(|_| {

@@ -1,4 +1,4 @@
-//! Which cells are mapped, and how often scans count.
+//! Extent of the mapped region, and weights of scans.
 
 use crate::interpret::{
     Beam, Heard, Sweep,
@@ -6,27 +6,27 @@ use crate::interpret::{
 };
 use sonard_model::geometry::{DVec2, Pose};
 
-/// Readings to the right of (1.02, 2.01).
-fn sweep(heard: &[Heard]) -> Sweep {
-    let beam = |&heard| Beam { azimuth_deg: 0.0, index: 0, heard, mount: DVec2::ZERO };
+/// Readings along +x from (1.02, 2.01).
+fn sweep(outcomes: &[Heard]) -> Sweep {
+    let beam = |&outcome| Beam { azimuth_deg: 0.0, index: 0, heard: outcome, mount: DVec2::ZERO };
     let pose = Pose { x_m: 1.02, y_m: 2.01, heading_deg: 0.0 };
-    Sweep { pose, step_deg: 0.9, beams: heard.iter().map(beam).collect(), closed: false }
+    Sweep { pose, step_deg: 0.9, beams: outcomes.iter().map(beam).collect(), closed: false }
 }
 
 #[test]
-fn five_scans_are_enough_and_fewer_count_more_often() {
+fn few_scans_have_more_weight() {
     let mapping = Mapping::default();
     let counts = [0, 1, 2, 3, 4, 5, 6, 1000].map(|scans| mapping.evidence(scans));
     assert_eq!(counts, [5, 5, 3, 2, 2, 1, 1, 1]);
-    let asked = Mapping { evidence: Some(3), ..mapping };
-    assert_eq!([1, 100].map(|scans| asked.evidence(scans)), [3, 3]);
+    let fixed = Mapping { evidence: Some(3), ..mapping };
+    assert_eq!([1, 100].map(|scans| fixed.evidence(scans)), [3, 3]);
 }
 
 #[test]
-fn half_a_metre_around_what_was_seen_is_mapped_in_whole_cells() {
+fn mapped_region_has_a_margin() {
     let mapping = Mapping::default();
     let sweeps = [sweep(&[Heard::Echo(2.0), Heard::Echo(4.5), Heard::Silent, Heard::Near])];
-    // To x = 3.02; what is farther than 4 m is not looked at.
+    // Echoes reach x = 3.02; those beyond 4 m are ignored.
     let shape = mapping.shape(&sweeps, 4.0).expect("few cells");
     assert!(shape.origin.distance(DVec2::new(0.5, 1.5)) < 1e-9, "{shape:?}");
     assert_eq!((shape.width, shape.height, shape.resolution_m), (61, 21, 0.05));

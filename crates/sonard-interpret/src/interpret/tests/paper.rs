@@ -1,4 +1,4 @@
-//! The figures printed in the paper.
+//! Values printed in the paper.
 
 use std::sync::Arc;
 
@@ -12,7 +12,7 @@ use sonard_model::{
     scene::{Scene, shipped},
 };
 
-/// The motor's step, degrees.
+/// Step of the motor, degrees.
 const STEP_DEG: f64 = 0.9;
 
 fn extents() -> Extents {
@@ -20,7 +20,7 @@ fn extents() -> Extents {
     Extents::new(&sensor, &Air::default(), true).expect("sensible figures")
 }
 
-/// What is seen from poses of `plane-corner-edge`.
+/// Features detected from poses of `plane-corner-edge`.
 fn seen(poses: &[&str]) -> Vec<Feature> {
     let text = shipped::text("plane-corner-edge").expect("shipped");
     let scene = Arc::new(Scene::from_json(text).expect("a scene"));
@@ -33,7 +33,7 @@ fn seen(poses: &[&str]) -> Vec<Feature> {
     features(&scans, &Settings::default())
 }
 
-/// The feature in a direction, degrees.
+/// Feature in a direction, degrees.
 fn at(features: &[Feature], bearing_deg: f64) -> &Feature {
     let off = |feature: &&Feature| {
         let off_deg = (feature.bearing_deg - bearing_deg).rem_euclid(360.0);
@@ -45,7 +45,7 @@ fn at(features: &[Feature], bearing_deg: f64) -> &Feature {
 }
 
 #[test]
-fn extents_and_boundary_are_the_printed_ones() {
+fn extents_and_boundary_are_reproduced() {
     let extents = extents();
     let printed = |value: f64, paper: f64, last_digit: f64| {
         assert!((value - paper).abs() <= last_digit, "{value} for {paper}");
@@ -54,19 +54,19 @@ fn extents_and_boundary_are_the_printed_ones() {
     printed(extents.edge_deg(0.47, 0.095), 7.8, 0.05);
     // 8.1 with the far field at 5.04 cm; the paper's own figures give 8.096 and print 8.0.
     printed(extents.edge_deg(0.44, 0.095), 8.0, 0.15);
-    // The paper takes the 7.8 degrees of 47 cm for its b(44 cm); b(44 cm) itself is 15.7.
+    // The paper uses the 7.8 degrees of 47 cm for its b(44 cm); b(44 cm) itself is 15.7.
     printed((23.3 + 7.8) / 2.0, 15.55, 1e-9);
     printed(extents.boundary_deg(0.47, 0.095), 15.55, 0.05);
     printed(extents.boundary_deg(0.44, 0.095), 15.55, 0.2);
     printed(extents.far_field_m(), 0.05, 0.0005);
     printed(extents.half_beam_deg(), 11.8, 0.1);
-    // (7) with these figures.
+    // Equation (7) with these values.
     printed(extents.edge_max_range_m(0.095), (0.095_f64 / 0.02).powi(2) * 0.0504, 1e-3);
 }
 
 #[test]
-fn the_largest_step_is_what_equation_20_gives() {
-    // The paper prints 4.3 degrees without the range: it is that of the start of the far field,
+fn largest_step_is_equation_20() {
+    // The paper prints 4.3 degrees without a range: the value at the start of the far field,
     // where edges are loudest. For its edge at 47 cm it would be 7.75.
     let extents = extents();
     assert!((extents.largest_step_deg(extents.far_field_m(), 0.095) - 4.3).abs() < 0.01);
@@ -74,7 +74,7 @@ fn the_largest_step_is_what_equation_20_gives() {
 }
 
 #[test]
-fn minimum_sizes_are_the_printed_ones() {
+fn minimum_sizes_are_reproduced() {
     let extents = extents();
     let delta_m = least_translation_m(2.0, STEP_DEG);
     assert!((delta_m - 0.0628).abs() < 1e-4);
@@ -85,7 +85,7 @@ fn minimum_sizes_are_the_printed_ones() {
 }
 
 #[test]
-fn translations_of_figure_14_satisfy_equation_25() {
+fn figure_14_satisfies_equation_25() {
     // asin(6.9 cm / r) = 6.8 degrees puts the paper's corner at 58 cm.
     let range_m = 0.069 / 6.8_f64.to_radians().sin();
     assert!((range_m - 0.583).abs() < 0.001);
@@ -93,7 +93,7 @@ fn translations_of_figure_14_satisfy_equation_25() {
 }
 
 #[test]
-fn one_scan_tells_the_edges_and_asks_for_a_second_place() {
+fn one_scan_classifies_edges_only() {
     let features = seen(&["fig13"]);
     assert_eq!(features.len(), 6, "{features:#?}");
     for bearing_deg in [0.0, 72.0, 117.0, 162.0] {
@@ -101,7 +101,7 @@ fn one_scan_tells_the_edges_and_asks_for_a_second_place() {
         assert!((feature.extent_deg - 23.3).abs() <= STEP_DEG, "{feature:?}");
         assert_eq!(feature.kind, FeatureKind::Unresolved);
         assert_eq!(feature.reason, Some(Reason::SecondPosition));
-        // One scan tells nothing of plane or corner: they are as likely as before it.
+        // One scan carries no information on plane or corner: they keep their prior ratio.
         let Probabilities { plane, corner, other, .. } = feature.probabilities;
         assert!((plane / corner - 0.58 / 0.34).abs() < 1e-9, "{feature:?}");
         assert!(other < 0.03, "{feature:?}");
@@ -113,13 +113,13 @@ fn one_scan_tells_the_edges_and_asks_for_a_second_place() {
         assert!((feature.extent_deg - extent_deg).abs() <= STEP_DEG, "{feature:?}");
         assert!((feature.range_m.expect("a range") - range_m).abs() < 0.001);
         assert!(feature.boundary_deg.is_some_and(|b| (b - 15.55).abs() < 0.2));
-        // The paper knows nothing else than its edges; what else it may be keeps it from certainty.
+        // The paper has no class but its own; the alternative "other" prevents certainty here.
         assert!(feature.confidence > 0.95, "{feature:?}");
     }
 }
 
 #[test]
-fn two_scans_tell_planes_from_the_corner() {
+fn three_scans_separate_planes_and_corner() {
     let expected = [
         (0.0, FeatureKind::Plane),
         (36.0, FeatureKind::Edge),
@@ -143,7 +143,7 @@ fn two_scans_tell_planes_from_the_corner() {
 }
 
 #[test]
-fn a_scan_from_the_proposed_place_decides() {
+fn proposed_position_decides() {
     let text = shipped::text("plane-corner-edge").expect("shipped");
     let scene = Arc::new(Scene::from_json(text).expect("a scene"));
     let simulator = simulator(scene.clone());

@@ -1,8 +1,8 @@
-//! Probabilities of kinds, and how sure a border is, by hand.
+//! Class probabilities and border uncertainties against hand calculation.
 
 use crate::interpret::{
     Extents, Probabilities,
-    belief::{ExtentLikelihood, probabilities},
+    posterior::{ExtentLikelihood, probabilities},
 };
 use sonard_model::acoustics::{Air, Sensor};
 
@@ -14,31 +14,31 @@ fn check(found: &Probabilities, weights: [f64; 4]) {
     }
 }
 
-/// Densities of 0.2 and 0.1 per degree where a plane would be 20 degrees wide, so that anything has 1/30.
+/// Densities of 0.2 and 0.1 per degree where a plane is 20 degrees wide; other has 1/30.
 #[test]
 fn priors_and_likelihoods_multiply() {
     let extent = ExtentLikelihood::new(0.2, 0.1, 20.0);
-    // Of arcs that one nearer arc would hide 32 in 100 are something else.
+    // One nearer arc would hide it: 32 in 100 such arcs are other.
     let like_plane = 0.99 * 0.2 + 0.01 / 30.0;
     let plane = 0.68 * 0.58 * like_plane;
     let corner = 0.68 * 0.34 * like_plane;
     let edge = 0.68 * 0.08 * (0.7 * 0.1 + 0.3 / 30.0);
     let other = 0.32 * (0.65 * 0.2 + 0.35 / 30.0);
     check(&probabilities(&extent, 1, []), [plane, corner, edge, other]);
-    // A turn that is three times as likely of a plane; something else may turn by any of 60 degrees.
+    // A turn three times as likely for a plane; other may turn by any of 60 degrees.
     let turned = probabilities(&extent, 1, [[0.3, 0.1]]);
     let other = other * (0.8 * 0.2 + 0.2 / 60.0);
     check(&turned, [0.3 * plane, 0.1 * corner, 0.1 * edge, other]);
-    // Beyond five nearer arcs nothing changes.
+    // The prior is constant beyond five nearer arcs.
     assert_eq!(probabilities(&extent, 5, []), probabilities(&extent, 9, []));
     assert!(probabilities(&extent, 0, []).other < 0.05);
     let nothing = probabilities(&ExtentLikelihood::NONE, 0, []);
     assert_eq!(nothing, Probabilities { other: 1.0, ..Probabilities::default() });
 }
 
-/// Noise moves the border by as much as another threshold does.
+/// Noise moves the border like an equal relative change of the threshold.
 #[test]
-fn a_border_is_as_unsure_as_a_threshold_by_the_noise() {
+fn border_sigma_follows_the_threshold() {
     for name in ["bozma-kuc-60khz", "senscomp-6500"] {
         let sensor = Sensor::preset(name).expect("a preset");
         let extent_deg = |share: f64| {
@@ -55,7 +55,7 @@ fn a_border_is_as_unsure_as_a_threshold_by_the_noise() {
         assert!((found_deg / (0.001 * by_threshold) - 1.0).abs() < 0.02, "{name}: {found_deg}");
         assert_eq!(extents.border_sigma_deg(at_deg, 0.0), 0.0);
         assert_eq!(extents.border_sigma_deg(0.0, noise), 0.0);
-        // No further than the arc is wide.
+        // Limited by the width of the arc.
         assert!((extents.border_sigma_deg(at_deg, 10.0) - at_deg / 2.0).abs() < 1e-9);
     }
 }

@@ -1,4 +1,4 @@
-//! Scans as turns of beams: of the fewest stops, and of arrays.
+//! Sweeps of minimal length, closed sweeps, and sweeps of arrays.
 
 use std::sync::Arc;
 
@@ -31,7 +31,7 @@ fn two_stops_are_enough() {
 }
 
 #[test]
-fn a_closed_turn_has_a_gap_before_its_first_stop() {
+fn closed_sweep_has_a_closing_gap() {
     let whole = scan(&simulator(scene()), 1, &Pose { x_m: 1.2, y_m: 1.0, heading_deg: 30.0 });
     // Two readings in a row may be lost, and not three.
     for (lost, gap_deg) in [(0, Some(0.9)), (2, Some(2.7)), (3, None)] {
@@ -41,25 +41,25 @@ fn a_closed_turn_has_a_gap_before_its_first_stop() {
         let found_deg = sweep.gap_before_deg(0);
         assert_eq!(sweep.closed, gap_deg.is_some(), "{lost}");
         assert_eq!(found_deg.is_some(), gap_deg.is_some(), "{lost}");
-        let off_deg = found_deg.zip(gap_deg).map_or(0.0, |(one, other)| one - other);
+        let off_deg = found_deg.zip(gap_deg).map_or(0.0, |(found, expected)| found - expected);
         assert!(off_deg.abs() < 1e-9, "{lost}: {found_deg:?}");
     }
 }
 
-/// A beam of an array is at its ranger, wherever the robot stands and looks.
+/// Beams of an array have the position of their ranger for any pose of the robot.
 #[test]
-fn beams_of_an_array_are_where_its_rangers_are() {
+fn array_beams_are_at_their_rangers() {
     let array = Arc::new(RangerArray::preset("pioneer-8").expect("an array"));
     let sensor = Sensor::preset(&array.sensor).expect("a preset");
     let (air, options) = (Air::default(), ConeOptions::default().into());
     let model = ArrayModel::new(array.clone(), &scene(), &sensor, air, options).expect("a model");
     let pose = Pose { x_m: 1.3, y_m: 0.8, heading_deg: 70.0 };
     let (scan, time) = (Uuid::nil(), Timestamp::UNIX_EPOCH);
-    let stand = model.at(pose).expect("a stand");
+    let station = model.at(pose).expect("a free position");
     let pings = (0..array.rangers.len()).map(|ranger| {
-        let prediction = stand.ping(ranger).expect("few paths");
+        let prediction = station.ping(ranger).expect("few paths");
         let index = ranger as u32;
-        Record::Ping(Box::new(Ping::of_array(&stand, scan, &pose, index, ranger, &prediction)))
+        Record::Ping(Box::new(Ping::of_array(&station, scan, &pose, index, ranger, &prediction)))
     });
     let records = [
         Record::Session(Box::new(Session::of_array(&model, time))),

@@ -14,16 +14,16 @@ use sonard_model::{
 };
 use sonard_records::{PathKind, PingStatus, ScanView};
 
-/// As many as the paper's claim is tried on.
+/// Number of worlds in the paper's claim.
 const WORLDS: usize = 1000;
 
-/// The sensor hears edges up to here with the model's `sigma_E`, metres (7).
-const EDGE_HEARD_M: f64 = 1.14;
+/// Maximum range of edges with the model's `sigma_E`, metres (7).
+const EDGE_RANGE_M: f64 = 1.14;
 
-/// Twice the half beam angle, degrees: elements this far apart do not interfere (28).
+/// Twice the half beam angle, degrees: elements farther apart do not interfere (28).
 const APART_DEG: f64 = 23.6;
 
-/// Something that a scan shows.
+/// Element of a world.
 #[derive(Debug, Clone)]
 struct Element {
     kind: FeatureKind,
@@ -31,16 +31,16 @@ struct Element {
     point: DVec2,
     /// Direction of a plane.
     along: DVec2,
-    /// How far a plane reaches to both sides of `point`, metres.
+    /// Extent of a plane on both sides of `point`, metres.
     reach_m: [f64; 2],
 }
 
 impl Element {
-    fn of_point(kind: FeatureKind, point: DVec2) -> Self {
+    fn at_point(kind: FeatureKind, point: DVec2) -> Self {
         Self { kind, point, along: DVec2::X, reach_m: [0.0; 2] }
     }
 
-    /// Where its echo comes from when heard from `place`; `None` if it gives none there.
+    /// Origin of its echo as received at `place`; `None` without an echo there.
     fn echo_point(&self, place: DVec2, half_width_m: f64) -> Option<DVec2> {
         if self.kind != FeatureKind::Plane {
             return Some(self.point);
@@ -53,7 +53,7 @@ impl Element {
     }
 }
 
-/// Walls, and what they are.
+/// Walls with the elements that they form.
 #[derive(Debug, Default)]
 struct World {
     walls: Vec<(DVec2, DVec2)>,
@@ -61,7 +61,7 @@ struct World {
 }
 
 impl World {
-    /// Three elements in the thirds of a turn round the origin.
+    /// Three elements in the thirds of a turn around the origin.
     fn random(rng: &mut Pcg64) -> Self {
         let mut world = Self::default();
         let turn = rng.random_range(0.0..360.0_f64);
@@ -87,23 +87,23 @@ impl World {
         let ends = [foot - reach_m[0] * along, foot + reach_m[1] * along];
         self.walls.push((ends[0], ends[1]));
         self.elements.push(Element { kind: FeatureKind::Plane, point: foot, along, reach_m });
-        self.elements.extend(ends.map(|end| Element::of_point(FeatureKind::Edge, end)));
+        self.elements.extend(ends.map(|end| Element::at_point(FeatureKind::Edge, end)));
     }
 
     fn add_corner(&mut self, rng: &mut Pcg64, bearing: f64) {
         let range_m = rng.random_range(1.45..1.95);
-        // Between the way to the corner and a side: (28).
+        // Angle between the direction to the corner and a side: (28).
         let alpha = rng.random_range(24.0..66.0_f64).to_radians();
         let apex = range_m * DVec2::from_angle(bearing);
         let back = (-apex).normalize();
         let sides = [DVec2::from_angle(alpha), DVec2::from_angle(alpha - FRAC_PI_2)];
         for side in sides {
-            // At least (26) and (28); so short that the ends are too far to be heard.
+            // At least (26) and (28), but too short for the ends to be detected.
             let end = apex + rng.random_range(0.06..0.25) * back.rotate(side);
             self.walls.push((apex, end));
-            self.elements.push(Element::of_point(FeatureKind::Edge, end));
+            self.elements.push(Element::at_point(FeatureKind::Edge, end));
         }
-        self.elements.push(Element::of_point(FeatureKind::Corner, apex));
+        self.elements.push(Element::at_point(FeatureKind::Corner, apex));
     }
 
     fn add_edge(&mut self, rng: &mut Pcg64, bearing: f64) {
@@ -116,9 +116,9 @@ impl World {
             let length_m = rng.random_range(1.0..1.2) * (1.25 - range_m) / side.cos();
             let end = apex + length_m * ahead.rotate(DVec2::from_angle(side));
             self.walls.push((apex, end));
-            self.elements.push(Element::of_point(FeatureKind::Edge, end));
+            self.elements.push(Element::at_point(FeatureKind::Edge, end));
         }
-        self.elements.push(Element::of_point(FeatureKind::Edge, apex));
+        self.elements.push(Element::at_point(FeatureKind::Edge, apex));
     }
 
     fn simulator(&self) -> Simulator {
@@ -149,25 +149,25 @@ impl World {
         }))
     }
 
-    /// What must be seen from a place; `None` if elements interfere there.
+    /// Elements visible from a position; `None` if elements interfere there.
     ///
-    /// Elements whose arc lies in that of a nearer one are not seen at all. All others must be
-    /// 2 theta_o apart from those seen, and the second place must see what the first does.
+    /// Elements whose arc lies within that of a nearer one are invisible. All others must be
+    /// 2 theta_o apart from the visible ones, and the second position must see what the first does.
     fn seen_from(&self, place: DVec2, extents: &Extents) -> Option<Vec<&Element>> {
-        let mut heard: Vec<(f64, f64, f64, &Element)> = Vec::new();
+        let mut detected: Vec<(f64, f64, f64, &Element)> = Vec::new();
         for element in &self.elements {
             let point = element.echo_point(place, extents.half_width_m())?;
             let (range_m, bearing) = ((point - place).length(), (point - place).to_angle());
             let half_deg = match element.kind {
-                FeatureKind::Edge if range_m > EDGE_HEARD_M => continue,
+                FeatureKind::Edge if range_m > EDGE_RANGE_M => continue,
                 FeatureKind::Edge => extents.edge_deg(range_m, 0.095) / 2.0,
                 _ => extents.plane_corner_deg(range_m, 0.98) / 2.0,
             };
-            heard.push((range_m, bearing, half_deg, element));
+            detected.push((range_m, bearing, half_deg, element));
         }
-        heard.sort_by(|a, b| a.0.total_cmp(&b.0));
+        detected.sort_by(|a, b| a.0.total_cmp(&b.0));
         let mut seen: Vec<(f64, f64, &Element)> = Vec::new();
-        for (_, bearing, half_deg, element) in heard {
+        for (_, bearing, half_deg, element) in detected {
             let off = |other: f64| wrap_pi(bearing - other).to_degrees().abs();
             let covered = |(other, other_half_deg, _): &(f64, f64, &Element)| {
                 off(*other) + half_deg < other_half_deg - 1.0
@@ -184,34 +184,34 @@ impl World {
     }
 }
 
-/// Whether every echo came straight from an element: none took a way over several.
+/// Returns `true` if every echo came directly from a single element.
 fn is_direct(scan: &ScanView) -> bool {
     scan.pings.iter().filter(|ping| ping.status == PingStatus::Echo).all(|ping| {
         ping.path.as_ref().is_some_and(|path| match (path.kind, path.order) {
             (PathKind::Specular, 1) | (PathKind::Diffracted, 0) => true,
-            // A corner's two sides meet where the sound turns.
+            // Path via the two sides of a corner.
             (PathKind::Specular, 2) => {
-                path.interactions.iter().all(|met| met.id.starts_with("wall-"))
+                path.interactions.iter().all(|point| point.id.starts_with("wall-"))
             }
             _ => false,
         })
     })
 }
 
-/// How readings are spoilt.
+/// Quantization and noise of the readings.
 #[derive(Debug, Clone, Copy)]
-struct Spoil {
+struct Disturbance {
     range_step_m: f64,
-    /// Greatest error of a beam's direction, degrees.
+    /// Maximum error of a beam's direction, degrees.
     azimuth_deg: f64,
 }
 
-/// A scan at a place, as the motor's quantised and the clock's rounded readings give it.
+/// Scan at a pose, with optional quantization of ranges and errors of the motor.
 fn take(
     simulator: &Simulator,
     number: u128,
     pose: &Pose,
-    spoil: Option<(&mut Pcg64, Spoil)>,
+    spoil: Option<(&mut Pcg64, Disturbance)>,
 ) -> ScanView {
     let mut scan = scan(simulator, number, pose);
     let Some((rng, spoil)) = spoil else { return scan };
@@ -227,20 +227,20 @@ fn take(
     scan
 }
 
-/// What became of a world.
-enum Outcome {
-    /// It does not satisfy the constraints.
+/// Result for one world.
+enum Trial {
+    /// World that violates the constraints.
     Unfit,
-    /// Everything in it is named right, or not.
+    /// World within the constraints, with the correctness of all classifications.
     Fit { right: bool, what: String },
 }
 
-/// Scans a world from the origin and wherever the interpretation asks for.
-fn explore(rng: &mut Pcg64, spoil: Option<Spoil>, settings: &Settings) -> Outcome {
+/// Scans a world from the origin and from each proposed position.
+fn explore(rng: &mut Pcg64, spoil: Option<Disturbance>, settings: &Settings) -> Trial {
     let world = World::random(rng);
     let simulator = world.simulator();
     let extents = Extents::new(simulator.sensor(), simulator.air(), true).expect("figures");
-    let Some(truth) = world.seen_from(DVec2::ZERO, &extents) else { return Outcome::Unfit };
+    let Some(truth) = world.seen_from(DVec2::ZERO, &extents) else { return Trial::Unfit };
     let heading_deg = rng.random_range(0.0..360.0);
     let mut pose = Pose { x_m: 0.0, y_m: 0.0, heading_deg };
     let (mut scans, mut found): (Vec<ScanView>, Vec<Feature>) = (Vec::new(), Vec::new());
@@ -251,20 +251,21 @@ fn explore(rng: &mut Pcg64, spoil: Option<Spoil>, settings: &Settings) -> Outcom
         scans.push(take(&simulator, number, &pose, spoil.map(|spoil| (&mut *rng, spoil))));
         let direct = scans.last().is_some_and(is_direct);
         if !same || (spoil.is_none() && !direct) {
-            return Outcome::Unfit;
+            return Trial::Unfit;
         }
         found = features(&scans, settings);
         let Some(next) = found.iter().find_map(|feature| feature.next) else { break };
-        // The robot turns too, so that the motor's steps fall elsewhere.
+        // The robot turns as well, so that the motor's steps fall elsewhere.
         let turned_deg = rng.random_range(0.0..360.0);
         pose = Pose { x_m: next.x_m, y_m: next.y_m, heading_deg: turned_deg };
     }
-    let right = found.len() == truth.len() && truth.iter().all(|element| is_named(element, &found));
+    let right =
+        found.len() == truth.len() && truth.iter().all(|element| is_classified(element, &found));
     let what = format!("{truth:#?}\n{found:#?}");
-    Outcome::Fit { right, what }
+    Trial::Fit { right, what }
 }
 
-fn is_named(element: &Element, found: &[Feature]) -> bool {
+fn is_classified(element: &Element, found: &[Feature]) -> bool {
     found.iter().any(|feature| {
         let place = feature.x_m.zip(feature.y_m).map(DVec2::from);
         feature.kind == element.kind
@@ -272,13 +273,13 @@ fn is_named(element: &Element, found: &[Feature]) -> bool {
     })
 }
 
-/// Of so many fit worlds, how many are named right; and the first that is not.
-fn count_right(seed: u64, spoil: Option<Spoil>, settings: &Settings) -> (usize, String) {
+/// Number of worlds within the constraints that are classified correctly, and the first failure.
+fn count_right(seed: u64, spoil: Option<Disturbance>, settings: &Settings) -> (usize, String) {
     let mut rng = Pcg64::seed_from_u64(seed);
     let (mut right, mut fit, mut tried, mut first_wrong) = (0, 0, 0, String::new());
     while fit < WORLDS {
         tried += 1;
-        if let Outcome::Fit { right: is_right, what } = explore(&mut rng, spoil, settings) {
+        if let Trial::Fit { right: is_right, what } = explore(&mut rng, spoil, settings) {
             fit += 1;
             right += usize::from(is_right);
             if !is_right && first_wrong.is_empty() {
@@ -291,21 +292,21 @@ fn count_right(seed: u64, spoil: Option<Spoil>, settings: &Settings) -> (usize, 
 }
 
 #[test]
-fn without_noise_every_element_of_1000_worlds_is_named_right() {
+fn noiseless_worlds_are_all_correct() {
     let (right, what) = count_right(1, None, &Settings::default());
     assert_eq!(right, WORLDS, "{what}");
 }
 
 #[test]
-fn with_quantisation_noise_99_percent_of_1000_worlds_are_named_right() {
-    let spoil = Spoil { range_step_m: 0.001, azimuth_deg: 0.45 };
+fn quantized_worlds_are_99_percent_correct() {
+    let spoil = Disturbance { range_step_m: 0.001, azimuth_deg: 0.45 };
     let mut settings = Settings::default();
     settings.noise.azimuth_deg = 0.9 / 12_f64.sqrt();
     let (right, what) = count_right(2, Some(spoil), &settings);
     assert!(right * 100 >= 99 * WORLDS, "{what}");
 }
 
-/// Elements so close in angle that they interfere, from two places that need not decide.
+/// Elements close enough in angle to interfere, from two positions that need not decide.
 fn crowded(rng: &mut Pcg64) -> (World, [ScanView; 2], Vec<Feature>) {
     let mut world = World::default();
     let bearing = rng.random_range(0.0..std::f64::consts::TAU);
@@ -328,7 +329,7 @@ fn crowded(rng: &mut Pcg64) -> (World, [ScanView; 2], Vec<Feature>) {
     (world, scans, found)
 }
 
-/// Whether the middle of a feature's arc came straight from an element.
+/// Returns `true` if the middle of a feature's arc came directly from an element.
 fn came_straight(feature: &Feature, scans: &[ScanView]) -> bool {
     let middle = (feature.beams[0] + feature.beams[1]) / 2;
     let wraps = feature.beams[1] < feature.beams[0];
@@ -339,20 +340,20 @@ fn came_straight(feature: &Feature, scans: &[ScanView]) -> bool {
     })
 }
 
-/// Whether an element of the feature's kind is where the feature is.
+/// Returns `true` if an element of the feature's class is at the feature's position.
 fn is_there(element: &Element, feature: &Feature) -> bool {
     let Some(at) = feature.x_m.zip(feature.y_m).map(DVec2::from) else { return false };
     let off = at - element.point;
     element.kind == feature.kind
         && match element.kind {
-            // A plane's foot moves with the place it is seen from.
+            // The foot of a plane depends on the position it is seen from.
             FeatureKind::Plane => off.perp_dot(element.along).abs() < 0.04 && off.length() < 0.5,
             _ => off.length() < 0.05,
         }
 }
 
 #[test]
-fn what_violates_the_constraints_is_left_open_and_not_guessed() {
+fn violated_constraints_stay_open() {
     let mut rng = Pcg64::seed_from_u64(3);
     let (mut right, mut images, mut open, mut wrong) = (0, 0, 0, Vec::new());
     for _ in 0..WORLDS {
@@ -363,7 +364,7 @@ fn what_violates_the_constraints_is_left_open_and_not_guessed() {
             } else if world.elements.iter().any(|element| is_there(element, &feature)) {
                 right += 1;
             } else if !came_straight(&feature, &scans) {
-                // An element seen by way of a wall is where the wall's mirror shows it.
+                // An element seen via a wall appears at its mirror image.
                 images += 1;
             } else {
                 wrong.push(format!("{:#?} {feature:#?}", world.elements));

@@ -1,4 +1,4 @@
-//! What Feature Prediction makes of a long course through one room, read as the model hears it.
+//! Feature Prediction on a long course through one room with simulated readings.
 
 use std::sync::Arc;
 
@@ -19,15 +19,16 @@ use sonard_model::{
 };
 use sonard_records::{PathKind, Ping, ScanPlan, ScanView};
 
-/// How close the robot comes to a wall, metres.
+/// Minimum distance of the robot from a wall, metres.
 const CLEARANCE_M: f64 = 0.4;
 
-/// From one scan to the next, metres.
+/// Distance between scans, metres.
 const STRIDE_M: f64 = 0.15;
 
-/// How far walls are taken to go on, and what is trusted, as `sonard map` does it.
+/// Extension of walls, metres, as in `sonard map`.
 const EXTEND_M: f64 = 2.0;
-const LEAST_CONFIDENCE: f64 = 0.48;
+/// Minimum confidence of a trusted reading, as in `sonard map`.
+const MIN_CONFIDENCE: f64 = 0.48;
 
 /// The L-shaped room.
 fn simulator() -> Simulator {
@@ -37,7 +38,7 @@ fn simulator() -> Simulator {
         .expect("sensible figures")
 }
 
-/// A way that turns little as long as it can.
+/// Random trajectory with minimal turns.
 fn wander(scene: &Scene, places: usize, seed: u64) -> Vec<Pose> {
     let mut rng = Pcg64::seed_from_u64(seed);
     let mut pose = scene.pose("middle").expect("a pose");
@@ -52,15 +53,15 @@ fn wander(scene: &Scene, places: usize, seed: u64) -> Vec<Pose> {
                 let free = |at: DVec2| scene.clearance_m(at) >= CLEARANCE_M;
                 (free(half) && free(next)).then_some((turn_deg, next))
             })
-            .expect("a way on");
+            .expect("a free step");
         pose = Pose { x_m: next.x, y_m: next.y, heading_deg: pose.heading_deg + turn_deg };
         poses.push(pose);
     }
     poses
 }
 
-/// Of the readings that came straight from a wall's surface, the share that the prediction trusts in
-/// each fifty scans; and of those that are far too long, by more than one wall.
+/// Fractions of trusted readings in each fifty scans: of direct wall readings, and of readings that
+/// are far too long due to several reflections.
 fn trusted_shares(scans: usize, seed: u64) -> Vec<[f64; 2]> {
     let simulator = simulator();
     let extents = Extents::new(simulator.sensor(), simulator.air(), false).expect("figures");
@@ -78,15 +79,15 @@ fn trusted_shares(scans: usize, seed: u64) -> Vec<[f64; 2]> {
             let Some(kind) = kind(&scan.pings[beam.index as usize]) else { continue };
             let [all, trusted] = &mut counts[number / 50][kind];
             *all += 1;
-            *trusted += usize::from(assessment.confidence > LEAST_CONFIDENCE);
+            *trusted += usize::from(assessment.confidence > MIN_CONFIDENCE);
         }
     }
     let share = |[all, trusted]: [usize; 2]| trusted as f64 / all as f64;
     counts.into_iter().map(|kinds| kinds.map(share)).collect()
 }
 
-/// 0 for a reading that came straight from a wall, 1 for one by three reflections or more; those
-/// of corners are between the two: their range is right, but not for all of their beams.
+/// Class of a reading: 0 for a direct wall echo, 1 for three or more reflections. Corners are
+/// neither: their range is correct, but not for all of their beams.
 fn kind(ping: &Ping) -> Option<usize> {
     let path = ping.path.as_ref()?;
     match (path.kind, path.order) {
@@ -97,7 +98,7 @@ fn kind(ping: &Ping) -> Option<usize> {
 }
 
 #[test]
-fn right_readings_are_trusted_as_much_after_500_scans_as_at_first() {
+fn trust_does_not_decay_over_500_scans() {
     for seed in [1, 2] {
         let shares = trusted_shares(500, seed);
         println!("{shares:.3?}");

@@ -1,0 +1,83 @@
+//! Checkpoints: results of the searches of a fit, so that a stopped one can be resumed.
+//!
+//! A fit is a sequence of searches, each of which depends only on the results of those before it. A
+//! resumed fit skips the recorded searches and reproduces the uninterrupted result bit by bit.
+
+use nalgebra::DVector;
+use serde::{Deserialize, Serialize};
+
+use super::{FitError, Fitter};
+use crate::likelihood::ErrorModel;
+
+/// Result of one search of a fit.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "search", rename_all = "snake_case", deny_unknown_fields)]
+pub enum Found {
+    /// Stage of the continuation from a wide to the observed error model.
+    Spread {
+        /// Changes of the parameters since the start, each in its unit.
+        values: Vec<f64>,
+        /// Fitted error model.
+        errors: ErrorModel,
+        /// Whether narrower stages are skipped.
+        is_last: bool,
+    },
+    /// Optimum at the end of a continuation.
+    End {
+        /// Changes of the parameters since the start, each in its unit.
+        values: Vec<f64>,
+        /// Fitted error model.
+        errors: ErrorModel,
+        /// Log-likelihood plus log-prior.
+        log_posterior: f64,
+    },
+    /// Improved start near the optimum.
+    Place {
+        /// Changes of the parameters since the start, each in its unit.
+        values: Vec<f64>,
+        /// Log-posterior with the error model for comparison of starts.
+        log_posterior: f64,
+    },
+    /// Failed search: nothing to predict with, or a singular information matrix.
+    Nothing,
+}
+
+impl Found {
+    fn values(&self) -> &[f64] {
+        match self {
+            Self::Spread { values, .. } | Self::End { values, .. } | Self::Place { values, .. } => {
+                values
+            }
+            Self::Nothing => &[],
+        }
+    }
+}
+
+impl Fitter<'_> {
+    /// Runs the next search, or replays its recorded result.
+    pub(super) fn found(
+        &mut self,
+        search: impl FnOnce(&mut Self) -> Result<Found, FitError>,
+    ) -> Result<Found, FitError> {
+        match self.known.next() {
+            // A recorded failure is repeated to obtain its error.
+            Some(Found::Nothing) => search(self),
+            Some(found) if found.values().len() == self.parameters.len() => Ok(found.clone()),
+            Some(_) => Err(FitError::OtherFit),
+            None => {
+                let found = search(self);
+                match &found {
+                    Ok(found) => self.watch.found(found),
+                    Err(error) if error.ends_all() => {}
+                    Err(_) => self.watch.found(&Found::Nothing),
+                }
+                found
+            }
+        }
+    }
+}
+
+/// Values as a serializable list.
+pub(super) fn listed(values: &DVector<f64>) -> Vec<f64> {
+    values.iter().copied().collect()
+}
