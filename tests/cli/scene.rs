@@ -58,12 +58,8 @@ fn check_lists_what_is_not_taken_as_drawn_and_draw_shows_the_plan() {
     let path = written(folder.path(), &scene_file.to_string());
     scene(&["check", &path]).success().stdout(
         contains("r: 5 walls")
-            .and(contains(
-                "east.a at (4.0000, 0.0005): moved by 0.500 mm, 0.500 mm from south.b",
-            ))
-            .and(contains(
-                "screen.a at (2.0000, 0.0010): moved by 1.000 mm, short of south",
-            ))
+            .and(contains("east.a at (4.0000, 0.0005): moved by 0.500 mm, 0.500 mm from south.b"))
+            .and(contains("screen.a at (2.0000, 0.0010): moved by 1.000 mm, short of south"))
             .and(contains("rail.a at (1.0000, -0.0012): moved by 1.200 mm, past south"))
             .and(contains("again overlaps south over 0.500 m: south is used")),
     );
