@@ -1,4 +1,4 @@
-//! A mock ranger playing beside the daemon, behind a link that it keeps over hangups.
+//! Mock ranger of the daemon, behind a symbolic link that persists over hangups.
 
 use std::path::PathBuf;
 
@@ -32,7 +32,7 @@ impl Mock {
         let air = &settings.keys.air;
         let air = Air::new(air.temperature_c, air.humidity_percent, air.pressure_kpa)
             .map_err(|error| Failure::input(error, "see [air]"))?;
-        // Loading has refused a mock without a scene.
+        // A mock without a scene is rejected while loading.
         let Some(scene) = &settings.scene else {
             return Err(Failure::input("a mock needs a scene", "give --scene"));
         };
@@ -47,7 +47,7 @@ impl Mock {
         let board = world.board_at(pace, &assumed)?;
         let link = std::env::temp_dir().join(format!("sonard-mock-{}", std::process::id()));
         let port = MockPort::open(board, Some(&link)).map_err(|error| {
-            Failure::device(format!("cannot make a pty: {error}"), "is /dev/pts mounted?")
+            Failure::device(format!("cannot make a pty: {error}"), "check that /dev/pts is mounted")
         })?;
         let stop = CancellationToken::new();
         let stopped = stop.clone().cancelled_owned();
@@ -62,7 +62,7 @@ impl Mock {
 
     pub(super) async fn stop(self) {
         self.stop.cancel();
-        // A mock that is gone already has nothing left to say.
+        // The mock may have ended already.
         drop(self.playing.await);
     }
 }

@@ -13,47 +13,46 @@ use crate::acoustics::{EdgeLawKind, Response};
 #[cfg_attr(feature = "clap", command(next_help_heading = "Model"))]
 #[serde(default)]
 pub struct OptionKeys {
-    /// How echoes are found.
+    /// Simulation engine.
     #[cfg_attr(feature = "clap", arg(long, value_enum, default_value_t))]
     pub engine: EngineKind,
-    /// Listen and predict up to this range, metres, instead of the sensor's.
+    /// Maximum range, metres; instead of the sensor's.
     #[cfg_attr(feature = "clap", arg(long = "max-range", value_name = "M"))]
     #[schemars(range(min = 0.1, max = 100), example = 4)]
     pub max_range_m: Option<f64>,
-    /// Least amplitude detected, instead of the sensor's; a head-on, perfect wall gives 1.
+    /// Detection threshold, instead of the sensor's; a head-on, perfect wall gives 1.
     #[cfg_attr(feature = "clap", arg(long, value_name = "T"))]
     #[schemars(range(min = 0.000_001, max = 1), example = 0.04)]
     pub threshold: Option<f64>,
-    /// How the face answers to a pulse, instead of the sensor's way; with paths.
+    /// Aperture response, instead of the sensor's; engine paths only.
     #[cfg_attr(feature = "clap", arg(long, value_enum))]
     #[schemars(example = &"full")]
     pub response: Option<Response>,
-    /// Detect one sound at a time and time it by its path alone; with paths, the others always do.
+    /// Ideal receiver: no interference, no time walk; engine paths only, the others are always ideal.
     #[cfg_attr(feature = "clap", arg(long))]
     pub ideal_receiver: bool,
-    /// Leave out the absorption of the air; with paths and fan.
+    /// Ignore absorption in air; engines paths and fan only.
     #[cfg_attr(feature = "clap", arg(long))]
     pub lossless: bool,
-    /// Most mirror reflections on a path, if limited; with paths and fan.
+    /// Maximum reflection order; engines paths and fan only.
     #[cfg_attr(feature = "clap", arg(long, value_name = "N"))]
     #[schemars(range(min = 0, max = 65_535), example = 3)]
     pub max_order: Option<u32>,
-    /// Law of edge diffraction, if not the sensor's (or else utd); with paths.
+    /// Edge diffraction model, instead of the sensor's or utd; engine paths only.
     #[cfg_attr(feature = "clap", arg(long, value_enum, value_name = "LAW"))]
     #[schemars(example = &"kuc-siegel")]
     pub edge_law: Option<EdgeLawKind>,
-    /// Also find paths diffracted at two edges; with paths.
+    /// Include paths diffracted at two edges; engine paths only.
     #[cfg_attr(feature = "clap", arg(long))]
     pub double_diffraction: bool,
-    /// Leave out what a ranger of an array receives of other firings than its own; with paths, the others know no
-    /// crosstalk.
+    /// Ignore crosstalk between the rangers of an array; engine paths only, the others have none.
     #[cfg_attr(feature = "clap", arg(long))]
     pub without_crosstalk: bool,
-    /// Angle between the rays, degrees, instead of 0.05; with fan.
+    /// Angle between rays, degrees, instead of 0.05; engine fan only.
     #[cfg_attr(feature = "clap", arg(long, value_name = "DEG"))]
     #[schemars(range(min = 0.0001, max = 5), example = 0.1)]
     pub ray_spacing_deg: Option<f64>,
-    /// Full aperture, degrees, instead of the sensor's two-way -6 dB width; with cone.
+    /// Full aperture, degrees, instead of the sensor's two-way -6 dB width; engine cone only.
     #[cfg_attr(feature = "clap", arg(long, value_name = "DEG"))]
     #[schemars(range(min = 0, max = 180), example = 15)]
     pub aperture_deg: Option<f64>,
