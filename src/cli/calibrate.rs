@@ -170,8 +170,7 @@ fn find(
         let (path, searches) = (checkpoint.path().display(), saved.len());
         notice!("{path}: resuming after {searches} searches");
     }
-    let bar = progress::spinner("scans");
-    bar.set_position(sweeps.len() as u64);
+    let bar = progress::spinner(&format!("fitting {} scan(s):", sweeps.len()));
     let watcher = Watcher { bar: bar.clone(), interrupts, checkpoint };
     let fitted = fit_watched(world, sweeps, fit, saved, &watcher);
     bar.finish_and_clear();

@@ -124,7 +124,6 @@ fn is_simulated(scan: &ScanView) -> bool {
     scan.session.as_ref().is_some_and(|session| session.provenance == Provenance::Simulated)
 }
 
-/// Line of `--json`.
 #[derive(Serialize)]
 #[serde(untagged)]
 enum ComparisonLine<'a> {
@@ -134,7 +133,6 @@ enum ComparisonLine<'a> {
         comparison: &'a Comparison,
     },
     All {
-        /// Number of logs.
         logs: usize,
         #[serde(flatten)]
         comparison: &'a Comparison,

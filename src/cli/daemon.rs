@@ -72,7 +72,7 @@ pub(super) struct DaemonsArgs {
     fleet: Option<PathBuf>,
 }
 
-/// One daemon, or several.
+/// Daemons selected by the options.
 pub(super) enum Daemons {
     One(Client),
     Several(Vec<Asked>),

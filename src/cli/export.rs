@@ -40,7 +40,6 @@ pub(super) struct Args {
     recording: RecordingArgs,
 }
 
-/// Options of recordings.
 #[derive(Debug, Clone, PartialEq, clap::Args)]
 #[command(next_help_heading = "Recordings (mcap)")]
 struct RecordingArgs {

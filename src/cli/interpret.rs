@@ -86,7 +86,9 @@ Reasons for unresolved: second_position (plane or corner), translation (the posi
 close), lost (not seen again), ambiguous (several arcs fit, or none), interference (a nearer \
 object covers a part of the arc), cut_off (at the end of the scan), extent (fits neither), \
 reflections (behind likely walls: possibly a multiple reflection), min_range (below the minimum \
-range, or partly so). Exit codes: 0 done, also without features, 2 wrong usage or input, 3 write \
+range, or partly so).
+
+Exit codes: 0 done, also without features, 2 wrong usage or input, 3 write \
 error.";
 
 pub(super) fn run(args: &Args) -> Outcome {

@@ -63,7 +63,8 @@ Examples:
 
 A line of a laser's file is a scan from one position, counter-clockwise, null for no return: \
 {\"pose\":{\"x_m\":1,\"y_m\":0.5,\"heading_deg\":90},\"returns\":[{\"azimuth_deg\":-12.5,\"range_m\":1.21}, \
-...]} Lines seen by the laser only are `laser`, those merged with sonar lines are `complex`; ends \
+...]}
+Lines seen by the laser only are `laser`, those merged with sonar lines are `complex`; ends \
 that it saw are terminal.
 
 Exit codes: 0 done, 2 wrong usage or input, 3 the disk gave up.";

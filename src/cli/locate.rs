@@ -105,9 +105,10 @@ Examples:
 
 Fields of --json: log, scan, x_m, y_m, heading_deg, probability, sigma_x_m, sigma_y_m, \
 sigma_heading_deg, explained (share of the readings), besides (name, value and sigma of the \
-parameters of --fit), doubts (likely errors). Exit codes: 0 done, 2 wrong usage or input.";
+parameters of --fit), doubts (likely errors).
 
-/// Line of `--json`.
+Exit codes: 0 done, 2 wrong usage or input.";
+
 #[derive(Serialize)]
 struct LocatedPose<'a> {
     log: String,
@@ -151,7 +152,7 @@ pub(super) fn run(args: &Args) -> Outcome {
 fn atlas(world: &World, args: &Args) -> Result<Atlas, Failure> {
     let besides = prior::parameters(&args.fit, &args.prior, world, 1)?;
     let spacing_m = args.spacing_m.unwrap_or_else(|| Atlas::usual_spacing_m(&world.scene));
-    let bar = progress::spinner("positions");
+    let bar = progress::spinner("predicting on the grid of positions");
     let atlas = Atlas::new(world, spacing_m).map_err(|error| failure_from(&error))?;
     bar.finish_and_clear();
     Ok(atlas.fitting(besides))

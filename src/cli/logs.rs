@@ -200,7 +200,7 @@ const MAX_DRAWN_READINGS: usize = 60_000;
 pub(super) struct DrawnScans {
     scans: Vec<ScanView>,
     readings: usize,
-    /// One scan in `every` is kept.
+    /// Interval of the kept scans.
     every: usize,
     seen: usize,
 }

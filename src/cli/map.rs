@@ -47,7 +47,8 @@ pub(super) struct Args {
     /// Side of a cell, metres
     #[arg(long, value_name = "M", default_value_t = Mapping::default().resolution_m)]
     resolution: f64,
-    /// Maximum range, metres; longer ranges count as no echo [default: the sensor's, at most 5]
+    /// Maximum range, metres, instead of the sensor's; longer ranges count as no echo [default: the
+    /// sensor's, at most 5]
     #[arg(long, value_name = "M")]
     max_range: Option<f64>,
     /// Region to map: X0,Y0,X1,Y1 in metres [default: the observed area]
@@ -67,7 +68,7 @@ pub(super) struct Args {
     extend: f64,
     /// Minimum confidence of the readings used; 0.5 is full confidence
     #[arg(long, value_name = "C", default_value_t = Mapping::default().least_confidence)]
-    min_confidence: f64,
+    min_reading_confidence: f64,
     /// Number of times each scan counts [default: 5 divided by the number of scans, rounded up,
     /// because few scans would leave every cell undecided; 1 with --update]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=20))]
@@ -117,7 +118,9 @@ Examples:
   sonard-papers benchmark score map simple-room
 
 A confidence is 0.5 for a reading without contradiction, and less otherwise; clear_m is the \
-distance up to which the reading is certainly correct. Exit codes: 0 done, 2 wrong usage or input, \
+distance up to which the reading is certainly correct.
+
+Exit codes: 0 done, 2 wrong usage or input, \
 3 write error.";
 
 pub(super) fn run(args: &Args) -> Outcome {
@@ -193,7 +196,7 @@ impl Args {
             beam_deg: self.beam_deg,
             exponent: self.exponent,
             extend_m: self.extend,
-            least_confidence: self.min_confidence,
+            least_confidence: self.min_reading_confidence,
             // The existing map has already weighted its scans.
             evidence: self.scan_weight.or_else(|| self.update.is_some().then_some(1)),
             predicts_features: self.feature_prediction == Switch::On,

@@ -46,7 +46,7 @@ pub(super) struct MockWorldArgs {
     /// Pace the mock by the wall clock instead of as fast as possible
     #[arg(long)]
     realtime: bool,
-    /// Random seed of noise, missed steps and faults
+    /// Random seed; for noise, missed steps and faults
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
     /// Faults to inject

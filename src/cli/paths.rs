@@ -32,10 +32,10 @@ pub(super) struct Args {
     /// receiver at their positions for that azimuth. By default both are on the rotation axis
     #[arg(long, value_name = "DEG", allow_negative_numbers = true)]
     azimuth_deg: Option<f64>,
-    /// Maximum range, metres; instead of the sensor's
+    /// Maximum range, metres, instead of the sensor's
     #[arg(long, value_name = "M")]
     max_range: Option<f64>,
-    /// Maximum reflection order; default unlimited
+    /// Maximum number of mirror reflections on a path; unlimited by default
     #[arg(long, value_name = "N")]
     max_order: Option<u32>,
     /// Minimum amplitude of listed paths; a head-on, perfect wall gives 1. Paths with more than one
@@ -46,10 +46,10 @@ pub(super) struct Args {
     /// Edge diffraction model, instead of the sensor's or utd
     #[arg(long, value_enum, value_name = "LAW")]
     edge_law: Option<EdgeLawKind>,
-    /// Include paths diffracted at two edges
+    /// Find paths diffracted at two edges, too
     #[arg(long)]
     double_diffraction: bool,
-    /// Ignore absorption in air
+    /// Disable the absorption of the air
     #[arg(long)]
     lossless: bool,
     /// JSON instead of text; one object per path

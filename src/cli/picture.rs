@@ -16,7 +16,6 @@ use crate::{
     scene::Scene,
 };
 
-/// Options of pictures.
 #[derive(Debug, clap::Args)]
 pub(super) struct PictureArgs {
     /// File to write; a picture, .svg or .png by its name, or - for SVG to standard output

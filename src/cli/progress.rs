@@ -16,7 +16,7 @@ pub(super) fn bar(total: u64, items: &str) -> ProgressBar {
 pub(super) fn spinner(title: &str) -> ProgressBar {
     show_later(
         ProgressBar::no_length()
-            .with_style(style(&format!("{{spinner}} {title}: {{msg}}, {{elapsed}}"))),
+            .with_style(style(&format!("{{spinner}} {title} {{msg}} {{elapsed}}"))),
     )
 }
 

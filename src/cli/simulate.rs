@@ -67,7 +67,6 @@ pub(super) struct Args {
     air: AirArgs,
 }
 
-/// Options of noise.
 #[derive(Debug, Clone, Copy, clap::Args)]
 #[command(next_help_heading = "Noise")]
 struct NoiseArgs {

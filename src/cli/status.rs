@@ -36,7 +36,6 @@ Examples:
 With several daemons each has a line, including those that do not respond, reject the request, or are not the robot named before the `=`.
 Exit codes: 0 healthy, 1 problems, 3 no daemon responds (of several: at least one does not).";
 
-/// Object of `--json`.
 #[derive(Serialize)]
 struct StatusAndHealth<'a> {
     status: &'a Status,
@@ -82,7 +81,7 @@ fn describe(status: &Status, health: &Health) -> String {
     }
     lines.extend(health.fit.as_ref().and_then(agreement));
     let better = health.fit.as_ref().and_then(|fit| fit.explanations.first());
-    lines.extend(better.map(|better| format!("  better fit: {better}")));
+    lines.extend(better.map(|better| format!("  fit      better with {better}")));
     let (air, log, clients) = (&status.air, &status.log, &status.subscribers);
     let age = air.age_s.map_or_else(String::new, |age_s| format!(", {age_s:.0} s old"));
     let source = json_name(&air.source) + &age;

@@ -78,10 +78,11 @@ fn differing<T: Ord + std::fmt::Debug>(of: impl Fn(&Arg) -> Option<T>) -> Vec<St
 
 #[test]
 fn options_have_one_meaning() {
-    // Text after a semicolon depends on the verb; brackets contain the default.
+    // Text after a semicolon depends on the verb; brackets contain the default, parentheses a
+    // remark.
     let meaning = |arg: &Arg| {
         let help = arg.get_help()?.to_string();
-        Some(help.split([';', '[']).next().unwrap_or_default().trim().to_owned())
+        Some(help.split([';', '[', '(']).next().unwrap_or_default().trim().to_owned())
     };
     assert_eq!(differing(meaning), Vec::<String>::new());
 }
@@ -131,7 +132,7 @@ fn placeholders() {
 }
 
 #[test]
-fn scene_is_for_predictions_or_drawn() {
+fn meaning_of_scene() {
     for (path, arg) in by_name().remove("scene").expect("it is an option") {
         let help = arg.get_help().expect("help").to_string();
         let is_clear =

@@ -49,7 +49,6 @@ pub(super) struct InsteadArgs {
     sound_speed: Option<f64>,
 }
 
-/// Validated assumptions.
 #[derive(Debug, Clone, Default)]
 pub(super) struct WhatIf {
     pose: Option<Pose>,

@@ -48,7 +48,7 @@ fn require(program: &str) {
 }
 
 #[test]
-fn every_command_of_the_readme_runs_as_pasted() {
+fn readme_commands_run() {
     require("curl");
     let folder = tempfile::tempdir().expect("a folder");
     let (mut commands, mut verbs) = (0, Vec::new());
@@ -76,7 +76,7 @@ fn logs_in(folder: &Path) -> Vec<PathBuf> {
 }
 
 #[test]
-fn logs_are_copied_by_rsync_as_documented() {
+fn rsync_of_logs() {
     require("rsync");
     let folder = tempfile::tempdir().expect("a folder");
     let blocks = shell_blocks(COPYING_LOGS);
@@ -124,7 +124,7 @@ fn logs_are_copied_by_rsync_as_documented() {
 }
 
 #[test]
-fn what_curl_is_asked_to_do_works_in_old_ones() {
+fn old_curl_options() {
     // --json came with 7.82; Debian 11 has 7.74.
     for (name, text) in [("README.md", README), ("run.rs", include_str!("../../src/cli/run.rs"))] {
         let newer = text.lines().find(|line| line.contains("curl") && line.contains("--json"));

@@ -46,7 +46,6 @@ pub(super) const HELP: &str =
 pub(super) struct Head {
     /// SHA-256 of all inputs that determine the result.
     calibration_sha256: String,
-    /// Version of sonard.
     version: String,
 }
 
@@ -296,7 +295,7 @@ mod tests {
     }
 
     #[test]
-    fn foreign_file_is_rejected_unchanged() {
+    fn foreign_file_is_kept() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join(NAME);
         let begun = open(folder.path(), "a").expect("it is new");
@@ -313,7 +312,7 @@ mod tests {
     }
 
     #[test]
-    fn stops_saving_at_non_finite_number() {
+    fn stops_at_non_finite_number() {
         let folder = tempfile::tempdir().expect("a folder");
         let begun = open(folder.path(), "a").expect("it is new");
         [0.1, f64::NAN, 0.2].map(place).iter().for_each(|found| begun.save(found));

@@ -97,7 +97,7 @@ mod tests {
     }
 
     #[test]
-    fn uncertainty_of_slow_requests_is_allowed() {
+    fn slow_requests() {
         let slow: Vec<Exchange> = exchanges(1.0, 0)
             .into_iter()
             .map(|exchange| Exchange { received_us: exchange.sent_us + 300_000, ..exchange })

@@ -385,21 +385,30 @@ fn answered(identity: &Identity) -> Check {
 }
 
 fn last_reset(identity: &Identity) -> Check {
+    let cause = match identity.reset_cause {
+        ResetCause::Unknown => "unknown",
+        ResetCause::PowerOn => "power-on",
+        ResetCause::External => "reset pin",
+        ResetCause::BrownOut => "brown-out",
+        ResetCause::Watchdog => "watchdog (the firmware hung)",
+        ResetCause::Requested => "requested by a host",
+    };
+    let detail = format!("last reset: {cause}");
     match identity.reset_cause {
         ResetCause::BrownOut => Check::warning(
             "restart",
             Cause::Power,
-            "last reset: brown-out",
-            "the module draws 2 A while it transmits: put 1000 uF next to it, and use a separate supply \
-             instead of USB",
+            detail,
+            "the module draws 2 A while it transmits: put 1000 uF next to it, and use a separate \
+             supply instead of USB",
         ),
         ResetCause::Watchdog => Check::warning(
             "restart",
             Cause::Device,
-            "last reset: watchdog, the firmware hung",
+            detail,
             "report it, with what the board was doing",
         ),
-        cause => Check::ok("restart", format!("last reset: {cause:?}")),
+        _ => Check::ok("restart", detail),
     }
 }
 

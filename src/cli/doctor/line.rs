@@ -9,7 +9,6 @@ use super::report::{Cause, Check};
 /// Statistics of a number of requests.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct RequestStats {
-    /// Number of requests.
     pub(super) requests: u32,
     /// Link statistics before the first request and after the last possible reply.
     pub(super) before: LinkStats,

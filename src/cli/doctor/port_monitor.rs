@@ -54,9 +54,9 @@ impl PortMonitor {
         match holders.is_partial {
             true => Check::ok(
                 "port",
-                "opened; no visible program has it open, but those of other users are hidden",
+                "opened; not in use by a visible program, but those of other users are hidden",
             ),
-            false => Check::ok("port", "opened, and no other program has it open"),
+            false => Check::ok("port", "opened exclusively"),
         }
     }
 

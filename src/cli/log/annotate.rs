@@ -32,7 +32,8 @@ pub(in crate::cli) struct Args {
     output: Option<OutPath>,
     #[command(flatten)]
     overwrite: Overwrite,
-    /// Maximum range, metres; longer ranges count as no echo [default: the sensor's, at most 5]
+    /// Maximum range, metres, instead of the sensor's; longer ranges count as no echo [default: the
+    /// sensor's, at most 5]
     #[arg(long, value_name = "M")]
     max_range: Option<f64>,
     /// Exponent of the decrease of confidence with the feature's distance

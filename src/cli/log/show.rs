@@ -36,8 +36,11 @@ pub(in crate::cli) struct Args {
 const HELP: &str = "\
 Columns: echo, min (at minimum range), none (no echo), lost (by the link) and uncertain (motor \
 steps may be lost) count readings; |res| is the median distance between measured and predicted \
-range; time/limit is the scan's duration and its physical minimum. Lines that are not records are \
-listed at the end; `sonard log verify` checks the rest. Exit codes: 0 shown, 2 the file can't be \
+range; time/limit is the scan's duration and its physical minimum.
+Lines that are not records are \
+listed at the end; `sonard log verify` checks the rest.
+
+Exit codes: 0 shown, 2 the file can't be \
 opened.";
 
 pub(super) fn run(args: &Args) -> Outcome {

@@ -41,7 +41,8 @@ const HELP: &str = "\
 Problems: an incomplete last line, damaged lines, readings outside a scan or before any session, a \
 repeated beam, counts that disagree with scan_end, a scan followed by another without an end or an \
 event with the reason, contradictory status, range and residual, an azimuth that differs from the \
-plan. Warnings: the last scan has no end (it may be running), time goes backwards.
+plan.
+Warnings: the last scan has no end (it may be running), time goes backwards.
 
 Exit codes: 0 clean, 1 not clean, 2 a file can't be opened.";
 

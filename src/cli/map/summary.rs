@@ -10,7 +10,6 @@ use serde::Serialize;
 use super::{Args, Mapped, Switch};
 use crate::interpret::Sweep;
 
-/// Printed summary.
 #[derive(Debug, Serialize)]
 pub(super) struct Summary<'a> {
     map: PathBuf,

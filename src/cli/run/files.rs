@@ -34,7 +34,6 @@ pub(super) struct Files {
     pub(super) token: Option<String>,
     /// Clients of the other daemons of the fleet.
     pub(super) fleet: Vec<Asked>,
-    /// MQTT broker.
     pub(super) broker: Broker,
 }
 

@@ -23,7 +23,6 @@ use crate::{
     store::RecordWriter,
 };
 
-/// Options of arrays.
 #[derive(Debug, Clone, clap::Args)]
 #[command(next_help_heading = "Array")]
 pub(super) struct ArrayArgs {

@@ -17,7 +17,6 @@ const MAX_LINE_BYTES: usize = 16 << 20;
 /// Capacity of the channel of output lines.
 const LINE_CAPACITY: usize = 64;
 
-/// Output line.
 enum Line {
     /// Record of a robot's stream.
     Record(String, Vec<u8>),
@@ -138,7 +137,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn record_is_printed_with_its_robot() {
+    fn record_with_its_robot() {
         let line = encode_record("kiwi", b"{\"type\":\"ping\"}\n");
         assert_eq!(format_line("kiwi", b"\"a\x1b[2J\""), "kiwi         \"a\u{fffd}[2J\"\n");
         assert_eq!(line, b"{\"robot\":\"kiwi\",\"record\":{\"type\":\"ping\"}}\n");

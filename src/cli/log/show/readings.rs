@@ -19,7 +19,6 @@ pub(super) struct Readings {
 }
 
 impl Readings {
-    /// Opens a log.
     pub(super) fn open(log: &Path) -> Result<Self, StoreError> {
         let log = PathBuf::from(log);
         // Damaged lines were reported in the first pass.

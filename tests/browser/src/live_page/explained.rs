@@ -66,7 +66,7 @@ fn a_pose_that_is_wrong_is_said_drawn_previewed_and_put_right() {
     // In the words of the program.
     let socket = folder.path().join("s").display().to_string();
     let told = String::from_utf8(run(&["status", "--socket", &socket]).stdout).expect("text");
-    let told = told.split("better   explained: ").nth(1).and_then(|rest| rest.lines().next());
+    let told = told.split("fit      better with ").nth(1).and_then(|rest| rest.lines().next());
     let said =
         browser.text("#better-list button").replace('−', "-").replace('±', "+-").replace('°', "");
     let (what, more) = said.split_once("explains").expect("how many it explains");

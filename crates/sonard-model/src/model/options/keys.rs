@@ -16,7 +16,7 @@ pub struct OptionKeys {
     /// Simulation engine.
     #[cfg_attr(feature = "clap", arg(long, value_enum, default_value_t))]
     pub engine: EngineKind,
-    /// Maximum range, metres; instead of the sensor's.
+    /// Maximum range, metres, instead of the sensor's.
     #[cfg_attr(feature = "clap", arg(long = "max-range", value_name = "M"))]
     #[schemars(range(min = 0.1, max = 100), example = 4)]
     pub max_range_m: Option<f64>,
@@ -24,35 +24,37 @@ pub struct OptionKeys {
     #[cfg_attr(feature = "clap", arg(long, value_name = "T"))]
     #[schemars(range(min = 0.000_001, max = 1), example = 0.04)]
     pub threshold: Option<f64>,
-    /// Aperture response, instead of the sensor's; engine paths only.
+    /// Aperture response, instead of the sensor's (engine `paths` only).
     #[cfg_attr(feature = "clap", arg(long, value_enum))]
     #[schemars(example = &"full")]
     pub response: Option<Response>,
-    /// Ideal receiver: no interference, no time walk; engine paths only, the others are always ideal.
+    /// Ideal receiver: no interference, no time walk (engine `paths` only; the others always use
+    /// it).
     #[cfg_attr(feature = "clap", arg(long))]
     pub ideal_receiver: bool,
-    /// Ignore absorption in air; engines paths and fan only.
+    /// Disable the absorption of the air (engines `paths` and `fan`).
     #[cfg_attr(feature = "clap", arg(long))]
     pub lossless: bool,
-    /// Maximum reflection order; engines paths and fan only.
+    /// Maximum number of mirror reflections on a path (engines `paths` and `fan`).
     #[cfg_attr(feature = "clap", arg(long, value_name = "N"))]
     #[schemars(range(min = 0, max = 65_535), example = 3)]
     pub max_order: Option<u32>,
-    /// Edge diffraction model, instead of the sensor's or utd; engine paths only.
+    /// Edge diffraction model, instead of the sensor's or utd (engine `paths` only).
     #[cfg_attr(feature = "clap", arg(long, value_enum, value_name = "LAW"))]
     #[schemars(example = &"kuc-siegel")]
     pub edge_law: Option<EdgeLawKind>,
-    /// Include paths diffracted at two edges; engine paths only.
+    /// Find paths diffracted at two edges, too (engine `paths` only).
     #[cfg_attr(feature = "clap", arg(long))]
     pub double_diffraction: bool,
-    /// Ignore crosstalk between the rangers of an array; engine paths only, the others have none.
+    /// Disable crosstalk between the rangers of an array (engine `paths` only; the others have
+    /// none).
     #[cfg_attr(feature = "clap", arg(long))]
     pub without_crosstalk: bool,
-    /// Angle between rays, degrees, instead of 0.05; engine fan only.
+    /// Angle between the rays, degrees, instead of 0.05 (engine `fan` only).
     #[cfg_attr(feature = "clap", arg(long, value_name = "DEG"))]
     #[schemars(range(min = 0.0001, max = 5), example = 0.1)]
     pub ray_spacing_deg: Option<f64>,
-    /// Full aperture, degrees, instead of the sensor's two-way -6 dB width; engine cone only.
+    /// Full aperture, degrees, instead of the sensor's two-way -6 dB width (engine `cone` only).
     #[cfg_attr(feature = "clap", arg(long, value_name = "DEG"))]
     #[schemars(range(min = 0, max = 180), example = 15)]
     pub aperture_deg: Option<f64>,
