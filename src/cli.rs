@@ -1,14 +1,14 @@
-//! The command line: one file a verb.
+//! Command line: one module per verb.
 
-/// Writes a line to standard error for people. A recipient that is gone is ignored, and one that does not read delays
-/// the program for a second at most.
+/// Writes a line for people to standard error. A closed standard error is ignored, and a reader
+/// that stalls delays the program for a second at most.
 macro_rules! notice {
     ($($argument:tt)*) => {
         $crate::cli::terminal::write_notice(&format!($($argument)*))
     };
 }
 
-/// Writes a line to standard output; a reader that is gone is ignored.
+/// Writes a line to standard output; a closed reader is ignored.
 macro_rules! print_line {
     ($($argument:tt)*) => {
         $crate::cli::terminal::print_line(&format!($($argument)*))
@@ -75,7 +75,7 @@ use clap::{Command, CommandFactory as _, FromArgMatches as _, Parser, Subcommand
 
 use crate::messages;
 
-/// Drives an ultrasonic ranger on a stepper, and predicts what it reads.
+/// Drive an ultrasonic ranger on a stepper, and predict its readings
 #[derive(Debug, Parser)]
 #[command(version, about, max_term_width = 100)]
 struct Cli {
@@ -83,29 +83,29 @@ struct Cli {
     verb: Verb,
 }
 
-/// What holds for every verb that says nothing else.
-const EXIT_CODES: &str = "Exit codes: 0 done, 1 ran and found a failure, 2 wrong usage or input (also a \
-place that can't be written to), 3 device, link or disk.";
+/// Exit codes of the verbs whose help lists none of their own.
+const EXIT_CODES: &str = "Exit codes: 0 done, 1 ran and found a failure, 2 wrong usage or input (including \
+an output that can't be written), 3 device, link or disk error.";
 
 #[derive(Debug, Subcommand)]
 enum Verb {
-    /// Take one or more scans and log each reading beside the model's prediction
+    /// Take one or more scans and log each reading with the model's prediction
     #[command(long_about = scan::ABOUT)]
     Scan(scan::Args),
     /// Take scans by a plan, over days: poses, repeats, checks, a report
     #[command(long_about = collect::ABOUT)]
     Collect(Box<collect::Args>),
-    /// Run the daemon: scan by plan, keep logs, serve the API
+    /// Run the daemon: scan continuously, keep logs, serve the API
     #[command(long_about = run::ABOUT)]
     Run(Box<run::Args>),
-    /// Show what a running daemon is doing
+    /// Show the state of running daemons
     Status(status::Args),
-    /// Show the records of a running daemon as they are made
+    /// Stream live records
     Watch(watch::Args),
     /// Run a mock ranger on a pty, with echoes from the model
     #[command(long_about = mock::ABOUT)]
     Mock(mock::Args),
-    /// Act as a ranger: drive module and stepper from this Raspberry Pi's own pins
+    /// Drive the ranger from Raspberry Pi GPIO
     #[cfg(feature = "pi")]
     #[command(long_about = board::ABOUT)]
     Board(board::Args),
@@ -118,27 +118,27 @@ enum Verb {
     /// List the propagation paths of echoes at a position
     #[command(long_about = paths::ABOUT)]
     Paths(paths::Args),
-    /// Show the echo trace of one firing, each peak with its path
+    /// Show the echo trace of one ping, each peak with its propagation path
     #[command(long_about = trace::ABOUT)]
     Trace(trace::Args),
-    /// Make a data set for machine learning: rooms, poses, sensors and air drawn at random, shard by shard
+    /// Generate random training data
     #[command(long_about = generate::ABOUT)]
     Generate(generate::Args),
-    /// Convert readings from elsewhere to a log: tables, JSON, logs of CARMEN and Player
+    /// Convert readings from other sources to a log: tables, JSON, logs of CARMEN and Player
     #[command(long_about = import::ABOUT)]
     Import(Box<import::Args>),
     /// Write logs for other tools: recordings of ROS 2, tables
     #[command(long_about = export::ABOUT)]
     Export(export::Args),
-    /// Write a log again with the model's predictions beside its readings
+    /// Add the model's predictions to a log
     #[command(long_about = predict::ABOUT)]
     Predict(Box<predict::Args>),
-    /// Compare a log's readings with the predictions beside them
+    /// Compare a log's readings with its predictions
     Compare(compare::Args),
     /// Fit sensor, air, scene and poses to measurements
     #[command(long_about = calibrate::ABOUT)]
     Calibrate(Box<calibrate::Args>),
-    /// Find the poses of sweeps without an initial guess
+    /// Find the poses of scans without an initial guess
     #[command(long_about = locate::ABOUT)]
     Locate(Box<locate::Args>),
     /// Classify planes, corners and edges in scans
@@ -170,10 +170,10 @@ enum Verb {
     Array(preset::ArrayVerb),
 }
 
-/// The command line: verbs in groups, exit codes with every verb, and values that may be negative
-/// numbers, so that what begins with a digit after the minus is no option.
+/// Builds the command line: verbs in groups, exit codes with every verb, and values that may be
+/// negative numbers, so that a minus followed by a digit never starts an option.
 fn command_line() -> Command {
-    fn complete(command: Command) -> Command {
+    fn finish(command: Command) -> Command {
         let help = command.get_after_help().map(ToString::to_string).unwrap_or_default();
         let help = match (help.contains("Exit codes:"), help.is_empty()) {
             (true, _) => help,
@@ -186,25 +186,25 @@ fn command_line() -> Command {
                 true => arg.allow_negative_numbers(true),
                 false => arg,
             })
-            .mut_subcommands(complete)
+            .mut_subcommands(finish)
     }
-    groups::in_groups(complete(Cli::command()))
+    groups::in_groups(finish(Cli::command()))
 }
 
 /// Runs the command line of this process.
 #[must_use]
 pub fn main() -> ExitCode {
-    outlive_file_size_limit();
+    ignore_file_size_signal();
     failure::print_whole_lines();
     let mut command = command_line();
     let matches =
         command.try_get_matches_from_mut(std::env::args_os()).unwrap_or_else(|error| error.exit());
-    if let Err(failure) = output::guard(&command, &matches) {
+    if let Err(failure) = output::register_inputs(&command, &matches) {
         return failure::report(Err(failure));
     }
     let cli =
         Cli::from_arg_matches(&matches).unwrap_or_else(|error| error.format(&mut command).exit());
-    // The daemon has messages of its own.
+    // The daemon logs its own messages.
     if !matches!(cli.verb, Verb::Run(_)) {
         messages::warn_on_stderr();
     }
@@ -241,17 +241,17 @@ pub fn main() -> ExitCode {
     failure::report(outcome)
 }
 
-/// Every argument of the command line that names a place to write to: verb and option.
+/// Returns the arguments that name an output, each as verb and option.
 #[doc(hidden)]
 #[must_use]
 pub fn outputs() -> Vec<String> {
     output::arguments(&Cli::command())
 }
 
-/// A file-size limit is to be an error of the write that meets it, with a message, and not the end of
+/// Makes an exceeded file-size limit an error of the write, with a message, instead of the end of
 /// the process.
-fn outlive_file_size_limit() {
-    // Whoever can't have a handler has the system's behaviour.
+fn ignore_file_size_signal() {
+    // If no handler can be installed, the system's default applies.
     drop(signal_hook::flag::register(signal_hook::consts::SIGXFSZ, Arc::default()));
 }
 

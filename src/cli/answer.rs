@@ -1,4 +1,4 @@
-//! What a verb found, on standard output.
+//! Results of a verb on standard output.
 
 use std::io::{self, StdoutLock, Write as _};
 
@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::{Failure, Outcome};
 
-/// Prints records as JSON, one a line, or as `table` shows them.
+/// Prints records as JSON, one per line, or as text written by `table`.
 pub(super) fn answer<T: Serialize>(
     json: bool,
     records: impl IntoIterator<Item = T>,

@@ -5,7 +5,7 @@ use std::{fs, io, path::Path};
 use super::Failure;
 use crate::array::{ArrayError, Course, RangerArray};
 
-/// An array: a file, or a preset by its name. A file of that name wins.
+/// Loads an array from a file, or else from the preset of that name.
 pub(super) fn load_array(name: &str) -> Result<RangerArray, Failure> {
     let array = match fs::read_to_string(name) {
         Ok(text) => RangerArray::from_json(&text),
@@ -13,14 +13,14 @@ pub(super) fn load_array(name: &str) -> Result<RangerArray, Failure> {
         Err(error) => {
             return Err(Failure::input(
                 format!("cannot read the array {name}: {error}"),
-                "give a text file that you may read, or the name of a preset",
+                "give a readable text file, or the name of a preset",
             ));
         }
     };
     array.map_err(|error| {
         let message = match &error {
             ArrayError::UnknownPreset { .. } => {
-                format!("there is no array file `{name}` and no preset of that name")
+                format!("no array file `{name}` and no preset of that name")
             }
             ArrayError::Form { line, column, field, message } => {
                 format!("{name}:{line}:{column}: {field}: {message}")
@@ -31,13 +31,13 @@ pub(super) fn load_array(name: &str) -> Result<RangerArray, Failure> {
     })
 }
 
-/// A course from a file of poses.
+/// Loads a course from a file of poses.
 pub(super) fn load_course(path: &Path) -> Result<Course, Failure> {
     let name = path.display();
     let text = fs::read_to_string(path).map_err(|error| {
         Failure::input(
             format!("cannot read the poses {name}: {error}"),
-            "give a text file with a pose a line: {\"x_m\": 1.0, \"y_m\": 2.0, \"heading_deg\": 90.0}",
+            "give a text file with one pose per line: {\"x_m\": 1.0, \"y_m\": 2.0, \"heading_deg\": 90.0}",
         )
     })?;
     Course::from_json_lines(&text).map_err(|error| {
@@ -46,15 +46,15 @@ pub(super) fn load_course(path: &Path) -> Result<Course, Failure> {
     })
 }
 
-/// Refuses `--array` where one ranger turns on a stepper.
+/// Option that rejects `--array` where one ranger turns on a stepper.
 #[derive(Debug, Clone, clap::Args)]
 pub(super) struct NoArray {
-    #[arg(long, hide = true, value_name = "NAME|FILE", value_parser = no_array)]
+    #[arg(long, hide = true, value_name = "NAME|FILE", value_parser = reject_array)]
     array: Option<String>,
 }
 
-fn no_array(_name: &str) -> Result<String, String> {
-    Err("a stepper turns one ranger, and no device here drives several: arrays work with \
-         `sonard simulate --array` and `sonard run --simulate --array`"
+fn reject_array(_name: &str) -> Result<String, String> {
+    Err("a stepper turns a single ranger: arrays work with `sonard simulate --array` and \
+     `sonard run --simulate --array`"
         .into())
 }

@@ -20,35 +20,35 @@ pub(super) struct Args {
     /// Make this symbolic link to the pty
     #[arg(long, value_name = "PATH")]
     link: Option<OutPath>,
-    /// Motor steps a revolution, including microsteps and gears
+    /// Motor steps per revolution, including microsteps and gears
     #[arg(long, value_name = "N", default_value_t = 400, value_parser = clap::value_parser!(u16).range(4..))]
     steps_per_revolution: u16,
     /// Serial number: up to ten characters
-    #[arg(long, value_name = "TEXT", default_value = "PI-NO-SER", value_parser = serial)]
+    #[arg(long, value_name = "TEXT", default_value = "PI-NO-SER", value_parser = parse_serial)]
     serial: [u8; 10],
     #[command(flatten)]
     pins: PinNumbers,
 }
 
 pub(super) const ABOUT: &str = "\
-Act as a ranger: drive module and stepper from this Raspberry Pi's own pins.
+Drive the ranger from Raspberry Pi GPIO.
 
-The device's own protocol code runs here and speaks on a pty as a board with the firmware does on its serial \
-port. Linux adds latency: readings are some 5 to 50 us (1 to 9 mm) too long and scatter with the load of the \
-computer, and a motor above some 1,000 steps/s does not run smoothly. A board with a microcontroller times \
-echoes to 0.5 us.";
+The firmware's protocol code runs on this computer and serves a pty in the same way as a board \
+serves its serial port. Linux adds latency: readings are 5 to 50 us (1 to 9 mm) too long, with \
+scatter that depends on the computer's load, and the motor runs smoothly only up to about 1,000 \
+steps/s. A microcontroller board times echoes to 0.5 us.";
 
 const EXAMPLES: &str = "\
 Example:
   sonard board --link /tmp/ranger &
   sonard scan --port /tmp/ranger --scene my-room.json --pose 1.2,0.8,90 --out out
 
-Exit codes: 0 stopped on request, 2 wrong usage, 3 no Raspberry Pi, or its pins can't be used.";
+Exit codes: 0 stopped on request, 2 wrong usage, 3 not a Raspberry Pi, or its pins are not usable.";
 
 pub(super) fn run(args: &Args) -> Outcome {
     let pins = GpioPins::open(&args.pins).map_err(|error| Failure::device(&error, error.help()))?;
     let settings = PiSettings {
-        // A counter would need a place to be kept in; two starts in a row hardly ever collide.
+        // A counter would need storage; two consecutive random numbers hardly ever collide.
         boot: rand::rng().random_range(1..=u16::MAX),
         serial: args.serial,
         steps_per_revolution: args.steps_per_revolution,
@@ -77,15 +77,15 @@ pub(super) fn run(args: &Args) -> Outcome {
             Ok(Err(error)) => {
                 Err(Failure::device(format!("the pty failed: {error}"), "start the board again"))
             }
-            Err(error) => Err(Failure::device(error, "this is a fault of the program: report it")),
+            Err(error) => Err(Failure::device(error, "this is a bug: report it")),
         }
     })
 }
 
-fn serial(text: &str) -> Result<[u8; 10], String> {
+fn parse_serial(text: &str) -> Result<[u8; 10], String> {
     let mut bytes = [0; 10];
     if !text.chars().all(|c| c.is_ascii_graphic()) || text.is_empty() || text.len() > bytes.len() {
-        return Err("one to ten printable characters".into());
+        return Err("give one to ten printable characters".into());
     }
     for (slot, byte) in bytes.iter_mut().zip(text.bytes()) {
         *slot = byte;

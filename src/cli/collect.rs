@@ -3,7 +3,7 @@
 mod adopt;
 mod load;
 mod local_device;
-mod person;
+mod observer;
 mod preview;
 mod report;
 mod terminal;
@@ -31,9 +31,9 @@ use crate::{
     },
     config::document,
 };
-use load::{in_words, load};
+use load::{describe, load};
 use local_device::LocalDevice;
-use person::Person;
+use observer::TerminalObserver;
 
 /// Options of `sonard collect`.
 #[derive(Debug, clap::Args)]
@@ -41,22 +41,22 @@ use person::Person;
 #[command(group(clap::ArgGroup::new("device").args(["port", "mock", "emulator", "daemon"])))]
 #[command(group(clap::ArgGroup::new("instead").args(["example", "check", "plan_only", "verify", "report"])))]
 pub(super) struct Args {
-    /// The plan, a TOML file: `sonard collect --example` prints one with every key explained
+    /// The plan, a TOML file; `sonard collect --example` prints one with all keys explained
     #[arg(value_name = "PLAN.toml", required_unless_present_any = ["example", "verify", "report"])]
     plan: Option<PathBuf>,
-    /// Output folder; in place of the one that the plan names
+    /// Output folder; instead of the one in the plan
     #[arg(long, value_name = "DIR")]
     out: Option<OutPath>,
-    /// Override a key of the file; may be given several times
+    /// Override a key of the file (repeatable)
     #[arg(long, value_name = "SECTION.KEY=VALUE")]
     set: Vec<String>,
-    /// Print a file with every key explained, and exit; a plan, with ranges and defaults
+    /// Print an example file with all keys explained, and exit; a plan, with ranges and defaults
     #[arg(long)]
     example: bool,
-    /// Check all that is named, and exit
+    /// Validate the file and all that it names, and exit
     #[arg(long)]
     check: bool,
-    /// Say how long it takes, how it splits into acoustics, motor and link, and how much disk, and exit
+    /// Estimate duration and disk use, and exit
     #[arg(long)]
     plan_only: bool,
     /// JSON instead of text; one object, with --plan-only
@@ -65,27 +65,27 @@ pub(super) struct Args {
     /// Check files against their digests, and exit; those of a collection's folder
     #[arg(long, value_name = "DIR", conflicts_with = "plan")]
     verify: Option<PathBuf>,
-    /// Write a collection's report and manifest anew, and exit
+    /// Regenerate report and manifest of a collection's folder, and exit
     #[arg(long, value_name = "DIR", conflicts_with = "plan")]
     report: Option<PathBuf>,
     /// Continue although plan, scene or ranger have changed since the start
     #[arg(long)]
     accept_changed_plan: bool,
-    /// Retry the scans that were given up
+    /// Retry the scans that failed
     #[arg(long)]
-    retry_given_up: bool,
+    retry_failed: bool,
     /// Serial port of the ranger: a path, a name in /dev/serial/by-id, or a USB serial number
     #[arg(long, value_name = "PATH|ID")]
     port: Option<String>,
-    /// Use a mock ranger instead of a real one; it is carried to each pose
+    /// Use a mock ranger instead of a real one; it is placed at each pose
     #[arg(long)]
     mock: bool,
-    /// Use the firmware's machine code in an emulated board (starts sonard-emulator); one board for
-    /// each pose
+    /// Run the firmware's machine code in an emulated board (starts sonard-emulator); one board per
+    /// pose
     #[arg(long)]
     emulator: bool,
-    /// Let a running daemon take the scans; with its own ranger, sensor and motion, and its own
-    /// scans held meanwhile
+    /// Let a running daemon take the scans; with its ranger, sensor and motion, and its own scans
+    /// paused meanwhile
     #[arg(long, conflicts_with_all = mock_world::OPTIONS)]
     daemon: bool,
     #[command(flatten)]
@@ -97,14 +97,14 @@ pub(super) struct Args {
 pub(super) const ABOUT: &str = "\
 Take scans by a plan, over days: poses, repeats, checks, a report.
 
-Each scan is a log of its own; it counts once it is complete and passes the plan's checks. Interrupted or \
-refused scans are kept aside and repeated. An interrupted collection (signal, crash, power cut, lost ranger) \
-continues where it stopped when it is started again. At the end there is a report with pictures and a manifest \
-with checksums.
+Each scan is a log of its own; it counts once it is complete and passes the plan's checks. \
+Interrupted or rejected scans are kept separately and repeated. An interrupted collection (signal, \
+crash, power failure, lost ranger) resumes when it is started again. At the end there is a report \
+with pictures and a manifest with checksums.
 
-With --daemon, a running `sonard run` takes the scans, and logs them too. Motion, sensor and air that the plan \
-does not state are the daemon's; a plan that states others is refused with the key to change. The daemon's own \
-scans are paused meanwhile and resume at the end.";
+With --daemon, a running `sonard run` takes the scans, and logs them too. Motion, sensor and air \
+that the plan does not specify are the daemon's; a conflicting plan is rejected with the key to \
+change. The daemon's own scans are paused meanwhile and resume at the end.";
 
 const EXAMPLES: &str = "\
 Examples:
@@ -116,15 +116,15 @@ Examples:
   sonard collect --verify collection
   sonard compare collection/scans/*.jsonl
 
-In the folder: scans/ (valid scans), set-aside/ (interrupted or refused), journal.jsonl, manifest.json,
+In the folder: scans/ (valid scans), set-aside/ (interrupted or rejected), journal.jsonl, manifest.json,
 report.md with report/, inputs/ (plan, scene and sensor as used).
 
-Exit codes: 0 every scan is there, 1 stopped on request, given up, or --verify found something, 2 wrong
-plan or input, 3 device, link or disk.";
+Exit codes: 0 all scans are complete, 1 interrupted, some scans failed, or --verify found a fault, 2 wrong
+plan or input, 3 device, link or disk error.";
 
 pub(super) fn run(args: &Args) -> Outcome {
     if args.example {
-        return say(&document::<CollectionKeys>());
+        return print(&document::<CollectionKeys>());
     }
     if let Some(root) = &args.verify {
         return verify_folder(root);
@@ -135,16 +135,17 @@ pub(super) fn run(args: &Args) -> Outcome {
     let mut plan = load(args)?;
     runtime::run_interruptible(async |interrupts| {
         let daemon = match args.daemon {
-            true => Some(daemon(args, &mut plan, interrupts.clone()).await?),
+            true => Some(find_daemon(args, &mut plan, interrupts.clone()).await?),
             false => None,
         };
         if args.check {
-            return say(&in_words(&plan));
+            return print(&describe(&plan));
         }
         if args.plan_only {
-            return say(&preview::of(&plan, args)?);
+            return print(&preview::render(&plan, args)?);
         }
-        // With a handler, a file that gets too large is an error of the write and not the end.
+        // With a handler, exceeding the file-size limit is an error of the write instead of the end
+        // of the process.
         let _too_large = signal(SignalKind::from_raw(Signal::XFSZ.as_raw()));
         match daemon {
             Some(daemon) => collect(args, plan, daemon, interrupts).await,
@@ -159,16 +160,20 @@ pub(super) fn run(args: &Args) -> Outcome {
 async fn collect(args: &Args, plan: Plan, device: impl Device, interrupts: Interrupts) -> Outcome {
     let choices = Choices {
         accept_changed_plan: args.accept_changed_plan,
-        retry_given_up: args.retry_given_up,
+        retry_given_up: args.retry_failed,
     };
-    let person = Person::new(plan.azimuths.beams());
-    Ok(crate::collect::collect(plan, choices, device, person, interrupts).await?)
+    let observer = TerminalObserver::new(plan.azimuths.beams());
+    Ok(crate::collect::collect(plan, choices, device, observer, interrupts).await?)
 }
 
-/// The daemon that is to take the scans, if it would take those of the plan.
-async fn daemon(args: &Args, plan: &mut Plan, interrupts: Interrupts) -> Result<ByDaemon, Failure> {
-    let tell = |line: &str| notice!("{line}");
-    let (daemon, status) = ByDaemon::find(args.at.client()?, interrupts, tell).await?;
+/// Finds the daemon, and checks that it can take the plan's scans.
+async fn find_daemon(
+    args: &Args,
+    plan: &mut Plan,
+    interrupts: Interrupts,
+) -> Result<ByDaemon, Failure> {
+    let notify = |line: &str| notice!("{line}");
+    let (daemon, status) = ByDaemon::find(args.at.client()?, interrupts, notify).await?;
     check_scene(status.scene.as_ref(), &plan.scene)?;
     adopt::adopt(plan, &daemon, &status)?;
     Ok(daemon)
@@ -177,54 +182,55 @@ async fn daemon(args: &Args, plan: &mut Plan, interrupts: Interrupts) -> Result<
 fn verify_folder(root: &Path) -> Outcome {
     let files = Manifest::read(root).map_err(|error| missing_manifest(root, &error))?.files.len();
     let bar = ProgressBar::new(files as u64);
-    let verified = verify(root, || bar.inc(1)).map_err(|error| refuse(&error));
+    let verified = verify(root, || bar.inc(1)).map_err(|error| failure_from(&error));
     bar.finish_and_clear();
     let verified = verified?;
     let counts = &verified.manifest.counts;
     let mut text = format!(
-        "{}: {} scans of {} wanted, {} set aside, {} given up; {files} files\n",
+        "{}: {} of {} scans, {} rejected, {} failed; {files} files\n",
         verified.manifest.name, counts.accepted, counts.wanted, counts.set_aside, counts.given_up,
     );
     for problem in &verified.problems {
         text += &format!("  {problem}\n");
     }
     if verified.problems.is_empty() {
-        text += "every file is as it was written\n";
+        text += "all digests match\n";
     }
-    say(&text)?;
+    print(&text)?;
     if verified.problems.is_empty() { Ok(()) } else { Err(Failure::Found(None)) }
 }
 
 fn missing_manifest(root: &Path, error: &FolderError) -> Failure {
     let help = if root.join(JOURNAL).exists() {
-        "the collection was broken off before the first scan was whole, or its manifest was removed: \
-         start it again, or `sonard collect --report DIR`"
+        "no scan was completed, or the manifest was removed: continue the collection, or \
+         run `sonard collect --report DIR`"
     } else {
         "give the folder of a collection"
     };
     Failure::input(error, help)
 }
 
-/// Report and manifest of a folder as it is, if nobody collects into it at the moment.
+/// Writes report and manifest of a folder, unless a collection is running in it.
 fn write_report(root: &Path) -> Outcome {
     let folder = Folder::at(root);
     if !folder.journal().exists() {
         return Err(Failure::input(
-            format!("{} is no collection: it has no {JOURNAL}", root.display()),
+            format!("{} is not a collection: it has no {JOURNAL}", root.display()),
             "give the folder of a collection",
         ));
     }
-    let journal = Journal::open(&folder.journal()).map_err(|error| refuse(&error))?;
+    let journal = Journal::open(&folder.journal()).map_err(|error| failure_from(&error))?;
     report::write(&folder, journal.history())?;
-    let manifest = Manifest::of(&folder, journal.history()).map_err(|error| refuse(&error))?;
-    manifest.write(&folder).map_err(|error| refuse(&error))
+    let manifest =
+        Manifest::of(&folder, journal.history()).map_err(|error| failure_from(&error))?;
+    manifest.write(&folder).map_err(|error| failure_from(&error))
 }
 
-fn refuse(error: &FolderError) -> Failure {
+fn failure_from(error: &FolderError) -> Failure {
     Failure::device(error, error.help())
 }
 
-fn say(text: &str) -> Outcome {
+fn print(text: &str) -> Outcome {
     let written = std::io::stdout().lock().write_all(text.as_bytes());
-    written.or_else(|error| Failure::from_write("to standard output", &error))
+    written.or_else(|error| Failure::from_write("standard output", &error))
 }

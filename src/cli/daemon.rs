@@ -1,4 +1,4 @@
-//! Which daemon a verb asks.
+//! Options that select one or more daemons.
 
 use std::path::{Path, PathBuf};
 
@@ -11,7 +11,7 @@ use crate::{
     server::read_token,
 };
 
-/// Where the daemon is.
+/// Options that select one daemon.
 #[derive(Debug, Clone, clap::Args)]
 pub(super) struct DaemonArgs {
     /// Unix socket of the daemon
@@ -25,7 +25,8 @@ pub(super) struct DaemonArgs {
     /// TCP address of the daemon, HOST:PORT, instead of its socket
     #[arg(long, value_name = "ADDRESS")]
     address: Option<String>,
-    /// File with the daemon's token: needed over TCP for commands, from another computer for everything
+    /// File with the daemon's token; needed for commands over TCP, and for everything from other
+    /// computers
     #[arg(long, value_name = "FILE", env = "SONARD_SERVER_TOKEN_FILE")]
     token_file: Option<PathBuf>,
 }
@@ -38,9 +39,9 @@ impl DaemonArgs {
         let host = address.strip_prefix("http://").unwrap_or(address).trim_end_matches('/');
         if host.contains('/') {
             return Err(Failure::input(
-                format!("--address {address} is no address of a daemon"),
-                "give HOST:PORT; the daemon speaks plain HTTP, so ask through a tunnel where \
-                 others listen in",
+                format!("--address {address} is not the address of a daemon"),
+                "give HOST:PORT; the daemon serves plain HTTP, so use a tunnel on an untrusted \
+                 network",
             ));
         }
         let token = self.token_file.as_deref().map(token).transpose()?;
@@ -48,10 +49,10 @@ impl DaemonArgs {
     }
 }
 
-/// Which daemons a verb asks that may ask several.
+/// Options that select any number of daemons.
 #[derive(Debug, Clone, clap::Args)]
 pub(super) struct DaemonsArgs {
-    /// Unix socket of the daemon; of each, if given several times
+    /// Unix socket of the daemon; repeatable
     #[arg(
         long,
         value_name = "PATH",
@@ -59,19 +60,19 @@ pub(super) struct DaemonsArgs {
         default_value = "/run/sonard/sonard.sock"
     )]
     socket: Vec<PathBuf>,
-    /// TCP address of the daemon, HOST:PORT, instead of its socket; of each, if given several times
+    /// TCP address of the daemon, HOST:PORT, instead of its socket; repeatable
     #[arg(long, value_name = "ADDRESS")]
     address: Vec<String>,
-    /// File with the daemon's token: needed over TCP for commands, from another computer for everything
+    /// File with the daemon's token; needed for commands over TCP, and for everything from other
+    /// computers
     #[arg(long, value_name = "FILE", env = "SONARD_SERVER_TOKEN_FILE")]
     token_file: Option<PathBuf>,
-    /// File that lists daemons, a [[daemon]] for each, or a configuration with [fleet]: all of them
-    /// are asked
+    /// File that lists daemons, a [[daemon]] for each, or a configuration with [fleet]; queries all
     #[arg(long, value_name = "FILE", conflicts_with = "address")]
     fleet: Option<PathBuf>,
 }
 
-/// One daemon, or several.
+/// Daemons selected by the options.
 pub(super) enum Daemons {
     One(Client),
     Several(Vec<Asked>),
@@ -91,33 +92,33 @@ impl DaemonsArgs {
         self.each().map(Daemons::Several)
     }
 
-    /// All of them, each with what is known of it, also if it is one.
+    /// Returns all selected daemons with their configuration, even if there is only one.
     pub(super) fn each(&self) -> Result<Vec<Asked>, Failure> {
         let wrong = |error: MemberError| Failure::input(&error, &error.help);
         if let Some(file) = &self.fleet {
-            return asked(read_members(file).map_err(wrong)?);
+            return connect_all(read_members(file).map_err(wrong)?);
         }
         let (socket, address) = (self.socket.as_slice(), self.address.as_slice());
-        // One may be the default, which addresses stand in place of.
+        // A single socket may be the default, which addresses replace.
         let sockets = if socket.len() > 1 || address.is_empty() { socket } else { &[] };
         let sockets = sockets.iter().map(|path| Ok(Member::at_socket(path.clone())));
         let members = sockets.chain(address.iter().map(|address| Member::parse(address)));
         let members: Result<Vec<_>, _> = members.collect();
         let with_token = |member: Member| Member { token_file: self.token_file.clone(), ..member };
         let members = members.map_err(wrong)?.into_iter().map(with_token).collect();
-        asked(check_all(members).map_err(wrong)?)
+        connect_all(check_all(members).map_err(wrong)?)
     }
 }
 
-/// Daemons with the way to ask them: their tokens are read.
-pub(super) fn asked(members: Vec<Member>) -> Result<Vec<Asked>, Failure> {
-    let asked = members.into_iter().map(|member| {
+/// Creates a client for each daemon, with its token.
+pub(super) fn connect_all(members: Vec<Member>) -> Result<Vec<Asked>, Failure> {
+    let connect_all = members.into_iter().map(|member| {
         let by_tcp = matches!(member.place, Endpoint::Address(_));
         let file = member.token_file.as_deref().filter(|_| by_tcp);
         let client = Client::new(member.place.clone(), file.map(token).transpose()?);
         Ok(Asked { member, client })
     });
-    asked.collect()
+    connect_all.collect()
 }
 
 fn token(file: &Path) -> Result<String, Failure> {
@@ -128,30 +129,30 @@ fn token(file: &Path) -> Result<String, Failure> {
     })
 }
 
-pub(super) fn refuse(error: &ClientError) -> Failure {
+pub(super) fn failure_from(error: &ClientError) -> Failure {
     Failure::device(error, error.help())
 }
 
-/// What it means for a verb that no more scans come.
-pub(super) fn refuse_scans(error: &ScansError) -> Failure {
+/// Converts the error of requested scans that ended early.
+pub(super) fn scans_failure(error: &ScansError) -> Failure {
     match error {
         ScansError::Forgotten(_) => Failure::Found(Some(error.to_string())),
         other => Failure::device(other, other.help()),
     }
 }
 
-/// Predictions are the daemon's: with another scene they would not be what was asked for.
+/// Checks that the daemon predicts in the given scene.
 pub(super) fn check_scene(of_daemon: Option<&SceneRef>, scene: &Scene) -> Outcome {
     if of_daemon.is_some_and(|of_daemon| of_daemon.sha256 == scene.sha256) {
         return Ok(());
     }
     Err(Failure::input(
         format!(
-            "the daemon predicts in {}, not in the scene {} as it is here",
+            "the daemon uses {}, not the scene {} given here",
             of_daemon
                 .map_or_else(|| "no scene".into(), |scene| format!("its scene {}", scene.name)),
             scene.name
         ),
-        "name that one here, or change place.scene of the daemon",
+        "give the daemon's scene, or change its place.scene",
     ))
 }

@@ -3,10 +3,10 @@
 mod clock;
 mod echo;
 mod examine;
+mod foreign_sender;
 mod line;
+mod port_monitor;
 mod report;
-mod speaker;
-mod surroundings;
 mod tap;
 
 use super::{Failure, Outcome, runtime};
@@ -20,10 +20,10 @@ pub(super) struct Args {
     /// Serial port of the ranger: a path, a name in /dev/serial/by-id, or a USB serial number
     #[arg(long, value_name = "PATH|ID")]
     port: Option<String>,
-    /// Leave the motor alone
+    /// Do not move the motor
     #[arg(long)]
     no_motion: bool,
-    /// Firings
+    /// Number of pings
     #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u32).range(1..=1000))]
     pings: u32,
     /// JSON instead of text; one object
@@ -34,11 +34,12 @@ pub(super) struct Args {
 pub(super) const ABOUT: &str = "\
 Diagnose a ranger: port, firmware, motor, echo.
 
-With --port it opens that port, identifies the board, measures the line, turns the motor a few steps back and \
-forth, fires some times, and compares the board's clock with this computer's. Each check reports what it found \
-and, if something is wrong, what to do. Other programs that use the port are named, as far as this user may see \
-them, and nothing is moved then. Without --port it lists the serial ports by their stable names and opens \
-none of them, because other devices may react to it.";
+With --port it opens that port, identifies the board, tests the serial line, turns the motor a few \
+steps back and forth, transmits some pings, and compares the board's clock with this computer's. \
+Each check reports its result and, if something is wrong, what to do. If another program visible \
+to this user has the port open, it is named, and nothing is moved. Without --port it lists the \
+serial ports by their stable names and opens none of them, because other devices may react to \
+it.";
 
 const EXAMPLES: &str = "\
 Examples:
@@ -53,10 +54,10 @@ With --json, `checks` holds objects {check, status, detail, cause, help}. status
 failed or skipped; cause is null or one of not_found, ambiguous, permission, busy (another program \
 has the port open), not_serial, port_error, cable, silent, wrong_firmware, wrong_version, \
 login_prompt, modem (commands or replies of one), echo (the line returns what is sent), settings \
-(another program changed the line's), power, line, latency, emergency_stop, motor, missing_echo, stuck_echo, echo_time (before the receiver opens or after the window), scatter (readings \
-that disagree), clock (it stands or runs at another rate), device.
+(another program changed the line's), power, line, latency, emergency_stop, motor, missing_echo, stuck_echo, echo_time (before the end of the blanking or after the window), scatter (readings \
+that disagree), clock (stopped, or wrong rate), device.
 
-Exit codes: 0 all well, or warnings only (or ports listed), 1 the board works but something failed, 2 wrong \
+Exit codes: 0 all checks passed, or warnings only (or ports listed), 1 the board works but a check failed, 2 wrong \
 usage, 3 no port, no board or no link to it.";
 
 pub(super) fn run(args: &Args) -> Outcome {
@@ -86,19 +87,19 @@ fn list(candidates: &[Candidate], json: bool) -> Outcome {
     }
     if candidates.is_empty() {
         return Err(Failure::device(
-            "there is no serial port",
-            "plug the board in; if it is, its cable may be one for charging only, or `dmesg` tells \
-             why it is not recognised",
+            "no serial port found",
+            "connect the board; if it is connected, the cable may be for charging only, or `dmesg` \
+             shows why it is not recognised",
         ));
     }
     if !json {
-        notice!("none was opened: examine one with `sonard doctor --port NAME`");
+        notice!("no port was opened; `sonard doctor --port NAME` checks one");
     }
     Ok(())
 }
 
 impl Report {
-    /// The exit code that goes with it.
+    /// Returns the exit code of the report.
     fn outcome(&self) -> Outcome {
         match self.worst() {
             None => Ok(()),

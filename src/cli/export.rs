@@ -28,7 +28,7 @@ pub(super) struct Args {
     /// Logs, folders of a daemon's logs (or one per robot), of collections; - for standard input
     #[arg(required = true, value_name = "LOG")]
     logs: Vec<PathBuf>,
-    /// Format to write [default: as the ending of the output says]
+    /// Format to write [default: from the output's file extension]
     #[arg(long, value_enum, value_name = "FORMAT")]
     to: Option<FormatName>,
     /// File to write; the export goes to it instead of to standard output
@@ -40,47 +40,48 @@ pub(super) struct Args {
     recording: RecordingArgs,
 }
 
-/// How a recording is made.
 #[derive(Debug, Clone, PartialEq, clap::Args)]
 #[command(next_help_heading = "Recordings (mcap)")]
 struct RecordingArgs {
-    /// How a Range encodes no echo and too-near readings
+    /// Encoding of no echo and of readings at minimum range in a Range
     #[arg(long, value_enum, value_name = "PROFILE")]
     profile: Option<ProfileName>,
-    /// Full angle that a Range is said to be valid for, degrees [default: the two-way 6 dB width of the beam]
-    #[arg(long, value_name = "DEG", value_parser = angle)]
+    /// Field of view stated in a Range, degrees, full angle [default: the two-way 6 dB width of the
+    /// beam]
+    #[arg(long, value_name = "DEG", value_parser = parse_angle)]
     field_of_view_deg: Option<f64>,
-    /// Frame of the transducer, which the others are named after [default: sonar]
-    #[arg(long, value_name = "FRAME", value_parser = frame)]
+    /// Frame of the transducer, prefix of the other frames [default: sonar]
+    #[arg(long, value_name = "FRAME", value_parser = parse_frame)]
     frame: Option<String>,
-    /// Leave the logs themselves out of the recording
+    /// Omit the logs themselves from the recording
     #[arg(long)]
     without_log: bool,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 enum FormatName {
-    /// A recording of ROS 2: Range, LaserScan, PointCloud2, TF and markers, with the log attached
+    /// Recording of ROS 2: Range, LaserScan, PointCloud2, TF and markers, with the log attached
     Mcap,
-    /// A table of typed columns: a reading a row, its prediction beside it
+    /// Table of typed columns: one reading per row, with its prediction
     Parquet,
-    /// The same table as text
+    /// Table as text
     Csv,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 enum ProfileName {
-    /// Infinite ranges, as REP 117 says
+    /// Infinite ranges, as specified by REP 117
     Rep117,
-    /// max_range for no echo and min_range for too near, as nav2's range layer requires
+    /// max_range for no echo and min_range at minimum range, as required by nav2's range layer
     Nav2,
 }
 
 pub(super) const ABOUT: &str = "\
 Write logs for other tools: recordings of ROS 2 (MCAP), tables (Parquet, CSV).
 
-All logs go into one output, scan by scan in their order. A folder stands for its logs in the order of their \
-names: a collection for those in `scans`, a folder of robots' folders for those of each robot.";
+All logs go into one output, scan by scan in their order. A folder is expanded to its logs in the \
+order of their names: a collection to those in `scans`, a folder of robots' folders to those of \
+each robot.";
 
 const HELP: &str = "\
 Examples:
@@ -89,15 +90,15 @@ Examples:
   sonard export trial -o trial.parquet                # a collection, or a daemon's folder
   sonard simulate --scene corridor --pose beside-wall | sonard export - --to csv | head -n 3
 
-A recording has /sonar/range (of arrays /sonar/RANGER/range), /sonar/scan, /sonar/points, /sonar/paths, /tf, \
-/tf_static, and below /sonar/predicted what the model says; stamps are those of the firing. A sonar is not a laser: see \
-docs/export.md before a map is made of its scans.
+A recording has /sonar/range (for arrays /sonar/RANGER/range), /sonar/scan, /sonar/points, \
+/sonar/paths, /tf, /tf_static, and predictions below /sonar/predicted. Stamps are the times of the \
+pings. A sonar is not a laser: see docs/export.md before building a map from its scans.
 
-Columns of tables have the names of the fields in the log, with their units; those that begin with sim_ are predictions. \
-Cells without a value in the log are empty. Parquet has typed columns, and the sessions' records in the file's metadata; \
-it is smaller and faster for many readings.
+Columns of tables have the names of the fields in the log, with their units; those that begin with \
+sim_ are predictions. Cells without a value in the log are empty. Parquet has typed columns, and \
+the sessions' records in the file's metadata; it is smaller, and faster for many readings.
 
-Exit codes: 0 done, 2 wrong usage or input, 3 the disk gave up.";
+Exit codes: 0 done, 2 wrong usage or input, 3 write error.";
 
 pub(super) fn run(args: &Args) -> Outcome {
     let format = args.format()?;
@@ -108,20 +109,20 @@ pub(super) fn run(args: &Args) -> Outcome {
         None => Stream::standard(),
     };
     let to = args.output.as_deref().unwrap_or(Path::new("standard output"));
-    let refuse = |error: ExportError| match error {
+    let failure_from = |error: ExportError| match error {
         ExportError::Write(error) => Failure::from_write(&to.display().to_string(), &error),
         error @ ExportError::Attach { .. } => {
-            Err(Failure::input(error, "give logs that nobody writes meanwhile"))
+            Err(Failure::input(error, "give logs that are not being written"))
         }
     };
     match write(&logs, format, args, &mut stream) {
-        Ok(told) => {
-            stream.finish().or_else(|error| refuse(error.into()))?;
-            told.tell();
+        Ok(counts) => {
+            stream.finish().or_else(|error| failure_from(error.into()))?;
+            counts.print();
             Ok(())
         }
-        Err(Stop::Input(failure)) => Err(failure),
-        Err(Stop::Export(error)) => refuse(error),
+        Err(ExportFailure::Input(failure)) => Err(failure),
+        Err(ExportFailure::Export(error)) => failure_from(error),
     }
 }
 
@@ -136,27 +137,27 @@ impl Args {
             _ => None,
         };
         let format = self.to.or(by_ending).ok_or_else(|| {
-            let what = path.map_or("no format is named".to_owned(), |path| {
-                format!("{}: its ending says no format", path.display())
+            let what = path.map_or("no format is given".to_owned(), |path| {
+                format!("{}: unknown file extension", path.display())
             });
-            Failure::input(what, "say which with --to mcap, --to parquet or --to csv")
+            Failure::input(what, "choose a format with --to mcap, --to parquet or --to csv")
         })?;
         Ok(format)
     }
 
-    /// Refuses what the format has no place for, before any work.
+    /// Rejects options that the format does not support, before any work.
     fn check(&self, format: FormatName) -> Outcome {
         let is_binary = matches!(format, FormatName::Mcap | FormatName::Parquet);
         if is_binary && self.output.is_none() && io::stdout().is_terminal() {
             return Err(Failure::input(
-                "a recording or a table in Parquet is nothing to read on a terminal",
+                "recordings and Parquet tables can't be printed to a terminal",
                 "name a file with -o",
             ));
         }
         match format == FormatName::Mcap || self.recording == RecordingArgs::NONE {
             true => Ok(()),
             false => Err(Failure::input(
-                "--profile, --field-of-view-deg, --frame and --without-log are of recordings",
+                "--profile, --field-of-view-deg, --frame and --without-log apply to recordings only",
                 "leave them out, or write a recording with --to mcap",
             )),
         }
@@ -181,17 +182,19 @@ impl RecordingArgs {
     }
 }
 
-fn angle(text: &str) -> Result<f64, String> {
+fn parse_angle(text: &str) -> Result<f64, String> {
     let angle = text.parse().ok().filter(|deg: &f64| *deg > 0.0 && *deg <= 360.0);
     angle.ok_or_else(|| "give degrees, more than 0 and at most 360".to_owned())
 }
 
-/// A frame as tf2 takes it: without a slash before it.
-fn frame(text: &str) -> Result<String, String> {
+/// Parses a frame name as tf2 requires it: without a leading slash.
+fn parse_frame(text: &str) -> Result<String, String> {
     let plain = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '/';
     match !text.is_empty() && !text.starts_with('/') && text.chars().all(plain) {
         true => Ok(text.to_owned()),
-        false => Err("give letters, digits, underscores and slashes, no slash first".to_owned()),
+        false => {
+            Err("give letters, digits, underscores and slashes, without a leading slash".to_owned())
+        }
     }
 }
 
@@ -205,84 +208,84 @@ impl FormatName {
     }
 }
 
-/// Why it ended before the last scan.
-enum Stop {
+/// Reason for an early end.
+enum ExportFailure {
     Input(Failure),
     Export(ExportError),
 }
 
-impl From<ExportError> for Stop {
+impl From<ExportError> for ExportFailure {
     fn from(error: ExportError) -> Self {
         Self::Export(error)
     }
 }
 
-/// What was written.
+/// Numbers of exported logs, scans and readings.
 #[derive(Debug, Default)]
-struct Told {
+struct ExportCounts {
     logs: usize,
     scans: usize,
     readings: usize,
 }
 
-impl Told {
-    fn tell(&self) {
+impl ExportCounts {
+    fn print(&self) {
         let Self { logs, scans, readings } = self;
         notice!("{logs} logs, {scans} scans, {readings} readings");
     }
 }
 
-/// Writes all scans of the logs, and what belongs to the end.
+/// Writes all scans of the logs, and finishes the output.
 fn write(
     logs: &[PathBuf],
     format: FormatName,
     args: &Args,
     stream: &mut Stream,
-) -> Result<Told, Stop> {
+) -> Result<ExportCounts, ExportFailure> {
     let mut export: Box<dyn Export + '_> = match format {
         FormatName::Mcap => Box::new(McapExport::new(stream, args.recording.settings())?),
         FormatName::Parquet => Box::new(ParquetExport::new(stream)?),
         FormatName::Csv => Box::new(CsvExport::new(stream)?),
     };
-    let mut told = Told { logs: logs.len(), ..Told::default() };
+    let mut counts = ExportCounts { logs: logs.len(), ..ExportCounts::default() };
     for log in logs {
-        let name = name_of(log, &args.logs);
-        let mut refused = None;
+        let name = export_name(log, &args.logs);
+        let mut rejected = None;
         let read = for_each_scan(log, |scan| match export.scan(&name, &scan) {
             Ok(None) => {
-                told.scans += 1;
-                told.readings += scan.pings.len();
+                counts.scans += 1;
+                counts.readings += scan.pings.len();
                 Ok(())
             }
             Ok(Some(why)) => {
-                notice!("{}: scan {} is left out: {why}", log.display(), scan.scan);
+                notice!("{}: scan {} is skipped: {why}", log.display(), scan.scan);
                 Ok(())
             }
             Err(error) => {
-                refused = Some(error);
+                rejected = Some(error);
                 Err(Failure::Found(None))
             }
         });
-        if let Some(error) = refused {
+        if let Some(error) = rejected {
             return Err(error.into());
         }
-        read.map_err(Stop::Input)?;
+        read.map_err(ExportFailure::Input)?;
         if format == FormatName::Mcap && !args.recording.without_log && log.is_file() {
             attach(&mut *export, log, &name)?;
         }
     }
-    if told.scans == 0 {
-        return Err(Stop::Input(Failure::input(
-            "there is no scan to export",
+    if counts.scans == 0 {
+        return Err(ExportFailure::Input(Failure::input(
+            "there are no scans to export",
             "give logs as `sonard scan` or `sonard simulate` writes them",
         )));
     }
     export.finish()?;
-    Ok(told)
+    Ok(counts)
 }
 
-/// Keeps a log beside what was made of it, up to where it ended just now.
-fn attach(export: &mut dyn Export, log: &Path, name: &str) -> Result<(), Stop> {
+/// Attaches a log, up to its current end.
+fn attach(export: &mut dyn Export, log: &Path, name: &str) -> Result<(), ExportFailure> {
     let opened = File::open(log).and_then(|file| {
         let metadata = file.metadata()?;
         Ok((file, metadata.len(), metadata.modified()?))
@@ -293,9 +296,9 @@ fn attach(export: &mut dyn Export, log: &Path, name: &str) -> Result<(), Stop> {
     Ok(export.attach(&LogFile { name, bytes, written }, &mut file)?)
 }
 
-/// Name of a log in the export: its file name, preceded by the robot's folder if the log is from a folder of robots'
-/// folders, because logs of two robots may share their file name.
-fn name_of(log: &Path, given: &[PathBuf]) -> String {
+/// Name of a log in the export: its file name, preceded by the robot's folder if the log is from a
+/// folder of robots' folders, because logs of different robots may share a file name.
+fn export_name(log: &Path, given: &[PathBuf]) -> String {
     let name = log.file_name().unwrap_or(log.as_os_str()).to_string_lossy();
     let is_given = |folder: &&Path| given.iter().any(|path| path == folder);
     let robot = log.parent().filter(|robot| robot.parent().as_ref().is_some_and(is_given));

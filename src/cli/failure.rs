@@ -1,4 +1,4 @@
-//! How a verb ends, and the exit code for it.
+//! Outcome of a verb, and its exit code.
 
 use std::{io, process::ExitCode};
 
@@ -6,36 +6,36 @@ use miette::Report;
 
 use crate::{collect::Halt, scan::SinkError};
 
-/// What a verb returns.
+/// Result of a verb.
 pub type Outcome = Result<(), Failure>;
 
-/// The reason why a verb did not succeed.
+/// Reason why a verb failed.
 #[derive(Debug)]
 pub enum Failure {
-    /// It ran and found what it was asked to look for (exit code 1). The finding is already
-    /// printed, or stands in the text.
+    /// Negative result (exit code 1), already printed or given as text.
     Found(Option<String>),
     /// Wrong usage or input (exit code 2).
     Input(Report),
-    /// Device, link, or a disk that gave up (exit code 3).
+    /// Error of device, link or disk (exit code 3).
     Device(Report),
 }
 
 impl Failure {
-    /// A usage or input failure with a message and what would be right.
+    /// Creates a usage or input failure with a message and advice.
     pub fn input(message: impl std::fmt::Display, help: impl std::fmt::Display) -> Self {
         Self::Input(miette::miette!(help = help.to_string(), "{message}"))
     }
 
-    /// A device or link failure with a message and what to do.
+    /// Creates a device or link failure with a message and advice.
     pub fn device(message: impl std::fmt::Display, help: impl std::fmt::Display) -> Self {
         Self::Device(miette::miette!(help = help.to_string(), "{message}"))
     }
 
-    /// A failed write to standard output or a file; a reader that went away is no failure.
+    /// Converts a failed write to standard output or a file; a closed reader is not a failure.
     ///
     /// # Errors
-    /// Everything but a broken pipe.
+    ///
+    /// All errors except a broken pipe.
     pub fn from_write(what: &str, error: &io::Error) -> Outcome {
         if error.kind() == io::ErrorKind::BrokenPipe {
             return Ok(());
@@ -43,7 +43,8 @@ impl Failure {
         Err(Self::unwritable(&what, error))
     }
 
-    /// A place that was named and can't be written to, which is wrong input, or a disk that gave up.
+    /// Creates the failure of a path that can't be written: wrong input for an unsuitable path,
+    /// otherwise a disk error.
     pub(super) fn unwritable(what: &dyn std::fmt::Display, error: &io::Error) -> Self {
         let message = format!("cannot write {what}: {error}");
         match is_wrong_place(error) {
@@ -51,7 +52,7 @@ impl Failure {
                 message,
                 "give a file in a folder that exists and that you may write to",
             ),
-            false => Self::device(message, "check free space; what was there before is kept"),
+            false => Self::device(message, "check free space; the previous file is unchanged"),
         }
     }
 }
@@ -72,7 +73,7 @@ impl From<Halt> for Failure {
     }
 }
 
-/// For what verbs lend to a collection.
+/// Errors of verbs used by a collection.
 impl From<Failure> for Halt {
     fn from(failure: Failure) -> Self {
         let help = |report: &Report| report.help().map(|help| help.to_string()).unwrap_or_default();
@@ -84,7 +85,7 @@ impl From<Failure> for Halt {
     }
 }
 
-/// Whether another place would do: the one that was named is not there, or not for writing.
+/// Returns `true` if the path itself is unsuitable: missing or not writable.
 pub(super) fn is_wrong_place(error: &io::Error) -> bool {
     use io::ErrorKind as Kind;
     matches!(
@@ -100,16 +101,16 @@ pub(super) fn is_wrong_place(error: &io::Error) -> bool {
     )
 }
 
-/// Leaves the wrapping of failures to the terminal, so that the options which they name can be copied.
+/// Disables wrapping of failure messages, so that suggested options can be copied.
 pub(super) fn print_whole_lines() {
     let whole = |_: &dyn miette::Diagnostic| -> Box<dyn miette::ReportHandler> {
         Box::new(miette::MietteHandlerOpts::new().wrap_lines(false).build())
     };
-    // Only the first handler of a process counts, and this is it.
+    // A process accepts only its first hook, which is this one.
     let _ = miette::set_hook(Box::new(move |error| whole(error)));
 }
 
-/// Prints a failure and turns it into the process's exit code.
+/// Prints a failure and converts the outcome to an exit code.
 pub(super) fn report(outcome: Outcome) -> ExitCode {
     match outcome {
         Ok(()) => ExitCode::SUCCESS,

@@ -1,4 +1,4 @@
-//! What verbs write of what they found: pictures, and files that other tools show.
+//! Output files of verbs that interpret scans: pictures, GeoJSON and recordings.
 
 use std::{
     ffi::OsStr,
@@ -20,11 +20,11 @@ use crate::{
     scan::{Provenance, ScanView},
 };
 
-/// Which files.
+/// Options of output files.
 #[derive(Debug, clap::Args)]
 pub(super) struct FindingsArgs {
-    /// File to write; by its name a picture (.svg, .png), GeoJSON in local metres (.geojson) or a recording
-    /// of ROS 2 with markers (.mcap), or - for SVG to standard output; may be given several times
+    /// File to write; by its name a picture (.svg, .png), GeoJSON in local metres (.geojson) or a
+    /// recording of ROS 2 with markers (.mcap), or - for SVG to standard output (repeatable)
     #[arg(short, long, value_name = "FILE")]
     pub(super) output: Vec<OutPath>,
     /// Width of a PNG, pixels
@@ -35,23 +35,23 @@ pub(super) struct FindingsArgs {
     overwrite: Overwrite,
 }
 
-/// Where what was found goes.
+/// Destination and format of an output.
 enum Target {
     Picture(picture::Target),
     File(PathBuf, Product),
 }
 
-/// Places that were checked, for what will be found.
-pub(super) struct Targets<'a> {
+/// Outputs that passed their checks.
+pub(super) struct FindingTargets<'a> {
     args: &'a FindingsArgs,
     all: Vec<Target>,
 }
 
 impl FindingsArgs {
-    /// Checked before anything is read, so that a wrong name costs no time.
-    pub(super) fn targets(&self) -> Result<Targets<'_>, Failure> {
+    /// Checks the outputs before anything is read, so that a wrong name fails early.
+    pub(super) fn targets(&self) -> Result<FindingTargets<'_>, Failure> {
         let all = self.output.iter().map(|path| self.target(path));
-        Ok(Targets { args: self, all: all.collect::<Result<_, _>>()? })
+        Ok(FindingTargets { args: self, all: all.collect::<Result<_, _>>()? })
     }
 
     fn target(&self, path: &Path) -> Result<Target, Failure> {
@@ -60,16 +60,16 @@ impl FindingsArgs {
             Some("geojson") => Product::GeoJson,
             Some("mcap") => Product::Recording,
             _ if path == Path::new("-") => {
-                return picture::Target::of(path, self.overwrite).map(Target::Picture);
+                return picture::Target::new(path, self.overwrite).map(Target::Picture);
             }
             _ => {
-                output::picture(path).map_err(|_| {
+                output::picture_format(path).map_err(|_| {
                     Failure::input(
-                        format!("{}: its ending says no format", path.display()),
+                        format!("{}: unknown file extension", path.display()),
                         "let the name end in .svg, .png, .geojson or .mcap",
                     )
                 })?;
-                return picture::Target::of(path, self.overwrite).map(Target::Picture);
+                return picture::Target::new(path, self.overwrite).map(Target::Picture);
             }
         };
         self.overwrite.check(path, product)?;
@@ -77,8 +77,8 @@ impl FindingsArgs {
     }
 }
 
-impl Targets<'_> {
-    /// Writes all; the picture is drawn if there is one among them.
+impl FindingTargets<'_> {
+    /// Writes all outputs; the picture is drawn only if needed.
     pub(super) fn write(
         &self,
         place: &Findings<'_>,
@@ -101,7 +101,7 @@ impl Targets<'_> {
     }
 }
 
-/// Writes what was found as GeoJSON or as a recording.
+/// Writes findings as GeoJSON or as a recording.
 pub(super) fn write(
     path: &Path,
     product: Product,
@@ -122,19 +122,19 @@ pub(super) fn write(
     })
 }
 
-/// The scans that something was found in.
+/// Properties of the interpreted scans.
 #[derive(Debug, Default)]
-pub(super) struct Seen {
+pub(super) struct ScanOrigin {
     time: Option<Timestamp>,
     provenance: Option<Provenance>,
     scene: Option<String>,
 }
 
-impl Seen {
+impl ScanOrigin {
     pub(super) fn add(&mut self, scan: &ScanView) {
         self.time = self.time.max(scan.start.as_ref().map(|start| start.time));
         let Some(session) = scan.session.as_deref() else { return };
-        // Where anything was made up, all that came of it is.
+        // A single simulated scan makes the result a simulated one.
         if self.provenance.is_none_or(|known| known == Provenance::Hardware) {
             self.provenance = Some(session.provenance);
         }

@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use super::{
     Failure, Outcome,
     failure::is_wrong_place,
-    output::{OutPath, note_input},
+    output::{OutPath, register_input},
     progress,
 };
 use crate::{
@@ -28,38 +28,39 @@ pub(super) struct Args {
     /// The specification, a TOML file, or spec.json of a data set
     #[arg(value_name = "SPEC.toml", required_unless_present_any = ["example", "verify"])]
     spec: Option<PathBuf>,
-    /// Output folder; the data set, a folder for each shard in it
+    /// Output folder; one subfolder per shard
     #[arg(long, value_name = "DIR", required_unless_present = "instead")]
     out: Option<OutPath>,
-    /// The part of the set that this process makes: every N-th shard from the I-th on, I from 1
-    /// [default: as an array job's environment says, else all]
+    /// Part of the set to make: every N-th shard starting from the I-th, I from 1 [default: from an
+    /// array job's environment, else all]
     #[arg(long, value_name = "I/N", conflicts_with = "instead")]
     shard: Option<Part>,
-    /// Print a file with every key explained, and exit; a specification
+    /// Print an example file with all keys explained, and exit; a specification
     #[arg(long)]
     example: bool,
-    /// Check all that is named, and exit
+    /// Validate the file and all that it names, and exit
     #[arg(long)]
     check: bool,
     /// Check files against their digests, and exit; those of a data set's folder
     #[arg(long, value_name = "DIR", conflicts_with = "spec")]
     verify: Option<PathBuf>,
-    /// Also recompute so many shards and compare them with the existing ones
+    /// Also recompute this number of shards and compare them with the existing ones
     #[arg(long, value_name = "SHARDS", requires = "verify", default_value_t = 0)]
-    again: u32,
+    recheck: u32,
 }
 
 pub(super) const ABOUT: &str = "\
-Make a data set for machine learning: rooms, poses, sensors and air drawn at random, shard by shard.
+Generate random training data for machine learning.
 
-A specification states the size of the set, the distributions of scenes, furniture, materials, poses, sensors, \
-air and noise, and what is kept: readings, their paths, every echo, traces, ideal ranges, features as labels, \
-true maps. What does not fit is redrawn and counted.
+A specification states the size of the set, the distributions of scenes, furniture, materials, \
+poses, sensors, air and noise, and what is stored: readings, their paths, every echo, traces, \
+ideal ranges, features as labels, true maps. Invalid samples are redrawn and counted.
 
-A shard depends on the specification and its number only, so any engine can make a set: each process makes its \
-part (--shard I/N), in any order. Existing shards are skipped, so an interrupted set continues when the command \
-is repeated; a killed process leaves nothing that looks complete. The process that completes the set writes \
-manifest.json (counts, digests) and README.md (description of the set and its columns).
+A shard depends only on the specification and its number, so any job system can make a set: each \
+process makes its part (--shard I/N), in any order. Existing shards are skipped, so an interrupted \
+set resumes when the command is repeated; a killed process leaves no shard that looks complete. \
+The process that completes the set writes manifest.json (counts, digests) and README.md \
+(description of the set and its columns).
 
 Without --shard the index of an array job is taken from its environment: SLURM_ARRAY_TASK_ID with its count, or \
 JOB_COMPLETION_INDEX (Kubernetes) or AWS_BATCH_JOB_ARRAY_INDEX out of the number of shards. The command reports \
@@ -73,12 +74,12 @@ Examples:
   sonard generate rooms.toml --out rooms --shard 3/20
   parallel sonard generate rooms.toml --out rooms --shard {#}/20 ::: $(seq 20)
   sbatch --array=1-20 --wrap 'sonard generate rooms.toml --out /shared/rooms'
-  sonard generate --verify rooms --again 2      # digests, and two shards drawn anew
+  sonard generate --verify rooms --recheck 2    # digests, and two shards recomputed
 
 It uses all cores, or RAYON_NUM_THREADS threads. docs/generate.md explains how to read a set.
 
-Exit codes: 0 done (also: was there), 1 --verify found a fault, 2 wrong usage, specification or folder, 3 the disk gave \
-up: the same command goes on.";
+Exit codes: 0 done (or already complete), 1 --verify found a fault, 2 wrong usage, specification or folder, 3 write \
+error; run the same command to resume.";
 
 const EXAMPLE: &str = include_str!("../../config/generate.toml");
 
@@ -89,13 +90,13 @@ pub(super) fn run(args: &Args) -> Outcome {
             .or_else(|error| Failure::from_write("to standard output", &error));
     }
     if let Some(folder) = &args.verify {
-        return verify(folder, args.again);
+        return verify(folder, args.recheck);
     }
-    // Required without them.
+    // Required unless one of those options is given.
     let Some(spec) = &args.spec else { return Ok(()) };
     let generator = read(spec)?;
     let Some(out) = args.out.as_deref().filter(|_| !args.check) else {
-        print_line!("{}", size(&generator));
+        print_line!("{}", describe_size(&generator));
         return Ok(());
     };
     let shards = generator.spec().set.shards;
@@ -104,25 +105,24 @@ pub(super) fn run(args: &Args) -> Outcome {
 }
 
 fn read(path: &Path) -> Result<Generator, Failure> {
-    DataSet::read_specification(path, &note_input).map_err(|error| match error.of_disk() {
+    DataSet::read_specification(path, &register_input).map_err(|error| match error.of_disk() {
         Some(_) => {
-            let help =
-                "give a specification that you may read: `sonard generate --example` prints one";
+            let help = "give a readable specification: `sonard generate --example` prints one";
             Failure::input(&error, help)
         }
-        None => refused(&error),
+        None => failure_from(&error),
     })
 }
 
-fn refused(error: &DataSetError) -> Failure {
+fn failure_from(error: &DataSetError) -> Failure {
     match error.of_disk() {
         Some(disk) if !is_wrong_place(disk) => Failure::device(error, error.help()),
         _ => Failure::input(error, error.help()),
     }
 }
 
-/// How much a set is, in a line.
-fn size(generator: &Generator) -> String {
+/// Describes the size of a set in one line.
+fn describe_size(generator: &Generator) -> String {
     let set = &generator.spec().set;
     let readings = generator.readings() * u64::from(set.shards);
     format!(
@@ -136,48 +136,48 @@ fn size(generator: &Generator) -> String {
 }
 
 fn make(generator: &Generator, out: &Path, part: Part) -> Outcome {
-    let set = DataSet::open(out, generator).map_err(|error| refused(&error))?;
+    let set = DataSet::open(out, generator).map_err(|error| failure_from(&error))?;
     let shards = part.shards(generator.spec().set.shards).count() as u64;
     let bar = progress::bar(generator.readings() * shards, "readings");
     let made = set.make_part(part, &|readings| bar.inc(readings));
     bar.finish_and_clear();
-    let PartOutcome { made, were_there } = made.map_err(|error| refused(&error))?;
-    notice!("{made} shards made, {were_there} were there");
-    match set.seal().map_err(|error| refused(&error))? {
-        Some(manifest) => notice!("{}: {}", out.display(), whole(&manifest)),
+    let PartOutcome { made, were_there } = made.map_err(|error| failure_from(&error))?;
+    notice!("{made} shards made, {were_there} already complete");
+    match set.seal().map_err(|error| failure_from(&error))? {
+        Some(manifest) => notice!("{}: {}", out.display(), describe_complete(&manifest)),
         None => {
-            let missing = set.missing().map_err(|error| refused(&error))?;
-            let of = generator.spec().set.shards;
-            notice!("{}: {} of {of} shards are still missing", out.display(), missing.len());
+            let missing = set.missing().map_err(|error| failure_from(&error))?;
+            let total = generator.spec().set.shards;
+            notice!("{}: {} of {total} shards missing", out.display(), missing.len());
         }
     }
     Ok(())
 }
 
-/// What a whole set is, in a line.
-fn whole(manifest: &Manifest) -> String {
+/// Describes a complete set in one line.
+fn describe_complete(manifest: &Manifest) -> String {
     let totals = &manifest.totals;
     let readings = totals.rows.get(&Table::Readings).copied().unwrap_or_default();
-    let again = &totals.redrawn;
+    let redrawn = &totals.redrawn;
     format!(
-        "whole: {} shards, {readings} readings, {:.2} bytes a reading; drawn again: {} poses, {} pieces of furniture, {} \
+        "complete: {} shards, {readings} readings, {:.2} bytes per reading; redrawn: {} poses, {} pieces of furniture, {} \
          scenes; SHA-256 {}",
         manifest.shards,
         totals.bytes as f64 / readings.max(1) as f64,
-        again.poses + again.costly,
-        again.furniture,
-        again.scenes,
+        redrawn.poses + redrawn.costly,
+        redrawn.furniture,
+        redrawn.scenes,
         manifest.sha256,
     )
 }
 
-/// Problems that are named; the others are counted.
-const NAMED: usize = 20;
+/// Maximum number of listed problems; further ones are counted.
+const MAX_LISTED: usize = 20;
 
-fn verify(folder: &Path, again: u32) -> Outcome {
+fn verify(folder: &Path, recheck: u32) -> Outcome {
     let generator = DataSet::specification(folder).map_err(|error| match error.of_disk() {
         Some(_) => Failure::input(&error, "give the folder of a data set, with its spec.json"),
-        None => refused(&error),
+        None => failure_from(&error),
     })?;
     let set = DataSet::at(folder, &generator);
     let shards = generator.spec().set.shards;
@@ -193,8 +193,8 @@ fn verify(folder: &Path, again: u32) -> Outcome {
         .collect();
     bar.finish_and_clear();
     let mut problems: Vec<String> = of_shards.into_iter().flatten().collect();
-    problems.extend(set.check_manifest().map_err(|error| refused(&error))?);
-    let sample = sample(shards, again);
+    problems.extend(set.check_manifest().map_err(|error| failure_from(&error))?);
+    let sample = sample(shards, recheck);
     if problems.is_empty() {
         let bar = progress::bar(generator.readings() * sample.len() as u64, "readings");
         let drawn: Result<Vec<_>, _> = sample
@@ -202,20 +202,20 @@ fn verify(folder: &Path, again: u32) -> Outcome {
             .map(|shard| set.check_again(*shard, &|readings| bar.inc(readings)))
             .collect();
         bar.finish_and_clear();
-        problems.extend(drawn.map_err(|error| refused(&error))?.into_iter().flatten());
+        problems.extend(drawn.map_err(|error| failure_from(&error))?.into_iter().flatten());
     }
     if problems.is_empty() {
-        print_line!("{}; as it should be, {} drawn anew", size(&generator), sample.len());
+        print_line!("{}; verified, {} recomputed", describe_size(&generator), sample.len());
         return Ok(());
     }
-    for problem in problems.iter().take(NAMED) {
+    for problem in problems.iter().take(MAX_LISTED) {
         print_line!("{problem}");
     }
-    let hint = "`sonard generate` makes what is missing; remove what is damaged first";
+    let hint = "delete damaged shards and run `sonard generate` again to make missing ones";
     Err(Failure::Found(Some(format!("{}: {} problems; {hint}", folder.display(), problems.len()))))
 }
 
-/// So many shards, evenly over the set.
+/// Selects `count` shards, evenly over the set.
 fn sample(shards: u32, count: u32) -> Vec<u32> {
     let count = count.min(shards);
     let at = |number: u32| (u64::from(number) * u64::from(shards) / u64::from(count.max(1))) as u32;
@@ -227,7 +227,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_example_is_right_and_has_every_key() {
+    fn example_has_every_key() {
         let none = |name: &str| Err(io::Error::other(format!("no file {name}")));
         let generator = Generator::from_toml("generate.toml", EXAMPLE, &none);
         let generator = generator.unwrap_or_else(|error| panic!("{error}: {}", error.help));
@@ -250,7 +250,7 @@ mod tests {
     }
 
     #[test]
-    fn a_sample_is_spread_over_the_set() {
+    fn sample_is_spread_evenly() {
         assert_eq!(sample(10, 0), [] as [u32; 0]);
         assert_eq!(sample(10, 2), [1, 6]);
         assert_eq!(sample(3, 9), [1, 2, 3]);

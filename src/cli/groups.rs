@@ -1,32 +1,32 @@
-//! The verbs in groups, as `sonard --help` shows them.
+//! Groups of verbs in `sonard --help`.
 
 use std::fmt::Write as _;
 
 use clap::Command;
 
-/// What the verbs are for, in the order in which a person comes to them.
+/// Verbs by purpose, in the order of a typical workflow.
 pub(super) const GROUPS: [(&str, &[&str]); 7] = [
-    ("Measure", &["scan", "collect", "run", "status", "watch", "import"]),
+    ("Measure", &["scan", "collect", "run", "status", "watch"]),
     ("Model", &["simulate", "paths", "trace", "predict", "generate"]),
-    ("Look at scans", &["plot", "compare", "interpret", "log", "export"]),
-    ("Explain", &["calibrate", "locate"]),
+    ("Logs and scans", &["plot", "compare", "interpret", "log", "import", "export"]),
+    ("Estimate", &["calibrate", "locate"]),
     ("Map", &["map", "lines"]),
     ("Device", &["doctor", "mock", "board"]),
     ("Scenes and presets", &["scene", "sensor", "array"]),
 ];
 
-/// Widest name of a verb, and what stands between it and its meaning.
+/// Width of the column of names.
 const NAME_WIDTH: usize = 11;
 
-/// The command with its verbs listed in groups.
+/// Returns the command with a help template that lists its verbs in groups.
 pub(super) fn in_groups(command: Command) -> Command {
     let styles = command.get_styles();
     let (header, literal) = (*styles.get_header(), *styles.get_literal());
     let mut text = String::from("{about-with-newline}\n{usage-heading} {usage}\n\n");
     for (group, verbs) in GROUPS {
-        // Writing to a text can't fail.
+        // Writing to a string never fails.
         let _ = writeln!(text, "{header}{group}:{header:#}");
-        // Some builds have no pins.
+        // Some builds lack a verb.
         for verb in verbs.iter().filter_map(|verb| command.find_subcommand(verb)) {
             let (name, about) = (verb.get_name(), verb.get_about().map(ToString::to_string));
             let about = about.unwrap_or_default();

@@ -47,25 +47,26 @@ pub(super) struct Args {
     overwrite: Overwrite,
     #[command(flatten)]
     columns: ColumnArgs,
-    /// Pose of the ranger: X,Y,DEG (metres, degrees) or the name of a pose in the scene; as far as
-    /// the file does not say
+    /// Pose of the ranger: X,Y,DEG (metres, degrees) or the name of a pose in the scene; used where
+    /// the file has none
     #[arg(long, value_name = "POSE", allow_hyphen_values = true)]
     pose: Option<String>,
-    /// Scene file, or the name of a shipped scene (`sonard scene list`); predicts in it whoever asks: it
-    /// goes into the log
+    /// Scene file, or the name of a shipped scene (`sonard scene list`); used for predictions, and
+    /// stored in the log
     #[arg(long, value_name = "SCENE")]
     scene: Option<PathBuf>,
-    /// Array of rangers, a preset (`sonard array list`) or a file with an array's data; of a table with a
-    /// range of each ranger in a row, and of a CARMEN or Player log without the places of its rangers
+    /// Array of rangers, a preset (`sonard array list`) or a file with an array's data; for a table
+    /// with one range per ranger in each row, and for a CARMEN or Player log without the positions
+    /// of its rangers
     #[arg(long, value_name = "NAME|FILE")]
     array: Option<String>,
-    /// Accept the numbers as declared, even if they look wrong
+    /// Skip the check that numbers are plausible in their declared units
     #[arg(long)]
-    as_said: bool,
-    /// Examine the file and print what was assumed and left out, but write no log
+    no_unit_check: bool,
+    /// Examine the file and print all assumptions and omissions, but write no log
     #[arg(long, conflicts_with = "output")]
     dry_run: bool,
-    /// Picture of the first scan on its plan, .svg or .png by its name
+    /// Picture of the first scan on its floor plan, .svg or .png by its name
     #[arg(long, value_name = "FILE")]
     picture: Option<OutPath>,
     #[command(flatten)]
@@ -75,22 +76,24 @@ pub(super) struct Args {
 }
 
 pub(super) const ABOUT: &str = "\
-Convert readings from elsewhere to a log: tables, JSON, messages of ROS as text, logs of CARMEN and Player, recordings of \
+Convert readings from other sources to a log: tables, JSON, messages of ROS as text, logs of CARMEN and Player, recordings of \
 ROS 2.
 
-The log is like any other, with provenance `imported`; its session states the source file and the meaning of its \
-columns. Without --columns the meaning is taken from the header and shown. Every assumption and everything that is left \
-out is printed, a line each; try --dry-run --picture first.svg. What the file does not settle is refused with the option that \
-settles it: numbers that contradict their unit (radians for degrees, metres for centimetres), and constants that stand for no \
-echo (0, -1, 255, 65535, the sensor's longest range). A file always makes the same log.
+The log is like any other, with provenance `imported`; its session states the source file and the \
+meaning of its columns. Without --columns the meaning is taken from the header and printed. Every \
+assumption and omission is printed, one per line; try --dry-run --picture first.svg. Ambiguous \
+input is rejected with the option that resolves it: numbers that contradict their unit (radians \
+for degrees, metres for centimetres), and constants that mean no echo (0, -1, 255, 65535, the \
+sensor's maximum range). The same file always gives the same log.
 
-Scans are separated by the field `scan`, or else by the robot's position, or else where the motion turns round, jumps back or \
-has gone full circle.
+Scans are separated by the field `scan`, or else by the robot's position, or else where the \
+rotation reverses, jumps back or completes a revolution.
 
-Of a recording (MCAP, or a file or folder of rosbag2 in MCAP or SQLite) all sensor_msgs/Range are read, or else LaserScan; \
-/tf and /tf_static give the pose of the ranger at each reading, and readings outside their span are left out. A ranger that \
-turns on the robot makes scans; fixed rangers are an array. Ranges at or below min_range are too near, those at or above \
-max_range and those of 0 no echo, NaN is no reading.";
+From a recording (MCAP, or a file or folder of rosbag2 in MCAP or SQLite) all sensor_msgs/Range \
+are read, or else LaserScan. /tf and /tf_static give the pose of the ranger at each reading; \
+readings outside their time span are skipped. A ranger that rotates on the robot makes scans; \
+fixed rangers are an array. Ranges at or below min_range are at minimum range, those at or above \
+max_range and those of 0 are no echo, NaN is no reading.";
 
 const HELP: &str = "\
 Fields: azimuth_deg|rad|grad (from the heading) or bearing_deg|rad|grad (in the world); range_m|cm|mm|in|ft or \
@@ -99,12 +102,12 @@ heading_deg|rad; temperature_c|k; status.
 
 Examples:
   sonard import sweep.csv -o sweep.jsonl
-  sonard import sweep.csv --columns azimuth_deg=1,range_cm=2 --clockwise --none 255 \\
+  sonard import sweep.csv --columns azimuth_deg=1,range_cm=2 --clockwise --no-echo 255 \\
     --sensor hc-sr04 --pose 1.2,0.8,90 --scene my-room.json -o sweep.jsonl
   sonard import sweeps.json --columns scan=id,bearing_deg=bearings,range_m=ranges,x_m=at.0,y_m=at.1 \\
     -o sweeps.jsonl
   sonard import rosbag2_2026_01_31 --topic /front_sonar -o run.jsonl
-  sonard import robot.clf --none-from 5 --sensor pioneer -o robot.jsonl
+  sonard import robot.clf --no-echo-from 5 --sensor pioneer -o robot.jsonl
   sonard import rounds.tsv --array pioneer-8 --columns range_m=1-8 -o rounds.jsonl
   sonard import wall.csv --columns time_ms=1,range_cm=2 --azimuth-deg 0 --started 2026-01-31T12:00:00Z -o wall.jsonl
 
@@ -112,7 +115,8 @@ Exit codes: 0 done, 2 wrong usage or input, 3 the disk gave up.";
 
 pub(super) fn run(args: &Args) -> Outcome {
     let name = args.file.display().to_string();
-    let refuse = |error: ImportError| Failure::input(format!("{name}: {error}"), error.help());
+    let failure_from =
+        |error: ImportError| Failure::input(format!("{name}: {error}"), error.help());
     let mapping = args.columns.mapping()?;
     let scene = args.scene.as_deref().map(scene_file::load).transpose()?;
     let array = args.array.as_deref().map(load_array).transpose()?;
@@ -122,7 +126,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     };
     let air = args.air.air()?;
     let picture =
-        args.picture.as_deref().map(|path| Target::of(path, args.overwrite)).transpose()?;
+        args.picture.as_deref().map(|path| Target::new(path, args.overwrite)).transpose()?;
     let taken = taken(args, scene.as_ref(), array, &sensor, &air)?;
     let bytes = if args.file.as_os_str() == "-" { Some(standard_input()?) } else { None };
     let files = if args.file.is_dir() { bag::files(&args.file)? } else { vec![args.file.clone()] };
@@ -130,68 +134,70 @@ pub(super) fn run(args: &Args) -> Outcome {
     let open = || -> io::Result<Box<dyn io::Read>> {
         Ok(match &bytes {
             Some(bytes) => Box::new(io::Cursor::new(Arc::clone(bytes))),
-            None => bag::one_after_the_other(&files)?,
+            None => bag::concatenate(&files)?,
         })
     };
-    let mut found = Source { open: &open }.examine(mapping, taken).map_err(refuse)?;
-    if let Some(sha256) = bag::digest_of_databases(&files).map_err(|error| refuse(error.into()))? {
+    let mut found = Source { open: &open }.examine(mapping, taken).map_err(failure_from)?;
+    if let Some(sha256) =
+        bag::digest_of_databases(&files).map_err(|error| failure_from(error.into()))?
+    {
         found.taken.sha256 = sha256;
     }
     let session = session(args, &found, scene.as_ref(), sensor, &air);
     if let Some(picture) = &picture {
-        let source = open().map_err(|error| refuse(error.into()))?;
-        let view = first_scan(&found, source, &session).map_err(refuse)?;
+        let source = open().map_err(|error| failure_from(error.into()))?;
+        let view = first_scan(&found, source, &session).map_err(failure_from)?;
         picture.write(&draw_scans(&view, scene.as_ref()), PICTURE_WIDTH_PX)?;
     }
     if args.dry_run {
-        let source = open().map_err(|error| refuse(error.into()))?;
-        let scans = found.scans(source).map_err(refuse)?;
+        let source = open().map_err(|error| failure_from(error.into()))?;
+        let scans = found.scans(source).map_err(failure_from)?;
         let scans =
-            scans.map(|scan| scan.map(|_| 1_u64)).sum::<Result<u64, _>>().map_err(refuse)?;
-        tell(args, &found, scans);
+            scans.map(|scan| scan.map(|_| 1_u64)).sum::<Result<u64, _>>().map_err(failure_from)?;
+        report(args, &found, scans);
         return Ok(());
     }
     let mut out = records_to(args.output.as_deref(), args.overwrite)?;
-    let source = open().map_err(|error| refuse(error.into()))?;
+    let source = open().map_err(|error| failure_from(error.into()))?;
     match write(&found, source, session, &mut *out) {
         Ok(scans) => {
             closed(out.finish())?;
-            tell(args, &found, scans);
+            report(args, &found, scans);
             Ok(())
         }
-        Err(Stop::File(error)) => Err(refuse(error)),
-        Err(Stop::Write(error @ StoreError::Record { .. })) => {
+        Err(ImportFailure::File(error)) => Err(failure_from(error)),
+        Err(ImportFailure::Write(error @ StoreError::Record { .. })) => {
             Err(Failure::input(error, "correct the file"))
         }
-        Err(Stop::Write(error)) => closed(Err(error)),
+        Err(ImportFailure::Write(error)) => closed(Err(error)),
     }
 }
 
-/// Why it ended before the last scan.
-enum Stop {
+/// Reason for an early end.
+enum ImportFailure {
     File(ImportError),
     Write(StoreError),
 }
 
-impl From<ImportError> for Stop {
+impl From<ImportError> for ImportFailure {
     fn from(error: ImportError) -> Self {
         Self::File(error)
     }
 }
 
-impl From<StoreError> for Stop {
+impl From<StoreError> for ImportFailure {
     fn from(error: StoreError) -> Self {
         Self::Write(error)
     }
 }
 
-/// Writes the session and all scans; how many these are.
+/// Writes the session and all scans, and returns the number of scans.
 fn write(
     found: &Imported,
     source: impl io::Read,
     session: Session,
     out: &mut dyn RecordWriter,
-) -> Result<u64, Stop> {
+) -> Result<u64, ImportFailure> {
     out.write(&Record::Session(Box::new(session)))?;
     let mut scans = 0;
     for scan in found.scans(source)? {
@@ -203,12 +209,12 @@ fn write(
     Ok(scans)
 }
 
-/// Whether it is known where the robot stood.
+/// Returns `true` if the poses of the robot are known.
 const fn has_poses(args: &Args, found: &Imported) -> bool {
     args.pose.is_some() || found.has_poses
 }
 
-/// The first scan of a file, as a picture shows it.
+/// Reads the first scan of a file, for a picture.
 fn first_scan(
     found: &Imported,
     source: impl io::Read,
@@ -224,12 +230,12 @@ fn first_scan(
 /// Width of a PNG of the first scan, pixels.
 const PICTURE_WIDTH_PX: u32 = 1000;
 
-/// Prints what was assumed and left out, a line each, and the counts, on standard error.
-fn tell(args: &Args, found: &Imported, scans: u64) {
+/// Prints assumptions, omissions and counts on standard error.
+fn report(args: &Args, found: &Imported, scans: u64) {
     if found.guessed && !found.mapping.columns.is_empty() {
-        let said = found.mapping.columns.iter();
-        let said: Vec<_> = said.map(|(field, column)| format!("{field} from {column}")).collect();
-        notice!("by the header: {}", said.join(", "));
+        let fields = found.mapping.columns.iter();
+        let fields: Vec<_> = fields.map(|(field, column)| format!("{column} -> {field}")).collect();
+        notice!("columns: {}", fields.join(", "));
     }
     for note in &found.notes {
         notice!("note: {note}");
@@ -238,39 +244,37 @@ fn tell(args: &Args, found: &Imported, scans: u64) {
         let Mapping { clockwise, zero_deg, azimuth_deg, .. } = found.mapping;
         if !clockwise && zero_deg == 0.0 && azimuth_deg.is_none() {
             notice!(
-                "note: directions count counter-clockwise from the heading; --clockwise and --zero-deg give another sense and zero"
+                "note: azimuths are counter-clockwise from the heading; --clockwise and --zero-deg change sense and zero"
             );
         }
     }
-    let without = found.readings - found.echoes;
+    let no_range = found.readings - found.echoes;
     notice!(
-        "{scans} scans, {} readings: {} with a range, {without} without; sensor {}",
+        "{scans} scans, {} readings: {} with a range, {no_range} without; sensor {}",
         found.readings,
         found.echoes,
         found.taken.sensor
     );
     if !has_poses(args, found) {
-        notice!(
-            "note: where the robot stood is not known: give --pose, or columns x_m, y_m and heading_deg"
-        );
+        notice!("note: pose unknown: give --pose, or columns x_m, y_m and heading_deg");
     }
 }
 
-/// All of standard input: a file is read more than once.
+/// Reads standard input into memory, because a source is read more than once.
 fn standard_input() -> Result<Arc<[u8]>, Failure> {
     let mut bytes = Vec::new();
-    io::stdin().lock().take(MOST_STANDARD_INPUT).read_to_end(&mut bytes).map_err(|error| {
+    io::stdin().lock().take(MAX_STANDARD_INPUT_BYTES).read_to_end(&mut bytes).map_err(|error| {
         Failure::input(format!("cannot read standard input: {error}"), "give a file")
     })?;
-    if bytes.len() as u64 == MOST_STANDARD_INPUT {
-        let what = format!("standard input is longer than {MOST_STANDARD_INPUT} bytes");
-        return Err(Failure::input(what, "give a file: what it holds is read piece by piece"));
+    if bytes.len() as u64 == MAX_STANDARD_INPUT_BYTES {
+        let what = format!("standard input is longer than {MAX_STANDARD_INPUT_BYTES} bytes");
+        return Err(Failure::input(what, "give a file: files are not limited in size"));
     }
     Ok(bytes.into())
 }
 
-/// So much of standard input is kept, bytes.
-const MOST_STANDARD_INPUT: u64 = 256 << 20;
+/// Maximum length of standard input, bytes.
+const MAX_STANDARD_INPUT_BYTES: u64 = 256 << 20;
 
 fn taken(
     args: &Args,
@@ -293,20 +297,20 @@ fn taken(
         array,
         sensor: sensor.name.clone(),
         longest_m: sensor.max_range_m,
-        least_m: least_m(sensor, air),
+        least_m: min_range_m(sensor, air),
         air: *air,
         started: started(&args.file),
-        as_said: args.as_said,
+        as_said: args.no_unit_check,
     })
 }
 
-/// The least range of a sensor, by its shortest blanking, metres.
-fn least_m(sensor: &Sensor, air: &Air) -> f64 {
+/// Minimum range of a sensor, from its shortest blanking, metres.
+fn min_range_m(sensor: &Sensor, air: &Air) -> f64 {
     let blanking_us = sensor.short_blanking_us.unwrap_or(f64::INFINITY).min(sensor.blanking_us);
     blanking_us * 1e-6 * air.sound_speed_m_s() / 2.0
 }
 
-/// When scans were taken that do not say it: at the latest when their file was last written.
+/// Time of scans without times of their own: the modification time of the file.
 fn started(file: &Path) -> Timestamp {
     let written = fs::metadata(file).and_then(|file| file.modified());
     written.ok().and_then(|time| Timestamp::try_from(time).ok()).unwrap_or_else(Timestamp::now)

@@ -11,8 +11,8 @@ use super::{
     Failure, Outcome,
     answer::answer,
     compare::RULED,
-    findings::{FindingsArgs, Seen},
-    logs::first_of,
+    findings::{FindingsArgs, ScanOrigin},
+    logs::first_log,
     numbers::{not_negative, positive, probability},
     picture::scene_for,
     sweeps::for_each_sweep,
@@ -27,34 +27,36 @@ use crate::{
 #[derive(Debug, clap::Args)]
 #[command(after_help = HELP)]
 pub(super) struct Args {
-    /// Logs of scans by one ranger, from one place or more, or folders of such; - for standard input
+    /// Logs of scans by one ranger, from one or more positions, or folders of logs; - for standard
+    /// input
     #[arg(required = true, value_name = "LOG")]
     logs: Vec<PathBuf>,
-    /// JSON instead of text; one object a feature
+    /// JSON instead of text; one object per feature
     #[arg(long)]
     json: bool,
     #[command(flatten)]
     files: FindingsArgs,
-    /// Scene file, or the name of a shipped scene (`sonard scene list`); only draws its walls, in
-    /// place of those of the scene in the log
+    /// Scene file, or the name of a shipped scene (`sonard scene list`); only its walls are drawn,
+    /// instead of those of the scene in the log
     #[arg(long, value_name = "SCENE")]
     scene: Option<PathBuf>,
-    /// Strength of an edge's echo, sigma_E: for the boundary between edges and the rest
+    /// Strength of an edge's echo, sigma_E; determines the boundary between edges and other
+    /// features
     #[arg(long, value_name = "S", default_value_t = Settings::default().sigma_e, value_parser = positive)]
     sigma_e: f64,
-    /// How far a reading may be from its arc's mean, millimetres
+    /// Maximum deviation of a reading from the mean of its arc, millimetres
     #[arg(long, value_name = "MM", default_value_t = 10.0, value_parser = positive)]
     depth_tolerance_mm: f64,
-    /// Ratio of a head-on wall's echo to the noise, decibels [default: no noise]
+    /// Signal-to-noise ratio of a head-on wall's echo, decibels [default: no noise]
     #[arg(long, value_name = "DB")]
     snr_db: Option<f64>,
-    /// Standard deviation of each beam's azimuth beside the step, degrees
+    /// Standard deviation of each beam's azimuth, in addition to the step, degrees
     #[arg(long, value_name = "DEG", default_value_t = 0.0, value_parser = not_negative)]
     azimuth_sigma_deg: f64,
     /// Standard deviation of the heading from scan to scan, degrees
     #[arg(long, value_name = "DEG", default_value_t = 0.0, value_parser = not_negative)]
     heading_sigma_deg: f64,
-    /// Report nothing less probable than this
+    /// Minimum probability of a reported feature
     #[arg(long, value_name = "P", default_value_t = Settings::default().min_confidence, value_parser = probability)]
     min_confidence: f64,
 }
@@ -62,14 +64,15 @@ pub(super) struct Args {
 pub(super) const ABOUT: &str = "\
 Classify planes, corners and edges in scans.
 
-After O. Bozma and R. Kuc (IEEE PAMI 13, 1991): beams with the same range form an arc. An arc narrower than \
-b(r), half way between what the sensor gives edges and what it gives planes and corners, is an edge. A plane is \
-seen in the same direction from a second position, a corner is not. Beyond the paper, an arc may have another \
-cause: reflections by several walls, multiple echoes between a wall and the ranger, a round body. That has a \
-probability too, which grows with the number of nearer arcs in front of it. `sonard-papers benchmark interpret` \
-measures how often the claims are true. Repeats from one pose count as one scan. With one scan, planes and \
-corners stay `unresolved`, with the position for the next scan that decides most of them; give the log of that \
-scan too, and they are decided.";
+After O. Bozma and R. Kuc (IEEE PAMI 13, 1991): beams with the same range form an arc. An arc \
+narrower than b(r), the mean of the widths that the sensor gives to edges and to planes and \
+corners, is an edge. A plane is seen in the same direction from a second position, a corner is \
+not. In addition to the paper, an arc may have another cause: reflections by several walls, \
+multiple echoes between a wall and the ranger, a round body. Its probability increases with the \
+number of nearer arcs in front of it. `sonard-papers benchmark interpret` measures the calibration \
+of the probabilities. Repeats from one pose count as one scan. With one scan, planes and corners \
+remain `unresolved`, with the position of the next scan that decides most of them; give the log of \
+that scan too, and they are decided.";
 
 const HELP: &str = "\
 Examples:
@@ -78,28 +81,30 @@ Examples:
   sonard interpret one.jsonl two.jsonl --json
   sonard interpret one.jsonl two.jsonl -o features.geojson -o features.mcap
 
-A feature's bearing is counter-clockwise from the heading of the scan it was first seen in. Why \
-one is unresolved: second_position (plane or corner), translation (the places are too near to \
-each other), lost (not seen again), ambiguous (several arcs fit, or none), interference \
-(something nearer covers a part of the arc), cut_off (the scan ends in it), extent (fits neither), \
-reflections (behind what may be walls: the sound may have come by way of them), min_range (closer than \
-can be measured, or so near to that that a part may be).
-Exit codes: 0 done, also if nothing was found, 2 wrong usage or input, 3 the disk gave up.";
+A feature's bearing is counter-clockwise from the heading of the first scan that contains it. \
+Reasons for unresolved: second_position (plane or corner), translation (the positions are too \
+close), lost (not seen again), ambiguous (several arcs fit, or none), interference (a nearer \
+object covers a part of the arc), cut_off (at the end of the scan), extent (fits neither), \
+reflections (behind likely walls: possibly a multiple reflection), min_range (below the minimum \
+range, or partly so).
+
+Exit codes: 0 done, also without features, 2 wrong usage or input, 3 write \
+error.";
 
 pub(super) fn run(args: &Args) -> Outcome {
     let targets = args.files.targets()?;
-    let (scans, features) = find(args)?;
+    let (scans, features) = classify(args)?;
     answer(args.json, &features, |out| print(out, &features))?;
-    let mut seen = Seen::default();
-    scans.iter().for_each(|scan| seen.add(scan));
-    targets.write(&seen.place(None, &[], &features), || {
-        let scene = scene_for(&first_of(&args.logs), &scans, args.scene.as_deref())?;
+    let mut origin = ScanOrigin::default();
+    scans.iter().for_each(|scan| origin.add(scan));
+    targets.write(&origin.place(None, &[], &features), || {
+        let scene = scene_for(&first_log(&args.logs), &scans, args.scene.as_deref())?;
         Ok(draw_features(&scans, scene.as_ref(), &features))
     })
 }
 
-/// The scans that can be interpreted, and what is in them.
-fn find(args: &Args) -> Result<(Vec<ScanView>, Vec<Feature>), Failure> {
+/// Reads the scans that can be interpreted, and classifies their features.
+fn classify(args: &Args) -> Result<(Vec<ScanView>, Vec<Feature>), Failure> {
     let (mut scans, mut sweeps) = (Vec::new(), Vec::new());
     let mut of_arrays = 0;
     for_each_sweep(&args.logs, |scan, sweep| {
@@ -112,20 +117,20 @@ fn find(args: &Args) -> Result<(Vec<ScanView>, Vec<Feature>), Failure> {
     })?;
     if of_arrays > 0 {
         return Err(Failure::input(
-            format!("{of_arrays} scan(s) are of an array: arcs need one ranger that turns"),
-            "`sonard map` and `sonard lines` take an array's readings",
+            format!("{of_arrays} scan(s) are of an array: arcs need a single rotating ranger"),
+            "`sonard map` and `sonard lines` accept an array's readings",
         ));
     }
     let Some(session) = scans.iter().find_map(|scan| scan.session.clone()) else {
         return Err(Failure::input(
-            "there is no scan with its session to interpret",
-            "give a log as `sonard scan` or `sonard simulate` writes it",
+            "no scan with a session to interpret",
+            "give a log written by `sonard scan` or `sonard simulate`",
         ));
     };
     if scans.iter().flat_map(|scan| &scan.session).any(|other| other.sensor != session.sensor) {
         return Err(Failure::input(
-            "the scans are of different sensors, whose arcs differ",
-            "interpret the logs of each sensor by themselves",
+            "the scans are from different sensors, whose arcs differ",
+            "interpret the logs of each sensor separately",
         ));
     }
     let extents = Extents::of_session(&session).map_err(|error| {
@@ -151,7 +156,7 @@ fn settings(args: &Args) -> Settings {
 
 fn print(out: &mut impl Write, features: &[Feature]) -> io::Result<()> {
     if features.is_empty() {
-        return writeln!(out, "no feature: every beam is silent");
+        return writeln!(out, "no features: no beam has an echo");
     }
     let mut table = Table::new();
     table.load_style(RULED).set_header([
@@ -163,8 +168,8 @@ fn print(out: &mut impl Write, features: &[Feature]) -> io::Result<()> {
         "beta",
         "corner's",
         "confidence",
-        "else",
-        "why open",
+        "other",
+        "reason",
     ]);
     for feature in features {
         table.add_row(row(feature));
@@ -173,10 +178,10 @@ fn print(out: &mut impl Write, features: &[Feature]) -> io::Result<()> {
         column.set_cell_alignment(CellAlignment::Right);
     }
     writeln!(out, "{table}")?;
-    let mut said = Vec::new();
+    let mut printed = Vec::new();
     for next in features.iter().filter_map(|feature| feature.next) {
-        if !said.contains(&next.direction_deg) {
-            said.push(next.direction_deg);
+        if !printed.contains(&next.direction_deg) {
+            printed.push(next.direction_deg);
             writeln!(
                 out,
                 "next scan: {:.1} cm in direction {:.1} degrees, at ({:.4}, {:.4}) m, decides {} \
@@ -195,7 +200,7 @@ fn print(out: &mut impl Write, features: &[Feature]) -> io::Result<()> {
 }
 
 fn row(feature: &Feature) -> [String; 10] {
-    // Adding zero makes -0 plain.
+    // Adding zero converts -0 to 0.
     let hundredths = |value: f64| (value * 100.0).round() / 100.0 + 0.0;
     let degrees =
         |value: Option<f64>| value.map_or("-".into(), |value| format!("{:.2}", hundredths(value)));

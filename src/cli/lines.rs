@@ -10,8 +10,8 @@ use std::{
 use super::{
     Failure, Outcome,
     answer::answer,
-    findings::{FindingsArgs, Seen},
-    logs::{Drawn, first_of},
+    findings::{FindingsArgs, ScanOrigin},
+    logs::{DrawnScans, first_log},
     picture::scene_for,
     sweeps::for_each_sweep,
 };
@@ -25,23 +25,23 @@ use crate::{
 #[derive(Debug, clap::Args)]
 #[command(after_help = HELP)]
 pub(super) struct Args {
-    /// Logs whose scans have poses, or folders of such; - for standard input
+    /// Logs whose scans have poses, or folders of logs; - for standard input
     #[arg(required_unless_present = "laser", value_name = "LOG")]
     logs: Vec<PathBuf>,
-    /// Laser scans of the same place, used after the sonar's: one JSON object a line; - for
+    /// Laser scans of the same place, used after the sonar's; one JSON object per line, - for
     /// standard input
     #[arg(long, value_name = "FILE")]
     laser: Vec<PathBuf>,
-    /// Leave out sonar readings beyond this "logical" distance, metres
+    /// Maximum ("logical") range of sonar readings used, metres
     #[arg(long, value_name = "M", default_value_t = LineMapSettings::default().logical_m)]
     logical: f64,
-    /// JSON instead of text; one object a line of the map
+    /// JSON instead of text; one object per line segment
     #[arg(long)]
     json: bool,
     #[command(flatten)]
     files: FindingsArgs,
-    /// Scene file, or the name of a shipped scene (`sonard scene list`); only draws its walls, in
-    /// place of those of the scene in the log
+    /// Scene file, or the name of a shipped scene (`sonard scene list`); only its walls are drawn,
+    /// instead of those of the scene in the log
     #[arg(long, value_name = "SCENE")]
     scene: Option<PathBuf>,
 }
@@ -49,9 +49,10 @@ pub(super) struct Args {
 pub(super) const ABOUT: &str = "\
 Make a map of line segments from the scans of logs.
 
-After G. Dudek, P. Freedman and I. Rekleitis (ICRA 1996): readings that can't be right are left out (too far, or \
-contradicted by nearer observations), the rest are grouped by the sphere-of-influence graph, segments are fitted \
-to each group by split and merge, and segments of one wall are merged.";
+After G. Dudek, P. Freedman and I. Rekleitis (ICRA 1996): implausible readings are discarded (too \
+long, or contradicted by nearer observations), the rest are grouped by the sphere-of-influence \
+graph, segments are fitted to each group by split and merge, and segments of one wall are \
+merged.";
 
 const HELP: &str = "\
 Examples:
@@ -60,10 +61,11 @@ Examples:
   sonard lines run/*.jsonl -o lines.geojson -o lines.mcap
   sonard lines run/*.jsonl --laser laser.jsonl -o lines.png
 
-A line of a laser's file is a scan from one place, counter-clockwise, null where nothing \
-returned: {\"pose\":{\"x_m\":1,\"y_m\":0.5,\"heading_deg\":90},\"returns\":[{\"azimuth_deg\":-12.5,\"range_m\":1.21}, ...]}
-Lines that it saw are `laser`, or `complex` if merged with sonar lines; ends that it saw are \
-terminal.
+A line of a laser's file is a scan from one position, counter-clockwise, null for no return: \
+{\"pose\":{\"x_m\":1,\"y_m\":0.5,\"heading_deg\":90},\"returns\":[{\"azimuth_deg\":-12.5,\"range_m\":1.21}, \
+...]}
+Lines seen by the laser only are `laser`, those merged with sonar lines are `complex`; ends \
+that it saw are terminal.
 
 Exit codes: 0 done, 2 wrong usage or input, 3 the disk gave up.";
 
@@ -75,33 +77,33 @@ pub(super) fn run(args: &Args) -> Outcome {
         ));
     }
     let targets = args.files.targets()?;
-    let Read { scans, seen, map, left_out } = read(args)?;
-    answer(args.json, map.lines().iter().map(record), |out| print(out, &map, left_out))?;
-    targets.write(&seen.place(None, map.lines(), &[]), || {
-        let scene = scene_for(&first_of(&args.logs), &scans, args.scene.as_deref())?;
+    let LineMapInput { scans, origin, map, discarded } = read_logs(args)?;
+    answer(args.json, map.lines().iter().map(record), |out| print(out, &map, discarded))?;
+    targets.write(&origin.place(None, map.lines(), &[]), || {
+        let scene = scene_for(&first_log(&args.logs), &scans, args.scene.as_deref())?;
         Ok(draw_lines(&scans, scene.as_ref(), map.lines()))
     })
 }
 
-/// The logs and what came of them.
-struct Read {
+/// Line map of the logs, with the scans for a picture.
+struct LineMapInput {
     scans: Vec<ScanView>,
-    seen: Seen,
+    origin: ScanOrigin,
     map: LineMap,
-    /// Readings.
-    left_out: usize,
+    /// Number of discarded readings.
+    discarded: usize,
 }
 
-fn read(args: &Args) -> Result<Read, Failure> {
+fn read_logs(args: &Args) -> Result<LineMapInput, Failure> {
     let settings = LineMapSettings { logical_m: args.logical, ..LineMapSettings::default() };
-    let (mut scans, mut seen, mut map) =
-        (Drawn::default(), Seen::default(), LineMap::new(settings));
-    let (mut count, mut left_out) = (0_usize, 0);
+    let (mut scans, mut origin, mut map) =
+        (DrawnScans::default(), ScanOrigin::default(), LineMap::new(settings));
+    let (mut count, mut discarded) = (0_usize, 0);
     for_each_sweep(&args.logs, |scan, sweep| {
-        left_out += map.add_sonar(&sweep);
+        discarded += map.add_sonar(&sweep);
         count += 1;
-        seen.add(&scan);
-        // A picture shows all readings; without one they need not stay in memory.
+        origin.add(&scan);
+        // A picture shows all readings; otherwise they need not be kept in memory.
         if !args.files.output.is_empty() {
             scans.add(scan);
         }
@@ -113,11 +115,11 @@ fn read(args: &Args) -> Result<Read, Failure> {
     }
     if count == 0 && args.laser.is_empty() {
         return Err(Failure::input(
-            "there is no scan with its pose to map",
-            "give logs as `sonard scan` or `sonard simulate` writes them",
+            "no scan with a pose to map",
+            "give logs written by `sonard scan` or `sonard simulate`",
         ));
     }
-    Ok(Read { scans: scans.finish(), seen, map, left_out })
+    Ok(LineMapInput { scans: scans.finish(), origin, map, discarded })
 }
 
 pub(super) fn record(line: &MapLine) -> serde_json::Value {
@@ -128,7 +130,7 @@ pub(super) fn record(line: &MapLine) -> serde_json::Value {
     })
 }
 
-fn print(out: &mut impl Write, map: &LineMap, left_out: usize) -> io::Result<()> {
+fn print(out: &mut impl Write, map: &LineMap, discarded: usize) -> io::Result<()> {
     for line in map.lines() {
         let [a, b] = line.ends;
         writeln!(
@@ -142,5 +144,5 @@ fn print(out: &mut impl Write, map: &LineMap, left_out: usize) -> io::Result<()>
             line.confidence
         )?;
     }
-    writeln!(out, "{} lines; {left_out} readings left out", map.lines().len())
+    writeln!(out, "{} lines; {discarded} readings discarded", map.lines().len())
 }

@@ -27,16 +27,16 @@ use crate::inverse::{Atlas, Besides, Course, Doubt, Group, Mode, Odometry, World
 pub(super) struct Args {
     #[command(flatten)]
     sweeps: SweepArgs,
-    /// Spacing of the positions that are tried first, metres [default: 0.05 in small scenes to 0.1]
+    /// Spacing of the initial grid of positions, metres [default: 0.05 in small scenes to 0.1]
     #[arg(long, value_name = "M", value_parser = within(0.01..=2.0))]
     spacing_m: Option<f64>,
-    /// What to fit, separated by commas
+    /// Parameters to fit, separated by commas
     #[arg(long, value_name = "WHAT", value_delimiter = ',')]
     fit: Vec<Group>,
-    /// Prior standard deviation of a parameter, in its unit; may be given several times
+    /// Prior standard deviation of a parameter, in its unit (repeatable)
     #[arg(long, value_name = "NAME=SIGMA", requires = "fit")]
     prior: Vec<PriorSigma>,
-    /// JSON instead of text; one object a pose, most probable first
+    /// JSON instead of text; one object per pose, most probable first
     #[arg(long)]
     json: bool,
     #[command(flatten)]
@@ -45,70 +45,72 @@ pub(super) struct Args {
     course: CourseArgs,
 }
 
-/// Options of scans that a robot took on its way.
+/// Options for consecutive scans of a moving robot.
 #[derive(Debug, clap::Args)]
 #[command(next_help_heading = "Course")]
 struct CourseArgs {
-    /// The scans are consecutive, and the poses in the log are odometry, in any frame
+    /// The scans are consecutive, and the poses in the log are odometry in any frame
     #[arg(long)]
     course: bool,
-    /// Standard deviation of odometry's position for each metre driven, metres
+    /// Standard deviation of the odometry's position, metres per metre driven
     #[arg(long, value_name = "M", requires = "course", default_value_t = 0.05,
           value_parser = within(0.0..=1.0))]
     drift_m_per_m: f64,
-    /// Standard deviation of odometry's heading for each metre driven, degrees
+    /// Standard deviation of the odometry's heading, degrees per metre driven
     #[arg(long, value_name = "DEG", requires = "course", default_value_t = 5.0,
           value_parser = within(0.0..=180.0))]
     drift_deg_per_m: f64,
-    /// Probability that the robot was carried elsewhere between two scans
+    /// Probability that the robot was displaced between two scans (kidnapped)
     #[arg(long, value_name = "P", requires = "course", default_value_t = 0.02,
           value_parser = within(0.0..=1.0))]
-    carried: f64,
+    kidnap_probability: f64,
 }
 
 impl CourseArgs {
-    /// Of scans that follow each other.
+    /// Returns the odometry model if the scans are consecutive.
     fn odometry(&self) -> Option<Odometry> {
-        let &Self { course, drift_m_per_m, drift_deg_per_m, carried } = self;
-        course.then_some(Odometry { drift_m_per_m, drift_deg_per_m, carried })
+        let &Self { course, drift_m_per_m, drift_deg_per_m, kidnap_probability } = self;
+        course.then_some(Odometry { drift_m_per_m, drift_deg_per_m, carried: kidnap_probability })
     }
 }
 
 pub(super) const ABOUT: &str = "\
 Find the poses of sweeps without an initial guess.
 
-The readings of a scan alone determine where in the scene the ranger was: every pose that explains them is \
-listed with its probability, because symmetric rooms have several. The model first predicts readings on a grid \
-of positions all over the scene; the best matches are then refined until all readings (echoes by any path, \
-missing echoes, ends of arcs) are as likely as possible. The pose in the log is ignored, or used as odometry \
-only.
+The readings of a scan alone determine the position of the ranger in the scene. Every pose that \
+explains them is listed with its probability, because symmetric rooms have several. The model \
+first predicts readings on a grid of positions all over the scene; the best matches are then \
+refined until all readings (echoes along any path, missing echoes, ends of arcs) are as likely as \
+possible. The pose in the log is ignored, or used as odometry only.
 
-With --course earlier scans count too: odometry leads from each pose of the last scan to an expected pose of \
-this one, and poses that agree gain probability. So rooms that look alike are told apart once the robot has been \
-where they differ, and a robot that was carried elsewhere is found again. Each scan is answered as soon as it is \
-read: a log may come through a pipe while it is taken.
+With --course previous scans count too: odometry leads from each pose of the previous scan to an \
+expected pose of the current one, and poses that agree gain probability. This distinguishes \
+similar rooms once the robot has passed where they differ, and finds a kidnapped robot. Each scan \
+is located as soon as it is read: a log may be piped while it is recorded.
 
-Cheap rangers of one kind differ by some decibels. With --fit threshold (or any other parameters of `sonard \
-calibrate`) these are fitted to each scan besides its pose, and listed with it.
+Sensitivity differs by some decibels between units of a cheap ranger. With --fit threshold (or any \
+other parameters of `sonard calibrate`) these are fitted to each scan along with its pose, and \
+listed with it.
 
-A scan that nothing in the scene explains still gets its best pose, with the share of readings that it explains \
-and, if the readings show it, what may be wrong with them: azimuths counted clockwise, or another unit.";
+A scan that no pose explains still gets its best pose, with the share of readings that it explains \
+and, if the readings show it, a likely cause: clockwise azimuths, or another unit.";
 
 const HELP: &str = "\
 Examples:
   sonard simulate --scene mcgill-lab --pose center -o scan.jsonl
   sonard locate scan.jsonl
   sonard locate sweep.jsonl --scene my-room.json --sensor hc-sr04 --json
-  sonard locate way.jsonl --scene my-room.json --course --drift-m-per-m 0.1
-  sonard locate sweep.jsonl --scene my-room.json --sensor lego-nxt --fit threshold   # of another specimen
+  sonard locate trajectory.jsonl --scene my-room.json --course --drift-m-per-m 0.1
+  sonard locate sweep.jsonl --scene my-room.json --sensor lego-nxt --fit threshold   # another unit
 
-Of --json: log, scan, x_m, y_m, heading_deg, probability, sigma_x_m, sigma_y_m, sigma_heading_deg, explained (share of \
-the readings), besides (name, value and sigma of what --fit names), doubts.
+Fields of --json: log, scan, x_m, y_m, heading_deg, probability, sigma_x_m, sigma_y_m, \
+sigma_heading_deg, explained (share of the readings), besides (name, value and sigma of the \
+parameters of --fit), doubts (likely errors).
+
 Exit codes: 0 done, 2 wrong usage or input.";
 
-/// A line of `--json`.
 #[derive(Serialize)]
-struct Answer<'a> {
+struct LocatedPose<'a> {
     log: String,
     scan: Uuid,
     #[serde(flatten)]
@@ -119,45 +121,45 @@ struct Answer<'a> {
 
 pub(super) fn run(args: &Args) -> Outcome {
     let what_if = args.instead.load()?;
-    let mut known: Option<(Arc<World>, Atlas)> = None;
+    let mut current: Option<(Arc<World>, Atlas)> = None;
     let mut course = args.course.odometry().map(Course::new);
-    let mut any = false;
+    let mut found = false;
     args.sweeps.for_each(&what_if, |log, sweep, world| {
-        if known.as_ref().is_none_or(|(of, _)| !Arc::ptr_eq(of, world)) {
-            known = Some((Arc::clone(world), atlas(world, args)?));
+        if current.as_ref().is_none_or(|(of, _)| !Arc::ptr_eq(of, world)) {
+            current = Some((Arc::clone(world), atlas(world, args)?));
         }
-        let Some((_, atlas)) = &known else { return Ok(()) };
+        let Some((_, atlas)) = &current else { return Ok(()) };
         let modes = match &mut course {
             Some(course) => course.next(world, atlas, &sweep),
             None => locate(world, atlas, &sweep),
         };
-        let modes = modes.map_err(|error| refuse(&error))?;
+        let modes = modes.map_err(|error| failure_from(&error))?;
         let doubts = doubts(world, atlas, &sweep, &modes);
-        any = true;
+        found = true;
         let log = log.display().to_string();
-        let of = |mode| Answer { log: log.clone(), scan: sweep.scan, mode, doubts: &doubts };
-        answer(args.json, modes.iter().map(of), |out| print(out, &log, sweep.scan, &modes, &doubts))
+        let located =
+            |mode| LocatedPose { log: log.clone(), scan: sweep.scan, mode, doubts: &doubts };
+        answer(args.json, modes.iter().map(located), |out| {
+            print(out, &log, sweep.scan, &modes, &doubts)
+        })
     })?;
-    if any {
+    if found {
         return Ok(());
     }
-    Err(Failure::input("there is no sweep to locate", "give a log of a ranger on a stepper"))
+    Err(Failure::input("no scan to locate", "give a log of a ranger on a stepper"))
 }
 
 fn atlas(world: &World, args: &Args) -> Result<Atlas, Failure> {
-    let besides = prior::fitted(&args.fit, &args.prior, world, 1)?;
+    let besides = prior::parameters(&args.fit, &args.prior, world, 1)?;
     let spacing_m = args.spacing_m.unwrap_or_else(|| Atlas::usual_spacing_m(&world.scene));
-    let bar = progress::spinner("scenes looked over");
-    let atlas = Atlas::new(world, spacing_m).map_err(|error| refuse(&error))?;
+    let bar = progress::spinner("predicting on the grid of positions");
+    let atlas = Atlas::new(world, spacing_m).map_err(|error| failure_from(&error))?;
     bar.finish_and_clear();
     Ok(atlas.fitting(besides))
 }
 
-fn refuse(error: &dyn std::fmt::Display) -> Failure {
-    Failure::input(
-        error,
-        "see `sonard scene check` for the scene, and give sensor and air that make sense",
-    )
+fn failure_from(error: &dyn std::fmt::Display) -> Failure {
+    Failure::input(error, "check the scene with `sonard scene check`, and sensor and air")
 }
 
 fn print(
@@ -181,12 +183,12 @@ fn print(
             format!("{:.2} \u{b1} {:.2}", mode.heading_deg, mode.sigma_heading_deg),
             format!("{:.0} %", 100.0 * mode.explained),
         ];
-        let told = |of: &Besides| format!("{:.2} \u{b1} {:.2}", of.value, of.sigma);
-        table.add_row(pose.into_iter().chain(mode.besides.iter().map(told)));
+        let parameter = |of: &Besides| format!("{:.2} \u{b1} {:.2}", of.value, of.sigma);
+        table.add_row(pose.into_iter().chain(mode.besides.iter().map(parameter)));
     }
     for column in table.column_iter_mut() {
         column.set_cell_alignment(CellAlignment::Right);
     }
     writeln!(out, "{table}")?;
-    doubts.iter().try_for_each(|doubt| writeln!(out, "doubt: {doubt}"))
+    doubts.iter().try_for_each(|diagnosis| writeln!(out, "warning: {diagnosis}"))
 }

@@ -15,15 +15,15 @@ use super::{Failure, Outcome, failure::is_wrong_place};
 /// Verbs of `sonard log`.
 #[derive(Debug, clap::Subcommand)]
 pub(super) enum Verb {
-    /// Check logs: exit code 0 if all are clean, 1 if not, with what and where by line
+    /// Check logs; exit code 0 if all are clean, else 1, with each problem by line
     Verify(verify::Args),
-    /// Leave out what can't be read and keep the original beside it
+    /// Remove unreadable lines, and keep the original as LOG.orig
     Repair(repair::Args),
-    /// Show what is in a log: sessions, scans, events
+    /// Show the contents of a log: sessions, scans, events
     Show(show::Args),
-    /// Write a log again with Feature Prediction's confidence in every ping
+    /// Add Feature Prediction's confidence to every ping of a log
     Annotate(annotate::Args),
-    /// Print the JSON Schema of a log's lines (docs/log.md says what they mean)
+    /// Print the JSON Schema of a log's lines (docs/log.md explains them)
     Schema,
 }
 
@@ -46,7 +46,8 @@ fn schema() -> Outcome {
 }
 
 impl From<StoreError> for Failure {
-    /// A path that can't be opened is wrong input; a lock or a disk that fails is not, wherever it is.
+    /// Converts errors of a path that can't be opened to input failures, and errors of a lock or
+    /// disk to device failures.
     fn from(error: StoreError) -> Self {
         match &error {
             StoreError::Unreadable { .. }

@@ -1,5 +1,4 @@
-//! Logs as verbs read them: scan by scan, so that a collection of days need not be in memory, and with
-//! what is wrong in them told once.
+//! Input logs of verbs, read scan by scan in bounded memory, with damaged lines reported once.
 
 use std::{
     ffi::OsStr,
@@ -7,7 +6,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use super::{Failure, output::note_input, progress};
+use super::{Failure, output::register_input, progress};
 use crate::{
     collect::SCANS,
     compare::keep_every_second,
@@ -15,27 +14,27 @@ use crate::{
     store::{FileKind, Line, LineError, StoreError, log_files, open_for_reading, read_log},
 };
 
-/// Lines that can't be read and are named; of more only the number is told.
-const SHOWN: usize = 5;
+/// Maximum number of reported damaged lines; further ones are counted.
+const MAX_REPORTED: usize = 5;
 
-/// Damaged lines as they are met.
+/// Damaged lines found in a log.
 #[derive(Debug, Default)]
 pub(super) struct Damage {
     count: u64,
 }
 
 impl Damage {
-    /// Names a line, unless enough are named.
-    pub(super) fn note(&mut self, log: &Path, error: &LineError) {
+    /// Reports a damaged line, up to a limit.
+    pub(super) fn report(&mut self, log: &Path, error: &LineError) {
         self.count += 1;
-        if self.count <= SHOWN as u64 {
-            notice!("warning: {}: {error}; the line is left out", log.display());
+        if self.count <= MAX_REPORTED as u64 {
+            notice!("warning: {}: {error}; line skipped", log.display());
         }
     }
 
-    /// Says how many more there were.
-    pub(super) fn sum_up(&self, log: &Path) {
-        if let Some(more) = self.count.checked_sub(SHOWN as u64).filter(|more| *more > 0) {
+    /// Reports the number of further damaged lines.
+    pub(super) fn report_rest(&self, log: &Path) {
+        if let Some(more) = self.count.checked_sub(MAX_REPORTED as u64).filter(|more| *more > 0) {
             notice!(
                 "warning: {}: {more} more damaged lines; see `sonard log verify`",
                 log.display()
@@ -44,10 +43,13 @@ impl Damage {
     }
 }
 
-/// Expands folders to their logs, ordered by name, and notes all of them as read: a collection to its scans, a folder
-/// without logs of its own to those of daemons in its subfolders (one per robot).
+/// Expands folders to their logs, ordered by name, and registers all of them as inputs. A
+/// collection is expanded to its scans, a folder without logs of its own to the daemons' logs in
+/// its subfolders (one per robot).
 ///
 /// # Errors
+///
+/// A folder can't be read or contains no log.
 /// A folder can't be read, or has no log in it.
 pub(super) fn logs_in(paths: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
     let mut logs = Vec::new();
@@ -58,29 +60,29 @@ pub(super) fn logs_in(paths: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
         }
         let scans = path.join(SCANS);
         let folder = if scans.is_dir() { &scans } else { path };
-        let found = logs_of(folder).and_then(|found| match found.is_empty() {
+        let found = logs_in_folder(folder).and_then(|found| match found.is_empty() {
             true => logs_of_robots(folder),
             false => Ok(found),
         });
         let found = found.map_err(|error| {
             Failure::input(
                 format!("cannot read the folder {}: {error}", folder.display()),
-                "give a folder that you may read, or logs",
+                "give a readable folder, or logs",
             )
         })?;
         if found.is_empty() {
             return Err(Failure::input(
-                format!("there is no log in the folder {}", folder.display()),
-                "give a folder as `sonard run --log` or `sonard collect` writes it, or logs: they end in .jsonl",
+                format!("no log in the folder {}", folder.display()),
+                "give a folder written by `sonard run --log` or `sonard collect`, or logs (.jsonl)",
             ));
         }
-        found.iter().for_each(|log| note_input(log));
+        found.iter().for_each(|log| register_input(log));
         logs.extend(found);
     }
     Ok(logs)
 }
 
-fn logs_of(folder: &Path) -> io::Result<Vec<PathBuf>> {
+fn logs_in_folder(folder: &Path) -> io::Result<Vec<PathBuf>> {
     let entries = fs::read_dir(folder)?.map(|entry| entry.map(|entry| entry.path()));
     let paths: Vec<_> = entries.collect::<io::Result<_>>()?;
     let is_log = |path: &PathBuf| path.extension() == Some(OsStr::new("jsonl")) && path.is_file();
@@ -89,7 +91,7 @@ fn logs_of(folder: &Path) -> io::Result<Vec<PathBuf>> {
     Ok(logs)
 }
 
-/// Logs of daemons in the subfolders of `folder`, ordered by subfolder and name.
+/// Returns the logs of daemons in the subfolders of `folder`, ordered by subfolder and name.
 fn logs_of_robots(folder: &Path) -> io::Result<Vec<PathBuf>> {
     let entries = fs::read_dir(folder)?.map(|entry| entry.map(|entry| entry.path()));
     let mut robots: Vec<_> = entries.collect::<io::Result<_>>()?;
@@ -108,33 +110,36 @@ fn kind_of(reader: &mut impl std::io::BufRead) -> FileKind {
 
 fn no_record(log: &Path, kind: FileKind) -> Failure {
     Failure::input(
-        format!("{} holds no record: it looks like {kind}", log.display()),
+        format!("{} contains no records: it looks like {kind}", log.display()),
         kind.instead_of_a_log(),
     )
 }
 
-/// Hands over each scan of a log as soon as it has ended; names the lines that hold no record.
+/// Passes each scan of a log to `take` as soon as it has ended; reports lines that are not records.
 ///
 /// # Errors
-/// The log can't be read or holds no record at all, or what `take` refuses; nothing is read after that.
+///
+/// The log can't be read or contains no records, or `take` fails, which ends the reading.
 pub(super) fn for_each_scan(
     log: &Path,
     take: impl FnMut(ScanView) -> Result<(), Failure>,
 ) -> Result<(), Failure> {
-    for_each_scan_of(log, |_| {}, take)
+    for_each_record_and_scan(log, |_| {}, take)
 }
 
-/// The same, and before a scan each record up to the one that ends it is shown to `see`.
+/// Passes each scan of a log to `take`, and before it each record up to the end of the scan to
+/// `inspect`.
 ///
 /// # Errors
+///
 /// As [`for_each_scan`].
-pub(super) fn for_each_scan_of(
+pub(super) fn for_each_record_and_scan(
     log: &Path,
-    see: impl FnMut(&Record),
+    inspect: impl FnMut(&Record),
     mut take: impl FnMut(ScanView) -> Result<(), Failure>,
 ) -> Result<(), Failure> {
     let mut outcome = Ok(());
-    each_scan(log, see, |scan| {
+    each_scan(log, inspect, |scan| {
         if outcome.is_ok() {
             outcome = take(scan);
         }
@@ -143,10 +148,10 @@ pub(super) fn for_each_scan_of(
     outcome
 }
 
-/// The same until `take` has had enough.
+/// Passes scans to `take` until it returns `false`.
 fn each_scan(
     log: &Path,
-    mut see: impl FnMut(&Record),
+    mut inspect: impl FnMut(&Record),
     mut take: impl FnMut(ScanView) -> bool,
 ) -> Result<(), Failure> {
     let mut reader = progress::reading(log, open_for_reading(log)?);
@@ -161,7 +166,7 @@ fn each_scan(
             Ok(Line { record: Ok(record), .. }) => Some(Some(record)),
             Ok(Line { record: Err(error), .. }) => match error.reject_other_format(log) {
                 Ok(error) => {
-                    damage.note(log, &error);
+                    damage.report(log, &error);
                     Some(None)
                 }
                 Err(error) => stop(error),
@@ -171,14 +176,14 @@ fn each_scan(
         .flatten()
         .inspect(|record| {
             any = true;
-            see(record);
+            inspect(record);
         });
     for scan in ScanView::one_by_one(records) {
         if !take(scan) {
             break;
         }
     }
-    damage.sum_up(log);
+    damage.report_rest(log);
     match broken {
         Some(error) => Err(error.into()),
         None if any => Ok(()),
@@ -186,26 +191,27 @@ fn each_scan(
     }
 }
 
-/// Readings that a picture shows: more could not be told apart, and would fill the memory.
-const MOST_DRAWN: usize = 60_000;
+/// Maximum number of readings in a picture: more are neither distinguishable nor affordable in
+/// memory.
+const MAX_DRAWN_READINGS: usize = 60_000;
 
-/// Scans for a picture: all of them, or evenly so many that they can be shown.
+/// Scans for a picture: all of them, or an even selection.
 #[derive(Debug)]
-pub(super) struct Drawn {
+pub(super) struct DrawnScans {
     scans: Vec<ScanView>,
     readings: usize,
-    /// One scan in so many is kept.
+    /// Interval of the kept scans.
     every: usize,
     seen: usize,
 }
 
-impl Default for Drawn {
+impl Default for DrawnScans {
     fn default() -> Self {
         Self { scans: Vec::new(), readings: 0, every: 1, seen: 0 }
     }
 }
 
-impl Drawn {
+impl DrawnScans {
     pub(super) fn add(&mut self, scan: ScanView) {
         self.seen += 1;
         if !(self.seen - 1).is_multiple_of(self.every) {
@@ -213,18 +219,18 @@ impl Drawn {
         }
         self.readings += scan.pings.len();
         self.scans.push(scan);
-        while self.readings > MOST_DRAWN && self.scans.len() > 1 {
+        while self.readings > MAX_DRAWN_READINGS && self.scans.len() > 1 {
             keep_every_second(&mut self.scans);
             self.readings = self.scans.iter().map(|scan| scan.pings.len()).sum();
             self.every *= 2;
         }
     }
 
-    /// The scans to draw; says if these are not all.
+    /// Returns the scans to draw, with a notice if they are not all.
     pub(super) fn finish(self) -> Vec<ScanView> {
         if self.every > 1 {
             notice!(
-                "note: {} scans are more than a picture shows: one in {} is drawn, {} in all",
+                "note: {} scans are too many for a picture: one in {} is drawn, {} in total",
                 self.seen,
                 self.every,
                 self.scans.len()
@@ -234,8 +240,8 @@ impl Drawn {
     }
 }
 
-/// Logs of one robot stand together, and their scenes with them.
-pub(super) fn first_of(logs: &[PathBuf]) -> PathBuf {
+/// Returns the first log, whose neighbours share its scenes.
+pub(super) fn first_log(logs: &[PathBuf]) -> PathBuf {
     let first = logs_in(logs).ok().and_then(|logs| logs.into_iter().next());
     first.unwrap_or_else(|| "-".into())
 }

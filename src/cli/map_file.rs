@@ -1,10 +1,10 @@
-//! Maps on disk: the pair that ROS's map_server reads.
+//! Maps on disk in the format of ROS's map_server.
 
 use std::path::Path;
 
 use super::{
     Failure, Outcome,
-    output::{Overwrite, Product, note_input},
+    output::{Overwrite, Product, register_input},
 };
 use crate::{
     grid_file,
@@ -12,30 +12,31 @@ use crate::{
     scene::Surfaces,
 };
 
-/// A map by its description, or by the folder that holds `map.yaml`.
+/// Reads a map from its description, or from a folder with `map.yaml`.
 pub(super) fn read(path: &Path) -> Result<Grid, Failure> {
-    grid_file::read(path, note_input).map_err(|error| Failure::input(&error, error.help()))
+    grid_file::read(path, register_input).map_err(|error| Failure::input(&error, error.help()))
 }
 
-/// Walls of a map as surfaces, with its description; lengths are metres.
+/// Traces the walls of a map as surfaces; lengths are metres. Returns them with the map's
+/// description.
 pub(super) fn read_walls(
     path: &Path,
     tolerance_m: Option<f64>,
-    least_m: Option<f64>,
+    min_length_m: Option<f64>,
 ) -> Result<(Surfaces, MapYaml), Failure> {
-    grid_file::read_walls(path, tolerance_m, least_m, note_input)
+    grid_file::read_walls(path, tolerance_m, min_length_m, register_input)
         .map_err(|error| Failure::input(&error, error.help()))
 }
 
-/// Notes that the command reads a map, before it does.
-pub(super) fn note(path: &Path) {
+/// Registers the files of a map as inputs.
+pub(super) fn register_inputs(path: &Path) {
     for name in ["map.yaml", "map.pgm"] {
-        note_input(&path.join(name));
-        note_input(&path.with_file_name(name));
+        register_input(&path.join(name));
+        register_input(&path.with_file_name(name));
     }
 }
 
-/// What [`write`] writes.
+/// Files written by [`write`].
 const FILES: [(&str, Product); 2] = [("map.pgm", Product::Pgm), ("map.yaml", Product::MapYaml)];
 
 /// Checks that a map may be written into a folder.

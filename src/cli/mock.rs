@@ -16,8 +16,8 @@ use crate::{
     model::OptionKeys,
 };
 
-/// Firings between two lines of output.
-const FIRINGS_A_LINE: u64 = 100;
+/// Pings between two lines of output.
+const PINGS_PER_LINE: u64 = 100;
 
 /// Options of `sonard mock`.
 #[derive(Debug, clap::Args)]
@@ -43,9 +43,10 @@ pub(super) struct Args {
 pub(super) const ABOUT: &str = "\
 Run a mock ranger on a pty, with echoes from the model.
 
-The device's own protocol code runs on a pseudo-terminal, in a simulated world made from a scene. Any program \
-that speaks the protocol can open the port, such as `sonard scan --port`. It runs until it is interrupted. The \
-device identifies itself as simulated, and so does every log taken from it.";
+The firmware's protocol code runs on a pseudo-terminal, in a simulated world made from a scene. \
+Any program that implements the protocol can open the port, such as `sonard scan --port`. It runs \
+until it is interrupted. The device identifies itself as simulated, and its logs are marked \
+accordingly.";
 
 const EXAMPLES: &str = "\
 Examples:
@@ -81,7 +82,7 @@ pub(super) fn run(args: &Args) -> Outcome {
 
 fn print(note: &Note) {
     match note {
-        Note::Fired(count) if count % FIRINGS_A_LINE != 0 => {}
+        Note::Fired(count) if count % PINGS_PER_LINE != 0 => {}
         note => print_line!("{note}"),
     }
 }

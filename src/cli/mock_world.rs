@@ -1,4 +1,4 @@
-//! The mock's world as options: shared by `mock` and `scan --mock`.
+//! Options of the mock's world, shared by `mock` and `scan --mock`.
 
 use std::{
     path::{Path, PathBuf},
@@ -20,7 +20,7 @@ use crate::{
     scene::Scene,
 };
 
-/// Names of the options below, for verbs that can do without a mock.
+/// Names of the options below, for verbs that work without a mock.
 pub(super) const OPTIONS: [&str; 9] = [
     "truth",
     "truth_temperature_c",
@@ -46,7 +46,7 @@ pub(super) struct MockWorldArgs {
     /// Pace the mock by the wall clock instead of as fast as possible
     #[arg(long)]
     realtime: bool,
-    /// Random seed; noise, missed steps and faults
+    /// Random seed; for noise, missed steps and faults
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
     /// Faults to inject
@@ -55,18 +55,18 @@ pub(super) struct MockWorldArgs {
     /// Standard deviation of the range noise, millimetres (the far tail is longer)
     #[arg(long, value_name = "MM", default_value_t = 0.5, value_parser = not_negative)]
     noise_mm: f64,
-    /// Probability for each move that the motor falls a step short
+    /// Probability of a lost step in each move
     #[arg(long, value_name = "P", default_value_t = 0.0, value_parser = probability)]
     missed_steps: f64,
-    /// How far the transducer is turned on the motor's shaft, degrees
+    /// Mounting offset of the transducer on the motor's shaft, degrees
     #[arg(long, value_name = "DEG", default_value_t = 0.0, allow_negative_numbers = true)]
     mounting_offset_deg: f64,
-    /// Motor steps a revolution, including microsteps and gears
+    /// Motor steps per revolution, including microsteps and gears
     #[arg(long, value_name = "N", default_value_t = 400, value_parser = clap::value_parser!(u16).range(4..=12800))]
     steps_per_revolution: u16,
 }
 
-/// What the host believes, from which the truth differs only where it is told to.
+/// Model assumed by the host; the true world differs only by explicit options.
 pub(super) struct AssumedModel<'a> {
     pub(super) scene: &'a Arc<Scene>,
     pub(super) pose: &'a Pose,
@@ -76,13 +76,13 @@ pub(super) struct AssumedModel<'a> {
 }
 
 impl MockWorldArgs {
-    /// The board, powered up in its world.
+    /// Creates the board, powered up in its world, paced according to the options.
     pub(super) fn board(&self, assumed: &AssumedModel<'_>) -> Result<MockBoard, Failure> {
         let pace = if self.realtime { Pace::RealTime } else { Pace::Virtual };
         self.board_at(pace, assumed)
     }
 
-    /// The same at a given pace.
+    /// Creates the board with the given pace.
     pub(super) fn board_at(
         &self,
         pace: Pace,
@@ -93,7 +93,7 @@ impl MockWorldArgs {
         let steps = self.steps_per_revolution;
         let noise = TofNoise::of_range_mm(self.noise_mm, sound_speed_m_s);
         let world = World::new(soundings, noise, self.missed_steps, self.seed);
-        // Two mocks in a row are two boots: a nonce from the seed would repeat.
+        // Consecutive mocks are different boots, so the boot number must not come from the seed.
         let boot = rand::rng().random_range(1..=u16::MAX);
         let settings = BoardSettings {
             boot,
@@ -106,14 +106,14 @@ impl MockWorldArgs {
         Ok(MockBoard::new(settings, world))
     }
 
-    /// What is heard at the pose believed in.
+    /// Computes the echoes at the assumed pose in the true world.
     pub(super) fn soundings(&self, assumed: &AssumedModel<'_>) -> Result<Soundings, Failure> {
         let scene = match &self.truth {
             Some(name) => Arc::new(scene_file::load(name)?),
             None => Arc::clone(assumed.scene),
         };
         let air = self.truth_air(assumed.air)?;
-        // The mock hears to the end of whatever window it is told; the model must reach as far.
+        // The mock covers whatever window it receives, so the model must reach as far.
         let options = Options { max_range_m: None, ..*assumed.options };
         let simulator = Simulator::new(
             Arc::new(scene.with_robot_at(assumed.pose)),
@@ -127,31 +127,31 @@ impl MockWorldArgs {
             .map_err(|error| Failure::input(error, "give a simpler scene"))
     }
 
-    /// Motor steps a revolution.
+    /// Motor steps per revolution.
     pub(super) const fn steps_per_revolution(&self) -> u16 {
         self.steps_per_revolution
     }
 
-    /// The same world for `sonard-emulator`, as far as it has one.
+    /// Returns the options of `sonard-emulator` for this world, as far as it supports them.
     pub(super) fn emulator(&self, scene: &Path) -> Result<Vec<String>, Failure> {
         let scene = self.truth.as_deref().unwrap_or(scene);
         let scene = scene.to_str().ok_or_else(|| {
-            let help = "rename it: the emulator takes its options as text";
+            let help = "rename it: the emulator accepts UTF-8 paths only";
             Failure::input(format!("the path {} is not UTF-8", scene.display()), help)
         })?;
-        let refuse = |option: &str, instead: &str| {
-            Err(Failure::input(format!("the emulator has no {option}"), instead))
+        let unsupported = |option: &str, instead: &str| {
+            Err(Failure::input(format!("the emulator does not support {option}"), instead))
         };
         if self.faults.is_some() {
-            return refuse(
+            return unsupported(
                 "--faults",
-                "they are the mock's; a supply that sags is `sonard-emulator --dips`",
+                "use --mock; `sonard-emulator --dips` simulates brown-outs",
             );
         }
         if self.missed_steps > 0.0 {
-            return refuse(
+            return unsupported(
                 "--missed-steps",
-                "its motor misses steps when --speed or --acceleration ask too much of it",
+                "its motor loses steps if --speed or --acceleration are too high",
             );
         }
         let mut options = vec![
@@ -167,9 +167,9 @@ impl MockWorldArgs {
         Ok(options)
     }
 
-    fn truth_air(&self, believed: &Air) -> Result<Air, Failure> {
-        let Some(temperature_c) = self.truth_temperature_c else { return Ok(*believed) };
-        Air::new(temperature_c, believed.humidity_percent(), believed.pressure_kpa())
+    fn truth_air(&self, assumed: &Air) -> Result<Air, Failure> {
+        let Some(temperature_c) = self.truth_temperature_c else { return Ok(*assumed) };
+        Air::new(temperature_c, assumed.humidity_percent(), assumed.pressure_kpa())
             .map_err(|error| Failure::input(error, "give --truth-temperature-c in degrees Celsius"))
     }
 }

@@ -1,38 +1,38 @@
-//! Numbers on the command line, within what makes sense.
+//! Parsers of bounded numbers for options.
 
 use std::ops::RangeInclusive;
 
-/// More makes no sense of any quantity that is given here.
-const MOST: f64 = 1e6;
+/// Upper bound of positive numbers without a bound of their own.
+const MAX: f64 = 1e6;
 
-/// A number within a range, as clap parses it.
+/// Parser of a number within a range.
 pub(super) fn within(
     range: RangeInclusive<f64>,
 ) -> impl Fn(&str) -> Result<f64, String> + Clone + Send + Sync + 'static {
     move |text| {
         let value = text.parse::<f64>().ok().filter(|value| range.contains(value));
-        value.ok_or_else(|| format!("give a number {}", words(&range)))
+        value.ok_or_else(|| format!("give a number {}", describe(&range)))
     }
 }
 
-/// More than nothing.
+/// Parser of a number greater than 0.
 pub(super) fn positive(text: &str) -> Result<f64, String> {
-    within(f64::MIN_POSITIVE..=MOST)(text)
+    within(f64::MIN_POSITIVE..=MAX)(text)
 }
 
 pub(super) fn not_negative(text: &str) -> Result<f64, String> {
-    within(0.0..=MOST)(text)
+    within(0.0..=MAX)(text)
 }
 
 pub(super) fn probability(text: &str) -> Result<f64, String> {
     within(0.0..=1.0)(text)
 }
 
-fn words(range: &RangeInclusive<f64>) -> String {
-    let (least, most) = (range.start(), range.end());
-    match *least {
-        f64::MIN_POSITIVE => format!("greater than 0, at most {most}"),
-        _ => format!("from {least} to {most}"),
+fn describe(range: &RangeInclusive<f64>) -> String {
+    let (min, max) = (range.start(), range.end());
+    match *min {
+        f64::MIN_POSITIVE => format!("greater than 0, at most {max}"),
+        _ => format!("from {min} to {max}"),
     }
 }
 
@@ -41,7 +41,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_out_of_range_are_told_what_would_do() {
+    fn rejects_with_the_valid_range() {
         for (parsed, expected) in [
             (within(0.01..=2.0)("0.5"), Ok(0.5)),
             (within(0.01..=2.0)("3"), Err("give a number from 0.01 to 2")),

@@ -1,4 +1,4 @@
-//! Options that several verbs share: sensor, air and engine.
+//! Options shared by several verbs: sensor, air and engine.
 
 use std::{fs, io};
 
@@ -9,38 +9,39 @@ use crate::{
     scene::suggest,
 };
 
-/// The sensor that is meant when none is named.
+/// Sensor used if none is given.
 const SENSOR: &str = "senscomp-6500";
 
-/// Which ranger.
+/// Options of the sensor and its mounting.
 #[derive(Debug, Clone, clap::Args)]
 #[command(next_help_heading = "Sensor and air")]
 pub(super) struct SensorArgs {
-    /// Sensor preset (`sonard sensor list`), or a file with a sensor's data [default: senscomp-6500; of an array, its own]
+    /// Sensor preset (`sonard sensor list`), or a file with a sensor's data [default:
+    /// senscomp-6500; for an array, its own]
     #[arg(long, value_name = "NAME|FILE")]
     sensor: Option<String>,
-    /// End the blanking by hand as early as the sensor allows, as BINH does
+    /// End the blanking as early as the sensor allows, with BINH
     #[arg(long, conflicts_with = "blanking_us")]
     short_blanking: bool,
-    /// From firing until the receiver listens, microseconds [default: the sensor's]
+    /// Blanking time after transmission, microseconds [default: the sensor's]
     #[arg(long, value_name = "US")]
     blanking_us: Option<f64>,
     /// Height of the transducer in a scene with floor, ceiling or low walls, metres [default: the
-    /// sensor's, else half a metre above the floor]
+    /// sensor's, else 0.5 m above the floor]
     #[arg(long, value_name = "M", allow_negative_numbers = true)]
     sensor_z: Option<f64>,
     /// Elevation of the transducer's axis, degrees [default: the sensor's]
     #[arg(long, value_name = "DEG", allow_negative_numbers = true)]
     tilt_deg: Option<f64>,
-    /// How far the transducer's face is ahead of the rotation axis, metres [default: the sensor's]
+    /// Transducer offset forward of the rotation axis, metres [default: the sensor's]
     #[arg(long, value_name = "M", allow_negative_numbers = true)]
     ahead_m: Option<f64>,
-    /// The same to the left [default: the sensor's]
+    /// Transducer offset to the left of the rotation axis, metres [default: the sensor's]
     #[arg(long, value_name = "M", allow_negative_numbers = true)]
     left_m: Option<f64>,
 }
 
-/// The air between ranger and walls.
+/// Options of the air.
 #[derive(Debug, Clone, Copy, clap::Args)]
 #[command(next_help_heading = "Sensor and air")]
 pub(super) struct AirArgs {
@@ -53,27 +54,26 @@ pub(super) struct AirArgs {
     /// Static pressure, kilopascals
     #[arg(long, value_name = "KPA", default_value_t = 101.325)]
     pressure_kpa: f64,
-    /// Speed of sound, metres a second; instead of the one that follows from the air
+    /// Speed of sound, metres per second; instead of that computed from the air
     #[arg(long, value_name = "M/S")]
     sound_speed: Option<f64>,
 }
 
 impl SensorArgs {
-    /// The same for `sonard-emulator`, with the blanking that came of it.
+    /// Returns the options of `sonard-emulator` for this sensor and its blanking.
     pub(super) fn emulator(&self, sensor: &Sensor) -> [String; 2] {
         let name = self.sensor.as_deref().unwrap_or(SENSOR);
         [format!("--sensor={name}"), format!("--blanking-us={}", sensor.blanking_us)]
     }
 
-    /// The sensor named: a file if there is one of that name, else a preset; with its blanking as
-    /// asked for.
+    /// Loads the sensor, from a file or else a preset, and applies the overrides.
     pub(super) fn sensor(&self) -> Result<Sensor, Failure> {
         self.sensor_or(SENSOR)
     }
 
-    /// The same with another one to fall back on.
-    pub(super) fn sensor_or(&self, otherwise: &str) -> Result<Sensor, Failure> {
-        let mut sensor = load_sensor(self.sensor.as_deref().unwrap_or(otherwise))?;
+    /// Loads the sensor with another default.
+    pub(super) fn sensor_or(&self, default: &str) -> Result<Sensor, Failure> {
+        let mut sensor = load_sensor(self.sensor.as_deref().unwrap_or(default))?;
         if self.short_blanking {
             sensor.blanking_us = sensor.short_blanking_us.ok_or_else(|| {
                 Failure::input(
@@ -103,27 +103,27 @@ impl SensorArgs {
     }
 }
 
-/// A sensor by the name of its file or preset.
+/// Loads a sensor from a file, or else the preset of that name.
 pub(super) fn load_sensor(name: &str) -> Result<Sensor, Failure> {
     match fs::read_to_string(name) {
-        Ok(text) => Sensor::from_json(&text).map_err(|error| refuse_sensor(name, &error)),
+        Ok(text) => Sensor::from_json(&text).map_err(|error| sensor_failure(name, &error)),
         Err(error) if error.kind() == io::ErrorKind::NotFound => {
-            Sensor::preset(name).map_err(|error| refuse_sensor(name, &error))
+            Sensor::preset(name).map_err(|error| sensor_failure(name, &error))
         }
         Err(error) => Err(Failure::input(
             format!("cannot read the sensor {name}: {error}"),
-            "give a text file that you may read, or the name of a preset",
+            "give a readable text file, or the name of a preset",
         )),
     }
 }
 
-fn refuse_sensor(name: &str, error: &SensorError) -> Failure {
+fn sensor_failure(name: &str, error: &SensorError) -> Failure {
     match error {
         SensorError::UnknownPreset { .. } => {
-            let known: Vec<String> = Sensor::preset_names().map(str::to_owned).collect();
+            let names: Vec<String> = Sensor::preset_names().map(str::to_owned).collect();
             Failure::input(
-                format!("there is no sensor file `{name}` and no preset of that name"),
-                suggest(name, &known, "presets"),
+                format!("no sensor file `{name}` and no preset of that name"),
+                suggest(name, &names, "presets"),
             )
         }
         SensorError::Form { line, column, field, message } => Failure::input(
@@ -131,13 +131,13 @@ fn refuse_sensor(name: &str, error: &SensorError) -> Failure {
             "start from a preset in the folder sensors/ of the source",
         ),
         SensorError::Figure { .. } => {
-            Failure::input(format!("{name}: {error}"), "correct that figure in the file")
+            Failure::input(format!("{name}: {error}"), "correct that value in the file")
         }
     }
 }
 
 impl AirArgs {
-    /// The same for `sonard-emulator`.
+    /// Returns the options of `sonard-emulator` for this air.
     pub(super) fn emulator(&self) -> [String; 3] {
         [
             format!("--temperature-c={}", self.temperature_c),
@@ -146,7 +146,7 @@ impl AirArgs {
         ]
     }
 
-    /// The air described.
+    /// Returns the air with the given properties.
     pub(super) fn air(&self) -> Result<Air, Failure> {
         Air::new(self.temperature_c, self.humidity_percent, self.pressure_kpa)
             .and_then(|air| self.sound_speed.map_or(Ok(air), |speed| air.with_sound_speed(speed)))
@@ -163,13 +163,13 @@ impl AirArgs {
     }
 }
 
-/// The model's options, each of which the engine has to know.
+/// Converts the model's options; options of another engine are errors.
 pub(super) fn engine_options(keys: &OptionKeys) -> Result<Options, Failure> {
     keys.options().map_err(|error| {
         let engines: Vec<_> = error.of.iter().map(|engine| engine.name()).collect();
         Failure::input(
             format!(
-                "--{}: {} does not know it",
+                "--{}: not an option of the engine {}",
                 error.option.replace('_', "-"),
                 error.engine.name()
             ),

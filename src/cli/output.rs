@@ -1,9 +1,9 @@
-//! What verbs write, by one rule.
+//! Output files of verbs, written under common rules.
 //!
-//! A file that a command reads is never written over, by whatever name it goes. What is written is
-//! made beside its place, synced and renamed, so that a full disk or a crash leaves the old file or
-//! none. A picture, a map, a list, a table or a recording takes the place of an older one of its kind; anything else that is
-//! there is refused unless `--force` says to replace it. Measured logs are added to, never replaced.
+//! A file that the command reads is never overwritten, under any name. Outputs are written to a
+//! temporary file, synced and renamed, so a full disk or a crash leaves the old file or none. A
+//! picture, map, list, table or recording replaces an older one of its kind; any other existing
+//! file is rejected unless `--force` is given. Measured logs are appended to, never replaced.
 
 mod stream;
 
@@ -32,7 +32,7 @@ use crate::{
 };
 pub(super) use stream::Stream;
 
-/// A path on the command line that is written to.
+/// Path of an output on the command line.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct OutPath(PathBuf);
 
@@ -52,38 +52,38 @@ impl std::ops::Deref for OutPath {
     }
 }
 
-/// Whether what is there may be replaced.
+/// Permission to replace existing files.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, clap::Args)]
 pub(super) struct Overwrite {
-    /// Replace what is there, whatever it is; without it, only an older output of the same kind. What
-    /// the command reads is never replaced
+    /// Overwrite the output; without it, only an older output of the same kind is replaced. Files
+    /// that the command reads are never overwritten
     #[arg(long)]
     force: bool,
 }
 
-/// What is written.
+/// Kind of an output.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Product {
     Svg,
     Png,
     Pgm,
     MapYaml,
-    /// JSON objects, one a line, that all have these members.
+    /// JSON objects, one per line, that all have these members.
     List(&'static [&'static str]),
-    /// A table of the readings of logs.
+    /// Table of the readings of logs.
     Table,
-    /// The same with typed columns.
+    /// Table of the readings of logs, with typed columns.
     TypedTable,
-    /// A recording of ROS 2 that this program made.
+    /// Recording of ROS 2 made by this program.
     Recording,
-    /// Lines or features that this program found, as GeoJSON.
+    /// Lines or features found by this program, as GeoJSON.
     GeoJson,
-    /// A log: never replaced unasked.
+    /// Log, replaced only with `--force`.
     Log,
 }
 
 impl Product {
-    /// Whether a file that begins so is an older one of its kind.
+    /// Returns `true` if a file with this beginning is an older output of the same kind.
     fn replaces(self, head: &[u8]) -> bool {
         let kind = FileKind::of(head);
         match self {
@@ -92,7 +92,7 @@ impl Product {
             Self::Png => kind == FileKind::Png,
             Self::Pgm => kind == FileKind::Pgm,
             Self::MapYaml => kind == FileKind::MapYaml,
-            Self::List(members) => is_list(head, members),
+            Self::List(members) => is_list_of(head, members),
             Self::Table => head.starts_with(CsvExport::<Vec<u8>>::head().as_bytes()),
             Self::TypedTable => ParquetExport::<Vec<u8>>::begins(head),
             Self::Recording => McapExport::<Vec<u8>>::begins(head),
@@ -102,8 +102,8 @@ impl Product {
     }
 }
 
-/// Whether the first line is a JSON object with exactly these members.
-fn is_list(head: &[u8], members: &[&str]) -> bool {
+/// Returns `true` if the first line is a JSON object with exactly these members.
+fn is_list_of(head: &[u8], members: &[&str]) -> bool {
     let first = head.split(|&byte| byte == b'\n').next().unwrap_or_default();
     let object = serde_json::from_slice::<serde_json::Map<String, serde_json::Value>>(first);
     object.is_ok_and(|object| {
@@ -111,37 +111,38 @@ fn is_list(head: &[u8], members: &[&str]) -> bool {
     })
 }
 
-/// A file by what it is instead of by its name.
+/// Device and inode of a file, independent of its name.
 type FileId = (u64, u64);
 
-/// What this process reads, and the name it goes by: one process runs one command line.
-static READ: Mutex<Vec<(FileId, PathBuf)>> = Mutex::new(Vec::new());
+/// Files that this process reads, with their names; a process runs one command line.
+static INPUTS: Mutex<Vec<(FileId, PathBuf)>> = Mutex::new(Vec::new());
 
-/// Notes that the command reads this file. For files that the command line does not name itself.
-pub(super) fn note_input(path: &Path) {
+/// Registers a file that the command reads but the command line does not name.
+pub(super) fn register_input(path: &Path) {
     if let Ok(metadata) = fs::metadata(path) {
-        note(&metadata, path);
+        register(&metadata, path);
     }
 }
 
-fn note(metadata: &Metadata, path: &Path) {
+fn register(metadata: &Metadata, path: &Path) {
     if metadata.is_file() {
         let id = (metadata.dev(), metadata.ino());
-        READ.lock().unwrap_or_else(PoisonError::into_inner).push((id, path.into()));
+        INPUTS.lock().unwrap_or_else(PoisonError::into_inner).push((id, path.into()));
     }
 }
 
-fn read_as(metadata: &Metadata) -> Option<PathBuf> {
+fn input_name(metadata: &Metadata) -> Option<PathBuf> {
     let id = (metadata.dev(), metadata.ino());
-    let read = READ.lock().unwrap_or_else(PoisonError::into_inner);
+    let read = INPUTS.lock().unwrap_or_else(PoisonError::into_inner);
     read.iter().find(|(known, _)| *known == id).map(|(_, path)| path.clone())
 }
 
-/// Notes every file that the command line names for anything but output, and standard input.
+/// Registers every file that the command line names other than as an output, and standard input.
 ///
 /// # Errors
-/// When standard output is one of them.
-pub(super) fn guard(command: &Command, matches: &ArgMatches) -> Outcome {
+///
+/// Standard output is one of them.
+pub(super) fn register_inputs(command: &Command, matches: &ArgMatches) -> Outcome {
     let mut level = (command, matches);
     while let Some((name, below)) = level.1.subcommand() {
         let Some(command) = level.0.find_subcommand(name) else { break };
@@ -155,28 +156,28 @@ pub(super) fn guard(command: &Command, matches: &ArgMatches) -> Outcome {
                 .flatten()
                 .into_iter()
                 .flatten()
-                .for_each(|value| note_input(value.as_ref()));
+                .for_each(|value| register_input(value.as_ref()));
         }
     }
-    if let Some(metadata) = of_descriptor(io::stdin().as_fd()) {
-        note(&metadata, Path::new("standard input"));
+    if let Some(metadata) = descriptor_metadata(io::stdin().as_fd()) {
+        register(&metadata, Path::new("standard input"));
     }
-    let out = of_descriptor(io::stdout().as_fd()).filter(Metadata::is_file);
-    match out.as_ref().and_then(read_as) {
+    let out = descriptor_metadata(io::stdout().as_fd()).filter(Metadata::is_file);
+    match out.as_ref().and_then(input_name) {
         Some(read) => Err(Failure::input(
             format!("standard output goes to {}, which this command reads", read.display()),
-            "send it to another file, and take this one from a copy if the shell has emptied it",
+            "redirect it to another file, and restore this one from a copy if the shell has truncated it",
         )),
         None => Ok(()),
     }
 }
 
-/// Whether an argument names a place to write to.
+/// Returns `true` for arguments that name an output.
 pub(super) fn is_output(argument: &clap::Arg) -> bool {
     argument.get_value_parser().type_id() == std::any::TypeId::of::<OutPath>()
 }
 
-/// The outputs of every verb below a command, as `VERB --option` or `VERB NAME`.
+/// Lists the outputs of every verb below a command, as `VERB --option` or `VERB NAME`.
 pub(super) fn arguments(command: &Command) -> Vec<String> {
     let mut all = Vec::new();
     for below in command.get_subcommands() {
@@ -191,14 +192,14 @@ pub(super) fn arguments(command: &Command) -> Vec<String> {
     all
 }
 
-fn of_descriptor(fd: BorrowedFd<'_>) -> Option<Metadata> {
+fn descriptor_metadata(fd: BorrowedFd<'_>) -> Option<Metadata> {
     File::from(fd.try_clone_to_owned().ok()?).metadata().ok()
 }
 
-/// Where a file is to be: behind links, and what is there.
+/// Resolved path of an output, and the existing file.
 struct Destination {
     path: PathBuf,
-    there: Option<Metadata>,
+    existing: Option<Metadata>,
 }
 
 impl Destination {
@@ -213,112 +214,118 @@ impl Destination {
             Err(error) if error.kind() == io::ErrorKind::NotFound => {
                 let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
                 if folder.is_some_and(|folder| !folder.is_dir()) {
-                    let error = io::Error::new(error.kind(), "there is no such folder");
-                    return Err(failed(path, &error));
+                    let error = io::Error::new(error.kind(), "no such folder");
+                    return Err(failure_from(path, &error));
                 }
-                return Ok(Self { path: path.into(), there: None });
+                return Ok(Self { path: path.into(), existing: None });
             }
             Err(error) => return Err(cannot(&error)),
             Ok(link) if link.is_symlink() => match fs::metadata(path) {
-                Ok(there) if there.is_file() => fs::canonicalize(path).map_err(|e| cannot(&e))?,
-                // As /dev/stdout is one, to a pipe.
+                Ok(existing) if existing.is_file() => {
+                    fs::canonicalize(path).map_err(|e| cannot(&e))?
+                }
+                // For example /dev/stdout when it is a pipe.
                 Ok(_) => path.into(),
                 Err(error) => {
-                    return Err(cannot(&format!("it is a symbolic link to nothing: {error}")));
+                    return Err(cannot(&format!("broken symbolic link: {error}")));
                 }
             },
             Ok(_) => path.into(),
         };
-        let there = fs::metadata(&path).map_err(|error| cannot(&error))?;
-        let kind = there.file_type();
+        let existing = fs::metadata(&path).map_err(|error| cannot(&error))?;
+        let kind = existing.file_type();
         if !(kind.is_file() || kind.is_char_device() || kind.is_fifo()) {
-            return Err(cannot(&"it is no file"));
+            return Err(cannot(&"not a file"));
         }
-        Ok(Self { path, there: Some(there) })
+        Ok(Self { path, existing: Some(existing) })
     }
 
-    /// A terminal, a pipe: nothing to be replaced.
+    /// Returns `true` for a terminal or pipe, which can't be replaced.
     fn is_stream(&self) -> bool {
-        self.there.as_ref().is_some_and(|there| !there.is_file())
+        self.existing.as_ref().is_some_and(|existing| !existing.is_file())
     }
 }
 
 impl Overwrite {
-    /// Whether it was asked for.
+    /// Returns `true` with `--force`.
     pub(super) const fn is_forced(self) -> bool {
         self.force
     }
 
-    /// The same, or as if it was asked for.
+    /// Returns a copy that is also forced by `force`.
     pub(super) const fn or_forced(self, force: bool) -> Self {
         Self { force: self.force || force }
     }
 
-    /// Checks that a file may be written there. Before any work, so that a refusal costs none.
+    /// Checks that a file may be written, before any work.
     pub(super) fn check(self, path: &Path, product: Product) -> Outcome {
         self.place(path, product).map(drop)
     }
 
-    /// The same of a file in a folder that need not be there yet.
+    /// Checks that a file may be written to a folder that may not exist yet.
     pub(super) fn check_in(self, folder: &Path, name: &str, product: Product) -> Outcome {
         if folder.exists() { self.check(&folder.join(name), product) } else { Ok(()) }
     }
 
-    /// Writes a whole file.
+    /// Writes a complete file.
     pub(super) fn save(self, path: &Path, product: Product, bytes: &[u8]) -> Outcome {
         let mut file = self.begin(path, product)?;
-        file.write_all(bytes).and_then(|()| file.finish()).map_err(|error| failed(path, &error))
+        file.write_all(bytes)
+            .and_then(|()| file.finish())
+            .map_err(|error| failure_from(path, &error))
     }
 
-    /// Begins a file, or standard output where there is no name.
+    /// Opens an output file.
     pub(super) fn begin(self, path: &Path, product: Product) -> Result<Stream, Failure> {
-        let Destination { path: at, there } = self.place(path, product)?;
-        let stream = match &there {
-            Some(there) if !there.is_file() => {
+        let Destination { path: at, existing } = self.place(path, product)?;
+        let stream = match &existing {
+            Some(existing) if !existing.is_file() => {
                 OpenOptions::new().write(true).open(&at).map(Stream::Device)
             }
             _ => WholeFile::create(&at).and_then(|file| {
-                // What was kept from others stays so.
-                there
-                    .map_or(Ok(()), |there| file.as_file().set_permissions(there.permissions()))?;
+                // The permissions of the existing file are kept.
+                existing.map_or(Ok(()), |existing| {
+                    file.as_file().set_permissions(existing.permissions())
+                })?;
                 Ok(Stream::File(BufWriter::new(file)))
             }),
         };
-        stream.map_err(|error| failed(path, &error))
+        stream.map_err(|error| failure_from(path, &error))
     }
 
     fn place(self, path: &Path, product: Product) -> Result<Destination, Failure> {
         let place = Destination::find(path)?;
-        if place.there.is_none() || place.is_stream() {
+        if place.existing.is_none() || place.is_stream() {
             return Ok(place);
         }
-        refuse_input(&place.path)?;
+        reject_input(&place.path)?;
         if self.force {
             return Ok(place);
         }
-        let head = head(&place.path).map_err(|error| failed(path, &error))?;
+        let head = head(&place.path).map_err(|error| failure_from(path, &error))?;
         if product.replaces(&head) {
             return Ok(place);
         }
         Err(Failure::input(
-            format!("{} is there already and is {}", path.display(), FileKind::of(&head)),
-            "give another file, or --force to replace this one",
+            format!("{} exists and is {}", path.display(), FileKind::of(&head)),
+            "give another file, or --force to overwrite this one",
         ))
     }
 }
 
-fn failed(path: &Path, error: &io::Error) -> Failure {
+fn failure_from(path: &Path, error: &io::Error) -> Failure {
     Failure::unwritable(&path.display(), error)
 }
 
-/// The beginning of a file.
+/// Reads the beginning of a file.
 fn head(path: &Path) -> io::Result<Vec<u8>> {
     let mut head = Vec::new();
     File::open(path)?.take(HEAD_BYTES as u64).read_to_end(&mut head)?;
     Ok(head)
 }
 
-/// Where a verb's records go: a file that takes its place when it is whole, or standard output.
+/// Opens the output for records: a file, renamed to its destination when complete, or standard
+/// output.
 pub(super) fn records_to(
     path: Option<&Path>,
     overwrite: Overwrite,
@@ -331,37 +338,37 @@ pub(super) fn records_to(
     Ok(Box::new(LogWriter::new(stream, path).with_scenes_beside()))
 }
 
-/// How it went to write records; that their reader went away is no failure.
+/// Converts the result of writing records; a closed reader is not a failure.
 pub(super) fn closed(written: Result<(), StoreError>) -> Outcome {
     written.or_else(|error| if error.is_broken_pipe() { Ok(()) } else { Err(error.into()) })
 }
 
-/// Refuses to write to a file that the command reads.
-pub(super) fn refuse_input(path: &Path) -> Outcome {
-    let Some(read) = fs::metadata(path).ok().as_ref().and_then(read_as) else { return Ok(()) };
+/// Rejects an output that the command reads.
+pub(super) fn reject_input(path: &Path) -> Outcome {
+    let Some(read) = fs::metadata(path).ok().as_ref().and_then(input_name) else { return Ok(()) };
     let shown = path.display();
     let as_other = if read == path { String::new() } else { format!(" as {}", read.display()) };
     Err(Failure::input(
-        format!("{shown} is read by this command{as_other}: it is not written over"),
-        "give another file to write to",
+        format!("{shown} is read by this command{as_other} and can't be overwritten"),
+        "give another output",
     ))
 }
 
-/// Makes a folder for what is to be written, if there is none.
+/// Creates the folder of outputs, if missing.
 pub(super) fn make_folder(folder: &Path) -> Outcome {
     fs::create_dir_all(folder)
         .map_err(|error| Failure::unwritable(&format!("the folder {}", folder.display()), &error))
 }
 
-/// The format of a picture, by the end of its name.
-pub(super) fn picture(path: &Path) -> Result<Product, Failure> {
+/// Returns the format of a picture, by its extension.
+pub(super) fn picture_format(path: &Path) -> Result<Product, Failure> {
     let ending = path.extension().map(OsStr::to_ascii_lowercase);
     match ending.as_deref().and_then(OsStr::to_str) {
         Some("svg") => Ok(Product::Svg),
         Some("png") => Ok(Product::Png),
         _ => Err(Failure::input(
-            format!("{}: the format of a picture follows from its ending", path.display()),
-            "let the name end in .svg or .png",
+            format!("{}: unknown extension of a picture", path.display()),
+            "use .svg or .png",
         )),
     }
 }

@@ -12,7 +12,7 @@ use crate::config::{Key, Section, sections};
 /// Options of `sonard package-files`.
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
-    /// Folder to write into; it gets man1, man5 and completions
+    /// Output folder, with man1, man5 and completions
     dir: OutPath,
 }
 
@@ -26,7 +26,7 @@ fn write_all(dir: &Path) -> io::Result<()> {
     for folder in [&pages, &files, &completions] {
         fs::create_dir_all(folder)?;
     }
-    // Lines are filled by whoever shows the page.
+    // Lines are wrapped by the pager.
     let command = command_line().term_width(0);
     clap_mangen::generate_to(command.clone(), &pages)?;
     for shell in [Shell::Bash, Shell::Zsh, Shell::Fish] {
@@ -35,7 +35,7 @@ fn write_all(dir: &Path) -> io::Result<()> {
     fs::write(files.join("sonard.toml.5"), configuration_page(&command))
 }
 
-/// `sonard.toml(5)`, made from the table of keys that the configuration is checked by.
+/// Page `sonard.toml(5)`, generated from the table of configuration keys.
 fn configuration_page(command: &Command) -> String {
     let version = command.get_version().unwrap_or_default();
     let mut page = Roff::new();
@@ -49,40 +49,40 @@ fn configuration_page(command: &Command) -> String {
         roman("Read by "),
         bold("sonard run"),
         roman(
-            ". The file is TOML. Every key has a default or may be left out; a key that is not \
-             known is refused, with the nearest known one. Over the file go environment variables \
-             (SONARD_PLAN_STEP_DEG=1.8), over those the options of the command line (",
+            ". The file is TOML. Every key has a default or is optional; an unknown key \
+             is an error, with the nearest known key. Environment variables \
+             (SONARD_PLAN_STEP_DEG=1.8) override the file, options of the command line (",
         ),
         bold("--set plan.step_deg=1.8"),
-        roman("). "),
+        roman(") override both. "),
         bold("sonard run --check"),
         roman(
-            " reads it all and says what is in force. A reload (SIGHUP) takes changes in; those of \
-             keys marked (restart) wait for the next start.",
+            " validates the configuration and prints the effective values. A reload (SIGHUP) applies changes; \
+             keys marked (restart) take effect after a restart.",
         ),
     ]);
-    for of in sections() {
-        keys(&mut page, of);
+    for entry in sections() {
+        write_keys(&mut page, entry);
     }
     section(&mut page, "SEE ALSO");
     page.text([bold("sonard-run"), roman("(1), "), bold("sonard"), roman("(1)")]);
     page.render()
 }
 
-fn keys(page: &mut Roff, of: &Section) {
-    section(page, &format!("[{}]", of.name));
-    page.text([roman(of.about.as_str())]);
-    for key in &of.keys {
+fn write_keys(page: &mut Roff, entry: &Section) {
+    section(page, &format!("[{}]", entry.name));
+    page.text([roman(entry.about.as_str())]);
+    for key in &entry.keys {
         page.control("TP", []);
         page.text([bold(key.name.as_str())]);
         page.text([roman(format!("{} {}", key.about, key.kind.wanted()))]);
         page.control("br", []);
-        page.text([roman(fallback(key))]);
+        page.text([roman(describe_default(key))]);
     }
 }
 
-/// What is in force if the key is not given.
-fn fallback(key: &Key) -> String {
+/// Describes the value of a key that is not given.
+fn describe_default(key: &Key) -> String {
     match (&key.default, &key.example) {
         (Some(default), _) => format!("Default: {}.", key.kind.toml(default)),
         (None, Some(example)) => format!("No default; for example {}.", key.kind.toml(example)),
@@ -99,7 +99,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_verb_has_a_page_and_every_key_an_entry() {
+    fn pages_cover_verbs_and_keys() {
         let folder = tempfile::tempdir().expect("a folder");
         write_all(folder.path()).expect("there is room");
         let read = |name: &str| fs::read_to_string(folder.path().join(name)).expect("it is there");
@@ -107,7 +107,7 @@ mod tests {
             let page = read(&format!("man1/sonard-{}.1", verb.get_name()));
             assert!(page.contains(".SH OPTIONS"), "{}", verb.get_name());
         }
-        // A hidden verb is for whoever makes packages.
+        // A hidden verb is for packagers only.
         assert!(!folder.path().join("man1/sonard-package-files.1").exists());
         let page = read("man5/sonard.toml.5");
         for section in sections() {

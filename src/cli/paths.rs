@@ -28,30 +28,31 @@ use crate::{
 pub(super) struct Args {
     #[command(flatten)]
     place: PlaceArgs,
-    /// Azimuth, degrees counter-clockwise from the heading; the paths are those between transmitter and receiver where
-    /// they are when the ranger looks there. Without it both are on its axis
+    /// Azimuth, degrees counter-clockwise from the heading; lists the paths between transmitter and
+    /// receiver at their positions for that azimuth. By default both are on the rotation axis
     #[arg(long, value_name = "DEG", allow_negative_numbers = true)]
     azimuth_deg: Option<f64>,
-    /// Listen and predict up to this range, metres, instead of the sensor's
+    /// Maximum range, metres, instead of the sensor's
     #[arg(long, value_name = "M")]
     max_range: Option<f64>,
-    /// Most mirror reflections on a path, if limited
+    /// Maximum number of mirror reflections on a path; unlimited by default
     #[arg(long, value_name = "N")]
     max_order: Option<u32>,
-    /// Leave out paths weaker than this; a head-on, perfect wall gives 1. Those that touch cylinders more than once,
-    /// or a cylinder and an edge, are listed from ten times this where they are longer than the blanking covers
+    /// Minimum amplitude of listed paths; a head-on, perfect wall gives 1. Paths with more than one
+    /// cylinder, or a cylinder and an edge, are listed from ten times this amplitude if they are
+    /// longer than the blanking covers
     #[arg(long, value_name = "A", default_value_t = 0.001)]
-    weakest: f64,
-    /// Law of edge diffraction, if not the sensor's (or else utd)
+    min_amplitude: f64,
+    /// Edge diffraction model, instead of the sensor's or utd
     #[arg(long, value_enum, value_name = "LAW")]
     edge_law: Option<EdgeLawKind>,
-    /// Also find paths diffracted at two edges
+    /// Find paths diffracted at two edges, too
     #[arg(long)]
     double_diffraction: bool,
-    /// Leave out the absorption of the air
+    /// Disable the absorption of the air
     #[arg(long)]
     lossless: bool,
-    /// JSON instead of text; one object a path
+    /// JSON instead of text; one object per path
     #[arg(long)]
     json: bool,
     #[command(flatten)]
@@ -63,22 +64,23 @@ pub(super) struct Args {
 pub(super) const ABOUT: &str = "\
 List the propagation paths of echoes at a position, shortest first.
 
-Paths have any number of mirror reflections, and one diffraction (two with --double-diffraction) with any \
-reflections before and after. The amplitude includes reflectances, edges, curvature and absorption but no beam \
-pattern: it is that of a ranger pointed along both departure and arrival. A path that can be followed in both \
-directions is listed twice, with departure and arrival swapped. Departure and arrival are directions in the \
-world, degrees counter-clockwise from +x; azimuth_deg of `sonard simulate` counts from the heading.";
+Paths have any number of mirror reflections, and one diffraction (two with --double-diffraction) \
+with any reflections before and after. The amplitude includes reflectances, edges, curvature and \
+absorption but no beam pattern: it is that of a ranger pointed along both departure and arrival. A \
+path that can be traversed in both directions is listed twice, with departure and arrival \
+exchanged. Departure and arrival are directions in the world, degrees counter-clockwise from +x; \
+azimuth_deg of `sonard simulate` counts from the heading.";
 
 const EXAMPLES: &str = "\
 Examples:
   sonard paths --scene simple-room --pose fig9 --max-range 1
   sonard paths --scene mcgill-lab --pose 1,1,0 --max-order 2 --json | jq -c '.interactions[].point'
-  sonard paths --scene my-room.json --pose 1.2,0.8,90 --lossless --weakest 0.05
-  sonard paths --scene simple-room --pose fig9 --sensor hc-sr04 --azimuth-deg 45   # its two capsules apart
+  sonard paths --scene my-room.json --pose 1.2,0.8,90 --lossless --min-amplitude 0.05
+  sonard paths --scene simple-room --pose fig9 --sensor hc-sr04 --azimuth-deg 45   # separate transducers
 
 Exit codes: 0 done, 2 wrong usage or input, 3 the disk gave up.";
 
-/// A path as `--json` prints it.
+/// Path as `--json` prints it.
 #[derive(Debug, Serialize)]
 struct PathLine {
     length_m: f64,
@@ -90,13 +92,13 @@ struct PathLine {
     amplitude: f64,
     phase_deg: f64,
     #[serde(skip)]
-    words: String,
+    description: String,
 }
 
 pub(super) fn run(args: &Args) -> Outcome {
-    if !(1e-6..=1.0).contains(&args.weakest) {
+    if !(1e-6..=1.0).contains(&args.min_amplitude) {
         return Err(Failure::input(
-            format!("--weakest is {}", args.weakest),
+            format!("--min-amplitude is {}", args.min_amplitude),
             "give a number from 0.000001 to 1",
         ));
     }
@@ -116,7 +118,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     let simulator = Simulator::new(scene, args.sensor.sensor()?, args.air.air()?, options)
         .map_err(|error| Failure::input(error, "see `sonard paths --help`"))?;
     let settings =
-        crate::model::paths::Settings { floor: args.weakest, ..simulator.path_settings() };
+        crate::model::paths::Settings { floor: args.min_amplitude, ..simulator.path_settings() };
     let paths = Paths::new(simulator.scene(), settings);
     let [transmitter, receiver] = match args.azimuth_deg {
         None => [pose.position(); 2],
@@ -125,19 +127,19 @@ pub(super) fn run(args: &Args) -> Outcome {
             simulator.sensor().mounting.viewpoint(&axis).ends()
         }
     };
-    let told = paths.each_between(transmitter, receiver, |paths| {
+    let printed = paths.each_between(transmitter, receiver, |paths| {
         let count = paths.len();
-        let lines = paths.map(|path| line(&simulator, &path));
+        let lines = paths.map(|path| path_line(&simulator, &path));
         if args.json { write_json(lines) } else { write_table(lines, count) }
     });
-    let written = told.map_err(|error| Failure::input(error, "see `sonard paths --help`"))?;
+    let written = printed.map_err(|error| Failure::input(error, "see `sonard paths --help`"))?;
     written.or_else(|error| Failure::from_write("to standard output", &error))
 }
 
-fn line(simulator: &Simulator, path: &EchoPath) -> PathLine {
+fn path_line(simulator: &Simulator, path: &EchoPath) -> PathLine {
     let record = PathRecord::of(simulator.scene(), &path.path, path.length_m);
     PathLine {
-        words: record.in_words(),
+        description: record.in_words(),
         length_m: path.length_m,
         kind: record.kind,
         order: record.order,
@@ -149,15 +151,15 @@ fn line(simulator: &Simulator, path: &EchoPath) -> PathLine {
     }
 }
 
-/// From 0 to 360, and never a negative zero.
+/// Degrees from 0 to 360, without negative zero.
 fn degrees(angle_rad: f64) -> f64 {
     wrap_360(angle_rad.to_degrees()) + 0.0
 }
 
 fn write_json(lines: impl Iterator<Item = PathLine>) -> io::Result<()> {
     let mut out = io::BufWriter::new(io::stdout().lock());
-    for line in lines {
-        serde_json::to_writer(&mut out, &line)?;
+    for path_line in lines {
+        serde_json::to_writer(&mut out, &path_line)?;
         out.write_all(b"\n")?;
     }
     out.flush()
@@ -168,8 +170,8 @@ fn write_table(lines: impl Iterator<Item = PathLine>, count: usize) -> io::Resul
     table.load_style(NOTHING).set_header([
         "length m",
         "range m",
-        "leaves",
-        "comes from",
+        "departure",
+        "arrival",
         "amplitude",
         "path",
     ]);
@@ -178,14 +180,14 @@ fn write_table(lines: impl Iterator<Item = PathLine>, count: usize) -> io::Resul
             column.set_cell_alignment(CellAlignment::Right);
         }
     }
-    for line in lines {
+    for path_line in lines {
         table.add_row([
-            format!("{:.4}", line.length_m),
-            format!("{:.4}", line.length_m / 2.0),
-            format!("{:.1}°", line.departure_deg),
-            format!("{:.1}°", line.arrival_deg),
-            format!("{:.4}", line.amplitude),
-            line.words,
+            format!("{:.4}", path_line.length_m),
+            format!("{:.4}", path_line.length_m / 2.0),
+            format!("{:.1}°", path_line.departure_deg),
+            format!("{:.1}°", path_line.arrival_deg),
+            format!("{:.4}", path_line.amplitude),
+            path_line.description,
         ]);
     }
     let mut out = io::BufWriter::new(io::stdout().lock());

@@ -1,4 +1,4 @@
-//! Pictures that verbs write, and the scene and damage that they tell of.
+//! Pictures written by verbs, and the scenes drawn in them.
 
 use std::{
     io::{self, IsTerminal, Write as _},
@@ -16,10 +16,10 @@ use crate::{
     scene::Scene,
 };
 
-/// Which pictures.
 #[derive(Debug, clap::Args)]
 pub(super) struct PictureArgs {
-    /// File to write; a picture, .svg or .png by its name, or - for SVG to standard output; may be given several times
+    /// File to write; a picture, .svg or .png by its name, or - for SVG to standard output
+    /// (repeatable)
     #[arg(short, long, value_name = "FILE")]
     pub(super) output: Vec<OutPath>,
     /// Width of a PNG, pixels
@@ -31,30 +31,30 @@ pub(super) struct PictureArgs {
 }
 
 impl PictureArgs {
-    /// Checked before anything is read, so that a wrong name costs no time.
+    /// Checks the outputs before anything is read, so that a wrong name fails early.
     pub(super) fn targets(&self) -> Result<Vec<Target>, Failure> {
-        self.output.iter().map(|path| Target::of(path, self.overwrite)).collect()
+        self.output.iter().map(|path| Target::new(path, self.overwrite)).collect()
     }
 }
 
-/// Where a picture goes, and in which format.
+/// Destination and format of a picture.
 pub(super) enum Target {
     StandardOutput,
     File(PathBuf, Product, Overwrite),
 }
 
 impl Target {
-    /// A place whose name says the format, and that may be written to.
-    pub(super) fn of(path: &Path, overwrite: Overwrite) -> Result<Self, Failure> {
+    /// Checks that the name has a known extension and that the file may be written.
+    pub(super) fn new(path: &Path, overwrite: Overwrite) -> Result<Self, Failure> {
         if path == Path::new("-") {
             return Ok(Self::StandardOutput);
         }
-        let product = output::picture(path)?;
+        let product = output::picture_format(path)?;
         overwrite.check(path, product)?;
         Ok(Self::File(path.into(), product, overwrite))
     }
 
-    /// Writes a picture; `width_px` is a PNG's.
+    /// Writes the picture; `width_px` applies to PNG.
     pub(super) fn write(&self, picture: &Picture, width_px: u32) -> Outcome {
         let Self::File(path, product, overwrite) = self else {
             return io::stdout()
@@ -72,19 +72,19 @@ impl Target {
     }
 }
 
-/// Without a name the picture goes to standard output, unless that is a terminal.
+/// Returns the outputs; standard output by default, unless it is a terminal.
 pub(super) fn targets(args: &PictureArgs) -> Result<Vec<Target>, Failure> {
     if args.output.is_empty() && io::stdout().is_terminal() {
         return Err(Failure::input(
             "the picture would go to the terminal",
-            "name a file with -o scan.svg or -o scan.png, or send standard output somewhere",
+            "name a file with -o scan.svg or -o scan.png, or redirect standard output",
         ));
     }
     if args.output.is_empty() { Ok(vec![Target::StandardOutput]) } else { args.targets() }
 }
 
-/// The scene named on the command line, else the one that the first of these scans with a scene was
-/// predicted in: as the log has it, or, in logs that only name it, the shipped one.
+/// Returns the scene named on the command line, or else that of the first scan with a scene: as
+/// stored in the log, or the shipped one of that name.
 pub(super) fn scene_for(
     log: &Path,
     views: &[ScanView],
@@ -106,7 +106,7 @@ pub(super) fn scene_for(
     if logged.is_some_and(|logged| logged.sha256 != scene.sha256) {
         notice!(
             "warning: the scene `{}` is not the one that the log's model used (its SHA-256 \
-             differs): walls and predictions may not fit",
+             differs): walls and predictions may be wrong",
             scene.name
         );
     }

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use super::{
     Failure, Outcome,
-    logs::{Drawn, for_each_scan},
+    logs::{DrawnScans, for_each_scan},
     picture::{PictureArgs, scene_for, targets},
 };
 use crate::{
@@ -20,21 +20,22 @@ use crate::{
 pub(super) struct Args {
     /// The log; - for standard input
     log: PathBuf,
-    /// Scene file, or the name of a shipped scene (`sonard scene list`); only draws its walls, in
-    /// place of those of the scene in the log
+    /// Scene file, or the name of a shipped scene (`sonard scene list`); only its walls are drawn,
+    /// instead of those of the scene in the log
     #[arg(long, value_name = "SCENE")]
     scene: Option<PathBuf>,
-    /// What to draw
+    /// Kind of picture
     #[arg(long, value_enum, default_value_t = Kind::Scan)]
     kind: Kind,
-    /// Draw only this scan: its number in the log, from 1, or the beginning of its id. Several
-    /// are drawn over each other
+    /// Draw only this scan: its number in the log, from 1, or the beginning of its id; several are
+    /// overlaid (repeatable)
     #[arg(long, value_name = "N|ID")]
     scan: Vec<String>,
     /// Draw the propagation path of one beam: its index in the plan
     #[arg(long, value_name = "INDEX", conflicts_with = "azimuth_deg")]
     beam: Option<u32>,
-    /// Azimuth, degrees counter-clockwise from the heading; draws the propagation path of the beam nearest to it
+    /// Azimuth, degrees counter-clockwise from the heading; draws the propagation path of the
+    /// nearest beam
     #[arg(long, value_name = "DEG", allow_negative_numbers = true)]
     azimuth_deg: Option<f64>,
     #[command(flatten)]
@@ -43,14 +44,14 @@ pub(super) struct Args {
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 enum Kind {
-    /// Floor plan with walls, readings and predictions; range and residual beside it
+    /// Floor plan with walls, readings and predictions, and plots of range and residual
     Scan,
     /// Range against azimuth around the ranger
     Polar,
     /// Measured minus predicted range
     Residuals,
-    /// The first three scans beside each other, and how many beams differ: for scans of one place by
-    /// different engines
+    /// The first three scans side by side, with the number of beams that differ: for scans of one
+    /// place by different engines
     SideBySide,
     /// Floor plan with each reading in the colour of its confidence, from `sonard log annotate`
     Confidence,
@@ -59,11 +60,12 @@ enum Kind {
 pub(super) const ABOUT: &str = "\
 Draw the scans of a log as SVG or PNG.
 
-Filled marks are readings; shape and colour show their cause: a direct echo, multiple reflections, an edge, \
-sound already arriving when the blanking ended (minimum range), or nothing the model knows. Rings and thin rays \
-are predictions. Ticks on the border are beams without an echo, arrows are readings beyond the view. In a \
-browser, pointing at a mark of an SVG shows its numbers. Scans of one log are drawn over each other. With --beam \
-or --azimuth-deg the propagation path of one beam is drawn instead, interaction by interaction.";
+Filled marks are readings; shape and colour show their cause: a direct echo, multiple reflections, \
+an edge, sound arriving at the end of the blanking (minimum range), or disagreement with the \
+model. Rings and thin rays are predictions. Ticks on the border are beams without an echo, arrows \
+are readings outside the view. In a browser, pointing at a mark of an SVG shows its values. Scans \
+of one log are overlaid. With --beam or --azimuth-deg the propagation path of one beam is drawn \
+instead, interaction by interaction.";
 
 const HELP: &str = "\
 Examples:
@@ -79,7 +81,8 @@ Exit codes: 0 drawn, 2 wrong usage or input, 3 the disk gave up.";
 pub(super) fn run(args: &Args) -> Outcome {
     let targets = targets(&args.picture)?;
     let log = &args.log;
-    let views = if args.scan.is_empty() { all(args)? } else { chosen(log, &args.scan)? };
+    let views =
+        if args.scan.is_empty() { read_all(args)? } else { read_requested(log, &args.scan)? };
     let scene = scene_for(log, &views, args.scene.as_deref())?;
     let beam = args.beam.map(path::Beam::Index).or(args.azimuth_deg.map(path::Beam::Azimuth));
     let picture = match (beam, args.kind) {
@@ -93,18 +96,18 @@ pub(super) fn run(args: &Args) -> Outcome {
     targets.iter().try_for_each(|target| target.write(&picture, args.picture.width))
 }
 
-/// The scans of the log, as far as they are drawn.
-fn all(args: &Args) -> Result<Vec<ScanView>, Failure> {
+/// Reads the scans that are drawn.
+fn read_all(args: &Args) -> Result<Vec<ScanView>, Failure> {
     let one = args.beam.is_some() || args.azimuth_deg.is_some();
-    let most = match args.kind {
+    let max_scans = match args.kind {
         _ if one => 1,
-        Kind::SideBySide => SIDE_BY_SIDE,
+        Kind::SideBySide => MAX_SIDE_BY_SIDE,
         _ => usize::MAX,
     };
-    let (mut drawn, mut count) = (Drawn::default(), 0);
+    let (mut drawn, mut count) = (DrawnScans::default(), 0);
     for_each_scan(&args.log, |scan| {
         count += 1;
-        if count <= most {
+        if count <= max_scans {
             drawn.add(scan);
         }
         Ok(())
@@ -113,28 +116,28 @@ fn all(args: &Args) -> Result<Vec<ScanView>, Failure> {
     if scans.is_empty() { Err(no_scan(&args.log)) } else { Ok(scans) }
 }
 
-/// Scans that fit next to each other.
-const SIDE_BY_SIDE: usize = 3;
+/// Maximum number of scans side by side.
+const MAX_SIDE_BY_SIDE: usize = 3;
 
 fn no_scan(log: &Path) -> Failure {
     Failure::input(
-        format!("{}: there is no scan in this log", log.display()),
-        "give a log written by `sonard scan` or `sonard simulate`; `sonard log show` tells what is \
-         in one",
+        format!("{}: no scan in this log", log.display()),
+        "give a log written by `sonard scan` or `sonard simulate`; `sonard log show` lists the \
+         contents of one",
     )
 }
 
-/// The scans asked for: each by its number from 1, or by the only id that begins so.
-fn chosen(log: &Path, wanted: &[String]) -> Result<Vec<ScanView>, Failure> {
-    let mut found: Vec<Found> = wanted.iter().map(|_| Found::default()).collect();
+/// Reads the requested scans: each by its number from 1, or by the unique id with that beginning.
+fn read_requested(log: &Path, requested: &[String]) -> Result<Vec<ScanView>, Failure> {
+    let mut found: Vec<Matches> = requested.iter().map(|_| Matches::default()).collect();
     let (mut count, mut first) = (0, None);
     for_each_scan(log, |scan| {
         count += 1;
         let id = scan.scan.to_string();
-        for (wanted, found) in wanted.iter().zip(&mut found) {
-            if wanted.parse() == Ok(count) {
+        for (requested, found) in requested.iter().zip(&mut found) {
+            if requested.parse() == Ok(count) {
                 found.by_number = Some(scan.clone());
-            } else if !wanted.is_empty() && id.starts_with(&wanted.to_lowercase()) {
+            } else if !requested.is_empty() && id.starts_with(&requested.to_lowercase()) {
                 found.with_id += 1;
                 found.by_id.get_or_insert_with(|| scan.clone());
             }
@@ -143,27 +146,31 @@ fn chosen(log: &Path, wanted: &[String]) -> Result<Vec<ScanView>, Failure> {
         Ok(())
     })?;
     let Some(first) = first else { return Err(no_scan(log)) };
-    wanted.iter().zip(found).map(|(wanted, found)| found.one(wanted, count, &first)).collect()
+    requested
+        .iter()
+        .zip(found)
+        .map(|(requested, found)| found.select(requested, count, &first))
+        .collect()
 }
 
-/// What was found for a choice.
+/// Matches of a requested scan.
 #[derive(Default)]
-struct Found {
+struct Matches {
     by_number: Option<ScanView>,
     by_id: Option<ScanView>,
     with_id: usize,
 }
 
-impl Found {
-    fn one(self, wanted: &str, count: usize, first: &str) -> Result<ScanView, Failure> {
+impl Matches {
+    fn select(self, requested: &str, count: usize, first: &str) -> Result<ScanView, Failure> {
         match (self.by_number, self.by_id, self.with_id) {
             (Some(scan), ..) | (None, Some(scan), 1) => Ok(scan),
             (None, Some(_), _) => Err(Failure::input(
-                format!("--scan {wanted}: several scans have ids that begin so"),
-                "give more of the id, or the scan's number",
+                format!("--scan {requested}: ambiguous, several ids have this beginning"),
+                "give a longer part of the id, or the scan's number",
             )),
             (None, None, _) => Err(Failure::input(
-                format!("--scan {wanted}: the log has no such scan"),
+                format!("--scan {requested}: no such scan"),
                 format!(
                     "give a number from 1 to {count}, or the beginning of an id; the first is {first}"
                 ),

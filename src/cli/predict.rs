@@ -4,7 +4,7 @@ use std::{path::PathBuf, sync::Arc};
 
 use super::{
     Failure, Outcome,
-    log::rewrite::{Waiting, rewrite},
+    log::rewrite::{PendingRecords, rewrite},
     options::engine_options,
     output::{OutPath, Overwrite},
     predictor::Predictor,
@@ -23,8 +23,8 @@ use crate::{
 pub(super) struct Args {
     /// The log; - for standard input
     log: PathBuf,
-    /// Scene file, or the name of a shipped scene (`sonard scene list`); predicts in it, in place of the
-    /// log's
+    /// Scene file, or the name of a shipped scene (`sonard scene list`); used for predictions,
+    /// instead of the log's
     #[arg(long, value_name = "SCENE")]
     scene: Option<PathBuf>,
     /// File to write; the log with predictions goes to it instead of to standard output
@@ -39,11 +39,12 @@ pub(super) struct Args {
 }
 
 pub(super) const ABOUT: &str = "\
-Write a log again with the model's predictions beside its readings.
+Add the model's predictions to a log.
 
-Each reading gets the model's reading for the same position and direction, with its propagation path, replacing \
-any earlier one; sessions state the scene, sensor, air and model. Measured readings are unchanged, except that \
-under another speed of sound ranges are recomputed from their times of flight.";
+Each reading gets the model's prediction for the same position and direction, with its propagation \
+path, replacing any earlier one; sessions state the scene, sensor, air and model. Measured \
+readings are unchanged, except that ranges are recomputed from times of flight if the speed of \
+sound differs.";
 
 const HELP: &str = "\
 Examples:
@@ -57,16 +58,17 @@ pub(super) fn run(args: &Args) -> Outcome {
     let given = args.scene.as_deref().map(scene_file::load).transpose()?.map(Arc::new);
     let what_if = args.what_if.load()?.with_options(engine_options(&args.engine)?);
     let mut predictor = Predictor::new(&args.log, given.as_ref(), &what_if);
-    let (waiting, mut any) = (Waiting::default(), false);
+    let (pending, mut any) = (PendingRecords::default(), false);
     let to = (args.output.as_ref(), args.overwrite);
-    let change = |record: &mut Record| suppose(record, &what_if, given.as_deref());
-    let written = rewrite(&args.log, to, &waiting, change, |mut scan| {
+    let change = |record: &mut Record| apply_assumptions(record, &what_if, given.as_deref());
+    let written = rewrite(&args.log, to, &pending, change, |mut scan| {
         predictor.predict(&mut scan)?;
         any |= scan.pings.iter().any(|ping| ping.sim.is_some());
         let mut predicted: Vec<Ping> = scan.pings;
         predicted.sort_by_key(|ping| ping.index);
         Ok(Box::new(move |ping: &mut Ping| {
-            // A reading that was fetched again has the index of the one before it, and its prediction.
+            // A reading that was requested again has the same index as the previous one, and the
+            // same prediction.
             if let Ok(at) = predicted.binary_search_by_key(&ping.index, |known| known.index) {
                 let found = &predicted[at];
                 (ping.sim, ping.range_m) = (found.sim.clone(), found.range_m);
@@ -76,15 +78,15 @@ pub(super) fn run(args: &Args) -> Outcome {
     })?;
     if !any {
         return Err(Failure::input(
-            format!("{}: there is no reading to predict beside", args.log.display()),
-            "a log needs its session, a pose and a scene: see --scene",
+            format!("{}: no reading to predict", args.log.display()),
+            "predictions need a session, a pose and a scene: see --scene",
         ));
     }
     written.finish()
 }
 
-/// Has sessions and scans say what was predicted with.
-fn suppose(record: &mut Record, what_if: &WhatIf, scene: Option<&Scene>) {
+/// Updates sessions and scan starts to the assumptions of the predictions.
+fn apply_assumptions(record: &mut Record, what_if: &WhatIf, scene: Option<&Scene>) {
     match record {
         Record::Session(session) => {
             what_if.change_session(session);

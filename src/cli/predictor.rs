@@ -1,4 +1,4 @@
-//! Predictions computed again: in a scene given, or for a pose, a sensor or air that the log does not say.
+//! Recomputed predictions, with another scene, pose, sensor or air than the log's.
 
 use std::{path::Path, sync::Arc};
 
@@ -7,7 +7,7 @@ use crate::{
     array::{ArrayPoseError, RangerArray},
     cli::{
         Failure, scene_file,
-        what_if::{Supposer, WhatIf},
+        what_if::{AssumptionFilter, WhatIf},
     },
     geometry::Pose,
     model::{ArrayModel, EngineKind, ModelError, Options, Simulator, TooCostly},
@@ -16,44 +16,44 @@ use crate::{
     store::logged_scene,
 };
 
-/// Puts the model's reading in a scene beside each reading. Sensor, array, air and model are those of
+/// Adds the model's predictions in a scene to readings. Sensor, array, air and model are those of
 /// the scan's session.
 pub(super) struct Predictor<'a> {
     log: &'a Path,
-    /// The scene to predict in, in place of what the log has.
+    /// Scene for predictions, instead of the log's.
     given: Option<&'a Arc<Scene>>,
     what_if: &'a WhatIf,
-    supposer: Supposer<'a>,
-    /// The scene of the session of the scan before.
+    assumptions: AssumptionFilter<'a>,
+    /// Session of the previous scan, and its scene.
     logged: Option<(Arc<Session>, Option<Arc<Scene>>)>,
-    /// An array's scans are many and short, and a session's share their model.
-    made: Option<(Arc<Session>, ArrayModel)>,
+    /// Model of the previous scan of an array; a session has many short scans with the same model.
+    model_of_session: Option<(Arc<Session>, ArrayModel)>,
 }
 
 impl<'a> Predictor<'a> {
-    /// For the scans of a log.
+    /// Creates a predictor for the scans of a log.
     pub(super) const fn new(
         log: &'a Path,
         given: Option<&'a Arc<Scene>>,
         what_if: &'a WhatIf,
     ) -> Self {
-        let supposer = Supposer::new(what_if);
-        Self { log, given, what_if, supposer, logged: None, made: None }
+        let assumptions = AssumptionFilter::new(what_if);
+        Self { log, given, what_if, assumptions, logged: None, model_of_session: None }
     }
 
-    /// Predicts a scan again in the scene given; without one, in the log's own scene what has no
-    /// prediction.
+    /// Replaces the predictions of a scan by those in the given scene; without one, adds missing
+    /// predictions in the log's own scene.
     ///
     /// # Errors
-    /// When the ranger can't stand in the scene where it stood, or the session's figures make no
-    /// sense.
+    ///
+    /// The pose is not free in the scene, or the session has invalid values.
     pub(super) fn predict(&mut self, scan: &mut ScanView) -> Result<(), Failure> {
-        self.supposer.suppose(scan);
+        self.assumptions.apply(scan);
         let (Some(pose), Some(session)) = (scan.pose(), scan.session.clone()) else {
             if self.given.is_some() {
                 let (log, id) = (self.log.display(), scan.scan);
                 notice!("{log}: scan {id} lacks its pose or session: no prediction");
-                forget(scan);
+                clear_predictions(scan);
             }
             return Ok(());
         };
@@ -62,21 +62,21 @@ impl<'a> Predictor<'a> {
             None => self.own_scene(scan, &session)?,
         };
         let Some(scene) = scene else { return Ok(()) };
-        forget(scan);
+        clear_predictions(scan);
         let Some(array) = &session.array else {
             return predict_stepper(self.log, scan, &pose, &scene, &session);
         };
-        let model = match self.made.take() {
+        let model = match self.model_of_session.take() {
             Some((of, model)) if Arc::ptr_eq(&of, &session) => model,
             _ => array_model(self.log, array, &scene, &session)?,
         };
         predict_array(scan, &pose, &model)?;
-        self.made = Some((session, model));
+        self.model_of_session = Some((session, model));
         Ok(())
     }
 
-    /// The scene that the log holds, for measured scans without predictions, and for all where something else is
-    /// supposed. A simulated scan beside itself would say nothing.
+    /// Returns the log's scene for measured scans without predictions, and for all scans with other
+    /// assumptions. Simulated scans already are predictions.
     fn own_scene(
         &mut self,
         scan: &ScanView,
@@ -84,8 +84,8 @@ impl<'a> Predictor<'a> {
     ) -> Result<Option<Arc<Scene>>, Failure> {
         let has_model = session.model.is_some() || session.provenance == Provenance::Imported;
         let measured = session.provenance != Provenance::Simulated && has_model;
-        let is_left_alone = !measured || scan.pings.iter().any(|ping| ping.sim.is_some());
-        if is_left_alone && self.what_if.is_nothing() {
+        let keeps_predictions = !measured || scan.pings.iter().any(|ping| ping.sim.is_some());
+        if keeps_predictions && self.what_if.is_empty() {
             return Ok(None);
         }
         if let Some((of, scene)) = &self.logged
@@ -93,7 +93,7 @@ impl<'a> Predictor<'a> {
         {
             return Ok(scene.clone());
         }
-        let scene = match self.what_if.is_nothing() {
+        let scene = match self.what_if.is_empty() {
             true => logged_scene(session, self.log).ok().flatten(),
             false => scene_file::of_session(self.log, session)?,
         };
@@ -103,13 +103,13 @@ impl<'a> Predictor<'a> {
     }
 }
 
-fn forget(scan: &mut ScanView) {
+fn clear_predictions(scan: &mut ScanView) {
     for ping in &mut scan.pings {
         (ping.sim, ping.residual_m) = (None, None);
     }
 }
 
-/// Predicts the scan of a ranger on a stepper, each reading from where the robot stood then.
+/// Predicts the scan of a ranger on a stepper, with the robot's pose at each reading.
 fn predict_stepper(
     log: &Path,
     scan: &mut ScanView,
@@ -117,7 +117,7 @@ fn predict_stepper(
     scene: &Scene,
     session: &Session,
 ) -> Result<(), Failure> {
-    for pings in scan.pings.chunk_by_mut(|one, next| one.pose == next.pose) {
+    for pings in scan.pings.chunk_by_mut(|a, b| a.pose == b.pose) {
         let robot = pings[0].pose.unwrap_or(*pose);
         scene.check_pose(&robot).map_err(|error| Failure::input(&error, error.help()))?;
         let simulator = simulator(log, scene.with_robot_at(&robot), session)?;
@@ -126,36 +126,36 @@ fn predict_stepper(
             let Some(axis) = ping.axis(Some(session), pose) else { continue };
             let prediction =
                 point.ping(axis.direction_rad(0.0)).map_err(|error| too_costly(log, &error))?;
-            set_beside(ping, SimRecord::of(&simulator, &prediction));
+            set_prediction(ping, SimRecord::of(&simulator, &prediction));
         }
     }
     Ok(())
 }
 
-/// The same for the scan of an array; a reading of a ranger that it does not have stays alone.
+/// Predicts the scan of an array; readings of unknown rangers get no prediction.
 fn predict_array(scan: &mut ScanView, pose: &Pose, model: &ArrayModel) -> Result<(), Failure> {
     let refuse_pose = |error: ArrayPoseError| Failure::input(&error, error.help());
-    let refuse = |error: ModelError| Failure::input(error, "compare without --scene");
+    let failure_from = |error: ModelError| Failure::input(error, "compare without --scene");
     let round: Vec<usize> = model.array().round().collect();
     for ping in &mut scan.pings {
         let Some(ranger) = ping.ranger.as_ref().and_then(|id| model.array().index_of(id)) else {
             continue;
         };
-        // Imported readings may have another order than the array's own.
+        // Imported readings may be in another order than the array's own.
         let firing = ping.index as usize % round.len().max(1);
         let in_round = (round.get(firing) == Some(&ranger)).then_some(firing);
         let pose = ping.pose.unwrap_or(*pose);
         model.array().check_pose(model.scene(), &pose).map_err(refuse_pose)?;
-        let stand = model.at(pose).map_err(refuse)?;
+        let at_pose = model.at(pose).map_err(failure_from)?;
         let prediction =
-            in_round.map_or_else(|| stand.ping(ranger), |firing| stand.ping_in_round(firing));
-        let prediction = prediction.map_err(|error| refuse(error.into()))?;
-        set_beside(ping, SimRecord::of_array(&stand, ranger, &prediction));
+            in_round.map_or_else(|| at_pose.ping(ranger), |firing| at_pose.ping_in_round(firing));
+        let prediction = prediction.map_err(|error| failure_from(error.into()))?;
+        set_prediction(ping, SimRecord::of_array(&at_pose, ranger, &prediction));
     }
     Ok(())
 }
 
-fn set_beside(ping: &mut Ping, sim: SimRecord) {
+fn set_prediction(ping: &mut Ping, sim: SimRecord) {
     ping.residual_m = ping.range_m.zip(sim.range_m).map(|(measured, sim)| measured - sim);
     ping.sim = Some(sim);
 }
@@ -163,7 +163,7 @@ fn set_beside(ping: &mut Ping, sim: SimRecord) {
 fn simulator(log: &Path, scene: Scene, session: &Session) -> Result<Simulator, Failure> {
     let (air, options) = conditions(log, session)?;
     Simulator::new(Arc::new(scene), session.sensor.clone(), air, options)
-        .map_err(|error| refuse(log, &error))
+        .map_err(|error| failure_from(log, &error))
 }
 
 fn array_model(
@@ -172,10 +172,10 @@ fn array_model(
     scene: &Scene,
     session: &Session,
 ) -> Result<ArrayModel, Failure> {
-    array.check().map_err(|error| refuse(log, &error))?;
+    array.check().map_err(|error| failure_from(log, &error))?;
     let (air, options) = conditions(log, session)?;
     ArrayModel::new(Arc::new(array.clone()), scene, &session.sensor, air, options)
-        .map_err(|error| refuse(log, &error))
+        .map_err(|error| failure_from(log, &error))
 }
 
 fn too_costly(log: &Path, error: &TooCostly) -> Failure {
@@ -185,24 +185,25 @@ fn too_costly(log: &Path, error: &TooCostly) -> Failure {
     )
 }
 
-fn refuse(log: &Path, error: &dyn std::fmt::Display) -> Failure {
+fn failure_from(log: &Path, error: &dyn std::fmt::Display) -> Failure {
     Failure::input(
         format!("{}: no prediction with the session's sensor and air: {error}", log.display()),
         "correct the session's record, or compare without --scene",
     )
 }
 
-/// The air and the settings of the model that a session's readings were predicted with.
+/// Returns air and model options of a session's predictions.
 ///
 /// # Errors
-/// Air that there is not.
+///
+/// Invalid properties of the air.
 pub(super) fn conditions(log: &Path, session: &Session) -> Result<(Air, Options), Failure> {
-    let (air, options) = session.conditions().map_err(|error| refuse(log, &error))?;
+    let (air, options) = session.conditions().map_err(|error| failure_from(log, &error))?;
     let options = options.unwrap_or_else(|| {
         let engine = EngineKind::default().name();
         let had = session.model.as_ref().map_or("", |model| &model.engine);
         notice!(
-            "{}: the log's model ({had}) can't be set up again: {engine} with its defaults is used",
+            "{}: the log's model ({had}) is not available: using {engine} with its defaults",
             log.display()
         );
         Options::default()

@@ -1,4 +1,4 @@
-//! `sonard sensor` and `sonard array`: the data that come with the program.
+//! `sonard sensor` and `sonard array`: presets shipped with the program.
 
 use std::io::{self, Write as _};
 
@@ -14,7 +14,7 @@ use crate::{
 pub(super) enum SensorVerb {
     /// List the shipped sensors
     List,
-    /// Print the file of a shipped sensor, each figure with its source, to start one of your own
+    /// Print the file of a shipped sensor, with the source of each value, as a template
     #[command(after_help = "Examples:\n  sonard sensor show senscomp-6500 > my-sensor.json\n  \
                             sonard simulate --sensor my-sensor.json --scene simple-room --pose fig9")]
     Show(Name),
@@ -25,16 +25,16 @@ pub(super) enum SensorVerb {
 pub(super) enum ArrayVerb {
     /// List the shipped arrays of rangers
     List,
-    /// Print the file of a shipped array, to start one of your own
+    /// Print the file of a shipped array, as a template
     #[command(after_help = "Examples:\n  sonard array show pioneer-8 > my-robot.json\n  \
                             sonard simulate --array my-robot.json --scene mcgill-lab --pose fig4")]
     Show(Name),
 }
 
-/// Which one.
+/// Name of a preset.
 #[derive(Debug, clap::Args)]
 pub(super) struct Name {
-    /// Its name, as the list has it
+    /// Name in the list
     #[arg(value_name = "NAME")]
     name: String,
 }
@@ -85,7 +85,7 @@ fn show<'a>(
     let Some(text) = text else {
         let known: Vec<String> = names.map(str::to_owned).collect();
         return Err(Failure::input(
-            format!("no {kind} `{name}` comes with sonard"),
+            format!("no shipped {kind} `{name}`"),
             suggest(name, &known, &format!("{kind}s")),
         ));
     };

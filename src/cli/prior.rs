@@ -1,11 +1,11 @@
-//! What is fitted, and what is believed of it beforehand: `--fit` and `--prior`.
+//! Fitted parameters and their priors: `--fit` and `--prior`.
 
 use std::str::FromStr;
 
 use super::Failure;
 use crate::inverse::{Group, GroupError, Prior, World, priors};
 
-/// `NAME=SIGMA`.
+/// Value of `--prior`: `NAME=SIGMA`.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct PriorSigma(pub(super) (String, f64));
 
@@ -13,7 +13,7 @@ impl FromStr for PriorSigma {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let (name, sigma) = text.split_once('=').ok_or("write NAME=SIGMA, as in x_m=0.05")?;
+        let (name, sigma) = text.split_once('=').ok_or("give NAME=SIGMA, as in x_m=0.05")?;
         let sigma: f64 = sigma.trim().parse().map_err(|_| format!("`{sigma}` is not a number"))?;
         if !(sigma.is_finite() && sigma > 0.0) {
             return Err(format!("{sigma} must be greater than 0"));
@@ -22,14 +22,14 @@ impl FromStr for PriorSigma {
     }
 }
 
-/// All parameters of what `--fit` names, with the doubts that `--prior` gives.
-pub(super) fn fitted(
+/// Returns the parameters selected by `--fit`, with the prior deviations of `--prior`.
+pub(super) fn parameters(
     fit: &[Group],
     prior: &[PriorSigma],
     world: &World,
     sweeps: usize,
 ) -> Result<Vec<Prior>, Failure> {
-    let given: Vec<(String, f64)> = prior.iter().map(|PriorSigma(one)| one.clone()).collect();
+    let given: Vec<(String, f64)> = prior.iter().map(|PriorSigma(pair)| pair.clone()).collect();
     priors(fit, &given, world, sweeps).map_err(|error| {
         let option = match error {
             GroupError::NoHeight | GroupError::NoSkirts { .. } => "--fit ",

@@ -1,29 +1,29 @@
-//! Progress bars of long work; a terminal shows them, a file or pipe does not.
+//! Progress bars, shown only on a terminal.
 
 use std::{fs, io::BufRead, path::Path, thread, time::Duration};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-/// Logs shorter than this are read before a bar could be seen, bytes.
+/// Size below which logs are read too quickly for a bar, bytes.
 const LONG_LOG_BYTES: u64 = 16 << 20;
 
-/// Of so many `things` (a word in the plural); drawn from the first second on.
-pub(super) fn bar(of: u64, things: &str) -> ProgressBar {
-    later(styled(of, &format!("{{bar:40}} {{pos}}/{{len}} {things}, {{eta}} left")))
+/// Bar over `total` items (a plural noun), shown after a second.
+pub(super) fn bar(total: u64, items: &str) -> ProgressBar {
+    show_later(styled(total, &format!("{{bar:40}} {{pos}}/{{len}} {items}, {{eta}} left")))
 }
 
-/// Of `things` nobody knows how many of there will be, and a message; drawn from the first second on.
-pub(super) fn spinner(things: &str) -> ProgressBar {
-    later(
+/// Spinner with a title and a message, for work of unknown length, shown after a second.
+pub(super) fn spinner(title: &str) -> ProgressBar {
+    show_later(
         ProgressBar::no_length()
-            .with_style(style(&format!("{{spinner}} {{pos}} {things}, {{msg}}, {{elapsed}}"))),
+            .with_style(style(&format!("{{spinner}} {title} {{msg}} {{elapsed}}"))),
     )
 }
 
-fn later(bar: ProgressBar) -> ProgressBar {
+fn show_later(bar: ProgressBar) -> ProgressBar {
     bar.set_draw_target(ProgressDrawTarget::hidden());
     let shown = bar.clone();
-    #[allow(clippy::disallowed_methods, reason = "it only shows a bar")]
+    #[allow(clippy::disallowed_methods, reason = "only shows a bar")]
     thread::spawn(move || {
         thread::sleep(Duration::from_secs(1));
         if !shown.is_finished() {
@@ -33,7 +33,7 @@ fn later(bar: ProgressBar) -> ProgressBar {
     bar
 }
 
-/// A reader of a log that shows how much of it has been read.
+/// Wraps the reader of a long log with a bar.
 pub(super) fn reading<R: BufRead>(log: &Path, reader: R) -> impl BufRead + use<R> {
     let bytes = fs::metadata(log).map_or(0, |file| file.len());
     let bar = match bytes >= LONG_LOG_BYTES {
@@ -43,8 +43,8 @@ pub(super) fn reading<R: BufRead>(log: &Path, reader: R) -> impl BufRead + use<R
     bar.wrap_read(reader)
 }
 
-fn styled(of: u64, template: &str) -> ProgressBar {
-    ProgressBar::new(of).with_style(style(template))
+fn styled(total: u64, template: &str) -> ProgressBar {
+    ProgressBar::new(total).with_style(style(template))
 }
 
 fn style(template: &str) -> ProgressStyle {

@@ -48,36 +48,36 @@ const TASKS_LIMIT: Duration = Duration::from_millis(500);
 #[derive(Debug, Clone, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct Args {
-    /// Configuration file [default: /etc/sonard/sonard.toml if it is there]
+    /// Configuration file [default: /etc/sonard/sonard.toml, if it exists]
     #[arg(long, value_name = "FILE", env = "SONARD_CONFIG")]
     config: Option<PathBuf>,
-    /// Override a key of the file; over the environment, too; may be given several times
+    /// Override a key of the file (repeatable); takes precedence over the environment
     #[arg(long, value_name = "SECTION.KEY=VALUE")]
     set: Vec<String>,
-    /// Check all that is named, and exit; says what is in force
+    /// Validate the file and all that it names, and exit; prints the effective values
     #[arg(long)]
     check: bool,
-    /// Print the configuration file that documents every key, and exit
+    /// Print a configuration file that documents every key, and exit
     #[arg(long)]
     print_config: bool,
     /// Serial port of the ranger: a path, a name in /dev/serial/by-id, or a USB serial number; sets
     /// device.port
     #[arg(long, value_name = "PATH|ID")]
     port: Option<String>,
-    /// Use a mock ranger instead of a real one; in real time, with sound from the scene
+    /// Use a mock ranger instead of a real one; in real time, with echoes from the scene
     #[arg(long, conflicts_with = "port")]
     mock: bool,
     /// Simulate an array of rangers with the model, in real time, instead of using a device
     #[arg(long, conflicts_with_all = ["port", "mock"])]
     simulate: bool,
-    /// Array of rangers, a preset (`sonard array list`) or a file with an array's data;
-    /// what --simulate plays (simulate.array)
+    /// Array of rangers, a preset (`sonard array list`) or a file with an array's data; simulated
+    /// by --simulate (simulate.array)
     #[arg(long, value_name = "NAME|FILE", requires = "simulate")]
     array: Option<String>,
-    /// Let the mock's time run as fast as the computer can
+    /// Let the mock's time advance as fast as possible
     #[arg(long, requires = "mock", conflicts_with = "realtime")]
     virtual_time: bool,
-    /// Scene file, or the name of a shipped scene (`sonard scene list`); predicts in it
+    /// Scene file, or the name of a shipped scene (`sonard scene list`); used for predictions
     /// (place.scene)
     #[arg(long, value_name = "SCENE")]
     scene: Option<PathBuf>,
@@ -88,8 +88,7 @@ pub(super) struct Args {
     /// Folder of the logs (log.folder)
     #[arg(long, value_name = "DIR")]
     log: Option<PathBuf>,
-    /// Unix socket of the daemon; sets server.socket; a dead one of that name is replaced, no other
-    /// file
+    /// Unix socket of the daemon; sets server.socket; a stale socket is replaced, no other file
     #[arg(long, value_name = "PATH")]
     socket: Option<PathBuf>,
     #[command(flatten)]
@@ -97,16 +96,17 @@ pub(super) struct Args {
 }
 
 pub(super) const ABOUT: &str = "\
-Run the daemon: scan by plan, keep logs, serve the API.
+Run the daemon: scan continuously, keep logs, serve the API.
 
-The daemon finds the ranger by its stable name, homes it, and scans continuously, on a schedule or on request. \
-It waits for a ranger that disconnects, and measures nothing that can't be logged. SIGHUP reloads the \
-configuration; SIGTERM and SIGINT stop the motor, close the scan and sync the log. Control it with `sonard \
-status`, `sonard watch` and curl.
+The daemon finds the ranger by its stable name, homes it, and scans continuously, on a schedule or \
+on request. If the ranger disconnects, it waits for it; readings that can't be logged are not \
+taken. SIGHUP reloads the configuration; SIGTERM and SIGINT stop the motor, close the scan and \
+sync the log. Control it with `sonard status`, `sonard watch` and curl.
 
-With --simulate there is no device: the model simulates an array of rangers at fixed bearings on a robot, fired \
-in turn (pioneer-8: one every 40 ms, so each of the eight every 320 ms), round after round unless scanning.mode \
-says otherwise. Every record is marked as simulated. PUT /v1/pose moves the robot, simulate.course drives it.";
+With --simulate there is no device: the model simulates an array of rangers at fixed bearings on a \
+robot, fired in turn (pioneer-8: one every 40 ms, so each of the eight every 320 ms), round after \
+round unless scanning.mode differs. Every record is marked as simulated. PUT /v1/pose moves the \
+robot, simulate.course drives it.";
 
 const EXAMPLES: &str = "\
 Examples:
@@ -122,8 +122,8 @@ Examples:
   sonard run --config sonard.toml --check
 
 SONARD_LOG sets the level of messages on standard error: error, warn, info (default), debug.
-Exit codes: 0 stopped by a signal, 1 the end was forced by a second signal, 2 wrong configuration, 3 log or socket \
-belong to another process, the disk failed, or a task of the daemon failed.";
+Exit codes: 0 stopped by a signal, 1 forced to stop by a second signal, 2 wrong configuration, 3 \
+log or socket in use by another process, disk error, or a task of the daemon failed.";
 
 pub(super) fn run(args: Args) -> Outcome {
     if args.print_config {
@@ -136,7 +136,7 @@ pub(super) fn run(args: Args) -> Outcome {
     let (mut settings, files) = loader.load()?;
     if check {
         files::check_places(&settings.keys)?;
-        return print(&load::in_force(&settings));
+        return print(&load::effective_configuration(&settings));
     }
     let hangup = Hangup::of_this_process();
     let supervisor = Supervisor::default();
@@ -173,9 +173,7 @@ pub(super) fn run(args: Args) -> Outcome {
     });
     runtime.shutdown_timeout(TASKS_LIMIT);
     match supervisor.first_failure() {
-        Some(failure) => {
-            Err(Failure::device(failure, "this is a fault of the program: please report it"))
-        }
+        Some(failure) => Err(Failure::device(failure, "this is a bug: please report it")),
         None => outcome,
     }
 }
@@ -195,19 +193,20 @@ async fn serve(
     hangup: Hangup,
     supervisor: Supervisor,
 ) -> Outcome {
-    // With a handler, a file that gets too large is an error of the write and not the end.
+    // With a handler, exceeding the file-size limit is an error of the write instead of the end of
+    // the process.
     let _too_large = signal(SignalKind::from_raw(Signal::XFSZ.as_raw()));
-    // Installed before the API answers: a client may send a hangup from then on.
+    // Installed before the API is served, because clients may send SIGHUP from then on.
     let hangups = (hangup == Hangup::Reload).then(|| signal(SignalKind::hangup()));
     let keys = &settings.keys;
     let gpio = match settings.simulated {
-        // What is made up touches no pins.
+        // A simulation uses no pins.
         Some(_) => None,
         None => Some(
             host_gpio::open(&keys.gpio).map_err(|error| Failure::input(&error, error.help()))?,
         ),
     };
-    // Sockets first: they are removed when a later step fails, which a log is not.
+    // Sockets first: unlike a log, they are removed if a later step fails.
     let listeners =
         Listeners::open(&keys.server).map_err(|error| Failure::device(&error, error.help()))?;
     let Files { token, fleet, mut broker } = files;
@@ -216,7 +215,7 @@ async fn serve(
     let (journal, thread) = Journal::open(&log_folder, settings.rotation(), &supervisor)
         .map_err(|error| sandbox::log_failure(&log_folder, error))?;
     sandbox::warn_of_private_folder(&log_folder);
-    // A start that is rejected below stops the log's thread.
+    // A rejected start stops the log's thread.
     let _stopping = supervisor.stopping().clone().drop_guard();
     let keys = keys.clone();
     let (daemon, handle) = match gpio {
@@ -250,7 +249,8 @@ async fn serve(
         ended.cancel();
         outcome
     };
-    // Clients and brokers are waited for, unless the end is forced; the log is closed in either case.
+    // Clients and brokers are waited for, unless the shutdown is forced; the log is closed in
+    // either case.
     let leaving = async {
         let (outcome, ()) = tokio::join!(working, serving);
         ros.stop().await;
@@ -267,12 +267,12 @@ async fn serve(
     let last = tokio::task::spawn_blocking(|| thread.close()).await.unwrap_or_default();
     broker.stop().await;
     match last.error {
-        Some(error) => Err(Failure::device(format!("the log was not closed well: {error}"), "")),
+        Some(error) => Err(Failure::device(format!("cannot close the log: {error}"), "")),
         None => Ok(()),
     }
 }
 
-/// Opens ports; another device than before becomes an event of the daemon, once there is one.
+/// Opens ports; a changed device becomes an event of the daemon.
 fn open_and_announce(daemon: Arc<OnceLock<Handle>>) -> OpenPort {
     let mut ports = PortOpener::default();
     Box::new(move |port| {
@@ -287,7 +287,7 @@ fn open_and_announce(daemon: Arc<OnceLock<Handle>>) -> OpenPort {
     })
 }
 
-/// Who may write over TCP, and under which names the server is asked.
+/// Determines which clients may write over TCP, and the accepted host names.
 fn access(
     settings: &Settings,
     token: Option<&str>,
@@ -301,8 +301,8 @@ fn access(
         // Checked with the configuration, except for sockets of systemd.
         if !address.ip().is_loopback() && token.is_none() {
             return Err(Failure::input(
-                format!("the socket unit's {address} can be reached from other computers"),
-                "let it listen on 127.0.0.1, or set server.token_file",
+                format!("the socket unit's {address} is reachable from other computers"),
+                "bind it to 127.0.0.1, or set server.token_file",
             ));
         }
         access = access.with_address(address.ip());
@@ -310,16 +310,16 @@ fn access(
     Ok(access)
 }
 
-/// Reads the configuration again at each SIGHUP.
+/// Reloads the configuration at each SIGHUP.
 async fn reload_on_hangup(mut loader: Loader, daemon: Handle, mut hangups: Hangups) {
     while hangups.recv().await.is_some() {
         let loaded = loader.load().map(|(settings, _)| Box::new(settings));
-        let loaded = loaded.map_err(|failure| load::words(&failure));
+        let loaded = loaded.map_err(|failure| load::one_line(&failure));
         match &loaded {
-            Ok(_) => tracing::info!("the configuration was read again"),
-            Err(error) => tracing::error!("the configuration stays as it was: {error}"),
+            Ok(_) => tracing::info!("configuration reloaded"),
+            Err(error) => tracing::error!("configuration unchanged: {error}"),
         }
-        // A daemon that is stopping needs no new configuration.
+        // A stopping daemon ignores new configurations.
         drop(daemon.order(Order::Reload(loaded)).await);
         let waiting = daemon.status().configuration.needs_restart;
         if !waiting.is_empty() {

@@ -7,16 +7,17 @@ use tokio::runtime::{Builder, Runtime};
 use super::Failure;
 pub(super) use crate::interrupts::Interrupts;
 
-/// Time allowed for tasks and blocking calls that are left when a verb has ended.
+/// Time allowed for remaining tasks and blocking calls after a verb has ended.
 const SHUTDOWN_TIMEOUT: Duration = Duration::from_millis(500);
-/// Pairs of file descriptors that must be free for the runtime to start: its library panics where it gets none for
-/// signals.
+/// Pairs of file descriptors that must be free at the start: without them the runtime's signal
+/// handling panics.
 const DESCRIPTOR_PAIRS: usize = 6;
 
-/// A runtime of two threads.
+/// Creates a runtime with two threads.
 ///
 /// # Errors
-/// When the system refuses threads or descriptors.
+///
+/// The system has no free threads or descriptors.
 pub(super) fn new() -> Result<Runtime, Failure> {
     let spare: io::Result<Vec<_>> = (0..DESCRIPTOR_PAIRS).map(|_| io::pipe()).collect();
     spare.map_err(|error| {
@@ -28,11 +29,13 @@ pub(super) fn new() -> Result<Runtime, Failure> {
     })
 }
 
-/// Runs a verb that stops in order on a signal. If the end is forced by another signal, it is abandoned a few seconds
-/// later; what it owns is dropped in either case, and nothing that blocks is waited for.
+/// Runs a verb that stops in an orderly way on a signal. After a second signal it is abandoned
+/// within a few seconds; its resources are dropped in either case, and blocking calls are not
+/// waited for.
 ///
 /// # Errors
-/// The verb's own; when its end was forced; when no runtime can be started.
+///
+/// Errors of the verb, a forced stop, or a failed start of the runtime.
 pub(super) fn run_interruptible<T>(
     work: impl AsyncFnOnce(Interrupts) -> Result<T, Failure>,
 ) -> Result<T, Failure> {
@@ -49,7 +52,7 @@ pub(super) fn run_interruptible<T>(
     outcome
 }
 
-/// Failure of a verb whose end was forced before it had stopped in order.
+/// Failure of a verb that was forced to stop.
 pub(super) fn abandoned() -> Failure {
-    Failure::Found(Some("interrupted again: ended before everything was closed in order".into()))
+    Failure::Found(Some("interrupted again: stopped without closing everything".into()))
 }

@@ -32,14 +32,14 @@ use crate::{
 };
 use emulator::Emulator;
 use output::Output;
-use setup::{assumed, prepared};
+use setup::{assumed, prepare};
 
-/// How often a request is sent before the device counts as gone: some nine seconds, in which a
-/// board that the opening of its port has reset is long awake.
+/// Maximum number of attempts per request: about nine seconds, enough for a board that resets when
+/// its port is opened.
 pub(super) const ATTEMPTS: u8 = 7;
 
-/// What a daemon has of its own, and a scan by it is not told.
-const OF_THE_DAEMON: [&str; 26] = [
+/// Options that a daemon determines itself, which conflict with --daemon.
+const DAEMON_OPTIONS: [&str; 26] = [
     "sensor",
     "short_blanking",
     "blanking_us",
@@ -79,26 +79,26 @@ pub(super) struct Args {
     /// Use a mock ranger instead of a real one
     #[arg(long)]
     mock: bool,
-    /// Use the firmware's machine code in an emulated board (starts sonard-emulator)
+    /// Run the firmware's machine code in an emulated board (starts sonard-emulator)
     #[arg(long)]
     emulator: bool,
     /// Let a running daemon take the scans; with its own ranger, sensor, air and model
-    #[arg(long, conflicts_with_all = OF_THE_DAEMON, conflicts_with_all = mock_world::OPTIONS)]
+    #[arg(long, conflicts_with_all = DAEMON_OPTIONS, conflicts_with_all = mock_world::OPTIONS)]
     daemon: bool,
     #[command(flatten)]
     at: DaemonArgs,
     #[command(flatten)]
     place: PlaceArgs,
-    /// Output folder; scan.jsonl, scan.svg and scan.png; without it records go to
-    /// standard output; a log that is there is added to if its scans are of the same setup
+    /// Output folder; scan.jsonl, scan.svg and scan.png. Without it records go to standard output.
+    /// An existing log of the same setup is appended to
     #[arg(long, value_name = "DIR")]
     out: Option<OutPath>,
-    /// How often to take the scan
+    /// Number of scans
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
     repeat: u32,
     #[command(flatten)]
     azimuths: AzimuthArgs,
-    /// Firings at each stop
+    /// Pings per step
     #[arg(long, value_name = "N", default_value_t = 1)]
     pings_per_stop: u32,
     #[command(flatten)]
@@ -115,26 +115,26 @@ pub(super) struct Args {
     no_array: NoArray,
 }
 
-/// How the motor turns and the ranger listens.
+/// Options of motor and receiver.
 #[derive(Debug, Clone, Copy, clap::Args)]
-#[command(next_help_heading = "Motion and listening")]
+#[command(next_help_heading = "Motion and reception")]
 struct MotionArgs {
-    /// Listening window after each firing, milliseconds, instead of the time to the maximum range
+    /// Receive window after each ping, milliseconds, instead of the time to the maximum range
     #[arg(long, value_name = "MS", value_parser = within(0.0..=8_000.0))]
     window_ms: Option<f64>,
-    /// Settling time between the end of a step and firing, milliseconds
+    /// Settling time between the end of a motor step and the ping, milliseconds
     #[arg(long, value_name = "MS", default_value_t = 5.0, value_parser = within(0.0..=8_000.0))]
     settle_ms: f64,
-    /// Least time between firings, milliseconds, to protect the module
+    /// Minimum time between pings, milliseconds, which protects the module
     #[arg(long, value_name = "MS", default_value_t = 20.0, value_parser = within(0.0..=8_000.0))]
     min_interval_ms: f64,
-    /// Echoes to record for each firing, at most
+    /// Maximum number of recorded echoes per ping
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u8).range(1..=8))]
     max_echoes: u8,
-    /// Largest motor speed, steps a second
+    /// Maximum motor speed, steps per second
     #[arg(long, value_name = "STEPS/S", default_value_t = 800, value_parser = clap::value_parser!(u16).range(1..=10_000))]
     speed: u16,
-    /// Motor acceleration, steps a second squared
+    /// Motor acceleration, steps per second squared
     #[arg(long, value_name = "STEPS/S2", default_value_t = 40_000, value_parser = clap::value_parser!(u32).range(1..=200_000))]
     acceleration: u32,
 }
@@ -147,11 +147,11 @@ impl MotionArgs {
 }
 
 pub(super) const ABOUT: &str = "\
-Take one or more scans and log each reading beside the model's prediction.
+Take one or more scans and log each reading with the model's prediction.
 
-The device homes, then steps, fires and listens on its own along the plan; readings that the line lost are \
-requested again. Records go to standard output, or with --out to a folder that also gets a picture. An interrupt \
-stops the motor and closes the log.";
+The device homes and then executes the plan on its own: step, ping, receive. Readings lost on the \
+serial line are requested again. Records go to standard output, or with --out to a folder that \
+also gets a picture. An interrupt stops the motor and closes the log.";
 
 const EXAMPLES: &str = "\
 Examples:
@@ -162,25 +162,25 @@ Examples:
   sonard scan --mock --scene corridor --pose beside-wall --to-deg 45 | sonard compare -
   sonard scan --mock --scene simple-room --pose fig9 --faults flip=0.001,reset=0.005 --out noisy
 
-Exit codes: 0 every beam measured, 1 stopped on request or beams are missing, 2 wrong usage or \
-input, 3 device or link.";
+Exit codes: 0 every beam measured, 1 interrupted, or beams are missing, 2 wrong usage or input, 3 \
+device or link error.";
 
 pub(super) fn run(args: &Args) -> Outcome {
     if args.daemon {
         return daemon::run(args);
     }
-    let setup = prepared(args)?;
+    let setup = prepare(args)?;
     let mut output = Output::open(args.out.as_deref())?;
     let measured = runtime::run_interruptible(async |interrupts| {
         measure(args, &setup, &mut output, &interrupts).await
     });
-    // Whatever happened, what was measured is closed properly and drawn.
+    // After any outcome, the log is closed and the measured scan is drawn.
     let closed = output.close(&setup.scene);
     measured?;
     closed
 }
 
-/// Opens the port, meets the device, and takes the scans.
+/// Opens the port, identifies the device, and takes the scans.
 async fn measure(
     args: &Args,
     setup: &PreparedScan,
@@ -201,21 +201,21 @@ async fn measure(
         .or_else(|| emulator.as_ref().map(Emulator::port))
         .or_else(|| args.port.clone())
         .unwrap_or_default();
-    let mut ranger = meet(&mut PortOpener::default(), &port, interrupts).await?;
+    let mut ranger = identify(&mut PortOpener::default(), &port, interrupts).await?;
     let job = setup.job(ranger.identity()).map_err(|error| scan_failure(error.into()))?;
     let session = setup.session(ranger.identity());
-    output.add_to_earlier(&session, job.pose, job.plan)?;
+    output.check_same_setup(&session, job.pose, job.plan)?;
     output.record(&Record::Session(Box::new(session)))?;
     let (mut missing, mut link) = (0, LinkStats::default());
-    for turn in 1..=args.repeat {
-        output.begin_scan(turn, args.repeat, job.plan.beams());
+    for number in 1..=args.repeat {
+        output.begin_scan(number, args.repeat, job.plan.beams());
         let summary = ranger.scan(&job, output, interrupts.clone().reason()).await;
         output.end_scan();
         let summary = summary.map_err(scan_failure)?;
         let before = std::mem::replace(&mut link, *ranger.link_stats());
         summary::print(setup, &summary, ranger.identity(), &[before, link], output);
         if interrupts.happened() {
-            return Err(stopped(&summary));
+            return Err(interrupted_failure(&summary));
         }
         missing += summary.end.missing;
     }
@@ -231,7 +231,7 @@ async fn measure(
     Ok(())
 }
 
-/// The world that the options say, as `sonard-emulator` takes it.
+/// Returns the options of `sonard-emulator` for the mock's world.
 fn emulator_options(args: &Args, setup: &PreparedScan) -> Result<Vec<String>, Failure> {
     let mut options = args.world.emulator(&args.place.scene)?;
     options.push(format!("--pose={}", setup.pose_numbers()));
@@ -240,7 +240,7 @@ fn emulator_options(args: &Args, setup: &PreparedScan) -> Result<Vec<String>, Fa
     Ok(options)
 }
 
-pub(super) async fn meet(
+pub(super) async fn identify(
     ports: &mut PortOpener,
     port: &str,
     interrupts: &Interrupts,
@@ -251,7 +251,7 @@ pub(super) async fn meet(
     }
     let config = HostConfig { max_attempts: ATTEMPTS, ..HostConfig::new(BAUD, rand::random()) };
     tokio::select! {
-        met = Ranger::meet(Driver::new(line, config)) => met.map_err(|error| match &error {
+        identified = Ranger::meet(Driver::new(line, config)) => identified.map_err(|error| match &error {
             DriveError::Host(HostError::NoAnswer { .. } | HostError::NotADevice { .. }) => {
                 let help = link::describe_contention(port);
                 Failure::device(error, help.unwrap_or_else(|| error.help().to_owned()))
@@ -259,12 +259,12 @@ pub(super) async fn meet(
             _ => device_failure(&error),
         }),
         () = interrupts.clone().wait() => {
-            Err(Failure::Found(Some("stopped before the device answered".into())))
+            Err(Failure::Found(Some("interrupted before the device replied".into())))
         }
     }
 }
 
-/// A mock playing beside the scan.
+/// Mock ranger running alongside a scan.
 pub(super) struct Mock {
     port: PathBuf,
     soundings: mpsc::UnboundedSender<Soundings>,
@@ -273,10 +273,10 @@ pub(super) struct Mock {
 }
 
 impl Mock {
-    /// Begins to play; behind `link`, a mock comes back after a hangup.
+    /// Starts the mock; behind `link`, it reopens after a hangup.
     pub(super) fn start(board: MockBoard, link: Option<&Path>) -> Result<Self, Failure> {
         let port = MockPort::open(board, link).map_err(|error| {
-            let help = "is /dev/pts mounted?";
+            let help = "check that /dev/pts is mounted";
             Failure::device(format!("cannot make a pty for the mock: {error}"), help)
         })?;
         let path = link.map_or_else(|| port.path().to_path_buf(), Path::to_path_buf);
@@ -295,22 +295,22 @@ impl Mock {
         self.port.display().to_string()
     }
 
-    /// Hears this from now on, as if it had been carried elsewhere.
+    /// Moves the mock to another pose, by its echoes there.
     pub(super) fn carry_to(&self, soundings: Soundings) {
-        // A mock that is gone hears nothing any more.
+        // The mock may have ended already.
         drop(self.soundings.send(soundings));
     }
 
     pub(super) async fn stop(self) {
-        // A mock that is gone already has nothing left to say.
+        // The mock may have ended already.
         let _ = self.stop.send(());
         let _ = self.playing.await;
     }
 }
 
-fn stopped(summary: &ScanSummary) -> Failure {
+fn interrupted_failure(summary: &ScanSummary) -> Failure {
     let planned = summary.end.beams + summary.end.missing;
-    Failure::Found(Some(format!("stopped after {} of {planned} beams", summary.end.beams)))
+    Failure::Found(Some(format!("interrupted after {} of {planned} beams", summary.end.beams)))
 }
 
 pub(super) fn scan_failure(error: ScanError) -> Failure {

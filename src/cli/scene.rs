@@ -24,33 +24,33 @@ use crate::{
     scene::{Scene, json_schema, shipped},
 };
 
-/// Changes of the plan that are listed, at most.
-const MOST_CHANGES: usize = 100;
+/// Maximum number of listed changes of the plan.
+const MAX_LISTED_CHANGES: usize = 100;
 
 /// Verbs of `sonard scene`.
 #[derive(Debug, clap::Subcommand)]
 pub(super) enum Verb {
-    /// Check a scene file and summarise it in a line
+    /// Check a scene file and summarize it in one line
     #[command(long_about = CHECK_ABOUT, after_help = CHECK_EXAMPLES)]
     Check(CheckArgs),
     /// Draw a scene's floor plan as SVG or PNG
     #[command(long_about = DRAW_ABOUT, after_help = DRAW_EXAMPLES)]
     Draw(DrawArgs),
-    /// Make a scene from a CAD drawing: the lines of a DXF file
+    /// Make a scene from a CAD drawing, from the lines of a DXF file
     #[command(long_about = from_dxf::ABOUT, after_help = from_dxf::EXAMPLES)]
     FromDxf(from_dxf::FromDxfArgs),
-    /// Make a scene from a map of map_server: its walls, traced as lines
+    /// Make a scene from a map_server map, from its traced walls
     #[command(long_about = from_grid::ABOUT, after_help = from_grid::EXAMPLES)]
     FromGrid(from_grid::FromGridArgs),
-    /// Make a scene from a Gazebo world: the boxes and cylinders of an SDF file
+    /// Make a scene from a Gazebo world, from the boxes and cylinders of an SDF file
     #[command(long_about = from_sdf::ABOUT, after_help = from_sdf::EXAMPLES)]
     FromSdf(from_sdf::FromSdfArgs),
-    /// Make a scene from a drawing: the lines of an SVG file
+    /// Make a scene from a drawing, from the lines of an SVG file
     #[command(long_about = from_svg::ABOUT, after_help = from_svg::EXAMPLES)]
     FromSvg(from_svg::FromSvgArgs),
     /// List the shipped scenes, with their poses
     List,
-    /// Print the file of a shipped scene, to start a scene of your own
+    /// Print the file of a shipped scene, as a template
     Show(preset::Name),
     /// Print the JSON Schema of scene files
     #[command(long_about = SCHEMA_ABOUT, after_help = SCHEMA_EXAMPLES)]
@@ -63,8 +63,8 @@ pub(super) struct CheckArgs {
     /// Scene file, or the name of a shipped scene (`sonard scene list`)
     #[arg(value_name = "FILE")]
     scene: PathBuf,
-    /// Pose of the ranger: X,Y,DEG (metres, degrees) or the name of a pose in the scene;
-    /// checks that it can stand there
+    /// Pose of the ranger: X,Y,DEG (metres, degrees) or the name of a pose in the scene; checks
+    /// that it is free
     #[arg(long, value_name = "POSE", allow_hyphen_values = true)]
     pose: Option<String>,
 }
@@ -75,8 +75,8 @@ pub(super) struct DrawArgs {
     /// Scene file, or the name of a shipped scene (`sonard scene list`)
     #[arg(value_name = "FILE")]
     scene: PathBuf,
-    /// Pose of the ranger: X,Y,DEG (metres, degrees) or the name of a pose in the scene; draws
-    /// it alone, instead of all named poses
+    /// Pose of the ranger: X,Y,DEG (metres, degrees) or the name of a pose in the scene; the only
+    /// one drawn, instead of all named poses
     #[arg(long, value_name = "POSE", allow_hyphen_values = true)]
     pose: Option<String>,
     /// File to write; a picture, .svg or .png by its name, instead of SVG to standard output
@@ -90,25 +90,25 @@ pub(super) struct DrawArgs {
 }
 
 const CHECK_ABOUT: &str = "\
-Check a scene file and summarise it in a line.
+Check a scene file and summarize it in one line.
 
 A scene is a floor plan in JSON: materials with their reflectance, walls (from one point to \
 another, or a polyline), cylinders, and named poses of the ranger. With floor_z_m and ceiling_z_m \
-it has a height: these reflect too, as floor_material and ceiling_material say (rigid without), \
-and walls and cylinders may end below or above (z_m). Lengths are metres, angles degrees \
-counter-clockwise from +x. A fault is shown at its line and column, with what would be \
-right, and the exit code is 2.
+it has a height: floor and ceiling reflect, too, with floor_material and ceiling_material (rigid \
+by default), and walls and cylinders may have limits in height (z_m). Lengths are metres, angles \
+degrees counter-clockwise from +x. Errors are reported with line and column, and with advice; the \
+exit code is then 2.
 
-Below the line stands what is not taken as it was drawn: ends of walls nearer to each other, or to a wall, than \
-the scene's snap_m (2 mm without it) meet, what runs past a wall by less is cut, and of walls \
-drawn over each other one counts. snap_m 0 takes the plan as it is drawn.";
+Changes of the plan as drawn are listed below the summary: ends of walls closer to each other, or \
+to a wall, than the scene's snap_m (default 2 mm) are joined, shorter overhangs are cut, and of \
+coincident walls one is kept. snap_m 0 keeps the plan as drawn.";
 
 const CHECK_EXAMPLES: &str = r#"Examples:
   sonard scene check my-room.json
   sonard scene check simple-room        a shipped scene, by name
   sonard scene check simple-room --pose 0.4,0.3,90
 
-The smallest useful scene:
+A minimal scene:
   {"name": "my-room",
    "materials": {"plaster": {"reflectance": 0.95}},
    "walls": [{"id": "room", "polyline": [[0,0],[4,0],[4,3],[0,3]], "closed": true,
@@ -118,9 +118,10 @@ The smallest useful scene:
 const DRAW_ABOUT: &str = "\
 Draw a scene's floor plan as SVG or PNG.
 
-Shows the walls by material with their ids, as the model has them after what `sonard scene check` lists, cylinders, the poses with an arrow along azimuth 0, \
-the robot's body where the scene has one, a scale in metres, and what the scene says of its \
-source and of what is approximate. Heights, and what floor and ceiling are made of, are not drawn.";
+Shows the walls by material with their ids, after the changes listed by `sonard scene check`, \
+cylinders, the poses with an arrow along azimuth 0, the robot's body if the scene has one, a scale \
+in metres, and the scene's source and approximations. Heights, and the materials of floor and \
+ceiling, are not drawn.";
 
 const DRAW_EXAMPLES: &str = "\
 Examples:
@@ -131,9 +132,9 @@ Examples:
 const SCHEMA_ABOUT: &str = "\
 Print the JSON Schema of scene files.
 
-Editors that know JSON Schema complete fields and mark mistakes while you type. The schema \
-describes every field with its unit; rules that go beyond shapes (materials that exist, walls \
-that have a length) are checked by `sonard scene check`.";
+Editors with JSON Schema support complete fields and mark errors while you type. The schema \
+describes every field with its unit; rules beyond the format (existing materials, walls with a \
+length) are checked by `sonard scene check`.";
 
 const SCHEMA_EXAMPLES: &str = r#"Examples:
   sonard scene schema > scene.schema.json
@@ -159,28 +160,29 @@ fn check(args: &CheckArgs) -> Outcome {
         scene_file::pose(&scene, pose)?;
     }
     let plan = scene.floor_plan();
-    let mut said = summary(&scene);
-    for change in plan.changes.iter().take(MOST_CHANGES) {
-        let _ = write!(said, "\n  {}", change.describe(&scene));
+    let mut text = summary(&scene);
+    for change in plan.changes.iter().take(MAX_LISTED_CHANGES) {
+        let _ = write!(text, "\n  {}", change.describe(&scene));
     }
-    if let Some(more) = plan.changes.len().checked_sub(MOST_CHANGES).filter(|more| *more > 0) {
-        let _ = write!(said, "\n  and {more} changes more");
+    if let Some(more) = plan.changes.len().checked_sub(MAX_LISTED_CHANGES).filter(|more| *more > 0)
+    {
+        let _ = write!(text, "\n  and {more} more changes");
     }
-    print(&said)
+    print(&text)
 }
 
 fn draw(args: &DrawArgs) -> Outcome {
-    let target = args.output.as_ref().map(|path| Target::of(path, args.overwrite)).transpose()?;
+    let target = args.output.as_ref().map(|path| Target::new(path, args.overwrite)).transpose()?;
     let scene = scene_file::load(&args.scene)?;
-    let picture = draw_scene(&drawn(scene, args.pose.as_deref())?);
+    let picture = draw_scene(&with_drawn_poses(scene, args.pose.as_deref())?);
     match target {
         None => print(picture.to_svg().trim_end()),
         Some(target) => target.write(&picture, args.width),
     }
 }
 
-/// The scene with the poses to draw, and the robot's body at each of them.
-fn drawn(mut scene: Scene, pose: Option<&str>) -> Result<Scene, Failure> {
+/// Returns the scene with the poses to draw, and the robot's body at each of them.
+fn with_drawn_poses(mut scene: Scene, pose: Option<&str>) -> Result<Scene, Failure> {
     if let Some(spec) = pose {
         let pose = scene_file::pose(&scene, spec)?;
         scene.poses = [(spec.to_owned(), pose)].into();
@@ -213,7 +215,7 @@ fn print(text: &str) -> Outcome {
         .or_else(|error| Failure::from_write("to standard output", &error))
 }
 
-/// One line: what the scene holds and how large it is.
+/// Summarizes contents and size of a scene in one line.
 fn summary(scene: &Scene) -> String {
     let mut parts =
         vec![count(scene.walls.len(), "wall"), count(scene.cylinders.len(), "cylinder")];
@@ -236,12 +238,12 @@ fn count(number: usize, noun: &str) -> String {
     format!("{number} {noun}{}", if number == 1 { "" } else { "s" })
 }
 
-/// Lower left and upper right corner of everything that reflects, metres.
+/// Lower left and upper right corner of all reflectors, metres.
 fn extent(scene: &Scene) -> Option<(DVec2, DVec2)> {
     let walls = scene.walls.iter().map(|wall| (wall.a.min(wall.b), wall.a.max(wall.b)));
     let cylinders = scene.cylinders.iter().map(|cylinder| {
         let reach = DVec2::splat(cylinder.radius_m);
         (cylinder.center - reach, cylinder.center + reach)
     });
-    walls.chain(cylinders).reduce(|all, one| (all.0.min(one.0), all.1.max(one.1)))
+    walls.chain(cylinders).reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
 }

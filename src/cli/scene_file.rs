@@ -4,7 +4,7 @@ use std::{fs, io, path::Path};
 
 use miette::{LabeledSpan, MietteDiagnostic, NamedSource, Report};
 
-use super::{Failure, output::note_input};
+use super::{Failure, output::register_input};
 use crate::{
     geometry::Pose,
     scan::Session,
@@ -12,10 +12,11 @@ use crate::{
     store::{SceneLost, logged_scene},
 };
 
-/// Reads and checks a scene: a file, or a shipped scene by its name. A file of that name wins.
+/// Reads and checks a scene from a file, or else the shipped scene of that name.
 ///
 /// # Errors
-/// No such file or name, a file that can't be read, or a fault in it, shown at its line.
+///
+/// No such file or name, an unreadable file, or an error in it, reported with its line.
 pub(super) fn load(path_or_name: impl AsRef<Path>) -> Result<Scene, Failure> {
     let path_or_name = path_or_name.as_ref();
     let text = read(path_or_name)?;
@@ -23,20 +24,22 @@ pub(super) fn load(path_or_name: impl AsRef<Path>) -> Result<Scene, Failure> {
     Scene::from_json(&text).map_err(|error| Failure::Input(report(&name, text, &error)))
 }
 
-/// Reads and checks a shipped scene, whatever files there are.
+/// Reads and checks a shipped scene, ignoring files of that name.
 ///
 /// # Errors
+///
 /// No shipped scene of that name.
 pub(super) fn shipped(name: &str) -> Result<Scene, Failure> {
     let text = shipped::text(name).ok_or_else(|| no_such_scene(name))?;
     Scene::from_json(text).map_err(|error| Failure::Input(report(name, text.to_owned(), &error)))
 }
 
-/// The scene that a session of a log was predicted in: the one that the log holds, else a shipped one
-/// of its name; without either a note says so.
+/// Returns the scene of a session's predictions: the one in the log, or else the shipped scene of
+/// that name; otherwise `None`, with a notice.
 ///
 /// # Errors
-/// A shipped scene with a fault, which there is none of.
+///
+/// An invalid shipped scene.
 pub(super) fn of_session(log: &Path, session: &Session) -> Result<Option<Scene>, Failure> {
     let lost = match logged_scene(session, log) {
         Ok(scene) => return Ok(scene),
@@ -50,17 +53,18 @@ pub(super) fn of_session(log: &Path, session: &Session) -> Result<Option<Scene>,
         return shipped(named).map(Some);
     }
     notice!(
-        "note: {}: {lost}, and it does not come with sonard: give its file with --scene; until then \
-         it is taken as unknown",
+        "note: {}: {lost}, and it is not shipped with sonard: give its file with --scene; the scene \
+         is unknown",
         log.display()
     );
     Ok(None)
 }
 
-/// The pose meant by `X,Y,DEG` or a name, if a ranger can stand there.
+/// Parses a pose, `X,Y,DEG` or a name, and checks that it is free.
 ///
 /// # Errors
-/// No such pose, or one outside the room, in a body or on a wall.
+///
+/// No such pose, or a pose outside the room, in a body or on a wall.
 pub(super) fn pose(scene: &Scene, spec: &str) -> Result<Pose, Failure> {
     let refuse = |error: PoseError| Failure::input(&error, error.help());
     let pose = scene.pose(spec).map_err(refuse)?;
@@ -68,11 +72,11 @@ pub(super) fn pose(scene: &Scene, spec: &str) -> Result<Pose, Failure> {
     Ok(pose)
 }
 
-/// The text of a scene, by its file or name.
+/// Reads the text of a scene, by its file or name.
 pub(super) fn read(path_or_name: impl AsRef<Path>) -> Result<String, Failure> {
     let path = path_or_name.as_ref();
-    note_input(path);
-    // No shipped scene has a name that is no text.
+    register_input(path);
+    // All names of shipped scenes are UTF-8.
     let name = path.to_string_lossy();
     let bytes = match fs::read(path) {
         Ok(bytes) => bytes,
@@ -82,14 +86,14 @@ pub(super) fn read(path_or_name: impl AsRef<Path>) -> Result<String, Failure> {
         Err(error) => {
             return Err(Failure::input(
                 format!("cannot read the scene {name}: {error}"),
-                "give a scene file that you may read, or the name of a shipped scene",
+                "give a readable scene file, or the name of a shipped scene",
             ));
         }
     };
     String::from_utf8(bytes).map_err(|error| {
         Failure::input(
             format!(
-                "the scene {name} is not UTF-8 text: byte {} is wrong",
+                "the scene {name} is not UTF-8 text: invalid byte {}",
                 error.utf8_error().valid_up_to()
             ),
             "a scene is a JSON text file; `sonard scene schema` describes it",
@@ -101,28 +105,27 @@ fn no_such_scene(path_or_name: &str) -> Failure {
     let names: Vec<String> = shipped::names().map(str::to_owned).collect();
     let stem = Path::new(path_or_name).file_stem().unwrap_or_default().to_string_lossy();
     Failure::input(
-        format!("there is no scene file `{path_or_name}` and no shipped scene of that name"),
+        format!("no scene file `{path_or_name}` and no shipped scene of that name"),
         suggest(&stem, &names, "shipped scenes"),
     )
 }
 
-/// Lines up to this length are shown whole, bytes.
-const LONGEST_LINE: usize = 400;
+/// Maximum length of a line shown in full, bytes.
+const MAX_LINE_BYTES: usize = 400;
 
-/// So are parts of the file up to this length.
-const LONGEST_PART: usize = 10_000;
+/// Maximum length of a file region shown in full, bytes.
+const MAX_REGION_BYTES: usize = 10_000;
 
-/// Shows the line of the file that is wrong. The headline alone says `file:line:column` too,
-/// for whoever greps.
+/// Reports an error with the affected line of the file. The first line contains `file:line:column`.
 fn report(name: &str, text: String, error: &SceneError) -> Report {
     let label = if error.path.is_empty() { "here".to_owned() } else { shown(&error.path) };
     let diagnostic = MietteDiagnostic::new(format!("{name}:{error}")).with_help(error.help());
     let (before, after) = text.split_at(error.span.start);
     let near = before.rsplit('\n').take(3).chain(after.split('\n').take(3));
     let longest = near.map(str::len).max().unwrap_or_default();
-    if longest > LONGEST_LINE || error.span.len() > LONGEST_PART {
-        // The place says line and column; a line of a hundred megabytes would say nothing more.
-        let excerpt: String = after.chars().take(LONGEST_LINE).collect();
+    if longest > MAX_LINE_BYTES || error.span.len() > MAX_REGION_BYTES {
+        // Line and column suffice for a very long line, of which an excerpt is shown.
+        let excerpt: String = after.chars().take(MAX_LINE_BYTES).collect();
         return Report::new(diagnostic.with_help(format!(
             "{}\nthere: {}",
             error.help(),

@@ -33,7 +33,7 @@ use array::ArrayArgs;
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct Args {
-    /// Scene file, or the name of a shipped scene (`sonard scene list`); predicts in it
+    /// Scene file, or the name of a shipped scene (`sonard scene list`); used for predictions
     #[arg(long, value_name = "SCENE")]
     scene: PathBuf,
     /// Pose of the ranger: X,Y,DEG (metres, degrees) or the name of a pose in the scene
@@ -44,8 +44,8 @@ pub(super) struct Args {
         required_unless_present = "poses"
     )]
     pose: Option<String>,
-    /// Poses one after the other, a scan at each: a CSV file with columns x_m,y_m,heading_deg, or
-    /// one with a line {"x_m": 1.0, "y_m": 2.0, "heading_deg": 90.0} for each
+    /// Poses, one scan at each: a CSV file with columns x_m,y_m,heading_deg, or a JSON lines file
+    /// of {"x_m": 1.0, "y_m": 2.0, "heading_deg": 90.0}
     #[arg(long, value_name = "FILE", conflicts_with = "pose")]
     poses: Option<PathBuf>,
     #[command(flatten)]
@@ -67,29 +67,28 @@ pub(super) struct Args {
     air: AirArgs,
 }
 
-/// What disturbs the readings.
 #[derive(Debug, Clone, Copy, clap::Args)]
 #[command(next_help_heading = "Noise")]
 struct NoiseArgs {
-    /// Noise at the receiver's input, root mean square, as the amplitude of an echo from 1 m
+    /// Receiver noise, root mean square, relative to the amplitude of an echo from 1 m
     #[arg(long, value_name = "A", default_value_t = 0.0)]
     noise_floor: f64,
-    /// Standard deviation of the time of flight beside what the noise does to it, microseconds
+    /// Additional timing jitter, standard deviation of the time of flight, microseconds
     #[arg(long, value_name = "US", default_value_t = 0.0)]
     jitter_us: f64,
-    /// Random seed; the same one gives the same readings
+    /// Random seed; the same seed gives the same readings
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
 }
 
 impl NoiseArgs {
-    /// The noise asked for, if any.
+    /// Returns the configured noise; `None` without any.
     fn noise(&self) -> Result<Option<ReceiverNoise>, Failure> {
-        for (option, value, most) in
+        for (option, value, max) in
             [("noise-floor", self.noise_floor, 1.0), ("jitter-us", self.jitter_us, 1e4)]
         {
-            if !(0.0..=most).contains(&value) {
-                let help = format!("give a number from 0 to {most}");
+            if !(0.0..=max).contains(&value) {
+                let help = format!("give a number from 0 to {max}");
                 return Err(Failure::input(format!("--{option} is {value}"), help));
             }
         }
@@ -101,15 +100,15 @@ impl NoiseArgs {
 pub(super) const ABOUT: &str = "\
 Predict a scan with the model alone.
 
-Writes the records of a log, one JSON object a line, with provenance `simulated`. Each reading has its \
-propagation path, amplitude and margin over the threshold. A reading without an echo has the candidate nearest \
-to the threshold, with a negative margin.
+Writes the records of a log, one JSON object per line, with provenance `simulated`. Each reading \
+has its propagation path, amplitude and level above threshold. A reading without an echo has the \
+strongest arrival relative to the threshold, with a negative level.
 
-With --array, several rangers at fixed bearings on a robot fire in turn, each from its own position. Their \
-readings name the ranger (`ranger`) and, if the robot turned or moved within a scan, its pose (`pose`). \
-azimuth_deg counts counter-clockwise from the heading; the directions of `sonard paths` are in world \
-coordinates. If rangers fire simultaneously, or before the sound of an earlier firing has decayed, their \
-readings include crosstalk, with its source (`crosstalk`).";
+With --array, several rangers at fixed bearings on a robot fire in turn, each from its own \
+position. Their readings contain the ranger (`ranger`) and, if the robot rotated or moved within a \
+scan, its pose (`pose`). azimuth_deg counts counter-clockwise from the heading; the directions of \
+`sonard paths` are in world coordinates. If rangers fire simultaneously, or before the sound of an \
+earlier ping has decayed, their readings include crosstalk, with its source (`crosstalk`).";
 
 const EXAMPLES: &str = "\
 Examples:
@@ -118,22 +117,22 @@ Examples:
   sonard simulate --scene corridor --pose 1,0.4,0 --engine cone --max-range 4 | sonard plot -
   sonard simulate --scene my-room.json --pose 1.2,0.8,90 --temperature-c 5 --lossless
   sonard simulate --scene two-surface-room --pose 1.2,1,30 --array pioneer-8 | sonard plot - -o a.svg
-  sonard simulate --scene mcgill-lab --poses way.csv -o course.jsonl
-  sonard simulate --scene corridor --poses way.jsonl --array ring-12 --rounds 15 > ring.jsonl
+  sonard simulate --scene mcgill-lab --poses trajectory.csv -o trajectory.jsonl
+  sonard simulate --scene corridor --poses trajectory.jsonl --array ring-12 --rounds 15 > ring.jsonl
 
-Exit codes: 0 done, 1 poses of the file were left out because nothing can stand there or their line is
-wrong, 2 wrong usage or input, 3 the disk gave up.";
+Exit codes: 0 done, 1 poses of the file were skipped because they are not free or their line is invalid, \
+2 wrong usage or input, 3 write error.";
 
 pub(super) fn run(args: &Args) -> Outcome {
     if let Some(name) = &args.array.array {
         return array::run(args, name);
     }
     let scene = scene_file::load(&args.scene)?;
-    let Places { poses, left_out } = places(args, &scene, |pose| {
+    let SimulatedPoses { poses, skipped } = simulated_poses(args, &scene, |pose| {
         scene.check_pose(pose).map_err(|error| (error.to_string(), error.help()))
     })?;
     let plan = args.azimuths.plan(1)?;
-    // A robot's body stands among the reflectors, so that each pose has its own.
+    // A robot's body is one of the reflectors, so each pose needs its own scene.
     let shared = match scene.robot {
         Some(_) => None,
         None => Some(simulator(args, &scene, &poses[0])?),
@@ -146,7 +145,7 @@ pub(super) fn run(args: &Args) -> Outcome {
         None => point.ping(direction_rad),
     };
     let bar = progress::bar(u64::from(plan.stops()) * poses.len() as u64, "beams");
-    let mut written: Result<(), Stop> = Ok(());
+    let mut written: Result<(), SimulationFailure> = Ok(());
     for (number, pose) in poses.iter().enumerate() {
         let own = match shared {
             Some(_) => None,
@@ -156,7 +155,7 @@ pub(super) fn run(args: &Args) -> Outcome {
         let session = (number == 0 || own.is_some()).then_some(simulator);
         written = session
             .map_or(Ok(()), |simulator| write_session(&mut *out, simulator))
-            .map_err(Stop::from)
+            .map_err(SimulationFailure::from)
             .and_then(|()| write(&mut *out, simulator, pose, &plan, &mut ping, &bar));
         if written.is_err() {
             break;
@@ -165,87 +164,87 @@ pub(super) fn run(args: &Args) -> Outcome {
     bar.finish_and_clear();
     match written {
         Ok(()) => closed(out.finish())?,
-        Err(Stop::Model(error)) => {
+        Err(SimulationFailure::Model(error)) => {
             return Err(Failure::input(error, "see `sonard simulate --help`"));
         }
-        Err(Stop::Write(error)) => closed(Err(error))?,
+        Err(SimulationFailure::Write(error)) => closed(Err(error))?,
     }
-    left_out
+    skipped
 }
 
-/// Why it ended before the last scan.
-enum Stop {
+/// Reason for an early end.
+enum SimulationFailure {
     Model(ModelError),
     Write(StoreError),
 }
 
-impl From<StoreError> for Stop {
+impl From<StoreError> for SimulationFailure {
     fn from(error: StoreError) -> Self {
         Self::Write(error)
     }
 }
 
-impl From<TooCostly> for Stop {
+impl From<TooCostly> for SimulationFailure {
     fn from(error: TooCostly) -> Self {
         Self::Model(error.into())
     }
 }
 
-/// Where scans are to be taken.
-struct Places {
+/// Poses at which scans are simulated.
+struct SimulatedPoses {
     poses: Vec<Pose>,
-    /// Whether poses of the file were left out, as the verb is to end.
-    left_out: Outcome,
+    /// Outcome of the verb: a failure if poses of the file were skipped.
+    skipped: Outcome,
 }
 
-/// Wrong lines that are named; the others are counted.
-const NAMED_LINES: usize = 20;
+/// Maximum number of reported invalid lines; further ones are counted.
+const MAX_LISTED_LINES: usize = 20;
 
-/// The pose asked for, or those of a file that are right; says which are not.
-fn places(
+/// Returns the given pose, or the valid ones of a file; reports the others.
+fn simulated_poses(
     args: &Args,
     scene: &Scene,
     check: impl Fn(&Pose) -> Result<(), (String, String)>,
-) -> Result<Places, Failure> {
+) -> Result<SimulatedPoses, Failure> {
     let Some(file) = &args.poses else {
         let pose = scene.pose(args.pose.as_deref().unwrap_or_default());
         let pose = pose.map_err(|error| Failure::input(&error, error.help()))?;
         check(&pose).map_err(|(message, help)| Failure::input(message, help))?;
-        return Ok(Places { poses: vec![pose], left_out: Ok(()) });
+        return Ok(SimulatedPoses { poses: vec![pose], skipped: Ok(()) });
     };
     let name = file.display();
     let text = fs::read_to_string(file).map_err(|error| {
-        let help = "give a CSV or JSON lines file of poses that you may read";
+        let help = "give a CSV or JSON lines file of poses";
         Failure::input(format!("cannot read the poses {name}: {error}"), help)
     })?;
     let lines = read_lines(&text, scene, Some(0.0)).map_err(|fault| {
         let line = fault.line.map_or_else(String::new, |line| format!("{line}:"));
         Failure::input(format!("{name}:{line} {fault}"), &fault.help)
     })?;
-    let (all, mut poses, mut wrong) = (lines.len(), Vec::new(), Vec::new());
+    let (all, mut poses, mut invalid) = (lines.len(), Vec::new(), Vec::new());
     for PoseLine { line, pose } in lines {
         let checked = pose
             .map_err(|fault| (fault.message, fault.help))
             .and_then(|pose| check(&pose.pose).map(|()| pose.pose));
         match checked {
             Ok(pose) => poses.push(pose),
-            Err((message, help)) => wrong.push((format!("{name}:{line}: {message}"), help)),
+            Err((message, help)) => invalid.push((format!("{name}:{line}: {message}"), help)),
         }
     }
     if poses.is_empty() {
-        let (message, help) = wrong.into_iter().next().unwrap_or_default();
-        return Err(Failure::input(format!("{message} (and no other pose is right)"), help));
+        let (message, help) = invalid.into_iter().next().unwrap_or_default();
+        return Err(Failure::input(format!("{message} (and no other pose is valid)"), help));
     }
-    for (message, help) in wrong.iter().take(NAMED_LINES) {
-        notice!("{message}: left out; {help}");
+    for (message, help) in invalid.iter().take(MAX_LISTED_LINES) {
+        notice!("{message}: skipped; {help}");
     }
-    let left_out = match wrong.len() {
+    let skipped = match invalid.len() {
         0 => Ok(()),
         count => {
-            Err(Failure::Found(Some(format!("{count} of {all} poses of {name} were left out"))))
+            Err(Failure::Found(Some(format!("{count} of {all} poses of {name} were skipped"))))
         }
     };
-    Ok(Places { poses, left_out })
+    Ok(SimulatedPoses { poses, skipped })
 }
 
 fn simulator(args: &Args, scene: &Scene, pose: &Pose) -> Result<Simulator, Failure> {
@@ -266,7 +265,7 @@ fn write(
     plan: &ScanPlan,
     predict: &mut dyn FnMut(&ObservationPoint, f64) -> Result<Prediction, TooCostly>,
     bar: &ProgressBar,
-) -> Result<(), Stop> {
+) -> Result<(), SimulationFailure> {
     let scan = Uuid::new_v4();
     let start = ScanStart::new(scan, Timestamp::now(), *pose, *plan);
     out.write(&Record::ScanStart(start))?;

@@ -8,7 +8,7 @@ mod fleet;
 
 use super::{
     Failure, Outcome,
-    daemon::{Daemons, DaemonsArgs, refuse},
+    daemon::{Daemons, DaemonsArgs, failure_from},
     runtime,
 };
 use crate::api::{
@@ -21,7 +21,7 @@ use crate::api::{
 pub(super) struct Args {
     #[command(flatten)]
     daemon: DaemonsArgs,
-    /// JSON instead of text; one object a daemon: status and health as the API gives them
+    /// JSON instead of text; one object per daemon, with status and health as in the API
     #[arg(long)]
     json: bool,
 }
@@ -33,12 +33,11 @@ Examples:
   sonard status --address kiwi=10.0.0.7:8765 --address 10.0.0.8:8765 --token-file fleet-token
   sonard status --fleet fleet.toml
 
-Each of several daemons has its line, including one that is silent, refuses, or is not the robot named before the `=`.
-Exit codes: 0 all is well, 1 something is not, 3 no daemon answers (of several: not each of them).";
+With several daemons each has a line, including those that do not respond, reject the request, or are not the robot named before the `=`.
+Exit codes: 0 healthy, 1 problems, 3 no daemon responds (of several: at least one does not).";
 
-/// What is told with `--json`.
 #[derive(Serialize)]
-struct Told<'a> {
+struct StatusAndHealth<'a> {
     status: &'a Status,
     health: &'a Health,
 }
@@ -52,11 +51,11 @@ pub(super) fn run(args: &Args) -> Outcome {
         .block_on(async {
             Ok((client.get_json("/v1/status").await?, client.get_json("/v1/health").await?))
         })
-        .map_err(|error| refuse(&error))?;
+        .map_err(|error| failure_from(&error))?;
     let mut text = match args.json {
-        true => serde_json::to_string(&Told { status: &status, health: &health })
-            .map_err(|error| Failure::device(error, "this is a fault of the program"))?,
-        false => screen(&status, &health),
+        true => serde_json::to_string(&StatusAndHealth { status: &status, health: &health })
+            .map_err(|error| Failure::device(error, "this is a bug: please report it"))?,
+        false => describe(&status, &health),
     };
     text.push('\n');
     let written = std::io::stdout().lock().write_all(text.as_bytes());
@@ -64,15 +63,15 @@ pub(super) fn run(args: &Args) -> Outcome {
     if health.healthy { Ok(()) } else { Err(Failure::Found(None)) }
 }
 
-/// One screen for a person.
-fn screen(status: &Status, health: &Health) -> String {
+/// Formats status and health as text.
+fn describe(status: &Status, health: &Health) -> String {
     let mut lines = match &status.simulation {
         None => device(status, health),
         Some(simulation) => array(status, simulation),
     };
     let scans = &health.scans;
-    let mode = word(&status.scanning.mode);
-    let stopped = if status.scanning.paused { " (stopped)" } else { "" };
+    let mode = json_name(&status.scanning.mode);
+    let stopped = if status.scanning.paused { " (paused)" } else { "" };
     lines.push(format!(
         "  scans    {} completed, {} stopped, {} failed; {} beams, {} missing; mode {mode}{stopped}",
         scans.completed, scans.stopped, scans.failed, scans.beams, scans.missing,
@@ -82,10 +81,10 @@ fn screen(status: &Status, health: &Health) -> String {
     }
     lines.extend(health.fit.as_ref().and_then(agreement));
     let better = health.fit.as_ref().and_then(|fit| fit.explanations.first());
-    lines.extend(better.map(|better| format!("  better   explained: {better}")));
+    lines.extend(better.map(|better| format!("  fit      better with {better}")));
     let (air, log, clients) = (&status.air, &status.log, &status.subscribers);
     let age = air.age_s.map_or_else(String::new, |age_s| format!(", {age_s:.0} s old"));
-    let source = word(&air.source) + &age;
+    let source = json_name(&air.source) + &age;
     let uncertain = match log.uncertain {
         0 => String::new(),
         count => format!(", {count} uncertain"),
@@ -98,71 +97,71 @@ fn screen(status: &Status, health: &Health) -> String {
         ),
         format!("  log      {file} ({} records, {} synced{uncertain})", log.written, log.synced),
         format!(
-            "  clients  {} live; {} readings dropped, {} cut off",
+            "  clients  {} live; {} readings dropped, {} disconnected as too slow",
             clients.now, clients.dropped_readings, clients.cut_off,
         ),
     ]);
     lines.extend(status.ros.as_ref().map(ros));
     lines.extend(status.mqtt.as_ref().map(broker));
     lines.extend(pending(&status.pending));
-    lines.extend(health.reasons.iter().map(|reason| format!("  not well: {reason}")));
+    lines.extend(health.reasons.iter().map(|reason| format!("  problem: {reason}")));
     if let Some(error) = &status.configuration.error {
-        lines.push(format!("  the last change of the configuration was refused: {error}"));
+        lines.push(format!("  the last configuration change was rejected: {error}"));
     }
     let waiting = &status.configuration.needs_restart;
     if !waiting.is_empty() {
-        lines.push(format!("  after a restart these changes take effect: {}", waiting.join(", ")));
+        lines.push(format!("  changes that need a restart: {}", waiting.join(", ")));
     }
     lines.join("\n")
 }
 
-/// How it goes with ROS 2.
+/// Describes the state of the ROS 2 node.
 fn ros(report: &RosReport) -> String {
     let RosReport { domain, messages, left_out, subscriptions, .. } = report;
     let networks = report.networks.join(", ");
     if let Some(why) = &report.trouble {
-        return format!("  ros      domain {domain} is not told: {why}");
+        return format!("  ros      domain {domain} not connected: {why}");
     }
-    let refusal = report.refusal.as_ref().map(|why| format!("; last refused: {why}"));
+    let refusal = report.refusal.as_ref().map(|why| format!("; last rejected: {why}"));
     format!(
-        "  ros      domain {domain} on {networks}; {subscriptions} subscriptions, {messages} messages, {left_out} left \
-         out{}",
+        "  ros      domain {domain} on {networks}; {subscriptions} subscriptions, {messages} messages, {left_out} \
+         dropped{}",
         refusal.unwrap_or_default()
     )
 }
 
-/// How it goes with the MQTT broker.
+/// Describes the state of the MQTT broker.
 fn broker(report: &MqttReport) -> String {
     let MqttReport { broker, acknowledged, left_out, behind_bytes, .. } = report;
     let left_out = match left_out {
         0 => String::new(),
-        count => format!("{count} left out, "),
+        count => format!("{count} skipped, "),
     };
-    let is_there = if report.connected { "is there" } else { "is not there" };
+    let connection = if report.connected { "connected" } else { "not connected" };
     let why = report.trouble.as_ref().map(|why| format!(" ({why})")).unwrap_or_default();
     let behind_kb = *behind_bytes as f64 / 1e3;
     format!(
-        "  mqtt     {broker} {is_there}{why}; {acknowledged} records acknowledged, {left_out}{behind_kb:.0} kB behind"
+        "  mqtt     {broker} {connection}{why}; {acknowledged} records acknowledged, {left_out}{behind_kb:.0} kB behind"
     )
 }
 
-/// How the last scan agrees with the model.
+/// Describes the agreement of the last scan with the model.
 fn agreement(fit: &ScanFit) -> Option<String> {
     let (share, off_m) = (fit.agree_fraction?, fit.median_abs_residual_m?);
     Some(format!(
-        "  model    {:.0} % of {} echoes of the last scan agree, half of them within {:.0} mm",
+        "  model    {:.0} % of {} echoes of the last scan agree, median |residual| {:.0} mm",
         100.0 * share,
         fit.both_echo,
         1e3 * off_m,
     ))
 }
 
-/// What counts from the next scan on.
+/// Describes the changes that take effect with the next scan.
 fn pending(pending: &Pending) -> Option<String> {
     let parts = [
         pending.plan.map(|plan| {
             format!(
-                "plan {:?} to {:?} degrees, every {:?}, {} pings",
+                "sweep {:?} to {:?} degrees, step {:?}, {} pings",
                 plan.from_deg, plan.to_deg, plan.step_deg, plan.pings_per_stop
             )
         }),
@@ -172,34 +171,34 @@ fn pending(pending: &Pending) -> Option<String> {
         pending.setup.as_ref().map(|_| "sensor, model or motion".into()),
     ];
     let parts: Vec<String> = parts.into_iter().flatten().collect();
-    (!parts.is_empty()).then(|| format!("  pending  from the next scan on: {}", parts.join("; ")))
+    (!parts.is_empty()).then(|| format!("  pending  with the next scan: {}", parts.join("; ")))
 }
 
-/// The ranger and its line.
+/// Describes the ranger and its serial link.
 fn device(status: &Status, health: &Health) -> Vec<String> {
     let (device, line) = (status.device.as_ref(), &health.line);
     vec![
         format!(
-            "{} on {}; the daemon runs for {:.1} s",
-            state(&status.link),
+            "{} on {}; daemon up {}",
+            link_state(&status.link),
             status.link.port,
-            status.uptime_s,
+            uptime(status.uptime_s),
         ),
         format!(
             "  device   {} firmware {} ({})",
             device.map_or("-", |device| &device.serial),
             device.map_or("-", |device| &device.firmware),
-            word(&status.provenance),
+            json_name(&status.provenance),
         ),
         format!(
-            "  line     {} CRC errors, {} requests repeated, {} readings repaired, {} refused, lost {} \
-             times",
+            "  link     {} CRC errors, {} requests repeated, {} readings re-requested, {} rejected, {} \
+         disconnects",
             line.crc_errors, line.retries, line.repaired, line.refused, line.losses,
         ),
     ]
 }
 
-/// The array that the model plays, and what it reads.
+/// Describes the simulated array and its readings.
 fn array(status: &Status, simulation: &SimulationReport) -> Vec<String> {
     let driving = if simulation.driving { ", driving" } else { "" };
     let pose = &status.pose;
@@ -208,13 +207,9 @@ fn array(status: &Status, simulation: &SimulationReport) -> Vec<String> {
         format!("{} {range}", reading.id)
     });
     vec![
+        format!("SIMULATED: {}; daemon up {}", link_state(&status.link), uptime(status.uptime_s),),
         format!(
-            "SIMULATED, nothing measured: {}; the daemon runs for {:.1} s",
-            state(&status.link),
-            status.uptime_s,
-        ),
-        format!(
-            "  array    {}, one ranger each {:.1} ms, {} turns left out",
+            "  array    {}, one ranger every {:.1} ms, {} slots skipped",
             simulation.array, simulation.interval_ms, simulation.skipped,
         ),
         format!(
@@ -225,16 +220,26 @@ fn array(status: &Status, simulation: &SimulationReport) -> Vec<String> {
     ]
 }
 
-/// State of the link, and for how long by the daemon's clock that is never set.
-fn state(link: &LinkReport) -> String {
+/// State of the link and its duration, measured by the daemon's monotonic clock.
+fn link_state(link: &LinkReport) -> String {
     let state = link.state.name().replace('_', " ");
     link.for_s.map_or_else(|| state.clone(), |for_s| format!("{state} for {for_s:.1} s"))
 }
 
-/// The word that stands for a value in JSON.
-fn word(value: &impl Serialize) -> String {
+/// Formats a value as its string in JSON.
+fn json_name(value: &impl Serialize) -> String {
     match serde_json::to_value(value) {
-        Ok(serde_json::Value::String(word)) => word,
+        Ok(serde_json::Value::String(json_name)) => json_name,
         _ => "-".into(),
+    }
+}
+
+/// Formats a duration in its largest unit, for example `42 s`, `11 min`, `3 h` or `5 days`.
+fn uptime(seconds: f64) -> String {
+    match seconds {
+        ..120.0 => format!("{seconds:.0} s"),
+        ..7_200.0 => format!("{:.0} min", seconds / 60.0),
+        ..172_800.0 => format!("{:.0} h", seconds / 3_600.0),
+        _ => format!("{:.0} days", seconds / 86_400.0),
     }
 }

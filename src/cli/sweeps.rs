@@ -1,4 +1,4 @@
-//! Scans of logs as sweeps, for the verbs that make sense of them.
+//! Scans of logs as sweeps, for verbs that interpret them.
 
 use std::path::PathBuf;
 
@@ -8,8 +8,8 @@ use super::{
 };
 use crate::{interpret::Sweep, scan::ScanView};
 
-/// Hands over each scan of the logs that can be interpreted, one by one as it is read, since a
-/// collection of days need not be in memory at once. Says which scans are left out.
+/// Passes each interpretable scan of the logs to `take` as it is read, so that long collections
+/// need not be in memory. Reports skipped scans.
 pub(super) fn for_each_sweep(
     logs: &[PathBuf],
     mut take: impl FnMut(ScanView, Sweep),
@@ -20,7 +20,7 @@ pub(super) fn for_each_sweep(
                 Ok(sweep) => take(scan, sweep),
                 Err(error) => {
                     let log = log.display();
-                    notice!("{log}: scan {} is left out: {error}", scan.scan);
+                    notice!("{log}: scan {} skipped: {error}", scan.scan);
                 }
             }
             Ok(())

@@ -6,7 +6,7 @@ use anstream::{AutoStream, ColorChoice, adapter::strip_str};
 
 use crate::messages::write_stderr;
 
-/// Writes a line to standard error, without colours where they are not shown.
+/// Writes a line to standard error, without colours if they are not supported.
 pub(super) fn write_notice(line: &str) {
     match AutoStream::choice(&io::stderr()) {
         ColorChoice::Never => write_stderr(&format!("{}\n", strip_str(line))),
@@ -14,9 +14,9 @@ pub(super) fn write_notice(line: &str) {
     }
 }
 
-/// Writes a line to standard output. Verbs whose output is their result use
+/// Writes a line to standard output. Verbs whose result is on standard output use
 /// [`Failure::from_write`](super::Failure::from_write) instead.
 pub(super) fn print_line(line: &str) {
-    // A reader that is gone needs no more lines.
+    // A closed reader is ignored.
     drop(writeln!(anstream::stdout(), "{line}"));
 }

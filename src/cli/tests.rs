@@ -1,4 +1,4 @@
-//! Rules that hold for the whole command line.
+//! Rules for the whole command line.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -6,10 +6,10 @@ use clap::{Arg, error::ErrorKind};
 
 use super::*;
 
-/// Each option of each verb with a value, as the words that lead to it, and the value's name.
+/// Lists options that take a value: their verb as words, with the option, and the value's name.
 fn options(command: &Command, path: &[String]) -> Vec<(Vec<String>, String)> {
-    let of_this = command.get_arguments().filter(|arg| arg.get_action().takes_values());
-    let mut found: Vec<_> = of_this
+    let own = command.get_arguments().filter(|arg| arg.get_action().takes_values());
+    let mut found: Vec<_> = own
         .filter_map(|arg| {
             let option = format!("--{}", arg.get_long()?);
             let name = arg.get_value_names()?.first()?.to_string();
@@ -23,7 +23,7 @@ fn options(command: &Command, path: &[String]) -> Vec<(Vec<String>, String)> {
 }
 
 #[test]
-fn a_negative_number_is_a_value_and_no_option_everywhere() {
+fn negative_numbers_are_values() {
     let command = command_line();
     let options = options(&command, &["sonard".to_owned()]);
     assert!(options.len() > 200, "{}", options.len());
@@ -40,7 +40,7 @@ fn a_negative_number_is_a_value_and_no_option_everywhere() {
     }
 }
 
-/// Every verb with the words that lead to it, the groups of verbs among them.
+/// Lists every verb with its path, including groups of verbs.
 fn verbs(command: &Command, path: &str) -> Vec<(String, Command)> {
     let shown = command.get_subcommands().filter(|verb| !verb.is_hide_set());
     let below = shown.flat_map(|verb| {
@@ -50,7 +50,7 @@ fn verbs(command: &Command, path: &str) -> Vec<(String, Command)> {
     below.filter(|(_, verb)| verb.get_name() != "help").collect()
 }
 
-/// Every option that is shown, by its long name, with the verb that it is of.
+/// Lists visible options by their long name, with their verbs.
 fn by_name() -> BTreeMap<String, Vec<(String, Arg)>> {
     let mut by_name: BTreeMap<_, Vec<_>> = BTreeMap::new();
     for (path, verb) in verbs(&command_line(), "sonard") {
@@ -63,8 +63,8 @@ fn by_name() -> BTreeMap<String, Vec<(String, Arg)>> {
     by_name
 }
 
-/// The values of a trait of each name's options where there are several.
-fn several<T: Ord + std::fmt::Debug>(of: impl Fn(&Arg) -> Option<T>) -> Vec<String> {
+/// Reports options of one name that differ in a property.
+fn differing<T: Ord + std::fmt::Debug>(of: impl Fn(&Arg) -> Option<T>) -> Vec<String> {
     let mut faults = Vec::new();
     for (name, args) in by_name() {
         let values: BTreeSet<T> = args.iter().filter_map(|(_, arg)| of(arg)).collect();
@@ -77,31 +77,32 @@ fn several<T: Ord + std::fmt::Debug>(of: impl Fn(&Arg) -> Option<T>) -> Vec<Stri
 }
 
 #[test]
-fn an_option_has_one_meaning_wherever_it_is() {
-    // What follows a semicolon says what this verb makes of it, brackets what is in force without.
+fn options_have_one_meaning() {
+    // Text after a semicolon depends on the verb; brackets contain the default, parentheses a
+    // remark.
     let meaning = |arg: &Arg| {
         let help = arg.get_help()?.to_string();
-        Some(help.split([';', '[']).next().unwrap_or_default().trim().to_owned())
+        Some(help.split([';', '[', '(']).next().unwrap_or_default().trim().to_owned())
     };
-    assert_eq!(several(meaning), Vec::<String>::new());
+    assert_eq!(differing(meaning), Vec::<String>::new());
 }
 
 #[test]
-fn an_option_has_one_placeholder_one_short_name_and_one_default_wherever_it_is() {
+fn options_have_one_form() {
     let placeholder = |arg: &Arg| {
         let takes = arg.get_action().takes_values();
         Some(takes.then(|| arg.get_value_names().map(|names| format!("{names:?}"))))
     };
-    assert_eq!(several(placeholder), Vec::<String>::new());
-    assert_eq!(several(|arg| Some(arg.get_short())), Vec::<String>::new());
-    // Where there is none, the option chooses something that otherwise is not.
+    assert_eq!(differing(placeholder), Vec::<String>::new());
+    assert_eq!(differing(|arg| Some(arg.get_short())), Vec::<String>::new());
+    // Without a default, the option selects something that is otherwise absent.
     let default =
         |arg: &Arg| Some(format!("{:?}", arg.get_default_values())).filter(|values| values != "[]");
-    assert_eq!(several(default), Vec::<String>::new());
+    assert_eq!(differing(default), Vec::<String>::new());
 }
 
 #[test]
-fn placeholders_are_words_and_outputs_are_files_or_folders() {
+fn placeholders() {
     for (name, args) in by_name() {
         for (path, arg) in args {
             let placeholder = match arg.get_action().takes_values() {
@@ -112,7 +113,7 @@ fn placeholders_are_words_and_outputs_are_files_or_folders() {
             };
             let placeholder = placeholder.unwrap_or_default();
             assert!(!placeholder.contains('_'), "{path} --{name} <{placeholder}>");
-            assert!(arg.get_help().is_some(), "{path} --{name} says nothing");
+            assert!(arg.get_help().is_some(), "{path} --{name} has no help");
             match name.as_str() {
                 "out" => {
                     assert_eq!((placeholder.as_str(), arg.get_short()), ("DIR", None), "{path}");
@@ -131,16 +132,17 @@ fn placeholders_are_words_and_outputs_are_files_or_folders() {
 }
 
 #[test]
-fn a_scene_is_said_to_be_predicted_in_or_only_drawn() {
+fn meaning_of_scene() {
     for (path, arg) in by_name().remove("scene").expect("it is an option") {
         let help = arg.get_help().expect("help").to_string();
-        let said = help.contains("; predicts in it") != help.contains("; only draws its walls");
-        assert!(said, "{path}: {help}");
+        let is_clear =
+            help.contains("; used for predictions") != help.contains("; only its walls are drawn");
+        assert!(is_clear, "{path}: {help}");
     }
 }
 
 #[test]
-fn every_verb_says_its_exit_codes_and_stands_in_one_group() {
+fn exit_codes_and_groups() {
     let command = command_line();
     for (path, verb) in verbs(&command, "sonard") {
         let help = verb.clone().render_long_help().to_string();
@@ -153,7 +155,7 @@ fn every_verb_says_its_exit_codes_and_stands_in_one_group() {
     shown.sort_unstable();
     let there = |verb: &&&str| shown.contains(*verb) || **verb == "board";
     assert!(grouped.iter().all(there), "{grouped:?}");
-    assert!(shown.iter().all(|verb| grouped.iter().filter(|one| **one == verb).count() == 1));
+    assert!(shown.iter().all(|verb| grouped.iter().filter(|name| **name == verb).count() == 1));
     let help = command.clone().render_help().to_string();
     for (group, _) in groups::GROUPS {
         assert!(help.contains(&format!("\n{group}:\n")), "{group}: {help}");

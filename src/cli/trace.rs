@@ -25,10 +25,10 @@ use crate::{
 pub(super) struct Args {
     #[command(flatten)]
     place: PlaceArgs,
-    /// Azimuth, degrees counter-clockwise from the heading; where the ranger looks
+    /// Azimuth, degrees counter-clockwise from the heading; direction of the beam
     #[arg(long, value_name = "DEG", default_value_t = 0.0, allow_negative_numbers = true)]
     azimuth_deg: f64,
-    /// Show the trace up to this range, metres [default: until nothing more comes near the threshold]
+    /// Maximum range of the trace, metres [default: after the last arrival near the threshold]
     #[arg(long, value_name = "M")]
     until: Option<f64>,
     /// Spacing of the samples, microseconds
@@ -48,12 +48,13 @@ pub(super) struct Args {
 }
 
 pub(super) const ABOUT: &str = "\
-Show the echo trace of one firing, as on an oscilloscope.
+Show the echo trace of one ping, as on an oscilloscope.
 
-The trace is the envelope of the sum of all echoes against time, with the gain, the current threshold, the \
-blanking and the moments at which ECHO rises; each peak has its path. Without -o and --json, a table of the \
-peaks. Times are those of a calibrated ranger: the echo of a head-on, perfectly reflecting wall rises at the \
-length of its path over the speed of sound.";
+The trace is the envelope of the sum of all echoes over time, with the gain, the current \
+threshold, the blanking and the rising edges of ECHO; each peak has its path. Without -o and \
+--json, a table of the peaks is printed. Times are those of a calibrated ranger: the echo of a \
+head-on, perfectly reflecting wall rises at the length of its path divided by the speed of \
+sound.";
 
 const HELP: &str = "\
 Examples:
@@ -64,9 +65,9 @@ Examples:
 
 Exit codes: 0 done, 2 wrong usage or input, 3 the disk gave up.";
 
-/// A trace as `--json` prints it.
+/// Trace as `--json` prints it.
 #[derive(Debug, Serialize)]
-struct TraceObject<'a> {
+struct TraceJson<'a> {
     scene: &'a str,
     pose: Pose,
     azimuth_deg: f64,
@@ -78,12 +79,12 @@ struct TraceObject<'a> {
     threshold: Vec<f64>,
     gain_db: Vec<f64>,
     transmission: &'a [(f64, f64)],
-    peaks: Vec<PeakObject>,
-    detection: DetectionObject,
+    peaks: Vec<PeakJson>,
+    detection: DetectionJson,
 }
 
 #[derive(Debug, Serialize)]
-struct PeakObject {
+struct PeakJson {
     tof_us: f64,
     peak_us: f64,
     peak: f64,
@@ -91,7 +92,7 @@ struct PeakObject {
 }
 
 #[derive(Debug, Serialize)]
-struct DetectionObject {
+struct DetectionJson {
     status: PingStatus,
     range_m: Option<f64>,
     tof_us: Vec<f64>,
@@ -115,23 +116,23 @@ pub(super) fn run(args: &Args) -> Outcome {
     let scene = Arc::new(scene.with_robot_at(&pose));
     let simulator = Simulator::new(scene, sensor, air, engine_options(&args.engine)?)
         .map_err(|error| Failure::input(error, "see `sonard trace --help`"))?;
-    let firing = Firing::new(args, &simulator, pose)
+    let ping = PingTrace::new(args, &simulator, pose)
         .map_err(|error| Failure::input(error, "see `sonard trace --help`"))?;
     if args.json {
-        let printed = serde_json::to_writer(std::io::stdout().lock(), &firing.object())
+        let printed = serde_json::to_writer(std::io::stdout().lock(), &ping.object())
             .map_err(std::io::Error::from)
             .and_then(|()| writeln!(std::io::stdout()));
         printed.or_else(|error| Failure::from_write("to standard output", &error))?;
     } else if targets.is_empty() {
-        let table = firing.table();
-        writeln!(std::io::stdout(), "{table}\n{}", firing.reading())
+        let table = ping.table();
+        writeln!(std::io::stdout(), "{table}\n{}", ping.describe_detection())
             .or_else(|error| Failure::from_write("to standard output", &error))?;
     }
-    firing.draw(&targets, args.picture.width)
+    ping.draw(&targets, args.picture.width)
 }
 
-/// One firing, with names for its peaks.
-struct Firing<'a> {
+/// Trace of one ping, with the paths of its peaks.
+struct PingTrace<'a> {
     simulator: &'a Simulator,
     pose: Pose,
     pose_text: &'a str,
@@ -141,14 +142,14 @@ struct Firing<'a> {
     path: Option<PathRecord>,
 }
 
-impl<'a> Firing<'a> {
+impl<'a> PingTrace<'a> {
     fn new(args: &'a Args, simulator: &'a Simulator, pose: Pose) -> Result<Self, TooCostly> {
         let direction_rad = pose.direction_rad(args.azimuth_deg);
         let point = simulator.at(pose.position());
         let whole = || {
             let longest_m = simulator.receiver().max_range_m;
             let trace = point.trace(direction_rad, longest_m, args.step_us)?;
-            Ok(interesting_m(simulator, &trace))
+            Ok(default_range_m(simulator, &trace))
         };
         let until_m = args.until.map_or_else(whole, Ok)?;
         let trace = point.trace(direction_rad, until_m, args.step_us)?;
@@ -174,10 +175,10 @@ impl<'a> Firing<'a> {
         self.trace.peaks.iter().zip(&self.paths)
     }
 
-    fn object(&self) -> TraceObject<'_> {
+    fn object(&self) -> TraceJson<'_> {
         let points = &self.trace.points;
         let detection = &self.trace.detection;
-        TraceObject {
+        TraceJson {
             scene: &self.simulator.scene().name,
             pose: self.pose,
             azimuth_deg: self.azimuth_deg,
@@ -191,14 +192,14 @@ impl<'a> Firing<'a> {
             transmission: &self.trace.transmission,
             peaks: self
                 .peaks()
-                .map(|(peak, path)| PeakObject {
+                .map(|(peak, path)| PeakJson {
                     tof_us: peak.tof_us,
                     peak_us: peak.peak.1,
                     peak: peak.peak.0,
                     path: path.clone(),
                 })
                 .collect(),
-            detection: DetectionObject {
+            detection: DetectionJson {
                 status: detection.status,
                 range_m: detection.range_m,
                 tof_us: detection.echoes_us.to_vec(),
@@ -229,24 +230,27 @@ impl<'a> Firing<'a> {
         table
     }
 
-    /// What the receiver makes of it, in words.
-    fn reading(&self) -> String {
+    /// Describes the receiver's output.
+    fn describe_detection(&self) -> String {
         let detection = &self.trace.detection;
         let path = self.path.as_ref().map(PathRecord::in_words);
-        let by = path.map(|path| format!(" by {path}")).unwrap_or_default();
+        let by = path.map(|path| format!(" via {path}")).unwrap_or_default();
         let margin_db = detection.margin_db.unwrap_or(f64::NEG_INFINITY);
         match (detection.status, detection.range_m) {
             (PingStatus::MinRange, Some(range_m)) => format!(
-                "minimum range, {range_m:.4} m: sound{by} is there when the blanking ends, \
+                "minimum range, {range_m:.4} m: sound{by} is arriving at the end of the blanking, \
                  {margin_db:.1} dB above the threshold"
             ),
             (_, Some(range_m)) => {
                 format!("echo at {range_m:.4} m{by}, {margin_db:.1} dB above the threshold")
             }
             _ if self.path.is_some() => {
-                format!("no echo; the best candidate{by} lacks {:.1} dB", -margin_db)
+                format!(
+                    "no echo; the strongest arrival{by} is {:.1} dB below the threshold",
+                    -margin_db
+                )
             }
-            _ => "no echo, and nothing that comes near".to_owned(),
+            _ => "no echo, and no arrival near the threshold".to_owned(),
         }
     }
 
@@ -261,7 +265,7 @@ impl<'a> Firing<'a> {
                 self.simulator.scene().name,
                 self.pose_text,
                 self.azimuth_deg,
-                self.reading()
+                self.describe_detection()
             ),
             lines: vec![format!(
                 "{} \u{b7} {:.2} m/s \u{b7} blanking {:.0} us",
@@ -280,8 +284,9 @@ impl<'a> Firing<'a> {
     }
 }
 
-/// Half a metre beyond the last peak that comes within 10 dB of the threshold, and of the blanking.
-fn interesting_m(simulator: &Simulator, trace: &EchoTrace) -> f64 {
+/// Range of the default trace: 0.5 m beyond the last peak within 10 dB of the threshold, and beyond
+/// the blanking.
+fn default_range_m(simulator: &Simulator, trace: &EchoTrace) -> f64 {
     let receiver = simulator.receiver();
     let near = |peak: &&EnvelopePeak| peak.peak.0 > 0.3 * receiver.threshold_at(peak.tof_us);
     let last = trace.peaks.iter().rev().find(near);

@@ -11,7 +11,7 @@ use tokio::time::sleep;
 
 use super::{
     Failure, Outcome,
-    daemon::{Daemons, DaemonsArgs, refuse},
+    daemon::{Daemons, DaemonsArgs, failure_from},
     runtime,
 };
 use crate::{
@@ -29,18 +29,17 @@ const RECONNECT: Backoff = Backoff::new(Duration::from_millis(200), Duration::fr
 pub(super) struct Args {
     #[command(flatten)]
     daemon: DaemonsArgs,
-    /// Only readings that moved by more than this, metres, or whose status changed
+    /// Only readings whose range changed by more than this, metres, or whose status changed
     #[arg(long, value_name = "M", conflicts_with = "scans")]
     moved: Option<f64>,
-    /// Whole scans when they are over, as JSON
+    /// Complete scans, as JSON
     #[arg(long)]
     scans: bool,
-    /// JSON instead of text; the records themselves, one a line, of several daemons each as `record`
-    /// beside its `robot`
+    /// JSON instead of text; one record per line, for several daemons as `record` with its `robot`
     #[arg(long)]
     json: bool,
-    /// Wait for a daemon that goes away, and go on when it is back; what it measures meanwhile is not
-    /// shown; of several, each is waited for anyway
+    /// Reconnect when the daemon restarts; readings in between are not shown; always on for several
+    /// daemons
     #[arg(long)]
     reconnect: bool,
 }
@@ -53,8 +52,8 @@ Examples:
   sonard watch --fleet fleet.toml
   sonard watch --json | jq 'select(.type == \"ping\") | .range_m'
 
-Exit codes: 0 interrupted, or nobody reads its output any more; 2 wrong usage; 3 no daemon answers, or
-it ended the stream (with --reconnect: it refused to go on).";
+Exit codes: 0 interrupted or output closed, 2 wrong usage, 3 no daemon responds, or it ended the
+stream (with --reconnect: it rejected the request).";
 
 pub(super) fn run(args: &Args) -> Outcome {
     let path = match (args.scans, args.moved) {
@@ -64,85 +63,85 @@ pub(super) fn run(args: &Args) -> Outcome {
     };
     runtime::run_interruptible(async |interrupts| {
         tokio::select! {
-            watched = watched(args, &path) => watched,
+            watch_all = watch_all(args, &path) => watch_all,
             () = interrupts.wait() => Ok(()),
         }
     })
 }
 
-/// One daemon, or several at a time.
-async fn watched(args: &Args, path: &str) -> Outcome {
+/// Watches one or more daemons.
+async fn watch_all(args: &Args, path: &str) -> Outcome {
     match args.daemon.daemons()? {
         Daemons::One(client) => watch(args, client, path).await,
         Daemons::Several(daemons) => fleet::watch(daemons, path, args.json || args.scans).await,
     }
 }
 
-/// Why a stream is over.
-enum Over {
-    /// Nobody reads what is written here.
+/// Reason for the end of a stream.
+enum StreamEnd {
+    /// The reader of the output closed it.
     Reader(Outcome),
-    /// The daemon ended it, or broke off.
+    /// The daemon ended it, or the connection was lost.
     Daemon(String),
 }
 
 async fn watch(args: &Args, client: Client, path: &str) -> Outcome {
-    let mut lines = client.live(path).await.map_err(|error| refuse(&error))?;
+    let mut lines = client.live(path).await.map_err(|error| failure_from(&error))?;
     loop {
         let why = match follow(args, lines).await {
-            Over::Reader(outcome) => return outcome,
-            Over::Daemon(why) => why,
+            StreamEnd::Reader(outcome) => return outcome,
+            StreamEnd::Daemon(why) => why,
         };
         if !args.reconnect {
             return Err(Failure::device(
                 why,
-                "it was stopped, hangs, or this client was too slow for it; lines that came are whole. \
-                 --reconnect waits for it and goes on",
+                "it was stopped, does not respond, or this client was too slow; received lines are complete. \
+                 Use --reconnect to wait for it",
             ));
         }
-        notice!("{why}: waiting for it");
-        lines = again(&client, path).await?;
-        notice!("the daemon answers again; its log has what was measured meanwhile");
+        notice!("{why}: reconnecting");
+        lines = reconnect(&client, path).await?;
+        notice!("reconnected; readings in between are in the daemon's log");
     }
 }
 
-/// Asks until the daemon answers; only a refusal ends that.
-async fn again(client: &Client, path: &str) -> Result<LiveLines, Failure> {
+/// Retries until the daemon responds or rejects the request.
+async fn reconnect(client: &Client, path: &str) -> Result<LiveLines, Failure> {
     let mut backoff = RECONNECT;
     loop {
         sleep(backoff.next_wait()).await;
         match client.live(path).await {
             Ok(lines) => return Ok(lines),
-            Err(error) if error.is_final() => return Err(refuse(&error)),
+            Err(error) if error.is_final() => return Err(failure_from(&error)),
             Err(_not_yet) => {}
         }
     }
 }
 
-/// Writes lines as they come, each only when it is whole.
-async fn follow(args: &Args, mut lines: LiveLines) -> Over {
+/// Prints complete lines as they arrive.
+async fn follow(args: &Args, mut lines: LiveLines) -> StreamEnd {
     loop {
         let line = match lines.next().await {
             Ok(Some(line)) => line,
-            Ok(None) => return Over::Daemon("the daemon ended the stream".into()),
+            Ok(None) => return StreamEnd::Daemon("the daemon ended the stream".into()),
             Err(ClientError::Http(error)) => {
-                return Over::Daemon(format!("the daemon broke off: {error}"));
+                return StreamEnd::Daemon(format!("connection lost: {error}"));
             }
-            Err(error) => return Over::Daemon(error.to_string()),
+            Err(error) => return StreamEnd::Daemon(error.to_string()),
         };
         let text = match args.json || args.scans {
             true => line,
-            false => words(&line).into_bytes(),
+            false => format_record(&line).into_bytes(),
         };
         let mut out = io::stdout().lock();
         if let Err(error) = out.write_all(&text).and_then(|()| out.flush()) {
-            return Over::Reader(Failure::from_write("to standard output", &error));
+            return StreamEnd::Reader(Failure::from_write("to standard output", &error));
         }
     }
 }
 
-/// A record as a line for a person.
-fn words(line: &[u8]) -> String {
+/// Formats a record as a line of text.
+fn format_record(line: &[u8]) -> String {
     let line = line.strip_suffix(b"\n").unwrap_or(line);
     match decode_line(line) {
         Ok(Record::Ping(ping)) => {
@@ -150,10 +149,10 @@ fn words(line: &[u8]) -> String {
                 |metres: Option<f64>| metres.map_or_else(|| "-".into(), |m| format!("{m:.3} m"));
             let status = match ping.status {
                 PingStatus::Echo => "echo",
-                PingStatus::NoEcho => "silent",
+                PingStatus::NoEcho => "no echo",
                 PingStatus::MinRange => "minimum range",
                 PingStatus::LinkLost => "link lost",
-                PingStatus::StepDoubtful => "step doubtful",
+                PingStatus::StepDoubtful => "step uncertain",
                 PingStatus::ModuleFault => "module fault",
             };
             let model = ping
@@ -161,12 +160,12 @@ fn words(line: &[u8]) -> String {
                 .as_ref()
                 .map_or_else(String::new, |sim| format!("  model {}", length(sim.range_m)));
             let ranger = ping.ranger.map_or_else(String::new, |id| format!("{id:>4} "));
-            let made_up = match ping.provenance {
+            let simulated = match ping.provenance {
                 Some(Provenance::Simulated) => "  (simulated)",
                 _ => "",
             };
             format!(
-                "{ranger}{:>6.1} deg  {:>9}  {status}{model}{made_up}\n",
+                "{ranger}{:>6.1} deg  {:>9}  {status}{model}{simulated}\n",
                 ping.azimuth_deg,
                 length(ping.range_m)
             )
@@ -176,16 +175,16 @@ fn words(line: &[u8]) -> String {
         }
         Ok(Record::ScanEnd(end)) => {
             format!(
-                "scan over: {} beams, {} missing, {:.1} s\n",
+                "scan complete: {} beams, {} missing, {:.1} s\n",
                 end.beams, end.missing, end.duration_s
             )
         }
         Ok(Record::Event(event)) => format!("{}\n", event.detail),
         Ok(Record::Session(session)) => match &session.array {
-            Some(array) => format!("a new session: array {}, simulated\n", array.name),
-            None => "a new session\n".into(),
+            Some(array) => format!("new session: array {}, simulated\n", array.name),
+            None => "new session\n".into(),
         },
-        // What the daemon says about the stream itself.
+        // Lines about the stream itself are printed as they are.
         Err(_) => format!("{}\n", String::from_utf8_lossy(line)),
     }
 }

@@ -1,4 +1,4 @@
-//! Another pose, sensor or air than a log says.
+//! Assumed pose, sensor or air, instead of the log's.
 
 use std::sync::Arc;
 
@@ -11,29 +11,31 @@ use crate::{
     scene::parse_pose,
 };
 
-/// What to suppose in place of what the log says.
+/// Options that override values of the log.
 #[derive(Debug, Clone, clap::Args)]
 #[command(next_help_heading = "What if")]
 pub(super) struct WhatIfArgs {
-    /// Pose of the ranger: X,Y,DEG (metres, degrees) or the name of a pose in the scene;
-    /// assumed for all scans, and only X,Y,DEG here
+    /// Pose of the ranger: X,Y,DEG (metres, degrees) or the name of a pose in the scene; assumed
+    /// for all scans, X,Y,DEG only
     #[arg(long, value_name = "POSE", allow_hyphen_values = true)]
     pose: Option<String>,
-    /// Assume this heading, degrees counter-clockwise from the x axis
+    /// Assumed heading, degrees counter-clockwise from the x axis
     #[arg(long, value_name = "DEG", allow_negative_numbers = true, conflicts_with = "pose")]
     heading: Option<f64>,
     #[command(flatten)]
     instead: InsteadArgs,
 }
 
-/// What to suppose in place of the sensor and the air that the log says.
+/// Options that override sensor and air of the log.
 #[derive(Debug, Clone, clap::Args)]
 #[command(next_help_heading = "What if")]
 pub(super) struct InsteadArgs {
-    /// Sensor preset (`sonard sensor list`), or a file with a sensor's data; assumed instead of the log's
+    /// Sensor preset (`sonard sensor list`), or a file with a sensor's data; assumed instead of the
+    /// log's
     #[arg(long, value_name = "NAME|FILE")]
     sensor: Option<String>,
-    /// Air temperature, degrees Celsius; assumed: measured ranges change with the speed of sound
+    /// Air temperature, degrees Celsius; assumed instead of the log's, and measured ranges change
+    /// with the speed of sound
     #[arg(long, value_name = "C", allow_negative_numbers = true)]
     temperature_c: Option<f64>,
     /// Relative humidity, percent; assumed instead of the log's
@@ -42,12 +44,11 @@ pub(super) struct InsteadArgs {
     /// Static pressure, kilopascals; assumed instead of the log's
     #[arg(long, value_name = "KPA")]
     pressure_kpa: Option<f64>,
-    /// Speed of sound, metres a second; assumed instead of the log's
+    /// Speed of sound, metres per second; assumed instead of the log's
     #[arg(long, value_name = "M/S")]
     sound_speed: Option<f64>,
 }
 
-/// The same, checked and read.
 #[derive(Debug, Clone, Default)]
 pub(super) struct WhatIf {
     pose: Option<Pose>,
@@ -57,15 +58,16 @@ pub(super) struct WhatIf {
     humidity_percent: Option<f64>,
     pressure_kpa: Option<f64>,
     sound_speed_m_s: Option<f64>,
-    /// The model to predict with.
+    /// Model used for predictions.
     options: Option<Options>,
 }
 
 impl WhatIfArgs {
-    /// Reads what is named.
+    /// Loads and validates the assumptions.
     ///
     /// # Errors
-    /// No such sensor, or figures that make no sense.
+    ///
+    /// Unknown sensor, or invalid values.
     pub(super) fn load(&self) -> Result<WhatIf, Failure> {
         let pose = match &self.pose {
             Some(pose) => {
@@ -78,10 +80,11 @@ impl WhatIfArgs {
 }
 
 impl InsteadArgs {
-    /// Reads what is named.
+    /// Loads and validates the assumptions.
     ///
     /// # Errors
-    /// No such sensor, or figures that make no sense.
+    ///
+    /// Unknown sensor, or invalid values.
     pub(super) fn load(&self) -> Result<WhatIf, Failure> {
         let what_if = WhatIf {
             sensor: self.sensor.as_deref().map(load_sensor).transpose()?,
@@ -91,20 +94,20 @@ impl InsteadArgs {
             sound_speed_m_s: self.sound_speed,
             ..WhatIf::default()
         };
-        // Said now rather than at the first scan.
+        // Invalid air is rejected now rather than at the first scan.
         what_if.air(&Air::default())?;
         Ok(what_if)
     }
 }
 
 impl WhatIf {
-    /// The same, predicted by a model of one's own choice.
+    /// Sets the model used for predictions.
     pub(super) fn with_options(self, options: Options) -> Self {
         Self { options: Some(options), ..self }
     }
 
-    /// Whether nothing else is supposed than what the log says.
-    pub(super) const fn is_nothing(&self) -> bool {
+    /// Returns `true` if nothing differs from the log.
+    pub(super) const fn is_empty(&self) -> bool {
         self.pose.is_none()
             && self.heading_deg.is_none()
             && self.sensor.is_none()
@@ -128,10 +131,10 @@ impl WhatIf {
         air.and_then(|air| {
             self.sound_speed_m_s.map_or(Ok(air), |speed| air.with_sound_speed(speed))
         })
-        .map_err(|error| Failure::input(error, "give air that there is"))
+        .map_err(|error| Failure::input(error, "give plausible properties of air"))
     }
 
-    /// Puts sensor, air and model into a session.
+    /// Replaces sensor, air and model of a session.
     pub(super) fn change_session(&self, session: &mut Session) {
         if let Some(sensor) = &self.sensor {
             session.sensor = sensor.clone();
@@ -146,20 +149,20 @@ impl WhatIf {
         }
     }
 
-    /// Puts the pose and the air into a scan's start.
+    /// Replaces pose and air of a scan's start.
     pub(super) fn change_start(&self, start: &mut ScanStart) {
-        start.pose = self.posed(start.pose);
+        start.pose = self.assumed_pose(start.pose);
         if self.has_air() {
             start.air = None;
         }
     }
 
-    fn posed(&self, logged: Pose) -> Pose {
+    fn assumed_pose(&self, logged: Pose) -> Pose {
         let pose = self.pose.unwrap_or(logged);
         Pose { heading_deg: self.heading_deg.unwrap_or(pose.heading_deg), ..pose }
     }
 
-    /// Takes a reading for one of the supposed pose, and computes its range again for the supposed air of its
+    /// Adapts a reading to the assumed pose, and recomputes its range for the assumed air of its
     /// session.
     fn change_ping(&self, ping: &mut Ping, session: &Session) {
         if self.pose.is_some() {
@@ -174,33 +177,33 @@ impl WhatIf {
     }
 }
 
-/// Takes scans for what they are supposed to be; those of a session get one supposed session.
-pub(super) struct Supposer<'a> {
+/// Applies assumptions to scans; scans of one session share the modified session.
+pub(super) struct AssumptionFilter<'a> {
     what_if: &'a WhatIf,
-    /// The session of the scan before, and what it would be.
+    /// Session of the previous scan, and its modified copy.
     known: Option<(Arc<Session>, Arc<Session>)>,
 }
 
-impl<'a> Supposer<'a> {
+impl<'a> AssumptionFilter<'a> {
     pub(super) const fn new(what_if: &'a WhatIf) -> Self {
         Self { what_if, known: None }
     }
 
-    pub(super) fn suppose(&mut self, scan: &mut ScanView) {
-        if self.what_if.is_nothing() {
+    pub(super) fn apply(&mut self, scan: &mut ScanView) {
+        if self.what_if.is_empty() {
             return;
         }
         if let Some(session) = &scan.session {
             let known = self.known.take().filter(|(of, _)| Arc::ptr_eq(of, session));
-            let (_, supposed) = self.known.insert(known.unwrap_or_else(|| {
-                let mut supposed = Session::clone(session);
-                self.what_if.change_session(&mut supposed);
-                (Arc::clone(session), Arc::new(supposed))
+            let (_, assumed) = self.known.insert(known.unwrap_or_else(|| {
+                let mut assumed = Session::clone(session);
+                self.what_if.change_session(&mut assumed);
+                (Arc::clone(session), Arc::new(assumed))
             }));
             for ping in &mut scan.pings {
-                self.what_if.change_ping(ping, supposed);
+                self.what_if.change_ping(ping, assumed);
             }
-            scan.session = Some(Arc::clone(supposed));
+            scan.session = Some(Arc::clone(assumed));
         }
         if let Some(start) = &mut scan.start {
             self.what_if.change_start(start);

@@ -1,4 +1,4 @@
-//! Sweeps of logs with the worlds that they were taken in.
+//! Sweeps of logs with sensor, scene and air.
 
 use std::{
     path::{Path, PathBuf},
@@ -10,7 +10,7 @@ use super::{
     logs::for_each_scan,
     predictor::conditions,
     scene_file,
-    what_if::{Supposer, WhatIf},
+    what_if::{AssumptionFilter, WhatIf},
 };
 use crate::{
     inverse::{Sweep, World},
@@ -18,38 +18,39 @@ use crate::{
     scene::Scene,
 };
 
-/// Options of verbs that explain sweeps.
+/// Options of verbs that estimate parameters from sweeps.
 #[derive(Debug, clap::Args)]
 pub(super) struct SweepArgs {
     /// Logs of sweeps; - for standard input
     #[arg(required = true, value_name = "LOG")]
     logs: Vec<PathBuf>,
-    /// Scene file, or the name of a shipped scene (`sonard scene list`); predicts in it, in place of the
-    /// log's
+    /// Scene file, or the name of a shipped scene (`sonard scene list`); used for predictions,
+    /// instead of the log's
     #[arg(long, value_name = "SCENE")]
     scene: Option<PathBuf>,
 }
 
 impl SweepArgs {
-    /// Hands over each sweep of the logs with its world; says which scans are none.
+    /// Passes each sweep of the logs with its world to `take`; reports scans that are not sweeps.
     ///
     /// # Errors
-    /// A log or a scene that can't be read, a scene that is not known, or what `take` refuses.
+    ///
+    /// An unreadable log or scene, an unknown scene, or a failure of `take`.
     pub(super) fn for_each(
         &self,
         what_if: &WhatIf,
         mut take: impl FnMut(&Path, Sweep, &Arc<World>) -> Result<(), Failure>,
     ) -> Result<(), Failure> {
         let given = self.scene.as_deref().map(scene_file::load).transpose()?.map(Arc::new);
-        let mut worlds = Worlds { given, known: None };
-        let mut supposer = Supposer::new(what_if);
+        let mut worlds = WorldCache { given, current: None };
+        let mut assumptions = AssumptionFilter::new(what_if);
         for log in &self.logs {
             for_each_scan(log, |mut scan| {
-                supposer.suppose(&mut scan);
+                assumptions.apply(&mut scan);
                 match Sweep::of(&scan) {
                     Ok(sweep) => take(log, sweep, &worlds.world(log, &scan)?),
                     Err(error) => {
-                        notice!("warning: {}: {error}; it is left out", log.display());
+                        notice!("warning: {}: {error}; scan skipped", log.display());
                         Ok(())
                     }
                 }
@@ -59,20 +60,21 @@ impl SweepArgs {
     }
 }
 
-/// Finds the world of each scan: the scene given, or the log's own; the session's sensor, air and model.
-struct Worlds {
+/// Finds the world of each scan: the given scene or the log's own, and the session's sensor, air
+/// and model.
+struct WorldCache {
     given: Option<Arc<Scene>>,
-    /// Of the session of the scan before.
-    known: Option<(Arc<Session>, Arc<World>)>,
+    /// World of the previous scan's session.
+    current: Option<(Arc<Session>, Arc<World>)>,
 }
 
-impl Worlds {
+impl WorldCache {
     fn world(&mut self, log: &Path, scan: &ScanView) -> Result<Arc<World>, Failure> {
-        // A sweep has its session.
+        // Every sweep has a session.
         let Some(session) = &scan.session else {
-            return Err(Failure::input("a scan lacks its session", "give a whole log"));
+            return Err(Failure::input("a scan has no session", "give a complete log"));
         };
-        if let Some((of, world)) = &self.known
+        if let Some((of, world)) = &self.current
             && Arc::ptr_eq(of, session)
         {
             return Ok(Arc::clone(world));
@@ -83,13 +85,13 @@ impl Worlds {
         };
         let scene = scene.ok_or_else(|| {
             Failure::input(
-                format!("{}: the log holds no scene", log.display()),
-                "say where it was taken with --scene",
+                format!("{}: the log contains no scene", log.display()),
+                "give its scene with --scene",
             )
         })?;
         let (air, options) = conditions(log, session)?;
         let world = Arc::new(World::new(scene, session.sensor.clone(), air, options));
-        self.known = Some((Arc::clone(session), Arc::clone(&world)));
+        self.current = Some((Arc::clone(session), Arc::clone(&world)));
         Ok(world)
     }
 }

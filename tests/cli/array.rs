@@ -19,7 +19,7 @@ fn simulate(further: &[&str]) -> Log {
 
 /// Writes a course through the two-surface room, and the readings of an array along it.
 fn drive(folder: &Path, array: &str) -> String {
-    let way = folder.join("way.jsonl");
+    let way = folder.join("trajectory.jsonl");
     let poses =
         ["0.7,0.8,0", "1.0,0.8,20", "1.3,0.9,60", "1.3,1.3,90", "1.1,1.7,120", "1.0,2.1,180"];
     let line = |pose: &&str| {
@@ -36,7 +36,7 @@ fn drive(folder: &Path, array: &str) -> String {
 }
 
 #[test]
-fn each_ranger_of_an_array_has_its_reading_from_its_own_place() {
+fn readings_per_ranger() {
     let log = simulate(&["--scene", "simple-room", "--pose", "0.4,0.37,0", "--array", "pioneer-8"]);
     let session = log.of_type("session").next().expect("a session");
     assert_eq!(session["provenance"], "simulated");
@@ -55,7 +55,7 @@ fn each_ranger_of_an_array_has_its_reading_from_its_own_place() {
 
 /// The ring of a Pioneer that is polled in 12 ms instead of 40, and one of which two rangers fire at once.
 #[test]
-fn rangers_that_fire_too_soon_or_at_once_hear_one_another() {
+fn crosstalk() {
     let folder = TempDir::new().expect("a folder");
     let shipped = fs::read_to_string("arrays/pioneer-8.json").expect("the preset's file");
     let write = |name: &str, text: String| {
@@ -123,7 +123,7 @@ fn rangers_that_fire_too_soon_or_at_once_hear_one_another() {
 }
 
 #[test]
-fn a_ring_turned_in_place_is_one_scan_of_all_its_rounds() {
+fn rounds_of_a_ring() {
     let folder = TempDir::new().expect("a folder");
     let path = folder.path().join("ring.jsonl").to_str().expect("plain path").to_owned();
     let arguments = ["--scene", "two-surface-room", "--pose", "1.2,1,30", "--array", "ring-12"];
@@ -151,7 +151,7 @@ fn a_ring_turned_in_place_is_one_scan_of_all_its_rounds() {
 }
 
 #[test]
-fn an_arrays_readings_are_drawn_mapped_and_fitted_with_lines() {
+fn plot_map_and_lines() {
     let folder = TempDir::new().expect("a folder");
     let (eight, ring) = (drive(folder.path(), "pioneer-8"), drive(folder.path(), "ring-12"));
     let file = |name: &str| folder.path().join(name).to_str().expect("plain path").to_owned();
@@ -180,7 +180,7 @@ fn an_arrays_readings_are_drawn_mapped_and_fitted_with_lines() {
 /// A wall that a ranger looks at straight on is mapped where it is, which needs the ranger's own
 /// place: from the robot's middle it would be 16 cm nearer.
 #[test]
-fn a_map_has_walls_where_they_are() {
+fn map_matches_the_scene() {
     let folder = TempDir::new().expect("a folder");
     let path = |name: &str| folder.path().join(name).to_str().expect("plain path").to_owned();
     let (log, out) = (path("ring.jsonl"), path("map"));
@@ -201,7 +201,7 @@ fn a_map_has_walls_where_they_are() {
 }
 
 #[test]
-fn wrong_arrays_are_refused_with_what_would_be_right() {
+fn wrong_arrays() {
     let folder = TempDir::new().expect("a folder");
     let file = |name: &str, text: &str| {
         let path = folder.path().join(name);
@@ -212,7 +212,7 @@ fn wrong_arrays_are_refused_with_what_would_be_right() {
     let twice = file("twice.json", &good.replace("\"s5\"", "\"s2\""));
     let wrong = file("wrong.json", &good.replace("bearing_deg", "bearing"));
     let nan = file("nan.json", &good.replace("50.0", "NaN"));
-    let way = file("way.jsonl", "\n{\"x_m\":9,\"y_m\":0.3}\n");
+    let way = file("trajectory.jsonl", "\n{\"x_m\":9,\"y_m\":0.3}\n");
     let broken = file("broken.jsonl", "\n{\"x_m\":0.4}\n");
     let at = |pose: &'static str, further: &[&str]| -> Vec<String> {
         let place = ["simulate", "--scene", "simple-room", "--pose", pose];
@@ -234,7 +234,7 @@ fn wrong_arrays_are_refused_with_what_would_be_right() {
         (at("0.8,0.37,0", &["--array", "pioneer-8"]), &["ranger s2", "outside the room"]),
         (at("0.762,0.37,0", &["--array", "pioneer-8"]), &["ranger s3", "mm from `east`"]),
         (at("5,5,0", &["--array", "pioneer-8"]), &["outside the room"]),
-        (along(&way), &["way.jsonl:2: ", "outside"]),
+        (along(&way), &["trajectory.jsonl:2: ", "outside"]),
         (along(&broken), &["broken.jsonl:2: ", "y_m"]),
         (along("/nowhere.jsonl"), &["/nowhere.jsonl"]),
         (

@@ -27,13 +27,13 @@ fn way(folder: &TempDir) -> String {
         let part: Vec<&str> = pose.split(',').collect();
         format!("{{\"x_m\":{},\"y_m\":{},\"heading_deg\":{}}}\n", part[0], part[1], part[2])
     };
-    let path = folder.path().join("way.jsonl");
+    let path = folder.path().join("trajectory.jsonl");
     fs::write(&path, POSES.iter().map(line).collect::<String>()).expect("writes");
     path.to_str().expect("plain path").to_owned()
 }
 
 #[test]
-fn a_course_is_the_scans_of_its_poses() {
+fn one_scan_per_pose() {
     let folder = TempDir::new().expect("a temporary folder");
     let way = way(&folder);
     // A robot's body is elsewhere at each pose, and with it the scene that a session names.
@@ -55,9 +55,9 @@ fn a_course_is_the_scans_of_its_poses() {
 }
 
 #[test]
-fn poses_that_are_wrong_are_named_and_left_out_and_the_others_done() {
+fn invalid_poses_are_skipped() {
     let folder = TempDir::new().expect("a temporary folder");
-    let path = folder.path().join("way.jsonl");
+    let path = folder.path().join("trajectory.jsonl");
     let lines = "{\"x_m\":0.4,\"y_m\":0.3}\n{\"x_m\":9,\"y_m\":0.3}\n{\"x_m\":\"a\"}\n\
                  {\"x_m\":0.5,\"y_m\":0.3}\n";
     fs::write(&path, lines).expect("writes");
@@ -66,7 +66,9 @@ fn poses_that_are_wrong_are_named_and_left_out_and_the_others_done() {
     let said = stderr(&output);
     assert_eq!(output.status.code(), Some(1), "{said}");
     assert_eq!(String::from_utf8_lossy(&output.stdout).matches("scan_end").count(), 2);
-    for part in ["way.jsonl:2: ", "outside", "way.jsonl:3: ", "x_m is", "2 of 4 poses"] {
+    for part in
+        ["trajectory.jsonl:2: ", "outside", "trajectory.jsonl:3: ", "x_m is", "2 of 4 poses"]
+    {
         assert!(said.contains(part), "{part}: {said}");
     }
     // With none left there is nothing to do.
@@ -80,7 +82,7 @@ fn poses_that_are_wrong_are_named_and_left_out_and_the_others_done() {
 }
 
 #[test]
-fn a_course_is_read_from_the_file_that_a_collection_takes() {
+fn file_formats_of_collections() {
     let folder = TempDir::new().expect("a temporary folder");
     let path = folder.path().join("poses.csv");
     fs::write(&path, "name,x_m,y_m,heading_deg,door\na,0.4,0.3,90,open\nb,0.5,0.2,-5,shut\n")

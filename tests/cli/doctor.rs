@@ -52,7 +52,7 @@ fn findings(report: &Value) -> Vec<String> {
 }
 
 #[test]
-fn a_sound_ranger_is_called_sound() {
+fn healthy_ranger() {
     let (code, report) = examine(&[], &[]);
     assert_eq!(findings(&report), [""; 0], "{report:#}");
     assert_eq!(code, Some(0));
@@ -68,7 +68,7 @@ fn a_sound_ranger_is_called_sound() {
 }
 
 #[test]
-fn each_fault_has_its_name() {
+fn faults_and_causes() {
     let cases: [(&str, &[&str], &str, i32); 12] = [
         // A supply that sags as the motor turns, whichever turn it is.
         ("motor_reset=1", &[], "motor power failed", 1),
@@ -92,14 +92,14 @@ fn each_fault_has_its_name() {
 }
 
 #[test]
-fn a_clock_that_stands_or_runs_at_another_rate_is_found() {
+fn clock_rate() {
     let folder = tempfile::tempdir().expect("a folder");
     let mock = MockProcess::start(folder.path(), &["--realtime"]);
     let options = ["--no-motion", "--pings", "1"];
     let (code, report) = doctor(mock.port(), &options);
     assert_eq!((findings(&report), code), (vec![], Some(0)), "{report:#}");
     assert_eq!(report["checks"][6]["status"], "ok", "{report:#}");
-    for (rate, said) in [(0_u32, "stands still"), (2, "2.0")] {
+    for (rate, said) in [(0_u32, "is stopped"), (2, "2.0")] {
         let change = move |reply: &mut Reply| {
             if let Reply::StatusReport(status) = reply {
                 status.ticks = status.ticks.wrapping_mul(rate);
@@ -118,7 +118,7 @@ fn a_clock_that_stands_or_runs_at_another_rate_is_found() {
 }
 
 #[test]
-fn echoes_that_no_sound_made_and_readings_that_disagree_are_found() {
+fn impossible_and_scattered_echoes() {
     let folder = tempfile::tempdir().expect("a folder");
     let mock = MockProcess::start(folder.path(), &[]);
     // An echo at 1 mm, and one at 172 m; readings that wander by 0.7 m.
@@ -147,7 +147,7 @@ fn echoes_that_no_sound_made_and_readings_that_disagree_are_found() {
 }
 
 #[test]
-fn answers_that_come_late_are_not_called_lost() {
+fn late_replies_are_not_lost() {
     let slow = ["--faults", "delay=1,delay_ms=150"];
     let (code, report) = examine(&slow, &["--no-motion", "--pings", "1"]);
     assert_eq!(findings(&report), ["line latency warning"], "{report:#}");
@@ -155,14 +155,14 @@ fn answers_that_come_late_are_not_called_lost() {
 }
 
 #[test]
-fn a_line_that_loses_bytes_is_a_warning_while_it_works() {
+fn lossy_line() {
     let (code, report) = examine(&["--faults", "flip=0.004"], &["--pings", "2"]);
     assert_eq!(findings(&report), ["line line warning"], "{report:#}");
     assert_eq!(code, Some(0));
 }
 
 #[test]
-fn a_motor_that_misses_steps_is_found_by_its_index() {
+fn missed_steps() {
     let (code, report) = examine(&["--missed-steps", "1"], &["--pings", "1"]);
     assert_eq!(findings(&report), ["motor motor failed"], "{report:#}");
     assert_eq!(code, Some(1));
@@ -193,7 +193,7 @@ fn stranger(says: &'static [u8]) -> (Option<i32>, Value) {
 }
 
 #[test]
-fn silence_and_other_firmware_are_told_apart() {
+fn no_reply_and_other_firmware() {
     let (code, report) = stranger(b"");
     assert_eq!(findings(&report), ["board silent failed"], "{report:#}");
     assert_eq!(code, Some(3));
@@ -201,8 +201,8 @@ fn silence_and_other_firmware_are_told_apart() {
         (&b"$GPGGA,123519,4807.038,N,01131.000,E*47\r\n"[..], "wrong_firmware", "GPS"),
         (b"\r\nDebian GNU/Linux robot ttyS0\r\n\r\nrobot login: ", "login_prompt", "robot login:"),
         (b"AT\r\nAT+GCAP\r\n", "modem", "modem commands"),
-        (b"\r\nERROR\r\n", "modem", "a modem answers"),
-        (&[0xf8, 0x80, 0xe6, 0x98], "wrong_firmware", "no frames"),
+        (b"\r\nERROR\r\n", "modem", "a modem replies"),
+        (&[0xf8, 0x80, 0xe6, 0x98], "wrong_firmware", "nor frames"),
     ] {
         let (code, report) = stranger(says);
         assert_eq!(findings(&report), [format!("board {cause} failed")], "{report:#}");
@@ -239,7 +239,7 @@ impl Drop for Holder {
 }
 
 #[test]
-fn program_that_reads_the_port_is_named_before_anything_is_moved() {
+fn reading_program_is_named() {
     let folder = tempfile::tempdir().expect("a folder");
     let mock = MockProcess::start(folder.path(), &[]);
     let holder = Holder::start(mock.port(), "exec cat >/dev/null");
@@ -262,7 +262,7 @@ fn program_that_reads_the_port_is_named_before_anything_is_moved() {
 }
 
 #[test]
-fn few_descriptors_are_an_error_with_its_name_and_no_panic() {
+fn few_descriptors() {
     let folder = tempfile::tempdir().expect("a folder");
     let mock = MockProcess::start(folder.path(), &[]);
     let mut named = 0;
@@ -288,7 +288,7 @@ fn few_descriptors_are_an_error_with_its_name_and_no_panic() {
 }
 
 #[test]
-fn program_that_locks_the_port_is_named() {
+fn locking_program_is_named() {
     let folder = tempfile::tempdir().expect("a folder");
     let mock = MockProcess::start(folder.path(), &[]);
     let lock = "flock --exclusive 1 && exec sleep 60";
@@ -301,7 +301,7 @@ fn program_that_locks_the_port_is_named() {
 }
 
 #[test]
-fn settings_that_another_program_changed_are_named() {
+fn changed_port_settings() {
     let folder = tempfile::tempdir().expect("a folder");
     let mock = MockProcess::start(folder.path(), &["--realtime"]);
     let port = mock.port().to_owned();
@@ -323,7 +323,7 @@ fn settings_that_another_program_changed_are_named() {
 }
 
 #[test]
-fn a_missing_a_wrong_and_a_busy_port_are_told_apart() {
+fn missing_wrong_and_busy_ports() {
     let (code, report) = doctor("/dev/no-such-port", &[]);
     assert_eq!(findings(&report), ["port not_found failed"]);
     assert_eq!(code, Some(3));
@@ -343,7 +343,7 @@ fn a_missing_a_wrong_and_a_busy_port_are_told_apart() {
 }
 
 #[test]
-fn without_a_port_it_lists_and_opens_none() {
+fn lists_ports_without_opening() {
     let output = run(&["doctor", "--json"]);
     let listed: Value = serde_json::from_slice(&output.stdout).expect("an object");
     let empty = listed["candidates"].as_array().expect("a list").is_empty();
@@ -352,7 +352,7 @@ fn without_a_port_it_lists_and_opens_none() {
 }
 
 #[test]
-fn an_emulator_that_is_missing_is_named_with_how_to_build_it() {
+fn missing_emulator() {
     let scan = ["scan", "--emulator", "--scene", "simple-room", "--pose", "fig9"];
     let output = crate::common::sonard(&scan)
         .env("SONARD_EMULATOR", "/no/such/emulator")

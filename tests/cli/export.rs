@@ -31,7 +31,7 @@ fn table_of(arguments: &[&str]) -> Vec<csv::StringRecord> {
 }
 
 #[test]
-fn every_reading_of_logs_and_folders_is_a_row() {
+fn one_row_per_reading() {
     let folder = tempfile::tempdir().expect("a folder");
     // As a collection leaves it: a journal that is no log, and scans.
     let scans = folder.path().join("scans");
@@ -61,7 +61,7 @@ fn every_reading_of_logs_and_folders_is_a_row() {
 }
 
 #[test]
-fn the_format_follows_from_the_ending_or_is_asked_for() {
+fn format_selection() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = |name: &str| folder.path().join(name).to_str().expect("a plain path").to_owned();
     let log = path("small.jsonl");
@@ -95,7 +95,7 @@ fn the_format_follows_from_the_ending_or_is_asked_for() {
 }
 
 #[test]
-fn a_recording_keeps_the_log_and_takes_only_its_own_place() {
+fn recording_with_attached_log() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = |name: &str| folder.path().join(name).to_str().expect("a plain path").to_owned();
     let log = path("small.jsonl");
@@ -132,23 +132,23 @@ fn a_recording_keeps_the_log_and_takes_only_its_own_place() {
 }
 
 #[test]
-fn a_folder_without_logs_and_a_log_without_scans_are_refused() {
+fn empty_folders_and_logs() {
     let folder = tempfile::tempdir().expect("a folder");
     let (empty, out) = (folder.path().to_str().expect("a plain path"), folder.path().join("a.csv"));
     let out = out.to_str().expect("a plain path");
     let refused = run(&["export", empty, "-o", out]);
     assert_eq!(refused.status.code(), Some(2));
-    assert!(said(&refused).contains("there is no log in the folder"), "{}", said(&refused));
+    assert!(said(&refused).contains("no log in the folder"), "{}", said(&refused));
     let log = folder.path().join("session.jsonl");
     fs::write(&log, SMALL.lines().next().expect("a session")).expect("writable");
     let refused = run(&["export", log.to_str().expect("a plain path"), "-o", out]);
     assert_eq!(refused.status.code(), Some(2));
-    assert!(said(&refused).contains("there is no scan to export"), "{}", said(&refused));
+    assert!(said(&refused).contains("there are no scans to export"), "{}", said(&refused));
     assert!(!Path::new(out).exists());
 }
 
 #[test]
-fn nobody_reads_on_and_that_is_no_failure() {
+fn closed_reader() {
     let folder = tempfile::tempdir().expect("a folder");
     let log = simulated(folder.path(), "a.jsonl", "fig7");
     let mut export = sonard(&["export", &log, &log, &log, "--to", "csv"]);

@@ -98,11 +98,11 @@ fn said(output: &Output) -> String {
 }
 
 #[test]
-fn the_bytes_are_the_same_however_many_processes_and_threads_make_them() {
+fn identical_for_any_parallelism() {
     let case = Case::new();
     let one = case.command("one", &[]).env("RAYON_NUM_THREADS", "1").output().expect("it starts");
     assert!(
-        one.status.success() && said(&one).contains("whole: 6 shards, 21600 readings"),
+        one.status.success() && said(&one).contains("complete: 6 shards, 21600 readings"),
         "{}",
         said(&one)
     );
@@ -127,11 +127,11 @@ fn the_bytes_are_the_same_however_many_processes_and_threads_make_them() {
     }
     // Whoever was last may have seen a part that was not there yet.
     let last = case.generate("parts", &[]);
-    assert!(said(&last).contains("0 shards made, 6 were there"), "{}", said(&last));
+    assert!(said(&last).contains("0 shards made, 6 already complete"), "{}", said(&last));
     assert_eq!(files(&case.path("parts")), wanted);
-    let verified = case.verify("parts", &["--again", "2"]);
+    let verified = case.verify("parts", &["--recheck", "2"]);
     let told = String::from_utf8_lossy(&verified.stdout).into_owned();
-    assert!(verified.status.success() && told.contains("as it should be, 2 drawn anew"), "{told}");
+    assert!(verified.status.success() && told.contains("verified, 2 recomputed"), "{told}");
     // From the specification that the set itself holds, in another folder.
     let (spec, out) = (case.text_path("one/spec.json"), case.text_path("again"));
     assert!(run(&["generate", &spec, "--out", &out, "--shard", "1/1"]).status.success());
@@ -139,7 +139,7 @@ fn the_bytes_are_the_same_however_many_processes_and_threads_make_them() {
 }
 
 #[test]
-fn a_set_that_was_killed_goes_on_and_is_the_one_that_was_not() {
+fn resumes_after_kill() {
     let case = Case::new();
     assert!(case.generate("whole", &[]).status.success());
     let wanted = files(&case.path("whole"));
@@ -176,7 +176,7 @@ fn a_set_that_was_killed_goes_on_and_is_the_one_that_was_not() {
 }
 
 #[test]
-fn array_jobs_are_understood_and_it_is_said_what_counted() {
+fn array_jobs() {
     let case = Case::new();
     let in_array = |variables: &[(&str, &str)], further: &[&str]| {
         let mut command = case.command("array", further);
@@ -190,12 +190,8 @@ fn array_jobs_are_understood_and_it_is_said_what_counted() {
         ("SLURM_ARRAY_TASK_STEP", "1"),
     ];
     let second = in_array(&slurm, &[]);
-    assert!(
-        said(&second).starts_with("part 2/3, as SLURM_ARRAY_TASK_ID says"),
-        "{}",
-        said(&second)
-    );
-    assert!(said(&second).contains("4 of 6 shards are still missing"), "{}", said(&second));
+    assert!(said(&second).starts_with("part 2/3, from SLURM_ARRAY_TASK_ID"), "{}", said(&second));
+    assert!(said(&second).contains("4 of 6 shards missing"), "{}", said(&second));
     let first = in_array(&[("JOB_COMPLETION_INDEX", "0")], &[]);
     assert!(
         said(&first).contains("part 1/6") && said(&first).contains("1 shards made"),
@@ -203,7 +199,7 @@ fn array_jobs_are_understood_and_it_is_said_what_counted() {
         said(&first)
     );
     let by_option = in_array(&slurm, &["--shard", "6/6"]);
-    assert!(said(&by_option).contains("as --shard says; SLURM_ARRAY_TASK_ID is not looked at"));
+    assert!(said(&by_option).contains("from --shard; SLURM_ARRAY_TASK_ID is ignored"));
     let there: Vec<_> =
         (1..=6).filter(|n| case.path(&format!("array/shard-0000{n}")).exists()).collect();
     assert_eq!(there, [1, 2, 5, 6]);
@@ -219,7 +215,7 @@ fn array_jobs_are_understood_and_it_is_said_what_counted() {
 }
 
 #[test]
-fn faults_are_told_with_their_place_and_damage_with_its_file() {
+fn wrong_specifications_and_damage() {
     let case = Case::new();
     let told = case.generate("set", &["--check"]);
     let size = String::from_utf8_lossy(&told.stdout).into_owned();

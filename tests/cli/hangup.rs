@@ -9,7 +9,7 @@ use sonard::{
 };
 
 #[tokio::test]
-async fn a_driver_whose_line_closed_says_so_once_and_then_rests() {
+async fn closed_line_is_reported_once() {
     let pty = Pty::open(None).expect("a pty");
     let line = link::open(pty.path().to_str().expect("plain path")).expect("opens");
     let mut driver = Driver::new(line, HostConfig::new(link::BAUD, 1));

@@ -60,7 +60,7 @@ fn sound_speed_m_s() -> f64 {
 }
 
 #[test]
-fn a_table_becomes_a_log_that_every_verb_takes() {
+fn table_to_log() {
     let folder = tempfile::tempdir().expect("a folder");
     let out = |name: &str| folder.path().join(name).to_str().expect("a plain path").to_owned();
     let table = write_table(folder.path());
@@ -73,9 +73,9 @@ fn a_table_becomes_a_log_that_every_verb_takes() {
             "--clockwise",
             "--zero-deg",
             "90",
-            "--none",
+            "--no-echo",
             "0",
-            "--ranged-with",
+            "--source-sound-speed",
             "340",
             "--temperature-c",
             "15",
@@ -90,10 +90,7 @@ fn a_table_becomes_a_log_that_every_verb_takes() {
         stderr(&output)
     };
     let said = import(&log);
-    assert!(
-        said.contains("azimuth_deg from `Angle [deg]`, range_cm from `Distance [cm]`"),
-        "{said}"
-    );
+    assert!(said.contains("`Angle [deg]` -> azimuth_deg, `Distance [cm]` -> range_cm"), "{said}");
     let records = Log::read(log.as_ref());
     let session = &records.records[0];
     assert_eq!(session["provenance"], "imported");
@@ -138,7 +135,7 @@ fn a_table_becomes_a_log_that_every_verb_takes() {
 
 /// A mapping file, options over it, and a file from standard input.
 #[test]
-fn a_mapping_is_a_file_as_well() {
+fn mapping_file() {
     let folder = tempfile::tempdir().expect("a folder");
     let mapping = folder.path().join("mapping.toml");
     fs::write(
@@ -170,17 +167,17 @@ fn a_mapping_is_a_file_as_well() {
 }
 
 #[test]
-fn wrong_files_and_outputs_are_refused() {
+fn wrong_files_and_outputs() {
     let folder = tempfile::tempdir().expect("a folder");
     let table = write_table(folder.path());
     let before = fs::read(&table).expect("reads");
-    let over = refused(&["import", &table, "--none", "0", "-o", &table]);
+    let over = refused(&["import", &table, "--no-echo", "0", "-o", &table]);
     assert!(over.contains("is read by this command"), "{over}");
     assert_eq!(fs::read(&table).expect("reads"), before);
     let zero = folder.path().join("zero.csv");
     fs::write(&zero, "azimuth_deg,range_cm\n0,100\n10,0\n").expect("writes");
     let silent = refused(&["import", zero.to_str().expect("a plain path")]);
-    assert!(silent.contains("a range of 0") && silent.contains("--none=0"), "{silent}");
+    assert!(silent.contains("a range of 0") && silent.contains("--no-echo=0"), "{silent}");
     let none = refused(&["import", "/nowhere.csv"]);
     assert!(none.contains("No such file"), "{none}");
     let picture = folder.path().join("a.gz");
@@ -189,17 +186,14 @@ fn wrong_files_and_outputs_are_refused() {
     assert!(packed.contains("compressed"), "{packed}");
     let log = folder.path().join("log.jsonl");
     let log = log.to_str().expect("a plain path");
-    done(&["import", &table, "--none", "0", "-o", log]);
+    done(&["import", &table, "--no-echo", "0", "-o", log]);
     let nothing = refused(&["predict", log]);
-    assert!(
-        nothing.contains("no reading to predict beside") && nothing.contains("--scene"),
-        "{nothing}"
-    );
+    assert!(nothing.contains("no reading to predict") && nothing.contains("--scene"), "{nothing}");
 }
 
 /// The page about the format holds a log, and the schema knows its lines.
 #[test]
-fn the_least_log_of_the_documents_is_one() {
+fn minimal_log_of_the_manual() {
     let page = include_str!("../../docs/log.md");
     let (_, rest) = page.split_once("```json\n").expect("a log");
     let (log, _) = rest.split_once("```").expect("its end");
@@ -247,7 +241,7 @@ fn places(log: &str) -> Vec<[i64; 3]> {
 
 /// What `sonard export` wrote comes back with the same readings in the same places.
 #[test]
-fn an_exported_recording_is_the_same_log_again() {
+fn recording_round_trip() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = |name: &str| folder.path().join(name).to_str().expect("a plain path").to_owned();
     let course = path("course.csv");
@@ -279,7 +273,7 @@ fn an_exported_recording_is_the_same_log_again() {
 }
 
 #[test]
-fn the_folder_of_a_recording_is_read() {
+fn recording_folder() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = |name: &str| folder.path().join(name).to_str().expect("a plain path").to_owned();
     let (log, bag) = (path("log.jsonl"), path("bag"));
@@ -298,7 +292,7 @@ fn the_folder_of_a_recording_is_read() {
 
 #[cfg(not(feature = "sqlite"))]
 #[test]
-fn a_database_is_told_what_reads_it() {
+fn database_without_the_feature() {
     let folder = tempfile::tempdir().expect("a folder");
     let bag = folder.path().to_str().expect("a plain path");
     let file = folder.path().join("bag_0.db3");

@@ -38,7 +38,7 @@ fn kinds(features: &[Value]) -> Vec<&str> {
 }
 
 #[test]
-fn one_scan_names_edges_and_proposes_and_a_second_decides() {
+fn second_scan_decides() {
     let folder = TempDir::new().expect("a temporary folder");
     let first = simulate(folder.path(), "fig13");
     let one = features(&["interpret", &first, "--json"]);
@@ -63,7 +63,7 @@ fn one_scan_names_edges_and_proposes_and_a_second_decides() {
 }
 
 #[test]
-fn wrong_input_is_refused_with_what_would_be_right() {
+fn wrong_input() {
     let folder = TempDir::new().expect("a temporary folder");
     let log = folder.path().join("empty.jsonl");
     fs::write(&log, "").expect("written");
@@ -82,7 +82,7 @@ fn wrong_input_is_refused_with_what_would_be_right() {
 }
 
 #[test]
-fn help_teaches_the_reasons() {
+fn help_lists_the_reasons() {
     let output = sonard(&["interpret", "--help"]).output().expect("it runs");
     let text = String::from_utf8_lossy(&output.stdout).into_owned();
     assert!(text.contains("second_position") && text.contains("Examples"), "{text}");

@@ -38,7 +38,7 @@ fn number(line: &Value, name: &str) -> f64 {
 }
 
 #[test]
-fn what_was_believed_wrongly_is_found_and_written_as_files_that_verbs_take() {
+fn calibration_corrects_inputs() {
     let folder = tempfile::tempdir().expect("a folder");
     let log = sweep(folder.path(), "simple-room", "0.80,0.05,92", &COLD);
     let out = folder.path().join("out");
@@ -76,7 +76,7 @@ fn what_was_believed_wrongly_is_found_and_written_as_files_that_verbs_take() {
 }
 
 #[test]
-fn a_symmetric_room_has_its_poses_listed_and_another_room_is_doubted() {
+fn symmetric_and_wrong_rooms() {
     let folder = tempfile::tempdir().expect("a folder");
     let log = sweep(folder.path(), "simple-room", "0.774,0.085,0", &[]);
     let found = lines(&["locate", &log, "--json"]);
@@ -94,7 +94,7 @@ fn a_symmetric_room_has_its_poses_listed_and_another_room_is_doubted() {
 
 /// A ranger less sensitive than the one that `locate` is told of, and one whose log says so.
 #[test]
-fn how_sensitive_a_ranger_was_is_found_with_its_place() {
+fn threshold_with_pose() {
     const THRESHOLD: f64 = 0.3;
     let folder = tempfile::tempdir().expect("a folder");
     let usual = sonard::acoustics::Sensor::preset("hc-sr04").expect("a preset");
@@ -123,7 +123,7 @@ fn how_sensitive_a_ranger_was_is_found_with_its_place() {
 /// A robot drives from one end of a room, whose ends look alike, past a short wall to the other; its log comes through
 /// a pipe, and each scan is answered before the next is there.
 #[test]
-fn a_course_is_followed_while_its_log_is_written() {
+fn course_from_a_growing_log() {
     let folder = tempfile::tempdir().expect("a folder");
     let room = r#"{"name": "long room", "materials": {"plaster": {"reflectance": 0.95}}, "walls": [
         {"id": "w", "polyline": [[0, 0], [5, 0], [5, 1], [0, 1]], "closed": true, "material": "plaster"},
@@ -134,7 +134,7 @@ fn a_course_is_followed_while_its_log_is_written() {
         path.to_str().expect("a plain path").to_owned()
     };
     let scene = file("room.json", room);
-    let way = file("way.csv", "x_m,y_m,heading_deg\n2.2,0.4,5\n3.4,0.35,30\n4.4,0.6,80\n");
+    let way = file("trajectory.csv", "x_m,y_m,heading_deg\n2.2,0.4,5\n3.4,0.35,30\n4.4,0.6,80\n");
     let simulate = ["simulate", "--scene", &scene, "--poses", &way, "--step-deg", "4"];
     let log = run(&[&simulate[..], &["--max-range", "1.5"]].concat());
     assert_eq!(log.status.code(), Some(0), "{}", stderr(&log));
@@ -161,14 +161,14 @@ fn a_course_is_followed_while_its_log_is_written() {
     let end = rest.last().expect("an answer to the last scan");
     assert!((number(end, "x_m") - 4.4).abs() < 0.02, "{end}");
     assert!(number(end, "probability") > 0.99, "{end}");
-    let alone = lines(&["locate", &file("way.jsonl", &log), "--json"]);
+    let alone = lines(&["locate", &file("trajectory.jsonl", &log), "--json"]);
     let of_end = alone.iter().filter(|mode| mode["scan"] == end["scan"]);
     assert_eq!(of_end.count(), 2, "{alone:?}");
 }
 
 /// Two chair legs and a bin stand in a room of which the scene knows the walls alone.
 #[test]
-fn what_the_scene_lacks_bends_no_values_if_it_is_allowed_for() {
+fn furniture_does_not_bias() {
     let folder = tempfile::tempdir().expect("a folder");
     let room = fs::read_to_string("scenes/simple-room.json").expect("it ships");
     let mut room: Value = serde_json::from_str(&room).expect("JSON");
@@ -195,7 +195,7 @@ fn what_the_scene_lacks_bends_no_values_if_it_is_allowed_for() {
 }
 
 #[test]
-fn what_can_not_be_fitted_is_said() {
+fn unfittable_parameters() {
     let folder = tempfile::tempdir().expect("a folder");
     let log = sweep(folder.path(), "simple-room", "0.774,0.085,0", &["--step-deg", "9"]);
     for (arguments, part) in [
@@ -207,11 +207,11 @@ fn what_can_not_be_fitted_is_said() {
         (vec!["calibrate", "nowhere.jsonl"], "nowhere.jsonl"),
         (vec!["locate", &log, "--scene", "nowhere"], "nowhere"),
         (vec!["locate", &log, "--spacing-m", "0"], "0.01 to 2"),
-        (vec!["locate", &log, "--carried", "0.1"], "--course"),
+        (vec!["locate", &log, "--kidnap-probability", "0.1"], "--course"),
         (vec!["locate", &log, "--prior", "threshold_db=3"], "--fit"),
         (vec!["locate", &log, "--fit", "height"], "neither floor nor ceiling"),
         (vec!["locate", &log, "--fit", "threshold", "--prior", "gear=1"], "is not fitted"),
-        (vec!["locate", &log, "--course", "--carried", "1.1"], "0 to 1"),
+        (vec!["locate", &log, "--course", "--kidnap-probability", "1.1"], "0 to 1"),
     ] {
         let output = run(&arguments);
         assert_eq!(output.status.code(), Some(2), "{arguments:?}");
@@ -221,7 +221,7 @@ fn what_can_not_be_fitted_is_said() {
 }
 
 #[test]
-fn a_height_is_told_from_where_it_usually_is_and_what_goes_together_by_name() {
+fn height_and_correlations() {
     let folder = tempfile::tempdir().expect("a folder");
     let room = r#"{"name": "low room", "materials": {"plaster": {"reflectance": 0.95}},
         "walls": [{"id": "w", "polyline": [[0, 0], [3, 0], [3, 2], [0, 2]], "closed": true, "material": "plaster"}],
@@ -239,8 +239,8 @@ fn a_height_is_told_from_where_it_usually_is_and_what_goes_together_by_name() {
     let said = String::from_utf8(output.stdout).expect("text");
     // A turn of the robot and one of the stepper's zero are the same, whatever is read.
     let is_told = |line: &str| {
-        line.starts_with("hardly told apart: heading_deg of ")
-            && line.contains(" and heading_zero_deg (correlation -1")
+        line.starts_with("strongly correlated: heading_deg of ")
+            && line.contains(" and heading_zero_deg (-1")
     };
     assert!(said.lines().any(is_told), "{said}");
 }

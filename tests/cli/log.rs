@@ -25,7 +25,7 @@ fn log_of(folder: &Path, bytes: impl AsRef<[u8]>) -> String {
 }
 
 #[test]
-fn a_torn_log_is_found_repaired_and_then_clean() {
+fn repair_of_an_incomplete_line() {
     let folder = tempfile::tempdir().expect("a folder");
     let torn = &LOG[..LOG.len() - 200];
     let log = &log_of(folder.path(), torn);
@@ -45,14 +45,14 @@ fn a_torn_log_is_found_repaired_and_then_clean() {
 }
 
 #[test]
-fn damage_in_the_middle_is_listed() {
+fn damaged_lines() {
     let folder = tempfile::tempdir().expect("a folder");
     let log = &log_of(folder.path(), LOG.replacen("\"ping\"", "\"ping", 1));
     let said = check(&["log", "verify", log], 1);
     assert!(said.contains("scan.jsonl:3: problem: column "), "{said}");
     let said = check(&["log", "repair", log], 1);
     let length = LOG.lines().nth(2).expect("a reading").len() - 1;
-    assert!(said.contains(&format!("scan.jsonl:3: left out {length} byte(s)")), "{said}");
+    assert!(said.contains(&format!("scan.jsonl:3: removed {length} byte(s)")), "{said}");
     let json = check(&["log", "verify", "--json", log], 1);
     let lines: Vec<Value> =
         json.lines().map(|line| serde_json::from_str(line).expect("JSON")).collect();
@@ -61,7 +61,7 @@ fn damage_in_the_middle_is_listed() {
 }
 
 #[test]
-fn what_cannot_be_opened_is_wrong_input() {
+fn unreadable_files() {
     let folder = tempfile::tempdir().expect("a folder");
     let empty = folder.path().to_str().expect("plain path");
     for verb in [&["log", "verify"][..], &["log", "repair"], &["log", "show"], &["compare"]] {
@@ -74,7 +74,7 @@ fn what_cannot_be_opened_is_wrong_input() {
 }
 
 #[test]
-fn a_log_is_shown() {
+fn show() {
     let folder = tempfile::tempdir().expect("a folder");
     let log = &log_of(folder.path(), format!("{LOG}rubbish\n"));
     let said = check(&["log", "show", "--readings", log], 0);
@@ -104,7 +104,7 @@ fn a_log_is_shown() {
 }
 
 #[test]
-fn a_comparison_is_one_object_and_always_ends_well() {
+fn compare_json() {
     let folder = tempfile::tempdir().expect("a folder");
     let log = &log_of(folder.path(), LOG);
     let said = check(&["compare", "--json", log], 0);
@@ -129,7 +129,7 @@ fn a_comparison_is_one_object_and_always_ends_well() {
 }
 
 #[test]
-fn a_simulated_scan_agrees_with_itself() {
+fn simulated_scan_agrees() {
     let folder = tempfile::tempdir().expect("a folder");
     let log = folder.path().join("sim.jsonl");
     let log = log.to_str().expect("plain path");
@@ -137,7 +137,7 @@ fn a_simulated_scan_agrees_with_itself() {
     check(&[&["simulate"][..], &pose, &["--step-deg", "9", "-o", log]].concat(), 0);
     check(&["log", "verify", "--strict", log], 0);
     let said = check(&["compare", log], 0);
-    assert!(said.contains("--scene makes one"), "{said}");
+    assert!(said.contains("--scene adds them"), "{said}");
     let said = check(&["compare", "--json", "--scene", "simple-room", log], 0);
     let json: Value = serde_json::from_str(&said).expect("one object");
     assert_eq!(json["beams"], 40);
@@ -147,13 +147,13 @@ fn a_simulated_scan_agrees_with_itself() {
 }
 
 #[test]
-fn degenerate_logs_have_clear_answers() {
+fn empty_and_partial_logs() {
     let folder = tempfile::tempdir().expect("a folder");
     let session_only = LOG.lines().next().expect("a session").to_owned() + "\n";
     for (bytes, code, part) in [
-        ("", 2, "holds no record"),
-        ("rubbish\n", 2, "holds no record"),
-        (&session_only, 0, "no reading in it"),
+        ("", 2, "contains no records"),
+        ("rubbish\n", 2, "contains no records"),
+        (&session_only, 0, "contains no readings"),
     ] {
         let log = &log_of(folder.path(), bytes);
         let said = check(&["compare", log], code);
@@ -167,7 +167,7 @@ fn degenerate_logs_have_clear_answers() {
 }
 
 #[test]
-fn readings_of_a_robot_that_moved_are_predicted_from_where_they_were_taken() {
+fn predictions_of_a_moving_robot() {
     let folder = tempfile::tempdir().expect("a folder");
     let simulated = |pose: &str| {
         let turn = ["--step-deg", "9", "--max-range", "2"];
@@ -197,7 +197,7 @@ fn readings_of_a_robot_that_moved_are_predicted_from_where_they_were_taken() {
 }
 
 #[test]
-fn logs_of_other_formats_are_rejected() {
+fn unsupported_formats() {
     let folder = tempfile::tempdir().expect("a folder");
     let out = folder.path().join("out").display().to_string();
     let picture = folder.path().join("out.svg").display().to_string();

@@ -1,15 +1,17 @@
-//! The program as a user meets it. One test binary, because each would link all of it.
+//! Tests of the program through its command line. One test binary, because each would link all of it.
 #![cfg(feature = "daemon")]
 
+mod arguments;
 mod array;
 mod collect;
 mod common;
+mod compare;
 mod course;
 mod daemon;
-mod degenerate;
 mod doctor;
 mod export;
 mod faults;
+mod file_kinds;
 mod generate;
 mod hangup;
 mod import;
@@ -21,13 +23,15 @@ mod map;
 mod outputs;
 mod paths;
 mod plot;
+mod ports;
+mod presets;
 mod readme;
+mod receive_window;
 mod scan;
+mod scan_input;
 mod scene;
 mod scene_made;
-mod small;
+mod sparse_logs;
 mod tamper;
 mod trace;
 mod whole_logs;
-mod wrong_files;
-mod wrong_input;

@@ -72,7 +72,7 @@ fn with<'a>(verb: &'a str, logs: &'a [String], further: &[&'a str]) -> Vec<&'a s
 }
 
 #[test]
-fn feature_prediction_makes_the_better_map() {
+fn feature_prediction() {
     let folder = TempDir::new().expect("a temporary folder");
     let logs = logs(folder.path());
     let path = |name: &str| folder.path().join(name).to_str().expect("plain path").to_owned();
@@ -109,7 +109,7 @@ fn feature_prediction_makes_the_better_map() {
 }
 
 #[test]
-fn an_ideal_map_scores_full_marks_against_its_scene() {
+fn ideal_map_scores_one() {
     let folder = TempDir::new().expect("a temporary folder");
     let logs = logs(folder.path());
     let [map, ideal] =
@@ -124,7 +124,7 @@ fn an_ideal_map_scores_full_marks_against_its_scene() {
 }
 
 #[test]
-fn one_scan_makes_a_map_with_free_space() {
+fn map_of_one_scan() {
     let folder = TempDir::new().expect("a temporary folder");
     let logs = logs(folder.path());
     let out = folder.path().join("map").to_str().expect("plain path").to_owned();
@@ -137,7 +137,7 @@ fn one_scan_makes_a_map_with_free_space() {
 }
 
 #[test]
-fn confidences_are_written_into_the_log_and_drawn() {
+fn annotated_confidences() {
     let folder = TempDir::new().expect("a temporary folder");
     let log = &logs(folder.path())[0];
     let path = |name: &str| folder.path().join(name).to_str().expect("plain path").to_owned();
@@ -172,7 +172,7 @@ fn confidences_are_written_into_the_log_and_drawn() {
 }
 
 #[test]
-fn laser_scans_are_refused_by_file_line_and_field() {
+fn wrong_laser_scans() {
     let folder = TempDir::new().expect("a temporary folder");
     let file = folder.path().join("laser.jsonl");
     let path = file.to_str().expect("plain path");
@@ -187,7 +187,7 @@ fn laser_scans_are_refused_by_file_line_and_field() {
             &format!(
                 r#"{{{pose},"returns":[{{"azimuth_deg":1,"range_m":1}},{{"azimuth_deg":0,"range_m":1}}]}}"#
             ),
-            "comes after",
+            "follows",
         ),
         (
             &format!(r#"{{{pose},"returns":[{{"azimuth_deg":1,"range_m":-1}}]}}"#),
@@ -204,7 +204,7 @@ fn laser_scans_are_refused_by_file_line_and_field() {
 }
 
 #[test]
-fn lines_are_drawn_and_listed() {
+fn lines() {
     let folder = TempDir::new().expect("a temporary folder");
     let logs = logs(folder.path());
     let picture = folder.path().join("lines.png").to_str().expect("plain path").to_owned();
@@ -223,7 +223,7 @@ fn lines_are_drawn_and_listed() {
 }
 
 #[test]
-fn wrong_input_is_refused_with_what_would_be_right() {
+fn wrong_input() {
     let folder = TempDir::new().expect("a temporary folder");
     let logs = logs(folder.path());
     let out = folder.path().join("map").to_str().expect("plain path").to_owned();
@@ -238,7 +238,7 @@ fn wrong_input_is_refused_with_what_would_be_right() {
         (with("map", &logs, &["--out", &out, "--resolution", "1e-9"]), "too many"),
         (with("map", &logs, &["--out", &out, "--region", "1,2,3"]), "X0,Y0,X1,Y1"),
         (with("map", &logs, &["--out", &out, "--region", "1,1,0,0"]), "no area"),
-        (with("map", &logs, &["--out", &out, "--silent-beyond", "0"]), "greater than 0"),
+        (with("map", &logs, &["--out", &out, "--max-range", "0"]), "greater than 0"),
         (vec!["lines", &empty], "sonard scan"),
         (with("lines", &logs, &["--logical", "0"]), "greater than 0"),
     ] {
@@ -249,14 +249,14 @@ fn wrong_input_is_refused_with_what_would_be_right() {
 }
 
 #[test]
-fn a_map_goes_on_from_another() {
+fn update_of_a_map() {
     let folder = TempDir::new().expect("a temporary folder");
     let logs = logs(folder.path());
     let path = |name: &str| folder.path().join(name).to_str().expect("plain path").to_owned();
     let (first, both) = (path("first"), path("both"));
-    let alone = ["--out", &first, "--region", "-1,-1,4,4", "--evidence", "1", "--json"];
+    let alone = ["--out", &first, "--region", "-1,-1,4,4", "--scan-weight", "1", "--json"];
     let of_one = object(&with("map", &logs[..1], &alone));
-    let went_on = object(&with("map", &logs[1..], &["--onto", &first, "--out", &both, "--json"]));
+    let went_on = object(&with("map", &logs[1..], &["--update", &first, "--out", &both, "--json"]));
     for kept in ["width", "height", "origin_m", "resolution_m"] {
         assert_eq!(of_one[kept], went_on[kept], "{kept}");
     }
@@ -264,7 +264,7 @@ fn a_map_goes_on_from_another() {
     let unknown = |map: &Value| map["unknown_cells"].as_u64().expect("a count");
     assert!(unknown(&went_on) < unknown(&of_one), "{of_one} {went_on}");
 
-    let refused = run(&with("map", &logs, &["--onto", &path("nowhere"), "--out", &both]));
+    let refused = run(&with("map", &logs, &["--update", &path("nowhere"), "--out", &both]));
     assert_eq!(refused.status.code(), Some(2));
     assert!(stderr(&refused).contains("nowhere"), "{}", stderr(&refused));
 }

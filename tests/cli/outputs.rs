@@ -56,7 +56,7 @@ const CASES: [Case; 37] = [
     case(
         "scene from-grid --output",
         ("map.yaml", MAP),
-        "scene from-grid IN --least-m 0 -o IN --force",
+        "scene from-grid IN --min-length-m 0 -o IN --force",
     ),
     case(
         "scene from-svg --output",
@@ -156,7 +156,7 @@ fn run_case(arguments: &str, input: &Path, folder: &Path) -> Output {
 }
 
 #[test]
-fn every_output_has_a_case() {
+fn every_output_is_tested() {
     let known: BTreeSet<String> = sonard::cli::outputs().into_iter().collect();
     let told: BTreeSet<String> = CASES.iter().map(|case| case.output.to_owned()).collect();
     let without: BTreeSet<String> = WITHOUT_INPUT.map(str::to_owned).into();
@@ -167,7 +167,7 @@ fn every_output_has_a_case() {
 }
 
 #[test]
-fn no_command_writes_over_what_it_reads() {
+fn inputs_are_not_overwritten() {
     for Case { input, arguments, .. } in CASES {
         let (folder, path) = folder_with(input);
         let output = run_case(arguments, &path, folder.path());
@@ -181,7 +181,7 @@ fn no_command_writes_over_what_it_reads() {
 }
 
 #[test]
-fn no_other_name_of_an_input_is_written_over_either() {
+fn links_to_inputs() {
     let (folder, input) = folder_with(("room.json", SCENE));
     let place = |name: &str| folder.path().join(name);
     fs::hard_link(&input, place("hard.svg")).expect("same file system");
@@ -210,7 +210,7 @@ fn no_other_name_of_an_input_is_written_over_either() {
 }
 
 #[test]
-fn a_picture_replaces_a_picture_and_nothing_else_unasked() {
+fn pictures_replace_pictures_only() {
     let (folder, scene) = folder_with(("room.json", SCENE));
     let draw = |name: &str, further: &str| {
         run_case(&format!("scene draw IN -o DIR/{name}{further}"), &scene, folder.path())
@@ -249,7 +249,7 @@ fn a_picture_replaces_a_picture_and_nothing_else_unasked() {
 }
 
 #[test]
-fn a_log_that_was_measured_or_simulated_is_not_replaced_unasked() {
+fn logs_need_force() {
     let (folder, log) = folder_with(("measured.jsonl", LOG));
     let to_log = "simulate --scene simple-room --pose fig9 --to-deg 9 -o IN";
     let refused = run_case(to_log, &log, folder.path());
@@ -264,7 +264,7 @@ fn a_log_that_was_measured_or_simulated_is_not_replaced_unasked() {
 }
 
 #[test]
-fn map_replaces_its_own_files_only() {
+fn maps_replace_maps_only() {
     let (folder, log) = folder_with(("scan.jsonl", LOG));
     let simulate = "simulate --scene simple-room --pose fig9 -o DIR/fig9.jsonl";
     assert!(run_case(simulate, &log, folder.path()).status.success());

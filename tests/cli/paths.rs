@@ -15,7 +15,7 @@ fn lines(args: &[&str]) -> Vec<Value> {
 }
 
 #[test]
-fn json_lists_the_false_wall_of_figure_9_with_its_path() {
+fn json_of_figure_9() {
     let lines = lines(&["--scene", "simple-room", "--pose", "fig9", "--max-range", "1", "--json"]);
     let length = |line: &Value| line["length_m"].as_f64().expect("a number");
     assert!(lines.windows(2).all(|pair| length(&pair[0]) <= length(&pair[1])));
@@ -37,14 +37,14 @@ fn json_lists_the_false_wall_of_figure_9_with_its_path() {
 }
 
 #[test]
-fn the_table_names_paths_and_max_order_limits_them() {
+fn table_and_max_order() {
     paths(&["--scene", "simple-room", "--pose", "fig9", "--max-range", "1", "--max-order", "1"])
         .success()
         .stdout(contains("south").and(contains("4 paths")).and(contains("south, east").not()));
 }
 
 #[test]
-fn an_azimuth_puts_transmitter_and_receiver_where_they_are_when_the_ranger_looks_there() {
+fn azimuth_moves_the_transducers() {
     let folder = tempfile::tempdir().expect("a folder");
     let scene = folder.path().join("wall.json");
     let text = r#"{"name":"wall","materials":{"brick":{"reflectance":1}},
@@ -67,8 +67,8 @@ fn an_azimuth_puts_transmitter_and_receiver_where_they_are_when_the_ranger_looks
 }
 
 #[test]
-fn wrong_input_is_refused_with_what_would_be_right() {
-    paths(&["--scene", "simple-room", "--pose", "fig9", "--weakest", "0"])
+fn wrong_input() {
+    paths(&["--scene", "simple-room", "--pose", "fig9", "--min-amplitude", "0"])
         .code(2)
         .stderr(contains("from 0.000001 to 1"));
     paths(&["--scene", "simple-room", "--pose", "nowhere"]).code(2).stderr(contains("fig7"));

@@ -49,7 +49,7 @@ fn folder_with_log() -> TempDir {
 }
 
 #[test]
-fn writes_svg_and_png_with_the_walls_of_the_shipped_scene() {
+fn svg_and_png() {
     let folder = folder_with_log();
     sonard(folder.path())
         .args(["scan.jsonl", "-o", "a.svg", "-o", "b.png", "--width", "640"])
@@ -65,7 +65,7 @@ fn writes_svg_and_png_with_the_walls_of_the_shipped_scene() {
 }
 
 #[test]
-fn reads_standard_input_and_writes_svg_to_a_pipe() {
+fn standard_input_and_output() {
     let folder = folder_with_log();
     for kind in ["scan", "polar", "residuals"] {
         sonard(folder.path())
@@ -78,7 +78,7 @@ fn reads_standard_input_and_writes_svg_to_a_pipe() {
 }
 
 #[test]
-fn draws_the_scan_that_is_asked_for() {
+fn selected_scan() {
     let folder = folder_with_log();
     for wanted in ["2", "1000", SCAN[1]] {
         sonard(folder.path())
@@ -90,12 +90,12 @@ fn draws_the_scan_that_is_asked_for() {
 }
 
 #[test]
-fn wrong_input_is_refused_with_what_would_be_right() {
+fn wrong_input() {
     let folder = folder_with_log();
     fs::write(folder.path().join("empty.jsonl"), "").expect("written");
     let cases: [(&[&str], &str); 7] = [
         (&["nowhere.jsonl", "-o", "a.svg"], "nowhere.jsonl"),
-        (&["empty.jsonl", "-o", "a.svg"], "holds no record"),
+        (&["empty.jsonl", "-o", "a.svg"], "contains no records"),
         (&["scan.jsonl", "-o", "a.pdf"], ".svg or .png"),
         (&["scan.jsonl", "-o", "a.svg", "--scan", "3"], "1 to 2"),
         (&["scan.jsonl", "-o", "a.svg", "--scan", "ff"], "no such scan"),
@@ -114,7 +114,7 @@ fn wrong_input_is_refused_with_what_would_be_right() {
 }
 
 #[test]
-fn damaged_lines_are_named_and_the_rest_is_drawn() {
+fn damaged_lines_are_skipped() {
     let folder = folder_with_log();
     let damaged = log().replacen("\"type\":\"scan_start\"", "\"type\":\"scan_strat\"", 1);
     sonard(folder.path())
@@ -123,5 +123,5 @@ fn damaged_lines_are_named_and_the_rest_is_drawn() {
         .assert()
         .success()
         .stdout(contains("</svg>"))
-        .stderr(contains("line 2").and(contains("left out")));
+        .stderr(contains("line 2").and(contains("skipped")));
 }

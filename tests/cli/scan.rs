@@ -10,7 +10,7 @@ fn number(value: &Value) -> f64 {
 }
 
 #[test]
-fn the_false_lower_wall_of_figure_9_is_seen() {
+fn false_wall_of_figure_9() {
     let folder = tempfile::tempdir().expect("a folder");
     let output = mock_scan("fig9", folder.path(), &[]);
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
@@ -35,7 +35,7 @@ fn the_false_lower_wall_of_figure_9_is_seen() {
 }
 
 #[test]
-fn sound_that_still_bounces_when_the_receiver_opens_gives_the_minimum_range() {
+fn minimum_range() {
     let folder = tempfile::tempdir().expect("a folder");
     assert_eq!(mock_scan("fig7", folder.path(), &[]).status.code(), Some(0));
     let log = Log::read(&folder.path().join("scan.jsonl"));
@@ -48,7 +48,7 @@ fn sound_that_still_bounces_when_the_receiver_opens_gives_the_minimum_range() {
 }
 
 #[test]
-fn a_mock_is_logged_as_a_mock_however_its_port_was_opened() {
+fn mock_provenance() {
     let folder = tempfile::tempdir().expect("a folder");
     let mock = crate::common::MockProcess::start(folder.path(), &[]);
     let port = mock.port().to_owned();
@@ -66,7 +66,7 @@ fn a_mock_is_logged_as_a_mock_however_its_port_was_opened() {
 }
 
 #[test]
-fn records_flow_through_a_pipe_into_a_comparison() {
+fn pipe_into_compare() {
     let scan = run(&[
         "scan",
         "--mock",
@@ -104,7 +104,7 @@ fn records_flow_through_a_pipe_into_a_comparison() {
 }
 
 #[test]
-fn a_warmer_truth_shows_as_a_bias_that_grows_with_range() {
+fn temperature_bias() {
     let folder = tempfile::tempdir().expect("a folder");
     let further = ["--truth-temperature-c", "25", "--noise-mm", "0"];
     assert_eq!(mock_scan("fig9", folder.path(), &further).status.code(), Some(0));
@@ -121,7 +121,7 @@ fn a_warmer_truth_shows_as_a_bias_that_grows_with_range() {
 }
 
 #[test]
-fn missed_steps_are_found_when_the_motor_goes_home() {
+fn missed_steps_found_by_homing() {
     let folder = tempfile::tempdir().expect("a folder");
     let output = mock_scan("fig9", folder.path(), &["--missed-steps", "0.02", "--max-range", "3"]);
     assert_eq!(output.status.code(), Some(0));
@@ -134,7 +134,7 @@ fn missed_steps_are_found_when_the_motor_goes_home() {
 }
 
 #[test]
-fn a_second_run_into_the_same_folder_keeps_the_first() {
+fn second_run_appends() {
     let folder = tempfile::tempdir().expect("a folder");
     let few = ["--to-deg", "9"];
     assert_eq!(mock_scan("fig9", folder.path(), &few).status.code(), Some(0));
@@ -146,7 +146,7 @@ fn a_second_run_into_the_same_folder_keeps_the_first() {
 }
 
 #[test]
-fn in_real_time_nothing_but_acoustics_and_motor_takes_time() {
+fn real_time_duration() {
     let folder = tempfile::tempdir().expect("a folder");
     let output = mock_scan("fig9", folder.path(), &["--realtime", "--max-range", "4"]);
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
@@ -163,4 +163,21 @@ fn in_real_time_nothing_but_acoustics_and_motor_takes_time() {
     let ticks = number(&pings[399]["fired_ticks"]) - number(&pings[0]["fired_ticks"]);
     assert!((wall_s - ticks / 2e6).abs() < 0.02, "{wall_s} s for {ticks} ticks");
     assert!(number(&pings[200]["time_sigma_us"]) < 20_000.0);
+}
+
+#[test]
+fn link_statistics_per_scan() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let out = folder.path().to_str().expect("plain path");
+    let scan = ["scan", "--mock", "--scene", "simple-room", "--pose", "fig9", "--max-range", "2"];
+    let output = run(&[&scan[..], &["--to-deg", "90", "--repeat", "3", "--out", out]].concat());
+    let text = stderr(&output);
+    let received: Vec<f64> = text
+        .lines()
+        .filter_map(|line| line.trim().strip_prefix("link: ")?.split(' ').next()?.parse().ok())
+        .collect();
+    let [first, second, third, all] = received[..] else { panic!("{text}") };
+    assert!((first + second + third - all).abs() < 0.5, "{text}");
+    assert!(third < 1.5 * first && second > 0.5 * first, "{text}");
+    assert!(text.contains("total 3 scans"), "{text}");
 }

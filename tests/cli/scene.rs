@@ -21,14 +21,14 @@ fn written(folder: &Path, text: &str) -> String {
 }
 
 #[test]
-fn check_says_in_a_line_what_a_scene_holds() {
+fn check_summary() {
     scene(&["check", "simple-room"])
         .success()
         .stdout("simple-room: 4 walls, 0 cylinders, 2 poses (fig7, fig9), 0.928 x 0.742 m\n");
 }
 
 #[test]
-fn check_points_at_the_line_and_exits_with_2() {
+fn check_reports_the_line() {
     let folder = tempdir().expect("a folder");
     let path = written(folder.path(), "{\"name\": \"r\",\n \"materials\": {},\n \"wals\": []}");
     scene(&["check", &path])
@@ -42,7 +42,7 @@ fn check_points_at_the_line_and_exits_with_2() {
 }
 
 #[test]
-fn check_lists_what_is_not_taken_as_drawn_and_draw_shows_the_plan() {
+fn check_lists_plan_changes() {
     let folder = tempdir().expect("a folder");
     let wall = |id: &str, ends: [[f64; 2]; 2]| serde_json::json!({"id": id, "from": ends[0], "to": ends[1], "material": "m"});
     let walls = [
@@ -80,7 +80,7 @@ fn check_lists_what_is_not_taken_as_drawn_and_draw_shows_the_plan() {
 }
 
 #[test]
-fn a_fault_in_a_line_without_end_is_shown_in_part() {
+fn error_in_a_very_long_line() {
     let folder = tempdir().expect("a folder");
     let walls = "[1,".repeat(1_000_000);
     let path = written(folder.path(), &format!("{{\"name\": \"r\", \"walls\": [1 2{walls}"));
@@ -91,7 +91,7 @@ fn a_fault_in_a_line_without_end_is_shown_in_part() {
 }
 
 #[test]
-fn a_transducer_in_the_floor_is_refused() {
+fn transducer_below_the_floor() {
     let folder = tempdir().expect("a folder");
     let room = r#"{"name": "r", "materials": {}, "floor_z_m": 0, "ceiling_z_m": 2.5}"#;
     let path = written(folder.path(), room);
@@ -104,7 +104,7 @@ fn a_transducer_in_the_floor_is_refused() {
 }
 
 #[test]
-fn check_refuses_a_pose_outside_the_room() {
+fn pose_outside_the_room() {
     scene(&["check", "simple-room", "--pose", "2,0.3"])
         .code(2)
         .stderr(contains("outside the room").and(contains("x 0 to 0.928 m")));
@@ -114,7 +114,7 @@ fn check_refuses_a_pose_outside_the_room() {
 }
 
 #[test]
-fn a_scene_that_is_not_there_is_said_so() {
+fn missing_scene() {
     scene(&["check", "simple-rom"]).code(2).stderr(contains("did you mean `simple-room`?"));
     let folder = tempdir().expect("a folder");
     scene(&["check", folder.path().to_str().expect("UTF-8")]).code(2);
@@ -124,7 +124,7 @@ fn a_scene_that_is_not_there_is_said_so() {
 }
 
 #[test]
-fn a_file_wins_over_a_shipped_scene_of_that_name() {
+fn file_precedes_shipped_scene() {
     let folder = tempdir().expect("a folder");
     fs::write(folder.path().join("simple-room"), r#"{"name": "mine", "materials": {}}"#)
         .expect("a scene file");
@@ -137,7 +137,7 @@ fn a_file_wins_over_a_shipped_scene_of_that_name() {
 }
 
 #[test]
-fn draw_writes_svg_and_png() {
+fn draw_svg_and_png() {
     let folder = tempdir().expect("a folder");
     let svg = folder.path().join("room.svg");
     let png = folder.path().join("room.png");
@@ -157,12 +157,12 @@ fn draw_writes_svg_and_png() {
 }
 
 #[test]
-fn schema_prints_the_committed_one() {
+fn schema_is_committed() {
     scene(&["schema"]).success().stdout(include_str!("../../scenes/scene.schema.json"));
 }
 
 #[test]
-fn list_names_every_shipped_scene() {
+fn list() {
     let shown = scene(&["list"]).success().get_output().stdout.clone();
     let shown = String::from_utf8(shown).expect("UTF-8");
     for name in sonard::scene::shipped::names() {

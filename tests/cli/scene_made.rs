@@ -31,7 +31,7 @@ fn made(arguments: &[&str]) -> Scene {
 }
 
 #[test]
-fn a_map_becomes_the_scene_that_it_was_made_of() {
+fn map_round_trip() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = |name: &str| folder.path().join(name).to_str().expect("a plain path").to_owned();
     let log = path("log.jsonl");
@@ -102,7 +102,7 @@ fn a_map_becomes_the_scene_that_it_was_made_of() {
 }
 
 #[test]
-fn lines_of_a_drawing_become_walls_to_scale() {
+fn svg_scale() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("plan.svg");
     let drawing = path.to_str().expect("a plain path");
@@ -135,7 +135,7 @@ fn lines_of_a_drawing_become_walls_to_scale() {
     let round: Vec<_> = scene.walls.iter().filter(|wall| wall.id.starts_with("wall-3.")).collect();
     assert!(round.len() > 12, "{}", round.len());
     assert!(round.iter().all(|wall| (wall.a.distance((1.0, 2.0).into()) - 0.2).abs() < 1e-3));
-    for (content, part) in [("<text x='9'>nothing</text>", "no wall"), ("<path d='", "SVG")] {
+    for (content, part) in [("<text x='9'>nothing</text>", "no walls"), ("<path d='", "SVG")] {
         write(content);
         refused(&["scene", "from-svg", drawing, "--width-m", "4"], part);
     }
@@ -243,7 +243,7 @@ const HIDDEN: &[(i32, &str)] =
     &[(0, "LINE"), (8, "A-ANNO"), (10, "0"), (20, "0"), (11, "4000"), (21, "3000")];
 
 #[test]
-fn a_drawing_of_a_cad_program_becomes_walls_and_columns_in_its_units() {
+fn dxf_units() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("plan.dxf");
     let drawing = path.to_str().expect("a plain path");
@@ -251,7 +251,7 @@ fn a_drawing_of_a_cad_program_becomes_walls_and_columns_in_its_units() {
     let all = [ROOM, BAY, OLD_LINE, LINE, COLUMN, ARC, BLOCK, HIDDEN];
     fs::write(&path, dxf("4", &layers, &all)).expect("writable");
     let output = run(&["scene", "from-dxf", drawing]);
-    assert!(stderr(&output).contains("left out: 1 blocks"), "{}", stderr(&output));
+    assert!(stderr(&output).contains("ignored: 1 blocks"), "{}", stderr(&output));
     let scene = made(&["scene", "from-dxf", drawing]);
     let near =
         |a: DVec2, x: f64, y: f64| assert!(a.distance((x, y).into()) < 1e-3, "{a} is not {x}, {y}");
@@ -275,11 +275,11 @@ fn a_drawing_of_a_cad_program_becomes_walls_and_columns_in_its_units() {
     let scene = made(&["scene", "from-dxf", drawing, "--layer", "A-ANNO", "--unit-m", "0.01"]);
     let [wall] = &scene.walls[..] else { panic!("{:?}", scene.walls) };
     near(wall.b, 40.0, 30.0);
-    refused(&["scene", "from-dxf", drawing, "--layer", "A-WALLS"], "nothing is on layer `A-WALLS`");
+    refused(&["scene", "from-dxf", drawing, "--layer", "A-WALLS"], "layer `A-WALLS` is empty");
 }
 
 #[test]
-fn a_drawing_without_units_or_walls_and_no_drawing_are_refused() {
+fn unusable_drawings() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("plan.dxf");
     let drawing = path.to_str().expect("a plain path");
@@ -287,9 +287,9 @@ fn a_drawing_without_units_or_walls_and_no_drawing_are_refused() {
     let time = dxf("6\n  9\n$TDCREATE\n 40\n1e300", &[], &[LINE]);
     for (text, part) in [
         (dxf("0", &[], &[LINE]), "--unit-m"),
-        (dxf("6", &[], &[BLOCK]), "no wall"),
-        (dxf("6", &[], &[LINE]).replace("3500", "wide"), "no DXF"),
-        ("hello".to_owned(), "no DXF"),
+        (dxf("6", &[], &[BLOCK]), "no walls"),
+        (dxf("6", &[], &[LINE]).replace("3500", "wide"), "invalid DXF"),
+        ("hello".to_owned(), "invalid DXF"),
         (String::new(), "$INSUNITS"),
         (time, "out of range"),
     ] {
@@ -328,13 +328,13 @@ const WORLD: &str = r#"<?xml version="1.0"?>
 </world></sdf>"#;
 
 #[test]
-fn what_a_world_of_gazebo_has_at_the_rangers_height_becomes_a_scene() {
+fn sdf_slice() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("arena.sdf");
     let world = path.to_str().expect("a plain path");
     fs::write(&path, WORLD).expect("writable");
     let output = run(&["scene", "from-sdf", world]);
-    for part in ["1 models from elsewhere", "1 bodies that lean"] {
+    for part in ["1 models from elsewhere", "1 tilted objects"] {
         assert!(stderr(&output).contains(part), "{}", stderr(&output));
     }
     let scene = made(&["scene", "from-sdf", world]);

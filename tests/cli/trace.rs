@@ -11,7 +11,7 @@ fn sonard(args: &[&str]) -> assert_cmd::assert::Assert {
 }
 
 #[test]
-fn json_has_the_signal_the_peaks_and_what_was_made_of_them() {
+fn json() {
     let assert =
         sonard(&["trace", "--scene", "echo-traces", "--pose", "d", "--until", "2.5", "--json"]);
     let trace: Value =
@@ -38,20 +38,22 @@ fn json_has_the_signal_the_peaks_and_what_was_made_of_them() {
 }
 
 #[test]
-fn the_table_says_what_a_silence_lacks_and_what_blanking_hides() {
+fn table() {
     sonard(&["trace", "--scene", "echo-traces", "--pose", "a"])
         .success()
-        .stdout(contains("no echo, and nothing that comes near"));
+        .stdout(contains("no echo, and no arrival near the threshold"));
     sonard(&["trace", "--scene", "right-angle-corner", "--pose", "robot", "--azimuth-deg", "199"])
         .success()
-        .stdout(contains("no echo; the best candidate by").and(contains("lacks")));
+        .stdout(
+            contains("no echo; the strongest arrival via").and(contains("below the threshold")),
+        );
     sonard(&["trace", "--scene", "simple-room", "--pose", "fig7", "--azimuth-deg", "90"])
         .success()
         .stdout(contains("minimum range").and(contains("north")));
 }
 
 #[test]
-fn a_faint_peak_that_stands_alone_has_a_number_too() {
+fn isolated_faint_peak() {
     let folder = tempfile::tempdir().expect("a folder");
     let svg = folder.path().join("trace.svg");
     let svg = svg.to_str().expect("plain");
@@ -62,7 +64,7 @@ fn a_faint_peak_that_stands_alone_has_a_number_too() {
 }
 
 #[test]
-fn pictures_and_ways_are_drawn_and_wrong_input_is_refused() {
+fn pictures_and_wrong_input() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = |name: &str| folder.path().join(name).to_str().expect("plain").to_owned();
     let (log, svg, way) = (path("fig9.jsonl"), path("trace.svg"), path("way.svg"));
@@ -95,7 +97,7 @@ fn pictures_and_ways_are_drawn_and_wrong_input_is_refused() {
 }
 
 #[test]
-fn noise_repeats_with_its_seed() {
+fn noise_depends_on_the_seed() {
     let scan = |seed: &str| {
         let args = [
             "simulate",

@@ -35,7 +35,7 @@ fn scanned_room() -> tempfile::TempDir {
 }
 
 #[test]
-fn a_log_of_ones_own_room_is_drawn_mapped_and_interpreted_without_its_file() {
+fn scene_from_the_log() {
     let folder = scanned_room();
     let drawn = |words: &str, name: &str| {
         let (_, said) = succeed(words, folder.path());
@@ -55,7 +55,7 @@ fn a_log_of_ones_own_room_is_drawn_mapped_and_interpreted_without_its_file() {
 }
 
 #[test]
-fn a_log_without_predictions_is_compared_in_the_scene_that_it_holds() {
+fn predictions_in_the_logged_scene() {
     let folder = scanned_room();
     let log = folder.path().join("scan/scan.jsonl");
     let bare: String = Log::read(&log)
@@ -81,7 +81,7 @@ fn a_log_without_predictions_is_compared_in_the_scene_that_it_holds() {
 }
 
 #[test]
-fn a_text_that_is_not_the_sessions_scene_is_not_taken_for_it() {
+fn modified_scene_is_rejected() {
     let folder = scanned_room();
     let log = folder.path().join("scan/scan.jsonl");
     let text = fs::read_to_string(&log).expect("there");

@@ -271,7 +271,7 @@ impl<D: Device, W: Watcher> Collector<D, W> {
         ));
         if whole && given_up > 0 {
             return Err(Halt::Stopped(format!(
-                "{given_up} scans were given up: report.md says why; --retry-given-up tries again"
+                "{given_up} scans were given up: report.md says why; --retry-failed tries again"
             )));
         }
         Ok(())

@@ -176,14 +176,14 @@ impl Ranges {
                     constant.why
                 ),
                 help: format!(
-                    "if they stand for no echo: --none-from={value}; if they are distances: --as-said"
+                    "if they stand for no echo: --no-echo-from={value}; if they are distances: --no-unit-check"
                 ),
             }
         } else {
             ImportError::Doubtful {
                 what: format!("{count} of {of} ranges are {value} {unit}{first}: {}", constant.why),
                 help: format!(
-                    "if that stands for no echo: {}; if it is a distance: --as-said",
+                    "if that stands for no echo: {}; if it is a distance: --no-unit-check",
                     ways.mapping.none_option(&[value])
                 ),
             }
@@ -205,13 +205,13 @@ impl Ranges {
         let units = ways.units(self, taken);
         let none_from = 2.0 * taken.longest_m / metres;
         let help = if 2 * far >= echoes && !units.is_empty() {
-            format!("is the unit right? {}; --as-said takes it as it is", units.join(" | "))
+            format!("is the unit right? {}; --no-unit-check takes it as it is", units.join(" | "))
         } else if 2 * far >= echoes {
-            "is the unit right, and the sensor? --sensor NAME; --as-said takes them as they are"
+            "is the unit right, and the sensor? --sensor NAME; --no-unit-check takes them as they are"
                 .to_owned()
         } else {
             format!(
-                "mixed units? If they stand for no echo: --none-from={none_from:.3}; --as-said takes them as they are"
+                "mixed units? If they stand for no echo: --no-echo-from={none_from:.3}; --no-unit-check takes them as they are"
             )
         };
         Err(ImportError::Doubtful { what, help })
@@ -233,11 +233,11 @@ impl Ranges {
         let units = ways.units(self, taken);
         let help = match units.is_empty() {
             true => {
-                "is the unit right, and the sensor? --sensor NAME; --as-said takes them as they are"
+                "is the unit right, and the sensor? --sensor NAME; --no-unit-check takes them as they are"
                     .to_owned()
             }
             false => {
-                format!("is the unit right? {}; --as-said takes it as it is", units.join(" | "))
+                format!("is the unit right? {}; --no-unit-check takes it as it is", units.join(" | "))
             }
         };
         Err(ImportError::Doubtful { what, help })
@@ -316,14 +316,14 @@ impl Doubts {
                     "{field} goes from {low:.1} to {high:.1} rad, {:.0} turns",
                     most / std::f64::consts::TAU
                 ),
-                help: format!("if these are degrees: {option}; --as-said takes them as they are"),
+                help: format!("if these are degrees: {option}; --no-unit-check takes them as they are"),
             });
         }
         let is_like_radians = most <= MAX_RAD && !self.are_whole && high - low > 0.3;
         if field.unit() == Some("deg") && is_like_radians {
             return Err(ImportError::Doubtful {
                 what: format!("{field} goes from {low:.3} to {high:.3}, as radians would"),
-                help: format!("if these are radians: {option}; if they are degrees: --as-said"),
+                help: format!("if these are radians: {option}; if they are degrees: --no-unit-check"),
             });
         }
         Ok(())
@@ -349,7 +349,7 @@ impl Doubts {
                 named.join(" and ")
             ),
             help: format!(
-                "leave them out: {}; --as-said takes them as the place of the robot",
+                "leave them out: {}; --no-unit-check takes them as the place of the robot",
                 crate::mapping::columns_option(columns, ways.names)
             ),
         })

@@ -294,7 +294,7 @@ pub(crate) fn check_beyond(
             notes.readings,
             notes.most()
         ),
-        help: "are ranges and limits in different units? Correct the driver; --as-said takes all as no echo".to_owned(),
+        help: "are ranges and limits in different units? Correct the driver; --no-unit-check takes all as no echo".to_owned(),
     })
 }
 
@@ -309,7 +309,7 @@ fn check_one_row(found: &Imported, readings: u64) -> Result<(), ImportError> {
     }
     Err(ImportError::Doubtful {
         what: format!("the file is one row of {values} values, of which {columns} are read"),
-        help: "have its line ends been lost? Give a file with a reading a line; --as-said takes the row as it is".to_owned(),
+        help: "have its line ends been lost? Give a file with a reading a line; --no-unit-check takes the row as it is".to_owned(),
     })
 }
 

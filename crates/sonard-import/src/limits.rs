@@ -87,7 +87,7 @@ impl LimitNotes {
         let mut lines = Vec::new();
         if self.zeros > 0 {
             lines.push(format!(
-                "{} of {of} ranges are 0 or less, which REP 117 has no meaning for: taken as no echo, as by --none 0",
+                "{} of {of} ranges are 0 or less, which REP 117 has no meaning for: taken as no echo, as by --no-echo 0",
                 self.zeros
             ));
         }

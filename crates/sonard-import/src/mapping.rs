@@ -203,10 +203,10 @@ impl Mapping {
         self.range_unit.unwrap_or(RangeUnit::M).metres()
     }
 
-    /// The option `--none` with further values, those given before among them.
+    /// The option `--no-echo` with further values, those given before among them.
     pub(crate) fn none_option(&self, more: &[f64]) -> String {
         let values = self.none.iter().chain(more);
-        values.map(|value| format!("--none={value}")).collect::<Vec<_>>().join(" ")
+        values.map(|value| format!("--no-echo={value}")).collect::<Vec<_>>().join(" ")
     }
 
     /// The option `--columns` with one field in place of another of its quantity.

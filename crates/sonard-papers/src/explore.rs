@@ -65,7 +65,7 @@ pub struct ExploreSettings {
     /// Minimum distance of the robot's centre from known obstacles, metres.
     pub keep_off_m: f64,
     /// Maximum number of stops.
-    pub most_stops: usize,
+    pub max_stops: usize,
     /// Settings of the line map.
     pub map: LineMapSettings,
 }
@@ -77,7 +77,7 @@ impl Default for ExploreSettings {
             sonar_stride_m: 0.45,
             laser_stride_m: 1.0,
             keep_off_m: 0.28,
-            most_stops: 400,
+            max_stops: 400,
             // `gap_m`: sonar follows a wall only up to a gap before the corner that the laser
             // measures, and both parts are one wall. `least_length_m`: sonar lines at a corner that
             // the laser measured are too short for walls.

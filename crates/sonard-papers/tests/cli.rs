@@ -82,7 +82,7 @@ fn exploration_depends_on_the_seed() {
 #[test]
 fn explore_table_has_every_room() {
     let arguments =
-        ["benchmark", "explore", "--rooms", "2", "--sonar-range", "3.2", "--most-stops", "60"];
+        ["benchmark", "explore", "--rooms", "2", "--sonar-range", "3.2", "--max-stops", "60"];
     let output = run(&arguments);
     assert!(output.status.success(), "{}", stderr(&output));
     let table = String::from_utf8_lossy(&output.stdout).into_owned();

@@ -1,4 +1,4 @@
-//! What a calibration found, as lines and files.
+//! Results of a calibration as text and files.
 
 use std::{fmt::Write as _, path::Path};
 
@@ -13,7 +13,7 @@ use crate::{
     scan::AirRecord,
 };
 
-/// Files of the folder.
+/// Files in the output folder.
 const FILES: [&str; 7] = [
     "estimates.jsonl",
     "correlations.csv",
@@ -23,13 +23,13 @@ const FILES: [&str; 7] = [
     "air.json",
     "report.md",
 ];
-/// So many pairs that can hardly be told apart are named: of many scans there are hundreds.
-const PAIRS: usize = 8;
+/// Maximum number of listed pairs of correlated parameters; many scans have hundreds.
+const MAX_PAIRS: usize = 8;
 
-/// How well it fits, in sentences, with those that say what may be wrong.
-pub(super) fn fit_words(lines: &[Told], fitted: &Fitted, doubts: Vec<String>) -> Vec<String> {
+/// Summarizes the quality of the fit, with the given diagnoses, one sentence per line.
+pub(super) fn summarize(lines: &[Told], fitted: &Fitted, diagnoses: Vec<String>) -> Vec<String> {
     let errors = &fitted.errors;
-    let mut said = vec![format!(
+    let mut text = vec![format!(
         "{} readings: {:.0} % explained, ranges within {:.1} mm (standard deviation), strengths within {:.1} dB",
         fitted.readings,
         100.0 * errors.explained(),
@@ -38,8 +38,8 @@ pub(super) fn fit_words(lines: &[Told], fitted: &Fitted, doubts: Vec<String>) ->
     )];
     let is_furnished = errors.arcs > 0.0;
     if is_furnished {
-        said.push(format!(
-            "{:.0} % are taken for things that the scene lacks, of {:.0} beams on average",
+        text.push(format!(
+            "{:.0} % are attributed to objects that are not in the scene, {:.0} beams wide on average",
             100.0 * errors.arcs,
             errors.arc_beams
         ));
@@ -47,38 +47,40 @@ pub(super) fn fit_words(lines: &[Told], fitted: &Fitted, doubts: Vec<String>) ->
     if fitted.is_doubtful() {
         let furniture =
             if is_furnished { "" } else { ", or allow for furniture with --search furnished" };
-        said.push(format!(
-            "doubt: a good part of the readings is not explained; see `sonard locate` whether the scene is the \
-             right one, and free what else may be wrong with --fit{furniture}"
+        text.push(format!(
+            "warning: many readings are unexplained; check with `sonard locate` whether the scene is the \
+                    right one, and fit further parameters with --fit{furniture}"
         ));
     }
-    said.extend(doubts);
+    text.extend(diagnoses);
     let pairs = fitted.hardly_told_apart();
-    for &(one, other, correlation) in pairs.iter().take(PAIRS) {
-        let [one, other] = [&lines[one], &lines[other]].map(Told::title);
-        said.push(format!("hardly told apart: {one} and {other} (correlation {correlation:.2})"));
+    for &(a, b, correlation) in pairs.iter().take(MAX_PAIRS) {
+        let [a, b] = [&lines[a], &lines[b]].map(Told::title);
+        text.push(format!("strongly correlated: {a} and {b} ({correlation:.2})"));
     }
-    if pairs.len() > PAIRS {
-        let more = pairs.len() - PAIRS;
-        said.push(format!(
-            "hardly told apart: {more} more pairs, all in correlations.csv of --out"
+    if pairs.len() > MAX_PAIRS {
+        let more = pairs.len() - MAX_PAIRS;
+        text.push(format!(
+            "strongly correlated: {more} more pairs, all in correlations.csv of --out"
         ));
     }
-    said
+    text
 }
 
-/// Whether the folder may be written to; before any work.
+/// Checks, before any work, that the files may be written to the folder.
 ///
 /// # Errors
-/// A file of the same name in it.
+///
+/// A file that may not be replaced.
 pub(super) fn check(folder: &Path, overwrite: Overwrite) -> Outcome {
     FILES.iter().try_for_each(|name| overwrite.check_in(folder, name, Product::Log))
 }
 
-/// Writes what was found, as files that other verbs take.
+/// Writes the results as files that other verbs read.
 ///
 /// # Errors
-/// What the disk refuses.
+///
+/// Write errors.
 pub(super) fn write_folder(
     folder: &Path,
     overwrite: Overwrite,
@@ -86,7 +88,7 @@ pub(super) fn write_folder(
     sweeps: &[Sweep],
     fitted: &Fitted,
     lines: &[Told],
-    words: &[String],
+    summary: &[String],
 ) -> Outcome {
     make_folder(folder)?;
     let poses: String = sweeps
@@ -107,27 +109,29 @@ pub(super) fn write_folder(
         json(&fitted.sensor(&world.sensor)),
         fitted.world.scene.rewritten(),
         json(&AirRecord::from(&fitted.world.air)),
-        report(lines, words),
+        format_report(lines, summary),
     ];
     FILES.iter().zip(contents).try_for_each(|(name, text)| {
         overwrite.save(&folder.join(name), Product::Log, text.as_bytes())
     })
 }
 
-/// A value as a line of JSON.
+/// Serializes a value as a line of JSON.
 fn json(value: &impl Serialize) -> String {
     // Numbers, texts and maps with text keys can always be written.
     serde_json::to_string(value).unwrap_or_default() + "\n"
 }
 
-/// The matrix of correlations, each row and column under the name of its estimate.
+/// Formats the correlation matrix as CSV with the parameters' titles as headers.
 fn correlations(lines: &[Told], fitted: &Fitted) -> String {
     let titles = || lines.iter().map(Told::title);
     let figures = fitted.correlations();
     let mut table = csv::Writer::from_writer(Vec::new());
     let mut rows = vec![[String::new()].into_iter().chain(titles()).collect::<Vec<_>>()];
     for (title, row) in titles().zip(figures.row_iter()) {
-        rows.push([title].into_iter().chain(row.iter().map(|of| format!("{of:.4}"))).collect());
+        rows.push(
+            [title].into_iter().chain(row.iter().map(|value| format!("{value:.4}"))).collect(),
+        );
     }
     // Rows of one length are always written to memory.
     rows.iter().for_each(|row| table.write_record(row).unwrap_or_default());
@@ -135,23 +139,23 @@ fn correlations(lines: &[Told], fitted: &Fitted) -> String {
     String::from_utf8_lossy(&bytes).into_owned()
 }
 
-fn report(lines: &[Told], words: &[String]) -> String {
+fn format_report(lines: &[Told], summary: &[String]) -> String {
     let mut text = String::from("# Calibration\n\n");
-    for line in words {
+    for line in summary {
         let _ = writeln!(text, "{line}\n");
     }
     text.push_str(
-        "| parameter | was | believed within | is | standard deviation | told by the readings |\n",
+        "| parameter | initial | prior sigma | estimate | standard deviation | identifiable |\n",
     );
     text.push_str("| --- | --- | --- | --- | --- | --- |\n");
     for line in lines {
-        let told = match line.remark() {
+        let identifiable = match line.remark() {
             "" => "yes".to_owned(),
             remark => format!("no: {remark}"),
         };
         let _ = writeln!(
             text,
-            "| {} | {:.5} | {:.5} | {:.5} | {:.5} | {told} |",
+            "| {} | {:.5} | {:.5} | {:.5} | {:.5} | {identifiable} |",
             line.title(),
             line.prior,
             line.prior_sigma,

@@ -1,9 +1,9 @@
-//! A plan for a daemon: what the plan leaves open is as the daemon has it; where it says otherwise it is
-//! refused.
+//! Adapts a plan to a daemon: keys that the plan leaves open take the daemon's values, conflicting
+//! keys are errors.
 
 use serde_json::Value;
 
-use super::load::{Places, sensor};
+use super::load::{Origins, sensor};
 use crate::{
     acoustics::Sensor,
     api::{Setup, Status},
@@ -12,10 +12,11 @@ use crate::{
     model::OptionKeys,
 };
 
-/// Takes over what a daemon decides by itplan.
+/// Adopts the settings that the daemon determines.
 ///
 /// # Errors
-/// When the plan wants something of that otherwise: all of it, with the key to change.
+///
+/// The plan sets other values; the message lists each key to change.
 pub(super) fn adopt(plan: &mut Plan, daemon: &ByDaemon, status: &Status) -> Result<(), Failure> {
     let setup = daemon.setup();
     let mut differences = adopt_motion(plan, setup);
@@ -28,12 +29,16 @@ pub(super) fn adopt(plan: &mut Plan, daemon: &ByDaemon, status: &Status) -> Resu
     }
     if !differences.is_empty() {
         return Err(Failure::input(
-            format!("the plan is not what the daemon does:\n  {}", differences.join("\n  ")),
+            format!(
+                "the plan differs from the daemon's settings:\n  {}",
+                differences.join("\n  ")
+            ),
             "leave these keys out of the plan, or change them in the daemon's configuration and \
-             have it read again (`systemctl reload sonard`)",
+             reload it (`systemctl reload sonard`)",
         ));
     }
-    plan.steps_per_revolution = steps_per_revolution(status).unwrap_or(plan.steps_per_revolution);
+    plan.steps_per_revolution =
+        steps_per_revolution(status).unwrap_or(plan.steps_per_revolution);
     Ok(())
 }
 
@@ -56,32 +61,25 @@ fn adopt_sensor(plan: &mut Plan, setup: &Setup) -> Result<Vec<String>, Failure> 
     let reach_m = setup.model.options.max_range_m.unwrap_or(setup.sensor.max_range_m);
     let adopted = OptionKeys { max_range_m: Some(reach_m), ..setup.model.options };
     let threshold = adopted.threshold.or(Some(setup.sensor.threshold));
-    let (ours, theirs) = (value(keys.options), value(OptionKeys { threshold, ..adopted }));
+    let (ours, theirs) = (to_json(keys.options), to_json(OptionKeys { threshold, ..adopted }));
     let options = theirs.as_object().into_iter().flatten();
     let mut differ: Vec<String> = options
         .filter(|(key, theirs)| plan.is_given("sensor", key) && ours[key.as_str()] != **theirs)
         .map(|(key, theirs)| {
-            describe_difference(
-                plan,
-                "sensor",
-                key,
-                &ours[key.as_str()],
-                &format!("model.{key}"),
-                theirs,
-            )
+            describe_difference(plan, "sensor", key, &ours[key.as_str()], &format!("model.{key}"), theirs)
         })
         .collect();
     let base = match plan.is_given("sensor", "sensor") {
         true => load_sensor(&keys.sensor)?,
         false => setup.sensor.clone(),
     };
-    let at = Places { layers: &plan.layers, file: &plan.name };
-    let wanted = sensor(base, &plan.keys, &at)?;
-    let fields = differing(&wanted, &setup.sensor);
+    let at = Origins { layers: &plan.layers, file: &plan.name };
+    let requested = sensor(base, &plan.keys, &at)?;
+    let fields = differing_fields(&requested, &setup.sensor);
     if !fields.is_empty() {
         differ.push(format!(
             "the plan's sensor {} is not the daemon's {} (model.sensor): {} differ",
-            wanted.name,
+            requested.name,
             setup.sensor.name,
             fields.join(", ")
         ));
@@ -101,22 +99,23 @@ fn describe_difference(
     there: &str,
     theirs: &Value,
 ) -> String {
-    let place = plan.layers.origin(section, key).map_or_else(String::new, |at| format!("{at}: "));
+    let place =
+        plan.layers.origin(section, key).map_or_else(String::new, |at| format!("{at}: "));
     format!("{place}{section}.{key} is {ours}, and {there} of the daemon {theirs}")
 }
 
-fn value(value: impl serde::Serialize) -> Value {
-    serde_json::to_value(value).unwrap_or_default()
+fn to_json(to_json: impl serde::Serialize) -> Value {
+    serde_json::to_value(to_json).unwrap_or_default()
 }
 
-/// Names of the fields in which two sensors differ.
-fn differing(one: &Sensor, other: &Sensor) -> Vec<String> {
-    let (one, other) = (value(one), value(other));
+/// Returns the names of the fields in which two sensors differ.
+fn differing_fields(a: &Sensor, b: &Sensor) -> Vec<String> {
+    let (a, b) = (to_json(a), to_json(b));
     let fields = |sensor: &Value| sensor.as_object().cloned().unwrap_or_default();
     let mut names: Vec<String> =
-        fields(&one).into_iter().chain(fields(&other)).map(|(name, _)| name).collect();
+        fields(&a).into_iter().chain(fields(&b)).map(|(name, _)| name).collect();
     names.sort();
     names.dedup();
-    names.retain(|name| one[name.as_str()] != other[name.as_str()]);
+    names.retain(|name| a[name.as_str()] != b[name.as_str()]);
     names
 }

@@ -1,4 +1,4 @@
-//! From a plan's file to everything it names, checked.
+//! Loads and validates a plan with the files that it names.
 
 use std::{
     fs,
@@ -16,7 +16,7 @@ use crate::{
     scene::Scene,
 };
 
-/// The plan that the options name.
+/// Loads the plan with the overrides of the options.
 pub(super) fn load(args: &Args) -> Result<Plan, Failure> {
     let path = args.plan.clone().unwrap_or_default();
     let text = fs::read_to_string(&path).map_err(|error| {
@@ -27,12 +27,12 @@ pub(super) fn load(args: &Args) -> Result<Plan, Failure> {
     })?;
     let name = path.display().to_string();
     let mut layers =
-        Layers::<CollectionKeys>::new().file(&name, &text).map_err(|error| refuse(&error))?;
+        Layers::<CollectionKeys>::new().file(&name, &text).map_err(|error| failure_from(&error))?;
     for setting in &args.set {
-        layers = layers.option("--set", setting).map_err(|error| refuse(&error))?;
+        layers = layers.option("--set", setting).map_err(|error| failure_from(&error))?;
     }
-    let keys = layers.clone().keys().map_err(|error| refuse(&error))?;
-    let at = Places { layers: &layers, file: &name };
+    let keys = layers.clone().keys().map_err(|error| failure_from(&error))?;
+    let at = Origins { layers: &layers, file: &name };
     let scene_text = scene_file::read(&keys.place.scene)?;
     let scene = Arc::new(scene_file::load(&keys.place.scene)?);
     let sensor = sensor(load_sensor(&keys.sensor.sensor)?, &keys, &at)?;
@@ -67,39 +67,39 @@ pub(super) fn load(args: &Args) -> Result<Plan, Failure> {
     })
 }
 
-/// Checks what the ranges of single keys can't say.
-fn check(keys: &CollectionKeys, poses: &Poses, at: &Places<'_>) -> Result<(), Failure> {
+/// Validates combinations of keys.
+fn check(keys: &CollectionKeys, poses: &Poses, at: &Origins<'_>) -> Result<(), Failure> {
     let air = &keys.air;
     Air::new(air.temperature_c, air.humidity_percent, air.pressure_kpa).map_err(|error| {
         let fault = Fault::new(error, "degrees Celsius, percent and kilopascals");
-        at.refuse("air", "temperature_c", fault)
+        at.failure_from("air", "temperature_c", fault)
     })?;
     keys.sensor.options.options().map_err(|foreign| {
-        at.refuse("sensor", foreign.option, Fault::new(foreign, foreign.help()))
+        at.failure_from("sensor", foreign.option, Fault::new(foreign, foreign.help()))
     })?;
     if matches!(poses, Poses::Listed(_)) || keys.collection.order == Order::ByPose {
         return Ok(());
     }
     let fault = Fault::new(
-        "poses that are asked for one by one can only be taken by pose",
+        "poses that are requested one by one require order = \"by-pose\"",
         "give all poses with poses.list or poses.file, or order = \"by-pose\"",
     );
-    Err(at.refuse("collection", "order", fault))
+    Err(at.failure_from("collection", "order", fault))
 }
 
-/// One screen about a plan that is right.
-pub(super) fn in_words(plan: &Plan) -> String {
+/// Describes a valid plan in a few lines.
+pub(super) fn describe(plan: &Plan) -> String {
     let poses = match (&plan.poses, plan.pose_count()) {
         (Poses::Listed(poses), _) => {
             let names: Vec<_> = poses.iter().map(NamedPose::label).collect();
             format!("{} poses: {}", poses.len(), names.join("; "))
         }
-        (_, Some(count)) => format!("at most {count} poses, asked for one by one"),
-        (_, None) => "poses asked for one by one, until there are no more".into(),
+        (_, Some(count)) => format!("at most {count} poses, requested one by one"),
+        (_, None) => "poses requested one by one, until there are no more".into(),
     };
     format!(
-        "The plan is right.\n  {}\n  {} scans at each, {} beams a scan, scene {}, sensor {}\n  \
-         into {}\n",
+        "The plan is valid.\n  {}\n  {} scans per pose, {} beams per scan, scene {}, sensor {}\n  \
+         output: {}\n",
         textwrap::fill(&poses, textwrap::Options::new(96).subsequent_indent("    ")),
         plan.keys.collection.repeats,
         plan.azimuths.beams(),
@@ -109,7 +109,7 @@ pub(super) fn in_words(plan: &Plan) -> String {
     )
 }
 
-/// What is wrong with a value, before it is said where.
+/// Invalid value: message and advice, without its location.
 pub(super) struct Fault {
     message: String,
     help: String,
@@ -121,21 +121,21 @@ impl Fault {
     }
 }
 
-/// Where values were given.
-pub(super) struct Places<'a> {
+/// Origins of values: plan file, environment and options.
+pub(super) struct Origins<'a> {
     pub(super) layers: &'a Layers<CollectionKeys>,
     pub(super) file: &'a str,
 }
 
-impl Places<'_> {
-    fn refuse(&self, section: &str, key: &str, fault: Fault) -> Failure {
+impl Origins<'_> {
+    fn failure_from(&self, section: &str, key: &str, fault: Fault) -> Failure {
         let origin = self.layers.origin(section, key);
         let place = origin.map_or_else(|| self.file.to_owned(), ToString::to_string);
         Failure::input(format!("{place}: {section}.{key}: {}", fault.message), fault.help)
     }
 }
 
-fn scan_plan(keys: &CollectionKeys, at: &Places<'_>) -> Result<ScanPlan, Failure> {
+fn scan_plan(keys: &CollectionKeys, at: &Origins<'_>) -> Result<ScanPlan, Failure> {
     let keys = &keys.plan;
     let plan = ScanPlan {
         from_deg: keys.from_deg,
@@ -143,34 +143,38 @@ fn scan_plan(keys: &CollectionKeys, at: &Places<'_>) -> Result<ScanPlan, Failure
         step_deg: keys.step_deg,
         pings_per_stop: keys.pings_per_stop,
     };
-    let help = "a full turn is from_deg = 0, to_deg = 360, step_deg = 0.9";
-    plan.check().map_err(|error| at.refuse("plan", "to_deg", Fault::new(error, help)))?;
+    let help = "a full revolution is from_deg = 0, to_deg = 360, step_deg = 0.9";
+    plan.check().map_err(|error| at.failure_from("plan", "to_deg", Fault::new(error, help)))?;
     Ok(plan)
 }
 
-/// A sensor as the plan changes it.
+/// Applies the plan's overrides to a sensor.
 pub(super) fn sensor(
     mut sensor: Sensor,
     keys: &CollectionKeys,
-    at: &Places<'_>,
+    at: &Origins<'_>,
 ) -> Result<Sensor, Failure> {
     let keys = &keys.sensor;
     if keys.short_blanking {
         sensor.blanking_us = sensor.short_blanking_us.ok_or_else(|| {
             let message = format!("{} has no short_blanking_us", sensor.name);
-            at.refuse("sensor", "short_blanking", Fault::new(message, "give blanking_us instead"))
+            at.failure_from(
+                "sensor",
+                "short_blanking",
+                Fault::new(message, "give blanking_us instead"),
+            )
         })?;
     }
     sensor.blanking_us = keys.blanking_us.unwrap_or(sensor.blanking_us);
     sensor.mounting.z_m = keys.height_m.or(sensor.mounting.z_m);
     sensor.mounting.tilt_deg = keys.tilt_deg.unwrap_or(sensor.mounting.tilt_deg);
     sensor.check().map_err(|error| {
-        at.refuse("sensor", "sensor", Fault::new(error, "correct that figure of the sensor"))
+        at.failure_from("sensor", "sensor", Fault::new(error, "correct that figure of the sensor"))
     })?;
     Ok(sensor)
 }
 
-fn poses(keys: &CollectionKeys, scene: &Scene, at: &Places<'_>) -> Result<Poses, Failure> {
+fn poses(keys: &CollectionKeys, scene: &Scene, at: &Origins<'_>) -> Result<Poses, Failure> {
     let keys = &keys.poses;
     let given = [
         !keys.list.is_empty(),
@@ -182,18 +186,18 @@ fn poses(keys: &CollectionKeys, scene: &Scene, at: &Places<'_>) -> Result<Poses,
     let help = "give exactly one of list, file, program, stream and prompt in [poses]";
     match given.iter().filter(|&&given| given).count() {
         1 => {}
-        0 => return Err(at.refuse("poses", "list", Fault::new("no poses", help))),
+        0 => return Err(at.failure_from("poses", "list", Fault::new("no poses", help))),
         _ => {
             let fault = Fault::new("poses from more than one source", help);
-            return Err(at.refuse("poses", "list", fault));
+            return Err(at.failure_from("poses", "list", fault));
         }
     }
     if let Some(file) = &keys.file {
-        return poses_of_file(Path::new(file), scene).map(Poses::Listed);
+        return load_poses(Path::new(file), scene).map(Poses::Listed);
     }
     let listed = keys.list.iter().map(|text| {
         NamedPose::parse(text, scene)
-            .map_err(|fault| at.refuse("poses", "list", Fault::new(&fault, &fault.help)))
+            .map_err(|fault| at.failure_from("poses", "list", Fault::new(&fault, &fault.help)))
     });
     Ok(match (&keys.program, &keys.stream) {
         (Some(command), _) => Poses::Program(command.clone()),
@@ -203,12 +207,12 @@ fn poses(keys: &CollectionKeys, scene: &Scene, at: &Places<'_>) -> Result<Poses,
     })
 }
 
-fn poses_of_file(file: &Path, scene: &Scene) -> Result<Vec<NamedPose>, Failure> {
+fn load_poses(file: &Path, scene: &Scene) -> Result<Vec<NamedPose>, Failure> {
     let name = file.display();
     let text = fs::read_to_string(file).map_err(|error| {
         Failure::input(
             format!("cannot read the poses {name}: {error}"),
-            "poses.file names a CSV or JSON lines file, seen from where sonard is started",
+            "poses.file names a CSV or JSON lines file, relative to the working directory",
         )
     })?;
     read_file(&text, scene).map_err(|fault: PoseFault| {
@@ -217,6 +221,6 @@ fn poses_of_file(file: &Path, scene: &Scene) -> Result<Vec<NamedPose>, Failure> 
     })
 }
 
-fn refuse(error: &ConfigError) -> Failure {
+fn failure_from(error: &ConfigError) -> Failure {
     Failure::input(error, &error.help)
 }

@@ -1,4 +1,5 @@
-//! A ranger that the collection itself drives: met, carried from pose to pose, lost and found again.
+//! Ranger driven by the collection itself: identified, placed at each pose, and recovered after a
+//! loss.
 
 use std::time::Duration;
 
@@ -20,77 +21,77 @@ use crate::{
     scan::Session,
 };
 
-/// Who measures.
-enum Kind {
+/// Source of the readings.
+enum Source {
     Port(String),
     Mock(Option<Mock>),
     Emulator { sensor: String, air: [f64; 3], running: Option<Emulator> },
 }
 
-/// A ranger that the collection itself drives.
+/// Ranger driven by the collection itself.
 pub(super) struct LocalDevice {
-    kind: Kind,
+    source: Source,
     ports: PortOpener,
     world: MockWorldArgs,
     scene: String,
     patience: Duration,
     interrupts: Interrupts,
     ranger: Option<Ranger<SerialStream>>,
-    /// The ranger that was met first.
-    met: Option<Identity>,
+    /// Identity of the ranger that was identified first.
+    first: Option<Identity>,
 }
 
 impl LocalDevice {
-    /// The one that the options or the plan name.
+    /// Creates the device that the options or the plan name.
     pub(super) fn new(args: &Args, plan: &Plan, interrupts: Interrupts) -> Self {
         let keys = &plan.keys;
-        let kind = if args.mock {
-            Kind::Mock(None)
+        let source = if args.mock {
+            Source::Mock(None)
         } else if args.emulator {
             let air = [keys.air.temperature_c, keys.air.humidity_percent, keys.air.pressure_kpa];
-            Kind::Emulator { sensor: keys.sensor.sensor.clone(), air, running: None }
+            Source::Emulator { sensor: keys.sensor.sensor.clone(), air, running: None }
         } else {
             let port = args.port.clone().or_else(|| keys.device.port.clone());
-            Kind::Port(port.unwrap_or_default())
+            Source::Port(port.unwrap_or_default())
         };
         let (world, scene) = (args.world.clone(), keys.place.scene.clone());
         let patience = Duration::ZERO;
         let ports = PortOpener::default();
-        Self { kind, ports, world, scene, patience, interrupts, ranger: None, met: None }
+        Self { source, ports, world, scene, patience, interrupts, ranger: None, first: None }
     }
 
-    /// The ranger, met if it is not yet; a failure is final.
+    /// Returns the ranger, identifying it first if necessary; failures are not retried.
     async fn ranger(&mut self) -> Result<&mut Ranger<SerialStream>, Halt> {
         let ranger = match self.ranger.take() {
             Some(ranger) => ranger,
             None => {
                 let port = self.port();
-                scan::meet(&mut self.ports, &port, &self.interrupts).await?
+                scan::identify(&mut self.ports, &port, &self.interrupts).await?
             }
         };
         let identity = *ranger.identity();
-        if let Some(change) = self.met.and_then(|met| BoardChange::between(&met, &identity)) {
+        if let Some(change) = self.first.and_then(|first| BoardChange::between(&first, &identity)) {
             return Err(Halt::failed(
-                format!("another ranger answers than the one that measured so far: {change}"),
-                "connect that one, or start the collection again: it says what it needs",
+                format!("a different ranger is connected than at the start: {change}"),
+                "connect the first ranger, or restart the collection: it reports what it needs",
             ));
         }
-        self.met = Some(identity);
+        self.first = Some(identity);
         Ok(self.ranger.insert(ranger))
     }
 
-    /// The same after it was lost: it is tried for until the plan's patience is over.
+    /// Returns the ranger, reconnecting until the plan's timeout expires.
     async fn find(&mut self) -> Result<&mut Ranger<SerialStream>, Halt> {
-        let (mut patience, mut told) = (Patience::with_absence(self.patience), false);
+        let (mut patience, mut notified) = (Patience::with_absence(self.patience), false);
         loop {
             let halt = match self.ranger().await {
-                // The borrow checker would keep the first borrow through the loop.
+                // A direct return would extend the first borrow through the loop.
                 Ok(_) => return self.ranger().await,
                 Err(halt @ Halt::Failed { .. }) => halt,
                 Err(halt) => return Err(halt),
             };
             let Some(wait) = patience.next_wait() else { return Err(halt) };
-            if !std::mem::replace(&mut told, true) {
+            if !std::mem::replace(&mut notified, true) {
                 notice!("waiting for the ranger: {halt}");
             }
             tokio::select! {
@@ -100,9 +101,9 @@ impl LocalDevice {
         }
     }
 
-    /// An emulated board stands where it was started.
+    /// Starts an emulated board at a pose; its pose is fixed at start.
     fn start_emulator(&mut self, at: &PreparedScan) -> Result<(), Halt> {
-        let Kind::Emulator { sensor, air, running } = &mut self.kind else { return Ok(()) };
+        let Source::Emulator { sensor, air, running } = &mut self.source else { return Ok(()) };
         self.ranger = None;
         *running = None;
         let [temperature_c, humidity_percent, pressure_kpa] = air;
@@ -120,10 +121,10 @@ impl LocalDevice {
     }
 
     fn port(&self) -> String {
-        match &self.kind {
-            Kind::Port(port) => port.clone(),
-            Kind::Mock(mock) => mock.as_ref().map(Mock::port).unwrap_or_default(),
-            Kind::Emulator { running, .. } => {
+        match &self.source {
+            Source::Port(port) => port.clone(),
+            Source::Mock(mock) => mock.as_ref().map(Mock::port).unwrap_or_default(),
+            Source::Emulator { running, .. } => {
                 running.as_ref().map(Emulator::port).unwrap_or_default()
             }
         }
@@ -140,7 +141,7 @@ impl Device for LocalDevice {
     }
 
     fn prepare(&mut self, _plan: &Plan, first: &PreparedScan) -> Result<(), Halt> {
-        if let Kind::Mock(mock) = &mut self.kind {
+        if let Source::Mock(mock) = &mut self.source {
             let link = std::env::temp_dir().join(format!("sonard-mock-{}", std::process::id()));
             *mock = Some(Mock::start(self.world.board(&assumed(first))?, Some(&link))?);
         }
@@ -152,9 +153,9 @@ impl Device for LocalDevice {
         Ok(Connected { device: device_record(identity), provenance: provenance(identity) })
     }
 
-    /// A real ranger stands where somebody put it.
+    /// Only a mock can be moved; a real ranger is placed by the operator.
     fn carry_to(&mut self, to: &PreparedScan) -> Result<(), Halt> {
-        if let Kind::Mock(Some(mock)) = &self.kind {
+        if let Source::Mock(Some(mock)) = &self.source {
             mock.carry_to(self.world.soundings(&assumed(to))?);
         }
         self.start_emulator(to)
@@ -179,10 +180,7 @@ impl Device for LocalDevice {
     async fn take(&mut self, scan: ScanOrder<'_>, beam: &(dyn Fn() + Sync)) -> Result<Taken, Halt> {
         let ScanOrder { prepared, air, of, path, .. } = scan;
         let Some(prepared) = prepared else {
-            return Err(Halt::wrong(
-                "the scan has no predictions",
-                "this is a fault of the program",
-            ));
+            return Err(Halt::wrong("the scan has no predictions", "this is a bug: report it"));
         };
         let interrupts = self.interrupts.clone();
         let ranger = self.find().await?;
@@ -199,7 +197,7 @@ impl Device for LocalDevice {
 
     async fn close(self) {
         drop(self.ranger);
-        if let Kind::Mock(Some(mock)) = self.kind {
+        if let Source::Mock(Some(mock)) = self.source {
             mock.stop().await;
         }
     }

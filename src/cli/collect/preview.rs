@@ -1,31 +1,31 @@
-//! How long a collection takes, before it begins.
+//! Duration and disk use of a collection, before it begins.
 
 use serde_json::json;
 
-use super::{Args, person::human};
+use super::{Args, observer::human_duration};
 use crate::{
     cli::Failure,
     collect::{Plan, Poses, budget, disk_bytes},
     ranger::Budget,
 };
 
-/// The estimate as text, or as one JSON object.
-pub(super) fn of(plan: &Plan, args: &Args) -> Result<String, Failure> {
-    let estimate = Estimate::of(plan)?;
-    Ok(if args.json { format!("{}\n", estimate.object(plan)) } else { estimate.words(plan) })
+/// Formats the estimate as text, or as one JSON object.
+pub(super) fn render(plan: &Plan, args: &Args) -> Result<String, Failure> {
+    let estimate = Estimate::from_plan(plan)?;
+    Ok(if args.json { format!("{}\n", estimate.object(plan)) } else { estimate.describe(plan) })
 }
 
-/// How long a plan takes, as far as that is known.
+/// Estimated duration of a plan, as far as it is known.
 struct Estimate {
     scan: Budget,
     scans: Option<u32>,
     pauses_s: f64,
-    /// Whether people have to do something.
+    /// `true` if people have to act between scans.
     people: bool,
 }
 
 impl Estimate {
-    fn of(plan: &Plan) -> Result<Self, Failure> {
+    fn from_plan(plan: &Plan) -> Result<Self, Failure> {
         let collection = &plan.keys.collection;
         let scans = plan.pose_count().map(|poses| poses.saturating_mul(collection.repeats));
         let pauses = f64::from(scans.unwrap_or(0).saturating_sub(1));
@@ -61,7 +61,7 @@ impl Estimate {
         })
     }
 
-    fn words(&self, plan: &Plan) -> String {
+    fn describe(&self, plan: &Plan) -> String {
         let line = |name: &str, budget: &Budget| {
             format!(
                 "{name:<12}{:>12} = {} acoustics + {} motor + {} link",
@@ -81,22 +81,21 @@ impl Estimate {
                     lines.push(format!("{:<12}{:>12}", "pauses", seconds(self.pauses_s)));
                 }
                 lines.push(format!(
-                    "{:<12}{:>12} ({}), and some {:.1} MB of disk",
-                    "in all",
+                    "{:<12}{:>12} ({}), about {:.1} MB",
+                    "total",
                     seconds(total_s),
-                    human(total_s),
+                    human_duration(total_s),
                     disk_bytes(plan, scans) / 1e6
                 ));
             }
             None => {
-                lines.push("how many poses there will be is not known: set poses.count".into());
+                lines.push("the number of poses is unknown: set poses.count".into());
             }
         }
         if self.people {
-            lines
-                .push("not counted: how long people take to answer and to carry the ranger".into());
+            lines.push("not included: time for answers and for moving the ranger".into());
         }
-        lines.push("not counted: retakes, and the time of the model at each new pose".into());
+        lines.push("not included: retakes, and the model's computing time at each new pose".into());
         lines.join("\n") + "\n"
     }
 }

@@ -1,4 +1,4 @@
-//! The report of a collection: one page of Markdown, with pictures beside it.
+//! Report of a collection: a Markdown page with pictures.
 
 use std::fmt::Write as _;
 
@@ -16,10 +16,10 @@ use crate::{
     store::load,
 };
 
-/// Scans that are drawn over each other at most: more of them hide what is below.
-const DRAWN: usize = 12;
-/// Poses whose spreads are drawn at most.
-const STRIPS: usize = 6;
+/// Maximum number of overlaid scans per picture; more would hide each other.
+const MAX_DRAWN: usize = 12;
+/// Maximum number of poses whose spreads are drawn.
+const MAX_STRIPS: usize = 6;
 const PICTURES: &str = "report";
 const TABLE: &str = "\
 ## Poses
@@ -27,7 +27,7 @@ const TABLE: &str = "\
 Residuals are measured minus predicted range over the pairs of echoes; spread is the standard deviation
 of a beam's range over the repeats.
 
-| pose | where | scans | agree | median residual | 90 % within | spread | 90 % within | unsteady beams |
+| pose | position | scans | agree | median residual | 90 % within | spread | 90 % within | unsteady beams |
 |---|---|---|---|---|---|---|---|---|
 ";
 
@@ -38,21 +38,21 @@ pub(super) fn write(folder: &Folder, history: &History) -> Result<(), Halt> {
     };
     let keys: CollectionKeys = serde_json::from_value(plan.keys.clone()).unwrap_or_default();
     let scene = scene(folder)?;
-    let mut text = head(history, &keys);
+    let mut text = format_head(history, &keys);
     if let Some(scene) = &scene {
         draw(folder, "overview", &overview(scene, history))?;
         text += "![The poses in the scene](report/overview.svg)\n\n";
     }
     let (poses, details) = poses(folder, history, scene.as_ref())?;
     text += &poses;
-    text += &fates(history);
+    text += &format_exceptions(history);
     draw(folder, "drift", &drift(history, &keys.checks))?;
-    text += "\n## Drift\n\n![Every scan over time](report/drift.svg)\n\n";
+    text += "\n## Drift\n\n![Scans over time](report/drift.svg)\n\n";
     text += &format!("## Scans\n\n{details}");
     Ok(folder.write("report.md", text.as_bytes())?)
 }
 
-/// The table of poses, and a picture of the scans at each.
+/// Formats the table of poses, and draws the scans at each.
 fn poses(
     folder: &Folder,
     history: &History,
@@ -67,7 +67,7 @@ fn poses(
         let label = pose.label();
         if !views.is_empty() {
             let name = format!("pose-{number:03}");
-            let drawn = &views[..views.len().min(DRAWN)];
+            let drawn = &views[..views.len().min(MAX_DRAWN)];
             draw(folder, &name, &draw_scans(drawn, scene))?;
             let _ = write!(details, "### {number}: {label}\n\n{}", conditions(&pose.conditions));
             let _ = write!(details, "![Scans at {label}](report/{name}.svg)\n\n");
@@ -83,33 +83,33 @@ fn poses(
     Ok((table, details))
 }
 
-/// What there is, from when to when, by what.
-fn head(history: &History, keys: &CollectionKeys) -> String {
-    let wanted = history.wanted();
+/// Formats the header: counts, dates, devices, scene and sensor.
+fn format_head(history: &History, keys: &CollectionKeys) -> String {
+    let requested = history.wanted();
     let accepted: Vec<&Take> = history.accepted().collect();
-    let given_up = wanted.iter().filter(|slot| history.is_given_up(**slot)).count();
+    let given_up = requested.iter().filter(|slot| history.is_given_up(**slot)).count();
     let beams: u64 = accepted.iter().map(|take| u64::from(take.figures.beams)).sum();
     let missing: u64 = accepted.iter().map(|take| u64::from(take.figures.missing)).sum();
     let mut text = format!("# {}\n\n", keys.collection.name);
     let _ = writeln!(
         text,
-        "{} of {} scans, {} set aside, {given_up} given up; {beams} beams, {missing} without a usable \
+        "{} of {} scans, {} rejected, {given_up} failed; {beams} beams, {missing} without a usable \
          reading.",
         accepted.len(),
-        wanted.len(),
+        requested.len(),
         history.set_aside().count(),
     );
     let times = || accepted.iter().filter_map(|take| take.started);
     if let (Some(first), Some(last)) = (times().min(), times().max()) {
         let _ = writeln!(
             text,
-            "Begun {first:.0}, last scan {last:.0}; started {} times.",
+            "First scan {first:.0}, last {last:.0}; started {} times.",
             history.starts.len()
         );
     }
-    // The sum of no numbers is -0, and a scan that an earlier run left behind was not timed.
+    // The sum of an empty iterator is -0; scans recovered from an earlier run have no duration.
     let seconds = accepted.iter().filter_map(|take| take.wall_s).fold(0.0, |sum, one| sum + one);
-    let _ = writeln!(text, "Scanning took {seconds:.0} s in all.\n");
+    let _ = writeln!(text, "Scanning time {seconds:.0} s.\n");
     for start in &history.starts {
         let device = &start.device;
         let provenance = serde_json::to_value(start.provenance).unwrap_or_default();
@@ -130,14 +130,14 @@ fn head(history: &History, keys: &CollectionKeys) -> String {
     if history.plans.len() > 1 {
         let _ = writeln!(
             text,
-            "The plan was changed {} times; journal.jsonl keeps each.\n",
+            "The plan was changed {} times; journal.jsonl contains each version.\n",
             history.plans.len() - 1
         );
     }
     text
 }
 
-/// One pose of the table.
+/// Row of the table of poses.
 struct Row<'a> {
     number: u32,
     pose: &'a NamedPose,
@@ -167,42 +167,44 @@ impl Row<'_> {
     }
 }
 
-/// What was set aside, given up, or kept with a finding, and why.
-fn fates(history: &History) -> String {
+/// Lists rejected scans, failed poses, and accepted scans with findings, with reasons.
+fn format_exceptions(history: &History) -> String {
     let mut text = String::new();
     let mut aside = String::new();
     for take in history.set_aside() {
-        let what = if take.outcome == Outcome::Cut { "cut" } else { "refused" };
-        let why = take.cut.clone().unwrap_or_else(|| why(take));
-        let _ = writeln!(aside, "| {} | {what} | {why} |", take.file);
+        let what = if take.outcome == Outcome::Cut { "interrupted" } else { "rejected" };
+        let reasons = take.cut.clone().unwrap_or_else(|| reasons(take));
+        let _ = writeln!(aside, "| {} | {what} | {reasons} |", take.file);
     }
     if !aside.is_empty() {
-        let _ =
-            write!(text, "\n## Set aside and retaken\n\n| file | | why |\n|---|---|---|\n{aside}");
+        let _ = write!(
+            text,
+            "\n## Rejected and retaken\n\n| file | | reason |\n|---|---|---|\n{aside}"
+        );
     }
     let given_up: Vec<_> = history.given_up.iter().filter(|s| history.is_given_up(**s)).collect();
     if !given_up.is_empty() {
-        text += "\n## Given up\n\n";
+        text += "\n## Failed\n\n";
         for slot in given_up {
             let _ = writeln!(text, "- pose {}, repeat {}", slot.pose, slot.repeat);
         }
     }
     let noted: Vec<_> = history.accepted().filter(|take| !take.findings.is_empty()).collect();
     if !noted.is_empty() {
-        text += "\n## Noted\n\n";
+        text += "\n## Findings\n\n";
         for take in noted {
-            let _ = writeln!(text, "- {}: {}", take.file, why(take));
+            let _ = writeln!(text, "- {}: {}", take.file, reasons(take));
         }
     }
     text
 }
 
-fn why(take: &Take) -> String {
+fn reasons(take: &Take) -> String {
     let details: Vec<_> = take.findings.iter().map(|finding| finding.detail.as_str()).collect();
     details.join("; ")
 }
 
-/// The scene with the collection's poses in place of its own.
+/// Draws the scene with the collection's poses instead of its own.
 fn overview(scene: &Scene, history: &History) -> Picture {
     let name = |number: u32, pose: &NamedPose| match &pose.name {
         Some(name) => format!("{number} {name}"),
@@ -213,12 +215,12 @@ fn overview(scene: &Scene, history: &History) -> Picture {
     draw_scene(&Scene { poses, ..scene.clone() })
 }
 
-/// What the collection's readings are, if not of a real ranger.
+/// Returns the label of readings that are not from a real ranger.
 fn badge(history: &History) -> Option<&'static str> {
     badge_among(history.starts.iter().map(|start| start.provenance))
 }
 
-/// What every scan was like over time, those set aside among them.
+/// Draws figures of every scan over time, including rejected ones.
 fn drift(history: &History, checks: &CheckKeys) -> Picture {
     let first = history.takes.iter().filter_map(|take| take.started).min().unwrap_or_default();
     let hours = |at: Timestamp| at.duration_since(first).as_secs_f64() / 3600.0;
@@ -241,16 +243,16 @@ fn drift(history: &History, checks: &CheckKeys) -> Picture {
     let strips = [
         strip("air temperature, C", None, &|figures| figures.temperature_c),
         strip("median of measured \u{2212} model, mm", None, &|f| Some(1e3 * f.median_residual_m?)),
-        strip("echo pairs that agree, %", None, &|f| Some(100.0 * f.agree_fraction?)),
-        strip("index off after the scan, steps", Some([-off, off]), &|figures| {
+        strip("agreement, %", None, &|f| Some(100.0 * f.agree_fraction?)),
+        strip("index error, steps", Some([-off, off]), &|figures| {
             figures.home_drift_steps.map(f64::from)
         }),
     ];
     let along = format!("{unit} since {first:.0}");
-    draw_series("Every scan over time", badge(history), &[], &along, &strips)
+    draw_series("Scans over time", badge(history), &[], &along, &strips)
 }
 
-/// The spread of each beam's ranges at the poses that repeat worst.
+/// Draws the spread of each beam's ranges at the least repeatable poses.
 fn spreads(
     mut poses: Vec<(String, Repeatability, Vec<BeamSpread>)>,
     badge: Option<&str>,
@@ -260,7 +262,7 @@ fn spreads(
         worst(&b.1).total_cmp(&worst(&a.1))
     });
     let all = poses.len();
-    poses.truncate(STRIPS);
+    poses.truncate(MAX_STRIPS);
     let strips: Vec<Series> = poses
         .into_iter()
         .map(|(label, of, beams)| {
@@ -277,15 +279,15 @@ fn spreads(
             }
         })
         .collect();
-    let lines = match all > STRIPS {
-        true => vec![format!("The {STRIPS} of {all} poses that repeat worst")],
+    let lines = match all > MAX_STRIPS {
+        true => vec![format!("The {MAX_STRIPS} least repeatable of {all} poses")],
         false => Vec::new(),
     };
     let along = "azimuth, degrees counter-clockwise from the heading";
-    draw_series("How well beams repeat", badge, &lines, along, &strips)
+    draw_series("Repeatability of beams", badge, &lines, along, &strips)
 }
 
-/// The scans of a pose that count, by repeat.
+/// Loads the accepted scans of a pose, by repeat.
 fn views(folder: &Folder, history: &History, pose: u32) -> Result<Vec<ScanView>, Halt> {
     let mut takes: Vec<&Take> = history.accepted().filter(|take| take.slot.pose == pose).collect();
     takes.sort_by_key(|take| take.slot.repeat);
@@ -301,7 +303,7 @@ fn scene(folder: &Folder) -> Result<Option<Scene>, Halt> {
     let path = folder.root().join(INPUTS).join("scene.json");
     let Ok(text) = std::fs::read_to_string(&path) else { return Ok(None) };
     Scene::from_json(&text).map(Some).map_err(|error| {
-        Halt::wrong(format!("{}: {error}", path.display()), "it was changed: put it back")
+        Halt::wrong(format!("{}: {error}", path.display()), "the file was modified: restore it")
     })
 }
 
@@ -309,7 +311,7 @@ fn draw(folder: &Folder, name: &str, picture: &Picture) -> Result<(), Halt> {
     Ok(folder.write(&format!("{PICTURES}/{name}.svg"), picture.to_svg().as_bytes())?)
 }
 
-/// Conditions as a paragraph; nothing if there are none.
+/// Formats conditions as a paragraph; empty if there are none.
 fn conditions(of: &Conditions) -> String {
     if of.is_empty() { String::new() } else { format!("Conditions{}.\n\n", listed(of)) }
 }

@@ -1,4 +1,4 @@
-//! A comparison for people.
+//! Comparison as text.
 
 use std::io::{self, Write};
 
@@ -9,17 +9,17 @@ use crate::{
     scan::{PathKind, PathRecord, Ping, PingStatus},
 };
 
-/// A rule above, below and under the header.
+/// Table style with rules above the header, below it and at the end.
 pub(in crate::cli) const RULED: TableStyle = TableStyle::new()
     .top_border(LineStyle::none().fill('─').junction('─'))
     .header_separator(LineStyle::none().fill('─').junction('─'))
     .bottom_border(LineStyle::none().fill('─').junction('─'));
 
-/// Prints the numbers and the beams that fit worst.
+/// Prints the figures and the worst-fitting beams.
 pub(super) fn print(
     out: &mut impl Write,
     comparison: &Comparison,
-    worst: &Worst,
+    worst: &WorstBeams,
 ) -> io::Result<()> {
     print_numbers(out, comparison)?;
     if comparison.beams > 0 {
@@ -27,12 +27,12 @@ pub(super) fn print(
     }
     if !comparison.explanations.is_empty() {
         let table = explanations(&comparison.explanations);
-        writeln!(out, "What would explain the readings better:\n{table}")?;
+        writeln!(out, "Better-fitting changes:\n{table}")?;
     } else if comparison.agree_fraction.is_some_and(|share| share < FEW_AGREE) {
         writeln!(
             out,
-            "No change of some centimetres, degrees or percent explains the readings: is it another \
-             scene, a pose farther off, or angles that count clockwise?"
+            "No change of some centimetres, degrees or percent explains the readings: check the scene, \
+             a pose farther off, and the sense of the angles (--clockwise)."
         )?;
     }
     let apart = worst.apart();
@@ -41,36 +41,37 @@ pub(super) fn print(
     }
     let one_sided = worst.one_sided();
     if !one_sided.is_empty() {
-        writeln!(out, "Heard on one side only, or near on one only:\n{}", beam_table(&one_sided))?;
+        writeln!(
+            out,
+            "Detected by one only, or at minimum range in one only:\n{}",
+            beam_table(&one_sided)
+        )?;
     }
     Ok(())
 }
 
 fn print_numbers(out: &mut impl Write, comparison: &Comparison) -> io::Result<()> {
     let Comparison { beams, both_echo, agree, scans, poses, duplicates, .. } = *comparison;
-    let at = if poses > 1 { format!(" at {poses} poses, all together") } else { String::new() };
+    let at = if poses > 1 { format!(" at {poses} poses, combined") } else { String::new() };
     writeln!(out, "{beams} beams compared, in {scans} scan(s){at}")?;
     let skipped = comparison.not_compared;
     for (count, why) in [
         (skipped.link_lost, "not compared: the reading was lost"),
-        (skipped.step_doubtful, "not compared: the motor may have lost steps"),
-        (skipped.module_fault, "not compared: the module could not be fired"),
+        (skipped.step_doubtful, "not compared: motor steps may be lost"),
+        (skipped.module_fault, "not compared: the module did not fire"),
         (skipped.no_prediction, "not compared: no prediction"),
-        (skipped.no_range, "not compared: an echo without a range"),
-        (duplicates, "readings passed over: their beam has a later one"),
+        (skipped.no_range, "not compared: echo without a range"),
+        (duplicates, "readings skipped: their beam was measured again"),
     ] {
         if count > 0 {
             writeln!(out, "{count} {why}")?;
         }
     }
     let Some(share) = comparison.agree_fraction else {
-        return writeln!(out, "no beam has an echo on both sides");
+        return writeln!(out, "no beam has an echo in both");
     };
     let percent = 100.0 * share;
-    writeln!(
-        out,
-        "{both_echo} have an echo on both sides; {agree} of them agree ({percent:.1} %)"
-    )?;
+    writeln!(out, "{both_echo} have an echo in both; {agree} of them agree ({percent:.1} %)")?;
     writeln!(
         out,
         "residual: median of |r| {}, 90 % within {}, bias {} (measured minus predicted)",
@@ -89,7 +90,7 @@ fn verdict_table(comparison: &Comparison) -> Table {
         ("multiple", counts.multiple, medians.multiple),
         ("edge", counts.edge, medians.edge),
         ("min range", counts.min_range, None),
-        ("silent", counts.silent, None),
+        ("no echo", counts.silent, None),
         ("unexplained", counts.unexplained, medians.unexplained),
     ] {
         let percent = 100.0 * f64::from(count) / f64::from(comparison.beams);
@@ -103,7 +104,7 @@ fn verdict_table(comparison: &Comparison) -> Table {
 fn explanations(found: &[Explanation]) -> Table {
     let mut table = Table::new();
     table.load_style(RULED).set_header(["change", "by", "explains", "gain"]);
-    for Explanation { change, estimates, gain, explains } in found.iter().take(MOST_EXPLANATIONS) {
+    for Explanation { change, estimates, gain, explains } in found.iter().take(MAX_EXPLANATIONS) {
         let by: Vec<String> = estimates.iter().map(Estimate::to_string).collect();
         let explains = format!("{explains} readings");
         table.add_row([change.replace('_', " "), by.join(", "), explains, format!("{gain:.0}")]);
@@ -112,11 +113,11 @@ fn explanations(found: &[Explanation]) -> Table {
     table
 }
 
-/// Where fewer than this share of the pairs of echoes agree, something is wrong as a whole.
+/// Share of agreeing echoes below which a general error is likely.
 const FEW_AGREE: f64 = 0.25;
 
-/// So many of them are shown.
-const MOST_EXPLANATIONS: usize = 6;
+/// Maximum number of changes shown.
+const MAX_EXPLANATIONS: usize = 6;
 
 fn beam_table(beams: &[&Beam]) -> Table {
     let mut table = Table::new();
@@ -135,11 +136,11 @@ fn beam_table(beams: &[&Beam]) -> Table {
         table.add_row([
             ping.index.to_string(),
             format!("{:.1}", ping.azimuth_deg),
-            reading(ping.status, ping.range_m),
-            sim.map_or("-".into(), |sim| reading(sim.status, sim.range_m)),
+            format_reading(ping.status, ping.range_m),
+            sim.map_or("-".into(), |sim| format_reading(sim.status, sim.range_m)),
             millimetres(*residual_m),
             margin_db.map_or("-".into(), |db| format!("{db:+.1} dB")),
-            sim.and_then(|sim| sim.path.as_ref()).map_or(String::new(), path_text),
+            sim.and_then(|sim| sim.path.as_ref()).map_or(String::new(), describe_path),
         ]);
     }
     for column in table.column_iter_mut().take(6) {
@@ -148,39 +149,41 @@ fn beam_table(beams: &[&Beam]) -> Table {
     table
 }
 
-/// A beam that fits badly.
+/// Beam that disagrees with the model.
 #[derive(Debug, Clone)]
 struct Beam {
     ping: Ping,
     residual_m: Option<f64>,
 }
 
-/// The beams that fit worst, of scans that come one by one.
+/// Worst-fitting beams of scans that are added one by one.
 #[derive(Debug)]
-pub(super) struct Worst {
+pub(super) struct WorstBeams {
     count: usize,
     apart: Vec<Beam>,
-    /// Every `stride`th of the unexplained beams without a residual.
+    /// Every `stride`-th of the unexplained beams without a residual.
     one_sided: Vec<Beam>,
     stride: usize,
     seen: usize,
 }
 
-/// Beams without a residual that are kept to choose from.
-const KEPT: usize = 1024;
+/// Maximum number of retained beams without a residual.
+const MAX_RETAINED: usize = 1024;
 
-impl Worst {
-    /// As many as this of each kind.
+impl WorstBeams {
+    /// Collects up to `count` beams of each kind.
     pub(super) const fn new(count: usize) -> Self {
         Self { count, apart: Vec::new(), one_sided: Vec::new(), stride: 1, seen: 0 }
     }
 
-    /// Takes in the beams of a scan.
-    pub(super) fn add(&mut self, judged: &[Judged<'_>]) {
-        for beam in judged.iter().filter(|beam| beam.verdict == Ok(Verdict::Unexplained)) {
+    /// Adds the beams of a scan.
+    pub(super) fn add(&mut self, classified: &[Judged<'_>]) {
+        for beam in classified.iter().filter(|beam| beam.verdict == Ok(Verdict::Unexplained)) {
             let keep = || Beam { ping: beam.ping.clone(), residual_m: beam.residual_m };
             match beam.residual_m {
-                Some(m) if self.least_m().is_none_or(|least_m| m.abs() > least_m) => {
+                Some(m)
+                    if self.min_listed_m().is_none_or(|min_listed_m| m.abs() > min_listed_m) =>
+                {
                     self.apart.push(keep());
                 }
                 Some(_) => {}
@@ -194,23 +197,23 @@ impl Worst {
         }
         self.apart.sort_by(|a, b| size(b).total_cmp(&size(a)));
         self.apart.truncate(self.count);
-        while self.one_sided.len() > KEPT.max(2 * self.count) {
+        while self.one_sided.len() > MAX_RETAINED.max(2 * self.count) {
             keep_every_second(&mut self.one_sided);
             self.stride *= 2;
         }
     }
 
-    /// What a residual must exceed to be listed, metres.
-    fn least_m(&self) -> Option<f64> {
+    /// Returns the residual that a beam must exceed to be listed, metres.
+    fn min_listed_m(&self) -> Option<f64> {
         (self.apart.len() >= self.count).then(|| self.apart.last().map_or(f64::INFINITY, size))
     }
 
-    /// The pairs of echoes farthest apart, and only those that disagree.
+    /// Returns the beams with the largest residuals.
     fn apart(&self) -> Vec<&Beam> {
         self.apart.iter().collect()
     }
 
-    /// Some unexplained beams without a residual, spread over the scans.
+    /// Returns unexplained beams without a residual, spread over the scans.
     fn one_sided(&self) -> Vec<&Beam> {
         let stride = self.one_sided.len().div_ceil(self.count.max(1)).max(1);
         self.one_sided.iter().step_by(stride).take(self.count).collect()
@@ -227,12 +230,12 @@ fn right_align(table: &mut Table, from: usize) {
     }
 }
 
-fn reading(status: PingStatus, range_m: Option<f64>) -> String {
+fn format_reading(status: PingStatus, range_m: Option<f64>) -> String {
     match (status, range_m) {
         (PingStatus::Echo, Some(range_m)) => format!("{range_m:.3} m"),
-        (PingStatus::MinRange, Some(range_m)) => format!("near ({range_m:.3} m)"),
-        (PingStatus::MinRange, None) => "near".into(),
-        (PingStatus::NoEcho, _) => "silent".into(),
+        (PingStatus::MinRange, Some(range_m)) => format!("min ({range_m:.3} m)"),
+        (PingStatus::MinRange, None) => "min".into(),
+        (PingStatus::NoEcho, _) => "no echo".into(),
         _ => "-".into(),
     }
 }
@@ -241,13 +244,13 @@ fn millimetres(value_m: Option<f64>) -> String {
     value_m.map_or("-".into(), |value_m| format!("{:.1} mm", value_m * 1e3))
 }
 
-/// A path in words: `3 reflections: south, north, south`.
-pub(in crate::cli) fn path_text(path: &PathRecord) -> String {
-    let met = path.in_words();
+/// Describes a path, for example `3 reflections: south, north, south`.
+pub(in crate::cli) fn describe_path(path: &PathRecord) -> String {
+    let surfaces = path.in_words();
     match (path.kind, path.order) {
-        (PathKind::Diffracted, _) => met,
-        (PathKind::Scattered, _) => format!("scattered by {met}"),
-        (PathKind::Specular, 1) => format!("1 reflection: {met}"),
-        (PathKind::Specular, order) => format!("{order} reflections: {met}"),
+        (PathKind::Diffracted, _) => surfaces,
+        (PathKind::Scattered, _) => format!("scattered by {surfaces}"),
+        (PathKind::Specular, 1) => format!("1 reflection: {surfaces}"),
+        (PathKind::Specular, order) => format!("{order} reflections: {surfaces}"),
     }
 }

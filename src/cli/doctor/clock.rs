@@ -1,13 +1,13 @@
-//! The board's clock, judged by exchanges over the line. Pure.
+//! Check of the board's clock from request round trips. Pure.
 
 use super::report::{Cause, Check};
 
-/// Deviation from the nominal rate beyond which ranges are wrong by more than anybody would accept;
-/// a ceramic resonator is good to half a percent.
+/// Largest acceptable deviation from the nominal rate; a ceramic resonator is good to half a
+/// percent.
 const MAX_DEVIATION: f64 = 0.01;
 
-/// What both clocks showed at one exchange: the device read its own somewhere between the host's two
-/// times.
+/// Readings of both clocks in one request: the device reads its clock between the two times of the
+/// host.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Exchange {
     pub(super) sent_us: u64,
@@ -25,35 +25,38 @@ impl Exchange {
     }
 }
 
-/// Says how the rate of a clock of nominally `tick_hz` compares with this computer's, by exchanges
-/// in order: from the quickest of the first half to the quickest of the second, since what an
-/// exchange leaves open is half its round trip.
-pub(super) fn judge(exchanges: &[Exchange], tick_hz: u32) -> Check {
+/// Compares a clock of nominally `tick_hz` with this computer's, from requests in order. The
+/// quickest request of the first half and that of the second half are used, because a request's
+/// uncertainty is half its round trip.
+pub(super) fn check_clock(exchanges: &[Exchange], tick_hz: u32) -> Check {
     let (early, late) = exchanges.split_at(exchanges.len() / 2);
     let quickest = |part: &[Exchange]| {
         part.iter().copied().min_by(|a, b| a.round_trip_us().total_cmp(&b.round_trip_us()))
     };
     let (Some(first), Some(last)) = (quickest(early), quickest(late)) else {
-        return Check::skipped("clock", "no exchange went through without a repetition");
+        return Check::skipped("clock", "no request succeeded without a retry");
     };
     let host_us = last.middle_us() - first.middle_us();
     // The 32-bit count wraps each 36 minutes; an examination is shorter.
     let ticks = last.device_ticks.wrapping_sub(first.device_ticks);
     let rate = f64::from(ticks) / f64::from(tick_hz) * 1e6 / host_us;
-    let open = 0.5 * (first.round_trip_us() + last.round_trip_us()) / host_us;
-    if (rate - 1.0).abs() <= MAX_DEVIATION + open {
-        let uncertain = 100.0 * open;
-        return Check::ok("clock", format!("runs at {rate:.4} of its rate (+- {uncertain:.2} %)"));
+    let uncertainty = 0.5 * (first.round_trip_us() + last.round_trip_us()) / host_us;
+    if (rate - 1.0).abs() <= MAX_DEVIATION + uncertainty {
+        let uncertain = 100.0 * uncertainty;
+        return Check::ok(
+            "clock",
+            format!("rate error {:+.2} % (+- {uncertain:.2} %)", 100.0 * (rate - 1.0)),
+        );
     }
     let detail = match ticks {
-        0 => format!("its clock stands still: no tick in {:.1} s", host_us * 1e-6),
-        _ => format!("its clock runs at {rate:.3} of the rate that it tells"),
+        0 => format!("the clock is stopped: no tick in {:.1} s", host_us * 1e-6),
+        _ => format!("the clock runs at {rate:.3} of its stated rate"),
     };
     Check::failed(
         "clock",
         Cause::Clock,
         detail,
-        "every range is wrong by as much: the firmware was built for another crystal (F_CPU), or the \
+        "every range has the same relative error: the firmware was built for another crystal (F_CPU), or the \
          timer that counts the ticks does not run",
     )
 }
@@ -75,7 +78,7 @@ mod tests {
     }
 
     #[test]
-    fn rates_are_told_apart() {
+    fn rate_is_checked() {
         for (rate, cause) in [
             (1.0, None),
             (0.996, None),
@@ -86,20 +89,20 @@ mod tests {
             (2.0, Some(Cause::Clock)),
         ] {
             for start in [0, 5, u32::MAX - 100_000] {
-                assert_eq!(judge(&exchanges(rate, start), 2_000_000).cause, cause, "{rate}");
+                assert_eq!(check_clock(&exchanges(rate, start), 2_000_000).cause, cause, "{rate}");
             }
         }
-        assert!(judge(&exchanges(0.0, 7), 2_000_000).detail.contains("stands still"));
-        assert!(judge(&exchanges(2.0, 7), 2_000_000).detail.contains("2.000"));
+        assert!(check_clock(&exchanges(0.0, 7), 2_000_000).detail.contains("is stopped"));
+        assert!(check_clock(&exchanges(2.0, 7), 2_000_000).detail.contains("2.000"));
     }
 
     #[test]
-    fn what_slow_exchanges_leave_open_is_not_held_against_the_clock() {
+    fn slow_requests() {
         let slow: Vec<Exchange> = exchanges(1.0, 0)
             .into_iter()
             .map(|exchange| Exchange { received_us: exchange.sent_us + 300_000, ..exchange })
             .collect();
-        assert_eq!(judge(&slow, 2_000_000).cause, None);
-        assert_eq!(judge(&[], 2_000_000).status, crate::cli::doctor::report::Status::Skipped);
+        assert_eq!(check_clock(&slow, 2_000_000).cause, None);
+        assert_eq!(check_clock(&[], 2_000_000).status, crate::cli::doctor::report::Status::Skipped);
     }
 }

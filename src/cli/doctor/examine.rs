@@ -1,4 +1,4 @@
-//! The examination of one board: each check needs the ones before it.
+//! Checks of one board, in order: each needs the previous ones.
 
 use std::{
     ops::ControlFlow,
@@ -19,10 +19,10 @@ use super::{
     Args,
     clock::{self, Exchange},
     echo,
-    line::{self, Questions},
+    foreign_sender::ForeignSender,
+    line::{self, RequestStats},
+    port_monitor::PortMonitor,
     report::{Cause, Check, Report},
-    speaker::Speaker,
-    surroundings::Surroundings,
     tap::Tap,
 };
 use crate::{
@@ -31,16 +31,16 @@ use crate::{
     ranger::{DriveError, Driver, Ended, hold_s, serial_text},
 };
 
-/// Steps that the motor is turned by, there and back.
+/// Steps that the motor is turned forth and back.
 const TURN_STEPS: i32 = 25;
-/// Exchanges that the line is judged by.
-const EXCHANGES: u32 = 20;
-/// Least time over which the board's clock is judged, microseconds.
+/// Number of requests for the check of the line.
+const REQUESTS: u32 = 20;
+/// Minimum time over which the board's clock is compared, microseconds.
 const CLOCK_SPAN_US: u64 = 1_500_000;
-/// How long an answer that came late may take at most to be awaited.
+/// Time allowed for a late reply.
 const LATEST: Duration = Duration::from_secs(5);
 
-/// Gentle to the motor, and as far as the module hears: 62 ms, 10.7 m.
+/// Settings gentle to the motor, with the module's full range: 62 ms, 10.7 m.
 const SETTINGS: Settings = Settings {
     window_ticks: 124_000,
     min_interval_ticks: 200_000,
@@ -52,7 +52,7 @@ const SETTINGS: Settings = Settings {
     hold_s: 0,
 };
 
-/// Examines the board at `port`, as far as one gets.
+/// Examines the board at `port` until a check makes the following ones impossible.
 pub(super) async fn examine(port: &str, args: &Args, interrupts: Interrupts) -> Report {
     let mut report = Report { port: port.to_owned(), checks: Vec::new() };
     let line = match link::open(port) {
@@ -62,29 +62,29 @@ pub(super) async fn examine(port: &str, args: &Args, interrupts: Interrupts) -> 
             return report;
         }
     };
-    let surroundings = Surroundings::new(port, &line);
-    report.checks.push(surroundings.check_port());
+    let monitor = PortMonitor::new(port, &line);
+    report.checks.push(monitor.check_port());
     if report.worst().is_some() {
         report.checks.push(Check::skipped("rest", "another program uses the port"));
         return report;
     }
-    report.checks.extend(surroundings.check_adapter());
+    report.checks.extend(monitor.check_adapter());
     let config = HostConfig { max_attempts: ATTEMPTS, ..HostConfig::new(BAUD, rand::random()) };
     let driver = Driver::new(Tap::new(line), config);
-    let mut patient = Patient { driver, restarts: 0, exchanges: Vec::new() };
+    let mut board = BoardUnderTest { driver, restarts: 0, exchanges: Vec::new() };
     tokio::select! {
-        examined = patient.examine(args, &mut report.checks) => {
+        examined = board.examine(args, &mut report.checks) => {
             match examined {
-                // The cause stands before its consequences.
+                // The cause is listed before its consequences.
                 Ok(()) => {
                     let broken = report.worst().is_some();
-                    let cause = surroundings.check_settings().or_else(|| {
-                        Some(surroundings.check_port()).filter(|check| broken && check.cause.is_some())
+                    let cause = monitor.check_settings().or_else(|| {
+                        Some(monitor.check_port()).filter(|check| broken && check.cause.is_some())
                     });
                     report.checks.splice(1..1, cause);
                 }
                 Err(error) => {
-                    let check = explain_silence(&error, patient, &surroundings).await;
+                    let check = explain_silence(&error, board, &monitor).await;
                     report.checks.push(check);
                 }
             }
@@ -92,8 +92,8 @@ pub(super) async fn examine(port: &str, args: &Args, interrupts: Interrupts) -> 
         }
         () = interrupts.wait() => {
             report.checks.push(Check::skipped("rest", "interrupted"));
-            // Whatever turns must not go on turning.
-            let _ = patient.perform(Command::Stop).await;
+            // A running scan or motion must not continue.
+            let _ = board.perform(Command::Stop).await;
         }
     }
     report
@@ -111,27 +111,25 @@ fn no_port(error: &LinkError) -> Check {
     Check::failed("port", cause, error.to_string(), error.help())
 }
 
-struct Patient {
+struct BoardUnderTest {
     driver: Driver<Tap<SerialStream>>,
-    /// Restarts noticed.
+    /// Number of observed resets.
     restarts: u32,
-    /// What both clocks showed, since the board's last restart.
+    /// Clock readings since the board's last reset.
     exchanges: Vec<Exchange>,
 }
 
-/// What came of a command, beside its end.
+/// Readings received during a command.
 #[derive(Default)]
-struct Seen {
+struct CommandReadings {
     readings: Vec<Reading>,
 }
 
-impl Patient {
-    /// # Errors
-    /// If no board identifies itself.
+impl BoardUnderTest {
     async fn examine(&mut self, args: &Args, checks: &mut Vec<Check>) -> Result<(), DriveError> {
         let identity = self.identify().await?;
         checks.push(answered(&identity));
-        checks.push(last_restart(&identity));
+        checks.push(last_reset(&identity));
         let line = self.line().await;
         let broken = line.cause == Some(Cause::Cable);
         checks.push(line);
@@ -147,16 +145,16 @@ impl Patient {
             return Ok(());
         }
         let echo = self.echo(args.pings, settings).await;
-        let gone = matches!(echo.cause, Some(Cause::Cable | Cause::Power));
+        let device_failed = matches!(echo.cause, Some(Cause::Cable | Cause::Power));
         checks.push(echo);
-        checks.push(match gone {
-            true => Check::skipped("clock", "the board has to stay for that"),
+        checks.push(match device_failed {
+            true => Check::skipped("clock", "needs a connected board"),
             false => self.clock(&identity).await,
         });
         Ok(())
     }
 
-    /// Who it is; whatever it still does is stopped.
+    /// Identifies the board and stops its current operation.
     async fn identify(&mut self) -> Result<Identity, DriveError> {
         let Self { driver, restarts, exchanges } = self;
         let identified = driver.take_over(|event| {
@@ -169,45 +167,45 @@ impl Patient {
         identified.await
     }
 
-    /// Round trips, loss and damage.
+    /// Checks round-trip time, loss and damage of frames.
     async fn line(&mut self) -> Check {
         let before = *self.driver.host().stats();
         let mut longest = Duration::ZERO;
-        for _ in 0..EXCHANGES {
+        for _ in 0..REQUESTS {
             let began = Instant::now();
             if let Err(error) = self.perform(Command::Status).await {
-                return gone("line", &error);
+                return device_failed("line", &error);
             }
             longest = longest.max(began.elapsed());
         }
         if self.driver.host().stats().retries > before.retries {
-            // What is still under way is late, and no loss.
+            // Replies still under way are late, not lost.
             let _ = timeout((2 * longest).min(LATEST), self.driver.idle()).await;
         }
         let after = *self.driver.host().stats();
-        line::judge(&Questions { asked: EXCHANGES, before, after, longest })
+        line::check_line(&RequestStats { requests: REQUESTS, before, after, longest })
     }
 
-    /// The board's ticks beside this computer's clock, over the examination so far.
+    /// Compares the board's clock with this computer's, over all requests so far.
     async fn clock(&mut self, identity: &Identity) -> Check {
         if identity.capabilities.has(Capabilities::VIRTUAL_CLOCK) {
-            return Check::skipped("clock", "it is virtual and jumps");
+            return Check::skipped("clock", "virtual clock");
         }
         let began_us = self.exchanges.first().map_or(0, |exchange| exchange.sent_us);
         let spent_us = self.driver.now_us().saturating_sub(began_us);
         sleep(Duration::from_micros(CLOCK_SPAN_US.saturating_sub(spent_us))).await;
-        for _ in 0..EXCHANGES {
+        for _ in 0..REQUESTS {
             if let Err(error) = self.perform(Command::Status).await {
-                return gone("clock", &error);
+                return device_failed("clock", &error);
             }
         }
-        clock::judge(&self.exchanges, identity.tick_hz)
+        clock::check_clock(&self.exchanges, identity.tick_hz)
     }
 
     async fn motor(&mut self, identity: &Identity, settings: Settings) -> Check {
         let has_index = identity.capabilities.has(Capabilities::INDEX_SENSOR);
-        // With an index, home from where it stands: a motor that misses as much on its way back as
-        // on its way there would look right.
+        // With an index sensor, home from the current position: a motor that loses the same number
+        // of steps in both directions would otherwise pass.
         let back = if has_index { Command::Home } else { Command::MoveTo { step: 0 } };
         let turn = Command::MoveTo { step: TURN_STEPS };
         let mut drift = None;
@@ -220,54 +218,51 @@ impl Patient {
         }
         let turned = format!("turned by {TURN_STEPS} steps and back");
         if !has_index {
-            return Check::ok(
-                "motor",
-                format!("{turned}; without an index sensor nobody checks it"),
-            );
+            return Check::ok("motor", format!("{turned}; not verified, no index sensor"));
         }
         match drift.unwrap_or(0) {
-            0 => Check::ok("motor", format!("{turned}; the index is where it was")),
+            0 => Check::ok("motor", format!("{turned}; no index error")),
             drift => Check::failed(
                 "motor",
                 Cause::Motor,
-                format!("{turned}, but the index was {drift} steps off"),
-                "the motor misses steps: check its supply and the driver's current, that nothing \
-                 holds it, and its four wires; or the index sensor reads at two places",
+                format!("{turned}, but with an index error of {drift} steps"),
+                "the motor loses steps: check its supply and the driver's current, that it turns \
+                 freely, and its four wires; or the index sensor triggers at two positions",
             ),
         }
     }
 
     async fn echo(&mut self, pings: u32, settings: Settings) -> Check {
-        // What befell the board before is told already.
+        // A reset of the board before this check has been reported.
         if self.driver.host().identity().is_none()
             && let Err(error) = self.identify().await
         {
-            return gone("echo", &error);
+            return device_failed("echo", &error);
         }
         if let Err(error) = self.perform(Command::Configure(settings)).await {
-            return gone("echo", &error);
+            return device_failed("echo", &error);
         }
         let before = self.restarts;
         let mut readings = Vec::new();
         for _ in 0..pings {
             match self.perform(Command::Ping).await {
-                Ok((_, seen)) => readings.extend(seen.readings),
+                Ok((_, collected)) => readings.extend(collected.readings),
                 Err(DriveError::Host(HostError::Rebooted)) => {
                     return weak_supply(self.restarts - before, &readings);
                 }
-                Err(error) => return gone("echo", &error),
+                Err(error) => return device_failed("echo", &error),
             }
         }
-        echo::judge(&readings, SETTINGS.window_ticks)
+        echo::check_echoes(&readings, SETTINGS.window_ticks)
     }
 
-    async fn perform(&mut self, command: Command) -> Result<(Ended, Seen), DriveError> {
-        let mut seen = Seen::default();
+    async fn perform(&mut self, command: Command) -> Result<(Ended, CommandReadings), DriveError> {
+        let mut collected = CommandReadings::default();
         let Self { driver, restarts, exchanges } = self;
         let ended = driver
             .perform(command, |event| {
                 match event {
-                    HostEvent::Reading { reading, .. } => seen.readings.push(reading),
+                    HostEvent::Reading { reading, .. } => collected.readings.push(reading),
                     HostEvent::Rebooted { .. } => {
                         *restarts += 1;
                         exchanges.clear();
@@ -285,26 +280,26 @@ impl Patient {
                 ControlFlow::Continue(())
             })
             .await?;
-        Ok((ended, seen))
+        Ok((ended, collected))
     }
 }
 
 /// Time allowed for a terminal or modem to react to an empty line.
 const REACTION: Duration = Duration::from_millis(700);
 
-/// The check of a board that did not identify itself: what else acts on the line comes first, because
-/// it costs less to remedy than a board without firmware.
+/// Explains why a board did not identify itself. Other users of the line are considered first,
+/// because they are easier to remedy than a missing firmware.
 async fn explain_silence(
     error: &DriveError,
-    patient: Patient,
-    surroundings: &Surroundings,
+    board: BoardUnderTest,
+    monitor: &PortMonitor,
 ) -> Check {
     use HostError as Host;
     let DriveError::Host(host @ (Host::NoAnswer { .. } | Host::NotADevice { .. })) = error else {
         return no_answer(error);
     };
-    let mut line = patient.driver.into_line();
-    // A login or a modem that is silent answers an empty line.
+    let mut line = board.driver.into_line();
+    // A silent login or modem responds to an empty line.
     let _ = timeout(REACTION, async {
         line.write_all(b"\r\n").await?;
         let mut buffer = [0; 256];
@@ -312,11 +307,11 @@ async fn explain_silence(
         Ok::<(), std::io::Error>(())
     })
     .await;
-    if let Some(check) = surroundings.explain(&line.received, &line.sent) {
+    if let Some(check) = monitor.explain(&line.received, &line.sent) {
         return check;
     }
     let check = no_answer(&DriveError::Host(*host));
-    match (surroundings.may_hide_programs(), check.help) {
+    match (monitor.may_hide_programs(), check.help) {
         (true, Some(help)) => Check {
             help: Some(format!(
                 "programs of other users are hidden: `sudo sonard doctor` or `sudo fuser -v PORT` \
@@ -333,7 +328,7 @@ fn no_answer(error: &DriveError) -> Check {
         DriveError::Host(HostError::NoAnswer { .. }) => Check::failed(
             "board",
             Cause::Silent,
-            "silence: the port is there, but not a byte came back",
+            "no reply: the port exists, but not a byte was received",
             "check that the port is the ranger's and, on a separate serial adapter, that the board \
              has power and TX and RX are crossed; if the port is the board's USB, its program is not \
              running: flash the firmware (firmware/README.md)",
@@ -341,8 +336,8 @@ fn no_answer(error: &DriveError) -> Check {
         DriveError::Host(HostError::NotADevice { bytes }) => Check::failed(
             "board",
             Cause::WrongFirmware,
-            format!("{bytes} bytes came back, but none of them makes sense"),
-            Speaker::OtherRate.help(),
+            format!("{bytes} bytes were received, but no valid frame"),
+            ForeignSender::OtherRate.help(),
         ),
         DriveError::Host(HostError::WrongIdentity(_)) => {
             Check::failed("board", Cause::WrongFirmware, error.to_string(), error.help())
@@ -350,12 +345,12 @@ fn no_answer(error: &DriveError) -> Check {
         DriveError::Host(HostError::WrongVersion { .. }) => {
             Check::failed("board", Cause::WrongVersion, error.to_string(), error.help())
         }
-        error => gone("board", error),
+        error => device_failed("board", error),
     }
 }
 
-/// A failure that any check may meet.
-fn gone(check: &'static str, error: &DriveError) -> Check {
+/// Check failed by a device error.
+fn device_failed(check: &'static str, error: &DriveError) -> Check {
     let cause = match error {
         DriveError::Host(HostError::Hangup) => Cause::Cable,
         DriveError::Host(HostError::Rebooted) => Cause::Power,
@@ -378,7 +373,7 @@ fn answered(identity: &Identity) -> Check {
     Check::ok(
         "board",
         format!(
-            "{}{kind}, firmware {}.{}.{}, protocol {}, {} steps a revolution",
+            "{}{kind}, firmware {}.{}.{}, protocol {}, {} steps per revolution",
             serial_text(identity),
             firmware.major,
             firmware.minor,
@@ -389,22 +384,31 @@ fn answered(identity: &Identity) -> Check {
     )
 }
 
-fn last_restart(identity: &Identity) -> Check {
+fn last_reset(identity: &Identity) -> Check {
+    let cause = match identity.reset_cause {
+        ResetCause::Unknown => "unknown",
+        ResetCause::PowerOn => "power-on",
+        ResetCause::External => "reset pin",
+        ResetCause::BrownOut => "brown-out",
+        ResetCause::Watchdog => "watchdog (the firmware hung)",
+        ResetCause::Requested => "requested by a host",
+    };
+    let detail = format!("last reset: {cause}");
     match identity.reset_cause {
         ResetCause::BrownOut => Check::warning(
             "restart",
             Cause::Power,
-            "the board last restarted because its supply sagged",
-            "the module draws 2 A while it fires: put 1000 uF beside it, and feed it from a supply \
-             of its own, not from USB",
+            detail,
+            "the module draws 2 A while it transmits: put 1000 uF next to it, and use a separate \
+             supply instead of USB",
         ),
         ResetCause::Watchdog => Check::warning(
             "restart",
             Cause::Device,
-            "the board last restarted because its program hung",
+            detail,
             "report it, with what the board was doing",
         ),
-        cause => Check::ok("restart", format!("last restart: {cause:?}")),
+        _ => Check::ok("restart", detail),
     }
 }
 
@@ -414,28 +418,28 @@ fn motor_failed(error: &DriveError) -> Check {
         return Check::failed(
             "motor",
             Cause::Motor,
-            "no index within a turn",
+            "no index within one revolution",
             "if the motor did not turn: check its supply, the driver's ENABLE and current, and its \
-             wires; if it did: check the index sensor, and what the EEPROM says of its level",
+             wires; if it did: check the index sensor, and its level in the EEPROM",
         );
     }
     if refused(NakReason::EmergencyStop) {
         let stop = DriveError::Host(HostError::EmergencyStop);
-        return gone("motor", &stop);
+        return device_failed("motor", &stop);
     }
     match error {
         DriveError::Host(HostError::Rebooted) => {
             let check = weak_supply(1, &[]);
             Check {
                 check: "motor",
-                detail: "the board restarted as the motor turned".into(),
+                detail: "the board reset while the motor turned".into(),
                 ..check
             }
         }
         DriveError::Host(HostError::MotionFault) => {
             Check::failed("motor", Cause::Motor, error.to_string(), error.help())
         }
-        error => gone("motor", error),
+        error => device_failed("motor", error),
     }
 }
 
@@ -443,8 +447,8 @@ fn weak_supply(restarts: u32, readings: &[Reading]) -> Check {
     Check::failed(
         "echo",
         Cause::Power,
-        format!("the board restarted ({restarts}) after {} firings", readings.len()),
-        "its supply sags when the module draws its 2 A: put 1000 uF beside the module, and feed it \
-         from a supply of its own, not from USB",
+        format!("the board reset ({restarts}) after {} pings", readings.len()),
+        "its supply sags when the module draws its 2 A: put 1000 uF next to the module, and use a \
+         separate supply instead of USB",
     )
 }

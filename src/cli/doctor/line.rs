@@ -1,4 +1,4 @@
-//! The line, judged by questions and their answers. Pure.
+//! Check of the serial line from request statistics. Pure.
 
 use std::time::Duration;
 
@@ -6,21 +6,20 @@ use firmware_protocol::host::LinkStats;
 
 use super::report::{Cause, Check};
 
-/// What came of some questions.
+/// Statistics of a number of requests.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Questions {
-    /// How many.
-    pub(super) asked: u32,
-    /// The line's figures before the first, and when no further answer was to be expected.
+pub(super) struct RequestStats {
+    pub(super) requests: u32,
+    /// Link statistics before the first request and after the last possible reply.
     pub(super) before: LinkStats,
     pub(super) after: LinkStats,
-    /// The longest time to an answer.
+    /// Longest time to a reply.
     pub(super) longest: Duration,
 }
 
-/// Tells damage, loss and latency apart: each sending of a question is answered.
-pub(super) fn judge(questions: &Questions) -> Check {
-    let Questions { asked, before, after, longest } = questions;
+/// Distinguishes damage, loss and latency; each transmission of a request has a reply.
+pub(super) fn check_line(stats: &RequestStats) -> Check {
+    let RequestStats { requests, before, after, longest } = stats;
     let damage = |stats: &LinkStats| {
         stats.dropped.checksum + stats.dropped.stuffing + stats.dropped.too_long
     };
@@ -30,7 +29,7 @@ pub(super) fn judge(questions: &Questions) -> Check {
     let lost = sent.saturating_sub(after.frames_received - before.frames_received);
     let longest_ms = longest.as_millis();
     if damaged == 0 && repeated <= 1 {
-        let detail = format!("{asked} questions, each answered within {longest_ms} ms");
+        let detail = format!("{requests} requests, max latency {longest_ms} ms");
         return Check::ok("line", detail);
     }
     if damaged == 0 && lost == 0 {
@@ -38,11 +37,11 @@ pub(super) fn judge(questions: &Questions) -> Check {
             "line",
             Cause::Latency,
             format!(
-                "nothing was lost, but answers took up to {longest_ms} ms: of {asked} questions \
-                 {repeated} were repeated before the answer came"
+                "no loss, but replies took up to {longest_ms} ms: of {requests} requests \
+                 {repeated} were repeated before the reply arrived"
             ),
-            "something on the way holds bytes back: a hub, a serial server on a network, an \
-             adapter's latency timer, or a computer that is too busy; readings stay right, but \
+            "a component delays bytes: a hub, a serial server on a network, an \
+             adapter's latency timer, or a busy computer; readings stay correct, but \
              scans take longer",
         );
     }
@@ -50,9 +49,9 @@ pub(super) fn judge(questions: &Questions) -> Check {
         "line",
         Cause::Line,
         format!(
-            "of {asked} questions {repeated} had to be repeated: {lost} of {sent} frames found no \
-             answer, {damaged} came damaged"
+            "of {requests} requests {repeated} were repeated: {lost} of {sent} frames had no \
+             reply, {damaged} were damaged"
         ),
-        "the line loses or changes bytes: try another cable, away from the motor's, and no hub",
+        "the line loses or corrupts bytes: try another cable, away from the motor's, and no hub",
     )
 }

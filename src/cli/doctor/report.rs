@@ -1,10 +1,10 @@
-//! What was found.
+//! Results of the checks.
 
 use serde::Serialize;
 
 use crate::cli::{Failure, Outcome};
 
-/// How a check went.
+/// Result of a check.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub(super) enum Status {
@@ -14,7 +14,7 @@ pub(super) enum Status {
     Skipped,
 }
 
-/// What is wrong, by its place.
+/// Cause of a failure or warning.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub(super) enum Cause {
@@ -45,7 +45,7 @@ pub(super) enum Cause {
     Device,
 }
 
-/// One check.
+/// Check with its result.
 #[derive(Debug, Clone, Serialize)]
 pub(super) struct Check {
     pub(super) check: &'static str,
@@ -83,7 +83,7 @@ impl Check {
         Self { status: Status::Failed, ..Self::warning(check, cause, detail, help) }
     }
 
-    /// Whether a board was talked to when it failed.
+    /// Returns `true` if the board responded before the failure.
     pub(super) const fn reaches_device(&self) -> bool {
         !matches!(
             self.cause,
@@ -107,7 +107,7 @@ impl Check {
     }
 }
 
-/// All of them, in order.
+/// All checks, in order.
 #[derive(Debug, Serialize)]
 pub(super) struct Report {
     pub(super) port: String,
@@ -115,16 +115,15 @@ pub(super) struct Report {
 }
 
 impl Report {
-    /// The first failure.
+    /// Returns the first failure.
     pub(super) fn worst(&self) -> Option<&Check> {
         self.checks.iter().find(|check| check.status == Status::Failed)
     }
 
     pub(super) fn print(&self, json: bool) -> Outcome {
         if json {
-            let text = serde_json::to_string(self).map_err(|error| {
-                Failure::device(error, "this is a fault of the program: report it")
-            })?;
+            let text = serde_json::to_string(self)
+                .map_err(|error| Failure::device(error, "this is a bug: report it"))?;
             print_line!("{text}");
             return Ok(());
         }

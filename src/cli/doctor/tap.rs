@@ -1,4 +1,4 @@
-//! A line that keeps a copy of what passes.
+//! Serial line that records the first bytes in each direction.
 
 use std::{
     io,
@@ -8,10 +8,10 @@ use std::{
 
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 
-/// Bytes that are kept of each direction: the first ones.
-const MAX_KEPT: usize = 4096;
+/// Maximum number of recorded bytes per direction.
+const MAX_RECORDED: usize = 4096;
 
-/// A line, and the first bytes received from it and sent to it.
+/// Line with the first bytes received and sent.
 #[derive(Debug)]
 pub(super) struct Tap<L> {
     line: L,
@@ -25,9 +25,9 @@ impl<L> Tap<L> {
     }
 }
 
-fn keep(kept: &mut Vec<u8>, bytes: &[u8]) {
-    let room = MAX_KEPT.saturating_sub(kept.len());
-    kept.extend_from_slice(bytes.get(..room).unwrap_or(bytes));
+fn record(recorded: &mut Vec<u8>, bytes: &[u8]) {
+    let room = MAX_RECORDED.saturating_sub(recorded.len());
+    recorded.extend_from_slice(bytes.get(..room).unwrap_or(bytes));
 }
 
 impl<L: AsyncRead + Unpin> AsyncRead for Tap<L> {
@@ -39,7 +39,7 @@ impl<L: AsyncRead + Unpin> AsyncRead for Tap<L> {
         let before = buffer.filled().len();
         let polled = Pin::new(&mut self.line).poll_read(context, buffer);
         let new = buffer.filled().get(before..).unwrap_or_default().to_vec();
-        keep(&mut self.received, &new);
+        record(&mut self.received, &new);
         polled
     }
 }
@@ -52,7 +52,7 @@ impl<L: AsyncWrite + Unpin> AsyncWrite for Tap<L> {
     ) -> Poll<io::Result<usize>> {
         let polled = Pin::new(&mut self.line).poll_write(context, bytes);
         if let Poll::Ready(Ok(count)) = &polled {
-            keep(&mut self.sent, bytes.get(..*count).unwrap_or_default());
+            record(&mut self.sent, bytes.get(..*count).unwrap_or_default());
         }
         polled
     }

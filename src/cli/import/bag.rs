@@ -1,4 +1,4 @@
-//! Recordings of rosbag2: the files of a folder, and what they are stored in.
+//! Files of rosbag2 recordings and their storage format.
 
 use std::{
     fs::{self, File},
@@ -6,20 +6,20 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use super::super::{Failure, output::note_input, progress};
+use super::super::{Failure, output::register_input, progress};
 use crate::import;
 
-/// How every SQLite database begins.
+/// Magic bytes of SQLite databases.
 const SQLITE: &[u8] = b"SQLite format 3\0";
 
-/// The recordings of a folder, in the order in which they were written.
+/// Lists the recordings in a folder, in the order in which they were written.
 pub(super) fn files(folder: &Path) -> Result<Vec<PathBuf>, Failure> {
-    let refuse =
+    let failure =
         |what: String, help: &str| Failure::input(format!("{}: {what}", folder.display()), help);
     let entries = fs::read_dir(folder)
         .and_then(|entries| entries.map(|entry| Ok(entry?.path())).collect::<Result<Vec<_>, _>>())
         .map_err(|error| {
-            refuse(format!("cannot be read: {error}"), "give the folder of a recording")
+            failure(format!("cannot be read: {error}"), "give the folder of a recording")
         })?;
     let ending_in = |ending: &str| -> Vec<PathBuf> {
         let is_one = |path: &&PathBuf| path.extension().is_some_and(|end| end == ending);
@@ -29,31 +29,34 @@ pub(super) fn files(folder: &Path) -> Result<Vec<PathBuf>, Failure> {
     let Some(mut files) = found else {
         let is_packed = !ending_in("zstd").is_empty();
         return Err(if is_packed {
-            refuse("its recording is packed".to_owned(), "unpack it: `zstd -d FOLDER/*.zstd`")
+            failure(
+                "the recording is compressed".to_owned(),
+                "decompress it: `zstd -d FOLDER/*.zstd`",
+            )
         } else {
-            refuse(
-                "there is no recording (.mcap or .db3) in it".to_owned(),
-                "give a folder of rosbag2",
+            failure(
+                "it contains no recording (.mcap or .db3)".to_owned(),
+                "give the folder of a rosbag2 recording",
             )
         });
     };
     files.sort_by_key(|path| (number(path), path.clone()));
-    files.iter().for_each(|path| note_input(path));
+    files.iter().for_each(|path| register_input(path));
     Ok(files)
 }
 
-/// rosbag2 numbers the files of a recording: `NAME_0.mcap` to `NAME_10.mcap`.
+/// Number of a file of a recording: `NAME_0.mcap` to `NAME_10.mcap`.
 fn number(path: &Path) -> u64 {
     let name = path.file_stem().and_then(|name| name.to_str()).unwrap_or_default();
     name.rsplit('_').next().and_then(|number| number.parse().ok()).unwrap_or(0)
 }
 
-/// Refuses databases where this program can't read them.
+/// Rejects databases if this program can't read them.
 pub(super) fn check(files: &[PathBuf]) -> Result<(), Failure> {
     match files.iter().find(|path| is_database(path)) {
         Some(path) if !cfg!(feature = "sqlite") => Err(Failure::input(
             format!(
-                "{}: it is an SQLite database, and this program was built without the feature sqlite",
+                "{}: SQLite database, but this program was built without the feature sqlite",
                 path.display()
             ),
             "build it with `cargo build --release --features sqlite`, or write the recording as MCAP: `ros2 bag \
@@ -65,14 +68,14 @@ pub(super) fn check(files: &[PathBuf]) -> Result<(), Failure> {
 
 fn is_database(path: &Path) -> bool {
     let mut head = [0; SQLITE.len()];
-    // A pipe is read once: to look at it would take its beginning away.
+    // A pipe can be read only once, so its beginning must not be examined.
     fs::metadata(path).is_ok_and(|file| file.is_file())
         && File::open(path).and_then(|mut file| file.read_exact(&mut head)).is_ok()
         && head == SQLITE
 }
 
-/// The bytes of files that follow each other; of databases, those of the MCAP files that they would be.
-pub(super) fn one_after_the_other(files: &[PathBuf]) -> io::Result<Box<dyn Read>> {
+/// Concatenates the bytes of files; databases are converted to MCAP.
+pub(super) fn concatenate(files: &[PathBuf]) -> io::Result<Box<dyn Read>> {
     let mut all: Box<dyn Read> = Box::new(io::empty());
     for file in files {
         let next: Box<dyn Read> = match is_database(file) {
@@ -94,7 +97,8 @@ fn database(_file: &Path) -> io::Result<Box<dyn Read>> {
     Err(io::ErrorKind::Unsupported.into())
 }
 
-/// SHA-256 of databases as they are on the disk; `None` of other files, which are read as they are.
+/// SHA-256 of databases as stored on disk; `None` for other files, which are hashed while they are
+/// read.
 pub(super) fn digest_of_databases(files: &[PathBuf]) -> io::Result<Option<String>> {
     if !files.iter().any(|path| is_database(path)) {
         return Ok(None);

@@ -1,4 +1,4 @@
-//! Meaning of an imported file's columns, on the command line and in a mapping file.
+//! Meaning of an imported file's columns, from options and a mapping file.
 
 use std::{
     fs,
@@ -11,71 +11,75 @@ use jiff::Timestamp;
 use super::super::Failure;
 use crate::import::{Decimal, FORMATS, Format, Mapping, RangeUnit};
 
-/// Meaning of the file's columns.
+/// Options for the meaning of the file's columns.
 #[derive(Debug, Clone, clap::Args)]
 #[command(next_help_heading = "Columns")]
 pub(super) struct ColumnArgs {
-    /// Meaning of the columns: FIELD=COLUMN,... with the number of the column, from 1, or its name; of JSON,
-    /// the name of the member; of an array's rows the numbers of all ranges, as in range_m=1-8 [default: as the header says]
+    /// Meaning of the columns: FIELD=COLUMN,... with the number of the column, from 1, or its name;
+    /// for JSON, the name of the member; for an array's rows, the numbers of all ranges, as in
+    /// range_m=1-8 [default: from the header]
     #[arg(long, value_name = "FIELD=COLUMN,...")]
     columns: Option<String>,
-    /// Format of the file [default: by its content]
+    /// Format of the file [default: from its content]
     #[arg(long, value_name = "FORMAT", value_parser = format())]
     format: Option<Format>,
-    /// File (TOML) with all of this: the keys format, columns, topics and those of the options here, with _ for -;
-    /// options override it
+    /// File (TOML) with these settings; keys: format, columns, topics, device, clockwise, zero_deg,
+    /// azimuth_deg, none, none_from, sound_speed_m_s, range_unit, decimal, encoding, time_format,
+    /// utc_offset, started. Options take precedence
     #[arg(long, value_name = "FILE")]
     mapping: Option<PathBuf>,
-    /// Topic of a recording to read; may be given several times [default: all Range but predictions, else LaserScan]
+    /// Topic of a recording to read (repeatable) [default: all Range except predictions, else
+    /// LaserScan]
     #[arg(long, value_name = "TOPIC")]
     topic: Vec<String>,
-    /// Device of a Player log of several: HOST:ROBOT:INDEX, or the end of it [default: the first]
+    /// Device in a Player log of several: HOST:ROBOT:INDEX, or the end of it [default: the first]
     #[arg(long, value_name = "DEVICE")]
     device: Option<String>,
-    /// Azimuths and bearings count clockwise
+    /// Azimuths and bearings are clockwise
     #[arg(long)]
     clockwise: bool,
-    /// Where azimuth zero points, degrees counter-clockwise from the heading (bearing zero: from the x axis)
+    /// Direction of azimuth zero, degrees counter-clockwise from the heading (for bearings: from
+    /// the x axis)
     #[arg(long, value_name = "DEG", allow_negative_numbers = true)]
     zero_deg: Option<f64>,
-    /// Azimuth, degrees counter-clockwise from the heading; that of every reading of a fixed ranger, whose file has no
-    /// column for it
+    /// Azimuth, degrees counter-clockwise from the heading; of every reading, for a fixed ranger
+    /// whose file has no such column
     #[arg(long, value_name = "DEG", allow_negative_numbers = true)]
     azimuth_deg: Option<f64>,
-    /// A range, in the file's unit, that means no echo; may be given several times
+    /// Range, in the file's unit, that means no echo (repeatable)
     #[arg(long, value_name = "VALUE", allow_negative_numbers = true)]
-    none: Vec<f64>,
-    /// A range, in the file's unit, at and beyond which there is no echo
+    no_echo: Vec<f64>,
+    /// Range, in the file's unit, at and above which there is no echo
     #[arg(long, value_name = "VALUE")]
-    none_from: Option<f64>,
-    /// Speed of sound that the file's ranges were computed with, metres a second: they are computed again
-    /// with that of the air
+    no_echo_from: Option<f64>,
+    /// Speed of sound with which the file's ranges were computed, metres per second; they are
+    /// converted to the speed of sound in the air
     #[arg(long, value_name = "M/S")]
-    ranged_with: Option<f64>,
-    /// Unit of ranges and limits in logs and recordings, whose formats specify metres
+    source_sound_speed: Option<f64>,
+    /// Unit of ranges and limits in logs and recordings whose format specifies metres
     #[arg(long, value_name = "UNIT", value_parser = one_of(&RangeUnit::ALL))]
     range_unit: Option<RangeUnit>,
-    /// Sign before the fraction of numbers: point or comma [default: as the file shows]
+    /// Decimal separator of numbers: point or comma [default: detected]
     #[arg(long, value_name = "SIGN", value_parser = one_of(&DECIMALS))]
     decimal: Option<Decimal>,
-    /// Encoding of a text, such as utf-16le or latin1 [default: as the file shows]
+    /// Encoding of a text, such as utf-16le or latin1 [default: detected]
     #[arg(long, value_name = "NAME")]
     encoding: Option<String>,
-    /// Form of times, in the signs of strftime: '%d/%m/%Y %H:%M:%S'
+    /// Format of times, as for strftime: '%d/%m/%Y %H:%M:%S'
     #[arg(long, value_name = "FORM")]
     time_format: Option<String>,
     /// Offset from UTC of times without a zone, such as +01:00 [default: UTC]
     #[arg(long, value_name = "OFFSET", allow_hyphen_values = true)]
     utc_offset: Option<String>,
-    /// Time of the first reading, where the file has times of day or counts from the start of a board
-    /// (2026-01-31T12:00:00Z) [default: the file's date]
+    /// Time of the first reading, for files with times of day or times since start-up
+    /// (2026-01-31T12:00:00Z) [default: the file's modification time]
     #[arg(long, value_name = "TIME")]
     started: Option<Timestamp>,
 }
 
 const DECIMALS: [(&str, Decimal); 2] = [("point", Decimal::Point), ("comma", Decimal::Comma)];
 
-/// The formats of the registry, each with what it holds.
+/// Parser of format names, with descriptions from the registry.
 fn format() -> ValueParser {
     let names = FORMATS.iter().map(|entry| PossibleValue::new(entry.name).help(entry.about));
     let parser = PossibleValuesParser::new(names.collect::<Vec<_>>());
@@ -90,7 +94,7 @@ fn one_of<T: Copy + Send + Sync + 'static>(values: &'static [(&'static str, T)])
 }
 
 impl ColumnArgs {
-    /// The mapping of the file and of the options, which override it.
+    /// Returns the mapping of the file, overridden by the options.
     pub(super) fn mapping(&self) -> Result<Mapping, Failure> {
         let mut mapping = match &self.mapping {
             Some(path) => read_mapping(path)?,
@@ -107,11 +111,11 @@ impl ColumnArgs {
         mapping.clockwise |= self.clockwise;
         mapping.zero_deg = self.zero_deg.unwrap_or(mapping.zero_deg);
         mapping.azimuth_deg = self.azimuth_deg.or(mapping.azimuth_deg);
-        if !self.none.is_empty() {
-            mapping.none.clone_from(&self.none);
+        if !self.no_echo.is_empty() {
+            mapping.none.clone_from(&self.no_echo);
         }
-        mapping.none_from = self.none_from.or(mapping.none_from);
-        mapping.sound_speed_m_s = self.ranged_with.or(mapping.sound_speed_m_s);
+        mapping.none_from = self.no_echo_from.or(mapping.none_from);
+        mapping.sound_speed_m_s = self.source_sound_speed.or(mapping.sound_speed_m_s);
         mapping.range_unit = self.range_unit.or(mapping.range_unit);
         mapping.decimal = self.decimal.or(mapping.decimal);
         mapping.started = self.started.or(mapping.started);
@@ -128,8 +132,8 @@ impl ColumnArgs {
         if let Some(speed) =
             mapping.sound_speed_m_s.filter(|speed| !(200.0..=500.0).contains(speed))
         {
-            let what = format!("ranges computed with a speed of sound of {speed} m/s");
-            return Err(Failure::input(what, "give metres a second, 200 to 500"));
+            let what = format!("--source-sound-speed is {speed} m/s");
+            return Err(Failure::input(what, "give metres per second, 200 to 500"));
         }
         Ok(mapping)
     }
@@ -141,6 +145,9 @@ fn read_mapping(path: &Path) -> Result<Mapping, Failure> {
         Failure::input(format!("cannot read {name}: {error}"), "give a TOML file")
     })?;
     toml::from_str(&text).map_err(|error| {
-        Failure::input(format!("{name}: {error}"), "see `sonard import --help` for its keys")
+        Failure::input(
+            format!("{name}: {error}"),
+            "see --mapping in `sonard import --help` for the keys",
+        )
     })
 }

@@ -1,7 +1,7 @@
-//! Recordings of rosbag2 in an SQLite database, read as the MCAP recordings that they would be.
+//! Reader of rosbag2 recordings in SQLite databases, which converts them to MCAP.
 //!
-//! The database has the tables `topics` (`id, name, type, serialization_format, ...`) and `messages`
-//! (`id, topic_id, timestamp, data`): github.com/ros2/rosbag2, rosbag2_storage_sqlite3.
+//! The database has the tables `topics` (`id, name, type, serialization_format, ...`) and
+//! `messages` (`id, topic_id, timestamp, data`): github.com/ros2/rosbag2, rosbag2_storage_sqlite3.
 
 use std::{
     collections::BTreeMap,
@@ -11,64 +11,65 @@ use std::{
 
 use rusqlite::{Connection, OpenFlags, OptionalExtension as _, limits::Limit, params};
 
-/// The longest message that is taken into memory, bytes.
-const MOST_BYTES: i32 = 1 << 28;
+/// Maximum size of a message, bytes.
+const MAX_MESSAGE_BYTES: i32 = 1 << 28;
 
 const MCAP_MAGIC: &[u8] = b"\x89MCAP0\r\n";
-/// Kinds of records of an MCAP file: mcap.dev/spec.
+/// Opcodes of MCAP records: mcap.dev/spec.
 const FOOTER: u8 = 0x02;
 const SCHEMA: u8 = 0x03;
 const CHANNEL: u8 = 0x04;
 const MESSAGE: u8 = 0x05;
 
-/// The bytes of an MCAP file with the messages of a database, made while they are read: a message at a time
-/// is in memory.
+/// MCAP stream of the messages of a database, produced while it is read; one message at a time is
+/// in memory.
 pub(super) struct Database {
     connection: Connection,
-    /// Number of a topic in the database, and of its channel.
+    /// MCAP channel of each topic, by its number in the database.
     channels: BTreeMap<i64, u16>,
-    /// The message that was read last.
+    /// Identifier of the last message read.
     last_id: i64,
-    is_over: bool,
+    finished: bool,
     ready: io::Cursor<Vec<u8>>,
 }
 
-/// A row of the table `messages`.
+/// Row of the table `messages`.
 struct Row {
     id: i64,
     topic: i64,
-    /// When it was recorded, nanoseconds since 1970.
+    /// Recording time, nanoseconds since 1970.
     time_ns: i64,
     data: Vec<u8>,
 }
 
 impl Database {
-    /// Opens a database for reading alone; `types` are those of the messages that are wanted.
+    /// Opens a database read-only, for messages of the given types.
     ///
     /// # Errors
-    /// No database of rosbag2, or one that is damaged.
+    ///
+    /// The file is not a rosbag2 database, or is damaged.
     pub(super) fn open(path: &Path, types: &[&str]) -> io::Result<Self> {
         let flags = OpenFlags::SQLITE_OPEN_READ_ONLY | OpenFlags::SQLITE_OPEN_NO_MUTEX;
-        let connection = Connection::open_with_flags(path, flags).map_err(told)?;
-        connection.set_limit(Limit::SQLITE_LIMIT_LENGTH, MOST_BYTES).map_err(told)?;
-        // A stranger's file may name functions in its schema, and call a query a table.
-        connection.pragma_update(None, "trusted_schema", false).map_err(told)?;
+        let connection = Connection::open_with_flags(path, flags).map_err(to_io_error)?;
+        connection.set_limit(Limit::SQLITE_LIMIT_LENGTH, MAX_MESSAGE_BYTES).map_err(to_io_error)?;
+        // An untrusted schema may call functions, or define a view in place of a table.
+        connection.pragma_update(None, "trusted_schema", false).map_err(to_io_error)?;
         check(&connection)?;
         let mut ready = MCAP_MAGIC.to_vec();
         let channels = channels(&connection, types, &mut ready)?;
         let ready = io::Cursor::new(ready);
-        Ok(Self { connection, channels, last_id: i64::MIN, is_over: false, ready })
+        Ok(Self { connection, channels, last_id: i64::MIN, finished: false, ready })
     }
 
-    /// Makes the record of the next message, or of the file's end.
-    fn read_on(&mut self) -> io::Result<()> {
+    /// Encodes the record of the next message, or the end of the file.
+    fn encode_next(&mut self) -> io::Result<()> {
         let mut out = Vec::new();
         match self.next_message()? {
             Some(body) => record(&mut out, MESSAGE, &body),
             None => {
                 record(&mut out, FOOTER, &[0; 20]);
                 out.extend(MCAP_MAGIC);
-                self.is_over = true;
+                self.finished = true;
             }
         }
         self.ready = io::Cursor::new(out);
@@ -77,7 +78,7 @@ impl Database {
 
     fn next_message(&mut self) -> io::Result<Option<Vec<u8>>> {
         loop {
-            let Some(row) = self.row_behind(self.last_id)? else { return Ok(None) };
+            let Some(row) = self.row_after(self.last_id)? else { return Ok(None) };
             let Row { id, topic, time_ns, data } = row;
             self.last_id = id;
             let Some(channel) = self.channels.get(&topic) else { continue };
@@ -90,24 +91,23 @@ impl Database {
         }
     }
 
-    /// The next row of a wanted topic.
-    ///
-    /// One row a query, found by its number: so nothing borrows the database between two calls.
-    fn row_behind(&self, id: i64) -> io::Result<Option<Row>> {
+    /// Returns the next row of a selected topic. A query for each row, by number, avoids a borrow
+    /// of the database between calls.
+    fn row_after(&self, id: i64) -> io::Result<Option<Row>> {
         let topics: Vec<String> = self.channels.keys().map(i64::to_string).collect();
         let sql = format!(
             "SELECT id, topic_id, timestamp, data FROM messages WHERE id > ?1 AND topic_id IN ({}) ORDER BY id \
              LIMIT 1",
             topics.join(", ")
         );
-        let mut query = self.connection.prepare_cached(&sql).map_err(told)?;
+        let mut query = self.connection.prepare_cached(&sql).map_err(to_io_error)?;
         query
             .query_row(params![id], |row| {
                 let (id, topic) = (row.get(0)?, row.get(1)?);
                 Ok(Row { id, topic, time_ns: row.get(2)?, data: row.get(3)? })
             })
             .optional()
-            .map_err(told)
+            .map_err(to_io_error)
     }
 }
 
@@ -115,15 +115,15 @@ impl Read for Database {
     fn read(&mut self, into: &mut [u8]) -> io::Result<usize> {
         loop {
             let read = self.ready.read(into)?;
-            if read > 0 || into.is_empty() || self.is_over {
+            if read > 0 || into.is_empty() || self.finished {
                 return Ok(read);
             }
-            self.read_on()?;
+            self.encode_next()?;
         }
     }
 }
 
-/// Refuses what is no recording: both tables have to be plain ones, and no views.
+/// Rejects databases without the tables; views are not accepted in their place.
 fn check(connection: &Connection) -> io::Result<()> {
     for name in ["topics", "messages"] {
         let sql: Option<String> = connection
@@ -133,18 +133,17 @@ fn check(connection: &Connection) -> io::Result<()> {
                 |row| row.get(0),
             )
             .optional()
-            .map_err(told)?;
+            .map_err(to_io_error)?;
         if !sql.is_some_and(|sql| sql.starts_with("CREATE TABLE")) {
-            let what = format!(
-                "it is an SQLite database, but no recording of ROS 2: it has no table `{name}`"
-            );
+            let what =
+                format!("SQLite database, but not a recording of ROS 2: it has no table `{name}`");
             return Err(io::Error::new(io::ErrorKind::InvalidData, what));
         }
     }
     Ok(())
 }
 
-/// Writes schema and channel of each topic of these types; which channel a topic has.
+/// Writes schema and channel of each topic of the given types; returns the channels by topic.
 fn channels(
     connection: &Connection,
     types: &[&str],
@@ -152,16 +151,16 @@ fn channels(
 ) -> io::Result<BTreeMap<i64, u16>> {
     let mut query = connection
         .prepare("SELECT id, name, type, serialization_format FROM topics ORDER BY id")
-        .map_err(told)?;
+        .map_err(to_io_error)?;
     let rows = query
         .query_map([], |row| {
             let texts: [String; 3] = [row.get(1)?, row.get(2)?, row.get(3)?];
             Ok((row.get::<_, i64>(0)?, texts))
         })
-        .map_err(told)?;
+        .map_err(to_io_error)?;
     let mut channels = BTreeMap::new();
     for row in rows {
-        let (topic, [name, type_name, encoding]) = row.map_err(told)?;
+        let (topic, [name, type_name, encoding]) = row.map_err(to_io_error)?;
         if !types.contains(&type_name.as_str()) {
             continue;
         }
@@ -192,11 +191,11 @@ fn text(out: &mut Vec<u8>, text: &str) {
     out.extend(text.as_bytes());
 }
 
-/// What SQLite says of a file.
+/// Error of SQLite while reading a file.
 #[derive(Debug, thiserror::Error)]
 #[error("as an SQLite database: {0}")]
-struct Unreadable(#[source] rusqlite::Error);
+struct DatabaseError(#[source] rusqlite::Error);
 
-fn told(error: rusqlite::Error) -> io::Error {
-    io::Error::new(io::ErrorKind::InvalidData, Unreadable(error))
+fn to_io_error(error: rusqlite::Error) -> io::Error {
+    io::Error::new(io::ErrorKind::InvalidData, DatabaseError(error))
 }

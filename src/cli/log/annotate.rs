@@ -9,7 +9,7 @@ use std::{
 use super::super::output::{OutPath, Overwrite};
 use super::{
     Failure, Outcome,
-    rewrite::{Waiting, rewrite},
+    rewrite::{PendingRecords, rewrite},
 };
 use crate::{
     geometry::wrap_360,
@@ -32,13 +32,14 @@ pub(in crate::cli) struct Args {
     output: Option<OutPath>,
     #[command(flatten)]
     overwrite: Overwrite,
-    /// Treat ranges beyond this as no echo, metres [default: the sensor's, at most 5]
+    /// Maximum range, metres, instead of the sensor's; longer ranges count as no echo [default: the
+    /// sensor's, at most 5]
     #[arg(long, value_name = "M")]
-    silent_beyond: Option<f64>,
-    /// Exponent of the confidence with the distance of the feature
+    max_range: Option<f64>,
+    /// Exponent of the decrease of confidence with the feature's distance
     #[arg(long, value_name = "E", default_value_t = 2.0)]
     exponent: f64,
-    /// How far walls are extended beyond their observed part, metres
+    /// Extension of walls beyond their observed part, metres
     #[arg(long, value_name = "M", default_value_t = Mapping::default().extend_m)]
     extend: f64,
 }
@@ -48,22 +49,22 @@ Examples:
   sonard log annotate run.jsonl -o trusted.jsonl
   sonard plot trusted.jsonl --kind confidence -o trusted.png
 
-Feature Prediction goes through the scans in the order of the log, as in `sonard map`, and every \
-ping that it weighs gets a confidence: 0.5 where nothing speaks against it, less where a feature \
-predicted from other readings does. Every other record is written as it was read; lines that are no \
-records are left out and named. The log itself is not touched.
+Feature Prediction processes the scans in the order of the log, as in `sonard map`. Every valid \
+ping gets a confidence: 0.5 without contradiction, less if a feature predicted from other readings \
+contradicts it. All other records are copied unchanged; lines that are not records are skipped and \
+reported. The log itself is not modified.
 
 Exit codes: 0 done, 2 wrong usage or input, 3 the disk gave up.";
 
 pub(super) fn run(args: &Args) -> Outcome {
-    if let Some(range_m) =
-        args.silent_beyond.filter(|range_m| !(range_m.is_finite() && *range_m > 0.0))
+    if let Some(range_m) = args.max_range.filter(|range_m| !(range_m.is_finite() && *range_m > 0.0))
     {
         let help = "give a length in metres, greater than 0";
-        return Err(Failure::input(format!("--silent-beyond is {range_m}"), help));
+        return Err(Failure::input(format!("--max-range is {range_m}"), help));
     }
-    let (mut predictor, mut any) = (Predictor { args, of_session: None }, false);
-    let waiting = Waiting::default();
+    let (mut annotator, mut any_confidence) =
+        (ConfidenceAnnotator { args, of_session: None }, false);
+    let waiting = PendingRecords::default();
     let to = (args.output.as_ref(), args.overwrite);
     let written = rewrite(
         &args.log,
@@ -71,34 +72,35 @@ pub(super) fn run(args: &Args) -> Outcome {
         &waiting,
         |_| {},
         |scan| {
-            let found = predictor.confidences(&scan)?;
-            any |= !found.is_empty();
+            let found = annotator.confidences(&scan)?;
+            any_confidence |= !found.is_empty();
             Ok(Box::new(move |ping: &mut Ping| {
-                let found = found.get(&stop(ping.azimuth_deg)).copied();
-                ping.confidence = found.filter(|_| is_weighed(ping));
+                let found = found.get(&azimuth_key(ping.azimuth_deg)).copied();
+                ping.confidence = found.filter(|_| is_informative(ping));
             }))
         },
     )?;
-    if !any {
+    if !any_confidence {
         return Err(Failure::input(
-            format!("{}: there is no scan with its session and pose to weigh", args.log.display()),
-            "give a log as `sonard scan` or `sonard simulate` writes it",
+            format!("{}: no scan with a session and a pose", args.log.display()),
+            "give a log written by `sonard scan` or `sonard simulate`",
         ));
     }
     written.finish()
 }
 
-/// Confidences of a scan's stops, by azimuth in millionths of a degree: readings of one stop have one.
+/// Confidences of a scan's steps, by azimuth in millionths of a degree; all readings of a step
+/// share one.
 type Confidences = HashMap<i64, f64>;
 
-/// Feature Prediction through the scans of a session; each session begins with nothing predicted.
-struct Predictor<'a> {
+/// Feature Prediction over the scans of a session; each session starts without features.
+struct ConfidenceAnnotator<'a> {
     args: &'a Args,
     of_session: Option<(Arc<Session>, FeaturePrediction)>,
 }
 
-impl Predictor<'_> {
-    /// The confidence of each stop of a scan; none if it can't be weighed, which is told.
+impl ConfidenceAnnotator<'_> {
+    /// Returns the confidence of each step of a scan; empty, with a notice, for an unsuitable scan.
     fn confidences(&mut self, scan: &ScanView) -> Result<Confidences, Failure> {
         let Some(session) = &scan.session else { return Ok(Confidences::new()) };
         let sweep = match Sweep::of(scan) {
@@ -119,7 +121,9 @@ impl Predictor<'_> {
         };
         let assessed = predicted.assess(&sweep);
         let of_stops = sweep.beams.iter().zip(assessed);
-        Ok(of_stops.map(|(beam, worth)| (stop(beam.azimuth_deg), worth.confidence)).collect())
+        Ok(of_stops
+            .map(|(beam, worth)| (azimuth_key(beam.azimuth_deg), worth.confidence))
+            .collect())
     }
 }
 
@@ -127,7 +131,7 @@ fn settings(args: &Args, session: &Session) -> Result<PredictionSettings, Failur
     let extents = Extents::of_session(session).map_err(|error| {
         Failure::input(format!("session: {error}"), "correct the session's record in the log")
     })?;
-    let max_range_m = args.silent_beyond.unwrap_or(extents.max_range_m.min(MAX_RANGE_M));
+    let max_range_m = args.max_range.unwrap_or(extents.max_range_m.min(MAX_RANGE_M));
     let plane_deg = extents.plane_corner_deg(1.0, 1.0);
     Ok(PredictionSettings {
         exponent: args.exponent,
@@ -136,12 +140,12 @@ fn settings(args: &Args, session: &Session) -> Result<PredictionSettings, Failur
     })
 }
 
-/// An azimuth in millionths of a degree: those of one stop agree to this.
-fn stop(azimuth_deg: f64) -> i64 {
+/// Azimuth in millionths of a degree, which identifies a step.
+fn azimuth_key(azimuth_deg: f64) -> i64 {
     (wrap_360(azimuth_deg) * 1e6).round() as i64
 }
 
-/// Whether a reading counts: one that was lost or is doubtful says nothing.
-const fn is_weighed(ping: &Ping) -> bool {
+/// Returns `true` for readings with information; lost and uncertain ones have none.
+const fn is_informative(ping: &Ping) -> bool {
     matches!(ping.status, PingStatus::Echo | PingStatus::NoEcho | PingStatus::MinRange)
 }

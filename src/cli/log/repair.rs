@@ -17,16 +17,17 @@ pub(in crate::cli) struct Args {
 }
 
 const HELP: &str = "\
-Every whole record is kept byte for byte, in order; a torn last line and lines that are no records \
-are left out; a whole JSON object with a type is kept even if this version can't read it. The log as it was stays beside it as LOG.orig (or LOG.orig-2, ...). The repaired \
-file takes the log's place in one step; a log that needs nothing is not touched.
+All complete records are kept byte for byte, in order. An incomplete last line and lines that are \
+not records are removed; a complete JSON object with a type is kept even if this version can't \
+read it. The original log is kept as LOG.orig (or LOG.orig-2, ...). The repaired file replaces the \
+log atomically; a log without faults is not modified.
 
-Exit codes: 0 every whole record is kept (at most a torn last line was left out), 1 something else \
-had to be left out (listed), 2 the file can't be opened, 3 somebody is writing it, or the disk failed.";
+Exit codes: 0 all complete records were kept (at most an incomplete last line was removed), 1 \
+other lines were removed (listed), 2 the file can't be opened, 3 file in use, or disk error.";
 
 pub(super) fn run(args: &Args) -> Outcome {
     if args.log == Path::new("-") {
-        return Err(Failure::input("standard input can't be repaired", "name the log's file"));
+        return Err(Failure::input("standard input can't be repaired", "give the log's file name"));
     }
     let done = repair(&args.log)?;
     if let Err(error) = print(&mut io::stdout().lock(), &args.log, &done) {
@@ -40,20 +41,23 @@ fn print(out: &mut impl Write, log: &Path, done: &Repair) -> io::Result<()> {
     for left in &done.left_out {
         writeln!(
             out,
-            "{name}:{}: left out {} byte(s) at byte {}: {}",
+            "{name}:{}: removed {} byte(s) at byte {}: {}",
             left.line, left.length, left.offset, left.fault
         )?;
     }
     if let Some(torn) = &done.torn {
         let (line, length, offset) = (torn.line, torn.length, torn.offset);
-        writeln!(out, "{name}:{line}: torn last line left out, {length} byte(s) at byte {offset}")?;
+        writeln!(
+            out,
+            "{name}:{line}: incomplete last line removed, {length} byte(s) at byte {offset}"
+        )?;
     }
     if done.newline_added {
-        writeln!(out, "{name}: the last record was whole; its newline is added")?;
+        writeln!(out, "{name}: the last record was complete; newline added")?;
     }
     for error in &done.kept_unread {
         let (line, fault) = (error.line, &error.fault);
-        writeln!(out, "{name}:{line}: kept, though this version can't read it: {fault}")?;
+        writeln!(out, "{name}:{line}: kept, unreadable by this version: {fault}")?;
     }
     let kept = done.kept + done.kept_unread.len() as u64;
     match &done.original {

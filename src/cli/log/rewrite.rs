@@ -1,4 +1,4 @@
-//! A log written again, its readings changed by what their whole scan says.
+//! Copy of a log with readings modified per scan.
 
 use std::{
     cell::RefCell,
@@ -9,7 +9,7 @@ use std::{
 use uuid::Uuid;
 
 use super::super::{
-    logs::for_each_scan_of,
+    logs::for_each_record_and_scan,
     output::{OutPath, Overwrite, closed, records_to},
 };
 use super::{Failure, Outcome};
@@ -18,53 +18,56 @@ use crate::{
     store::{RecordWriter, StoreError},
 };
 
-/// What is done to each reading of a scan.
+/// Modification of each reading of a scan.
 pub(in crate::cli) type PingChange = Box<dyn Fn(&mut Ping)>;
 
-/// A log that is written in full and not yet in its place.
-pub(in crate::cli) struct Rewritten<'a> {
-    waiting: &'a RefCell<VecDeque<Record>>,
-    /// Scans that have ended and whose end is not written.
+/// Rewritten log that is not yet renamed to its destination.
+pub(in crate::cli) struct LogRewrite<'a> {
+    pending: &'a RefCell<VecDeque<Record>>,
+    /// Modifications for scans whose end has been read but not written.
     ready: HashMap<Uuid, PingChange>,
-    /// Nobody, once its reader has gone.
+    /// `None` once the reader of the output has closed it.
     out: Option<Box<dyn RecordWriter>>,
 }
 
-/// Records that were read and not written: at most those from the oldest scan on that has not ended.
-pub(in crate::cli) type Waiting = RefCell<VecDeque<Record>>;
+/// Records that were read but not yet written: at most those since the start of the oldest open
+/// scan.
+pub(in crate::cli) type PendingRecords = RefCell<VecDeque<Record>>;
 
-/// Writes the records of a log in their order, those between readings changed by `change`, and readings by what
-/// `of_scan` says once their scan has been read. Lines that hold no record are left out and named.
+/// Copies the records of a log in order. `modify` modifies each record; the result of `plan_scan`
+/// modifies the readings of a scan once the scan has been read. Lines that are not records are
+/// skipped and reported.
 ///
 /// # Errors
-/// The log can't be read, or what the two refuse; nothing is at the output's name then.
+///
+/// The log can't be read, or one of the functions fails; the output is then not created.
 pub(in crate::cli) fn rewrite<'a>(
     log: &Path,
     (out, overwrite): (Option<&OutPath>, Overwrite),
-    waiting: &'a Waiting,
-    change: impl Fn(&mut Record),
-    mut of_scan: impl FnMut(ScanView) -> Result<PingChange, Failure>,
-) -> Result<Rewritten<'a>, Failure> {
+    pending: &'a PendingRecords,
+    modify: impl Fn(&mut Record),
+    mut plan_scan: impl FnMut(ScanView) -> Result<PingChange, Failure>,
+) -> Result<LogRewrite<'a>, Failure> {
     let out = Some(records_to(out.map(|out| &**out), overwrite)?);
-    let mut written = Rewritten { waiting, ready: HashMap::new(), out };
-    for_each_scan_of(
+    let mut written = LogRewrite { pending, ready: HashMap::new(), out };
+    for_each_record_and_scan(
         log,
         |record| {
             let mut record = record.clone();
-            change(&mut record);
-            waiting.borrow_mut().push_back(record);
+            modify(&mut record);
+            pending.borrow_mut().push_back(record);
         },
         |scan| {
             let id = scan.scan;
-            written.ready.insert(id, of_scan(scan)?);
+            written.ready.insert(id, plan_scan(scan)?);
             written.write_ready()
         },
     )?;
     Ok(written)
 }
 
-impl Rewritten<'_> {
-    /// Writes up to the first reading whose scan has not ended.
+impl LogRewrite<'_> {
+    /// Writes up to the first reading of an open scan.
     fn write_ready(&mut self) -> Outcome {
         while let Some(record) = self.next_ready() {
             self.write(record)?;
@@ -73,19 +76,19 @@ impl Rewritten<'_> {
     }
 
     fn next_ready(&self) -> Option<Record> {
-        let mut waiting = self.waiting.borrow_mut();
-        let is_ready = match waiting.front()? {
+        let mut pending = self.pending.borrow_mut();
+        let is_ready = match pending.front()? {
             Record::Ping(ping) => self.ready.contains_key(&ping.scan),
             _ => true,
         };
-        if is_ready { waiting.pop_front() } else { None }
+        if is_ready { pending.pop_front() } else { None }
     }
 
     fn write(&mut self, mut record: Record) -> Outcome {
         match &mut record {
             Record::Ping(ping) => {
-                if let Some(change) = self.ready.get(&ping.scan) {
-                    change(ping);
+                if let Some(modify) = self.ready.get(&ping.scan) {
+                    modify(ping);
                 }
             }
             Record::ScanEnd(end) => drop(self.ready.remove(&end.scan)),
@@ -102,10 +105,10 @@ impl Rewritten<'_> {
         Ok(())
     }
 
-    /// Puts the log in its place.
+    /// Renames the file to its destination.
     pub(in crate::cli) fn finish(mut self) -> Outcome {
-        let left: Vec<_> = self.waiting.borrow_mut().drain(..).collect();
-        left.into_iter().try_for_each(|record| self.write(record))?;
+        let rest: Vec<_> = self.pending.borrow_mut().drain(..).collect();
+        rest.into_iter().try_for_each(|record| self.write(record))?;
         self.out.map_or(Ok(()), |out| closed(out.finish()))
     }
 }

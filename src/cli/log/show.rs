@@ -22,23 +22,26 @@ use summary::Summary;
 pub(in crate::cli) struct Args {
     /// The log; - for standard input
     log: PathBuf,
-    /// List every reading too
+    /// List every reading
     #[arg(long)]
     readings: bool,
-    /// Go on as records are added; what is in the log comes first, line by line
+    /// Follow a growing log; its current contents are printed first, line by line
     #[arg(long, conflicts_with = "json")]
     follow: bool,
-    /// JSON instead of text; one object for each session, scan, event and damaged line
+    /// JSON instead of text; one object per session, scan, event and damaged line
     #[arg(long, conflicts_with = "readings")]
     json: bool,
 }
 
 const HELP: &str = "\
-Columns: echo, min (at minimum range), none (no echo), lost (the link) and doubt (the motor may \
-have lost steps) count readings; |res| is the median distance between measured and predicted \
-range; time/limit is the scan's duration over what the acoustics allow.
-Lines that are no records are listed at the end; `sonard log verify` checks the rest.
-Exit codes: 0 shown, 2 the file can't be opened.";
+Columns: echo, min (at minimum range), none (no echo), lost (by the link) and uncertain (motor \
+steps may be lost) count readings; |res| is the median distance between measured and predicted \
+range; time/limit is the scan's duration and its physical minimum.
+Lines that are not records are \
+listed at the end; `sonard log verify` checks the rest.
+
+Exit codes: 0 shown, 2 the file can't be \
+opened.";
 
 pub(super) fn run(args: &Args) -> Outcome {
     if args.follow {
@@ -52,7 +55,7 @@ pub(super) fn run(args: &Args) -> Outcome {
             writeln!(out)
         })
     } else if args.readings {
-        let readings = Readings::of(&args.log)?;
+        let readings = Readings::open(&args.log)?;
         text::print(&mut out, &summary, Some(readings))
     } else {
         text::print(&mut out, &summary, None)
@@ -60,12 +63,12 @@ pub(super) fn run(args: &Args) -> Outcome {
     printed.or_else(|error| Failure::from_write("standard output", &error))
 }
 
-/// Goes through the log once; with its readings listed, once more afterwards.
+/// Reads the log once; readings are listed in a second pass.
 fn read(args: &Args) -> Result<Summary, Failure> {
     if args.readings && args.log.as_os_str() == "-" {
         return Err(Failure::input(
-            "readings of standard input can't be listed: they are read twice",
-            "name the log's file, or use --follow",
+            "--readings does not work with standard input, which can be read only once",
+            "give the log's file name, or use --follow",
         ));
     }
     let mut summary = Summary::default();
@@ -76,7 +79,7 @@ fn read(args: &Args) -> Result<Summary, Failure> {
             Err(error) => summary.damaged(&error.reject_other_format(&args.log)?),
         }
     }
-    Ok(summary.finished())
+    Ok(summary.finish())
 }
 
 fn follow(args: &Args) -> Outcome {

@@ -13,10 +13,10 @@ use crate::store::{
     Finding, FindingKind, Severity, StoreError, Totals, check, is_being_written, open_for_reading,
 };
 
-/// Findings printed for one log unless all are asked for.
-const SHOWN: u64 = 40;
-/// Damaged lines among them.
-const SHOWN_DAMAGED: u64 = 5;
+/// Maximum number of printed findings per log without --all.
+const MAX_SHOWN: u64 = 40;
+/// Maximum number of damaged lines among them.
+const MAX_SHOWN_DAMAGED: u64 = 5;
 
 /// Options of `sonard log verify`.
 #[derive(Debug, clap::Args)]
@@ -25,21 +25,23 @@ pub(in crate::cli) struct Args {
     /// Logs to check; - for standard input
     #[arg(required = true, value_name = "LOG")]
     logs: Vec<PathBuf>,
-    /// Warnings count too: exit code 1 also for a scan without an end, or time going backwards
+    /// Count warnings as problems: exit code 1 also for a scan without an end, or time going
+    /// backwards
     #[arg(long)]
     strict: bool,
-    /// Print every finding, however many
+    /// Print all findings
     #[arg(long)]
     all: bool,
-    /// JSON instead of text; one object a finding, and one with the totals for each log
+    /// JSON instead of text; one object per finding, and one with the totals for each log
     #[arg(long)]
     json: bool,
 }
 
 const HELP: &str = "\
-Problems: a torn last line, damaged lines, readings outside a scan or before any session, a beam \
-twice, counts that disagree with scan_end, a scan that another follows without an end or an event \
-saying why, status, range and residual that contradict each other, an azimuth that is not the plan's.
+Problems: an incomplete last line, damaged lines, readings outside a scan or before any session, a \
+repeated beam, counts that disagree with scan_end, a scan followed by another without an end or an \
+event with the reason, contradictory status, range and residual, an azimuth that differs from the \
+plan.
 Warnings: the last scan has no end (it may be running), time goes backwards.
 
 Exit codes: 0 clean, 1 not clean, 2 a file can't be opened.";
@@ -61,8 +63,8 @@ fn verify(log: &Path, args: &Args) -> Result<Totals, Failure> {
     let totals = check(reader, |finding| {
         torn |= matches!(finding.kind, FindingKind::TornTail | FindingKind::NoNewline);
         damaged += u64::from(finding.kind == FindingKind::Damaged);
-        let enough =
-            shown == SHOWN || (finding.kind == FindingKind::Damaged && damaged > SHOWN_DAMAGED);
+        let enough = shown == MAX_SHOWN
+            || (finding.kind == FindingKind::Damaged && damaged > MAX_SHOWN_DAMAGED);
         if !args.all && !args.json && enough {
             hidden += 1;
         } else if printed.is_ok() {
@@ -89,12 +91,12 @@ fn print_finding(
 ) -> io::Result<()> {
     if json {
         #[derive(Serialize)]
-        struct InLog<'a> {
+        struct FindingLine<'a> {
             log: &'a Path,
             #[serde(flatten)]
             finding: &'a Finding,
         }
-        serde_json::to_writer(&mut *out, &InLog { log, finding })?;
+        serde_json::to_writer(&mut *out, &FindingLine { log, finding })?;
         return writeln!(out);
     }
     let severity = match finding.severity {
@@ -106,13 +108,13 @@ fn print_finding(
 
 fn print_totals_json(out: &mut impl Write, log: &Path, totals: Totals) -> io::Result<()> {
     #[derive(Serialize)]
-    struct OfLog<'a> {
+    struct TotalsLine<'a> {
         log: &'a Path,
         clean: bool,
         #[serde(flatten)]
         totals: Totals,
     }
-    serde_json::to_writer(&mut *out, &OfLog { log, clean: totals.problems == 0, totals })?;
+    serde_json::to_writer(&mut *out, &TotalsLine { log, clean: totals.problems == 0, totals })?;
     writeln!(out)
 }
 
@@ -125,7 +127,7 @@ fn print_totals(
 ) -> io::Result<()> {
     let log = log.display();
     if hidden > 0 {
-        writeln!(out, "{log}: {hidden} more; --all prints them")?;
+        writeln!(out, "{log}: {hidden} more; use --all to list them")?;
     }
     let Totals { lines, sessions, scans, pings, events, problems, warnings } = totals;
     let verdict = match (problems, warnings) {
@@ -142,9 +144,11 @@ fn print_totals(
     let written_now = torn && File::open(log.to_string()).is_ok_and(|file| is_being_written(&file));
     match (torn, written_now) {
         (true, true) => {
-            writeln!(out, "{log}: it is being written now; look again when that is over")
+            writeln!(out, "{log}: file in use; check again when it is complete")
         }
-        (true, false) => writeln!(out, "{log}: `sonard log repair {log}` sets its end right"),
+        (true, false) => {
+            writeln!(out, "{log}: `sonard log repair {log}` removes the incomplete last line")
+        }
         _ => Ok(()),
     }
 }

@@ -1,4 +1,4 @@
-//! What came of a map, in words and figures.
+//! Summary of a map as text and JSON.
 
 use std::{
     io::{self, Write},
@@ -10,7 +10,6 @@ use serde::Serialize;
 use super::{Args, Mapped, Switch};
 use crate::interpret::Sweep;
 
-/// What is printed.
 #[derive(Debug, Serialize)]
 pub(super) struct Summary<'a> {
     map: PathBuf,
@@ -35,7 +34,8 @@ pub(super) struct Summary<'a> {
 impl Mapped {
     pub(super) fn summary<'a>(&self, args: &'a Args, taken: &[(uuid::Uuid, Sweep)]) -> Summary<'a> {
         let shape = self.grid.shape();
-        let of = |wanted: fn(f64) -> bool| self.grid.probabilities().filter(|p| wanted(*p)).count();
+        let count =
+            |selects: fn(f64) -> bool| self.grid.probabilities().filter(|p| selects(*p)).count();
         let predicted = args.feature_prediction == Switch::On && self.readings > 0;
         Summary {
             map: args.out.join("map.yaml"),
@@ -44,25 +44,25 @@ impl Mapped {
             readings: self.readings,
             feature_prediction: args.feature_prediction == Switch::On,
             mean_confidence: predicted.then(|| self.confidence / self.readings as f64),
-            left_out: self.left_out,
-            poses_outside: self.outside,
+            left_out: self.discarded,
+            poses_outside: self.poses_outside,
             resolution_m: shape.resolution_m,
             width: shape.width,
             height: shape.height,
             origin_m: shape.origin.into(),
-            occupied_cells: of(|p| p > 0.65),
-            free_cells: of(|p| p < 0.196),
-            unknown_cells: of(|p| (0.196..=0.65).contains(&p)),
+            occupied_cells: count(|p| p > 0.65),
+            free_cells: count(|p| p < 0.196),
+            unknown_cells: count(|p| (0.196..=0.65).contains(&p)),
             out: &args.out,
         }
     }
 }
 
 impl Summary<'_> {
-    /// What stands under the picture's title.
-    pub(super) fn of_cells(&self) -> String {
+    /// Describes the map in the line below the picture's title.
+    pub(super) fn describe_cells(&self) -> String {
         format!(
-            "{} scans, {} readings \u{b7} {}x{} cells of {} m: {} occupied, {} free, {} between",
+            "{} scans, {} readings \u{b7} {}x{} cells of {} m: {} occupied, {} free, {} undecided",
             self.scans,
             self.readings,
             self.width,
@@ -77,7 +77,7 @@ impl Summary<'_> {
     pub(super) fn print(&self, out: &mut impl Write) -> io::Result<()> {
         writeln!(
             out,
-            "{} scans, {} readings -> {}x{} cells of {} m in {}: {} occupied, {} free, {} between",
+            "{} scans, {} readings -> {}x{} cells of {} m in {}: {} occupied, {} free, {} undecided",
             self.scans,
             self.readings,
             self.width,
@@ -89,15 +89,15 @@ impl Summary<'_> {
             self.unknown_cells
         )?;
         if let Some(confidence) = self.mean_confidence {
-            writeln!(out, "mean confidence {confidence:.3}, {} readings left out", self.left_out)?;
+            writeln!(out, "mean confidence {confidence:.3}, {} readings discarded", self.left_out)?;
         }
         if self.evidence > 1 {
-            writeln!(out, "each scan counted {} times (--evidence)", self.evidence)?;
+            writeln!(out, "scan weight {} (--scan-weight)", self.evidence)?;
         }
         if self.poses_outside > 0 {
             writeln!(
                 out,
-                "{} poses lie outside the map: give a --region around them, or none",
+                "{} poses are outside the map: enlarge --region, or omit it",
                 self.poses_outside
             )?;
         }

@@ -1,4 +1,4 @@
-//! What a verb writes to.
+//! Destination of a verb's output.
 
 use std::{
     fs::File,
@@ -8,13 +8,13 @@ use std::{
 
 use crate::store::{Medium, WholeFile};
 
-/// What a verb writes to.
+/// Destination of a verb's output.
 #[derive(Debug)]
 pub(in crate::cli) enum Stream {
     Standard(BufWriter<Stdout>),
     File(BufWriter<WholeFile>),
     Device(File),
-    /// Nothing more comes.
+    /// No further output is possible.
     Finished,
 }
 
@@ -23,7 +23,7 @@ impl Stream {
         Self::Standard(BufWriter::new(io::stdout()))
     }
 
-    /// Puts the file in its place.
+    /// Completes the output; a file is renamed to its destination.
     pub(in crate::cli) fn finish(&mut self) -> io::Result<()> {
         self.flush()?;
         match mem::replace(self, Self::Finished) {

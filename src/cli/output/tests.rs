@@ -5,7 +5,7 @@ use clap::CommandFactory as _;
 use super::*;
 use crate::cli::Cli;
 
-/// Every argument that is a path and nothing else, with its verb.
+/// Collects every argument of type `PathBuf`, with its verb.
 fn paths(command: &Command, verb: &str, found: &mut BTreeSet<String>) {
     for below in command.get_subcommands() {
         let verb = format!("{verb} {}", below.get_name());
@@ -18,9 +18,9 @@ fn paths(command: &Command, verb: &str, found: &mut BTreeSet<String>) {
     }
 }
 
-/// A path that a verb writes to is an `OutPath`, so that the rule holds for it.
+/// Every output path must be an `OutPath`, so that the common rules apply to it.
 #[test]
-fn every_plain_path_of_the_command_line_is_read() {
+fn plain_paths_are_inputs() {
     let mut found = BTreeSet::new();
     paths(&Cli::command(), "", &mut found);
     let read = [
@@ -52,8 +52,8 @@ fn every_plain_path_of_the_command_line_is_read() {
         "log show log",
         "log verify logs",
         "map logs",
-        "map onto",
         "map scene",
+        "map update",
         "mock scene",
         "mock truth",
         "paths scene",
@@ -83,15 +83,15 @@ fn every_plain_path_of_the_command_line_is_read() {
         "watch fleet",
         "watch socket",
         "watch token_file",
-        // The daemon's own, by rules of the store and the server.
+        // Outputs of the daemon, with rules of the store and the server.
         "run log",
         "run socket",
     ];
-    assert_eq!(found, read.map(str::to_owned).into(), "is a new one written to?");
+    assert_eq!(found, read.map(str::to_owned).into(), "is a new path an output?");
 }
 
 #[test]
-fn a_list_is_known_by_its_members() {
+fn list_is_identified_by_members() {
     let list = Product::List(&["pose", "returns"]);
     assert!(list.replaces(b"{\"returns\":[],\"pose\":{}}\n{\"pose\":1}\n") && list.replaces(b""));
     for other in

@@ -1,4 +1,4 @@
-//! The path of one beam's sound.
+//! Picture of the propagation path of one beam.
 
 use std::fmt;
 
@@ -10,12 +10,12 @@ use crate::{
     scene::Scene,
 };
 
-/// Which beam.
+/// Selection of a beam.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Beam {
-    /// Its index in the plan.
+    /// Index in the plan.
     Index(u32),
-    /// The one nearest to an azimuth, degrees.
+    /// Beam nearest to an azimuth, degrees.
     Azimuth(f64),
 }
 
@@ -28,8 +28,7 @@ impl fmt::Display for Beam {
     }
 }
 
-/// The picture of a beam of the first scan, by the path that its record or the prediction in it
-/// names.
+/// Draws the path of a beam of the first scan, from its record or its prediction.
 pub(super) fn draw(
     views: &[ScanView],
     scene: Option<&Scene>,
@@ -41,12 +40,12 @@ pub(super) fn draw(
     let Some(view) = views.first() else { return Err(no_beam(views, beam)) };
     let ping = find(view, beam).ok_or_else(|| no_beam(views, beam))?;
     let pose = view.pose().ok_or_else(|| {
-        Failure::input("the scan lacks its scan_start record", "choose another with --scan")
+        Failure::input("the scan lacks its scan_start record", "choose another scan with --scan")
     })?;
     let (azimuth_deg, index) = (ping.azimuth_deg, ping.index);
     let record = ping.sound_path().ok_or_else(|| {
         Failure::input(
-            format!("beam {index}, azimuth {azimuth_deg}\u{b0}, has no path: nothing came near"),
+            format!("beam {index}, azimuth {azimuth_deg}\u{b0}, has no path: no arrival near the threshold"),
             "choose a beam with an echo; `sonard log show --readings` lists them",
         )
     })?;
@@ -60,7 +59,7 @@ pub(super) fn draw(
     })?;
     Ok(draw_path(&PathView {
         title: format!("{}, beam {index} at azimuth {azimuth_deg}\u{b0}", scene.name),
-        lines: vec![reading(ping), by(record)],
+        lines: vec![describe_reading(ping), describe_path(record)],
         badge: badge_of(ping.provenance.or(view.session.as_ref().map(|s| s.provenance))),
         scene,
         pose,
@@ -74,16 +73,16 @@ pub(super) fn draw(
 fn find(view: &ScanView, beam: Beam) -> Option<&Ping> {
     match beam {
         Beam::Index(index) => view.pings.iter().find(|ping| ping.index == index),
-        Beam::Azimuth(wanted_deg) => {
-            let off = |ping: &&Ping| wrap_pi((ping.azimuth_deg - wanted_deg).to_radians()).abs();
-            view.pings.iter().min_by(|one, other| off(one).total_cmp(&off(other)))
+        Beam::Azimuth(azimuth_deg) => {
+            let off = |ping: &&Ping| wrap_pi((ping.azimuth_deg - azimuth_deg).to_radians()).abs();
+            view.pings.iter().min_by(|a, b| off(a).total_cmp(&off(b)))
         }
     }
 }
 
-/// What was read, and what the model says.
-fn reading(ping: &Ping) -> String {
-    let said = |status: PingStatus, range_m: Option<f64>| match (status, range_m) {
+/// Describes reading and prediction.
+fn describe_reading(ping: &Ping) -> String {
+    let describe = |status: PingStatus, range_m: Option<f64>| match (status, range_m) {
         (PingStatus::MinRange, Some(range_m)) => format!("minimum range, {range_m:.4} m"),
         (_, Some(range_m)) => format!("echo at {range_m:.4} m"),
         (PingStatus::NoEcho, _) => "no echo".to_owned(),
@@ -91,15 +90,18 @@ fn reading(ping: &Ping) -> String {
     };
     let margin_db = ping.margin_db.or_else(|| ping.sim.as_ref()?.margin_db);
     let margin = match margin_db {
-        Some(db) if db < 0.0 => format!(", the best candidate lacks {:.1} dB", -db),
+        Some(db) if db < 0.0 => {
+            format!(", the strongest arrival is {:.1} dB below the threshold", -db)
+        }
         Some(db) => format!(", {db:.1} dB above the threshold"),
         None => String::new(),
     };
-    let model = ping.sim.as_ref().map(|sim| format!("; model: {}", said(sim.status, sim.range_m)));
-    format!("{}{}{margin}", said(ping.status, ping.range_m), model.unwrap_or_default())
+    let model =
+        ping.sim.as_ref().map(|sim| format!("; model: {}", describe(sim.status, sim.range_m)));
+    format!("{}{}{margin}", describe(ping.status, ping.range_m), model.unwrap_or_default())
 }
 
-fn by(record: &PathRecord) -> String {
+fn describe_path(record: &PathRecord) -> String {
     format!("path of {:.4} m: {}", record.length_m, record.in_words())
 }
 
@@ -107,7 +109,7 @@ fn no_beam(views: &[ScanView], beam: Beam) -> Failure {
     let last = views.first().and_then(|view| view.pings.iter().map(|ping| ping.index).max());
     let help = match last {
         Some(last) => format!("the scan's beams run from 0 to {last}"),
-        None => "the scan has no readings; choose another with --scan".to_owned(),
+        None => "the scan has no readings; choose another scan with --scan".to_owned(),
     };
     Failure::input(format!("the scan has no beam {beam}"), help)
 }

@@ -1,4 +1,4 @@
-//! Records to an MQTT broker, in a program that was built for it.
+//! Connection to an MQTT broker, if the program was built with it.
 
 use std::path::Path;
 
@@ -10,67 +10,67 @@ use crate::{
     daemon::{Handle, Settings},
 };
 
-/// The way to the broker, if one is named: before the daemon runs, and while it does.
+/// Configured broker, before and after its connection is started.
 pub(super) struct Broker {
     #[cfg(feature = "mqtt")]
-    account: Option<Account>,
+    credentials: Option<Account>,
     #[cfg(feature = "mqtt")]
-    sending: Option<Mqtt>,
+    publisher: Option<Mqtt>,
 }
 
 #[cfg(feature = "mqtt")]
 impl Broker {
-    /// Gets hold of what the configuration names.
+    /// Reads the credentials named in the configuration.
     pub(super) fn open(keys: &Keys) -> Result<Self, Failure> {
-        let account = Account::open(&keys.mqtt, &keys.fleet.robot);
-        let account = account.map_err(|error| Failure::input(&error, error.help.clone()))?;
-        Ok(Self { account, sending: None })
+        let credentials = Account::open(&keys.mqtt, &keys.fleet.robot);
+        let credentials =
+            credentials.map_err(|error| Failure::input(&error, error.help.clone()))?;
+        Ok(Self { credentials, publisher: None })
     }
 
-    /// Begins to send, once the log is open.
+    /// Starts publishing, after the log is open.
     pub(super) fn start(
         &mut self,
         settings: &Settings,
         daemon: &Handle,
         log: &Path,
     ) -> Result<(), Failure> {
-        if let Some(account) = self.account.take() {
+        if let Some(credentials) = self.credentials.take() {
             let begun = Mqtt::start(
-                account,
+                credentials,
                 &settings.keys.mqtt,
                 &settings.keys.fleet.robot,
                 daemon.clone(),
                 log,
             );
             let refuse = |error| {
-                Failure::device(format!("cannot send what is in {}: {error}", log.display()), "")
+                Failure::device(
+                    format!("cannot publish the records in {}: {error}", log.display()),
+                    "",
+                )
             };
-            self.sending = Some(begun.map_err(refuse)?);
+            self.publisher = Some(begun.map_err(refuse)?);
         }
         Ok(())
     }
 
-    /// Sends what is left.
+    /// Publishes what is pending, and disconnects.
     pub(super) async fn stop(self) {
-        if let Some(sending) = self.sending {
-            sending.stop().await;
+        if let Some(publisher) = self.publisher {
+            publisher.stop().await;
         }
     }
 }
 
-/// The configuration names no broker: that was refused.
+/// Without the feature, a configuration with a broker has been rejected before.
 #[cfg(not(feature = "mqtt"))]
 impl Broker {
-    #[expect(clippy::unnecessary_wraps, reason = "with the feature it can fail")]
+    #[expect(clippy::unnecessary_wraps, reason = "fallible with the feature")]
     pub(super) const fn open(_: &Keys) -> Result<Self, Failure> {
         Ok(Self {})
     }
 
-    #[expect(
-        clippy::unnecessary_wraps,
-        clippy::unused_self,
-        reason = "with the feature it can fail"
-    )]
+    #[expect(clippy::unnecessary_wraps, clippy::unused_self, reason = "fallible with the feature")]
     pub(super) const fn start(
         &mut self,
         _: &Settings,

@@ -1,4 +1,4 @@
-//! The files that the configuration names beside scene and sensor: secrets, certificates, lists.
+//! Files named by the configuration other than scene and sensor: secrets, certificates, lists.
 
 use std::{
     collections::BTreeMap,
@@ -13,7 +13,7 @@ use sha2::{Digest as _, Sha256};
 
 use super::broker::Broker;
 use crate::{
-    cli::{Failure, Outcome, daemon::asked},
+    cli::{Failure, Outcome, daemon::connect_all},
     config::{FleetKeys, Keys},
     daemon::JournalThread,
     fleet::{Asked, members_of},
@@ -21,8 +21,8 @@ use crate::{
     store::StoreError,
 };
 
-/// Longest content that is compared with an earlier one, bytes; all of these files are smaller.
-const MOST_BYTES: u64 = 1 << 20;
+/// Maximum length of a compared file, bytes; all of these files are smaller.
+const MAX_COMPARED_BYTES: u64 = 1 << 20;
 /// Longest path of a unix socket, bytes: `sun_path` with its terminating zero.
 const MAX_SOCKET_PATH_BYTES: usize = 107;
 /// Page of a playground, as `web/build.sh` makes it.
@@ -32,9 +32,8 @@ const PLAYGROUND_PAGE: &str = "index.html";
 pub(super) struct Files {
     /// The token of `server.token_file`.
     pub(super) token: Option<String>,
-    /// Other daemons with the way to ask them.
+    /// Clients of the other daemons of the fleet.
     pub(super) fleet: Vec<Asked>,
-    /// The account at the MQTT broker.
     pub(super) broker: Broker,
 }
 
@@ -50,12 +49,12 @@ impl Files {
     }
 }
 
-/// Digests of the files' contents by the keys that name them, for a comparison after a reload. A file that cannot be read
-/// has none: reading it is an error elsewhere.
+/// Digests of the files' contents, by the keys that name them, for a comparison after a reload. An
+/// unreadable file has none; reading it is an error elsewhere.
 pub(super) fn digests(keys: &Keys, fleet: &[Asked]) -> BTreeMap<&'static str, [u8; 32]> {
     let Keys { server, mqtt, fleet: list, .. } = keys;
     let path = |file: &Option<String>| file.iter().map(PathBuf::from).collect::<Vec<_>>();
-    let tokens = fleet.iter().filter_map(|one| one.member.token_file.clone()).collect();
+    let tokens = fleet.iter().filter_map(|client| client.member.token_file.clone()).collect();
     [
         ("server.token_file", path(&server.token_file)),
         ("fleet.file", path(&list.file)),
@@ -74,11 +73,11 @@ pub(super) fn digests(keys: &Keys, fleet: &[Asked]) -> BTreeMap<&'static str, [u
 fn digest(files: &[PathBuf]) -> io::Result<[u8; 32]> {
     let mut digest = Sha256::new();
     for file in files {
-        // Opening a pipe would wait for its writer.
+        // Opening a pipe would block until it has a writer.
         let nonblocking = OFlags::NONBLOCK.bits().cast_signed();
         let file = OpenOptions::new().read(true).custom_flags(nonblocking).open(file)?;
         let mut bytes = Vec::new();
-        file.take(MOST_BYTES).read_to_end(&mut bytes)?;
+        file.take(MAX_COMPARED_BYTES).read_to_end(&mut bytes)?;
         digest.update((bytes.len() as u64).to_le_bytes());
         digest.update(&bytes);
     }
@@ -95,7 +94,7 @@ fn token(file: &str) -> Result<String, Failure> {
 fn fleet(keys: &FleetKeys) -> Result<Vec<Asked>, Failure> {
     let members = members_of(keys)
         .map_err(|error| Failure::input(format!("[fleet]: {error}"), &error.help))?;
-    asked(members)
+    connect_all(members)
 }
 
 fn check_playground(folder: &str) -> Outcome {
@@ -107,20 +106,20 @@ fn check_playground(folder: &str) -> Outcome {
     found.map_err(|error| {
         Failure::input(
             format!("server.playground {folder}: {PLAYGROUND_PAGE}: {error}"),
-            "name the folder that web/build.sh has made",
+            "give the folder made by web/build.sh",
         )
     })
 }
 
-/// Ends the log of a start that is rejected, and removes its file if nothing is in it.
+/// Closes the log of a rejected start, and removes its file if it is empty.
 pub(super) fn remove_empty_log(log: JournalThread) {
     let empty = log.close().file.filter(|file| fs::metadata(file).is_ok_and(|log| log.len() == 0));
-    // The rejection is what is reported.
+    // Only the rejection is reported.
     empty.into_iter().for_each(|file| drop(fs::remove_file(file)));
 }
 
-/// Checks, without creating anything, that a log folder and a socket can exist where the configuration puts them on any
-/// boot: a folder that is missing, or that another user may write, is not an error here.
+/// Checks, without creating anything, that log folder and socket are possible at the configured
+/// paths on any boot. A missing folder, or one writable by another user, is not an error here.
 pub(super) fn check_places(keys: &Keys) -> Outcome {
     let folder = Path::new(&keys.log.folder);
     check_folder(folder).map_err(|source| StoreError::Open { path: folder.into(), source })?;
@@ -142,7 +141,7 @@ fn check_socket(socket: &Path) -> io::Result<()> {
         return Err(io::Error::other(error));
     }
     if fs::symlink_metadata(socket).is_ok_and(|there| !there.file_type().is_socket()) {
-        return Err(io::Error::other("there is a file of that name, which is no socket"));
+        return Err(io::Error::other("a file of that name exists and is not a socket"));
     }
     match socket.parent().filter(|folder| !folder.as_os_str().is_empty()) {
         Some(folder) => check_folder(folder),
@@ -150,7 +149,7 @@ fn check_socket(socket: &Path) -> io::Result<()> {
     }
 }
 
-/// Whether the folder, or the nearest one above it that exists, is a folder on a file system that can be written.
+/// Checks that the folder, or its nearest existing ancestor, is a folder on a writable file system.
 fn check_folder(folder: &Path) -> io::Result<()> {
     for folder in folder.ancestors() {
         let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
@@ -159,7 +158,7 @@ fn check_folder(folder: &Path) -> io::Result<()> {
             Ok(_) => {
                 return match access(folder, Permission::WRITE_OK) {
                     Err(rustix::io::Errno::ROFS) => Err(io::ErrorKind::ReadOnlyFilesystem.into()),
-                    // The daemon's user may be another.
+                    // The daemon may run as another user.
                     _ => Ok(()),
                 };
             }
@@ -176,7 +175,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_digest_follows_the_contents_of_all_files() {
+    fn digest_depends_on_all_files() {
         let folder = tempfile::tempdir().expect("a folder");
         let files = ["a", "b"].map(|name| folder.path().join(name));
         let write = |contents: [&str; 2]| {
@@ -194,7 +193,7 @@ mod tests {
     }
 
     #[test]
-    fn places_that_can_never_be_used_are_told_from_those_that_come_later() {
+    fn impossible_and_missing_places() {
         let folder = tempfile::tempdir().expect("a folder");
         let file = folder.path().join("file");
         fs::write(&file, "").expect("there is room");

@@ -1,4 +1,4 @@
-//! From options, environment and file to settings; again at each reload.
+//! Loads settings from options, environment and file, at start and at each reload.
 
 use std::{
     collections::BTreeMap,
@@ -28,7 +28,7 @@ use crate::{
 
 const FILE: &str = "/etc/sonard/sonard.toml";
 
-/// Reads the configuration as often as it is asked to.
+/// Reader of the configuration, for the start and reloads.
 pub(super) struct Loader {
     args: Args,
     port: Option<String>,
@@ -39,15 +39,16 @@ impl Loader {
         Self { args, port: None }
     }
 
-    /// Whatever is configured, the port is this: the mock's.
+    /// Overrides the port by that of the mock.
     pub(super) fn fix_port(&mut self, port: String) {
         self.port = Some(port);
     }
 
-    /// Reads the configuration with every file that it names. Start, reload and `--check` have this check in common.
+    /// Reads and checks the configuration with every file that it names, for start, reload and
+    /// `--check`.
     pub(super) fn load(&mut self) -> Result<(Settings, Files), Failure> {
         let layers = self.layers()?;
-        let mut keys = layers.clone().keys().map_err(|error| refuse(&error))?;
+        let mut keys = layers.clone().keys().map_err(|error| failure_from(&error))?;
         self.fill_in(&layers, &mut keys);
         let mut settings = match self.args.simulate {
             true => simulated(keys, layers.origin("model", "sensor").is_some())?,
@@ -75,7 +76,7 @@ impl Loader {
         }
         if self.args.mock && settings.scene.is_none() {
             return Err(Failure::input(
-                "a mock needs a scene to hear",
+                "a mock needs a scene",
                 "give --scene, for instance --scene simple-room --pose fig9",
             ));
         }
@@ -84,7 +85,7 @@ impl Loader {
 
     fn layers(&self) -> Result<Layers, Failure> {
         let mut layers = Layers::<Keys>::new();
-        let (file, wanted) = match &self.args.config {
+        let (file, requested) = match &self.args.config {
             Some(file) => (file.clone(), true),
             None => (PathBuf::from(FILE), false),
         };
@@ -92,9 +93,9 @@ impl Loader {
             Ok(text) => {
                 layers = layers
                     .file(&file.display().to_string(), &text)
-                    .map_err(|error| refuse(&error))?;
+                    .map_err(|error| failure_from(&error))?;
             }
-            Err(error) if error.kind() == io::ErrorKind::NotFound && !wanted => {}
+            Err(error) if error.kind() == io::ErrorKind::NotFound && !requested => {}
             Err(error) => {
                 return Err(Failure::input(
                     format!("cannot read the configuration {}: {error}", file.display()),
@@ -102,11 +103,11 @@ impl Loader {
                 ));
             }
         }
-        // Names and values that are no text can't be ours.
+        // Names and values that are not UTF-8 can't be settings.
         let variables = env::vars_os().filter_map(|(name, value)| {
             Some((name.into_string().ok()?, value.into_string().ok()?))
         });
-        layers = layers.environment(variables).map_err(|error| refuse(&error))?;
+        layers = layers.environment(variables).map_err(|error| failure_from(&error))?;
         let args = &self.args;
         let path = |path: &Option<PathBuf>| path.clone().map(PathBuf::into_os_string);
         let text = |text: &Option<String>| text.clone().map(OsString::from);
@@ -119,28 +120,29 @@ impl Loader {
             ("--array", "simulate.array", text(&args.array)),
         ];
         for setting in &self.args.set {
-            layers = layers.option("--set", setting).map_err(|error| refuse(&error))?;
+            layers = layers.option("--set", setting).map_err(|error| failure_from(&error))?;
         }
         for (option, key, value) in shortcuts {
             if let Some(value) = value {
                 let value = value.to_str().ok_or_else(|| {
                     let value = value.display();
                     Failure::input(
-                        format!("{option}: {value} is not UTF-8, and a configuration is text"),
+                        format!("{option}: {value} is not UTF-8, as a configuration must be"),
                         "rename it, or name it by a symbolic link",
                     )
                 })?;
                 layers = layers
                     .option(option, &format!("{key}={value}"))
-                    .map_err(|error| refuse(&error))?;
+                    .map_err(|error| failure_from(&error))?;
             }
         }
         Ok(layers)
     }
 
-    /// What system and systemd provide goes before defaults, and the mock's port before everything.
+    /// Fills in values from system and systemd, which replace defaults, and the mock's port, which
+    /// overrides all.
     fn fill_in(&self, layers: &Layers, keys: &mut Keys) {
-        // Of several folders, systemd separates by colons, the first is meant.
+        // systemd separates several folders by colons; the first is used.
         let first = |variable| {
             let folders = env::var(variable).ok()?;
             folders.split(':').next().map(str::to_owned).filter(|folder| !folder.is_empty())
@@ -161,7 +163,7 @@ impl Loader {
         {
             keys.fleet.robot = name;
         }
-        // A simulated array is polled all the time, as on the robot.
+        // A simulated array runs continuously by default, as on the robot.
         if self.args.simulate && layers.origin("scanning", "mode").is_none() {
             keys.scanning.mode = Mode::Continuous;
         }
@@ -197,20 +199,19 @@ fn settings(keys: Keys) -> Result<Settings, Failure> {
     })
 }
 
-/// The same for an array that the model plays; its rangers are what it says, unless the sensor was
-/// chosen.
+/// Settings of a simulated array; the sensor is the array's own unless one is configured.
 fn simulated(mut keys: Keys, sensor_chosen: bool) -> Result<Settings, Failure> {
-    let wanted = &keys.simulate;
-    let mut array = load_array(&wanted.array)?;
-    array.interval_ms = wanted.interval_ms.unwrap_or(array.interval_ms);
-    let course = wanted.course.as_ref().map(|file| load_course(Path::new(file))).transpose()?;
-    let course = course.map(|course| course.timed(wanted.speed_m_s));
+    let requested = &keys.simulate;
+    let mut array = load_array(&requested.array)?;
+    array.interval_ms = requested.interval_ms.unwrap_or(array.interval_ms);
+    let course = requested.course.as_ref().map(|file| load_course(Path::new(file))).transpose()?;
+    let course = course.map(|course| course.timed(requested.speed_m_s));
     if !sensor_chosen {
         keys.model.sensor.clone_from(&array.sensor);
     }
     let Some(name) = &keys.place.scene else {
         return Err(Failure::input(
-            "an array needs a scene to hear",
+            "an array needs a scene",
             "give --scene, for instance --scene mcgill-lab --pose fig4",
         ));
     };
@@ -242,14 +243,14 @@ fn simulated(mut keys: Keys, sensor_chosen: bool) -> Result<Settings, Failure> {
     })
 }
 
-/// What is in force, as a file that would say the same.
-pub(super) fn in_force(settings: &Settings) -> String {
+/// Formats the effective values as a configuration file.
+pub(super) fn effective_configuration(settings: &Settings) -> String {
     let text = toml::to_string(&settings.keys).unwrap_or_default();
-    format!("# The configuration is right. What is in force:\n{text}")
+    format!("# Configuration valid. Effective values:\n{text}")
 }
 
-/// A failure on one line.
-pub(super) fn words(failure: &Failure) -> String {
+/// Formats a failure on one line.
+pub(super) fn one_line(failure: &Failure) -> String {
     match failure {
         Failure::Found(text) => text.clone().unwrap_or_default(),
         Failure::Input(report) | Failure::Device(report) => match report.help() {
@@ -259,6 +260,6 @@ pub(super) fn words(failure: &Failure) -> String {
     }
 }
 
-fn refuse(error: &ConfigError) -> Failure {
+fn failure_from(error: &ConfigError) -> Failure {
     Failure::input(error, &error.help)
 }

@@ -1,4 +1,4 @@
-//! A mock ranger playing beside the daemon, behind a link that it keeps over hangups.
+//! Mock ranger of the daemon, behind a symbolic link that persists over hangups.
 
 use std::path::PathBuf;
 
@@ -56,7 +56,7 @@ impl Mock {
         let board = board(world, pace, settings)?;
         let link = std::env::temp_dir().join(format!("sonard-mock-{}", std::process::id()));
         let port = MockPort::open(board, Some(&link)).map_err(|error| {
-            Failure::device(format!("cannot make a pty: {error}"), "is /dev/pts mounted?")
+            Failure::device(format!("cannot make a pty: {error}"), "check that /dev/pts is mounted")
         })?;
         let stop = CancellationToken::new();
         let stopped = stop.clone().cancelled_owned();
@@ -71,7 +71,7 @@ impl Mock {
 
     pub(super) async fn stop(self) {
         self.stop.cancel();
-        // A mock that is gone already has nothing left to say.
+        // The mock may have ended already.
         drop(self.playing.await);
     }
 }

@@ -1,34 +1,34 @@
-//! Messages for ROS 2, in a program that was built for it.
+//! Connection to ROS 2, if the program was built with it.
 
 use crate::{cli::Failure, config::RosKeys, daemon::Handle};
 
-/// What tells ROS 2, if it is to be told.
+/// ROS 2 node, if enabled.
 pub(super) struct Ros {
     #[cfg(feature = "ros")]
-    telling: Option<crate::ros::Ros>,
+    node: Option<crate::ros::Ros>,
 }
 
 #[cfg(feature = "ros")]
 impl Ros {
-    /// Begins to tell, before the daemon runs.
+    /// Starts the node, before the daemon runs.
     pub(super) fn start(keys: &RosKeys, daemon: &Handle) -> Result<Self, Failure> {
         let begun = keys.enabled.then(|| crate::ros::Ros::start(keys, daemon.clone())).transpose();
-        let refuse = |error| Failure::device(format!("cannot tell ROS 2 anything: {error}"), "");
-        Ok(Self { telling: begun.map_err(refuse)? })
+        let refuse = |error| Failure::device(format!("cannot start the ROS 2 node: {error}"), "");
+        Ok(Self { node: begun.map_err(refuse)? })
     }
 
-    /// Tells what is left, once the daemon ended.
+    /// Publishes what is pending and stops the node, after the daemon has ended.
     pub(super) async fn stop(self) {
-        if let Some(telling) = self.telling {
-            telling.stop().await;
+        if let Some(node) = self.node {
+            node.stop().await;
         }
     }
 }
 
-/// The configuration wants none: that was refused.
+/// Without the feature, a configuration that enables ROS has been rejected before.
 #[cfg(not(feature = "ros"))]
 impl Ros {
-    #[expect(clippy::unnecessary_wraps, reason = "with the feature it can fail")]
+    #[expect(clippy::unnecessary_wraps, reason = "fallible with the feature")]
     pub(super) const fn start(_: &RosKeys, _: &Handle) -> Result<Self, Failure> {
         Ok(Self {})
     }

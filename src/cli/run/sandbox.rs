@@ -1,4 +1,4 @@
-//! What the restrictions of a systemd unit do to a log folder.
+//! Effects of a systemd unit's restrictions on a log folder.
 
 use std::{
     fs, io,
@@ -7,8 +7,8 @@ use std::{
 
 use crate::{cli::Failure, store::StoreError};
 
-/// The failure of a log folder that can't be opened; with the drop-in that allows it, if a unit's
-/// restrictions forbid it.
+/// Converts the failure to open a log folder; if a unit's restrictions are the cause, with the
+/// drop-in that permits it.
 pub(super) fn log_failure(folder: &Path, error: StoreError) -> Failure {
     let StoreError::Open { source, .. } = &error else { return error.into() };
     let cgroup = fs::read_to_string("/proc/self/cgroup").unwrap_or_default();
@@ -38,7 +38,7 @@ fn absolute(folder: &Path) -> PathBuf {
 fn unit_name(cgroup: &str) -> Option<&str> {
     let path = cgroup.lines().find_map(|line| line.strip_prefix("0::"))?;
     let unit = path.rsplit('/').find(|part| part.ends_with(".service"))?;
-    // A user's session is a service, too, without any of these restrictions.
+    // A user session is a service, too, but without these restrictions.
     (!unit.starts_with("user@")).then_some(unit)
 }
 
@@ -58,7 +58,7 @@ fn drop_in(folder: &Path, error: io::ErrorKind, unit: &str) -> Option<String> {
     Some(format!(
         "{unit} may write below /var/lib/sonard only, unless a drop-in allows more. Make the folder \
          (`sudo install -d -o sonard -g sonard {folder}`), run `sudo systemctl edit {unit}`, \
-         write\n\n[Service]\nReadWritePaths={folder}{home}\n\nand restart it. If it still fails, its \
+         enter\n\n[Service]\nReadWritePaths={folder}{home}\n\nand restart it. If it still fails, its \
          file system is mounted read-only."
     ))
 }
@@ -79,7 +79,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn unit_is_that_of_a_service() {
+    fn unit_of_a_service() {
         for (cgroup, unit) in [
             ("0::/system.slice/sonard.service\n", Some("sonard.service")),
             (
@@ -96,7 +96,7 @@ mod tests {
     }
 
     #[test]
-    fn drop_in_is_given_where_it_helps() {
+    fn drop_in_for_forbidden_folders() {
         use io::ErrorKind as Kind;
         let data = Path::new("/data/sonar");
         let help = drop_in(data, Kind::ReadOnlyFilesystem, "sonard.service").expect("a drop-in");
@@ -110,7 +110,7 @@ mod tests {
     }
 
     #[test]
-    fn private_temporary_folder_is_recognized() {
+    fn private_temporary_folder() {
         let mounts = "21 1 8:1 / / rw - ext4 /dev/sda1 rw\n\
                       40 21 8:1 /tmp/systemd-private-1-sonard.service-x/tmp /tmp rw - ext4 /dev/sda1 rw\n";
         assert!(is_private(Path::new("/tmp/log"), mounts));

@@ -5,7 +5,7 @@ use crate::{
     api::{LinkState, ScanRequest, Status},
     cli::{
         Failure, Outcome,
-        daemon::{check_scene, refuse, refuse_scans},
+        daemon::{check_scene, failure_from, scans_failure},
         runtime::{self, Interrupts},
     },
     client::RequestedScans,
@@ -20,56 +20,57 @@ pub(super) fn run(args: &Args) -> Outcome {
     let client = args.at.client()?;
     let output = Output::open(args.out.as_deref())?;
     let mut scans =
-        Scans { output, wanted: args.repeat, ends: Vec::new(), told_again: 0, pose, plan };
+        Scans { output, count: args.repeat, ends: Vec::new(), reported_repeats: 0, pose, plan };
     let measured = runtime::run_interruptible(async |interrupts| {
-        let status: Status = client.get_json("/v1/status").await.map_err(|error| refuse(&error))?;
+        let status: Status =
+            client.get_json("/v1/status").await.map_err(|error| failure_from(&error))?;
         check_scene(status.scene.as_ref(), &scene)?;
         let requested =
-            RequestedScans::ask(client, &request).await.map_err(|error| refuse(&error))?;
-        notice!("the daemon takes {} scan(s), {}", args.repeat, first(&status));
+            RequestedScans::ask(client, &request).await.map_err(|error| failure_from(&error))?;
+        notice!("the daemon takes {} scan(s), {}", args.repeat, describe_wait(&status));
         let followed = scans.follow(requested, &interrupts).await;
         scans.output.end_scan();
         followed
     });
-    // Whatever happened, what was measured is closed properly and drawn.
+    // After any outcome, the log is closed and the measured scan is drawn.
     let closed = scans.output.close(&scene);
     measured?;
     closed
 }
 
-/// Scans that a daemon was asked for, as they come in.
+/// Scans requested from a daemon, as they arrive.
 struct Scans {
     output: Output,
-    wanted: u32,
+    count: u32,
     ends: Vec<ScanEnd>,
-    /// Readings fetched again that were told of.
-    told_again: usize,
+    /// Number of re-requested readings already reported.
+    reported_repeats: usize,
     pose: Pose,
     plan: ScanPlan,
 }
 
 impl Scans {
-    /// Takes records in until the last scan is over.
+    /// Receives records until the last scan has ended.
     async fn follow(&mut self, mut scans: RequestedScans, interrupts: &Interrupts) -> Outcome {
-        while (self.ends.len() as u32) < self.wanted {
+        while (self.ends.len() as u32) < self.count {
             let record = tokio::select! {
                 record = scans.next() => record,
                 () = interrupts.clone().wait() => return self.cancel(&mut scans).await,
             };
             let record = record.map_err(|error| {
-                let anyone = refuse_scans(&error);
-                let Failure::Found(Some(why)) = anyone else { return anyone };
+                let failure = scans_failure(&error);
+                let Failure::Found(Some(why)) = failure else { return failure };
                 Failure::Found(Some(format!(
-                    "{why}: {} of {} scans were taken",
+                    "{why}: {} of {} scans taken",
                     self.ends.len(),
-                    self.wanted
+                    self.count
                 )))
             })?;
-            self.take_in(&record)?;
-            let again = scans.fetched_again() - self.told_again;
-            if again > 0 {
-                notice!("{again} readings were fetched again");
-                self.told_again += again;
+            self.add_record(&record)?;
+            let repeated = scans.fetched_again() - self.reported_repeats;
+            if repeated > 0 {
+                notice!("{repeated} readings re-requested");
+                self.reported_repeats += repeated;
             }
         }
         let missing: u32 = self.ends.iter().map(|end| end.missing).sum();
@@ -79,15 +80,15 @@ impl Scans {
         Ok(())
     }
 
-    fn take_in(&mut self, record: &Record) -> Outcome {
+    fn add_record(&mut self, record: &Record) -> Outcome {
         if let Record::Session(session) = record {
-            self.output.add_to_earlier(session, self.pose, self.plan)?;
+            self.output.check_same_setup(session, self.pose, self.plan)?;
         }
         if let Record::ScanStart(start) = record {
-            let turn = self.ends.len() as u32 + 1;
-            let (wanted, beams) = (self.wanted, start.plan.beams());
-            notice!("scan {turn} of {wanted} has begun: {beams} beams");
-            self.output.begin_scan(turn, wanted, beams);
+            let number = self.ends.len() as u32 + 1;
+            let (count, beams) = (self.count, start.plan.beams());
+            notice!("scan {number} of {count} started: {beams} beams");
+            self.output.begin_scan(number, count, beams);
         }
         self.output.record(record)?;
         if let Record::ScanEnd(end) = record {
@@ -98,27 +99,27 @@ impl Scans {
         Ok(())
     }
 
-    /// Lets the daemon go back to what it did before.
+    /// Cancels the remaining scans; the daemon resumes its previous mode.
     async fn cancel(&mut self, scans: &mut RequestedScans) -> Outcome {
-        for record in scans.cancel().await.map_err(|error| refuse_scans(&error))? {
-            self.take_in(&record)?;
+        for record in scans.cancel().await.map_err(|error| scans_failure(&error))? {
+            self.add_record(&record)?;
         }
         Err(Failure::Found(Some(format!(
-            "stopped: {} of {} scans were taken",
+            "interrupted: {} of {} scans taken",
             self.ends.iter().filter(|end| end.missing == 0).count(),
-            self.wanted
+            self.count
         ))))
     }
 }
 
-/// What the daemon does before the scans that it was asked for, as its status has it.
-fn first(status: &Status) -> String {
+/// Describes what precedes the requested scans, from the daemon's status.
+fn describe_wait(status: &Status) -> String {
     match (&status.scan, status.link.state) {
         (Some(scan), _) => {
             let (done, beams) = (scan.done, scan.beams);
-            format!("after the one it is at, {done} of {beams} beams of which are measured")
+            format!("after the current one ({done} of {beams} beams)")
         }
-        (None, LinkState::Ready) => "at once".into(),
-        (None, state) => format!("once its ranger is ready; it is {} now", state.name()),
+        (None, LinkState::Ready) => "immediately".into(),
+        (None, state) => format!("when its ranger is ready (now {})", state.name()),
     }
 }

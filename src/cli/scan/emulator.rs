@@ -1,4 +1,4 @@
-//! The emulator as the scan's device: found, started, and ended with the scan.
+//! Emulator of a scan's device: located, started, and ended with the scan.
 
 use std::{
     env,
@@ -11,23 +11,23 @@ use std::{
 use crate::cli::Failure;
 
 const PROGRAM: &str = "sonard-emulator";
-/// Names it, wherever it is.
+/// Environment variable with its path.
 const VARIABLE: &str = "SONARD_EMULATOR";
 const LISTENING: &str = "listening on ";
 
 const BUILD: &str = "build it, in a clone of the repository, with `firmware/test.sh` (Debian; it \
-                     installs what is missing) or `cargo build --release --package \
-                     sonard-emulator --features simavr`; put it beside `sonard` or in PATH, or name it in \
-                     SONARD_EMULATOR. Without it, `--mock` runs the same device code";
+     installs what is missing) or `cargo build --release --package \
+     sonard-emulator --features simavr`; put it next to `sonard` or in PATH, or set \
+     SONARD_EMULATOR. Without it, `--mock` runs the same device code";
 
-/// A `sonard-emulator` that ends when this is dropped.
+/// Running `sonard-emulator`, killed on drop.
 pub(in crate::cli) struct Emulator {
     child: Child,
     port: String,
 }
 
 impl Emulator {
-    /// Starts one in the world that the options say, and waits until its port is there.
+    /// Starts the emulator with the given options, and waits for its port.
     pub(in crate::cli) fn start(options: &[String]) -> Result<Self, Failure> {
         let program = find()?;
         let mut child = Command::new(&program)
@@ -36,21 +36,21 @@ impl Emulator {
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())
-            // An interrupt is for the scan, which stops the motor first.
+            // An interrupt must reach the scan first, which stops the motor.
             .process_group(0)
             .spawn()
             .map_err(|error| {
                 Failure::device(format!("cannot start {}: {error}", program.display()), BUILD)
             })?;
-        let said = child.stdout.take().map(BufReader::new);
+        let output = child.stdout.take().map(BufReader::new);
         let port =
-            said.into_iter().flat_map(BufReader::lines).map_while(Result::ok).find_map(|line| {
+            output.into_iter().flat_map(BufReader::lines).map_while(Result::ok).find_map(|line| {
                 line.strip_prefix(LISTENING)?.split(' ').next().map(str::to_owned)
             });
         match port {
             Some(port) => Ok(Self { child, port }),
-            // Why, it says on standard error.
-            None => Err(refused(child)),
+            // The reason is on its standard error.
+            None => Err(start_failure(child)),
         }
     }
 
@@ -67,20 +67,20 @@ impl Drop for Emulator {
     }
 }
 
-/// What it said instead of starting.
-fn refused(mut child: Child) -> Failure {
-    let mut said = String::new();
+/// Failure of an emulator that exited with a message instead of starting.
+fn start_failure(mut child: Child) -> Failure {
+    let mut output = String::new();
     if let Some(mut stderr) = child.stderr.take() {
-        drop(stderr.read_to_string(&mut said));
+        drop(stderr.read_to_string(&mut output));
     }
     drop(child.wait());
     Failure::input(
-        format!("the emulator did not start: {}", said.trim()),
+        format!("the emulator did not start: {}", output.trim()),
         "its firmware comes from `firmware/test.sh`, or SONARD_FIRMWARE names it",
     )
 }
 
-/// By the variable, beside this program, in PATH, or where its build leaves it in a clone.
+/// Searches the variable, this program's folder, PATH, and the build folders of a clone.
 fn find() -> Result<PathBuf, Failure> {
     if let Some(named) = env::var_os(VARIABLE) {
         let path = PathBuf::from(named);
@@ -88,22 +88,22 @@ fn find() -> Result<PathBuf, Failure> {
             Ok(path)
         } else {
             Err(Failure::device(
-                format!("{VARIABLE} names {}, which is no file", path.display()),
+                format!("{VARIABLE} is {}, which is not a file", path.display()),
                 BUILD,
             ))
         };
     }
     let program = env::current_exe().unwrap_or_default();
-    let beside = program.parent().map(|folder| folder.join(PROGRAM));
+    let next_to_program = program.parent().map(|folder| folder.join(PROGRAM));
     let search = env::var_os("PATH").unwrap_or_default();
     let in_path = env::split_paths(&search).map(|folder| folder.join(PROGRAM));
     let built = program.ancestors().flat_map(|folder| {
         ["release", "debug"].map(|kind| folder.join("target").join(kind).join(PROGRAM))
     });
-    beside
+    next_to_program
         .into_iter()
         .chain(in_path)
         .chain(built)
         .find(|path| path.is_file())
-        .ok_or_else(|| Failure::device(format!("there is no {PROGRAM} on this computer"), BUILD))
+        .ok_or_else(|| Failure::device(format!("{PROGRAM} not found"), BUILD))
 }

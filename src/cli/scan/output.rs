@@ -1,6 +1,6 @@
-//! Where a scan's records, bar and pictures go.
+//! Outputs of a scan: log, progress bar and pictures.
 
-mod earlier;
+mod existing;
 
 use std::path::{Path, PathBuf};
 
@@ -17,44 +17,44 @@ use crate::{
     scene::Scene,
     store::LogWriter,
 };
-use earlier::Earlier;
+use existing::ExistingLog;
 
 const PICTURE_WIDTH_PX: u32 = 1600;
 
-/// The log, the progress bar, and the last scan's records for the picture and the summary.
+/// Log, progress bar, and the last scan's records for picture and summary.
 pub(super) struct Output {
     log: Option<LogWriter>,
     folder: Option<PathBuf>,
-    /// What was in the folder's log before, until the first scan.
-    earlier: Option<Earlier>,
+    /// Previous contents of the folder's log, until the first scan.
+    existing: Option<ExistingLog>,
     bar: ProgressBar,
     records: Vec<Record>,
 }
 
 impl Output {
-    /// Opens `scan.jsonl` in `folder` (made if it isn't there), or standard output.
+    /// Opens `scan.jsonl` in `folder` (created if missing), or standard output.
     pub(super) fn open(folder: Option<&Path>) -> Result<Self, Failure> {
-        let (log, earlier) = match folder {
+        let (log, existing) = match folder {
             Some(folder) => open_log(folder)?,
             None => (LogWriter::stdout(), None),
         };
         Ok(Self {
             log: Some(log),
             folder: folder.map(Path::to_path_buf),
-            earlier,
+            existing,
             bar: ProgressBar::hidden(),
             records: Vec::new(),
         })
     }
 
-    pub(super) fn begin_scan(&mut self, turn: u32, turns: u32, beams: u32) {
+    pub(super) fn begin_scan(&mut self, number: u32, count: u32, beams: u32) {
         self.bar = ProgressBar::new(beams.into());
         if let Ok(style) = ProgressStyle::with_template(
             "{msg} {wide_bar} {pos}/{len} beams, {per_sec}, {eta} left",
         ) {
             self.bar.set_style(style);
         }
-        let message = if turns > 1 { format!("scan {turn} of {turns}") } else { "scan".into() };
+        let message = if count > 1 { format!("scan {number} of {count}") } else { "scan".into() };
         self.bar.set_message(message);
     }
 
@@ -62,7 +62,7 @@ impl Output {
         self.bar.finish_and_clear();
     }
 
-    /// The last scan.
+    /// Returns the last scan.
     pub(super) fn views(&self) -> Vec<ScanView> {
         ScanView::from_records(self.records.iter().cloned())
     }
@@ -71,17 +71,16 @@ impl Output {
         self.folder.as_deref()
     }
 
-    /// Makes sure that what is to be added to the folder's log was taken like what is in it, and says
-    /// what it is added to. Asked with the session and the beginning of the first scan, before either is
-    /// written.
-    pub(super) fn add_to_earlier(
+    /// Checks that the new scans have the same setup as those in the folder's log, and reports what
+    /// they are appended to. Must be called before session and first scan start are written.
+    pub(super) fn check_same_setup(
         &mut self,
         session: &Session,
         pose: Pose,
         plan: ScanPlan,
     ) -> Outcome {
-        let Some(earlier) = self.earlier.take() else { return Ok(()) };
-        earlier.agree(session, pose, plan)
+        let Some(existing) = self.existing.take() else { return Ok(()) };
+        existing.check_same_setup(session, pose, plan)
     }
 
     /// Writes a record outside a scan.
@@ -119,7 +118,7 @@ impl Sink for Output {
         if matches!(record, Record::Ping(_)) {
             self.bar.inc(1);
         }
-        // Only the last scan is drawn: a thousand repeats must not fill the memory.
+        // Only the last scan is drawn: the records of many repeats would fill the memory.
         if matches!(record, Record::ScanStart(_)) {
             self.records.retain(|record| matches!(record, Record::Session(_)));
         }
@@ -132,13 +131,13 @@ const LOG: &str = "scan.jsonl";
 const SVG: &str = "scan.svg";
 const PNG: &str = "scan.png";
 
-fn open_log(folder: &Path) -> Result<(LogWriter, Option<Earlier>), Failure> {
+fn open_log(folder: &Path) -> Result<(LogWriter, Option<ExistingLog>), Failure> {
     make_folder(folder)?;
     for (name, product) in [(SVG, Product::Svg), (PNG, Product::Png)] {
         Overwrite::default().check(&folder.join(name), product)?;
     }
     let path = folder.join(LOG);
-    let earlier = Earlier::of(&path)?;
+    let existing = ExistingLog::read(&path)?;
     let log = LogWriter::open(&path)?;
-    Ok((log.with_scenes_beside(), earlier))
+    Ok((log.with_scenes_beside(), existing))
 }

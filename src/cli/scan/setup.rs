@@ -1,4 +1,4 @@
-//! What the options of `sonard scan` ask for.
+//! Setup of `sonard scan` from its options.
 
 use std::sync::Arc;
 
@@ -8,8 +8,8 @@ use crate::{
     ranger::{PrepareError, PreparedScan, ScanInputs},
 };
 
-/// Everything the scan needs to know before a port is opened.
-pub(super) fn prepared(args: &Args) -> Result<PreparedScan, Failure> {
+/// Prepares everything that is needed before a port is opened.
+pub(super) fn prepare(args: &Args) -> Result<PreparedScan, Failure> {
     let (scene, pose) = args.place.load()?;
     let inputs = ScanInputs {
         scene: Arc::new(scene),
@@ -21,17 +21,17 @@ pub(super) fn prepared(args: &Args) -> Result<PreparedScan, Failure> {
         air: args.air.air()?,
         options: engine_options(&args.engine)?,
     };
-    PreparedScan::of(inputs).map_err(|error| refuse(&error))
+    PreparedScan::of(inputs).map_err(|error| failure_from(&error))
 }
 
-fn refuse(error: &PrepareError) -> Failure {
+fn failure_from(error: &PrepareError) -> Failure {
     match error {
-        PrepareError::Deaf(deaf) => Failure::input(deaf, deaf.help()),
+        PrepareError::Deaf(error) => Failure::input(error, error.help()),
         PrepareError::Model(error) => Failure::input(error, "see `sonard scan --help`"),
     }
 }
 
-/// What the host believes of a mock's world.
+/// Model that the host assumes of a mock's world.
 pub(in crate::cli) const fn assumed(scan: &PreparedScan) -> AssumedModel<'_> {
     AssumedModel {
         scene: &scan.scene,

@@ -1,4 +1,4 @@
-//! One screen about a scan.
+//! Summary of a scan in a few lines.
 
 use firmware_protocol::{host::LinkStats, messages::Identity};
 
@@ -9,13 +9,12 @@ use crate::{
     scan::{PingStatus, Provenance, ScanEnd, ScanView},
 };
 
-/// Prints it on standard error, where it is in no pipe's way. The line's figures are counted from the
-/// first of two moments to the second.
+/// Prints the summary on standard error. Link statistics are the difference between the two given.
 pub(super) fn print(
     setup: &PreparedScan,
     summary: &ScanSummary,
     identity: &Identity,
-    [before, now]: &[LinkStats; 2],
+    [earlier, current]: &[LinkStats; 2],
     output: &Output,
 ) {
     let views = output.views();
@@ -24,7 +23,7 @@ pub(super) fn print(
         Some(beams(&summary.end, views.last())),
         Some(agreement(&compare(&views).0, setup.simulator.options().engine.kind().name())),
         Some(time(&summary.end)),
-        Some(traffic(before, now)),
+        Some(traffic(earlier, current)),
         warnings(summary),
         output.folder().map(|folder| {
             format!("  wrote {0}/scan.jsonl, {0}/scan.svg and {0}/scan.png", folder.display())
@@ -37,7 +36,7 @@ pub(super) fn print(
     }
 }
 
-/// The same about a scan that a daemon took.
+/// Prints the summary of a scan taken by a daemon.
 pub(super) fn print_of_daemon(end: &ScanEnd, output: &Output) {
     let views = output.views();
     let session = views.last().and_then(|view| view.session.as_ref());
@@ -73,7 +72,7 @@ fn beams(end: &ScanEnd, view: Option<&ScanView>) -> String {
         view.map_or(0, |view| view.pings.iter().filter(|ping| ping.status == status).count())
     };
     let mut text = format!(
-        "  {} beams, {} missing, {} repaired: {} echo, {} minimum range, {} silent",
+        "  {} beams, {} missing, {} repaired: {} echo, {} minimum range, {} no echo",
         end.beams,
         end.missing,
         end.repaired,
@@ -82,7 +81,7 @@ fn beams(end: &ScanEnd, view: Option<&ScanView>) -> String {
         count(PingStatus::NoEcho),
     );
     for (status, name) in
-        [(PingStatus::StepDoubtful, "step doubtful"), (PingStatus::ModuleFault, "module fault")]
+        [(PingStatus::StepDoubtful, "step uncertain"), (PingStatus::ModuleFault, "module fault")]
     {
         if count(status) > 0 {
             text += &format!(", {} {name}", count(status));
@@ -96,57 +95,56 @@ fn agreement(comparison: &Comparison, engine: &str) -> String {
         metres.map_or_else(|| "-".into(), |metres| format!("{:.1} mm", metres * 1e3))
     };
     format!(
-        "  model ({engine}): {} of {} echo pairs agree; |residual| median {}, 90 % {}; measured \
-         only {}, simulated only {}",
+        "  model ({engine}): {} of {} echoes agree; |residual| median {}, 90 % {}; missed {}, false {}",
         comparison.agree,
         comparison.both_echo,
         mm(comparison.median_abs_residual_m),
         mm(comparison.p90_abs_residual_m),
-        comparison.measured_only,
         comparison.simulated_only,
+        comparison.measured_only,
     )
 }
 
 fn time(end: &ScanEnd) -> String {
     let ratio = end.duration_s / end.acoustic_limit_s;
     format!(
-        "  {:.3} s of device time; acoustics and motor need {:.3} s (x {ratio:.4})",
+        "  {:.1} s (physical minimum {:.1} s, ratio {ratio:.4})",
         end.duration_s, end.acoustic_limit_s
     )
 }
 
-/// One line about the line over several scans.
+/// Prints the link statistics over several scans.
 pub(super) fn print_total(scans: u32, link: &LinkStats) {
-    notice!("{scans} scans in all\n{}", traffic(&LinkStats::default(), link));
+    notice!("total {scans} scans\n{}", traffic(&LinkStats::default(), link));
 }
 
-fn traffic(before: &LinkStats, now: &LinkStats) -> String {
-    let received = now.bytes_received - before.bytes_received;
-    let sent = now.bytes_sent - before.bytes_sent;
+fn traffic(earlier: &LinkStats, current: &LinkStats) -> String {
+    let received = current.bytes_received - earlier.bytes_received;
+    let sent = current.bytes_sent - earlier.bytes_sent;
     let damaged = |link: &LinkStats| {
         let dropped = &link.dropped;
         u32::from(dropped.checksum) + u32::from(dropped.stuffing) + u32::from(dropped.too_long)
     };
     format!(
         "  link: {received} bytes in, {sent} bytes out ({:.1} % of the traffic), {} frames damaged, {} \
-         requests repeated, {} readings refused",
+         requests repeated, {} readings rejected",
         100.0 * sent as f64 / (sent + received).max(1) as f64,
-        damaged(now) - damaged(before),
-        now.retries - before.retries,
-        now.refused - before.refused,
+        damaged(current) - damaged(earlier),
+        current.retries - earlier.retries,
+        current.refused - earlier.refused,
     )
 }
 
 fn warnings(summary: &ScanSummary) -> Option<String> {
     let mut parts = Vec::new();
     if summary.restarts > 0 {
-        parts.push(format!("the device restarted {} times", summary.restarts));
+        parts.push(format!("the device reset {} times", summary.restarts));
     }
     if let Some(drift) = summary.end.home_drift_steps.filter(|&drift| drift != 0) {
-        parts.push(format!("the index was {drift} steps off afterwards: azimuths are doubtful"));
+        parts.push(format!("index error {drift} steps after the scan: azimuths are uncertain"));
     }
     if let Some(error) = &summary.not_home {
-        parts.push(format!("it could not go home afterwards: {error}"));
+        parts.push(format!("homing after the scan failed: {error}"));
     }
     (!parts.is_empty()).then(|| format!("  warning: {}", parts.join("; ")))
 }

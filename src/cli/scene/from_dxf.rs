@@ -9,7 +9,7 @@ use dxf::{Drawing, enums::Units};
 
 use super::{
     super::{Failure, Outcome, numbers::positive},
-    made::{MadeArgs, read, refuse},
+    made::{MadeArgs, file_failure, read},
 };
 use layers::Layers;
 use plan::Plan;
@@ -20,10 +20,10 @@ pub(in crate::cli) struct FromDxfArgs {
     /// Drawing of the plan, a DXF file
     #[arg(value_name = "DRAWING")]
     drawing: PathBuf,
-    /// Length of a unit of the drawing, metres [default: as its $INSUNITS says]
+    /// Length of a drawing unit, metres [default: from $INSUNITS]
     #[arg(long, value_name = "M", value_parser = positive)]
     unit_m: Option<f64>,
-    /// Layers with walls, separated by commas [default: all that are neither switched off nor frozen]
+    /// Layers with walls, separated by commas [default: all layers that are on and not frozen]
     #[arg(long, value_name = "NAME", value_delimiter = ',')]
     layer: Vec<String>,
     #[command(flatten)]
@@ -33,13 +33,14 @@ pub(in crate::cli) struct FromDxfArgs {
 pub(super) const ABOUT: &str = "\
 Make a scene of a drawing of a CAD program: lines are walls, circles are columns.
 
-LINE, LWPOLYLINE, POLYLINE and ARC become walls (curves short ones, off the curve by a millimetre at most), SOLID and TRACE \
-their outlines, CIRCLE becomes a cylinder, each named by its layer; blocks (INSERT) are drawn where they stand. Layers that are \
-switched off or frozen count only where --layer names them. Everything else that is drawn is left out with a warning: \
-explode splines and ellipses in the CAD program, or turn them into polylines. The drawing is seen from above, x and y are the \
-world's; one far from its origin, as surveyors draw, is moved to it. A plan smaller or larger than buildings are is refused: \
-$INSUNITS is often wrong, and --unit-m overrides it. All is of one material: give walls their own in the file that \
-comes out.";
+LINE, LWPOLYLINE, POLYLINE and ARC become walls (curves are approximated to a millimetre), SOLID \
+and TRACE their outlines, CIRCLE a cylinder, each named after its layer; blocks (INSERT) are \
+expanded. Layers that are off or frozen are used only if named with --layer. Other entities are \
+ignored with a warning: explode splines and ellipses in the CAD program, or convert them to \
+polylines. The drawing is viewed from above, x and y are the world's; a plan far from its origin, \
+as in surveying, is moved to it. A plan of implausible size is rejected, because $INSUNITS is \
+often wrong; --unit-m overrides it. All walls have the same material, which can be changed in the \
+resulting file.";
 
 pub(super) const EXAMPLES: &str = "\
 Examples:
@@ -47,21 +48,21 @@ Examples:
   sonard scene from-dxf plan.dxf --layer A-WALL,A-COLS --unit-m 0.001 -o plan.json
   sonard scene draw plan.json -o check.svg";
 
-/// Rooms and buildings are at least and at most so large, metres.
+/// Plausible sizes of a plan, metres.
 const SIZES_M: std::ops::RangeInclusive<f64> = 0.5..=2000.0;
 
 pub(super) fn run(args: &FromDxfArgs) -> Outcome {
-    let help = "give a DXF file, ASCII or binary, as a CAD program writes it";
+    let help = "give a DXF file, ASCII or binary, from a CAD program";
     let bytes = read(&args.drawing, help)?;
-    let drawing =
-        load(&bytes).map_err(|error| refuse(&args.drawing, &format!("no DXF: {error}"), help))?;
+    let drawing = load(&bytes)
+        .map_err(|error| file_failure(&args.drawing, &format!("invalid DXF: {error}"), help))?;
     let stated_m = metres(drawing.header.default_drawing_units);
     let unit_m = args.unit_m.or(stated_m).ok_or_else(|| {
-        let help = "give the length of a unit of it: --unit-m 0.001 for millimetres";
-        refuse(&args.drawing, &"the drawing has no units ($INSUNITS)", help)
+        let help = "give the length of a unit: --unit-m 0.001 for millimetres";
+        file_failure(&args.drawing, &"the drawing has no units ($INSUNITS)", help)
     })?;
-    let layers = Layers::of(&drawing, &bytes, &args.layer)
-        .map_err(|(what, help)| refuse(&args.drawing, &what, &help))?;
+    let layers = Layers::select(&drawing, &bytes, &args.layer)
+        .map_err(|(what, help)| file_failure(&args.drawing, &what, &help))?;
     let mut plan = Plan::new(&drawing, &layers, unit_m);
     plan.add_all();
     let size_m = plan.size_m();
@@ -75,27 +76,27 @@ pub(super) fn run(args: &FromDxfArgs) -> Outcome {
     args.made.write(&args.drawing, &found, &notes, help)
 }
 
-/// A plan whose size no building has.
+/// Failure for a plan of implausible size.
 fn implausible(args: &FromDxfArgs, drawing: &Drawing, unit_m: f64, size_m: f64) -> Failure {
     let units = drawing.header.default_drawing_units;
     let what = format!(
-        "by its units ($INSUNITS: {units:?}) the plan is {size_m:.3} m across, which no room is: is the unit right?"
+        "by its units ($INSUNITS: {units:?}) the plan is {size_m:.3} m across, which is implausible: check the unit"
     );
     let fits = |unit: &&f64| (2.0..=200.0).contains(&(size_m / unit_m * **unit));
     let options = [1.0, 0.01, 0.001, 0.0254, 0.3048];
     let options: Vec<String> =
         options.iter().filter(fits).map(|unit| format!("--unit-m {unit}")).collect();
     let help = match options.is_empty() {
-        true => format!("give the length of a unit: --unit-m {unit_m} takes it as it is"),
+        true => format!("give the length of a unit: --unit-m {unit_m} accepts this size"),
         false => format!(
-            "give the length of a unit: {}; --unit-m {unit_m} takes it as it is",
+            "give the length of a unit: {}; --unit-m {unit_m} accepts this size",
             options.join(" or ")
         ),
     };
-    refuse(&args.drawing, &what, &help)
+    file_failure(&args.drawing, &what, &help)
 }
 
-/// What a file holds. The crate that reads it panics at dates out of range.
+/// Parses a drawing, despite panics of the parser at dates out of range.
 fn load(bytes: &[u8]) -> Result<Drawing, String> {
     let hook = panic::take_hook();
     panic::set_hook(Box::new(|_| {}));
@@ -103,11 +104,11 @@ fn load(bytes: &[u8]) -> Result<Drawing, String> {
     panic::set_hook(hook);
     match loaded {
         Ok(loaded) => loaded.map_err(|error| error.to_string()),
-        Err(_) => Err("a figure in it is out of range".to_owned()),
+        Err(_) => Err("a value is out of range".to_owned()),
     }
 }
 
-/// Length of a unit, metres.
+/// Length of a drawing unit, metres.
 const fn metres(units: Units) -> Option<f64> {
     const INCH: f64 = 0.0254;
     const SURVEY_FOOT: f64 = 1200.0 / 3937.0;

@@ -12,7 +12,7 @@ use roxmltree::{Document, Node};
 
 use super::{
     super::{Failure, Outcome, numbers::within},
-    made::{MadeArgs, read, refuse},
+    made::{MadeArgs, file_failure, read},
 };
 use crate::scene::Surfaces;
 use frames::Scope;
@@ -24,7 +24,7 @@ pub(in crate::cli) struct FromSdfArgs {
     /// World or model of Gazebo, an SDF file
     #[arg(value_name = "WORLD")]
     world: PathBuf,
-    /// Height at which the world is cut, that of the ranger, metres
+    /// Height of the horizontal slice, that of the ranger, metres
     #[arg(long, value_name = "M", default_value_t = 0.2, value_parser = within(-1e4..=1e4), allow_negative_numbers = true)]
     cut_z_m: f64,
     #[command(flatten)]
@@ -32,14 +32,15 @@ pub(in crate::cli) struct FromSdfArgs {
 }
 
 pub(super) const ABOUT: &str = "\
-Make a scene of a world of Gazebo: boxes and outlines of an SDF file are walls, cylinders are cylinders.
+Make a scene from a Gazebo world: boxes and outlines of an SDF file are walls, cylinders are cylinders.
 
-What has to do with collisions is cut at the height of the ranger (--cut-z-m), so the ground is none, and a table's top is \
-only for a ranger at its height; boxes, cylinders and outlines (polyline) that stand upright count, \
-each named by its model. Poses and scales of a saved <state> override those of the models; poses relative to other frames, \
-nested models, and models from files beside the world (include) are followed. Meshes, spheres, other shapes, upright planes, populations, \
-models from elsewhere and what leans are left out with a warning that names them. All is of one material: give walls their own in \
-the file that comes out.";
+Collision geometry is sliced at the ranger's height (--cut-z-m); the ground is ignored, and a \
+table's top counts only for a ranger at its height. Upright boxes, cylinders and outlines \
+(polyline) are used, each named after its model. Poses and scales of a saved <state> override \
+those of the models; poses relative to other frames, nested models, and models from files next to \
+the world (include) are followed. Meshes, spheres, other shapes, vertical planes, populations, \
+models from elsewhere and tilted objects are ignored with a warning. All walls have the same \
+material, which can be changed in the resulting file.";
 
 pub(super) const EXAMPLES: &str = "\
 Examples:
@@ -48,14 +49,15 @@ Examples:
   sonard scene draw arena.json -o check.svg";
 
 pub(super) fn run(args: &FromSdfArgs) -> Outcome {
-    let help = "give an SDF file, as Gazebo reads it";
+    let help = "give an SDF file for Gazebo";
     let bytes = read(&args.world, help)?;
-    let text = String::from_utf8(bytes).map_err(|error| refuse(&args.world, &error, help))?;
-    let document = Document::parse(&text).map_err(|error| refuse(&args.world, &error, help))?;
+    let text = String::from_utf8(bytes).map_err(|error| file_failure(&args.world, &error, help))?;
+    let document =
+        Document::parse(&text).map_err(|error| file_failure(&args.world, &error, help))?;
     let root = document.root_element();
     if !root.has_tag_name("sdf") {
-        let what = format!("the outermost element is {}, not sdf", root.tag_name().name());
-        return Err(refuse(&args.world, &what, help));
+        let what = format!("the root element is {}, not sdf", root.tag_name().name());
+        return Err(file_failure(&args.world, &what, help));
     }
     let mut world = World {
         args,
@@ -65,23 +67,23 @@ pub(super) fn run(args: &FromSdfArgs) -> Outcome {
         depth: 0,
     };
     world.add_worlds(root)?;
-    let help = "give a world with boxes, cylinders or outlines that the height of --cut-z-m meets";
+    let help = "give a world with boxes, cylinders or outlines at the height of --cut-z-m";
     args.made.write(&args.world, &world.found, &world.notes, help)
 }
 
-/// What was found so far.
+/// Surfaces and notes collected so far.
 struct World<'a> {
     args: &'a FromSdfArgs,
     found: Surfaces,
-    /// Names of the things left out.
+    /// Notes on ignored objects.
     notes: Vec<String>,
-    /// The file that is read: the world, or one that it includes.
+    /// Current file: the world, or one that it includes.
     file: PathBuf,
-    /// Files included within each other.
+    /// Nesting depth of included files.
     depth: usize,
 }
 
-/// A body that shapes belong to: its name and the scale of its model.
+/// Model with collision shapes: its name and scale.
 #[derive(Clone, Copy)]
 struct Body<'n> {
     name: &'n str,
@@ -89,12 +91,12 @@ struct Body<'n> {
 }
 
 impl World<'_> {
-    /// The worlds of a file, and the models beside them.
+    /// Adds the worlds of a file, and the models outside them.
     fn add_worlds(&mut self, root: Node) -> Outcome {
         for child in root.children().filter(Node::is_element) {
             if child.has_tag_name("world") {
                 let states = child.children().filter(|child| child.has_tag_name("state"));
-                let state = State::of(states.collect());
+                let state = State::new(states.collect());
                 self.add_members(&Scope::world(child), &state)?;
                 for inserted in state.insertions() {
                     self.add_model(inserted, &Scope::world(child), &state)?;
@@ -106,7 +108,7 @@ impl World<'_> {
         Ok(())
     }
 
-    /// The models and links in a world or a model.
+    /// Adds the models and links in a world or a model.
     fn add_members(&mut self, scope: &Scope, state: &State) -> Outcome {
         for child in scope.element.children().filter(Node::is_element) {
             match child.tag_name().name() {
@@ -115,7 +117,7 @@ impl World<'_> {
                 "include" => self.include(child, scope, state)?,
                 "population" => {
                     let name = child.attribute("name").unwrap_or("without a name");
-                    self.notes.push(format!("left out: population `{name}`"));
+                    self.notes.push(format!("ignored: population `{name}`"));
                 }
                 _ => {}
             }
@@ -140,7 +142,7 @@ impl World<'_> {
         self.add_members(&inner, &state)
     }
 
-    /// The frame of a model: that of the state, else its own pose.
+    /// Returns the frame of a model: that of the state, or else its own pose.
     fn frame_of_model<'n>(
         &mut self,
         model: Node<'n, 'n>,
@@ -149,9 +151,7 @@ impl World<'_> {
         state: &State<'_, 'n>,
     ) -> Result<Option<DAffine3>, Failure> {
         if model.attribute("placement_frame").is_some_and(|frame| !frame.is_empty()) {
-            self.notes.push(format!(
-                "left out: model `{name}`, which is placed by one of its frames (placement_frame)"
-            ));
+            self.notes.push(format!("ignored: model `{name}`, which uses placement_frame"));
             return Ok(None);
         }
         match state.of_model(name).pose(self)? {
@@ -184,7 +184,8 @@ impl World<'_> {
         Ok(())
     }
 
-    /// The frame of an element by its pose; none, with a note, where that is relative to what is not there.
+    /// Returns the frame of an element by its pose; `None`, with a note, if the frame that it is
+    /// relative to is missing.
     fn placed<'n>(
         &mut self,
         element: Node<'n, 'n>,
@@ -194,9 +195,9 @@ impl World<'_> {
         match self.frame(element, scope, 0)? {
             Ok(frame) => Ok(Some(frame)),
             Err(missing) => {
-                self.found.leave_out("poses relative to something else");
+                self.found.leave_out("poses relative to missing frames");
                 self.notes.push(format!(
-                    "left out: {} of `{name}`, whose pose is relative to `{missing}`",
+                    "ignored: {} of `{name}`, whose pose is relative to `{missing}`",
                     element.tag_name().name()
                 ));
                 Ok(None)
@@ -204,14 +205,14 @@ impl World<'_> {
         }
     }
 
-    fn refuse(&self, element: Node, what: &str) -> Failure {
+    fn file_failure(&self, element: Node, what: &str) -> Failure {
         let at = element.document().text_pos_at(element.range().start);
         let place = format!("line {}, column {}: {what}", at.row, at.col);
-        refuse(&self.file, &place, "mend it, as http://sdformat.org describes the format")
+        file_failure(&self.file, &place, "correct it; see http://sdformat.org")
     }
 }
 
-/// The first child of a name.
+/// Returns the first child with a name.
 fn child<'a, 'input>(element: Node<'a, 'input>, name: &str) -> Option<Node<'a, 'input>> {
     element.children().find(|child| child.has_tag_name(name))
 }

@@ -12,7 +12,7 @@ use usvg::{
 
 use super::{
     super::{Outcome, numbers::positive},
-    made::{MadeArgs, read, refuse},
+    made::{MadeArgs, file_failure, read},
 };
 use crate::{geometry::DVec2, scene::Surfaces};
 use clip::Window;
@@ -23,7 +23,8 @@ pub(in crate::cli) struct FromSvgArgs {
     /// Drawing of the plan, an SVG file
     #[arg(value_name = "DRAWING")]
     drawing: PathBuf,
-    /// Width of the whole drawing (its `width`, else its `viewBox`, else what is drawn) in the world, metres
+    /// Width of the whole drawing (its `width`, else its `viewBox`, else the extent of its
+    /// contents) in the world, metres
     #[arg(long, value_name = "M", value_parser = positive)]
     width_m: f64,
     #[command(flatten)]
@@ -31,66 +32,68 @@ pub(in crate::cli) struct FromSvgArgs {
 }
 
 pub(super) const ABOUT: &str = "\
-Make a scene of a drawing: every line of an SVG file is a wall.
+Make a scene from a drawing: every line of an SVG file is a wall.
 
-Lines, polylines, polygons, rectangles, circles and paths count, in whatever groups they are and however they are \
-turned; fills, colours, widths, markers (arrow heads) and texts do not. What a rectangular clip path or the edge of an inner page hides \
-is no wall; other clip paths and masks are not followed, with a warning. Curves become short walls, a hundredth of the drawing's \
-width at most. The lower left corner of the drawing is the origin, y points up. Compressed files (.svgz) are read. All is of one material: give walls their own in the file that comes out.";
+Lines, polylines, polygons, rectangles, circles and paths are used, with all groups and \
+transformations; fills, colours, widths, markers (arrow heads) and texts are ignored. Lines hidden \
+by a rectangular clip path or the edge of an inner page are ignored; other clip paths and masks \
+are not applied, with a warning. Curves become short walls, at most a hundredth of the drawing's \
+width. The lower left corner of the drawing is the origin, y points up. Compressed files (.svgz) \
+are accepted. All walls have the same material, which can be changed in the resulting file.";
 
 pub(super) const EXAMPLES: &str = "\
 Examples:
   sonard scene from-svg plan.svg --width-m 12.5 -o plan.json
   sonard scene draw plan.json -o check.svg";
 
-/// Of the drawing's width; a wall of a curve is at most so long.
-const LONGEST_OF_CURVE: f64 = 0.01;
-/// Walls of a curve, at least and at most.
-const LEAST_OF_CURVE: usize = 4;
-const MOST_OF_CURVE: usize = 64;
+/// Maximum length of a wall of a curve, as a share of the drawing's width.
+const MAX_CURVE_STEP: f64 = 0.01;
+/// Minimum number of walls of a curve.
+const MIN_CURVE_WALLS: usize = 4;
+const MAX_CURVE_WALLS: usize = 64;
 
 pub(super) fn run(args: &FromSvgArgs) -> Outcome {
-    let help = "give an SVG file, as a drawing program writes it";
+    let help = "give an SVG file, from a drawing program";
     let bytes = read(&args.drawing, help)?;
     let file::Drawing { text, notes } =
-        file::text(bytes).map_err(|what| refuse(&args.drawing, &what, help))?;
+        file::text(bytes).map_err(|what| file_failure(&args.drawing, &what, help))?;
     let tree = Tree::from_str(&text, &Options::default())
-        .map_err(|error| refuse(&args.drawing, &error, help))?;
+        .map_err(|error| file_failure(&args.drawing, &error, help))?;
     let (width, height) = (f64::from(tree.size().width()), f64::from(tree.size().height()));
     let scale = args.width_m / width;
     let mut drawing = Drawing { scale, width, height, found: Surfaces::default(), notes };
     drawing.group(tree.root(), Window::default());
-    let help = "draw walls as lines; texts and images are none";
+    let help = "draw walls as lines; texts and images are ignored";
     args.made.write(&args.drawing, &drawing.found, &drawing.notes, help)
 }
 
-/// What was found so far.
+/// Surfaces and notes collected so far.
 struct Drawing {
-    /// Metres a unit.
+    /// Metres per unit.
     scale: f64,
-    /// Of the drawing, in its units.
+    /// Width of the drawing, units.
     width: f64,
     height: f64,
     found: Surfaces,
-    /// Notes on assumptions and on what was left out.
+    /// Notes on assumptions and ignored elements.
     notes: Vec<String>,
 }
 
 impl Drawing {
-    /// Adds what is seen of a group through a window of the drawing.
+    /// Adds the visible part of a group within a window of the drawing.
     fn group(&mut self, group: &Group, window: Window) {
         let window = match group.clip_path() {
             Some(clip) => match clip::rectangle(group, clip) {
                 Some(rectangle) => window.within(rectangle),
                 None => {
-                    self.note("a clip path that is no upright rectangle is not followed: what it hides is drawn");
+                    self.note("a clip path other than an axis-parallel rectangle is not applied");
                     window
                 }
             },
             None => window,
         };
         if group.mask().is_some() {
-            self.note("a mask is not followed: what it hides is drawn");
+            self.note("a mask is not applied");
         }
         for node in group.children() {
             match node {
@@ -100,7 +103,7 @@ impl Drawing {
                         self.outline(&outline, window);
                     }
                 }
-                Node::Image(_) => self.note("an image is left out"),
+                Node::Image(_) => self.note("an image is ignored"),
                 Node::Path(_) | Node::Text(_) => {}
             }
         }
@@ -127,7 +130,7 @@ impl Drawing {
                     last = to;
                 }
                 PathSegment::QuadTo(by, to) => {
-                    // The same curve as one of the third degree.
+                    // Exact conversion to a cubic curve.
                     let third = |end: Point| mixed([end, by], [1.0 / 3.0, 2.0 / 3.0]);
                     self.curve(&mut corners, [last, third(last), third(to), to]);
                     last = to;
@@ -142,11 +145,12 @@ impl Drawing {
         self.line(&mut corners, false, window);
     }
 
-    /// A Bezier curve as short lines; it is no longer than the way by its control points.
+    /// Approximates a Bezier curve by short lines; its length is at most that of its control
+    /// polygon.
     fn curve(&self, corners: &mut Vec<DVec2>, points: [Point; 4]) {
         let longest: f32 = points.windows(2).map(|ends| ends[0].distance(ends[1])).sum();
-        let parts = (f64::from(longest) / (LONGEST_OF_CURVE * self.width)).ceil();
-        let parts = (parts as usize).clamp(LEAST_OF_CURVE, MOST_OF_CURVE);
+        let parts = (f64::from(longest) / (MAX_CURVE_STEP * self.width)).ceil();
+        let parts = (parts as usize).clamp(MIN_CURVE_WALLS, MAX_CURVE_WALLS);
         corners.extend((1..=parts).map(|part| {
             let t = part as f32 / parts as f32;
             let s = 1.0 - t;
@@ -154,12 +158,12 @@ impl Drawing {
         }));
     }
 
-    /// In the world: y up.
+    /// Converts to the world, with y up.
     fn place(&self, point: Point) -> DVec2 {
         self.scale * DVec2::new(f64::from(point.x), self.height - f64::from(point.y))
     }
 
-    /// Keeps what is seen of a line, and begins another.
+    /// Adds the visible parts of a line, and starts a new one.
     fn line(&mut self, corners: &mut Vec<DVec2>, is_closed: bool, window: Window) {
         let corners = std::mem::take(corners);
         let seen = window.transformed(|[x, y]| self.place(Point::from_xy(x as f32, y as f32)));

@@ -1,4 +1,4 @@
-//! `sonard simulate --array`: rounds of an array's rangers at one pose or many.
+//! `sonard simulate --array`: rounds of an array's rangers at one or more poses.
 
 use std::sync::Arc;
 
@@ -7,7 +7,7 @@ use rand::SeedableRng as _;
 use rand_pcg::Pcg64;
 use uuid::Uuid;
 
-use super::{Args, Places, Stop, places};
+use super::{Args, SimulatedPoses, SimulationFailure, simulated_poses};
 use crate::{
     acoustics::ReceiverNoise,
     cli::{
@@ -23,16 +23,15 @@ use crate::{
     store::RecordWriter,
 };
 
-/// Several rangers instead of one that turns.
 #[derive(Debug, Clone, clap::Args)]
 #[command(next_help_heading = "Array")]
 pub(super) struct ArrayArgs {
-    /// Array of rangers, a preset (`sonard array list`) or a file with an array's data;
-    /// they fire in turn, and the pose is the robot's
+    /// Array of rangers, a preset (`sonard array list`) or a file with an array's data; the rangers
+    /// fire in turn, and the pose is the robot's
     #[arg(long, value_name = "NAME|FILE", conflicts_with_all = ["from_deg", "to_deg", "step_deg"])]
     pub(super) array: Option<String>,
-    /// Rounds at each pose, between which the robot turns in place: of an even ring, so that
-    /// directions are spread evenly
+    /// Rounds at each pose, between which the robot rotates in place by equal angles; fills the
+    /// gaps of an evenly spaced ring
     #[arg(long, value_name = "N", requires = "array", default_value_t = 1,
           value_parser = clap::value_parser!(u32).range(1..=200))]
     pub(super) rounds: u32,
@@ -41,7 +40,7 @@ pub(super) struct ArrayArgs {
 pub(super) fn run(args: &Args, name: &str) -> Outcome {
     let array = load_array(name)?;
     let scene = scene_file::load(&args.scene)?;
-    let Places { poses, left_out } = places(args, &scene, |pose| {
+    let SimulatedPoses { poses, skipped } = simulated_poses(args, &scene, |pose| {
         let checked = array.check_poses(&scene, &array.turned(pose, args.array.rounds));
         checked.map_err(|(_, error)| (error.to_string(), error.help()))
     })?;
@@ -50,49 +49,53 @@ pub(super) fn run(args: &Args, name: &str) -> Outcome {
     let (sensor, air) = (args.sensor.sensor_or(&array.sensor)?, args.air.air()?);
     let model =
         ArrayModel::new(Arc::new(array), &scene, &sensor, air, engine_options(&args.engine)?)
-            .map_err(|error| refuse(&error))?;
+            .map_err(|error| failure_from(&error))?;
     let noise = args.noise.noise()?;
     let mut out = records_to(args.output.as_deref(), args.overwrite)?;
-    let mut firing =
-        ArrayFiring { model: &model, noise, rng: Pcg64::seed_from_u64(args.noise.seed) };
-    match firing.fire(&mut *out, &rounds) {
+    let mut simulator =
+        ArraySimulator { model: &model, noise, rng: Pcg64::seed_from_u64(args.noise.seed) };
+    match simulator.fire(&mut *out, &rounds) {
         Ok(()) => {
             closed(out.finish())?;
-            left_out
+            skipped
         }
-        Err(Stop::Model(error)) => Err(refuse(&error)),
-        Err(Stop::Write(error)) => closed(Err(error)),
+        Err(SimulationFailure::Model(error)) => Err(failure_from(&error)),
+        Err(SimulationFailure::Write(error)) => closed(Err(error)),
     }
 }
 
-fn refuse(error: &ModelError) -> Failure {
+fn failure_from(error: &ModelError) -> Failure {
     Failure::input(error, "see `sonard simulate --help`")
 }
 
-struct ArrayFiring<'a> {
+struct ArraySimulator<'a> {
     model: &'a ArrayModel,
     noise: Option<ReceiverNoise>,
     rng: Pcg64,
 }
 
-impl ArrayFiring<'_> {
-    /// Writes the session, and a scan for each place with its rounds.
-    fn fire(&mut self, out: &mut dyn RecordWriter, places: &[Vec<Pose>]) -> Result<(), Stop> {
+impl ArraySimulator<'_> {
+    /// Writes the session, and one scan with all rounds per pose.
+    fn fire(
+        &mut self,
+        out: &mut dyn RecordWriter,
+        simulated_poses: &[Vec<Pose>],
+    ) -> Result<(), SimulationFailure> {
         out.write(&Record::Session(Box::new(Session::of_array(self.model, Timestamp::now()))))?;
         let round: Vec<usize> = self.model.array().round().collect();
-        let firings = round.len() * places.iter().map(Vec::len).sum::<usize>();
+        let firings = round.len() * simulated_poses.iter().map(Vec::len).sum::<usize>();
         let progress = progress::bar(firings as u64, "beams");
-        for rounds in places {
+        for rounds in simulated_poses {
             let Some(first) = rounds.first() else { continue };
             let (scan, count) = (Uuid::new_v4(), rounds.len() as u32);
             let start = ScanStart::of_array(self.model, scan, *first, count, Timestamp::now());
             out.write(&Record::ScanStart(start))?;
             let mut index = 0;
             for pose in rounds {
-                let stand = self.model.at(*pose).map_err(Stop::Model)?;
+                let at_pose = self.model.at(*pose).map_err(SimulationFailure::Model)?;
                 for (firing, &ranger) in round.iter().enumerate() {
-                    let prediction = self.listen(&stand, firing)?;
-                    let ping = Ping::of_array(&stand, scan, first, index, ranger, &prediction);
+                    let prediction = self.predict(&at_pose, firing)?;
+                    let ping = Ping::of_array(&at_pose, scan, first, index, ranger, &prediction);
                     out.write(&Record::Ping(Box::new(ping)))?;
                     index += 1;
                     progress.inc(1);
@@ -105,10 +108,14 @@ impl ArrayFiring<'_> {
         Ok(())
     }
 
-    fn listen(&mut self, stand: &ArrayAtPose<'_>, firing: usize) -> Result<Prediction, TooCostly> {
+    fn predict(
+        &mut self,
+        at_pose: &ArrayAtPose<'_>,
+        firing: usize,
+    ) -> Result<Prediction, TooCostly> {
         match &self.noise {
-            Some(noise) => stand.ping_in_noise(firing, noise, &mut self.rng),
-            None => stand.ping_in_round(firing),
+            Some(noise) => at_pose.ping_in_noise(firing, noise, &mut self.rng),
+            None => at_pose.ping_in_round(firing),
         }
     }
 }

@@ -12,9 +12,9 @@ use crate::{
     fleet::{Asked, Seen, ask, judge},
 };
 
-/// What is told of a daemon with `--json`.
+/// Object of `--json` for a daemon.
 #[derive(Serialize)]
-struct Told<'a> {
+struct FleetRow<'a> {
     robot: Option<&'a str>,
     address: String,
     state: FleetState,
@@ -23,56 +23,56 @@ struct Told<'a> {
     health: Option<&'a Health>,
 }
 
-/// Asks all at once, each in its own time, and tells of them in their order.
+/// Queries all daemons in parallel, and prints the results in their order.
 pub(super) fn run(daemons: &[Asked], json: bool) -> Outcome {
-    let seen = runtime::new()?.block_on(look(daemons));
-    let rows: Vec<_> = daemons.iter().zip(&seen).map(|(of, seen)| told(of, seen)).collect();
+    let seen = runtime::new()?.block_on(query_all(daemons));
+    let rows: Vec<_> = daemons.iter().zip(&seen).map(|(of, seen)| fleet_row(of, seen)).collect();
     let mut text = match json {
-        true => lines(&rows)?,
+        true => json_lines(&rows)?,
         false => table(&rows).to_string(),
     };
     text.push('\n');
     let written = std::io::stdout().lock().write_all(text.as_bytes());
     written.or_else(|error| Failure::from_write("to standard output", &error))?;
-    let silent = rows.iter().filter(|row| row.status.is_none()).count();
-    if silent > 0 {
-        let message = format!("{silent} of {} daemons did not say how they are", rows.len());
-        return Err(Failure::device(message, "the table says why, for each"));
+    let missing = rows.iter().filter(|row| row.status.is_none()).count();
+    if missing > 0 {
+        let message = format!("{missing} of {} daemons did not respond", rows.len());
+        return Err(Failure::device(message, "see the reasons in the table"));
     }
     let well = rows.iter().all(|row| row.state == FleetState::Well);
     if well { Ok(()) } else { Err(Failure::Found(None)) }
 }
 
-async fn look(daemons: &[Asked]) -> Vec<Seen> {
-    let mut asking = JoinSet::new();
+async fn query_all(daemons: &[Asked]) -> Vec<Seen> {
+    let mut tasks = JoinSet::new();
     for (number, Asked { member, client }) in daemons.iter().enumerate() {
         let (robot, client) = (member.robot.clone(), client.clone());
-        asking.spawn(async move { (number, judge(robot.as_deref(), ask(&client).await)) });
+        tasks.spawn(async move { (number, judge(robot.as_deref(), ask(&client).await)) });
     }
-    let mut seen = asking.join_all().await;
+    let mut seen = tasks.join_all().await;
     seen.sort_by_key(|(number, _)| *number);
     seen.into_iter().map(|(_, seen)| seen).collect()
 }
 
-fn told<'a>(of: &'a Asked, seen: &'a Seen) -> Told<'a> {
-    let said = seen.told.as_ref();
-    Told {
-        robot: said.map(|told| &*told.status.robot).or(of.member.robot.as_deref()),
+fn fleet_row<'a>(of: &'a Asked, seen: &'a Seen) -> FleetRow<'a> {
+    let report = seen.told.as_ref();
+    FleetRow {
+        robot: report.map(|report| &*report.status.robot).or(of.member.robot.as_deref()),
         address: of.member.address(),
         state: seen.state,
         wrong: &seen.wrong,
-        status: said.map(|told| &told.status),
-        health: said.map(|told| &told.health),
+        status: report.map(|report| &report.status),
+        health: report.map(|report| &report.health),
     }
 }
 
-fn lines(rows: &[Told]) -> Result<String, Failure> {
-    let lines: Result<Vec<_>, _> = rows.iter().map(serde_json::to_string).collect();
-    let fault = |error| Failure::device(error, "this is a fault of the program");
-    Ok(lines.map_err(fault)?.join("\n"))
+fn json_lines(rows: &[FleetRow]) -> Result<String, Failure> {
+    let json_lines: Result<Vec<_>, _> = rows.iter().map(serde_json::to_string).collect();
+    let fault = |error| Failure::device(error, "this is a bug: please report it");
+    Ok(json_lines.map_err(fault)?.join("\n"))
 }
 
-fn table(rows: &[Told]) -> Table {
+fn table(rows: &[FleetRow]) -> Table {
     let mut table = Table::new();
     table.load_style(RULED).set_header([
         "robot",
@@ -81,7 +81,7 @@ fn table(rows: &[Told]) -> Table {
         "last reading",
         "agreement",
         "missing",
-        "what is wrong",
+        "problems",
     ]);
     for row in rows {
         let fit = row.health.and_then(|health| health.fit.as_ref());
@@ -91,7 +91,7 @@ fn table(rows: &[Told]) -> Table {
         let share = fit.and_then(|fit| fit.agree_fraction);
         table.add_row([
             row.robot.map_or_else(|| row.address.clone(), str::to_owned),
-            state(row),
+            describe_state(row),
             or_dash(scan.map(|scan| format!("{} of {}", scan.done, scan.beams))),
             or_dash(age_s.map(|age_s| format!("{age_s:.1} s ago"))),
             or_dash(share.map(|share| format!("{:.0} %", 100.0 * share))),
@@ -102,12 +102,12 @@ fn table(rows: &[Told]) -> Table {
     table
 }
 
-/// What it is doing, or why it does not say so.
-fn state(row: &Told) -> String {
+/// Describes the state, or why it is unknown.
+fn describe_state(row: &FleetRow) -> String {
     match (row.status, row.state) {
         (Some(status), _) => status.link.state.name().replace('_', " "),
-        (None, FleetState::Silent) => "SILENT".into(),
-        (None, FleetState::Refusing) => "REFUSES".into(),
+        (None, FleetState::Silent) => "OFFLINE".into(),
+        (None, FleetState::Refusing) => "REJECTED".into(),
         (None, FleetState::OtherRobot) => "OTHER ROBOT".into(),
         (None, _) => "NO DAEMON".into(),
     }

@@ -51,7 +51,7 @@ fn is_taking(case: &Case) -> bool {
 }
 
 #[test]
-fn a_daemon_takes_the_scans_and_is_left_as_it_was_found() {
+fn daemon_settings_are_restored() {
     let folder = tempfile::tempdir().expect("a folder");
     let daemon = daemon(folder.path(), &[]);
     daemon.wait_for_scans(1);
@@ -97,7 +97,7 @@ fn a_daemon_takes_the_scans_and_is_left_as_it_was_found() {
 }
 
 #[test]
-fn what_the_daemon_does_otherwise_is_refused_with_the_key_to_change() {
+fn conflicting_settings() {
     let folder = tempfile::tempdir().expect("a folder");
     let thermometer = folder.path().join("t");
     std::fs::write(&thermometer, "21000\n").expect("writable");
@@ -144,7 +144,7 @@ fn what_the_daemon_does_otherwise_is_refused_with_the_key_to_change() {
 }
 
 #[test]
-fn killed_stopped_or_interrupted_it_goes_on_and_gives_the_daemon_back() {
+fn resumes_and_restores_the_daemon() {
     let folder = tempfile::tempdir().expect("a folder");
     let daemon = daemon(folder.path(), &[]);
     let case = Case::new("[poses]\nlist = [\"fig9\"]\n[collection]\nrepeats = 4\n");
@@ -189,7 +189,7 @@ fn killed_stopped_or_interrupted_it_goes_on_and_gives_the_daemon_back() {
 }
 
 #[test]
-fn a_daemon_that_goes_away_is_waited_for() {
+fn waits_for_a_lost_daemon() {
     let folder = tempfile::tempdir().expect("a folder");
     let first = daemon(folder.path(), &[]);
     let case = Case::new("[poses]\nlist = [\"fig9\"]\n[collection]\nrepeats = 3\n");

@@ -8,7 +8,7 @@ use crate::common::{stderr, wait_until};
 const POSE: &str = "[poses]\nlist = [\"fig9\"]\n";
 
 #[test]
-fn a_scan_with_missed_steps_is_set_aside_and_retaken() {
+fn missed_steps_cause_a_retake() {
     let case = Case::new(&format!("{POSE}[collection]\nrepeats = 6\nretakes = 50\n"));
     let output = case.collect_all(&["--missed-steps", "0.03", "--seed", "3"]);
     case.assert_each_scan_once(1, 6, 25);
@@ -26,14 +26,14 @@ fn a_scan_with_missed_steps_is_set_aside_and_retaken() {
     }
     let report = case.text("out/report.md");
     assert!(
-        report.contains("Set aside and retaken") && report.contains("it missed steps"),
+        report.contains("Rejected and retaken") && report.contains("it missed steps"),
         "{report}"
     );
     assert_eq!(case.manifest()["counts"]["set_aside"], aside.len());
 }
 
 #[test]
-fn what_retakes_do_not_mend_is_given_up_or_stops_as_the_plan_says() {
+fn retakes_exhausted() {
     let plan = format!("{POSE}[collection]\nrepeats = 2\nretakes = 2\n");
     let case = Case::new(&plan);
     let output = case.collect(&["--missed-steps", "1"]);
@@ -43,11 +43,11 @@ fn what_retakes_do_not_mend_is_given_up_or_stops_as_the_plan_says() {
     assert_eq!(case.files("set-aside"), aside.concat());
     assert_eq!(case.manifest()["counts"]["given_up"], 2);
     let report = case.text("out/report.md");
-    assert!(report.contains("## Given up") && report.contains("took 0 s in all"), "{report}");
+    assert!(report.contains("## Failed") && report.contains("Scanning time 0 s"), "{report}");
     // They stay given up, until somebody wants them.
     case.collect(&[]);
     assert_eq!(case.files("scans").len(), 0);
-    case.collect_all(&["--retry-given-up"]);
+    case.collect_all(&["--retry-failed"]);
     case.assert_each_scan_once(1, 2, 25);
 
     let case = Case::new(&(plan + "after_retakes = \"stop\"\n"));
@@ -57,11 +57,11 @@ fn what_retakes_do_not_mend_is_given_up_or_stops_as_the_plan_says() {
 
     let case = Case::new(&format!("{POSE}[checks]\non_home_drift = \"note\"\n"));
     case.collect_all(&["--missed-steps", "1"]);
-    assert!(case.text("out/report.md").contains("## Noted"));
+    assert!(case.text("out/report.md").contains("## Findings"));
 }
 
 #[test]
-fn beams_without_a_reading_and_a_wrong_scene_are_noticed() {
+fn missing_beams_and_wrong_scene() {
     let case = Case::new(&format!(
         "{POSE}[collection]\nretakes = 0\n[checks]\nmax_unexplained_share = 0.3\non_unexplained = \"stop\"\n"
     ));
@@ -78,7 +78,7 @@ fn beams_without_a_reading_and_a_wrong_scene_are_noticed() {
 }
 
 #[test]
-fn air_that_drifts_begins_a_session_of_its_own_and_moves_the_ranges() {
+fn drifting_air_starts_a_session() {
     // The program that gives the second pose heats the room.
     let case = Case::new("");
     let thermometer = case.path("thermometer").display().to_string();
@@ -119,7 +119,7 @@ fn air_that_drifts_begins_a_session_of_its_own_and_moves_the_ranges() {
 }
 
 #[test]
-fn air_that_changes_during_a_scan_costs_a_retake() {
+fn air_change_within_a_scan() {
     let case = Case::new(POSE);
     let thermometer = case.path("thermometer");
     let plan = format!("{}[air]\nfile = \"{}\"\n", case.text("plan.toml"), thermometer.display());

@@ -26,7 +26,7 @@ fn spawn(case: &Case, further: &[&str]) -> Child {
 }
 
 #[test]
-fn killed_at_any_moment_it_goes_on_and_has_every_scan_once() {
+fn resumes_after_kill() {
     let kills = env::var("SONARD_COLLECT_KILLS").ok().and_then(|n| n.parse().ok()).unwrap_or(24);
     let repeats = kills / 2 + 4;
     let case = Case::new(&format!(
@@ -66,7 +66,7 @@ fn killed_at_any_moment_it_goes_on_and_has_every_scan_once() {
 }
 
 #[test]
-fn an_interrupt_stops_the_motor_keeps_the_cut_scan_aside_and_goes_on_later() {
+fn resumes_after_interrupt() {
     let case = Case::new("[poses]\nlist = [\"fig9\"]\n[collection]\nrepeats = 3\n");
     let child = spawn(&case, &["--realtime"]);
     wait_until("a scan", || {
@@ -88,7 +88,7 @@ fn an_interrupt_stops_the_motor_keeps_the_cut_scan_aside_and_goes_on_later() {
 }
 
 #[test]
-fn a_full_disk_stops_it_and_with_room_again_it_goes_on() {
+fn resumes_after_full_disk() {
     let case = Case::new("[poses]\nlist = [\"fig9\"]\n[collection]\nrepeats = 4\n");
     let child = spawn(&case, &["--realtime"]);
     wait_until("a scan", || case.path("out/scans/p001-r01.jsonl").exists());
@@ -101,7 +101,7 @@ fn a_full_disk_stops_it_and_with_room_again_it_goes_on() {
 }
 
 #[test]
-fn a_ranger_that_goes_away_is_waited_for_and_the_scan_retaken() {
+fn lost_ranger() {
     let case = Case::new("[poses]\nlist = [\"fig9\"]\n[collection]\nrepeats = 3\nretakes = 20\n");
     let folder = tempfile::tempdir().expect("a folder");
     let mock = MockProcess::start(folder.path(), &["--realtime"]);
@@ -124,7 +124,7 @@ fn a_ranger_that_goes_away_is_waited_for_and_the_scan_retaken() {
 }
 
 #[test]
-fn a_sweep_that_a_killed_collection_left_behind_costs_the_next_one_nothing() {
+fn running_sweep_is_stopped() {
     let plan = "[poses]\nlist = [\"fig9\"]\n[collection]\nrepeats = 2\n";
     let case = Case::new(plan);
     let folder = tempfile::tempdir().expect("a folder");
@@ -143,7 +143,7 @@ fn a_sweep_that_a_killed_collection_left_behind_costs_the_next_one_nothing() {
 }
 
 #[test]
-fn a_ranger_that_measures_nothing_is_tried_ever_more_seldom_and_leaves_no_scans_aside() {
+fn failing_ranger_backs_off() {
     let plan = "[poses]\nlist = [\"fig9\"]\n[collection]\nrepeats = 20\npatience_s = 8\n";
     let case = Case::new(plan);
     let output = case.collect(&["--faults", "reset=1"]);
@@ -159,7 +159,7 @@ fn a_ranger_that_measures_nothing_is_tried_ever_more_seldom_and_leaves_no_scans_
 }
 
 #[test]
-fn two_processes_do_not_collect_into_one_folder() {
+fn folder_is_locked() {
     let case = Case::new("[poses]\nlist = [\"fig9\"]\n[collection]\nrepeats = 3\n");
     let mut child = spawn(&case, &["--realtime"]);
     wait_until("a scan", || case.path("out/taking").exists() && !case.files("taking").is_empty());

@@ -4,7 +4,7 @@ use super::{Case, said};
 use crate::common::{run, stderr};
 
 #[test]
-fn a_plan_becomes_scans_a_report_and_a_manifest_that_notices_any_change() {
+fn report_and_manifest() {
     let case = Case::new(
         "[collection]\nname = \"shelf\"\nrepeats = 2\norder = \"random\"\nseed = 5\n\
          [poses]\nlist = [\"fig9\", \"0.5,0.3,45\", \"fig7\"]\n\
@@ -69,7 +69,7 @@ fn a_plan_becomes_scans_a_report_and_a_manifest_that_notices_any_change() {
 }
 
 #[test]
-fn wrong_plans_are_refused_where_they_are_wrong() {
+fn wrong_plans() {
     for (plan, place, help) in [
         ("", "plan.toml: poses.list: no poses", "exactly one of"),
         ("[poses]\nlist = [\"fig99\"]\n", "plan.toml:9:8: poses.list", "fig9"),
@@ -100,7 +100,7 @@ fn wrong_plans_are_refused_where_they_are_wrong() {
 }
 
 #[test]
-fn a_plan_that_changed_is_refused_with_what_changed_and_goes_on_when_told_to() {
+fn changed_plan() {
     let plan =
         |more: &str| format!("{}[poses]\nlist = [\"fig9\"{more}]\n[collection]\n", super::SHORT);
     let case = Case::new("");
@@ -122,7 +122,7 @@ fn a_plan_that_changed_is_refused_with_what_changed_and_goes_on_when_told_to() {
 }
 
 #[test]
-fn the_estimate_is_what_a_collection_takes() {
+fn estimate_matches_the_duration() {
     let case = Case::new(
         "[poses]\nlist = [\"fig9\"]\n[collection]\nrepeats = 3\npause_s = 0.2\n[motion]\nsettle_ms = 20\n",
     );

@@ -21,7 +21,7 @@ fn answered(case: &Case, lines: &str, further: &[&str]) -> std::process::Output 
 }
 
 #[test]
-fn people_give_poses_conditions_and_their_consent() {
+fn prompted_poses_and_conditions() {
     let case = Case::new(
         "[poses]\nprompt = true\nconfirm = true\n[collection]\nrepeats = 2\n\
          [ask]\nat_start = [\"operator\"]\nat_pose = [\"door\"]\n",
@@ -44,7 +44,7 @@ fn people_give_poses_conditions_and_their_consent() {
 }
 
 #[test]
-fn a_person_decides_about_a_scan_that_a_check_asks_about() {
+fn prompt_about_a_failed_check() {
     let plan = "[poses]\nlist = [\"fig9\"]\n[checks]\non_home_drift = \"ask\"\n";
     let case = Case::new(plan);
     let output = answered(&case, "what?\nr\nk\n", &["--missed-steps", "1"]);
@@ -59,7 +59,7 @@ fn a_person_decides_about_a_scan_that_a_check_asks_about() {
 }
 
 #[test]
-fn programs_give_poses_one_at_a_time_or_as_they_come() {
+fn poses_from_programs() {
     let one = "[poses]\nprogram = '''case $SONARD_POSE in 1) echo fig9;; \
                2) echo '{\"x_m\":0.5,\"y_m\":0.3,\"heading_deg\":10,\"tilt\":2}';; esac'''\n";
     let case = Case::new(one);
@@ -86,7 +86,7 @@ fn programs_give_poses_one_at_a_time_or_as_they_come() {
 }
 
 #[test]
-fn a_file_gives_poses_with_conditions_and_is_watched_for_changes() {
+fn poses_from_a_file() {
     let case = Case::new("");
     let file = case.path("poses.csv");
     case.write("poses.csv", "name,x_m,y_m,heading_deg,door\na,0.5,0.3,0,open\nb,0.6,0.2,45,\n");

@@ -34,7 +34,7 @@ fn beams(daemon: &Daemon) -> u64 {
 }
 
 #[test]
-fn strangers_are_refused_and_the_daemon_keeps_scanning() {
+fn foreign_origins_are_rejected() {
     let folder = tempfile::tempdir().expect("a folder");
     let daemon = start(folder.path(), &[]);
     wait_until("some beams", || beams(&daemon) > 2);
@@ -98,7 +98,7 @@ fn strangers_are_refused_and_the_daemon_keeps_scanning() {
 }
 
 #[test]
-fn clients_that_dawdle_lose_their_places_and_too_many_are_turned_away() {
+fn slow_and_excess_clients() {
     let folder = tempfile::tempdir().expect("a folder");
     let daemon = start(folder.path(), &["--set", "server.max_clients=8"]);
     // Seven heads that never end, and one place for everybody else who comes by TCP.
@@ -134,7 +134,7 @@ fn clients_that_dawdle_lose_their_places_and_too_many_are_turned_away() {
 }
 
 #[test]
-fn a_flood_of_requests_is_cut_to_the_rate() {
+fn request_rate_limit() {
     let folder = tempfile::tempdir().expect("a folder");
     let daemon = start(folder.path(), &["--set", "server.max_requests_per_s=20"]);
     let statuses: Vec<u16> = (0..100).map(|_| daemon.get("/v1/plan").status).collect();
@@ -157,7 +157,7 @@ fn assert_problem(reply: &Reply, of: &str) {
 }
 
 #[test]
-fn strangers_on_loopback_take_neither_places_nor_requests_from_the_owner() {
+fn loopback_without_token() {
     let folder = tempfile::tempdir().expect("a folder");
     let daemon = start(folder.path(), &["--set", "server.max_requests_per_s=50"]);
     let subscribe = |host: &str| {

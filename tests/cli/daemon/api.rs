@@ -30,7 +30,7 @@ const SHORT: [&str; 6] =
     ["--set", "plan.to_deg=36", "--set", "model.max_range_m=3", "--set", "plan.step_deg=1.8"];
 
 #[test]
-fn the_server_does_what_its_document_says() {
+fn responses_match_the_openapi() {
     let folder = tempfile::tempdir().expect("a folder");
     for name in ["index.html", "playground.js"] {
         fs::write(folder.path().join(name), "a page").expect("there is room");
@@ -159,7 +159,7 @@ fn the_server_does_what_its_document_says() {
 
 /// What the server writes is what its clients read: the same types, and nothing lost on the way.
 #[test]
-fn every_answer_is_read_by_the_type_it_is_written_by() {
+fn responses_deserialize() {
     fn same<T: Serialize + DeserializeOwned>(path: &str, answer: &Value) {
         let read: T = serde_json::from_value(answer.clone())
             .unwrap_or_else(|error| panic!("{path}: {error}"));
@@ -229,7 +229,7 @@ fn check_stream(daemon: &Daemon, path: &str, content: &Value, document: &Value) 
 }
 
 #[test]
-fn past_scans_and_their_beams_are_read_from_the_logs() {
+fn past_scans_and_beams() {
     let folder = tempfile::tempdir().expect("a folder");
     let daemon = InProcess::start_mock(folder.path(), &SHORT);
     daemon.wait_for("ready");

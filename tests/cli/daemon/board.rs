@@ -110,7 +110,7 @@ fn run(
 }
 
 #[test]
-fn pins_stop_power_reset_and_show() {
+fn host_pins() {
     let folder = tempfile::tempdir().expect("a folder");
     let mut rig = Rig::new(folder.path(), Pace::RealTime);
     let settings = settings(folder.path().join("ranger").display().to_string());
@@ -167,7 +167,7 @@ fn start() -> Order {
 }
 
 #[test]
-fn where_it_may_it_goes_on_by_itself_after_an_emergency_stop() {
+fn automatic_resume_after_stop() {
     let folder = tempfile::tempdir().expect("a folder");
     let mut rig = Rig::new(folder.path(), Pace::RealTime);
     rig.plug("", 1);

@@ -43,7 +43,7 @@ fn is_left_out() -> bool {
 }
 
 #[test]
-fn a_clock_that_is_set_within_a_scan_is_noted_there_and_its_times_stay_even() {
+fn clock_step_within_a_scan() {
     if is_left_out() {
         return;
     }
@@ -81,7 +81,7 @@ fn a_clock_that_is_set_within_a_scan_is_noted_there_and_its_times_stay_even() {
 }
 
 #[test]
-fn a_clock_that_is_set_is_noted_and_costs_no_beam() {
+fn clock_step_loses_no_beam() {
     if is_left_out() {
         return;
     }
@@ -116,7 +116,7 @@ fn a_clock_that_is_set_is_noted_and_costs_no_beam() {
 }
 
 #[test]
-fn ages_do_not_follow_a_clock_that_is_set() {
+fn ages_ignore_clock_steps() {
     if is_left_out() {
         return;
     }

@@ -8,7 +8,7 @@ use super::{Daemon, clean_log, logs, write_token};
 use crate::common::{run, sonard, stderr};
 
 #[test]
-fn the_shipped_file_is_what_the_program_prints_and_it_is_right() {
+fn shipped_file_is_printed() {
     let printed = run(&["run", "--print-config"]);
     let shipped = concat!(env!("CARGO_MANIFEST_DIR"), "/config/sonard.toml");
     let text = fs::read_to_string(shipped).expect("it is shipped");
@@ -21,7 +21,7 @@ fn the_shipped_file_is_what_the_program_prints_and_it_is_right() {
 /// An instance's file is a copy of the shipped one: it must not send the instance to the folder and
 /// socket of another.
 #[test]
-fn a_copy_of_the_shipped_file_leaves_to_the_start_what_is_decided_there() {
+fn shipped_file_keeps_defaults() {
     let shipped = concat!(env!("CARGO_MANIFEST_DIR"), "/config/sonard.toml");
     let start = ["--simulate", "--scene", "corridor", "--pose", "2,1,0"];
     let output = sonard(&["run", "--check", "--config", shipped])
@@ -41,7 +41,7 @@ fn a_copy_of_the_shipped_file_leaves_to_the_start_what_is_decided_there() {
 }
 
 #[test]
-fn wrong_configurations_end_with_the_place_and_a_way_out() {
+fn wrong_configurations() {
     let folder = tempfile::tempdir().expect("a folder");
     let file = folder.path().join("s.toml");
     let port = ["--port", "/dev/ttyACM0"];
@@ -100,7 +100,7 @@ fn wrong_configurations_end_with_the_place_and_a_way_out() {
 }
 
 #[test]
-fn a_robot_is_called_as_its_host_unless_it_has_a_name_and_says_so_everywhere() {
+fn robot_name() {
     let host = rustix::system::uname();
     let host = host.nodename().to_str().expect("plain");
     let folder = tempfile::tempdir().expect("a folder");
@@ -131,7 +131,7 @@ fn a_robot_is_called_as_its_host_unless_it_has_a_name_and_says_so_everywhere() {
 }
 
 #[test]
-fn a_hangup_takes_changes_in_and_a_wrong_file_changes_nothing() {
+fn reload_on_hangup() {
     let folder = tempfile::tempdir().expect("a folder");
     let file = folder.path().join("s.toml");
     fs::write(&file, "[plan]\nto_deg = 90\n").expect("a file");
@@ -156,7 +156,7 @@ fn a_hangup_takes_changes_in_and_a_wrong_file_changes_nothing() {
 }
 
 #[test]
-fn a_token_that_others_may_read_or_that_is_no_file_is_refused_at_once() {
+fn unusable_token_files() {
     let folder = tempfile::tempdir().expect("a folder");
     let token = write_token(folder.path(), "0123456789abcdef");
     let path = |name: &str| folder.path().join(name).display().to_string();
@@ -180,7 +180,7 @@ fn a_token_that_others_may_read_or_that_is_no_file_is_refused_at_once() {
 }
 
 #[test]
-fn a_second_daemon_gets_neither_the_log_nor_the_socket() {
+fn second_daemon_is_rejected() {
     let folder = tempfile::tempdir().expect("a folder");
     let daemon = Daemon::start_mock(folder.path(), &[]);
     let mock = ["run", "--mock", "--scene", "simple-room", "--pose", "fig9"];

@@ -13,7 +13,7 @@ use super::{Daemon, clean_log, rig::Rig};
 use crate::common::{sonard, wait_until};
 
 #[test]
-fn clients_leave_port_and_log_their_descriptors() {
+fn descriptors_are_reserved() {
     let folder = tempfile::tempdir().expect("a folder");
     let mut rig = Rig::new(folder.path(), Pace::RealTime);
     rig.plug("", 1);

@@ -30,7 +30,7 @@ fn events(folder: &std::path::Path) -> Vec<String> {
 }
 
 #[test]
-fn a_pose_that_is_wrong_is_told_once_and_moved_by_nobody() {
+fn wrong_pose_is_reported_once() {
     let folder = tempfile::tempdir().expect("a folder");
     let mut rig = Rig::new(folder.path(), Pace::Virtual);
     rig.plug("", 1);
@@ -54,7 +54,7 @@ fn a_pose_that_is_wrong_is_told_once_and_moved_by_nobody() {
     }
     let socket = folder.path().join("s").display().to_string();
     let said = String::from_utf8(run(&["status", "--socket", &socket]).stdout).expect("text");
-    assert!(said.contains("better   explained: "), "{said}");
+    assert!(said.contains("fit      better with "), "{said}");
     assert_eq!(daemon.get("/v1/pose").json()["x_m"].as_f64(), Some(x_m + 0.02));
     scan(&daemon, [x_m, y_m, heading_deg], 2);
     let log = logs(folder.path()).remove(0);

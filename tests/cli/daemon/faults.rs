@@ -20,7 +20,7 @@ fn start(rig: &Rig, folder: &std::path::Path, further: &[&str]) -> Daemon {
 }
 
 #[test]
-fn an_unplugged_ranger_is_waited_for_and_found_under_another_name() {
+fn unplugged_ranger() {
     let folder = tempfile::tempdir().expect("a folder");
     let mut rig = Rig::new(folder.path(), Pace::RealTime);
     let daemon = start(&rig, folder.path(), &[]);
@@ -59,7 +59,7 @@ fn an_unplugged_ranger_is_waited_for_and_found_under_another_name() {
 }
 
 #[test]
-fn what_is_wrong_with_a_port_or_device_is_told_apart() {
+fn port_and_device_faults() {
     let folder = tempfile::tempdir().expect("a folder");
     let mut rig = Rig::new(folder.path(), Pace::Virtual);
     rig.plug("version=9", 1);
@@ -83,7 +83,7 @@ fn what_is_wrong_with_a_port_or_device_is_told_apart() {
 }
 
 #[test]
-fn another_ranger_than_the_configured_one_is_refused() {
+fn other_ranger_is_rejected() {
     let folder = tempfile::tempdir().expect("a folder");
     let serial = ["--set", "device.serial=SONARD-0007"];
     let mut daemon = InProcess::start(folder.path(), &[&RIG_OPTIONS[..], &serial].concat());
@@ -98,7 +98,7 @@ fn another_ranger_than_the_configured_one_is_refused() {
 }
 
 #[test]
-fn on_a_full_disk_nothing_is_measured_and_nothing_is_lost() {
+fn full_disk() {
     let folder = tempfile::tempdir().expect("a folder");
     let mut rig = Rig::new(folder.path(), Pace::Virtual);
     rig.plug("", 1);

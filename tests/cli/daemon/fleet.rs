@@ -24,7 +24,7 @@ fn said(output: &Output) -> String {
 }
 
 #[test]
-fn three_robots_one_unplugged_and_one_killed() {
+fn status_of_three_robots() {
     let folder = tempfile::tempdir().expect("a folder");
     let mut fleet = Fleet::start(folder.path());
     wait_until("three that are well", || fleet.states() == ["well", "well", "well"]);
@@ -51,7 +51,7 @@ fn three_robots_one_unplugged_and_one_killed() {
     let table = said(&output);
     let row =
         |name: &str| table.lines().find(|line| line.contains(name)).expect("a row").to_owned();
-    assert!(row("mango").contains("SILENT") && row("lime").contains('%'), "{table}");
+    assert!(row("mango").contains("OFFLINE") && row("lime").contains('%'), "{table}");
     assert!(row("kiwi").contains("the link is"), "{table}");
     // What it was last is still there, and since when it is silent.
     let mango = &fleet.told()[1];
@@ -73,7 +73,7 @@ fn three_robots_one_unplugged_and_one_killed() {
 }
 
 #[test]
-fn a_daemon_that_names_no_other_asks_none_and_shows_none() {
+fn without_a_fleet() {
     let folder = tempfile::tempdir().expect("a folder");
     let daemon = Daemon::start_mock(folder.path(), &[]);
     assert_eq!(daemon.get("/v1/fleet").status, 404);
@@ -133,7 +133,7 @@ fn pour(mut stream: TcpStream, taken: &AtomicU64) {
 }
 
 #[test]
-fn who_is_silent_or_says_something_else_has_a_row_with_the_reason_and_delays_nobody() {
+fn unreachable_and_foreign_daemons() {
     let folder = tempfile::tempdir().expect("a folder");
     let name = ["--set", "fleet.robot=kiwi", "--set", "server.listen=127.0.0.1:0"];
     let robot = Daemon::start_mock(folder.path(), &name);
@@ -194,7 +194,7 @@ fn who_is_silent_or_says_something_else_has_a_row_with_the_reason_and_delays_nob
 }
 
 #[test]
-fn a_fleet_is_told_to_whoever_may_read_and_tokens_to_nobody() {
+fn api_hides_tokens() {
     const TOKEN: &str = "0123456789abcdef0123456789abcdef";
     let (seen, tokens) = std::sync::mpsc::channel();
     let seen = std::sync::Mutex::new(seen);
@@ -245,7 +245,7 @@ fn a_fleet_is_told_to_whoever_may_read_and_tokens_to_nobody() {
 }
 
 #[test]
-fn watch_shows_the_readings_of_all_each_with_its_robot_also_after_a_restart() {
+fn watch_of_all_robots() {
     let folders = [(); 2].map(|()| tempfile::tempdir().expect("a folder"));
     let start = |number: usize, name: &str| {
         let named = format!("fleet.robot={name}");

@@ -26,7 +26,7 @@ fn start(folder: &std::path::Path, further: &[&str]) -> Daemon {
 }
 
 #[test]
-fn a_viewer_is_told_each_reading_as_the_log_has_it_by_both_names_of_the_protocol() {
+fn readings_match_the_log() {
     let folder = tempfile::tempdir().expect("a folder");
     let daemon = start(folder.path(), &[]);
     daemon.wait_for("ready");
@@ -104,7 +104,7 @@ fn assert_ranges<'a>(
 }
 
 #[test]
-fn who_comes_late_is_told_the_last_scan_and_what_stands_still() {
+fn late_viewer_gets_the_last_scan() {
     let folder = tempfile::tempdir().expect("a folder");
     let daemon = start(folder.path(), &["--virtual-time"]);
     daemon.wait_for("ready");
@@ -134,7 +134,7 @@ fn who_comes_late_is_told_the_last_scan_and_what_stands_still() {
 }
 
 #[test]
-fn rangers_of_an_array_have_topics_of_their_own() {
+fn topic_per_ranger() {
     let folder = tempfile::tempdir().expect("a folder");
     let array = ["--simulate", "--array", "pioneer-8", "--scene", "mcgill-lab", "--pose", "fig4"];
     let daemon =

@@ -11,7 +11,7 @@ use super::{Daemon, clean_log, logs, rig::Rig};
 use crate::common::wait_until;
 
 #[test]
-fn killed_at_any_moment_it_loses_no_synced_record_and_doubles_none() {
+fn synced_records_survive_kill() {
     let kills = env::var("SONARD_KILLS").ok().and_then(|n| n.parse().ok()).unwrap_or(8);
     let folder = tempfile::tempdir().expect("a folder");
     let mut rig = Rig::new(folder.path(), Pace::RealTime);

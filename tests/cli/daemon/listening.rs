@@ -31,7 +31,7 @@ fn count(daemon: &Daemon, words: &str) -> usize {
 }
 
 #[test]
-fn a_removed_socket_is_bound_again_with_its_permissions() {
+fn removed_socket_is_bound_again() {
     let folder = tempfile::tempdir().expect("a folder");
     let socket = folder.path().join("s");
     let daemon = Daemon::start_mock(folder.path(), &["--set", "server.socket_mode=0620"]);
@@ -47,7 +47,7 @@ fn a_removed_socket_is_bound_again_with_its_permissions() {
 }
 
 #[test]
-fn a_socket_of_another_process_is_reported_once_and_never_removed() {
+fn foreign_socket_is_kept() {
     let folder = tempfile::tempdir().expect("a folder");
     let socket = folder.path().join("s");
     let daemon = Daemon::start_mock(folder.path(), &["--set", "server.listen=127.0.0.1:0"]);
@@ -72,7 +72,7 @@ fn a_socket_of_another_process_is_reported_once_and_never_removed() {
 }
 
 #[test]
-fn scanning_does_not_wait_for_a_port_that_is_in_use() {
+fn busy_tcp_port() {
     let folder = tempfile::tempdir().expect("a folder");
     let taken = TcpListener::bind("127.0.0.1:0").expect("a port");
     let address = taken.local_addr().expect("an address").to_string();
@@ -106,7 +106,7 @@ fn options(folder: &Path, further: &[&str]) -> Vec<String> {
 }
 
 #[test]
-fn a_configuration_that_never_works_is_rejected_by_start_and_check_and_leaves_nothing() {
+fn impossible_addresses() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = |name: &str| folder.path().join(name).display().to_string();
     fs::write(path("open"), "0123456789abcdef").expect("there is room");
@@ -143,7 +143,7 @@ fn a_configuration_that_never_works_is_rejected_by_start_and_check_and_leaves_no
 }
 
 #[test]
-fn a_start_that_fails_at_a_later_step_leaves_neither_socket_nor_log() {
+fn failed_start_leaves_no_files() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = |name: &str| folder.path().join(name).display().to_string();
     fs::write(path("file"), "").expect("there is room");
@@ -171,7 +171,7 @@ fn a_start_that_fails_at_a_later_step_leaves_neither_socket_nor_log() {
 }
 
 #[test]
-fn a_reload_reports_changed_files_until_the_restart_and_rejects_wrong_ones() {
+fn changed_files_on_reload() {
     let folder = tempfile::tempdir().expect("a folder");
     let token = write_token(folder.path(), "0123456789abcdef");
     let key = format!("server.token_file={}", token.display());

@@ -38,7 +38,7 @@ fn simulated(folder: &Path, day: u32, scene: &str, way: &str, further: &[&str]) 
     let logs = folder.join("log");
     fs::create_dir_all(&logs).expect("room on the disk");
     let log = logs.join(format!("sonard-2026010{day}T000000Z.jsonl"));
-    let [scene_file, way_file] = ["scene.json", "way.csv"].map(|name| folder.join(name));
+    let [scene_file, way_file] = ["scene.json", "trajectory.csv"].map(|name| folder.join(name));
     fs::write(&scene_file, scene).expect("room on the disk");
     fs::write(&way_file, format!("x_m,y_m,heading_deg\n{way}")).expect("room on the disk");
     let [scene_file, way_file, out] =
@@ -80,7 +80,7 @@ fn scans(list: &Reply) -> Vec<String> {
 }
 
 #[test]
-fn scans_are_located_as_by_the_program_and_along_their_way() {
+fn locates_as_the_command_does() {
     let folder = tempfile::tempdir().expect("a folder");
     let log = simulated(folder.path(), 1, ROOM, WAY, &["--step-deg", "4", "--max-range", "1.5"]);
     let daemon = InProcess::start_mock(folder.path(), &["--set", "scanning.mode=on-request"]);
@@ -107,7 +107,7 @@ fn scans_are_located_as_by_the_program_and_along_their_way() {
     // Where all may have been carried, the way there says nothing.
     let carried = course(&format!("?carried=1&to={}", scans[1]));
     assert_eq!(carried.len(), 2);
-    assert_same(&carried[1], &located(&log, &["--course", "--carried", "1"]));
+    assert_same(&carried[1], &located(&log, &["--course", "--kidnap-probability", "1"]));
     let nobody = "00000000-0000-4000-8000-000000000000";
     for (path, status) in [
         (format!("{nobody}/location"), 404),
@@ -124,7 +124,7 @@ fn scans_are_located_as_by_the_program_and_along_their_way() {
 }
 
 #[test]
-fn what_can_not_be_located_is_said_with_the_reason() {
+fn reasons_without_location() {
     let folder = tempfile::tempdir().expect("a folder");
     let short = ["--step-deg", "90", "--max-range", "1.5"];
     simulated(folder.path(), 1, ROOM, "2.2,0.4,5\n", &short);
@@ -140,7 +140,7 @@ fn what_can_not_be_located_is_said_with_the_reason() {
 }
 
 #[test]
-fn one_client_at_a_time_is_answered_and_none_that_has_left() {
+fn one_client_at_a_time() {
     let folder = tempfile::tempdir().expect("a folder");
     simulated(folder.path(), 1, &hall(), "4.8,9.3,0\n", &["--step-deg", "9"]);
     simulated(folder.path(), 2, ROOM, "2.2,0.4,5\n", &["--step-deg", "9", "--max-range", "1.5"]);

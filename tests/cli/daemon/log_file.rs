@@ -55,7 +55,7 @@ fn assert_gap(log: &Log, detail: &str) {
 }
 
 #[test]
-fn removed_log_is_replaced_and_its_scan_kept() {
+fn removed_log_is_replaced() {
     let folder = tempfile::tempdir().expect("a folder");
     let (daemon, log) = start(folder.path());
     fs::remove_file(&log).expect("it is there");
@@ -69,7 +69,7 @@ fn removed_log_is_replaced_and_its_scan_kept() {
 }
 
 #[test]
-fn moved_log_gets_the_end_of_its_scan() {
+fn moved_log_is_completed() {
     let folder = tempfile::tempdir().expect("a folder");
     let (daemon, log) = start(folder.path());
     let moved = folder.path().join("moved.jsonl");
@@ -83,7 +83,7 @@ fn moved_log_gets_the_end_of_its_scan() {
 }
 
 #[test]
-fn removed_folder_is_made_again() {
+fn removed_folder_is_created_again() {
     let folder = tempfile::tempdir().expect("a folder");
     let (daemon, _) = start(folder.path());
     fs::remove_dir_all(folder.path().join("log")).expect("it is there");
@@ -104,7 +104,7 @@ fn replaced_folder_gets_a_new_log() {
 }
 
 #[test]
-fn truncated_log_is_left_for_a_new_one() {
+fn truncated_log_is_abandoned() {
     let folder = tempfile::tempdir().expect("a folder");
     let (daemon, log) = start(folder.path());
     fs::write(&log, "").expect("it is there");

@@ -25,7 +25,7 @@ fn numbers(list: &Value) -> Vec<f64> {
 }
 
 #[test]
-fn what_is_previewed_is_what_the_scan_is_predicted_by() {
+fn preview_matches_the_prediction() {
     let folder = tempfile::tempdir().expect("a folder");
     let daemon = Daemon::start_mock(folder.path(), &TURN);
     daemon.wait_for("ready");
@@ -56,7 +56,7 @@ fn what_is_previewed_is_what_the_scan_is_predicted_by() {
 }
 
 #[test]
-fn a_preview_is_refused_with_the_reason() {
+fn rejected_previews() {
     let folder = tempfile::tempdir().expect("a folder");
     let daemon = Daemon::start_mock(folder.path(), &TURN);
     for (body, status, words) in [
@@ -78,7 +78,7 @@ fn a_preview_is_refused_with_the_reason() {
 }
 
 #[test]
-fn a_beam_has_the_echo_trace_that_the_model_predicts() {
+fn echo_trace_of_a_beam() {
     let folder = tempfile::tempdir().expect("a folder");
     let daemon = Daemon::start_mock(folder.path(), &TURN);
     daemon.wait_for("ready");
@@ -101,7 +101,7 @@ fn a_beam_has_the_echo_trace_that_the_model_predicts() {
 }
 
 #[test]
-fn a_map_lines_and_features_are_found_in_a_scan() {
+fn map_lines_and_features() {
     let folder = tempfile::tempdir().expect("a folder");
     let corridor = ["--mock", "--scene", "two-surface-room", "--pose", "middle"];
     let daemon = Daemon::start(folder.path(), &[&corridor[..], &TURN].concat());
@@ -132,7 +132,7 @@ fn a_map_lines_and_features_are_found_in_a_scan() {
 }
 
 #[test]
-fn arrays_have_no_features_and_long_scans_cost_nothing() {
+fn arrays_and_long_scans() {
     let folder = tempfile::tempdir().expect("a folder");
     write_scans(&folder.path().join("log"), 1, 4001);
     let daemon = start_array(folder.path(), &[]);

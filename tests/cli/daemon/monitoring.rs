@@ -29,7 +29,7 @@ fn value(figures: &str, name: &str) -> Option<f64> {
 }
 
 #[test]
-fn every_figure_that_dashboard_and_alerts_ask_for_is_told() {
+fn dashboard_and_alert_metrics() {
     let folder = tempfile::tempdir().expect("a folder");
     let daemon = Daemon::start_mock(
         folder.path(),
@@ -70,7 +70,7 @@ fn every_figure_that_dashboard_and_alerts_ask_for_is_told() {
 }
 
 #[test]
-fn format_follows_accept() {
+fn format_from_accept_header() {
     let folder = tempfile::tempdir().expect("a folder");
     let daemon = Daemon::start_mock(folder.path(), &[]);
     daemon.wait_for("ready");

@@ -69,7 +69,7 @@ fn logged(log: &Log) -> BTreeMap<String, Value> {
 }
 
 #[test]
-fn every_record_of_the_log_is_published_as_it_stands_there_and_who_is_there_is_told() {
+fn records_and_presence() {
     let folder = tempfile::tempdir().expect("a folder");
     let broker = Broker::start(Manner::Honest);
     let password = write_token(folder.path(), "secret word");
@@ -113,7 +113,7 @@ fn every_record_of_the_log_is_published_as_it_stands_there_and_who_is_there_is_t
 }
 
 #[test]
-fn what_was_logged_while_the_broker_was_away_comes_later_also_after_the_daemon_was_killed() {
+fn backlog_after_outage_and_kill() {
     let folder = tempfile::tempdir().expect("a folder");
     let broker = Broker::start(Manner::Curt);
     // A log for each scan, so that there are several to go through.
@@ -151,7 +151,7 @@ fn what_was_logged_while_the_broker_was_away_comes_later_also_after_the_daemon_w
 }
 
 #[test]
-fn what_came_before_the_first_time_is_sent_where_that_is_wanted_and_a_gap_is_told() {
+fn older_records_and_gaps() {
     let folder = tempfile::tempdir().expect("a folder");
     let broker = Broker::start(Manner::Honest);
     let without = Daemon::start_mock(folder.path(), &["--virtual-time", "--set", "plan.to_deg=9"]);
@@ -185,7 +185,7 @@ fn what_came_before_the_first_time_is_sent_where_that_is_wanted_and_a_gap_is_tol
 }
 
 #[test]
-fn settings_that_can_not_be_are_refused_with_what_would_be_right() {
+fn wrong_settings() {
     let folder = tempfile::tempdir().expect("a folder");
     let file = folder.path().join("file");
     std::fs::write(&file, "no certificate").expect("there is room");

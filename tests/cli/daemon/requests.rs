@@ -26,7 +26,7 @@ fn scan(daemon: &Daemon, further: &[&str]) -> std::process::Command {
 }
 
 #[test]
-fn a_scan_through_a_busy_daemon_has_its_own_plan_and_leaves_the_daemons_alone() {
+fn scan_with_its_own_plan() {
     let folder = tempfile::tempdir().expect("a folder");
     let continuous = ["--set", "scanning.mode=continuous"];
     let daemon = Daemon::start_mock(folder.path(), &[&SHORT[..], &continuous].concat());
@@ -40,8 +40,7 @@ fn a_scan_through_a_busy_daemon_has_its_own_plan_and_leaves_the_daemons_alone() 
         .expect("it runs");
     assert_eq!(taken.status.code(), Some(0), "{}", stderr(&taken));
     let told = stderr(&taken);
-    for part in ["takes 2 scan(s), ", "scan 2 of 2 has begun: 50 beams", "mock", "echo pairs agree"]
-    {
+    for part in ["takes 2 scan(s), ", "scan 2 of 2 started: 50 beams", "mock", "echoes agree"] {
         assert!(told.contains(part), "{part}: {told}");
     }
     let log = Log::read(&out.join("scan.jsonl"));
@@ -78,7 +77,7 @@ fn a_scan_through_a_busy_daemon_has_its_own_plan_and_leaves_the_daemons_alone() 
 }
 
 #[test]
-fn over_tcp_a_scan_needs_the_token_and_a_look_does_not() {
+fn token_over_tcp() {
     let folder = tempfile::tempdir().expect("a folder");
     let token = write_token(folder.path(), "correct horse battery\n");
     let token = token.to_str().expect("plain path").to_owned();
@@ -114,7 +113,7 @@ fn over_tcp_a_scan_needs_the_token_and_a_look_does_not() {
 }
 
 #[test]
-fn air_from_a_program_is_forgotten_on_request() {
+fn requested_air_is_reset() {
     let folder = tempfile::tempdir().expect("a folder");
     let daemon = InProcess::start_mock(folder.path(), &SHORT);
     assert_eq!(daemon.send("PUT", "/v1/air", r#"{"temperature_c":25}"#).status, 202);
@@ -133,7 +132,7 @@ fn air_from_a_program_is_forgotten_on_request() {
 }
 
 #[test]
-fn an_interrupt_and_a_stop_end_the_wait_for_a_scan() {
+fn wait_is_interruptible() {
     let folder = tempfile::tempdir().expect("a folder");
     let daemon = Daemon::start_mock(folder.path(), &SHORT);
     let own = ["--scene", "simple-room", "--pose", "fig9", "--repeat", "50"];
@@ -156,7 +155,7 @@ fn an_interrupt_and_a_stop_end_the_wait_for_a_scan() {
 }
 
 #[test]
-fn the_mode_can_be_changed_while_it_runs() {
+fn change_of_mode() {
     let folder = tempfile::tempdir().expect("a folder");
     let daemon = InProcess::start_mock(folder.path(), &SHORT);
     daemon.wait_for("ready");
@@ -189,7 +188,7 @@ fn the_mode_can_be_changed_while_it_runs() {
 }
 
 #[test]
-fn the_figures_of_the_line_go_on_within_a_scan() {
+fn link_counters_during_a_scan() {
     let folder = tempfile::tempdir().expect("a folder");
     let daemon = InProcess::start_mock(folder.path(), &["--set", "model.max_range_m=4"]);
     daemon.wait_for("ready");
@@ -207,7 +206,7 @@ fn the_figures_of_the_line_go_on_within_a_scan() {
 }
 
 #[test]
-fn whole_scans_can_be_had_with_only_what_moved() {
+fn scans_with_deadband() {
     let folder = tempfile::tempdir().expect("a folder");
     let daemon = Daemon::start_mock(folder.path(), &SHORT);
     daemon.wait_for("ready");

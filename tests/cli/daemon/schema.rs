@@ -116,7 +116,7 @@ fn is(value: &Value, kind: &str) -> bool {
 }
 
 #[test]
-fn the_check_finds_what_does_not_fit() {
+fn detects_mismatches() {
     let document = serde_json::json!({"a": {"type": "object", "properties": {
         "x": {"type": ["number", "null"]}, "k": {"enum": ["u", "v"]},
         "p": {"type": "array", "minItems": 2, "maxItems": 2}}, "required": ["x"]}});

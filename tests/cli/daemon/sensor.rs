@@ -19,7 +19,7 @@ fn echoes(pings: &Value) -> usize {
 }
 
 #[test]
-fn a_sensor_is_previewed_pending_in_force_and_given_back() {
+fn preview_apply_and_restore() {
     let folder = tempfile::tempdir().expect("a folder");
     let daemon = Daemon::start_mock(folder.path(), &TURN);
     daemon.wait_for("ready");
@@ -81,7 +81,7 @@ fn a_sensor_is_previewed_pending_in_force_and_given_back() {
 }
 
 #[test]
-fn a_sensor_is_refused_where_device_or_configuration_says_otherwise() {
+fn rejected_by_device_or_file() {
     let folder = tempfile::tempdir().expect("a folder");
     let file = folder.path().join("s.toml");
     fs::write(&file, "[model]\nthreshold = 0.03\n").expect("there is room");
@@ -120,7 +120,7 @@ fn a_sensor_is_refused_where_device_or_configuration_says_otherwise() {
 }
 
 #[test]
-fn preview_rejects_what_an_order_is_rejected_for() {
+fn preview_rejects_like_apply() {
     let folder = tempfile::tempdir().expect("a folder");
     let daemon = Daemon::start_mock(folder.path(), &TURN);
     daemon.wait_for("ready");
@@ -154,7 +154,7 @@ fn preview_rejects_what_an_order_is_rejected_for() {
 }
 
 #[test]
-fn an_array_is_previewed_and_its_rangers_are_another_sensor_from_the_next_round_on() {
+fn sensor_of_an_array() {
     let folder = tempfile::tempdir().expect("a folder");
     let daemon = start_array(folder.path(), &[]);
     let pose = daemon.get("/v1/pose").json();

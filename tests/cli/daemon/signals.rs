@@ -39,7 +39,7 @@ fn assert_closed(folder: &Path) {
 }
 
 #[test]
-fn signals_in_quick_succession_are_one_request() {
+fn repeated_signals_are_merged() {
     use Signal as S;
     for (first, second, gap_ms) in [
         (S::TERM, S::TERM, 0),
@@ -67,7 +67,7 @@ fn signals_in_quick_succession_are_one_request() {
 
 /// A client that holds a stream open delays an orderly end by seconds.
 #[test]
-fn later_signal_forces_the_end_and_closes_the_log() {
+fn second_signal_forces_the_end() {
     let folder = tempfile::tempdir().expect("a folder");
     let mut rig = Rig::new(folder.path(), Pace::RealTime);
     rig.plug("", 1);
@@ -114,7 +114,7 @@ fn with_terminal(mut command: std::process::Command) -> (std::process::Child, Pt
 }
 
 #[test]
-fn closed_terminal_ends_the_daemon_in_order() {
+fn closed_terminal_stops_daemon() {
     let folder = tempfile::tempdir().expect("a folder");
     let mut command =
         sonard(&["run", "--mock", "--scene", "simple-room", "--pose", "fig9", "--log"]);
@@ -128,18 +128,18 @@ fn closed_terminal_ends_the_daemon_in_order() {
 }
 
 #[test]
-fn hangup_without_a_terminal_is_a_reload() {
+fn hangup_without_terminal_reloads() {
     let folder = tempfile::tempdir().expect("a folder");
     let command = without_terminal(sonard(&[]));
     let mock = ["--mock", "--scene", "simple-room", "--pose", "fig9"];
     let daemon = Daemon::start_as(command, folder.path(), &[&mock[..], &FAST].concat());
     daemon.signal(Signal::HUP);
-    wait_until("the reload", || daemon.said().contains("the configuration was read again"));
+    wait_until("the reload", || daemon.said().contains("configuration reloaded"));
     assert_eq!(daemon.stop(), Some(0));
 }
 
 #[test]
-fn closed_terminal_ends_a_scan_in_order() {
+fn closed_terminal_stops_scan() {
     let folder = tempfile::tempdir().expect("a folder");
     let mock = MockProcess::start(folder.path(), &["--realtime"]);
     let mut command = sonard(&["scan", "--port", mock.port(), "--scene", "simple-room"]);

@@ -76,7 +76,7 @@ fn told(daemon: &InProcess) -> Vec<(Value, Value)> {
 }
 
 #[test]
-fn sonars_fire_in_turn_and_every_record_is_marked_simulated() {
+fn records_are_marked_simulated() {
     let folder = tempfile::tempdir().expect("a folder");
     let daemon = standing(folder.path(), &[]);
     daemon.wait_for_scans(1);
@@ -100,7 +100,10 @@ fn sonars_fire_in_turn_and_every_record_is_marked_simulated() {
     let status = run(&["status", "--socket", socket.to_str().expect("plain path")]);
     assert_eq!(status.status.code(), Some(0));
     let said = String::from_utf8_lossy(&status.stdout).into_owned();
-    assert!(said.contains("SIMULATED") && said.contains("pioneer-8, one ranger each 40"), "{said}");
+    assert!(
+        said.contains("SIMULATED") && said.contains("pioneer-8, one ranger every 40"),
+        "{said}"
+    );
     let metrics = String::from_utf8(daemon.get("/metrics").body).expect("text");
     assert!(metrics.contains("sonard_simulated 1"), "{metrics}");
     assert!(daemon.status()["device"].is_null() && daemon.status()["link"]["port"] == "");
@@ -115,7 +118,7 @@ fn sonars_fire_in_turn_and_every_record_is_marked_simulated() {
 }
 
 #[test]
-fn a_pose_set_shows_in_readings_that_are_those_of_sonard_simulate() {
+fn readings_after_a_pose_change() {
     let folder = tempfile::tempdir().expect("a folder");
     let daemon = in_process(folder.path(), &["--pose", "3,1.2,20"], &[]);
     daemon.wait_for_scans(1);
@@ -148,7 +151,7 @@ fn a_pose_set_shows_in_readings_that_are_those_of_sonard_simulate() {
 }
 
 #[test]
-fn subscribers_may_be_told_of_substantial_changes_only() {
+fn deadband_of_subscribers() {
     let folder = tempfile::tempdir().expect("a folder");
     let daemon = standing(folder.path(), &[]);
     daemon.wait_for_scans(1);
@@ -183,7 +186,7 @@ fn subscribers_may_be_told_of_substantial_changes_only() {
 }
 
 #[test]
-fn a_robot_drives_along_its_course_and_its_log_says_where_each_sonar_fired() {
+fn course_and_poses_in_the_log() {
     let folder = tempfile::tempdir().expect("a folder");
     let course = folder.path().join("course.jsonl");
     let line = |time_s: f64, x_m: f64, y_m: f64, heading_deg: f64| {
@@ -223,7 +226,7 @@ fn a_robot_drives_along_its_course_and_its_log_says_where_each_sonar_fired() {
 }
 
 #[test]
-fn rounds_are_taken_on_request_and_stop_when_told() {
+fn requested_rounds() {
     let folder = tempfile::tempdir().expect("a folder");
     let daemon =
         in_process(folder.path(), &["--pose", "3,1.2,20"], &["--set", "scanning.mode=on-request"]);
@@ -247,7 +250,7 @@ fn rounds_are_taken_on_request_and_stop_when_told() {
 }
 
 #[test]
-fn killed_at_any_moment_it_loses_no_synced_record_and_goes_on_with_the_same_log() {
+fn synced_records_survive_kill() {
     let folder = tempfile::tempdir().expect("a folder");
     let records = || -> u64 {
         let bytes = |log| fs::read(log).expect("readable");

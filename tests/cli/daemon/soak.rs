@@ -18,7 +18,7 @@ use super::{
 use crate::common::{Log, wait_until};
 
 #[test]
-fn every_fault_is_recovered_from_and_every_beam_is_logged_once() {
+fn recovers_and_logs_each_beam() {
     let wanted = env::var("SONARD_SOAK_FAULTS").ok().and_then(|n| n.parse().ok()).unwrap_or(60);
     let folder = tempfile::tempdir().expect("a folder");
     let mut rig = Rig::new(folder.path(), Pace::Virtual);

@@ -39,7 +39,7 @@ fn replug(daemon: &Daemon, rig: &mut Rig, seed: u64) {
 }
 
 #[test]
-fn closed_stderr_does_not_stop_scanning() {
+fn closed_stderr() {
     let folder = tempfile::tempdir().expect("a folder");
     let mut rig = Rig::new(folder.path(), Pace::Virtual);
     rig.plug("", 1);
@@ -53,7 +53,7 @@ fn closed_stderr_does_not_stop_scanning() {
 }
 
 #[test]
-fn full_stderr_delays_nothing() {
+fn full_stderr() {
     let folder = tempfile::tempdir().expect("a folder");
     let mut rig = Rig::new(folder.path(), Pace::Virtual);
     rig.plug("", 1);

@@ -43,7 +43,7 @@ fn sessions_of_readings(log: &Log) -> BTreeSet<String> {
 }
 
 #[test]
-fn a_board_that_comes_back_as_another_begins_a_session_of_its_own() {
+fn changed_board_starts_a_session() {
     for (lie, kind, said) in [
         ("other-steps", "MOCK-00001 mock 800", "800 steps per revolution, not 400"),
         ("other-serial", "OTHER-0002 mock 400", "OTHER-0002, not MOCK-00001"),
@@ -63,7 +63,7 @@ fn a_board_that_comes_back_as_another_begins_a_session_of_its_own() {
 }
 
 #[test]
-fn another_board_is_refused_where_one_is_named_also_after_a_restart() {
+fn named_board_is_required() {
     let folder = tempfile::tempdir().expect("a folder");
     let serial = ["--set", "device.serial=MOCK-00001"];
     let daemon = start(folder.path(), "reset=0.01,lie=other-serial", &serial);
@@ -79,7 +79,7 @@ fn another_board_is_refused_where_one_is_named_also_after_a_restart() {
 }
 
 #[test]
-fn a_restart_or_hangup_in_the_home_after_a_scan_is_what_it_is() {
+fn restart_while_homing() {
     for faults in ["motor_reset=0.2", "motor_hangup=0.2"] {
         let folder = tempfile::tempdir().expect("a folder");
         // One beam at home: the motor only ever goes home, before and after.

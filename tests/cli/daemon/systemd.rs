@@ -27,7 +27,7 @@ fn hear(socket: &UnixDatagram, wanted: &str) -> String {
 }
 
 #[test]
-fn ready_comes_after_identity_and_the_watchdog_is_fed_while_it_gets_on() {
+fn ready_and_watchdog() {
     let folder = tempfile::tempdir().expect("a folder");
     let mut rig = Rig::new(folder.path(), Pace::RealTime);
     let path = folder.path().join("notify");
@@ -56,7 +56,7 @@ fn ready_comes_after_identity_and_the_watchdog_is_fed_while_it_gets_on() {
 }
 
 #[test]
-fn a_socket_that_systemd_hands_over_is_served_and_left_behind() {
+fn socket_activation() {
     if Command::new("systemd-socket-activate").arg("--version").output().is_err() {
         println!("systemd-socket-activate is not here: left out");
         return;

@@ -66,7 +66,7 @@ const FAN: [&str; 2] = ["--set", "model.engine=fan"];
 const CONE: [&str; 2] = ["--set", "model.engine=cone"];
 
 #[test]
-fn readings_of_an_array_say_where_their_sonar_was_and_paths_end_there() {
+fn positions_of_an_array() {
     for (further, late_m) in [(&[][..], time_walk_m as fn(f64) -> f64), (&FAN, |_| 1e-3)] {
         let folder = tempfile::tempdir().expect("a folder");
         let daemon = in_process::start_array(folder.path(), further);
@@ -92,7 +92,7 @@ fn readings_of_an_array_say_where_their_sonar_was_and_paths_end_there() {
 }
 
 #[test]
-fn readings_of_a_transducer_ahead_of_its_axis_say_where_its_face_was_live_and_later() {
+fn offset_transducer() {
     for (further, late_m) in [(&[][..], time_walk_m as fn(f64) -> f64), (&CONE, |_| 1e-3)] {
         let folder = tempfile::tempdir().expect("a folder");
         let plan = ["--set", "plan.step_deg=18", "--set", "model.max_range_m=4"];

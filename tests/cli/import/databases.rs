@@ -41,7 +41,7 @@ fn converted(recording: &str, database: &Path) {
 }
 
 #[test]
-fn a_bag_in_sqlite_is_the_same_log() {
+fn sqlite_equals_mcap() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = |name: &str| folder.path().join(name).to_str().expect("a plain path").to_owned();
     let (log, recording, bag) = (path("log.jsonl"), path("log.mcap"), path("bag"));
@@ -64,7 +64,7 @@ fn a_bag_in_sqlite_is_the_same_log() {
 }
 
 #[test]
-fn what_is_no_bag_or_a_damaged_one_is_refused() {
+fn invalid_databases() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = |name: &str| folder.path().join(name).to_str().expect("a plain path").to_owned();
     fs::write(path("cut.db3"), b"SQLite format 3\0\x10\0\x01").expect("writable");
@@ -78,7 +78,7 @@ fn what_is_no_bag_or_a_damaged_one_is_refused() {
         database.execute_batch(tables).expect("tables");
         drop(database);
         let told = refused(&["import", &path(name)]);
-        assert!(told.contains("no recording of ROS 2"), "{name}: {told}");
+        assert!(told.contains("not a recording of ROS 2"), "{name}: {told}");
     }
     let empty = Connection::open(path("empty.db3")).expect("a database");
     empty.execute_batch(TABLES).expect("tables");
@@ -87,7 +87,7 @@ fn what_is_no_bag_or_a_damaged_one_is_refused() {
 }
 
 #[test]
-fn a_database_with_any_byte_changed_is_read_or_refused() {
+fn any_changed_byte() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = |name: &str| folder.path().join(name).to_str().expect("a plain path").to_owned();
     let (log, recording) = (path("log.jsonl"), path("log.mcap"));

@@ -5,7 +5,7 @@ use sonard::import::FORMATS;
 use super::{done, refused};
 
 #[test]
-fn help_and_documentation_list_every_format() {
+fn formats_are_documented() {
     let page = include_str!("../../../docs/import.md");
     let help = done(&["import", "--help"]);
     for entry in &FORMATS {
@@ -25,7 +25,7 @@ fn help_and_documentation_list_every_format() {
 }
 
 #[test]
-fn files_of_other_kinds_are_named_with_the_way_in() {
+fn unsupported_files() {
     let folder = tempfile::tempdir().expect("a folder");
     for (name, bytes, what, way) in [
         ("a.bag", &b"#ROSBAG V2.0\nE\0\0\0op=\x03"[..], "ROS 1", "rosbags-convert"),

@@ -19,7 +19,7 @@ impl Case {
     fn new() -> Self {
         let folder = tempfile::tempdir().expect("a folder");
         let path = |name: &str| folder.path().join(name).to_str().expect("a plain path").to_owned();
-        let (way, log) = (path("way.csv"), path("room.jsonl"));
+        let (way, log) = (path("trajectory.csv"), path("room.jsonl"));
         fs::write(&way, "x_m,y_m,heading_deg\n0.8,0.05,92\n0.4,0.3,10\n0.2,0.3,200\n")
             .expect("room on the disk");
         let simulate = ["simulate", "--scene", "simple-room", "--poses", &way];
@@ -72,12 +72,12 @@ fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
 /// How many searches a calibration went on after, as it says.
 fn known(output: &Output) -> usize {
     let said = stderr(output);
-    let words = said.split("goes on after ").nth(1).unwrap_or_else(|| panic!("{said}"));
+    let words = said.split("resuming after ").nth(1).unwrap_or_else(|| panic!("{said}"));
     words.split(' ').next().and_then(|count| count.parse().ok()).expect("a number")
 }
 
 #[test]
-fn a_calibration_that_was_killed_goes_on_to_the_same_files() {
+fn resumes_after_kill() {
     let case = Case::new();
     let whole = case.calibrate("whole");
     assert_eq!(whole.status.code(), Some(0), "{}", stderr(&whole));
@@ -101,14 +101,14 @@ fn a_calibration_that_was_killed_goes_on_to_the_same_files() {
 }
 
 #[test]
-fn one_that_was_interrupted_says_how_it_goes_on_and_keeps_others_out() {
+fn interrupt_and_lock() {
     let case = Case::new();
     let child = case.command("out").stderr(Stdio::piped()).spawn().expect("it starts");
     case.wait_for_lines("out", 3);
     interrupt(child.id());
     let output = child.wait_with_output().expect("it ends");
     assert_eq!(output.status.code(), Some(1), "{}", stderr(&output));
-    assert!(stderr(&output).contains("the same command goes on from there"), "{}", stderr(&output));
+    assert!(stderr(&output).contains("run the same command to resume"), "{}", stderr(&output));
     let unfinished = case.path("out").join(UNFINISHED);
     let kept = fs::read(&unfinished).expect("it is kept");
     // Other beliefs, and other readings.

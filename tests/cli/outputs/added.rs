@@ -3,14 +3,18 @@
 use super::*;
 
 #[test]
-fn a_scan_is_added_only_to_scans_taken_alike_and_says_so() {
+fn append_needs_the_same_setup() {
     let folder = tempfile::tempdir().expect("a folder");
     let out = folder.path();
     let first = short_scan("fig9", out, &[]);
-    assert!(first.status.success() && !stderr(&first).contains("added"), "{}", stderr(&first));
+    assert!(first.status.success() && !stderr(&first).contains("appending"), "{}", stderr(&first));
     let second = short_scan("fig9", out, &[]);
     assert!(second.status.success(), "{}", stderr(&second));
-    assert!(stderr(&second).contains("holds 1 scan(s) taken alike"), "{}", stderr(&second));
+    assert!(
+        stderr(&second).contains("contains 1 scan(s) of the same setup"),
+        "{}",
+        stderr(&second)
+    );
     let was = fs::read(out.join("scan.jsonl")).expect("written");
     for (pose, further, difference) in [
         ("fig7", &[][..], "pose"),
@@ -21,7 +25,7 @@ fn a_scan_is_added_only_to_scans_taken_alike_and_says_so() {
         let refused = short_scan(pose, out, further);
         let message = said(&refused);
         assert_eq!(refused.status.code(), Some(2), "{message}");
-        assert!(message.contains("taken otherwise") && message.contains(difference), "{message}");
+        assert!(message.contains("a different setup") && message.contains(difference), "{message}");
         assert_eq!(fs::read(out.join("scan.jsonl")).expect("kept"), was, "{difference}");
     }
     let text = String::from_utf8(
@@ -31,7 +35,7 @@ fn a_scan_is_added_only_to_scans_taken_alike_and_says_so() {
 }
 
 #[test]
-fn compare_says_that_scans_were_taken_at_several_poses() {
+fn compare_of_several_poses() {
     let folder = tempfile::tempdir().expect("a folder");
     let of = |pose: &str| {
         let out = folder.path().join(pose);
@@ -42,7 +46,7 @@ fn compare_says_that_scans_were_taken_at_several_poses() {
     fs::write(&both, of("fig7") + &of("fig9")).expect("writable");
     let both = both.to_str().expect("plain path");
     let text = String::from_utf8(run(&["compare", both]).stdout).expect("text");
-    assert!(text.contains("2 scan(s) at 2 poses, all together"), "{text}");
+    assert!(text.contains("2 scan(s) at 2 poses, combined"), "{text}");
     let json =
         Log::parse(&String::from_utf8(run(&["compare", "--json", both]).stdout).expect("text"));
     assert_eq!((&json.records[0]["scans"], &json.records[0]["poses"]), (&2.into(), &2.into()));

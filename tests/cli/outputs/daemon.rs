@@ -3,7 +3,7 @@
 use super::*;
 
 #[test]
-fn only_a_dead_socket_is_replaced_by_the_daemons() {
+fn stale_socket_is_replaced() {
     let folder = tempfile::tempdir().expect("a folder");
     let place = |name: &str| folder.path().join(name);
     let socket = place("s").display().to_string();
@@ -69,7 +69,7 @@ fn only_a_dead_socket_is_replaced_by_the_daemons() {
 }
 
 #[test]
-fn a_daemon_does_not_mend_what_a_link_in_its_log_folder_leads_to() {
+fn links_in_the_log_folder() {
     let folder = tempfile::tempdir().expect("a folder");
     let logs = folder.path().join("log");
     fs::create_dir(&logs).expect("writable");

@@ -3,7 +3,7 @@
 use super::*;
 
 #[test]
-fn a_full_disk_leaves_the_old_file_or_none_and_the_command_says_so() {
+fn full_disk_keeps_the_old_file() {
     let (folder, scene) = folder_with(("room.json", SCENE));
     let path = |name: &str| folder.path().join(name).display().to_string();
     let (old, new) = (path("old.png"), path("new.png"));
@@ -41,7 +41,7 @@ fn a_full_disk_leaves_the_old_file_or_none_and_the_command_says_so() {
 }
 
 #[test]
-fn a_place_that_can_not_be_written_to_is_wrong_input_in_every_verb() {
+fn unwritable_outputs() {
     let (folder, scene) = folder_with(("room.json", SCENE));
     let fine = "simulate --scene simple-room --pose fig9 --to-deg 9 -o DIR/fig9.jsonl";
     assert!(run_case(fine, &scene, folder.path()).status.success());

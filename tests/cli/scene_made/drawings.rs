@@ -54,7 +54,7 @@ impl Dxf {
 }
 
 #[test]
-fn layers_that_are_off_or_frozen_do_not_count_whatever_the_case_of_their_names() {
+fn hidden_layers() {
     for (name, flags, colour, is_seen) in [
         ("FURN", 0, 7, true),
         ("FURN", 1, 7, false),
@@ -78,7 +78,7 @@ fn layers_that_are_off_or_frozen_do_not_count_whatever_the_case_of_their_names()
 }
 
 #[test]
-fn plans_of_no_room_are_asked_about_and_far_ones_moved() {
+fn implausible_and_far_plans() {
     for units in ["4", "1", "7"] {
         let dxf = Dxf::new(&drawing(units, &[], "", &[room("0", 0.0, 0.0)]));
         refused(&["scene", "from-dxf", &dxf.path()], "--unit-m 1");
@@ -94,7 +94,7 @@ fn plans_of_no_room_are_asked_about_and_far_ones_moved() {
 }
 
 #[test]
-fn blocks_stand_where_they_are_inserted_and_filled_areas_are_outlines() {
+fn blocks_and_filled_areas() {
     let line = "0\nLINE\n8\n0\n10\n1\n20\n0\n11\n2\n21\n0\n";
     let block = format!(
         "0\nBLOCK\n8\n0\n2\nDOOR\n70\n0\n10\n1\n20\n0\n30\n0\n3\nDOOR\n{line}0\nENDBLK\n8\n0\n"
@@ -166,7 +166,7 @@ fn svg(content: &str) -> (Vec<[f64; 4]>, String) {
 }
 
 #[test]
-fn markers_are_no_walls_and_clip_paths_hide() {
+fn markers_and_clip_paths() {
     let marker = "<defs><marker id='a' orient='auto' style='overflow:visible'><path d='M 5,0 -3,5 V -5 Z'/></marker></defs>";
     for ends in
         ["marker-end:url(#a)", "marker-start:url(#a)", "marker-mid:url(#a)", "marker:url(#a)"]
@@ -195,7 +195,7 @@ fn markers_are_no_walls_and_clip_paths_hide() {
 }
 
 #[test]
-fn compressed_drawings_are_read_and_those_without_size_noted() {
+fn compressed_and_unsized_drawings() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("plan.svgz");
     let text = "<svg xmlns='http://www.w3.org/2000/svg'><line x1='0' y1='5' x2='100' y2='5' stroke='black'/></svg>";

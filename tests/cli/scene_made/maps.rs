@@ -29,7 +29,7 @@ fn room(column: usize, row: usize) -> u8 {
 const ORIGIN: &str = "origin: [0, 0, 0]";
 
 #[test]
-fn walls_stay_where_the_cells_are() {
+fn walls_follow_the_cells() {
     let folder = tempfile::tempdir().expect("a folder");
     // A partition of a cell from the upper wall down, and a notch of a cell in the lower one.
     let shade = |column: usize, row: usize| match (column, row) {
@@ -51,7 +51,7 @@ fn walls_stay_where_the_cells_are() {
 }
 
 #[test]
-fn a_turned_map_is_turned_about_its_origin() {
+fn rotated_map() {
     let folder = tempfile::tempdir().expect("a folder");
     let straight = made(&["scene", "from-grid", &map(folder.path(), "origin: [1, 2, 0]", room)]);
     let path = map(folder.path(), "origin: [1, 2, 0.7853981633974483]", room);
@@ -69,12 +69,12 @@ fn a_turned_map_is_turned_about_its_origin() {
         ["scan.jsonl", "map"].map(|name| folder.path().join(name).display().to_string());
     let simulated = ["simulate", "--scene", "simple-room", "--pose", "fig9", "--step-deg", "36"];
     assert!(run(&[&simulated[..], &["-o", &log]].concat()).status.success());
-    let refused = run(&["map", &log, "--onto", &path, "--out", &out]);
+    let refused = run(&["map", &log, "--update", &path, "--out", &out]);
     assert!(stderr(&refused).contains("turned"), "{}", stderr(&refused));
 }
 
 #[test]
-fn shades_are_what_the_file_says() {
+fn thresholds_and_modes() {
     let folder = tempfile::tempdir().expect("a folder");
     for (name, yaml, shade) in [
         ("as map_saver writes it", "negate: 0", room as fn(usize, usize) -> u8),
@@ -104,7 +104,7 @@ fn shades_are_what_the_file_says() {
 }
 
 #[test]
-fn missing_images_and_images_for_descriptions_are_named() {
+fn missing_images() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = map(folder.path(), ORIGIN, room);
     refused(

@@ -44,7 +44,7 @@ fn extents(text: &str) -> (Vec<[f64; 4]>, String) {
 }
 
 #[test]
-fn a_saved_state_overrides_poses_and_scales_and_deletes() {
+fn saved_state() {
     let a = block("a", "<pose>0 2 0.5 0 0 0</pose>", "4 0.2 1");
     let b = block("b", "<pose>0 -1 0.5 0 0 0</pose>", "1 1 1");
     let c = block("c", "<pose>-3 0 0.5 0 0 0</pose>", "1 0.2 1");
@@ -64,7 +64,7 @@ fn a_saved_state_overrides_poses_and_scales_and_deletes() {
 }
 
 #[test]
-fn poses_relative_to_other_frames_are_followed() {
+fn relative_poses() {
     let box_at = |pose: &str| block("a", pose, "1 1 1");
     for (content, expected) in [
         (box_at("<pose relative_to='world'>1 1 0.5 0 0 0</pose>"), [0.5, 0.5, 1.5, 1.5]),
@@ -107,7 +107,7 @@ fn poses_relative_to_other_frames_are_followed() {
 }
 
 #[test]
-fn what_is_left_out_is_named() {
+fn ignored_objects_are_reported() {
     let plain = block("b", "<pose>0 2 0.5 0 0 0</pose>", "1 0.2 1");
     for (content, part) in [
         (
@@ -128,7 +128,7 @@ fn what_is_left_out_is_named() {
 }
 
 #[test]
-fn models_beside_the_world_are_included() {
+fn included_models() {
     let folder = tempfile::tempdir().expect("a folder");
     fs::create_dir(folder.path().join("shelf")).expect("writable");
     let model = format!(

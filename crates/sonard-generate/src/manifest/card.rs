@@ -156,7 +156,7 @@ fn made(text: &mut String, manifest: &Manifest) {
         "## How it was made\n\n\
          By `sonard generate`, version {}, of the specification in `spec.json` (SHA-256 {}). The same \
          specification and version give the same bytes, whoever makes which shard; `sonard generate --verify` checks \
-         digests, with `--again` by making shards anew. The digest of the set is {}.\n\n\
+         digests, with `--recheck` by making shards anew. The digest of the set is {}.\n\n\
          What did not fit was drawn again: {} poses where nothing could stand, {} places of furniture, {} scenes, {} \
          poses with too many echo paths. So poses are even over the free space, and crowded rooms rarer than drawn.\n",
         manifest.sonard,

@@ -282,7 +282,7 @@ impl Bag {
                          that ranges are not those over the floor",
                         source.frame
                     ),
-                    help: "choose other rangers with --topic TOPIC; --as-said takes the ranges as they are, with directions \
+                    help: "choose other rangers with --topic TOPIC; --no-unit-check takes the ranges as they are, with directions \
                            over the floor"
                         .to_owned(),
                 });

@@ -36,9 +36,9 @@ fn carmen(ranges: &[f64]) -> String {
     rounds.collect()
 }
 
-/// The value of `--none` that a message offers.
+/// The value of `--no-echo` that a message offers.
 fn offered(said: &str) -> f64 {
-    let (_, rest) = said.split_once("--none=").unwrap_or_else(|| panic!("{said}"));
+    let (_, rest) = said.split_once("--no-echo=").unwrap_or_else(|| panic!("{said}"));
     rest.split([';', ' ']).next().and_then(|value| value.parse().ok()).expect("a number")
 }
 
@@ -83,7 +83,7 @@ fn noise_about_a_constant_is_asked_about() {
         ranges.iter().enumerate().map(|(at, range)| format!("{},{range}\n", 3 * at)).collect();
     let mapping = columns("azimuth_deg=1,range_cm=2");
     let told = said(examine(rows.as_bytes(), mapping.clone(), taken()));
-    let (_, rest) = told.split_once("--none-from=").unwrap_or_else(|| panic!("{told}"));
+    let (_, rest) = told.split_once("--no-echo-from=").unwrap_or_else(|| panic!("{told}"));
     let from = rest.split(';').next().and_then(|value| value.parse().ok());
     let found = examine(rows.as_bytes(), Mapping { none_from: from, ..mapping }, taken())
         .expect("answered");
@@ -126,5 +126,5 @@ fn walls_at_one_distance_are_read() {
 fn several_values_below_zero_are_answered_at_once() {
     let rows = "0,-1\n10,100\n20,0\n30,-1\n";
     let told = said(examine(rows.as_bytes(), columns("azimuth_deg=1,range_cm=2"), taken()));
-    assert!(told.contains("--none=-1 --none=0") && told.contains("(2 of 4 are)"), "{told}");
+    assert!(told.contains("--no-echo=-1 --no-echo=0") && told.contains("(2 of 4 are)"), "{told}");
 }

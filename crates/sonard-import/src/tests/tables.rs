@@ -158,7 +158,7 @@ fn what_is_wrong_is_named() {
             mapping(),
             "line 2, range_cm (column 2): a range of -1 is no distance (1 of 2 are)",
         ),
-        ("1,2\n3,0\n", mapping(), "--none=0"),
+        ("1,2\n3,0\n", mapping(), "--no-echo=0"),
         (
             "1,2\n",
             columns("azimuth_deg=1,range_cm=5"),

@@ -80,8 +80,8 @@ pub(crate) struct RobotArgs {
     #[arg(long, value_name = "M", default_value_t = 8.0)]
     pub(crate) sonar_range: f64,
     /// Maximum number of stops
-    #[arg(long, value_name = "N", default_value_t = ExploreSettings::default().most_stops)]
-    most_stops: usize,
+    #[arg(long, value_name = "N", default_value_t = ExploreSettings::default().max_stops)]
+    max_stops: usize,
 }
 
 /// [`Sensing`] as a command-line value.
@@ -154,7 +154,7 @@ pub(crate) fn run(args: &Args) -> Outcome {
         return Ok(());
     }
     Err(Failure::Found(format!(
-        "the exploration is incomplete after {} stops: see --most-stops",
+        "the exploration is incomplete after {} stops: see --max-stops",
         made.stops.len()
     )))
 }
@@ -222,7 +222,7 @@ impl RobotArgs {
         };
         let mut settings = ExploreSettings {
             standoff_m: self.standoff,
-            most_stops: self.most_stops.max(1),
+            max_stops: self.max_stops.max(1),
             ..ExploreSettings::default()
         };
         settings.map.logical_m = self.logical;

@@ -65,7 +65,7 @@ pub(crate) struct Args {
     whole_readings: bool,
     /// Discard readings of lower confidence; 0.5 is full confidence
     #[arg(long, value_name = "C", default_value_t = Mapping::default().least_confidence)]
-    least_confidence: f64,
+    min_reading_confidence: f64,
     /// Detect one arrival at a time and time it by its path alone
     #[arg(long)]
     ideal_receiver: bool,
@@ -91,7 +91,7 @@ const HELP: &str = "\
 Examples:
   sonard-papers benchmark map                         128 courses; the same seed gives the same table
   sonard-papers benchmark map --maps 16 --out maps    and pictures of the maps
-  sonard-papers benchmark map --extend 0 --whole-readings --least-confidence 0     as in the paper except wall splitting
+  sonard-papers benchmark map --extend 0 --whole-readings --min-reading-confidence 0     as in the paper except wall splitting
 
 The benchmarks, in percent: correlation of the two maps (more is better); map score, the mean \
 squared difference of cells; the same of cells occupied in either map; and the share of the shortest paths \
@@ -165,7 +165,7 @@ fn trial(args: &Args, course: usize) -> Result<Row, Failure> {
         range_sigma_m: 0.005,
         exponent: args.exponent,
         extend_m: args.extend,
-        trust: Trust { least_confidence: args.least_confidence, keep_clear: !args.whole_readings },
+        trust: Trust { least_confidence: args.min_reading_confidence, keep_clear: !args.whole_readings },
     };
     let sensor = Sensor::preset("senscomp-6500").map_err(|error| reject(&error))?;
     let air = Air::default();

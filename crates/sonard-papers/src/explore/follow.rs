@@ -69,7 +69,7 @@ pub fn explore_watched(
         log: Exploration::default(),
     };
     explorer.stop(Task::Begin, None);
-    while explorer.log.stops.len() < settings.most_stops {
+    while explorer.log.stops.len() < settings.max_stops {
         on_stop(&explorer.log);
         let Some(goal) = explorer.choose() else {
             explorer.log.finished = true;

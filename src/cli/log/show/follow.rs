@@ -1,4 +1,4 @@
-//! A file that grows, read as if it had no end.
+//! Reader of a growing file that waits at its end.
 
 use std::{
     fs::File,
@@ -10,22 +10,22 @@ use std::{
 
 use crate::store::StoreError;
 
-/// How long a new record may stay unnoticed.
+/// Poll interval at the end of the file.
 const POLL: Duration = Duration::from_millis(200);
 
-/// Opens a log so that reading waits at its end for more.
+/// Opens a log so that reads at its end wait for more data.
 pub(super) fn open(path: &Path) -> Result<Box<dyn BufRead>, StoreError> {
     match File::open(path) {
-        Ok(file) => Ok(Box::new(BufReader::new(Growing { file }))),
+        Ok(file) => Ok(Box::new(BufReader::new(FollowedFile { file }))),
         Err(source) => Err(StoreError::Unreadable { path: path.into(), source }),
     }
 }
 
-struct Growing {
+struct FollowedFile {
     file: File,
 }
 
-impl Read for Growing {
+impl Read for FollowedFile {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         loop {
             let count = self.file.read(buffer)?;
@@ -33,7 +33,7 @@ impl Read for Growing {
                 return Ok(count);
             }
             if self.file.metadata()?.len() < self.file.stream_position()? {
-                return Err(io::Error::other("the file became shorter; show it again"));
+                return Err(io::Error::other("the file was truncated; run the command again"));
             }
             thread::sleep(POLL);
         }

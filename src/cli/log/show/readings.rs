@@ -1,4 +1,4 @@
-//! The readings of a log's scans, in the order in which they are asked for.
+//! Readings of a log's scans, in any order of requests.
 
 use std::{
     collections::HashMap,
@@ -12,34 +12,33 @@ use crate::{
     store::{StoreError, open_for_reading, read_log},
 };
 
-/// Reads on until the scan asked for has ended; what ended before it waits for its turn.
+/// Reader that advances until the requested scan has ended; earlier scans are buffered.
 pub(super) struct Readings {
     scans: Box<dyn Iterator<Item = ScanView>>,
-    waiting: HashMap<Uuid, Vec<Ping>>,
+    buffered: HashMap<Uuid, Vec<Ping>>,
 }
 
 impl Readings {
-    /// Of the log at `log`.
-    pub(super) fn of(log: &Path) -> Result<Self, StoreError> {
+    pub(super) fn open(log: &Path) -> Result<Self, StoreError> {
         let log = PathBuf::from(log);
-        // Damage was told when the log was read for the first time.
+        // Damaged lines were reported in the first pass.
         let records = read_log(open_for_reading(&log)?)
             .map_while(Result::ok)
             .filter_map(|line| line.record.ok());
-        Ok(Self { scans: Box::new(ScanView::one_by_one(records)), waiting: HashMap::new() })
+        Ok(Self { scans: Box::new(ScanView::one_by_one(records)), buffered: HashMap::new() })
     }
 
-    /// The readings of a scan, in the order of the log.
+    /// Returns the readings of a scan, in the order of the log.
     pub(super) fn take(&mut self, scan: Uuid) -> Vec<Ping> {
-        let known = self.waiting.remove(&scan);
-        if let Some(pings) = known {
+        let found = self.buffered.remove(&scan);
+        if let Some(pings) = found {
             return pings;
         }
         for view in self.scans.by_ref() {
             if view.scan == scan {
                 return view.pings;
             }
-            self.waiting.entry(view.scan).or_default().extend(view.pings);
+            self.buffered.entry(view.scan).or_default().extend(view.pings);
         }
         Vec::new()
     }

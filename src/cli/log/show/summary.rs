@@ -1,4 +1,4 @@
-//! What a log holds, scan by scan.
+//! Contents of a log, scan by scan.
 
 use std::{collections::HashMap, mem};
 
@@ -17,7 +17,7 @@ use crate::{
 #[derive(Debug, Default)]
 pub(super) struct Summary {
     pub(super) items: Vec<Item>,
-    /// Where in `items` each scan is.
+    /// Position of each scan in `items`.
     scans: HashMap<Uuid, usize>,
     damaged: Vec<Item>,
     more_damaged: u64,
@@ -34,13 +34,13 @@ pub(super) enum Item {
         line: u64,
         fault: String,
     },
-    /// So many more damaged lines.
+    /// Number of further damaged lines.
     MoreDamaged {
         lines: u64,
     },
 }
 
-/// A scan in numbers.
+/// Counts and figures of a scan.
 #[derive(Debug, Clone, Default, Serialize)]
 pub(super) struct Scan {
     pub(super) scan: Uuid,
@@ -60,11 +60,11 @@ pub(super) struct Scan {
     residuals_m: Vec<f64>,
 }
 
-/// Damaged lines that are listed; of more only the number is told.
-const MOST_DAMAGED: usize = 5;
+/// Maximum number of listed damaged lines; further ones are counted.
+const MAX_DAMAGED: usize = 5;
 
 impl Summary {
-    /// Takes in the next record.
+    /// Adds the next record.
     pub(super) fn add(&mut self, record: Record) {
         match record {
             Record::Session(session) => self.items.push(Item::Session(session)),
@@ -78,9 +78,9 @@ impl Summary {
         }
     }
 
-    /// Takes in a line that is no record.
+    /// Adds a line that is not a record.
     pub(super) fn damaged(&mut self, error: &LineError) {
-        if self.damaged.len() == MOST_DAMAGED {
+        if self.damaged.len() == MAX_DAMAGED {
             self.more_damaged += 1;
             return;
         }
@@ -88,8 +88,8 @@ impl Summary {
         self.damaged.push(Item::Damaged { line: error.line, fault });
     }
 
-    /// After the last line.
-    pub(super) fn finished(mut self) -> Self {
+    /// Computes medians and appends damaged lines, after the last line.
+    pub(super) fn finish(mut self) -> Self {
         for item in &mut self.items {
             if let Item::Scan(scan) = item {
                 scan.median_abs_residual_m = quantile(mem::take(&mut scan.residuals_m), 0.5);

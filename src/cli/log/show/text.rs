@@ -1,4 +1,4 @@
-//! A log's contents for people.
+//! Contents of a log as text.
 
 use std::io::{self, Write};
 
@@ -10,12 +10,12 @@ use super::{
     summary::{Item, Scan, Summary},
 };
 use crate::{
-    cli::compare::{RULED, path_text},
+    cli::compare::{RULED, describe_path},
     scan::{Ping, PingStatus, Record, Session},
     store::Line,
 };
 
-/// Prints sessions with a table of their scans and events; with `pings`, every reading after it.
+/// Prints sessions with a table of their scans and events, and with `pings` every reading.
 pub(super) fn print(
     out: &mut impl Write,
     summary: &Summary,
@@ -47,20 +47,20 @@ pub(super) fn print(
     print_scans(out, &mut scans, pings.as_mut())
 }
 
-/// Prints one line of a log as it comes.
+/// Prints a line of a log as it arrives.
 pub(super) fn print_line(out: &mut impl Write, line: &Line, pings: bool) -> io::Result<()> {
     match &line.record {
         Ok(Record::Session(session)) => print_session(out, session),
         Ok(Record::ScanStart(start)) => {
-            let pose = pose_text(start.pose);
+            let pose = format_pose(start.pose);
             let beams = start.plan.check().map_or(0, |()| start.plan.beams());
-            let (time, id) = (seconds(start.time), short(start.scan));
-            writeln!(out, "scan      {time}  {id} begins at {pose}, {beams} beams")
+            let (time, id) = (seconds(start.time), short_id(start.scan));
+            writeln!(out, "scan      {time}  {id} starts at {pose}, {beams} beams")
         }
-        Ok(Record::Ping(ping)) if pings => writeln!(out, "{}", ping_text(ping)),
+        Ok(Record::Ping(ping)) if pings => writeln!(out, "{}", format_ping(ping)),
         Ok(Record::Ping(_)) => Ok(()),
         Ok(Record::ScanEnd(end)) => {
-            let (time, id, beams) = (seconds(end.time), short(end.scan), end.beams);
+            let (time, id, beams) = (seconds(end.time), short_id(end.scan), end.beams);
             let (missing, repaired, took_s) = (end.missing, end.repaired, end.duration_s);
             writeln!(
                 out,
@@ -86,18 +86,18 @@ fn print_session(out: &mut impl Write, session: &Session) -> io::Result<()> {
         let steps = device.steps_per_revolution;
         writeln!(
             out,
-            "  device  {serial}, firmware {firmware}, boot {boot}, {steps} steps a turn"
+            "  device  {serial}, firmware {firmware}, boot {boot}, {steps} steps per revolution"
         )?;
     }
     if let Some(of) = &session.collection {
         let pose = of.pose_name.as_ref().map_or_else(String::new, |name| format!(" ({name})"));
-        writeln!(out, "  taken for {}, pose {}{pose}, repeat {}", of.name, of.pose, of.repeat)?;
+        writeln!(out, "  collected for {}, pose {}{pose}, repeat {}", of.name, of.pose, of.repeat)?;
     }
     let (celsius, humidity, speed) = (air.temperature_c, air.humidity_percent, air.sound_speed_m_s);
     writeln!(out, "  sensor  {}; air {celsius} C, {humidity} %, {speed:.2} m/s", sensor.name)?;
     if let Some(array) = array {
         let (name, count) = (&array.name, array.rangers.len());
-        writeln!(out, "  array   {name}: {count} rangers, one each {} ms", array.interval_ms)?;
+        writeln!(out, "  array   {name}: {count} rangers, one every {} ms", array.interval_ms)?;
     }
     let scene = scene.as_ref().map_or("no scene", |scene| &scene.name);
     let model = model.as_ref().map_or("none", |model| &model.engine);
@@ -112,7 +112,7 @@ fn print_event(out: &mut impl Write, event: &crate::scan::Event) -> io::Result<(
     writeln!(out, "event     {}  {kind}: {}", seconds(event.time), event.detail)
 }
 
-/// Prints the scans gathered so far and empties the list.
+/// Prints the scans collected so far and empties the list.
 fn print_scans(
     out: &mut impl Write,
     scans: &mut Vec<&Scan>,
@@ -128,7 +128,7 @@ fn print_scans(
         writeln!(out, "scan {}", scan.scan)?;
         writeln!(out, "{PING_HEADER}")?;
         for ping in pings.take(scan.scan) {
-            writeln!(out, "{}", ping_text(&ping))?;
+            writeln!(out, "{}", format_ping(&ping))?;
         }
     }
     Ok(())
@@ -138,14 +138,14 @@ fn scan_table(scans: &[&Scan]) -> Table {
     let mut table = Table::new();
     table.load_style(RULED).set_header([
         "scan",
-        "began",
+        "started",
         "pose",
         "beams",
         "echo",
         "min",
         "none",
         "lost",
-        "doubt",
+        "uncertain",
         "repaired",
         "|res| mm",
         "time/limit s",
@@ -154,12 +154,12 @@ fn scan_table(scans: &[&Scan]) -> Table {
         let planned = scan.planned.map_or("?".into(), |planned| planned.to_string());
         let took = match &scan.end {
             Some(end) => format!("{:.1}/{:.1}", end.duration_s, end.acoustic_limit_s),
-            None => "not ended".into(),
+            None => "incomplete".into(),
         };
         table.add_row([
-            short(scan.scan),
+            short_id(scan.scan),
             scan.time.map_or("?".into(), seconds),
-            scan.pose.map_or("?".into(), pose_text),
+            scan.pose.map_or("?".into(), format_pose),
             format!("{}/{planned}", scan.pings),
             scan.echo.to_string(),
             scan.min_range.to_string(),
@@ -178,10 +178,10 @@ fn scan_table(scans: &[&Scan]) -> Table {
 }
 
 const PING_HEADER: &str =
-    " beam  azimuth  status     range m    sim m   res mm  margin dB  path of the prediction";
+    " beam  azimuth  status     range m    sim m   res mm  margin dB  predicted path";
 
-/// One reading on one line, under [`PING_HEADER`].
-fn ping_text(ping: &Ping) -> String {
+/// Formats a reading as a line below [`PING_HEADER`].
+fn format_ping(ping: &Ping) -> String {
     let number = |value: Option<f64>, scale: f64, digits: usize| match value {
         Some(value) => format!("{:.digits$}", value * scale),
         None => "-".into(),
@@ -191,12 +191,12 @@ fn ping_text(ping: &Ping) -> String {
         PingStatus::NoEcho => "no echo",
         PingStatus::MinRange => "min range",
         PingStatus::LinkLost => "link lost",
-        PingStatus::StepDoubtful => "doubtful",
-        PingStatus::ModuleFault => "no firing",
+        PingStatus::StepDoubtful => "uncertain",
+        PingStatus::ModuleFault => "not fired",
     };
     let sim = ping.sim.as_ref();
     let path = sim.and_then(|sim| sim.path.as_ref()).or(ping.path.as_ref());
-    let path = path.map_or(String::new(), path_text);
+    let path = path.map_or(String::new(), describe_path);
     format!(
         "{:5}  {:7.1}  {status:9}  {:>7}  {:>7}  {:>7}  {:>9}  {path}{}",
         ping.index,
@@ -213,7 +213,7 @@ fn ping_text(ping: &Ping) -> String {
     )
 }
 
-fn short(scan: Uuid) -> String {
+fn short_id(scan: Uuid) -> String {
     scan.to_string()[..8].to_owned()
 }
 
@@ -221,6 +221,6 @@ fn seconds(time: jiff::Timestamp) -> String {
     format!("{time:.0}")
 }
 
-fn pose_text(pose: crate::geometry::Pose) -> String {
+fn format_pose(pose: crate::geometry::Pose) -> String {
     format!("{},{},{}", pose.x_m, pose.y_m, pose.heading_deg)
 }

@@ -1,4 +1,4 @@
-//! Entities of a drawing as surfaces.
+//! Conversion of a drawing's entities to surfaces.
 
 use std::collections::BTreeMap;
 
@@ -11,32 +11,32 @@ use glam::DAffine2;
 use super::{super::made::arc, layers::Layers};
 use crate::{geometry::DVec2, scene::Surfaces};
 
-/// A surface that was found, before it is moved to the origin, metres.
+/// Surface before it is moved to the origin, metres.
 enum Shape {
     Walls { layer: String, corners: Vec<DVec2>, is_closed: bool },
     Round { layer: String, center: DVec2, radius_m: f64 },
 }
 
-/// Surfaces and notes found so far.
+/// Surfaces and notes collected so far.
 pub(super) struct Plan<'a> {
     drawing: &'a Drawing,
     layers: &'a Layers,
-    /// From the drawing's units, or those of a block, to metres.
+    /// Transformation from units of the drawing or block to metres.
     frame: DAffine2,
-    /// The layer of the block that is drawn, which its layer 0 stands for.
-    of_block: Option<String>,
+    /// Layer of the current block, which its entities on layer 0 inherit.
+    block_layer: Option<String>,
     depth: usize,
     count: usize,
     shapes: Vec<Shape>,
-    left_out: BTreeMap<String, usize>,
+    ignored: BTreeMap<String, usize>,
     filled: usize,
 }
 
-/// Blocks within blocks, at most.
+/// Maximum nesting depth of blocks.
 const MAX_DEPTH: usize = 8;
-/// Entities that are drawn, those of blocks each time, at most.
+/// Maximum number of entities, with those of blocks counted at each insertion.
 const MAX_ENTITIES: usize = 1 << 20;
-/// A plan farther than this from the origin is moved to it, metres.
+/// Distance from the origin above which a plan is moved to it, metres.
 const FAR_M: f64 = 1000.0;
 
 impl<'a> Plan<'a> {
@@ -45,16 +45,16 @@ impl<'a> Plan<'a> {
             drawing,
             layers,
             frame: DAffine2::from_scale(DVec2::splat(unit_m)),
-            of_block: None,
+            block_layer: None,
             depth: 0,
             count: 0,
             shapes: Vec::new(),
-            left_out: BTreeMap::new(),
+            ignored: BTreeMap::new(),
             filled: 0,
         }
     }
 
-    /// Adds all that is seen in the drawing.
+    /// Adds all visible entities of the drawing.
     pub(super) fn add_all(&mut self) {
         let drawing = self.drawing;
         for entity in drawing.entities() {
@@ -62,7 +62,7 @@ impl<'a> Plan<'a> {
         }
     }
 
-    /// The greater side of the plan, metres.
+    /// Length of the plan's longer side, metres.
     pub(super) fn size_m(&self) -> Option<f64> {
         let (low, high) = self.bounds()?;
         Some((high - low).max_element())
@@ -82,13 +82,13 @@ impl<'a> Plan<'a> {
         }))
     }
 
-    /// The surfaces, near the origin, and what was left out or moved, a line each.
+    /// Returns the surfaces, near the origin, and a note for everything ignored or moved.
     pub(super) fn finish(self) -> (Surfaces, Vec<String>) {
         let mut notes: Vec<String> =
-            self.left_out.iter().map(|(what, count)| format!("left out: {count} {what}")).collect();
+            self.ignored.iter().map(|(what, count)| format!("ignored: {count} {what}")).collect();
         if self.filled > 0 {
             notes.push(format!(
-                "{} filled areas (SOLID, TRACE) are taken as their outlines",
+                "{} filled areas (SOLID, TRACE) are replaced by their outlines",
                 self.filled
             ));
         }
@@ -97,7 +97,7 @@ impl<'a> Plan<'a> {
         let shift = far.map_or(DVec2::ZERO, |(low, _)| low.floor());
         if shift != DVec2::ZERO {
             notes.push(format!(
-                "the plan is far from the origin: moved by {} m in x and {} m in y",
+                "plan moved to the origin, by {} m in x and {} m in y",
                 -shift.x, -shift.y
             ));
         }
@@ -116,8 +116,8 @@ impl<'a> Plan<'a> {
         (found, notes)
     }
 
-    fn leave_out(&mut self, what: &str) {
-        *self.left_out.entry(what.to_owned()).or_default() += 1;
+    fn ignore(&mut self, what: &str) {
+        *self.ignored.entry(what.to_owned()).or_default() += 1;
     }
 
     fn walls(&mut self, layer: &str, corners: Vec<DVec2>, is_closed: bool) {
@@ -127,14 +127,14 @@ impl<'a> Plan<'a> {
     fn add(&mut self, entity: &Entity) {
         let common = &entity.common;
         let own = common.layer.as_str();
-        let of_block = self.of_block.clone().filter(|_| own == "0");
-        let layer = of_block.as_deref().unwrap_or(own);
+        let block_layer = self.block_layer.clone().filter(|_| own == "0");
+        let layer = block_layer.as_deref().unwrap_or(own);
         if !common.is_visible || common.is_in_paper_space || !self.layers.has(layer) {
             return;
         }
         self.count += 1;
         if self.count > MAX_ENTITIES {
-            return self.leave_out("entities behind the first million");
+            return self.ignore("entities after the first million");
         }
         match &entity.specific {
             EntityType::Line(line) => {
@@ -167,11 +167,12 @@ impl<'a> Plan<'a> {
                 self.filled(layer, [a, b, d, c], &trace.extrusion_direction);
             }
             EntityType::Seqend(_) | EntityType::Vertex(_) => {}
-            other => self.leave_out(kind(other)),
+            other => self.ignore(kind(other)),
         }
     }
 
-    /// The outline of an area of four corners, in their order round it; of a triangle the last two are one.
+    /// Adds the outline of a quadrilateral with corners in order; a triangle repeats its last
+    /// corner.
     fn filled(&mut self, layer: &str, corners: [&Point; 4], normal: &Vector) {
         let Some(side) = self.side(normal) else { return };
         let corners = corners.map(|corner| self.place(side * corner.x, corner.y));
@@ -179,19 +180,19 @@ impl<'a> Plan<'a> {
         self.walls(layer, corners.to_vec(), true);
     }
 
-    /// The entities of a block, where it stands.
+    /// Adds the entities of an inserted block.
     fn insert(&mut self, layer: &str, insert: &Insert) {
         let drawing = self.drawing;
         let named = |block: &&Block| block.name.eq_ignore_ascii_case(&insert.name);
         let Some(block) = drawing.blocks().find(named).filter(|block| !block.is_xref()) else {
-            return self.leave_out("blocks (INSERT) that are not in the file");
+            return self.ignore("blocks (INSERT) that are not in the file");
         };
         if self.depth == MAX_DEPTH {
-            return self.leave_out("blocks (INSERT) within too many others");
+            return self.ignore("blocks (INSERT) nested too deeply");
         }
         let Some(side) = self.side(&insert.extrusion_direction) else { return };
-        let outer = (self.frame, self.of_block.take());
-        self.of_block = Some(layer.to_owned());
+        let outer = (self.frame, self.block_layer.take());
+        self.block_layer = Some(layer.to_owned());
         self.depth += 1;
         let (columns, rows) = (insert.column_count.clamp(1, 1000), insert.row_count.clamp(1, 1000));
         let turn = DAffine2::from_angle(insert.rotation.to_radians());
@@ -210,28 +211,28 @@ impl<'a> Plan<'a> {
             }
         }
         self.depth -= 1;
-        (self.frame, self.of_block) = outer;
+        (self.frame, self.block_layer) = outer;
     }
 
     fn light_polyline(&mut self, layer: &str, line: &LwPolyline) {
         let vertices = line.vertices.iter().map(|vertex| (vertex.x, vertex.y, vertex.bulge));
         let vertices: Vec<_> = vertices.collect();
-        self.bulged(layer, &vertices, line.is_closed(), &line.extrusion_direction);
+        self.add_bulged(layer, &vertices, line.is_closed(), &line.extrusion_direction);
     }
 
     fn polyline(&mut self, layer: &str, line: &Polyline) {
         if line.is_3d_polygon_mesh() || line.is_polyface_mesh() {
-            return self.leave_out("meshes (POLYLINE)");
+            return self.ignore("meshes (POLYLINE)");
         }
         let vertices = line.vertices().filter(|vertex| !vertex.is_spline_frame_control_point());
         let vertices = vertices.map(|vertex| (vertex.location.x, vertex.location.y, vertex.bulge));
         let vertices: Vec<_> = vertices.collect();
-        self.bulged(layer, &vertices, line.is_closed(), &line.normal);
+        self.add_bulged(layer, &vertices, line.is_closed(), &line.normal);
     }
 
-    /// A row of lines and arcs: x, y, and the bulge of what leads to the next corner, the tangent of a quarter of its
-    /// turn.
-    fn bulged(
+    /// Adds a sequence of lines and arcs: x, y, and the bulge to the next corner, the tangent of a
+    /// quarter of the arc's angle.
+    fn add_bulged(
         &mut self,
         layer: &str,
         vertices: &[(f64, f64, f64)],
@@ -245,7 +246,7 @@ impl<'a> Plan<'a> {
         let next = vertices.iter().skip(1).copied().chain(is_closed.then_some(first));
         for (&from, to) in vertices.iter().zip(next) {
             let (a, b, bulge) = (flat(from), flat(to), side * from.2);
-            if bulge.abs() < LEAST_BULGE {
+            if bulge.abs() < MIN_BULGE {
                 corners.push(self.at(b));
                 continue;
             }
@@ -281,34 +282,34 @@ impl<'a> Plan<'a> {
         self.walls(layer, corners, false);
     }
 
-    /// Corners along an arc of the drawing, as fine as its size in metres asks for.
+    /// Corners along an arc of the drawing, with a spacing suitable for its size in metres.
     fn arc_about(&self, center: DVec2, from: DVec2, turn_rad: f64) -> Vec<DVec2> {
         let scale_m = self.scale_m().max(f64::MIN_POSITIVE);
         let corners = arc(scale_m * center, scale_m * from, turn_rad);
         corners.map(|corner| self.at(corner / scale_m)).collect()
     }
 
-    /// Metres a unit, the greater of those along two axes.
+    /// Metres per unit, the larger scale of the two axes.
     fn scale_m(&self) -> f64 {
         self.frame.matrix2.x_axis.length().max(self.frame.matrix2.y_axis.length())
     }
 
-    /// Checks whether circles stay circles.
+    /// Returns `true` if circles remain circles.
     fn is_uniform(&self) -> bool {
         let [x, y] = [self.frame.matrix2.x_axis, self.frame.matrix2.y_axis];
         let size = x.length().max(y.length());
         (x.length() - y.length()).abs() < 1e-6 * size && x.dot(y).abs() < 1e-6 * size * size
     }
 
-    /// 1 for what is drawn as it is seen from above, -1 for what is mirrored, because it is seen from below; the rest
-    /// does not stand upright.
+    /// Returns 1 for an entity seen from above, and -1 for one seen from below, which is mirrored.
+    /// Others are ignored.
     fn side(&mut self, normal: &Vector) -> Option<f64> {
         let along_z =
             normal.z / (normal.x * normal.x + normal.y * normal.y + normal.z * normal.z).sqrt();
         if along_z.abs() > 1.0 - 1e-6 {
             return Some(along_z.signum());
         }
-        self.leave_out("outlines that are not level");
+        self.ignore("outlines that are not horizontal");
         None
     }
 
@@ -321,7 +322,7 @@ impl<'a> Plan<'a> {
     }
 }
 
-/// The kind of an entity that makes no wall.
+/// Description of an ignored entity.
 const fn kind(entity: &EntityType) -> &'static str {
     match entity {
         EntityType::Spline(_) | EntityType::Ellipse(_) | EntityType::Helix(_) => {
@@ -352,12 +353,12 @@ const fn kind(entity: &EntityType) -> &'static str {
         | EntityType::DgnUnderlay(_)
         | EntityType::DwfUnderlay(_)
         | EntityType::PdfUnderlay(_) => "images and underlays",
-        EntityType::Ray(_) | EntityType::XLine(_) => "lines without end (RAY, XLINE)",
+        EntityType::Ray(_) | EntityType::XLine(_) => "infinite lines (RAY, XLINE)",
         EntityType::ModelPoint(_) => "points",
         EntityType::Shape(_) => "shapes of fonts (SHAPE)",
         _ => "other entities",
     }
 }
 
-/// Less than this is straight: a turn of a thousandth of a degree.
-const LEAST_BULGE: f64 = 4e-6;
+/// Bulge below which a segment is straight: an angle of a thousandth of a degree.
+const MIN_BULGE: f64 = 4e-6;

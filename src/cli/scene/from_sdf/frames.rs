@@ -1,22 +1,22 @@
-//! Frames of a world: poses, and what they are relative to (SDFormat, "Pose frame semantics").
+//! Frames of a world: poses and their reference frames (SDFormat, "Pose frame semantics").
 
 use glam::{DAffine3, DMat3, DQuat, DVec3};
 use roxmltree::Node;
 
 use super::{super::super::Failure, World, child};
 
-/// A world, a model or a link whose members are placed in its frame.
+/// World, model or link whose members are placed in its frame.
 pub(super) struct Scope<'s, 'n> {
     pub(super) element: Node<'n, 'n>,
-    /// Its frame in the world.
+    /// Frame in the world.
     pub(super) frame: DAffine3,
-    /// Scale of what is in it.
+    /// Scale of its members.
     pub(super) scale: DVec3,
     pub(super) name: &'n str,
     pub(super) outer: Option<&'s Scope<'s, 'n>>,
 }
 
-/// Frames that are relative to each other, at most.
+/// Maximum length of a chain of reference frames.
 const MAX_DEPTH: usize = 32;
 
 impl<'n> Scope<'_, 'n> {
@@ -25,11 +25,11 @@ impl<'n> Scope<'_, 'n> {
     }
 }
 
-/// A frame, or the name of one that is not there.
+/// Frame, or the name of a missing one.
 pub(super) type Found = Result<DAffine3, String>;
 
 impl World<'_> {
-    /// The frame of an element in the world, by its pose and what that is relative to.
+    /// Returns the frame of an element in the world, from its pose and reference frame.
     pub(super) fn frame<'n>(
         &self,
         element: Node<'n, 'n>,
@@ -54,7 +54,7 @@ impl World<'_> {
             Some(pose) => self.pose(pose)?,
             None => DAffine3::IDENTITY,
         };
-        // A scaled model is larger, and so are the distances in it.
+        // Positions within a scaled model are scaled, too.
         let own = match relative_to {
             None => DAffine3 { translation: scope.scale * own.translation, ..own },
             Some(_) => own,
@@ -62,7 +62,7 @@ impl World<'_> {
         Ok(Ok(base * own))
     }
 
-    /// The frame of a name, in a scope or in those about it.
+    /// Finds a frame by name, in a scope or the enclosing ones.
     fn named<'n>(&self, name: &str, scope: &Scope<'_, 'n>, depth: usize) -> Result<Found, Failure> {
         let missing = || Ok(Err(name.to_owned()));
         if depth > MAX_DEPTH {
@@ -105,7 +105,7 @@ impl World<'_> {
         missing()
     }
 
-    /// A pose by itself: x y z, and roll pitch yaw or a quaternion.
+    /// Parses a pose: x y z, and roll pitch yaw or a quaternion.
     pub(super) fn pose(&self, pose: Node) -> Result<DAffine3, Failure> {
         if pose.text().unwrap_or_default().trim().is_empty() {
             return Ok(DAffine3::IDENTITY);
@@ -114,7 +114,7 @@ impl World<'_> {
             let [x, y, z, qx, qy, qz, qw] = self.numbers(pose)?;
             let turn = DQuat::from_xyzw(qx, qy, qz, qw);
             if !turn.is_finite() || turn.length() < 1e-6 {
-                return Err(self.refuse(pose, "the quaternion of the pose has no length"));
+                return Err(self.file_failure(pose, "the quaternion of the pose has no length"));
             }
             return Ok(DAffine3::from_rotation_translation(turn.normalize(), DVec3::new(x, y, z)));
         }

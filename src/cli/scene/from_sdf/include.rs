@@ -1,4 +1,4 @@
-//! Models that a world includes: those in files beside it are read.
+//! Models included by a world, read from files next to it.
 
 use std::{
     fs,
@@ -8,18 +8,18 @@ use std::{
 use roxmltree::{Document, Node};
 
 use super::{
-    super::super::{Outcome, output::note_input},
+    super::super::{Outcome, output::register_input},
     Scope, World, child,
     state::State,
 };
 
-/// Files included within each other, at most.
+/// Maximum nesting depth of included files.
 const MAX_DEPTH: usize = 8;
-/// The longest file that is included, bytes.
+/// Maximum size of an included file, bytes.
 const MAX_BYTES: u64 = 64 << 20;
 
 impl World<'_> {
-    /// Adds the model of an `include`, or notes that it is elsewhere.
+    /// Adds the model of an `include`, or notes that it is not available.
     pub(super) fn include<'n>(
         &mut self,
         include: Node<'n, 'n>,
@@ -29,20 +29,20 @@ impl World<'_> {
         let text = |name: &str| child(include, name).and_then(|node| node.text()).map(str::trim);
         let uri = text("uri").unwrap_or_default();
         let Some(path) = self.local(uri).filter(|_| self.depth < MAX_DEPTH) else {
-            return self.leave_out(uri);
+            return self.ignore(uri);
         };
-        note_input(&path);
-        let Ok(file) = fs::read_to_string(&path) else { return self.leave_out(uri) };
-        let Ok(document) = Document::parse(&file) else { return self.leave_out(uri) };
+        register_input(&path);
+        let Ok(file) = fs::read_to_string(&path) else { return self.ignore(uri) };
+        let Ok(document) = Document::parse(&file) else { return self.ignore(uri) };
         let Some(model) = document.descendants().find(|node| node.has_tag_name("model")) else {
-            return self.leave_out(uri);
+            return self.ignore(uri);
         };
         let own = text("name").or_else(|| model.attribute("name"));
         let name = own.unwrap_or("body").to_owned();
         if state.is_deleted(&name) {
             return Ok(());
         }
-        // The pose of the include is in place of the model's own.
+        // The pose of the include replaces that of the model.
         let frame = match state.of_model(&name).pose(self)? {
             Some(frame) => Some(frame),
             None if child(include, "pose").is_some() => self.placed(include, scope, &name)?,
@@ -62,15 +62,15 @@ impl World<'_> {
         added
     }
 
-    fn leave_out(&mut self, uri: &str) -> Outcome {
+    fn ignore(&mut self, uri: &str) -> Outcome {
         self.found.leave_out("models from elsewhere (include)");
         self.notes.push(format!(
-            "left out: the model `{uri}`; it is read if its folder is beside the world"
+            "ignored: the model `{uri}`; put its folder next to the world to include it"
         ));
         Ok(())
     }
 
-    /// The file of a model in the world's folder or below it.
+    /// Returns the file of a model in the world's folder or below it.
     fn local(&self, uri: &str) -> Option<PathBuf> {
         let folder = self.file.parent().filter(|folder| !folder.as_os_str().is_empty());
         let folder = folder.unwrap_or(Path::new("."));

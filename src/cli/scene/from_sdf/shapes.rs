@@ -1,4 +1,4 @@
-//! Shapes of collisions, cut at the height of the ranger.
+//! Collision shapes, sliced at the height of the ranger.
 
 use glam::{DAffine3, DVec3};
 use roxmltree::Node;
@@ -9,7 +9,7 @@ use super::{
 };
 
 impl World<'_> {
-    /// The shape of a collision, in its frame.
+    /// Adds a collision shape, in its frame.
     pub(super) fn geometry(&mut self, geometry: Node, body: Body, frame: &DAffine3) -> Outcome {
         let Body { name, scale } = body;
         for shape in geometry.children().filter(Node::is_element) {
@@ -23,7 +23,7 @@ impl World<'_> {
                     let [length_m] = self.numbers_of(shape, "length")?;
                     if (scale.x - scale.y).abs() > 1e-6 * scale.x.abs() {
                         self.notes.push(format!(
-                            "left out: a cylinder of `{name}` that is scaled to an oval"
+                            "ignored: a cylinder of `{name}` that is scaled to an oval"
                         ));
                         continue;
                     }
@@ -34,28 +34,28 @@ impl World<'_> {
                 "empty" => {}
                 kind => {
                     self.found.leave_out("meshes, spheres and other shapes");
-                    self.notes.push(format!("left out: {kind} of `{name}`"));
+                    self.notes.push(format!("ignored: {kind} of `{name}`"));
                 }
             }
         }
         Ok(())
     }
 
-    /// A plane is the ground, unless it stands.
+    /// Ignores a horizontal plane as the ground, and notes others.
     fn plane(&mut self, shape: Node, name: &str, frame: &DAffine3) -> Outcome {
         let normal = match child(shape, "normal") {
             Some(normal) => DVec3::from(self.numbers(normal)?),
             None => DVec3::Z,
         };
         if (frame.matrix3 * normal.normalize_or(DVec3::Z)).z.abs() < UPRIGHT {
-            self.notes.push(format!("left out: a plane of `{name}` that is not level"));
+            self.notes.push(format!("ignored: a plane of `{name}` that is not horizontal"));
         }
         Ok(())
     }
 
-    /// A box that stands on one of its sides, half as long along its axes as `half` says, metres.
+    /// Adds a box with a vertical axis; `half` are its half-lengths, metres.
     fn upright_box(&mut self, name: &str, frame: &DAffine3, half: DVec3) {
-        let Some(up) = axis_up(frame) else { return self.lean(name) };
+        let Some(up) = axis_up(frame) else { return self.ignore_tilted(name) };
         if !self.cuts(frame.translation.z, half[up]) {
             return;
         }
@@ -68,13 +68,13 @@ impl World<'_> {
 
     fn cylinder(&mut self, name: &str, frame: &DAffine3, radius_m: f64, length_m: f64) {
         if axis_up(frame) != Some(AXIS_Z) {
-            self.lean(name);
+            self.ignore_tilted(name);
         } else if self.cuts(frame.translation.z, 0.5 * length_m) {
             self.found.round(name, frame.translation.truncate(), radius_m);
         }
     }
 
-    /// An outline that stands on its frame's ground.
+    /// Adds an outline extruded from the ground of its frame.
     fn outline(&mut self, shape: Node, Body { name, scale }: Body, frame: &DAffine3) -> Outcome {
         let [height_m] = self.numbers_of(shape, "height")?;
         let height_m = scale.z * height_m;
@@ -85,7 +85,7 @@ impl World<'_> {
         });
         let corners = corners.collect::<Result<Vec<_>, Failure>>()?;
         if axis_up(frame) != Some(AXIS_Z) {
-            self.lean(name);
+            self.ignore_tilted(name);
         } else {
             let up_m = height_m * frame.matrix3.z_axis.z.signum();
             if self.cuts(frame.translation.z + 0.5 * up_m, 0.5 * height_m) {
@@ -95,17 +95,18 @@ impl World<'_> {
         Ok(())
     }
 
-    fn lean(&mut self, name: &str) {
-        self.found.leave_out(LEANS);
-        self.notes.push(format!("left out: a body of `{name}` that leans or lies"));
+    fn ignore_tilted(&mut self, name: &str) {
+        self.found.leave_out(TILTED);
+        self.notes.push(format!("ignored: a tilted object of `{name}`"));
     }
 
-    /// Checks whether the height of the cut meets a body whose middle is so high, metres.
+    /// Returns `true` if the slice intersects a body with this centre height and half-height,
+    /// metres.
     fn cuts(&self, middle_z_m: f64, half_m: f64) -> bool {
         (self.args.cut_z_m - middle_z_m).abs() <= half_m
     }
 
-    /// The numbers of an element's child.
+    /// Parses the numbers of an element's child.
     pub(super) fn numbers_of<const N: usize>(
         &self,
         element: Node,
@@ -114,7 +115,8 @@ impl World<'_> {
         match child(element, name) {
             Some(child) => self.numbers(child),
             None => {
-                Err(self.refuse(element, &format!("{} has no {name}", element.tag_name().name())))
+                Err(self
+                    .file_failure(element, &format!("{} has no {name}", element.tag_name().name())))
             }
         }
     }
@@ -127,17 +129,17 @@ impl World<'_> {
             .collect();
         numbers.and_then(|numbers| numbers.try_into().ok()).ok_or_else(|| {
             let name = element.tag_name().name();
-            self.refuse(element, &format!("{name} is `{text}`: {N} numbers are wanted"))
+            self.file_failure(element, &format!("{name} is `{text}`: {N} numbers are expected"))
         })
     }
 }
 
-const LEANS: &str = "bodies that lean or lie";
+const TILTED: &str = "tilted objects";
 const AXIS_Z: usize = 2;
-/// Cosine of the lean that is none: a quarter of a degree.
+/// Cosine of the largest tilt of an upright object: a quarter of a degree.
 const UPRIGHT: f64 = 1.0 - 1e-5;
 
-/// The axis of a frame that is upright: 0 to 2 for x, y, z.
+/// Returns the vertical axis of a frame: 0 to 2 for x, y, z.
 fn axis_up(frame: &DAffine3) -> Option<usize> {
     (0..3).find(|axis| frame.matrix3.col(*axis).z.abs() > UPRIGHT)
 }

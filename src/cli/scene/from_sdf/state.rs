@@ -1,23 +1,23 @@
-//! The state of a world as it was saved: poses in the world, scales and deletions that override those of the models
-//! (SDFormat, state.sdf).
+//! Saved state of a world: poses in the world, scales and deletions that override those of the
+//! models (SDFormat, state.sdf).
 
 use glam::{DAffine3, DVec3};
 use roxmltree::Node;
 
 use super::{super::super::Failure, World, child};
 
-/// Elements that say the state of a world or of a model; of several the last counts.
+/// State elements of a world or model; the last one takes precedence.
 #[derive(Debug, Clone, Default)]
 pub(super) struct State<'s, 'n> {
     elements: Vec<Node<'s, 'n>>,
 }
 
 impl<'s, 'n> State<'s, 'n> {
-    pub(super) const fn of(elements: Vec<Node<'s, 'n>>) -> Self {
+    pub(super) const fn new(elements: Vec<Node<'s, 'n>>) -> Self {
         Self { elements }
     }
 
-    /// The state of the model of that name in this one.
+    /// Returns the state of a member model.
     pub(super) fn of_model(&self, name: &str) -> Self {
         let models = self.elements.iter().flat_map(|element| element.children());
         let is_of =
@@ -31,14 +31,14 @@ impl<'s, 'n> State<'s, 'n> {
         names.any(|node| node.has_tag_name("name") && node.text().map(str::trim) == Some(name))
     }
 
-    /// The models that the state adds to the world.
+    /// Returns the models that the state adds to the world.
     pub(super) fn insertions(&self) -> Vec<Node<'s, 'n>> {
         let insertions = self.elements.iter().filter_map(|element| child(*element, "insertions"));
         let models = insertions.flat_map(|insertions| insertions.children());
         models.filter(|node| node.has_tag_name("model")).collect()
     }
 
-    /// The pose of the model in the world, if the state has one.
+    /// Returns the pose of the model in the world, if the state has one.
     pub(super) fn pose(&self, world: &World) -> Result<Option<DAffine3>, Failure> {
         let pose = self.elements.iter().rev().find_map(|element| child(*element, "pose"));
         pose.map(|pose| world.pose(pose)).transpose()
@@ -52,7 +52,7 @@ impl<'s, 'n> State<'s, 'n> {
         })
     }
 
-    /// The pose in the world of a link of the model, if the state has one.
+    /// Returns the pose in the world of a link of the model, if the state has one.
     pub(super) fn of_link(&self, name: &str, world: &World) -> Result<Option<DAffine3>, Failure> {
         let links = self.elements.iter().rev().flat_map(|element| element.children());
         let mut links =

@@ -1,10 +1,10 @@
-//! Lines cut at rectangular clip paths.
+//! Clipping of lines at rectangular clip paths.
 
 use usvg::{ClipPath, Group, Node, Transform, tiny_skia_path::PathSegment};
 
 use crate::geometry::DVec2;
 
-/// An upright rectangle through which a drawing is seen.
+/// Axis-parallel rectangle through which a drawing is visible.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Window {
     low: [f64; 2],
@@ -30,7 +30,7 @@ impl Window {
         self == Self::default()
     }
 
-    /// The same in other coordinates, whose axes are parallel to these.
+    /// Transforms the window to other coordinates with parallel axes.
     pub(super) fn transformed(self, place: impl Fn([f64; 2]) -> DVec2) -> Self {
         if self.is_open() {
             return self;
@@ -40,7 +40,7 @@ impl Window {
         Self { low: [a.x.min(b.x), a.y.min(b.y)], high: [a.x.max(b.x), a.y.max(b.y)] }
     }
 
-    /// The parts of a line that are seen, and whether they are closed.
+    /// Returns the visible parts of a line, each with a flag for closed lines.
     pub(super) fn cut(self, corners: Vec<DVec2>, is_closed: bool) -> Vec<(Vec<DVec2>, bool)> {
         let is_inside = |corner: &DVec2| {
             (0..2).all(|axis| (self.low[axis]..=self.high[axis]).contains(&corner[axis]))
@@ -67,15 +67,15 @@ impl Window {
     fn seen(self, from: DVec2, to: DVec2) -> Option<(DVec2, DVec2)> {
         let (mut enters, mut leaves) = (0.0_f64, 1.0_f64);
         for axis in 0..2 {
-            let way = to[axis] - from[axis];
+            let delta = to[axis] - from[axis];
             let (below, above) = (self.low[axis] - from[axis], self.high[axis] - from[axis]);
-            if way == 0.0 {
+            if delta == 0.0 {
                 if below > 0.0 || above < 0.0 {
                     return None;
                 }
                 continue;
             }
-            let (a, b) = (below / way, above / way);
+            let (a, b) = (below / delta, above / delta);
             enters = enters.max(a.min(b));
             leaves = leaves.min(a.max(b));
         }
@@ -83,7 +83,7 @@ impl Window {
     }
 }
 
-/// The rectangle of a clip path of a group, if it is one that stands upright.
+/// Returns the rectangle of a group's clip path, if it is an axis-parallel one.
 pub(super) fn rectangle(group: &Group, clip: &ClipPath) -> Option<Window> {
     let frame = group.abs_transform().pre_concat(clip.transform());
     let window = of_children(clip.root(), frame)?;
@@ -121,14 +121,12 @@ fn of_children(root: &Group, frame: Transform) -> Option<Window> {
     }
 }
 
-/// The rectangle of four corners, each two neighbours of which share x or y.
+/// Returns the rectangle of four corners, if adjacent ones share x or y.
 fn of_corners(corners: &[[f64; 2]]) -> Option<Window> {
     let [a, b, c, d] = corners else { return None };
-    let near = |one: f64, other: f64| (one - other).abs() < 1e-3;
-    let is_side =
-        |one: &[f64; 2], other: &[f64; 2]| near(one[0], other[0]) != near(one[1], other[1]);
-    let is_upright =
-        [(a, b), (b, c), (c, d), (d, a)].iter().all(|(one, other)| is_side(one, other));
+    let near = |a: f64, b: f64| (a - b).abs() < 1e-3;
+    let is_side = |a: &[f64; 2], b: &[f64; 2]| near(a[0], b[0]) != near(a[1], b[1]);
+    let is_upright = [(a, b), (b, c), (c, d), (d, a)].iter().all(|(a, b)| is_side(a, b));
     let of = |pick: fn(f64, f64) -> f64, axis: usize| {
         corners.iter().map(|corner| corner[axis]).reduce(pick).unwrap_or_default()
     };
@@ -143,7 +141,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn lines_are_cut_at_the_edges_of_a_window() {
+    fn lines_are_cut_at_the_window() {
         let window = Window { low: [4.0, 0.0], high: [6.0, 8.0] };
         let line =
             |ends: &[(f64, f64)]| ends.iter().map(|&(x, y)| DVec2::new(x, y)).collect::<Vec<_>>();

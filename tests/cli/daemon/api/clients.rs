@@ -3,7 +3,7 @@
 use super::*;
 
 #[test]
-fn status_and_watch_are_clients() {
+fn status_and_watch() {
     let folder = tempfile::tempdir().expect("a folder");
     let daemon = Daemon::start_mock(folder.path(), &SHORT);
     daemon.wait_for("ready");
@@ -39,7 +39,7 @@ fn status_and_watch_are_clients() {
 }
 
 #[test]
-fn watch_goes_on_with_the_next_daemon_if_told_to() {
+fn watch_reconnects() {
     let folder = tempfile::tempdir().expect("a folder");
     let daemon = Daemon::start_mock(folder.path(), &SHORT);
     let socket = folder.path().join("s").display().to_string();

@@ -5,7 +5,7 @@ use sonard_test_support::in_process::Daemon as InProcess;
 use super::*;
 
 #[test]
-fn scans_are_taken_on_request_with_the_plan_pose_and_air_in_force() {
+fn requested_scans() {
     let folder = tempfile::tempdir().expect("a folder");
     let daemon = InProcess::start_mock(folder.path(), &SHORT);
     daemon.wait_for("ready");
@@ -42,7 +42,7 @@ fn scans_are_taken_on_request_with_the_plan_pose_and_air_in_force() {
 }
 
 #[test]
-fn continuous_scans_stop_in_mid_scan_and_go_on_when_told() {
+fn stop_and_resume() {
     let folder = tempfile::tempdir().expect("a folder");
     let daemon = InProcess::start_mock(folder.path(), &["--set", "scanning.mode=continuous"]);
     daemon.wait_until("some beams", || daemon.status()["scan"]["done"].as_u64() >= Some(5));
@@ -67,7 +67,7 @@ fn continuous_scans_stop_in_mid_scan_and_go_on_when_told() {
 }
 
 #[test]
-fn a_change_during_a_scan_is_shown_at_once_beside_what_is_in_force() {
+fn pending_changes() {
     let folder = tempfile::tempdir().expect("a folder");
     let file = folder.path().join("s.toml");
     fs::write(&file, "[plan]\nto_deg = 360\n").expect("a file");
@@ -102,7 +102,7 @@ fn a_change_during_a_scan_is_shown_at_once_beside_what_is_in_force() {
     assert_eq!(daemon.get("/v1/pose").json()["pending"]["x_m"], 0.5);
     let shown = run(&["status", "--socket", daemon.folder.join("s").to_str().expect("plain path")]);
     let shown = String::from_utf8_lossy(&shown.stdout).into_owned();
-    assert!(shown.contains("pending  from the next scan on: plan 0.0 to 180.0"), "{shown}");
+    assert!(shown.contains("pending  with the next scan: sweep 0.0 to 180.0"), "{shown}");
 
     // The configuration that is read again, and what is wrong with it, likewise.
     fs::write(&file, "[plan]\nto_dge = 90\n").expect("a file");

@@ -25,7 +25,7 @@ const TOKEN: &str = "0123456789abcdef0123456789abcdef";
 const PROTOCOL: (&str, &str) = ("sec-websocket-protocol", "foxglove.sdk.v1");
 
 #[test]
-fn viewers_come_by_the_rules_of_the_api_and_the_token_is_never_said() {
+fn access_rules_of_the_api() {
     let folder = tempfile::tempdir().expect("a folder");
     let token = format!("server.token_file={}", write_token(folder.path(), TOKEN).display());
     let mut command = sonard(&[]);
@@ -83,7 +83,7 @@ fn viewers_come_by_the_rules_of_the_api_and_the_token_is_never_said() {
 }
 
 #[test]
-fn without_the_key_there_are_no_viewers_and_with_it_so_many() {
+fn key_and_viewer_limit() {
     let folder = tempfile::tempdir().expect("a folder");
     let daemon = Daemon::start_mock(folder.path(), &[]);
     let asked = ask_for_viewer(daemon.connect().expect("it listens"), "/foxglove/", &[PROTOCOL]);
@@ -112,7 +112,7 @@ fn without_the_key_there_are_no_viewers_and_with_it_so_many() {
 
 /// A place is one also while a viewer holds it, long after the request for it was answered.
 #[test]
-fn viewers_keep_the_places_of_their_connections() {
+fn connection_slots() {
     let folder = tempfile::tempdir().expect("a folder");
     let daemon = start(folder.path(), &["--set", "server.max_clients=4"]);
     let connect = || daemon.connect().expect("it listens");
@@ -135,7 +135,7 @@ fn refusal(viewer: &mut Viewer<impl Read + Write>) -> String {
 }
 
 #[test]
-fn what_makes_no_sense_is_refused_in_words_and_the_daemon_goes_on() {
+fn invalid_messages() {
     let folder = tempfile::tempdir().expect("a folder");
     let daemon = start(folder.path(), &["--virtual-time"]);
     daemon.wait_for("ready");

@@ -23,7 +23,7 @@ fn viewer(daemon: &Daemon) -> Viewer<std::os::unix::net::UnixStream> {
 }
 
 #[test]
-fn a_viewer_that_slept_is_told_how_much_it_missed_and_goes_on() {
+fn stalled_viewer_gets_a_count() {
     let folder = tempfile::tempdir().expect("a folder");
     let daemon =
         busy(folder.path(), &["--set", "foxglove.queue_kb=16", "--set", "server.stall_s=60"]);
@@ -40,7 +40,7 @@ fn a_viewer_that_slept_is_told_how_much_it_missed_and_goes_on() {
 }
 
 #[test]
-fn viewers_that_never_wake_are_cut_off_while_others_are_told() {
+fn dead_viewers_are_disconnected() {
     let folder = tempfile::tempdir().expect("a folder");
     let daemon = busy(folder.path(), &["--set", "server.stall_s=3"]);
     let mut awake = viewer(&daemon);

@@ -58,7 +58,7 @@ fn named<'a>(value: &'a Value, found: &mut Vec<&'a str>) {
 }
 
 #[test]
-fn every_topic_and_field_of_the_layout_is_there() {
+fn topics_and_fields_exist() {
     let layout: Value = serde_json::from_str(LAYOUT).expect("JSON");
     let folder = tempfile::tempdir().expect("a folder");
     let daemon = start(folder.path(), &["--virtual-time", "--set", "foxglove.map=true"]);

@@ -18,7 +18,7 @@ fn made_of_log(folder: &Path) -> Vec<u8> {
 }
 
 #[test]
-fn the_map_that_is_told_is_the_one_that_is_made_of_the_log() {
+fn live_map_matches_the_log() {
     let folder = tempfile::tempdir().expect("a folder");
     let daemon = start(folder.path(), &["--virtual-time", "--set", "foxglove.map=true"]);
     daemon.wait_for("ready");
@@ -50,7 +50,7 @@ fn the_map_that_is_told_is_the_one_that_is_made_of_the_log() {
 }
 
 #[test]
-fn a_map_that_gets_too_large_is_told_no_more_and_scanning_goes_on() {
+fn too_large_map() {
     let folder = tempfile::tempdir().expect("a folder");
     let walls = r#"{"name": "plain", "materials": {"brick": {"reflectance": 0.9}},
         "walls": [{"id": "wall", "from": [-400, 2], "to": [400, 2], "material": "brick"}]}"#;

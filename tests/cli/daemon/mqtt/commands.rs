@@ -31,7 +31,7 @@ fn ask(broker: &Broker, command: &str, body: &[u8], flags: u8) -> Value {
 }
 
 #[test]
-fn scans_are_started_and_stopped_by_the_bodies_of_the_api() {
+fn start_and_stop() {
     let folder = tempfile::tempdir().expect("a folder");
     let broker = Broker::start(Manner::Honest);
     let daemon = commanded(folder.path(), &broker);
@@ -49,7 +49,7 @@ fn scans_are_started_and_stopped_by_the_bodies_of_the_api() {
 }
 
 #[test]
-fn what_the_api_refuses_is_refused_and_what_may_come_twice_is_not_carried_out() {
+fn rejected_and_repeated_commands() {
     let folder = tempfile::tempdir().expect("a folder");
     let broker = Broker::start(Manner::Honest);
     let daemon = commanded(folder.path(), &broker);
@@ -87,7 +87,7 @@ fn what_the_api_refuses_is_refused_and_what_may_come_twice_is_not_carried_out() 
 }
 
 #[test]
-fn nothing_is_carried_out_where_commands_are_not_wanted() {
+fn commands_disabled() {
     let folder = tempfile::tempdir().expect("a folder");
     let broker = Broker::start(Manner::Honest);
     let daemon = start(folder.path(), &broker, &[]);

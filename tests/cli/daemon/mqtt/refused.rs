@@ -23,7 +23,7 @@ fn gaps(folder: &std::path::Path) -> Vec<String> {
 }
 
 #[test]
-fn a_record_above_the_broker_s_limit_is_left_out_with_an_event_and_the_others_are_published() {
+fn too_large_record_is_skipped() {
     let folder = tempfile::tempdir().expect("a folder");
     let broker = Broker::start(Manner::Limited(2000));
     // A session for each file of the log, and one above the limit in each.
@@ -52,7 +52,7 @@ fn a_record_above_the_broker_s_limit_is_left_out_with_an_event_and_the_others_ar
 }
 
 #[test]
-fn a_topic_without_permission_is_named_and_the_others_are_published() {
+fn forbidden_topic_is_reported() {
     let folder = tempfile::tempdir().expect("a folder");
     let broker = Broker::start(Manner::Denying("/scan_start"));
     let daemon = start(folder.path(), &broker, &[]);
@@ -67,7 +67,7 @@ fn a_topic_without_permission_is_named_and_the_others_are_published() {
 }
 
 #[test]
-fn a_broker_that_takes_nothing_gets_everything_once_it_does() {
+fn stalled_broker_catches_up() {
     let folder = tempfile::tempdir().expect("a folder");
     let broker = Broker::start(Manner::Denying(""));
     let daemon = start(folder.path(), &broker, &[]);
@@ -83,7 +83,7 @@ fn a_broker_that_takes_nothing_gets_everything_once_it_does() {
 }
 
 #[test]
-fn two_daemons_of_one_name_are_told_of_the_other_and_back_off() {
+fn duplicate_client_id_backs_off() {
     let broker = Broker::start(Manner::Unique);
     let folders = [(); 2].map(|()| tempfile::tempdir().expect("a folder"));
     let daemons = folders.each_ref().map(|folder| start(folder.path(), &broker, &[]));

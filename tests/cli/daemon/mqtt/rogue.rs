@@ -36,7 +36,7 @@ fn beside(broker: Option<(Manner, &str)>) -> u64 {
 }
 
 #[test]
-fn none_holds_up_a_scan() {
+fn scans_are_not_delayed() {
     for (manner, trouble) in [
         (Manner::Honest, ""),
         (Manner::Deaf, ""),
@@ -51,7 +51,7 @@ fn none_holds_up_a_scan() {
 }
 
 #[test]
-fn none_is_tried_without_a_pause() {
+fn attempts_back_off() {
     for manner in
         [Manner::Deaf, Manner::Curt, Manner::Garbled, Manner::Noisy, Manner::Pushy, Manner::Bulky]
     {
@@ -67,7 +67,7 @@ fn none_is_tried_without_a_pause() {
 }
 
 #[test]
-fn a_deaf_one_is_left_and_what_it_did_not_acknowledge_is_sent_again() {
+fn unacknowledged_are_resent() {
     let folder = tempfile::tempdir().expect("a folder");
     let broker = Broker::start(Manner::Deaf);
     let daemon = start(folder.path(), &broker, &[]);
@@ -84,7 +84,7 @@ fn a_deaf_one_is_left_and_what_it_did_not_acknowledge_is_sent_again() {
 }
 
 #[test]
-fn one_that_refuses_user_or_password_is_told_in_the_status() {
+fn rejected_credentials_in_status() {
     let folder = tempfile::tempdir().expect("a folder");
     let broker = Broker::start(Manner::Refusing);
     let daemon = start(folder.path(), &broker, &["--set", "mqtt.user=somebody"]);

@@ -3,7 +3,7 @@
 use super::*;
 
 #[test]
-fn another_scene_array_and_noise_come_with_the_configuration() {
+fn reload_of_scene_and_array() {
     let folder = tempfile::tempdir().expect("a folder");
     let file = folder.path().join("sonard.toml");
     let text = |scene: &str, array: &str, noise_mm: f64| {
@@ -53,7 +53,7 @@ fn another_scene_array_and_noise_come_with_the_configuration() {
 }
 
 #[test]
-fn wrong_configurations_are_refused_with_what_would_be_right() {
+fn wrong_configurations() {
     let folder = tempfile::tempdir().expect("a folder");
     let log = folder.path().join("log").display().to_string();
     let socket = folder.path().join("s").display().to_string();

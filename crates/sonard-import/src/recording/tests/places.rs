@@ -80,7 +80,7 @@ fn tilted_planes_and_beams_are_refused_unless_they_are_wanted() {
     let bytes = mounted([0.0, 30.0, 0.0]);
     let told = said(examine(&bytes, Mapping::default()));
     assert!(
-        told.contains("/scan") && told.contains("30.0 degrees") && told.contains("--as-said"),
+        told.contains("/scan") && told.contains("30.0 degrees") && told.contains("--no-unit-check"),
         "{told}"
     );
     let open = || -> io::Result<Box<dyn io::Read>> { Ok(Box::new(Cursor::new(bytes.clone()))) };

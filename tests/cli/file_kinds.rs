@@ -1,4 +1,4 @@
-//! Files of another kind where a log is asked for: named in a line, with what to do, whatever they hold.
+//! Files of other kinds in place of a log: a short message with advice.
 
 use std::{fs, process::Stdio};
 
@@ -38,7 +38,7 @@ fn others() -> Vec<(&'static str, Vec<u8>, &'static str)> {
 }
 
 #[test]
-fn a_file_of_another_kind_is_named_in_few_lines() {
+fn other_kinds_of_file() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = |name: &str| folder.path().join(name).display().to_string();
     let (svg, map) = (path("out.svg"), path("map"));
@@ -80,14 +80,14 @@ fn a_file_of_another_kind_is_named_in_few_lines() {
 }
 
 #[test]
-fn of_many_damaged_lines_five_are_named_and_the_rest_counted() {
+fn damaged_lines_are_limited() {
     let folder = tempfile::tempdir().expect("a folder");
     let log = folder.path().join("log.jsonl");
     fs::write(&log, LOG.to_owned() + &"not a record\n".repeat(11_640)).expect("writable");
     let log = log.to_str().expect("plain path");
     for arguments in [&["compare", log][..], &["lines", log], &["log", "annotate", log]] {
         let message = stderr(&run(arguments));
-        assert_eq!(message.matches("the line is left out").count(), 5, "{arguments:?}: {message}");
+        assert_eq!(message.matches("line skipped").count(), 5, "{arguments:?}: {message}");
         assert!(message.contains("11635 more damaged lines"), "{arguments:?}: {message}");
     }
     for verb in ["show", "verify"] {
@@ -97,7 +97,7 @@ fn of_many_damaged_lines_five_are_named_and_the_rest_counted() {
 }
 
 #[test]
-fn a_log_that_may_not_be_read_is_not_a_matter_of_writing() {
+fn unreadable_log() {
     let folder = tempfile::tempdir().expect("a folder");
     let log = folder.path().join("no-such.jsonl").display().to_string();
     for arguments in

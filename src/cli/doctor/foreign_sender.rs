@@ -1,17 +1,17 @@
-//! Classification of what something other than the firmware sends. Pure.
+//! Classification of data sent by something other than the firmware. Pure.
 
 use super::report::Cause;
 
-/// Share of printable characters from which bytes count as text.
+/// Share of printable characters above which bytes count as text.
 const MIN_TEXT_SHARE: f64 = 0.9;
-/// Bytes of a frame that an echo must repeat.
-const MIN_ECHO: usize = 8;
-/// Characters that are quoted.
-const MAX_QUOTED: usize = 60;
+/// Leading bytes of a sent frame that identify an echo.
+const MIN_ECHO_BYTES: usize = 8;
+/// Maximum length of a quoted line, characters.
+const MAX_QUOTE_LENGTH: usize = 60;
 
-/// Something that sends on the line in place of the firmware.
+/// Sender on the line other than the firmware.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Speaker {
+pub(super) enum ForeignSender {
     LoginPrompt,
     ModemCommands,
     ModemReplies,
@@ -21,13 +21,13 @@ pub(super) enum Speaker {
     OtherRate,
 }
 
-impl Speaker {
-    /// Classifies received bytes, given those that were sent; `None` if there are too few.
+impl ForeignSender {
+    /// Classifies received bytes, given the sent bytes; `None` below two bytes.
     pub(super) fn classify(received: &[u8], sent: &[u8]) -> Option<Self> {
         if received.len() < 2 {
             return None;
         }
-        if sent.get(..MIN_ECHO).is_some_and(|start| contains(received, start)) {
+        if sent.get(..MIN_ECHO_BYTES).is_some_and(|start| contains(received, start)) {
             return Some(Self::Echo);
         }
         let text = printable(received);
@@ -61,21 +61,21 @@ impl Speaker {
         match self {
             Self::LoginPrompt => "a login prompt is on the line",
             Self::ModemCommands => "modem commands (AT...) are on the line",
-            Self::ModemReplies => "a modem answers",
+            Self::ModemReplies => "a modem replies",
             Self::Gps => "a GPS receiver sends (NMEA)",
             Self::Echo => "the line returns what is sent",
             Self::OtherText => "something sends text",
-            Self::OtherRate => "something sends bytes that are no text and no frames",
+            Self::OtherRate => "something sends bytes that are neither text nor frames",
         }
     }
 
     pub(super) const fn help(self) -> &'static str {
         match self {
             Self::LoginPrompt => {
-                "a system offers its serial console here, this computer or one at the other end: \
-                 give the ranger's port; on this computer `sudo systemctl disable --now \
-                 serial-getty@PORT.service` (PORT as in ttyAMA0) and no `console=` for it in the \
-                 kernel's command line free the port"
+                "a system offers its serial console here, this computer or the one at the other end: \
+                 give the ranger's port; on this computer, free the port with `sudo systemctl disable --now \
+                 serial-getty@PORT.service` (PORT as in ttyAMA0) and without `console=` for it in the \
+                 kernel's command line"
             }
             Self::ModemCommands => {
                 "a program looks for a modem: `sudo systemctl stop ModemManager`, and install \
@@ -97,7 +97,7 @@ impl Speaker {
                  it is the ranger's, flash the firmware (firmware/README.md)"
             }
             Self::OtherRate => {
-                "another program runs on this board, at another line rate perhaps, or this is another \
+                "another program runs on this board, perhaps at another line rate, or this is another \
                  device: check the port; if it is the ranger's, flash the firmware \
                  (firmware/README.md)"
             }
@@ -105,22 +105,22 @@ impl Speaker {
     }
 }
 
-/// The received line that reveals a speaker, else the first one, for quoting.
-pub(super) fn quote(received: &[u8], speaker: Speaker) -> Option<String> {
+/// Returns the received line that identifies a sender, or else the first one.
+pub(super) fn quote(received: &[u8], sender: ForeignSender) -> Option<String> {
     let text = printable(received);
     let mut lines = text.lines().map(str::trim).filter(|line| line.len() > 1);
-    let reveals = |line: &&str| match speaker {
-        Speaker::LoginPrompt => is_prompt(line),
-        Speaker::ModemCommands => is_modem_command(line),
-        Speaker::ModemReplies => is_modem_reply(line),
-        Speaker::Gps => is_nmea(line),
-        Speaker::Echo | Speaker::OtherText | Speaker::OtherRate => true,
+    let reveals = |line: &&str| match sender {
+        ForeignSender::LoginPrompt => is_prompt(line),
+        ForeignSender::ModemCommands => is_modem_command(line),
+        ForeignSender::ModemReplies => is_modem_reply(line),
+        ForeignSender::Gps => is_nmea(line),
+        ForeignSender::Echo | ForeignSender::OtherText | ForeignSender::OtherRate => true,
     };
     let line = lines.clone().find(reveals).or_else(|| lines.next())?;
-    Some(line.chars().take(MAX_QUOTED).collect())
+    Some(line.chars().take(MAX_QUOTE_LENGTH).collect())
 }
 
-/// Received bytes as lines; anything else than text ends a line.
+/// Splits received bytes into lines at anything other than text.
 fn printable(received: &[u8]) -> String {
     received
         .iter()
@@ -170,41 +170,41 @@ mod tests {
     use super::*;
 
     #[test]
-    fn each_speaker_is_recognized() {
+    fn senders_are_recognized() {
         let sent = [0x00, 0x05, 0x11, 0x22, 0x33, 0x44, 0x55, 0x66, 0x77, 0x00];
-        for (received, speaker) in [
+        for (received, sender) in [
             (
                 &b"\r\nDebian GNU/Linux 13 robot ttyAMA0\r\n\r\nrobot login: "[..],
-                Speaker::LoginPrompt,
+                ForeignSender::LoginPrompt,
             ),
-            (b"\xffPassword: ", Speaker::LoginPrompt),
-            (b"AT\r\nAT+GCAP\r\n", Speaker::ModemCommands),
-            (b"at\r", Speaker::ModemCommands),
-            (b"ATE1 E0\r", Speaker::ModemCommands),
-            (b"\r\nOK\r\n", Speaker::ModemReplies),
-            (b"\r\nERROR\r\n", Speaker::ModemReplies),
-            (b"$GPGGA,123519,4807.038,N*47\r\n", Speaker::Gps),
-            (&sent, Speaker::Echo),
-            (b"temperature 21.5\n", Speaker::OtherText),
-            (b"ATMOSPHERE 1013\n", Speaker::OtherText),
-            (&[0xf8, 0x80, 0x00, 0xe6, 0x98, 0xff], Speaker::OtherRate),
+            (b"\xffPassword: ", ForeignSender::LoginPrompt),
+            (b"AT\r\nAT+GCAP\r\n", ForeignSender::ModemCommands),
+            (b"at\r", ForeignSender::ModemCommands),
+            (b"ATE1 E0\r", ForeignSender::ModemCommands),
+            (b"\r\nOK\r\n", ForeignSender::ModemReplies),
+            (b"\r\nERROR\r\n", ForeignSender::ModemReplies),
+            (b"$GPGGA,123519,4807.038,N*47\r\n", ForeignSender::Gps),
+            (&sent, ForeignSender::Echo),
+            (b"temperature 21.5\n", ForeignSender::OtherText),
+            (b"ATMOSPHERE 1013\n", ForeignSender::OtherText),
+            (&[0xf8, 0x80, 0x00, 0xe6, 0x98, 0xff], ForeignSender::OtherRate),
         ] {
             let text = String::from_utf8_lossy(received);
-            assert_eq!(Speaker::classify(received, &sent), Some(speaker), "{text}");
+            assert_eq!(ForeignSender::classify(received, &sent), Some(sender), "{text}");
         }
-        assert_eq!(Speaker::classify(b"", &sent), None);
+        assert_eq!(ForeignSender::classify(b"", &sent), None);
         let banner = b"Debian GNU/Linux\r\nrobot login: ";
-        assert_eq!(quote(banner, Speaker::LoginPrompt).as_deref(), Some("robot login:"));
-        assert_eq!(quote(banner, Speaker::OtherText).as_deref(), Some("Debian GNU/Linux"));
+        assert_eq!(quote(banner, ForeignSender::LoginPrompt).as_deref(), Some("robot login:"));
+        assert_eq!(quote(banner, ForeignSender::OtherText).as_deref(), Some("Debian GNU/Linux"));
     }
 
     proptest! {
         #[test]
         fn any_bytes_are_classified(received: Vec<u8>, sent: Vec<u8>) {
-            let speaker = Speaker::classify(&received, &sent);
-            prop_assert_eq!(speaker.is_none(), received.len() < 2);
-            let quoted = speaker.and_then(|speaker| quote(&received, speaker));
-            prop_assert!(quoted.is_none_or(|quoted| quoted.len() <= MAX_QUOTED));
+            let sender = ForeignSender::classify(&received, &sent);
+            prop_assert_eq!(sender.is_none(), received.len() < 2);
+            let quoted = sender.and_then(|sender| quote(&received, sender));
+            prop_assert!(quoted.is_none_or(|quoted| quoted.len() <= MAX_QUOTE_LENGTH));
         }
     }
 }

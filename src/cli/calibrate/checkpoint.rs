@@ -1,7 +1,8 @@
-//! What a calibration has found so far, kept beside its results until these are there.
+//! Checkpoint file of a calibration, kept in the output folder until the results are written.
 //!
-//! The first line says of what; then one line follows for each search of the fit that is done, each by one write. So
-//! whenever the program was killed, all but a last line can be read, and the same command goes on from there.
+//! The first line identifies the calibration; one line per completed search follows. Each line is
+//! appended by a single write, so after a crash at most the last line is incomplete and the same
+//! command resumes.
 
 use std::{
     fmt::{self, Write as _},
@@ -27,86 +28,88 @@ use crate::{
     store::{hexadecimal, open_own},
 };
 
-/// Its name in the folder.
+/// File name in the output folder.
 const NAME: &str = "unfinished.jsonl";
-/// What its first line has.
-const PRODUCT: Product = Product::List(&["calibration_sha256", "version"]);
-/// How that begins.
-const BEGINNING: &[u8] = br#"{"calibration_sha256":""#;
-/// The line after which the folder's other files are this calibration's own.
+/// Keys of the first line.
+const HEAD_KEYS: Product = Product::List(&["calibration_sha256", "version"]);
+/// First bytes of the first line.
+const HEAD_START: &[u8] = br#"{"calibration_sha256":""#;
+/// Line after which the folder's other files are results of this calibration.
 const RESULTS: &str = r#"{"results":"begun"}"#;
-/// What to do where the file is of no use.
+/// Advice for a file that can't be resumed from.
 pub(super) const HELP: &str =
-    "give another folder with --out; or delete the file, or begin anew with --force";
+    "give another folder with --out; or delete the file, or start again with --force";
 
-/// The first line: what is calibrated.
+/// First line: identity of the calibration.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Head {
-    /// Of everything that decides the answer.
+    /// SHA-256 of all inputs that determine the result.
     calibration_sha256: String,
-    /// The program's.
     version: String,
 }
 
 impl Head {
-    /// Of a fit: readings, scene, sensor, air, model, and what is believed beforehand.
-    pub(super) fn of(world: &World, sweeps: &[Sweep], fit: &Fit) -> Self {
-        let mut digest = Hashed(Sha256::new());
-        // All fields of all of them, also of those that are yet to come; digits of numbers are enough to have them back.
+    /// Digest of a fit's readings, scene, sensor, air, model and priors.
+    pub(super) fn new(world: &World, sweeps: &[Sweep], fit: &Fit) -> Self {
+        let mut digest = DigestWriter(Sha256::new());
+        // `Debug` covers all fields, including future ones, and prints floats with round-trip
+        // precision.
         let _ = write!(digest, "{world:?} {sweeps:?} {fit:?}");
         let calibration_sha256 = hexadecimal(&digest.0.finalize());
         Self { calibration_sha256, version: env!("CARGO_PKG_VERSION").to_owned() }
     }
 }
 
-/// Text that only its digest is kept of.
-struct Hashed(Sha256);
+/// Digest of written text.
+struct DigestWriter(Sha256);
 
-impl fmt::Write for Hashed {
+impl fmt::Write for DigestWriter {
     fn write_str(&mut self, text: &str) -> fmt::Result {
         self.0.update(text);
         Ok(())
     }
 }
 
-/// What the lines after the first say.
+/// Contents of the lines after the first.
 #[derive(Debug, Clone, PartialEq, Default)]
-struct Known {
+struct Saved {
     found: Vec<Found>,
     has_results: bool,
-    /// Bytes of the lines that are whole.
-    whole: usize,
+    /// Length of the complete lines, bytes.
+    complete: usize,
 }
 
-/// The file of a calibration, held by this process alone.
-pub(super) struct Unfinished {
+/// Checkpoint file of a calibration, locked by this process.
+pub(super) struct Checkpoint {
     path: PathBuf,
-    known: Known,
-    /// `None` once something could not be kept: what follows it is of no use.
+    saved: Saved,
+    /// `None` after a failed write: later lines would be useless.
     file: Mutex<Option<File>>,
 }
 
-/// Checks before any work that the file may be written in a folder. Returns whether the results in the folder are those
-/// of the calibration that it holds unfinished.
+/// Checks, before any work, that the file may be written in a folder. Returns `true` if the results
+/// in the folder belong to the calibration of the checkpoint.
 ///
 /// # Errors
-/// When something else is in the file's place.
+///
+/// Another file has this name.
 pub(super) fn check(folder: &Path, overwrite: Overwrite) -> Result<bool, Failure> {
     let text = fs::read(folder.join(NAME)).unwrap_or_default();
-    // A first line that was cut off says nothing yet.
-    let is_cut = text.starts_with(BEGINNING) || BEGINNING.starts_with(&text);
+    // An incomplete first line identifies no calibration yet.
+    let is_cut = text.starts_with(HEAD_START) || HEAD_START.starts_with(&text);
     let is_cut = is_cut && !text.contains(&b'\n');
-    overwrite.or_forced(is_cut).check_in(folder, NAME, PRODUCT)?;
+    overwrite.or_forced(is_cut).check_in(folder, NAME, HEAD_KEYS)?;
     Ok(text.split(|byte| *byte == b'\n').any(|line| line == RESULTS.as_bytes()))
 }
 
-impl Unfinished {
-    /// Opens or begins the file in a folder, which is made if it is not there.
+impl Checkpoint {
+    /// Opens or creates the file in a folder, which is created if missing.
     ///
     /// # Errors
-    /// When another process has it, it is of another calibration or version, a line in it is wrong, or the disk
-    /// refuses.
+    ///
+    /// The file is locked by another process, belongs to another calibration or version, has an
+    /// invalid line, or can't be written.
     pub(super) fn open(folder: &Path, overwrite: Overwrite, head: &Head) -> Result<Self, Failure> {
         make_folder(folder)?;
         check(folder, overwrite)?;
@@ -118,7 +121,7 @@ impl Unfinished {
         match flock(&file, FlockOperation::NonBlockingLockExclusive) {
             Ok(()) => {}
             Err(Errno::WOULDBLOCK) => {
-                let error = format!("{}: another process is at this calibration", path.display());
+                let error = format!("{}: another process runs this calibration", path.display());
                 return Err(Failure::input(
                     error,
                     "wait for it, or give another folder with --out",
@@ -128,116 +131,116 @@ impl Unfinished {
         }
         let mut text = Vec::new();
         file.read_to_end(&mut text).map_err(fail)?;
-        let known = match read(&text, head) {
+        let saved = match read(&text, head) {
             Err(_) if overwrite.is_forced() => None,
-            known => {
-                known.map_err(|why| Failure::input(format!("{}: {why}", path.display()), HELP))?
+            saved => {
+                saved.map_err(|why| Failure::input(format!("{}: {why}", path.display()), HELP))?
             }
         };
-        let whole = known.as_ref().map_or(0, |known| known.whole);
-        if whole < text.len() {
-            file.set_len(whole as u64).map_err(fail)?;
+        let complete = saved.as_ref().map_or(0, |saved| saved.complete);
+        if complete < text.len() {
+            file.set_len(complete as u64).map_err(fail)?;
         }
-        if known.is_none() {
+        if saved.is_none() {
             write_line(&mut file, &json(head)).map_err(fail)?;
         }
-        Ok(Self { path, known: known.unwrap_or_default(), file: Mutex::new(Some(file)) })
+        Ok(Self { path, saved: saved.unwrap_or_default(), file: Mutex::new(Some(file)) })
     }
 
-    /// What was found before.
-    pub(super) fn known(&self) -> &[Found] {
-        &self.known.found
+    /// Returns the saved searches.
+    pub(super) fn saved(&self) -> &[Found] {
+        &self.saved.found
     }
 
-    /// Where it is.
     pub(super) fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Keeps what a search came to; says so if it can't.
-    pub(super) fn keep(&self, found: &Found) {
+    /// Appends the result of a search; logs a warning on failure.
+    pub(super) fn save(&self, found: &Found) {
         let line = json(found);
-        // A figure that is no number would not come back as it is.
+        // A non-finite number would not survive the round trip.
         let is_right = serde_json::from_str::<Found>(&line).is_ok_and(|read| read == *found);
-        self.add(is_right.then_some(line));
+        self.append(is_right.then_some(line));
     }
 
-    /// Remembers that the folder's other files are this calibration's from here on. Gives whether they were before.
+    /// Marks the folder's other files as results of this calibration. Returns `true` if they were
+    /// marked before.
     pub(super) fn begin_results(&self) -> bool {
-        if !self.known.has_results {
-            self.add(Some(RESULTS.to_owned()));
+        if !self.saved.has_results {
+            self.append(Some(RESULTS.to_owned()));
         }
-        self.known.has_results
+        self.saved.has_results
     }
 
-    /// Takes it away: the results are there, or there will be none.
+    /// Deletes the file, when results are written or no results are possible.
     ///
     /// # Errors
-    /// What the disk refuses.
+    ///
+    /// The file can't be deleted.
     pub(super) fn remove(&self) -> Outcome {
         fs::remove_file(&self.path)
             .map_err(|error| Failure::unwritable(&self.path.display(), &error))
     }
 
-    fn add(&self, line: Option<String>) {
-        // Nothing under this lock can panic, so a poisoned one holds what it should.
+    fn append(&self, line: Option<String>) {
+        // No code panics while it holds this lock, so a poisoned lock guards consistent data.
         let mut file = self.file.lock().unwrap_or_else(PoisonError::into_inner);
         let written = match (file.as_mut(), line) {
             (Some(file), Some(line)) => write_line(file, &line).map_err(|error| error.to_string()),
-            (Some(_), None) => Err("a figure in it is no number".to_owned()),
+            (Some(_), None) => Err("it contains a non-finite number".to_owned()),
             (None, _) => Ok(()),
         };
         if let Err(why) = written {
             let path = self.path.display();
             notice!(
-                "warning: cannot add to {path}: {why}; if it is stopped, it will go on from before this"
+                "warning: cannot append to {path}: {why}; an interrupted calibration will resume from the last saved search"
             );
             *file = None;
         }
     }
 }
 
-/// What the file says; `None` of one that was hardly begun.
-fn read(text: &[u8], head: &Head) -> Result<Option<Known>, String> {
+/// Parses the file; `None` if no line is complete.
+fn read(text: &[u8], head: &Head) -> Result<Option<Saved>, String> {
     let lines: Vec<&[u8]> =
         text.split_inclusive(|byte| *byte == b'\n').filter(|line| line.ends_with(b"\n")).collect();
-    let Some((first, rest)) = lines.split_first() else { return Ok(None) };
-    let of: Head = serde_json::from_slice(first)
-        .map_err(|error| format!("line 1 does not say of which calibration it is: {error}"))?;
-    if of.version != head.version {
-        let [had, is] = [&of.version, &head.version];
-        return Err(format!("begun by version {had} of sonard, and this is {is}"));
+    let Some((head_line, rest)) = lines.split_first() else { return Ok(None) };
+    let first: Head = serde_json::from_slice(head_line)
+        .map_err(|error| format!("line 1 does not identify a calibration: {error}"))?;
+    if first.version != head.version {
+        let [had, is] = [&first.version, &head.version];
+        return Err(format!("started by sonard {had}; this is sonard {is}"));
     }
-    if of != *head {
+    if first != *head {
         return Err(
-            "the calibration that it was begun for is another one: other readings, scene, \
-                    sensor, air or options"
+            "it belongs to another calibration: readings, scene, sensor, air or options differ"
                 .to_owned(),
         );
     }
-    let mut known = Known { whole: first.len(), ..Known::default() };
+    let mut saved = Saved { complete: head_line.len(), ..Saved::default() };
     for (at, line) in rest.iter().enumerate() {
         if line.trim_ascii_end() == RESULTS.as_bytes() {
-            known.has_results = true;
+            saved.has_results = true;
         } else {
             match serde_json::from_slice(line) {
-                Ok(found) => known.found.push(found),
-                // Cut off by a power cut that left the file its length.
+                Ok(found) => saved.found.push(found),
+                // Incomplete, although the length is right, after a power failure.
                 Err(_) if at + 1 == rest.len() => break,
-                Err(error) => return Err(format!("line {} is wrong: {error}", at + 2)),
+                Err(error) => return Err(format!("line {} is invalid: {error}", at + 2)),
             }
         }
-        known.whole += line.len();
+        saved.complete += line.len();
     }
-    Ok(Some(known))
+    Ok(Some(saved))
 }
 
-/// Numbers and texts can always be written.
+/// Serializes a value; numbers and strings never fail.
 fn json(value: &impl Serialize) -> String {
     serde_json::to_string(value).unwrap_or_default()
 }
 
-/// By one write, so that it is there whole or cut off.
+/// Appends a line with a single write, so that it is either complete or cut off.
 fn write_line(file: &mut File, line: &str) -> io::Result<()> {
     file.write_all(format!("{line}\n").as_bytes())
 }
@@ -258,17 +261,17 @@ mod tests {
         check(folder, Overwrite::default()).expect("it is a calibration's")
     }
 
-    fn open(folder: &Path, digest: &str) -> Result<Unfinished, Failure> {
-        Unfinished::open(folder, Overwrite::default(), &head(digest))
+    fn open(folder: &Path, digest: &str) -> Result<Checkpoint, Failure> {
+        Checkpoint::open(folder, Overwrite::default(), &head(digest))
     }
 
     #[test]
-    fn what_was_found_is_there_again_and_what_was_cut_off_is_not() {
+    fn resumes_after_cut_at_any_byte() {
         let folder = tempfile::tempdir().expect("a folder");
         let folder = &folder.path().join("out");
         let found: Vec<Found> = [0.1, f64::MIN_POSITIVE, 5e-324, -0.0, 1.0 / 7.0].map(place).into();
         let begun = open(folder, "a").expect("it is new");
-        found.iter().for_each(|found| begun.keep(found));
+        found.iter().for_each(|found| begun.save(found));
         assert!(open(folder, "a").is_err(), "two at a time");
         drop(begun);
         let path = folder.join(NAME);
@@ -277,22 +280,26 @@ mod tests {
         for cut in 0..=text.len() {
             fs::write(&path, &text[..cut]).expect("writable");
             let again = open(folder, "a").expect("it is the same");
-            let whole = text[..cut].iter().filter(|byte| **byte == b'\n').count();
-            assert_eq!(again.known(), &found[..whole.saturating_sub(1)], "{cut}");
-            again.keep(&found[0]);
+            let complete = text[..cut].iter().filter(|byte| **byte == b'\n').count();
+            assert_eq!(again.saved(), &found[..complete.saturating_sub(1)], "{cut}");
+            again.save(&found[0]);
             drop(again);
             let written = fs::read(&path).expect("there");
             assert!(written.ends_with(b"}\n") && written.len() > head_bytes, "{cut}");
-            assert_eq!(open(folder, "a").expect("the same").known().len(), whole.max(1), "{cut}");
+            assert_eq!(
+                open(folder, "a").expect("the same").saved().len(),
+                complete.max(1),
+                "{cut}"
+            );
         }
     }
 
     #[test]
-    fn a_file_that_does_not_go_with_it_is_refused_and_kept() {
+    fn foreign_file_is_kept() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join(NAME);
         let begun = open(folder.path(), "a").expect("it is new");
-        [0.1, 0.2].map(place).iter().for_each(|found| begun.keep(found));
+        [0.1, 0.2].map(place).iter().for_each(|found| begun.save(found));
         drop(begun);
         let text = fs::read_to_string(&path).expect("there");
         let wrong_line = text.replacen("place", "palace", 1);
@@ -305,14 +312,14 @@ mod tests {
     }
 
     #[test]
-    fn what_would_not_come_back_is_not_kept_nor_what_follows() {
+    fn stops_at_non_finite_number() {
         let folder = tempfile::tempdir().expect("a folder");
         let begun = open(folder.path(), "a").expect("it is new");
-        [0.1, f64::NAN, 0.2].map(place).iter().for_each(|found| begun.keep(found));
+        [0.1, f64::NAN, 0.2].map(place).iter().for_each(|found| begun.save(found));
         assert!(!begun.begin_results());
         drop(begun);
         let again = open(folder.path(), "a").expect("the same");
-        assert_eq!(again.known(), [place(0.1)]);
+        assert_eq!(again.saved(), [place(0.1)]);
         assert!(!again.begin_results() && has_results(folder.path()));
         drop(again);
         let again = open(folder.path(), "a").expect("the same");

@@ -1,4 +1,4 @@
-//! How far a collection is, on the terminal.
+//! Progress of a collection on the terminal.
 
 use std::time::Duration;
 
@@ -7,32 +7,32 @@ use indicatif::{HumanDuration, ProgressBar, ProgressStyle};
 use super::{report, terminal::Terminal};
 use crate::collect::{Folder, Halt, History, Watcher};
 
-/// The person at the terminal: a bar over all beams, lines above it, and answers.
-pub(super) struct Person {
+/// Terminal of a collection: a bar over all beams, messages above it, and questions.
+pub(super) struct TerminalObserver {
     bar: ProgressBar,
     terminal: Terminal,
-    beams_a_scan: u32,
+    beams_per_scan: u32,
 }
 
-impl Person {
-    pub(super) fn new(beams_a_scan: u32) -> Self {
+impl TerminalObserver {
+    pub(super) fn new(beams_per_scan: u32) -> Self {
         let bar = ProgressBar::new(0);
         let style = ProgressStyle::with_template("{msg} {wide_bar} {pos}/{len} beams");
         if let Ok(style) = style {
             bar.set_style(style);
         }
-        Self { bar, terminal: Terminal::default(), beams_a_scan }
+        Self { bar, terminal: Terminal::default(), beams_per_scan }
     }
 }
 
-impl Watcher for Person {
+impl Watcher for TerminalObserver {
     fn begin(&self, doing: &str, done: u32, of: u32, left_s: f64) {
         if self.bar.is_finished() {
             self.bar.reset();
         }
-        self.bar.set_length(u64::from(of) * u64::from(self.beams_a_scan));
-        self.bar.set_position(u64::from(done) * u64::from(self.beams_a_scan));
-        self.bar.set_message(format!("{doing}, {} left,", human(left_s)));
+        self.bar.set_length(u64::from(of) * u64::from(self.beams_per_scan));
+        self.bar.set_position(u64::from(done) * u64::from(self.beams_per_scan));
+        self.bar.set_message(format!("{doing}, {} left,", human_duration(left_s)));
     }
 
     fn beam(&self) {
@@ -45,17 +45,16 @@ impl Watcher for Person {
     }
 
     fn announce(&self, scans: u32, left_s: f64) {
-        notice!("{scans} scans to take, about {}", human(left_s));
+        notice!("{scans} scans to take, about {}", human_duration(left_s));
     }
 
-    /// Takes the bar away, for a question or for good, until the next scan begins: drawn again
-    /// earlier, it would be drawn over the question.
+    /// Removes the bar until the next scan begins: an earlier redraw would cover a question.
     fn rest(&self) {
         self.bar.finish_and_clear();
     }
 
     async fn ask(&mut self, question: &str) -> Option<String> {
-        self.terminal.ask(question).await
+        self.terminal.prompt(question).await
     }
 
     fn report(&self, folder: &Folder, history: &History) -> Result<(), Halt> {
@@ -63,6 +62,6 @@ impl Watcher for Person {
     }
 }
 
-pub(super) fn human(seconds: f64) -> HumanDuration {
+pub(super) fn human_duration(seconds: f64) -> HumanDuration {
     HumanDuration(Duration::from_secs_f64(seconds.clamp(0.0, 1e9)))
 }

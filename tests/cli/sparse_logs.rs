@@ -1,4 +1,4 @@
-//! Logs that hold nothing, or not enough, given to every verb that makes sense of scans.
+//! Logs without usable readings, or with too few, in every verb that interprets scans.
 
 use std::{fs, path::Path};
 
@@ -53,7 +53,7 @@ fn verbs(folder: &Path, log: &[String]) -> Vec<(&'static str, Option<i32>, Strin
 }
 
 #[test]
-fn one_ping_is_too_few() {
+fn single_reading() {
     let folder = TempDir::new().expect("a temporary folder");
     let mut pings = 0;
     let one: Vec<String> = scan(folder.path(), "middle")
@@ -70,7 +70,7 @@ fn one_ping_is_too_few() {
 }
 
 #[test]
-fn silence_is_an_answer() {
+fn no_echoes() {
     let folder = TempDir::new().expect("a temporary folder");
     let silent: Vec<String> = scan(folder.path(), "middle")
         .into_iter()
@@ -86,8 +86,8 @@ fn silence_is_an_answer() {
     for (verb, code, text, words) in verbs(folder.path(), &silent) {
         assert_eq!(code, Some(0), "{verb}: {words}");
         let expected = match verb {
-            "interpret" => "no feature: every beam is silent",
-            "lines" => "0 lines; 0 readings left out",
+            "interpret" => "no features: no beam has an echo",
+            "lines" => "0 lines; 0 readings discarded",
             "map" => "0 occupied",
             _ => r#""confidence":0.5"#,
         };
@@ -96,7 +96,7 @@ fn silence_is_an_answer() {
 }
 
 #[test]
-fn one_pose_twice_is_one_place_measured_twice() {
+fn repeated_pose() {
     let folder = TempDir::new().expect("a temporary folder");
     let once = scan(folder.path(), "middle");
     let again = scan(folder.path(), "middle");
@@ -114,7 +114,7 @@ fn one_pose_twice_is_one_place_measured_twice() {
 }
 
 #[test]
-fn a_reading_that_is_no_number_costs_that_reading() {
+fn non_finite_range() {
     let folder = TempDir::new().expect("a temporary folder");
     let mut log = scan(folder.path(), "middle");
     let at = log.iter().position(|line| is_ping(line) && line.contains(r#""status":"echo""#));
@@ -130,7 +130,7 @@ fn a_reading_that_is_no_number_costs_that_reading() {
 }
 
 #[test]
-fn poses_outside_the_map_are_said() {
+fn poses_outside_the_map() {
     let folder = TempDir::new().expect("a temporary folder");
     let log = scan(folder.path(), "middle");
     let path = folder.path().join("log.jsonl");
@@ -140,5 +140,5 @@ fn poses_outside_the_map_are_said() {
     let output = run(&["map", path, "--out", map, "--region", "10,10,11,11"]);
     assert!(output.status.success(), "{}", stderr(&output));
     let text = String::from_utf8_lossy(&output.stdout).into_owned();
-    assert!(text.contains("1 poses lie outside the map") && text.contains("--region"), "{text}");
+    assert!(text.contains("1 poses are outside the map") && text.contains("--region"), "{text}");
 }

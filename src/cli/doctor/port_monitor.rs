@@ -1,4 +1,4 @@
-//! What else acts on the port: other programs, changed settings, an adapter that delays bytes.
+//! Interference on the port: other programs, changed settings, an adapter that delays bytes.
 
 use std::{os::fd::AsRawFd, path::PathBuf};
 
@@ -8,22 +8,22 @@ use rustix::{
 };
 
 use super::{
+    foreign_sender::{ForeignSender, quote},
     report::{Cause, Check},
-    speaker::{Speaker, quote},
 };
 use crate::link::{self, Holders};
 
-/// The port, and the settings that this program gave it.
-pub(super) struct Surroundings {
+/// Port with the settings that this program applied.
+pub(super) struct PortMonitor {
     path: PathBuf,
-    /// The open port, and its settings after opening; `None` where the kernel does not give them.
+    /// Open port with its settings after opening; `None` if the kernel does not report them.
     settings: Option<(std::os::fd::OwnedFd, Termios)>,
 }
 
-impl Surroundings {
-    /// Of a port that was opened as `line`.
+impl PortMonitor {
+    /// Records the settings of a port opened as `line`.
     pub(super) fn new(port: &str, line: &impl AsRawFd) -> Self {
-        // The line's type gives its descriptor by number only; the kernel duplicates it by that.
+        // `line` exposes its descriptor only as a number, which the kernel duplicates.
         let duplicate = |number| {
             let process = pidfd_open(getpid(), PidfdFlags::empty()).ok()?;
             pidfd_getfd(process, number, PidfdGetfdFlags::empty()).ok()
@@ -36,11 +36,11 @@ impl Surroundings {
         Self { path: link::device_path(port).unwrap_or_else(|_| port.into()), settings }
     }
 
-    /// Whether another program has the port open.
+    /// Checks whether another program has the port open.
     pub(super) fn check_port(&self) -> Check {
         let holders = link::find_holders(&self.path);
         if let Some(advice) = holders.advice(&self.path) {
-            return shared(&holders, advice);
+            return port_shared(&holders, advice);
         }
         if link::is_kernel_console(&self.path) {
             return Check::warning(
@@ -54,19 +54,19 @@ impl Surroundings {
         match holders.is_partial {
             true => Check::ok(
                 "port",
-                "opened; no visible program has it open, but those of other users are hidden",
+                "opened; not in use by a visible program, but those of other users are hidden",
             ),
-            false => Check::ok("port", "opened, and no other program has it open"),
+            false => Check::ok("port", "opened exclusively"),
         }
     }
 
-    /// The adapter's latency timer, if it has one.
+    /// Checks the adapter's latency timer, if it has one.
     pub(super) fn check_adapter(&self) -> Option<Check> {
         let latency_ms = link::latency_timer_ms(&self.path)?;
-        Some(judge_latency(latency_ms, &self.path.to_string_lossy()))
+        Some(check_latency(latency_ms, &self.path.to_string_lossy()))
     }
 
-    /// Settings that differ from those after opening.
+    /// Checks for settings that have changed since opening.
     pub(super) fn check_settings(&self) -> Option<Check> {
         let (line, before) = self.settings.as_ref()?;
         let changes = describe_changes(before, &tcgetattr(line).ok()?)?;
@@ -83,40 +83,40 @@ impl Surroundings {
         ))
     }
 
-    /// An explanation of a board that did not answer, from what was received and sent.
+    /// Explains from received and sent bytes why a board did not reply.
     pub(super) fn explain(&self, received: &[u8], sent: &[u8]) -> Option<Check> {
         let holders = link::find_holders(&self.path);
         if let Some(advice) = holders.advice(&self.path) {
-            return Some(Check { check: "board", ..shared(&holders, advice) });
+            return Some(Check { check: "board", ..port_shared(&holders, advice) });
         }
         if let Some(check) = self.check_settings() {
             return Some(Check { check: "board", ..check });
         }
-        let speaker = Speaker::classify(received, sent)?;
-        let quoted = quote(received, speaker);
+        let sender = ForeignSender::classify(received, sent)?;
+        let quoted = quote(received, sender);
         let quoted = quoted.map_or_else(String::new, |line| format!(": {line:?}"));
-        let detail = format!("{} ({} bytes){quoted}", speaker.name(), received.len());
-        Some(Check::failed("board", speaker.cause(), detail, speaker.help()))
+        let detail = format!("{} ({} bytes){quoted}", sender.name(), received.len());
+        Some(Check::failed("board", sender.cause(), detail, sender.help()))
     }
 
-    /// `true` if programs may have the port open that this user can't see.
+    /// Returns `true` if programs hidden from this user may have the port open.
     pub(super) fn may_hide_programs(&self) -> bool {
         link::find_holders(&self.path).is_partial
     }
 }
 
-fn shared(holders: &Holders, advice: String) -> Check {
+fn port_shared(holders: &Holders, advice: String) -> Check {
     let who = holders.describe("another program");
     Check::failed(
         "port",
         Cause::Busy,
-        format!("{who} has it open, too, and may take what the board sends"),
+        format!("{who} has it open, too, and may consume the board's replies"),
         advice,
     )
 }
 
 /// Checks a latency timer, milliseconds, of the port at `path`.
-fn judge_latency(latency_ms: u32, path: &str) -> Check {
+fn check_latency(latency_ms: u32, path: &str) -> Check {
     let detail = format!("latency timer {latency_ms} ms");
     if latency_ms <= 1 {
         return Check::ok("adapter", detail);
@@ -127,17 +127,17 @@ fn judge_latency(latency_ms: u32, path: &str) -> Check {
         "adapter",
         Cause::Latency,
         format!(
-            "{detail}: the adapter holds received bytes back for as long, so times in records are up \
+            "{detail}: the adapter delays received bytes by as much, so times in records are up \
              to {bias_ms} ms late; ranges are not affected, because the board times echoes"
         ),
         format!(
-            "`echo 1 | sudo tee /sys/class/tty/{name}/device/latency_timer`, and for good a udev rule: \
+            "`echo 1 | sudo tee /sys/class/tty/{name}/device/latency_timer`, and permanently a udev rule: \
              SUBSYSTEM==\"usb-serial\", DRIVER==\"ftdi_sio\", ATTR{{latency_timer}}=\"1\""
         ),
     )
 }
 
-/// Names the settings that differ; `None` if none does.
+/// Describes the settings that differ; `None` if there are none.
 fn describe_changes(before: &Termios, now: &Termios) -> Option<String> {
     let mut changes = Vec::new();
     for (name, then, now) in [
@@ -184,7 +184,7 @@ fn describe_changes(before: &Termios, now: &Termios) -> Option<String> {
     }
     let size = |settings: &Termios| settings.control_modes & ControlModes::CSIZE;
     if size(before) != size(now) {
-        changes.push("another number of data bits".into());
+        changes.push("different number of data bits".into());
     }
     (!changes.is_empty()).then(|| changes.join(", "))
 }
@@ -195,7 +195,7 @@ mod tests {
     use crate::link::Pty;
 
     #[test]
-    fn changed_settings_are_named() {
+    fn changed_settings() {
         let pty = Pty::open(None).expect("a pty");
         let line = std::fs::File::open(pty.path()).expect("opens");
         let before = tcgetattr(&line).expect("a terminal");
@@ -211,9 +211,9 @@ mod tests {
     }
 
     #[test]
-    fn latency_timer_is_reported_with_its_bias() {
-        assert_eq!(judge_latency(1, "/dev/ttyUSB0").cause, None);
-        let check = judge_latency(16, "/dev/ttyUSB0");
+    fn latency_timer() {
+        assert_eq!(check_latency(1, "/dev/ttyUSB0").cause, None);
+        let check = check_latency(16, "/dev/ttyUSB0");
         assert_eq!(check.cause, Some(Cause::Latency));
         assert!(check.detail.contains("16 ms") && check.detail.contains("8 ms late"), "{check:?}");
         assert!(check.help.expect("a remedy").contains("/sys/class/tty/ttyUSB0/"));

@@ -1,19 +1,12 @@
-//! Wrong input: each gives one clear message that says what to do, and the right exit code.
+//! Wrong input of `sonard scan` and `sonard simulate`: one clear message with advice, and the right exit code.
 
-use std::{
-    fs,
-    io::Write as _,
-    os::unix::{fs::PermissionsExt as _, process::CommandExt as _},
-    process::Stdio,
-    time::Duration,
-};
+use std::{fs, io::Write as _, process::Stdio};
 
-use crate::common::{MockProcess, mock_scan, run, sonard, stderr};
-use sonard::link::Pty;
+use crate::common::{mock_scan, run, sonard, stderr};
 
-/// Runs `arguments` and checks exit code and what the message must contain.
+/// Runs `arguments` and checks the exit code and parts of the message.
 #[track_caller]
-fn check(arguments: &[&str], code: i32, parts: &[&str]) {
+pub(crate) fn check(arguments: &[&str], code: i32, parts: &[&str]) {
     let output = run(arguments);
     let message = stderr(&output);
     assert_eq!(output.status.code(), Some(code), "{arguments:?}: {message}");
@@ -33,18 +26,7 @@ fn scan_of<'a>(scene: &'a str, pose: &'a str, further: &[&'a str]) -> Vec<&'a st
 }
 
 #[test]
-fn ports() {
-    let port = |port| ["scan", "--port", port, "--scene", "simple-room", "--pose", "fig9"];
-    check(&port("/dev/no-such-port"), 3, &["no serial port", "/dev/no-such-port", "--mock"]);
-    for no_port in ["/etc/hostname", "/etc", "/dev/null", "/dev/zero", "/dev/ptmx"] {
-        let named = format!("{no_port} is not a serial port");
-        check(&port(no_port), 3, &[&named, "/dev/ttyACM0"]);
-    }
-    check(&["scan", "--scene", "simple-room", "--pose", "fig9"], 2, &["--port", "--mock"]);
-}
-
-#[test]
-fn an_option_of_another_engine_is_refused_by_name() {
+fn option_of_another_engine() {
     let simulate = ["simulate", "--scene", "simple-room", "--pose", "fig9", "--to-deg", "9"];
     for (engine, option, knowing) in [
         ("cone", &["--lossless"][..], "--engine paths or --engine fan"),
@@ -58,77 +40,12 @@ fn an_option_of_another_engine_is_refused_by_name() {
         ("paths", &["--aperture-deg", "15"], "--engine cone"),
     ] {
         let wrong = [&simulate[..], &["--engine", engine], option].concat();
-        check(&wrong, 2, &[option[0], &format!("{engine} does not know it"), knowing]);
+        check(&wrong, 2, &[option[0], &format!("not an option of the engine {engine}"), knowing]);
     }
 }
 
 #[test]
-fn a_port_without_permission() {
-    let pty = Pty::open(None).expect("a pty");
-    fs::set_permissions(pty.path(), fs::Permissions::from_mode(0o000)).expect("it is ours");
-    let path = pty.path().to_str().expect("plain path");
-    let mut scan = sonard(&["scan", "--port", path, "--scene", "simple-room", "--pose", "fig9"]);
-    if rustix::process::geteuid().is_root() {
-        // Root may open anything: try as somebody who may not, from where that one may be.
-        let copy = tempfile::tempdir_in("/tmp").expect("a folder");
-        fs::set_permissions(copy.path(), fs::Permissions::from_mode(0o755)).expect("ours");
-        let program = copy.path().join("sonard");
-        fs::copy(env!("CARGO_BIN_EXE_sonard"), &program).expect("copies");
-        let mut other = std::process::Command::new(&program);
-        other.args(scan.get_args()).current_dir("/tmp").uid(65_534).gid(65_534);
-        scan = other;
-        let output = scan.output().expect("starts");
-        return assert_forbidden(&output);
-    }
-    assert_forbidden(&scan.output().expect("starts"));
-}
-
-#[track_caller]
-fn assert_forbidden(output: &std::process::Output) {
-    let message = stderr(output);
-    assert_eq!(output.status.code(), Some(3), "{message}");
-    assert!(message.contains("permission") && message.contains("dialout"), "{message}");
-}
-
-#[test]
-fn a_busy_port() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let mock = MockProcess::start(folder.path(), &["--realtime"]);
-    let arguments = ["scan", "--port", mock.port(), "--scene", "simple-room", "--pose", "fig9"];
-    let mut first =
-        sonard(&arguments).stdout(Stdio::piped()).stderr(Stdio::null()).spawn().expect("starts");
-    // Once it has written something, it has the port.
-    let mut byte = [0];
-    std::io::Read::read_exact(first.stdout.as_mut().expect("piped"), &mut byte).expect("writes");
-    let holder = format!("(pid {})", first.id());
-    check(&arguments, 3, &["in use by another program", "fuser", &holder]);
-    first.kill().expect("it runs");
-    first.wait().expect("it ends");
-}
-
-#[test]
-fn a_port_where_nothing_answers_and_one_that_speaks_something_else() {
-    let silent = Pty::open(None).expect("a pty");
-    let path = silent.path().to_str().expect("plain path").to_owned();
-    let arguments = ["scan", "--port", &path, "--scene", "simple-room", "--pose", "fig9"];
-    check(&arguments, 3, &["did not answer", "cable"]);
-
-    let gps = Pty::open(None).expect("a pty");
-    let path = gps.path().to_str().expect("plain path").to_owned();
-    let talking = std::thread::spawn(move || {
-        for _ in 0..200 {
-            // A full pty only means that nobody listens yet.
-            let _ = gps.write(b"$GPGGA,123519,4807.038,N,01131.000,E,1,08,0.9,545.4,M\r\n");
-            std::thread::sleep(Duration::from_millis(100));
-        }
-    });
-    let arguments = ["scan", "--port", &path, "--scene", "simple-room", "--pose", "fig9"];
-    check(&arguments, 3, &["no frame", "not a sonard device"]);
-    talking.join().expect("talks");
-}
-
-#[test]
-fn scenes_and_poses() {
+fn wrong_scenes_and_poses() {
     let folder = tempfile::tempdir().expect("a folder");
     let scene = |text: &str| {
         let path = folder.path().join("room.json");
@@ -148,7 +65,7 @@ fn scenes_and_poses() {
 }
 
 #[test]
-fn plans_and_settings() {
+fn wrong_plans_and_settings() {
     let scan = |further: &[&'static str]| scan_of("simple-room", "fig9", further);
     check(&scan(&["--step-deg", "1"]), 2, &["step_deg 1", "0.9"]);
     check(&scan(&["--step-deg", "0"]), 2, &["step_deg"]);
@@ -160,7 +77,7 @@ fn plans_and_settings() {
 }
 
 #[test]
-fn output_folders() {
+fn unusable_output_folders() {
     let scan = |out| {
         [
             "scan",
@@ -184,7 +101,7 @@ fn output_folders() {
 }
 
 #[test]
-fn a_log_in_use_is_not_shared() {
+fn log_in_use() {
     let folder = tempfile::tempdir().expect("a folder");
     let log = folder.path().join("scan.jsonl");
     let _held = sonard::store::LogWriter::open(&log).expect("opens");
@@ -194,7 +111,7 @@ fn a_log_in_use_is_not_shared() {
 }
 
 #[test]
-fn a_reader_that_goes_away_is_no_failure_worth_a_backtrace() {
+fn closed_reader() {
     let mut scan = sonard(&["scan", "--mock", "--scene", "simple-room", "--pose", "fig9"]);
     let mut child = scan.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("starts");
     drop(child.stdout.take());

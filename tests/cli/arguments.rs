@@ -1,0 +1,47 @@
+//! Arguments that are valid text but unusual: paths that are not UTF-8, extreme numbers.
+
+use std::{ffi::OsStr, fs, os::unix::ffi::OsStrExt as _};
+
+use crate::{
+    collect::said,
+    common::{run, sonard, stderr},
+};
+
+#[test]
+fn non_utf8_paths() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let scene = folder.path().join(OsStr::from_bytes(b"room-\xff.json"));
+    fs::write(&scene, include_str!("../../scenes/simple-room.json")).expect("writes");
+    for arguments in [
+        &["scene", "check"][..],
+        &["simulate", "--pose", "fig9", "--to-deg", "9", "--scene"],
+        &["scan", "--mock", "--pose", "fig9", "--to-deg", "9", "--scene"],
+    ] {
+        let output = sonard(arguments).arg(&scene).output().expect("starts");
+        assert_eq!(output.status.code(), Some(0), "{arguments:?}: {}", stderr(&output));
+    }
+    // A configuration is text: it is refused by name.
+    for option in ["--scene", "--log"] {
+        let output = sonard(&["run", "--check", "--mock", option]).arg(&scene).output();
+        let output = output.expect("starts");
+        assert_eq!(output.status.code(), Some(2));
+        assert!(said(&output).contains(&format!("{option}: ")), "{}", said(&output));
+    }
+}
+
+#[test]
+fn too_many_cells() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let log = folder.path().join("log.jsonl");
+    let log = log.to_str().expect("plain path");
+    let simulate = ["simulate", "--scene", "simple-room", "--pose", "fig9", "-o", log];
+    assert_eq!(run(&simulate).status.code(), Some(0));
+    for resolution in ["1e-12", "1e-200"] {
+        let out = folder.path().join("map");
+        let out = out.to_str().expect("plain path");
+        let map = run(&["map", log, "--out", out, "--resolution", resolution]);
+        let text = said(&map);
+        assert_eq!(map.status.code(), Some(2), "{text}");
+        assert!(text.contains("more than 10^12 cells are too many"), "{text}");
+    }
+}
