@@ -316,14 +316,18 @@ impl Doubts {
                     "{field} goes from {low:.1} to {high:.1} rad, {:.0} turns",
                     most / std::f64::consts::TAU
                 ),
-                help: format!("if these are degrees: {option}; --no-unit-check takes them as they are"),
+                help: format!(
+                    "if these are degrees: {option}; --no-unit-check takes them as they are"
+                ),
             });
         }
         let is_like_radians = most <= MAX_RAD && !self.are_whole && high - low > 0.3;
         if field.unit() == Some("deg") && is_like_radians {
             return Err(ImportError::Doubtful {
                 what: format!("{field} goes from {low:.3} to {high:.3}, as radians would"),
-                help: format!("if these are radians: {option}; if they are degrees: --no-unit-check"),
+                help: format!(
+                    "if these are radians: {option}; if they are degrees: --no-unit-check"
+                ),
             });
         }
         Ok(())

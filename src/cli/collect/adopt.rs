@@ -29,16 +29,12 @@ pub(super) fn adopt(plan: &mut Plan, daemon: &ByDaemon, status: &Status) -> Resu
     }
     if !differences.is_empty() {
         return Err(Failure::input(
-            format!(
-                "the plan differs from the daemon's settings:\n  {}",
-                differences.join("\n  ")
-            ),
+            format!("the plan differs from the daemon's settings:\n  {}", differences.join("\n  ")),
             "leave these keys out of the plan, or change them in the daemon's configuration and \
              reload it (`systemctl reload sonard`)",
         ));
     }
-    plan.steps_per_revolution =
-        steps_per_revolution(status).unwrap_or(plan.steps_per_revolution);
+    plan.steps_per_revolution = steps_per_revolution(status).unwrap_or(plan.steps_per_revolution);
     Ok(())
 }
 
@@ -66,7 +62,14 @@ fn adopt_sensor(plan: &mut Plan, setup: &Setup) -> Result<Vec<String>, Failure> 
     let mut differ: Vec<String> = options
         .filter(|(key, theirs)| plan.is_given("sensor", key) && ours[key.as_str()] != **theirs)
         .map(|(key, theirs)| {
-            describe_difference(plan, "sensor", key, &ours[key.as_str()], &format!("model.{key}"), theirs)
+            describe_difference(
+                plan,
+                "sensor",
+                key,
+                &ours[key.as_str()],
+                &format!("model.{key}"),
+                theirs,
+            )
         })
         .collect();
     let base = match plan.is_given("sensor", "sensor") {
@@ -99,8 +102,7 @@ fn describe_difference(
     there: &str,
     theirs: &Value,
 ) -> String {
-    let place =
-        plan.layers.origin(section, key).map_or_else(String::new, |at| format!("{at}: "));
+    let place = plan.layers.origin(section, key).map_or_else(String::new, |at| format!("{at}: "));
     format!("{place}{section}.{key} is {ours}, and {there} of the daemon {theirs}")
 }
 

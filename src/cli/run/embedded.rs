@@ -136,7 +136,7 @@ impl EmbeddedControl {
     /// A daemon that is stopping takes no configuration. A configuration with errors is reported by the daemon.
     pub async fn reload(&mut self) -> Result<(), String> {
         let loaded = self.loader.load().map(|(settings, _files)| Box::new(settings));
-        let loaded = loaded.map_err(|failure| super::load::words(&failure));
+        let loaded = loaded.map_err(|failure| super::load::one_line(&failure));
         let ordered = self.handle.order(Order::Reload(loaded)).await;
         ordered.map_err(|refusal| refusal.message)
     }

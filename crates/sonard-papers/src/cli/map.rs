@@ -165,7 +165,10 @@ fn trial(args: &Args, course: usize) -> Result<Row, Failure> {
         range_sigma_m: 0.005,
         exponent: args.exponent,
         extend_m: args.extend,
-        trust: Trust { least_confidence: args.min_reading_confidence, keep_clear: !args.whole_readings },
+        trust: Trust {
+            least_confidence: args.min_reading_confidence,
+            keep_clear: !args.whole_readings,
+        },
     };
     let sensor = Sensor::preset("senscomp-6500").map_err(|error| reject(&error))?;
     let air = Air::default();
