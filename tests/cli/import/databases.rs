@@ -83,7 +83,7 @@ fn what_is_no_bag_or_a_damaged_one_is_refused() {
     let empty = Connection::open(path("empty.db3")).expect("a database");
     empty.execute_batch(TABLES).expect("tables");
     drop(empty);
-    assert!(refused(&["import", &path("empty.db3")]).contains("no message of"));
+    assert!(refused(&["import", &path("empty.db3")]).contains("no sensor_msgs/Range"));
 }
 
 #[test]
