@@ -239,7 +239,7 @@ fn wrong_specifications_and_damage() {
     );
     for (from, to, part) in [
         ("poses = 3", "pose = 3", "spec.toml:5:1: set.pose: unknown field `pose`"),
-        ("boxes = [0, 1]", "boxes = 90", "its furniture finds no place"),
+        ("boxes = [0, 1]", "boxes = 90", "no free position for its furniture"),
         ("[model]", "[sensor]\nany_of = [\"mine.json\"]\n[model]", "mine.json: No such file"),
     ] {
         fs::write(case.path("spec.toml"), SPEC.replace(from, to)).expect("writable");

@@ -145,7 +145,7 @@ fn mapping_file() {
     .expect("writes");
     let mapping = mapping.to_str().expect("a plain path");
     let refusal = refused(&["import", "/dev/null", "--mapping", mapping]);
-    assert!(refusal.contains("holds no line"), "{refusal}");
+    assert!(refusal.contains("has no line"), "{refusal}");
     let mut child =
         sonard(&["import", "-", "--mapping", mapping, "--columns", "bearing_deg=1,range_cm=2"])
             .stdin(std::process::Stdio::piped())

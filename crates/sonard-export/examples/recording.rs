@@ -1,4 +1,4 @@
-//! Makes a recording of a log and says how fast that went.
+//! Converts a log to a recording and prints the throughput.
 //!
 //! ```sh
 //! cargo run --release -p sonard-export --example recording -- scan.jsonl scan.mcap [nav2]
@@ -27,15 +27,15 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut export = Box::new(McapExport::new(out, Settings { profile, ..Settings::default() })?);
     let lines = BufReader::new(File::open(&log)?).split(b'\n').map_while(Result::ok);
     let records = lines.filter_map(|line| decode_line(&line).ok());
-    let began = Instant::now();
+    let start = Instant::now();
     let (mut readings, mut writing_s) = (0, 0.0);
     for scan in ScanView::one_by_one(records) {
         readings += scan.pings.len();
-        let began = Instant::now();
+        let start = Instant::now();
         if let Some(why) = export.scan(&log, &scan)? {
-            println!("scan {} is left out: {why}", scan.scan);
+            println!("scan {} skipped: {why}", scan.scan);
         }
-        writing_s += began.elapsed().as_secs_f64();
+        writing_s += start.elapsed().as_secs_f64();
     }
     let mut file = File::open(&log)?;
     let name = log.rsplit('/').next().unwrap_or(&log);
@@ -43,8 +43,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     export.attach(&LogFile { name, bytes, written: Timestamp::UNIX_EPOCH }, &mut file)?;
     export.finish()?;
     println!(
-        "{readings} readings: {:.0} a second, of the log read {:.0}",
-        readings as f64 / began.elapsed().as_secs_f64(),
+        "{readings} readings: {:.0} per second, {:.0} per second without reading the log",
+        readings as f64 / start.elapsed().as_secs_f64(),
         readings as f64 / writing_s
     );
     Ok(())

@@ -1,7 +1,7 @@
-//! The columns of tables, which are the same in every format of a table.
+//! Columns of exported tables, shared by all table formats.
 //!
-//! Names are those of the log's records, with the unit in them; what stands in `sim` there begins with `sim_`.
-//! What the log does not say is nothing, never a number that means nothing.
+//! Names are those of the log records, with the unit; fields of `sim` are prefixed by `sim_`.
+//! Values missing in the log are empty cells, never special numbers.
 
 use std::borrow::Cow;
 
@@ -11,12 +11,12 @@ use serde::Serialize;
 use sonard_model::{geometry::Pose, viewpoint::Viewpoint};
 use sonard_records::{CrosstalkRecord, PathRecord, Ping, ScanView, Session, SimRecord};
 
-/// A reading with what holds for its scan.
+/// Reading with the context of its scan.
 #[derive(Debug, Clone, Copy)]
 pub struct Row<'a> {
-    /// The log's name.
+    /// File name of the log.
     log: &'a str,
-    /// Number of the session among those that are exported, from 1.
+    /// Number of the session among the exported ones, from 1.
     session: Option<u32>,
     scan: &'a ScanView,
     ping: &'a Ping,
@@ -24,7 +24,7 @@ pub struct Row<'a> {
 }
 
 impl<'a> Row<'a> {
-    /// Of a reading of a scan.
+    /// Creates the row of a reading.
     pub(crate) fn new(
         log: &'a str,
         session: Option<u32>,
@@ -34,11 +34,11 @@ impl<'a> Row<'a> {
         Self { log, session, scan, ping, viewpoint: scan.viewpoint(ping) }
     }
 
-    fn of_session(&self) -> Option<&'a Session> {
+    fn session_record(&self) -> Option<&'a Session> {
         self.scan.session.as_deref()
     }
 
-    /// Where the robot stood at firing.
+    /// Returns the pose of the robot at the firing.
     fn pose(&self) -> Option<Pose> {
         self.ping.pose.or_else(|| self.scan.pose())
     }
@@ -53,57 +53,57 @@ impl<'a> Row<'a> {
 
     fn sound_speed_m_s(&self) -> Option<f64> {
         let of_scan = self.scan.start.as_ref().and_then(|start| start.air);
-        let of_session = || self.of_session().map(|session| session.air.sound_speed_m_s);
-        of_scan.map(|air| air.sound_speed_m_s).or_else(of_session)
+        let session_air = || self.session_record().map(|session| session.air.sound_speed_m_s);
+        of_scan.map(|air| air.sound_speed_m_s).or_else(session_air)
     }
 
     fn temperature_c(&self) -> Option<f64> {
         let of_scan = self.scan.start.as_ref().and_then(|start| start.air);
-        let of_session = || self.of_session().map(|session| session.air.temperature_c);
-        of_scan.map(|air| air.temperature_c).or_else(of_session)
+        let session_air = || self.session_record().map(|session| session.air.temperature_c);
+        of_scan.map(|air| air.temperature_c).or_else(session_air)
     }
 }
 
-/// What a cell can hold.
+/// Type of the values of a column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
-    /// UTF-8.
+    /// Text, encoded as UTF-8.
     Text,
-    /// A whole number.
+    /// Signed 64-bit integer.
     Integer,
-    /// A finite number.
+    /// Finite double-precision number.
     Number,
-    /// Yes or no.
+    /// Truth value of a flag.
     Flag,
-    /// A moment, to the nanosecond.
+    /// Time with nanosecond resolution.
     Time,
-    /// Whole numbers, perhaps none.
+    /// Possibly empty list of unsigned integers.
     Integers,
-    /// Finite numbers of seven digits, perhaps none.
+    /// Possibly empty list of finite single-precision numbers.
     Numbers,
 }
 
-/// What a cell holds.
+/// Value of a cell.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Value<'a> {
-    /// Of [`Kind::Text`].
+    /// Value of a [`Kind::Text`] column.
     Text(Cow<'a, str>),
-    /// Of [`Kind::Integer`].
+    /// Value of a [`Kind::Integer`] column.
     Integer(i64),
-    /// Of [`Kind::Number`].
+    /// Value of a [`Kind::Number`] column.
     Number(f64),
-    /// Of [`Kind::Flag`].
+    /// Value of a [`Kind::Flag`] column.
     Flag(bool),
-    /// Of [`Kind::Time`].
+    /// Value of a [`Kind::Time`] column.
     Time(Timestamp),
-    /// Of [`Kind::Integers`].
+    /// Value of a [`Kind::Integers`] column.
     Integers(&'a [u32]),
-    /// Of [`Kind::Numbers`].
+    /// Value of a [`Kind::Numbers`] column.
     Numbers(&'a [f32]),
 }
 
 impl Value<'_> {
-    /// Which kind it is of.
+    /// Returns the kind of column that the value belongs to.
     #[must_use]
     pub const fn kind(&self) -> Kind {
         match self {
@@ -118,37 +118,39 @@ impl Value<'_> {
     }
 }
 
-/// What a column of a table is called and holds.
+/// Name and type of a column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Field {
-    /// Its name, with the unit.
+    /// Column name, with the unit.
     pub name: &'static str,
-    /// What its cells hold.
+    /// Type of the cells.
     pub kind: Kind,
-    /// Of numbers, whether seven digits say all: formats that have such numbers take four bytes instead of eight.
+    /// True if single precision is sufficient; binary formats then store four bytes instead of
+    /// eight.
     pub is_single: bool,
 }
 
-/// A column of a table of logs.
+/// Column of a table of readings.
 #[derive(Debug, Clone, Copy)]
 pub struct Column {
-    /// Its name, with the unit.
+    /// Column name, with the unit.
     pub name: &'static str,
-    /// What its cells hold.
+    /// Type of the cells.
     pub kind: Kind,
-    /// Of numbers, whether seven digits say all: formats that have such numbers take four bytes instead of eight.
+    /// True if single precision is sufficient; binary formats then store four bytes instead of
+    /// eight.
     pub is_single: bool,
     cell: for<'a> fn(&Row<'a>) -> Option<Value<'a>>,
 }
 
 impl Column {
-    /// What it is called and holds.
+    /// Returns name and type of the column.
     #[must_use]
     pub const fn field(&self) -> Field {
         Field { name: self.name, kind: self.kind, is_single: self.is_single }
     }
 
-    /// The cell of a reading; `None` where the log does not say it.
+    /// Returns the cell of a reading; `None` for a value missing in the log.
     #[must_use]
     pub fn cell<'a>(&self, row: &Row<'a>) -> Option<Value<'a>> {
         (self.cell)(row)
@@ -167,7 +169,7 @@ const fn number(name: &'static str, cell: for<'a> fn(&Row<'a>) -> Option<Value<'
     Column { name, kind: Kind::Number, is_single: false, cell }
 }
 
-/// A number of what was heard: a micrometre in ten metres is its seventh digit.
+/// Column of a measured or predicted quantity: seven digits resolve a micrometre in ten metres.
 const fn single(name: &'static str, cell: for<'a> fn(&Row<'a>) -> Option<Value<'a>>) -> Column {
     Column { name, kind: Kind::Number, is_single: true, cell }
 }
@@ -176,19 +178,19 @@ const fn time(name: &'static str, cell: for<'a> fn(&Row<'a>) -> Option<Value<'a>
     Column { name, kind: Kind::Time, is_single: false, cell }
 }
 
-/// A word of the records, as a log has it.
-pub(crate) fn logged_word(value: impl Serialize) -> Option<String> {
+/// Returns the serialized name of an enum value, as written in a log.
+pub(crate) fn serialized_name(value: impl Serialize) -> Option<String> {
     match serde_json::to_value(value) {
-        Ok(serde_json::Value::String(word)) => Some(word),
+        Ok(serde_json::Value::String(name)) => Some(name),
         _ => None,
     }
 }
 
-fn word<'a>(value: impl Serialize) -> Option<Value<'a>> {
-    logged_word(value).map(|word| Value::Text(word.into()))
+fn enum_text<'a>(value: impl Serialize) -> Option<Value<'a>> {
+    serialized_name(value).map(|name| Value::Text(name.into()))
 }
 
-fn words(path: &PathRecord) -> Value<'_> {
+fn path_text(path: &PathRecord) -> Value<'_> {
     Value::Text(path.in_words().into())
 }
 
@@ -196,22 +198,24 @@ fn sender(crosstalk: &CrosstalkRecord) -> Value<'_> {
     Value::Text((&*crosstalk.ranger).into())
 }
 
-/// The columns, in their order.
+/// All columns, in table order.
 pub const COLUMNS: &[Column] = &[
     text("log", |row| Some(Value::Text(row.log.into()))),
     integer("session", |row| row.session.map(|number| Value::Integer(number.into()))),
-    time("session_started", |row| Some(Value::Time(row.of_session()?.started))),
-    text("provenance", |row| word(row.ping.provenance.or(Some(row.of_session()?.provenance))?)),
-    text("scene", |row| Some(Value::Text((&*row.of_session()?.scene.as_ref()?.name).into()))),
-    text("sensor", |row| Some(Value::Text((&*row.of_session()?.sensor.name).into()))),
-    text("array", |row| Some(Value::Text((&*row.of_session()?.array.as_ref()?.name).into()))),
+    time("session_started", |row| Some(Value::Time(row.session_record()?.started))),
+    text("provenance", |row| {
+        enum_text(row.ping.provenance.or(Some(row.session_record()?.provenance))?)
+    }),
+    text("scene", |row| Some(Value::Text((&*row.session_record()?.scene.as_ref()?.name).into()))),
+    text("sensor", |row| Some(Value::Text((&*row.session_record()?.sensor.name).into()))),
+    text("array", |row| Some(Value::Text((&*row.session_record()?.array.as_ref()?.name).into()))),
     text("scan", |row| Some(Value::Text(row.scan.scan.to_string().into()))),
     time("scan_started", |row| Some(Value::Time(row.scan.start.as_ref()?.time))),
     integer("collection_pose", |row| {
-        Some(Value::Integer(row.of_session()?.collection.as_ref()?.pose.into()))
+        Some(Value::Integer(row.session_record()?.collection.as_ref()?.pose.into()))
     }),
     integer("collection_repeat", |row| {
-        Some(Value::Integer(row.of_session()?.collection.as_ref()?.repeat.into()))
+        Some(Value::Integer(row.session_record()?.collection.as_ref()?.repeat.into()))
     }),
     integer("index", |row| Some(Value::Integer(row.ping.index.into()))),
     time("time", |row| row.ping.time.map(Value::Time)),
@@ -229,7 +233,7 @@ pub const COLUMNS: &[Column] = &[
     number("tilt_deg", |row| Some(Value::Number(row.viewpoint?.tilt_deg))),
     number("temperature_c", |row| row.temperature_c().map(Value::Number)),
     number("sound_speed_m_s", |row| row.sound_speed_m_s().map(Value::Number)),
-    text("status", |row| word(row.ping.status)),
+    text("status", |row| enum_text(row.ping.status)),
     single("range_m", |row| row.ping.range_m.map(Value::Number)),
     single("tof_us", |row| row.ping.tof_us.map(Value::Number)),
     integer("fired_ticks", |row| {
@@ -249,22 +253,22 @@ pub const COLUMNS: &[Column] = &[
     },
     single("amplitude", |row| row.ping.amplitude.map(Value::Number)),
     single("margin_db", |row| row.ping.margin_db.map(Value::Number)),
-    text("path_kind", |row| word(row.ping.path.as_ref()?.kind)),
+    text("path_kind", |row| enum_text(row.ping.path.as_ref()?.kind)),
     integer("path_order", |row| Some(Value::Integer(row.ping.path.as_ref()?.order.into()))),
     single("path_length_m", |row| Some(Value::Number(row.ping.path.as_ref()?.length_m))),
-    text("path", |row| row.ping.path.as_ref().map(words)),
+    text("path", |row| row.ping.path.as_ref().map(path_text)),
     text("crosstalk_ranger", |row| Some(sender(row.ping.crosstalk.as_ref()?))),
     number("crosstalk_before_us", |row| {
         Some(Value::Number(row.ping.crosstalk.as_ref()?.before_us))
     }),
-    text("sim_status", |row| word(row.sim()?.status)),
+    text("sim_status", |row| enum_text(row.sim()?.status)),
     single("sim_range_m", |row| row.sim()?.range_m.map(Value::Number)),
     single("sim_amplitude", |row| row.sim()?.amplitude.map(Value::Number)),
     single("sim_margin_db", |row| row.sim()?.margin_db.map(Value::Number)),
-    text("sim_path_kind", |row| word(row.sim_path()?.kind)),
+    text("sim_path_kind", |row| enum_text(row.sim_path()?.kind)),
     integer("sim_path_order", |row| Some(Value::Integer(row.sim_path()?.order.into()))),
     single("sim_path_length_m", |row| Some(Value::Number(row.sim_path()?.length_m))),
-    text("sim_path", |row| row.sim_path().map(words)),
+    text("sim_path", |row| row.sim_path().map(path_text)),
     text("sim_crosstalk_ranger", |row| Some(sender(row.sim()?.crosstalk.as_ref()?))),
     number("sim_crosstalk_before_us", |row| {
         Some(Value::Number(row.sim()?.crosstalk.as_ref()?.before_us))

@@ -1,6 +1,7 @@
-//! From records to messages of ROS 2, one record at a time: what recordings hold and what live viewers are told.
+//! Conversion of records to ROS 2 messages, one record at a time, for recordings and live viewers.
 //!
-//! Pure: it is told when each reading was fired, and hands messages to an [`MessageSink`].
+//! Free of I/O and clocks: the caller provides the time of each firing and a [`MessageSink`] for
+//! the messages.
 
 mod frames;
 mod readings;
@@ -20,21 +21,21 @@ use crate::{
     },
 };
 pub(crate) use frames::MAP;
-use frames::Stance;
-use readings::{Figures, Heard, laser_scan, paths, points};
-pub(crate) use readings::{Firings, in_order};
+use frames::RangerPose;
+pub(crate) use readings::{FiringTimes, plan_order};
+use readings::{RangeReading, SessionParameters, laser_scan, paths, points};
 use scene::outlines;
 pub use settings::{Distribution, Profile, Settings};
-use topics::OfReading;
+use topics::ReadingTopic;
 pub use topics::Topic;
 use topics::{FIXED_TRANSFORMS, SCENE};
-pub(crate) use topics::{MAP_TOPIC, stands_still};
+pub(crate) use topics::{MAP_TOPIC, is_static_topic};
 
-/// Where messages go.
+/// Receiver of converted messages.
 pub(crate) trait MessageSink {
     type Error;
 
-    /// Takes a message, told at a time.
+    /// Writes a message at a time.
     fn message(
         &mut self,
         topic: &str,
@@ -44,73 +45,81 @@ pub(crate) trait MessageSink {
     ) -> Result<(), Self::Error>;
 }
 
-/// Makes messages of readings and scans.
+/// Converter of readings and scans to messages.
 #[derive(Debug)]
 pub(crate) struct Converter {
     settings: Settings,
-    /// Of the session in force.
-    figures: Option<Figures>,
+    /// Parameters of the current session.
+    parameters: Option<SessionParameters>,
     topics: Vec<Topic>,
-    /// What stands still in that session and was not told yet.
-    untold: Option<Untold>,
-    /// The last reading, until the transducer's place at its end is told.
-    listening: Option<Listening>,
-    /// When the last reading ended.
+    /// Static messages of the session, until the first reading gives their time.
+    static_messages: Option<StaticMessages>,
+    /// Last reading, until the transducer's position at its end is written.
+    open_reading: Option<OpenReading>,
+    /// End of the last written reading.
     end: Stamp,
 }
 
-/// What is told once in a session, when it has a first time.
+/// Messages that are written once per session, with the time of its first reading.
 #[derive(Debug)]
-struct Untold {
+struct StaticMessages {
     scene: Vec<(&'static str, Vec<[f64; 3]>)>,
 }
 
-/// A reading whose end is not told yet.
+/// Reading whose end is not written yet.
 #[derive(Debug, Clone, Copy)]
-struct Listening {
+struct OpenReading {
     fired: Stamp,
-    stance: Stance,
+    ranger_pose: RangerPose,
 }
 
 impl Converter {
     pub(crate) fn new(settings: Settings) -> Self {
         let end = Stamp(0);
-        Self { settings, figures: None, topics: Vec::new(), untold: None, listening: None, end }
+        Self {
+            settings,
+            parameters: None,
+            topics: Vec::new(),
+            static_messages: None,
+            open_reading: None,
+            end,
+        }
     }
 
-    /// Takes what holds for the scans that follow; says so if there is nothing to be told of them.
+    /// Starts a session; returns the reason if its scans cannot be converted.
     pub(crate) fn begin_session(&mut self, session: &Session) -> Result<(), LeftOut> {
-        (self.figures, self.topics, self.untold) = (None, Vec::new(), None);
-        let figures = Figures::of(session, &self.settings)?;
+        (self.parameters, self.topics, self.static_messages) = (None, Vec::new(), None);
+        let parameters = SessionParameters::new(session, &self.settings)?;
         let scene = outlines(session);
         let distribution = self.settings.distribution;
-        self.topics = topics::of_session(session, &figures.frames, !scene.is_empty(), distribution);
-        self.untold = Some(Untold { scene });
-        self.figures = Some(figures);
+        self.topics =
+            topics::session_topics(session, &parameters.frames, !scene.is_empty(), distribution);
+        self.static_messages = Some(StaticMessages { scene });
+        self.parameters = Some(parameters);
         Ok(())
     }
 
-    /// Whether there is something to be told of the scans of the session in force.
+    /// Returns `true` if scans of the current session can be converted.
     pub(crate) const fn is_in_session(&self) -> bool {
-        self.figures.is_some()
+        self.parameters.is_some()
     }
 
-    /// The topics of the session in force.
+    /// Returns the topics of the current session.
     pub(crate) fn topics(&self) -> &[Topic] {
         &self.topics
     }
 
-    /// When the last reading ended that was told.
+    /// Returns the end of the last written reading.
     pub(crate) const fn end(&self) -> Stamp {
         self.end
     }
 
-    /// How long a reading listens, nanoseconds.
+    /// Returns the duration of the receive window, nanoseconds.
     pub(crate) fn window_ns(&self) -> u64 {
-        self.figures.as_ref().map_or(0, |figures| figures.window_ns)
+        self.parameters.as_ref().map_or(0, |parameters| parameters.window_ns)
     }
 
-    /// Tells a reading, with the robot at a pose, and where the transducer was.
+    /// Writes the messages of a reading, and the transforms at its firing with the robot at a pose.
     pub(crate) fn reading<O: MessageSink>(
         &mut self,
         robot: Pose,
@@ -118,39 +127,40 @@ impl Converter {
         fired: Stamp,
         out: &mut O,
     ) -> Result<(), O::Error> {
-        // Before the motor steps on, and before the next reading begins: no frame is at two places at one time.
+        // Ends before the motor steps and the next reading starts: a frame has one placement at a
+        // time.
         self.close(Stamp(fired.0.saturating_sub(1)), out)?;
-        let Some(figures) = &self.figures else { return Ok(()) };
-        if let Some(untold) = self.untold.take() {
-            untold.tell(figures, fired, out)?;
+        let Some(parameters) = &self.parameters else { return Ok(()) };
+        if let Some(static_messages) = self.static_messages.take() {
+            static_messages.write(parameters, fired, out)?;
         }
-        let stance = Stance::of(robot, ping);
-        self.settings.place(figures, fired, stance, out)?;
-        self.listening = Some(Listening { fired, stance });
-        figures.tell(&self.settings, ping, fired, out)
+        let ranger_pose = RangerPose::at_reading(robot, ping);
+        self.settings.write_transforms(parameters, fired, ranger_pose, out)?;
+        self.open_reading = Some(OpenReading { fired, ranger_pose });
+        parameters.write(&self.settings, ping, fired, out)
     }
 
-    /// Tells a scan whose readings are told, in the order of its plan.
+    /// Writes the messages of a complete scan, whose readings were written, in plan order.
     pub(crate) fn scan<O: MessageSink>(
         &mut self,
         scan: &ScanView,
-        (pings, firings): (&[&Ping], &Firings),
+        (pings, firings): (&[&Ping], &FiringTimes),
         out: &mut O,
     ) -> Result<(), O::Error> {
         self.close(Stamp(u64::MAX), out)?;
         let (end, both) = (self.end, (pings, firings));
         let first = firings.fired.iter().flatten().min();
-        let Some((first, figures)) = first.copied().zip(self.figures.as_ref()) else {
+        let Some((first, parameters)) = first.copied().zip(self.parameters.as_ref()) else {
             return Ok(());
         };
-        if let Some(laser) = laser_scan(scan, both, figures, first) {
+        if let Some(laser) = laser_scan(scan, both, parameters, first) {
             out.message(topics::SCAN, LASER_SCAN, end, &laser)?;
         }
         let header = Header { stamp: first, frame: MAP };
-        let cloud = points(scan, both, header, |ping| Some(Heard::measured(ping)));
+        let cloud = points(scan, both, header, |ping| Some(RangeReading::measured(ping)));
         out.message(topics::POINTS, POINT_CLOUD, end, &cloud)?;
         if pings.iter().any(|ping| ping.sim.is_some()) {
-            let cloud = points(scan, both, header, Heard::predicted);
+            let cloud = points(scan, both, header, RangeReading::predicted);
             out.message(topics::PREDICTED_POINTS, POINT_CLOUD, end, &cloud)?;
         }
         if pings.iter().any(|ping| ping.sound_path().is_some()) {
@@ -159,49 +169,50 @@ impl Converter {
         Ok(())
     }
 
-    /// Tells where the transducer was when the last reading's window ended, or at `latest`.
+    /// Writes the transforms at the end of the last reading's window, or at `latest`.
     fn close<O: MessageSink>(&mut self, latest: Stamp, out: &mut O) -> Result<(), O::Error> {
-        let Some((last, figures)) = self.listening.take().zip(self.figures.as_ref()) else {
+        let Some((last, parameters)) = self.open_reading.take().zip(self.parameters.as_ref())
+        else {
             return Ok(());
         };
-        let end = figures.ended(last.fired).min(latest).max(last.fired);
+        let end = parameters.window_end(last.fired).min(latest).max(last.fired);
         self.end = self.end.max(end);
-        // Told already, where there is no time between.
+        // Already written if no time has passed.
         if end == last.fired {
             return Ok(());
         }
-        self.settings.place(figures, end, last.stance, out)
+        self.settings.write_transforms(parameters, end, last.ranger_pose, out)
     }
 }
 
 impl Settings {
-    /// Tells where what moves is at a time.
-    fn place<O: MessageSink>(
+    /// Writes the transforms of moving frames at a time.
+    fn write_transforms<O: MessageSink>(
         &self,
-        figures: &Figures,
+        parameters: &SessionParameters,
         at: Stamp,
-        stance: Stance,
+        ranger_pose: RangerPose,
         out: &mut O,
     ) -> Result<(), O::Error> {
-        let mut placed = figures.frames.moving(at, stance);
+        let mut transforms = parameters.frames.moving(at, ranger_pose);
         if !self.places_robot {
-            placed.retain(|transform| transform.header.frame != MAP);
+            transforms.retain(|transform| transform.header.frame != MAP);
         }
-        match placed.is_empty() {
+        match transforms.is_empty() {
             true => Ok(()),
-            false => out.message(topics::TRANSFORMS_TOPIC, TRANSFORMS, at, &Transforms(placed)),
+            false => out.message(topics::TRANSFORMS_TOPIC, TRANSFORMS, at, &Transforms(transforms)),
         }
     }
 }
 
-impl Untold {
-    fn tell<O: MessageSink>(
+impl StaticMessages {
+    fn write<O: MessageSink>(
         self,
-        figures: &Figures,
+        parameters: &SessionParameters,
         at: Stamp,
         out: &mut O,
     ) -> Result<(), O::Error> {
-        let fixed = Transforms(figures.frames.fixed(at));
+        let fixed = Transforms(parameters.frames.fixed(at));
         out.message(FIXED_TRANSFORMS, TRANSFORMS, at, &fixed)?;
         if self.scene.is_empty() {
             return Ok(());
@@ -211,28 +222,28 @@ impl Untold {
     }
 }
 
-impl Figures {
-    /// When a reading that was fired at a time stops to listen: before the motor steps on.
-    fn ended(&self, fired: Stamp) -> Stamp {
+impl SessionParameters {
+    /// Returns the end of the receive window of a reading, before the motor steps.
+    fn window_end(&self, fired: Stamp) -> Stamp {
         Stamp(fired.0.saturating_add(self.window_ns.saturating_sub(1)))
     }
 
-    /// Tells what was heard, what was predicted, and by how much they differ, when both are known.
-    fn tell<O: MessageSink>(
+    /// Writes measured range, predicted range and residual, as far as they are known.
+    fn write<O: MessageSink>(
         &self,
         settings: &Settings,
         ping: &Ping,
         fired: Stamp,
         out: &mut O,
     ) -> Result<(), O::Error> {
-        let Some((frame, ranger)) = self.frames.of_reading(ping) else { return Ok(()) };
-        let heard_at = self.ended(fired);
+        let Some((frame, ranger)) = self.frames.frame_of_reading(ping) else { return Ok(()) };
+        let received_at = self.window_end(fired);
         let readings = [
-            (OfReading::Range, Some(Heard::measured(ping))),
-            (OfReading::Predicted, Heard::predicted(ping)),
+            (ReadingTopic::Range, Some(RangeReading::measured(ping))),
+            (ReadingTopic::Predicted, RangeReading::predicted(ping)),
         ];
-        for (told, heard) in readings {
-            let range = heard.and_then(|heard| self.range(settings.profile, heard));
+        for (topic, reading) in readings {
+            let range = reading.and_then(|reading| self.range(settings.profile, reading));
             let Some(range) = range else { continue };
             let message = Range {
                 header: Header { stamp: fired, frame },
@@ -242,14 +253,14 @@ impl Figures {
                 range,
                 has_variance: settings.distribution != Distribution::Humble,
             };
-            let interface = told.interface(settings.distribution);
-            out.message(&told.topic(ranger), interface, heard_at, &message)?;
+            let interface = topic.interface(settings.distribution);
+            out.message(&topic.topic(ranger), interface, received_at, &message)?;
         }
         match ping.residual_m {
             Some(residual_m) => {
-                let told = OfReading::Residual;
-                let interface = told.interface(settings.distribution);
-                out.message(&told.topic(ranger), interface, heard_at, &Float(residual_m))
+                let topic = ReadingTopic::Residual;
+                let interface = topic.interface(settings.distribution);
+                out.message(&topic.topic(ranger), interface, received_at, &Float(residual_m))
             }
             None => Ok(()),
         }

@@ -1,41 +1,42 @@
-//! How ROS 2 uses DDS: what topics and types are called on the wire, how a node makes itself known, and what
-//! `std_srvs/Trigger` looks like. Bytes are CDR with the four bytes that say so.
+//! Conventions of ROS 2 on DDS: names of topics and types on the wire, node discovery, and
+//! `std_srvs/Trigger`. Messages are CDR with its four-byte encapsulation header.
 //!
-//! Sources: "ROS 2: Topic and Service name mapping to DDS" and "Node to Participant mapping" (design.ros2.org);
-//! the messages of `rmw_dds_common`.
+//! Sources: "ROS 2: Topic and Service name mapping to DDS" and "Node to Participant mapping"
+//! (design.ros2.org); the messages of `rmw_dds_common`.
 
 use crate::{
     Distribution,
     conversion::MAP,
-    ros::cdr::{Cdr, Encode},
+    ros::cdr::{CdrWriter, Encode},
 };
 
-/// The topic by which nodes make themselves known, and the type of its messages.
+/// Discovery topic of nodes, and its message type.
 pub const NODES: (&str, &str) =
     ("ros_discovery_info", "rmw_dds_common::msg::dds_::ParticipantEntitiesInfo_");
 
-/// The frame of the world, in which poses are.
+/// World frame, in which poses are given.
 pub const MAP_FRAME: &str = MAP;
 
-/// Most characters of a namespace, so that topics stay within the 255 that DDS has.
+/// Maximum length of a namespace, so topics stay within the 255 characters of DDS.
 pub const MOST_NAMESPACE: usize = 100;
 
-/// Number of a participant, reader or writer of DDS.
+/// Identifier of a DDS participant, reader or writer.
 pub type Guid = [u8; 16];
 
-/// What a topic as `/sonar/range` is called on the wire, under a namespace as `/kiwi`; the outermost one is empty.
+/// Returns the DDS name of a topic such as `/sonar/range` in a namespace such as `/kiwi`; the root
+/// namespace is empty.
 #[must_use]
 pub fn topic_on_wire(namespace: &str, topic: &str) -> String {
     format!("rt{namespace}{topic}")
 }
 
-/// What request and reply of a service as `/sonar/start` are called on the wire.
+/// Returns the DDS names of request and reply of a service such as `/sonar/start`.
 #[must_use]
 pub fn service_on_wire(namespace: &str, service: &str) -> [String; 2] {
     [format!("rq{namespace}{service}Request"), format!("rr{namespace}{service}Reply")]
 }
 
-/// What a type as `sensor_msgs/msg/Range` is called on the wire.
+/// Returns the DDS name of a type such as `sensor_msgs/msg/Range`.
 #[must_use]
 pub fn type_on_wire(name: &str) -> String {
     match name.rsplit_once('/') {
@@ -44,14 +45,16 @@ pub fn type_on_wire(name: &str) -> String {
     }
 }
 
-/// Whether a text can be a namespace: empty, or names of letters, digits and `_`, each behind a `/`.
+/// Returns `true` for a valid namespace: empty, or names of letters, digits and `_`, each after a
+/// `/`.
 #[must_use]
 pub fn is_namespace(text: &str) -> bool {
     let Some(names) = text.strip_prefix('/') else { return text.is_empty() };
     text.len() <= MOST_NAMESPACE && names.split('/').all(is_name)
 }
 
-/// Whether a text can be a name of ROS: letters, digits and `_`, no digit first and no two `_` together.
+/// Returns `true` for a valid ROS name: letters, digits and `_`, without a leading digit or a
+/// double `_`.
 #[must_use]
 pub fn is_name(text: &str) -> bool {
     let fits = |byte: u8| byte.is_ascii_alphanumeric() || byte == b'_';
@@ -60,42 +63,43 @@ pub fn is_name(text: &str) -> bool {
         && !text.contains("__")
 }
 
-/// A node, and what of DDS belongs to it.
+/// Node with its DDS endpoints.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Node {
-    /// Empty, or as `/kiwi`.
+    /// Namespace, empty or such as `/kiwi`.
     pub namespace: String,
-    /// Its name in there.
+    /// Node name within the namespace.
     pub name: String,
-    /// What it listens by.
+    /// Readers of the node's subscriptions.
     pub readers: Vec<Guid>,
-    /// What it tells by.
+    /// Writers of the node's publications.
     pub writers: Vec<Guid>,
 }
 
 impl Node {
-    /// What the only node of a participant says of itself: `rmw_dds_common/ParticipantEntitiesInfo`.
+    /// Encodes the discovery message of the participant's only node:
+    /// `rmw_dds_common/ParticipantEntitiesInfo`.
     #[must_use]
     pub fn announcement(&self, participant: Guid, distribution: Distribution) -> Vec<u8> {
-        // Up to Humble numbers have room for those of other middleware.
-        let room = match distribution {
+        // Identifiers have 24 bytes up to Humble.
+        let guid_bytes = match distribution {
             Distribution::Humble => 24,
             Distribution::Jazzy => 16,
         };
-        encoded(&Announcement { node: self, participant, room })
+        encoded(&Announcement { node: self, participant, guid_bytes })
     }
 }
 
 struct Announcement<'a> {
     node: &'a Node,
     participant: Guid,
-    room: usize,
+    guid_bytes: usize,
 }
 
 impl Encode for Announcement<'_> {
-    fn encode(&self, cdr: &mut Cdr) {
-        let guid = |guid: &Guid, cdr: &mut Cdr| {
-            (0..self.room).for_each(|at| cdr.u8(guid.get(at).copied().unwrap_or(0)));
+    fn encode(&self, cdr: &mut CdrWriter) {
+        let guid = |guid: &Guid, cdr: &mut CdrWriter| {
+            (0..self.guid_bytes).for_each(|at| cdr.u8(guid.get(at).copied().unwrap_or(0)));
         };
         guid(&self.participant, cdr);
         cdr.u32(1);
@@ -103,48 +107,49 @@ impl Encode for Announcement<'_> {
         cdr.text(&self.node.name);
         for guids in [&self.node.readers, &self.node.writers] {
             cdr.u32(guids.len() as u32);
-            guids.iter().for_each(|one| guid(one, cdr));
+            guids.iter().for_each(|each| guid(each, cdr));
         }
     }
 }
 
-/// The types of request and reply of `std_srvs/srv/Trigger`, as they are called on the wire.
+/// DDS names of the request and reply types of `std_srvs/srv/Trigger`.
 pub const TRIGGER: [&str; 2] =
     ["std_srvs::srv::dds_::Trigger_Request_", "std_srvs::srv::dds_::Trigger_Response_"];
 
-/// Who asked for what, as the middleware of the asker says it.
+/// Identification of a service request, which depends on the client's middleware.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Asker {
-    /// In the message itself: number of the asker and of its request (`rmw_cyclonedds`).
+    /// Header in the message: client and sequence number (`rmw_cyclonedds`).
     Within([u8; Self::BYTES]),
-    /// Beside the message, as DDS-RPC has it (`rmw_fastrtps`).
+    /// Sample identity outside of the message, as in DDS-RPC (`rmw_fastrtps`).
     Beside,
 }
 
 impl Asker {
     const BYTES: usize = 16;
 
-    /// Who sent a request of `Trigger`, which has no fields of its own, by its bytes behind the four of the encoding.
+    /// Identifies a `Trigger` request, which has no fields, by its bytes after the encapsulation
+    /// header.
     #[must_use]
     pub fn of_trigger(request: &[u8]) -> Self {
         request.first_chunk().map_or(Self::Beside, |header| Self::Within(*header))
     }
 
-    /// The reply to it: whether that was done, and what there is to say.
+    /// Encodes the reply with its success flag and message.
     #[must_use]
     pub fn reply(self, success: bool, message: &str) -> Vec<u8> {
-        encoded(&Reply { to: self, success, message })
+        encoded(&TriggerReply { to: self, success, message })
     }
 }
 
-struct Reply<'a> {
+struct TriggerReply<'a> {
     to: Asker,
     success: bool,
     message: &'a str,
 }
 
-impl Encode for Reply<'_> {
-    fn encode(&self, cdr: &mut Cdr) {
+impl Encode for TriggerReply<'_> {
+    fn encode(&self, cdr: &mut CdrWriter) {
         if let Asker::Within(header) = self.to {
             header.iter().for_each(|byte| cdr.u8(*byte));
         }
@@ -155,7 +160,7 @@ impl Encode for Reply<'_> {
 
 fn encoded(message: &impl Encode) -> Vec<u8> {
     let mut buffer = Vec::new();
-    Cdr::of(message, &mut buffer);
+    CdrWriter::encode(message, &mut buffer);
     buffer
 }
 
@@ -164,7 +169,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_on_the_wire_are_those_of_ros() {
+    fn converts_names() {
         assert_eq!(topic_on_wire("", "/sonar/range"), "rt/sonar/range");
         assert_eq!(topic_on_wire("/kiwi", "/tf"), "rt/kiwi/tf");
         assert_eq!(type_on_wire("sensor_msgs/msg/Range"), "sensor_msgs::msg::dds_::Range_");
@@ -175,7 +180,7 @@ mod tests {
     }
 
     #[test]
-    fn namespaces_are_names_behind_slashes() {
+    fn validates_namespaces() {
         for good in ["", "/kiwi", "/lab/_kiwi_7"] {
             assert!(is_namespace(good), "{good}");
         }
@@ -185,9 +190,9 @@ mod tests {
         }
     }
 
-    /// The bytes as another encoder of CDR has them.
+    /// Comparison with an independent CDR encoder.
     #[test]
-    fn a_node_says_who_it_is_as_rmw_dds_common_has_it() {
+    fn encodes_discovery_message() {
         let guid = |first: u8| std::array::from_fn::<u8, 16, _>(|at| first + at as u8);
         let node = Node {
             namespace: "/kiwi".into(),
@@ -201,10 +206,10 @@ mod tests {
             vec![("/kiwi".into(), "sonard".into(), vec![guid(1)], vec![guid(2), guid(3)])],
         );
         let other = cdr_encoding::to_vec::<_, byteorder::LittleEndian>(&mine).expect("encodes");
-        let told = node.announcement(guid(0), Distribution::Jazzy);
-        assert_eq!((&told[..4], &told[4..]), (&[0, 1, 0, 0][..], &other[..]));
+        let encoded = node.announcement(guid(0), Distribution::Jazzy);
+        assert_eq!((&encoded[..4], &encoded[4..]), (&[0, 1, 0, 0][..], &other[..]));
 
-        // Eight zeros behind each number.
+        // Identifiers padded by eight zeros.
         let wide = |first: u8| (guid(first), [0_u8; 8]);
         let mine: Info<(Guid, [u8; 8])> = (
             wide(0),
@@ -215,18 +220,18 @@ mod tests {
     }
 
     #[test]
-    fn a_reply_goes_back_the_way_that_its_request_came() {
-        // No fields are one byte, and padding.
+    fn replies_match_requests() {
+        // A message without fields is one byte, and padding.
         for request in [&[][..], &[0], &[0, 0, 0, 0]] {
             let asker = Asker::of_trigger(request);
             assert_eq!(asker, Asker::Beside);
-            let told = asker.reply(true, "ok");
-            assert_eq!(told, [0, 1, 0, 0, 1, 0, 0, 0, 3, 0, 0, 0, b'o', b'k', 0]);
+            let reply = asker.reply(true, "ok");
+            assert_eq!(reply, [0, 1, 0, 0, 1, 0, 0, 0, 3, 0, 0, 0, b'o', b'k', 0]);
         }
         let header: [u8; 16] = std::array::from_fn(|at| at as u8);
         let asker = Asker::of_trigger(&[&header[..], &[0]].concat());
         assert_eq!(asker, Asker::Within(header));
-        let told = asker.reply(false, "");
-        assert_eq!(told[4..], [&header[..], &[0, 0, 0, 0, 1, 0, 0, 0, 0]].concat());
+        let reply = asker.reply(false, "");
+        assert_eq!(reply[4..], [&header[..], &[0, 0, 0, 0, 1, 0, 0, 0, 0]].concat());
     }
 }

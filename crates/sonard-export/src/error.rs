@@ -1,41 +1,41 @@
-//! What can go wrong with an export.
+//! Export errors, and reasons for skipping a scan.
 
 use std::io;
 
 use thiserror::Error;
 
-/// Why an export ends before its end.
+/// Error that ends an export.
 #[derive(Debug, Error)]
 pub enum ExportError {
-    /// The output refuses to be written.
+    /// Write error of the output.
     #[error("{0}")]
     Write(#[from] io::Error),
-    /// A log that is attached can't be read to its end.
+    /// Log that could not be read to its end.
     #[error("cannot attach {name}: {source}")]
     Attach {
-        /// The log.
+        /// File name of the log.
         name: String,
-        /// Why.
+        /// Read error of the log.
         source: io::Error,
     },
 }
 
-/// Why a scan has no place in a format.
+/// Reason why a format cannot represent a scan.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 pub enum LeftOut {
-    /// What sensor it was is not known.
-    #[error("its session is missing, and with it the sensor")]
+    /// Missing session record, so the sensor is unknown.
+    #[error("session record missing: sensor unknown")]
     NoSession,
-    /// Where it was taken is not known.
-    #[error("its scan_start is missing, and with it the pose")]
+    /// Missing `scan_start` record, so the pose is unknown.
+    #[error("scan_start record missing: pose unknown")]
     NoPose,
-    /// Figures of sensor or air make no sense.
-    #[error("its session: {0}")]
+    /// Session record with invalid parameters of sensor or air.
+    #[error("invalid session record: {0}")]
     Session(String),
-    /// With this scan the live map ends.
+    /// Live map that ends with this scan.
     #[error(
-        "no more map is told: {0}; `sonard map` makes one of the log, with larger cells (--resolution) or of a part \
-         (--region)"
+        "live map stopped: {0}; create the map from the log with `sonard map`, with larger cells (--resolution) or for \
+                   a part (--region)"
     )]
     Map(String),
 }

@@ -1,8 +1,10 @@
-//! Foxglove's WebSocket protocol, as a server that only tells. Version 1, which Lichtblick and others speak, too.
+//! Server side of Foxglove's WebSocket protocol, version 1, for publishing only. Lichtblick
+//! supports it, too.
 //!
-//! Sans-IO: a [`Session`] takes what a client sends and says what is to be done; the other functions write what a
-//! server sends. Texts are JSON, messages are binary: a byte 1, the number of the subscription (32 bits), the time
-//! (nanoseconds, 64 bits), all little-endian, and the message itself.
+//! Sans-IO: a [`Session`] handles client messages and returns the actions to take; the other
+//! functions encode server messages. Text messages are JSON. Binary messages are a byte 1, the
+//! subscription id (32 bits), the time (nanoseconds, 64 bits), all little-endian, and the encoded
+//! message.
 
 use std::collections::BTreeMap;
 
@@ -11,136 +13,140 @@ use serde_json::json;
 
 use crate::Topic;
 
-/// The sub-protocol by both its names, which mean the same: a client asks for one of them.
+/// Equivalent names of the sub-protocol, of which a client requests one.
 pub const PROTOCOLS: [&str; 2] = ["foxglove.sdk.v1", "foxglove.websocket.v1"];
 
-/// Longest text that is taken of a client, bytes: it could subscribe to a thousand channels at once.
+/// Maximum length of a client's text message: sufficient to subscribe to a thousand channels.
 pub const MOST_TEXT_BYTES: usize = 1 << 16;
 
-/// A client that sent so many texts which make no sense is shown out.
-const MOST_FAULTS: u32 = 100;
+/// Number of invalid messages after which a client is disconnected.
+const MAX_FAULTS: u32 = 100;
 
-/// Longest sentence that a client is told of its own text, characters.
-const MOST_CHARACTERS: usize = 200;
+/// Maximum length of a status message that quotes a client's text, characters.
+const MAX_STATUS_CHARACTERS: usize = 200;
 
-/// How much a status matters to who reads it.
+/// Severity of a status message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Level {
-    /// Good to know.
+    /// Information without consequences.
     Info = 0,
-    /// Something is missing.
+    /// Missing data that the client may need.
     Warning = 1,
-    /// Something was refused.
+    /// Rejected request of the client.
     Error = 2,
 }
 
-/// What is to be done after something came from a client.
+/// Action to take after a client message.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Step {
-    /// Messages of this channel go to it from now on; what is kept of the channel goes at once.
+    /// Send messages of this channel from now on, beginning with its retained message.
     Begin(u32),
-    /// They do no more.
+    /// Stop sending messages of this channel.
     Cease(u32),
-    /// It is told this.
+    /// Send this text to the client.
     Say(String),
-    /// It is shown out.
+    /// Close the connection.
     End,
 }
 
-/// A client's session: what it is subscribed to. It holds at most one subscription for each channel that there is,
-/// whatever the client sends.
+/// Subscriptions of a client, limited to one per existing channel.
 #[derive(Debug, Clone, Default)]
 pub struct Session {
-    /// The client's number of each subscription, by channel.
+    /// Client's subscription id, by channel.
     subscriptions: BTreeMap<u32, u32>,
     faults: u32,
 }
 
-/// What a client asks for; other fields belong to what this server does not do.
+/// Client message; fields of unsupported operations are ignored.
 #[derive(Debug, Deserialize)]
-struct Order {
+struct ClientMessage {
     op: String,
     #[serde(default)]
-    subscriptions: Vec<Subscription>,
+    subscriptions: Vec<SubscribeRequest>,
     #[serde(default, rename = "subscriptionIds")]
     subscription_ids: Vec<u32>,
 }
 
 #[derive(Debug, Deserialize)]
-struct Subscription {
+struct SubscribeRequest {
     id: u32,
     #[serde(rename = "channelId")]
     channel: u32,
 }
 
 impl Session {
-    /// Takes a text of the client; `is_there` says which channels there are.
+    /// Handles a text message of the client; `is_there` returns `true` for existing channels.
     pub fn take_text(&mut self, text: &str, is_there: impl Fn(u32) -> bool) -> Vec<Step> {
         if text.len() > MOST_TEXT_BYTES {
-            return self.fault(&format!("texts have at most {MOST_TEXT_BYTES} bytes"));
+            return self.fault(&format!("text messages have at most {MOST_TEXT_BYTES} bytes"));
         }
-        let order: Order = match serde_json::from_str(text) {
-            Ok(order) => order,
+        let message: ClientMessage = match serde_json::from_str(text) {
+            Ok(message) => message,
             Err(error) => {
-                return self.fault(&format!("this is no message of the protocol: {error}"));
+                return self.fault(&format!("invalid message: {error}"));
             }
         };
-        match order.op.as_str() {
-            "subscribe" => self.subscribe(&order.subscriptions, is_there),
-            "unsubscribe" => self.unsubscribe(&order.subscription_ids),
-            other => self.fault(&format!("`{other}` is not done here: this server only tells")),
+        match message.op.as_str() {
+            "subscribe" => self.subscribe(&message.subscriptions, is_there),
+            "unsubscribe" => self.unsubscribe(&message.subscription_ids),
+            other => self
+                .fault(&format!("operation `{other}` not supported: this server only publishes")),
         }
     }
 
-    /// Takes something binary of the client, which could only be a message that it publishes.
+    /// Handles a binary message of the client, which could only be a publication.
     pub fn take_binary(&mut self) -> Vec<Step> {
-        self.fault("messages are not taken here: this server only tells")
+        self.fault("client publications not supported: this server only publishes")
     }
 
-    fn subscribe(&mut self, asked: &[Subscription], is_there: impl Fn(u32) -> bool) -> Vec<Step> {
-        let (mut steps, mut refused) = (Vec::new(), Refusals::default());
-        for Subscription { id, channel } in asked {
+    fn subscribe(
+        &mut self,
+        requests: &[SubscribeRequest],
+        is_there: impl Fn(u32) -> bool,
+    ) -> Vec<Step> {
+        let (mut steps, mut rejected) = (Vec::new(), Rejections::default());
+        for SubscribeRequest { id, channel } in requests {
             if !is_there(*channel) {
-                refused.add(|| format!("there is no channel {channel}"));
+                rejected.add(|| format!("unknown channel {channel}"));
             } else if self.subscriptions.contains_key(channel) {
-                refused.add(|| format!("channel {channel} is subscribed to already"));
-            } else if self.subscriptions.values().any(|known| known == id) {
-                refused.add(|| format!("subscription {id} is of another channel already"));
+                rejected.add(|| format!("already subscribed to channel {channel}"));
+            } else if self.subscriptions.values().any(|used| used == id) {
+                rejected.add(|| format!("subscription {id} already used for another channel"));
             } else {
                 self.subscriptions.insert(*channel, *id);
                 steps.push(Step::Begin(*channel));
             }
         }
-        steps.extend(self.tell(refused));
+        steps.extend(self.report(rejected));
         steps
     }
 
     fn unsubscribe(&mut self, ids: &[u32]) -> Vec<Step> {
-        let (mut steps, mut refused) = (Vec::new(), Refusals::default());
+        let (mut steps, mut rejected) = (Vec::new(), Rejections::default());
         for id in ids {
-            let known = self.subscriptions.iter().find(|(_, known)| *known == id);
-            let Some(channel) = known.map(|(channel, _)| *channel) else {
-                refused.add(|| format!("there is no subscription {id}"));
+            let found = self.subscriptions.iter().find(|(_, used)| *used == id);
+            let Some(channel) = found.map(|(channel, _)| *channel) else {
+                rejected.add(|| format!("unknown subscription {id}"));
                 continue;
             };
             self.subscriptions.remove(&channel);
             steps.push(Step::Cease(channel));
         }
-        steps.extend(self.tell(refused));
+        steps.extend(self.report(rejected));
         steps
     }
 
-    /// Forgets subscriptions to channels that are no more.
+    /// Removes subscriptions to channels that no longer exist.
     pub fn keep_only(&mut self, is_there: impl Fn(u32) -> bool) {
         self.subscriptions.retain(|channel, _| is_there(*channel));
     }
 
-    /// The channels that it is subscribed to.
+    /// Returns the channels to which the client is subscribed.
     pub fn channels(&self) -> impl Iterator<Item = u32> {
         self.subscriptions.keys().copied()
     }
 
-    /// A message of a channel as it goes to the client; `None` if that is not subscribed to it.
+    /// Encodes a message of a channel for the client; `None` without a subscription.
     #[must_use]
     pub fn frame(&self, channel: u32, at_ns: u64, message: &[u8]) -> Option<Vec<u8>> {
         const MESSAGE: u8 = 1;
@@ -153,43 +159,44 @@ impl Session {
         Some(frame)
     }
 
-    fn tell(&mut self, refused: Refusals) -> Vec<Step> {
-        refused.in_words().map_or_else(Vec::new, |words| self.fault(&words))
+    fn report(&mut self, rejected: Rejections) -> Vec<Step> {
+        rejected.message().map_or_else(Vec::new, |message| self.fault(&message))
     }
 
     fn fault(&mut self, what: &str) -> Vec<Step> {
         self.faults = self.faults.saturating_add(1);
-        let shown: String = what.chars().take(MOST_CHARACTERS).collect();
-        let said = Step::Say(status(Level::Error, &shown));
-        if self.faults < MOST_FAULTS { vec![said] } else { vec![said, Step::End] }
+        let shown: String = what.chars().take(MAX_STATUS_CHARACTERS).collect();
+        let status = Step::Say(status(Level::Error, &shown));
+        if self.faults < MAX_FAULTS { vec![status] } else { vec![status, Step::End] }
     }
 }
 
-/// What was refused of one text: the first in words, the others as a number.
+/// Rejected requests of one client message: the first as text, the others counted.
 #[derive(Debug, Default)]
-struct Refusals {
+struct Rejections {
     first: Option<String>,
     others: usize,
 }
 
-impl Refusals {
-    fn add(&mut self, words: impl FnOnce() -> String) {
+impl Rejections {
+    fn add(&mut self, text: impl FnOnce() -> String) {
         match self.first {
-            None => self.first = Some(words()),
+            None => self.first = Some(text()),
             Some(_) => self.others += 1,
         }
     }
 
-    fn in_words(self) -> Option<String> {
+    fn message(self) -> Option<String> {
         let Self { first, others } = self;
         first.map(|first| match others {
             0 => first,
-            _ => format!("{first}, and {others} more of this text were refused"),
+            _ => format!("{first}, and {others} more requests of this message rejected"),
         })
     }
 }
 
-/// What a client is told first: who the server is, and by which session, so that it knows when that is another.
+/// Encodes the first message to a client: server name and session id, by which clients detect a
+/// restart.
 #[must_use]
 pub fn server_info(session: &str) -> String {
     json!({
@@ -203,7 +210,7 @@ pub fn server_info(session: &str) -> String {
     .to_string()
 }
 
-/// Tells of channels that there are now, by their numbers.
+/// Encodes the advertisement of channels with their ids.
 pub fn advertise<'a>(channels: impl IntoIterator<Item = (u32, &'a Topic)>) -> String {
     let channel = |(id, topic): (u32, &Topic)| {
         json!({
@@ -219,13 +226,13 @@ pub fn advertise<'a>(channels: impl IntoIterator<Item = (u32, &'a Topic)>) -> St
     json!({ "op": "advertise", "channels": channels }).to_string()
 }
 
-/// Tells of channels that are no more.
+/// Encodes the removal of channels.
 #[must_use]
 pub fn unadvertise(channels: &[u32]) -> String {
     json!({ "op": "unadvertise", "channelIds": channels }).to_string()
 }
 
-/// Tells something in words.
+/// Encodes a status message.
 #[must_use]
 pub fn status(level: Level, message: &str) -> String {
     json!({ "op": "status", "level": level as u8, "message": message }).to_string()

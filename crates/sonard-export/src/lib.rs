@@ -1,11 +1,13 @@
-//! Scans in the formats of other tools: tables (CSV, and with the feature `parquet` Parquet) of readings beside
-//! predictions, and recordings of ROS 2 (MCAP); maps, lines and features as recordings and as GeoJSON.
+//! Export of scans to the formats of other tools.
 //!
-//! [`Live`] converts records to the messages of a recording as they arrive. [`foxglove`] is the protocol of live
-//! viewers, [`dds`] has topic names and encapsulation for ROS 2.
+//! Readings and predictions become tables (CSV and, with the feature `parquet`, Parquet) or ROS 2
+//! recordings (MCAP). Maps, lines and features become recordings or GeoJSON.
 //!
-//! An [`Export`] takes scans one by one and writes to any `Write`, so that its memory does not grow with the number of
-//! scans.
+//! [`Live`] converts records to the messages of a recording as they arrive. [`foxglove`] implements
+//! the protocol of live viewers, [`dds`] the topic names and encapsulation of ROS 2.
+//!
+//! An [`Export`] takes scans one by one and writes to any `Write`, so its memory does not grow with
+//! their number.
 
 #![warn(clippy::mod_module_files)]
 
@@ -13,14 +15,14 @@ mod columns;
 mod conversion;
 pub mod dds;
 mod error;
+mod findings;
 pub mod foxglove;
 mod live;
 #[cfg(feature = "parquet")]
 mod parquet;
-mod place;
 mod recording;
 mod ros;
-mod sessions;
+mod session_numbers;
 mod table;
 
 use std::io::Read;
@@ -32,45 +34,46 @@ use sonard_records::ScanView;
 pub use columns::{COLUMNS, Column, Field, Kind, Row, Value};
 pub use conversion::{Distribution, Profile, Settings, Topic};
 pub use error::{ExportError, LeftOut};
+pub use findings::{Findings, begins_geojson, to_geojson, write_findings};
 pub use live::{Live, LiveMessage};
 #[cfg(feature = "parquet")]
 pub use parquet::{ParquetExport, TypedTable};
-pub use place::{Findings, begins_geojson, to_geojson, write_findings};
 pub use recording::McapExport;
 pub use table::CsvExport;
 
-/// Takes scans, in the order in which they were taken, and writes them in its format.
+/// Writer of scans in one format, in the order in which they were recorded.
 pub trait Export {
-    /// Writes a scan of the log of this name; says so if the format has no place for it.
+    /// Writes a scan of the log `log`; returns the reason if the format cannot represent the scan.
     ///
     /// # Errors
-    /// What the output refuses.
+    /// Returns the write error of the output.
     fn scan(&mut self, log: &str, scan: &ScanView) -> Result<Option<LeftOut>, ExportError>;
 
-    /// Keeps a log itself beside what was made of it, in formats that can; others take no notice.
+    /// Attaches the log itself, in formats that support attachments; other formats ignore it.
     ///
     /// # Errors
-    /// What the output refuses, and a log that can't be read or ends before its length.
+    /// Returns the write error of the output, or an error if the log is unreadable or shorter than
+    /// stated.
     fn attach(&mut self, log: &LogFile<'_>, bytes: &mut dyn Read) -> Result<(), ExportError> {
         let _ = (log, bytes);
         Ok(())
     }
 
-    /// Writes what belongs to the end; the output is whole then.
+    /// Writes the end of the file, which completes the output.
     ///
     /// # Errors
-    /// What the output refuses.
+    /// Returns the write error of the output.
     fn finish(self: Box<Self>) -> Result<(), ExportError>;
 }
 
-/// A log as it is attached to what was made of it.
+/// Log to attach to an export.
 #[derive(Debug, Clone, Copy)]
 pub struct LogFile<'a> {
-    /// Its name, without folders.
+    /// File name without folders.
     pub name: &'a str,
-    /// How long it is, bytes.
+    /// Length of the log.
     pub bytes: u64,
-    /// When it was last written.
+    /// Time of the last modification.
     pub written: Timestamp,
 }
 

@@ -1,4 +1,4 @@
-//! The messages of a recording, made of records as they come.
+//! Live conversion of records to the messages of a recording.
 
 mod map;
 
@@ -8,53 +8,53 @@ use sonard_records::{Ping, Record, ScanStart, ScanView, Session};
 
 use crate::{
     LeftOut, Settings, Topic,
-    conversion::{Converter, Firings, MessageSink, in_order},
+    conversion::{Converter, FiringTimes, MessageSink, plan_order},
     live::map::LiveMap,
     recording::nanoseconds,
     ros::{
-        cdr::{Cdr, Encode},
+        cdr::{CdrWriter, Encode},
         interface::Interface,
         message::Stamp,
     },
 };
 
-/// Readings of the longest scan that is told as a whole; of a longer one the readings are. They wait in memory until
-/// the scan ends, about a kilobyte each.
-const MOST_READINGS: usize = 4096;
+/// Maximum number of readings of a scan that is converted as a whole; of longer scans only the
+/// readings are converted. Readings are held in memory until the scan ends, about a kilobyte each.
+const MAX_READINGS: usize = 4096;
 
-/// A message for live viewers.
+/// Message for live viewers.
 #[derive(Debug, Clone, Copy)]
 pub struct LiveMessage<'a> {
-    /// Name of its topic, one of [`Live::topics`].
+    /// Topic name, one of [`Live::topics`].
     pub topic: &'a str,
-    /// When it was known, nanoseconds since 1970.
+    /// Time at which the message was complete, nanoseconds since 1970.
     pub at_ns: u64,
-    /// It, in CDR.
+    /// Message encoded in CDR.
     pub bytes: &'a [u8],
 }
 
-/// Makes messages of records in the order of a log, whose readings have times. What it holds does not grow with what it
-/// is given: at most the readings of a scan of 4096 and, where it makes a map, that.
+/// Converter of records, in log order and with times, to messages. Memory is bounded: at most the
+/// readings of a scan of 4096 and an optional map.
 #[derive(Debug)]
 pub struct Live {
     converter: Converter,
     topics: Vec<Topic>,
     map: Option<LiveMap>,
     session: Option<Arc<Session>>,
-    /// The scan under way, with its readings as long as they are not too many.
-    scan: Option<UnderWay>,
-    /// The bytes of a message, kept for the next.
+    /// Current scan, with its readings unless they are too many.
+    scan: Option<PartialScan>,
+    /// Buffer of an encoded message, reused.
     buffer: Vec<u8>,
 }
 
 #[derive(Debug)]
-struct UnderWay {
+struct PartialScan {
     view: ScanView,
     is_too_long: bool,
 }
 
 impl Live {
-    /// One that has not seen any record.
+    /// Creates a converter without a session.
     #[must_use]
     pub fn new(settings: Settings) -> Self {
         let converter = Converter::new(settings);
@@ -62,58 +62,59 @@ impl Live {
         Self { converter, topics, map: None, session: None, scan: None, buffer: Vec::new() }
     }
 
-    /// Whether it also tells a map after each scan ([`Topic::map`]): cell for cell the one that `sonard map` makes of
-    /// all scans so far. Scans of more than 4096 readings are not on it. It has at most 500,000 cells, and takes at most 12
-    /// megabytes; a place that is larger ends it.
+    /// Enables a map after each scan ([`Topic::map`]), identical to that of `sonard map` for all
+    /// scans so far. Scans of more than 4096 readings are excluded. The map has at most 500,000
+    /// cells and takes at most 12 MB; it stops at a larger place.
     #[must_use]
-    pub fn with_map(mut self, is_wanted: bool) -> Self {
-        self.map = is_wanted.then(LiveMap::new);
+    pub fn with_map(mut self, is_enabled: bool) -> Self {
+        self.map = is_enabled.then(LiveMap::new);
         self.topics.retain(|topic| *topic != Topic::map());
-        self.topics.extend(is_wanted.then(Topic::map));
+        self.topics.extend(is_enabled.then(Topic::map));
         self
     }
 
-    /// What there may be messages of in the session in force.
+    /// Returns the topics of the current session.
     #[must_use]
     pub fn topics(&self) -> &[Topic] {
         &self.topics
     }
 
-    /// Takes the next record and hands what there is to be told of it to `tell`.
+    /// Converts the next record and passes its messages to `callback`.
     ///
     /// # Errors
-    /// Of a session that says too little for messages: nothing is told of its scans. Of a scan with which the map ends.
+    /// Returns the reason if a session cannot be converted, so that its scans are skipped, or if a
+    /// scan ends the map.
     pub fn take(
         &mut self,
         record: Record,
-        tell: impl FnMut(LiveMessage<'_>),
+        callback: impl FnMut(LiveMessage<'_>),
     ) -> Result<(), LeftOut> {
-        let mut teller = Teller { tell, buffer: std::mem::take(&mut self.buffer) };
-        let taken = match record {
+        let mut sink = CallbackSink { callback, buffer: std::mem::take(&mut self.buffer) };
+        let result = match record {
             Record::Session(session) => {
-                let mapped = self.end_without_word(&mut teller);
+                let mapped = self.map_unfinished_scan(&mut sink);
                 self.begin_session(session.into()).and(mapped)
             }
             Record::ScanStart(start) => {
-                let mapped = self.end_without_word(&mut teller);
-                self.scan = Some(UnderWay::of(start, self.session.clone()));
+                let mapped = self.map_unfinished_scan(&mut sink);
+                self.scan = Some(PartialScan::new(start, self.session.clone()));
                 mapped
             }
             Record::Ping(ping) => {
-                self.take_reading(*ping, &mut teller);
+                self.convert_reading(*ping, &mut sink);
                 Ok(())
             }
             Record::ScanEnd(end) => {
                 let scan = self.scan.take_if(|scan| scan.view.scan == end.scan);
                 scan.map_or(Ok(()), |mut scan| {
                     scan.view.end = Some(end);
-                    self.end_scan(&scan, &mut teller)
+                    self.end_scan(&scan, &mut sink)
                 })
             }
             Record::Event(_) => Ok(()),
         };
-        self.buffer = teller.buffer;
-        taken
+        self.buffer = sink.buffer;
+        result
     }
 
     fn begin_session(&mut self, session: Arc<Session>) -> Result<(), LeftOut> {
@@ -124,8 +125,8 @@ impl Live {
         begun
     }
 
-    /// A scan whose end never came is on the map as well.
-    fn end_without_word(
+    /// Adds a scan without an end record to the map.
+    fn map_unfinished_scan(
         &mut self,
         out: &mut impl MessageSink<Error = Infallible>,
     ) -> Result<(), LeftOut> {
@@ -135,7 +136,7 @@ impl Live {
 
     fn map(
         &mut self,
-        scan: &UnderWay,
+        scan: &PartialScan,
         out: &mut impl MessageSink<Error = Infallible>,
     ) -> Result<(), LeftOut> {
         match &mut self.map {
@@ -144,7 +145,7 @@ impl Live {
         }
     }
 
-    fn take_reading(&mut self, ping: Ping, out: &mut impl MessageSink<Error = Infallible>) {
+    fn convert_reading(&mut self, ping: Ping, out: &mut impl MessageSink<Error = Infallible>) {
         let Some(scan) = self.scan.as_mut().filter(|scan| scan.view.scan == ping.scan) else {
             return;
         };
@@ -157,22 +158,22 @@ impl Live {
 
     fn end_scan(
         &mut self,
-        scan: &UnderWay,
+        scan: &PartialScan,
         out: &mut impl MessageSink<Error = Infallible>,
     ) -> Result<(), LeftOut> {
         if scan.is_too_long {
             return Ok(());
         }
-        let pings = in_order(&scan.view);
+        let pings = plan_order(&scan.view);
         let fired = pings.iter().map(|ping| fired(ping)).collect();
-        let firings = Firings { fired, window_ns: self.converter.window_ns() };
+        let firings = FiringTimes { fired, window_ns: self.converter.window_ns() };
         let Ok(()) = self.converter.scan(&scan.view, (&pings, &firings), out);
         self.map(scan, out)
     }
 }
 
-impl UnderWay {
-    fn of(start: ScanStart, session: Option<Arc<Session>>) -> Self {
+impl PartialScan {
+    fn new(start: ScanStart, session: Option<Arc<Session>>) -> Self {
         let (pings, events) = (Vec::new(), Vec::new());
         let scan = start.scan;
         let view = ScanView { scan, session, start: Some(start), pings, events, end: None };
@@ -180,7 +181,7 @@ impl UnderWay {
     }
 
     fn add(&mut self, ping: Ping) {
-        if self.view.pings.len() >= MOST_READINGS {
+        if self.view.pings.len() >= MAX_READINGS {
             (self.view.pings, self.is_too_long) = (Vec::new(), true);
         }
         if !self.is_too_long {
@@ -189,18 +190,18 @@ impl UnderWay {
     }
 }
 
-/// When a reading was fired, by the log: where a device's time is not the world's, when it came.
+/// Returns the firing time in the log; without clock synchronization, the time of reception.
 fn fired(ping: &Ping) -> Option<Stamp> {
     ping.time.map(|time| Stamp(nanoseconds(time)))
 }
 
-/// Encodes messages and hands them on.
-struct Teller<F> {
-    tell: F,
+/// Message sink that encodes messages and passes them to a callback.
+struct CallbackSink<F> {
+    callback: F,
     buffer: Vec<u8>,
 }
 
-impl<F: FnMut(LiveMessage<'_>)> MessageSink for Teller<F> {
+impl<F: FnMut(LiveMessage<'_>)> MessageSink for CallbackSink<F> {
     type Error = Infallible;
 
     fn message(
@@ -210,8 +211,8 @@ impl<F: FnMut(LiveMessage<'_>)> MessageSink for Teller<F> {
         at: Stamp,
         message: &impl Encode,
     ) -> Result<(), Infallible> {
-        let bytes = Cdr::of(message, &mut self.buffer);
-        (self.tell)(LiveMessage { topic, at_ns: at.0, bytes });
+        let bytes = CdrWriter::encode(message, &mut self.buffer);
+        (self.callback)(LiveMessage { topic, at_ns: at.0, bytes });
         Ok(())
     }
 }

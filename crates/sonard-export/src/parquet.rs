@@ -1,7 +1,7 @@
 //! Tables of typed columns: Apache Parquet.
 
 mod cells;
-mod remarks;
+mod file_metadata;
 mod typed;
 
 use std::io::{self, Write};
@@ -10,36 +10,37 @@ use ::parquet::errors::ParquetError;
 
 use sonard_records::ScanView;
 
-use crate::{COLUMNS, Column, Export, ExportError, LeftOut, Row, sessions::Sessions};
+use crate::{COLUMNS, Column, Export, ExportError, LeftOut, Row, session_numbers::SessionNumbers};
 pub use typed::TypedTable;
 
-/// A reading a row, in the typed columns of [`COLUMNS`], compressed by Snappy.
+/// Parquet export with one reading per row, in the typed columns of [`COLUMNS`], compressed by
+/// Snappy.
 ///
-/// What the log does not say is null. The records of the sessions stand in the file's key-value metadata, as
-/// `sonard.session.NUMBER` (JSON), the texts of their scenes as `sonard.scene.SHA256`.
+/// Missing values are null. The file's key-value metadata contains the session records, as
+/// `sonard.session.NUMBER` (JSON), and the scene texts, as `sonard.scene.SHA256`.
 pub struct ParquetExport<W: Write + Send> {
     out: TypedTable<W>,
-    sessions: Sessions,
+    sessions: SessionNumbers,
 }
 
 impl<W: Write + Send> ParquetExport<W> {
-    /// A table that is written to `out`, from its beginning to its end.
+    /// Writes the beginning of a table to `out`.
     ///
     /// # Errors
-    /// When `out` refuses the beginning.
+    /// Returns the write error of the output.
     pub fn new(out: W) -> Result<Self, ExportError> {
         let fields: Vec<_> = COLUMNS.iter().map(Column::field).collect();
         let out = TypedTable::new(out, "reading", &fields)?;
-        Ok(Self { out, sessions: Sessions::default() })
+        Ok(Self { out, sessions: SessionNumbers::default() })
     }
 
-    /// Whether a file that begins so is such a table.
+    /// Returns `true` if `head` is the beginning of such a table.
     #[must_use]
     pub fn begins(head: &[u8]) -> bool {
         TypedTable::<W>::begins(head)
     }
 
-    /// Says something of the whole table in its metadata, under a key of the caller's: how it was made.
+    /// Adds an entry to the metadata of the table, such as its origin.
     pub fn remark(&mut self, key: &str, value: String) {
         self.out.remark(key, value);
     }
@@ -49,7 +50,7 @@ impl<W: Write + Send> Export for ParquetExport<W> {
     fn scan(&mut self, log: &str, scan: &ScanView) -> Result<Option<LeftOut>, ExportError> {
         let session = self.sessions.number(scan.session.as_ref());
         if let (Some((number, true)), Some(session)) = (session, scan.session.as_deref()) {
-            self.out.remark_session(number, session);
+            self.out.add_session(number, session);
         }
         for ping in &scan.pings {
             let row = Row::new(log, session.map(|(number, _)| number), scan, ping);
@@ -63,7 +64,7 @@ impl<W: Write + Send> Export for ParquetExport<W> {
     }
 }
 
-fn refused(error: ParquetError) -> ExportError {
+fn write_error(error: ParquetError) -> ExportError {
     match error {
         ParquetError::External(error) => match error.downcast::<io::Error>() {
             Ok(error) => (*error).into(),

@@ -1,4 +1,4 @@
-//! Recordings of ROS 2: MCAP with messages in CDR.
+//! ROS 2 recordings: MCAP with messages in CDR.
 
 mod messages;
 mod times;
@@ -14,53 +14,54 @@ use sonard_records::{Ping, ScanView};
 
 use crate::{
     Export, ExportError, LeftOut, LogFile,
-    columns::logged_word,
-    conversion::{Converter, Profile, Settings, in_order},
+    columns::serialized_name,
+    conversion::{Converter, Profile, Settings, plan_order},
     ros::message::Stamp,
-    sessions::Sessions,
+    session_numbers::SessionNumbers,
 };
-pub(crate) use messages::Messages;
-use messages::refused;
-use times::Times;
+pub(crate) use messages::RecordingWriter;
+use messages::write_error;
+use times::ScanTimes;
 pub(crate) use times::nanoseconds;
 
-/// A recording as ROS 2, Foxglove and others read it: each reading a `Range`, each scan a `LaserScan` where it has
-/// the form of one, a `PointCloud2` and the paths of its sound, with the frames of robot and rangers.
+/// Export to a recording for ROS 2 and Foxglove. Each reading is a `Range`; each scan is a
+/// `PointCloud2`, markers of its propagation paths and, if it has the form, a `LaserScan`. Frames
+/// place robot and rangers.
 pub struct McapExport<W: Write> {
-    messages: Messages<W>,
+    messages: RecordingWriter<W>,
     profile: Profile,
     converter: Converter,
-    sessions: Sessions,
-    times: Times,
+    sessions: SessionNumbers,
+    times: ScanTimes,
     provenances: BTreeSet<String>,
 }
 
 impl<W: Write> McapExport<W> {
-    /// A recording that is written to `out`, from its beginning to its end.
+    /// Writes the beginning of a recording to `out`.
     ///
     /// # Errors
-    /// When `out` refuses the beginning.
+    /// Returns the write error of the output.
     pub fn new(out: W, settings: Settings) -> Result<Self, ExportError> {
         Ok(Self {
-            messages: Messages::new(out)?,
+            messages: RecordingWriter::new(out)?,
             profile: settings.profile,
             converter: Converter::new(settings),
-            sessions: Sessions::default(),
-            times: Times::default(),
+            sessions: SessionNumbers::default(),
+            times: ScanTimes::default(),
             provenances: BTreeSet::new(),
         })
     }
 
-    /// Whether a file that begins so is such a recording.
+    /// Returns `true` if `head` is the beginning of such a recording.
     #[must_use]
     pub fn begins(head: &[u8]) -> bool {
         messages::begins(head)
     }
 
-    /// Its readings in the order of their firing, then what is told of all of them.
+    /// Writes the readings in the order of their firing, then the messages of the whole scan.
     fn write_scan(&mut self, scan: &ScanView) -> Result<(), ExportError> {
-        let pings = in_order(scan);
-        let firings = self.times.of(scan, &pings, self.converter.window_ns());
+        let pings = plan_order(scan);
+        let firings = self.times.firing_times(scan, &pings, self.converter.window_ns());
         let fired = pings.iter().zip(&firings.fired);
         let mut fired: Vec<(Stamp, &Ping)> =
             fired.filter_map(|(ping, fired)| Some((fired.as_ref().copied()?, *ping))).collect();
@@ -72,14 +73,14 @@ impl<W: Write> McapExport<W> {
         self.converter.scan(scan, (&pings, &firings), &mut self.messages)
     }
 
-    /// What a reader of the recording must know and no message says.
-    fn remarks(&self) -> BTreeMap<String, String> {
-        let bases: Vec<_> = self.times.bases.iter().map(|base| base.in_words()).collect();
+    /// Returns the metadata of the recording that messages do not contain.
+    fn metadata(&self) -> BTreeMap<String, String> {
+        let bases: Vec<_> = self.times.bases.iter().map(|base| base.description()).collect();
         let provenances: Vec<_> = self.provenances.iter().cloned().collect();
         BTreeMap::from([
             ("time_base".to_owned(), bases.join(", ")),
             ("provenance".to_owned(), provenances.join(", ")),
-            ("profile".to_owned(), self.profile.in_words().to_owned()),
+            ("profile".to_owned(), self.profile.name().to_owned()),
             ("stamp".to_owned(), "firing".to_owned()),
         ])
     }
@@ -100,35 +101,35 @@ impl<W: Write> Export for McapExport<W> {
         if scan.pose().is_none() {
             return Ok(Some(LeftOut::NoPose));
         }
-        self.provenances.extend(logged_word(session.provenance));
+        self.provenances.extend(serialized_name(session.provenance));
         self.write_scan(scan).map(|()| None)
     }
 
     fn attach(&mut self, log: &LogFile<'_>, bytes: &mut dyn Read) -> Result<(), ExportError> {
-        let cannot = |source| ExportError::Attach { name: log.name.to_owned(), source };
+        let attach_error = |source| ExportError::Attach { name: log.name.to_owned(), source };
         let header = AttachmentHeader {
             log_time: self.converter.end().0,
             create_time: nanoseconds(log.written),
             name: log.name.to_owned(),
             media_type: "application/x-ndjson".to_owned(),
         };
-        self.messages.out.start_attachment(log.bytes, header).map_err(refused)?;
+        self.messages.out.start_attachment(log.bytes, header).map_err(write_error)?;
         let mut piece = vec![0; 1 << 16];
         let mut left = log.bytes;
         while left > 0 {
-            let most = piece.len().min(usize::try_from(left).unwrap_or(usize::MAX));
-            let read = bytes.read(&mut piece[..most]).map_err(cannot)?;
+            let length = piece.len().min(usize::try_from(left).unwrap_or(usize::MAX));
+            let read = bytes.read(&mut piece[..length]).map_err(attach_error)?;
             if read == 0 {
-                return Err(cannot(io::ErrorKind::UnexpectedEof.into()));
+                return Err(attach_error(io::ErrorKind::UnexpectedEof.into()));
             }
-            self.messages.out.put_attachment_bytes(&piece[..read]).map_err(refused)?;
+            self.messages.out.put_attachment_bytes(&piece[..read]).map_err(write_error)?;
             left -= read as u64;
         }
-        self.messages.out.finish_attachment().map_err(refused)
+        self.messages.out.finish_attachment().map_err(write_error)
     }
 
     fn finish(self: Box<Self>) -> Result<(), ExportError> {
-        let remarks = self.remarks();
-        self.messages.finish(remarks)
+        let metadata = self.metadata();
+        self.messages.finish(metadata)
     }
 }

@@ -1,4 +1,4 @@
-//! Messages of ROS 2: their types, their bytes, and what they say of a scan.
+//! ROS 2 messages: types and serialization.
 
 pub(crate) mod cdr;
 pub(crate) mod interface;

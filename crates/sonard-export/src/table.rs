@@ -7,31 +7,32 @@ use std::{
 
 use sonard_records::ScanView;
 
-use crate::{COLUMNS, Export, ExportError, LeftOut, Row, Value, sessions::Sessions};
+use crate::{COLUMNS, Export, ExportError, LeftOut, Row, Value, session_numbers::SessionNumbers};
 
-/// A reading a line, after a line with the names of [`COLUMNS`] (RFC 4180; lines end with a line feed).
+/// CSV export with one reading per line, after a header with the names of [`COLUMNS`] (RFC 4180,
+/// line feeds).
 ///
-/// What the log does not say is empty; times are as in the log, in UTC; lists are apart by blanks.
+/// Missing values are empty, times are in UTC as in the log, and lists are separated by blanks.
 #[derive(Debug)]
 pub struct CsvExport<W: Write> {
     out: csv::Writer<W>,
-    sessions: Sessions,
-    /// The text of a cell, kept for the next.
+    sessions: SessionNumbers,
+    /// Buffer of a cell, reused.
     cell: String,
 }
 
 impl<W: Write> CsvExport<W> {
-    /// A table that is written to `out`.
+    /// Writes the header of a table to `out`.
     ///
     /// # Errors
-    /// When `out` refuses the first line.
+    /// Returns the write error of the header.
     pub fn new(out: W) -> Result<Self, ExportError> {
         let mut out = csv::Writer::from_writer(out);
-        out.write_record(COLUMNS.iter().map(|column| column.name)).map_err(refused)?;
-        Ok(Self { out, sessions: Sessions::default(), cell: String::new() })
+        out.write_record(COLUMNS.iter().map(|column| column.name)).map_err(write_error)?;
+        Ok(Self { out, sessions: SessionNumbers::default(), cell: String::new() })
     }
 
-    /// The first line of every such table, without its end.
+    /// Returns the header line of such a table, without the line end.
     #[must_use]
     pub fn head() -> String {
         let names: Vec<_> = COLUMNS.iter().map(|column| column.name).collect();
@@ -44,9 +45,9 @@ impl<W: Write> CsvExport<W> {
             if let Some(value) = column.cell(row) {
                 write_cell(&mut self.cell, &value);
             }
-            self.out.write_field(&self.cell).map_err(refused)?;
+            self.out.write_field(&self.cell).map_err(write_error)?;
         }
-        self.out.write_record(None::<&[u8]>).map_err(refused)
+        self.out.write_record(None::<&[u8]>).map_err(write_error)
     }
 }
 
@@ -65,7 +66,7 @@ impl<W: Write> Export for CsvExport<W> {
 }
 
 fn write_cell(cell: &mut String, value: &Value<'_>) {
-    // Writing to a text can't fail.
+    // Writing to a string cannot fail.
     let _ = match value {
         Value::Text(text) => cell.write_str(text),
         Value::Integer(number) => write!(cell, "{number}"),
@@ -78,16 +79,16 @@ fn write_cell(cell: &mut String, value: &Value<'_>) {
 }
 
 fn write_list(cell: &mut String, numbers: &[impl Display]) -> fmt::Result {
-    for (place, number) in numbers.iter().enumerate() {
-        write!(cell, "{}{number}", if place == 0 { "" } else { " " })?;
+    for (index, number) in numbers.iter().enumerate() {
+        write!(cell, "{}{number}", if index == 0 { "" } else { " " })?;
     }
     Ok(())
 }
 
-fn refused(error: csv::Error) -> ExportError {
-    let told = error.to_string();
+fn write_error(error: csv::Error) -> ExportError {
+    let message = error.to_string();
     match error.into_kind() {
         csv::ErrorKind::Io(error) => error.into(),
-        _ => io::Error::other(told).into(),
+        _ => io::Error::other(message).into(),
     }
 }

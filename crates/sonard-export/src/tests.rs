@@ -1,11 +1,11 @@
-//! Exports of one log that has something of everything.
+//! Exports of a log that contains every kind of record.
 
 mod cdr;
 mod csv;
+mod findings;
 mod foxglove;
 mod live;
 mod live_map;
 mod mcap;
 mod parquet;
-mod place;
 mod scans;

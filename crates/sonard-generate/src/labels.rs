@@ -1,4 +1,4 @@
-//! What is true of a scene: which feature an echo is of, which features there are.
+//! Ground truth of a scene: the feature label of an echo, and the features of the scene.
 
 use sonard_model::{
     geometry::{DVec2, distance_to_segment},
@@ -6,17 +6,17 @@ use sonard_model::{
     scene::{Scene, Wall},
 };
 
-/// Walls this near to each other meet, metres.
+/// Maximum distance between walls that share a vertex, metres.
 const JOINT_M: f64 = 2e-3;
-/// How far from a joint it is looked whether something can stand there, metres.
-const BESIDE_M: f64 = 0.01;
-/// Walls that differ less in direction go straight on, radians.
+/// Distance from a vertex at which free space is tested, metres.
+const PROBE_M: f64 = 0.01;
+/// Maximum change of direction between collinear walls, radians.
 const STRAIGHT_RAD: f64 = 0.02;
 
-/// The word for what a path is the echo of.
+/// Returns the feature label of an echo, by its propagation path.
 pub(crate) fn feature_of(path: &Path, scene: &Scene) -> &'static str {
-    let mut met = path.mechanisms();
-    match (met.next(), met.next(), met.next()) {
+    let mut mechanisms = path.mechanisms();
+    match (mechanisms.next(), mechanisms.next(), mechanisms.next()) {
         (Some(Mechanism::Reflection(Reflector::Wall(_))), None, _) => "plane",
         (Some(Mechanism::Reflection(Reflector::Cylinder(_))), None, _)
         | (Some(Mechanism::Diffraction(Diffractor::Post { .. })), None, _) => "cylinder",
@@ -24,39 +24,38 @@ pub(crate) fn feature_of(path: &Path, scene: &Scene) -> &'static str {
         (Some(Mechanism::Scattering { .. }), None, _) => "rough",
         (Some(Mechanism::Reflection(Reflector::Floor | Reflector::Ceiling)), None, _) => "level",
         (
-            Some(Mechanism::Reflection(Reflector::Wall(one))),
-            Some(Mechanism::Reflection(Reflector::Wall(other))),
+            Some(Mechanism::Reflection(Reflector::Wall(a))),
+            Some(Mechanism::Reflection(Reflector::Wall(b))),
             None,
-        ) if meet(&scene.walls[one as usize], &scene.walls[other as usize]) => "corner",
+        ) if share_vertex(&scene.walls[a as usize], &scene.walls[b as usize]) => "corner",
         _ => "multiple",
     }
 }
 
-fn meet(one: &Wall, other: &Wall) -> bool {
+fn share_vertex(a: &Wall, b: &Wall) -> bool {
     let touches = |point: DVec2, wall: &Wall| distance_to_segment(point, wall.a, wall.b) < JOINT_M;
-    [one.a, one.b].iter().any(|end| touches(*end, other))
-        || [other.a, other.b].iter().any(|end| touches(*end, one))
+    [a.a, a.b].iter().any(|end| touches(*end, b)) || [b.a, b.b].iter().any(|end| touches(*end, a))
 }
 
-/// A feature of a scene.
+/// Feature of a scene.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Feature {
-    /// `plane`, `corner`, `edge` or `cylinder`.
+pub(crate) struct SceneFeature {
+    /// Feature kind: `plane`, `corner`, `edge` or `cylinder`.
     pub(crate) kind: &'static str,
-    /// The names of the walls or of the cylinder.
+    /// Names of the walls or of the cylinder.
     pub(crate) id: String,
-    /// One end of a plane; the place of others.
+    /// First end of a plane; the position of other features.
     pub(crate) at: DVec2,
-    /// The other end of a plane.
+    /// Second end of a plane.
     pub(crate) to: Option<DVec2>,
     pub(crate) radius_m: Option<f64>,
-    /// How wide it is open to where one can stand, degrees: below 180 a corner, above an edge.
+    /// Opening angle toward free space, degrees: below 180 for a corner, above for an edge.
     pub(crate) opening_deg: Option<f64>,
 }
 
-/// The planes, corners, edges and cylinders of a scene that a ranger could have before it.
-pub(crate) fn features(scene: &Scene) -> Vec<Feature> {
-    let planes = scene.walls.iter().map(|wall| Feature {
+/// Returns the planes, corners, edges and cylinders of a scene.
+pub(crate) fn features(scene: &Scene) -> Vec<SceneFeature> {
+    let planes = scene.walls.iter().map(|wall| SceneFeature {
         kind: "plane",
         id: wall.id.to_string(),
         at: wall.a,
@@ -64,7 +63,7 @@ pub(crate) fn features(scene: &Scene) -> Vec<Feature> {
         radius_m: None,
         opening_deg: None,
     });
-    let cylinders = scene.cylinders.iter().map(|cylinder| Feature {
+    let cylinders = scene.cylinders.iter().map(|cylinder| SceneFeature {
         kind: "cylinder",
         id: cylinder.id.to_string(),
         at: cylinder.center,
@@ -75,32 +74,33 @@ pub(crate) fn features(scene: &Scene) -> Vec<Feature> {
     planes.chain(cylinders).chain(joints(scene)).collect()
 }
 
-/// A sector between two walls at a joint: its place, its opening in radians, the direction of its middle, the walls.
-struct Sector {
+/// Sector between two walls at a vertex: position, opening angle, bisector and walls.
+struct JointSector {
     at: DVec2,
     opening_rad: f64,
     middle: DVec2,
     walls: [usize; 2],
 }
 
-/// Corners and edges: where walls meet or end.
-fn joints(scene: &Scene) -> Vec<Feature> {
+/// Returns the corners and edges, where walls share a vertex or end.
+fn joints(scene: &Scene) -> Vec<SceneFeature> {
     let mut places: Vec<DVec2> = Vec::new();
     for end in scene.walls.iter().flat_map(|wall| [wall.a, wall.b]) {
         if places.iter().all(|place| place.distance(end) >= JOINT_M) {
             places.push(end);
         }
     }
-    let sectors: Vec<Sector> = places.iter().flat_map(|place| sectors(scene, *place)).collect();
-    let beside: Vec<DVec2> =
-        sectors.iter().map(|sector| sector.at + BESIDE_M * sector.middle).collect();
-    let is_open = scene.can_stand(&beside);
+    let sectors: Vec<JointSector> =
+        places.iter().flat_map(|place| sectors(scene, *place)).collect();
+    let probes: Vec<DVec2> =
+        sectors.iter().map(|sector| sector.at + PROBE_M * sector.middle).collect();
+    let is_open = scene.can_stand(&probes);
     let open = sectors.into_iter().zip(is_open).filter(|(_, is_open)| *is_open);
     open.map(|(sector, _)| {
-        let [one, other] = sector.walls.map(|wall| &*scene.walls[wall].id);
-        Feature {
+        let [a, b] = sector.walls.map(|wall| &*scene.walls[wall].id);
+        SceneFeature {
             kind: if sector.opening_rad < std::f64::consts::PI { "corner" } else { "edge" },
-            id: if one == other { one.to_owned() } else { format!("{one} {other}") },
+            id: if a == b { a.to_owned() } else { format!("{a} {b}") },
             at: sector.at,
             to: None,
             radius_m: None,
@@ -110,8 +110,8 @@ fn joints(scene: &Scene) -> Vec<Feature> {
     .collect()
 }
 
-/// The sectors between the walls that leave a place, but those that go straight on.
-fn sectors(scene: &Scene, at: DVec2) -> Vec<Sector> {
+/// Returns the sectors between the walls at a vertex, without straight angles.
+fn sectors(scene: &Scene, at: DVec2) -> Vec<JointSector> {
     let mut leaving: Vec<(f64, usize)> = Vec::new();
     for (index, wall) in scene.walls.iter().enumerate() {
         if distance_to_segment(at, wall.a, wall.b) < JOINT_M {
@@ -119,13 +119,13 @@ fn sectors(scene: &Scene, at: DVec2) -> Vec<Sector> {
             leaving.extend(ends.map(|end| ((end - at).to_angle(), index)));
         }
     }
-    leaving.sort_by(|one, other| one.0.total_cmp(&other.0));
+    leaving.sort_by(|a, b| a.0.total_cmp(&b.0));
     let next = leaving.iter().cycle().skip(1);
-    let sector = |(one, other): (&(f64, usize), &(f64, usize))| {
-        let gap = (other.0 - one.0).rem_euclid(std::f64::consts::TAU);
+    let sector = |(a, b): (&(f64, usize), &(f64, usize))| {
+        let gap = (b.0 - a.0).rem_euclid(std::f64::consts::TAU);
         let opening_rad = if gap == 0.0 { std::f64::consts::TAU } else { gap };
-        let middle = DVec2::from_angle(one.0 + 0.5 * opening_rad);
-        Sector { at, opening_rad, middle, walls: [one.1, other.1] }
+        let middle = DVec2::from_angle(a.0 + 0.5 * opening_rad);
+        JointSector { at, opening_rad, middle, walls: [a.1, b.1] }
     };
     let all = leaving.iter().zip(next).map(sector);
     all.filter(|sector| (sector.opening_rad - std::f64::consts::PI).abs() > STRAIGHT_RAD).collect()
@@ -136,7 +136,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_room_has_corners_inside_and_a_box_in_it_edges_outside() {
+    fn finds_corners_and_edges() {
         let room = [[0.0, 0.0], [4.0, 0.0], [4.0, 3.0], [0.0, 3.0]];
         let scene = Scene::builder("room")
             .material("wall", 1.0)
@@ -150,11 +150,11 @@ mod tests {
         let of = |kind: &'static str| found.iter().filter(move |feature| feature.kind == kind);
         assert_eq!(of("plane").count(), 9);
         assert_eq!(of("cylinder").count(), 1);
-        // Four of the room and two beside the partition's foot.
+        // Four of the room and two at the foot of the partition.
         let corners: Vec<_> = of("corner").map(|corner| corner.opening_deg).collect();
         assert_eq!(corners.len(), 6);
         assert!(corners.iter().flatten().all(|deg| (deg - 90.0).abs() < 1e-9), "{corners:?}");
-        // Four of the box and the partition's free end.
+        // Four of the box, and the free end of the partition.
         let mut edges: Vec<_> = of("edge").filter_map(|edge| edge.opening_deg).collect();
         edges.sort_by(f64::total_cmp);
         assert_eq!(edges.len(), 5);

@@ -1,9 +1,9 @@
-//! Data sets of simulated readings for machine learning: scenes, poses, sensors, air and noise drawn from the
-//! distributions of a specification.
+//! Data sets of simulated readings for machine learning. Scenes, poses, sensors, air and noise are
+//! drawn from the distributions of a specification.
 //!
-//! A set is divided into shards. A shard depends on the specification and its number only, so that any engine that
-//! distributes numbers can make a set, and a killed run can continue: [`Generator::shard`] writes the tables of one shard
-//! to any `Write`.
+//! A set is divided into shards. A shard depends only on the specification and its number, so any
+//! engine that distributes numbers can generate a set, and an interrupted run can be resumed.
+//! [`Generator::shard`] writes the tables of one shard to any `Write`.
 //!
 //! ```
 //! use sonard_generate::{Generator, Table};
@@ -28,28 +28,28 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! The crate uses no clock, file or socket.
+//! The crate performs no I/O and reads no clock.
 
-// Modules are `foo.rs` beside `foo/`.
+// Modules are in `foo.rs` next to the folder `foo/`.
 #![warn(clippy::mod_module_files)]
 
-mod draw;
+mod distribution;
 mod labels;
 mod manifest;
-mod part;
+mod partition;
+mod sample;
 mod seed;
 mod shard;
 mod spec;
-mod spread;
 mod summary;
 mod table;
 #[cfg(test)]
 mod tests;
 
-pub use draw::Redrawn;
+pub use distribution::Spread;
 pub use manifest::{FileFacts, Manifest, ManifestError, ShardFacts};
-pub use part::{Part, PartError};
+pub use partition::{Part, PartError};
+pub use sample::Redrawn;
 pub use shard::{Generator, Made, ShardError};
 pub use spec::{Spec, SpecError};
-pub use spread::Spread;
 pub use table::Table;

@@ -1,4 +1,4 @@
-//! A shard: so many scenes of a set, and the tables that are made of them.
+//! Generation of a shard: its scenes, and the tables of their readings.
 
 mod rows;
 mod writer;
@@ -18,66 +18,66 @@ use sonard_model::{
 use thiserror::Error;
 
 use crate::{
-    draw::{self, Drawn, Redrawn},
-    spec::{Loaded, Spec, SpecError, from_json, from_toml},
-    summary::Summary,
+    sample::{self, Redrawn, SampledScene},
+    spec::{LoadedSpec, Spec, SpecError, from_json, from_toml},
+    summary::ShardIdentity,
     table::Table,
 };
-use rows::AtPose;
-use writer::Tables;
+use rows::PoseReadings;
+use writer::TableWriter;
 
-/// Makes the shards of a set.
+/// Generator of the shards of a set.
 #[derive(Debug)]
 pub struct Generator {
-    loaded: Loaded,
+    loaded: LoadedSpec,
     plan: ScanPlan,
     options: Options,
 }
 
-/// What a shard came to.
+/// Numbers of rows and rejected draws of a generated shard.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Made {
     rows: BTreeMap<Table, u64>,
-    /// What did not fit and was drawn again.
+    /// Numbers of rejected draws.
     pub redrawn: Redrawn,
 }
 
 impl Made {
-    /// Rows of a table.
+    /// Returns the number of rows of a table.
     #[must_use]
     pub fn rows(&self, table: Table) -> u64 {
         self.rows.get(&table).copied().unwrap_or_default()
     }
 }
 
-/// Why there is no shard.
+/// Error of generating a shard.
 #[derive(Debug, Error)]
 pub enum ShardError {
-    /// Beyond what the set has.
-    #[error("there is no shard {number}: the set has {of}")]
+    /// Shard number outside of the set.
+    #[error("there is no shard {number}: the set has {of} shards")]
     Number {
-        /// The one asked for.
+        /// Requested number of the shard.
         number: u32,
-        /// How many there are.
+        /// Number of shards in the set.
         of: u32,
     },
-    /// Nothing that was drawn fits.
+    /// Scene for which all draws were rejected.
     #[error("scene {scene} of the set: {why}")]
     DoesNotFit {
-        /// Number of the scene.
+        /// Number of the scene in the set.
         scene: u64,
-        /// In words, with what would be right.
+        /// Reason, with advice for the specification.
         why: String,
     },
-    /// What was drawn is nothing that the model takes.
+    /// Sampled scene that the model rejects.
     #[error("scene {scene} of the set: {error}")]
     Model {
-        /// Number of the scene.
+        /// Number of the scene in the set.
         scene: u64,
-        /// Why.
+        /// Error of the model.
         error: ModelError,
     },
-    /// A table can't be written.
+    /// Write error of a table.
     #[error(transparent)]
     Write(#[from] io::Error),
 }
@@ -91,156 +91,167 @@ impl From<ExportError> for ShardError {
     }
 }
 
-/// Poses of a scene that are given up at most because their paths are too many.
-const MOST_COSTLY: u32 = 100;
+/// Maximum number of poses per scene position that are rejected for too many paths.
+const MAX_COSTLY: u32 = 100;
 
 impl Generator {
-    /// From a specification's text (TOML); `file` is what errors call it, `read` gives the texts of scenes and
-    /// sensors that are no shipped ones.
+    /// Loads a specification from TOML; `file` names it in errors, `read` returns the texts of
+    /// scenes and sensors that are not shipped.
     ///
     /// # Errors
-    /// The first fault, with its place and what would be right.
+    /// Returns the first fault with its position and valid values.
     pub fn from_toml(
         file: &str,
         text: &str,
         read: &dyn Fn(&str) -> io::Result<String>,
     ) -> Result<Self, SpecError> {
-        from_toml(file, text, read).map(Self::of)
+        from_toml(file, text, read).map(Self::new)
     }
 
-    /// From what [`text`](Self::text) gave.
+    /// Loads a specification from [`text`](Self::text).
     ///
     /// # Errors
-    /// The first fault.
+    /// Returns the first fault.
     pub fn from_json(file: &str, text: &str) -> Result<Self, SpecError> {
-        from_json(file, text).map(Self::of)
+        from_json(file, text).map(Self::new)
     }
 
-    fn of(loaded: Loaded) -> Self {
+    fn new(loaded: LoadedSpec) -> Self {
         let (plan, options) =
             (ScanPlan::from(&loaded.spec.plan), loaded.spec.model.options_of_engine());
         Self { loaded, plan, options }
     }
 
-    /// The specification.
+    /// Returns the specification of the set.
     #[must_use]
     pub const fn spec(&self) -> &Spec {
         &self.loaded.spec
     }
 
-    /// The specification with everything that it names, as JSON: whoever has it has the set.
+    /// Returns the specification and all referenced files as JSON, sufficient to regenerate the
+    /// set.
     #[must_use]
     pub fn text(&self) -> &str {
         &self.loaded.text
     }
 
-    /// SHA-256 of that, hexadecimal: what shards name their specification by.
+    /// Returns the SHA-256 of [`text`](Self::text), hexadecimal, by which shards identify their
+    /// specification.
     #[must_use]
     pub fn sha256(&self) -> &str {
         &self.loaded.sha256
     }
 
-    pub(crate) fn summary(&self, shard: u32) -> Summary {
-        Summary::new(&self.loaded, shard)
+    pub(crate) fn summary(&self, shard: u32) -> ShardIdentity {
+        ShardIdentity::new(&self.loaded, shard)
     }
 
-    /// The tables of each shard.
+    /// Returns the tables of each shard.
     #[must_use]
     pub fn tables(&self) -> Vec<Table> {
-        Table::of(self.spec())
+        Table::for_spec(self.spec())
     }
 
-    /// Readings of a shard, for whoever shows how far it is.
+    /// Returns the number of readings per shard, for progress reports.
     #[must_use]
     pub fn readings(&self) -> u64 {
         let set = &self.spec().set;
         u64::from(set.scenes) * u64::from(set.poses) * u64::from(self.plan.beams())
     }
 
-    /// Writes the tables of a shard, from 1, each to what `create` gives for it; `told` hears how many readings were
-    /// made since it was told last.
+    /// Writes the tables of a shard, from 1, each to the output that `create` returns; calls
+    /// `progress` with the number of readings since the last call.
     ///
     /// # Errors
-    /// When there is no such shard, when nothing that is drawn fits (then it never does), and what the output refuses.
+    /// Returns an error for an invalid number, if all draws of a scene are rejected (which is
+    /// reproducible), or if writing fails.
     pub fn shard(
         &self,
         number: u32,
         create: &mut dyn FnMut(Table) -> io::Result<Box<dyn Write + Send>>,
-        told: &dyn Fn(u64),
+        progress: &dyn Fn(u64),
     ) -> Result<Made, ShardError> {
         let set = &self.spec().set;
         if !(1..=set.shards).contains(&number) {
             return Err(ShardError::Number { number, of: set.shards });
         }
-        let mut tables = Tables::create(self.spec(), &self.summary(number).remark(), create)?;
-        let (mut redrawn, mut known) = (Redrawn::default(), None);
+        let mut tables = TableWriter::create(self.spec(), &self.summary(number).to_json(), create)?;
+        let (mut redrawn, mut last) = (Redrawn::default(), None);
         let before = u64::from(number - 1) * u64::from(set.scenes);
         for scene in (1..=u64::from(set.scenes)).map(|scene| before + scene) {
-            let mut drawn = draw::scene(&self.loaded, scene)
+            let mut drawn = sample::scene(&self.loaded, scene)
                 .map_err(|why| ShardError::DoesNotFit { scene, why: why.to_owned() })?;
-            let simulator = self.simulator(&drawn, &mut known)?;
-            self.write_scene(&mut drawn, simulator, &mut tables, told)?;
+            let simulator = self.simulator(&drawn, &mut last)?;
+            self.write_scene(&mut drawn, simulator, &mut tables, progress)?;
             redrawn += drawn.redrawn;
         }
         Ok(Made { rows: tables.finish()?, redrawn })
     }
 
-    /// The ranger in a drawn scene; what does not change from scene to scene is taken over from the last.
+    /// Returns the simulator of a sampled scene; reuses the parts of the last simulator that did
+    /// not change.
     fn simulator<'a>(
         &self,
-        drawn: &Drawn,
-        known: &'a mut Option<Simulator>,
+        drawn: &SampledScene,
+        last: &'a mut Option<Simulator>,
     ) -> Result<&'a Simulator, ShardError> {
         let mut sensor = self.loaded.sensors[drawn.sensor].clone();
         if drawn.sensor_z_m.is_some() {
             sensor.mounting.z_m = drawn.sensor_z_m;
         }
         let scene = Arc::clone(&drawn.scene);
-        let made = match known.take() {
-            Some(known) if *known.sensor() == sensor && *known.air() == drawn.air => {
-                known.in_scene(scene)
+        let made = match last.take() {
+            Some(last) if *last.sensor() == sensor && *last.air() == drawn.air => {
+                last.in_scene(scene)
             }
             _ => Simulator::new(scene, sensor, drawn.air, self.options),
         };
         let made = made.map_err(|error| ShardError::Model { scene: drawn.number, error })?;
-        Ok(known.insert(made))
+        Ok(last.insert(made))
     }
 
     fn write_scene(
         &self,
-        drawn: &mut Drawn,
+        drawn: &mut SampledScene,
         simulator: &Simulator,
-        tables: &mut Tables,
-        told: &dyn Fn(u64),
+        tables: &mut TableWriter,
+        progress: &dyn Fn(u64),
     ) -> Result<(), ShardError> {
         tables.scene(drawn, simulator)?;
-        let mut heard_at = Vec::with_capacity(drawn.poses.len());
+        let mut positions = Vec::with_capacity(drawn.poses.len());
         for number in 1..=drawn.poses.len() as u32 {
-            let at = self.listen(drawn, number, simulator)?;
+            let at = self.simulate(drawn, number, simulator)?;
             tables.pose(simulator, &at)?;
-            told(at.heard.len() as u64);
-            heard_at.push(at.pose.position());
+            progress(at.firings.len() as u64);
+            positions.push(at.pose.position());
         }
-        tables.truth(drawn, &heard_at)
+        tables.truth(drawn, &positions)
     }
 
-    /// What is heard at a pose of a scene, by its number; at another one if that has too many paths.
-    fn listen(
+    /// Simulates the readings at a pose of a scene; replaces poses with too many paths.
+    fn simulate(
         &self,
-        drawn: &mut Drawn,
+        drawn: &mut SampledScene,
         number: u32,
         simulator: &Simulator,
-    ) -> Result<AtPose, ShardError> {
+    ) -> Result<PoseReadings, ShardError> {
         let mut pose: Pose = drawn.poses[number as usize - 1];
         let mut last: Option<TooCostly> = None;
-        for _ in 0..=MOST_COSTLY {
+        for _ in 0..=MAX_COSTLY {
             let of = (drawn.number, number);
-            match AtPose::listen(&self.loaded, of, &drawn.noise, simulator, pose, &self.plan) {
+            match PoseReadings::simulate(
+                &self.loaded,
+                of,
+                &drawn.noise,
+                simulator,
+                pose,
+                &self.plan,
+            ) {
                 Ok(at) => return Ok(at),
                 Err(error) => last = Some(error),
             }
             drawn.redrawn.costly += 1;
-            match draw::another_pose(&self.loaded, drawn) {
+            match sample::replacement_pose(&self.loaded, drawn) {
                 Some(other) => pose = other,
                 None => break,
             }

@@ -1,4 +1,5 @@
-//! The specification of a data set: what is drawn, from what, and what of it is kept.
+//! Specification of a data set: distributions of scenes, sensors and noise, and the recorded
+//! columns.
 
 mod check;
 mod error;
@@ -9,157 +10,158 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 use sonard_model::{model::OptionKeys, plan::ScanPlan};
 
-use crate::spread::Spread;
+use crate::distribution::Spread;
 
 pub use error::SpecError;
-pub(crate) use read::{Loaded, from_json, from_toml};
+pub(crate) use read::{LoadedSpec, from_json, from_toml};
 
-/// A specification as its file has it; a section that is not there has its defaults.
+/// Specification as in its file; missing sections have defaults.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Spec {
-    /// How large the set is.
+    /// Size of the set.
     pub set: SetKeys,
-    /// Kinds of scenes; each scene is of one of them.
+    /// Kinds of scenes, of which each scene is one.
     pub scene: Vec<SceneKeys>,
-    /// Surfaces by name.
-    #[serde(default = "usual_materials")]
+    /// Surface materials by name.
+    #[serde(default = "default_materials")]
     pub materials: BTreeMap<String, MaterialKeys>,
-    /// What stands in scenes.
+    /// Furniture of generated scenes.
     #[serde(default)]
     pub furniture: FurnitureKeys,
-    /// Floor and ceiling; without them scenes are plans.
+    /// Floor and ceiling; scenes without them are plans.
     #[serde(default)]
     pub heights: Option<HeightKeys>,
-    /// Where the ranger stands.
+    /// Poses of the ranger.
     #[serde(default)]
     pub poses: PoseKeys,
-    /// Which azimuths it looks at.
+    /// Azimuths of a scan.
     #[serde(default)]
     pub plan: PlanKeys,
-    /// Which ranger it is.
+    /// Sensors of the rangers.
     #[serde(default)]
     pub sensor: SensorKeys,
-    /// The air.
+    /// Distributions of the air.
     #[serde(default)]
     pub air: AirKeys,
-    /// What disturbs readings.
+    /// Distributions of receiver noise.
     #[serde(default)]
     pub noise: NoiseKeys,
-    /// Settings of the model, as for `sonard run`.
+    /// Model settings, as for `sonard run`.
     #[serde(default)]
     pub model: OptionKeys,
-    /// What of it all is kept.
+    /// Recorded tables and columns.
     #[serde(default)]
     pub keep: KeepKeys,
 }
 
-/// How large a set is.
+/// Size and identity of a set.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SetKeys {
-    /// What it is called.
+    /// Name of the set.
     pub name: String,
-    /// What it is for, in a sentence.
+    /// Purpose of the set, in a sentence.
     #[serde(default)]
     pub about: String,
-    /// Another number gives another set of the same kind.
+    /// Seed; different seeds give different sets.
     #[serde(default)]
     pub seed: u64,
-    /// Shards.
+    /// Number of shards in the set.
     pub shards: u32,
-    /// Scenes of a shard.
+    /// Number of scenes per shard.
     pub scenes: u32,
-    /// Poses in a scene.
+    /// Number of poses per scene.
     pub poses: u32,
 }
 
-/// A kind of scenes.
+/// Kind of scenes, with the distributions of its rooms.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SceneKeys {
-    /// How often, beside the weights of the others.
-    #[serde(default = "one")]
+    /// Relative frequency of this kind.
+    #[serde(default = "default_weight")]
     pub weight: f64,
-    /// What it is like.
+    /// Shape of the room.
     pub shape: Shape,
-    /// Of `file`: a shipped scene's name, or a file beside the specification.
+    /// Shipped scene, or file next to the specification; only for shape `file`.
     #[serde(default)]
     pub file: Option<String>,
-    /// Along x before it is turned, metres; not of files.
+    /// Extent along x before rotation, metres; not for shape `file`.
     #[serde(default)]
     pub width_m: Option<Spread>,
-    /// Along y, metres; not of files.
+    /// Extent along y before rotation, metres; not for shape `file`.
     #[serde(default)]
     pub depth_m: Option<Spread>,
-    /// Of `l` and `t`: the share of width and depth that is cut away.
+    /// Share of width and depth that is cut away; only for shapes `l` and `t`.
     #[serde(default)]
     pub notch: Option<Spread>,
-    /// Of `polygon`: how many.
+    /// Number of corners; only for shape `polygon`.
     #[serde(default)]
     pub corners: Option<Spread>,
-    /// Turned by, degrees; not of files.
+    /// Rotation, degrees; not for shape `file`.
     #[serde(default)]
     pub turn_deg: Option<Spread>,
-    /// Materials that each wall is of one of; all if none is named. Not of files.
+    /// Materials of the walls, one drawn for each wall; all materials if empty. Not for shape
+    /// `file`.
     #[serde(default)]
     pub walls: Vec<String>,
 }
 
-/// What a room is like from above.
+/// Shape of a room seen from above.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Shape {
-    /// Four walls.
+    /// Rectangle with four walls.
     Rectangle,
-    /// A rectangle without one corner.
+    /// Rectangle without one corner.
     L,
-    /// A rectangle without two.
+    /// Rectangle without two corners.
     T,
-    /// Any angles.
+    /// Polygon with arbitrary angles.
     Polygon,
-    /// The one of a file, as it is.
+    /// Unmodified scene of a file.
     File,
 }
 
-/// A surface; drawn anew for each scene.
+/// Surface material, drawn for each scene.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct MaterialKeys {
-    /// Amplitude of the mirror reflection, 0 to 1.
+    /// Amplitude of the specular reflection, 0 to 1.
     pub reflectance: Spread,
-    /// Share of what is not absorbed that is scattered, 0 to 1.
+    /// Scattered share of the energy that is not absorbed, 0 to 1.
     #[serde(default = "zero")]
     pub roughness: Spread,
 }
 
-/// What stands in scenes that are not of files.
+/// Furniture of generated scenes.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct FurnitureKeys {
-    /// How many boxes.
+    /// Number of boxes per scene.
     pub boxes: Spread,
-    /// Their sides, metres.
+    /// Side length of a box, metres.
     pub box_m: Spread,
-    /// How they are turned against the room, degrees.
+    /// Rotation of a box relative to the room, degrees.
     pub box_turn_deg: Spread,
-    /// How many cylinders.
+    /// Number of cylinders per scene.
     pub cylinders: Spread,
-    /// Their radii, metres.
+    /// Radius of a cylinder, metres.
     pub radius_m: Spread,
-    /// How many partitions, which stand out from walls.
+    /// Number of partitions, which extend from walls.
     pub partitions: Spread,
-    /// Their length, metres.
+    /// Length of a partition, metres.
     pub partition_m: Spread,
-    /// Between them and to walls at least, metres.
+    /// Minimum gap between pieces and to walls, metres.
     pub gap_m: f64,
-    /// In scenes with heights: how high boxes and cylinders are, metres.
+    /// Height of boxes and cylinders, metres; only in scenes with heights.
     pub height_m: Option<Spread>,
-    /// Materials that each is of one of; all if none is named.
+    /// Materials of the furniture, one drawn for each piece; all materials if empty.
     pub materials: Vec<String>,
 }
 
-/// Floor and ceiling.
+/// Floor and ceiling of generated scenes.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct HeightKeys {
@@ -167,88 +169,89 @@ pub struct HeightKeys {
     pub ceiling_m: Spread,
     /// Height of the transducer above the floor, metres.
     pub sensor_m: Spread,
-    /// Materials that the floor is of one of; all if none is named.
+    /// Materials of the floor, one drawn for each scene; all materials if empty.
     #[serde(default)]
     pub floor: Vec<String>,
-    /// Materials that the ceiling is of one of.
+    /// Materials of the ceiling, one drawn for each scene; all materials if empty.
     #[serde(default)]
     pub ceiling: Vec<String>,
 }
 
-/// Where the ranger stands: anywhere in a scene with its back free.
+/// Poses of the ranger, uniform over the free space of a scene.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct PoseKeys {
-    /// Away from everything at least, metres.
+    /// Minimum distance to all surfaces, metres.
     pub clearance_m: f64,
-    /// Where azimuth 0 points, degrees counter-clockwise from +x.
+    /// Direction of azimuth 0, degrees counter-clockwise from +x.
     pub heading_deg: Spread,
 }
 
-/// Which azimuths a scan measures.
+/// Azimuths of a scan.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct PlanKeys {
-    /// First azimuth, degrees.
+    /// First azimuth of the scan, degrees.
     pub from_deg: f64,
-    /// End of the range, degrees, not itself measured.
+    /// End of the range, exclusive, degrees.
     pub to_deg: f64,
-    /// Between stops, degrees.
+    /// Step between stops, degrees.
     pub step_deg: f64,
-    /// Firings at each stop.
+    /// Number of firings at each stop.
     pub pings_per_stop: u32,
 }
 
-/// Which ranger it is.
+/// Sensors of the rangers.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct SensorKeys {
-    /// Presets or files beside the specification; each scene has one of them.
+    /// Presets, or files next to the specification; one is drawn for each scene.
     pub any_of: Vec<String>,
 }
 
-/// The air of a scene.
+/// Distributions of the air of a scene.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct AirKeys {
-    /// Degrees Celsius.
+    /// Temperature of the air, degrees Celsius.
     pub temperature_c: Spread,
-    /// Relative humidity, percent.
+    /// Relative humidity of the air, percent.
     pub humidity_percent: Spread,
-    /// Kilopascals.
+    /// Static pressure of the air, kilopascals.
     pub pressure_kpa: Spread,
 }
 
-/// What disturbs the readings of a scene.
+/// Distributions of the noise of a scene's readings.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct NoiseKeys {
-    /// At the receiver's input, root mean square, as the amplitude of an echo from 1 m.
+    /// RMS noise at the receiver's input, as the amplitude of an echo from 1 m.
     pub floor: Spread,
-    /// Standard deviation of the time of flight beside that, microseconds.
+    /// Standard deviation of additional jitter of the time of flight, microseconds.
     pub jitter_us: Spread,
 }
 
-/// What is kept beside status and range.
+/// Recorded columns and tables in addition to status and range.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct KeepKeys {
-    /// Of each reading time of flight, amplitude and margin.
+    /// Time of flight, amplitude and margin of each reading.
     pub strength: bool,
-    /// The path of the echo that was heard.
+    /// Propagation path of the detected echo.
     pub path: bool,
-    /// Every echo of a firing down to this share of a head-on wall's, in a table of its own; 0 for none.
+    /// Minimum amplitude, relative to a head-on wall, of the echoes in a table of all echoes; 0 for
+    /// none.
     pub echoes_down_to: f64,
-    /// The envelope of each firing up to this range, metres; 0 for none.
+    /// Maximum range of recorded envelopes, metres; 0 for none.
     pub trace_to_m: f64,
-    /// From sample to sample of it, microseconds.
+    /// Sample interval of envelopes, microseconds.
     pub trace_step_us: f64,
-    /// How far it is straight ahead to the nearest surface.
+    /// Distance along the beam axis to the nearest surface.
     pub ideal_range: bool,
-    /// What was heard as a label (plane, corner, edge, ...), and a table of the planes, corners, edges and cylinders
-    /// of each scene.
+    /// Feature label of the detected echo (plane, corner, edge, ...), and a table of the planes,
+    /// corners, edges and cylinders of each scene.
     pub features: bool,
-    /// Side of a cell of each scene's map as it should be, metres; 0 for none.
+    /// Cell size of the true occupancy map of each scene, metres; 0 for none.
     pub occupancy_m: f64,
 }
 
@@ -326,12 +329,12 @@ impl Default for KeepKeys {
     }
 }
 
-fn usual_materials() -> BTreeMap<String, MaterialKeys> {
+fn default_materials() -> BTreeMap<String, MaterialKeys> {
     let plaster = MaterialKeys { reflectance: Spread::Fixed(0.97), roughness: zero() };
     [("plaster".to_owned(), plaster)].into()
 }
 
-const fn one() -> f64 {
+const fn default_weight() -> f64 {
     1.0
 }
 

@@ -1,27 +1,27 @@
-//! Which shard of which set something is, and who drew it.
+//! Identity of a shard: specification, number and program version.
 
 use serde::{Deserialize, Serialize};
 
-use crate::{seed::DRAWING, spec::Loaded};
+use crate::{seed::DRAWING, spec::LoadedSpec};
 
-/// The form of what sets and shards say of themselves.
+/// Format version of `manifest.json` and `shard.json`.
 const FORMAT: u32 = 1;
 
-/// Which shard of which set it is, and who drew it.
+/// Identity of a shard, as recorded in its files.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub(crate) struct Summary {
+pub(crate) struct ShardIdentity {
     pub(crate) format: u32,
     /// Version of the program.
     pub(crate) sonard: String,
-    /// How the program draws: raised when the same specification draws something else.
+    /// Version of the sampling procedure.
     pub(crate) drawing: u32,
     pub(crate) spec_sha256: String,
     pub(crate) shard: u32,
     pub(crate) of: u32,
 }
 
-impl Summary {
-    pub(crate) fn new(loaded: &Loaded, shard: u32) -> Self {
+impl ShardIdentity {
+    pub(crate) fn new(loaded: &LoadedSpec, shard: u32) -> Self {
         Self {
             format: FORMAT,
             sonard: env!("CARGO_PKG_VERSION").to_owned(),
@@ -32,9 +32,9 @@ impl Summary {
         }
     }
 
-    /// As it stands in the metadata of tables.
-    pub(crate) fn remark(&self) -> String {
-        // Numbers and texts: there is nothing that JSON has no words for.
+    /// Serializes the identity for the metadata of tables.
+    pub(crate) fn to_json(&self) -> String {
+        // Numbers and texts are always serializable as JSON.
         serde_json::to_string(self).unwrap_or_default()
     }
 }

@@ -1,36 +1,36 @@
-//! The tables of a shard and their columns.
+//! Tables of a shard and their columns.
 
 use serde::{Deserialize, Serialize};
 use sonard_export::{Field, Kind};
 
 use crate::spec::{KeepKeys, Spec};
 
-/// A table of a shard.
+/// Table of a shard.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Table {
-    /// A scene a row: what was drawn for it, and its file.
+    /// Scenes, one per row, with sampled values and the scene file.
     Scenes,
-    /// A firing a row.
+    /// Readings, one firing per row.
     Readings,
-    /// An echo of a firing a row.
+    /// Echoes, one arrival of a firing per row.
     Echoes,
-    /// A plane, corner, edge or cylinder of a scene a row.
+    /// Planes, corners, edges and cylinders of the scenes, one per row.
     Features,
-    /// The map of a scene as it should be, a scene a row.
+    /// True occupancy maps, one scene per row.
     Occupancy,
 }
 
-/// A column with what it means.
+/// Column with its description for the data card.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Described {
+pub(crate) struct ColumnInfo {
     pub(crate) field: Field,
     pub(crate) about: &'static str,
 }
 
 impl Table {
-    /// Those of a specification, in the order in which they are written.
-    pub(crate) fn of(spec: &Spec) -> Vec<Self> {
+    /// Returns the tables of a specification, in writing order.
+    pub(crate) fn for_spec(spec: &Spec) -> Vec<Self> {
         let keep = &spec.keep;
         [
             (Self::Scenes, true),
@@ -44,7 +44,7 @@ impl Table {
         .collect()
     }
 
-    /// Its file's name.
+    /// Returns the file name of the table.
     #[must_use]
     pub const fn file(self) -> &'static str {
         match self {
@@ -56,7 +56,7 @@ impl Table {
         }
     }
 
-    /// What one of its rows is.
+    /// Returns the name of the row type.
     pub(crate) const fn row(self) -> &'static str {
         match self {
             Self::Scenes => "scene",
@@ -67,8 +67,8 @@ impl Table {
         }
     }
 
-    /// What it has columns for, with what is kept of readings.
-    pub(crate) fn columns(self, keep: &KeepKeys) -> Vec<Described> {
+    /// Returns the columns of the table, by the recorded columns of the specification.
+    pub(crate) fn columns(self, keep: &KeepKeys) -> Vec<ColumnInfo> {
         match self {
             Self::Scenes => SCENES.to_vec(),
             Self::Readings => readings(keep),
@@ -79,86 +79,93 @@ impl Table {
     }
 }
 
-const fn column(name: &'static str, kind: Kind, is_single: bool, about: &'static str) -> Described {
-    Described { field: Field { name, kind, is_single }, about }
+const fn column(
+    name: &'static str,
+    kind: Kind,
+    is_single: bool,
+    about: &'static str,
+) -> ColumnInfo {
+    ColumnInfo { field: Field { name, kind, is_single }, about }
 }
 
-const fn text(name: &'static str, about: &'static str) -> Described {
+const fn text(name: &'static str, about: &'static str) -> ColumnInfo {
     column(name, Kind::Text, false, about)
 }
 
-const fn integer(name: &'static str, about: &'static str) -> Described {
+const fn integer(name: &'static str, about: &'static str) -> ColumnInfo {
     column(name, Kind::Integer, false, about)
 }
 
-const fn number(name: &'static str, about: &'static str) -> Described {
+const fn number(name: &'static str, about: &'static str) -> ColumnInfo {
     column(name, Kind::Number, false, about)
 }
 
-const fn single(name: &'static str, about: &'static str) -> Described {
+const fn single(name: &'static str, about: &'static str) -> ColumnInfo {
     column(name, Kind::Number, true, about)
 }
 
-const SCENE: Described = integer("scene", "number of the scene in the set, from 1");
-const POSE: Described = integer("pose", "number of the pose in its scene, from 1");
-const INDEX: Described = integer("index", "number of the firing in its scan, from 0");
+const SCENE: ColumnInfo = integer("scene", "number of the scene in the set, from 1");
+const POSE: ColumnInfo = integer("pose", "number of the pose in its scene, from 1");
+const INDEX: ColumnInfo = integer("index", "number of the firing in its scan, from 0");
 
-const SCENES: &[Described] = &[
+const SCENES: &[ColumnInfo] = &[
     SCENE,
-    integer("kind", "kind of scene: which [[scene]] of the specification, from 1"),
+    integer("kind", "kind of scene: index of the [[scene]] in the specification, from 1"),
     text("sensor", "name of the sensor"),
     number("sensor_z_m", "height of the transducer, metres; null in a plan"),
     number("temperature_c", "temperature of the air, degrees Celsius"),
     number("humidity_percent", "relative humidity, percent"),
     number("pressure_kpa", "static pressure, kilopascals"),
-    number("sound_speed_m_s", "speed of sound, metres a second"),
+    number("sound_speed_m_s", "speed of sound, metres per second"),
     number("noise_floor", "noise at the receiver's input, as the amplitude of an echo from 1 m"),
-    number("jitter_us", "standard deviation of the time of flight beside it, microseconds"),
-    text("scene_text", "the scene's file, for `sonard simulate --scene` and others"),
+    number("jitter_us", "standard deviation of additional timing jitter, microseconds"),
+    text("scene_text", "scene file, for `sonard simulate --scene` and other commands"),
 ];
 
-const FIRING: [Described; 7] = [
+const FIRING: [ColumnInfo; 7] = [
     SCENE,
     POSE,
     INDEX,
-    number("x_m", "where the rotation axis stands, metres"),
-    number("y_m", "the same"),
-    number("heading_deg", "where azimuth 0 points, degrees counter-clockwise from +x"),
-    number("azimuth_deg", "of the firing, degrees counter-clockwise from the heading"),
+    number("x_m", "x of the rotation axis, metres"),
+    number("y_m", "y of the rotation axis, metres"),
+    number("heading_deg", "direction of azimuth 0, degrees counter-clockwise from +x"),
+    number("azimuth_deg", "azimuth of the firing, degrees counter-clockwise from the heading"),
 ];
-const HEARD: [Described; 2] = [
+const RESULT: [ColumnInfo; 2] = [
     text("status", "echo, no_echo or min_range"),
-    single("range_m", "range, metres; null where nothing was heard"),
+    single("range_m", "range, metres; null without an echo"),
 ];
-const STRENGTH: [Described; 3] = [
+const STRENGTH: [ColumnInfo; 3] = [
     single("tof_us", "time of flight of the first echo, microseconds"),
-    single("amplitude", "most of the envelope; a head-on, perfect wall gives 1"),
-    single("margin_db", "the same above the threshold, decibels; of no_echo what it lacked"),
+    single("amplitude", "peak of the envelope; a perfect head-on wall gives 1"),
+    single("margin_db", "peak above the threshold, decibels; negative for no_echo"),
 ];
-const PATH: [Described; 4] = [
+const PATH: [ColumnInfo; 4] = [
     text("path_kind", "specular, diffracted or scattered"),
-    integer("path_order", "mirror reflections on the way"),
-    single("path_length_m", "length of the path there and back, metres"),
-    text("path", "what the sound met, in order"),
+    integer("path_order", "number of mirror reflections"),
+    single("path_length_m", "two-way length of the path, metres"),
+    text("path", "surfaces along the path, in order"),
 ];
-const IDEAL: Described =
-    single("ideal_range_m", "distance straight ahead to the nearest surface, metres; null if none");
-const FEATURE: Described = text(
-    "feature",
-    "what was heard: plane, corner, edge, cylinder, level (floor, ceiling), rough, or multiple reflections; null if \
-     nothing",
+const IDEAL: ColumnInfo = single(
+    "ideal_range_m",
+    "distance along the beam axis to the nearest surface, metres; null if none",
 );
-const ENVELOPE: Described = column(
+const FEATURE: ColumnInfo = text(
+    "feature",
+    "feature of the echo: plane, corner, edge, cylinder, level (floor, ceiling), rough, or multiple reflections; null \
+         without an echo",
+);
+const ENVELOPE: ColumnInfo = column(
     "envelope",
     Kind::Numbers,
     false,
-    "envelope of the firing from time 0 on, a sample every keep.trace_step_us; without noise",
+    "envelope of the firing from time 0, sampled every keep.trace_step_us; without noise",
 );
 
-fn readings(keep: &KeepKeys) -> Vec<Described> {
-    let parts: [(&[Described], bool); 7] = [
+fn readings(keep: &KeepKeys) -> Vec<ColumnInfo> {
+    let parts: [(&[ColumnInfo], bool); 7] = [
         (&FIRING, true),
-        (&HEARD, true),
+        (&RESULT, true),
         (&STRENGTH, keep.strength),
         (&PATH, keep.path),
         (&[IDEAL], keep.ideal_range),
@@ -168,40 +175,40 @@ fn readings(keep: &KeepKeys) -> Vec<Described> {
     parts.into_iter().filter(|(_, is_kept)| *is_kept).flat_map(|(part, _)| part.to_vec()).collect()
 }
 
-const ECHOES: &[Described] = &[
+const ECHOES: &[ColumnInfo] = &[
     SCENE,
     POSE,
     INDEX,
     text("path_kind", "specular, diffracted or scattered"),
-    integer("path_order", "mirror reflections on the way"),
-    single("path_length_m", "length of the path there and back, metres"),
-    single("amplitude", "strength after gain and beam pattern; a head-on, perfect wall gives 1"),
-    text("path", "what the sound met, in order"),
+    integer("path_order", "number of mirror reflections"),
+    single("path_length_m", "two-way length of the path, metres"),
+    single("amplitude", "amplitude after gain and beam pattern; a perfect head-on wall gives 1"),
+    text("path", "surfaces along the path, in order"),
 ];
 
-const FEATURES: &[Described] = &[
+const FEATURES: &[ColumnInfo] = &[
     SCENE,
     text("kind", "plane, corner, edge or cylinder"),
     text("id", "names of the walls or of the cylinder"),
-    number("x_m", "one end of a plane, the place of others, metres"),
-    number("y_m", "the same"),
-    number("to_x_m", "the other end of a plane, metres"),
-    number("to_y_m", "the same"),
-    number("radius_m", "of a cylinder, metres"),
-    number("opening_deg", "of corner and edge: angle between the walls on the open side, degrees"),
+    number("x_m", "x of one end of a plane, or of the feature, metres"),
+    number("y_m", "y of one end of a plane, or of the feature, metres"),
+    number("to_x_m", "x of the other end of a plane, metres"),
+    number("to_y_m", "y of the other end of a plane, metres"),
+    number("radius_m", "radius of a cylinder, metres"),
+    number("opening_deg", "angle between the walls of a corner or edge on the open side, degrees"),
 ];
 
-const OCCUPANCY: &[Described] = &[
+const OCCUPANCY: &[ColumnInfo] = &[
     SCENE,
-    number("origin_x_m", "lower left corner of the map, metres"),
-    number("origin_y_m", "the same"),
+    number("origin_x_m", "x of the lower left corner of the map, metres"),
+    number("origin_y_m", "y of the lower left corner of the map, metres"),
     number("resolution_m", "side of a cell, metres"),
-    integer("width", "cells in x"),
-    integer("height", "cells in y"),
+    integer("width", "number of cells along x"),
+    integer("height", "number of cells along y"),
     column(
         "cells",
         Kind::Integers,
         false,
-        "row by row from the lower left corner: 0 free, 1 occupied, 2 out of reach of the poses",
+        "row by row from the lower left corner: 0 free, 1 occupied, 2 not visible from the poses",
     ),
 ];

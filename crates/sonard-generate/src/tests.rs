@@ -83,13 +83,13 @@ fn generator(text: &str) -> Generator {
     Generator::from_toml("set.toml", text, &no_files).unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// Takes what is written.
+/// Shared buffer of the written bytes.
 #[derive(Debug, Clone, Default)]
 struct Memory(Arc<Mutex<Vec<u8>>>);
 
 impl Write for Memory {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        self.0.lock().expect("nobody panicked").write(bytes)
+        self.0.lock().expect("not poisoned").write(bytes)
     }
 
     fn flush(&mut self) -> io::Result<()> {
@@ -106,7 +106,7 @@ fn shard(generator: &Generator, number: u32) -> (Made, Files) {
         Ok(Box::new(memory.clone()) as Box<dyn Write + Send>)
     };
     let made = generator.shard(number, &mut create, &|_| {}).expect("it fits");
-    let bytes = |memory: Memory| std::mem::take(&mut *memory.0.lock().expect("nobody panicked"));
+    let bytes = |memory: Memory| std::mem::take(&mut *memory.0.lock().expect("not poisoned"));
     (made, files.into_iter().map(|(table, memory)| (table, bytes(memory))).collect())
 }
 
@@ -136,16 +136,16 @@ fn text(field: &Field) -> Option<&str> {
 }
 
 #[test]
-fn a_shard_is_a_function_of_specification_and_number() {
+fn shards_are_reproducible() {
     let one = generator(EVERYTHING);
-    // Another process, which makes the shards in another order and read the file that the first one left.
+    // Another process, which generates the shards in another order from the saved specification.
     let other = Generator::from_json("spec.json", one.text()).expect("as it was written");
     assert_eq!((one.sha256(), one.text()), (other.sha256(), other.text()));
     let first = shard(&one, 1);
     let (second, again) = (shard(&other, 2), shard(&other, 1));
     assert_eq!(first, again);
     assert_ne!(first.1, second.1);
-    // What only changes how the file looks changes nothing; what changes the set changes all of it.
+    // Comments do not change the set; a seed changes all of it.
     let commented = EVERYTHING.replace("[heights]", "# as rooms are\n[heights]");
     assert_eq!(generator(&commented).sha256(), one.sha256());
     let reseeded = generator(&EVERYTHING.replace("shards = 2", "shards = 2\nseed = 1"));
@@ -153,7 +153,7 @@ fn a_shard_is_a_function_of_specification_and_number() {
 }
 
 #[test]
-fn what_is_kept_is_there_and_true_of_the_scene() {
+fn recorded_columns_match_the_scene() {
     let generator = generator(EVERYTHING);
     let (made, files) = shard(&generator, 2);
     assert_eq!(generator.tables().len(), 5);
@@ -173,7 +173,7 @@ fn what_is_kept_is_there_and_true_of_the_scene() {
         })
         .collect();
     assert_eq!(scenes.keys().copied().collect::<Vec<_>>(), [4, 5, 6]);
-    let mut heard = 0;
+    let mut echoes = 0;
     for row in &read[&Table::Readings] {
         let of = |name: &str| number(&row[name]);
         let scene = &scenes[&(of("scene").expect("a number") as i64)];
@@ -182,31 +182,31 @@ fn what_is_kept_is_there_and_true_of_the_scene() {
         let is_echo = text(&row["status"]) == Some("echo");
         assert_eq!(of("range_m").is_some(), text(&row["status"]) != Some("no_echo"));
         if is_echo {
-            heard += 1;
+            echoes += 1;
             assert!(of("amplitude").is_some() && of("margin_db").is_some());
-            let path = text(&row["path"]).expect("what was heard came by a path");
+            let path = text(&row["path"]).expect("an echo has a path");
             assert!(!path.is_empty());
             assert!(text(&row["feature"]).is_some());
-            // No sound is faster than straight there and back.
+            // The path is longer than twice the minimum clearance.
             let (length_m, ideal_m) = (of("path_length_m").expect("a length"), of("range_m"));
             assert!(length_m > 0.2 && ideal_m.is_some());
         }
         assert!(matches!(&row["envelope"], Field::ListInternal(list) if list.len() > 40));
     }
-    assert!(heard > 20, "{heard}");
+    assert!(echoes > 20, "{echoes}");
     for row in &read[&Table::Occupancy] {
         let Field::ListInternal(cells) = &row["cells"] else { panic!("a list") };
         let all = number(&row["width"]).expect("cells") * number(&row["height"]).expect("cells");
         assert_eq!(cells.len() as f64, all);
-        let count = |wanted: u32| {
-            cells.elements().iter().filter(|cell| **cell == Field::UInt(wanted)).count()
+        let count = |value: u32| {
+            cells.elements().iter().filter(|cell| **cell == Field::UInt(value)).count()
         };
         assert!(count(0) > 100 && count(1) > 50, "{} {}", count(0), count(1));
     }
 }
 
 #[test]
-fn ranges_alone_take_three_bytes_a_reading() {
+fn ranges_take_three_bytes_each() {
     let generator = generator(
         "[set]\nname = \"ranges\"\nshards = 1\nscenes = 1\nposes = 60\n[[scene]]\nshape = \"file\"\n\
          file = \"simple-room\"\n[model]\nmax_range_m = 3",
@@ -214,18 +214,18 @@ fn ranges_alone_take_three_bytes_a_reading() {
     let (made, files) = shard(&generator, 1);
     let all: usize = files.values().map(Vec::len).sum();
     let bytes = all as f64 / made.rows(Table::Readings) as f64;
-    assert!(bytes < 3.5, "{bytes} bytes a reading");
+    assert!(bytes < 3.5, "{bytes} bytes per reading");
 }
 
 #[test]
-fn what_did_not_fit_is_drawn_again_and_counted() {
+fn counts_rejected_draws() {
     let crowded = "[set]\nname = \"crowded\"\nshards = 1\nscenes = 4\nposes = 5\n[[scene]]\nshape = \"l\"\n\
                    width_m = 3\ndepth_m = 3\n[furniture]\nboxes = 2\nbox_m = 0.5\ngap_m = 0.1\n[plan]\nstep_deg = 90";
     let generator = generator(crowded);
     let (made, _) = shard(&generator, 1);
     assert_eq!((made.rows(Table::Scenes), made.rows(Table::Readings)), (4, 4 * 5 * 4));
     assert!(made.redrawn.furniture > 0 && made.redrawn.poses > 0, "{:?}", made.redrawn);
-    // What never fits is said, and not tried for ever.
+    // A scene without any acceptable draw is an error.
     let never = self::generator(&crowded.replace("box_m = 0.5", "box_m = 3"));
     let error = never.shard(1, &mut |_| Ok(Box::new(io::sink())), &|_| {}).expect_err("no place");
     assert!(matches!(&error, ShardError::DoesNotFit { scene: 1, .. }), "{error}");
@@ -239,7 +239,7 @@ fn fault(text: &str) -> SpecError {
 }
 
 #[test]
-fn faults_name_file_line_field_and_what_would_be_right() {
+fn faults_have_position_and_advice() {
     let right = "[set]\nname = \"a\"\nshards = 1\nscenes = 1\nposes = 1\n[[scene]]\nshape = \"rectangle\"\n\
                  width_m = 3\ndepth_m = [2, 3]\n";
     assert_eq!(generator(right).spec().set.name, "a");
@@ -333,9 +333,13 @@ fn faults_name_file_line_field_and_what_would_be_right() {
         let text = right.replacen(from, to, 1);
         assert_ne!(text, right, "{to}");
         let error = fault(&text);
-        let told = error.to_string();
-        assert!(told.starts_with(place), "{to}: {told}");
-        assert!(told.contains(part) && error.help.contains(help), "{to}: {told}; {}", error.help);
+        let message = error.to_string();
+        assert!(message.starts_with(place), "{to}: {message}");
+        assert!(
+            message.contains(part) && error.help.contains(help),
+            "{to}: {message}; {}",
+            error.help
+        );
     }
 }
 
@@ -346,17 +350,17 @@ fn facts(generator: &Generator, number: u32) -> ShardFacts {
 }
 
 #[test]
-fn the_facts_of_a_shard_are_refused_for_any_other() {
+fn facts_match_only_their_shard() {
     let small = EVERYTHING.replace("scenes = 3", "scenes = 1");
     let own = generator(&small);
     let text = facts(&own, 1).to_text();
     assert_eq!(ShardFacts::read(&own, 1, &text).map(|facts| facts.to_text()), Ok(text.clone()));
-    let foreign = generator(&small.replace("poses = 2", "poses = 3"));
+    let different = generator(&small.replace("poses = 2", "poses = 3"));
     let read = |generator: &Generator, number: u32, text: &str| {
         ShardFacts::read(generator, number, text).expect_err(text)
     };
-    assert!(matches!(read(&foreign, 1, &text), ManifestError::Specification { .. }));
-    assert_eq!(read(&own, 2, &text), ManifestError::Number { found: 1, wanted: 2 });
+    assert!(matches!(read(&different, 1, &text), ManifestError::Specification { .. }));
+    assert_eq!(read(&own, 2, &text), ManifestError::Number { found: 1, expected: 2 });
     let older = text.replace("\"drawing\": 1", "\"drawing\": 0");
     assert!(matches!(read(&own, 1, &older), ManifestError::Version { .. }));
     let fewer = text.replace("echoes.parquet", "echos.parquet");

@@ -1,22 +1,22 @@
-//! Logs of CARMEN: a line a message.
+//! CARMEN logs: one message per line.
 //!
-//! `SONAR cone_angle count ranges... [x y theta of each...] time host logger_time`, in metres and radians; older
-//! logs lack the cone's angle. `ODOM x y theta ...`, `TRUEPOS x y theta ...`. Messages of other kinds are left
-//! out, and so are comments and parameters.
+//! `SONAR cone_angle count ranges... [x y theta of each...] time host logger_time`, in metres and
+//! radians; older logs lack the cone angle. `ODOM x y theta ...`, `TRUEPOS x y theta ...`. Other
+//! messages, comments and parameters are skipped.
 
 use crate::{
     ImportError, Location,
-    rounds::{self, Content, Device, Message, count, number, numbers},
+    array_rounds::{self, LogDevice, LogMessage, MessageContent, count, number, numbers},
 };
 
-/// Words after the ranges and places: when it was sent, by which computer, and when it was logged.
-const AFTER: usize = 3;
+/// Number of words after ranges and positions: send time, host and log time.
+const TRAILING_WORDS: usize = 3;
 
-/// The message of a line, if it is one of ranges or poses.
+/// Parses a line; `None` for lines without ranges or a pose.
 ///
 /// # Errors
-/// A line of such a kind that holds something else.
-pub(crate) fn message(place: Location, line: &str) -> Result<Option<Message>, ImportError> {
+/// Returns an error for a malformed message.
+pub(crate) fn message(place: Location, line: &str) -> Result<Option<LogMessage>, ImportError> {
     let words: Vec<&str> = line.split_whitespace().collect();
     let content = match words.first() {
         Some(&"ODOM") => pose(place, &words, false)?,
@@ -24,37 +24,37 @@ pub(crate) fn message(place: Location, line: &str) -> Result<Option<Message>, Im
         Some(&"SONAR") => ranges(place, &words)?,
         _ => return Ok(None),
     };
-    Ok(Some(Message { device: Device::default(), content }))
+    Ok(Some(LogMessage { device: LogDevice::default(), content }))
 }
 
-fn pose(place: Location, words: &[&str], is_true: bool) -> Result<Content, ImportError> {
+fn pose(place: Location, words: &[&str], is_true: bool) -> Result<MessageContent, ImportError> {
     let [x_m, y_m, heading_rad] =
         [(1, "x"), (2, "y"), (3, "theta")].map(|(at, what)| number(place, words, at, what));
-    Ok(Content::Pose { pose: rounds::pose(x_m?, y_m?, heading_rad?), is_true })
+    Ok(MessageContent::Pose { pose: array_rounds::pose(x_m?, y_m?, heading_rad?), is_true })
 }
 
-/// The count of words tells how the line is made.
-fn ranges(place: Location, words: &[&str]) -> Result<Content, ImportError> {
+/// Parses a SONAR line; its layout follows from the number of words.
+fn ranges(place: Location, words: &[&str]) -> Result<MessageContent, ImportError> {
     let fits = |at: usize| {
         let count: usize = words.get(at)?.parse().ok().filter(|count| *count > 0)?;
-        let rest = words.len().checked_sub(at + 1 + count + AFTER)?;
+        let rest = words.len().checked_sub(at + 1 + count + TRAILING_WORDS)?;
         [0, 3].contains(&(rest / count)).then_some(())?;
         (rest % count == 0).then_some((at + 1, rest > 0))
     };
     let Some((from, has_places)) = fits(2).or_else(|| fits(1)) else {
-        let what = "a SONAR message of a form that is not known";
+        let what = "SONAR message with an unexpected number of words";
         return Err(ImportError::at(
             place,
             what,
-            "it should be: SONAR cone_angle count ranges... [x y theta of each...] time host time",
+            "expected: SONAR cone_angle count ranges... [x y theta of each...] time host time",
         ));
     };
     let count = count(place, words, from - 1)?;
-    let ranges = rounds::ranges(place, words, from, count)?;
-    let places = has_places.then(|| numbers(place, words, from + count, 3 * count, "place"));
+    let ranges = array_rounds::ranges(place, words, from, count)?;
+    let places = has_places.then(|| numbers(place, words, from + count, 3 * count, "position"));
     let geometry = places.transpose()?.map(|numbers| {
         numbers.chunks_exact(3).map(|place| [place[0], place[1], place[2]]).collect()
     });
-    let seconds = number(place, words, words.len() - AFTER, "time")?;
-    Ok(Content::Ranges { seconds: Some(seconds), ranges, geometry })
+    let seconds = number(place, words, words.len() - TRAILING_WORDS, "time")?;
+    Ok(MessageContent::Ranges { seconds: Some(seconds), ranges, geometry })
 }

@@ -1,5 +1,5 @@
-//! Encodings of texts: all of the WHATWG with the feature `texts`, else UTF-8 alone. The tables of the others are larger
-//! than the rest of a page's WebAssembly.
+//! Text encodings: all of the WHATWG standard with the feature `texts`, otherwise only UTF-8. The
+//! tables of the other encodings are larger than the rest of a page's WebAssembly.
 
 use std::io::Read;
 
@@ -9,7 +9,7 @@ pub(crate) use encoding_rs::{Encoding, UTF_8, UTF_16BE, UTF_16LE, WINDOWS_1252};
 #[cfg(not(feature = "texts"))]
 pub(crate) use plain::{Encoding, UTF_8, UTF_16BE, UTF_16LE, WINDOWS_1252};
 
-/// A text as UTF-8, without a byte order mark.
+/// Decodes a text to UTF-8 and removes its byte order mark.
 #[cfg(feature = "texts")]
 pub(crate) fn decoded<R: Read>(source: R, encoding: &'static Encoding) -> impl Read + use<R> {
     encoding_rs_io::DecodeReaderBytesBuilder::new()
@@ -18,16 +18,16 @@ pub(crate) fn decoded<R: Read>(source: R, encoding: &'static Encoding) -> impl R
         .build(source)
 }
 
-/// Checks whether this build decodes an encoding.
+/// Returns `true` if this build decodes the encoding.
 pub(crate) fn is_supported(encoding: &'static Encoding) -> bool {
     cfg!(feature = "texts") || encoding == UTF_8
 }
 
-/// A text without a byte order mark.
+/// Removes the byte order mark of a UTF-8 text.
 #[cfg(not(feature = "texts"))]
 pub(crate) fn decoded<R: Read>(mut source: R, _: &'static Encoding) -> impl Read + use<R> {
     let mut start = Vec::new();
-    // A failure is met again by the next read.
+    // The next read returns the same error.
     let _ = source.by_ref().take(plain::MARK.len() as u64).read_to_end(&mut start);
     if start == plain::MARK {
         start.clear();
@@ -39,10 +39,10 @@ pub(crate) fn decoded<R: Read>(mut source: R, _: &'static Encoding) -> impl Read
 mod plain {
     use std::borrow::Cow;
 
-    /// Byte order mark of UTF-8.
+    /// UTF-8 byte order mark.
     pub(crate) const MARK: [u8; 3] = *b"\xef\xbb\xbf";
 
-    /// An encoding by its name.
+    /// Named encoding.
     #[derive(Debug, PartialEq, Eq)]
     pub(crate) struct Encoding(&'static str);
 

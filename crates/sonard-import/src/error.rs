@@ -1,21 +1,21 @@
-//! What can be wrong with a file that is imported.
+//! Import errors and the position in the file that they refer to.
 
 use std::fmt;
 
 use thiserror::Error;
 
-/// Where in a file something stands.
+/// Position of a reading or an error within a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Location {
-    /// A line, from 1.
+    /// Line number, from 1.
     Line(u64),
-    /// A message of a recording, from 1, among those of readings.
+    /// Message of a recording, from 1, counting only messages with readings.
     Message(u64),
-    /// An object of a JSON file, and one of the numbers in its lists, both from 1.
+    /// Object of a JSON file, optionally with an element of its lists, both from 1.
     Entry {
-        /// The object.
+        /// Number of the object, from 1.
         object: u64,
-        /// The place in its lists; `None` of what it has once.
+        /// Index within the lists of the object, from 1; `None` for values that are not in a list.
         number: Option<u64>,
     },
 }
@@ -33,38 +33,38 @@ impl fmt::Display for Location {
     }
 }
 
-/// Why a file can't be imported.
+/// Error of examining or converting a file.
 #[derive(Debug, Error)]
 pub enum ImportError {
-    /// The system refused.
+    /// I/O error of the operating system.
     #[error("{0}")]
     Io(#[from] std::io::Error),
-    /// A place in the file holds what it should not.
+    /// Invalid value at a position in the file.
     #[error("{place}{}: {what}", column.as_ref().map(|column| format!(", {column}")).unwrap_or_default())]
     At {
-        /// Where.
+        /// Position of the invalid value.
         place: Location,
-        /// The field, and the column that it was looked for in.
+        /// Field, and the column mapped to it.
         column: Option<String>,
-        /// What is wrong.
+        /// Description of the fault.
         what: String,
-        /// What to do.
+        /// Advice for the user, with the option that resolves the fault.
         help: String,
     },
-    /// The mapping does not fit the file, or makes no sense by itself.
+    /// Mapping that is inconsistent or does not fit the file.
     #[error("{what}")]
     Mapping {
-        /// What is wrong.
+        /// Description of the fault.
         what: String,
-        /// What to do.
+        /// Advice for the user, with the option that resolves the fault.
         help: String,
     },
-    /// The numbers are not what the mapping says they are.
+    /// Values that are implausible for the mapped quantity or unit.
     #[error("{what}")]
     Doubtful {
-        /// What speaks against it.
+        /// Evidence against the mapping.
         what: String,
-        /// What they may be instead.
+        /// Alternative interpretations, each with its option.
         help: String,
     },
 }
@@ -78,7 +78,7 @@ impl ImportError {
         Self::At { place, column: None, what: what.into(), help: help.into() }
     }
 
-    /// What to do about it.
+    /// Returns advice for the user, with the option that resolves the error.
     #[must_use]
     pub fn help(&self) -> &str {
         match self {

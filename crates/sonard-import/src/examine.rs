@@ -1,4 +1,4 @@
-//! Texts of each kind: examined once, and read again for their records.
+//! Examination of text files, and their second reading for records.
 
 use std::io::Read;
 
@@ -6,20 +6,20 @@ use serde_json::Value;
 
 use crate::{
     Column, Field, ImportError, Imported, Location, Quantity, Reading, Row, Source,
-    doubt::{Doubts, Ranges, Ways},
+    array_rounds::{self, DeviceCounts, LogMessage, RoundReader},
     format::ReadLine,
-    json::{self, Entry},
-    layout::Header,
-    lines::{Ends, Lines},
+    json::{self, FirstEntry},
+    layout::TableLayout,
+    lines::{LineEnding, LineReader},
     mapping::{Decimal, columns_option},
-    reading::Reader,
+    no_echo_constant::DirectionKind,
+    reading::RowReader,
     ros_text,
-    rounds::{self, Devices, Message, Rounds},
-    scans::{self, Cutter},
-    silence::Across,
-    source::Scan,
-    table::{self, Raggedness},
+    scans::{self, ScanSplitter},
+    source::ScanRecords,
+    table::{self, RowFaults},
     text::Survey,
+    unit_check::{RangeStats, SweepStats, UnitContext},
 };
 
 /// Rows of a table or of JSON.
@@ -40,14 +40,14 @@ impl Source<'_> {
         }
         if rangers.is_some() {
             return Err(ImportError::mapping(
-                "--array is for rows with a range of each ranger, and one column has the range",
-                "leave --array out, or give the columns of all ranges: --columns range_m=1-8",
+                "--array needs rows with one range per ranger, but a single column is mapped to the range",
+                "leave --array out, or map the columns of all ranges: --columns range_m=1-8",
             ));
         }
-        let mut raggedness = Raggedness::default();
-        let mut doubts = Doubts::new();
-        let mut reader = Reader::new(&found.mapping, &found.taken, found.decimal())?;
-        let ways = Ways {
+        let mut faults = RowFaults::default();
+        let mut stats = SweepStats::new();
+        let mut reader = RowReader::new(&found.mapping, &found.taken, found.decimal())?;
+        let units = UnitContext {
             mapping: &found.mapping,
             names: &names,
             has_columns: true,
@@ -56,40 +56,40 @@ impl Source<'_> {
         match &found.header {
             Some(header) => {
                 let source = found.decoded((self.open)()?);
-                let mut rows = table::Rows::of(source, header, &found.mapping)?;
+                let mut rows = table::TableRows::new(source, header, &found.mapping)?;
                 for row in rows.by_ref() {
-                    doubts.add(&reader.read(&row?)?, (&ways, &found.taken));
+                    stats.add(&reader.read(&row?)?, (&units, &found.taken));
                 }
-                raggedness = rows.raggedness;
+                faults = rows.faults;
             }
             None => {
                 for row in found.rows((self.open)()?)? {
-                    doubts.add(&reader.read(&row?)?, (&ways, &found.taken));
+                    stats.add(&reader.read(&row?)?, (&units, &found.taken));
                 }
             }
         }
-        check_one_row(found, doubts.ranges.readings)?;
-        let notes = doubts.check(&ways, &found.taken)?;
+        check_one_row(found, stats.ranges.readings)?;
+        let notes = stats.check(&units, &found.taken)?;
         let times = reader.times.notes();
         found.notes.extend(notes);
         found.notes.extend(times);
-        found.note_ends(survey, raggedness);
-        (found.readings, found.echoes) = (doubts.ranges.readings, doubts.ranges.echoes);
+        found.note_ends(survey, faults);
+        (found.readings, found.echoes) = (stats.ranges.readings, stats.ranges.echoes);
         found.has_poses = found.mapping.field(Quantity::X).is_some();
         Ok(())
     }
 
-    /// Names of the columns, with the layout of a table, and the mapping completed by them.
+    /// Returns the column names; detects the layout of a table and completes the mapping.
     fn names(&self, head: &str, found: &mut Imported) -> Result<Vec<String>, ImportError> {
         let rangers = found.taken.array.as_ref().map(|array| array.rangers.len());
         let (names, columns) = if found.format == crate::Format::Json {
             match self.json_entry(head, found)? {
-                Entry::Names(names) => (names, None),
-                Entry::List(length) => (Vec::new(), Some(length)),
-                Entry::Other => (Vec::new(), None),
+                FirstEntry::Names(names) => (names, None),
+                FirstEntry::List(length) => (Vec::new(), Some(length)),
+                FirstEntry::Other => (Vec::new(), None),
             }
         } else {
-            let header = Header::of(head, &found.mapping)?;
+            let header = TableLayout::detect(head, &found.mapping)?;
             found.notes.extend(header.notes.iter().cloned());
             let names = if header.has_names { header.cells.clone() } else { Vec::new() };
             let columns = header.cells.len();
@@ -100,71 +100,76 @@ impl Source<'_> {
             return Ok(names);
         }
         if let Some(rangers) = rangers {
-            if found.mapping.guess_array(&names, rangers) {
+            if found.mapping.infer_array(&names, rangers) {
                 return Ok(names);
             }
             if names.is_empty() && columns == Some(rangers) {
-                return Err(ask_unit_of_array(found, rangers));
+                return Err(missing_array_unit(found, rangers));
             }
         }
         if names.is_empty() {
-            return Err(unnamed(columns, found.format == crate::Format::Json));
+            return Err(missing_names(columns, found.format == crate::Format::Json));
         }
-        let notes = found.mapping.guess(&names)?;
+        let notes = found.mapping.infer_columns(&names)?;
         found.notes.extend(notes);
         Ok(names)
     }
 
-    /// The first entry of a JSON file; of one too long for a look, the whole file is read.
-    fn json_entry(&self, head: &str, found: &Imported) -> Result<Entry, ImportError> {
-        if let Some(entry) = Entry::of_head(head) {
+    /// Returns the kind of the first entry of a JSON file; reads the whole file if the entry
+    /// exceeds the head.
+    fn json_entry(&self, head: &str, found: &Imported) -> Result<FirstEntry, ImportError> {
+        if let Some(entry) = FirstEntry::from_head(head) {
             return Ok(entry);
         }
         let source = found.decoded((self.open)()?);
         let first = json::objects(source)?.next();
-        Ok(first.transpose()?.map_or(Entry::Other, |value| Entry::of(&value)))
+        Ok(first.transpose()?.map_or(FirstEntry::Other, |value| FirstEntry::from_value(&value)))
     }
 
-    /// Rows that are rounds of an array.
+    /// Examines rows that are rounds of an array.
     fn examine_rounds(&self, names: &[String], found: &mut Imported) -> Result<(), ImportError> {
         let Some(array) = &found.taken.array else {
             return Err(ImportError::mapping(
                 "several columns of ranges need an array",
-                "give their places: --array NAME or FILE",
+                "give the array: --array NAME or FILE",
             ));
         };
         let count = array.rangers.len();
-        let mut reader = Reader::new(&found.mapping, &found.taken, found.decimal())?;
-        let mut ranges = Ranges::new(Across::Rangers);
-        let ways =
-            Ways { mapping: &found.mapping, names, has_columns: true, zero_is_no_echo: false };
+        let mut reader = RowReader::new(&found.mapping, &found.taken, found.decimal())?;
+        let mut ranges = RangeStats::new(DirectionKind::Rangers);
+        let units = UnitContext {
+            mapping: &found.mapping,
+            names,
+            has_columns: true,
+            zero_is_no_echo: false,
+        };
         let mut has_poses = false;
         for row in found.rows((self.open)()?)? {
             let round = reader.round(&row?)?;
             if round.raw.len() != count {
                 let what = format!(
-                    "{} ranges, and the array {} has {count} rangers",
+                    "{} ranges, but the array {} has {count} rangers",
                     round.raw.len(),
                     array.name
                 );
                 return Err(ImportError::at(
                     round.place,
                     what,
-                    "give the array that the file is of",
+                    "give the array with which the file was recorded",
                 ));
             }
             has_poses |= round.pose.is_some();
             for (place, (raw, range_m)) in round.raw.iter().zip(&round.ranges_m).enumerate() {
-                ranges.add(round.place, place as f64, *raw, *range_m, (&ways, &found.taken));
+                ranges.add(round.place, place as f64, *raw, *range_m, (&units, &found.taken));
             }
         }
         if ranges.readings == 0 {
             return Err(ImportError::mapping(
-                "there is no reading in it",
+                "the file has no readings",
                 "give a file with readings",
             ));
         }
-        let notes = ranges.check(&ways, &found.taken)?;
+        let notes = ranges.check(&units, &found.taken)?;
         let times = reader.times.notes();
         found.notes.extend(notes.into_iter().chain(times));
         found.has_poses = has_poses;
@@ -174,39 +179,43 @@ impl Source<'_> {
 
     pub(crate) fn examine_ros_text(&self, found: &mut Imported) -> Result<(), ImportError> {
         found.guessed = false;
-        let mut doubts = Doubts::new();
-        let mut reader = ros_text::Reader::new(&found.mapping);
-        let ways =
-            Ways { mapping: &found.mapping, names: &[], has_columns: false, zero_is_no_echo: true };
+        let mut stats = SweepStats::new();
+        let mut reader = ros_text::MessageConverter::new(&found.mapping);
+        let units = UnitContext {
+            mapping: &found.mapping,
+            names: &[],
+            has_columns: false,
+            zero_is_no_echo: true,
+        };
         let source = found.decoded((self.open)()?);
         let mut has_fixed = false;
         for message in ros_text::messages(source, found.is_json)? {
             let message = message?;
             has_fixed |= !ros_text::is_scan(&message);
             for reading in reader.read(&message)? {
-                doubts.add(&reading, (&ways, &found.taken));
+                stats.add(&reading, (&units, &found.taken));
             }
         }
         check_beyond(&reader.notes, &found.taken)?;
-        let notes = doubts.check(&ways, &found.taken)?;
+        let notes = stats.check(&units, &found.taken)?;
         found.notes.extend(reader.notes.lines());
         found.notes.extend(notes);
         if reader.others > 0 {
             found.notes.push(format!(
-                "left out: {} messages that are no LaserScan or Range",
+                "skipped: {} messages other than LaserScan and Range",
                 reader.others
             ));
         }
         found.notes.push(
-            "frames are not in it: the scanner is taken to stand upright and look ahead".to_owned(),
+            "the file has no frames: the scanner is assumed upright and facing ahead".to_owned(),
         );
         if has_fixed && found.mapping.azimuth_deg.is_none() {
             found.notes.push(
-                "Range messages have no direction: taken as ahead; --azimuth-deg DEG gives another"
+                "Range messages have no direction: assumed ahead; set it with --azimuth-deg DEG"
                     .to_owned(),
             );
         }
-        (found.readings, found.echoes) = (doubts.ranges.readings, doubts.ranges.echoes);
+        (found.readings, found.echoes) = (stats.ranges.readings, stats.ranges.echoes);
         Ok(())
     }
 
@@ -216,61 +225,65 @@ impl Source<'_> {
         found: &mut Imported,
     ) -> Result<(), ImportError> {
         found.guessed = false;
-        let mut devices = Devices::default();
+        let mut counts = DeviceCounts::default();
         for message in messages(read, found.decoded((self.open)()?)) {
-            devices.add(&message?.1);
+            counts.add(&message?.1);
         }
-        let (chosen, notes) = devices.choose(found.mapping.device.as_deref())?;
+        let (devices, notes) = counts.select(found.mapping.device.as_deref())?;
         found.notes.extend(notes);
-        found.chosen = chosen;
-        let mut rounds = Rounds::new(&found.mapping, &found.chosen, found.taken.started)?;
-        let mut ranges = Ranges::new(Across::Rangers);
-        let ways =
-            Ways { mapping: &found.mapping, names: &[], has_columns: false, zero_is_no_echo: true };
+        found.devices = devices;
+        let mut rounds = RoundReader::new(&found.mapping, &found.devices, found.taken.started)?;
+        let mut ranges = RangeStats::new(DirectionKind::Rangers);
+        let units = UnitContext {
+            mapping: &found.mapping,
+            names: &[],
+            has_columns: false,
+            zero_is_no_echo: true,
+        };
         let mut has_poses = false;
         for message in messages(read, found.decoded((self.open)()?)) {
             let (place, message) = message?;
-            let Some(round) = rounds.take(place, message)? else { continue };
+            let Some(round) = rounds.push(place, message)? else { continue };
             has_poses |= round.pose.is_some();
             for (ranger, (raw, range_m)) in round.raw.iter().zip(&round.ranges_m).enumerate() {
-                ranges.add(place, ranger as f64, *raw, *range_m, (&ways, &found.taken));
+                ranges.add(place, ranger as f64, *raw, *range_m, (&units, &found.taken));
             }
         }
         let Some(count) = rounds.rangers else {
             return Err(ImportError::mapping(
-                "there is no sonar message in it",
-                "give a log with sonars",
+                "the log has no sonar messages",
+                "give a log with sonar data",
             ));
         };
         let (array, note) = match (&rounds.geometry, &found.taken.array) {
             (Some(geometry), given) => {
                 let note = given.as_ref().map(|given| {
                     format!(
-                        "the log states the places of its rangers: the array {} is not used",
+                        "the log contains the positions of its rangers: the array {} is ignored",
                         given.name
                     )
                 });
-                (rounds::array(geometry, &found.taken.sensor), note)
+                (array_rounds::array(geometry, &found.taken.sensor), note)
             }
             (None, Some(array)) => (array.clone(), None),
             (None, None) => {
                 return Err(ImportError::mapping(
-                    format!("the log does not say where its {count} rangers are"),
-                    "say it: --array NAME or FILE",
+                    format!("the log does not contain the positions of its {count} rangers"),
+                    "give the array: --array NAME or FILE",
                 ));
             }
         };
         if array.rangers.len() != count {
             return Err(ImportError::mapping(
                 format!(
-                    "the log has {count} rangers, and the array {} has {}",
+                    "the log has {count} rangers, but the array {} has {}",
                     array.name,
                     array.rangers.len()
                 ),
-                "give the array that the log is of",
+                "give the array with which the log was recorded",
             ));
         }
-        let notes = ranges.check(&ways, &found.taken)?;
+        let notes = ranges.check(&units, &found.taken)?;
         let times = rounds.times.notes();
         (found.readings, found.echoes) = (ranges.readings, ranges.echoes);
         found.notes.extend(note.into_iter().chain(notes).chain(times));
@@ -280,25 +293,25 @@ impl Source<'_> {
     }
 }
 
-/// Refuses ranges that are all beyond the greatest one that is stated beside them.
+/// Rejects a file whose ranges are all beyond the `max_range` of their messages.
 pub(crate) fn check_beyond(
     notes: &crate::limits::LimitNotes,
-    taken: &crate::Taken,
+    assumptions: &crate::Taken,
 ) -> Result<(), ImportError> {
-    if taken.as_said || !notes.are_all_beyond() {
+    if assumptions.as_said || !notes.all_beyond_max() {
         return Ok(());
     }
     Err(ImportError::Doubtful {
         what: format!(
-            "all {} ranges are beyond max_range = {}, the greatest that is stated beside them",
+            "all {} ranges are beyond max_range = {} of their messages",
             notes.readings,
-            notes.most()
+            notes.max()
         ),
-        help: "are ranges and limits in different units? Correct the driver; --no-unit-check takes all as no echo".to_owned(),
+        help: "are ranges and limits in different units? Correct the driver; --no-unit-check reads all as no echo".to_owned(),
     })
 }
 
-/// A file that is one line of many values has lost its line ends.
+/// Rejects a table of a single long row, which has probably lost its line ends.
 fn check_one_row(found: &Imported, readings: u64) -> Result<(), ImportError> {
     let Some(header) = found.header.as_ref().filter(|header| !header.has_names) else {
         return Ok(());
@@ -309,12 +322,13 @@ fn check_one_row(found: &Imported, readings: u64) -> Result<(), ImportError> {
     }
     Err(ImportError::Doubtful {
         what: format!("the file is one row of {values} values, of which {columns} are read"),
-        help: "have its line ends been lost? Give a file with a reading a line; --no-unit-check takes the row as it is".to_owned(),
+        help: "are line ends missing? Give one reading per line; --no-unit-check reads the row as it is"
+            .to_owned(),
     })
 }
 
-/// Asks for the unit of rows that have as many values as an array has rangers.
-fn ask_unit_of_array(found: &Imported, rangers: usize) -> ImportError {
+/// Builds the error that requests the unit of rows with one value per ranger of the array.
+fn missing_array_unit(found: &Imported, rangers: usize) -> ImportError {
     let name = found.taken.array.as_ref().map_or("", |array| &array.name);
     let column = Column::Several((1..=rangers).collect());
     let options = Field::of_quantity(Quantity::Range)
@@ -323,29 +337,29 @@ fn ask_unit_of_array(found: &Imported, rangers: usize) -> ImportError {
     let options: Vec<String> = options.collect();
     ImportError::mapping(
         format!(
-            "each row has {rangers} values, as many as the array {name} has rangers, and no names"
+            "each row has {rangers} values without names, as many as the array {name} has rangers"
         ),
-        format!("choose their unit: {}", options.join(" | ")),
+        format!("select their unit: {}", options.join(" | ")),
     )
 }
 
-fn unnamed(columns: Option<usize>, is_json: bool) -> ImportError {
+fn missing_names(columns: Option<usize>, is_json: bool) -> ImportError {
     let count = columns.map_or(String::new(), |count| format!(" of {count} values"));
     let what = if is_json {
-        format!("its entries are lists{count} without names")
+        format!("the entries are lists{count} without names")
     } else {
-        format!("the first line{count} has no names of columns")
+        format!("the first line{count} has no column names")
     };
-    let help = "say what the columns are, and their units, by their numbers: --columns azimuth_deg=1,range_cm=2 for degrees and \
-                centimetres, --columns azimuth_rad=1,range_m=2 for radians and metres; one column a ranger of an array: \
-                --array NAME --columns range_m=1-8";
+    let help = "map the columns by number, with units: --columns azimuth_deg=1,range_cm=2 (degrees and centimetres), \
+                    --columns azimuth_rad=1,range_m=2 (radians and metres), or one column per ranger of an array: \
+                    --array NAME --columns range_m=1-8";
     ImportError::mapping(what, help)
 }
 
 impl Imported {
-    /// Checks whether each row is a round of an array.
+    /// Returns `true` if each row is a round of an array.
     pub(crate) fn is_of_array(&self) -> bool {
-        self.mapping.is_of_array()
+        self.mapping.has_array_columns()
             || (self.format == crate::Format::Json && self.taken.array.is_some())
     }
 
@@ -354,20 +368,19 @@ impl Imported {
         self.mapping.decimal.or(by_header).unwrap_or(Decimal::Point)
     }
 
-    fn note_ends(&mut self, survey: &Survey, raggedness: Raggedness) {
-        if let Some(place) = raggedness.cut {
-            self.notes.push(format!("{place} was cut: it lacks a column and is left out"));
-        } else if self.header.as_ref().is_some_and(|header| header.ends == Ends::Lines)
-            && !survey.has_last_end()
+    fn note_ends(&mut self, survey: &Survey, faults: RowFaults) {
+        if let Some(place) = faults.cut {
+            self.notes.push(format!("{place} is incomplete (a column is missing): skipped"));
+        } else if self.header.as_ref().is_some_and(|header| header.ends == LineEnding::Lines)
+            && !survey.ends_with_line_end()
         {
-            self.notes.push(
-                "the last line has no end: it may have been cut within its last value".to_owned(),
-            );
+            self.notes
+                .push("the last line has no line end: its last value may be truncated".to_owned());
         }
-        if raggedness.short > 0 {
+        if faults.short > 0 {
             self.notes.push(format!(
-                "{} rows have fewer values than the table has columns; what is read is there",
-                raggedness.short
+                "{} rows have fewer values than the table has columns; no mapped column is missing",
+                faults.short
             ));
         }
     }
@@ -375,7 +388,7 @@ impl Imported {
     fn rows<'a>(&'a self, source: impl Read + 'a) -> Result<Rows<'a>, ImportError> {
         let source = self.decoded(source);
         Ok(match &self.header {
-            Some(header) => Box::new(table::Rows::of(source, header, &self.mapping)?),
+            Some(header) => Box::new(table::TableRows::new(source, header, &self.mapping)?),
             None => json::rows(source, &self.mapping, self.is_of_array())?,
         })
     }
@@ -383,8 +396,8 @@ impl Imported {
     pub(crate) fn scans_of_rows<'a>(
         &'a self,
         source: impl Read + 'a,
-    ) -> Result<Box<dyn Iterator<Item = Scan> + 'a>, ImportError> {
-        let mut reader = Reader::new(&self.mapping, &self.taken, self.decimal())?;
+    ) -> Result<Box<dyn Iterator<Item = ScanRecords> + 'a>, ImportError> {
+        let mut reader = RowReader::new(&self.mapping, &self.taken, self.decimal())?;
         let readings = self.rows(source)?.map(move |row| reader.read(&row?));
         Ok(self.cut(readings))
     }
@@ -392,8 +405,8 @@ impl Imported {
     pub(crate) fn scans_of_messages<'a>(
         &'a self,
         source: impl Read + 'a,
-    ) -> Result<Box<dyn Iterator<Item = Scan> + 'a>, ImportError> {
-        let mut reader = ros_text::Reader::new(&self.mapping);
+    ) -> Result<Box<dyn Iterator<Item = ScanRecords> + 'a>, ImportError> {
+        let mut reader = ros_text::MessageConverter::new(&self.mapping);
         let messages = ros_text::messages(self.decoded(source), self.is_json)?;
         let air_m_s = self.taken.air.sound_speed_m_s();
         let assumed_m_s = self.mapping.sound_speed_m_s.unwrap_or(air_m_s);
@@ -414,22 +427,22 @@ impl Imported {
         Ok(self.cut(readings))
     }
 
-    /// Readings cut into scans, as records.
+    /// Splits readings into scans and converts them to records.
     fn cut<'a>(
         &'a self,
         mut readings: impl Iterator<Item = Result<Reading, ImportError>> + 'a,
-    ) -> Box<dyn Iterator<Item = Scan> + 'a> {
-        let (mut cutter, mut number) = (Some(Cutter::default()), 0);
+    ) -> Box<dyn Iterator<Item = ScanRecords> + 'a> {
+        let (mut splitter, mut number) = (Some(ScanSplitter::default()), 0);
         Box::new(std::iter::from_fn(move || {
             let scan = loop {
                 match readings.next() {
                     Some(Ok(reading)) => {
-                        if let Some(scan) = cutter.as_mut()?.push(reading) {
+                        if let Some(scan) = splitter.as_mut()?.push(reading) {
                             break scan;
                         }
                     }
                     Some(Err(error)) => return Some(Err(error)),
-                    None => break cutter.take()?.finish()?,
+                    None => break splitter.take()?.finish()?,
                 }
             };
             number += 1;
@@ -440,8 +453,8 @@ impl Imported {
     pub(crate) fn rounds_of_rows<'a>(
         &'a self,
         source: impl Read + 'a,
-    ) -> Result<Box<dyn Iterator<Item = Scan> + 'a>, ImportError> {
-        let mut reader = Reader::new(&self.mapping, &self.taken, self.decimal())?;
+    ) -> Result<Box<dyn Iterator<Item = ScanRecords> + 'a>, ImportError> {
+        let mut reader = RowReader::new(&self.mapping, &self.taken, self.decimal())?;
         let rounds = self.rows(source)?.map(move |row| reader.round(&row?));
         Ok(Box::new(
             (1..).zip(rounds).map(|(number, round)| Ok(scans::round(&self.taken, number, &round?))),
@@ -452,10 +465,10 @@ impl Imported {
         &'a self,
         read: ReadLine,
         source: impl Read + 'a,
-    ) -> Result<Box<dyn Iterator<Item = Scan> + 'a>, ImportError> {
-        let mut rounds = Rounds::new(&self.mapping, &self.chosen, self.taken.started)?;
+    ) -> Result<Box<dyn Iterator<Item = ScanRecords> + 'a>, ImportError> {
+        let mut rounds = RoundReader::new(&self.mapping, &self.devices, self.taken.started)?;
         let found = messages(read, self.decoded(source)).filter_map(move |message| {
-            let round = message.and_then(|(place, message)| rounds.take(place, message));
+            let round = message.and_then(|(place, message)| rounds.push(place, message));
             round.transpose()
         });
         Ok(Box::new(
@@ -464,12 +477,12 @@ impl Imported {
     }
 }
 
-/// The messages of a robot's log that are of ranges or poses, and their places.
+/// Parses the range and pose messages of a robot's log, with their positions in the file.
 fn messages(
     read: ReadLine,
     source: impl Read,
-) -> impl Iterator<Item = Result<(Location, Message), ImportError>> {
-    Lines::of(source, Ends::Lines).filter_map(move |line| {
+) -> impl Iterator<Item = Result<(Location, LogMessage), ImportError>> {
+    LineReader::new(source, LineEnding::Lines).filter_map(move |line| {
         let message = line.and_then(|line| {
             let message = read(line.place(), &line.text)?;
             Ok(message.map(|message| (line.place(), message)))

@@ -1,4 +1,4 @@
-//! What a column may hold: a quantity in a unit, by one name.
+//! Fields of a mapping: a physical quantity in a unit, under one name.
 
 use std::fmt;
 
@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize, de};
 
 use crate::ImportError;
 
-/// What is measured or stated.
+/// Physical or descriptive quantity of a column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Quantity {
     /// Direction of the beam from the robot's heading.
@@ -18,24 +18,24 @@ pub enum Quantity {
     Range,
     /// Time from firing to the first echo.
     Tof,
-    /// When it was fired.
+    /// Time at which the ranger fired.
     Time,
-    /// What tells scans apart: any text.
+    /// Scan identifier: any text; a change starts a new scan.
     Scan,
-    /// Where the robot stood.
+    /// Position of the robot along the x axis.
     X,
-    /// The same.
+    /// Position of the robot along the y axis.
     Y,
-    /// Where it looked to.
+    /// Heading of the robot.
     Heading,
-    /// Of the air.
+    /// Air temperature at the reading.
     Temperature,
-    /// What became of the firing, in the words of the log.
+    /// Outcome of the firing, named as in the log.
     Status,
 }
 
 impl Quantity {
-    /// In words.
+    /// Returns the English name of the quantity, for messages.
     #[must_use]
     pub const fn words(self) -> &'static str {
         match self {
@@ -55,16 +55,16 @@ impl Quantity {
 }
 
 impl Quantity {
-    /// Checks whether a reading has it: a direction, a range or a time of flight.
-    pub(crate) const fn is_of_reading(self) -> bool {
+    /// Returns `true` for a direction, a range or a time of flight.
+    pub(crate) const fn is_measurement(self) -> bool {
         matches!(self, Self::Azimuth | Self::Bearing | Self::Range | Self::Tof)
     }
 }
 
 const DEG: f64 = 180.0 / std::f64::consts::PI;
 
-/// Names of fields, the quantity, and what turns a number into degrees, metres, microseconds, seconds or
-/// degrees Celsius; without such a factor they are text.
+/// Field names with quantity and scale factor to degrees, metres, microseconds, seconds or degrees
+/// Celsius. Fields without a factor hold text.
 const FIELDS: [(&str, Quantity, Option<f64>); 31] = [
     ("azimuth_deg", Quantity::Azimuth, Some(1.0)),
     ("azimuth_rad", Quantity::Azimuth, Some(DEG)),
@@ -104,30 +104,30 @@ const FIELDS: [(&str, Quantity, Option<f64>); 31] = [
 pub struct Field(usize);
 
 impl Field {
-    /// All of them.
+    /// Returns every field that a mapping may use.
     pub fn all() -> impl Iterator<Item = Self> {
         (0..FIELDS.len()).map(Self)
     }
 
-    /// By its name.
+    /// Returns the field with this name.
     #[must_use]
     pub fn named(name: &str) -> Option<Self> {
         FIELDS.iter().position(|(known, ..)| *known == name).map(Self)
     }
 
-    /// Its name.
+    /// Returns the name used in mappings and on the command line.
     #[must_use]
     pub const fn name(self) -> &'static str {
         FIELDS[self.0].0
     }
 
-    /// What it is a field of.
+    /// Returns the quantity that the field holds.
     #[must_use]
     pub const fn quantity(self) -> Quantity {
         FIELDS[self.0].1
     }
 
-    /// The number in degrees, metres, microseconds, seconds or degrees Celsius.
+    /// Converts a number to degrees, metres, microseconds, seconds or degrees Celsius.
     pub(crate) fn scaled(self, number: f64) -> f64 {
         if self.name() == "temperature_k" {
             return number - 273.15;
@@ -135,22 +135,22 @@ impl Field {
         number * FIELDS[self.0].2.unwrap_or(1.0)
     }
 
-    /// Whether it is counted in radians.
+    /// Returns `true` for an angle in radians.
     pub(crate) fn is_radians(self) -> bool {
         self.unit() == Some("rad")
     }
 
-    /// The unit in its name; `None` of a text.
+    /// Returns the unit suffix of the name; `None` for text.
     pub(crate) fn unit(self) -> Option<&'static str> {
         FIELDS[self.0].2.and(self.name().rsplit_once('_')).map(|(_, unit)| unit)
     }
 
-    /// The field of a quantity in a unit.
-    pub(crate) fn of(quantity: Quantity, unit: Option<&str>) -> Option<Self> {
+    /// Returns the field of a quantity in a unit.
+    pub(crate) fn with_unit(quantity: Quantity, unit: Option<&str>) -> Option<Self> {
         Self::all().find(|field| field.quantity() == quantity && field.unit() == unit)
     }
 
-    /// The fields of a quantity.
+    /// Returns all fields of a quantity.
     pub(crate) fn of_quantity(quantity: Quantity) -> impl Iterator<Item = Self> {
         Self::all().filter(move |field| field.quantity() == quantity)
     }
@@ -175,7 +175,7 @@ impl std::str::FromStr for Field {
         Self::named(name).ok_or_else(|| {
             let known: Vec<_> = Self::all().map(Self::name).collect();
             ImportError::mapping(
-                format!("there is no field `{name}`"),
+                format!("unknown field `{name}`"),
                 format!("the fields are {}", known.join(", ")),
             )
         })

@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::{ImportError, Location, carmen, player, recording::MAGIC, rounds::Message};
+use crate::{ImportError, Location, array_rounds::LogMessage, carmen, player, recording::MAGIC};
 
 /// Format of a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -11,119 +11,119 @@ use crate::{ImportError, Location, carmen, player, recording::MAGIC, rounds::Mes
 pub enum Format {
     /// Lines of values separated by commas, semicolons, tabs or blanks.
     Csv,
-    /// JSON: a list of objects, or an object a line; numbers or lists of numbers in them.
+    /// JSON: a list of objects, or one object per line; members are numbers or lists of numbers.
     Json,
-    /// LaserScan and Range messages of ROS as text: JSON, or YAML as `rostopic echo` prints it.
+    /// ROS LaserScan and Range messages as text: JSON, or YAML as printed by `rostopic echo`.
     RosText,
-    /// The log of CARMEN.
+    /// CARMEN log, with SONAR, ODOM and TRUEPOS lines.
     Carmen,
-    /// The log of Player.
+    /// Player log, with lines of sonars, rangers and positions.
     Player,
-    /// A recording of ROS 2.
+    /// ROS 2 recording in MCAP or SQLite.
     Mcap,
 }
 
-/// Reads the message of a line of a robot's log, if it is one of ranges or poses.
-pub(crate) type ReadLine = fn(Location, &str) -> Result<Option<Message>, ImportError>;
+/// Parses one line of a robot's log; `None` for lines without ranges or a pose.
+pub(crate) type ReadLine = fn(Location, &str) -> Result<Option<LogMessage>, ImportError>;
 
-/// Structure of a format, which decides who reads it.
+/// Structure of a format, which selects its reader.
 #[derive(Debug, Clone, Copy)]
-pub(crate) enum Kind {
+pub(crate) enum FormatKind {
     /// Rows of named or numbered columns.
     Rows,
-    /// Messages of ROS as text.
+    /// ROS messages as text.
     RosText,
-    /// A message a line.
+    /// Messages of one line each, with their parser.
     Lines(ReadLine),
-    /// Bytes of a recording.
+    /// Binary recording of messages.
     Recording,
 }
 
-/// A row of the registry.
+/// Row of the registry.
 #[derive(Debug, Clone, Copy)]
 pub struct FormatEntry {
-    /// The format.
+    /// Format described by this row.
     pub format: Format,
-    /// Its name on the command line and in mapping files.
+    /// Name on the command line and in mapping files.
     pub name: &'static str,
-    /// Content of such files, for the help and the documentation.
+    /// Description of the content, for help and documentation.
     pub about: &'static str,
-    /// True if `--columns` gives its columns a meaning.
+    /// True if `--columns` maps the columns of this format.
     pub has_columns: bool,
-    pub(crate) kind: Kind,
-    /// True if the first bytes, and their text if they are one, are of this format.
-    is: fn(&[u8], &str) -> bool,
+    pub(crate) kind: FormatKind,
+    /// Detector, given the first bytes and their text if they are text.
+    matches: fn(&[u8], &str) -> bool,
 }
 
-/// The formats, in the order in which they are looked for.
+/// All formats, in the order of detection.
 pub const FORMATS: [FormatEntry; 6] = [
     FormatEntry {
         format: Format::Mcap,
         name: "mcap",
         about: "Recording of ROS 2 (MCAP or SQLite) with sensor_msgs/Range or LaserScan",
         has_columns: false,
-        kind: Kind::Recording,
-        is: |bytes, _| bytes.starts_with(MAGIC),
+        kind: FormatKind::Recording,
+        matches: |bytes, _| bytes.starts_with(MAGIC),
     },
     FormatEntry {
         format: Format::RosText,
         name: "ros_text",
         about: "LaserScan or Range messages as JSON, or as YAML from `rostopic echo` and `ros2 topic echo`",
         has_columns: false,
-        kind: Kind::RosText,
-        is: |_, text| is_ros_text(text),
+        kind: FormatKind::RosText,
+        matches: |_, text| is_ros_text(text),
     },
     FormatEntry {
         format: Format::Json,
         name: "json",
         about: "JSON: a list of objects or of lists, or one a line; numbers or lists of numbers in them",
         has_columns: true,
-        kind: Kind::Rows,
-        is: |_, text| text.trim_start().starts_with(['{', '[']),
+        kind: FormatKind::Rows,
+        matches: |_, text| text.trim_start().starts_with(['{', '[']),
     },
     FormatEntry {
         format: Format::Carmen,
         name: "carmen",
         about: "Log of CARMEN (SONAR, ODOM and TRUEPOS lines)",
         has_columns: false,
-        kind: Kind::Lines(carmen::message),
-        is: |_, text| text.lines().any(is_carmen),
+        kind: FormatKind::Lines(carmen::message),
+        matches: |_, text| text.lines().any(is_carmen),
     },
     FormatEntry {
         format: Format::Player,
         name: "player",
         about: "Log of Player 1 to 3 (sonar, ranger, position and position2d)",
         has_columns: false,
-        kind: Kind::Lines(player::message),
-        is: |_, text| text.lines().any(is_player),
+        kind: FormatKind::Lines(player::message),
+        matches: |_, text| text.lines().any(is_player),
     },
     FormatEntry {
         format: Format::Csv,
         name: "csv",
         about: "Table: lines of values separated by commas, semicolons, tabs, bars or blanks",
         has_columns: true,
-        kind: Kind::Rows,
-        is: |_, _| true,
+        kind: FormatKind::Rows,
+        matches: |_, _| true,
     },
 ];
 
 impl Format {
-    /// Its row of the registry.
+    /// Returns the format's row of the registry.
     #[must_use]
     pub fn entry(self) -> &'static FormatEntry {
         let found = FORMATS.iter().find(|entry| entry.format == self);
         found.unwrap_or(&FORMATS[FORMATS.len() - 1])
     }
 
-    /// The format of that name.
+    /// Returns the format with this name.
     #[must_use]
     pub fn named(name: &str) -> Option<Self> {
         FORMATS.iter().find(|entry| entry.name == name).map(|entry| entry.format)
     }
 
-    /// The format of a file that begins so.
+    /// Detects the format from the beginning of a file.
     pub(crate) fn detect(bytes: &[u8], text: &str) -> Self {
-        let found = FORMATS.iter().find(|entry| (entry.is)(bytes, text));
+        let found = FORMATS.iter().find(|entry| (entry.matches)(bytes, text));
         found.map_or(Self::Csv, |entry| entry.format)
     }
 }
@@ -140,7 +140,7 @@ fn is_player(line: &str) -> bool {
         || matches!(words[..], [time, _, _, interface] if is_interface(interface) && time.parse::<f64>().is_ok())
 }
 
-/// Members of LaserScan beside `ranges`, or of Range beside `range`, as JSON or as YAML writes their names.
+/// Returns `true` if a text has the members of a LaserScan or Range message, in JSON or YAML.
 fn is_ros_text(text: &str) -> bool {
     let has = |name: &str| {
         text.match_indices(name).any(|(at, _)| {
@@ -153,55 +153,55 @@ fn is_ros_text(text: &str) -> bool {
         || (has("radiation_type") && has("min_range") && has("range"))
 }
 
-/// A kind of file that is known but holds no readings that can be read here.
-struct Foreign {
-    /// Name of the kind.
+/// Recognized kind of file that contains no importable readings.
+struct UnsupportedKind {
+    /// Description of the kind, after "the file is".
     what: &'static str,
-    /// The way in.
+    /// Advice for the user: conversion, or the command that reads the file.
     help: &'static str,
-    is: fn(&[u8], &str) -> bool,
+    matches: fn(&[u8], &str) -> bool,
 }
 
-const FOREIGN: &[Foreign] = &[
-    Foreign {
-        what: "a recording of ROS 1",
+const UNSUPPORTED_KINDS: &[UnsupportedKind] = &[
+    UnsupportedKind {
+        what: "a ROS 1 recording",
         help: "convert it: `rosbags-convert --src FILE.bag --dst FOLDER --dst-storage mcap`, then import the folder",
-        is: |bytes, _| bytes.starts_with(b"#ROSBAG V"),
+        matches: |bytes, _| bytes.starts_with(b"#ROSBAG V"),
     },
-    Foreign {
-        what: "an SQLite database, as some recordings of ROS 2 are",
-        help: "give the file by its name: it can't be read from its beginning to its end",
-        is: |bytes, _| bytes.starts_with(b"SQLite format 3\0"),
+    UnsupportedKind {
+        what: "an SQLite database, as used by some ROS 2 recordings",
+        help: "give the file by name: it cannot be read as a stream",
+        matches: |bytes, _| bytes.starts_with(b"SQLite format 3\0"),
     },
-    Foreign {
-        what: "an array of NumPy",
+    UnsupportedKind {
+        what: "a NumPy array",
         help: "write it as text: python3 -c \"import numpy as np; np.savetxt('FILE.csv', np.load('FILE.npy'), delimiter=',')\"",
-        is: |bytes, _| bytes.starts_with(b"\x93NUMPY"),
+        matches: |bytes, _| bytes.starts_with(b"\x93NUMPY"),
     },
-    Foreign {
+    UnsupportedKind {
         what: "compressed by gzip",
         help: "unpack it first: `gunzip FILE`",
-        is: |bytes, _| bytes.starts_with(b"\x1f\x8b"),
+        matches: |bytes, _| bytes.starts_with(b"\x1f\x8b"),
     },
-    Foreign {
+    UnsupportedKind {
         what: "compressed by Zstandard",
         help: "unpack it first: `zstd -d FILE`",
-        is: |bytes, _| bytes.starts_with(b"\x28\xb5\x2f\xfd"),
+        matches: |bytes, _| bytes.starts_with(b"\x28\xb5\x2f\xfd"),
     },
-    Foreign {
+    UnsupportedKind {
         what: "compressed by bzip2",
         help: "unpack it first: `bunzip2 FILE`",
-        is: |bytes, _| bytes.starts_with(b"BZh"),
+        matches: |bytes, _| bytes.starts_with(b"BZh"),
     },
-    Foreign {
+    UnsupportedKind {
         what: "compressed by xz",
         help: "unpack it first: `unxz FILE`",
-        is: |bytes, _| bytes.starts_with(b"\xfd7zXZ\0"),
+        matches: |bytes, _| bytes.starts_with(b"\xfd7zXZ\0"),
     },
-    Foreign {
+    UnsupportedKind {
         what: "a spreadsheet",
         help: "save it as CSV in the spreadsheet program",
-        is: |bytes, _| {
+        matches: |bytes, _| {
             let is_zip = bytes.starts_with(b"PK\x03\x04");
             let has = |name: &[u8]| bytes.windows(name.len()).any(|part| part == name);
             is_zip
@@ -209,85 +209,87 @@ const FOREIGN: &[Foreign] = &[
                 || bytes.starts_with(b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1")
         },
     },
-    Foreign {
+    UnsupportedKind {
         what: "an archive of NumPy arrays (npz)",
-        help: "write an array of it as text: np.savetxt('FILE.csv', np.load('FILE.npz')['NAME'], delimiter=',')",
-        is: |bytes, _| {
+        help: "write one of its arrays as text: np.savetxt('FILE.csv', np.load('FILE.npz')['NAME'], delimiter=',')",
+        matches: |bytes, _| {
             bytes.starts_with(b"PK\x03\x04")
                 && bytes.windows(4).take(200).any(|part| part == b".npy")
         },
     },
-    Foreign {
+    UnsupportedKind {
         what: "a ZIP archive",
         help: "unpack it first: `unzip FILE`",
-        is: |bytes, _| bytes.starts_with(b"PK\x03\x04"),
+        matches: |bytes, _| bytes.starts_with(b"PK\x03\x04"),
     },
-    Foreign {
-        what: "a file of HDF5 or of MATLAB 7.3",
+    UnsupportedKind {
+        what: "an HDF5 or MATLAB 7.3 file",
         help: "write the readings as text: in MATLAB `writematrix(x, 'FILE.csv')`",
-        is: |bytes, _| bytes.starts_with(b"\x89HDF") || bytes.starts_with(b"MATLAB 7.3 MAT-file"),
+        matches: |bytes, _| {
+            bytes.starts_with(b"\x89HDF") || bytes.starts_with(b"MATLAB 7.3 MAT-file")
+        },
     },
-    Foreign {
-        what: "a file of MATLAB",
+    UnsupportedKind {
+        what: "a MATLAB file",
         help: "write the readings as text: in MATLAB `writematrix(x, 'FILE.csv')`",
-        is: |bytes, _| bytes.starts_with(b"MATLAB 5.0 MAT-file"),
+        matches: |bytes, _| bytes.starts_with(b"MATLAB 5.0 MAT-file"),
     },
-    Foreign {
+    UnsupportedKind {
         what: "a Parquet file",
         help: "write it as CSV: python3 -c \"import pandas; pandas.read_parquet('FILE').to_csv('FILE.csv', index=False)\"",
-        is: |bytes, _| bytes.starts_with(b"PAR1"),
+        matches: |bytes, _| bytes.starts_with(b"PAR1"),
     },
-    Foreign {
+    UnsupportedKind {
         what: "a picture or a PDF",
-        help: "give the readings, not a picture of them; a map's image goes to `sonard scene from-grid`",
-        is: |bytes, _| {
+        help: "give readings instead; a map image is read by `sonard scene from-grid`",
+        matches: |bytes, _| {
             [&b"\x89PNG"[..], b"\xff\xd8\xff", b"GIF8", b"%PDF-", b"P5\n", b"P5 ", b"P2\n"]
                 .iter()
                 .any(|magic| bytes.starts_with(magic))
         },
     },
-    Foreign {
-        what: "a world of Gazebo (SDF)",
-        help: "make a scene of it: `sonard scene from-sdf FILE`",
-        is: |_, text| is_xml(text, "sdf"),
+    UnsupportedKind {
+        what: "a Gazebo world (SDF)",
+        help: "convert it to a scene: `sonard scene from-sdf FILE`",
+        matches: |_, text| is_xml(text, "sdf"),
     },
-    Foreign {
-        what: "a drawing (SVG)",
-        help: "make a scene of it: `sonard scene from-svg FILE --width-m M`",
-        is: |_, text| is_xml(text, "svg"),
+    UnsupportedKind {
+        what: "an SVG drawing",
+        help: "convert it to a scene: `sonard scene from-svg FILE --width-m M`",
+        matches: |_, text| is_xml(text, "svg"),
     },
-    Foreign {
+    UnsupportedKind {
         what: "an XML document",
         help: "give a table, JSON, a log or a recording",
-        is: |_, text| text.trim_start().starts_with("<?xml"),
+        matches: |_, text| text.trim_start().starts_with("<?xml"),
     },
-    Foreign {
-        what: "a world of Stage",
-        help: "import the log of readings that Player wrote beside it; a floor plan of it that is a bitmap goes to \
-               `sonard scene from-grid`",
-        is: |_, text| is_stage_world(text),
+    UnsupportedKind {
+        what: "a Stage world",
+        help: "import the log of readings that Player wrote; a floor plan bitmap of the world is read by \
+                       `sonard scene from-grid`",
+        matches: |_, text| is_stage_world(text),
     },
-    Foreign {
-        what: "the description of a map",
-        help: "make a scene of it: `sonard scene from-grid FILE`",
-        is: |_, text| {
+    UnsupportedKind {
+        what: "a map description",
+        help: "convert it to a scene: `sonard scene from-grid FILE`",
+        matches: |_, text| {
             let has = |key: &str| text.lines().any(|line| line.trim_start().starts_with(key));
             has("image:") && has("resolution:") && has("origin:")
         },
     },
-    Foreign {
-        what: "a drawing (DXF)",
-        help: "make a scene of it: `sonard scene from-dxf FILE`",
-        is: |bytes, text| {
+    UnsupportedKind {
+        what: "a DXF drawing",
+        help: "convert it to a scene: `sonard scene from-dxf FILE`",
+        matches: |bytes, text| {
             let mut lines = text.lines().map(str::trim).filter(|line| !line.is_empty());
             bytes.starts_with(b"AutoCAD Binary DXF")
                 || (lines.next() == Some("0") && lines.next() == Some("SECTION"))
         },
     },
-    Foreign {
-        what: "a scene or a sensor of this program",
-        help: "give readings; a scene goes to --scene, a sensor to --sensor",
-        is: |_, text| {
+    UnsupportedKind {
+        what: "a sonard scene or sensor",
+        help: "give readings; a scene is given with --scene, a sensor with --sensor",
+        matches: |_, text| {
             let text = text.trim_start();
             let has = |name: &str| text.contains(&format!("\"{name}\""));
             text.starts_with('{')
@@ -296,10 +298,10 @@ const FOREIGN: &[Foreign] = &[
                 && !has("type")
         },
     },
-    Foreign {
-        what: "already a log of this program",
-        help: "use it as it is: `sonard log show FILE`",
-        is: |_, text| {
+    UnsupportedKind {
+        what: "already a sonard log",
+        help: "use it directly: `sonard log show FILE`",
+        matches: |_, text| {
             text.starts_with("{\"type\":\"session\"") || text.starts_with("{\"type\": \"session\"")
         },
     },
@@ -315,7 +317,7 @@ fn is_xml(text: &str, root: &str) -> bool {
         })
 }
 
-/// Stage describes models by `name ( property value ... )`.
+/// Detects a Stage world, which describes models as `name ( property value ... )`.
 fn is_stage_world(text: &str) -> bool {
     const MODELS: [&str; 8] =
         ["floorplan", "position", "window", "pioneer2dx", "map", "ranger", "model", "sensor"];
@@ -331,10 +333,10 @@ fn is_stage_world(text: &str) -> bool {
     (has_bracket || text.contains("(\n")) && text.lines().map(str::trim_start).any(opens)
 }
 
-/// Names a file that holds no readings which can be read here, and the way in.
-pub(crate) fn foreign(bytes: &[u8], text: &str) -> Option<ImportError> {
-    let found = FOREIGN.iter().find(|foreign| (foreign.is)(bytes, text))?;
-    Some(ImportError::mapping(format!("it is {}", found.what), found.help))
+/// Returns an error with advice for a recognized file without importable readings.
+pub(crate) fn unsupported(bytes: &[u8], text: &str) -> Option<ImportError> {
+    let found = UNSUPPORTED_KINDS.iter().find(|unsupported| (unsupported.matches)(bytes, text))?;
+    Some(ImportError::mapping(format!("the file is {}", found.what), found.help))
 }
 
 #[cfg(test)]
@@ -342,7 +344,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_format_has_one_row_and_its_name_is_that_of_mapping_files() {
+    fn registry_is_consistent() {
         for entry in &FORMATS {
             assert_eq!(Format::named(entry.name), Some(entry.format));
             assert_eq!(serde_json::to_value(entry.format).expect("a name"), entry.name);
@@ -351,7 +353,7 @@ mod tests {
     }
 
     #[test]
-    fn files_are_identified_by_their_content() {
+    fn detected_by_content() {
         for (text, format) in [
             ("angle_deg,distance_cm\n0,1\n", Format::Csv),
             ("\n  [{\"a\": 1}]", Format::Json),
@@ -372,13 +374,13 @@ mod tests {
             ("{\"angle\": 0, \"ranges\": [1]}", Format::Json),
         ] {
             assert_eq!(Format::detect(text.as_bytes(), text), format, "{text}");
-            assert!(foreign(text.as_bytes(), text).is_none(), "{text}");
+            assert!(unsupported(text.as_bytes(), text).is_none(), "{text}");
         }
     }
 
     #[test]
-    fn files_of_other_kinds_are_named_with_the_way_in() {
-        for (bytes, what, way) in [
+    fn rejects_other_files_with_advice() {
+        for (bytes, what, advice) in [
             (&b"#ROSBAG V2.0\nE\0"[..], "ROS 1", "rosbags-convert"),
             (b"\x93NUMPY\x01\0", "NumPy", "np.savetxt"),
             (b"\x1f\x8b\x08\0", "gzip", "gunzip"),
@@ -387,7 +389,7 @@ mod tests {
             (b"PK\x03\x04....a.csv", "ZIP", "unzip"),
             (b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1", "spreadsheet", "CSV"),
             (b"\x89PNG\r\n\x1a\n", "picture", "from-grid"),
-            (b"SQLite format 3\0", "SQLite", "by its name"),
+            (b"SQLite format 3\0", "SQLite", "by name"),
             (b"<?xml version='1.0'?>\n<!-- w --><sdf version='1.6'>", "Gazebo", "from-sdf"),
             (b"<svg xmlns='x'>", "SVG", "from-svg"),
             (
@@ -398,12 +400,12 @@ mod tests {
             (b"define pioneer position\n(\n)\nposition ( pose [1 2 0 0] )\n", "Stage", "Player"),
             (b"image: a.pgm\nresolution: 0.05\norigin: [0, 0, 0]\n", "map", "from-grid"),
             (b"  0\nSECTION\n  2\nHEADER\n", "DXF", "from-dxf"),
-            (b"{\"type\": \"session\", \"format\": 2}", "log of this program", "log show"),
+            (b"{\"type\": \"session\", \"format\": 2}", "sonard log", "log show"),
         ] {
             let text = String::from_utf8_lossy(bytes);
-            let error = foreign(bytes, &text).expect("known");
-            let said = format!("{error}; {}", error.help());
-            assert!(said.contains(what) && said.contains(way), "{said}");
+            let error = unsupported(bytes, &text).expect("known");
+            let message = format!("{error}; {}", error.help());
+            assert!(message.contains(what) && message.contains(advice), "{message}");
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Numbers in JSON: objects with a reading each or with lists of them, and lists of numbers.
+//! JSON readings: objects with one reading or with lists of readings, and lists of numbers.
 
 use std::{borrow::Cow, io::Read};
 
@@ -6,18 +6,19 @@ use serde_json::Value;
 
 use crate::{
     Column, ImportError, Location, Mapping, Row,
-    lines::{Ends, Line, Lines},
+    lines::{LineEnding, LineReader, TextLine},
 };
 
-/// The longest document that is not an object a line, bytes.
+/// Maximum size of a document that is not JSON Lines.
 const MAX_DOCUMENT_BYTES: usize = 64 << 20;
 
-/// The rows of a file that holds a list of objects or lists, an object, or an object a line. Where a member of the
-/// mapping is a list there is a row for each of its numbers, with what is no list repeated; with `of_array` the lists
-/// are rounds of an array, a row each.
+/// Returns the rows of a JSON file: of a list of objects or lists, of a single object, or of one
+/// object per line. Lists in mapped members give one row per element, with scalar members repeated.
+/// With `of_array`, lists are rounds of an array and give one row each.
 ///
 /// # Errors
-/// No JSON; of the rows, an object that lacks a member or whose lists are not equally long.
+/// Returns an error for invalid JSON. Rows are errors if an object lacks a member or its lists
+/// differ in length.
 pub(crate) fn rows<'a>(
     source: impl Read + 'a,
     mapping: &'a Mapping,
@@ -32,35 +33,35 @@ pub(crate) fn rows<'a>(
     })))
 }
 
-/// An object of the file, or why there is none.
+/// Parsed object of a file.
 type Object = Result<Value, ImportError>;
 
-/// The objects of a file of JSON or JSON Lines.
+/// Returns the objects of a JSON or JSON Lines file.
 pub(crate) fn objects<'a>(
     source: impl Read + 'a,
 ) -> Result<Box<dyn Iterator<Item = Object> + 'a>, ImportError> {
-    let mut lines = Lines::of(source, Ends::Lines);
-    // A line by itself, or the beginning of something longer.
+    let mut lines = LineReader::new(source, LineEnding::Lines);
+    // A single line, or the beginning of a longer document.
     let mut text = String::new();
     let mut is_first = true;
     for line in lines.by_ref() {
-        let Line { text: line, .. } = line?;
+        let TextLine { text: line, .. } = line?;
         text.push_str(&line);
         text.push('\n');
         if text.len() > MAX_DOCUMENT_BYTES {
             return Err(ImportError::mapping(
                 format!(
-                    "a JSON document of more than {} MB is held in memory as a whole",
+                    "JSON document of more than {} MB, which is the limit without JSON Lines",
                     MAX_DOCUMENT_BYTES >> 20
                 ),
-                "write an object a line: `jq -c '.[]' FILE > LINES`",
+                "write one object per line: `jq -c '.[]' FILE > LINES`",
             ));
         }
         if line.trim().is_empty() {
             continue;
         }
         let is_whole = std::mem::take(&mut is_first)
-            && read(&line).is_ok_and(|value| value.is_object() || is_pair(&value));
+            && read(&line).is_ok_and(|value| value.is_object() || is_scalar_row(&value));
         if is_whole {
             let first = std::iter::once(parse(1, &text));
             let rest =
@@ -72,15 +73,15 @@ pub(crate) fn objects<'a>(
         }
     }
     let values = match parse(1, &text)? {
-        value if is_pair(&value) => vec![value],
+        value if is_scalar_row(&value) => vec![value],
         Value::Array(values) => values,
         value => vec![value],
     };
     Ok(Box::new(values.into_iter().map(Ok)))
 }
 
-/// Checks whether a list is a row of numbers.
-fn is_pair(value: &Value) -> bool {
+/// Returns `true` for a list of at least two scalars, a row of numbers.
+fn is_scalar_row(value: &Value) -> bool {
     let is_cell = |cell: &Value| !cell.is_object() && !cell.is_array();
     value.as_array().is_some_and(|cells| cells.len() > 1 && cells.iter().all(is_cell))
 }
@@ -88,41 +89,41 @@ fn is_pair(value: &Value) -> bool {
 pub(crate) fn parse(first_line: u64, text: &str) -> Object {
     read(text).map_err(|error| {
         let line = first_line + (error.line() as u64).saturating_sub(1);
-        ImportError::at(Location::Line(line), format!("no JSON: {error}"), "correct the file")
+        ImportError::at(Location::Line(line), format!("invalid JSON: {error}"), "correct the file")
     })
 }
 
 fn read(text: &str) -> serde_json::Result<Value> {
-    serde_json::from_str(&without_signs_of_python(text))
+    serde_json::from_str(&replace_non_finite(text))
 }
 
-/// JSON with `null` for the `NaN`, `Infinity` and `-Infinity` that Python writes; they are no number and no echo.
-fn without_signs_of_python(text: &str) -> Cow<'_, str> {
-    const SIGNS: [&str; 4] = ["-Infinity", "Infinity", "NaN", "nan"];
-    if !SIGNS.iter().any(|sign| text.contains(sign)) {
+/// Replaces `NaN`, `Infinity` and `-Infinity`, as written by Python, by `null`: no echo.
+fn replace_non_finite(text: &str) -> Cow<'_, str> {
+    const NON_FINITE: [&str; 4] = ["-Infinity", "Infinity", "NaN", "nan"];
+    if !NON_FINITE.iter().any(|name| text.contains(name)) {
         return Cow::Borrowed(text);
     }
     let mut plain = String::with_capacity(text.len());
-    let (mut rest, mut is_text) = (text, false);
+    let (mut rest, mut is_string) = (text, false);
     while let Some(next) = rest.chars().next() {
-        let sign = SIGNS.iter().find(|sign| !is_text && rest.starts_with(**sign));
-        let taken = match (sign, next) {
-            (Some(sign), _) => {
+        let name = NON_FINITE.iter().find(|name| !is_string && rest.starts_with(**name));
+        let consumed = match (name, next) {
+            (Some(name), _) => {
                 plain.push_str("null");
-                sign.len()
+                name.len()
             }
-            (None, '\\') if is_text => {
+            (None, '\\') if is_string => {
                 let escaped = 1 + rest[1..].chars().next().map_or(0, char::len_utf8);
                 plain.push_str(&rest[..escaped]);
                 escaped
             }
             (None, next) => {
-                is_text ^= next == '"';
+                is_string ^= next == '"';
                 plain.push(next);
                 next.len_utf8()
             }
         };
-        rest = &rest[taken..];
+        rest = &rest[consumed..];
     }
     Cow::Owned(plain)
 }
@@ -156,8 +157,12 @@ fn rows_of(
     for (field, count) in lists {
         match length {
             Some((other, known)) if known != count => {
-                let what = format!("{count} numbers of {field} and {known} of {other}");
-                return Err(ImportError::at(whole, what, "lists of one object are equally long"));
+                let what = format!("{count} numbers of {field} but {known} of {other}");
+                return Err(ImportError::at(
+                    whole,
+                    what,
+                    "the lists of an object must have equal lengths",
+                ));
             }
             _ => length = Some((field, count)),
         }
@@ -176,7 +181,7 @@ fn rows_of(
     Ok((0..length).map(row).collect())
 }
 
-/// A member, by names and places with dots between, or by its place in a list.
+/// Returns the values of a column: a member by its path, or elements of a list by their numbers.
 fn member<'a>(
     whole: Location,
     object: &'a Value,
@@ -189,14 +194,14 @@ fn member<'a>(
     };
     let Value::Array(values) = object else {
         return Err(ImportError::mapping(
-            format!("{column}: the members of a JSON object have names"),
+            format!("{column}: members of a JSON object are mapped by name"),
             "write FIELD=MEMBER: --columns azimuth_deg=angle,range_m=range",
         ));
     };
     let value = |number: &usize| {
         let place = number.checked_sub(1).and_then(|place| values.get(place));
         place.ok_or_else(|| {
-            let what = format!("there is no number {number}: the list has {}", values.len());
+            let what = format!("no element {number}: the list has {}", values.len());
             ImportError::at(whole, what, "complete that list")
         })
     };
@@ -211,13 +216,13 @@ fn named<'a>(whole: Location, object: &'a Value, path: &str) -> Result<&'a Value
     };
     let found = object.get(path).or_else(|| path.split('.').try_fold(object, step));
     found.ok_or_else(|| {
-        let what = format!("there is no `{path}`");
+        let what = format!("no member `{path}`");
         let help = match object {
             Value::Object(members) => {
                 format!("the object has {}", members.keys().cloned().collect::<Vec<_>>().join(", "))
             }
             Value::Array(_) => {
-                "these are lists: give the places of the numbers in them, --columns azimuth_deg=1,range_m=2".to_owned()
+                "the entries are lists: map the elements by number, --columns azimuth_deg=1,range_m=2".to_owned()
             }
             _ => "give a list of objects".to_owned(),
         };
@@ -235,19 +240,19 @@ fn cell(value: &Value) -> Option<String> {
 
 /// Kind of the first entry of a file.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) enum Entry {
-    /// Names of the members of an object.
+pub(crate) enum FirstEntry {
+    /// Object, with the names of its members.
     Names(Vec<String>),
-    /// Length of a list of numbers.
+    /// List of numbers, with its length.
     List(usize),
     Other,
 }
 
-impl Entry {
-    /// By the first value of a file, and what is in it if that is a list.
-    pub(crate) fn of(value: &Value) -> Self {
+impl FirstEntry {
+    /// Classifies the first value of a file, or the first element of a list of objects.
+    pub(crate) fn from_value(value: &Value) -> Self {
         let first = match value {
-            Value::Array(values) if !is_pair(value) => values.first().unwrap_or(&Value::Null),
+            Value::Array(values) if !is_scalar_row(value) => values.first().unwrap_or(&Value::Null),
             value => value,
         };
         match first {
@@ -257,11 +262,11 @@ impl Entry {
         }
     }
 
-    /// By the beginning of a file; `None` where that is cut.
-    pub(crate) fn of_head(head: &str) -> Option<Self> {
-        let text = without_signs_of_python(head);
+    /// Classifies the first value of a head; `None` if the value is incomplete.
+    pub(crate) fn from_head(head: &str) -> Option<Self> {
+        let text = replace_non_finite(head);
         let first = serde_json::Deserializer::from_str(&text).into_iter::<Value>().next();
-        first.and_then(Result::ok).map(|value| Self::of(&value))
+        first.and_then(Result::ok).map(|value| Self::from_value(&value))
     }
 }
 
@@ -270,28 +275,28 @@ mod tests {
     use super::*;
 
     #[test]
-    fn signs_of_python_are_null_but_not_within_texts() {
+    fn non_finite_numbers_become_null() {
         for (text, plain) in [
             ("[NaN, -Infinity, Infinity]", "[null, null, null]"),
             ("{\"NaN\": NaN, \"a\\\"NaN\": 1}", "{\"NaN\": null, \"a\\\"NaN\": 1}"),
             ("{\"NaN\\\\\": NaN}", "{\"NaN\\\\\": null}"),
             ("[1, 2]", "[1, 2]"),
         ] {
-            assert_eq!(without_signs_of_python(text), plain);
+            assert_eq!(replace_non_finite(text), plain);
         }
     }
 
     #[test]
-    fn entries_are_objects_or_lists() {
+    fn first_entry_is_object_or_list() {
         for (text, entry) in [
-            ("[{\"a\": 1}]", Entry::Names(vec!["a".to_owned()])),
-            ("{\"a\": 1}\n{\"a\": 2}", Entry::Names(vec!["a".to_owned()])),
-            ("[[0, 1.0], [1, 2]]", Entry::List(2)),
-            ("[0, 1.0]\n[1, 2.0]", Entry::List(2)),
-            ("3", Entry::Other),
+            ("[{\"a\": 1}]", FirstEntry::Names(vec!["a".to_owned()])),
+            ("{\"a\": 1}\n{\"a\": 2}", FirstEntry::Names(vec!["a".to_owned()])),
+            ("[[0, 1.0], [1, 2]]", FirstEntry::List(2)),
+            ("[0, 1.0]\n[1, 2.0]", FirstEntry::List(2)),
+            ("3", FirstEntry::Other),
         ] {
-            assert_eq!(Entry::of_head(text), Some(entry), "{text}");
+            assert_eq!(FirstEntry::from_head(text), Some(entry), "{text}");
         }
-        assert_eq!(Entry::of_head("[{\"a\": 1"), None);
+        assert_eq!(FirstEntry::from_head("[{\"a\": 1"), None);
     }
 }

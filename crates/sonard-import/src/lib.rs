@@ -1,24 +1,28 @@
-//! Converts readings of ultrasonic rangers to records of a log: from tables (CSV and similar), JSON, messages of ROS as
-//! text, the logs of CARMEN and Player, and, with the feature `recordings`, recordings of ROS 2 (MCAP). [`FORMATS`] lists
-//! them.
+//! Converts readings of ultrasonic rangers to log records.
 //!
-//! A [`Mapping`] states the meaning of the columns. [`Source`] detects the format of a file, reads it once for its hash and
-//! encoding, once to check it against the mapping and once to make records, and holds at most one scan in memory (a JSON
-//! file that is not JSON Lines is held as a whole, up to 64 MB).
+//! Supported sources are tables (CSV and similar), JSON, ROS messages as text, CARMEN and Player
+//! logs and, with the feature `recordings`, ROS 2 recordings (MCAP). [`FORMATS`] lists them.
+//!
+//! A [`Mapping`] states the meaning of the columns. [`Source`] detects the format of a file and
+//! reads the file three times: for its hash and encoding, to check it against the mapping, and to
+//! produce records. At most one scan is held in memory; a JSON file that is not JSON Lines is held
+//! as a whole, up to 64 MB.
 
+mod array_rounds;
 mod carmen;
-mod doubt;
+mod column_names;
 mod encoding;
 mod error;
 mod examine;
 mod field;
 mod format;
-mod guess;
+mod infer_columns;
 mod json;
 mod layout;
 mod limits;
 mod lines;
 mod mapping;
+mod no_echo_constant;
 mod number;
 mod player;
 mod reading;
@@ -28,17 +32,15 @@ mod recording;
 #[path = "no_recording.rs"]
 mod recording;
 mod ros_text;
-mod rounds;
 mod scans;
-mod silence;
 mod source;
+mod sweep_end;
 mod table;
 #[cfg(test)]
 mod tests;
 mod text;
 mod time;
-mod turning;
-mod words;
+mod unit_check;
 
 pub use error::{ImportError, Location};
 pub use field::{Field, Quantity};

@@ -1,27 +1,28 @@
-//! Ranges of LaserScan and Range messages, by REP 117, the messages' definitions and the limits beside them.
+//! Classification of the ranges of LaserScan and Range messages by REP 117, the message definitions
+//! and the limits in each message.
 
 use sonard_model::reading::PingStatus;
 
 use crate::Mapping;
 
-/// The least and the greatest range that a message states, in its unit.
+/// `range_min` and `range_max` of a message, in the unit of its ranges.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Limits {
-    pub(crate) least: f64,
-    pub(crate) most: f64,
+    pub(crate) min: f64,
+    pub(crate) max: f64,
 }
 
-/// Meaning of a range.
+/// Classified range of a message.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum Told {
-    /// No reading: REP 117's NaN.
-    Nothing,
-    Without(PingStatus),
-    /// A range in the message's unit.
+pub(crate) enum RangeClass {
+    /// NaN, which REP 117 defines as an invalid reading.
+    Invalid,
+    NoRange(PingStatus),
+    /// Valid range, in the unit of the message.
     Echo(f64),
 }
 
-/// Counts of the assumptions about limits and ranges of a file.
+/// Counts of assumptions that were made about ranges and limits of a file.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct LimitNotes {
     pub(crate) readings: u64,
@@ -29,97 +30,108 @@ pub(crate) struct LimitNotes {
     without_limits: u64,
     fixed_distance: u64,
     fixed_m: f64,
-    beyond_most: u64,
-    most: f64,
+    beyond_max: u64,
+    max: f64,
 }
 
 impl Limits {
-    /// Reads a range by what the mapping and the limits say.
-    pub(crate) fn tell(self, range: f64, mapping: &Mapping, notes: &mut LimitNotes) -> Told {
+    /// Classifies a range by the mapping and the limits, and counts assumptions in `notes`.
+    pub(crate) fn classify(
+        self,
+        range: f64,
+        mapping: &Mapping,
+        notes: &mut LimitNotes,
+    ) -> RangeClass {
         notes.readings += 1;
         if range.is_nan() {
-            return Told::Nothing;
+            return RangeClass::Invalid;
         }
         if range.is_finite() && mapping.is_no_echo(range) {
-            return Told::Without(PingStatus::NoEcho);
+            return RangeClass::NoRange(PingStatus::NoEcho);
         }
-        // REP 117 has -inf for what is too near; drivers write 0 where nothing came back.
+        // REP 117 uses -inf for objects that are too near; drivers write 0 where no echo was
+        // received.
         if range.is_finite() && range <= 0.0 {
             notes.zeros += 1;
-            return Told::Without(PingStatus::NoEcho);
+            return RangeClass::NoRange(PingStatus::NoEcho);
         }
-        let has_limits = self.most > 0.0 && self.most >= self.least && !self.least.is_nan();
+        let has_limits = self.max > 0.0 && self.max >= self.min && !self.min.is_nan();
         if !has_limits {
             notes.without_limits += 1;
             return match range {
-                f64::INFINITY => Told::Without(PingStatus::NoEcho),
-                f64::NEG_INFINITY => Told::Without(PingStatus::MinRange),
-                range => Told::Echo(range),
+                f64::INFINITY => RangeClass::NoRange(PingStatus::NoEcho),
+                f64::NEG_INFINITY => RangeClass::NoRange(PingStatus::MinRange),
+                range => RangeClass::Echo(range),
             };
         }
-        // sensor_msgs/Range: such a ranger tells -inf for something nearer than its distance, +inf for nothing.
-        if self.least == self.most {
+        // sensor_msgs/Range: a fixed-distance ranger reports -inf for a detection and +inf for
+        // none.
+        if self.min == self.max {
             notes.fixed_distance += 1;
-            notes.fixed_m = self.most;
-            let is_near = range < self.most || (range.is_finite() && range <= self.most);
-            return Told::Without(if is_near { PingStatus::MinRange } else { PingStatus::NoEcho });
+            notes.fixed_m = self.max;
+            let is_near = range < self.max || (range.is_finite() && range <= self.max);
+            return RangeClass::NoRange(if is_near {
+                PingStatus::MinRange
+            } else {
+                PingStatus::NoEcho
+            });
         }
-        if range == f64::NEG_INFINITY || range <= self.least.max(0.0) {
-            Told::Without(PingStatus::MinRange)
+        if range == f64::NEG_INFINITY || range <= self.min.max(0.0) {
+            RangeClass::NoRange(PingStatus::MinRange)
         } else if range == f64::INFINITY {
-            Told::Without(PingStatus::NoEcho)
-        } else if range >= self.most {
-            if range > self.most {
-                notes.beyond_most += 1;
-                notes.most = self.most;
+            RangeClass::NoRange(PingStatus::NoEcho)
+        } else if range >= self.max {
+            if range > self.max {
+                notes.beyond_max += 1;
+                notes.max = self.max;
             }
-            Told::Without(PingStatus::NoEcho)
+            RangeClass::NoRange(PingStatus::NoEcho)
         } else {
-            Told::Echo(range)
+            RangeClass::Echo(range)
         }
     }
 }
 
 impl LimitNotes {
-    /// A line for each assumption.
+    /// Returns one line for each assumption.
     pub(crate) fn lines(&self) -> Vec<String> {
         let of = self.readings;
         let mut lines = Vec::new();
         if self.zeros > 0 {
             lines.push(format!(
-                "{} of {of} ranges are 0 or less, which REP 117 has no meaning for: taken as no echo, as by --no-echo 0",
+                "{} of {of} ranges are 0 or less (not defined by REP 117): read as no echo, as with --no-echo 0",
                 self.zeros
             ));
         }
         if self.without_limits > 0 {
             lines.push(format!(
-                "{} of {of} ranges come without limits (max_range is 0 or below min_range): taken without any",
+                "{} of {of} ranges have no valid limits (max_range is 0 or below min_range): read without limits",
                 self.without_limits
             ));
         }
         if self.fixed_distance > 0 {
             lines.push(format!(
-                "{} of {of} readings are of a fixed-distance ranger (min_range = max_range = {}): they detect only whether \
-                 something is nearer",
+                "{} of {of} readings are from a fixed-distance ranger (min_range = max_range = {}): it only detects whether \
+                             an object is nearer",
                 self.fixed_distance, self.fixed_m
             ));
         }
-        if self.beyond_most > 0 {
+        if self.beyond_max > 0 {
             lines.push(format!(
-                "{} of {of} ranges are beyond max_range = {}: taken as no echo",
-                self.beyond_most, self.most
+                "{} of {of} ranges are beyond max_range = {}: read as no echo",
+                self.beyond_max, self.max
             ));
         }
         lines
     }
 
-    /// Checks whether all ranges are finite and beyond the greatest, which a wrong unit makes them.
-    pub(crate) const fn are_all_beyond(&self) -> bool {
-        self.readings > 0 && self.beyond_most == self.readings
+    /// Returns `true` if all ranges are finite and beyond `max_range`, as a wrong unit causes.
+    pub(crate) const fn all_beyond_max(&self) -> bool {
+        self.readings > 0 && self.beyond_max == self.readings
     }
 
-    pub(crate) const fn most(&self) -> f64 {
-        self.most
+    pub(crate) const fn max(&self) -> f64 {
+        self.max
     }
 }
 
@@ -127,15 +139,15 @@ impl LimitNotes {
 mod tests {
     use super::*;
 
-    fn tell(least: f64, most: f64, range: f64) -> Told {
-        Limits { least, most }.tell(range, &Mapping::default(), &mut LimitNotes::default())
+    fn classify(min: f64, max: f64, range: f64) -> RangeClass {
+        Limits { min, max }.classify(range, &Mapping::default(), &mut LimitNotes::default())
     }
 
     #[test]
-    fn ranges_mean_what_rep_117_and_their_definition_say() {
-        use Told::{Echo, Nothing, Without};
-        let (near, none) = (Without(PingStatus::MinRange), Without(PingStatus::NoEcho));
-        for (least, most, range, told) in [
+    fn classifies_by_rep_117() {
+        use RangeClass::{Echo, Invalid, NoRange};
+        let (near, none) = (NoRange(PingStatus::MinRange), NoRange(PingStatus::NoEcho));
+        for (min, max, range, expected) in [
             (0.02, 4.0, f64::NEG_INFINITY, near),
             (0.02, 4.0, f64::INFINITY, none),
             (0.02, 4.0, 1.0, Echo(1.0)),
@@ -143,17 +155,17 @@ mod tests {
             (0.02, 4.0, 4.0, none),
             (0.02, 4.0, 5.0, none),
             (0.02, 4.0, 0.0, none),
-            // Limits that make no sense limit nothing.
+            // Inconsistent limits are ignored.
             (0.0, 0.0, 1.0, Echo(1.0)),
             (4.0, 0.02, 1.0, Echo(1.0)),
             (0.1, f64::NAN, 1.0, Echo(1.0)),
-            // A ranger of one distance.
+            // Fixed-distance ranger.
             (0.5, 0.5, f64::NEG_INFINITY, near),
             (0.5, 0.5, f64::INFINITY, none),
             (0.5, 0.5, 0.5, near),
         ] {
-            assert_eq!(tell(least, most, range), told, "{least} {most} {range}");
+            assert_eq!(classify(min, max, range), expected, "{min} {max} {range}");
         }
-        assert!(matches!(tell(0.02, 4.0, f64::NAN), Nothing));
+        assert!(matches!(classify(0.02, 4.0, f64::NAN), Invalid));
     }
 }

@@ -1,54 +1,54 @@
-//! Lines of a text, whatever ends them.
+//! Reading of text lines with any line ending.
 
 use std::io::{BufRead as _, BufReader, Read};
 
 use crate::{ImportError, Location};
 
-/// A line longer than this is no row of readings, bytes.
+/// Maximum length of a line.
 const MAX_LINE_BYTES: usize = 1 << 20;
 
-/// End of a record of text.
+/// Record separator of a text.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(crate) enum Ends {
-    /// A line feed, a carriage return, or both.
+pub(crate) enum LineEnding {
+    /// Line feed, carriage return, or both.
     #[default]
     Lines,
-    /// A full stop, as the "radar" sketches for Arduino send `angle,distance.`
+    /// Full stop, as in `angle,distance.` sent by the "radar" sketches for Arduino.
     Stops,
 }
 
-/// One record of a text.
+/// Numbered record of a text.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct Line {
-    /// Its number, from 1.
+pub(crate) struct TextLine {
+    /// Line number, from 1.
     pub(crate) number: u64,
-    /// Its text, without its end.
+    /// Text without the line ending.
     pub(crate) text: String,
-    /// True if it has an end, or the file stopped within it.
+    /// True if the line is terminated; false at the end of a file without a final line ending.
     pub(crate) is_ended: bool,
 }
 
-impl Line {
+impl TextLine {
     pub(crate) const fn place(&self) -> Location {
         Location::Line(self.number)
     }
 }
 
-/// Lines of a text with their numbers, in bounded memory.
-pub(crate) struct Lines<R> {
+/// Iterator over numbered lines, in bounded memory.
+pub(crate) struct LineReader<R> {
     source: BufReader<R>,
-    ends: Ends,
+    ends: LineEnding,
     count: u64,
-    /// The last end was a carriage return, so that a line feed may belong to it.
+    /// True if the last ending was a carriage return, which a line feed may complete.
     is_after_return: bool,
 }
 
-impl<R: Read> Lines<R> {
-    pub(crate) fn of(source: R, ends: Ends) -> Self {
+impl<R: Read> LineReader<R> {
+    pub(crate) fn new(source: R, ends: LineEnding) -> Self {
         Self { source: BufReader::new(source), ends, count: 0, is_after_return: false }
     }
 
-    fn read(&mut self) -> Result<Option<Line>, ImportError> {
+    fn read(&mut self) -> Result<Option<TextLine>, ImportError> {
         let mut bytes = Vec::new();
         let mut is_begun = false;
         let is_ended = loop {
@@ -62,14 +62,14 @@ impl<R: Read> Lines<R> {
             }
             is_begun = true;
             let is_end = |byte: &u8| match self.ends {
-                Ends::Lines => matches!(byte, b'\n' | b'\r'),
-                Ends::Stops => matches!(byte, b'\n' | b'\r' | b'.'),
+                LineEnding::Lines => matches!(byte, b'\n' | b'\r'),
+                LineEnding::Stops => matches!(byte, b'\n' | b'\r' | b'.'),
             };
             let end = piece.iter().position(is_end);
             bytes.extend(&piece[..end.unwrap_or(piece.len())]);
             if bytes.len() > MAX_LINE_BYTES {
                 let what = format!("longer than {MAX_LINE_BYTES} bytes");
-                let help = "give a file with a reading a line";
+                let help = "give a file with one reading per line";
                 return Err(ImportError::at(Location::Line(self.count + 1), what, help));
             }
             let used = end.map_or(piece.len(), |end| end + 1);
@@ -84,12 +84,12 @@ impl<R: Read> Lines<R> {
         }
         self.count += 1;
         let text = String::from_utf8_lossy(&bytes).into_owned();
-        Ok(Some(Line { number: self.count, text, is_ended }))
+        Ok(Some(TextLine { number: self.count, text, is_ended }))
     }
 }
 
-impl<R: Read> Iterator for Lines<R> {
-    type Item = Result<Line, ImportError>;
+impl<R: Read> Iterator for LineReader<R> {
+    type Item = Result<TextLine, ImportError>;
 
     fn next(&mut self) -> Option<Self::Item> {
         self.read().transpose()
@@ -100,34 +100,35 @@ impl<R: Read> Iterator for Lines<R> {
 mod tests {
     use super::*;
 
-    fn split(text: &str, ends: Ends) -> Vec<(u64, String, bool)> {
-        let lines = Lines::of(text.as_bytes(), ends).map(|line| line.expect("short"));
+    fn split(text: &str, ends: LineEnding) -> Vec<(u64, String, bool)> {
+        let lines = LineReader::new(text.as_bytes(), ends).map(|line| line.expect("short"));
         lines.map(|line| (line.number, line.text, line.is_ended)).collect()
     }
 
     #[test]
-    fn every_kind_of_line_end_counts_one_line() {
+    fn counts_every_line_ending_once() {
         for text in ["a\nb\n\nc", "a\r\nb\r\n\r\nc", "a\rb\r\rc", "a\nb\r\n\rc"] {
             let expected = [(1, "a", true), (2, "b", true), (3, "", true), (4, "c", false)];
             let expected = expected.map(|(number, text, end)| (number, text.to_owned(), end));
-            assert_eq!(split(text, Ends::Lines), expected, "{text:?}");
+            assert_eq!(split(text, LineEnding::Lines), expected, "{text:?}");
         }
-        assert_eq!(split("", Ends::Lines), []);
-        assert_eq!(split("1,2.3,4.5", Ends::Stops).len(), 3);
+        assert_eq!(split("", LineEnding::Lines), []);
+        assert_eq!(split("1,2.3,4.5", LineEnding::Stops).len(), 3);
     }
 
     #[test]
-    fn lines_without_end_are_bounded() {
+    fn bounds_line_length() {
         let long = std::io::Read::take(std::io::repeat(b'1'), 1 << 30);
-        let error = Lines::of(long, Ends::Lines).next().expect("a line").expect_err("too long");
+        let error =
+            LineReader::new(long, LineEnding::Lines).next().expect("a line").expect_err("too long");
         assert!(error.to_string().contains("longer than"), "{error}");
     }
 
     #[test]
-    fn a_return_and_feed_split_between_reads_is_one_end() {
+    fn joins_split_crlf() {
         let source = "a\r".as_bytes().chain("\nb".as_bytes());
         let lines: Vec<_> =
-            Lines::of(source, Ends::Lines).map(|line| line.expect("short")).collect();
+            LineReader::new(source, LineEnding::Lines).map(|line| line.expect("short")).collect();
         assert_eq!(lines.len(), 2, "{lines:?}");
     }
 }

@@ -1,4 +1,4 @@
-//! What the columns of a file mean.
+//! Mapping of the columns of a file to fields.
 
 use std::collections::BTreeMap;
 
@@ -6,27 +6,27 @@ use jiff::Timestamp;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::{Field, Format, ImportError, Quantity, rounds::MAX_RANGERS};
+use crate::{Field, Format, ImportError, Quantity, array_rounds::MAX_RANGERS};
 
-/// Which column of a table, or member of a JSON object, has a field.
+/// Column of a table, or member of a JSON object, mapped to a field.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(untagged)]
 pub enum Column {
-    /// Its place, from 1.
+    /// Column number, from 1.
     Number(usize),
-    /// Its name in the header; of JSON the member, with dots into members and lists (`pose.0`).
+    /// Column name; in JSON the member, with dots into members and lists (`pose.0`).
     Name(String),
-    /// The places of several, one for each ranger of an array.
+    /// Column numbers, one for each ranger of an array.
     Several(Vec<usize>),
 }
 
 impl Column {
-    /// Reads `3`, `range`, or `1-24` for one column a ranger.
-    fn of(text: &str) -> Result<Self, String> {
+    /// Parses `3`, `range`, or `1-24` for one column per ranger.
+    fn parse(text: &str) -> Result<Self, String> {
         let text = text.trim();
         if let Ok(number) = text.parse() {
             return if number == 0 {
-                Err("there is no column 0".to_owned())
+                Err("columns count from 1".to_owned())
             } else {
                 Ok(Self::Number(number))
             };
@@ -38,7 +38,9 @@ impl Column {
             Some((first, last)) if first > 0 && first <= last && last <= MAX_RANGERS => {
                 Ok(Self::Several((first..=last).collect()))
             }
-            Some(_) => Err(format!("`{text}` is no span of columns")),
+            Some(_) => Err(format!(
+                "`{text}` is not a range of columns (FIRST-LAST, at most {MAX_RANGERS})"
+            )),
             None => Ok(Self::Name(text.to_owned())),
         }
     }
@@ -58,7 +60,7 @@ impl std::fmt::Display for Column {
     }
 }
 
-/// Sign between the whole part of a number and its fraction.
+/// Decimal sign of numbers in text.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Decimal {
@@ -68,28 +70,28 @@ pub enum Decimal {
     Comma,
 }
 
-/// Unit of the ranges of a format that specifies metres.
+/// Unit of ranges in a format that specifies metres.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum RangeUnit {
-    /// Metres.
+    /// Metres, as in ROS messages.
     M,
-    /// Centimetres.
+    /// Centimetres, as reported by many drivers.
     Cm,
-    /// Millimetres.
+    /// Millimetres, as reported by many drivers.
     Mm,
-    /// Inches.
+    /// Inches of 25.4 mm.
     In,
-    /// Feet.
+    /// Feet of 0.3048 m.
     Ft,
 }
 
 impl RangeUnit {
-    /// All of them, with their names.
+    /// All units with their names.
     pub const ALL: [(&'static str, Self); 5] =
         [("m", Self::M), ("cm", Self::Cm), ("mm", Self::Mm), ("in", Self::In), ("ft", Self::Ft)];
 
-    /// Length of one, metres.
+    /// Returns the length of the unit in metres.
     #[must_use]
     pub const fn metres(self) -> f64 {
         match self {
@@ -102,60 +104,60 @@ impl RangeUnit {
     }
 }
 
-/// What a file's columns mean, and what has to be done to its numbers. It is what a mapping file (TOML) says,
-/// and stands in the session of the log that is made.
+/// Meaning of a file's columns, and the conversions of its numbers. Serialized in mapping files
+/// (TOML) and in the session record of the imported log.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema, Default)]
 #[serde(default, deny_unknown_fields)]
 pub struct Mapping {
-    /// How the file is written; without it, what it looks like.
+    /// Format of the file; detected if absent.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub format: Option<Format>,
-    /// Which column has which field; without any, what the header says.
+    /// Column of each field; inferred from the header if empty.
     pub columns: BTreeMap<Field, Column>,
-    /// Topics of a recording that are read; without any, all of `sensor_msgs/Range` but predictions, else of
-    /// `sensor_msgs/LaserScan`.
+    /// Topics to read from a recording; if empty, all of `sensor_msgs/Range` except predictions, or
+    /// else of `sensor_msgs/LaserScan`.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub topics: Vec<String>,
-    /// Azimuths and bearings of the file count clockwise.
+    /// True if azimuths and bearings of the file are clockwise.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub clockwise: bool,
-    /// Direction of the file's azimuth zero, degrees counter-clockwise from the robot's heading (of its bearing
-    /// zero, from the x axis).
+    /// Direction of the file's zero azimuth, degrees counter-clockwise from the robot's heading;
+    /// for bearings, from the x axis.
     #[serde(skip_serializing_if = "is_zero")]
     pub zero_deg: f64,
-    /// Ranges, in the file's unit, that mean no echo.
+    /// Range values for no echo, in the unit of the file.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub none: Vec<f64>,
-    /// Ranges, in the file's unit, at and beyond which there is no echo.
+    /// Lower limit of range values for no echo, in the unit of the file.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub none_from: Option<f64>,
-    /// Speed of sound that the file's ranges were computed with, metres a second; they are computed again
-    /// with that of the air. Without it they are taken as they are.
+    /// Sound speed with which the ranges of the file were computed, m/s. Ranges are recomputed with
+    /// that of the air; if absent, they are kept.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sound_speed_m_s: Option<f64>,
-    /// Azimuth of every reading, degrees: of a fixed ranger, whose file has no column for it.
+    /// Azimuth of every reading, degrees, for a fixed ranger without a direction column.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub azimuth_deg: Option<f64>,
-    /// Unit of the ranges of logs and recordings whose format specifies metres.
+    /// Unit of ranges in logs and recordings whose format specifies metres.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub range_unit: Option<RangeUnit>,
-    /// Sign before the fraction of numbers; without it, as the file shows.
+    /// Decimal sign; detected if absent.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub decimal: Option<Decimal>,
-    /// Encoding of a text, by a label of the WHATWG Encoding Standard (`latin1`, `utf-16le`); without it, as the file
-    /// shows.
+    /// Encoding of a text, as a label of the WHATWG Encoding Standard (`latin1`, `utf-16le`);
+    /// detected if absent.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub encoding: Option<String>,
-    /// Form of times, in the signs of `strftime`.
+    /// Time format, in `strftime` specifiers.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub time_format: Option<String>,
-    /// Offset from UTC of times without a zone, such as `+01:00`.
+    /// UTC offset of times without a time zone, such as `+01:00`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub utc_offset: Option<String>,
-    /// Time of the first reading, where the file has times of day or counts from the start of a board.
+    /// Time of the first reading, for times of day and counters that start with a board.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub started: Option<Timestamp>,
-    /// Device of a log of several: `HOST:ROBOT:INDEX` of Player, or the end of it.
+    /// Device of a log with several: `HOST:ROBOT:INDEX` of Player, or the end of it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub device: Option<String>,
 }
@@ -165,10 +167,10 @@ fn is_zero(number: &f64) -> bool {
 }
 
 impl Mapping {
-    /// Reads `azimuth_deg=1,range_cm=distance`.
+    /// Parses `azimuth_deg=1,range_cm=distance`.
     ///
     /// # Errors
-    /// A field that there is not, or one named twice.
+    /// Returns an error for an unknown field or a field given twice.
     pub fn columns_of(text: &str) -> Result<BTreeMap<Field, Column>, ImportError> {
         let mut columns = BTreeMap::new();
         for pair in text.split(',') {
@@ -176,40 +178,40 @@ impl Mapping {
                         azimuth_deg=1,range_cm=distance";
             let (field, column) = pair
                 .split_once('=')
-                .ok_or_else(|| ImportError::mapping(format!("`{pair}` says no column"), help))?;
+                .ok_or_else(|| ImportError::mapping(format!("`{pair}` names no column"), help))?;
             let field: Field = field.trim().parse()?;
-            let column = Column::of(column)
+            let column = Column::parse(column)
                 .map_err(|what| ImportError::mapping(format!("`{pair}`: {what}"), help))?;
             if columns.insert(field, column).is_some() {
-                return Err(ImportError::mapping(format!("{field} is named twice"), help));
+                return Err(ImportError::mapping(format!("{field} is given twice"), help));
             }
         }
         Ok(columns)
     }
 
-    /// The field of a quantity, if it has one.
+    /// Returns the mapped field of a quantity.
     #[must_use]
     pub fn field(&self, quantity: Quantity) -> Option<Field> {
         self.columns.keys().copied().find(|field| field.quantity() == quantity)
     }
 
-    /// Checks whether a range of the file, in its unit, stands for no echo.
+    /// Returns `true` for a range, in the unit of the file, that means no echo.
     pub(crate) fn is_no_echo(&self, range: f64) -> bool {
         self.none.contains(&range) || self.none_from.is_some_and(|from| range >= from)
     }
 
-    /// Length of a unit of ranges in a format that says metres.
+    /// Returns the length in metres of one unit of ranges, for formats that specify metres.
     pub(crate) fn metres(&self) -> f64 {
         self.range_unit.unwrap_or(RangeUnit::M).metres()
     }
 
-    /// The option `--no-echo` with further values, those given before among them.
+    /// Formats `--no-echo` options for the current values and `more`.
     pub(crate) fn none_option(&self, more: &[f64]) -> String {
         let values = self.none.iter().chain(more);
         values.map(|value| format!("--no-echo={value}")).collect::<Vec<_>>().join(" ")
     }
 
-    /// The option `--columns` with one field in place of another of its quantity.
+    /// Formats `--columns` with `field` in place of the field of the same quantity.
     pub(crate) fn columns_option_with(&self, field: Field, names: &[String]) -> String {
         let columns = self.columns.iter().map(|(known, column)| {
             let known = if known.quantity() == field.quantity() { field } else { *known };
@@ -218,40 +220,42 @@ impl Mapping {
         columns_option(columns, names)
     }
 
-    /// Whether it says enough to make readings, and nothing twice.
+    /// Checks that the mapping is complete and unambiguous.
     ///
     /// # Errors
-    /// What is missing, or too much.
+    /// Returns an error for a missing or duplicate quantity.
     pub fn check(&self) -> Result<(), ImportError> {
         let mut seen = BTreeMap::new();
         for field in self.columns.keys() {
             if let Some(other) = seen.insert(field.quantity(), field) {
                 return Err(ImportError::mapping(
-                    format!("{other} and {field} both say the {}", field.quantity().words()),
+                    format!("{other} and {field} are both the {}", field.quantity().words()),
                     "leave one of them out",
                 ));
             }
         }
         let has = |quantity| seen.contains_key(&quantity);
-        for (one, other) in
+        for (preferred, alternative) in
             [(Quantity::Azimuth, Quantity::Bearing), (Quantity::Range, Quantity::Tof)]
         {
-            let (this, that) = (one.words(), other.words());
-            let is_fixed = one == Quantity::Azimuth && self.azimuth_deg.is_some();
-            match (has(one), has(other)) {
-                (false, false) if is_fixed || (one == Quantity::Azimuth && self.is_of_array()) => {}
+            let (name, alternative_name) = (preferred.words(), alternative.words());
+            let is_fixed = preferred == Quantity::Azimuth && self.azimuth_deg.is_some();
+            match (has(preferred), has(alternative)) {
+                (false, false)
+                    if is_fixed || (preferred == Quantity::Azimuth && self.has_array_columns()) => {
+                }
                 (true, _) | (_, true) if is_fixed => {
-                    let what = "both --azimuth-deg and a column say the direction";
+                    let what = "both --azimuth-deg and a column give the direction";
                     return Err(ImportError::mapping(what, "leave one of them out"));
                 }
                 (true, true) => {
-                    let what = format!("both {this} and {that} are named");
+                    let what = format!("both {name} and {alternative_name} are mapped");
                     return Err(ImportError::mapping(what, "leave one of them out"));
                 }
                 (false, false) => {
                     return Err(ImportError::mapping(
-                        format!("no column has the {this} or the {that}"),
-                        "name the columns: --columns azimuth_deg=1,range_cm=2",
+                        format!("no column is mapped to {name} or {alternative_name}"),
+                        "map the columns: --columns azimuth_deg=1,range_cm=2",
                     ));
                 }
                 _ => {}
@@ -259,20 +263,21 @@ impl Mapping {
         }
         if has(Quantity::X) != has(Quantity::Y) {
             return Err(ImportError::mapping(
-                "only one of x and y is named",
-                "name both, or neither",
+                "only one of x and y is mapped",
+                "map both, or neither",
             ));
         }
         Ok(())
     }
 
-    /// Checks whether one column a ranger is named.
-    pub(crate) fn is_of_array(&self) -> bool {
+    /// Returns `true` if a field is mapped to one column per ranger.
+    pub(crate) fn has_array_columns(&self) -> bool {
         self.columns.values().any(|column| matches!(column, Column::Several(_)))
     }
 }
 
-/// The option `--columns` as one types it in a shell; `names` are those of all columns, for names that cannot be typed.
+/// Formats `--columns` as typed in a shell. Names that cannot be typed become numbers, by their
+/// index in `names`.
 pub(crate) fn columns_option(
     columns: impl IntoIterator<Item = (Field, Column)>,
     names: &[String],
@@ -293,11 +298,11 @@ pub(crate) fn columns_option(
         format!("{field}={text}")
     };
     let text = columns.into_iter().map(pair).collect::<Vec<_>>().join(",");
-    format!("--columns {}", typed(&text))
+    format!("--columns {}", shell_quoted(&text))
 }
 
-/// A word as one types it in a shell.
-pub(crate) fn typed(word: &str) -> String {
+/// Quotes a word for a shell if necessary.
+pub(crate) fn shell_quoted(word: &str) -> String {
     let is_plain = |c: char| c.is_alphanumeric() || "_=,.-/%+@:".contains(c);
     if word.chars().all(is_plain) {
         word.to_owned()

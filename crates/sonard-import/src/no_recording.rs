@@ -1,4 +1,4 @@
-//! Recordings of ROS 2 where they can't be read.
+//! Replacement of the recording reader in builds without the feature `recordings`.
 
 use std::{
     io::{self, Read},
@@ -10,29 +10,28 @@ use sonard_records::Record;
 
 use crate::{
     ImportError, Mapping, Taken,
-    doubt::{Ranges, Ways},
+    unit_check::{RangeStats, UnitContext},
 };
 
-/// How every such file begins.
+/// Magic bytes of an MCAP file.
 pub(crate) const MAGIC: &[u8] = b"\x89MCAP0\r\n";
 
-/// Stands for the recording, of which there is none.
+/// Placeholder that is never constructed.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Bag {
     pub(crate) has_poses: bool,
 }
 
 impl Bag {
-    /// # Errors
-    /// Always.
-    pub(crate) fn look(
+    /// Rejects every recording.
+    pub(crate) fn survey(
         _open: &dyn Fn() -> io::Result<Box<dyn Read>>,
         _mapping: &Mapping,
         _taken: &Taken,
     ) -> Result<Self, ImportError> {
         Err(ImportError::mapping(
-            "recordings can't be read here",
-            "`sonard import` makes a log of them",
+            "this build cannot read recordings",
+            "convert it to a log with `sonard import`",
         ))
     }
 
@@ -43,8 +42,8 @@ impl Bag {
     pub(crate) fn examine(
         &self,
         _open: &dyn Fn() -> io::Result<Box<dyn Read>>,
-        _ways: (&Ways, &Taken),
-        _ranges: &mut Ranges,
+        _units: (&UnitContext, &Taken),
+        _ranges: &mut RangeStats,
     ) -> Result<Vec<String>, ImportError> {
         Ok(Vec::new())
     }

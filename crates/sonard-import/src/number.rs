@@ -1,8 +1,8 @@
-//! Numbers as programs and spreadsheets of several countries write them.
+//! Parsing of numbers with decimal points or commas and with thousands separators.
 
 use crate::mapping::Decimal;
 
-/// Reads a number of a text cell; `None` of what is none.
+/// Parses the number of a text cell; `None` if the text is not a number.
 pub(crate) fn parse(cell: &str, decimal: Decimal) -> Option<f64> {
     let cell = cell.trim();
     if !cell.contains(',') && (decimal == Decimal::Point || !is_grouped(cell, '.')) {
@@ -22,9 +22,9 @@ pub(crate) fn parse(cell: &str, decimal: Decimal) -> Option<f64> {
     }
 }
 
-/// Groups of three digits behind the first.
-fn is_grouped(whole: &str, sign: char) -> bool {
-    let mut groups = whole.trim_start_matches(['+', '-']).split(sign);
+/// Returns `true` for groups of three digits after the first.
+fn is_grouped(whole: &str, separator: char) -> bool {
+    let mut groups = whole.trim_start_matches(['+', '-']).split(separator);
     let is_digits = |group: &str| group.bytes().all(|byte| byte.is_ascii_digit());
     let first = groups.next().unwrap_or_default();
     let rest: Vec<&str> = groups.collect();
@@ -34,30 +34,32 @@ fn is_grouped(whole: &str, sign: char) -> bool {
         && rest.iter().all(|group| group.len() == 3 && is_digits(group))
 }
 
-/// Evidence of a cell with a comma for the sign before fractions.
+/// Evidence of one cell for the decimal separator.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Shows {
+pub(crate) enum DecimalEvidence {
     Comma,
     Point,
-    /// `1,500` is one and a half or fifteen hundred.
+    /// Ambiguous: `1,500` is one and a half or fifteen hundred.
     Either,
-    /// No number, or one without a sign.
-    Nothing,
+    /// Not a number, or a number without a separator.
+    Unknown,
 }
 
-pub(crate) fn shows(cell: &str) -> Shows {
+pub(crate) fn decimal_evidence(cell: &str) -> DecimalEvidence {
     let cell = cell.trim();
     let by = |decimal| parse(cell, decimal).is_some();
     if !cell.contains(',') {
-        return Shows::Nothing;
+        return DecimalEvidence::Unknown;
     }
     match (by(Decimal::Comma), by(Decimal::Point)) {
-        // No number has a group of three behind a zero.
-        (true, true) if cell.trim_start_matches(['+', '-']).starts_with("0,") => Shows::Comma,
-        (true, true) => Shows::Either,
-        (true, false) => Shows::Comma,
-        (false, true) => Shows::Point,
-        (false, false) => Shows::Nothing,
+        // A number with thousands separators does not start with a zero.
+        (true, true) if cell.trim_start_matches(['+', '-']).starts_with("0,") => {
+            DecimalEvidence::Comma
+        }
+        (true, true) => DecimalEvidence::Either,
+        (true, false) => DecimalEvidence::Comma,
+        (false, true) => DecimalEvidence::Point,
+        (false, false) => DecimalEvidence::Unknown,
     }
 }
 
@@ -66,7 +68,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_are_read_by_either_sign() {
+    fn parses_both_separators() {
         for (cell, comma, point) in [
             ("15", Some(15.0), Some(15.0)),
             ("-3.5e2", Some(-350.0), Some(-350.0)),
@@ -87,17 +89,17 @@ mod tests {
     }
 
     #[test]
-    fn cells_show_their_sign_where_it_is_certain() {
-        for (cell, shown) in [
-            ("15,5", Shows::Comma),
-            ("0,250", Shows::Comma),
-            ("1.234,5", Shows::Comma),
-            ("1,234.5", Shows::Point),
-            ("1,234", Shows::Either),
-            ("15.5", Shows::Nothing),
-            ("2026-01-31 12:00:00,5", Shows::Nothing),
+    fn finds_separator_evidence() {
+        for (cell, expected) in [
+            ("15,5", DecimalEvidence::Comma),
+            ("0,250", DecimalEvidence::Comma),
+            ("1.234,5", DecimalEvidence::Comma),
+            ("1,234.5", DecimalEvidence::Point),
+            ("1,234", DecimalEvidence::Either),
+            ("15.5", DecimalEvidence::Unknown),
+            ("2026-01-31 12:00:00,5", DecimalEvidence::Unknown),
         ] {
-            assert_eq!(shows(cell), shown, "{cell}");
+            assert_eq!(decimal_evidence(cell), expected, "{cell}");
         }
     }
 }

@@ -1,96 +1,107 @@
-//! A row's numbers as a reading.
+//! Conversion of table rows to readings.
 
 use jiff::Timestamp;
 use sonard_model::{acoustics::Air, geometry::Pose, reading::PingStatus};
 
 use crate::{
-    Field, ImportError, Location, Mapping, Quantity, Taken, mapping::Decimal, number,
-    rounds::Round, time::Times,
+    Field, ImportError, Location, Mapping, Quantity, Taken,
+    array_rounds::ArrayRound,
+    mapping::Decimal,
+    number::{self, DecimalEvidence},
+    time::TimeReader,
 };
 
-/// The values of the mapping's columns, in its order: one each, or of an array one a ranger; `None` where there is
-/// nothing.
+/// Cells of the mapped columns, in the order of the mapping. A column has one cell, or one per
+/// ranger of an array; `None` is an empty cell.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Row {
     pub(crate) place: Location,
     pub(crate) cells: Vec<Vec<Option<String>>>,
 }
 
-/// Numbers of a reading as the file has them, before units, senses and no echo.
+/// Numbers as in the file, before conversion of units and direction sense and before no-echo values
+/// are removed.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(crate) struct Raw {
-    /// Azimuth or bearing.
+pub(crate) struct RawReading {
+    /// Azimuth or bearing, in the unit of the file.
     pub(crate) direction: f64,
     /// Range or time of flight.
     pub(crate) range: Option<f64>,
 }
 
-/// One firing, in the units and senses of a log.
+/// Single firing, in the units and conventions of a log.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Reading {
-    /// Where it stands in the file.
+    /// Position in the file.
     pub place: Location,
-    /// Direction of the beam, degrees counter-clockwise: from the heading, or of a bearing in the world.
+    /// Direction of the beam, degrees counter-clockwise: from the heading, or a bearing from the x
+    /// axis.
     pub direction_deg: f64,
-    /// Whether that is a bearing.
+    /// True if `direction_deg` is a bearing in the world frame.
     pub is_bearing: bool,
-    /// What became of it.
+    /// Outcome of the firing.
     pub status: PingStatus,
-    /// Half the path of its first echo, metres.
+    /// Range of the first echo (half its path), metres.
     pub range_m: Option<f64>,
-    /// Its time of flight, microseconds.
+    /// Time of flight of the first echo, microseconds.
     pub tof_us: Option<f64>,
-    /// When it was fired.
+    /// Time at which the ranger fired.
     pub time: Option<Timestamp>,
-    /// Which scan it belongs to, where the file says so.
+    /// Scan identifier, where the file has one.
     pub scan: Option<String>,
-    /// Where the robot stood: x and y in metres, and heading in degrees.
+    /// Position of the robot, x and y in metres.
     pub place_m: Option<[f64; 2]>,
-    /// The same.
+    /// Heading of the robot, degrees.
     pub heading_deg: Option<f64>,
-    /// The air, where the file says its temperature.
+    /// Air at the reading, where the file contains its temperature.
     pub air: Option<Air>,
-    /// The same numbers as the file has them.
-    pub(crate) raw: Raw,
+    /// Unconverted numbers of the file.
+    pub(crate) raw: RawReading,
 }
 
 impl Reading {
-    /// Where the robot stood, with what the row does not say from another pose.
-    pub(crate) fn pose(&self, otherwise: &Pose) -> Pose {
-        let [x_m, y_m] = self.place_m.unwrap_or([otherwise.x_m, otherwise.y_m]);
-        Pose { x_m, y_m, heading_deg: self.heading_deg.unwrap_or(otherwise.heading_deg) }
+    /// Returns the pose of the robot, completed from `fallback`.
+    pub(crate) fn pose(&self, fallback: &Pose) -> Pose {
+        let [x_m, y_m] = self.place_m.unwrap_or([fallback.x_m, fallback.y_m]);
+        Pose { x_m, y_m, heading_deg: self.heading_deg.unwrap_or(fallback.heading_deg) }
     }
 }
 
-/// Makes readings of rows, in their order.
+/// Converts rows to readings, in their order.
 #[derive(Debug)]
-pub(crate) struct Reader<'a> {
+pub(crate) struct RowReader<'a> {
     mapping: &'a Mapping,
     fields: Vec<Field>,
-    taken: &'a Taken,
+    assumptions: &'a Taken,
     decimal: Decimal,
-    pub(crate) times: Times<'a>,
+    pub(crate) times: TimeReader<'a>,
 }
 
-impl<'a> Reader<'a> {
+impl<'a> RowReader<'a> {
     /// # Errors
-    /// The mapping has an offset from UTC that is none.
+    /// Returns an error for an invalid UTC offset in the mapping.
     pub(crate) fn new(
         mapping: &'a Mapping,
-        taken: &'a Taken,
+        assumptions: &'a Taken,
         decimal: Decimal,
     ) -> Result<Self, ImportError> {
         let fields = mapping.columns.keys().copied().collect();
-        Ok(Self { mapping, fields, taken, decimal, times: Times::new(mapping, taken.started)? })
+        Ok(Self {
+            mapping,
+            fields,
+            assumptions,
+            decimal,
+            times: TimeReader::new(mapping, assumptions.started)?,
+        })
     }
 
-    /// The cells of a quantity.
+    /// Returns the cells of a quantity.
     fn cells<'r>(&self, row: &'r Row, quantity: Quantity) -> Option<(Field, &'r [Option<String>])> {
         let place = self.fields.iter().position(|field| field.quantity() == quantity)?;
         Some((self.fields[place], row.cells.get(place)?))
     }
 
-    /// The cell of a quantity that has one.
+    /// Returns the first cell of a quantity, if it is not empty.
     fn cell<'r>(&self, row: &'r Row, quantity: Quantity) -> Option<(Field, &'r str)> {
         let (field, cells) = self.cells(row, quantity)?;
         cells.first()?.as_deref().map(|cell| (field, cell))
@@ -110,10 +121,10 @@ impl<'a> Reader<'a> {
         Ok(found.map(|(field, number)| field.scaled(number)))
     }
 
-    /// The reading of a row.
+    /// Converts a row to a reading.
     ///
     /// # Errors
-    /// A value that is none, with its field and column.
+    /// Returns an error with field and column for an invalid value.
     pub(crate) fn read(&mut self, row: &Row) -> Result<Reading, ImportError> {
         let is_bearing = self.mapping.field(Quantity::Bearing).is_some();
         let direction = if is_bearing { Quantity::Bearing } else { Quantity::Azimuth };
@@ -122,7 +133,7 @@ impl<'a> Reader<'a> {
         let found = found.map(|(field, number)| (number, field.scaled(number)));
         let (raw_direction, direction_deg) =
             found.or(fixed.map(|deg| (deg, deg))).ok_or_else(|| {
-                let what = format!("there is no {}", direction.words());
+                let what = format!("no {} in this row", direction.words());
                 ImportError::at(
                     row.place,
                     what,
@@ -138,7 +149,7 @@ impl<'a> Reader<'a> {
             Some(temperature_c) => Some(self.air(row.place, temperature_c)?),
             None => None,
         };
-        let sound_speed_m_s = air.unwrap_or(self.taken.air).sound_speed_m_s();
+        let sound_speed_m_s = air.unwrap_or(self.assumptions.air).sound_speed_m_s();
         let measured = match self.number_of(row, Quantity::Range)? {
             Some(range) => Some(range),
             None => self.number_of(row, Quantity::Tof)?,
@@ -165,20 +176,20 @@ impl<'a> Reader<'a> {
             place_m: x.zip(y).map(|(x, y)| [x, y]),
             heading_deg: self.scaled(row, Quantity::Heading)?,
             air,
-            raw: Raw { direction: raw_direction, range: measured.map(|(_, number)| number) },
+            raw: RawReading { direction: raw_direction, range: measured.map(|(_, number)| number) },
         })
     }
 
-    /// The round of a row that has a range of each ranger.
+    /// Converts a row with one range per ranger to a round.
     ///
     /// # Errors
-    /// A value that is none, with its field and column.
-    pub(crate) fn round(&mut self, row: &Row) -> Result<Round, ImportError> {
+    /// Returns an error with field and column for an invalid value.
+    pub(crate) fn round(&mut self, row: &Row) -> Result<ArrayRound, ImportError> {
         let found = self.cells(row, Quantity::Range).or_else(|| self.cells(row, Quantity::Tof));
         let Some((field, cells)) = found else {
             return Err(ImportError::mapping("no column has a range", "name one with --columns"));
         };
-        let sound_speed_m_s = self.taken.air.sound_speed_m_s();
+        let sound_speed_m_s = self.assumptions.air.sound_speed_m_s();
         let raw = cells.iter().map(|cell| match cell {
             Some(cell) => self.number(row.place, field, cell),
             None => Ok(None),
@@ -191,30 +202,30 @@ impl<'a> Reader<'a> {
         let ranges_m = raw.iter().map(range_m).collect();
         let [x, y] = [self.scaled(row, Quantity::X)?, self.scaled(row, Quantity::Y)?];
         let heading_deg = self.scaled(row, Quantity::Heading)?;
-        let otherwise = self.taken.pose;
+        let fallback = self.assumptions.pose;
         let pose = (x.is_some() || heading_deg.is_some()).then(|| Pose {
-            x_m: x.unwrap_or(otherwise.x_m),
-            y_m: y.unwrap_or(otherwise.y_m),
-            heading_deg: heading_deg.unwrap_or(otherwise.heading_deg),
+            x_m: x.unwrap_or(fallback.x_m),
+            y_m: y.unwrap_or(fallback.y_m),
+            heading_deg: heading_deg.unwrap_or(fallback.heading_deg),
         });
-        Ok(Round { place: row.place, time: self.time(row)?, pose, ranges_m, raw })
+        Ok(ArrayRound { place: row.place, time: self.time(row)?, pose, ranges_m, raw })
     }
 
     fn air(&self, place: Location, temperature_c: f64) -> Result<Air, ImportError> {
-        let Taken { air, .. } = self.taken;
+        let Taken { air, .. } = self.assumptions;
         Air::new(temperature_c, air.humidity_percent(), air.pressure_kpa())
             .map_err(|error| ImportError::at(place, error.to_string(), "is the unit right?"))
     }
 
-    /// The time of flight of a number of the file, microseconds; `None` of one that stands for no echo, or is no
-    /// distance.
+    /// Converts a number of the file to a time of flight, microseconds; `None` for a no-echo value
+    /// or a number that is not a distance.
     fn tof_us(&self, field: Field, number: f64, sound_speed_m_s: f64) -> Option<f64> {
         if self.mapping.is_no_echo(number) || number.is_infinite() || number <= 0.0 {
             return None;
         }
         Some(match field.quantity() {
             Quantity::Tof => field.scaled(number),
-            // What the ranger measured is a time: its program made a range of that.
+            // A ranger measures time; its program computed the range with a sound speed of its own.
             _ => {
                 let assumed_m_s = self.mapping.sound_speed_m_s.unwrap_or(sound_speed_m_s);
                 2e6 * field.scaled(number) / assumed_m_s
@@ -222,7 +233,7 @@ impl<'a> Reader<'a> {
         })
     }
 
-    /// A number; `None` where the cell says that there is none.
+    /// Parses a number; `None` for the usual markers of a missing value.
     fn number(
         &self,
         place: Location,
@@ -234,46 +245,56 @@ impl<'a> Reader<'a> {
             _ => {}
         }
         match number::parse(cell, self.decimal) {
-            Some(number) if !number.is_finite() && field.quantity() != Quantity::Range => {
-                Err(self.wrong(place, field, format!("{cell} is not finite"), "correct that value"))
-            }
+            Some(number) if !number.is_finite() && field.quantity() != Quantity::Range => Err(self
+                .invalid_value(
+                    place,
+                    field,
+                    format!("{cell} is not finite"),
+                    "correct that value",
+                )),
             Some(number) => Ok(Some(number)),
             None => {
-                let what = format!("`{}` is no number", shortened(cell));
-                let help = match number::shows(cell) {
-                    number::Shows::Nothing => "is it the right column? see --columns",
+                let what = format!("`{}` is not a number", shortened(cell));
+                let help = match number::decimal_evidence(cell) {
+                    DecimalEvidence::Unknown => "is it the right column? see --columns",
                     _ => "is the comma a decimal sign? --decimal comma",
                 };
-                Err(self.wrong(place, field, what, help))
+                Err(self.invalid_value(place, field, what, help))
             }
         }
     }
 
     fn status(&self, place: Location, word: &str) -> Result<PingStatus, ImportError> {
         serde_json::from_value(word.to_lowercase().into()).map_err(|_| {
-            let what = format!("`{}` is no status", shortened(word));
-            ImportError::at(place, what, "write echo, no_echo, min_range or link_lost")
+            let what = format!("unknown status `{}`", shortened(word));
+            ImportError::at(place, what, "use echo, no_echo, min_range or link_lost")
         })
     }
 
     fn time(&mut self, row: &Row) -> Result<Option<Timestamp>, ImportError> {
         let Some((field, cell)) = self.cell(row, Quantity::Time) else { return Ok(None) };
         let read = if field.name() == "time" {
-            self.times.text(cell)
+            self.times.parse_text(cell)
         } else {
             let Some(number) = self.number(row.place, field, cell)? else { return Ok(None) };
             self.times.number(Some(field), field.scaled(number)).map(Some)
         };
-        read.map_err(|(what, help)| self.wrong(row.place, field, what, &help))
+        read.map_err(|(what, help)| self.invalid_value(row.place, field, what, &help))
     }
 
-    fn wrong(&self, place: Location, field: Field, what: String, help: &str) -> ImportError {
+    fn invalid_value(
+        &self,
+        place: Location,
+        field: Field,
+        what: String,
+        help: &str,
+    ) -> ImportError {
         let column = self.mapping.columns.get(&field).map(|column| format!("{field} ({column})"));
         ImportError::At { place, column, what, help: help.to_owned() }
     }
 }
 
-/// So much of a text as an error can show.
+/// Truncates a text for an error message.
 fn shortened(text: &str) -> String {
     let short: String = text.chars().take(40).collect();
     if short.len() < text.len() { format!("{short}...") } else { short }

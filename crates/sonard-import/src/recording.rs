@@ -1,15 +1,15 @@
-//! Recordings of ROS 2: ranges and scans of a sonar, with the frames that say where it was.
+//! ROS 2 recordings: Range and LaserScan messages of sonars, placed by the recorded frames.
 //!
-//! A transducer that turns on the robot is a ranger on a stepper, and each turn of it a scan; one or more that
-//! do not are an array. Poses are those of `base_link` in the root of the tree of frames.
+//! A transducer that rotates on the robot is a ranger on a stepper, with one scan per revolution.
+//! Fixed transducers form an array. Poses are those of `base_link` in the root of the frame tree.
 
 mod cdr;
-mod look;
 mod mcap;
 mod message;
 mod numbers;
 mod order;
 mod scan;
+mod survey;
 mod transforms;
 
 use std::{
@@ -26,78 +26,79 @@ use sonard_records::Record;
 
 use crate::{
     ImportError, Location, Mapping, Taken,
-    doubt::{Ranges, Ways},
     examine::check_beyond,
-    limits::{LimitNotes, Limits, Told},
+    limits::{LimitNotes, Limits, RangeClass},
+    unit_check::{RangeStats, UnitContext},
 };
-use cdr::{Cdr, CdrError, Part};
-use mcap::{Message, Messages};
-use message::{Header, LaserScan, Range, Transform};
+use cdr::{CdrError, CdrReader, Decoded};
+use mcap::{MessageReader, RecordedMessage};
+use message::{LaserScanMessage, MessageHeader, RangeMessage, TransformMessage};
 use numbers::{as_written, billionths, plain_deg};
-use order::in_order;
-use scan::Gathered;
-use transforms::{Placed, TransformError, Transforms};
+use order::sort_by_stamp;
+use scan::ScanCollector;
+use transforms::{FrameTree, Placement, TransformError};
 
 pub(crate) use mcap::MAGIC;
 
-/// What a recording's readings come from.
+/// Frames, topics and clock of a recording.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Bag {
-    transforms: Transforms,
-    topics: BTreeMap<String, Source>,
-    /// Whether the ranger turns: if not, they are an array.
-    turns: bool,
+    frames: FrameTree,
+    topics: BTreeMap<String, Topic>,
+    /// True if the ranger rotates; false for an array of fixed rangers.
+    rotates: bool,
     pub(crate) has_poses: bool,
     clock: Clock,
-    /// True if messages stand in the order of their stamps.
+    /// True if messages are in the order of their time stamps.
     is_in_order: bool,
-    /// Assumptions that were made, a line each.
+    /// Notes on assumptions, one line each.
     notes: Vec<String>,
-    /// The greatest range that a message states, in its unit.
-    stated_most: f64,
+    /// Greatest `range_max` of the messages, in their unit.
+    max_stated_range: f64,
 }
 
-/// The recording's clock, where stamps count from the start of a board.
+/// Offsets between time stamps, the recorder's clock and the log.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 struct Clock {
-    /// From stamps before 2000 to the recorder's clock, nanoseconds.
-    of_board_ns: Option<i64>,
-    /// From stamps to what the log shall have, nanoseconds.
-    shown_ns: i64,
+    /// Offset from stamps before 2000 to the recorder's clock, nanoseconds.
+    board_offset_ns: Option<i64>,
+    /// Offset from stamps to the times of the log, nanoseconds.
+    log_offset_ns: i64,
 }
 
-/// A topic of readings.
+/// Topic of readings, with its frames.
 #[derive(Debug, Clone, PartialEq)]
-struct Source {
+struct Topic {
     is_scan: bool,
     frame: String,
-    /// The frame by which its place is known: its own, or the robot's where nothing places it.
+    /// Frame that places the ranger: its own, or the robot's if no transform places it.
     placed_as: String,
-    /// From the root of the tree: frame of the world, of the robot, and of what the readings are told from.
+    /// Frames of the world (the root of the tree) and of the robot, and the origin frame of the
+    /// readings.
     world: String,
     robot: String,
     axis: String,
-    /// Where it was in the robot's frame at first.
-    mounted: Placed,
+    /// Initial position and rotation in the robot's frame.
+    mounted: Placement,
 }
 
-/// A reading in its place.
+/// Reading with its pose.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Heard {
+pub(crate) struct PlacedReading {
     pub(crate) time_ns: i64,
     pub(crate) pose: Option<Pose>,
     pub(crate) direction_deg: f64,
     pub(crate) status: PingStatus,
     pub(crate) range_m: Option<f64>,
-    /// The range in the message's unit, unless it stands for none.
+    /// Range in the unit of the message, if there is one.
     raw: Option<f64>,
 }
 
-/// Readings of a message, and those that have no place.
+/// Readings of a message, and the number of readings without a pose.
 #[derive(Debug, Default)]
-struct Placeable {
-    heard: Vec<Heard>,
-    left_out: u64,
+struct MessageReadings {
+    readings: Vec<PlacedReading>,
+    skipped: u64,
     why: Option<TransformError>,
 }
 
@@ -105,72 +106,74 @@ const RANGE: &str = "sensor_msgs/msg/Range";
 const LASER_SCAN: &str = "sensor_msgs/msg/LaserScan";
 const TRANSFORMS: &str = "tf2_msgs/msg/TFMessage";
 const READINGS: [&str; 2] = [RANGE, LASER_SCAN];
-/// The types of the messages that are read; all others in a recording are passed over.
+/// Message types read from recordings; messages of other types are skipped.
 pub const MESSAGE_TYPES: [&str; 3] = [RANGE, LASER_SCAN, TRANSFORMS];
 
-/// Rangers that turn by less than this stand still, degrees.
-const STILL_DEG: f64 = 0.05;
-/// No ranger of sound reaches so far, metres: limits beyond it are in another unit.
+/// Rotation below which a ranger counts as fixed, degrees.
+const FIXED_DEG: f64 = 0.05;
+/// Limit of any ultrasonic ranger, metres; a greater `range_max` is in another unit.
 const MAX_STATED_M: f64 = 60.0;
 
 impl Bag {
-    /// Reads all readings once: what is left out, and what their ranges say.
+    /// Reads all readings once; adds their ranges to `ranges` and returns notes on skipped
+    /// readings.
     ///
     /// # Errors
-    /// A damaged message, or no reading with a place.
+    /// Returns an error for a damaged message, or if no reading has a pose.
     pub(crate) fn examine(
         &self,
         open: &dyn Fn() -> std::io::Result<Box<dyn Read>>,
-        (ways, taken): (&Ways, &Taken),
-        ranges: &mut Ranges,
+        (units, assumptions): (&UnitContext, &Taken),
+        ranges: &mut RangeStats,
     ) -> Result<Vec<String>, ImportError> {
         let mut limits = LimitNotes::default();
-        let mut left_out: BTreeMap<&str, (u64, u64, Option<TransformError>)> = BTreeMap::new();
-        let stated_m = Some(self.stated_most * ways.mapping.metres());
+        let mut skipped: BTreeMap<&str, (u64, u64, Option<TransformError>)> = BTreeMap::new();
+        let stated_m = Some(self.max_stated_range * units.mapping.metres());
         let stated_m = stated_m.filter(|stated_m| *stated_m <= MAX_STATED_M).unwrap_or(0.0);
-        let taken = &Taken { longest_m: taken.longest_m.max(stated_m), ..taken.clone() };
-        for (number, message) in (1..).zip(Messages::of(open()?, &READINGS)) {
+        let assumptions =
+            &Taken { longest_m: assumptions.longest_m.max(stated_m), ..assumptions.clone() };
+        for (number, message) in (1..).zip(MessageReader::new(open()?, &READINGS)) {
             let message = message?;
-            let Some((ranger, topic, source)) = self.source_of(&message) else { continue };
-            let found = self.readings(&message, source, ways.mapping, &mut limits)?;
-            let counts = left_out.entry(topic).or_default();
-            counts.0 += found.left_out;
-            counts.1 += found.left_out + found.heard.len() as u64;
+            let Some((ranger, topic, source)) = self.topic_of(&message) else { continue };
+            let found = self.readings(&message, source, units.mapping, &mut limits)?;
+            let counts = skipped.entry(topic).or_default();
+            counts.0 += found.skipped;
+            counts.1 += found.skipped + found.readings.len() as u64;
             counts.2 = counts.2.take().or(found.why);
-            for heard in found.heard {
-                let direction = if self.turns { heard.direction_deg } else { ranger as f64 };
+            for readings in found.readings {
+                let direction = if self.rotates { readings.direction_deg } else { ranger as f64 };
                 let place = Location::Message(number);
-                ranges.add(place, direction, heard.raw, heard.range_m, (ways, taken));
+                ranges.add(place, direction, readings.raw, readings.range_m, (units, assumptions));
             }
         }
-        check_beyond(&limits, taken)?;
+        check_beyond(&limits, assumptions)?;
         let mut notes = self.notes.clone();
-        for (topic, (missing, of, why)) in left_out {
+        for (topic, (missing, of, why)) in skipped {
             let Some(why) = why else { continue };
             if ranges.readings == 0 {
-                return Err(misplaced(topic, &why));
+                return Err(pose_error(topic, &why));
             }
             notes.push(format!(
-                "{topic}: {missing} of {of} readings are left out, because their place is not known: {why}"
+                "{topic}: {missing} of {of} readings skipped, position unknown: {why}"
             ));
         }
         notes.extend(limits.lines());
         Ok(notes)
     }
 
-    /// The ranger of a message, with its number.
-    fn source_of(&self, message: &Message) -> Option<(usize, &str, &Source)> {
+    /// Returns the topic of a message with its index.
+    fn topic_of(&self, message: &RecordedMessage) -> Option<(usize, &str, &Topic)> {
         let mut topics = self.topics.iter().enumerate();
         let found = topics.find(|(_, (topic, _))| **topic == message.channel.topic);
         found.map(|(ranger, (topic, source))| (ranger, topic.as_str(), source))
     }
 
-    /// The array that the recording is of; `None` of a ranger that turns.
+    /// Returns the array of fixed rangers; `None` for a rotating ranger.
     pub(crate) fn array(&self, sensor: &str) -> Option<RangerArray> {
-        if self.turns {
+        if self.rotates {
             return None;
         }
-        let ranger = |(id, source): (String, &Source)| MountedRanger {
+        let ranger = |(id, source): (String, &Topic)| MountedRanger {
             id,
             x_m: source.mounted.at.x,
             y_m: source.mounted.at.y,
@@ -179,11 +182,11 @@ impl Bag {
         };
         Some(RangerArray {
             rangers: self.ids().zip(self.topics.values()).map(ranger).collect(),
-            ..crate::rounds::array(&[], sensor)
+            ..crate::array_rounds::array(&[], sensor)
         })
     }
 
-    /// What the rangers are called: `/sonar/left/range` is `left`.
+    /// Derives ranger names from topics: `/sonar/left/range` becomes `left`.
     fn ids(&self) -> impl Iterator<Item = String> {
         let name = |topic: &String| {
             let words: Vec<&str> = topic.split('/').filter(|word| !word.is_empty()).collect();
@@ -196,27 +199,27 @@ impl Bag {
         if unique { names.into_iter() } else { topics.into_iter() }
     }
 
-    /// The records of each scan, one after the other; `source` is the recording again.
+    /// Returns the records of each scan in turn; `source` is the recording, opened again.
     ///
     /// # Errors
-    /// Messages out of order are more than fit into memory.
+    /// Returns an error if messages are out of order and exceed the memory limit for sorting.
     pub(crate) fn scans<'a>(
         &'a self,
         source: impl Read + 'a,
         mapping: &'a Mapping,
-        taken: &'a Taken,
+        assumptions: &'a Taken,
     ) -> Result<impl Iterator<Item = Result<Vec<Record>, ImportError>> + 'a, ImportError> {
-        let ids = if self.turns { Vec::new() } else { self.ids().collect() };
-        let mut gathered = Gathered::new(taken, mapping.sound_speed_m_s, ids);
-        let messages = Messages::of(source, &READINGS);
-        let mut messages: Box<dyn Iterator<Item = Result<Message, ImportError>> + 'a> =
+        let ids = if self.rotates { Vec::new() } else { self.ids().collect() };
+        let mut collector = ScanCollector::new(assumptions, mapping.sound_speed_m_s, ids);
+        let messages = MessageReader::new(source, &READINGS);
+        let mut messages: Box<dyn Iterator<Item = Result<RecordedMessage, ImportError>> + 'a> =
             match self.is_in_order {
                 true => Box::new(messages),
                 false => {
-                    let wanted = messages.filter(|message| {
-                        message.as_ref().map_or(true, |message| self.source_of(message).is_some())
+                    let used = messages.filter(|message| {
+                        message.as_ref().map_or(true, |message| self.topic_of(message).is_some())
                     });
-                    Box::new(in_order(wanted, |message| self.stamp_of(message))?)
+                    Box::new(sort_by_stamp(used, |message| self.stamp_of(message))?)
                 }
             };
         let mut limits = LimitNotes::default();
@@ -227,7 +230,7 @@ impl Bag {
                 match messages.next() {
                     Some(message) => {
                         let scans = message.and_then(|message| {
-                            self.take(&message, mapping, &mut limits, &mut gathered)
+                            self.process(&message, mapping, &mut limits, &mut collector)
                         });
                         match scans {
                             Ok(scans) => ready.extend(scans),
@@ -236,7 +239,7 @@ impl Bag {
                     }
                     None => {
                         is_over = true;
-                        ready.extend(gathered.finish());
+                        ready.extend(collector.finish());
                     }
                 }
             }
@@ -244,78 +247,84 @@ impl Bag {
         }))
     }
 
-    /// The time of a message of readings.
-    fn stamp_of(&self, message: &Message) -> Result<i64, ImportError> {
-        let mut header = decode(message, Header::decode)?;
+    /// Returns the time stamp of a message of readings.
+    fn stamp_of(&self, message: &RecordedMessage) -> Result<i64, ImportError> {
+        let mut header = decode(message, MessageHeader::decode)?;
         self.clock.stamp(&mut header, message);
         Ok(header.stamp_ns)
     }
 
-    /// Takes a message in; the scans that end with it.
-    fn take(
+    /// Processes a message and returns the scans that it completes.
+    fn process(
         &self,
-        message: &Message,
+        message: &RecordedMessage,
         mapping: &Mapping,
         limits: &mut LimitNotes,
-        gathered: &mut Gathered<'_>,
+        collector: &mut ScanCollector<'_>,
     ) -> Result<Vec<Vec<Record>>, ImportError> {
-        let Some((ranger, _, source)) = self.source_of(message) else { return Ok(Vec::new()) };
-        let mut heard = self.readings(message, source, mapping, limits)?.heard;
-        for heard in &mut heard {
-            heard.time_ns = heard.time_ns.saturating_add(self.clock.shown_ns);
+        let Some((ranger, _, source)) = self.topic_of(message) else { return Ok(Vec::new()) };
+        let mut readings = self.readings(message, source, mapping, limits)?.readings;
+        for readings in &mut readings {
+            readings.time_ns = readings.time_ns.saturating_add(self.clock.log_offset_ns);
         }
         if source.is_scan {
-            return Ok(gathered.whole(heard).into_iter().collect());
+            return Ok(collector.complete_scan(readings).into_iter().collect());
         }
-        Ok(heard.into_iter().filter_map(|heard| gathered.add(ranger, heard)).collect())
+        Ok(readings.into_iter().filter_map(|readings| collector.add(ranger, readings)).collect())
     }
 
-    /// The readings of a message, in their places; those without a place are counted.
+    /// Converts a message to readings with poses, and counts readings without a pose.
     fn readings(
         &self,
-        message: &Message,
-        source: &Source,
+        message: &RecordedMessage,
+        source: &Topic,
         mapping: &Mapping,
         notes: &mut LimitNotes,
-    ) -> Result<Placeable, ImportError> {
+    ) -> Result<MessageReadings, ImportError> {
         let metres = mapping.metres();
-        let mut found = Placeable::default();
+        let mut found = MessageReadings::default();
         let mut place = |time_ns: i64, turned_deg: f64, range: f32, limits: Limits| {
-            let (status, raw) = match limits.tell(as_written(range), mapping, notes) {
-                Told::Nothing => return Ok(()),
-                Told::Without(status) => (status, None),
-                Told::Echo(range) => (PingStatus::Echo, Some(range)),
+            let (status, raw) = match limits.classify(as_written(range), mapping, notes) {
+                RangeClass::Invalid => return Ok(()),
+                RangeClass::NoRange(status) => (status, None),
+                RangeClass::Echo(range) => (PingStatus::Echo, Some(range)),
             };
             let (in_robot, pose) = match self.placed(source, time_ns) {
                 Ok(placed) => placed,
-                Err(why @ (TransformError::Lacks { .. } | TransformError::Gap { .. })) => {
-                    found.left_out += 1;
+                Err(why @ (TransformError::Missing { .. } | TransformError::Gap { .. })) => {
+                    found.skipped += 1;
                     found.why.get_or_insert(why);
                     return Ok(());
                 }
-                Err(error) => return Err(misplaced(&message.channel.topic, &error)),
+                Err(error) => return Err(pose_error(&message.channel.topic, &error)),
             };
             let direction_deg = billionths(in_robot.beam_deg(turned_deg));
-            // A beam of no angle is none.
+            // An infinite angle is not a direction.
             if direction_deg.is_finite() {
                 let range_m = raw.map(|range| range * metres);
-                found.heard.push(Heard { time_ns, pose, direction_deg, status, range_m, raw });
+                found.readings.push(PlacedReading {
+                    time_ns,
+                    pose,
+                    direction_deg,
+                    status,
+                    range_m,
+                    raw,
+                });
             }
             Ok(())
         };
-        let limits =
-            |[least, most]: [f32; 2]| Limits { least: as_written(least), most: as_written(most) };
+        let limits = |[min, max]: [f32; 2]| Limits { min: as_written(min), max: as_written(max) };
         if !source.is_scan {
-            let mut range = decode(message, Range::decode)?;
+            let mut range = decode(message, RangeMessage::decode)?;
             self.clock.stamp(&mut range.header, message);
             place(range.header.stamp_ns, 0.0, range.range_m, limits(range.limits_m))?;
             return Ok(found);
         }
-        let mut scan = decode(message, LaserScan::decode)?;
+        let mut scan = decode(message, LaserScanMessage::decode)?;
         self.clock.stamp(&mut scan.header, message);
         let limits = limits(scan.limits_m);
         for (beam, range) in (0_u32..).zip(&scan.ranges_m) {
-            let later_ns = f64::from(scan.apart_s) * f64::from(beam) * 1e9;
+            let later_ns = f64::from(scan.time_increment_s) * f64::from(beam) * 1e9;
             let turned_rad = f64::from(scan.first_rad) + f64::from(scan.step_rad) * f64::from(beam);
             let time_ns = scan.header.stamp_ns.saturating_add(later_ns as i64);
             place(time_ns, plain_deg(turned_rad), *range, limits)?;
@@ -323,13 +332,13 @@ impl Bag {
         Ok(found)
     }
 
-    /// Place of a ranger in its robot, and the robot's pose.
+    /// Returns the placement of a ranger on its robot, and the pose of the robot.
     fn placed(
         &self,
-        source: &Source,
+        source: &Topic,
         time_ns: i64,
-    ) -> Result<(Placed, Option<Pose>), TransformError> {
-        let in_robot = self.transforms.place(&source.placed_as, &source.robot, time_ns)?;
+    ) -> Result<(Placement, Option<Pose>), TransformError> {
+        let in_robot = self.frames.place(&source.placed_as, &source.robot, time_ns)?;
         let pose = match source.world == source.robot {
             true => None,
             false => Some(self.pose(source, time_ns)?),
@@ -337,11 +346,12 @@ impl Bag {
         Ok((in_robot, pose))
     }
 
-    /// Of the robot; of a ranger that turns on an axis beside its middle, of that axis.
-    fn pose(&self, source: &Source, time_ns: i64) -> Result<Pose, TransformError> {
-        let robot = self.transforms.place(&source.robot, &source.world, time_ns)?;
-        let at = match self.turns {
-            true => self.transforms.place(&source.axis, &source.world, time_ns)?.at,
+    /// Returns the pose of the robot; for a rotating ranger, with the position of its rotation
+    /// axis.
+    fn pose(&self, source: &Topic, time_ns: i64) -> Result<Pose, TransformError> {
+        let robot = self.frames.place(&source.robot, &source.world, time_ns)?;
+        let at = match self.rotates {
+            true => self.frames.place(&source.axis, &source.world, time_ns)?.at,
             false => robot.at,
         };
         Ok(Pose {
@@ -353,63 +363,61 @@ impl Bag {
 }
 
 impl Clock {
-    /// Sets the time of a header on the recorder's clock where the sender has none: no stamp at all, or one that counts
-    /// from the start of a board.
-    fn stamp(&self, header: &mut Header, message: &Message) {
+    /// Replaces the time stamp by the recorder's clock if the sender has none: for a stamp of zero,
+    /// or one that counts from the start of a board.
+    fn stamp(&self, header: &mut MessageHeader, message: &RecordedMessage) {
         if header.stamp_ns == 0 {
             header.stamp_ns = i64::try_from(message.recorded_ns).unwrap_or(i64::MAX);
-        } else if let Some(of_board_ns) =
-            self.of_board_ns.filter(|_| header.stamp_ns < MIN_CLOCK_NS)
+        } else if let Some(board_offset_ns) =
+            self.board_offset_ns.filter(|_| header.stamp_ns < MIN_CLOCK_NS)
         {
-            header.stamp_ns = header.stamp_ns.saturating_add(of_board_ns);
+            header.stamp_ns = header.stamp_ns.saturating_add(board_offset_ns);
         }
     }
 }
 
-/// Stamps before 2000-01-01 are of no clock, nanoseconds since 1970.
+/// Nanoseconds since 1970 below which a stamp is not of a wall clock: 2000-01-01.
 const MIN_CLOCK_NS: i64 = 946_684_800_000_000_000;
 
-/// Decodes a message of one of the types that are read; how many numbers and frames it has.
+/// Decodes a message of a supported type and returns its number of ranges or transforms.
 ///
 /// # Errors
-/// Bytes that are no such message.
+/// Returns an error for bytes that are not such a message.
 pub fn read_message(type_name: &str, bytes: &[u8]) -> Result<usize, ImportError> {
-    let channel = mcap::Channel {
+    let channel = mcap::ChannelInfo {
         topic: String::new(),
         type_name: type_name.to_owned(),
         encoding: "cdr".to_owned(),
     };
-    let message = Message { channel: channel.into(), recorded_ns: 0, bytes: bytes.to_vec() };
+    let message =
+        RecordedMessage { channel: channel.into(), recorded_ns: 0, bytes: bytes.to_vec() };
     match type_name {
-        TRANSFORMS => decode(&message, Transform::all).map(|all| all.len()),
-        LASER_SCAN => decode(&message, LaserScan::decode).map(|scan| scan.ranges_m.len()),
-        _ => decode(&message, Range::decode).map(|_| 1),
+        TRANSFORMS => decode(&message, TransformMessage::all).map(|all| all.len()),
+        LASER_SCAN => decode(&message, LaserScanMessage::decode).map(|scan| scan.ranges_m.len()),
+        _ => decode(&message, RangeMessage::decode).map(|_| 1),
     }
 }
 
 fn decode<T>(
-    message: &Message,
-    read: impl FnOnce(&mut Cdr<'_>) -> Part<T>,
+    message: &RecordedMessage,
+    read: impl FnOnce(&mut CdrReader<'_>) -> Decoded<T>,
 ) -> Result<T, ImportError> {
     let channel = &message.channel;
     let refuse = |error: CdrError| {
-        let what = format!("{}: a {} can't be decoded: {error}", channel.topic, channel.type_name);
-        ImportError::mapping(what, "is it a recording of ROS 2? Convert others: `rosbags-convert`")
+        let what = format!("{}: cannot decode a {}: {error}", channel.topic, channel.type_name);
+        ImportError::mapping(what, "is it a ROS 2 recording? Convert others with `rosbags-convert`")
     };
     if channel.encoding != "cdr" {
         let what = format!("{}: messages are encoded as `{}`", channel.topic, channel.encoding);
-        return Err(ImportError::mapping(
-            what,
-            "give a recording of ROS 2, whose messages are CDR",
-        ));
+        return Err(ImportError::mapping(what, "give a ROS 2 recording with CDR messages"));
     }
-    Cdr::new(&message.bytes).and_then(|mut cdr| read(&mut cdr)).map_err(refuse)
+    CdrReader::new(&message.bytes).and_then(|mut cdr| read(&mut cdr)).map_err(refuse)
 }
 
-fn misplaced(topic: &str, error: &TransformError) -> ImportError {
+fn pose_error(topic: &str, error: &TransformError) -> ImportError {
     ImportError::mapping(
         format!("{topic}: {error}"),
-        "record /tf and /tf_static beside it, or cut the recording to where they are",
+        "record /tf and /tf_static as well, or cut the recording to their time span",
     )
 }
 

@@ -1,7 +1,8 @@
-//! LaserScan and Range messages of ROS as text: JSON, as rosbridge publishes them, or the YAML of `rostopic echo`.
+//! ROS LaserScan and Range messages as text: JSON from rosbridge, or YAML from `rostopic echo`.
 //!
-//! A LaserScan is a scan of its own: beam `i` is at `angle_min + i angle_increment`, radians, and its limits hold as in a
-//! recording. Range messages are readings of a fixed ranger. Names are those of ROS 1 and 2.
+//! Each LaserScan is a scan: beam `i` is at `angle_min + i angle_increment`, radians, with limits
+//! as in a recording. Range messages are readings of a fixed ranger. Member names of ROS 1 and 2
+//! are accepted.
 
 use std::io::Read;
 
@@ -11,15 +12,15 @@ use sonard_model::reading::PingStatus;
 
 use crate::{
     ImportError, Location, Mapping, Reading, json,
-    limits::{LimitNotes, Limits, Told},
-    lines::{Ends, Lines},
-    reading::Raw,
+    limits::{LimitNotes, Limits, RangeClass},
+    lines::{LineEnding, LineReader},
+    reading::RawReading,
 };
 
-/// A document of more than this is no message, bytes.
+/// Maximum size of a message.
 const MAX_MESSAGE_BYTES: usize = 16 << 20;
 
-/// The messages of a file, one after the other.
+/// Returns the messages of a file, in order.
 pub(crate) fn messages<'a>(
     source: impl Read + 'a,
     is_json: bool,
@@ -27,7 +28,7 @@ pub(crate) fn messages<'a>(
     if is_json {
         return json::objects(source);
     }
-    let mut lines = Lines::of(source, Ends::Lines);
+    let mut lines = LineReader::new(source, LineEnding::Lines);
     let mut number = 0;
     Ok(Box::new(std::iter::from_fn(move || {
         loop {
@@ -47,8 +48,9 @@ pub(crate) fn messages<'a>(
     })))
 }
 
-/// The number of the first line of a document, its text, and whether the file ends with it.
-fn document(lines: &mut Lines<impl Read>) -> Result<(u64, String, bool), ImportError> {
+/// Reads one document; returns the number of its first line, its text, and whether the file ends
+/// with it.
+fn document(lines: &mut LineReader<impl Read>) -> Result<(u64, String, bool), ImportError> {
     let (mut first, mut text) = (0, String::new());
     for line in lines.by_ref() {
         let line = line?;
@@ -58,7 +60,7 @@ fn document(lines: &mut Lines<impl Read>) -> Result<(u64, String, bool), ImportE
         if first == 0 {
             first = line.number;
         }
-        // Between messages `rostopic echo` may warn.
+        // `rostopic echo` may print warnings between messages.
         if line.text.starts_with("WARNING") {
             continue;
         }
@@ -74,17 +76,17 @@ fn document(lines: &mut Lines<impl Read>) -> Result<(u64, String, bool), ImportE
 
 fn yaml(number: u64, first_line: u64, text: &str) -> Result<Value, ImportError> {
     let place = Location::Entry { object: number, number: None };
-    // `ros2 topic echo` shortens long lists unless it is told not to.
+    // `ros2 topic echo` abbreviates long lists by default.
     let is_shortened = text.lines().any(|line| matches!(line.trim(), "- '...'" | "- ..." | "..."));
     if is_shortened {
         return Err(ImportError::at(
             place,
-            "its list is shortened to `...`",
+            "the list is abbreviated with `...`",
             "print whole lists: `ros2 topic echo --full-length TOPIC`",
         ));
     }
-    parse_yaml(&with_words(text)).map_err(|error| {
-        let what = format!("no YAML from line {first_line} on: {error}");
+    parse_yaml(&quote_non_finite(text)).map_err(|error| {
+        let what = format!("invalid YAML from line {first_line}: {error}");
         ImportError::at(place, what, "messages are separated by lines `---`")
     })
 }
@@ -96,11 +98,11 @@ fn parse_yaml(text: &str) -> Result<Value, String> {
 
 #[cfg(not(feature = "texts"))]
 fn parse_yaml(_: &str) -> Result<Value, String> {
-    Err("this build has no reader for it; convert it with `sonard import`".to_owned())
+    Err("this build cannot read YAML; convert the file with `sonard import`".to_owned())
 }
 
-/// YAML's infinities and NaN as texts, which JSON can hold.
-fn with_words(text: &str) -> String {
+/// Quotes YAML's infinities and NaN, which JSON cannot represent as numbers.
+fn quote_non_finite(text: &str) -> String {
     let is_end = |c: char| c.is_whitespace() || matches!(c, ',' | '[' | ']');
     let word = |piece: &str| {
         let plain = piece.trim_end_matches(is_end);
@@ -114,50 +116,50 @@ fn with_words(text: &str) -> String {
     text.split_inclusive(is_end).map(word).collect()
 }
 
-/// Reads the readings of messages, in their order.
-pub(crate) struct Reader<'a> {
+/// Converts messages to readings, in their order.
+pub(crate) struct MessageConverter<'a> {
     mapping: &'a Mapping,
     count: u64,
     pub(crate) notes: LimitNotes,
-    /// Messages that are neither a LaserScan nor a Range.
+    /// Number of messages other than LaserScan and Range.
     pub(crate) others: u64,
 }
 
-impl<'a> Reader<'a> {
+impl<'a> MessageConverter<'a> {
     pub(crate) fn new(mapping: &'a Mapping) -> Self {
         Self { mapping, count: 0, notes: LimitNotes::default(), others: 0 }
     }
 
     /// # Errors
-    /// A message whose numbers are none.
+    /// Returns an error for a message without valid angles.
     pub(crate) fn read(&mut self, message: &Value) -> Result<Vec<Reading>, ImportError> {
         self.count += 1;
         let place = Location::Entry { object: self.count, number: None };
-        let Some(message) = inner(message) else {
+        let Some(message) = unwrap_published(message) else {
             self.others += 1;
             return Ok(Vec::new());
         };
         let number = |names: &[&str]| names.iter().find_map(|name| float(message.get(*name)?));
-        let limit = |names: &[&str], otherwise| number(names).unwrap_or(otherwise);
+        let limit = |names: &[&str], default| number(names).unwrap_or(default);
         let limits = Limits {
-            least: limit(&["range_min", "min_range"], 0.0),
-            most: limit(&["range_max", "max_range"], f64::INFINITY),
+            min: limit(&["range_min", "min_range"], 0.0),
+            max: limit(&["range_max", "max_range"], f64::INFINITY),
         };
         let time = time(message);
         let topic_scan = self.count.to_string();
-        let mut one = |number: Option<u64>,
-                       direction_deg: f64,
-                       range: f64,
-                       later_s: f64,
-                       scan: Option<&str>| {
-            let told = limits.tell(range, self.mapping, &mut self.notes);
-            let (status, range) = match told {
-                Told::Nothing => return None,
-                Told::Without(status) => (status, None),
-                Told::Echo(range) => (PingStatus::Echo, Some(range)),
+        let mut convert = |number: Option<u64>,
+                           direction_deg: f64,
+                           range: f64,
+                           delay_s: f64,
+                           scan: Option<&str>| {
+            let class = limits.classify(range, self.mapping, &mut self.notes);
+            let (status, range) = match class {
+                RangeClass::Invalid => return None,
+                RangeClass::NoRange(status) => (status, None),
+                RangeClass::Echo(range) => (PingStatus::Echo, Some(range)),
             };
             let sense = if self.mapping.clockwise { -1.0 } else { 1.0 };
-            let later_ns = (later_s * 1e9).round();
+            let delay_ns = (delay_s * 1e9).round();
             Some(Reading {
                 place: Location::Entry { object: self.count, number },
                 direction_deg: self.mapping.zero_deg + sense * direction_deg,
@@ -166,13 +168,13 @@ impl<'a> Reader<'a> {
                 range_m: range.map(|range| range * self.mapping.metres()),
                 tof_us: None,
                 time: time.and_then(|time| {
-                    Timestamp::from_nanosecond(time.as_nanosecond() + later_ns as i128).ok()
+                    Timestamp::from_nanosecond(time.as_nanosecond() + delay_ns as i128).ok()
                 }),
                 scan: scan.map(str::to_owned),
                 place_m: None,
                 heading_deg: None,
                 air: None,
-                raw: Raw { direction: direction_deg, range },
+                raw: RawReading { direction: direction_deg, range },
             })
         };
         if let Some(ranges) = message.get("ranges").and_then(Value::as_array) {
@@ -180,22 +182,23 @@ impl<'a> Reader<'a> {
                 number(&[name]).filter(|number| number.is_finite()).ok_or_else(|| {
                     ImportError::at(
                         place,
-                        format!("`{name}` is no number"),
-                        "give a whole LaserScan",
+                        format!("`{name}` is not a number"),
+                        "give a complete LaserScan",
                     )
                 })
             };
             let (first_rad, step_rad) = (need("angle_min")?, need("angle_increment")?);
-            let apart_s = number(&["time_increment"]).filter(|s| s.is_finite()).unwrap_or(0.0);
+            let time_increment_s =
+                number(&["time_increment"]).filter(|s| s.is_finite()).unwrap_or(0.0);
             let readings = (0_u32..).zip(ranges).filter_map(|(beam, range)| {
                 let beam_at = f64::from(beam);
                 let direction_deg = plain_deg(first_rad + beam_at * step_rad);
                 let range = float(range).unwrap_or(f64::NAN);
-                one(
+                convert(
                     Some(u64::from(beam) + 1),
                     direction_deg,
                     range,
-                    beam_at * apart_s,
+                    beam_at * time_increment_s,
                     Some(&topic_scan),
                 )
             });
@@ -203,23 +206,24 @@ impl<'a> Reader<'a> {
         }
         let range = number(&["range"]).unwrap_or(f64::NAN);
         let azimuth_deg = self.mapping.azimuth_deg.unwrap_or(0.0);
-        Ok(one(None, azimuth_deg, range, 0.0, None).into_iter().collect())
+        Ok(convert(None, azimuth_deg, range, 0.0, None).into_iter().collect())
     }
 }
 
-/// Degrees of an angle that was printed with few digits.
+/// Converts an angle to degrees, rounded to the few digits that were printed.
 fn plain_deg(angle_rad: f64) -> f64 {
     (angle_rad.to_degrees() * 1e4).round() / 1e4
 }
 
-/// The message itself, where it stands within a published one.
-fn inner(value: &Value) -> Option<&Value> {
+/// Returns the message, unwrapped from a rosbridge publication.
+fn unwrap_published(value: &Value) -> Option<&Value> {
     let is_message = |value: &&Value| value.get("ranges").is_some() || value.get("range").is_some();
-    let inner = ["msg", "message", "data", "scan"].iter().find_map(|name| value.get(*name));
-    Some(value).filter(is_message).or_else(|| inner.filter(is_message))
+    let unwrap_published =
+        ["msg", "message", "data", "scan"].iter().find_map(|name| value.get(*name));
+    Some(value).filter(is_message).or_else(|| unwrap_published.filter(is_message))
 }
 
-/// A number, also as a text: YAML and rosbridge have `.inf`, `inf` and `"Infinity"`.
+/// Parses a number that may be a text: YAML and rosbridge use `.inf`, `inf` and `"Infinity"`.
 fn float(value: &Value) -> Option<f64> {
     match value {
         Value::Number(number) => number.as_f64(),
@@ -233,7 +237,7 @@ fn float(value: &Value) -> Option<f64> {
     }
 }
 
-/// The stamp of a message's header.
+/// Returns the time stamp of the message header.
 fn time(message: &Value) -> Option<Timestamp> {
     let stamp = message.get("header")?.get("stamp")?;
     let part = |names: [&str; 2]| names.iter().find_map(|name| stamp.get(*name)?.as_i64());
@@ -243,7 +247,7 @@ fn time(message: &Value) -> Option<Timestamp> {
     Timestamp::from_nanosecond(time).ok().filter(|time| time.as_second() > 0)
 }
 
-/// Checks whether each message is of a ranger that turns.
+/// Returns `true` for a LaserScan.
 pub(crate) fn is_scan(message: &Value) -> bool {
-    inner(message).is_some_and(|message| message.get("ranges").is_some())
+    unwrap_published(message).is_some_and(|message| message.get("ranges").is_some())
 }

@@ -1,4 +1,4 @@
-//! A file from its first byte to its records.
+//! Examination of a file and conversion of its content to records.
 
 use std::io::{self, Read};
 
@@ -9,82 +9,83 @@ use sonard_records::Record;
 
 use crate::{
     Format, ImportError, Mapping,
-    doubt::{Ranges, Ways},
+    array_rounds::SelectedDevices,
     encoding::{self, Encoding, UTF_8},
-    format::{self, Kind},
-    layout::Header,
+    format::{self, FormatKind},
+    layout::TableLayout,
+    no_echo_constant::DirectionKind,
     recording::Bag,
-    rounds::Chosen,
-    silence::Across,
     text::{self, Survey, hexadecimal},
+    unit_check::{RangeStats, UnitContext},
 };
 
-/// A file that can be opened more than once.
+/// File that can be opened repeatedly.
 pub struct Source<'a> {
-    /// Opens it at its beginning.
+    /// Opens the file at its beginning.
     pub open: &'a dyn Fn() -> io::Result<Box<dyn Read>>,
 }
 
-/// What is taken for true about the readings beside what their file says.
+/// Assumptions for what a file does not contain.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Taken {
-    /// SHA-256 of the file, hexadecimal; made by [`Source::examine`].
+    /// SHA-256 of the file, hexadecimal; set by [`Source::examine`].
     pub sha256: String,
-    /// Where the robot stands, as far as the file does not say.
+    /// Pose of the robot, for the parts missing in the file.
     pub pose: Pose,
-    /// The rangers of a file that has many and does not say where they are.
+    /// Array, for files with several ranges per row or message and without ranger positions.
     pub array: Option<RangerArray>,
-    /// The sensor's name.
+    /// Name of the sensor.
     pub sensor: String,
-    /// The longest range of the sensor, metres.
+    /// Maximum range of the sensor, metres.
     pub longest_m: f64,
-    /// The least range of the sensor, by its shortest blanking, metres.
+    /// Minimum range of the sensor at its shortest blanking, metres.
     pub least_m: f64,
-    /// The air, as far as the file does not say.
+    /// Air, for files without temperature.
     pub air: Air,
-    /// When scans were taken whose file does not say it.
+    /// Start time, for files without times.
     pub started: Timestamp,
-    /// Take the numbers as they are said to be, whatever speaks against it.
+    /// True to skip the plausibility checks of units and no-echo values.
     pub as_said: bool,
 }
 
-/// A file that was looked through, and what it holds.
+/// Examined file with its complete mapping.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Imported {
-    /// Its format.
+    /// Detected or requested format.
     pub format: Format,
-    /// The meaning of its columns, guessed ones included.
+    /// Complete mapping, including inferred columns.
     pub mapping: Mapping,
-    /// Whether they were guessed.
+    /// True if the columns were inferred from their names.
     pub guessed: bool,
-    /// What is taken for true, with the file's hash, and its array if it has one.
+    /// Assumptions, completed with the file's hash and its array.
     pub taken: Taken,
-    /// Its readings.
+    /// Number of readings in the file.
     pub readings: u64,
-    /// Those with a range.
+    /// Number of readings with a range.
     pub echoes: u64,
-    /// Whether it says where the robot stood.
+    /// True if the file contains poses.
     pub has_poses: bool,
-    /// Notes on assumptions and on what was left out, a line each.
+    /// Notes on assumptions and skipped content, one line each.
     pub notes: Vec<String>,
     pub(crate) encoding: &'static Encoding,
-    pub(crate) header: Option<Header>,
-    /// The first bytes of a text, which show how it is written.
+    pub(crate) header: Option<TableLayout>,
+    /// True for JSON, by the first character.
     pub(crate) is_json: bool,
-    /// The devices of a robot's log that are read.
-    pub(crate) chosen: Chosen,
-    /// The frames and topics of a recording.
+    /// Devices selected from a robot's log.
+    pub(crate) devices: SelectedDevices,
+    /// Frames and topics of a recording.
     pub(crate) bag: Option<Bag>,
 }
 
 impl Source<'_> {
-    /// Reads the whole file: what it is, whether each line can be read, and whether its numbers are what the mapping
-    /// says.
+    /// Reads the whole file: detects its format, parses every line, and checks that its values are
+    /// plausible for the mapping.
     ///
     /// # Errors
-    /// The first place that is wrong, or what speaks against the mapping, with the option that resolves it.
-    pub fn examine(&self, mapping: Mapping, taken: Taken) -> Result<Imported, ImportError> {
-        let survey = Survey::of((self.open)()?)?;
+    /// Returns the first invalid value, or the evidence against the mapping, with the option that
+    /// resolves it.
+    pub fn examine(&self, mapping: Mapping, assumptions: Taken) -> Result<Imported, ImportError> {
+        let survey = Survey::read((self.open)()?)?;
         let (encoding, head) = self.text(&survey, &mapping)?;
         let format = mapping.format.unwrap_or_else(|| Format::detect(&survey.head, &head));
         let entry = format.entry();
@@ -98,7 +99,7 @@ impl Source<'_> {
             format,
             guessed: mapping.columns.is_empty(),
             mapping: Mapping { format: Some(format), ..mapping },
-            taken: Taken { sha256: survey.sha256.clone(), ..taken },
+            taken: Taken { sha256: survey.sha256.clone(), ..assumptions },
             readings: 0,
             echoes: 0,
             has_poses: false,
@@ -106,22 +107,22 @@ impl Source<'_> {
             encoding,
             header: None,
             is_json: head.trim_start().starts_with(['{', '[']),
-            chosen: Chosen::default(),
+            devices: SelectedDevices::default(),
             bag: None,
         };
-        if encoding != UTF_8 && !matches!(entry.kind, Kind::Recording) {
+        if encoding != UTF_8 && !matches!(entry.kind, FormatKind::Recording) {
             found.notes.push(format!("the text is {}", encoding.name()));
         }
         match entry.kind {
-            Kind::Rows => self.examine_rows(&survey, &head, &mut found)?,
-            Kind::RosText => self.examine_ros_text(&mut found)?,
-            Kind::Lines(read) => self.examine_lines(read, &mut found)?,
-            Kind::Recording => self.examine_recording(&mut found)?,
+            FormatKind::Rows => self.examine_rows(&survey, &head, &mut found)?,
+            FormatKind::RosText => self.examine_ros_text(&mut found)?,
+            FormatKind::Lines(read) => self.examine_lines(read, &mut found)?,
+            FormatKind::Recording => self.examine_recording(&mut found)?,
         }
         Ok(found)
     }
 
-    /// Encoding and beginning of a text; of a recording an empty one.
+    /// Returns the encoding and the beginning of a text; an empty text for a recording.
     fn text(
         &self,
         survey: &Survey,
@@ -134,7 +135,7 @@ impl Source<'_> {
         if let Some(label) = &mapping.encoding {
             let encoding = Encoding::for_label(label.as_bytes()).ok_or_else(|| {
                 ImportError::mapping(
-                    format!("there is no encoding `{label}`"),
+                    format!("unknown encoding `{label}`"),
                     "give utf-8, utf-16le, utf-16be or latin1",
                 )
             })?;
@@ -142,16 +143,16 @@ impl Source<'_> {
             return Ok((encoding, text::head(survey, encoding)));
         }
         let Some(encoding) = survey.encoding() else {
-            return Err(format::foreign(&survey.head, "").unwrap_or_else(|| {
+            return Err(format::unsupported(&survey.head, "").unwrap_or_else(|| {
                 ImportError::mapping(
-                    "it is no text: it has bytes that no text has",
-                    "give a text, or a recording; a text of an encoding that was not found: --encoding NAME",
+                    "not a text file: it contains control characters",
+                    "give a text file or a recording; if the encoding was not detected: --encoding NAME",
                 )
             }));
         };
         check_supported(encoding)?;
         let head = text::head(survey, encoding);
-        match format::foreign(&survey.head, &head).filter(|_| mapping.format.is_none()) {
+        match format::unsupported(&survey.head, &head).filter(|_| mapping.format.is_none()) {
             Some(error) => Err(error),
             None => Ok((encoding, head)),
         }
@@ -160,36 +161,47 @@ impl Source<'_> {
     fn examine_recording(&self, found: &mut Imported) -> Result<(), ImportError> {
         if found.taken.array.is_some() {
             return Err(ImportError::mapping(
-                "a recording states the places of its rangers",
+                "a recording contains the positions of its rangers",
                 "leave --array out",
             ));
         }
-        let bag = Bag::look(self.open, &found.mapping, &found.taken)?;
+        let bag = Bag::survey(self.open, &found.mapping, &found.taken)?;
         found.guessed = false;
         found.has_poses = bag.has_poses;
         found.taken.array = bag.array(&found.taken.sensor);
         if let Some(array) = &found.taken.array {
             array.check().map_err(|error| {
-                ImportError::mapping(format!("its rangers: {error}"), "choose some: --topic TOPIC")
+                ImportError::mapping(
+                    format!("rangers of the recording: {error}"),
+                    "select some: --topic TOPIC",
+                )
             })?;
         }
-        let across = if found.taken.array.is_some() { Across::Rangers } else { Across::Angles };
-        let ways =
-            Ways { mapping: &found.mapping, names: &[], has_columns: false, zero_is_no_echo: true };
-        let mut ranges = Ranges::new(across);
-        let notes = bag.examine(self.open, (&ways, &found.taken), &mut ranges)?;
+        let direction_kind = if found.taken.array.is_some() {
+            DirectionKind::Rangers
+        } else {
+            DirectionKind::Angles
+        };
+        let units = UnitContext {
+            mapping: &found.mapping,
+            names: &[],
+            has_columns: false,
+            zero_is_no_echo: true,
+        };
+        let mut ranges = RangeStats::new(direction_kind);
+        let notes = bag.examine(self.open, (&units, &found.taken), &mut ranges)?;
         found.notes.extend(notes);
-        found.notes.extend(ranges.check(&ways, &found.taken)?);
+        found.notes.extend(ranges.check(&units, &found.taken)?);
         (found.readings, found.echoes) = (ranges.readings, ranges.echoes);
         found.bag = Some(bag);
         Ok(())
     }
 }
 
-/// SHA-256 of all bytes of a file, in hexadecimal digits.
+/// Computes the SHA-256 of a file, in hexadecimal digits.
 ///
 /// # Errors
-/// It can't be read.
+/// Returns an error if reading fails.
 pub fn digest(mut source: impl Read) -> io::Result<String> {
     let mut hash = Sha256::new();
     let mut piece = vec![0; 1 << 16];
@@ -203,29 +215,29 @@ pub fn digest(mut source: impl Read) -> io::Result<String> {
     }
 }
 
-/// Records of a scan, or what is wrong.
-pub(crate) type Scan = Result<Vec<Record>, ImportError>;
+/// Records of one scan.
+pub(crate) type ScanRecords = Result<Vec<Record>, ImportError>;
 
 impl Imported {
-    /// The text of the file as UTF-8.
+    /// Decodes the text of the file to UTF-8.
     pub(crate) fn decoded<'a>(&self, source: impl Read + 'a) -> Box<dyn Read + 'a> {
         Box::new(encoding::decoded(source, self.encoding))
     }
 
-    /// The records of each scan, one after the other; `source` is the file again.
+    /// Returns the records of each scan in turn; `source` is the examined file, opened again.
     ///
     /// # Errors
-    /// It can't be read, or is another file than before.
+    /// Returns an error if reading fails, or if the file has changed since it was examined.
     pub fn scans<'a>(
         &'a self,
         source: impl Read + 'a,
-    ) -> Result<Box<dyn Iterator<Item = Scan> + 'a>, ImportError> {
+    ) -> Result<Box<dyn Iterator<Item = ScanRecords> + 'a>, ImportError> {
         match self.format.entry().kind {
-            Kind::Rows if self.is_of_array() => self.rounds_of_rows(source),
-            Kind::Rows => self.scans_of_rows(source),
-            Kind::RosText => self.scans_of_messages(source),
-            Kind::Lines(read) => self.rounds_of_lines(read, source),
-            Kind::Recording => match &self.bag {
+            FormatKind::Rows if self.is_of_array() => self.rounds_of_rows(source),
+            FormatKind::Rows => self.scans_of_rows(source),
+            FormatKind::RosText => self.scans_of_messages(source),
+            FormatKind::Lines(read) => self.rounds_of_lines(read, source),
+            FormatKind::Recording => match &self.bag {
                 Some(bag) => Ok(Box::new(bag.scans(source, &self.mapping, &self.taken)?)),
                 None => Ok(Box::new(std::iter::empty())),
             },
@@ -233,13 +245,13 @@ impl Imported {
     }
 }
 
-/// Rejects a text that this build does not decode.
+/// Rejects an encoding that this build does not decode.
 fn check_supported(encoding: &'static Encoding) -> Result<(), ImportError> {
     if encoding::is_supported(encoding) {
         return Ok(());
     }
     Err(ImportError::mapping(
-        format!("the text is {}, and this build reads UTF-8 alone", encoding.name()),
+        format!("the text is {}, but this build reads only UTF-8", encoding.name()),
         "convert it with `sonard import`, or save it as UTF-8",
     ))
 }

@@ -1,4 +1,4 @@
-//! Tables of text: comma separated values and their kin (RFC 4180 and what programs make of it).
+//! Text tables: comma separated values (RFC 4180) and the variants that programs write.
 
 use std::io::Read;
 
@@ -6,92 +6,96 @@ use csv::{ReaderBuilder, StringRecord, Trim};
 
 use crate::{
     Column, ImportError, Location, Mapping, Row,
-    layout::{Between, Header},
-    lines::{Ends, Line, Lines},
+    layout::{Separator, TableLayout},
+    lines::{LineEnding, LineReader, TextLine},
 };
 
-/// Rows of a table, and what was found wrong with it on the way.
+/// Irregular rows of a table.
 #[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Raggedness {
-    /// Rows that lack columns which the mapping does not use.
+pub(crate) struct RowFaults {
+    /// Number of rows that lack columns which the mapping does not use.
     pub(crate) short: u64,
-    /// The last row, which has no end and lacks a column.
+    /// Last row, if it is unterminated and lacks a mapped column.
     pub(crate) cut: Option<Location>,
 }
 
-/// The rows of a table, with the values of the mapping's columns in its order.
-pub(crate) struct Rows<R> {
-    lines: Lines<R>,
-    header: Header,
-    /// Places of the mapping's columns, from 0, in its order.
+/// Iterator over the rows of a table, with the cells of the mapped columns in mapping order.
+pub(crate) struct TableRows<R> {
+    lines: LineReader<R>,
+    layout: TableLayout,
+    /// Indices of the mapped columns, from 0, in mapping order.
     places: Vec<Vec<usize>>,
-    is_behind_names: bool,
+    has_passed_names: bool,
     to_skip: u64,
-    pub(crate) raggedness: Raggedness,
+    pub(crate) faults: RowFaults,
 }
 
-impl<R: Read> Rows<R> {
+impl<R: Read> TableRows<R> {
     /// # Errors
-    /// The header has not the mapping's columns.
-    pub(crate) fn of(source: R, header: &Header, mapping: &Mapping) -> Result<Self, ImportError> {
+    /// Returns an error if the table lacks a mapped column.
+    pub(crate) fn new(
+        source: R,
+        layout: &TableLayout,
+        mapping: &Mapping,
+    ) -> Result<Self, ImportError> {
         let places = mapping.columns.values().map(|column| match column {
             Column::Several(numbers) => {
-                numbers.iter().map(|number| header.find(&Column::Number(*number))).collect()
+                numbers.iter().map(|number| layout.find(&Column::Number(*number))).collect()
             }
-            one => header.find(one).map(|place| vec![place]),
+            column => layout.find(column).map(|index| vec![index]),
         });
         Ok(Self {
-            lines: Lines::of(source, header.ends),
+            lines: LineReader::new(source, layout.ends),
             places: places.collect::<Result<_, _>>()?,
-            header: header.clone(),
-            is_behind_names: !header.has_names || header.is_comment,
-            to_skip: u64::from(header.has_separator_line),
-            raggedness: Raggedness::default(),
+            layout: layout.clone(),
+            has_passed_names: !layout.has_names || layout.is_comment,
+            to_skip: u64::from(layout.has_separator_line),
+            faults: RowFaults::default(),
         })
     }
 
-    fn row(&mut self, line: &Line) -> Result<Option<Row>, ImportError> {
+    fn row(&mut self, line: &TextLine) -> Result<Option<Row>, ImportError> {
         let place = line.place();
         let text = without_comment(&line.text);
-        let cells = split(self.header.between, text)
+        let cells = split(self.layout.separator, text)
             .map_err(|what| ImportError::at(place, what, "correct that line"))?;
-        let columns = self.header.cells.len();
+        let columns = self.layout.cells.len();
         let used = cells.iter().rposition(|cell| !cell.is_empty()).map_or(0, |last| last + 1);
         if used > columns {
-            let what = format!("{used} values, and the table has {columns} columns");
-            let comma = match self.header.between {
-                Between::Byte(b',') => {
+            let what = format!("{used} values, but the table has {columns} columns");
+            let comma = match self.layout.separator {
+                Separator::Byte(b',') => {
                     "; decimal commas need another separator, such as semicolons"
                 }
                 _ => "",
             };
-            let help = format!("are line ends missing? Give a file with a reading a line{comma}");
+            let help = format!("are line ends missing? Give one reading per line{comma}");
             return Err(ImportError::at(place, what, help));
         }
         let lacks = self.places.iter().flatten().any(|place| *place >= cells.len());
-        // A capture of a stream may begin within a record, too.
-        let is_first = self.header.ends == Ends::Stops && line.number == 1;
+        // A captured stream may also begin within a record.
+        let is_first = self.layout.ends == LineEnding::Stops && line.number == 1;
         let is_without = cells.first().is_some_and(String::is_empty);
         if (lacks && (!line.is_ended || is_first)) || (is_without && is_first) {
-            self.raggedness.cut = Some(place);
+            self.faults.cut = Some(place);
             return Ok(None);
         }
         if lacks {
-            let what = format!("{} values, and the table has {columns} columns", cells.len());
+            let what = format!("{} values, but the table has {columns} columns", cells.len());
             return Err(ImportError::at(
                 place,
                 what,
                 "complete that line, or remove it; an empty value is written as two separators",
             ));
         }
-        self.raggedness.short += u64::from(cells.len() < columns);
+        self.faults.short += u64::from(cells.len() < columns);
         let cell = |at: &usize| cells.get(*at).filter(|cell| !cell.is_empty()).cloned();
         let cells = self.places.iter().map(|places| places.iter().map(cell).collect());
         Ok(Some(Row { place, cells: cells.collect() }))
     }
 }
 
-impl<R: Read> Iterator for Rows<R> {
+impl<R: Read> Iterator for TableRows<R> {
     type Item = Result<Row, ImportError>;
 
     fn next(&mut self) -> Option<Self::Item> {
@@ -107,7 +111,7 @@ impl<R: Read> Iterator for Rows<R> {
                 self.to_skip -= 1;
                 continue;
             }
-            if !std::mem::replace(&mut self.is_behind_names, true) {
+            if !std::mem::replace(&mut self.has_passed_names, true) {
                 continue;
             }
             if let Some(row) = self.row(&line).transpose() {
@@ -117,7 +121,7 @@ impl<R: Read> Iterator for Rows<R> {
     }
 }
 
-/// Signs that begin a comment: of shells and Octave, of MATLAB, of C.
+/// Comment signs of shells and Octave, MATLAB, and C.
 const COMMENTS: [&str; 3] = ["#", "%", "//"];
 
 pub(crate) fn is_comment(line: &str) -> bool {
@@ -125,14 +129,14 @@ pub(crate) fn is_comment(line: &str) -> bool {
     line.is_empty() || COMMENTS.iter().any(|sign| line.starts_with(sign))
 }
 
-/// The text of a comment line, without its sign.
+/// Returns the text of a comment line, without its sign.
 pub(crate) fn comment(line: &str) -> Option<&str> {
     let line = line.trim();
     let sign = COMMENTS.iter().find(|sign| line.starts_with(**sign))?;
     Some(line.trim_start_matches(*sign).trim())
 }
 
-/// A row without the comment behind it.
+/// Removes a trailing comment from a row.
 fn without_comment(line: &str) -> &str {
     let is_start = |at: &usize| {
         let before = line[..*at].chars().next_back();
@@ -142,15 +146,15 @@ fn without_comment(line: &str) -> &str {
     line.get(..begins.into_iter().find(is_start).unwrap_or(line.len())).unwrap_or(line)
 }
 
-/// The values of a line.
-pub(crate) fn split(between: Between, line: &str) -> Result<Vec<String>, String> {
-    match between {
-        Between::Blanks => Ok(line.split_whitespace().map(str::to_owned).collect()),
-        // Most lines have no quotes, and need no parser of them.
-        Between::Byte(byte) if !line.contains('"') => {
+/// Splits a line into its values.
+pub(crate) fn split(separator: Separator, line: &str) -> Result<Vec<String>, String> {
+    match separator {
+        Separator::Blanks => Ok(line.split_whitespace().map(str::to_owned).collect()),
+        // Lines without quotes need no CSV parser.
+        Separator::Byte(byte) if !line.contains('"') => {
             Ok(line.split(char::from(byte)).map(|cell| cell.trim().to_owned()).collect())
         }
-        Between::Byte(byte) => {
+        Separator::Byte(byte) => {
             let mut record = StringRecord::new();
             let mut reader = ReaderBuilder::new()
                 .delimiter(byte)

@@ -1,4 +1,4 @@
-//! Files as people have them.
+//! End-to-end tests of the importer, by kind of file.
 
 mod headers;
 mod messages;
@@ -16,8 +16,8 @@ use sonard_records::{Ping, Record, ScanStart};
 
 use crate::{ImportError, Imported, Mapping, Source, Taken};
 
-/// What is taken for true of a file that says nothing else.
-fn taken() -> Taken {
+/// Assumptions for a file without further information.
+fn assumptions() -> Taken {
     Taken {
         sha256: String::new(),
         pose: Pose { x_m: 1.0, y_m: 2.0, heading_deg: 30.0 },
@@ -31,14 +31,14 @@ fn taken() -> Taken {
     }
 }
 
-fn examine(text: &[u8], mapping: Mapping, taken: Taken) -> Result<Imported, ImportError> {
+fn examine(text: &[u8], mapping: Mapping, assumptions: Taken) -> Result<Imported, ImportError> {
     let open = || -> io::Result<Box<dyn Read>> { Ok(Box::new(Cursor::new(text.to_vec()))) };
-    Source { open: &open }.examine(mapping, taken)
+    Source { open: &open }.examine(mapping, assumptions)
 }
 
-/// Every record of a file.
+/// Imports a file and returns all records.
 fn import(text: &str, mapping: Mapping) -> Result<Vec<Record>, ImportError> {
-    let found = examine(text.as_bytes(), mapping, taken())?;
+    let found = examine(text.as_bytes(), mapping, assumptions())?;
     let scans: Result<Vec<_>, _> = found.scans(text.as_bytes())?.collect();
     Ok(scans?.into_iter().flatten().collect())
 }
@@ -63,8 +63,8 @@ fn starts(records: &[Record]) -> Vec<ScanStart> {
     records.iter().filter_map(start).collect()
 }
 
-/// What an error says, and what it says to do.
-fn said<T: std::fmt::Debug>(result: Result<T, ImportError>) -> String {
+/// Returns message and advice of an error.
+fn error_text<T: std::fmt::Debug>(result: Result<T, ImportError>) -> String {
     let error = result.expect_err("this is wrong");
     format!("{error}; {}", error.help())
 }

@@ -1,4 +1,4 @@
-//! Survey of a file in one pass, and its text as UTF-8 whatever its encoding.
+//! Survey of a file in one pass, with detection of its text encoding.
 
 use std::io::{self, Read};
 
@@ -6,17 +6,17 @@ use sha2::{Digest as _, Sha256};
 
 use crate::encoding::{Encoding, UTF_8, UTF_16BE, UTF_16LE, WINDOWS_1252};
 
-/// Leading bytes of a file that are kept for detection.
+/// Length of the head that is kept for detection.
 const HEAD_BYTES: usize = 64 * 1024;
 
-/// Facts about a whole file, gathered in one pass in constant memory.
+/// Hash, head and encoding of a file, gathered in one pass and constant memory.
 #[derive(Debug)]
 pub(crate) struct Survey {
-    /// SHA-256 of the bytes, hexadecimal.
+    /// SHA-256 of the file, hexadecimal.
     pub(crate) sha256: String,
-    /// The first [`HEAD_BYTES`] of it.
+    /// First [`HEAD_BYTES`] of the file.
     pub(crate) head: Vec<u8>,
-    /// Total length, bytes.
+    /// Length of the file.
     pub(crate) bytes: u64,
     is_utf8: bool,
     /// The last four bytes.
@@ -24,7 +24,7 @@ pub(crate) struct Survey {
 }
 
 impl Survey {
-    pub(crate) fn of(mut source: impl Read) -> io::Result<Self> {
+    pub(crate) fn read(mut source: impl Read) -> io::Result<Self> {
         let (mut hash, mut piece) = (Sha256::new(), vec![0; 1 << 16]);
         let mut survey = Self {
             sha256: String::new(),
@@ -33,7 +33,7 @@ impl Survey {
             is_utf8: true,
             tail: Vec::new(),
         };
-        let mut cut = Vec::new();
+        let mut partial = Vec::new();
         loop {
             let count = match source.read(&mut piece) {
                 Ok(0) => break,
@@ -48,18 +48,18 @@ impl Survey {
             survey.head.extend(&read[..count.min(room)]);
             survey.tail.extend(&read[count.saturating_sub(4)..]);
             survey.tail.drain(..survey.tail.len().saturating_sub(4));
-            survey.is_utf8 = survey.is_utf8 && is_utf8(&mut cut, read);
+            survey.is_utf8 = survey.is_utf8 && is_utf8(&mut partial, read);
         }
         survey.sha256 = hexadecimal(hash);
         Ok(survey)
     }
 
-    /// The encoding of a text; `None` for what is no text.
+    /// Returns the encoding of a text; `None` for binary content.
     pub(crate) fn encoding(&self) -> Option<&'static Encoding> {
         if let Some((marked, _)) = Encoding::for_bom(&self.head) {
             return Some(marked);
         }
-        // ASCII in UTF-16 has a zero in every other byte.
+        // ASCII text in UTF-16 has a zero in every second byte.
         let zeros = |from: usize| {
             let bytes = self.head.iter().skip(from).step_by(2);
             let zeros = bytes.filter(|byte| **byte == 0).count();
@@ -78,41 +78,42 @@ impl Survey {
         Some(if self.is_utf8 { UTF_8 } else { WINDOWS_1252 })
     }
 
-    /// Checks whether the last line ends as lines do.
-    pub(crate) fn has_last_end(&self) -> bool {
+    /// Returns `true` if the last line is terminated.
+    pub(crate) fn ends_with_line_end(&self) -> bool {
         let last = self.tail.iter().rev().find(|byte| **byte != 0);
         self.bytes == 0 || matches!(last, Some(b'\n' | b'\r'))
     }
 
-    /// Checks whether more follows behind the head.
+    /// Returns `true` if the file continues after the head.
     pub(crate) fn is_longer_than_head(&self) -> bool {
         self.bytes > self.head.len() as u64
     }
 }
 
-/// Checks whether bytes continue a UTF-8 text; `cut` holds a character that the end of the last piece split.
-fn is_utf8(cut: &mut Vec<u8>, piece: &[u8]) -> bool {
+/// Returns `true` if bytes continue a UTF-8 text; `partial` holds a character split by the end of
+/// the previous piece.
+fn is_utf8(partial: &mut Vec<u8>, piece: &[u8]) -> bool {
     let joined;
-    let bytes = if cut.is_empty() {
+    let bytes = if partial.is_empty() {
         piece
     } else {
-        joined = [cut, piece].concat();
+        joined = [partial, piece].concat();
         &joined
     };
     match std::str::from_utf8(bytes) {
         Ok(_) => {
-            cut.clear();
+            partial.clear();
             true
         }
         Err(error) if error.error_len().is_none() => {
-            *cut = bytes[error.valid_up_to()..].to_vec();
+            *partial = bytes[error.valid_up_to()..].to_vec();
             true
         }
         Err(_) => false,
     }
 }
 
-/// Control characters that no text has. Ctrl-Z ends texts of old systems.
+/// Control characters that do not occur in text. Ctrl-Z terminates texts of old systems.
 const fn is_control(byte: u8) -> bool {
     matches!(byte, 0..=8 | 0x0e..=0x19 | 0x1b..=0x1f | 0x7f)
 }
@@ -121,7 +122,7 @@ pub(crate) fn hexadecimal(hash: Sha256) -> String {
     hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-/// The head of a file as text, without a line that its end cuts.
+/// Decodes the head of a file, without an incomplete last line.
 pub(crate) fn head(survey: &Survey, encoding: &'static Encoding) -> String {
     let (text, _) = encoding.decode_with_bom_removal(&survey.head);
     let whole = match survey.is_longer_than_head() {
@@ -138,12 +139,12 @@ mod tests {
     use crate::encoding::decoded;
 
     fn survey(bytes: &[u8]) -> Survey {
-        Survey::of(bytes).expect("memory is readable")
+        Survey::read(bytes).expect("memory is readable")
     }
 
     #[cfg(feature = "texts")]
     #[test]
-    fn encodings_are_detected_with_and_without_mark() {
+    fn detects_encodings() {
         let text = "angle_deg,distance_cm\n15,31\n16,32\n";
         let wide = |order: fn(u16) -> [u8; 2]| -> Vec<u8> {
             text.encode_utf16().flat_map(order).collect()
@@ -171,14 +172,18 @@ mod tests {
     }
 
     #[test]
-    fn characters_split_between_pieces_are_whole() {
-        let mut cut = Vec::new();
-        assert!(is_utf8(&mut cut, b"a\xc2") && is_utf8(&mut cut, b"\xb0b") && cut.is_empty());
-        assert!(is_utf8(&mut cut, b"\xe2") && !is_utf8(&mut cut, b"ab"));
+    fn joins_characters_split_between_pieces() {
+        let mut partial = Vec::new();
+        assert!(
+            is_utf8(&mut partial, b"a\xc2")
+                && is_utf8(&mut partial, b"\xb0b")
+                && partial.is_empty()
+        );
+        assert!(is_utf8(&mut partial, b"\xe2") && !is_utf8(&mut partial, b"ab"));
     }
 
     #[test]
-    fn the_end_of_the_last_line_is_known_in_every_encoding() {
+    fn finds_the_last_line_end() {
         for (bytes, is_ended) in [
             (&b"1,2\n"[..], true),
             (b"1,2\r", true),
@@ -188,7 +193,7 @@ mod tests {
             (b"\x001\x002", false),
             (b"", true),
         ] {
-            assert_eq!(survey(bytes).has_last_end(), is_ended, "{bytes:?}");
+            assert_eq!(survey(bytes).ends_with_line_end(), is_ended, "{bytes:?}");
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Times as loggers write them: with and without a zone, a date, or a start.
+//! Parsing of times as loggers write them: with or without time zone, date, or a known start.
 
 use jiff::{
     SignedDuration, Timestamp, civil,
@@ -8,60 +8,61 @@ use jiff::{
 
 use crate::{Field, ImportError, Mapping};
 
-/// Times before 2000-01-01 count from the start of a board, seconds since 1970.
+/// Seconds since 1970 below which a time counts from the start of a board: 2000-01-01.
 pub(crate) const MIN_CLOCK_S: f64 = 946_684_800.0;
-/// Counters of 32 bits begin again at this.
+/// Modulus of 32-bit counters.
 const WRAP: f64 = 4_294_967_296.0;
-/// A time of day that is earlier by more than this is one of the next day.
+/// Minimum backward step of a time of day that means the next day.
 const DAY_JUMP: SignedDuration = SignedDuration::from_hours(12);
 
-/// Assumptions that were made about the times of a file.
+/// Counts of assumptions made about the times of a file.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub(crate) struct Assumed {
-    /// Times without a zone.
+pub(crate) struct TimeAssumptions {
+    /// TimeReader without a time zone.
     pub(crate) without_zone: u64,
-    /// Times of day without a date.
+    /// TimeReader of day without a date.
     pub(crate) without_date: u64,
-    /// Counts from the start of a board.
+    /// TimeReader counted from the start of a board.
     pub(crate) from_start: u64,
-    /// Wraps of such a counter at 2^32, and its restarts from zero.
+    /// Wraps of such a counter at 2^32, and restarts from zero.
     pub(crate) wraps: u64,
     pub(crate) restarts: u64,
-    /// Numbers that may be seconds, milliseconds or anything else.
+    /// Numbers without a unit: seconds, milliseconds or anything else.
     pub(crate) without_unit: u64,
 }
 
-/// Reads the times of a file in their order.
+/// Parser of the times of a file, in their order.
 #[derive(Debug)]
-pub(crate) struct Times<'a> {
+pub(crate) struct TimeReader<'a> {
     mapping: &'a Mapping,
     zone: TimeZone,
-    /// Time of the first reading where the file does not say it.
+    /// Time of the first reading, for files without absolute times.
     started: Timestamp,
-    pub(crate) assumed: Assumed,
+    pub(crate) assumed: TimeAssumptions,
     last_clock: Option<civil::DateTime>,
-    /// Counter at the first reading and at the last one, and what restarts have added, seconds.
+    /// First and last counter value, and the parse_utc_offset added for wraps and restarts,
+    /// seconds.
     first_s: Option<f64>,
     last_s: f64,
     added_s: f64,
 }
 
-/// Why a text is no time.
-type Refusal = (String, String);
+/// Description of an invalid time, and format_advice for the user.
+type InvalidTime = (String, String);
 
-impl<'a> Times<'a> {
+impl<'a> TimeReader<'a> {
     /// # Errors
-    /// An offset from UTC that is none.
+    /// Returns an error for an invalid UTC parse_utc_offset.
     pub(crate) fn new(mapping: &'a Mapping, started: Timestamp) -> Result<Self, ImportError> {
         let zone = match &mapping.utc_offset {
-            Some(text) => TimeZone::fixed(offset(text)?),
+            Some(text) => TimeZone::fixed(parse_utc_offset(text)?),
             None => TimeZone::UTC,
         };
         Ok(Self {
             mapping,
             zone,
             started: mapping.started.unwrap_or(started),
-            assumed: Assumed::default(),
+            assumed: TimeAssumptions::default(),
             last_clock: None,
             first_s: None,
             last_s: 0.0,
@@ -69,10 +70,10 @@ impl<'a> Times<'a> {
         })
     }
 
-    /// A time that is written as text; `None` of a number without a unit.
-    pub(crate) fn text(&mut self, cell: &str) -> Result<Option<Timestamp>, Refusal> {
+    /// Parses a time written as text; `None` for a number without a unit.
+    pub(crate) fn parse_text(&mut self, cell: &str) -> Result<Option<Timestamp>, InvalidTime> {
         if let Some(format) = &self.mapping.time_format {
-            return self.by_format(format, cell).map(Some);
+            return self.parse_format(format, cell).map(Some);
         }
         if let Ok(time) = cell.parse::<Timestamp>() {
             return Ok(Some(time));
@@ -89,20 +90,21 @@ impl<'a> Times<'a> {
             (Some(civil), _) => self.local(civil).map(Some),
             (None, Ok(time)) => self.of_day(time).map(Some),
             (None, Err(_)) => Err((
-                format!("`{}` is no time", cell.chars().take(40).collect::<String>()),
-                advice(&cell),
+                format!("`{}` is not a time", cell.chars().take(40).collect::<String>()),
+                format_advice(&cell),
             )),
         }
     }
 
-    /// A number of a unit; `seconds` is the number in seconds.
+    /// Converts a number, scaled to seconds; `field` is the field of the mapping that gives the
+    /// unit.
     pub(crate) fn number(
         &mut self,
         field: Option<Field>,
         seconds: f64,
-    ) -> Result<Timestamp, Refusal> {
+    ) -> Result<Timestamp, InvalidTime> {
         let nanoseconds = if seconds.abs() >= MIN_CLOCK_S {
-            // As many digits as a number of this size has.
+            // Microseconds are the precision of a floating-point number of this size.
             1000 * (seconds * 1e6).round() as i128
         } else {
             let since_s = self.since_start(field, seconds);
@@ -113,7 +115,7 @@ impl<'a> Times<'a> {
         })
     }
 
-    /// Seconds since the first reading of a counter that begins with a board.
+    /// Returns the seconds since the first value of a counter that starts with a board.
     fn since_start(&mut self, field: Option<Field>, seconds: f64) -> f64 {
         self.assumed.from_start += 1;
         let unit_s = match field.and_then(Field::unit) {
@@ -137,7 +139,7 @@ impl<'a> Times<'a> {
         now_s - first_s
     }
 
-    /// A number whose size alone shows its unit, if it does: of the years 2001 to 2286.
+    /// Converts a number whose magnitude reveals its unit: times in the years 2001 to 2286.
     fn plain_number(&mut self, number: f64) -> Option<Timestamp> {
         let unit_s =
             [1.0, 1e-3, 1e-6, 1e-9].into_iter().find(|unit| (1e9..1e10).contains(&(number * unit)));
@@ -149,14 +151,14 @@ impl<'a> Times<'a> {
         time
     }
 
-    fn by_format(&mut self, format: &str, cell: &str) -> Result<Timestamp, Refusal> {
-        let refuse = |error: jiff::Error| {
+    fn parse_format(&mut self, format: &str, cell: &str) -> Result<Timestamp, InvalidTime> {
+        let invalid = |error: jiff::Error| {
             (
                 error.to_string(),
-                "--time-format has the signs of strftime: '%d/%m/%Y %H:%M:%S%.f'".to_owned(),
+                "--time-format takes strftime specifiers: '%d/%m/%Y %H:%M:%S%.f'".to_owned(),
             )
         };
-        let read = strtime::parse(format, cell).map_err(refuse)?;
+        let read = strtime::parse(format, cell).map_err(invalid)?;
         if read.offset().is_some()
             && let Ok(time) = read.to_timestamp()
         {
@@ -165,11 +167,11 @@ impl<'a> Times<'a> {
         match (read.to_datetime(), read.to_time()) {
             (Ok(civil), _) => self.local(civil),
             (Err(_), Ok(time)) => self.of_day(time),
-            (Err(error), Err(_)) => Err(refuse(error)),
+            (Err(error), Err(_)) => Err(invalid(error)),
         }
     }
 
-    fn local(&mut self, civil: civil::DateTime) -> Result<Timestamp, Refusal> {
+    fn local(&mut self, civil: civil::DateTime) -> Result<Timestamp, InvalidTime> {
         self.assumed.without_zone += 1;
         let zoned = civil.to_zoned(self.zone.clone());
         zoned
@@ -177,8 +179,8 @@ impl<'a> Times<'a> {
             .map_err(|error| (error.to_string(), "correct that time".to_owned()))
     }
 
-    /// A time of day, on the day of the start or later.
-    fn of_day(&mut self, time: civil::Time) -> Result<Timestamp, Refusal> {
+    /// Converts a time of day, on the first day or a later one.
+    fn of_day(&mut self, time: civil::Time) -> Result<Timestamp, InvalidTime> {
         self.assumed.without_date += 1;
         let day = match self.last_clock {
             Some(last) => last.date(),
@@ -194,25 +196,28 @@ impl<'a> Times<'a> {
         self.local(civil)
     }
 
-    /// Assumptions that were made, a line each.
+    /// Returns one line for each assumption.
     pub(crate) fn notes(&self) -> Vec<String> {
-        let Assumed { without_zone, without_date, from_start, wraps, restarts, without_unit } =
-            self.assumed;
+        let TimeAssumptions {
+            without_zone,
+            without_date,
+            from_start,
+            wraps,
+            restarts,
+            without_unit,
+        } = self.assumed;
         let mut notes = Vec::new();
         if without_date > 0 {
             let day = self.started.to_zoned(self.zone.clone()).date();
-            let source = if self.mapping.started.is_some() {
-                "as --started says"
-            } else {
-                "the file's date"
-            };
+            let source =
+                if self.mapping.started.is_some() { "--started" } else { "the file's date" };
             notes.push(format!(
-                "times have no date: the first is of {day}, {source}; --started TIME gives another"
+                "times have no date: first day taken as {day} ({source}); change it with --started TIME"
             ));
         }
         if without_zone > 0 && self.mapping.utc_offset.is_none() {
             notes.push(
-                "times have no zone: taken as UTC; --utc-offset +01:00 gives another".to_owned(),
+                "times have no time zone: taken as UTC; change it with --utc-parse_utc_offset +01:00".to_owned(),
             );
         }
         if from_start > 0 {
@@ -224,27 +229,27 @@ impl<'a> Times<'a> {
             };
             let restarts = match restarts {
                 0 => String::new(),
-                count => format!("; it restarts {count} times, and the time between is not known"),
+                count => format!("; {count} restarts of unknown duration"),
             };
             notes.push(format!(
-                "times count from the start of the board (or a simulation), not from 1970: the first is taken as {} ({source}){wraps}{restarts}; \
-                 --started TIME gives another",
+                "times count from the start of the board (or a simulation), not from 1970: first time taken as {} ({source}){wraps}{restarts}; \
+                                 change it with --started TIME",
                 self.started
             ));
         }
         if without_unit > 0 {
             notes.push(format!(
-                "{without_unit} times have no unit and are left out: name the column time_s, time_ms or time_us with --columns"
+                "{without_unit} times without unit skipped: map the column as time_s, time_ms or time_us with --columns"
             ));
         }
         notes
     }
 }
 
-/// A counter that falls back by less than this is merely out of order, seconds.
+/// Backward step below which a counter is out of order instead of restarted.
 const RESTART_S: f64 = 0.5;
 
-/// Forms of local times that mean one thing only.
+/// Unambiguous formats of local times.
 const CIVIL: [&str; 10] = [
     "%d.%m.%Y %H:%M:%S%.f",
     "%d.%m.%Y %H:%M",
@@ -258,7 +263,7 @@ const CIVIL: [&str; 10] = [
     "%a %b %e %H:%M:%S %Y",
 ];
 
-/// With a point before the fraction of seconds.
+/// Replaces a decimal comma of the seconds by a point.
 fn with_point(cell: &str) -> String {
     match cell.rsplit_once(',') {
         Some((whole, fraction))
@@ -272,8 +277,8 @@ fn with_point(cell: &str) -> String {
     }
 }
 
-/// The way in for a time that may mean several.
-fn advice(cell: &str) -> String {
+/// Returns format_advice for a time that is ambiguous or not recognized.
+fn format_advice(cell: &str) -> String {
     if cell.contains('/') {
         let clock = match (cell.to_uppercase().ends_with('M'), cell.matches(':').count()) {
             (true, 2..) => " %I:%M:%S%.f %p",
@@ -288,21 +293,20 @@ fn advice(cell: &str) -> String {
             "%y"
         };
         return format!(
-            "choose: --time-format '%d/%m/{year}{clock}' for the day, --time-format '%m/%d/{year}{clock}' for \
-             the month"
+            "choose: --time-format '%d/%m/{year}{clock}' (day first) or --time-format '%m/%d/{year}{clock}' (month first)"
         );
     }
-    "write it as in 2026-01-31T12:00:00Z, give its form with --time-format '%d.%m.%Y %H:%M:%S', or name a column time_s \
-     for seconds"
+    "write it as 2026-01-31T12:00:00Z, give its format with --time-format '%d.%m.%Y %H:%M:%S', or map a column of \
+         seconds as time_s"
         .to_owned()
 }
 
-/// `+01:00`, `-0330`, `Z`, or hours.
-fn offset(text: &str) -> Result<Offset, ImportError> {
-    let refuse = || {
+/// Parses `+01:00`, `-0330`, `Z`, or hours.
+fn parse_utc_offset(text: &str) -> Result<Offset, ImportError> {
+    let invalid = || {
         ImportError::mapping(
-            format!("`{text}` is no offset from UTC"),
-            "write it as in --utc-offset +01:00",
+            format!("`{text}` is not a UTC parse_utc_offset"),
+            "write it as --utc-parse_utc_offset +01:00",
         )
     };
     let plain: String = text.trim().chars().filter(|c| *c != ':').collect();
@@ -315,12 +319,12 @@ fn offset(text: &str) -> Result<Offset, ImportError> {
         _ => (1, plain.as_str()),
     };
     if digits.is_empty() || digits.len() > 4 || !digits.bytes().all(|byte| byte.is_ascii_digit()) {
-        return Err(refuse());
+        return Err(invalid());
     }
-    let number: i32 = digits.parse().map_err(|_| refuse())?;
+    let number: i32 = digits.parse().map_err(|_| invalid())?;
     let (hours, minutes) =
         if digits.len() > 2 { (number / 100, number % 100) } else { (number, 0) };
-    Offset::from_seconds(sign * (hours * 3600 + minutes * 60)).map_err(|_| refuse())
+    Offset::from_seconds(sign * (hours * 3600 + minutes * 60)).map_err(|_| invalid())
 }
 
 #[cfg(test)]
@@ -330,8 +334,9 @@ mod tests {
     const STARTED: &str = "2026-11-27T08:00:00Z";
 
     fn read(mapping: &Mapping, cells: &[&str]) -> (Vec<String>, String) {
-        let mut times = Times::new(mapping, STARTED.parse().expect("a time")).expect("an offset");
-        let read = cells.iter().map(|cell| match times.text(cell) {
+        let mut times = TimeReader::new(mapping, STARTED.parse().expect("a time"))
+            .expect("an parse_utc_offset");
+        let read = cells.iter().map(|cell| match times.parse_text(cell) {
             Ok(Some(time)) => time.to_string(),
             Ok(None) => "-".to_owned(),
             Err((what, help)) => format!("{what}; {help}"),
@@ -341,7 +346,7 @@ mod tests {
     }
 
     #[test]
-    fn local_times_are_read_and_the_zone_named() {
+    fn reads_local_times() {
         let plain = Mapping::default();
         for (cell, time) in [
             ("2026-01-31T12:00:00Z", "2026-01-31T12:00:00Z"),
@@ -366,7 +371,7 @@ mod tests {
     }
 
     #[test]
-    fn times_of_day_are_of_the_start_and_the_days_after() {
+    fn reads_times_of_day() {
         let (read, notes) = read(&Mapping::default(), &["23:59:58.5", "23:59:59", "00:00:01"]);
         let expected = ["2026-11-27T23:59:58.5Z", "2026-11-27T23:59:59Z", "2026-11-28T00:00:01Z"];
         assert_eq!(read, expected);
@@ -379,15 +384,15 @@ mod tests {
     }
 
     #[test]
-    fn dates_that_may_mean_two_are_asked_about_and_the_answer_reads_them() {
+    fn rejects_ambiguous_dates() {
         for (cell, day_first) in [
             ("01/02/2026 12:00:00", "2026-02-01T12:00:00Z"),
             ("01/02/26 12:00", "2026-02-01T12:00:00Z"),
             ("01/02/2026 01:30:00 PM", "2026-02-01T13:30:00Z"),
         ] {
-            let (said, _) = read(&Mapping::default(), &[cell]);
-            let formats: Vec<&str> = said[0].split('\'').skip(1).step_by(2).collect();
-            let [first, second] = formats[..] else { panic!("{said:?}") };
+            let (message, _) = read(&Mapping::default(), &[cell]);
+            let formats: Vec<&str> = message[0].split('\'').skip(1).step_by(2).collect();
+            let [first, second] = formats[..] else { panic!("{message:?}") };
             let by = |format: &str| Mapping {
                 time_format: Some(format.to_owned()),
                 ..Mapping::default()
@@ -398,9 +403,10 @@ mod tests {
     }
 
     #[test]
-    fn counters_of_boards_count_from_the_start_and_wrap() {
+    fn counters_wrap_and_restart() {
         let mapping = Mapping::default();
-        let mut times = Times::new(&mapping, STARTED.parse().expect("a time")).expect("an offset");
+        let mut times = TimeReader::new(&mapping, STARTED.parse().expect("a time"))
+            .expect("an parse_utc_offset");
         let field = Field::named("time_ms");
         let read = [4_294_967_000.0, 4_294_967_200.0, 104.0, 304.0, 100_304.0, 4.0, 1004.0];
         let read =
@@ -416,9 +422,9 @@ mod tests {
     }
 
     #[test]
-    fn numbers_without_unit_are_left_out_and_counted() {
+    fn skips_numbers_without_unit() {
         let (read, notes) = read(&Mapping::default(), &["1350", "1400"]);
         assert_eq!(read, ["-", "-"]);
-        assert!(notes.contains("2 times have no unit"), "{notes}");
+        assert!(notes.contains("2 times without unit"), "{notes}");
     }
 }

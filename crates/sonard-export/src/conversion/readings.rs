@@ -1,4 +1,4 @@
-//! What messages say of the readings of a scan.
+//! Conversion of readings to points, laser scans and path markers.
 
 use std::collections::BTreeMap;
 
@@ -7,79 +7,79 @@ use sonard_model::{acoustics::BeamPattern, viewpoint::Viewpoint};
 use sonard_records::{PathKind, Ping, PingStatus, Point, ScanView, Session};
 
 use super::{
-    frames::Frames,
+    frames::RangerFrames,
     settings::{Profile, Settings},
 };
 use crate::{
     LeftOut,
-    ros::message::{Header, LaserScan, Marker, PointCloud, PointNumber, Shape, Stamp},
+    ros::message::{Header, LaserScan, Marker, MarkerShape, PointCloud, PointNumber, Stamp},
 };
 
-/// What holds for all readings of a session.
+/// Parameters shared by all readings of a session.
 #[derive(Debug)]
-pub(super) struct Figures {
-    pub(super) frames: Frames,
+pub(super) struct SessionParameters {
+    pub(super) frames: RangerFrames,
     pub(super) min_range_m: f64,
     pub(super) max_range_m: f64,
     pub(super) field_of_view_rad: f64,
-    /// Of the longest path that is listened for, nanoseconds.
+    /// Duration of the receive window, nanoseconds.
     pub(super) window_ns: u64,
 }
 
-/// Two-way the beam is 6 dB down where the transducer's own pattern is 3 dB down.
+/// One-way amplitude at which the two-way beam is 6 dB down and the transducer's own pattern 3 dB.
 const HALF_POWER: f64 = 0.707_945_784_384_138;
 
-impl Figures {
-    pub(super) fn of(session: &Session, settings: &Settings) -> Result<Self, LeftOut> {
+impl SessionParameters {
+    pub(super) fn new(session: &Session, settings: &Settings) -> Result<Self, LeftOut> {
         let extents =
             Extents::of_session(session).map_err(|error| LeftOut::Session(error.to_string()))?;
         let speed_m_s = session.air.sound_speed_m_s;
         let by_beam = || 2.0 * BeamPattern::new(&session.sensor, speed_m_s).angle_at(HALF_POWER);
-        let asked = settings.field_of_view_deg.map(f64::to_radians);
+        let requested = settings.field_of_view_deg.map(f64::to_radians);
         let window_ns = 2.0 * extents.max_range_m / speed_m_s * 1e9;
         Ok(Self {
-            frames: Frames::of(session, &settings.frame),
+            frames: RangerFrames::new(session, &settings.frame),
             min_range_m: extents.min_range_m,
             max_range_m: extents.max_range_m,
-            field_of_view_rad: asked.unwrap_or_else(by_beam),
+            field_of_view_rad: requested.unwrap_or_else(by_beam),
             window_ns: window_ns as u64,
         })
     }
 
-    /// What a `Range` says of a reading; `None` where there is nothing that it could say.
-    pub(super) fn range(&self, profile: Profile, heard: Heard) -> Option<f32> {
-        let [silent, near] = match profile {
+    /// Returns the value of a `Range` message; `None` for a reading without a valid measurement.
+    pub(super) fn range(&self, profile: Profile, reading: RangeReading) -> Option<f32> {
+        let [no_echo, too_near] = match profile {
             Profile::Rep117 => [f32::INFINITY, f32::NEG_INFINITY],
             Profile::Nav2 => [self.max_range_m as f32, self.min_range_m as f32],
         };
-        match heard.status {
-            PingStatus::Echo => heard.range_m.map(|range_m| range_m as f32),
-            PingStatus::NoEcho => Some(silent),
-            PingStatus::MinRange => Some(near),
+        match reading.status {
+            PingStatus::Echo => reading.range_m.map(|range_m| range_m as f32),
+            PingStatus::NoEcho => Some(no_echo),
+            PingStatus::MinRange => Some(too_near),
             PingStatus::LinkLost | PingStatus::StepDoubtful | PingStatus::ModuleFault => None,
         }
     }
 }
 
-/// When the readings of a scan were fired.
+/// Firing times of the readings of a scan.
 #[derive(Debug)]
-pub(crate) struct Firings {
-    /// Of each reading; of one that never was, none.
+pub(crate) struct FiringTimes {
+    /// Time of each reading; `None` if it was never fired.
     pub(crate) fired: Vec<Option<Stamp>>,
-    /// How long each listened, nanoseconds.
+    /// Duration of the receive window, nanoseconds.
     pub(crate) window_ns: u64,
 }
 
-/// What was heard, or is predicted to be.
+/// Measured or predicted range.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Heard {
+pub(super) struct RangeReading {
     status: PingStatus,
     range_m: Option<f64>,
     margin_db: Option<f64>,
     order: Option<u32>,
 }
 
-impl Heard {
+impl RangeReading {
     pub(super) fn measured(ping: &Ping) -> Self {
         let Ping { status, range_m, margin_db, .. } = *ping;
         let order = ping.sound_path().map(|path| path.order);
@@ -97,13 +97,13 @@ impl Heard {
     }
 }
 
-/// The readings of a scan in the order of the plan. Of one that was measured again the last counts.
-pub(crate) fn in_order(scan: &ScanView) -> Vec<&Ping> {
+/// Returns the readings of a scan in plan order; the last measurement of a repeated reading wins.
+pub(crate) fn plan_order(scan: &ScanView) -> Vec<&Ping> {
     let by_index: BTreeMap<u32, &Ping> = scan.pings.iter().map(|ping| (ping.index, ping)).collect();
     by_index.into_values().collect()
 }
 
-/// The fields of the points of a cloud.
+/// Point fields of a `PointCloud2`.
 pub(super) const POINT_FIELDS: &[(&str, PointNumber)] = &[
     ("x", PointNumber::F32),
     ("y", PointNumber::F32),
@@ -117,27 +117,27 @@ pub(super) const POINT_FIELDS: &[(&str, PointNumber)] = &[
     ("confidence", PointNumber::F32),
 ];
 
-/// The echoes of a scan as points straight ahead of the transducer.
+/// Builds a cloud of the echoes, at their range along the beam axis.
 pub(super) fn points<'a>(
     scan: &ScanView,
-    (pings, firings): (&[&Ping], &Firings),
+    (pings, firings): (&[&Ping], &FiringTimes),
     header: Header<'a>,
-    heard: impl Fn(&Ping) -> Option<Heard>,
+    reading: impl Fn(&Ping) -> Option<RangeReading>,
 ) -> PointCloud<'a> {
     let mut data = Vec::new();
     for (ping, fired) in pings.iter().zip(&firings.fired) {
-        let Some((heard, fired)) = heard(ping).zip(*fired) else { continue };
-        let Some((range_m, from)) = heard.echo_m().zip(scan.viewpoint(ping)) else { continue };
+        let Some((reading, fired)) = reading(ping).zip(*fired) else { continue };
+        let Some((range_m, from)) = reading.echo_m().zip(scan.viewpoint(ping)) else { continue };
         let [x, y, z] = ahead(&from, range_m);
         let time_s = fired.0.saturating_sub(header.stamp.0) as f64 * 1e-9;
         let or_nan = |value: Option<f64>| value.unwrap_or(f64::NAN) as f32;
         for value in
-            [x as f32, y as f32, z as f32, or_nan(heard.margin_db), range_m as f32, time_s as f32]
+            [x as f32, y as f32, z as f32, or_nan(reading.margin_db), range_m as f32, time_s as f32]
         {
             data.extend(value.to_le_bytes());
         }
         data.extend(ping.index.to_le_bytes());
-        data.extend(heard.order.map_or(-1, u32::cast_signed).to_le_bytes());
+        data.extend(reading.order.map_or(-1, u32::cast_signed).to_le_bytes());
         data.extend(or_nan(ping.residual_m).to_le_bytes());
         data.extend(or_nan(ping.confidence).to_le_bytes());
     }
@@ -150,30 +150,33 @@ fn ahead(from: &Viewpoint, range_m: f64) -> [f64; 3] {
     [x, y, from.z_m.unwrap_or(0.0) + range_m * sin]
 }
 
-/// A scan as that of a laser at the middle of the stepper's axis; `None` of scans that have no such form: of arrays, of a
-/// face beside its axis or tilted, with several firings a stop, or in directions that are not evenly apart.
+/// Builds a `LaserScan` about the axis of the stepper.
+///
+/// Returns `None` for scans without this form: of arrays, of faces off the axis or tilted, with
+/// several firings per stop, or with uneven directions.
 pub(super) fn laser_scan<'a>(
     scan: &ScanView,
-    (pings, firings): (&[&Ping], &Firings),
-    figures: &'a Figures,
+    (pings, firings): (&[&Ping], &FiringTimes),
+    parameters: &'a SessionParameters,
     stamp: Stamp,
 ) -> Option<LaserScan<'a>> {
     let session = scan.session.as_ref()?;
     let plan = scan.start.as_ref()?.plan;
-    let has_form =
+    let is_planar =
         !scan.is_of_array() && scan.has_one_place() && session.sensor.mounting.tilt_deg == 0.0;
-    if !has_form || plan.check().is_err() || plan.pings_per_stop != 1 {
+    if !is_planar || plan.check().is_err() || plan.pings_per_stop != 1 {
         return None;
     }
     let mut ranges = vec![f32::NAN; plan.beams() as usize];
     let simulated = pings.iter().any(|ping| ping.margin_db.is_some());
     let mut intensities = vec![0.0; if simulated { ranges.len() } else { 0 }];
     for ping in pings {
-        let even =
+        let is_even =
             sonard_model::geometry::wrap_180(plan.azimuth_deg(ping.index) - ping.azimuth_deg).abs()
                 < SAME_DEG;
-        let range = ranges.get_mut(ping.index as usize).filter(|_| even)?;
-        *range = figures.range(Profile::Rep117, Heard::measured(ping)).unwrap_or(f32::NAN);
+        let range = ranges.get_mut(ping.index as usize).filter(|_| is_even)?;
+        *range =
+            parameters.range(Profile::Rep117, RangeReading::measured(ping)).unwrap_or(f32::NAN);
         if let Some(intensity) = intensities.get_mut(ping.index as usize) {
             *intensity = ping.margin_db.unwrap_or(0.0) as f32;
         }
@@ -182,32 +185,33 @@ pub(super) fn laser_scan<'a>(
     let last_rad =
         plan.from_deg.to_radians() + step_rad * f64::from(plan.beams().saturating_sub(1));
     Some(LaserScan {
-        header: Header { stamp, frame: &figures.frames.mount },
+        header: Header { stamp, frame: &parameters.frames.mount },
         angles: [plan.from_deg.to_radians() as f32, last_rad as f32, step_rad as f32],
         times: times(pings, firings),
-        range_limits: [figures.min_range_m as f32, figures.max_range_m as f32],
+        range_limits: [parameters.min_range_m as f32, parameters.max_range_m as f32],
         ranges,
         intensities,
     })
 }
 
-/// Directions closer than this are one, degrees.
+/// Tolerance for equal directions, degrees.
 const SAME_DEG: f64 = 1e-3;
 
-/// From one firing to the next on the average, and from the first to the end of the last's window, seconds.
-fn times(pings: &[&Ping], firings: &Firings) -> [f32; 2] {
+/// Returns the mean time between firings, and the time from the first firing to the end of the last
+/// window, seconds.
+fn times(pings: &[&Ping], firings: &FiringTimes) -> [f32; 2] {
     let fired = pings
         .iter()
         .zip(&firings.fired)
         .filter_map(|(ping, fired)| Some((ping.index, fired.as_ref()?.0)));
     let (first, last) = (fired.clone().min(), fired.max());
-    let Some(((from, began), (to, ended))) = first.zip(last) else { return [0.0; 2] };
-    let gone_s = ended.saturating_sub(began) as f64 * 1e-9;
-    let apart_s = if to > from { gone_s / f64::from(to - from) } else { 0.0 };
-    [apart_s as f32, (gone_s + firings.window_ns as f64 * 1e-9) as f32]
+    let Some(((from, start), (to, end))) = first.zip(last) else { return [0.0; 2] };
+    let elapsed_s = end.saturating_sub(start) as f64 * 1e-9;
+    let interval_s = if to > from { elapsed_s / f64::from(to - from) } else { 0.0 };
+    [interval_s as f32, (elapsed_s + firings.window_ns as f64 * 1e-9) as f32]
 }
 
-/// How a path of each kind is drawn: its name, and red, green and blue.
+/// Namespace and colour (red, green, blue) of each kind of path.
 const PATH_KINDS: [(PathKind, &str, [f32; 3]); 3] = [
     (PathKind::Specular, "specular", [0.0, 0.45, 0.7]),
     (PathKind::Diffracted, "diffracted", [0.84, 0.37, 0.0]),
@@ -217,7 +221,7 @@ const PATH_KINDS: [(PathKind, &str, [f32; 3]); 3] = [
 const PATH_WIDTH_M: f64 = 0.004;
 const PATH_OPACITY: f32 = 0.5;
 
-/// The paths of the sound of all echoes, lines of one kind together.
+/// Builds line markers of the propagation paths of all echoes, one per kind of path.
 pub(super) fn paths<'a>(scan: &ScanView, pings: &[&Ping], header: Header<'a>) -> Vec<Marker<'a>> {
     let lines = PATH_KINDS.map(|(kind, namespace, [red, green, blue])| {
         let mut points = Vec::new();
@@ -228,7 +232,7 @@ pub(super) fn paths<'a>(scan: &ScanView, pings: &[&Ping], header: Header<'a>) ->
         Marker {
             header,
             namespace,
-            shape: Shape::Lines,
+            shape: MarkerShape::Lines,
             width_m: PATH_WIDTH_M,
             colour: [red, green, blue, PATH_OPACITY],
             points,
@@ -237,12 +241,12 @@ pub(super) fn paths<'a>(scan: &ScanView, pings: &[&Ping], header: Header<'a>) ->
     lines.into()
 }
 
-/// The corners of the path of a reading's echo, if it is of this kind and known.
+/// Returns the corners of a reading's propagation path, if it is known and of this kind.
 fn path_of(scan: &ScanView, ping: &Ping, kind: PathKind) -> Option<Vec<[f64; 3]>> {
-    let heard = |status: PingStatus| status.has_range();
-    let own = ping.path.as_ref().filter(|_| heard(ping.status));
+    let has_range = |status: PingStatus| status.has_range();
+    let own = ping.path.as_ref().filter(|_| has_range(ping.status));
     let predicted = || {
-        let sim = ping.sim.as_ref().filter(|sim| heard(sim.status))?;
+        let sim = ping.sim.as_ref().filter(|sim| has_range(sim.status))?;
         sim.path.as_ref()
     };
     let path = own.or_else(predicted).filter(|path| path.kind == kind)?;
@@ -253,6 +257,6 @@ fn path_of(scan: &ScanView, ping: &Ping, kind: PathKind) -> Option<Vec<[f64; 3]>
         Point::Space(at) => at,
     };
     let [transmitter, receiver] = scan.ends(ping, path)?.map(|end| [end.x, end.y, z_m]);
-    let met = path.interactions.iter().map(|met| corner(met.point));
-    Some([transmitter].into_iter().chain(met).chain([receiver]).collect())
+    let reflections = path.interactions.iter().map(|interaction| corner(interaction.point));
+    Some([transmitter].into_iter().chain(reflections).chain([receiver]).collect())
 }

@@ -1,21 +1,21 @@
-//! The scene that readings are predicted in, as it is drawn.
+//! Markers of the scene in which readings are predicted.
 
 use std::f64::consts::TAU;
 
 use sonard_model::{geometry::DVec2, scene::Scene};
 use sonard_records::Session;
 
-use crate::ros::message::{Header, Marker, Shape};
+use crate::ros::message::{Header, Marker, MarkerShape};
 
 const WIDTH_M: f64 = 0.01;
 const COLOUR: [f32; 4] = [0.35, 0.35, 0.35, 1.0];
-/// A round reflector is drawn by so many lines.
+/// Number of lines that approximate a cylinder.
 const SIDES: u32 = 24;
-/// Beyond so many ends of lines a scene is not drawn: 24 bytes each.
-const MOST_ENDS: usize = 1 << 15;
+/// Maximum number of line ends; larger scenes are not drawn. Each end has 24 bytes.
+const MAX_ENDS: usize = 1 << 15;
 
-/// The ends of the lines that a session's scene is drawn by, walls and round reflectors apart; empty if it has none or
-/// the log does not have its text.
+/// Returns the line ends of a session's scene, walls and cylinders separately; empty without a
+/// scene text in the log.
 pub(super) fn outlines(session: &Session) -> Vec<(&'static str, Vec<[f64; 3]>)> {
     let text = session.scene_text.as_deref();
     let Some(scene) = text.and_then(|text| Scene::from_json(text).ok()) else { return Vec::new() };
@@ -30,10 +30,10 @@ pub(super) fn outlines(session: &Session) -> Vec<(&'static str, Vec<[f64; 3]>)> 
         .collect();
     let drawn = vec![("walls", walls), ("cylinders", cylinders)];
     let ends: usize = drawn.iter().map(|(_, ends)| ends.len()).sum();
-    if ends > MOST_ENDS { Vec::new() } else { drawn }
+    if ends > MAX_ENDS { Vec::new() } else { drawn }
 }
 
-/// The ends of the sides of a circle, side by side.
+/// Returns the line ends of a polygon that approximates a circle.
 fn circle(centre: DVec2, radius_m: f64) -> impl Iterator<Item = DVec2> {
     let corner = move |number: u32| {
         centre + radius_m * DVec2::from_angle(TAU * f64::from(number % SIDES) / f64::from(SIDES))
@@ -48,7 +48,7 @@ pub(super) fn markers<'a>(
     let marker = |(namespace, points)| Marker {
         header,
         namespace,
-        shape: Shape::Lines,
+        shape: MarkerShape::Lines,
         width_m: WIDTH_M,
         colour: COLOUR,
         points,

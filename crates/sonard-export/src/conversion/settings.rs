@@ -1,19 +1,20 @@
-//! How messages are made.
+//! Export settings of ROS 2 messages.
 
-/// What a `Range` says of silence and of what is too near. REP 117 and the obstacle layer of nav2 contradict
-/// each other: that leaves out infinite ranges.
+/// Encoding of missing echoes and of ranges below the minimum in `Range` messages. REP 117 and the
+/// obstacle layer of nav2, which ignores infinite ranges, contradict each other.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Profile {
-    /// Infinite, as REP 117 says: positive for silence, negative for what is too near.
+    /// REP 117: positive infinity for no echo, negative infinity for objects below the minimum
+    /// range.
     #[default]
     Rep117,
-    /// Exactly the greatest range for silence, and the least for what is too near: nav2's `RangeSensorLayer` then
-    /// clears the beam, and marks what is near.
+    /// Maximum range for no echo, minimum range for nearer objects: nav2's `RangeSensorLayer` then
+    /// clears the beam or marks the object.
     Nav2,
 }
 
 impl Profile {
-    pub(crate) const fn in_words(self) -> &'static str {
+    pub(crate) const fn name(self) -> &'static str {
         match self {
             Self::Rep117 => "rep117",
             Self::Nav2 => "nav2",
@@ -21,29 +22,29 @@ impl Profile {
     }
 }
 
-/// Whose definitions messages follow: `sensor_msgs/Range` is not the same everywhere.
+/// ROS 2 distribution whose message definitions are used; `sensor_msgs/Range` differs between them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Distribution {
-    /// Up to Humble: a range has no variance.
+    /// Humble and earlier: `Range` has no variance.
     Humble,
-    /// Iron, Jazzy and later.
+    /// Iron, Jazzy and later distributions.
     #[default]
     Jazzy,
 }
 
-/// How messages are made.
+/// Settings of the conversion to messages.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Settings {
-    /// What a `Range` says of silence.
+    /// Encoding of missing echoes.
     pub profile: Profile,
-    /// Whose definitions messages follow.
+    /// Distribution whose message definitions are used.
     pub distribution: Distribution,
-    /// Whether it is told where the robot is, `base_link` in `map`. Where others tell that, two would contradict each other.
+    /// True to publish the transform from `map` to `base_link`; false if another node publishes it.
     pub places_robot: bool,
-    /// Full angle of what a reading is valid for, degrees; without it, as far as the beam is 6 dB down, there and
-    /// back.
+    /// Full field of view of a reading, degrees; by default the width at which the two-way beam is
+    /// 6 dB down.
     pub field_of_view_deg: Option<f64>,
-    /// The frame of the transducer, which others are named after.
+    /// Frame of the transducer, and prefix of the other frames.
     pub frame: String,
 }
 

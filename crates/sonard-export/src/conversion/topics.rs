@@ -1,14 +1,14 @@
-//! The topics, by name.
+//! Topic names, types and durability.
 
 use sonard_model::array::RangerArray;
 use sonard_records::{Provenance, Session};
 
 use super::{
-    frames::{Frames, names},
+    frames::{RangerFrames, names},
     settings::Distribution,
 };
 use crate::ros::interface::{
-    FLOAT, Interface, LASER_SCAN, MARKERS, OCCUPANCY_GRID, POINT_CLOUD, RANGE, RANGE_OF_HUMBLE,
+    FLOAT, Interface, LASER_SCAN, MARKERS, OCCUPANCY_GRID, POINT_CLOUD, RANGE, RANGE_HUMBLE,
     TRANSFORMS,
 };
 
@@ -21,18 +21,18 @@ pub(crate) const PATHS: &str = "/sonar/paths";
 pub(crate) const PREDICTED_POINTS: &str = "/sonar/predicted/points";
 pub(crate) const MAP_TOPIC: &str = "/map";
 
-/// What is told of each reading; of those of an array by `/sonar/RANGER/range` and the like.
+/// Topic of individual readings; those of an array are named `/sonar/RANGER/range` and the like.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum OfReading {
+pub(super) enum ReadingTopic {
     Range,
     Predicted,
     Residual,
 }
 
-impl OfReading {
+impl ReadingTopic {
     pub(super) const ALL: [Self; 3] = [Self::Range, Self::Predicted, Self::Residual];
 
-    /// The topic of a ranger, which has a name if it is one of an array.
+    /// Returns the topic name for a ranger, which is named only in an array.
     pub(super) fn topic(self, ranger: Option<&str>) -> String {
         let (above, last) = match self {
             Self::Range => ("/sonar", "range"),
@@ -48,26 +48,26 @@ impl OfReading {
     pub(super) const fn interface(self, distribution: Distribution) -> Interface {
         match (self, distribution) {
             (Self::Range | Self::Predicted, Distribution::Jazzy) => RANGE,
-            (Self::Range | Self::Predicted, Distribution::Humble) => RANGE_OF_HUMBLE,
+            (Self::Range | Self::Predicted, Distribution::Humble) => RANGE_HUMBLE,
             (Self::Residual, _) => FLOAT,
         }
     }
 }
 
-/// A topic that a session has messages for.
+/// Topic of a session.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Topic {
-    /// As `/sonar/range`.
+    /// Topic name, such as `/sonar/range`.
     pub name: String,
-    /// Whether its last message is still true when no other comes, so that who comes late should have it: all but
-    /// what is told of each reading.
+    /// True if the last message remains valid and late subscribers should receive it; false for
+    /// topics of individual readings.
     pub is_kept: bool,
     interface: Interface,
 }
 
 impl Topic {
-    /// What there will be messages of, as far as can be told before the first session says: of a ranger that turns, or of
-    /// an array's; with predictions, and with a scene, if there are any.
+    /// Returns the topics expected before the first session: for a rotating ranger or an array,
+    /// with predictions and with a scene if requested.
     #[must_use]
     pub fn expected(
         array: Option<&RangerArray>,
@@ -77,56 +77,56 @@ impl Topic {
     ) -> Vec<Self> {
         let rangers = array.map(names).unwrap_or_default();
         let rangers: Vec<&str> = rangers.iter().map(String::as_str).collect();
-        of_rangers(&rangers, predicts, draws_scene, distribution)
+        topics_of_rangers(&rangers, predicts, draws_scene, distribution)
     }
 
-    /// A map of what was seen so far.
+    /// Returns the topic of the map built so far.
     #[must_use]
     pub fn map() -> Self {
         Self { name: MAP_TOPIC.to_owned(), is_kept: true, interface: OCCUPANCY_GRID }
     }
 
-    /// Whether it tells what stands still, so that each subscriber must get it whenever it comes: transient local,
-    /// in words of ROS 2.
+    /// Returns `true` for static content, which every late subscriber must receive ("transient
+    /// local" in ROS 2).
     #[must_use]
     pub fn stands_still(&self) -> bool {
-        stands_still(&self.name)
+        is_static_topic(&self.name)
     }
 
-    /// The type of its messages, as `package/msg/Type`.
+    /// Returns the message type, as `package/msg/Type`.
     #[must_use]
     pub const fn type_name(&self) -> &'static str {
         self.interface.name
     }
 
-    /// The definition of that type and those of its parts, as the encoding `ros2msg` of schemas has them.
+    /// Returns the message definition with those of nested types, in the schema encoding `ros2msg`.
     #[must_use]
     pub fn definition(&self) -> String {
         self.interface.definition()
     }
 }
 
-/// Whether the messages of a topic tell what stands still.
-pub(crate) fn stands_still(topic: &str) -> bool {
-    const STILL: [&str; 5] =
+/// Returns `true` if the messages of a topic are static.
+pub(crate) fn is_static_topic(topic: &str) -> bool {
+    const STATIC_TOPICS: [&str; 5] =
         [FIXED_TRANSFORMS, SCENE, MAP_TOPIC, "/sonar/lines", "/sonar/features"];
-    STILL.contains(&topic)
+    STATIC_TOPICS.contains(&topic)
 }
 
-/// The topics of a session, those of an array's rangers by their names.
-pub(super) fn of_session(
+/// Returns the topics of a session; those of an array contain the ranger names.
+pub(super) fn session_topics(
     session: &Session,
-    frames: &Frames,
+    frames: &RangerFrames,
     draws_scene: bool,
     distribution: Distribution,
 ) -> Vec<Topic> {
-    // Of what the model made itself there is nothing beside it.
+    // Simulated sessions are predictions themselves.
     let predicts = session.model.is_some() && session.provenance != Provenance::Simulated;
-    of_rangers(&frames.rangers(), predicts, draws_scene, distribution)
+    topics_of_rangers(&frames.rangers(), predicts, draws_scene, distribution)
 }
 
-/// The topics of a ranger that turns, or of an array's by their names.
-fn of_rangers(
+/// Returns the topics of a rotating ranger, or of an array's rangers by name.
+fn topics_of_rangers(
     rangers: &[&str],
     predicts: bool,
     draws_scene: bool,
@@ -147,12 +147,12 @@ fn of_rangers(
     let rangers: Vec<Option<&str>> =
         if rangers.is_empty() { vec![None] } else { rangers.iter().copied().map(Some).collect() };
     for ranger in rangers {
-        let told = OfReading::ALL.into_iter();
-        let told = told.filter(|one| predicts || *one == OfReading::Range);
-        topics.extend(told.map(|one| Topic {
-            name: one.topic(ranger),
+        let kinds = ReadingTopic::ALL.into_iter();
+        let kinds = kinds.filter(|kind| predicts || *kind == ReadingTopic::Range);
+        topics.extend(kinds.map(|kind| Topic {
+            name: kind.topic(ranger),
             is_kept: false,
-            interface: one.interface(distribution),
+            interface: kind.interface(distribution),
         }));
     }
     topics

@@ -1,4 +1,4 @@
-//! The map that is told live.
+//! Live map of all scans so far.
 
 use std::convert::Infallible;
 
@@ -19,21 +19,21 @@ use crate::{
     },
 };
 
-/// Cells that it may have, a byte each in a message: a square of 35 m with cells of 5 cm. Half of what waits for viewers.
-const MOST_CELLS: usize = 500_000;
+/// Maximum number of cells, one byte each in a message: a square of 35 m with cells of 5 cm.
+const MAX_CELLS: usize = 500_000;
 
-/// A map of all scans so far, as `sonard map` makes it without options.
+/// Map of all scans so far, identical to that of `sonard map` without options.
 #[derive(Debug)]
 pub(super) enum LiveMap {
-    /// There was no scan yet that can be mapped.
+    /// No mappable scan so far.
     Empty,
     Growing {
         map: Box<GrowingMap>,
-        /// When the latest scan began.
+        /// Start of the latest scan.
         time: Timestamp,
     },
-    /// It can't be told any more.
-    Over,
+    /// Stopped by an error.
+    Stopped,
 }
 
 impl LiveMap {
@@ -41,10 +41,11 @@ impl LiveMap {
         Self::Empty
     }
 
-    /// Adds a scan and tells the map, at a time. Scans that nothing can be made of are passed over, as by the verb.
+    /// Adds a scan and writes the map at a time. Scans that cannot be mapped are skipped, as by
+    /// `sonard map`.
     ///
     /// # Errors
-    /// When it can't be told from now on; that is said once.
+    /// Returns the reason, once, if the map stops with this scan.
     pub(super) fn add(
         &mut self,
         scan: &ScanView,
@@ -55,10 +56,10 @@ impl LiveMap {
             return Ok(());
         };
         let Ok(sweep) = Sweep::of(scan) else { return Ok(()) };
-        let (mut map, time) = match std::mem::replace(self, Self::Over) {
-            Self::Empty => (Box::new(begin(session)?), start.time),
+        let (mut map, time) = match std::mem::replace(self, Self::Stopped) {
+            Self::Empty => (Box::new(new_map(session)?), start.time),
             Self::Growing { map, time } => (map, time.max(start.time)),
-            Self::Over => return Ok(()),
+            Self::Stopped => return Ok(()),
         };
         let grid = map.add(sweep).map_err(|error| LeftOut::Map(error.to_string()))?;
         *self = Self::Growing { map, time };
@@ -69,8 +70,8 @@ impl LiveMap {
     }
 }
 
-/// By the session of the first scan, whatever comes after it.
-fn begin(session: &Session) -> Result<GrowingMap, LeftOut> {
+/// Creates the map with the parameters of the first scan's session.
+fn new_map(session: &Session) -> Result<GrowingMap, LeftOut> {
     let extents = Extents::of_session(session).map_err(|error| LeftOut::Map(error.to_string()))?;
-    Ok(GrowingMap::new(Mapping::default(), extents, session.array.is_some(), MOST_CELLS))
+    Ok(GrowingMap::new(Mapping::default(), extents, session.array.is_some(), MAX_CELLS))
 }

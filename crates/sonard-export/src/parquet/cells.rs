@@ -1,7 +1,8 @@
-//! The cells of a column before they are written.
+//! Buffered cells of a column.
 //!
-//! Parquet has nulls and lists as levels beside the values: a definition level says how much of a cell is
-//! there, a repetition level whether a value goes on with the list of the one before.
+//! Parquet encodes nulls and lists by levels in addition to the values: the definition level states
+//! how much of a cell is defined, the repetition level whether a value continues the list of the
+//! previous one.
 
 use std::collections::HashMap;
 
@@ -18,20 +19,20 @@ use std::sync::Arc;
 
 use crate::{Field, Kind, Value};
 
-/// The cells of a column that wait.
+/// Buffered cells of one column.
 #[derive(Debug)]
-pub(super) struct Cells {
+pub(super) struct ColumnBuffer {
     values: Values,
-    /// Of a cell 1, or 0 for null; of lists see [`LIST`].
+    /// Definition level of each cell: 1, or 0 for null; see [`LIST`] for lists.
     definitions: Vec<i16>,
 }
 
-/// What is there of a list: not even a list, an empty one, an element.
+/// Definition levels of lists: null, empty list, element.
 const LIST: [i16; 3] = [0, 1, 2];
 
 #[derive(Debug)]
 enum Values {
-    Text(Texts),
+    Text(DistinctTexts),
     Whole(Vec<i64>),
     Double(Vec<f64>),
     Single(Vec<f32>),
@@ -39,23 +40,23 @@ enum Values {
     List(Elements, Vec<i16>),
 }
 
-/// The elements of lists, one behind the other.
+/// Concatenated elements of lists.
 #[derive(Debug)]
 enum Elements {
     Whole(Vec<i32>),
     Single(Vec<f32>),
 }
 
-/// Texts, each kept once.
+/// Texts, with each distinct text stored once.
 #[derive(Debug, Default)]
-struct Texts {
+struct DistinctTexts {
     places: HashMap<Box<str>, u32>,
     distinct: Vec<ByteArray>,
     cells: Vec<u32>,
 }
 
-/// The type of a column; every cell may be null.
-pub(super) fn type_of(column: &Field) -> Result<Type, ParquetError> {
+/// Returns the Parquet type of a column; every cell may be null.
+pub(super) fn parquet_type(column: &Field) -> Result<Type, ParquetError> {
     let (physical, logical) = match column.kind {
         Kind::Text => (Physical::BYTE_ARRAY, Some(LogicalType::String)),
         Kind::Integer => (Physical::INT64, None),
@@ -75,7 +76,7 @@ pub(super) fn type_of(column: &Field) -> Result<Type, ParquetError> {
         .build()
 }
 
-/// A list as the format's own rules ask for it, in three levels.
+/// Returns a list type in the three levels that the format specifies.
 fn list_of(
     name: &str,
     physical: Physical,
@@ -96,18 +97,18 @@ fn list_of(
         .build()
 }
 
-/// Where a column's values are in the schema.
-pub(super) fn leaf(column: &Field) -> ColumnPath {
+/// Returns the path of a column's values in the schema.
+pub(super) fn leaf_path(column: &Field) -> ColumnPath {
     let is_list = matches!(column.kind, Kind::Integers | Kind::Numbers);
     let below: &[&str] = if is_list { &["list", "element"] } else { &[] };
     ColumnPath::new([column.name].iter().chain(below).map(ToString::to_string).collect())
 }
 
-impl Cells {
-    /// No cells yet.
-    pub(super) fn of(column: &Field) -> Self {
+impl ColumnBuffer {
+    /// Creates an empty buffer.
+    pub(super) fn new(column: &Field) -> Self {
         let values = match column.kind {
-            Kind::Text => Values::Text(Texts::default()),
+            Kind::Text => Values::Text(DistinctTexts::default()),
             Kind::Integer | Kind::Time => Values::Whole(Vec::new()),
             Kind::Number if column.is_single => Values::Single(Vec::new()),
             Kind::Number => Values::Double(Vec::new()),
@@ -118,7 +119,7 @@ impl Cells {
         Self { values, definitions: Vec::new() }
     }
 
-    /// Adds a cell; how many bytes more it takes than a number does.
+    /// Adds a cell and returns its size in bytes beyond that of a number.
     pub(super) fn push(&mut self, value: Option<Value<'_>>) -> usize {
         let (is_there, bytes) = match (&mut self.values, value) {
             (Values::List(elements, repetitions), value) => {
@@ -138,7 +139,7 @@ impl Cells {
                 (true, 0)
             }
             (Values::Whole(cells), Some(Value::Time(time))) => {
-                // Nobody measured before 1678 or after 2262.
+                // Times before 1678 and after 2262 do not occur.
                 let time_ns = i64::try_from(time.as_nanosecond()).ok();
                 cells.extend(time_ns);
                 (time_ns.is_some(), 0)
@@ -155,14 +156,14 @@ impl Cells {
                 cells.push(flag);
                 (true, 0)
             }
-            // Of columns, each has cells of its kind.
+            // The caller passes values of the column's kind.
             (_, None | Some(_)) => (false, 0),
         };
         self.definitions.push(is_there.into());
         bytes
     }
 
-    /// Writes the cells and forgets them.
+    /// Writes and clears the cells.
     pub(super) fn write(
         &mut self,
         column: &mut SerializedColumnWriter<'_>,
@@ -203,11 +204,11 @@ fn write<T: DataType>(
 }
 
 impl Elements {
-    /// Adds those of a list and says how many they are; `None` if it is of others.
+    /// Adds the elements of a list and returns their number; `None` for a value of another kind.
     fn extend(&mut self, list: &Value<'_>) -> Option<usize> {
         match (self, list) {
             (Self::Whole(cells), Value::Integers(list)) => {
-                // Unsigned by its logical type: the bits are the same.
+                // Unsigned by the logical type, with equal bits.
                 cells.extend(list.iter().map(|number| number.cast_signed()));
                 Some(list.len())
             }
@@ -220,7 +221,7 @@ impl Elements {
     }
 }
 
-impl Texts {
+impl DistinctTexts {
     fn push(&mut self, text: &str) -> usize {
         if let Some(place) = self.places.get(text) {
             self.cells.push(*place);
@@ -233,7 +234,7 @@ impl Texts {
         2 * text.len()
     }
 
-    /// Piece by piece, as each cell takes as much as a long text while it is written.
+    /// Writes the texts in pieces, because each cell temporarily takes the memory of a long text.
     fn write(
         &mut self,
         definitions: &[i16],

@@ -1,4 +1,4 @@
-//! A table of typed columns that is written row by row.
+//! Table of typed columns, written row by row.
 
 use std::{io::Write, sync::Arc};
 
@@ -14,95 +14,95 @@ use ::parquet::{
 use sonard_records::Session;
 
 use super::{
-    cells::{Cells, leaf, type_of},
-    refused,
-    remarks::Remarks,
+    cells::{ColumnBuffer, leaf_path, parquet_type},
+    file_metadata::FileMetadata,
+    write_error,
 };
 use crate::{ExportError, Field, Kind, Value};
 
-/// A table of typed columns, compressed by Snappy, that takes its rows one by one. Every cell may be null.
+/// Parquet table of nullable, typed columns, compressed by Snappy and written row by row.
 pub struct TypedTable<W: Write + Send> {
     out: SerializedFileWriter<W>,
-    remarks: Remarks,
-    /// The rows that wait for their group to be full, column by column.
-    waiting: Vec<Cells>,
+    metadata: FileMetadata,
+    /// Buffered rows of the current group, by column.
+    buffers: Vec<ColumnBuffer>,
     rows: usize,
-    /// What texts and lists among them take.
+    /// Size of texts and lists in the buffers.
     bytes: usize,
 }
 
-/// Rows that are written together, each column by itself: what waits in memory, at about 400 bytes each.
+/// Maximum number of rows per group, which are buffered at about 400 bytes each.
 const GROUP_ROWS: usize = 1 << 16;
-/// The most that texts and lists of a group take.
+/// Maximum size of texts and lists of a group.
 const GROUP_BYTES: usize = 1 << 24;
 
-/// What stands behind the four bytes that every such file begins with; readers go by places told at its end.
+/// Mark after the magic bytes of the file; readers use offsets in the footer and ignore it.
 const MARK: &[u8] = concat!("sonard ", env!("CARGO_PKG_VERSION"), "\n").as_bytes();
 const MAGIC: &[u8] = b"PAR1";
 
 impl<W: Write + Send> TypedTable<W> {
-    /// A table that is written to `out`, from its beginning to its end; `row` is what one of its rows is.
+    /// Writes the beginning of a table to `out`; `row` is the name of the row type.
     ///
     /// # Errors
-    /// When `out` refuses the beginning.
+    /// Returns the write error of the output.
     pub fn new(out: W, row: &str, fields: &[Field]) -> Result<Self, ExportError> {
-        let schema = schema(row, fields).map_err(refused)?;
+        let schema = schema(row, fields).map_err(write_error)?;
         let mut out = SerializedFileWriter::new(out, schema, Arc::new(properties(fields)))
-            .map_err(refused)?;
+            .map_err(write_error)?;
         out.write_all(MARK)?;
         Ok(Self {
             out,
-            remarks: Remarks::default(),
-            waiting: fields.iter().map(Cells::of).collect(),
+            metadata: FileMetadata::default(),
+            buffers: fields.iter().map(ColumnBuffer::new).collect(),
             rows: 0,
             bytes: 0,
         })
     }
 
-    /// Whether a file that begins so is such a table.
+    /// Returns `true` if `head` is the beginning of such a table.
     #[must_use]
     pub fn begins(head: &[u8]) -> bool {
         head.strip_prefix(MAGIC).is_some_and(|rest| rest.starts_with(b"sonard "))
     }
 
-    /// Says something of the whole table in its metadata, under a key of the caller's: how it was made.
+    /// Adds an entry to the metadata of the table, such as its origin.
     pub fn remark(&mut self, key: &str, value: String) {
-        self.remarks.add(key, value);
+        self.metadata.add(key, value);
     }
 
-    /// The record of a session, in the metadata too.
-    pub(super) fn remark_session(&mut self, number: u32, session: &Session) {
-        self.remarks.add_session(number, session);
+    /// Adds a session record to the metadata.
+    pub(super) fn add_session(&mut self, number: u32, session: &Session) {
+        self.metadata.add_session(number, session);
     }
 
-    /// Adds a row, its cells in the order of the columns.
+    /// Adds a row with cells in column order.
     ///
     /// # Errors
-    /// When the output refuses a group of rows that this one fills.
+    /// Returns the write error of the row group that this row completes.
     pub fn row<'a>(
         &mut self,
         cells: impl IntoIterator<Item = Option<Value<'a>>>,
     ) -> Result<(), ExportError> {
-        for (value, cells) in cells.into_iter().zip(&mut self.waiting) {
+        for (value, cells) in cells.into_iter().zip(&mut self.buffers) {
             self.bytes += cells.push(value);
         }
         self.rows += 1;
         if self.rows >= GROUP_ROWS || self.bytes >= GROUP_BYTES {
-            self.write_group().map_err(refused)?;
+            self.write_group().map_err(write_error)?;
         }
         Ok(())
     }
 
-    /// Writes what belongs to the end.
+    /// Writes the end of the file.
     ///
     /// # Errors
-    /// When the output refuses it.
+    /// Returns the write error of the output.
     pub fn finish(mut self) -> Result<(), ExportError> {
-        self.write_group().map_err(refused)?;
-        for remark in self.remarks.take() {
-            self.out.append_key_value_metadata(remark);
+        self.write_group().map_err(write_error)?;
+        for entry in self.metadata.take() {
+            self.out.append_key_value_metadata(entry);
         }
-        self.out.finish().map_err(refused)?;
+        self.out.finish().map_err(write_error)?;
         Ok(())
     }
 
@@ -111,7 +111,7 @@ impl<W: Write + Send> TypedTable<W> {
             return Ok(());
         }
         let mut group = self.out.next_row_group()?;
-        for cells in &mut self.waiting {
+        for cells in &mut self.buffers {
             let Some(mut column) = group.next_column()? else { break };
             cells.write(&mut column)?;
             column.close()?;
@@ -123,13 +123,13 @@ impl<W: Write + Send> TypedTable<W> {
 }
 
 fn schema(row: &str, fields: &[Field]) -> Result<TypePtr, ParquetError> {
-    let fields = fields.iter().map(|field| type_of(field).map(Arc::new));
+    let fields = fields.iter().map(|field| parquet_type(field).map(Arc::new));
     let fields = fields.collect::<Result<_, _>>()?;
     Type::group_type_builder(row).with_fields(fields).build().map(Arc::new)
 }
 
-/// How each column is written: places that repeat by dictionary, what goes on step by step as differences, what
-/// was heard byte by byte apart, so that the bytes that repeat stand together.
+/// Returns the writer properties: dictionaries for repeating positions, differences for counters,
+/// and separated byte streams for measured values, so that equal bytes are adjacent.
 fn properties(fields: &[Field]) -> WriterProperties {
     let by_default = WriterProperties::builder()
         .set_compression(Compression::SNAPPY)
@@ -139,13 +139,13 @@ fn properties(fields: &[Field]) -> WriterProperties {
         let Some(encoding) = encoding(field) else { return properties };
         let by_dictionary = field.kind == Kind::Number && !field.is_single;
         properties
-            .set_column_encoding(leaf(field), encoding)
-            .set_column_dictionary_enabled(leaf(field), by_dictionary)
+            .set_column_encoding(leaf_path(field), encoding)
+            .set_column_dictionary_enabled(leaf_path(field), by_dictionary)
     });
     all.build()
 }
 
-/// How a column is written if not by dictionary.
+/// Returns the encoding of a column without a dictionary.
 const fn encoding(field: &Field) -> Option<Encoding> {
     match field.kind {
         Kind::Integer | Kind::Time | Kind::Integers => Some(Encoding::DELTA_BINARY_PACKED),

@@ -1,4 +1,4 @@
-//! The topics of a recording, and how messages come into it.
+//! Writing of messages and topics to a recording.
 
 use std::{
     collections::BTreeMap,
@@ -13,43 +13,44 @@ use mcap::{
 
 use crate::{
     ExportError,
-    conversion::{MessageSink, stands_still},
+    conversion::{MessageSink, is_static_topic},
     ros::{
-        cdr::{Cdr, Encode},
+        cdr::{CdrWriter, Encode},
         interface::Interface,
         message::Stamp,
     },
 };
 
-/// A recording that is being written: messages by topic.
-pub(crate) struct Messages<W: Write> {
+/// Writer of a recording.
+pub(crate) struct RecordingWriter<W: Write> {
     pub(super) out: Writer<NoSeek<W>>,
-    channels: BTreeMap<String, Channel>,
-    /// The bytes of a message, kept for the next.
+    channels: BTreeMap<String, ChannelState>,
+    /// Buffer of an encoded message, reused.
     buffer: Vec<u8>,
 }
 
 #[derive(Debug, Clone, Copy)]
-struct Channel {
+struct ChannelState {
     id: u16,
     sequence: u32,
 }
 
-/// Messages are compressed together, so many bytes of them: what waits in memory.
+/// Size of a chunk, which is held in memory and compressed as a whole.
 const CHUNK_BYTES: u64 = 1 << 20;
 
 const LIBRARY: &str = "sonard ";
 
-/// Whether a file that begins so is a recording of this program.
+/// Returns `true` if `head` is the beginning of a recording by this program.
 pub(super) fn begins(head: &[u8]) -> bool {
     const MAGIC: &[u8] = b"\x89MCAP0\r\n";
-    /// Behind it: kind and length of the header, length and name of the profile, length of the library.
+    /// Offset of the library name: magic, kind and length of the header, length and name of the
+    /// profile, length of the library name.
     const BEFORE_LIBRARY: usize = 8 + 9 + 4 + 4 + 4;
     let library = head.get(BEFORE_LIBRARY..).unwrap_or_default();
     head.starts_with(MAGIC) && library.starts_with(LIBRARY.as_bytes())
 }
 
-impl<W: Write> Messages<W> {
+impl<W: Write> RecordingWriter<W> {
     pub(crate) fn new(out: W) -> Result<Self, ExportError> {
         let options = WriteOptions::new()
             .profile("ros2")
@@ -58,7 +59,7 @@ impl<W: Write> Messages<W> {
             .chunk_size(Some(CHUNK_BYTES))
             .disable_seeking(true);
         Ok(Self {
-            out: options.create(NoSeek::new(out)).map_err(refused)?,
+            out: options.create(NoSeek::new(out)).map_err(write_error)?,
             channels: BTreeMap::new(),
             buffer: Vec::new(),
         })
@@ -73,7 +74,7 @@ impl<W: Write> Messages<W> {
     ) -> Result<(), ExportError> {
         if !self.channels.contains_key(topic) {
             let id = self.add_channel(topic, interface)?;
-            self.channels.insert(topic.to_owned(), Channel { id, sequence: 0 });
+            self.channels.insert(topic.to_owned(), ChannelState { id, sequence: 0 });
         }
         let Some(channel) = self.channels.get_mut(topic) else { return Ok(()) };
         channel.sequence = channel.sequence.wrapping_add(1);
@@ -83,8 +84,8 @@ impl<W: Write> Messages<W> {
             log_time: at.0,
             publish_time: at.0,
         };
-        let bytes = Cdr::of(message, &mut self.buffer);
-        self.out.write_to_known_channel(&header, bytes).map_err(refused)
+        let bytes = CdrWriter::encode(message, &mut self.buffer);
+        self.out.write_to_known_channel(&header, bytes).map_err(write_error)
     }
 
     fn add_channel(&mut self, topic: &str, interface: Interface) -> Result<u16, ExportError> {
@@ -94,19 +95,21 @@ impl<W: Write> Messages<W> {
             ("offered_qos_profiles".to_owned(), quality_of_service(topic)),
             ("topic_type_hash".to_owned(), interface.hash.to_owned()),
         ]);
-        self.out.add_channel(schema.map_err(refused)?, topic, "cdr", &metadata).map_err(refused)
+        self.out
+            .add_channel(schema.map_err(write_error)?, topic, "cdr", &metadata)
+            .map_err(write_error)
     }
 
-    /// Says what a reader of the recording must know and no message says, and ends it.
-    pub(crate) fn finish(mut self, remarks: BTreeMap<String, String>) -> Result<(), ExportError> {
-        let remarks = Metadata { name: "sonard".to_owned(), metadata: remarks };
-        self.out.write_metadata(&remarks).map_err(refused)?;
-        self.out.finish().map_err(refused)?;
+    /// Writes the metadata and the end of the recording.
+    pub(crate) fn finish(mut self, metadata: BTreeMap<String, String>) -> Result<(), ExportError> {
+        let metadata = Metadata { name: "sonard".to_owned(), metadata };
+        self.out.write_metadata(&metadata).map_err(write_error)?;
+        self.out.finish().map_err(write_error)?;
         Ok(self.out.into_inner().into_inner().flush()?)
     }
 }
 
-impl<W: Write> MessageSink for Messages<W> {
+impl<W: Write> MessageSink for RecordingWriter<W> {
     type Error = ExportError;
 
     fn message(
@@ -120,9 +123,9 @@ impl<W: Write> MessageSink for Messages<W> {
     }
 }
 
-/// The profile that a topic was offered with, as rosbag2 has it in its text.
+/// Returns the QoS profile of a topic, in the text form of rosbag2.
 fn quality_of_service(topic: &str) -> String {
-    let (depth, durability) = match stands_still(topic) {
+    let (depth, durability) = match is_static_topic(topic) {
         true => (1, "transient_local"),
         false => (10, "volatile"),
     };
@@ -134,7 +137,7 @@ fn quality_of_service(topic: &str) -> String {
     )
 }
 
-pub(super) fn refused(error: McapError) -> ExportError {
+pub(super) fn write_error(error: McapError) -> ExportError {
     match error {
         McapError::Io(error) => error.into(),
         other => io::Error::other(other).into(),

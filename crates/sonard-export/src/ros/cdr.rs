@@ -1,24 +1,25 @@
-//! CDR, the bytes of ROS 2's messages (OMG DDS-XTypes, "plain CDR" version 1, little-endian).
+//! Encoding of CDR, the serialization of ROS 2 messages (OMG DDS-XTypes, "plain CDR" version 1,
+//! little-endian).
 //!
-//! Four bytes say which encoding it is. Behind them each number is aligned to its size, counted from behind
-//! those four. A text is its length with the zero that ends it, then both; a list is its length, then its
-//! elements.
+//! Four bytes identify the encoding. Numbers after them are aligned to their size, counted from the
+//! end of those four bytes. A string is its length including the terminating zero, then its bytes;
+//! a list is its length, then its elements.
 
-/// A message that is being encoded.
+/// Encoder of one message.
 #[derive(Debug)]
-pub(crate) struct Cdr(Vec<u8>);
+pub(crate) struct CdrWriter(Vec<u8>);
 
-/// Version 1, little-endian, no options.
+/// Encapsulation header: version 1, little-endian, no options.
 const ENCODING: [u8; 4] = [0, 1, 0, 0];
 
-/// What can be encoded.
+/// Message or part of a message that can be encoded.
 pub(crate) trait Encode {
-    fn encode(&self, cdr: &mut Cdr);
+    fn encode(&self, cdr: &mut CdrWriter);
 }
 
-impl Cdr {
-    /// The bytes of a message, in a buffer that is used again.
-    pub(crate) fn of<'a>(message: &impl Encode, buffer: &'a mut Vec<u8>) -> &'a [u8] {
+impl CdrWriter {
+    /// Encodes a message into a reusable buffer.
+    pub(crate) fn encode<'a>(message: &impl Encode, buffer: &'a mut Vec<u8>) -> &'a [u8] {
         let mut cdr = Self(std::mem::take(buffer));
         cdr.0.clear();
         cdr.0.extend(ENCODING);
@@ -58,7 +59,7 @@ impl Cdr {
         self.0.extend(value.to_le_bytes());
     }
 
-    /// The length of a list; of one too long for CDR its greatest, which no scan reaches.
+    /// Writes the length of a list, saturated at the maximum of CDR, which no scan reaches.
     fn length(&mut self, length: usize) {
         self.u32(u32::try_from(length).unwrap_or(u32::MAX));
     }

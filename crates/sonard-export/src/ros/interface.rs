@@ -1,19 +1,19 @@
-//! The types of messages as a recording declares them: name, definition, hash.
+//! Message types as declared in a recording: name, definition and hash.
 
-/// A type of message.
+/// Message type with its definition.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Interface {
-    /// As `package/msg/Type`.
+    /// Type name, as `package/msg/Type`.
     pub(crate) name: &'static str,
-    /// Of its definition, as ROS 2 computes it since Iron (REP 2016).
+    /// Hash of the definition, as computed by ROS 2 since Iron (REP 2016).
     pub(crate) hash: &'static str,
     definition: &'static str,
-    /// The types that it is made of, from the outermost on.
+    /// Nested types, the outermost first.
     parts: &'static [(&'static str, &'static str)],
 }
 
 impl Interface {
-    /// Its definition and those of its parts, as the encoding `ros2msg` of schemas has them.
+    /// Returns the definition with those of nested types, in the schema encoding `ros2msg`.
     pub(crate) fn definition(&self) -> String {
         let rule = "=".repeat(80);
         let parts = self.parts.iter();
@@ -39,8 +39,8 @@ float32 variance
     parts: &[HEADER, TIME],
 };
 
-/// `sensor_msgs/Range` as it was up to Humble.
-pub(crate) const RANGE_OF_HUMBLE: Interface = Interface {
+/// `sensor_msgs/Range` of Humble and earlier.
+pub(crate) const RANGE_HUMBLE: Interface = Interface {
     name: "sensor_msgs/msg/Range",
     hash: "RIHS01_9430b1915b94d4268ff903679e8ecd09b6a67d331bd028738ec1eeb592891ebd",
     definition: "\

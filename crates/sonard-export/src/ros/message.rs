@@ -1,17 +1,17 @@
-//! The messages, field by field as ROS 2's interfaces have them.
+//! ROS 2 messages, field by field.
 
 use sonard_interpret::interpret::grid::Grid;
 
-use super::cdr::{Cdr, Encode};
+use super::cdr::{CdrWriter, Encode};
 
-/// A moment, nanoseconds since 1970.
+/// Time stamp, nanoseconds since 1970.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct Stamp(pub(crate) u64);
 
 impl Encode for Stamp {
-    fn encode(&self, cdr: &mut Cdr) {
+    fn encode(&self, cdr: &mut CdrWriter) {
         const SECOND: u64 = 1_000_000_000;
-        // Seconds are signed and end in 2038.
+        // Seconds are signed and saturate in 2038.
         cdr.i32(i32::try_from(self.0 / SECOND).unwrap_or(i32::MAX));
         cdr.u32((self.0 % SECOND) as u32);
     }
@@ -25,7 +25,7 @@ pub(crate) struct Header<'a> {
 }
 
 impl Encode for Header<'_> {
-    fn encode(&self, cdr: &mut Cdr) {
+    fn encode(&self, cdr: &mut CdrWriter) {
         self.stamp.encode(cdr);
         cdr.text(self.frame);
     }
@@ -35,19 +35,19 @@ impl Encode for Header<'_> {
 #[derive(Debug)]
 pub(crate) struct Range<'a> {
     pub(crate) header: Header<'a>,
-    /// Full angle, radians.
+    /// Full field of view, radians.
     pub(crate) field_of_view: f32,
     pub(crate) min_range: f32,
     pub(crate) max_range: f32,
     pub(crate) range: f32,
-    /// Whether there is a variance, as there is since Iron.
+    /// True to write the variance, which exists since Iron.
     pub(crate) has_variance: bool,
 }
 
 impl Encode for Range<'_> {
-    fn encode(&self, cdr: &mut Cdr) {
+    fn encode(&self, cdr: &mut CdrWriter) {
         const ULTRASOUND: u8 = 0;
-        /// The variance of a range of which none is known.
+        /// Variance that means "unknown".
         const UNKNOWN: f32 = 0.0;
         self.header.encode(cdr);
         cdr.u8(ULTRASOUND);
@@ -64,9 +64,9 @@ impl Encode for Range<'_> {
 #[derive(Debug)]
 pub(crate) struct LaserScan<'a> {
     pub(crate) header: Header<'a>,
-    /// First and last, and from one to the next, radians.
+    /// First angle, last angle and increment, radians.
     pub(crate) angles: [f32; 3],
-    /// From one firing to the next, and of the whole scan, seconds.
+    /// Time between firings and duration of the scan, seconds.
     pub(crate) times: [f32; 2],
     pub(crate) range_limits: [f32; 2],
     pub(crate) ranges: Vec<f32>,
@@ -74,7 +74,7 @@ pub(crate) struct LaserScan<'a> {
 }
 
 impl Encode for LaserScan<'_> {
-    fn encode(&self, cdr: &mut Cdr) {
+    fn encode(&self, cdr: &mut CdrWriter) {
         self.header.encode(cdr);
         let figures = self.angles.iter().chain(&self.times).chain(&self.range_limits);
         figures.for_each(|value| cdr.f32(*value));
@@ -88,12 +88,12 @@ impl Encode for LaserScan<'_> {
 pub(crate) struct Float(pub(crate) f64);
 
 impl Encode for Float {
-    fn encode(&self, cdr: &mut Cdr) {
+    fn encode(&self, cdr: &mut CdrWriter) {
         cdr.f64(self.0);
     }
 }
 
-/// What the fields of a point are made of.
+/// Data type of a point field.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum PointNumber {
     I32 = 5,
@@ -101,21 +101,21 @@ pub(crate) enum PointNumber {
     F32 = 7,
 }
 
-/// `sensor_msgs/PointCloud2`, in a row, of points whose fields have four bytes each.
+/// `sensor_msgs/PointCloud2` of one row, with four-byte fields.
 #[derive(Debug)]
 pub(crate) struct PointCloud<'a> {
     pub(crate) header: Header<'a>,
     pub(crate) fields: &'a [(&'static str, PointNumber)],
-    /// The fields of one point after the other, little-endian.
+    /// Fields of consecutive points, little-endian.
     pub(crate) data: Vec<u8>,
 }
 
 impl Encode for PointCloud<'_> {
-    fn encode(&self, cdr: &mut Cdr) {
+    fn encode(&self, cdr: &mut CdrWriter) {
         let point_bytes = 4 * self.fields.len();
         let points = self.data.len() / point_bytes.max(1);
         self.header.encode(cdr);
-        // Height, width.
+        // Height and width.
         cdr.u32(1);
         cdr.u32(points as u32);
         cdr.u32(self.fields.len() as u32);
@@ -125,17 +125,17 @@ impl Encode for PointCloud<'_> {
             cdr.u8(*number as u8);
             cdr.u32(1);
         }
-        // Not big-endian.
+        // Little-endian.
         cdr.flag(false);
         cdr.u32(point_bytes as u32);
         cdr.u32(self.data.len() as u32);
         cdr.bytes(&self.data);
-        // No point without a place.
+        // Every point is valid.
         cdr.flag(true);
     }
 }
 
-/// `geometry_msgs/TransformStamped`: where a frame is in another one.
+/// `geometry_msgs/TransformStamped`: placement of a frame in its parent.
 #[derive(Debug)]
 pub(crate) struct Transform<'a> {
     pub(crate) header: Header<'a>,
@@ -146,7 +146,7 @@ pub(crate) struct Transform<'a> {
 }
 
 impl Encode for Transform<'_> {
-    fn encode(&self, cdr: &mut Cdr) {
+    fn encode(&self, cdr: &mut CdrWriter) {
         self.header.encode(cdr);
         cdr.text(self.child);
         self.translation.iter().chain(&self.rotation).for_each(|value| cdr.f64(*value));
@@ -158,15 +158,15 @@ impl Encode for Transform<'_> {
 pub(crate) struct Transforms<'a>(pub(crate) Vec<Transform<'a>>);
 
 impl Encode for Transforms<'_> {
-    fn encode(&self, cdr: &mut Cdr) {
+    fn encode(&self, cdr: &mut CdrWriter) {
         cdr.list(&self.0);
     }
 }
 
-/// What the points of a marker are drawn as.
+/// Marker type, which determines how the points are drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Shape {
-    /// `LINE_LIST`: each two are the ends of a line.
+pub(crate) enum MarkerShape {
+    /// `LINE_LIST`: pairs of points are lines.
     Lines = 5,
     /// `SPHERE_LIST`.
     Spheres = 7,
@@ -177,7 +177,7 @@ pub(crate) enum Shape {
 pub(crate) struct Marker<'a> {
     pub(crate) header: Header<'a>,
     pub(crate) namespace: &'a str,
-    pub(crate) shape: Shape,
+    pub(crate) shape: MarkerShape,
     pub(crate) width_m: f64,
     /// Red, green, blue, opacity.
     pub(crate) colour: [f32; 4],
@@ -185,8 +185,8 @@ pub(crate) struct Marker<'a> {
 }
 
 impl Encode for Marker<'_> {
-    fn encode(&self, cdr: &mut Cdr) {
-        // What is not drawn any more has to be taken away.
+    fn encode(&self, cdr: &mut CdrWriter) {
+        // An empty marker deletes the one drawn before.
         const ADD: i32 = 0;
         const DELETE: i32 = 2;
         self.header.encode(cdr);
@@ -194,37 +194,37 @@ impl Encode for Marker<'_> {
         cdr.i32(0);
         cdr.i32(self.shape as i32);
         cdr.i32(if self.points.is_empty() { DELETE } else { ADD });
-        // Pose: the origin.
+        // Pose at the origin.
         for value in [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0] {
             cdr.f64(value);
         }
-        // Of lines only the first counts.
-        let others_m = if self.shape == Shape::Lines { 0.0 } else { self.width_m };
+        // Lines use only the first scale.
+        let others_m = if self.shape == MarkerShape::Lines { 0.0 } else { self.width_m };
         for value in [self.width_m, others_m, others_m] {
             cdr.f64(value);
         }
         self.colour.iter().for_each(|value| cdr.f32(*value));
-        // Lifetime: for ever.
+        // Unlimited lifetime.
         cdr.i32(0);
         cdr.u32(0);
         cdr.flag(false);
         cdr.u32(self.points.len() as u32);
         self.points.iter().flatten().for_each(|value| cdr.f64(*value));
-        no_pictures(cdr);
+        encode_unused_fields(cdr);
     }
 }
 
-/// The fields of a marker from `colors` on, which are those of other kinds.
-fn no_pictures(cdr: &mut Cdr) {
-    // Colours.
+/// Writes the fields from `colors` on, which other kinds of markers use.
+fn encode_unused_fields(cdr: &mut CdrWriter) {
+    // Point colours.
     cdr.u32(0);
-    // The resource of a texture, the texture's header, format and data, and where it lies.
+    // Texture resource, its header, format and data, and texture coordinates.
     cdr.text("");
     Header { stamp: Stamp(0), frame: "" }.encode(cdr);
     cdr.text("");
     cdr.u32(0);
     cdr.u32(0);
-    // Text, resource and file of a mesh.
+    // Text, and resource and file of a mesh.
     cdr.text("");
     cdr.text("");
     cdr.text("");
@@ -237,7 +237,7 @@ fn no_pictures(cdr: &mut Cdr) {
 pub(crate) struct Markers<'a>(pub(crate) Vec<Marker<'a>>);
 
 impl Encode for Markers<'_> {
-    fn encode(&self, cdr: &mut Cdr) {
+    fn encode(&self, cdr: &mut CdrWriter) {
         cdr.list(&self.0);
     }
 }
@@ -250,15 +250,15 @@ pub(crate) struct OccupancyGrid<'a> {
 }
 
 impl Encode for OccupancyGrid<'_> {
-    fn encode(&self, cdr: &mut Cdr) {
+    fn encode(&self, cdr: &mut CdrWriter) {
         let shape = self.grid.shape();
         self.header.encode(cdr);
-        // When the map was loaded.
+        // Load time of the map.
         self.header.stamp.encode(cdr);
         cdr.f32(shape.resolution_m as f32);
         cdr.u32(shape.width as u32);
         cdr.u32(shape.height as u32);
-        // Where the lower left corner is, and that it is not turned.
+        // Position of the lower left corner, without rotation.
         for value in [shape.origin.x, shape.origin.y, 0.0, 0.0, 0.0, 0.0, 1.0] {
             cdr.f64(value);
         }
@@ -267,7 +267,7 @@ impl Encode for OccupancyGrid<'_> {
     }
 }
 
-/// How likely a cell is occupied, in hundredths, as a signed byte; -1 where nothing is known.
+/// Returns the occupancy of a cell in percent as a signed byte; -1 for an unknown cell.
 fn percent(p: f64) -> u8 {
     let known = p != 0.5;
     let percent = if known { (100.0 * p).round() as i8 } else { -1 };

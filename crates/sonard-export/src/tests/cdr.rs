@@ -1,12 +1,12 @@
-//! The encoder against another one.
+//! Comparison with an independent CDR encoder.
 
 use byteorder::LittleEndian;
 use proptest::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use crate::ros::cdr::{Cdr, Encode};
+use crate::ros::cdr::{CdrWriter, Encode};
 
-/// Something of everything, so that each kind comes behind each at every alignment.
+/// Values of every type, for all alignments of each after each.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 enum Field {
     U8(u8),
@@ -20,12 +20,12 @@ enum Field {
     Floats(Vec<f32>),
 }
 
-/// One after the other, without what an enum would add.
+/// Consecutive values, without the discriminants of an enum.
 #[derive(Debug)]
 struct Message(Vec<Field>);
 
 impl Encode for Message {
-    fn encode(&self, cdr: &mut Cdr) {
+    fn encode(&self, cdr: &mut CdrWriter) {
         for field in &self.0 {
             match field {
                 Field::U8(value) => cdr.u8(*value),
@@ -79,10 +79,10 @@ fn field() -> impl Strategy<Value = Field> {
 
 proptest! {
     #[test]
-    fn bytes_are_those_of_another_encoder(fields in prop::collection::vec(field(), 0..12)) {
+    fn matches_independent_encoder(fields in prop::collection::vec(field(), 0..12)) {
         let message = Message(fields);
         let mut buffer = Vec::new();
-        let bytes = Cdr::of(&message, &mut buffer);
+        let bytes = CdrWriter::encode(&message, &mut buffer);
         let others = cdr_encoding::to_vec::<_, LittleEndian>(&message).expect("encodes");
         prop_assert_eq!(&bytes[..4], &[0, 1, 0, 0]);
         prop_assert_eq!(&bytes[4..], &others[..]);

@@ -18,14 +18,14 @@ fn exported(scans: &[ScanView]) -> String {
     String::from_utf8(bytes).expect("UTF-8")
 }
 
-/// The rows as name and text of each cell.
+/// Returns the rows, with cells by column name.
 fn rows(table: &str) -> Vec<BTreeMap<String, String>> {
     let mut reader = csv::Reader::from_reader(table.as_bytes());
     reader.deserialize().map(|row| row.expect("a row")).collect()
 }
 
 #[test]
-fn every_reading_is_a_row_that_says_what_the_log_says() {
+fn rows_match_records() {
     let scans = measured();
     let table = exported(&scans);
     assert_eq!(table.lines().next(), Some(CsvExport::<Vec<u8>>::head().as_str()));
@@ -33,7 +33,7 @@ fn every_reading_is_a_row_that_says_what_the_log_says() {
     let pings: Vec<_> = scans.iter().flat_map(|scan| &scan.pings).collect();
     assert_eq!(rows.len(), pings.len());
     for (row, ping) in rows.iter().zip(&pings) {
-        // What a record of the log has under the same name stands in the row.
+        // Record fields appear in the column of the same name.
         let record = serde_json::to_value(ping).expect("JSON");
         let sim = record.get("sim").cloned().unwrap_or_default();
         for (name, cell) in row {
@@ -51,8 +51,8 @@ fn every_reading_is_a_row_that_says_what_the_log_says() {
                     assert_eq!(cell.parse().ok(), number.as_f64(), "{name}");
                 }
                 Some(serde_json::Value::Array(list)) => {
-                    let told: Vec<_> = list.iter().map(ToString::to_string).collect();
-                    assert_eq!(*cell, told.join(" "), "{name}");
+                    let expected: Vec<_> = list.iter().map(ToString::to_string).collect();
+                    assert_eq!(*cell, expected.join(" "), "{name}");
                 }
                 Some(other) => assert_eq!(*cell, other.to_string(), "{name}"),
             }
@@ -71,7 +71,7 @@ fn every_reading_is_a_row_that_says_what_the_log_says() {
 }
 
 #[test]
-fn a_scan_of_which_the_log_says_little_is_a_table_with_empty_cells() {
+fn missing_values_are_empty() {
     let rows = rows(&exported(&bare()));
     assert!(!rows.is_empty());
     for row in rows {
@@ -83,7 +83,7 @@ fn a_scan_of_which_the_log_says_little_is_a_table_with_empty_cells() {
 }
 
 #[test]
-fn sessions_are_counted_as_they_change() {
+fn numbers_sessions() {
     let mut scans = measured();
     scans.extend(measured());
     let mut warmer = measured();
@@ -104,7 +104,7 @@ fn sessions_are_counted_as_they_change() {
 }
 
 #[test]
-fn columns_have_each_a_name_of_their_own_and_cells_of_their_kind() {
+fn columns_have_unique_names_and_kinds() {
     let names: BTreeSet<_> = COLUMNS.iter().map(|column| column.name).collect();
     assert_eq!(names.len(), COLUMNS.len());
     for scan in measured() {
@@ -119,18 +119,18 @@ fn columns_have_each_a_name_of_their_own_and_cells_of_their_kind() {
 }
 
 #[test]
-fn a_full_disk_is_told() {
+fn reports_full_disk() {
     let mut export = Box::new(CsvExport::new(Full(500)).expect("the first line waits"));
-    let taken = measured().iter().try_for_each(|scan| export.scan("a", scan).map(drop));
-    match taken.and_then(|()| export.finish()) {
+    let result = measured().iter().try_for_each(|scan| export.scan("a", scan).map(drop));
+    match result.and_then(|()| export.finish()) {
         Err(ExportError::Write(error)) => assert_eq!(error.kind(), io::ErrorKind::StorageFull),
         other => panic!("{other:?}"),
     }
 }
 
-/// The columns that docs/export.md explains, in their order.
+/// The columns explained in docs/export.md, in their order.
 #[test]
-fn the_documentation_explains_every_column() {
+fn documentation_lists_all_columns() {
     let text = include_str!("../../../../docs/export.md");
     let (_, table) = text.split_once("| columns | what they hold |\n").expect("the table");
     let rows = table.lines().skip(1).take_while(|line| line.starts_with('|'));

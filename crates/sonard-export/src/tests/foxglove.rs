@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 
 use crate::foxglove::{MOST_TEXT_BYTES, Session, Step, advertise};
 
-/// The channels that there are in these tests.
+/// Channels that exist in these tests.
 fn is_there(channel: u32) -> bool {
     (1..=6).contains(&channel)
 }
@@ -14,13 +14,13 @@ fn take(session: &mut Session, order: &Value) -> Vec<Step> {
     session.take_text(&order.to_string(), is_there)
 }
 
-fn subscribe(wishes: &[[u32; 2]]) -> Value {
-    let wish = |[id, channel]: &[u32; 2]| json!({"id": id, "channelId": channel});
-    json!({"op": "subscribe", "subscriptions": wishes.iter().map(wish).collect::<Vec<_>>()})
+fn subscribe(requests: &[[u32; 2]]) -> Value {
+    let request = |[id, channel]: &[u32; 2]| json!({"id": id, "channelId": channel});
+    json!({"op": "subscribe", "subscriptions": requests.iter().map(request).collect::<Vec<_>>()})
 }
 
-/// The words of a status, which must be the only step.
-fn refusal(steps: &[Step]) -> String {
+/// Returns the message of a status, which must be the only step.
+fn rejection(steps: &[Step]) -> String {
     let [Step::Say(text)] = steps else { panic!("{steps:?}") };
     let status: Value = serde_json::from_str(text).expect("JSON");
     assert_eq!((&status["op"], &status["level"]), (&json!("status"), &json!(2)));
@@ -28,7 +28,7 @@ fn refusal(steps: &[Step]) -> String {
 }
 
 #[test]
-fn who_subscribes_is_told_by_its_own_number() {
+fn subscribes_and_frames_messages() {
     let mut session = Session::default();
     assert_eq!(
         take(&mut session, &subscribe(&[[70, 3], [71, 1]])),
@@ -41,63 +41,66 @@ fn who_subscribes_is_told_by_its_own_number() {
     assert_eq!(take(&mut session, &order), [Step::Cease(3)]);
     assert_eq!((session.frame(3, 0, b""), session.channels().collect::<Vec<_>>()), (None, vec![1]));
     session.keep_only(|channel| channel == 2);
-    assert_eq!(session.frame(1, 0, b""), None, "that channel is gone");
+    assert_eq!(session.frame(1, 0, b""), None, "the channel no longer exists");
 }
 
 #[test]
-fn what_makes_no_sense_is_refused_in_words_and_costs_nothing() {
+fn rejects_invalid_messages() {
     let mut session = Session::default();
     take(&mut session, &subscribe(&[[1, 1]]));
     let long = "x".repeat(MOST_TEXT_BYTES);
     for (text, words) in [
-        ("{", "no message of the protocol"),
-        ("", "no message of the protocol"),
-        ("[]", "no message of the protocol"),
-        (r#"{"op":7}"#, "no message of the protocol"),
-        (r#"{"op":"subscribe","subscriptions":[{"id":-1,"channelId":1}]}"#, "no message"),
-        (r#"{"op":"subscribe","subscriptions":[{"id":4294967296,"channelId":1}]}"#, "no message"),
-        (r#"{"op":"subscribe","subscriptions":[{"id":2,"channelId":7}]}"#, "no channel 7"),
+        ("{", "invalid message"),
+        ("", "invalid message"),
+        ("[]", "invalid message"),
+        (r#"{"op":7}"#, "invalid message"),
+        (r#"{"op":"subscribe","subscriptions":[{"id":-1,"channelId":1}]}"#, "invalid message"),
+        (
+            r#"{"op":"subscribe","subscriptions":[{"id":4294967296,"channelId":1}]}"#,
+            "invalid message",
+        ),
+        (r#"{"op":"subscribe","subscriptions":[{"id":2,"channelId":7}]}"#, "unknown channel 7"),
         (r#"{"op":"subscribe","subscriptions":[{"id":2,"channelId":1}]}"#, "already"),
-        (r#"{"op":"subscribe","subscriptions":[{"id":1,"channelId":2}]}"#, "of another channel"),
-        (r#"{"op":"unsubscribe","subscriptionIds":[2]}"#, "no subscription 2"),
-        (r#"{"op":"advertise","channels":[]}"#, "only tells"),
-        (r#"{"op":"getParameters"}"#, "only tells"),
+        (r#"{"op":"subscribe","subscriptions":[{"id":1,"channelId":2}]}"#, "for another channel"),
+        (r#"{"op":"unsubscribe","subscriptionIds":[2]}"#, "unknown subscription 2"),
+        (r#"{"op":"advertise","channels":[]}"#, "only publishes"),
+        (r#"{"op":"getParameters"}"#, "only publishes"),
         (&format!(r#"{{"op":"{long}"}}"#), "at most 65536 bytes"),
-        (&format!(r#"{{"op":"{}"}}"#, &long[20..]), "only tells"),
-        (&"[".repeat(60_000), "no message of the protocol"),
+        (&format!(r#"{{"op":"{}"}}"#, &long[20..]), "only publishes"),
+        (&"[".repeat(60_000), "invalid message"),
     ] {
-        let words_said = refusal(&session.take_text(text, is_there));
-        let expected = words_said.contains(words) || words_said.chars().count() == 200;
-        assert!(expected && words_said.chars().count() <= 200, "{words_said}");
+        let message = rejection(&session.take_text(text, is_there));
+        let is_expected = message.contains(words) || message.chars().count() == 200;
+        assert!(is_expected && message.chars().count() <= 200, "{message}");
     }
-    assert!(refusal(&session.take_binary()).contains("only tells"));
+    assert!(rejection(&session.take_binary()).contains("only publishes"));
     assert_eq!(session.channels().collect::<Vec<_>>(), [1]);
 }
 
 #[test]
-fn ten_thousand_subscriptions_are_one_sentence_and_no_memory() {
+fn bounds_subscriptions() {
     let mut session = Session::default();
-    let wishes: Vec<[u32; 2]> = (0..2000).map(|number| [number, number]).collect();
-    let steps = take(&mut session, &subscribe(&wishes));
-    let said = steps.iter().filter(|step| matches!(step, Step::Say(_))).count();
-    assert_eq!((steps.len(), said, session.channels().count()), (7, 1, 6), "{steps:?}");
+    let requests: Vec<[u32; 2]> = (0..2000).map(|number| [number, number]).collect();
+    let steps = take(&mut session, &subscribe(&requests));
+    let statuses = steps.iter().filter(|step| matches!(step, Step::Say(_))).count();
+    assert_eq!((steps.len(), statuses, session.channels().count()), (7, 1, 6), "{steps:?}");
     let Some(Step::Say(text)) = steps.last() else { panic!("{steps:?}") };
-    assert!(text.contains("there is no channel 0, and 1993 more"), "{text}");
-    let wishes: Vec<[u32; 2]> = (0..10_000).map(|number| [number, number]).collect();
-    assert!(refusal(&take(&mut session, &subscribe(&wishes))).contains("at most"));
+    assert!(text.contains("unknown channel 0, and 1993 more"), "{text}");
+    let requests: Vec<[u32; 2]> = (0..10_000).map(|number| [number, number]).collect();
+    assert!(rejection(&take(&mut session, &subscribe(&requests))).contains("at most"));
 }
 
 #[test]
-fn who_goes_on_making_no_sense_is_shown_out() {
+fn closes_after_repeated_faults() {
     let mut session = Session::default();
     let ended = (1..=100).find(|_| session.take_text("?", is_there).contains(&Step::End));
     assert_eq!(ended, Some(100));
 }
 
 #[test]
-fn channels_declare_what_their_messages_are() {
+fn advertises_message_types() {
     let mut live = crate::Live::new(crate::Settings::default());
-    for record in super::scans::records_of_measured() {
+    for record in super::scans::measured_records() {
         live.take(record, |_| ()).expect("a whole session");
     }
     let text = advertise((1..).zip(live.topics()));
@@ -110,13 +113,13 @@ fn channels_declare_what_their_messages_are() {
     assert!(range["schema"].as_str().is_some_and(|text| text.contains("float32 variance")));
 }
 
-/// Texts of a client, most of them nearly right.
+/// Client messages, most of them nearly valid.
 fn text() -> impl Strategy<Value = String> {
-    let wish =
+    let request =
         (0..12_u32, 0..9_u32).prop_map(|(id, channel)| json!({"id": id, "channelId": channel}));
-    let wishes = prop::collection::vec(wish, 0..5);
+    let requests = prop::collection::vec(request, 0..5);
     prop_oneof![
-        4 => wishes.prop_map(|wishes| json!({"op": "subscribe", "subscriptions": wishes}).to_string()),
+        4 => requests.prop_map(|requests| json!({"op": "subscribe", "subscriptions": requests}).to_string()),
         3 => prop::collection::vec(0..12_u32, 0..5)
             .prop_map(|ids| json!({"op": "unsubscribe", "subscriptionIds": ids}).to_string()),
         1 => "\\PC{0,40}",
@@ -124,26 +127,26 @@ fn text() -> impl Strategy<Value = String> {
 }
 
 proptest! {
-    /// Whatever is sent: what was begun and did not cease is what messages come of, each subscription by a number of
-    /// its own, and only of channels that there are.
+    /// Channels that were begun and not ceased are those with messages, each with a distinct
+    /// subscription id.
     #[test]
-    fn steps_and_subscriptions_say_the_same(texts in prop::collection::vec(text(), 0..40)) {
-        let (mut session, mut told) = (Session::default(), BTreeMap::new());
+    fn steps_match_subscriptions(texts in prop::collection::vec(text(), 0..40)) {
+        let (mut session, mut begun) = (Session::default(), BTreeMap::new());
         for text in texts {
             for step in session.take_text(&text, is_there) {
                 match step {
-                    Step::Begin(channel) => prop_assert!(told.insert(channel, ()).is_none()),
-                    Step::Cease(channel) => prop_assert!(told.remove(&channel).is_some()),
+                    Step::Begin(channel) => prop_assert!(begun.insert(channel, ()).is_none()),
+                    Step::Cease(channel) => prop_assert!(begun.remove(&channel).is_some()),
                     Step::Say(text) => prop_assert!(serde_json::from_str::<Value>(&text).is_ok()),
                     Step::End => {}
                 }
             }
-            prop_assert!(told.keys().all(|channel| is_there(*channel)));
-            prop_assert!(session.channels().eq(told.keys().copied()));
+            prop_assert!(begun.keys().all(|channel| is_there(*channel)));
+            prop_assert!(session.channels().eq(begun.keys().copied()));
             let numbers = session.channels().filter_map(|channel| session.frame(channel, 0, b""));
             let numbers: Vec<_> = numbers.collect();
             let distinct: std::collections::BTreeSet<_> = numbers.iter().collect();
-            prop_assert_eq!(distinct.len(), told.len());
+            prop_assert_eq!(distinct.len(), begun.len());
         }
     }
 }

@@ -4,27 +4,30 @@ use sonard_records::{PingStatus, Record};
 
 use crate::{Distribution, Export as _, Live, McapExport, Settings, Topic};
 
-use super::scans::{measured, of_array, records_of_measured};
+use super::scans::{measured, measured_records, of_array};
 
 type Messages = BTreeMap<String, Vec<(u64, Vec<u8>)>>;
 
-fn told(records: impl IntoIterator<Item = Record>) -> (Live, Messages) {
-    told_with(Settings::default(), records)
+fn converted(records: impl IntoIterator<Item = Record>) -> (Live, Messages) {
+    converted_with(Settings::default(), records)
 }
 
-fn told_with(settings: Settings, records: impl IntoIterator<Item = Record>) -> (Live, Messages) {
+fn converted_with(
+    settings: Settings,
+    records: impl IntoIterator<Item = Record>,
+) -> (Live, Messages) {
     let (mut live, mut messages) = (Live::new(settings), Messages::new());
     for record in records {
         live.take(record, |message| {
-            let told = (message.at_ns, message.bytes.to_vec());
-            messages.entry(message.topic.to_owned()).or_default().push(told);
+            let copy = (message.at_ns, message.bytes.to_vec());
+            messages.entry(message.topic.to_owned()).or_default().push(copy);
         })
         .expect("a whole session");
     }
     (live, messages)
 }
 
-/// What a recording holds of the same scans.
+/// Messages of a recording of the same scans.
 fn recorded() -> Messages {
     let mut bytes = Vec::new();
     let mut export = Box::new(McapExport::new(&mut bytes, Settings::default()).expect("memory"));
@@ -42,23 +45,23 @@ fn recorded() -> Messages {
 }
 
 #[test]
-fn what_is_told_live_is_what_a_recording_of_the_log_holds() {
-    let (live, told) = told(records_of_measured());
+fn matches_recording() {
+    let (live, converted) = converted(measured_records());
     let recorded = recorded();
-    assert!(told.len() > 6, "{:?}", told.keys());
-    assert_eq!(told.keys().collect::<Vec<_>>(), recorded.keys().collect::<Vec<_>>());
-    for (topic, messages) in &told {
+    assert!(converted.len() > 6, "{:?}", converted.keys());
+    assert_eq!(converted.keys().collect::<Vec<_>>(), recorded.keys().collect::<Vec<_>>());
+    for (topic, messages) in &converted {
         assert!(messages == &recorded[topic], "{topic}");
     }
     let topics: Vec<_> = live.topics().iter().map(|topic| topic.name.as_str()).collect();
-    assert!(told.keys().all(|topic| topics.contains(&topic.as_str())), "{topics:?}");
+    assert!(converted.keys().all(|topic| topics.contains(&topic.as_str())), "{topics:?}");
 }
 
 #[test]
-fn topics_are_those_of_the_session_in_force() {
+fn topics_follow_the_session() {
     let scan = of_array().remove(0);
     let session = scan.session.as_deref().expect("it has one").clone();
-    let (live, _) = told([Record::Session(Box::new(session))]);
+    let (live, _) = converted([Record::Session(Box::new(session))]);
     let names: Vec<_> = live.topics().iter().map(|topic| topic.name.as_str()).collect();
     assert!(names.contains(&"/sonar/s0/range") && !names.contains(&"/sonar/scan"), "{names:?}");
     assert!(live.topics().iter().all(|topic| topic.is_kept != topic.name.ends_with("/range")));
@@ -66,9 +69,9 @@ fn topics_are_those_of_the_session_in_force() {
 }
 
 #[test]
-fn what_is_expected_is_what_the_session_then_says() {
+fn expected_topics_match_session() {
     let jazzy = Distribution::Jazzy;
-    let (live, _) = told(records_of_measured());
+    let (live, _) = converted(measured_records());
     let draws = |live: &Live| live.topics().iter().any(|topic| topic.name == "/sonar/scene");
     let predicts = |live: &Live| live.topics().iter().any(|topic| topic.name == "/sonar/residual");
     assert!(predicts(&live));
@@ -82,10 +85,10 @@ fn what_is_expected_is_what_the_session_then_says() {
 }
 
 #[test]
-fn a_range_of_humble_is_that_of_jazzy_without_its_variance() {
+fn humble_range_lacks_variance() {
     let humble = Settings { distribution: Distribution::Humble, ..Settings::default() };
-    let (live, of_humble) = told_with(humble, records_of_measured());
-    let (_, of_jazzy) = told(records_of_measured());
+    let (live, of_humble) = converted_with(humble, measured_records());
+    let (_, of_jazzy) = converted(measured_records());
     for (topic, messages) in &of_jazzy {
         let less = if topic.ends_with("/range") { 4 } else { 0 };
         let cut = messages.iter().map(|(at, bytes)| (*at, bytes[..bytes.len() - less].to_vec()));
@@ -96,10 +99,10 @@ fn a_range_of_humble_is_that_of_jazzy_without_its_variance() {
 }
 
 #[test]
-fn where_others_place_the_robot_only_the_ranger_is_placed() {
+fn robot_placement_is_optional() {
     let elsewhere = Settings { places_robot: false, ..Settings::default() };
-    let (_, placed) = told_with(elsewhere, records_of_measured());
-    let (_, all) = told(records_of_measured());
+    let (_, placed) = converted_with(elsewhere, measured_records());
+    let (_, all) = converted(measured_records());
     let has = |bytes: &[u8], name: &[u8]| bytes.windows(name.len()).any(|part| part == name);
     assert_eq!(placed["/tf"].len(), all["/tf"].len());
     assert!(all["/tf"].iter().all(|(_, bytes)| has(bytes, b"map\0") && has(bytes, b"base_link\0")));
@@ -108,22 +111,22 @@ fn where_others_place_the_robot_only_the_ranger_is_placed() {
 }
 
 #[test]
-fn a_session_that_says_too_little_has_no_topics() {
+fn invalid_session_has_no_topics() {
     let scan = measured().remove(0);
     let mut session = scan.session.as_deref().expect("it has one").clone();
     session.sensor.frequency_hz = -1.0;
     let mut live = Live::new(Settings::default());
-    let told = |_: crate::LiveMessage<'_>| panic!("nothing to be told");
-    assert!(live.take(Record::Session(Box::new(session)), told).is_err());
+    let reject = |_: crate::LiveMessage<'_>| panic!("no message expected");
+    assert!(live.take(Record::Session(Box::new(session)), reject).is_err());
     assert_eq!(live.topics(), []);
-    for record in records_of_measured().into_iter().skip(1) {
-        live.take(record, told).expect("passed over");
+    for record in measured_records().into_iter().skip(1) {
+        live.take(record, reject).expect("skipped");
     }
 }
 
 #[test]
-fn a_scan_of_very_many_readings_is_told_reading_by_reading_alone() {
-    let records = records_of_measured();
+fn long_scans_have_only_readings() {
+    let records = measured_records();
     let at = records
         .iter()
         .position(|record| matches!(record, Record::Ping(ping) if ping.status == PingStatus::Echo));
@@ -135,7 +138,7 @@ fn a_scan_of_very_many_readings_is_told_reading_by_reading_alone() {
         Record::Ping(ping)
     });
     let before = records[..at].iter().cloned();
-    let (_, messages) = told(before.chain(more).chain(records[at..].iter().cloned()));
+    let (_, messages) = converted(before.chain(more).chain(records[at..].iter().cloned()));
     assert!(messages["/sonar/range"].len() > 10_000);
     assert!(!messages.contains_key("/sonar/points") && !messages.contains_key("/sonar/scan"));
 }

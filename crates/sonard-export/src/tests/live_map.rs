@@ -9,12 +9,12 @@ use uuid::Uuid;
 
 use crate::{Findings, LeftOut, Live, Settings, Topic, write_findings};
 
-use super::scans::records_of_measured;
+use super::scans::measured_records;
 
-/// The measured scan as if it had been taken from so many metres aside, with an id of its own.
+/// Returns the measured scan, shifted along x, with another id.
 fn scan_aside(number: u128, x_m: f64) -> Vec<Record> {
     let scan = Uuid::from_u128(number);
-    let mut records = records_of_measured();
+    let mut records = measured_records();
     records.retain(|record| !matches!(record, Record::Session(_)));
     for record in &mut records {
         match record {
@@ -30,20 +30,20 @@ fn scan_aside(number: u128, x_m: f64) -> Vec<Record> {
 }
 
 fn session() -> Record {
-    let mut records = records_of_measured().into_iter();
+    let mut records = measured_records().into_iter();
     records.find(|record| matches!(record, Record::Session(_))).expect("it has one")
 }
 
-/// The maps that are told of records, each with its time.
+/// Returns the maps of records with their times, and the errors.
 fn maps(live: &mut Live, records: &[Record]) -> (Vec<(u64, Vec<u8>)>, Vec<LeftOut>) {
     let (mut maps, mut left_out) = (Vec::new(), Vec::new());
     for record in records {
-        let taken = live.take(record.clone(), |message| {
+        let result = live.take(record.clone(), |message| {
             if message.topic == "/map" {
                 maps.push((message.at_ns, message.bytes.to_vec()));
             }
         });
-        left_out.extend(taken.err());
+        left_out.extend(result.err());
     }
     (maps, left_out)
 }
@@ -52,7 +52,7 @@ fn mapping_live() -> Live {
     Live::new(Settings::default()).with_map(true)
 }
 
-/// The message that a recording of the map of these records holds.
+/// Returns the map message of a recording of these records.
 fn recorded(records: &[Record]) -> Vec<u8> {
     let scans = ScanView::from_records(records.iter().cloned());
     let session = scans[0].session.as_deref().expect("it has one");
@@ -74,17 +74,17 @@ fn recorded(records: &[Record]) -> Vec<u8> {
 }
 
 #[test]
-fn after_each_scan_it_is_the_map_of_all_so_far_also_of_one_that_never_ended() {
+fn maps_all_scans_so_far() {
     let mut unfinished = scan_aside(2, 0.4);
     unfinished.retain(|record| !matches!(record, Record::ScanEnd(_)));
     let scans = [scan_aside(1, 0.0), unfinished, scan_aside(3, -0.7)];
-    let (mut live, mut so_far, mut told) = (mapping_live(), vec![session()], Vec::new());
+    let (mut live, mut so_far, mut found) = (mapping_live(), vec![session()], Vec::new());
     drop(live.take(session(), |_| {}));
     assert!(live.topics().contains(&Topic::map()));
     for scan in &scans {
         let (maps, left_out) = maps(&mut live, scan);
         assert_eq!(left_out, []);
-        told.extend(maps.into_iter().map(|(_, map)| map));
+        found.extend(maps.into_iter().map(|(_, map)| map));
     }
     let expected: Vec<Vec<u8>> = scans
         .iter()
@@ -93,12 +93,12 @@ fn after_each_scan_it_is_the_map_of_all_so_far_also_of_one_that_never_ended() {
             recorded(&so_far)
         })
         .collect();
-    assert_eq!(told.len(), 3);
-    assert!(told == expected);
+    assert_eq!(found.len(), 3);
+    assert!(found == expected);
 }
 
 #[test]
-fn it_goes_on_in_a_new_session_and_is_not_there_unless_it_is_wanted() {
+fn continues_in_a_new_session() {
     let mut records = [vec![session()], scan_aside(1, 0.0)].concat();
     let mut live = mapping_live();
     let (first, _) = maps(&mut live, &records);
@@ -114,19 +114,19 @@ fn it_goes_on_in_a_new_session_and_is_not_there_unless_it_is_wanted() {
 }
 
 #[test]
-fn a_place_that_is_too_large_ends_it_and_that_is_said_once() {
+fn stops_once_at_a_large_place() {
     let mut live = mapping_live();
     let near = [vec![session()], scan_aside(1, 0.0)].concat();
     assert_eq!(maps(&mut live, &near).0.len(), 1);
-    let (told, left_out) = maps(&mut live, &scan_aside(2, 1e4));
+    let (found, left_out) = maps(&mut live, &scan_aside(2, 1e4));
     let [LeftOut::Map(why)] = &left_out[..] else { panic!("{left_out:?}") };
-    assert!(told.is_empty() && why.contains("more than 500000 cells"), "{why}");
+    assert!(found.is_empty() && why.contains("more than 500000 cells"), "{why}");
     assert!(left_out[0].to_string().contains("sonard map"));
     assert_eq!(maps(&mut live, &scan_aside(3, 0.0)), (Vec::new(), Vec::new()));
 }
 
 #[test]
-fn a_scan_of_very_many_readings_is_not_on_it() {
+fn excludes_long_scans() {
     let mut long = scan_aside(2, 0.3);
     let at = long.iter().position(|record| matches!(record, Record::Ping(_))).expect("one");
     let more = vec![long[at].clone(); 5000];

@@ -29,7 +29,7 @@ fn recorded(scans: &[ScanView]) -> Vec<u8> {
     recorded_with(scans, Settings::default())
 }
 
-/// A message as it was read: its time, and its bytes.
+/// Time and bytes of a message.
 type Read = (u64, Vec<u8>);
 
 fn by_topic(recording: &[u8]) -> BTreeMap<String, Vec<Read>> {
@@ -100,14 +100,14 @@ struct Transform {
 }
 
 #[test]
-fn a_range_says_what_its_reading_does() {
+fn range_matches_reading() {
     let scans = measured();
     let topics = by_topic(&recorded(&scans));
     let ranges: Vec<Range> = decoded(&topics["/sonar/range"]);
-    let heard: Vec<_> =
+    let echoes: Vec<_> =
         scans[0].pings.iter().filter(|ping| ping.status == PingStatus::Echo).collect();
-    assert!(!heard.is_empty());
-    for ping in heard {
+    assert!(!echoes.is_empty());
+    for ping in echoes {
         let at = ping.time.expect("measured").as_nanosecond();
         let range =
             ranges.iter().find(|range| range.header.nanoseconds() == at).expect("its message");
@@ -121,33 +121,33 @@ fn a_range_says_what_its_reading_does() {
         assert_eq!(range.max_range, 10.7);
         assert!((range.field_of_view.to_degrees() - 10.3).abs() < 0.5, "{range:?}");
     }
-    // One that the line lost has no time of firing.
+    // A reading lost on the link has no firing time.
     let predicted = scans[0].pings.iter().filter(|ping| ping.sim.is_some() && ping.time.is_some());
     assert_eq!(topics["/sonar/predicted/range"].len(), predicted.count());
 }
 
 #[test]
-fn silence_and_what_is_near_are_told_as_the_profile_says() {
+fn profiles_encode_missing_echoes() {
     let scans = [every_status()];
-    let told = |profile| {
+    let found = |profile| {
         let settings = Settings { profile, ..Settings::default() };
         let topics = by_topic(&recorded_with(&scans, settings));
         let ranges: Vec<Range> = decoded(&topics["/sonar/range"]);
         let limits = (ranges[0].min_range, ranges[0].max_range);
         (ranges.iter().map(|range| range.range).collect::<Vec<_>>(), limits, topics)
     };
-    let (ranges, _, topics) = told(Profile::Rep117);
+    let (ranges, _, topics) = found(Profile::Rep117);
     assert_eq!(ranges, [1.25, f32::INFINITY, f32::NEG_INFINITY]);
-    let (ranges, (min, max), _) = told(Profile::Nav2);
+    let (ranges, (min, max), _) = found(Profile::Nav2);
     assert_eq!(ranges, [1.25, max, min]);
     let scan: LaserScan = decoded(&topics["/sonar/scan"]).remove(0);
-    let [echo, silent, near, rest @ ..] = scan.ranges.as_slice() else { panic!("{scan:?}") };
-    assert_eq!((*echo, *silent, *near), (1.25, f32::INFINITY, f32::NEG_INFINITY));
+    let [echo, no_echo, near, rest @ ..] = scan.ranges.as_slice() else { panic!("{scan:?}") };
+    assert_eq!((*echo, *no_echo, *near), (1.25, f32::INFINITY, f32::NEG_INFINITY));
     assert!(rest.len() == 3 && rest.iter().all(|range| range.is_nan()), "{rest:?}");
 }
 
 #[test]
-fn a_laser_scan_has_each_beam_in_its_place() {
+fn laser_scan_beams_are_in_place() {
     let scans = simulated();
     let scan: LaserScan = decoded(&by_topic(&recorded(&scans))["/sonar/scan"]).remove(0);
     let pings = &scans[0].pings;
@@ -168,7 +168,7 @@ fn a_laser_scan_has_each_beam_in_its_place() {
 }
 
 #[test]
-fn residuals_and_the_scene_are_told_as_the_log_has_them() {
+fn residuals_match_the_log() {
     let scans = measured();
     let topics = by_topic(&recorded(&scans));
     let residuals: Vec<f64> = decoded(&topics["/sonar/residual"]);
@@ -178,7 +178,7 @@ fn residuals_and_the_scene_are_told_as_the_log_has_them() {
 }
 
 #[test]
-fn transforms_lead_from_the_map_to_where_the_transducer_was() {
+fn transforms_lead_to_the_transducer() {
     let scans = simulated();
     let topics = by_topic(&recorded(&scans));
     let fixed: Vec<Vec<Transform>> = decoded(&topics["/tf_static"]);
@@ -212,7 +212,7 @@ fn transforms_lead_from_the_map_to_where_the_transducer_was() {
 }
 
 #[test]
-fn rangers_of_an_array_have_topics_and_frames_of_their_own() {
+fn array_rangers_have_own_topics() {
     let scans = of_array();
     let topics = by_topic(&recorded(&scans));
     let ids: BTreeSet<_> = scans[0].pings.iter().filter_map(|ping| ping.ranger.clone()).collect();
@@ -231,7 +231,7 @@ fn rangers_of_an_array_have_topics_and_frames_of_their_own() {
 }
 
 #[test]
-fn scans_without_times_follow_each_other_and_the_recording_says_that_they_are_made_up() {
+fn synthetic_times_are_sequential() {
     let mut scans = simulated();
     scans.extend(simulated());
     let recording = recorded(&scans);
@@ -245,10 +245,10 @@ fn scans_without_times_follow_each_other_and_the_recording_says_that_they_are_ma
         .map(|range| range.header.nanoseconds())
         .collect();
     assert!(stamps.windows(2).all(|pair| pair[0] < pair[1]), "{stamps:?}");
-    // The window of the last reading ends before the next scan begins: no frame is told twice of one time.
+    // The last window ends before the next scan, so a frame has one placement at a time.
     let moving: Vec<Vec<Transform>> = decoded(&topics["/tf"]);
-    let told: Vec<_> = moving.iter().map(|message| message[0].header.nanoseconds()).collect();
-    assert!(told.windows(2).all(|pair| pair[0] < pair[1]), "{told:?}");
+    let found: Vec<_> = moving.iter().map(|message| message[0].header.nanoseconds()).collect();
+    assert!(found.windows(2).all(|pair| pair[0] < pair[1]), "{found:?}");
     let summary = mcap::Summary::read(&recording).expect("reads").expect("it has one");
     let remarks = mcap::read::metadata(&recording, &summary.metadata_indexes[0]).expect("reads");
     assert_eq!(remarks.name, "sonard");
@@ -257,7 +257,7 @@ fn scans_without_times_follow_each_other_and_the_recording_says_that_they_are_ma
 }
 
 #[test]
-fn the_log_is_attached_byte_by_byte() {
+fn attaches_the_log() {
     let text = "{\"type\":\"session\"}\n".repeat(10_000);
     let mut bytes = Vec::new();
     let mut export = Box::new(McapExport::new(&mut bytes, Settings::default()).expect("memory"));
@@ -268,14 +268,14 @@ fn the_log_is_attached_byte_by_byte() {
     let summary = mcap::Summary::read(&bytes).expect("reads").expect("it has one");
     let found = mcap::read::attachment(&bytes, &summary.attachment_indexes[0]).expect("reads");
     assert_eq!((found.name.as_str(), &*found.data), ("small.jsonl", text.as_bytes()));
-    // One that shrank meanwhile is no attachment.
+    // A log that has become shorter is an error.
     let mut export = McapExport::new(Vec::new(), Settings::default()).expect("memory");
     let short = export.attach(&log, &mut &text.as_bytes()[1..]);
     assert!(matches!(short, Err(ExportError::Attach { .. })), "{short:?}");
 }
 
 #[test]
-fn a_scan_without_session_or_pose_is_left_out() {
+fn skips_scans_without_session_or_pose() {
     let mut export = McapExport::new(Vec::new(), Settings::default()).expect("memory");
     for scan in bare() {
         assert_eq!(export.scan("a", &scan).expect("memory"), Some(LeftOut::NoSession));
@@ -295,17 +295,17 @@ fn a_scan_without_session_or_pose_is_left_out() {
     }
 }
 
-/// The types that are exported.
+/// Exported message types.
 const INTERFACES: [Interface; 6] = [RANGE, FLOAT, LASER_SCAN, POINT_CLOUD, TRANSFORMS, MARKERS];
 
 #[test]
-fn topics_declare_their_types_and_how_they_were_offered() {
+fn topics_declare_types_and_qos() {
     let mut scans = measured();
     scans.extend(of_array());
     let recording = recorded(&scans);
     assert!(McapExport::<Vec<u8>>::begins(&recording));
     let summary = mcap::Summary::read(&recording).expect("reads").expect("it has one");
-    let known: BTreeMap<_, _> = INTERFACES.iter().map(|one| (one.name, one)).collect();
+    let known: BTreeMap<_, _> = INTERFACES.iter().map(|each| (each.name, each)).collect();
     let mut used = BTreeSet::new();
     for channel in summary.channels.values() {
         let schema = channel.schema.as_ref().expect("a schema");
@@ -325,11 +325,11 @@ fn topics_declare_their_types_and_how_they_were_offered() {
 }
 
 #[test]
-fn a_full_disk_is_told() {
+fn reports_full_disk() {
     let mut export =
         Box::new(McapExport::new(Full(500), Settings::default()).expect("its head fits"));
-    let taken = measured().iter().try_for_each(|scan| export.scan("a", scan).map(drop));
-    match taken.and_then(|()| export.finish()) {
+    let result = measured().iter().try_for_each(|scan| export.scan("a", scan).map(drop));
+    match result.and_then(|()| export.finish()) {
         Err(ExportError::Write(error)) => assert_eq!(error.kind(), io::ErrorKind::StorageFull),
         other => panic!("{other:?}"),
     }

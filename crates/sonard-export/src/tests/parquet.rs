@@ -27,14 +27,14 @@ fn read(bytes: Vec<u8>) -> SerializedFileReader<bytes::Bytes> {
     SerializedFileReader::new(bytes.into()).expect("Parquet")
 }
 
-/// The rows, each cell by the name of its column.
+/// Returns the rows, with cells by column name.
 fn rows(bytes: Vec<u8>) -> Vec<BTreeMap<String, Field>> {
     let reader = read(bytes);
     let rows = reader.get_row_iter(None).expect("rows").map(|row| row.expect("a row"));
     rows.map(|row| row.into_columns().into_iter().collect()).collect()
 }
 
-/// A cell as the format has it.
+/// Returns the expected cell in Parquet.
 fn cell(column: &Column, row: &Row<'_>) -> Field {
     let Some(value) = column.cell(row) else { return Field::Null };
     match value {
@@ -58,7 +58,7 @@ fn list(field: &Field) -> Vec<u32> {
 }
 
 #[test]
-fn every_cell_is_there_in_its_type() {
+fn cells_have_their_types() {
     let mut ticks = every_status();
     ticks.pings[1].echo_ticks = vec![7, u32::MAX, 0];
     for scans in [measured(), bare(), simulated(), of_array(), vec![ticks, every_status()]] {
@@ -80,7 +80,7 @@ fn every_cell_is_there_in_its_type() {
 }
 
 #[test]
-fn metadata_has_the_sessions_and_each_scene_once() {
+fn metadata_has_sessions_and_scenes() {
     let mut scans = simulated();
     let mut warmer = scans[0].session.as_deref().expect("it has one").clone();
     warmer.air.temperature_c += 1.0;
@@ -89,23 +89,26 @@ fn metadata_has_the_sessions_and_each_scene_once() {
     other.session = Some(warmer.into());
     scans.push(other);
     let reader = read(exported(&scans));
-    let told = reader.metadata().file_metadata().key_value_metadata().expect("told");
-    let told: BTreeMap<_, _> =
-        told.iter().map(|told| (told.key.as_str(), told.value.as_deref().unwrap_or(""))).collect();
+    let entries = reader.metadata().file_metadata().key_value_metadata().expect("metadata");
+    let entries: BTreeMap<_, _> = entries
+        .iter()
+        .map(|entry| (entry.key.as_str(), entry.value.as_deref().unwrap_or("")))
+        .collect();
     for (number, scan) in [1, 2].iter().zip(&scans) {
         let mut session = scan.session.as_deref().expect("it has one").clone();
         session.scene_text = None;
-        let record = serde_json::from_str(told[format!("sonard.session.{number}").as_str()]);
+        let record = serde_json::from_str(entries[format!("sonard.session.{number}").as_str()]);
         assert_eq!(record.ok(), Some(session));
     }
-    let scenes: Vec<_> = told.iter().filter(|(key, _)| key.starts_with("sonard.scene.")).collect();
+    let scenes: Vec<_> =
+        entries.iter().filter(|(key, _)| key.starts_with("sonard.scene.")).collect();
     assert_eq!(scenes.iter().map(|(_, value)| **value).collect::<Vec<_>>(), [&*text]);
-    assert_eq!(told["shard"], "3 of 8");
+    assert_eq!(entries["shard"], "3 of 8");
 }
 
-/// A log of more rows than are kept waiting: they are written in groups, and none is lost between two.
+/// A log with more rows than a group; no row is lost between groups.
 #[test]
-fn long_logs_are_written_in_groups() {
+fn writes_long_logs_in_groups() {
     let mut scan = bare().remove(0);
     let id = scan.scan;
     let pings = (0..70_000).map(|index| Ping::new(id, index, 0.0, PingStatus::NoEcho));
@@ -117,7 +120,7 @@ fn long_logs_are_written_in_groups() {
     assert_eq!(rows.len(), 70_000);
 }
 
-/// Texts that don't fit into memory together are not kept together.
+/// Long texts complete a group early, which bounds memory.
 #[test]
 fn long_texts_end_a_group() {
     let mut scan = bare().remove(0);
@@ -132,7 +135,7 @@ fn long_texts_end_a_group() {
 }
 
 #[test]
-fn a_table_is_known_by_its_beginning() {
+fn detected_by_its_head() {
     let bytes = exported(&measured());
     assert!(ParquetExport::<Vec<u8>>::begins(&bytes));
     for other in [&bytes[..4], b"PAR1\x15\x04", b"sonard 0.1.0", b""] {
@@ -141,7 +144,7 @@ fn a_table_is_known_by_its_beginning() {
 }
 
 #[test]
-fn a_full_disk_is_told() {
+fn reports_full_disk() {
     for bytes in [0, 3_000, 12_000] {
         let export = ParquetExport::new(Full(bytes)).map(Box::new);
         let written = export.and_then(|mut export| {
@@ -155,9 +158,9 @@ fn a_full_disk_is_told() {
     }
 }
 
-/// The figure that docs/export.md tells: a tenth of the same table as text.
+/// The ratio stated in docs/export.md: a tenth of the same table as text.
 #[test]
-fn it_is_a_tenth_of_the_text() {
+fn is_a_tenth_of_csv() {
     let mut scan = simulated().remove(0);
     let scans: Vec<_> = (0..50)
         .map(|number| {

@@ -1,4 +1,4 @@
-//! Scans to export.
+//! Scans for the export tests.
 
 use std::sync::Arc;
 
@@ -13,30 +13,30 @@ use sonard_model::{
 };
 use sonard_records::{Ping, PingStatus, Record, ScanPlan, ScanView, decode_line};
 
-/// A measured scan with predictions.
+/// Measured scan with predictions.
 const SMALL: &str = include_str!("../../../../tests/fixtures/small.jsonl");
 
 fn records(log: &str) -> impl Iterator<Item = Record> {
     log.lines().filter_map(|line| decode_line(line.as_bytes()).ok())
 }
 
-/// The scans of a measured log with predictions.
+/// Scans of a measured log with predictions.
 pub(super) fn measured() -> Vec<ScanView> {
     ScanView::from_records(records(SMALL))
 }
 
-/// Its records.
-pub(super) fn records_of_measured() -> Vec<Record> {
+/// Records of the measured log.
+pub(super) fn measured_records() -> Vec<Record> {
     records(SMALL).collect()
 }
 
-/// The same without sessions, and without the start of the scan.
+/// Scans of the measured log without session and scan start.
 pub(super) fn bare() -> Vec<ScanView> {
     let kept = |record: &Record| !matches!(record, Record::Session(_) | Record::ScanStart(_));
     ScanView::from_records(records(SMALL).filter(kept))
 }
 
-/// A simulated scan of 40 beams.
+/// Simulated scan of 40 beams.
 pub(super) fn simulated() -> Vec<ScanView> {
     let text = shipped::text("simple-room").expect("shipped");
     let room = Arc::new(Scene::from_json(text).expect("good"));
@@ -52,7 +52,7 @@ fn started() -> Timestamp {
     "2026-11-22T12:00:00Z".parse().expect("a time")
 }
 
-/// A round of an array, each of its rangers once.
+/// Round of an array, with one reading of each ranger.
 pub(super) fn of_array() -> Vec<ScanView> {
     let mut scan = simulated().remove(0);
     let array = RangerArray::preset("pioneer-8").expect("a preset");
@@ -67,14 +67,14 @@ pub(super) fn of_array() -> Vec<ScanView> {
     vec![scan]
 }
 
-/// A scan of a reading of each status, the echo at 1.25 m.
+/// Scan with a reading of each status, the echo at 1.25 m.
 pub(super) fn every_status() -> ScanView {
     use PingStatus::{Echo, LinkLost, MinRange, ModuleFault, NoEcho, StepDoubtful};
     let mut scan = simulated().remove(0);
     let statuses = [Echo, NoEcho, MinRange, LinkLost, StepDoubtful, ModuleFault];
     let pings = statuses.iter().zip(0..).map(|(status, index)| {
         let mut ping = Ping::new(scan.scan, index, 0.9 * f64::from(index), *status);
-        // Where the blanking ended is no range.
+        // The end of the blanking is not a range.
         ping.range_m = status.has_range().then_some(if *status == Echo { 1.25 } else { 0.4 });
         ping
     });
@@ -85,7 +85,7 @@ pub(super) fn every_status() -> ScanView {
     scan
 }
 
-/// Takes so many bytes and no more.
+/// Output that fails after a number of bytes.
 pub(super) struct Full(pub(super) usize);
 
 impl std::io::Write for Full {

@@ -1,4 +1,4 @@
-//! The data card of a set.
+//! Data card of a set, in Markdown.
 
 use std::fmt::Write as _;
 
@@ -6,13 +6,13 @@ use sonard_export::Kind;
 
 use super::Manifest;
 use crate::{
+    distribution::Spread,
     shard::Generator,
     spec::{SceneKeys, Shape, Spec},
-    spread::Spread,
     table::Table,
 };
 
-/// The card. Writing to a text can't fail.
+/// Writes the card. Writing to a string cannot fail.
 pub(super) fn card(manifest: &Manifest, generator: &Generator) -> String {
     let spec = generator.spec();
     let mut text = format!("# {}\n\n", manifest.name);
@@ -24,16 +24,16 @@ pub(super) fn card(manifest: &Manifest, generator: &Generator) -> String {
     let _ = writeln!(
         text,
         "{readings} simulated readings of ultrasonic rangers in {} scenes, {} poses in each; {} shards, {} bytes, \
-         {:.1} bytes a reading.\n",
+         {:.1} bytes per reading.\n",
         rows(Table::Scenes),
         spec.set.poses,
         manifest.shards,
         manifest.totals.bytes,
         manifest.totals.bytes as f64 / readings.max(1) as f64,
     );
-    drawn(&mut text, spec);
-    made(&mut text, manifest);
-    tables(&mut text, generator);
+    write_distributions(&mut text, spec);
+    write_generation(&mut text, manifest);
+    write_tables(&mut text, generator);
     text.push_str(USE);
     text
 }
@@ -46,12 +46,12 @@ import duckdb
 duckdb.sql(\"select avg(range_m) from 'shard-*/readings.parquet' where status = 'echo'\")
 ```
 
-Split by scene, not by reading: readings of a scene tell of one another. All readings are simulated; what the model \
-leaves out, no learner can find here.
+Split by scene, not by reading: readings of one scene are correlated. All readings are simulated; effects that the model \
+omits are not in the data.
 ";
 
-fn drawn(text: &mut String, spec: &Spec) {
-    text.push_str("## What is drawn\n\n");
+fn write_distributions(text: &mut String, spec: &Spec) {
+    text.push_str("## Distributions\n\n");
     let weights: f64 = spec.scene.iter().map(|kind| kind.weight).sum();
     for kind in &spec.scene {
         let share = 100.0 * kind.weight / weights;
@@ -60,40 +60,40 @@ fn drawn(text: &mut String, spec: &Spec) {
     let furniture = &spec.furniture;
     let _ = writeln!(
         text,
-        "- In each that is of no file: {} boxes, {} cylinders, {} partitions",
-        words(&furniture.boxes, ""),
-        words(&furniture.cylinders, ""),
-        words(&furniture.partitions, "")
+        "- In each generated scene: {} boxes, {} cylinders, {} partitions",
+        distribution_text(&furniture.boxes, ""),
+        distribution_text(&furniture.cylinders, ""),
+        distribution_text(&furniture.partitions, "")
     );
     for (name, material) in &spec.materials {
         let _ = writeln!(
             text,
             "- Material {name}: reflectance {}, roughness {}",
-            words(&material.reflectance, ""),
-            words(&material.roughness, "")
+            distribution_text(&material.reflectance, ""),
+            distribution_text(&material.roughness, "")
         );
     }
     match &spec.heights {
-        None => text.push_str("- Scenes of no file are plans, without floor and ceiling\n"),
+        None => text.push_str("- Generated scenes are plans, without floor and ceiling\n"),
         Some(heights) => {
             let _ = writeln!(
                 text,
                 "- Ceiling at {}, transducer at {}",
-                words(&heights.ceiling_m, " m"),
-                words(&heights.sensor_m, " m")
+                distribution_text(&heights.ceiling_m, " m"),
+                distribution_text(&heights.sensor_m, " m")
             );
         }
     }
-    measured(text, spec);
+    write_measurement(text, spec);
 }
 
-/// From where readings are taken, and with what.
-fn measured(text: &mut String, spec: &Spec) {
+/// Writes poses, azimuths, sensors, air and noise.
+fn write_measurement(text: &mut String, spec: &Spec) {
     let _ = writeln!(
         text,
-        "- Poses anywhere, at least {} m from everything, heading {}",
+        "- Poses uniform over the free space, at least {} m from all surfaces, heading {}",
         spec.poses.clearance_m,
-        words(&spec.poses.heading_deg, " degrees")
+        distribution_text(&spec.poses.heading_deg, " degrees")
     );
     let plan = &spec.plan;
     let _ = writeln!(
@@ -105,15 +105,15 @@ fn measured(text: &mut String, spec: &Spec) {
     let _ = writeln!(
         text,
         "- Air: {}, {} relative humidity, {}",
-        words(&spec.air.temperature_c, " degrees Celsius"),
-        words(&spec.air.humidity_percent, " %"),
-        words(&spec.air.pressure_kpa, " kPa")
+        distribution_text(&spec.air.temperature_c, " degrees Celsius"),
+        distribution_text(&spec.air.humidity_percent, " %"),
+        distribution_text(&spec.air.pressure_kpa, " kPa")
     );
     let _ = writeln!(
         text,
         "- Noise: floor {}, jitter {}",
-        words(&spec.noise.floor, ""),
-        words(&spec.noise.jitter_us, " us")
+        distribution_text(&spec.noise.floor, ""),
+        distribution_text(&spec.noise.jitter_us, " us")
     );
     let _ = writeln!(text, "- Engine: {}\n", spec.model.engine.name());
 }
@@ -123,7 +123,7 @@ fn scene(kind: &SceneKeys) -> String {
         (Shape::File, Some(name)) => format!("`{name}`"),
         (shape, _) => {
             let side = |spread: &Option<Spread>| {
-                spread.as_ref().map_or_else(String::new, |spread| words(spread, " m"))
+                spread.as_ref().map_or_else(String::new, |spread| distribution_text(spread, " m"))
             };
             format!(
                 "rooms of shape {}, {} wide, {} deep",
@@ -135,7 +135,7 @@ fn scene(kind: &SceneKeys) -> String {
     }
 }
 
-fn words(spread: &Spread, unit: &str) -> String {
+fn distribution_text(spread: &Spread, unit: &str) -> String {
     match spread {
         Spread::Fixed(number) => format!("{number}{unit}"),
         Spread::Even([least, most]) => format!("{least} to {most}{unit}"),
@@ -149,30 +149,31 @@ fn words(spread: &Spread, unit: &str) -> String {
     }
 }
 
-fn made(text: &mut String, manifest: &Manifest) {
-    let again = &manifest.totals.redrawn;
+fn write_generation(text: &mut String, manifest: &Manifest) {
+    let rejected = &manifest.totals.redrawn;
     let _ = writeln!(
         text,
-        "## How it was made\n\n\
-         By `sonard generate`, version {}, of the specification in `spec.json` (SHA-256 {}). The same \
-         specification and version give the same bytes, whoever makes which shard; `sonard generate --verify` checks \
-         digests, with `--recheck` by making shards anew. The digest of the set is {}.\n\n\
-         What did not fit was drawn again: {} poses where nothing could stand, {} places of furniture, {} scenes, {} \
-         poses with too many echo paths. So poses are even over the free space, and crowded rooms rarer than drawn.\n",
+        "## Generation\n\n\
+                 Generated by `sonard generate`, version {}, from the specification in `spec.json` (SHA-256 {}). The same \
+                 specification and version give the same bytes, regardless of which process generates which shard. \
+                 `sonard generate --verify` checks digests, with `--recheck` by regenerating shards. The digest of the set is {}.\n\n\
+                 Draws were rejected and repeated: {} poses without free space, {} positions of furniture, {} scenes, {} \
+                 poses with too many echo paths. Poses are therefore uniform over the free space, and crowded rooms rarer than \
+                 drawn.\n",
         manifest.sonard,
         manifest.spec_sha256,
         manifest.sha256,
-        again.poses,
-        again.furniture,
-        again.scenes,
-        again.costly,
+        rejected.poses,
+        rejected.furniture,
+        rejected.scenes,
+        rejected.costly,
     );
 }
 
-fn tables(text: &mut String, generator: &Generator) {
-    text.push_str("## Tables\n\nEach shard is a folder, `shard-00001` and so on, with a file a table (Parquet).\n");
+fn write_tables(text: &mut String, generator: &Generator) {
+    text.push_str("## Tables\n\nEach shard is a folder, `shard-00001` and so on, with one file per table (Parquet).\n");
     for table in generator.tables() {
-        let _ = writeln!(text, "\n### {}\n\nA row a {}.\n", table.file(), table.row());
+        let _ = writeln!(text, "\n### {}\n\nOne row per {}.\n", table.file(), table.row());
         text.push_str("| column | type | meaning |\n| --- | --- | --- |\n");
         for column in table.columns(&generator.spec().keep) {
             let kind = match column.field.kind {
@@ -180,7 +181,7 @@ fn tables(text: &mut String, generator: &Generator) {
                 Kind::Integer => "integer",
                 Kind::Number if column.field.is_single => "float",
                 Kind::Number => "double",
-                Kind::Flag => "yes or no",
+                Kind::Flag => "boolean",
                 Kind::Time => "time",
                 Kind::Integers => "list of integers",
                 Kind::Numbers => "list of floats",

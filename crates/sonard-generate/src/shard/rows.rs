@@ -1,4 +1,4 @@
-//! The readings at a pose.
+//! Simulated readings at one pose.
 
 use sonard_model::{
     acoustics::ReceiverNoise,
@@ -8,39 +8,39 @@ use sonard_model::{
 };
 
 use crate::{
-    seed::{Of, rng},
-    spec::Loaded,
+    seed::{RandomStream, rng},
+    spec::LoadedSpec,
 };
 
-/// What is heard at a pose.
-pub(super) struct AtPose {
+/// Readings at a pose.
+pub(super) struct PoseReadings {
     /// Number of the scene in the set.
     pub(super) scene: u64,
     /// Number of the pose in the scene.
     pub(super) number: u32,
     pub(super) pose: Pose,
-    /// By firing.
-    pub(super) heard: Vec<Firing>,
+    /// Firings in plan order.
+    pub(super) firings: Vec<SimulatedFiring>,
 }
 
-/// One firing.
-pub(super) struct Firing {
+/// Firing with its simulated reading.
+pub(super) struct SimulatedFiring {
     pub(super) azimuth_deg: f64,
     pub(super) direction_rad: f64,
     pub(super) reading: Prediction,
-    /// Its echoes, where they are kept.
+    /// Echoes of the firing, if they are recorded.
     pub(super) echoes: Vec<Arrival>,
-    /// Its envelope, where that is kept.
+    /// Envelope of the firing, if it is recorded.
     pub(super) envelope: Vec<f32>,
 }
 
-impl AtPose {
-    /// All firings of a plan.
+impl PoseReadings {
+    /// Simulates all firings of a plan.
     ///
     /// # Errors
-    /// When there are too many paths.
-    pub(super) fn listen(
-        loaded: &Loaded,
+    /// Returns an error if there are too many paths.
+    pub(super) fn simulate(
+        loaded: &LoadedSpec,
         (scene, number): (u64, u32),
         noise: &ReceiverNoise,
         simulator: &Simulator,
@@ -48,9 +48,9 @@ impl AtPose {
         plan: &ScanPlan,
     ) -> Result<Self, TooCostly> {
         let point = simulator.at(pose.position());
-        let mut rng = rng(&loaded.sha256, Of::Pose(scene, number));
+        let mut rng = rng(&loaded.sha256, RandomStream::Pose(scene, number));
         let keep = &loaded.spec.keep;
-        let mut heard = Vec::with_capacity(plan.beams() as usize);
+        let mut firings = Vec::with_capacity(plan.beams() as usize);
         for index in 0..plan.beams() {
             let azimuth_deg = plan.azimuth_deg(index / plan.pings_per_stop);
             let direction_rad = pose.direction_rad(azimuth_deg);
@@ -73,8 +73,8 @@ impl AtPose {
                 }
                 false => Vec::new(),
             };
-            heard.push(Firing { azimuth_deg, direction_rad, reading, echoes, envelope });
+            firings.push(SimulatedFiring { azimuth_deg, direction_rad, reading, echoes, envelope });
         }
-        Ok(Self { scene, number, pose, heard })
+        Ok(Self { scene, number, pose, firings })
     }
 }

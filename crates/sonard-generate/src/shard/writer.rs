@@ -1,4 +1,4 @@
-//! The tables of a shard while they are written.
+//! Writing of the tables of a shard.
 
 use std::{
     collections::BTreeMap,
@@ -15,10 +15,10 @@ use sonard_model::{
 };
 use sonard_records::PathRecord;
 
-use super::rows::{AtPose, Firing};
+use super::rows::{PoseReadings, SimulatedFiring};
 use crate::{
-    draw::Drawn,
     labels,
+    sample::SampledScene,
     shard::ShardError,
     spec::{KeepKeys, Spec},
     table::Table,
@@ -26,31 +26,31 @@ use crate::{
 
 type Row<'a> = SmallVec<[Option<Value<'a>>; 20]>;
 
-/// Tables, each with how many rows it has.
-pub(super) struct Tables {
+/// Open tables with their numbers of rows.
+pub(super) struct TableWriter {
     keep: KeepKeys,
     open: BTreeMap<Table, (TypedTable<Box<dyn Write + Send>>, u64)>,
 }
 
-impl Tables {
-    /// Begins all tables of a specification; `remark` stands in the metadata of each.
+impl TableWriter {
+    /// Opens all tables of a specification, with `identity` in the metadata of each.
     pub(super) fn create(
         spec: &Spec,
-        remark: &str,
+        identity: &str,
         create: &mut dyn FnMut(Table) -> io::Result<Box<dyn Write + Send>>,
     ) -> Result<Self, ShardError> {
         let mut open = BTreeMap::new();
-        for table in Table::of(spec) {
+        for table in Table::for_spec(spec) {
             let columns = table.columns(&spec.keep);
             let fields: Vec<Field> = columns.iter().map(|column| column.field).collect();
             let mut typed = TypedTable::new(create(table)?, table.row(), &fields)?;
-            typed.remark("sonard.shard", remark.to_owned());
+            typed.remark("sonard.shard", identity.to_owned());
             open.insert(table, (typed, 0));
         }
         Ok(Self { keep: spec.keep.clone(), open })
     }
 
-    /// Writes the ends of all tables; their rows.
+    /// Finishes all tables and returns their numbers of rows.
     pub(super) fn finish(self) -> Result<BTreeMap<Table, u64>, ShardError> {
         let mut all = BTreeMap::new();
         for (table, (typed, rows)) in self.open {
@@ -66,10 +66,10 @@ impl Tables {
         typed.row(row)
     }
 
-    /// What was drawn for a scene.
+    /// Writes the sampled values of a scene.
     pub(super) fn scene(
         &mut self,
-        drawn: &Drawn,
+        drawn: &SampledScene,
         simulator: &Simulator,
     ) -> Result<(), ExportError> {
         let (air, noise) = (&drawn.air, &drawn.noise);
@@ -91,27 +91,31 @@ impl Tables {
         )
     }
 
-    /// The readings at a pose, and their echoes.
-    pub(super) fn pose(&mut self, simulator: &Simulator, at: &AtPose) -> Result<(), ShardError> {
+    /// Writes the readings at a pose, and their echoes.
+    pub(super) fn pose(
+        &mut self,
+        simulator: &Simulator,
+        at: &PoseReadings,
+    ) -> Result<(), ShardError> {
         let reflectors = self.keep.ideal_range.then(|| {
             let scene = simulator.scene();
             Reflectors::new(scene, &scene.floor_plan())
         });
-        for (firing, index) in at.heard.iter().zip(0..) {
+        for (firing, index) in at.firings.iter().zip(0..) {
             let ideal_m = reflectors.as_ref().map(|reflectors| {
                 let direction = DVec2::from_angle(firing.direction_rad);
                 reflectors.nearest(at.pose.position(), direction, None).map(|hit| hit.distance_m)
             });
-            let words = self.keep.path.then(|| heard_path(simulator, firing)).flatten();
-            let row = self.reading(simulator, at, (firing, index), words.as_deref(), ideal_m);
+            let path = self.keep.path.then(|| echo_path(simulator, firing)).flatten();
+            let row = self.reading(simulator, at, (firing, index), path.as_deref(), ideal_m);
             self.row(Table::Readings, row)?;
             for echo in &firing.echoes {
-                let path = in_words(simulator, &echo.path, echo.length_m);
+                let path = path_text(simulator, &echo.path, echo.length_m);
                 let row = Row::from_iter([
                     integer(at.scene),
                     integer(at.number.into()),
                     integer(index),
-                    word(echo.path.kind()),
+                    enum_text(echo.path.kind()),
                     integer(echo.path.order() as u64),
                     number(echo.length_m),
                     number(echo.amplitude),
@@ -126,8 +130,8 @@ impl Tables {
     fn reading<'a>(
         &self,
         simulator: &Simulator,
-        at: &AtPose,
-        (firing, index): (&'a Firing, u64),
+        at: &PoseReadings,
+        (firing, index): (&'a SimulatedFiring, u64),
         path: Option<&'a str>,
         ideal_m: Option<Option<f64>>,
     ) -> Row<'a> {
@@ -140,11 +144,11 @@ impl Tables {
             number(at.pose.y_m),
             number(at.pose.heading_deg),
             number(firing.azimuth_deg),
-            word(reading.status),
+            enum_text(reading.status),
             reading.range_m.map(Value::Number),
         ]);
-        // What was not heard is the candidate that came closest, not what a reading is of.
-        let heard = reading.arrival.as_ref().filter(|_| reading.status.has_range());
+        // Without an echo, the arrival is only the candidate closest to detection.
+        let echo = reading.arrival.as_ref().filter(|_| reading.status.has_range());
         if keep.strength {
             row.extend([
                 reading.echoes_us.first().copied().map(Value::Number),
@@ -154,16 +158,16 @@ impl Tables {
         }
         if keep.path {
             row.extend([
-                heard.and_then(|arrival| word(arrival.path.kind())),
-                heard.and_then(|arrival| integer(arrival.path.order() as u64)),
-                heard.map(|arrival| Value::Number(arrival.length_m)),
+                echo.and_then(|arrival| enum_text(arrival.path.kind())),
+                echo.and_then(|arrival| integer(arrival.path.order() as u64)),
+                echo.map(|arrival| Value::Number(arrival.length_m)),
                 path.and_then(text),
             ]);
         }
         row.extend(ideal_m.map(|range_m| range_m.map(Value::Number)));
         if keep.features {
             let feature = |path: &Path| labels::feature_of(path, simulator.scene());
-            row.push(heard.and_then(|arrival| text(feature(&arrival.path))));
+            row.push(echo.and_then(|arrival| text(feature(&arrival.path))));
         }
         if keep.trace_to_m > 0.0 {
             row.push(Some(Value::Numbers(&firing.envelope)));
@@ -171,8 +175,12 @@ impl Tables {
         row
     }
 
-    /// What is true of a scene, seen from where something stood.
-    pub(super) fn truth(&mut self, drawn: &Drawn, places: &[DVec2]) -> Result<(), ShardError> {
+    /// Writes the features and the true map of a scene, as seen from these positions.
+    pub(super) fn truth(
+        &mut self,
+        drawn: &SampledScene,
+        positions: &[DVec2],
+    ) -> Result<(), ShardError> {
         if self.keep.features {
             for feature in labels::features(&drawn.scene) {
                 let row = Row::from_iter([
@@ -190,18 +198,18 @@ impl Tables {
             }
         }
         if self.keep.occupancy_m > 0.0 {
-            self.map(drawn, places)?;
+            self.map(drawn, positions)?;
         }
         Ok(())
     }
 
-    fn map(&mut self, drawn: &Drawn, places: &[DVec2]) -> Result<(), ShardError> {
-        let (low, high) = extent(drawn, places);
+    fn map(&mut self, drawn: &SampledScene, positions: &[DVec2]) -> Result<(), ShardError> {
+        let (low, high) = extent(drawn, positions);
         let shape = GridShape::covering(low, high, self.keep.occupancy_m).map_err(|error| {
             let why = format!("{error} (keep.occupancy_m)");
             ShardError::DoesNotFit { scene: drawn.number, why }
         })?;
-        let grid = ideal(&drawn.scene, shape, places);
+        let grid = ideal(&drawn.scene, shape, positions);
         let cells: Vec<u32> = grid.probabilities().map(cell).collect();
         let row = Row::from_iter([
             integer(drawn.number),
@@ -216,15 +224,15 @@ impl Tables {
     }
 }
 
-/// Around everything that reflects and all places, with a margin, metres.
-fn extent(drawn: &Drawn, places: &[DVec2]) -> (DVec2, DVec2) {
+/// Returns the bounding box of all reflectors and positions, with a margin.
+fn extent(drawn: &SampledScene, positions: &[DVec2]) -> (DVec2, DVec2) {
     const MARGIN_M: f64 = 0.2;
     let walls = drawn.scene.walls.iter().flat_map(|wall| [wall.a, wall.b]);
     let cylinders = drawn.scene.cylinders.iter().flat_map(|cylinder| {
         let reach = DVec2::splat(cylinder.radius_m);
         [cylinder.center - reach, cylinder.center + reach]
     });
-    let all = walls.chain(cylinders).chain(places.iter().copied());
+    let all = walls.chain(cylinders).chain(positions.iter().copied());
     let (mut low, mut high) = (DVec2::splat(f64::INFINITY), DVec2::splat(f64::NEG_INFINITY));
     for point in all {
         (low, high) = (low.min(point), high.max(point));
@@ -232,7 +240,7 @@ fn extent(drawn: &Drawn, places: &[DVec2]) -> (DVec2, DVec2) {
     (low - DVec2::splat(MARGIN_M), high + DVec2::splat(MARGIN_M))
 }
 
-/// Free, occupied, or out of reach.
+/// Converts an occupancy probability: 0 free, 1 occupied, 2 not visible.
 fn cell(probability: f64) -> u32 {
     match probability {
         p if p < 0.25 => 0,
@@ -241,12 +249,12 @@ fn cell(probability: f64) -> u32 {
     }
 }
 
-fn heard_path(simulator: &Simulator, firing: &Firing) -> Option<String> {
+fn echo_path(simulator: &Simulator, firing: &SimulatedFiring) -> Option<String> {
     let arrival = firing.reading.arrival.as_ref().filter(|_| firing.reading.status.has_range())?;
-    Some(in_words(simulator, &arrival.path, arrival.length_m))
+    Some(path_text(simulator, &arrival.path, arrival.length_m))
 }
 
-fn in_words(simulator: &Simulator, path: &Path, length_m: f64) -> String {
+fn path_text(simulator: &Simulator, path: &Path, length_m: f64) -> String {
     PathRecord::of(simulator.scene(), path, length_m).in_words()
 }
 
@@ -262,10 +270,10 @@ fn text(text: &str) -> Option<Value<'_>> {
     Some(Value::Text(text.into()))
 }
 
-/// A word of the records, as a log has it.
-fn word<'a>(value: impl Serialize) -> Option<Value<'a>> {
+/// Serialized name of an enum value, as written in a log.
+fn enum_text<'a>(value: impl Serialize) -> Option<Value<'a>> {
     match serde_json::to_value(value) {
-        Ok(serde_json::Value::String(word)) => Some(Value::Text(word.into())),
+        Ok(serde_json::Value::String(enum_text)) => Some(Value::Text(enum_text.into())),
         _ => None,
     }
 }

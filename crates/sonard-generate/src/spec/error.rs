@@ -1,19 +1,19 @@
-//! What can be wrong with a specification.
+//! Errors of a specification.
 
 use std::fmt;
 
-/// A fault in a specification, with its place in the file.
+/// Fault in a specification, with its position in the file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct SpecError {
-    /// The file, as its reader called it.
+    /// File name, as given by the caller.
     pub file: String,
-    /// Line and column from 1, where they are known.
+    /// Line and column from 1, if known.
     pub place: Option<(usize, usize)>,
-    /// Which field, as `scene[0].width_m`; empty for the file as a whole.
+    /// Path of the field, such as `scene[0].width_m`; empty for the whole file.
     pub field: String,
-    /// What is wrong.
+    /// Description of the fault.
     pub message: String,
-    /// What would be right.
+    /// Advice for the user, with valid values.
     pub help: String,
 }
 
@@ -32,15 +32,15 @@ impl fmt::Display for SpecError {
 
 impl std::error::Error for SpecError {}
 
-/// A fault before its place is looked up.
+/// Fault without its position in the file.
 #[derive(Debug)]
-pub(super) struct Fault {
+pub(super) struct SpecFault {
     pub(super) field: String,
     pub(super) message: String,
     pub(super) help: String,
 }
 
-impl Fault {
+impl SpecFault {
     pub(super) fn new(
         field: impl Into<String>,
         message: impl Into<String>,

@@ -1,34 +1,35 @@
-//! CDR, the bytes of ROS 2's messages (OMG DDS-XTypes, "plain CDR" version 1), of either byte order.
+//! Decoding of CDR, the serialization of ROS 2 messages (OMG DDS-XTypes, "plain CDR" version 1), in
+//! either byte order.
 //!
-//! Four bytes say which encoding it is. Behind them each number is aligned to its size, counted from behind
-//! those four. A text is its length with the zero that ends it, then both; a list is its length, then its
-//! elements.
+//! Four bytes identify the encoding. Numbers after them are aligned to their size, counted from the
+//! end of those four bytes. A string is its length including the terminating zero, then its bytes;
+//! a list is its length, then its elements.
 
-/// A message that is being decoded.
+/// Decoder of one message.
 #[derive(Debug)]
-pub(crate) struct Cdr<'a> {
-    /// From behind the four bytes of the encoding.
+pub(crate) struct CdrReader<'a> {
+    /// Message after the four bytes of the encoding.
     bytes: &'a [u8],
     at: usize,
     is_big_endian: bool,
 }
 
-/// Why bytes are no such message.
+/// Decoding error.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub(crate) enum CdrError {
-    #[error("its bytes end too early")]
+    #[error("the message ends too early")]
     Short,
-    #[error("its encoding, {0:#06x}, is not plain CDR")]
+    #[error("encoding {0:#06x} is not plain CDR")]
     Encoding(u16),
-    #[error("a text in it is not UTF-8, or has no end")]
+    #[error("a string is not UTF-8 or not terminated")]
     Text,
 }
 
-/// A part of a message.
-pub(crate) type Part<T> = Result<T, CdrError>;
+/// Result of decoding a part of a message.
+pub(crate) type Decoded<T> = Result<T, CdrError>;
 
-impl<'a> Cdr<'a> {
-    pub(crate) fn new(message: &'a [u8]) -> Part<Self> {
+impl<'a> CdrReader<'a> {
+    pub(crate) fn new(message: &'a [u8]) -> Decoded<Self> {
         let ([high, low, _, _], bytes) = message.split_first_chunk().ok_or(CdrError::Short)?;
         match (high, low) {
             (0, 0 | 1) => Ok(Self { bytes, at: 0, is_big_endian: *low == 0 }),
@@ -36,7 +37,7 @@ impl<'a> Cdr<'a> {
         }
     }
 
-    fn take<const N: usize>(&mut self) -> Part<[u8; N]> {
+    fn take<const N: usize>(&mut self) -> Decoded<[u8; N]> {
         let from = self.at.next_multiple_of(N);
         let rest = self.bytes.get(from..).ok_or(CdrError::Short)?;
         let mut number = *rest.first_chunk::<N>().ok_or(CdrError::Short)?;
@@ -47,38 +48,38 @@ impl<'a> Cdr<'a> {
         Ok(number)
     }
 
-    pub(crate) fn u8(&mut self) -> Part<u8> {
+    pub(crate) fn u8(&mut self) -> Decoded<u8> {
         self.take().map(u8::from_le_bytes)
     }
 
-    pub(crate) fn u32(&mut self) -> Part<u32> {
+    pub(crate) fn u32(&mut self) -> Decoded<u32> {
         self.take().map(u32::from_le_bytes)
     }
 
-    pub(crate) fn i32(&mut self) -> Part<i32> {
+    pub(crate) fn i32(&mut self) -> Decoded<i32> {
         self.take().map(i32::from_le_bytes)
     }
 
-    pub(crate) fn f32(&mut self) -> Part<f32> {
+    pub(crate) fn f32(&mut self) -> Decoded<f32> {
         self.take().map(f32::from_le_bytes)
     }
 
-    pub(crate) fn f64(&mut self) -> Part<f64> {
+    pub(crate) fn f64(&mut self) -> Decoded<f64> {
         self.take().map(f64::from_le_bytes)
     }
 
-    pub(crate) fn text(&mut self) -> Part<&'a str> {
+    pub(crate) fn text(&mut self) -> Decoded<&'a str> {
         let length = self.u32()? as usize;
         let rest = self.bytes.get(self.at..).ok_or(CdrError::Short)?;
         let text = rest.get(..length).ok_or(CdrError::Short)?;
         self.at += length;
-        // Some write an empty text without its zero.
+        // Some programs write an empty string without its terminating zero.
         let text = if length == 0 { Some(text) } else { text.strip_suffix(&[0]) };
         text.and_then(|text| std::str::from_utf8(text).ok()).ok_or(CdrError::Text)
     }
 
-    /// The elements of a list. What a length says is not believed before the elements are there.
-    pub(crate) fn list<T>(&mut self, element: impl Fn(&mut Self) -> Part<T>) -> Part<Vec<T>> {
+    /// Decodes a list. Memory grows with decoded elements, as the stated length may be wrong.
+    pub(crate) fn list<T>(&mut self, element: impl Fn(&mut Self) -> Decoded<T>) -> Decoded<Vec<T>> {
         let length = self.u32()?;
         let mut elements = Vec::new();
         for _ in 0..length {

@@ -1,4 +1,4 @@
-//! The messages of MCAP files, in the order in which they stand there.
+//! Reading of messages from MCAP files, in file order.
 
 use std::{
     collections::{BTreeMap, VecDeque},
@@ -17,99 +17,99 @@ use ruzstd::decoding::StreamingDecoder;
 
 use crate::ImportError;
 
-/// How every such file begins and ends.
+/// Magic bytes at both ends of a file.
 pub(crate) const MAGIC: &[u8] = b"\x89MCAP0\r\n";
 
-/// The longest record that is taken into memory, and what a chunk may become, bytes.
-const MOST_BYTES: u64 = 1 << 28;
+/// Maximum size of a record and of a decompressed chunk.
+const MAX_BYTES: u64 = 1 << 28;
 
-/// The compression that recorders of ROS 2 and `mcap` prefer.
+/// Compression preferred by ROS 2 recorders and by `mcap`.
 const ZSTD: &str = "zstd";
 
-/// What stands before the records of a chunk, without the name of its compression: three times eight bytes, a check
-/// sum and the lengths of name and records.
+/// Size of a chunk's head without the name of its compression: three 8-byte numbers, a checksum,
+/// and the lengths of name and records.
 const CHUNK_HEAD: usize = 3 * 8 + 4 + 4 + 8;
 
-/// A channel of a recording.
+/// Channel of a recording.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Channel {
+pub(crate) struct ChannelInfo {
     pub(crate) topic: String,
-    /// Name of its type.
+    /// Message type, such as `sensor_msgs/msg/Range`.
     pub(crate) type_name: String,
-    /// How its messages are encoded.
+    /// Message encoding, such as `cdr`.
     pub(crate) encoding: String,
 }
 
-/// A message as it was recorded.
+/// Message with its channel and time of recording.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Message {
-    pub(crate) channel: Arc<Channel>,
-    /// Nanoseconds since 1970.
+pub(crate) struct RecordedMessage {
+    pub(crate) channel: Arc<ChannelInfo>,
+    /// Time of recording, nanoseconds since 1970.
     pub(crate) recorded_ns: u64,
     pub(crate) bytes: Vec<u8>,
 }
 
-/// The messages of such types in files that follow each other, in their order.
-pub(crate) struct Messages<'a, R> {
-    files: Files<R>,
+/// Iterator over the messages of some types in consecutive files.
+pub(crate) struct MessageReader<'a, R> {
+    files: FileReader<R>,
     types: &'a [&'a str],
-    topics: Option<Topics>,
-    /// The rest of a chunk.
-    waiting: VecDeque<Message>,
+    channels: Option<ChannelTable>,
+    /// Remaining messages of the current chunk.
+    pending: VecDeque<RecordedMessage>,
 }
 
-impl<'a, R: Read> Messages<'a, io::BufReader<R>> {
-    pub(crate) fn of(source: R, types: &'a [&'a str]) -> Self {
-        let files = Files { source: io::BufReader::new(source), at: 0 };
-        Self { files, types, topics: None, waiting: VecDeque::new() }
+impl<'a, R: Read> MessageReader<'a, io::BufReader<R>> {
+    pub(crate) fn new(source: R, types: &'a [&'a str]) -> Self {
+        let files = FileReader { source: io::BufReader::new(source), at: 0 };
+        Self { files, types, channels: None, pending: VecDeque::new() }
     }
 }
 
-impl<R: Read> Messages<'_, R> {
-    /// Takes the next record in; whether there was one.
-    fn read_on(&mut self) -> Result<bool, ImportError> {
-        let Some(topics) = &mut self.topics else {
-            self.topics = self.files.begin()?.then(Topics::default);
-            return Ok(self.topics.is_some());
+impl<R: Read> MessageReader<'_, R> {
+    /// Reads the next record; returns `false` at the end of the last file.
+    fn read_record(&mut self) -> Result<bool, ImportError> {
+        let Some(channels) = &mut self.channels else {
+            self.channels = self.files.begin()?.then(ChannelTable::default);
+            return Ok(self.channels.is_some());
         };
         let Some((opcode, body)) = self.files.record()? else {
-            self.topics = None;
+            self.channels = None;
             return Ok(true);
         };
         let files = &self.files;
         let record = parse_record(opcode, &body).map_err(|error| files.damaged(&error))?;
         let Record::Chunk { header, data } = record else {
-            self.waiting.extend(topics.take(record, self.types));
+            self.pending.extend(channels.take(record, self.types));
             return Ok(true);
         };
-        if header.uncompressed_size > MOST_BYTES {
-            return Err(files.damaged(&"a chunk of it is too long"));
+        if header.uncompressed_size > MAX_BYTES {
+            return Err(files.damaged(&"a chunk is too long"));
         }
         let plain;
         let chunk = if header.compression == ZSTD {
-            plain = without_zstd(&header, &data).map_err(|error| files.damaged(&error))?;
+            plain = decompress_zstd(&header, &data).map_err(|error| files.damaged(&error))?;
             &plain
         } else {
-            // What is told of it, and its records; more may stand behind them.
+            // Head and records of the chunk; padding may follow.
             let end = CHUNK_HEAD + header.compression.len() + header.compressed_size as usize;
             body.get(..end).unwrap_or(&body)
         };
-        let mut take = |record: Record<'_>| self.waiting.extend(topics.take(record, self.types));
-        each_of_chunk(chunk, header.uncompressed_size as usize, &mut take)
+        let mut take = |record: Record<'_>| self.pending.extend(channels.take(record, self.types));
+        for_each_record(chunk, header.uncompressed_size as usize, &mut take)
             .map_err(|error| files.unpacked(error))?;
         Ok(true)
     }
 }
 
-impl<R: Read> Iterator for Messages<'_, R> {
-    type Item = Result<Message, ImportError>;
+impl<R: Read> Iterator for MessageReader<'_, R> {
+    type Item = Result<RecordedMessage, ImportError>;
 
     fn next(&mut self) -> Option<Self::Item> {
         loop {
-            if let Some(message) = self.waiting.pop_front() {
+            if let Some(message) = self.pending.pop_front() {
                 return Some(Ok(message));
             }
-            match self.read_on() {
+            match self.read_record() {
                 Ok(true) => {}
                 Ok(false) => return None,
                 Err(error) => return Some(Err(error)),
@@ -118,36 +118,37 @@ impl<R: Read> Iterator for Messages<'_, R> {
     }
 }
 
-/// The body of the same chunk, not compressed.
+/// Decompresses a Zstandard chunk.
 ///
-/// Zstandard is unpacked here, by a decoder in Rust, because the library's needs a C library of its own.
+/// The Rust decoder is used because that of the `mcap` crate needs a C library.
 ///
 /// # Errors
-/// No such data, or another length of it than the chunk's head says.
-fn without_zstd(header: &ChunkHeader, data: &[u8]) -> io::Result<Vec<u8>> {
+/// Returns an error for invalid data, or if the decompressed length differs from the chunk's head.
+fn decompress_zstd(header: &ChunkHeader, data: &[u8]) -> io::Result<Vec<u8>> {
     let length = header.uncompressed_size;
     let mut body = Vec::with_capacity(CHUNK_HEAD + length as usize);
     for number in [header.message_start_time, header.message_end_time, length] {
         body.extend(number.to_le_bytes());
     }
     body.extend(header.uncompressed_crc.to_le_bytes());
-    body.extend(0_u32.to_le_bytes()); // no compression's name
+    body.extend(0_u32.to_le_bytes()); // empty name of the compression
     body.extend(length.to_le_bytes());
     let decoder = StreamingDecoder::new(data).map_err(io::Error::other)?;
-    // One byte more than there may be tells that there is more.
+    // Reading one more byte than stated detects longer data.
     let unpacked = decoder.take(length + 1).read_to_end(&mut body)?;
     if unpacked as u64 == length {
         Ok(body)
     } else {
-        Err(io::Error::other("a chunk unpacks to another length than it says"))
+        Err(io::Error::other("a chunk decompresses to another length than stated"))
     }
 }
 
-/// Gives each record of a chunk of this body, which unpacks to so many bytes by its own account.
+/// Calls `take` for each record of a chunk that states a decompressed size of `unpacked` bytes.
 ///
-/// The library's own reader of chunks knows no limit, and takes a record for as long as it says it is; of a file's
-/// records it knows one. So it is given the chunk as a file of nothing else.
-fn each_of_chunk(
+/// The chunk reader of the `mcap` crate has no length limit and trusts the stated length of each
+/// record. Its file reader has a limit, so the chunk is passed as a file that contains nothing
+/// else.
+fn for_each_record(
     body: &[u8],
     unpacked: usize,
     take: &mut impl FnMut(Record<'_>),
@@ -166,30 +167,30 @@ fn each_of_chunk(
                 let read = source.read(reader.insert(wanted))?;
                 reader.notify_read(read);
             }
-            LinearReadEvent::Record { data, opcode } if is_of_messages(opcode) => {
+            LinearReadEvent::Record { data, opcode } if is_relevant(opcode) => {
                 take(parse_record(opcode, data)?);
             }
-            // Of others the library believes lengths that may be lies.
+            // The `mcap` crate trusts lengths in other records, which may be wrong.
             LinearReadEvent::Record { .. } => {}
         }
     }
     Ok(())
 }
 
-/// Whether a record in a chunk matters.
-const fn is_of_messages(opcode: u8) -> bool {
+/// Returns `true` for the records in a chunk that are needed to read messages.
+const fn is_relevant(opcode: u8) -> bool {
     matches!(opcode, op::SCHEMA | op::CHANNEL | op::MESSAGE)
 }
 
-/// Files that follow each other.
-struct Files<R> {
+/// Consecutive MCAP files in one stream.
+struct FileReader<R> {
     source: R,
-    /// Bytes that were read.
+    /// Number of bytes read.
     at: u64,
 }
 
-impl<R: Read> Files<R> {
-    /// Whether another file begins.
+impl<R: Read> FileReader<R> {
+    /// Reads the magic bytes of the next file; returns `false` at the end of the stream.
     fn begin(&mut self) -> Result<bool, ImportError> {
         let mut first = [0];
         if self.source.read(&mut first)? == 0 {
@@ -200,14 +201,14 @@ impl<R: Read> Files<R> {
         self.fill(&mut magic[1..])?;
         if magic != MAGIC {
             return Err(ImportError::mapping(
-                "it is no MCAP recording",
-                "give a recording of ROS 2 in MCAP, or the folder of one",
+                "not an MCAP recording",
+                "give a ROS 2 recording in MCAP, or its folder",
             ));
         }
         Ok(true)
     }
 
-    /// The next record that can matter: its kind and bytes; `None` at the end of the file.
+    /// Reads the next relevant record, as opcode and body; `None` at the end of the file.
     fn record(&mut self) -> Result<Option<(u8, Vec<u8>)>, ImportError> {
         loop {
             let mut head = [0; 9];
@@ -215,7 +216,7 @@ impl<R: Read> Files<R> {
             let [opcode, length @ ..] = head;
             let length = u64::from_le_bytes(length);
             match opcode {
-                op::SCHEMA | op::CHANNEL | op::MESSAGE | op::CHUNK if length > MOST_BYTES => {
+                op::SCHEMA | op::CHANNEL | op::MESSAGE | op::CHUNK if length > MAX_BYTES => {
                     return Err(self.damaged(&format!("a record of {length} bytes is too long")));
                 }
                 op::SCHEMA | op::CHANNEL | op::MESSAGE | op::CHUNK => {
@@ -253,39 +254,39 @@ impl<R: Read> Files<R> {
 
     fn cut_off(&self) -> ImportError {
         ImportError::mapping(
-            format!("the recording ends within a record, behind byte {}", self.at),
-            "it was cut off: `mcap recover` saves what is whole",
+            format!("the recording ends within a record, after byte {}", self.at),
+            "the file is truncated: `mcap recover` saves the intact part",
         )
     }
 
     fn damaged(&self, error: &dyn std::fmt::Display) -> ImportError {
         ImportError::mapping(
             format!("a record before byte {} is damaged: {error}", self.at),
-            "`mcap recover` saves what is whole",
+            "`mcap recover` saves the intact part",
         )
     }
 
     fn unpacked(&self, error: McapError) -> ImportError {
         match error {
             McapError::UnsupportedCompression(how) => ImportError::mapping(
-                format!("its chunks are compressed by {how}"),
-                "`mcap compress --compression lz4` writes it as it can be read here",
+                format!("unsupported chunk compression: {how}"),
+                "convert it: `mcap compress --compression lz4`",
             ),
             error => self.damaged(&error),
         }
     }
 }
 
-/// What the file said of its topics so far.
+/// Schemas and channels of the current file.
 #[derive(Default)]
-struct Topics {
+struct ChannelTable {
     types: BTreeMap<u16, String>,
-    channels: BTreeMap<u16, Arc<Channel>>,
+    channels: BTreeMap<u16, Arc<ChannelInfo>>,
 }
 
-impl Topics {
-    /// Takes a record in; the message that it is, if it is of such a type.
-    fn take(&mut self, record: Record<'_>, types: &[&str]) -> Option<Message> {
+impl ChannelTable {
+    /// Processes a record; returns its message if the type is one of `types`.
+    fn take(&mut self, record: Record<'_>, types: &[&str]) -> Option<RecordedMessage> {
         match record {
             Record::Schema { header, .. } => {
                 self.types.insert(header.id, header.name);
@@ -293,16 +294,19 @@ impl Topics {
             }
             Record::Channel(channel) => {
                 let type_name = self.types.get(&channel.schema_id).cloned().unwrap_or_default();
-                let told =
-                    Channel { topic: channel.topic, type_name, encoding: channel.message_encoding };
-                self.channels.insert(channel.id, Arc::new(told));
+                let info = ChannelInfo {
+                    topic: channel.topic,
+                    type_name,
+                    encoding: channel.message_encoding,
+                };
+                self.channels.insert(channel.id, Arc::new(info));
                 None
             }
             Record::Message { header, data } => {
                 let channel = self.channels.get(&header.channel_id)?;
                 let bytes = || data.into_owned();
                 let (channel, recorded_ns) = (Arc::clone(channel), header.log_time);
-                types.contains(&channel.type_name.as_str()).then(|| Message {
+                types.contains(&channel.type_name.as_str()).then(|| RecordedMessage {
                     channel,
                     recorded_ns,
                     bytes: bytes(),

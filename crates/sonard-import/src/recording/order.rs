@@ -1,31 +1,31 @@
-//! Messages by their stamps, where they stand in another order.
+//! Sorting of messages by time stamp.
 
-use super::mcap::Message;
+use super::mcap::RecordedMessage;
 use crate::ImportError;
 
-/// Messages that are sorted in memory, at most, bytes.
+/// Maximum size of the messages that are sorted in memory.
 const MAX_BYTES: usize = 256 << 20;
 
-/// All messages, sorted by what `stamp_ns` says of them; of equal ones, as they come.
+/// Sorts messages by `stamp_ns`, stably.
 ///
 /// # Errors
-/// They do not fit into memory, or one of them can't be read.
-pub(super) fn in_order(
-    messages: impl Iterator<Item = Result<Message, ImportError>>,
-    stamp_ns: impl Fn(&Message) -> Result<i64, ImportError>,
-) -> Result<impl Iterator<Item = Result<Message, ImportError>>, ImportError> {
+/// Returns an error for an unreadable message, or if the messages exceed the memory limit.
+pub(super) fn sort_by_stamp(
+    messages: impl Iterator<Item = Result<RecordedMessage, ImportError>>,
+    stamp_ns: impl Fn(&RecordedMessage) -> Result<i64, ImportError>,
+) -> Result<impl Iterator<Item = Result<RecordedMessage, ImportError>>, ImportError> {
     let mut bytes = 0;
     let mut all = Vec::new();
     for message in messages {
         let message = message?;
-        bytes += message.bytes.len() + size_of::<Message>();
+        bytes += message.bytes.len() + size_of::<RecordedMessage>();
         if bytes > MAX_BYTES {
             return Err(ImportError::mapping(
                 format!(
-                    "its messages are out of order, and more than the {} MB that are sorted in memory",
+                    "the messages are out of order and exceed the {} MB that can be sorted in memory",
                     MAX_BYTES >> 20
                 ),
-                "bring them into order first: `mcap sort FILE -o SORTED`",
+                "sort them first: `mcap sort FILE -o SORTED`",
             ));
         }
         all.push((stamp_ns(&message)?, message));

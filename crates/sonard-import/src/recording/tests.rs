@@ -1,4 +1,4 @@
-//! Recordings as other programs write them: encoded by another's encoder, in both byte orders.
+//! Recordings encoded by independent encoders, in both byte orders.
 
 mod chunks;
 mod places;
@@ -23,7 +23,7 @@ enum Order {
     Big,
 }
 
-/// A message behind the four bytes that say how it is encoded.
+/// Encodes a message after the four bytes of its encoding.
 fn cdr(message: &impl Serialize, order: Order) -> Vec<u8> {
     let (head, bytes) = match order {
         Order::Little => ([0, 1, 0, 0], cdr_encoding::to_vec::<_, LittleEndian>(message)),
@@ -57,7 +57,7 @@ fn transform(time_s: f64, parent: &str, child: &str, [x, y, yaw_deg]: [f64; 3]) 
     Transform(header(time_s, parent), child.to_owned(), [x, y, 0.0, 0.0, 0.0, sin, cos])
 }
 
-/// A recording in the making.
+/// Builder of a recording.
 struct Bag {
     out: mcap::Writer<Cursor<Vec<u8>>>,
     channels: BTreeMap<String, u16>,
@@ -114,7 +114,7 @@ impl Bag {
     }
 }
 
-fn taken() -> Taken {
+fn assumptions() -> Taken {
     Taken {
         sha256: String::new(),
         pose: Pose { x_m: 7.0, y_m: 8.0, heading_deg: 9.0 },
@@ -130,7 +130,7 @@ fn taken() -> Taken {
 
 fn examine(bytes: &[u8], mapping: Mapping) -> Result<Imported, ImportError> {
     let open = || -> io::Result<Box<dyn io::Read>> { Ok(Box::new(Cursor::new(bytes.to_vec()))) };
-    Source { open: &open }.examine(mapping, taken())
+    Source { open: &open }.examine(mapping, assumptions())
 }
 
 fn scans(bytes: &[u8], mapping: Mapping) -> Result<Vec<(ScanStart, Vec<Ping>)>, ImportError> {
@@ -148,12 +148,12 @@ fn scans(bytes: &[u8], mapping: Mapping) -> Result<Vec<(ScanStart, Vec<Ping>)>, 
     Ok(scans)
 }
 
-fn said<T: std::fmt::Debug>(result: Result<T, ImportError>) -> String {
+fn error_text<T: std::fmt::Debug>(result: Result<T, ImportError>) -> String {
     let error = result.expect_err("this is wrong");
     format!("{error}; {}", error.help())
 }
 
-/// A ranger that stands ahead of the middle of a robot that drives and turns.
+/// A ranger mounted ahead of the center of a robot that drives and turns.
 fn driving(order: Order) -> Bag {
     Bag::new(order)
         .mounts("base_link", "front", [0.2, 0.0, 0.0])
@@ -165,14 +165,14 @@ fn driving(order: Order) -> Bag {
 }
 
 #[test]
-fn poses_are_interpolated_at_the_stamp_in_both_byte_orders() {
+fn interpolates_poses_in_both_orders() {
     let [little, big] = [Order::Little, Order::Big]
         .map(|order| scans(&driving(order).bytes(), Mapping::default()).expect("a recording"));
     assert_eq!(
         little.iter().flat_map(|(_, pings)| pings).map(|ping| ping.range_m).collect::<Vec<_>>(),
         big.iter().flat_map(|(_, pings)| pings).map(|ping| ping.range_m).collect::<Vec<_>>()
     );
-    // One ranger that stands still is an array of one: each firing a round.
+    // A single fixed ranger is an array of one: each firing is a round.
     let [(first, one), (second, two), (_, three)] = &little[..] else { panic!("{little:?}") };
     assert_eq!(first.pose, Pose { x_m: 0.5, y_m: 0.25, heading_deg: 45.0 });
     assert_eq!(second.pose, Pose { x_m: 1.0, y_m: 0.5, heading_deg: 90.0 });
@@ -188,7 +188,7 @@ fn poses_are_interpolated_at_the_stamp_in_both_byte_orders() {
 }
 
 #[test]
-fn a_ranger_that_turns_makes_scans_that_end_where_they_began() {
+fn rotating_ranger_makes_scans() {
     let mut bag = Bag::new(Order::Little).mounts("base_link", "mount", [0.0, 0.1, 0.0]);
     for turn in 0..7 {
         let time_s = 10.0 + f64::from(turn);
@@ -201,16 +201,16 @@ fn a_ranger_that_turns_makes_scans_that_end_where_they_began() {
         bag = bag.range("/sonar/range", time_s, "sonar", 1.0 + turn as f32);
     }
     let scans = scans(&bag.bytes(), Mapping::default()).expect("a recording");
-    let told: Vec<Vec<_>> = scans
+    let message: Vec<Vec<_>> = scans
         .iter()
         .map(|(_, pings)| pings.iter().map(|ping| (ping.azimuth_deg, ping.range_m)).collect())
         .collect();
-    // From 4 m on nothing was heard.
+    // No echo from 4 m on.
     let turn = |ranges_m: [Option<f64>; 3]| [0.0, 90.0, 180.0].into_iter().zip(ranges_m);
-    assert_eq!(told[0], turn([Some(1.0), Some(2.0), Some(3.0)]).collect::<Vec<_>>());
-    assert_eq!(told[1], turn([None; 3]).collect::<Vec<_>>());
-    assert_eq!(told.len(), 3);
-    // On the axis, which stands beside the middle of the robot.
+    assert_eq!(message[0], turn([Some(1.0), Some(2.0), Some(3.0)]).collect::<Vec<_>>());
+    assert_eq!(message[1], turn([None; 3]).collect::<Vec<_>>());
+    assert_eq!(message.len(), 3);
+    // Position of the rotation axis, which is off the center of the robot.
     let pose = scans[0].0.pose;
     let (sin, cos) = 30_f64.to_radians().sin_cos();
     assert!(
@@ -220,7 +220,7 @@ fn a_ranger_that_turns_makes_scans_that_end_where_they_began() {
 }
 
 #[test]
-fn a_laser_scan_is_a_scan_whose_beams_have_times_and_places_of_their_own() {
+fn laser_scan_beams_have_own_times() {
     let scan = LaserScan(
         header(10.0, "laser"),
         [0.0, 1.5, std::f32::consts::FRAC_PI_2, 0.5, 1.5, 0.3, 4.0],
@@ -235,56 +235,60 @@ fn a_laser_scan_is_a_scan_whose_beams_have_times_and_places_of_their_own() {
     let scans = scans(&bag.bytes(), Mapping::default()).expect("a recording");
     let [(start, pings)] = &scans[..] else { panic!("{scans:?}") };
     assert_eq!(start.pose, Pose { x_m: 0.0, y_m: 0.0, heading_deg: 0.0 });
-    let told: Vec<_> = pings.iter().map(|ping| (ping.azimuth_deg, ping.status)).collect();
+    let message: Vec<_> = pings.iter().map(|ping| (ping.azimuth_deg, ping.status)).collect();
     let expected =
         [(90.0, PingStatus::Echo), (270.0, PingStatus::NoEcho), (0.0, PingStatus::MinRange)];
-    assert_eq!(told, expected);
+    assert_eq!(message, expected);
     assert_eq!(pings[1].pose, Some(Pose { x_m: 1.0, y_m: 0.0, heading_deg: 0.0 }));
     assert_eq!(pings[2].time.map(|time| time.as_millisecond()), Some(11_500));
 }
 
 #[test]
-fn readings_without_a_place_are_left_out_and_topic_frame_and_time_named() {
+fn skips_readings_without_pose() {
     let late = driving(Order::Little).range("/front/range", 3.5, "front", 1.0).bytes();
     let found = examine(&late, Mapping::default()).expect("the rest is read");
     assert_eq!(found.readings, 3);
-    let told = found.notes.join("\n");
+    let message = found.notes.join("\n");
     for part in
         ["/front/range: 1 of 4", "`base_link` in `map`", "1970-01-01T00:00:03.5Z", "00:00:02Z"]
     {
-        assert!(told.contains(part), "{part}: {told}");
+        assert!(message.contains(part), "{part}: {message}");
     }
     let never = Bag::new(Order::Little).moves(9.0, [0.0; 3]).range("/range", 1.0, "base_link", 1.0);
-    let told = said(scans(&never.moves(10.0, [1.0, 0.0, 0.0]).bytes(), Mapping::default()));
-    assert!(told.contains("/range: there is no transform"), "{told}");
+    let message =
+        error_text(scans(&never.moves(10.0, [1.0, 0.0, 0.0]).bytes(), Mapping::default()));
+    assert!(message.contains("/range: no transform of frame"), "{message}");
     let looped = driving(Order::Little).mounts("front", "map", [0.0; 3]).bytes();
-    assert!(said(scans(&looped, Mapping::default())).contains("its own parent"));
+    assert!(error_text(scans(&looped, Mapping::default())).contains("its own parent"));
     let twice = driving(Order::Little).mounts("odom", "front", [0.0; 3]).bytes();
-    assert!(said(scans(&twice, Mapping::default())).contains("`base_link` and in `odom`"));
+    assert!(error_text(scans(&twice, Mapping::default())).contains("`base_link` and `odom`"));
 }
 
 #[test]
-fn angles_and_places_that_are_none_are_no_readings() {
+fn infinite_angles_and_positions() {
     let angles = [0.0, 1.0, f32::INFINITY, 0.0, 0.0, 0.3, 4.0];
     let scan = LaserScan(header(1.0, "laser"), angles, vec![1.5, 2.0], Vec::new());
     let bag = Bag::new(Order::Little).add("/scan", LASER_SCAN, 1.0, &scan).bytes();
     assert_eq!(examine(&bag, Mapping::default()).expect("a recording").readings, 0);
     for far_m in [f64::NAN, f64::INFINITY, 1e300] {
         let bag = driving(Order::Little).moves(3.0, [far_m, 0.0, 0.0]).bytes();
-        assert!(said(examine(&bag, Mapping::default())).contains("no finite place"), "{far_m}");
+        assert!(
+            error_text(examine(&bag, Mapping::default())).contains("no finite position"),
+            "{far_m}"
+        );
     }
 }
 
 #[test]
-fn without_poses_the_given_one_holds() {
+fn given_pose_replaces_missing_poses() {
     let bag = Bag::new(Order::Big).range("/range", 1.0, "sonar", 1.5).bytes();
     assert!(!examine(&bag, Mapping::default()).expect("a recording").has_poses);
     let scans = scans(&bag, Mapping::default()).expect("a recording");
-    assert_eq!(scans[0].0.pose, taken().pose);
+    assert_eq!(scans[0].0.pose, assumptions().pose);
 }
 
 #[test]
-fn topics_are_chosen_and_predictions_left_alone() {
+fn selects_topics() {
     let bag = || {
         driving(Order::Little).range("/sonar/predicted/range", 1.5, "front", 9.0).range(
             "/rear/range",
@@ -298,14 +302,14 @@ fn topics_are_chosen_and_predictions_left_alone() {
     let one = |topic: &str| Mapping { topics: vec![topic.to_owned()], ..Mapping::default() };
     let found = examine(&bag().bytes(), one("/rear/range")).expect("a recording");
     assert_eq!((found.readings, found.echoes), (1, 1));
-    let told = said(examine(&bag().bytes(), one("/left")));
-    assert!(told.contains("/left") && told.contains("/rear/range"), "{told}");
+    let message = error_text(examine(&bag().bytes(), one("/left")));
+    assert!(message.contains("/left") && message.contains("/rear/range"), "{message}");
     let empty = Bag::new(Order::Little).moves(1.0, [0.0; 3]).bytes();
-    assert!(said(examine(&empty, Mapping::default())).contains("no message of sensor_msgs/Range"));
+    assert!(error_text(examine(&empty, Mapping::default())).contains("no sensor_msgs/Range"));
 }
 
 #[test]
-fn recordings_in_several_files_follow_each_other() {
+fn reads_several_files() {
     let one = driving(Order::Little).bytes();
     let other = Bag::new(Order::Big).range("/front/range", 1.75, "front", 2.0).bytes();
     let both = [one, other].concat();
@@ -314,42 +318,45 @@ fn recordings_in_several_files_follow_each_other() {
 }
 
 #[test]
-fn what_is_cut_off_or_no_recording_is_told() {
+fn rejects_truncated_recordings() {
     let whole = driving(Order::Little).bytes();
     for end in 9..whole.len() {
-        let told = said(examine(&whole[..end], Mapping::default()));
-        assert!(told.contains("ends within a record") || told.contains("damaged"), "{end}: {told}");
+        let message = error_text(examine(&whole[..end], Mapping::default()));
+        assert!(
+            message.contains("ends within a record") || message.contains("damaged"),
+            "{end}: {message}"
+        );
     }
-    let sqlite = said(examine(b"SQLite format 3\0\x10\0", Mapping::default()));
+    let sqlite = error_text(examine(b"SQLite format 3\0\x10\0", Mapping::default()));
     assert!(sqlite.contains("SQLite database"), "{sqlite}");
     let mapping = || Mapping {
         columns: Mapping::columns_of("azimuth_deg=1,range_m=2").expect("columns"),
         ..Mapping::default()
     };
-    assert!(said(examine(&whole, mapping())).contains("defines its own fields"));
+    assert!(error_text(examine(&whole, mapping())).contains("defines its own fields"));
 }
 
 #[test]
-fn messages_that_are_none_are_refused() {
+fn rejects_malformed_messages() {
     let message = cdr(&range(1.0, "front", 1.0), Order::Little);
     assert_eq!(read_message(RANGE, &message).expect("decodes"), 1);
     for end in 0..message.len() {
-        let told = said(read_message(RANGE, &message[..end]));
-        // What the variance stands behind is whole before it.
-        assert!(told.contains("end too early"), "{end}: {told}");
+        let message = error_text(read_message(RANGE, &message[..end]));
+        // The range is complete before the optional variance.
+        assert!(message.contains("ends too early"), "{end}: {message}");
     }
     for encoding in [[0, 2], [0, 3], [0, 6], [1, 1]] {
         let other = [&encoding[..], &message[2..]].concat();
-        assert!(said(read_message(RANGE, &other)).contains("not plain CDR"), "{encoding:?}");
+        assert!(error_text(read_message(RANGE, &other)).contains("not plain CDR"), "{encoding:?}");
     }
-    // A list that says that it is long.
+    // List with a wrong, large length.
     let long = [&[0, 1, 0, 0], &u32::MAX.to_le_bytes()[..], &[0; 64]].concat();
-    assert!(said(read_message(TRANSFORMS, &long)).contains("end too early"));
+    assert!(error_text(read_message(TRANSFORMS, &long)).contains("ends too early"));
 }
 
 proptest! {
     #[test]
-    fn any_bytes_are_a_message_or_none(bytes in proptest::collection::vec(any::<u8>(), 0..200)) {
+    fn any_bytes_decode_or_fail(bytes in proptest::collection::vec(any::<u8>(), 0..200)) {
         for type_name in [RANGE, LASER_SCAN, TRANSFORMS] {
             for head in [[0, 0, 0, 0], [0, 1, 0, 0]] {
                 let _ = read_message(type_name, &[&head[..], &bytes].concat());
@@ -360,7 +367,7 @@ proptest! {
     }
 
     #[test]
-    fn a_damaged_recording_never_panics(at in 0_usize..1000, bits in 1_u8..) {
+    fn damaged_recording_never_panics(at in 0_usize..1000, bits in 1_u8..) {
         let mut bytes = driving(Order::Little).bytes();
         let at = at % bytes.len();
         bytes[at] ^= bits;

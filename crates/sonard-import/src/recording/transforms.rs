@@ -1,82 +1,83 @@
-//! Where frames were: the tree that `/tf` and `/tf_static` tell, over time.
+//! Frame tree of `/tf` and `/tf_static` over time.
 
 use std::collections::BTreeMap;
 
 use glam::{DQuat, DVec3};
 use thiserror::Error;
 
-use super::message::{Transform, moment};
+use super::message::{TransformMessage, timestamp};
 
-/// Transforms by the frame that they place.
+/// Frames of a recording, by name.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub(crate) struct Transforms {
-    frames: BTreeMap<String, Link>,
+pub(crate) struct FrameTree {
+    frames: BTreeMap<String, FrameHistory>,
     count: usize,
 }
 
-/// Where a frame is in its parent.
+/// Placement of a frame in its parent over time.
 #[derive(Debug, Clone, PartialEq)]
-struct Link {
+struct FrameHistory {
     parent: String,
     is_fixed: bool,
-    /// By time, nanoseconds since 1970; of a fixed one the last counts.
-    places: Vec<(i64, Placed)>,
+    /// Placements by time, nanoseconds since 1970; a fixed frame keeps only the last.
+    placements: Vec<(i64, Placement)>,
 }
 
-/// Where something is in a frame.
+/// Position and rotation in a frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Placed {
+pub(crate) struct Placement {
     pub(crate) at: DVec3,
     pub(crate) turn: DQuat,
 }
 
-/// What is wrong with the frames of a recording.
+/// Fault of the frames of a recording.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub(crate) enum TransformError {
     #[error(
-        "there is no transform of the frame `{child}` in `{parent}` at {time}: they go from {from} to {to}"
+        "no transform of frame `{child}` in `{parent}` at {time}: available from {from} to {to}"
     )]
-    Lacks { child: String, parent: String, time: String, from: String, to: String },
+    Missing { child: String, parent: String, time: String, from: String, to: String },
     #[error(
-        "the transforms of the frame `{child}` in `{parent}` have a gap from {from} to {to}, and it moved"
+        "no transform of frame `{child}` in `{parent}` from {from} to {to}, during which it moved"
     )]
     Gap { child: String, parent: String, from: String, to: String },
-    #[error("the frame `{0}` is its own parent")]
+    #[error("frame `{0}` is its own parent")]
     Loop(String),
-    #[error("the frame `{child}` is in `{parent}` and in `{other}`")]
+    #[error("frame `{child}` has two parents: `{parent}` and `{other}`")]
     TwoParents { child: String, parent: String, other: String },
-    #[error("a transform of the frame `{0}` has no finite place or no direction")]
-    Senseless(String),
-    #[error("there are more than {MOST} transforms")]
+    #[error("a transform of frame `{0}` has no finite position or no rotation")]
+    NotFinite(String),
+    #[error("more than {MAX_TRANSFORMS} transforms")]
     TooMany,
 }
 
-/// As many as are kept: 64 MB.
-const MOST: usize = 1 << 20;
-/// A frame that moved is not where it was between, after so long without a transform, nanoseconds.
+/// Maximum number of transforms: 64 MB.
+const MAX_TRANSFORMS: usize = 1 << 20;
+/// Maximum gap between transforms of a moving frame for interpolation, nanoseconds.
 const MAX_GAP_NS: i64 = 5_000_000_000;
-/// A frame that moved by more than this has moved, metres and radians.
+/// Displacement and rotation from which a frame counts as moved, metres and radians.
 const MOVED_M: f64 = 0.05;
 const MOVED_RAD: f64 = 0.05;
-/// No robot is so far from where its map begins, metres.
-const MOST_M: f64 = 1e9;
-/// Cosine of a tilt that is none.
+/// Maximum distance of a robot from the origin of its map, metres.
+const MAX_DISTANCE_M: f64 = 1e9;
+/// Cosine of a tilt that is only a rounding error.
 const LEVEL: f64 = 1.0 - 1e-12;
-/// No tree of a robot is this deep.
-const MOST_DEEP: usize = 64;
+/// Maximum depth of the frame tree.
+const MAX_DEPTH: usize = 64;
 
-impl Placed {
+impl Placement {
     pub(crate) const ORIGIN: Self = Self { at: DVec3::ZERO, turn: DQuat::IDENTITY };
 
-    /// What is placed so in a frame that is itself placed.
+    /// Composes this placement with an inner one.
     pub(crate) fn then(self, inner: Self) -> Self {
         Self { at: self.at + self.turn * inner.at, turn: self.turn * inner.turn }
     }
 
-    /// Direction over the floor of a beam that is turned about its z axis, degrees counter-clockwise.
+    /// Returns the azimuth of a beam rotated about the z axis by `turned_deg`, degrees
+    /// counter-clockwise.
     pub(crate) fn beam_deg(self, turned_deg: f64) -> f64 {
         match self.upright().z {
-            // Level: without the rounding of a rotation.
+            // Level mounts avoid the rounding errors of a rotation.
             up if up > LEVEL => self.yaw_deg() + turned_deg,
             up if up < -LEVEL => self.yaw_deg() - turned_deg,
             _ => {
@@ -86,17 +87,17 @@ impl Placed {
         }
     }
 
-    /// Direction of its z axis.
+    /// Returns the direction of the z axis.
     fn upright(self) -> DVec3 {
         self.turn * DVec3::Z
     }
 
-    /// By how much the plane of its x and y is tilted, whichever side is up, degrees.
+    /// Returns the tilt of the x-y plane, regardless of which side is up, degrees.
     pub(crate) fn tilt_deg(self) -> f64 {
         self.upright().z.abs().min(1.0).acos().to_degrees()
     }
 
-    /// Elevation of its x axis, degrees.
+    /// Returns the elevation of the x axis, degrees.
     pub(crate) fn elevation_deg(self) -> f64 {
         (self.turn * DVec3::X).z.clamp(-1.0, 1.0).asin().to_degrees()
     }
@@ -105,7 +106,7 @@ impl Placed {
         self.at.distance(from.at) > MOVED_M || self.turn.angle_between(from.turn) > MOVED_RAD
     }
 
-    /// Direction of its x axis over the floor, degrees counter-clockwise.
+    /// Returns the azimuth of the x axis, degrees counter-clockwise.
     pub(crate) fn yaw_deg(self) -> f64 {
         let ahead = self.turn * DVec3::X;
         ahead.y.atan2(ahead.x).to_degrees()
@@ -116,84 +117,88 @@ impl Placed {
     }
 }
 
-impl Transforms {
-    /// Takes a transform in.
+impl FrameTree {
+    /// Adds a transform.
     pub(crate) fn add(
         &mut self,
-        transform: Transform,
+        transform: TransformMessage,
         is_fixed: bool,
     ) -> Result<(), TransformError> {
-        let Transform { header, child, translation_m, rotation } = transform;
+        let TransformMessage { header, child, translation_m, rotation } = transform;
         let (at, turn) = (DVec3::from(translation_m), DQuat::from_array(rotation));
         if !(at.is_finite()
-            && at.abs().max_element() < MOST_M
+            && at.abs().max_element() < MAX_DISTANCE_M
             && turn.is_finite()
             && turn.length_squared() > 1e-6)
         {
-            return Err(TransformError::Senseless(child));
+            return Err(TransformError::NotFinite(child));
         }
-        let placed = Placed { at, turn: turn.normalize() };
-        let fresh = || Link { parent: header.frame.clone(), is_fixed, places: Vec::new() };
+        let placed = Placement { at, turn: turn.normalize() };
+        let fresh =
+            || FrameHistory { parent: header.frame.clone(), is_fixed, placements: Vec::new() };
         let link = self.frames.entry(child.clone()).or_insert_with(fresh);
         if link.parent != header.frame {
             let parent = link.parent.clone();
             return Err(TransformError::TwoParents { child, parent, other: header.frame });
         }
         if is_fixed {
-            link.places.clear();
-        } else if let [.., (_, before), (last, at)] = &mut link.places[..]
+            link.placements.clear();
+        } else if let [.., (_, before), (last, at)] = &mut link.placements[..]
             && *before == placed
             && *at == placed
             && *last <= header.stamp_ns
         {
-            // A frame that rests is told again and again: its first time and its last are enough.
+            // Transforms of a resting frame repeat: the first and the last are sufficient.
             *last = header.stamp_ns;
             return Ok(());
         } else {
             self.count += 1;
-            if self.count > MOST {
+            if self.count > MAX_TRANSFORMS {
                 return Err(TransformError::TooMany);
             }
         }
-        link.places.push((header.stamp_ns, placed));
+        link.placements.push((header.stamp_ns, placed));
         Ok(())
     }
 
-    /// Checks whether a frame is placed in another, or another in it.
-    pub(crate) fn knows(&self, frame: &str) -> bool {
+    /// Returns `true` for a frame that has a parent or a child.
+    pub(crate) fn contains(&self, frame: &str) -> bool {
         self.frames.contains_key(frame) || self.frames.values().any(|link| link.parent == frame)
     }
 
-    /// Brings them into the order of time.
+    /// Sorts the placements of all frames by time.
     pub(crate) fn sort(&mut self) {
         for link in self.frames.values_mut() {
-            link.places.sort_by_key(|(time, _)| *time);
+            link.placements.sort_by_key(|(time, _)| *time);
         }
     }
 
-    /// The frames from one up to the root of its tree.
-    pub(crate) fn way_up<'a>(&'a self, frame: &'a str) -> Result<Vec<&'a str>, TransformError> {
-        let mut way = vec![frame];
+    /// Returns the path from a frame to the root of its tree.
+    pub(crate) fn path_to_root<'a>(
+        &'a self,
+        frame: &'a str,
+    ) -> Result<Vec<&'a str>, TransformError> {
+        let mut path = vec![frame];
         let mut at = frame;
         while let Some(link) = self.frames.get(at) {
             at = &link.parent;
-            way.push(at);
-            if way.len() > MOST_DEEP {
+            path.push(at);
+            if path.len() > MAX_DEPTH {
                 return Err(TransformError::Loop(frame.to_owned()));
             }
         }
-        Ok(way)
+        Ok(path)
     }
 
-    /// Where a frame was in one that it is below of, interpolated.
+    /// Returns the interpolated placement of a frame in one of its ancestors.
     pub(crate) fn place(
         &self,
         frame: &str,
         above: &str,
         time_ns: i64,
-    ) -> Result<Placed, TransformError> {
-        let mut placed = Placed::ORIGIN;
-        for child in self.way_up(frame)?.into_iter().take_while(|frame| *frame != above) {
+    ) -> Result<Placement, TransformError> {
+        let mut placed = Placement::ORIGIN;
+        for child in self.path_to_root(frame)?.into_iter().take_while(|frame| *frame != above) {
             let Some(link) = self.frames.get(child) else { break };
             placed = link.place(child, time_ns)?.then(placed);
         }
@@ -201,39 +206,41 @@ impl Transforms {
     }
 }
 
-impl Link {
-    fn place(&self, child: &str, time_ns: i64) -> Result<Placed, TransformError> {
-        let after = self.places.partition_point(|(time, _)| *time < time_ns);
-        let last = self.places.last();
+impl FrameHistory {
+    fn place(&self, child: &str, time_ns: i64) -> Result<Placement, TransformError> {
+        let after = self.placements.partition_point(|(time, _)| *time < time_ns);
+        let last = self.placements.last();
         if let Some((_, placed)) = last.filter(|_| self.is_fixed) {
             return Ok(*placed);
         }
-        if let Some((time, placed)) = self.places.get(after) {
+        if let Some((time, placed)) = self.placements.get(after) {
             if *time == time_ns {
                 return Ok(*placed);
             }
-            if let Some((before, from)) = after.checked_sub(1).and_then(|at| self.places.get(at)) {
+            if let Some((before, from)) =
+                after.checked_sub(1).and_then(|at| self.placements.get(at))
+            {
                 if time - before > MAX_GAP_NS && placed.has_moved(*from) {
                     return Err(TransformError::Gap {
                         child: child.to_owned(),
                         parent: self.parent.clone(),
-                        from: moment(*before).to_string(),
-                        to: moment(*time).to_string(),
+                        from: timestamp(*before).to_string(),
+                        to: timestamp(*time).to_string(),
                     });
                 }
                 let part = (time_ns - before) as f64 / (time - before) as f64;
                 return Ok(from.between(*placed, part));
             }
         }
-        let told = |at: Option<&(i64, Placed)>| {
-            at.map_or("none".to_owned(), |(time, _)| moment(*time).to_string())
+        let time = |at: Option<&(i64, Placement)>| {
+            at.map_or("none".to_owned(), |(time, _)| timestamp(*time).to_string())
         };
-        Err(TransformError::Lacks {
+        Err(TransformError::Missing {
             child: child.to_owned(),
             parent: self.parent.clone(),
-            time: moment(time_ns).to_string(),
-            from: told(self.places.first()),
-            to: told(last),
+            time: timestamp(time_ns).to_string(),
+            from: time(self.placements.first()),
+            to: time(last),
         })
     }
 }

@@ -1,10 +1,10 @@
-//! Columns by their names, and what is offered where these say too little.
+//! Inference of columns from their names, and the options offered if that fails.
 
 use super::*;
 
 fn mapped(header: &str, row: &str) -> Result<Imported, ImportError> {
-    let as_said = Taken { as_said: true, ..taken() };
-    examine(format!("{header}\n{row}\n{row}\n").as_bytes(), Mapping::default(), as_said)
+    let unchecked = Taken { as_said: true, ..assumptions() };
+    examine(format!("{header}\n{row}\n{row}\n").as_bytes(), Mapping::default(), unchecked)
 }
 
 fn fields(found: &Imported) -> String {
@@ -13,7 +13,7 @@ fn fields(found: &Imported) -> String {
 }
 
 #[test]
-fn columns_are_taken_from_names_that_are_clear() {
+fn infers_clear_names() {
     for (header, expected) in [
         ("angle_deg,min_range_m,max_range_m,range_m", "azimuth_deg=`angle_deg` range_m=`range_m`"),
         ("pan_deg,tilt_deg,distance_cm", "azimuth_deg=`pan_deg` range_cm=`distance_cm`"),
@@ -35,9 +35,9 @@ fn columns_are_taken_from_names_that_are_clear() {
     );
 }
 
-/// Offered options are complete, in the file's own names, and give right readings.
+/// Offered options are complete, use the file's own names, and give correct readings.
 #[test]
-fn what_is_offered_is_accepted_as_it_stands() {
+fn offered_options_are_accepted() {
     for (header, row, offered) in [
         (
             "angle_deg,min_range,max_range,range",
@@ -47,30 +47,30 @@ fn what_is_offered_is_accepted_as_it_stands() {
         ("Lage [deg],Messwert [cm]", "1,150", "azimuth_deg=Lage [deg],range_cm=Messwert [cm]"),
         ("a,\"b (cm, raw)\",angle_deg", "1,150,2", "azimuth_deg=angle_deg,range_cm=2"),
     ] {
-        let told = said(mapped(header, row));
+        let message = error_text(mapped(header, row));
         let typed = if offered.contains(' ') { format!("'{offered}'") } else { offered.to_owned() };
-        assert!(told.contains(&format!("--columns {typed}")), "{told}");
+        assert!(message.contains(&format!("--columns {typed}")), "{message}");
         let text = format!("{header}\n{row}\n");
         let found = import(&text, columns(offered)).expect(header);
         assert_eq!(pings(&found)[0].range_m.map(|range_m| (range_m * 1e3).round()), Some(1500.0));
     }
-    let told = said(mapped(
+    let message = error_text(mapped(
         "%time,field.min_range,field.max_range,field.range",
         "1462946345463606605,0.02,4.0,0.8",
     ));
     assert!(
-        told.contains("range_m=field.range")
-            && told.contains("--azimuth-deg")
-            && !told.contains("=field.min"),
-        "{told}"
+        message.contains("range_m=field.range")
+            && message.contains("--azimuth-deg")
+            && !message.contains("=field.min"),
+        "{message}"
     );
 }
 
 #[test]
-fn a_fixed_ranger_has_no_column_for_its_direction() {
+fn fixed_ranger_needs_no_direction() {
     let text = "time_ms,distance_cm\n1000,120\n1100,130\n";
-    let told = said(examine(text.as_bytes(), Mapping::default(), taken()));
-    assert!(told.contains("--azimuth-deg DEG"), "{told}");
+    let message = error_text(examine(text.as_bytes(), Mapping::default(), assumptions()));
+    assert!(message.contains("--azimuth-deg DEG"), "{message}");
     let fixed = Mapping { azimuth_deg: Some(90.0), ..Mapping::default() };
     let found = import(text, fixed).expect("answered");
     let read: Vec<_> = pings(&found).iter().map(|ping| (ping.azimuth_deg, ping.range_m)).collect();
@@ -78,19 +78,19 @@ fn a_fixed_ranger_has_no_column_for_its_direction() {
     assert!(read.iter().all(|(azimuth_deg, range_m)| *azimuth_deg == 90.0 && range_m.is_some()));
 }
 
-/// Rows with a range of each ranger, with names and without.
+/// Rows with one range per ranger, with and without names.
 #[test]
-fn rows_of_an_array_are_rounds() {
+fn array_rows_are_rounds() {
     let array = sonard_model::array::RangerArray::preset("pioneer-8").expect("shipped");
     let of_array = || Taken {
         array: Some(array.clone()),
         sensor: "pioneer".to_owned(),
         longest_m: 6.8,
-        ..taken()
+        ..assumptions()
     };
     let rows = "1.50\t2.50\t4.10\t4.20\t4.30\t4.40\t2.00\t1.00\n1.51\t2.49\t4.10\t4.20\t4.30\t4.40\t2.00\t1.01\n";
-    let told = said(examine(rows.as_bytes(), Mapping::default(), of_array()));
-    assert!(told.contains("8 values") && told.contains("--columns range_m=1-8"), "{told}");
+    let message = error_text(examine(rows.as_bytes(), Mapping::default(), of_array()));
+    assert!(message.contains("8 values") && message.contains("--columns range_m=1-8"), "{message}");
     let names: Vec<String> = (0..8).map(|at| format!("sonar_{at}_m")).collect();
     let named = format!("{}\n{rows}", names.join("\t"));
     for (text, mapping) in
@@ -105,12 +105,12 @@ fn rows_of_an_array_are_rounds() {
         assert_eq!((first.azimuth_deg, first.ranger.is_some()), (90.0, true));
         assert!((first.range_m.expect("an echo") - 1.5).abs() < 1e-12);
     }
-    let told = said(examine(named.as_bytes(), Mapping::default(), taken()));
+    let message = error_text(examine(named.as_bytes(), Mapping::default(), assumptions()));
     assert!(
-        told.contains("8 columns are ranges")
-            && told.contains("--array NAME --columns range_m=1-8"),
-        "{told}"
+        message.contains("8 columns are ranges")
+            && message.contains("--array NAME --columns range_m=1-8"),
+        "{message}"
     );
-    let told = said(examine(rows.as_bytes(), columns("range_m=1-7"), of_array()));
-    assert!(told.contains("7 ranges") && told.contains("8 rangers"), "{told}");
+    let message = error_text(examine(rows.as_bytes(), columns("range_m=1-7"), of_array()));
+    assert!(message.contains("7 ranges") && message.contains("8 rangers"), "{message}");
 }

@@ -1,9 +1,9 @@
-//! Logs of CARMEN and Player.
+//! CARMEN and Player logs.
 
 use super::*;
 use crate::Format;
 
-/// Two rangers, one ahead and one to the left.
+/// Two rangers, one facing ahead and one facing left.
 const CARMEN: &str = "\
 # CARMEN Logfile
 PARAM robot_length 0.5
@@ -16,16 +16,16 @@ SONAR 0.26 2 1.40 0.75 0.2 0.0 0.0 0.0 0.1 1.5707963267948966 1000.7 host 0.8
 ";
 
 #[test]
-fn a_log_of_carmen_is_an_arrays() {
+fn carmen_log_is_an_array() {
     let mapping = Mapping { none_from: Some(5.0), ..Mapping::default() };
-    let found = examine(CARMEN.as_bytes(), mapping.clone(), taken()).expect("right");
+    let found = examine(CARMEN.as_bytes(), mapping.clone(), assumptions()).expect("right");
     assert_eq!((found.format, found.readings, found.echoes), (Format::Carmen, 4, 3));
     let array = found.taken.array.as_ref().expect("an array");
     array.check().expect("one that can be");
     assert_eq!((array.rangers[1].y_m, array.rangers[1].bearing_deg), (0.1, 90.0));
     let records = import(CARMEN, mapping).expect("right");
     let starts = starts(&records);
-    // The true pose, though odometry came later.
+    // The true pose, although odometry was logged later.
     assert_eq!(starts[0].pose, Pose { x_m: 1.0, y_m: 2.0, heading_deg: 90.0 });
     // Such times count from the start of a board, half a second apart.
     assert_eq!(starts[1].time.as_millisecond(), 500);
@@ -37,16 +37,18 @@ fn a_log_of_carmen_is_an_arrays() {
     assert_eq!(readings, expected.map(|(id, range_m)| (id.to_owned(), range_m)));
 }
 
-/// Lines without places, and older ones without the cone's angle.
+/// Lines without positions, and older ones without the cone angle.
 #[test]
-fn an_array_that_the_log_does_not_say_is_asked_for() {
-    let array = examine(CARMEN.as_bytes(), Mapping::default(), taken()).expect("right").taken.array;
+fn missing_positions_need_an_array() {
+    let array =
+        examine(CARMEN.as_bytes(), Mapping::default(), assumptions()).expect("right").taken.array;
     for line in ["SONAR 0.26 2 1.5 2.5 10.0 host 0.3\n", "SONAR 2 1.5 2.5 10.0 host 0.3\n"] {
-        let without = said(examine(line.as_bytes(), Mapping::default(), taken()));
+        let without = error_text(examine(line.as_bytes(), Mapping::default(), assumptions()));
         assert!(
-            without.contains("does not say where its 2 rangers are") && without.contains("--array")
+            without.contains("does not contain the positions of its 2 rangers")
+                && without.contains("--array")
         );
-        let with = Taken { array: array.clone(), ..taken() };
+        let with = Taken { array: array.clone(), ..assumptions() };
         let found = examine(line.as_bytes(), Mapping::default(), with).expect("right");
         assert_eq!((found.readings, found.echoes, found.has_poses), (2, 2, false), "{line}");
     }
@@ -61,7 +63,7 @@ const PLAYER: &str = "\
 ";
 
 #[test]
-fn a_log_of_player_is_an_arrays() {
+fn player_log_is_an_array() {
     let records = import(PLAYER, Mapping::default()).expect("right");
     let pings = pings(&records);
     assert_eq!(pings.iter().map(|ping| ping.range_m).collect::<Vec<_>>(), [Some(1.5), Some(2.5)]);
@@ -69,40 +71,44 @@ fn a_log_of_player_is_an_arrays() {
     assert_eq!(starts(&records)[0].pose, Pose { x_m: 1.0, y_m: 2.0, heading_deg: 0.0 });
 }
 
-/// Without type and subtype, as versions before 2 wrote them.
+/// Lines without type and subtype, from versions before 2.
 #[test]
-fn an_older_log_of_player_is_read() {
-    let array = examine(PLAYER.as_bytes(), Mapping::default(), taken()).expect("right").taken.array;
+fn reads_old_player_log() {
+    let array =
+        examine(PLAYER.as_bytes(), Mapping::default(), assumptions()).expect("right").taken.array;
     let old =
         "10.0 robot 6665 position 0 1.0 2.0 0.0 0 0 0\n10.1 robot 6665 sonar 0 2 1.500 2.500\n";
-    let found =
-        examine(old.as_bytes(), Mapping::default(), Taken { array, ..taken() }).expect("right");
+    let found = examine(old.as_bytes(), Mapping::default(), Taken { array, ..assumptions() })
+        .expect("right");
     assert_eq!((found.format, found.readings, found.has_poses), (Format::Player, 2, true));
 }
 
 #[test]
-fn messages_that_are_cut_or_change_are_named() {
+fn rejects_truncated_or_changed_lines() {
     let change = CARMEN.replace("1.40 0.75 0.2", "1.40 0.75 0.3");
     let fewer = "SONAR 0.26 1 1.4 1.0 host 0.8\n";
     for (text, words) in [
-        (change, "line 8: the rangers are elsewhere than before"),
-        (format!("{CARMEN}{fewer}"), "line 9: 1 ranges, and 2 before"),
-        ("SONAR 0.26 2 1.5\n".to_owned(), "line 1: a SONAR message of a form that is not known"),
+        (change, "line 8: the positions of the rangers differ from those before"),
+        (format!("{CARMEN}{fewer}"), "line 9: 1 ranges, but 2 before"),
+        (
+            "SONAR 0.26 2 1.5\n".to_owned(),
+            "line 1: SONAR message with an unexpected number of words",
+        ),
         (
             "ODOM 1 2\nSONAR 1 1.0 1.0 host 0.8\n".to_owned(),
-            "line 1: the line ends before its theta",
+            "line 1: the line ends before the theta",
         ),
-        ("ODOM 1 2 3\n".to_owned(), "there is no sonar message in it"),
-        (PLAYER.replace("2 1.500 2.500", "2 1.500"), "the line ends before its range"),
+        ("ODOM 1 2 3\n".to_owned(), "the log has no sonar messages"),
+        (PLAYER.replace("2 1.500 2.500", "2 1.500"), "the line ends before the range"),
     ] {
-        let said = said(examine(text.as_bytes(), Mapping::default(), taken()));
-        assert!(said.contains(words), "{said}");
+        let message = error_text(examine(text.as_bytes(), Mapping::default(), assumptions()));
+        assert!(message.contains(words), "{message}");
     }
 }
 
-/// Places as data (1:2) and as a reply (4:1), and the base's offset and size, which are no pose.
+/// Positions as data (1:2) and as a reply (4:1); offset and size of the base are not a pose.
 #[test]
-fn types_and_subtypes_of_player_decide_what_a_message_is() {
+fn player_types_and_subtypes() {
     let base = "0009.000 robot 6665 position2d 00 004 001 -00.040 +00.000 +00.000 +00.440 +00.400\n\
                 0009.000 robot 6665 position2d 00 001 002 -00.040 +00.000 +00.000 +00.440 +00.400\n\
                 0009.000 robot 6665 sonar 00 004 003 2 9 9 9 9 9 9\n";
@@ -118,7 +124,7 @@ fn types_and_subtypes_of_player_decide_what_a_message_is() {
 }
 
 #[test]
-fn player_3_has_rangers_with_their_places() {
+fn player_3_rangers() {
     let log = "## Player version 3.0.2\n\
                0010.0 h 6665 ranger 00 004 001 0 0 0 0 0 0 0.1 0.1 0.1 2 0.2 0 0 0 0 0 0 0.1 0 0 0 1.5707963267948966 \
                2 0.01 0.01 0.01 0.01 0.01 0.01\n\
@@ -131,7 +137,7 @@ fn player_3_has_rangers_with_their_places() {
 }
 
 #[test]
-fn player_1_has_a_second_time_and_places_in_its_lines() {
+fn player_1_lines() {
     let log = "1106955333.270 rob 6665 position 00 1106955333.260 +01.200 -00.910 -1.501 -0.005 +0.000 +0.000\n\
                1106955333.287 rob 6665 sonar 00 1106955333.277 2 +00.115 +00.130 +1.5708 +00.115 -00.130 -1.5708 2 0.326 7.365\n";
     let records = import(log, Mapping::default()).expect("right");
@@ -141,7 +147,7 @@ fn player_1_has_a_second_time_and_places_in_its_lines() {
         pings(&records).iter().map(|ping| ping.range_m).collect::<Vec<_>>(),
         [Some(0.326), Some(7.365)]
     );
-    // The time of a simulation, which is small.
+    // Small time, as in a simulation.
     let simulated = log.replace("1106955333.260", "0012.260").replace("1106955333.277", "0012.277");
     assert!(
         (starts(&import(&simulated, Mapping::default()).expect("right"))[0].pose.x_m - 1.2).abs()
@@ -150,12 +156,12 @@ fn player_1_has_a_second_time_and_places_in_its_lines() {
 }
 
 #[test]
-fn of_several_devices_one_is_imported_and_the_others_are_named() {
+fn imports_one_of_several_devices() {
     let other =
         PLAYER.replace(" 6665 ", " 6666 ").replace("+01.000", "-03.000").replace("1.500", "0.500");
     let second = "0010.050 robot 6665 position2d 01 001 001 +05.000 +07.000 +1.571 0 0 0 0\n";
     let log = format!("{second}{PLAYER}{other}");
-    let found = examine(log.as_bytes(), Mapping::default(), taken()).expect("right");
+    let found = examine(log.as_bytes(), Mapping::default(), assumptions()).expect("right");
     let notes = found.notes.join("\n");
     for part in
         ["sonar robot:6666:00 (1 messages)", "position2d robot:6665:01 (1 messages)", "--device"]
@@ -174,14 +180,14 @@ fn of_several_devices_one_is_imported_and_the_others_are_named() {
         );
     }
     let none = Mapping { device: Some("7000:00".to_owned()), ..Mapping::default() };
-    assert!(said(import(&log, none)).contains("sonar robot:6665:00"));
+    assert!(error_text(import(&log, none)).contains("sonar robot:6665:00"));
 }
 
 #[test]
-fn infinities_and_zeros_in_logs_are_no_echo() {
+fn infinities_and_zeros_are_no_echo() {
     for value in ["inf", "-inf", "nan", "0.000", "0"] {
         let log = CARMEN.replace("5.00", value);
-        let found = examine(log.as_bytes(), Mapping::default(), taken()).expect(value);
+        let found = examine(log.as_bytes(), Mapping::default(), assumptions()).expect(value);
         assert_eq!((found.readings, found.echoes), (4, 3), "{value}");
         let is_noted = found.notes.iter().any(|note| note.contains("ranges are 0"));
         assert_eq!(is_noted, value.starts_with('0'), "{value}: {:?}", found.notes);
@@ -189,10 +195,10 @@ fn infinities_and_zeros_in_logs_are_no_echo() {
 }
 
 #[test]
-fn ranges_of_logs_may_be_in_another_unit() {
+fn offers_range_unit() {
     let log = CARMEN.replace("1.50 5.00", "150 500").replace("1.40 0.75", "140 75");
-    let told = said(examine(log.as_bytes(), Mapping::default(), taken()));
-    assert!(told.contains("--range-unit cm"), "{told}");
+    let message = error_text(examine(log.as_bytes(), Mapping::default(), assumptions()));
+    assert!(message.contains("--range-unit cm"), "{message}");
     let mapping = Mapping { range_unit: Some(crate::RangeUnit::Cm), ..Mapping::default() };
     let records = import(&log, mapping).expect("right");
     let ranges: Vec<_> = pings(&records).iter().filter_map(|ping| ping.range_m).collect();

@@ -1,8 +1,8 @@
-//! Constants that stand for no echo: one rule for every format, and the option that each message names.
+//! Constants written for no echo, in every format, and the option offered for them.
 
 use super::*;
 
-/// Ranges of a room in centimetres: every third is the constant.
+/// Ranges of a room in centimetres; every third is the constant.
 fn ranges(constant: f64) -> Vec<f64> {
     (0..36).map(|at| if at % 3 == 0 { constant } else { 120.0 + f64::from(at % 7) }).collect()
 }
@@ -36,14 +36,14 @@ fn carmen(ranges: &[f64]) -> String {
     rounds.collect()
 }
 
-/// The value of `--no-echo` that a message offers.
-fn offered(said: &str) -> f64 {
-    let (_, rest) = said.split_once("--no-echo=").unwrap_or_else(|| panic!("{said}"));
+/// Parses the value of `--no-echo` that a message offers.
+fn offered(message: &str) -> f64 {
+    let (_, rest) = message.split_once("--no-echo=").unwrap_or_else(|| panic!("{message}"));
     rest.split([';', ' ']).next().and_then(|value| value.parse().ok()).expect("a number")
 }
 
 #[test]
-fn constants_are_asked_about_in_every_format_and_the_answer_gives_right_readings() {
+fn offered_constant_resolves_error() {
     for constant in [255.0, 400.0, 797.0, 4000.0, 65_535.0, 500.0, 299.9, 0.0, -1.0, -100.0] {
         let ranges = ranges(constant);
         for (text, mapping) in [
@@ -54,8 +54,8 @@ fn constants_are_asked_about_in_every_format_and_the_answer_gives_right_readings
         ] {
             let is_log = text.contains("1000000000.0");
             if constant == 0.0 && is_log {
-                // What these drivers write for nothing: taken so, and noted.
-                let found = examine(text.as_bytes(), mapping, taken()).expect("right");
+                // Value that drivers of these formats write for no echo: accepted, and noted.
+                let found = examine(text.as_bytes(), mapping, assumptions()).expect("right");
                 assert_eq!((found.readings, found.echoes), (36, 24));
                 assert!(
                     found.notes.join(" ").contains("12 of 36 ranges are 0"),
@@ -64,10 +64,10 @@ fn constants_are_asked_about_in_every_format_and_the_answer_gives_right_readings
                 );
                 continue;
             }
-            let told = said(examine(text.as_bytes(), mapping.clone(), taken()));
-            assert!(told.contains("12 of 36"), "{constant}: {told}");
-            let mapping = Mapping { none: vec![offered(&told)], ..mapping };
-            let found = examine(text.as_bytes(), mapping, taken());
+            let message = error_text(examine(text.as_bytes(), mapping.clone(), assumptions()));
+            assert!(message.contains("12 of 36"), "{constant}: {message}");
+            let mapping = Mapping { none: vec![offered(&message)], ..mapping };
+            let found = examine(text.as_bytes(), mapping, assumptions());
             let found = found.unwrap_or_else(|error| panic!("{constant}: {error}"));
             assert_eq!((found.readings, found.echoes), (36, 24), "{constant}");
         }
@@ -75,23 +75,23 @@ fn constants_are_asked_about_in_every_format_and_the_answer_gives_right_readings
 }
 
 #[test]
-fn noise_about_a_constant_is_asked_about() {
+fn offered_cluster_resolves_error() {
     let noisy = |at: usize| 396.0 + (at * 7919 % 83) as f64 / 10.0;
     let ranges: Vec<f64> =
         (0..120).map(|at| if at % 3 == 0 { noisy(at) } else { 120.0 + (at % 7) as f64 }).collect();
     let rows: String =
         ranges.iter().enumerate().map(|(at, range)| format!("{},{range}\n", 3 * at)).collect();
     let mapping = columns("azimuth_deg=1,range_cm=2");
-    let told = said(examine(rows.as_bytes(), mapping.clone(), taken()));
-    let (_, rest) = told.split_once("--no-echo-from=").unwrap_or_else(|| panic!("{told}"));
+    let message = error_text(examine(rows.as_bytes(), mapping.clone(), assumptions()));
+    let (_, rest) = message.split_once("--no-echo-from=").unwrap_or_else(|| panic!("{message}"));
     let from = rest.split(';').next().and_then(|value| value.parse().ok());
-    let found = examine(rows.as_bytes(), Mapping { none_from: from, ..mapping }, taken())
+    let found = examine(rows.as_bytes(), Mapping { none_from: from, ..mapping }, assumptions())
         .expect("answered");
     assert_eq!((found.readings, found.echoes), (120, 80));
 }
 
 #[test]
-fn walls_at_one_distance_are_read() {
+fn accepts_walls_at_one_distance() {
     let ranges = |is_wall: fn(usize) -> bool| -> Vec<f64> {
         (0..36).map(|at| if is_wall(at) { 243.0 } else { 100.0 + (7 * at % 23) as f64 }).collect()
     };
@@ -107,24 +107,30 @@ fn walls_at_one_distance_are_read() {
         ),
     ] {
         let found =
-            examine(table(&ranges).as_bytes(), columns("azimuth_deg=1,range_cm=2"), taken());
+            examine(table(&ranges).as_bytes(), columns("azimuth_deg=1,range_cm=2"), assumptions());
         assert_eq!(found.expect(name).echoes, 36, "{name}");
     }
-    // One ranger of an array beside a wall.
-    let mut beside = vec![120.0; 36];
-    for (at, range) in beside.iter_mut().enumerate() {
+    // One ranger of an array next to a wall.
+    let mut along_wall = vec![120.0; 36];
+    for (at, range) in along_wall.iter_mut().enumerate() {
         *range = if at % 6 == 2 { 255.0 } else { 100.0 + 3.0 * at as f64 };
     }
     assert_eq!(
-        examine(carmen(&beside).as_bytes(), Mapping::default(), taken()).expect("a wall").echoes,
+        examine(carmen(&along_wall).as_bytes(), Mapping::default(), assumptions())
+            .expect("a wall")
+            .echoes,
         36
     );
 }
 
-/// A value that is no distance is never one, whatever is said.
+/// Values of zero or less are never distances.
 #[test]
-fn several_values_below_zero_are_answered_at_once() {
+fn offers_all_negative_values_at_once() {
     let rows = "0,-1\n10,100\n20,0\n30,-1\n";
-    let told = said(examine(rows.as_bytes(), columns("azimuth_deg=1,range_cm=2"), taken()));
-    assert!(told.contains("--no-echo=-1 --no-echo=0") && told.contains("(2 of 4 are)"), "{told}");
+    let message =
+        error_text(examine(rows.as_bytes(), columns("azimuth_deg=1,range_cm=2"), assumptions()));
+    assert!(
+        message.contains("--no-echo=-1 --no-echo=0") && message.contains("(2 of 4 readings)"),
+        "{message}"
+    );
 }

@@ -15,7 +15,7 @@ fn read(text: &str) -> Vec<(f64, Option<f64>)> {
 }
 
 #[test]
-fn a_laser_scan_is_read_by_itself_in_a_list_and_published() {
+fn reads_laser_scan_json() {
     let expected = [(302.704, Some(1.0)), (331.352, Some(1.1)), (28.648, None), (57.296, None)];
     for text in [
         SCAN.to_owned(),
@@ -29,16 +29,16 @@ fn a_laser_scan_is_read_by_itself_in_a_list_and_published() {
     let records = import(&twice, Mapping::default()).expect("two scans");
     assert_eq!(starts(&records).len(), 2);
     assert_eq!(pings(&records)[0].time.map(|time| time.as_millisecond()), Some(1_760_000_000_500));
-    let found = examine(SCAN.as_bytes(), Mapping::default(), taken()).expect("a scan");
+    let found = examine(SCAN.as_bytes(), Mapping::default(), assumptions()).expect("a scan");
     assert_eq!(found.format, Format::RosText);
     let notes = found.notes.join("\n");
-    for part in ["ranges are 0", "beyond max_range", "frames are not in it"] {
+    for part in ["ranges are 0", "beyond max_range", "the file has no frames"] {
         assert!(notes.contains(part), "{part}: {notes}");
     }
 }
 
 #[test]
-fn what_rostopic_echo_prints_is_read() {
+fn reads_rostopic_echo() {
     let ros_1 = "header:\n  seq: 1\n  stamp:\n    secs: 1760000000\n    nsecs: 0\n  frame_id: \"laser\"\nangle_min: 0.0\n\
         angle_max: 3.14159\nangle_increment: 1.5707963\ntime_increment: 0.0\nscan_time: 0.1\nrange_min: 0.1\nrange_max: 10.0\n\
         ranges: [1.0, inf, 2.5]\nintensities: []\n---\n";
@@ -50,11 +50,11 @@ fn what_rostopic_echo_prints_is_read() {
         assert_eq!(read(&text.repeat(3)).len(), 9);
     }
     let shortened = ros_2.replace("- 2.5\n", "- '...'\n");
-    assert!(said(import(&shortened, Mapping::default())).contains("--full-length"));
+    assert!(error_text(import(&shortened, Mapping::default())).contains("--full-length"));
 }
 
 #[test]
-fn range_messages_are_of_a_fixed_ranger() {
+fn range_messages_are_a_fixed_ranger() {
     let message = |range: &str| {
         format!(
             "header:\n  stamp:\n    secs: 1760000000\n    nsecs: 0\n  frame_id: sonar\nradiation_type: 0\nfield_of_view: 0.26\n\
@@ -62,7 +62,7 @@ fn range_messages_are_of_a_fixed_ranger() {
         )
     };
     let text = [message("1.25"), message("4.0"), message("nan")].concat();
-    let found = examine(text.as_bytes(), Mapping::default(), taken()).expect("ranges");
+    let found = examine(text.as_bytes(), Mapping::default(), assumptions()).expect("ranges");
     assert_eq!((found.readings, found.echoes), (2, 1));
     assert!(found.notes.join(" ").contains("--azimuth-deg"), "{:?}", found.notes);
     let turned = Mapping { azimuth_deg: Some(-90.0), ..Mapping::default() };
@@ -70,10 +70,13 @@ fn range_messages_are_of_a_fixed_ranger() {
 }
 
 #[test]
-fn lists_of_pairs_are_read_by_their_places() {
+fn reads_lists_of_pairs() {
     for text in ["[[0, 1.0], [10, 1.1], [20, null]]", "[0, 1.0]\n[10, 1.1]\n[20, NaN]\n"] {
-        let told = said(import(text, Mapping::default()));
-        assert!(told.contains("lists") && told.contains("--columns azimuth_deg=1"), "{told}");
+        let message = error_text(import(text, Mapping::default()));
+        assert!(
+            message.contains("lists") && message.contains("--columns azimuth_deg=1"),
+            "{message}"
+        );
         let records = import(text, columns("azimuth_deg=1,range_m=2")).expect("pairs");
         let read: Vec<_> =
             pings(&records).iter().map(|ping| (ping.azimuth_deg, ping.range_m.is_some())).collect();

@@ -1,4 +1,4 @@
-//! Tables and JSON.
+//! Tables and JSON files.
 
 use proptest::prelude::*;
 use sonard_model::reading::PingStatus;
@@ -6,14 +6,14 @@ use sonard_model::reading::PingStatus;
 use super::*;
 use crate::{Column, Format};
 
-/// Azimuths and ranges, metres.
+/// Returns azimuths in degrees and ranges in metres.
 fn read(text: &str, mapping: Mapping) -> Vec<(f64, Option<f64>)> {
-    let records = import(text, mapping).expect("it is right");
+    let records = import(text, mapping).expect("valid");
     pings(&records).iter().map(|ping| (ping.azimuth_deg, ping.range_m)).collect()
 }
 
 #[test]
-fn whatever_stands_between_values_they_are_the_same() {
+fn reads_every_separator_and_json() {
     let expected = [(10.0, Some(1.5)), (20.0, None), (30.0, Some(0.25))];
     for text in [
         "azimuth_deg,range_m\n10,1.5\n20,\n30,0.25\n",
@@ -37,9 +37,9 @@ fn whatever_stands_between_values_they_are_the_same() {
     }
 }
 
-/// Sense, zero, unit, speed of sound and silence are each what they are said to be.
+/// Direction sense, zero, unit, sound speed and no-echo value.
 #[test]
-fn directions_and_ranges_are_turned_into_those_of_a_log() {
+fn converts_directions_and_ranges() {
     let mapping = Mapping {
         clockwise: true,
         zero_deg: 90.0,
@@ -54,17 +54,17 @@ fn directions_and_ranges_are_turned_into_those_of_a_log() {
     assert_eq!(found[1].1, None);
     let by_time = read("0 5000\n", columns("azimuth_deg=1,tof_us=2"));
     assert!((by_time[0].1.expect("a range") - 2500e-6 * sound_speed_m_s).abs() < 1e-12);
-    // A bearing is one in the world, where the robot looks to 30 degrees.
+    // A bearing in the world, with the robot heading at 30 degrees.
     let in_world = read("75 1\n", columns("bearing_deg=1,range_m=2"));
     assert!((in_world[0].0 - 45.0).abs() < 1e-9);
-    // Warmer air carries the same time of flight farther.
+    // In warmer air, the same time of flight is a longer range.
     let warm = read("0 5000 30\n", columns("azimuth_deg=1,tof_us=2,temperature_c=3"));
     let warm_m_s = Air::new(30.0, 50.0, 101.325).expect("air").sound_speed_m_s();
     assert!((warm[0].1.expect("a range") - 2500e-6 * warm_m_s).abs() < 1e-12);
 }
 
 #[test]
-fn scans_are_told_apart_by_name_place_or_turn() {
+fn splits_scans_by_id_pose_or_sweep() {
     let turns: String = (0..25).map(|i| format!("{},1\n", 30 * i % 360)).collect();
     let records = import(&turns, columns("azimuth_deg=1,range_m=2")).expect("right");
     assert_eq!(
@@ -84,14 +84,14 @@ fn scans_are_told_apart_by_name_place_or_turn() {
             Pose { x_m: 0.6, y_m: 0.5, heading_deg: 30.0 },
         ]
     );
-    // Imported again, it makes the same records.
+    // Repeated imports give the same records.
     assert_eq!(
         import(moved, columns("azimuth_deg=1,range_m=2,x_m=3,y_m=4")).expect("right"),
         records
     );
 }
 
-/// A plan is told where there is one, to both senses; else it only counts.
+/// Evenly spaced directions of either sense; otherwise the plan only has the number of beams.
 #[test]
 fn even_directions_are_a_plan() {
     let plan_of = |text: &str| {
@@ -111,11 +111,11 @@ fn even_directions_are_a_plan() {
 }
 
 #[test]
-fn a_header_is_understood_or_asked_about() {
+fn infers_header_or_offers_options() {
     let guess = |header: &str| {
         let text = format!("{header}\n{}\n", vec!["1"; header.split(',').count()].join(","));
-        let as_said = Taken { as_said: true, ..taken() };
-        examine(text.as_bytes(), Mapping::default(), as_said).map(|found| {
+        let unchecked = Taken { as_said: true, ..assumptions() };
+        examine(text.as_bytes(), Mapping::default(), unchecked).map(|found| {
             assert!(found.guessed && found.format == Format::Csv);
             let columns = found.mapping.columns.into_iter();
             columns.map(|(field, column)| format!("{field}={column}")).collect::<Vec<_>>().join(" ")
@@ -129,75 +129,82 @@ fn a_header_is_understood_or_asked_about() {
         guess("theta_rad,echo_us,t").expect("clear"),
         "azimuth_rad=`theta_rad` tof_us=`echo_us`"
     );
-    let twice = said(guess("angle_deg,true_range_m,range_cm"));
+    let twice = error_text(guess("angle_deg,true_range_m,range_cm"));
     assert!(
         twice.contains("may both be the range")
             && twice.contains("--columns azimuth_deg=angle_deg,range_cm=range_cm"),
         "{twice}"
     );
-    let unit = said(guess("angle_deg,distance"));
-    assert!(unit.contains("does not say its unit") && unit.contains("range_mm=distance"), "{unit}");
-    let nothing = said(guess("foo,bar"));
+    let unit = error_text(guess("angle_deg,distance"));
     assert!(
-        nothing.contains("no column is named as a direction") && nothing.contains("foo"),
+        unit.contains("unit of column `distance` is unknown") && unit.contains("range_mm=distance"),
+        "{unit}"
+    );
+    let nothing = error_text(guess("foo,bar"));
+    assert!(
+        nothing.contains("no column is recognized as a direction") && nothing.contains("foo"),
         "{nothing}"
     );
-    let numbers = said(examine(b"1,2\n", Mapping::default(), taken()));
-    assert!(numbers.contains("the first line of 2 values has no names"), "{numbers}");
+    let numbers = error_text(examine(b"1,2\n", Mapping::default(), assumptions()));
+    assert!(numbers.contains("the first line of 2 values has no column names"), "{numbers}");
 }
 
-/// An error names line, field and column, and what to do.
+/// Errors name line, field and column, and the remedy.
 #[test]
-fn what_is_wrong_is_named() {
+fn errors_name_position_and_remedy() {
     let mapping = || columns("azimuth_deg=1,range_cm=2");
     for (text, mapping, words) in [
-        ("1,2\n2,abc\n", mapping(), "line 2, range_cm (column 2): `abc` is no number"),
-        ("1,2\n,3\n", mapping(), "line 2: there is no azimuth"),
+        ("1,2\n2,abc\n", mapping(), "line 2, range_cm (column 2): `abc` is not a number"),
+        ("1,2\n,3\n", mapping(), "line 2: no azimuth"),
         (
             "1,2\n3,-1\n",
             mapping(),
-            "line 2, range_cm (column 2): a range of -1 is no distance (1 of 2 are)",
+            "line 2, range_cm (column 2): a range of -1 is not a distance (1 of 2 readings)",
         ),
         ("1,2\n3,0\n", mapping(), "--no-echo=0"),
         (
             "1,2\n",
             columns("azimuth_deg=1,range_cm=5"),
-            "there is no column 5: the first line has 2",
+            "there is no column 5: the first line has 2 columns",
         ),
-        ("1,2\n", columns("azimuth_deg=1,range_cm=dist"), "the first line has no names"),
+        ("1,2\n", columns("azimuth_deg=1,range_cm=dist"), "the first line has no column names"),
         ("a,b\n1,2\n", columns("azimuth_deg=a,range_cm=dist"), "the columns are a, b"),
-        ("a,b\n", columns("azimuth_deg=a,range_cm=b"), "there is no reading"),
+        ("a,b\n", columns("azimuth_deg=a,range_cm=b"), "the file has no readings"),
         ("# nothing\n", mapping(), "no line of values"),
-        ("1,2\n", columns("range_cm=2"), "no column has the azimuth or the bearing"),
-        ("1,2,3\n", columns("azimuth_deg=1,range_cm=2,range_m=3"), "both say the range"),
+        ("1,2\n", columns("range_cm=2"), "no column is mapped to azimuth or bearing"),
+        ("1,2,3\n", columns("azimuth_deg=1,range_cm=2,range_m=3"), "are both the range"),
         ("1,2,3\n", columns("azimuth_deg=1,range_cm=2,tof_us=3"), "both range and time of flight"),
         ("1,2,3\n", columns("azimuth_deg=1,range_cm=2,x_m=3"), "only one of x and y"),
         ("1,2,x\n", columns("azimuth_deg=1,range_cm=2,time=3"), "line 1, time (column 3)"),
-        ("1,2,maybe\n", columns("azimuth_deg=1,range_cm=2,status=3"), "`maybe` is no status"),
+        ("1,2,maybe\n", columns("azimuth_deg=1,range_cm=2,status=3"), "unknown status `maybe`"),
         ("1,2,90\n", columns("azimuth_deg=1,range_cm=2,temperature_c=3"), "temperature_c is 90"),
         (
             "{\"a\": 1}",
             columns("azimuth_deg=a,range_cm=b"),
-            "object 1: there is no `b`; the object has a",
+            "object 1: no member `b`; the object has a",
         ),
         (
             "{\"a\": [1, 2], \"b\": [1]}",
             columns("azimuth_deg=a,range_cm=b"),
-            "1 numbers of range_cm and 2 of azimuth_deg",
+            "1 numbers of range_cm but 2 of azimuth_deg",
         ),
-        ("{\"a\": 1, \"b\": 2}\n{\"a\"\n", columns("azimuth_deg=a,range_cm=b"), "line 2: no JSON"),
-        ("[1, 2", columns("azimuth_deg=a,range_cm=b"), "no JSON"),
+        (
+            "{\"a\": 1, \"b\": 2}\n{\"a\"\n",
+            columns("azimuth_deg=a,range_cm=b"),
+            "line 2: invalid JSON",
+        ),
+        ("[1, 2", columns("azimuth_deg=a,range_cm=b"), "invalid JSON"),
         (
             "{\"a\": [1, \"x\"], \"b\": [1, 2]}",
             columns("azimuth_deg=a,range_cm=b"),
-            "object 1, number 2 of its lists, azimuth_deg (`a`): `x` is no number",
+            "object 1, number 2 of its lists, azimuth_deg (`a`): `x` is not a number",
         ),
     ] {
-        let said = said(import(text, mapping));
-        assert!(said.contains(words), "{text:?}: {said}");
+        let message = error_text(import(text, mapping));
+        assert!(message.contains(words), "{text:?}: {message}");
     }
     for text in ["azimuth_deg", "angle=1", "azimuth_deg=0", "azimuth_deg=1,azimuth_deg=2"] {
-        said(Mapping::columns_of(text));
+        error_text(Mapping::columns_of(text));
     }
     assert_eq!(
         columns("range_m=a=b").columns.values().next(),
@@ -205,9 +212,9 @@ fn what_is_wrong_is_named() {
     );
 }
 
-/// Numbers that can't be what they are said to be are refused, and taken when that is asked for.
+/// Implausible units are rejected, unless the check is skipped.
 #[test]
-fn other_units_than_said_are_found_out() {
+fn rejects_implausible_units() {
     let table = |angle: fn(f64) -> f64, range: fn(f64) -> f64| -> String {
         let row = |i: i32| {
             format!("{},{}\n", angle(f64::from(i) * 3.0), range(0.3 + 0.01 * f64::from(i)))
@@ -215,7 +222,7 @@ fn other_units_than_said_are_found_out() {
         (0..120).map(row).collect()
     };
     for (text, mapping, words) in [
-        (table(f64::to_radians, |m| m), columns("azimuth_deg=1,range_m=2"), "as radians would"),
+        (table(f64::to_radians, |m| m), columns("azimuth_deg=1,range_m=2"), "looks like radians"),
         (
             table(|deg| 10.0 * deg, |m| m),
             columns("azimuth_rad=1,range_m=2"),
@@ -236,18 +243,18 @@ fn other_units_than_said_are_found_out() {
     ] {
         let found = import(&text, mapping.clone());
         if words.is_empty() {
-            found.expect("that may be");
+            found.expect("plausible");
             continue;
         }
-        let said = said(found);
-        assert!(said.contains(words), "{said}");
-        let as_said = Taken { as_said: true, ..taken() };
-        examine(text.as_bytes(), mapping, as_said).expect("as it is said to be");
+        let message = error_text(found);
+        assert!(message.contains(words), "{message}");
+        let unchecked = Taken { as_said: true, ..assumptions() };
+        examine(text.as_bytes(), mapping, unchecked).expect("unchecked");
     }
 }
 
 #[test]
-fn a_status_says_more_than_a_range() {
+fn status_overrides_range() {
     let text = "0,1.5,echo\n10,1.5,no_echo\n20,,MIN_RANGE\n30,,\n";
     let records = import(text, columns("azimuth_deg=1,range_m=2,status=3")).expect("right");
     let found: Vec<_> =
@@ -266,9 +273,9 @@ fn a_status_says_more_than_a_range() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(400))]
 
-    /// No file makes it panic, and what it takes has each reading once.
+    /// No file causes a panic, and each accepted reading is imported once.
     #[test]
-    fn any_bytes_are_read_or_refused(
+    fn any_bytes_are_read_or_rejected(
         bytes in prop_oneof![
             proptest::collection::vec(any::<u8>(), 0..300),
             "[0-9eE.,;\t \n\"#-]{0,200}".prop_map(String::into_bytes),
@@ -279,8 +286,8 @@ proptest! {
         by_number in any::<bool>(),
     ) {
         let mapping = if by_number { columns("azimuth_deg=1,range_m=2") } else { columns("azimuth_deg=a,range_m=b") };
-        let as_said = Taken { as_said: true, ..taken() };
-        if let Ok(found) = examine(&bytes, mapping, as_said) {
+        let unchecked = Taken { as_said: true, ..assumptions() };
+        if let Ok(found) = examine(&bytes, mapping, unchecked) {
             let scans: Vec<_> = found.scans(&bytes[..]).expect("as before").collect();
             let records: Vec<_> = scans.into_iter().flat_map(|scan| scan.expect("as before")).collect();
             prop_assert_eq!(pings(&records).len() as u64, found.readings);

@@ -9,7 +9,7 @@ fn wide(text: &str, order: fn(u16) -> [u8; 2], mark: &[u8]) -> Vec<u8> {
 }
 
 #[test]
-fn texts_are_read_in_every_encoding_and_with_every_line_end() {
+fn reads_encodings_and_line_ends() {
     for (name, bytes) in [
         ("UTF-16LE with a mark", wide(ROWS, u16::to_le_bytes, b"\xff\xfe")),
         ("UTF-16BE with a mark", wide(ROWS, u16::to_be_bytes, b"\xfe\xff")),
@@ -28,12 +28,12 @@ fn texts_are_read_in_every_encoding_and_with_every_line_end() {
         ("bars", ROWS.replace(',', "|").into_bytes()),
         (
             "MATLAB comments",
-            format!("% by hand\n{}% the end\n", ROWS.replace("16,32", "16,32 % doubtful"))
+            format!("% by hand\n{}% the end\n", ROWS.replace("16,32", "16,32 % uncertain"))
                 .into_bytes(),
         ),
         ("names in a comment", format!("% {ROWS}").into_bytes()),
     ] {
-        let found = examine(&bytes, Mapping::default(), taken());
+        let found = examine(&bytes, Mapping::default(), assumptions());
         let found = found.unwrap_or_else(|error| panic!("{name}: {error}; {}", error.help()));
         let scans =
             found.scans(&bytes[..]).expect("as before").map(|scan| scan.expect("as before"));
@@ -49,7 +49,7 @@ fn texts_are_read_in_every_encoding_and_with_every_line_end() {
 }
 
 #[test]
-fn decimal_commas_are_read_where_they_are_certain_and_asked_about_elsewhere() {
+fn accepts_certain_decimal_commas() {
     let expected = [(15.5, Some(31.5)), (16.5, Some(32.5))];
     for text in [
         "angle_deg;distance_cm\n15,5;31,5\n16,5;32,5\n",
@@ -64,49 +64,63 @@ fn decimal_commas_are_read_where_they_are_certain_and_asked_about_elsewhere() {
             .collect();
         assert_eq!(read, expected, "{text}");
     }
-    let told = said(import("angle_deg,distance_cm\n15,5,31,5\n", Mapping::default()));
-    assert!(told.contains("line 2: 4 values") && told.contains("decimal commas"), "{told}");
+    let message = error_text(import("angle_deg,distance_cm\n15,5,31,5\n", Mapping::default()));
+    assert!(
+        message.contains("line 2: 4 values") && message.contains("decimal commas"),
+        "{message}"
+    );
     let either = "angle_deg;distance_mm\n10;1,500\n20;1,750\n";
-    let told = said(import(either, Mapping::default()));
-    assert!(told.contains("--decimal comma") && told.contains("--decimal point"), "{told}");
+    let message = error_text(import(either, Mapping::default()));
+    assert!(
+        message.contains("--decimal comma") && message.contains("--decimal point"),
+        "{message}"
+    );
     let point = Mapping { decimal: Some(crate::Decimal::Point), ..Mapping::default() };
-    assert_eq!(pings(&import(either, point).expect("said"))[0].range_m, Some(1.5));
+    assert_eq!(pings(&import(either, point).expect("given"))[0].range_m, Some(1.5));
 }
 
 #[test]
-fn rows_that_are_too_long_or_too_short_are_named() {
-    let long =
-        said(import("angle_deg,distance_cm\n0,100\n5,101,10,102,15,103\n", Mapping::default()));
-    assert!(long.contains("line 3: 6 values, and the table has 2 columns"), "{long}");
-    let short = said(import("angle_deg,distance_cm\n0,100\n10\n20,100\n", Mapping::default()));
+fn rejects_rows_of_wrong_length() {
+    let long = error_text(import(
+        "angle_deg,distance_cm\n0,100\n5,101,10,102,15,103\n",
+        Mapping::default(),
+    ));
+    assert!(long.contains("line 3: 6 values, but the table has 2 columns"), "{long}");
+    let short =
+        error_text(import("angle_deg,distance_cm\n0,100\n10\n20,100\n", Mapping::default()));
     assert!(short.contains("line 3: 1 values"), "{short}");
     let found =
-        examine(b"angle_deg,distance_cm\n0,100\n5,\n10,102,\n", Mapping::default(), taken())
+        examine(b"angle_deg,distance_cm\n0,100\n5,\n10,102,\n", Mapping::default(), assumptions())
             .expect("whole");
     assert_eq!((found.readings, found.echoes), (3, 2));
-    let whole = examine(b"angle_deg,distance_cm\n0,100\n5,18", Mapping::default(), taken())
+    let whole = examine(b"angle_deg,distance_cm\n0,100\n5,18", Mapping::default(), assumptions())
         .expect("maybe cut");
     assert!(
-        whole.readings == 2 && whole.notes.join(" ").contains("the last line has no end"),
+        whole.readings == 2 && whole.notes.join(" ").contains("the last line has no line end"),
         "{:?}",
         whole.notes
     );
-    let cut = examine(b"angle_deg,distance_cm\n0,100\n5,120\n10", Mapping::default(), taken())
-        .expect("cut");
-    assert!(cut.readings == 2 && cut.notes.join(" ").contains("line 4 was cut"), "{:?}", cut.notes);
-    let row = said(import("1,2,3,4,5,6,7,8\n", columns("azimuth_deg=1,range_cm=2")));
+    let cut =
+        examine(b"angle_deg,distance_cm\n0,100\n5,120\n10", Mapping::default(), assumptions())
+            .expect("cut");
+    assert!(
+        cut.readings == 2 && cut.notes.join(" ").contains("line 4 is incomplete"),
+        "{:?}",
+        cut.notes
+    );
+    let row = error_text(import("1,2,3,4,5,6,7,8\n", columns("azimuth_deg=1,range_cm=2")));
     assert!(row.contains("one row of 8 values"), "{row}");
 }
 
 #[test]
-fn streams_without_line_ends_are_read_record_by_record() {
+fn reads_streams_without_line_ends() {
     let stream: String = (15..45).map(|angle| format!("{angle},{}.", 31 + angle % 7)).collect();
     for (text, count) in [
         (stream.clone(), 30),
         (stream[2..].to_owned(), 29),
         (stream[..stream.len() - 4].to_owned(), 29),
     ] {
-        let found = examine(text.as_bytes(), columns("azimuth_deg=1,range_cm=2"), taken())
+        let found = examine(text.as_bytes(), columns("azimuth_deg=1,range_cm=2"), assumptions())
             .expect("a stream");
         assert_eq!(found.readings, count, "{text}");
         assert!(found.notes[0].contains("full stop"), "{:?}", found.notes);
@@ -114,10 +128,16 @@ fn streams_without_line_ends_are_read_record_by_record() {
 }
 
 #[test]
-fn times_without_date_zone_or_start_are_read_and_what_is_assumed_is_noted() {
-    let started = Taken { started: "2026-11-27T08:00:00Z".parse().expect("a time"), ..taken() };
+fn notes_assumptions_on_times() {
+    let started =
+        Taken { started: "2026-11-27T08:00:00Z".parse().expect("a time"), ..assumptions() };
     for (column, cells, first, note) in [
-        ("time", ["2026-01-31 12:00:00", "2026-01-31 12:00:01"], "2026-01-31T12:00:00Z", "no zone"),
+        (
+            "time",
+            ["2026-01-31 12:00:00", "2026-01-31 12:00:01"],
+            "2026-01-31T12:00:00Z",
+            "no time zone",
+        ),
         ("time", ["12:00:15.015", "12:00:16.015"], "2026-11-27T12:00:15.015Z", "no date"),
         ("time_ms", ["1350", "1400"], "2026-11-27T08:00:00Z", "start of the board"),
         ("time_s", ["1700000000.5", "1700000001"], "2023-11-14T22:13:20.5Z", ""),

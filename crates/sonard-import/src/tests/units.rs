@@ -1,4 +1,4 @@
-//! Units of angles and ranges, and what the numbers show of them.
+//! Detection of wrong units of angles and ranges.
 
 use super::*;
 
@@ -8,7 +8,7 @@ fn rows(count: usize, angle: impl Fn(f64) -> f64) -> String {
 }
 
 #[test]
-fn radians_in_a_column_of_degrees_are_found_over_any_span() {
+fn finds_radians_over_any_span() {
     use std::f64::consts::{PI, TAU};
     let mapping = || columns("azimuth_deg=1,range_cm=2");
     for (name, text) in [
@@ -19,14 +19,14 @@ fn radians_in_a_column_of_degrees_are_found_over_any_span() {
         ("few", rows(5, |part| TAU * part)),
         ("sixteen", rows(16, |part| TAU * part)),
     ] {
-        let told = said(examine(text.as_bytes(), mapping(), taken()));
+        let message = error_text(examine(text.as_bytes(), mapping(), assumptions()));
         assert!(
-            told.contains("as radians would")
-                && told.contains("--columns azimuth_rad=1,range_cm=2"),
-            "{name}: {told}"
+            message.contains("looks like radians")
+                && message.contains("--columns azimuth_rad=1,range_cm=2"),
+            "{name}: {message}"
         );
         let radians = columns("azimuth_rad=1,range_cm=2");
-        examine(text.as_bytes(), radians, taken()).expect(name);
+        examine(text.as_bytes(), radians, assumptions()).expect(name);
     }
     for (name, text) in [
         (
@@ -36,12 +36,12 @@ fn radians_in_a_column_of_degrees_are_found_over_any_span() {
         ("tenths of degrees", rows(36, |part| 360.0 * part)),
         ("beyond", rows(36, |part| 6.5 * part)),
     ] {
-        examine(text.as_bytes(), mapping(), taken()).expect(name);
+        examine(text.as_bytes(), mapping(), assumptions()).expect(name);
     }
 }
 
 #[test]
-fn metres_in_a_column_of_centimetres_are_found_either_way() {
+fn finds_wrong_length_units() {
     let table = |scale: f64| -> String {
         (0..36)
             .map(|at| format!("{},{:.3}\n", 10 * at, scale * (1.2 + 0.01 * f64::from(at))))
@@ -54,20 +54,26 @@ fn metres_in_a_column_of_centimetres_are_found_either_way() {
         (1000.0, "range_m=2", "range_mm=2"),
     ] {
         let mapping = columns(&format!("azimuth_deg=1,{given}"));
-        let told = said(examine(table(scale).as_bytes(), mapping, taken()));
+        let message = error_text(examine(table(scale).as_bytes(), mapping, assumptions()));
         let option = format!("--columns azimuth_deg=1,{right}");
-        assert!(told.contains("is the unit right?") && told.contains(&option), "{scale}: {told}");
+        assert!(
+            message.contains("is the unit right?") && message.contains(&option),
+            "{scale}: {message}"
+        );
         let mapping = columns(&format!("azimuth_deg=1,{right}"));
-        assert_eq!(examine(table(scale).as_bytes(), mapping, taken()).expect("right").echoes, 36);
+        assert_eq!(
+            examine(table(scale).as_bytes(), mapping, assumptions()).expect("right").echoes,
+            36
+        );
     }
-    // What stands near is near.
+    // Ranges of a few centimetres are plausible.
     let near: String = (0..36).map(|at| format!("{},{}\n", 10 * at, 6 + at % 4)).collect();
-    examine(near.as_bytes(), columns("azimuth_deg=1,range_cm=2"), taken())
+    examine(near.as_bytes(), columns("azimuth_deg=1,range_cm=2"), assumptions())
         .expect("a few centimetres");
 }
 
 #[test]
-fn the_place_of_an_echo_is_not_the_robots() {
+fn rejects_positions_of_echoes() {
     let plotted = |turn: bool, own: [f64; 2]| -> String {
         let row = |at: i32| {
             let (angle, range) = (f64::from(10 * at), 120.0 + f64::from(at * 7 % 5));
@@ -79,15 +85,18 @@ fn the_place_of_an_echo_is_not_the_robots() {
     };
     for text in [plotted(false, [0.0; 2]), plotted(true, [0.0; 2]), plotted(false, [50.0, 20.0])] {
         let text = format!("angle_deg,distance_cm,x_cm,y_cm\n{text}");
-        let told = said(examine(text.as_bytes(), Mapping::default(), taken()));
+        let message = error_text(examine(text.as_bytes(), Mapping::default(), assumptions()));
         let option = "--columns azimuth_deg=angle_deg,range_cm=distance_cm";
-        assert!(told.contains("the place of the echo") && told.contains(option), "{told}");
+        assert!(
+            message.contains("the position of the echo") && message.contains(option),
+            "{message}"
+        );
         let mapping = columns("azimuth_deg=angle_deg,range_cm=distance_cm");
-        assert!(!examine(text.as_bytes(), mapping, taken()).expect("answered").has_poses);
+        assert!(!examine(text.as_bytes(), mapping, assumptions()).expect("answered").has_poses);
     }
-    // A robot that drives.
+    // Moving robot.
     let driven: String =
         (0..18).map(|at| format!("{},{},{},{}\n", 20 * at, 120 + at, 5 * at, 2 * at)).collect();
     let mapping = columns("azimuth_deg=1,range_cm=2,x_cm=3,y_cm=4");
-    assert!(examine(driven.as_bytes(), mapping, taken()).expect("a course").has_poses);
+    assert!(examine(driven.as_bytes(), mapping, assumptions()).expect("a course").has_poses);
 }

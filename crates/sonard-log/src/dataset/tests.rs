@@ -111,16 +111,16 @@ fn another_sets_folder_and_shards_are_refused_in_words() {
     fs::rename(elsewhere.path().join("shard-00002"), folder.path().join("shard-00002"))
         .expect("one disk");
     let error = set.make(2, &|_| {}).expect_err("foreign").to_string();
-    assert!(error.contains("shard-00002: it is of another specification"), "{error}");
+    assert!(error.contains("shard-00002: different specification"), "{error}");
     fs::rename(folder.path().join("shard-00001"), folder.path().join("shard-00003"))
         .expect("one disk");
     let error = set.make(3, &|_| {}).expect_err("renamed").to_string();
-    assert!(error.contains("it is shard 1, not 3"), "{error}");
+    assert!(error.contains("shard 1 instead of 3"), "{error}");
     let facts = folder.path().join("shard-00003").join(FACTS);
     let text = fs::read_to_string(&facts).expect("there");
     fs::write(&facts, text.replace("\"drawing\": ", "\"drawing\": 9")).expect("writable");
     let error = set.make(3, &|_| {}).expect_err("older").to_string();
-    assert!(error.contains("their readings may differ"), "{error}");
+    assert!(error.contains("the readings may differ"), "{error}");
     // A folder of something else.
     let error =
         DataSet::open(folder.path().join("shard-00003").as_path(), &own).expect_err("strange");

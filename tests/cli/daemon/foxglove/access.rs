@@ -153,19 +153,19 @@ fn invalid_messages() {
     let subscribe = |wishes: Vec<Value>| json!({"op": "subscribe", "subscriptions": wishes});
     let many: Vec<Value> = (0..1500).map(|id| wish(id, id + 1000)).collect();
     for (order, words) in [
-        (subscribe(vec![wish(1, 999)]), "no channel 999"),
-        (subscribe(vec![wish(1, range), wish(2, range)]), "subscribed to already"),
+        (subscribe(vec![wish(1, 999)]), "unknown channel 999"),
+        (subscribe(vec![wish(1, range), wish(2, range)]), "already subscribed to"),
         (subscribe(many), "and 1499 more"),
-        (json!({"op": "unsubscribe", "subscriptionIds": [77]}), "no subscription 77"),
-        (json!({"op": "advertise", "channels": []}), "only tells"),
-        (json!("?"), "no message of the protocol"),
+        (json!({"op": "unsubscribe", "subscriptionIds": [77]}), "unknown subscription 77"),
+        (json!({"op": "advertise", "channels": []}), "only publishes"),
+        (json!("?"), "invalid message"),
     ] {
         viewer.send(&order);
         let said = refusal(&mut viewer);
         assert!(said.contains(words), "{order:.80}: {said}");
     }
     viewer.socket.send(Message::binary(vec![1, 2, 3])).expect("it takes that");
-    assert!(refusal(&mut viewer).contains("only tells"));
+    assert!(refusal(&mut viewer).contains("only publishes"));
     // Still subscribed, and told.
     scan();
     while !matches!(viewer.next(), Some(Came::Message(1, _))) {}

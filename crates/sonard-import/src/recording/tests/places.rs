@@ -20,7 +20,7 @@ fn scan(time_s: f64, ranges_m: Vec<f32>) -> LaserScan {
     )
 }
 
-/// A scanner that hangs so; a metre to its left, three to its right.
+/// Recording of a scanner mounted with this rotation, with one range of 1 m to its left.
 fn mounted(turned_deg: [f64; 3]) -> Vec<u8> {
     let mount = vec![placed(0.0, "base_link", "laser", [0.1, 0.0, 0.2], turned_deg)];
     let ranges =
@@ -31,7 +31,7 @@ fn mounted(turned_deg: [f64; 3]) -> Vec<u8> {
         .bytes()
 }
 
-/// The direction of the near reading.
+/// Azimuth of the reading of 1 m.
 fn near_deg(bytes: &[u8]) -> f64 {
     let scans = scans(bytes, Mapping::default()).expect("a recording");
     let near = scans[0].1.iter().find(|ping| ping.range_m == Some(1.0)).expect("the near one");
@@ -39,7 +39,7 @@ fn near_deg(bytes: &[u8]) -> f64 {
 }
 
 #[test]
-fn directions_follow_the_whole_rotation_of_the_frame() {
+fn directions_follow_frame_rotation() {
     for (turned_deg, direction_deg) in [
         ([0.0, 0.0, 0.0], 90.0),
         ([180.0, 0.0, 0.0], 270.0),
@@ -59,7 +59,7 @@ fn wrap(deg: f64) -> f64 {
 }
 
 #[test]
-fn upside_down_by_a_frame_between_is_mirrored_as_well() {
+fn mirrors_upside_down_parent() {
     let mounts = vec![
         placed(0.0, "base_link", "plate", [0.0; 3], [180.0, 0.0, 0.0]),
         placed(0.0, "plate", "laser", [0.0; 3], [0.0, 0.0, 30.0]),
@@ -76,25 +76,29 @@ fn upside_down_by_a_frame_between_is_mirrored_as_well() {
 }
 
 #[test]
-fn tilted_planes_and_beams_are_refused_unless_they_are_wanted() {
+fn rejects_tilted_planes_and_beams() {
     let bytes = mounted([0.0, 30.0, 0.0]);
-    let told = said(examine(&bytes, Mapping::default()));
+    let message = error_text(examine(&bytes, Mapping::default()));
     assert!(
-        told.contains("/scan") && told.contains("30.0 degrees") && told.contains("--no-unit-check"),
-        "{told}"
+        message.contains("/scan")
+            && message.contains("30.0 degrees")
+            && message.contains("--no-unit-check"),
+        "{message}"
     );
     let open = || -> io::Result<Box<dyn io::Read>> { Ok(Box::new(Cursor::new(bytes.clone()))) };
-    let as_said = Taken { as_said: true, ..taken() };
-    Source { open: &open }.examine(Mapping::default(), as_said).expect("as it is said to be");
+    let unchecked = Taken { as_said: true, ..assumptions() };
+    Source { open: &open }.examine(Mapping::default(), unchecked).expect("unchecked");
     let down = vec![placed(0.0, "base_link", "cliff", [0.0; 3], [0.0, 90.0, 0.0])];
     let bag = Bag::new(Order::Little)
         .add("/tf_static", TRANSFORMS, 1.0, &down)
         .range("/cliff", 2.0, "cliff", 1.0);
-    assert!(said(examine(&bag.bytes(), Mapping::default())).contains("beam is inclined by 90.0"));
+    assert!(
+        error_text(examine(&bag.bytes(), Mapping::default())).contains("beam inclined by 90.0")
+    );
 }
 
 #[test]
-fn a_mount_that_no_transform_tells_is_noted_and_the_robots_pose_kept() {
+fn notes_mount_without_transform() {
     let bag = Bag::new(Order::Little).moves(1.0, [1.0, 2.0, 0.0]).moves(2.0, [2.0, 2.0, 0.0]);
     let bytes = bag.range("/sonar", 1.5, "sonar", 1.0).bytes();
     let found = examine(&bytes, Mapping::default()).expect("a recording");
@@ -108,7 +112,7 @@ fn a_mount_that_no_transform_tells_is_noted_and_the_robots_pose_kept() {
 }
 
 #[test]
-fn messages_count_by_their_stamps_in_whatever_order() {
+fn sorts_messages_by_stamp() {
     let messages = |order: fn(&mut Vec<(f64, bool)>)| {
         let mut times: Vec<(f64, bool)> = (0..10)
             .flat_map(|at| [(1.0 + 0.1 * f64::from(at), false), (1.05 + 0.1 * f64::from(at), true)])
@@ -125,7 +129,7 @@ fn messages_count_by_their_stamps_in_whatever_order() {
         }
         bag.bytes()
     };
-    let told = |bytes: &[u8]| {
+    let readings = |bytes: &[u8]| {
         let scans = scans(bytes, Mapping::default()).expect("a recording");
         scans
             .into_iter()
@@ -134,34 +138,34 @@ fn messages_count_by_their_stamps_in_whatever_order() {
             })
             .collect::<Vec<_>>()
     };
-    let expected = told(&messages(|_| {}));
+    let expected = readings(&messages(|_| {}));
     assert_eq!(expected.len(), 10);
     let by_topic = messages(|times| times.sort_by_key(|(_, is_second)| *is_second));
     let shuffled =
         messages(|times| times.sort_by_key(|(time_s, _)| (time_s * 1e3) as u64 * 7919 % 101));
-    assert_eq!(told(&by_topic), expected);
-    assert_eq!(told(&shuffled), expected);
+    assert_eq!(readings(&by_topic), expected);
+    assert_eq!(readings(&shuffled), expected);
     let found = examine(&by_topic, Mapping::default()).expect("a recording");
     assert!(found.notes.join(" ").contains("order"), "{:?}", found.notes);
 }
 
-/// A million transforms of wheels are passed over, and those of a frame at rest are few.
+/// Transforms of wheels are skipped, and those of a resting frame are merged.
 #[test]
-fn transforms_of_other_frames_are_not_kept() {
+fn skips_unneeded_frames() {
     let wheels: Vec<Transform> =
         (0..1000).map(|at| transform(1.0, "base_link", &format!("wheel_{at}"), [0.0; 3])).collect();
     let mut bag = driving(Order::Little);
     for _ in 0..50 {
         bag = bag.add("/tf", TRANSFORMS, 1.0, &wheels);
     }
-    // Of one of them the place makes no sense, and another has two parents.
+    // One position is NaN, and the frame has two parents.
     let odd = vec![transform(1.0, "axle", "wheel_1", [f64::NAN, 0.0, 0.0])];
     let found = examine(&bag.add("/tf", TRANSFORMS, 1.0, &odd).bytes(), Mapping::default());
     assert_eq!(found.expect("the wheels do not matter").readings, 3);
 }
 
 #[test]
-fn zeros_and_limits_without_sense_are_noted() {
+fn notes_zeros_and_invalid_limits() {
     let mount = || Bag::new(Order::Little).mounts("base_link", "sonar", [0.0; 3]);
     let ranger = |limits: [f32; 2], ranges: &[f32]| {
         let mut bag = mount();
@@ -182,18 +186,24 @@ fn zeros_and_limits_without_sense_are_noted() {
         assert!(found.notes.join("\n").contains(note), "{:?}", found.notes);
     }
     let none = Mapping { none: vec![1.1], ..Mapping::default() };
-    assert_eq!(examine(&ranger([0.02, 4.0], &[1.0, 1.1, 1.2]), none).expect("said").echoes, 2);
-    let far = said(examine(&ranger([2.0, 400.0], &[123.0, 124.0, 125.0]), Mapping::default()));
+    assert_eq!(examine(&ranger([0.02, 4.0], &[1.0, 1.1, 1.2]), none).expect("given").echoes, 2);
+    let far =
+        error_text(examine(&ranger([2.0, 400.0], &[123.0, 124.0, 125.0]), Mapping::default()));
     assert!(far.contains("--range-unit cm"), "{far}");
     let cm = Mapping { range_unit: Some(crate::RangeUnit::Cm), ..Mapping::default() };
-    assert_eq!(examine(&ranger([2.0, 400.0], &[123.0, 124.0, 125.0]), cm).expect("said").echoes, 3);
-    let beyond =
-        said(examine(&ranger([0.02, 4.0], &[12_300.0, 12_301.0, 12_302.0]), Mapping::default()));
+    assert_eq!(
+        examine(&ranger([2.0, 400.0], &[123.0, 124.0, 125.0]), cm).expect("given").echoes,
+        3
+    );
+    let beyond = error_text(examine(
+        &ranger([0.02, 4.0], &[12_300.0, 12_301.0, 12_302.0]),
+        Mapping::default(),
+    ));
     assert!(beyond.contains("beyond max_range"), "{beyond}");
 }
 
 #[test]
-fn stamps_from_the_start_of_a_board_are_taken_on_the_recorders_clock() {
+fn shifts_board_stamps() {
     let mut bag = Bag::new(Order::Little).mounts("base_link", "sonar", [0.0; 3]);
     for at in 0..4 {
         let message = range(12.0 + f64::from(at), "sonar", 1.0 + at as f32 / 10.0);
@@ -208,7 +218,7 @@ fn stamps_from_the_start_of_a_board_are_taken_on_the_recorders_clock() {
 }
 
 #[test]
-fn sweeps_to_and_fro_end_where_they_turn_round() {
+fn sweeps_end_on_reversal() {
     let mut bag = Bag::new(Order::Little);
     let there = (0..=6).map(|at| 30.0 * f64::from(at));
     let directions: Vec<f64> = there

@@ -1,39 +1,40 @@
-//! GeoJSON (RFC 7946) of a place in its own metres.
+//! GeoJSON (RFC 7946) of a place in local metres.
 
 use serde_json::{Map, Value, json};
 use sonard_interpret::interpret::{Feature, lines::MapLine};
 
 use super::Findings;
-use crate::columns::logged_word;
+use crate::columns::serialized_name;
 
-/// How such a file begins.
+/// Beginning of GeoJSON files by this program.
 const HEAD: &str = r#"{"sonard":"#;
 
-/// Whether a file that begins so is GeoJSON of this program.
+/// Returns `true` if `head` is the beginning of GeoJSON by this program.
 #[must_use]
 pub fn begins_geojson(head: &[u8]) -> bool {
     head.starts_with(HEAD.as_bytes())
 }
 
-/// Lines and features as a `FeatureCollection`, a geometry a line of text.
+/// Converts lines and features to a `FeatureCollection`, with one geometry per line of text.
 ///
-/// RFC 7946 knows degrees of longitude and latitude only. A room has none: coordinates are metres in its own
-/// frame, which the member `sonard` says. Nothing that the format has would keep GDAL from taking them for degrees.
+/// RFC 7946 only defines longitude and latitude in degrees, which a room does not have: coordinates
+/// are metres in the local frame, as stated by the member `sonard`. No member of the format keeps
+/// GDAL from reading them as degrees.
 #[must_use]
 pub fn to_geojson(place: &Findings<'_>) -> String {
-    let about = json!({
+    let header = json!({
         "version": env!("CARGO_PKG_VERSION"),
         "units": "metres",
         "frame": "local: x and y of the scene, x to the right, y up",
         "time": place.time,
-        "provenance": place.provenance.and_then(logged_word),
+        "provenance": place.provenance.and_then(serialized_name),
         "scene": place.scene,
     });
     let lines = place.lines.iter().map(line);
     let all: Vec<_> = lines.chain(place.features.iter().map(feature)).collect();
     let all: Vec<_> = all.iter().map(Value::to_string).collect();
     format!(
-        "{HEAD}{about},\"type\":\"FeatureCollection\",\"features\":[\n{}\n]}}\n",
+        "{HEAD}{header},\"type\":\"FeatureCollection\",\"features\":[\n{}\n]}}\n",
         all.join(",\n")
     )
 }
@@ -51,7 +52,7 @@ fn line(line: &MapLine) -> Value {
     })
 }
 
-/// One of which only the direction is known has no geometry.
+/// Converts a feature; without a known position its geometry is null.
 fn feature(feature: &Feature) -> Value {
     let at = feature.x_m.zip(feature.y_m);
     let geometry = at.map(|(x_m, y_m)| json!({"type": "Point", "coordinates": [x_m, y_m]}));
@@ -61,7 +62,8 @@ fn feature(feature: &Feature) -> Value {
     json!({"type": "Feature", "geometry": geometry, "properties": properties})
 }
 
-/// Columns of a table, which is what properties are to a map on the screen: `probabilities_plane`, `beams_first`.
+/// Flattens nested values to properties, as shown by map viewers: `probabilities_plane`,
+/// `beams_first`.
 fn flatten(properties: &mut Map<String, Value>, name: &str, value: Value) {
     let within =
         |part: &str| if name.is_empty() { part.to_owned() } else { format!("{name}_{part}") };

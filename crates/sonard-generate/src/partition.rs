@@ -1,42 +1,43 @@
-//! The part of a set that one of several processes makes.
+//! Partition of a set among processes.
 
 use std::{fmt, str::FromStr};
 
 use thiserror::Error;
 
-/// One of so many parts of a set, counted from 1: `3/20`.
+/// Part of a set for one of several processes, counted from 1: `3/20`.
 ///
-/// Part I of N are the shards I, I + N, I + 2 N, and so on, so that a set may have more shards than there are processes.
+/// Part I of N consists of the shards I, I + N, I + 2 N, ..., so a set may have more shards than
+/// there are processes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Part {
     index: u32,
     of: u32,
 }
 
-/// What is no part.
+/// Error of parsing or creating a part.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 pub enum PartError {
-    /// Not two numbers.
+    /// Text that is not two numbers.
     #[error("`{0}` is not I/N: give two whole numbers, as in 3/20")]
     Form(String),
-    /// Beyond what there is.
+    /// Index outside of 1 to the number of parts.
     #[error("there is no part {index} of {of}: parts count from 1/{of} to {of}/{of}")]
     Range {
-        /// Which one was asked for.
+        /// Requested index of the part.
         index: u32,
-        /// Of how many.
+        /// Number of parts of the set.
         of: u32,
     },
 }
 
 impl Part {
-    /// The whole set.
+    /// The whole set as a single part.
     pub const WHOLE: Self = Self { index: 1, of: 1 };
 
-    /// Part `index` of `of`, from 1.
+    /// Creates part `index` of `of`, from 1.
     ///
     /// # Errors
-    /// When there is no such part.
+    /// Returns an error unless `index` is in 1 to `of`.
     pub const fn new(index: u32, of: u32) -> Result<Self, PartError> {
         match index >= 1 && index <= of {
             true => Ok(Self { index, of }),
@@ -44,7 +45,7 @@ impl Part {
         }
     }
 
-    /// Its shards in a set of so many, by their numbers, from 1.
+    /// Returns the shard numbers of this part, from 1, in a set of `of_set` shards.
     pub fn shards(self, of_set: u32) -> impl Iterator<Item = u32> {
         (self.index..=of_set).step_by(self.of as usize)
     }
@@ -73,7 +74,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn parts_together_are_the_set_and_no_shard_is_in_two() {
+    fn parts_cover_the_set_once() {
         for shards in [1, 5, 12] {
             for of in [1, 2, 5, 20] {
                 let parts = (1..=of).map(|index| Part::new(index, of).expect("a part"));
@@ -85,7 +86,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_part_is_told_what_would_be() {
+    fn rejects_invalid_parts() {
         assert_eq!("3/20".parse(), Part::new(3, 20));
         for (text, part) in
             [("3", "as in 3/20"), ("a/b", "as in 3/20"), ("0/4", "from 1/4"), ("5/4", "to 4/4")]

@@ -1,4 +1,4 @@
-//! Rounds of an array's rangers, as logs of robots have them: all ranges in one message.
+//! Rounds of an array: all of its ranges in one message of a robot's log, or in one row of a table.
 
 use std::collections::BTreeMap;
 
@@ -8,83 +8,83 @@ use sonard_model::{
     geometry::Pose,
 };
 
-use crate::{ImportError, Location, Mapping, time::Times};
+use crate::{ImportError, Location, Mapping, time::TimeReader};
 
-/// Measurements of all rangers at one time.
+/// Ranges of all rangers of an array at one time.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Round {
+pub(crate) struct ArrayRound {
     pub(crate) place: Location,
     pub(crate) time: Option<Timestamp>,
-    /// Where the robot stood, if the log said so before.
+    /// Pose of the robot, if the log stated one before.
     pub(crate) pose: Option<Pose>,
-    /// `None` of a ranger without an echo.
+    /// Range of each ranger, `None` without an echo.
     pub(crate) ranges_m: Vec<Option<f64>>,
-    /// The same as the file has them, those that stand for no echo among them.
+    /// Ranges as in the file, including no-echo values.
     pub(crate) raw: Vec<Option<f64>>,
 }
 
 /// Content of a message of a robot's log.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) enum Content {
-    /// Places of the rangers: ahead, to the left, metres, and their directions, radians.
+pub(crate) enum MessageContent {
+    /// Positions of the rangers, forward and left in metres, and their directions in radians.
     Geometry(Vec<[f64; 3]>),
-    /// Place of the robot, and whether it is known better than by its wheels.
+    /// Pose of the robot; `is_true` if it is better than odometry.
     Pose { pose: Pose, is_true: bool },
-    /// Ranges in the log's unit, with the rangers' places where the line has them.
+    /// Ranges in the log's unit, with the positions of the rangers if the line contains them.
     Ranges { seconds: Option<f64>, ranges: Vec<f64>, geometry: Option<Vec<[f64; 3]>> },
 }
 
-/// A message of a robot's log.
+/// Message of a robot's log.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Message {
-    /// The device that sent it; of a log of one robot, nothing.
-    pub(crate) device: Device,
-    pub(crate) content: Content,
+pub(crate) struct LogMessage {
+    /// Sending device; empty in logs of a single robot.
+    pub(crate) device: LogDevice,
+    pub(crate) content: MessageContent,
 }
 
-/// A device of a robot.
+/// Device of a robot.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Default)]
-pub(crate) struct Device {
+pub(crate) struct LogDevice {
     /// Host and robot, `HOST:ROBOT`.
     pub(crate) robot: String,
     pub(crate) interface: String,
     pub(crate) index: String,
 }
 
-impl Device {
-    /// Checks whether an option means it: its whole name, or the end of it.
-    fn is_meant(&self, wanted: &str) -> bool {
+impl LogDevice {
+    /// Returns `true` if an option selects this device, by its full name or the end of it.
+    fn is_selected_by(&self, requested: &str) -> bool {
         let name = format!(":{}:{}", self.robot, self.index);
-        name.ends_with(&format!(":{wanted}")) || self.robot.ends_with(wanted)
+        name.ends_with(&format!(":{requested}")) || self.robot.ends_with(requested)
     }
 }
 
-impl std::fmt::Display for Device {
+impl std::fmt::Display for LogDevice {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "{} {}:{}", self.interface, self.robot, self.index)
     }
 }
 
-/// The devices of a log, with counts of their messages.
+/// Devices of a log, with counts of their messages.
 #[derive(Debug, Default)]
-pub(crate) struct Devices {
-    /// Devices of ranges, in the order in which they first come.
-    ranges: Vec<(Device, u64)>,
-    poses: BTreeMap<Device, u64>,
+pub(crate) struct DeviceCounts {
+    /// Ranging devices, in order of first appearance.
+    ranges: Vec<(LogDevice, u64)>,
+    poses: BTreeMap<LogDevice, u64>,
 }
 
-/// The devices that are imported.
+/// Devices selected for the import.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub(crate) struct Chosen {
-    ranges: Option<Device>,
-    pose: Option<Device>,
+pub(crate) struct SelectedDevices {
+    ranges: Option<LogDevice>,
+    pose: Option<LogDevice>,
 }
 
-impl Devices {
-    pub(crate) fn add(&mut self, message: &Message) {
+impl DeviceCounts {
+    pub(crate) fn add(&mut self, message: &LogMessage) {
         let device = &message.device;
         match message.content {
-            Content::Ranges { .. } => {
+            MessageContent::Ranges { .. } => {
                 match self.ranges.iter().position(|(known, _)| known == device) {
                     Some(place) => self.ranges[place].1 += 1,
                     None if self.ranges.len() < MAX_RANGERS => {
@@ -93,7 +93,7 @@ impl Devices {
                     None => {}
                 }
             }
-            Content::Pose { .. }
+            MessageContent::Pose { .. }
                 if self.poses.len() < MAX_RANGERS || self.poses.contains_key(device) =>
             {
                 *self.poses.entry(device.clone()).or_default() += 1;
@@ -102,25 +102,28 @@ impl Devices {
         }
     }
 
-    /// The devices to import, and a note about those left out.
+    /// Selects the devices to import, with notes on the skipped ones.
     ///
     /// # Errors
-    /// The device that is asked for is not in the log.
-    pub(crate) fn choose(
+    /// Returns an error if the requested device is not in the log.
+    pub(crate) fn select(
         &self,
-        wanted: Option<&str>,
-    ) -> Result<(Chosen, Vec<String>), ImportError> {
-        let is_wanted = |device: &Device| wanted.is_none_or(|wanted| device.is_meant(wanted));
-        let ranges = self.ranges.iter().map(|(device, _)| device).find(|device| is_wanted(device));
-        if let (Some(wanted), None) = (wanted, ranges) {
+        requested: Option<&str>,
+    ) -> Result<(SelectedDevices, Vec<String>), ImportError> {
+        let is_requested =
+            |device: &LogDevice| requested.is_none_or(|requested| device.is_selected_by(requested));
+        let ranges =
+            self.ranges.iter().map(|(device, _)| device).find(|device| is_requested(device));
+        if let (Some(requested), None) = (requested, ranges) {
             let known: Vec<String> =
                 self.ranges.iter().map(|(device, _)| device.to_string()).collect();
             return Err(ImportError::mapping(
-                format!("there is no device {wanted} of ranges"),
-                format!("those in the log are: {}", known.join(", ")),
+                format!("no ranging device {requested} in the log"),
+                format!("the log has {}", known.join(", ")),
             ));
         }
-        let of_robot = |device: &&Device| ranges.is_some_and(|ranges| device.robot == ranges.robot);
+        let of_robot =
+            |device: &&LogDevice| ranges.is_some_and(|ranges| device.robot == ranges.robot);
         let pose = self.poses.keys().find(of_robot);
         let others = self.ranges.iter().filter(|(device, _)| Some(device) != ranges);
         let others: Vec<String> =
@@ -131,88 +134,88 @@ impl Devices {
         let mut notes = Vec::new();
         if let Some(ranges) = ranges.filter(|_| !others.is_empty()) {
             notes.push(format!(
-                "of several devices {ranges} is imported; left out: {}; --device ROBOT:INDEX chooses another",
+                "several devices: importing {ranges}; skipped: {}; select another with --device ROBOT:INDEX",
                 others.join(", ")
             ));
         }
         if ranges.is_some() && !other_poses.is_empty() {
             let used = pose.map_or("none".to_owned(), ToString::to_string);
-            notes.push(format!("poses are those of {used}; left out: {}", other_poses.join(", ")));
+            notes.push(format!("poses taken from {used}; skipped: {}", other_poses.join(", ")));
         }
-        Ok((Chosen { ranges: ranges.cloned(), pose: pose.cloned() }, notes))
+        Ok((SelectedDevices { ranges: ranges.cloned(), pose: pose.cloned() }, notes))
     }
 }
 
-/// Messages in order, as rounds.
+/// Converts the messages of a log, in order, to rounds.
 #[derive(Debug)]
-pub(crate) struct Rounds<'a> {
+pub(crate) struct RoundReader<'a> {
     mapping: &'a Mapping,
-    chosen: &'a Chosen,
-    /// The array's rangers by the log.
+    selected: &'a SelectedDevices,
+    /// Positions of the rangers, from the log.
     pub(crate) geometry: Option<Vec<[f64; 3]>>,
     pose: Option<Pose>,
-    has_true: bool,
-    /// Of the first message with ranges.
+    has_true_poses: bool,
+    /// Number of ranges in the first message with ranges.
     pub(crate) rangers: Option<usize>,
-    pub(crate) times: Times<'a>,
+    pub(crate) times: TimeReader<'a>,
 }
 
-impl<'a> Rounds<'a> {
+impl<'a> RoundReader<'a> {
     /// # Errors
-    /// The mapping has an offset from UTC that is none.
+    /// Returns an error for an invalid UTC offset in the mapping.
     pub(crate) fn new(
         mapping: &'a Mapping,
-        chosen: &'a Chosen,
+        selected: &'a SelectedDevices,
         started: Timestamp,
     ) -> Result<Self, ImportError> {
-        let times = Times::new(mapping, started)?;
+        let times = TimeReader::new(mapping, started)?;
         Ok(Self {
             mapping,
-            chosen,
+            selected,
             geometry: None,
             pose: None,
-            has_true: false,
+            has_true_poses: false,
             rangers: None,
             times,
         })
     }
 
-    /// Takes a message in; the round that it is.
+    /// Processes a message and returns the round that it contains, if any.
     ///
     /// # Errors
-    /// The rangers are others than before.
-    pub(crate) fn take(
+    /// Returns an error if the number or the positions of the rangers change.
+    pub(crate) fn push(
         &mut self,
         place: Location,
-        message: Message,
-    ) -> Result<Option<Round>, ImportError> {
-        let Message { device, content } = message;
-        let is_of = |chosen: &Option<Device>| chosen.as_ref() == Some(&device);
+        message: LogMessage,
+    ) -> Result<Option<ArrayRound>, ImportError> {
+        let LogMessage { device, content } = message;
+        let is_of = |selected: &Option<LogDevice>| selected.as_ref() == Some(&device);
         match content {
-            Content::Geometry(geometry) => {
-                if is_of(&self.chosen.ranges) {
-                    self.know(place, geometry)?;
+            MessageContent::Geometry(geometry) => {
+                if is_of(&self.selected.ranges) {
+                    self.set_geometry(place, geometry)?;
                 }
                 Ok(None)
             }
-            Content::Pose { pose, is_true } => {
-                if is_of(&self.chosen.pose) {
-                    self.has_true |= is_true;
-                    // Where a log has true poses, those by the wheels beside them are left alone.
-                    if is_true || !self.has_true {
+            MessageContent::Pose { pose, is_true } => {
+                if is_of(&self.selected.pose) {
+                    self.has_true_poses |= is_true;
+                    // A log with true poses also contains odometry, which is ignored.
+                    if is_true || !self.has_true_poses {
                         self.pose = Some(pose);
                     }
                 }
                 Ok(None)
             }
-            Content::Ranges { .. } if !is_of(&self.chosen.ranges) => Ok(None),
-            Content::Ranges { seconds, ranges, geometry } => {
+            MessageContent::Ranges { .. } if !is_of(&self.selected.ranges) => Ok(None),
+            MessageContent::Ranges { seconds, ranges, geometry } => {
                 if let Some(geometry) = geometry {
-                    self.know(place, geometry)?;
+                    self.set_geometry(place, geometry)?;
                 }
                 let known = *self.rangers.get_or_insert(ranges.len());
                 if known != ranges.len() {
-                    let what = format!("{} ranges, and {known} before", ranges.len());
+                    let what = format!("{} ranges, but {known} before", ranges.len());
                     return Err(ImportError::at(
                         place,
                         what,
@@ -232,16 +235,20 @@ impl<'a> Rounds<'a> {
                 let ranges_m = ranges.iter().map(range_m).collect();
                 let raw = ranges.iter().map(|range| Some(*range).filter(|range| range.is_finite()));
                 let raw = raw.collect();
-                Ok(Some(Round { place, time, pose: self.pose, ranges_m, raw }))
+                Ok(Some(ArrayRound { place, time, pose: self.pose, ranges_m, raw }))
             }
         }
     }
 
-    fn know(&mut self, place: Location, geometry: Vec<[f64; 3]>) -> Result<(), ImportError> {
+    fn set_geometry(
+        &mut self,
+        place: Location,
+        geometry: Vec<[f64; 3]>,
+    ) -> Result<(), ImportError> {
         match &self.geometry {
             Some(known) if *known != geometry => Err(ImportError::at(
                 place,
-                "the rangers are elsewhere than before",
+                "the positions of the rangers differ from those before",
                 "import the log of one array at a time",
             )),
             _ => {
@@ -252,7 +259,7 @@ impl<'a> Rounds<'a> {
     }
 }
 
-/// The array of such rangers, `s0` and so on.
+/// Builds an array of rangers `s0`, `s1`, ... at these positions.
 pub(crate) fn array(geometry: &[[f64; 3]], sensor: &str) -> RangerArray {
     let ranger = |(number, &[x_m, y_m, turn_rad]): (usize, &[f64; 3])| MountedRanger {
         id: format!("s{number}"),
@@ -263,7 +270,7 @@ pub(crate) fn array(geometry: &[[f64; 3]], sensor: &str) -> RangerArray {
     };
     RangerArray {
         name: "imported".to_owned(),
-        description: "The rangers of an imported log, at the places that it states".to_owned(),
+        description: "Rangers of an imported log, at the positions in the log".to_owned(),
         sensor: sensor.to_owned(),
         interval_ms: 40.0,
         rangers: geometry.iter().enumerate().map(ranger).collect(),
@@ -271,17 +278,17 @@ pub(crate) fn array(geometry: &[[f64; 3]], sensor: &str) -> RangerArray {
         body: None,
         sources: BTreeMap::from([
             ("rangers".to_owned(), "the log".to_owned()),
-            ("interval_ms".to_owned(), "assumed: such logs do not state it".to_owned()),
+            ("interval_ms".to_owned(), "assumed: the log does not contain it".to_owned()),
         ]),
     }
 }
 
-/// A pose in metres and radians.
+/// Builds a pose from metres and radians.
 pub(crate) fn pose(x_m: f64, y_m: f64, heading_rad: f64) -> Pose {
     Pose { x_m, y_m, heading_deg: heading_rad.to_degrees() }
 }
 
-/// A word of a line as a number.
+/// Parses one word of a line as a number.
 pub(crate) fn number(
     place: Location,
     words: &[&str],
@@ -289,16 +296,16 @@ pub(crate) fn number(
     what: &str,
 ) -> Result<f64, ImportError> {
     let word = words.get(at).ok_or_else(|| {
-        ImportError::at(place, format!("the line ends before its {what}"), "is the log whole?")
+        ImportError::at(place, format!("the line ends before the {what}"), "is the log complete?")
     })?;
     let number: Option<f64> = word.parse().ok();
     number.filter(|number| number.is_finite()).ok_or_else(|| {
-        let what = format!("`{word}`, its {what}, is no number");
+        let what = format!("the {what}, `{word}`, is not a number");
         ImportError::at(place, what, "correct that line")
     })
 }
 
-/// Ranges from a place on; `inf` and `nan`, as C prints them, are no distance.
+/// Parses ranges; `inf` and `nan`, as printed by C, become infinite.
 pub(crate) fn ranges(
     place: Location,
     words: &[&str],
@@ -312,7 +319,7 @@ pub(crate) fn ranges(
     (from..from + count).map(range).collect()
 }
 
-/// So many numbers from a place on.
+/// Parses `count` consecutive words as numbers.
 pub(crate) fn numbers(
     place: Location,
     words: &[&str],
@@ -323,15 +330,15 @@ pub(crate) fn numbers(
     (from..from + count).map(|at| number(place, words, at, what)).collect()
 }
 
-/// Most rangers of a message or a row.
+/// Maximum number of rangers of a message or a row.
 pub(crate) const MAX_RANGERS: usize = 256;
 
-/// The count of rangers that a line begins with.
+/// Parses the number of rangers at the beginning of a line.
 pub(crate) fn count(place: Location, words: &[&str], at: usize) -> Result<usize, ImportError> {
-    let count = number(place, words, at, "count of rangers")?;
+    let count = number(place, words, at, "number of rangers")?;
     if count.fract() == 0.0 && (1.0..=MAX_RANGERS as f64).contains(&count) {
         return Ok(count as usize);
     }
-    let what = format!("{count} is no count of rangers");
+    let what = format!("invalid number of rangers: {count}");
     Err(ImportError::at(place, what, "correct that line"))
 }

@@ -1,4 +1,4 @@
-//! What was drawn as a scene file, so that a scene of a set is one that every verb reads.
+//! Conversion of sampled rooms to scene files, which every command reads.
 
 use std::collections::BTreeMap;
 
@@ -6,12 +6,12 @@ use rand::{Rng, RngExt as _};
 use serde::Serialize;
 use sonard_model::{geometry::DVec2, scene::Scene};
 
-use super::{Unfit, furnish::Piece, room::Outline};
+use super::{Rejection, furnish::Furniture, room::RoomOutline};
 use crate::spec::{SceneKeys, Spec};
 
-/// A scene file. Not a map of JSON: the order of its members must not hang on how the program was built.
+/// Scene file. A struct keeps the order of members independent of the build, unlike a JSON map.
 #[derive(Serialize)]
-struct File<'a> {
+struct SceneFile<'a> {
     name: &'a str,
     #[serde(skip_serializing_if = "Option::is_none")]
     floor_z_m: Option<f64>,
@@ -21,19 +21,19 @@ struct File<'a> {
     ceiling_z_m: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     ceiling_material: Option<&'a str>,
-    materials: BTreeMap<&'a str, Material>,
-    walls: Vec<Wall<'a>>,
-    cylinders: Vec<Cylinder<'a>>,
+    materials: BTreeMap<&'a str, MaterialEntry>,
+    walls: Vec<WallEntry<'a>>,
+    cylinders: Vec<CylinderEntry<'a>>,
 }
 
 #[derive(Serialize)]
-struct Material {
+struct MaterialEntry {
     reflectance: f64,
     roughness: f64,
 }
 
 #[derive(Serialize)]
-struct Wall<'a> {
+struct WallEntry<'a> {
     id: String,
     #[serde(skip_serializing_if = "Option::is_none")]
     from: Option<DVec2>,
@@ -49,7 +49,7 @@ struct Wall<'a> {
 }
 
 #[derive(Serialize)]
-struct Cylinder<'a> {
+struct CylinderEntry<'a> {
     id: String,
     center: DVec2,
     radius_m: f64,
@@ -58,21 +58,21 @@ struct Cylinder<'a> {
     z_m: Option<[f64; 2]>,
 }
 
-/// The scene of an outline and its furniture, in materials that are drawn for it.
+/// Builds the scene of an outline and its furniture, with sampled materials.
 ///
 /// # Errors
-/// When it is none: a wall of no length, an angle that closes.
+/// Returns an error for an invalid scene, such as walls of zero length or zero angle.
 pub(super) fn scene(
     spec: &Spec,
     keys: &SceneKeys,
-    outline: &Outline,
-    pieces: &[Piece],
+    outline: &RoomOutline,
+    pieces: &[Furniture],
     rng: &mut impl Rng,
-) -> Result<Scene, Unfit> {
+) -> Result<Scene, Rejection> {
     let mut file = empty(spec, rng);
     for (number, ends) in outline.walls().enumerate() {
-        let material = one_of(&keys.walls, spec, rng);
-        file.walls.push(Wall::single(format!("room.{number}"), ends, material));
+        let material = draw_material(&keys.walls, spec, rng);
+        file.walls.push(WallEntry::single(format!("room.{number}"), ends, material));
     }
     let mut numbers = [0; 3];
     let mut id = |kind: usize, name: &str| {
@@ -80,18 +80,18 @@ pub(super) fn scene(
         format!("{name}-{}", numbers[kind])
     };
     for piece in pieces {
-        let is_partition = matches!(piece, Piece::Partition(_));
+        let is_partition = matches!(piece, Furniture::Partition(_));
         let named = if is_partition { &keys.walls } else { &spec.furniture.materials };
-        let material = one_of(named, spec, rng);
+        let material = draw_material(named, spec, rng);
         let top_m = spec.furniture.height_m.as_ref().map(|height| height.draw(rng));
-        // Furniture up to the ceiling has no top.
+        // Furniture that reaches the ceiling has no top.
         let top_m = top_m.filter(|top_m| file.ceiling_z_m.is_some_and(|ceiling| *top_m < ceiling));
         let z_m = top_m.map(|top_m| [0.0, top_m]);
         match piece {
-            Piece::Partition(ends) => {
-                file.walls.push(Wall::single(id(0, "partition"), *ends, material));
+            Furniture::Partition(ends) => {
+                file.walls.push(WallEntry::single(id(0, "partition"), *ends, material));
             }
-            Piece::Box(corners) => file.walls.push(Wall {
+            Furniture::Box(corners) => file.walls.push(WallEntry {
                 id: id(1, "box"),
                 from: None,
                 to: None,
@@ -100,7 +100,7 @@ pub(super) fn scene(
                 material,
                 z_m,
             }),
-            Piece::Cylinder { center, radius_m } => file.cylinders.push(Cylinder {
+            Furniture::Cylinder { center, radius_m } => file.cylinders.push(CylinderEntry {
                 id: id(2, "cylinder"),
                 center: *center,
                 radius_m: *radius_m,
@@ -109,17 +109,17 @@ pub(super) fn scene(
             }),
         }
     }
-    let text = serde_json::to_string(&file).map_err(|_| Unfit::Scene)?;
-    Scene::from_json(&text).map_err(|_| Unfit::Scene)
+    let text = serde_json::to_string(&file).map_err(|_| Rejection::Scene)?;
+    Scene::from_json(&text).map_err(|_| Rejection::Scene)
 }
 
-/// The room without walls: its materials, its floor and its ceiling.
-fn empty<'a>(spec: &'a Spec, rng: &mut impl Rng) -> File<'a> {
+/// Builds a scene without walls, with materials, floor and ceiling.
+fn empty<'a>(spec: &'a Spec, rng: &mut impl Rng) -> SceneFile<'a> {
     let materials = spec.materials.iter().map(|(name, material)| {
         let reflectance = material.reflectance.draw(rng);
-        (name.as_str(), Material { reflectance, roughness: material.roughness.draw(rng) })
+        (name.as_str(), MaterialEntry { reflectance, roughness: material.roughness.draw(rng) })
     });
-    let mut file = File {
+    let mut file = SceneFile {
         name: &spec.set.name,
         floor_z_m: None,
         floor_material: None,
@@ -131,14 +131,14 @@ fn empty<'a>(spec: &'a Spec, rng: &mut impl Rng) -> File<'a> {
     };
     if let Some(heights) = &spec.heights {
         file.floor_z_m = Some(0.0);
-        file.floor_material = Some(one_of(&heights.floor, spec, rng));
+        file.floor_material = Some(draw_material(&heights.floor, spec, rng));
         file.ceiling_z_m = Some(heights.ceiling_m.draw(rng));
-        file.ceiling_material = Some(one_of(&heights.ceiling, spec, rng));
+        file.ceiling_material = Some(draw_material(&heights.ceiling, spec, rng));
     }
     file
 }
 
-impl<'a> Wall<'a> {
+impl<'a> WallEntry<'a> {
     const fn single(id: String, [from, to]: [DVec2; 2], material: &'a str) -> Self {
         Self {
             id,
@@ -152,8 +152,8 @@ impl<'a> Wall<'a> {
     }
 }
 
-/// One of the named materials, or of all.
-fn one_of<'a>(named: &'a [String], spec: &'a Spec, rng: &mut impl Rng) -> &'a str {
+/// Draws one of the named materials, or of all if none is named.
+fn draw_material<'a>(named: &'a [String], spec: &'a Spec, rng: &mut impl Rng) -> &'a str {
     match named.len() {
         0 => {
             let index = rng.random_range(0..spec.materials.len());

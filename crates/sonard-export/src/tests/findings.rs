@@ -34,7 +34,7 @@ fn lines() -> Vec<MapLine> {
     ]
 }
 
-/// Of a simulated scan.
+/// Features of a simulated scan.
 fn features() -> Vec<Feature> {
     let scans = simulated();
     let session = scans[0].session.as_deref().expect("it has one");
@@ -73,7 +73,7 @@ struct OccupancyGrid {
 }
 
 #[test]
-fn a_grid_is_a_topic_that_those_who_come_late_get() {
+fn grid_topic_is_transient_local() {
     let grid = grid();
     let mut bytes = Vec::new();
     write_findings(&mut bytes, &place(Some(&grid), &[], &[])).expect("memory takes it");
@@ -89,7 +89,7 @@ fn a_grid_is_a_topic_that_those_who_come_late_get() {
     assert_eq!((read.frame_id.as_str(), read.resolution), ("map", 0.05));
     assert_eq!((read.width, read.height), (4, 2));
     assert_eq!(read.origin, [-1.0, 2.0, 0.0, 0.0, 0.0, 0.0, 1.0]);
-    // Row by row from the lower left; of the rest, and of 0.5, nothing is known.
+    // Row by row from the lower left; missing cells and 0.5 are unknown.
     assert_eq!(read.data, [10, 90, -1, 26, 100, -1, -1, -1]);
 }
 
@@ -110,7 +110,7 @@ fn lines_and_features_are_markers() {
 }
 
 #[test]
-fn geojson_has_each_line_and_feature_with_what_is_known_of_it() {
+fn geojson_has_lines_and_features() {
     let (lines, mut features) = (lines(), features());
     (features[0].x_m, features[0].y_m) = (None, None);
     let text = to_geojson(&place(None, &lines, &features));
@@ -148,7 +148,7 @@ fn geojson_has_each_line_and_feature_with_what_is_known_of_it() {
 }
 
 #[test]
-fn a_full_disk_is_told() {
+fn reports_full_disk() {
     let grid = grid();
     let written = write_findings(Full(500), &place(Some(&grid), &[], &[]));
     assert!(matches!(written, Err(crate::ExportError::Write(_))), "{written:?}");

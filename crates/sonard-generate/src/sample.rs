@@ -1,8 +1,8 @@
-//! A scene and the poses in it, drawn until they fit.
+//! Sampling of a scene and its poses by rejection.
 
 mod furnish;
 mod room;
-mod write;
+mod scene_file;
 
 use std::sync::Arc;
 
@@ -16,21 +16,21 @@ use sonard_model::{
 };
 
 use crate::{
-    seed::{Of, rng},
-    spec::{Loaded, SceneKeys},
+    seed::{RandomStream, rng},
+    spec::{LoadedSpec, SceneKeys},
 };
 
-/// What was drawn again because it did not fit.
+/// Numbers of rejected draws.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Redrawn {
-    /// Scenes that no furniture or no pose found room in, or that were none.
+    /// Scenes without room for furniture or poses, or with invalid walls.
     pub scenes: u64,
-    /// Places of furniture that something was in the way at.
+    /// Positions of furniture with a collision.
     pub furniture: u64,
-    /// Poses where nothing could stand.
+    /// Poses in occupied space or too close to a surface.
     pub poses: u64,
-    /// Poses with more echo paths than can be found.
+    /// Poses with too many echo paths.
     pub costly: u64,
 }
 
@@ -43,68 +43,66 @@ impl std::ops::AddAssign for Redrawn {
     }
 }
 
-/// A scene is drawn again at most so often: whatever fits more seldom is a fault of the specification.
-const MOST_SCENES: u32 = 200;
-/// For each pose so many places are tried at most before the scene is drawn again.
-const PLACES_A_POSE: usize = 200;
+/// Maximum number of draws of a scene; lower acceptance is a fault of the specification.
+const MAX_SCENES: u32 = 200;
+/// Maximum number of positions drawn per pose before the scene is rejected.
+const MAX_POSITIONS_PER_POSE: usize = 200;
 
-/// A scene with all that is drawn for it.
+/// Sampled scene with poses, sensor, air and noise.
 #[derive(Debug)]
-pub(crate) struct Drawn {
-    /// Its number in the set, from 1.
+pub(crate) struct SampledScene {
+    /// Number of the scene in the set, from 1.
     pub(crate) number: u64,
-    /// Its kind, an index into the specification's.
+    /// Index of the kind of scene in the specification.
     pub(crate) kind: usize,
     pub(crate) scene: Arc<Scene>,
     pub(crate) poses: Vec<Pose>,
-    /// An index into the specification's sensors.
+    /// Index of the sensor in the specification.
     pub(crate) sensor: usize,
     /// Height of the transducer, metres.
     pub(crate) sensor_z_m: Option<f64>,
     pub(crate) air: Air,
     pub(crate) noise: ReceiverNoise,
-    /// What goes on being drawn for this scene: poses in place of others.
+    /// Generator for replacements of poses.
     pub(crate) rng: Pcg64,
     pub(crate) redrawn: Redrawn,
 }
 
-/// Why a drawing is not taken.
+/// Reason for rejecting a draw.
 #[derive(Debug)]
-enum Unfit {
+enum Rejection {
     Furniture,
     Scene,
     Poses,
 }
 
-impl Unfit {
-    const fn in_words(&self) -> &'static str {
+impl Rejection {
+    const fn message(&self) -> &'static str {
         match self {
             Self::Furniture => {
-                "its furniture finds no place: draw fewer or smaller pieces, or larger rooms"
+                "no free position for its furniture: use fewer or smaller pieces, or larger rooms"
             }
-            Self::Scene => "its walls make no scene: draw larger rooms or smaller notches",
-            Self::Poses => {
-                "nothing can stand in it: draw larger rooms, or give poses less clearance"
-            }
+            Self::Scene => "its walls are not a valid scene: use larger rooms or smaller notches",
+            Self::Poses => "no free space for a pose: use larger rooms, or less clearance of poses",
         }
     }
 }
 
-/// The scene of a number, from 1.
+/// Samples the scene with this number, from 1.
 ///
 /// # Errors
-/// In words why none fits.
-pub(crate) fn scene(loaded: &Loaded, number: u64) -> Result<Drawn, &'static str> {
-    let mut rng = rng(&loaded.sha256, Of::Scene(number));
+/// Returns the reason for rejection if no draw fits.
+pub(crate) fn scene(loaded: &LoadedSpec, number: u64) -> Result<SampledScene, &'static str> {
+    let mut rng = rng(&loaded.sha256, RandomStream::Scene(number));
     let mut redrawn = Redrawn::default();
-    let mut last = Unfit::Scene;
-    for _ in 0..MOST_SCENES {
+    let mut last = Rejection::Scene;
+    for _ in 0..MAX_SCENES {
         match attempt(loaded, &mut rng, &mut redrawn) {
             Ok((kind, scene, poses, sensor_z_m)) => {
                 let sensor = rng.random_range(0..loaded.sensors.len());
                 let (air, noise) = (air(loaded, &mut rng), noise(loaded, &mut rng));
                 let scene = Arc::new(scene);
-                return Ok(Drawn {
+                return Ok(SampledScene {
                     number,
                     kind,
                     scene,
@@ -117,19 +115,23 @@ pub(crate) fn scene(loaded: &Loaded, number: u64) -> Result<Drawn, &'static str>
                     redrawn,
                 });
             }
-            Err(unfit) => {
+            Err(rejection) => {
                 redrawn.scenes += 1;
-                last = unfit;
+                last = rejection;
             }
         }
     }
-    Err(last.in_words())
+    Err(last.message())
 }
 
-/// Kind, scene, poses, and the transducer's height.
+/// Kind, scene, poses, and height of the transducer.
 type Attempt = (usize, Scene, Vec<Pose>, Option<f64>);
 
-fn attempt(loaded: &Loaded, rng: &mut Pcg64, redrawn: &mut Redrawn) -> Result<Attempt, Unfit> {
+fn attempt(
+    loaded: &LoadedSpec,
+    rng: &mut Pcg64,
+    redrawn: &mut Redrawn,
+) -> Result<Attempt, Rejection> {
     let spec = &loaded.spec;
     let kind = weighted(&spec.scene, rng);
     let keys = &spec.scene[kind];
@@ -139,7 +141,7 @@ fn attempt(loaded: &Loaded, rng: &mut Pcg64, redrawn: &mut Redrawn) -> Result<At
         None => {
             let outline = room::outline(keys, rng);
             let pieces = furnish::furnish(&outline, &spec.furniture, rng, redrawn)?;
-            write::scene(spec, keys, &outline, &pieces, rng)?
+            scene_file::scene(spec, keys, &outline, &pieces, rng)?
         }
     };
     let is_level = scene.floor_z_m.is_some() || scene.ceiling_z_m.is_some();
@@ -150,8 +152,8 @@ fn attempt(loaded: &Loaded, rng: &mut Pcg64, redrawn: &mut Redrawn) -> Result<At
     Ok((kind, scene, poses, sensor_z_m))
 }
 
-/// Another pose in a scene, in place of one that had too many paths; `None` if none is found.
-pub(crate) fn another_pose(loaded: &Loaded, drawn: &mut Drawn) -> Option<Pose> {
+/// Samples a replacement of a pose with too many paths; `None` if there is none.
+pub(crate) fn replacement_pose(loaded: &LoadedSpec, drawn: &mut SampledScene) -> Option<Pose> {
     let scene = Arc::clone(&drawn.scene);
     poses(loaded, &scene, 1, &mut drawn.rng, &mut drawn.redrawn).ok()?.pop()
 }
@@ -165,64 +167,64 @@ fn weighted(kinds: &[SceneKeys], rng: &mut impl Rng) -> usize {
             return index;
         }
     }
-    // By rounding alone.
+    // Reached only by rounding errors.
     kinds.iter().rposition(|kind| kind.weight > 0.0).unwrap_or_default()
 }
 
-/// Poses where a ranger can stand and nothing is near.
+/// Samples poses in free space with the required clearance.
 fn poses(
-    loaded: &Loaded,
+    loaded: &LoadedSpec,
     scene: &Scene,
     count: usize,
     rng: &mut Pcg64,
     redrawn: &mut Redrawn,
-) -> Result<Vec<Pose>, Unfit> {
+) -> Result<Vec<Pose>, Rejection> {
     let keys = &loaded.spec.poses;
     let walls = scene.walls.iter().map(|wall| (wall.a.min(wall.b), wall.a.max(wall.b)));
-    let round = scene.cylinders.iter().map(|cylinder| {
-        // Where there are no walls, a ranger stands round about.
+    let cylinders = scene.cylinders.iter().map(|cylinder| {
+        // Around a cylinder without walls, poses are within one metre.
         let reach = DVec2::splat(cylinder.radius_m + 1.0);
         (cylinder.center - reach, cylinder.center + reach)
     });
-    let extent = walls.chain(round).reduce(|all, one| (all.0.min(one.0), all.1.max(one.1)));
-    let (low, high) = extent.ok_or(Unfit::Poses)?;
+    let extent = walls.chain(cylinders).reduce(|all, part| (all.0.min(part.0), all.1.max(part.1)));
+    let (low, high) = extent.ok_or(Rejection::Poses)?;
     let mut poses = Vec::with_capacity(count);
     let mut tried = 0;
     while poses.len() < count {
-        if tried >= PLACES_A_POSE * count {
-            return Err(Unfit::Poses);
+        if tried >= MAX_POSITIONS_PER_POSE * count {
+            return Err(Rejection::Poses);
         }
-        let places: Vec<Pose> = (poses.len()..count)
+        let positions: Vec<Pose> = (poses.len()..count)
             .map(|_| {
                 let share = DVec2::new(rng.random(), rng.random());
                 let at = low + share * (high - low);
                 Pose { x_m: at.x, y_m: at.y, heading_deg: keys.heading_deg.draw(rng) }
             })
             .collect();
-        tried += places.len();
-        let stands = scene.can_stand(&places.iter().map(Pose::position).collect::<Vec<_>>());
+        tried += positions.len();
+        let is_free = scene.can_stand(&positions.iter().map(Pose::position).collect::<Vec<_>>());
         let before = poses.len();
-        poses.extend(places.iter().zip(stands).filter_map(|(pose, stands)| {
+        poses.extend(positions.iter().zip(is_free).filter_map(|(pose, is_free)| {
             let is_clear = scene.clearance_m(pose.position()) >= keys.clearance_m;
-            (stands && is_clear).then_some(*pose)
+            (is_free && is_clear).then_some(*pose)
         }));
-        redrawn.poses += (places.len() - (poses.len() - before)) as u64;
+        redrawn.poses += (positions.len() - (poses.len() - before)) as u64;
     }
     Ok(poses)
 }
 
-fn air(loaded: &Loaded, rng: &mut Pcg64) -> Air {
+fn air(loaded: &LoadedSpec, rng: &mut Pcg64) -> Air {
     let keys = &loaded.spec.air;
     let drawn = Air::new(
         keys.temperature_c.draw(rng),
         keys.humidity_percent.draw(rng),
         keys.pressure_kpa.draw(rng),
     );
-    // The distributions were checked to be within what air can be.
+    // Validation guarantees that the distributions are within the validity of the model.
     drawn.unwrap_or_default()
 }
 
-fn noise(loaded: &Loaded, rng: &mut Pcg64) -> ReceiverNoise {
+fn noise(loaded: &LoadedSpec, rng: &mut Pcg64) -> ReceiverNoise {
     let keys = &loaded.spec.noise;
     ReceiverNoise { floor: keys.floor.draw(rng), jitter_us: keys.jitter_us.draw(rng) }
 }

@@ -1,4 +1,4 @@
-//! What was found of a place: a map of it, its lines, its features.
+//! Export of map, lines and features of a place.
 
 mod geojson;
 
@@ -14,40 +14,40 @@ use sonard_records::Provenance;
 
 use crate::{
     ExportError,
-    columns::logged_word,
+    columns::serialized_name,
     conversion::{MAP, MAP_TOPIC},
-    recording::{Messages, nanoseconds},
+    recording::{RecordingWriter, nanoseconds},
     ros::{
         interface::{MARKERS, OCCUPANCY_GRID},
-        message::{Header, Marker, Markers, OccupancyGrid, Shape, Stamp},
+        message::{Header, Marker, MarkerShape, Markers, OccupancyGrid, Stamp},
     },
 };
 pub use geojson::{begins_geojson, to_geojson};
 
-/// What was found of a place, in its own metres.
+/// Interpretation results of a place, in local metres.
 #[derive(Debug, Clone, Copy)]
 pub struct Findings<'a> {
-    /// When it was found so: the start of the last scan, if there is one.
+    /// Start of the last interpreted scan.
     pub time: Option<Timestamp>,
-    /// Where the readings come from.
+    /// Origin of the readings.
     pub provenance: Option<Provenance>,
-    /// Name of the scene, if it has one.
+    /// Name of the scene, if known.
     pub scene: Option<&'a str>,
-    /// How likely each cell is occupied.
+    /// Occupancy probabilities of the cells.
     pub grid: Option<&'a Grid>,
-    /// Line segments.
+    /// Line segments with their confidence.
     pub lines: &'a [MapLine],
     /// Planes, corners and edges.
     pub features: &'a [Feature],
 }
 
-/// Writes a recording of ROS 2 of a place: `/map` (`nav_msgs/OccupancyGrid`), `/sonar/lines` and `/sonar/features`
-/// (`visualization_msgs/MarkerArray`), as far as there are such.
+/// Writes a ROS 2 recording of a place: `/map` (`nav_msgs/OccupancyGrid`), `/sonar/lines` and
+/// `/sonar/features` (`visualization_msgs/MarkerArray`), each only if there is content.
 ///
 /// # Errors
-/// What the output refuses.
+/// Returns the write error of the output.
 pub fn write_findings(out: impl Write, place: &Findings<'_>) -> Result<(), ExportError> {
-    let mut messages = Messages::new(out)?;
+    let mut messages = RecordingWriter::new(out)?;
     let stamp = Stamp(place.time.map_or(0, nanoseconds));
     let header = Header { stamp, frame: MAP };
     if let Some(grid) = place.grid {
@@ -61,20 +61,20 @@ pub fn write_findings(out: impl Write, place: &Findings<'_>) -> Result<(), Expor
         let points = Markers(FEATURES.map(|drawn| points(place.features, header, drawn)).into());
         messages.write("/sonar/features", MARKERS, stamp, &points)?;
     }
-    let provenance = place.provenance.and_then(logged_word);
-    let said = [("provenance", provenance), ("scene", place.scene.map(str::to_owned))];
-    let said = said.into_iter().filter_map(|(key, value)| Some((key.to_owned(), value?)));
-    messages.finish(said.collect())
+    let provenance = place.provenance.and_then(serialized_name);
+    let metadata = [("provenance", provenance), ("scene", place.scene.map(str::to_owned))];
+    let metadata = metadata.into_iter().filter_map(|(key, value)| Some((key.to_owned(), value?)));
+    messages.finish(metadata.collect())
 }
 
-/// How lines of each kind are drawn: namespace, and red, green and blue.
+/// Namespace and colour (red, green, blue) of each kind of line.
 const LINES: [(LineKind, &str, [f32; 3]); 3] = [
     (LineKind::Sonar, "sonar", [0.0, 0.45, 0.7]),
     (LineKind::Laser, "laser", [0.0, 0.62, 0.45]),
     (LineKind::Complex, "complex", [0.8, 0.47, 0.65]),
 ];
 
-/// The same of features.
+/// Namespace and colour (red, green, blue) of each kind of feature.
 const FEATURES: [(FeatureKind, &str, [f32; 3]); 4] = [
     (FeatureKind::Plane, "plane", [0.0, 0.45, 0.7]),
     (FeatureKind::Corner, "corner", [0.84, 0.37, 0.0]),
@@ -94,14 +94,14 @@ fn lines<'a>(
     Marker {
         header,
         namespace,
-        shape: Shape::Lines,
+        shape: MarkerShape::Lines,
         width_m: LINE_WIDTH_M,
         colour: [red, green, blue, 1.0],
         points: of_kind.flat_map(|line| line.ends.map(|end| [end.x, end.y, 0.0])).collect(),
     }
 }
 
-/// Those of which more than a direction is known.
+/// Builds the marker of features with a known position.
 fn points<'a>(
     all: &[Feature],
     header: Header<'a>,
@@ -111,7 +111,7 @@ fn points<'a>(
     Marker {
         header,
         namespace,
-        shape: Shape::Spheres,
+        shape: MarkerShape::Spheres,
         width_m: POINT_WIDTH_M,
         colour: [red, green, blue, 1.0],
         points: of_kind.filter_map(|feature| Some([feature.x_m?, feature.y_m?, 0.0])).collect(),

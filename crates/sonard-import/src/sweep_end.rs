@@ -1,45 +1,46 @@
-//! Ends of sweeps: where the motion turns round, jumps back to its beginning, or has gone full circle.
+//! Detection of the end of a sweep: where the rotation reverses, jumps back to its start, or
+//! completes a circle.
 
 use sonard_model::geometry::wrap_180;
 
-/// Steps in one sense that make a motion; fewer are readings in no order.
+/// Minimum number of steps in one sense that count as a rotation; fewer may be unordered readings.
 const MIN_STEPS: u32 = 2;
-/// Directions closer than this are one, degrees.
+/// Tolerance for equal directions, degrees.
 const SAME_DEG: f64 = 1e-3;
-/// A step back smaller than this share of a usual one is jitter of the mount.
+/// Share of the usual step below which a backward step is jitter of the mount.
 const JITTER: f64 = 0.5;
 
-/// The motion of a ranger, reading by reading.
+/// Rotation of a ranger, reading by reading.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Turning {
+pub(crate) struct SweepDetector {
     first_deg: Option<f64>,
     last_deg: f64,
-    /// Way in all, and the way in the sense of the motion, degrees.
-    way_deg: f64,
-    /// Sense of the motion, its steps, and what they add up to, degrees.
+    /// Total rotation, regardless of sense, degrees.
+    travel_deg: f64,
+    /// Sense of the rotation, number of its steps and their sum, degrees.
     sense: f64,
     steps: u32,
     run_deg: f64,
 }
 
-impl Turning {
-    /// Takes the direction of the next reading; whether it begins another sweep.
+impl SweepDetector {
+    /// Adds the direction of the next reading; returns `true` if the reading starts another sweep.
     pub(crate) fn is_next(&mut self, direction_deg: f64) -> bool {
         if self.first_deg.is_none() {
             self.begin(direction_deg);
             return false;
         }
         let step_deg = wrap_180(direction_deg - self.last_deg);
-        let way_deg = self.way_deg + step_deg.abs();
+        let travel_deg = self.travel_deg + step_deg.abs();
         let usual_deg = self.run_deg / f64::from(self.steps.max(1));
         let is_back = step_deg * self.sense < 0.0;
-        let turns_round = is_back && self.steps >= MIN_STEPS && step_deg.abs() > JITTER * usual_deg;
-        // A little less than a turn, for the rounding of the angles.
-        if turns_round || way_deg > 360.0 - SAME_DEG {
+        let is_reversal = is_back && self.steps >= MIN_STEPS && step_deg.abs() > JITTER * usual_deg;
+        // The tolerance allows for rounding of the angles.
+        if is_reversal || travel_deg > 360.0 - SAME_DEG {
             self.begin(direction_deg);
             return true;
         }
-        (self.last_deg, self.way_deg) = (direction_deg, way_deg);
+        (self.last_deg, self.travel_deg) = (direction_deg, travel_deg);
         if step_deg.abs() > SAME_DEG {
             if is_back || self.sense == 0.0 {
                 (self.sense, self.steps, self.run_deg) = (step_deg.signum(), 0, 0.0);
@@ -54,7 +55,7 @@ impl Turning {
         *self = Self { first_deg: Some(direction_deg), last_deg: direction_deg, ..Self::default() };
     }
 
-    /// Forgets the motion so far.
+    /// Starts a sweep at this direction.
     pub(crate) fn restart(&mut self, direction_deg: f64) {
         self.begin(direction_deg);
     }
@@ -64,12 +65,12 @@ impl Turning {
 mod tests {
     use super::*;
 
-    /// Numbers of readings in each sweep.
+    /// Number of readings in each sweep.
     fn sweeps(directions_deg: impl IntoIterator<Item = f64>) -> Vec<usize> {
-        let mut turning = Turning::default();
+        let mut detector = SweepDetector::default();
         let mut counts = vec![0];
         for direction_deg in directions_deg {
-            if turning.is_next(direction_deg) {
+            if detector.is_next(direction_deg) {
                 counts.push(0);
             }
             *counts.last_mut().expect("begun") += 1;
@@ -83,19 +84,19 @@ mod tests {
     }
 
     #[test]
-    fn sweeps_to_and_fro_end_where_they_turn_round() {
+    fn ends_on_reversal() {
         let there = steps(15, 165, 5);
         let back = steps(160, 15, -5);
         let again = steps(20, 165, 5);
         assert_eq!(sweeps([there.clone(), back, again].concat()), [31, 30, 30]);
-        // The last direction twice.
+        // Repeated last direction.
         assert_eq!(sweeps([there.clone(), steps(165, 15, -5)].concat()), [32, 30]);
         // Across zero.
         assert_eq!(sweeps([steps(-30, 30, 10), steps(20, -30, -10)].concat()), [7, 6]);
     }
 
     #[test]
-    fn sweeps_that_begin_again_end_where_they_jump_back() {
+    fn ends_on_jump_back() {
         for (from, to) in [(15, 165), (0, 90), (0, 200), (-135, 135), (0, 350)] {
             let one = steps(from, to, 5);
             let count = one.len();
@@ -104,7 +105,7 @@ mod tests {
     }
 
     #[test]
-    fn full_turns_jitter_and_repeated_directions_do_not_end_a_sweep_early() {
+    fn survives_jitter_and_repeats() {
         assert_eq!(sweeps([steps(0, 355, 5), steps(0, 355, 5)].concat()), [72, 72]);
         let jitter = (0..60).map(|at| f64::from(at) + if at % 7 == 3 { -1.3 } else { 0.0 });
         assert_eq!(sweeps(jitter), [60]);

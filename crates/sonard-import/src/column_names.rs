@@ -1,22 +1,23 @@
-//! Words by which people name quantities and units in the header of a table.
+//! Recognition of quantities and units in the column names of a table.
 
 use crate::{Field, Quantity};
 
-/// Meaning of a name.
+/// Meaning of a column name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Name {
+pub(crate) enum NameMeaning {
     Field(Field),
-    /// A quantity, but not in which unit.
+    /// Quantity without a unit.
     Quantity(Quantity),
-    /// A unit, but not of what.
+    /// Unit without a quantity.
     Unit(&'static str),
-    Nothing,
+    Unknown,
 }
 
 use Quantity::{Azimuth, Bearing, Heading, Range, Scan, Status, Temperature, Time, Tof, X, Y};
 
-/// Words for a quantity, the more specific first; a word may be used for several, which its unit tells apart.
-const WORDS: &[(&str, &[Quantity])] = &[
+/// Words for a quantity, the more specific first. The unit resolves words that several quantities
+/// share.
+const QUANTITY_WORDS: &[(&str, &[Quantity])] = &[
     ("flight", &[Tof]),
     ("tof", &[Tof]),
     ("laufzeit", &[Tof]),
@@ -106,8 +107,8 @@ const WORDS: &[(&str, &[Quantity])] = &[
     ("status", &[Status]),
 ];
 
-/// Words for a unit, and how fields write it.
-const UNITS: &[(&str, &str)] = &[
+/// Words for a unit, and the suffix that fields use.
+const UNIT_WORDS: &[(&str, &str)] = &[
     ("deg", "deg"),
     ("degs", "deg"),
     ("degree", "deg"),
@@ -171,8 +172,8 @@ const UNITS: &[(&str, &str)] = &[
     ("kelvin", "k"),
 ];
 
-/// Words of columns that are no reading: limits, steps, spreads, and angles about level axes.
-const OTHERS: [&str; 34] = [
+/// Words of columns without readings: limits, steps, standard deviations, and pitch or roll angles.
+const NON_READING_WORDS: [&str; 34] = [
     "min",
     "minimum",
     "max",
@@ -209,13 +210,14 @@ const OTHERS: [&str; 34] = [
     "covariance",
 ];
 
-/// Words of an echo's place, which is not the robot's.
-const OF_ECHO: [&str; 8] = ["echo", "point", "hit", "target", "obstacle", "plot", "px", "py"];
+/// Words that mark the position of an echo, as opposed to that of the robot.
+const ECHO_POSITION_WORDS: [&str; 8] =
+    ["echo", "point", "hit", "target", "obstacle", "plot", "px", "py"];
 
-/// German words for a direction, beside which `Grad` is the degree.
-const GERMAN: [&str; 5] = ["winkel", "drehwinkel", "richtung", "azimut", "peilung"];
+/// German words for a direction; next to one of them, `Grad` means degrees instead of gradians.
+const GERMAN_DIRECTION_WORDS: [&str; 5] = ["winkel", "drehwinkel", "richtung", "azimut", "peilung"];
 
-/// The words of a name, in lower case: parted at signs, and where a capital follows a small letter.
+/// Splits a name into lower-case words, at punctuation, digits and capitals after small letters.
 fn words(name: &str) -> Vec<String> {
     let name = name.replace(['\u{b5}', '\u{3bc}'], "u").replace(['\u{b0}', '\u{ba}'], " deg ");
     let mut parted = String::new();
@@ -243,41 +245,43 @@ pub(crate) fn is_clockwise(name: &str) -> bool {
     words(name).iter().any(|word| word == "cw" || word == "clockwise")
 }
 
-/// Meaning of a column's name.
-pub(crate) fn meaning(name: &str) -> Name {
+/// Returns the meaning of a column name.
+pub(crate) fn meaning(name: &str) -> NameMeaning {
     let words = words(name);
     let has = |known: &[&str]| words.iter().any(|word| known.contains(&word.as_str()));
     if let Some(field) = Field::named(&name.trim().to_lowercase()) {
-        return Name::Field(field);
+        return NameMeaning::Field(field);
     }
-    if has(&OTHERS) {
-        return Name::Nothing;
+    if has(&NON_READING_WORDS) {
+        return NameMeaning::Unknown;
     }
-    let is_german_degree = has(&["grad"]) && has(&GERMAN);
+    let is_german_degree = has(&["grad"]) && has(&GERMAN_DIRECTION_WORDS);
     let unit = words.iter().rev().find_map(|word| {
-        let unit = UNITS.iter().find(|(known, _)| known == word).map(|(_, unit)| *unit);
+        let unit = UNIT_WORDS.iter().find(|(known, _)| known == word).map(|(_, unit)| *unit);
         unit.or_else(|| (word == "grad" && is_german_degree).then_some("deg"))
     });
     let quantities = || {
-        let named = WORDS.iter().filter(|(known, _)| words.iter().any(|word| word == known));
+        let named =
+            QUANTITY_WORDS.iter().filter(|(known, _)| words.iter().any(|word| word == known));
         named.flat_map(|(_, quantities)| quantities.iter().copied())
     };
-    let is_of_echo = has(&OF_ECHO) && quantities().any(|quantity| matches!(quantity, X | Y));
+    let is_of_echo =
+        has(&ECHO_POSITION_WORDS) && quantities().any(|quantity| matches!(quantity, X | Y));
     if is_of_echo {
-        return Name::Nothing;
+        return NameMeaning::Unknown;
     }
-    if let Some(field) = quantities().find_map(|quantity| Field::of(quantity, unit)) {
-        return Name::Field(field);
+    if let Some(field) = quantities().find_map(|quantity| Field::with_unit(quantity, unit)) {
+        return NameMeaning::Field(field);
     }
     match (quantities().next(), unit) {
-        // A text with a unit beside it.
+        // Text columns that carry a unit.
         (Some(Scan | Status), _) => {
-            let field = quantities().find_map(|quantity| Field::of(quantity, None));
-            field.map_or(Name::Nothing, Name::Field)
+            let field = quantities().find_map(|quantity| Field::with_unit(quantity, None));
+            field.map_or(NameMeaning::Unknown, NameMeaning::Field)
         }
-        (_, Some(unit)) => Name::Unit(unit),
-        (Some(quantity), None) => Name::Quantity(quantity),
-        (None, None) => Name::Nothing,
+        (_, Some(unit)) => NameMeaning::Unit(unit),
+        (Some(quantity), None) => NameMeaning::Quantity(quantity),
+        (None, None) => NameMeaning::Unknown,
     }
 }
 
@@ -286,7 +290,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_in_several_languages_and_spellings_are_understood() {
+    fn understands_languages_and_spellings() {
         for (name, field) in [
             ("Angle (deg)", "azimuth_deg"),
             ("angleDeg", "azimuth_deg"),
@@ -320,12 +324,16 @@ mod tests {
             ("scan_id", "scan"),
             ("yaw_deg", "heading_deg"),
         ] {
-            assert_eq!(meaning(name), Name::Field(Field::named(field).expect("a field")), "{name}");
+            assert_eq!(
+                meaning(name),
+                NameMeaning::Field(Field::named(field).expect("a field")),
+                "{name}"
+            );
         }
     }
 
     #[test]
-    fn limits_tilts_and_places_of_echoes_are_no_readings() {
+    fn rejects_limits_and_tilts() {
         for name in [
             "min_range_m",
             "max_range",
@@ -341,12 +349,12 @@ mod tests {
             "foo",
             "class",
         ] {
-            assert_eq!(meaning(name), Name::Nothing, "{name}");
+            assert_eq!(meaning(name), NameMeaning::Unknown, "{name}");
         }
-        assert_eq!(meaning("angle"), Name::Quantity(Azimuth));
-        assert_eq!(meaning("angle_grad"), Name::Quantity(Azimuth));
-        assert_eq!(meaning("Messwert_cm"), Name::Unit("cm"));
-        assert_eq!(meaning("angle_cm"), Name::Unit("cm"));
+        assert_eq!(meaning("angle"), NameMeaning::Quantity(Azimuth));
+        assert_eq!(meaning("angle_grad"), NameMeaning::Quantity(Azimuth));
+        assert_eq!(meaning("Messwert_cm"), NameMeaning::Unit("cm"));
+        assert_eq!(meaning("angle_cm"), NameMeaning::Unit("cm"));
         assert!(is_clockwise("angle_cw_deg") && !is_clockwise("angle_ccw_deg"));
     }
 }

@@ -1,4 +1,4 @@
-//! Distributions of numbers, as a specification writes them.
+//! Distributions of numbers, as written in a specification.
 
 use std::fmt;
 
@@ -9,33 +9,34 @@ use serde::{
     de::{Error, MapAccess, SeqAccess, Visitor, value::MapAccessDeserializer},
 };
 
-/// Where a number comes from.
+/// Distribution of a number.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Spread {
-    /// Always this one: `0.5`.
+    /// Constant: `0.5`.
     Fixed(f64),
-    /// Evenly from one number to another: `[0.3, 0.7]`.
+    /// Uniform distribution: `[0.3, 0.7]`.
     Even([f64; 2]),
-    /// About a mean, and drawn again outside of bounds: `{ mean = 20, sigma = 3, least = 10, most = 30 }`.
+    /// Truncated normal distribution: `{ mean = 20, sigma = 3, least = 10, most = 30 }`.
     Normal {
-        /// The middle.
+        /// Mean before truncation.
         mean: f64,
-        /// Standard deviation, before what is out of bounds is drawn again.
+        /// Standard deviation before truncation.
         sigma: f64,
-        /// The least that is taken.
+        /// Lower bound of the number.
         least: f64,
-        /// The most that is taken.
+        /// Upper bound of the number.
         most: f64,
     },
-    /// One of some, each as likely as any other: `{ any_of = [0.02, 0.05] }`.
+    /// Uniform choice: `{ any_of = [0.02, 0.05] }`.
     AnyOf(Vec<f64>),
 }
 
-/// What a bounded normal distribution is drawn again at most; after that its bound counts.
-const MOST_DRAWS: usize = 1000;
+/// Maximum number of draws of a truncated normal distribution, after which the mean is clamped to
+/// the bounds.
+const MAX_DRAWS: usize = 1000;
 
 impl Spread {
-    /// The least number that can come.
+    /// Returns the minimum of the distribution.
     #[must_use]
     pub fn least(&self) -> f64 {
         match self {
@@ -45,7 +46,7 @@ impl Spread {
         }
     }
 
-    /// The greatest that can come.
+    /// Returns the maximum of the distribution.
     #[must_use]
     pub fn most(&self) -> f64 {
         match self {
@@ -55,7 +56,7 @@ impl Spread {
         }
     }
 
-    /// Draws a number.
+    /// Draws a number from the distribution.
     pub fn draw(&self, rng: &mut impl Rng) -> f64 {
         match self {
             Self::Fixed(number) => *number,
@@ -67,13 +68,13 @@ impl Spread {
                     mean + sigma * unit
                 };
                 let fits = |number: &f64| (*least..=*most).contains(number);
-                (0..MOST_DRAWS).map(|_| draw()).find(fits).unwrap_or(mean.clamp(*least, *most))
+                (0..MAX_DRAWS).map(|_| draw()).find(fits).unwrap_or(mean.clamp(*least, *most))
             }
             Self::AnyOf(numbers) => numbers[rng.random_range(0..numbers.len())],
         }
     }
 
-    /// Draws a number of things: of `[2, 4]` 2, 3 or 4, of others the nearest whole number.
+    /// Draws a count: for `[2, 4]` 2, 3 or 4, for other distributions rounded to a whole number.
     pub fn count(&self, rng: &mut impl Rng) -> usize {
         match self {
             Self::Even([least, most]) => rng.random_range(*least as usize..=*most as usize),
@@ -81,27 +82,27 @@ impl Spread {
         }
     }
 
-    /// What is wrong with it by itself.
+    /// Checks bounds and parameters.
     fn check(self) -> Result<Self, &'static str> {
         let (least, most) = (self.least(), self.most());
         if !(least.is_finite() && most.is_finite()) {
             return Err("a distribution needs finite numbers, and any_of at least one");
         }
         if least > most {
-            return Err("the least number comes first, the greatest after it");
+            return Err("the minimum comes first, then the maximum");
         }
         match self {
             Self::Normal { mean, sigma, .. } if !(mean.is_finite() && sigma >= 0.0) => {
-                Err("mean is a finite number, sigma one that is not negative")
+                Err("mean must be finite and sigma must not be negative")
             }
-            sound => Ok(sound),
+            valid => Ok(valid),
         }
     }
 }
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Written {
+struct DistributionKeys {
     mean: Option<f64>,
     sigma: Option<f64>,
     least: Option<f64>,
@@ -109,26 +110,26 @@ struct Written {
     any_of: Option<Vec<f64>>,
 }
 
-impl Written {
+impl DistributionKeys {
     fn spread(self) -> Result<Spread, &'static str> {
         match self {
             Self { mean: None, sigma: None, least: None, most: None, any_of: Some(numbers) } => {
                 Ok(Spread::AnyOf(numbers))
             }
             Self { mean: Some(mean), sigma: Some(sigma), least, most, any_of: None } => {
-                // Farther out nothing comes: one of 10^9 is beyond six sigma.
+                // Truncated at six sigma, which one number in 10^9 exceeds.
                 let least = least.unwrap_or(mean - 6.0 * sigma);
                 Ok(Spread::Normal { mean, sigma, least, most: most.unwrap_or(mean + 6.0 * sigma) })
             }
-            _ => Err("give mean and sigma (perhaps least and most), or any_of alone"),
+            _ => Err("give mean and sigma (optionally least and most), or only any_of"),
         }
     }
 }
 
 impl<'de> Deserialize<'de> for Spread {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct Form;
-        impl<'de> Visitor<'de> for Form {
+        struct DistributionVisitor;
+        impl<'de> Visitor<'de> for DistributionVisitor {
             type Value = Spread;
 
             fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -151,30 +152,30 @@ impl<'de> Deserialize<'de> for Spread {
                 let mut next = || list.next_element::<f64>();
                 match (next()?, next()?, next()?) {
                     (Some(least), Some(most), None) => Ok(Spread::Even([least, most])),
-                    _ => Err(A::Error::custom("a list is [least, most]; for others write any_of")),
+                    _ => Err(A::Error::custom("a list is [least, most]; for a choice use any_of")),
                 }
             }
 
             fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<Spread, A::Error> {
-                let written = Written::deserialize(MapAccessDeserializer::new(map))?;
-                written.spread().map_err(A::Error::custom)
+                let keys = DistributionKeys::deserialize(MapAccessDeserializer::new(map))?;
+                keys.spread().map_err(A::Error::custom)
             }
         }
-        deserializer.deserialize_any(Form)?.check().map_err(D::Error::custom)
+        deserializer.deserialize_any(DistributionVisitor)?.check().map_err(D::Error::custom)
     }
 }
 
 impl Serialize for Spread {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         #[derive(Serialize)]
-        struct Bounded {
+        struct NormalKeys {
             mean: f64,
             sigma: f64,
             least: f64,
             most: f64,
         }
         #[derive(Serialize)]
-        struct Chosen<'a> {
+        struct ChoiceKeys<'a> {
             any_of: &'a [f64],
         }
         match self {
@@ -182,9 +183,9 @@ impl Serialize for Spread {
             Self::Even(ends) => ends.serialize(serializer),
             Self::Normal { mean, sigma, least, most } => {
                 let (mean, sigma, least, most) = (*mean, *sigma, *least, *most);
-                Bounded { mean, sigma, least, most }.serialize(serializer)
+                NormalKeys { mean, sigma, least, most }.serialize(serializer)
             }
-            Self::AnyOf(any_of) => Chosen { any_of }.serialize(serializer),
+            Self::AnyOf(any_of) => ChoiceKeys { any_of }.serialize(serializer),
         }
     }
 }
@@ -201,7 +202,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_stay_within_what_is_said_of_them_and_reach_its_ends() {
+    fn draws_reach_their_bounds() {
         let mut rng = Pcg64::seed_from_u64(1);
         for text in [
             "3",
@@ -224,7 +225,7 @@ mod tests {
     }
 
     #[test]
-    fn counts_are_each_as_likely_with_both_ends() {
+    fn counts_are_uniform() {
         let mut rng = Pcg64::seed_from_u64(1);
         let spread = Spread::Even([2.0, 4.0]);
         let mut seen = [0; 6];
@@ -236,7 +237,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_distribution_is_refused() {
+    fn rejects_invalid_distributions() {
         for (text, part) in [
             ("\"wide\"", "expected a number, [least, most]"),
             ("[1]", "[least, most]"),

@@ -1,4 +1,4 @@
-//! Outlines of rooms.
+//! Sampling of room outlines.
 
 use std::f64::consts::TAU;
 
@@ -6,32 +6,33 @@ use rand::{Rng, RngExt as _};
 use sonard_model::geometry::DVec2;
 
 use crate::{
+    distribution::Spread,
     spec::{SceneKeys, Shape},
-    spread::Spread,
 };
 
 /// Corners of a room, counter-clockwise.
 #[derive(Debug, Clone)]
-pub(super) struct Outline {
+pub(super) struct RoomOutline {
     pub(super) corners: Vec<DVec2>,
 }
 
-impl Outline {
-    /// Its walls, from corner to corner.
+impl RoomOutline {
+    /// Returns the walls, from corner to corner.
     pub(super) fn walls(&self) -> impl Iterator<Item = [DVec2; 2]> {
         let next = self.corners.iter().cycle().skip(1);
         self.corners.iter().zip(next).map(|(a, b)| [*a, *b])
     }
 }
 
-/// A polygon's corners are off their even spacing by at most this share of it, and off the ellipse by that.
+/// Maximum deviation of a polygon's corners from even spacing and from the ellipse, as a share of
+/// each.
 const UNEVEN: f64 = 0.3;
 const INDENT: f64 = 0.3;
 
-/// Draws one; of a file there is none, and nobody asks.
-pub(super) fn outline(keys: &SceneKeys, rng: &mut impl Rng) -> Outline {
-    let draw = |spread: &Option<Spread>, usual: Spread, rng: &mut _| {
-        spread.as_ref().unwrap_or(&usual).draw(rng)
+/// Samples the outline of a room; shape `file` has none and is not passed.
+pub(super) fn outline(keys: &SceneKeys, rng: &mut impl Rng) -> RoomOutline {
+    let draw = |spread: &Option<Spread>, default: Spread, rng: &mut _| {
+        spread.as_ref().unwrap_or(&default).draw(rng)
     };
     let width_m = draw(&keys.width_m, Spread::Fixed(4.0), rng);
     let depth_m = draw(&keys.depth_m, Spread::Fixed(4.0), rng);
@@ -58,22 +59,22 @@ pub(super) fn outline(keys: &SceneKeys, rng: &mut impl Rng) -> Outline {
             ]
         }
         Shape::Polygon => {
-            let usual = Spread::Even([5.0, 8.0]);
-            let count = keys.corners.as_ref().unwrap_or(&usual).count(rng);
+            let default = Spread::Even([5.0, 8.0]);
+            let count = keys.corners.as_ref().unwrap_or(&default).count(rng);
             polygon(count, DVec2::new(width_m, depth_m), rng)
         }
     };
     let turn_deg = draw(&keys.turn_deg, Spread::Fixed(0.0), rng);
     let turn = DVec2::from_angle(turn_deg.to_radians());
-    // A room that is not turned is drawn as it is, without rounding.
+    // Rooms without rotation avoid rounding errors.
     let turned = |corner: [f64; 2]| match turn_deg == 0.0 {
         true => corner.into(),
         false => turn.rotate(corner.into()),
     };
-    Outline { corners: corners.into_iter().map(turned).collect() }
+    RoomOutline { corners: corners.into_iter().map(turned).collect() }
 }
 
-/// A polygon that is seen whole from its middle, in an ellipse of this size.
+/// Samples a polygon within an ellipse of this size, star-shaped about its center.
 fn polygon(count: usize, size: DVec2, rng: &mut impl Rng) -> Vec<[f64; 2]> {
     let first = rng.random_range(0.0..TAU);
     let corner = |number: usize| {

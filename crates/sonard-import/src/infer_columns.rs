@@ -1,39 +1,41 @@
-//! Meaning of columns by their names.
+//! Inference of a mapping from column names.
 
 use crate::{
     Column, Field, ImportError, Mapping, Quantity,
+    column_names::{self, NameMeaning},
     mapping::columns_option,
-    words::{self, Name},
 };
 
-/// Meanings of the columns' names, on the way into a mapping.
+/// Columns of a table, sorted by the meaning of their names.
 #[derive(Debug, Default)]
-pub(crate) struct Guess {
-    /// Columns whose quantity and unit are certain.
+pub(crate) struct ColumnCandidates {
+    /// Columns with known quantity and unit.
     found: Vec<(Field, String)>,
     /// Columns of a quantity without a unit.
     without_unit: Vec<(Quantity, String)>,
-    /// Columns with a unit alone.
+    /// Columns with only a unit.
     unit_alone: Vec<(&'static str, String)>,
-    /// Columns that nothing is taken from.
+    /// Columns that are not used.
     unused: Vec<String>,
     is_clockwise: bool,
 }
 
-impl Guess {
-    fn of(names: &[String]) -> Self {
-        let mut guess = Self::default();
+impl ColumnCandidates {
+    fn from_names(names: &[String]) -> Self {
+        let mut candidates = Self::default();
         for name in names.iter().filter(|name| !name.is_empty()) {
-            guess.is_clockwise |= words::is_clockwise(name);
-            match words::meaning(name) {
-                Name::Field(field) => guess.found.push((field, name.clone())),
-                Name::Quantity(quantity) => guess.without_unit.push((quantity, name.clone())),
-                Name::Unit(unit) => guess.unit_alone.push((unit, name.clone())),
-                Name::Nothing => guess.unused.push(name.clone()),
+            candidates.is_clockwise |= column_names::is_clockwise(name);
+            match column_names::meaning(name) {
+                NameMeaning::Field(field) => candidates.found.push((field, name.clone())),
+                NameMeaning::Quantity(quantity) => {
+                    candidates.without_unit.push((quantity, name.clone()));
+                }
+                NameMeaning::Unit(unit) => candidates.unit_alone.push((unit, name.clone())),
+                NameMeaning::Unknown => candidates.unused.push(name.clone()),
             }
         }
-        guess.take_yaw_as_azimuth();
-        guess
+        candidates.take_yaw_as_azimuth();
+        candidates
     }
 
     fn has(&self, quantity: Quantity) -> bool {
@@ -48,21 +50,23 @@ impl Guess {
         self.has(Quantity::Range) || self.has(Quantity::Tof)
     }
 
-    /// Takes yaw as the azimuth of the ranger's mount, where nothing else turns and nothing moves.
+    /// Interprets yaw as the azimuth of the ranger's mount, if there is no other direction and no
+    /// position.
     fn take_yaw_as_azimuth(&mut self) {
         if self.has_direction() || self.has(Quantity::X) {
             return;
         }
         for (field, _) in &mut self.found {
             if field.quantity() == Quantity::Heading
-                && let Some(azimuth) = Field::of(Quantity::Azimuth, field.unit())
+                && let Some(azimuth) = Field::with_unit(Quantity::Azimuth, field.unit())
             {
                 *field = azimuth;
             }
         }
     }
 
-    /// Fields and columns, with some in place of those of their quantity.
+    /// Formats `--columns` for all found columns, with `with` in place of those of the same
+    /// quantity.
     fn option(&self, with: &[(Field, &str)], names: &[String]) -> String {
         let is_replaced =
             |field: &Field| with.iter().any(|(other, _)| other.quantity() == field.quantity());
@@ -74,8 +78,8 @@ impl Guess {
         columns_option(all.into_iter().map(|(field, name)| (field, Column::Name(name))), names)
     }
 
-    /// The columns of ranges in one unit, if they are many and side by side: those of an array.
-    pub(crate) fn of_array(&self, names: &[String]) -> Option<(Field, Vec<usize>)> {
+    /// Returns the range columns of an array: more than two, adjacent and in one unit.
+    pub(crate) fn array_columns(&self, names: &[String]) -> Option<(Field, Vec<usize>)> {
         let ranges = self.found.iter().filter(|(field, _)| field.quantity() == Quantity::Range);
         let ranges: Vec<&(Field, String)> = ranges.collect();
         let (field, _) = ranges.first()?;
@@ -87,42 +91,46 @@ impl Guess {
             .then_some((*field, places))
     }
 
-    /// Two columns of one quantity.
-    fn check_twins(&self, names: &[String]) -> Result<(), ImportError> {
-        if let Some((field, places)) = self.of_array(names) {
+    /// Rejects two columns of one quantity.
+    fn check_duplicates(&self, names: &[String]) -> Result<(), ImportError> {
+        if let Some((field, places)) = self.array_columns(names) {
             let columns = columns_option([(field, Column::Several(places.clone()))], names);
             return Err(ImportError::mapping(
-                format!("{} columns are ranges: one a ranger of an array?", places.len()),
+                format!("{} columns are ranges: one per ranger of an array?", places.len()),
                 format!(
-                    "give the places of the rangers: --array NAME {columns}, with an array of `sonard array list` or a file"
+                    "give the array: --array NAME {columns}, with a name from `sonard array list` or a file"
                 ),
             ));
         }
         for (at, (field, name)) in self.found.iter().enumerate() {
-            let twin =
+            let duplicate =
                 self.found[..at].iter().find(|(other, _)| other.quantity() == field.quantity());
-            if let Some((other, twin)) = twin {
-                let [one, two] = [(*other, twin.as_str()), (*field, name.as_str())]
+            if let Some((other, duplicate)) = duplicate {
+                let [first, second] = [(*other, duplicate.as_str()), (*field, name.as_str())]
                     .map(|choice| self.option(&[choice], names));
                 return Err(ImportError::mapping(
-                    format!("`{twin}` and `{name}` may both be the {}", field.quantity().words()),
-                    format!("choose: {one} or {two}"),
+                    format!(
+                        "`{duplicate}` and `{name}` may both be the {}",
+                        field.quantity().words()
+                    ),
+                    format!("choose: {first} or {second}"),
                 ));
             }
         }
         Ok(())
     }
 
-    /// The columns that a direction or a range may be taken from, by their units.
+    /// Returns the columns that may hold one of the quantities, with a field for each possible
+    /// unit.
     fn offers(&self, quantities: [Quantity; 2]) -> Vec<(Field, &str)> {
         let fields = |(unit, name): &(&'static str, String)| {
-            let fields = quantities.map(|quantity| Field::of(quantity, Some(unit)));
+            let fields = quantities.map(|quantity| Field::with_unit(quantity, Some(unit)));
             fields.into_iter().flatten().next().map(|field| (field, name.clone()))
         };
         let with_unit = self.unit_alone.iter().filter_map(fields);
-        let names = |wanted: &(Field, String)| {
-            let found = self.unit_alone.iter().find(|(_, name)| *name == wanted.1);
-            found.map(|(_, name)| (wanted.0, name.as_str()))
+        let names = |offer: &(Field, String)| {
+            let found = self.unit_alone.iter().find(|(_, name)| *name == offer.1);
+            found.map(|(_, name)| (offer.0, name.as_str()))
         };
         let with_unit: Vec<_> = with_unit.collect();
         let mut offers: Vec<(Field, &str)> = with_unit.iter().filter_map(names).collect();
@@ -134,7 +142,8 @@ impl Guess {
         offers
     }
 
-    /// Checks that a direction and a range are named; offers the options that name them with the file's own columns.
+    /// Checks that a direction and a range are mapped; the error offers complete options with the
+    /// file's own columns.
     fn check_missing(&self, mapping: &Mapping, names: &[String]) -> Result<(), ImportError> {
         let needs_direction = !self.has_direction() && mapping.azimuth_deg.is_none();
         let needs_range = !self.has_range();
@@ -144,9 +153,9 @@ impl Guess {
         let directions = self.offers([Quantity::Azimuth, Quantity::Bearing]);
         let ranges = self.offers([Quantity::Range, Quantity::Tof]);
         let lacks = match (needs_direction, needs_range) {
-            (true, true) => "no column is named as a direction or a range",
-            (true, false) => "no column has the azimuth or the bearing",
-            _ => "no column has the range or the time of flight",
+            (true, true) => "no column is recognized as a direction or a range",
+            (true, false) => "no column is mapped to azimuth or bearing",
+            _ => "no column is mapped to range or time of flight",
         };
         let without_unit = self.without_unit.iter().find(|(quantity, _)| match quantity {
             Quantity::Azimuth | Quantity::Bearing => needs_direction,
@@ -154,10 +163,10 @@ impl Guess {
             _ => false,
         });
         let what = match without_unit {
-            Some((_, name)) => format!("`{name}` does not say its unit"),
+            Some((_, name)) => format!("the unit of column `{name}` is unknown"),
             None => format!("{lacks}; the columns are `{}`", names.join("`, `")),
         };
-        // One choice of each at a time: the first of the directions with every range, then the others.
+        // Every combination of a direction and a range, if both are missing.
         let directions = if needs_direction { directions } else { Vec::new() };
         let ranges = if needs_range { ranges } else { Vec::new() };
         let complete: Vec<Vec<(Field, &str)>> = match (needs_direction, needs_range) {
@@ -172,86 +181,86 @@ impl Guess {
             complete.iter().take(MAX_OFFERS).map(|with| self.option(with, names)).collect();
         let mut help = match &options[..] {
             [] => String::new(),
-            [one] => format!("if that is meant: {one}"),
+            [option] => format!("if that is right: {option}"),
             all => format!("choose: {}", all.join(" | ")),
         };
         if needs_direction && !needs_range && options.is_empty() {
-            help = "give the direction of the ranger, if it is fixed: --azimuth-deg DEG".to_owned();
+            help = "if the ranger is fixed, give its direction: --azimuth-deg DEG".to_owned();
         } else if needs_direction && options.is_empty() && ranges.len() == 1 {
             let with = self.option(&ranges[..1], names);
-            help = format!(
-                "give the direction of the ranger, if it is fixed: --azimuth-deg DEG {with}"
-            );
+            help = format!("if the ranger is fixed, give its direction: --azimuth-deg DEG {with}");
         } else if needs_direction && options.is_empty() && !ranges.is_empty() {
             let with: Vec<String> =
                 ranges.iter().take(MAX_OFFERS).map(|range| self.option(&[*range], names)).collect();
             help = format!(
-                "give the direction of the ranger, if it is fixed, and choose a unit: --azimuth-deg DEG {}",
+                "if the ranger is fixed, give its direction and choose a unit: --azimuth-deg DEG {}",
                 with.join(" | --azimuth-deg DEG ")
             );
         } else if options.is_empty() {
             let place = if needs_range { "range_cm" } else { "azimuth_deg" };
             help = format!(
-                "name the columns, by name or number, and their units: --columns azimuth_deg=1,{place}=2, or any \
-                 other fields of `sonard import --help`"
+                "map the columns, by name or number, with units: --columns azimuth_deg=1,{place}=2, or other fields \
+                                 of `sonard import --help`"
             );
         }
         Err(ImportError::mapping(what, help))
     }
 }
 
-/// Options offered at most.
+/// Maximum number of options in a message.
 const MAX_OFFERS: usize = 6;
 
 impl Mapping {
-    /// Takes the ranges of an array's rangers, and what else the names say, if there is a column for each of them.
-    pub(crate) fn guess_array(&mut self, names: &[String], rangers: usize) -> bool {
-        let mut guess = Guess::of(names);
+    /// Maps the ranges of an array and the other named columns; returns `false` unless there is one
+    /// range column per ranger.
+    pub(crate) fn infer_array(&mut self, names: &[String], rangers: usize) -> bool {
+        let mut candidates = ColumnCandidates::from_names(names);
         let Some((field, places)) =
-            guess.of_array(names).filter(|(_, places)| places.len() == rangers)
+            candidates.array_columns(names).filter(|(_, places)| places.len() == rangers)
         else {
             return false;
         };
-        guess.found.retain(|(field, _)| {
+        candidates.found.retain(|(field, _)| {
             !matches!(
                 field.quantity(),
                 Quantity::Range | Quantity::Tof | Quantity::Azimuth | Quantity::Bearing
             )
         });
         self.columns =
-            guess.found.into_iter().map(|(field, name)| (field, Column::Name(name))).collect();
+            candidates.found.into_iter().map(|(field, name)| (field, Column::Name(name))).collect();
         self.columns.insert(field, Column::Several(places));
         true
     }
 
-    /// Takes the columns from their names; what was assumed, a line each.
+    /// Infers the columns from their names and returns one note for each assumption.
     ///
     /// # Errors
-    /// Two columns may have the same, or a name does not say the unit.
-    pub fn guess(&mut self, names: &[String]) -> Result<Vec<String>, ImportError> {
-        let guess = Guess::of(names);
-        guess.check_twins(names)?;
-        guess.check_missing(self, names)?;
+    /// Returns an error for two columns of one quantity, or for a name without a unit.
+    pub(crate) fn infer_columns(&mut self, names: &[String]) -> Result<Vec<String>, ImportError> {
+        let candidates = ColumnCandidates::from_names(names);
+        candidates.check_duplicates(names)?;
+        candidates.check_missing(self, names)?;
         let mut notes = Vec::new();
-        let yaw = guess
-            .found
-            .iter()
-            .find(|(field, name)| field.quantity() == Quantity::Azimuth && words::is_yaw(name));
+        let yaw = candidates.found.iter().find(|(field, name)| {
+            field.quantity() == Quantity::Azimuth && column_names::is_yaw(name)
+        });
         if let Some((_, name)) = yaw {
-            notes.push(format!("`{name}` is taken as the azimuth: no other column is a direction"));
+            notes.push(format!("`{name}` taken as the azimuth: no other column is a direction"));
         }
-        if guess.is_clockwise && !self.clockwise {
+        if candidates.is_clockwise && !self.clockwise {
             self.clockwise = true;
-            notes.push("directions count clockwise, as their column's name says".to_owned());
+            notes.push("azimuths taken as clockwise, by the name of their column".to_owned());
         }
-        let more = guess.without_unit.iter().map(|(_, name)| name);
-        let more = more.chain(guess.unit_alone.iter().map(|(_, name)| name)).chain(&guess.unused);
+        let more = candidates.without_unit.iter().map(|(_, name)| name);
+        let more = more
+            .chain(candidates.unit_alone.iter().map(|(_, name)| name))
+            .chain(&candidates.unused);
         let unused: Vec<&str> = more.map(String::as_str).collect();
         if !unused.is_empty() {
             notes.push(format!("columns not used: `{}`", unused.join("`, `")));
         }
         self.columns =
-            guess.found.into_iter().map(|(field, name)| (field, Column::Name(name))).collect();
+            candidates.found.into_iter().map(|(field, name)| (field, Column::Name(name))).collect();
         Ok(notes)
     }
 }

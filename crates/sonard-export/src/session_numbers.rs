@@ -1,18 +1,19 @@
-//! Sessions by number.
+//! Numbers of sessions in an export.
 
 use std::sync::Arc;
 
 use sonard_records::Session;
 
-/// Counts sessions from 1, in the order in which scans of them come.
+/// Counter of sessions from 1, in the order of their scans.
 #[derive(Debug, Default)]
-pub(crate) struct Sessions {
+pub(crate) struct SessionNumbers {
     count: u32,
     last: Option<Arc<Session>>,
 }
 
-impl Sessions {
-    /// The number of a scan's session, and whether no scan of it came before; `None` of a scan without one.
+impl SessionNumbers {
+    /// Returns the number of a scan's session, and whether this is its first scan; `None` without a
+    /// session.
     pub(crate) fn number(&mut self, session: Option<&Arc<Session>>) -> Option<(u32, bool)> {
         let session = session?;
         let known = self.last.as_ref();
