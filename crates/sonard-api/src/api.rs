@@ -1,8 +1,7 @@
-//! What is said over the HTTP API: the types of its requests and answers, for whoever serves them
-//! and whoever asks.
+//! Request and response types of the HTTP API, shared by server and clients.
 //!
-//! `GET /v1/openapi.json` is made from these types, and from those of [`scan`](sonard_records) that
-//! records are.
+//! `GET /v1/openapi.json` is generated from these types and from the record types of
+//! [`sonard_records`].
 
 mod air;
 mod beam;
@@ -49,7 +48,7 @@ pub use status::{
     SubscriberReport,
 };
 
-// Those that the pure part makes.
+// Types of the API that the model crates define.
 pub use sonard_interpret::compare::{Beside, JudgedPing, Word};
 pub use sonard_inverse::{Doubt, Mode};
 pub use sonard_records::{Body, Circle, FloorPlan, PeakLine, PlanPoint, TraceLine, WallLine};

@@ -1,4 +1,4 @@
-//! A client of the daemon's API, over its unix socket or TCP.
+//! Client of the daemon's HTTP API, over its unix socket or TCP.
 
 mod live;
 mod scans;
@@ -26,87 +26,89 @@ pub use scans::{RequestedScans, ScansError};
 
 use crate::api::{Accepted, Problem};
 
-/// How long a daemon may take for its answer to begin, and for each further piece of it.
-const PATIENCE: Duration = Duration::from_secs(10);
+/// Timeout for the head of a response, and for each further frame of its body.
+const RESPONSE_TIMEOUT: Duration = Duration::from_secs(10);
 
-/// Longest refusal that is read, bytes.
-const MOST_REFUSAL_BYTES: usize = 64 * 1024;
+/// Maximum size of an error response, bytes.
+const MAX_ERROR_BYTES: usize = 64 * 1024;
 
-/// The address of a daemon.
+/// Address of a daemon.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Endpoint {
-    /// At a unix socket.
+    /// Path of a unix socket.
     Socket(PathBuf),
-    /// At a TCP address, `HOST:PORT`.
+    /// TCP address, `HOST:PORT`.
     Address(String),
 }
 
-/// Asks one daemon.
+/// Client of one daemon. Each request opens a connection of its own.
 #[derive(Clone)]
 pub struct Client {
     place: Endpoint,
     token: Option<String>,
 }
 
-/// A request that a daemon did not answer as expected.
+/// Failed request to a daemon.
 #[derive(Debug, Error)]
 pub enum ClientError {
-    /// Nobody is there.
-    #[error("no daemon answers at {place}: {source}")]
+    /// No connection could be established.
+    #[error("no daemon responds at {place}: {source}")]
     NoDaemon {
-        /// Where.
+        /// Address of the daemon.
         place: String,
-        /// What the system says.
+        /// System error of the connection attempt.
         source: io::Error,
     },
-    /// It answers too slowly.
-    #[error("the daemon did not answer within {} s", PATIENCE.as_secs())]
+    /// No response within the timeout.
+    #[error("the daemon did not respond within {} s", RESPONSE_TIMEOUT.as_secs())]
     TooSlow,
-    /// A live stream lacks even signs of life.
+    /// No data on a live stream, not even its keep-alive lines.
     #[error(
-        "the daemon has sent nothing for {} s: it hangs, or can't be reached any more",
-        live::SILENCE.as_secs()
+        "no data from the daemon for {} s: it hangs, or the connection is lost",
+        live::IDLE_TIMEOUT.as_secs()
     )]
     Silent,
-    /// It speaks something else, or broke off.
-    #[error("the daemon's answer can't be read: {0}")]
+    /// Invalid HTTP, or an interrupted connection.
+    #[error("invalid response from the daemon: {0}")]
     Http(#[from] hyper::Error),
-    /// It answers something else than it should.
-    #[error("the daemon's answer can't be read: {0}")]
+    /// Response body that is not the expected JSON.
+    #[error("invalid response from the daemon: {0}")]
     Strange(#[from] serde_json::Error),
-    /// It answers more than was asked for.
-    #[error("the daemon's answer is longer than {0} bytes")]
+    /// Response body over the size limit, bytes.
+    #[error("the daemon's response is longer than {0} bytes")]
     TooLong(usize),
-    /// It refused.
-    #[error("the daemon refused ({status}): {error}")]
+    /// Error response of the daemon.
+    #[error("the daemon rejected the request ({status}): {error}")]
     Refused {
-        /// Status of the answer.
+        /// HTTP status of the response.
         status: StatusCode,
-        /// What it says is wrong.
+        /// Error message of the daemon.
         error: String,
-        /// What it says would be right.
+        /// Advice on how to correct the request.
         help: String,
     },
 }
 
 impl ClientError {
-    /// Whether asking the same again would be refused again.
+    /// Returns `true` if a repetition of the request would be rejected, too.
     #[must_use]
     pub fn is_final(&self) -> bool {
         let passing = [StatusCode::REQUEST_TIMEOUT, StatusCode::TOO_MANY_REQUESTS];
         matches!(self, Self::Refused { status, .. } if status.is_client_error() && !passing.contains(status))
     }
 
-    /// What a person can do about it.
+    /// Returns advice on how to resolve the error.
     #[must_use]
     pub fn help(&self) -> String {
         match self {
             Self::NoDaemon { .. } => "start it with `sonard run` or `systemctl start sonard`; \
-                 --socket or --address say where it is; the socket's group may use it"
+                 --socket or --address select it; only the socket's group may use it"
                 .into(),
-            Self::TooSlow | Self::Silent => "look at its messages (`journalctl -u sonard`)".into(),
+            Self::TooSlow | Self::Silent => {
+                "check the log messages of the daemon (`journalctl -u sonard`)".into()
+            }
             Self::Http(_) | Self::Strange(_) | Self::TooLong(_) => {
-                "make sure that it is a sonard of this version".into()
+                "check that it is a sonard daemon of this version".into()
             }
             Self::Refused { help, .. } => help.clone(),
         }
@@ -114,43 +116,44 @@ impl ClientError {
 }
 
 impl Client {
-    /// A client of the daemon there. Over TCP, orders need the daemon's token, and from another
-    /// computer every question does.
+    /// Creates a client. Over TCP, writes need the daemon's token; from another computer reads need
+    /// it, too.
     #[must_use]
     pub const fn new(place: Endpoint, token: Option<String>) -> Self {
         Self { place, token }
     }
 
-    /// Asks for a path; the answer's body can be read as it comes.
+    /// Requests a path. The body of the response can be read as it arrives.
     ///
     /// # Errors
-    /// When nobody answers, or the answer is not of success.
+    /// No response, or a response without success.
     pub async fn get(&self, path: &str) -> Result<Response<Incoming>, ClientError> {
-        self.ask(Request::get(path), Bytes::new()).await
+        self.send(Request::get(path), Bytes::new()).await
     }
 
-    /// The whole of an answer, which is JSON of this type.
+    /// Requests a path and deserializes the whole JSON response.
     ///
     /// # Errors
-    /// As [`Self::get`], or when it is something else.
+    /// As [`Self::get`], or a response that is not the expected JSON.
     pub async fn get_json<T: DeserializeOwned>(&self, path: &str) -> Result<T, ClientError> {
         self.get_json_within(path, usize::MAX).await
     }
 
-    /// The same of an answer that may have so many bytes; no more of one are taken.
+    /// Requests a path and deserializes a JSON response of at most `max_bytes`; reading stops
+    /// there.
     ///
     /// # Errors
-    /// As [`Self::get_json`], or when it is longer.
+    /// As [`Self::get_json`], or a longer response.
     pub async fn get_json_within<T: DeserializeOwned>(
         &self,
         path: &str,
-        most_bytes: usize,
+        max_bytes: usize,
     ) -> Result<T, ClientError> {
         let body = self.get(path).await?.into_body();
-        Ok(serde_json::from_slice(&within(body, most_bytes).await?)?)
+        Ok(serde_json::from_slice(&read_body(body, max_bytes).await?)?)
     }
 
-    /// Gives an order with a JSON body, and returns the whole answer.
+    /// Sends a JSON body by POST and deserializes the response.
     ///
     /// # Errors
     /// As [`Self::get_json`].
@@ -159,72 +162,72 @@ impl Client {
         path: &str,
         body: &impl Serialize,
     ) -> Result<T, ClientError> {
-        self.order(Request::post(path), body).await
+        self.send_json(Request::post(path), body).await
     }
 
-    /// Puts something in force.
+    /// Sends a JSON body by PUT.
     ///
     /// # Errors
     /// As [`Self::get`].
     pub async fn put(&self, path: &str, body: &impl Serialize) -> Result<(), ClientError> {
-        self.order::<Accepted>(Request::put(path), body).await.map(drop)
+        self.send_json::<Accepted>(Request::put(path), body).await.map(drop)
     }
 
-    /// Takes something out of force.
+    /// Sends a DELETE request.
     ///
     /// # Errors
     /// As [`Self::get`].
     pub async fn delete(&self, path: &str) -> Result<(), ClientError> {
-        self.ask(Request::delete(path), Bytes::new()).await.map(drop)
+        self.send(Request::delete(path), Bytes::new()).await.map(drop)
     }
 
-    async fn order<T: DeserializeOwned>(
+    async fn send_json<T: DeserializeOwned>(
         &self,
         request: Builder,
         body: &impl Serialize,
     ) -> Result<T, ClientError> {
         let request = request.header(header::CONTENT_TYPE, "application/json");
-        let answer = self.ask(request, serde_json::to_vec(body)?.into()).await?;
-        Ok(serde_json::from_slice(&within(answer.into_body(), usize::MAX).await?)?)
+        let response = self.send(request, serde_json::to_vec(body)?.into()).await?;
+        Ok(serde_json::from_slice(&read_body(response.into_body(), usize::MAX).await?)?)
     }
 
-    async fn ask(&self, request: Builder, body: Bytes) -> Result<Response<Incoming>, ClientError> {
+    async fn send(&self, request: Builder, body: Bytes) -> Result<Response<Incoming>, ClientError> {
         let request = match &self.token {
             Some(token) => request.header(header::AUTHORIZATION, format!("Bearer {token}")),
             None => request,
         };
-        let begun = timeout(PATIENCE, begin(&self.place, request, body));
-        let response = begun.await.map_err(|_| ClientError::TooSlow)??;
+        let head = timeout(RESPONSE_TIMEOUT, connect_and_send(&self.place, request, body));
+        let response = head.await.map_err(|_| ClientError::TooSlow)??;
         let status = response.status();
-        // A daemon that is not well says so with a body that is wanted all the same.
+        // An unhealthy daemon reports its health with status 503; the body is the expected one.
         if status.is_success() || status == StatusCode::SERVICE_UNAVAILABLE {
             return Ok(response);
         }
-        let body = within(response.into_body(), MOST_REFUSAL_BYTES).await?;
+        let body = read_body(response.into_body(), MAX_ERROR_BYTES).await?;
         let Problem { error, help } = serde_json::from_slice(&body).unwrap_or_else(|_| Problem {
             error: String::from_utf8_lossy(&body).into_owned(),
-            help: "make sure that it is a sonard of this version".into(),
+            help: "check that it is a sonard daemon of this version".into(),
         });
         Err(ClientError::Refused { status, error, help })
     }
 }
 
-/// A body's bytes, at most so many; none may be waited for longer than for the answer's beginning.
-async fn within(mut body: Incoming, most_bytes: usize) -> Result<Vec<u8>, ClientError> {
+/// Reads a body of at most `max_bytes`, with a timeout for each frame.
+async fn read_body(mut body: Incoming, max_bytes: usize) -> Result<Vec<u8>, ClientError> {
     let mut bytes = Vec::new();
     while let Some(frame) =
-        timeout(PATIENCE, body.frame()).await.map_err(|_| ClientError::TooSlow)?
+        timeout(RESPONSE_TIMEOUT, body.frame()).await.map_err(|_| ClientError::TooSlow)?
     {
         let frame = frame?;
         bytes.extend_from_slice(frame.data_ref().map_or(&[][..], |data| data));
-        if bytes.len() > most_bytes {
-            return Err(ClientError::TooLong(most_bytes));
+        if bytes.len() > max_bytes {
+            return Err(ClientError::TooLong(max_bytes));
         }
     }
     Ok(bytes)
 }
 
-async fn begin(
+async fn connect_and_send(
     place: &Endpoint,
     request: Builder,
     body: Bytes,
@@ -233,17 +236,17 @@ async fn begin(
         Endpoint::Socket(socket) => {
             let stream = UnixStream::connect(socket).await;
             let stream = stream.map_err(|source| no_daemon(&socket.display(), source))?;
-            send(stream, "localhost", request, body).await
+            send_on(stream, "localhost", request, body).await
         }
         Endpoint::Address(address) => {
             let stream = TcpStream::connect(address).await;
             let stream = stream.map_err(|source| no_daemon(address, source))?;
-            send(stream, address, request, body).await
+            send_on(stream, address, request, body).await
         }
     }
 }
 
-async fn send<S>(
+async fn send_on<S>(
     stream: S,
     host: &str,
     request: Builder,
@@ -253,7 +256,7 @@ where
     S: tokio::io::AsyncRead + tokio::io::AsyncWrite + Send + Unpin + 'static,
 {
     let (mut sender, connection) = http1::handshake(TokioIo::new(stream)).await?;
-    // Its end shows in the body.
+    // The end of the connection ends the body, too.
     #[allow(clippy::disallowed_methods, reason = "its end ends the requests on it")]
     tokio::spawn(async move { drop(connection.await) });
     let request = request.header(header::HOST, host).body(Full::new(body));

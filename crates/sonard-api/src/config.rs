@@ -1,8 +1,8 @@
-//! Configuration: the daemon's keys, and what reads any file of sections and keys.
+//! Configuration of the daemon: its keys, and a reader for any file of sections and keys.
 //!
-//! [`Keys`] is what there is for `sonard run`, with a doc comment, a range and a default each. From
-//! such a [`Form`] come the file that documents it ([`document`]), the check of every value with
-//! its place, and the refusal of unknown keys ([`Layers`]).
+//! [`Keys`] defines the configuration of `sonard run`: each key has a doc comment, a range and a
+//! default. The documented configuration file ([`document`]), validation with source positions and
+//! rejection of unknown keys are derived from the type. Other programs define a type of their own.
 
 mod air;
 mod document;
@@ -27,5 +27,5 @@ pub use mqtt::{Broker, MqttKeys};
 pub use ros::{RosDistribution, RosKeys, RosProfile};
 pub use schema::{Form, Key, Kind, Section, read_sections, sections};
 
-/// A key of a section with what is wrong with it, and what would be right.
+/// Invalid key of a section, with the error message and its remedy.
 pub type Fault = (&'static str, String, String);

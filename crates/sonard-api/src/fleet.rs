@@ -1,18 +1,18 @@
-//! Several daemons looked at together: who they are, how each answers, and one task that goes on asking.
+//! Polling of several daemons: members, their state, and a task that keeps it up to date.
 //!
-//! Each is asked by itself, in a time and a number of bytes that are bounded: one that is silent,
-//! refuses, or answers something else delays no other. [`judge`] and [`Roll`] are pure.
+//! Each daemon is polled independently, with limits on time and bytes, so one that does not respond
+//! or sends something else delays no other. Registry and derivation of states are pure.
 #![warn(clippy::expect_used, clippy::indexing_slicing, clippy::panic)]
 
-mod ask;
-mod judge;
 mod member;
 mod picture;
-mod roll;
+mod poll;
+mod registry;
+mod state;
 mod watch;
 
-pub use ask::{Told, ask};
-pub use judge::{Seen, Unheard, judge, plain};
 pub use member::{Asked, MOST_MEMBERS, Member, MemberError, check_all, members_of, read_members};
-pub use roll::Roll;
+pub use poll::{Told, ask};
+pub use registry::Roll;
+pub use state::{Seen, Unheard, judge, plain};
 pub use watch::watch;

@@ -1,4 +1,4 @@
-//! Files that hold a secret: a token, a password, a key.
+//! Reader of secret files: tokens, passwords and keys.
 
 use std::{
     fs::OpenOptions,
@@ -10,64 +10,64 @@ use std::{
 use rustix::fs::OFlags;
 use thiserror::Error;
 
-/// A secret that can't be read from its file.
+/// Error while reading a secret from a file.
 #[derive(Debug, Error)]
 pub enum SecretError {
-    /// It can't be read.
+    /// File access failed.
     #[error("{0}")]
     Unreadable(#[from] io::Error),
-    /// A folder, a pipe, a device.
-    #[error("it is no regular file")]
+    /// Folder, pipe or device instead of a file.
+    #[error("not a regular file")]
     NoFile,
-    /// Others than its owner may read it.
-    #[error("its permissions are {:03o}: others than its owner may read the {what}", mode & 0o777)]
+    /// File that others than its owner may read.
+    #[error("permissions {:03o}: others than the owner may read the {what}", mode & 0o777)]
     Open {
-        /// What is in it.
+        /// Kind of secret.
         what: &'static str,
-        /// Its permissions.
+        /// File mode.
         mode: u32,
     },
-    /// No such secret is that large.
-    #[error("it is larger than {0} bytes")]
+    /// File over the size limit, bytes.
+    #[error("larger than {0} bytes")]
     TooLarge(u64),
-    /// Not text.
-    #[error("it is no text")]
+    /// File that is not UTF-8 text.
+    #[error("not UTF-8 text")]
     NoText,
-    /// It could be guessed.
-    #[error("the {what} in it is shorter than {least} characters")]
+    /// Secret too short to be safe.
+    #[error("the {what} is shorter than {least} characters")]
     TooShort {
-        /// What is in it.
+        /// Kind of secret.
         what: &'static str,
-        /// Least length, characters.
+        /// Minimum length, characters.
         least: usize,
     },
 }
 
 impl SecretError {
-    /// What a person can do about it, if it is not the file's contents: then `None`.
+    /// Returns advice on the file's permissions; `None` for other errors.
     #[must_use]
     pub fn help(&self, path: &Path) -> Option<String> {
         matches!(self, Self::Open { .. }).then(|| format!("chmod 600 {}", path.display()))
     }
 }
 
-/// The kind of secret in a file.
+/// Kind of a secret and its limits.
 #[derive(Debug, Clone, Copy)]
 pub struct Secret {
-    /// What errors call it.
+    /// Name in error messages.
     pub what: &'static str,
-    /// Shortest, characters.
+    /// Minimum length, characters.
     pub least: usize,
-    /// Largest file, bytes.
+    /// Maximum size of the file, bytes.
     pub most_bytes: u64,
 }
 
-/// The secret in a file that only its owner may read, without blanks around it.
+/// Reads the secret from a file that only its owner may read, and trims white space.
 ///
 /// # Errors
-/// Anything but a small regular file with text in it; nothing is waited for.
-pub fn read_secret(path: &Path, wanted: Secret) -> Result<String, SecretError> {
-    let Secret { what, least, most_bytes } = wanted;
+/// Anything but a small regular file with text. Never blocks on pipes or devices.
+pub fn read_secret(path: &Path, secret: Secret) -> Result<String, SecretError> {
+    let Secret { what, least, most_bytes } = secret;
     let (text, mode) = read_small_file(path, most_bytes)?;
     if mode & 0o077 != 0 {
         return Err(SecretError::Open { what, mode });
@@ -76,12 +76,12 @@ pub fn read_secret(path: &Path, wanted: Secret) -> Result<String, SecretError> {
     if secret.len() < least { Err(SecretError::TooShort { what, least }) } else { Ok(secret) }
 }
 
-/// The text of a regular file of at most so many bytes, and the file's permissions.
+/// Reads the text of a regular file of at most `max_bytes`, with the file's mode.
 ///
 /// # Errors
-/// When it is something else; nothing is waited for.
-pub fn read_small_file(path: &Path, most_bytes: u64) -> Result<(String, u32), SecretError> {
-    // Opening a pipe would wait for whoever writes into it.
+/// Any other file. Never blocks on pipes or devices.
+pub fn read_small_file(path: &Path, max_bytes: u64) -> Result<(String, u32), SecretError> {
+    // Opening a pipe would otherwise block until it has a writer.
     let nonblocking = OFlags::NONBLOCK.bits().cast_signed();
     let file = OpenOptions::new().read(true).custom_flags(nonblocking).open(path)?;
     let metadata = file.metadata()?;
@@ -89,9 +89,9 @@ pub fn read_small_file(path: &Path, most_bytes: u64) -> Result<(String, u32), Se
         return Err(SecretError::NoFile);
     }
     let mut bytes = Vec::new();
-    file.take(most_bytes + 1).read_to_end(&mut bytes)?;
-    if bytes.len() as u64 > most_bytes {
-        return Err(SecretError::TooLarge(most_bytes));
+    file.take(max_bytes + 1).read_to_end(&mut bytes)?;
+    if bytes.len() as u64 > max_bytes {
+        return Err(SecretError::TooLarge(max_bytes));
     }
     let text = String::from_utf8(bytes).map_err(|_| SecretError::NoText)?;
     Ok((text, metadata.permissions().mode()))

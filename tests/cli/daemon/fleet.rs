@@ -63,7 +63,7 @@ fn status_of_three_robots() {
     let named = ["--set", &listen, "--set", "fleet.robot=papaya"];
     let papaya = Daemon::start_mock(&elsewhere, &named);
     wait_until("another", || fleet.states() == ["not_well", "other_robot", "well"]);
-    assert_eq!(fleet.told()[1]["wrong"][0], "papaya answers in place of mango");
+    assert_eq!(fleet.told()[1]["wrong"][0], "papaya responds in place of mango");
     assert_eq!(fleet.status().status.code(), Some(3));
     papaya.kill();
     wait_until("silence", || fleet.states() == ["not_well", "silent", "well"]);
@@ -81,8 +81,8 @@ fn without_a_fleet() {
     let page = String::from_utf8(daemon.get("/").body).expect("text");
     assert!(page.contains("href=\"/fleet\" hidden"), "{page}");
     for (setting, part) in [
-        ("fleet.daemons=kiwi", "no place of a daemon"),
-        ("fleet.daemons=a=h:1,a=h:2", "two daemons are of a"),
+        ("fleet.daemons=kiwi", "is not a daemon's address"),
+        ("fleet.daemons=a=h:1,a=h:2", "two daemons of robot a"),
         ("fleet.file=/no/such.toml", "/no/such.toml"),
     ] {
         let output = run(&["run", "--check", "--port", "x", "--set", setting]);
@@ -173,7 +173,7 @@ fn unreachable_and_foreign_daemons() {
         ["other_robot", "silent", "strange", "strange", "strange", "strange", "silent"],
         "{said}"
     );
-    assert_eq!(rows[0]["wrong"][0], "kiwi answers in place of mango");
+    assert_eq!(rows[0]["wrong"][0], "kiwi responds in place of mango");
     assert!(rows[3]["wrong"][0].as_str().expect("why").contains("longer than"), "{said}");
     // What the system's buffers hold, and no more, was taken of what has no end: two questions.
     let taken = taken.load(Ordering::Relaxed);

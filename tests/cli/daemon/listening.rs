@@ -39,7 +39,7 @@ fn removed_socket_is_bound_again() {
         fs::remove_file(&socket).expect("it is there");
         wait_until("the socket", || daemon.connect().is_ok());
         assert_eq!(fs::metadata(&socket).expect("it is there").mode() & 0o777, 0o620);
-        wait_until("the report", || count(&daemon, "it has been bound again") == round);
+        wait_until("the report", || count(&daemon, "removed; bound again") == round);
     }
     assert_eq!(daemon.status()["server"]["listening"], json!([socket]));
     assert_eq!(daemon.stop(), Some(0));
@@ -124,7 +124,7 @@ fn impossible_addresses() {
         (format!("server.token_file={}", path("open")), "chmod 600"),
         (format!("server.token_file={}", path("missing")), "No such file"),
         (format!("server.token_file={empty}"), "shorter"),
-        (format!("server.token_file={}", folder.path().display()), "no regular file"),
+        (format!("server.token_file={}", folder.path().display()), "not a regular file"),
         (format!("server.playground={}", path("missing")), "index.html"),
         (format!("fleet.file={}", path("missing")), "No such file"),
         (format!("fleet.file={}", path("fleet.toml")), "chmod 600"),

@@ -94,7 +94,7 @@ fn hanging_daemon_is_detected() {
         assert_eq!(output.status.code(), Some(3), "{what}: {said}");
         let words = said.replace("\n  │ ", " ").replace('\n', " ");
         // Between two scans the daemon is asked what it does.
-        let told = ["has sent nothing for 40 s", "did not answer within 10 s"];
+        let told = ["no data from the daemon for 40 s", "did not respond within 10 s"];
         assert!(told.iter().any(|told| words.contains(told)), "{what}: {said}");
     }
     daemon.signal(Signal::CONT);
@@ -102,7 +102,7 @@ fn hanging_daemon_is_detected() {
     let mut news = BufReader::new(patient.stderr.take().expect("piped")).lines();
     let mut heard =
         |words: &str| news.by_ref().map_while(Result::ok).any(|line| line.contains(words));
-    assert!(heard("has sent nothing for 40 s"));
+    assert!(heard("no data from the daemon for 40 s"));
     assert!(heard("reconnected"));
     lines.next().expect("it goes on").expect("text");
     several.kill().expect("it runs");

@@ -1,37 +1,37 @@
-//! One beam of a scan: what was heard, what the model hears, and the paths of the sound.
+//! Details of one beam of a scan: measured echoes, predicted arrivals and propagation paths.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use sonard_interpret::compare::JudgedPing;
 use sonard_records::{PeakLine, PlanPoint, TraceLine};
 
-/// A beam with all that is known about it.
+/// Measurement and prediction of one beam.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Beam {
-    /// The reading, and what explains it.
+    /// Reading, with its classification against the model.
     pub reading: JudgedPing,
-    /// Its echoes, in the order in which they came.
+    /// Measured echoes, in order of arrival.
     pub echoes: Vec<Echo>,
-    /// The path of the reading's sound, or else of the predicted echo, in the plan: the transmitter, each
-    /// interaction, the receiver.
+    /// Propagation path of the reading, or else of the predicted echo, as a polyline in the floor
+    /// plan: transmitter, each interaction, receiver.
     pub polyline: Option<Vec<PlanPoint>>,
-    /// What the model hears, in order of time, faint sounds included; `null` if it could not be
-    /// asked.
+    /// Predicted arrivals in order of time, including those below the threshold; `null` if no
+    /// prediction could be computed.
     pub peaks: Option<Vec<PeakLine>>,
-    /// The echo trace that the model predicts, up to half a metre beyond what was heard or predicted;
-    /// `null` if it could not be asked.
+    /// Predicted echo envelope, up to 0.5 m beyond the last measured or predicted echo; `null` if
+    /// no prediction could be computed.
     pub trace: Option<TraceLine>,
-    /// Why the model could not be asked, in words.
+    /// Reason why no prediction could be computed.
     pub lacks: Option<String>,
 }
 
-/// An echo that the ranger heard.
+/// Echo detected by the ranger.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Echo {
-    /// Time after firing, device ticks.
+    /// Time since firing, device ticks.
     pub ticks: u32,
-    /// The same in microseconds; `null` without a session.
+    /// Time of flight, microseconds; `null` without a session.
     pub tof_us: Option<f64>,
-    /// Half the way that sound goes in that time, metres.
+    /// Range: half the distance that sound travels in the time of flight, metres.
     pub range_m: Option<f64>,
 }

@@ -1,9 +1,9 @@
-//! How strictly what programs send is read.
+//! Strict deserialization of request bodies.
 
 use serde::{Deserialize, Deserializer, de::Error as _};
 use serde_json::Value;
 
-/// The fields of bodies that are lists, of objects.
+/// Names of the body fields that hold lists of objects.
 const LISTS: [&str; 1] = ["steps"];
 
 /// Returns `true` if a request body contains a list where the API has none.

@@ -1,59 +1,59 @@
-//! What can be made of a scan: a map, lines and features.
+//! Interpretation of a scan: occupancy grid, lines and features.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use sonard_interpret::interpret::{FeatureKind, Reason};
 use sonard_records::PlanPoint;
 
-/// Features, lines and map found in a scan.
+/// Features, lines and occupancy grid derived from a scan.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Findings {
-    /// Occupancy grid; `null` where nothing was heard near enough to be mapped.
+    /// Occupancy grid; `null` if no echo is near enough to be mapped.
     pub map: Option<MapCells>,
     /// Line segments fitted to the readings.
     pub lines: Vec<FoundLine>,
-    /// Planes, corners and edges told apart.
+    /// Planes, corners and edges, classified by their arcs.
     pub features: Vec<FoundFeature>,
-    /// What could not be found and why, in words.
+    /// Description of results that could not be computed, with the reason.
     pub lacks: Option<String>,
 }
 
-/// An occupancy grid.
+/// Occupancy grid of square cells.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct MapCells {
-    /// Lower left corner.
+    /// Lower left corner of the grid.
     pub origin: PlanPoint,
     /// Side of a cell, metres.
     pub resolution_m: f64,
-    /// Cells of a row.
+    /// Number of cells per row.
     pub width: usize,
-    /// How likely each cell is occupied, percent, -1 where nothing is known; row by row from the lower
+    /// Occupancy probability of each cell, percent, or -1 if unknown; row by row from the lower
     /// left, as in ROS's `OccupancyGrid`.
     pub cells: Vec<i8>,
 }
 
-/// A line segment.
+/// Line segment fitted to readings.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct FoundLine {
-    /// One end.
+    /// Start point of the segment.
     pub from: PlanPoint,
-    /// The other.
+    /// End point of the segment.
     pub to: PlanPoint,
-    /// From 0 (a guess) to 1.
+    /// Confidence, from 0 (a guess) to 1.
     pub confidence: f64,
 }
 
-/// A plane, corner or edge.
+/// Plane, corner or edge of the room.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct FoundFeature {
-    /// What it is.
+    /// Kind of reflector.
     pub kind: FeatureKind,
-    /// Middle of its arc.
+    /// Midpoint of the feature's arc.
     pub at: PlanPoint,
-    /// Probability of the kind; for what is unresolved, of the likeliest one.
+    /// Probability of the kind; for an unresolved feature, that of its most probable kind.
     pub confidence: f64,
-    /// Why it is unresolved.
+    /// Reason why the kind is unresolved.
     pub reason: Option<Reason>,
-    /// Indices of the first and last beam of its arc.
+    /// Indices of the first and last beam of the feature's arc.
     pub beams: [u32; 2],
 }

@@ -1,4 +1,4 @@
-//! Several robots, as one daemon that asks the others tells them.
+//! State of several robots, as polled by one daemon.
 
 use jiff::Timestamp;
 use schemars::JsonSchema;
@@ -9,101 +9,101 @@ use uuid::Uuid;
 
 use super::{LinkState, ScanProgress};
 
-/// The robots of a fleet, in the order of the configuration.
+/// States of all robots of a fleet.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Fleet {
-    /// The robots.
+    /// Robots in the order of the configuration.
     pub robots: Vec<FleetRobot>,
 }
 
-/// One of them.
+/// State of one robot of a fleet.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct FleetRobot {
-    /// Its name: as configured, else as it said first.
+    /// Name of the robot: as configured, or else as first reported.
     pub robot: Option<String>,
-    /// Where it is asked: `HOST:PORT`, or the path of a socket.
+    /// Address of the polled daemon: `HOST:PORT`, or the path of a socket.
     pub address: String,
-    /// Its own page, where it is asked by TCP.
+    /// URL of the robot's live page, if the daemon is polled over TCP.
     pub page: Option<String>,
-    /// How it is.
+    /// Observed state.
     pub state: FleetState,
-    /// Since when.
+    /// Time of the last change of `state`.
     pub since: Timestamp,
-    /// When it was heard last.
+    /// Time of the last report received from the robot.
     pub heard: Option<Timestamp>,
-    /// Time since then, seconds, by a clock that is never set.
+    /// Time since the last report, seconds, by a monotonic clock.
     #[serde(default)]
     pub heard_s: Option<f64>,
-    /// What is wrong, if anything.
+    /// Problems of the robot; empty if there are none.
     pub wrong: Vec<String>,
-    /// What it said when it was heard last.
+    /// Last report received from the robot.
     pub report: Option<FleetReport>,
 }
 
-/// State of a robot, as seen by the one that asks.
+/// State of a robot, as observed by the polling daemon.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum FleetState {
-    /// It was not asked yet.
+    /// The robot has not been polled yet.
     Unasked,
-    /// It says that all is well.
+    /// The robot reports itself healthy.
     Well,
-    /// It says that something is not well.
+    /// The robot reports problems.
     NotWell,
-    /// Nobody answers there, or not in time.
+    /// No response within the time limit.
     Silent,
-    /// It refuses to answer.
+    /// The daemon rejects the request.
     Refusing,
-    /// What answers there is no daemon of this version.
+    /// The response is not that of a daemon of this version.
     Strange,
-    /// A daemon answers, of another robot.
+    /// A daemon of another robot responds.
     OtherRobot,
 }
 
-/// A robot's report of itself.
+/// Report of a robot about itself.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct FleetReport {
-    /// Version of its program.
+    /// Version of the robot's `sonard`.
     pub sonard: String,
-    /// What its ranger is doing.
+    /// State of the link to the robot's ranger.
     pub link: LinkState,
-    /// Whether its readings come from hardware, once it knows.
+    /// Origin of the readings (hardware, mock or model), once identified.
     pub provenance: Option<Provenance>,
-    /// The scan under way.
+    /// Progress of the current scan.
     pub scan: Option<ScanProgress>,
-    /// When the last reading came in, by the clock of whoever asked.
+    /// Arrival time of the last reading, by the polling daemon's clock.
     pub last_reading: Option<Timestamp>,
-    /// Age of the last reading when the robot was heard last, seconds.
+    /// Age of the last reading at the time of the report, seconds.
     #[serde(default)]
     pub last_reading_age_s: Option<f64>,
-    /// The last scan that ended.
+    /// Last scan that ended.
     pub last_scan: Option<FleetScan>,
 }
 
-/// The last scan of a robot that ended.
+/// Summary of the last scan that ended on a robot.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct FleetScan {
-    /// The scan.
+    /// Id of the scan.
     pub scan: Uuid,
-    /// When it ended, by the robot's clock.
+    /// End of the scan, by the robot's clock.
     pub ended: Timestamp,
-    /// Share of the beams with an echo on both sides whose ranges agree with the model.
+    /// Fraction of the beams with both a measured and a predicted echo whose ranges agree.
     pub agree_fraction: Option<f64>,
-    /// Median distance between measured and predicted range, metres.
+    /// Median of |measured − predicted range|, metres.
     pub median_abs_residual_m: Option<f64>,
-    /// Beams that it lacked at its end.
+    /// Number of beams without a reading at the end of the scan.
     pub missing: u32,
-    /// How it looks, once its readings were fetched.
+    /// Small floor plan of the scan, once its readings have been fetched.
     pub picture: Option<FleetPicture>,
 }
 
-/// A scan as a small floor plan.
+/// Small floor plan of a scan.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct FleetPicture {
-    /// Where the robot stood.
+    /// Pose of the robot.
     pub pose: Pose,
-    /// Where ranges end, metres; of many readings every so manieth.
+    /// End points of the ranges, metres; long scans are thinned to every n-th reading.
     pub points_m: Vec<[f64; 2]>,
-    /// Walls of the scene, from and to, metres; none of a scene with many.
+    /// Walls of the scene, each by its two end points, metres; empty if the scene has too many.
     pub walls_m: Vec<[[f64; 2]; 2]>,
 }

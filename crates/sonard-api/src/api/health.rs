@@ -1,4 +1,4 @@
-//! Whether all is well.
+//! Health of the daemon.
 
 use jiff::Timestamp;
 use schemars::JsonSchema;
@@ -9,98 +9,99 @@ use uuid::Uuid;
 /// Health of the daemon, with the underlying figures.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Health {
-    /// Whether the device can be used, the log written, and the temperature is valid and fresh.
+    /// `true` if the device is usable, the log can be written and the temperature is valid and
+    /// fresh.
     pub healthy: bool,
-    /// Why not.
+    /// Reasons why the daemon is unhealthy.
     pub reasons: Vec<String>,
-    /// The serial line, since the start.
+    /// Counters of the serial line since the start.
     pub line: LineTotals,
-    /// Scans since the start.
+    /// Counters of scans since the start.
     pub scans: ScanTotals,
-    /// The device's clock in the last scan.
+    /// Device clock during the last scan.
     pub clock: ClockReport,
-    /// How the last scan that ended agrees with the model.
+    /// Agreement of the last completed scan with the model.
     pub fit: Option<ScanFit>,
-    /// Time since that scan ended, seconds, by a clock that is never set.
+    /// Time since the end of that scan, seconds, by a monotonic clock.
     #[serde(default)]
     pub last_scan_age_s: Option<f64>,
-    /// How long after its firing the last reading came in, seconds, if it is known when that was.
+    /// Delay from firing to arrival of the last reading, seconds, if the firing time is known.
     pub reading_lateness_s: Option<f64>,
     /// Messages dropped because standard error was blocked or gone.
     #[serde(default)]
     pub dropped_messages: u64,
 }
 
-/// Agreement of a scan with the model's prediction, by its last reading of each beam.
+/// Agreement of a scan with the prediction, by the last reading of each beam.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ScanFit {
-    /// The scan.
+    /// Id of the scan.
     pub scan: Uuid,
-    /// When it ended.
+    /// End of the scan.
     pub ended: Timestamp,
-    /// Beams with an echo on both sides.
+    /// Number of beams with both a measured and a predicted echo.
     pub both_echo: u32,
-    /// Share of them whose ranges agree.
+    /// Fraction of `both_echo` whose ranges agree.
     pub agree_fraction: Option<f64>,
-    /// Median distance between their ranges, metres.
+    /// Median of |measured − predicted range|, metres.
     pub median_abs_residual_m: Option<f64>,
     /// Median of measured minus predicted range, metres.
     pub median_residual_m: Option<f64>,
-    /// Beams that the scan lacked at its end.
+    /// Number of beams without a reading at the end of the scan.
     pub missing: u32,
-    /// What would explain its readings better than what is believed, most gain first; told some milliseconds after
-    /// the scan's end, and of scans of at most 4,096 readings.
+    /// Hypotheses that fit the readings better than the configured setup, largest gain first. They
+    /// are added some milliseconds after the end of the scan, for scans of at most 4,096 readings.
     #[serde(default)]
     pub explanations: Vec<Explanation>,
 }
 
-/// Figures of the serial line since the start.
+/// Counters of the serial line since the start.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct LineTotals {
     /// Bytes sent.
     pub bytes_sent: u64,
     /// Bytes received.
     pub bytes_received: u64,
-    /// Frames received whose checksum was right.
+    /// Frames received with a correct checksum.
     pub frames_received: u64,
-    /// Frames whose checksum was wrong.
+    /// Frames received with a wrong checksum.
     pub crc_errors: u64,
-    /// Frames that were damaged otherwise.
+    /// Frames with other damage.
     pub framing_errors: u64,
-    /// Requests sent again.
+    /// Retransmitted requests.
     pub retries: u64,
-    /// Readings that were lost at first and fetched again.
+    /// Lost readings that were fetched again.
     pub repaired: u64,
-    /// Readings and answers that made no sense.
+    /// Readings and responses rejected as invalid.
     pub refused: u64,
-    /// Times that the device was lost from use.
+    /// Number of times that the connection to a device in use was lost.
     pub losses: u64,
 }
 
-/// Figures of the scans since the start.
+/// Counters of the scans since the start.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct ScanTotals {
-    /// Every beam was measured.
+    /// Scans with all beams measured.
     pub completed: u64,
-    /// Stopped on request.
+    /// Scans stopped on request.
     pub stopped: u64,
-    /// Given up.
+    /// Scans that failed.
     pub failed: u64,
-    /// Beams measured.
+    /// Number of beams measured.
     pub beams: u64,
-    /// Beams that scans lacked at their end.
+    /// Number of beams without a reading at the end of their scan.
     pub missing: u64,
     /// Restarts of the device that scans survived.
     pub restarts: u64,
 }
 
-/// The device's clock.
+/// Rate and accuracy of the device's clock.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ClockReport {
-    /// Deviation from its nominal rate, parts in a million.
+    /// Deviation from the nominal rate, parts per million.
     pub drift_ppm: Option<f64>,
-    /// Standard deviation of the times in records, microseconds.
+    /// Standard deviation of timestamps in records, microseconds.
     pub sigma_us: Option<f64>,
-    /// Times that the computer's wall clock was set.
+    /// Number of times that the computer's wall clock was set.
     pub steps: u64,
 }

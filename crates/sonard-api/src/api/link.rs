@@ -1,91 +1,91 @@
-//! The link between the daemon and its device.
+//! State of the link between the daemon and its device.
 
 use jiff::Timestamp;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// The link to the device.
+/// State of the link to the device, with its recent failures.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct LinkReport {
-    /// What it is doing or suffering.
+    /// Current state of the link.
     pub state: LinkState,
-    /// Since when, by the wall clock.
+    /// Time of the last change of state, by the wall clock.
     pub since: Timestamp,
-    /// For how long, seconds, by a clock that is never set.
+    /// Time since the last change of state, seconds, by a monotonic clock.
     #[serde(default)]
     pub for_s: Option<f64>,
-    /// The port, as configured.
+    /// Serial port, as configured.
     pub port: String,
-    /// What went wrong last and what to do, while the device can't be used.
+    /// Last error and its remedy, while the device is unusable.
     pub trouble: Option<String>,
-    /// Failures since the device was last in proper use.
+    /// Failures since the device was last usable.
     pub failures: u32,
-    /// Until the next try, seconds.
+    /// Time until the next attempt, seconds.
     pub retry_in_s: Option<f64>,
 }
 
-/// State of the link.
+/// State of the link to the device.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum LinkState {
     /// The port is being opened.
     Opening,
-    /// The device is asked who it is.
+    /// The device is being identified.
     Identifying,
-    /// The motor is looking for its index.
+    /// The motor is homing to its index.
     Homing,
-    /// The device stands at home, without work.
+    /// The device is homed and idle.
     Ready,
-    /// A scan is under way.
+    /// A scan is in progress.
     Scanning,
     /// The emergency stop is pressed.
     EmergencyStop,
-    /// There was an emergency stop: nothing moves until somebody starts it.
+    /// Emergency stop released; the device stays still until a start request.
     AwaitingStart,
-    /// Stopped for good.
+    /// Permanently stopped, until the daemon exits.
     Stopped,
-    /// It can't be used, and why; in records the trouble stands for itself.
+    /// Unusable, with the reason. Records contain the name of the reason alone.
     #[serde(untagged)]
     Down(Trouble),
 }
 
-/// The reason why the link can't be used.
+/// Reason why the link is unusable.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Trouble {
-    /// The port is not there.
+    /// The port does not exist.
     Absent,
-    /// Another program has the port.
+    /// The port is in use by another program.
     Busy,
-    /// This user may not open the port, or it is no serial port.
+    /// The port is not accessible to this user, or is no serial port.
     Forbidden,
-    /// Nothing that speaks the protocol answers.
+    /// No response in the protocol.
     NotAnswering,
-    /// The device speaks another version of the protocol.
+    /// The device uses another protocol version.
     WrongFirmware,
-    /// The device is not the one with the configured serial number.
+    /// The device's serial number is not the configured one.
     WrongDevice,
-    /// The line was lost while the device was in use.
+    /// The connection was lost while the device was in use.
     Lost,
-    /// The device refused, or its motor or module failed.
+    /// The device rejected a request, or its motor or module failed.
     Fault,
 }
 
 impl LinkState {
-    /// Whether the device can be used.
+    /// Returns `true` if the device is usable.
     #[must_use]
     pub const fn is_up(self) -> bool {
         matches!(self, Self::Ready | Self::Scanning)
     }
 
-    /// Whether the link stays like this until something happens. The steps of a try are not
-    /// settled: telling of each would flood a log while a device is away.
+    /// Returns `true` if the state lasts until an external event. The transient steps of a
+    /// connection attempt are excluded: logging them would flood the log while a device is absent.
     #[must_use]
     pub const fn is_settled(self) -> bool {
         !matches!(self, Self::Opening | Self::Identifying | Self::Homing)
     }
 
-    /// Its name in records and on the screen.
+    /// Name in records and on displays.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -103,7 +103,7 @@ impl LinkState {
 }
 
 impl Trouble {
-    /// Its name in records and on the screen.
+    /// Name in records and on displays.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {

@@ -1,19 +1,19 @@
-//! Where scans were taken, as their readings say.
+//! Pose estimates of scans.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use sonard_inverse::{Doubt, Mode};
 use uuid::Uuid;
 
-/// The estimated pose of a scan.
+/// Estimated poses of a scan.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Location {
-    /// Which scan.
+    /// Id of the scan.
     pub scan: Uuid,
-    /// The poses that explain its readings, most probable first.
+    /// Poses that fit the readings, most probable first.
     pub poses: Vec<Mode>,
-    /// What may be wrong with readings that none of them explains.
+    /// Possible causes if no pose fits the readings.
     pub doubts: Vec<Doubt>,
-    /// Why it could not be located, in words.
+    /// Reason why the scan could not be located.
     pub lacks: Option<String>,
 }

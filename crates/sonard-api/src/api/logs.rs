@@ -1,15 +1,15 @@
-//! The logs on disk.
+//! List of the logs on disk.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// A log.
+/// Log file on disk.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct LogEntry {
-    /// Its name, for GET /v1/logs/{name}.
+    /// File name, for `GET /v1/logs/{name}`.
     pub name: String,
-    /// Its size, bytes.
+    /// File size, bytes.
     pub bytes: u64,
-    /// Whether it is the one being written.
+    /// `true` for the log that is being written.
     pub current: bool,
 }

@@ -1,4 +1,4 @@
-//! What goes to an MQTT broker.
+//! State of the MQTT output.
 
 use jiff::Timestamp;
 use schemars::JsonSchema;
@@ -7,29 +7,29 @@ use serde::{Deserialize, Serialize};
 /// State of the connection to the broker.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct MqttReport {
-    /// The broker.
+    /// URL of the broker.
     pub broker: String,
-    /// Whether it is there.
+    /// `true` while the broker is connected.
     pub connected: bool,
-    /// Since when.
+    /// Time of the last change of `connected`.
     pub since: Timestamp,
-    /// What is wrong, if something is.
+    /// Current error, if any.
     pub trouble: Option<String>,
-    /// Connections since the start.
+    /// Number of connections since the start.
     pub connections: u64,
-    /// Records that it acknowledged since the start.
+    /// Records acknowledged by the broker since the start.
     pub acknowledged: u64,
-    /// Records under way that it did not acknowledge yet.
+    /// Records sent but not acknowledged yet.
     pub waiting: u64,
-    /// What stands in the log behind the last record that it has, bytes.
+    /// Log data after the last acknowledged record, bytes.
     pub behind_bytes: u64,
-    /// Lines of the log that were passed over because no record is on them.
+    /// Log lines skipped because they hold no record.
     pub passed_over: u64,
-    /// Records that the broker does not take: they were left out, and are in the log.
+    /// Records rejected by the broker; they are skipped, and remain in the log.
     #[serde(default)]
     pub left_out: u64,
-    /// Commands that were taken.
+    /// Number of accepted commands.
     pub commands: u64,
-    /// Commands that were refused.
+    /// Number of rejected commands.
     pub refused: u64,
 }

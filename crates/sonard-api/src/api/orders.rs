@@ -1,4 +1,4 @@
-//! Orders: what they say, and what is answered.
+//! Requests that start and cancel scans, and their responses.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -8,56 +8,55 @@ use uuid::Uuid;
 
 use crate::config::Mode;
 
-/// A request for scans.
+/// Request body of `POST /v1/start`.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ScanRequest {
-    /// So many scans; without it, those of the mode go on (on-request: one scan).
+    /// Number of scans; omitted, the current mode resumes (on-request: one scan).
     #[serde(default)]
     #[schemars(range(min = 1))]
     pub scans: Option<u32>,
-    /// Azimuths for these scans alone, instead of those in force.
+    /// Azimuths for these scans only, instead of the current plan.
     #[serde(default)]
     pub plan: Option<ScanPlan>,
-    /// Where the ranger stands for these scans alone, instead of the pose in force.
+    /// Pose of the ranger for these scans only, instead of the current pose.
     #[serde(default)]
     pub pose: Option<Pose>,
 }
 
-/// Scans were asked for.
+/// Response to an accepted request for scans.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Started {
-    /// Always `true`.
+    /// Always `true` in a response.
     pub accepted: bool,
-    /// Identifies the request: `scan_start.request` of its scans bears it. Scans that the mode
-    /// takes by itself bear none.
+    /// Id of the request, stored in `scan_start.request` of its scans. Scans that the mode starts
+    /// by itself have none.
     pub request: Uuid,
 }
 
-/// A request to cancel another one.
+/// Request body of `POST /v1/cancel`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CancelRequest {
-    /// As POST /v1/start gave it.
+    /// Id of the request, as returned by `POST /v1/start`.
     pub request: Uuid,
 }
 
-/// When scans are taken.
+/// Scan mode, as set by `PUT /v1/scanning`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Scanning {
-    /// The mode.
+    /// Scan mode to set.
     pub mode: Mode,
-    /// From the start of a scan to the start of the next, seconds, when the mode is schedule;
-    /// without it, as it was.
+    /// Interval between the starts of scans in mode `schedule`, seconds; omitted, it is unchanged.
     #[serde(default)]
     #[schemars(range(min = 1, max = 604_800))]
     pub every_s: Option<f64>,
 }
 
-/// An order was taken in.
+/// Response to an accepted request.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct Accepted {
-    /// Always `true`.
+    /// Always `true` in a response.
     pub accepted: bool,
 }

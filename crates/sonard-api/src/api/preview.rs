@@ -1,4 +1,4 @@
-//! A scan before it is taken.
+//! Preview of a scan.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -7,20 +7,21 @@ use sonard_records::ScanPlan;
 
 use super::{AirOrder, SensorOrder};
 
-/// A scan that might be taken; what it leaves out is as in the next one.
+/// Request body of `POST /v1/preview`: a hypothetical scan. Omitted fields are those of the next
+/// scan.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PreviewRequest {
-    /// Where the ranger would stand.
+    /// Pose of the ranger.
     #[serde(default)]
     pub pose: Option<Pose>,
     /// Azimuths, at most 4000 beams.
     #[serde(default)]
     pub plan: Option<ScanPlan>,
-    /// The air.
+    /// Air data of the scan.
     #[serde(default)]
     pub air: Option<AirOrder>,
-    /// The sensor.
+    /// Sensor settings of the scan.
     #[serde(default)]
     pub sensor: Option<SensorOrder>,
 }

@@ -1,13 +1,13 @@
-//! Requests that are refused.
+//! Error responses of the API.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// The reason why a request was not carried out.
+/// Body of an error response.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 pub struct Problem {
-    /// What is wrong.
+    /// Error message in English.
     pub error: String,
-    /// What would be right.
+    /// Advice on how to correct the request.
     pub help: String,
 }

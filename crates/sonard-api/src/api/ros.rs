@@ -1,34 +1,34 @@
-//! What is told to ROS 2.
+//! Counters and state of the ROS 2 output.
 
 use jiff::Timestamp;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// State of the ROS 2 output.
+/// Counters and state of the ROS 2 output.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct RosReport {
-    /// The domain.
+    /// DDS domain (ROS_DOMAIN_ID).
     pub domain: u16,
-    /// The addresses of this computer that it is told by.
+    /// Addresses of this computer that messages are sent from.
     pub networks: Vec<String>,
-    /// Whether it is told.
+    /// `true` while messages are published.
     pub up: bool,
-    /// Since when.
+    /// Time of the last change of `up`.
     pub since: Timestamp,
-    /// What is wrong, if something is.
+    /// Current error, if any.
     pub trouble: Option<String>,
-    /// Topics that are offered.
+    /// Number of published topics.
     pub topics: u64,
-    /// Subscriptions to them.
+    /// Number of matched subscriptions.
     pub subscriptions: u64,
-    /// Messages since the start.
+    /// Messages published since the start.
     pub messages: u64,
-    /// Messages that were left out because what waits for subscribers was too much, or they were too long.
+    /// Messages dropped because the queue was full or they were too long.
     pub left_out: u64,
-    /// Services that were called and did what was asked, and poses that were followed.
+    /// Accepted commands: successful service calls and applied poses.
     pub commands: u64,
-    /// Services that were called and refused, and poses that were.
+    /// Rejected commands: failed service calls and poses.
     pub refused: u64,
-    /// Why the last of them was refused.
+    /// Reason of the last rejection.
     pub refusal: Option<String>,
 }

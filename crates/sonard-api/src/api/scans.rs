@@ -1,4 +1,4 @@
-//! Scans that were taken.
+//! Scans in memory and in logs.
 
 use std::sync::Arc;
 
@@ -10,51 +10,51 @@ use sonard_model::geometry::Pose;
 use sonard_records::{Event, Ping, Provenance, ScanEnd, ScanPlan, ScanStart, Session};
 use uuid::Uuid;
 
-/// A scan in a list.
+/// Entry of the list of scans.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ListedScan {
-    /// The scan.
+    /// Id of the scan.
     pub scan: Uuid,
-    /// When it began.
+    /// Start of the scan.
     pub time: Timestamp,
-    /// Its log, for GET /v1/logs/{name}.
+    /// Log that contains the scan, for `GET /v1/logs/{name}`.
     pub log: String,
-    /// Where the ranger stood.
+    /// Pose of the ranger.
     pub pose: Pose,
-    /// What was to be measured.
+    /// Planned azimuths of the scan.
     pub plan: ScanPlan,
-    /// Where its readings come from.
+    /// Origin of the readings.
     pub provenance: Option<Provenance>,
-    /// Name of the scene that the model was given.
+    /// Name of the scene used for predictions.
     pub scene: Option<String>,
-    /// How it ended; `null` for one under way, or broken off.
+    /// End of the scan; `null` for one that is in progress or was interrupted.
     pub end: Option<ScanEnd>,
 }
 
-/// A scan with its readings. The server never has it in memory: it writes it piece by piece.
+/// Scan with its annotated readings. The server streams it piecewise and never holds it in memory.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct WholeScan {
-    /// What was true for it; `null` if the log lacks it.
+    /// Session of the scan; `null` if missing in the log.
     pub session: Option<Arc<Session>>,
-    /// How it began.
+    /// Start record of the scan.
     pub start: Option<ScanStart>,
-    /// Its readings, in the order of the log.
+    /// Annotated readings, in the order of the log.
     pub pings: Vec<JudgedPing>,
-    /// What happened meanwhile.
+    /// Events during the scan.
     pub events: Vec<Event>,
-    /// How it ended; `null` for one under way, or broken off.
+    /// End of the scan; `null` for one that is in progress or was interrupted.
     pub end: Option<ScanEnd>,
 }
 
-/// One scan, whole. The daemon does not keep it: its log does.
+/// Latest scan with its readings as recorded.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ScanReport {
-    /// How it began.
+    /// Start record of the scan.
     pub start: ScanStart,
-    /// Its readings.
+    /// Readings in the order of arrival.
     pub pings: Vec<Ping>,
-    /// What happened meanwhile.
+    /// Events during the scan.
     pub events: Vec<Event>,
-    /// How it ended.
+    /// End record of the scan; `null` while in progress.
     pub end: Option<ScanEnd>,
 }

@@ -1,63 +1,65 @@
-//! The sensor that ranges are predicted for.
+//! Sensor settings used for predictions.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use sonard_model::acoustics::{Gain, Sensor, SensorError};
 
-/// A change of the sensor; an omitted field is as in the preset, or without one as in the next scan.
+/// Request body of `PUT /v1/sensor`. An omitted field has the preset's value, or without a preset
+/// that of the next scan.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SensorOrder {
-    /// Name of a sensor that comes with the program: GET /v1/sensors.
+    /// Name of a sensor preset; `GET /v1/sensors` lists them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("enum" = preset_choices()))]
     pub preset: Option<String>,
-    /// Least amplitude detected; a head-on, perfect wall gives 1.
+    /// Detection threshold, relative to the amplitude of a head-on, perfect wall (1).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.000_001, max = 1))]
     pub threshold: Option<f64>,
-    /// What the threshold gains with each metre of range, decibels.
+    /// Slope of the threshold over range, decibels per metre.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0, max = 100))]
     pub threshold_rise_db_per_m: Option<f64>,
-    /// From firing until the receiver listens, microseconds.
+    /// Receiver blanking after firing, microseconds.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0, max = 100_000))]
     pub blanking_us: Option<f64>,
-    /// How long an echo has to stay above the threshold, microseconds.
+    /// Time for which an echo must exceed the threshold, microseconds.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0, max = 10_000))]
     pub integration_us: Option<f64>,
-    /// Whole steps in which ranges are told, metres; 0 for ranges as they are.
+    /// Quantization step of reported ranges, metres; 0 for none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0, max = 1))]
     pub range_step_m: Option<f64>,
-    /// How the amplifier follows the spreading of the sound.
+    /// Time-varying gain, which compensates spreading loss.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub gain: Option<Gain>,
 }
 
-/// Those figures of a sensor that a program may change, and its name.
+/// Name of a sensor, with the settings that the API can change.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct SensorFigures {
-    /// The preset's name, or that of the configured file's sensor.
+    /// Name of the preset, or of the sensor in the configured file.
     pub name: String,
-    /// Least amplitude detected; `model.threshold` of the configuration goes before it.
+    /// Detection threshold (relative amplitude); `model.threshold` of the configuration takes
+    /// precedence.
     pub threshold: f64,
-    /// What the threshold gains with each metre of range, decibels.
+    /// Slope of the threshold over range, decibels per metre.
     pub threshold_rise_db_per_m: f64,
-    /// From firing until the receiver listens, microseconds.
+    /// Receiver blanking after firing, microseconds.
     pub blanking_us: f64,
-    /// How long an echo has to stay above the threshold, microseconds.
+    /// Time for which an echo must exceed the threshold, microseconds.
     pub integration_us: f64,
-    /// Whole steps in which ranges are told, metres; 0 for ranges as they are.
+    /// Quantization step of reported ranges, metres; 0 for none.
     pub range_step_m: f64,
-    /// How the amplifier follows the spreading of the sound.
+    /// Time-varying gain, which compensates spreading loss.
     pub gain: Gain,
 }
 
 impl SensorFigures {
-    /// Those of a sensor.
+    /// Extracts the settings of a sensor.
     #[must_use]
     pub fn of(sensor: &Sensor) -> Self {
         Self {
@@ -72,39 +74,40 @@ impl SensorFigures {
     }
 }
 
-/// What `preset` may be: null is as if it were left out.
+/// Allowed values of `preset`; null is equivalent to an omitted field.
 fn preset_choices() -> Vec<Option<&'static str>> {
     Sensor::preset_names().map(Some).chain([None]).collect()
 }
 
 impl SensorOrder {
-    /// The sensor that it makes of one.
+    /// Returns `sensor` with this change applied.
     ///
     /// # Errors
-    /// When there is no such preset, or a figure is out of range.
-    pub fn applied_to(&self, before: &Sensor) -> Result<Sensor, SensorError> {
+    /// Unknown preset, or a value out of range.
+    pub fn applied_to(&self, sensor: &Sensor) -> Result<Sensor, SensorError> {
         self.check()?;
-        let mut sensor = match &self.preset {
+        let mut changed = match &self.preset {
             Some(name) => Sensor::preset(name)?,
-            None => before.clone(),
+            None => sensor.clone(),
         };
-        for (figure, wanted) in [
-            (&mut sensor.threshold, self.threshold),
-            (&mut sensor.threshold_rise_db_per_m, self.threshold_rise_db_per_m),
-            (&mut sensor.blanking_us, self.blanking_us),
-            (&mut sensor.integration_us, self.integration_us),
-            (&mut sensor.range_step_m, self.range_step_m),
+        for (value, requested) in [
+            (&mut changed.threshold, self.threshold),
+            (&mut changed.threshold_rise_db_per_m, self.threshold_rise_db_per_m),
+            (&mut changed.blanking_us, self.blanking_us),
+            (&mut changed.integration_us, self.integration_us),
+            (&mut changed.range_step_m, self.range_step_m),
         ] {
-            *figure = wanted.unwrap_or(*figure);
+            *value = requested.unwrap_or(*value);
         }
         if let Some(gain) = &self.gain {
-            sensor.gain.clone_from(gain);
+            changed.gain.clone_from(gain);
         }
-        sensor.check()?;
-        Ok(sensor)
+        changed.check()?;
+        Ok(changed)
     }
 
-    /// Narrower than a data file: what a client asks for is to cost no more than what is configured.
+    /// Checks limits narrower than those of data files, so that a client's settings cost no more
+    /// time than configured ones.
     fn check(&self) -> Result<(), SensorError> {
         let within = |field, value: Option<f64>, from: f64, to: f64, expected| match value {
             Some(value) if !(from..=to).contains(&value) => {
@@ -122,7 +125,7 @@ impl SensorOrder {
             }
             Some(Gain::Steps { steps }) => {
                 let count = Some(steps.len() as f64);
-                within("gain.steps (how many)", count, 1.0, 64.0, "from 1 to 64")?;
+                within("gain.steps (count)", count, 1.0, 64.0, "from 1 to 64")?;
                 steps.iter().try_for_each(|step| {
                     let gain_db = Some(step.gain_db);
                     within("gain.steps.gain_db", gain_db, -200.0, 200.0, "from -200 to 200")
@@ -141,13 +144,13 @@ mod tests {
     }
 
     #[test]
-    fn what_is_left_out_is_as_in_the_preset_or_as_it_was() {
+    fn omitted_fields_keep_their_values() {
         let mut before = Sensor::preset("senscomp-6500").expect("a preset");
         before.integration_us = 17.0;
-        let changed = order(r#"{"threshold": 0.05}"#).applied_to(&before).expect("it is right");
+        let changed = order(r#"{"threshold": 0.05}"#).applied_to(&before).expect("valid");
         assert_eq!((changed.threshold, changed.integration_us), (0.05, 17.0));
         let other = order(r#"{"preset": "hc-sr04", "blanking_us": 400}"#);
-        let other = other.applied_to(&before).expect("it is right");
+        let other = other.applied_to(&before).expect("valid");
         let preset = Sensor::preset("hc-sr04").expect("a preset");
         assert_eq!(other, Sensor { blanking_us: 400.0, ..preset });
         let gain = order(r#"{"gain": {"kind": "compensating"}}"#);
@@ -155,7 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn figures_out_of_range_are_named() {
+    fn out_of_range_values_are_named() {
         let before = Sensor::preset("senscomp-6500").expect("a preset");
         for (text, part) in [
             (r#"{"preset": "ear"}"#, "no sensor preset \"ear\""),
@@ -171,7 +174,7 @@ mod tests {
                 r#"{"gain": {"kind": "steps", "steps": [{"until_us": null, "gain_db": 1e9}]}}"#,
                 "gain_db",
             ),
-            (r#"{"gain": {"kind": "steps", "steps": []}}"#, "how many"),
+            (r#"{"gain": {"kind": "steps", "steps": []}}"#, "count"),
         ] {
             let error = order(text).applied_to(&before).expect_err(text).to_string();
             assert!(error.contains(part), "{text}: {error}");

@@ -1,13 +1,13 @@
-//! The places where the API is served.
+//! Endpoints of the API.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Places where the API is served.
+/// Endpoints of the API, and those that could not be opened.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct ServerReport {
-    /// Paths of unix sockets and URLs where clients reach the daemon.
+    /// Paths of unix sockets and URLs that accept connections.
     pub listening: Vec<String>,
-    /// Places where they do not although the configuration names them, each with the reason.
+    /// Configured endpoints that are unavailable, each with the reason.
     pub trouble: Vec<String>,
 }

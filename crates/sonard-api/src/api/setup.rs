@@ -1,4 +1,4 @@
-//! What the configuration decides about every scan.
+//! Scan settings of the configuration.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -6,15 +6,15 @@ use sonard_model::acoustics::Sensor;
 
 use crate::config::{ModelKeys, MotionKeys};
 
-/// Settings of every scan by the configuration, of which requests can change only the sensor.
+/// Scan settings of the configuration. Requests can change only the sensor.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Setup {
-    /// The sensor's data.
+    /// Data of the configured sensor.
     pub sensor: Sensor,
-    /// How echoes are predicted, as configured.
+    /// Prediction settings, as configured.
     pub model: ModelKeys,
-    /// How the motor turns and the ranger listens.
+    /// Motor motion and listening window.
     pub motion: MotionKeys,
-    /// Whether a thermometer's file is read.
+    /// `true` if a thermometer file is configured.
     pub thermometer: bool,
 }

@@ -1,4 +1,4 @@
-//! An array that the model plays in place of a device.
+//! Simulated ranger array in place of a device.
 
 use jiff::Timestamp;
 use schemars::JsonSchema;
@@ -6,33 +6,33 @@ use serde::{Deserialize, Serialize};
 use sonard_model::array::{MountedRanger, RangerArray};
 use sonard_records::PingStatus;
 
-/// An array that the model plays.
+/// State of a simulated ranger array.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct SimulationReport {
-    /// Its name.
+    /// Name of the array.
     pub array: String,
-    /// From one firing to the next, milliseconds.
+    /// Interval between firings, milliseconds.
     pub interval_ms: f64,
-    /// Whether the robot is on its course.
+    /// `true` while the robot drives its course.
     pub driving: bool,
-    /// Turns left out because the model was not ready in time.
+    /// Firing slots skipped because the simulation was late.
     pub skipped: u64,
-    /// Each ranger's last reading, in the order of the array.
+    /// Last reading of each ranger, in the order of the array.
     pub readings: Vec<RangerReading>,
 }
 
-/// A ranger's last reading.
+/// Last reading of one ranger.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct RangerReading {
-    /// The ranger.
+    /// Id of the ranger in its array.
     pub id: String,
-    /// Where it looks, degrees counter-clockwise from the heading.
+    /// Beam direction, degrees counter-clockwise from the heading.
     pub bearing_deg: f64,
-    /// When it fired; `null` before it did.
+    /// Time of firing; `null` before the first.
     pub time: Option<Timestamp>,
-    /// What became of that.
+    /// Outcome of the firing.
     pub status: Option<PingStatus>,
-    /// The range, metres.
+    /// Measured range, metres.
     pub range_m: Option<f64>,
 }
 
@@ -52,13 +52,13 @@ impl SimulationReport {
     /// Returns `true` if the readings belong to rangers with the ids and bearings of `array`.
     #[must_use]
     pub fn is_of(&self, array: &RangerArray) -> bool {
-        let told = self.readings.iter().map(|reading| (&reading.id, reading.bearing_deg));
-        told.eq(array.rangers.iter().map(|ranger| (&ranger.id, ranger.bearing_deg)))
+        let reported = self.readings.iter().map(|reading| (&reading.id, reading.bearing_deg));
+        reported.eq(array.rangers.iter().map(|ranger| (&ranger.id, ranger.bearing_deg)))
     }
 }
 
 impl RangerReading {
-    /// An array's readings before there are any.
+    /// Returns an empty reading for each ranger of `array`.
     fn none(array: &RangerArray) -> Vec<Self> {
         let none = |ranger: &MountedRanger| Self {
             id: ranger.id.clone(),

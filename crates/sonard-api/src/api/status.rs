@@ -1,4 +1,4 @@
-//! What the daemon is doing.
+//! Status of the daemon.
 
 use std::path::PathBuf;
 
@@ -14,154 +14,156 @@ use super::{
 };
 use crate::config::Mode;
 
-/// State of the daemon.
+/// Complete status of the daemon.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Status {
-    /// The robot's name (`fleet.robot`).
+    /// Name of the robot (`fleet.robot`).
     pub robot: String,
-    /// Version of the program.
+    /// Version of the `sonard` program.
     pub sonard: String,
-    /// How long it runs, seconds.
+    /// Time since the start, seconds.
     pub uptime_s: f64,
-    /// The link to the device.
+    /// State of the link to the device.
     pub link: LinkReport,
-    /// The device, once it told its identity on this connection.
+    /// Device, once identified on the current connection.
     pub device: Option<Device>,
-    /// Whether readings come from hardware.
+    /// Origin of readings: hardware, mock or model.
     pub provenance: Option<Provenance>,
-    /// When scans are taken.
+    /// Scan mode and schedule.
     pub scanning: ScanningReport,
-    /// How long ago the last reading came in, seconds.
+    /// Age of the last reading, seconds.
     pub last_reading_age_s: Option<f64>,
-    /// The scan under way.
+    /// Progress of the current scan.
     pub scan: Option<ScanProgress>,
-    /// Azimuths in force: of the daemon's own scan that is under way, else of the next.
+    /// Current azimuths: those of the daemon's own scan in progress, or else of the next scan.
     pub plan: ScanPlan,
-    /// Where the ranger stands, likewise.
+    /// Current pose of the ranger (of the scan that `plan` describes).
     pub pose: Pose,
-    /// The scene that readings are predicted in, if there is one, likewise.
+    /// Current scene for predictions, if any (of the scan that `plan` describes).
     pub scene: Option<SceneRef>,
-    /// The air, likewise.
+    /// Current air data (of the scan that `plan` describes).
     pub air: AirStatus,
-    /// The sensor that readings are predicted for, likewise.
+    /// Current sensor for predictions (of the scan that `plan` describes).
     pub sensor: SensorFigures,
-    /// What was changed since the scan under way began: it counts from the next one on.
+    /// Settings changed since the start of the current scan; they apply from the next scan on.
     pub pending: Pending,
-    /// The log.
+    /// State of the log.
     pub log: LogStatus,
-    /// Clients of live streams.
+    /// Subscribers of live streams.
     pub subscribers: SubscriberReport,
-    /// Places where the API is served.
+    /// Endpoints of the API.
     #[serde(default)]
     pub server: ServerReport,
-    /// What is told to ROS 2, if anything is.
+    /// State of the ROS 2 output, if enabled.
     #[serde(default)]
     pub ros: Option<RosReport>,
-    /// What goes to an MQTT broker, if one is named.
+    /// State of the MQTT output, if a broker is configured.
     #[serde(default)]
     pub mqtt: Option<MqttReport>,
-    /// What became of the last change of the configuration.
+    /// Outcome of the last configuration reload.
     pub configuration: ConfigurationReport,
-    /// The array that the model plays, where nothing is measured.
+    /// Simulated array, if no device is used.
     pub simulation: Option<SimulationReport>,
 }
 
 /// Settings of the next scan that differ from those of the current one.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Pending {
-    /// Other azimuths.
+    /// Azimuths of the next scan.
     pub plan: Option<ScanPlan>,
-    /// Another place.
+    /// Pose of the next scan.
     pub pose: Option<Pose>,
-    /// Another scene.
+    /// Scene of the next scan.
     pub scene: Option<SceneRef>,
-    /// Other air.
+    /// Air data of the next scan.
     pub air: Option<AirStatus>,
-    /// Another sensor, or other figures of it.
+    /// Sensor settings of the next scan.
     pub sensor: Option<SensorFigures>,
-    /// Another sensor, model or motion.
+    /// Configured sensor, model and motion of the next scan.
     pub setup: Option<Setup>,
 }
 
 /// Current and pending settings.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct InForce<T> {
-    /// In force: for the daemon's own scan that is under way, else for the next.
+    /// Current value: that of the daemon's own scan in progress, or else of the next scan.
     #[serde(flatten)]
     pub now: T,
-    /// What counts from the next scan on, if that is something else.
+    /// Value from the next scan on, if it differs.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub pending: Option<T>,
 }
 
-/// When scans are taken.
+/// Scan mode and schedule.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ScanningReport {
-    /// The mode.
+    /// Current scan mode.
     pub mode: Mode,
-    /// From the start of a scan to the start of the next, seconds, when the mode is schedule.
+    /// Interval between the starts of scans in mode `schedule`, seconds.
     pub every_s: f64,
-    /// Whether scans that nobody asked for are held since a stop, until a start without a number;
-    /// a change of the mode does not end that. Scans that are asked for are taken all the same, so
-    /// a stop in on-request mode, which takes no others, holds nothing.
+    /// `true` if scans of the mode are suspended, from a stop until a start without a number; a
+    /// change of the mode does not end the suspension. Requested scans are taken all the same, so a
+    /// stop in mode `on-request` suspends nothing.
     pub paused: bool,
-    /// Scans asked for and not yet begun.
+    /// Number of requested scans that have not begun yet.
     pub requested: u32,
-    /// Until the next scan, seconds, if that is known.
+    /// Time until the next scan, seconds, if known.
     pub next_in_s: Option<f64>,
 }
 
-/// Progress of a scan.
+/// Progress of the current scan.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ScanProgress {
-    /// The scan.
+    /// Id of the scan.
     pub scan: Uuid,
-    /// Beams of the plan.
+    /// Number of planned beams.
     pub beams: u32,
-    /// Beams that are in.
+    /// Number of beams received.
     pub done: u32,
 }
 
-/// Clients of live streams.
+/// Subscribers of live streams.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct SubscriberReport {
-    /// At the moment.
+    /// Number of subscribers at present.
     pub now: usize,
-    /// Readings that slow ones missed.
+    /// Readings dropped for slow subscribers.
     pub dropped_readings: u64,
-    /// Clients that were cut off because they took nothing.
+    /// Subscribers disconnected because they stopped reading.
     pub cut_off: u64,
 }
 
-/// The outcome of the last change of the configuration.
+/// Outcome of the last configuration reload.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct ConfigurationReport {
-    /// Why it was refused, if it was; what was in force before is in force still.
+    /// Reason of a rejection; the previous configuration stays in use.
     pub error: Option<String>,
-    /// Keys whose change waits for the next start.
+    /// Changed keys that take effect at the next start.
     pub needs_restart: Vec<String>,
 }
 
 /// State of the log.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct LogStatus {
-    /// The log that is being written.
+    /// Log that is being written.
     pub file: Option<PathBuf>,
     /// Records written since the start.
     pub written: u64,
-    /// Of those, records that are confirmed to be on the disk.
+    /// Written records that are confirmed to be on the disk.
     pub synced: u64,
-    /// Of those, records that will never be confirmed: their sync failed, or their file was removed or changed.
+    /// Written records that will never be confirmed: their sync failed, or their file was removed
+    /// or changed.
     #[serde(default)]
     pub uncertain: u64,
-    /// Records that are not written yet.
+    /// Queued records that are not written yet.
     pub waiting: usize,
-    /// Duration of a write or sync under way that takes more than 5 s, seconds.
+    /// Duration of the current write or sync, if longer than 5 s, seconds.
     #[serde(default)]
     pub busy_s: Option<f64>,
     /// Reason why records can't be written: no scan is taken until they can be.
     pub error: Option<String>,
-    /// A log that had to be replaced within the last 30 s: removed, moved, changed, or its sync failed.
+    /// Log that had to be replaced within the last 30 s because it was removed, moved or changed,
+    /// or its sync failed.
     #[serde(default)]
     pub incident: Option<String>,
 }

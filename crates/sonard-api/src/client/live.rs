@@ -1,4 +1,4 @@
-//! Live streams of a daemon, line by line.
+//! Reader of a daemon's live streams, line by line.
 
 use std::time::Duration;
 
@@ -8,21 +8,22 @@ use tokio::time::{Instant, timeout, timeout_at};
 
 use super::{Client, ClientError};
 
-/// Longest time in which nothing arrives of a stream that is alive: the daemon sends an empty line, or a comment, every
-/// 15 s at least.
-pub(super) const SILENCE: Duration = Duration::from_secs(40);
-/// What is granted beyond it: a client that was itself suspended finds the time over and reads first.
+/// Timeout of a live stream without data. The daemon sends an empty line or a comment at least
+/// every 15 s.
+pub(super) const IDLE_TIMEOUT: Duration = Duration::from_secs(40);
+/// Additional time for a first read after the timeout: a client that was itself suspended finds the
+/// deadline passed although data are pending.
 const GRACE: Duration = Duration::from_secs(1);
 
-/// Lines of a live stream.
+/// Line reader of a live stream.
 pub struct LiveLines {
     body: Incoming,
-    /// What has arrived of lines that are not returned yet, and how much of it was searched for a newline.
+    /// Received bytes not returned yet, and the number of those already searched for a newline.
     rest: Vec<u8>,
     searched: usize,
     max_line_bytes: usize,
-    /// When the stream counts as silent, while something is waited for.
-    silent_at: Option<Instant>,
+    /// Deadline of the pending read, if any; kept across cancelled calls.
+    deadline: Option<Instant>,
 }
 
 impl Client {
@@ -33,22 +34,23 @@ impl Client {
     pub async fn live(&self, path: &str) -> Result<LiveLines, ClientError> {
         let body = self.get(path).await?.into_body();
         let (rest, searched, max_line_bytes) = (Vec::new(), 0, usize::MAX);
-        Ok(LiveLines { body, rest, searched, max_line_bytes, silent_at: None })
+        Ok(LiveLines { body, rest, searched, max_line_bytes, deadline: None })
     }
 }
 
 impl LiveLines {
-    /// The same with a limit for a line, bytes.
+    /// Limits the length of a line, bytes.
     #[must_use]
     pub const fn with_max_line_bytes(mut self, bytes: usize) -> Self {
         self.max_line_bytes = bytes;
         self
     }
 
-    /// The next line with its newline, `None` at the end of the stream. Empty lines are left out. Cancel-safe.
+    /// Returns the next line with its newline, or `None` at the end of the stream. Empty lines are
+    /// skipped. Cancel-safe.
     ///
     /// # Errors
-    /// When the stream breaks off, nothing arrives for 40 s, or a line is too long.
+    /// Interrupted stream, no data for 40 s, or a line that is too long.
     pub async fn next(&mut self) -> Result<Option<Vec<u8>>, ClientError> {
         loop {
             while let Some(line) = self.take_line() {
@@ -59,20 +61,21 @@ impl LiveLines {
             if self.rest.len() > self.max_line_bytes {
                 return Err(ClientError::TooLong(self.max_line_bytes));
             }
-            let silent_at = *self.silent_at.get_or_insert_with(|| Instant::now() + SILENCE);
-            let frame = match timeout_at(silent_at, self.body.frame()).await {
+            let deadline = *self.deadline.get_or_insert_with(|| Instant::now() + IDLE_TIMEOUT);
+            let frame = match timeout_at(deadline, self.body.frame()).await {
                 Ok(frame) => frame,
                 Err(_) => {
                     timeout(GRACE, self.body.frame()).await.map_err(|_| ClientError::Silent)?
                 }
             };
-            self.silent_at = None;
+            self.deadline = None;
             let Some(frame) = frame.transpose()? else { return Ok(None) };
             self.rest.extend_from_slice(frame.data_ref().map_or(&[][..], |data| data));
         }
     }
 
-    /// A whole line, if one has arrived. A scan may be a line of many megabytes: each byte is searched once.
+    /// Returns the first complete line, if one has been received. A scan can be a line of many
+    /// megabytes, so each byte is searched only once.
     fn take_line(&mut self) -> Option<Vec<u8>> {
         let end = self.rest[self.searched..].iter().position(|&byte| byte == b'\n');
         let Some(end) = end else {

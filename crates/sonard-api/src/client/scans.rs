@@ -1,4 +1,4 @@
-//! Scans that a daemon is asked for, as their records come in.
+//! Requests scans from a daemon and returns their records as they arrive.
 
 use std::{
     collections::{HashSet, VecDeque},
@@ -13,74 +13,73 @@ use uuid::Uuid;
 use super::{Client, ClientError, LiveLines};
 use crate::api::{Accepted, CancelRequest, ScanReport, ScanRequest, Started, Status};
 
-/// How long nothing may come before it is asked whether the request is still known.
-const QUIET: Duration = Duration::from_secs(2);
-/// How long the end of a cancelled scan is waited for.
-const CLOSING: Duration = Duration::from_secs(4);
-/// What stands in a stream for readings that this client was too slow for.
-const DROPPED: &[u8] = br#"{"type":"dropped""#;
+/// Time without data after which the client checks that the request is still pending.
+const CHECK_INTERVAL: Duration = Duration::from_secs(2);
+/// Maximum wait for the end of a cancelled scan.
+const CANCEL_TIMEOUT: Duration = Duration::from_secs(4);
+/// Prefix of the line that replaces readings dropped because this client was too slow.
+const DROPPED_LINE: &[u8] = br#"{"type":"dropped""#;
 
-/// Scans that a daemon takes on request, with their own plan and pose. What else it measures
-/// meanwhile is left out.
+/// Scans taken on request, with their own plan and pose. Records of other scans are skipped.
 pub struct RequestedScans {
     client: Client,
     stream: LiveLines,
-    /// The line that is being taken in.
+    /// Line that is being processed.
     line: Option<Vec<u8>>,
     request: Uuid,
-    /// Records that nobody has taken yet.
+    /// Records not returned yet.
     ready: VecDeque<Record>,
-    /// The scan under way that belongs to the request, and its beams that are in.
+    /// Current scan of the request, and the indices of its beams received so far.
     current: Option<(Uuid, HashSet<u32>)>,
-    /// Readings were lost on the way here: the daemon has them.
+    /// `true` if readings of the current scan were dropped; the daemon still has them.
     dropped: bool,
     fetched_again: usize,
     session: Option<Session>,
-    /// How often in a row the daemon did not seem to know of the request.
-    doubts: u32,
-    /// What the daemon said about taking no scan.
+    /// Number of consecutive status checks in which the request seemed unknown to the daemon.
+    unknown_checks: u32,
+    /// Reason given by the daemon for taking no scan.
     reason: Option<String>,
 }
 
-/// The reason why no more scans arrive.
+/// Premature end of the requested scans.
 #[derive(Debug, Error)]
 pub enum ScansError {
-    /// The daemon does not answer as it should.
+    /// Failed request to the daemon.
     #[error(transparent)]
     Client(#[from] ClientError),
-    /// It ended the stream of records.
+    /// End of the stream of records.
     #[error("the daemon ended the stream of records")]
     Ended,
-    /// It was told to stop, or can't take the scan.
-    #[error("{}", .0.as_deref().unwrap_or("the daemon was told to stop"))]
+    /// Request cancelled by a stop, or scan that can't be taken, with the daemon's reason.
+    #[error("{}", .0.as_deref().unwrap_or("the daemon was stopped"))]
     Forgotten(Option<String>),
-    /// Readings were lost on the way, and the daemon has begun another scan meanwhile.
+    /// Dropped readings can't be fetched, because the daemon has begun another scan.
     #[error("readings were dropped, and the daemon has begun another scan")]
     Overtaken,
 }
 
 impl ScansError {
-    /// What a person can do about it.
+    /// Returns advice on how to resolve the error.
     #[must_use]
     pub fn help(&self) -> String {
         match self {
             Self::Client(error) => error.help(),
             Self::Ended => {
-                "look at its messages (`journalctl -u sonard`); what came is kept".into()
+                "check the log messages of the daemon (`journalctl -u sonard`); received records are kept".into()
             }
-            Self::Forgotten(_) => "ask again".into(),
-            Self::Overtaken => "they are in the daemon's log: GET /v1/logs".into(),
+            Self::Forgotten(_) => "request the scans again".into(),
+            Self::Overtaken => "the daemon's log contains them: GET /v1/logs".into(),
         }
     }
 }
 
 impl RequestedScans {
-    /// Asks for scans.
+    /// Requests scans.
     ///
     /// # Errors
-    /// When nobody answers, or the daemon refuses.
+    /// No response, or a rejected request.
     pub async fn ask(client: Client, request: &ScanRequest) -> Result<Self, ClientError> {
-        // Listening before asking: nothing is missed.
+        // The subscription precedes the request, so no record is missed.
         let stream = client.live("/v1/live/records").await?;
         let Started { request, .. } = client.post("/v1/start", request).await?;
         Ok(Self {
@@ -93,42 +92,42 @@ impl RequestedScans {
             dropped: false,
             fetched_again: 0,
             session: None,
-            doubts: 0,
+            unknown_checks: 0,
             reason: None,
         })
     }
 
-    /// The next record of these scans: their session when it is new, `scan_start`, readings and
-    /// events, `scan_end`. Cancel-safe.
+    /// Returns the next record of these scans: their session when it changes, `scan_start`,
+    /// readings and events, `scan_end`. Cancel-safe.
     ///
     /// # Errors
-    /// When no more will come.
+    /// Premature end of the scans.
     pub async fn next(&mut self) -> Result<Record, ScansError> {
         loop {
             if let Some(record) = self.ready.pop_front() {
                 return Ok(record);
             }
             if self.line.is_some() {
-                self.take_in().await?;
+                self.process_line().await?;
                 continue;
             }
-            match timeout(QUIET, self.stream.next()).await.map(Result::transpose) {
+            match timeout(CHECK_INTERVAL, self.stream.next()).await.map(Result::transpose) {
                 Ok(Some(line)) => self.line = Some(line?),
                 Ok(None) => return Err(ScansError::Ended),
-                Err(_quiet) if self.current.is_none() => self.doubt().await?,
-                Err(_quiet) => {}
+                Err(_elapsed) if self.current.is_none() => self.check_pending().await?,
+                Err(_elapsed) => {}
             }
         }
     }
 
-    /// Wants no more of them, and returns what still came of the scan under way.
+    /// Cancels the request and returns the remaining records of the current scan.
     ///
     /// # Errors
-    /// When nobody answers.
+    /// No response from the daemon.
     pub async fn cancel(&mut self) -> Result<Vec<Record>, ScansError> {
         let body = CancelRequest { request: self.request };
         match self.client.post::<Accepted>("/v1/cancel", &body).await {
-            // It is over already.
+            // A rejection means that the request has ended already.
             Ok(_) | Err(ClientError::Refused { .. }) => {}
             Err(error) => return Err(error.into()),
         }
@@ -139,43 +138,43 @@ impl RequestedScans {
             }
             Ok::<(), ScansError>(())
         };
-        // A daemon that has gone meanwhile, or is too slow, keeps the rest in its log.
-        drop(timeout(CLOSING, over).await);
+        // If the daemon has exited or is too slow, the rest remains in its log.
+        drop(timeout(CANCEL_TIMEOUT, over).await);
         Ok(records)
     }
 
-    /// Readings that this client was too slow for and fetched again.
+    /// Number of dropped readings that were fetched again.
     #[must_use]
     pub const fn fetched_again(&self) -> usize {
         self.fetched_again
     }
 
-    /// Takes the line at hand in. Whatever has to be waited for comes first: dropped meanwhile, the
-    /// line is still to be taken in.
-    async fn take_in(&mut self) -> Result<(), ScansError> {
+    /// Processes the pending line. All awaits precede the change of state: if the call is
+    /// cancelled, the line is still pending.
+    async fn process_line(&mut self) -> Result<(), ScansError> {
         let line = self.line.as_deref().unwrap_or_default().trim_ascii_end();
-        self.dropped |= line.starts_with(DROPPED);
+        self.dropped |= line.starts_with(DROPPED_LINE);
         let (mut session, mut lost) = (None, Vec::new());
-        // A kind of record that this version does not know is none of its scans'.
+        // Records of unknown kinds do not belong to the requested scans.
         let record = decode_line(line).ok();
         match &record {
             Some(Record::ScanStart(start)) if start.request == Some(self.request) => {
                 session = Some(self.client.get_json::<Session>("/v1/session").await?);
             }
             Some(Record::ScanEnd(end)) if self.dropped && self.is_current(end.scan) => {
-                lost = self.lost(end).await?;
+                lost = self.fetch_lost(end).await?;
             }
             _ => {}
         }
         self.line = None;
-        self.doubts = 0;
+        self.unknown_checks = 0;
         if let Some(record) = record {
-            self.learn(record, session, lost);
+            self.handle_record(record, session, lost);
         }
         Ok(())
     }
 
-    fn learn(&mut self, record: Record, session: Option<Session>, lost: Vec<Ping>) {
+    fn handle_record(&mut self, record: Record, session: Option<Session>, lost: Vec<Ping>) {
         match &record {
             Record::ScanStart(start) if start.request == Some(self.request) => {
                 if let Some(session) = session.filter(|now| self.session.as_ref() != Some(now)) {
@@ -210,24 +209,28 @@ impl RequestedScans {
         self.current.as_ref().is_some_and(|(current, _)| *current == scan)
     }
 
-    /// Readings of the scan that ends here that did not come.
-    async fn lost(&self, end: &ScanEnd) -> Result<Vec<Ping>, ScansError> {
+    /// Fetches the missing readings of the scan that has ended.
+    async fn fetch_lost(&self, end: &ScanEnd) -> Result<Vec<Ping>, ScansError> {
         let latest: ScanReport = self.client.get_json("/v1/scan/latest").await?;
         if latest.start.scan != end.scan {
             return Err(ScansError::Overtaken);
         }
         let seen = self.current.as_ref().map(|(_, seen)| seen);
-        let came = |index| seen.is_some_and(|seen| seen.contains(&index));
-        Ok(latest.pings.into_iter().filter(|ping| !came(ping.index)).collect())
+        let is_received = |index| seen.is_some_and(|seen| seen.contains(&index));
+        Ok(latest.pings.into_iter().filter(|ping| !is_received(ping.index)).collect())
     }
 
-    /// Nothing comes: asks whether the daemon neither scans nor means to. Between its beginning and
-    /// its first record a scan is neither asked for nor under way: one look may fall there, two
-    /// don't.
-    async fn doubt(&mut self) -> Result<(), ScansError> {
+    /// Checks, when no data arrive, that the daemon still scans or is about to. Between its
+    /// beginning and its first record a scan is neither requested nor current; one check can fall
+    /// into that gap, two consecutive ones can't.
+    async fn check_pending(&mut self) -> Result<(), ScansError> {
         let status: Status = self.client.get_json("/v1/status").await?;
-        let forgotten = status.scanning.requested == 0 && status.scan.is_none();
-        self.doubts = if forgotten { self.doubts + 1 } else { 0 };
-        if self.doubts == 2 { Err(ScansError::Forgotten(self.reason.take())) } else { Ok(()) }
+        let is_unknown = status.scanning.requested == 0 && status.scan.is_none();
+        self.unknown_checks = if is_unknown { self.unknown_checks + 1 } else { 0 };
+        if self.unknown_checks == 2 {
+            Err(ScansError::Forgotten(self.reason.take()))
+        } else {
+            Ok(())
+        }
     }
 }

@@ -1,9 +1,9 @@
-//! The air's keys: the daemon's and a collection's have most of them in common.
+//! Configuration keys of the air, mostly shared by daemon and collections.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Makes a section of the keys that any air has, and of further ones with their defaults.
+/// Defines a section with the common air keys and further ones with their defaults.
 macro_rules! air_section {
     (
         $(#[$about:meta])*
@@ -13,7 +13,7 @@ macro_rules! air_section {
         #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
         #[serde(default, deny_unknown_fields)]
         pub struct $name {
-            /// Temperature, degrees Celsius, until a thermometer or a program gives another.
+            /// Temperature, degrees Celsius, until a thermometer or an API client sets another.
             #[schemars(range(min = -20, max = 50))]
             pub temperature_c: f64,
             /// Relative humidity, percent.
@@ -23,7 +23,7 @@ macro_rules! air_section {
             #[schemars(range(min = 60, max = 110))]
             pub pressure_kpa: f64,
             /// File of a 1-wire (w1_slave, temperature) or hwmon (temp1_input) thermometer, in
-            /// thousandths of a degree Celsius. Values that sensor or air can't have are rejected; the
+            /// thousandths of a degree Celsius. Values outside the physical range are rejected; the
             /// last valid one stays in use.
             #[schemars(example = "/sys/bus/w1/devices/28-0316a1d2f8ff/temperature")]
             pub file: Option<String>,
@@ -45,18 +45,18 @@ macro_rules! air_section {
 }
 
 air_section! {
-    /// The air, from which the speed of sound follows.
+    /// Air data, which determine the speed of sound.
     AirKeys {
-        /// How often the file is read, seconds.
+        /// Interval between readings of the file, seconds.
         #[schemars(range(min = 1, max = 3600))]
         every_s: f64 = 30.0,
-        /// A temperature older than this, seconds, is reported as stale.
+        /// Age from which a temperature is reported as stale, seconds.
         #[schemars(range(min = 1, max = 604_800))]
         max_age_s: f64 = 600.0,
     }
 }
 
 air_section! {
-    /// Air of a collection. A thermometer's file is read before and after each scan.
+    /// Air data of a collection. A thermometer's file is read before and after each scan.
     CollectionAirKeys {}
 }

@@ -1,4 +1,4 @@
-//! The configuration file that documents every key, written from the keys themselves.
+//! Generates the documented configuration file from the definition of the keys.
 
 use std::fmt::Write as _;
 
@@ -6,14 +6,15 @@ use super::schema::{Form, Key};
 
 const WIDTH: usize = 98;
 
-/// The file that documents every key; for `sonard run` the text of `config/sonard.toml`.
+/// Returns the configuration file with every key and its documentation; for `sonard run` the text
+/// of `config/sonard.toml`.
 #[must_use]
 pub fn document<K: Form>() -> String {
     let mut text = K::HEAD.to_owned();
     for section in K::sections() {
         text += "\n";
         comment(&mut text, &section.about);
-        // Writing to a text can't fail.
+        // Writing to a `String` can't fail.
         let _ = writeln!(text, "[{}]", section.name);
         for key in &section.keys {
             write_key(&mut text, key);
@@ -49,38 +50,39 @@ mod tests {
         *,
     };
 
+    const PATH: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../config/sonard.toml");
     const SHIPPED: &str = include_str!("../../../../config/sonard.toml");
 
     #[test]
-    fn the_shipped_file_shows_every_key_as_the_program_knows_it() {
+    fn shipped_file_is_up_to_date() {
         let fresh = document::<Keys>();
         if std::env::var_os("SONARD_TEST_WRITE").is_some() {
-            std::fs::write("config/sonard.toml", &fresh).expect("it can be written");
+            std::fs::write(PATH, &fresh).expect("config/sonard.toml is writable");
         }
         assert!(
             SHIPPED == fresh,
-            "config/sonard.toml is behind: `SONARD_TEST_WRITE=1 cargo test config::document`"
+            "config/sonard.toml is out of date; regenerate it with `SONARD_TEST_WRITE=1 cargo test -p sonard-api document`"
         );
     }
 
     #[test]
-    fn the_shipped_file_is_the_defaults_and_its_examples_are_right() {
+    fn shipped_file_equals_defaults() {
         let read = |text: &str| Layers::new().file("sonard.toml", text).and_then(Layers::keys);
         assert_eq!(read(SHIPPED), Ok(Keys::default()));
-        // Every comment that holds a key becomes that key.
+        // Comments of the form `key = value` are turned into settings.
         let sets = |line: &str| line.split_once(" = ").is_some_and(|(key, _)| !key.contains(' '));
         let opened: Vec<&str> = SHIPPED
             .lines()
             .map(|line| line.strip_prefix("# ").filter(|rest| sets(rest)).unwrap_or(line))
             .collect();
-        let opened = read(&opened.join("\n")).expect("the examples are right");
+        let opened = read(&opened.join("\n")).expect("examples are valid");
         assert_eq!(opened.server.listen.as_deref(), Some("127.0.0.1:8765"));
         assert_eq!(opened.gpio.reset_pin, Some(17));
     }
 
     #[test]
-    fn the_shipped_file_sets_no_default_that_gives_way() {
-        let read = Layers::<Keys>::new().file("sonard.toml", SHIPPED).expect("it is right");
+    fn shipped_file_omits_soft_defaults() {
+        let read = Layers::<Keys>::new().file("sonard.toml", SHIPPED).expect("valid");
         let mut yielding = Vec::new();
         for section in sections() {
             for key in section.keys.iter().filter(|key| key.default_yields) {
@@ -95,7 +97,7 @@ mod tests {
     }
 
     #[test]
-    fn every_key_says_what_it_is_and_every_number_has_a_range() {
+    fn every_key_is_documented() {
         for section in sections() {
             assert!(!section.about.is_empty() && !section.keys.is_empty(), "{}", section.name);
             for key in &section.keys {

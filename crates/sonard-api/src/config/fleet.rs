@@ -1,28 +1,30 @@
-//! The keys of a robot among others.
+//! Configuration keys of the fleet.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Most characters of a robot's name.
+/// Maximum length of a robot's name, characters.
 pub const MAX_ROBOT_NAME: usize = 64;
 
-/// This robot among others.
+/// Name of this robot, and other robots to poll.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct FleetKeys {
-    /// This robot's name, in the status, the log's sessions and the metrics (restart): letters, digits,
-    /// `-`, `_` and `.`, at most 64. The host's name goes before the default.
+    /// Name of this robot in the status, the log's sessions and the metrics (restart): letters,
+    /// digits, `-`, `_` and `.`, at most 64 characters. The host name takes precedence over the
+    /// default.
     #[schemars(extend("x-default-yields" = true))]
     pub robot: String,
-    /// Other daemons, at most 32, to be asked every 2 s and shown at /fleet and GET /v1/fleet (restart):
-    /// [NAME=]HOST:PORT, or [NAME=] and the path of a socket. One that says another name than NAME is
-    /// another robot. None asks nobody.
+    /// Other daemons, at most 32, polled every 2 s and shown at /fleet and GET /v1/fleet (restart):
+    /// [NAME=]HOST:PORT, or [NAME=] and the path of a socket. A daemon that reports a name other
+    /// than NAME is shown as another robot.
     pub daemons: Vec<String>,
-    /// File with the token that is shown to those by TCP (restart), readable by its owner alone.
+    /// File with the access token for daemons polled over TCP (restart), readable by its owner
+    /// only.
     #[schemars(example = "/etc/sonard/fleet-token")]
     pub token_file: Option<String>,
-    /// File that lists daemons, each with a token file of its own, to be asked as well (restart); as of
-    /// `sonard status --fleet`.
+    /// File with a list of further daemons to poll, each with its own token file (restart); same
+    /// format as for `sonard status --fleet`.
     #[schemars(example = "/etc/sonard/fleet.toml")]
     pub file: Option<String>,
 }
@@ -33,8 +35,8 @@ impl Default for FleetKeys {
     }
 }
 
-/// Whether a text can be a robot's name: part of a path, of a topic and of a label without a second
-/// meaning there.
+/// Returns `true` if `text` is a valid robot name, which is unambiguous within paths, topics and
+/// metric labels.
 #[must_use]
 pub fn is_robot_name(text: &str) -> bool {
     let fits = |byte: u8| byte.is_ascii_alphanumeric() || b"-_.".contains(&byte);
@@ -43,7 +45,7 @@ pub fn is_robot_name(text: &str) -> bool {
         && text.bytes().any(|byte| byte != b'.')
 }
 
-/// The robot's name that a host's name makes; `None` if there is no letter or digit in it.
+/// Derives a robot's name from a host name; `None` if it has no letter or digit.
 #[must_use]
 pub fn robot_name_of_host(host: &str) -> Option<String> {
     let fits = |letter: char| letter.is_ascii_alphanumeric() || "-_.".contains(letter);
@@ -61,7 +63,7 @@ mod tests {
     use proptest::prelude::*;
 
     #[test]
-    fn a_name_has_one_meaning_in_paths_topics_and_labels() {
+    fn names_are_safe_in_paths() {
         for good in ["kiwi", "robot-7", "a_b.c", "7", &"x".repeat(64)] {
             assert!(is_robot_name(good), "{good}");
         }
@@ -71,7 +73,7 @@ mod tests {
     }
 
     #[test]
-    fn a_host_name_is_taken_as_it_is_where_it_can_be() {
+    fn host_name_is_sanitized() {
         assert_eq!(robot_name_of_host("kiwi.lan").as_deref(), Some("kiwi.lan"));
         assert_eq!(robot_name_of_host("my robot/1").as_deref(), Some("my-robot-1"));
         assert_eq!(robot_name_of_host(""), None);
@@ -81,7 +83,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn every_name_made_of_a_host_is_a_name(host in "\\PC{0,80}") {
+        fn derived_names_are_valid(host in "\\PC{0,80}") {
             if let Some(name) = robot_name_of_host(&host) {
                 prop_assert!(is_robot_name(&name), "{name}");
             }

@@ -1,4 +1,4 @@
-//! The keys of live messages for viewers.
+//! Configuration keys of the Foxglove WebSocket server.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -7,18 +7,20 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct FoxgloveKeys {
-    /// Whether there are any (restart).
+    /// Enable live messages (restart).
     pub enabled: bool,
-    /// Viewers at a time (restart): so many by the socket or with the token, and so many others.
+    /// Maximum number of simultaneous viewers (restart), separately for those with access (socket
+    /// or token) and for all others.
     #[schemars(range(min = 1, max = 16))]
     pub max_clients: u32,
-    /// Messages kept for viewers that are slow, all together, kilobytes; older ones are left out, with a
-    /// count (restart).
+    /// Size of the shared queue for slow viewers, kilobytes; when it is full, the oldest messages
+    /// are dropped and counted (restart).
     #[schemars(range(min = 16, max = 32_768))]
     pub queue_kb: u32,
-    /// Whether a map of all scans since the start is told after each scan (restart), as `sonard map` makes it.
+    /// Publish a map of all scans since the start after each scan (restart), computed as by `sonard
+    /// map`.
     pub map: bool,
-    /// Origins of viewers from elsewhere that may ask in a browser, besides this server's own names
+    /// Web origins of browser viewers that may connect, in addition to this server's own host names
     /// (restart).
     pub origins: Vec<String>,
 }

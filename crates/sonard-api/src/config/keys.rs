@@ -1,7 +1,7 @@
-//! The keys of the configuration, as they stand in the file.
+//! Configuration keys of `sonard run`.
 //!
-//! The one place that says what there is: the doc comment of a field is its text in
-//! `config/sonard.toml`, its `range` is what is checked, its default what the file shows.
+//! Single definition of every key: the doc comment of a field is its text in `config/sonard.toml`,
+//! its `range` is validated, and its default is shown in the file.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -9,262 +9,265 @@ use sonard_model::model::OptionKeys;
 
 use super::{air::AirKeys, fleet::FleetKeys, foxglove::FoxgloveKeys, mqtt::MqttKeys, ros::RosKeys};
 
-/// Configuration of `sonard run`.
+/// Configuration of `sonard run`, one field per section.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Keys {
-    /// Which ranger.
+    /// Serial port and identity of the ranger.
     pub device: DeviceKeys,
-    /// Where it stands, and in what.
+    /// Pose of the ranger, and scene for predictions.
     pub place: PlaceKeys,
-    /// Which azimuths a scan measures.
+    /// Azimuths of a scan.
     pub plan: PlanKeys,
-    /// When scans are taken.
+    /// Scan mode and schedule.
     pub scanning: ScanningKeys,
-    /// How the motor turns and the ranger listens.
+    /// Motor motion and listening window.
     pub motion: MotionKeys,
-    /// What is known about the ranger, and how echoes are predicted.
+    /// Sensor data, and prediction of echoes.
     pub model: ModelKeys,
-    /// What `sonard run --simulate` plays.
+    /// Simulated array of `sonard run --simulate`.
     pub simulate: SimulateKeys,
-    /// The air, from which the speed of sound follows.
+    /// Air data, which determine the speed of sound.
     pub air: AirKeys,
-    /// Where records are kept.
+    /// Folder and size of the logs.
     pub log: LogKeys,
-    /// The line to the device.
+    /// Retries and timing of the link to the device.
     pub link: LinkKeys,
-    /// After an emergency stop.
+    /// Behaviour after an emergency stop.
     pub safety: SafetyKeys,
-    /// The HTTP API.
+    /// HTTP API and live page.
     pub server: ServerKeys,
     /// Live messages for Foxglove and Lichtblick, at /foxglove/ of the server's address.
     pub foxglove: FoxgloveKeys,
-    /// This robot among others.
+    /// Name of this robot, and other robots to poll.
     pub fleet: FleetKeys,
-    /// Messages and services for ROS 2, by DDS; only in a build with the feature ros.
+    /// Messages and services for ROS 2 over DDS; only in a build with the feature ros.
     pub ros: RosKeys,
-    /// Records to an MQTT broker, from the log; only in a build with the feature mqtt.
+    /// Publication of log records to an MQTT broker; only in a build with the feature mqtt.
     pub mqtt: MqttKeys,
     /// Pins of a Raspberry Pi (BCM numbers); only in a build with the feature pi.
     pub gpio: GpioKeys,
 }
 
-/// Which ranger.
+/// Serial port and identity of the ranger.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct DeviceKeys {
-    /// Serial port: a name in /dev/serial/by-id (or a part of one that fits no other), a USB
-    /// serial number, or a path. A stable name finds the ranger again after it was replugged.
+    /// Serial port: a name in /dev/serial/by-id (or an unambiguous part of one), a USB serial
+    /// number, or a path. A stable name finds the ranger again after it was replugged.
     #[schemars(example = "usb-Arduino_Uno_75830")]
     pub port: Option<String>,
-    /// Accept only the ranger with this serial number, as it tells it itself.
+    /// Required serial number, as reported by the ranger; others are rejected.
     #[schemars(example = "SONARD-0001")]
     pub serial: Option<String>,
 }
 
-/// Where it stands, and in what.
+/// Pose of the ranger, and scene for predictions.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct PlaceKeys {
-    /// Scene file, or the name of a shipped scene. Without one nothing is predicted.
+    /// Scene file, or the name of a shipped scene. Without a scene there are no predictions.
     #[schemars(example = "simple-room")]
     pub scene: Option<String>,
     /// Pose of the ranger: X,Y,DEG (metres, degrees) or the name of a pose in the scene.
     pub pose: String,
 }
 
-/// Which azimuths a scan measures.
+/// Azimuths of a scan.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct PlanKeys {
     /// First azimuth, degrees counter-clockwise from the heading.
     #[schemars(range(min = -360, max = 360))]
     pub from_deg: f64,
-    /// End of the azimuths, degrees, not itself fired at; at most 360 after from_deg.
+    /// End of the azimuths, degrees, exclusive; at most 360 after from_deg.
     #[schemars(range(min = -360, max = 720))]
     pub to_deg: f64,
-    /// From stop to stop, degrees; a multiple of the motor's step.
+    /// Step between azimuths, degrees; a multiple of the motor's step.
     #[schemars(range(min = 0.01, max = 360))]
     pub step_deg: f64,
-    /// Firings at each stop.
+    /// Number of pings per azimuth.
     #[schemars(range(min = 1, max = 255))]
     pub pings_per_stop: u32,
 }
 
-/// When scans are taken.
+/// Scan mode and schedule.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct ScanningKeys {
-    /// Scan after scan, only when asked to, or one every so often. With --simulate scan after scan
-    /// goes before the default.
+    /// Continuous scans, scans on request only, or scheduled scans. With --simulate, continuous
+    /// takes precedence over the default.
     #[schemars(extend("x-default-yields" = true))]
     pub mode: Mode,
-    /// From the start of a scan to the start of the next, seconds, when the mode is schedule. A
-    /// turn that is missed is left out.
+    /// Interval between the starts of scans in mode schedule, seconds. A missed start is skipped.
     #[schemars(range(min = 1, max = 604_800))]
     pub every_s: f64,
 }
 
-/// When scans are taken.
+/// Scan mode and schedule.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Mode {
-    /// Scan after scan.
+    /// Continuous scans without pause.
     Continuous,
-    /// Only when asked to.
+    /// Scans on request only.
     #[default]
     OnRequest,
-    /// One every so often.
+    /// Scans at a fixed interval.
     Schedule,
 }
 
-/// How the motor turns and the ranger listens.
+/// Motor motion and listening window.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct MotionKeys {
     /// Settling time between the end of a step and firing, milliseconds.
     #[schemars(range(min = 0, max = 8000))]
     pub settle_ms: f64,
-    /// Least time between firings, milliseconds, to protect the module.
+    /// Minimum interval between firings, milliseconds, to protect the module.
     #[schemars(range(min = 0, max = 8000))]
     pub min_interval_ms: f64,
-    /// Listening window after each firing, milliseconds, instead of the time to the maximum range.
+    /// Listening window after each firing, milliseconds; by default the time of flight to the
+    /// maximum range.
     #[schemars(range(min = 1, max = 8000), example = 30)]
     pub window_ms: Option<f64>,
-    /// Echoes to record for each firing, at most.
+    /// Maximum number of echoes recorded per firing.
     #[schemars(range(min = 1, max = 8))]
     pub max_echoes: u8,
-    /// Largest motor speed, steps a second.
+    /// Maximum motor speed, steps per second.
     #[schemars(range(min = 1, max = 10_000))]
     pub speed: u16,
-    /// Motor acceleration, steps a second squared.
+    /// Motor acceleration, steps per second squared.
     #[schemars(range(min = 1, max = 200_000))]
     pub acceleration: u32,
 }
 
-/// What is known about the ranger, and how echoes are predicted.
+/// Sensor data, and prediction of echoes.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct ModelKeys {
-    /// Sensor preset, or a file with a sensor's data. With --simulate the array's own goes before the
-    /// default.
+    /// Sensor preset, or a file with sensor data. With --simulate, the array's own sensors take
+    /// precedence over the default.
     #[schemars(extend("x-default-yields" = true))]
     pub sensor: String,
-    /// How echoes are predicted.
+    /// Options of the prediction.
     #[serde(flatten)]
     pub options: OptionKeys,
 }
 
-/// What `sonard run --simulate` plays.
+/// Simulated array of `sonard run --simulate`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct SimulateKeys {
-    /// Array of rangers: a preset (`sonard array list`), or a file with an array's data.
-    /// Unless model.sensor is set, its rangers are what the array says.
+    /// Array of rangers: a preset (`sonard array list`), or a file with array data. Unless
+    /// model.sensor is set, its rangers use the sensors of that file.
     pub array: String,
-    /// From one firing to the next, milliseconds, instead of the array's own interval.
+    /// Interval between firings, milliseconds; by default that of the array.
     #[schemars(range(min = 1, max = 10_000), example = 40)]
     pub interval_ms: Option<f64>,
-    /// File of poses that the robot drives along, one JSON object a line, with or without time_s;
-    /// the first goes before place.pose. A pose set through the API ends the drive.
+    /// File with the poses of the robot's course, one JSON object per line, with or without time_s;
+    /// the first takes precedence over place.pose. A pose set through the API ends the drive.
     #[schemars(example = "/etc/sonard/course.jsonl")]
     pub course: Option<String>,
-    /// How fast it drives where the file has no times, metres a second.
+    /// Speed of the robot on a course without times, metres per second.
     #[schemars(range(min = 0.001, max = 10))]
     pub speed_m_s: f64,
-    /// Standard deviation of the range noise, millimetres (the far tail is longer).
+    /// Standard deviation of the range noise, millimetres (the upper tail is longer).
     #[schemars(range(min = 0, max = 1000))]
     pub noise_mm: f64,
-    /// Seed of the noise.
+    /// Seed of the noise generator.
     #[schemars(range(min = 0, max = 9_007_199_254_740_991_i64))]
     pub seed: u64,
 }
 
-/// Where records are kept.
+/// Folder and size of the logs.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct LogKeys {
-    /// Folder of the logs (restart). systemd's STATE_DIRECTORY goes before the default.
+    /// Folder of the logs (restart). systemd's STATE_DIRECTORY takes precedence over the default.
     #[schemars(extend("x-default-yields" = true))]
     pub folder: String,
-    /// Begin another file when this one is larger, megabytes.
+    /// Size at which a new log file is started, megabytes.
     #[schemars(range(min = 0.01, max = 100_000))]
     pub rotate_mb: f64,
-    /// Begin another file each day (UTC).
+    /// Start a new log file each day (UTC).
     pub daily: bool,
-    /// Remove the oldest files when all together are larger, megabytes; 0 keeps everything.
+    /// Maximum total size of the logs, megabytes: beyond it the oldest files are removed; 0 keeps
+    /// everything.
     #[schemars(range(min = 0, max = 10_000_000))]
     pub keep_mb: f64,
-    /// How long a record may wait for the disk, seconds.
+    /// Maximum delay until a record is synced to disk, seconds.
     #[schemars(range(min = 0.1, max = 60))]
     pub sync_s: f64,
 }
 
-/// The line to the device.
+/// Retries and timing of the link to the device.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct LinkKeys {
-    /// How often a request is sent before the device counts as gone.
+    /// Attempts per request until the device is considered disconnected.
     #[schemars(range(min = 1, max = 50))]
     pub attempts: u8,
-    /// Wait before the second try to reach the device, seconds; doubled from try to try.
+    /// Delay before the second connection attempt, seconds; doubled after each attempt.
     #[schemars(range(min = 0.05, max = 60))]
     pub retry_min_s: f64,
-    /// Longest wait from try to try, seconds.
+    /// Maximum delay between connection attempts, seconds.
     #[schemars(range(min = 0.1, max = 600))]
     pub retry_max_s: f64,
-    /// How often a device without work is asked how it is, seconds.
+    /// Interval between status requests to an idle device, seconds.
     #[schemars(range(min = 0.1, max = 60))]
     pub check_s: f64,
 }
 
-/// After an emergency stop.
+/// Behaviour after an emergency stop.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct SafetyKeys {
-    /// Home and scan again by itself once an emergency stop is released. Without it the state is
-    /// awaiting_start, and nothing moves until POST /v1/start or a restart of the daemon.
+    /// Home and resume scanning automatically once an emergency stop is released. Otherwise the
+    /// state is awaiting_start, and nothing moves until POST /v1/start or a restart of the daemon.
     pub resume_after_emergency_stop: bool,
 }
 
-/// The HTTP API.
+/// HTTP API and live page.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct ServerKeys {
-    /// Unix socket (restart); empty for none. systemd's RUNTIME_DIRECTORY goes before the default. A socket whose file is
-    /// removed is made again.
+    /// Path of the unix socket (restart); empty for none. systemd's RUNTIME_DIRECTORY takes
+    /// precedence over the default. A socket whose file is removed is created again.
     #[schemars(extend("x-default-yields" = true))]
     pub socket: String,
-    /// Who may use the socket: its permissions, three octal digits, as of chmod (restart).
+    /// Permissions of the socket, three octal digits as for chmod (restart).
     pub socket_mode: String,
-    /// TCP address of API and live page (restart). Off loopback, all data need a token. An address that this computer
-    /// does not have yet, or a port in use, is bound once it can be; scanning does not wait for it.
+    /// TCP address of API and live page (restart). Off loopback, reading needs the token, too. An
+    /// address that this computer does not have yet, or a port in use, is bound as soon as
+    /// possible; scanning does not wait for it.
     #[schemars(example = "127.0.0.1:8765")]
     pub listen: Option<String>,
-    /// File with the token that writes over TCP must show, readable by its owner alone (restart);
-    /// without one there are no writes over TCP.
+    /// File with the access token that writes over TCP require, readable by its owner only
+    /// (restart); without one, writes over TCP are rejected.
     #[schemars(example = "/etc/sonard/token")]
     pub token_file: Option<String>,
-    /// Host names, besides those of loopback, under which a browser may ask (restart).
+    /// Host names that browsers may use in addition to those of loopback (restart).
     pub hosts: Vec<String>,
-    /// Folder of the playground, as `web/build.sh` makes it, to be served at /playground/ (restart).
+    /// Folder of the playground as built by `web/build.sh`, served at /playground/ (restart).
     #[schemars(example = "/usr/share/sonard/playground")]
     pub playground: Option<String>,
-    /// Connections at a time (restart): so many by the socket, by TCP from this computer, and by TCP
-    /// from others, each by itself.
+    /// Maximum number of simultaneous connections (restart), separately for the socket, TCP from
+    /// this computer, and TCP from others.
     #[schemars(range(min = 1, max = 10_000))]
     pub max_clients: u32,
-    /// Requests a second (restart): so many by the socket, with the token, and of all others, each by
-    /// itself. What is refused counts nowhere.
+    /// Maximum request rate, requests per second (restart), separately for the socket, for requests
+    /// with the token, and for all others. Rejected requests do not count.
     #[schemars(range(min = 1, max = 100_000))]
     pub max_requests_per_s: f64,
-    /// Largest body of a request, kilobytes (restart).
+    /// Maximum size of a request body, kilobytes (restart).
     #[schemars(range(min = 1, max = 10_000))]
     pub max_body_kb: u32,
-    /// Readings kept for a subscriber that is slow; older ones are dropped, with a count (restart).
+    /// Size of a slow subscriber's queue, readings; when it is full, the oldest readings are
+    /// dropped and counted (restart).
     #[schemars(range(min = 16, max = 100_000))]
     pub queue: u32,
-    /// A client that takes nothing for so long is cut off, seconds (restart).
+    /// Time after which a client that stops reading is disconnected, seconds (restart).
     #[schemars(range(min = 0.1, max = 600))]
     pub stall_s: f64,
 }
@@ -273,19 +276,20 @@ pub struct ServerKeys {
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct GpioKeys {
-    /// Output, low for 50 ms, that resets the microcontroller (restart).
+    /// Output that resets the microcontroller, low for 50 ms (restart).
     #[schemars(range(min = 0, max = 27), example = 17)]
     pub reset_pin: Option<u8>,
-    /// Output, high while the daemon runs, that powers the ranging module (restart).
+    /// Output that powers the ranging module, high while the daemon runs (restart).
     #[schemars(range(min = 0, max = 27), example = 27)]
     pub power_pin: Option<u8>,
-    /// Input with pull-up, low while the motor is at home (restart).
+    /// Input with pull-up for the home switch, low while the motor is at home (restart).
     #[schemars(range(min = 0, max = 27), example = 22)]
     pub home_pin: Option<u8>,
-    /// Input with pull-up, high (also: cable broken) while the emergency stop is pressed (restart).
+    /// Input with pull-up for the emergency stop, high while it is pressed or its cable is broken
+    /// (restart).
     #[schemars(range(min = 0, max = 27), example = 23)]
     pub stop_pin: Option<u8>,
-    /// Output, high while the ranger is ready or scanning (restart).
+    /// Output of the indicator light, high while the ranger is ready or scanning (restart).
     #[schemars(range(min = 0, max = 27), example = 24)]
     pub light_pin: Option<u8>,
 }
@@ -359,7 +363,7 @@ impl Default for LinkKeys {
 }
 
 impl ServerKeys {
-    /// The socket's permissions; `None` if they are not three octal digits.
+    /// Parses `socket_mode`; `None` if it is not three octal digits.
     #[must_use]
     pub fn socket_permissions(&self) -> Option<u32> {
         let digits = self.socket_mode.strip_prefix('0').unwrap_or(&self.socket_mode);

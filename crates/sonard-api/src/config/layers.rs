@@ -1,4 +1,5 @@
-//! File, environment and options, one over the other, with each value's place kept for errors.
+//! Merges configuration file, environment and options, and keeps the source of each value for error
+//! messages.
 
 mod error;
 
@@ -14,14 +15,14 @@ use super::{
 
 pub use error::{ConfigError, Origin};
 
-/// Values given so far for the keys of a form, the later ones over the earlier ones.
+/// Configuration values collected so far; later sources override earlier ones.
 #[derive(Debug, Clone, Default)]
 pub struct Layers<K = Keys> {
     given: BTreeMap<(String, String), (Value, Origin)>,
     form: PhantomData<K>,
 }
 
-/// What may be given in sections without keys of their own.
+/// Key of sections that accept any key.
 static FREE_KEY: Key = Key {
     name: String::new(),
     about: String::new(),
@@ -32,22 +33,22 @@ static FREE_KEY: Key = Key {
 };
 
 impl<K: Form> Layers<K> {
-    /// Nothing given: the defaults.
+    /// Configuration with default values only.
     #[must_use]
     pub const fn new() -> Self {
         Self { given: BTreeMap::new(), form: PhantomData }
     }
 
-    /// Puts a file's text over what was given before; `name` is what errors call it.
+    /// Merges the text of a file over the previous values; `name` identifies it in error messages.
     ///
     /// # Errors
-    /// Not TOML, or a section or key that there is not.
+    /// Invalid TOML, or an unknown section or key.
     pub fn file(mut self, name: &str, text: &str) -> Result<Self, ConfigError> {
-        let at = |span: Range<usize>| place(name, text, span.start);
+        let at = |span: Range<usize>| position(name, text, span.start);
         let syntax = |error: toml::de::Error| ConfigError {
             origin: at(error.span().unwrap_or(0..0)),
             message: error.message().to_owned(),
-            help: "the file is TOML: [section] lines, and key = value below them".into(),
+            help: "expected TOML: [section] lines, each followed by lines key = value".into(),
         };
         let spans = DeTable::parse(text).map_err(syntax)?;
         let values: toml::Table = toml::from_str(text).map_err(syntax)?;
@@ -62,23 +63,23 @@ impl<K: Form> Layers<K> {
                 });
             };
             for (key, value) in entries {
-                find::<K>(section, key.get_ref(), &at(key.span()))?;
+                find_key::<K>(section, key.get_ref(), &at(key.span()))?;
                 let Some(given) = values.get(&**section).and_then(|s| s.get(&**key.get_ref()))
                 else {
                     continue;
                 };
                 let origin = at(value.span());
-                self.give(section, key.get_ref(), given.clone(), origin);
+                self.set(section, key.get_ref(), given.clone(), origin);
             }
         }
         Ok(self)
     }
 
-    /// Puts environment variables over what was given before: `SONARD_SECTION_KEY`. Others are
-    /// not looked at.
+    /// Merges environment variables of the form `SONARD_SECTION_KEY` over the previous values.
+    /// Other variables are ignored.
     ///
     /// # Errors
-    /// A key that the section has not, or a value of the wrong kind.
+    /// Unknown key, or a value of the wrong type.
     pub fn environment(
         mut self,
         variables: impl IntoIterator<Item = (String, String)>,
@@ -94,10 +95,10 @@ impl<K: Form> Layers<K> {
         Ok(self)
     }
 
-    /// Puts one option over what was given before: `section.key=value`.
+    /// Merges one option `section.key=value` over the previous values.
     ///
     /// # Errors
-    /// Not of that form, a key that there is not, or a value of the wrong kind.
+    /// Wrong syntax, unknown key, or a value of the wrong type.
     pub fn option(mut self, option: &str, setting: &str) -> Result<Self, ConfigError> {
         let origin = Origin::Option(format!("{option} {setting}"));
         let parts =
@@ -105,8 +106,8 @@ impl<K: Form> Layers<K> {
         let Some(((section, key), value)) = parts else {
             return Err(ConfigError {
                 origin,
-                message: "not SECTION.KEY=VALUE".into(),
-                help: "for instance plan.step_deg=1.8".into(),
+                message: "expected SECTION.KEY=VALUE".into(),
+                help: "for example plan.step_deg=1.8".into(),
             });
         };
         check_section::<K>(section.trim(), &origin)?;
@@ -114,15 +115,15 @@ impl<K: Form> Layers<K> {
         Ok(self)
     }
 
-    /// The values in force, each within its range.
+    /// Returns the effective values, after validation of types and ranges.
     ///
     /// # Errors
-    /// The first value that is of the wrong kind or out of range.
+    /// First value that is of the wrong type or out of range.
     pub fn keys(self) -> Result<K, ConfigError> {
         let mut table = toml::Table::new();
         for ((section, name), (value, origin)) in &self.given {
-            let key = find::<K>(section, name, origin)?;
-            let value = checked(section, name, key, value, origin)?;
+            let key = find_key::<K>(section, name, origin)?;
+            let value = validate(section, name, key, value, origin)?;
             let entries = table.entry(section.clone()).or_insert_with(|| toml::Table::new().into());
             if let (Some(entries), Some(value)) = (entries.as_table_mut(), value) {
                 entries.insert(name.clone(), value);
@@ -139,7 +140,7 @@ impl<K: Form> Layers<K> {
         })
     }
 
-    /// Where a value came from; `None` if it is the default.
+    /// Returns the source of a value; `None` if it is the default.
     #[must_use]
     pub fn origin(&self, section: &str, key: &str) -> Option<&Origin> {
         self.given.get(&(section.to_owned(), key.to_owned())).map(|(_, origin)| origin)
@@ -152,7 +153,7 @@ impl<K: Form> Layers<K> {
         text: &str,
         origin: Origin,
     ) -> Result<(), ConfigError> {
-        let key = find::<K>(section, name, &origin)?;
+        let key = find_key::<K>(section, name, &origin)?;
         let value = match key.kind {
             Kind::Text | Kind::Choice(_) => Value::String(text.to_owned()),
             Kind::Texts => {
@@ -163,19 +164,19 @@ impl<K: Form> Layers<K> {
                 .ok()
                 .and_then(|mut table| table.remove("value"))
                 .unwrap_or_else(|| Value::String(text.to_owned())),
-            // "nan" is a number in TOML; the range refuses it.
+            // "nan" is a number in TOML; the range check rejects it.
             Kind::Number { .. } | Kind::Whole { .. } | Kind::Switch => {
                 toml::from_str::<toml::Table>(&format!("value = {text}"))
                     .ok()
                     .and_then(|mut table| table.remove("value"))
-                    .ok_or_else(|| wrong(section, name, key, text, origin.clone()))?
+                    .ok_or_else(|| invalid(section, name, key, text, origin.clone()))?
             }
         };
-        self.give(section, name, value, origin);
+        self.set(section, name, value, origin);
         Ok(())
     }
 
-    fn give(&mut self, section: &str, key: &str, value: Value, origin: Origin) {
+    fn set(&mut self, section: &str, key: &str, value: Value, origin: Origin) {
         self.given.insert((section.to_owned(), key.to_owned()), (value, origin));
     }
 }
@@ -187,12 +188,16 @@ fn check_section<K: Form>(name: &str, origin: &Origin) -> Result<(), ConfigError
     let known: Vec<String> = K::sections().iter().map(|section| section.name.clone()).collect();
     Err(ConfigError {
         origin: origin.clone(),
-        message: format!("there is no section [{name}]"),
+        message: format!("unknown section [{name}]"),
         help: suggest(name, &known, "sections"),
     })
 }
 
-fn find<K: Form>(section: &str, name: &str, origin: &Origin) -> Result<&'static Key, ConfigError> {
+fn find_key<K: Form>(
+    section: &str,
+    name: &str,
+    origin: &Origin,
+) -> Result<&'static Key, ConfigError> {
     let here: Option<&'static Section> = K::sections().iter().find(|known| known.name == section);
     if here.is_some_and(|here| here.free) {
         return Ok(&FREE_KEY);
@@ -204,7 +209,7 @@ fn find<K: Form>(section: &str, name: &str, origin: &Origin) -> Result<&'static 
             here.into_iter().flat_map(|known| &known.keys).map(|key| key.name.clone()).collect();
         ConfigError {
             origin: origin.clone(),
-            message: format!("there is no key {name} in [{section}]"),
+            message: format!("unknown key {name} in [{section}]"),
             help: match elsewhere {
                 Some(other) => format!("`{name}` belongs in [{}]", other.name),
                 None => suggest(name, &known, "keys"),
@@ -213,15 +218,15 @@ fn find<K: Form>(section: &str, name: &str, origin: &Origin) -> Result<&'static 
     })
 }
 
-/// The value if it fits its key; `None` for an empty text where nothing may be given.
-fn checked(
+/// Validates a value; `None` for an empty string where the key is optional.
+fn validate(
     section: &str,
     name: &str,
     key: &Key,
     value: &Value,
     origin: &Origin,
 ) -> Result<Option<Value>, ConfigError> {
-    let refuse = || Err(wrong(section, name, key, &value.to_string(), origin.clone()));
+    let reject = || Err(invalid(section, name, key, &value.to_string(), origin.clone()));
     match (&key.kind, value) {
         (Kind::Number { min, max }, Value::Float(number)) if (*min..=*max).contains(number) => {}
         (Kind::Number { min, max } | Kind::Whole { min, max }, Value::Integer(number))
@@ -229,7 +234,7 @@ fn checked(
         (Kind::Switch, Value::Boolean(_)) => {}
         (Kind::Choice(words), Value::String(word)) if words.contains(word) => {}
         (Kind::Choice(words), Value::String(word)) => {
-            let error = wrong(section, name, key, &value.to_string(), origin.clone());
+            let error = invalid(section, name, key, &value.to_string(), origin.clone());
             return Err(ConfigError { help: suggest(word, words, "choices"), ..error });
         }
         (Kind::Text, Value::String(text)) if text.is_empty() && key.default.is_none() => {
@@ -239,21 +244,21 @@ fn checked(
         (Kind::Any, Value::String(_) | Value::Integer(_) | Value::Boolean(_)) => {}
         (Kind::Any, Value::Float(number)) if number.is_finite() => {}
         (Kind::Texts, Value::Array(texts)) if texts.iter().all(Value::is_str) => {}
-        _ => return refuse(),
+        _ => return reject(),
     }
     Ok(Some(value.clone()))
 }
 
-fn wrong(section: &str, name: &str, key: &Key, value: &str, origin: Origin) -> ConfigError {
+fn invalid(section: &str, name: &str, key: &Key, value: &str, origin: Origin) -> ConfigError {
     ConfigError {
         origin,
         message: format!("{section}.{name} is {value}"),
-        help: format!("what is wanted: {}", key.kind.wanted()),
+        help: format!("expected: {}", key.kind.wanted()),
     }
 }
 
-/// Line and column of a byte of the text.
-fn place(file: &str, text: &str, byte: usize) -> Origin {
+/// Converts a byte offset to line and column.
+fn position(file: &str, text: &str, byte: usize) -> Origin {
     let before = text.get(..byte).unwrap_or(text);
     let line_start = before.rfind('\n').map_or(0, |newline| newline + 1);
     Origin::File {
@@ -273,7 +278,7 @@ mod tests {
     }
 
     #[test]
-    fn environment_goes_over_the_file_and_options_over_both() {
+    fn later_sources_override() {
         let file = "[plan]\nstep_deg = 3.6\nto_deg = 90\n[device]\nport = \"a\"\n";
         let environment =
             [("SONARD_PLAN_STEP_DEG", "1.8"), ("SONARD_DEVICE_PORT", "b"), ("HOME", "x")];
@@ -282,16 +287,21 @@ mod tests {
             .and_then(|l| l.environment(environment.map(|(k, v)| (k.into(), v.into()))))
             .and_then(|l| l.option("--set", "device.port=c"))
             .and_then(Layers::keys)
-            .expect("all of it is right");
+            .expect("valid");
         assert_eq!((keys.plan.step_deg, keys.plan.to_deg), (1.8, 90.0));
         assert_eq!(keys.device.port.as_deref(), Some("c"));
     }
 
     #[test]
-    fn what_is_wrong_is_named_with_its_place_and_what_would_be_right() {
+    fn errors_have_place_and_help() {
         for (text, place, message, help) in [
-            ("[plan]\nstep_dge = 1", "s.toml:2:1", "no key step_dge", "did you mean `step_deg`?"),
-            ("[paln]\n", "s.toml:1:2", "no section [paln]", "did you mean `plan`?"),
+            (
+                "[plan]\nstep_dge = 1",
+                "s.toml:2:1",
+                "unknown key step_dge",
+                "did you mean `step_deg`?",
+            ),
+            ("[paln]\n", "s.toml:1:2", "unknown section [paln]", "did you mean `plan`?"),
             ("[plan]\nstep_deg = 0", "s.toml:2:12", "plan.step_deg is 0", "0.01 to 360"),
             ("[plan]\nstep_deg = nan", "s.toml:2:12", "plan.step_deg is nan", "0.01 to 360"),
             ("[plan]\n\n  pings_per_stop = 1.5", "s.toml:3:20", "is 1.5", "Whole number, 1 to 255"),
@@ -302,20 +312,20 @@ mod tests {
                 "did you mean `on-request`?",
             ),
             ("[log]\ndaily = \"yes\"", "s.toml:2:9", "log.daily is \"yes\"", "true or false"),
-            ("[server]\nport = 3", "s.toml:2:1", "no key port", "`port` belongs in [device]"),
+            ("[server]\nport = 3", "s.toml:2:1", "unknown key port", "`port` belongs in [device]"),
             ("plan = 3", "s.toml:1:1", "plan is a section", "[plan]"),
             ("[plan]\nstep_deg = ", "s.toml:2:", "", "TOML"),
             ("[plan]\nto_deg = 1\nto_deg = 2", "s.toml:3:1", "duplicate", "TOML"),
         ] {
             let error = read(text).expect_err(text);
-            let said = error.to_string();
-            assert!(said.starts_with(place) && said.contains(message), "{text:?}: {said}");
+            let shown = error.to_string();
+            assert!(shown.starts_with(place) && shown.contains(message), "{text:?}: {shown}");
             assert!(error.help.contains(help), "{text:?}: {}", error.help);
         }
         for (option, message) in [
-            ("plan.step_deg", "not SECTION.KEY=VALUE"),
+            ("plan.step_deg", "expected SECTION.KEY=VALUE"),
             ("plan.step_deg=fast", "plan.step_deg is fast"),
-            ("plan.hosts=1", "no key hosts"),
+            ("plan.hosts=1", "unknown key hosts"),
         ] {
             let error = Layers::<Keys>::new().option("--set", option).expect_err(option);
             assert!(error.to_string().contains(message), "{error}");
@@ -323,20 +333,20 @@ mod tests {
     }
 
     #[test]
-    fn an_empty_text_means_nothing_given_where_there_is_no_default() {
+    fn empty_text_unsets_optional_key() {
         let keys = read("[device]\nport = \"\"\n[server]\nsocket = \"\"\n").expect("reads");
         assert_eq!((keys.device.port, keys.server.socket), (None, String::new()));
     }
 
     #[test]
-    fn lists_can_be_given_as_text() {
+    fn list_from_comma_separated_text() {
         let keys = Layers::<Keys>::new()
             .option("--set", "server.hosts=robot, robot.local")
             .and_then(Layers::keys);
         assert_eq!(keys.expect("reads").server.hosts, ["robot", "robot.local"]);
     }
 
-    /// Words that a configuration is made of, right and wrong, in any order.
+    /// Tokens of a configuration file, valid and invalid.
     fn piece() -> impl Strategy<Value = String> {
         let keys = sections().iter().flat_map(|section| {
             let names = section.keys.iter().map(|key| key.name.clone());
@@ -351,9 +361,9 @@ mod tests {
     }
 
     proptest! {
-        /// Whatever a file holds: no panic, and what is refused is refused at a place in it.
+        /// No text causes a panic, and each error has a position within the text.
         #[test]
-        fn any_text_is_read_or_refused_at_its_place(pieces in prop::collection::vec(piece(), 0..40)) {
+        fn errors_lie_within_the_text(pieces in prop::collection::vec(piece(), 0..40)) {
             let text = pieces.concat();
             if let Err(error) = read(&text) {
                 let Origin::File { line, column, .. } = error.origin else {

@@ -1,51 +1,55 @@
-//! The keys of what an MQTT broker is sent, and what in them ranges can't say.
+//! Configuration keys of the MQTT output, and checks beyond ranges.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::Fault;
 
-/// The port of MQTT, and that of MQTT by TLS.
+/// Default ports of MQTT and of MQTT over TLS.
 const PORTS: [u16; 2] = [1883, 8883];
-/// Longest prefix of topics and name of a robot, bytes: a topic has at most 65,535.
-const MOST_NAME_BYTES: usize = 200;
+/// Maximum length of a topic prefix and of a robot's name, bytes. A topic is limited to 65,535
+/// bytes.
+const MAX_NAME_BYTES: usize = 200;
 
-/// Records to an MQTT broker.
+/// Publication of log records to an MQTT broker.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct MqttKeys {
-    /// The broker (restart): mqtt://HOST:PORT, or mqtts://HOST:PORT for TLS. Without one nothing is sent.
+    /// URL of the broker (restart): mqtt://HOST:PORT, or mqtts://HOST:PORT for TLS. Without one
+    /// nothing is sent.
     #[schemars(example = "mqtt://broker.local:1883")]
     pub broker: Option<String>,
-    /// What topics begin with, before the robot's name (restart).
+    /// Prefix of topics, before the robot's name (restart).
     pub topic: String,
-    /// Name of the user at the broker (restart).
+    /// User name at the broker (restart).
     #[schemars(example = "robot-1")]
     pub user: Option<String>,
-    /// File with that user's password, readable by its owner alone (restart).
+    /// File with the user's password, readable by its owner only (restart).
     #[schemars(example = "/etc/sonard/mqtt-password")]
     pub password_file: Option<String>,
-    /// File of certificates (PEM) by one of which the broker's has to be signed (restart), in place of those that
-    /// this computer trusts.
+    /// File with certificates (PEM) of accepted certificate authorities (restart), in place of
+    /// those that this computer trusts.
     #[schemars(example = "/etc/sonard/mqtt-ca.pem")]
     pub ca_file: Option<String>,
-    /// File of the certificate (PEM) that the broker knows this daemon by (restart).
+    /// File with the client certificate (PEM) of this daemon (restart).
     #[schemars(example = "/etc/sonard/mqtt-client.pem")]
     pub certificate_file: Option<String>,
-    /// File of its key (PEM), readable by its owner alone (restart).
+    /// File with the key (PEM) of the client certificate, readable by its owner only (restart).
     #[schemars(example = "/etc/sonard/mqtt-client.key")]
     pub key_file: Option<String>,
-    /// Whether scans may be started and stopped through the broker (restart), by whoever may publish there.
+    /// Accept commands that start and stop scans (restart), from every client with publish
+    /// permission at the broker.
     pub commands: bool,
-    /// Whether the first time all that is in the log is sent (restart), and not only what comes from then on.
+    /// On the first connection, publish the whole log and not only records from then on (restart).
     pub history: bool,
-    /// How often a silent line is tried, seconds (restart).
+    /// Keep-alive interval of an idle connection, seconds (restart).
     #[schemars(range(min = 5, max = 600))]
     pub keep_alive_s: u16,
-    /// How often the status is sent, seconds (restart); a change of the link or of scanning is told at once.
+    /// Interval between status messages, seconds (restart); changes of the link or of scanning are
+    /// published at once.
     #[schemars(range(min = 1, max = 3600))]
     pub status_s: u32,
-    /// Records under way that the broker has not acknowledged, all together, kilobytes (restart).
+    /// Maximum size of sent but unacknowledged records, kilobytes (restart).
     #[schemars(range(min = 16, max = 32_768))]
     pub queue_kb: u32,
 }
@@ -69,69 +73,68 @@ impl Default for MqttKeys {
     }
 }
 
-/// The address of a broker.
+/// Address of an MQTT broker.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Broker {
-    /// Name or address of its computer; an address of IPv6 in brackets.
+    /// Host name or address; an IPv6 address in brackets.
     pub host: String,
-    /// Its port.
+    /// TCP port.
     pub port: u16,
-    /// Whether it is spoken to by TLS.
+    /// `true` for a connection over TLS.
     pub tls: bool,
 }
 
 impl Broker {
-    /// Reads `mqtt://HOST:PORT` or `mqtts://HOST:PORT`; the port may be left out.
+    /// Parses `mqtt://HOST:PORT` or `mqtts://HOST:PORT`; the port is optional.
     ///
     /// # Errors
-    /// What would be right.
+    /// Description of the expected format.
     pub fn parse(url: &str) -> Result<Self, String> {
-        let wanted = || "mqtt://HOST:PORT, or mqtts://HOST:PORT for TLS".to_owned();
-        let (scheme, place) = url.split_once("://").ok_or_else(wanted)?;
+        let expected = || "mqtt://HOST:PORT, or mqtts://HOST:PORT for TLS".to_owned();
+        let (scheme, place) = url.split_once("://").ok_or_else(expected)?;
         let tls = match scheme {
             "mqtt" => false,
             "mqtts" => true,
-            _ => return Err(wanted()),
+            _ => return Err(expected()),
         };
         let place = place.strip_suffix('/').unwrap_or(place);
         if place.contains('@') {
-            return Err("user and password have keys of their own: user, password_file".into());
+            return Err("set user and password by the keys user and password_file".into());
         }
         let (host, port) = match place.rsplit_once(':') {
             Some((host, port)) if !port.ends_with(']') => {
-                (host, port.parse().map_err(|_| wanted())?)
+                (host, port.parse().map_err(|_| expected())?)
             }
             _ => (place, PORTS[usize::from(tls)]),
         };
         let in_brackets = host.strip_prefix('[').and_then(|rest| rest.strip_suffix(']'));
         let is_host = match in_brackets {
             Some(address) => address.parse::<std::net::Ipv6Addr>().is_ok(),
-            None => !host.is_empty() && host.bytes().all(is_of_name),
+            None => !host.is_empty() && host.bytes().all(is_name_byte),
         };
         match (is_host, in_brackets, tls) {
-            (true, Some(_), true) => {
-                Err("TLS needs the name of a host, or an address of IPv4".into())
-            }
+            (true, Some(_), true) => Err("TLS needs a host name or an IPv4 address".into()),
             (true, ..) if port != 0 => Ok(Self { host: host.into(), port, tls }),
-            _ => Err(wanted()),
+            _ => Err(expected()),
         }
     }
 }
 
-const fn is_of_name(byte: u8) -> bool {
+const fn is_name_byte(byte: u8) -> bool {
     byte.is_ascii_alphanumeric() || matches!(byte, b'-' | b'.' | b'_')
 }
 
 impl MqttKeys {
-    /// Checks what ranges can't say; `built_in` is whether this program can speak to a broker at all. Nothing is wrong where no broker is named.
+    /// Checks rules beyond ranges. `built_in` is `true` if the program was built with MQTT support.
+    /// Without a broker every setting is valid.
     ///
     /// # Errors
-    /// The first key that is wrong.
+    /// First invalid key.
     pub fn check(&self, built_in: bool) -> Result<(), Fault> {
         let Some(url) = &self.broker else { return Ok(()) };
         if !built_in {
             let help =
-                "build it with `cargo build --release --features mqtt`, or leave mqtt.broker out";
+                "build it with `cargo build --release --features mqtt`, or remove mqtt.broker";
             return Err((
                 "broker",
                 "this program was built without the feature mqtt".into(),
@@ -149,7 +152,7 @@ impl MqttKeys {
 
     fn check_secrets(&self, broker: &Broker) -> Result<(), Fault> {
         if self.password_file.is_some() && self.user.is_none() {
-            let help = "set mqtt.user to the name that the password is of";
+            let help = "set mqtt.user";
             return Err(("password_file", "a password without a user".into(), help.into()));
         }
         if self.certificate_file.is_some() != self.key_file.is_some() {
@@ -158,22 +161,22 @@ impl MqttKeys {
             return Err(("certificate_file", message.into(), help.into()));
         }
         if !broker.tls && (self.ca_file.is_some() || self.certificate_file.is_some()) {
-            let help = "for TLS, mqtt.broker is mqtts://HOST:PORT";
-            return Err(("broker", "certificates are of no use without TLS".into(), help.into()));
+            let help = "set mqtt.broker to mqtts://HOST:PORT";
+            return Err(("broker", "certificates need TLS".into(), help.into()));
         }
         Ok(())
     }
 }
 
-/// Whether topics can begin so.
+/// Returns `true` for a valid topic prefix.
 fn is_prefix(topic: &str) -> bool {
-    topic.len() <= MOST_NAME_BYTES && !topic.starts_with('$') && topic.split('/').all(is_level)
+    topic.len() <= MAX_NAME_BYTES && !topic.starts_with('$') && topic.split('/').all(is_level)
 }
 
-/// Whether a level of a topic can be called so.
+/// Returns `true` for a valid level of a topic.
 fn is_level(name: &str) -> bool {
     let is_wrong = |c: char| matches!(c, '/' | '+' | '#') || c.is_control() || c.is_whitespace();
-    !name.is_empty() && name.len() <= MOST_NAME_BYTES && !name.contains(is_wrong)
+    !name.is_empty() && name.len() <= MAX_NAME_BYTES && !name.contains(is_wrong)
 }
 
 #[cfg(test)]
@@ -181,7 +184,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn brokers_are_read_and_what_is_none_is_told() {
+    fn broker_urls() {
         let read = |url| Broker::parse(url).map(|b| (b.host, b.port, b.tls));
         assert_eq!(read("mqtt://broker.local:1884"), Ok(("broker.local".into(), 1884, false)));
         assert_eq!(read("mqtts://10.0.0.7/"), Ok(("10.0.0.7".into(), 8883, true)));
@@ -200,12 +203,12 @@ mod tests {
             ("mqtt://me:secret@broker", "password_file"),
             ("mqtts://[::1]:8883", "IPv4"),
         ] {
-            assert!(read(url).is_err_and(|told| told.contains(help)), "{url}: {:?}", read(url));
+            assert!(read(url).is_err_and(|error| error.contains(help)), "{url}: {:?}", read(url));
         }
     }
 
     #[test]
-    fn keys_that_do_not_go_together_are_refused_with_what_would_be_right() {
+    fn inconsistent_keys() {
         let good = MqttKeys { broker: Some("mqtts://b".into()), ..MqttKeys::default() };
         let some = |text: &str| Some(text.to_owned());
         assert_eq!(good.check(true), Ok(()));
@@ -225,9 +228,9 @@ mod tests {
     }
 
     #[test]
-    fn a_program_without_the_feature_says_which_one() {
+    fn missing_feature_is_named() {
         let keys = MqttKeys { broker: Some("mqtt://b".into()), ..MqttKeys::default() };
-        let (key, message, help) = keys.check(false).expect_err("it can't");
+        let (key, message, help) = keys.check(false).expect_err("feature missing");
         assert!(key == "broker" && message.contains("feature mqtt"), "{message}");
         assert!(help.contains("--features mqtt"), "{help}");
     }

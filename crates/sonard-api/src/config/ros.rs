@@ -1,4 +1,4 @@
-//! The keys of what is told to ROS 2, and what in them ranges can't say.
+//! Configuration keys of the ROS 2 output, and checks beyond ranges.
 
 use std::net::Ipv4Addr;
 
@@ -11,62 +11,64 @@ use sonard_export::{
 
 use super::Fault;
 
-/// Messages and services for ROS 2, by DDS.
+/// Messages and services for ROS 2 over DDS.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct RosKeys {
-    /// Whether there are any (restart). Without them no port is opened and nothing is sent.
+    /// Enable the ROS 2 output (restart). Otherwise no port is opened and nothing is sent.
     pub enabled: bool,
-    /// ROS_DOMAIN_ID of those who are to hear it (restart).
+    /// DDS domain, as ROS_DOMAIN_ID of the subscribers (restart).
     #[schemars(range(min = 0, max = 232))]
     pub domain: u16,
-    /// Addresses (IPv4) of this computer, or names of its interfaces, that it is told by (restart). DDS has no
-    /// passwords: on each of these networks everybody hears it.
+    /// IPv4 addresses of this computer, or names of its interfaces, to publish on (restart). DDS
+    /// has no access control: every host on these networks can subscribe.
     pub networks: Vec<String>,
-    /// What the names of node and topics begin with (restart), as /kiwi; empty for none.
+    /// Namespace of node and topics (restart), such as /kiwi; empty for none.
     pub namespace: String,
-    /// What a Range says of silence (restart): +inf, or what nav2's range layer understands.
+    /// Encoding of "no echo" in Range messages (restart): +inf (REP 117), or the maximum range as
+    /// nav2's range layer expects.
     pub profile: RosProfile,
-    /// Whose definitions messages follow (restart): jazzy for Iron and later, humble for those before.
+    /// ROS distribution of the message definitions (restart): jazzy for Iron and later, humble for
+    /// earlier ones.
     pub distribution: RosDistribution,
-    /// The frame of the transducer, which others are named after (restart).
+    /// Frame of the transducer, from which other frame names are derived (restart).
     pub frame: String,
-    /// Full angle of what a Range is valid for, degrees (restart), instead of the sensor's beam.
+    /// Full opening angle of Range messages, degrees (restart); by default the sensor's beam width.
     #[schemars(range(min = 0.1, max = 180), example = 15)]
     pub field_of_view_deg: Option<f64>,
-    /// Whether /tf says where base_link is in map (restart). A robot whose own software says so must not be
-    /// told twice.
+    /// Publish the transform from map to base_link on /tf (restart). Disable it if the robot's own
+    /// software publishes that transform.
     pub places_robot: bool,
-    /// Whether a map of all scans since the start is told after each scan (restart), as `sonard map` makes it. Where others tell
-    /// /map, two would contradict each other.
+    /// Publish a map of all scans since the start after each scan (restart), computed as by `sonard
+    /// map`. Disable it if another node publishes /map.
     pub map: bool,
-    /// Whether scans may be started and stopped by services and the pose set by /initialpose (restart), by whoever is on
-    /// these networks.
+    /// Accept services that start and stop scans, and poses from /initialpose (restart), from every
+    /// host on these networks.
     pub commands: bool,
-    /// Messages of a topic that subscribers have not acknowledged, all together, kilobytes (restart); what comes
-    /// when so much waits is left out, with a count.
+    /// Maximum size of unacknowledged messages per topic, kilobytes (restart); further messages are
+    /// dropped and counted.
     #[schemars(range(min = 16, max = 8192))]
     pub queue_kb: u32,
 }
 
-/// What a `Range` says of silence.
+/// Encoding of "no echo" in `Range` messages.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum RosProfile {
-    /// +inf for silence, -inf for what is too near.
+    /// +inf for no echo, -inf below the minimum range.
     #[default]
     Rep117,
-    /// The greatest range for silence, the least for what is too near.
+    /// The maximum range for no echo, the minimum range below it.
     Nav2,
 }
 
-/// Whose definitions messages follow.
+/// ROS distribution of the message definitions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum RosDistribution {
-    /// Up to Humble.
+    /// ROS 2 Humble and earlier.
     Humble,
-    /// Iron and later.
+    /// ROS 2 Iron and later.
     #[default]
     Jazzy,
 }
@@ -91,7 +93,7 @@ impl Default for RosKeys {
 }
 
 impl RosKeys {
-    /// How messages are made.
+    /// Returns the settings of the message encoder.
     #[must_use]
     pub fn messages(&self) -> Settings {
         use sonard_export::{Distribution, Profile};
@@ -111,11 +113,11 @@ impl RosKeys {
         }
     }
 
-    /// Checks what ranges can't say; `built_in` is whether this program can speak DDS at all. Nothing is wrong where
-    /// nothing is to be told.
+    /// Checks rules beyond ranges. `built_in` is `true` if the program was built with DDS support.
+    /// If the output is disabled, every setting is valid.
     ///
     /// # Errors
-    /// The first key that is wrong.
+    /// First invalid key.
     pub fn check(&self, built_in: bool) -> Result<(), Fault> {
         if !self.enabled {
             return Ok(());
@@ -127,7 +129,7 @@ impl RosKeys {
             return Err(("enabled", message.into(), help.into()));
         }
         if !is_namespace(&self.namespace) {
-            let help = "names of letters, digits and _, each behind a slash: /kiwi, or /lab/kiwi_7";
+            let help = "expected names of letters, digits and _, each after a slash: /kiwi, or /lab/kiwi_7";
             return Err((
                 "namespace",
                 format!("ros.namespace is {:?}", self.namespace),
@@ -135,31 +137,31 @@ impl RosKeys {
             ));
         }
         if !self.frame.split('/').all(is_name) || self.frame.len() > 64 {
-            let help = "letters, digits and _, without a slash before them: sonar";
+            let help = "expected letters, digits and _, without a leading slash: sonar";
             return Err(("frame", format!("ros.frame is {:?}", self.frame), help.into()));
         }
         if let Some(network) = self.networks.iter().find(|network| !is_network(network)) {
-            let help = "an address (IPv4) of this computer or the name of an interface: 192.168.1.7, wlan0";
+            let help = "expected an IPv4 address of this computer or the name of an interface: 192.168.1.7, wlan0";
             return Err(("networks", format!("ros.networks has {network:?}"), help.into()));
         }
         if self.networks.is_empty() {
-            let help = "for this computer alone [\"127.0.0.1\"]; for nobody ros.enabled = false";
+            let help = "use [\"127.0.0.1\"] for this computer only; to disable the output, set ros.enabled = false";
             return Err(("networks", "ros.networks is empty".into(), help.into()));
         }
         Ok(())
     }
 }
 
-/// Whether a text can be an address or the name of an interface.
+/// Returns `true` for an IPv4 address or a valid interface name.
 fn is_network(text: &str) -> bool {
-    /// Linux has no longer names.
-    const MOST: usize = 15;
+    /// Maximum length of an interface name on Linux (IFNAMSIZ - 1).
+    const MAX_LENGTH: usize = 15;
     let is_digits_and_dots = text.bytes().all(|byte| byte.is_ascii_digit() || byte == b'.');
     if is_digits_and_dots {
         return text.parse::<Ipv4Addr>().is_ok_and(|address| !address.is_unspecified());
     }
     let fits = |c: char| c.is_ascii_alphanumeric() || "-_.@".contains(c);
-    (1..=MOST).contains(&text.len()) && text.chars().all(fits)
+    (1..=MAX_LENGTH).contains(&text.len()) && text.chars().all(fits)
 }
 
 #[cfg(test)]
@@ -167,7 +169,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn keys_that_ros_could_not_take_are_refused_with_what_would_be_right() {
+    fn invalid_keys_are_named() {
         let good = RosKeys { enabled: true, ..RosKeys::default() };
         assert_eq!(good.check(true), Ok(()));
         let key = |keys: RosKeys| keys.check(true).expect_err("wrong").0;
@@ -187,10 +189,10 @@ mod tests {
     }
 
     #[test]
-    fn a_program_without_the_feature_says_which_one() {
+    fn missing_feature_is_named() {
         assert_eq!(RosKeys::default().check(false), Ok(()));
         let keys = RosKeys { enabled: true, ..RosKeys::default() };
-        let (key, message, help) = keys.check(false).expect_err("it can't");
+        let (key, message, help) = keys.check(false).expect_err("feature missing");
         assert!(key == "enabled" && message.contains("feature ros"), "{message}");
         assert!(help.contains("--features ros"), "{help}");
     }

@@ -1,4 +1,4 @@
-//! What is known about each key, taken from the schema of the type that holds them.
+//! Sections and keys of a configuration, read from the JSON schema of its type.
 
 use std::sync::LazyLock;
 
@@ -8,25 +8,27 @@ use serde_json::{Map, Value};
 
 use super::keys::Keys;
 
-/// A file of sections and keys: its type says what there is, with a doc comment, a range and a
-/// default each, and everything else follows from it.
+/// Type of a configuration file. Sections, keys, texts, ranges and defaults are derived from its
+/// JSON schema.
 pub trait Form: Default + Serialize + DeserializeOwned + JsonSchema {
-    /// What stands above the first section of the file that documents every key.
+    /// Comment at the head of the documented configuration file.
     const HEAD: &'static str;
-    /// What prints that file.
+    /// Command that prints the documented configuration file.
     const DOCUMENTED_BY: &'static str;
 
-    /// Every section, in the order of the file. Read once and kept: see [`read_sections`].
+    /// Returns all sections in the order of the file, cached after the first call of
+    /// [`read_sections`].
     fn sections() -> &'static [Section];
 }
 
 impl Form for Keys {
     const HEAD: &'static str = "\
-# Configuration of `sonard run`. Every key is here, with its default; in a comment if that depends
-# on how the daemon is started; a key without one stands in a comment with an example. Over the file
-# go environment variables (SONARD_PLAN_STEP_DEG=1.8), over those the options of the command line
-# (--set plan.step_deg=1.8). `sonard run --check` reads it all and says what is in force. `systemctl
-# reload` (SIGHUP) takes changes in; those of keys marked (restart) wait for the next start.
+# Configuration of `sonard run`, with every key and its default. Defaults that depend on how the
+# daemon is started are commented out, and so are examples of keys without a default. Environment
+# variables (SONARD_PLAN_STEP_DEG=1.8) override this file, and command line options (--set
+# plan.step_deg=1.8) override both. `sonard run --check` validates the configuration and prints the
+# effective values. `systemctl reload` (SIGHUP) applies changes; those of keys marked (restart) take
+# effect at the next start.
 ";
     const DOCUMENTED_BY: &'static str = "sonard run --print-config";
 
@@ -36,71 +38,71 @@ impl Form for Keys {
     }
 }
 
-/// A section of the file.
+/// Section of a configuration file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Section {
-    /// Its name.
+    /// Name of the section.
     pub name: String,
-    /// What it is about.
+    /// Description of the section.
     pub about: String,
-    /// Its keys, in the order of the file.
+    /// Keys of the section, in the order of the file.
     pub keys: Vec<Key>,
-    /// Whether any key may stand in it, with a text, a number or a switch.
+    /// `true` if the section accepts any key, with a text, number or boolean.
     pub free: bool,
 }
 
-/// Marks in the schema what [`Key::default_yields`] says.
+/// Schema attribute of defaults that the environment overrides.
 const DEFAULT_YIELDS: &str = "x-default-yields";
 
-/// A key of a section.
+/// Key of a section.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Key {
-    /// Its name, with the unit.
+    /// Name of the key, with its unit.
     pub name: String,
-    /// What it means.
+    /// Description of the key.
     pub about: String,
-    /// What may be given.
+    /// Type and range of values.
     pub kind: Kind,
-    /// What is in force when nothing is given; `None` if that is nothing.
+    /// Default value; `None` for an optional key.
     pub default: Option<Value>,
-    /// What one could give, for keys without a default.
+    /// Example value, for keys without a default.
     pub example: Option<Value>,
-    /// Whether the default gives way to something about how the program is started: a file that
-    /// shows the default must not set it.
+    /// `true` if the environment of the program (such as systemd's directories) overrides the
+    /// default. A documented file must not set such a default.
     pub default_yields: bool,
 }
 
-/// The kind of value of a key.
+/// Type and range of a key's values.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Kind {
-    /// Any finite number between two.
+    /// Finite number within a range.
     Number {
-        /// Least.
+        /// Minimum of the range, inclusive.
         min: f64,
-        /// Greatest.
+        /// Maximum of the range, inclusive.
         max: f64,
     },
-    /// A whole number between two.
+    /// Integer within a range.
     Whole {
-        /// Least.
+        /// Minimum of the range, inclusive.
         min: f64,
-        /// Greatest.
+        /// Maximum of the range, inclusive.
         max: f64,
     },
-    /// `true` or `false`.
+    /// Boolean: `true` or `false`.
     Switch,
-    /// One of some words.
+    /// Enumeration of fixed strings.
     Choice(Vec<String>),
-    /// Text.
+    /// String of any content.
     Text,
-    /// A list of texts.
+    /// List of strings.
     Texts,
-    /// Text, number or switch.
+    /// String, number or boolean.
     Any,
 }
 
 impl Kind {
-    /// What may be given, as a sentence.
+    /// Describes the allowed values in a sentence.
     #[must_use]
     pub fn wanted(&self) -> String {
         match self {
@@ -114,31 +116,31 @@ impl Kind {
         }
     }
 
-    /// A value of this kind as it stands in the file.
+    /// Formats a value as TOML.
     #[must_use]
     pub fn toml(&self, value: &Value) -> String {
         match (self, value.as_f64()) {
-            // 20.0 and not 20: the file shows that fractions are welcome.
+            // 20.0 instead of 20 indicates that fractions are allowed.
             (Self::Number { .. }, Some(number)) => format!("{number:?}"),
             _ => value.to_string(),
         }
     }
 }
 
-/// The sections of the configuration of `sonard run`.
+/// Returns the sections of the configuration of `sonard run`.
 #[must_use]
 pub fn sections() -> &'static [Section] {
     Keys::sections()
 }
 
-/// Reads a form's sections from its schema.
+/// Reads the sections of a configuration type from its schema.
 #[must_use]
 pub fn read_sections<K: Form>() -> Vec<Section> {
     let generator = SchemaSettings::default().with(|s| s.inline_subschemas = true);
     let schema = generator.into_generator().into_root_schema_for::<K>().to_value();
     let defaults = serde_json::to_string(&K::default()).unwrap_or_default();
     let section = |(name, of): (&String, &Value)| {
-        // A key's name may stand in several sections: it is looked for behind the section's.
+        // A key's name can occur in several sections, so the search begins at the section's name.
         let at = defaults.find(&format!("\"{name}\":{{")).unwrap_or(0);
         let keys = properties(of, defaults.get(at..).unwrap_or_default());
         Section {
@@ -151,7 +153,8 @@ pub fn read_sections<K: Form>() -> Vec<Section> {
     properties(&schema, &defaults).into_iter().map(section).collect()
 }
 
-/// The properties of an object in the order of declaration, which only serialized text has kept.
+/// Returns the properties of an object in the order of declaration, which only the serialized text
+/// preserves.
 fn properties<'a>(of: &'a Value, serialized: &str) -> Vec<(&'a String, &'a Value)> {
     let map = of.get("properties").and_then(Value::as_object);
     let mut properties: Vec<_> = map.into_iter().flat_map(Map::iter).collect();
@@ -177,9 +180,9 @@ fn kind(of: &Value) -> Kind {
     }
     let bound = |name, otherwise| of.get(name).and_then(Value::as_f64).unwrap_or(otherwise);
     let (min, max) = (bound("minimum", f64::MIN), bound("maximum", f64::MAX));
-    let is = |wanted: &str| match of.get("type") {
-        Some(Value::Array(types)) => types.iter().any(|kind| kind == wanted),
-        Some(kind) => kind == wanted,
+    let is = |expected: &str| match of.get("type") {
+        Some(Value::Array(types)) => types.iter().any(|kind| kind == expected),
+        Some(kind) => kind == expected,
         None => false,
     };
     match () {
@@ -191,12 +194,12 @@ fn kind(of: &Value) -> Kind {
     }
 }
 
-/// The words of an enumeration, with or without a description each.
+/// Returns the variants of an enumeration schema.
 fn choices(of: &Value) -> Vec<String> {
     let listed = of.get("enum").and_then(Value::as_array).into_iter().flatten().collect::<Vec<_>>();
     let described = of.get("oneOf").and_then(Value::as_array).into_iter().flatten();
-    let constants = described.filter_map(|one| one.get("const"));
-    // Where it may be left out, it is one of two: the words, or nothing.
+    let constants = described.filter_map(|variant| variant.get("const"));
+    // An optional enumeration is `anyOf` of its variants and null.
     let either = of.get("anyOf").and_then(Value::as_array).into_iter().flatten();
     listed
         .into_iter()
@@ -206,7 +209,7 @@ fn choices(of: &Value) -> Vec<String> {
         .collect()
 }
 
-/// A text on one line.
+/// Returns a string property with line breaks replaced by spaces.
 fn text(of: &Value, name: &str) -> String {
     of.get(name).and_then(Value::as_str).unwrap_or_default().replace('\n', " ")
 }

@@ -1,4 +1,4 @@
-//! Which daemons there are, from options, configuration and files.
+//! Addresses of the daemons of a fleet, from options, configuration and files.
 
 use std::path::{Path, PathBuf};
 
@@ -10,72 +10,74 @@ use crate::{
     config::{FleetKeys, Keys, Layers, is_robot_name},
 };
 
-/// Most daemons that are looked at together.
+/// Maximum number of daemons in a fleet.
 pub const MOST_MEMBERS: usize = 32;
 
-/// A daemon among others.
+/// Address and expected robot of a daemon.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Member {
-    /// The robot that it is to be of, if that was said.
+    /// Expected name of the robot, if configured.
     pub robot: Option<String>,
-    /// Where it is.
+    /// Address of the daemon.
     pub place: Endpoint,
-    /// File with its token.
+    /// File with the access token of the daemon.
     pub token_file: Option<PathBuf>,
 }
 
-/// A daemon and the way to ask it.
+/// Daemon of a fleet with its client.
 #[derive(Clone)]
 pub struct Asked {
-    /// Which one.
+    /// Address and expected robot.
     pub member: Member,
-    /// Asks it.
+    /// Client of the daemon.
     pub client: Client,
 }
 
-/// An error in a list of daemons.
+/// Error in a list of daemons.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[error("{message}")]
 pub struct MemberError {
-    /// What is wrong.
+    /// Error message in English.
     pub message: String,
-    /// What would be right.
+    /// Advice on how to correct the list.
     pub help: String,
 }
 
 impl Member {
-    /// Reads `[NAME=]PLACE`, where the place is `HOST:PORT`, `http://HOST:PORT`, or a socket's path.
+    /// Parses `[NAME=]PLACE`, where the place is `HOST:PORT`, `http://HOST:PORT`, or the path of a
+    /// socket.
     ///
     /// # Errors
-    /// When it is none.
+    /// Invalid name or address.
     pub fn parse(text: &str) -> Result<Self, MemberError> {
         let (robot, place) = match text.split_once('=') {
-            // A path may have one in it.
+            // A path can contain an equals sign.
             Some((robot, place)) if !text.starts_with('/') => (Some(robot), place),
             _ => (None, text),
         };
         if let Some(robot) = robot.filter(|robot| !is_robot_name(robot)) {
             return Err(MemberError {
-                message: format!("{robot:?} is no robot's name"),
-                help: "letters, digits, `-`, `_` and `.`: kiwi=10.0.0.7:8765".into(),
+                message: format!("{robot:?} is not a valid robot name"),
+                help: "expected letters, digits, `-`, `_` and `.`: kiwi=10.0.0.7:8765".into(),
             });
         }
         let place = read_endpoint(place).ok_or_else(|| MemberError {
-            message: format!("{place:?} is no place of a daemon"),
-            help: "HOST:PORT, or the path of a socket, which begins with /; a daemon speaks plain \
-                   HTTP, so ask through a tunnel where others listen in"
-                .into(),
+            message: format!("{place:?} is not a daemon's address"),
+            help:
+                "expected HOST:PORT, or the path of a socket, which begins with /; the protocol is \
+                   plain HTTP, so use a tunnel on untrusted networks"
+                    .into(),
         })?;
         Ok(Self { robot: robot.map(str::to_owned), place, token_file: None })
     }
 
-    /// One at a socket.
+    /// Daemon at a unix socket.
     #[must_use]
     pub const fn at_socket(path: PathBuf) -> Self {
         Self { robot: None, place: Endpoint::Socket(path), token_file: None }
     }
 
-    /// Where it is asked, for people.
+    /// Address for display.
     #[must_use]
     pub fn address(&self) -> String {
         match &self.place {
@@ -84,7 +86,7 @@ impl Member {
         }
     }
 
-    /// Where its page is, if that can be opened from elsewhere.
+    /// URL of the live page, if the daemon is reached over TCP.
     #[must_use]
     pub fn page(&self) -> Option<String> {
         match &self.place {
@@ -106,10 +108,10 @@ fn read_endpoint(text: &str) -> Option<Endpoint> {
     is_good.then(|| Endpoint::Address(address.to_owned()))
 }
 
-/// The daemons that a configuration names, its file's among them.
+/// Returns the daemons of a configuration, including those of its `fleet.file`.
 ///
 /// # Errors
-/// One that is none, a file that can't be read, or too many.
+/// Invalid address, unreadable file, or too many daemons.
 pub fn members_of(keys: &FleetKeys) -> Result<Vec<Member>, MemberError> {
     let mut members = Vec::new();
     for text in &keys.daemons {
@@ -126,16 +128,16 @@ pub fn members_of(keys: &FleetKeys) -> Result<Vec<Member>, MemberError> {
     check_all(members)
 }
 
-/// The file's form.
+/// Structure of a file with a list of daemons.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct File {
-    daemon: Vec<Entry>,
+struct MemberFile {
+    daemon: Vec<MemberEntry>,
 }
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Entry {
+struct MemberEntry {
     #[serde(default)]
     robot: Option<String>,
     #[serde(default)]
@@ -146,53 +148,52 @@ struct Entry {
     token_file: Option<PathBuf>,
 }
 
-/// The daemons of a file: a list of `[[daemon]]`, or a configuration whose `[fleet]` names some.
+/// Reads daemons from a file: a list of `[[daemon]]`, or a configuration with `[fleet]`.
 ///
 /// # Errors
-/// When it can't be read, is something else, or names none or too many.
+/// Unreadable or invalid file, or one with no or too many daemons.
 pub fn read_members(path: &Path) -> Result<Vec<Member>, MemberError> {
     let name = path.display();
-    let wrong = |message: String| {
-        MemberError {
+    let invalid = |message: String| MemberError {
         message: format!("{name}: {message}"),
-        help: "a [[daemon]] for each, with address = \"HOST:PORT\" or socket = \"PATH\", and as wanted \
-               robot and token_file; or a configuration with [fleet]"
+        help: "expected one [[daemon]] each, with address = \"HOST:PORT\" or socket = \"PATH\", \
+               optionally robot and token_file; or a configuration with [fleet]"
             .into(),
-    }
     };
-    let text = std::fs::read_to_string(path).map_err(|error| wrong(error.to_string()))?;
+    let text = std::fs::read_to_string(path).map_err(|error| invalid(error.to_string()))?;
     let table: toml::Table =
-        toml::from_str(&text).map_err(|error| wrong(at_line(&text, &error)))?;
+        toml::from_str(&text).map_err(|error| invalid(at_line(&text, &error)))?;
     if table.contains_key("fleet") && !table.contains_key("daemon") {
         let layers = Layers::<Keys>::new().file(&name.to_string(), &text);
-        let keys = layers.and_then(Layers::keys).map_err(|error| wrong(error.to_string()))?;
-        // A file that names itself would be read for ever.
+        let keys = layers.and_then(Layers::keys).map_err(|error| invalid(error.to_string()))?;
+        // `fleet.file` is ignored here: a file that names itself would recurse for ever.
         let members = members_of(&FleetKeys { file: None, ..keys.fleet })?;
         return if members.is_empty() {
-            Err(wrong("its fleet.daemons names none".into()))
+            Err(invalid("fleet.daemons is empty".into()))
         } else {
             Ok(members)
         };
     }
-    let file: File = toml::from_str(&text).map_err(|error| wrong(at_line(&text, &error)))?;
-    let members = file.daemon.into_iter().map(|entry| member(entry, path));
+    let file: MemberFile =
+        toml::from_str(&text).map_err(|error| invalid(at_line(&text, &error)))?;
+    let members = file.daemon.into_iter().map(|entry| convert_entry(entry, path));
     let members: Vec<_> = members.collect::<Result<_, _>>().map_err(|error: MemberError| {
         MemberError { message: format!("{name}: {}", error.message), ..error }
     })?;
     if members.is_empty() {
-        return Err(wrong("it names no daemon".into()));
+        return Err(invalid("no daemon in the list".into()));
     }
     check_all(members)
 }
 
-/// A token file stands beside the list, unless its path says otherwise.
-fn member(entry: Entry, list: &Path) -> Result<Member, MemberError> {
+/// Converts an entry of the file. A relative path of a token file is relative to the list.
+fn convert_entry(entry: MemberEntry, list: &Path) -> Result<Member, MemberError> {
     let place = match (entry.address, entry.socket) {
         (Some(address), None) if !address.starts_with('/') => address,
         (None, Some(socket)) if socket.starts_with('/') => socket,
         _ => {
             return Err(MemberError {
-                message: "a [[daemon]] is at one place".into(),
+                message: "a [[daemon]] needs exactly one address".into(),
                 help: "address = \"HOST:PORT\", or socket = \"/PATH\"".into(),
             });
         }
@@ -207,29 +208,29 @@ fn at_line(text: &str, error: &toml::de::Error) -> String {
     format!("line {}: {}", before.matches('\n').count() + 1, error.message())
 }
 
-/// Daemons that can be looked at together.
+/// Checks the number of daemons and that their addresses and names are unique.
 ///
 /// # Errors
-/// Too many, or two that are one.
+/// Too many daemons, or duplicates.
 pub fn check_all(members: Vec<Member>) -> Result<Vec<Member>, MemberError> {
     if members.len() > MOST_MEMBERS {
         return Err(MemberError {
             message: format!("{} daemons", members.len()),
-            help: format!("at most {MOST_MEMBERS} are looked at together"),
+            help: format!("the maximum is {MOST_MEMBERS}"),
         });
     }
     for (i, member) in members.iter().enumerate() {
         if members.iter().take(i).any(|before| before.place == member.place) {
             return Err(MemberError {
-                message: format!("{} is named twice", member.address()),
-                help: "name each daemon once".into(),
+                message: format!("{} is listed twice", member.address()),
+                help: "list each daemon once".into(),
             });
         }
         let is_taken = |before: &Member| before.robot.is_some() && before.robot == member.robot;
         if members.iter().take(i).any(is_taken) {
             return Err(MemberError {
-                message: format!("two daemons are of {}", member.robot.as_deref().unwrap_or("")),
-                help: "give each robot a name of its own (fleet.robot)".into(),
+                message: format!("two daemons of robot {}", member.robot.as_deref().unwrap_or("")),
+                help: "give each robot a unique name (fleet.robot)".into(),
             });
         }
     }
@@ -242,7 +243,7 @@ mod tests {
     use std::fs;
 
     #[test]
-    fn a_place_may_have_a_name_before_it() {
+    fn parses_name_and_address() {
         let parsed = |text: &str| Member::parse(text).expect(text);
         let kiwi = parsed("kiwi=http://10.0.0.7:8765/");
         assert_eq!(kiwi.robot.as_deref(), Some("kiwi"));
@@ -256,7 +257,7 @@ mod tests {
     }
 
     #[test]
-    fn a_file_lists_daemons_or_is_a_configuration_and_is_refused_with_its_place() {
+    fn reads_list_or_configuration() {
         let folder = tempfile::tempdir().expect("a folder");
         let file = folder.path().join("fleet.toml");
         let read = |text: &str| {
@@ -267,24 +268,24 @@ mod tests {
             "[[daemon]]\nrobot = \"kiwi\"\naddress = \"h:1\"\ntoken_file = \"kiwi.token\"\n\
              [[daemon]]\nsocket = \"/run/s\"\n",
         );
-        let members = members.expect("it is right");
+        let members = members.expect("valid");
         assert_eq!(members[0].token_file.as_deref(), Some(&*folder.path().join("kiwi.token")));
         assert_eq!(members[1].place, Endpoint::Socket("/run/s".into()));
         let members = read("[fleet]\ndaemons = [\"a=h:1\", \"/s\"]\ntoken_file = \"/t\"\n");
-        let members = members.expect("it is right");
+        let members = members.expect("valid");
         assert_eq!(members[0].token_file.as_deref(), Some(Path::new("/t")));
         assert_eq!(members[1].token_file, None, "a socket needs none");
         for (text, part) in [
             ("[[daemon]]\naddress = 3\n", "line 2"),
             ("[[daemon]]\nport = \"h:1\"\n", "line 2"),
-            ("[[daemon]]\nrobot = \"a\"\n", "at one place"),
+            ("[[daemon]]\nrobot = \"a\"\n", "exactly one address"),
             ("daemon = []\n", "no daemon"),
-            ("[fleet]\n", "names none"),
+            ("[fleet]\n", "is empty"),
             ("[[daemon]]\naddress = \"h:1\"\n[[daemon]]\naddress = \"h:1\"\n", "twice"),
             (
                 "[[daemon]]\nrobot = \"a\"\naddress = \"h:1\"\n\
                  [[daemon]]\nrobot = \"a\"\naddress = \"h:2\"\n",
-                "two daemons are of a",
+                "two daemons of robot a",
             ),
             ("{", "line 1"),
         ] {

@@ -1,4 +1,4 @@
-//! One task that owns what is known of a fleet, and one for each robot that asks it.
+//! Task that owns the fleet's registry, and one polling task for each robot.
 
 use std::{sync::Arc, time::Duration};
 
@@ -15,20 +15,21 @@ use uuid::Uuid;
 use super::{Asked, Roll, Told, Unheard, ask, picture};
 use crate::{api::FleetPicture, client::Client};
 
-/// From question to question.
-const EVERY: Duration = Duration::from_secs(2);
-/// All pictures together, bytes of JSON: as many clients as there may be stay within the server's bound.
-const MOST_PICTURE_BYTES: usize = 64 * 1024;
-/// How often a scan is asked for that can't be had.
-const MOST_TRIES: u8 = 3;
+/// Poll interval.
+const POLL_INTERVAL: Duration = Duration::from_secs(2);
+/// Maximum JSON size of all pictures together, bytes. With it, the responses to the maximum number
+/// of clients stay within the server's memory limit.
+const MAX_PICTURE_BYTES: usize = 64 * 1024;
+/// Maximum number of attempts to fetch a scan.
+const MAX_TRIES: u8 = 3;
 
-/// What comes of asking.
-enum News {
-    Answer(Box<Result<Told, Unheard>>),
+/// Message of a polling task.
+enum PollMessage {
+    Report(Box<Result<Told, Unheard>>),
     Picture(Uuid, Option<FleetPicture>),
 }
 
-/// A scan whose picture is wanted.
+/// Pending or failed request for a picture.
 #[derive(Debug, Clone, Copy, Default)]
 struct PictureRequest {
     scan: Option<Uuid>,
@@ -36,75 +37,75 @@ struct PictureRequest {
     is_pending: bool,
 }
 
-/// Asks daemons every 2 s, for as long as somebody holds what is told: a [`Fleet`](crate::api::Fleet) as
-/// JSON, the same bytes for all. Must be called within a tokio runtime.
+/// Polls daemons every 2 s while a receiver of the result exists: a [`Fleet`](crate::api::Fleet) as
+/// JSON, serialized once for all receivers. Must be called within a tokio runtime.
 #[must_use]
 pub fn watch(fleet: Vec<Asked>, supervisor: &Supervisor) -> watch::Receiver<Bytes> {
-    let roll = Roll::new(fleet.iter().map(|one| &one.member), Timestamp::now());
-    let (tell, told) = watch::channel(written(&roll, Duration::ZERO));
-    drop(supervisor.spawn_finite(Task::Fleet, keep(roll, fleet, tell)));
-    told
+    let registry = Roll::new(fleet.iter().map(|daemon| &daemon.member), Timestamp::now());
+    let (sender, receiver) = watch::channel(serialize(&registry, Duration::ZERO));
+    drop(supervisor.spawn_finite(Task::Fleet, run(registry, fleet, sender)));
+    receiver
 }
 
-/// Owns the roll until nobody looks at it any more.
-async fn keep(mut roll: Roll, fleet: Vec<Asked>, tell: watch::Sender<Bytes>) {
+/// Updates and publishes the registry until all receivers are dropped.
+async fn run(mut registry: Roll, fleet: Vec<Asked>, sender: watch::Sender<Bytes>) {
     let began = Instant::now();
-    let (send, mut news) = mpsc::channel(fleet.len().max(1));
-    // Those that ask end with this task.
-    let mut asking = JoinSet::new();
-    let clients: Vec<Client> = fleet.into_iter().map(|one| one.client).collect();
+    let (send, mut messages) = mpsc::channel(fleet.len().max(1));
+    // The polling tasks end with this task.
+    let mut polling = JoinSet::new();
+    let clients: Vec<Client> = fleet.into_iter().map(|daemon| daemon.client).collect();
     for (number, client) in clients.iter().enumerate() {
-        asking.spawn(keep_asking(number, client.clone(), send.clone()));
+        polling.spawn(poll_forever(number, client.clone(), send.clone()));
     }
-    // Scans are large: one is read at a time.
-    let drawing = Arc::new(Semaphore::new(1));
-    let most_bytes = MOST_PICTURE_BYTES / clients.len().max(1);
+    // Scans are large, so only one is fetched at a time.
+    let fetching = Arc::new(Semaphore::new(1));
+    let max_bytes = MAX_PICTURE_BYTES / clients.len().max(1);
     let mut requests = vec![PictureRequest::default(); clients.len()];
     loop {
-        let (number, news) = tokio::select! {
-            Some(news) = news.recv() => news,
-            () = tell.closed() => return,
+        let (number, message) = tokio::select! {
+            Some(message) = messages.recv() => message,
+            () = sender.closed() => return,
         };
-        // Each daemon reports under the number that it was spawned with.
+        // Each polling task sends the number that it was spawned with.
         let Some((request, client)) = requests.get_mut(number).zip(clients.get(number)) else {
             continue;
         };
-        match news {
-            News::Answer(answer) => {
-                roll.take(number, *answer, (Timestamp::now(), began.elapsed()));
+        match message {
+            PollMessage::Report(report) => {
+                registry.take(number, *report, (Timestamp::now(), began.elapsed()));
             }
-            News::Picture(scan, picture) => {
+            PollMessage::Picture(scan, picture) => {
                 request.is_pending = false;
-                picture.into_iter().for_each(|picture| roll.show(number, scan, picture));
+                picture.into_iter().for_each(|picture| registry.show(number, scan, picture));
             }
         }
-        if let Some(scan) = request.next(roll.lacks_picture(number)) {
+        if let Some(scan) = request.next(registry.lacks_picture(number)) {
             let (client, send) = (client.clone(), send.clone());
-            let turn = Arc::clone(&drawing);
-            asking.spawn(async move {
-                let Ok(_turn) = turn.acquire().await else { return };
-                let picture = picture::fetch(&client, scan, most_bytes).await;
-                drop(send.send((number, News::Picture(scan, picture))).await);
+            let permits = Arc::clone(&fetching);
+            polling.spawn(async move {
+                let Ok(_permit) = permits.acquire().await else { return };
+                let picture = picture::fetch(&client, scan, max_bytes).await;
+                drop(send.send((number, PollMessage::Picture(scan, picture))).await);
             });
         }
-        while asking.try_join_next().is_some() {}
-        let now = written(&roll, began.elapsed());
-        tell.send_if_modified(|before| {
-            let is_news = *before != now;
-            *before = now;
-            is_news
+        while polling.try_join_next().is_some() {}
+        let current = serialize(&registry, began.elapsed());
+        sender.send_if_modified(|before| {
+            let is_changed = *before != current;
+            *before = current;
+            is_changed
         });
     }
 }
 
 impl PictureRequest {
-    /// The scan to ask for now, if one is lacking that may be had.
+    /// Returns the scan to fetch now, if a picture is missing and attempts are left.
     fn next(&mut self, lacking: Option<Uuid>) -> Option<Uuid> {
         let scan = lacking.filter(|_| !self.is_pending)?;
         if self.scan != Some(scan) {
             *self = Self { scan: Some(scan), ..Self::default() };
         }
-        if self.tries == MOST_TRIES {
+        if self.tries == MAX_TRIES {
             return None;
         }
         self.tries += 1;
@@ -113,20 +114,20 @@ impl PictureRequest {
     }
 }
 
-async fn keep_asking(number: usize, client: Client, send: mpsc::Sender<(usize, News)>) {
-    let mut turns = interval(EVERY);
-    turns.set_missed_tick_behavior(MissedTickBehavior::Delay);
+async fn poll_forever(number: usize, client: Client, send: mpsc::Sender<(usize, PollMessage)>) {
+    let mut ticks = interval(POLL_INTERVAL);
+    ticks.set_missed_tick_behavior(MissedTickBehavior::Delay);
     loop {
-        turns.tick().await;
-        let answer = Box::new(ask(&client).await);
-        if send.send((number, News::Answer(answer))).await.is_err() {
+        ticks.tick().await;
+        let report = Box::new(ask(&client).await);
+        if send.send((number, PollMessage::Report(report))).await.is_err() {
             return;
         }
     }
 }
 
-fn written(roll: &Roll, at: Duration) -> Bytes {
-    serde_json::to_vec(&roll.fleet(at)).unwrap_or_default().into()
+fn serialize(registry: &Roll, at: Duration) -> Bytes {
+    serde_json::to_vec(&registry.fleet(at)).unwrap_or_default().into()
 }
 
 #[cfg(test)]
@@ -134,13 +135,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_scan_is_asked_for_once_at_a_time_and_not_for_ever() {
+    fn picture_requests_are_limited() {
         let (scan, next) = (Uuid::from_u128(1), Uuid::from_u128(2));
         let mut request = PictureRequest::default();
         assert_eq!(request.next(None), None);
-        for _ in 0..MOST_TRIES {
+        for _ in 0..MAX_TRIES {
             assert_eq!(request.next(Some(scan)), Some(scan));
-            assert_eq!(request.next(Some(next)), None, "one is on its way");
+            assert_eq!(request.next(Some(next)), None, "a request is pending");
             request.is_pending = false;
         }
         assert_eq!(request.next(Some(scan)), None);

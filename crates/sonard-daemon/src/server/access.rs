@@ -1,8 +1,9 @@
-//! Who may ask for what. Pure: it sees the headers and says yes or no.
+//! Access control of requests by connection, method, path and headers. Pure.
 //!
-//! On the unix socket the file's permissions decide. Over TCP any program on the computer, and
-//! any page in a browser on it, could knock: a page gives itself away by `Host` (a name made to
-//! point here), `Origin` or `Sec-Fetch-Site`, and writing needs a token that no page knows.
+//! On the unix socket the permissions of its file decide. A TCP port is reachable for any program
+//! on the computer and for any web page in a browser on it. Requests of foreign pages are
+//! recognized by `Host` (DNS rebinding), `Origin` or `Sec-Fetch-Site`, and writes need a token that
+//! no page has.
 
 use std::net::IpAddr;
 
@@ -18,51 +19,51 @@ use sha2::{Digest as _, Sha256};
 
 use super::routes::{FOXGLOVE, is_public};
 
-/// The way in which a client connected.
+/// Kind of connection of a client.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Peer {
-    /// By the unix socket.
+    /// Connection over the unix socket.
     Unix,
-    /// By TCP on a loopback address.
+    /// Connection over TCP to a loopback address.
     Loopback,
-    /// By TCP on another address.
+    /// Connection over TCP to any other address.
     Network,
 }
 
-/// On what ground a request is let in. Each has requests a second of its own, so that none takes
-/// them from another.
+/// Authorization of an accepted request. Each kind has a request rate limit of its own, so that
+/// none can exhaust another's.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Standing {
-    /// It came by the unix socket, whose permissions say who may.
+pub enum Principal {
+    /// Client of the unix socket, authorized by the permissions of its file.
     Socket,
-    /// It shows the token.
+    /// Client with a valid token.
     Token,
-    /// It only reads, from this computer, or asks for what everybody may see.
+    /// Client without a token: reads from this computer, or public paths.
     Guest,
 }
 
-/// The reason why a request is refused.
+/// Rejection of a request.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Refused {
-    /// Status of the answer.
+pub struct AccessDenied {
+    /// HTTP status of the response.
     pub status: StatusCode,
-    /// What is wrong.
+    /// Error message.
     pub message: String,
-    /// What would be right.
+    /// Advice on how to correct the request.
     pub help: &'static str,
 }
 
-/// The rules.
+/// Access rules of the server.
 #[derive(Debug, Clone, Default)]
 pub struct Access {
     hosts: Vec<String>,
-    /// Origins of pages that may ask for live messages for viewers.
+    /// Web origins that may open the viewer WebSocket.
     viewers: Vec<String>,
     token: Option<[u8; 32]>,
 }
 
 impl Access {
-    /// Rules that accept these host names besides those of loopback, and this token.
+    /// Creates rules that accept `hosts` in addition to the loopback names, and `token`.
     #[must_use]
     pub fn new(hosts: &[String], token: Option<&str>) -> Self {
         Self {
@@ -72,7 +73,7 @@ impl Access {
         }
     }
 
-    /// Accepts the address that the server listens on as a host, too.
+    /// Adds the address that the server listens on to the accepted hosts.
     #[must_use]
     pub fn with_address(mut self, address: IpAddr) -> Self {
         if !address.is_unspecified() {
@@ -84,109 +85,110 @@ impl Access {
         self
     }
 
-    /// Lets pages of these origins, as browsers name them, ask for live messages, which need a page from elsewhere.
+    /// Adds web origins, as sent by browsers, whose pages may open the viewer WebSocket. Web
+    /// viewers are pages of other sites.
     #[must_use]
     pub fn with_viewers(mut self, origins: &[String]) -> Self {
         self.viewers.extend(origins.iter().map(|origin| origin.to_ascii_lowercase()));
         self
     }
 
-    /// On what ground a request may go on.
+    /// Authorizes a request.
     ///
     /// # Errors
-    /// Why not.
+    /// Status and reason of the rejection.
     pub fn check(
         &self,
         peer: Peer,
         method: &Method,
         uri: &Uri,
         headers: &HeaderMap,
-    ) -> Result<Standing, Refused> {
+    ) -> Result<Principal, AccessDenied> {
         self.check_origin(uri, headers)?;
         if peer == Peer::Unix {
-            return Ok(Standing::Socket);
+            return Ok(Principal::Socket);
         }
         self.check_host(uri, headers)?;
-        if self.shows_token(uri, headers) {
-            return Ok(Standing::Token);
+        if self.has_token(uri, headers) {
+            return Ok(Principal::Token);
         }
         let reads = matches!(*method, Method::GET | Method::HEAD | Method::OPTIONS);
-        // A browser can't show a token before the page is there that asks for it.
+        // A browser has no token before it has loaded the page that prompts for it.
         if reads && (peer == Peer::Loopback || is_public(uri.path())) {
-            return Ok(Standing::Guest);
+            return Ok(Principal::Guest);
         }
-        Err(self.lacks_token())
+        Err(self.token_error())
     }
 
-    fn check_origin(&self, uri: &Uri, headers: &HeaderMap) -> Result<(), Refused> {
+    fn check_origin(&self, uri: &Uri, headers: &HeaderMap) -> Result<(), AccessDenied> {
         let Some(origin) = headers.get(ORIGIN) else { return check_site(uri, headers) };
         let host = origin
             .to_str()
             .ok()
             .and_then(|origin| origin.strip_prefix("http://").or(origin.strip_prefix("https://")));
-        if host.is_some_and(|host| self.knows(host)) {
+        if host.is_some_and(|host| self.is_own_host(host)) {
             return Ok(());
         }
         let is_for_viewers = uri.path() == FOXGLOVE;
         if is_for_viewers && self.viewers.iter().any(|viewer| origin == viewer.as_str()) {
             return Ok(());
         }
-        Err(Refused {
+        Err(AccessDenied {
             status: StatusCode::FORBIDDEN,
-            message: format!("pages of {origin:?} may not ask here"),
+            message: format!("origin {origin:?} is not allowed"),
             help: match is_for_viewers {
-                true => "name the origin in foxglove.origins",
-                false => "open the page from this server itself, or name its host in server.hosts",
+                true => "add the origin to foxglove.origins",
+                false => "open the page from this server itself, or add its host to server.hosts",
             },
         })
     }
 
-    fn check_host(&self, uri: &Uri, headers: &HeaderMap) -> Result<(), Refused> {
+    fn check_host(&self, uri: &Uri, headers: &HeaderMap) -> Result<(), AccessDenied> {
         let mut hosts = headers.get_all(HOST).iter();
         let (first, second) = (hosts.next(), hosts.next());
         let named = first.and_then(|host| host.to_str().ok()).filter(|_| second.is_none());
-        let in_uri = uri.authority().is_none_or(|authority| self.knows(authority.as_str()));
-        if named.is_some_and(|host| self.knows(host)) && in_uri {
+        let in_uri = uri.authority().is_none_or(|authority| self.is_own_host(authority.as_str()));
+        if named.is_some_and(|host| self.is_own_host(host)) && in_uri {
             return Ok(());
         }
-        Err(Refused {
+        Err(AccessDenied {
             status: StatusCode::FORBIDDEN,
-            message: format!("there is no {} here", named.unwrap_or("host of that name")),
-            help: "ask for localhost, or name the host in server.hosts",
+            message: format!("host {} is not allowed", named.unwrap_or("(missing or invalid)")),
+            help: "use localhost, or add the host to server.hosts",
         })
     }
 
-    fn shows_token(&self, uri: &Uri, headers: &HeaderMap) -> bool {
+    fn has_token(&self, uri: &Uri, headers: &HeaderMap) -> bool {
         let in_header = headers
             .get(AUTHORIZATION)
             .and_then(|value| value.to_str().ok())
             .and_then(|value| value.split_once(' '))
             .filter(|(scheme, _)| scheme.eq_ignore_ascii_case("bearer"))
-            .map(|(_, shown)| shown.to_owned());
-        let shown = in_header.or_else(|| token_in_query(uri));
-        // Digests are compared, so that the time says nothing about the token.
-        shown.is_some_and(|shown| self.token == Some(digest(shown.trim())))
+            .map(|(_, token)| token.to_owned());
+        let token = in_header.or_else(|| token_in_query(uri));
+        // Comparing digests avoids a timing side channel.
+        token.is_some_and(|token| self.token == Some(digest(token.trim())))
     }
 
-    fn lacks_token(&self) -> Refused {
+    fn token_error(&self) -> AccessDenied {
         if self.token.is_none() {
-            return Refused {
+            return AccessDenied {
                 status: StatusCode::FORBIDDEN,
-                message: "nothing may be changed over TCP: there is no token".into(),
+                message: "read only: no access token is configured (server.token_file)".into(),
                 help: "use the unix socket, or set server.token_file",
             };
         }
-        Refused {
+        AccessDenied {
             status: StatusCode::UNAUTHORIZED,
             message: "the token is missing or wrong".into(),
-            help: "send `Authorization: Bearer TOKEN` with what is in server.token_file",
+            help: "send `Authorization: Bearer TOKEN` with the contents of server.token_file",
         }
     }
 
-    /// Whether a host, with or without a port, is one of this server's names.
-    fn knows(&self, host: &str) -> bool {
+    /// Returns `true` if a host, with or without a port, is one of this server's names.
+    fn is_own_host(&self, host: &str) -> bool {
         let name = match host.rsplit_once(':') {
-            // The colons of an IPv6 address stand in brackets.
+            // The colons of an IPv6 address are within brackets.
             Some((name, port)) if port.chars().all(|digit| digit.is_ascii_digit()) => name,
             _ => host,
         };
@@ -195,27 +197,27 @@ impl Access {
     }
 }
 
-/// A browser can't send a header with the request for a WebSocket: for those the token may stand in the query.
+/// Returns the token from the query of a WebSocket request, for which browsers can't set headers.
 fn token_in_query(uri: &Uri) -> Option<String> {
     #[derive(Deserialize)]
-    struct Shown {
+    struct TokenQuery {
         token: String,
     }
-    let shown = (uri.path() == FOXGLOVE).then(|| Query::<Shown>::try_from_uri(uri))?;
-    shown.ok().map(|Query(shown)| shown.token)
+    let query = (uri.path() == FOXGLOVE).then(|| Query::<TokenQuery>::try_from_uri(uri))?;
+    query.ok().map(|Query(query)| query.token)
 }
 
-/// Images and scripts of a page are asked for without `Origin`, but browsers say that they belong to
-/// a page from elsewhere. A link to the live page may be followed from anywhere.
-fn check_site(uri: &Uri, headers: &HeaderMap) -> Result<(), Refused> {
-    let says = |name: &str, word: &str| headers.get(name).is_some_and(|value| value == word);
-    let follows_link = says("sec-fetch-mode", "navigate") && is_public(uri.path());
-    if !says("sec-fetch-site", "cross-site") || follows_link {
+/// Rejects cross-site requests for images and scripts, which browsers send without `Origin` but
+/// mark by `Sec-Fetch-Site`. Links to the live page may be followed from any site.
+fn check_site(uri: &Uri, headers: &HeaderMap) -> Result<(), AccessDenied> {
+    let has = |name: &str, value: &str| headers.get(name).is_some_and(|found| found == value);
+    let follows_link = has("sec-fetch-mode", "navigate") && is_public(uri.path());
+    if !has("sec-fetch-site", "cross-site") || follows_link {
         return Ok(());
     }
-    Err(Refused {
+    Err(AccessDenied {
         status: StatusCode::FORBIDDEN,
-        message: "pages from elsewhere may not ask here".into(),
+        message: "cross-site requests are not allowed".into(),
         help: "open the page from this server itself",
     })
 }
@@ -229,16 +231,16 @@ mod tests {
     use super::*;
     use axum::http::HeaderValue;
 
-    fn ask(
+    fn check(
         access: &Access,
         peer: Peer,
         method: &Method,
         headers: &[(&'static str, &str)],
     ) -> Result<(), u16> {
-        ask_for("/v1/status", access, peer, method, headers)
+        check_path("/v1/status", access, peer, method, headers)
     }
 
-    fn ask_for(
+    fn check_path(
         path: &str,
         access: &Access,
         peer: Peer,
@@ -250,27 +252,27 @@ mod tests {
             map.append(*name, HeaderValue::from_str(value).expect("a header"));
         }
         let uri = path.parse().expect("a path");
-        access.check(peer, method, &uri, &map).map(drop).map_err(|refused| refused.status.as_u16())
+        access.check(peer, method, &uri, &map).map(drop).map_err(|denied| denied.status.as_u16())
     }
 
     #[test]
-    fn each_request_stands_on_its_own_ground() {
+    fn principals() {
         let access = Access::new(&[], Some("secret"));
-        let ask = |peer, token: &str| {
+        let check = |peer, token: &str| {
             let mut headers = HeaderMap::new();
             headers.insert(HOST, HeaderValue::from_static("localhost"));
             headers.insert(AUTHORIZATION, HeaderValue::from_str(token).expect("a header"));
             access.check(peer, &Method::GET, &Uri::from_static("/v1/status"), &headers)
         };
-        assert_eq!(ask(Peer::Unix, "Bearer secret"), Ok(Standing::Socket));
-        assert_eq!(ask(Peer::Loopback, "bEARER  secret"), Ok(Standing::Token));
-        assert_eq!(ask(Peer::Network, "bearer secret"), Ok(Standing::Token));
-        assert_eq!(ask(Peer::Loopback, "Bearer wrong"), Ok(Standing::Guest));
-        assert_eq!(ask(Peer::Loopback, "Basic secret"), Ok(Standing::Guest));
+        assert_eq!(check(Peer::Unix, "Bearer secret"), Ok(Principal::Socket));
+        assert_eq!(check(Peer::Loopback, "bEARER  secret"), Ok(Principal::Token));
+        assert_eq!(check(Peer::Network, "bearer secret"), Ok(Principal::Token));
+        assert_eq!(check(Peer::Loopback, "Bearer wrong"), Ok(Principal::Guest));
+        assert_eq!(check(Peer::Loopback, "Basic secret"), Ok(Principal::Guest));
     }
 
     #[test]
-    fn images_of_foreign_pages_are_refused_and_links_to_the_page_followed() {
+    fn cross_site_requests() {
         let (access, host) = (Access::default(), ("host", "localhost:8765"));
         let foreign = ("sec-fetch-site", "cross-site");
         let navigates = ("sec-fetch-mode", "navigate");
@@ -282,13 +284,13 @@ mod tests {
             ("/v1/status", vec![host, ("sec-fetch-site", "same-origin")], Ok(())),
             ("/v1/status", vec![host, ("sec-fetch-site", "none"), navigates], Ok(())),
         ] {
-            let answer = ask_for(path, &access, Peer::Loopback, &Method::GET, &headers);
-            assert_eq!(answer, expected, "{path} {headers:?}");
+            let result = check_path(path, &access, Peer::Loopback, &Method::GET, &headers);
+            assert_eq!(result, expected, "{path} {headers:?}");
         }
     }
 
     #[test]
-    fn foreign_hosts_and_origins_are_refused_and_writing_needs_the_token() {
+    fn hosts_origins_and_tokens() {
         let access = Access::new(&["robot.local".into()], Some("secret\n"));
         let (get, put) = (Method::GET, Method::PUT);
         let host = ("host", "localhost:8765");
@@ -313,19 +315,19 @@ mod tests {
             (&put, vec![host, ("authorization", "bearer secret")], Ok(())),
             (&put, vec![host, token, ("origin", "http://evil.example")], Err(403)),
         ] {
-            assert_eq!(ask(&access, Peer::Loopback, method, &headers), expected, "{headers:?}");
+            assert_eq!(check(&access, Peer::Loopback, method, &headers), expected, "{headers:?}");
         }
     }
 
     #[test]
-    fn from_the_network_even_reading_needs_the_token() {
+    fn network_reads_need_the_token() {
         let access = Access::new(&[], Some("secret"))
             .with_address("192.168.1.5".parse().expect("an address"));
         let host = ("host", "192.168.1.5:8765");
-        assert_eq!(ask(&access, Peer::Network, &Method::GET, &[host]), Err(401));
+        assert_eq!(check(&access, Peer::Network, &Method::GET, &[host]), Err(401));
         let token = ("authorization", "Bearer secret");
-        assert_eq!(ask(&access, Peer::Network, &Method::GET, &[host, token]), Ok(()));
-        // The page itself, which asks for the token, holds nothing to hide.
+        assert_eq!(check(&access, Peer::Network, &Method::GET, &[host, token]), Ok(()));
+        // The page itself, which prompts for the token, is public.
         for (path, headers, expected) in [
             ("/", &[host][..], Ok(())),
             ("/page/main.js", &[host], Ok(())),
@@ -336,14 +338,14 @@ mod tests {
             ("/pages", &[host], Err(401)),
             ("/v1/scans", &[host], Err(401)),
         ] {
-            let answer = ask_for(path, &access, Peer::Network, &Method::GET, headers);
-            assert_eq!(answer, expected, "{path}");
+            let result = check_path(path, &access, Peer::Network, &Method::GET, headers);
+            assert_eq!(result, expected, "{path}");
         }
-        assert_eq!(ask_for("/", &access, Peer::Network, &Method::POST, &[host]), Err(401));
+        assert_eq!(check_path("/", &access, Peer::Network, &Method::POST, &[host]), Err(401));
     }
 
     #[test]
-    fn viewers_may_come_from_elsewhere_and_show_the_token_in_the_query_but_on_their_route_alone() {
+    fn viewer_origin_and_query_token() {
         let viewer = "https://app.foxglove.dev";
         let access = Access::new(&[], Some("se+cret"))
             .with_viewers(&[viewer.to_owned()])
@@ -364,28 +366,28 @@ mod tests {
             ("/v1/status?token=se%2Bcret", &[host], Err(401)),
             ("/v1/status?token=se%2Bcret", &[host, from], Err(403)),
         ] {
-            let answer = ask_for(path, &access, Peer::Network, &Method::GET, headers);
-            assert_eq!(answer, expected, "{path} {headers:?}");
+            let result = check_path(path, &access, Peer::Network, &Method::GET, headers);
+            assert_eq!(result, expected, "{path} {headers:?}");
         }
         let unset = Access::default();
-        let refused = ask_for(
+        let result = check_path(
             "/foxglove/",
             &unset,
             Peer::Loopback,
             &Method::GET,
             &[("host", "localhost"), from],
         );
-        assert_eq!(refused, Err(403));
+        assert_eq!(result, Err(403));
     }
 
     #[test]
-    fn without_a_token_nothing_is_written_over_tcp_and_anything_over_the_socket() {
+    fn no_token_configured() {
         let access = Access::default();
         let headers = [("host", "localhost")];
-        assert_eq!(ask(&access, Peer::Loopback, &Method::POST, &headers), Err(403));
-        assert_eq!(ask(&access, Peer::Unix, &Method::POST, &headers), Ok(()));
-        assert_eq!(ask(&access, Peer::Unix, &Method::POST, &[]), Ok(()));
+        assert_eq!(check(&access, Peer::Loopback, &Method::POST, &headers), Err(403));
+        assert_eq!(check(&access, Peer::Unix, &Method::POST, &headers), Ok(()));
+        assert_eq!(check(&access, Peer::Unix, &Method::POST, &[]), Ok(()));
         let foreign = [("origin", "http://evil.example")];
-        assert_eq!(ask(&access, Peer::Unix, &Method::GET, &foreign), Err(403));
+        assert_eq!(check(&access, Peer::Unix, &Method::GET, &foreign), Err(403));
     }
 }

@@ -1,4 +1,4 @@
-//! Connections: taken in up to a bound, each with its own limits, ended in order.
+//! Accepts connections up to a limit, serves them with timeouts, and shuts them down.
 
 use std::{
     error::Error as _, future::Future, io, net::IpAddr, pin::pin, sync::Arc, time::Duration,
@@ -18,17 +18,17 @@ use tokio_io_timeout::TimeoutStream;
 use tokio_util::sync::CancellationToken;
 use tower::ServiceExt as _;
 
-use super::{Listeners, Peer, Server, plain::Worded, slots::Slot};
+use super::{Listeners, Peer, Server, error_body::ErrorBodyStream, limits::ConnectionSlot};
 
-/// How long the head of a request may take.
-const HEAD_TIME: Duration = Duration::from_secs(5);
-/// How long clients have to take in what is left at the end.
-const LAST_CALL: Duration = Duration::from_secs(2);
-/// What is kept of a connection in memory, bytes: heads, and answers not yet taken.
-const BUFFER: usize = 32 * 1024;
+/// Time limit for the head of a request.
+const HEAD_TIMEOUT: Duration = Duration::from_secs(5);
+/// Time for clients to read pending data at shutdown.
+const DRAIN_TIMEOUT: Duration = Duration::from_secs(2);
+/// Buffer size of a connection, bytes: request heads and unread responses.
+const BUFFER_BYTES: usize = 32 * 1024;
 
 impl Server {
-    /// Serves until `stop` is ready, then lets requests under way end.
+    /// Serves until `stop` completes, then lets pending requests finish.
     pub async fn run(self, listeners: Listeners, stop: impl Future<Output = ()>) {
         let shutdown = CancellationToken::new();
         let foxglove = self.foxglove.clone();
@@ -36,15 +36,16 @@ impl Server {
         let server = Arc::new(self);
         let mut accepting = Vec::new();
         let Listeners { unix, tcp, keeper } = listeners;
-        for kept in unix {
+        for listener in unix {
             let server = Arc::clone(&server);
             let accept =
-                server.accept(Peer::Unix, shutdown.clone(), async move || kept.accept().await);
+                server.accept(Peer::Unix, shutdown.clone(), async move || listener.accept().await);
             accepting.push(supervisor.spawn(Task::Server, accept));
         }
-        for (kept, peer) in tcp {
+        for (listener, peer) in tcp {
             let server = Arc::clone(&server);
-            let accept = server.accept(peer, shutdown.clone(), async move || kept.accept().await);
+            let accept =
+                server.accept(peer, shutdown.clone(), async move || listener.accept().await);
             accepting.push(supervisor.spawn(Task::Server, accept));
         }
         let keeping = keeper.run(server.daemon.clone(), shutdown.clone());
@@ -55,11 +56,11 @@ impl Server {
             drop(accept.await);
         }
         if let Some(viewers) = foxglove {
-            drop(timeout(LAST_CALL, viewers.is_empty()).await);
+            drop(timeout(DRAIN_TIMEOUT, viewers.is_empty()).await);
         }
     }
 
-    /// Takes connections in until the end, and waits for them then.
+    /// Accepts connections until shutdown, then waits for them to end.
     async fn accept<S: AsyncRead + AsyncWrite + Send + 'static>(
         self: Arc<Self>,
         peer: Peer,
@@ -68,48 +69,51 @@ impl Server {
     ) {
         let mut connections = JoinSet::new();
         loop {
-            let came = tokio::select! {
+            let accepted = tokio::select! {
                 () = shutdown.cancelled() => break,
                 Some(_) = connections.join_next(), if !connections.is_empty() => continue,
-                came = next() => came,
+                accepted = next() => accepted,
             };
-            let Ok((stream, address)) = came else {
-                // No descriptors left: some will be given back.
+            let Ok((stream, address)) = accepted else {
+                // Out of file descriptors: retry once others are closed.
                 sleep(Duration::from_millis(100)).await;
                 continue;
             };
-            if let Some(place) = self.places.take(peer, address) {
+            if let Some(slot) = self.slots.take(peer, address) {
                 let server = Arc::clone(&self);
-                connections.spawn(server.serve(peer, stream, place, shutdown.clone()));
-            } else if let Ok(place) = Arc::clone(&self.doorstep).try_acquire_owned() {
-                connections.spawn(turn_away(stream, place));
+                connections.spawn(server.serve(peer, stream, slot, shutdown.clone()));
+            } else if let Ok(permit) = Arc::clone(&self.rejecting_slots).try_acquire_owned() {
+                connections.spawn(reject_over_limit(stream, permit));
             }
         }
-        drop(timeout(LAST_CALL, async { while connections.join_next().await.is_some() {} }).await);
+        drop(
+            timeout(DRAIN_TIMEOUT, async { while connections.join_next().await.is_some() {} })
+                .await,
+        );
     }
 
     async fn serve<S: AsyncRead + AsyncWrite + Send + 'static>(
         self: Arc<Self>,
         peer: Peer,
         stream: S,
-        place: Slot,
+        slot: ConnectionSlot,
         shutdown: CancellationToken,
     ) {
-        // What is made of the connection later keeps its place.
-        let place = Arc::new(place);
+        // An upgraded connection keeps the slot.
+        let slot = Arc::new(slot);
         let mut stream = TimeoutStream::new(stream);
         stream.set_write_timeout(Some(self.stall));
         let service = service_fn(|mut request: Request<Incoming>| {
             request.extensions_mut().insert(peer);
-            request.extensions_mut().insert(Arc::clone(&place));
+            request.extensions_mut().insert(Arc::clone(&slot));
             let router = self.router.clone();
             router.oneshot(request)
         });
         let connection = http1::Builder::new()
             .timer(TokioTimer::new())
-            .header_read_timeout(HEAD_TIME)
-            .max_buf_size(BUFFER)
-            .serve_connection(TokioIo::new(Worded::new(Box::pin(stream))), service)
+            .header_read_timeout(HEAD_TIMEOUT)
+            .max_buf_size(BUFFER_BYTES)
+            .serve_connection(TokioIo::new(ErrorBodyStream::new(Box::pin(stream))), service)
             .with_upgrades();
         let mut connection = pin!(connection);
         let ended = tokio::select! {
@@ -120,18 +124,18 @@ impl Server {
             }
         };
         if let Err(error) = ended
-            && took_nothing(&error)
+            && is_write_timeout(&error)
         {
             self.daemon.hub().count_cut_off();
         }
     }
 }
 
-/// Says that all places are taken.
-async fn turn_away<S: AsyncRead + AsyncWrite>(stream: S, _place: OwnedSemaphorePermit) {
+/// Responds 503 on a connection over the limit.
+async fn reject_over_limit<S: AsyncRead + AsyncWrite>(stream: S, _permit: OwnedSemaphorePermit) {
     const BODY: &str =
         "{\"error\":\"too many clients\",\"help\":\"try later, or raise server.max_clients\"}\n";
-    let answer = format!(
+    let response = format!(
         "HTTP/1.1 503 Service Unavailable\r\nContent-Type: application/json\r\n\
          X-Content-Type-Options: nosniff\r\nCache-Control: no-store\r\n\
          Cross-Origin-Resource-Policy: same-origin\r\nConnection: close\r\nRetry-After: 5\r\n\
@@ -139,12 +143,12 @@ async fn turn_away<S: AsyncRead + AsyncWrite>(stream: S, _place: OwnedSemaphoreP
         BODY.len()
     );
     let mut stream = pin!(stream);
-    // Whoever can't take even this is gone.
-    drop(timeout(HEAD_TIME, stream.write_all(answer.as_bytes())).await);
+    // A client that can't read even this response is dropped.
+    drop(timeout(HEAD_TIMEOUT, stream.write_all(response.as_bytes())).await);
 }
 
-/// Whether a connection ended because the client did not read.
-fn took_nothing(error: &hyper::Error) -> bool {
+/// Returns `true` if a connection ended because the client did not read.
+fn is_write_timeout(error: &hyper::Error) -> bool {
     let io = error.source().and_then(|source| source.downcast_ref::<io::Error>());
     io.is_some_and(|error| error.kind() == io::ErrorKind::TimedOut)
 }

@@ -1,29 +1,31 @@
-//! Budget of file descriptors: clients leave enough for port, log and everything else that measuring needs.
+//! File descriptor budget: clients leave enough for the serial port, the log and all other needs of
+//! the measurement.
 
 use std::fs;
 
 use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
 
-use super::slots::Shares;
+use super::limits::Shares;
 
-/// Descriptors kept for the serial port, the log with its rotation, folders that are searched, thermometer, name
-/// resolution, broker, and reading of logs for clients.
+/// Descriptors reserved for the serial port, the log with its rotation, folder listings,
+/// thermometer, name resolution, broker, and reading of logs for clients.
 const RESERVED: usize = 14;
-/// Descriptors that are enough for all purposes of one daemon.
+/// Descriptors sufficient for one daemon.
 const ENOUGH: u64 = 65_536;
-/// Connections over their limit that are answered at a time, if there are enough descriptors.
+/// Maximum number of over-limit connections that are answered 503 concurrently, if there are enough
+/// descriptors; further ones are closed.
 const MAX_REJECTING: usize = 16;
 
-/// Raises this process's limit of descriptors as far as it may, and returns it.
+/// Raises this process's soft limit of descriptors as far as permitted, and returns it.
 fn raise_limit() -> u64 {
     let Rlimit { current, maximum } = getrlimit(Resource::Nofile);
-    let wanted = maximum.unwrap_or(ENOUGH).min(ENOUGH);
+    let target = maximum.unwrap_or(ENOUGH).min(ENOUGH);
     let current = current.unwrap_or(ENOUGH);
-    if current >= wanted {
+    if current >= target {
         return current;
     }
-    match setrlimit(Resource::Nofile, Rlimit { current: Some(wanted), maximum }) {
-        Ok(()) => wanted,
+    match setrlimit(Resource::Nofile, Rlimit { current: Some(target), maximum }) {
+        Ok(()) => target,
         Err(_) => current,
     }
 }
@@ -33,9 +35,9 @@ fn count_open() -> usize {
     fs::read_dir("/proc/self/fd").map_or(0, Iterator::count)
 }
 
-/// Connections that each way in may have, and connections over these that may be answered at a time: `max_clients` for
-/// each, or fewer where this process's limit of descriptors does not allow as many. `others` are descriptors that the
-/// configuration needs beside the usual ones.
+/// Returns the maximum number of connections per kind of peer, and of concurrent rejections. Each
+/// kind of peer may have `max_clients`, or fewer if this process's limit of descriptors is lower.
+/// `others` are descriptors that the configuration needs in addition to the usual ones.
 pub(super) fn connection_shares(
     max_clients: usize,
     has_tcp: bool,
@@ -47,7 +49,7 @@ pub(super) fn connection_shares(
     let (shares, rejecting) = divide(free, max_clients, has_tcp);
     if shares.socket < max_clients {
         tracing::warn!(
-            "the limit of {limit} file descriptors allows {} clients instead of {max_clients}: raise it (`ulimit -n`, \
+            "the limit of {limit} file descriptors allows {} clients instead of {max_clients}: raise the limit (`ulimit -n`, \
              LimitNOFILE=)",
             shares.socket
         );
@@ -55,8 +57,8 @@ pub(super) fn connection_shares(
     (shares, rejecting)
 }
 
-/// Divides free descriptors: one in eight for rejections, half of the others for the owner's socket, the rest for TCP.
-/// Each way in has one at least.
+/// Divides free descriptors: one in eight for rejections, half of the others for the unix socket,
+/// the rest for TCP. Each kind of peer has at least one.
 fn divide(free: usize, max_clients: usize, has_tcp: bool) -> (Shares, usize) {
     let rejecting = (free / 8).clamp(1, MAX_REJECTING);
     let free = free.saturating_sub(rejecting);
@@ -76,7 +78,7 @@ mod tests {
     use proptest::prelude::*;
 
     #[test]
-    fn enough_descriptors_give_all_clients() {
+    fn many_descriptors() {
         let all = Shares { socket: 32, loopback: 32, network: 32 };
         assert_eq!(divide(1000, 32, true), (all, MAX_REJECTING));
     }

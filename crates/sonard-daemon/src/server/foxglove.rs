@@ -1,5 +1,5 @@
-//! Live messages for viewers that speak Foxglove's protocol: one follower makes them of the daemon's records, and each
-//! viewer takes them from the queue at its own pace.
+//! Foxglove WebSocket server: one follower converts the daemon's records to messages, and each
+//! viewer reads them from a shared queue at its own pace.
 
 mod message_queue;
 
@@ -23,123 +23,129 @@ use tokio::{
 };
 use uuid::Uuid;
 
-use super::Standing;
+use super::Principal;
 use crate::{Audience, Follower, Handle};
-use message_queue::{Found, MOST_MESSAGE_BYTES, MessageQueue, Outgoing, Viewer};
+use message_queue::{Delivery, MAX_MESSAGE_BYTES, Outgoing, Viewer, ViewerQueue};
 
-/// Least time from one thing that a viewer sends to the next that is read.
-const BETWEEN_READS: Duration = Duration::from_millis(10);
-/// How often a viewer is asked whether it is there.
-const SIGN_OF_LIFE: Duration = Duration::from_secs(15);
-/// One that shows no sign of life for so long is gone.
-const GIVEN_UP: Duration = Duration::from_secs(60);
-/// How long a viewer may take to say goodbye.
-const GOODBYE: Duration = Duration::from_secs(1);
+/// Minimum interval between messages read from a viewer.
+const READ_INTERVAL: Duration = Duration::from_millis(10);
+/// Interval between pings to a viewer.
+const PING_INTERVAL: Duration = Duration::from_secs(15);
+/// Time without any message after which a viewer is disconnected.
+const IDLE_TIMEOUT: Duration = Duration::from_secs(60);
+/// Time limit of the closing handshake.
+const CLOSE_TIMEOUT: Duration = Duration::from_secs(1);
 
-/// The longest that a viewer may send at once, bytes: what is longer than a text may be is refused in words up to here.
-pub(super) const MOST_RECEIVED_BYTES: usize = 8 * MOST_TEXT_BYTES;
-/// What is kept of a viewer's connection beside its messages, bytes.
+/// Maximum size of a received message, bytes. Texts longer than `MOST_TEXT_BYTES` are rejected with
+/// a reason up to this size.
+pub(super) const MAX_RECEIVED_BYTES: usize = 8 * MOST_TEXT_BYTES;
+/// Read buffer of a viewer's connection, bytes.
 pub(super) const READ_BYTES: usize = 4096;
-/// The longest that waits to be taken by a viewer's connection: a message, and what answers its pings.
-pub(super) const WRITE_BYTES: usize = MOST_MESSAGE_BYTES + (1 << 16);
+/// Maximum size of unsent data of a viewer's connection, bytes: a message, and responses to pings.
+pub(super) const WRITE_BYTES: usize = MAX_MESSAGE_BYTES + (1 << 16);
 
-/// Where viewers come together.
+/// State shared by all viewers.
 #[derive(Debug)]
 pub(super) struct Viewers {
     daemon: Handle,
-    queue: Mutex<MessageQueue>,
-    /// Changes with whatever viewers have to look at.
+    queue: Mutex<ViewerQueue>,
+    /// Notifies viewers of changes of the queue.
     changed: watch::Sender<()>,
-    /// Slots of guests, and of all others: nobody takes them from those.
-    places: [Arc<Semaphore>; 2],
-    most_viewers: u32,
-    /// Another one after a restart, so that viewers know.
+    /// Separate slots for guests and for all other viewers.
+    slots: [Arc<Semaphore>; 2],
+    max_viewers: u32,
+    /// Random session id, by which viewers detect a restart.
     session: String,
 }
 
 impl Viewers {
-    /// Begins to follow the daemon, until that ends. Must be called within a runtime.
+    /// Starts the task that follows the daemon until it ends. Must be called within a tokio
+    /// runtime.
     pub(super) fn open(daemon: &Handle, keys: &FoxgloveKeys) -> Arc<Self> {
         let viewers = Arc::new(Self {
             daemon: daemon.clone(),
-            queue: Mutex::new(MessageQueue::new(keys.queue_kb as usize * 1000)),
+            queue: Mutex::new(ViewerQueue::new(keys.queue_kb as usize * 1000)),
             changed: watch::Sender::new(()),
-            places: [(); 2].map(|()| Arc::new(Semaphore::new(keys.max_clients as usize))),
-            most_viewers: keys.max_clients,
+            slots: [(); 2].map(|()| Arc::new(Semaphore::new(keys.max_clients as usize))),
+            max_viewers: keys.max_clients,
             session: Uuid::new_v4().to_string(),
         });
-        let mut told = Told(Arc::clone(&viewers));
+        let mut sink = QueueSink(Arc::clone(&viewers));
         let live = Live::new(Settings::default()).with_map(keys.map);
-        let follower = Follower::begin(daemon, live, &mut told);
-        drop(daemon.supervisor().spawn(Task::LiveMessages, follow(follower, told)));
+        let follower = Follower::begin(daemon, live, &mut sink);
+        drop(daemon.supervisor().spawn(Task::LiveMessages, follow(follower, sink)));
         viewers
     }
 
-    /// A place for a viewer, if one is free.
-    pub(super) fn take_place(&self, standing: Standing) -> Option<OwnedSemaphorePermit> {
-        let [guests, others] = &self.places;
-        let places = if standing == Standing::Guest { guests } else { others };
-        Arc::clone(places).try_acquire_owned().ok()
+    /// Takes a slot for a viewer, if one is free.
+    pub(super) fn take_slot(&self, principal: Principal) -> Option<OwnedSemaphorePermit> {
+        let [guests, others] = &self.slots;
+        let slots = if principal == Principal::Guest { guests } else { others };
+        Arc::clone(slots).try_acquire_owned().ok()
     }
 
-    /// Waits until every viewer has left.
+    /// Waits until all viewers have disconnected.
     pub(super) async fn is_empty(&self) {
-        for places in &self.places {
-            drop(places.acquire_many(self.most_viewers).await);
+        for slots in &self.slots {
+            drop(slots.acquire_many(self.max_viewers).await);
         }
     }
 
-    /// Tells a viewer, until it leaves or is shown out.
-    pub(super) async fn attend(self: Arc<Self>, mut socket: WebSocket) {
+    /// Serves a viewer until it disconnects or is disconnected.
+    pub(super) async fn serve(self: Arc<Self>, mut socket: WebSocket) {
         let _attendance = self.daemon.hub().attend();
-        match self.tell(&mut socket).await {
-            Ok(goodbye) => say_goodbye(&mut socket, goodbye).await,
-            Err(error) if took_nothing(&error) => self.daemon.hub().count_cut_off(),
-            // It is gone.
+        match self.send_messages(&mut socket).await {
+            Ok(frame) => close_socket(&mut socket, frame).await,
+            Err(error) if is_write_timeout(&error) => self.daemon.hub().count_cut_off(),
+            // The viewer has disconnected.
             Err(_) => {}
         }
     }
 
-    /// Tells a viewer what it asks for; why that ended in order.
-    async fn tell(&self, socket: &mut WebSocket) -> Result<CloseFrame, axum::Error> {
+    /// Sends a viewer its subscribed messages. Returns the reason of a regular end.
+    async fn send_messages(&self, socket: &mut WebSocket) -> Result<CloseFrame, axum::Error> {
         let mut changed = self.changed.subscribe();
         let mut viewer = Viewer::new(&self.queue(), server_info(&self.session));
-        let mut heard = Instant::now();
-        let (mut may_read, mut next_ping) = (heard, heard + SIGN_OF_LIFE);
+        let mut last_received = Instant::now();
+        let (mut may_read, mut next_ping) = (last_received, last_received + PING_INTERVAL);
         loop {
-            // What comes after this look makes it ready again.
+            // A change after this point makes `changed` ready again.
             changed.mark_unchanged();
-            let found = viewer.look(&self.queue());
-            let is_idle = found == Found::Nothing;
-            match found {
-                Found::Something(Outgoing::Text(text)) => socket.send(text.into()).await?,
-                Found::Something(Outgoing::Binary(frame)) => socket.send(frame.into()).await?,
-                Found::Over => return Ok(goodbye(close_code::AWAY, "nothing more is told here")),
-                Found::ShownOut => {
-                    return Ok(goodbye(close_code::POLICY, "too much makes no sense"));
+            let next = viewer.next(&self.queue());
+            let is_idle = next == Delivery::Nothing;
+            match next {
+                Delivery::Message(Outgoing::Text(text)) => socket.send(text.into()).await?,
+                Delivery::Message(Outgoing::Binary(frame)) => socket.send(frame.into()).await?,
+                Delivery::Closed => {
+                    return Ok(close_frame(close_code::AWAY, "the daemon is stopping"));
                 }
-                Found::Nothing => {}
+                Delivery::Rejected => {
+                    return Ok(close_frame(close_code::POLICY, "too many invalid messages"));
+                }
+                Delivery::Nothing => {}
             }
             let now = Instant::now();
-            if now > heard + GIVEN_UP {
-                return Ok(goodbye(close_code::AWAY, "there is no sign of life"));
+            if now > last_received + IDLE_TIMEOUT {
+                return Ok(close_frame(close_code::AWAY, "no response to pings"));
             }
             if now > next_ping {
-                next_ping = now + SIGN_OF_LIFE;
+                next_ping = now + PING_INTERVAL;
                 socket.send(Message::Ping(Vec::new().into())).await?;
             }
             tokio::select! {
                 biased;
-                came = socket.recv(), if now >= may_read => {
-                    let Some(came) = came else { return Ok(goodbye(close_code::NORMAL, "")) };
-                    heard = Instant::now();
-                    may_read = heard + BETWEEN_READS;
-                    match came {
+                received = socket.recv(), if now >= may_read => {
+                    let Some(received) = received else {
+                        return Ok(close_frame(close_code::NORMAL, ""));
+                    };
+                    last_received = Instant::now();
+                    may_read = last_received + READ_INTERVAL;
+                    match received {
                         Ok(Message::Text(text)) => viewer.take_text(&text, &self.queue()),
                         Ok(Message::Binary(_)) => viewer.take_binary(&self.queue()),
                         Ok(Message::Ping(_) | Message::Pong(_)) => {}
-                        Ok(Message::Close(_)) => return Ok(goodbye(close_code::NORMAL, "")),
-                        Err(error) => return refused(error),
+                        Ok(Message::Close(_)) => return Ok(close_frame(close_code::NORMAL, "")),
+                        Err(error) => return receive_error(error),
                     }
                 }
                 () = std::future::ready(()), if !is_idle => {}
@@ -150,16 +156,16 @@ impl Viewers {
         }
     }
 
-    /// Nothing under this lock can panic, so a poisoned one holds what it should.
-    fn queue(&self) -> MutexGuard<'_, MessageQueue> {
+    /// Locks the queue. Nothing under this lock can panic, so a poisoned lock holds valid data.
+    fn queue(&self) -> MutexGuard<'_, ViewerQueue> {
         self.queue.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
-/// The viewers as the follower tells it.
-struct Told(Arc<Viewers>);
+/// Sink of the follower that fills the queue.
+struct QueueSink(Arc<Viewers>);
 
-impl Audience for Told {
+impl Audience for QueueSink {
     fn set_topics(&mut self, topics: &[Topic]) {
         self.0.queue().set_topics(topics);
     }
@@ -168,8 +174,8 @@ impl Audience for Told {
         self.0.queue().put(message);
     }
 
-    fn announce(&mut self, words: String) {
-        self.0.queue().announce(words);
+    fn announce(&mut self, text: String) {
+        self.0.queue().announce(text);
     }
 
     fn told(&mut self) {
@@ -177,48 +183,48 @@ impl Audience for Told {
     }
 }
 
-async fn follow(mut follower: Follower, mut told: Told) {
-    while follower.next(&mut told).await {}
-    told.0.queue().close();
-    told.0.changed.send_replace(());
+async fn follow(mut follower: Follower, mut sink: QueueSink) {
+    while follower.next(&mut sink).await {}
+    sink.0.queue().close();
+    sink.0.changed.send_replace(());
 }
 
-/// Why a viewer is shown out whose connection brought what can't be read.
-fn refused(error: axum::Error) -> Result<CloseFrame, axum::Error> {
-    if is_of_connection(&error) {
+/// Converts a receive error to a close frame; errors of the connection itself are returned.
+fn receive_error(error: axum::Error) -> Result<CloseFrame, axum::Error> {
+    if is_connection_error(&error) {
         return Err(error);
     }
     let why = format!("{error}; texts have at most {MOST_TEXT_BYTES} bytes");
-    // A reason has at most 123 bytes.
+    // A close reason is limited to 123 bytes.
     let why: String = why.chars().filter(char::is_ascii).take(120).collect();
-    Ok(goodbye(close_code::POLICY, &why))
+    Ok(close_frame(close_code::POLICY, &why))
 }
 
-fn goodbye(code: u16, reason: &str) -> CloseFrame {
+fn close_frame(code: u16, reason: &str) -> CloseFrame {
     CloseFrame { code, reason: reason.into() }
 }
 
-/// Closes a connection in order, if the other end does its part.
-async fn say_goodbye(socket: &mut WebSocket, goodbye: CloseFrame) {
+/// Performs the closing handshake, within a time limit.
+async fn close_socket(socket: &mut WebSocket, frame: CloseFrame) {
     let closing = async {
-        if socket.send(Message::Close(Some(goodbye))).await.is_ok() {
+        if socket.send(Message::Close(Some(frame))).await.is_ok() {
             while let Some(Ok(_)) = socket.recv().await {}
         }
     };
-    drop(timeout(GOODBYE, closing).await);
+    drop(timeout(CLOSE_TIMEOUT, closing).await);
 }
 
-/// Whether a connection ended because the viewer did not read.
-fn took_nothing(error: &axum::Error) -> bool {
-    cause(error).is_some_and(|error| error.kind() == io::ErrorKind::TimedOut)
+/// Returns `true` if a connection ended because the viewer did not read.
+fn is_write_timeout(error: &axum::Error) -> bool {
+    io_cause(error).is_some_and(|error| error.kind() == io::ErrorKind::TimedOut)
 }
 
-fn is_of_connection(error: &axum::Error) -> bool {
-    cause(error).is_some()
+fn is_connection_error(error: &axum::Error) -> bool {
+    io_cause(error).is_some()
 }
 
-/// The fault of the connection that is behind an error, if one is.
-fn cause(error: &axum::Error) -> Option<&io::Error> {
+/// Returns the I/O error that caused `error`, if any.
+fn io_cause(error: &axum::Error) -> Option<&io::Error> {
     let mut source = error.source();
     while let Some(error) = source {
         if let Some(io) = error.downcast_ref::<io::Error>() {

@@ -1,7 +1,7 @@
-//! Sockets: those that systemd hands over, or those that the configuration names.
+//! Listening sockets, inherited from systemd or opened by the configuration.
 
 mod keeper;
-mod kept;
+mod listener;
 mod tcp;
 mod unix;
 
@@ -15,66 +15,67 @@ use tokio::net::{TcpListener, UnixListener};
 use super::Peer;
 
 pub(super) use keeper::Keeper;
-pub(super) use kept::Kept;
-use tcp::TcpPlace;
-use unix::UnixPlace;
+pub(super) use listener::DynamicListener;
+use tcp::TcpEndpoint;
+use unix::UnixEndpoint;
 
 const SOCKET: &str = "server.socket";
 const LISTEN: &str = "server.listen";
 
-/// Places that the server listens at, now or as soon as they can be bound. Socket files that this process made are
-/// removed with it.
+/// Endpoints of the server, some of which may be bound later. Socket files created by this process
+/// are removed when it exits.
 #[derive(Debug, Default)]
 pub struct Listeners {
-    pub(super) unix: Vec<Kept<UnixListener>>,
-    pub(super) tcp: Vec<(Kept<TcpListener>, Peer)>,
+    pub(super) unix: Vec<DynamicListener<UnixListener>>,
+    pub(super) tcp: Vec<(DynamicListener<TcpListener>, Peer)>,
     pub(super) keeper: Keeper,
 }
 
-/// A socket that can't be opened.
+/// Socket that can't be opened.
 #[derive(Debug, Error)]
 #[error("cannot listen on {place}: {source}")]
 pub struct ListenError {
-    /// The key that names it; `None` for sockets that systemd hands over.
+    /// Configuration key of the socket; `None` for sockets inherited from systemd.
     pub key: Option<&'static str>,
-    /// The path or address.
+    /// Path or address.
     pub place: String,
-    /// What the system says.
+    /// System error.
     pub source: io::Error,
 }
 
 impl ListenError {
-    /// What a person can do about it.
+    /// Returns advice on how to resolve the error.
     #[must_use]
     pub fn help(&self) -> &'static str {
         match (self.key, self.source.kind()) {
             (Some(SOCKET), io::ErrorKind::AddrInUse) => {
-                "another sonard listens there: stop it, or give this one another server.socket"
+                "another sonard daemon uses this socket: stop it, or set another server.socket"
             }
             (Some(SOCKET), io::ErrorKind::NotFound | io::ErrorKind::PermissionDenied) => {
-                "give server.socket in a folder that exists and that you may write to, or an \
-                 empty one for no socket"
+                "set server.socket to a path in a writable folder, or to an empty text for no \
+                 socket"
             }
             (Some(SOCKET), io::ErrorKind::AlreadyExists) => {
-                "only a socket that a dead sonard left behind is replaced: give server.socket a name \
-                 of its own"
+                "only the stale socket of an exited daemon is replaced: set server.socket to an unused \
+                 path"
             }
             (Some(LISTEN), io::ErrorKind::PermissionDenied) => {
-                "ports below 1024 are the system's: give server.listen a higher one"
+                "ports below 1024 need privileges: set a higher port in server.listen"
             }
             (Some(LISTEN), _) => "see server.listen",
             (Some(_), _) => "see server.socket",
-            (None, _) => "see the socket unit: it hands over stream sockets",
+            (None, _) => "check the systemd socket unit: it must pass stream sockets",
         }
     }
 }
 
 impl Listeners {
-    /// The sockets that systemd hands over, else those of the configuration. An address that is not this computer's yet,
-    /// or a port that is in use, is bound later. Must be called within a tokio runtime.
+    /// Opens the sockets inherited from systemd, or else those of the configuration. An address not
+    /// assigned yet or a port in use is bound later. Must be called within a tokio runtime.
     ///
     /// # Errors
-    /// When a unix socket can't be made or another program listens there, or the address can never be bound.
+    /// Unix socket that can't be created or is in use by another program, or an address that can
+    /// never be bound.
     pub fn open(keys: &ServerKeys) -> Result<Self, ListenError> {
         let mut listeners = Self::default();
         let fail = |key, place: &str| {
@@ -83,12 +84,12 @@ impl Listeners {
         };
         listeners.take_inherited().map_err(fail(None, "the sockets of systemd"))?;
         if listeners.unix.is_empty() && !keys.socket.is_empty() {
-            // Checked with the configuration; nothing wider than meant comes of a wrong one.
+            // The configuration has been validated; the fallback grants the least permissions.
             let mode = keys.socket_permissions().unwrap_or(0o600);
-            let bound = UnixPlace::bind(Path::new(&keys.socket), mode);
-            let (place, kept) = bound.map_err(fail(Some(SOCKET), &keys.socket))?;
-            listeners.unix.push(kept);
-            listeners.keeper.unix.push(place);
+            let bound = UnixEndpoint::bind(Path::new(&keys.socket), mode);
+            let (endpoint, listener) = bound.map_err(fail(Some(SOCKET), &keys.socket))?;
+            listeners.unix.push(listener);
+            listeners.keeper.unix.push(endpoint);
         }
         if let Some(address) = keys.listen.as_deref().filter(|_| listeners.tcp.is_empty()) {
             listeners.add_tcp(address).map_err(fail(Some(LISTEN), address))?;
@@ -96,10 +97,10 @@ impl Listeners {
         Ok(listeners)
     }
 
-    /// TCP addresses that are, or are to be, listened on.
+    /// Returns the TCP addresses, including those not bound yet.
     #[must_use]
     pub fn addresses(&self) -> Vec<SocketAddr> {
-        self.keeper.tcp.iter().map(TcpPlace::address).collect()
+        self.keeper.tcp.iter().map(TcpEndpoint::address).collect()
     }
 
     fn take_inherited(&mut self) -> io::Result<()> {
@@ -107,13 +108,15 @@ impl Listeners {
         for at in 0..handed.len() {
             if let Ok(Some(listener)) = handed.take_unix_listener(at) {
                 listener.set_nonblocking(true)?;
-                let (place, kept) = UnixPlace::inherited(UnixListener::from_std(listener)?);
-                self.unix.push(kept);
-                self.keeper.unix.extend(place);
+                let (endpoint, listener) =
+                    UnixEndpoint::inherited(UnixListener::from_std(listener)?);
+                self.unix.push(listener);
+                self.keeper.unix.extend(endpoint);
             } else if let Ok(Some(listener)) = handed.take_tcp_listener(at) {
                 listener.set_nonblocking(true)?;
-                let (place, kept) = TcpPlace::inherited(TcpListener::from_std(listener)?)?;
-                self.add(place, kept);
+                let (endpoint, listener) =
+                    TcpEndpoint::inherited(TcpListener::from_std(listener)?)?;
+                self.add(endpoint, listener);
             }
         }
         Ok(())
@@ -121,22 +124,25 @@ impl Listeners {
 
     fn add_tcp(&mut self, address: &str) -> io::Result<()> {
         let address: SocketAddr = address.parse().map_err(|_| {
-            io::Error::new(io::ErrorKind::InvalidInput, "not an address such as 127.0.0.1:8765")
+            io::Error::new(
+                io::ErrorKind::InvalidInput,
+                "expected an address such as 127.0.0.1:8765",
+            )
         })?;
-        let (place, kept, not_yet) = TcpPlace::open(address)?;
-        if let Some(error) = not_yet {
+        let (endpoint, listener, error) = TcpEndpoint::open(address)?;
+        if let Some(error) = error {
             let name = format!("{LISTEN} {address}");
             let why = format!("cannot be bound yet: {error}");
-            keeper::note(&mut self.keeper.troubles, name, why);
+            keeper::report_trouble(&mut self.keeper.troubles, name, why);
         }
-        self.add(place, kept);
+        self.add(endpoint, listener);
         Ok(())
     }
 
-    fn add(&mut self, place: TcpPlace, kept: Kept<TcpListener>) {
-        place.announce();
-        let is_loopback = place.address().ip().is_loopback();
-        self.tcp.push((kept, if is_loopback { Peer::Loopback } else { Peer::Network }));
-        self.keeper.tcp.push(place);
+    fn add(&mut self, endpoint: TcpEndpoint, listener: DynamicListener<TcpListener>) {
+        endpoint.announce();
+        let is_loopback = endpoint.address().ip().is_loopback();
+        self.tcp.push((listener, if is_loopback { Peer::Loopback } else { Peer::Network }));
+        self.keeper.tcp.push(endpoint);
     }
 }

@@ -1,4 +1,4 @@
-//! Routes with their description in one place, so that document and server can't part.
+//! Route definitions with their OpenAPI description, so that document and server always agree.
 
 use axum::{
     Router,
@@ -14,19 +14,19 @@ use super::Api;
 
 type SchemaOf = fn(&mut SchemaGenerator) -> Schema;
 
-/// One operation of the API.
-pub(super) struct Endpoint {
+/// Operation of the API: route, handler and description.
+pub(super) struct Route {
     method: Method,
     path: &'static str,
     about: &'static str,
-    /// Name, schema and meaning of each parameter in the query or the path.
+    /// Location, name, schema and description of each parameter.
     parameters: Vec<(&'static str, &'static str, Value, &'static str)>,
     body: Option<SchemaOf>,
-    answers: Vec<(u16, &'static str, &'static str, Option<SchemaOf>)>,
+    responses: Vec<(u16, &'static str, &'static str, Option<SchemaOf>)>,
     router: Router<Api>,
 }
 
-impl Endpoint {
+impl Route {
     pub(super) fn get<H, T>(path: &'static str, handler: H, about: &'static str) -> Self
     where
         H: Handler<T, Api>,
@@ -71,17 +71,17 @@ impl Endpoint {
         T: 'static,
     {
         let router = Router::new().route(path, on(filter, handler));
-        let (parameters, answers) = (Vec::new(), Vec::new());
-        Self { method, path, about, parameters, body: None, answers, router }
+        let (parameters, responses) = (Vec::new(), Vec::new());
+        Self { method, path, about, parameters, body: None, responses, router }
     }
 
-    /// It takes a JSON body.
-    pub(super) fn takes<T: JsonSchema>(mut self) -> Self {
+    /// Adds a JSON request body.
+    pub(super) fn accepts<T: JsonSchema>(mut self) -> Self {
         self.body = Some(|generator| generator.subschema_for::<T>());
         self
     }
 
-    /// It takes a parameter in the `query` or the `path`.
+    /// Adds a parameter in the `query`, `path` or `header`.
     pub(super) fn parameter(
         mut self,
         place: &'static str,
@@ -93,47 +93,53 @@ impl Endpoint {
         self
     }
 
-    /// It answers JSON of a type.
-    pub(super) fn answers<T: JsonSchema>(self, status: u16, about: &'static str) -> Self {
-        self.answers_as::<T>(status, "application/json", about)
+    /// Adds a JSON response.
+    pub(super) fn responds<T: JsonSchema>(self, status: u16, about: &'static str) -> Self {
+        self.responds_as::<T>(status, "application/json", about)
     }
 
-    /// It answers with parts (lines, events) of a type.
-    pub(super) fn answers_as<T: JsonSchema>(
+    /// Adds a response of items (lines, events) of a type.
+    pub(super) fn responds_as<T: JsonSchema>(
         mut self,
         status: u16,
         media: &'static str,
         about: &'static str,
     ) -> Self {
-        self.answers.push((status, media, about, Some(|generator| generator.subschema_for::<T>())));
+        self.responses.push((
+            status,
+            media,
+            about,
+            Some(|generator| generator.subschema_for::<T>()),
+        ));
         self
     }
 
-    /// It answers text of its own kind.
-    pub(super) fn answers_text(
+    /// Adds a text response.
+    pub(super) fn responds_text(
         mut self,
         status: u16,
         media: &'static str,
         about: &'static str,
     ) -> Self {
-        self.answers.push((status, media, about, None));
+        self.responses.push((status, media, about, None));
         self
     }
 }
 
-/// The router of all endpoints.
-pub(super) fn router(endpoints: Vec<Endpoint>) -> Router<Api> {
+/// Builds the router of all endpoints.
+pub(super) fn router(endpoints: Vec<Route>) -> Router<Api> {
     endpoints.into_iter().fold(Router::new(), |router, endpoint| router.merge(endpoint.router))
 }
 
-/// The OpenAPI 3.1 document of all endpoints.
-pub(super) fn document(endpoints: &[Endpoint]) -> Value {
+/// Builds the OpenAPI 3.1 document of all endpoints.
+pub(super) fn document(endpoints: &[Route]) -> Value {
     let settings = SchemaSettings::draft2020_12().for_serialize().with(|settings| {
         settings.definitions_path = "/components/schemas".into();
         settings.meta_schema = None;
     });
     let mut generator = settings.into_generator();
-    // What a client may leave out differs from what the server leaves out: bodies stand in line.
+    // Optional fields differ between requests and responses, so the schemas of request bodies are
+    // inlined.
     let mut bodies = SchemaSettings::draft2020_12()
         .with(|settings| {
             settings.inline_subschemas = true;
@@ -154,7 +160,7 @@ pub(super) fn document(endpoints: &[Endpoint]) -> Value {
             "version": env!("CARGO_PKG_VERSION"),
             "description": "Status, control and live readings of an ultrasonic ranger. Served on a \
                 unix socket, and over loopback TCP if that is enabled; there, writes need a bearer \
-                token, and foreign Host or Origin headers are refused.",
+                token, and foreign Host or Origin headers are rejected.",
             "license": {"name": "MIT OR Apache-2.0"},
         },
         "servers": [{"url": "/"}],
@@ -168,13 +174,13 @@ pub(super) fn document(endpoints: &[Endpoint]) -> Value {
 
 #[expect(clippy::indexing_slicing, reason = "a JSON object takes any key")]
 fn operation(
-    endpoint: &Endpoint,
+    endpoint: &Route,
     problem: &Schema,
     generator: &mut SchemaGenerator,
     bodies: &mut SchemaGenerator,
 ) -> Value {
     let mut responses = Map::new();
-    for (status, media, about, schema) in &endpoint.answers {
+    for (status, media, about, schema) in &endpoint.responses {
         let content = match schema {
             Some(schema) => json!({ "schema": schema(generator) }),
             None => json!({ "schema": {"type": "string"} }),
@@ -187,9 +193,9 @@ fn operation(
     responses.insert(
         "default".into(),
         json!({
-            "description": "Refused, with the reason: 400 or 422 malformed or out of range, 401 or \
-                403 not allowed, 404 not there, 408 too slow, 409 not with what is in force (scene, \
-                motor, requests that wait), 413 too large, 429 too often, 503 too many clients",
+            "description": "Rejected, with the reason: 400 or 422 malformed or out of range, 401 or \
+                403 not allowed, 404 not found, 408 timeout, 409 conflict with the current state \
+                (scene, motor, pending requests), 413 too large, 429 too many requests, 503 too many clients",
             "content": {"application/json": {"schema": problem}},
         }),
     );
@@ -211,7 +217,7 @@ fn operation(
     });
     if let Some(body) = endpoint.body {
         let mut schema = body(bodies).to_value();
-        close(&mut schema);
+        close_schema(&mut schema);
         operation["requestBody"] =
             json!({ "required": true, "content": {"application/json": {"schema": schema}} });
     }
@@ -221,8 +227,8 @@ fn operation(
     operation
 }
 
-/// Says what holds for every body: nothing unknown is taken, and a whole number fits its type.
-fn close(schema: &mut Value) {
+/// Closes the schema of a request body: unknown fields are rejected, and integers fit their type.
+fn close_schema(schema: &mut Value) {
     if let Value::Object(schema) = schema {
         if schema.contains_key("properties") {
             schema.entry("additionalProperties").or_insert(Value::Bool(false));
@@ -230,15 +236,15 @@ fn close(schema: &mut Value) {
         if schema.get("format").is_some_and(|format| format == "uint32") {
             schema.entry("maximum").or_insert_with(|| u32::MAX.into());
         }
-        schema.values_mut().for_each(close);
+        schema.values_mut().for_each(close_schema);
     }
     if let Value::Array(schemas) = schema {
-        schemas.iter_mut().for_each(close);
+        schemas.iter_mut().for_each(close_schema);
     }
 }
 
-/// `get_v1_logs_name` for `GET /v1/logs/{name}`.
-fn operation_id(endpoint: &Endpoint) -> String {
+/// Returns the operation id, such as `get_v1_logs_name` for `GET /v1/logs/{name}`.
+fn operation_id(endpoint: &Route) -> String {
     let words = endpoint.path.split(|c: char| !c.is_ascii_alphanumeric());
     let words: Vec<&str> = words.filter(|word| !word.is_empty()).collect();
     format!("{}_{}", endpoint.method.as_str().to_ascii_lowercase(), words.join("_"))

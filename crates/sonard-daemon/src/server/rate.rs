@@ -1,10 +1,10 @@
-//! How many requests a second are let in. Pure: the time is given.
+//! Request rate limits (token buckets). Pure: the caller passes the time.
 
 use std::time::Duration;
 
-use super::access::Standing;
+use super::access::Principal;
 
-/// A bucket for each standing.
+/// Token buckets, one per kind of principal.
 #[derive(Debug, Clone)]
 pub(super) struct Buckets {
     socket: Bucket,
@@ -13,24 +13,24 @@ pub(super) struct Buckets {
 }
 
 impl Buckets {
-    /// So many requests a second for each.
+    /// Creates buckets of `per_s` requests per second each.
     pub(super) fn new(per_s: f64) -> Self {
         let bucket = Bucket::new(per_s);
         Self { socket: bucket.clone(), token: bucket.clone(), guest: bucket }
     }
 
-    /// Whether one more may come in now.
-    pub(super) fn take(&mut self, standing: Standing, now: Duration) -> bool {
-        let bucket = match standing {
-            Standing::Socket => &mut self.socket,
-            Standing::Token => &mut self.token,
-            Standing::Guest => &mut self.guest,
+    /// Takes a request from the bucket; `false` if it is empty.
+    pub(super) fn take(&mut self, principal: Principal, now: Duration) -> bool {
+        let bucket = match principal {
+            Principal::Socket => &mut self.socket,
+            Principal::Token => &mut self.token,
+            Principal::Guest => &mut self.guest,
         };
         bucket.take(now)
     }
 }
 
-/// A bucket that fills at a constant rate and holds one second's worth; each request takes one.
+/// Token bucket that fills at a constant rate and holds one second's worth of requests.
 #[derive(Debug, Clone)]
 struct Bucket {
     per_s: f64,
@@ -43,7 +43,7 @@ impl Bucket {
         Self { per_s, level: per_s.max(1.0), at: Duration::ZERO }
     }
 
-    /// Whether one more may come in now.
+    /// Takes a request from the bucket; `false` if it is empty.
     fn take(&mut self, now: Duration) -> bool {
         let since_s = now.saturating_sub(self.at).as_secs_f64();
         self.at = self.at.max(now);
@@ -59,7 +59,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_burst_passes_and_then_only_the_rate() {
+    fn burst_then_constant_rate() {
         let mut bucket = Bucket::new(10.0);
         let passed = |bucket: &mut Bucket, from_ms: u64, to_ms: u64| {
             (from_ms..to_ms).filter(|&ms| bucket.take(Duration::from_millis(ms))).count()

@@ -1,4 +1,4 @@
-//! What can be asked for, one file a subject.
+//! Request handlers, one module per subject.
 
 mod beam;
 mod control;
@@ -23,10 +23,10 @@ use serde_json::Value;
 pub(super) use foxglove::FOXGLOVE;
 pub(super) use page::is_public;
 
-use super::{Api, openapi::Endpoint};
+use super::{Api, openapi::Route};
 
-/// Every endpoint of the API.
-pub(super) fn endpoints() -> Vec<Endpoint> {
+/// Returns all endpoints of the API.
+pub(super) fn endpoints() -> Vec<Route> {
     let mut endpoints = report::endpoints();
     endpoints.extend(control::endpoints());
     endpoints.extend(scene::endpoints());
@@ -42,8 +42,8 @@ pub(super) fn endpoints() -> Vec<Endpoint> {
     endpoints.extend(page::endpoints());
     endpoints.extend(playground::endpoints());
     endpoints.push(
-        Endpoint::get("/v1/openapi.json", openapi, "This description")
-            .answers::<Value>(200, "An OpenAPI 3.1 document"),
+        Route::get("/v1/openapi.json", openapi, "OpenAPI description of this API")
+            .responds::<Value>(200, "OpenAPI 3.1 document"),
     );
     endpoints
 }

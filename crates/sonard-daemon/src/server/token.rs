@@ -1,26 +1,26 @@
-//! The file with the token.
+//! File with the access token.
 
 use std::path::Path;
 
 use crate::secret::{Secret, SecretError, read_secret};
 
-/// A token: `openssl rand -hex 8` makes 16 characters.
+/// Limits of a token file; `openssl rand -hex 8` generates 16 characters.
 const TOKEN: Secret = Secret { what: "token", least: 16, most_bytes: 4096 };
 
-/// The token in a file that only its owner may read.
+/// Reads the token from a file that only its owner may read.
 ///
 /// # Errors
-/// Anything but a small regular file with a token in it; nothing is waited for.
+/// Anything but a small regular file with a token. Never blocks on pipes or devices.
 pub fn read_token(path: &Path) -> Result<String, SecretError> {
     read_secret(path, TOKEN)
 }
 
-/// What the owner of a token's file can do about what is wrong with it.
+/// Returns advice on how to correct a token file.
 #[must_use]
 pub fn token_help(error: &SecretError, path: &Path) -> String {
     let path_shown = path.display();
     error.help(path).unwrap_or_else(|| {
-        format!("make one with `(umask 077; openssl rand -hex 32 >{path_shown})`")
+        format!("create a token with `(umask 077; openssl rand -hex 32 >{path_shown})`")
     })
 }
 
@@ -33,7 +33,7 @@ mod tests {
     };
 
     #[test]
-    fn only_a_small_file_of_its_owner_is_taken_for_a_token() {
+    fn needs_a_private_small_file() {
         let folder = tempfile::tempdir().expect("a folder");
         let file = folder.path().join("token");
         let read = |bytes: &[u8], mode: u32| {
@@ -54,7 +54,7 @@ mod tests {
     }
 
     #[test]
-    fn pipes_folders_and_devices_are_refused_at_once() {
+    fn special_files_are_rejected() {
         let folder = tempfile::tempdir().expect("a folder");
         let pipe = folder.path().join("pipe");
         let mode = rustix::fs::Mode::RUSR | rustix::fs::Mode::WUSR;

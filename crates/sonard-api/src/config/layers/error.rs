@@ -1,24 +1,24 @@
-//! Where a value was given, and what is wrong with it.
+//! Configuration errors and their source positions.
 
 use std::fmt;
 
 use thiserror::Error;
 
-/// Source of a value.
+/// Source of a configuration value.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Origin {
-    /// In a file, at this line and column (from 1).
+    /// Position in a file, counted from 1.
     File {
-        /// Its name.
+        /// Name of the file.
         file: String,
-        /// Line.
+        /// Line, counted from 1.
         line: usize,
-        /// Column, characters.
+        /// Column, characters, counted from 1.
         column: usize,
     },
-    /// In the environment variable of this name.
+    /// Environment variable of this name.
     Environment(String),
-    /// By this option of the command line.
+    /// Command line option.
     Option(String),
 }
 
@@ -32,14 +32,14 @@ impl fmt::Display for Origin {
     }
 }
 
-/// An error in the configuration.
+/// Error in the configuration, with its position.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[error("{origin}: {message}")]
 pub struct ConfigError {
-    /// Where.
+    /// Source of the invalid value.
     pub origin: Origin,
-    /// What.
+    /// Description of the error.
     pub message: String,
-    /// What would be right.
+    /// Advice on how to correct the error.
     pub help: String,
 }

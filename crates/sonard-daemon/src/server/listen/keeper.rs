@@ -1,4 +1,4 @@
-//! The task that keeps the server reachable at the places that are configured.
+//! Task that keeps the configured endpoints of the server open.
 
 use std::{collections::BTreeMap, time::Duration};
 
@@ -6,89 +6,91 @@ use sonard_api::ServerReport;
 use tokio::{task::spawn_blocking, time::sleep};
 use tokio_util::sync::CancellationToken;
 
-use super::{LISTEN, SOCKET, tcp::TcpPlace, unix::Outcome, unix::UnixPlace};
+use super::{LISTEN, SOCKET, tcp::TcpEndpoint, unix::SocketState, unix::UnixEndpoint};
 use crate::Handle;
 
-/// From one look at the places to the next.
-const LOOK: Duration = Duration::from_secs(2);
+/// Interval between checks of the endpoints.
+const CHECK_INTERVAL: Duration = Duration::from_secs(2);
 
-/// Owns the places: binds what could not be bound yet and what was removed, and reports each change once. The socket
-/// files that this process made are removed when it is dropped.
+/// Owns the endpoints: binds those that could not be bound before or were removed, and logs each
+/// change once. Socket files created by this process are removed on drop.
 #[derive(Debug, Default)]
 pub(in crate::server) struct Keeper {
-    pub(super) unix: Vec<UnixPlace>,
-    pub(super) tcp: Vec<TcpPlace>,
-    /// By place, why clients do not reach this process there.
+    pub(super) unix: Vec<UnixEndpoint>,
+    pub(super) tcp: Vec<TcpEndpoint>,
+    /// Reasons of unreachable endpoints, by endpoint.
     pub(super) troubles: BTreeMap<String, String>,
 }
 
 impl Keeper {
-    /// Looks after the places until `stop` is cancelled.
+    /// Checks the endpoints periodically until `stop` is cancelled.
     pub(in crate::server) async fn run(mut self, daemon: Handle, stop: CancellationToken) {
         loop {
             daemon.report_server(self.report());
             tokio::select! {
                 () = stop.cancelled() => return,
-                () = sleep(LOOK) => {}
+                () = sleep(CHECK_INTERVAL) => {}
             }
-            // A file system may be slow to answer.
-            let looking = spawn_blocking(move || {
-                self.look();
+            // File system calls can block.
+            let checking = spawn_blocking(move || {
+                self.check();
                 self
             });
             self = tokio::select! {
-                // A panic is printed already; the listeners stay as they are.
-                looked = looking => match looked { Ok(keeper) => keeper, Err(_) => return },
+                // A panic has been logged already; the listeners remain unchanged.
+                checked = checking => match checked { Ok(keeper) => keeper, Err(_) => return },
                 () = stop.cancelled() => return,
             };
         }
     }
 
-    fn look(&mut self) {
+    fn check(&mut self) {
         let Self { unix, tcp, troubles } = self;
-        for place in unix {
-            let name = format!("{SOCKET} {}", place.path().display());
-            match place.look() {
-                Outcome::Unreachable(why) => note(troubles, name, why),
-                Outcome::Bound => {
+        for endpoint in unix {
+            let name = format!("{SOCKET} {}", endpoint.path().display());
+            match endpoint.check() {
+                SocketState::Unreachable(why) => report_trouble(troubles, name, why),
+                SocketState::Rebound => {
                     troubles.remove(&name);
-                    tracing::warn!("{name}: its file was removed; it has been bound again");
+                    tracing::warn!("{name}: socket file was removed; bound again");
                 }
-                Outcome::Same => {
+                SocketState::Unchanged => {
                     if troubles.remove(&name).is_some() {
-                        tracing::info!("{name}: clients reach this daemon there again");
+                        tracing::info!("{name}: reachable again");
                     }
                 }
             }
         }
-        for place in tcp {
-            let name = format!("{LISTEN} {}", place.address());
-            match place.look() {
+        for endpoint in tcp {
+            let name = format!("{LISTEN} {}", endpoint.address());
+            match endpoint.check() {
                 Ok(false) => {}
                 Ok(true) => {
                     troubles.remove(&name);
-                    place.announce();
+                    endpoint.announce();
                 }
-                Err(error) => note(troubles, name, format!("cannot be bound yet: {error}")),
+                Err(error) => {
+                    report_trouble(troubles, name, format!("cannot be bound yet: {error}"))
+                }
             }
         }
     }
 
     fn report(&self) -> ServerReport {
-        let sockets = self.unix.iter().map(|place| place.path().display().to_string());
-        let reached =
+        let sockets = self.unix.iter().map(|endpoint| endpoint.path().display().to_string());
+        let reachable =
             sockets.filter(|path| !self.troubles.contains_key(&format!("{SOCKET} {path}")));
         let addresses =
-            self.tcp.iter().filter_map(TcpPlace::bound).map(|at| format!("http://{at}"));
+            self.tcp.iter().filter_map(TcpEndpoint::bound).map(|at| format!("http://{at}"));
         ServerReport {
-            listening: reached.chain(addresses).collect(),
+            listening: reachable.chain(addresses).collect(),
             trouble: self.troubles.iter().map(|(name, why)| format!("{name}: {why}")).collect(),
         }
     }
 }
 
-impl TcpPlace {
-    /// Logs that it is listened on.
+impl TcpEndpoint {
+    /// Logs the bound address.
     pub(super) fn announce(&self) {
         if let Some(address) = self.bound() {
             tracing::info!("listening on http://{address}");
@@ -96,10 +98,10 @@ impl TcpPlace {
     }
 }
 
-/// Logs a trouble unless it is known.
-pub(super) fn note(troubles: &mut BTreeMap<String, String>, name: String, why: String) {
+/// Records and logs a problem unless it is unchanged.
+pub(super) fn report_trouble(troubles: &mut BTreeMap<String, String>, name: String, why: String) {
     if troubles.get(&name) != Some(&why) {
-        tracing::warn!("{name}: {why}; checked again every {} s", LOOK.as_secs());
+        tracing::warn!("{name}: {why}; checked again every {} s", CHECK_INTERVAL.as_secs());
         troubles.insert(name, why);
     }
 }

@@ -1,60 +1,63 @@
-//! A TCP address, which may not be this computer's yet.
+//! TCP endpoint, whose address may not be assigned to this computer yet.
 
 use std::{io, net::SocketAddr, sync::Arc};
 
 use tokio::{net::TcpListener, sync::watch};
 
-use super::kept::Kept;
+use super::listener::DynamicListener;
 
-/// An address that is listened on as soon as it can be.
+/// TCP address that is bound as soon as possible.
 #[derive(Debug)]
-pub(super) struct TcpPlace {
+pub(super) struct TcpEndpoint {
     address: SocketAddr,
     listener: watch::Sender<Option<Arc<TcpListener>>>,
 }
 
-impl TcpPlace {
-    /// The place of this address, and why it could not be bound at once, if so. Must be called within a tokio runtime.
+impl TcpEndpoint {
+    /// Creates the endpoint; a transient error of the first attempt to bind is returned alongside.
+    /// Must be called within a tokio runtime.
     ///
     /// # Errors
-    /// When it can never be bound by this process.
+    /// Address that this process can never bind.
     pub(super) fn open(
         address: SocketAddr,
-    ) -> io::Result<(Self, Kept<TcpListener>, Option<io::Error>)> {
-        let (listener, not_yet) = match bind(address) {
+    ) -> io::Result<(Self, DynamicListener<TcpListener>, Option<io::Error>)> {
+        let (listener, error) = match bind(address) {
             Ok(listener) => (Some(listener), None),
-            Err(error) if is_lasting(&error) => return Err(error),
+            Err(error) if is_permanent(&error) => return Err(error),
             Err(error) => (None, Some(error)),
         };
-        let (kept, sender) = Kept::new(listener);
-        Ok((Self { address, listener: sender }, kept, not_yet))
+        let (listener_handle, sender) = DynamicListener::new(listener);
+        Ok((Self { address, listener: sender }, listener_handle, error))
     }
 
-    /// A listener that systemd has bound.
+    /// Creates the endpoint of a listener bound by systemd.
     ///
     /// # Errors
-    /// When its address is not known.
-    pub(super) fn inherited(listener: TcpListener) -> io::Result<(Self, Kept<TcpListener>)> {
+    /// Listener without a known address.
+    pub(super) fn inherited(
+        listener: TcpListener,
+    ) -> io::Result<(Self, DynamicListener<TcpListener>)> {
         let address = listener.local_addr()?;
-        let (kept, sender) = Kept::new(Some(listener));
-        Ok((Self { address, listener: sender }, kept))
+        let (listener_handle, sender) = DynamicListener::new(Some(listener));
+        Ok((Self { address, listener: sender }, listener_handle))
     }
 
-    /// The address as configured.
+    /// Configured address.
     pub(super) const fn address(&self) -> SocketAddr {
         self.address
     }
 
-    /// The address that is listened on, if one is.
+    /// Bound address, if any.
     pub(super) fn bound(&self) -> Option<SocketAddr> {
         self.listener.borrow().as_ref().and_then(|listener| listener.local_addr().ok())
     }
 
-    /// Tries again to bind an address that is not bound; whether it is bound by this call.
+    /// Retries to bind an unbound address. Returns `true` if this call has bound it.
     ///
     /// # Errors
-    /// As the system reports.
-    pub(super) fn look(&self) -> io::Result<bool> {
+    /// System error of the attempt.
+    pub(super) fn check(&self) -> io::Result<bool> {
         if self.listener.borrow().is_some() {
             return Ok(false);
         }
@@ -69,8 +72,9 @@ fn bind(address: SocketAddr) -> io::Result<TcpListener> {
     TcpListener::from_std(listener)
 }
 
-/// Whether no later try of the same process can succeed: no address appears and no other program ends that would change it.
-fn is_lasting(error: &io::Error) -> bool {
+/// Returns `true` if no later attempt can succeed, even if addresses are assigned or other programs
+/// exit.
+fn is_permanent(error: &io::Error) -> bool {
     matches!(error.kind(), io::ErrorKind::PermissionDenied | io::ErrorKind::InvalidInput)
 }
 
@@ -79,27 +83,27 @@ mod tests {
     use super::*;
 
     #[tokio::test]
-    async fn a_port_that_is_taken_is_bound_once_it_is_free() {
+    async fn busy_port_is_bound_later() {
         let taken = std::net::TcpListener::bind("127.0.0.1:0").expect("a port");
         let address = taken.local_addr().expect("an address");
-        let (place, kept, not_yet) = TcpPlace::open(address).expect("it may be tried");
-        assert_eq!(not_yet.map(|error| error.kind()), Some(io::ErrorKind::AddrInUse));
-        assert_eq!(place.bound(), None);
-        assert!(place.look().is_err());
+        let (endpoint, listener_handle, error) = TcpEndpoint::open(address).expect("transient");
+        assert_eq!(error.map(|error| error.kind()), Some(io::ErrorKind::AddrInUse));
+        assert_eq!(endpoint.bound(), None);
+        assert!(endpoint.check().is_err());
         drop(taken);
-        assert!(place.look().expect("it is free"));
-        assert!(!place.look().expect("it is bound"));
-        assert_eq!(place.bound(), Some(address));
-        let _client = std::net::TcpStream::connect(address).expect("it listens");
-        kept.accept().await.expect("a connection");
+        assert!(endpoint.check().expect("port is free"));
+        assert!(!endpoint.check().expect("port is bound"));
+        assert_eq!(endpoint.bound(), Some(address));
+        let _client = std::net::TcpStream::connect(address).expect("connects");
+        listener_handle.accept().await.expect("a connection");
     }
 
     #[tokio::test]
-    async fn an_address_of_another_computer_may_be_assigned_later() {
-        // TEST-NET-1 of RFC 5737: no computer's.
+    async fn unassigned_address_is_transient() {
+        // TEST-NET-1 of RFC 5737 is assigned to no computer.
         let address = "192.0.2.1:0".parse().expect("an address");
-        let (place, _kept, not_yet) = TcpPlace::open(address).expect("it may be tried");
-        assert_eq!(not_yet.map(|error| error.kind()), Some(io::ErrorKind::AddrNotAvailable));
-        assert_eq!((place.bound(), place.address()), (None, address));
+        let (endpoint, _listener_handle, error) = TcpEndpoint::open(address).expect("transient");
+        assert_eq!(error.map(|error| error.kind()), Some(io::ErrorKind::AddrNotAvailable));
+        assert_eq!((endpoint.bound(), endpoint.address()), (None, address));
     }
 }

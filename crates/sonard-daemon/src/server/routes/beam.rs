@@ -1,4 +1,4 @@
-//! One beam of a scan: what was heard, what the model hears, and the paths of the sound.
+//! Details of one beam of a scan: measured echoes, predicted arrivals and propagation paths.
 
 use std::sync::Arc;
 
@@ -11,17 +11,17 @@ use sonard_model::{
 };
 use sonard_records::{Ping, ScanView, Session};
 
-/// The model is asked so far beyond what was heard or predicted, metres.
-const BEYOND_M: f64 = 0.5;
+/// Length of the trace beyond the last measured or predicted echo, metres.
+const MARGIN_M: f64 = 0.5;
 /// Spacing of the samples that find an envelope peak, microseconds.
 const STEP_US: f64 = 20.0;
 
-/// Everything about a reading of a scan. The model is asked if `scene` is the one that the scan
-/// was taken in.
-pub(super) fn look(view: &ScanView, ping: Ping, scene: Option<&Scene>) -> Beam {
+/// Assembles the details of a reading. A prediction is computed only if `scene` is the scene of the
+/// scan.
+pub(super) fn describe_beam(view: &ScanView, ping: Ping, scene: Option<&Scene>) -> Beam {
     let session = view.session.as_deref();
     let echoes = echoes(view, session, &ping);
-    let (peaks, trace, lacks) = match ask_model(view, session, &ping, scene) {
+    let (peaks, trace, lacks) = match predict(view, session, &ping, scene) {
         Ok((peaks, trace)) => (Some(peaks), Some(trace), None),
         Err(lacks) => (None, None, Some(lacks)),
     };
@@ -44,35 +44,36 @@ fn echoes(view: &ScanView, session: Option<&Session>, ping: &Ping) -> Vec<Echo> 
     ping.echo_ticks.iter().map(echo).collect()
 }
 
-fn ask_model(
+fn predict(
     view: &ScanView,
     session: Option<&Session>,
     ping: &Ping,
     scene: Option<&Scene>,
 ) -> Result<(Vec<PeakLine>, TraceLine), String> {
-    let (session, pose) = session.zip(view.pose()).ok_or("the log lacks the scan's session")?;
-    let scene = scene.ok_or("there is no scene in force")?;
-    let taken_in = session.scene.as_ref().ok_or("the scan was taken without a scene")?;
-    if taken_in.sha256 != scene.sha256 {
-        return Err(format!("the scan was taken in another scene, {}", taken_in.name));
+    let (session, pose) =
+        session.zip(view.pose()).ok_or("the log does not contain the scan's session")?;
+    let scene = scene.ok_or("no scene is configured")?;
+    let logged_scene = session.scene.as_ref().ok_or("the scan has no scene")?;
+    if logged_scene.sha256 != scene.sha256 {
+        return Err(format!("the scan belongs to another scene, {}", logged_scene.name));
     }
-    let model = session.model.as_ref().ok_or("the scan was taken without a model")?;
-    let options = model.options().ok_or("the scan's model is unknown here")?;
+    let model = session.model.as_ref().ok_or("the scan has no model")?;
+    let options = model.options().ok_or("the scan's model is not supported by this version")?;
     let air = air(view, session).map_err(|error| error.to_string())?;
-    let axis = ping.axis(Some(session), &pose).ok_or("the log's array has no such ranger")?;
+    let axis = ping.axis(Some(session), &pose).ok_or("the logged array has no such ranger")?;
     let scene = Arc::new(session.scene_around(scene, &ping.pose.unwrap_or(pose)));
     let sensor = session.sensor_of(ping);
-    let heard_m = [ping.range_m, ping.sim.as_ref().and_then(|sim| sim.range_m)];
-    let heard_m = heard_m.into_iter().flatten().fold(0.0, f64::max);
+    let last_echo_m = [ping.range_m, ping.sim.as_ref().and_then(|sim| sim.range_m)];
+    let last_echo_m = last_echo_m.into_iter().flatten().fold(0.0, f64::max);
     let until_m = options.max_range_m.unwrap_or(sensor.max_range_m);
-    let until_m = if heard_m > 0.0 { until_m.min(heard_m + BEYOND_M) } else { until_m };
+    let until_m = if last_echo_m > 0.0 { until_m.min(last_echo_m + MARGIN_M) } else { until_m };
     let options = Options { max_range_m: Some(until_m), ..options };
     let simulator = Simulator::new(Arc::clone(&scene), sensor, air, options)
         .map_err(|error| error.to_string())?;
-    listen(&simulator, &axis, until_m).map_err(|error| error.to_string())
+    predict_arrivals(&simulator, &axis, until_m).map_err(|error| error.to_string())
 }
 
-/// The session's air, at the temperature that was known when the scan began.
+/// Returns the session's air at the temperature of the scan's start.
 fn air(view: &ScanView, session: &Session) -> Result<Air, sonard_model::acoustics::AirError> {
     match view.start.as_ref().and_then(|start| start.air) {
         Some(scan) => {
@@ -82,7 +83,7 @@ fn air(view: &ScanView, session: &Session) -> Result<Air, sonard_model::acoustic
     }
 }
 
-fn listen(
+fn predict_arrivals(
     simulator: &Simulator,
     axis: &Pose,
     until_m: f64,

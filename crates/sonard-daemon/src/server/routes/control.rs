@@ -1,4 +1,4 @@
-//! Orders.
+//! Handlers of requests that change settings, and that start and stop scans.
 
 use axum::{Json, extract::State, http::StatusCode};
 use sonard_api::{Accepted, AirOrder, CancelRequest, ScanRequest, Scanning, SensorOrder, Started};
@@ -9,73 +9,64 @@ use crate::{
     Order,
     server::{
         Api,
-        answer::{Body, Failed},
-        openapi::Endpoint,
+        openapi::Route,
+        response::{ApiError, JsonBody},
     },
 };
 
-type Answer = Result<(StatusCode, Json<Accepted>), Failed>;
+type CommandResult = Result<(StatusCode, Json<Accepted>), ApiError>;
 
-pub(super) fn endpoints() -> Vec<Endpoint> {
-    let taken = "Taken in; it counts from the next scan on";
+pub(super) fn endpoints() -> Vec<Route> {
+    let accepted = "Accepted; takes effect with the next scan";
     vec![
-        Endpoint::post("/v1/start", start, "Take scans, or go on with those of the mode")
-            .takes::<ScanRequest>()
-            .answers::<Started>(202, "Taken in"),
-        Endpoint::post(
-            "/v1/cancel",
-            cancel,
-            "Take no more scans of a request, end the one under way",
-        )
-        .takes::<CancelRequest>()
-        .answers::<Accepted>(202, "Taken in"),
-        Endpoint::get("/v1/scanning", scanning, "When scans are taken")
-            .answers::<Scanning>(200, "The mode"),
-        Endpoint::put("/v1/scanning", set_scanning, "Take scans in this way, from now on")
-            .takes::<Scanning>()
-            .answers::<Accepted>(202, "Taken in"),
-        Endpoint::post("/v1/stop", stop, "End the scan under way and take no more until a start")
-            .answers::<Accepted>(202, "Taken in"),
-        Endpoint::put("/v1/plan", plan, "Measure these azimuths")
-            .takes::<ScanPlan>()
-            .answers::<Accepted>(202, taken),
-        Endpoint::put("/v1/pose", pose, "The ranger stands here")
-            .takes::<Pose>()
-            .answers::<Accepted>(202, taken),
-        Endpoint::put("/v1/air", air, "The air is like this")
-            .takes::<AirOrder>()
-            .answers::<Accepted>(202, taken),
-        Endpoint::delete(
-            "/v1/air",
-            own_air,
-            "The air is again what the configuration and the thermometer say",
-        )
-        .answers::<Accepted>(202, taken),
-        Endpoint::put(
+        Route::post("/v1/start", start, "Start scans, or resume the scan mode")
+            .accepts::<ScanRequest>()
+            .responds::<Started>(202, "Accepted"),
+        Route::post("/v1/cancel", cancel, "Cancel a request for scans; its current scan ends")
+            .accepts::<CancelRequest>()
+            .responds::<Accepted>(202, "Accepted"),
+        Route::get("/v1/scanning", scanning, "Scan mode and schedule")
+            .responds::<Scanning>(200, "Scan mode"),
+        Route::put("/v1/scanning", set_scanning, "Set the scan mode")
+            .accepts::<Scanning>()
+            .responds::<Accepted>(202, "Accepted"),
+        Route::post("/v1/stop", stop, "End the current scan and stop scanning until a start")
+            .responds::<Accepted>(202, "Accepted"),
+        Route::put("/v1/plan", plan, "Set the azimuths of scans")
+            .accepts::<ScanPlan>()
+            .responds::<Accepted>(202, accepted),
+        Route::put("/v1/pose", pose, "Set the pose of the ranger")
+            .accepts::<Pose>()
+            .responds::<Accepted>(202, accepted),
+        Route::put("/v1/air", air, "Set the air data")
+            .accepts::<AirOrder>()
+            .responds::<Accepted>(202, accepted),
+        Route::delete("/v1/air", reset_air, "Reset the air data to configuration and thermometer")
+            .responds::<Accepted>(202, accepted),
+        Route::put(
             "/v1/sensor",
             sensor,
-            "The sensor is like this: what readings are predicted for, and when the receiver listens",
+            "Set the sensor: prediction of readings, and receiver blanking",
         )
-        .takes::<SensorOrder>()
-        .answers::<Accepted>(202, taken),
-        Endpoint::delete(
-            "/v1/sensor",
-            own_sensor,
-            "The sensor is again what the configuration says",
-        )
-        .answers::<Accepted>(202, taken),
+        .accepts::<SensorOrder>()
+        .responds::<Accepted>(202, accepted),
+        Route::delete("/v1/sensor", reset_sensor, "Reset the sensor to the configuration")
+            .responds::<Accepted>(202, accepted),
     ]
 }
 
 async fn start(
     State(api): State<Api>,
-    Body(start): Body<ScanRequest>,
-) -> Result<(StatusCode, Json<Started>), Failed> {
+    JsonBody(start): JsonBody<ScanRequest>,
+) -> Result<(StatusCode, Json<Started>), ApiError> {
     Ok((StatusCode::ACCEPTED, Json(api.daemon.start(start).await?)))
 }
 
-async fn cancel(State(api): State<Api>, Body(cancel): Body<CancelRequest>) -> Answer {
-    carry_out(&api, Order::Cancel(cancel.request)).await
+async fn cancel(
+    State(api): State<Api>,
+    JsonBody(cancel): JsonBody<CancelRequest>,
+) -> CommandResult {
+    execute(&api, Order::Cancel(cancel.request)).await
 }
 
 async fn scanning(State(api): State<Api>) -> Json<Scanning> {
@@ -83,39 +74,42 @@ async fn scanning(State(api): State<Api>) -> Json<Scanning> {
     Json(Scanning { mode: report.mode, every_s: Some(report.every_s) })
 }
 
-async fn set_scanning(State(api): State<Api>, Body(scanning): Body<Scanning>) -> Answer {
-    carry_out(&api, Order::Mode(scanning.mode, scanning.every_s)).await
+async fn set_scanning(
+    State(api): State<Api>,
+    JsonBody(scanning): JsonBody<Scanning>,
+) -> CommandResult {
+    execute(&api, Order::Mode(scanning.mode, scanning.every_s)).await
 }
 
-async fn stop(State(api): State<Api>) -> Answer {
-    carry_out(&api, Order::Stop).await
+async fn stop(State(api): State<Api>) -> CommandResult {
+    execute(&api, Order::Stop).await
 }
 
-async fn plan(State(api): State<Api>, Body(plan): Body<ScanPlan>) -> Answer {
-    carry_out(&api, Order::Plan(plan)).await
+async fn plan(State(api): State<Api>, JsonBody(plan): JsonBody<ScanPlan>) -> CommandResult {
+    execute(&api, Order::Plan(plan)).await
 }
 
-async fn pose(State(api): State<Api>, Body(pose): Body<Pose>) -> Answer {
-    carry_out(&api, Order::Pose(pose)).await
+async fn pose(State(api): State<Api>, JsonBody(pose): JsonBody<Pose>) -> CommandResult {
+    execute(&api, Order::Pose(pose)).await
 }
 
-async fn air(State(api): State<Api>, Body(order): Body<AirOrder>) -> Answer {
-    carry_out(&api, Order::Air(order)).await
+async fn air(State(api): State<Api>, JsonBody(order): JsonBody<AirOrder>) -> CommandResult {
+    execute(&api, Order::Air(order)).await
 }
 
-async fn own_air(State(api): State<Api>) -> Answer {
-    carry_out(&api, Order::OwnAir).await
+async fn reset_air(State(api): State<Api>) -> CommandResult {
+    execute(&api, Order::OwnAir).await
 }
 
-async fn sensor(State(api): State<Api>, Body(order): Body<SensorOrder>) -> Answer {
-    carry_out(&api, Order::Sensor(Box::new(order))).await
+async fn sensor(State(api): State<Api>, JsonBody(order): JsonBody<SensorOrder>) -> CommandResult {
+    execute(&api, Order::Sensor(Box::new(order))).await
 }
 
-async fn own_sensor(State(api): State<Api>) -> Answer {
-    carry_out(&api, Order::OwnSensor).await
+async fn reset_sensor(State(api): State<Api>) -> CommandResult {
+    execute(&api, Order::OwnSensor).await
 }
 
-async fn carry_out(api: &Api, order: Order) -> Answer {
+async fn execute(api: &Api, order: Order) -> CommandResult {
     api.daemon.order(order).await?;
     Ok((StatusCode::ACCEPTED, Json(Accepted { accepted: true })))
 }

@@ -1,4 +1,4 @@
-//! What can be made of a scan: a map, lines, and planes, corners and edges.
+//! Interpretation of a scan: occupancy grid, lines, planes, corners and edges.
 
 use std::sync::Arc;
 
@@ -16,60 +16,64 @@ use sonard_log::Passage;
 use sonard_records::{Record, ScanView, decode_line};
 use tokio::sync::OwnedSemaphorePermit;
 
-use super::scans::{broken, find_written, unreadable};
+use super::scans::{find_written, internal_error, unreadable};
 use crate::server::{
     Api,
-    answer::{Failed, Path},
-    openapi::Endpoint,
+    openapi::Route,
+    response::{ApiError, PathParams},
 };
 
-/// Most readings of a scan that something is made of.
-const MOST_READINGS: usize = 4000;
-/// Most cells of a map; cells are made larger for more.
-const MOST_CELLS: f64 = 40_000.0;
+/// Maximum number of readings of an interpreted scan.
+const MAX_READINGS: usize = 4000;
+/// Maximum number of cells of a grid; a larger area has larger cells.
+const MAX_CELLS: f64 = 40_000.0;
 
-pub(super) fn endpoints() -> Vec<Endpoint> {
-    let about = "A map, lines, and planes, corners and edges made of a scan by itself, as `sonard map`, \
-                 `lines` and `interpret` make them. Of at most 4000 readings";
+pub(super) fn endpoints() -> Vec<Route> {
+    let about = "Occupancy grid, lines, planes, corners and edges of a single scan, as computed by `sonard map`, \
+                 `lines` and `interpret`. At most 4000 readings";
     vec![
-        Endpoint::get("/v1/scans/{scan}/findings", findings, about)
+        Route::get("/v1/scans/{scan}/findings", findings, about)
             .parameter(
                 "path",
                 "scan",
                 json!({"type": "string", "format": "uuid"}),
-                "A scan from GET /v1/scans, or the one under way",
+                "Scan from GET /v1/scans, or the current scan",
             )
-            .answers::<Findings>(200, "What was found"),
+            .responds::<Findings>(200, "Interpretation of the scan"),
     ]
 }
 
 async fn findings(
     State(api): State<Api>,
-    Path(scan): Path<String>,
-) -> Result<Json<Findings>, Failed> {
+    PathParams(scan): PathParams<String>,
+) -> Result<Json<Findings>, ApiError> {
     let passage = find_written(&api, &scan).await?;
-    // One after the other, also when clients leave meanwhile.
-    let turn = Arc::clone(&api.looking).acquire_owned().await.ok();
-    let finding = tokio::task::spawn_blocking(move || find_in(&passage, turn));
-    finding.await.map_err(|error| broken(&error))?.map(Json)
+    // One interpretation at a time, even if clients disconnect meanwhile.
+    let permit = Arc::clone(&api.predicting).acquire_owned().await.ok();
+    let finding = tokio::task::spawn_blocking(move || interpret_scan(&passage, permit));
+    finding.await.map_err(|error| internal_error(&error))?.map(Json)
 }
 
-fn find_in(passage: &Passage, _turn: Option<OwnedSemaphorePermit>) -> Result<Findings, Failed> {
+fn interpret_scan(
+    passage: &Passage,
+    _permit: Option<OwnedSemaphorePermit>,
+) -> Result<Findings, ApiError> {
     let view = read(passage)?;
-    let nothing = |why: String| Failed::new(StatusCode::CONFLICT, why, "see `sonard map --help`");
+    let nothing = |why: String| ApiError::new(StatusCode::CONFLICT, why, "see `sonard map --help`");
     let session = view.session.as_deref();
-    let session = session.ok_or_else(|| nothing("the log lacks the scan's session".into()))?;
+    let session =
+        session.ok_or_else(|| nothing("the log does not contain the scan's session".into()))?;
     let extents = Extents::of_session(session).map_err(|error| nothing(error.to_string()))?;
     let sweep = Sweep::of(&view).map_err(|error| nothing(error.to_string()))?;
-    let of_array = session.array.is_some();
+    let is_array = session.array.is_some();
     let mut lines = LineMap::new(LineMapSettings::default());
     lines.add_sonar(&sweep);
-    let map = map(&sweep, &extents, of_array);
+    let map = map(&sweep, &extents, is_array);
     let sweeps = [(view.scan, sweep)];
-    // Arcs need one ranger that turns.
+    // Features are derived from arcs, which need a scanning ranger.
     let features =
-        if of_array { Vec::new() } else { interpret(&sweeps, &extents, &Settings::default()) };
-    let lacks = of_array.then(|| "features need one ranger that turns".to_owned());
+        if is_array { Vec::new() } else { interpret(&sweeps, &extents, &Settings::default()) };
+    let lacks = is_array.then(|| "features need a scanning ranger".to_owned());
     Ok(Findings {
         map,
         lines: lines.lines().iter().map(found_line).collect(),
@@ -78,8 +82,8 @@ fn find_in(passage: &Passage, _turn: Option<OwnedSemaphorePermit>) -> Result<Fin
     })
 }
 
-/// The scan with its readings; of a beam that was measured twice the last one.
-pub(super) fn read(passage: &Passage) -> Result<ScanView, Failed> {
+/// Reads the scan with its readings; the last one of a repeated beam counts.
+pub(super) fn read(passage: &Passage) -> Result<ScanView, ApiError> {
     let mut view = passage.view.clone();
     let mut count = 0;
     for line in passage.lines(true).map_err(|error| unreadable(&error))? {
@@ -89,27 +93,26 @@ pub(super) fn read(passage: &Passage) -> Result<ScanView, Failed> {
             continue;
         }
         count += 1;
-        if count > MOST_READINGS {
-            let help =
-                "`sonard map`, `sonard lines` and `sonard interpret` take logs of any length";
-            let error = format!("the scan has more than {MOST_READINGS} readings");
-            return Err(Failed::new(StatusCode::CONFLICT, error, help));
+        if count > MAX_READINGS {
+            let help = "use `sonard map`, `sonard lines` and `sonard interpret`, which accept logs of any length";
+            let error = format!("more than {MAX_READINGS} readings");
+            return Err(ApiError::new(StatusCode::CONFLICT, error, help));
         }
         view.pings.push(*ping);
     }
     Ok(view)
 }
 
-fn map(sweep: &Sweep, extents: &Extents, of_array: bool) -> Option<MapCells> {
+fn map(sweep: &Sweep, extents: &Extents, is_array: bool) -> Option<MapCells> {
     let mut mapping = Mapping::default();
     let max_range_m = mapping.max_range_m(extents);
     let mut shape = mapping.shape([sweep], max_range_m).ok()?;
-    let coarser = (shape.cells() as f64 / MOST_CELLS).sqrt();
+    let coarser = (shape.cells() as f64 / MAX_CELLS).sqrt();
     if coarser > 1.0 {
         mapping.resolution_m *= coarser * 1.05;
         shape = mapping.shape([sweep], max_range_m).ok()?;
     }
-    let mut mapper = Mapper::new(&mapping, Grid::new(shape), extents.clone(), of_array, 1);
+    let mut mapper = Mapper::new(&mapping, Grid::new(shape), extents.clone(), is_array, 1);
     mapper.add(sweep);
     let grid = mapper.finish();
     let percent = |p: f64| if (p - 0.5).abs() < 1e-6 { -1 } else { (100.0 * p).round() as i8 };
@@ -126,7 +129,7 @@ fn found_line(line: &MapLine) -> FoundLine {
     FoundLine { from, to, confidence: line.confidence }
 }
 
-/// Of a feature whose range is known.
+/// Converts a feature; `None` if its range is unknown.
 fn found_feature(feature: &Feature) -> Option<FoundFeature> {
     Some(FoundFeature {
         kind: feature.kind,

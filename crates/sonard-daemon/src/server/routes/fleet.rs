@@ -1,4 +1,4 @@
-//! Other robots that this daemon asks.
+//! State of the other robots that this daemon polls.
 
 use axum::{
     extract::State,
@@ -8,35 +8,35 @@ use axum::{
 use sonard_api::Fleet;
 
 use super::page::{self, HTML};
-use crate::server::{Api, answer::Failed, openapi::Endpoint};
+use crate::server::{Api, openapi::Route, response::ApiError};
 
-/// The fleet's page.
+/// Path of the fleet page.
 pub(super) const PAGE: &str = "/fleet";
 
-pub(super) fn endpoints() -> Vec<Endpoint> {
+pub(super) fn endpoints() -> Vec<Route> {
     vec![
-        Endpoint::get(
+        Route::get(
             "/v1/fleet",
             fleet,
-            "How other robots are that this daemon asks (fleet.daemons)",
+            "State of other robots, as polled by this daemon (fleet.daemons)",
         )
-        .answers::<Fleet>(200, "The robots"),
-        Endpoint::get(PAGE, index, "The page of all robots").answers_text(200, HTML, "The page"),
+        .responds::<Fleet>(200, "Robots and their state"),
+        Route::get(PAGE, index, "Page of all robots").responds_text(200, HTML, "HTML page"),
     ]
 }
 
-async fn fleet(State(api): State<Api>) -> Result<Response, Failed> {
+async fn fleet(State(api): State<Api>) -> Result<Response, ApiError> {
     let fleet = api.fleet.as_ref().ok_or_else(no_fleet)?;
-    let told = fleet.borrow().clone();
-    Ok(([(header::CONTENT_TYPE, "application/json")], told).into_response())
+    let state = fleet.borrow().clone();
+    Ok(([(header::CONTENT_TYPE, "application/json")], state).into_response())
 }
 
-async fn index(State(api): State<Api>, headers: HeaderMap) -> Result<Response, Failed> {
+async fn index(State(api): State<Api>, headers: HeaderMap) -> Result<Response, ApiError> {
     api.fleet.as_ref().ok_or_else(no_fleet)?;
     Ok(page::fleet(&headers))
 }
 
-fn no_fleet() -> Failed {
-    let help = "name others in fleet.daemons";
-    Failed::new(StatusCode::NOT_FOUND, "this daemon asks no other", help)
+fn no_fleet() -> ApiError {
+    let help = "list other daemons in fleet.daemons";
+    ApiError::new(StatusCode::NOT_FOUND, "no fleet is configured", help)
 }

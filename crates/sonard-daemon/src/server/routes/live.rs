@@ -1,4 +1,4 @@
-//! Live streams: lines of JSON, or server-sent events for browsers.
+//! Live streams as lines of JSON, or as server-sent events for browsers.
 
 use std::{convert::Infallible, io, sync::Arc, time::Duration};
 
@@ -17,30 +17,30 @@ use sonard_records::Record;
 use tokio::{sync::OwnedSemaphorePermit, time::timeout};
 
 use super::{
-    pieces::{Form, Pieces, read_on},
-    scans::written,
+    pieces::{ScanForm, ScanPieces, next_piece},
+    scans::wait_written,
 };
 use crate::{
     Moved, ScanSubscription, Subscription, Wanted,
     server::{
-        Api, Standing,
-        answer::{Failed, Query},
-        openapi::Endpoint,
+        Api, Principal,
+        openapi::Route,
+        response::{ApiError, QueryParams},
     },
 };
 
-const MOVED: &str = "Only readings whose range moved by more than this since it was last sent for \
-                     that direction, or whose status changed";
+const MOVED_ABOUT: &str = "Only readings whose range changed by more than this (metres) since the last one \
+                     sent for the same direction, or whose status changed";
 const NDJSON: &str = "application/x-ndjson";
 const SSE: &str = "text/event-stream";
-/// How often a stream in which nothing happens shows that it is alive; clients wait longer than twice that.
-const SIGN_OF_LIFE: Duration = Duration::from_secs(15);
+/// Keep-alive interval of an idle stream. Client timeouts are longer than twice this interval.
+const KEEP_ALIVE_INTERVAL: Duration = Duration::from_secs(15);
 
 #[derive(Debug, Clone, Copy, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct Options {
+pub(super) struct StreamOptions {
     #[serde(default)]
-    format: Option<Format>,
+    format: Option<StreamFormat>,
     #[serde(default)]
     moved_m: Option<f64>,
     #[serde(default)]
@@ -49,132 +49,134 @@ pub(super) struct Options {
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
-enum Format {
+enum StreamFormat {
     Ndjson,
     Sse,
 }
 
-/// A record of a live stream.
+/// Record of a live stream.
 #[derive(JsonSchema)]
-#[expect(dead_code, reason = "its schema says what is written")]
+#[expect(dead_code, reason = "only its schema is used")]
 struct LiveRecord {
-    /// The record, as in a log.
+    /// Record, as in a log.
     #[serde(flatten)]
     record: Record,
-    /// What is told beside a reading, with `verdicts`.
+    /// Annotations of a reading, with `verdicts`.
     #[serde(flatten)]
     beside: Option<Beside>,
 }
 
-pub(super) fn endpoints() -> Vec<Endpoint> {
+pub(super) fn endpoints() -> Vec<Route> {
     let format = json!({"type": "string", "enum": ["ndjson", "sse"]});
-    let format_about = "Lines of JSON or server-sent events; without it, as `Accept` says";
-    let scans = "One scan a line, read from the log: a slow client costs no memory. A line \
-        {\"type\":\"dropped\",\"scans\":N} stands for scans that the log no longer has. While none ends, an \
-        empty line every 15 s shows that the daemon is alive";
-    let records = "One record a line, as in a log. A line {\"type\":\"dropped\",\"readings\":N} \
-        stands for readings that this client was too slow for. While nothing happens, an empty line every \
-        15 s shows that the daemon is alive";
+    let format_about = "Lines of JSON or server-sent events; by default according to `Accept`";
+    let scans = "One scan per line, read from the log. A line {\"type\":\"dropped\",\"scans\":N} replaces scans \
+        that the log no longer contains. An idle stream has an empty line every 15 s (keep-alive)";
+    let records = "One record per line, as in a log. A line {\"type\":\"dropped\",\"readings\":N} \
+        replaces readings dropped because this client was too slow. An idle stream has an empty line \
+        every 15 s (keep-alive)";
     vec![
-        Endpoint::get("/v1/live/records", live_records, "Records as they are made")
+        Route::get("/v1/live/records", live_records, "Live records")
             .parameter("query", "format", format.clone(), format_about)
-            .parameter("query", "moved_m", json!({"type": "number", "minimum": 0}), MOVED)
+            .parameter("query", "moved_m", json!({"type": "number", "minimum": 0}), MOVED_ABOUT)
             .parameter(
                 "query",
                 "verdicts",
                 json!({"type": "boolean"}),
-                "Give each reading a `verdict` and a `viewpoint`, as GET /v1/scans/{scan} has them",
+                "Add a `verdict` and a `viewpoint` to each reading, as in GET /v1/scans/{scan}",
             )
-            .answers_as::<LiveRecord>(200, NDJSON, records)
-            .answers_as::<LiveRecord>(200, SSE, records),
-        Endpoint::get("/v1/live/scans", live_scans, "Whole scans when they are over")
+            .responds_as::<LiveRecord>(200, NDJSON, records)
+            .responds_as::<LiveRecord>(200, SSE, records),
+        Route::get("/v1/live/scans", live_scans, "Complete scans, each after its end")
             .parameter("query", "format", format, format_about)
-            .parameter("query", "moved_m", json!({"type": "number", "minimum": 0}), MOVED)
-            .answers_as::<ScanReport>(200, NDJSON, scans)
-            .answers_as::<ScanReport>(200, SSE, scans),
+            .parameter("query", "moved_m", json!({"type": "number", "minimum": 0}), MOVED_ABOUT)
+            .responds_as::<ScanReport>(200, NDJSON, scans)
+            .responds_as::<ScanReport>(200, SSE, scans),
     ]
 }
 
 async fn live_records(
     State(api): State<Api>,
-    Extension(standing): Extension<Standing>,
+    Extension(principal): Extension<Principal>,
     headers: HeaderMap,
-    Query(options): Query<Options>,
-) -> Result<Response, Failed> {
-    let (format, leave) = begin(&api, standing, &headers, options)?;
-    let wanted = Wanted { moved_m: options.moved_m, verdicts: options.verdicts };
-    let subscription = api.daemon.hub().subscribe(wanted);
-    let lines =
-        stream::unfold((subscription, leave), move |(mut subscription, leave)| async move {
-            let line = next_line(&mut subscription, format).await?;
-            Some((line, (subscription, leave)))
-        });
-    Ok(answer(format, lines.map(Ok::<_, Infallible>)))
+    QueryParams(options): QueryParams<StreamOptions>,
+) -> Result<Response, ApiError> {
+    let (format, slot) = prepare(&api, principal, &headers, options)?;
+    let filter = Wanted { moved_m: options.moved_m, verdicts: options.verdicts };
+    let subscription = api.daemon.hub().subscribe(filter);
+    let lines = stream::unfold((subscription, slot), move |(mut subscription, slot)| async move {
+        let line = next_line(&mut subscription, format).await?;
+        Some((line, (subscription, slot)))
+    });
+    Ok(stream_response(format, lines.map(Ok::<_, Infallible>)))
 }
 
 async fn live_scans(
     State(api): State<Api>,
-    Extension(standing): Extension<Standing>,
+    Extension(principal): Extension<Principal>,
     headers: HeaderMap,
-    Query(options): Query<Options>,
-) -> Result<Response, Failed> {
-    let (format, leave) = begin(&api, standing, &headers, options)?;
-    let scans = Scans {
+    QueryParams(options): QueryParams<StreamOptions>,
+) -> Result<Response, ApiError> {
+    let (format, slot) = prepare(&api, principal, &headers, options)?;
+    let scans = ScanStream {
         subscription: api.daemon.hub().subscribe_scans(),
         api,
         format,
         moved: Moved::new(options.moved_m),
         current: None,
-        _leave: leave,
+        _slot: slot,
     };
     let pieces = stream::unfold(Some(scans), |scans| async move {
         match scans?.next().await {
             Ok((piece, scans)) => Some((Ok(piece?), Some(scans))),
-            // What was begun can't be ended: the client sees that the stream broke off.
+            // A partial scan can't be completed, so the stream is aborted.
             Err(error) => Some((Err(error), None)),
         }
     });
-    Ok(answer(format, pieces))
+    Ok(stream_response(format, pieces))
 }
 
-/// The form of a stream, and leave for it.
-fn begin(
+/// Returns the format of a stream, and a slot for it.
+fn prepare(
     api: &Api,
-    standing: Standing,
+    principal: Principal,
     headers: &HeaderMap,
-    options: Options,
-) -> Result<(Format, Option<OwnedSemaphorePermit>), Failed> {
+    options: StreamOptions,
+) -> Result<(StreamFormat, Option<OwnedSemaphorePermit>), ApiError> {
     if options.moved_m.is_some_and(|moved_m| !(moved_m.is_finite() && moved_m >= 0.0)) {
         let status = StatusCode::UNPROCESSABLE_ENTITY;
-        return Err(Failed::new(status, "moved_m is no length", "metres, 0 or more"));
+        return Err(ApiError::new(
+            status,
+            "moved_m is not a valid length",
+            "expected metres, 0 or more",
+        ));
     }
-    let leave = api.places.take_stream(standing).ok_or_else(|| {
-        let help = "subscribe by the unix socket, or show the token; or raise server.max_clients";
-        Failed::new(StatusCode::SERVICE_UNAVAILABLE, "too many live streams of guests", help)
+    let slot = api.slots.take_stream(principal).ok_or_else(|| {
+        let help = "use the unix socket, send the token, or raise server.max_clients";
+        ApiError::new(StatusCode::SERVICE_UNAVAILABLE, "too many live streams of guests", help)
     })?;
     let accepts_events = headers
         .get(header::ACCEPT)
         .and_then(|accept| accept.to_str().ok())
         .is_some_and(|accept| accept.contains(SSE));
-    let usual = if accepts_events { Format::Sse } else { Format::Ndjson };
-    Ok((options.format.unwrap_or(usual), leave))
+    let default_format = if accepts_events { StreamFormat::Sse } else { StreamFormat::Ndjson };
+    Ok((options.format.unwrap_or(default_format), slot))
 }
 
-fn answer<E>(
-    format: Format,
+fn stream_response<E>(
+    format: StreamFormat,
     pieces: impl Stream<Item = Result<Bytes, E>> + Send + 'static,
 ) -> Response
 where
     E: Into<Box<dyn std::error::Error + Send + Sync>> + 'static,
 {
     let mut response = Body::from_stream(pieces).into_response();
-    let media = if format == Format::Sse { SSE } else { NDJSON };
+    let media = if format == StreamFormat::Sse { SSE } else { NDJSON };
     response.headers_mut().insert(header::CONTENT_TYPE, HeaderValue::from_static(media));
     response
 }
 
-impl Format {
-    /// What stands before and after each text.
+impl StreamFormat {
+    /// Prefix and suffix of each text.
     const fn around(self) -> [&'static [u8]; 2] {
         match self {
             Self::Ndjson => [b"", b"\n"],
@@ -182,8 +184,8 @@ impl Format {
         }
     }
 
-    /// What shows that a stream is alive: an empty line, or a comment.
-    const fn sign_of_life(self) -> Bytes {
+    /// Keep-alive message: an empty line, or a comment.
+    const fn keep_alive(self) -> Bytes {
         Bytes::from_static(match self {
             Self::Ndjson => b"\n",
             Self::Sse => b":\n\n",
@@ -191,40 +193,41 @@ impl Format {
     }
 }
 
-/// The next line of a stream; `None` at its end. Where nothing has to stand around it, it is everybody's.
-async fn next_line(subscription: &mut Subscription, format: Format) -> Option<Bytes> {
-    let Ok(line) = timeout(SIGN_OF_LIFE, subscription.next()).await else {
-        return Some(format.sign_of_life());
+/// Returns the next line of a stream; `None` at its end. Lines without a prefix are shared by all
+/// subscribers.
+async fn next_line(subscription: &mut Subscription, format: StreamFormat) -> Option<Bytes> {
+    let Ok(line) = timeout(KEEP_ALIVE_INTERVAL, subscription.next()).await else {
+        return Some(format.keep_alive());
     };
     match format {
-        Format::Ndjson => Some(Bytes::from_owner(line?)),
-        Format::Sse => Some([b"data: ", &*line?, b"\n"].concat().into()),
+        StreamFormat::Ndjson => Some(Bytes::from_owner(line?)),
+        StreamFormat::Sse => Some([b"data: ", &*line?, b"\n"].concat().into()),
     }
 }
 
-/// A stream of whole scans.
-struct Scans {
+/// Stream of complete scans.
+struct ScanStream {
     subscription: ScanSubscription,
     api: Api,
-    format: Format,
+    format: StreamFormat,
     moved: Moved,
-    /// The one that is being sent.
-    current: Option<Pieces>,
-    _leave: Option<OwnedSemaphorePermit>,
+    /// Scan that is being sent.
+    current: Option<ScanPieces>,
+    _slot: Option<OwnedSemaphorePermit>,
 }
 
-impl Scans {
-    /// The next piece of the stream; `None` at its end.
+impl ScanStream {
+    /// Returns the next piece of the stream; `None` at its end.
     async fn next(mut self) -> io::Result<(Option<Bytes>, Self)> {
         loop {
             let pieces = match self.current.take() {
                 Some(pieces) => pieces,
                 None => match self.begin().await? {
-                    Begun::Scan(pieces) => *pieces,
-                    Begun::Told(told) => return Ok((told, self)),
+                    ScanStreamItem::Scan(pieces) => *pieces,
+                    ScanStreamItem::Text(text) => return Ok((text, self)),
                 },
             };
-            let (piece, pieces) = read_on(pieces, Arc::clone(&self.api.reading)).await?;
+            let (piece, pieces) = next_piece(pieces, Arc::clone(&self.api.reading)).await?;
             if piece.is_some() {
                 self.current = Some(pieces);
                 return Ok((piece, self));
@@ -233,30 +236,30 @@ impl Scans {
         }
     }
 
-    /// Waits for the next scan.
-    async fn begin(&mut self) -> io::Result<Begun> {
-        let scan = match timeout(SIGN_OF_LIFE, self.subscription.next()).await {
+    /// Waits for the next scan or a keep-alive message.
+    async fn begin(&mut self) -> io::Result<ScanStreamItem> {
+        let scan = match timeout(KEEP_ALIVE_INTERVAL, self.subscription.next()).await {
             Ok(Some(scan)) => scan,
-            Ok(None) => return Ok(Begun::Told(None)),
-            Err(_nothing_yet) => return Ok(Begun::Told(Some(self.format.sign_of_life()))),
+            Ok(None) => return Ok(ScanStreamItem::Text(None)),
+            Err(_nothing_yet) => return Ok(ScanStreamItem::Text(Some(self.format.keep_alive()))),
         };
-        let passage = written(&self.api, scan)
+        let passage = wait_written(&self.api, scan)
             .await
             .map_err(|failed| io::Error::other(failed.problem.error))?;
         let around = self.format.around();
         let Some(passage) = passage else {
-            let told = [around[0], br#"{"type":"dropped","scans":1}"#, around[1]].concat();
-            return Ok(Begun::Told(Some(told.into())));
+            let text = [around[0], br#"{"type":"dropped","scans":1}"#, around[1]].concat();
+            return Ok(ScanStreamItem::Text(Some(text.into())));
         };
         let moved = std::mem::take(&mut self.moved);
-        let pieces = Pieces::new(passage, Form::Report, moved).within(around);
-        Ok(Begun::Scan(Box::new(pieces)))
+        let pieces = ScanPieces::new(passage, ScanForm::Report, moved).enclosed_in(around);
+        Ok(ScanStreamItem::Scan(Box::new(pieces)))
     }
 }
 
-/// What comes next in a stream of scans.
-enum Begun {
-    Scan(Box<Pieces>),
-    /// Something else, or the end.
-    Told(Option<Bytes>),
+/// Next element of a stream of scans.
+enum ScanStreamItem {
+    Scan(Box<ScanPieces>),
+    /// Other text, or the end.
+    Text(Option<Bytes>),
 }

@@ -1,4 +1,4 @@
-//! Where scans were taken: one by itself, or a course of them.
+//! Localization of scans, of a single one or along a course.
 
 use std::{
     io,
@@ -30,22 +30,22 @@ use uuid::Uuid;
 
 use super::{
     findings::read,
-    scans::{broken, find_written, in_history, no_such_scan, taken_in},
+    scans::{find_written, in_history, internal_error, load_scene, scan_not_found},
 };
 use crate::server::{
     Api,
-    answer::{Failed, Path, Query},
-    openapi::Endpoint,
+    openapi::Route,
+    response::{ApiError, PathParams, QueryParams},
 };
 
-/// Most scans of a course.
-const MOST_SCANS: usize = 500;
-/// How long to wait until others have been answered.
-const TURN: Duration = Duration::from_secs(5);
+/// Maximum number of scans of a course.
+const MAX_SCANS: usize = 500;
+/// Maximum wait for other localizations to finish.
+const LOCATE_TIMEOUT: Duration = Duration::from_secs(5);
 
 #[derive(Debug, Clone, Copy, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Way {
+struct CourseQuery {
     #[serde(default)]
     to: Option<Uuid>,
     #[serde(default)]
@@ -56,125 +56,130 @@ struct Way {
     carried: Option<f64>,
 }
 
-pub(super) fn endpoints() -> Vec<Endpoint> {
+pub(super) fn endpoints() -> Vec<Route> {
     let uuid = || json!({"type": "string", "format": "uuid"});
-    let up_to = |most: f64| json!({"type": "number", "minimum": 0, "maximum": most});
+    let up_to = |max: f64| json!({"type": "number", "minimum": 0, "maximum": max});
     vec![
-        Endpoint::get(
+        Route::get(
             "/v1/scans/{scan}/location",
             location,
-            "Where a scan was taken, by its readings alone, as `sonard locate` finds it. Of at most 4000 readings; for \
-             one client at a time",
+            "Pose of a scan estimated from its readings, as by `sonard locate`. At most 4000 readings; one client at a \
+             time",
         )
-        .parameter("path", "scan", uuid(), "A scan from GET /v1/scans, or the one under way")
-        .answers::<Location>(200, "All poses that explain it, most probable first"),
-        Endpoint::get(
+        .parameter("path", "scan", uuid(), "Scan from GET /v1/scans, or the current scan")
+        .responds::<Location>(200, "All poses that fit the readings, most probable first"),
+        Route::get(
             "/v1/scans/{scan}/course",
             course,
-            "Where a scan and those after it were taken, with the poses in the log as odometry's, as `sonard locate \
-             --course` finds it. At most 500 scans; for one client at a time",
+            "Poses of a scan and its successors, with the logged poses as odometry, as by `sonard locate --course`. At \
+             most 500 scans; one client at a time",
         )
-        .parameter("path", "scan", uuid(), "The first scan of the course, from GET /v1/scans")
-        .parameter("query", "to", uuid(), "Its last scan; without it, the newest")
+        .parameter("path", "scan", uuid(), "First scan of the course, from GET /v1/scans")
+        .parameter("query", "to", uuid(), "Last scan of the course; by default the newest")
         .parameter(
             "query",
             "drift_m_per_m",
             up_to(1.0),
-            "Standard deviation of odometry's position for each metre driven, metres; without it, 0.05",
+            "Standard deviation of the odometry position per metre driven, metres; default 0.05",
         )
         .parameter(
             "query",
             "drift_deg_per_m",
             up_to(180.0),
-            "Standard deviation of odometry's heading for each metre driven, degrees; without it, 5",
+            "Standard deviation of the odometry heading per metre driven, degrees; default 5",
         )
         .parameter(
             "query",
             "carried",
             up_to(1.0),
-            "Probability that the robot was carried elsewhere between two scans; without it, 0.02",
+            "Probability that the robot was carried elsewhere between two scans; default 0.02",
         )
-        .answers_as::<Location>(
+        .responds_as::<Location>(
             200,
             "application/x-ndjson",
-            "One scan a line, as soon as it is located",
+            "One scan per line, as soon as it is located",
         ),
     ]
 }
 
-async fn location(State(api): State<Api>, Path(scan): Path<String>) -> Result<Response, Failed> {
+async fn location(
+    State(api): State<Api>,
+    PathParams(scan): PathParams<String>,
+) -> Result<Response, ApiError> {
     let passage = find_written(&api, &scan).await?;
-    let turn = turn(&api).await?;
-    let asked = api.clone();
-    let reading = tokio::task::spawn_blocking(move || Located::of(&asked, &passage, None));
+    let permit = acquire_permit(&api).await?;
+    let reader_api = api.clone();
+    let reading =
+        tokio::task::spawn_blocking(move || LocatableScan::load(&reader_api, &passage, None));
     let place = reading
         .await
-        .map_err(|error| broken(&error))?
-        .map_err(|why| Failed::new(StatusCode::CONFLICT, why, "see `sonard locate --help`"))?;
-    Ok(answer("application/json", turn, move |answers| {
-        let mut locator = Locator::new(None);
-        let _ = answers.tell(&locator.locate(place, answers), "");
+        .map_err(|error| internal_error(&error))?
+        .map_err(|why| ApiError::new(StatusCode::CONFLICT, why, "see `sonard locate --help`"))?;
+    Ok(stream_results("application/json", permit, move |sender| {
+        let mut locator = ScanLocator::new(None);
+        let _ = sender.send(&locator.locate(place, sender), "");
     }))
 }
 
 async fn course(
     State(api): State<Api>,
-    Path(scan): Path<String>,
-    Query(way): Query<Way>,
-) -> Result<Response, Failed> {
-    let odometry = odometry(way)?;
-    let from = Uuid::parse_str(&scan).map_err(|_| no_such_scan())?;
-    let find = move |history: &mut History| scans_between(history, from, way.to);
+    PathParams(scan): PathParams<String>,
+    QueryParams(query): QueryParams<CourseQuery>,
+) -> Result<Response, ApiError> {
+    let odometry = odometry(query)?;
+    let from = Uuid::parse_str(&scan).map_err(|_| scan_not_found())?;
+    let find = move |history: &mut History| scans_between(history, from, query.to);
     let scans = in_history(&api, find).await?.ok_or_else(|| {
-        let error = format!("of the {MOST_SCANS} scans up to the last none is {from}");
-        Failed::new(StatusCode::NOT_FOUND, error, "see GET /v1/scans, newest first")
+        let error = format!("scan {from} is not among the {MAX_SCANS} scans up to the last one");
+        ApiError::new(StatusCode::NOT_FOUND, error, "GET /v1/scans lists the scans, newest first")
     })?;
-    let turn = turn(&api).await?;
-    Ok(answer("application/x-ndjson", turn, move |answers| {
-        let mut locator = Locator::new(Some(Course::new(odometry)));
-        // Whoever has gone wants no more.
+    let permit = acquire_permit(&api).await?;
+    Ok(stream_results("application/x-ndjson", permit, move |sender| {
+        let mut locator = ScanLocator::new(Some(Course::new(odometry)));
+        // Localization stops if the client has disconnected.
         let _ = scans.into_iter().try_for_each(|scan| {
-            let location = match place(&api, scan, &locator) {
-                Ok(place) => locator.locate(place, answers),
-                Err(why) => lacking(scan, why),
+            let location = match load_scan(&api, scan, &locator) {
+                Ok(place) => locator.locate(place, sender),
+                Err(why) => unlocated(scan, why),
             };
-            answers.tell(&location, "\n")
+            sender.send(&location, "\n")
         });
     }))
 }
 
-fn odometry(way: Way) -> Result<Odometry, Failed> {
-    let usual = Odometry::default();
-    let within = |name: &str, given: Option<f64>, usual: f64, most: f64| {
-        let value = given.unwrap_or(usual);
-        (0.0..=most).contains(&value).then_some(value).ok_or_else(|| {
-            let help = format!("from 0 to {most}");
-            Failed::new(StatusCode::UNPROCESSABLE_ENTITY, format!("{name} is {value}"), help)
+fn odometry(query: CourseQuery) -> Result<Odometry, ApiError> {
+    let defaults = Odometry::default();
+    let within = |name: &str, given: Option<f64>, default: f64, max: f64| {
+        let value = given.unwrap_or(default);
+        (0.0..=max).contains(&value).then_some(value).ok_or_else(|| {
+            let help = format!("from 0 to {max}");
+            ApiError::new(StatusCode::UNPROCESSABLE_ENTITY, format!("{name} is {value}"), help)
         })
     };
     Ok(Odometry {
-        drift_m_per_m: within("drift_m_per_m", way.drift_m_per_m, usual.drift_m_per_m, 1.0)?,
+        drift_m_per_m: within("drift_m_per_m", query.drift_m_per_m, defaults.drift_m_per_m, 1.0)?,
         drift_deg_per_m: within(
             "drift_deg_per_m",
-            way.drift_deg_per_m,
-            usual.drift_deg_per_m,
+            query.drift_deg_per_m,
+            defaults.drift_deg_per_m,
             180.0,
         )?,
-        carried: within("carried", way.carried, usual.carried, 1.0)?,
+        carried: within("carried", query.carried, defaults.carried, 1.0)?,
     })
 }
 
-/// The scans from one to another, or to the newest, oldest first; `None` where there is no such way.
+/// Returns the scans from `from` to `to` or to the newest, oldest first; `None` if `from` is not
+/// among the last ones before `to`.
 fn scans_between(
     history: &mut History,
     from: Uuid,
     to: Option<Uuid>,
 ) -> io::Result<Option<Vec<Uuid>>> {
     let mut scans: Vec<Uuid> = to.into_iter().collect();
-    let most = MOST_SCANS - scans.len();
+    let max_before = MAX_SCANS - scans.len();
     let before = match to {
-        None => history.newest(most)?,
-        Some(to) => match history.before(to, most)? {
+        None => history.newest(max_before)?,
+        Some(to) => match history.before(to, max_before)? {
             None => return Ok(None),
             Some(before) => before,
         },
@@ -188,150 +193,159 @@ fn scans_between(
     }))
 }
 
-/// Leave to locate: one client at a time, because it takes a processor for seconds.
-async fn turn(api: &Api) -> Result<OwnedSemaphorePermit, Failed> {
-    let turn = timeout(TURN, Arc::clone(&api.locating).acquire_owned()).await;
-    turn.ok().and_then(Result::ok).ok_or_else(|| {
-        let help = "try again later: scans are located for one client at a time";
-        Failed::new(StatusCode::SERVICE_UNAVAILABLE, "another client has scans located", help)
+/// Waits for permission to locate. Only one client at a time, because localization occupies
+/// processors for seconds.
+async fn acquire_permit(api: &Api) -> Result<OwnedSemaphorePermit, ApiError> {
+    let permit = timeout(LOCATE_TIMEOUT, Arc::clone(&api.locating).acquire_owned()).await;
+    permit.ok().and_then(Result::ok).ok_or_else(|| {
+        let help = "try again later: one client at a time";
+        ApiError::new(
+            StatusCode::SERVICE_UNAVAILABLE,
+            "localization is busy with another client",
+            help,
+        )
     })
 }
 
-/// Answers with what `work` tells, beside everything else, as long as the client takes it.
-fn answer(
+/// Runs `work` on a blocking thread and streams its results, while the client is connected.
+fn stream_results(
     media: &'static str,
-    turn: OwnedSemaphorePermit,
-    work: impl FnOnce(&Answers) + Send + 'static,
+    permit: OwnedSemaphorePermit,
+    work: impl FnOnce(&ResultSender) + Send + 'static,
 ) -> Response {
     let (sender, receiver) = mpsc::channel(1);
     let working = tokio::task::spawn_blocking(move || {
-        let _turn = turn;
-        let answers = Answers(sender);
-        // One processor is left to who measures.
+        let _permit = permit;
+        let results = ResultSender(sender);
+        // One processor remains free for the measurement.
         let threads = thread::available_parallelism().map_or(1, NonZero::get).saturating_sub(1);
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.max(1)).build();
         match pool {
-            Ok(pool) => pool.install(|| work(&answers)),
-            Err(_) => work(&answers),
+            Ok(pool) => pool.install(|| work(&results)),
+            Err(_) => work(&results),
         }
     });
     let pieces = stream::try_unfold((receiver, working), next_piece);
     ([(header::CONTENT_TYPE, media)], Body::from_stream(pieces)).into_response()
 }
 
-type Coming = (mpsc::Receiver<Bytes>, JoinHandle<()>);
+type PendingResults = (mpsc::Receiver<Bytes>, JoinHandle<()>);
 
-/// What is told next; that the work broke off is no end.
-async fn next_piece((mut receiver, working): Coming) -> io::Result<Option<(Bytes, Coming)>> {
+/// Returns the next result. A panic of the worker aborts the stream instead of ending it.
+async fn next_piece(
+    (mut receiver, working): PendingResults,
+) -> io::Result<Option<(Bytes, PendingResults)>> {
     match receiver.recv().await {
         Some(piece) => Ok(Some((piece, (receiver, working)))),
         None => working.await.map(|()| None).map_err(io::Error::other),
     }
 }
 
-/// Where answers go.
-struct Answers(mpsc::Sender<Bytes>);
+/// Sender of results to the client.
+struct ResultSender(mpsc::Sender<Bytes>);
 
-impl Answers {
-    /// Tells one; `None` where nobody listens any more.
-    fn tell(&self, location: &Location, end: &str) -> Option<()> {
+impl ResultSender {
+    /// Sends a result; `None` if the client has disconnected.
+    fn send(&self, location: &Location, end: &str) -> Option<()> {
         let line = serde_json::to_string(location).ok()? + end;
         self.0.blocking_send(line.into()).ok()
     }
 }
 
-impl Watch for Answers {
+impl Watch for ResultSender {
     fn stops(&self) -> bool {
         self.0.is_closed()
     }
 }
 
-/// A scan, and the world in which it was taken.
-struct Located {
+/// Scan with the scene and model needed to locate it.
+struct LocatableScan {
     sweep: Sweep,
     session: Arc<Session>,
     world: Arc<World>,
 }
 
-/// What can be located of a scan of the logs.
-fn place(api: &Api, scan: Uuid, locator: &Locator) -> Result<Located, String> {
+/// Loads a scan of the logs.
+fn load_scan(api: &Api, scan: Uuid, locator: &ScanLocator) -> Result<LocatableScan, String> {
     let found = api.history.lock().unwrap_or_else(PoisonError::into_inner).passage(scan);
     let passage = found.map_err(|error| format!("cannot read the logs: {error}"))?;
-    let passage = passage.ok_or("the newest logs have no such scan")?;
-    Located::of(api, &passage, locator.known.as_ref())
+    let passage = passage.ok_or("the newest logs do not contain this scan")?;
+    LocatableScan::load(api, &passage, locator.previous.as_ref())
 }
 
-impl Located {
-    /// What can be located of a scan, or why nothing can. The world of the previous scan is reused if the session is the
-    /// same. Reads the disk.
-    fn of(api: &Api, passage: &Passage, known: Option<&Known>) -> Result<Self, String> {
+impl LocatableScan {
+    /// Prepares a scan for localization, or returns the reason why it can't be located. The world
+    /// of the previous scan is reused if the session is equal. Reads the disk.
+    fn load(api: &Api, passage: &Passage, previous: Option<&PreviousScan>) -> Result<Self, String> {
         let view = read(passage).map_err(|failed| failed.problem.error)?;
         let sweep = Sweep::of(&view).map_err(|error| error.to_string())?;
-        let session = view.session.ok_or("the log lacks the scan's session")?;
-        if let Some(known) = known.filter(|known| *known.session == *session) {
-            let (session, world) = (Arc::clone(&known.session), Arc::clone(&known.world));
+        let session = view.session.ok_or("the log does not contain the scan's session")?;
+        if let Some(previous) = previous.filter(|previous| *previous.session == *session) {
+            let (session, world) = (Arc::clone(&previous.session), Arc::clone(&previous.world));
             return Ok(Self { sweep, session, world });
         }
-        let scene = taken_in(api.daemon.scene(), passage);
-        let is_own = session.scene.as_ref();
-        let scene = scene
-            .filter(|scene| is_own.is_none_or(|own| own.sha256 == scene.sha256))
-            .ok_or("the log does not hold the scan's scene, and none such is in force")?;
+        let scene = load_scene(api.daemon.scene(), passage);
+        let own_scene = session.scene.as_ref();
+        let scene =
+            scene.filter(|scene| own_scene.is_none_or(|own| own.sha256 == scene.sha256)).ok_or(
+                "the log does not contain the scan's scene, and the current scene is another one",
+            )?;
         let (air, options) = session.conditions().map_err(|error| error.to_string())?;
-        let options = options.ok_or("the scan's model is unknown here")?;
+        let options = options.ok_or("the scan's model is not supported by this version")?;
         let world = Arc::new(World::new(scene, session.sensor.clone(), air, options));
         Ok(Self { sweep, session, world })
     }
 }
 
-/// The world of the scan that was located last, with its readings on a grid.
-struct Known {
+/// World and precomputed grid of the previous scan.
+struct PreviousScan {
     session: Arc<Session>,
     world: Arc<World>,
     atlas: Atlas,
 }
 
-/// Locates scan after scan.
-struct Locator {
+/// Locates scans one after the other.
+struct ScanLocator {
     course: Option<Course>,
-    known: Option<Known>,
+    previous: Option<PreviousScan>,
 }
 
-impl Locator {
+impl ScanLocator {
     const fn new(course: Option<Course>) -> Self {
-        Self { course, known: None }
+        Self { course, previous: None }
     }
 
-    fn locate(&mut self, place: Located, watch: &dyn Watch) -> Location {
+    fn locate(&mut self, place: LocatableScan, watch: &dyn Watch) -> Location {
         let scan = place.sweep.scan;
-        self.found(place, watch).unwrap_or_else(|why| lacking(scan, why))
+        self.try_locate(place, watch).unwrap_or_else(|why| unlocated(scan, why))
     }
 
-    fn found(&mut self, place: Located, watch: &dyn Watch) -> Result<Location, String> {
-        let Located { sweep, session, world } = place;
-        // One atlas at a time: each may have megabytes.
-        let known = self.known.take().filter(|known| Arc::ptr_eq(&known.session, &session));
-        let known = match known {
-            Some(known) => known,
+    fn try_locate(&mut self, place: LocatableScan, watch: &dyn Watch) -> Result<Location, String> {
+        let LocatableScan { sweep, session, world } = place;
+        // Only one atlas is kept, because each can have many megabytes.
+        let previous =
+            self.previous.take().filter(|previous| Arc::ptr_eq(&previous.session, &session));
+        let previous = match previous {
+            Some(previous) => previous,
             None => {
                 let spacing_m = Atlas::usual_spacing_m(&world.scene);
                 let atlas = Atlas::watched(&world, spacing_m, watch);
                 let atlas = atlas.map_err(|error| error.to_string())?;
-                Known { session, world: Arc::clone(&world), atlas }
+                PreviousScan { session, world: Arc::clone(&world), atlas }
             }
         };
-        let Known { atlas, .. } = self.known.insert(known);
+        let PreviousScan { atlas, .. } = self.previous.insert(previous);
         let poses = match &mut self.course {
             Some(course) => course.next_watched(&world, atlas, &sweep, watch),
             None => locate_watched(&world, atlas, &sweep, watch),
         };
         let poses = poses.map_err(|error| error.to_string())?;
-        let doubts = doubts(&world, atlas, &sweep, &poses);
-        Ok(Location { scan: sweep.scan, poses, doubts, lacks: None })
+        let diagnoses = doubts(&world, atlas, &sweep, &poses);
+        Ok(Location { scan: sweep.scan, poses, doubts: diagnoses, lacks: None })
     }
 }
 
-/// A scan that could not be located.
-const fn lacking(scan: Uuid, why: String) -> Location {
+/// Result for a scan that could not be located.
+const fn unlocated(scan: Uuid, why: String) -> Location {
     Location { scan, poses: Vec::new(), doubts: Vec::new(), lacks: Some(why) }
 }

@@ -1,4 +1,4 @@
-//! The logs on disk.
+//! Listing and download of the logs on disk.
 
 use axum::{
     Json,
@@ -18,32 +18,28 @@ use tokio_util::io::ReaderStream;
 
 use crate::server::{
     Api,
-    answer::{Failed, Path},
-    openapi::Endpoint,
+    openapi::Route,
+    response::{ApiError, PathParams},
 };
 
-pub(super) fn endpoints() -> Vec<Endpoint> {
+pub(super) fn endpoints() -> Vec<Route> {
     vec![
-        Endpoint::get("/v1/logs", list, "The logs, oldest first")
-            .answers::<Vec<LogEntry>>(200, "The logs"),
-        Endpoint::get("/v1/logs/{name}", download, "A log, as far as it is written")
-            .parameter("path", "name", json!({"type": "string"}), "A name from GET /v1/logs")
+        Route::get("/v1/logs", list, "Logs, oldest first")
+            .responds::<Vec<LogEntry>>(200, "List of logs"),
+        Route::get("/v1/logs/{name}", download, "Contents of a log, as far as it is written")
+            .parameter("path", "name", json!({"type": "string"}), "Name from GET /v1/logs")
             .parameter(
                 "header",
                 "Range",
                 json!({"type": "string"}),
-                "bytes=N-: from byte N on. Any other range is answered with the whole",
+                "bytes=N-: from byte N on. Any other range is ignored",
             )
-            .answers_text(200, "application/x-ndjson", "One record a line")
-            .answers_text(
-                206,
-                "application/x-ndjson",
-                "The log from the byte on that was asked for",
-            ),
+            .responds_text(200, "application/x-ndjson", "One record per line")
+            .responds_text(206, "application/x-ndjson", "The log from the requested byte on"),
     ]
 }
 
-async fn list(State(api): State<Api>) -> Result<Json<Vec<LogEntry>>, Failed> {
+async fn list(State(api): State<Api>) -> Result<Json<Vec<LogEntry>>, ApiError> {
     let current = api.daemon.status().log.file;
     let current = current.as_deref().and_then(|file| file.file_name()).map(ToOwned::to_owned);
     let entries = files(&api)?.into_iter().map(|file| LogEntry {
@@ -56,23 +52,27 @@ async fn list(State(api): State<Api>) -> Result<Json<Vec<LogEntry>>, Failed> {
 
 async fn download(
     State(api): State<Api>,
-    Path(name): Path<String>,
-    asked: HeaderMap,
-) -> Result<Response, Failed> {
-    // Only what the list shows: a name can't lead out of the folder.
+    PathParams(name): PathParams<String>,
+    request_headers: HeaderMap,
+) -> Result<Response, ApiError> {
+    // Only listed names are accepted, so a name can't lead out of the folder.
     let known = files(&api)?.into_iter().any(|file| file.name == name);
     if !known {
-        let help = "GET /v1/logs names them";
-        return Err(Failed::new(StatusCode::NOT_FOUND, format!("there is no log {name}"), help));
+        let help = "GET /v1/logs lists them";
+        return Err(ApiError::new(StatusCode::NOT_FOUND, format!("unknown log {name}"), help));
     }
     let mut file =
         File::open(api.log_folder.join(&name)).await.map_err(|error| unreadable(&error))?;
     let bytes = file.metadata().await.map_err(|error| unreadable(&error))?.len();
-    let from = first_byte(&asked);
+    let from = first_byte(&request_headers);
     let begin = from.unwrap_or(0);
     if from.is_some() && begin >= bytes {
         let status = StatusCode::RANGE_NOT_SATISFIABLE;
-        return Err(Failed::new(status, format!("{name} has {bytes} bytes"), "ask for fewer"));
+        return Err(ApiError::new(
+            status,
+            format!("{name} has {bytes} bytes"),
+            "request a smaller offset",
+        ));
     }
     file.seek(SeekFrom::Start(begin)).await.map_err(|error| unreadable(&error))?;
     let headers = [
@@ -81,7 +81,7 @@ async fn download(
         (header::ACCEPT_RANGES, "bytes".to_owned()),
         (header::CONTENT_DISPOSITION, format!("attachment; filename=\"{name}\"")),
     ];
-    // The log grows: what was announced is what is sent.
+    // The log can grow meanwhile; the announced length is sent.
     let body = Body::from_stream(ReaderStream::new(file.take(bytes - begin)));
     let range = [(header::CONTENT_RANGE, format!("bytes {begin}-{}/{bytes}", bytes.max(1) - 1))];
     match from {
@@ -90,17 +90,18 @@ async fn download(
     }
 }
 
-/// The byte from which on a part is asked for. Other ranges may be answered with the whole (RFC 9110, 14.2).
-fn first_byte(asked: &HeaderMap) -> Option<u64> {
-    let range = asked.get(header::RANGE)?.to_str().ok()?;
+/// Returns the first byte of a requested range `bytes=N-`. Other ranges may be served with the
+/// whole file (RFC 9110, section 14.2).
+fn first_byte(request_headers: &HeaderMap) -> Option<u64> {
+    let range = request_headers.get(header::RANGE)?.to_str().ok()?;
     range.strip_prefix("bytes=")?.strip_suffix('-')?.parse().ok()
 }
 
-fn files(api: &Api) -> Result<Vec<sonard_log::LogFile>, Failed> {
+fn files(api: &Api) -> Result<Vec<sonard_log::LogFile>, ApiError> {
     log_files(&api.log_folder).map_err(|error| unreadable(&error))
 }
 
-fn unreadable(error: &std::io::Error) -> Failed {
+fn unreadable(error: &std::io::Error) -> ApiError {
     let help = "check the log folder and its permissions";
-    Failed::new(StatusCode::INTERNAL_SERVER_ERROR, format!("cannot read: {error}"), help)
+    ApiError::new(StatusCode::INTERNAL_SERVER_ERROR, format!("cannot read: {error}"), help)
 }

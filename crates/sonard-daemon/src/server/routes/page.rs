@@ -1,4 +1,5 @@
-//! The live page: files without secrets, which ask the API like any other client.
+//! Serves the files of the live page. They contain no secrets and use the API like any other
+//! client.
 
 use axum::{
     extract::State,
@@ -12,8 +13,8 @@ use sonard_log::hexadecimal;
 use super::{fleet::PAGE as FLEET, playground::is_playground};
 use crate::server::{
     Api,
-    answer::{Failed, Path},
-    openapi::Endpoint,
+    openapi::Route,
+    response::{ApiError, PathParams},
 };
 
 pub(super) const HTML: &str = "text/html; charset=utf-8";
@@ -21,12 +22,13 @@ pub(super) const CSS: &str = "text/css; charset=utf-8";
 pub(super) const SCRIPT: &str = "text/javascript; charset=utf-8";
 pub(super) const SVG: &str = "image/svg+xml";
 
-/// Nothing from elsewhere, no script or style within the page, no frame around it.
+/// Content security policy: own resources only, no inline scripts or styles, no embedding in
+/// frames.
 const POLICY: HeaderValue = HeaderValue::from_static(
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self'; connect-src 'self'; \
      base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
 );
-/// A browser asks whether its copy is good, each time: after an update it must not be.
+/// Browsers revalidate their copy on each use, because an update can replace the files.
 pub(super) const CACHED: HeaderValue = HeaderValue::from_static("no-cache");
 
 struct Asset {
@@ -45,7 +47,7 @@ macro_rules! assets {
     };
 }
 
-/// Every file of the pages; the first two are the pages themselves.
+/// All files of the pages; the first two are the pages themselves.
 static ASSETS: &[Asset] = &assets![
     "index.html" HTML,
     "fleet.html" HTML,
@@ -89,67 +91,75 @@ static ASSETS: &[Asset] = &assets![
     "waterfall.js" SCRIPT,
 ];
 
-/// Whether a path is one of the page's files, which anybody who reaches the server may see: they
-/// hold no data and no secret.
+/// Returns `true` for paths of the pages, which are public: they contain no data and no secrets.
 pub(in crate::server) fn is_public(path: &str) -> bool {
     path == "/" || path == FLEET || path.starts_with("/page/") || is_playground(path)
 }
 
-pub(super) fn endpoints() -> Vec<Endpoint> {
-    let about = "A file of the page";
+pub(super) fn endpoints() -> Vec<Route> {
+    let about = "File of the page";
     vec![
-        Endpoint::get("/", index, "The live page").answers_text(200, HTML, "The page"),
-        Endpoint::get("/page/{file}", file, "A file of the live page")
-            .parameter("path", "file", json!({"type": "string"}), "As the page names it")
-            .answers_text(200, SCRIPT, about)
-            .answers_text(200, CSS, about)
-            .answers_text(200, SVG, about),
+        Route::get("/", index, "Live page").responds_text(200, HTML, "HTML page"),
+        Route::get("/page/{file}", file, "File of the live page")
+            .parameter(
+                "path",
+                "file",
+                json!({"type": "string"}),
+                "File name, as referenced by the page",
+            )
+            .responds_text(200, SCRIPT, about)
+            .responds_text(200, CSS, about)
+            .responds_text(200, SVG, about),
     ]
 }
 
 #[expect(clippy::indexing_slicing, reason = "the table of assets begins with both pages")]
 async fn index(State(api): State<Api>, headers: HeaderMap) -> Response {
     let Asset { media, text, .. } = &ASSETS[0];
-    // The way to the playground is shown where there is one.
+    // Links to playground and fleet are hidden if they are not configured.
     let link = if api.playground.is_some() { "" } else { " hidden" };
     let fleet = if api.fleet.is_some() { "" } else { " hidden" };
     let text = text.replace(" data-playground", link).replace(" data-fleet", fleet);
-    answer(media, text, &headers)
+    asset_response(media, text, &headers)
 }
 
-/// The page of all robots.
+/// Returns the page of all robots.
 #[expect(clippy::indexing_slicing, reason = "the table of assets begins with both pages")]
 pub(super) fn fleet(headers: &HeaderMap) -> Response {
     let Asset { media, text, .. } = &ASSETS[1];
-    answer(media, (*text).to_owned(), headers)
+    asset_response(media, (*text).to_owned(), headers)
 }
 
-async fn file(Path(name): Path<String>, headers: HeaderMap) -> Result<Response, Failed> {
+async fn file(
+    PathParams(name): PathParams<String>,
+    headers: HeaderMap,
+) -> Result<Response, ApiError> {
     let asset = ASSETS.iter().skip(2).find(|asset| asset.name == name);
     let missing =
-        || Failed::new(StatusCode::NOT_FOUND, "the page has no such file", "the page is at GET /");
+        || ApiError::new(StatusCode::NOT_FOUND, "unknown file of the page", "the page is at GET /");
     let asset = asset.ok_or_else(missing)?;
-    Ok(answer(asset.media, asset.text.to_owned(), &headers))
+    Ok(asset_response(asset.media, asset.text.to_owned(), &headers))
 }
 
-/// The file, or that the browser's copy is good.
-fn answer(media: &'static str, text: String, headers: &HeaderMap) -> Response {
+/// Returns the file, or 304 if the browser's copy is current.
+fn asset_response(media: &'static str, text: String, headers: &HeaderMap) -> Response {
     let tag = tag(&text);
-    let known = headers.get(header::IF_NONE_MATCH).and_then(|known| known.to_str().ok());
-    let good = known.is_some_and(|known| known.split(',').any(|one| one.trim() == tag));
+    let client_tags = headers.get(header::IF_NONE_MATCH).and_then(|tags| tags.to_str().ok());
+    let is_current =
+        client_tags.is_some_and(|tags| tags.split(',').any(|known| known.trim() == tag));
     let common = [
         (header::CACHE_CONTROL, CACHED),
         (header::CONTENT_SECURITY_POLICY, POLICY),
         (header::REFERRER_POLICY, HeaderValue::from_static("no-referrer")),
     ];
     let tag = [(header::ETAG, tag)];
-    if good {
+    if is_current {
         return (StatusCode::NOT_MODIFIED, common, tag).into_response();
     }
     (common, tag, [(header::CONTENT_TYPE, media)], text).into_response()
 }
 
-/// Names a text by what is in it.
+/// Entity tag of a text, from its hash.
 #[expect(clippy::indexing_slicing, reason = "a SHA-256 has 32 bytes")]
 fn tag(text: &str) -> String {
     format!("\"{}\"", hexadecimal(&Sha256::digest(text.as_bytes())[..8]))
@@ -160,7 +170,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_file_of_the_page_is_served_and_small() {
+    fn all_files_are_served() {
         let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/src/server/page");
         let mut names: Vec<String> = std::fs::read_dir(folder)
             .expect("the page's folder")
@@ -175,7 +185,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_file_names_is_there_and_nothing_is_from_elsewhere() {
+    fn references_are_local() {
         for asset in ASSETS {
             let mut rest = asset.text;
             while let Some((_, after)) = rest.split_once("from \"./") {
@@ -184,14 +194,14 @@ mod tests {
                 rest = after;
             }
             let elsewhere = asset.text.replace("http://www.w3.org/2000/svg", "");
-            assert!(!elsewhere.contains("://"), "{} names another place", asset.name);
+            assert!(!elsewhere.contains("://"), "{} references another host", asset.name);
         }
     }
 
     #[test]
-    fn a_copy_that_is_good_is_not_sent_again() {
+    fn current_copy_is_not_resent() {
         let mut headers = HeaderMap::new();
-        let page = |headers: &HeaderMap| answer(HTML, ASSETS[0].text.to_owned(), headers);
+        let page = |headers: &HeaderMap| asset_response(HTML, ASSETS[0].text.to_owned(), headers);
         let first = page(&headers);
         assert_eq!(first.status(), StatusCode::OK);
         let tag = first.headers().get(header::ETAG).expect("a tag").clone();

@@ -1,5 +1,5 @@
-//! A scan as JSON, read from its log and written piece by piece: what it costs does not depend on how
-//! long it is.
+//! Streams a scan from its log as JSON in pieces of bounded size, so memory use is independent of
+//! its length.
 
 use std::{io, sync::Arc};
 
@@ -13,95 +13,95 @@ use tokio::sync::Semaphore;
 
 use crate::{Moved, judged_line};
 
-/// A piece has so many bytes, or a line more.
-const PIECE: usize = 32 * 1024;
-/// How a reading's line begins, where only its fields are wanted.
+/// Size of a piece, bytes; the last line may exceed it.
+const PIECE_BYTES: usize = 32 * 1024;
+/// Start of a reading's line, before the fields that are copied.
 const TAG: &[u8] = br#"{"type":"ping","#;
 
-/// What of a scan is wanted.
+/// Content of a streamed scan.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Form {
-    /// With its session, verdicts and viewpoints, as `WholeScan`.
+pub(super) enum ScanForm {
+    /// Session, verdicts and viewpoints included, as `WholeScan`.
     Whole,
-    /// As it was measured, as `ScanReport`.
+    /// Readings as measured, as `ScanReport`.
     Report,
 }
 
-/// A scan on its way to a client.
-pub(super) struct Pieces {
+/// State of a scan that is being streamed.
+pub(super) struct ScanPieces {
     passage: Passage,
-    form: Form,
-    /// Which readings are left out.
+    form: ScanForm,
+    /// Filter of readings that have not moved.
     moved: Moved,
-    part: Part,
-    /// Whether nothing stands in the list that is being written.
+    part: ScanPart,
+    /// `true` while the current JSON list is empty.
     first: bool,
-    /// What stands before and after it all.
-    around: [&'static [u8]; 2],
+    /// Prefix and suffix of the scan.
+    enclosure: [&'static [u8]; 2],
 }
 
-enum Part {
+enum ScanPart {
     Head,
     Readings(PassageLines),
     Events(PassageLines),
     Tail,
-    Over,
+    Done,
 }
 
-impl Pieces {
-    pub(super) const fn new(passage: Passage, form: Form, moved: Moved) -> Self {
-        Self { passage, form, moved, part: Part::Head, first: true, around: [b"", b""] }
+impl ScanPieces {
+    pub(super) const fn new(passage: Passage, form: ScanForm, moved: Moved) -> Self {
+        Self { passage, form, moved, part: ScanPart::Head, first: true, enclosure: [b"", b""] }
     }
 
-    /// The same with something before and after it.
-    pub(super) const fn within(mut self, around: [&'static [u8]; 2]) -> Self {
-        self.around = around;
+    /// Sets the prefix and suffix of the scan.
+    pub(super) const fn enclosed_in(mut self, enclosure: [&'static [u8]; 2]) -> Self {
+        self.enclosure = enclosure;
         self
     }
 
-    /// What was sent by now, for who wants only what moved.
+    /// Returns the filter state for the next scan of the stream.
     pub(super) fn into_moved(self) -> Moved {
         self.moved
     }
 
-    /// The next piece; `None` at the end. It reads the disk.
+    /// Returns the next piece; `None` at the end. Reads the disk.
     fn next(&mut self) -> io::Result<Option<Vec<u8>>> {
         let mut piece = Vec::new();
-        while piece.len() < PIECE {
+        while piece.len() < PIECE_BYTES {
             match &mut self.part {
-                Part::Head => {
+                ScanPart::Head => {
                     self.write_head(&mut piece)?;
-                    self.part = Part::Readings(self.passage.lines(true)?);
+                    self.part = ScanPart::Readings(self.passage.lines(true)?);
                 }
-                Part::Readings(lines) => match lines.next().transpose()? {
+                ScanPart::Readings(lines) => match lines.next().transpose()? {
                     Some(line) => self.write_reading(&mut piece, &line),
                     None => {
                         piece.extend_from_slice(br#"],"events":["#);
                         self.first = true;
-                        self.part = Part::Events(self.passage.lines(false)?);
+                        self.part = ScanPart::Events(self.passage.lines(false)?);
                     }
                 },
-                Part::Events(lines) => match lines.next().transpose()? {
+                ScanPart::Events(lines) => match lines.next().transpose()? {
                     Some(line) => self.write_event(&mut piece, &line)?,
-                    None => self.part = Part::Tail,
+                    None => self.part = ScanPart::Tail,
                 },
-                Part::Tail => {
+                ScanPart::Tail => {
                     piece.extend_from_slice(br#"],"end":"#);
                     write(&mut piece, &self.passage.view.end)?;
                     piece.push(b'}');
-                    piece.extend_from_slice(self.around[1]);
-                    self.part = Part::Over;
+                    piece.extend_from_slice(self.enclosure[1]);
+                    self.part = ScanPart::Done;
                 }
-                Part::Over => break,
+                ScanPart::Done => break,
             }
         }
         Ok(Some(piece).filter(|piece| !piece.is_empty()))
     }
 
     fn write_head(&self, piece: &mut Vec<u8>) -> io::Result<()> {
-        piece.extend_from_slice(self.around[0]);
+        piece.extend_from_slice(self.enclosure[0]);
         piece.push(b'{');
-        if self.form == Form::Whole {
+        if self.form == ScanForm::Whole {
             piece.extend_from_slice(br#""session":"#);
             write(piece, &self.passage.view.session)?;
             piece.push(b',');
@@ -112,12 +112,12 @@ impl Pieces {
         Ok(())
     }
 
-    /// A damaged line is left out, and so is a reading of another scan.
+    /// Writes a reading. Damaged lines and readings of other scans are skipped.
     fn write_reading(&mut self, piece: &mut Vec<u8>, line: &[u8]) {
         let line = line.trim_ascii_end();
         let Some(fields) = line.strip_prefix(TAG) else { return };
-        if self.form == Form::Report && self.moved.is_everything() {
-            // Nothing has to be known of it but that it is whole.
+        if self.form == ScanForm::Report && self.moved.is_everything() {
+            // The line is copied as it is, provided that it is complete.
             let scan = format!(r#""scan":"{}","#, self.passage.view.scan);
             let whole = fields.starts_with(scan.as_bytes())
                 && serde_json::from_slice::<IgnoredAny>(line).is_ok();
@@ -135,11 +135,11 @@ impl Pieces {
         self.separate(piece);
         piece.push(b'{');
         match self.form {
-            Form::Whole => {
+            ScanForm::Whole => {
                 let beside = Beside::of(&ping, Some(&self.passage.view));
                 piece.extend_from_slice(&judged_line(fields, &beside));
             }
-            Form::Report => piece.extend_from_slice(fields),
+            ScanForm::Report => piece.extend_from_slice(fields),
         }
     }
 
@@ -158,29 +158,29 @@ impl Pieces {
     }
 }
 
-/// Reads the next piece beside everything else: disks block. One at a time reads, so that what many
-/// clients want leaves processors for who measures.
-pub(super) async fn read_on(
-    mut pieces: Pieces,
-    turns: Arc<Semaphore>,
-) -> io::Result<(Option<Bytes>, Pieces)> {
-    let turn = turns.acquire_owned().await;
+/// Reads the next piece on a blocking thread. One piece is read at a time, so that many clients
+/// can't occupy the processors needed for the measurement.
+pub(super) async fn next_piece(
+    mut pieces: ScanPieces,
+    permits: Arc<Semaphore>,
+) -> io::Result<(Option<Bytes>, ScanPieces)> {
+    let permit = permits.acquire_owned().await;
     let reading = tokio::task::spawn_blocking(move || {
-        let _turn = turn;
+        let _permit = permit;
         let piece = pieces.next()?;
         Ok((piece.map(Bytes::from), pieces))
     });
     reading.await.map_err(io::Error::other)?
 }
 
-/// A whole scan.
+/// Returns a scan as a stream of pieces.
 pub(super) fn stream(
-    pieces: Pieces,
-    turns: Arc<Semaphore>,
+    pieces: ScanPieces,
+    permits: Arc<Semaphore>,
 ) -> impl Stream<Item = io::Result<Bytes>> {
-    stream::try_unfold((pieces, turns), |(pieces, turns)| async move {
-        let (piece, pieces) = read_on(pieces, Arc::clone(&turns)).await?;
-        Ok(piece.map(|piece| (piece, (pieces, turns))))
+    stream::try_unfold((pieces, permits), |(pieces, permits)| async move {
+        let (piece, pieces) = next_piece(pieces, Arc::clone(&permits)).await?;
+        Ok(piece.map(|piece| (piece, (pieces, permits))))
     })
 }
 

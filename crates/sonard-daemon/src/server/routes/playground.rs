@@ -1,4 +1,4 @@
-//! The playground, from the folder that the configuration names.
+//! Serves the playground from the configured folder.
 
 use std::{io, path::Path as FilePath, sync::Arc};
 
@@ -13,20 +13,21 @@ use tokio::{fs::File, io::AsyncReadExt as _};
 use super::page::{CACHED, CSS, HTML, SCRIPT, SVG};
 use crate::server::{
     Api,
-    answer::{Failed, Path},
-    openapi::Endpoint,
+    openapi::Route,
+    response::{ApiError, PathParams},
 };
 
-/// What the page itself says, and no frame around it. WebAssembly is compiled, no text is run as a script, and
-/// nothing is asked of anybody: not of this server either.
+/// Content security policy of the page itself, plus no embedding in frames. It permits the
+/// compilation of WebAssembly, and forbids scripts from text and all requests, including those to
+/// this server.
 const POLICY: HeaderValue = HeaderValue::from_static(
     "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; worker-src blob:; style-src 'self'; \
      img-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
 );
-/// A file that is longer is none of the playground's.
-const MOST_BYTES: u64 = 16 << 20;
+/// Maximum size of a file, bytes.
+const MAX_BYTES: u64 = 16 << 20;
 
-/// Every file of the folder that is served; the first is the page itself.
+/// All served files of the folder; the first is the page itself.
 const FILES: [(&str, &str); 6] = [
     ("index.html", HTML),
     ("playground.js", SCRIPT),
@@ -36,38 +37,42 @@ const FILES: [(&str, &str); 6] = [
     ("icon.svg", SVG),
 ];
 
-/// Whether a path is one of the playground's, which holds no data and no secret.
+/// Returns `true` for paths of the playground, which has no data and no secrets.
 pub(super) fn is_playground(path: &str) -> bool {
     path.starts_with("/playground/")
 }
 
-pub(super) fn endpoints() -> Vec<Endpoint> {
-    let about = "A file of the page";
+pub(super) fn endpoints() -> Vec<Route> {
+    let about = "File of the page";
     vec![
-        Endpoint::get(
-            "/playground/",
-            index,
-            "The playground, if server.playground names its folder",
-        )
-        .answers_text(200, HTML, "The page"),
-        Endpoint::get("/playground/{file}", file, "A file of the playground")
-            .parameter("path", "file", json!({"type": "string"}), "As the page names it")
-            .answers_text(200, SCRIPT, about)
-            .answers_text(200, CSS, about)
-            .answers_text(200, SVG, about),
+        Route::get("/playground/", index, "Playground, if server.playground is configured")
+            .responds_text(200, HTML, "HTML page"),
+        Route::get("/playground/{file}", file, "File of the playground")
+            .parameter(
+                "path",
+                "file",
+                json!({"type": "string"}),
+                "File name, as referenced by the page",
+            )
+            .responds_text(200, SCRIPT, about)
+            .responds_text(200, CSS, about)
+            .responds_text(200, SVG, about),
     ]
 }
 
-async fn index(State(api): State<Api>) -> Result<Response, Failed> {
+async fn index(State(api): State<Api>) -> Result<Response, ApiError> {
     serve(api.playground, FILES[0]).await
 }
 
-async fn file(State(api): State<Api>, Path(name): Path<String>) -> Result<Response, Failed> {
-    // Only names that are known: none leads out of the folder.
+async fn file(
+    State(api): State<Api>,
+    PathParams(name): PathParams<String>,
+) -> Result<Response, ApiError> {
+    // Only known names are accepted, so none leads out of the folder.
     let known = FILES.into_iter().skip(1).find(|(known, _)| *known == name);
     let missing = || {
         let help = "the page is at GET /playground/";
-        Failed::new(StatusCode::NOT_FOUND, "the playground has no such file", help)
+        ApiError::new(StatusCode::NOT_FOUND, "unknown file of the playground", help)
     };
     serve(api.playground, known.ok_or_else(missing)?).await
 }
@@ -75,15 +80,15 @@ async fn file(State(api): State<Api>, Path(name): Path<String>) -> Result<Respon
 async fn serve(
     folder: Option<Arc<FilePath>>,
     (name, media): (&'static str, &'static str),
-) -> Result<Response, Failed> {
+) -> Result<Response, ApiError> {
     let folder = folder.ok_or_else(|| {
-        let help = "web/build.sh makes it; name its folder in server.playground";
-        Failed::new(StatusCode::NOT_FOUND, "the playground is not served here", help)
+        let help = "build it with web/build.sh, and set server.playground to its folder";
+        ApiError::new(StatusCode::NOT_FOUND, "the playground is not configured", help)
     })?;
     let bytes = read(&folder.join(name)).await.map_err(|error| {
         let error = format!("cannot read {name} of server.playground: {error}");
-        let help = "make the folder with web/build.sh, readable by the daemon";
-        Failed::new(StatusCode::INTERNAL_SERVER_ERROR, error, help)
+        let help = "build the folder with web/build.sh, readable by the daemon";
+        ApiError::new(StatusCode::INTERNAL_SERVER_ERROR, error, help)
     })?;
     let headers = [
         (header::CONTENT_TYPE, HeaderValue::from_static(media)),
@@ -96,9 +101,9 @@ async fn serve(
 
 async fn read(file: &FilePath) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
-    let read = File::open(file).await?.take(MOST_BYTES + 1).read_to_end(&mut bytes).await?;
-    if read as u64 > MOST_BYTES {
-        return Err(io::Error::other("it is too long"));
+    let read = File::open(file).await?.take(MAX_BYTES + 1).read_to_end(&mut bytes).await?;
+    if read as u64 > MAX_BYTES {
+        return Err(io::Error::other("file too large"));
     }
     Ok(bytes)
 }
@@ -108,7 +113,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_policy_is_the_pages_own_and_keeps_it_out_of_frames() {
+    fn policy_matches_the_page() {
         let page = include_str!("../../../../../web/playground/index.html");
         let policy = POLICY;
         let policy = policy.to_str().expect("text");
@@ -117,7 +122,7 @@ mod tests {
     }
 
     #[test]
-    fn every_file_that_the_page_names_is_served() {
+    fn referenced_files_are_served() {
         let page = include_str!("../../../../../web/playground/index.html");
         for attribute in ["src=\"", "href=\""] {
             for named in page.split(attribute).skip(1) {

@@ -1,4 +1,4 @@
-//! What the model expects of a scan before it is taken.
+//! Preview: prediction of a scan before it is taken.
 
 use std::sync::Arc;
 
@@ -19,46 +19,47 @@ use crate::{
     NextScan, check_device, check_plan, check_pose, ordered_air, ordered_sensor,
     server::{
         Api,
-        answer::{Body, Failed},
-        openapi::Endpoint,
+        openapi::Route,
+        response::{ApiError, JsonBody},
     },
 };
 
-/// Most beams of a scan that is asked about.
-const MOST_BEAMS: u32 = 4000;
+/// Maximum number of beams of a preview.
+const MAX_BEAMS: u32 = 4000;
 
-pub(super) fn endpoints() -> Vec<Endpoint> {
+pub(super) fn endpoints() -> Vec<Route> {
     vec![
-        Endpoint::post(
+        Route::post(
             "/v1/preview",
             preview,
-            "What the model expects of a scan before it is taken. Nothing is changed by it",
+            "Predict a scan before it is taken. Changes no settings",
         )
-        .takes::<PreviewRequest>()
-        .answers::<WholeScan>(200, "The scan, as the model would have it"),
+        .accepts::<PreviewRequest>()
+        .responds::<WholeScan>(200, "The predicted scan"),
     ]
 }
 
 async fn preview(
     State(api): State<Api>,
-    Body(request): Body<PreviewRequest>,
-) -> Result<Json<WholeScan>, Failed> {
-    let wanted = Wanted::of(request, api.daemon.next_scan())?;
-    // One after the other, also when clients leave meanwhile: asking the model takes its time.
-    let turn = Arc::clone(&api.looking).acquire_owned().await;
-    let asking = tokio::task::spawn_blocking(move || {
-        let _turn = turn;
-        wanted.ask()
+    JsonBody(request): JsonBody<PreviewRequest>,
+) -> Result<Json<WholeScan>, ApiError> {
+    let scan = HypotheticalScan::new(request, api.daemon.next_scan())?;
+    // One prediction at a time, even if clients disconnect meanwhile, because predictions take
+    // long.
+    let permit = Arc::clone(&api.predicting).acquire_owned().await;
+    let predicting = tokio::task::spawn_blocking(move || {
+        let _permit = permit;
+        scan.predict()
     });
-    let answer = asking.await.map_err(|error| {
-        let help = "this is a fault of the program";
-        Failed::new(StatusCode::INTERNAL_SERVER_ERROR, error.to_string(), help)
+    let preview = predicting.await.map_err(|error| {
+        let help = "this is a bug: see the log messages of the daemon";
+        ApiError::new(StatusCode::INTERNAL_SERVER_ERROR, error.to_string(), help)
     })?;
-    answer.map(Json)
+    preview.map(Json)
 }
 
-/// A scan that the model can be asked about.
-struct Wanted {
+/// Settings of a hypothetical scan.
+struct HypotheticalScan {
     pose: Pose,
     plan: ScanPlan,
     air: Air,
@@ -68,22 +69,22 @@ struct Wanted {
     array: Option<Arc<RangerArray>>,
 }
 
-impl Wanted {
-    fn of(request: PreviewRequest, next: NextScan) -> Result<Self, Failed> {
+impl HypotheticalScan {
+    fn new(request: PreviewRequest, next: NextScan) -> Result<Self, ApiError> {
         let scene = next
             .scene
             .clone()
-            .ok_or_else(|| conflict("there is no scene", "give the daemon one with place.scene"))?;
+            .ok_or_else(|| conflict("no scene is configured", "configure one in place.scene"))?;
         let plan = plan(&request, &next)?;
         let pose = request.pose.unwrap_or(next.pose);
         check_pose(&pose, Some(&scene), next.array.as_deref())?;
-        let (now, order) = (&next.air, request.air);
+        let (current, order) = (&next.air, request.air);
         let order = order.unwrap_or(AirOrder {
-            temperature_c: now.temperature_c,
+            temperature_c: current.temperature_c,
             humidity_percent: None,
             pressure_kpa: None,
         });
-        let air = ordered_air(&order, now.humidity_percent, now.pressure_kpa)?;
+        let air = ordered_air(&order, current.humidity_percent, current.pressure_kpa)?;
         let mut sensor = next.setup.sensor.clone();
         if let Some(order) = request.sensor {
             let of_array = next.array.is_some();
@@ -96,36 +97,36 @@ impl Wanted {
         Ok(Self { pose, plan, air, sensor, options, scene, array: next.array })
     }
 
-    fn ask(self) -> Result<WholeScan, Failed> {
+    fn predict(self) -> Result<WholeScan, ApiError> {
         match self.array.clone() {
-            None => self.ask_ranger(),
-            Some(array) => self.ask_array(array),
+            None => self.predict_ranger(),
+            Some(array) => self.predict_array(array),
         }
     }
 
-    fn ask_ranger(self) -> Result<WholeScan, Failed> {
+    fn predict_ranger(self) -> Result<WholeScan, ApiError> {
         let scene = Arc::new(self.scene.with_robot_at(&self.pose));
         let simulator = Simulator::new(scene, self.sensor, self.air, self.options)
-            .map_err(|error| refused(&error))?;
+            .map_err(|error| model_error(&error))?;
         let (id, time) = (Uuid::new_v4(), Timestamp::now());
         let view = ScanView::simulated(&simulator, id, &self.pose, &self.plan, time)
-            .map_err(|error| refused(&error))?;
-        Ok(whole(view, Session::simulated(&simulator, time)))
+            .map_err(|error| model_error(&error))?;
+        Ok(preview_response(view, Session::simulated(&simulator, time)))
     }
 
-    /// A round of an array's rangers, each as if the robot stood still.
-    fn ask_array(self, array: Arc<RangerArray>) -> Result<WholeScan, Failed> {
+    /// Predicts one round of an array's rangers for a stationary robot.
+    fn predict_array(self, array: Arc<RangerArray>) -> Result<WholeScan, ApiError> {
         let rangers: Vec<usize> = array.round().collect();
         let model = ArrayModel::new(array, &self.scene, &self.sensor, self.air, self.options)
-            .map_err(|error| refused(&error))?;
-        let stand = model.at(self.pose).map_err(|error| refused(&error))?;
+            .map_err(|error| model_error(&error))?;
+        let point = model.at(self.pose).map_err(|error| model_error(&error))?;
         let (id, time) = (Uuid::new_v4(), Timestamp::now());
         let fire = |(firing, ranger): (usize, usize)| {
-            let prediction = stand.ping_in_round(firing)?;
-            Ok(Ping::of_array(&stand, id, &self.pose, firing as u32, ranger, &prediction))
+            let prediction = point.ping_in_round(firing)?;
+            Ok(Ping::of_array(&point, id, &self.pose, firing as u32, ranger, &prediction))
         };
         let pings = rangers.iter().copied().enumerate().map(fire);
-        let pings = pings.collect::<Result<_, TooCostly>>().map_err(|error| refused(&error))?;
+        let pings = pings.collect::<Result<_, TooCostly>>().map_err(|error| model_error(&error))?;
         let session = Session::of_array(&model, time);
         let view = ScanView {
             scan: id,
@@ -135,47 +136,47 @@ impl Wanted {
             events: Vec::new(),
             end: None,
         };
-        Ok(whole(view, session))
+        Ok(preview_response(view, session))
     }
 }
 
-/// Azimuths, few enough.
-fn plan(request: &PreviewRequest, next: &NextScan) -> Result<ScanPlan, Failed> {
+/// Returns the requested plan, checked against the limit of beams.
+fn plan(request: &PreviewRequest, next: &NextScan) -> Result<ScanPlan, ApiError> {
     let array = next.array.as_ref();
     let plan = request.plan.or_else(|| Some(array?.plan(1))).unwrap_or(next.plan);
     if request.plan.is_some() {
         check_plan(&plan, array.is_some(), next.device.as_ref())?;
     }
-    if plan.beams() > MOST_BEAMS {
+    if plan.beams() > MAX_BEAMS {
         let error = format!("the plan has {} beams", plan.beams());
-        return Err(wrong(error, "ask about 4000 or fewer: a greater step_deg"));
+        return Err(unprocessable(error, "at most 4000 beams: increase step_deg"));
     }
     Ok(plan)
 }
 
-fn conflict(error: impl std::fmt::Display, help: impl Into<String>) -> Failed {
-    Failed::new(StatusCode::CONFLICT, error.to_string(), help)
+fn conflict(error: impl std::fmt::Display, help: impl Into<String>) -> ApiError {
+    ApiError::new(StatusCode::CONFLICT, error.to_string(), help)
 }
 
-fn wrong(error: String, help: &str) -> Failed {
-    Failed::new(StatusCode::UNPROCESSABLE_ENTITY, error, help)
+fn unprocessable(error: String, help: &str) -> ApiError {
+    ApiError::new(StatusCode::UNPROCESSABLE_ENTITY, error, help)
 }
 
-fn refused(error: &dyn std::fmt::Display) -> Failed {
-    conflict(error, "a smaller model.max_range_m, or the engine cone")
+fn model_error(error: &dyn std::fmt::Display) -> ApiError {
+    conflict(error, "reduce model.max_range_m, or use the engine cone")
 }
 
-/// A scan of the model's with its verdicts, without the text of its scene.
-fn whole(mut view: ScanView, session: Session) -> WholeScan {
+/// Converts a simulated scan to a response with verdicts, without the text of its scene.
+fn preview_response(mut view: ScanView, session: Session) -> WholeScan {
     let pings = std::mem::take(&mut view.pings);
-    let pings = pings.into_iter().map(|ping| judged(ping, &view)).collect();
+    let pings = pings.into_iter().map(|ping| annotate(ping, &view)).collect();
     let session = Some(Arc::new(Session { scene_text: None, ..session }));
     let ScanView { start, events, end, .. } = view;
     WholeScan { session, start, pings, events, end }
 }
 
-/// A reading of the model's, which the model explains.
-fn judged(ping: Ping, view: &ScanView) -> JudgedPing {
+/// Annotates a simulated reading, which agrees with the model by definition.
+fn annotate(ping: Ping, view: &ScanView) -> JudgedPing {
     let sim = SimRecord {
         status: ping.status,
         range_m: ping.range_m,
@@ -185,7 +186,7 @@ fn judged(ping: Ping, view: &ScanView) -> JudgedPing {
         crosstalk: ping.crosstalk.clone(),
     };
     let verdict = Word::of(&Ping { sim: Some(sim), ..ping.clone() });
-    let mut judged = JudgedPing::of(ping, view);
-    judged.beside.verdict = verdict;
-    judged
+    let mut annotated = JudgedPing::of(ping, view);
+    annotated.beside.verdict = verdict;
+    annotated
 }

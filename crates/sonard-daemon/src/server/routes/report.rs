@@ -1,4 +1,4 @@
-//! What the daemon is doing and has done.
+//! Status, health, current settings and latest scan.
 
 use axum::{Json, extract::State, http::StatusCode, response::Response};
 use sonard_api::{AirStatus, Health, InForce, ScanReport, SensorFigures, Setup, Status};
@@ -6,41 +6,36 @@ use sonard_model::{acoustics::Sensor, geometry::Pose};
 use sonard_records::{ScanPlan, Session};
 
 use super::{
-    pieces::{Form, Pieces},
-    scans::{answer, written},
+    pieces::{ScanForm, ScanPieces},
+    scans::{scan_response, wait_written},
 };
 use crate::{
     Moved,
-    server::{Api, answer::Failed, openapi::Endpoint},
+    server::{Api, openapi::Route, response::ApiError},
 };
 
-pub(super) fn endpoints() -> Vec<Endpoint> {
+pub(super) fn endpoints() -> Vec<Route> {
     vec![
-        Endpoint::get("/v1/status", status, "What the daemon is doing")
-            .answers::<Status>(200, "The status"),
-        Endpoint::get("/v1/health", health, "Whether all is well, with link and scan statistics")
-            .answers::<Health>(200, "All is well")
-            .answers::<Health>(503, "Something is not well, and what"),
-        Endpoint::get("/v1/scan/latest", latest, "The last scan that is over")
-            .answers::<ScanReport>(200, "The scan"),
-        Endpoint::get(
-            "/v1/session",
-            session,
-            "What is true for the scans now: device, sensor, model",
-        )
-        .answers::<Session>(200, "The session"),
-        Endpoint::get("/v1/setup", setup, "What the configuration decides about every scan")
-            .answers::<InForce<Setup>>(200, "The setup, and what of it is pending"),
-        Endpoint::get("/v1/plan", plan, "The azimuths in force")
-            .answers::<InForce<ScanPlan>>(200, "The plan, and one that is pending"),
-        Endpoint::get("/v1/pose", pose, "Where the ranger stands")
-            .answers::<InForce<Pose>>(200, "The pose, and one that is pending"),
-        Endpoint::get("/v1/air", air, "The air in force, with its age")
-            .answers::<InForce<AirStatus>>(200, "The air, and what is pending"),
-        Endpoint::get("/v1/sensor", sensor, "Those figures of the sensor that requests change")
-            .answers::<InForce<SensorFigures>>(200, "The sensor, and what is pending"),
-        Endpoint::get("/v1/sensors", sensors, "The sensors that come with the program")
-            .answers::<Vec<Sensor>>(200, "All that is known of each, with sources"),
+        Route::get("/v1/status", status, "Status of the daemon").responds::<Status>(200, "Status"),
+        Route::get("/v1/health", health, "Health of the daemon, with link and scan statistics")
+            .responds::<Health>(200, "Healthy")
+            .responds::<Health>(503, "Unhealthy, with the reasons"),
+        Route::get("/v1/scan/latest", latest, "Last completed scan")
+            .responds::<ScanReport>(200, "Scan"),
+        Route::get("/v1/session", session, "Current session of the log: device, sensor, model")
+            .responds::<Session>(200, "Session"),
+        Route::get("/v1/setup", setup, "Scan settings of the configuration")
+            .responds::<InForce<Setup>>(200, "Current and pending settings"),
+        Route::get("/v1/plan", plan, "Azimuths of scans")
+            .responds::<InForce<ScanPlan>>(200, "Current and pending plan"),
+        Route::get("/v1/pose", pose, "Pose of the ranger")
+            .responds::<InForce<Pose>>(200, "Current and pending pose"),
+        Route::get("/v1/air", air, "Air data and their age")
+            .responds::<InForce<AirStatus>>(200, "Current and pending air data"),
+        Route::get("/v1/sensor", sensor, "Sensor settings that the API can change")
+            .responds::<InForce<SensorFigures>>(200, "Current and pending sensor settings"),
+        Route::get("/v1/sensors", sensors, "Sensor presets")
+            .responds::<Vec<Sensor>>(200, "Data of each preset, with sources"),
     ]
 }
 
@@ -54,24 +49,28 @@ async fn health(State(api): State<Api>) -> (StatusCode, Json<Health>) {
     (status, Json(health))
 }
 
-async fn latest(State(api): State<Api>) -> Result<Response, Failed> {
+async fn latest(State(api): State<Api>) -> Result<Response, ApiError> {
     let scan = api.daemon.latest_scan().ok_or_else(|| {
-        let help = "start one with POST /v1/start, and wait for it";
-        Failed::new(StatusCode::NOT_FOUND, "no scan is over yet", help)
+        let help = "start a scan with POST /v1/start and wait for its end";
+        ApiError::new(StatusCode::NOT_FOUND, "no scan has been completed yet", help)
     })?;
-    let passage = written(&api, scan).await?.ok_or_else(|| {
-        let help = "GET /v1/status says what the log lacks";
-        Failed::new(StatusCode::SERVICE_UNAVAILABLE, "the log does not have the scan yet", help)
+    let passage = wait_written(&api, scan).await?.ok_or_else(|| {
+        let help = "GET /v1/status reports the state of the log";
+        ApiError::new(
+            StatusCode::SERVICE_UNAVAILABLE,
+            "the scan is not completely logged yet",
+            help,
+        )
     })?;
-    Ok(answer(&api, Pieces::new(passage, Form::Report, Moved::default())))
+    Ok(scan_response(&api, ScanPieces::new(passage, ScanForm::Report, Moved::default())))
 }
 
-async fn session(State(api): State<Api>) -> Result<Response, Failed> {
+async fn session(State(api): State<Api>) -> Result<Response, ApiError> {
     let session = api.daemon.session().ok_or_else(|| {
         let help = "a session begins with the first scan: POST /v1/start";
-        Failed::new(StatusCode::NOT_FOUND, "there is no session yet", help)
+        ApiError::new(StatusCode::NOT_FOUND, "no session yet", help)
     })?;
-    Ok(api.session.answer(&session, Session::clone))
+    Ok(api.session.response(&session, Session::clone))
 }
 
 async fn setup(State(api): State<Api>) -> Json<InForce<Setup>> {
@@ -99,6 +98,6 @@ async fn sensor(State(api): State<Api>) -> Json<InForce<SensorFigures>> {
 }
 
 async fn sensors() -> Json<Vec<Sensor>> {
-    // A preset that can't be read is a fault that a test finds.
+    // All presets are valid, which a test checks.
     Json(Sensor::preset_names().filter_map(|name| Sensor::preset(name).ok()).collect())
 }

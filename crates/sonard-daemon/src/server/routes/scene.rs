@@ -1,21 +1,21 @@
-//! The scene in force, as it is drawn.
+//! Floor plan of the current scene.
 
 use axum::{extract::State, http::StatusCode, response::Response};
 use sonard_api::FloorPlan;
 
-use crate::server::{Api, answer::Failed, openapi::Endpoint};
+use crate::server::{Api, openapi::Route, response::ApiError};
 
-pub(super) fn endpoints() -> Vec<Endpoint> {
+pub(super) fn endpoints() -> Vec<Route> {
     vec![
-        Endpoint::get("/v1/scene", scene, "The floor plan of the scene in force")
-            .answers::<FloorPlan>(200, "The floor plan"),
+        Route::get("/v1/scene", scene, "Floor plan of the current scene")
+            .responds::<FloorPlan>(200, "Floor plan"),
     ]
 }
 
-async fn scene(State(api): State<Api>) -> Result<Response, Failed> {
+async fn scene(State(api): State<Api>) -> Result<Response, ApiError> {
     let scene = api.daemon.scene().ok_or_else(|| {
-        let help = "give the daemon one with place.scene";
-        Failed::new(StatusCode::NOT_FOUND, "there is no scene", help)
+        let help = "configure one in place.scene";
+        ApiError::new(StatusCode::NOT_FOUND, "no scene is configured", help)
     })?;
-    Ok(api.scene.answer(&scene, FloorPlan::of))
+    Ok(api.scene.response(&scene, FloorPlan::of))
 }

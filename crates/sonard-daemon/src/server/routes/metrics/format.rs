@@ -1,17 +1,17 @@
-//! Exposition formats, and the choice among them. Pure.
+//! Exposition formats, with content negotiation. Pure.
 
 use std::fmt::Write as _;
 
-/// A format in which figures are exposed.
+/// Exposition format of metrics.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Format {
-    /// OpenMetrics 1.0.0.
+pub(super) enum ExpositionFormat {
+    /// OpenMetrics text format 1.0.0.
     OpenMetrics,
     /// Prometheus text format 0.0.4.
     Text,
 }
 
-/// A media range of an `Accept` header.
+/// Media range of an `Accept` header.
 #[derive(Debug, PartialEq)]
 struct MediaRange<'a> {
     kind: &'a str,
@@ -19,23 +19,23 @@ struct MediaRange<'a> {
     quality: f64,
 }
 
-impl Format {
-    /// The format that an `Accept` header prefers (RFC 9110, section 12.5.1); OpenMetrics among equal
-    /// ones, and if the header names neither.
+impl ExpositionFormat {
+    /// Selects the format that an `Accept` header prefers (RFC 9110, section 12.5.1). OpenMetrics
+    /// is preferred among equals, and if the header names neither.
     pub(super) fn negotiate(accept: &str) -> Self {
         let ranges: Vec<MediaRange> =
             split_quoted(accept, ',').into_iter().filter_map(MediaRange::parse).collect();
         let [open_metrics, text] =
             [Self::OpenMetrics, Self::Text].map(|format| format.quality(&ranges));
-        let is_refused = open_metrics == Some(0.0) && text != Some(0.0);
-        if is_refused || text.unwrap_or(0.0) > open_metrics.unwrap_or(0.0) {
+        let is_rejected = open_metrics == Some(0.0) && text != Some(0.0);
+        if is_rejected || text.unwrap_or(0.0) > open_metrics.unwrap_or(0.0) {
             Self::Text
         } else {
             Self::OpenMetrics
         }
     }
 
-    /// Value of `Content-Type`.
+    /// Value of the `Content-Type` header.
     pub(super) const fn media_type(self) -> &'static str {
         match self {
             Self::OpenMetrics => "application/openmetrics-text; version=1.0.0; charset=utf-8",
@@ -43,7 +43,7 @@ impl Format {
         }
     }
 
-    /// Figures in this format, from those in OpenMetrics.
+    /// Converts metrics from OpenMetrics to this format.
     pub(super) fn render(self, open_metrics: String) -> String {
         match self {
             Self::OpenMetrics => open_metrics,
@@ -51,7 +51,7 @@ impl Format {
         }
     }
 
-    /// Quality by the most specific range that matches; `None` if none does.
+    /// Returns the quality of the most specific matching range; `None` without a match.
     fn quality(self, ranges: &[MediaRange]) -> Option<f64> {
         let (kind, versions): (_, &[&str]) = match self {
             Self::OpenMetrics => ("application/openmetrics-text", &["1.0.0", "0.0.1"]),
@@ -77,13 +77,13 @@ impl Format {
             }
         };
         let matching = ranges.iter().filter_map(|range| Some((specificity(range)?, range.quality)));
-        // Of equally specific ranges the better one.
+        // Among equally specific ranges the highest quality counts.
         matching.max_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1))).map(|(_, quality)| quality)
     }
 }
 
 impl<'a> MediaRange<'a> {
-    /// `None` for what is malformed.
+    /// Parses a media range; `None` if it is malformed.
     fn parse(text: &'a str) -> Option<Self> {
         let mut parts = split_quoted(text, ';').into_iter().map(str::trim);
         let kind = parts.next().filter(|kind| kind.contains('/'))?;
@@ -97,7 +97,7 @@ impl<'a> MediaRange<'a> {
                     range.quality = Some(quality).filter(|q| (0.0..=1.0).contains(q))?;
                 }
                 name if name.eq_ignore_ascii_case("version") => range.version = Some(value),
-                // Neither character set nor escaping of names makes a difference: all is ASCII.
+                // Character set and escaping are irrelevant, because all output is ASCII.
                 _ => {}
             }
         }
@@ -105,7 +105,7 @@ impl<'a> MediaRange<'a> {
     }
 }
 
-/// Parts of a header between separators that are not quoted.
+/// Splits a header at separators outside quotes.
 fn split_quoted(text: &str, separator: char) -> Vec<&str> {
     let mut is_quoted = false;
     text.split(move |c| {
@@ -115,11 +115,11 @@ fn split_quoted(text: &str, separator: char) -> Vec<&str> {
     .collect()
 }
 
-/// Prometheus text format 0.0.4 of figures in OpenMetrics: the name of each sample has a type, an info
+/// Converts OpenMetrics to Prometheus text format 0.0.4: each sample name has its own type, an info
 /// is a gauge, and there is no end mark.
 fn to_text(open_metrics: &str) -> String {
     let mut text = String::with_capacity(open_metrics.len());
-    // Help comes before the type, on which the name depends.
+    // HELP precedes TYPE, on which the sample name depends.
     let mut help: Option<(&str, &str)> = None;
     for line in open_metrics.lines() {
         if let Some((name, about)) =
@@ -136,7 +136,7 @@ fn to_text(open_metrics: &str) -> String {
                 _ => ("", kind),
             };
             if let Some((_, about)) = help.take().filter(|(helped, _)| *helped == name) {
-                // Unlike in OpenMetrics, quotes are not escaped there.
+                // Unlike in OpenMetrics, quotes are not escaped.
                 let about = about.replace("\\\"", "\"");
                 let _ = writeln!(text, "# HELP {name}{suffix} {about}");
             }
@@ -156,51 +156,54 @@ mod tests {
     use super::*;
 
     #[test]
-    fn accept_decides() {
+    fn negotiates_by_accept() {
         for (accept, format) in [
-            ("", Format::OpenMetrics),
-            ("*/*", Format::OpenMetrics),
-            ("application/json", Format::OpenMetrics),
-            ("text/plain", Format::Text),
-            ("text/plain;version=0.0.4", Format::Text),
-            ("TEXT/PLAIN; Version=\"0.0.4\" ; charset=utf-8", Format::Text),
-            ("text/*", Format::Text),
-            ("text/plain;version=1.0.0;escaping=allow-utf-8", Format::OpenMetrics),
-            ("application/openmetrics-text", Format::OpenMetrics),
+            ("", ExpositionFormat::OpenMetrics),
+            ("*/*", ExpositionFormat::OpenMetrics),
+            ("application/json", ExpositionFormat::OpenMetrics),
+            ("text/plain", ExpositionFormat::Text),
+            ("text/plain;version=0.0.4", ExpositionFormat::Text),
+            ("TEXT/PLAIN; Version=\"0.0.4\" ; charset=utf-8", ExpositionFormat::Text),
+            ("text/*", ExpositionFormat::Text),
+            ("text/plain;version=1.0.0;escaping=allow-utf-8", ExpositionFormat::OpenMetrics),
+            ("application/openmetrics-text", ExpositionFormat::OpenMetrics),
             // Prometheus 2 and 3.
             (
                 "application/openmetrics-text;version=1.0.0;q=0.5,application/openmetrics-text;\
                  version=0.0.1;q=0.4,text/plain;version=0.0.4;q=0.3,*/*;q=0.2",
-                Format::OpenMetrics,
+                ExpositionFormat::OpenMetrics,
             ),
             (
                 "application/openmetrics-text;version=1.0.0;escaping=allow-utf-8;q=0.5,text/plain;\
                  version=1.0.0;escaping=allow-utf-8;q=0.4,text/plain;version=0.0.4;q=0.3,*/*;q=0.2",
-                Format::OpenMetrics,
+                ExpositionFormat::OpenMetrics,
             ),
             // Telegraf and VictoriaMetrics.
-            ("text/plain;version=0.0.4;q=1,*/*;q=0.1", Format::Text),
-            ("text/plain;version=0.0.4, application/openmetrics-text;q=0.9", Format::Text),
-            ("application/openmetrics-text;q=0.2, text/plain;q=0.7", Format::Text),
-            ("application/openmetrics-text;q=0", Format::Text),
-            ("application/openmetrics-text;q=0, */*", Format::Text),
-            ("text/plain;q=0, */*", Format::OpenMetrics),
+            ("text/plain;version=0.0.4;q=1,*/*;q=0.1", ExpositionFormat::Text),
+            (
+                "text/plain;version=0.0.4, application/openmetrics-text;q=0.9",
+                ExpositionFormat::Text,
+            ),
+            ("application/openmetrics-text;q=0.2, text/plain;q=0.7", ExpositionFormat::Text),
+            ("application/openmetrics-text;q=0", ExpositionFormat::Text),
+            ("application/openmetrics-text;q=0, */*", ExpositionFormat::Text),
+            ("text/plain;q=0, */*", ExpositionFormat::OpenMetrics),
             (
                 "text/html,application/xhtml+xml,application/xml;q=0.9,*/*;q=0.8",
-                Format::OpenMetrics,
+                ExpositionFormat::OpenMetrics,
             ),
-            // Malformed elements count for nothing.
-            ("text/plain;q=2", Format::OpenMetrics),
-            ("text/plain;q=NaN", Format::OpenMetrics),
-            ("text/plain;q, ;;, ,text", Format::OpenMetrics),
-            ("foo/bar;x=\"a,text/plain\"", Format::OpenMetrics),
+            // Malformed elements are ignored.
+            ("text/plain;q=2", ExpositionFormat::OpenMetrics),
+            ("text/plain;q=NaN", ExpositionFormat::OpenMetrics),
+            ("text/plain;q, ;;, ,text", ExpositionFormat::OpenMetrics),
+            ("foo/bar;x=\"a,text/plain\"", ExpositionFormat::OpenMetrics),
         ] {
-            assert_eq!(Format::negotiate(accept), format, "{accept}");
+            assert_eq!(ExpositionFormat::negotiate(accept), format, "{accept}");
         }
     }
 
     #[test]
-    fn text_format_has_a_type_for_each_sample_and_no_end() {
+    fn converts_to_text_format() {
         let open_metrics = "# HELP sonard_robot Which \\\"robot\\\".\n# TYPE sonard_robot info\n\
                             sonard_robot_info{robot=\"kiwi\"} 1\n# HELP sonard_beams Beams.\n\
                             # TYPE sonard_beams counter\nsonard_beams_total 7\n# HELP sonard_up Up.\n\
@@ -209,14 +212,14 @@ mod tests {
                     sonard_robot_info{robot=\"kiwi\"} 1\n# HELP sonard_beams_total Beams.\n\
                     # TYPE sonard_beams_total counter\nsonard_beams_total 7\n\
                     # HELP sonard_up Up.\n# TYPE sonard_up gauge\nsonard_up 1.5\n";
-        assert_eq!(Format::Text.render(open_metrics.to_owned()), text);
-        assert_eq!(Format::OpenMetrics.render(open_metrics.to_owned()), open_metrics);
+        assert_eq!(ExpositionFormat::Text.render(open_metrics.to_owned()), text);
+        assert_eq!(ExpositionFormat::OpenMetrics.render(open_metrics.to_owned()), open_metrics);
     }
 
     proptest! {
         #[test]
-        fn any_header_gives_a_format(accept in "[ -~]{0,80}|(text/plain|[*]/[*]|;q=|0[.]5|,|\"){0,20}") {
-            Format::negotiate(&accept);
+        fn any_header_is_accepted(accept in "[ -~]{0,80}|(text/plain|[*]/[*]|;q=|0[.]5|,|\"){0,20}") {
+            ExpositionFormat::negotiate(&accept);
         }
     }
 }

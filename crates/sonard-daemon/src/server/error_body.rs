@@ -1,4 +1,5 @@
-//! Words for the refusals of the HTTP library, which answers what is no HTTP by a bare status.
+//! Adds a JSON body to error responses of the HTTP library, which rejects malformed requests with a
+//! bare status.
 
 use std::{
     io::{self, IoSlice},
@@ -9,20 +10,20 @@ use std::{
 use sonard_api::Problem;
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 
-/// A connection on which a bare refusal gets a body that says what is wrong.
-pub(super) struct Worded<S> {
+/// Connection that replaces bare error responses by responses with a JSON error body.
+pub(super) struct ErrorBodyStream<S> {
     stream: S,
-    /// What is still to be written of a refusal, from this byte on.
-    refusal: (Vec<u8>, usize),
+    /// Pending error response, and the number of its bytes already written.
+    pending: (Vec<u8>, usize),
 }
 
-impl<S: AsyncWrite + Unpin> Worded<S> {
+impl<S: AsyncWrite + Unpin> ErrorBodyStream<S> {
     pub(super) const fn new(stream: S) -> Self {
-        Self { stream, refusal: (Vec::new(), 0) }
+        Self { stream, pending: (Vec::new(), 0) }
     }
 
-    fn poll_refusal(&mut self, context: &mut Context<'_>) -> Poll<io::Result<()>> {
-        let (bytes, written) = &mut self.refusal;
+    fn poll_pending(&mut self, context: &mut Context<'_>) -> Poll<io::Result<()>> {
+        let (bytes, written) = &mut self.pending;
         while *written < bytes.len() {
             let more = ready!(
                 Pin::new(&mut self.stream)
@@ -37,11 +38,11 @@ impl<S: AsyncWrite + Unpin> Worded<S> {
     }
 }
 
-/// The whole of a refusal with words, if `bytes` are one without.
-fn worded(bytes: &[u8]) -> Option<Vec<u8>> {
+/// Returns the error response with a body if `bytes` is one without.
+fn with_body(bytes: &[u8]) -> Option<Vec<u8>> {
     let head = bytes.strip_prefix(b"HTTP/1.1 4").and(bytes.strip_suffix(b"\r\n\r\n"))?;
     let head = std::str::from_utf8(head).ok()?;
-    // Every answer of this server's own bears the first.
+    // All responses of the router have the first header.
     let has = |field: &str| head.lines().any(|line| line.eq_ignore_ascii_case(field));
     if has("x-content-type-options: nosniff") || !has("content-length: 0") {
         return None;
@@ -49,8 +50,8 @@ fn worded(bytes: &[u8]) -> Option<Vec<u8>> {
     let status = head.lines().next()?;
     let reason = status.splitn(3, ' ').nth(2)?.to_ascii_lowercase();
     let problem = Problem {
-        error: format!("the request can't be read: {reason}"),
-        help: "ask by HTTP/1.1, with a head of less than 32 kilobytes".into(),
+        error: format!("invalid request: {reason}"),
+        help: "use HTTP/1.1, with a request head of less than 32 kB".into(),
     };
     let body = serde_json::to_string(&problem).ok()?;
     let length = body.len();
@@ -63,7 +64,7 @@ fn worded(bytes: &[u8]) -> Option<Vec<u8>> {
     )
 }
 
-impl<S: AsyncRead + Unpin> AsyncRead for Worded<S> {
+impl<S: AsyncRead + Unpin> AsyncRead for ErrorBodyStream<S> {
     fn poll_read(
         mut self: Pin<&mut Self>,
         context: &mut Context<'_>,
@@ -73,16 +74,16 @@ impl<S: AsyncRead + Unpin> AsyncRead for Worded<S> {
     }
 }
 
-impl<S: AsyncWrite + Unpin> AsyncWrite for Worded<S> {
+impl<S: AsyncWrite + Unpin> AsyncWrite for ErrorBodyStream<S> {
     fn poll_write(
         mut self: Pin<&mut Self>,
         context: &mut Context<'_>,
         bytes: &[u8],
     ) -> Poll<io::Result<usize>> {
-        ready!(self.poll_refusal(context))?;
-        match worded(bytes) {
-            Some(refusal) => {
-                self.refusal = (refusal, 0);
+        ready!(self.poll_pending(context))?;
+        match with_body(bytes) {
+            Some(response) => {
+                self.pending = (response, 0);
                 Poll::Ready(Ok(bytes.len()))
             }
             None => Pin::new(&mut self.stream).poll_write(context, bytes),
@@ -97,7 +98,7 @@ impl<S: AsyncWrite + Unpin> AsyncWrite for Worded<S> {
         if let [only] = slices {
             return self.poll_write(context, only);
         }
-        ready!(self.poll_refusal(context))?;
+        ready!(self.poll_pending(context))?;
         Pin::new(&mut self.stream).poll_write_vectored(context, slices)
     }
 
@@ -106,12 +107,12 @@ impl<S: AsyncWrite + Unpin> AsyncWrite for Worded<S> {
     }
 
     fn poll_flush(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<io::Result<()>> {
-        ready!(self.poll_refusal(context))?;
+        ready!(self.poll_pending(context))?;
         Pin::new(&mut self.stream).poll_flush(context)
     }
 
     fn poll_shutdown(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<io::Result<()>> {
-        ready!(self.poll_refusal(context))?;
+        ready!(self.poll_pending(context))?;
         Pin::new(&mut self.stream).poll_shutdown(context)
     }
 }
@@ -121,10 +122,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn only_a_bare_refusal_gets_words() {
+    fn bare_errors_get_a_body() {
         let bare = b"HTTP/1.1 431 Request Header Fields Too Large\r\nconnection: close\r\n\
                      content-length: 0\r\ndate: Sun, 22 Nov 2026 10:00:00 GMT\r\n\r\n";
-        let text = String::from_utf8(worded(bare).expect("words")).expect("text");
+        let text = String::from_utf8(with_body(bare).expect("a body")).expect("text");
         let (head, body) = text.split_once("\r\n\r\n").expect("a body");
         assert!(head.starts_with("HTTP/1.1 431 ") && head.contains("connection: close"), "{head}");
         assert!(head.contains(&format!("content-length: {}", body.len())), "{head}");
@@ -137,7 +138,7 @@ mod tests {
             b"{\"type\":\"ping\"}\r\n\r\n",
             b"",
         ] {
-            assert_eq!(worded(other), None);
+            assert_eq!(with_body(other), None);
         }
     }
 }

@@ -1,4 +1,4 @@
-//! What is known of each robot, kept from answer to answer. Pure: times are told.
+//! State of each robot of a fleet, updated by poll results. Pure: the caller passes the time.
 
 use std::time::Duration;
 
@@ -8,16 +8,16 @@ use uuid::Uuid;
 use super::{Member, Told, Unheard, judge};
 use crate::api::{Fleet, FleetPicture, FleetReport, FleetRobot, FleetScan, FleetState};
 
-/// The robots, in the order of the configuration.
+/// States of all robots, in the order of the configuration.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Roll {
     robots: Vec<FleetRobot>,
-    /// When each was heard last, on a clock that is never set.
-    heard_at: Vec<Option<Duration>>,
+    /// Monotonic time of the last report of each robot.
+    reported_at: Vec<Option<Duration>>,
 }
 
 impl Roll {
-    /// Robots of which nothing is known yet.
+    /// Creates a registry of robots that have not been polled yet.
     #[must_use]
     pub fn new<'a>(members: impl IntoIterator<Item = &'a Member>, now: Timestamp) -> Self {
         let robot = |member: &Member| FleetRobot {
@@ -32,44 +32,44 @@ impl Roll {
             report: None,
         };
         let robots: Vec<_> = members.into_iter().map(robot).collect();
-        Self { heard_at: vec![None; robots.len()], robots }
+        Self { reported_at: vec![None; robots.len()], robots }
     }
 
-    /// Takes in an answer, or that there was none, at a time by the wall clock and by one that is
-    /// never set. A number that there is not changes nothing.
+    /// Updates a robot with the result of a poll. `now` is the wall clock time, `at` a monotonic
+    /// time. An unknown `number` has no effect.
     pub fn take(
         &mut self,
         number: usize,
-        answer: Result<Told, Unheard>,
+        polled: Result<Told, Unheard>,
         (now, at): (Timestamp, Duration),
     ) {
         let Some(robot) = self.robots.get_mut(number) else { return };
-        let seen = judge(robot.robot.as_deref(), answer);
+        let seen = judge(robot.robot.as_deref(), polled);
         if robot.state != seen.state {
             (robot.state, robot.since) = (seen.state, now);
         }
         robot.wrong = seen.wrong;
-        if let Some(told) = seen.told {
+        if let Some(report) = seen.told {
             robot.heard = Some(now);
-            if let Some(heard_at) = self.heard_at.get_mut(number) {
-                *heard_at = Some(at);
+            if let Some(reported_at) = self.reported_at.get_mut(number) {
+                *reported_at = Some(at);
             }
             let before = robot.report.take().and_then(|report| report.last_scan);
-            robot.report = Some(report(&told, before, now));
-            // Whoever answers there from now on is this one, or another robot.
-            robot.robot.get_or_insert(told.status.robot);
+            robot.report = Some(fleet_report(&report, before, now));
+            // The first reported name becomes the expected one for further polls.
+            robot.robot.get_or_insert(report.status.robot);
         }
-        self.tell_of_namesakes();
+        self.flag_duplicate_names();
     }
 
-    /// The scan of which there is no picture yet.
+    /// Returns the last scan of a robot if its picture is missing.
     #[must_use]
     pub fn lacks_picture(&self, number: usize) -> Option<Uuid> {
         let last = self.robots.get(number)?.report.as_ref()?.last_scan.as_ref()?;
         last.picture.is_none().then_some(last.scan)
     }
 
-    /// Takes in how a scan looks, if it is the last one still.
+    /// Stores the picture of a scan, if it is still the robot's last one.
     pub fn show(&mut self, number: usize, scan: Uuid, picture: FleetPicture) {
         let robot = self.robots.get_mut(number);
         let last = robot.and_then(|robot| robot.report.as_mut()?.last_scan.as_mut());
@@ -78,35 +78,36 @@ impl Roll {
         }
     }
 
-    /// All that is known at a time by the clock that is never set.
+    /// Returns the state of the fleet at a monotonic time.
     #[must_use]
     pub fn fleet(&self, at: Duration) -> Fleet {
         let mut robots = self.robots.clone();
-        for (robot, heard_at) in robots.iter_mut().zip(&self.heard_at) {
-            robot.heard_s = heard_at.map(|heard_at| at.saturating_sub(heard_at).as_secs_f64());
+        for (robot, reported_at) in robots.iter_mut().zip(&self.reported_at) {
+            robot.heard_s =
+                reported_at.map(|reported_at| at.saturating_sub(reported_at).as_secs_f64());
         }
         Fleet { robots }
     }
 
-    /// Two of one name can't be told apart in logs and figures.
-    fn tell_of_namesakes(&mut self) {
+    /// Adds a problem to robots with duplicate names, which are ambiguous in logs and metrics.
+    fn flag_duplicate_names(&mut self) {
         let names: Vec<_> = self.robots.iter().map(|robot| robot.robot.clone()).collect();
         for (number, robot) in self.robots.iter_mut().enumerate() {
             let Some(name) = &robot.robot else { continue };
             let namesakes = names.iter().filter(|other| other.as_ref() == Some(name)).count();
-            let told = format!("{namesakes} robots are called {name}: set fleet.robot");
+            let problem = format!("{namesakes} robots have the name {name}: set fleet.robot");
             robot.wrong.retain(|why| !why.ends_with(": set fleet.robot"));
             if namesakes > 1
-                && names.iter().position(|one| one.as_ref() == Some(name)) != Some(number)
+                && names.iter().position(|other| other.as_ref() == Some(name)) != Some(number)
             {
-                robot.wrong.push(told);
+                robot.wrong.push(problem);
             }
         }
     }
 }
 
-fn report(told: &Told, before: Option<FleetScan>, now: Timestamp) -> FleetReport {
-    let (status, health) = (&told.status, &told.health);
+fn fleet_report(report: &Told, before: Option<FleetScan>, now: Timestamp) -> FleetReport {
+    let (status, health) = (&report.status, &report.health);
     let age =
         status.last_reading_age_s.and_then(|age_s| SignedDuration::try_from_secs_f64(age_s).ok());
     let picture_of =
@@ -140,8 +141,8 @@ mod tests {
     };
     use serde_json::json;
 
-    /// What a robot that is well says, with a last scan.
-    fn told(robot: &str, scan: Uuid) -> Told {
+    /// Report of a healthy robot with a last scan.
+    fn sample_report(robot: &str, scan: Uuid) -> Told {
         let zero = Timestamp::UNIX_EPOCH;
         let sensor = Sensor::preset("senscomp-6500").expect("a preset");
         let status = json!({
@@ -179,7 +180,7 @@ mod tests {
         walls_m: Vec::new(),
     };
 
-    fn roll() -> Roll {
+    fn registry() -> Roll {
         let members = ["kiwi=/a", "/b"].map(|text| Member::parse(text).expect("a place"));
         Roll::new(&members, Timestamp::UNIX_EPOCH)
     }
@@ -188,103 +189,111 @@ mod tests {
         Timestamp::from_second(second).expect("a time")
     }
 
-    /// A time by both clocks.
+    /// Wall clock and monotonic time.
     fn now(second: u64) -> (Timestamp, Duration) {
         (at(second.cast_signed()), Duration::from_secs(second))
     }
 
-    fn state(roll: &Roll, number: usize) -> (FleetState, Timestamp) {
-        let robot = &roll.fleet(Duration::ZERO).robots[number];
+    fn state(registry: &Roll, number: usize) -> (FleetState, Timestamp) {
+        let robot = &registry.fleet(Duration::ZERO).robots[number];
         (robot.state, robot.since)
     }
 
     #[test]
-    fn silence_counts_from_its_first_answer_on_and_touches_no_other() {
-        let mut roll = roll();
-        let gone = || Err(Unheard::Silent("nobody".into()));
-        roll.take(0, gone(), now(2));
-        roll.take(0, gone(), now(4));
-        assert_eq!(state(&roll, 0), (FleetState::Silent, at(2)));
-        assert_eq!(state(&roll, 1), (FleetState::Unasked, at(0)));
-        roll.take(0, Err(Unheard::Refusing("no".into())), now(6));
-        assert_eq!(state(&roll, 0), (FleetState::Refusing, at(6)));
-        roll.take(7, gone(), now(8));
-        roll.show(7, Uuid::nil(), PICTURE);
-        assert_eq!(roll.fleet(Duration::ZERO).robots.len(), 2);
+    fn outage_starts_at_first_failure() {
+        let mut registry = registry();
+        let gone = || Err(Unheard::Silent("no response".into()));
+        registry.take(0, gone(), now(2));
+        registry.take(0, gone(), now(4));
+        assert_eq!(state(&registry, 0), (FleetState::Silent, at(2)));
+        assert_eq!(state(&registry, 1), (FleetState::Unasked, at(0)));
+        registry.take(0, Err(Unheard::Refusing("no".into())), now(6));
+        assert_eq!(state(&registry, 0), (FleetState::Refusing, at(6)));
+        registry.take(7, gone(), now(8));
+        registry.show(7, Uuid::nil(), PICTURE);
+        assert_eq!(registry.fleet(Duration::ZERO).robots.len(), 2);
     }
 
     #[test]
-    fn who_answered_first_is_who_is_expected_and_what_it_said_stays_while_another_answers() {
-        let (mut roll, scan) = (roll(), Uuid::from_u128(1));
-        roll.take(1, Ok(told("mango", scan)), now(10));
-        let mango = roll.fleet(Duration::ZERO).robots[1].clone();
+    fn first_name_becomes_expected() {
+        let (mut registry, scan) = (registry(), Uuid::from_u128(1));
+        registry.take(1, Ok(sample_report("mango", scan)), now(10));
+        let mango = registry.fleet(Duration::ZERO).robots[1].clone();
         assert_eq!((mango.state, mango.robot.as_deref()), (FleetState::Well, Some("mango")));
-        let report = mango.report.expect("it was heard");
+        let report = mango.report.expect("a report");
         assert_eq!((report.last_reading, report.last_reading_age_s), (Some(at(8)), Some(2.0)));
-        assert_eq!(mango.wrong, ["2 beams of the last scan are missing"]);
-        roll.take(1, Ok(told("papaya", scan)), now(12));
-        let mango = roll.fleet(Duration::ZERO).robots[1].clone();
+        assert_eq!(mango.wrong, ["2 beams missing in the last scan"]);
+        registry.take(1, Ok(sample_report("papaya", scan)), now(12));
+        let mango = registry.fleet(Duration::ZERO).robots[1].clone();
         assert_eq!((mango.state, mango.since), (FleetState::OtherRobot, at(12)));
         assert_eq!((mango.robot.as_deref(), mango.heard), (Some("mango"), Some(at(10))));
         assert_eq!(mango.report, Some(report));
-        roll.take(1, Ok(told("a/b", scan)), now(14));
-        assert_eq!(state(&roll, 1), (FleetState::Strange, at(14)));
+        registry.take(1, Ok(sample_report("a/b", scan)), now(14));
+        assert_eq!(state(&registry, 1), (FleetState::Strange, at(14)));
     }
 
     #[test]
-    fn age_does_not_follow_a_clock_that_is_set() {
-        let (mut roll, scan) = (roll(), Uuid::from_u128(1));
-        let age_s = |roll: &Roll, at| roll.fleet(Duration::from_secs(at)).robots[0].heard_s;
-        assert_eq!(age_s(&roll, 5), None);
-        roll.take(0, Ok(told("kiwi", scan)), (at(1_800_000_000), Duration::from_secs(10)));
-        roll.take(0, Err(Unheard::Silent("nobody".into())), (at(5), Duration::from_secs(12)));
-        assert_eq!(age_s(&roll, 17), Some(7.0));
-        assert_eq!(age_s(&roll, 0), Some(0.0));
+    fn age_ignores_wall_clock_steps() {
+        let (mut registry, scan) = (registry(), Uuid::from_u128(1));
+        let age_s = |registry: &Roll, at| registry.fleet(Duration::from_secs(at)).robots[0].heard_s;
+        assert_eq!(age_s(&registry, 5), None);
+        registry.take(
+            0,
+            Ok(sample_report("kiwi", scan)),
+            (at(1_800_000_000), Duration::from_secs(10)),
+        );
+        registry.take(
+            0,
+            Err(Unheard::Silent("no response".into())),
+            (at(5), Duration::from_secs(12)),
+        );
+        assert_eq!(age_s(&registry, 17), Some(7.0));
+        assert_eq!(age_s(&registry, 0), Some(0.0));
     }
 
     #[test]
-    fn a_picture_is_of_its_scan_and_goes_with_it() {
-        let (mut roll, scan, next) = (roll(), Uuid::from_u128(1), Uuid::from_u128(2));
-        roll.take(0, Ok(told("kiwi", scan)), now(1));
-        assert_eq!(roll.lacks_picture(0), Some(scan));
-        roll.show(0, next, PICTURE);
-        assert_eq!(roll.lacks_picture(0), Some(scan), "that was another scan");
-        roll.show(0, scan, PICTURE);
-        roll.take(0, Ok(told("kiwi", scan)), now(3));
-        assert_eq!(roll.lacks_picture(0), None);
-        roll.take(0, Ok(told("kiwi", next)), now(5));
-        assert_eq!(roll.lacks_picture(0), Some(next));
+    fn picture_belongs_to_its_scan() {
+        let (mut registry, scan, next) = (registry(), Uuid::from_u128(1), Uuid::from_u128(2));
+        registry.take(0, Ok(sample_report("kiwi", scan)), now(1));
+        assert_eq!(registry.lacks_picture(0), Some(scan));
+        registry.show(0, next, PICTURE);
+        assert_eq!(registry.lacks_picture(0), Some(scan), "that was another scan");
+        registry.show(0, scan, PICTURE);
+        registry.take(0, Ok(sample_report("kiwi", scan)), now(3));
+        assert_eq!(registry.lacks_picture(0), None);
+        registry.take(0, Ok(sample_report("kiwi", next)), now(5));
+        assert_eq!(registry.lacks_picture(0), Some(next));
     }
 
     #[test]
-    fn namesakes_are_told_once_and_no_longer_when_one_has_another_name() {
-        let (mut roll, scan) = (roll(), Uuid::from_u128(1));
-        roll.take(1, Ok(told("kiwi", scan)), now(1));
-        roll.take(0, Ok(told("kiwi", scan)), now(1));
-        roll.take(0, Ok(told("kiwi", scan)), now(3));
+    fn duplicate_names_are_flagged_once() {
+        let (mut registry, scan) = (registry(), Uuid::from_u128(1));
+        registry.take(1, Ok(sample_report("kiwi", scan)), now(1));
+        registry.take(0, Ok(sample_report("kiwi", scan)), now(1));
+        registry.take(0, Ok(sample_report("kiwi", scan)), now(3));
         let wrong: Vec<_> =
-            roll.fleet(Duration::ZERO).robots.iter().map(|one| one.wrong.len()).collect();
+            registry.fleet(Duration::ZERO).robots.iter().map(|robot| robot.wrong.len()).collect();
         assert_eq!(wrong, [1, 2]);
         assert_eq!(
-            roll.fleet(Duration::ZERO).robots[1].wrong[1],
-            "2 robots are called kiwi: set fleet.robot"
+            registry.fleet(Duration::ZERO).robots[1].wrong[1],
+            "2 robots have the name kiwi: set fleet.robot"
         );
     }
 
     #[test]
-    fn the_largest_fleet_with_all_that_can_be_wrong_is_within_its_bytes() {
+    fn largest_fleet_fits_size_limit() {
         let members: Vec<_> = (0..crate::fleet::MOST_MEMBERS)
             .map(|i| Member::parse(&format!("{i:0>64}={}:1", "h".repeat(60))).expect("a place"))
             .collect();
-        let mut roll = Roll::new(&members, at(0));
+        let mut registry = Roll::new(&members, at(0));
         for (number, member) in members.iter().enumerate() {
-            let mut told = told(member.robot.as_deref().expect("a name"), Uuid::nil());
-            told.status.sonard = "\u{1F916}".repeat(10_000);
-            told.health.reasons = vec!["\u{1F916}\"\\".repeat(10_000); 100];
-            told.health.healthy = false;
-            roll.take(number, Ok(told), now(1));
+            let mut report = sample_report(member.robot.as_deref().expect("a name"), Uuid::nil());
+            report.status.sonard = "\u{1F916}".repeat(10_000);
+            report.health.reasons = vec!["\u{1F916}\"\\".repeat(10_000); 100];
+            report.health.healthy = false;
+            registry.take(number, Ok(report), now(1));
         }
-        let bytes = serde_json::to_vec(&roll.fleet(Duration::ZERO)).expect("JSON").len();
+        let bytes = serde_json::to_vec(&registry.fleet(Duration::ZERO)).expect("JSON").len();
         assert!(bytes < 100_000, "{bytes} bytes without pictures");
     }
 }

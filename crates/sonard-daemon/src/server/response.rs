@@ -1,4 +1,4 @@
-//! What goes wrong with a request, as JSON.
+//! Responses: errors as JSON, cached JSON, and extractors whose rejections are JSON.
 
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -15,37 +15,37 @@ use axum::{
 use serde::{Serialize, de::DeserializeOwned};
 use sonard_api::{Problem, Strict, has_list};
 
-use super::access::Refused;
+use super::access::AccessDenied;
 use crate::{Refusal, RefusalKind};
 
-/// A problem with its status.
+/// Error response: HTTP status and JSON body.
 #[derive(Debug, Clone)]
-pub(super) struct Failed {
+pub(super) struct ApiError {
     pub(super) status: StatusCode,
     pub(super) problem: Problem,
 }
 
-/// An answer of any size that is the same for all: written once, and shared by who takes it.
-pub(super) struct Shelved<T>(Arc<Mutex<Option<Written<T>>>>);
+/// JSON response that is serialized once and shared by all clients.
+pub(super) struct CachedJson<T>(Arc<Mutex<Option<Serialized<T>>>>);
 
-/// What was written, and of what.
-type Written<T> = (Arc<T>, Bytes);
+/// Source value with its serialized JSON.
+type Serialized<T> = (Arc<T>, Bytes);
 
-impl<T> Shelved<T> {
-    /// The answer about `of`, by `write` if it is about another than before.
-    pub(super) fn answer<U: Serialize>(
+impl<T> CachedJson<T> {
+    /// Returns the JSON of `source`, serialized by `convert` if the source has changed.
+    pub(super) fn response<U: Serialize>(
         &self,
-        of: &Arc<T>,
-        write: impl FnOnce(&T) -> U,
+        source: &Arc<T>,
+        convert: impl FnOnce(&T) -> U,
     ) -> Response {
-        // Nothing under this lock can panic, so a poisoned one holds what it should.
-        let mut kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        let same = kept.as_ref().filter(|(before, _)| Arc::ptr_eq(before, of));
-        let bytes = match same {
+        // Nothing under this lock can panic, so a poisoned lock holds valid data.
+        let mut cached = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let current = cached.as_ref().filter(|(before, _)| Arc::ptr_eq(before, source));
+        let bytes = match current {
             Some((_, bytes)) => bytes.clone(),
             None => {
-                let bytes = Bytes::from(serde_json::to_vec(&write(of)).unwrap_or_default());
-                *kept = Some((Arc::clone(of), bytes.clone()));
+                let bytes = Bytes::from(serde_json::to_vec(&convert(source)).unwrap_or_default());
+                *cached = Some((Arc::clone(source), bytes.clone()));
                 bytes
             }
         };
@@ -53,19 +53,19 @@ impl<T> Shelved<T> {
     }
 }
 
-impl<T> Clone for Shelved<T> {
+impl<T> Clone for CachedJson<T> {
     fn clone(&self) -> Self {
         Self(Arc::clone(&self.0))
     }
 }
 
-impl<T> Default for Shelved<T> {
+impl<T> Default for CachedJson<T> {
     fn default() -> Self {
         Self(Arc::default())
     }
 }
 
-impl Failed {
+impl ApiError {
     pub(super) fn new(
         status: StatusCode,
         error: impl Into<String>,
@@ -75,7 +75,7 @@ impl Failed {
     }
 }
 
-impl IntoResponse for Failed {
+impl IntoResponse for ApiError {
     fn into_response(self) -> Response {
         let mut response = (self.status, Json(self.problem)).into_response();
         if self.status == StatusCode::UNAUTHORIZED {
@@ -86,7 +86,7 @@ impl IntoResponse for Failed {
     }
 }
 
-impl From<Refusal> for Failed {
+impl From<Refusal> for ApiError {
     fn from(refusal: Refusal) -> Self {
         let status = match refusal.kind {
             RefusalKind::Wrong => StatusCode::UNPROCESSABLE_ENTITY,
@@ -98,13 +98,13 @@ impl From<Refusal> for Failed {
     }
 }
 
-impl From<Refused> for Failed {
-    fn from(refused: Refused) -> Self {
-        Self::new(refused.status, refused.message, refused.help)
+impl From<AccessDenied> for ApiError {
+    fn from(denied: AccessDenied) -> Self {
+        Self::new(denied.status, denied.message, denied.help)
     }
 }
 
-impl From<BytesRejection> for Failed {
+impl From<BytesRejection> for ApiError {
     fn from(rejection: BytesRejection) -> Self {
         Self::new(
             rejection.status(),
@@ -114,7 +114,7 @@ impl From<BytesRejection> for Failed {
     }
 }
 
-impl From<JsonRejection> for Failed {
+impl From<JsonRejection> for ApiError {
     fn from(rejection: JsonRejection) -> Self {
         let help =
             "send JSON as GET /v1/openapi.json describes it, with `Content-Type: application/json`";
@@ -122,45 +122,45 @@ impl From<JsonRejection> for Failed {
     }
 }
 
-impl From<QueryRejection> for Failed {
+impl From<QueryRejection> for ApiError {
     fn from(rejection: QueryRejection) -> Self {
         Self::new(rejection.status(), rejection.body_text(), "see GET /v1/openapi.json")
     }
 }
 
-impl From<PathRejection> for Failed {
+impl From<PathRejection> for ApiError {
     fn from(rejection: PathRejection) -> Self {
         Self::new(rejection.status(), rejection.body_text(), "see GET /v1/openapi.json")
     }
 }
 
-/// A JSON body whose faults are answered in JSON.
-pub(super) struct Body<T>(pub(super) T);
+/// JSON body whose rejections are JSON.
+pub(super) struct JsonBody<T>(pub(super) T);
 
-impl<T: DeserializeOwned, S: Send + Sync> FromRequest<S> for Body<T> {
-    type Rejection = Failed;
+impl<T: DeserializeOwned, S: Send + Sync> FromRequest<S> for JsonBody<T> {
+    type Rejection = ApiError;
 
-    async fn from_request(request: Request, state: &S) -> Result<Self, Failed> {
+    async fn from_request(request: Request, state: &S) -> Result<Self, ApiError> {
         let (parts, body) = request.into_parts();
-        let (again, request) = (parts.clone(), Request::from_parts(parts, body));
+        let (retained, request) = (parts.clone(), Request::from_parts(parts, body));
         let bytes = Bytes::from_request(request, state).await?;
-        let request = Request::from_parts(again, bytes.clone().into());
+        let request = Request::from_parts(retained, bytes.clone().into());
         let Json(Strict(body)) = Json::from_request(request, state).await?;
         if serde_json::from_slice(&bytes).is_ok_and(|value| has_list(&value)) {
             let help = "send objects, as GET /v1/openapi.json describes them";
-            let error = "there is a list where an object is wanted";
+            let error = "found a list, expected an object";
             return Err(Self::Rejection::new(StatusCode::UNPROCESSABLE_ENTITY, error, help));
         }
         Ok(Self(body))
     }
 }
 
-/// Parts of the path whose faults are answered in JSON.
+/// Path parameters whose rejections are JSON.
 #[derive(FromRequestParts)]
-#[from_request(via(axum::extract::Path), rejection(Failed))]
-pub(super) struct Path<T>(pub(super) T);
+#[from_request(via(axum::extract::Path), rejection(ApiError))]
+pub(super) struct PathParams<T>(pub(super) T);
 
-/// A query whose faults are answered in JSON.
+/// Query parameters whose rejections are JSON.
 #[derive(FromRequestParts)]
-#[from_request(via(axum::extract::Query), rejection(Failed))]
-pub(super) struct Query<T>(pub(super) T);
+#[from_request(via(axum::extract::Query), rejection(ApiError))]
+pub(super) struct QueryParams<T>(pub(super) T);

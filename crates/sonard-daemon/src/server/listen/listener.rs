@@ -1,4 +1,4 @@
-//! The accepting side of a place: the listener there may be bound late and be replaced.
+//! Accepting side of an endpoint, whose listener can be bound late and replaced.
 
 use std::{future::pending, io, net::IpAddr, sync::Arc};
 
@@ -7,21 +7,22 @@ use tokio::{
     sync::watch,
 };
 
-/// The listener of a place as its keeper publishes it; `None` until it is bound.
+/// Listener that the keeper publishes and replaces; `None` until it is bound.
 #[derive(Debug)]
-pub(in crate::server) struct Kept<L>(watch::Receiver<Option<Arc<L>>>);
+pub(in crate::server) struct DynamicListener<L>(watch::Receiver<Option<Arc<L>>>);
 
-/// A connection and the address that it came from.
+/// Connection with its remote address.
 type Accepted<S> = (S, Option<IpAddr>);
 
-impl<L> Kept<L> {
-    /// A place with this listener, and the end by which its keeper replaces it.
+impl<L> DynamicListener<L> {
+    /// Creates a listener handle, and the sender by which the keeper replaces the listener.
     pub(super) fn new(first: Option<L>) -> (Self, watch::Sender<Option<Arc<L>>>) {
         let (sender, receiver) = watch::channel(first.map(Arc::new));
         (Self(receiver), sender)
     }
 
-    /// Accepts from the current listener by `accept`, from another one as soon as there is one.
+    /// Accepts by `accept` from the current listener, and switches to a new one as soon as it is
+    /// published.
     async fn accept_by<T>(&self, accept: impl AsyncFn(&L) -> io::Result<T>) -> io::Result<T> {
         let mut current = self.0.clone();
         loop {
@@ -34,26 +35,26 @@ impl<L> Kept<L> {
             };
             tokio::select! {
                 accepted = accepted => return accepted,
-                // Without a keeper the last listener stays.
+                // If the keeper is gone, the last listener remains.
                 Ok(()) = current.changed() => {}
             }
         }
     }
 }
 
-impl Kept<UnixListener> {
-    /// The next connection. Cancel-safe.
+impl DynamicListener<UnixListener> {
+    /// Accepts the next connection. Cancel-safe.
     pub(in crate::server) async fn accept(&self) -> io::Result<Accepted<UnixStream>> {
         self.accept_by(async |listener| listener.accept().await.map(|(stream, _)| (stream, None)))
             .await
     }
 }
 
-impl Kept<TcpListener> {
-    /// The next connection. Cancel-safe.
+impl DynamicListener<TcpListener> {
+    /// Accepts the next connection. Cancel-safe.
     pub(in crate::server) async fn accept(&self) -> io::Result<Accepted<TcpStream>> {
         let (stream, from) = self.accept_by(async |listener| listener.accept().await).await?;
-        // Each line goes out at once.
+        // Each line is sent without delay.
         stream.set_nodelay(true)?;
         Ok((stream, Some(from.ip())))
     }
