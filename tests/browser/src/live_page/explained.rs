@@ -70,7 +70,7 @@ fn wrong_pose_is_corrected() {
     let spans = browser.eval(spans);
     let [change, agreement, gain] = [0, 1, 2].map(|i| spans[i].as_str().expect("a text"));
     let (_, estimates) = change.split_once(": ").expect("estimates");
-    let estimates = estimates.replace('−', "-").replace('±', "+-");
+    let estimates = estimates.replace('−', "-").replace('±', "+-").replace('°', "");
     let socket = folder.path().join("s").display().to_string();
     let status = String::from_utf8(run(&["status", "--socket", &socket]).stdout).expect("text");
     assert!(status.contains(&estimates), "{estimates} is not in {status}");
