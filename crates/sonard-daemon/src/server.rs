@@ -168,7 +168,6 @@ impl Server {
     }
 
     /// Returns the API without connections: requests carry a [`Peer`] as an extension.
-    #[must_use]
     pub fn router(&self) -> Router {
         self.router.clone()
     }

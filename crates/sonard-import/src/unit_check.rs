@@ -237,10 +237,15 @@ impl RangeStats {
         );
         let options = units.unit_options(self, assumptions);
         let help = match options.is_empty() {
-            true => "is the unit right, and the sensor? --sensor NAME; --no-unit-check skips this check"
-                .to_owned(),
+            true => {
+                "is the unit right, and the sensor? --sensor NAME; --no-unit-check skips this check"
+                    .to_owned()
+            }
             false => {
-                format!("is the unit right? {}; --no-unit-check skips this check", options.join(" | "))
+                format!(
+                    "is the unit right? {}; --no-unit-check skips this check",
+                    options.join(" | ")
+                )
             }
         };
         Err(ImportError::Doubtful { what, help })
@@ -330,7 +335,9 @@ impl SweepStats {
         if field.unit() == Some("deg") && is_like_radians {
             return Err(ImportError::Doubtful {
                 what: format!("{field} spans {low:.3} to {high:.3}, which looks like radians"),
-                help: format!("if these are radians: {option}; if they are degrees: --no-unit-check"),
+                help: format!(
+                    "if these are radians: {option}; if they are degrees: --no-unit-check"
+                ),
             });
         }
         Ok(())

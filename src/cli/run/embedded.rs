@@ -96,7 +96,6 @@ impl EmbeddedDaemon {
     }
 
     /// Separates the daemon's work from what controls it.
-    #[must_use]
     pub fn split(self) -> (EmbeddedControl, impl Future<Output = Result<(), String>> + Send) {
         let Self { handle, router, socket, loader, daemon, log, supervisor, mock_stop } = self;
         let stop = CancellationToken::new();

@@ -109,7 +109,7 @@ fn hanging_daemon_is_detected() {
     let mut said = String::new();
     several.stderr.take().expect("piped").read_to_string(&mut said).expect("text");
     several.wait().expect("it ends");
-    assert!(said.contains("has sent nothing for 40 s"), "{said}");
+    assert!(said.contains("no data from the daemon for 40 s"), "{said}");
     patient.kill().expect("it runs");
     patient.wait().expect("it ends");
     assert_eq!(daemon.stop(), Some(0));

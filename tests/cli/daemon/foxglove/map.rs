@@ -76,8 +76,7 @@ fn too_large_map() {
     drop(viewer.until(MAP));
     take(2, 390.0);
     let told = viewer.for_a_while(Duration::from_secs(2));
-    let said =
-        |words: &String| words.contains("live map stopped") && words.contains("sonard map");
+    let said = |words: &String| words.contains("live map stopped") && words.contains("sonard map");
     assert!(told.words.iter().any(said), "{:?}", told.words);
     assert_eq!((told.of(MAP).count(), told.of("/sonar/points").count()), (0, 1));
     take(3, -390.0);

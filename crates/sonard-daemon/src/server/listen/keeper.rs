@@ -70,7 +70,7 @@ impl Keeper {
                     endpoint.announce();
                 }
                 Err(error) => {
-                    report_trouble(troubles, name, format!("cannot be bound yet: {error}"))
+                    report_trouble(troubles, name, format!("cannot be bound yet: {error}"));
                 }
             }
         }
