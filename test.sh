@@ -285,7 +285,7 @@ check_monitoring() {
 # Tests of the program that take long, or whose subject is load: their modules and names. They run in `all` only.
 long=(
   collect::interrupted daemon::chaos daemon::clock daemon::foxglove::cost daemon::kill daemon::load daemon::mqtt::rogue daemon::soak
-  daemon::strangers inverse::
+  inverse::
 )
 # Prints the parts of its arguments between bars, as in a regular expression.
 alternatives() { local IFS='|'; printf '%s' "$*"; }

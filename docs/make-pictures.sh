@@ -77,9 +77,9 @@ node target/tools/studio/picture.mjs "$SONARD" config/foxglove-layout.json "$pic
 
 # The live page, as its test sees it in Chromium.
 tests/axe.sh
-cargo test --quiet --test cli live_page::accessible
-cargo test --quiet --test cli live_page::pictures
-cargo test --quiet --test cli live_page::fleet
+cargo test --quiet -p sonard-browser-tests live_page::accessible
+cargo test --quiet -p sonard-browser-tests live_page::pictures
+cargo test --quiet -p sonard-browser-tests live_page::fleet
 cp target/page/desk.png "$pictures/page-desk.png"
 cp target/page/phone-dark.png "$pictures/page-phone.png"
 cp target/page/fleet-desk.png "$pictures/fleet.png"
@@ -87,7 +87,7 @@ cp target/page/page-{overlays,preview}.png "$pictures/"
 
 # The playground, likewise.
 web/build.sh
-cargo test --quiet --test cli playground::pictures
+cargo test --quiet -p sonard-browser-tests playground::pictures
 for picture in desk phone engines; do cp "target/page/playground-$picture.png" "$pictures/"; done
 cp target/page/playground.png "$pictures/playground.png"
 ls -l "$pictures"
