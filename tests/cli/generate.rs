@@ -237,7 +237,7 @@ fn faults_are_told_with_their_place_and_damage_with_its_file() {
     let foreign = case.generate("set", &[]);
     assert_eq!(foreign.status.code(), Some(2));
     assert!(
-        said(&foreign).contains("holds the data set of another specification"),
+        said(&foreign).contains("contains the data set of another specification"),
         "{}",
         said(&foreign)
     );
