@@ -2,7 +2,8 @@
 //!
 //! Each scan is recorded into its own log in `taking/` and accepted by renaming the log into
 //! `scans/`, with pose and repeat in its name. A rename is atomic, so after a crash at any time
-//! each scan is present once or not at all. Incomplete and rejected scans are renamed into `set-aside/`.
+//! each scan is present once or not at all. Incomplete and rejected scans are renamed into
+//! `set-aside/`.
 
 mod error;
 

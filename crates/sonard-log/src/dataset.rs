@@ -142,8 +142,8 @@ impl<'a> DataSet<'a> {
         Ok(outcome)
     }
 
-    /// Generates the shards of a part on all threads of the current pool. `progress` is called as by
-    /// [`make`](Self::make), and once with all readings of an existing shard.
+    /// Generates the shards of a part on all threads of the current pool. `progress` is called as
+    /// by [`make`](Self::make), and once with all readings of an existing shard.
     ///
     /// # Errors
     /// Returns the errors of [`make`](Self::make); shards that were started are finished first.

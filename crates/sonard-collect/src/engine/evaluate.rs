@@ -85,8 +85,8 @@ impl<D: Device, W: Watcher> Collector<D, W> {
         self.wait_for_ranger(lost.unwrap_or_else(ranger_lost)).await
     }
 
-    /// Waits after a lost scan, longer after each one. A loss is independent of the pose, so it does
-    /// not count as a retake; the collection ends after `collection.patience_s`.
+    /// Waits after a lost scan, longer after each one. A loss is independent of the pose, so it
+    /// does not count as a retake; the collection ends after `collection.patience_s`.
     async fn wait_for_ranger(&mut self, lost: Halt) -> Result<Next, Halt> {
         let patience = Duration::from_secs_f64(self.plan.keys.collection.patience_s);
         let losses = self.losses.get_or_insert_with(|| Patience::with_losses(patience));
