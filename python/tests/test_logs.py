@@ -86,7 +86,7 @@ def test_damaged_lines(course: Path, tmp_path: Path) -> None:
     assert [number for number, _ in log.damaged] == [6, 11] and "2 damaged lines" in repr(log)
     assert log.readings.size == 7
     for name, text, words in [
-        ("scene.json", sonard.Scene.shipped("corridor").to_json(), "give it with --scene"),
+        ("scene.json", sonard.Scene.shipped("corridor").to_json(), "use --scene for it"),
         ("text.txt", "nonsense\n", ""),
     ]:
         (tmp_path / name).write_text(text)

@@ -233,7 +233,7 @@ fn wrong_specifications_and_damage() {
     let foreign = case.generate("set", &[]);
     assert_eq!(foreign.status.code(), Some(2));
     assert!(
-        said(&foreign).contains("holds the data set of another specification"),
+        said(&foreign).contains("contains the data set of another specification"),
         "{}",
         said(&foreign)
     );

@@ -1,4 +1,4 @@
-//! Whether a scan is as it should be. Pure.
+//! Quality checks of a recorded scan. Pure.
 
 use serde::{Deserialize, Serialize};
 use sonard_interpret::compare::compare;
@@ -6,44 +6,44 @@ use sonard_records::{EventKind, PingStatus, ScanView};
 
 use super::keys::{Action, CheckKeys};
 
-/// A finding of a check of a scan.
+/// Violation of a quality check by a scan.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Finding {
-    /// Which check, as its key in `[checks]` is called without `max_`.
+    /// Name of the check: its key in `[checks]` without `max_`.
     pub check: String,
-    /// In words, with numbers.
+    /// Description with the measured values.
     pub detail: String,
-    /// What the plan wants done about it.
+    /// Action that the plan requires.
     pub action: Action,
 }
 
-/// Figures of a whole scan, for the report and its pictures.
+/// Quality figures of a complete scan, for the report and its plots.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Figures {
     /// Beams of the plan.
     pub beams: u32,
     /// Beams without a usable reading.
     pub missing: u32,
-    /// Beams set beside a prediction.
+    /// Beams compared with a prediction.
     pub compared: u32,
-    /// Share of the pairs of echoes that agree; `null` without a pair.
+    /// Share of echoes present in both measurement and prediction that agree; `null` without any.
     pub agree_fraction: Option<f64>,
-    /// Share of the compared beams that the model leaves unexplained; `null` without one.
+    /// Share of the compared beams that disagree with the model; `null` without any.
     pub unexplained_share: Option<f64>,
     /// Median of measured minus predicted range, metres.
     pub median_residual_m: Option<f64>,
-    /// Distance that nine tenths of the pairs of echoes don't exceed, metres.
+    /// 90th percentile of the absolute residual, metres.
     pub p90_abs_residual_m: Option<f64>,
-    /// How far off the index was found afterwards, motor steps.
+    /// Index error after the scan, motor steps.
     pub home_drift_steps: Option<i32>,
-    /// Air temperature that the scan's ranges were computed with, degrees Celsius.
+    /// Air temperature used for the scan's ranges, degrees Celsius.
     pub temperature_c: Option<f64>,
-    /// How far the thermometer moved during the scan, degrees Celsius.
+    /// Change of the measured temperature during the scan, degrees Celsius.
     pub temperature_change_c: Option<f64>,
 }
 
 impl Figures {
-    /// Of a scan with every record it will ever have.
+    /// Computes the figures of a finished scan.
     #[must_use]
     pub fn of(view: &ScanView, temperature_change_c: Option<f64>) -> Self {
         let views = std::slice::from_ref(view);
@@ -70,10 +70,10 @@ impl Figures {
     }
 }
 
-/// Whether the scan was broken off before its end: by a signal, a crash or a power cut.
+/// Returns `true` if the scan ended early: by a signal, a crash or a power cut.
 ///
-/// A scan that was given up because the ranger was lost is no such thing: it has an end and a
-/// reading, if only a `link_lost` one, for each beam, and the checks decide.
+/// A scan whose ranger was lost is not incomplete in this sense. It has an end and a reading for
+/// each beam, some of them `link_lost`, and is rated by the checks.
 #[must_use]
 pub fn is_cut(view: &ScanView) -> bool {
     let beams = view.start.as_ref().map_or(u32::MAX, |start| start.plan.beams());
@@ -81,7 +81,7 @@ pub fn is_cut(view: &ScanView) -> bool {
     view.end.is_none() || stopped || view.pings.len() < beams as usize
 }
 
-/// What the plan's checks find in a scan.
+/// Applies the plan's checks to a scan's figures.
 #[must_use]
 pub fn check(figures: &Figures, keys: &CheckKeys) -> Vec<Finding> {
     let mut findings = Vec::new();
@@ -96,20 +96,20 @@ pub fn check(figures: &Figures, keys: &CheckKeys) -> Vec<Finding> {
     if let Some(drift) = figures.home_drift_steps
         && drift.unsigned_abs() > keys.max_home_drift_steps
     {
-        let detail = format!("the index was found off by {drift} motor steps: it missed steps");
+        let detail = format!("index error {drift} motor steps: the motor missed steps");
         find("home_drift_steps", keys.on_home_drift, detail);
     }
     if let Some(change_c) = figures.temperature_change_c
         && change_c.abs() > keys.max_temperature_change_c
     {
-        let detail = format!("the air changed by {change_c:+.2} C during the scan");
+        let detail = format!("air temperature changed by {change_c:+.2} C during the scan");
         find("temperature_change_c", keys.on_temperature_change, detail);
     }
     if let Some(share) = figures.unexplained_share
         && share > keys.max_unexplained_share
     {
         let detail = format!(
-            "the model leaves {:.0} % of {} beams unexplained: is it the right pose and scene?",
+            "{:.0} % of {} beams disagree with the model: check pose and scene",
             100.0 * share,
             figures.compared
         );
@@ -118,7 +118,7 @@ pub fn check(figures: &Figures, keys: &CheckKeys) -> Vec<Finding> {
     findings
 }
 
-/// The strongest action that findings ask for.
+/// Returns the strongest action among the findings.
 #[must_use]
 pub fn verdict(findings: &[Finding]) -> Action {
     findings.iter().map(|finding| finding.action).max().unwrap_or_default()
@@ -140,7 +140,7 @@ mod tests {
     }
 
     #[test]
-    fn each_check_trips_at_its_limit_and_the_strongest_action_counts() {
+    fn limits_and_strongest_action() {
         let keys = CheckKeys { on_unexplained: Action::Stop, ..CheckKeys::default() };
         assert_eq!(check(&good(), &keys), []);
         for (figures, name, action) in [

@@ -1,102 +1,104 @@
-//! Who takes the scans of a collection.
+//! Interface of the devices that take a collection's scans.
 
 use std::{path::Path, time::Duration};
 
-use super::{Borrowed, Halt, Plan, taking::Taken};
+use super::{Borrowed, Halt, Plan, record_scan::Taken};
 use sonard_api::AirOrder;
 use sonard_device::ranger::PreparedScan;
 use sonard_model::geometry::Pose;
 use sonard_records::{CollectionRef, Provenance, ScanAir, ScanPlan};
 
-/// A device that takes the scans of a collection: a ranger that is driven from here, or a daemon that has one.
+/// Scanning device of a collection: a locally driven ranger, or a daemon with a ranger.
 pub trait Device {
-    /// Whether the ranger is driven from here: its scans are predicted here, and it may be carried.
+    /// Returns `true` for a locally driven ranger. Its scans are predicted in this process, and a
+    /// simulated one can be moved.
     fn is_local(&self) -> bool;
 
-    /// Gets a local ranger ready at the first pose; nothing is asked of it yet.
+    /// Prepares a local ranger for the first pose without sending it a request.
     ///
     /// # Errors
-    /// When there can be none.
+    /// Returns an error if the ranger cannot be set up.
     fn prepare(&mut self, plan: &Plan, first: &PreparedScan) -> Result<(), Halt>;
 
-    /// Meets the ranger; a failure is final.
+    /// Connects to the ranger and identifies it; a failure is final.
     ///
     /// # Errors
-    /// When none answers, or another one than before.
+    /// Returns an error if no ranger responds, or a different one than before.
     fn meet(&mut self) -> impl Future<Output = Result<Connected, Halt>>;
 
-    /// Lets a ranger that is no real one stand where the scan says.
+    /// Moves a simulated ranger to the pose of the scan.
     ///
     /// # Errors
-    /// When it can't be carried.
+    /// Returns an error if the ranger cannot be moved.
     fn carry_to(&mut self, to: &PreparedScan) -> Result<(), Halt>;
 
-    /// Goes on where an earlier run left it, and waits so long for a ranger that is not there.
+    /// Restores the state of an earlier run and sets the time allowed for an absent ranger to
+    /// return.
     fn go_on(&mut self, patience: Duration, borrowed: Option<Borrowed>);
 
-    /// What is about to be changed of what it does by itself, beyond what is known already.
+    /// Returns the device settings about to be changed, unless all of them are saved already.
     ///
     /// # Errors
-    /// When it does not answer.
+    /// Returns an error if the device does not respond.
     fn to_borrow(
         &self,
         air: Option<&AirOrder>,
     ) -> impl Future<Output = Result<Option<Borrowed>, Halt>>;
 
-    /// Changes that.
+    /// Applies the collection's settings, after the previous ones in `before` were journaled.
     ///
     /// # Errors
-    /// When it refuses.
+    /// Returns an error if the device rejects them.
     fn borrow(
         &mut self,
         before: Option<Borrowed>,
         air: Option<&AirOrder>,
     ) -> impl Future<Output = Result<(), Halt>>;
 
-    /// Leaves it as it was found; whether there was anything to give back.
+    /// Restores the saved settings; returns `true` if there were any.
     ///
     /// # Errors
-    /// When it refuses.
+    /// Returns an error if the device rejects them.
     fn give_back(&mut self) -> impl Future<Output = Result<bool, Halt>>;
 
-    /// The temperature that somebody measured for it, degrees Celsius.
+    /// Returns the measured air temperature of the device, degrees Celsius, if there is one.
     fn temperature_c(&self) -> impl Future<Output = Option<f64>>;
 
-    /// Takes a scan into a file; a beam that is in is told.
+    /// Records a scan into a file and calls `beam` after each recorded beam.
     ///
     /// # Errors
-    /// When the file can't be written, or nothing can be measured at all.
+    /// Returns an error if the file cannot be written or the device cannot measure.
     fn take(
         &mut self,
         scan: ScanOrder<'_>,
         beam: &(dyn Fn() + Sync),
     ) -> impl Future<Output = Result<Taken, Halt>>;
 
-    /// Lets go of the ranger.
+    /// Releases the ranger.
     fn close(self) -> impl Future<Output = ()>;
 }
 
-/// A scan to be taken.
+/// Request for one scan.
 pub struct ScanOrder<'a> {
-    /// Which azimuths.
+    /// Azimuths of the beams.
     pub plan: ScanPlan,
-    /// Where the ranger stands.
+    /// Pose of the ranger.
     pub pose: Pose,
-    /// The same with predictions, for a local ranger.
+    /// Scan setup with predictions, for a local ranger.
     pub prepared: Option<&'a PreparedScan>,
-    /// The air as it was measured, if it was.
+    /// Measured air, if any.
     pub air: Option<ScanAir>,
-    /// Which one of the collection it is.
+    /// Reference to the collection, written into the session record.
     pub of: CollectionRef,
-    /// Where it goes.
+    /// Path of the scan's log.
     pub path: &'a Path,
 }
 
-/// A ranger that told who it is.
+/// Identified ranger.
 #[derive(Debug, Clone)]
 pub struct Connected {
-    /// What it said.
+    /// Identity as written into records.
     pub device: sonard_records::Device,
-    /// Whether it is hardware.
+    /// Origin of the readings: hardware, mock or simulation.
     pub provenance: Provenance,
 }

@@ -1,8 +1,8 @@
-//! Takes the scans of a plan, one after the other, until all are there.
+//! Collection engine: takes the scans of a plan in order until all are accepted.
 
-mod begin;
-mod judge;
+mod evaluate;
 mod measure;
+mod startup;
 #[cfg(test)]
 mod tests;
 
@@ -22,10 +22,10 @@ use super::{
     AfterRetakes, Conditions, Device, Entry, Folder, Halt, Journal, Manifest, NamedPose, Patience,
     Plan, Slot, Watcher,
     estimate::{Pace, disk_bytes},
-    source::{Source, answered},
+    pose_source::{PoseSource, answered},
 };
 
-/// Choices of the operator for a run.
+/// Operator's options for one run.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Choices {
     /// Continue although plan, scene or ranger have changed since the start.
@@ -34,7 +34,7 @@ pub struct Choices {
     pub retry_given_up: bool,
 }
 
-/// A collection under way.
+/// State of a running collection.
 struct Collector<D, W> {
     choices: Choices,
     plan: Plan,
@@ -42,40 +42,41 @@ struct Collector<D, W> {
     journal: Journal,
     id: Uuid,
     interrupts: Interrupts,
-    source: Source,
-    /// Whether the source may have more poses.
-    more: bool,
+    source: PoseSource,
+    /// `true` while the source may supply further poses.
+    has_more_poses: bool,
     thermometer: Option<Thermometer>,
-    /// The air of the session.
+    /// Air of the current session.
     air: Air,
-    /// What is to be measured at each pose in that air.
+    /// Scan setups with predictions in that air, by pose number.
     prepared: HashMap<u32, Arc<PreparedScan>>,
     device: D,
-    /// The pose at which the ranger stands, as far as people said so in this run.
-    here: Option<u32>,
-    /// The pose that the device was carried to.
-    carried_to: Option<u32>,
-    /// Waits while the ranger loses one scan after the other; `None` once it took a whole one.
+    /// Pose confirmed by the operator in this run.
+    confirmed_pose: Option<u32>,
+    /// Pose of the simulated ranger.
+    device_pose: Option<u32>,
+    /// Retry delays while scans are lost; `None` after a complete one.
     losses: Option<Patience>,
-    /// Refused scans of this run.
-    refused: BTreeMap<Slot, u32>,
-    /// Noted at the start of this run.
+    /// Number of rejections in this run, by scan.
+    rejections: BTreeMap<Slot, u32>,
+    /// Conditions entered at the start of this run.
     conditions: Conditions,
     pace: Pace,
     watcher: W,
 }
 
-/// What comes after a scan.
+/// Decision after a scan.
 enum Next {
-    GoOn,
-    /// The person or the plan wants no more, and why.
+    Continue,
+    /// End of the collection by the operator or the plan, with the reason.
     Stop(String),
 }
 
-/// Collects until every scan is there, something can't be mended, or somebody interrupts.
+/// Takes scans until all are accepted, a failure is final, or the run is interrupted.
 ///
 /// # Errors
-/// Why not every scan is there; what was taken is kept, and a run by the same plan goes on.
+/// Returns the reason why scans are missing. Recorded scans are kept, and a run with the same plan
+/// resumes the collection.
 pub async fn collect<D: Device, W: Watcher>(
     plan: Plan,
     choices: Choices,
@@ -89,8 +90,8 @@ pub async fn collect<D: Device, W: Watcher>(
         Err(halt) => return Err(halt),
     };
     collector.watcher.rest();
-    collector.give_back().await;
-    // However it ended, the manifest says what is there.
+    collector.restore_settings().await;
+    // The manifest lists the scans after every outcome.
     let closed = collector.close(outcome.is_ok());
     collector.device.close().await;
     outcome?;
@@ -104,60 +105,59 @@ impl<D: Device, W: Watcher> Collector<D, W> {
             if !std::mem::take(&mut first) {
                 self.pause().await?;
             }
-            self.stand_at(slot.pose).await?;
-            self.follow_air().await?;
+            self.confirm_pose(slot.pose).await?;
+            self.update_air().await?;
             self.carry_to(slot.pose)?;
             let taken = self.take(slot).await?;
-            if let Next::Stop(why) = self.judge(slot, taken).await? {
-                return Err(Halt::Stopped(format!(
-                    "{why}\nstart it again with the same plan: it goes on where it stopped"
-                )));
+            if let Next::Stop(reason) = self.evaluate(slot, taken).await? {
+                return Err(Halt::Stopped(format!("{reason}\nrun the same command to resume")));
             }
         }
         Ok(())
     }
 
-    /// The scan to take now; `None` when all are there.
+    /// Returns the next scan to take; `None` once all are accepted or given up.
     async fn next_slot(&mut self) -> Result<Option<Slot>, Halt> {
         loop {
             let accepted: HashSet<Slot> =
                 self.journal.history().accepted().map(|take| take.slot).collect();
             let given_up = &self.journal.history().given_up;
             let open = |slot: &Slot| {
-                let left = given_up.contains(slot) && !self.retries(*slot);
-                !accepted.contains(slot) && !left
+                let skipped = given_up.contains(slot) && !self.retries(*slot);
+                !accepted.contains(slot) && !skipped
             };
             if let Some(slot) = self.journal.history().wanted().into_iter().find(open) {
                 return Ok(Some(slot));
             }
-            if !self.more || !self.another_pose().await? {
+            if !self.has_more_poses || !self.request_pose().await? {
                 return Ok(None);
             }
         }
     }
 
-    /// Whether a scan that was given up is to be tried once more, in this run.
+    /// Returns `true` if a given-up scan is retried in this run.
     fn retries(&self, slot: Slot) -> bool {
-        let refused = self.refused.get(&slot).copied().unwrap_or(0);
-        self.choices.retry_given_up && refused <= self.plan.keys.collection.retakes
+        let rejections = self.rejections.get(&slot).copied().unwrap_or(0);
+        self.choices.retry_given_up && rejections <= self.plan.keys.collection.retakes
     }
 
-    /// Asks the source for a pose; whether there was one.
-    async fn another_pose(&mut self) -> Result<bool, Halt> {
+    /// Requests a pose from the source; returns `false` if there are no more.
+    async fn request_pose(&mut self) -> Result<bool, Halt> {
         let number = self.journal.history().poses.keys().last().copied().unwrap_or(0) + 1;
         let count = self.plan.keys.poses.count;
-        self.more = (count == 0 || number <= count) && !matches!(self.source, Source::Listed);
-        if !self.more {
+        let has_source = !matches!(self.source, PoseSource::Listed);
+        self.has_more_poses = has_source && (count == 0 || number <= count);
+        if !self.has_more_poses {
             return Ok(false);
         }
         self.watcher.rest();
         let scene = Arc::clone(&self.plan.scene);
         let next = self.source.next(number, &scene, &mut self.watcher, &self.interrupts).await?;
         let Some(pose) = next else {
-            self.more = false;
+            self.has_more_poses = false;
             return Ok(false);
         };
-        self.note(Entry::Pose { number, pose })?;
+        self.append(Entry::Pose { number, pose })?;
         Ok(true)
     }
 
@@ -171,37 +171,37 @@ impl<D: Device, W: Watcher> Collector<D, W> {
         }
     }
 
-    /// Waits until people say that the ranger stands at a pose, as far as that is wanted, and
-    /// asks what is to be noted there.
-    async fn stand_at(&mut self, number: u32) -> Result<(), Halt> {
+    /// Waits for the operator to confirm the ranger's pose (`poses.confirm`) and prompts for the
+    /// conditions there.
+    async fn confirm_pose(&mut self, number: u32) -> Result<(), Halt> {
         let pose = self.pose(number);
-        if self.here != Some(number) && self.plan.keys.poses.confirm {
+        if self.confirmed_pose != Some(number) && self.plan.keys.poses.confirm {
             self.watcher.rest();
             let question =
                 format!("put the ranger at {}, pose {number}, and press Enter:", pose.label());
             if answered(&mut self.watcher, &question, &self.interrupts).await?.is_none() {
                 return Err(Halt::wrong(
-                    "nobody is there to say that the ranger stands at its pose",
-                    "start it at a terminal, or without poses.confirm",
+                    "poses.confirm needs a terminal to confirm the ranger's pose",
+                    "run the command in a terminal, or without poses.confirm",
                 ));
             }
         }
-        self.here = Some(number);
-        self.ask_at_pose(number, pose).await
+        self.confirmed_pose = Some(number);
+        self.prompt_at_pose(number, pose).await
     }
 
-    /// Carries a ranger that is no real one.
+    /// Moves a simulated ranger to a pose.
     fn carry_to(&mut self, number: u32) -> Result<(), Halt> {
-        if self.carried_to == Some(number) || !self.device.is_local() {
+        if self.device_pose == Some(number) || !self.device.is_local() {
             return Ok(());
         }
         let prepared = self.prepared(number)?;
-        self.carried_to = Some(number);
+        self.device_pose = Some(number);
         self.device.carry_to(&prepared)
     }
 
-    /// Asks what is to be noted at a pose, unless it is noted already.
-    async fn ask_at_pose(&mut self, number: u32, mut pose: NamedPose) -> Result<(), Halt> {
+    /// Prompts for the conditions of a pose that are not recorded yet.
+    async fn prompt_at_pose(&mut self, number: u32, mut pose: NamedPose) -> Result<(), Halt> {
         let questions = self.plan.keys.ask.at_pose.clone();
         let open: Vec<_> =
             questions.into_iter().filter(|key| !pose.conditions.contains_key(key)).collect();
@@ -214,11 +214,11 @@ impl<D: Device, W: Watcher> Collector<D, W> {
             let answer = answered(&mut self.watcher, &question, &self.interrupts).await?;
             pose.conditions.insert(key, answer.unwrap_or_default().into());
         }
-        self.note(Entry::Pose { number, pose })
+        self.append(Entry::Pose { number, pose })
     }
 
     fn pose(&self, number: u32) -> NamedPose {
-        // Slots are made of poses that the journal knows.
+        // Slots refer to poses in the journal; the default is never used.
         let origin = sonard_model::geometry::Pose { x_m: 0.0, y_m: 0.0, heading_deg: 0.0 };
         self.journal.history().poses.get(&number).cloned().unwrap_or(NamedPose {
             name: None,
@@ -242,7 +242,7 @@ impl<D: Device, W: Watcher> Collector<D, W> {
         }
     }
 
-    fn note(&mut self, entry: Entry) -> Result<(), Halt> {
+    fn append(&mut self, entry: Entry) -> Result<(), Halt> {
         Ok(self.journal.append(entry)?)
     }
 
@@ -251,61 +251,61 @@ impl<D: Device, W: Watcher> Collector<D, W> {
         Ok(manifest.write(&self.folder)?)
     }
 
-    /// Report and manifest, and in words how it went.
-    fn close(&self, whole: bool) -> Result<(), Halt> {
+    /// Writes the manifest and, for a complete collection, the report; logs a summary.
+    fn close(&self, complete: bool) -> Result<(), Halt> {
         let history = self.journal.history();
-        if whole {
+        if complete {
             self.watcher.report(&self.folder, history)?;
         }
         self.write_manifest()?;
-        let wanted = history.wanted();
+        let requested = history.wanted();
         let done = history.accepted().count();
-        let given_up = wanted.iter().filter(|slot| history.is_given_up(**slot)).count();
+        let given_up = requested.iter().filter(|slot| history.is_given_up(**slot)).count();
         let (estimated_s, measured_s) = self.pace.times_s();
         self.watcher.say(&format!(
-            "{done} of {} scans in {}, {} set aside, {given_up} given up; this run: {measured_s:.1} s \
-             of scanning, {estimated_s:.1} s estimated",
-            wanted.len(),
+            "{done} of {} scans in {}, {} rejected, {given_up} given up; this run: {measured_s:.1} s \
+             of scanning, estimated {estimated_s:.1} s",
+            requested.len(),
             self.folder.root().display(),
             history.set_aside().count(),
         ));
-        if whole && given_up > 0 {
+        if complete && given_up > 0 {
             return Err(Halt::Stopped(format!(
-                "{given_up} scans were given up: report.md says why; --retry-failed tries again"
+                "{given_up} scans failed (reasons in report.md); --retry-failed retries them"
             )));
         }
         Ok(())
     }
 
-    /// What to do about a scan that can't be taken as it should be.
+    /// Applies `collection.after_retakes` to a scan whose retakes are used up.
     fn give_up(&mut self, slot: Slot) -> Result<Next, Halt> {
         let retakes = self.plan.keys.collection.retakes;
-        let why =
-            format!("pose {}, repeat {}: {retakes} retakes did not help", slot.pose, slot.repeat);
+        let Slot { pose, repeat } = slot;
+        let reason = format!("pose {pose}, repeat {repeat}: {retakes} retakes failed");
         match self.plan.keys.collection.after_retakes {
-            AfterRetakes::Stop => Ok(Next::Stop(why)),
+            AfterRetakes::Stop => Ok(Next::Stop(reason)),
             AfterRetakes::GoOn => {
-                self.watcher.say(&format!("{why}: going on without it"));
-                self.note(Entry::GivenUp { slot, time: jiff::Timestamp::now() })?;
-                Ok(Next::GoOn)
+                self.watcher.say(&format!("{reason}: continuing without this scan"));
+                self.append(Entry::GivenUp { slot, time: jiff::Timestamp::now() })?;
+                Ok(Next::Continue)
             }
         }
     }
 }
 
-/// Bytes free where the collection goes.
+/// Free disk space at the collection's folder, bytes.
 fn free_bytes(folder: &Folder) -> Option<u64> {
     let disk = rustix::fs::statvfs(folder.root()).ok()?;
     Some(disk.f_bavail.saturating_mul(disk.f_frsize))
 }
 
-/// Says when the disk is too small for what is to come.
+/// Warns if the remaining scans are expected to exceed the free disk space.
 fn warn_of_disk(plan: &Plan, folder: &Folder, scans: u32, watcher: &impl Watcher) {
-    let wanted = disk_bytes(plan, scans);
-    if let Some(free) = free_bytes(folder).filter(|&free| wanted > free as f64) {
+    let required = disk_bytes(plan, scans);
+    if let Some(free) = free_bytes(folder).filter(|&free| required > free as f64) {
         watcher.say(&format!(
-            "warning: the scans take some {:.0} MB, and {:.0} MB of disk are free",
-            wanted / 1e6,
+            "warning: the scans need about {:.0} MB; {:.0} MB of disk are free",
+            required / 1e6,
             free as f64 / 1e6
         ));
     }

@@ -1,9 +1,9 @@
-//! The folder of a collection: what lies where, and how a scan comes to count.
+//! Folder layout of a collection and atomic acceptance of scans.
 //!
-//! Each scan is measured into a log of its own in `taking/`. It counts from the moment its file is
-//! renamed into `scans/`, under a name that says pose and repeat: a rename happens or does not, so
-//! a crash at any time leaves every scan there once or not at all. What was cut off or refused is
-//! renamed into `set-aside/`.
+//! Each scan is recorded into its own log in `taking/` and accepted by renaming the log into
+//! `scans/`, with pose and repeat in its name. A rename is atomic, so after a crash at any time
+//! each scan is present once or not at all. Incomplete and rejected scans are renamed into
+//! `set-aside/`.
 
 mod error;
 
@@ -20,107 +20,107 @@ use super::order::Slot;
 
 pub use error::FolderError;
 
-/// Scans under way: empty unless the program is running or was killed.
+/// Subfolder of scans being recorded: empty unless the program is running or was killed.
 pub(super) const TAKING: &str = "taking";
-/// Scans that count.
+/// Subfolder of accepted scans.
 pub const SCANS: &str = "scans";
-/// Scans that were cut off or refused.
+/// Subfolder of incomplete and rejected scans.
 pub const SET_ASIDE: &str = "set-aside";
-/// Plan, scene and sensor as they were used.
+/// Subfolder with copies of plan, scene and sensor.
 pub const INPUTS: &str = "inputs";
-/// What a file's name ends in until it is whole.
-const DRAFT: &str = ".new";
-/// The journal's name.
+/// Suffix of files that are still being written.
+const DRAFT_SUFFIX: &str = ".new";
+/// File name of the journal.
 pub const JOURNAL: &str = "journal.jsonl";
 
-/// A file at its final place.
+/// File at its final path, with size and digest.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Sealed {
-    /// Seen from the collection's folder.
+    /// Path relative to the collection's folder.
     pub file: String,
-    /// Its size, bytes.
+    /// File size, bytes.
     pub bytes: u64,
-    /// Its SHA-256, hexadecimal.
+    /// SHA-256 of the file, hexadecimal.
     pub sha256: String,
 }
 
-/// A collection's folder.
+/// Folder of a collection.
 #[derive(Debug, Clone)]
 pub struct Folder {
     root: PathBuf,
 }
 
 impl Folder {
-    /// Makes the folder and what it is divided into, as far as it is not there.
+    /// Opens the folder and creates missing subfolders.
     ///
     /// # Errors
-    /// When it can't be made, or holds something else than a collection.
+    /// Returns an error if the folder cannot be created, or contains other files.
     pub fn open(root: &Path) -> Result<Self, FolderError> {
-        let strange = fs::read_dir(root).is_ok_and(|mut entries| entries.next().is_some())
+        let has_other_files = fs::read_dir(root).is_ok_and(|mut entries| entries.next().is_some())
             && !root.join(JOURNAL).exists()
             && !root.join(TAKING).exists();
-        if strange {
+        if has_other_files {
             return Err(FolderError::Strange { path: root.into() });
         }
         for part in [TAKING, SCANS, SET_ASIDE, INPUTS] {
             let path = root.join(part);
-            fs::create_dir_all(&path).map_err(|source| FolderError::io("make", &path, source))?;
+            fs::create_dir_all(&path).map_err(|source| FolderError::io("create", &path, source))?;
         }
         Ok(Self { root: root.into() })
     }
 
-    /// A folder that is only read.
+    /// Creates a handle for reading, without touching the folder.
     #[must_use]
     pub fn at(root: &Path) -> Self {
         Self { root: root.into() }
     }
 
-    /// Where it is.
+    /// Path of the folder.
     #[must_use]
     pub fn root(&self) -> &Path {
         &self.root
     }
 
-    /// Where the journal is.
+    /// Path of the journal.
     #[must_use]
     pub fn journal(&self) -> PathBuf {
         self.root.join(JOURNAL)
     }
 
-    /// Where a scan is measured into.
+    /// Path of a scan while it is recorded.
     #[must_use]
     pub fn taking(&self, slot: Slot) -> PathBuf {
         self.root.join(TAKING).join(format!("{}.jsonl", stem(slot)))
     }
 
-    /// The scans that count, by what their files say.
+    /// Lists the accepted scans by their file names.
     ///
     /// # Errors
-    /// When the folder can't be read.
+    /// Returns an error if the folder cannot be read.
     pub fn scans(&self) -> Result<Vec<Slot>, FolderError> {
         Ok(self.files(SCANS)?.iter().filter_map(|name| slot_of(name)).collect())
     }
 
-    /// Scans that were under way when the program ended.
+    /// Lists the scans that were being recorded when an earlier run ended.
     ///
     /// # Errors
-    /// When the folder can't be read.
+    /// Returns an error if the folder cannot be read.
     pub fn left_over(&self) -> Result<Vec<Slot>, FolderError> {
         Ok(self.files(TAKING)?.iter().filter_map(|name| slot_of(name)).collect())
     }
 
-    /// Lets a scan count. Its file must be written, synced and closed.
+    /// Accepts a scan by renaming its file, which must be synced and closed.
     ///
     /// # Errors
-    /// When there is one already, or the disk fails.
+    /// Returns an error if the scan was accepted before, or the disk fails.
     pub fn accept(&self, slot: Slot) -> Result<Sealed, FolderError> {
         self.seal(slot, format!("{SCANS}/{}.jsonl", stem(slot)))
     }
 
-    /// Keeps a scan beside those that count.
+    /// Moves an incomplete or rejected scan into `set-aside/`, under the next take number.
     ///
     /// # Errors
-    /// When the disk fails.
+    /// Returns an error if the disk fails.
     pub fn set_aside(&self, slot: Slot) -> Result<Sealed, FolderError> {
         let stem = stem(slot);
         let prefix = format!("{stem}-take");
@@ -130,7 +130,7 @@ impl Folder {
             .filter_map(|name| name.strip_prefix(&prefix)?.split('.').next()?.parse::<u32>().ok());
         let take = last.max().unwrap_or(0) + 1;
         let name = format!("{stem}-take{take}.jsonl");
-        // What was cut off its end goes with it.
+        // Torn ends removed from the log are moved along.
         let torn = format!("{stem}.jsonl.torn-");
         for name in self.files(TAKING)?.iter().filter(|name| name.starts_with(&torn)) {
             let to =
@@ -140,10 +140,10 @@ impl Folder {
         self.seal(slot, format!("{SET_ASIDE}/{name}"))
     }
 
-    /// Removes a scan that has no reading in it.
+    /// Removes a scan without readings.
     ///
     /// # Errors
-    /// When the disk fails.
+    /// Returns an error if the disk fails.
     pub fn discard(&self, slot: Slot) -> Result<(), FolderError> {
         let path = self.taking(slot);
         match fs::remove_file(&path) {
@@ -154,43 +154,43 @@ impl Folder {
         }
     }
 
-    /// Size and SHA-256 of a scan that counts.
+    /// Returns size and SHA-256 of an accepted scan.
     ///
     /// # Errors
-    /// When it can't be read.
+    /// Returns an error if the file cannot be read.
     pub fn sealed(&self, slot: Slot) -> Result<Sealed, FolderError> {
         self.look(format!("{SCANS}/{}.jsonl", stem(slot)))
     }
 
-    /// Writes a file so that at any time either the old or the new one is there, whole.
+    /// Replaces a file atomically: a crash leaves either the old or the new content.
     ///
     /// # Errors
-    /// When the disk is full or fails; then the old one is still there.
+    /// Returns an error if the disk is full or fails; the old content is then kept.
     pub fn write(&self, name: &str, bytes: &[u8]) -> Result<(), FolderError> {
         let path = self.root.join(name);
         if let Some(folder) = path.parent() {
-            fs::create_dir_all(folder).map_err(|s| FolderError::io("make", folder, s))?;
+            fs::create_dir_all(folder).map_err(|s| FolderError::io("create", folder, s))?;
         }
         WholeFile::write(&path, bytes).map_err(|source| FolderError::io("write", &path, source))
     }
 
-    /// Removes what [`write`](Self::write) was at when the program was killed. Only for who holds
-    /// the journal.
+    /// Removes unfinished files of [`write`](Self::write) after a kill. The caller must hold the
+    /// journal's lock.
     ///
     /// # Errors
-    /// When it can't be removed.
+    /// Returns an error if a file cannot be removed.
     pub fn remove_drafts(&self) -> Result<(), FolderError> {
-        for name in self.all_files()?.iter().filter(|name| name.ends_with(DRAFT)) {
+        for name in self.all_files()?.iter().filter(|name| name.ends_with(DRAFT_SUFFIX)) {
             let path = self.root.join(name);
             fs::remove_file(&path).map_err(|source| FolderError::io("remove", &path, source))?;
         }
         Ok(())
     }
 
-    /// Looks at a file, named as seen from the folder.
+    /// Computes size and SHA-256 of a file, named relative to the folder.
     ///
     /// # Errors
-    /// When it can't be read.
+    /// Returns an error if the file cannot be read.
     pub fn look(&self, file: String) -> Result<Sealed, FolderError> {
         let path = self.root.join(&file);
         let (bytes, sha256) = File::open(&path)
@@ -199,10 +199,10 @@ impl Folder {
         Ok(Sealed { file, bytes, sha256 })
     }
 
-    /// Every file, as seen from the folder, sorted.
+    /// Lists all files recursively, relative to the folder and sorted.
     ///
     /// # Errors
-    /// When a folder can't be read.
+    /// Returns an error if a folder cannot be read.
     pub fn all_files(&self) -> Result<Vec<String>, FolderError> {
         let mut files = Vec::new();
         let mut folders = vec![String::new()];
@@ -213,8 +213,8 @@ impl Folder {
                 let entry = entry.map_err(fail)?;
                 let name = entry.file_name().to_string_lossy().into_owned();
                 let name = if folder.is_empty() { name } else { format!("{folder}/{name}") };
-                let of = entry.file_type().map_err(fail)?;
-                if of.is_dir() { folders.push(name) } else { files.push(name) }
+                let file_type = entry.file_type().map_err(fail)?;
+                if file_type.is_dir() { folders.push(name) } else { files.push(name) }
             }
         }
         files.sort();
@@ -226,11 +226,11 @@ impl Folder {
         self.look(file)
     }
 
-    /// Renames, but over no other file, and brings both folders to the disk.
+    /// Renames without replacing an existing file, and syncs both folders.
     fn rename(&self, from: &Path, to: &str) -> Result<(), FolderError> {
         let target = self.root.join(to);
         let rename = || {
-            // This process holds the journal's lock: nobody else puts one there meanwhile.
+            // The journal's lock excludes other writers between check and rename.
             if target.exists() {
                 return Err(io::ErrorKind::AlreadyExists.into());
             }
@@ -260,7 +260,7 @@ pub fn sha256(bytes: &[u8]) -> String {
     hexadecimal(&Sha256::digest(bytes))
 }
 
-/// The name of a scan's file without its ending; names sort as the scans do up to 999 poses.
+/// File name of a scan without extension. Names sort in scan order up to 999 poses.
 #[must_use]
 pub fn stem(slot: Slot) -> String {
     format!("p{:03}-r{:02}", slot.pose, slot.repeat)
@@ -276,7 +276,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_say_pose_and_repeat() {
+    fn file_names_of_slots() {
         for slot in [Slot { pose: 1, repeat: 2 }, Slot { pose: 1234, repeat: 567 }] {
             assert_eq!(slot_of(&format!("{}.jsonl", stem(slot))), Some(slot));
         }
@@ -285,9 +285,9 @@ mod tests {
     }
 
     #[test]
-    fn a_scan_counts_once_and_what_is_set_aside_is_numbered() {
+    fn accepts_once_and_numbers_takes() {
         let root = tempfile::tempdir().expect("a folder");
-        let folder = Folder::open(root.path()).expect("it is made");
+        let folder = Folder::open(root.path()).expect("created");
         let slot = Slot { pose: 2, repeat: 1 };
         let take = |text: &str| fs::write(folder.taking(slot), text).expect("writable");
         take("one");
@@ -297,20 +297,20 @@ mod tests {
         take("two");
         assert_eq!(folder.set_aside(slot).expect("kept").file, "set-aside/p002-r01-take2.jsonl");
         take("abc");
-        let sealed = folder.accept(slot).expect("it counts");
+        let sealed = folder.accept(slot).expect("accepted");
         assert_eq!(sealed, folder.sealed(slot).expect("readable"));
         // FIPS 180-2, appendix B.1.
         let known = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad";
         assert_eq!((sealed.bytes, sealed.sha256.as_str()), (3, known));
         take("again");
-        assert!(folder.accept(slot).is_err(), "nothing is written over");
+        assert!(folder.accept(slot).is_err(), "an accepted scan was replaced");
         assert_eq!(folder.sealed(slot).expect("readable"), sealed);
         let files = folder.all_files().expect("readable");
         assert!(files.contains(&"set-aside/p002-r01-take1.jsonl.torn-1".to_owned()), "{files:?}");
     }
 
     #[test]
-    fn a_folder_with_other_files_in_it_is_left_alone() {
+    fn rejects_other_folders() {
         let root = tempfile::tempdir().expect("a folder");
         fs::write(root.path().join("thesis.tex"), "").expect("writable");
         assert!(matches!(Folder::open(root.path()), Err(FolderError::Strange { .. })));
@@ -318,16 +318,16 @@ mod tests {
     }
 
     #[test]
-    fn a_file_is_replaced_whole() {
+    fn replaces_files_atomically() {
         let root = tempfile::tempdir().expect("a folder");
-        let folder = Folder::open(root.path()).expect("it is made");
+        let folder = Folder::open(root.path()).expect("created");
         for text in ["first", "second"] {
-            folder.write("manifest.json", text.as_bytes()).expect("there is room");
+            folder.write("manifest.json", text.as_bytes()).expect("written");
         }
         let text = fs::read_to_string(root.path().join("manifest.json")).expect("readable");
         assert_eq!(text, "second");
         fs::write(root.path().join("manifest.json.new"), "hal").expect("writable");
-        folder.remove_drafts().expect("it goes");
+        folder.remove_drafts().expect("removed");
         assert_eq!(folder.all_files().expect("readable"), ["manifest.json"]);
     }
 }

@@ -1,5 +1,5 @@
-//! What was decided and what came of it: one JSON object a line, each on the disk before anything
-//! is done by it.
+//! Journal of decisions and results: one JSON object per line, synced before the decision is
+//! carried out.
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -24,156 +24,156 @@ use super::{
     poses::NamedPose,
 };
 
-/// One line.
+/// Line of the journal.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "entry", rename_all = "snake_case")]
 pub enum Entry {
-    /// The plan from here on.
+    /// Plan that applies to the following entries.
     Plan(Box<PlanEntry>),
-    /// The program began or went on.
+    /// Start of a run.
     Started(Box<Started>),
-    /// A pose got its number.
+    /// Number assigned to a pose, or its updated conditions.
     Pose {
-        /// Its number, from 1.
+        /// Number of the pose, from 1.
         number: u32,
-        /// Where, and what was noted.
+        /// Pose and its conditions.
         #[serde(flatten)]
         pose: NamedPose,
     },
-    /// A scan is over, one way or another.
+    /// Result of a scan.
     Take(Box<Take>),
-    /// What the daemon that takes the scans did by itself before that was changed.
+    /// Settings of the daemon before the collection changed them.
     Borrowed(Borrowed),
-    /// It does that again.
+    /// Restoration of the daemon's settings.
     GivenBack {
-        /// When.
+        /// Time of the restoration.
         time: Timestamp,
     },
-    /// The scan is not tried again.
+    /// Scan that is not repeated any more.
     GivenUp {
-        /// Which.
+        /// Pose and repeat of the scan.
         #[serde(flatten)]
         slot: Slot,
-        /// When.
+        /// Time of the decision.
         time: Timestamp,
     },
 }
 
-/// The plan in force, with what it names.
+/// Plan with digests of its inputs.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PlanEntry {
-    /// When it came into force.
+    /// Time from which the plan applies.
     pub time: Timestamp,
-    /// Identifies the collection.
+    /// Identifier of the collection.
     pub collection: Uuid,
-    /// Version of the program.
+    /// Version of `sonard` that wrote the file.
     pub sonard: String,
-    /// Every key in force.
+    /// Effective values of all keys.
     pub keys: Value,
-    /// The scene.
+    /// Scene with its digest.
     pub scene: SceneRef,
     /// SHA-256 of the sensor's data, hexadecimal.
     pub sensor_sha256: String,
-    /// Numbers of the poses wanted, in order; `null` for all that come.
+    /// Numbers of the requested poses, in order; `null` for every pose of the source.
     pub poses: Option<Vec<u32>>,
 }
 
-/// The program began or went on.
+/// Start of a run, with the identified device.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Started {
-    /// When.
+    /// Start time.
     pub time: Timestamp,
-    /// Who measures.
+    /// Identity of the ranger.
     pub device: Device,
-    /// Whether it is hardware.
+    /// Origin of the readings: hardware, mock or simulation.
     pub provenance: Provenance,
-    /// What was noted.
+    /// Conditions entered at the start.
     #[serde(default, skip_serializing_if = "Conditions::is_empty")]
     pub conditions: Conditions,
 }
 
-/// Settings of a daemon before a collection changed them; unchanged ones are left out.
+/// Settings of a daemon before a collection changed them; unchanged ones are omitted.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Borrowed {
-    /// When it took scans.
+    /// Scan mode and interval.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub scanning: Option<ScanningKeys>,
-    /// In which air.
+    /// PoseSource of the air settings.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub air: Option<AirBefore>,
 }
 
-/// The air of a daemon.
+/// PoseSource of a daemon's air settings.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum AirBefore {
-    /// What its configuration and its thermometer say.
+    /// Configuration and thermometer of the daemon.
     Own,
-    /// What a program had said.
+    /// Values set by a client.
     Given(AirOrder),
 }
 
-/// The outcome of a scan.
+/// Outcome of a scan.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Outcome {
-    /// It counts.
+    /// Accepted as part of the collection.
     Accepted,
-    /// A check refused it: it is kept and does not count.
+    /// Rejected by a check; kept in `set-aside/`.
     Refused,
-    /// It was broken off: it is kept and does not count.
+    /// Ended early; kept in `set-aside/`.
     Cut,
 }
 
-/// A scan that is over.
+/// Result of one attempt at a scan.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Take {
-    /// Which scan it was to be.
+    /// Pose and repeat of the scan.
     #[serde(flatten)]
     pub slot: Slot,
-    /// Its id in records; `null` if it was cut before its first one.
+    /// Identifier of the scan in records; `null` if the scan ended before its first record.
     pub scan: Option<Uuid>,
-    /// When it began.
+    /// Start time of the scan.
     pub started: Option<Timestamp>,
-    /// What became of it.
+    /// Outcome of the scan.
     pub outcome: Outcome,
-    /// Its file, seen from the collection's folder.
+    /// Path of the log, relative to the collection's folder.
     pub file: String,
-    /// Size of that file, bytes.
+    /// Size of the log, bytes.
     pub bytes: u64,
-    /// SHA-256 of that file, hexadecimal.
+    /// SHA-256 of the log, hexadecimal.
     pub sha256: String,
-    /// The scan in figures.
+    /// Quality figures of the scan.
     pub figures: Figures,
-    /// What the checks found.
+    /// Violations of the plan's checks.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub findings: Vec<Finding>,
-    /// Why it does not count, for one that was cut.
+    /// Reason for an early end.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub cut: Option<String>,
-    /// From its beginning to its end by the wall clock, seconds; `null` if that is not known.
+    /// Duration by the wall clock, seconds; `null` if unknown.
     pub wall_s: Option<f64>,
 }
 
-/// Everything a journal says.
+/// State of a collection, accumulated from its journal.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct History {
-    /// The plans, the last one in force.
+    /// Plans in order; the last one is current.
     pub plans: Vec<PlanEntry>,
-    /// Each start of the program.
+    /// Starts of runs, in order.
     pub starts: Vec<Started>,
-    /// The poses by number.
+    /// Poses by their number, from 1.
     pub poses: BTreeMap<u32, NamedPose>,
-    /// Every scan that is over, in order.
+    /// Results of all attempts, in order.
     pub takes: Vec<Take>,
-    /// Scans that are not tried again.
+    /// Scans that are not repeated any more.
     pub given_up: BTreeSet<Slot>,
-    /// What was not given back yet.
+    /// Settings that still have to be restored.
     pub borrowed: Option<Borrowed>,
 }
 
 impl History {
-    fn learn(&mut self, entry: Entry) {
+    fn apply(&mut self, entry: Entry) {
         match entry {
             Entry::Plan(plan) => self.plans.push(*plan),
             Entry::Started(started) => self.starts.push(*started),
@@ -185,7 +185,7 @@ impl History {
         }
     }
 
-    /// Every scan that the plan in force wants, in its order, as far as its poses are known.
+    /// Lists the scans requested by the current plan, in measuring order, for all known poses.
     #[must_use]
     pub fn wanted(&self) -> Vec<Slot> {
         let Some(plan) = self.plans.last() else { return Vec::new() };
@@ -196,24 +196,24 @@ impl History {
         slots(&poses, keys.repeats, keys.order, keys.seed)
     }
 
-    /// Whether a scan is not there and not tried again.
+    /// Returns `true` if a scan is missing and not repeated any more.
     #[must_use]
     pub fn is_given_up(&self, slot: Slot) -> bool {
         self.given_up.contains(&slot) && !self.accepted().any(|take| take.slot == slot)
     }
 
-    /// The scans that count.
+    /// Iterates over the accepted scans.
     pub fn accepted(&self) -> impl Iterator<Item = &Take> {
         self.takes.iter().filter(|take| take.outcome == Outcome::Accepted)
     }
 
-    /// Those kept beside them, refused or cut.
+    /// Iterates over the rejected and incomplete scans.
     pub fn set_aside(&self) -> impl Iterator<Item = &Take> {
         self.takes.iter().filter(|take| take.outcome != Outcome::Accepted)
     }
 }
 
-/// The journal's file, held by this process alone.
+/// Journal file, locked by this process.
 #[derive(Debug)]
 pub struct Journal {
     file: File,
@@ -222,11 +222,12 @@ pub struct Journal {
 }
 
 impl Journal {
-    /// Opens a journal, or begins one, and reads what it says. A last line that was cut off in
-    /// mid-write is removed: nothing was done by it yet.
+    /// Opens and reads a journal, or creates it. An incomplete last line is removed: its decision
+    /// was not carried out.
     ///
     /// # Errors
-    /// When another process holds it, it can't be read, or a line in it is no entry.
+    /// Returns an error if another process has locked the journal, if reading fails, or if a line
+    /// is not a valid entry.
     pub fn open(path: &Path) -> Result<Self, FolderError> {
         let fail = |source| FolderError::io("open", path, source);
         let mut file = open_own(OpenOptions::new().read(true).append(true).create(true), path)
@@ -240,37 +241,39 @@ impl Journal {
         }
         let mut text = Vec::new();
         file.read_to_end(&mut text).map_err(fail)?;
-        let whole = text.iter().rposition(|&byte| byte == b'\n').map_or(0, |at| at + 1);
-        // Read before it is cut: what is no journal must stay as it is.
-        let history = read(&text[..whole], path)?;
-        if whole < text.len() {
-            file.set_len(whole as u64).and_then(|()| sync_file(&file)).map_err(fail)?;
+        let complete = complete_lines(&text);
+        // Parsed before truncation: a file that is not a journal must remain unchanged.
+        let history = read(complete, path)?;
+        if complete.len() < text.len() {
+            let length = complete.len() as u64;
+            file.set_len(length).and_then(|()| sync_file(&file)).map_err(fail)?;
             file.seek(SeekFrom::End(0)).map_err(fail)?;
         }
         Ok(Self { file, path: path.into(), history })
     }
 
-    /// What it says.
+    /// State accumulated from the journal.
     #[must_use]
     pub const fn history(&self) -> &History {
         &self.history
     }
 
-    /// Writes an entry, and returns when it is on the disk.
+    /// Appends an entry and syncs the file.
     ///
     /// # Errors
-    /// When the disk is full or fails; then nothing of it is in the journal.
+    /// Returns an error if the disk is full or fails; the entry is then removed from the journal.
     pub fn append(&mut self, entry: Entry) -> Result<(), FolderError> {
         let fail = |source| FolderError::io("write to", &self.path, source);
         let mut line = serde_json::to_vec(&entry).map_err(|error| fail(error.into()))?;
         line.push(b'\n');
         let before = self.file.metadata().map_err(fail)?.len();
         if let Err(error) = self.file.write_all(&line).and_then(|()| sync_file(&self.file)) {
-            // Half a line would hide what comes after it. If this fails too, opening mends it.
+            // A partial line would corrupt the next one. If truncation fails as well, `open`
+            // repairs the file.
             let _ = self.file.set_len(before);
             return Err(fail(error));
         }
-        self.history.learn(entry);
+        self.history.apply(entry);
         Ok(())
     }
 }
@@ -278,11 +281,16 @@ impl Journal {
 /// Reads a journal that another process may be writing.
 ///
 /// # Errors
-/// As [`Journal::open`].
+/// Returns an error if the file cannot be read or a line is not a valid entry.
 pub fn read_journal(path: &Path) -> Result<History, FolderError> {
     let text = std::fs::read(path).map_err(|source| FolderError::io("read", path, source))?;
-    let whole = text.iter().rposition(|&byte| byte == b'\n').map_or(0, |at| at + 1);
-    read(&text[..whole], path)
+    read(complete_lines(&text), path)
+}
+
+/// Text up to its last line feed.
+fn complete_lines(text: &[u8]) -> &[u8] {
+    let length = text.iter().rposition(|&byte| byte == b'\n').map_or(0, |at| at + 1);
+    &text[..length]
 }
 
 fn read(text: &[u8], path: &Path) -> Result<History, FolderError> {
@@ -294,7 +302,7 @@ fn read(text: &[u8], path: &Path) -> Result<History, FolderError> {
             line: index as u64 + 1,
             message: error.to_string(),
         })?;
-        history.learn(entry);
+        history.apply(entry);
     }
     Ok(history)
 }
@@ -305,9 +313,9 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
-        /// A journal that was changed at any place is read or refused at a line, without a panic.
+        /// Bytes changed at random: the journal is read or rejected with a line number.
         #[test]
-        fn a_changed_journal_is_read_or_refused(
+        fn corrupted_journal(
             changes in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..8),
         ) {
             let mut text: Vec<u8> = Vec::new();
@@ -337,37 +345,37 @@ mod tests {
     }
 
     #[test]
-    fn a_journal_cut_at_any_byte_keeps_its_whole_lines_and_goes_on() {
+    fn truncation_at_any_byte() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("journal.jsonl");
-        let mut journal = Journal::open(&path).expect("it begins");
+        let mut journal = Journal::open(&path).expect("created");
         for number in 1..=3 {
-            journal.append(pose(number)).expect("there is room");
+            journal.append(pose(number)).expect("written");
         }
         let slot = Slot { pose: 3, repeat: 2 };
         let time = Timestamp::UNIX_EPOCH;
-        journal.append(Entry::GivenUp { slot, time }).expect("there is room");
+        journal.append(Entry::GivenUp { slot, time }).expect("written");
         assert!(matches!(Journal::open(&path), Err(FolderError::Busy { .. })));
         drop(journal);
         let text = std::fs::read(&path).expect("readable");
         for length in 0..=text.len() {
             std::fs::write(&path, &text[..length]).expect("writable");
             let lines = text[..length].iter().filter(|&&byte| byte == b'\n').count();
-            let mut journal = Journal::open(&path).expect("it goes on");
+            let mut journal = Journal::open(&path).expect("reopened");
             assert_eq!(journal.history().poses.len(), lines.min(3));
             assert_eq!(journal.history().given_up.contains(&slot), lines == 4);
-            journal.append(pose(9)).expect("there is room");
+            journal.append(pose(9)).expect("written");
             drop(journal);
-            assert!(read_journal(&path).expect("whole").poses.contains_key(&9), "{length}");
+            assert!(read_journal(&path).expect("complete").poses.contains_key(&9), "{length}");
         }
     }
 
     #[test]
-    fn a_line_that_is_no_entry_is_named() {
+    fn line_of_an_invalid_entry() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("journal.jsonl");
         std::fs::write(&path, "{\"entry\":\"given_up\"}\n").expect("writable");
-        let error = Journal::open(&path).expect_err("it is damaged");
+        let error = Journal::open(&path).expect_err("damaged");
         assert!(error.to_string().contains("journal.jsonl:1: missing field"), "{error}");
     }
 }

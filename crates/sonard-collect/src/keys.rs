@@ -1,7 +1,7 @@
-//! The keys of a collection's plan, as they stand in its file.
+//! Keys of a collection's plan file.
 //!
-//! As for the daemon's configuration, this is the one place that says what there is: the doc
-//! comment of a field is its text in `sonard collect --example`, its `range` is what is checked.
+//! These structs define the file format, as for the daemon's configuration. The doc comment of a
+//! field is its text in `sonard collect --example`, and its `range` is validated.
 
 use std::sync::LazyLock;
 
@@ -12,137 +12,136 @@ use sonard_api::config::{
 };
 use sonard_model::model::OptionKeys;
 
-/// Things noted about a scan: name and value.
+/// Conditions recorded with a scan: name and value.
 pub type Conditions = serde_json::Map<String, serde_json::Value>;
 
 /// Plan of `sonard collect`.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct CollectionKeys {
-    /// What is collected, how often and in which order.
+    /// Name, folder, repeats and order of the scans.
     pub collection: CollectionSection,
-    /// Where the ranger stands: exactly one of list, file, program, stream and prompt.
+    /// Poses of the ranger: exactly one of list, file, program, stream and prompt.
     pub poses: PosesKeys,
-    /// What is to be noted with every scan: any keys, for instance room = "laboratory",
+    /// Conditions recorded with every scan: any keys, for instance room = "laboratory",
     /// carpet = false, humidity_percent = 41.
     pub conditions: Conditions,
-    /// What is asked for at the terminal and noted.
+    /// Conditions entered at the terminal.
     pub ask: AskKeys,
-    /// Which ranger; --port, --daemon, --mock and --emulator go before it.
+    /// Ranger to use; overridden by --port, --daemon, --mock and --emulator.
     pub device: DeviceKeys,
-    /// In what the ranger stands.
+    /// Environment of the ranger.
     pub place: SceneKeys,
-    /// What is known about the ranger, and how echoes are predicted.
+    /// Sensor data and prediction of echoes.
     pub sensor: SensorKeys,
-    /// Which azimuths a scan measures.
+    /// Azimuths of a scan.
     pub plan: PlanKeys,
-    /// How the motor turns and the ranger listens.
+    /// Motion of the motor and timing of the measurements.
     pub motion: MotionKeys,
-    /// The air, from which the speed of sound follows. A thermometer's file is read before and
-    /// after each scan.
+    /// Air, which determines the speed of sound. A thermometer's file is read before and after each
+    /// scan.
     pub air: CollectionAirKeys,
-    /// What is looked at after each scan, and what to do about it: note it in the report, retake
-    /// the scan, ask at the terminal (without one: stop), or stop.
+    /// Checks after each scan, and their actions: note the finding in the report, retake the scan,
+    /// ask at the terminal (without a terminal: stop), or stop.
     pub checks: CheckKeys,
 }
 
-/// What is collected.
+/// Section `[collection]`: name, folder, repeats and order.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct CollectionSection {
-    /// What the collection is called in its report.
+    /// Name of the collection in its report.
     pub name: String,
-    /// Folder of everything that is collected; --out goes before it.
+    /// Folder of the collection; overridden by --out.
     pub folder: String,
     /// Scans at each pose.
     #[schemars(range(min = 1, max = 10_000))]
     pub repeats: u32,
-    /// By pose: all repeats at a pose, then the next pose. Rounds: every pose once, then again.
-    /// Random: all scans in an order by seed. A drift of the air or of the ranger spreads over all
-    /// poses in the last two.
+    /// By pose: all repeats at a pose, then the next pose. Rounds: every pose once per round.
+    /// Random: all scans shuffled by seed. The last two distribute a drift of the air or of the
+    /// ranger over all poses.
     pub order: Order,
     /// Seed of the random order.
     #[schemars(range(min = 0, max = 4_294_967_295_u64))]
     pub seed: u64,
-    /// Pause between the end of a scan and the beginning of the next, seconds.
+    /// Pause between the end of a scan and the start of the next, seconds.
     #[schemars(range(min = 0, max = 604_800))]
     pub pause_s: f64,
-    /// How often a scan that a check refused is taken again.
+    /// Maximum number of retakes of a scan that a check rejected.
     #[schemars(range(min = 0, max = 1000))]
     pub retakes: u32,
-    /// What to do when that did not help: go on without that scan, or stop.
+    /// Action after the last retake: continue without that scan, or stop.
     pub after_retakes: AfterRetakes,
-    /// How long a ranger that is gone, or that loses one scan after the other, is tried again, ever
-    /// more seldom, seconds, before the collection stops. It goes on where it stopped when it is
-    /// started again.
+    /// Time before the collection stops if the ranger is gone or loses its scans, seconds. Retries
+    /// within that time are increasingly rare. The same command resumes a stopped collection.
     #[schemars(range(min = 0, max = 604_800))]
     pub patience_s: f64,
 }
 
-/// In which order scans are taken.
+/// Order of the scans.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Order {
     /// All repeats at a pose, then the next pose.
     #[default]
     ByPose,
-    /// Every pose once, then again.
+    /// Every pose once per round.
     Rounds,
-    /// All scans in an order by seed.
+    /// All scans shuffled by seed.
     Random,
 }
 
-/// What to do about a scan that could not be taken as it should be.
+/// Action after the last retake of a rejected scan.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum AfterRetakes {
-    /// Go on without it.
+    /// Continue without the scan.
     #[default]
     GoOn,
-    /// Stop.
+    /// Stop the collection.
     Stop,
 }
 
-/// Where the ranger stands.
+/// Section `[poses]`: source of the poses.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct PosesKeys {
     /// Poses, each X,Y,DEG (metres, degrees) or the name of a pose in the scene.
     pub list: Vec<String>,
-    /// File of poses: CSV whose first line names the columns x_m, y_m, heading_deg, perhaps name,
-    /// or JSON lines with these keys. Other columns are noted as conditions of the pose.
+    /// File of poses: CSV whose first line names the columns x_m, y_m, heading_deg and optionally
+    /// name, or JSON lines with these keys. Other columns are recorded as conditions of the pose.
     #[schemars(example = "poses.csv")]
     pub file: Option<String>,
-    /// Command that prints one pose each time it is run, as JSON with x_m, y_m, heading_deg and
-    /// perhaps name and others, or as in list; nothing when there are no more. It may move the
-    /// ranger. SONARD_POSE says the pose's number, from 1.
+    /// Command that prints one pose per run, as JSON with x_m, y_m, heading_deg and optionally name
+    /// and conditions, or as in list; no output ends the collection. The command may move the
+    /// ranger. SONARD_POSE is the pose's number, from 1.
     #[schemars(example = "./move-robot --next")]
     pub program: Option<String>,
-    /// Command that runs on and prints one such pose a line. SONARD_POSE says which number the
-    /// first line has: those before are known already when a collection goes on.
+    /// Command that keeps running and prints one such pose per line. SONARD_POSE is the number of
+    /// the first line's pose; a resumed collection has the earlier ones already.
     #[schemars(example = "ssh robot report-poses")]
     pub stream: Option<String>,
-    /// Ask for each pose at the terminal; an empty line ends the collection.
+    /// Prompt for each pose at the terminal; an empty line ends the collection.
     pub prompt: bool,
-    /// Poses wanted of program, stream or prompt, at most; 0 for as many as come.
+    /// Maximum number of poses from program, stream or prompt; 0 for no limit.
     #[schemars(range(min = 0, max = 100_000))]
     pub count: u32,
-    /// Before the first scan at another pose, wait until somebody says at the terminal that the
-    /// ranger stands there.
+    /// Before the first scan at a new pose, wait until the operator confirms at the terminal that
+    /// the ranger is in place.
     pub confirm: bool,
 }
 
-/// What is asked for at the terminal.
+/// Section `[ask]`: conditions entered at the terminal.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct AskKeys {
-    /// Once each time that the collection is started: for instance ["operator"].
+    /// Conditions entered once per start: for instance ["operator"].
     pub at_start: Vec<String>,
-    /// At each pose: for instance ["carpet", "door"].
+    /// Conditions entered at each pose: for instance ["carpet", "door"].
     pub at_pose: Vec<String>,
 }
 
-/// In what the ranger stands.
+/// Section `[place]`: environment of the ranger.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct SceneKeys {
@@ -150,15 +149,15 @@ pub struct SceneKeys {
     pub scene: String,
 }
 
-/// What is known about the ranger.
+/// Section `[sensor]`: sensor data and prediction.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct SensorKeys {
     /// Sensor preset, or a file with a sensor's data.
     pub sensor: String,
-    /// End the blanking by hand as early as the sensor allows, as BINH does.
+    /// End the blanking as early as the sensor allows, by its BINH input.
     pub short_blanking: bool,
-    /// From firing until the receiver listens, microseconds, instead of the sensor's.
+    /// Blanking after the ping, microseconds, instead of the sensor's.
     #[schemars(range(min = 0, max = 100_000), example = 1500)]
     pub blanking_us: Option<f64>,
     /// Height of the transducer in a scene with floor, ceiling or low walls, metres.
@@ -167,71 +166,71 @@ pub struct SensorKeys {
     /// Elevation of the transducer's axis, degrees, instead of the sensor's.
     #[schemars(range(min = -90, max = 90), example = 2)]
     pub tilt_deg: Option<f64>,
-    /// How echoes are predicted.
+    /// Options of the prediction of echoes.
     #[serde(flatten)]
     pub options: OptionKeys,
 }
 
-/// What to do about a scan that a check finds something wrong with.
+/// Action for a scan that violates a check.
 #[derive(
     Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default, Serialize, Deserialize, JsonSchema,
 )]
 #[serde(rename_all = "kebab-case")]
 pub enum Action {
-    /// Keep it, and say so in the report.
+    /// Keep the scan and note the finding in the report.
     #[default]
     Note,
-    /// Set it aside and take it again.
+    /// Set the scan aside and repeat it.
     Retake,
-    /// Ask at the terminal; without one, stop.
+    /// Prompt at the terminal; stop without a terminal.
     Ask,
-    /// Set it aside and stop.
+    /// Set the scan aside and stop.
     Stop,
 }
 
-/// What to do when the air is no longer that of the session.
+/// Action for air that drifted from the session's.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum AirAction {
-    /// Begin a session with the air as it is now, and predict anew.
+    /// Start a session with the current air and update the predictions.
     #[default]
     NewSession,
-    /// Go on with the session's, and say so in the report.
+    /// Keep the session's air and note the drift in the report.
     Note,
-    /// Stop.
+    /// Stop the collection.
     Stop,
 }
 
-/// What is looked at after each scan.
+/// Section `[checks]`: limits and actions after each scan.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct CheckKeys {
-    /// Beams of a scan that may lack a usable reading: lost, the motor's place in doubt, or the
-    /// module not fired.
+    /// Maximum number of beams without a usable reading: lost, uncertain motor position, or no
+    /// ping.
     #[schemars(range(min = 0, max = 65_535))]
     pub max_missing_beams: u32,
-    /// What to do about more of them.
+    /// Action if max_missing_beams is exceeded.
     pub on_missing_beams: Action,
-    /// How far off the index may be found after a scan, motor steps: missed steps show there.
+    /// Maximum index error after a scan, motor steps; missed steps cause it.
     #[schemars(range(min = 0, max = 10_000))]
     pub max_home_drift_steps: u32,
-    /// What to do about more.
+    /// Action if max_home_drift_steps is exceeded.
     pub on_home_drift: Action,
-    /// How far the thermometer may be from the session's air before a scan, degrees Celsius.
+    /// Maximum difference between thermometer and session air before a scan, degrees Celsius.
     #[schemars(range(min = 0, max = 50))]
     pub max_temperature_drift_c: f64,
-    /// What to do about more.
+    /// Action if max_temperature_drift_c is exceeded.
     pub on_temperature_drift: AirAction,
-    /// How far the thermometer may move during a scan, degrees Celsius.
+    /// Maximum temperature change during a scan, degrees Celsius.
     #[schemars(range(min = 0, max = 50))]
     pub max_temperature_change_c: f64,
-    /// What to do about more.
+    /// Action if max_temperature_change_c is exceeded.
     pub on_temperature_change: Action,
-    /// Share of the compared beams that the model may leave unexplained; more means a wrong pose,
-    /// a wrong scene, or a room that changed. 1 for any share.
+    /// Maximum share of compared beams that disagree with the model; a larger one indicates a wrong
+    /// pose, a wrong scene, or a changed room. 1 for no limit.
     #[schemars(range(min = 0, max = 1))]
     pub max_unexplained_share: f64,
-    /// What to do about more.
+    /// Action if max_unexplained_share is exceeded.
     pub on_unexplained: Action,
 }
 
@@ -289,9 +288,9 @@ impl Default for CheckKeys {
 
 impl Form for CollectionKeys {
     const HEAD: &'static str = "\
-# Plan of a collection for `sonard collect`. Every key is here, with its default; a key without one
-# stands in a comment with an example. `sonard collect PLAN.toml --check` reads it, `--plan-only`
-# says how long it takes.
+# Plan of a collection for `sonard collect`, with every key and its default; keys without a default
+# are comments with an example. `sonard collect PLAN.toml --check` validates it, `--plan-only`
+# estimates the duration.
 ";
     const DOCUMENTED_BY: &'static str = "sonard collect --example";
 
@@ -311,28 +310,28 @@ mod tests {
     }
 
     #[test]
-    fn the_example_is_the_defaults_and_every_key_says_what_it_is() {
+    fn example_documents_all_defaults() {
         assert_eq!(read(&document::<CollectionKeys>()), Ok(CollectionKeys::default()));
         for section in CollectionKeys::sections() {
             assert!(!section.about.is_empty(), "{}", section.name);
             for key in &section.keys {
-                let (of, name) = (&section.name, &key.name);
-                assert!(key.about.ends_with('.'), "{of}.{name}: {}", key.about);
-                assert!(key.default.is_some() || key.example.is_some(), "{of}.{name}");
+                let path = format!("{}.{}", section.name, key.name);
+                assert!(key.about.ends_with('.'), "{path}: {}", key.about);
+                assert!(key.default.is_some() || key.example.is_some(), "{path}");
                 if let Kind::Number { min, max } | Kind::Whole { min, max } = key.kind {
-                    assert!(min > f64::MIN && max < f64::MAX, "{of}.{name}");
+                    assert!(min > f64::MIN && max < f64::MAX, "{path}");
                 }
             }
         }
     }
 
     #[test]
-    fn conditions_take_any_key_and_other_sections_only_their_own() {
+    fn free_keys_in_conditions() {
         let keys = read(
             "[conditions]\nroom = \"laboratory\"\ncarpet = false\nhumidity_percent = 41\n\
              [collection]\nrepeats = 3\n",
         )
-        .expect("it is right");
+        .expect("valid");
         assert_eq!(keys.collection.repeats, 3);
         assert_eq!(keys.conditions["humidity_percent"], 41);
         for (text, place, help) in [

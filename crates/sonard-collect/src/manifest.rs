@@ -1,4 +1,4 @@
-//! The manifest: what belongs to a collection, with checksums; and its check.
+//! Manifest of a collection: files with digests, and their verification.
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -21,103 +21,103 @@ use super::{
     poses::NamedPose,
 };
 
-/// The manifest's name.
+/// File name of the manifest.
 pub const MANIFEST: &str = "manifest.json";
-/// Version of the manifest's form.
+/// Format version of the manifest.
 const FORMAT: u32 = 1;
 
-/// The files of a collection.
+/// Contents of a collection, with a digest per file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Manifest {
-    /// Version of this form.
+    /// Format version of the manifest.
     pub format: u32,
-    /// Identifies the collection.
+    /// Identifier of the collection.
     pub collection: Uuid,
-    /// What it is called.
+    /// Name of the collection.
     pub name: String,
-    /// When this was written.
+    /// Time at which the manifest was written.
     pub written: Timestamp,
-    /// Version of the program.
+    /// Version of `sonard` that wrote the file.
     pub sonard: String,
-    /// Whether every scan of the plan is there or was given up.
+    /// `true` if every scan of the plan is accepted or given up.
     pub complete: bool,
-    /// How many of what.
+    /// Numbers of scans and beams.
     pub counts: Counts,
-    /// Every key of the plan in force.
+    /// Effective values of all keys of the plan.
     pub plan: Value,
-    /// SHA-256 of those keys as compact JSON, hexadecimal.
+    /// SHA-256 of the plan's keys as compact JSON, hexadecimal.
     pub plan_sha256: String,
-    /// The scene.
+    /// Scene with its digest.
     pub scene: SceneRef,
     /// SHA-256 of the sensor's data, hexadecimal.
     pub sensor_sha256: String,
-    /// Each start of the program, with the device that answered and what was noted.
+    /// Starts of runs, with the identified device and the entered conditions.
     pub starts: Vec<Started>,
-    /// The poses by number.
+    /// Poses by their number, from 1.
     pub poses: BTreeMap<u32, NamedPose>,
-    /// Every file, but for this one.
+    /// All files except the manifest.
     pub files: Vec<FileEntry>,
 }
 
-/// Counts of scans by outcome.
+/// Numbers of scans by outcome, and of beams.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Counts {
-    /// Scans of the plan, as far as its poses are known.
+    /// Scans requested by the plan, for all known poses.
     pub wanted: u32,
-    /// Scans that count.
+    /// Number of accepted scans.
     pub accepted: u32,
-    /// Scans cut off or refused, kept beside them.
+    /// Incomplete and rejected scans in `set-aside/`.
     pub set_aside: u32,
-    /// Scans that are not tried again.
+    /// Scans that are not repeated any more.
     pub given_up: u32,
-    /// Beams of the scans that count.
+    /// Beams of the accepted scans.
     pub beams: u64,
-    /// Of those, beams without a usable reading.
+    /// Beams of the accepted scans without a usable reading.
     pub missing: u64,
 }
 
-/// A file.
+/// File of a collection.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FileEntry {
-    /// Seen from the folder.
+    /// Path relative to the collection's folder.
     pub path: String,
-    /// Its size, bytes.
+    /// File size, bytes.
     pub bytes: u64,
-    /// Its SHA-256, hexadecimal.
+    /// SHA-256 of the file, hexadecimal.
     pub sha256: String,
-    /// The scan in it, if it holds one.
+    /// Scan in the file, if any.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub scan: Option<ScanEntry>,
 }
 
-/// A scan in a file.
+/// Scan in a file of the collection.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ScanEntry {
-    /// Which one it is, or was to be.
+    /// Pose and repeat of the scan.
     #[serde(flatten)]
     pub slot: Slot,
-    /// Its id in records.
+    /// Identifier of the scan in records.
     pub id: Option<Uuid>,
-    /// Whether it counts.
+    /// Outcome of the scan.
     pub outcome: Outcome,
-    /// Beams of its plan.
+    /// Beams of the scan plan.
     pub beams: u32,
-    /// Of those, beams without a usable reading.
+    /// Beams without a usable reading.
     pub missing: u32,
 }
 
 impl Manifest {
-    /// Of a folder as its journal tells; the scans' checksums are the journal's, taken when each
-    /// was sealed, and other files are read.
+    /// Builds the manifest of a folder. Digests of scans are those of the journal, computed at
+    /// acceptance; other files are read.
     ///
     /// # Errors
-    /// When a file can't be read, or there is no plan yet.
+    /// Returns an error if a file cannot be read or the journal has no plan.
     pub fn of(folder: &Folder, history: &History) -> Result<Self, FolderError> {
-        let wanted = history.wanted();
+        let requested = history.wanted();
         let plan = history.plans.last().ok_or_else(|| FolderError::Damaged {
             path: folder.journal(),
             line: 1,
-            message: "the journal holds no plan".into(),
+            message: "the journal has no plan".into(),
         })?;
         let mut files = BTreeMap::new();
         for take in &history.takes {
@@ -151,9 +151,9 @@ impl Manifest {
             name: plan.keys["collection"]["name"].as_str().unwrap_or_default().to_owned(),
             written: Timestamp::now(),
             sonard: env!("CARGO_PKG_VERSION").into(),
-            complete: wanted.iter().find(open).is_none(),
+            complete: requested.iter().find(open).is_none(),
             counts: Counts {
-                wanted: wanted.len() as u32,
+                wanted: requested.len() as u32,
                 accepted: done.len() as u32,
                 set_aside: history.set_aside().count() as u32,
                 given_up: history.given_up.difference(&done).count() as u32,
@@ -170,19 +170,19 @@ impl Manifest {
         })
     }
 
-    /// Writes it into the folder.
+    /// Writes the manifest into the folder, replacing it atomically.
     ///
     /// # Errors
-    /// When the disk is full or fails; then the one before is still there.
+    /// Returns an error if the disk is full or fails; the previous manifest is then kept.
     pub fn write(&self, folder: &Folder) -> Result<(), FolderError> {
         let text = serde_json::to_string_pretty(self).unwrap_or_default() + "\n";
         folder.write(MANIFEST, text.as_bytes())
     }
 
-    /// Reads a folder's manifest.
+    /// Reads the manifest of a folder.
     ///
     /// # Errors
-    /// When it can't be read, or is none.
+    /// Returns an error if the file cannot be read or is not a manifest.
     pub fn read(root: &Path) -> Result<Self, FolderError> {
         let path = root.join(MANIFEST);
         let text = fs::read_to_string(&path).map_err(|s| FolderError::io("read", &path, s))?;
@@ -194,19 +194,20 @@ impl Manifest {
     }
 }
 
-/// The result of verifying a collection.
+/// Result of verifying a collection.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Verified {
-    /// The manifest it was checked against.
+    /// Manifest that the files were compared with.
     pub manifest: Manifest,
-    /// What is wrong, each with the file it is about; empty if all is as it was written.
+    /// Problems, each with its file; empty if the collection is intact.
     pub problems: Vec<String>,
 }
 
-/// Checks every file of a collection against its manifest, and every scan as a log.
+/// Verifies every file of a collection against its manifest, and checks every scan's log. Calls
+/// `each` after each file.
 ///
 /// # Errors
-/// When there is no manifest to check against, or the folder can't be read.
+/// Returns an error if the manifest or the folder cannot be read.
 pub fn verify(root: &Path, mut each: impl FnMut()) -> Result<Verified, FolderError> {
     let manifest = Manifest::read(root)?;
     let folder = Folder::at(root);
@@ -219,7 +220,7 @@ pub fn verify(root: &Path, mut each: impl FnMut()) -> Result<Verified, FolderErr
     }
     let mut seen = BTreeSet::new();
     for file in &manifest.files {
-        problems.extend(differs(&folder, file));
+        problems.extend(difference(&folder, file));
         if let Some(scan) = &file.scan {
             if scan.outcome == Outcome::Accepted && !seen.insert(scan.slot) {
                 let Slot { pose, repeat } = scan.slot;
@@ -235,12 +236,12 @@ pub fn verify(root: &Path, mut each: impl FnMut()) -> Result<Verified, FolderErr
     }
     problems.extend(journal_problems(root, &seen));
     if !manifest.complete {
-        problems.push("the collection is not complete: start it again, it goes on".into());
+        problems.push("the collection is not complete: run the same command to resume".into());
     }
     Ok(Verified { manifest, problems })
 }
 
-fn differs(folder: &Folder, file: &FileEntry) -> Option<String> {
+fn difference(folder: &Folder, file: &FileEntry) -> Option<String> {
     let path = &file.path;
     match folder.look(path.clone()) {
         Err(error) => Some(format!("{path}: {error}")),
@@ -248,13 +249,13 @@ fn differs(folder: &Folder, file: &FileEntry) -> Option<String> {
             Some(format!("{path}: {} bytes, {} in the manifest", found.bytes, file.bytes))
         }
         Ok(found) if found.sha256 != file.sha256 => {
-            Some(format!("{path}: changed: its SHA-256 is not the manifest's"))
+            Some(format!("{path}: changed: its SHA-256 differs from the manifest"))
         }
         Ok(_) => None,
     }
 }
 
-/// What is wrong with the log of a scan that counts.
+/// Problems in the log of an accepted scan.
 fn scan_problems(path: &Path, file: &FileEntry, scan: &ScanEntry) -> Vec<String> {
     if scan.outcome != Outcome::Accepted {
         return Vec::new();
@@ -269,7 +270,7 @@ fn scan_problems(path: &Path, file: &FileEntry, scan: &ScanEntry) -> Vec<String>
     });
     match checked {
         Ok(totals) if totals.scans != 1 => {
-            problems.push(format!("{name}: {} scans in it", totals.scans));
+            problems.push(format!("{name}: contains {} scans", totals.scans));
         }
         Ok(_) => {}
         Err(error) => problems.push(format!("{name}: {error}")),
@@ -278,7 +279,7 @@ fn scan_problems(path: &Path, file: &FileEntry, scan: &ScanEntry) -> Vec<String>
     if let Ok(views) = views
         && views.first().map(|view| view.scan) != scan.id
     {
-        problems.push(format!("{name}: it holds another scan than the manifest says"));
+        problems.push(format!("{name}: the scan's id differs from the manifest"));
     }
     problems
 }
@@ -288,13 +289,12 @@ fn journal_problems(root: &Path, accepted: &BTreeSet<Slot>) -> Vec<String> {
         Ok(history) => history,
         Err(error) => return vec![error.to_string()],
     };
-    let told: BTreeSet<Slot> = history.accepted().map(|take| take.slot).collect();
-    told.symmetric_difference(accepted)
+    let journaled: BTreeSet<Slot> = history.accepted().map(|take| take.slot).collect();
+    journaled
+        .symmetric_difference(accepted)
         .map(|slot| {
             let Slot { pose, repeat } = slot;
-            format!(
-                "{JOURNAL}: it does not agree with the manifest on pose {pose}, repeat {repeat}"
-            )
+            format!("{JOURNAL}: differs from the manifest in pose {pose}, repeat {repeat}")
         })
         .collect()
 }

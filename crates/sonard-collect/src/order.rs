@@ -1,4 +1,4 @@
-//! Which scans there are to take, and in which order. Pure.
+//! Order of the scans of a collection. Pure.
 
 use rand::{SeedableRng as _, seq::SliceRandom as _};
 use rand_pcg::Pcg64;
@@ -6,19 +6,18 @@ use serde::{Deserialize, Serialize};
 
 use super::keys::Order;
 
-/// One scan of a collection: the pose's number and the repeat's, both from 1.
+/// Scan of a collection, identified by pose and repeat, both counted from 1.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct Slot {
     /// Number of the pose.
     pub pose: u32,
-    /// Number of the scan at that pose.
+    /// Number of the repeat at that pose.
     pub repeat: u32,
 }
 
-/// Every scan of `poses` with so many repeats each.
+/// Lists all scans of `poses` with `repeats` scans each, in measuring order.
 ///
-/// The same poses, repeats and seed always give the same order, so that a collection that is
-/// resumed goes on in the order in which it began.
+/// The order depends only on the arguments, so a resumed collection keeps its order.
 #[must_use]
 pub fn slots(poses: &[u32], repeats: u32, order: Order, seed: u64) -> Vec<Slot> {
     let at = |pose: u32| (1..=repeats).map(move |repeat| Slot { pose, repeat });
@@ -47,19 +46,19 @@ mod tests {
     }
 
     #[test]
-    fn orders_are_what_they_say() {
+    fn by_pose_and_in_rounds() {
         assert_eq!(text(&slots(&[1, 2], 2, Order::ByPose, 1)), "1.1 1.2 2.1 2.2");
         assert_eq!(text(&slots(&[1, 4], 2, Order::Rounds, 1)), "1.1 4.1 1.2 4.2");
     }
 
     #[test]
-    fn a_random_order_has_every_scan_once_and_repeats_by_seed() {
-        let of = |seed| slots(&[1, 2, 3, 5], 25, Order::Random, seed);
-        let mut sorted = of(7);
+    fn random_order_by_seed() {
+        let shuffled = |seed| slots(&[1, 2, 3, 5], 25, Order::Random, seed);
+        let mut sorted = shuffled(7);
         sorted.sort_unstable();
         assert_eq!(sorted, slots(&[1, 2, 3, 5], 25, Order::ByPose, 7));
-        assert_eq!(of(7), of(7));
-        assert_ne!(of(7), of(8));
-        assert_ne!(of(7), sorted);
+        assert_eq!(shuffled(7), shuffled(7));
+        assert_ne!(shuffled(7), shuffled(8));
+        assert_ne!(shuffled(7), sorted);
     }
 }

@@ -1,4 +1,4 @@
-//! A plan with everything that it names.
+//! Resolved collection plan: keys with the loaded scene, sensor and poses.
 
 use std::{path::PathBuf, sync::Arc};
 
@@ -11,51 +11,51 @@ use sonard_model::{
 };
 use sonard_records::ScanPlan;
 
-/// What a plan may say about the air.
-const AIR: [&str; 4] = ["temperature_c", "humidity_percent", "pressure_kpa", "file"];
+/// Keys of the plan's `[air]` section.
+const AIR_KEYS: [&str; 4] = ["temperature_c", "humidity_percent", "pressure_kpa", "file"];
 
-/// A source of poses.
+/// PoseSource of a collection's poses.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Poses {
-    /// They are all known.
+    /// Poses listed in the plan or in a file.
     Listed(Vec<NamedPose>),
-    /// A person gives them.
+    /// Poses entered by the operator.
     Prompt,
-    /// A command that is run for each.
+    /// Command that is run once per pose.
     Program(String),
-    /// A command that prints them one by one.
+    /// Command that prints one pose per line.
     Stream(String),
 }
 
-/// A plan with everything it names.
+/// Collection plan with its loaded inputs.
 #[derive(Debug)]
 pub struct Plan {
-    /// Every key in force.
+    /// Effective values of all keys.
     pub keys: CollectionKeys,
-    /// The plan's text.
+    /// Text of the plan's file.
     pub text: String,
-    /// Where the collection goes.
+    /// Folder of the collection.
     pub folder: PathBuf,
-    /// The scene.
+    /// Loaded scene.
     pub scene: Arc<Scene>,
-    /// Its text.
+    /// Text of the scene's file.
     pub scene_text: String,
-    /// The sensor, as the plan changes it.
+    /// Sensor with the plan's overrides.
     pub sensor: Sensor,
-    /// Where the ranger is to stand.
+    /// Poses of the ranger.
     pub poses: Poses,
-    /// Which azimuths.
+    /// Azimuths of the beams.
     pub azimuths: ScanPlan,
-    /// Motor steps a turn.
+    /// Motor steps per revolution.
     pub steps_per_revolution: u16,
-    /// Where the keys were given.
+    /// Layers of the configuration, with the origin of each key.
     pub layers: Layers<CollectionKeys>,
-    /// The plan's file, as errors call it.
+    /// Name of the plan's file in error messages.
     pub name: String,
 }
 
 impl Plan {
-    /// What is measured at a pose in this air.
+    /// Builds the inputs of a scan at a pose in the given air.
     #[must_use]
     pub fn inputs(&self, pose: &NamedPose, air: Air) -> ScanInputs {
         ScanInputs {
@@ -66,28 +66,28 @@ impl Plan {
             motion: self.motion(),
             sensor: self.sensor.clone(),
             air,
-            // Options that the engine does not know are refused when the plan is read.
+            // Options that the engine does not support are rejected when the plan is read.
             options: self.keys.sensor.options.options_of_engine(),
         }
     }
 
-    /// The air at this temperature, degrees Celsius.
+    /// Returns the air at a temperature in degrees Celsius, with the plan's humidity and pressure.
     ///
     /// # Errors
-    /// When there is no such air.
+    /// Returns an error if a value is outside the valid range.
     pub fn air(&self, temperature_c: f64) -> Result<Air, Halt> {
         let keys = &self.keys.air;
         Air::new(temperature_c, keys.humidity_percent, keys.pressure_kpa)
             .map_err(|error| Halt::failed(error, "degrees Celsius, percent and kilopascals"))
     }
 
-    /// How the motor turns and the ranger listens.
+    /// Motion and measurement settings.
     #[must_use]
     pub fn motion(&self) -> Motion {
         Motion::from(&self.keys.motion)
     }
 
-    /// Poses that will be there, as far as that is known.
+    /// Returns the number of poses; `None` for a source without limit.
     #[must_use]
     pub fn pose_count(&self) -> Option<u32> {
         match &self.poses {
@@ -96,13 +96,13 @@ impl Plan {
         }
     }
 
-    /// Whether the plan says anything about the air.
+    /// Returns `true` if the plan sets any key of `[air]`.
     #[must_use]
     pub fn gives_air(&self) -> bool {
         self.given_air().next().is_some()
     }
 
-    /// What a daemon is told about the air; nothing if that is the daemon's to know.
+    /// Returns the air settings for a daemon; `None` if the plan leaves them to the daemon.
     #[must_use]
     pub fn air_order(&self, temperature_c: f64) -> Option<AirOrder> {
         let given = |key, value| self.is_given("air", key).then_some(value);
@@ -113,12 +113,12 @@ impl Plan {
         })
     }
 
-    /// What it says about it.
+    /// Lists the keys of `[air]` that the plan sets.
     pub fn given_air(&self) -> impl Iterator<Item = &'static str> {
-        AIR.into_iter().filter(|key| self.is_given("air", key))
+        AIR_KEYS.into_iter().filter(|key| self.is_given("air", key))
     }
 
-    /// Whether a key stands in the plan, or was set over it.
+    /// Returns `true` if a key is set in the plan or by an override.
     #[must_use]
     pub fn is_given(&self, section: &str, key: &str) -> bool {
         self.layers.origin(section, key).is_some()

@@ -1,4 +1,4 @@
-//! Poses as people, files and programs give them. Pure.
+//! Parser of poses from operators, files and programs. Pure.
 
 use std::{collections::BTreeMap, fmt};
 
@@ -8,28 +8,28 @@ use sonard_model::{geometry::Pose, scene::Scene};
 
 use super::keys::Conditions;
 
-/// A pose of a collection, with its notes.
+/// Pose of a collection, with optional name and conditions.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct NamedPose {
-    /// What it is called.
+    /// Name of the pose.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub name: Option<String>,
-    /// Where.
+    /// Position and heading.
     #[serde(flatten)]
     pub pose: Pose,
-    /// What was noted.
+    /// Recorded conditions, such as the state of a door.
     #[serde(default, skip_serializing_if = "Conditions::is_empty")]
     pub conditions: Conditions,
 }
 
-/// The reason why a pose is missing or invalid.
+/// Reason why a pose is missing or invalid.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct PoseFault {
-    /// Line of the file, from 1, if it is one.
+    /// Line number in the file, from 1, if the pose is from a file.
     pub line: Option<u64>,
-    /// What is wrong.
+    /// Description of the fault.
     pub message: String,
-    /// What would be right.
+    /// Suggested correction for the user.
     pub help: String,
 }
 
@@ -50,21 +50,22 @@ impl PoseFault {
 }
 
 impl NamedPose {
-    /// Reads a pose that stands on a line of its own: a JSON object, `X,Y,DEG`, or the name of a
-    /// pose of the scene. The ranger must be able to stand there.
+    /// Parses a pose from one line: a JSON object, `X,Y,DEG`, or the name of a pose of the scene.
+    /// The pose must be free for the ranger.
     ///
     /// # Errors
-    /// What is wrong, and what would be right.
+    /// Returns the fault and its correction if the text is not a pose or the pose is not free.
     pub fn parse(text: &str, scene: &Scene) -> Result<Self, PoseFault> {
         Self::read(text, scene, None)?.checked(scene)
     }
 
-    /// The same, whether or not a ranger can stand there, with the heading where none is given.
+    /// Parses a pose without checking that it is free; `heading_deg` is the default of a JSON
+    /// object without heading.
     fn read(text: &str, scene: &Scene, heading_deg: Option<f64>) -> Result<Self, PoseFault> {
         let text = text.trim();
         if text.starts_with('{') {
             let object = serde_json::from_str(text).map_err(|error| {
-                PoseFault::new(format!("{text}: no JSON object: {error}"), JSON_HELP)
+                PoseFault::new(format!("{text}: not a JSON object: {error}"), JSON_HELP)
             })?;
             return Self::from_object(object, heading_deg);
         }
@@ -73,22 +74,20 @@ impl NamedPose {
         Ok(Self { name, pose, conditions: Conditions::new() })
     }
 
-    /// Reads a pose of an object with `x_m`, `y_m`, `heading_deg`; `name` is its name, and
-    /// everything else is noted as a condition.
+    /// Converts an object with `x_m`, `y_m`, `heading_deg` and optional `name`; other keys become
+    /// conditions.
     fn from_object(
         mut object: Map<String, Value>,
         heading_deg: Option<f64>,
     ) -> Result<Self, PoseFault> {
-        let mut figure = |key: &str, otherwise: Option<f64>| match object.remove(key) {
+        let mut number = |key: &str, default: Option<f64>| match object.remove(key) {
             Some(value) => {
                 value.as_f64().ok_or_else(|| PoseFault::new(format!("{key} is {value}"), JSON_HELP))
             }
-            None => {
-                otherwise.ok_or_else(|| PoseFault::new(format!("there is no {key}"), JSON_HELP))
-            }
+            None => default.ok_or_else(|| PoseFault::new(format!("{key} is missing"), JSON_HELP)),
         };
-        let (x_m, y_m) = (figure("x_m", None)?, figure("y_m", None)?);
-        let heading_deg = figure("heading_deg", heading_deg)?;
+        let (x_m, y_m) = (number("x_m", None)?, number("y_m", None)?);
+        let heading_deg = number("heading_deg", heading_deg)?;
         let name = match object.remove("name") {
             None | Some(Value::Null) => None,
             Some(Value::String(name)) => Some(name).filter(|name| !name.is_empty()),
@@ -103,13 +102,13 @@ impl NamedPose {
         Ok(self)
     }
 
-    /// Whether it is the same place under the same name, whatever was noted.
+    /// Returns `true` if pose and name are equal; conditions may differ.
     #[must_use]
     pub fn is_place(&self, other: &Self) -> bool {
         self.pose == other.pose && self.name == other.name
     }
 
-    /// What a person calls it.
+    /// Name of the pose, or its coordinates as `X,Y,DEG`.
     #[must_use]
     pub fn label(&self) -> String {
         let Pose { x_m, y_m, heading_deg } = self.pose;
@@ -117,8 +116,8 @@ impl NamedPose {
     }
 }
 
-/// For each listed pose the number that a collection gave it; `None` for a new one. A place that is
-/// listed twice has two numbers.
+/// Finds the number of each listed pose in a collection; `None` for a new one. A pose listed twice
+/// has two numbers.
 #[must_use]
 pub fn numbers_of(listed: &[NamedPose], known: &BTreeMap<u32, NamedPose>) -> Vec<Option<u32>> {
     let mut free: Vec<(u32, &NamedPose)> =
@@ -130,25 +129,25 @@ pub fn numbers_of(listed: &[NamedPose], known: &BTreeMap<u32, NamedPose>) -> Vec
     listed.iter().map(&mut number).collect()
 }
 
-const JSON_HELP: &str = "a pose is {\"x_m\": 1.2, \"y_m\": 0.8, \"heading_deg\": 90}, perhaps with \
-                         \"name\", in metres and degrees; or X,Y,DEG; or a pose of the scene";
-const CSV_HELP: &str = "the first line names the columns: x_m,y_m,heading_deg, perhaps name, and \
-                        any others, which are noted as conditions";
+const JSON_HELP: &str = "a pose is {\"x_m\": 1.2, \"y_m\": 0.8, \"heading_deg\": 90}, optionally \
+                         with \"name\", in metres and degrees; or X,Y,DEG; or a pose of the scene";
+const CSV_HELP: &str = "the first line names the columns: x_m,y_m,heading_deg, optionally name; \
+                        further columns are recorded as conditions";
 
-/// A line of a file of poses.
+/// Line of a pose file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PoseLine {
-    /// Number of the line, from 1.
+    /// Line number, from 1.
     pub line: u64,
-    /// The pose, wherever it is, or why there is none.
+    /// Parsed pose, not checked against the scene, or the fault of the line.
     pub pose: Result<NamedPose, PoseFault>,
 }
 
-/// Reads a file of poses: JSON lines if its first character is `{`, else CSV with a header. A ranger
-/// must be able to stand at each.
+/// Parses a pose file: JSON lines if its first character is `{`, otherwise CSV with a header. Each
+/// pose must be free for the ranger.
 ///
 /// # Errors
-/// The first line that is wrong.
+/// Returns the fault of the first invalid line.
 pub fn read_file(text: &str, scene: &Scene) -> Result<Vec<NamedPose>, PoseFault> {
     let lines = read_lines(text, scene, None)?.into_iter();
     lines
@@ -158,11 +157,11 @@ pub fn read_file(text: &str, scene: &Scene) -> Result<Vec<NamedPose>, PoseFault>
         .collect()
 }
 
-/// Reads a file of poses line by line, so that one that is wrong costs no other. `heading_deg` is
-/// taken where a JSON object has none.
+/// Parses a pose file line by line; an invalid line does not affect others. `heading_deg` is the
+/// default of JSON objects without heading.
 ///
 /// # Errors
-/// When there is no pose to be read at all: an empty file, or columns that are missing.
+/// Returns an error if the file is empty or a required column is missing.
 pub fn read_lines(
     text: &str,
     scene: &Scene,
@@ -175,7 +174,7 @@ pub fn read_lines(
         comma_separated(text)?
     };
     if lines.is_empty() {
-        return Err(PoseFault::new("no pose in it", CSV_HELP));
+        return Err(PoseFault::new("no pose in the file", CSV_HELP));
     }
     Ok(lines)
 }
@@ -197,7 +196,7 @@ fn comma_separated(text: &str) -> Result<Vec<PoseLine>, PoseFault> {
     let columns = reader.headers().map_err(|error| fault(&error))?.clone();
     for needed in ["x_m", "y_m", "heading_deg"] {
         if !columns.iter().any(|column| column == needed) {
-            return Err(PoseFault::new(format!("there is no column {needed}"), CSV_HELP).at(1));
+            return Err(PoseFault::new(format!("column {needed} is missing"), CSV_HELP).at(1));
         }
     }
     let lines = reader.records().map(|record| {
@@ -216,11 +215,11 @@ fn comma_separated(text: &str) -> Result<Vec<PoseLine>, PoseFault> {
     Ok(lines.collect())
 }
 
-/// A cell as a number or a switch if it is one; a name is always text.
+/// Converts a cell to a number or a boolean where possible; a name is always text.
 fn value(column: &str, cell: &str) -> Value {
-    let plain = serde_json::from_str(cell).ok();
-    let kept = plain.filter(|value: &Value| value.is_number() || value.is_boolean());
-    kept.filter(|_| column != "name").unwrap_or_else(|| cell.into())
+    let parsed = serde_json::from_str(cell).ok();
+    let scalar = parsed.filter(|value: &Value| value.is_number() || value.is_boolean());
+    scalar.filter(|_| column != "name").unwrap_or_else(|| cell.into())
 }
 
 #[cfg(test)]
@@ -231,11 +230,11 @@ mod tests {
     use proptest::prelude::*;
 
     fn room() -> Scene {
-        Scene::from_json(shipped::text("simple-room").expect("shipped")).expect("it is right")
+        Scene::from_json(shipped::text("simple-room").expect("shipped")).expect("valid")
     }
 
     #[test]
-    fn poses_are_read_in_every_form() {
+    fn all_formats() {
         let room = room();
         let named = NamedPose::parse("fig9", &room).expect("a pose");
         assert_eq!((named.label().as_str(), named.pose.x_m), ("fig9", 0.774));
@@ -253,9 +252,9 @@ mod tests {
     }
 
     proptest! {
-        /// Whatever a file of poses holds: no panic, and what is refused is refused at a line of it.
+        /// Random text: parsed, or rejected with a line number of the text.
         #[test]
-        fn any_text_is_read_or_refused_at_a_line(
+        fn random_text(
             pieces in prop::collection::vec(
                 prop_oneof![
                     8 => prop::sample::select(vec![
@@ -282,7 +281,7 @@ mod tests {
     }
 
     #[test]
-    fn a_place_that_is_listed_twice_has_two_numbers_and_a_new_one_none() {
+    fn assigns_numbers() {
         let room = room();
         let pose = |text| NamedPose::parse(text, &room).expect("a pose");
         let known = [(1, pose("fig9")), (2, pose("fig7")), (4, pose("fig9"))].into();
@@ -291,17 +290,21 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_pose_is_named_with_its_line() {
+    fn reports_the_line_of_a_fault() {
         let room = room();
         for (text, line, message) in [
-            ("x_m,y_m\n0.5,0.3\n", Some(1), "no column heading_deg"),
+            ("x_m,y_m\n0.5,0.3\n", Some(1), "column heading_deg is missing"),
             ("x_m,y_m,heading_deg\n0.5,0.3,0\n0.5,zero,0\n", Some(3), "y_m is \"zero\""),
             ("x_m,y_m,heading_deg\n0.5,0.3\n", Some(2), "fields"),
             ("x_m,y_m,heading_deg\n5,0.3,0\n", Some(2), ""),
             ("x_m,y_m,heading_deg\n", None, "no pose"),
-            ("", Some(1), "no column"),
-            ("{\"x_m\":0.5,\"y_m\":0.3,\"heading_deg\":0}\n{\"x_m\":1}\n", Some(2), "no y_m"),
-            ("{\"x_m\":0.5,\n", Some(1), "no JSON object"),
+            ("", Some(1), "column x_m is missing"),
+            (
+                "{\"x_m\":0.5,\"y_m\":0.3,\"heading_deg\":0}\n{\"x_m\":1}\n",
+                Some(2),
+                "y_m is missing",
+            ),
+            ("{\"x_m\":0.5,\n", Some(1), "not a JSON object"),
         ] {
             let fault = read_file(text, &room).expect_err(text);
             assert_eq!(fault.line, line, "{text:?}: {fault}");

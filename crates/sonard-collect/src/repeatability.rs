@@ -1,4 +1,4 @@
-//! How well scans at one pose repeat. Pure.
+//! Repeatability of scans at one pose. Pure.
 
 use std::collections::BTreeMap;
 
@@ -6,32 +6,33 @@ use serde::Serialize;
 use sonard_interpret::compare::quantile;
 use sonard_records::{PingStatus, ScanView};
 
-/// Repeatability of the scans at a pose, beam by beam.
+/// Repeatability of the scans at a pose, evaluated per beam.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct Repeatability {
-    /// Scans looked at.
+    /// Number of scans.
     pub scans: u32,
-    /// Beams that every scan heard an echo in.
+    /// Beams with an echo in every scan.
     pub steady: u32,
-    /// Beams that some scans heard an echo in and others not.
+    /// Beams with an echo in some scans only.
     pub unsteady: u32,
-    /// Median over the steady beams of the standard deviation of a beam's ranges, metres.
+    /// Median over the steady beams of the standard deviation of range, metres.
     pub median_spread_m: Option<f64>,
-    /// The standard deviation that nine tenths of the steady beams don't exceed, metres.
+    /// 90th percentile over the steady beams of the standard deviation of range, metres.
     pub p90_spread_m: Option<f64>,
 }
 
-/// The spread of a beam's ranges.
+/// Spread of the ranges of one beam.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BeamSpread {
     /// Azimuth, degrees.
     pub azimuth_deg: f64,
-    /// Standard deviation of its ranges (divisor n - 1), metres.
+    /// Standard deviation of the ranges (divisor n - 1), metres.
     pub spread_m: f64,
 }
 
-/// Of scans with the same plan at the same pose. A beam's ranges are those of its echoes; firings at
-/// the same stop are beams of their own.
+/// Computes the repeatability of scans with the same plan and pose.
+///
+/// The ranges of a beam are those of its echoes. Several pings at one step are separate beams.
 #[must_use]
 pub fn repeatability(scans: &[ScanView]) -> (Repeatability, Vec<BeamSpread>) {
     let mut beams: BTreeMap<u32, (f64, Vec<f64>)> = BTreeMap::new();
@@ -41,20 +42,20 @@ pub fn repeatability(scans: &[ScanView]) -> (Repeatability, Vec<BeamSpread>) {
             beam.1.extend(ping.range_m);
         }
     }
-    let mut of = Repeatability { scans: scans.len() as u32, ..Repeatability::default() };
+    let mut result = Repeatability { scans: scans.len() as u32, ..Repeatability::default() };
     let mut spreads = Vec::new();
     for (azimuth_deg, ranges) in beams.into_values() {
         if ranges.len() == scans.len() {
-            of.steady += 1;
+            result.steady += 1;
             spreads.extend(deviation(&ranges).map(|spread_m| BeamSpread { azimuth_deg, spread_m }));
         } else if !ranges.is_empty() {
-            of.unsteady += 1;
+            result.unsteady += 1;
         }
     }
     let all = || spreads.iter().map(|beam| beam.spread_m).collect();
-    of.median_spread_m = quantile(all(), 0.5);
-    of.p90_spread_m = quantile(all(), 0.9);
-    (of, spreads)
+    result.median_spread_m = quantile(all(), 0.5);
+    result.p90_spread_m = quantile(all(), 0.9);
+    (result, spreads)
 }
 
 /// Standard deviation of a sample; `None` for fewer than two values.
@@ -70,7 +71,7 @@ mod tests {
     use super::*;
     use sonard_records::decode_line;
 
-    /// A scan of the fixture whose beams all have these ranges; `None` is silence.
+    /// Scan from the fixture with the given ranges per beam; `None` is a missing echo.
     fn scan(ranges_m: &[Option<f64>]) -> ScanView {
         let log = include_str!("../../../tests/fixtures/small.jsonl");
         let records = log.lines().take(3).map(|line| decode_line(line.as_bytes()).expect("clean"));
@@ -87,22 +88,22 @@ mod tests {
     }
 
     #[test]
-    fn spread_is_the_standard_deviation_over_repeats() {
+    fn standard_deviation() {
         let scans = [
             scan(&[Some(1.000), Some(2.0), None, None]),
             scan(&[Some(1.002), Some(2.0), Some(3.0), None]),
             scan(&[Some(1.004), Some(2.0), Some(3.0), None]),
         ];
-        let (of, beams) = repeatability(&scans);
-        assert_eq!((of.scans, of.steady, of.unsteady), (3, 2, 1));
+        let (result, beams) = repeatability(&scans);
+        assert_eq!((result.scans, result.steady, result.unsteady), (3, 2, 1));
         assert!((beams[0].spread_m - 0.002).abs() < 1e-12, "{beams:?}");
         assert!(beams[1].spread_m.abs() < 1e-12);
-        assert!((of.median_spread_m.expect("two beams") - 0.001).abs() < 1e-12);
+        assert!((result.median_spread_m.expect("two beams") - 0.001).abs() < 1e-12);
     }
 
     #[test]
     fn one_scan_has_no_spread() {
-        let (of, beams) = repeatability(&[scan(&[Some(1.0)])]);
-        assert_eq!((of.steady, of.median_spread_m, beams.len()), (1, None, 0));
+        let (result, beams) = repeatability(&[scan(&[Some(1.0)])]);
+        assert_eq!((result.steady, result.median_spread_m, beams.len()), (1, None, 0));
     }
 }

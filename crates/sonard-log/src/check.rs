@@ -1,4 +1,4 @@
-//! Looks at a whole log and says, line by line, what does not hold.
+//! Consistency check of a log, line by line.
 
 mod finding;
 mod open_scan;
@@ -21,39 +21,39 @@ use open_scan::OpenScan;
 
 use super::{Line, read_log};
 
-/// Azimuths are multiples of a motor step; a record may have rounded them, degrees.
+/// Tolerance of an azimuth for rounding in records, degrees.
 const AZIMUTH_TOLERANCE_DEG: f64 = 1e-3;
-/// A residual may have been rounded to the millimetre, metres.
+/// Tolerance of a residual for rounding to millimetres, metres.
 const RESIDUAL_TOLERANCE_M: f64 = 1e-3;
-/// Records of the host and of the device's fitted clock interleave within this.
+/// Tolerance of record order between the host's clock and the fitted device clock.
 const TIME_TOLERANCE: SignedDuration = SignedDuration::from_secs(1);
 
-/// Checks a log and hands each finding to `tell`, in the order of the lines.
+/// Checks a log and passes each finding to `report`, in line order.
 ///
 /// # Errors
-/// When reading fails.
-pub fn check<R: BufRead>(reader: R, mut tell: impl FnMut(Finding)) -> io::Result<Totals> {
+/// Returns an error if reading fails.
+pub fn check<R: BufRead>(reader: R, mut report: impl FnMut(Finding)) -> io::Result<Totals> {
     let mut checker = Checker::default();
     for line in read_log(reader) {
         checker.line(&line?);
-        checker.take_findings().for_each(&mut tell);
+        checker.take_findings().for_each(&mut report);
     }
     checker.end();
-    checker.take_findings().for_each(&mut tell);
+    checker.take_findings().for_each(&mut report);
     Ok(checker.totals)
 }
 
-/// Checks a log line by line; what [`check`] does, for callers with lines of their own.
+/// Incremental form of [`check`], for callers that supply the lines.
 #[derive(Debug, Default)]
 pub struct Checker {
     totals: Totals,
     findings: Vec<Finding>,
-    /// The line now looked at.
+    /// Number of the current line.
     at: u64,
     session: bool,
-    /// The array of the session in force.
+    /// Array of the current session.
     array: Option<RangerArray>,
-    /// Whether its readings were imported, with directions that no plan may have.
+    /// `true` for imported readings, whose azimuths need not match a plan.
     imported: bool,
     scan: Option<OpenScan>,
     scans: HashSet<Uuid>,
@@ -61,7 +61,7 @@ pub struct Checker {
 }
 
 impl Checker {
-    /// Looks at the next line.
+    /// Checks the next line.
     pub fn line(&mut self, line: &Line) {
         self.at = line.number;
         self.totals.lines += 1;
@@ -84,23 +84,23 @@ impl Checker {
         }
     }
 
-    /// Looks at what the log lacks at its end.
+    /// Checks the end of the log for missing records.
     pub fn end(&mut self) {
         if self.totals.lines == 0 {
             self.problem(FindingKind::EmptyLog, "the log is empty".into());
         }
         if let Some(scan) = self.scan.take() {
-            // The scan may be running; and a log that was cut off and repaired is consistent.
+            // Only a warning: the scan may be running, or the log was truncated and repaired.
             self.warn(FindingKind::NotEnded, scan.not_ended("at the end of the log"));
         }
     }
 
-    /// What was found since the last call.
+    /// Returns the findings since the last call.
     pub fn take_findings(&mut self) -> impl Iterator<Item = Finding> + use<> {
         mem::take(&mut self.findings).into_iter()
     }
 
-    /// What the lines so far hold.
+    /// Numbers of records and findings so far.
     #[must_use]
     pub fn totals(&self) -> Totals {
         self.totals
@@ -148,10 +148,10 @@ impl Checker {
             self.problem(FindingKind::Contradiction, format!("beam {}: {detail}", ping.index));
         }
         if let Some(plan) = self.scan.as_ref().and_then(|scan| scan.plan) {
-            self.place(ping, &plan);
+            self.check_azimuth(ping, &plan);
         }
         self.count_beam(ping);
-        // A reading fetched again fired before those that came through at once.
+        // A repaired reading is older than readings received without loss.
         if let (Some(time), false) = (ping.time, ping.repaired) {
             self.time(time);
         }
@@ -161,7 +161,7 @@ impl Checker {
         self.enter_scan(end.scan, "scan_end");
         if let Some(scan) = self.scan.take() {
             for detail in scan.wrong_counts(end) {
-                // The log accounts for records that it lost.
+                // A gap event explains missing records.
                 if scan.has_gap {
                     self.warn(FindingKind::WrongCount, detail);
                 } else {
@@ -181,14 +181,15 @@ impl Checker {
         self.time(event.time);
     }
 
-    /// A record belongs to the scan that is open; if not, that is found once a scan.
+    /// Checks that a record belongs to the open scan; reports a mismatch once per scan.
     fn enter_scan(&mut self, id: Uuid, what: &str) {
         if self.scan.as_ref().is_some_and(|scan| scan.id == id) {
             return;
         }
         self.leave_scan("when records of another scan follow");
-        let why = if self.scans.insert(id) { "its scan_start is missing" } else { "it is over" };
-        self.problem(FindingKind::OutsideScan, format!("{what} outside of scan {id}: {why}"));
+        let reason =
+            if self.scans.insert(id) { "its scan_start is missing" } else { "it has ended" };
+        self.problem(FindingKind::OutsideScan, format!("{what} outside of scan {id}: {reason}"));
         self.need_session();
         self.scan = Some(OpenScan::new(id, self.at, None));
     }
@@ -211,34 +212,34 @@ impl Checker {
         }
     }
 
-    /// Whether the plan has this beam, there.
-    fn place(&mut self, ping: &Ping, plan: &ScanPlan) {
+    /// Checks index and azimuth of a reading against the plan.
+    fn check_azimuth(&mut self, ping: &Ping, plan: &ScanPlan) {
         let index = ping.index;
         if index >= plan.beams() {
             let detail = format!("beam {index}: the plan has beams 0 to {}", plan.beams() - 1);
             return self.problem(FindingKind::NoSuchBeam, detail);
         }
         if let Some(id) = &ping.ranger {
-            return self.mounted(ping, id);
+            return self.check_mounted(ping, id);
         }
         let planned_deg = plan.azimuth_deg(index / plan.pings_per_stop);
         let off = !self.imported && is_off(ping.azimuth_deg, planned_deg);
         if off && ping.status != PingStatus::StepDoubtful {
             let is_deg = ping.azimuth_deg;
             let detail =
-                format!("beam {index}: azimuth_deg is {is_deg}; the plan says {planned_deg}");
+                format!("beam {index}: azimuth_deg is {is_deg}; the plan has {planned_deg}");
             self.problem(FindingKind::WrongAzimuth, detail);
         }
     }
 
-    /// Whether the session's array has this ranger, looking there.
-    fn mounted(&mut self, ping: &Ping, id: &str) {
+    /// Checks ranger and azimuth of a reading against the session's array.
+    fn check_mounted(&mut self, ping: &Ping, id: &str) {
         let (index, is_deg) = (ping.index, ping.azimuth_deg);
         let ranger = self.array.as_ref().and_then(|array| array.ranger(id));
         match ranger.map(MountedRanger::azimuth_deg) {
             Some(deg) if is_off(is_deg, deg) => {
                 let detail =
-                    format!("beam {index}: azimuth_deg is {is_deg}; ranger {id} looks to {deg}");
+                    format!("beam {index}: azimuth_deg is {is_deg}; ranger {id} has {deg}");
                 self.problem(FindingKind::WrongAzimuth, detail);
             }
             Some(_) => {}
@@ -253,7 +254,7 @@ impl Checker {
         let (at, index) = (self.at, ping.index);
         let came_through = ping.status != PingStatus::LinkLost;
         let Some(scan) = &mut self.scan else { return };
-        // A lost reading that was fetched later stands in the log twice, and may.
+        // A lost reading may appear again once it was repaired.
         if let Some((first, true)) = scan.beams.insert(index, (at, came_through)) {
             let detail = format!("beam {index} has a reading already, on line {first}");
             self.problem(FindingKind::DuplicateBeam, detail);
@@ -282,13 +283,13 @@ impl Checker {
     }
 }
 
-/// Whether two azimuths are not the same, degrees.
-fn is_off(one_deg: f64, other_deg: f64) -> bool {
-    let apart_deg = (one_deg - other_deg + 180.0).rem_euclid(360.0) - 180.0;
-    apart_deg.abs() > AZIMUTH_TOLERANCE_DEG
+/// Returns `true` if two azimuths differ by more than the tolerance, degrees.
+fn is_off(a_deg: f64, b_deg: f64) -> bool {
+    let difference_deg = (a_deg - b_deg + 180.0).rem_euclid(360.0) - 180.0;
+    difference_deg.abs() > AZIMUTH_TOLERANCE_DEG
 }
 
-/// What in a reading contradicts itself.
+/// Lists contradictions between the fields of a reading.
 fn contradictions(ping: &Ping) -> Vec<String> {
     let mut found = Vec::new();
     let mut side = |what: &str, status: PingStatus, range_m: Option<f64>| match range_m {

@@ -1,4 +1,4 @@
-//! What can go wrong with a log, and what to do about it.
+//! Errors of logs, with remedies.
 
 use std::{
     io,
@@ -11,34 +11,34 @@ use thiserror::Error;
 
 use super::{FileKind, LineError};
 
-/// A log that can't be opened, written, synced or repaired.
+/// Error in opening, reading, writing, syncing or repairing a log.
 #[derive(Debug, Error)]
 pub enum StoreError {
-    /// The file can't be opened or created.
+    /// Failure to open or create the file for writing.
     #[error("cannot open {}: {source}", path.display())]
     Open {
-        /// Which file.
+        /// Path of the log.
         path: PathBuf,
-        /// What the system says.
+        /// Error of the operating system.
         source: io::Error,
     },
-    /// The file can't be opened to read it.
+    /// Failure to open the file for reading.
     #[error("cannot open {}: {source}", path.display())]
     Unreadable {
-        /// Which file.
+        /// Path of the log.
         path: PathBuf,
-        /// What the system says.
+        /// Error of the operating system.
         source: io::Error,
     },
-    /// It is another kind of file.
+    /// File of another kind.
     #[error("{} is {kind}, not a log", path.display())]
     NoLog {
-        /// Which file.
+        /// Path of the file.
         path: PathBuf,
-        /// What it is.
+        /// Detected kind of the file.
         kind: FileKind,
     },
-    /// A session of a log format that this version does not read.
+    /// Session of a log format that this version does not read.
     #[error("cannot read {}: {fault}", path.display())]
     UnsupportedFormat {
         /// Path of the log.
@@ -46,70 +46,70 @@ pub enum StoreError {
         /// Line and fault of the session.
         fault: LineError,
     },
-    /// Reading failed.
+    /// Failure to read the file.
     #[error("cannot read {}: {source}", path.display())]
     Read {
-        /// Which file.
+        /// Path of the log.
         path: PathBuf,
-        /// What the system says.
+        /// Error of the operating system.
         source: io::Error,
     },
-    /// Somebody else holds the log.
+    /// Log locked by another process.
     #[error("{} is being written by another process", path.display())]
     Busy {
-        /// Which file.
+        /// Path of the log.
         path: PathBuf,
     },
-    /// A record could not be written; nothing of it is in the log, and the log can still be
-    /// written to.
+    /// Failure to write a record. No part of the record is in the log, and the log remains
+    /// writable.
     #[error("cannot write to {}: {source}", path.display())]
     Write {
-        /// Which file.
+        /// Path of the log.
         path: PathBuf,
-        /// What the system says.
+        /// Error of the operating system.
         source: io::Error,
     },
-    /// Part of a record was written and could not be taken back; the log ends in a torn line and
-    /// takes no more records until it is opened again.
+    /// Partially written record that could not be removed. The log ends in a torn line and rejects
+    /// records until it is reopened.
     #[error("cannot write to {}: {source}; its last line is torn", path.display())]
     Torn {
-        /// Which file.
+        /// Path of the log.
         path: PathBuf,
-        /// What the system says.
+        /// Error of the operating system.
         source: io::Error,
     },
-    /// What was written since the last sync may not be on the disk; the log takes no more
-    /// records until it is opened again.
+    /// Failed sync: records since the last sync may not be on the disk. The log rejects records
+    /// until it is reopened.
     #[error(
         "cannot sync {}: {source}; {unsynced} record(s) may not be on the disk",
         path.display()
     )]
     Sync {
-        /// Which file.
+        /// Path of the log.
         path: PathBuf,
-        /// What the system says.
+        /// Error of the operating system.
         source: io::Error,
-        /// Records appended since the last sync that succeeded.
+        /// Number of records appended since the last successful sync.
         unsynced: u64,
     },
-    /// An earlier failure left the log in doubt.
-    #[error("{} takes no more records after an earlier failure", path.display())]
+    /// Log that rejects records after an earlier failure.
+    #[error("{} rejects records after an earlier failure", path.display())]
     Failed {
-        /// Which file.
+        /// Path of the log.
         path: PathBuf,
     },
-    /// The record itself can't be written down.
+    /// Record that cannot be encoded.
     #[error("{}: {source}", path.display())]
     Record {
-        /// Which file.
+        /// Path of the log.
         path: PathBuf,
-        /// What is wrong with the record.
+        /// Fault of the record.
         source: EncodeError,
     },
 }
 
 impl StoreError {
-    /// What the user can do.
+    /// Suggested remedy for the user.
     #[must_use]
     pub fn help(&self) -> String {
         match self {
@@ -119,20 +119,20 @@ impl StoreError {
             Self::Open { source, path }
             | Self::Write { source, path }
             | Self::Sync { source, path, .. } => help_for(source, path),
-            Self::UnsupportedFormat { .. } => {
-                "`sonard log verify` lists the lines that this version reads".into()
-            }
+            Self::UnsupportedFormat { .. } => "`sonard log verify` lists the readable lines".into(),
             Self::NoLog { kind, .. } => kind.instead_of_a_log().into(),
-            Self::Busy { .. } => "wait until it is done, stop it, or choose another file".into(),
+            Self::Busy { .. } => {
+                "wait until that process ends, stop it, or choose another file".into()
+            }
             Self::Torn { source, path } => {
                 format!("{}; then `sonard log repair {}`", help_for(source, path), path.display())
             }
-            Self::Failed { .. } => "open it again: that repairs its end".into(),
-            Self::Record { .. } => "this is a fault of the program: please report it".into(),
+            Self::Failed { .. } => "reopen the log: that repairs its end".into(),
+            Self::Record { .. } => "this is a bug of the program: please report it".into(),
         }
     }
 
-    /// Whether the reader of a pipe went away, which is no failure of the program's.
+    /// Returns `true` for a closed pipe, which is not a failure of the program.
     #[must_use]
     pub fn is_broken_pipe(&self) -> bool {
         matches!(self, Self::Write { source, .. } | Self::Torn { source, .. } | Self::Sync { source, .. }
@@ -151,42 +151,44 @@ fn help_for(error: &io::Error, path: &Path) -> String {
     use io::ErrorKind as Kind;
     match error.kind() {
         Kind::StorageFull if !has_free_inodes(path) => {
-            "that file system has bytes left but no inodes (`df -i`): remove files there; every record before this one \
-             is in the log"
+            "the file system has free space but no inodes (`df -i`): remove files there; all earlier \
+             records are in the log"
         }
-        Kind::StorageFull => "make room on that disk: every record before this one is in the log",
+        Kind::StorageFull => "free space on that disk; all earlier records are in the log",
         Kind::QuotaExceeded => {
-            "the disk quota of this user is used up: raise it or make room; every record before this one is in the log"
+            "the disk quota of this user is used up: raise it or free space; all earlier records are in \
+             the log"
         }
         Kind::FileTooLarge => {
-            "the file-size limit of this process is reached (`ulimit -f`, LimitFSIZE=): raise it; every record before \
-             this one is in the log"
+            "the file-size limit of this process is reached (`ulimit -f`, LimitFSIZE=): raise it; all \
+             earlier records are in the log"
         }
         Kind::NotFound => "check the path; its folder must exist",
         Kind::ReadOnlyFilesystem => {
-            "that file system is mounted read-only, perhaps after an error of its disk (`dmesg`): remount it, or \
-             choose another place"
+            "the file system is mounted read-only, perhaps after a disk error (`dmesg`): remount it, or \
+             choose another folder"
         }
-        Kind::PermissionDenied => "choose a place where you may write, or change its permissions",
+        Kind::PermissionDenied => "choose a writable folder, or change its permissions",
         Kind::IsADirectory => "name a file in that folder",
-        Kind::InvalidInput => "move it out of the way, or choose another place",
+        Kind::InvalidInput => "move that file away, or choose another path",
         _ if is_out_of_descriptors(error) => {
             "no file descriptors are left: close programs, or raise the limit (`ulimit -n`, LimitNOFILE=)"
         }
-        _ => "check the disk; every record synced before is in the log",
+        _ => "check the disk; all synced records are in the log",
     }
     .into()
 }
 
-/// Whether the file system of a path, or of its folder, can take another file; `true` where that is unknown.
+/// Returns `true` if the file system of a path, or of its folder, has a free inode or does not
+/// report inodes.
 fn has_free_inodes(path: &Path) -> bool {
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
     let stat = statvfs(path).or_else(|_| statvfs(folder.unwrap_or(Path::new("."))));
-    // File systems without a fixed count of inodes report none at all.
+    // File systems without a fixed number of inodes report zero.
     stat.map_or(true, |stat| stat.f_files == 0 || stat.f_favail > 0)
 }
 
-/// Whether an error is that of a process or system without free file descriptors.
+/// Returns `true` if the process or the system has no free file descriptors.
 pub(crate) fn is_out_of_descriptors(error: &io::Error) -> bool {
     let errno = error.raw_os_error();
     [Errno::MFILE, Errno::NFILE].iter().any(|limit| errno == Some(limit.raw_os_error()))
@@ -198,6 +200,6 @@ fn help_for_reading(error: &io::Error) -> &'static str {
         Kind::NotFound => "check the path",
         Kind::PermissionDenied => "ask its owner for permission to read it, or read a copy",
         Kind::IsADirectory => "name a file in that folder",
-        _ => "check the disk; copy what can still be read of it",
+        _ => "check the disk; copy the files that are still readable",
     }
 }

@@ -1,4 +1,4 @@
-//! A folder of logs: one is written, full ones are left behind, whole sessions in each.
+//! Folder of logs with rotation: every file starts with a session and contains complete scans.
 
 mod replacement;
 
@@ -20,71 +20,71 @@ use replacement::Replacement;
 const PREFIX: &str = "sonard-";
 const SUFFIX: &str = ".jsonl";
 
-/// When another file is begun and old ones go.
+/// Limits for starting a new file and removing old ones.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Rotation {
-    /// Begin another file when this one is larger, bytes.
+    /// Maximum size of a file before rotation, bytes.
     pub max_bytes: u64,
-    /// Begin another file each day (UTC).
+    /// Rotation at each change of the day (UTC).
     pub daily: bool,
-    /// Remove the oldest when all together are larger, bytes; 0 keeps everything.
+    /// Total size above which the oldest files are removed, bytes; 0 keeps all files.
     pub keep_bytes: u64,
-    /// How long a record may wait for the disk.
+    /// Maximum time between append and sync of a record.
     pub sync_interval: Duration,
 }
 
-/// One log of a folder.
+/// Log in a folder.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct LogFile {
-    /// Its name in the folder.
+    /// File name within the folder.
     pub name: String,
-    /// Its size, bytes.
+    /// File size, bytes.
     pub bytes: u64,
 }
 
-/// Writes the newest log of a folder and begins another when it is time, always with a
-/// session's record first, never within a scan.
+/// Writer of a folder of logs. Rotation never splits a scan, and each new file starts with a
+/// session record.
 #[derive(Debug)]
 pub struct LogFolder {
     folder: PathBuf,
     rotation: Rotation,
     path: PathBuf,
-    /// Not there after an error that it did not survive; then it is opened anew.
+    /// Open writer; `None` after an error, until the log is reopened.
     writer: Option<LogWriter>,
     day: String,
     session: Option<Box<Session>>,
-    /// No scan is in the log yet: it has no reason to end.
-    fresh: bool,
-    /// Whether the file lacks the session in force.
-    bare: bool,
-    /// Where the scan under way begins in the file, bytes, with its first record.
+    /// `true` while the file has no scan, which excludes rotation.
+    has_no_scan: bool,
+    /// `true` while the file lacks the current session.
+    lacks_session: bool,
+    /// Offset of the current scan in the file, bytes, and its first record.
     scan: Option<(u64, Box<ScanStart>)>,
-    /// Gaps that the next file begins with: the present one can't be continued.
+    /// Contents of the next file, if the current one cannot be continued.
     replacement: Option<Replacement>,
-    /// Records of earlier files: appended, and of those, on the disk for good.
+    /// Appended and synced records of earlier files.
     appended_before: u64,
     synced_before: u64,
-    /// Records of earlier files that will never be confirmed to be on the disk.
+    /// Records of earlier files whose sync was never confirmed.
     uncertain: u64,
-    /// The file was moved during the scan under way.
+    /// `true` if the file was moved during the current scan.
     is_displaced: bool,
-    /// Report of a log that had to be replaced.
+    /// Description of the last replacement of a log.
     incident: Option<String>,
 }
 
-/// The logs of a folder, oldest first.
+/// Lists the logs of a folder, oldest first.
 ///
 /// # Errors
-/// When the folder can't be read.
+/// Returns an error if the folder cannot be read.
 pub fn log_files(folder: &Path) -> io::Result<Vec<LogFile>> {
     let mut files = Vec::new();
     for entry in fs::read_dir(folder)? {
         let entry = entry?;
         let Ok(name) = entry.file_name().into_string() else { continue };
         if name.starts_with(PREFIX) && name.ends_with(SUFFIX) {
-            // A file that is removed at this moment is none.
+            // Skips a file that was removed in the meantime.
             let Ok(metadata) = entry.metadata() else { continue };
-            // A link is not followed: a log is what this program wrote here itself.
+            // Skips links: logs of this program are regular files.
             if !metadata.is_file() {
                 continue;
             }
@@ -96,11 +96,11 @@ pub fn log_files(folder: &Path) -> io::Result<Vec<LogFile>> {
 }
 
 impl LogFolder {
-    /// Goes on with the newest log of a folder (which is made if it isn't there): its torn end
-    /// is mended, and a scan that it broke off in is marked by an event.
+    /// Opens the newest log of a folder, which is created if missing. A torn end is repaired, and
+    /// an event marks an interrupted scan.
     ///
     /// # Errors
-    /// When the folder or the log can't be opened, or another process writes it.
+    /// Returns an error if folder or log cannot be opened, or another process writes the log.
     pub fn open(folder: &Path, rotation: Rotation, now: Timestamp) -> Result<Self, StoreError> {
         let fail = |source| StoreError::Open { path: folder.into(), source };
         fs::create_dir_all(folder).map_err(fail)?;
@@ -116,8 +116,8 @@ impl LogFolder {
             writer: None,
             day,
             session: None,
-            fresh: false,
-            bare: false,
+            has_no_scan: false,
+            lacks_session: false,
             scan: None,
             replacement: None,
             appended_before: 0,
@@ -127,9 +127,9 @@ impl LogFolder {
             incident: None,
         };
         log.writer(now)?;
-        log.fresh = fs::metadata(&log.path).map_err(fail)?.len() == 0;
+        log.has_no_scan = fs::metadata(&log.path).map_err(fail)?.len() == 0;
         if ends_within_scan(&log.path).map_err(fail)? {
-            let detail = "the program ended within the scan before this".to_owned();
+            let detail = "the program ended within the previous scan".to_owned();
             let event = Event { time: now, kind: EventKind::Gap, detail };
             let writer = log.writer(now)?;
             writer.append(&Record::Event(event))?;
@@ -138,31 +138,31 @@ impl LogFolder {
         Ok(log)
     }
 
-    /// Appends one record; before a scan or a session another file is begun if it is time.
+    /// Appends a record. Before a scan or a session, a rotation is carried out if due.
     ///
     /// # Errors
-    /// After [`StoreError::Sync`] the record is in the log, though not safely. After any other
-    /// error it is not, and can be given again: a log that did not survive is opened anew, and
-    /// its end mended.
+    /// After [`StoreError::Sync`] the record is in the log but may not be on the disk. After any
+    /// other error the record is not in the log and can be appended again: the log is then
+    /// reopened and its end repaired.
     pub fn append(&mut self, record: &Record, now: Timestamp) -> Result<(), StoreError> {
         let begins = matches!(record, Record::ScanStart(_));
         if begins || matches!(record, Record::Session(_)) {
             self.inspect(now)?;
             self.rotate_if_due(now)?;
-            if begins && self.bare {
+            if begins && self.lacks_session {
                 self.put_session(now)?;
             }
         }
         let offset = self.writer(now)?.length();
-        let outcome = self.put(record, now);
+        let outcome = self.write(record, now);
         if matches!(outcome, Ok(()) | Err(StoreError::Sync { .. })) {
             match record {
                 Record::Session(session) => {
-                    (self.session, self.bare) = (Some(session.clone()), false);
+                    (self.session, self.lacks_session) = (Some(session.clone()), false);
                 }
                 Record::ScanStart(start) => {
                     self.scan = Some((offset, Box::new(start.clone())));
-                    self.fresh = false;
+                    self.has_no_scan = false;
                 }
                 Record::ScanEnd(_) => self.scan = None,
                 Record::Ping(_) | Record::Event(_) => {}
@@ -171,58 +171,59 @@ impl LogFolder {
         outcome
     }
 
-    /// Syncs if a record has waited for long enough. For callers whose records may stop coming.
+    /// Syncs if the sync interval of a record has elapsed. Needed by callers whose records may
+    /// cease.
     ///
     /// # Errors
-    /// As [`LogWriter::sync`].
+    /// Returns the errors of [`LogWriter::sync`].
     pub fn sync_if_due(&mut self, now: Timestamp) -> Result<(), StoreError> {
         let outcome = self.writer(now)?.sync_if_due(Instant::now());
-        self.survive(outcome)
+        self.handle_failure(outcome)
     }
 
-    /// Other limits from the next scan on.
+    /// Sets new limits, effective from the next scan.
     pub fn set_rotation(&mut self, rotation: Rotation) {
         self.rotation = rotation;
     }
 
-    /// The log that is being written.
+    /// Path of the current log.
     #[must_use]
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Records appended since the folder was opened.
+    /// Number of records appended since the folder was opened.
     #[must_use]
     pub fn appended(&self) -> u64 {
         self.appended_before + self.writer.as_ref().map_or(0, LogWriter::appended)
     }
 
-    /// Records that are on the disk for good, of those [`appended`](Self::appended).
+    /// Number of synced records among the [`appended`](Self::appended) ones.
     #[must_use]
     pub fn synced(&self) -> u64 {
         self.synced_before + self.writer.as_ref().map_or(0, LogWriter::synced)
     }
 
-    /// Records that will never be confirmed, of those [`appended`](Self::appended): their sync failed, or their file was
-    /// removed or changed.
+    /// Number of [`appended`](Self::appended) records that cannot be confirmed: their sync failed,
+    /// or their file was removed or changed.
     #[must_use]
     pub const fn uncertain(&self) -> u64 {
         self.uncertain
     }
 
-    /// Syncs and lets go of the log.
+    /// Syncs and closes the log.
     ///
     /// # Errors
-    /// As [`LogWriter::sync`].
+    /// Returns the errors of [`LogWriter::sync`].
     pub fn close(&mut self) -> Result<(), StoreError> {
         let outcome = self.writer.as_mut().map_or(Ok(()), LogWriter::sync);
         self.release_writer();
         outcome
     }
 
-    fn put(&mut self, record: &Record, now: Timestamp) -> Result<(), StoreError> {
+    fn write(&mut self, record: &Record, now: Timestamp) -> Result<(), StoreError> {
         let outcome = self.writer(now)?.append(record);
-        self.survive(outcome)
+        self.handle_failure(outcome)
     }
 
     fn writer(&mut self, now: Timestamp) -> Result<&mut LogWriter, StoreError> {
@@ -241,15 +242,17 @@ impl LogFolder {
         Ok(writer.with_sync_interval(self.rotation.sync_interval).with_scenes_beside())
     }
 
-    /// Lets go of a log that takes no more records. After a failed sync another file is begun, since a later sync of
-    /// this one proves nothing about what was written before; after a torn record its end is mended.
-    fn survive(&mut self, outcome: Result<(), StoreError>) -> Result<(), StoreError> {
+    /// Closes a log that rejects further records. After a failed sync a new file is started, since
+    /// a later sync of the old one does not cover earlier records. After a torn record the log is
+    /// reopened and repaired.
+    fn handle_failure(&mut self, outcome: Result<(), StoreError>) -> Result<(), StoreError> {
         use StoreError::{Failed, Sync, Torn};
         match &outcome {
             Err(Sync { source, unsynced, .. }) => {
                 let file = self.file_name();
                 let detail = format!(
-                    "{file} could not be synced ({source}): its last {unsynced} record(s) may not be on the disk"
+                    "{file} could not be synced ({source}): its last {unsynced} record(s) may not be on \
+                     the disk"
                 );
                 self.replace(detail, Vec::new());
             }
@@ -259,7 +262,7 @@ impl LogFolder {
         outcome
     }
 
-    /// Closes the file and takes over its counts.
+    /// Closes the file and adds its counts to the totals.
     fn release_writer(&mut self) {
         if let Some(writer) = self.writer.take() {
             self.appended_before += writer.appended();
@@ -267,37 +270,38 @@ impl LogFolder {
         }
     }
 
-    /// Repeats the session in force in a file that lacks it. Until that has succeeded the file
-    /// stays bare, so that another try does not leave it out.
+    /// Repeats the current session in a file that lacks one; retried with the next scan after a
+    /// failure.
     fn put_session(&mut self, now: Timestamp) -> Result<(), StoreError> {
         let Some(session) = self.session.clone() else { return Ok(()) };
-        match self.put(&Record::Session(session), now) {
+        match self.write(&Record::Session(session), now) {
             Ok(()) => {
-                self.bare = false;
+                self.lacks_session = false;
                 Ok(())
             }
             Err(StoreError::Sync { path, .. }) => {
-                self.bare = false;
-                // The session is in the log; the record that is to follow is not, which `Sync`
-                // would say.
+                self.lacks_session = false;
+                // The session is in the log, but the following record is not; `Sync` would
+                // indicate the opposite.
                 Err(StoreError::Failed { path })
             }
             Err(error) => Err(error),
         }
     }
 
-    /// Begins another file if it is time.
+    /// Starts a new file if size or day require it.
     fn rotate_if_due(&mut self, now: Timestamp) -> Result<(), StoreError> {
         let bytes = fs::metadata(&self.path).map_or(0, |metadata| metadata.len());
         let too_old = self.rotation.daily && self.day != day(now);
-        if self.scan.is_some() || self.fresh || !(bytes > self.rotation.max_bytes || too_old) {
+        if self.scan.is_some() || self.has_no_scan || !(bytes > self.rotation.max_bytes || too_old)
+        {
             return Ok(());
         }
         if let Some(writer) = &mut self.writer {
             let synced = writer.sync();
             let path = self.path.clone();
-            // The record that is to follow is not in any log yet, which `Sync` would say.
-            self.survive(synced).map_err(|_| StoreError::Failed { path })?;
+            // The following record is not in any log; `Sync` would indicate the opposite.
+            self.handle_failure(synced).map_err(|_| StoreError::Failed { path })?;
             self.release_writer();
         }
         self.name_next_file(now);
@@ -306,13 +310,13 @@ impl LogFolder {
         Ok(())
     }
 
-    /// Names the next file, which has no session yet.
+    /// Chooses the name of the next file and resets its state.
     fn name_next_file(&mut self, now: Timestamp) {
         self.path = self.folder.join(file_name(&self.folder, now));
-        (self.day, self.fresh, self.bare) = (day(now), true, true);
+        (self.day, self.has_no_scan, self.lacks_session) = (day(now), true, true);
     }
 
-    /// Removes the oldest logs as far as the limit asks for it, never the one being written.
+    /// Removes the oldest logs above the size limit, but never the current one.
     fn remove_oldest(&self) {
         if self.rotation.keep_bytes == 0 {
             return;
@@ -323,18 +327,18 @@ impl LogFolder {
             if total <= self.rotation.keep_bytes {
                 break;
             }
-            // What can't be removed now is tried again at the next file.
+            // A failed removal is retried at the next rotation.
             if fs::remove_file(self.folder.join(&file.name)).is_ok() {
                 total -= file.bytes;
             }
         }
-        // Costs nothing if it fails: the files are gone from the folder all the same.
+        // A failed sync may at worst restore removed files after a power failure.
         let _ = sync_folder_of(&self.path);
     }
 }
 
-/// Returns `true` if the first line of a log is a session of another format: readers reject the whole file, so nothing
-/// may be appended to it.
+/// Returns `true` if the first line of a log is a session of another format. Readers reject such a
+/// file, so nothing may be appended to it.
 fn is_of_other_format(log: &Path) -> bool {
     let Ok(file) = File::open(log) else { return false };
     let first = read_log(BufReader::new(file)).next().and_then(Result::ok);
@@ -347,18 +351,18 @@ fn day(now: Timestamp) -> String {
     now.to_zoned(TimeZone::UTC).strftime("%Y%m%d").to_string()
 }
 
-/// The day in a log's name.
+/// Extracts the day from a log's name.
 fn day_of(name: &str) -> String {
     name.strip_prefix(PREFIX).and_then(|rest| rest.get(..8)).unwrap_or_default().to_owned()
 }
 
-/// A name that sorts behind every other of the folder and is not taken.
+/// Chooses an unused name that sorts after all others in the folder.
 fn file_name(folder: &Path, now: Timestamp) -> String {
     let time = now.to_zoned(TimeZone::UTC).strftime("%Y%m%dT%H%M%SZ").to_string();
     let newest = log_files(folder).ok().and_then(|mut files| files.pop()).map(|file| file.name);
     let first = format!("{PREFIX}{time}{SUFFIX}");
     match newest {
-        // The clock was set back, or this is the second file of a second: go on from the newest.
+        // The clock was set back, or two files start within one second: numbers the newest name.
         Some(newest) if newest >= first => {
             let stem = newest.trim_end_matches(SUFFIX);
             let (stem, number) = stem.split_once('_').unwrap_or((stem, "0"));
@@ -369,7 +373,7 @@ fn file_name(folder: &Path, now: Timestamp) -> String {
     }
 }
 
-/// Whether the last record of a scan in the log is not its end, looking from the end of the file.
+/// Returns `true` if the last scan of a log has no end. The file is searched backwards.
 fn ends_within_scan(path: &Path) -> io::Result<bool> {
     const START: &[u8] = b"{\"type\":\"scan_start\"";
     const END: &[u8] = b"{\"type\":\"scan_end\"";
@@ -379,7 +383,7 @@ fn ends_within_scan(path: &Path) -> io::Result<bool> {
     let mut end = length;
     while end > 0 {
         let start = end.saturating_sub(CHUNK);
-        // Some bytes more, so that nothing is cut in two.
+        // The overlap finds a match across the chunk boundary.
         let stop = (end + START.len() as u64).min(length);
         let mut bytes = vec![0; (stop - start) as usize];
         file.read_exact_at(&mut bytes, start)?;

@@ -1,21 +1,22 @@
-//! The seam between records and the format that they are written in.
+//! Interface of output formats for records.
 
 use super::{LogWriter, Medium, StoreError};
 use sonard_records::Record;
 
-/// Writes the records of a log, in their order, in some format. JSON Lines is one ([`LogWriter`]);
-/// another one implements this trait, and needs nothing else of whoever has the records.
+/// Writer of a log's records in one output format. [`LogWriter`] implements JSON Lines; other
+/// formats implement this trait independently of the source of the records.
 pub trait RecordWriter {
-    /// Writes a record, or keeps of it what the format has a place for.
+    /// Writes a record, or the part of it that the format can represent.
     ///
     /// # Errors
-    /// When it can't be written.
+    /// Returns an error if the record cannot be written.
     fn write(&mut self, record: &Record) -> Result<(), StoreError>;
 
-    /// Writes what is left, and puts the whole in its place. What is dropped before is not there.
+    /// Writes the remaining data and moves the output to its path. A writer that is dropped earlier
+    /// leaves no output.
     ///
     /// # Errors
-    /// When it can't be written.
+    /// Returns an error if the output cannot be written.
     fn finish(self: Box<Self>) -> Result<(), StoreError>;
 }
 

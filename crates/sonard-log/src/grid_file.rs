@@ -1,4 +1,4 @@
-//! Occupancy grids on disk, as ROS's map_server has them: a description (YAML), and beside it an image, PGM or PNG.
+//! Occupancy grids in the format of ROS's map_server: a description (YAML) and an image (PGM, PNG).
 
 use std::{
     fs,
@@ -12,69 +12,72 @@ use sonard_interpret::interpret::grid::{
 use sonard_model::{geometry::DVec2, scene::Surfaces};
 use thiserror::Error;
 
-/// A file of a map that can't be used.
+/// Error in a map file, with its path.
 #[derive(Debug, Error)]
 #[error("{}: {fault}", path.display())]
 pub struct GridFileError {
-    /// Which file.
+    /// Path of the file.
     pub path: PathBuf,
-    /// What is wrong with it.
+    /// Fault of the file.
     #[source]
     pub fault: GridFileFault,
 }
 
-/// An error in a map file.
+/// Fault of a map file.
 #[derive(Debug, Error)]
 pub enum GridFileFault {
-    /// The disk does not give it.
+    /// Failure to read the file.
     #[error(transparent)]
     Disk(#[from] io::Error),
-    /// It is no description or image of a map.
+    /// Invalid description or image.
     #[error(transparent)]
     Map(#[from] ImageError),
-    /// The image that the description names is not there, or can't be read.
-    #[error("the image that `image:` names: {0}")]
+    /// Failure to read the image named by the description.
+    #[error("cannot read the file of `image:`: {0}")]
     Image(#[source] io::Error),
-    /// The image of a map in place of its description.
-    #[error("it is an image, not the description of a map")]
+    /// Image given instead of the description.
+    #[error("file is an image, not the description of a map")]
     IsImage,
-    /// A map that is turned about its lower left corner, radians.
-    #[error("the map is turned by {0} radians (the third number of `origin`)")]
+    /// Map rotated about its lower left corner, radians.
+    #[error("the map is rotated by {0} radians (the third number of `origin`)")]
     Turned(f64),
-    /// It is no PNG, or too large a one.
+    /// Invalid or too large PNG.
     #[error("PNG: {0}")]
     Png(#[from] png::DecodingError),
 }
 
 impl GridFileError {
-    /// What would be right.
+    /// Suggested correction for the user.
     #[must_use]
     pub const fn help(&self) -> &'static str {
         match self.fault {
             GridFileFault::Turned(_) => {
-                "give a map along the axes; `sonard scene from-grid` reads turned ones"
+                "use an axis-aligned map; `sonard scene from-grid` reads rotated ones"
             }
-            GridFileFault::Image(_) => "put the image beside the description, or correct `image:`",
+            GridFileFault::Image(_) => {
+                "move the image to the description's folder, or correct `image:`"
+            }
             GridFileFault::IsImage => {
-                "give its description: a text beside it with `image: NAME`, `resolution: 0.05` and `origin: [0, 0, 0]`"
+                "name its description: a text file with `image: NAME`, `resolution: 0.05` and \
+                 `origin: [0, 0, 0]`"
             }
             _ => {
-                "give a map as `sonard map` or map_saver writes it: map.yaml beside map.pgm (or a PNG)"
+                "name a map written by `sonard map` or map_saver: map.yaml with map.pgm (or a PNG)"
             }
         }
     }
 }
 
-/// What a PNG begins with.
+/// Magic bytes of PNG.
 const PNG: &[u8] = b"\x89PNG";
-/// The most that an image takes in memory, bytes: as many as a grid has cells, in four colours.
-const MOST_BYTES: usize = 1 << 28;
+/// Maximum size of a decoded image, bytes: the maximum number of cells with four channels.
+const MAX_IMAGE_BYTES: usize = 1 << 28;
 
-/// A map by its description, or by the folder that holds `map.yaml`, with probabilities for shades; `note` is told of each
-/// file before it is read.
+/// Reads a map by its description, or by a folder with `map.yaml`, with grey levels as
+/// probabilities. `note` receives the path of each file before it is read.
 ///
 /// # Errors
-/// The file that can't be read or is none of a map, or a map that is turned.
+/// Returns an error for an unreadable or invalid file, or a rotated map.
 pub fn read(path: &Path, note: impl FnMut(&Path)) -> Result<Grid, GridFileError> {
     let with_shades = |yaml: MapYaml| MapYaml { is_graded: true, ..yaml };
     let (grid, yaml) = read_as(path, with_shades, note)?;
@@ -84,47 +87,51 @@ pub fn read(path: &Path, note: impl FnMut(&Path)) -> Result<Grid, GridFileError>
     }
 }
 
-/// Walls of a map that is read by the thresholds and the mode of its description, as map_server does, as surfaces in its frame, with its description. Without a
-/// tolerance, walls along rows and columns of cells stay where the cells are, unless this program mapped them; lengths are
-/// metres.
+/// Reads the walls of a map as surfaces in the map's frame, with the map's description.
+///
+/// Cells are classified by thresholds and mode of the description, as by map_server. Without a
+/// tolerance (metres), walls along rows and columns of cells keep their positions, except in maps
+/// from this program. Walls shorter than `min_length_m` (metres) are dropped.
 ///
 /// # Errors
-/// The file that can't be read or is none of a map.
+/// Returns an error for an unreadable or invalid file.
 pub fn read_walls(
     path: &Path,
     tolerance_m: Option<f64>,
-    least_m: Option<f64>,
+    min_length_m: Option<f64>,
     note: impl FnMut(&Path),
 ) -> Result<(Surfaces, MapYaml), GridFileError> {
     let (grid, yaml) = read_as(path, |yaml| yaml, note)?;
-    let by_default = TraceSettings::of_cells(grid.shape().resolution_m);
+    let defaults = TraceSettings::of_cells(grid.shape().resolution_m);
     let settings = TraceSettings {
-        tolerance_m: tolerance_m.unwrap_or(by_default.tolerance_m),
-        least_m: least_m.unwrap_or(by_default.least_m),
-        // What a sonar mapped has ragged walls; others draw them as they are.
+        tolerance_m: tolerance_m.unwrap_or(defaults.tolerance_m),
+        least_m: min_length_m.unwrap_or(defaults.least_m),
+        // Walls mapped by sonar are ragged; other maps have exact rows.
         keeps_rows: !yaml.is_graded && tolerance_m.is_none(),
-        ..by_default
+        ..defaults
     };
     let [x_m, y_m, yaw_rad] = yaml.origin;
-    let (origin, turn) = (DVec2::new(x_m, y_m), DVec2::from_angle(yaw_rad));
-    let turned =
-        |corner: DVec2| if yaw_rad == 0.0 { corner } else { origin + turn.rotate(corner - origin) };
-    let mut found = Surfaces::default();
+    let (origin, rotation) = (DVec2::new(x_m, y_m), DVec2::from_angle(yaw_rad));
+    let rotated = |corner: DVec2| match yaw_rad {
+        0.0 => corner,
+        _ => origin + rotation.rotate(corner - origin),
+    };
+    let mut surfaces = Surfaces::default();
     for WallLine { corners, is_closed } in trace(&grid, &settings) {
-        found.walls("wall", corners.into_iter().map(turned).collect(), is_closed);
+        surfaces.walls("wall", corners.into_iter().map(rotated).collect(), is_closed);
     }
-    Ok((found, yaml))
+    Ok((surfaces, yaml))
 }
 
 fn read_as(
     path: &Path,
-    as_meant: impl Fn(MapYaml) -> MapYaml,
+    adapt: impl Fn(MapYaml) -> MapYaml,
     mut note: impl FnMut(&Path),
 ) -> Result<(Grid, MapYaml), GridFileError> {
     let yaml_path = if path.is_dir() { path.join("map.yaml") } else { path.to_path_buf() };
     note(&yaml_path);
     let yaml = description(&yaml_path)
-        .map(as_meant)
+        .map(adapt)
         .map_err(|fault| GridFileError { path: yaml_path.clone(), fault })?;
     let path = yaml_path.parent().unwrap_or(Path::new("")).join(&yaml.image);
     note(&path);
@@ -137,7 +144,7 @@ fn read_as(
     }
 }
 
-/// The longest description that is read, bytes: more is none.
+/// Maximum number of bytes read of a description.
 const MAX_DESCRIPTION_BYTES: u64 = 1 << 20;
 
 fn description(path: &Path) -> Result<MapYaml, GridFileFault> {
@@ -149,7 +156,7 @@ fn description(path: &Path) -> Result<MapYaml, GridFileFault> {
     Ok(MapYaml::from_text(&String::from_utf8_lossy(&bytes))?)
 }
 
-/// First bytes of images that are given in place of a description.
+/// Magic bytes of images, to detect an image given instead of the description.
 const IMAGES: [&[u8]; 4] = [PNG, b"P5", b"P2", b"\xff\xd8\xff"];
 
 fn image(path: &Path, yaml: &MapYaml) -> Result<Grid, GridFileFault> {
@@ -161,13 +168,13 @@ fn image(path: &Path, yaml: &MapYaml) -> Result<Grid, GridFileFault> {
     Ok(from_pixels(size, &pixels, yaml)?)
 }
 
-/// Size and brightness of the pixels of a PNG; those that one sees through are unknown.
+/// Decodes size and grey levels of a PNG; transparent pixels are unknown (`None`).
 fn grey(bytes: &[u8]) -> Result<([usize; 2], Vec<Option<u8>>), png::DecodingError> {
-    let limits = png::Limits { bytes: MOST_BYTES };
+    let limits = png::Limits { bytes: MAX_IMAGE_BYTES };
     let mut decoder = png::Decoder::new_with_limits(Cursor::new(bytes), limits);
     decoder.set_transformations(png::Transformations::EXPAND | png::Transformations::STRIP_16);
     let mut reader = decoder.read_info()?;
-    let size = reader.output_buffer_size().filter(|size| *size <= MOST_BYTES);
+    let size = reader.output_buffer_size().filter(|size| *size <= MAX_IMAGE_BYTES);
     let mut image = vec![0; size.ok_or(png::DecodingError::LimitsExceeded)?];
     let frame = reader.next_frame(&mut image)?;
     let channels = frame.color_type.samples();

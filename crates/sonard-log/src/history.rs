@@ -1,7 +1,7 @@
-//! The scans in a folder of logs, newest first, found without reading any log twice.
+//! Index of the scans in a folder of logs.
 //!
-//! Logs only grow, so what was read of one is remembered as places in it, and the next question
-//! reads on from there. Nothing but places is kept: a scan that is asked for is read then.
+//! Logs only grow, so each query continues reading at the end of the previous one. The index stores
+//! only offsets; the records of a scan are read on request.
 
 use std::{
     collections::BTreeMap,
@@ -19,45 +19,46 @@ use uuid::Uuid;
 
 use super::{log_files, read_log};
 
-/// Only so many of the newest logs are looked at: memory stays bounded after months.
-const MOST_LOGS: usize = 8;
+/// Number of newest logs that are indexed, which bounds memory.
+const MAX_LOGS: usize = 8;
 
-/// How every reading of a log begins; most lines need no closer look.
-const READING: &[u8] = br#"{"type":"ping","#;
+/// Prefix of ping records, the majority of lines, which the index skips.
+const PING_PREFIX: &[u8] = br#"{"type":"ping","#;
 
-/// The scans in a folder of logs.
+/// Index of the scans in a folder of logs.
 #[derive(Debug)]
 pub struct History {
     folder: PathBuf,
     logs: BTreeMap<String, Index>,
 }
 
-/// One scan of a folder.
+/// Summary of a logged scan.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PastScan {
-    /// Name of its log.
+    /// Name of the log.
     pub log: String,
-    /// How it began.
+    /// First record of the scan.
     pub start: ScanStart,
-    /// How it ended; `None` for one under way, or broken off.
+    /// Last record of the scan; `None` for a running or interrupted scan.
     pub end: Option<ScanEnd>,
-    /// Where its readings come from, if the log says so.
+    /// Origin of the readings, if recorded.
     pub provenance: Option<Provenance>,
-    /// The scene that the model was given.
+    /// Scene of the model's predictions.
     pub scene: Option<SceneRef>,
 }
 
-/// What is known of one log.
+/// Index of one log.
 #[derive(Debug, Default)]
 struct Index {
     read_to: u64,
     session: Option<Arc<SessionPlace>>,
-    /// Where the last session stands that has the text of its scene, and which scene.
+    /// Offset of the last session with a scene text, and the scene.
     text: Option<(u64, Option<SceneRef>)>,
     scans: Vec<ScanLines>,
 }
 
-/// A log may hold tens of thousands of scans: what is told of them is read when it is asked for.
+/// Offsets of a scan's lines. A log may contain tens of thousands of scans, so their records are
+/// read on request.
 #[derive(Debug, Clone)]
 struct ScanLines {
     scan: Uuid,
@@ -70,97 +71,97 @@ struct ScanLines {
 #[derive(Debug, Clone)]
 struct SessionPlace {
     at: u64,
-    /// The session before it that has the text of the same scene, if it has none itself.
+    /// Offset of an earlier session with the text of the same scene, if this session has none.
     text_at: Option<u64>,
     provenance: Provenance,
     scene: Option<SceneRef>,
 }
 
-/// The position of a scan's records in a log, to be read piece by piece.
+/// Location of a scan's records in a log, for reading line by line.
 #[derive(Debug, Clone)]
 pub struct Passage {
-    /// The scan, without its readings and events.
+    /// Scan without readings and events.
     pub view: ScanView,
-    /// The log.
+    /// Path of the log.
     pub path: PathBuf,
     from: u64,
     to: u64,
 }
 
 impl History {
-    /// Of the logs in `folder`; nothing is read yet.
+    /// Creates an empty index of the logs in `folder`.
     #[must_use]
     pub fn new(folder: PathBuf) -> Self {
         Self { folder, logs: BTreeMap::new() }
     }
 
-    /// The newest scans, newest first, at most so many.
+    /// Returns at most `max` of the newest scans, newest first.
     ///
     /// # Errors
-    /// When the folder or a log in it can't be read.
-    pub fn newest(&mut self, most: usize) -> io::Result<Vec<PastScan>> {
-        Ok(self.list(None, most)?.unwrap_or_default())
+    /// Returns an error if the folder or a log cannot be read.
+    pub fn newest(&mut self, max: usize) -> io::Result<Vec<PastScan>> {
+        Ok(self.list(None, max)?.unwrap_or_default())
     }
 
-    /// The scans that stand before one, newest first, at most so many; `None` if the newest logs have no
-    /// such scan.
+    /// Returns at most `max` scans before the given one, newest first; `None` if the given scan is
+    /// not in the index.
     ///
     /// # Errors
-    /// When the folder or a log in it can't be read.
-    pub fn before(&mut self, scan: Uuid, most: usize) -> io::Result<Option<Vec<PastScan>>> {
-        self.list(Some(scan), most)
+    /// Returns an error if the folder or a log cannot be read.
+    pub fn before(&mut self, scan: Uuid, max: usize) -> io::Result<Option<Vec<PastScan>>> {
+        self.list(Some(scan), max)
     }
 
-    fn list(&mut self, mut before: Option<Uuid>, most: usize) -> io::Result<Option<Vec<PastScan>>> {
+    fn list(&mut self, mut before: Option<Uuid>, max: usize) -> io::Result<Option<Vec<PastScan>>> {
         let mut listed = Vec::new();
         for log in self.recent()? {
-            let mut places = self.read_on(&log)?.scans.iter().rev();
-            if before.is_some_and(|scan| !places.any(|place| place.scan == scan)) {
+            let mut scans = self.update(&log)?.scans.iter().rev();
+            if before.is_some_and(|scan| !scans.any(|lines| lines.scan == scan)) {
                 continue;
             }
             before = None;
-            let places: Vec<ScanLines> = places.take(most - listed.len()).cloned().collect();
+            let scans: Vec<ScanLines> = scans.take(max - listed.len()).cloned().collect();
             let mut file = BufReader::new(File::open(self.folder.join(&log))?);
-            for place in places {
-                listed.extend(place.summary(&log, &mut file)?);
+            for lines in scans {
+                listed.extend(lines.summary(&log, &mut file)?);
             }
-            if listed.len() == most {
+            if listed.len() == max {
                 break;
             }
         }
         Ok(Some(listed).filter(|_| before.is_none()))
     }
 
-    /// Where a scan stands; `None` if the newest logs have no such scan.
+    /// Locates a scan; `None` if the scan is not in the index.
     ///
     /// # Errors
-    /// When the folder or a log in it can't be read.
+    /// Returns an error if the folder or a log cannot be read.
     pub fn passage(&mut self, scan: Uuid) -> io::Result<Option<Passage>> {
         for log in self.recent()? {
             let path = self.folder.join(&log);
-            let places = &self.read_on(&log)?.scans;
-            if let Some(place) = places.iter().rev().find(|place| place.scan == scan) {
-                return place.passage(path);
+            let scans = &self.update(&log)?.scans;
+            if let Some(lines) = scans.iter().rev().find(|lines| lines.scan == scan) {
+                return lines.passage(path);
             }
         }
         Ok(None)
     }
 
-    /// Names of the newest logs, newest first; what is known of others is forgotten.
+    /// Lists the names of the newest logs, newest first, and drops the indices of others.
     fn recent(&mut self) -> io::Result<Vec<String>> {
         let files = log_files(&self.folder)?;
         let recent: Vec<String> =
-            files.into_iter().rev().take(MOST_LOGS).map(|file| file.name).collect();
+            files.into_iter().rev().take(MAX_LOGS).map(|file| file.name).collect();
         self.logs.retain(|name, _| recent.contains(name));
         Ok(recent)
     }
 
-    /// Reads what a log has grown by.
-    fn read_on(&mut self, log: &str) -> io::Result<&Index> {
+    /// Indexes the lines added to a log since the last call.
+    fn update(&mut self, log: &str) -> io::Result<&Index> {
         let index = self.logs.entry(log.to_owned()).or_default();
         let mut file = File::open(self.folder.join(log))?;
         if file.metadata()?.len() < index.read_to {
-            // It was repaired: another file under the same name.
+            // A shorter file is a different one, for instance after a repair.
             *index = Index::default();
         }
         file.seek(SeekFrom::Start(index.read_to))?;
@@ -170,39 +171,41 @@ impl History {
             line.clear();
             let limit = MAX_LINE_BYTES as u64 + 2;
             let length = reader.by_ref().take(limit).read_until(b'\n', &mut line)? as u64;
-            // A line without its newline is still being written; one too long for a record is
-            // passed over piece by piece.
+            // A line without newline is still being written. A line too long for a record is
+            // skipped in chunks.
             if length == 0 || (!line.ends_with(b"\n") && length < limit) {
                 return Ok(index);
             }
-            index.take(&line, length);
+            index.add_line(&line, length);
         }
     }
 }
 
-/// The record of the line that begins there.
+/// Reads the record at an offset.
 fn record_at(file: &mut BufReader<File>, at: u64) -> io::Result<Option<Record>> {
     file.seek(SeekFrom::Start(at))?;
     Ok(read_log(file.by_ref()).next().transpose()?.and_then(|line| line.record.ok()))
 }
 
 impl Index {
-    /// Takes in one line, given with its newline.
-    fn take(&mut self, line: &[u8], length: u64) {
+    /// Adds the next line, including its newline.
+    fn add_line(&mut self, line: &[u8], length: u64) {
         let at = self.read_to;
         self.read_to += length;
-        let record = (!line.starts_with(READING)).then(|| decode_line(line.trim_ascii_end()));
+        let is_ping = line.starts_with(PING_PREFIX);
+        let record = (!is_ping).then(|| decode_line(line.trim_ascii_end()));
         match record {
             Some(Ok(Record::Session(session))) => {
                 let (provenance, scene) = (session.provenance, session.scene);
                 if session.scene_text.is_some() {
                     self.text = Some((at, scene.clone()));
                 }
-                let text = self.text.as_ref().filter(|(_, of)| *of == scene && scene.is_some());
+                let text = self.text.as_ref();
+                let text = text.filter(|(_, text_of)| *text_of == scene && scene.is_some());
                 let text_at = text.map(|(text_at, _)| *text_at).filter(|text_at| *text_at != at);
                 self.session = Some(Arc::new(SessionPlace { at, text_at, provenance, scene }));
             }
-            // Scans of another log format have no session of this program.
+            // Scans of another log format have no readable session.
             Some(Err(fault)) if fault.kind == FaultKind::UnsupportedFormat => self.session = None,
             Some(Ok(Record::ScanStart(start))) => {
                 let session = self.session.clone();
@@ -210,15 +213,15 @@ impl Index {
                 self.scans.push(ScanLines { scan, from: at, to, end_at: None, session });
             }
             Some(Ok(Record::ScanEnd(end))) => {
-                let of = self.scans.iter_mut().rev().find(|place| place.scan == end.scan);
-                if let Some(place) = of {
-                    (place.to, place.end_at) = (self.read_to, Some(at));
+                let ended = self.scans.iter_mut().rev().find(|lines| lines.scan == end.scan);
+                if let Some(lines) = ended {
+                    (lines.to, lines.end_at) = (self.read_to, Some(at));
                 }
             }
-            // Damaged lines are `sonard log verify`'s business.
+            // Damaged lines are reported by `sonard log verify`.
             _ => {
-                if let Some(place) = self.scans.last_mut().filter(|place| place.end_at.is_none()) {
-                    place.to = self.read_to;
+                if let Some(lines) = self.scans.last_mut().filter(|lines| lines.end_at.is_none()) {
+                    lines.to = self.read_to;
                 }
             }
         }
@@ -226,7 +229,7 @@ impl Index {
 }
 
 impl ScanLines {
-    /// How it began and ended, if that can still be read.
+    /// Reads the first and the last record; `None` if the first is no longer readable.
     fn bounds(
         &self,
         file: &mut BufReader<File>,
@@ -254,7 +257,7 @@ impl ScanLines {
     fn passage(&self, path: PathBuf) -> io::Result<Option<Passage>> {
         let mut file = BufReader::new(File::open(&path)?);
         let Some((start, end)) = self.bounds(&mut file)? else { return Ok(None) };
-        // Before the session the one before it that has the text of its scene.
+        // An earlier session with the scene's text precedes the scan's own session.
         let sessions = self.session.iter();
         let sessions = sessions.flat_map(|session| session.text_at.into_iter().chain([session.at]));
         let mut records = Vec::new();
@@ -269,19 +272,19 @@ impl ScanLines {
 }
 
 impl Passage {
-    /// The lines of its readings, or of everything else in it, in the order of the log, each with its
-    /// newline.
+    /// Iterates over the lines of the readings (`true`) or of all other records (`false`), in log
+    /// order and including newlines.
     ///
     /// # Errors
-    /// When the log can't be opened.
+    /// Returns an error if the log cannot be opened.
     pub fn lines(&self, readings: bool) -> io::Result<PassageLines> {
         PassageLines::open(&self.path, self.from, self.to, readings)
     }
 
-    /// The last reading of a beam, and the highest index that there is.
+    /// Returns the last reading of a beam, and the highest beam index of the scan.
     ///
     /// # Errors
-    /// When the log can't be read.
+    /// Returns an error if the log cannot be read.
     pub fn beam(&self, index: u32) -> io::Result<(Option<Ping>, Option<u32>)> {
         let scan = self.view.scan;
         let head = format!(r#"{{"type":"ping","scan":"{scan}","index":"#);
@@ -303,7 +306,7 @@ impl Passage {
     }
 }
 
-/// See [`Passage::lines`]. It holds a line at a time.
+/// Iterator of [`Passage::lines`], with one line in memory at a time.
 #[derive(Debug)]
 pub struct PassageLines {
     file: io::Take<BufReader<File>>,
@@ -327,7 +330,7 @@ impl Iterator for PassageLines {
             let limit = MAX_LINE_BYTES as u64 + 2;
             match self.file.by_ref().take(limit).read_until(b'\n', &mut line) {
                 Ok(0) => return None,
-                Ok(_) if line.starts_with(READING) == self.readings => return Some(Ok(line)),
+                Ok(_) if line.starts_with(PING_PREFIX) == self.readings => return Some(Ok(line)),
                 Ok(_) => {}
                 Err(error) => return Some(Err(error)),
             }

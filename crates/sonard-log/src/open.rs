@@ -1,4 +1,4 @@
-//! Opens a log for appending: lock, and a torn last line set right.
+//! Opening of a log for appending, with lock and repair of a torn last line.
 
 use std::{
     ffi::OsString,
@@ -20,24 +20,24 @@ use super::{
     sync::{is_unsupported, sync_file, sync_folder_of},
 };
 
-/// The damage at the end of a log and its repair.
+/// Repair made at the end of a log.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Recovered {
-    /// The last record was whole and only its newline was missing.
+    /// Newline added after a complete last record.
     Newline,
-    /// The last line was torn; its bytes were moved to a file of their own.
+    /// Torn last line, moved into a separate file.
     Torn {
-        /// Where the log was cut, bytes.
+        /// Offset at which the log was truncated, bytes.
         offset: u64,
         /// Length of the torn line, bytes.
         bytes: u64,
-        /// Where the torn bytes are kept.
+        /// Path of the file with the torn bytes.
         kept: PathBuf,
     },
 }
 
 impl Recovered {
-    /// The event that tells readers of the data, if data was lost.
+    /// Event that records the loss in the log; `None` if no data was lost.
     #[must_use]
     pub fn event(&self) -> Option<Event> {
         let Self::Torn { offset, bytes, kept } = self else { return None };
@@ -52,14 +52,14 @@ impl Recovered {
     }
 }
 
-/// Opens `path` for a [`super::LogWriter`].
+/// Opens, locks and repairs a log for a [`super::LogWriter`].
 pub(super) fn open_file(
     path: &Path,
 ) -> Result<(Box<dyn Medium + Send>, Option<Recovered>), StoreError> {
     let fail = |source| StoreError::Open { path: path.into(), source };
     let existing = fs::symlink_metadata(path);
     if existing.as_ref().is_ok_and(|meta| !meta.is_file() && !meta.is_dir() && !meta.is_symlink()) {
-        // A FIFO or a device: nothing to lock, nothing to mend.
+        // A FIFO or a device is neither locked nor repaired.
         let file = open_own(OpenOptions::new().append(true), path).map_err(fail)?;
         return Ok((Box::new(Pipe(file)), None));
     }
@@ -67,32 +67,32 @@ pub(super) fn open_file(
     if existing.is_err()
         && let Err(error) = sync_folder_of(path)
     {
-        // Nothing is written to it yet, and nothing is to be left of a log that could not be made.
+        // The log is still empty: a failed creation leaves no file.
         let _ = fs::remove_file(path);
         return Err(fail(error));
     }
-    let recovered = mend_end(&file, path).map_err(fail)?;
+    let recovered = repair_end(&file, path).map_err(fail)?;
     Ok((Box::new(FileMedium::new(file).map_err(fail)?), recovered))
 }
 
-/// Opens a file that is to be changed, where it is: a symbolic link in its place is refused, since
-/// what it leads to is not this program's to mend.
+/// Opens a file for modification and rejects symbolic links, whose target may not belong to this
+/// program.
 ///
 /// # Errors
-/// As the system says, or that it is a link.
+/// Returns the error of the system, or an error for a symbolic link.
 pub fn open_own(options: &mut OpenOptions, path: &Path) -> io::Result<File> {
     let opened = options.custom_flags(OFlags::NOFOLLOW.bits().cast_signed()).open(path);
     opened.map_err(|error| match fs::symlink_metadata(path) {
         Ok(there) if there.is_symlink() => io::Error::new(
             io::ErrorKind::InvalidInput,
-            "it is a symbolic link, and what it leads to is not written to",
+            "it is a symbolic link, whose target is not modified",
         ),
         _ => error,
     })
 }
 
-/// Opens and locks a regular file, and makes sure that the path still means it: a repair may
-/// have put another file in its place between the two.
+/// Opens and locks a regular file, and reopens it if a repair replaced the file between opening and
+/// locking.
 fn open_locked(path: &Path) -> Result<File, StoreError> {
     let fail = |source| StoreError::Open { path: path.into(), source };
     loop {
@@ -100,7 +100,10 @@ fn open_locked(path: &Path) -> Result<File, StoreError> {
             .map_err(fail)?;
         let ours = file.metadata().map_err(fail)?;
         if !ours.is_file() {
-            return Err(fail(io::Error::new(io::ErrorKind::InvalidInput, "it is no regular file")));
+            return Err(fail(io::Error::new(
+                io::ErrorKind::InvalidInput,
+                "it is not a regular file",
+            )));
         }
         lock(&file, path)?;
         let named = fs::symlink_metadata(path);
@@ -110,14 +113,14 @@ fn open_locked(path: &Path) -> Result<File, StoreError> {
     }
 }
 
-/// Takes the advisory lock that every writer and every repair of a log holds.
+/// Acquires the advisory lock of writers and repairs.
 pub(super) fn lock(file: &File, path: &Path) -> Result<(), StoreError> {
     match flock(file, FlockOperation::NonBlockingLockExclusive) {
         Ok(()) => Ok(()),
         Err(rustix::io::Errno::WOULDBLOCK) => Err(StoreError::Busy { path: path.into() }),
         Err(error) if is_unsupported(error.raw_os_error()) || error == Errno::NOLCK => {
             tracing::warn!(
-                "{} can't be locked on this file system ({error}): make sure that no other program writes to it",
+                "{} cannot be locked on this file system ({error}): make sure that no other program writes to it",
                 path.display()
             );
             Ok(())
@@ -126,19 +129,19 @@ pub(super) fn lock(file: &File, path: &Path) -> Result<(), StoreError> {
     }
 }
 
-/// Whether some process is writing (or repairing) the log now.
+/// Returns `true` if a process is writing or repairing the log.
 #[must_use]
 pub fn is_being_written(file: &File) -> bool {
     let busy = flock(file, FlockOperation::NonBlockingLockShared);
     if busy.is_ok() {
-        // Held for no longer than this look takes.
+        // Released immediately: the lock was only a test.
         let _ = flock(file, FlockOperation::Unlock);
     }
     busy == Err(rustix::io::Errno::WOULDBLOCK)
 }
 
-/// Makes the log end with a newline, and loses nothing by it.
-fn mend_end(file: &File, path: &Path) -> io::Result<Option<Recovered>> {
+/// Repairs the end of a log, so that it ends with a newline. Torn bytes move to a separate file.
+fn repair_end(file: &File, path: &Path) -> io::Result<Option<Recovered>> {
     let length = file.metadata()?.len();
     let offset = last_line_offset(file, length)?;
     let bytes = length - offset;
@@ -160,7 +163,7 @@ fn mend_end(file: &File, path: &Path) -> io::Result<Option<Recovered>> {
     Ok(Some(Recovered::Torn { offset, bytes, kept }))
 }
 
-/// Where the bytes after the last newline begin.
+/// Offset of the first byte after the last newline.
 #[expect(clippy::indexing_slicing, reason = "a part is never longer than the chunk")]
 fn last_line_offset(file: &File, length: u64) -> io::Result<u64> {
     let mut chunk = vec![0; 1 << 16];
@@ -177,13 +180,13 @@ fn last_line_offset(file: &File, length: u64) -> io::Result<u64> {
     Ok(0)
 }
 
-/// Copies everything from `offset` on to `<log>.torn-<n>` and brings it to the disk.
+/// Copies the bytes from `offset` to `<log>.torn-<n>` and syncs the copy.
 fn keep_torn(mut file: &File, offset: u64, path: &Path) -> io::Result<PathBuf> {
     let (mut kept, name) = create_next(|n| with_suffix(path, &format!(".torn-{n}")))?;
     file.seek(SeekFrom::Start(offset))?;
     let copied = io::copy(&mut file, &mut kept).and_then(|_| sync_file(&kept));
     if let Err(error) = copied {
-        // The log still has the bytes; half a copy would only confuse.
+        // The log still has the bytes, so a partial copy is removed.
         let _ = fs::remove_file(&name);
         return Err(error);
     }
@@ -191,7 +194,7 @@ fn keep_torn(mut file: &File, offset: u64, path: &Path) -> io::Result<PathBuf> {
     Ok(name)
 }
 
-/// Creates the first file of a numbered series, from 1, that does not exist yet.
+/// Creates the first non-existing file of a series numbered from 1.
 fn create_next(name: impl Fn(u32) -> PathBuf) -> io::Result<(File, PathBuf)> {
     let mut n = 1;
     loop {
@@ -204,7 +207,7 @@ fn create_next(name: impl Fn(u32) -> PathBuf) -> io::Result<(File, PathBuf)> {
     }
 }
 
-/// `path` with something after its name.
+/// Appends a suffix to the file name of `path`.
 pub(super) fn with_suffix(path: &Path, suffix: &str) -> PathBuf {
     let mut name = OsString::from(path);
     name.push(suffix);

@@ -1,4 +1,4 @@
-//! Reads a log line by line.
+//! Reading of logs line by line, with damaged lines reported individually.
 
 use std::{
     fmt, fs,
@@ -12,31 +12,30 @@ use super::{FileKind, HEAD_BYTES, StoreError};
 
 const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 
-/// One line of a log.
+/// Line of a log.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Line {
-    /// Number of the line, from 1.
+    /// Line number, from 1.
     pub number: u64,
-    /// Where it begins in the file, bytes.
+    /// Offset in the file, bytes.
     pub offset: u64,
-    /// How long it is, bytes without the newline.
+    /// Length without the newline, bytes.
     pub length: u64,
-    /// The line as it stands, without the newline; of a line longer than
-    /// [`MAX_LINE_BYTES`] only the beginning.
+    /// Content without the newline; truncated for a line longer than [`MAX_LINE_BYTES`].
     pub bytes: Vec<u8>,
-    /// Whether a newline ends it. Only the last line can be without one: cut off, or still being
-    /// written.
+    /// `true` if the line ends with a newline. Only the last line can lack one, because of a torn
+    /// or unfinished write.
     pub ended: bool,
-    /// The record, or why there is none.
+    /// Decoded record, or the fault of the line.
     pub record: Result<Record, LineError>,
 }
 
-/// A line that is not a record.
+/// Line that is not a valid record.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct LineError {
-    /// Number of the line, from 1.
+    /// Line number, from 1.
     pub line: u64,
-    /// What is wrong, where on the line, and in which field.
+    /// Fault with its column and field.
     pub fault: RecordError,
 }
 
@@ -49,7 +48,7 @@ impl fmt::Display for LineError {
 impl std::error::Error for LineError {}
 
 impl LineError {
-    /// Passes damaged lines on, for the caller to report, but rejects a log of another format.
+    /// Returns a damaged line for the caller to report, but rejects a log of another format.
     ///
     /// # Errors
     /// [`StoreError::UnsupportedFormat`] if the line is a session of another format.
@@ -63,10 +62,10 @@ impl LineError {
     }
 }
 
-/// Every line of a log, damaged ones included, in order.
+/// Iterates over all lines of a log, including damaged ones.
 ///
-/// Memory stays bounded whatever the file holds. An item is an error only when reading itself
-/// failed; nothing follows it.
+/// Memory is bounded for any content. An item is an error only if reading fails, which ends the
+/// iteration.
 pub fn read_log<R: BufRead>(reader: R) -> Lines<R> {
     Lines { reader, number: 0, offset: 0, done: false }
 }
@@ -96,7 +95,7 @@ impl<R: BufRead> Iterator for Lines<R> {
 impl<R: BufRead> Lines<R> {
     fn read_line(&mut self) -> io::Result<Option<Line>> {
         let mut bytes = Vec::with_capacity(512);
-        // The newline and a carriage return before it come on top of the longest record.
+        // Two bytes for a carriage return and a newline after the longest record.
         let limit = MAX_LINE_BYTES as u64 + 2;
         let mut read = self.reader.by_ref().take(limit).read_until(b'\n', &mut bytes)? as u64;
         if read == 0 {
@@ -117,8 +116,8 @@ impl<R: BufRead> Lines<R> {
         Ok(Some(Line { number, offset, length, bytes, ended, record }))
     }
 
-    /// Reads on to the newline and keeps nothing. Gives the bytes read in all, and whether a
-    /// newline came.
+    /// Skips the rest of a line; returns the total of read bytes, and `true` if a newline was
+    /// found.
     fn skip_rest(&mut self, mut read: u64) -> io::Result<(u64, bool)> {
         let mut scrap = Vec::new();
         loop {
@@ -148,7 +147,7 @@ fn torn_fault(length: u64) -> RecordError {
         kind: FaultKind::Torn,
         column: None,
         field: None,
-        message: format!("the last line is torn: it ends after {length} byte(s), in mid-record"),
+        message: format!("the last line is torn: it ends within a record after {length} byte(s)"),
     }
 }
 
@@ -161,21 +160,21 @@ fn too_long_fault(length: u64) -> RecordError {
     }
 }
 
-/// A log read whole: what could be read, and what could not.
+/// Content of a log: records and damaged lines.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Loaded {
-    /// The records, in order.
+    /// Valid records, in order.
     pub records: Vec<Record>,
-    /// The lines that hold none, in order.
+    /// Faults of the other lines, in order.
     pub damaged: Vec<LineError>,
 }
 
-/// Reads a whole log from a file, or from standard input for `-`.
+/// Reads a complete log from a file, or from standard input for `-`.
 ///
-/// Damaged lines are not an error; whoever calls shows them.
+/// Damaged lines are returned for the caller to report.
 ///
 /// # Errors
-/// When the file can't be opened or read, or has a session of another format.
+/// Returns an error if the file cannot be read, or has a session of another format.
 pub fn load(path: &Path) -> Result<Loaded, StoreError> {
     let reader = open_for_reading(path)?;
     let mut loaded = Loaded::default();
@@ -191,18 +190,21 @@ pub fn load(path: &Path) -> Result<Loaded, StoreError> {
 /// Opens a file, or standard input for `-`, for [`read_log`].
 pub fn open_for_reading(path: &Path) -> Result<Box<dyn BufRead>, StoreError> {
     if path == Path::new("-") {
-        return refuse_other(path, Box::new(io::stdin().lock()));
+        return reject_other_kind(path, Box::new(io::stdin().lock()));
     }
     let fail = |source| StoreError::Unreadable { path: PathBuf::from(path), source };
     let file = fs::File::open(path).map_err(fail)?;
     if file.metadata().map_err(fail)?.is_dir() {
         return Err(fail(io::ErrorKind::IsADirectory.into()));
     }
-    refuse_other(path, Box::new(io::BufReader::with_capacity(HEAD_BYTES, file)))
+    reject_other_kind(path, Box::new(io::BufReader::with_capacity(HEAD_BYTES, file)))
 }
 
-/// Names what is plainly no log instead of finding fault with each of its lines.
-fn refuse_other(path: &Path, mut reader: Box<dyn BufRead>) -> Result<Box<dyn BufRead>, StoreError> {
+/// Rejects files of other kinds with one error, instead of a fault per line.
+fn reject_other_kind(
+    path: &Path,
+    mut reader: Box<dyn BufRead>,
+) -> Result<Box<dyn BufRead>, StoreError> {
     let fail = |source| StoreError::Read { path: path.into(), source };
     let kind = FileKind::of(reader.fill_buf().map_err(fail)?);
     if kind.is_no_log() { Err(StoreError::NoLog { path: path.into(), kind }) } else { Ok(reader) }

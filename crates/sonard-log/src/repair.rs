@@ -1,4 +1,4 @@
-//! Leaves out of a log what can't be read, and keeps the original.
+//! Repair of a damaged log: unreadable lines are removed, and the original is kept.
 
 use std::{
     fs::{self, File, OpenOptions},
@@ -15,79 +15,80 @@ use super::{
     sync::{sync_file, sync_folder_of},
 };
 
-/// A line that a repair left out.
+/// Line removed by a repair.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct LeftOut {
-    /// Number of the line in the original, from 1.
+    /// Line number in the original, from 1.
     pub line: u64,
-    /// Where it begins in the original, bytes.
+    /// Offset in the original, bytes.
     pub offset: u64,
-    /// How long it is, bytes.
+    /// Length without the newline, bytes.
     pub length: u64,
-    /// What is wrong with it.
+    /// Fault of the line.
     pub fault: RecordError,
 }
 
-/// The result of a repair.
+/// Result of a repair.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Repair {
-    /// Records kept, byte for byte.
+    /// Number of records kept byte for byte.
     pub kept: u64,
-    /// The torn last line, if there was one.
+    /// Removed torn last line, if any.
     pub torn: Option<LeftOut>,
-    /// The last record was whole and got the newline it lacked.
+    /// `true` if the last record was complete and only its newline was added.
     pub newline_added: bool,
-    /// Other lines left out.
+    /// Other removed lines.
     pub left_out: Vec<LeftOut>,
-    /// Whole records kept, byte for byte too, although this program can't read them: another
-    /// version may.
+    /// Complete records kept byte for byte although this version cannot read them: another version
+    /// may.
     pub kept_unread: Vec<LineError>,
-    /// Where the original is; `None` if nothing had to be done.
+    /// Path of the original; `None` if the log was intact.
     pub original: Option<PathBuf>,
 }
 
-/// Repairs the log at `path`: every whole record is kept byte for byte, all else left out, the
-/// original stays beside it as `<log>.orig` (or `.orig-2`, ...).
+/// Repairs the log at `path`: complete records are kept byte for byte, other lines removed. The
+/// original is kept in the same folder as `<log>.orig` (or `.orig-2`, ...).
 ///
-/// The new file takes the log's place in one step, so that a crash leaves either the old log or
-/// the repaired one. A log that needs nothing is not touched.
+/// The log is replaced atomically, so a crash leaves either the old or the repaired log. An intact
+/// log is not modified.
 ///
 /// # Errors
-/// When another process holds the log, or reading or writing fails; the log is then as it was.
+/// Returns an error if another process has locked the log, or reading or writing fails; the log is
+/// then unchanged.
 pub fn repair(path: &Path) -> Result<Repair, StoreError> {
-    // A link to a log is repaired where the log is.
+    // Follows links, so that the log itself is repaired.
     let path = &fs::canonicalize(path)
         .map_err(|source| StoreError::Unreadable { path: path.into(), source })?;
-    // Other files have no records to keep.
+    // Rejects files of other kinds.
     drop(open_for_reading(path)?);
     let open = |source| StoreError::Open { path: path.clone(), source };
     let file = open_own(OpenOptions::new().read(true), path).map_err(open)?;
     if !file.metadata().map_err(open)?.is_file() {
-        return Err(open(io::Error::new(io::ErrorKind::InvalidInput, "it is no regular file")));
+        return Err(open(io::Error::new(io::ErrorKind::InvalidInput, "it is not a regular file")));
     }
     lock(&file, path)?;
-    let draft = Draft::create(path)?;
+    let draft = RepairDraft::create(path)?;
     let mut repair = Repair::default();
     let mut out = BufWriter::with_capacity(1 << 16, &draft.file);
     for line in read_log(BufReader::with_capacity(1 << 16, &file)) {
         let line = line.map_err(|source| StoreError::Read { path: path.clone(), source })?;
-        repair.take(&line, &mut out).map_err(|source| draft.fail(source))?;
+        repair.process(&line, &mut out).map_err(|source| draft.fail(source))?;
     }
     if repair.kept == 0 && repair.kept_unread.is_empty() && !repair.left_out.is_empty() {
-        // There is nothing to keep: it is some other file, and stays what it is.
+        // A file without any record is not a log and remains unchanged.
         let kind = open_for_reading(path)?.fill_buf().map_or(FileKind::Binary, FileKind::of);
         return Err(StoreError::NoLog { path: path.clone(), kind });
     }
     out.flush().map_err(|source| draft.fail(source))?;
     drop(out);
-    if repair.changes_something() {
+    if repair.has_changes() {
         repair.original = Some(draft.replace(&file, path)?);
     }
     Ok(repair)
 }
 
 impl Repair {
-    fn take(&mut self, line: &Line, out: &mut impl Write) -> io::Result<()> {
+    fn process(&mut self, line: &Line, out: &mut impl Write) -> io::Result<()> {
         let fault = match &line.record {
             Ok(_) => {
                 self.kept += 1;
@@ -111,7 +112,7 @@ impl Repair {
         Ok(())
     }
 
-    fn changes_something(&self) -> bool {
+    fn has_changes(&self) -> bool {
         self.torn.is_some() || self.newline_added || !self.left_out.is_empty()
     }
 }
@@ -121,13 +122,13 @@ fn keep(line: &Line, out: &mut impl Write) -> io::Result<()> {
     out.write_all(b"\n")
 }
 
-/// The repaired log while it is being written; removed unless it takes the log's place.
-struct Draft {
+/// Repaired log during writing; removed on drop unless it replaced the log.
+struct RepairDraft {
     file: File,
     path: PathBuf,
 }
 
-impl Draft {
+impl RepairDraft {
     fn create(log: &Path) -> Result<Self, StoreError> {
         let path = with_suffix(log, &format!(".repair-{}", std::process::id()));
         match OpenOptions::new().write(true).create_new(true).open(&path) {
@@ -140,7 +141,7 @@ impl Draft {
         StoreError::Write { path: self.path.clone(), source }
     }
 
-    /// Keeps `original` under another name and puts the draft in its place.
+    /// Links the original under another name and replaces the log by the draft.
     fn replace(&self, original: &File, log: &Path) -> Result<PathBuf, StoreError> {
         let swap = || {
             self.file.set_permissions(original.metadata()?.permissions())?;
@@ -155,14 +156,14 @@ impl Draft {
     }
 }
 
-impl Drop for Draft {
+impl Drop for RepairDraft {
     fn drop(&mut self) {
-        // After the rename there is nothing of that name.
+        // After the rename this file no longer exists.
         let _ = fs::remove_file(&self.path);
     }
 }
 
-/// Gives the log a second name, the first of `.orig`, `.orig-2`, ... that is free.
+/// Links the log under the first free name of `.orig`, `.orig-2`, ...
 fn keep_original(log: &Path) -> io::Result<PathBuf> {
     let mut n = 1;
     loop {
@@ -171,7 +172,7 @@ fn keep_original(log: &Path) -> io::Result<PathBuf> {
         match fs::hard_link(log, &kept) {
             Ok(()) => return Ok(kept),
             Err(error) if error.kind() == io::ErrorKind::AlreadyExists => n += 1,
-            // Some file systems have no second names: copy instead.
+            // Copies on file systems without hard links.
             Err(_) => {
                 let mut copy = OpenOptions::new().write(true).create_new(true).open(&kept)?;
                 io::copy(&mut File::open(log)?, &mut copy)?;

@@ -1,5 +1,5 @@
-//! Where a log has the text of its scene: in the session's record, or, if it is too long for a
-//! line, in a file beside the log that is named by its hash.
+//! Storage of scene texts: in the session record, or, if too long for a line, in a separate file
+//! named by its hash in the log's folder.
 
 use std::{
     fs,
@@ -12,34 +12,34 @@ use thiserror::Error;
 
 use super::{StoreError, WholeFile};
 
-/// Longest text of a scene that a session's record carries, bytes: escaped, it still fits a line.
+/// Maximum length of a scene's text in a session record, bytes: its escaped form fits in a line.
 pub const MAX_LOGGED_SCENE_BYTES: usize = 1 << 18;
 
-/// Folder beside a log for longer ones, in files `SHA256.json`.
+/// Subfolder for longer texts, in files `SHA256.json`.
 const FOLDER: &str = "scenes";
 
-/// The reason why a log's scene can't be read from the log.
+/// Reason why the scene of a log is unavailable.
 #[derive(Debug, Error)]
 pub enum SceneLost {
-    /// Absent from the record, and from the folder for scenes that are too long for a line.
-    #[error("the log does not hold its scene `{}`", .0.name)]
+    /// Scene missing from the record and from the folder for long texts.
+    #[error("the log does not contain its scene `{}`", .0.name)]
     NotThere(SceneRef),
-    /// The text is not the one that the model used.
+    /// Scene whose text differs from the one that the model used.
     #[error("the log's text of its scene `{}` was changed: its SHA-256 differs", .0.name)]
     Changed(SceneRef),
 }
 
-/// The scene that a session's model was given, as the log at `log` has it; `None` if it was given
-/// none.
+/// Reads the scene of a session's predictions from the log at `log`; `None` for a session without
+/// scene.
 ///
 /// # Errors
-/// When the log does not have it, or not unchanged.
+/// Returns an error if the scene's text is missing or was changed.
 pub fn logged_scene(session: &Session, log: &Path) -> Result<Option<Scene>, SceneLost> {
     let Some(named) = &session.scene else { return Ok(None) };
-    let beside = || fs::read_to_string(path_beside(log, &named.sha256)?).ok();
+    let from_file = || fs::read_to_string(scene_path(log, &named.sha256)?).ok();
     let text = match &session.scene_text {
         Some(text) => text.to_string(),
-        None => beside().ok_or_else(|| SceneLost::NotThere(named.clone()))?,
+        None => from_file().ok_or_else(|| SceneLost::NotThere(named.clone()))?,
     };
     match Scene::from_json(&text) {
         Ok(scene) if scene.sha256 == named.sha256 => Ok(Some(scene)),
@@ -47,43 +47,43 @@ pub fn logged_scene(session: &Session, log: &Path) -> Result<Option<Scene>, Scen
     }
 }
 
-/// Where the text of a scene with this hash would be; `None` for what is no hash.
-fn path_beside(log: &Path, sha256: &str) -> Option<PathBuf> {
+/// Path of the file for a scene with this hash; `None` if the text is not a SHA-256.
+fn scene_path(log: &Path, sha256: &str) -> Option<PathBuf> {
     let is_hash = sha256.len() == 64 && sha256.bytes().all(|byte| byte.is_ascii_hexdigit());
     is_hash.then(|| log.with_file_name(FOLDER).join(format!("{sha256}.json")))
 }
 
-/// Sees to it that a log has the text of a scene once.
+/// Writer of scene texts that stores each text once per log.
 #[derive(Debug, Default)]
-pub(super) struct SceneKeeper {
-    /// The log, if texts may be kept beside it.
+pub(super) struct SceneStore {
+    /// Path of the log, if long texts may be stored in its folder.
     log: Option<PathBuf>,
-    /// Hash of the scene whose text was written last.
+    /// Hash of the last written scene.
     last: Option<String>,
 }
 
-impl SceneKeeper {
-    /// Keeps long texts beside `log`.
-    pub(super) fn beside(log: &Path) -> Self {
+impl SceneStore {
+    /// Creates a store that writes long texts into the folder of `log`.
+    pub(super) fn in_folder_of(log: &Path) -> Self {
         Self { log: Some(log.into()), last: None }
     }
 
-    /// What is to be written in place of a session whose scene's text must not stand in it; the text
-    /// is then in the log already, or beside it.
-    pub(super) fn shortened(&self, record: &Record) -> Result<Option<Record>, StoreError> {
+    /// Returns the session without its scene text if the text is already stored or too long for the
+    /// record; a long text is written to its file.
+    pub(super) fn without_text(&self, record: &Record) -> Result<Option<Record>, StoreError> {
         let Some((session, scene, text)) = scene_in(record) else { return Ok(None) };
         let known = self.last.as_ref() == Some(&scene.sha256);
         if !known && text.len() <= MAX_LOGGED_SCENE_BYTES {
             return Ok(None);
         }
         if !known && let Some(log) = &self.log {
-            keep(log, scene, text)?;
+            write_text(log, scene, text)?;
         }
         Ok(Some(Record::Session(Box::new(Session { scene_text: None, ..session.clone() }))))
     }
 
-    /// The record is in the log.
-    pub(super) fn written(&mut self, record: &Record) {
+    /// Notes that the log contains the record.
+    pub(super) fn record_written(&mut self, record: &Record) {
         if let Some((_, scene, _)) = scene_in(record) {
             self.last = Some(scene.sha256.clone());
         }
@@ -95,9 +95,9 @@ fn scene_in(record: &Record) -> Option<(&Session, &SceneRef, &str)> {
     Some((session, session.scene.as_ref()?, session.scene_text.as_deref()?))
 }
 
-/// Keeps a text beside the log, unless it is there.
-fn keep(log: &Path, scene: &SceneRef, text: &str) -> Result<(), StoreError> {
-    let Some(path) = path_beside(log, &scene.sha256) else { return Ok(()) };
+/// Writes a scene's text into the log's folder, unless the file exists.
+fn write_text(log: &Path, scene: &SceneRef, text: &str) -> Result<(), StoreError> {
+    let Some(path) = scene_path(log, &scene.sha256) else { return Ok(()) };
     if path.exists() {
         return Ok(());
     }

@@ -1,8 +1,8 @@
 //! Synchronisation of files and folders with the disk.
 //!
-//! Some file systems (CIFS, several of FUSE, shared folders of virtual machines) have no fsync(2) of folders, or none at
-//! all. What is written there survives the end of the program, only not a loss of power, so that a missing operation is
-//! a warning and no error.
+//! Some file systems (CIFS, several of FUSE, shared folders of virtual machines) have no fsync(2)
+//! for folders, or none at all. Data written there survives the end of the program but not a power
+//! failure, so a missing operation is a warning, not an error.
 
 use std::{
     fs::File,
@@ -13,40 +13,41 @@ use std::{
 
 use rustix::io::Errno;
 
-/// Brings a file's content to the disk.
+/// Syncs the content of a file.
 ///
 /// # Errors
-/// As the system reports, unless the file system has no such operation.
+/// Returns the error of the system, unless the file system lacks the operation.
 pub fn sync_file(file: &File) -> io::Result<()> {
     static REPORTED: AtomicBool = AtomicBool::new(false);
     unless_unsupported(file.sync_data(), &REPORTED, "files")
 }
 
-/// Brings the entries of the folder of `path` to the disk, so that a new or renamed file keeps its name.
+/// Syncs the folder that contains `path`, so that a new or renamed file keeps its name.
 ///
 /// # Errors
-/// As the system reports, unless the file system has no such operation, or this user may not read the folder.
+/// Returns the error of the system, unless the file system lacks the operation or this user may not
+/// read the folder.
 pub fn sync_folder_of(path: &Path) -> io::Result<()> {
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
     sync_folder(folder.unwrap_or(Path::new(".")))
 }
 
-/// Brings the entries of a folder to the disk.
+/// Syncs the entries of a folder.
 ///
 /// # Errors
-/// As [`sync_folder_of`].
+/// Returns the error of the system, with the exceptions of [`sync_folder_of`].
 pub fn sync_folder(folder: &Path) -> io::Result<()> {
     static REPORTED: AtomicBool = AtomicBool::new(false);
     let synced = match File::open(folder) {
         Ok(folder) => folder.sync_all(),
-        // A folder may allow new files and not to be listed.
+        // A folder may be writable but not readable.
         Err(error) if error.kind() == io::ErrorKind::PermissionDenied => Ok(()),
         Err(error) => Err(error),
     };
     unless_unsupported(synced, &REPORTED, "folders")
 }
 
-/// Turns the error of a file system that lacks an operation into one warning of this process.
+/// Replaces the error of a missing operation with one warning per process.
 fn unless_unsupported(
     outcome: io::Result<()>,
     reported: &AtomicBool,
@@ -58,14 +59,14 @@ fn unless_unsupported(
     }
     if !reported.swap(true, Ordering::Relaxed) {
         tracing::warn!(
-            "this file system can't sync {what} ({error}): records survive the end of the program, but not a loss of \
-             power; a local disk keeps both"
+            "this file system cannot sync {what} ({error}): records survive the end of the program, \
+             but not a power failure; use a local disk for both"
         );
     }
     Ok(())
 }
 
-/// Whether an error of fsync(2) or flock(2) is that of a file system without the operation.
+/// Returns `true` if fsync(2) or flock(2) failed because the file system lacks the operation.
 pub(super) fn is_unsupported(errno: i32) -> bool {
     let unsupported = [Errno::INVAL, Errno::NOSYS, Errno::OPNOTSUPP, Errno::NOTSUP, Errno::NOTTY];
     unsupported.iter().any(|known| known.raw_os_error() == errno)
@@ -80,7 +81,7 @@ mod tests {
     }
 
     #[test]
-    fn missing_operations_are_no_errors() {
+    fn missing_operations_are_ignored() {
         for errno in [Errno::INVAL, Errno::NOSYS, Errno::OPNOTSUPP] {
             assert!(outcome(errno).is_ok(), "{errno}");
         }
@@ -90,7 +91,7 @@ mod tests {
     }
 
     #[test]
-    fn folders_that_can_be_synced_are() {
+    fn syncs_existing_folders() {
         let folder = tempfile::tempdir().expect("a folder");
         assert!(sync_folder_of(&folder.path().join("log")).is_ok());
         assert!(sync_folder_of(&folder.path().join("missing/log")).is_err());

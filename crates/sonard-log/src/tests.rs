@@ -1,4 +1,4 @@
-//! Tests of the store, by what they are about; the small log that they share.
+//! Tests of logs by subject, with a shared fixture.
 
 mod checking;
 mod faults;
@@ -19,14 +19,14 @@ fn records() -> Vec<Record> {
     LOG.lines().map(|line| decode_line(line.as_bytes()).expect("clean")).collect()
 }
 
-/// A folder of its own, and the path of a log in it.
+/// Creates a temporary folder and the path of a log in it.
 fn folder() -> (tempfile::TempDir, PathBuf) {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let log = folder.path().join("scan.jsonl");
     (folder, log)
 }
 
-/// The same in memory where there is such a place: thousands of syncs to a disk take minutes.
+/// Creates a temporary folder in memory where possible: thousands of syncs to a disk take minutes.
 fn fast_folder() -> (tempfile::TempDir, PathBuf) {
     let Ok(folder) = tempfile::tempdir_in("/dev/shm") else { return folder() };
     let log = folder.path().join("scan.jsonl");
@@ -38,5 +38,5 @@ fn written(log: &Path, bytes: impl AsRef<[u8]>) {
 }
 
 fn read(log: impl AsRef<Path>) -> String {
-    std::fs::read_to_string(log).expect("it is there")
+    std::fs::read_to_string(log).expect("exists")
 }

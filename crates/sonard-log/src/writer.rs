@@ -1,4 +1,4 @@
-//! Appends records to a log.
+//! Writer that appends records to a log.
 
 use std::{
     io,
@@ -11,42 +11,42 @@ use sonard_records::{Record, encode_line};
 use super::{
     Displacement, Medium, Pipe, StoreError,
     open::{Recovered, open_file},
-    scenes::SceneKeeper,
+    scenes::SceneStore,
 };
 
-/// How long a record may wait for the disk while others follow it.
+/// Default maximum time between append and sync of a record while records follow.
 pub const SYNC_INTERVAL: Duration = Duration::from_secs(2);
 
-/// Writes a log: each record as one line with one write.
+/// Writer of a log: each record is one line and one write.
 ///
-/// A record is on the disk for good after the sync that follows it: at the end of a scan, when
-/// [`SYNC_INTERVAL`] has passed since the first record not yet synced (noticed by the next
-/// [`append`](Self::append) or [`sync_if_due`](Self::sync_if_due)), and on
-/// [`close`](Self::close). A process that is killed loses nothing it appended, only a machine
-/// that stops loses what was not synced.
+/// Records are durable after the next sync. A sync follows the end of a scan,
+/// [`close`](Self::close), and the [`SYNC_INTERVAL`] of the oldest unsynced record, which
+/// [`append`](Self::append) and [`sync_if_due`](Self::sync_if_due) check. A killed process loses no
+/// appended record; a power failure loses the unsynced ones.
 #[derive(Debug)]
 pub struct LogWriter<M: Medium = Box<dyn Medium + Send>> {
     medium: M,
     path: PathBuf,
     line: Vec<u8>,
     interval: Duration,
-    /// When the oldest record not yet synced was appended.
-    waiting_since: Option<Instant>,
+    /// Time at which the oldest unsynced record was appended.
+    unsynced_since: Option<Instant>,
     appended: u64,
     synced: u64,
     failed: bool,
     recovered: Option<Recovered>,
-    scenes: SceneKeeper,
+    scenes: SceneStore,
 }
 
 impl LogWriter {
-    /// Opens a log for appending, creates it if it isn't there, and locks it.
+    /// Opens and locks a log for appending, or creates it.
     ///
-    /// An existing log that ends in a torn line is mended first: the torn bytes go to a file
-    /// beside it and an event of kind `gap` says so; see [`recovered`](Self::recovered).
+    /// A torn last line is repaired first: its bytes are moved to a separate file, and a `gap`
+    /// event records the loss; see [`recovered`](Self::recovered).
     ///
     /// # Errors
-    /// When the file can't be opened, another process holds it, or mending fails.
+    /// Returns an error if the file cannot be opened, another process has locked it, or the repair
+    /// fails.
     pub fn open(path: &Path) -> Result<Self, StoreError> {
         let (medium, recovered) = open_file(path)?;
         let mut writer = Self::new(medium, path);
@@ -58,7 +58,7 @@ impl LogWriter {
         Ok(writer)
     }
 
-    /// Writes to standard output.
+    /// Creates a writer to standard output.
     #[must_use]
     pub fn stdout() -> Self {
         Self::new(Box::new(Pipe(io::stdout())), Path::new("standard output"))
@@ -66,95 +66,95 @@ impl LogWriter {
 }
 
 impl<M: Medium> LogWriter<M> {
-    /// Writes to `medium`; `path` is what errors call it.
+    /// Creates a writer to `medium`; `path` names it in errors.
     pub fn new(medium: M, path: &Path) -> Self {
         Self {
             medium,
             path: path.into(),
             line: Vec::with_capacity(1024),
             interval: SYNC_INTERVAL,
-            waiting_since: None,
+            unsynced_since: None,
             appended: 0,
             synced: 0,
             failed: false,
             recovered: None,
-            scenes: SceneKeeper::default(),
+            scenes: SceneStore::default(),
         }
     }
 
-    /// The same with another interval between syncs.
+    /// Sets the interval between syncs.
     #[must_use]
     pub fn with_sync_interval(mut self, interval: Duration) -> Self {
         self.interval = interval;
         self
     }
 
-    /// The same, with scenes too long for a line kept in the log's folder.
+    /// Stores scenes that are too long for a line in the log's folder.
     #[must_use]
     pub fn with_scenes_beside(mut self) -> Self {
-        self.scenes = SceneKeeper::beside(&self.path);
+        self.scenes = SceneStore::in_folder_of(&self.path);
         self
     }
 
-    /// Appends one record, and syncs if it ends a scan or a sync is due.
+    /// Appends a record, and syncs at the end of a scan or if a sync is due.
     ///
     /// # Errors
-    /// After [`StoreError::Record`] and [`StoreError::Write`] nothing of the record is in the
-    /// log and the next one can be appended; any other error is final.
+    /// After [`StoreError::Record`] and [`StoreError::Write`] no part of the record is in the log
+    /// and further records can be appended; any other error is final.
     pub fn append(&mut self, record: &Record) -> Result<(), StoreError> {
         self.append_at(record, Instant::now())
     }
 
-    /// [`append`](Self::append) with the time given.
+    /// Appends a record at a given time; see [`append`](Self::append).
     ///
     /// # Errors
-    /// As for [`append`](Self::append).
+    /// Returns the errors of [`append`](Self::append).
     pub fn append_at(&mut self, record: &Record, now: Instant) -> Result<(), StoreError> {
         self.check_usable()?;
         self.line.clear();
-        let shorter = self.scenes.shortened(record)?;
+        let shorter = self.scenes.without_text(record)?;
         encode_line(shorter.as_ref().unwrap_or(record), &mut self.line)
             .map_err(|source| StoreError::Record { path: self.path.clone(), source })?;
         self.write_line()?;
-        self.scenes.written(record);
+        self.scenes.record_written(record);
         self.appended += 1;
-        self.waiting_since.get_or_insert(now);
+        self.unsynced_since.get_or_insert(now);
         if matches!(record, Record::ScanEnd(_)) { self.sync() } else { self.sync_if_due(now) }
     }
 
-    /// Appends a record by its line as it stands in another log, without the newline: with all that a later version may
-    /// have put there. It is on the disk for good after the next [`sync`](Self::sync), which is the caller's to ask for.
+    /// Appends a record by its line from another log, without the newline, which preserves fields
+    /// of later versions. The caller must call [`sync`](Self::sync).
     ///
     /// # Errors
-    /// As for [`append`](Self::append).
+    /// Returns the errors of [`append`](Self::append).
     pub fn append_line(&mut self, line: &[u8], record: &Record) -> Result<(), StoreError> {
         self.check_usable()?;
         self.line.clear();
         self.line.extend_from_slice(line);
         self.line.push(b'\n');
         self.write_line()?;
-        self.scenes.written(record);
+        self.scenes.record_written(record);
         self.appended += 1;
         Ok(())
     }
 
-    /// Syncs if a record has waited for longer than the interval. For callers whose records may
-    /// stop coming.
+    /// Syncs if the interval of the oldest unsynced record has elapsed. Needed by callers whose
+    /// records may cease.
     ///
     /// # Errors
-    /// As for [`sync`](Self::sync).
+    /// Returns the errors of [`sync`](Self::sync).
     pub fn sync_if_due(&mut self, now: Instant) -> Result<(), StoreError> {
-        match self.waiting_since {
+        match self.unsynced_since {
             Some(since) if now.saturating_duration_since(since) >= self.interval => self.sync(),
             _ => Ok(()),
         }
     }
 
-    /// Brings everything appended to the disk.
+    /// Syncs all appended records.
     ///
     /// # Errors
-    /// [`StoreError::Sync`], after which the log must be opened again: the system may have
-    /// dropped what it could not write, and a later sync would not tell.
+    /// Returns [`StoreError::Sync`], after which the log must be reopened: the system may have
+    /// dropped unwritten data, which a later sync would not report.
     pub fn sync(&mut self) -> Result<(), StoreError> {
         self.check_usable()?;
         if self.synced == self.appended {
@@ -166,60 +166,60 @@ impl<M: Medium> LogWriter<M> {
             StoreError::Sync { path: self.path.clone(), source, unsynced }
         })?;
         self.synced = self.appended;
-        self.waiting_since = None;
+        self.unsynced_since = None;
         Ok(())
     }
 
-    /// Syncs and lets go of the log.
+    /// Syncs and closes the log.
     ///
     /// # Errors
-    /// As for [`sync`](Self::sync).
+    /// Returns the errors of [`sync`](Self::sync).
     pub fn close(mut self) -> Result<(), StoreError> {
         self.sync()
     }
 
-    /// What it writes to: for what is to happen to it after the last record.
+    /// Output of the writer, for operations after the last record.
     pub fn medium_mut(&mut self) -> &mut M {
         &mut self.medium
     }
 
-    /// Length of the log by what was written, bytes; 0 where there is none.
+    /// Length of the log from the written bytes; 0 for outputs without a length.
     pub(super) fn length(&self) -> u64 {
         self.medium.length()
     }
 
-    /// Everything written from a byte on.
+    /// Reads back all bytes from an offset.
     pub(super) fn read_from(&self, offset: u64) -> io::Result<Vec<u8>> {
         self.medium.read_from(offset)
     }
 
-    /// Deviation of the open file from the one that the log's path names.
+    /// Compares the open file with the file at the log's path.
     ///
     /// # Errors
-    /// When file or path can't be examined.
+    /// Returns an error if file or path cannot be examined.
     pub fn displacement(&self) -> io::Result<Option<Displacement>> {
         self.medium.displacement(&self.path)
     }
 
-    /// Records appended through this writer.
+    /// Number of records appended by this writer.
     #[must_use]
     pub fn appended(&self) -> u64 {
         self.appended
     }
 
-    /// Records that are on the disk for good.
+    /// Number of synced records.
     #[must_use]
     pub fn synced(&self) -> u64 {
         self.synced
     }
 
-    /// What was found wrong with the end of an existing log and mended.
+    /// Repair made at the end of an existing log.
     #[must_use]
     pub fn recovered(&self) -> Option<&Recovered> {
         self.recovered.as_ref()
     }
 
-    /// What errors call the log.
+    /// Path that names the log in errors.
     #[must_use]
     pub fn path(&self) -> &Path {
         &self.path
@@ -229,10 +229,10 @@ impl<M: Medium> LogWriter<M> {
         if self.failed { Err(StoreError::Failed { path: self.path.clone() }) } else { Ok(()) }
     }
 
-    /// Writes `self.line` whole or leaves nothing of it behind.
+    /// Writes `self.line` completely or removes the written part.
     ///
-    /// One write is the rule; only when the system takes fewer bytes is the rest offered again,
-    /// to learn why.
+    /// Normally one write. After a partial write the rest is retried once more to obtain the
+    /// system's error.
     fn write_line(&mut self) -> Result<(), StoreError> {
         let mut written = 0;
         let source = loop {
@@ -262,7 +262,7 @@ impl<M: Medium> LogWriter<M> {
 
 impl<M: Medium> Drop for LogWriter<M> {
     fn drop(&mut self) {
-        // close() is the way to learn of an error; here nobody could be told.
+        // Errors cannot be returned here; callers use close() to receive them.
         if !self.failed {
             let _ = self.sync();
         }

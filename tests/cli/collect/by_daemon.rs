@@ -139,7 +139,7 @@ fn conflicting_settings() {
     let daemon = Daemon::start(folder.path(), &array);
     let output = collect(&case, &daemon);
     let text = said(&output);
-    assert!(output.status.code() == Some(2) && text.contains("plays an array"), "{text}");
+    assert!(output.status.code() == Some(2) && text.contains("simulates an array"), "{text}");
     assert_eq!(daemon.stop(), Some(0));
 }
 
@@ -164,7 +164,7 @@ fn resumes_and_restores_the_daemon() {
     assert_eq!(daemon.send("POST", "/v1/stop", "").status, 202);
     let output = stopped.wait_with_output().expect("it ends");
     assert_eq!(output.status.code(), Some(1), "{}", said(&output));
-    assert!(said(&output).contains("the daemon was "), "{}", said(&output));
+    assert!(said(&output).contains("the daemon was stopped by another client"), "{}", said(&output));
     assert_eq!(daemon.status()["scanning"]["mode"], "continuous");
 
     let interrupted = spawn(&case, &daemon);

@@ -26,7 +26,7 @@ fn missed_steps_cause_a_retake() {
     }
     let report = case.text("out/report.md");
     assert!(
-        report.contains("Rejected and retaken") && report.contains("it missed steps"),
+        report.contains("Rejected and retaken") && report.contains("the motor missed steps"),
         "{report}"
     );
     assert_eq!(case.manifest()["counts"]["set_aside"], aside.len());
@@ -52,7 +52,7 @@ fn retakes_exhausted() {
 
     let case = Case::new(&(plan + "after_retakes = \"stop\"\n"));
     let output = case.collect(&["--missed-steps", "1"]);
-    assert!(output.status.code() == Some(1) && said(&output).contains("2 retakes did not help"));
+    assert!(output.status.code() == Some(1) && said(&output).contains("2 retakes failed"));
     assert_eq!(case.files("set-aside").len(), 3);
 
     let case = Case::new(&format!("{POSE}[checks]\non_home_drift = \"note\"\n"));
@@ -67,7 +67,7 @@ fn missing_beams_and_wrong_scene() {
     ));
     let output = case.collect(&["--truth", "corridor"]);
     let text = said(&output);
-    assert!(output.status.code() == Some(1) && text.contains("is it the right pose"), "{text}");
+    assert!(output.status.code() == Some(1) && text.contains("check pose and scene"), "{text}");
     assert_eq!(case.files("set-aside").len(), 1);
     case.collect_all(&[]);
 
@@ -114,7 +114,7 @@ fn drifting_air_starts_a_session() {
     case.write("plan.toml", &plan);
     std::fs::write(&thermometer, "20000\n").expect("writable");
     let output = case.collect(&[]);
-    assert!(output.status.code() == Some(1) && said(&output).contains("stopped: the air is 26.00"));
+    assert!(output.status.code() == Some(1) && said(&output).contains("stopped: air temperature 26.00"));
     assert_eq!(case.files("scans").len(), 2);
 }
 

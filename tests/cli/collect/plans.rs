@@ -113,7 +113,7 @@ fn changed_plan() {
     let refused = case.collect(&[]);
     let text = said(&refused);
     assert_eq!(refused.status.code(), Some(2), "{text}");
-    assert!(text.contains("collection.repeats was 1 and is 2"), "{text}");
+    assert!(text.contains("collection.repeats changed from 1 to 2"), "{text}");
     let before = case.text("out/scans/p001-r01.jsonl");
     case.collect_all(&["--accept-changed-plan"]);
     case.assert_each_scan_once(2, 2, 25);

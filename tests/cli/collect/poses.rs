@@ -73,7 +73,7 @@ fn poses_from_programs() {
     case.assert_each_scan_once(3, 1, 25);
 
     for (command, part) in
-        [("false", "failed: exit status: 1"), ("echo nonsense", "printed no pose")]
+        [("false", "failed: exit status: 1"), ("echo nonsense", "printed no valid pose")]
     {
         let case = Case::new(&format!("[poses]\nprogram = \"{command}\"\n"));
         let output = case.collect(&[]);
@@ -97,7 +97,7 @@ fn poses_from_a_file() {
     assert_eq!(case.manifest()["poses"]["1"]["conditions"]["door"], "open");
     case.write("poses.csv", "name,x_m,y_m,heading_deg\na,0.5,0.3,0\nb,0.6,0.25,45\n");
     let output = case.collect(&[]);
-    assert!(output.status.code() == Some(2) && said(&output).contains("the poses in the file"));
+    assert!(output.status.code() == Some(2) && said(&output).contains("poses in the file"));
     case.write("poses.csv", "name,x_m,y_m,heading_deg\na,0.5,0.3,0\nb,zero,0.25,45\n");
     let output = case.collect(&[]);
     assert!(said(&output).contains("poses.csv:3:"), "{}", stderr(&output));

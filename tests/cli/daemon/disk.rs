@@ -120,7 +120,7 @@ fn missing_folder_sync_is_a_warning() {
     fs::create_dir_all(&faults).expect("a folder");
     set(folder.path(), "nodirsync", true);
     let daemon = start(folder.path());
-    wait_until("the warning", || daemon.said().contains("can't sync folders"));
+    wait_until("the warning", || daemon.said().contains("cannot sync folders"));
     assert_eq!(daemon.stop(), Some(0));
     clean_log(folder.path());
     for verb in ["scan", "simulate"] {
@@ -134,7 +134,7 @@ fn missing_folder_sync_is_a_warning() {
         let output = command.output().expect("it starts");
         let said = String::from_utf8_lossy(&output.stderr).into_owned();
         assert_eq!(output.status.code(), Some(0), "{verb}: {said}");
-        assert!(said.contains("can't sync folders"), "{verb}: {said}");
+        assert!(said.contains("cannot sync folders"), "{verb}: {said}");
         let log = if verb == "scan" { out.join("scan.jsonl") } else { out };
         let verified = run(&["log", "verify", log.to_str().expect("plain path")]);
         assert_eq!(verified.status.code(), Some(0), "{verb}");

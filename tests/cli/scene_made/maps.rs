@@ -70,7 +70,7 @@ fn rotated_map() {
     let simulated = ["simulate", "--scene", "simple-room", "--pose", "fig9", "--step-deg", "36"];
     assert!(run(&[&simulated[..], &["-o", &log]].concat()).status.success());
     let refused = run(&["map", &log, "--update", &path, "--out", &out]);
-    assert!(stderr(&refused).contains("turned"), "{}", stderr(&refused));
+    assert!(stderr(&refused).contains("rotated"), "{}", stderr(&refused));
 }
 
 #[test]
@@ -112,5 +112,5 @@ fn missing_images() {
         "an image",
     );
     fs::remove_file(folder.path().join("map.pgm")).expect("writable");
-    refused(&["scene", "from-grid", &path], "`image:` names");
+    refused(&["scene", "from-grid", &path], "the file of `image:`");
 }

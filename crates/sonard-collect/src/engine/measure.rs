@@ -1,4 +1,4 @@
-//! A scan, and the air that it is taken in.
+//! Recording of a scan, with the air temperature before and after it.
 
 use std::sync::Arc;
 
@@ -7,45 +7,47 @@ use sonard_device::ranger::PreparedScan;
 use sonard_records::{AirSource, ScanAir};
 
 use super::{
-    super::{AirAction, Device, Entry, Halt, ScanOrder, Slot, Watcher, taking::Taken},
+    super::{AirAction, Device, Entry, Halt, ScanOrder, Slot, Watcher, record_scan::Taken},
     Collector,
 };
 
 impl<D: Device, W: Watcher> Collector<D, W> {
-    /// Looks at the thermometer before a scan, and does what the plan wants when the air is no
-    /// longer that of the session.
-    pub(super) async fn follow_air(&mut self) -> Result<(), Halt> {
+    /// Reads the thermometer before a scan and applies `checks.on_temperature_drift` if the air
+    /// drifted from the session's.
+    pub(super) async fn update_air(&mut self) -> Result<(), Halt> {
         let Some(now_c) = self.temperature().await else { return Ok(()) };
         let keys = &self.plan.keys.checks;
         let drift_c = now_c - self.air.temperature_c();
         if drift_c.abs() <= keys.max_temperature_drift_c {
             return Ok(());
         }
-        let said = format!("the air is {now_c:.2} C, {drift_c:+.2} C from the session's");
+        let drift = format!("air temperature {now_c:.2} C, {drift_c:+.2} C from the session's");
         match keys.on_temperature_drift {
-            AirAction::Note => self.watcher.say(&format!("warning: {said}")),
-            AirAction::Stop => return Err(Halt::Stopped(format!("stopped: {said}"))),
+            AirAction::Note => self.watcher.say(&format!("warning: {drift}")),
+            AirAction::Stop => return Err(Halt::Stopped(format!("stopped: {drift}"))),
             AirAction::NewSession => {
-                self.watcher
-                    .say(&format!("{said}: from here on it is predicted and ranged with that"));
+                self.watcher.say(&format!(
+                    "{drift}: predictions and ranges use the new temperature from now on"
+                ));
                 self.air = self.plan.air(now_c)?;
                 self.prepared.clear();
-                // A mock's air is what the thermometer says, unless it has a truth of its own.
-                self.carried_to = None;
+                // Passes the new air to a mock, whose air follows the thermometer by default.
+                self.device_pose = None;
             }
         }
         Ok(())
     }
 
-    /// Takes a scan; beside it, by how much the air changed meanwhile.
+    /// Takes a scan; returns it with the temperature change during it, degrees Celsius.
     pub(super) async fn take(&mut self, slot: Slot) -> Result<(Taken, Option<f64>), Halt> {
         let history = self.journal.history();
-        let (done, of) = (history.accepted().count() as u32, history.wanted().len() as u32);
+        let done = history.accepted().count() as u32;
+        let total = history.wanted().len() as u32;
         let label = self.pose(slot.pose).label();
-        let doing = format!("{label}, scan {} of {of}", done + 1);
-        self.watcher.begin(&doing, done, of, self.pace.left_s(of.saturating_sub(done)));
+        let doing = format!("{label}, scan {} of {total}", done + 1);
+        self.watcher.begin(&doing, done, total, self.pace.left_s(total.saturating_sub(done)));
         let before_c = self.temperature().await;
-        // A thermometer that gives no valid value now leaves the last one, with its age.
+        // Without a valid temperature now, the last valid one is recorded with its age.
         let age_s = self.temperature_age_s().or(before_c.map(|_| 0.0));
         let air = age_s.map(|age_s| ScanAir {
             temperature_c: self.air.temperature_c(),
@@ -53,7 +55,7 @@ impl<D: Device, W: Watcher> Collector<D, W> {
             source: AirSource::File,
             age_s: Some(age_s),
         });
-        self.borrow().await?;
+        self.apply_settings().await?;
         let prepared = match self.device.is_local() {
             true => Some(self.prepared(slot.pose)?),
             false => None,
@@ -73,30 +75,30 @@ impl<D: Device, W: Watcher> Collector<D, W> {
         Ok((taken, change_c))
     }
 
-    /// Lets the collection decide what the device otherwise does by itself; noted before it is done.
-    async fn borrow(&mut self) -> Result<(), Halt> {
+    /// Applies the collection's settings to the device, after journaling the previous ones.
+    async fn apply_settings(&mut self) -> Result<(), Halt> {
         let air = self.plan.air_order(self.air.temperature_c());
         let before = self.device.to_borrow(air.as_ref()).await?;
         if let Some(before) = &before {
-            self.note(Entry::Borrowed(before.clone()))?;
+            self.append(Entry::Borrowed(before.clone()))?;
         }
         self.device.borrow(before, air.as_ref()).await
     }
 
-    /// Leaves the device as it was found.
-    pub(super) async fn give_back(&mut self) {
+    /// Restores the device's previous settings.
+    pub(super) async fn restore_settings(&mut self) {
         match self.device.give_back().await {
             Ok(false) | Err(Halt::Stopped(_)) => {}
-            // Not noted, it is only given back once more.
-            Ok(true) => drop(self.note(Entry::GivenBack { time: Timestamp::now() })),
+            // If this entry is lost, the next run restores the settings once more.
+            Ok(true) => drop(self.append(Entry::GivenBack { time: Timestamp::now() })),
             Err(halt) => self.watcher.say(&format!(
-                "warning: the daemon still does what the collection wanted: {halt}\n\
-                 start the collection again, or set its mode with PUT /v1/scanning"
+                "warning: the daemon still has the collection's settings: {halt}\n\
+                 start the collection again, or set the daemon's mode with PUT /v1/scanning"
             )),
         }
     }
 
-    /// The temperature now, if there is a thermometer with a valid value.
+    /// Reads the current air temperature, degrees Celsius; `None` without a valid one.
     async fn temperature(&mut self) -> Option<f64> {
         if !self.device.is_local() && !self.plan.gives_air() {
             return self.device.temperature_c().await;
@@ -121,7 +123,7 @@ impl<D: Device, W: Watcher> Collector<D, W> {
         }
     }
 
-    /// Age of the last valid temperature, seconds; `None` without a thermometer of its own.
+    /// Age of the last valid temperature, seconds; `None` without a thermometer in the plan.
     fn temperature_age_s(&self) -> Option<f64> {
         if !self.device.is_local() && !self.plan.gives_air() {
             return None;
@@ -130,7 +132,7 @@ impl<D: Device, W: Watcher> Collector<D, W> {
         Some(age.as_secs_f64())
     }
 
-    /// What is to be measured at a pose, with the model's predictions in the air of the session.
+    /// Returns the scan setup of a pose, with predictions in the air of the session.
     pub(super) fn prepared(&mut self, number: u32) -> Result<Arc<PreparedScan>, Halt> {
         if let Some(prepared) = self.prepared.get(&number) {
             return Ok(Arc::clone(prepared));

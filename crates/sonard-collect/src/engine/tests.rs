@@ -1,4 +1,4 @@
-//! The engine with a device and a person that are made up.
+//! Tests of the engine with a fake device and operator.
 
 use std::{
     path::Path,
@@ -14,35 +14,35 @@ use sonard_model::{
     model::{Options, Simulator},
     scene::{Scene, shipped},
 };
-use sonard_records::{Device as Told, Provenance, Record, ScanPlan, ScanView};
+use sonard_records::{Device as DeviceRecord, Provenance, Record, ScanPlan, ScanView};
 use sonard_runtime::interrupts::Interrupts;
 
 use super::*;
 use crate::{Borrowed, CollectionKeys, Connected, History, Poses, ScanOrder, Taken, read_journal};
 
-/// Somewhere, scans are taken: by the model, but for those that are lost.
-struct Elsewhere {
+/// Remote device whose readings are the model's; the first `lost` scans fail.
+struct FakeDevice {
     scene: Arc<Scene>,
     taken: u32,
-    /// Of so many tries, the first ones come to nothing.
+    /// Remaining scans to fail.
     lost: u32,
-    given_back: Arc<Mutex<u32>>,
+    restored: Arc<Mutex<u32>>,
 }
 
-impl Device for Elsewhere {
+impl Device for FakeDevice {
     fn is_local(&self) -> bool {
         false
     }
 
     fn prepare(&mut self, _: &Plan, _: &PreparedScan) -> Result<(), Halt> {
-        unreachable!("it is not local")
+        unreachable!("only for local devices")
     }
 
     fn go_on(&mut self, _: Duration, _: Option<Borrowed>) {}
 
     async fn meet(&mut self) -> Result<Connected, Halt> {
-        let device = Told {
-            serial: "ELSEWHERE".into(),
+        let device = DeviceRecord {
+            serial: "REMOTE".into(),
             firmware: "1".into(),
             protocol: 1,
             boot: "1".into(),
@@ -53,7 +53,7 @@ impl Device for Elsewhere {
     }
 
     fn carry_to(&mut self, _: &PreparedScan) -> Result<(), Halt> {
-        unreachable!("it is not local")
+        unreachable!("only for local devices")
     }
 
     async fn to_borrow(&self, _: Option<&AirOrder>) -> Result<Option<Borrowed>, Halt> {
@@ -65,7 +65,7 @@ impl Device for Elsewhere {
     }
 
     async fn give_back(&mut self) -> Result<bool, Halt> {
-        *self.given_back.lock().expect("nobody panics") += 1;
+        *self.restored.lock().expect("not poisoned") += 1;
         Ok(false)
     }
 
@@ -78,14 +78,14 @@ impl Device for Elsewhere {
         order: ScanOrder<'_>,
         beam: &(dyn Fn() + Sync),
     ) -> Result<Taken, Halt> {
-        assert!(order.prepared.is_none(), "who is elsewhere predicts by itself");
+        assert!(order.prepared.is_none(), "a remote device predicts by itself");
         let mut log = LogWriter::open(order.path)?;
         let (view, lost) = if self.lost > 0 {
             self.lost -= 1;
-            (None, Some(Halt::failed("it is gone", "wait")))
+            (None, Some(Halt::failed("no response", "wait")))
         } else {
             self.taken += 1;
-            let view = simulated(&self.scene, &order);
+            let view = simulate(&self.scene, &order);
             let mut session = view.session.as_deref().cloned().expect("a session");
             session.collection = Some(Box::new(order.of));
             log.append(&Record::Session(Box::new(session)))?;
@@ -104,7 +104,7 @@ impl Device for Elsewhere {
     async fn close(self) {}
 }
 
-fn simulated(scene: &Scene, order: &ScanOrder<'_>) -> ScanView {
+fn simulate(scene: &Scene, order: &ScanOrder<'_>) -> ScanView {
     let sensor = Sensor::preset("senscomp-6500").expect("a preset");
     let scene = Arc::new(scene.with_robot_at(&order.pose));
     let simulator =
@@ -113,19 +113,19 @@ fn simulated(scene: &Scene, order: &ScanOrder<'_>) -> ScanView {
         .expect("few paths")
 }
 
-/// Nobody, who keeps what was said.
+/// Unattended observer that collects the messages.
 #[derive(Default)]
-struct Nobody(Arc<Mutex<Vec<String>>>);
+struct FakeWatcher(Arc<Mutex<Vec<String>>>);
 
-impl Watcher for Nobody {
-    fn begin(&self, doing: &str, _: u32, _: u32, _: f64) {
-        self.say(doing);
+impl Watcher for FakeWatcher {
+    fn begin(&self, label: &str, _: u32, _: u32, _: f64) {
+        self.say(label);
     }
 
     fn beam(&self) {}
 
     fn say(&self, line: &str) {
-        self.0.lock().expect("nobody panics").push(line.to_owned());
+        self.0.lock().expect("not poisoned").push(line.to_owned());
     }
 
     fn announce(&self, scans: u32, _: f64) {
@@ -139,18 +139,18 @@ impl Watcher for Nobody {
     }
 
     fn report(&self, _: &Folder, history: &History) -> Result<(), Halt> {
-        self.say(&format!("a report of {}", history.accepted().count()));
+        self.say(&format!("report of {} scans", history.accepted().count()));
         Ok(())
     }
 }
 
-fn plan(folder: &Path, further: &str) -> Plan {
+fn plan(folder: &Path, extra_keys: &str) -> Plan {
     let text = format!(
         "[place]\nscene = \"simple-room\"\n[poses]\nlist = [\"fig7\", \"fig9\"]\n\
-         [plan]\nto_deg = 18\nstep_deg = 1.8\n{further}"
+         [plan]\nto_deg = 18\nstep_deg = 1.8\n{extra_keys}"
     );
-    let layers = Layers::<CollectionKeys>::new().file("plan.toml", &text).expect("right");
-    let keys = layers.clone().keys().expect("right");
+    let layers = Layers::<CollectionKeys>::new().file("plan.toml", &text).expect("valid");
+    let keys = layers.clone().keys().expect("valid");
     let scene_text = shipped::text("simple-room").expect("shipped").to_owned();
     let scene = Arc::new(Scene::from_json(&scene_text).expect("a scene"));
     let poses = ["fig7", "fig9"].map(|name| NamedPose::parse(name, &scene).expect("a pose"));
@@ -169,39 +169,39 @@ fn plan(folder: &Path, further: &str) -> Plan {
     }
 }
 
-async fn run(folder: &Path, further: &str, lost: u32) -> (Result<(), Halt>, Vec<String>) {
-    let plan = plan(folder, further);
-    let (given_back, said) = (Arc::default(), Arc::default());
-    let device = Elsewhere {
+async fn run(folder: &Path, extra_keys: &str, lost: u32) -> (Result<(), Halt>, Vec<String>) {
+    let plan = plan(folder, extra_keys);
+    let (restored, messages) = (Arc::default(), Arc::default());
+    let device = FakeDevice {
         scene: Arc::clone(&plan.scene),
         taken: 0,
         lost,
-        given_back: Arc::clone(&given_back),
+        restored: Arc::clone(&restored),
     };
-    let watcher = Nobody(Arc::clone(&said));
+    let watcher = FakeWatcher(Arc::clone(&messages));
     let outcome = collect(plan, Choices::default(), device, watcher, Interrupts::listen()).await;
-    let said = said.lock().expect("nobody panics").clone();
-    if !said.is_empty() {
-        assert_eq!(*given_back.lock().expect("nobody panics"), 1);
+    let messages = messages.lock().expect("not poisoned").clone();
+    if !messages.is_empty() {
+        assert_eq!(*restored.lock().expect("not poisoned"), 1);
     }
-    (outcome, said)
+    (outcome, messages)
 }
 
 #[tokio::test]
-async fn every_scan_of_a_plan_is_taken_once_by_any_device() {
+async fn takes_every_scan_once() {
     let folder = tempfile::tempdir().expect("a folder");
     let root = folder.path().join("collection");
     let twice = "[collection]\nrepeats = 2\n";
-    let (outcome, said) = run(&root, twice, 0).await;
-    outcome.expect("every scan is there");
-    assert_eq!(said.first().map(String::as_str), Some("4 scans"), "{said:?}");
-    assert!(said.contains(&"a report of 4".to_owned()), "{said:?}");
+    let (outcome, messages) = run(&root, twice, 0).await;
+    outcome.expect("complete");
+    assert_eq!(messages.first().map(String::as_str), Some("4 scans"), "{messages:?}");
+    assert!(messages.contains(&"report of 4 scans".to_owned()), "{messages:?}");
     let history = read_journal(&Folder::at(&root).journal()).expect("readable");
     let taken: Vec<_> = history.accepted().map(|take| (take.slot.pose, take.slot.repeat)).collect();
     assert_eq!(taken, [(1, 1), (1, 2), (2, 1), (2, 2)]);
     assert_eq!(Folder::at(&root).scans().expect("readable").len(), 4);
-    // Started again there is nothing to do, and another plan is refused.
-    run(&root, twice, 0).await.0.expect("it is done");
+    // A second run has nothing to do, and a different plan is rejected.
+    run(&root, twice, 0).await.0.expect("complete");
     let (other, _) = run(&root, "[collection]\nrepeats = 3\n", 0).await;
     assert!(
         matches!(&other, Err(Halt::Wrong { message, .. }) if message.contains("repeats")),
@@ -210,11 +210,12 @@ async fn every_scan_of_a_plan_is_taken_once_by_any_device() {
 }
 
 #[tokio::test]
-async fn a_scan_that_is_lost_is_taken_again_and_patience_ends() {
+async fn retries_until_the_deadline() {
     let folder = tempfile::tempdir().expect("a folder");
-    let (outcome, said) = run(&folder.path().join("once"), "", 1).await;
-    outcome.expect("every scan is there");
-    assert!(said.iter().any(|line| line.contains("taken again in 1 s: it is gone")), "{said:?}");
+    let (outcome, messages) = run(&folder.path().join("once"), "", 1).await;
+    outcome.expect("complete");
+    let retry = "repeating the scan in 1 s: no response";
+    assert!(messages.iter().any(|line| line.contains(retry)), "{messages:?}");
     let (outcome, _) =
         run(&folder.path().join("never"), "[collection]\npatience_s = 0\n", u32::MAX).await;
     assert!(matches!(&outcome, Err(Halt::Failed { .. })), "{outcome:?}");

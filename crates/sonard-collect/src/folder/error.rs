@@ -1,4 +1,4 @@
-//! What goes wrong with a collection's folder.
+//! Errors of a collection's folder.
 
 use std::{
     io,
@@ -7,39 +7,39 @@ use std::{
 
 use thiserror::Error;
 
-/// An error in the folder of a collection.
+/// Error in the folder of a collection.
 #[derive(Debug, Error)]
 pub enum FolderError {
-    /// The system refused.
+    /// Failed file operation.
     #[error("cannot {doing} {}: {source}", path.display())]
     Io {
-        /// What was tried.
+        /// Attempted operation, as a verb.
         doing: &'static str,
-        /// With what.
+        /// File or folder of the operation.
         path: PathBuf,
-        /// What the system says.
+        /// Error of the operating system.
         source: io::Error,
     },
-    /// It holds files of other people.
-    #[error("{} is not empty, and no collection", path.display())]
+    /// Folder with files that are not a collection.
+    #[error("{} is not empty and not a collection", path.display())]
     Strange {
-        /// The folder.
+        /// Path of the folder.
         path: PathBuf,
     },
-    /// Another process collects into it.
+    /// Folder in use by another process.
     #[error("another process is collecting into this folder: {} is locked", path.display())]
     Busy {
-        /// The locked file.
+        /// Path of the locked file.
         path: PathBuf,
     },
-    /// A file that is not as it was written.
+    /// File whose content was damaged.
     #[error("{}:{line}: {message}", path.display())]
     Damaged {
-        /// Which file.
+        /// Path of the damaged file.
         path: PathBuf,
-        /// Which line, from 1.
+        /// Line number, from 1.
         line: u64,
-        /// What is wrong.
+        /// Description of the damage.
         message: String,
     },
 }
@@ -49,25 +49,25 @@ impl FolderError {
         Self::Io { doing, path: path.into(), source }
     }
 
-    /// What a person can do about it.
+    /// Suggested remedy for the user.
     #[must_use]
     pub fn help(&self) -> &'static str {
         use io::ErrorKind as Kind;
         match self {
             Self::Io { source, .. } => match source.kind() {
                 Kind::StorageFull | Kind::QuotaExceeded | Kind::FileTooLarge => {
-                    "make room on that disk and start again: the collection goes on where it stopped"
+                    "free space on that disk and run the same command to resume"
                 }
                 Kind::PermissionDenied | Kind::ReadOnlyFilesystem => {
-                    "choose a folder that you may write to, or change its permissions"
+                    "choose a writable folder, or change its permissions"
                 }
-                _ => "check the path and the disk; what was collected so far is kept",
+                _ => "check the path and the disk; recorded scans are kept",
             },
-            Self::Strange { .. } => "give another --out: a collection has a folder of its own",
-            Self::Busy { .. } => "wait until it is done, or give another --out",
+            Self::Strange { .. } => "choose another --out: a collection needs its own folder",
+            Self::Busy { .. } => "wait until that process ends, or choose another --out",
             Self::Damaged { .. } => {
-                "compare the file with a copy: somebody changed it. The scans themselves lie in \
-                 scans/ and are good logs without it"
+                "compare the file with a copy: it was changed. The logs in scans/ are valid \
+                 without it"
             }
         }
     }

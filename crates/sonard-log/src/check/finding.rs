@@ -1,4 +1,4 @@
-//! What can be found in a log.
+//! Findings of a log check.
 
 use std::fmt;
 
@@ -8,62 +8,62 @@ use serde::Serialize;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Severity {
-    /// Data is damaged, missing or contradicts itself.
+    /// Damaged, missing or contradictory data.
     Problem,
-    /// Worth knowing; the data is consistent.
+    /// Remark on consistent data.
     Warning,
 }
 
-/// The kind of a finding.
+/// Kind of a finding.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum FindingKind {
-    /// The file holds no line.
+    /// Log without any line.
     EmptyLog,
-    /// The last line is cut off in mid-record.
+    /// Last line that ends within a record.
     TornTail,
-    /// The last record is whole but its newline is missing.
+    /// Complete last record without newline.
     NoNewline,
-    /// A line that is not a record.
+    /// Line that is not a record.
     Damaged,
-    /// A session of another log format.
+    /// Session of another log format.
     UnsupportedFormat,
-    /// A scan before any session.
+    /// Scan before the first session.
     NoSession,
-    /// A ping, or an end, of a scan that was not begun or is over.
+    /// Ping or end of a scan that has not started or has ended.
     OutsideScan,
-    /// A scan's identifier begun twice.
+    /// Second start with the same scan identifier.
     ScanTwice,
-    /// The plan can't be carried out.
+    /// Invalid scan plan.
     BadPlan,
-    /// A beam with two readings.
+    /// Beam with two readings.
     DuplicateBeam,
-    /// A beam that the plan does not have.
+    /// Beam index beyond the plan.
     NoSuchBeam,
-    /// `scan_end` counts otherwise than the lines do.
+    /// Counts in `scan_end` that differ from the log.
     WrongCount,
-    /// A scan without `scan_end`.
+    /// Scan without `scan_end`.
     NotEnded,
-    /// Status, range, prediction and residual of a reading contradict each other.
+    /// Contradiction between status, range, prediction and residual of a reading.
     Contradiction,
-    /// A reading's azimuth is not the plan's, or not its ranger's.
+    /// Azimuth that differs from the plan or from the ranger's mounting.
     WrongAzimuth,
-    /// A reading of a ranger that the session's array does not have.
+    /// Reading of a ranger that is not in the session's array.
     UnknownRanger,
-    /// A record older than the one before it.
+    /// Record that is older than its predecessor.
     TimeBackwards,
 }
 
-/// A finding in a log.
+/// Finding in a log.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Finding {
-    /// Number of the line, from 1 (for what is missing at the end: of the last line).
+    /// Line number, from 1; for findings at the end of the log, the last line.
     pub line: u64,
-    /// How bad it is.
+    /// Severity of the finding.
     pub severity: Severity,
-    /// What kind of thing.
+    /// Kind of the finding.
     pub kind: FindingKind,
-    /// In words.
+    /// Description with the values found.
     pub detail: String,
 }
 
@@ -79,16 +79,16 @@ impl fmt::Display for Finding {
 pub struct Totals {
     /// Lines, damaged ones included.
     pub lines: u64,
-    /// Sessions.
+    /// Number of sessions.
     pub sessions: u64,
-    /// Scans begun.
+    /// Number of started scans.
     pub scans: u64,
-    /// Readings.
+    /// Number of readings.
     pub pings: u64,
-    /// Events.
+    /// Number of events.
     pub events: u64,
-    /// Findings that make the log not clean.
+    /// Findings of severity [`Problem`](Severity::Problem).
     pub problems: u64,
-    /// Findings that do not.
+    /// Findings of severity [`Warning`](Severity::Warning).
     pub warnings: u64,
 }

@@ -1,22 +1,22 @@
-//! A scan while its records are gone through.
+//! State of a scan during the check.
 
 use std::collections::HashMap;
 
 use sonard_records::{ScanEnd, ScanPlan};
 use uuid::Uuid;
 
-/// A scan that has begun and not ended.
+/// Scan that has started and not ended.
 #[derive(Debug)]
 pub(super) struct OpenScan {
     pub(super) id: Uuid,
     line: u64,
-    /// `None` when its `scan_start` is missing.
+    /// Scan plan; `None` if `scan_start` is missing.
     pub(super) plan: Option<ScanPlan>,
-    /// By beam index: the line of its reading, and whether that came through.
+    /// Line number of the reading, and `true` if the reading was received, by beam index.
     pub(super) beams: HashMap<u32, (u64, bool)>,
-    /// Whether an event in the log accounts for an early end.
+    /// `true` if an event explains an early end.
     pub(super) interrupted: bool,
-    /// An event reports that records were lost.
+    /// `true` if an event reports lost records.
     pub(super) has_gap: bool,
 }
 
@@ -29,11 +29,13 @@ impl OpenScan {
         let Self { id, line, beams, .. } = self;
         let planned = self.plan.map_or(String::new(), |plan| format!(" of {}", plan.beams()));
         let count = beams.len();
-        format!("scan {id} (line {line}) has no scan_end {when}: {count}{planned} beams are there")
+        format!(
+            "scan {id} (line {line}) has no scan_end {when}: {count}{planned} beams are present"
+        )
     }
 
-    /// A beam whose reading was lost has a line and no reading: both ways of counting it are
-    /// taken, as long as beams and missing ones count it the same way.
+    /// Compares the counts in `scan_end` with the log. A lost reading has a line but no value, so
+    /// it may be counted as a beam or as missing.
     pub(super) fn wrong_counts(&self, end: &ScanEnd) -> Vec<String> {
         let logged = self.beams.len() as u32;
         let lost = self.beams.values().filter(|(_, came_through)| !came_through).count() as u32;
@@ -53,7 +55,7 @@ impl OpenScan {
     }
 }
 
-/// Beam numbers for people: `: 3-7, 12`, cut short after eight runs.
+/// Formats beam numbers as `: 3-7, 12`, truncated after eight runs.
 fn ranges(indices: &[u32]) -> String {
     let runs: Vec<String> = indices
         .chunk_by(|a, b| a + 1 == *b)

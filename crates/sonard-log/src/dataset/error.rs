@@ -1,4 +1,4 @@
-//! What can go wrong with the folder of a data set.
+//! Errors of a data set's folder.
 
 use std::{
     io,
@@ -8,58 +8,58 @@ use std::{
 use sonard_generate::{ManifestError, ShardError, SpecError};
 use thiserror::Error;
 
-/// An error in making or reading a data set.
+/// Error in generating or reading a data set.
 #[derive(Debug, Error)]
 pub enum DataSetError {
-    /// The folder is in use for something else.
-    #[error("{} holds {name} and no data set", root.display())]
+    /// Folder that is used for other files.
+    #[error("{} contains {name} and is not a data set", root.display())]
     Strange {
-        /// The folder.
+        /// Path of the folder.
         root: PathBuf,
-        /// Something in it.
+        /// Name of a file in the folder.
         name: String,
     },
-    /// The folder is of another set.
-    #[error("{} holds the data set of another specification (its spec.json)", root.display())]
+    /// Folder of a data set with another specification.
+    #[error("{} contains the data set of another specification (spec.json)", root.display())]
     OtherSet {
-        /// The folder.
+        /// Path of the folder.
         root: PathBuf,
     },
-    /// What is in a shard's place is another shard.
+    /// Shard folder with a different shard.
     #[error("{}: {why}", path.display())]
     Foreign {
-        /// The shard's folder.
+        /// Path of the shard's folder.
         path: PathBuf,
-        /// What is wrong.
+        /// Mismatch with the expected shard.
         why: ManifestError,
     },
-    /// Something was taken out of a shard.
+    /// Incomplete shard.
     #[error("{} lacks {lacks}", path.display())]
     NotWhole {
-        /// The shard's folder.
+        /// Path of the shard's folder.
         path: PathBuf,
-        /// What it lacks.
+        /// Missing file or size.
         lacks: String,
     },
-    /// The specification of a set has a fault.
+    /// Fault in the specification of a set.
     #[error(transparent)]
     Specification(#[from] SpecError),
-    /// A shard can't be made.
+    /// Failure to generate a shard.
     #[error("shard {shard}: {error}")]
     Shard {
-        /// Its number.
+        /// Number of the shard.
         shard: u32,
-        /// Why.
+        /// Cause of the failure.
         error: ShardError,
     },
-    /// A file or folder can't be read or written.
+    /// Failure to read or write a file or folder.
     #[error("cannot {what} {}: {source}", path.display())]
     Io {
-        /// What was tried: `read`, `write`, `make`.
+        /// Attempted operation: `read`, `write` or `create`.
         what: &'static str,
-        /// The file or folder.
+        /// Path of the file or folder.
         path: PathBuf,
-        /// Why.
+        /// Error of the operating system.
         source: io::Error,
     },
 }
@@ -69,35 +69,34 @@ impl DataSetError {
         Self::Io { what, path: path.into(), source }
     }
 
-    /// What to do.
+    /// Suggested remedy for the user.
     #[must_use]
     pub fn help(&self) -> String {
         match self {
             Self::Strange { .. } | Self::OtherSet { .. } => {
-                "give an empty or a new folder; one set, one folder".to_owned()
+                "choose an empty or a new folder: each set needs its own folder".to_owned()
             }
             Self::Foreign { .. } => {
-                "give another folder, or remove that shard: it is made anew".to_owned()
+                "choose another folder, or remove that shard to regenerate it".to_owned()
             }
-            Self::NotWhole { .. } => "remove that folder: the shard is made anew".to_owned(),
+            Self::NotWhole { .. } => "remove that folder to regenerate the shard".to_owned(),
             Self::Specification(error) => error.help.clone(),
             Self::Shard { error: ShardError::DoesNotFit { .. }, .. } => {
-                "mend the specification: the same is drawn each time".to_owned()
+                "correct the specification: a retry draws the same values".to_owned()
             }
             Self::Shard { error: ShardError::Model { .. }, .. } => {
-                "mend the specification, its sections [model], [sensor] and [heights]".to_owned()
+                "correct the specification in [model], [sensor] or [heights]".to_owned()
             }
-            Self::Shard { error: ShardError::Number { .. }, .. } => {
-                "give numbers from 1 on".to_owned()
-            }
+            Self::Shard { error: ShardError::Number { .. }, .. } => "use numbers from 1".to_owned(),
             Self::Shard { error: ShardError::Write(_), .. } | Self::Io { .. } => {
-                "check free space and permissions; begin again: shards that are there stay"
+                "check free space and permissions, then run the command again: existing shards are \
+                 kept"
                     .to_owned()
             }
         }
     }
 
-    /// The refusal of the disk behind it, if that is what it is.
+    /// Returns the error of the operating system, if that is the cause.
     #[must_use]
     pub const fn of_disk(&self) -> Option<&io::Error> {
         match self {

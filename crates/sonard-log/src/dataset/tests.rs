@@ -31,7 +31,7 @@ fn names(root: &Path) -> Vec<String> {
 }
 
 #[test]
-fn a_set_is_made_once_and_sealed_when_it_is_whole() {
+fn generates_and_seals_a_set() {
     let folder = tempfile::tempdir().expect("a folder");
     let root = folder.path().join("set");
     let generator = generator(SPEC);
@@ -52,10 +52,10 @@ fn a_set_is_made_once_and_sealed_when_it_is_whole() {
         names(&root),
         ["README.md", "manifest.json", "shard-00001", "shard-00002", "shard-00003", "spec.json"]
     );
-    // As readable as what else is written there.
+    // Folders are readable like files.
     let mode = |path: &str| fs::metadata(root.join(path)).expect("there").permissions().mode();
     assert_eq!(mode("shard-00001") & 0o444, mode("spec.json") & 0o444);
-    // By another process in another order it is the same set.
+    // Another process and another order produce the same set.
     let other_root = folder.path().join("other");
     let specification = DataSet::specification(&root).expect("as it was written");
     let other = DataSet::open(&other_root, &specification).expect("a new folder");
@@ -65,18 +65,18 @@ fn a_set_is_made_once_and_sealed_when_it_is_whole() {
     assert_eq!(other.seal().expect("writable"), Some(manifest));
     let text = |root: &Path| fs::read_to_string(root.join(MANIFEST)).expect("there");
     assert_eq!(text(&root), text(&other_root));
-    // A card that somebody wrote on stays.
+    // An edited card is kept.
     fs::write(root.join(CARD), "mine").expect("writable");
     set.seal().expect("writable");
     assert_eq!(fs::read_to_string(root.join(CARD)).expect("there"), "mine");
 }
 
 #[test]
-fn what_a_killed_process_left_is_no_shard_and_goes_when_the_shard_is_there() {
+fn removes_stale_drafts() {
     let folder = tempfile::tempdir().expect("a folder");
     let generator = generator(SPEC);
     let set = DataSet::open(folder.path(), &generator).expect("an empty folder");
-    // Cut off in the middle of a table, and just before the rename.
+    // Killed within a table, and just before the rename.
     let whole = set.draft(1, &|_| {}).expect("made");
     let (cut, last) =
         (folder.path().join(".shard-00001.a.draft"), folder.path().join(".shard-00001.b.draft"));
@@ -87,17 +87,17 @@ fn what_a_killed_process_left_is_no_shard_and_goes_when_the_shard_is_there() {
         fs::copy(whole.path().join(&name), last.join(&name)).expect("writable");
     }
     assert_eq!(set.missing().expect("readable"), [1, 2, 3]);
-    // Another process that is still at it keeps its own; who comes second does not mind.
+    // The draft of a running process is kept.
     assert_eq!(set.make(1, &|_| {}).expect("made"), Outcome::Made);
     assert!(!cut.exists() && !last.exists());
     assert!(whole.path().exists());
-    let late = whole.take_place(&folder.path().join("shard-00001"));
-    assert!(late.is_err(), "a shard's place is taken once");
+    let late = whole.rename_to(&folder.path().join("shard-00001"));
+    assert!(late.is_err(), "an existing shard was replaced");
     assert_eq!(set.check_digests(1), [] as [&str; 0]);
 }
 
 #[test]
-fn another_sets_folder_and_shards_are_refused_in_words() {
+fn rejects_foreign_files() {
     let folder = tempfile::tempdir().expect("a folder");
     let (own, other) = (generator(SPEC), generator(&SPEC.replace("poses = 3", "poses = 2")));
     let set = DataSet::open(folder.path(), &own).expect("an empty folder");
@@ -105,7 +105,7 @@ fn another_sets_folder_and_shards_are_refused_in_words() {
     let error = DataSet::open(folder.path(), &other).expect_err("another set's");
     assert!(error.to_string().contains("of another specification"), "{error}");
     assert!(error.help().contains("new folder"));
-    // A shard that was copied from elsewhere.
+    // Shard copied from another set.
     let elsewhere = tempfile::tempdir().expect("a folder");
     DataSet::open(elsewhere.path(), &other).expect("empty").make(2, &|_| {}).expect("made");
     fs::rename(elsewhere.path().join("shard-00002"), folder.path().join("shard-00002"))
@@ -120,15 +120,15 @@ fn another_sets_folder_and_shards_are_refused_in_words() {
     let text = fs::read_to_string(&facts).expect("there");
     fs::write(&facts, text.replace("\"drawing\": ", "\"drawing\": 9")).expect("writable");
     let error = set.make(3, &|_| {}).expect_err("older").to_string();
-    assert!(error.contains("the readings may differ"), "{error}");
-    // A folder of something else.
+    assert!(error.contains("readings may differ"), "{error}");
+    // Folder with other files.
     let error =
         DataSet::open(folder.path().join("shard-00003").as_path(), &own).expect_err("strange");
     assert!(matches!(error, DataSetError::Strange { .. }), "{error}");
 }
 
 #[test]
-fn what_was_damaged_or_is_missing_is_told() {
+fn reports_damage() {
     let folder = tempfile::tempdir().expect("a folder");
     let generator = generator(SPEC);
     let set = DataSet::open(folder.path(), &generator).expect("an empty folder");
@@ -139,7 +139,7 @@ fn what_was_damaged_or_is_missing_is_told() {
     assert_eq!(set.check_again(2, &|_| {}).expect("drawn"), [] as [&str; 0]);
     let readings = folder.path().join("shard-00002/readings.parquet");
     let whole = fs::read(&readings).expect("there");
-    // A bit in the middle, by which the file has the size that it had.
+    // A flipped bit, which keeps the size.
     let mut flipped = whole.clone();
     flipped[whole.len() / 2] ^= 1;
     fs::write(&readings, &flipped).expect("writable");
@@ -155,26 +155,23 @@ fn what_was_damaged_or_is_missing_is_told() {
     assert!(matches!(set.make(2, &|_| {}), Err(DataSetError::NotWhole { .. })));
     fs::remove_dir_all(folder.path().join("shard-00002")).expect("writable");
     assert_eq!(set.check_digests(2), ["shard-00002 is missing"]);
-    set.make(2, &|_| {}).expect("made anew");
-    // Digests that were made to fit what somebody changed.
+    set.make(2, &|_| {}).expect("made");
+    // Digests adapted to a changed file.
     let facts = folder.path().join("shard-00001").join(FACTS);
     let scenes = folder.path().join("shard-00001/scenes.parquet");
     let other = fs::read(folder.path().join("shard-00003/scenes.parquet")).expect("there");
     fs::write(&scenes, &other).expect("writable");
-    let (bytes, sha256) = digest(&scenes).expect("there");
-    let mut told: serde_json::Value =
+    let (bytes, sha256) = sync_and_digest(&scenes).expect("there");
+    let mut facts_json: serde_json::Value =
         serde_json::from_str(&fs::read_to_string(&facts).expect("there")).expect("JSON");
-    told["files"]["scenes.parquet"]["bytes"] = bytes.into();
-    told["files"]["scenes.parquet"]["sha256"] = sha256.into();
-    fs::write(&facts, told.to_string()).expect("writable");
+    facts_json["files"]["scenes.parquet"]["bytes"] = bytes.into();
+    facts_json["files"]["scenes.parquet"]["sha256"] = sha256.into();
+    fs::write(&facts, facts_json.to_string()).expect("writable");
     assert_eq!(set.check_digests(1), [] as [&str; 0]);
-    assert_eq!(
-        set.check_manifest().expect("readable"),
-        ["manifest.json: it does not say what the shards say"]
-    );
+    assert_eq!(set.check_manifest().expect("readable"), ["manifest.json: differs from the shards"]);
     let problems = set.check_again(1, &|_| {}).expect("drawn");
-    assert_eq!(problems, ["shard-00001/scenes.parquet: drawn anew it is another one"]);
+    assert_eq!(problems, ["shard-00001/scenes.parquet: differs from the regenerated file"]);
     fs::write(folder.path().join("notes.txt"), "mine").expect("writable");
     let problems = set.check_manifest().expect("readable");
-    assert!(problems.contains(&"notes.txt: it is no part of the set".to_owned()), "{problems:?}");
+    assert!(problems.contains(&"notes.txt: not part of the set".to_owned()), "{problems:?}");
 }

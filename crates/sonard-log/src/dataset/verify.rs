@@ -1,4 +1,4 @@
-//! Whether a set is what it says.
+//! Verification of a data set.
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -10,41 +10,48 @@ use std::{
 use sha2::{Digest as _, Sha256};
 use sonard_generate::{ShardFacts, Table};
 
-use super::{CARD, DataSet, DataSetError, MANIFEST, SPECIFICATION, digest, name, visible};
+use super::{
+    CARD, DataSet, DataSetError, MANIFEST, SPECIFICATION, shard_name, sync_and_digest,
+    visible_names,
+};
 use crate::hexadecimal;
 
 impl DataSet<'_> {
-    /// Holds a shard that is there against the digests that it names; what is wrong, in words.
+    /// Compares the files of a shard with its recorded digests; returns a message per problem.
     ///
     /// # Errors
-    /// None: what can't be read is what is wrong.
+    /// Unreadable files are reported as problems.
     #[must_use]
     pub fn check_digests(&self, shard: u32) -> Vec<String> {
         let facts = match self.facts(shard) {
             Ok(Some(facts)) => facts,
-            Ok(None) => return vec![format!("{} is missing", name(shard))],
+            Ok(None) => return vec![format!("{} is missing", shard_name(shard))],
             Err(error) => return vec![error.to_string()],
         };
-        let place = self.place(shard);
-        let differs = |(file, known): (&String, &sonard_generate::FileFacts)| {
-            let shown = format!("{}/{file}", name(shard));
-            match digest(&place.join(file)) {
+        let folder = self.shard_path(shard);
+        let difference = |(file, known): (&String, &sonard_generate::FileFacts)| {
+            let shown = format!("{}/{file}", shard_name(shard));
+            match sync_and_digest(&folder.join(file)) {
                 Err(error) => Some(format!("{shown}: {error}")),
                 Ok((_, found)) if found != known.sha256 => {
-                    Some(format!("{shown}: its SHA-256 is not the one in shard.json"))
+                    Some(format!("{shown}: its SHA-256 differs from shard.json"))
                 }
                 Ok(_) => None,
             }
         };
-        facts.files.iter().filter_map(differs).collect()
+        facts.files.iter().filter_map(difference).collect()
     }
 
-    /// Draws a shard that is there anew and holds the digests against each other; what is wrong, in words. `told`
-    /// as for [`make`](Self::make).
+    /// Regenerates an existing shard and compares the digests; returns a message per problem.
+    /// `progress` is called as by [`make`](Self::make).
     ///
     /// # Errors
-    /// When it can't be drawn.
-    pub fn check_again(&self, shard: u32, told: &dyn Fn(u64)) -> Result<Vec<String>, DataSetError> {
+    /// Returns an error if the shard cannot be generated.
+    pub fn check_again(
+        &self,
+        shard: u32,
+        progress: &dyn Fn(u64),
+    ) -> Result<Vec<String>, DataSetError> {
         let Some(facts) = self.facts(shard)? else { return Ok(Vec::new()) };
         let mut hashes: BTreeMap<Table, Hasher> = BTreeMap::new();
         let mut create = |table| -> io::Result<Box<dyn Write + Send>> {
@@ -52,36 +59,37 @@ impl DataSet<'_> {
         };
         let made = self
             .generator
-            .shard(shard, &mut create, told)
+            .shard(shard, &mut create, progress)
             .map_err(|error| DataSetError::Shard { shard, error })?;
-        let files = hashes.iter().map(|(table, hash)| (*table, hash.sealed())).collect();
-        let again = ShardFacts::new(self.generator, shard, &made, &files);
-        let differs = |(file, anew): (&String, &sonard_generate::FileFacts)| {
-            let is_same = facts.files.get(file) == Some(anew);
-            (!is_same).then(|| format!("{}/{file}: drawn anew it is another one", name(shard)))
+        let files = hashes.iter().map(|(table, hash)| (*table, hash.digest())).collect();
+        let regenerated = ShardFacts::new(self.generator, shard, &made, &files);
+        let difference = |(file, expected): (&String, &sonard_generate::FileFacts)| {
+            let is_same = facts.files.get(file) == Some(expected);
+            (!is_same)
+                .then(|| format!("{}/{file}: differs from the regenerated file", shard_name(shard)))
         };
-        Ok(again.files.iter().filter_map(differs).collect())
+        Ok(regenerated.files.iter().filter_map(difference).collect())
     }
 
-    /// What is wrong with the set as a whole, in words: its manifest, and what does not belong there.
+    /// Checks the manifest and looks for foreign files; returns a message per problem.
     ///
     /// # Errors
-    /// When the folder can't be read.
+    /// Returns an error if the folder cannot be read.
     pub fn check_manifest(&self) -> Result<Vec<String>, DataSetError> {
         let mut problems = Vec::new();
-        let known: BTreeSet<String> = self.shards().map(name).collect();
-        for found in visible(&self.root)? {
+        let known: BTreeSet<String> = self.shards().map(shard_name).collect();
+        for found in visible_names(&self.root)? {
             let belongs = [SPECIFICATION, MANIFEST, CARD].contains(&&*found);
             if !belongs && !known.contains(&found) {
-                problems.push(format!("{found}: it is no part of the set"));
+                problems.push(format!("{found}: not part of the set"));
             }
         }
-        // A shard that is not as it should be is told by itself.
+        // Damaged shards are reported by `check_digests`.
         let Ok(manifest) = self.manifest() else { return Ok(problems) };
         let written = fs::read_to_string(self.root.join(MANIFEST)).ok();
         match (manifest, written) {
             (Some(manifest), Some(written)) if written != manifest.to_text() => {
-                problems.push(format!("{MANIFEST}: it does not say what the shards say"));
+                problems.push(format!("{MANIFEST}: differs from the shards"));
             }
             (Some(_), None) => problems.push(format!("{MANIFEST} is missing")),
             _ => {}
@@ -90,12 +98,12 @@ impl DataSet<'_> {
     }
 }
 
-/// Takes a table for its digest alone.
+/// Output that only computes size and digest.
 #[derive(Debug, Clone, Default)]
 struct Hasher(Arc<Mutex<(u64, Sha256)>>);
 
 impl Hasher {
-    fn sealed(&self) -> (u64, String) {
+    fn digest(&self) -> (u64, String) {
         let held = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         (held.0, hexadecimal(&held.1.clone().finalize()))
     }

@@ -1,4 +1,4 @@
-//! Replacement of a log that can't be continued: its sync failed, or it is no longer the file that its path names.
+//! Replacement of a log that cannot be continued: its sync failed, or its path names another file.
 
 use std::fs;
 
@@ -8,28 +8,28 @@ use sonard_records::{Event, EventKind, Record, decode_line};
 use super::{LogFolder, LogWriter};
 use crate::{Displacement, StoreError};
 
-/// Longest part of a scan that is carried over from a removed file, bytes.
+/// Maximum size of a scan's records that are copied from a removed file, bytes.
 const MAX_CARRIED_BYTES: u64 = 64 << 20;
 
-/// A file to be begun in place of one that can't be continued.
+/// Contents of the file that replaces the current one.
 #[derive(Debug)]
 pub(super) struct Replacement {
-    /// Gaps that the new file reports as events.
+    /// Descriptions of gaps, written as events.
     gaps: Vec<String>,
-    /// Lines of the scan under way that only the removed file has.
+    /// Lines of the current scan, copied from a removed file.
     carried: Vec<u8>,
 }
 
 impl LogFolder {
-    /// Compares the open file with the one that its path names, and begins a new one if they differ. A scan that is under
-    /// way is finished in a file that was moved, and carried over from a file that was removed. Call it every few
-    /// seconds; it costs two stat(2).
+    /// Compares the open file with the file at its path and starts a new one if they differ. The
+    /// current scan is finished in a moved file, and copied from a removed one. To be called every
+    /// few seconds; the cost is two stat(2).
     ///
     /// # Errors
-    /// When the new file can't be written; it is tried again with the next call or record.
+    /// Returns an error if the new file cannot be written; retried with the next call or record.
     pub fn inspect(&mut self, now: Timestamp) -> Result<(), StoreError> {
         let Some(writer) = &self.writer else { return Ok(()) };
-        // A path that can't be examined is no proof of a displacement.
+        // Ignores paths that cannot be examined.
         let Ok(Some(displacement)) = writer.displacement() else { return Ok(()) };
         let detail = format!("{} {displacement}", self.file_name());
         match (displacement, &self.scan) {
@@ -42,14 +42,14 @@ impl LogFolder {
             }
             (Displacement::Moved, None) => {
                 let synced = self.writer.as_mut().map_or(Ok(()), LogWriter::sync);
-                self.survive(synced).ok();
+                self.handle_failure(synced).ok();
                 self.replace(detail, Vec::new());
                 self.writer(now).map(drop)
             }
             (Displacement::Removed, Some((offset, _)))
                 if writer.length().saturating_sub(*offset) <= MAX_CARRIED_BYTES =>
             {
-                // What can't be read back is a part of the gap.
+                // Unreadable records become part of the gap.
                 let carried = writer.read_from(*offset).unwrap_or_default();
                 self.replace(detail, carried);
                 self.writer(now).map(drop)
@@ -61,17 +61,17 @@ impl LogFolder {
         }
     }
 
-    /// Report of a log that had to be replaced, since the last call.
+    /// Returns the description of a replacement since the last call.
     pub fn take_incident(&mut self) -> Option<String> {
         self.incident.take()
     }
 
-    /// Name of the log that is being written.
+    /// File name of the current log.
     pub(super) fn file_name(&self) -> String {
         self.path.file_name().unwrap_or_default().to_string_lossy().into_owned()
     }
 
-    /// Closes the file for good; the next record begins another one with an event about the gap.
+    /// Closes the file; the next record starts a new one with an event about the gap.
     pub(super) fn replace(&mut self, gap: String, carried: Vec<u8>) {
         if let Some(writer) = &self.writer {
             self.uncertain += writer.appended() - writer.synced();
@@ -85,8 +85,8 @@ impl LogFolder {
         }
     }
 
-    /// Begins the file that replaces the last one: the session in force, the scan under way, the gaps. Nothing is left
-    /// of a file that could not be begun.
+    /// Creates the replacement with the current session, the current scan and the gaps. On failure
+    /// the new file is removed.
     pub(super) fn begin_replacement(&mut self, now: Timestamp) -> Result<(), StoreError> {
         let fail = |source| StoreError::Open { path: self.folder.clone(), source };
         fs::create_dir_all(&self.folder).map_err(fail)?;
@@ -98,18 +98,18 @@ impl LogFolder {
                 if let (Some(offset), Some((at, _))) = (offset, &mut self.scan) {
                     *at = offset;
                 }
-                self.fresh = self.scan.is_none();
-                self.bare = self.session.is_none();
+                self.has_no_scan = self.scan.is_none();
+                self.lacks_session = self.session.is_none();
                 self.replacement = None;
                 self.writer = Some(writer);
                 Ok(())
             }
             Err(error) => {
                 drop(writer);
-                // It holds nothing that is not written again.
+                // All its records are written again by the next attempt.
                 let _ = fs::remove_file(&self.path);
                 Err(match error {
-                    // The record that is to follow is in no log, other than after a failed sync of its own.
+                    // The following record is not in any log; `Sync` would indicate the opposite.
                     StoreError::Sync { path, source, .. } => StoreError::Write { path, source },
                     error => error,
                 })
@@ -117,7 +117,7 @@ impl LogFolder {
         }
     }
 
-    /// Writes and syncs the first records; returns the offset of the scan under way, bytes.
+    /// Writes and syncs the first records; returns the offset of the current scan, bytes.
     fn write_beginning(
         &self,
         writer: &mut LogWriter,

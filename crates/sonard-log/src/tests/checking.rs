@@ -1,9 +1,9 @@
-//! What a check of a whole log finds.
+//! Findings of the log check.
 
 use super::*;
 use crate::{FindingKind, Severity, Totals, check};
 
-/// The lines and kinds of what is found: problems first, then warnings.
+/// Line and kind of each finding.
 type Found = Vec<(u64, FindingKind)>;
 
 fn found(log: &str) -> (Found, Found, Totals) {
@@ -18,7 +18,7 @@ fn found(log: &str) -> (Found, Found, Totals) {
     (problems, warnings, totals)
 }
 
-/// The fixture with one line changed: `None` leaves it out.
+/// Changes one line of the fixture; `None` removes the line.
 fn with_line(number: usize, change: impl Fn(&str) -> Option<String>) -> String {
     let lines = LOG
         .lines()
@@ -43,7 +43,7 @@ fn the_fixture_is_clean() {
 }
 
 #[test]
-fn each_problem_is_found_on_its_line() {
+fn line_of_each_problem() {
     use FindingKind::*;
     let second = LOG.replace("5a0e7f5e", "6b1f8a6f");
     let without_end = with_line(10, |_| None);
@@ -92,25 +92,25 @@ fn each_problem_is_found_on_its_line() {
 }
 
 #[test]
-fn what_may_well_be_is_a_warning() {
+fn warnings() {
     use FindingKind::*;
-    // Running, or cut off and repaired.
+    // Running scan, or truncated and repaired log.
     let running: String = LOG.lines().take(6).map(|line| format!("{line}\n")).collect();
     assert_eq!(found(&running).0, []);
     assert_eq!(found(&running).1, [(6, NotEnded)]);
-    // An event says why the scan has no end.
+    // An event explains the missing end.
     let second = LOG.replace("5a0e7f5e", "6b1f8a6f");
     let stopped = with_line(10, |_| None) + &second;
     assert_eq!((found(&stopped).0, found(&stopped).1[0]), (vec![], (11, NotEnded)));
     let back = replaced(9, "\"time\":null", "\"time\":\"2026-11-21T13:00:00Z\"");
     assert_eq!((found(&back).0, found(&back).1), (vec![], vec![(9, TimeBackwards)]));
-    // Half a second is how far the host's clock and the device's fitted one may be apart.
+    // Half a second between the host's clock and the fitted device clock is tolerated.
     let apart = replaced(11, "14:00:01", "14:00:00");
     assert_eq!((found(&apart).0, found(&apart).1), (vec![], vec![]));
 }
 
 #[test]
-fn a_lost_reading_that_was_fetched_may_stand_twice() {
+fn repaired_reading_may_repeat() {
     let lost = LOG.lines().nth(8).expect("the lost one");
     let fetched = LOG.lines().nth(7).expect("a repaired one");
     let fetched = fetched.replace("\"index\":5", "\"index\":6").replace("4.5", "5.4");

@@ -1,4 +1,4 @@
-//! The writer on a disk that fails.
+//! Writer on a failing disk.
 
 use std::{
     io,
@@ -12,8 +12,7 @@ use sonard_records::{EventKind, encode_line};
 use super::*;
 use crate::{LogWriter, Medium, Recovered, StoreError};
 
-/// A file in memory with room for so many bytes, which may take each write in pieces and may be
-/// unable to give bytes back.
+/// File in memory with limited space, partial writes and optionally without truncation.
 #[derive(Debug, Default)]
 struct Disk {
     bytes: Vec<u8>,
@@ -68,11 +67,11 @@ fn lines(records: &[Record]) -> Vec<Vec<u8>> {
 }
 
 #[test]
-fn a_record_is_one_write_and_a_scan_end_a_sync() {
+fn writes_and_syncs_per_record() {
     let mut disk = disk();
     let mut writer = LogWriter::new(&mut disk, Path::new("log"));
     for record in records() {
-        writer.append(&record).expect("there is room");
+        writer.append(&record).expect("written");
     }
     assert_eq!((writer.appended(), writer.synced()), (11, 10));
     writer.close().expect("it syncs");
@@ -84,17 +83,17 @@ fn a_record_is_one_write_and_a_scan_end_a_sync() {
 }
 
 #[test]
-fn no_record_waits_longer_than_the_interval_while_others_follow() {
+fn sync_interval() {
     let (mut disk, record) = (disk(), &records()[2]);
     let begin = Instant::now();
     let mut writer =
         LogWriter::new(&mut disk, Path::new("log")).with_sync_interval(Duration::from_secs(1));
     let at = |ms| begin + Duration::from_millis(ms);
     for (ms, synced) in [(0, 0), (900, 0), (1000, 3), (1500, 3), (2400, 3), (2500, 6)] {
-        writer.append_at(record, at(ms)).expect("there is room");
+        writer.append_at(record, at(ms)).expect("written");
         assert_eq!(writer.synced(), synced, "after {ms} ms");
     }
-    writer.append_at(record, at(3000)).expect("there is room");
+    writer.append_at(record, at(3000)).expect("written");
     writer.sync_if_due(at(3999)).expect("nothing is due");
     assert_eq!(writer.synced(), 6);
     writer.sync_if_due(at(4000)).expect("it syncs");
@@ -102,7 +101,7 @@ fn no_record_waits_longer_than_the_interval_while_others_follow() {
 }
 
 #[test]
-fn after_a_failed_sync_the_log_takes_no_more() {
+fn failed_sync_is_final() {
     let mut disk = Disk { sync_fails: true, ..disk() };
     let mut writer = LogWriter::new(&mut disk, Path::new("far/log"));
     writer.append(&records()[0]).expect("no sync yet");
@@ -114,7 +113,7 @@ fn after_a_failed_sync_the_log_takes_no_more() {
 }
 
 #[test]
-fn a_bad_record_leaves_no_trace() {
+fn invalid_record_writes_nothing() {
     let mut disk = disk();
     let mut writer = LogWriter::new(&mut disk, Path::new("log"));
     let Record::Ping(mut ping) = records()[2].clone() else { panic!("the third is a ping") };
@@ -127,10 +126,10 @@ fn a_bad_record_leaves_no_trace() {
 }
 
 proptest! {
-    /// Wherever the disk is full and however it splits writes, the log holds whole records, all
-    /// that were said to be appended, and goes on when there is room again.
+    /// Full disk and partial writes: the log contains exactly the acknowledged records, and
+    /// accepts further ones once space is free.
     #[test]
-    fn a_full_disk_leaves_whole_records(room in 0..5000_usize, piece in 1..2000_usize) {
+    fn full_disk(room in 0..5000_usize, piece in 1..2000_usize) {
         let mut disk = Disk { room, piece, ..disk() };
         let mut appended = Vec::new();
         for record in records() {
@@ -149,10 +148,10 @@ proptest! {
         prop_assert!(disk.bytes.ends_with(&lines(&records())[0]));
     }
 
-    /// Where nothing can be taken back, at most one line is torn, the error says so, and opening
-    /// the log again keeps every record before it.
+    /// Without truncation at most one line is torn, with an error; reopening keeps all earlier
+    /// records.
     #[test]
-    fn what_cannot_be_taken_back_is_said(room in 0..5000_usize) {
+    fn full_disk_without_truncation(room in 0..5000_usize) {
         let mut disk = Disk { room, rigid: true, ..disk() };
         let mut writer = LogWriter::new(&mut disk, Path::new("log"));
         let (mut appended, mut torn) = (Vec::new(), false);
@@ -170,23 +169,23 @@ proptest! {
         prop_assert!(disk.bytes.starts_with(&whole));
         let (_folder, log) = fast_folder();
         written(&log, &disk.bytes);
-        drop(LogWriter::open(&log).expect("a torn line is mended"));
+        drop(LogWriter::open(&log).expect("repaired"));
         prop_assert!(read(&log).as_bytes().starts_with(&whole));
     }
 }
 
 #[test]
-fn a_full_device_is_named() {
+fn full_device() {
     let mut writer = LogWriter::open(Path::new("/dev/full")).expect("it opens");
     let error = writer.append(&records()[0]).expect_err("it is always full");
     assert!(matches!(&error, StoreError::Write { source, .. }
         if source.kind() == io::ErrorKind::StorageFull));
     assert!(error.to_string().contains("/dev/full"), "{error}");
-    assert!(error.help().contains("make room"), "{}", error.help());
+    assert!(error.help().contains("free space"), "{}", error.help());
 }
 
 #[test]
-fn two_writers_cannot_share_a_log() {
+fn lock_excludes_second_writer() {
     let (_folder, log) = folder();
     let first = LogWriter::open(&log).expect("it is created");
     let error = LogWriter::open(&log).expect_err("it is taken");
@@ -198,20 +197,20 @@ fn two_writers_cannot_share_a_log() {
 }
 
 #[test]
-fn a_log_is_continued_after_a_torn_line() {
+fn reopens_after_a_torn_line() {
     let (folder, log) = folder();
     for (cut, recovered) in [(0, false), (1, true), (LOG.len() - 30, true)] {
         written(&log, &LOG[..LOG.len() - cut]);
-        let mut writer = LogWriter::open(&log).expect("it is mended");
+        let mut writer = LogWriter::open(&log).expect("repaired");
         assert_eq!(writer.recovered().is_some(), recovered, "cut by {cut}");
-        writer.append(&records()[2]).expect("there is room");
+        writer.append(&records()[2]).expect("written");
         writer.close().expect("it syncs");
         let lines = read(&log);
         assert!(lines.as_bytes().ends_with(&super::faults::lines(&records())[2]), "cut by {cut}");
     }
-    // Cut by all but 30 bytes: those are kept, and the log says so.
+    // The 30 torn bytes are kept, and an event records them.
     assert_eq!(read(folder.path().join("scan.jsonl.torn-1")), LOG[..30]);
-    let loaded = crate::load(&log).expect("it is there");
+    let loaded = crate::load(&log).expect("exists");
     assert_eq!(loaded.damaged, []);
     let Record::Event(event) = &loaded.records[0] else { panic!("{:?}", loaded.records) };
     assert_eq!(event.kind, EventKind::Gap);
@@ -219,10 +218,10 @@ fn a_log_is_continued_after_a_torn_line() {
 }
 
 #[test]
-fn a_whole_record_that_lacks_its_newline_is_not_torn() {
+fn adds_a_missing_newline() {
     let (_folder, log) = folder();
     written(&log, LOG.trim_end());
-    let writer = LogWriter::open(&log).expect("it is mended");
+    let writer = LogWriter::open(&log).expect("repaired");
     assert_eq!(writer.recovered(), Some(&Recovered::Newline));
     assert_eq!(read(&log), LOG);
 }

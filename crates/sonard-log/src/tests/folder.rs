@@ -1,4 +1,4 @@
-//! Logs in a folder: rotation at session and scan boundaries, and going on after a crash.
+//! Folder of logs: rotation at session and scan boundaries, and recovery after a crash.
 
 use std::{fs, path::Path, time::Duration};
 
@@ -18,7 +18,7 @@ fn time(text: &str) -> Timestamp {
     text.parse().expect("a time")
 }
 
-/// The records of the fixture, as scan number `n`.
+/// Records of the fixture with scan number `n`.
 fn scan(n: u128) -> Vec<Record> {
     let id = Uuid::from_u128(n);
     let with_id = |line: &str| {
@@ -34,15 +34,15 @@ fn scan(n: u128) -> Vec<Record> {
     LOG.lines().map(with_id).collect()
 }
 
-fn put(log: &mut LogFolder, records: &[Record], now: Timestamp) {
-    records.iter().for_each(|record| log.append(record, now).expect("there is room"));
+fn append_all(log: &mut LogFolder, records: &[Record], now: Timestamp) {
+    records.iter().for_each(|record| log.append(record, now).expect("written"));
 }
 
 fn names(folder: &Path) -> Vec<String> {
     log_files(folder).expect("readable").into_iter().map(|file| file.name).collect()
 }
 
-/// Problems and warnings of every log.
+/// Counts the problems and warnings of all logs.
 fn faults(folder: &Path) -> (u64, u64) {
     let mut sum = (0, 0);
     for name in names(folder) {
@@ -54,14 +54,13 @@ fn faults(folder: &Path) -> (u64, u64) {
 }
 
 #[test]
-fn a_file_whose_beginning_failed_begins_with_the_session_all_the_same() {
+fn session_after_failed_rotation() {
     let root = tempfile::tempdir().expect("a folder");
     let (folder, away) = (root.path().join("log"), root.path().join("away"));
     let now = time("2026-03-01T10:00:00Z");
     let mut log = LogFolder::open(&folder, rotation(1), now).expect("opens");
-    put(&mut log, &scan(1), now);
-    // The next file can't be made: found by a thousand faults, one of them a disk that was full
-    // at just that moment.
+    append_all(&mut log, &scan(1), now);
+    // Creation of the next file fails, as on a full disk.
     fs::rename(&folder, &away).expect("renamed");
     fs::write(&folder, "no folder").expect("the name is free");
     let second = scan(2);
@@ -69,21 +68,21 @@ fn a_file_whose_beginning_failed_begins_with_the_session_all_the_same() {
     assert!(log.append(&second[1], tomorrow).is_err());
     fs::remove_file(&folder).expect("removed");
     fs::rename(&away, &folder).expect("renamed");
-    put(&mut log, &second[1..], tomorrow);
+    append_all(&mut log, &second[1..], tomorrow);
     log.close().expect("syncs");
-    // The event about the moved folder is of tomorrow, the fixture's records are not.
+    // The event about the moved folder is later than the fixture's records.
     assert_eq!((names(&folder).len(), faults(&folder)), (2, (0, 1)));
 }
 
 #[test]
-fn each_file_begins_with_a_session_and_holds_whole_scans() {
+fn rotation_between_scans() {
     let folder = tempfile::tempdir().expect("a folder");
     let now = time("2026-03-01T10:00:00Z");
     let mut log = LogFolder::open(folder.path(), rotation(1), now).expect("opens");
-    put(&mut log, &scan(1), now);
-    // The next scan comes without a session of its own: the file repeats the one in force.
-    put(&mut log, &scan(2)[1..], now);
-    put(&mut log, &scan(3)[1..], now);
+    append_all(&mut log, &scan(1), now);
+    // The next scan has no session of its own: the new file repeats the current one.
+    append_all(&mut log, &scan(2)[1..], now);
+    append_all(&mut log, &scan(3)[1..], now);
     log.close().expect("syncs");
     let names = names(folder.path());
     assert_eq!(names.len(), 3, "{names:?}");
@@ -97,14 +96,14 @@ fn each_file_begins_with_a_session_and_holds_whole_scans() {
 }
 
 #[test]
-fn a_new_day_begins_a_new_file_and_a_clock_set_back_does_not_mix_the_order() {
+fn daily_rotation() {
     let folder = tempfile::tempdir().expect("a folder");
     let day1 = time("2026-03-01T23:59:59Z");
     let mut log = LogFolder::open(folder.path(), rotation(1 << 20), day1).expect("opens");
-    put(&mut log, &scan(1), day1);
-    put(&mut log, &scan(2)[1..], time("2026-03-02T00:00:01Z"));
-    put(&mut log, &scan(3)[1..], time("2026-03-02T12:00:00Z"));
-    put(&mut log, &scan(4)[1..], time("2026-02-27T12:00:00Z"));
+    append_all(&mut log, &scan(1), day1);
+    append_all(&mut log, &scan(2)[1..], time("2026-03-02T00:00:01Z"));
+    append_all(&mut log, &scan(3)[1..], time("2026-03-02T12:00:00Z"));
+    append_all(&mut log, &scan(4)[1..], time("2026-02-27T12:00:00Z"));
     assert_eq!(
         names(folder.path()),
         [
@@ -117,34 +116,34 @@ fn a_new_day_begins_a_new_file_and_a_clock_set_back_does_not_mix_the_order() {
 }
 
 #[test]
-fn after_a_crash_the_same_log_goes_on_and_says_what_happened() {
+fn continues_after_a_crash() {
     let folder = tempfile::tempdir().expect("a folder");
     let now = time("2026-03-01T10:00:00Z");
     let mut log = LogFolder::open(folder.path(), rotation(1 << 20), now).expect("opens");
-    put(&mut log, &scan(1)[..4], now);
+    append_all(&mut log, &scan(1)[..4], now);
     let path = log.path().to_path_buf();
     drop(log);
     let whole = fs::read(&path).expect("readable");
     fs::write(&path, &whole[..whole.len() - 20]).expect("a power cut");
 
     let mut log = LogFolder::open(folder.path(), rotation(1 << 20), now).expect("opens");
-    put(&mut log, &scan(2), now);
+    append_all(&mut log, &scan(2), now);
     log.close().expect("syncs");
     assert_eq!(names(folder.path()).len(), 1);
-    assert_eq!(faults(folder.path()).0, 0, "the break is explained");
+    assert_eq!(faults(folder.path()).0, 0, "an event explains the gap");
     let text = fs::read_to_string(&path).expect("readable");
-    assert!(text.contains("the program ended within the scan"), "{text}");
+    assert!(text.contains("the program ended within the previous scan"), "{text}");
 }
 
 #[test]
-fn the_oldest_go_when_there_is_a_limit() {
+fn removes_the_oldest_logs() {
     let folder = tempfile::tempdir().expect("a folder");
     let now = time("2026-03-01T10:00:00Z");
     let bytes = LOG.len() as u64;
     let limits = Rotation { keep_bytes: 3 * bytes, ..rotation(1) };
     let mut log = LogFolder::open(folder.path(), limits, now).expect("opens");
     for n in 1..=10 {
-        put(&mut log, &scan(n)[usize::from(n > 1)..], now);
+        append_all(&mut log, &scan(n)[usize::from(n > 1)..], now);
     }
     let files = log_files(folder.path()).expect("readable");
     let total: u64 = files.iter().map(|file| file.bytes).sum();
@@ -154,13 +153,13 @@ fn the_oldest_go_when_there_is_a_limit() {
 }
 
 #[test]
-fn a_log_of_another_format_is_not_continued() {
+fn does_not_continue_other_format() {
     let folder = tempfile::tempdir().expect("a folder");
     let now = time("2026-03-01T10:00:00Z");
     let other = LOG.replacen("\"format\":1", "\"format\":2", 1);
     fs::write(folder.path().join("sonard-20260301T100000Z.jsonl"), &other).expect("written");
     let mut log = LogFolder::open(folder.path(), rotation(1 << 20), now).expect("opens");
-    put(&mut log, &scan(1), now);
+    append_all(&mut log, &scan(1), now);
     log.close().expect("syncs");
     let [first, second] = &names(folder.path())[..] else { panic!("two logs") };
     assert_eq!(fs::read_to_string(folder.path().join(first)).expect("readable"), other);

@@ -1,4 +1,4 @@
-//! Another format at the seam of those that write records.
+//! Output formats behind the [`RecordWriter`] interface.
 
 use std::{fmt::Write as _, fs, path::PathBuf};
 
@@ -7,7 +7,7 @@ use sonard_records::{Record, decode_line};
 
 use crate::{LogWriter, Pipe, RecordWriter, StoreError};
 
-/// Azimuths and ranges, one a line.
+/// Table of azimuths and ranges, one reading per line.
 struct Table {
     path: PathBuf,
     text: String,
@@ -27,16 +27,16 @@ impl RecordWriter for Table {
     }
 }
 
-/// Whoever has records knows nothing of what they become.
+/// Writes the fixture with any writer.
 fn write_all(mut writer: Box<dyn RecordWriter>) {
     for record in records() {
-        writer.write(&record).expect("there is room");
+        writer.write(&record).expect("written");
     }
-    writer.finish().expect("there is room");
+    writer.finish().expect("written");
 }
 
 #[test]
-fn records_are_written_in_a_format_that_their_source_does_not_know() {
+fn two_formats_from_one_source() {
     let (folder, log) = folder();
     let table = folder.path().join("table.csv");
     let file = fs::File::create(&log).expect("it is new");

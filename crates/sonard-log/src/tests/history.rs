@@ -1,4 +1,4 @@
-//! Scans found in a folder of logs that grows, rotates and is repaired.
+//! Index of a folder of logs that grows, rotates and is repaired.
 
 use std::{fs, io::Write as _, path::Path};
 
@@ -7,12 +7,12 @@ use uuid::Uuid;
 use super::{LOG, folder};
 use crate::{History, Passage, PastScan};
 
-/// The fixture's lines with another scan id.
+/// Lines of the fixture with scan number `n`.
 fn scan(n: u128) -> String {
     LOG.replace("5a0e7f5e-3c1d-4f5b-9d57-0c7c3d0a1b2c", &Uuid::from_u128(n).to_string())
 }
 
-/// Without session, trailing event and the end of the scan.
+/// First lines of a scan, without session, end and trailing event.
 fn begun(n: u128) -> String {
     scan(n).lines().skip(1).take(4).map(|line| format!("{line}\n")).collect()
 }
@@ -20,7 +20,7 @@ fn begun(n: u128) -> String {
 fn append(folder: &Path, log: &str, text: &str) {
     let mut file =
         fs::OpenOptions::new().create(true).append(true).open(folder.join(log)).expect("a log");
-    file.write_all(text.as_bytes()).expect("there is room");
+    file.write_all(text.as_bytes()).expect("written");
 }
 
 fn ids(scans: &[PastScan]) -> Vec<u128> {
@@ -32,7 +32,7 @@ fn readings(passage: &Passage) -> usize {
 }
 
 #[test]
-fn the_newest_scans_come_first_from_several_logs_while_they_grow() {
+fn newest_first_in_growing_logs() {
     let (folder, _) = folder();
     let folder = folder.path();
     let mut history = History::new(folder.into());
@@ -42,15 +42,15 @@ fn the_newest_scans_come_first_from_several_logs_while_they_grow() {
     append(folder, "notes.jsonl", &scan(9));
     assert_eq!(ids(&history.newest(5).expect("readable")), [3, 2, 1]);
     assert_eq!(ids(&history.newest(2).expect("readable")), [3, 2]);
-    let mut before = |scan, most| {
-        let listed = history.before(Uuid::from_u128(scan), most).expect("readable");
+    let mut before = |scan, max| {
+        let listed = history.before(Uuid::from_u128(scan), max).expect("readable");
         listed.map(|scans| ids(&scans))
     };
     assert_eq!(before(3, 5), Some(vec![2, 1]));
     assert_eq!(before(3, 1), Some(vec![2]));
     assert_eq!(before(1, 5), Some(vec![]));
     assert_eq!(before(9, 5), None);
-    // A scan under way is there with what it has, a line that is still being written is not.
+    // A running scan is listed; its incomplete last line is not.
     let begun = begun(4);
     let (whole, torn) = begun.split_at(begun.len() - 10);
     append(folder, "sonard-20261121T000000Z.jsonl", whole);
@@ -69,7 +69,7 @@ fn the_newest_scans_come_first_from_several_logs_while_they_grow() {
 }
 
 #[test]
-fn what_was_removed_or_repaired_is_not_shown_from_memory() {
+fn removed_and_repaired_logs() {
     let (folder, _) = folder();
     let folder = folder.path();
     let (old, new) = ("sonard-20261120T000000Z.jsonl", "sonard-20261121T000000Z.jsonl");
@@ -77,25 +77,25 @@ fn what_was_removed_or_repaired_is_not_shown_from_memory() {
     append(folder, new, &(scan(2) + &scan(3)));
     let mut history = History::new(folder.into());
     assert_eq!(ids(&history.newest(5).expect("readable")), [3, 2, 1]);
-    fs::remove_file(folder.join(old)).expect("it is there");
-    fs::write(folder.join(new), scan(2)).expect("there is room");
+    fs::remove_file(folder.join(old)).expect("exists");
+    fs::write(folder.join(new), scan(2)).expect("written");
     assert_eq!(ids(&history.newest(5).expect("readable")), [2]);
     assert!(history.passage(Uuid::from_u128(3)).expect("readable").is_none());
 }
 
 #[test]
-fn damaged_and_endless_lines_do_not_hide_the_scans_around_them() {
+fn damaged_and_overlong_lines() {
     let (folder, _) = folder();
     let folder = folder.path();
     let noise = format!("{{\"type\":\"scan_start\",\n{}\n\n", "x".repeat(3 << 20));
     append(folder, "sonard-20261121T000000Z.jsonl", &(scan(1) + &noise + &scan(2)));
     let mut history = History::new(folder.into());
     assert_eq!(ids(&history.newest(5).expect("readable")), [2, 1]);
-    let passage = history.passage(Uuid::from_u128(2)).expect("readable").expect("it is there");
+    let passage = history.passage(Uuid::from_u128(2)).expect("readable").expect("exists");
     assert_eq!(readings(&passage), 7);
-    // Both kinds of lines are all of it, and a beam is found among them.
+    // Readings and other lines together are complete.
     let others = passage.lines(false).expect("readable").count();
-    assert_eq!(others + 7, scan(2).lines().count() - 2, "without session and the event behind it");
+    assert_eq!(others + 7, scan(2).lines().count() - 2, "without session and trailing event");
     let (ping, highest) = passage.beam(3).expect("readable");
     assert_eq!((ping.map(|ping| ping.index), highest), (Some(3), Some(6)));
     assert_eq!(passage.beam(7).expect("readable"), (None, Some(6)));

@@ -1,4 +1,4 @@
-//! The reader on damaged files.
+//! Reading of damaged files.
 
 use std::io::{self, BufRead, BufReader, Read};
 
@@ -18,7 +18,7 @@ fn faults(bytes: &[u8]) -> Vec<(u64, FaultKind)> {
 }
 
 #[test]
-fn every_line_is_there_with_its_place() {
+fn number_and_offset_of_lines() {
     let lines = lines(LOG.as_bytes());
     assert_eq!(lines.len(), 11);
     for line in &lines {
@@ -34,7 +34,7 @@ fn every_line_is_there_with_its_place() {
 }
 
 #[test]
-fn damage_costs_its_own_line_only() {
+fn damage_affects_single_lines() {
     let session = LOG.lines().next().expect("a session");
     let end = LOG.lines().nth(9).expect("an end");
     let log = format!("{session}\nrubbish\n\n{end}\n\0\0\0\n{{\"type\":\"pong\"}}\n{end}\n{{\"ty");
@@ -52,17 +52,17 @@ fn damage_costs_its_own_line_only() {
 }
 
 #[test]
-fn windows_line_ends_and_a_byte_order_mark_are_read() {
+fn windows_line_ends_and_bom() {
     let windows = format!("\u{feff}{}", LOG.replace('\n', "\r\n"));
     assert_eq!(faults(windows.as_bytes()), []);
-    // In the middle it is damage.
+    // Within the file, a byte-order mark is damage.
     let late = LOG.replace("\n{\"type\":\"scan_end\"", "\n\u{feff}{\"type\":\"scan_end\"");
     assert_eq!(faults(late.as_bytes()), [(10, FaultKind::NotJson)]);
 }
 
 #[test]
-fn a_line_without_end_does_not_fill_the_memory() {
-    // 64 MiB of one line between two good ones, from a reader that holds none of it.
+fn memory_is_bounded() {
+    // A streamed line of 64 MiB between two valid ones.
     let good = LOG.lines().next().expect("a session").to_owned() + "\n";
     let long = io::repeat(b'x').take(64 << 20);
     let log = good.as_bytes().chain(long).chain(&b"\n"[..]).chain(good.as_bytes());
@@ -76,7 +76,7 @@ fn a_line_without_end_does_not_fill_the_memory() {
 }
 
 #[test]
-fn a_line_of_the_greatest_length_is_read_and_one_more_byte_is_not() {
+fn maximum_line_length() {
     let event = LOG.lines().nth(10).expect("an event");
     for (length, ok) in [(MAX_LINE_BYTES, true), (MAX_LINE_BYTES + 3, false)] {
         let filler = "x".repeat(length - event.len());
@@ -87,7 +87,7 @@ fn a_line_of_the_greatest_length_is_read_and_one_more_byte_is_not() {
 }
 
 #[test]
-fn an_error_of_the_disk_ends_the_reading() {
+fn read_error_ends_the_iteration() {
     struct Broken;
     impl Read for Broken {
         fn read(&mut self, _: &mut [u8]) -> io::Result<usize> {
@@ -101,8 +101,8 @@ fn an_error_of_the_disk_ends_the_reading() {
 }
 
 proptest! {
-    /// Whatever the bytes: no panic, every byte accounted for, and nothing after a line without
-    /// a newline.
+    /// Random bytes: the lines cover the file without gaps, and none follows a line without
+    /// newline.
     #[test]
     fn lines_tile_the_file(
         pieces in proptest::collection::vec(

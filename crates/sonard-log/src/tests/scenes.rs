@@ -1,4 +1,4 @@
-//! A log is whole by itself: the scene of its predictions is in it, or beside it.
+//! Scene texts in a log or in its folder.
 
 use std::{fs, path::Path, sync::Arc, time::Duration};
 
@@ -17,13 +17,13 @@ fn simple_room() -> Scene {
     Scene::from_json(shipped::text("simple-room").expect("shipped")).expect("right")
 }
 
-/// The same room, with so much blank space after it.
+/// Room whose text is too long for a record because of trailing blanks.
 fn long_room() -> Scene {
     let text = shipped::text("simple-room").expect("shipped");
     Scene::from_json(&(text.to_owned() + &" ".repeat(MAX_LOGGED_SCENE_BYTES))).expect("right")
 }
 
-/// The fixture, taken in `scene`, as scan number `n`.
+/// Records of the fixture in `scene`, with scan number `n`.
 fn scan_in(scene: &Scene, n: u128) -> Vec<Record> {
     let mut records = records();
     for record in &mut records {
@@ -42,15 +42,15 @@ fn scan_in(scene: &Scene, n: u128) -> Vec<Record> {
 }
 
 fn sessions(log: &Path) -> Vec<Session> {
-    let of = |record| match record {
+    let session = |record| match record {
         Record::Session(session) => Some(*session),
         _ => None,
     };
-    load(log).expect("readable").records.into_iter().filter_map(of).collect()
+    load(log).expect("readable").records.into_iter().filter_map(session).collect()
 }
 
 #[test]
-fn a_log_has_a_scene_once_and_every_scan_of_it_gets_it_back() {
+fn text_is_stored_once_per_scene() {
     let (_folder, log) = folder();
     let (room, other) = (simple_room(), shipped::text("corridor").expect("shipped"));
     let other = Scene::from_json(other).expect("right");
@@ -59,7 +59,8 @@ fn a_log_has_a_scene_once_and_every_scan_of_it_gets_it_back() {
         scan_in(scene, n).iter().for_each(|record| writer.append(record).expect("room"));
     }
     drop(writer);
-    let texts: Vec<bool> = sessions(&log).iter().map(|one| one.scene_text.is_some()).collect();
+    let texts: Vec<bool> =
+        sessions(&log).iter().map(|session| session.scene_text.is_some()).collect();
     assert_eq!(texts, [true, false, true, true]);
     let views = ScanView::from_records(load(&log).expect("readable").records);
     for (view, scene) in views.iter().zip([&room, &room, &other, &room]) {
@@ -69,7 +70,7 @@ fn a_log_has_a_scene_once_and_every_scan_of_it_gets_it_back() {
 }
 
 #[test]
-fn a_scene_too_long_for_a_line_is_kept_beside_the_log_by_its_hash_and_only_once() {
+fn long_text_is_stored_in_a_file() {
     let (folder, _) = folder();
     let folder = folder.path();
     let rotation =
@@ -102,7 +103,7 @@ fn a_scene_too_long_for_a_line_is_kept_beside_the_log_by_its_hash_and_only_once(
 }
 
 #[test]
-fn a_scan_of_the_history_has_its_scene_whichever_session_of_the_log_holds_the_text() {
+fn history_finds_the_text() {
     let (folder, _) = folder();
     let log = folder.path().join("sonard-20261122T000000Z.jsonl");
     let scene = simple_room();
@@ -122,7 +123,7 @@ fn a_scan_of_the_history_has_its_scene_whichever_session_of_the_log_holds_the_te
 }
 
 #[test]
-fn the_text_of_another_scene_is_not_taken_for_the_sessions() {
+fn rejects_a_different_text() {
     let (_folder, log) = folder();
     let Record::Session(mut session) = records().swap_remove(0) else { panic!("a session first") };
     session.scene = Some(SceneRef::of(&simple_room()));

@@ -1,4 +1,4 @@
-//! Where poses come from that are not known beforehand.
+//! Sources of poses that are not listed in the plan: prompt, program or stream.
 
 use std::{
     io::{BufRead as _, BufReader},
@@ -13,30 +13,30 @@ use tokio::sync::mpsc::{Receiver, channel};
 
 use super::{Halt, NamedPose, Poses, Watcher};
 
-/// Tells programs which pose is wanted.
-const VARIABLE: &str = "SONARD_POSE";
+/// Environment variable with the requested pose's number.
+const POSE_VARIABLE: &str = "SONARD_POSE";
 
-/// Gives poses one by one.
-pub(super) enum Source {
-    /// There are none but those listed.
+/// Supplier of poses, one at a time.
+pub(super) enum PoseSource {
+    /// No poses beyond the listed ones.
     Listed,
     Prompt,
     Program(String),
     Stream {
         command: String,
-        running: Option<Stream>,
+        running: Option<PoseStream>,
     },
 }
 
-/// A command that is running, with what it has printed.
-pub(super) struct Stream {
+/// Running command with the lines that it printed.
+pub(super) struct PoseStream {
     child: Child,
     lines: Receiver<String>,
 }
 
-impl Drop for Stream {
+impl Drop for PoseStream {
     fn drop(&mut self) {
-        // It may have ended by itself; what it started itself goes with it.
+        // The group includes the command's own children; it may have ended already.
         if let Some(group) = Pid::from_raw(self.child.id().cast_signed()) {
             let _ = kill_process_group(group, Signal::TERM);
         }
@@ -44,8 +44,8 @@ impl Drop for Stream {
     }
 }
 
-impl Source {
-    pub(super) fn of(poses: &Poses) -> Self {
+impl From<&Poses> for PoseSource {
+    fn from(poses: &Poses) -> Self {
         match poses {
             Poses::Listed(_) => Self::Listed,
             Poses::Prompt => Self::Prompt,
@@ -53,11 +53,13 @@ impl Source {
             Poses::Stream(command) => Self::Stream { command: command.clone(), running: None },
         }
     }
+}
 
-    /// The pose with this number; `None` when there are no more.
+impl PoseSource {
+    /// Returns the pose with this number; `None` if there are no more.
     ///
     /// # Errors
-    /// When a program fails or prints no pose, or when interrupted.
+    /// Returns an error if a program fails or prints no valid pose, or on an interrupt.
     pub(super) async fn next(
         &mut self,
         number: u32,
@@ -75,7 +77,7 @@ impl Source {
                     output = output => output.unwrap_or_else(|error| Err(error.to_string())),
                     () = interrupts.clone().wait() => return Err(Halt::on_request()),
                 };
-                let text = text.map_err(|why| failed(command, &why))?;
+                let text = text.map_err(|reason| failed(command, &reason))?;
                 parse(command, text.trim(), scene)
             }
             Self::Stream { command, running } => {
@@ -95,7 +97,7 @@ impl Source {
                             |error| Some(error.to_string()),
                             |status| (!status.success()).then(|| status.to_string()),
                         );
-                        fault.map_or(Ok(None), |why| Err(failed(command, &why)))
+                        fault.map_or(Ok(None), |reason| Err(failed(command, &reason)))
                     }
                 }
             }
@@ -103,15 +105,14 @@ impl Source {
     }
 }
 
-/// Asks until there is a pose at which a ranger can stand, or none any more.
+/// Prompts until the operator enters a valid pose, or an empty line to end the collection.
 async fn prompt(
     number: u32,
     scene: &Scene,
     watcher: &mut impl Watcher,
     interrupts: &Interrupts,
 ) -> Result<Option<NamedPose>, Halt> {
-    let question =
-        format!("pose {number} (X,Y,DEG or a name; an empty line when there are no more):");
+    let question = format!("pose {number} (X,Y,DEG or a name; empty line to finish):");
     loop {
         let answer = answered(watcher, &question, interrupts).await?;
         let Some(text) = answer.filter(|text| !text.is_empty()) else { return Ok(None) };
@@ -122,7 +123,7 @@ async fn prompt(
     }
 }
 
-/// An answer, unless it is interrupted.
+/// Prompts the operator and returns the answer, unless interrupted.
 pub(super) async fn answered(
     watcher: &mut impl Watcher,
     question: &str,
@@ -139,13 +140,14 @@ fn parse(command: &str, text: &str, scene: &Scene) -> Result<Option<NamedPose>, 
         return Ok(None);
     }
     let pose = NamedPose::parse(text, scene);
-    pose.map(Some)
-        .map_err(|fault| Halt::wrong(format!("`{command}` printed no pose: {fault}"), &fault.help))
+    pose.map(Some).map_err(|fault| {
+        Halt::wrong(format!("`{command}` printed no valid pose: {fault}"), &fault.help)
+    })
 }
 
 fn shell(command: &str, number: u32) -> Command {
     let mut shell = Command::new("sh");
-    shell.args(["-c", command]).env(VARIABLE, number.to_string()).stdin(Stdio::null());
+    shell.args(["-c", command]).env(POSE_VARIABLE, number.to_string()).stdin(Stdio::null());
     shell
 }
 
@@ -160,16 +162,16 @@ fn run_once(command: &str, number: u32) -> Result<String, String> {
     Ok(String::from_utf8_lossy(&output.stdout).into_owned())
 }
 
-fn start(command: &str, number: u32) -> Result<Stream, Halt> {
+fn start(command: &str, number: u32) -> Result<PoseStream, Halt> {
     let mut child = shell(command, number)
         .stdout(Stdio::piped())
         .process_group(0)
         .spawn()
         .map_err(|error| failed(command, &error.to_string()))?;
-    // As many lines as are wanted and one more: who prints faster has to wait.
+    // Buffers one line beyond the requested ones; a faster command blocks.
     let (sender, lines) = channel(1);
     let printed = child.stdout.take();
-    #[allow(clippy::disallowed_methods, reason = "its end is received as the end of a channel")]
+    #[allow(clippy::disallowed_methods, reason = "ends by closing the channel")]
     std::thread::spawn(move || {
         for line in printed.into_iter().flat_map(|out| BufReader::new(out).lines()) {
             let Ok(line) = line else { break };
@@ -178,12 +180,12 @@ fn start(command: &str, number: u32) -> Result<Stream, Halt> {
             }
         }
     });
-    Ok(Stream { child, lines })
+    Ok(PoseStream { child, lines })
 }
 
-fn failed(command: &str, why: &str) -> Halt {
+fn failed(command: &str, reason: &str) -> Halt {
     Halt::wrong(
-        format!("`{command}`, which is to give poses, failed: {why}"),
-        "run it by itself; what was collected is kept, and the collection goes on when started again",
+        format!("`{command}`, the source of poses, failed: {reason}"),
+        "test the command alone; recorded scans are kept, and the same `sonard collect` resumes",
     )
 }

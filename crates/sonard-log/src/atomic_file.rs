@@ -1,4 +1,4 @@
-//! A file that is there whole or not at all.
+//! Atomic creation and replacement of files.
 
 use std::{
     ffi::{OsStr, OsString},
@@ -16,12 +16,14 @@ use tempfile::{Builder, NamedTempFile};
 
 use super::sync::{sync_file, sync_folder_of};
 
-/// A new file is readable for whom the umask leaves it.
+/// Mode of a new file, reduced by the umask.
 const MODE: u32 = 0o666;
 
-/// A file that is being made beside the place it will take: dropped before
-/// [`take_place`](Self::take_place), it is gone, and what was in that place stays. Where the file system can
-/// (`O_TMPFILE`), it has no name until then, so that a killed program leaves nothing behind.
+/// File that replaces another one atomically.
+///
+/// A draft dropped before [`take_place`](Self::take_place) is removed, and the existing file stays.
+/// Where the file system supports `O_TMPFILE`, the draft has no name, so a killed program
+/// leaves no file behind.
 #[derive(Debug)]
 pub struct WholeFile {
     draft: Draft,
@@ -30,38 +32,38 @@ pub struct WholeFile {
 
 #[derive(Debug)]
 enum Draft {
-    Nameless(File),
+    Unnamed(File),
     Named(NamedTempFile),
 }
 
 impl WholeFile {
-    /// Begins a file for `path`, readable for whom the umask leaves it.
+    /// Creates a draft for `path` in the same folder, with permissions set by the umask.
     ///
     /// # Errors
-    /// As the system says, about the folder.
+    /// Returns an error if the folder is not writable.
     pub fn create(path: &Path) -> io::Result<Self> {
         let path = PathBuf::from(path);
         if path.file_name().is_none() {
             return Err(io::ErrorKind::IsADirectory.into());
         }
-        let draft = match nameless(folder_of(&path))? {
-            Some(file) => Draft::Nameless(file),
-            None => Draft::Named(names(&hidden(&path)).tempfile_in(folder_of(&path))?),
+        let draft = match unnamed_file(folder_of(&path))? {
+            Some(file) => Draft::Unnamed(file),
+            None => Draft::Named(hidden_names(&prefix(&path)).tempfile_in(folder_of(&path))?),
         };
         Ok(Self { draft, path })
     }
 
-    /// Brings the file to the disk and puts it in its place, over what may be there.
+    /// Syncs the file and moves it to its path, replacing an existing file.
     ///
     /// # Errors
-    /// As the system says; what was in its place stays.
+    /// Returns the error of the system; the existing file is then kept.
     pub fn take_place(self) -> io::Result<()> {
         sync_file(self.as_file())?;
         let Self { draft, path } = self;
         let persisted = match draft {
             Draft::Named(draft) => draft.persist(&path).map(drop).map_err(|error| error.error),
-            // A link can't replace a file, but a rename can.
-            Draft::Nameless(file) => names(&hidden(&path))
+            // linkat(2) cannot replace a file, rename(2) can.
+            Draft::Unnamed(file) => hidden_names(&prefix(&path))
                 .make_in(folder_of(&path), |name| link(&file, name))?
                 .persist(&path)
                 .map_err(|error| error.error),
@@ -70,21 +72,21 @@ impl WholeFile {
         sync_folder_of(&path)
     }
 
-    /// Writes a whole file.
+    /// Writes a file atomically.
     ///
     /// # Errors
-    /// As the system says; what was in its place stays.
+    /// Returns the error of the system; the existing file is then kept.
     pub fn write(path: &Path, bytes: &[u8]) -> io::Result<()> {
         let mut file = Self::create(path)?;
         file.write_all(bytes)?;
         file.take_place()
     }
 
-    /// The draft.
+    /// Open file of the draft.
     #[must_use]
     pub fn as_file(&self) -> &File {
         match &self.draft {
-            Draft::Nameless(file) => file,
+            Draft::Unnamed(file) => file,
             Draft::Named(draft) => draft.as_file(),
         }
     }
@@ -100,15 +102,16 @@ impl Write for WholeFile {
     }
 }
 
-/// A file in a folder without a name; `None` where there are none, or where it could not be given one.
-fn nameless(folder: &Path) -> io::Result<Option<File>> {
+/// Creates an unnamed file in a folder; `None` if the system does not support such files or their
+/// later naming.
+fn unnamed_file(folder: &Path) -> io::Result<Option<File>> {
     if !Path::new(DESCRIPTORS).exists() {
         return Ok(None);
     }
     let flags = OFlags::TMPFILE | OFlags::RDWR | OFlags::CLOEXEC;
     match open(folder, flags, Mode::from_raw_mode(MODE)) {
         Ok(file) => Ok(Some(file.into())),
-        // What kernels say that know no such files, on the whole or on this file system.
+        // Errors of kernels and file systems without O_TMPFILE.
         Err(Errno::OPNOTSUPP | Errno::ISDIR | Errno::INVAL) => Ok(None),
         Err(error) => Err(error.into()),
     }
@@ -121,15 +124,15 @@ fn link(file: &File, name: &Path) -> io::Result<()> {
     Ok(linkat(CWD, descriptor, CWD, name, AtFlags::SYMLINK_FOLLOW)?)
 }
 
-/// Makes hidden names beside a file.
-fn names(prefix: &OsStr) -> Builder<'_, 'static> {
-    let mut names = Builder::new();
-    names.prefix(prefix).suffix(".new").permissions(Permissions::from_mode(MODE));
-    names
+/// Builder of hidden temporary file names.
+fn hidden_names(prefix: &OsStr) -> Builder<'_, 'static> {
+    let mut builder = Builder::new();
+    builder.prefix(prefix).suffix(".new").permissions(Permissions::from_mode(MODE));
+    builder
 }
 
-/// What they begin with.
-fn hidden(path: &Path) -> OsString {
+/// Prefix of the hidden names for a file.
+fn prefix(path: &Path) -> OsString {
     let mut name = OsString::from(".");
     name.push(path.file_name().unwrap_or_default());
     name
@@ -149,32 +152,32 @@ mod tests {
     }
 
     #[test]
-    fn a_draft_has_no_name_that_a_killed_program_could_leave() {
+    fn unnamed_draft() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("scan.jsonl");
         std::fs::write(&path, "before").expect("writes");
-        let mut file = WholeFile::create(&path).expect("begins");
+        let mut file = WholeFile::create(&path).expect("created");
         file.write_all(b"after").expect("writes");
         assert_eq!(names_in(folder.path()), ["scan.jsonl"]);
         assert_eq!(std::fs::read(&path).expect("reads"), b"before");
-        file.take_place().expect("takes its place");
+        file.take_place().expect("replaced");
         assert_eq!(names_in(folder.path()), ["scan.jsonl"]);
         assert_eq!(std::fs::read(&path).expect("reads"), b"after");
     }
 
     #[test]
-    fn a_draft_with_a_name_takes_its_place_as_well() {
+    fn named_draft() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("scan.jsonl");
-        let draft = names(&hidden(&path)).tempfile_in(folder.path()).expect("begins");
+        let draft = hidden_names(&prefix(&path)).tempfile_in(folder.path()).expect("created");
         let mut file = WholeFile { draft: Draft::Named(draft), path: path.clone() };
         file.write_all(b"after").expect("writes");
-        file.take_place().expect("takes its place");
+        file.take_place().expect("replaced");
         assert_eq!(names_in(folder.path()), ["scan.jsonl"]);
-        let mode = |path| std::fs::metadata(path).expect("is there").permissions().mode();
-        let nameless = WholeFile::create(&folder.path().join("other")).expect("begins");
-        let Draft::Nameless(other) = &nameless.draft else { panic!("the system can") };
-        let mode_of_other = other.metadata().expect("is there").permissions().mode();
-        assert_eq!(mode(&path) & 0o777, mode_of_other & 0o777, "readable for the same");
+        let mode = |path| std::fs::metadata(path).expect("exists").permissions().mode();
+        let unnamed = WholeFile::create(&folder.path().join("other")).expect("created");
+        let Draft::Unnamed(other) = &unnamed.draft else { panic!("O_TMPFILE is supported") };
+        let mode_of_other = other.metadata().expect("exists").permissions().mode();
+        assert_eq!(mode(&path) & 0o777, mode_of_other & 0o777, "same permissions");
     }
 }

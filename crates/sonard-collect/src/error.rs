@@ -1,4 +1,4 @@
-//! Why a collection does not go on.
+//! Reasons for which a collection ends before its last scan.
 
 use sonard_api::client::{ClientError, ScansError};
 use sonard_device::ranger::{PrepareError, ScanError};
@@ -8,42 +8,46 @@ use thiserror::Error;
 
 use super::FolderError;
 
-/// The reason why a collection stopped, and the remedy.
+/// Remedy for a scan plan whose azimuths are not multiples of the motor step.
+pub(super) const MOTOR_STEP_HELP: &str =
+    "give plan.from_deg and plan.step_deg on the motor's steps";
+
+/// Reason for which a collection stopped, with its remedy.
 #[derive(Debug, Error)]
 pub enum Halt {
-    /// Somebody wanted it so, or the plan did.
+    /// Stopped by the operator or by a rule of the plan.
     #[error("{0}")]
     Stopped(String),
-    /// What was asked for can't be done.
+    /// Request that cannot be carried out.
     #[error("{message}")]
     Wrong {
-        /// What is wrong.
+        /// Description of the fault.
         message: String,
-        /// What would be right.
+        /// Suggested correction for the user.
         help: String,
     },
-    /// The ranger, the line to it or a disk gave up.
+    /// Failure of the ranger, its serial link or a disk.
     #[error("{message}")]
     Failed {
-        /// What happened.
+        /// Description of the failure.
         message: String,
-        /// What to do.
+        /// Suggested remedy for the user.
         help: String,
     },
 }
 
 impl Halt {
-    /// What was asked for can't be done.
+    /// Creates the error of a request that cannot be carried out.
     pub fn wrong(message: impl std::fmt::Display, help: impl std::fmt::Display) -> Self {
         Self::Wrong { message: message.to_string(), help: help.to_string() }
     }
 
-    /// The ranger, the line to it or a disk gave up.
+    /// Creates the error of a failed ranger, serial link or disk.
     pub fn failed(message: impl std::fmt::Display, help: impl std::fmt::Display) -> Self {
         Self::Failed { message: message.to_string(), help: help.to_string() }
     }
 
-    /// A signal.
+    /// Creates the error of a collection stopped by a signal.
     #[must_use]
     pub fn on_request() -> Self {
         Self::Stopped("stopped on request".into())
@@ -88,7 +92,7 @@ impl From<PrepareError> for Halt {
         match error {
             PrepareError::Deaf(deaf) => Self::wrong(deaf, deaf.help()),
             PrepareError::Model(error) => {
-                Self::wrong(error, "correct [sensor] of the plan, or the sensor's data")
+                Self::wrong(error, "correct [sensor] in the plan, or the sensor's data")
             }
         }
     }
@@ -97,9 +101,7 @@ impl From<PrepareError> for Halt {
 impl From<ScanError> for Halt {
     fn from(error: ScanError) -> Self {
         match error {
-            ScanError::Plan(error) => {
-                Self::wrong(error, "give plan.from_deg and plan.step_deg on the motor's steps")
-            }
+            ScanError::Plan(error) => Self::wrong(error, MOTOR_STEP_HELP),
             ScanError::Device(error) => Self::failed(error, error.help()),
             ScanError::Sink(error) => error.into(),
         }

@@ -1,5 +1,5 @@
-//! A daemon that takes the scans of a collection: asked for each with its pose and plan, and left as
-//! it was found.
+//! Collection through a daemon: each scan is requested with its pose and plan, and the daemon's
+//! settings are restored afterwards.
 
 use std::time::Duration;
 
@@ -16,45 +16,46 @@ use tokio::time::{Instant, sleep};
 
 use super::{
     AirBefore, Borrowed, Connected, Device, Halt, Plan, ScanOrder,
-    taking::{Taken, Taking},
+    record_scan::{ScanSink, Taken},
 };
 
-const WAIT: Duration = Duration::from_secs(1);
-/// How often it is looked whether a daemon that has not begun yet can scan at all.
-const LOOK: Duration = Duration::from_secs(5);
+/// Retry interval while the daemon or its ranger is unavailable.
+const RETRY_INTERVAL: Duration = Duration::from_secs(1);
+/// Poll interval of the daemon's state between a request and the first record of its scan.
+const POLL_INTERVAL: Duration = Duration::from_secs(5);
 
-/// A daemon, and what a collection wants of it.
+/// Daemon that takes the scans of a collection.
 pub struct ByDaemon {
     client: Client,
-    /// What it decided about every scan when the collection began.
+    /// Daemon's scan setup at the start of the collection.
     setup: Setup,
     patience: Duration,
     interrupts: Interrupts,
-    /// What it did by itself before, as far as that was changed.
+    /// Settings to restore, as far as the collection changed them.
     borrowed: Option<Borrowed>,
-    /// Tells whoever looks on.
-    tell: Tell,
+    /// Reports messages to the operator.
+    report: Report,
 }
 
-/// Tells whoever looks on.
-type Tell = Box<dyn Fn(&str) + Send + Sync>;
+/// Callback for messages to the operator.
+type Report = Box<dyn Fn(&str) + Send + Sync>;
 
-/// The air that the next scan of a daemon will be taken in.
+/// Air settings that apply to the daemon's next scan.
 fn next_air(status: &Status) -> &AirStatus {
     status.pending.air.as_ref().unwrap_or(&status.air)
 }
 
-/// Motor steps a turn of its ranger, once that told them.
+/// Returns the motor steps per revolution of the daemon's ranger, once it is identified.
 #[must_use]
 pub fn steps_per_revolution(status: &Status) -> Option<u16> {
     status.device.as_ref().and_then(|device| device.steps_per_revolution.try_into().ok())
 }
 
-fn trouble(link: &LinkReport) -> Halt {
-    let trouble = link.trouble.as_deref().unwrap_or("no more is known");
+fn link_failure(link: &LinkReport) -> Halt {
+    let trouble = link.trouble.as_deref().unwrap_or("no details");
     Halt::failed(
-        format!("the daemon has no ranger, it is {}: {trouble}", link.state.name()),
-        "see `sonard status`; the collection goes on where it stopped when it is started again",
+        format!("the daemon's ranger is not available ({}): {trouble}", link.state.name()),
+        "see `sonard status`; start the collection again to resume it",
     )
 }
 
@@ -71,23 +72,23 @@ impl Device for ByDaemon {
         Ok(())
     }
 
-    /// Goes on where an earlier run left it.
     fn go_on(&mut self, patience: Duration, borrowed: Option<Borrowed>) {
         (self.patience, self.borrowed) = (patience, borrowed);
     }
 
-    /// Waits until it has a ranger that can be used.
+    /// Waits until the daemon has a usable ranger.
     async fn meet(&mut self) -> Result<Connected, Halt> {
         let status = self.ready().await?;
         match (status.device, status.provenance) {
             (Some(device), Some(provenance)) => Ok(Connected { device, provenance }),
-            _ => Err(Halt::failed("the daemon does not know its ranger", "see `sonard status`")),
+            _ => {
+                Err(Halt::failed("the daemon has not identified its ranger", "see `sonard status`"))
+            }
         }
     }
 
-    /// What is about to be changed of what it does by itself, beyond what is known already: its own
-    /// scans are held, because only the collection knows where the ranger stands, and the air is
-    /// what the plan says, if it says anything.
+    /// Returns the settings about to be changed. The daemon's own scans are suspended, because the
+    /// pose is known only to the collection; the air is set if the plan specifies it.
     async fn to_borrow(&self, air: Option<&AirOrder>) -> Result<Option<Borrowed>, Halt> {
         let status = self.ready().await?;
         let ScanningReport { mode, every_s, .. } = status.scanning;
@@ -95,8 +96,8 @@ impl Device for ByDaemon {
         if mode != Mode::OnRequest {
             before.get_or_insert_default().scanning = Some(ScanningKeys { mode, every_s });
         }
-        if air.is_some_and(|air| !is(next_air(&status), air)) {
-            // Air that this collection gave earlier is not the daemon's own.
+        if air.is_some_and(|air| !is_ordered(next_air(&status), air)) {
+            // The API's air is an earlier setting by a client and must be restored as such.
             let own = || match next_air(&status).source {
                 AirSource::Api => AirBefore::Given(as_order(next_air(&status))),
                 _ => AirBefore::Own,
@@ -106,7 +107,7 @@ impl Device for ByDaemon {
         Ok(before.filter(|before| Some(before) != self.borrowed.as_ref()))
     }
 
-    /// Lets the collection decide when scans are taken, and in which air.
+    /// Switches the daemon to scans on request and sets the plan's air.
     async fn borrow(
         &mut self,
         before: Option<Borrowed>,
@@ -118,13 +119,13 @@ impl Device for ByDaemon {
         let on_request = Scanning { mode: Mode::OnRequest, every_s: None };
         self.put("/v1/scanning", &on_request).await?;
         let status: Status = self.client.get_json("/v1/status").await?;
-        match air.filter(|air| !is(next_air(&status), air)) {
+        match air.filter(|air| !is_ordered(next_air(&status), air)) {
             Some(air) => self.put("/v1/air", air).await,
             None => Ok(()),
         }
     }
 
-    /// Leaves it as it was found; whether there was anything to give back.
+    /// Restores scan mode and air; returns `true` if anything was saved.
     async fn give_back(&mut self) -> Result<bool, Halt> {
         let Some(before) = self.borrowed.take() else { return Ok(false) };
         if let Some(ScanningKeys { mode, every_s }) = before.scanning {
@@ -141,7 +142,7 @@ impl Device for ByDaemon {
         Ok(true)
     }
 
-    /// The temperature that somebody measured for it, degrees Celsius.
+    /// Returns the daemon's air temperature, degrees Celsius, unless it is the configured default.
     async fn temperature_c(&self) -> Option<f64> {
         let InForce::<AirStatus> { now, pending } = self.client.get_json("/v1/air").await.ok()?;
         let air = pending.unwrap_or(now);
@@ -153,14 +154,14 @@ impl Device for ByDaemon {
         let request = ScanRequest { scans: Some(1), plan: Some(plan), pose: Some(pose) };
         let (mut scans, first) = self.begin(&request).await?;
         let began = Instant::now();
-        let mut sink = Taking::open(path, beam)?;
+        let mut sink = ScanSink::open(path, beam)?;
         let (mut lost, mut stopped) = (None, false);
         let mut next = Some(first);
         while let Some(mut record) = next.take() {
             if let Record::Session(session) = &mut record {
                 session.collection = Some(Box::new(of.clone()));
             }
-            stopped |= is_stop(&record);
+            stopped |= is_stop_event(&record);
             sink.record(&record)?;
             if matches!(record, Record::ScanEnd(_)) {
                 break;
@@ -171,7 +172,7 @@ impl Device for ByDaemon {
                     Err(error) => lost = Some(error.into()),
                 },
                 () = self.interrupts.clone().wait() => {
-                    // What can't be had any more is in the daemon's log.
+                    // Records that can no longer be fetched remain in the daemon's log.
                     for record in scans.cancel().await.unwrap_or_default() {
                         sink.record(&record)?;
                     }
@@ -187,37 +188,37 @@ impl Device for ByDaemon {
 }
 
 impl ByDaemon {
-    /// Looks at a daemon, and changes nothing of it yet. What a person should know meanwhile goes to
-    /// `tell`.
+    /// Connects to a daemon and reads its setup without changing it. Messages to the operator go to
+    /// `report`.
     ///
     /// # Errors
-    /// When it does not answer, or measures nothing.
+    /// Returns an error if the daemon does not respond, or only simulates.
     pub async fn find(
         client: Client,
         interrupts: Interrupts,
-        tell: impl Fn(&str) + Send + Sync + 'static,
+        report: impl Fn(&str) + Send + Sync + 'static,
     ) -> Result<(Self, Status), Halt> {
         let status: Status = client.get_json("/v1/status").await?;
         if status.simulation.is_some() {
             return Err(Halt::wrong(
-                "the daemon plays an array and measures nothing",
-                "collect by a daemon that drives a ranger, or see `sonard simulate --array`",
+                "the daemon simulates an array and measures nothing",
+                "use a daemon that drives a ranger, or see `sonard simulate --array`",
             ));
         }
         let setup = client.get_json("/v1/setup").await?;
         let patience = Duration::ZERO;
-        let tell = Box::new(tell);
-        Ok((Self { client, setup, patience, interrupts, borrowed: None, tell }, status))
+        let report = Box::new(report);
+        Ok((Self { client, setup, patience, interrupts, borrowed: None, report }, status))
     }
 
-    /// What it decides about every scan.
+    /// Scan setup of the daemon.
     #[must_use]
     pub const fn setup(&self) -> &Setup {
         &self.setup
     }
 
-    /// Asks for the scan and waits for its first record; a daemon that restarts meanwhile is asked
-    /// again.
+    /// Requests a scan and waits for its first record; the request is repeated if the daemon
+    /// restarts meanwhile.
     async fn begin(&self, request: &ScanRequest) -> Result<(RequestedScans, Record), Halt> {
         loop {
             self.ready().await?;
@@ -226,23 +227,24 @@ impl ByDaemon {
                 Err(error) if error.is_final() => return Err(error.into()),
                 Err(_) => continue,
             };
-            match self.first(&mut scans).await? {
+            match self.first_record(&mut scans).await? {
                 Ok(record) => return Ok((scans, record)),
                 Err(error @ ScansError::Forgotten(_)) => {
-                    return Err(Halt::Stopped(format!(
-                        "{error}\nstart it again with the same plan: it goes on where it stopped"
-                    )));
+                    return Err(Halt::Stopped(format!("{error}\nrun the same command to resume")));
                 }
                 Err(_) => {}
             }
         }
     }
 
-    async fn first(&self, scans: &mut RequestedScans) -> Result<Result<Record, ScansError>, Halt> {
+    async fn first_record(
+        &self,
+        scans: &mut RequestedScans,
+    ) -> Result<Result<Record, ScansError>, Halt> {
         loop {
             tokio::select! {
                 record = scans.next() => return Ok(record),
-                () = sleep(LOOK) => drop(self.ready().await?),
+                () = sleep(POLL_INTERVAL) => drop(self.ready().await?),
                 () = self.interrupts.clone().wait() => {
                     drop(scans.cancel().await);
                     return Err(Halt::on_request());
@@ -251,35 +253,37 @@ impl ByDaemon {
         }
     }
 
-    /// Waits, for as long as the plan's patience, until the daemon answers and has its ranger.
+    /// Waits until the daemon responds and has its ranger, at most `collection.patience_s`.
     async fn ready(&self) -> Result<Status, Halt> {
-        let (until, mut told) = (Instant::now() + self.patience, false);
+        let (deadline, mut reported) = (Instant::now() + self.patience, false);
         loop {
-            let failure = match self.look().await {
+            let failure = match self.status().await {
                 Ok(status) if status.link.state.is_up() => return Ok(status),
-                Ok(status) => trouble(&status.link),
+                Ok(status) => link_failure(&status.link),
                 Err(failure @ Halt::Failed { .. }) => failure,
                 Err(failure) => return Err(failure),
             };
-            if Instant::now() + WAIT > until {
+            if Instant::now() + RETRY_INTERVAL > deadline {
                 return Err(failure);
             }
-            if !std::mem::replace(&mut told, true) {
-                (self.tell)(&format!("waiting: {failure}"));
+            if !std::mem::replace(&mut reported, true) {
+                (self.report)(&format!("waiting: {failure}"));
             }
             tokio::select! {
-                () = sleep(WAIT) => {}
+                () = sleep(RETRY_INTERVAL) => {}
                 () = self.interrupts.clone().wait() => return Err(Halt::on_request()),
             }
         }
     }
 
-    async fn look(&self) -> Result<Status, Halt> {
+    /// Status of the daemon, provided that its setup is unchanged.
+    async fn status(&self) -> Result<Status, Halt> {
         let setup: Setup = self.client.get_json("/v1/setup").await?;
         if setup != self.setup {
             return Err(Halt::wrong(
-                "the daemon's sensor, model or motion is not what it was when this began",
-                "put its configuration back (a sensor that a program changed: DELETE /v1/sensor), or start the collection again: it says what changed",
+                "the daemon's sensor, model or motion changed since the collection started",
+                "restore its configuration (a sensor set by a client: DELETE /v1/sensor), or start the \
+                 collection again to list the changes",
             ));
         }
         Ok(self.client.get_json("/v1/status").await?)
@@ -290,9 +294,9 @@ impl ByDaemon {
     }
 }
 
-/// Whether that is the air in force, by a program's word.
-fn is(air: &AirStatus, order: &AirOrder) -> bool {
-    let same = |wanted: Option<f64>, now: f64| wanted.is_none_or(|wanted| wanted == now);
+/// Returns `true` if a client set exactly the ordered air.
+fn is_ordered(air: &AirStatus, order: &AirOrder) -> bool {
+    let same = |ordered: Option<f64>, now: f64| ordered.is_none_or(|ordered| ordered == now);
     air.source == AirSource::Api
         && air.temperature_c == order.temperature_c
         && same(order.humidity_percent, air.humidity_percent)
@@ -307,8 +311,8 @@ const fn as_order(air: &AirStatus) -> AirOrder {
     }
 }
 
-/// Whether somebody told the daemon to end the scan.
-fn is_stop(record: &Record) -> bool {
+/// Returns `true` for the event of a scan stopped by a client's request.
+fn is_stop_event(record: &Record) -> bool {
     let Record::Event(event) = record else { return false };
     event.kind == EventKind::Stopped && event.detail.contains(STOPPED_ON_REQUEST)
 }

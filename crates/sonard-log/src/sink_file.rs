@@ -1,4 +1,4 @@
-//! What a log is written to: a file, or a pipe that can't be taken back.
+//! Outputs of the log writer: a regular file, or a pipe without truncation.
 
 use std::{
     fmt,
@@ -10,53 +10,53 @@ use std::{
 
 use super::sync::sync_file;
 
-/// The few things that [`super::LogWriter`] does to a file. Tests put faults in between.
+/// File operations of [`super::LogWriter`]. Tests implement them with faults.
 pub trait Medium: fmt::Debug {
-    /// Writes at the end, once: may take fewer bytes than offered.
+    /// Appends bytes with one write and returns the number written, which may be smaller.
     ///
     /// # Errors
-    /// As the system says.
+    /// Returns the error of the system.
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize>;
 
-    /// Brings everything written to the disk.
+    /// Syncs all written bytes.
     ///
     /// # Errors
-    /// As the system says; what was written before may then be lost.
+    /// Returns the error of the system; unsynced bytes may then be lost.
     fn sync(&mut self) -> io::Result<()>;
 
-    /// Takes back the last `bytes` bytes, written just before.
+    /// Removes the last `bytes` bytes, which were just written.
     ///
     /// # Errors
-    /// When that can't be done; the end of the log is then torn.
+    /// Returns an error if truncation fails; the log then ends in a torn line.
     fn take_back(&mut self, bytes: u64) -> io::Result<()>;
 
-    /// Length by what was written, bytes; 0 where there is no length.
+    /// Expected length from the written bytes; 0 for outputs without a length.
     fn length(&self) -> u64 {
         0
     }
 
-    /// Deviation from the file that `path` names; `None` if there is none, or nothing to compare.
+    /// Compares the open file with the file at `path`; `None` if they agree or cannot be compared.
     ///
     /// # Errors
-    /// When file or path can't be examined.
+    /// Returns an error if file or path cannot be examined.
     fn displacement(&self, path: &Path) -> io::Result<Option<Displacement>> {
         let _ = path;
         Ok(None)
     }
 
-    /// Everything written from a byte on.
+    /// Reads back all bytes from an offset.
     ///
     /// # Errors
-    /// When it can't be read back.
+    /// Returns an error if the output is not readable.
     fn read_from(&self, offset: u64) -> io::Result<Vec<u8>> {
         let _ = offset;
         Err(io::ErrorKind::Unsupported.into())
     }
 
-    /// Puts what was written in its place, after the last sync; most are there all along.
+    /// Moves the output to its final path after the last sync, where an output has one.
     ///
     /// # Errors
-    /// As the system says.
+    /// Returns the error of the system.
     fn finish(&mut self) -> io::Result<()> {
         Ok(())
     }
@@ -92,18 +92,19 @@ impl<M: Medium + ?Sized> Medium for Box<M> {
     }
 }
 
-/// Deviation of an open log from the file that its path names.
+/// Difference between an open log and the file at its path.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Displacement {
-    /// The file has no name any more; its content is gone once it is closed.
+    /// Deleted file; the content is lost once the log is closed.
     Removed,
-    /// The path names no file or another one: the file, or a folder above it, was moved, replaced or covered.
+    /// Missing or different file at the path: the log or a parent folder was moved, replaced or
+    /// hidden by a mount.
     Moved,
-    /// Another program changed the file's length.
+    /// Length changed by another program.
     Resized {
-        /// Length by what was written, bytes.
+        /// Length from the written bytes.
         expected: u64,
-        /// Length found, bytes.
+        /// Length of the file, bytes.
         found: u64,
     },
 }
@@ -112,7 +113,7 @@ impl fmt::Display for Displacement {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Removed => f.write_str("was removed"),
-            Self::Moved => f.write_str("is no longer in its place: it was moved or replaced"),
+            Self::Moved => f.write_str("was moved or replaced"),
             Self::Resized { expected, found } => {
                 write!(f, "was changed by another program: {found} bytes instead of {expected}")
             }
@@ -120,19 +121,19 @@ impl fmt::Display for Displacement {
     }
 }
 
-/// A regular file, opened for appending and locked.
+/// Regular file, opened for appending and locked.
 #[derive(Debug)]
 pub struct FileMedium {
     file: File,
-    /// Length by what was written, bytes.
+    /// Length from the written bytes.
     length: u64,
 }
 
 impl FileMedium {
-    /// Appends to an open file.
+    /// Wraps an open file.
     ///
     /// # Errors
-    /// When its length can't be read.
+    /// Returns an error if the length cannot be read.
     pub(super) fn new(file: File) -> io::Result<Self> {
         let length = file.metadata()?.len();
         Ok(Self { file, length })
@@ -151,8 +152,8 @@ impl Medium for FileMedium {
     }
 
     fn take_back(&mut self, bytes: u64) -> io::Result<()> {
-        // The length now, not one remembered: should somebody have cut the file short meanwhile,
-        // setting a remembered length would fill the difference with NUL bytes.
+        // Uses the current length: if another program truncated the file, a stored length would
+        // extend the file with NUL bytes.
         let length = self.file.metadata()?.len();
         self.file.set_len(length.saturating_sub(bytes))?;
         self.length = self.length.saturating_sub(bytes);
@@ -190,7 +191,7 @@ impl Medium for FileMedium {
     }
 }
 
-/// Standard output or any other writer: flushed, never synced.
+/// Standard output or another writer, which is flushed but not synced.
 #[derive(Debug)]
 pub struct Pipe<W>(pub W);
 

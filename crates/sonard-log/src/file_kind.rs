@@ -1,46 +1,46 @@
-//! What kind of file it likely is that begins with these bytes: for messages about wrong files, and
-//! to tell an older output from somebody's data.
+//! Detection of file kinds by their first bytes, for error messages about wrong files and to
+//! distinguish earlier outputs from other data.
 
 use std::fmt;
 
 use serde_json::{Map, Value};
 use sonard_records::decode_line;
 
-/// So many bytes of a file's beginning tell its kind.
+/// Number of bytes that [`FileKind`] examines at the start of a file.
 pub const HEAD_BYTES: usize = 1 << 16;
 
-/// A kind of file, by its first bytes.
+/// Kind of a file, detected by its first bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FileKind {
-    /// Nothing at all.
+    /// File without content.
     Empty,
-    /// A log of this program.
+    /// Log of `sonard`.
     Log,
-    /// A scene, in JSON.
+    /// Scene in JSON.
     Scene,
-    /// A sensor's data, in JSON.
+    /// Sensor data in JSON.
     Sensor,
-    /// An array's data, in JSON.
+    /// Array data in JSON.
     Array,
-    /// Other JSON objects, one a line.
+    /// Other JSON objects, one per line.
     JsonLines,
-    /// Other JSON.
+    /// Other JSON document.
     Json,
-    /// PNG picture.
+    /// PNG image.
     Png,
-    /// SVG picture.
+    /// SVG image.
     Svg,
-    /// PGM picture, as of an occupancy grid.
+    /// PGM image, for instance of an occupancy grid.
     Pgm,
-    /// Description of an occupancy grid.
+    /// Description of an occupancy grid in YAML.
     MapYaml,
-    /// TOML, as of a plan or a configuration.
+    /// TOML, for instance a plan or a configuration.
     Toml,
     /// Comma-separated values.
     Csv,
-    /// gzip.
+    /// File compressed with gzip.
     Gzip,
-    /// Another compressed file or archive.
+    /// Other compressed file or archive.
     Compressed,
     /// MCAP recording.
     Mcap,
@@ -48,17 +48,17 @@ pub enum FileKind {
     Parquet,
     /// ROS 1 bag.
     RosBag,
-    /// `SQLite` database, as of a ROS 2 bag.
+    /// `SQLite` database, for instance of a ROS 2 bag.
     Sqlite,
-    /// PDF.
+    /// PDF document.
     Pdf,
-    /// Other text.
+    /// Other text file.
     Text,
-    /// Other bytes.
+    /// Other binary data.
     Binary,
 }
 
-/// How files begin that are not text.
+/// Magic bytes of binary formats.
 const SIGNATURES: [(&[u8], FileKind); 15] = [
     (b"\x89PNG\r\n\x1a\n", FileKind::Png),
     (b"\x1f\x8b", FileKind::Gzip),
@@ -77,18 +77,18 @@ const SIGNATURES: [(&[u8], FileKind); 15] = [
     (b"P5\r", FileKind::Pgm),
 ];
 
-/// How every record begins.
-const RECORD: &str = r#"{"type":""#;
+/// Prefix of every record.
+const RECORD_PREFIX: &str = r#"{"type":""#;
 
 impl FileKind {
-    /// Of a file that begins so; `head` is [`HEAD_BYTES`] of it, or all.
+    /// Detects the kind of a file by its first [`HEAD_BYTES`] bytes, or all of a shorter file.
     #[must_use]
     pub fn of(head: &[u8]) -> Self {
         let head = head.strip_prefix(b"\xef\xbb\xbf").unwrap_or(head);
         if head.is_empty() {
             return Self::Empty;
         }
-        // A log whose beginning is damaged is one all the same.
+        // Any valid record identifies a log, even after a damaged start.
         if head.split(|&byte| byte == b'\n').any(|line| decode_line(line).is_ok()) {
             return Self::Log;
         }
@@ -96,12 +96,12 @@ impl FileKind {
             return *kind;
         }
         match text_of(head) {
-            Some(text) => of_text(text),
+            Some(text) => kind_of_text(text),
             None => Self::Binary,
         }
     }
 
-    /// Whether it can't be a log, however damaged.
+    /// Returns `true` if the file cannot be a log, not even a damaged one.
     #[must_use]
     pub const fn is_no_log(self) -> bool {
         !matches!(
@@ -110,20 +110,18 @@ impl FileKind {
         )
     }
 
-    /// What to do with it where a log is asked for.
+    /// Remedy for a file of this kind where a log is expected.
     #[must_use]
     pub const fn instead_of_a_log(self) -> &'static str {
         match self {
             Self::Gzip => "unpack it: zcat FILE | sonard ... -",
             Self::Compressed => "unpack it first",
-            Self::Scene => "give it with --scene; a log is what `sonard scan` or `simulate` writes",
-            Self::Sensor => {
-                "give it with --sensor; a log is what `sonard scan` or `simulate` writes"
-            }
-            Self::Array => "give it with --array; a log is what `sonard scan` or `simulate` writes",
-            Self::Empty => "nothing was written to it; give a log as `sonard scan` writes it",
+            Self::Scene => "use --scene for it; logs are written by `sonard scan` or `simulate`",
+            Self::Sensor => "use --sensor for it; logs are written by `sonard scan` or `simulate`",
+            Self::Array => "use --array for it; logs are written by `sonard scan` or `simulate`",
+            Self::Empty => "the file is empty; name a log written by `sonard scan`",
             _ => {
-                "give a log as `sonard scan` or `sonard simulate` writes it: one JSON object a line"
+                "name a log written by `sonard scan` or `sonard simulate`: one JSON object per line"
             }
         }
     }
@@ -137,11 +135,11 @@ impl fmt::Display for FileKind {
             Self::Scene => "a scene (JSON)",
             Self::Sensor => "a sensor's data (JSON)",
             Self::Array => "an array's data (JSON)",
-            Self::JsonLines => "JSON lines that are no records of a log",
-            Self::Json => "JSON, but no log, scene, sensor or array",
-            Self::Png => "a PNG picture",
-            Self::Svg => "an SVG picture",
-            Self::Pgm => "a PGM picture",
+            Self::JsonLines => "JSON lines that are not records of a log",
+            Self::Json => "JSON, but not a log, scene, sensor or array",
+            Self::Png => "a PNG image",
+            Self::Svg => "an SVG image",
+            Self::Pgm => "a PGM image",
             Self::MapYaml => "a map's description (YAML)",
             Self::Toml => "TOML, like a plan or a configuration",
             Self::Csv => "a table of comma-separated values",
@@ -152,13 +150,13 @@ impl fmt::Display for FileKind {
             Self::RosBag => "a ROS bag",
             Self::Sqlite => "an SQLite database (a ROS 2 bag?)",
             Self::Pdf => "a PDF",
-            Self::Text => "text, but no log",
+            Self::Text => "text, but not a log",
             Self::Binary => "binary data",
         })
     }
 }
 
-/// The text that it is, but for a character cut off at the end.
+/// Decodes text, without a character that is cut off at the end; `None` for binary data.
 fn text_of(head: &[u8]) -> Option<&str> {
     let text = match std::str::from_utf8(head) {
         Ok(text) => text,
@@ -171,15 +169,15 @@ fn text_of(head: &[u8]) -> Option<&str> {
     (!text.contains(control)).then_some(text)
 }
 
-fn of_text(text: &str) -> FileKind {
+fn kind_of_text(text: &str) -> FileKind {
     let text = text.trim_start();
     let first = text.lines().next().unwrap_or_default();
-    // A first record too long for the beginning, or torn.
-    if text.starts_with(RECORD) || RECORD.starts_with(text) {
+    // First record longer than the examined bytes, or torn.
+    if text.starts_with(RECORD_PREFIX) || RECORD_PREFIX.starts_with(text) {
         return FileKind::Log;
     }
     if text.starts_with(['{', '[']) && !first.trim_end().ends_with(']') {
-        return of_json(text, first);
+        return kind_of_json(text, first);
     }
     if text.starts_with('<') {
         return if text.contains("<svg") { FileKind::Svg } else { FileKind::Text };
@@ -188,7 +186,7 @@ fn of_text(text: &str) -> FileKind {
         return FileKind::MapYaml;
     }
     let mut lines = text.lines().map(str::trim);
-    let mut told = lines.clone().filter(|line| !line.is_empty() && !line.starts_with('#'));
+    let mut content = lines.clone().filter(|line| !line.is_empty() && !line.starts_with('#'));
     let is_table = |line: &str| line.starts_with('[') && line.ends_with(']');
     let is_key = |line: &str| {
         let key = line.split_once('=').map(|(key, _)| key.trim());
@@ -196,7 +194,7 @@ fn of_text(text: &str) -> FileKind {
             !key.is_empty() && key.chars().all(|c| c.is_alphanumeric() || "_-.\"".contains(c))
         })
     };
-    if told.next().is_some_and(|line| is_table(line) || is_key(line)) {
+    if content.next().is_some_and(|line| is_table(line) || is_key(line)) {
         return FileKind::Toml;
     }
     let commas = first.matches(',').count();
@@ -206,13 +204,13 @@ fn of_text(text: &str) -> FileKind {
     FileKind::Text
 }
 
-fn of_json(text: &str, first: &str) -> FileKind {
+fn kind_of_json(text: &str, first: &str) -> FileKind {
     if first.len() < text.trim_end().len()
         && serde_json::from_str::<Map<String, Value>>(first).is_ok()
     {
         return FileKind::JsonLines;
     }
-    // Only the beginning may be here: names of members tell enough.
+    // The text may be incomplete, so keys are matched instead of parsing it.
     let has = |name: &str| text.contains(&format!("\"{name}\""));
     match () {
         () if has("walls") || has("materials") => FileKind::Scene,
@@ -241,7 +239,7 @@ mod tests {
     }
 
     #[test]
-    fn files_are_told_by_their_beginning() {
+    fn detects_each_kind() {
         check("", FileKind::Empty);
         check(LOG, FileKind::Log);
         check(include_bytes!("../../../scenes/mcgill-lab.json"), FileKind::Scene);
@@ -268,7 +266,7 @@ mod tests {
     }
 
     #[test]
-    fn a_log_with_a_damaged_beginning_is_a_log() {
+    fn damaged_start_of_a_log() {
         check([&[0; 4096][..], b"\n", LOG].concat(), FileKind::Log);
         check([&b"PK\x03\x04 garbage\n"[..], LOG].concat(), FileKind::Log);
         for length in 1..200 {

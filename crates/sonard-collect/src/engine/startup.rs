@@ -1,4 +1,5 @@
-//! The beginning of a run: the journal, the plan it knows, what was left over, the device.
+//! Start of a run: opens the journal, compares the plan, recovers interrupted scans and identifies
+//! the device.
 
 use std::{
     collections::{BTreeMap, HashMap, HashSet},
@@ -14,10 +15,12 @@ use uuid::Uuid;
 use super::{
     super::{
         Conditions, Connected, Device, Entry, Folder, Halt, INPUTS, Journal, Plan, PlanEntry,
-        Poses, Started, Watcher, changes,
+        Poses, Started, Watcher,
         estimate::{Pace, budget},
-        numbers_of, sha256,
-        source::{Source, answered},
+        numbers_of,
+        plan_changes::plan_changes,
+        pose_source::{PoseSource, answered},
+        sha256,
     },
     Choices, Collector, warn_of_disk,
 };
@@ -40,11 +43,11 @@ impl<D: Device, W: Watcher> Collector<D, W> {
             })?),
             None => None,
         };
-        let told_c = match device.is_local() || plan.gives_air() {
+        let air_c = match device.is_local() || plan.gives_air() {
             true => measured_c,
             false => device.temperature_c().await,
         };
-        let air = plan.air(told_c.unwrap_or(plan.keys.air.temperature_c))?;
+        let air = plan.air(air_c.unwrap_or(plan.keys.air.temperature_c))?;
         let folder = Folder::open(&plan.folder)?;
         let journal = Journal::open(&folder.journal())?;
         let id = journal.history().plans.last().map_or_else(Uuid::new_v4, |plan| plan.collection);
@@ -53,8 +56,8 @@ impl<D: Device, W: Watcher> Collector<D, W> {
         device.go_on(patience, journal.history().borrowed.clone());
         let mut collector = Self {
             choices,
-            source: Source::of(&plan.poses),
-            more: true,
+            source: PoseSource::from(&plan.poses),
+            has_more_poses: true,
             thermometer,
             air,
             id,
@@ -63,10 +66,10 @@ impl<D: Device, W: Watcher> Collector<D, W> {
             interrupts,
             prepared: HashMap::new(),
             device,
-            here: None,
-            carried_to: None,
+            confirmed_pose: None,
+            device_pose: None,
             losses: None,
-            refused: BTreeMap::new(),
+            rejections: BTreeMap::new(),
             conditions: Conditions::new(),
             pace: Pace::new(scan_s, plan.keys.collection.pause_s),
             watcher,
@@ -74,33 +77,33 @@ impl<D: Device, W: Watcher> Collector<D, W> {
         };
         collector.folder.remove_drafts()?;
         collector.adopt_plan()?;
-        collector.take_in_left_overs()?;
+        collector.recover_scans()?;
         collector.write_manifest()?;
         Ok(collector)
     }
 
-    /// Goes on with the plan that the journal knows, or begins with this one.
+    /// Records the plan in the journal, or compares it with the recorded one.
     fn adopt_plan(&mut self) -> Result<(), Halt> {
         let sensor = serde_json::to_string_pretty(&self.plan.sensor).unwrap_or_default();
         let sensor_sha256 = sha256(sensor.as_bytes());
         if !self.journal.history().plans.is_empty() {
-            let changes = changes::since(self.journal.history(), &self.plan, &sensor_sha256);
+            let changes = plan_changes(self.journal.history(), &self.plan, &sensor_sha256);
             if changes.is_empty() {
                 return Ok(());
             }
             if !self.choices.accept_changed_plan {
                 return Err(Halt::wrong(
                     format!(
-                        "{} holds a collection by another plan: {}",
+                        "{} holds a collection with a different plan: {}",
                         self.folder.root().display(),
                         changes.join("; ")
                     ),
-                    "give another --out, put the plan back, or go on with the new one by \
-                     --accept-changed-plan: scans that are there stay, and the journal keeps both",
+                    "choose another --out, restore the plan, or continue with the new one by \
+                     --accept-changed-plan: existing scans are kept, and the journal records both",
                 ));
             }
         }
-        // The files first: a plan that the journal knows is there to be read.
+        // Files before the entry: a plan in the journal always has its input files.
         for (name, text) in [
             ("plan.toml", &self.plan.text),
             ("scene.json", &self.plan.scene_text),
@@ -120,10 +123,10 @@ impl<D: Device, W: Watcher> Collector<D, W> {
             sensor_sha256,
             poses,
         };
-        self.note(Entry::Plan(Box::new(plan)))
+        self.append(Entry::Plan(Box::new(plan)))
     }
 
-    /// Gives each listed pose that has none a number, and returns them all in order.
+    /// Assigns numbers to new listed poses and returns the numbers of all in order.
     fn number_poses(&mut self) -> Result<Option<Vec<u32>>, Halt> {
         let Poses::Listed(listed) = self.plan.poses.clone() else { return Ok(None) };
         let known = &self.journal.history().poses;
@@ -134,7 +137,7 @@ impl<D: Device, W: Watcher> Collector<D, W> {
                 Some(number) => number,
                 None => {
                     last += 1;
-                    self.note(Entry::Pose { number: last, pose: pose.clone() })?;
+                    self.append(Entry::Pose { number: last, pose: pose.clone() })?;
                     last
                 }
             });
@@ -142,12 +145,12 @@ impl<D: Device, W: Watcher> Collector<D, W> {
         Ok(Some(numbers))
     }
 
-    /// Meets the device, unless nothing is left to do.
+    /// Connects to the device, unless no scan is left.
     pub(super) async fn start(&mut self) -> Result<(), Halt> {
         let history = self.journal.history();
         let done: HashSet<_> = history.accepted().map(|take| take.slot).collect();
-        let wanted = history.wanted();
-        let open: Vec<_> = wanted
+        let requested = history.wanted();
+        let open: Vec<_> = requested
             .iter()
             .filter(|slot| !done.contains(slot))
             .filter(|slot| self.choices.retry_given_up || !history.is_given_up(**slot))
@@ -164,8 +167,8 @@ impl<D: Device, W: Watcher> Collector<D, W> {
         let first = match open.first() {
             Some(slot) => slot.pose,
             None => {
-                // The first pose is asked for before the device, which may need to know it.
-                if !self.another_pose().await? {
+                // The device may need the first pose for its setup.
+                if !self.request_pose().await? {
                     return Ok(());
                 }
                 self.journal.history().wanted().first().map_or(1, |slot| slot.pose)
@@ -173,39 +176,39 @@ impl<D: Device, W: Watcher> Collector<D, W> {
         };
         if self.device.is_local() {
             let prepared = self.prepared(first)?;
-            self.carried_to = Some(first);
+            self.device_pose = Some(first);
             self.device.prepare(&self.plan, &prepared)?;
         }
         let Connected { device, provenance } = self.device.meet().await?;
         self.check_device(&device.serial)?;
-        self.ask_at_start().await?;
+        self.prompt_at_start().await?;
         let time = Timestamp::now();
         let started = Started { time, device, provenance, conditions: self.conditions.clone() };
-        self.note(Entry::Started(Box::new(started)))
+        self.append(Entry::Started(Box::new(started)))
     }
 
-    /// Refuses another ranger than the plan or the journal knows.
+    /// Rejects a ranger whose serial number differs from the plan's or the journal's.
     fn check_device(&self, serial: &str) -> Result<(), Halt> {
-        let wanted = self.plan.keys.device.serial.as_deref();
-        if let Some(wanted) = wanted.filter(|wanted| *wanted != serial) {
+        let expected = self.plan.keys.device.serial.as_deref();
+        if let Some(expected) = expected.filter(|expected| *expected != serial) {
             return Err(Halt::failed(
-                format!("the ranger says it is {serial}, not {wanted}"),
-                "connect that one, or change device.serial in the plan",
+                format!("the ranger's serial number is {serial}, not {expected}"),
+                format!("connect {expected}, or change device.serial in the plan"),
             ));
         }
         let before = self.journal.history().starts.last().map(|start| start.device.serial.as_str());
         match before {
             Some(before) if before != serial && !self.choices.accept_changed_plan => {
                 Err(Halt::failed(
-                    format!("the ranger says it is {serial}; so far {before} measured"),
-                    "connect that one, or go on with this one by --accept-changed-plan",
+                    format!("the ranger's serial number is {serial}; previous scans used {before}"),
+                    format!("connect {before}, or continue with {serial} by --accept-changed-plan"),
                 ))
             }
             _ => Ok(()),
         }
     }
 
-    async fn ask_at_start(&mut self) -> Result<(), Halt> {
+    async fn prompt_at_start(&mut self) -> Result<(), Halt> {
         for key in self.plan.keys.ask.at_start.clone() {
             let answer = answered(&mut self.watcher, &format!("{key}:"), &self.interrupts).await?;
             self.conditions.insert(key, answer.unwrap_or_default().into());

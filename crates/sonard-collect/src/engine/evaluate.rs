@@ -1,4 +1,4 @@
-//! What becomes of a scan: accepted, refused or cut.
+//! Evaluation of a recorded scan: accepted, rejected or incomplete.
 
 use std::{collections::HashSet, path::Path, time::Duration};
 
@@ -10,25 +10,25 @@ use super::{
     super::{
         Action, Device, Entry, Figures, Finding, Halt, Outcome, Patience, Sealed, Slot, Take,
         Watcher, check, is_cut,
-        source::answered,
-        taking::{self, Taken},
+        pose_source::answered,
+        record_scan::{self, Taken},
         verdict,
     },
     Collector, Next,
 };
 
 impl<D: Device, W: Watcher> Collector<D, W> {
-    /// Lets a scan count, or sets it aside, and says what is next.
-    pub(super) async fn judge(
+    /// Accepts a scan or sets it aside, and returns the next step.
+    pub(super) async fn evaluate(
         &mut self,
         slot: Slot,
         (taken, change_c): (Taken, Option<f64>),
     ) -> Result<Next, Halt> {
         let Taken { view, lost, stopped, wall_s, gone: _ } = taken;
-        let lost =
-            lost.or_else(|| view.as_ref().filter(|view| lacks_readings(view)).map(|_| gone()));
+        let lost = lost
+            .or_else(|| view.as_ref().filter(|view| lacks_readings(view)).map(|_| ranger_lost()));
         let Some(view) = view.filter(|view| !is_cut(view) && is_measured(view)) else {
-            return self.broken_off(slot, lost, stopped).await;
+            return self.set_aside_incomplete(slot, lost, stopped).await;
         };
         if lost.is_none() {
             self.losses = None;
@@ -36,30 +36,31 @@ impl<D: Device, W: Watcher> Collector<D, W> {
         let figures = Figures::of(&view, change_c);
         let findings = check(&figures, &self.plan.keys.checks);
         let mut action = verdict(&findings);
-        self.tell(slot, &figures, &findings);
+        self.report_findings(slot, &figures, &findings);
         if action == Action::Ask {
-            action = self.ask_what_to_do().await?;
+            action = self.prompt_action().await?;
         }
         if action == Action::Note {
             self.accept(slot, &view, figures, findings, Some(wall_s))?;
-            return Ok(Next::GoOn);
+            return Ok(Next::Continue);
         }
-        let why = words(&findings);
-        self.set_aside(slot, Some((&view, figures, wall_s)), Outcome::Refused, findings, &why)?;
+        let reason = rejection_reason(&findings);
+        let scan = Some((&view, figures, wall_s));
+        self.set_aside(slot, scan, Outcome::Refused, findings, &reason)?;
         if self.interrupts.happened() {
             return Ok(Next::Stop("stopped on request".into()));
         }
         match action {
-            Action::Stop | Action::Ask => Ok(Next::Stop(format!("stopped: {why}"))),
+            Action::Stop | Action::Ask => Ok(Next::Stop(format!("stopped: {reason}"))),
             Action::Note | Action::Retake => match lost {
                 Some(lost) => self.wait_for_ranger(lost).await,
-                None => self.count_refusal(slot),
+                None => self.count_rejection(slot),
             },
         }
     }
 
-    /// Puts away a scan without an end, or without a reading, and says what is next.
-    async fn broken_off(
+    /// Sets aside a scan without end or without readings, and returns the next step.
+    async fn set_aside_incomplete(
         &mut self,
         slot: Slot,
         lost: Option<Halt>,
@@ -67,84 +68,85 @@ impl<D: Device, W: Watcher> Collector<D, W> {
     ) -> Result<Next, Halt> {
         let stop = match (self.interrupts.happened(), stopped) {
             (true, _) => Some("stopped on request"),
-            (_, true) => Some("the daemon was told to stop"),
+            (_, true) => Some("the daemon was stopped by another client"),
             _ => None,
         };
-        // A ranger that loses scan after scan before the first reading must not fill the folder.
+        // Scans lost before their first reading are removed, or repeated losses would fill the
+        // folder.
         if stop.is_some() || read(&self.folder.taking(slot))?.is_some_and(|view| is_measured(&view))
         {
-            self.set_aside(slot, None, Outcome::Cut, Vec::new(), "it was broken off")?;
+            self.set_aside(slot, None, Outcome::Cut, Vec::new(), "incomplete")?;
         } else {
             self.folder.discard(slot)?;
         }
-        if let Some(why) = stop {
-            return Ok(Next::Stop(why.into()));
+        if let Some(reason) = stop {
+            return Ok(Next::Stop(reason.into()));
         }
-        self.wait_for_ranger(lost.unwrap_or_else(gone)).await
+        self.wait_for_ranger(lost.unwrap_or_else(ranger_lost)).await
     }
 
-    /// Gives a ranger that lost a scan time before the next one, longer each time. That says nothing
-    /// about the pose, so it is no refusal: the collection ends when the plan's patience does.
+    /// Waits after a lost scan, longer after each one. A loss is independent of the pose, so it
+    /// does not count as a retake; the collection ends after `collection.patience_s`.
     async fn wait_for_ranger(&mut self, lost: Halt) -> Result<Next, Halt> {
         let patience = Duration::from_secs_f64(self.plan.keys.collection.patience_s);
         let losses = self.losses.get_or_insert_with(|| Patience::with_losses(patience));
         let (Halt::Failed { .. }, Some(wait)) = (&lost, losses.next_wait()) else {
             return match lost {
-                // The daemon wants no more of it.
-                Halt::Stopped(why) => Ok(Next::Stop(why)),
+                // The daemon dropped the request.
+                Halt::Stopped(reason) => Ok(Next::Stop(reason)),
                 lost => Err(lost),
             };
         };
-        self.watcher.say(&format!(
-            "the ranger was lost, the scan is taken again in {} s: {lost}",
-            wait.as_secs()
-        ));
+        self.watcher
+            .say(&format!("ranger lost; repeating the scan in {} s: {lost}", wait.as_secs()));
         tokio::select! {
-            () = sleep(wait) => Ok(Next::GoOn),
+            () = sleep(wait) => Ok(Next::Continue),
             () = self.interrupts.clone().wait() => Ok(Next::Stop("stopped on request".into())),
         }
     }
 
-    /// Takes in what an earlier run left behind: a scan that was whole counts as if nothing had
-    /// happened, another one is kept beside.
-    pub(super) fn take_in_left_overs(&mut self) -> Result<(), Halt> {
-        // Renamed, but not told: the rename is what counts.
-        let told: HashSet<Slot> = self.journal.history().accepted().map(|take| take.slot).collect();
+    /// Recovers the scans of an interrupted run: complete ones are evaluated like new scans, others
+    /// are set aside.
+    pub(super) fn recover_scans(&mut self) -> Result<(), Halt> {
+        // The rename accepts a scan; its journal entry may be missing after a crash.
+        let history = self.journal.history();
+        let journaled: HashSet<Slot> = history.accepted().map(|take| take.slot).collect();
         let scans = self.folder.scans()?;
-        for slot in scans.into_iter().filter(|slot| !told.contains(slot)) {
+        for slot in scans.into_iter().filter(|slot| !journaled.contains(slot)) {
             let sealed = self.folder.sealed(slot)?;
             let path = self.folder.root().join(&sealed.file);
             let Some(view) = read(&path)? else { continue };
             let figures = Figures::of(&view, None);
             let findings = check(&figures, &self.plan.keys.checks);
-            self.note(take_entry(slot, Some(&view), Outcome::Accepted, sealed, figures, findings))?;
+            let entry = take_entry(slot, Some(&view), Outcome::Accepted, sealed, figures, findings);
+            self.append(entry)?;
         }
         for slot in self.folder.left_over()? {
             let path = self.folder.taking(slot);
-            // Opening mends an end that was torn off.
+            // Opening removes an incomplete last line.
             LogWriter::open(&path).and_then(LogWriter::close)?;
             let view = read(&path)?.filter(|view| !is_cut(view));
             let done = self.folder.sealed(slot).is_ok();
             match view {
-                Some(view) if !done => self.judge_left_over(slot, &view)?,
+                Some(view) if !done => self.evaluate_recovered(slot, &view)?,
                 _ => {
-                    let why = "the program ended within it";
-                    self.set_aside(slot, None, Outcome::Cut, Vec::new(), why)?;
+                    let reason = "the program ended during the scan";
+                    self.set_aside(slot, None, Outcome::Cut, Vec::new(), reason)?;
                 }
             }
         }
         Ok(())
     }
 
-    fn judge_left_over(&mut self, slot: Slot, view: &ScanView) -> Result<(), Halt> {
+    fn evaluate_recovered(&mut self, slot: Slot, view: &ScanView) -> Result<(), Halt> {
         let figures = Figures::of(view, None);
         let findings = check(&figures, &self.plan.keys.checks);
         if verdict(&findings) == Action::Note {
             return self.accept(slot, view, figures, findings, None);
         }
-        let why = words(&findings);
+        let reason = rejection_reason(&findings);
         let wall_s = f64::NAN;
-        self.set_aside(slot, Some((view, figures, wall_s)), Outcome::Refused, findings, &why)
+        self.set_aside(slot, Some((view, figures, wall_s)), Outcome::Refused, findings, &reason)
     }
 
     fn accept(
@@ -160,9 +162,9 @@ impl<D: Device, W: Watcher> Collector<D, W> {
         if let Entry::Take(take) = &mut entry {
             take.wall_s = wall_s;
         }
-        self.note(entry)?;
+        self.append(entry)?;
         if let Some(wall_s) = wall_s {
-            self.pace.learn(wall_s);
+            self.pace.record_scan(wall_s);
         }
         self.write_manifest()
     }
@@ -170,42 +172,42 @@ impl<D: Device, W: Watcher> Collector<D, W> {
     fn set_aside(
         &mut self,
         slot: Slot,
-        of: Option<(&ScanView, Figures, f64)>,
+        scan: Option<(&ScanView, Figures, f64)>,
         outcome: Outcome,
         findings: Vec<Finding>,
-        why: &str,
+        reason: &str,
     ) -> Result<(), Halt> {
         let path = self.folder.taking(slot);
-        taking::mark(&path, why)?;
+        record_scan::mark_rejected(&path, reason)?;
         let sealed = self.folder.set_aside(slot)?;
-        let kept = match of {
+        let stored = match scan {
             Some(_) => None,
             None => read(&self.folder.root().join(&sealed.file))?,
         };
-        let view = of.map(|(view, ..)| view).or(kept.as_ref());
-        let figures = of.map_or_else(
+        let view = scan.map(|(view, ..)| view).or(stored.as_ref());
+        let figures = scan.map_or_else(
             || view.map(|view| Figures::of(view, None)).unwrap_or_default(),
             |(_, figures, _)| figures,
         );
         let mut entry = take_entry(slot, view, outcome, sealed, figures, findings);
         if let Entry::Take(take) = &mut entry {
-            take.wall_s = of.map(|(.., wall_s)| wall_s).filter(|wall_s| wall_s.is_finite());
-            take.cut = (outcome == Outcome::Cut).then(|| why.to_owned());
+            take.wall_s = scan.map(|(.., wall_s)| wall_s).filter(|wall_s| wall_s.is_finite());
+            take.cut = (outcome == Outcome::Cut).then(|| reason.to_owned());
         }
-        self.note(entry)
+        self.append(entry)
     }
 
-    /// One refusal more; after too many the scan is given up.
-    fn count_refusal(&mut self, slot: Slot) -> Result<Next, Halt> {
-        let refused = self.refused.entry(slot).or_default();
-        *refused += 1;
-        if *refused > self.plan.keys.collection.retakes {
+    /// Counts a rejection; the scan is given up once `collection.retakes` are used.
+    fn count_rejection(&mut self, slot: Slot) -> Result<Next, Halt> {
+        let rejections = self.rejections.entry(slot).or_default();
+        *rejections += 1;
+        if *rejections > self.plan.keys.collection.retakes {
             return self.give_up(slot);
         }
-        Ok(Next::GoOn)
+        Ok(Next::Continue)
     }
 
-    async fn ask_what_to_do(&mut self) -> Result<Action, Halt> {
+    async fn prompt_action(&mut self) -> Result<Action, Halt> {
         self.watcher.rest();
         loop {
             let question = "keep it, retake it or stop? [k/r/s]";
@@ -219,13 +221,13 @@ impl<D: Device, W: Watcher> Collector<D, W> {
         }
     }
 
-    /// One line about a scan, and one about each finding.
-    fn tell(&self, slot: Slot, figures: &Figures, findings: &[Finding]) {
+    /// Reports a line about a scan and a line about each finding.
+    fn report_findings(&self, slot: Slot, figures: &Figures, findings: &[Finding]) {
         let percent = |share: Option<f64>| {
             share.map_or_else(|| "-".into(), |share| format!("{:.0} %", 100.0 * share))
         };
         self.watcher.say(&format!(
-            "pose {} ({}), repeat {}: {} of {} beams, {} of the echo pairs agree",
+            "pose {} ({}), repeat {}: {} of {} beams, {} of the echoes agree",
             slot.pose,
             self.pose(slot.pose).label(),
             slot.repeat,
@@ -234,35 +236,36 @@ impl<D: Device, W: Watcher> Collector<D, W> {
             percent(figures.agree_fraction),
         ));
         for finding in findings {
-            let done = match finding.action {
+            let consequence = match finding.action {
                 Action::Note => "noted",
                 Action::Retake => "to be retaken",
-                Action::Ask => "asking",
+                Action::Ask => "prompting",
                 Action::Stop => "stopping",
             };
-            self.watcher.say(&format!("  {}: {done}", finding.detail));
+            self.watcher.say(&format!("  {}: {consequence}", finding.detail));
         }
     }
 }
 
-/// Whether any beam has a reading of the ranger's.
+/// Returns `true` if any beam has a reading from the ranger.
 fn is_measured(view: &ScanView) -> bool {
     view.pings.iter().any(|ping| ping.status != PingStatus::LinkLost)
 }
 
-/// Whether the ranger was given up before its last beam.
+/// Returns `true` if the link was lost before the last beam.
 fn lacks_readings(view: &ScanView) -> bool {
     view.pings.iter().any(|ping| ping.status == PingStatus::LinkLost)
 }
 
-fn gone() -> Halt {
+fn ranger_lost() -> Halt {
     Halt::failed(
         "the ranger was lost during the scan",
-        "look at its cable and supply: `sonard doctor --port PORT` examines them",
+        "check its cable and supply with `sonard doctor --port PORT`",
     )
 }
 
-fn words(findings: &[Finding]) -> String {
+/// Details of all findings that reject a scan.
+fn rejection_reason(findings: &[Finding]) -> String {
     let details: Vec<_> = findings
         .iter()
         .filter(|finding| finding.action != Action::Note)
@@ -295,7 +298,7 @@ fn take_entry(
     }))
 }
 
-/// The scan in a file, if it holds one.
+/// Reads the first scan of a file, if any.
 fn read(path: &Path) -> Result<Option<ScanView>, Halt> {
     let loaded = load(path)?;
     Ok(ScanView::from_records(loaded.records).into_iter().next())

@@ -1,4 +1,4 @@
-//! One scan into a file of its own.
+//! Recording of one scan into its own log file.
 
 use std::{
     path::Path,
@@ -13,28 +13,29 @@ use tokio::io::{AsyncRead, AsyncWrite};
 
 use super::Halt;
 
-/// How long a record may wait for the disk: a power cut costs the scan under way all the same.
-const SYNC: Duration = Duration::from_secs(5);
+/// Sync interval of the scan's log. A power cut invalidates the current scan anyway, so a longer
+/// interval loses nothing.
+const SYNC_INTERVAL: Duration = Duration::from_secs(5);
 
-/// A scan that is over, with its file closed and on the disk.
+/// Finished scan whose file is closed and synced.
 #[derive(Debug)]
 pub struct Taken {
-    /// The scan, if the file holds one.
+    /// Scan read from the file's records, if present.
     pub view: Option<ScanView>,
-    /// Why the device gave up, if it did.
+    /// Failure that ended the scan, if any.
     pub lost: Option<Halt>,
-    /// Whether it has to be met again, though the scan may be whole.
+    /// `true` if the device must be identified again; the scan may still be complete.
     pub gone: bool,
-    /// Whether somebody told the daemon that took it to stop.
+    /// `true` if a client stopped the daemon that was taking the scan.
     pub stopped: bool,
-    /// How long it took, seconds.
+    /// Duration by the wall clock, seconds.
     pub wall_s: f64,
 }
 
-/// Takes a scan with a ranger of one's own, whose session is the file's first record.
+/// Takes a scan with a local ranger; the session becomes the file's first record.
 ///
 /// # Errors
-/// When the file can't be written: what is in it is cut.
+/// Returns an error if the file cannot be written; the scan in it is then incomplete.
 pub async fn take<L: AsyncRead + AsyncWrite + Unpin>(
     ranger: &mut Ranger<L>,
     (job, session): (&ScanJob, Session),
@@ -42,7 +43,7 @@ pub async fn take<L: AsyncRead + AsyncWrite + Unpin>(
     beam: &(dyn Fn() + Sync),
     interrupts: &Interrupts,
 ) -> Result<Taken, Halt> {
-    let mut sink = Taking::open(path, beam)?;
+    let mut sink = ScanSink::open(path, beam)?;
     sink.record(&Record::Session(Box::new(session)))?;
     let began = Instant::now();
     let outcome = ranger.scan(job, &mut sink, interrupts.clone().reason()).await;
@@ -55,42 +56,42 @@ pub async fn take<L: AsyncRead + AsyncWrite + Unpin>(
     Ok(Taken { view: sink.close()?, lost, gone, stopped: false, wall_s })
 }
 
-/// Marks the end of a file that does not count, so that it says so itself.
+/// Appends an event to a rejected scan's file, which marks it without the journal.
 ///
 /// # Errors
-/// When the disk is full or fails.
-pub(super) fn mark(path: &Path, why: &str) -> Result<(), Halt> {
+/// Returns an error if the disk is full or fails.
+pub(super) fn mark_rejected(path: &Path, reason: &str) -> Result<(), Halt> {
     let event = Event {
         time: jiff::Timestamp::now(),
         kind: EventKind::Gap,
-        detail: format!("this scan does not count: {why}"),
+        detail: format!("this scan does not count: {reason}"),
     };
     let marked = LogWriter::open(path)
         .and_then(|mut log| log.append(&Record::Event(event)).and_then(|()| log.close()));
     Ok(marked?)
 }
 
-/// A scan's file while it is written, with what was written.
-pub(super) struct Taking<'a> {
+/// Writer of a scan's file that keeps the written records.
+pub(super) struct ScanSink<'a> {
     log: LogWriter,
     records: Vec<Record>,
     beam: &'a (dyn Fn() + Sync),
 }
 
-impl<'a> Taking<'a> {
+impl<'a> ScanSink<'a> {
     pub(super) fn open(path: &Path, beam: &'a (dyn Fn() + Sync)) -> Result<Self, Halt> {
-        let log = LogWriter::open(path)?.with_sync_interval(SYNC);
+        let log = LogWriter::open(path)?.with_sync_interval(SYNC_INTERVAL);
         Ok(Self { log, records: Vec::new(), beam })
     }
 
-    /// Closes the file; the scan in it, if there is one.
+    /// Closes the file and returns its last scan, if any.
     pub(super) fn close(self) -> Result<Option<ScanView>, Halt> {
         self.log.close()?;
         Ok(ScanView::from_records(self.records).pop())
     }
 }
 
-impl Sink for Taking<'_> {
+impl Sink for ScanSink<'_> {
     fn record(&mut self, record: &Record) -> Result<(), SinkError> {
         self.log.append(record)?;
         if matches!(record, Record::Ping(_)) {

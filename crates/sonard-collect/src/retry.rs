@@ -1,11 +1,11 @@
-//! Waits between tries, which grow until patience is over.
+//! Growing retry delays with an overall time limit.
 
 use std::time::Duration;
 
 use sonard_runtime::backoff::Backoff;
 use tokio::time::Instant;
 
-/// Waits between tries to get something of a ranger.
+/// Delays between attempts to use a ranger, up to a deadline.
 #[derive(Debug)]
 pub struct Patience {
     until: Instant,
@@ -13,13 +13,15 @@ pub struct Patience {
 }
 
 impl Patience {
-    /// For finding a ranger that does not answer: a try costs nothing.
+    /// Creates delays for a ranger that does not respond: 0.3 s to 10 s, because an attempt is
+    /// cheap.
     #[must_use]
     pub fn with_absence(patience: Duration) -> Self {
         Self::new(patience, Backoff::new(Duration::from_millis(300), Duration::from_secs(10)))
     }
 
-    /// For a ranger that answers and loses one scan after the other: a try costs a scan.
+    /// Creates delays for a ranger that responds and then loses its scans: 1 s to 300 s with
+    /// factor 4, because an attempt costs a scan.
     #[must_use]
     pub fn with_losses(patience: Duration) -> Self {
         let backoff = Backoff::new(Duration::from_secs(1), Duration::from_secs(300));
@@ -30,7 +32,7 @@ impl Patience {
         Self { until: Instant::now() + patience, backoff }
     }
 
-    /// How long to wait before the next try; `None` when there is to be no other.
+    /// Returns the delay before the next attempt; `None` if it would end after the deadline.
     pub fn next_wait(&mut self) -> Option<Duration> {
         let wait = self.backoff.next_wait();
         (Instant::now() + wait < self.until).then_some(wait)

@@ -1,4 +1,4 @@
-//! Places in logs, remembered in a file beside them.
+//! Fingerprints of log positions and file digests.
 
 use std::{
     fs::{self, File},
@@ -9,38 +9,38 @@ use std::{
 use serde::de::DeserializeOwned;
 use sha2::{Digest as _, Sha256};
 
-/// So many bytes before a place tell whether a log is the one it was.
+/// Number of bytes before a position that identify a log.
 pub const MARK_BYTES: u64 = 256;
 
-/// The last bytes before a place in a log, at most [`MARK_BYTES`].
+/// Fingerprint of a position in a log: the preceding bytes, at most [`MARK_BYTES`].
 #[derive(Debug, Clone, Default)]
 pub struct Mark(Vec<u8>);
 
 impl Mark {
-    /// Goes on by what comes next in the log.
+    /// Advances the position by the next bytes of the log.
     pub fn push(&mut self, bytes: &[u8]) {
-        let most = MARK_BYTES as usize;
-        self.0.extend_from_slice(bytes.get(bytes.len().saturating_sub(most)..).unwrap_or_default());
-        self.0.drain(..self.0.len().saturating_sub(most));
+        let max = MARK_BYTES as usize;
+        self.0.extend_from_slice(bytes.get(bytes.len().saturating_sub(max)..).unwrap_or_default());
+        self.0.drain(..self.0.len().saturating_sub(max));
     }
 
-    /// What the log is known by.
+    /// SHA-256 of the fingerprint, hexadecimal.
     #[must_use]
     pub fn sha256(&self) -> String {
         hexadecimal(&Sha256::digest(&self.0))
     }
 }
 
-/// A digest in hexadecimal digits.
+/// Formats a digest in hexadecimal digits.
 #[must_use]
 pub fn hexadecimal(digest: &[u8]) -> String {
     digest.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-/// Size and SHA-256 of a file, read piece by piece.
+/// Computes size and SHA-256 of a file, read in chunks.
 ///
 /// # Errors
-/// When it can't be read.
+/// Returns an error if the file cannot be read.
 pub fn digest_of(file: &mut File) -> io::Result<(u64, String)> {
     let (mut hash, mut bytes, mut piece) = (Sha256::new(), 0, vec![0; 1 << 16]);
     loop {
@@ -53,14 +53,14 @@ pub fn digest_of(file: &mut File) -> io::Result<(u64, String)> {
     }
 }
 
-/// What a small file of JSON says; `None` where there is no file.
+/// Reads and parses a small JSON file; `None` if there is no file.
 ///
 /// # Errors
-/// When there is one that can't be read, is longer than `most_bytes`, or says something else.
-pub fn read_small<T: DeserializeOwned>(path: &Path, most_bytes: u64) -> io::Result<Option<T>> {
+/// Returns an error if the file cannot be read or parsed, or is longer than `max_bytes`.
+pub fn read_small<T: DeserializeOwned>(path: &Path, max_bytes: u64) -> io::Result<Option<T>> {
     match fs::metadata(path) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
-        Ok(metadata) if metadata.is_file() && metadata.len() <= most_bytes => {}
+        Ok(metadata) if metadata.is_file() && metadata.len() <= max_bytes => {}
         Ok(_) => return Err(io::ErrorKind::InvalidData.into()),
         Err(error) => return Err(error),
     }
@@ -72,7 +72,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_mark_is_of_the_last_bytes_however_they_came() {
+    fn fingerprint_of_chunks() {
         let bytes: Vec<u8> = (0..=255).cycle().take(1000).collect();
         let (mut whole, mut pieces) = (Mark::default(), Mark::default());
         whole.push(&bytes);
@@ -82,7 +82,7 @@ mod tests {
     }
 
     #[test]
-    fn a_file_longer_than_a_piece_has_the_digest_of_its_bytes() {
+    fn digest_over_several_chunks() {
         let bytes: Vec<u8> = (0..=250).cycle().take(200_001).collect();
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("file");

@@ -1,66 +1,66 @@
-//! What a plan changed since the collection began.
+//! Differences between the current plan and the plan in the journal.
 
 use serde_json::Value;
 
 use super::{CollectionKeys, History, Plan, Poses, numbers_of};
 
-/// Keys that do not matter for what is collected.
-const FREE: [&str; 3] = ["collection.folder", "collection.patience_s", "device.port"];
+/// Keys that do not affect the collected scans.
+const IGNORED_KEYS: [&str; 3] = ["collection.folder", "collection.patience_s", "device.port"];
 
-/// What differs from the plan the journal knows, one line each; nothing if it is the same.
-pub(super) fn since(history: &History, now: &Plan, sensor_sha256: &str) -> Vec<String> {
+/// Lists the differences from the journal's last plan, one message each.
+pub(super) fn plan_changes(history: &History, now: &Plan, sensor_sha256: &str) -> Vec<String> {
     let Some(before) = history.plans.last() else { return Vec::new() };
     let keys = serde_json::to_value(&now.keys).unwrap_or_default();
     let mut changes = Vec::new();
-    // What an earlier version did not know yet was as it is by default.
-    let mut then = serde_json::to_value(CollectionKeys::default()).unwrap_or_default();
-    merge(&mut then, &before.keys);
-    compare("", &then, &keys, &mut changes);
+    // Keys added by a later version had their default value.
+    let mut old_keys = serde_json::to_value(CollectionKeys::default()).unwrap_or_default();
+    merge(&mut old_keys, &before.keys);
+    compare("", &old_keys, &keys, &mut changes);
     if before.scene.sha256 != now.scene.sha256 {
-        changes.push(format!("the scene {} is not the one it was", now.scene.name));
+        changes.push(format!("scene {} changed", now.scene.name));
     }
     if before.sensor_sha256 != sensor_sha256 {
-        changes.push(format!("the data of the sensor {} is not what it was", now.sensor.name));
+        changes.push(format!("data of sensor {} changed", now.sensor.name));
     }
     if let (Poses::Listed(listed), Some(known)) = (&now.poses, &before.poses)
         && changes.is_empty()
         && numbers_of(listed, &history.poses) != known.iter().map(|n| Some(*n)).collect::<Vec<_>>()
     {
-        changes.push("the poses in the file are not those they were".into());
+        changes.push("poses in the file changed".into());
     }
     changes
 }
 
-/// Puts values over others, deep.
-fn merge(under: &mut Value, over: &Value) {
-    match (under, over) {
-        (Value::Object(under), Value::Object(over)) => {
-            for (key, over) in over {
-                merge(under.entry(key.clone()).or_insert(Value::Null), over);
+/// Overrides values recursively.
+fn merge(base: &mut Value, overrides: &Value) {
+    match (base, overrides) {
+        (Value::Object(base), Value::Object(overrides)) => {
+            for (key, value) in overrides {
+                merge(base.entry(key.clone()).or_insert(Value::Null), value);
             }
         }
-        (under, over) => *under = over.clone(),
+        (base, overrides) => *base = overrides.clone(),
     }
 }
 
-fn compare(at: &str, before: &Value, now: &Value, changes: &mut Vec<String>) {
-    let nothing = serde_json::Map::new();
+fn compare(path: &str, before: &Value, now: &Value, changes: &mut Vec<String>) {
+    let empty = serde_json::Map::new();
     match (before.as_object(), now.as_object()) {
         (None, None) if before != now => {
             let shown =
                 |value: &Value| if value.is_null() { "not set".into() } else { value.to_string() };
-            changes.push(format!("{at} was {} and is {}", shown(before), shown(now)));
+            changes.push(format!("{path} changed from {} to {}", shown(before), shown(now)));
         }
         (None, None) => {}
         (before, now) => {
-            let (before, now) = (before.unwrap_or(&nothing), now.unwrap_or(&nothing));
+            let (before, now) = (before.unwrap_or(&empty), now.unwrap_or(&empty));
             let added = now.keys().filter(|key| !before.contains_key(*key));
             for key in before.keys().chain(added) {
-                let place = if at.is_empty() { key.clone() } else { format!("{at}.{key}") };
-                if !FREE.contains(&place.as_str()) {
-                    let of = |map: &serde_json::Map<String, Value>| map.get(key).cloned();
-                    let (was, is) = (of(before).unwrap_or_default(), of(now).unwrap_or_default());
-                    compare(&place, &was, &is, changes);
+                let path = if path.is_empty() { key.clone() } else { format!("{path}.{key}") };
+                if !IGNORED_KEYS.contains(&path.as_str()) {
+                    let before = before.get(key).unwrap_or(&Value::Null);
+                    let now = now.get(key).unwrap_or(&Value::Null);
+                    compare(&path, before, now, changes);
                 }
             }
         }
@@ -73,7 +73,7 @@ mod tests {
     use serde_json::json;
 
     #[test]
-    fn every_key_that_matters_is_named_with_both_values() {
+    fn lists_changed_keys() {
         let before = json!({
             "collection": {"repeats": 3, "folder": "a"},
             "device": {"port": null, "serial": "x"},
@@ -89,9 +89,9 @@ mod tests {
         assert_eq!(
             changes,
             [
-                "collection.repeats was 3 and is 5",
-                "conditions.door was \"open\" and is not set",
-                "conditions.carpet was not set and is true",
+                "collection.repeats changed from 3 to 5",
+                "conditions.door changed from \"open\" to not set",
+                "conditions.carpet changed from not set to true",
             ]
         );
         compare("", &now, &now, &mut changes);
@@ -99,7 +99,7 @@ mod tests {
     }
 
     #[test]
-    fn values_are_put_over_others_key_by_key() {
+    fn merges_key_by_key() {
         let mut values = json!({"sensor": {"lossless": false, "engine": "paths"}, "poses": {}});
         merge(&mut values, &json!({"sensor": {"engine": "fan"}, "conditions": {"door": "open"}}));
         let expected = json!({

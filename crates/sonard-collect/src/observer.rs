@@ -1,0 +1,32 @@
+//! Progress reports and prompts of a running collection.
+
+use super::{Folder, Halt, History};
+
+/// Receiver of progress reports that answers prompts: a terminal, or an unattended process.
+pub trait Watcher: Send + Sync {
+    /// Reports the start of a scan, after `done` of `total` scans; `left_s` is the estimated
+    /// remaining time in seconds.
+    fn begin(&self, label: &str, done: u32, total: u32, left_s: f64);
+
+    /// Reports one recorded beam.
+    fn beam(&self);
+
+    /// Reports a message to the operator.
+    fn say(&self, line: &str);
+
+    /// Reports the number of remaining scans and their estimated duration in seconds.
+    fn announce(&self, scans: u32, left_s: f64);
+
+    /// Reports that measuring pauses until the next scan starts.
+    fn rest(&self);
+
+    /// Prompts the operator and waits for the answer; `None` without a terminal. Cancel-safe: an
+    /// unanswered prompt is repeated by the next call.
+    fn ask(&mut self, question: &str) -> impl Future<Output = Option<String>> + Send;
+
+    /// Writes the report of a complete collection, before its manifest is written.
+    ///
+    /// # Errors
+    /// Returns an error if the report cannot be written.
+    fn report(&self, folder: &Folder, history: &History) -> Result<(), Halt>;
+}
