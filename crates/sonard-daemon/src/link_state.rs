@@ -1,107 +1,107 @@
-//! The link to the device as a state machine: what to do next, how long to wait, what to say.
+//! State machine of the link to the device: next step, retry delay, reportable transitions.
 //!
-//! Pure: it is told what came of each step and what time it is (any clock that does not jump),
-//! and never waits itself. It holds two rules: the motor moves only after homing on this
-//! connection, and between two tries there is a bounded wait.
+//! The machine is pure: the caller supplies the outcome of each step and the time of a monotonic
+//! clock, and does the waiting. Two invariants hold: the motor moves only after homing on the
+//! current connection, and consecutive attempts are separated by a bounded wait.
 
 use std::time::Duration;
 
 use sonard_api::{LinkState, Trouble};
 
-/// The outcome of a step, or an external event.
+/// Outcome of a step, or an external event.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Input {
     /// The port is open and locked.
     Opened,
-    /// The right device told its identity.
+    /// The expected device reported its identity.
     Identified,
-    /// The motor is at home.
+    /// The motor is at its home position.
     Homed,
-    /// A scan began.
+    /// The first beam of a scan is about to be measured.
     ScanBegun,
-    /// A scan ended as it should, or was stopped.
+    /// A scan ended normally, or was stopped.
     ScanEnded,
-    /// The device restarted while it had no work: its position is unknown.
+    /// The device restarted while idle: the position of its motor is unknown.
     Restarted,
-    /// The step, or the link by itself, failed.
+    /// The step or the link failed.
     Failed(Trouble),
     /// The emergency stop was pressed (`true`) or released.
     EmergencyStop(bool),
     /// The device's own emergency stop was pressed.
     DeviceStopped,
-    /// Somebody wants it to work.
+    /// A start was requested.
     Start,
-    /// Another port is to be used.
+    /// The configured port changed.
     PortChanged,
-    /// The end.
+    /// The daemon is stopping.
     Shutdown,
 }
 
-/// The next step.
+/// Next step of the device task.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Step {
-    /// Open the port.
+    /// Open and lock the port.
     Open,
-    /// Ask who is there.
+    /// Query the identity of the device.
     Identify,
     /// Set up the device and home the motor.
     Home,
-    /// The device can be used; scans may begin.
+    /// Serve scans: the device is ready.
     Serve,
-    /// Close the port if it is open, and wait until this time or until something happens.
+    /// Close the port if it is open, and wait until this time or the next event.
     Wait(Duration),
-    /// Close the port and wait until something happens.
+    /// Close the port and wait for the next event.
     Rest,
-    /// Close everything.
+    /// Close all resources and end.
     End,
 }
 
-/// From one settled state to another, to be told once.
+/// Transition between settled states, to be reported once.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Transition {
     /// Settled state before, if there was one.
     pub from: Option<LinkState>,
-    /// Settled state now.
+    /// Settled state from now on.
     pub to: LinkState,
 }
 
-/// Bounds of the wait from try to try.
+/// Bounds of the wait between attempts.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct BackOff {
-    /// After the first failure.
+pub struct RetryBounds {
+    /// Wait after the first failure.
     pub min: Duration,
-    /// Never longer.
+    /// Upper bound of the wait.
     pub max: Duration,
 }
 
-/// Decides what to do about the link: [`Self::poll`] says what, [`Self::handle`] is told what came
-/// of it, [`Self::poll_transition`] what to tell others.
+/// State machine of the link. [`Self::poll`] returns the next step, [`Self::handle`] takes its
+/// outcome, and [`Self::poll_transition`] returns a transition to report.
 #[derive(Debug, Clone)]
 pub struct LinkMachine {
-    back_off: BackOff,
+    retry_bounds: RetryBounds,
     state: LinkState,
     since: Duration,
     retry_at: Duration,
-    /// Tries in a row that did not bring the device up.
+    /// Consecutive attempts that failed to bring the device up.
     failures: u32,
-    /// Times in a row that the device was up, and lost before it had been of use.
+    /// Consecutive losses of a device that was up, before it completed a scan.
     relapses: u32,
-    /// Since when the device can be used without a break.
+    /// Time since which the device is up without interruption.
     up_since: Option<Duration>,
     pressed: bool,
-    /// Whether it works on by itself after an emergency stop.
+    /// The machine resumes by itself after an emergency stop.
     resumes: bool,
-    /// The settled state that was told last.
-    told: Option<LinkState>,
+    /// Last reported settled state.
+    reported: Option<LinkState>,
     transition: Option<Transition>,
 }
 
 impl LinkMachine {
-    /// A machine that begins by opening the port.
+    /// Creates a machine whose first step opens the port.
     #[must_use]
-    pub const fn new(back_off: BackOff, now: Duration) -> Self {
+    pub const fn new(retry_bounds: RetryBounds, now: Duration) -> Self {
         Self {
-            back_off,
+            retry_bounds,
             state: LinkState::Opening,
             since: now,
             retry_at: now,
@@ -110,22 +110,22 @@ impl LinkMachine {
             up_since: None,
             pressed: false,
             resumes: false,
-            told: None,
+            reported: None,
             transition: None,
         }
     }
 
-    /// Other bounds from the next failure on.
-    pub const fn set_back_off(&mut self, back_off: BackOff) {
-        self.back_off = back_off;
+    /// Changes the bounds of the wait, from the next failure on.
+    pub const fn set_retry_bounds(&mut self, retry_bounds: RetryBounds) {
+        self.retry_bounds = retry_bounds;
     }
 
-    /// Whether it works on by itself after the next emergency stop.
+    /// Sets whether the machine resumes by itself after the next emergency stop.
     pub const fn set_resumes(&mut self, resumes: bool) {
         self.resumes = resumes;
     }
 
-    /// What to do now. The same until something is handled, except that a wait ends.
+    /// Returns the current step. It changes only with an input, or when a wait ends.
     pub fn poll(&mut self, now: Duration) -> Step {
         use LinkState as State;
         match self.state {
@@ -143,7 +143,7 @@ impl LinkMachine {
         }
     }
 
-    /// Takes in what happened. What does not fit the state is ignored.
+    /// Handles an input. Inputs that do not apply to the current state are ignored.
     pub fn handle(&mut self, now: Duration, input: Input) {
         use LinkState as State;
         match (input, self.state) {
@@ -154,7 +154,7 @@ impl LinkMachine {
                 if pressed {
                     self.enter(now, State::EmergencyStop);
                 } else if state == State::EmergencyStop {
-                    self.after_stop(now);
+                    self.leave_emergency_stop(now);
                 }
             }
             (_, State::EmergencyStop) => {}
@@ -182,59 +182,60 @@ impl LinkMachine {
         }
     }
 
-    /// The next change of settled state that nobody was told of.
+    /// Takes the transition that has not been reported yet.
     pub const fn poll_transition(&mut self) -> Option<Transition> {
         self.transition.take()
     }
 
-    /// What the link is doing.
+    /// Current state of the link.
     #[must_use]
     pub const fn state(&self) -> LinkState {
         self.state
     }
 
-    /// Since when.
+    /// Time since which the current state lasts.
     #[must_use]
     pub const fn since(&self) -> Duration {
         self.since
     }
 
-    /// Failures since the device was last in proper use.
+    /// Consecutive failures; a completed scan resets them.
     #[must_use]
     pub const fn failures(&self) -> u32 {
         self.failures
     }
 
-    /// When the next try is due, if the link waits for one.
+    /// Time of the next attempt, if the link is waiting for one.
     #[must_use]
     pub fn retry_at(&self) -> Option<Duration> {
         let waits = self.state.is_settled() && !self.state.is_up();
-        let for_ever = matches!(
+        let has_no_retry = matches!(
             self.state,
             LinkState::EmergencyStop | LinkState::AwaitingStart | LinkState::Stopped
         );
-        (waits && !for_ever).then_some(self.retry_at)
+        (waits && !has_no_retry).then_some(self.retry_at)
     }
 
-    /// Whoever released it may still have a hand there, or have turned the motor: nothing moves by
-    /// itself, and what begins then begins anew, homing and all.
-    fn after_stop(&mut self, now: Duration) {
+    /// Leaves the emergency stop. A hand may still be near the motor, or have turned it: motion
+    /// needs a start unless `resumes` is set, and the device is homed again in any case.
+    fn leave_emergency_stop(&mut self, now: Duration) {
         let next = if self.resumes { LinkState::Opening } else { LinkState::AwaitingStart };
         self.enter(now, next);
     }
 
     fn fail(&mut self, now: Duration, trouble: Trouble) {
-        // A device that came up is there again, however long it was away: what counts from here on is
-        // how often it was lost again, until it was of use or up for longer than the longest wait.
+        // A device that came up ends the sequence of failures, however long it was absent. From
+        // then on losses count, until it completes a scan or is up for longer than the maximum
+        // wait.
         if let Some(since) = self.up_since {
-            if now.saturating_sub(since) > self.back_off.max {
+            if now.saturating_sub(since) > self.retry_bounds.max {
                 self.relapses = 0;
             }
             self.failures = self.relapses;
             self.relapses = self.relapses.saturating_add(1);
         }
         let doublings = self.failures.min(16);
-        let wait = self.back_off.min.saturating_mul(1 << doublings).min(self.back_off.max);
+        let wait = self.retry_bounds.min.saturating_mul(1 << doublings).min(self.retry_bounds.max);
         self.failures = self.failures.saturating_add(1);
         self.retry_at = now.saturating_add(wait);
         self.enter(now, LinkState::Down(trouble));
@@ -250,8 +251,8 @@ impl LinkMachine {
             self.up_since = None;
         }
         let settled = if state == LinkState::Scanning { LinkState::Ready } else { state };
-        if settled.is_settled() && self.told != Some(settled) {
-            let from = self.told.replace(settled);
+        if settled.is_settled() && self.reported != Some(settled) {
+            let from = self.reported.replace(settled);
             self.transition = Some(Transition { from, to: settled });
         }
     }

@@ -1,17 +1,18 @@
-//! The link's state machine against simulated time.
+//! State machine of the link in simulated time.
 
 use super::*;
 use proptest::prelude::*;
 
-const BACK_OFF: BackOff = BackOff { min: Duration::from_millis(200), max: Duration::from_secs(5) };
+const RETRY_BOUNDS: RetryBounds =
+    RetryBounds { min: Duration::from_millis(200), max: Duration::from_secs(5) };
 
 fn ms(ms: u64) -> Duration {
     Duration::from_millis(ms)
 }
 
-/// A machine brought to `Ready` at time 0.
+/// Creates a machine that is `Ready` at time 0.
 fn ready() -> LinkMachine {
-    let mut machine = LinkMachine::new(BACK_OFF, ms(0));
+    let mut machine = LinkMachine::new(RETRY_BOUNDS, ms(0));
     for (step, input) in [
         (Step::Open, Input::Opened),
         (Step::Identify, Input::Identified),
@@ -25,8 +26,8 @@ fn ready() -> LinkMachine {
 }
 
 #[test]
-fn waits_double_up_to_the_bound_and_begin_anew_after_proper_use() {
-    let mut machine = LinkMachine::new(BACK_OFF, ms(0));
+fn wait_doubles_up_to_the_maximum() {
+    let mut machine = LinkMachine::new(RETRY_BOUNDS, ms(0));
     let mut now = ms(0);
     let mut waits = Vec::new();
     for _ in 0..8 {
@@ -46,8 +47,8 @@ fn waits_double_up_to_the_bound_and_begin_anew_after_proper_use() {
 }
 
 #[test]
-fn a_device_that_fails_again_as_soon_as_it_is_up_is_tried_less_and_less_often() {
-    let mut machine = LinkMachine::new(BACK_OFF, ms(0));
+fn wait_grows_if_the_device_relapses() {
+    let mut machine = LinkMachine::new(RETRY_BOUNDS, ms(0));
     let mut now = ms(0);
     for _ in 0..6 {
         for input in [Input::Opened, Input::Identified, Input::Homed, Input::ScanBegun] {
@@ -59,7 +60,7 @@ fn a_device_that_fails_again_as_soon_as_it_is_up_is_tried_less_and_less_often() 
         now = until;
     }
     assert_eq!(now, ms(200 + 400 + 800 + 1600 + 3200 + 5000));
-    // One that was up for longer than the longest wait is a new case.
+    // A device that was up for longer than the maximum wait starts again with the minimum.
     for input in [Input::Opened, Input::Identified, Input::Homed] {
         machine.poll(now);
         machine.handle(now, input);
@@ -70,11 +71,11 @@ fn a_device_that_fails_again_as_soon_as_it_is_up_is_tried_less_and_less_often() 
 }
 
 #[test]
-fn a_device_that_came_back_is_waited_for_as_if_it_had_never_been_away() {
+fn absence_does_not_lengthen_waits() {
     let mut machine = ready();
     let mut now = ms(0);
     let mut waits = Vec::new();
-    // Pulled and plugged in again: gone for five tries, and soon up again.
+    // Unplugged for five attempts, then up again.
     for _ in 0..3 {
         now += ms(1_000);
         machine.handle(now, Input::Failed(Trouble::Lost));
@@ -94,19 +95,19 @@ fn a_device_that_came_back_is_waited_for_as_if_it_had_never_been_away() {
             machine.handle(now, input);
         }
     }
-    // Without a scan it has not proved itself: one that flaps is tried less and less often.
+    // Without a completed scan each loss counts: a flapping device is retried less often.
     assert_eq!(waits, [200, 400, 800]);
 }
 
 #[test]
-fn a_long_absence_is_told_once_and_the_return_once() {
+fn absence_is_reported_once() {
     let mut machine = ready();
     assert_eq!(machine.poll_transition(), Some(Transition { from: None, to: LinkState::Ready }));
-    let mut told = Vec::new();
+    let mut reported = Vec::new();
     let mut now = ms(10);
     machine.handle(now, Input::Failed(Trouble::Lost));
     for _ in 0..1000 {
-        told.extend(machine.poll_transition());
+        reported.extend(machine.poll_transition());
         match machine.poll(now) {
             Step::Open => machine.handle(now, Input::Failed(Trouble::Absent)),
             Step::Wait(until) => now = until,
@@ -117,20 +118,20 @@ fn a_long_absence_is_told_once_and_the_return_once() {
     for input in [Input::Opened, Input::Identified, Input::Homed] {
         machine.handle(now, input);
     }
-    told.extend(machine.poll_transition());
-    let states: Vec<_> = told.iter().map(|transition| transition.to).collect();
+    reported.extend(machine.poll_transition());
+    let states: Vec<_> = reported.iter().map(|transition| transition.to).collect();
     assert_eq!(
         states,
         [LinkState::Down(Trouble::Lost), LinkState::Down(Trouble::Absent), LinkState::Ready]
     );
-    // Scan after scan is not told either.
+    // Scans are no transition.
     machine.handle(now, Input::ScanBegun);
     machine.handle(now, Input::ScanEnded);
     assert_eq!(machine.poll_transition(), None);
 }
 
 #[test]
-fn a_restart_without_work_homes_again_before_the_next_scan() {
+fn idle_restart_homes_again() {
     let mut machine = ready();
     machine.handle(ms(5), Input::Restarted);
     assert_eq!(machine.poll(ms(5)), Step::Identify);
@@ -141,7 +142,7 @@ fn a_restart_without_work_homes_again_before_the_next_scan() {
 }
 
 #[test]
-fn after_an_emergency_stop_nothing_moves_until_it_is_started() {
+fn emergency_stop_requires_a_start() {
     let mut machine = ready();
     machine.handle(ms(1), Input::EmergencyStop(true));
     machine.handle(ms(2), Input::Start);
@@ -157,7 +158,7 @@ fn after_an_emergency_stop_nothing_moves_until_it_is_started() {
     machine.handle(ms(5), Input::Start);
     assert_eq!(machine.poll(ms(5)), Step::Open);
 
-    // The device's own emergency stop is no other.
+    // The device's own emergency stop has the same effect.
     let mut machine = ready();
     machine.handle(ms(1), Input::DeviceStopped);
     assert_eq!(machine.poll(ms(3_600_000)), Step::Rest);
@@ -166,7 +167,7 @@ fn after_an_emergency_stop_nothing_moves_until_it_is_started() {
 }
 
 #[test]
-fn where_it_may_resume_it_homes_after_the_emergency_stop() {
+fn emergency_stop_with_resume() {
     let mut machine = ready();
     machine.set_resumes(true);
     machine.handle(ms(1), Input::ScanBegun);
@@ -207,11 +208,11 @@ fn input() -> impl Strategy<Value = Input> {
 }
 
 proptest! {
-    /// Whatever happens in whatever order: scans run only on a connection that was homed,
-    /// waits are bounded, and tries are never closer together than the least wait.
+    /// For any sequence of inputs: scans run only on a homed connection, waits are bounded, and
+    /// attempts are at least the minimum wait apart.
     #[test]
     fn no_motion_before_homing_and_no_spin(inputs in prop::collection::vec((input(), 0..2000_u64), 1..200)) {
-        let mut machine = LinkMachine::new(BACK_OFF, ms(0));
+        let mut machine = LinkMachine::new(RETRY_BOUNDS, ms(0));
         let (mut now, mut homed, mut failed_at) = (ms(0), false, None);
         for (input, wait_ms) in inputs {
             now += ms(wait_ms);
@@ -220,12 +221,12 @@ proptest! {
                 Step::Open => {
                     homed = false;
                     if let Some(at) = failed_at.take() {
-                        prop_assert!(now - at >= BACK_OFF.min);
+                        prop_assert!(now - at >= RETRY_BOUNDS.min);
                     }
                 }
                 Step::Serve => prop_assert!(homed, "{:?}", machine.state()),
                 Step::Wait(until) => {
-                    prop_assert!(until > now && until - now <= BACK_OFF.max);
+                    prop_assert!(until > now && until - now <= RETRY_BOUNDS.max);
                 }
                 _ => {}
             }
@@ -235,11 +236,11 @@ proptest! {
                 Input::Restarted => homed = false,
                 _ => {}
             }
-            let held =
+            let is_stopped =
                 matches!(machine.state(), LinkState::EmergencyStop | LinkState::AwaitingStart);
             machine.handle(now, input);
             match input {
-                Input::Failed(_) if !held => failed_at = Some(now),
+                Input::Failed(_) if !is_stopped => failed_at = Some(now),
                 Input::EmergencyStop(_) | Input::DeviceStopped | Input::PortChanged => {
                     failed_at = None;
                 }
@@ -252,7 +253,7 @@ proptest! {
 }
 
 #[test]
-fn a_trouble_is_one_word_in_records() {
+fn states_serialize_as_words() {
     let state = LinkState::Down(Trouble::NotAnswering);
     assert_eq!(serde_json::to_value(state).expect("a word"), "not_answering");
     assert_eq!(serde_json::to_value(LinkState::Ready).expect("a word"), LinkState::Ready.name());
