@@ -266,7 +266,7 @@ pub struct Subscription {
 /// Next item of a subscription.
 enum NextItem {
     Line(Line),
-    /// BufferedReading within the deadband.
+    /// Reading within the deadband.
     Filtered,
     /// All buffered items were returned.
     Empty,

@@ -21,7 +21,7 @@ use tokio::time::{Instant, sleep_until};
 use super::{
     control::{Control, Interrupt},
     fan_out::RecordFanOut,
-    link_state::{Input, LinkMachine, Step},
+    link_state::{LinkInput, LinkMachine, LinkStep},
     prediction_cache::{PredictionCache, listening},
     schedule::Due,
     state::LinkFigures,
@@ -82,20 +82,20 @@ impl DeviceTask {
             let step = self.machine.poll(self.control.now());
             self.publish_status();
             match step {
-                Step::Open => self.open(),
-                Step::Identify => self.identify().await,
-                Step::Home => self.home().await,
-                Step::Serve => self.serve().await,
-                Step::Wait(until) => {
+                LinkStep::Open => self.open(),
+                LinkStep::Identify => self.identify().await,
+                LinkStep::Home => self.home().await,
+                LinkStep::Serve => self.serve().await,
+                LinkStep::Wait(until) => {
                     self.close();
                     self.wait(Some(self.control.epoch + until)).await;
                 }
-                Step::Rest => {
+                LinkStep::Rest => {
                     self.close();
                     self.control.gpio.set_power(false);
                     self.wait(None).await;
                 }
-                Step::End => break,
+                LinkStep::End => break,
             }
         }
         self.close();
@@ -103,7 +103,7 @@ impl DeviceTask {
         self.control.gpio.set_power(false);
     }
 
-    fn handle(&mut self, input: Input) {
+    fn handle(&mut self, input: LinkInput) {
         self.out.state.beat();
         self.machine.handle(self.control.now(), input);
     }
@@ -111,7 +111,7 @@ impl DeviceTask {
     fn fail(&mut self, trouble: Trouble, why: String) {
         tracing::debug!("{why}");
         self.trouble = Some(why);
-        self.handle(Input::Failed(trouble));
+        self.handle(LinkInput::Failed(trouble));
     }
 
     fn open(&mut self) {
@@ -121,7 +121,7 @@ impl DeviceTask {
         match (self.open_port)(&port) {
             Ok(line) => {
                 self.line = Some(line);
-                self.handle(Input::Opened);
+                self.handle(LinkInput::Opened);
             }
             Err(error) => {
                 let trouble = match &error {
@@ -188,7 +188,7 @@ impl DeviceTask {
         self.control.identity = Some(identity);
         self.line_figures.live = Some(ranger.watch_link());
         self.ranger = Some(ranger);
-        self.handle(Input::Identified);
+        self.handle(LinkInput::Identified);
     }
 
     async fn home(&mut self) {
@@ -213,7 +213,7 @@ impl DeviceTask {
             }
             Ok(Ok(_drift)) => {
                 self.next_check = Instant::now() + self.check_interval();
-                self.handle(Input::Homed);
+                self.handle(LinkInput::Homed);
             }
         }
     }
@@ -247,10 +247,10 @@ impl DeviceTask {
             Unasked::Restarted => {
                 let detail = "the device restarted while idle: homing again".to_owned();
                 self.out.event(EventKind::Reboot, detail);
-                self.handle(Input::Restarted);
+                self.handle(LinkInput::Restarted);
             }
             // Homing clears an expired hold.
-            Unasked::Fault(FaultKind::HoldExpired) => self.handle(Input::Restarted),
+            Unasked::Fault(FaultKind::HoldExpired) => self.handle(LinkInput::Restarted),
             Unasked::Fault(FaultKind::EmergencyStop) => {
                 self.handle_device_stop(&DriveError::Host(HostError::EmergencyStop));
             }
@@ -283,7 +283,7 @@ impl DeviceTask {
         let why = if self.resumes() { error.help() } else { AWAITS_START };
         self.trouble = Some(format!("{error}; {why}"));
         self.machine.set_resumes(self.resumes());
-        self.handle(Input::DeviceStopped);
+        self.handle(LinkInput::DeviceStopped);
     }
 
     fn device_failed(&mut self, error: &DriveError) {
@@ -331,7 +331,7 @@ impl DeviceTask {
 
     fn react(&mut self, interrupt: Interrupt) {
         match interrupt {
-            Interrupt::Shutdown => self.handle(Input::Shutdown),
+            Interrupt::Shutdown => self.handle(LinkInput::Shutdown),
             Interrupt::EmergencyStop(pressed) => {
                 let (kind, what) = match pressed {
                     true => (EventKind::Fault, "the emergency stop was pressed"),
@@ -342,16 +342,16 @@ impl DeviceTask {
                     self.trouble = Some(AWAITS_START.to_owned());
                 }
                 self.machine.set_resumes(self.resumes());
-                self.handle(Input::EmergencyStop(pressed));
+                self.handle(LinkInput::EmergencyStop(pressed));
             }
-            Interrupt::PortChanged => self.handle(Input::PortChanged),
+            Interrupt::PortChanged => self.handle(LinkInput::PortChanged),
             Interrupt::Log => match self.out.journal.status().error {
                 Some(error) => {
                     tracing::error!("scanning is paused: the log can't be written: {error}");
                 }
                 None => tracing::info!("the log can be written again"),
             },
-            Interrupt::Start => self.handle(Input::Start),
+            Interrupt::Start => self.handle(LinkInput::Start),
             Interrupt::Stop | Interrupt::ScheduleChanged => {}
         }
         self.machine.set_retry_bounds(self.control.settings.retry_bounds());

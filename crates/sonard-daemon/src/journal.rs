@@ -1,4 +1,4 @@
-//! JournalWriter of the log: a thread, because disks block.
+//! Writer of the log: a thread, because disks block.
 //!
 //! Records that can't be written are kept in memory, in order, until they can be. Scanning pauses
 //! meanwhile, so that few follow. A separate task reports a slow write or sync while it lasts.

@@ -4,7 +4,7 @@
 //!  API, signals ──orders─> Control ┐                        ┌──> Journal (thread: log folder)
 //!  emergency stop, thermometer ────┤   DeviceTask (port,    ├──> Hub ──> subscribers
 //!                                  └─> Ranger) ──records──> ┤
-//!                      LinkMachine, Schedule: decisions       └──> DaemonState: status, latest scan
+//!                      LinkMachine, Schedule: decisions     └──> DaemonState: status, latest scan
 //! ```
 //!
 //! [`LinkMachine`] and [`Schedule`] are pure and decide. The device task carries out their
@@ -61,7 +61,7 @@ pub use control::{Order, Request};
 pub use device_task::OpenPort;
 pub use journal::{Journal, JournalThread};
 pub use limits::{check_device, check_plan, check_pose, ordered_air};
-pub use link_state::{Input, LinkMachine, RetryBounds, Step, Transition};
+pub use link_state::{LinkInput, LinkMachine, LinkStep, RetryBounds, Transition};
 pub use live_messages::{Audience, Follower};
 pub use order_error::{Refusal, RefusalKind};
 pub use schedule::{Asked, Due, Schedule};

@@ -10,7 +10,7 @@ use sonard_api::{LinkState, Trouble};
 
 /// Outcome of a step, or an external event.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Input {
+pub enum LinkInput {
     /// The port is open and locked.
     Opened,
     /// The expected device reported its identity.
@@ -39,7 +39,7 @@ pub enum Input {
 
 /// Next step of the device task.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Step {
+pub enum LinkStep {
     /// Open and lock the port.
     Open,
     /// Query the identity of the device.
@@ -126,30 +126,30 @@ impl LinkMachine {
     }
 
     /// Returns the current step. It changes only with an input, or when a wait ends.
-    pub fn poll(&mut self, now: Duration) -> Step {
+    pub fn poll(&mut self, now: Duration) -> LinkStep {
         use LinkState as State;
         match self.state {
-            State::Opening => Step::Open,
-            State::Identifying => Step::Identify,
-            State::Homing => Step::Home,
-            State::Ready | State::Scanning => Step::Serve,
-            State::EmergencyStop | State::AwaitingStart => Step::Rest,
-            State::Stopped => Step::End,
-            _ if now < self.retry_at => Step::Wait(self.retry_at),
+            State::Opening => LinkStep::Open,
+            State::Identifying => LinkStep::Identify,
+            State::Homing => LinkStep::Home,
+            State::Ready | State::Scanning => LinkStep::Serve,
+            State::EmergencyStop | State::AwaitingStart => LinkStep::Rest,
+            State::Stopped => LinkStep::End,
+            _ if now < self.retry_at => LinkStep::Wait(self.retry_at),
             _ => {
                 self.enter(now, State::Opening);
-                Step::Open
+                LinkStep::Open
             }
         }
     }
 
     /// Handles an input. Inputs that do not apply to the current state are ignored.
-    pub fn handle(&mut self, now: Duration, input: Input) {
+    pub fn handle(&mut self, now: Duration, input: LinkInput) {
         use LinkState as State;
         match (input, self.state) {
             (_, State::Stopped) => {}
-            (Input::Shutdown, _) => self.enter(now, State::Stopped),
-            (Input::EmergencyStop(pressed), state) => {
+            (LinkInput::Shutdown, _) => self.enter(now, State::Stopped),
+            (LinkInput::EmergencyStop(pressed), state) => {
                 self.pressed = pressed;
                 if pressed {
                     self.enter(now, State::EmergencyStop);
@@ -158,24 +158,24 @@ impl LinkMachine {
                 }
             }
             (_, State::EmergencyStop) => {}
-            (Input::Start, State::AwaitingStart) => self.enter(now, State::Opening),
+            (LinkInput::Start, State::AwaitingStart) => self.enter(now, State::Opening),
             (_, State::AwaitingStart) => {}
-            (Input::DeviceStopped, _) if self.resumes => self.fail(now, Trouble::Fault),
-            (Input::DeviceStopped, _) => self.enter(now, State::AwaitingStart),
-            (Input::PortChanged, _) => self.enter(now, State::Opening),
-            (Input::Failed(trouble), _) => self.fail(now, trouble),
-            (Input::Opened, State::Opening) => self.enter(now, State::Identifying),
-            (Input::Identified, State::Identifying) => self.enter(now, State::Homing),
-            (Input::Homed, State::Homing) => {
+            (LinkInput::DeviceStopped, _) if self.resumes => self.fail(now, Trouble::Fault),
+            (LinkInput::DeviceStopped, _) => self.enter(now, State::AwaitingStart),
+            (LinkInput::PortChanged, _) => self.enter(now, State::Opening),
+            (LinkInput::Failed(trouble), _) => self.fail(now, trouble),
+            (LinkInput::Opened, State::Opening) => self.enter(now, State::Identifying),
+            (LinkInput::Identified, State::Identifying) => self.enter(now, State::Homing),
+            (LinkInput::Homed, State::Homing) => {
                 self.up_since = Some(now);
                 self.enter(now, State::Ready);
             }
-            (Input::ScanBegun, State::Ready) => self.enter(now, State::Scanning),
-            (Input::ScanEnded, State::Scanning) => {
+            (LinkInput::ScanBegun, State::Ready) => self.enter(now, State::Scanning),
+            (LinkInput::ScanEnded, State::Scanning) => {
                 self.relapses = 0;
                 self.enter(now, State::Ready);
             }
-            (Input::Restarted, State::Ready | State::Scanning) => {
+            (LinkInput::Restarted, State::Ready | State::Scanning) => {
                 self.enter(now, State::Identifying);
             }
             _ => {}

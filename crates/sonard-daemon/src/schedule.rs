@@ -49,7 +49,7 @@ pub enum Due {
 }
 
 impl Schedule {
-    /// Creates an schedule without requests, whose first scheduled scan is due at `now`.
+    /// Creates a schedule without requests, whose first scheduled scan is due at `now`.
     #[must_use]
     pub const fn new(mode: Mode, every: Duration, now: Duration) -> Self {
         Self { mode, every, queue: VecDeque::new(), paused: false, due: now }

@@ -220,7 +220,7 @@ impl DaemonState {
         }
     }
 
-    /// SubscriberCounts a heartbeat of the device task.
+    /// Counts a heartbeat of the device task.
     pub(super) fn beat(&self) {
         self.beats.fetch_add(1, Ordering::Relaxed);
     }

@@ -1,4 +1,4 @@
-//! SubscriberCounts of the hub's subscribers.
+//! Counts of the hub's subscribers.
 
 use std::sync::atomic::Ordering;
 
@@ -25,7 +25,7 @@ pub(super) struct SubscriberCounts {
     pub(super) verdicts: usize,
 }
 
-/// SubscriberCounts a subscription for its lifetime.
+/// Counts a subscription for its lifetime.
 #[derive(Debug)]
 pub(super) struct CountGuard {
     hub: Hub,

@@ -11,7 +11,9 @@ use tokio::{sync::oneshot, time::Instant};
 use uuid::Uuid;
 
 use super::{
-    super::{control::Interrupt, link_state::Input, prediction_cache::predict, schedule::Asked},
+    super::{
+        control::Interrupt, link_state::LinkInput, prediction_cache::predict, schedule::Asked,
+    },
     DeviceTask, with_orders,
 };
 
@@ -28,7 +30,7 @@ impl DeviceTask {
         let Some(mut ranger) = self.ranger.take() else { return };
         self.control.schedule.begun(self.control.now());
         self.control.serving = job.request;
-        self.handle(Input::ScanBegun);
+        self.handle(LinkInput::ScanBegun);
         self.publish_status();
         let previous = self.out.state.latest_scan();
         let clock_steps = ranger.clock_steps();
@@ -191,10 +193,12 @@ impl DeviceTask {
         match outcome {
             Ok(summary) => {
                 self.count(&summary);
-                self.handle(Input::ScanEnded);
+                self.handle(LinkInput::ScanEnded);
                 match summary.not_home {
                     None => {}
-                    Some(DriveError::Host(HostError::Rebooted)) => self.handle(Input::Restarted),
+                    Some(DriveError::Host(HostError::Rebooted)) => {
+                        self.handle(LinkInput::Restarted)
+                    }
                     Some(error) => self.device_failed(&error),
                 }
             }
