@@ -1,4 +1,4 @@
-//! The air as it is known now: from the configuration, a thermometer's file, or the API.
+//! Current air: from the configuration, the thermometer's file, or the API.
 
 use std::time::Duration;
 
@@ -9,13 +9,13 @@ use sonard_records::{AirSource, ScanAir};
 use sonard_runtime::supervisor::{Supervisor, Task};
 use tokio::{sync::watch, time::Instant};
 
-use super::{limits::ordered_air, refusal::Refusal};
+use super::{limits::ordered_air, order_error::Refusal};
 
-/// A change smaller than this is no reason to predict everything anew, degrees: it moves a range
+/// Minimum temperature change for new predictions, degrees Celsius. A smaller change shifts a range
 /// by less than 0.02 percent.
-const NOTABLE_C: f64 = 0.1;
+const MIN_CHANGE_C: f64 = 0.1;
 
-/// What is known about the air. The newest reading counts, whoever gave it.
+/// Current air and its source. The newest value is used, from whichever source.
 #[derive(Debug, Clone)]
 pub(super) struct AirControl {
     keys: AirKeys,
@@ -25,15 +25,15 @@ pub(super) struct AirControl {
     source: AirSource,
     at: Option<Instant>,
     error: Option<String>,
-    /// The air that predictions were made for last.
+    /// Air of the last predictions.
     settled: Option<Air>,
 }
 
-/// A thermometer's reading, or why there is none.
+/// Temperature in degrees Celsius, or the reason why there is none.
 pub(super) type Reading = Result<f64, String>;
 
 impl AirControl {
-    /// The air of the configuration.
+    /// Starts with the air of the configuration.
     #[must_use]
     pub(super) fn new(keys: AirKeys) -> Self {
         Self {
@@ -48,8 +48,8 @@ impl AirControl {
         }
     }
 
-    /// Takes a thermometer's reading in.
-    pub(super) fn read(&mut self, reading: &Reading, now: Instant) {
+    /// Updates the air with a reading of the thermometer.
+    pub(super) fn update(&mut self, reading: &Reading, now: Instant) {
         match reading {
             Ok(temperature_c) => {
                 if self.error.is_some() {
@@ -71,10 +71,10 @@ impl AirControl {
         }
     }
 
-    /// Takes a program's word.
+    /// Sets the air by an order.
     ///
     /// # Errors
-    /// When a figure is out of range; nothing was changed then.
+    /// When a value is out of range; the air is then unchanged.
     pub(super) fn order(&mut self, order: &AirOrder, now: Instant) -> Result<(), Refusal> {
         let air = ordered_air(order, self.humidity_percent, self.pressure_kpa)?;
         (self.humidity_percent, self.pressure_kpa) = (air.humidity_percent(), air.pressure_kpa());
@@ -83,17 +83,18 @@ impl AirControl {
         Ok(())
     }
 
-    /// The air to compute with: the one before, unless it changed notably.
+    /// Air for predictions and ranges: the last one, unless the current air differs by at least
+    /// `MIN_CHANGE_C` or in humidity or pressure.
     pub(super) fn settled(&mut self) -> Air {
         let now = self.air();
         let before = *self.settled.get_or_insert(now);
-        let notable = (before.temperature_c() - now.temperature_c()).abs() >= NOTABLE_C
+        let is_changed = (before.temperature_c() - now.temperature_c()).abs() >= MIN_CHANGE_C
             || before.humidity_percent() != now.humidity_percent()
             || before.pressure_kpa() != now.pressure_kpa();
-        *self.settled.insert(if notable { now } else { before })
+        *self.settled.insert(if is_changed { now } else { before })
     }
 
-    /// As it stands in a scan's record, for ranges computed with `air`.
+    /// Air in the record of a scan whose ranges are computed with `air`.
     #[must_use]
     pub(super) fn scan_air(&self, air: &Air, now: Instant) -> ScanAir {
         ScanAir {
@@ -104,7 +105,7 @@ impl AirControl {
         }
     }
 
-    /// For whoever asks.
+    /// Status of the air for the API.
     #[must_use]
     pub(super) fn status(&self, now: Instant) -> AirStatus {
         let age_s = self.age_s(now);
@@ -123,7 +124,7 @@ impl AirControl {
         }
     }
 
-    /// Whether another air is known here than there.
+    /// Returns `true` if temperature, source, humidity or pressure differ.
     #[must_use]
     pub(super) fn differs(&self, other: &Self) -> bool {
         (self.temperature_c, self.source) != (other.temperature_c, other.source)
@@ -132,7 +133,7 @@ impl AirControl {
     }
 
     fn air(&self) -> Air {
-        // Every way in checks the figures.
+        // The values were validated when they were set.
         Air::new(self.temperature_c, self.humidity_percent, self.pressure_kpa).unwrap_or_default()
     }
 
@@ -141,8 +142,8 @@ impl AirControl {
     }
 }
 
-/// Reads a thermometer every so often; a 1-wire conversion takes most of a second, so it is read
-/// beside everything else.
+/// Starts a task that reads the thermometer periodically, if one is configured. A 1-wire conversion
+/// takes most of a second, so it must not delay the device task.
 #[must_use]
 pub(super) fn watch_thermometer(
     keys: &AirKeys,
@@ -151,7 +152,7 @@ pub(super) fn watch_thermometer(
     let (sender, receiver) = watch::channel(None);
     let Some(mut thermometer) = keys.file.as_ref().map(Thermometer::new) else { return receiver };
     let every = Duration::from_secs_f64(keys.every_s);
-    let watching = async move {
+    let read_periodically = async move {
         while !sender.is_closed() {
             let reading = tokio::select! {
                 reading = thermometer.read() => reading.map_err(|error| error.to_string()),
@@ -167,7 +168,7 @@ pub(super) fn watch_thermometer(
             }
         }
     };
-    drop(supervisor.spawn_finite(Task::Thermometer, watching));
+    drop(supervisor.spawn_finite(Task::Thermometer, read_periodically));
     receiver
 }
 
@@ -176,12 +177,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_newest_reading_counts_and_its_age_is_told() {
+    fn newest_value_is_used_with_its_age() {
         let (mut control, start) = (AirControl::new(AirKeys::default()), Instant::now());
         assert_eq!(control.status(start).age_s, None);
-        control.read(&Ok(25.0), start);
+        control.update(&Ok(25.0), start);
         let later = start + Duration::from_secs(700);
-        control.read(&Err("gone".into()), later);
+        control.update(&Err("gone".into()), later);
         let status = control.status(later);
         assert_eq!((status.temperature_c, status.source), (25.0, AirSource::File));
         assert_eq!(status.age_s, Some(700.0));
@@ -196,16 +197,16 @@ mod tests {
     }
 
     #[test]
-    fn small_changes_do_not_make_everything_be_predicted_anew() {
+    fn small_changes_keep_predictions() {
         let mut control = AirControl::new(AirKeys::default());
         let now = Instant::now();
-        control.read(&Ok(20.0), now);
+        control.update(&Ok(20.0), now);
         let first = control.settled();
         for temperature_c in [20.04, 20.09, 19.95] {
-            control.read(&Ok(temperature_c), now);
+            control.update(&Ok(temperature_c), now);
             assert_eq!(control.settled(), first);
         }
-        control.read(&Ok(20.11), now);
+        control.update(&Ok(20.11), now);
         assert_eq!(control.settled().temperature_c(), 20.11);
     }
 }

@@ -1,4 +1,4 @@
-//! Takes orders: from the API, from signals, from the emergency stop, at any time.
+//! Orders and interrupts from the API, signals, the emergency stop, the thermometer and the log.
 
 mod orders;
 
@@ -20,100 +20,100 @@ use tokio::{
 use uuid::Uuid;
 
 use super::{
-    agenda::{Agenda, Asked},
     air::{AirControl, Reading, watch_thermometer},
     journal::Journal,
-    refusal::Refusal,
+    order_error::Refusal,
+    schedule::{Asked, Schedule},
     settings::Settings,
-    shared::{Shared, Terms},
+    state::{DaemonState, ScanSettings},
 };
 
-/// How often the emergency stop is looked at.
+/// Polling interval of the emergency stop.
 const STOP_CHECK: Duration = Duration::from_millis(50);
 
 /// An order to the daemon.
 #[derive(Debug)]
 pub enum Order {
-    /// Take scans, or go on with those of the mode.
+    /// Take scans, or resume those of the mode.
     Start(Asked),
-    /// Take no more scans of a request, and end the one under way if it is one of them.
+    /// Cancel a request, and end the running scan if it belongs to the request.
     Cancel(Uuid),
-    /// Take scans in this way from now on.
+    /// Change the mode, and the interval in seconds of the schedule mode.
     Mode(Mode, Option<f64>),
-    /// End the scan under way and take no more until the next start.
+    /// End the running scan and take no more until the next start.
     Stop,
     /// Measure these azimuths from the next scan on.
     Plan(ScanPlan),
-    /// The ranger stands here from the next scan on.
+    /// Use this pose of the ranger from the next scan on.
     Pose(Pose),
-    /// The air is like this.
+    /// Use this air until the next change by any source.
     Air(AirOrder),
-    /// The air is again what the configuration and the thermometer say.
+    /// Use the air of the configuration and the thermometer again.
     OwnAir,
-    /// The sensor is like this from the next scan on.
+    /// Use this sensor from the next scan on.
     Sensor(Box<SensorOrder>),
-    /// The sensor is again what the configuration says.
+    /// Use the sensor of the configuration again.
     OwnSensor,
-    /// The configuration was read again.
+    /// Apply the reloaded configuration, or report the error of the reload.
     Reload(Result<Box<Settings>, String>),
 }
 
-/// An order and the way for its answer.
+/// An order with the channel of its result.
 #[derive(Debug)]
 pub struct Request {
-    /// The order.
+    /// The order to carry out.
     pub order: Order,
-    /// Where the answer goes; a program that left needs none.
+    /// Channel of the result; a closed one is ignored.
     pub reply: oneshot::Sender<Result<(), Refusal>>,
 }
 
-/// What the operator has to react to.
+/// Event that the device task has to handle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Interrupt {
-    /// The end.
+    /// The daemon is stopping.
     Shutdown,
     /// The emergency stop was pressed or released.
     EmergencyStop(bool),
-    /// Somebody wants scans.
+    /// A start was requested.
     Start,
-    /// The scan under way is to end.
+    /// The running scan has to end.
     Stop,
-    /// Another port is to be used.
+    /// The configured port changed.
     PortChanged,
-    /// The log began or ceased to be in trouble.
+    /// The log began to fail, or can be written again.
     Log,
-    /// What is due may have changed.
-    Agenda,
+    /// The next due scan may have changed.
+    ScheduleChanged,
 }
 
-/// What is in force, and the ends of everything that may change it.
+/// Current settings, and the receivers of everything that changes them.
 pub(super) struct Control {
     pub(super) settings: Settings,
-    /// Those of the start, which keys marked `(restart)` still have.
+    /// Settings at the start, current for keys marked `(restart)`.
     first_settings: Settings,
-    /// The configuration's sensor, in whose place `settings` has one that a program wants.
-    own_sensor: Sensor,
-    /// What of them the configuration decides.
+    /// Sensor of the configuration; an order may have replaced the one in `settings`.
+    configured_sensor: Sensor,
+    /// Setup of scans, derived from `settings`.
     pub(super) setup: Arc<Setup>,
     pub(super) plan: ScanPlan,
     pub(super) pose: Pose,
     pub(super) scanning: ScanningKeys,
-    pub(super) agenda: Agenda,
-    /// The request that the scan under way was asked for by.
+    pub(super) schedule: Schedule,
+    /// Request of the running scan.
     pub(super) serving: Option<Uuid>,
     pub(super) air: AirControl,
     pub(super) gpio: Box<dyn HostGpio>,
     pub(super) configuration: ConfigurationReport,
     pub(super) epoch: Instant,
-    /// The device, for the check of plans.
+    /// Connected device, for the check of plans.
     pub(super) identity: Option<Identity>,
-    /// Scene or sensor changed: predictions are out of date.
+    /// Predictions are outdated: scene, model or sensor changed.
     pub(super) stale: bool,
     requests: mpsc::Receiver<Request>,
     supervisor: Supervisor,
     thermometer: watch::Receiver<Option<Reading>>,
     journal: Journal,
-    shared: Arc<Shared>,
+    state: Arc<DaemonState>,
     pressed: bool,
 }
 
@@ -122,16 +122,16 @@ impl Control {
         settings: Settings,
         gpio: Box<dyn HostGpio>,
         requests: mpsc::Receiver<Request>,
-        (supervisor, shared): (Supervisor, Arc<Shared>),
+        (supervisor, state): (Supervisor, Arc<DaemonState>),
         journal: Journal,
     ) -> Self {
         Self {
-            own_sensor: settings.sensor.clone(),
+            configured_sensor: settings.sensor.clone(),
             setup: Arc::new(settings.setup()),
             plan: settings.plan(),
             pose: settings.pose,
             scanning: settings.keys.scanning.clone(),
-            agenda: Agenda::new(settings.keys.scanning.mode, settings.every(), Duration::ZERO),
+            schedule: Schedule::new(settings.keys.scanning.mode, settings.every(), Duration::ZERO),
             serving: None,
             air: AirControl::new(settings.keys.air.clone()),
             thermometer: watch_thermometer(&settings.keys.air, &supervisor),
@@ -143,22 +143,22 @@ impl Control {
             requests,
             supervisor,
             journal,
-            shared,
+            state,
             pressed: false,
             first_settings: settings.clone(),
             settings,
         }
     }
 
-    /// Time since the start, on a clock that does not jump.
+    /// Time since the start, on the monotonic clock.
     pub(super) fn now(&self) -> Duration {
         self.epoch.elapsed()
     }
 
-    /// What the next scan is taken by.
-    pub(super) fn terms(&self) -> Terms {
+    /// Settings of the next scan.
+    pub(super) fn scan_settings(&self) -> ScanSettings {
         let simulated = self.settings.simulated.as_ref();
-        Terms {
+        ScanSettings {
             plan: simulated.map_or(self.plan, |simulated| simulated.array.plan(1)),
             pose: self.pose,
             scene: self.settings.scene.clone(),
@@ -168,21 +168,22 @@ impl Control {
         }
     }
 
-    /// Publishes what changed for scans to come, while one may be under way.
+    /// Publishes the settings of the next scan, also during a scan.
     fn publish(&self) {
-        self.shared.view.send_modify(|view| {
-            view.next = self.terms();
+        self.state.published.send_modify(|published| {
+            published.next = self.scan_settings();
             if self.settings.simulated.is_some() {
-                // What is simulated moves at once.
-                view.now = self.terms();
+                // A simulated robot moves immediately.
+                published.now = self.scan_settings();
             }
-            view.scanning = self.scanning.clone();
-            (view.paused, view.requested) = (self.agenda.is_paused(), self.agenda.requested());
-            view.configuration = self.configuration.clone();
+            published.scanning = self.scanning.clone();
+            (published.paused, published.requested) =
+                (self.schedule.is_paused(), self.schedule.requested());
+            published.configuration = self.configuration.clone();
         });
     }
 
-    /// Carries out orders until one needs the operator. Cancel-safe.
+    /// Carries out orders until an interrupt for the device task. Cancel-safe.
     pub(super) async fn next(&mut self) -> Interrupt {
         loop {
             let watches_stop = self.gpio.emergency_stop().is_some();
@@ -203,9 +204,9 @@ impl Control {
                 Ok(()) = self.thermometer.changed() => {
                     let reading = self.thermometer.borrow_and_update().clone();
                     if let Some(reading) = reading {
-                        self.air.read(&reading, Instant::now());
+                        self.air.update(&reading, Instant::now());
                         self.publish();
-                        return Interrupt::Agenda;
+                        return Interrupt::ScheduleChanged;
                     }
                 }
                 () = self.journal.changed() => return Interrupt::Log,
@@ -214,53 +215,58 @@ impl Control {
     }
 
     fn carry_out(&mut self, Request { order, reply }: Request) -> Option<Interrupt> {
-        let (answer, interrupt) = match order {
-            Order::Start(asked) => {
-                let answer = self.start(asked);
-                let begun = if answer.is_ok() { Interrupt::Start } else { Interrupt::Agenda };
-                (answer, Some(begun))
+        let (result, interrupt) = match order {
+            Order::Start(request) => {
+                let result = self.start(request);
+                let interrupt =
+                    if result.is_ok() { Interrupt::Start } else { Interrupt::ScheduleChanged };
+                (result, Some(interrupt))
             }
             Order::Cancel(request) => self.cancel(request),
-            Order::Mode(mode, every_s) => (self.set_mode(mode, every_s), Some(Interrupt::Agenda)),
+            Order::Mode(mode, every_s) => {
+                (self.set_mode(mode, every_s), Some(Interrupt::ScheduleChanged))
+            }
             Order::Stop => {
-                self.agenda.stop();
+                self.schedule.stop();
                 (Ok(()), Some(Interrupt::Stop))
             }
-            Order::Plan(plan) => (self.set_plan(plan), Some(Interrupt::Agenda)),
-            Order::Pose(pose) => (self.set_pose(pose), Some(Interrupt::Agenda)),
-            Order::Air(order) => (self.air.order(&order, Instant::now()), Some(Interrupt::Agenda)),
-            Order::OwnAir => {
-                self.take_own_air();
-                (Ok(()), Some(Interrupt::Agenda))
+            Order::Plan(plan) => (self.set_plan(plan), Some(Interrupt::ScheduleChanged)),
+            Order::Pose(pose) => (self.set_pose(pose), Some(Interrupt::ScheduleChanged)),
+            Order::Air(order) => {
+                (self.air.order(&order, Instant::now()), Some(Interrupt::ScheduleChanged))
             }
-            Order::Sensor(order) => (self.set_sensor(&order), Some(Interrupt::Agenda)),
+            Order::OwnAir => {
+                self.reset_air();
+                (Ok(()), Some(Interrupt::ScheduleChanged))
+            }
+            Order::Sensor(order) => (self.set_sensor(&order), Some(Interrupt::ScheduleChanged)),
             Order::OwnSensor => {
-                self.use_sensor(self.own_sensor.clone());
-                (Ok(()), Some(Interrupt::Agenda))
+                self.use_sensor(self.configured_sensor.clone());
+                (Ok(()), Some(Interrupt::ScheduleChanged))
             }
             Order::Reload(Ok(settings)) => (Ok(()), Some(self.reload(*settings))),
             Order::Reload(Err(error)) => {
                 self.configuration.error = Some(error);
-                (Ok(()), Some(Interrupt::Agenda))
+                (Ok(()), Some(Interrupt::ScheduleChanged))
             }
         };
-        // Whoever asks after the answer finds what was ordered.
+        // A status requested after the reply must contain the change.
         self.publish();
-        // A program that did not wait for its answer does not want it.
-        drop(reply.send(answer));
+        // The client may have disconnected.
+        drop(reply.send(result));
         interrupt
     }
 
-    /// Forgets what programs said about the air.
-    fn take_own_air(&mut self) {
+    /// Discards the air set by orders.
+    fn reset_air(&mut self) {
         self.air = AirControl::new(self.settings.keys.air.clone());
         self.thermometer = watch_thermometer(&self.settings.keys.air, &self.supervisor);
     }
 
-    /// Takes a new configuration in: what changed in it goes before what programs said.
+    /// Applies a new configuration. Its changes override earlier orders.
     fn reload(&mut self, mut settings: Settings) -> Interrupt {
-        let own_sensor = std::mem::replace(&mut self.own_sensor, settings.sensor.clone());
-        if own_sensor == settings.sensor && settings.goes_with(&self.settings.sensor) {
+        let configured = std::mem::replace(&mut self.configured_sensor, settings.sensor.clone());
+        if configured == settings.sensor && settings.goes_with(&self.settings.sensor) {
             settings.sensor = self.settings.sensor.clone();
         }
         let before = std::mem::replace(&mut self.settings, settings);
@@ -269,12 +275,13 @@ impl Control {
         if keys.plan != then.plan {
             self.plan = self.settings.plan();
         }
-        let moved = self.settings.scene.as_ref().map(|scene| &scene.sha256)
+        let scene_changed = self.settings.scene.as_ref().map(|scene| &scene.sha256)
             != before.scene.as_ref().map(|scene| &scene.sha256);
-        if self.settings.pose != before.pose || moved {
+        if self.settings.pose != before.pose || scene_changed {
             self.pose = self.settings.pose;
         }
-        self.stale |= moved || keys.model != then.model || self.settings.sensor != before.sensor;
+        self.stale |=
+            scene_changed || keys.model != then.model || self.settings.sensor != before.sensor;
         self.stale |= keys.simulate != then.simulate || self.settings.simulated != before.simulated;
         self.setup = Arc::new(self.settings.setup());
         if keys.air != then.air {
@@ -283,13 +290,13 @@ impl Control {
         }
         if keys.scanning != then.scanning {
             self.scanning = keys.scanning.clone();
-            self.agenda.set_mode(keys.scanning.mode, self.settings.every(), now);
+            self.schedule.set_mode(keys.scanning.mode, self.settings.every(), now);
         }
         self.journal.set_rotation(self.settings.rotation());
         self.configuration = ConfigurationReport {
             error: None,
             needs_restart: self.settings.needs_restart(&self.first_settings),
         };
-        if keys.device == then.device { Interrupt::Agenda } else { Interrupt::PortChanged }
+        if keys.device == then.device { Interrupt::ScheduleChanged } else { Interrupt::PortChanged }
     }
 }

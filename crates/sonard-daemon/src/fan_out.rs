@@ -1,4 +1,4 @@
-//! Where records and news go: log, subscribers, status.
+//! Distribution of records to log, subscribers and status.
 
 use std::sync::Arc;
 
@@ -7,71 +7,71 @@ use sonard_log::MAX_LOGGED_SCENE_BYTES;
 use sonard_records::{Event, EventKind, Record, ScanView, Session, Sink, SinkError};
 use tokio::sync::Semaphore;
 
-use super::{fit::explanations, hub::Hub, journal::Journal, shared::Shared};
+use super::{broadcast::Hub, fit::explanations, journal::Journal, state::DaemonState};
 
-/// Where records and news go.
+/// Publisher of records to log, subscribers and status.
 #[derive(Clone)]
 pub(super) struct RecordFanOut {
     pub(super) journal: Journal,
     pub(super) hub: Hub,
-    pub(super) shared: Arc<Shared>,
-    /// One scan at a time is looked at for what would explain it better.
+    pub(super) state: Arc<DaemonState>,
+    /// Limits the search for explanations to one scan at a time.
     explaining: Arc<Semaphore>,
 }
 
 impl RecordFanOut {
-    pub(super) fn new(journal: Journal, hub: Hub, shared: Arc<Shared>) -> Self {
-        Self { journal, hub, shared, explaining: Arc::new(Semaphore::new(1)) }
+    pub(super) fn new(journal: Journal, hub: Hub, state: Arc<DaemonState>) -> Self {
+        Self { journal, hub, state, explaining: Arc::new(Semaphore::new(1)) }
     }
 
-    /// An event, now.
+    /// Publishes an event with the current time.
     pub(super) fn event(&self, kind: EventKind, detail: String) {
-        self.put(&Record::Event(Event { time: Timestamp::now(), kind, detail }));
+        self.publish(&Record::Event(Event { time: Timestamp::now(), kind, detail }));
     }
 
-    /// A session with the robot's name in it.
-    pub(super) fn named(&self, session: Session) -> Session {
-        Session { robot: Some(self.shared.robot.clone()), ..session }
+    /// Adds the robot's name to a session.
+    pub(super) fn with_robot_name(&self, session: Session) -> Session {
+        Session { robot: Some(self.state.robot.clone()), ..session }
     }
 
-    /// A record for everybody.
-    pub(super) fn put(&self, record: &Record) {
-        let over = self.shared.collect(record);
+    /// Publishes a record to all outputs.
+    pub(super) fn publish(&self, record: &Record) {
+        let ended = self.state.update(record);
         self.journal.record(record);
         match record {
-            Record::Session(session) => self.begin(session),
+            Record::Session(session) => self.publish_session(session),
             _ => self.hub.publish(record),
         }
-        if let Some((scan, readings)) = over {
+        if let Some((scan, readings)) = ended {
             self.hub.publish_scan(scan);
             readings.into_iter().for_each(|readings| self.explain(readings));
         }
     }
 
-    /// Looks for what would explain a scan better, beside all else: the ranger does not wait for it. A scan that ends
-    /// while another is looked at is passed over.
+    /// Searches explanations that fit a scan better than its settings, in a thread of its own: the
+    /// next scan is not delayed. A scan that ends during a search is skipped.
     fn explain(&self, scan: ScanView) {
-        let Ok(turn) = Arc::clone(&self.explaining).try_acquire_owned() else { return };
+        let Ok(permit) = Arc::clone(&self.explaining).try_acquire_owned() else { return };
         let out = self.clone();
         tokio::task::spawn_blocking(move || {
             let id = scan.scan;
-            if let Some(news) = out.shared.explained(id, &explanations(scan)) {
-                out.event(EventKind::Explanation, format!("scan {id}: {news}"));
+            if let Some(change) = out.state.set_explanations(id, &explanations(scan)) {
+                out.event(EventKind::Explanation, format!("scan {id}: {change}"));
             }
-            drop(turn);
+            drop(permit);
         });
     }
 
-    /// Live streams go without the scene's text, and the API has it as far as a log's line has: what a
-    /// client asks for is bounded, whatever the scene.
-    fn begin(&self, session: &Session) {
+    /// Publishes a session. Live streams omit the text of the scene, and the API serves it only up
+    /// to the limit of a log line, so that responses are bounded for any scene.
+    fn publish_session(&self, session: &Session) {
         let fits = |text: &Arc<str>| text.len() <= MAX_LOGGED_SCENE_BYTES;
         let mut session = session.clone();
         let scene_text = session.scene_text.take().filter(fits);
         let record = Record::Session(Box::new(session.clone()));
         let session = Arc::new(Session { scene_text, ..session });
-        // Who follows the records finds the text there.
-        self.shared.view.send_modify(|view| view.session = Some(session));
+        // Set before the record is published: followers read the text from the published status.
+        self.state.published.send_modify(|published| published.session = Some(session));
         self.hub.publish(&record);
     }
 }
@@ -79,10 +79,10 @@ impl RecordFanOut {
 impl Sink for RecordFanOut {
     fn record(&mut self, record: &Record) -> Result<(), SinkError> {
         if let Record::ScanStart(start) = record {
-            let begun = (start.scan, start.plan.beams());
-            self.shared.view.send_modify(|view| view.scan = Some(begun));
+            let running = (start.scan, start.plan.beams());
+            self.state.published.send_modify(|published| published.scan = Some(running));
         }
-        self.put(record);
+        self.publish(record);
         Ok(())
     }
 }

@@ -1,4 +1,4 @@
-//! How the scan under way agrees with its prediction.
+//! Agreement of the running scan with its prediction, and hypotheses that fit better.
 
 use std::{collections::BTreeMap, sync::Arc};
 
@@ -6,24 +6,24 @@ use sonard_api::ScanFit;
 use sonard_interpret::compare::{Explanation, agrees, compare, judge, quantile};
 use sonard_records::{Ping, ScanEnd, ScanStart, ScanView, Session};
 
-/// Readings of the longest scan of which it is told what would explain it better. They wait in memory until the scan
+/// Maximum number of readings of a scan that is explained. They are kept in memory until the scan
 /// ends, about a kilobyte each.
-const MOST_READINGS: usize = 4096;
-/// So many changes are told.
-const MOST_EXPLANATIONS: usize = 6;
+const MAX_READINGS: usize = 4096;
+/// Maximum number of explanations reported for a scan.
+const MAX_EXPLANATIONS: usize = 6;
 
-/// What is gathered of the scan under way.
+/// Accumulated residuals and readings of the running scan.
 #[derive(Debug, Default)]
-pub(super) struct Fit {
-    /// Residuals of the beams with an echo on both sides, metres, and whether the ranges agree. A plan's beams are at
-    /// most 65,535, and a beam that is measured again counts once.
+pub(super) struct FitAccumulator {
+    /// Residuals in metres of the beams with both a measured and a predicted echo, by beam index,
+    /// and whether the ranges agree. A plan has at most 65,535 beams; a repeated beam counts once.
     residuals: BTreeMap<u32, (f64, bool)>,
-    /// The scan with its readings; `None` once they are too many.
+    /// Scan with its readings; `None` once they exceed `MAX_READINGS`.
     scan: Option<ScanView>,
 }
 
-impl Fit {
-    pub(super) fn of(start: &ScanStart, session: Option<Arc<Session>>) -> Self {
+impl FitAccumulator {
+    pub(super) fn new(start: &ScanStart, session: Option<Arc<Session>>) -> Self {
         let (pings, events) = (Vec::new(), Vec::new());
         let scan = ScanView {
             scan: start.scan,
@@ -37,9 +37,9 @@ impl Fit {
     }
 
     pub(super) fn add(&mut self, ping: &Ping) {
-        let judged = judge(ping);
+        let comparison = judge(ping);
         let predicted_m = ping.sim.as_ref().and_then(|sim| sim.range_m);
-        let residual_m = judged.residual_m.filter(|_| judged.verdict.is_ok());
+        let residual_m = comparison.residual_m.filter(|_| comparison.verdict.is_ok());
         match residual_m.zip(ping.range_m.zip(predicted_m)) {
             Some((residual_m, (measured_m, predicted_m))) => {
                 let agrees = agrees(measured_m, predicted_m);
@@ -49,7 +49,7 @@ impl Fit {
                 self.residuals.remove(&ping.index);
             }
         }
-        self.scan = self.scan.take().filter(|scan| scan.pings.len() < MOST_READINGS);
+        self.scan = self.scan.take().filter(|scan| scan.pings.len() < MAX_READINGS);
         if let Some(scan) = &mut self.scan {
             scan.pings.push(ping.clone());
         }
@@ -71,35 +71,43 @@ impl Fit {
         }
     }
 
-    /// The scan, if its readings were few enough to be kept.
+    /// Returns the scan, unless it had more than `MAX_READINGS` readings.
     pub(super) fn into_scan(self) -> Option<ScanView> {
         self.scan
     }
 }
 
-/// What would explain a scan better, most gain first. Takes milliseconds.
+/// Finds hypotheses that fit a scan better than its settings, by decreasing gain. Takes
+/// milliseconds.
 pub(super) fn explanations(scan: ScanView) -> Vec<Explanation> {
     let mut found = compare(&[scan]).0.explanations;
-    found.truncate(MOST_EXPLANATIONS);
+    found.truncate(MAX_EXPLANATIONS);
     found
 }
 
-/// What to say of the best explanation beside the one that was told last; nothing of much the same.
-pub(super) fn news(told: Option<&Explanation>, best: Option<&Explanation>) -> Option<String> {
-    match (told, best) {
-        (Some(told), Some(best)) if is_much_the_same(told, best) => None,
+/// Describes the change from the last published explanation to the best one. Returns `None` if they
+/// are equal within their uncertainty.
+pub(super) fn describe_change(
+    published: Option<&Explanation>,
+    best: Option<&Explanation>,
+) -> Option<String> {
+    match (published, best) {
+        (Some(published), Some(best)) if is_similar(published, best) => None,
         (_, Some(best)) => Some(format!("better explained: {best}")),
-        (Some(told), None) => Some(format!("no longer better explained: {}", told.change)),
+        (Some(published), None) => {
+            Some(format!("no longer better explained: {}", published.change))
+        }
         (None, None) => None,
     }
 }
 
-fn is_much_the_same(told: &Explanation, best: &Explanation) -> bool {
+fn is_similar(a: &Explanation, b: &Explanation) -> bool {
     const SIGMAS: f64 = 3.0;
-    told.change == best.change
-        && told.estimates.iter().zip(&best.estimates).all(|(one, other)| {
-            (one.value - other.value).abs() <= SIGMAS * one.sigma.hypot(other.sigma)
-        })
+    a.change == b.change
+        && a.estimates
+            .iter()
+            .zip(&b.estimates)
+            .all(|(a, b)| (a.value - b.value).abs() <= SIGMAS * a.sigma.hypot(b.sigma))
 }
 
 #[cfg(test)]
@@ -108,18 +116,18 @@ mod tests {
     use sonard_records::{Record, decode_line};
 
     #[test]
-    fn it_says_what_a_comparison_of_the_scan_does() {
+    fn report_equals_the_comparison() {
         let log = include_str!("../../../tests/fixtures/small.jsonl");
         let records = || log.lines().map(|line| decode_line(line.as_bytes()).expect("a record"));
-        let mut fit = Fit::default();
+        let mut fit = FitAccumulator::default();
         let mut report = None;
-        // Each reading twice: the second is the one that counts.
+        // Each beam is measured twice; the second reading counts.
         for record in records() {
             match record {
                 Record::Ping(ping) => {
-                    let mut other = ping.clone();
-                    (other.range_m, other.residual_m) = (Some(9.0), Some(5.0));
-                    fit.add(&other);
+                    let mut first = ping.clone();
+                    (first.range_m, first.residual_m) = (Some(9.0), Some(5.0));
+                    fit.add(&first);
                     fit.add(&ping);
                 }
                 Record::ScanEnd(end) => report = Some(fit.report(&end)),
@@ -135,7 +143,7 @@ mod tests {
         assert_eq!(report.median_abs_residual_m, comparison.median_abs_residual_m);
         assert_eq!(report.median_residual_m, comparison.median_residual_m);
         assert_eq!(
-            Fit::default().report(scans[0].end.as_ref().expect("an end")).agree_fraction,
+            FitAccumulator::default().report(scans[0].end.as_ref().expect("an end")).agree_fraction,
             None
         );
     }

@@ -1,7 +1,7 @@
-//! Owner of the log: a thread, because disks block.
+//! Writer of the log: a thread, because disks block.
 //!
-//! Records that can't be written wait in memory, in order, until they can be; scanning pauses meanwhile, so that few
-//! follow. A write or sync that takes long is reported while it takes, by a task beside the thread.
+//! Records that can't be written are kept in memory, in order, until they can be. Scanning pauses
+//! meanwhile, so that few follow. A separate task reports a slow write or sync while it lasts.
 
 use std::{
     collections::VecDeque,
@@ -25,13 +25,14 @@ use sonard_runtime::{
 };
 use tokio::sync::watch;
 
-/// Records queued for the thread above which publishing waits, and scanning pauses if the disk does not respond.
+/// Queue length from which publishing waits, and scanning pauses if the disk does not respond.
 const QUEUE: usize = 4096;
-/// Longest wait of a publisher for a place in the queue. A disk that hangs for longer pauses scanning instead.
+/// Maximum wait of a publisher for a place in the queue. A disk that hangs for longer pauses
+/// scanning instead.
 const QUEUE_TIMEOUT: Duration = Duration::from_secs(1);
 /// Interval at which a waiting publisher looks for a place in the queue.
 const QUEUE_POLL: Duration = Duration::from_millis(2);
-/// How soon after the last record the need for a sync is examined.
+/// Delay after the last record until the need for a sync is examined.
 const SYNC_CHECK: Duration = Duration::from_millis(500);
 /// Interval at which the open file is compared with the one that its path names.
 const FILE_CHECK: Duration = Duration::from_secs(2);
@@ -47,7 +48,7 @@ const INCIDENT_TIME: Duration = Duration::from_secs(30);
 /// Time allowed for the last sync at the end of the daemon.
 const CLOSE_TIMEOUT: Duration = Duration::from_secs(15);
 
-enum Entry {
+enum JournalEntry {
     Record(Box<Record>),
     Rotation(Rotation),
     Close,
@@ -56,23 +57,23 @@ enum Entry {
 /// Access to the log for the tasks that publish records. Clones share it.
 #[derive(Debug, Clone)]
 pub struct Journal {
-    entries: Sender<Entry>,
+    entries: Sender<JournalEntry>,
     status: watch::Receiver<LogStatus>,
-    progress: Arc<Progress>,
+    progress: Arc<WriteProgress>,
 }
 
-/// The thread, to be closed at the end.
+/// Handle of the log's thread, to be closed at the end.
 #[derive(Debug)]
 pub struct JournalThread {
-    entries: Sender<Entry>,
+    entries: Sender<JournalEntry>,
     thread: JoinHandle<Option<LogStatus>>,
     status: watch::Receiver<LogStatus>,
-    progress: Arc<Progress>,
+    progress: Arc<WriteProgress>,
 }
 
 /// Progress of the thread, which other tasks examine while it blocks.
 #[derive(Debug)]
-struct Progress {
+struct WriteProgress {
     epoch: Instant,
     /// Start of the write or sync under way, microseconds since the epoch; 0 for none.
     began_us: AtomicU64,
@@ -80,7 +81,7 @@ struct Progress {
     queued: AtomicUsize,
 }
 
-impl Progress {
+impl WriteProgress {
     fn new() -> Self {
         Self { epoch: Instant::now(), began_us: AtomicU64::new(0), queued: AtomicUsize::new(0) }
     }
@@ -111,7 +112,7 @@ impl Progress {
     }
 }
 
-impl std::fmt::Debug for Entry {
+impl std::fmt::Debug for JournalEntry {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str(match self {
             Self::Record(_) => "Record",
@@ -122,7 +123,8 @@ impl std::fmt::Debug for Entry {
 }
 
 impl Journal {
-    /// Opens the log of `folder` and starts the thread that writes it. Must be called within a tokio runtime.
+    /// Opens the log of `folder` and starts the thread that writes it. Must be called within a
+    /// tokio runtime.
     ///
     /// # Errors
     /// When the log can't be opened at all: a daemon without a log would measure in vain.
@@ -135,8 +137,8 @@ impl Journal {
         let (entries, incoming) = channel();
         let first = LogStatus { file: Some(log.path().into()), ..LogStatus::default() };
         let (sender, status) = watch::channel(first);
-        let progress = Arc::new(Progress::new());
-        let writer = Writer {
+        let progress = Arc::new(WriteProgress::new());
+        let writer = JournalWriter {
             log,
             waiting: VecDeque::new(),
             retry: RETRY,
@@ -160,7 +162,8 @@ impl Journal {
         Ok((journal, JournalThread { entries, thread, status, progress }))
     }
 
-    /// Queues a record. A full queue delays the caller for a second at most; [`is_well`](Self::is_well) is false then.
+    /// Queues a record. A full queue delays the caller for a second at most;
+    /// [`is_well`](Self::is_well) is then false.
     pub fn record(&self, record: &Record) {
         if self.progress.is_full() {
             let deadline = Instant::now() + QUEUE_TIMEOUT;
@@ -170,20 +173,20 @@ impl Journal {
                 }
             });
         }
-        self.push(Entry::Record(Box::new(record.clone())));
+        self.push(JournalEntry::Record(Box::new(record.clone())));
     }
 
-    /// An event, now.
+    /// Queues an event with the current time.
     pub fn event(&self, kind: EventKind, detail: String) {
         self.record(&Record::Event(Event { time: Timestamp::now(), kind, detail }));
     }
 
-    /// Other limits from the next scan on.
+    /// Sets the limits of log files, from the next scan on.
     pub fn set_rotation(&self, rotation: Rotation) {
-        self.push(Entry::Rotation(rotation));
+        self.push(JournalEntry::Rotation(rotation));
     }
 
-    /// State of the log.
+    /// Current state of the log.
     #[must_use]
     pub fn status(&self) -> LogStatus {
         let busy_s = self.progress.stalled().map(|busy| busy.as_secs_f64());
@@ -192,25 +195,25 @@ impl Journal {
         LogStatus { busy_s, waiting: status.waiting + queued, ..status }
     }
 
-    /// Records that are in the log since it was opened.
+    /// Number of records written since the log was opened.
     #[must_use]
     pub fn written(&self) -> u64 {
         self.status.borrow().written
     }
 
-    /// Whether records can be written.
+    /// Returns `true` if records can be written.
     #[must_use]
     pub fn is_well(&self) -> bool {
         self.status.borrow().error.is_none()
     }
 
-    fn push(&self, entry: Entry) {
+    fn push(&self, entry: JournalEntry) {
         self.progress.queued.fetch_add(1, Ordering::Relaxed);
         // A thread that has ended was reported by the supervisor.
         drop(self.entries.send(entry));
     }
 
-    /// Ready when the log begins or ceases to be in trouble.
+    /// Completes when the log begins to fail, or can be written again.
     pub async fn changed(&mut self) {
         if self.status.changed().await.is_err() {
             std::future::pending::<()>().await;
@@ -219,12 +222,12 @@ impl Journal {
 }
 
 impl JournalThread {
-    /// Writes and syncs everything, ends the thread, and returns the last state. A disk that hangs is waited for no longer
-    /// than `CLOSE_TIMEOUT`. Blocks.
+    /// Writes and syncs all records, ends the thread, and returns the last state. Blocks, for at
+    /// most `CLOSE_TIMEOUT` if the disk hangs.
     #[must_use]
     pub fn close(self) -> LogStatus {
         // A thread that has ended was reported by the supervisor.
-        let _ = self.entries.send(Entry::Close);
+        let _ = self.entries.send(JournalEntry::Close);
         let deadline = Instant::now() + CLOSE_TIMEOUT;
         while !self.thread.is_finished() && Instant::now() < deadline {
             thread::sleep(Duration::from_millis(5));
@@ -238,15 +241,20 @@ impl JournalThread {
         let busy_s = self.progress.busy().unwrap_or_default().as_secs_f64();
         let waiting = status.waiting + queued;
         let error = format!(
-            "the disk has not responded for {busy_s:.0} s: {unsynced} record(s) are written and not confirmed, \
+            "the disk has not responded for {busy_s:.0} s: {unsynced} record(s) written but not synced, \
              {waiting} not written"
         );
         LogStatus { error: Some(error), waiting, busy_s: Some(busy_s), ..status }
     }
 }
 
-/// Reports a disk that does not respond, for as long as the log's thread lives. Scanning pauses once the queue is full.
-async fn watch_stalls(progress: Arc<Progress>, status: watch::Sender<LogStatus>, folder: PathBuf) {
+/// Reports a disk that does not respond, for as long as the log's thread lives. Scanning pauses
+/// once the queue is full.
+async fn watch_stalls(
+    progress: Arc<WriteProgress>,
+    status: watch::Sender<LogStatus>,
+    folder: PathBuf,
+) {
     let mut is_reported = false;
     // The thread's sender and this one.
     while status.receiver_count() > 0 {
@@ -269,7 +277,7 @@ async fn watch_stalls(progress: Arc<Progress>, status: watch::Sender<LogStatus>,
     }
 }
 
-/// Takes records for the log.
+/// Queues records; never fails.
 impl Sink for Journal {
     fn record(&mut self, record: &Record) -> Result<(), SinkError> {
         Self::record(self, record);
@@ -277,42 +285,45 @@ impl Sink for Journal {
     }
 }
 
-struct Writer {
+struct JournalWriter {
     log: LogFolder,
     waiting: VecDeque<Box<Record>>,
-    /// Wait from try to try, and when the next one is due, while in trouble.
+    /// Wait between attempts after a failure.
     retry: Backoff,
+    /// Time of the next attempt, after a failure.
     retry_at: Option<Instant>,
-    /// Last failure, until the log has been well for a while.
+    /// Time of the last failure, until the log has been written without one for `CALM`.
     failed_at: Option<Instant>,
     next_file_check: Instant,
-    /// Report of the last log that had to be replaced, and when.
+    /// Time and description of the last replacement of the log file.
     incident: Option<(Instant, String)>,
     status: watch::Sender<LogStatus>,
-    progress: Arc<Progress>,
+    progress: Arc<WriteProgress>,
 }
 
-impl Writer {
-    fn run(mut self, incoming: &Receiver<Entry>) -> LogStatus {
+impl JournalWriter {
+    fn run(mut self, incoming: &Receiver<JournalEntry>) -> LogStatus {
         loop {
             let entry = incoming.recv_timeout(self.timeout());
             if entry.is_ok() {
                 self.progress.queued.fetch_sub(1, Ordering::Relaxed);
             }
             match entry {
-                Ok(Entry::Record(record)) => self.waiting.push_back(record),
-                Ok(Entry::Rotation(rotation)) => self.log.set_rotation(rotation),
+                Ok(JournalEntry::Record(record)) => self.waiting.push_back(record),
+                Ok(JournalEntry::Rotation(rotation)) => self.log.set_rotation(rotation),
                 Err(RecvTimeoutError::Timeout) => {}
-                Ok(Entry::Close) | Err(RecvTimeoutError::Disconnected) => return self.finish(),
+                Ok(JournalEntry::Close) | Err(RecvTimeoutError::Disconnected) => {
+                    return self.finish();
+                }
             }
-            // While in trouble, only time brings another try, however many records come.
+            // After a failure only time triggers the next attempt, however many records arrive.
             if self.retry_at.is_none_or(|at| at <= Instant::now()) {
                 self.write();
             }
         }
     }
 
-    /// Time until there is something to do without another entry.
+    /// Time until the next periodic task, if no entry arrives.
     fn timeout(&self) -> Duration {
         let check = self.next_file_check.saturating_duration_since(Instant::now());
         match self.retry_at {
@@ -324,7 +335,7 @@ impl Writer {
         }
     }
 
-    /// Writes the records that wait, as far as possible.
+    /// Writes the waiting records, as far as possible.
     fn write(&mut self) {
         self.progress.begin();
         let outcome = self.write_waiting();
@@ -337,8 +348,8 @@ impl Writer {
         self.publish(outcome.err().map(|error| format!("{error}; {}", error.help())));
     }
 
-    /// Waits longer from failure to failure. A success in between counts only after a while, so that a fault that comes
-    /// and goes is not reported again and again.
+    /// Increases the wait with each failure. A success resets it only after `CALM`, so that an
+    /// intermittent fault is not reported repeatedly.
     fn schedule_retry(&mut self, is_ok: bool) {
         let now = Instant::now();
         if is_ok {
@@ -361,11 +372,11 @@ impl Writer {
         while let Some(record) = self.waiting.front() {
             let outcome = match self.log.append(record, Timestamp::now()) {
                 Ok(()) => Ok(()),
-                // It is in the log, though not safely.
+                // The record is in the log, but not synced.
                 Err(error @ StoreError::Sync { .. }) => Err(error),
                 Err(error @ StoreError::Record { .. }) => {
-                    // This one can never be written: it must not hold up the others.
-                    tracing::error!("a record is left out: {error}");
+                    // A record that can never be written must not delay the next ones.
+                    tracing::error!("a record was skipped: {error}");
                     Ok(())
                 }
                 Err(error) => return Err(error),

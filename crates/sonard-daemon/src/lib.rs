@@ -1,39 +1,40 @@
-//! The daemon: one task a resource, an explicit state machine for the link, orders at any time.
+//! The daemon: one task per resource, an explicit state machine for the link, orders at any time.
 //!
 //! ```text
 //!  API, signals ──orders─> Control ┐                        ┌──> Journal (thread: log folder)
-//!  emergency stop, thermometer ────┤   Operator (port,      ├──> Hub ──> subscribers
+//!  emergency stop, thermometer ────┤   DeviceTask (port,    ├──> Hub ──> subscribers
 //!                                  └─> Ranger) ──records──> ┤
-//!                      LinkMachine, Agenda: what to do      └──> Shared: status, latest scan
+//!                      LinkMachine, Schedule: decisions     └──> DaemonState: status, latest scan
 //! ```
 //!
-//! [`LinkMachine`] and [`Agenda`] are pure and decide; the operator carries out their decisions and reports the
-//! outcome to them. [`prepare`] wires them, and [`Daemon::run`] returns when all are done.
+//! [`LinkMachine`] and [`Schedule`] are pure and decide. The device task carries out their
+//! decisions and reports the outcome to them. [`prepare`] wires the tasks, and [`Daemon::run`]
+//! returns when all have ended.
 #![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 #![warn(clippy::expect_used, clippy::indexing_slicing, clippy::panic)]
 
-mod agenda;
 mod air;
+mod annotate;
 mod blocking;
+mod broadcast;
 mod control;
+mod device_task;
 mod fan_out;
 mod fit;
-mod follower;
-mod forecast;
-mod hub;
 mod journal;
-mod judged;
 mod limits;
-mod machine;
+mod link_state;
+mod live_messages;
 mod notify;
-mod operator;
-mod refusal;
+mod order_error;
+mod prediction_cache;
+mod schedule;
 pub mod secret;
 mod sensor;
 pub mod server;
 mod settings;
-mod shared;
 mod simulated_array;
+mod state;
 
 use std::sync::Arc;
 
@@ -53,48 +54,48 @@ use tokio::{
 };
 use uuid::Uuid;
 
-pub use agenda::{Agenda, Asked, Due};
+pub use annotate::judged_line;
+pub(crate) use broadcast::Shelf;
+pub use broadcast::{ClientGuard, Hub, Line, Moved, ScanSubscription, Subscription, Wanted};
 pub use control::{Order, Request};
-pub use follower::{Audience, Follower};
-pub(crate) use hub::Shelf;
-pub use hub::{Attendance, Hub, Line, Moved, ScanSubscription, Subscription, Wanted};
+pub use device_task::OpenPort;
 pub use journal::{Journal, JournalThread};
-pub use judged::judged_line;
 pub use limits::{check_device, check_plan, check_pose, ordered_air};
-pub use machine::{BackOff, Input, LinkMachine, Step, Transition};
-pub use operator::OpenPort;
-pub use refusal::{Refusal, RefusalKind};
+pub use link_state::{LinkInput, LinkMachine, LinkStep, RetryBounds, Transition};
+pub use live_messages::{Audience, Follower};
+pub use order_error::{Refusal, RefusalKind};
+pub use schedule::{Asked, Due, Schedule};
 pub use sensor::ordered_sensor;
 pub use settings::{Mismatch, OptionalOutputs, Settings, Simulated};
-pub use shared::NextScan;
+pub use state::NextScan;
 
 use air::AirControl;
 use control::Control;
+use device_task::DeviceTask;
 use fan_out::RecordFanOut;
-use operator::Operator;
-use shared::{Shared, Terms, View};
 use simulated_array::SimulatedArray;
+use state::{DaemonState, PublishedStatus, ScanSettings};
 
-/// Orders that may wait while one is carried out.
-const ORDERS: usize = 64;
+/// Maximum number of queued orders while one is carried out.
+const MAX_QUEUED_ORDERS: usize = 64;
 
-/// Resources that the daemon owns.
+/// Resources owned by the daemon.
 pub struct Resources {
-    /// Opens the serial port.
+    /// Opens the serial port by its name.
     pub open_port: OpenPort,
-    /// Pins of the computer.
+    /// GPIO pins of the host computer.
     pub gpio: Box<dyn HostGpio>,
-    /// The log.
+    /// Access to the log's writer thread.
     pub journal: Journal,
-    /// Supervisor of the daemon's tasks.
+    /// Supervisor of the daemon's long-lived tasks.
     pub supervisor: Supervisor,
 }
 
-/// The daemon for whoever gives it orders or wants to know something: cheap to clone.
+/// Interface of the running daemon for its clients: orders, status, live records. Cheap to clone.
 #[derive(Debug, Clone)]
 pub struct Handle {
     orders: mpsc::Sender<Request>,
-    shared: Arc<Shared>,
+    state: Arc<DaemonState>,
     hub: Hub,
     journal: Journal,
     supervisor: Supervisor,
@@ -103,28 +104,29 @@ pub struct Handle {
 /// The daemon's tasks, not yet running.
 pub struct Daemon {
     worker: Worker,
-    shared: Arc<Shared>,
+    state: Arc<DaemonState>,
     hub: Hub,
     supervisor: Supervisor,
 }
 
-/// Who has the readings: a ranger on a port, or the model.
+/// Source of the readings: a ranger on a port, or the model.
 enum Worker {
-    Ranger(Box<Operator>),
+    Ranger(Box<DeviceTask>),
     Array(Box<SimulatedArray>),
 }
 
-/// A daemon that owns `resources` and works by `settings`, and the handle to it. Must be called
+/// Creates a daemon that owns `resources` and follows `settings`, with its handle. Must be called
 /// within a multi-threaded tokio runtime.
 #[must_use]
 pub fn prepare(resources: Resources, settings: Settings) -> (Daemon, Handle) {
     let Resources { open_port, gpio, journal, supervisor } = resources;
     wire(gpio, journal, supervisor, settings, |control, out| {
-        Worker::Ranger(Box::new(Operator::new(control, open_port, out)))
+        Worker::Ranger(Box::new(DeviceTask::new(control, open_port, out)))
     })
 }
 
-/// The same for the array that `settings` name, played by the model: no port and no pin is opened.
+/// Creates a daemon that simulates the array named by `settings` with the model, with its handle.
+/// No port and no pin is opened. Must be called within a multi-threaded tokio runtime.
 #[must_use]
 pub fn prepare_simulated(
     journal: Journal,
@@ -141,38 +143,39 @@ fn wire(
     journal: Journal,
     supervisor: Supervisor,
     settings: Settings,
-    employ: impl FnOnce(Control, RecordFanOut) -> Worker,
+    create_worker: impl FnOnce(Control, RecordFanOut) -> Worker,
 ) -> (Daemon, Handle) {
-    let (orders, requests) = mpsc::channel(ORDERS);
+    let (orders, requests) = mpsc::channel(MAX_QUEUED_ORDERS);
     let hub = Hub::new(settings.keys.server.queue as usize);
-    let shared = Arc::new(Shared::new(first_view(&settings), settings.keys.fleet.robot.clone()));
-    let gate = (supervisor.clone(), Arc::clone(&shared));
+    let state =
+        Arc::new(DaemonState::new(first_status(&settings), settings.keys.fleet.robot.clone()));
+    let gate = (supervisor.clone(), Arc::clone(&state));
     let control = Control::new(settings, gpio, requests, gate, journal.clone());
-    let out = RecordFanOut::new(journal.clone(), hub.clone(), Arc::clone(&shared));
-    let worker = employ(control, out);
+    let out = RecordFanOut::new(journal.clone(), hub.clone(), Arc::clone(&state));
+    let worker = create_worker(control, out);
     let handle = Handle {
         orders,
-        shared: Arc::clone(&shared),
+        state: Arc::clone(&state),
         hub: hub.clone(),
         journal,
         supervisor: supervisor.clone(),
     };
-    (Daemon { worker, shared, hub, supervisor }, handle)
+    (Daemon { worker, state, hub, supervisor }, handle)
 }
 
 impl Daemon {
-    /// Runs until `stop` completes or a task fails; then the motor is stopped, the scan closed, and every live stream
-    /// ended.
+    /// Runs until `stop` completes or a task fails. Then the motor is stopped, the scan closed, and
+    /// every live stream ended.
     ///
     /// # Errors
     /// The first failure of a task.
     pub async fn run(self, stop: impl Future<Output = ()>) -> Result<(), TaskFailure> {
-        let Self { worker, shared, hub, supervisor } = self;
+        let Self { worker, state, hub, supervisor } = self;
         let stopping = supervisor.stopping().clone();
-        let notifier = supervisor.spawn(Task::Notifications, notify::run(shared, stopping.clone()));
+        let notifier = supervisor.spawn(Task::Notifications, notify::run(state, stopping.clone()));
         let device = supervisor.spawn(Task::Device, async {
             match worker {
-                Worker::Ranger(operator) => operator.run().await,
+                Worker::Ranger(task) => task.run().await,
                 Worker::Array(array) => array.run().await,
             }
         });
@@ -181,7 +184,7 @@ impl Daemon {
             _failure = supervisor.failure() => {}
         }
         stopping.cancel();
-        // The supervisor has their panics.
+        // The supervisor keeps the panics of its tasks.
         drop(device.await);
         hub.close();
         drop(notifier.await);
@@ -190,32 +193,32 @@ impl Daemon {
 }
 
 impl Handle {
-    /// Gives an order and waits for the answer.
+    /// Sends an order and waits for its result.
     ///
     /// # Errors
-    /// When the order is refused, or the daemon is stopping.
+    /// When the order is rejected, or the daemon is stopping.
     pub async fn order(&self, order: Order) -> Result<(), Refusal> {
         let gone = || Refusal {
             kind: RefusalKind::Stopping,
             message: "the daemon is stopping".into(),
-            help: "ask the next one".into(),
+            help: "retry once it is running again".into(),
         };
         let (reply, answer) = oneshot::channel();
         self.orders.send(Request { order, reply }).await.map_err(|_| gone())?;
         answer.await.map_err(|_| gone())?
     }
 
-    /// Takes in a request for scans, as programs make it.
+    /// Submits an API request for scans. Returns the id of the accepted request.
     ///
     /// # Errors
-    /// As [`order`](Self::order), and for a request of no scans.
-    pub async fn start(&self, asked: ScanRequest) -> Result<Started, Refusal> {
-        let ScanRequest { scans, plan, pose } = asked;
+    /// Those of [`order`](Self::order), and a request of zero scans.
+    pub async fn start(&self, request: ScanRequest) -> Result<Started, Refusal> {
+        let ScanRequest { scans, plan, pose } = request;
         if scans == Some(0) {
             return Err(Refusal {
                 kind: RefusalKind::Wrong,
                 message: "scans is 0".into(),
-                help: "give 1 or more, or leave it out".into(),
+                help: "set it to 1 or more, or omit it".into(),
             });
         }
         let request = Uuid::new_v4();
@@ -223,84 +226,84 @@ impl Handle {
         Ok(Started { accepted: true, request })
     }
 
-    /// An event of now for log and live streams.
+    /// Publishes an event with the current time to the log and the live streams.
     pub fn event(&self, kind: EventKind, detail: String) {
         let record = Record::Event(Event { time: Timestamp::now(), kind, detail });
         self.journal.record(&record);
         self.hub.publish(&record);
     }
 
-    /// Publishes where clients reach the server.
+    /// Publishes the server's addresses and faults in the status.
     pub fn report_server(&self, report: ServerReport) {
-        self.shared.report_server(report);
+        self.state.report_server(report);
     }
 
-    /// Says how it goes with ROS 2.
+    /// Publishes the state of the ROS 2 node in the status.
     pub fn report_ros(&self, report: RosReport) {
-        self.shared.report_ros(report);
+        self.state.report_ros(report);
     }
 
-    /// Says how it goes with the MQTT broker.
+    /// Publishes the state of the MQTT connection in the status.
     pub fn report_mqtt(&self, report: MqttReport) {
-        self.shared.report_mqtt(report);
+        self.state.report_mqtt(report);
     }
 
-    /// What the daemon is doing.
+    /// Current status of the daemon, as served by `GET /v1/status`.
     #[must_use]
     pub fn status(&self) -> Status {
-        self.shared.status(self.journal.status(), self.subscribers())
+        self.state.status(self.journal.status(), self.subscribers())
     }
 
-    /// Records that are in the log since the start.
+    /// Number of records written to the log since the start.
     #[must_use]
     pub fn records_written(&self) -> u64 {
         self.journal.written()
     }
 
-    /// Whether all is well.
+    /// Current health of the daemon, with the reasons of a problem.
     #[must_use]
     pub fn health(&self) -> Health {
-        self.shared.health(&self.journal.status())
+        self.state.health(&self.journal.status())
     }
 
-    /// The last scan that is over.
+    /// Id of the last scan that has ended.
     #[must_use]
     pub fn latest_scan(&self) -> Option<Uuid> {
-        self.shared.latest_scan()
+        self.state.latest_scan()
     }
 
-    /// The scene in force, if there is one.
+    /// Current scene, if there is one.
     #[must_use]
     pub fn scene(&self) -> Option<Arc<Scene>> {
-        self.shared.view.borrow().in_force().scene.clone()
+        self.state.published.borrow().current().scene.clone()
     }
 
-    /// What the configuration in force decides about every scan.
+    /// Current setup of scans by the configuration, and the pending one of the next scan.
     #[must_use]
     pub fn setup(&self) -> InForce<Setup> {
-        let now = (*self.shared.view.borrow().in_force().setup).clone();
+        let now = (*self.state.published.borrow().current().setup).clone();
         InForce { now, pending: self.status().pending.setup }
     }
 
-    /// What the next scan is taken by.
+    /// Settings of the next scan.
     #[must_use]
     pub fn next_scan(&self) -> NextScan {
-        self.shared.view.borrow().next_scan(Instant::now())
+        self.state.published.borrow().next_scan(Instant::now())
     }
 
-    /// The session in force in the log, once there was a scan.
+    /// Current session of the log, once there was a scan.
     #[must_use]
     pub fn session(&self) -> Option<Arc<Session>> {
-        self.shared.view.borrow().session.clone()
+        self.state.published.borrow().session.clone()
     }
 
-    /// Supervisor of the daemon's tasks.
+    /// Supervisor of the daemon's long-lived tasks.
     #[must_use]
     pub const fn supervisor(&self) -> &Supervisor {
         &self.supervisor
     }
 
-    /// Live records.
+    /// Broadcast of live records.
     #[must_use]
     pub const fn hub(&self) -> &Hub {
         &self.hub
@@ -315,8 +318,8 @@ impl Handle {
     }
 }
 
-fn first_view(settings: &Settings) -> View {
-    let terms = Terms {
+fn first_status(settings: &Settings) -> PublishedStatus {
+    let scan_settings = ScanSettings {
         plan: settings.plan(),
         pose: settings.pose,
         scene: settings.scene.clone(),
@@ -324,7 +327,7 @@ fn first_view(settings: &Settings) -> View {
         array: settings.simulated.as_ref().map(|simulated| Arc::clone(&simulated.array)),
         air: AirControl::new(settings.keys.air.clone()),
     };
-    View {
+    PublishedStatus {
         state: LinkState::Opening,
         since: Timestamp::now(),
         changed: Instant::now(),
@@ -341,13 +344,16 @@ fn first_view(settings: &Settings) -> View {
         requested: 0,
         next_at: None,
         scan: None,
-        now: terms.clone(),
-        next: terms,
+        now: scan_settings.clone(),
+        next: scan_settings,
         configuration: ConfigurationReport::default(),
-        line: shared::LinkFigures::default(),
+        line: state::LinkFigures::default(),
         scans: ScanTotals::default(),
         clock: ClockReport::default(),
-        // From the first look on: nobody shall take a simulation for a ranger.
-        simulation: settings.simulated.as_ref().map(|one| SimulationReport::new(&one.array)),
+        // Set from the first status on: a simulation must never be mistaken for a ranger.
+        simulation: settings
+            .simulated
+            .as_ref()
+            .map(|simulated| SimulationReport::new(&simulated.array)),
     }
 }

@@ -1,4 +1,4 @@
-//! Limits of scene, array and device for what programs order or preview.
+//! Checks of ordered and previewed settings against scene, array and device.
 
 use firmware_protocol::messages::Identity;
 use sonard_api::AirOrder;
@@ -11,12 +11,13 @@ use sonard_model::{
 };
 use sonard_records::{PlanError, ScanPlan};
 
-use super::refusal::{Refusal, RefusalKind};
+use super::order_error::{Refusal, RefusalKind};
 
-/// Checks azimuths of a scan, by a device if one is connected.
+/// Checks the azimuths of a scan, also against the motor if a device is connected.
 ///
 /// # Errors
-/// If they are none, the motor can't reach them, or an array is simulated, whose rangers are fixed.
+/// If the plan is invalid, the motor can't reach its azimuths, or an array is simulated, whose
+/// rangers are fixed.
 pub fn check_plan(
     plan: &ScanPlan,
     of_array: bool,
@@ -26,39 +27,40 @@ pub fn check_plan(
         return Err(Refusal {
             kind: RefusalKind::Conflict,
             message: "an array has no plan: its rangers are fixed".into(),
-            help: "another array is simulate.array in the configuration".into(),
+            help: "to change them, set simulate.array in the configuration".into(),
         });
     }
-    let refuse = |error: PlanError| Refusal {
+    let reject = |error: PlanError| Refusal {
         kind: match error {
             PlanError::OffMotorGrid { .. } => RefusalKind::Conflict,
             _ => RefusalKind::Wrong,
         },
         message: error.to_string(),
-        help: "a full turn is from_deg 0, to_deg 360, step_deg 0.9, pings_per_stop 1".into(),
+        help: "a full revolution is from_deg 0, to_deg 360, step_deg 0.9, pings_per_stop 1".into(),
     };
-    plan.check().map_err(refuse)?;
+    plan.check().map_err(reject)?;
     if let Some(device) = device {
-        plan.motor_steps(device.steps_per_revolution.into()).map_err(refuse)?;
+        plan.motor_steps(device.steps_per_revolution.into()).map_err(reject)?;
     }
     Ok(())
 }
 
-/// Checks a pose of the ranger, or of the robot with an array; without a scene any will do.
+/// Checks a pose of the ranger, or of the robot with an array. Without a scene any finite pose is
+/// valid.
 ///
 /// # Errors
-/// If a figure is not finite, or the scene is in the way.
+/// If a value is not finite, or the pose is inside an obstacle or outside the scene.
 pub fn check_pose(
     pose: &Pose,
     scene: Option<&Scene>,
     array: Option<&RangerArray>,
 ) -> Result<(), Refusal> {
-    let finite = [pose.x_m, pose.y_m, pose.heading_deg].iter().all(|figure| figure.is_finite());
-    if !finite {
+    let is_finite = [pose.x_m, pose.y_m, pose.heading_deg].iter().all(|value| value.is_finite());
+    if !is_finite {
         return Err(Refusal {
             kind: RefusalKind::Wrong,
-            message: "a figure of the pose is not finite".into(),
-            help: "metres and degrees".into(),
+            message: "the pose has a value that is not finite".into(),
+            help: "give x_m and y_m in metres, heading_deg in degrees".into(),
         });
     }
     let Some(scene) = scene else { return Ok(()) };
@@ -70,10 +72,10 @@ pub fn check_pose(
     }
 }
 
-/// The air of an order; humidity (percent) and pressure (kilopascals) stay if it leaves them out.
+/// Air of an order. The given humidity and pressure apply where the order omits them.
 ///
 /// # Errors
-/// If a figure is out of range.
+/// If a value is out of range.
 pub fn ordered_air(
     order: &AirOrder,
     humidity_percent: f64,
@@ -91,16 +93,16 @@ pub fn ordered_air(
     })
 }
 
-/// Checks that a device can keep the blanking of a sensor that is to take another's place.
+/// Checks that a device supports the blanking of a sensor that replaces the one in `before`.
 ///
 /// # Errors
-/// If it can't.
+/// If the blanking is shorter than the device supports.
 pub fn check_device(sensor: &Sensor, before: &Sensor, device: &Identity) -> Result<(), Refusal> {
     if sensor.blanking_us == before.blanking_us {
         return Ok(());
     }
-    let kept = check_blanking(sensor.blanking_us, device);
-    kept.map_err(|error| conflict(&error, "leave blanking_us as it is, or give more".into()))
+    check_blanking(sensor.blanking_us, device)
+        .map_err(|error| conflict(&error, "keep blanking_us unchanged, or increase it".into()))
 }
 
 fn conflict(error: &impl std::fmt::Display, help: String) -> Refusal {

@@ -1,5 +1,5 @@
-//! Notifications to systemd: ready once the ranger has reported its identity, alive as long as the device task makes
-//! progress.
+//! Notifications to systemd: ready once the ranger has reported its identity, alive as long as the
+//! device task makes progress.
 
 use std::{
     io,
@@ -19,14 +19,14 @@ use sonard_api::LinkState;
 use tokio::time::interval;
 use tokio_util::sync::CancellationToken;
 
-use super::shared::Shared;
+use super::state::DaemonState;
 
-/// How often systemd is asked to wait longer for a ranger that is not there yet.
-const PATIENCE: Duration = Duration::from_secs(5);
+/// Interval at which the start-up timeout of systemd is extended while the ranger is absent.
+const EXTENSION_INTERVAL: Duration = Duration::from_secs(5);
 
 /// Notifies until `shutdown`. Does nothing where there is no systemd.
-pub(super) async fn run(shared: Arc<Shared>, shutdown: CancellationToken) {
-    let manager = match Manager::connect() {
+pub(super) async fn run(state: Arc<DaemonState>, shutdown: CancellationToken) {
+    let manager = match ServiceManager::connect() {
         Ok(Some(manager)) => manager,
         Ok(None) => return shutdown.cancelled().await,
         Err(error) => {
@@ -34,44 +34,43 @@ pub(super) async fn run(shared: Arc<Shared>, shutdown: CancellationToken) {
             return shutdown.cancelled().await;
         }
     };
-    let say = |states: &[NotifyState<'_>]| manager.notify(states);
     let watchdog = watchdog_enabled();
-    let mut tick = interval(watchdog.map_or(PATIENCE, |limit| (limit / 3).min(PATIENCE)));
-    let mut views = shared.view.subscribe();
-    let (mut ready, mut told, mut beats) = (false, None, None);
+    let mut tick =
+        interval(watchdog.map_or(EXTENSION_INTERVAL, |limit| (limit / 3).min(EXTENSION_INTERVAL)));
+    let mut changes = state.published.subscribe();
+    let (mut ready, mut notified, mut beats) = (false, None, None);
     loop {
-        let (state, met, trouble) = {
-            let view = views.borrow_and_update();
-            let met = view.device.is_some() || view.simulation.is_some();
-            (view.state, met, view.trouble.clone())
+        let (link, is_identified, trouble) = {
+            let published = changes.borrow_and_update();
+            let is_identified = published.device.is_some() || published.simulation.is_some();
+            (published.state, is_identified, published.trouble.clone())
         };
-        if met && !std::mem::replace(&mut ready, true) {
-            say(&[NotifyState::Ready]);
+        if is_identified && !std::mem::replace(&mut ready, true) {
+            manager.notify(&[NotifyState::Ready]);
         }
-        if told.replace(state) != Some(state) {
-            say(&[NotifyState::Status(&words(state, trouble.as_deref()))]);
+        if notified.replace(link) != Some(link) {
+            manager.notify(&[NotifyState::Status(&describe_link(link, trouble.as_deref()))]);
         }
         tokio::select! {
             () = shutdown.cancelled() => break,
-            changed = views.changed() => if changed.is_err() { break },
+            changed = changes.changed() => if changed.is_err() { break },
             _ = tick.tick() => {
                 if !ready {
-                    let microseconds = u32::try_from((4 * PATIENCE).as_micros()).unwrap_or(u32::MAX);
-                    say(&[NotifyState::ExtendTimeoutUsec(microseconds)]);
+                    let microseconds = u32::try_from((4 * EXTENSION_INTERVAL).as_micros()).unwrap_or(u32::MAX);
+                    manager.notify(&[NotifyState::ExtendTimeoutUsec(microseconds)]);
                 }
-                // A scan beats with every beam, everything else once a second. What beats no more
-                // is stuck.
-                let now = shared.beats();
+                // The heartbeat counts every beam of a scan, and once a second otherwise.
+                let now = state.beats();
                 if watchdog.is_some() && beats.replace(now) != Some(now) {
-                    say(&[NotifyState::Watchdog]);
+                    manager.notify(&[NotifyState::Watchdog]);
                 }
             }
         }
     }
-    say(&[NotifyState::Stopping]);
+    manager.notify(&[NotifyState::Stopping]);
 }
 
-fn words(state: LinkState, trouble: Option<&str>) -> String {
+fn describe_link(state: LinkState, trouble: Option<&str>) -> String {
     match trouble {
         Some(trouble) if state.is_settled() && !state.is_up() => {
             format!("{}: {trouble}", state.name())
@@ -81,9 +80,9 @@ fn words(state: LinkState, trouble: Option<&str>) -> String {
 }
 
 /// Socket of the service manager.
-struct Manager(UnixDatagram);
+struct ServiceManager(UnixDatagram);
 
-impl Manager {
+impl ServiceManager {
     /// Connects to the socket that `NOTIFY_SOCKET` names, if it names one.
     fn connect() -> io::Result<Option<Self>> {
         let Some(name) = std::env::var_os("NOTIFY_SOCKET") else { return Ok(None) };

@@ -1,14 +1,14 @@
-//! A sensor that a program wants.
+//! Sensor set by an order.
 
-use super::refusal::{Refusal, RefusalKind};
+use super::order_error::{Refusal, RefusalKind};
 use sonard_api::{SensorOrder, Setup};
 use sonard_device::ranger::{Listening, Motion};
 use sonard_model::acoustics::Sensor;
 
-/// The sensor of an order beside what the configuration decides.
+/// Sensor of an order, applied to the configured one and checked against the configuration.
 ///
 /// # Errors
-/// When it is none, or the configuration says otherwise.
+/// When the sensor is invalid, or the order conflicts with the configuration.
 pub fn ordered_sensor(
     order: &SensorOrder,
     setup: &Setup,
@@ -18,20 +18,21 @@ pub fn ordered_sensor(
     let sensor = order.applied_to(&setup.sensor).map_err(|error| Refusal {
         kind: RefusalKind::Wrong,
         message: error.to_string(),
-        help: "GET /v1/sensors tells the presets with their figures".into(),
+        help: "GET /v1/sensors lists the presets with their values".into(),
     })?;
     if let (Some(configured), Some(_)) = (setup.model.options.threshold, order.threshold) {
         return Err(conflict(
-            format!("model.threshold of the configuration is {configured}: it goes before"),
-            "take it out of the configuration, or leave threshold out of the order",
+            format!("model.threshold = {configured} in the configuration overrides the order"),
+            "remove model.threshold from the configuration, or threshold from the order",
         ));
     }
-    // What the model plays listens until the next one of its rangers fires.
+    // A simulated ranger receives until the next ranger of its array fires.
     if !of_array {
         let max_range_m = setup.model.options.max_range_m.unwrap_or(sensor.max_range_m);
         let listening = Listening { max_range_m, sound_speed_m_s, blanking_us: sensor.blanking_us };
-        let heard = Motion::from(&setup.motion).check_window(&listening);
-        heard.map_err(|deaf| conflict(deaf.to_string(), &deaf.help()))?;
+        Motion::from(&setup.motion)
+            .check_window(&listening)
+            .map_err(|error| conflict(error.to_string(), &error.help()))?;
     }
     Ok(sensor)
 }

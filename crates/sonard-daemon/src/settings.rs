@@ -1,4 +1,4 @@
-//! Everything the daemon works by, checked and loaded.
+//! Settings of the daemon: the configuration with the files that it names, validated.
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -7,7 +7,7 @@ use std::{
     time::Duration,
 };
 
-use super::{forecast::listening, machine::BackOff};
+use super::{link_state::RetryBounds, prediction_cache::listening};
 use sonard_api::{
     Setup,
     config::{Keys, MAX_ROBOT_NAME, is_robot_name},
@@ -23,58 +23,59 @@ use sonard_model::{
 };
 use sonard_records::ScanPlan;
 
-/// The configuration with what it names: scene and sensor.
+/// Configuration with the loaded scene, sensor and array.
 #[derive(Debug, Clone)]
 pub struct Settings {
-    /// The keys, each within its range.
+    /// Configuration keys, each within its range.
     pub keys: Keys,
-    /// The scene, if there is one.
+    /// Scene of the predictions, if there is one.
     pub scene: Option<Arc<Scene>>,
-    /// The sensor's data.
+    /// Acoustic data of the sensor.
     pub sensor: Sensor,
-    /// Where the ranger stands.
+    /// Position and heading of the ranger.
     pub pose: Pose,
-    /// What the model plays in place of a device, if it does.
+    /// Array simulated in place of a device, if there is one.
     pub simulated: Option<Simulated>,
-    /// Optional outputs that this program was built with.
+    /// Optional outputs supported by this build.
     pub outputs: OptionalOutputs,
-    /// SHA-256 of the contents of files that are read only at the start, by the keys that name them.
+    /// SHA-256 of the contents of files that are read only at the start, by the keys that name
+    /// them.
     pub files: BTreeMap<&'static str, [u8; 32]>,
 }
 
 /// Outputs that are optional features of the program; configuring a missing one is an error.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct OptionalOutputs {
-    /// Records to an MQTT broker.
+    /// Publication of records to an MQTT broker.
     pub mqtt: bool,
-    /// Messages to ROS 2.
+    /// Publication of messages to ROS 2.
     pub ros: bool,
 }
 
-/// An array that the model plays.
+/// Simulated array and its motion.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Simulated {
-    /// The array.
+    /// Array of fixed rangers.
     pub array: Arc<RangerArray>,
-    /// The way its robot takes, with times.
+    /// Trajectory of the robot with times; `None` for a robot at rest.
     pub course: Option<Arc<Course>>,
 }
 
-/// Values that are each in range but do not fit together.
+/// Conflict between configuration values that are each in range.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Mismatch {
-    /// The section of the key to look at.
+    /// Section of the conflicting key.
     pub section: &'static str,
-    /// That key.
+    /// Name of the conflicting key.
     pub key: &'static str,
-    /// What is wrong.
+    /// Description of the conflict.
     pub message: String,
-    /// What would be right.
+    /// Hint for the correction.
     pub help: String,
 }
 
 impl Settings {
-    /// Which azimuths.
+    /// Azimuths of a scan.
     #[must_use]
     pub const fn plan(&self) -> ScanPlan {
         let plan = &self.keys.plan;
@@ -86,13 +87,13 @@ impl Settings {
         }
     }
 
-    /// How the motor turns and the ranger listens.
+    /// Motion profile and receive window.
     #[must_use]
     pub fn motion(&self) -> Motion {
         Motion::from(&self.keys.motion)
     }
 
-    /// What the configuration decides about every scan.
+    /// Setup of scans: sensor, model and motion.
     #[must_use]
     pub fn setup(&self) -> Setup {
         Setup {
@@ -103,20 +104,20 @@ impl Settings {
         }
     }
 
-    /// How echoes are predicted.
+    /// Options of the model.
     #[must_use]
     pub fn options(&self) -> Options {
-        // Options that the engine does not know are refused by `check`.
+        // `check` rejects options that the engine does not support.
         self.keys.model.options.options_of_engine()
     }
 
-    /// Farthest range of interest, metres.
+    /// Maximum range of the model, metres.
     #[must_use]
     pub fn max_range_m(&self) -> f64 {
         self.keys.model.options.max_range_m.unwrap_or(self.sensor.max_range_m)
     }
 
-    /// When another log is begun.
+    /// Limits of log files.
     #[must_use]
     pub fn rotation(&self) -> Rotation {
         let log = &self.keys.log;
@@ -129,33 +130,33 @@ impl Settings {
         }
     }
 
-    /// Bounds of the wait from try to try.
+    /// Bounds of the wait between connection attempts.
     #[must_use]
-    pub fn back_off(&self) -> BackOff {
+    pub fn retry_bounds(&self) -> RetryBounds {
         let link = &self.keys.link;
-        BackOff {
+        RetryBounds {
             min: Duration::from_secs_f64(link.retry_min_s),
             max: Duration::from_secs_f64(link.retry_max_s.max(link.retry_min_s)),
         }
     }
 
-    /// From the start of a scan to the next, if the mode is schedule.
+    /// Interval between the starts of scans in the schedule mode.
     #[must_use]
     pub fn every(&self) -> Duration {
         Duration::from_secs_f64(self.keys.scanning.every_s)
     }
 
-    /// Checks what ranges can't say.
+    /// Checks constraints between values, beyond the range of each.
     ///
     /// # Errors
-    /// The first pair of values that do not go together.
+    /// The first conflict found.
     pub fn check(&self) -> Result<(), Mismatch> {
         let air = &self.keys.air;
         self.plan().check().map_err(|error| Mismatch {
             section: "plan",
             key: "to_deg",
             message: error.to_string(),
-            help: "a full turn is from_deg = 0, to_deg = 360, step_deg = 0.9".into(),
+            help: "a full revolution is from_deg = 0, to_deg = 360, step_deg = 0.9".into(),
         })?;
         let air = Air::new(air.temperature_c, air.humidity_percent, air.pressure_kpa).map_err(
             |error| Mismatch {
@@ -165,15 +166,15 @@ impl Settings {
                 help: String::new(),
             },
         )?;
-        // What the model plays listens until the next one of its rangers fires.
+        // A simulated ranger receives until the next ranger of its array fires.
         if self.simulated.is_none() {
-            let windowed = self.keys.motion.window_ms.is_some();
+            let has_window = self.keys.motion.window_ms.is_some();
             let checked = self.motion().check_window(&listening(self, &air));
-            checked.map_err(|deaf| Mismatch {
-                section: if windowed { "motion" } else { "model" },
-                key: if windowed { "window_ms" } else { "max_range_m" },
-                message: deaf.to_string(),
-                help: deaf.help(),
+            checked.map_err(|error| Mismatch {
+                section: if has_window { "motion" } else { "model" },
+                key: if has_window { "window_ms" } else { "max_range_m" },
+                message: error.to_string(),
+                help: error.help(),
             })?;
         }
         self.keys.model.options.options().map_err(|foreign| Mismatch {
@@ -194,14 +195,14 @@ impl Settings {
             return Err(Mismatch {
                 section: "link",
                 key: "retry_max_s",
-                message: "the longest wait is shorter than the first one".into(),
-                help: "give link.retry_max_s at least link.retry_min_s".into(),
+                message: "link.retry_max_s is less than link.retry_min_s".into(),
+                help: "set link.retry_max_s to at least link.retry_min_s".into(),
             });
         }
         Ok(())
     }
 
-    /// Whether a sensor in place of this one goes together with the rest.
+    /// Returns `true` if the settings are valid with another sensor.
     #[must_use]
     pub fn goes_with(&self, sensor: &Sensor) -> bool {
         Self { sensor: sensor.clone(), ..self.clone() }.check().is_ok()
@@ -214,25 +215,26 @@ impl Settings {
                 section: "server",
                 key: "socket_mode",
                 message: format!("server.socket_mode is {}", server.socket_mode),
-                help: "three octal digits: 0660 for the socket's group, 0600 for its owner".into(),
+                help: "use three octal digits: 0660 for owner and group, 0600 for the owner only"
+                    .into(),
             });
         }
         let Some(listen) = &server.listen else { return Ok(()) };
-        let wrong = |message: String, help: &str| {
+        let invalid = |message: String, help: &str| {
             Err(Mismatch { section: "server", key: "listen", message, help: help.into() })
         };
         let Ok(address) = listen.parse::<SocketAddr>() else {
-            return wrong(
+            return invalid(
                 format!("server.listen is {listen}"),
-                "an address and a port, such as 127.0.0.1:8765 or [::1]:8765",
+                "use an address with a port, such as 127.0.0.1:8765 or [::1]:8765",
             );
         };
-        if let Some(why) = never_bound(&address) {
+        if let Some(why) = why_unbindable(&address) {
             let message = format!("server.listen {listen} {why}");
-            return wrong(message, "give an address of this computer, such as 127.0.0.1:8765");
+            return invalid(message, "use an address of this computer, such as 127.0.0.1:8765");
         }
         if !address.ip().is_loopback() && server.token_file.is_none() {
-            return wrong(
+            return invalid(
                 format!("server.listen {listen} can be reached from other computers"),
                 "listen on 127.0.0.1, or set server.token_file",
             );
@@ -249,12 +251,14 @@ impl Settings {
             section: "fleet",
             key: "robot",
             message: format!("fleet.robot is {robot:?}"),
-            help: format!("letters, digits, `-`, `_` and `.`, at most {MAX_ROBOT_NAME}: kiwi-7"),
+            help: format!(
+                "use at most {MAX_ROBOT_NAME} letters, digits, `-`, `_` and `.`, as in kiwi-7"
+            ),
         })
     }
 
-    /// What differs from `before` and takes effect only after a restart: keys marked `(restart)`, as their section or
-    /// `section.key`, and files that such keys name, as `contents of section.key`.
+    /// Differences from `before` that take effect only after a restart: keys marked `(restart)`, as
+    /// their section or `section.key`, and files that such keys name, as `contents of section.key`.
     #[must_use]
     pub fn needs_restart(&self, before: &Self) -> Vec<String> {
         let (now, then) = (&self.keys, &before.keys);
@@ -271,7 +275,7 @@ impl Settings {
         let mut keys: Vec<String> = keys.map(str::to_owned).collect();
         let files: BTreeSet<_> = self.files.keys().chain(before.files.keys()).copied().collect();
         for key in files {
-            // Where the section differs, the file may be another one.
+            // A changed section may name another file.
             let is_named = keys.iter().any(|section| key.starts_with(&format!("{section}.")));
             if !is_named && self.files.get(key) != before.files.get(key) {
                 keys.push(format!("contents of {key}"));
@@ -281,8 +285,8 @@ impl Settings {
     }
 }
 
-/// Why no computer can ever listen on an address, if so.
-fn never_bound(address: &SocketAddr) -> Option<&'static str> {
+/// Reason why no computer can listen on an address, if there is one.
+fn why_unbindable(address: &SocketAddr) -> Option<&'static str> {
     match address.ip() {
         ip if ip.is_multicast() => Some("is a multicast address"),
         IpAddr::V4(ip) if ip.is_broadcast() => Some("is the broadcast address"),

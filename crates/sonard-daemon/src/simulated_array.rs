@@ -1,10 +1,11 @@
-//! The operator of an array that the model plays: fires its rangers turn by turn, by the clock.
+//! Device task of a simulated array: fires its rangers in turn, at fixed intervals.
 //!
-//! After R. Arrabales' service of simulated sonars: one ranger each interval (25 Hz on a Pioneer), a
-//! scan for each round. No port is opened, and every record says that it is simulated. The model finds the
-//! paths of an observation point once: a robot that stands costs nothing new, one that moves a search for each firing.
+//! After R. Arrabales' service of simulated sonars: one ranger per interval (25 Hz on a Pioneer),
+//! one scan per round. No port is opened, and every record is marked as simulated. The model
+//! computes the paths of an observation point once: a robot at rest needs no further computation, a
+//! moving one needs a path search for each firing.
 
-mod rhythm;
+mod firing_grid;
 mod simulation;
 
 use std::{ops::ControlFlow, time::Duration};
@@ -19,23 +20,23 @@ use tokio::time::{Instant, sleep_until};
 use uuid::Uuid;
 
 use super::{
-    agenda::Due,
     control::{Control, Interrupt},
     fan_out::RecordFanOut,
+    schedule::Due,
 };
-use rhythm::Rhythm;
-use simulation::{Drive, Simulation};
+use firing_grid::FiringGrid;
+use simulation::{RobotMotion, Simulation};
 
-/// How often a array that waits shows that it is alive.
-const BEAT: Duration = Duration::from_secs(1);
+/// Heartbeat interval while the task is waiting.
+const HEARTBEAT: Duration = Duration::from_secs(1);
 
 pub(super) struct SimulatedArray {
     control: Control,
     out: RecordFanOut,
     simulation: Option<Simulation>,
-    drive: Drive,
-    rhythm: Rhythm,
-    /// The session's record that is in force in the log.
+    motion: RobotMotion,
+    firing_grid: FiringGrid,
+    /// Current session record of the log.
     session: Option<Session>,
     state: LinkState,
     since: Timestamp,
@@ -43,7 +44,7 @@ pub(super) struct SimulatedArray {
     scans: ScanTotals,
 }
 
-/// A round, and where it began.
+/// A round of firings, and the pose at its start.
 #[derive(Debug, Clone, Copy)]
 struct Round {
     scan: Uuid,
@@ -53,11 +54,11 @@ struct Round {
 impl SimulatedArray {
     pub(super) fn new(control: Control, out: RecordFanOut) -> Self {
         Self {
-            drive: Drive::new(&control),
+            motion: RobotMotion::new(&control),
             control,
             out,
             simulation: None,
-            rhythm: Rhythm::new(Instant::now()),
+            firing_grid: FiringGrid::new(Instant::now()),
             session: None,
             state: LinkState::Ready,
             since: Timestamp::now(),
@@ -66,18 +67,18 @@ impl SimulatedArray {
         }
     }
 
-    /// Plays until the end.
+    /// Runs the simulation until the daemon stops.
     pub(super) async fn run(mut self) {
         if let Some(simulated) = &self.control.settings.simulated {
             let array = &simulated.array;
             let (name, count) = (&array.name, array.rangers.len());
-            tracing::info!("nothing is measured: the model plays {count} rangers, array {name}");
+            tracing::info!("simulation: {count} rangers, array {name}");
         }
         loop {
-            let due = match self.control.agenda.due(self.control.now()) {
-                // Nothing is told that can't be kept.
+            let due = match self.control.schedule.due(self.control.now()) {
+                // No round starts unless its readings can be logged.
                 Due::Now if self.out.journal.is_well() => {
-                    if self.round().await.is_break() {
+                    if self.run_round().await.is_break() {
                         break;
                     }
                     continue;
@@ -86,42 +87,42 @@ impl SimulatedArray {
                 Due::At(at) => Some(self.control.epoch + at),
             };
             self.enter(LinkState::Ready);
-            let beat = Instant::now() + BEAT;
-            let until = due.map_or(beat, |due| due.min(beat));
+            let heartbeat = Instant::now() + HEARTBEAT;
+            let until = due.map_or(heartbeat, |due| due.min(heartbeat));
             if self.attend_until(until).await == Some(Interrupt::Shutdown) {
                 break;
             }
-            self.out.shared.beat();
+            self.out.state.beat();
         }
         self.enter(LinkState::Stopped);
     }
 
-    /// One round of the array.
-    async fn round(&mut self) -> ControlFlow<()> {
-        if let Err(why) = self.set_stage().await {
-            // Trying again would fail again, until somebody changes something.
-            self.control.agenda.stop();
-            tracing::error!("no scan is taken: {why}");
-            self.out.event(EventKind::Stopped, format!("no scan is taken: {why}"));
+    /// Fires each ranger of the array once.
+    async fn run_round(&mut self) -> ControlFlow<()> {
+        if let Err(why) = self.update_simulation().await {
+            // A retry would fail again until an order or the configuration changes the scan.
+            self.control.schedule.stop();
+            tracing::error!("scanning stopped: {why}");
+            self.out.event(EventKind::Stopped, format!("scanning stopped: {why}"));
             return ControlFlow::Continue(());
         }
         let Some(simulation) = &self.simulation else { return ControlFlow::Continue(()) };
         let (model, turns) = (simulation.model(), simulation.turns());
         self.enter(LinkState::Scanning);
-        self.control.agenda.begun(self.control.now());
-        self.rhythm.resume(Instant::now());
+        self.control.schedule.begun(self.control.now());
+        self.firing_grid.resume(Instant::now());
         let round =
-            Round { scan: Uuid::new_v4(), pose: self.drive.pose(&mut self.control, &self.out) };
+            Round { scan: Uuid::new_v4(), pose: self.motion.pose(&mut self.control, &self.out) };
         let air = self.control.air.settled();
         let start = ScanStart {
             air: Some(self.control.air.scan_air(&air, Instant::now())),
             ..ScanStart::of_array(&model, round.scan, round.pose, 1, Timestamp::now())
         };
         self.put(&Record::ScanStart(start));
-        let (mut index, mut fired, mut halted) = (0, 0, None);
+        let (mut index, mut fired, mut interrupted) = (0, 0, None);
         for turn in &turns {
-            halted = self.attend_until(self.rhythm.next()).await;
-            if halted.is_some() {
+            interrupted = self.attend_until(self.firing_grid.next()).await;
+            if interrupted.is_some() {
                 break;
             }
             let at = (Instant::now(), Timestamp::now());
@@ -129,9 +130,9 @@ impl SimulatedArray {
                 fired += u32::from(self.fire(round, index, ranger, at).await);
                 index += 1;
             }
-            self.rhythm.advance(Instant::now(), self.interval());
+            self.firing_grid.advance(Instant::now(), self.interval());
         }
-        if let Some(interrupt) = halted {
+        if let Some(interrupt) = interrupted {
             let stopping = interrupt == Interrupt::Shutdown;
             let why = if stopping { "the daemon is stopping" } else { STOPPED_ON_REQUEST };
             self.out.event(EventKind::Stopped, why.to_owned());
@@ -140,14 +141,14 @@ impl SimulatedArray {
         let counts = [fired, missing];
         self.put(&Record::ScanEnd(ScanEnd::of_array(&model, round.scan, counts, Timestamp::now())));
         self.count(counts);
-        match halted {
+        match interrupted {
             Some(Interrupt::Shutdown) => ControlFlow::Break(()),
             _ => ControlFlow::Continue(()),
         }
     }
 
-    /// Fires one ranger in a turn that began at a time, and tells of its reading when its echo is back or its turn
-    /// is over; not if the model failed.
+    /// Fires a ranger in a slot that began at the given time. Its reading is published when the
+    /// echo arrives or the receive window ends. Returns `false` if the model fails.
     async fn fire(
         &mut self,
         round: Round,
@@ -155,21 +156,21 @@ impl SimulatedArray {
         ranger: usize,
         (slot, time): (Instant, Timestamp),
     ) -> bool {
-        let pose = self.drive.pose(&mut self.control, &self.out);
+        let pose = self.motion.pose(&mut self.control, &self.out);
         let Some(simulation) = &mut self.simulation else { return false };
-        let heard = match simulation.reading(index as usize, pose).await {
-            Ok(heard) => heard,
+        let reading = match simulation.reading(index as usize, pose).await {
+            Ok(reading) => reading,
             Err(why) => {
                 tracing::error!("ranger {ranger}: {why}");
                 return false;
             }
         };
         let pose = Some(pose).filter(|pose| *pose != round.pose);
-        let ping = Ping { scan: round.scan, index, pose, time: Some(time), ..heard };
-        let listening_s = ping.tof_us.map_or_else(|| simulation.window_s(), |tof_us| tof_us * 1e-6);
-        sleep_until(slot + Duration::from_secs_f64(listening_s.max(0.0))).await;
-        self.out.shared.view.send_modify(|view| {
-            let readings = view.simulation.as_mut().map(|told| &mut told.readings);
+        let ping = Ping { scan: round.scan, index, pose, time: Some(time), ..reading };
+        let delay_s = ping.tof_us.map_or_else(|| simulation.window_s(), |tof_us| tof_us * 1e-6);
+        sleep_until(slot + Duration::from_secs_f64(delay_s.max(0.0))).await;
+        self.out.state.published.send_modify(|published| {
+            let readings = published.simulation.as_mut().map(|report| &mut report.readings);
             if let Some(reading) = readings.and_then(|readings| readings.get_mut(ranger)) {
                 (reading.time, reading.status) = (ping.time, Some(ping.status));
                 reading.range_m = ping.range_m;
@@ -179,7 +180,7 @@ impl SimulatedArray {
         true
     }
 
-    /// Carries out orders until a time, or until one that a round has to end for.
+    /// Carries out orders until a time, or until an interrupt that ends the round.
     async fn attend_until(&mut self, until: Instant) -> Option<Interrupt> {
         loop {
             let interrupt = tokio::select! {
@@ -190,58 +191,59 @@ impl SimulatedArray {
                 Interrupt::Shutdown | Interrupt::Stop => return Some(interrupt),
                 Interrupt::Log => match self.out.journal.status().error {
                     Some(error) => {
-                        tracing::error!("no scan until the log can be written: {error}");
+                        tracing::error!("scanning is paused: the log can't be written: {error}");
                     }
                     None => tracing::info!("the log can be written again"),
                 },
-                // There is neither a port nor a board.
+                // A simulation has neither a port nor a board.
                 Interrupt::PortChanged
                 | Interrupt::EmergencyStop(_)
                 | Interrupt::Start
-                | Interrupt::Agenda => {}
+                | Interrupt::ScheduleChanged => {}
             }
-            self.tell();
-            // A waiting array has to look at its agenda again.
+            self.publish_status();
+            // The order may have changed the next due time.
             if self.state == LinkState::Ready {
                 return Some(interrupt);
             }
         }
     }
 
-    /// The model of what is in force now, and a session that says so.
-    async fn set_stage(&mut self) -> Result<(), String> {
+    /// Updates the model to the current settings, and publishes a session if they changed.
+    async fn update_simulation(&mut self) -> Result<(), String> {
         let air = self.control.air.settled();
         let stale = std::mem::take(&mut self.control.stale);
         if stale {
-            self.drive.reload(&self.control);
+            self.motion.reload(&self.control);
         }
-        if stale || self.simulation.as_ref().is_none_or(|simulation| !simulation.is_of(&air)) {
-            self.simulation = Some(Simulation::set(&self.control.settings, air).await?);
+        if stale || self.simulation.as_ref().is_none_or(|simulation| !simulation.matches(&air)) {
+            self.simulation = Some(Simulation::new(&self.control.settings, air).await?);
         }
         let Some(simulation) = &self.simulation else { return Ok(()) };
-        let session = self.out.named(Session::of_array(&simulation.model(), Timestamp::now()));
+        let session =
+            self.out.with_robot_name(Session::of_array(&simulation.model(), Timestamp::now()));
         let same = self.session.as_ref().is_some_and(|before| {
             *before == Session { started: before.started, ..session.clone() }
         });
         if !same {
             self.put(&Record::Session(Box::new(session.clone())));
             self.session = Some(session);
-            self.tell();
+            self.publish_status();
         }
         Ok(())
     }
 
     fn put(&mut self, record: &Record) {
-        // The journal keeps what can't be written yet.
+        // The journal buffers records that can't be written yet.
         let _ = self.out.record(record);
     }
 
     fn count(&mut self, [beams, missing]: [u32; 2]) {
-        self.out.shared.view.send_modify(|view| view.scan = None);
+        self.out.state.published.send_modify(|published| published.scan = None);
         *if missing > 0 { &mut self.scans.stopped } else { &mut self.scans.completed } += 1;
         self.scans.beams += u64::from(beams);
         self.scans.missing += u64::from(missing);
-        self.tell();
+        self.publish_status();
     }
 
     fn enter(&mut self, state: LinkState) {
@@ -251,37 +253,38 @@ impl SimulatedArray {
                 tracing::info!("stopped");
             }
         }
-        self.tell();
+        self.publish_status();
     }
 
-    /// Publishes what is in force.
-    fn tell(&mut self) {
-        let next_at = match self.control.agenda.due(self.control.now()) {
+    /// Publishes the current status and settings.
+    fn publish_status(&mut self) {
+        let next_at = match self.control.schedule.due(self.control.now()) {
             Due::At(at) => Some(self.control.epoch + at),
             Due::Now | Due::OnRequest => None,
         };
-        let (control, drive, rhythm) = (&self.control, &self.drive, &self.rhythm);
-        self.out.shared.view.send_modify(|view| {
-            (view.state, view.since, view.changed) = (self.state, self.since, self.changed);
-            view.provenance = Some(Provenance::Simulated);
-            // Whatever port is configured, none is open.
-            view.port.clear();
-            view.scanning = control.scanning.clone();
-            (view.paused, view.requested) =
-                (control.agenda.is_paused(), control.agenda.requested());
-            view.next_at = next_at;
-            (view.now, view.next) = (control.terms(), control.terms());
-            view.configuration = control.configuration.clone();
-            view.scans = self.scans;
-            let told = control.settings.simulated.as_ref().map(|simulated| {
+        let (control, motion, firing_grid) = (&self.control, &self.motion, &self.firing_grid);
+        self.out.state.published.send_modify(|published| {
+            (published.state, published.since, published.changed) =
+                (self.state, self.since, self.changed);
+            published.provenance = Some(Provenance::Simulated);
+            // A configured port is not opened.
+            published.port.clear();
+            published.scanning = control.scanning.clone();
+            (published.paused, published.requested) =
+                (control.schedule.is_paused(), control.schedule.requested());
+            published.next_at = next_at;
+            (published.now, published.next) = (control.scan_settings(), control.scan_settings());
+            published.configuration = control.configuration.clone();
+            published.scans = self.scans;
+            let report = control.settings.simulated.as_ref().map(|simulated| {
                 let array = &simulated.array;
                 let now = SimulationReport::new(array);
-                let before = view.simulation.take().filter(|told| told.is_of(array));
+                let before = published.simulation.take().filter(|report| report.is_of(array));
                 let readings = before.map_or(now.readings, |before| before.readings);
-                let (driving, skipped) = (drive.is_driving(), rhythm.skipped());
+                let (driving, skipped) = (motion.is_driving(), firing_grid.skipped());
                 SimulationReport { driving, skipped, readings, ..now }
             });
-            view.simulation = told;
+            published.simulation = report;
         });
     }
 

@@ -1,8 +1,9 @@
 //! Signals that request the end of a program.
 //!
-//! SIGINT, SIGTERM and, with a controlling terminal, SIGHUP request an orderly end. Process wrappers such as `timeout`
-//! and `sudo` deliver one request as several signals, so signals within half a second of the first one count as one
-//! request. A later signal requests the end within [`FORCED_END`]: motor and log are still closed.
+//! SIGINT, SIGTERM and, with a controlling terminal, SIGHUP request an orderly end. Process
+//! wrappers such as `timeout` and `sudo` deliver one request as several signals, so signals within
+//! half a second of the first one count as one request. A later signal requests the end within
+//! [`FORCED_END`]: motor and log are still closed.
 #![warn(clippy::expect_used, clippy::indexing_slicing, clippy::panic)]
 
 use std::{fs, fs::File, time::Duration};
@@ -21,7 +22,7 @@ pub const FORCED_END: Duration = Duration::from_secs(3);
 
 /// Urgency of a requested end.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
-enum Request {
+enum StopRequest {
     #[default]
     None,
     Orderly,
@@ -33,8 +34,8 @@ enum Request {
 pub enum Hangup {
     /// The controlling terminal has closed: an orderly end.
     Stop,
-    /// Reload of the configuration: there is no controlling terminal, or the parent process has arranged for this one to
-    /// survive it (`nohup`).
+    /// Reload of the configuration: there is no controlling terminal, or the parent process has
+    /// arranged for this one to survive it (`nohup`).
     Reload,
 }
 
@@ -57,19 +58,19 @@ fn is_ignored(signal: Number) -> bool {
 
 /// Requests for the end of this process, from its signals. Clones share them.
 #[derive(Debug, Clone)]
-pub struct Interrupts(watch::Receiver<Request>);
+pub struct Interrupts(watch::Receiver<StopRequest>);
 
 /// Handlers of the stop signals, installed.
 #[derive(Debug)]
 pub struct SignalHandlers {
     /// The signals that could be handled.
     streams: Vec<Signal>,
-    requests: watch::Sender<Request>,
+    requests: watch::Sender<StopRequest>,
 }
 
 impl Interrupts {
-    /// Installs handlers for the stop signals, among them SIGHUP, and starts a task that receives them. Must be called
-    /// within a tokio runtime.
+    /// Installs handlers for the stop signals, among them SIGHUP, and starts a task that receives
+    /// them. Must be called within a tokio runtime.
     #[must_use]
     pub fn listen() -> Self {
         let (interrupts, handlers) = Self::install(Hangup::of_this_process());
@@ -81,13 +82,13 @@ impl Interrupts {
         interrupts
     }
 
-    /// Installs handlers for the stop signals; [`SignalHandlers::receive`] is to be spawned. Must be called within a tokio
-    /// runtime.
+    /// Installs handlers for the stop signals; [`SignalHandlers::receive`] is to be spawned. Must
+    /// be called within a tokio runtime.
     #[must_use]
     pub fn install(hangup: Hangup) -> (Self, SignalHandlers) {
         let mut kinds = vec![SignalKind::interrupt(), SignalKind::terminate()];
         kinds.extend((hangup == Hangup::Stop).then(SignalKind::hangup));
-        let (requests, receiver) = watch::channel(Request::default());
+        let (requests, receiver) = watch::channel(StopRequest::default());
         // A signal without a handler ends the process at once, as the system has it.
         let streams = kinds.into_iter().filter_map(|kind| signal(kind).ok()).collect();
         (Self(receiver), SignalHandlers { streams, requests })
@@ -95,15 +96,16 @@ impl Interrupts {
 
     /// Completes once an end is requested.
     pub async fn wait(self) {
-        self.reach(Request::Orderly).await;
+        self.reach(StopRequest::Orderly).await;
     }
 
     /// Completes once the end is forced: a stop signal has come after the first request.
     pub async fn wait_forced(self) {
-        self.reach(Request::Forced).await;
+        self.reach(StopRequest::Forced).await;
     }
 
-    /// Completes [`FORCED_END`] after the end was forced, when waiting any longer is against the user's will.
+    /// Completes [`FORCED_END`] after the end was forced, when waiting any longer is against the
+    /// user's will.
     pub async fn wait_overdue(self) {
         self.wait_forced().await;
         sleep(FORCED_END).await;
@@ -118,10 +120,10 @@ impl Interrupts {
     /// Whether an end has been requested.
     #[must_use]
     pub fn happened(&self) -> bool {
-        *self.0.borrow() >= Request::Orderly
+        *self.0.borrow() >= StopRequest::Orderly
     }
 
-    async fn reach(mut self, request: Request) {
+    async fn reach(mut self, request: StopRequest) {
         if self.0.wait_for(|&now| now >= request).await.is_err() {
             std::future::pending::<()>().await;
         }
@@ -135,7 +137,8 @@ impl SignalHandlers {
         loop {
             next_of(&mut self.streams).await;
             let first = *first.get_or_insert_with(Instant::now);
-            let request = if first.elapsed() <= BURST { Request::Orderly } else { Request::Forced };
+            let request =
+                if first.elapsed() <= BURST { StopRequest::Orderly } else { StopRequest::Forced };
             self.requests.send_if_modified(|now| {
                 let is_news = *now < request;
                 *now = request.max(*now);
@@ -167,10 +170,10 @@ mod tests {
 
     #[tokio::test]
     async fn forced_end_follows_an_orderly_one() {
-        let (sender, receiver) = watch::channel(Request::None);
+        let (sender, receiver) = watch::channel(StopRequest::None);
         let interrupts = Interrupts(receiver);
         assert!(!interrupts.happened());
-        sender.send_replace(Request::Orderly);
+        sender.send_replace(StopRequest::Orderly);
         interrupts.clone().wait().await;
         assert!(interrupts.happened());
         let forced = interrupts.wait_forced();
@@ -179,7 +182,7 @@ mod tests {
             std::task::Poll::Ready(forced.as_mut().poll(context).is_pending())
         });
         assert!(waiting.await, "an orderly end is not forced");
-        sender.send_replace(Request::Forced);
+        sender.send_replace(StopRequest::Forced);
         forced.await;
     }
 }

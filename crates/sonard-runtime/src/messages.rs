@@ -1,8 +1,9 @@
 //! Messages of a long-running program on standard error.
 //!
-//! Standard error can be closed, full (a pipe without reader, a stopped terminal, a stuck journal) or gone with its
-//! terminal. A message must neither fail nor block the task that emits it, so messages pass through a bounded queue to
-//! a thread of its own. When the queue is full, messages are dropped and counted.
+//! Standard error can be closed, full (a pipe without reader, a stopped terminal, a stuck journal)
+//! or gone with its terminal. A message must neither fail nor block the task that emits it, so
+//! messages pass through a bounded queue to a thread of its own. When the queue is full, messages
+//! are dropped and counted.
 #![warn(clippy::expect_used, clippy::indexing_slicing, clippy::panic)]
 
 use std::{
@@ -26,7 +27,8 @@ const MAX_QUEUED_BYTES: usize = 256 * 1024;
 const DRAIN_TIMEOUT: Duration = Duration::from_millis(500);
 /// Time allowed for a message that is written directly.
 const DIRECT_TIMEOUT: Duration = Duration::from_secs(1);
-/// Largest write that does not block once poll(2) reports a pipe as writable, bytes: PIPE_BUF of Linux.
+/// Largest write that does not block once poll(2) reports a pipe as writable, bytes: PIPE_BUF of
+/// Linux.
 const ATOMIC_WRITE_BYTES: usize = 4096;
 /// Level of messages unless `SONARD_LOG` sets another.
 const DEFAULT_FILTER: &str = "info,rustdds=off";
@@ -42,20 +44,20 @@ pub fn dropped() -> u64 {
 
 /// Queue of messages for standard error. Clones share it.
 #[derive(Debug, Clone)]
-pub struct MessageQueue(Arc<Shared>);
+pub struct MessageQueue(Arc<QueueInner>);
 
 /// Drains the queue when dropped, within half a second.
 #[derive(Debug)]
 pub struct MessageGuard(MessageQueue);
 
 #[derive(Debug)]
-struct Shared {
-    state: Mutex<State>,
+struct QueueInner {
+    state: Mutex<QueueState>,
     changed: Condvar,
 }
 
 #[derive(Debug, Default)]
-struct State {
+struct QueueState {
     messages: VecDeque<Vec<u8>>,
     bytes: usize,
     /// A message taken from the queue is being written.
@@ -65,8 +67,8 @@ struct State {
     unreported: u64,
 }
 
-/// Sends tracing's messages to standard error through a [`MessageQueue`] that is drained when the guard is dropped. Under
-/// systemd the journal adds the time.
+/// Sends tracing's messages to standard error through a [`MessageQueue`] that is drained when the
+/// guard is dropped. Under systemd the journal adds the time.
 #[must_use]
 pub fn log_to_stderr() -> MessageGuard {
     let queue = QUEUE.get_or_init(|| MessageQueue::start(stderr())).clone();
@@ -94,7 +96,8 @@ pub fn log_to_stderr() -> MessageGuard {
     MessageGuard(queue)
 }
 
-/// Sends warnings to standard error, for programs that write their own messages there. `SONARD_LOG` sets another level.
+/// Sends warnings to standard error, for programs that write their own messages there. `SONARD_LOG`
+/// sets another level.
 pub fn warn_on_stderr() {
     let filter =
         EnvFilter::try_from_env("SONARD_LOG").unwrap_or_else(|_| EnvFilter::new("off,sonard=warn"));
@@ -123,8 +126,8 @@ impl Write for DirectWriter {
     }
 }
 
-/// Writes a text to standard error for at most a second: a recipient that does not read delays the program no longer,
-/// and one that is gone is ignored.
+/// Writes a text to standard error for at most a second: a recipient that does not read delays the
+/// program no longer, and one that is gone is ignored.
 pub fn write_stderr(text: &str) {
     let deadline = Instant::now() + DIRECT_TIMEOUT;
     for piece in text.as_bytes().chunks(ATOMIC_WRITE_BYTES) {
@@ -141,7 +144,7 @@ fn stderr() -> BorrowedFd<'static> {
 impl MessageQueue {
     /// Starts the thread that writes the messages to `output`.
     fn start(output: BorrowedFd<'static>) -> Self {
-        let shared = Shared { state: Mutex::default(), changed: Condvar::new() };
+        let shared = QueueInner { state: Mutex::default(), changed: Condvar::new() };
         let queue = Self(Arc::new(shared));
         let writer = queue.clone();
         #[allow(clippy::disallowed_methods, reason = "supervised tasks depend on this thread")]
@@ -181,7 +184,8 @@ impl MessageQueue {
         }
     }
 
-    /// Waits for a message. Once the queue is empty, a message about those that were dropped follows.
+    /// Waits for a message. Once the queue is empty, a message about those that were dropped
+    /// follows.
     fn next_message(&self) -> Vec<u8> {
         let mut state = self.state();
         loop {
@@ -215,7 +219,7 @@ impl MessageQueue {
     }
 
     /// Nothing under this lock can panic.
-    fn state(&self) -> MutexGuard<'_, State> {
+    fn state(&self) -> MutexGuard<'_, QueueState> {
         self.0.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
@@ -246,8 +250,9 @@ impl MakeWriter<'_> for MessageQueue {
     }
 }
 
-/// Writes all bytes; before a deadline, `bytes` must not be longer than [`ATOMIC_WRITE_BYTES`]. The standard library's
-/// lock on standard error is not taken, since another thread may hold it while it blocks.
+/// Writes all bytes; before a deadline, `bytes` must not be longer than [`ATOMIC_WRITE_BYTES`]. The
+/// standard library's lock on standard error is not taken, since another thread may hold it while
+/// it blocks.
 fn write_before(
     output: BorrowedFd<'_>,
     mut bytes: &[u8],

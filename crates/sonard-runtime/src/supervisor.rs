@@ -1,9 +1,10 @@
 //! Supervision of the daemon's long-lived tasks and threads.
 //!
-//! Each long-lived task is spawned through a [`Supervisor`] under a [`Task`]. A panic, or an end before the daemon is
-//! stopping, is a [`TaskFailure`]; the first one is returned by [`Supervisor::failure`], upon which the daemon shuts
-//! down and exits with a non-zero code, so that the service manager restarts it. `clippy.toml` forbids the plain
-//! spawning functions, so that no task is left out.
+//! Each long-lived task is spawned through a [`Supervisor`] under a [`Task`]. A panic, or an end
+//! before the daemon is stopping, is a [`TaskFailure`]; the first one is returned by
+//! [`Supervisor::failure`], upon which the daemon shuts down and exits with a non-zero code, so
+//! that the service manager restarts it. `clippy.toml` forbids the plain spawning functions, so
+//! that no task is left out.
 #![warn(clippy::expect_used, clippy::indexing_slicing, clippy::panic)]
 
 use std::{
@@ -128,8 +129,8 @@ impl Supervisor {
         &self.stopping
     }
 
-    /// Spawns a task that runs until the daemon stops: a panic and an early end are failures. `None` is its output after
-    /// a panic. Must be called within a tokio runtime.
+    /// Spawns a task that runs until the daemon stops: a panic and an early end are failures.
+    /// `None` is its output after a panic. Must be called within a tokio runtime.
     pub fn spawn<F>(&self, task: Task, future: F) -> JoinHandle<Option<F::Output>>
     where
         F: Future<Output: Send> + Send + 'static,
@@ -137,8 +138,8 @@ impl Supervisor {
         self.spawn_supervised(task, future, true)
     }
 
-    /// Spawns a task that may end when its work is done: only a panic is a failure. Must be called within a tokio
-    /// runtime.
+    /// Spawns a task that may end when its work is done: only a panic is a failure. Must be called
+    /// within a tokio runtime.
     pub fn spawn_finite<F>(&self, task: Task, future: F) -> JoinHandle<Option<F::Output>>
     where
         F: Future<Output: Send> + Send + 'static,
@@ -228,8 +229,8 @@ pub(crate) fn panic_message(panic: &(dyn Any + Send)) -> String {
     text.unwrap_or("no message").to_owned()
 }
 
-/// Panics on request, for the test that ends each task in turn: in builds with debug assertions, the environment
-/// variable `SONARD_TEST_PANIC` names a task that panics a second after its start.
+/// Panics on request, for the test that ends each task in turn: in builds with debug assertions,
+/// the environment variable `SONARD_TEST_PANIC` names a task that panics a second after its start.
 mod fault {
     use super::Task;
 

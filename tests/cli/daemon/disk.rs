@@ -108,7 +108,7 @@ fn hanging_sync() {
     let code = daemon.child.wait().expect("it ends").code();
     assert_eq!(code, Some(3), "{}", daemon.said());
     assert!(since.elapsed() < Duration::from_secs(40), "longer than the unit allows");
-    assert!(daemon.said().contains("not confirmed"), "{}", daemon.said());
+    assert!(daemon.said().contains("not synced"), "{}", daemon.said());
     set(&faults, "slow", false);
     clean_log(folder.path());
 }

@@ -1,4 +1,4 @@
-//! What programs order, checked and carried out.
+//! Validation and execution of orders.
 
 use std::{sync::Arc, time::Duration};
 
@@ -13,15 +13,15 @@ use uuid::Uuid;
 
 use super::{Control, Interrupt};
 use crate::{
-    agenda::Asked,
     limits::{check_device, check_plan, check_pose},
-    refusal::{Refusal, RefusalKind},
+    order_error::{Refusal, RefusalKind},
+    schedule::Asked,
     sensor::ordered_sensor,
     settings::Settings,
 };
 
 impl Control {
-    pub(super) fn start(&mut self, asked: Asked) -> Result<(), Refusal> {
+    pub(super) fn start(&mut self, request: Asked) -> Result<(), Refusal> {
         if self.pressed {
             return Err(Refusal {
                 kind: RefusalKind::Conflict,
@@ -29,28 +29,28 @@ impl Control {
                 help: "release it first".into(),
             });
         }
-        asked.plan.map_or(Ok(()), |plan| self.check_plan(&plan))?;
-        asked.pose.map_or(Ok(()), |pose| self.check_pose(&pose))?;
-        if self.agenda.start(asked) {
+        request.plan.map_or(Ok(()), |plan| self.check_plan(&plan))?;
+        request.pose.map_or(Ok(()), |pose| self.check_pose(&pose))?;
+        if self.schedule.start(request) {
             return Ok(());
         }
         Err(Refusal {
             kind: RefusalKind::Conflict,
-            message: "too many requests wait already".into(),
-            help: "wait until some are done, or POST /v1/stop".into(),
+            message: "too many requests are queued".into(),
+            help: "wait until some are complete, or clear the queue with POST /v1/stop".into(),
         })
     }
 
     pub(super) fn cancel(&mut self, request: Uuid) -> (Result<(), Refusal>, Option<Interrupt>) {
-        let waiting = self.agenda.cancel(request);
+        let was_queued = self.schedule.cancel(request);
         if self.serving == Some(request) {
             return (Ok(()), Some(Interrupt::Stop));
         }
-        if waiting {
-            return (Ok(()), Some(Interrupt::Agenda));
+        if was_queued {
+            return (Ok(()), Some(Interrupt::ScheduleChanged));
         }
         let message = format!("there is no request {request}");
-        let help = "POST /v1/start gives it its id; it may be over".into();
+        let help = "use the id returned by POST /v1/start; the request may be complete".into();
         (Err(Refusal { kind: RefusalKind::Unknown, message, help }), None)
     }
 
@@ -60,11 +60,11 @@ impl Control {
             return Err(Refusal {
                 kind: RefusalKind::Wrong,
                 message: format!("every_s is {every_s}"),
-                help: "1 to 604800 seconds".into(),
+                help: "use 1 to 604800 seconds".into(),
             });
         }
         self.scanning = ScanningKeys { mode, every_s };
-        self.agenda.set_mode(mode, Duration::from_secs_f64(every_s), self.now());
+        self.schedule.set_mode(mode, Duration::from_secs_f64(every_s), self.now());
         Ok(())
     }
 
@@ -84,7 +84,7 @@ impl Control {
         Ok(())
     }
 
-    /// Whether what is simulated, or the ranger, can stand there.
+    /// Checks that the ranger, or the simulated robot, can be at a pose of the current scene.
     pub(crate) fn check_pose(&self, pose: &Pose) -> Result<(), Refusal> {
         let Settings { scene, simulated, .. } = &self.settings;
         check_pose(pose, scene.as_deref(), simulated.as_ref().map(|simulated| &*simulated.array))

@@ -1,27 +1,27 @@
-//! What makes live messages of the daemon's records, for whoever tells them.
+//! Conversion of live records to messages of visualization tools (Foxglove, ROS 2).
 
 use std::sync::Arc;
 
 use super::{
     Handle,
-    hub::{Line, Subscription},
+    broadcast::{Line, Subscription},
 };
 use sonard_export::{LeftOut, Live, LiveMessage, Topic};
 use sonard_records::{Record, Session, decode_line};
 
-/// Who tells them.
+/// Output of live messages.
 pub trait Audience {
-    /// There are messages of these topics from now on, and of no other.
+    /// Replaces the list of topics; later messages belong to these topics only.
     fn set_topics(&mut self, topics: &[Topic]);
-    /// A message of one of them.
+    /// Sends a message of one of the topics.
     fn tell(&mut self, message: &LiveMessage<'_>);
-    /// Something is not told, in words.
+    /// Reports missing messages, with a description of the reason.
     fn announce(&mut self, words: String);
-    /// All that there is to be told of a record was.
+    /// Marks the end of the messages of a record.
     fn told(&mut self);
 }
 
-/// What makes messages of the daemon's records.
+/// Converter of the daemon's live records to messages.
 pub struct Follower {
     daemon: Handle,
     records: Subscription,
@@ -29,7 +29,8 @@ pub struct Follower {
 }
 
 impl Follower {
-    /// Begins to follow; what is in force already is told to nobody.
+    /// Subscribes to the records of a daemon. The current session is taken as context; a running
+    /// scan is not replayed.
     pub fn begin(daemon: &Handle, live: Live, audience: &mut impl Audience) -> Self {
         let records = daemon.hub().follow();
         let mut follower = Self { daemon: daemon.clone(), records, live };
@@ -39,14 +40,15 @@ impl Follower {
         follower
     }
 
-    /// Tells the next record; false when there will be none. Cancel-safe.
+    /// Converts the next record. Returns `false` at the end of the stream. Cancel-safe.
     pub async fn next(&mut self, audience: &mut impl Audience) -> bool {
         match self.records.next().await {
             Some(line) => self.take_line(&line, audience),
             None if self.daemon.hub().is_closed() => return false,
             None => {
-                let words = "records came faster than they could be told: a scan is not whole";
-                audience.announce(words.into());
+                let message =
+                    "records arrived faster than they could be sent: a scan is incomplete";
+                audience.announce(message.into());
                 self.records = self.daemon.hub().follow();
             }
         }
@@ -59,35 +61,35 @@ impl Follower {
                 session.scene_text = self.scene_text(&session);
                 self.take(Record::Session(session), audience);
             }
-            // A whole scan takes its time, and may end with the next one's start.
+            // Converting a whole scan takes long, and may be triggered by the next scan's start.
             Ok(record @ (Record::ScanStart(_) | Record::ScanEnd(_))) => {
                 crate::blocking::block_in_place(|| self.take(record, audience));
             }
             Ok(record) => self.take(record, audience),
-            Err(_missed) => {
-                let words = "readings came faster than they could be told: some are left out";
-                audience.announce(words.into());
+            Err(_dropped) => {
+                let message = "readings arrived faster than they could be sent: some were dropped";
+                audience.announce(message.into());
             }
         }
         audience.told();
     }
 
-    /// The text of a session's scene, which live records go without.
+    /// Text of a session's scene, which live records omit.
     fn scene_text(&self, session: &Session) -> Option<Arc<str>> {
-        let in_force = self.daemon.session()?;
-        in_force.scene_text.clone().filter(|_| in_force.scene == session.scene)
+        let current = self.daemon.session()?;
+        current.scene_text.clone().filter(|_| current.scene == session.scene)
     }
 
     fn take(&mut self, record: Record, audience: &mut impl Audience) {
         let is_session = matches!(record, Record::Session(_));
         let taken = self.live.take(record, |message| audience.tell(&message));
         if let Err(why) = taken {
-            let words = match why {
+            let message = match why {
                 LeftOut::Map(_) => why.to_string(),
-                why => format!("nothing can be told of these scans: {why}"),
+                why => format!("these scans can't be converted: {why}"),
             };
-            tracing::warn!("live messages: {words}");
-            audience.announce(words);
+            tracing::warn!("live messages: {message}");
+            audience.announce(message);
         }
         if is_session {
             audience.set_topics(self.live.topics());

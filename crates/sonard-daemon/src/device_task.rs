@@ -1,7 +1,8 @@
-//! The task that owns the port and the ranger: does what the link's state machine says.
+//! Device task: owns the port and the ranger, and carries out the steps of the link's state
+//! machine.
 
+mod publish;
 mod scan;
-mod tell;
 
 use std::time::Duration;
 
@@ -18,33 +19,35 @@ use sonard_records::{EventKind, Session};
 use tokio::time::{Instant, sleep_until};
 
 use super::{
-    agenda::Due,
     control::{Control, Interrupt},
     fan_out::RecordFanOut,
-    forecast::{Forecast, listening},
-    machine::{Input, LinkMachine, Step},
-    shared::LinkFigures,
+    link_state::{LinkInput, LinkMachine, LinkStep},
+    prediction_cache::{PredictionCache, listening},
+    schedule::Due,
+    state::LinkFigures,
 };
 
-/// What to do after an emergency stop.
-const AWAITS_START: &str = "there was an emergency stop: nothing moves until somebody starts it \
-                            (POST /v1/start, or a restart of the daemon)";
-/// How often an operator that waits shows that it is alive.
-const BEAT: Duration = Duration::from_secs(1);
+/// Message after an emergency stop that requires a manual start.
+const AWAITS_START: &str = "there was an emergency stop: nothing moves until POST /v1/start, or a \
+restart of the daemon";
+/// Failure of a step that needs an open port.
+const LINE_CLOSED: &str = "the port is not open any more";
+/// Heartbeat interval while the task is waiting.
+const HEARTBEAT: Duration = Duration::from_secs(1);
 
-/// Opens the port of a name.
+/// Function that opens the serial port with the given name.
 pub type OpenPort = Box<dyn FnMut(&str) -> Result<Box<dyn Line>, LinkError> + Send>;
 
-pub(super) struct Operator {
+pub(super) struct DeviceTask {
     control: Control,
     machine: LinkMachine,
     open_port: OpenPort,
     ranger: Option<Ranger<Box<dyn Line>>>,
     line: Option<Box<dyn Line>>,
-    forecast: Forecast,
-    /// The device that was met last, on whatever connection.
-    met: Option<Identity>,
-    /// The session's record that is in force in the log.
+    predictions: PredictionCache,
+    /// Last device identified, on this connection or an earlier one.
+    last_identity: Option<Identity>,
+    /// Current session record of the log.
     session: Option<Session>,
     out: RecordFanOut,
     trouble: Option<String>,
@@ -53,17 +56,17 @@ pub(super) struct Operator {
     next_check: Instant,
 }
 
-impl Operator {
+impl DeviceTask {
     pub(super) fn new(control: Control, open_port: OpenPort, out: RecordFanOut) -> Self {
-        let machine = LinkMachine::new(control.settings.back_off(), control.now());
+        let machine = LinkMachine::new(control.settings.retry_bounds(), control.now());
         Self {
             control,
             machine,
             open_port,
             ranger: None,
             line: None,
-            forecast: Forecast::default(),
-            met: None,
+            predictions: PredictionCache::default(),
+            last_identity: None,
             session: None,
             out,
             trouble: None,
@@ -73,26 +76,26 @@ impl Operator {
         }
     }
 
-    /// Works until the machine has ended.
+    /// Runs until the state machine reaches its end.
     pub(super) async fn run(mut self) {
         loop {
             let step = self.machine.poll(self.control.now());
-            self.tell();
+            self.publish_status();
             match step {
-                Step::Open => self.open(),
-                Step::Identify => self.identify().await,
-                Step::Home => self.home().await,
-                Step::Serve => self.serve().await,
-                Step::Wait(until) => {
+                LinkStep::Open => self.open(),
+                LinkStep::Identify => self.identify().await,
+                LinkStep::Home => self.home().await,
+                LinkStep::Serve => self.serve().await,
+                LinkStep::Wait(until) => {
                     self.close();
                     self.wait(Some(self.control.epoch + until)).await;
                 }
-                Step::Rest => {
+                LinkStep::Rest => {
                     self.close();
                     self.control.gpio.set_power(false);
                     self.wait(None).await;
                 }
-                Step::End => break,
+                LinkStep::End => break,
             }
         }
         self.close();
@@ -100,15 +103,15 @@ impl Operator {
         self.control.gpio.set_power(false);
     }
 
-    fn handle(&mut self, input: Input) {
-        self.out.shared.beat();
+    fn handle(&mut self, input: LinkInput) {
+        self.out.state.beat();
         self.machine.handle(self.control.now(), input);
     }
 
     fn fail(&mut self, trouble: Trouble, why: String) {
         tracing::debug!("{why}");
         self.trouble = Some(why);
-        self.handle(Input::Failed(trouble));
+        self.handle(LinkInput::Failed(trouble));
     }
 
     fn open(&mut self) {
@@ -118,7 +121,7 @@ impl Operator {
         match (self.open_port)(&port) {
             Ok(line) => {
                 self.line = Some(line);
-                self.handle(Input::Opened);
+                self.handle(LinkInput::Opened);
             }
             Err(error) => {
                 let trouble = match &error {
@@ -129,7 +132,7 @@ impl Operator {
                     LinkError::Permission(_)
                     | LinkError::DevicePolicy(_)
                     | LinkError::NotSerial(_) => Trouble::Forbidden,
-                    // A port that is being unplugged says all kinds of things.
+                    // A port that is being unplugged returns various I/O errors.
                     LinkError::NotListed { .. } | LinkError::Io { .. } => Trouble::Lost,
                 };
                 self.fail(trouble, format!("{error}; {}", error.help()));
@@ -139,50 +142,53 @@ impl Operator {
 
     async fn identify(&mut self) {
         let attempts = self.control.settings.keys.link.attempts;
-        let met = match (self.line.take(), self.ranger.take()) {
+        let identified = match (self.line.take(), self.ranger.take()) {
             (Some(line), _) => {
                 let config =
                     HostConfig { max_attempts: attempts, ..HostConfig::new(BAUD, rand::random()) };
-                attended(&mut self.control, Ranger::meet(Driver::new(line, config))).await
+                with_orders(&mut self.control, Ranger::meet(Driver::new(line, config))).await
             }
             (None, Some(mut ranger)) => {
                 let again = async {
                     ranger.meet_again().await?;
                     Ok(ranger)
                 };
-                attended(&mut self.control, again).await
+                with_orders(&mut self.control, again).await
             }
-            (None, None) => return self.fail(Trouble::Lost, "the line is gone".into()),
+            (None, None) => return self.fail(Trouble::Lost, LINE_CLOSED.into()),
         };
-        match met {
+        match identified {
             Err(interrupt) => self.react(interrupt),
             Ok(Err(error)) => self.device_failed(&error),
-            Ok(Ok(ranger)) => self.meet(ranger),
+            Ok(Ok(ranger)) => self.accept(ranger),
         }
     }
 
-    /// Takes the device if it is the right one.
-    fn meet(&mut self, ranger: Ranger<Box<dyn Line>>) {
+    /// Accepts the device if its serial number matches `device.serial`; a different board than
+    /// before starts a new session.
+    fn accept(&mut self, ranger: Ranger<Box<dyn Line>>) {
         let serial = serial_text(ranger.identity());
-        let wanted = self.control.settings.keys.device.serial.clone();
-        if let Some(wanted) = wanted.filter(|wanted| *wanted != serial) {
+        let expected = self.control.settings.keys.device.serial.clone();
+        if let Some(expected) = expected.filter(|expected| *expected != serial) {
             let why = format!(
-                "the device says it is {serial}, not {wanted}; connect that one, or change \
-                 device.serial"
+                "the connected device has serial number {serial}, expected {expected}; connect \
+    {expected}, or change device.serial"
             );
             return self.fail(Trouble::WrongDevice, why);
         }
         let identity = *ranger.identity();
-        if let Some(change) = self.met.and_then(|met| BoardChange::between(&met, &identity)) {
-            let detail = format!("another device than before: {change}; a new session begins");
+        if let Some(change) =
+            self.last_identity.and_then(|last| BoardChange::between(&last, &identity))
+        {
+            let detail = format!("the device was replaced: {change}; a new session begins");
             self.out.event(EventKind::Reconnected, detail);
             self.session = None;
         }
-        self.met = Some(identity);
+        self.last_identity = Some(identity);
         self.control.identity = Some(identity);
         self.line_figures.live = Some(ranger.watch_link());
         self.ranger = Some(ranger);
-        self.handle(Input::Identified);
+        self.handle(LinkInput::Identified);
     }
 
     async fn home(&mut self) {
@@ -193,62 +199,63 @@ impl Operator {
             .settings
             .motion()
             .settings(&listening(&self.control.settings, &air), ranger.identity());
-        match attended(&mut self.control, ranger.home(settings)).await {
+        match with_orders(&mut self.control, ranger.home(settings)).await {
             Err(interrupt) => {
-                // The motor is turning. A device that does not hear this stops at its index.
+                // The motor is turning. A device that misses this request stops at its index.
                 let _ = ranger.stop().await;
                 self.react(interrupt);
             }
             Ok(Err(error)) => self.device_failed(&error),
             Ok(Ok(_drift)) if self.control.gpio.at_home() == Some(false) => {
-                let why = "the motor says it is home, but the home switch is open".into();
+                let why =
+                    "the device reports the home position, but the home switch is open".into();
                 self.fail(Trouble::Fault, why);
             }
             Ok(Ok(_drift)) => {
                 self.next_check = Instant::now() + self.check_interval();
-                self.handle(Input::Homed);
+                self.handle(LinkInput::Homed);
             }
         }
     }
 
-    /// The device can be used: scans if that is due, else listens until it is.
+    /// Takes a scan if one is due; otherwise waits for device events, orders or the next due time.
     async fn serve(&mut self) {
-        let due = match self.control.agenda.due(self.control.now()) {
-            // Nothing is measured that can't be kept.
+        let due = match self.control.schedule.due(self.control.now()) {
+            // No scan starts unless its readings can be logged.
             Due::Now if self.out.journal.is_well() => return self.scan().await,
             Due::Now | Due::OnRequest => None,
             Due::At(at) => Some(self.control.epoch + at),
         };
         let Some(ranger) = &mut self.ranger else {
-            return self.fail(Trouble::Lost, "the line is gone".into());
+            return self.fail(Trouble::Lost, LINE_CLOSED.into());
         };
-        self.out.shared.beat();
-        let wake = self.next_check.min(Instant::now() + BEAT);
+        self.out.state.beat();
+        let wake = self.next_check.min(Instant::now() + HEARTBEAT);
         let wake = due.map_or(wake, |due| due.min(wake));
         tokio::select! {
-            unasked = ranger.unasked() => self.unasked(unasked),
+            event = ranger.unasked() => self.handle_device_event(event),
             interrupt = self.control.next() => self.react(interrupt),
             () = sleep_until(wake) => self.check_if_due().await,
         }
     }
 
-    fn unasked(&mut self, unasked: Unasked) {
-        match unasked {
+    fn handle_device_event(&mut self, event: Unasked) {
+        match event {
             Unasked::Hangup => {
-                self.fail(Trouble::Lost, "the line was closed: the cable was pulled?".into());
+                self.fail(Trouble::Lost, "the port was closed: check the cable".into());
             }
             Unasked::Restarted => {
-                let detail = "the device restarted without work: homing again".to_owned();
+                let detail = "the device restarted while idle: homing again".to_owned();
                 self.out.event(EventKind::Reboot, detail);
-                self.handle(Input::Restarted);
+                self.handle(LinkInput::Restarted);
             }
-            // Homing again is all that it takes.
-            Unasked::Fault(FaultKind::HoldExpired) => self.handle(Input::Restarted),
+            // Homing clears an expired hold.
+            Unasked::Fault(FaultKind::HoldExpired) => self.handle(LinkInput::Restarted),
             Unasked::Fault(FaultKind::EmergencyStop) => {
-                self.device_stopped(&DriveError::Host(HostError::EmergencyStop));
+                self.handle_device_stop(&DriveError::Host(HostError::EmergencyStop));
             }
             Unasked::Fault(kind) => {
-                self.fail(Trouble::Fault, format!("the device stopped by itself: {kind}"));
+                self.fail(Trouble::Fault, format!("the device stopped: {kind}"));
             }
         }
     }
@@ -258,33 +265,35 @@ impl Operator {
             return;
         }
         self.next_check = Instant::now() + self.check_interval();
-        self.out.shared.beat();
+        self.out.state.beat();
         let Some(ranger) = &mut self.ranger else { return };
-        match attended(&mut self.control, ranger.check()).await {
+        match with_orders(&mut self.control, ranger.check()).await {
             Err(interrupt) => self.react(interrupt),
-            Ok(Err(DriveError::Host(HostError::Rebooted))) => self.unasked(Unasked::Restarted),
+            Ok(Err(DriveError::Host(HostError::Rebooted))) => {
+                self.handle_device_event(Unasked::Restarted);
+            }
             Ok(Err(error)) => self.device_failed(&error),
             Ok(Ok(())) => {}
         }
     }
 
-    /// The device's own emergency stop was pressed.
-    fn device_stopped(&mut self, error: &DriveError) {
+    /// Handles a press of the device's own emergency stop.
+    fn handle_device_stop(&mut self, error: &DriveError) {
         self.out.event(EventKind::Fault, error.to_string());
         let why = if self.resumes() { error.help() } else { AWAITS_START };
         self.trouble = Some(format!("{error}; {why}"));
         self.machine.set_resumes(self.resumes());
-        self.handle(Input::DeviceStopped);
+        self.handle(LinkInput::DeviceStopped);
     }
 
     fn device_failed(&mut self, error: &DriveError) {
         use HostError as Host;
         let trouble = match error {
             DriveError::Host(Host::EmergencyStop | Host::Refused(NakReason::EmergencyStop)) => {
-                return self.device_stopped(error);
+                return self.handle_device_stop(error);
             }
             DriveError::OtherBoard(_) => {
-                // Whatever it measures goes under its own name.
+                // Readings of another board belong to a session of their own.
                 self.session = None;
                 Trouble::WrongDevice
             }
@@ -296,7 +305,7 @@ impl Operator {
             _ => Trouble::Fault,
         };
         if trouble == Trouble::NotAnswering && self.control.gpio.can_reset() {
-            tracing::warn!("the device does not answer: pulling its reset line");
+            tracing::warn!("the device does not answer: resetting it by its reset line");
             crate::blocking::block_in_place(|| self.control.gpio.reset());
         }
         let contention = match trouble {
@@ -310,19 +319,19 @@ impl Operator {
         self.fail(trouble, format!("{error}; {help}"));
     }
 
-    /// Waits until a time or until something happens, and for no longer than a heartbeat.
+    /// Waits until a time or an interrupt, for at most a heartbeat interval.
     async fn wait(&mut self, until: Option<Instant>) {
-        self.out.shared.beat();
-        let beat = Instant::now() + BEAT;
+        self.out.state.beat();
+        let heartbeat = Instant::now() + HEARTBEAT;
         tokio::select! {
-            () = sleep_until(until.map_or(beat, |until| until.min(beat))) => {}
-            interrupt = self.control.next() => self.react(interrupt),
-        }
+        () = sleep_until(until.map_or(heartbeat, |until| until.min(heartbeat))) => {}
+                interrupt = self.control.next() => self.react(interrupt),
+            }
     }
 
     fn react(&mut self, interrupt: Interrupt) {
         match interrupt {
-            Interrupt::Shutdown => self.handle(Input::Shutdown),
+            Interrupt::Shutdown => self.handle(LinkInput::Shutdown),
             Interrupt::EmergencyStop(pressed) => {
                 let (kind, what) = match pressed {
                     true => (EventKind::Fault, "the emergency stop was pressed"),
@@ -333,17 +342,19 @@ impl Operator {
                     self.trouble = Some(AWAITS_START.to_owned());
                 }
                 self.machine.set_resumes(self.resumes());
-                self.handle(Input::EmergencyStop(pressed));
+                self.handle(LinkInput::EmergencyStop(pressed));
             }
-            Interrupt::PortChanged => self.handle(Input::PortChanged),
+            Interrupt::PortChanged => self.handle(LinkInput::PortChanged),
             Interrupt::Log => match self.out.journal.status().error {
-                Some(error) => tracing::error!("no scan until the log can be written: {error}"),
+                Some(error) => {
+                    tracing::error!("scanning is paused: the log can't be written: {error}");
+                }
                 None => tracing::info!("the log can be written again"),
             },
-            Interrupt::Start => self.handle(Input::Start),
-            Interrupt::Stop | Interrupt::Agenda => {}
+            Interrupt::Start => self.handle(LinkInput::Start),
+            Interrupt::Stop | Interrupt::ScheduleChanged => {}
         }
-        self.machine.set_back_off(self.control.settings.back_off());
+        self.machine.set_retry_bounds(self.control.settings.retry_bounds());
         self.machine.set_resumes(self.resumes());
     }
 
@@ -363,9 +374,12 @@ impl Operator {
     }
 }
 
-/// Waits for something of the device, carrying out orders meanwhile; broken off only by what
-/// can't wait.
-async fn attended<T>(control: &mut Control, work: impl Future<Output = T>) -> Result<T, Interrupt> {
+/// Runs `work` on the device while orders are carried out. Returns early only with a shutdown, an
+/// emergency stop or a change of port.
+async fn with_orders<T>(
+    control: &mut Control,
+    work: impl Future<Output = T>,
+) -> Result<T, Interrupt> {
     tokio::pin!(work);
     loop {
         tokio::select! {
@@ -374,8 +388,8 @@ async fn attended<T>(control: &mut Control, work: impl Future<Output = T>) -> Re
                 Interrupt::Shutdown | Interrupt::EmergencyStop(_) | Interrupt::PortChanged => {
                     return Err(interrupt);
                 }
-                // The operator looks at the agenda and the log when the device can be used.
-                Interrupt::Start | Interrupt::Stop | Interrupt::Log | Interrupt::Agenda => {}
+                // Schedule and log are examined once the device is ready.
+                Interrupt::Start | Interrupt::Stop | Interrupt::Log | Interrupt::ScheduleChanged => {}
             }
         }
     }

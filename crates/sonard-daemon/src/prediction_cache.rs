@@ -1,4 +1,4 @@
-//! What is known before a scan: settings for the device, and what the model predicts.
+//! Predictions of the next scan, cached, with the scan and session built from them.
 
 use std::sync::Arc;
 
@@ -14,50 +14,50 @@ use sonard_records::{ModelRecord, ScanAir, ScanPlan, Session, SimRecord};
 
 use super::settings::Settings;
 
-/// What predictions depend on, besides scene and sensor.
-pub(super) type ForecastKey = (Pose, ScanPlan, Air);
+/// Cache key: inputs of the predictions other than scene and sensor.
+pub(super) type PredictionKey = (Pose, ScanPlan, Air);
 
-/// What the model says.
+/// Result of the model for a scan.
 #[derive(Debug, Default)]
 pub(super) struct Predicted {
-    /// For each stop.
+    /// Prediction for each stop.
     predictions: Vec<SimRecord>,
-    /// Which model that was.
+    /// Options of the model.
     model: Option<ModelRecord>,
-    /// Why it says nothing although it was asked.
+    /// Reason why the model has no predictions for this scene.
     pub(super) refusal: Option<TooCostly>,
 }
 
-/// The predictions made last, kept for as long as nothing they depend on changes.
+/// Cache of the last predictions, valid until one of their inputs changes.
 #[derive(Debug, Default)]
-pub(super) struct Forecast {
-    made_for: Option<ForecastKey>,
+pub(super) struct PredictionCache {
+    key: Option<PredictionKey>,
     predictions: Vec<SimRecord>,
     model: Option<ModelRecord>,
 }
 
-impl Forecast {
-    /// Forgets everything, as after a change of scene or sensor.
-    pub(super) fn forget(&mut self) {
+impl PredictionCache {
+    /// Clears the cache, as needed after a change of scene or sensor.
+    pub(super) fn clear(&mut self) {
         *self = Self::default();
     }
 
-    /// Whether there are predictions for this.
-    pub(super) fn knows(&self, what: ForecastKey) -> bool {
-        self.made_for == Some(what)
+    /// Returns `true` if the cached predictions are those of `key`.
+    pub(super) fn contains(&self, key: PredictionKey) -> bool {
+        self.key == Some(key)
     }
 
-    /// Takes predictions in.
-    pub(super) fn learn(&mut self, what: ForecastKey, predicted: Predicted) {
+    /// Replaces the cached predictions.
+    pub(super) fn store(&mut self, key: PredictionKey, predicted: Predicted) {
         let Predicted { predictions, model, .. } = predicted;
-        *self = Self { made_for: Some(what), predictions, model };
+        *self = Self { key: Some(key), predictions, model };
     }
 
-    /// The scan of a plan at a pose, with the predictions made last.
+    /// Builds the scan of a plan at a pose, with the cached predictions.
     pub(super) fn job(
         &self,
         settings: &Settings,
-        (pose, plan, air): ForecastKey,
+        (pose, plan, air): PredictionKey,
         scan_air: ScanAir,
         identity: &Identity,
     ) -> ScanJob {
@@ -73,7 +73,7 @@ impl Forecast {
         }
     }
 
-    /// The session's record for scans with this air.
+    /// Builds the session record of scans in this air.
     pub(super) fn session(&self, settings: &Settings, air: &Air, identity: &Identity) -> Session {
         let sensor = settings.sensor.clone();
         let mut session = Session::new(Timestamp::now(), provenance(identity), sensor, air);
@@ -86,7 +86,7 @@ impl Forecast {
     }
 }
 
-/// What listening has to reach and where it begins.
+/// Receive window: maximum range and blanking.
 pub(super) fn listening(settings: &Settings, air: &Air) -> Listening {
     Listening {
         max_range_m: settings.max_range_m(),
@@ -95,14 +95,14 @@ pub(super) fn listening(settings: &Settings, air: &Air) -> Listening {
     }
 }
 
-/// Asks the model, beside everything else: it may take its time. Nothing without a scene, and where there are
-/// too many paths.
+/// Computes predictions in a thread of their own, since they may take long. The result is empty
+/// without a scene, and if the scene has too many paths.
 ///
 /// # Errors
-/// When the model refuses sensor or options, in words.
+/// When the model rejects sensor or options, with a description.
 pub(super) fn predict(
     settings: &Settings,
-    (pose, plan, air): ForecastKey,
+    (pose, plan, air): PredictionKey,
 ) -> impl Future<Output = Result<Predicted, String>> + use<> {
     let (scene, sensor) = (settings.scene.clone(), settings.sensor.clone());
     let options = settings.options();
@@ -114,13 +114,14 @@ pub(super) fn predict(
                 Simulator::new(scene, sensor, air, options).map_err(|error| error.to_string())?;
             // All firings at a stop have the same prediction.
             let stops = ScanPlan { pings_per_stop: 1, ..plan };
-            let told = match simulator.predict(&pose, &stops) {
-                Ok(told) => told,
+            let found = match simulator.predict(&pose, &stops) {
+                Ok(found) => found,
                 Err(error) => {
                     return Ok(Predicted { refusal: Some(error), ..Predicted::default() });
                 }
             };
-            let predictions = told.iter().map(|one| SimRecord::of(&simulator, one)).collect();
+            let predictions =
+                found.iter().map(|prediction| SimRecord::of(&simulator, prediction)).collect();
             let model = Some(ModelRecord::from(simulator.options()));
             Ok(Predicted { predictions, model, refusal: None })
         });

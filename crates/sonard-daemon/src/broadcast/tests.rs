@@ -29,7 +29,7 @@ async fn all(subscription: &mut Subscription, hub: &Hub) -> Vec<serde_json::Valu
 }
 
 #[tokio::test]
-async fn a_slow_subscriber_loses_the_oldest_readings_with_a_count_in_their_place_and_no_control() {
+async fn slow_subscriber_gets_drop_count() {
     let hub = Hub::new(10);
     let mut slow = hub.subscribe(Wanted::default());
     hub.publish(&control());
@@ -47,28 +47,28 @@ async fn a_slow_subscriber_loses_the_oldest_readings_with_a_count_in_their_place
 }
 
 #[tokio::test]
-async fn readings_missed_on_both_sides_of_a_scans_start_are_told_on_both() {
+async fn drop_counts_around_a_scan_start() {
     let hub = Hub::new(2);
     let mut slow = hub.subscribe(Wanted::default());
     (0..5).for_each(|step| hub.publish(&ping(step, Some(1.0))));
     hub.publish(&control());
     (5..10).for_each(|step| hub.publish(&ping(step, Some(1.0))));
-    let told: Vec<String> = all(&mut slow, &hub)
+    let received: Vec<String> = all(&mut slow, &hub)
         .await
         .iter()
         .map(|line| line["readings"].as_u64().map_or(line["type"].to_string(), |n| n.to_string()))
         .collect();
-    assert_eq!(told, ["5", "\"scan_start\"", "3", "\"ping\"", "\"ping\""]);
+    assert_eq!(received, ["5", "\"scan_start\"", "3", "\"ping\"", "\"ping\""]);
 }
 
 #[tokio::test]
-async fn only_what_moved_is_sent_on_request() {
+async fn deadband_suppresses_readings() {
     let hub = Hub::new(100);
     let mut some = hub.subscribe(Wanted { moved_m: Some(0.05), ..Wanted::default() });
     for (step, range_m) in [
         (0, Some(1.0)),
         (0, Some(1.04)),
-        // Creeping away in small steps is noticed against what was sent, not the last one.
+        // A slow drift is detected: ranges are compared with the last one sent.
         (0, Some(1.08)),
         (1, Some(1.08)),
         (0, Some(1.09)),
@@ -85,61 +85,64 @@ async fn only_what_moved_is_sent_on_request() {
 }
 
 #[tokio::test]
-async fn verdicts_and_viewpoints_come_to_who_wants_them_alone() {
+async fn verdicts_are_sent_on_request() {
     let hub = Hub::new(100);
-    // Who begins to listen in mid-scan sees its readings from the same places.
+    // A subscription in mid-scan has the viewpoint of the running scan.
     hub.publish(&session());
     hub.publish(&control());
-    let mut judged = hub.subscribe(Wanted { verdicts: true, ..Wanted::default() });
+    let mut annotated = hub.subscribe(Wanted { verdicts: true, ..Wanted::default() });
     let mut plain = hub.subscribe(Wanted::default());
     hub.publish(&ping(0, Some(1.0)));
-    let judged = all(&mut judged, &hub).await.remove(0);
-    assert_eq!(judged["verdict"].as_str().map(str::is_empty), Some(false));
+    let annotated = all(&mut annotated, &hub).await.remove(0);
+    assert_eq!(annotated["verdict"].as_str().map(str::is_empty), Some(false));
     let Record::ScanStart(start) = control() else { panic!("a start") };
-    assert_eq!(judged["viewpoint"]["x_m"], start.pose.x_m);
+    assert_eq!(annotated["viewpoint"]["x_m"], start.pose.x_m);
     let plain = all(&mut plain, &hub).await.remove(0);
     assert_eq!((plain.get("verdict"), plain.get("viewpoint")), (None, None));
 }
 
 #[tokio::test]
-async fn scans_are_told_in_order_and_a_subscriber_that_never_asks_is_cut_off() {
+async fn scan_subscriber_is_cut_off() {
     let hub = Hub::new(100);
-    let (mut one, mut dead) = (hub.subscribe_scans(), hub.subscribe_scans());
+    let (mut one, mut idle) = (hub.subscribe_scans(), hub.subscribe_scans());
     hub.publish_scan(Uuid::from_u128(1));
     hub.publish_scan(Uuid::from_u128(2));
     assert_eq!(one.next().await, Some(Uuid::from_u128(1)));
     assert_eq!(one.next().await, Some(Uuid::from_u128(2)));
-    (0..=CONTROLS as u128).for_each(|n| hub.publish_scan(Uuid::from_u128(n)));
-    assert_eq!((dead.next().await, hub.cut_off()), (None, 1));
+    (0..=MAX_CONTROLS as u128).for_each(|n| hub.publish_scan(Uuid::from_u128(n)));
+    assert_eq!((idle.next().await, hub.cut_off()), (None, 1));
 }
 
 #[tokio::test]
-async fn a_subscriber_that_never_reads_is_cut_off_and_one_that_leaves_is_forgotten() {
+async fn idle_subscriber_is_cut_off() {
     let hub = Hub::new(10);
-    let mut dead = hub.subscribe(Wanted::default());
-    for _ in 0..=CONTROLS {
+    let mut idle = hub.subscribe(Wanted::default());
+    for _ in 0..=MAX_CONTROLS {
         hub.publish(&control());
     }
-    assert_eq!((dead.next().await, dead.next().await, hub.cut_off()), (None, None, 1));
+    assert_eq!((idle.next().await, idle.next().await, hub.cut_off()), (None, None, 1));
     assert_eq!(hub.subscribers(), 1);
-    drop(dead);
+    drop(idle);
     assert_eq!(hub.subscribers(), 0);
 }
 
 #[tokio::test]
-async fn what_waits_is_bounded_in_bytes_and_kept_once_for_all() {
+async fn buffers_are_bounded_in_bytes() {
     let hub = Hub::new(100_000);
     let slow: Vec<Subscription> = (0..100).map(|_| hub.subscribe(Wanted::default())).collect();
     for step in 0..50_000 {
         hub.publish(&ping(step, Some(1.0)));
     }
-    let held = {
-        let waiting = held(&hub.inner.waiting);
-        let numbers = waiting.readings.first()..waiting.readings.end();
-        let lines = numbers.filter_map(|number| waiting.readings.get(number));
+    let buffered = {
+        let buffers = lock(&hub.inner.buffers);
+        let numbers = buffers.readings.first()..buffers.readings.end();
+        let lines = numbers.filter_map(|number| buffers.readings.get(number));
         lines.map(|reading| reading.line.len()).sum::<usize>()
     };
-    assert!((READING_BYTES / 2..=READING_BYTES).contains(&held), "{held} bytes wait");
+    assert!(
+        (MAX_READING_BYTES / 2..=MAX_READING_BYTES).contains(&buffered),
+        "{buffered} bytes buffered"
+    );
     drop(slow);
-    assert!(super::held(&hub.inner.waiting).readings.get(49_999).is_none());
+    assert!(lock(&hub.inner.buffers).readings.get(49_999).is_none());
 }

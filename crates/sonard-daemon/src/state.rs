@@ -1,4 +1,5 @@
-//! What the operator publishes, and other tasks look at.
+//! State shared between the daemon's tasks: status published by the device task, scan counters, and
+//! reports of the outputs.
 
 use std::sync::{
     Arc, Mutex, MutexGuard, PoisonError,
@@ -24,15 +25,15 @@ use uuid::Uuid;
 
 use super::{
     air::AirControl,
-    fit::{Fit, news},
+    fit::{FitAccumulator, describe_change},
 };
 
-/// What the operator publishes; ages and waits are computed when somebody asks.
+/// Status published by the device task. Ages and waits are computed when the status is read.
 #[derive(Debug, Clone)]
-pub(super) struct View {
+pub(super) struct PublishedStatus {
     pub(super) state: LinkState,
     pub(super) since: Timestamp,
-    /// `since` on the clock that is never set.
+    /// Time of `since` on the monotonic clock.
     pub(super) changed: Instant,
     pub(super) port: String,
     pub(super) trouble: Option<String>,
@@ -47,10 +48,10 @@ pub(super) struct View {
     pub(super) requested: u32,
     pub(super) next_at: Option<Instant>,
     pub(super) scan: Option<(Uuid, u32)>,
-    /// What the scan under way is taken by, unless it was asked for otherwise.
-    pub(super) now: Terms,
-    /// What the next one will be taken by.
-    pub(super) next: Terms,
+    /// Settings of the running scan, without those of its own request.
+    pub(super) now: ScanSettings,
+    /// Settings of the next scan.
+    pub(super) next: ScanSettings,
     pub(super) configuration: ConfigurationReport,
     pub(super) line: LinkFigures,
     pub(super) scans: ScanTotals,
@@ -61,59 +62,61 @@ pub(super) struct View {
 /// Settings of the next scan.
 #[derive(Debug, Clone)]
 pub struct NextScan {
-    /// Azimuths.
+    /// Azimuths of the beams.
     pub plan: ScanPlan,
-    /// Where the ranger stands.
+    /// Position and heading of the ranger.
     pub pose: Pose,
-    /// The scene, if there is one.
+    /// Scene of the predictions, if there is one.
     pub scene: Option<Arc<Scene>>,
-    /// Sensor and model.
+    /// Sensor, model and motion.
     pub setup: Arc<Setup>,
-    /// The air.
+    /// Temperature, humidity, pressure and speed of sound.
     pub air: AirStatus,
-    /// The array that is played in place of a ranger that turns, if one is.
+    /// Simulated array, if the readings come from the model.
     pub array: Option<Arc<RangerArray>>,
-    /// The connected device, for its limits.
+    /// Connected device, for its limits.
     pub device: Option<Identity>,
 }
 
-/// What scans are taken by.
+/// Settings of a scan: azimuths, pose, scene, sensor and air.
 #[derive(Debug, Clone)]
-pub(super) struct Terms {
+pub(super) struct ScanSettings {
     pub(super) plan: ScanPlan,
     pub(super) pose: Pose,
     pub(super) scene: Option<Arc<Scene>>,
     pub(super) setup: Arc<Setup>,
-    /// The array that is played, where nothing is measured.
+    /// Simulated array, if the readings come from the model.
     pub(super) array: Option<Arc<RangerArray>>,
     pub(super) air: AirControl,
 }
 
-impl Terms {
-    /// Whether a scan by these is one by others, but for the air, which may change at any time.
-    pub(super) fn measures_as(&self, other: &Self) -> bool {
-        let scene = |terms: &Self| terms.scene.as_ref().map(Arc::as_ptr);
+impl ScanSettings {
+    /// Returns `true` if both settings describe the same scan. The air is ignored, since it may
+    /// change at any time.
+    pub(super) fn same_scan_as(&self, other: &Self) -> bool {
+        let scene = |settings: &Self| settings.scene.as_ref().map(Arc::as_ptr);
         (self.plan, self.pose, scene(self)) == (other.plan, other.pose, scene(other))
             && Arc::ptr_eq(&self.setup, &other.setup)
     }
 }
 
-impl View {
-    /// What is in force. Without a scan under way that is what the next one will be taken by.
-    pub(super) const fn in_force(&self) -> &Terms {
+impl PublishedStatus {
+    /// Current settings: those of the running scan, otherwise those of the next one.
+    pub(super) const fn current(&self) -> &ScanSettings {
         if self.scan.is_some() { &self.now } else { &self.next }
     }
 
     pub(super) fn next_scan(&self, at: Instant) -> NextScan {
-        let Terms { plan, pose, scene, setup, array, air } = self.next.clone();
+        let ScanSettings { plan, pose, scene, setup, array, air } = self.next.clone();
         let (air, device) = (air.status(at), self.identity);
         NextScan { plan, pose, scene, setup, air, array, device }
     }
 
-    /// What differs from it in the next scan.
+    /// Settings of the next scan that differ from the current ones.
     fn pending(&self, at: Instant) -> Pending {
-        let (now, next) = (self.in_force(), &self.next);
-        let hash = |terms: &Terms| terms.scene.as_ref().map(|scene| scene.sha256.clone());
+        let (now, next) = (self.current(), &self.next);
+        let hash =
+            |settings: &ScanSettings| settings.scene.as_ref().map(|scene| scene.sha256.clone());
         let scene = next.scene.as_deref().filter(|_| hash(now) != hash(next));
         Pending {
             plan: Some(next.plan).filter(|plan| *plan != now.plan),
@@ -128,29 +131,29 @@ impl View {
     }
 }
 
-/// Figures of the line: what is settled, and the connection that there is.
+/// Counters of the serial line: totals of closed connections, and the open connection.
 #[derive(Debug, Clone, Default)]
 pub(super) struct LinkFigures {
-    /// Connections before this one, and losses.
+    /// Totals of closed connections, and the number of losses.
     pub(super) earlier: LineTotals,
-    /// This one's, which go on changing.
+    /// Live counters of the open connection.
     pub(super) live: Option<watch::Receiver<LinkStats>>,
 }
 
 impl LinkFigures {
-    /// All together, now.
+    /// Current totals of all connections.
     pub(super) fn totals(&self) -> LineTotals {
-        self.live.as_ref().map_or(self.earlier, |live| with(self.earlier, &live.borrow()))
+        self.live.as_ref().map_or(self.earlier, |live| add_stats(self.earlier, &live.borrow()))
     }
 
-    /// The connection is over.
+    /// Adds the counters of the open connection to the totals when it is closed.
     pub(super) fn close(&mut self) {
         *self = Self { earlier: self.totals(), live: None };
     }
 }
 
-/// Totals of earlier connections, and the figures of one more.
-fn with(mut totals: LineTotals, stats: &LinkStats) -> LineTotals {
+/// Adds the counters of a connection to the totals.
+fn add_stats(mut totals: LineTotals, stats: &LinkStats) -> LineTotals {
     let dropped = &stats.dropped;
     totals.bytes_sent += stats.bytes_sent;
     totals.bytes_received += stats.bytes_received;
@@ -163,51 +166,51 @@ fn with(mut totals: LineTotals, stats: &LinkStats) -> LineTotals {
     totals
 }
 
-/// State that several tasks look at.
+/// State shared between the daemon's tasks.
 #[derive(Debug)]
-pub(super) struct Shared {
+pub(super) struct DaemonState {
     pub(super) started: Instant,
-    /// The robot's name, as of the start.
+    /// Name of the robot, fixed at the start.
     pub(super) robot: String,
-    pub(super) view: watch::Sender<View>,
-    /// Counts whatever shows that the operator gets on; the watchdog looks at it.
+    pub(super) published: watch::Sender<PublishedStatus>,
+    /// Heartbeats of the device task, which the watchdog of systemd examines.
     beats: AtomicU64,
     beams_done: AtomicU32,
-    scans: Mutex<Collector>,
+    scans: Mutex<ScanSummaries>,
     server: Mutex<ServerReport>,
     ros: Mutex<Option<RosReport>>,
     mqtt: Mutex<Option<MqttReport>>,
 }
 
-/// What is remembered of scans. Their readings are in the log.
+/// Summary of the running scan and of the last one. Their readings are in the log.
 #[derive(Debug, Default)]
-struct Collector {
+struct ScanSummaries {
     current: Option<Uuid>,
-    /// How the last one ended, and the standard deviation of its last reading's time, microseconds.
+    /// End of the last scan, and the standard deviation of its last reading's time in microseconds.
     latest: Option<(ScanEnd, Option<f64>)>,
     sigma_us: Option<f64>,
-    /// How the scan under way agrees with the model, and how the last one did.
-    fit: Fit,
+    /// Agreement of the running scan with the model, and that of the last scan.
+    fit: FitAccumulator,
     latest_fit: Option<ScanFit>,
-    /// When the last one ended.
+    /// Time of the last scan's end.
     ended: Option<Instant>,
-    /// Start of the scan under way by both clocks. Times of its readings follow the wall clock as it
-    /// was then.
+    /// Start of the running scan by both clocks. Times of its readings are relative to the wall
+    /// clock at that moment.
     began: Option<(Instant, Timestamp)>,
-    /// The best explanation that an event told.
-    told: Option<Explanation>,
-    /// How long after its firing the last reading came in, seconds.
+    /// Best explanation published by the last event.
+    published: Option<Explanation>,
+    /// Delay from the firing of the last reading to its reception, seconds.
     lateness_s: Option<f64>,
-    /// When it came in.
+    /// Time of reception of the last reading.
     read: Option<Instant>,
 }
 
-impl Shared {
-    pub(super) fn new(view: View, robot: String) -> Self {
+impl DaemonState {
+    pub(super) fn new(published: PublishedStatus, robot: String) -> Self {
         Self {
             started: Instant::now(),
             robot,
-            view: watch::Sender::new(view),
+            published: watch::Sender::new(published),
             beats: AtomicU64::new(0),
             beams_done: AtomicU32::new(0),
             scans: Mutex::default(),
@@ -217,7 +220,7 @@ impl Shared {
         }
     }
 
-    /// Something went on.
+    /// Counts a heartbeat of the device task.
     pub(super) fn beat(&self) {
         self.beats.fetch_add(1, Ordering::Relaxed);
     }
@@ -226,17 +229,18 @@ impl Shared {
         self.beats.load(Ordering::Relaxed)
     }
 
-    /// Takes in a record of a scan; gives back the scan if this was its end, with its readings if they were few enough.
-    pub(super) fn collect(&self, record: &Record) -> Option<(Uuid, Option<ScanView>)> {
+    /// Updates the summaries with a record. At the end of a scan, returns its id, and its readings
+    /// unless there were too many to keep.
+    pub(super) fn update(&self, record: &Record) -> Option<(Uuid, Option<ScanView>)> {
         self.beat();
-        let session = self.view.borrow().session.clone();
+        let session = self.published.borrow().session.clone();
         let mut scans = self.scans();
         match record {
             Record::ScanStart(start) => {
                 self.beams_done.store(0, Ordering::Relaxed);
                 (scans.current, scans.sigma_us) = (Some(start.scan), None);
                 scans.began = Some((Instant::now(), start.time));
-                scans.fit = Fit::of(start, session);
+                scans.fit = FitAccumulator::new(start, session);
             }
             Record::Ping(ping) => {
                 self.beams_done.fetch_add(1, Ordering::Relaxed);
@@ -261,24 +265,25 @@ impl Shared {
         None
     }
 
-    /// Takes in what would explain a scan better; gives back what there is to say of it.
-    pub(super) fn explained(&self, scan: Uuid, found: &[Explanation]) -> Option<String> {
+    /// Stores the explanations of a scan that fit better than its settings. Returns the text of an
+    /// event if the best one changed.
+    pub(super) fn set_explanations(&self, scan: Uuid, found: &[Explanation]) -> Option<String> {
         let mut scans = self.scans();
-        let news = news(scans.told.as_ref(), found.first());
-        if news.is_some() {
-            scans.told = found.first().cloned();
+        let change = describe_change(scans.published.as_ref(), found.first());
+        if change.is_some() {
+            scans.published = found.first().cloned();
         }
         let latest = scans.latest_fit.as_mut().filter(|fit| fit.scan == scan);
         latest.into_iter().for_each(|fit| fit.explanations = found.to_vec());
-        news
+        change
     }
 
-    /// The last scan that is over.
+    /// Id of the last scan that has ended.
     pub(super) fn latest_scan(&self) -> Option<Uuid> {
         self.scans().latest.as_ref().map(|(end, _)| end.scan)
     }
 
-    /// How it ended, and the standard deviation of its last reading's time, microseconds.
+    /// End of the last scan, and the standard deviation of its last reading's time in microseconds.
     pub(super) fn latest_end(&self) -> Option<(ScanEnd, Option<f64>)> {
         self.scans().latest.clone()
     }
@@ -287,63 +292,63 @@ impl Shared {
         let now = Instant::now();
         let until =
             |at: Option<Instant>| at.map(|at| at.saturating_duration_since(now).as_secs_f64());
-        let view = self.view.borrow().clone();
-        let (in_force, pending) = (view.in_force().clone(), view.pending(now));
+        let published = self.published.borrow().clone();
+        let (current, pending) = (published.current().clone(), published.pending(now));
         Status {
             robot: self.robot.clone(),
             sonard: env!("CARGO_PKG_VERSION").into(),
             uptime_s: now.duration_since(self.started).as_secs_f64(),
             link: LinkReport {
-                state: view.state,
-                since: view.since,
-                for_s: Some(now.saturating_duration_since(view.changed).as_secs_f64()),
-                port: view.port,
-                trouble: view.trouble,
-                failures: view.failures,
-                retry_in_s: until(view.retry_at),
+                state: published.state,
+                since: published.since,
+                for_s: Some(now.saturating_duration_since(published.changed).as_secs_f64()),
+                port: published.port,
+                trouble: published.trouble,
+                failures: published.failures,
+                retry_in_s: until(published.retry_at),
             },
-            device: view.device,
-            provenance: view.provenance,
+            device: published.device,
+            provenance: published.provenance,
             scanning: ScanningReport {
-                mode: view.scanning.mode,
-                every_s: view.scanning.every_s,
-                paused: view.paused,
-                requested: view.requested,
-                next_in_s: until(view.next_at),
+                mode: published.scanning.mode,
+                every_s: published.scanning.every_s,
+                paused: published.paused,
+                requested: published.requested,
+                next_in_s: until(published.next_at),
             },
             last_reading_age_s: self
                 .scans()
                 .read
                 .map(|read| now.duration_since(read).as_secs_f64()),
-            scan: view.scan.map(|(scan, beams)| ScanProgress {
+            scan: published.scan.map(|(scan, beams)| ScanProgress {
                 scan,
                 beams,
                 done: self.beams_done.load(Ordering::Relaxed),
             }),
-            plan: in_force.plan,
-            pose: in_force.pose,
-            scene: in_force.scene.as_deref().map(SceneRef::of),
-            air: in_force.air.status(now),
-            sensor: SensorFigures::of(&in_force.setup.sensor),
+            plan: current.plan,
+            pose: current.pose,
+            scene: current.scene.as_deref().map(SceneRef::of),
+            air: current.air.status(now),
+            sensor: SensorFigures::of(&current.setup.sensor),
             pending,
             log,
             subscribers,
-            server: held(&self.server).clone(),
-            ros: held(&self.ros).clone(),
-            mqtt: held(&self.mqtt).clone(),
-            configuration: view.configuration,
-            simulation: view.simulation,
+            server: lock(&self.server).clone(),
+            ros: lock(&self.ros).clone(),
+            mqtt: lock(&self.mqtt).clone(),
+            configuration: published.configuration,
+            simulation: published.simulation,
         }
     }
 
     pub(super) fn health(&self, log: &LogStatus) -> Health {
-        let view = self.view.borrow().clone();
-        // A scan takes its time: the thermometer is judged by what it said last.
-        let air = view.next.air.status(Instant::now());
+        let published = self.published.borrow().clone();
+        // The current air would be that of the scan's start; health reports the last temperature.
+        let air = published.next.air.status(Instant::now());
         let mut reasons = Vec::new();
-        if !view.state.is_up() {
-            let trouble = view.trouble.unwrap_or_default();
-            reasons.push(format!("the link is {}: {trouble}", view.state.name()));
+        if !published.state.is_up() {
+            let trouble = published.trouble.unwrap_or_default();
+            reasons.push(format!("the link is {}: {trouble}", published.state.name()));
         }
         reasons.extend(log.error.iter().map(|error| format!("the log: {error}")));
         reasons.extend(log.incident.iter().map(|incident| format!("the log: {incident}")));
@@ -356,7 +361,7 @@ impl Shared {
         if air.stale {
             reasons.push("the air temperature is stale".into());
         }
-        reasons.extend(held(&self.server).trouble.iter().cloned());
+        reasons.extend(lock(&self.server).trouble.iter().cloned());
         let (fit, last_scan_age_s, reading_lateness_s) = {
             let scans = self.scans();
             let age_s = scans.ended.map(|ended| ended.elapsed().as_secs_f64());
@@ -366,36 +371,36 @@ impl Shared {
             healthy: reasons.is_empty(),
             dropped_messages: messages::dropped(),
             reasons,
-            line: view.line.totals(),
-            scans: view.scans,
-            clock: view.clock,
+            line: published.line.totals(),
+            scans: published.scans,
+            clock: published.clock,
             fit,
             last_scan_age_s,
             reading_lateness_s,
         }
     }
 
-    /// Takes in where clients reach the server.
+    /// Stores the server's addresses and faults.
     pub(super) fn report_server(&self, report: ServerReport) {
-        *held(&self.server) = report;
+        *lock(&self.server) = report;
     }
 
-    /// How it goes with ROS 2.
+    /// Stores the state of the ROS 2 node.
     pub(super) fn report_ros(&self, report: RosReport) {
-        *held(&self.ros) = Some(report);
+        *lock(&self.ros) = Some(report);
     }
 
-    /// How it goes with the broker.
+    /// Stores the state of the MQTT connection.
     pub(super) fn report_mqtt(&self, report: MqttReport) {
-        *held(&self.mqtt) = Some(report);
+        *lock(&self.mqtt) = Some(report);
     }
 
-    fn scans(&self) -> MutexGuard<'_, Collector> {
-        held(&self.scans)
+    fn scans(&self) -> MutexGuard<'_, ScanSummaries> {
+        lock(&self.scans)
     }
 }
 
-/// A thermometer's fault, and what ranges are computed with meanwhile.
+/// Describes a fault of the thermometer, and the temperature used for ranges meanwhile.
 fn describe_thermometer(error: &str, air: &AirStatus) -> String {
     let temperature_c = air.temperature_c;
     let in_use = match (air.source, air.age_s) {
@@ -408,7 +413,7 @@ fn describe_thermometer(error: &str, air: &AirStatus) -> String {
     format!("the thermometer has no valid temperature: {error}; {in_use}")
 }
 
-/// Nothing under these locks can panic, so a poisoned one holds what it should.
-fn held<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+/// Locks a mutex. No code under these locks can panic, so a poisoned value is valid.
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }

@@ -1,17 +1,17 @@
-//! What others get to know.
+//! Publication of link state, settings and counters to the daemon's state and the log.
 
 use jiff::{SignedDuration, Timestamp};
 use sonard_api::{LinkState, Trouble};
 use sonard_device::ranger::{device_record, provenance};
 use sonard_records::EventKind;
 
-use super::{super::agenda::Due, Operator};
+use super::{super::schedule::Due, DeviceTask};
 
-impl Operator {
-    /// Tells of a change of state, once, and publishes what is in force.
-    pub(super) fn tell(&mut self) {
+impl DeviceTask {
+    /// Publishes the current status, and logs a change of link state once.
+    pub(super) fn publish_status(&mut self) {
         if let Some(transition) = self.machine.poll_transition() {
-            self.tell_transition(transition.from, transition.to);
+            self.report_transition(transition.from, transition.to);
         }
         if self.machine.state().is_up() {
             self.trouble = None;
@@ -20,36 +20,36 @@ impl Operator {
             - SignedDuration::try_from(self.control.now().saturating_sub(self.machine.since()))
                 .unwrap_or_default();
         let changed = self.control.epoch + self.machine.since();
-        let next_at = match self.control.agenda.due(self.control.now()) {
+        let next_at = match self.control.schedule.due(self.control.now()) {
             Due::At(at) => Some(self.control.epoch + at),
             Due::Now | Due::OnRequest => None,
         };
         let retry_at = self.machine.retry_at().map(|at| self.control.epoch + at);
         let (control, machine) = (&self.control, &self.machine);
-        self.out.shared.view.send_modify(|view| {
-            if view.state != machine.state() {
-                (view.since, view.changed) = (since, changed);
+        self.out.state.published.send_modify(|published| {
+            if published.state != machine.state() {
+                (published.since, published.changed) = (since, changed);
             }
-            view.state = machine.state();
-            view.port = control.settings.keys.device.port.clone().unwrap_or_default();
-            view.trouble.clone_from(&self.trouble);
-            (view.failures, view.retry_at) = (machine.failures(), retry_at);
-            view.device = control.identity.as_ref().map(device_record);
-            view.identity = control.identity;
-            view.provenance = control.identity.as_ref().map(provenance);
-            view.scanning = control.scanning.clone();
-            (view.paused, view.requested) =
-                (control.agenda.is_paused(), control.agenda.requested());
-            view.next_at = next_at;
-            (view.now, view.next) = (control.terms(), control.terms());
-            view.configuration = control.configuration.clone();
-            view.line.clone_from(&self.line_figures);
-            view.scans = self.scans;
+            published.state = machine.state();
+            published.port = control.settings.keys.device.port.clone().unwrap_or_default();
+            published.trouble.clone_from(&self.trouble);
+            (published.failures, published.retry_at) = (machine.failures(), retry_at);
+            published.device = control.identity.as_ref().map(device_record);
+            published.identity = control.identity;
+            published.provenance = control.identity.as_ref().map(provenance);
+            published.scanning = control.scanning.clone();
+            (published.paused, published.requested) =
+                (control.schedule.is_paused(), control.schedule.requested());
+            published.next_at = next_at;
+            (published.now, published.next) = (control.scan_settings(), control.scan_settings());
+            published.configuration = control.configuration.clone();
+            published.line.clone_from(&self.line_figures);
+            published.scans = self.scans;
         });
         self.control.gpio.set_light(self.machine.state().is_up());
     }
 
-    fn tell_transition(&mut self, from: Option<LinkState>, to: LinkState) {
+    fn report_transition(&mut self, from: Option<LinkState>, to: LinkState) {
         let trouble = self.trouble.clone().unwrap_or_default();
         let was_up = from.is_some_and(LinkState::is_up);
         match to {

@@ -1,8 +1,8 @@
-//! Readings with what the API tells beside them.
+//! Annotation of readings with verdict and viewpoint.
 
 use sonard_api::Beside;
 
-/// A reading's line, an object with or without a newline, with what is told beside it as its last fields.
+/// Appends the fields of `beside` to a reading's line, a JSON object with or without a newline.
 #[must_use]
 pub fn judged_line(line: &[u8], beside: &Beside) -> Vec<u8> {
     let (object, newline) = match line.strip_suffix(b"\n") {
@@ -13,7 +13,7 @@ pub fn judged_line(line: &[u8], beside: &Beside) -> Vec<u8> {
     else {
         return line.to_vec();
     };
-    // The second object's fields take the place of the first one's end.
+    // The fields of the second object replace the closing brace of the first one.
     [open, b",", fields.get(1..).unwrap_or_default(), newline].concat()
 }
 
@@ -33,7 +33,7 @@ mod tests {
     }
 
     #[test]
-    fn a_reading_gets_its_verdict_its_viewpoint_and_nothing_else() {
+    fn adds_verdict_and_viewpoint_only() {
         let view = view();
         let (mut verdicts, robot) = (Vec::new(), view.pose().expect("a pose"));
         for line in LOG.lines() {
@@ -58,7 +58,7 @@ mod tests {
     }
 
     #[test]
-    fn a_viewpoint_is_that_of_the_mounting_and_unknown_where_the_scan_does_not_say() {
+    fn viewpoint_follows_the_mounting() {
         let mut view = view();
         let mut session = Session::clone(view.session.as_deref().expect("a session"));
         session.sensor.mounting.ahead_m = 0.1;
@@ -66,8 +66,9 @@ mod tests {
         let robot = Pose { x_m: 1.0, y_m: 2.0, heading_deg: 90.0 };
         let mut ping = view.pings[0].clone();
         (ping.pose, ping.azimuth_deg) = (Some(robot), 0.0);
-        let seen = Beside::of(&ping, Some(&view)).viewpoint.expect("a viewpoint");
-        assert!((seen.x_m - 1.0).hypot(seen.y_m - 2.1) < 1e-12, "{seen:?}");
+        let viewpoint = Beside::of(&ping, Some(&view)).viewpoint.expect("a viewpoint");
+        let error_m = (viewpoint.x_m - 1.0).hypot(viewpoint.y_m - 2.1);
+        assert!(error_m < 1e-12, "{viewpoint:?}");
 
         ping.ranger = Some("s0".into());
         assert_eq!(Beside::of(&ping, Some(&view)).viewpoint, None, "a ranger that the array lacks");

@@ -1,4 +1,4 @@
-//! One scan, with whatever happens meanwhile.
+//! A single scan, with the orders and interrupts that arrive meanwhile.
 
 use std::future::pending;
 
@@ -11,43 +11,45 @@ use tokio::{sync::oneshot, time::Instant};
 use uuid::Uuid;
 
 use super::{
-    super::{agenda::Asked, control::Interrupt, forecast::predict, machine::Input},
-    Operator, attended,
+    super::{
+        control::Interrupt, link_state::LinkInput, prediction_cache::predict, schedule::Asked,
+    },
+    DeviceTask, with_orders,
 };
 
-impl Operator {
+impl DeviceTask {
     pub(super) async fn scan(&mut self) {
-        let Some(identity) = self.recognise().await else { return };
-        let (asked, terms) = (self.control.agenda.next(), self.control.terms());
-        let Some(job) = self.prepare(&identity, asked).await else { return };
-        let now = self.control.terms();
-        if self.control.agenda.next() != asked || !now.measures_as(&terms) {
-            // While the model was asked, somebody wanted something else.
+        let Some(identity) = self.verify_identity().await else { return };
+        let (request, before) = (self.control.schedule.next(), self.control.scan_settings());
+        let Some(job) = self.prepare(&identity, request).await else { return };
+        let now = self.control.scan_settings();
+        if self.control.schedule.next() != request || !now.same_scan_as(&before) {
+            // An order changed the next scan while the model was computing.
             return;
         }
         let Some(mut ranger) = self.ranger.take() else { return };
-        self.control.agenda.begun(self.control.now());
+        self.control.schedule.begun(self.control.now());
         self.control.serving = job.request;
-        self.handle(Input::ScanBegun);
-        self.tell();
-        let before = self.out.shared.latest_scan();
+        self.handle(LinkInput::ScanBegun);
+        self.publish_status();
+        let previous = self.out.state.latest_scan();
         let clock_steps = ranger.clock_steps();
-        let (outcome, interrupts) = self.scan_attended(&mut ranger, &job).await;
+        let (outcome, interrupts) = self.run_scan(&mut ranger, &job).await;
         self.count_clock_steps(ranger.clock_steps() - clock_steps);
         self.control.serving = None;
         self.control.identity = Some(*ranger.identity());
         self.ranger = Some(ranger);
         self.next_check = Instant::now() + self.check_interval();
-        self.out.shared.view.send_modify(|view| view.scan = None);
-        self.scan_ended(before, outcome);
+        self.out.state.published.send_modify(|published| published.scan = None);
+        self.finish_scan(previous, outcome);
         interrupts.into_iter().for_each(|interrupt| self.react(interrupt));
     }
 
-    /// Makes sure that the device is there, before a scan is begun that nobody would take. A restart
-    /// since the last one is no other device, but begins a session.
-    async fn recognise(&mut self) -> Option<Identity> {
+    /// Re-identifies the device: a scan never starts on a disconnected or different board. A
+    /// restart since the last scan is the same device, but starts a session.
+    async fn verify_identity(&mut self) -> Option<Identity> {
         let ranger = self.ranger.as_mut()?;
-        match attended(&mut self.control, ranger.recognise()).await {
+        match with_orders(&mut self.control, ranger.recognise()).await {
             Err(interrupt) => self.react(interrupt),
             Ok(Err(error)) => self.device_failed(&error),
             Ok(Ok(())) => {
@@ -58,76 +60,80 @@ impl Operator {
         None
     }
 
-    /// The next scan, and a session in the log that it fits; `None` if it can't be taken now.
+    /// Prepares the next scan and writes its session to the log. Returns `None` if the scan can't
+    /// be taken now.
     async fn prepare(&mut self, identity: &Identity, asked: Option<Asked>) -> Option<ScanJob> {
         if std::mem::take(&mut self.control.stale) {
-            self.forecast.forget();
+            self.predictions.clear();
         }
         let air = self.control.air.settled();
-        let pose = asked.and_then(|asked| asked.pose).unwrap_or(self.control.pose);
-        let plan = asked.and_then(|asked| asked.plan).unwrap_or(self.control.plan);
-        let what = (pose, plan, air);
-        if let Err(error) = what.1.motor_steps(identity.steps_per_revolution.into()) {
-            return self.give_up_scans(&error.to_string(), asked);
+        let pose = asked.and_then(|request| request.pose).unwrap_or(self.control.pose);
+        let plan = asked.and_then(|request| request.plan).unwrap_or(self.control.plan);
+        let key = (pose, plan, air);
+        if let Err(error) = plan.motor_steps(identity.steps_per_revolution.into()) {
+            return self.abandon_scans(&error.to_string(), asked);
         }
-        if !self.forecast.knows(what) {
-            let predicting = predict(&self.control.settings, what);
-            match attended(&mut self.control, predicting).await {
+        if !self.predictions.contains(key) {
+            let predicting = predict(&self.control.settings, key);
+            match with_orders(&mut self.control, predicting).await {
                 Err(interrupt) => {
                     self.react(interrupt);
                     return None;
                 }
-                Ok(Err(why)) => return self.give_up_scans(&why, asked),
+                Ok(Err(why)) => return self.abandon_scans(&why, asked),
                 Ok(Ok(predicted)) => {
                     if let Some(why) = &predicted.refusal {
-                        tracing::warn!("scans are taken without predictions: {why}");
+                        tracing::warn!("scans have no predictions: {why}");
                         self.out.event(EventKind::NoPrediction, why.to_string());
                     }
-                    self.forecast.learn(what, predicted);
+                    self.predictions.store(key, predicted);
                 }
             }
         }
-        let session = self.forecast.session(&self.control.settings, &air, identity);
-        self.put_session(session);
+        let session = self.predictions.session(&self.control.settings, &air, identity);
+        self.publish_session(session);
         let scan_air = self.control.air.scan_air(&air, Instant::now());
-        let job = self.forecast.job(&self.control.settings, what, scan_air, identity);
-        Some(ScanJob { request: asked.map(|asked| asked.request), ..job })
+        let job = self.predictions.job(&self.control.settings, key, scan_air, identity);
+        Some(ScanJob { request: asked.map(|request| request.request), ..job })
     }
 
-    /// Takes no more scans (of a request with its own plan: no more of those): trying again would
-    /// fail again, until somebody changes something.
-    fn give_up_scans(&mut self, why: &str, asked: Option<Asked>) -> Option<ScanJob> {
-        match asked.filter(|asked| asked.plan.is_some() || asked.pose.is_some()) {
-            Some(asked) => drop(self.control.agenda.cancel(asked.request)),
-            None => self.control.agenda.stop(),
+    /// Pauses scanning, or cancels only the request if the failure comes from its own plan or pose.
+    /// A retry would fail again until an order or the configuration changes the scan.
+    fn abandon_scans(&mut self, why: &str, asked: Option<Asked>) -> Option<ScanJob> {
+        match asked.filter(|request| request.plan.is_some() || request.pose.is_some()) {
+            Some(request) => drop(self.control.schedule.cancel(request.request)),
+            None => self.control.schedule.stop(),
         }
-        tracing::error!("no scan is taken: {why}");
-        self.out.event(EventKind::Stopped, format!("no scan is taken: {why}"));
+        tracing::error!("scanning stopped: {why}");
+        self.out.event(EventKind::Stopped, format!("scanning stopped: {why}"));
         None
     }
 
-    /// Writes a session's record if the one in force says something else.
-    fn put_session(&mut self, session: Session) {
-        let session = self.out.named(session);
+    /// Publishes a session record if it differs from the current one in more than the time.
+    fn publish_session(&mut self, session: Session) {
+        let session = self.out.with_robot_name(session);
         let same = self.session.as_ref().is_some_and(|before| {
             *before == Session { started: before.started, ..session.clone() }
         });
         if !same {
-            self.out.put(&Record::Session(Box::new(session.clone())));
+            self.out.publish(&Record::Session(Box::new(session.clone())));
             self.session = Some(session);
         }
     }
 
     fn count_clock_steps(&self, steps: u32) {
         if steps > 0 {
-            tracing::warn!("the computer's clock was set; the log says by how much");
-            self.out.shared.view.send_modify(|view| view.clock.steps += u64::from(steps));
+            tracing::warn!("the computer's clock was stepped; the log contains the offset");
+            self.out
+                .state
+                .published
+                .send_modify(|published| published.clock.steps += u64::from(steps));
         }
     }
 
-    /// Takes the scan, and carries out orders meanwhile. What happened that the machine has to
-    /// know comes back with the outcome.
-    async fn scan_attended(
+    /// Runs the scan while orders are carried out. Returns its outcome, and the interrupts that the
+    /// state machine has to handle afterwards.
+    async fn run_scan(
         &mut self,
         ranger: &mut Ranger<Box<dyn Line>>,
         job: &ScanJob,
@@ -147,18 +153,18 @@ impl Operator {
         let outcome = loop {
             let interrupt = tokio::select! {
                 outcome = &mut scan => break outcome,
-                // After the end there is nothing more to be told.
+                // A shutdown is final: no interrupt after it matters.
                 interrupt = self.control.next(), if !interrupts.contains(&Interrupt::Shutdown) => interrupt,
             };
             let why = match interrupt {
                 Interrupt::Shutdown => "the daemon is stopping",
                 Interrupt::Stop => STOPPED_ON_REQUEST,
                 Interrupt::EmergencyStop(true) => "the emergency stop was pressed",
-                Interrupt::PortChanged => "another port is to be used",
+                Interrupt::PortChanged => "the configured port changed",
                 Interrupt::Log if !self.out.journal.is_well() => "the log can't be written",
                 Interrupt::Log
                 | Interrupt::Start
-                | Interrupt::Agenda
+                | Interrupt::ScheduleChanged
                 | Interrupt::EmergencyStop(false) => {
                     if let Interrupt::EmergencyStop(_) = interrupt {
                         interrupts.push(interrupt);
@@ -176,10 +182,10 @@ impl Operator {
         (outcome, interrupts)
     }
 
-    fn scan_ended(&mut self, before: Option<Uuid>, outcome: Result<ScanSummary, ScanError>) {
-        if let Some((end, _)) = self.out.shared.latest_end()
+    fn finish_scan(&mut self, previous: Option<Uuid>, outcome: Result<ScanSummary, ScanError>) {
+        if let Some((end, _)) = self.out.state.latest_end()
             && outcome.is_err()
-            && Some(end.scan) != before
+            && Some(end.scan) != previous
         {
             self.scans.beams += u64::from(end.beams);
             self.scans.missing += u64::from(end.missing);
@@ -187,10 +193,12 @@ impl Operator {
         match outcome {
             Ok(summary) => {
                 self.count(&summary);
-                self.handle(Input::ScanEnded);
+                self.handle(LinkInput::ScanEnded);
                 match summary.not_home {
                     None => {}
-                    Some(DriveError::Host(HostError::Rebooted)) => self.handle(Input::Restarted),
+                    Some(DriveError::Host(HostError::Rebooted)) => {
+                        self.handle(LinkInput::Restarted)
+                    }
                     Some(error) => self.device_failed(&error),
                 }
             }
@@ -212,9 +220,9 @@ impl Operator {
         self.scans.missing += u64::from(end.missing);
         self.scans.restarts += u64::from(summary.restarts);
         let drift_ppm = summary.clock_drift.map(|drift| drift * 1e6);
-        let sigma_us = self.out.shared.latest_end().and_then(|(_, sigma_us)| sigma_us);
-        self.out.shared.view.send_modify(|view| {
-            (view.clock.drift_ppm, view.clock.sigma_us) = (drift_ppm, sigma_us);
+        let sigma_us = self.out.state.latest_end().and_then(|(_, sigma_us)| sigma_us);
+        self.out.state.published.send_modify(|published| {
+            (published.clock.drift_ppm, published.clock.sigma_us) = (drift_ppm, sigma_us);
         });
     }
 }

@@ -1,0 +1,28 @@
+//! Errors of rejected orders.
+
+use thiserror::Error;
+
+/// Rejection of an order, with its reason and a hint.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[error("{message}")]
+pub struct Refusal {
+    /// Category of the rejection.
+    pub kind: RefusalKind,
+    /// Description of the problem.
+    pub message: String,
+    /// Hint for the correction.
+    pub help: String,
+}
+
+/// Category of a rejection.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum RefusalKind {
+    /// The order is invalid at any time.
+    Wrong,
+    /// The order conflicts with the current state: scene, motor, queued requests.
+    Conflict,
+    /// The order refers to an object that does not exist, or no longer exists.
+    Unknown,
+    /// The daemon is stopping.
+    Stopping,
+}
