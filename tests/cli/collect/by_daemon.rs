@@ -164,7 +164,11 @@ fn resumes_and_restores_the_daemon() {
     assert_eq!(daemon.send("POST", "/v1/stop", "").status, 202);
     let output = stopped.wait_with_output().expect("it ends");
     assert_eq!(output.status.code(), Some(1), "{}", said(&output));
-    assert!(said(&output).contains("the daemon was stopped by another client"), "{}", said(&output));
+    assert!(
+        said(&output).contains("the daemon was stopped by another client"),
+        "{}",
+        said(&output)
+    );
     assert_eq!(daemon.status()["scanning"]["mode"], "continuous");
 
     let interrupted = spawn(&case, &daemon);

@@ -114,7 +114,9 @@ fn drifting_air_starts_a_session() {
     case.write("plan.toml", &plan);
     std::fs::write(&thermometer, "20000\n").expect("writable");
     let output = case.collect(&[]);
-    assert!(output.status.code() == Some(1) && said(&output).contains("stopped: air temperature 26.00"));
+    assert!(
+        output.status.code() == Some(1) && said(&output).contains("stopped: air temperature 26.00")
+    );
     assert_eq!(case.files("scans").len(), 2);
 }
 

@@ -51,8 +51,11 @@ fn synced_records_survive_kill() {
     assert_eq!(daemon.stop(), Some(0));
     assert_eq!(logs(folder.path()).len(), 1, "the same log goes on");
     let log = clean_log(folder.path());
-    let broken =
-        log.events().iter().filter(|event| event.contains("ended within the previous scan")).count();
+    let broken = log
+        .events()
+        .iter()
+        .filter(|event| event.contains("ended within the previous scan"))
+        .count();
     println!(
         "killed {kills} times, {torn} torn ends, {broken} scans broken off, {} records",
         log.records.len()

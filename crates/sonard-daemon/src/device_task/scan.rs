@@ -197,7 +197,7 @@ impl DeviceTask {
                 match summary.not_home {
                     None => {}
                     Some(DriveError::Host(HostError::Rebooted)) => {
-                        self.handle(LinkInput::Restarted)
+                        self.handle(LinkInput::Restarted);
                     }
                     Some(error) => self.device_failed(&error),
                 }
