@@ -100,7 +100,7 @@ fn a_restart_or_hangup_in_the_home_after_a_scan_is_what_it_is() {
         // What its own Home failed at is the only reason for an empty scan: one in five, and not also one
         // for each Home that failed before it. The last one may have been stopped with the daemon.
         let has_reason = |event: &&String| {
-            event.contains("scan given up") || event.contains("the daemon is stopping")
+            event.contains("scan failed") || event.contains("the daemon is stopping")
         };
         let reasons = events.iter().filter(has_reason).count();
         assert!(empty <= reasons, "{faults}: {empty} empty scans: {events:?}");

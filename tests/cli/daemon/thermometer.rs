@@ -65,7 +65,7 @@ fn last_valid_temperature_and_its_age_are_kept_and_reported() {
         (Some(ZEROS), "all registers"),
         (Some("85000\n"), "before its first conversion"),
         (Some(""), "it is empty"),
-        (Some("nan\n"), "no number"),
+        (Some("nan\n"), "not a number"),
         (None, "a named pipe"),
     ] {
         match bad {
