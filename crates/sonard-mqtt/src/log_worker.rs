@@ -1,69 +1,71 @@
-//! What the courier asks of the disk, in a thread: disks block.
+//! Disk access of the publisher on a blocking thread.
 
 use std::{io, path::PathBuf};
 
 use tokio::task::{JoinError, JoinHandle, spawn_blocking};
 
 use super::{
-    bookmark::Bookmark,
-    tail::{Piece, Tail},
-    window::LogPosition,
+    checkpoint::LogCheckpoint,
+    in_flight::LogPosition,
+    tail::{Tail, TailChunk},
 };
 
-/// What is asked.
+/// Disk operations to perform.
 #[derive(Debug, Default)]
-pub(super) struct Errand {
-    /// Read on, so many bytes.
+pub(super) struct LogJob {
+    /// Number of bytes to read from the log.
     pub(super) read: Option<usize>,
-    /// Remember this place.
-    pub(super) remember: Option<LogPosition>,
-    /// Say how much stands behind this place.
+    /// Position to write to the checkpoint file.
+    pub(super) checkpoint: Option<LogPosition>,
+    /// Position after which the unread bytes are counted.
     pub(super) behind: Option<LogPosition>,
 }
 
-/// What came of it.
+/// Results of the requested disk operations.
 #[derive(Debug)]
-pub(super) struct Outcome {
-    pub(super) piece: Option<io::Result<Piece>>,
-    pub(super) remembered: Option<(LogPosition, io::Result<()>)>,
+pub(super) struct LogJobResult {
+    pub(super) chunk: Option<io::Result<TailChunk>>,
+    pub(super) checkpoint: Option<(LogPosition, io::Result<()>)>,
     pub(super) behind_bytes: Option<u64>,
 }
 
-/// The logs and the place in them. One errand is run at a time.
+/// Log reader that runs one job at a time.
 #[derive(Debug)]
-pub(super) struct LogSide {
+pub(super) struct LogWorker {
     pub(super) tail: Tail,
     pub(super) folder: PathBuf,
 }
 
-impl LogSide {
-    /// Runs an errand, and comes back with what came of it.
-    pub(super) fn run(mut self, errand: Errand) -> JoinHandle<(Self, Outcome)> {
+impl LogWorker {
+    /// Runs a job on a blocking thread; the worker is returned with the result.
+    pub(super) fn run(mut self, job: LogJob) -> JoinHandle<(Self, LogJobResult)> {
         spawn_blocking(move || {
-            let outcome = self.carry_out(errand);
-            (self, outcome)
+            let result = self.execute(job);
+            (self, result)
         })
     }
 
-    fn carry_out(&mut self, errand: Errand) -> Outcome {
-        let remember = |place: LogPosition| {
-            let written = Bookmark::write(&self.folder, &place);
-            (place, written)
+    fn execute(&mut self, job: LogJob) -> LogJobResult {
+        let write = |position: LogPosition| {
+            let written = LogCheckpoint::write(&self.folder, &position);
+            (position, written)
         };
-        let remembered = errand.remember.map(remember);
-        let piece = errand.read.map(|bytes| self.tail.read(bytes));
-        let behind_bytes = errand.behind.and_then(|place| self.tail.behind(&place).ok());
-        Outcome { piece, remembered, behind_bytes }
+        let checkpoint = job.checkpoint.map(write);
+        let chunk = job.read.map(|bytes| self.tail.read(bytes));
+        let behind_bytes = job.behind.and_then(|position| self.tail.behind(&position).ok());
+        LogJobResult { chunk, checkpoint, behind_bytes }
     }
 }
 
-/// An errand under way.
-pub(super) type Errands = JoinHandle<(LogSide, Outcome)>;
+/// Handle of a running job.
+pub(super) type RunningLogJob = JoinHandle<(LogWorker, LogJobResult)>;
 
-/// What came of the errand under way; never, if there is none. Cancel-safe.
-pub(super) async fn back(errand: &mut Option<Errands>) -> Result<(LogSide, Outcome), JoinError> {
-    match errand {
-        Some(errand) => errand.await,
+/// Waits for the running job; pending forever if there is none. Cancel-safe.
+pub(super) async fn wait_for_job(
+    job: &mut Option<RunningLogJob>,
+) -> Result<(LogWorker, LogJobResult), JoinError> {
+    match job {
+        Some(job) => job.await,
         None => std::future::pending().await,
     }
 }

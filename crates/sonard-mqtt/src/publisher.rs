@@ -1,4 +1,4 @@
-//! The task that brings records from the log to the broker.
+//! Publishing task: sends records from the log to the broker and executes commands.
 
 use std::time::Duration;
 
@@ -15,481 +15,492 @@ use tokio::{
 use tokio_util::sync::CancellationToken;
 
 use super::{
-    account::Account,
-    commands::{Asked, Clerk},
-    connection::{Connection, Loss, News},
-    diagnosis::{Cause, Diagnosis, Finding, STEADY, Sending},
-    log_side::{Errand, Errands, LogSide, Outcome, back},
-    patience::Patience,
-    status::StatusNews,
-    topics::{Kind, Topics},
-    window::Window,
+    backoff::Backoff,
+    commands::{CommandHandler, ReceivedCommand},
+    connection::{BrokerEvent, Connection, Disconnection},
+    credentials::Account,
+    diagnosis::{Cause, Diagnosis, Finding, STABLE_AFTER, SentMessage},
+    in_flight::InFlightQueue,
+    log_worker::{LogJob, LogJobResult, LogWorker, RunningLogJob, wait_for_job},
+    status::StatusSchedule,
+    topics::{MessageKind, Topics},
 };
 
-/// How often it is looked whether there is more to do.
-const LOOK: Duration = Duration::from_millis(100);
-/// How often it is told how it goes.
-const TELL: Duration = Duration::from_secs(1);
-/// A broker that acknowledges nothing for so long does not do its part.
-const SILENCE: Duration = Duration::from_secs(30);
-/// How long the end may take.
-const FAREWELL: Duration = Duration::from_secs(3);
-/// How long the broker may take to hear that it is.
-const GOODBYE: Duration = Duration::from_secs(1);
-/// How soon after a fault of the disk it is asked again.
-const DISK_AGAIN: Duration = Duration::from_secs(1);
+/// Poll interval of the publish loop.
+const POLL_INTERVAL: Duration = Duration::from_millis(100);
+/// Interval of reports to the daemon's status.
+const REPORT_INTERVAL: Duration = Duration::from_secs(1);
+/// Time without an acknowledgement after which the connection is closed.
+const ACK_TIMEOUT: Duration = Duration::from_secs(30);
+/// Time allowed at shutdown to publish the remaining records.
+const DRAIN_TIMEOUT: Duration = Duration::from_secs(3);
+/// Time allowed for the broker to acknowledge the final `offline` message.
+const CLOSE_TIMEOUT: Duration = Duration::from_secs(1);
+/// Delay before the next disk access after a disk error.
+const DISK_RETRY_DELAY: Duration = Duration::from_secs(1);
 
-/// The request for commands.
-const SUBSCRIPTION: Sending = Sending { record: None, kind: None, bytes: 0 };
+/// Subscription to commands, as a message in flight.
+const SUBSCRIPTION: SentMessage = SentMessage { record: None, kind: None, bytes: 0 };
 
-/// What the task is made of.
-pub(super) struct Courier {
+/// State of the publishing task.
+pub(super) struct Publisher {
     pub(super) account: Account,
     pub(super) topics: Topics,
     pub(super) commands: bool,
-    pub(super) status_every: Duration,
+    pub(super) status_interval: Duration,
     pub(super) daemon: Handle,
-    pub(super) window: Window,
-    pub(super) log: Option<LogSide>,
+    pub(super) in_flight: InFlightQueue,
+    pub(super) log: Option<LogWorker>,
     pub(super) stop: CancellationToken,
     pub(super) report: MqttReport,
     pub(super) epoch: Instant,
-    pub(super) troubles: Troubles,
+    pub(super) faults: Faults,
     pub(super) diagnosis: Diagnosis,
 }
 
-/// What is wrong, the first thing first.
+/// Current faults by source; the first one is reported.
 #[derive(Debug, Default)]
-pub(super) struct Troubles {
+pub(super) struct Faults {
     line: Option<String>,
     log: Option<String>,
     commands: Option<String>,
-    /// The cause of repeated losses; it may be wrong while a connection lasts.
+    /// Cause of repeated disconnections, kept while connected again.
     cause: Option<String>,
 }
 
-/// What changes while a connection lasts.
-struct Round {
+/// State of an accepted connection.
+struct Connected {
     connection: Connection,
-    clerk: Clerk,
-    status: StatusNews,
-    errand: Option<Errands>,
-    /// Whether all of the log was read when so many records were written to it.
-    read_at: Option<u64>,
-    disk_again: Option<Instant>,
-    tell_at: Instant,
-    /// When the broker acknowledged something last, or had nothing to acknowledge.
-    heard: Instant,
-    /// When it ends, once it is to end; whether it was said that it does.
+    commands: CommandHandler,
+    status: StatusSchedule,
+    job: Option<RunningLogJob>,
+    /// Number of written records at which the log was last read to its end.
+    read_up_to: Option<u64>,
+    retry_at: Option<Instant>,
+    report_at: Instant,
+    /// Time of the last acknowledgement, or at which no message was in flight.
+    last_ack: Instant,
+    /// End of the drain timeout, at shutdown.
     end: Option<Instant>,
-    said_goodbye: bool,
+    sent_offline: bool,
     began: Instant,
-    /// Whether commands are still to be asked for.
+    /// `true` while the subscription to commands is still to be sent.
     subscribes: bool,
 }
 
-impl Courier {
-    /// Brings records until it is stopped and, as far as a broker is there, everything is acknowledged.
+impl Publisher {
+    /// Publishes records until stopped and, with a broker, until everything is acknowledged.
     pub(super) async fn run(mut self) {
-        let mut patience = Patience::new();
+        let mut backoff = Backoff::new();
         loop {
-            let loss = self.attend(&mut patience).await;
-            self.window.disconnect();
+            let lost = self.run_connection(&mut backoff).await;
+            self.in_flight.disconnect();
             if self.stop.is_cancelled() {
                 break;
             }
-            let wait = patience.next(rand::random());
-            self.tell_lost(&loss.why);
+            let delay = backoff.next(rand::random());
+            self.report_disconnection(&lost.reason);
             tokio::select! {
                 () = self.stop.cancelled() => break,
-                () = sleep(wait) => {}
+                () = sleep(delay) => {}
             }
         }
-        if let (Some(log), Some(place)) = (self.log.take(), self.window.last()) {
-            let errand = Errand { remember: Some(place.clone()), ..Errand::default() };
-            // What is not remembered is sent again.
-            drop(log.run(errand).await);
+        if let (Some(log), Some(place)) = (self.log.take(), self.in_flight.last()) {
+            let job = LogJob { checkpoint: Some(place.clone()), ..LogJob::default() };
+            // After a failure to write the checkpoint, the records are sent again.
+            drop(log.run(job).await);
         }
     }
 
-    /// Uses a connection from its beginning to its end; says why it ended.
-    async fn attend(&mut self, patience: &mut Patience) -> Loss {
+    /// Runs a connection from its start to its end. Returns the cause of the end.
+    async fn run_connection(&mut self, backoff: &mut Backoff) -> Disconnection {
         let connection = match self.connect().await {
             Ok(connection) => connection,
             Err(loss) => {
                 self.diagnosis.not_accepted();
-                self.troubles.cause = None;
+                self.faults.cause = None;
                 return loss;
             }
         };
         let now = Instant::now();
-        let mut round = Round {
+        let mut connected = Connected {
             connection,
-            clerk: Clerk::new(self.daemon.clone()),
-            status: StatusNews::new(self.status_every),
-            errand: None,
-            read_at: None,
-            disk_again: None,
-            tell_at: now,
-            heard: now,
+            commands: CommandHandler::new(self.daemon.clone()),
+            status: StatusSchedule::new(self.status_interval),
+            job: None,
+            read_up_to: None,
+            retry_at: None,
+            report_at: now,
+            last_ack: now,
             end: None,
-            said_goodbye: false,
+            sent_offline: false,
             began: now,
             subscribes: self.commands,
         };
-        let served = self.serve(&mut round, patience).await;
-        if let Some(errand) = round.errand.take() {
-            self.come_back(errand.await, &mut round);
+        let served = self.serve(&mut connected, backoff).await;
+        if let Some(job) = connected.job.take() {
+            self.job_finished(job.await, &mut connected);
         }
-        let loss = served.err().unwrap_or_else(|| Loss::from(String::new()));
+        let loss = served.err().unwrap_or_else(|| Disconnection::from(String::new()));
         if self.stop.is_cancelled() {
-            round.connection.close().await;
+            connected.connection.close().await;
         } else {
-            let finding = self.diagnosis.ended(loss.by_broker, round.began.elapsed());
-            self.act_on(finding, patience);
+            let finding = self.diagnosis.ended(loss.by_broker, connected.began.elapsed());
+            self.handle_finding(finding, backoff);
         }
         loss
     }
 
-    /// A connection that the broker has accepted.
-    async fn connect(&self) -> Result<Connection, Loss> {
+    /// Connects to the broker and waits until it accepts the connection.
+    async fn connect(&self) -> Result<Connection, Disconnection> {
         let mut connection = Connection::open(&self.account)?;
         tokio::select! {
-            () = self.stop.cancelled() => Err(Loss::from(String::new())),
-            news = connection.next() => match news {
-                News::Connected => Ok(connection),
-                News::Lost(loss) => Err(loss),
-                News::Published(_) | News::Acknowledged(_) | News::Subscribed(_) => {
-                    Err(Loss::from("it sends before it is asked".to_owned()))
+            () = self.stop.cancelled() => Err(Disconnection::from(String::new())),
+            event = connection.next() => match event {
+                BrokerEvent::Connected => Ok(connection),
+                BrokerEvent::Lost(loss) => Err(loss),
+                BrokerEvent::Published(_) | BrokerEvent::Acknowledged(_) | BrokerEvent::Subscribed(_) => {
+                    Err(Disconnection::from("it sends before accepting the connection".to_owned()))
                 }
             }
         }
     }
 
-    /// Leaves out what the broker does not take, and reports the cause of a loss that repeats.
-    fn act_on(&mut self, finding: Finding, patience: &mut Patience) {
+    /// Drops a message that the broker rejects, and reports the cause of repeated disconnections.
+    fn handle_finding(&mut self, finding: Finding, backoff: &mut Backoff) {
         match finding {
             Finding::Open => {}
-            Finding::Cause(cause) => self.tell_cause(self.words(cause, None)),
-            Finding::Refused(sending, cause) => {
-                self.leave_out(sending, cause);
-                patience.restore();
+            Finding::Cause(cause) => self.report_cause(self.describe(cause, None)),
+            Finding::Rejected(sending, cause) => {
+                self.drop_message(sending, cause);
+                backoff.reset();
             }
         }
     }
 
-    fn leave_out(&mut self, sending: Sending, cause: Cause) {
-        let told = self.words(cause, sending.kind);
+    fn drop_message(&mut self, sending: SentMessage, cause: Cause) {
+        let text = self.describe(cause, sending.kind);
         if let Some(number) = sending.record {
-            let place = self.window.leave_out(number, self.epoch.elapsed());
-            // Of a whole kind, one event is enough.
+            let place = self.in_flight.leave_out(number, self.epoch.elapsed());
+            // A rejected kind is logged only once.
             let is_known =
-                matches!(cause, Cause::Kind(_)) && self.troubles.cause == Some(told.clone());
+                matches!(cause, Cause::Kind(_)) && self.faults.cause == Some(text.clone());
             if let (Some(place), Some(kind), false) = (place, sending.kind, is_known) {
-                let (topic, bytes) = (self.topics.of(kind), sending.bytes);
+                let (topic, bytes) = (self.topics.topic_for(kind), sending.bytes);
                 let detail = format!(
-                    "mqtt: a record for {topic} is left out, {bytes} bytes before byte {} of {}: {told}",
+                    "mqtt: a record for {topic} was dropped, {bytes} bytes before byte {} of {}: {text}",
                     place.bytes, place.file
                 );
                 self.daemon.event(EventKind::Gap, detail);
             }
         }
-        self.tell_cause(told);
+        self.report_cause(text);
     }
 
-    fn words(&self, cause: Cause, kind: Option<Kind>) -> String {
-        cause.words(kind, &self.topics, &self.account.client_id())
+    fn describe(&self, cause: Cause, kind: Option<MessageKind>) -> String {
+        cause.describe(kind, &self.topics, &self.account.client_id())
     }
 
-    fn tell_cause(&mut self, cause: String) {
-        if self.troubles.cause.as_ref() != Some(&cause) {
+    fn report_cause(&mut self, cause: String) {
+        if self.faults.cause.as_ref() != Some(&cause) {
             tracing::warn!("mqtt: {}: {cause}", self.report.broker);
-            self.troubles.cause = Some(cause);
+            self.faults.cause = Some(cause);
         }
     }
 
-    /// Sends and hears until the end, which is an error if it is not wanted.
-    async fn serve(&mut self, round: &mut Round, patience: &mut Patience) -> Result<(), Loss> {
-        self.greet(round)?;
-        let mut look = interval(LOOK);
-        look.set_missed_tick_behavior(MissedTickBehavior::Delay);
+    /// Sends and receives until shutdown or disconnection.
+    async fn serve(
+        &mut self,
+        connected: &mut Connected,
+        backoff: &mut Backoff,
+    ) -> Result<(), Disconnection> {
+        self.send_online(connected)?;
+        let mut ticks = interval(POLL_INTERVAL);
+        ticks.set_missed_tick_behavior(MissedTickBehavior::Delay);
         loop {
-            self.subscribe(round)?;
-            self.give_out(&round.connection)?;
-            self.send_errand(round);
-            if self.is_over(round)? {
+            self.subscribe(connected)?;
+            self.send_pending(&connected.connection)?;
+            self.schedule_job(connected);
+            if self.is_over(connected)? {
                 return Ok(());
             }
             tokio::select! {
-                news = round.connection.next() => match news {
-                    News::Lost(loss) => return Err(loss),
-                    News::Published(publish) if self.commands => self.command(&publish, round),
-                    News::Acknowledged(sending) => self.take_in(sending, round),
-                    News::Subscribed(is_granted) => self.take_subscription(is_granted, round),
-                    // A broker that sends what was not asked for is not answered.
-                    News::Published(_) | News::Connected => {}
+                event = connected.connection.next() => match event {
+                    BrokerEvent::Lost(loss) => return Err(loss),
+                    BrokerEvent::Published(publish) if self.commands => self.handle_command(&publish, connected),
+                    BrokerEvent::Acknowledged(sending) => self.acknowledge(sending, connected),
+                    BrokerEvent::Subscribed(is_granted) => self.handle_subscription(is_granted, connected),
+                    // Messages without a subscription are ignored.
+                    BrokerEvent::Published(_) | BrokerEvent::Connected => {}
                 },
-                (answer, taken) = round.clerk.next() => {
-                    *(if taken { &mut self.report.commands } else { &mut self.report.refused }) += 1;
-                    self.answer(round, &answer);
+                (reply, is_accepted) = connected.commands.next() => {
+                    *(if is_accepted { &mut self.report.commands } else { &mut self.report.refused }) += 1;
+                    self.send_reply(connected, &reply);
                 }
-                done = back(&mut round.errand) => {
-                    round.errand = None;
-                    self.come_back(done, round);
+                done = wait_for_job(&mut connected.job) => {
+                    connected.job = None;
+                    self.job_finished(done, connected);
                 }
-                () = self.stop.cancelled(), if round.end.is_none() => {
-                    round.end = Some(Instant::now() + FAREWELL);
-                    // The last records were written meanwhile.
-                    round.read_at = None;
+                () = self.stop.cancelled(), if connected.end.is_none() => {
+                    connected.end = Some(Instant::now() + DRAIN_TIMEOUT);
+                    // Further records were written meanwhile.
+                    connected.read_up_to = None;
                 }
-                _ = look.tick() => self.look(round, patience)?,
+                _ = ticks.tick() => self.poll(connected, backoff)?,
             }
         }
     }
 
-    /// Says that the daemon is there.
-    fn greet(&mut self, round: &mut Round) -> Result<(), String> {
-        self.send(&round.connection, Kind::Online, Bytes::from_static(b"true"))?;
+    /// Publishes the `online` message and resets the faults.
+    fn send_online(&mut self, connected: &mut Connected) -> Result<(), String> {
+        self.send(&connected.connection, MessageKind::Online, Bytes::from_static(b"true"))?;
         self.report.connections += 1;
         self.report.connected = true;
         self.report.since = Timestamp::now();
-        self.troubles = Troubles { cause: self.troubles.cause.take(), ..Troubles::default() };
-        if self.troubles.cause.is_none() {
-            tracing::info!("mqtt: connected with {}", self.report.broker);
+        self.faults = Faults { cause: self.faults.cause.take(), ..Faults::default() };
+        if self.faults.cause.is_none() {
+            tracing::info!("mqtt: connected to {}", self.report.broker);
         }
-        self.tell();
+        self.report_state();
         Ok(())
     }
 
-    /// Asks for commands if they are wanted.
-    fn subscribe(&mut self, round: &mut Round) -> Result<(), String> {
-        if !round.subscribes || !self.may_send(&round.connection) {
+    /// Subscribes to commands, if they are enabled.
+    fn subscribe(&mut self, connected: &mut Connected) -> Result<(), String> {
+        if !connected.subscribes || !self.may_send(&connected.connection) {
             return Ok(());
         }
-        round.subscribes = false;
-        if self.diagnosis.refuses(None, 0).is_none() {
-            round.connection.subscribe(self.topics.commands())?;
+        connected.subscribes = false;
+        if self.diagnosis.rejects(None, 0).is_none() {
+            connected.connection.subscribe(self.topics.commands())?;
             self.diagnosis.sent(SUBSCRIPTION);
         }
         Ok(())
     }
 
-    /// Gives out what may be under way.
-    fn give_out(&mut self, connection: &Connection) -> Result<(), String> {
+    /// Sends records as far as the limits allow.
+    fn send_pending(&mut self, connection: &Connection) -> Result<(), String> {
         while self.may_send(connection) {
-            let Some((number, message)) = self.window.give() else { break };
+            let Some((number, message)) = self.in_flight.give() else { break };
             let (kind, bytes) = (Some(message.kind), message.payload.len());
-            let sending = Sending { record: Some(number), kind, bytes };
-            if let Some(cause) = self.diagnosis.refuses(kind, bytes) {
-                self.leave_out(sending, cause);
+            let sending = SentMessage { record: Some(number), kind, bytes };
+            if let Some(cause) = self.diagnosis.rejects(kind, bytes) {
+                self.drop_message(sending, cause);
                 continue;
             }
-            connection.send(self.topics.of(message.kind), sending, message.payload)?;
+            connection.send(self.topics.topic_for(message.kind), sending, message.payload)?;
             self.diagnosis.sent(sending);
         }
         Ok(())
     }
 
-    /// Whether another message may be under way.
+    /// Returns `true` if another message may be in flight.
     fn may_send(&self, connection: &Connection) -> bool {
         self.diagnosis.allows_many() || !connection.is_waiting()
     }
 
-    /// Sends a message that is no record, unless the broker does not take it; whether it is under way.
+    /// Sends a message that is not a record. Returns `false` if the broker rejects such messages.
     fn send(
         &mut self,
         connection: &Connection,
-        kind: Kind,
+        kind: MessageKind,
         payload: Bytes,
     ) -> Result<bool, String> {
-        let sending = Sending { record: None, kind: Some(kind), bytes: payload.len() };
-        if let Some(cause) = self.diagnosis.refuses(sending.kind, sending.bytes) {
-            self.leave_out(sending, cause);
+        let sending = SentMessage { record: None, kind: Some(kind), bytes: payload.len() };
+        if let Some(cause) = self.diagnosis.rejects(sending.kind, sending.bytes) {
+            self.drop_message(sending, cause);
             return Ok(false);
         }
-        connection.send(self.topics.of(kind), sending, payload)?;
+        connection.send(self.topics.topic_for(kind), sending, payload)?;
         self.diagnosis.sent(sending);
         Ok(true)
     }
 
-    /// Reads on, and remembers the place, when it is time.
-    fn send_errand(&mut self, round: &mut Round) {
-        if round.errand.is_some() || round.disk_again.is_some_and(|at| at > Instant::now()) {
+    /// Starts reading the log and writing the checkpoint, as far as due.
+    fn schedule_job(&mut self, connected: &mut Connected) {
+        if connected.job.is_some() || connected.retry_at.is_some_and(|at| at > Instant::now()) {
             return;
         }
         let written = self.daemon.records_written();
-        let room = Some(self.window.room()).filter(|room| *room > 0);
-        let errand = Errand {
-            read: room.filter(|_| round.read_at != Some(written)),
-            remember: self.window.due(self.epoch.elapsed()).cloned(),
+        let room = Some(self.in_flight.room()).filter(|room| *room > 0);
+        let job = LogJob {
+            read: room.filter(|_| connected.read_up_to != Some(written)),
+            checkpoint: self.in_flight.due(self.epoch.elapsed()).cloned(),
             behind: None,
         };
-        self.send_off(errand, round, written);
+        self.start_job(job, connected, written);
     }
 
-    fn send_off(&mut self, errand: Errand, round: &mut Round, written: u64) {
-        let Errand { read, remember, behind } = &errand;
-        if read.is_none() && remember.is_none() && behind.is_none() {
+    fn start_job(&mut self, job: LogJob, connected: &mut Connected, written: u64) {
+        let LogJob { read, checkpoint, behind } = &job;
+        if read.is_none() && checkpoint.is_none() && behind.is_none() {
             return;
         }
         if let Some(log) = self.log.take() {
             if read.is_some() {
-                // What is written from now on is read the next time.
-                round.read_at = Some(written);
+                // Records written from now on are read by the next job.
+                connected.read_up_to = Some(written);
             }
-            round.errand = Some(log.run(errand));
+            connected.job = Some(log.run(job));
         }
     }
 
-    /// Takes in what came of an errand.
-    fn come_back(&mut self, done: Result<(LogSide, Outcome), JoinError>, round: &mut Round) {
-        let Ok((log, outcome)) = done else {
-            // It was printed why.
-            self.troubles.log = Some("reading the log failed: a fault of this program".into());
+    /// Processes the result of a job.
+    fn job_finished(
+        &mut self,
+        done: Result<(LogWorker, LogJobResult), JoinError>,
+        connected: &mut Connected,
+    ) {
+        let Ok((log, result)) = done else {
+            // The panic was logged.
+            self.faults.log = Some("reading the log failed: an internal error".into());
             return;
         };
         self.log = Some(log);
         let mut fault = None;
-        if let Some((place, written)) = outcome.remembered {
+        if let Some((place, written)) = result.checkpoint {
             match written {
-                Ok(()) => self.window.remembered(&place, self.epoch.elapsed()),
+                Ok(()) => self.in_flight.remembered(&place, self.epoch.elapsed()),
                 Err(error) => fault = Some(error),
             }
         }
-        match outcome.piece {
-            Some(Ok(piece)) => {
-                if !piece.is_end {
-                    round.read_at = None;
+        match result.chunk {
+            Some(Ok(chunk)) => {
+                if !chunk.is_end {
+                    connected.read_up_to = None;
                 }
-                if let Some(gap) = piece.gap {
+                if let Some(gap) = chunk.gap {
                     self.daemon.event(EventKind::Gap, format!("mqtt: {gap}"));
                 }
-                piece.lines.into_iter().for_each(|line| self.window.put(line));
+                chunk.lines.into_iter().for_each(|line| self.in_flight.put(line));
             }
             Some(Err(error)) => {
-                round.read_at = None;
+                connected.read_up_to = None;
                 fault = Some(error);
             }
             None => {}
         }
-        if let Some(bytes) = outcome.behind_bytes {
+        if let Some(bytes) = result.behind_bytes {
             self.report.behind_bytes = bytes;
         }
-        round.disk_again = fault.as_ref().map(|_| Instant::now() + DISK_AGAIN);
-        self.troubles.log = fault.map(|error| format!("the log: {error}"));
+        connected.retry_at = fault.as_ref().map(|_| Instant::now() + DISK_RETRY_DELAY);
+        self.faults.log = fault.map(|error| format!("the log: {error}"));
     }
 
-    fn command(&mut self, publish: &Publish, round: &mut Round) {
+    fn handle_command(&mut self, publish: &Publish, connected: &mut Connected) {
         let topic = String::from_utf8_lossy(&publish.topic);
-        let asked = Asked {
+        let received = ReceivedCommand {
             name: self.topics.command(&topic).unwrap_or_default(),
             body: &publish.payload,
             is_retained: publish.retain,
             is_repeated: publish.dup,
         };
-        if let Err(answer) = round.clerk.take(&asked) {
+        if let Err(reply) = connected.commands.queue(&received) {
             self.report.refused += 1;
-            self.answer(round, &answer);
+            self.send_reply(connected, &reply);
         }
     }
 
-    fn take_in(&mut self, sending: Sending, round: &mut Round) {
-        round.heard = Instant::now();
+    fn acknowledge(&mut self, sending: SentMessage, connected: &mut Connected) {
+        connected.last_ack = Instant::now();
         self.diagnosis.acknowledged(sending);
         match sending {
-            Sending { record: Some(number), .. } => {
-                self.window.acknowledge(number, self.epoch.elapsed());
+            SentMessage { record: Some(number), .. } => {
+                self.in_flight.acknowledge(number, self.epoch.elapsed());
             }
-            Sending { kind: Some(Kind::Status), .. } => round.status.acknowledged(),
+            SentMessage { kind: Some(MessageKind::Status), .. } => connected.status.acknowledged(),
             _ => {}
         }
     }
 
-    fn take_subscription(&mut self, is_granted: bool, round: &mut Round) {
-        round.heard = Instant::now();
+    fn handle_subscription(&mut self, is_granted: bool, connected: &mut Connected) {
+        connected.last_ack = Instant::now();
         self.diagnosis.acknowledged(SUBSCRIPTION);
         if !is_granted {
-            let why = "it gives this user no commands";
-            tracing::warn!("mqtt: {}: {why}", self.report.broker);
-            self.troubles.commands = Some(why.into());
+            let reason = "it denies this user the subscription to commands";
+            tracing::warn!("mqtt: {}: {reason}", self.report.broker);
+            self.faults.commands = Some(reason.into());
         }
     }
 
-    /// What is done from time to time.
-    fn look(&mut self, round: &mut Round, patience: &mut Patience) -> Result<(), String> {
+    /// Performs the periodic checks and reports.
+    fn poll(&mut self, connected: &mut Connected, backoff: &mut Backoff) -> Result<(), String> {
         let now = Instant::now();
-        // Not at once: a connection that is ended again and again works in between.
-        if now > round.began + SILENCE {
-            patience.restore();
+        // With a delay: a connection that is closed repeatedly works in between.
+        if now > connected.began + ACK_TIMEOUT {
+            backoff.reset();
         }
-        if now > round.began + STEADY && !self.diagnosis.leaves_out() {
-            self.troubles.cause = None;
+        if now > connected.began + STABLE_AFTER && !self.diagnosis.rejects_any() {
+            self.faults.cause = None;
         }
-        if !round.connection.is_waiting() {
-            round.heard = now;
-        } else if now > round.heard + SILENCE {
-            return Err(format!("it acknowledged nothing for {} s", SILENCE.as_secs()));
+        if !connected.connection.is_waiting() {
+            connected.last_ack = now;
+        } else if now > connected.last_ack + ACK_TIMEOUT {
+            return Err(format!("it acknowledged nothing for {} s", ACK_TIMEOUT.as_secs()));
         }
-        if now < round.tell_at {
+        if now < connected.report_at {
             return Ok(());
         }
-        round.tell_at = now + TELL;
-        self.tell();
-        if self.may_send(&round.connection)
-            && let Some(status) = round.status.due(&self.daemon.status(), self.epoch.elapsed())
-            && !self.send(&round.connection, Kind::Status, status)?
+        connected.report_at = now + REPORT_INTERVAL;
+        self.report_state();
+        if self.may_send(&connected.connection)
+            && let Some(status) = connected.status.due(&self.daemon.status(), self.epoch.elapsed())
+            && !self.send(&connected.connection, MessageKind::Status, status)?
         {
-            round.status.acknowledged();
+            connected.status.acknowledged();
         }
-        if round.errand.is_none() {
-            let behind = Some(self.window.place().clone());
-            self.send_off(Errand { behind, ..Errand::default() }, round, 0);
+        if connected.job.is_none() {
+            let behind = Some(self.in_flight.place().clone());
+            self.start_job(LogJob { behind, ..LogJob::default() }, connected, 0);
         }
         Ok(())
     }
 
-    /// Whether it is over: everything is acknowledged and the goodbye said, or it took too long.
-    fn is_over(&mut self, round: &mut Round) -> Result<bool, String> {
-        let Some(end) = round.end else { return Ok(false) };
-        let is_done = round.errand.is_none()
-            && round.read_at == Some(self.daemon.records_written())
-            && self.window.waiting() == 0;
-        if !round.said_goodbye && (is_done || Instant::now() > end) {
-            self.send(&round.connection, Kind::Online, Bytes::from_static(b"false"))?;
-            round.said_goodbye = true;
+    /// Returns `true` when the shutdown is complete: everything, including the `offline` message,
+    /// is acknowledged, or the timeout has expired.
+    fn is_over(&mut self, connected: &mut Connected) -> Result<bool, String> {
+        let Some(end) = connected.end else { return Ok(false) };
+        let is_done = connected.job.is_none()
+            && connected.read_up_to == Some(self.daemon.records_written())
+            && self.in_flight.waiting() == 0;
+        if !connected.sent_offline && (is_done || Instant::now() > end) {
+            self.send(&connected.connection, MessageKind::Online, Bytes::from_static(b"false"))?;
+            connected.sent_offline = true;
         }
-        let is_heard = round.said_goodbye && !round.connection.is_waiting();
-        Ok(is_heard || Instant::now() > end + GOODBYE)
+        let is_acknowledged = connected.sent_offline && !connected.connection.is_waiting();
+        Ok(is_acknowledged || Instant::now() > end + CLOSE_TIMEOUT)
     }
 
-    fn answer(&mut self, round: &Round, answer: &serde_json::Value) {
-        // Where hundreds wait to be taken by the broker, nobody waits for this one.
-        if let Err(error) = self.send(&round.connection, Kind::Answer, answer.to_string().into()) {
-            tracing::warn!("mqtt: an answer is left out: {error}");
+    fn send_reply(&mut self, connected: &Connected, reply: &serde_json::Value) {
+        // With a full queue of the client, the reply is dropped.
+        if let Err(error) =
+            self.send(&connected.connection, MessageKind::Answer, reply.to_string().into())
+        {
+            tracing::warn!("mqtt: a reply was dropped: {error}");
         }
     }
 
-    fn tell_lost(&mut self, why: &str) {
-        // A cause that is known explains all that follow.
-        let is_news = self.report.connected || self.troubles.line.as_deref() != Some(why);
-        if is_news && self.troubles.cause.is_none() {
-            tracing::warn!("mqtt: {}: {why}", self.report.broker);
+    fn report_disconnection(&mut self, reason: &str) {
+        // A known cause explains all further disconnections.
+        let is_news = self.report.connected || self.faults.line.as_deref() != Some(reason);
+        if is_news && self.faults.cause.is_none() {
+            tracing::warn!("mqtt: {}: {reason}", self.report.broker);
         }
         if std::mem::replace(&mut self.report.connected, false) {
             self.report.since = Timestamp::now();
         }
-        self.troubles.line = Some(why.to_owned());
-        self.tell();
+        self.faults.line = Some(reason.to_owned());
+        self.report_state();
     }
 
-    fn tell(&mut self) {
-        self.report.acknowledged = self.window.acknowledged();
-        self.report.passed_over = self.window.passed_over();
-        self.report.waiting = self.window.waiting() as u64;
-        self.report.left_out = self.window.left_out();
-        let Troubles { line, log, commands, cause } = &self.troubles;
-        let told = [cause, line, log, commands].into_iter().flatten().next();
-        self.report.trouble = told.cloned();
+    fn report_state(&mut self) {
+        self.report.acknowledged = self.in_flight.acknowledged();
+        self.report.passed_over = self.in_flight.passed_over();
+        self.report.waiting = self.in_flight.waiting() as u64;
+        self.report.left_out = self.in_flight.left_out();
+        let Faults { line, log, commands, cause } = &self.faults;
+        let first = [cause, line, log, commands].into_iter().flatten().next();
+        self.report.trouble = first.cloned();
         self.daemon.report_mqtt(self.report.clone());
     }
 }

@@ -41,10 +41,10 @@ fn none_holds_up_a_scan() {
         (Manner::Honest, ""),
         (Manner::Deaf, ""),
         (Manner::Curt, "closed the connection"),
-        (Manner::Garbled, "makes no sense"),
-        (Manner::Noisy, "messages a second"),
-        (Manner::Pushy, "messages a second"),
-        (Manner::Bulky, "makes no sense"),
+        (Manner::Garbled, "protocol error"),
+        (Manner::Noisy, "messages per second"),
+        (Manner::Pushy, "messages per second"),
+        (Manner::Bulky, "protocol error"),
     ] {
         assert!(beside(Some((manner, trouble))) > 0, "{manner:?}");
     }
