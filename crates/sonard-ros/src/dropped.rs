@@ -1,38 +1,42 @@
-//! How often it is said that messages were left out. Pure.
+//! Rate-limited reports of dropped messages. Pure.
 
 use std::time::{Duration, Instant};
 
-/// Least time from one sentence to the next.
-const BETWEEN: Duration = Duration::from_secs(60);
+/// Minimum interval between two reports.
+const REPORT_INTERVAL: Duration = Duration::from_secs(60);
 
-/// Messages that were left out, until it is said.
+/// Count of dropped messages since the last report.
 #[derive(Debug, Default)]
-pub(super) struct Gaps {
-    left_out: u64,
+pub(super) struct DroppedMessages {
+    count: u64,
+    /// Topic of the first dropped message.
     topic: String,
-    said: Option<Instant>,
+    reported: Option<Instant>,
 }
 
-impl Gaps {
-    /// A message of a topic was left out.
+impl DroppedMessages {
+    /// Counts a dropped message of a topic.
     pub(super) fn add(&mut self, topic: &str) {
-        if self.left_out == 0 {
+        if self.count == 0 {
             topic.clone_into(&mut self.topic);
         }
-        self.left_out += 1;
+        self.count += 1;
     }
 
-    /// What there is to say now: at most a sentence a minute, however much is left out.
-    pub(super) fn say(&mut self, now: Instant) -> Option<String> {
-        let is_early = self.said.is_some_and(|said| now.saturating_duration_since(said) < BETWEEN);
-        if self.left_out == 0 || is_early {
+    /// Takes the report, at most once per minute.
+    pub(super) fn take_report(&mut self, now: Instant) -> Option<String> {
+        let is_early = self
+            .reported
+            .is_some_and(|reported| now.saturating_duration_since(reported) < REPORT_INTERVAL);
+        if self.count == 0 || is_early {
             return None;
         }
-        self.said = Some(now);
-        let left_out = std::mem::take(&mut self.left_out);
+        self.reported = Some(now);
+        let count = std::mem::take(&mut self.count);
         let topic = &self.topic;
         Some(format!(
-            "{left_out} messages left out, the first of {topic}: a subscriber does not take them, or they are too long"
+            "{count} messages dropped, the first of {topic}: a subscriber does not acknowledge \
+             them, or they are too long"
         ))
     }
 }
@@ -42,17 +46,19 @@ mod tests {
     use super::*;
 
     #[test]
-    fn much_that_is_left_out_is_one_sentence_a_minute() {
-        let (mut gaps, start) = (Gaps::default(), Instant::now());
-        assert_eq!(gaps.say(start), None);
-        gaps.add("/sonar/range");
-        assert!(gaps.say(start).is_some_and(|words| words.starts_with("1 messages left out")));
+    fn drops_are_reported_once_per_minute() {
+        let (mut dropped, start) = (DroppedMessages::default(), Instant::now());
+        assert_eq!(dropped.take_report(start), None);
+        dropped.add("/sonar/range");
+        assert!(
+            dropped.take_report(start).is_some_and(|text| text.starts_with("1 messages dropped"))
+        );
         for _ in 0..1000 {
-            gaps.add("/tf");
-            assert_eq!(gaps.say(start + Duration::from_secs(59)), None);
+            dropped.add("/tf");
+            assert_eq!(dropped.take_report(start + Duration::from_secs(59)), None);
         }
-        let words = gaps.say(start + BETWEEN).expect("it is time");
-        assert!(words.starts_with("1000 messages left out, the first of /tf"), "{words}");
-        assert_eq!(gaps.say(start + 2 * BETWEEN), None);
+        let text = dropped.take_report(start + REPORT_INTERVAL).expect("it is time");
+        assert!(text.starts_with("1000 messages dropped, the first of /tf"), "{text}");
+        assert_eq!(dropped.take_report(start + 2 * REPORT_INTERVAL), None);
     }
 }

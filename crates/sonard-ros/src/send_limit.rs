@@ -1,44 +1,51 @@
-//! How much of a topic may wait for subscribers. Pure.
+//! Limit of the unacknowledged bytes of a topic. Pure.
 
-/// What a message costs beside its bytes while it waits, bytes.
-const OVERHEAD: usize = 256;
+/// Overhead per unacknowledged message, bytes.
+const OVERHEAD_BYTES: usize = 256;
 
-/// The longest message that is told, bytes.
-pub(super) const MOST_MESSAGE_BYTES: usize = 1 << 20;
+/// Maximum length of a published message, bytes.
+pub(super) const MAX_MESSAGE_BYTES: usize = 1 << 20;
 
-/// What of a topic's messages waits, at most: it is only known whether all were acknowledged, not which.
+/// Limit of the unacknowledged bytes of a topic. DDS reports only whether all messages are
+/// acknowledged, not which.
 #[derive(Debug)]
-pub(super) struct Budget {
-    waiting: usize,
-    most: usize,
+pub(super) struct SendLimit {
+    waiting_bytes: usize,
+    max_bytes: usize,
 }
 
-impl Budget {
-    /// One of so many bytes.
-    pub(super) const fn new(most: usize) -> Self {
-        Self { waiting: 0, most }
+impl SendLimit {
+    pub(super) const fn new(max_bytes: usize) -> Self {
+        Self { waiting_bytes: 0, max_bytes }
     }
 
-    /// Whether there is room for a message; `all_taken` is asked whether all before it were acknowledged from when the room
-    /// seems to be half full: acknowledgments take some time, so that the answer at one moment is chance. What alone is more than may wait finds room when nothing else waits.
-    pub(super) fn has_room(&mut self, bytes: usize, all_taken: impl FnOnce() -> bool) -> bool {
-        if bytes > MOST_MESSAGE_BYTES {
+    /// Returns `true` if there is room for a message.
+    ///
+    /// `all_acknowledged` is called from half of the limit on: acknowledgements take some time, so
+    /// a single call at the limit could fail by chance. A message above the limit is accepted if no
+    /// other one is waiting.
+    pub(super) fn has_room(
+        &mut self,
+        bytes: usize,
+        all_acknowledged: impl FnOnce() -> bool,
+    ) -> bool {
+        if bytes > MAX_MESSAGE_BYTES {
             return false;
         }
-        let then = self.waiting + bytes + OVERHEAD;
-        if self.waiting > 0 && then > self.most / 2 {
-            if all_taken() {
-                self.waiting = 0;
-            } else if then > self.most {
+        let total = self.waiting_bytes + bytes + OVERHEAD_BYTES;
+        if self.waiting_bytes > 0 && total > self.max_bytes / 2 {
+            if all_acknowledged() {
+                self.waiting_bytes = 0;
+            } else if total > self.max_bytes {
                 return false;
             }
         }
         true
     }
 
-    /// Counts a message that waits from now on.
-    pub(super) const fn put(&mut self, bytes: usize) {
-        self.waiting += bytes + OVERHEAD;
+    /// Counts a sent message.
+    pub(super) const fn add(&mut self, bytes: usize) {
+        self.waiting_bytes += bytes + OVERHEAD_BYTES;
     }
 }
 
@@ -47,34 +54,34 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_waits_stays_within_its_bound_until_it_is_taken() {
-        let mut budget = Budget::new(10_000);
-        let mut put = 0;
-        while budget.has_room(744, || false) {
-            budget.put(744);
-            put += 1;
+    fn unacknowledged_bytes_are_bounded() {
+        let mut limit = SendLimit::new(10_000);
+        let mut added = 0;
+        while limit.has_room(744, || false) {
+            limit.add(744);
+            added += 1;
         }
-        assert_eq!(put, 10);
-        assert!(!budget.has_room(744, || false), "it stays full");
-        assert!(budget.has_room(744, || true) && budget.has_room(744, || panic!("it has room")));
+        assert_eq!(added, 10);
+        assert!(!limit.has_room(744, || false), "it stays full");
+        assert!(limit.has_room(744, || true) && limit.has_room(744, || panic!("it has room")));
     }
 
     #[test]
-    fn nothing_is_left_out_where_all_but_the_last_few_are_always_acknowledged() {
-        let mut budget = Budget::new(10_000);
-        // Two messages one behind the other, of which the first is still on its way when the second comes.
+    fn slow_acknowledgements_drop_nothing() {
+        let mut limit = SendLimit::new(10_000);
+        // Pairs of messages, the first of which is unacknowledged when the second is sent.
         for message in 0..10_000 {
-            assert!(budget.has_room(744, || message % 2 == 0), "message {message}");
-            budget.put(744);
+            assert!(limit.has_room(744, || message % 2 == 0), "message {message}");
+            limit.add(744);
         }
     }
 
     #[test]
-    fn a_large_message_goes_alone_and_a_larger_one_not_at_all() {
-        let mut budget = Budget::new(10_000);
-        assert!(budget.has_room(50_000, || false));
-        budget.put(50_000);
-        assert!(!budget.has_room(1, || false) && budget.has_room(1, || true));
-        assert!(!Budget::new(usize::MAX).has_room(MOST_MESSAGE_BYTES + 1, || true));
+    fn large_message_is_sent_alone() {
+        let mut limit = SendLimit::new(10_000);
+        assert!(limit.has_room(50_000, || false));
+        limit.add(50_000);
+        assert!(!limit.has_room(1, || false) && limit.has_room(1, || true));
+        assert!(!SendLimit::new(usize::MAX).has_room(MAX_MESSAGE_BYTES + 1, || true));
     }
 }
