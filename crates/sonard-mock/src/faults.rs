@@ -102,8 +102,9 @@ impl FaultPlan {
             "motor_reset" => self.motor_reset = probability(key, value)?,
             "motor_hangup" => self.motor_hangup = probability(key, value)?,
             "lie" => {
-                self.lie =
-                    Some(InvalidReply::from_name(value).map_err(|names| bad(key, value, names))?)
+                let invalid =
+                    InvalidReply::from_name(value).map_err(|names| bad(key, value, names))?;
+                self.lie = Some(invalid);
             }
             "version" => self.version = Some(whole(key, value, "a protocol version, 0 to 255")?),
             _ => return Err(FaultSpecError::UnknownKey(key.into())),

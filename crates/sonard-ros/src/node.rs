@@ -244,7 +244,7 @@ impl Audience for Node {
             match self.offer(topic) {
                 Ok(offer) => drop(self.offers.insert(topic.name.clone(), offer)),
                 Err(error) => {
-                    self.fault = Some(format!("{} can't be offered: {error}", topic.name))
+                    self.fault = Some(format!("{} can't be offered: {error}", topic.name));
                 }
             }
         }
