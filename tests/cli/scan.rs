@@ -129,7 +129,7 @@ fn missed_steps_found_by_homing() {
     let drift = log.end()["home_drift_steps"].as_i64().expect("a drift");
     // Some 8 of 399 moves fall a step short.
     assert!((2..=20).contains(&drift), "{drift}");
-    assert!(log.events().iter().any(|event| event.contains("azimuths are doubtful")));
+    assert!(log.events().iter().any(|event| event.contains("azimuths are uncertain")));
     assert!(stderr(&output).contains("warning"), "{}", stderr(&output));
 }
 

@@ -350,7 +350,7 @@ def initial_pose(daemon, me, namespace):
     here, half = (0.5, 0.3, 0.0), math.sqrt(0.5)
     for wrong, why in (
         (("odom", here, (0, 0, 0, 1)), 'its frame is "odom"'),
-        (("map", here, (half, 0, 0, half)), "it leans by 90 degrees"),
+        (("map", here, (half, 0, 0, half)), "it is inclined by 90 degrees"),
         (("map", (math.nan, 0, 0), (0, 0, 0, 1)), "not finite"),
         (("map", here, (0, 0, 0, 0)), "length 0"),
         (("map", (-7, 0, 0), (0, 0, 0, 1)), "outside the room"),
@@ -358,7 +358,7 @@ def initial_pose(daemon, me, namespace):
         tell(*wrong)
         refused += 1
         until(lambda: status()["refused"] == refused, f"a refusal: {why}")
-        assert "/initialpose is not followed" in status()["refusal"] and why in status()["refusal"], status()
+        assert "/initialpose is rejected" in status()["refusal"] and why in status()["refusal"], status()
     assert wanted() == before, wanted()
     tell("map", here, (0, 0, half, half))
     until(lambda: wanted() != before, "a pose that is followed")
@@ -367,7 +367,7 @@ def initial_pose(daemon, me, namespace):
               if '"scan_start"' in line]
     pose = max(starts, key=lambda start: start["time"])["pose"]
     assert (pose["x_m"], pose["y_m"]) == here[:2] and abs(pose["heading_deg"] - 90) < 1e-9, pose
-    assert "is not followed" in daemon.said.read_text()
+    assert "is rejected" in daemon.said.read_text()
     return refused
 
 

@@ -1,27 +1,27 @@
-//! Pins of the computer that the ranger hangs on: reset line, module's power, home switch,
-//! emergency stop and status light. Behind a trait, because most computers have none of them.
+//! GPIO pins of the host computer: reset line, module supply, home switch, emergency stop and
+//! status light. Behind a trait, because most computers have none of them.
 #![warn(clippy::expect_used, clippy::indexing_slicing, clippy::panic)]
 
 use sonard_api::config::GpioKeys;
 use thiserror::Error;
 
-/// The host's pins around the ranger. Without a pin, doing is nothing and
-/// seeing is `None`.
+/// GPIO pins of the host that are wired to the ranger. Without a pin, an output does nothing and
+/// an input is `None`.
 pub trait HostGpio: Send {
-    /// Whether the microcontroller can be reset.
+    /// Returns `true` if a reset line is configured.
     fn can_reset(&self) -> bool {
         false
     }
     /// Pulls the microcontroller's reset line for 50 ms.
     fn reset(&mut self) {}
-    /// Switches the ranging module's supply. It must not fire within 5 ms of power-up, which the
-    /// time to open a port exceeds.
+    /// Switches the ranging module's supply. The module must not fire within 5 ms of power-up;
+    /// opening a port takes longer.
     fn set_power(&mut self, _on: bool) {}
-    /// Whether the motor stands at home.
+    /// State of the home switch; `Some(true)` if the motor is at home.
     fn at_home(&self) -> Option<bool> {
         None
     }
-    /// Whether the emergency stop is pressed.
+    /// State of the emergency stop; `Some(true)` if pressed.
     fn emergency_stop(&self) -> Option<bool> {
         None
     }
@@ -29,16 +29,16 @@ pub trait HostGpio: Send {
     fn set_light(&mut self, _on: bool) {}
 }
 
-/// A computer without such pins.
+/// Host without GPIO pins.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct NoGpio;
 
 impl HostGpio for NoGpio {}
 
-/// Configured pins that can't be used.
+/// Failure to use the configured pins.
 #[derive(Debug, Error)]
 pub enum HostGpioError {
-    /// Built without them.
+    /// The feature `pi` is not compiled in.
     #[error("the configuration names pins, but this sonard was built without the feature pi")]
     NotBuilt,
     /// No Raspberry Pi, or no access to its pins.
@@ -48,14 +48,14 @@ pub enum HostGpioError {
 }
 
 impl HostGpioError {
-    /// What a person can do about it.
+    /// Suggests a remedy.
     #[must_use]
     pub const fn help(&self) -> &'static str {
         match self {
-            Self::NotBuilt => "build with --features pi, or take the pins out of [gpio]",
+            Self::NotBuilt => "build with --features pi, or remove the pins from [gpio]",
             #[cfg(feature = "pi")]
             Self::Gpio(crate::pi::GpioError::NotAPi) => {
-                "take the pins out of [gpio]: the daemon runs without them on any computer"
+                "remove the pins from [gpio]: the daemon runs without them on any computer"
             }
             #[cfg(feature = "pi")]
             Self::Gpio(error) => error.help(),
@@ -63,10 +63,10 @@ impl HostGpioError {
     }
 }
 
-/// Checks that this program and this computer have pins if the configuration names some; no pin is touched.
+/// Checks that this program and this computer support the configured pins, without touching any.
 ///
 /// # Errors
-/// When they have none.
+/// If pins are configured but not supported.
 pub fn check(keys: &GpioKeys) -> Result<(), HostGpioError> {
     if *keys == GpioKeys::default() {
         return Ok(());
@@ -80,17 +80,17 @@ pub fn check(keys: &GpioKeys) -> Result<(), HostGpioError> {
     Err(HostGpioError::NotBuilt)
 }
 
-/// The pins that the configuration names.
+/// Opens the configured pins.
 ///
 /// # Errors
-/// When it names some and they can't be used: a reset line or an emergency stop that is
-/// silently not there would be worse than no daemon.
+/// If a configured pin can't be used. A reset line or an emergency stop that is missing without
+/// notice would be worse than no daemon.
 pub fn open(keys: &GpioKeys) -> Result<Box<dyn HostGpio>, HostGpioError> {
     if *keys == GpioKeys::default() {
         return Ok(Box::new(NoGpio));
     }
     #[cfg(feature = "pi")]
-    return match raspberry_pi::Pins::open(keys) {
+    return match raspberry_pi::BcmPins::open(keys) {
         Ok(pins) => Ok(Box::new(pins)),
         Err(error) => Err(HostGpioError::Gpio(error.into())),
     };
@@ -109,9 +109,9 @@ mod raspberry_pi {
 
     const RESET: Duration = Duration::from_millis(50);
 
-    /// Pins of a Raspberry Pi, by their BCM numbers. Outputs go back to inputs when dropped.
+    /// Pins of a Raspberry Pi by BCM number. Outputs become inputs again when dropped.
     #[derive(Debug)]
-    pub(super) struct Pins {
+    pub(super) struct BcmPins {
         reset: Option<OutputPin>,
         power: Option<OutputPin>,
         light: Option<OutputPin>,
@@ -119,12 +119,12 @@ mod raspberry_pi {
         stop: Option<InputPin>,
     }
 
-    impl Pins {
+    impl BcmPins {
         pub(super) fn open(keys: &GpioKeys) -> Result<Self, Error> {
             let gpio = Gpio::new()?;
             let pin = |number: Option<u8>| number.map(|number| gpio.get(number)).transpose();
             Ok(Self {
-                // The line has a pull-up on the microcontroller's side: high is let go.
+                // The line has a pull-up on the microcontroller's side: high means released.
                 reset: pin(keys.reset_pin)?.map(|pin| pin.into_output_high()),
                 power: pin(keys.power_pin)?.map(|pin| pin.into_output_low()),
                 light: pin(keys.light_pin)?.map(|pin| pin.into_output_low()),
@@ -134,7 +134,7 @@ mod raspberry_pi {
         }
     }
 
-    impl HostGpio for Pins {
+    impl HostGpio for BcmPins {
         fn can_reset(&self) -> bool {
             self.reset.is_some()
         }
@@ -174,16 +174,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn without_pins_in_the_configuration_there_are_none_and_no_error() {
+    fn no_configured_pins_is_no_error() {
         let gpio = open(&GpioKeys::default()).expect("nothing to open");
         assert!(!gpio.can_reset());
         assert_eq!((gpio.at_home(), gpio.emergency_stop()), (None, None));
     }
 
     #[test]
-    fn pins_that_can_not_be_used_are_refused_with_a_way_out() {
+    fn unusable_pins_have_a_remedy() {
         let keys = GpioKeys { stop_pin: Some(23), ..GpioKeys::default() };
-        // On a Raspberry Pi with the feature they can.
+        // Opening succeeds on a Raspberry Pi with the feature.
         if let Err(error) = open(&keys) {
             assert!(error.help().contains("[gpio]"), "{error}");
         }

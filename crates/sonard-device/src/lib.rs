@@ -1,8 +1,8 @@
 //! Host side of the ranger: serial link, scan driver, pins of this computer, thermometer.
 //!
-//! [`link`] finds, opens and locks serial ports. [`ranger::Ranger`] takes scans with the protocol machine of
-//! `firmware-protocol`. [`pi`] (feature `pi`) runs the device itself on the pins of a Raspberry Pi. A simulated
-//! device is in `sonard-mock`.
+//! [`link`] finds, opens and locks serial ports. [`ranger::Ranger`] takes scans with the protocol
+//! state machine of `firmware-protocol`. [`pi`] (feature `pi`) runs the device itself on the pins
+//! of a Raspberry Pi. A simulated device is in `sonard-mock`.
 #![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 
 pub mod host_gpio;

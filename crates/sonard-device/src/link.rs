@@ -1,4 +1,4 @@
-//! Serial lines: finding, opening and locking them, with errors that tell causes apart.
+//! Discovery, opening and locking of serial lines, with a distinct error for each cause.
 #![warn(clippy::expect_used, clippy::indexing_slicing, clippy::panic)]
 
 mod adapter;
@@ -30,7 +30,7 @@ pub use ports::{Candidate, candidates};
 use ports::{PortFolders, Resolved};
 pub use pty::Pty;
 
-/// Byte stream to a device: a serial port, or a pipe in memory.
+/// Byte stream to a device: a serial port or an in-memory pipe.
 pub trait Line: AsyncRead + AsyncWrite + Send + Unpin {}
 
 impl<T: AsyncRead + AsyncWrite + Send + Unpin> Line for T {}
@@ -38,14 +38,14 @@ impl<T: AsyncRead + AsyncWrite + Send + Unpin> Line for T {}
 /// Line rate of the firmware, bits per second (8N1).
 pub const BAUD: u32 = 115_200;
 
-/// Opens a line for the ranger's protocol, locked against other programs and emptied of what
-/// was received before.
+/// Opens a line for the ranger's protocol, locked against other programs and with an empty input
+/// buffer.
 ///
-/// `port` is a path, the name of an entry of `/dev/serial/by-id` (or a part of one that fits no
-/// other), or a USB serial number. Must be called within a tokio runtime.
+/// `port` is a path, the name of an entry of `/dev/serial/by-id` (or an unambiguous part of it),
+/// or a USB serial number. Must be called within a tokio runtime.
 ///
 /// # Errors
-/// [`LinkError`] tells a missing, ambiguous, busy, forbidden and wrong port apart.
+/// [`LinkError`] distinguishes a missing, ambiguous, busy, forbidden and wrong port.
 pub fn open(port: &str) -> Result<SerialStream, LinkError> {
     open_path(&resolve(port, None)?.path)
 }
@@ -54,35 +54,36 @@ fn open_path(path: &Path) -> Result<SerialStream, LinkError> {
     let stream = tokio_serial::new(path.to_string_lossy(), BAUD)
         .open_native_async()
         .map_err(|error| classify(path, error))?;
-    // What a device said to an earlier program is not an answer to this one.
+    // Bytes buffered before are replies to an earlier program.
     stream.clear(ClearBuffer::Input).map_err(|error| classify(path, error))?;
     Ok(stream)
 }
 
-/// Path of the device that a port's name stands for, as the kernel names it.
+/// Kernel path of the device that a port name resolves to.
 ///
 /// # Errors
-/// As [`open`], apart from what only opening reveals.
+/// As [`open`], except for errors of the opening itself.
 pub fn device_path(port: &str) -> Result<PathBuf, LinkError> {
     Ok(holders::real_path(&resolve(port, None)?.path))
 }
 
-/// The programs that have `port` open besides this one, with a remedy; `None` if none is visible.
+/// Describes the other programs that have `port` open, with a remedy; `None` if none is visible.
 ///
-/// A program that reads the same port takes bytes away, which looks like a silent or faulty board.
+/// A program that reads the same port consumes bytes, which looks like an unresponsive or faulty
+/// board.
 #[must_use]
 pub fn describe_contention(port: &str) -> Option<String> {
     let path = device_path(port).ok()?;
     let holders = find_holders(&path);
     let advice = holders.advice(&path)?;
     Some(format!(
-        "{} has the port open, too, and may take its bytes: {advice}",
+        "{} has the port open, too, and may consume its bytes: {advice}",
         holders.describe("")
     ))
 }
 
-/// The device behind a path, a stable id or a serial number. Of several ids that match, `preferred`
-/// is taken.
+/// Resolves a path, a stable id or a serial number to a device. Among several matching ids,
+/// `preferred` is chosen.
 fn resolve(port: &str, preferred: Option<&str>) -> Result<Resolved, LinkError> {
     let path = PathBuf::from(port);
     match fs::metadata(&path) {
@@ -98,26 +99,26 @@ fn resolve(port: &str, preferred: Option<&str>) -> Result<Resolved, LinkError> {
     PortFolders::system().find(port, preferred)
 }
 
-/// Whether it is a terminal of people's and no line: this process's own (`/dev/tty`), the maker of
-/// new ones (`/dev/ptmx`), or a console of the screen (`/dev/tty1`). To open one would lock it.
+/// Returns `true` for an interactive terminal: the process's own (`/dev/tty`), the pty multiplexer
+/// (`/dev/ptmx`), or a virtual console (`/dev/tty1`). Opening one would lock it.
 fn is_console(metadata: &fs::Metadata) -> bool {
     let device = metadata.rdev();
     matches!((rustix::fs::major(device), rustix::fs::minor(device)), (5, 0 | 2) | (4, 0..64))
 }
 
-/// `true` if a path can be opened and is no terminal at all, such as `/dev/null`. Tried only if it could
-/// not be opened as a line, because opening resets many a board.
+/// Returns `true` if a path can be opened and is not a terminal, such as `/dev/null`. Called only
+/// after a failed opening as a line, because opening a port resets many boards.
 ///
 /// # Errors
-/// If it can't be opened either, with the number that the other error has lost.
+/// If the path can't be opened, with the error number that the earlier error lacks.
 fn is_no_terminal(path: &Path) -> Result<bool, Errno> {
     let flags = OFlags::RDONLY | OFlags::NONBLOCK | OFlags::NOCTTY | OFlags::CLOEXEC;
     let file = rustix::fs::open(path, flags, Mode::empty())?;
     Ok(!rustix::termios::isatty(file))
 }
 
-/// `true` if the kernel denies access by another rule than the file's permissions: those give EACCES,
-/// a cgroup's device policy EPERM.
+/// Returns `true` if a cgroup's device policy denies access (EPERM) rather than the file's
+/// permissions (EACCES).
 fn is_denied_by_policy(path: &Path) -> bool {
     rustix::fs::access(path, Access::READ_OK | Access::WRITE_OK) == Err(Errno::PERM)
 }
@@ -150,7 +151,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_missing_port_is_named_and_what_is_present_is_said() {
+    fn missing_port_is_named() {
         let error = resolve("/dev/no-such-port", None).expect_err("it does not exist");
         assert!(error.to_string().contains("/dev/no-such-port"));
         assert!(matches!(error, LinkError::NotFound { .. }));
@@ -158,19 +159,19 @@ mod tests {
     }
 
     #[test]
-    fn a_file_is_not_a_port() {
+    fn file_is_not_a_port() {
         let file = tempfile::NamedTempFile::new().expect("a temporary file");
         let path = file.path().to_str().expect("plain name");
         assert!(matches!(resolve(path, None), Err(LinkError::NotSerial(_))));
     }
 
     #[tokio::test]
-    async fn devices_that_are_no_line_are_refused_by_name() {
+    async fn other_devices_are_rejected() {
         for path in ["/dev/null", "/dev/zero", "/dev/urandom", "/dev/tty", "/dev/ptmx", "/dev", "/"]
         {
             match open(path) {
                 Err(error @ LinkError::NotSerial(_)) => assert!(error.to_string().contains(path)),
-                // What a container lacks.
+                // Missing in a container.
                 Err(LinkError::NotFound { .. }) => assert!(!Path::new(path).exists(), "{path}"),
                 other => panic!("{path}: {other:?}"),
             }

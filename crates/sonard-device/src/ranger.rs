@@ -1,25 +1,25 @@
-//! Drives a ranger over its protocol: [`Driver`] pumps the host machine on a line, [`Ranger`]
-//! takes scans with it.
+//! Protocol driver of a ranger: [`Driver`] runs the host state machine on a serial line,
+//! [`Ranger`] takes scans through it.
 #![warn(clippy::expect_used, clippy::indexing_slicing, clippy::panic)]
 
-mod budget;
 mod clock;
+mod device_info;
 mod driver;
-mod introduction;
-mod job;
-mod prepared;
-mod progress;
+mod duration;
+mod scan_job;
+mod scan_recorder;
 mod scanner;
 mod settings;
+mod setup;
 mod timing;
 mod wall_clock;
 
-pub use budget::Budget;
 pub use clock::{ClockFit, HostTime, TickExtender};
+pub use device_info::{device_record, provenance, serial_text};
 pub use driver::{DriveError, Driver, Ended};
-pub use introduction::{device_record, provenance, serial_text};
-pub use job::ScanJob;
-pub use prepared::{PrepareError, PreparedScan, ScanInputs};
+pub use duration::Budget;
+pub use scan_job::ScanJob;
 pub use scanner::{Ranger, ScanError, ScanSummary, Unasked};
-pub use settings::{BlankingError, DeafWindow, Listening, Motion, check_blanking, hold_s};
+pub use settings::{BlankingError, Listening, Motion, WindowTooShort, check_blanking, hold_s};
+pub use setup::{PrepareError, PreparedScan, ScanInputs};
 pub use timing::limit_s;

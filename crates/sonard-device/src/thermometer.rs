@@ -1,4 +1,4 @@
-//! A thermometer behind a file of a Linux driver (1-wire, hwmon, thermal).
+//! Thermometer read from a file of a Linux driver (1-wire, hwmon, thermal).
 #![warn(clippy::expect_used, clippy::indexing_slicing, clippy::panic)]
 
 mod file;
@@ -21,64 +21,64 @@ use file::read_file;
 pub use plausibility::{Admission, FastChange, MAX_SLOPE_K_S, MAX_STEP_K, Plausibility};
 use scratchpad::Scratchpad;
 
-/// Attempts for one reading: a 1-wire bus garbles one now and then.
-const ATTEMPTS: u32 = 3;
-const PAUSE: Duration = Duration::from_millis(300);
+/// Maximum attempts per reading: a 1-wire bus occasionally garbles one.
+const MAX_ATTEMPTS: u32 = 3;
+const RETRY_PAUSE: Duration = Duration::from_millis(300);
 /// Time allowed for one attempt: a 1-wire conversion takes most of a second.
-const READ_LIMIT: Duration = Duration::from_secs(10);
+const READ_TIMEOUT: Duration = Duration::from_secs(10);
 
-/// A thermometer's file, with what its readings so far allow to check.
+/// Thermometer file with the state of its plausibility checks.
 #[derive(Debug)]
 pub struct Thermometer {
     file: PathBuf,
-    /// Start of the time line of `plausibility`.
+    /// Time origin of `plausibility`.
     epoch: Instant,
     plausibility: Plausibility,
     last_valid: Option<(f64, Instant)>,
-    /// Name of the chip that was read first.
+    /// Name of the chip at the first reading.
     chip: Option<String>,
-    /// An attempt that has not returned yet.
-    under_way: Option<oneshot::Receiver<Result<Sample, Fault>>>,
+    /// Pending read attempt.
+    pending: Option<oneshot::Receiver<Result<Sample, Fault>>>,
     remark: Option<String>,
     has_remarked_registers: bool,
 }
 
-/// A reading that was rejected, or a file that gives none.
+/// Failed or rejected reading of a thermometer.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[error("{}: {fault}", file.display())]
 pub struct ThermometerError {
-    /// The thermometer's file.
+    /// Path of the thermometer's file.
     pub file: PathBuf,
-    /// The cause.
+    /// Cause of the failure.
     pub fault: Fault,
 }
 
-/// A cause for which a thermometer has no valid reading.
+/// Cause of a failed or rejected reading.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum Fault {
     /// The file can't be opened or read.
     #[error("{0}")]
     Unreadable(String),
-    /// The path leads to something else than a file.
-    #[error("it is {0} and no thermometer's file")]
+    /// The path is not a regular file.
+    #[error("it is {0}, not a thermometer's file")]
     NotAFile(&'static str),
     /// The driver does not return.
-    #[error("reading it takes more than {} s", READ_LIMIT.as_secs())]
+    #[error("reading it takes more than {} s", READ_TIMEOUT.as_secs())]
     TimedOut,
     /// The file is longer than any thermometer's.
     #[error("it is too long for a thermometer's file")]
     TooLong,
     /// The file is binary.
-    #[error("it is no text")]
+    #[error("it is not a text file")]
     NotText,
     /// The file is empty.
     #[error("it is empty")]
     Empty,
-    /// The two lines of `w1_slave` are not complete.
+    /// The two lines of `w1_slave` are incomplete.
     #[error("it is cut off: {0} is missing")]
     CutOff(&'static str),
-    /// The text is no number.
-    #[error("{0:?} is no number of thousandths of a degree")]
+    /// The text is not a number.
+    #[error("{0:?} is not a number of thousandths of a degree")]
     NotANumber(String),
     /// The sensor's checksum is wrong.
     #[error("the sensor's checksum is wrong")]
@@ -86,16 +86,18 @@ pub enum Fault {
     /// All registers are equal.
     #[error("all registers of the sensor are {0:02x}: check its supply, ground and data line")]
     StuckBus(u8),
-    /// A register has a value that the sensor can't have.
+    /// A register has an impossible value.
     #[error("the sensor can't have these registers: {0}")]
     ImpossibleRegisters(String),
-    /// The value that a DS18B20 has before its first conversion.
-    #[error("85 C is what a DS18B20 has before its first conversion: check its supply and pull-up")]
+    /// The value is the power-on value of a DS18B20.
+    #[error(
+        "85 C is the value of a DS18B20 before its first conversion: check its supply and pull-up"
+    )]
     PowerOnValue,
-    /// The air can't be so cold or warm, or the model does not cover it.
+    /// The temperature is outside of the model's range for air.
     #[error("{0}")]
     NotOfAir(String),
-    /// A sensor that measures a part of the computer.
+    /// The sensor measures a part of the computer.
     #[error(
         "it belongs to {0}, which does not measure the air: give the path of the air's sensor (hwmon \
          numbers change from boot to boot; the path under /sys/devices does not)"
@@ -104,9 +106,9 @@ pub enum Fault {
     /// The file belongs to another chip than before.
     #[error("it belongs to {now} now and to {before} before: give a path that stays the same")]
     OtherChip {
-        /// The chip that was read first.
+        /// Chip at the first reading.
         before: String,
-        /// The chip that the file belongs to now.
+        /// Chip at present.
         now: String,
     },
     /// The temperature changed faster than that of air.
@@ -114,17 +116,17 @@ pub enum Fault {
     TooFast(FastChange),
 }
 
-/// A temperature as a file gives it.
+/// Temperature as read from a file.
 #[derive(Debug, Clone, PartialEq)]
 struct Sample {
     temperature_c: f64,
     chip: Option<String>,
-    /// Registers that a genuine sensor does not have.
+    /// `true` if the registers are not those of a genuine sensor.
     is_unusual: bool,
 }
 
 impl Fault {
-    /// `true` if another attempt may succeed at once.
+    /// Returns `true` if an immediate retry may succeed.
     const fn is_transient(&self) -> bool {
         !matches!(
             self,
@@ -134,7 +136,7 @@ impl Fault {
 }
 
 impl Thermometer {
-    /// A thermometer that was not read yet.
+    /// Creates a thermometer without reading it.
     #[must_use]
     pub fn new(file: impl Into<PathBuf>) -> Self {
         Self {
@@ -143,17 +145,17 @@ impl Thermometer {
             plausibility: Plausibility::default(),
             last_valid: None,
             chip: None,
-            under_way: None,
+            pending: None,
             remark: None,
             has_remarked_registers: false,
         }
     }
 
-    /// Reads the temperature, degrees Celsius. Takes a second with a 1-wire sensor, and at most some
-    /// 30 s.
+    /// Reads the temperature, degrees Celsius. Takes a second with a 1-wire sensor, and at most
+    /// about 30 s.
     ///
     /// # Errors
-    /// If it can't be read, or if sensor or air can't have the value.
+    /// If the file can't be read, or the value is impossible for the sensor or implausible for air.
     pub async fn read(&mut self) -> Result<f64, ThermometerError> {
         let mut attempts = 0;
         loop {
@@ -164,21 +166,21 @@ impl Thermometer {
                     self.last_valid = Some((temperature_c, Instant::now()));
                     return Ok(temperature_c);
                 }
-                Err(fault) if attempts == ATTEMPTS || !fault.is_transient() => {
+                Err(fault) if attempts == MAX_ATTEMPTS || !fault.is_transient() => {
                     return Err(ThermometerError { file: self.file.clone(), fault });
                 }
-                Err(_) => sleep(PAUSE).await,
+                Err(_) => sleep(RETRY_PAUSE).await,
             }
         }
     }
 
-    /// The last valid temperature, degrees Celsius, and its age.
+    /// Last valid temperature, degrees Celsius, and its age.
     #[must_use]
     pub fn last_valid(&self) -> Option<(f64, Duration)> {
         self.last_valid.map(|(temperature_c, at)| (temperature_c, at.elapsed()))
     }
 
-    /// A remark on accepted readings, once.
+    /// Takes the pending remark on accepted readings, if any.
     pub fn take_remark(&mut self) -> Option<String> {
         self.remark.take()
     }
@@ -193,7 +195,7 @@ impl Thermometer {
         let admitted = self.plausibility.admit(sample.temperature_c, self.epoch.elapsed());
         if let Admission::Persistent { from_c, waited } = admitted.map_err(Fault::TooFast)? {
             self.remark = Some(format!(
-                "{}: {:.1} C after {from_c:.1} C is accepted, because it stays for {:.0} s",
+                "{}: {:.1} C after {from_c:.1} C is accepted, because it has lasted for {:.0} s",
                 self.file.display(),
                 sample.temperature_c,
                 waited.as_secs_f64(),
@@ -210,11 +212,11 @@ impl Thermometer {
         Ok(sample.temperature_c)
     }
 
-    /// A driver may block, and then for ever: it is called by a thread of its own, which neither
-    /// occupies the runtime nor keeps the program from ending.
+    /// Reads a sample on a separate thread. A driver may block forever; the thread neither occupies
+    /// the runtime nor prevents the program from exiting.
     async fn sample(&mut self) -> Result<Sample, Fault> {
-        let mut under_way = match self.under_way.take() {
-            Some(under_way) => under_way,
+        let mut pending = match self.pending.take() {
+            Some(pending) => pending,
             None => {
                 let (send, receive) = oneshot::channel();
                 let file = self.file.clone();
@@ -228,11 +230,11 @@ impl Thermometer {
                 receive
             }
         };
-        match timeout(READ_LIMIT, &mut under_way).await {
+        match timeout(READ_TIMEOUT, &mut pending).await {
             Ok(Ok(sample)) => sample,
-            Ok(Err(_)) => Err(Fault::Unreadable("its reader has ended".into())),
+            Ok(Err(_)) => Err(Fault::Unreadable("the reading thread has ended".into())),
             Err(_) => {
-                self.under_way = Some(under_way);
+                self.pending = Some(pending);
                 Err(Fault::TimedOut)
             }
         }
@@ -247,14 +249,14 @@ fn read_sample(file: &Path) -> Result<Sample, Fault> {
     parse(&read_file(file)?).map(|sample| Sample { chip, ..sample })
 }
 
-/// Either a number of thousandths of a degree, or the two lines of `w1_slave`: registers with their
+/// Parses a number of thousandths of a degree, or the two lines of `w1_slave`: registers with their
 /// checksum and a `YES`, and `t=` with the number.
 fn parse(text: &str) -> Result<Sample, Fault> {
     if text.trim().is_empty() {
         return Err(Fault::Empty);
     }
     if !text.contains("crc=") && !text.contains("t=") {
-        // The first register of a `w1_slave` that is cut off looks like a number.
+        // The first register of a truncated `w1_slave` looks like a number.
         let number = text.trim();
         if !text.ends_with('\n') && number.len() <= 2 && number != "0" {
             return Err(Fault::CutOff("the end of the line"));

@@ -1,7 +1,7 @@
-//! The mock's board: carries out the device machine's actions in the world, on a clock of its own.
+//! Board of the mock: executes the device state machine's actions in the world, on its own clock.
 //!
-//! A discrete-event simulation without I/O. Events happen at their exact device times, however
-//! late the real clock gets round to them, so that timing does not depend on the machine.
+//! Discrete-event simulation without I/O. Events happen at their exact device times, however late
+//! they are processed, so that timing does not depend on the computer.
 
 use firmware_protocol::{
     device::{Action, Device, DeviceTimer, EchoReport},
@@ -12,51 +12,51 @@ use sonard_model::motion::Trapezoid;
 use super::{
     faults::{DeviceFault, Faults},
     identity::{BoardSettings, Pace, identity},
-    liar::Liar,
+    invalid_replies::ReplyCorruptor,
     note::Note,
     world::World,
 };
 
 const TICK_HZ: u32 = limits::TICK_HZ;
-/// Time from the machine's wish to fire until INIT rises, ticks: the compare unit's lead.
+/// Time from the action to the rise of INIT, ticks: the lead of the compare unit.
 const FIRE_LEAD_TICKS: u64 = 32;
 
-/// The reason for which the board wants to be woken.
+/// Kind of the next event.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum WakeKind {
-    /// A move, a rest or a listening window ends: virtual time may jump there.
+    /// A move, a settling time or a listening window ends: virtual time may jump there.
     Work,
-    /// The host's patience is measured, or the device hangs: only real time may pass.
-    Patience,
+    /// The host's lease runs, or the device hangs: only real time may pass.
+    RealTimeOnly,
 }
 
-/// When the board wants to be woken.
+/// Next event of the board.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Wake {
-    /// Device time, ticks since power came on.
+    /// Device time, ticks since power-up.
     pub at: u64,
-    /// Why.
+    /// Kind of event, which decides on jumps in time.
     pub kind: WakeKind,
 }
 
-/// The device machine, its board, and the world around it.
+/// Device state machine with its board and environment.
 #[derive(Debug)]
 pub struct MockBoard {
     settings: BoardSettings,
     device: Device,
     world: World,
     faults: Faults,
-    liar: Liar,
+    corruptor: ReplyCorruptor,
     now: u64,
     boot: u16,
-    /// What the step counter says.
+    /// Value of the step counter.
     step: i32,
     known: bool,
     coils: bool,
     activity: Activity,
     stalled_until: u64,
-    /// Half of the lease that was left when the host was last heard, ticks.
-    patience: u64,
+    /// Half of the remaining lease at the last message from the host, ticks.
+    lease_reserve: u64,
     hung_up: bool,
     fired: u64,
     notes: Vec<Note>,
@@ -84,7 +84,7 @@ impl Activity {
 }
 
 impl MockBoard {
-    /// Powers the board up.
+    /// Creates a board at power-up.
     #[must_use]
     pub fn new(settings: BoardSettings, world: World) -> Self {
         let mut board = Self {
@@ -92,7 +92,7 @@ impl MockBoard {
             device: Device::new(identity(&settings, settings.boot, ResetCause::PowerOn)),
             world,
             faults: Faults::new(settings.faults, settings.seed ^ 0x00b0_a4d0),
-            liar: Liar::new(settings.faults.lie, settings.faults.version),
+            corruptor: ReplyCorruptor::new(settings.faults.lie, settings.faults.version),
             now: u64::from(settings.clock),
             boot: settings.boot,
             step: 0,
@@ -100,7 +100,7 @@ impl MockBoard {
             coils: false,
             activity: Activity::Nothing,
             stalled_until: 0,
-            patience: 0,
+            lease_reserve: 0,
             hung_up: false,
             fired: 0,
             notes: vec![Note::Booted(settings.boot)],
@@ -109,24 +109,24 @@ impl MockBoard {
         board
     }
 
-    /// Device time, ticks since power came on.
+    /// Device time, ticks since power-up.
     #[must_use]
     pub const fn now(&self) -> u64 {
         self.now
     }
 
-    /// When to call [`Self::advance`] next; `None` if only bytes can make something happen.
+    /// Next event, at which to call [`Self::advance`]; `None` if only received bytes cause events.
     #[must_use]
     pub fn next_wake(&self) -> Option<Wake> {
         if self.stalled() {
-            return Some(Wake { at: self.stalled_until, kind: WakeKind::Patience });
+            return Some(Wake { at: self.stalled_until, kind: WakeKind::RealTimeOnly });
         }
         let work = self.activity.until().map(|at| Wake { at, kind: WakeKind::Work });
         let timer = self.device.poll_timeout().map(|(timer, at)| {
             let ahead = at.wrapping_sub(self.now as u32).cast_signed().max(0);
             let kind = match timer {
                 DeviceTimer::Settle | DeviceTimer::MinInterval => WakeKind::Work,
-                DeviceTimer::Lease | DeviceTimer::Hold => WakeKind::Patience,
+                DeviceTimer::Lease | DeviceTimer::Hold => WakeKind::RealTimeOnly,
             };
             Wake { at: self.now + u64::from(ahead.unsigned_abs()), kind }
         });
@@ -134,25 +134,24 @@ impl MockBoard {
             (Some(work), Some(timer)) => Some(if timer.at < work.at { timer } else { work }),
             (work, timer) => work.or(timer),
         }?;
-        let jumps = wake.kind == WakeKind::Work && self.leaves_patience(wake.at);
-        Some(Wake { kind: if jumps { WakeKind::Work } else { WakeKind::Patience }, ..wake })
+        let may_jump = wake.kind == WakeKind::Work && self.leaves_lease(wake.at);
+        Some(Wake { kind: if may_jump { WakeKind::Work } else { WakeKind::RealTimeOnly }, ..wake })
     }
 
-    /// Whether a jump to `at` leaves the host at least half of its lease in real time.
+    /// Returns `true` if a jump to `at` leaves the host at least half of its lease in real time.
     ///
-    /// Without that, a host that the computer keeps waiting for some milliseconds would find its
-    /// lease used up by jumps.
-    fn leaves_patience(&self, at: u64) -> bool {
-        self.lease_left().is_none_or(|left| at + self.patience <= self.now + left)
+    /// Otherwise jumps would use up the lease of a host that is delayed by some milliseconds.
+    fn leaves_lease(&self, at: u64) -> bool {
+        self.lease_left().is_none_or(|left| at + self.lease_reserve <= self.now + left)
     }
 
-    /// Ticks until the sweep's lease ends.
+    /// Time to the end of the sweep's lease, ticks.
     fn lease_left(&self) -> Option<u64> {
         let ends = self.device.lease_ends()?;
         Some(u64::from(ends.wrapping_sub(self.now as u32).cast_signed().max(0).unsigned_abs()))
     }
 
-    /// Lets device time pass up to `to`; everything due happens at its own time.
+    /// Advances device time to `to`; everything due happens at its exact time.
     pub fn advance(&mut self, to: u64) {
         while let Some(wake) = self.next_wake().filter(|wake| wake.at <= to) {
             self.now = self.now.max(wake.at);
@@ -165,78 +164,78 @@ impl MockBoard {
         self.now = self.now.max(to);
     }
 
-    /// Bytes from the host, now.
+    /// Processes bytes from the host at the present device time.
     pub fn handle_bytes(&mut self, bytes: &[u8]) {
         let mut garbled = Vec::with_capacity(bytes.len());
         self.faults.garble(bytes, &mut garbled);
         for byte in garbled {
             self.device.handle_byte(self.now as u32, byte);
-            // Between two bytes a real board's main loop comes round many times.
+            // A real board's main loop runs many times between two bytes.
             self.act();
         }
-        self.patience = self.lease_left().unwrap_or(0) / 2;
+        self.lease_reserve = self.lease_left().unwrap_or(0) / 2;
     }
 
-    /// Appends what the device has to say, as the host will get it.
+    /// Appends the bytes for the host, with the faults of the line applied.
     pub fn poll_transmit(&mut self, out: &mut Vec<u8>) {
         if self.stalled() {
             return;
         }
         let mut buffer = [0; 128];
-        let mut said = Vec::new();
+        let mut sent = Vec::new();
         loop {
             let count = self.device.poll_transmit(&mut buffer);
             if count == 0 {
                 break;
             }
-            said.extend_from_slice(buffer.get(..count).unwrap_or_default());
+            sent.extend_from_slice(buffer.get(..count).unwrap_or_default());
         }
-        let told = self.liar.told(said);
-        self.faults.garble(&told, out);
-        // A restart waits until its acknowledgement is out.
+        let corrupted = self.corruptor.corrupt(sent);
+        self.faults.garble(&corrupted, out);
+        // A restart waits until its acknowledgement is sent.
         self.act();
     }
 
-    /// How its clock passes.
+    /// Passage of device time: real or virtual.
     #[must_use]
     pub const fn pace(&self) -> Pace {
         self.settings.pace
     }
 
-    /// How long the next chunk of bytes is held back on the line, milliseconds.
+    /// Draws the delay of the next chunk of bytes on the line, milliseconds.
     pub fn line_delay_ms(&mut self) -> u32 {
         self.faults.delay_ms()
     }
 
-    /// Whether the device hangs and hears nothing.
+    /// Returns `true` while the device hangs and ignores the line.
     #[must_use]
     pub const fn stalled(&self) -> bool {
         self.now < self.stalled_until
     }
 
-    /// Whether the line is to hang up now; asking resets it.
+    /// Takes a pending hangup of the line.
     pub const fn take_hangup(&mut self) -> bool {
         std::mem::replace(&mut self.hung_up, false)
     }
 
-    /// The world around it.
+    /// Mutable access to the environment.
     pub const fn world(&mut self) -> &mut World {
         &mut self.world
     }
 
-    /// Steps that the motor really stands away from the index.
+    /// True distance of the motor from the index, steps.
     #[must_use]
     pub const fn steps_from_index(&self) -> i32 {
         self.world.steps_from_index()
     }
 
-    /// Whether the motor's coils have current.
+    /// Returns `true` while the motor's coils have current.
     #[must_use]
     pub const fn holds_coils(&self) -> bool {
         self.coils
     }
 
-    /// What happened since the last call.
+    /// Takes the messages since the last call.
     pub fn take_notes(&mut self) -> Vec<Note> {
         std::mem::take(&mut self.notes)
     }
@@ -284,7 +283,7 @@ impl MockBoard {
                 }
                 Action::StopMotion => self.brake(),
                 Action::ReleaseCoils => {
-                    self.halt_at_once();
+                    self.release_coils();
                     self.notes.push(Note::CoilsReleased);
                 }
                 Action::Fire { window_ticks, max_echoes, .. } => {
@@ -296,7 +295,7 @@ impl MockBoard {
             if matches!(action, Action::Home { .. } | Action::Move { .. })
                 && let Some(fault) = self.faults.at_motion()
             {
-                self.suffer(fault);
+                self.inject(fault);
             }
         }
     }
@@ -312,19 +311,19 @@ impl MockBoard {
     fn brake(&mut self) {
         let (step, until) = match self.activity {
             Activity::Moving { motion, from, since, .. } => {
-                let (gone, stands_s) =
+                let (gone, stopped_s) =
                     motion.braked_at((self.now - since) as f64 / f64::from(TICK_HZ));
                 self.world.turn(gone);
-                (from + gone, since + ticks(stands_s))
+                (from + gone, since + ticks(stopped_s))
             }
-            // Half way to the index nobody knows where the motor is.
+            // During a search for the index the position is unknown.
             _ => (self.step, self.now),
         };
         self.activity = Activity::Braking { step, until: until.max(self.now) };
     }
 
-    /// The coils lose their current: the motor stays about where it was.
-    fn halt_at_once(&mut self) {
+    /// Switches the coil current off; the motor stays about where it was.
+    fn release_coils(&mut self) {
         if let Activity::Moving { motion, from, since, .. } = self.activity {
             let (gone, _) = motion.braked_at((self.now - since) as f64 / f64::from(TICK_HZ));
             self.world.turn(gone);
@@ -336,9 +335,9 @@ impl MockBoard {
     }
 
     fn fire(&mut self, window_ticks: u32, max_echoes: u8) {
-        let (stuck, silent) = self.faults.of_module();
+        let (stuck, no_echo) = self.faults.of_module();
         if stuck {
-            // Not fired: the machine is told at once.
+            // Without a firing the result is available at once.
             let report = Box::new(EchoReport {
                 fired_ticks: self.now as u32,
                 status: ReadingStatus::ModuleFault,
@@ -348,11 +347,11 @@ impl MockBoard {
             return;
         }
         let fired = self.now + FIRE_LEAD_TICKS;
-        let mut heard = self.world.fire(window_ticks, TICK_HZ);
-        if silent {
-            heard.clear();
+        let mut echo_ticks = self.world.fire(window_ticks, TICK_HZ);
+        if no_echo {
+            echo_ticks.clear();
         }
-        let mut echoes = Echoes::from_ticks(&heard);
+        let mut echoes = Echoes::from_ticks(&echo_ticks);
         echoes.truncate(max_echoes);
         let status = if echoes.is_empty() { ReadingStatus::NoEcho } else { ReadingStatus::Echo };
         let report = Box::new(EchoReport { fired_ticks: fired as u32, status, echoes });
@@ -360,11 +359,11 @@ impl MockBoard {
         self.fired += 1;
         self.notes.push(Note::Fired(self.fired));
         if let Some(fault) = self.faults.at_firing() {
-            self.suffer(fault);
+            self.inject(fault);
         }
     }
 
-    fn suffer(&mut self, fault: DeviceFault) {
+    fn inject(&mut self, fault: DeviceFault) {
         self.notes.push(Note::Fault(fault));
         match fault {
             DeviceFault::Stall(ms) => self.stalled_until = self.now + ticks(f64::from(ms) / 1e3),
@@ -374,7 +373,7 @@ impl MockBoard {
     }
 
     fn restart(&mut self, cause: ResetCause) {
-        self.halt_at_once();
+        self.release_coils();
         self.boot = self.boot.checked_add(1).unwrap_or(1);
         self.step = 0;
         self.device = Device::new(identity(&self.settings, self.boot, cause));

@@ -1,4 +1,4 @@
-//! Faults of the line and of the device, chosen by a seed.
+//! Random faults of the line and of the device.
 
 use std::{borrow::Cow, fmt, str::FromStr};
 
@@ -6,68 +6,68 @@ use rand::{RngExt as _, SeedableRng as _};
 use rand_pcg::Pcg64;
 use thiserror::Error;
 
-use super::liar::Lie;
+use super::invalid_replies::InvalidReply;
 
-/// Rates of injected faults. Written `flip=0.001,drop=0.001,reset=0.002,version=9`.
+/// Probabilities of injected faults. Text form: `flip=0.001,drop=0.001,reset=0.002,version=9`.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct FaultPlan {
     /// Probability that a byte has one bit flipped.
     pub flip: f64,
     /// Probability that a byte is lost.
     pub drop: f64,
-    /// Probability that a byte comes twice.
+    /// Probability that a byte is duplicated.
     pub double: f64,
-    /// Probability that a chunk of bytes is held back for `delay_ms`.
+    /// Probability that a chunk of bytes is delayed by `delay_ms`.
     pub delay: f64,
-    /// How long a chunk is held back, milliseconds.
+    /// Delay of a chunk, milliseconds.
     pub delay_ms: u32,
     /// Probability for each firing that the device hangs for `stall_ms`.
     pub stall: f64,
-    /// How long the device hangs, milliseconds.
+    /// Duration of a stall, milliseconds.
     pub stall_ms: u32,
     /// Probability for each firing that the device restarts.
     pub reset: f64,
     /// Probability for each firing that the line hangs up and comes back.
     pub hangup: f64,
-    /// Probability for each turn of the motor that the device restarts, as from a weak supply.
+    /// Probability for each move of the motor that the device restarts, as from a weak supply.
     pub motor_reset: f64,
-    /// Probability for each turn of the motor that the line hangs up and comes back.
+    /// Probability for each move of the motor that the line hangs up and comes back.
     pub motor_hangup: f64,
-    /// Probability for each firing that no echo comes back, as without a transducer.
+    /// Probability for each firing that no echo is detected, as without a transducer.
     pub no_echo: f64,
     /// Probability for each firing that ECHO is high before it, as from a module without power.
     pub stuck_echo: f64,
     /// Protocol version to claim instead of the true one.
     pub version: Option<u8>,
-    /// What it says wrongly.
-    pub lie: Option<Lie>,
+    /// Fault of the replies.
+    pub lie: Option<InvalidReply>,
 }
 
-/// The keys of a fault specification, with what their value means.
-pub const FAULT_HELP: &str = "comma-separated KEY=VALUE: flip, drop, double (probability a byte), \
-delay (probability a chunk; delay_ms, default 20), stall (probability a firing; stall_ms, default \
-500), reset, hangup, no_echo, stuck_echo (probability a firing), motor_reset, motor_hangup \
-(probability a turn of the motor), version (protocol version to claim), lie (what to say wrongly: \
-lie=? names them)";
+/// Help text on the keys of a fault specification.
+pub const FAULT_HELP: &str = "comma-separated KEY=VALUE: flip, drop, double (probability per \
+byte), delay (probability per chunk; delay_ms, default 20), stall (probability per firing; \
+stall_ms, default 500), reset, hangup, no_echo, stuck_echo (probability per firing), motor_reset, \
+motor_hangup (probability per move of the motor), version (protocol version to report), lie \
+(protocol faults; lie=? lists them)";
 
-/// An error in a fault specification.
+/// Error in a fault specification.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 pub enum FaultSpecError {
-    /// No `=` in a part.
+    /// A part without `=`.
     #[error("{0:?} is not KEY=VALUE")]
     NotAPair(String),
-    /// A key that is not known.
+    /// An unknown key.
     #[error("{0:?} is not a fault")]
     UnknownKey(String),
-    /// A value that does not fit its key.
-    #[error("{key}={value} does not fit: {wanted}")]
+    /// An invalid value for a key.
+    #[error("{key}={value} is invalid, expected {expected}")]
     BadValue {
-        /// The key.
+        /// Key of the fault.
         key: String,
-        /// The value.
+        /// Value as specified.
         value: String,
-        /// What would be right.
-        wanted: Cow<'static, str>,
+        /// Description of valid values.
+        expected: Cow<'static, str>,
     },
 }
 
@@ -101,7 +101,11 @@ impl FaultPlan {
             "stall_ms" => self.stall_ms = whole(key, value, "milliseconds, 0 to 60000")?,
             "motor_reset" => self.motor_reset = probability(key, value)?,
             "motor_hangup" => self.motor_hangup = probability(key, value)?,
-            "lie" => self.lie = Some(Lie::named(value).map_err(|names| bad(key, value, names))?),
+            "lie" => {
+                let invalid =
+                    InvalidReply::from_name(value).map_err(|names| bad(key, value, names))?;
+                self.lie = Some(invalid);
+            }
             "version" => self.version = Some(whole(key, value, "a protocol version, 0 to 255")?),
             _ => return Err(FaultSpecError::UnknownKey(key.into())),
         }
@@ -120,20 +124,20 @@ fn probability(key: &str, value: &str) -> Result<f64, FaultSpecError> {
         .ok_or_else(|| bad(key, value, "a probability, 0 to 1"))
 }
 
-fn whole<T: FromStr>(key: &str, value: &str, wanted: &'static str) -> Result<T, FaultSpecError> {
-    value.parse().map_err(|_| bad(key, value, wanted))
+fn whole<T: FromStr>(key: &str, value: &str, expected: &'static str) -> Result<T, FaultSpecError> {
+    value.parse().map_err(|_| bad(key, value, expected))
 }
 
-fn bad(key: &str, value: &str, wanted: impl Into<Cow<'static, str>>) -> FaultSpecError {
-    FaultSpecError::BadValue { key: key.into(), value: value.into(), wanted: wanted.into() }
+fn bad(key: &str, value: &str, expected: impl Into<Cow<'static, str>>) -> FaultSpecError {
+    FaultSpecError::BadValue { key: key.into(), value: value.into(), expected: expected.into() }
 }
 
-/// A fault of the device at a firing.
+/// Fault of the device at a firing or a move.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum DeviceFault {
-    /// It does nothing for so many milliseconds.
+    /// The device hangs for a number of milliseconds.
     Stall(u32),
-    /// It restarts.
+    /// The device restarts.
     Reset,
     /// The line hangs up.
     Hangup,
@@ -149,7 +153,7 @@ impl fmt::Display for DeviceFault {
     }
 }
 
-/// Draws faults; the same seed and the same calls give the same faults.
+/// Random generator of faults, reproducible for a given seed and sequence of calls.
 #[derive(Debug)]
 pub struct Faults {
     plan: FaultPlan,
@@ -157,13 +161,13 @@ pub struct Faults {
 }
 
 impl Faults {
-    /// Faults of a plan from a seed.
+    /// Creates a generator for a plan from a seed.
     #[must_use]
     pub fn new(plan: FaultPlan, seed: u64) -> Self {
         Self { plan, rng: Pcg64::seed_from_u64(seed) }
     }
 
-    /// What the other end of the line gets of `bytes`.
+    /// Appends `bytes` to `out` with the faults of the line applied.
     pub fn garble(&mut self, bytes: &[u8], out: &mut Vec<u8>) {
         for &byte in bytes {
             if self.happens(self.plan.drop) {
@@ -181,15 +185,15 @@ impl Faults {
         }
     }
 
-    /// How long a chunk of bytes is held back, milliseconds.
+    /// Draws the delay of the next chunk of bytes, milliseconds.
     pub fn delay_ms(&mut self) -> u32 {
         if self.happens(self.plan.delay) { self.plan.delay_ms } else { 0 }
     }
 
-    /// What befalls the device at a firing, if anything.
+    /// Draws the fault of the device at a firing, if any.
     pub fn at_firing(&mut self) -> Option<DeviceFault> {
         let FaultPlan { stall, stall_ms, reset, hangup, .. } = self.plan;
-        // All three are drawn each time, so that one rate does not shift another's sequence.
+        // All three are drawn each time, so that no probability affects the sequence of another.
         let draws = [self.happens(reset), self.happens(hangup), self.happens(stall)];
         [DeviceFault::Reset, DeviceFault::Hangup, DeviceFault::Stall(stall_ms)]
             .into_iter()
@@ -197,7 +201,7 @@ impl Faults {
             .find_map(|(fault, happens)| happens.then_some(fault))
     }
 
-    /// What befalls the device as its motor begins to turn, if anything.
+    /// Draws the fault of the device at the start of a move, if any.
     pub fn at_motion(&mut self) -> Option<DeviceFault> {
         let FaultPlan { motor_reset, motor_hangup, .. } = self.plan;
         let draws = [self.happens(motor_reset), self.happens(motor_hangup)];
@@ -207,7 +211,7 @@ impl Faults {
             .find_map(|(fault, happens)| happens.then_some(fault))
     }
 
-    /// What the module does at a firing: whether ECHO hangs high, and whether nothing comes back.
+    /// Draws the faults of the module at a firing: ECHO stuck high, no echo.
     pub fn of_module(&mut self) -> (bool, bool) {
         let FaultPlan { stuck_echo, no_echo, .. } = self.plan;
         (self.happens(stuck_echo), self.happens(no_echo))
@@ -223,7 +227,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn specifications_are_read_and_wrong_ones_say_what_would_be_right() {
+    fn specification_is_parsed() {
         let plan: FaultPlan = "flip=0.25, reset=1,version=9".parse().expect("reads");
         assert_eq!((plan.flip, plan.reset, plan.version), (0.25, 1.0, Some(9)));
         for (spec, part) in [
@@ -241,7 +245,7 @@ mod tests {
     }
 
     #[test]
-    fn rates_are_met_and_a_seed_repeats() {
+    fn probabilities_are_reproduced() {
         let plan: FaultPlan = "drop=0.1,double=0.1,flip=0.1".parse().expect("reads");
         let sent = vec![0x55; 100_000];
         let run = |seed| {

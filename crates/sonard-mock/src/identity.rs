@@ -1,4 +1,4 @@
-//! What the mock says it is.
+//! Identity and settings of the mock board.
 
 use firmware_protocol::{
     device::Board,
@@ -14,26 +14,26 @@ pub struct BoardSettings {
     pub boot: u16,
     /// Device clock at the first boot, ticks.
     pub clock: u32,
-    /// Steps a revolution.
+    /// Motor steps per revolution.
     pub steps_per_revolution: u16,
-    /// What goes wrong.
+    /// Probabilities of injected faults.
     pub faults: FaultPlan,
     /// Seed of the faults.
     pub seed: u64,
-    /// How its clock passes; a virtual one is announced to the host.
+    /// Real or virtual time; a virtual clock is reported to the host.
     pub pace: Pace,
 }
 
-/// The passage of device time.
+/// Passage of device time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Pace {
-    /// As on a wall clock.
+    /// Device time passes in real time.
     RealTime,
-    /// Jumps to whatever happens next; only the host's patience is measured in real time.
+    /// Device time jumps to the next event; only the host's lease is measured in real time.
     Virtual,
 }
 
-/// The board as it introduces itself: never as hardware.
+/// Builds the identity of the board, always as a simulated device.
 pub(super) fn identity(settings: &BoardSettings, boot: u16, reset_cause: ResetCause) -> Board {
     let clock = match settings.pace {
         Pace::RealTime => Capabilities::default(),

@@ -1,14 +1,14 @@
-//! A mock ranger: the device machine on a pty, with sound from the model.
+//! Mock ranger: the device state machine on a pty, with echoes from the acoustic model.
 //!
-//! [`World`] and [`MockBoard`] are a simulation without I/O; [`MockPort`] plays it on a
-//! [`Pty`](sonard_device::link::Pty).
-//! It is only ever used when asked for by name, and it says of itself that it is simulated.
+//! [`World`] and [`MockBoard`] are a simulation without I/O; [`MockPort`] runs it on a
+//! [`Pty`](sonard_device::link::Pty). The mock is used only on explicit request, and its identity
+//! reports a simulated device.
 #![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 
 mod board;
 mod faults;
 mod identity;
-mod liar;
+mod invalid_replies;
 mod memory;
 mod note;
 mod serve;
@@ -19,7 +19,7 @@ mod world;
 pub use board::{MockBoard, Wake, WakeKind};
 pub use faults::{DeviceFault, FAULT_HELP, FaultPlan, FaultSpecError, Faults};
 pub use identity::{BoardSettings, Pace};
-pub use liar::{LIES, Lie};
+pub use invalid_replies::{INVALID_REPLIES, InvalidReply};
 pub use memory::MemorySocket;
 pub use note::Note;
 pub use serve::MockPort;

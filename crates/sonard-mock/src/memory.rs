@@ -1,4 +1,4 @@
-//! Port in memory: a pipe between host and board that can be unplugged, without a device of the system.
+//! In-memory port: an unpluggable pipe between host and board, without a device of the system.
 
 use std::{
     io,
@@ -11,28 +11,29 @@ use tokio::{
     sync::Notify,
 };
 
-/// Bytes that each direction of the pipe holds; further bytes from the board are lost, as on a serial line without a
-/// reader.
+/// Capacity of each direction of the pipe, bytes. Further bytes from the board are lost, as on a
+/// serial line without a reader.
 const PIPE_BYTES: usize = 64 * 1024;
 
-/// Socket of a port in memory: hosts open it with [`connect`](Self::connect) while a board is plugged in.
+/// Socket of an in-memory port: hosts open it with [`connect`](Self::connect) while a board is
+/// plugged in.
 ///
 /// Clones share the socket. At most one host is connected; a second one is rejected as busy.
 #[derive(Debug, Clone, Default)]
 pub struct MemorySocket {
-    shared: Arc<Shared>,
+    shared: Arc<SharedSocket>,
 }
 
 #[derive(Debug, Default)]
-struct Shared {
-    state: Mutex<State>,
+struct SharedSocket {
+    state: Mutex<SocketState>,
     connected: Notify,
 }
 
 #[derive(Debug, Default)]
-struct State {
+struct SocketState {
     plugged: bool,
-    /// The board's end of a connection that the board has not taken yet.
+    /// Board's end of a connection that the board has not accepted yet.
     offered: Option<DuplexStream>,
     /// `true` while a host's connection is open on the board's side.
     in_use: bool,
@@ -60,7 +61,7 @@ impl MemorySocket {
 
     fn set_plugged(&self, plugged: bool) {
         let mut state = self.shared.state.lock().unwrap_or_else(PoisonError::into_inner);
-        *state = State { plugged, ..State::default() };
+        *state = SocketState { plugged, ..SocketState::default() };
     }
 
     fn take_offered(&self) -> Option<DuplexStream> {
@@ -73,7 +74,7 @@ impl MemorySocket {
     }
 }
 
-/// The board's end of a [`MemorySocket`].
+/// Board's end of a [`MemorySocket`].
 #[derive(Debug)]
 pub(super) struct MemoryLine {
     socket: MemorySocket,
@@ -87,7 +88,7 @@ impl MemoryLine {
         Self { socket, stream: None }
     }
 
-    /// Waits for bytes of a host, across its connections. Cancel-safe.
+    /// Waits for bytes from a host, across connections. Cancel-safe.
     pub(super) async fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         loop {
             if let Some(stream) = &mut self.stream {
@@ -104,7 +105,7 @@ impl MemoryLine {
         }
     }
 
-    /// Writes what the pipe has room for; the rest is lost.
+    /// Writes as many bytes as the pipe can hold; the rest is lost.
     pub(super) fn write(&mut self, bytes: &[u8]) {
         if self.stream.is_none() {
             self.stream = self.socket.take_offered();

@@ -1,23 +1,23 @@
-//! What the mock tells the person who watches it.
+//! Messages of the mock for its console.
 
 use std::fmt;
 
 use super::faults::DeviceFault;
 
-/// A message for a person watching the mock.
+/// Message for the console of the mock.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Note {
-    /// The device booted with this nonce.
+    /// Boot of the device, with its nonce.
     Booted(u16),
-    /// The motor went home; the index was off by so many steps.
+    /// Homing of the motor, with the drift in steps.
     Homed(i32),
-    /// So many firings since boot.
+    /// Number of firings since power-up.
     Fired(u64),
-    /// The motor stopped on request, at this step.
+    /// Stop of the motor on request, with its step.
     Stopped(i32),
-    /// The coils were let go.
+    /// Release of the coils.
     CoilsReleased,
-    /// A fault was played.
+    /// Injected fault.
     Fault(DeviceFault),
 }
 

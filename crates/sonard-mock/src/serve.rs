@@ -1,4 +1,4 @@
-//! Runs the board on a pseudo-terminal or a port in memory, in real time or as fast as the host keeps up.
+//! Service loop of the board on a pseudo-terminal or an in-memory port, in real or virtual time.
 
 use std::{
     collections::VecDeque,
@@ -22,17 +22,17 @@ use super::{
     world::Soundings,
 };
 
-/// How often a lock left behind by a killed host is lifted.
-const LOCK_CHECK: Duration = Duration::from_millis(200);
-/// How long the port is away after a hangup.
-const HANGUP: Duration = Duration::from_millis(300);
+/// Interval at which a lock left behind by a killed host is cleared.
+const LOCK_CHECK_INTERVAL: Duration = Duration::from_millis(200);
+/// Time for which the port is unavailable after a hangup.
+const HANGUP_DURATION: Duration = Duration::from_millis(300);
 const TICK_HZ: u64 = firmware_protocol::messages::limits::TICK_HZ as u64;
 
-/// A board behind a port that hosts can open.
+/// Board on a port that hosts can open.
 #[derive(Debug)]
 pub struct MockPort {
     board: MockBoard,
-    line: Line,
+    line: BoardLine,
     epoch: Instant,
     epoch_ticks: u64,
     to_host: DelayedBytes,
@@ -41,9 +41,9 @@ pub struct MockPort {
     moves: Option<UnboundedReceiver<Soundings>>,
 }
 
-/// The board's side of the port.
+/// Board's side of the port.
 #[derive(Debug)]
-enum Line {
+enum BoardLine {
     /// Pseudo-terminal, with the symbolic link to it.
     Pty {
         pty: AsyncFd<Pty>,
@@ -52,8 +52,8 @@ enum Line {
     Memory(MemoryLine),
 }
 
-impl Line {
-    /// Waits for bytes of the host. Cancel-safe.
+impl BoardLine {
+    /// Waits for bytes from the host. Cancel-safe.
     async fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         match self {
             Self::Pty { pty, .. } => read_some(pty, buffer).await,
@@ -61,7 +61,7 @@ impl Line {
         }
     }
 
-    /// Writes without waiting: a serial line loses bytes that are not read, and so does a full pipe.
+    /// Writes without blocking. Like a serial line without a reader, a full pipe loses bytes.
     fn write(&mut self, bytes: &[u8]) -> io::Result<()> {
         match self {
             Self::Pty { pty, .. } => match pty.get_ref().write(bytes) {
@@ -75,28 +75,29 @@ impl Line {
         }
     }
 
-    /// Lifts a lock left behind by a killed host.
+    /// Clears a lock left behind by a killed host.
     fn clear_lock(&self) {
         if let Self::Pty { pty, .. } = self {
             pty.get_ref().clear_exclusive();
         }
     }
 
-    /// Takes the port away for [`HANGUP`] and returns it under the same name, as after an unplug.
+    /// Removes the port for [`HANGUP_DURATION`] and restores it under the same name, as when
+    /// replugged.
     async fn hang_up(&mut self) -> io::Result<()> {
         match self {
             Self::Pty { pty, link } => {
-                // The old pty has to be gone before its link can be created again.
+                // The old pty must be closed before its link can be created again.
                 let parked = open_watched(None)?;
                 drop(std::mem::replace(pty, parked));
-                sleep(HANGUP).await;
+                sleep(HANGUP_DURATION).await;
                 if let Some(link) = link.as_deref() {
                     *pty = open_watched(Some(link))?;
                 }
             }
             Self::Memory(line) => {
                 line.unplug();
-                sleep(HANGUP).await;
+                sleep(HANGUP_DURATION).await;
                 line.replug();
             }
         }
@@ -104,14 +105,14 @@ impl Line {
     }
 }
 
-/// One direction of the line, with bytes that are held back.
+/// Queue of delayed bytes in one direction of the line.
 #[derive(Debug, Default)]
 struct DelayedBytes {
     chunks: VecDeque<(Instant, Vec<u8>)>,
 }
 
 impl DelayedBytes {
-    /// Bytes never overtake bytes.
+    /// Appends bytes; the order is kept whatever the delays.
     fn push(&mut self, bytes: Vec<u8>, delay: Duration) {
         let earliest = self.chunks.back().map(|(at, _)| *at);
         let at = Instant::now() + delay;
@@ -132,19 +133,20 @@ impl MockPort {
     /// Opens the pty. Must be called within a tokio runtime.
     ///
     /// # Errors
-    /// What the system says; `AlreadyExists` if `link` is something else than a symbolic link.
+    /// Any system error; `AlreadyExists` if `link` exists and is not a link left by a mock.
     pub fn open(board: MockBoard, link: Option<&Path>) -> io::Result<Self> {
         let pty = open_watched(link)?;
-        Ok(Self::with_line(board, Line::Pty { pty, link: link.map(Path::to_path_buf) }))
+        Ok(Self::with_line(board, BoardLine::Pty { pty, link: link.map(Path::to_path_buf) }))
     }
 
-    /// Plugs the board into a port in memory. Must be called within a tokio runtime, whose clock may be paused.
+    /// Plugs the board into an in-memory port. Must be called within a tokio runtime, whose clock
+    /// may be paused.
     #[must_use]
     pub fn in_memory(board: MockBoard, socket: MemorySocket) -> Self {
-        Self::with_line(board, Line::Memory(MemoryLine::plug(socket)))
+        Self::with_line(board, BoardLine::Memory(MemoryLine::plug(socket)))
     }
 
-    fn with_line(board: MockBoard, line: Line) -> Self {
+    fn with_line(board: MockBoard, line: BoardLine) -> Self {
         Self {
             epoch: Instant::now(),
             epoch_ticks: board.now(),
@@ -152,31 +154,31 @@ impl MockPort {
             board,
             to_host: DelayedBytes::default(),
             to_board: DelayedBytes::default(),
-            lock_check: Instant::now() + LOCK_CHECK,
+            lock_check: Instant::now() + LOCK_CHECK_INTERVAL,
             moves: None,
         }
     }
 
-    /// The same board, carried from place to place: what comes is heard from then on, before any
-    /// byte that was sent after it.
+    /// Sets a channel of echoes for a board that is moved. A received table applies from then on,
+    /// and before any byte sent later.
     #[must_use]
     pub fn moved_by(self, moves: UnboundedReceiver<Soundings>) -> Self {
         Self { moves: Some(moves), ..self }
     }
 
-    /// Path of the pseudo-terminal for hosts; empty for a port in memory.
+    /// Path of the pseudo-terminal for hosts; empty for an in-memory port.
     #[must_use]
     pub fn path(&self) -> &Path {
         match &self.line {
-            Line::Pty { pty, .. } => pty.get_ref().path(),
-            Line::Memory(_) => Path::new(""),
+            BoardLine::Pty { pty, .. } => pty.get_ref().path(),
+            BoardLine::Memory(_) => Path::new(""),
         }
     }
 
-    /// Plays until `shutdown` is ready, handing what happens to `on_note`.
+    /// Runs the board until `shutdown` is ready, passing its messages to `on_note`.
     ///
     /// # Errors
-    /// When the pty fails.
+    /// If the pty fails.
     pub async fn run(
         mut self,
         shutdown: impl Future<Output = ()>,
@@ -195,7 +197,7 @@ impl MockPort {
             {
                 self.board.handle_bytes(&bytes);
             }
-            self.speak()?;
+            self.send()?;
             self.board.take_notes().into_iter().for_each(&mut on_note);
             if self.board.take_hangup() {
                 self.hang_up().await?;
@@ -203,28 +205,28 @@ impl MockPort {
             tokio::select! {
                 biased;
                 () = &mut shutdown => return self.drain().await,
-                heard = self.wait() => heard?,
+                waited = self.wait() => waited?,
             }
         }
     }
 
-    /// The device time that has come.
+    /// Present device time.
     fn due(&mut self) -> u64 {
         let real = self.epoch_ticks + ticks(self.epoch.elapsed());
         let Some(at) = self.jump().filter(|&at| at > real) else { return real };
-        // From the jump on, the host's patience is measured from here.
+        // After a jump, real time and with it the host's lease is measured from here.
         self.epoch = Instant::now();
         self.epoch_ticks = at;
         at
     }
 
-    /// The device time that virtual time may jump to.
+    /// Device time to which virtual time may jump.
     fn jump(&self) -> Option<u64> {
         let wake = self.board.next_wake().filter(|wake| wake.kind == WakeKind::Work)?;
         (self.board.pace() == Pace::Virtual).then_some(wake.at)
     }
 
-    /// Waits for bytes from the host or for the next thing to happen.
+    /// Waits for bytes from the host or for the next event.
     async fn wait(&mut self) -> io::Result<()> {
         let at = match self.jump() {
             Some(_) => Some(Instant::now()),
@@ -235,7 +237,7 @@ impl MockPort {
             if self.board.stalled() { None } else { lines.into_iter().flatten().min() };
         let wake_at = [at, stalled_lines].into_iter().flatten().fold(self.lock_check, Instant::min);
         let timer = async {
-            // A jump still gives the host's bytes their turn.
+            // Yields so that the host's bytes are processed before the jump.
             if wake_at <= Instant::now() {
                 tokio::task::yield_now().await;
             } else {
@@ -259,7 +261,7 @@ impl MockPort {
     fn check_lock(&mut self) {
         if self.lock_check <= Instant::now() {
             self.line.clear_lock();
-            self.lock_check = Instant::now() + LOCK_CHECK;
+            self.lock_check = Instant::now() + LOCK_CHECK_INTERVAL;
         }
     }
 
@@ -268,12 +270,12 @@ impl MockPort {
         self.epoch + Duration::from_nanos(ahead * (1_000_000_000 / TICK_HZ))
     }
 
-    fn speak(&mut self) -> io::Result<()> {
-        let mut said = Vec::new();
-        self.board.poll_transmit(&mut said);
-        if !said.is_empty() {
+    fn send(&mut self) -> io::Result<()> {
+        let mut bytes = Vec::new();
+        self.board.poll_transmit(&mut bytes);
+        if !bytes.is_empty() {
             let delay = Duration::from_millis(self.board.line_delay_ms().into());
-            self.to_host.push(said, delay);
+            self.to_host.push(bytes, delay);
         }
         while let Some(bytes) = self.to_host.pop_due() {
             self.line.write(&bytes)?;
@@ -287,9 +289,9 @@ impl MockPort {
         self.line.hang_up().await
     }
 
-    /// What is queued when the master closes is lost: lets the host read it first.
+    /// Waits until the host has read the queued bytes, which closing the master would discard.
     async fn drain(&mut self) -> io::Result<()> {
-        self.speak()?;
+        self.send()?;
         sleep(Duration::from_millis(20)).await;
         Ok(())
     }

@@ -1,6 +1,6 @@
 //! The board against the host machine, without a pty and in simulated time.
 
-mod lies;
+mod reply_faults;
 
 use firmware_protocol::{
     host::{Command, Host, HostConfig, HostEvent},
@@ -72,7 +72,7 @@ impl Bench {
         (self.board.now() - self.start_ticks) / TICKS_PER_US
     }
 
-    /// Runs a command to its end; the clock goes to whichever machine waits for less.
+    /// Runs a command to its end. The clock advances to the earlier timer of the two machines.
     fn run(&mut self, command: Command) {
         self.host.start(self.now_us(), command).expect("begins");
         self.exchange();
@@ -80,7 +80,7 @@ impl Bench {
             let host = self.host.poll_timeout();
             let host = host.map(|(_, at_us)| self.start_ticks + at_us * TICKS_PER_US);
             let board = self.board.next_wake().map(|wake| wake.at);
-            let next = host.into_iter().chain(board).min().expect("somebody waits");
+            let next = host.into_iter().chain(board).min().expect("a timer");
             self.board.advance(next.max(self.board.now()));
             let now_us = self.now_us();
             self.host.handle_timeout(now_us);
@@ -91,16 +91,16 @@ impl Bench {
     fn exchange(&mut self) {
         let now_us = self.now_us();
         loop {
-            let mut said = Vec::new();
-            self.board.poll_transmit(&mut said);
-            self.host.handle_bytes(now_us, &said);
-            let mut quiet = said.is_empty();
+            let mut sent = Vec::new();
+            self.board.poll_transmit(&mut sent);
+            self.host.handle_bytes(now_us, &sent);
+            let mut is_idle = sent.is_empty();
             while let Some(frame) = self.host.poll_transmit() {
                 self.board.handle_bytes(&frame);
-                quiet = false;
+                is_idle = false;
             }
             self.events.extend(std::iter::from_fn(|| self.host.poll_event()));
-            if quiet {
+            if is_idle {
                 return;
             }
         }
@@ -108,7 +108,7 @@ impl Bench {
 }
 
 #[test]
-fn a_sweep_takes_what_acoustics_and_motor_need_and_each_direction_has_its_echo() {
+fn sweep_duration_and_echoes() {
     let mut bench = Bench::new(FaultPlan::default());
     for command in [Command::Identify, Command::Configure(SETTINGS), Command::Home] {
         bench.run(command);
@@ -130,14 +130,14 @@ fn a_sweep_takes_what_acoustics_and_motor_need_and_each_direction_has_its_echo()
         assert_eq!(reading.echoes[..], [expected], "{reading:?}");
     }
     let span = readings[399].fired_ticks.wrapping_sub(readings[0].fired_ticks);
-    // 399 times: the window, a step of 10 ms and 5 ms of rest.
+    // 399 times: the window, a step of 10 ms and 5 ms of settling.
     let needed = 399.0 * (46_512.0 + 20_000.0 + 10_000.0);
     assert!((f64::from(span) / needed - 1.0).abs() < 0.002, "{span} ticks for {needed}");
     assert!(bench.board.take_notes().contains(&Note::Fired(400)));
 }
 
 #[test]
-fn jumps_in_time_never_use_up_the_patience_of_a_host_that_is_kept_waiting() {
+fn time_jumps_leave_half_the_lease() {
     let mut bench = Bench::new(FaultPlan::default());
     for command in [Command::Identify, Command::Configure(SETTINGS), Command::Home] {
         bench.run(command);
@@ -145,7 +145,7 @@ fn jumps_in_time_never_use_up_the_patience_of_a_host_that_is_kept_waiting() {
     bench.host.start(bench.now_us(), Command::Sweep(SWEEP)).expect("begins");
     bench.exchange();
     let began = bench.board.now();
-    // The host hears nothing more; the board may jump, but not over half of the lease.
+    // The host is not served any more; the board may jump by half of the lease at most.
     while let Some(wake) = bench.board.next_wake().filter(|wake| wake.kind == WakeKind::Work) {
         bench.board.advance(wake.at);
         bench.board.poll_transmit(&mut Vec::new());
@@ -155,19 +155,19 @@ fn jumps_in_time_never_use_up_the_patience_of_a_host_that_is_kept_waiting() {
 }
 
 #[test]
-fn a_restart_changes_the_nonce_and_ends_the_sweep() {
+fn restart_ends_the_sweep() {
     let mut bench = Bench::new("reset=0.05".parse().expect("a plan"));
     for command in [Command::Identify, Command::Configure(SETTINGS), Command::Home] {
         bench.run(command);
     }
     bench.run(Command::Sweep(SWEEP));
     assert!(bench.events.contains(&HostEvent::Rebooted { old: 7, new: 8 }), "{:?}", bench.events);
-    let ended_well =
+    let is_complete =
         |event: &HostEvent| matches!(event, HostEvent::SweepDone { end: SweepState::Complete, .. });
-    assert!(!bench.events.iter().any(ended_well));
+    assert!(!bench.events.iter().any(is_complete));
 }
 
-/// What every board must do, the mock does too.
+/// Conformance tests of all boards.
 mod conformance {
     use std::convert::Infallible;
 
@@ -192,9 +192,9 @@ mod conformance {
         }
 
         fn receive(&mut self) -> Vec<u8> {
-            let mut said = Vec::new();
-            self.poll_transmit(&mut said);
-            said
+            let mut sent = Vec::new();
+            self.poll_transmit(&mut sent);
+            sent
         }
 
         fn set_echoes(&mut self, after_us: &[f64]) {

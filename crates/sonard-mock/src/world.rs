@@ -1,6 +1,6 @@
-//! The world around the mock: where the motor really is, and what is heard there.
+//! Simulated environment of the mock: true motor position and echoes.
 //!
-//! Pure: no clock, no I/O; the same seed gives the same readings.
+//! Pure: no clock, no I/O; readings are determined by the seed.
 
 use rand::{RngExt as _, SeedableRng as _};
 use rand_pcg::Pcg64;
@@ -12,27 +12,27 @@ use sonard_model::{
 };
 use sonard_records::{PingStatus, ScanPlan};
 
-/// The model's readings in each direction of the motor.
+/// Predicted echoes for each motor step of a revolution.
 #[derive(Debug, Clone)]
 pub struct Soundings {
-    rows: Vec<Sounding>,
+    rows: Vec<EchoRow>,
 }
 
-/// What is heard in one direction.
+/// Predicted echoes at one motor step.
 #[derive(Debug, Clone, Default, PartialEq)]
-struct Sounding {
+struct EchoRow {
     echoes_us: SmallVec<[f64; 8]>,
-    /// The first one is timed by the end of blanking, not by an echo's arrival.
+    /// `true` if the first time is the end of blanking instead of an echo's arrival.
     first_is_blanking: bool,
 }
 
 impl Soundings {
-    /// Asks the model for every step of a revolution.
+    /// Computes the echoes for every step of a revolution.
     ///
-    /// `mounting_offset_deg`: how far the transducer is turned on the motor's shaft.
+    /// `mounting_offset_deg`: angle of the transducer on the motor's shaft.
     ///
     /// # Errors
-    /// When there are more paths than the model can find.
+    /// If the number of propagation paths exceeds the model's limit.
     pub fn of(
         simulator: &Simulator,
         pose: &Pose,
@@ -40,20 +40,20 @@ impl Soundings {
         mounting_offset_deg: f64,
     ) -> Result<Self, TooCostly> {
         let mounted = Pose { heading_deg: pose.heading_deg + mounting_offset_deg, ..*pose };
-        let turn =
+        let revolution =
             ScanPlan { step_deg: 360.0 / f64::from(steps_per_revolution), ..ScanPlan::default() };
         let point = simulator.at(mounted.position());
-        let ping = |stop| point.ping_rearmed(mounted.direction_rad(turn.azimuth_deg(stop)));
-        let predictions = (0..turn.stops()).map(ping).collect::<Result<Vec<_>, _>>()?;
+        let ping = |stop| point.ping_rearmed(mounted.direction_rad(revolution.azimuth_deg(stop)));
+        let predictions = (0..revolution.stops()).map(ping).collect::<Result<Vec<_>, _>>()?;
         Ok(Self::from_predictions(&predictions))
     }
 
-    /// One prediction for each step of a revolution, from azimuth 0 on.
+    /// Converts predictions for each step of a revolution, from azimuth 0 on.
     #[must_use]
     pub fn from_predictions(predictions: &[Prediction]) -> Self {
         let rows = predictions
             .iter()
-            .map(|prediction| Sounding {
+            .map(|prediction| EchoRow {
                 echoes_us: prediction.echoes_us.clone(),
                 first_is_blanking: prediction.status == PingStatus::MinRange,
             })
@@ -61,71 +61,71 @@ impl Soundings {
         Self { rows }
     }
 
-    fn at(&self, step: i32) -> Option<&Sounding> {
-        let turn = i32::try_from(self.rows.len()).ok().filter(|&turn| turn > 0)?;
-        self.rows.get(step.rem_euclid(turn) as usize)
+    fn at(&self, step: i32) -> Option<&EchoRow> {
+        let steps = i32::try_from(self.rows.len()).ok().filter(|&steps| steps > 0)?;
+        self.rows.get(step.rem_euclid(steps) as usize)
     }
 }
 
-/// Motor and air.
+/// Simulated motor and echoes.
 #[derive(Debug)]
 pub struct World {
     soundings: Soundings,
     noise: TofNoise,
     missed_step_rate: f64,
-    /// Where the motor really is, steps.
+    /// True position of the motor, steps.
     step: i32,
     rng: Pcg64,
 }
 
 impl World {
-    /// A world; the motor stands at home. `missed_step_rate`: probability for each move that it
-    /// falls one step short.
+    /// Creates a world with the motor at home. `missed_step_rate`: probability per move that it
+    /// ends one step short.
     #[must_use]
     pub fn new(soundings: Soundings, noise: TofNoise, missed_step_rate: f64, seed: u64) -> Self {
         let rng = Pcg64::seed_from_u64(seed);
         Self { soundings, noise, missed_step_rate: missed_step_rate.clamp(0.0, 1.0), step: 0, rng }
     }
 
-    /// Sounds otherwise from now on.
+    /// Replaces the echoes, for instance after a move of the robot.
     pub fn set_soundings(&mut self, soundings: Soundings) {
         self.soundings = soundings;
     }
 
-    /// Turns by so many commanded steps.
+    /// Turns the motor by a commanded number of steps.
     pub fn turn(&mut self, steps: i32) {
         let missed = steps != 0 && self.rng.random_bool(self.missed_step_rate);
         self.step += steps - if missed { steps.signum() } else { 0 };
     }
 
-    /// How far the motor really is from the index, steps.
+    /// True distance of the motor from the index, steps.
     #[must_use]
     pub const fn steps_from_index(&self) -> i32 {
         self.step
     }
 
-    /// Turns to the index and returns how far that was, steps.
+    /// Turns the motor to the index. Returns the true distance, steps.
     pub fn seek_index(&mut self) -> i32 {
         std::mem::take(&mut self.step)
     }
 
     /// Fires and returns the echo times after firing, ticks of `tick_hz`, within the window.
     pub fn fire(&mut self, window_ticks: u32, tick_hz: u32) -> SmallVec<[u32; 8]> {
-        let sounding = self.soundings.at(self.step).cloned().unwrap_or_default();
+        let row = self.soundings.at(self.step).cloned().unwrap_or_default();
         let ticks_per_us = f64::from(tick_hz) / 1e6;
-        let mut heard = SmallVec::new();
+        let mut echoes = SmallVec::new();
         let mut last = 0;
-        for (i, echo_us) in sounding.echoes_us.iter().enumerate() {
-            let blanking = i == 0 && sounding.first_is_blanking;
+        for (i, echo_us) in row.echoes_us.iter().enumerate() {
+            let blanking = i == 0 && row.first_is_blanking;
             let error_us = if blanking { 0.0 } else { self.noise.sample_us(&mut self.rng) };
-            // Noise never swaps two echoes, and none comes before the ranger fired.
+            // Noise neither swaps two echoes nor moves one before the firing.
             let ticks = (((echo_us + error_us) * ticks_per_us).round() as u32).max(last + 1);
             if ticks <= window_ticks {
-                heard.push(ticks);
+                echoes.push(ticks);
                 last = ticks;
             }
         }
-        heard
+        echoes
     }
 }
 
@@ -135,7 +135,7 @@ mod tests {
     use smallvec::smallvec;
 
     fn soundings() -> Soundings {
-        let row = |echoes_us: &[f64], first_is_blanking| Sounding {
+        let row = |echoes_us: &[f64], first_is_blanking| EchoRow {
             echoes_us: echoes_us.into(),
             first_is_blanking,
         };
@@ -149,10 +149,10 @@ mod tests {
     }
 
     #[test]
-    fn each_direction_has_its_echoes_and_a_turn_wraps() {
+    fn echoes_depend_on_direction() {
         let mut world = World::new(soundings(), TofNoise::NONE, 0.0, 1);
-        let heard: SmallVec<[u32; 8]> = smallvec![6000, 10_000];
-        assert_eq!(world.fire(20_000, 2_000_000), heard);
+        let echoes: SmallVec<[u32; 8]> = smallvec![6000, 10_000];
+        assert_eq!(world.fire(20_000, 2_000_000), echoes);
         world.turn(-2);
         assert_eq!(world.fire(20_000, 2_000_000)[..], [4760, 12_000]);
         world.turn(1);
@@ -162,7 +162,7 @@ mod tests {
     }
 
     #[test]
-    fn the_end_of_blanking_has_no_noise_and_a_seed_repeats() {
+    fn noise_spares_the_blanking() {
         let noise = TofNoise { sigma_us: 5.0, tail_share: 0.1, tail_us: 20.0 };
         let fire = |seed| {
             let mut world = World::new(soundings(), noise, 0.0, seed);
@@ -176,7 +176,7 @@ mod tests {
     }
 
     #[test]
-    fn missed_steps_show_at_the_index() {
+    fn missed_steps_appear_at_the_index() {
         let mut world = World::new(soundings(), TofNoise::NONE, 1.0, 1);
         for _ in 0..10 {
             world.turn(3);

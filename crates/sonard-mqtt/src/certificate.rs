@@ -1,4 +1,4 @@
-//! Errors of TLS, in words; a certificate may be valid and the clock unset.
+//! Messages for TLS errors, with a hint for an unset clock.
 
 use std::io;
 
@@ -8,11 +8,11 @@ use rumqttc::{
     tokio_rustls::rustls::{CertificateError, Error},
 };
 
-/// No clock that is set reads an earlier time than this program was released, seconds since 1970: 2026-01-01.
+/// Release time of this program, seconds since 1970 (2026-01-01): an earlier clock is unset.
 const RELEASED_S: i64 = 1_767_225_600;
 
-/// An error of TLS at this time of the computer's clock, in words that stay the same from try to try.
-pub(super) fn words(error: &TlsError, now: Timestamp) -> String {
+/// Describes a TLS error at a time of the computer's clock. Repeated attempts give the same text.
+pub(super) fn describe(error: &TlsError, now: Timestamp) -> String {
     let today = now.strftime("%Y-%m-%d");
     match certificate_error(error) {
         Some(CertificateError::NotValidYet | CertificateError::NotValidYetContext { .. }) => {
@@ -29,8 +29,8 @@ fn not_valid_yet(now: Timestamp) -> String {
     let today = now.strftime("%Y-%m-%d");
     if now.as_second() < RELEASED_S {
         return format!(
-            "its certificate is not valid yet because this computer's clock is not set ({today}): it is tried again until \
-             the clock is"
+            "its certificate is not valid yet because this computer's clock is not set ({today}): \
+             retrying until the clock is set"
         );
     }
     format!(
@@ -38,11 +38,11 @@ fn not_valid_yet(now: Timestamp) -> String {
     )
 }
 
-/// What is wrong with the broker's certificate, if that is the error.
+/// Extracts the error of the broker's certificate, if any.
 fn certificate_error(error: &TlsError) -> Option<&CertificateError> {
     let error = match error {
         TlsError::TLS(error) => error,
-        TlsError::Io(error) => within(error)?,
+        TlsError::Io(error) => inner_error(error)?,
         _ => return None,
     };
     match error {
@@ -51,7 +51,7 @@ fn certificate_error(error: &TlsError) -> Option<&CertificateError> {
     }
 }
 
-fn within(error: &io::Error) -> Option<&Error> {
+fn inner_error(error: &io::Error) -> Option<&Error> {
     let inner = error.get_ref()?;
     inner.downcast_ref().or_else(|| inner.source()?.downcast_ref())
 }
@@ -65,18 +65,18 @@ mod tests {
     }
 
     #[test]
-    fn a_certificate_of_the_future_blames_a_clock_that_is_not_set() {
+    fn unset_clock_is_named() {
         let not_yet = || Error::InvalidCertificate(CertificateError::NotValidYet);
         let wrapped = TlsError::Io(io::Error::new(io::ErrorKind::InvalidData, not_yet()));
         for error in [TlsError::TLS(not_yet()), wrapped] {
-            let unset = words(&error, at(3600));
+            let unset = describe(&error, at(3600));
             assert!(unset.contains("clock is not set (1970-01-01)"), "{unset}");
-            let set = words(&error, at(RELEASED_S + 3600));
+            let set = describe(&error, at(RELEASED_S + 3600));
             assert!(set.contains("compare the clocks") && !set.contains("not set"), "{set}");
         }
         let expired = TlsError::TLS(Error::InvalidCertificate(CertificateError::Expired));
-        assert!(words(&expired, at(RELEASED_S)).contains("expired"));
+        assert!(describe(&expired, at(RELEASED_S)).contains("expired"));
         let other = TlsError::TLS(Error::InvalidCertificate(CertificateError::UnknownIssuer));
-        assert!(words(&other, at(0)).starts_with("TLS: "));
+        assert!(describe(&other, at(0)).starts_with("TLS: "));
     }
 }

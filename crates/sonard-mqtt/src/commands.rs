@@ -1,4 +1,4 @@
-//! Commands that come through the broker: read and checked as the HTTP API does, carried out one after the other.
+//! Commands received from the broker: validated like requests of the HTTP API, executed in order.
 
 use std::collections::VecDeque;
 
@@ -8,23 +8,22 @@ use sonard_api::{Problem, ScanRequest, Strict, has_list};
 use sonard_daemon::{Handle, Order, Refusal};
 use tokio::task::JoinHandle;
 
-/// Commands that may wait while one is carried out.
-const MOST_WAITING: usize = 8;
-/// Longest body, bytes.
-const MOST_BODY_BYTES: usize = 4096;
-/// So much of a command's name is said again, characters.
-const MOST_NAME: usize = 32;
+/// Maximum number of queued commands.
+const MAX_WAITING: usize = 8;
+/// Maximum length of a body, bytes.
+const MAX_BODY_BYTES: usize = 4096;
+/// Maximum length of a command's name in a reply, characters.
+const MAX_NAME_CHARS: usize = 32;
 
-/// What was published as a command.
+/// Message received on a command topic.
 #[derive(Debug, Clone)]
-pub(super) struct Asked<'a> {
-    /// Its name: what the topic ends in.
+pub(super) struct ReceivedCommand<'a> {
+    /// Last level of the topic.
     pub(super) name: &'a str,
-    /// Its body.
     pub(super) body: &'a [u8],
-    /// Whether the broker kept it for who comes later.
+    /// Retain flag of the message.
     pub(super) is_retained: bool,
-    /// Whether it may have come before.
+    /// Duplicate flag of the message.
     pub(super) is_repeated: bool,
 }
 
@@ -35,26 +34,26 @@ enum Command {
 }
 
 impl Command {
-    fn read(asked: &Asked<'_>) -> Result<Self, Problem> {
-        if asked.is_retained {
+    fn parse(received: &ReceivedCommand<'_>) -> Result<Self, Problem> {
+        if received.is_retained {
             let help =
                 "publish it without the retain flag, and clear the topic (mosquitto_pub -r -n)";
-            return Err(problem("a retained command would be carried out again and again", help));
+            return Err(problem("a retained command would be executed repeatedly", help));
         }
-        if asked.is_repeated {
+        if received.is_repeated {
             return Err(problem(
-                "it is a repetition, and may be carried out already",
-                "send it anew",
+                "it is a repetition and may have been executed already",
+                "send it again",
             ));
         }
-        if asked.body.len() > MOST_BODY_BYTES {
-            let error = format!("the body has {} bytes", asked.body.len());
-            return Err(problem(&error, &format!("send at most {MOST_BODY_BYTES}")));
+        if received.body.len() > MAX_BODY_BYTES {
+            let error = format!("the body has {} bytes", received.body.len());
+            return Err(problem(&error, &format!("send at most {MAX_BODY_BYTES}")));
         }
-        match asked.name {
-            "start" => read_body(asked.body).map(Self::Start),
-            "stop" if matches!(asked.body, b"" | b"{}") => Ok(Self::Stop),
-            "stop" => Err(problem("stop takes nothing", "send an empty message, or {}")),
+        match received.name {
+            "start" => read_body(received.body).map(Self::Start),
+            "stop" if matches!(received.body, b"" | b"{}") => Ok(Self::Stop),
+            "stop" => Err(problem("stop has no parameters", "send an empty message, or {}")),
             _ => Err(problem("there is no such command", "start or stop")),
         }
     }
@@ -66,10 +65,12 @@ impl Command {
         }
     }
 
-    async fn carry_out(self, daemon: Handle) -> Result<Value, Problem> {
+    async fn execute(self, daemon: Handle) -> Result<Value, Problem> {
         let name = self.name();
         let done = match self {
-            Self::Start(asked) => daemon.start(asked).await.map(|started| Some(started.request)),
+            Self::Start(request) => {
+                daemon.start(request).await.map(|started| Some(started.request))
+            }
             Self::Stop => daemon.order(Order::Stop).await.map(|()| None),
         };
         match done {
@@ -81,11 +82,11 @@ impl Command {
 }
 
 fn read_body<T: DeserializeOwned>(body: &[u8]) -> Result<T, Problem> {
-    let help = "send JSON as of POST /v1/start: {} or {\"scans\": 1}";
+    let help = "send JSON as for POST /v1/start: {} or {\"scans\": 1}";
     let Strict(read) = serde_json::from_slice(body)
         .map_err(|error| problem(&format!("the body can't be read: {error}"), help))?;
     if serde_json::from_slice(body).is_ok_and(|value| has_list(&value)) {
-        return Err(problem("there is a list where an object is wanted", help));
+        return Err(problem("there is a list instead of an object", help));
     }
     Ok(read)
 }
@@ -94,57 +95,61 @@ fn problem(error: &str, help: &str) -> Problem {
     Problem { error: error.into(), help: help.into() }
 }
 
-/// What is said of a command that is refused.
-fn refused(name: &str, problem: &Problem) -> Value {
-    let name: String = name.chars().take(MOST_NAME).collect();
+/// Reply to a rejected command.
+fn rejection(name: &str, problem: &Problem) -> Value {
+    let name: String = name.chars().take(MAX_NAME_CHARS).collect();
     json!({"command": name, "accepted": false, "error": problem.error, "help": problem.help})
 }
 
-/// Who carries commands out, in the order that they came in.
+/// Queue of commands, executed in order.
 #[derive(Debug)]
-pub(super) struct Clerk {
+pub(super) struct CommandHandler {
     daemon: Handle,
     waiting: VecDeque<Command>,
-    at_work: Option<(&'static str, JoinHandle<Result<Value, Problem>>)>,
+    running: Option<(&'static str, JoinHandle<Result<Value, Problem>>)>,
 }
 
-impl Clerk {
+impl CommandHandler {
     pub(super) const fn new(daemon: Handle) -> Self {
-        Self { daemon, waiting: VecDeque::new(), at_work: None }
+        Self { daemon, waiting: VecDeque::new(), running: None }
     }
 
-    /// Takes a command in.
+    /// Queues a command.
     ///
     /// # Errors
-    /// What is answered at once, because it is refused.
-    pub(super) fn take(&mut self, asked: &Asked<'_>) -> Result<(), Value> {
-        let command = Command::read(asked).map_err(|problem| refused(asked.name, &problem))?;
-        if self.waiting.len() >= MOST_WAITING {
-            let many = problem("too many commands wait already", "wait for answers");
-            return Err(refused(asked.name, &many));
+    /// The reply to a rejected command.
+    pub(super) fn queue(&mut self, received: &ReceivedCommand<'_>) -> Result<(), Value> {
+        let command =
+            Command::parse(received).map_err(|problem| rejection(received.name, &problem))?;
+        if self.waiting.len() >= MAX_WAITING {
+            let many = problem("too many commands are queued", "wait for replies");
+            return Err(rejection(received.name, &many));
         }
-        tracing::info!("mqtt: {} is asked for", command.name());
+        tracing::info!("mqtt: received command {}", command.name());
         self.waiting.push_back(command);
         self.begin();
         Ok(())
     }
 
-    /// The answer to the next command that is done, and whether it was taken; never, if there is none. Cancel-safe.
+    /// Waits for the running command. Returns the reply, and `true` if the command was accepted;
+    /// pending forever if there is none. Cancel-safe.
     pub(super) async fn next(&mut self) -> (Value, bool) {
-        let Some((name, work)) = &mut self.at_work else { return std::future::pending().await };
+        let Some((name, work)) = &mut self.running else { return std::future::pending().await };
         let done = work.await;
         let name = *name;
-        self.at_work = None;
+        self.running = None;
         self.begin();
         match done {
             Ok(Ok(answer)) => (answer, true),
-            Ok(Err(problem)) => (refused(name, &problem), false),
-            Err(_) => (refused(name, &problem("it failed", "see what the daemon says")), false),
+            Ok(Err(problem)) => (rejection(name, &problem), false),
+            Err(_) => {
+                (rejection(name, &problem("the command failed", "see the daemon's log")), false)
+            }
         }
     }
 
     fn begin(&mut self) {
-        if self.at_work.is_none()
+        if self.running.is_none()
             && let Some(command) = self.waiting.pop_front()
         {
             let name = command.name();
@@ -152,8 +157,8 @@ impl Clerk {
                 clippy::disallowed_methods,
                 reason = "its end is awaited as the command's outcome"
             )]
-            let work = tokio::spawn(command.carry_out(self.daemon.clone()));
-            self.at_work = Some((name, work));
+            let work = tokio::spawn(command.execute(self.daemon.clone()));
+            self.running = Some((name, work));
         }
     }
 }
@@ -162,13 +167,13 @@ impl Clerk {
 mod tests {
     use super::*;
 
-    fn read(name: &str, body: &[u8]) -> Result<Command, Problem> {
-        Command::read(&Asked { name, body, is_retained: false, is_repeated: false })
+    fn parse(name: &str, body: &[u8]) -> Result<Command, Problem> {
+        Command::parse(&ReceivedCommand { name, body, is_retained: false, is_repeated: false })
     }
 
     #[test]
-    fn commands_are_read_as_the_api_reads_them() {
-        let right = |name, body| read(name, body).map_err(|problem| problem.error);
+    fn valid_commands_are_parsed() {
+        let right = |name, body| parse(name, body).map_err(|problem| problem.error);
         assert_eq!(right("start", b"{}"), Ok(Command::Start(ScanRequest::default())));
         let two = ScanRequest { scans: Some(2), ..ScanRequest::default() };
         assert_eq!(right("start", b" {\"scans\": 2}\n"), Ok(Command::Start(two)));
@@ -177,8 +182,8 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_command_is_refused_with_what_would_be_right() {
-        for (name, body, told) in [
+    fn invalid_commands_are_rejected() {
+        for (name, body, part) in [
             ("start", &b""[..], "can't be read"),
             ("start", b"now", "can't be read"),
             ("start", b"\xff\xfe", "can't be read"),
@@ -186,30 +191,32 @@ mod tests {
             ("start", b"{\"scans\": -1}", "can't be read"),
             ("start", b"{\"plan\": {\"from_deg\": 0}}", "missing field"),
             ("start", b"[1]", "list"),
-            ("stop", b"{\"now\": true}", "takes nothing"),
+            ("stop", b"{\"now\": true}", "no parameters"),
             ("reboot", b"{}", "no such command"),
             ("", b"{}", "no such command"),
         ] {
-            let refused = read(name, body).expect_err(name);
-            assert!(refused.error.contains(told), "{name} {body:?}: {}", refused.error);
-            assert!(!refused.help.is_empty());
+            let problem = parse(name, body).expect_err(name);
+            assert!(problem.error.contains(part), "{name} {body:?}: {}", problem.error);
+            assert!(!problem.help.is_empty());
         }
-        let huge = [b'['; MOST_BODY_BYTES + 1];
-        assert!(read("start", &huge).is_err_and(|refused| refused.error.contains("4097 bytes")));
+        let huge = [b'['; MAX_BODY_BYTES + 1];
+        assert!(parse("start", &huge).is_err_and(|problem| problem.error.contains("4097 bytes")));
         let long = "x".repeat(5000);
-        let said = refused(&long, &read(&long, b"").expect_err("none")).to_string();
-        assert!(said.len() < 200, "{said}");
+        let reply = rejection(&long, &parse(&long, b"").expect_err("none")).to_string();
+        assert!(reply.len() < 200, "{reply}");
     }
 
     #[test]
-    fn kept_and_repeated_commands_are_not_carried_out() {
-        let asked = |is_retained, is_repeated| Asked {
+    fn retained_and_repeated_are_rejected() {
+        let received = |is_retained, is_repeated| ReceivedCommand {
             name: "start",
             body: b"{}",
             is_retained,
             is_repeated,
         };
-        assert!(Command::read(&asked(true, false)).is_err_and(|p| p.help.contains("retain")));
-        assert!(Command::read(&asked(false, true)).is_err_and(|p| p.error.contains("repetition")));
+        assert!(Command::parse(&received(true, false)).is_err_and(|p| p.help.contains("retain")));
+        assert!(
+            Command::parse(&received(false, true)).is_err_and(|p| p.error.contains("repetition"))
+        );
     }
 }

@@ -1,4 +1,4 @@
-//! A connection to the broker: a client whose events are driven by a task of their own.
+//! Connection to the broker: a client with a separate task for its event loop.
 
 use std::{future::Future, io, pin::Pin, time::Duration};
 
@@ -15,114 +15,114 @@ use tokio::{
     time::{Instant, timeout},
 };
 
-use super::{account::Account, certificate, diagnosis::Sending, topics::Kind};
+use super::{certificate, credentials::Account, diagnosis::SentMessage, topics::MessageKind};
 
-/// News that may wait to be taken in.
-const NEWS: usize = 16;
-/// What else than acknowledgements a broker may send in a second.
-const MOST_A_SECOND: u32 = 100;
-/// How long the end of a connection may take.
-const GOODBYE: Duration = Duration::from_secs(1);
+/// Capacity of the event channel.
+const EVENT_CAPACITY: usize = 16;
+/// Maximum rate of messages from the broker, except acknowledgements.
+const MAX_MESSAGES_PER_S: u32 = 100;
+/// Time allowed for an orderly disconnection.
+const CLOSE_TIMEOUT: Duration = Duration::from_secs(1);
 
-/// What came from the broker.
+/// Event of a connection.
 #[derive(Debug)]
-pub(super) enum News {
-    /// It knows this client.
+pub(super) enum BrokerEvent {
+    /// The broker accepted the connection.
     Connected,
-    /// A command.
+    /// The broker forwarded a message on a subscribed topic.
     Published(Publish),
-    /// It has what was sent.
-    Acknowledged(Sending),
-    /// Whether commands will come.
+    /// The broker acknowledged a message.
+    Acknowledged(SentMessage),
+    /// The broker granted (`true`) or denied the subscription.
     Subscribed(bool),
-    /// The connection is over.
-    Lost(Loss),
+    /// The connection ended.
+    Lost(Disconnection),
 }
 
-/// The end of a connection.
+/// End of a connection.
 #[derive(Debug)]
-pub(super) struct Loss {
-    /// The reason, as far as it is known.
-    pub(super) why: String,
-    /// Whether the broker has closed it without a word.
+pub(super) struct Disconnection {
+    /// Description of the cause, as far as known.
+    pub(super) reason: String,
+    /// `true` if the broker closed the connection without a reason.
     pub(super) by_broker: bool,
 }
 
-impl From<String> for Loss {
-    fn from(why: String) -> Self {
-        Self { why, by_broker: false }
+impl From<String> for Disconnection {
+    fn from(reason: String) -> Self {
+        Self { reason, by_broker: false }
     }
 }
 
-type Acknowledgement = Pin<Box<dyn Future<Output = Option<News>> + Send>>;
+type Acknowledgement = Pin<Box<dyn Future<Output = Option<BrokerEvent>> + Send>>;
 
-/// A connection, from the first try to reach the broker to its end.
+/// Connection from the first attempt to reach the broker to its end.
 pub(super) struct Connection {
     client: AsyncClient,
-    news: mpsc::Receiver<News>,
+    news: mpsc::Receiver<BrokerEvent>,
     pump: JoinHandle<()>,
-    under_way: FuturesUnordered<Acknowledgement>,
+    in_flight: FuturesUnordered<Acknowledgement>,
 }
 
 impl Connection {
-    /// Begins to reach the broker.
+    /// Starts connecting to the broker.
     pub(super) fn open(account: &Account) -> Result<Self, String> {
         let options = account.options();
         let capacity = options.request_channel_capacity();
         let built = AsyncClient::builder(options).capacity(capacity).try_build();
         let (client, events) = built.map_err(|error| error.to_string())?;
-        let (sender, news) = mpsc::channel(NEWS);
+        let (sender, news) = mpsc::channel(EVENT_CAPACITY);
         #[allow(clippy::disallowed_methods, reason = "its end closes the channel of news")]
         let pump = tokio::spawn(pump(events, sender));
-        Ok(Self { client, news, pump, under_way: FuturesUnordered::new() })
+        Ok(Self { client, news, pump, in_flight: FuturesUnordered::new() })
     }
 
-    /// Hands a message over; the broker keeps it if its kind is kept.
+    /// Queues a message for sending, with the retain flag of its kind.
     pub(super) fn send(
         &self,
         topic: String,
-        sending: Sending,
+        sending: SentMessage,
         payload: Bytes,
     ) -> Result<(), String> {
-        let is_retained = sending.kind.is_some_and(Kind::is_retained);
+        let is_retained = sending.kind.is_some_and(MessageKind::is_retained);
         let options = PublishOptions::new(QoS::AtLeastOnce).retain(is_retained);
         let notice = match self.client.try_publish_tracked(topic, payload, options) {
             Ok(notice) => notice,
-            // Why it is over is among the news.
+            // The cause of the disconnection arrives as an event.
             Err(ClientError::RequestChannelDisconnected(_)) => return Ok(()),
             Err(error) => return Err(error.to_string()),
         };
-        // Without an acknowledgement there is news of the connection's end.
-        self.under_way.push(Box::pin(async move {
-            notice.wait_async().await.ok().map(|_| News::Acknowledged(sending))
+        // Without an acknowledgement an event reports the end of the connection.
+        self.in_flight.push(Box::pin(async move {
+            notice.wait_async().await.ok().map(|_| BrokerEvent::Acknowledged(sending))
         }));
         Ok(())
     }
 
-    /// Asks for commands.
+    /// Subscribes to a topic filter.
     pub(super) fn subscribe(&self, filter: String) -> Result<(), String> {
         let notice = self.client.try_subscribe_tracked(filter, QoS::AtLeastOnce);
         let notice = notice.map_err(|error| error.to_string())?;
-        self.under_way.push(Box::pin(async move {
-            Some(News::Subscribed(notice.wait_completion_async().await.is_ok()))
+        self.in_flight.push(Box::pin(async move {
+            Some(BrokerEvent::Subscribed(notice.wait_completion_async().await.is_ok()))
         }));
         Ok(())
     }
 
-    /// Whether something is sent that is not acknowledged.
+    /// Returns `true` while a message is unacknowledged.
     pub(super) fn is_waiting(&self) -> bool {
-        !self.under_way.is_empty()
+        !self.in_flight.is_empty()
     }
 
-    /// What comes next. Cancel-safe.
-    pub(super) async fn next(&mut self) -> News {
+    /// Waits for the next event. Cancel-safe.
+    pub(super) async fn next(&mut self) -> BrokerEvent {
         loop {
             tokio::select! {
                 news = self.news.recv() => {
-                    let over = || News::Lost(Loss::from("the connection is over".to_owned()));
+                    let over = || BrokerEvent::Lost(Disconnection::from("the connection is over".to_owned()));
                     return news.unwrap_or_else(over);
                 }
-                Some(done) = self.under_way.next() => {
+                Some(done) = self.in_flight.next() => {
                     if let Some(news) = done {
                         return news;
                     }
@@ -131,11 +131,11 @@ impl Connection {
         }
     }
 
-    /// Ends it in order, if the broker does its part.
+    /// Disconnects in an orderly way, if the broker cooperates in time.
     pub(super) async fn close(mut self) {
         if self.client.try_disconnect().is_ok() {
-            let over = async { while !matches!(self.next().await, News::Lost(_)) {} };
-            drop(timeout(GOODBYE, over).await);
+            let over = async { while !matches!(self.next().await, BrokerEvent::Lost(_)) {} };
+            drop(timeout(CLOSE_TIMEOUT, over).await);
         }
     }
 }
@@ -146,11 +146,11 @@ impl Drop for Connection {
     }
 }
 
-/// Drives a client until its connection is over.
-async fn pump(mut events: EventLoop, news: mpsc::Sender<News>) {
+/// Runs the client's event loop until the connection ends.
+async fn pump(mut events: EventLoop, news: mpsc::Sender<BrokerEvent>) {
     let (mut second, mut came) = (Instant::now(), 0);
     loop {
-        let told = match events.poll().await {
+        let event = match events.poll().await {
             Ok(Event::Incoming(Incoming::PubAck(_)) | Event::Outgoing(_)) => continue,
             Ok(Event::Incoming(incoming)) => {
                 if second.elapsed() > Duration::from_secs(1) {
@@ -158,47 +158,52 @@ async fn pump(mut events: EventLoop, news: mpsc::Sender<News>) {
                 }
                 came += 1;
                 match incoming {
-                    _ if came > MOST_A_SECOND => News::Lost(Loss::from(format!(
-                        "it sends more than {MOST_A_SECOND} messages a second"
-                    ))),
-                    Incoming::ConnAck(_) => News::Connected,
-                    Incoming::Publish(publish) => News::Published(publish),
+                    _ if came > MAX_MESSAGES_PER_S => BrokerEvent::Lost(Disconnection::from(
+                        format!("it sends more than {MAX_MESSAGES_PER_S} messages per second"),
+                    )),
+                    Incoming::ConnAck(_) => BrokerEvent::Connected,
+                    Incoming::Publish(publish) => BrokerEvent::Published(publish),
                     _ => continue,
                 }
             }
-            Err(error) => News::Lost(Loss { why: words(&error), by_broker: is_close(&error) }),
+            Err(error) => BrokerEvent::Lost(Disconnection {
+                reason: describe(&error),
+                by_broker: is_close(&error),
+            }),
         };
-        let is_over = matches!(told, News::Lost(_));
-        if news.send(told).await.is_err() || is_over {
+        let is_over = matches!(event, BrokerEvent::Lost(_));
+        if news.send(event).await.is_err() || is_over {
             return;
         }
     }
 }
 
-/// Why a connection is over, and what a person can do about it.
-fn words(error: &ConnectionError) -> String {
+/// Describes the cause of a disconnection, with a remedy if there is one.
+fn describe(error: &ConnectionError) -> String {
     match error {
         ConnectionError::ConnectionRefused(
             ConnectReturnCode::BadUserNamePassword | ConnectReturnCode::NotAuthorized,
-        ) => "it refuses user or password: see mqtt.user and mqtt.password_file".into(),
+        ) => "it refuses user or password: check mqtt.user and mqtt.password_file".into(),
         ConnectionError::ConnectionRefused(code) => format!("it refuses the connection: {code:?}"),
         ConnectionError::Io(error)
         | ConnectionError::MqttState(
             StateError::Io(error) | StateError::Deserialization(rumqttc::Error::Io(error)),
-        ) => words_of_io(error),
-        ConnectionError::NetworkTimeout => "it does not answer".into(),
-        ConnectionError::FlushTimeout => "it takes nothing".into(),
+        ) => describe_io(error),
+        ConnectionError::NetworkTimeout => "it does not respond".into(),
+        ConnectionError::FlushTimeout => "it does not read".into(),
         ConnectionError::MqttState(StateError::ConnectionAborted) => {
             "it closed the connection".into()
         }
-        ConnectionError::MqttState(StateError::AwaitPingResp) => "it shows no sign of life".into(),
-        ConnectionError::MqttState(error) => format!("what it sends makes no sense: {error}"),
-        ConnectionError::Tls(error) => certificate::words(error, Timestamp::now()),
+        ConnectionError::MqttState(StateError::AwaitPingResp) => {
+            "it does not respond to pings".into()
+        }
+        ConnectionError::MqttState(error) => format!("protocol error: {error}"),
+        ConnectionError::Tls(error) => certificate::describe(error, Timestamp::now()),
         other => other.to_string(),
     }
 }
 
-/// Whether the broker has closed the connection without a word.
+/// Returns `true` if the broker closed the connection without a reason.
 fn is_close(error: &ConnectionError) -> bool {
     match error {
         ConnectionError::Io(error)
@@ -218,9 +223,9 @@ const fn is_close_of_io(kind: io::ErrorKind) -> bool {
     )
 }
 
-fn words_of_io(error: &io::Error) -> String {
+fn describe_io(error: &io::Error) -> String {
     match error.kind() {
-        io::ErrorKind::ConnectionRefused => "nobody listens there".into(),
+        io::ErrorKind::ConnectionRefused => "connection refused".into(),
         kind if is_close_of_io(kind) => "it closed the connection".into(),
         _ => error.to_string(),
     }

@@ -1,77 +1,84 @@
-//! Why a broker ends connections that it has accepted, and which messages it does not take.
+//! Diagnosis of disconnections by the broker, and of the messages that it rejects.
 //!
-//! MQTT 3.1.1 has no reason codes: a broker that objects to a message closes the connection. Pure: the diagnosis is
-//! given what was under way each time. After such a loss messages are sent one at a time, so that the next loss names
-//! its message; one that is lost twice by itself is not sent again, if the broker takes others.
+//! MQTT 3.1.1 has no reason codes: a broker that rejects a message closes the connection. After
+//! such a disconnection messages are sent one at a time, so that the next one identifies its
+//! message. A message that is alone in flight at two disconnections is not sent again, if the
+//! broker accepts others. Pure: the caller reports the messages in flight.
 
 use std::time::Duration;
 
 use super::{
-    topics::{Kind, Topics},
-    window::MOST_UNDER_WAY,
+    in_flight::MAX_IN_FLIGHT,
+    topics::{MessageKind, Topics},
 };
 
-/// Losses of one message by itself until it is given up.
-const STRIKES: u8 = 2;
-/// Losses in a row without a message to blame until another client is suspected.
-const UNEXPLAINED: u8 = 4;
-/// A connection that lasts so long ends such a row.
-pub(super) const STEADY: Duration = Duration::from_secs(120);
+/// Number of disconnections with a single message in flight until the message is dropped.
+const MAX_STRIKES: u8 = 2;
+/// Number of consecutive unexplained disconnections until a duplicate client is suspected.
+const MAX_UNEXPLAINED: u8 = 4;
+/// Duration of a connection that ends such a sequence.
+pub(super) const STABLE_AFTER: Duration = Duration::from_secs(120);
 
-/// A message that is under way.
+/// Message in flight.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Sending {
-    /// Number of the record, if it is one.
+pub(super) struct SentMessage {
+    /// Sequence number, if the message is a record.
     pub(super) record: Option<u64>,
-    /// Its kind; `None` for the subscription to commands.
-    pub(super) kind: Option<Kind>,
-    /// Length of its payload.
+    /// MessageKind of the message; `None` for the subscription to commands.
+    pub(super) kind: Option<MessageKind>,
+    /// Length of the payload.
     pub(super) bytes: usize,
 }
 
-/// The finding after a connection has ended.
+/// Finding after the end of a connection.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Finding {
-    /// None yet.
+    /// No cause is identified yet.
     Open,
-    /// The broker takes nothing at all, or another client has the same id: nothing is left out.
+    /// The broker rejects everything, or another client has the same id: no message is dropped.
     Cause(Cause),
-    /// The broker does not take this message.
-    Refused(Sending, Cause),
+    /// The broker rejects a message, which is dropped.
+    Rejected(SentMessage, Cause),
 }
 
-/// A cause of repeated losses.
+/// Cause of repeated disconnections.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Cause {
-    /// Messages of so many bytes and more, which is more than any that the broker has taken.
+    /// Messages of this size in bytes or larger; the broker accepted only smaller ones.
     Size(usize),
-    /// Messages of this kind, none of which the broker has taken.
-    Kind(Option<Kind>),
-    /// This message, although others of its size and kind were taken.
+    /// Messages of this kind, none of which the broker accepted.
+    Kind(Option<MessageKind>),
+    /// A single message, although others of the same size and kind were accepted.
     Message,
-    /// Every message, from the first on.
+    /// All messages, from the first on.
     Everything,
-    /// No message: the broker ends connections that work.
+    /// No message: the broker closes working connections.
     OtherClient,
 }
 
 impl Cause {
-    /// The cause in words; `kind` is that of the message that showed it.
+    /// Describes the cause, with a remedy. `kind` is the kind of the rejected message.
     #[must_use]
-    pub(super) fn words(self, kind: Option<Kind>, topics: &Topics, client_id: &str) -> String {
-        let topic =
-            |kind: Option<Kind>| kind.map_or_else(|| topics.commands(), |kind| topics.of(kind));
+    pub(super) fn describe(
+        self,
+        kind: Option<MessageKind>,
+        topics: &Topics,
+        client_id: &str,
+    ) -> String {
+        let topic = |kind: Option<MessageKind>| {
+            kind.map_or_else(|| topics.commands(), |kind| topics.topic_for(kind))
+        };
         match self {
             Self::Size(bytes) => format!(
-                "the broker closes the connection at messages of {bytes} bytes and more: raise its limit for the size \
-                 of messages (mosquitto: max_packet_size)"
+                "the broker closes the connection at messages of {bytes} bytes and more: raise its \
+                 maximum message size (mosquitto: max_packet_size)"
             ),
             Self::Kind(kind) => format!(
                 "the broker closes the connection at every message for {}: permit this client to use that topic",
                 topic(kind)
             ),
             Self::Message => format!(
-                "the broker closes the connection at one message to {}: see the broker's log",
+                "the broker closes the connection at a message to {}: see the broker's log",
                 topic(kind)
             ),
             Self::Everything => format!(
@@ -79,105 +86,110 @@ impl Cause {
                 topics.all()
             ),
             Self::OtherClient => format!(
-                "the broker keeps closing connections that work: probably another client uses the id {client_id} (give \
-                 each daemon a fleet.robot of its own); otherwise see the broker's log"
+                "the broker keeps closing working connections: probably another client uses the id \
+                 {client_id} (set a different fleet.robot for each daemon); otherwise see the \
+                 broker's log"
             ),
         }
     }
 }
 
-/// Memory of losses, from connection to connection.
+/// State of the diagnosis across connections.
 #[derive(Debug, Default)]
 pub(super) struct Diagnosis {
-    /// Messages to be sent one at a time from now on.
+    /// Number of further messages to send one at a time.
     careful: usize,
-    /// Messages under way.
+    /// Number of messages in flight.
     waiting: usize,
-    /// The message under way, if it is the only one.
-    alone: Option<Sending>,
-    struck: Option<(Sending, u8)>,
-    /// Whether the broker has taken a message on this connection.
-    has_taken: bool,
-    /// Largest payload, and kinds, that it has taken at all.
-    taken_bytes: usize,
-    taken_kinds: Vec<Option<Kind>>,
-    /// Least payload that it does not take.
+    /// Message in flight, if it is the only one.
+    alone: Option<SentMessage>,
+    /// Message that was alone in flight at the latest disconnections, and their number.
+    suspect: Option<(SentMessage, u8)>,
+    /// `true` if the broker acknowledged a message on this connection.
+    has_accepted: bool,
+    /// Maximum accepted payload on any connection, bytes.
+    accepted_bytes: usize,
+    /// Kinds of message accepted on any connection.
+    accepted_kinds: Vec<Option<MessageKind>>,
+    /// Minimum rejected payload, bytes.
     limit_bytes: Option<usize>,
-    denied: Vec<Option<Kind>>,
+    denied: Vec<Option<MessageKind>>,
     unexplained: u8,
 }
 
 impl Diagnosis {
-    /// Whether a message may be sent while others are under way.
+    /// Returns `true` if a message may be sent while others are in flight.
     #[must_use]
     pub(super) const fn allows_many(&self) -> bool {
         self.careful == 0
     }
 
-    /// Why such a message is not sent at all, if so.
+    /// Returns the cause for which such a message is not sent, if any.
     #[must_use]
-    pub(super) fn refuses(&self, kind: Option<Kind>, bytes: usize) -> Option<Cause> {
+    pub(super) fn rejects(&self, kind: Option<MessageKind>, bytes: usize) -> Option<Cause> {
         if self.denied.contains(&kind) {
             return Some(Cause::Kind(kind));
         }
         self.limit_bytes.filter(|limit| bytes >= *limit).map(Cause::Size)
     }
 
-    /// Whether there are messages that are not sent at all.
+    /// Returns `true` if some messages are not sent.
     #[must_use]
-    pub(super) const fn leaves_out(&self) -> bool {
+    pub(super) const fn rejects_any(&self) -> bool {
         self.limit_bytes.is_some() || !self.denied.is_empty()
     }
 
-    /// This is under way from now on.
-    pub(super) fn sent(&mut self, sending: Sending) {
+    /// Notes a sent message.
+    pub(super) fn sent(&mut self, sending: SentMessage) {
         self.alone = (self.waiting == 0).then_some(sending);
         self.waiting += 1;
     }
 
-    /// The broker has this message.
-    pub(super) fn acknowledged(&mut self, sending: Sending) {
-        self.has_taken = true;
-        self.taken_bytes = self.taken_bytes.max(sending.bytes);
-        if !self.taken_kinds.contains(&sending.kind) {
-            self.taken_kinds.push(sending.kind);
+    /// Notes an acknowledged message.
+    pub(super) fn acknowledged(&mut self, sending: SentMessage) {
+        self.has_accepted = true;
+        self.accepted_bytes = self.accepted_bytes.max(sending.bytes);
+        if !self.accepted_kinds.contains(&sending.kind) {
+            self.accepted_kinds.push(sending.kind);
         }
-        if self.struck.is_some_and(|(struck, _)| struck == sending) {
-            self.struck = None;
+        if self.suspect.is_some_and(|(suspect, _)| suspect == sending) {
+            self.suspect = None;
         }
         self.waiting = self.waiting.saturating_sub(1);
         self.careful = self.careful.saturating_sub(1);
         self.alone = self.alone.filter(|alone| *alone != sending);
     }
 
-    /// The broker was not reached, or did not accept the connection: what it takes may be different afterwards.
+    /// Resets the diagnosis after a failed connection attempt: the broker's limits may have
+    /// changed.
     pub(super) fn not_accepted(&mut self) {
         *self = Self::default();
     }
 
-    /// The connection has ended `after` this time; `by_broker` if the broker has closed it.
+    /// Evaluates the end of a connection after the duration `after`; `by_broker` if the broker
+    /// closed it.
     pub(super) fn ended(&mut self, by_broker: bool, after: Duration) -> Finding {
         let (waiting, alone) = (std::mem::take(&mut self.waiting), self.alone.take());
-        let has_taken = std::mem::take(&mut self.has_taken);
-        if after >= STEADY {
+        let has_accepted = std::mem::take(&mut self.has_accepted);
+        if after >= STABLE_AFTER {
             self.unexplained = 0;
         }
         if !by_broker {
             return Finding::Open;
         }
         if waiting > 0 {
-            self.careful = MOST_UNDER_WAY;
+            self.careful = MAX_IN_FLIGHT;
         }
-        let strikes = match (alone, self.struck) {
-            (Some(alone), Some((struck, strikes))) if alone == struck => strikes + 1,
+        let strikes = match (alone, self.suspect) {
+            (Some(alone), Some((suspect, strikes))) if alone == suspect => strikes + 1,
             (Some(_), _) => 1,
             (None, _) => 0,
         };
-        self.struck = alone.map(|alone| (alone, strikes));
-        match alone.filter(|_| strikes >= STRIKES) {
-            Some(alone) if has_taken => self.refuse(alone),
-            Some(alone) if alone.kind == Some(Kind::Online) => {
-                // The first of all; the next one tells whether it is the only one.
+        self.suspect = alone.map(|alone| (alone, strikes));
+        match alone.filter(|_| strikes >= MAX_STRIKES) {
+            Some(alone) if has_accepted => self.reject(alone),
+            Some(alone) if alone.kind == Some(MessageKind::Online) => {
+                // The first message; the next one shows whether it is the only rejected one.
                 self.denied.push(alone.kind);
                 Finding::Cause(Cause::Everything)
             }
@@ -185,11 +197,11 @@ impl Diagnosis {
                 self.denied.clear();
                 Finding::Cause(Cause::Everything)
             }
-            // Nothing worked that could be ended.
-            None if !has_taken => Finding::Open,
+            // The connection never worked.
+            None if !has_accepted => Finding::Open,
             None => {
                 self.unexplained = self.unexplained.saturating_add(1);
-                match self.unexplained >= UNEXPLAINED {
+                match self.unexplained >= MAX_UNEXPLAINED {
                     true => Finding::Cause(Cause::OtherClient),
                     false => Finding::Open,
                 }
@@ -197,20 +209,20 @@ impl Diagnosis {
         }
     }
 
-    fn refuse(&mut self, sending: Sending) -> Finding {
-        let Sending { kind, bytes, .. } = sending;
-        let cause = if bytes > self.taken_bytes {
+    fn reject(&mut self, sending: SentMessage) -> Finding {
+        let SentMessage { kind, bytes, .. } = sending;
+        let cause = if bytes > self.accepted_bytes {
             let limit = self.limit_bytes.map_or(bytes, |limit| limit.min(bytes));
             self.limit_bytes = Some(limit);
             Cause::Size(limit)
-        } else if self.taken_kinds.contains(&kind) {
+        } else if self.accepted_kinds.contains(&kind) {
             Cause::Message
         } else {
             self.denied.push(kind);
             Cause::Kind(kind)
         };
-        (self.struck, self.careful, self.unexplained) = (None, 0, 0);
-        Finding::Refused(sending, cause)
+        (self.suspect, self.careful, self.unexplained) = (None, 0, 0);
+        Finding::Rejected(sending, cause)
     }
 }
 

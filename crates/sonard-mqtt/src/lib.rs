@@ -1,24 +1,25 @@
-//! Records to an MQTT broker.
+//! Publication of log records to an MQTT broker.
 //!
-//! They come from the log and not from the hub: what the broker has not acknowledged is in the log, whatever
-//! happens to daemon, broker or line. [`window`](Window) knows what is under way and which place of the log is to be
-//! remembered, `diagnosis` which messages a broker does not take; both are pure. The courier owns the client.
+//! Records are read from the log instead of the live broadcast: a record that is not acknowledged
+//! stays in the log, whatever happens to daemon, broker or connection. [`InFlightQueue`] tracks the
+//! messages in flight and the log position to checkpoint, `diagnosis` the messages that the broker
+//! rejects; both are pure. The publisher owns the client.
 #![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 #![warn(clippy::expect_used, clippy::indexing_slicing, clippy::panic)]
 
-mod account;
-mod bookmark;
+mod backoff;
 mod certificate;
+mod checkpoint;
 mod commands;
 mod connection;
-mod courier;
+mod credentials;
 mod diagnosis;
-mod log_side;
-mod patience;
+mod in_flight;
+mod log_worker;
+mod publisher;
 mod status;
 mod tail;
 mod topics;
-mod window;
 
 use std::{io, path::Path, time::Duration};
 
@@ -30,16 +31,16 @@ use sonard_runtime::supervisor::Task;
 use tokio::{task::JoinHandle, time::Instant};
 use tokio_util::sync::CancellationToken;
 
-pub use account::{Account, AccountError};
-pub use topics::{Kind, Topics};
-pub use window::{LogPosition, MOST_UNDER_WAY, Message, Read, Window};
+pub use credentials::{Account, AccountError};
+pub use in_flight::{InFlightQueue, LogLine, LogPosition, MAX_IN_FLIGHT, RecordMessage};
+pub use topics::{MessageKind, Topics};
 
-use courier::{Courier, Troubles};
 use diagnosis::Diagnosis;
-use log_side::LogSide;
+use log_worker::LogWorker;
+use publisher::{Faults, Publisher};
 use tail::Tail;
 
-/// The task that brings records to the broker, to be stopped at the end.
+/// Handle of the publishing task.
 #[derive(Debug)]
 pub struct Mqtt {
     stop: CancellationToken,
@@ -47,11 +48,13 @@ pub struct Mqtt {
 }
 
 impl Mqtt {
-    /// Begins to bring the records of the logs in `folder` to the broker of `account`. Must be called within a
-    /// multi-threaded tokio runtime, once the log is open and before the daemon runs.
+    /// Starts publishing the records of the logs in `folder` to the broker of `account`.
+    ///
+    /// Must be called within a multi-threaded tokio runtime, once the log is open and before the
+    /// daemon runs.
     ///
     /// # Errors
-    /// When the logs can't be read.
+    /// If the logs can't be read.
     pub fn start(
         account: Account,
         keys: &MqttKeys,
@@ -59,10 +62,10 @@ impl Mqtt {
         daemon: Handle,
         folder: &Path,
     ) -> io::Result<Self> {
-        let (tail, changed) = Tail::open(folder, keys.history)?;
-        if let Some(changed) = changed {
-            tracing::warn!("mqtt: {changed}");
-            daemon.event(EventKind::Gap, format!("mqtt: {changed}"));
+        let (tail, gap) = Tail::open(folder, keys.history)?;
+        if let Some(gap) = gap {
+            tracing::warn!("mqtt: {gap}");
+            daemon.event(EventKind::Gap, format!("mqtt: {gap}"));
         }
         let stop = CancellationToken::new();
         let report = MqttReport {
@@ -81,28 +84,28 @@ impl Mqtt {
         };
         daemon.report_mqtt(report.clone());
         let supervisor = daemon.supervisor().clone();
-        let courier = Courier {
+        let publisher = Publisher {
             account,
             topics: Topics::new(keys, robot),
             commands: keys.commands,
-            status_every: Duration::from_secs(keys.status_s.into()),
+            status_interval: Duration::from_secs(keys.status_s.into()),
             daemon,
-            window: Window::new(keys.queue_kb as usize * 1000, tail.place().clone()),
-            log: Some(LogSide { tail, folder: folder.into() }),
+            in_flight: InFlightQueue::new(keys.queue_kb as usize * 1000, tail.place().clone()),
+            log: Some(LogWorker { tail, folder: folder.into() }),
             stop: stop.clone(),
             report,
             epoch: Instant::now(),
-            troubles: Troubles::default(),
+            faults: Faults::default(),
             diagnosis: Diagnosis::default(),
         };
-        let task = supervisor.spawn(Task::Mqtt, courier.run());
+        let task = supervisor.spawn(Task::Mqtt, publisher.run());
         Ok(Self { stop, task })
     }
 
-    /// Brings what is written to the broker, as far as it takes it within seconds, and says that the daemon leaves.
+    /// Publishes the remaining records, within a few seconds, and the daemon's `offline` message.
     pub async fn stop(self) {
         self.stop.cancel();
-        // It ends by itself; the supervisor has its panic.
+        // The supervisor reports a panic of the task.
         drop(self.task.await);
     }
 }

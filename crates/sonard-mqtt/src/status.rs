@@ -1,50 +1,50 @@
-//! When the daemon's status is sent.
+//! Publication schedule of the daemon's status.
 
 use std::time::Duration;
 
 use bytes::Bytes;
 use sonard_api::{LinkState, Status};
 
-/// What of the status is told as soon as it changes.
-type Gist = (LinkState, Option<String>, bool, Option<uuid::Uuid>, Option<String>);
+/// Part of the status that is published immediately on change.
+type StatusKey = (LinkState, Option<String>, bool, Option<uuid::Uuid>, Option<String>);
 
-/// Decides when the status is sent: at once if its gist changed, else from time to time; and never while the one
-/// before is not acknowledged.
+/// Publication schedule: immediately after an important change, otherwise periodically, and never
+/// before the previous status is acknowledged.
 #[derive(Debug)]
-pub(super) struct StatusNews {
-    every: Duration,
-    last: Option<(Gist, Duration)>,
-    is_under_way: bool,
+pub(super) struct StatusSchedule {
+    interval: Duration,
+    last: Option<(StatusKey, Duration)>,
+    is_in_flight: bool,
 }
 
-impl StatusNews {
-    pub(super) const fn new(every: Duration) -> Self {
-        Self { every, last: None, is_under_way: false }
+impl StatusSchedule {
+    pub(super) const fn new(interval: Duration) -> Self {
+        Self { interval, last: None, is_in_flight: false }
     }
 
-    /// What is sent now, if something is.
+    /// Returns the serialized status if it is due.
     pub(super) fn due(&mut self, status: &Status, now: Duration) -> Option<Bytes> {
-        let gist = (
+        let key = (
             status.link.state,
             status.link.trouble.clone(),
             status.scanning.paused,
             status.scan.as_ref().map(|scan| scan.scan),
             status.log.error.clone(),
         );
-        let is_news = self
+        let is_due = self
             .last
             .as_ref()
-            .is_none_or(|(before, at)| *before != gist || now >= *at + self.every);
-        if self.is_under_way || !is_news {
+            .is_none_or(|(before, at)| *before != key || now >= *at + self.interval);
+        if self.is_in_flight || !is_due {
             return None;
         }
-        self.last = Some((gist, now));
-        self.is_under_way = true;
+        self.last = Some((key, now));
+        self.is_in_flight = true;
         serde_json::to_vec(status).ok().map(Bytes::from)
     }
 
-    /// The broker has it.
+    /// Notes the broker's acknowledgement.
     pub(super) const fn acknowledged(&mut self) {
-        self.is_under_way = false;
+        self.is_in_flight = false;
     }
 }

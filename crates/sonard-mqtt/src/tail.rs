@@ -1,4 +1,4 @@
-//! Reads the daemon's logs on from a place, also what is written meanwhile, file after file.
+//! Follows the daemon's logs from a position, file after file, including lines written meanwhile.
 
 use std::{
     fs::File,
@@ -11,110 +11,111 @@ use sonard_log::log_files;
 use sonard_records::{MAX_LINE_BYTES, decode_line};
 
 use super::{
-    bookmark::Bookmark,
-    topics::Kind,
-    window::{LogPosition, Message, Read},
+    checkpoint::LogCheckpoint,
+    in_flight::{LogLine, LogPosition, RecordMessage},
+    topics::MessageKind,
 };
 
-/// The place in a folder of logs that was read to.
+/// Reader of a folder of logs, with its position.
 #[derive(Debug)]
 pub(super) struct Tail {
     folder: PathBuf,
     at: LogPosition,
 }
 
-/// What reading on came to.
+/// Result of a read.
 #[derive(Debug, Default, PartialEq, Eq)]
-pub(super) struct Piece {
-    /// Why the log does not go on where it was read to, if so.
+pub(super) struct TailChunk {
+    /// Description of a gap, if the log does not continue at the position.
     pub(super) gap: Option<String>,
-    /// The lines that follow.
-    pub(super) lines: Vec<Read>,
-    /// Whether these are all there are.
+    /// Complete lines after the position.
+    pub(super) lines: Vec<LogLine>,
+    /// `true` if no further lines are available.
     pub(super) is_end: bool,
 }
 
 impl Tail {
-    /// Goes on where the last daemon had come to; without that at the end of the logs, or at their beginning
-    /// if all of `history` is wanted. Says what is not as it was, if that is so.
+    /// Resumes at the checkpoint of the previous daemon. Without a checkpoint, starts at the end of
+    /// the logs, or at their beginning with `history`. Also returns a description of a gap, if the
+    /// checkpoint does not match the logs.
     ///
     /// # Errors
-    /// When the folder can't be read, or the place not be remembered.
+    /// If the folder can't be read, or the checkpoint not be written.
     pub(super) fn open(folder: &Path, history: bool) -> io::Result<(Self, Option<String>)> {
         let mut tail =
             Self { folder: folder.into(), at: LogPosition { file: "".into(), bytes: 0 } };
-        let why = match Bookmark::read(folder) {
-            Ok(Some(mark)) => {
-                tail.at = mark.place();
-                if mark.fits(folder) {
+        let reason = match LogCheckpoint::read(folder) {
+            Ok(Some(checkpoint)) => {
+                tail.at = checkpoint.position();
+                if checkpoint.matches(folder) {
                     return Ok((tail, None));
                 }
                 let LogPosition { file, bytes } = &tail.at;
-                format!("the broker has {file} up to byte {bytes}, and that is gone or was changed")
+                format!("{file}, which the broker has up to byte {bytes}, was removed or changed")
             }
             Ok(None) => {
                 tail.at = if history { tail.next_log()? } else { tail.end()? };
-                // What is written before the broker is there for the first time counts, too.
-                Bookmark::write(folder, &tail.at)?;
+                // Records written before the first connection are published, too.
+                LogCheckpoint::write(folder, &tail.at)?;
                 return Ok((tail, None));
             }
-            Err(error) => format!("what the broker has is not known: {error}"),
+            Err(error) => format!("the position of the broker is not known: {error}"),
         };
         tail.at = tail.next_log()?;
-        let told = format!("{why}: sent again from the beginning of {}", tail.at.file);
-        Ok((tail, Some(told)))
+        let gap = format!("{reason}: sent again from the beginning of {}", tail.at.file);
+        Ok((tail, Some(gap)))
     }
 
-    /// The place that was read to.
+    /// Position up to which the logs were read.
     pub(super) const fn place(&self) -> &LogPosition {
         &self.at
     }
 
-    /// The following lines, until there are so many bytes of them.
+    /// Reads further lines, up to about `max_bytes`.
     ///
     /// # Errors
-    /// When a log can't be read.
-    pub(super) fn read(&mut self, most_bytes: usize) -> io::Result<Piece> {
-        let mut piece = Piece::default();
+    /// If a log can't be read.
+    pub(super) fn read(&mut self, max_bytes: usize) -> io::Result<TailChunk> {
+        let mut chunk = TailChunk::default();
         let mut read = 0;
-        while read < most_bytes {
-            // If there is a log after this one, nothing more is written to this.
+        while read < max_bytes {
+            // A log with a successor is not written any more.
             let next = self.log_after(&self.at.file)?;
-            match self.read_log(most_bytes - read, &mut piece.lines) {
+            match self.read_log(max_bytes - read, &mut chunk.lines) {
                 Ok(more) => read += more,
-                // What was read before it comes first.
-                Err(error) if is_gone(&error) && !piece.lines.is_empty() => return Ok(piece),
+                // Lines read before the gap are returned first.
+                Err(error) if is_gone(&error) && !chunk.lines.is_empty() => return Ok(chunk),
                 Err(error) if is_gone(&error) => {
                     let next = self.next_log()?;
                     let before = std::mem::replace(&mut self.at, next);
                     let LogPosition { file, bytes } = before;
-                    piece.gap = Some(format!(
-                        "{file} was removed or cut before the broker had all from byte {bytes} on: \
-                         sent on from the beginning of {}",
+                    chunk.gap = Some(format!(
+                        "{file} was removed or cut before its records from byte {bytes} on were \
+                         published: continued at the beginning of {}",
                         self.at.file
                     ));
-                    return Ok(piece);
+                    return Ok(chunk);
                 }
                 Err(error) => return Err(error),
             }
-            if read >= most_bytes {
-                return Ok(piece);
+            if read >= max_bytes {
+                return Ok(chunk);
             }
             match next {
                 Some(next) => self.at = LogPosition { file: next.into(), bytes: 0 },
                 None => {
-                    piece.is_end = true;
-                    return Ok(piece);
+                    chunk.is_end = true;
+                    return Ok(chunk);
                 }
             }
         }
-        Ok(piece)
+        Ok(chunk)
     }
 
-    /// How much there is in the logs behind a place, bytes.
+    /// Size of the logs after a position, bytes.
     ///
     /// # Errors
-    /// When the folder can't be read.
+    /// If the folder can't be read.
     pub(super) fn behind(&self, place: &LogPosition) -> io::Result<u64> {
         let files = log_files(&self.folder)?;
         let behind = files.iter().filter(|file| *file.name >= *place.file);
@@ -122,8 +123,8 @@ impl Tail {
         Ok(all.saturating_sub(place.bytes))
     }
 
-    /// Whole lines of the log at hand, and how many bytes they are.
-    fn read_log(&mut self, most_bytes: usize, lines: &mut Vec<Read>) -> io::Result<usize> {
+    /// Reads complete lines of the current log. Returns their length in bytes.
+    fn read_log(&mut self, max_bytes: usize, lines: &mut Vec<LogLine>) -> io::Result<usize> {
         if self.at.file.is_empty() {
             return Ok(0);
         }
@@ -136,27 +137,27 @@ impl Tail {
         let mut read = 0;
         let mut line = Vec::new();
         let mut is_rest = false;
-        while read < most_bytes {
+        while read < max_bytes {
             line.clear();
             let limit = MAX_LINE_BYTES as u64 + 2;
             let length = reader.by_ref().take(limit).read_until(b'\n', &mut line)?;
             let is_whole = line.ends_with(b"\n");
-            // A line without its newline is still being written; one too long for a record is passed over
-            // piece by piece.
+            // A line without newline is still being written; a line too long for a record is
+            // skipped in parts.
             if length == 0 || (!is_whole && (length as u64) < limit) {
                 break;
             }
             self.at.bytes += length as u64;
             let message = message(&line).filter(|_| is_whole && !is_rest);
             is_rest = !is_whole;
-            lines.push(Read { message, after: self.at.clone() });
+            lines.push(LogLine { message, after: self.at.clone() });
             read += length;
         }
         Ok(read)
     }
 
-    /// Where to go on if not where it was: the log after it, itself from its beginning if it is there, or else
-    /// the oldest there is.
+    /// Position to continue at after a gap: the same log from its beginning if it exists, else the
+    /// next one, else the oldest.
     fn next_log(&self) -> io::Result<LogPosition> {
         let files = log_files(&self.folder)?;
         let from = files.iter().find(|file| *file.name >= *self.at.file).or(files.first());
@@ -168,7 +169,7 @@ impl Tail {
         Ok(files.into_iter().map(|file| file.name).find(|other| **other > *name))
     }
 
-    /// The end of the newest log, which is being written.
+    /// End of the newest log, which is being written.
     fn end(&self) -> io::Result<LogPosition> {
         let newest = log_files(&self.folder)?.pop();
         Ok(newest.map_or(LogPosition { file: "".into(), bytes: 0 }, |file| LogPosition {
@@ -182,11 +183,11 @@ fn is_gone(error: &io::Error) -> bool {
     error.kind() == io::ErrorKind::NotFound
 }
 
-/// What is sent of a line.
-fn message(line: &[u8]) -> Option<Message> {
+/// Message for a line, if it is a valid record.
+fn message(line: &[u8]) -> Option<RecordMessage> {
     let line = line.trim_ascii_end();
-    let kind = Kind::of(&decode_line(line).ok()?);
-    Some(Message { kind, payload: Bytes::copy_from_slice(line) })
+    let kind = MessageKind::for_record(&decode_line(line).ok()?);
+    Some(RecordMessage { kind, payload: Bytes::copy_from_slice(line) })
 }
 
 #[cfg(test)]

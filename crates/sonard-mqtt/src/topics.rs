@@ -1,33 +1,33 @@
-//! Which topic what is sent under.
+//! MQTT topics of a robot.
 
 use sonard_api::config::MqttKeys;
 use sonard_records::Record;
 
-/// A kind of message.
+/// MessageKind of a message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Kind {
-    /// Whether the daemon is there; kept by the broker.
+pub enum MessageKind {
+    /// Presence of the daemon, `true` or `false`; retained.
     Online,
-    /// What the daemon is doing; kept by the broker.
+    /// Status of the daemon; retained.
     Status,
-    /// What the readings that follow are of; kept by the broker.
+    /// Conditions of the readings that follow; retained.
     Session,
-    /// A scan begins.
+    /// Start of a scan.
     ScanStart,
-    /// A reading.
+    /// Reading of one beam.
     Ping,
-    /// A scan is over.
+    /// End of a scan.
     ScanEnd,
-    /// Something happened.
+    /// Event record.
     Event,
-    /// What became of a command.
+    /// Reply to a command.
     Answer,
 }
 
-impl Kind {
-    /// The kind of a record.
+impl MessageKind {
+    /// Returns the kind of message for a record.
     #[must_use]
-    pub const fn of(record: &Record) -> Self {
+    pub const fn for_record(record: &Record) -> Self {
         match record {
             Record::Session(_) => Self::Session,
             Record::ScanStart(_) => Self::ScanStart,
@@ -37,7 +37,7 @@ impl Kind {
         }
     }
 
-    /// Whether the broker keeps the last one for who comes later.
+    /// Returns `true` for messages that the broker retains for later subscribers.
     #[must_use]
     pub const fn is_retained(self) -> bool {
         matches!(self, Self::Online | Self::Status | Self::Session)
@@ -57,39 +57,39 @@ impl Kind {
     }
 }
 
-/// The topics of a robot.
+/// Topics of a robot.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Topics {
-    /// With the slash at its end.
+    /// Common prefix, with a trailing slash.
     prefix: String,
 }
 
 impl Topics {
-    /// Those of the robot of this name.
+    /// Creates the topics for a robot name.
     #[must_use]
     pub fn new(keys: &MqttKeys, robot: &str) -> Self {
         Self { prefix: format!("{}/{robot}/", keys.topic) }
     }
 
-    /// The topic of a kind of message.
+    /// Returns the topic for a kind of message.
     #[must_use]
-    pub fn of(&self, kind: Kind) -> String {
+    pub fn topic_for(&self, kind: MessageKind) -> String {
         format!("{}{}", self.prefix, kind.level())
     }
 
-    /// A filter of everything that is published.
+    /// Topic filter for all published messages.
     #[must_use]
     pub fn all(&self) -> String {
         format!("{}#", self.prefix)
     }
 
-    /// What commands are published under.
+    /// Topic filter for commands.
     #[must_use]
     pub fn commands(&self) -> String {
         format!("{}command/+", self.prefix)
     }
 
-    /// The command that a topic names.
+    /// Extracts the name of a command from its topic.
     #[must_use]
     pub fn command<'a>(&self, topic: &'a str) -> Option<&'a str> {
         topic.strip_prefix(&self.prefix)?.strip_prefix("command/")

@@ -1,4 +1,4 @@
-//! The robot's pose as somebody on the network tells it: `/initialpose`, which RViz's "2D Pose Estimate" publishes.
+//! Subscription to `/initialpose`, the robot's pose as published by RViz's "2D Pose Estimate".
 
 use rustdds::{
     Subscriber, TopicKind, dds::CreateResult, no_key::SimpleDataReader, policy::Durability,
@@ -11,26 +11,26 @@ use sonard_model::geometry::{Pose, wrap_180};
 
 use super::{
     node::{Node, reliable},
-    services::{MOST_REQUESTS, in_time},
+    services::{MAX_REQUESTS, in_time},
 };
 
 const TOPIC: &str = "/initialpose";
 const TYPE: &str = "geometry_msgs/msg/PoseWithCovarianceStamped";
 
-/// How far the length of a quaternion may be from 1: what rounding to a few digits leaves.
-const MOST_OFF_LENGTH: f64 = 0.01;
-/// How far the robot may lean, degrees: the ranger measures in its plane.
-const MOST_LEAN_DEG: f64 = 1.0;
-/// Characters that are told of a frame that is not known.
-const MOST_TOLD: usize = 64;
+/// Maximum deviation of a quaternion's length from 1: the effect of rounding to a few digits.
+const MAX_LENGTH_ERROR: f64 = 0.01;
+/// Maximum inclination of the robot, degrees: the ranger measures in its plane.
+const MAX_LEAN_DEG: f64 = 1.0;
+/// Maximum length of an unknown frame's name in a message, characters.
+const MAX_FRAME_CHARS: usize = 64;
 
-/// What listens for poses.
+/// Subscription to initial poses.
 pub(super) struct InitialPose(SimpleDataReader<Stamped, CDRDeserializerAdapter<Stamped>>);
 
 impl InitialPose {
-    /// Begins to listen, as a part of the node.
-    pub(super) fn listen(node: &mut Node, subscriber: &Subscriber) -> CreateResult<Self> {
-        let policies = reliable(MOST_REQUESTS, Durability::Volatile);
+    /// Subscribes as a part of the node.
+    pub(super) fn subscribe(node: &mut Node, subscriber: &Subscriber) -> CreateResult<Self> {
+        let policies = reliable(MAX_REQUESTS, Durability::Volatile);
         let name = topic_on_wire(&node.namespace, TOPIC);
         let (type_name, kind) = (type_on_wire(TYPE), TopicKind::NoKey);
         let topic = node.participant.create_topic(name, type_name, &policies, kind)?;
@@ -39,27 +39,27 @@ impl InitialPose {
         Ok(Self(reader))
     }
 
-    /// Has the next scan taken where the last one that came says, if any came since the last time.
-    pub(super) async fn obey(&self, daemon: &Handle, node: &mut Node) {
+    /// Applies the latest pose received since the last call, if any, to the next scan.
+    pub(super) async fn apply_latest(&self, daemon: &Handle, node: &mut Node) {
         self.0.drain_read_notifications();
-        let mut last = None;
-        for _ in 0..MOST_REQUESTS {
+        let mut latest = None;
+        for _ in 0..MAX_REQUESTS {
             match self.0.try_take_one() {
-                Ok(Some(one)) => last = Some(one.into_value().pose()),
+                Ok(Some(sample)) => latest = Some(sample.into_value().pose()),
                 Ok(None) => break,
-                Err(error) => last = Some(Err(format!("it can't be read: {error}"))),
+                Err(error) => latest = Some(Err(format!("it can't be read: {error}"))),
             }
         }
-        let done = match last {
+        let done = match latest {
             None => return,
             Some(Ok(pose)) => in_time(daemon.order(Order::Pose(pose))).await,
-            Some(Err(why)) => Err(why),
+            Some(Err(reason)) => Err(reason),
         };
-        node.count_command(&done.map_err(|why| format!("{TOPIC} is not followed: {why}")));
+        node.count_command(&done.map_err(|reason| format!("{TOPIC} is rejected: {reason}")));
     }
 }
 
-/// `geometry_msgs/PoseWithCovarianceStamped` up to the covariance: nobody here would make use of that.
+/// `geometry_msgs/PoseWithCovarianceStamped` without the covariance, which is not used.
 #[derive(Debug, Deserialize)]
 struct Stamped {
     _stamp: (i32, u32),
@@ -70,24 +70,27 @@ struct Stamped {
 }
 
 impl Stamped {
-    /// Where the robot stands and looks, or why it can't stand so.
+    /// Converts the message to a planar pose.
+    ///
+    /// # Errors
+    /// The reason for which the pose is invalid.
     fn pose(&self) -> Result<Pose, String> {
         if self.frame != MAP_FRAME {
-            let told: String = self.frame.chars().take(MOST_TOLD).collect();
-            return Err(format!("its frame is {told:?}; give a pose in the frame {MAP_FRAME:?}"));
+            let frame: String = self.frame.chars().take(MAX_FRAME_CHARS).collect();
+            return Err(format!("its frame is {frame:?}; give a pose in the frame {MAP_FRAME:?}"));
         }
-        if !self.position.iter().chain(&self.orientation).all(|figure| figure.is_finite()) {
-            return Err("a figure of it is not finite".into());
+        if !self.position.iter().chain(&self.orientation).all(|number| number.is_finite()) {
+            return Err("a number in it is not finite".into());
         }
         let [x, y, z, w] = self.orientation;
         let length = [x, y, z, w].iter().map(|part| part * part).sum::<f64>().sqrt();
-        if (length - 1.0).abs() > MOST_OFF_LENGTH {
-            return Err(format!("its orientation is a quaternion of length {length}; 1 is one"));
+        if (length - 1.0).abs() > MAX_LENGTH_ERROR {
+            return Err(format!("its orientation is a quaternion of length {length}, not 1"));
         }
         let lean_deg = 2.0 * (x.hypot(y) / length).min(1.0).asin().to_degrees();
-        if lean_deg > MOST_LEAN_DEG {
+        if lean_deg > MAX_LEAN_DEG {
             return Err(format!(
-                "it leans by {lean_deg:.0} degrees; only the turn about z may differ from 0"
+                "it is inclined by {lean_deg:.0} degrees; only the rotation about z may differ from 0"
             ));
         }
         let [x_m, y_m, _] = self.position;
@@ -111,7 +114,7 @@ mod tests {
         CDRDeserializerAdapter::<Stamped>::from_bytes(bytes, LITTLE).ok()
     }
 
-    fn told(frame: &str, position: [f64; 3], orientation: [f64; 4]) -> Result<Pose, String> {
+    fn pose_from(frame: &str, position: [f64; 3], orientation: [f64; 4]) -> Result<Pose, String> {
         // The covariance: 36 numbers.
         let message = ((7_i32, 8_u32), frame, position, orientation, [[0.25_f64; 6]; 6]);
         let mut bytes = Vec::new();
@@ -125,22 +128,22 @@ mod tests {
     }
 
     #[test]
-    fn an_upright_pose_in_the_map_is_taken() {
+    fn upright_pose_is_accepted() {
         for heading_deg in [0.0, 90.0, 179.0, -135.0] {
-            let pose = told("map", [1.5, -2.25, 0.3], turned(heading_deg)).expect("good");
+            let pose = pose_from("map", [1.5, -2.25, 0.3], turned(heading_deg)).expect("good");
             assert_eq!([pose.x_m, pose.y_m], [1.5, -2.25]);
             assert!((pose.heading_deg - heading_deg).abs() < 1e-9, "{pose:?}");
-            // The same turn.
+            // The negative quaternion is the same rotation.
             let opposite = turned(heading_deg).map(|part| -part);
-            let same = told("map", [1.5, -2.25, 0.0], opposite).expect("good");
+            let same = pose_from("map", [1.5, -2.25, 0.0], opposite).expect("good");
             assert!((same.heading_deg - heading_deg).abs() < 1e-9, "{same:?}");
         }
     }
 
     #[test]
-    fn what_no_robot_can_do_here_is_refused_with_the_reason() {
+    fn invalid_pose_is_rejected() {
         let refused = |frame: &str, position, orientation| {
-            told(frame, position, orientation).expect_err("it is wrong")
+            pose_from(frame, position, orientation).expect_err("it is invalid")
         };
         let (here, ahead) = ([0.0; 3], turned(0.0));
         for frame in ["", "odom", "/map", &"x".repeat(500)] {
@@ -152,15 +155,15 @@ mod tests {
         assert!(refused("map", here, [0.0; 4]).contains("length 0"));
         assert!(refused("map", here, [0.0, 0.0, 1e300, 1e300]).contains("length"));
         let half = 0.5_f64.sqrt();
-        assert!(refused("map", here, [half, 0.0, 0.0, half]).contains("leans by 90 degrees"));
-        assert!(refused("map", here, [0.0, 1.0, 0.0, 0.0]).contains("leans by 180 degrees"));
+        assert!(refused("map", here, [half, 0.0, 0.0, half]).contains("inclined by 90 degrees"));
+        assert!(refused("map", here, [0.0, 1.0, 0.0, 0.0]).contains("inclined by 180 degrees"));
         let slightly = 0.4_f64.to_radians();
-        assert!(told("map", here, [slightly.sin(), 0.0, 0.0, slightly.cos()]).is_ok());
+        assert!(pose_from("map", here, [slightly.sin(), 0.0, 0.0, slightly.cos()]).is_ok());
     }
 
     proptest! {
         #[test]
-        fn whatever_bytes_come_make_a_finite_pose_or_none(
+        fn any_bytes_are_handled(
             bytes in proptest::collection::vec(any::<u8>(), 0..400),
         ) {
             if let Some(Ok(pose)) = read(&bytes).map(|stamped| stamped.pose()) {

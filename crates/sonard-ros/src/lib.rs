@@ -1,15 +1,16 @@
-//! Live messages for ROS 2, by DDS and without an installation of ROS.
+//! Live messages for ROS 2 over DDS, without an installation of ROS.
 //!
-//! One thread follows the daemon's records, as a viewer of Foxglove does, and hands messages to DDS. What waits for that thread
-//! waits in the hub; what waits for subscribers is bounded for each topic (`budget`). Nobody is waited for.
+//! A thread follows the daemon's records, like a Foxglove viewer, and passes messages to DDS.
+//! Records that the thread has not processed are queued in the daemon's broadcast; unacknowledged
+//! messages are bounded for each topic (`send_limit`). Publishing never blocks.
 #![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 #![warn(clippy::expect_used, clippy::indexing_slicing, clippy::panic)]
 
-mod budget;
-mod gaps;
+mod dropped;
 mod initial_pose;
 mod networks;
 mod node;
+mod send_limit;
 mod services;
 
 use std::{
@@ -33,12 +34,12 @@ use tokio_util::sync::CancellationToken;
 use node::Node;
 use services::Services;
 
-/// From one try to open the ports of DDS to the next.
-const BETWEEN_TRIES: Duration = Duration::from_secs(5);
-/// How often it is looked who came and went.
-const LOOK: Duration = Duration::from_secs(1);
+/// Delay between attempts to open the ports of DDS.
+const RETRY_DELAY: Duration = Duration::from_secs(5);
+/// Poll interval of subscribers.
+const POLL_INTERVAL: Duration = Duration::from_secs(1);
 
-/// The thread that tells ROS 2, to be stopped at the end.
+/// Handle of the publishing thread.
 #[derive(Debug)]
 pub struct Ros {
     stop: CancellationToken,
@@ -46,11 +47,11 @@ pub struct Ros {
 }
 
 impl Ros {
-    /// Begins to tell what the daemon measures, by `keys`. Must be called within a multi-threaded tokio runtime, before
-    /// the daemon runs.
+    /// Starts publishing the daemon's measurements as configured by `keys`. Must be called within a
+    /// multi-threaded tokio runtime, before the daemon runs.
     ///
     /// # Errors
-    /// When there can't be another thread.
+    /// If the thread can't be started.
     pub fn start(keys: &RosKeys, daemon: Handle) -> io::Result<Self> {
         let stop = CancellationToken::new();
         let report = RosReport {
@@ -69,37 +70,38 @@ impl Ros {
         };
         daemon.report_ros(report.clone());
         let supervisor = daemon.supervisor().clone();
-        let teller = Teller { keys: keys.clone(), daemon, stop: stop.clone(), report };
+        let publisher = RosThread { keys: keys.clone(), daemon, stop: stop.clone(), report };
         let runtime = Runtime::current();
-        let thread = supervisor.spawn_thread(Task::Ros, move || teller.run(&runtime))?;
+        let thread = supervisor.spawn_thread(Task::Ros, move || publisher.run(&runtime))?;
         Ok(Self { stop, thread })
     }
 
-    /// Waits until what was measured is told, as far as that is taken within a second. The daemon must have ended.
+    /// Publishes the remaining messages and waits up to a second for their acknowledgement. The
+    /// daemon must have ended.
     pub async fn stop(self) {
         self.stop.cancel();
-        // It ends by itself; the supervisor has its panic.
+        // The supervisor reports a panic of the thread.
         drop(tokio::task::spawn_blocking(|| self.thread.join()).await);
     }
 }
 
-struct Teller {
+struct RosThread {
     keys: RosKeys,
     daemon: Handle,
     stop: CancellationToken,
     report: RosReport,
 }
 
-impl Teller {
-    /// Opens a node whenever there is none, until the daemon ends.
+impl RosThread {
+    /// Runs nodes until the daemon ends; a failed node is replaced after a delay.
     fn run(mut self, runtime: &Runtime) {
         loop {
-            // What is wrong within the library must not be the end of what is told.
-            let lived = catch_unwind(AssertUnwindSafe(|| runtime.block_on(self.live())));
-            let trouble = match lived {
+            // A panic of the DDS library must not end the publication.
+            let ended = catch_unwind(AssertUnwindSafe(|| runtime.block_on(self.run_node())));
+            let trouble = match ended {
                 Ok(Ok(())) => return,
                 Ok(Err(trouble)) => trouble,
-                Err(_) => "something within DDS went wrong that should not".to_owned(),
+                Err(_) => "internal error of the DDS library".to_owned(),
             };
             if self.report.trouble.as_ref() != Some(&trouble) {
                 tracing::warn!("ros: {trouble}");
@@ -111,7 +113,7 @@ impl Teller {
             let waited = runtime.block_on(async {
                 tokio::select! {
                     () = self.stop.cancelled() => false,
-                    () = sleep(BETWEEN_TRIES) => true,
+                    () = sleep(RETRY_DELAY) => true,
                 }
             });
             if !waited {
@@ -120,8 +122,11 @@ impl Teller {
         }
     }
 
-    /// A node's life: ends well with the daemon, and else with what is wrong.
-    async fn live(&mut self) -> Result<(), String> {
+    /// Runs a node until the daemon ends.
+    ///
+    /// # Errors
+    /// Description of the failure of the node.
+    async fn run_node(&mut self) -> Result<(), String> {
         let opened = Node::open(&self.keys, &self.daemon, &self.report);
         let mut node = opened.map_err(|error| error.to_string())?;
         tracing::info!("ros: domain {} on {}", self.keys.domain, self.keys.networks.join(", "));
@@ -129,35 +134,36 @@ impl Teller {
             true => Services::offer(&mut node).map_err(|error| error.to_string())?,
             false => Services::none(),
         };
-        node.set_topics(&self.expected());
+        node.set_topics(&self.expected_topics());
         let live = Live::new(self.keys.messages()).with_map(self.keys.map);
         let mut follower = Follower::begin(&self.daemon, live, &mut node);
-        let ended = self.tell(&mut follower, &mut node, &services).await;
+        let ended = self.publish(&mut follower, &mut node, &services).await;
         self.report = node.leave();
         ended
     }
 
-    async fn tell(
+    async fn publish(
         &self,
         follower: &mut Follower,
         node: &mut Node,
         services: &Services,
     ) -> Result<(), String> {
-        let mut looks = interval(if services.are_offered() { services::LOOK } else { LOOK });
-        looks.set_missed_tick_behavior(MissedTickBehavior::Delay);
+        let mut ticks =
+            interval(if services.are_offered() { services::POLL_INTERVAL } else { POLL_INTERVAL });
+        ticks.set_missed_tick_behavior(MissedTickBehavior::Delay);
         loop {
             tokio::select! {
-                more = follower.next(node) => if !more { return node.look_after() },
-                _ = looks.tick() => {
-                    node.look_after()?;
-                    services.answer(&self.daemon, node).await;
+                more = follower.next(node) => if !more { return node.update() },
+                _ = ticks.tick() => {
+                    node.update()?;
+                    services.process(&self.daemon, node).await;
                 }
             }
         }
     }
 
-    /// Topics before the first session says what there is: subscribers find them then.
-    fn expected(&self) -> Vec<Topic> {
+    /// Topics to offer before the first session record, so that subscribers discover them early.
+    fn expected_topics(&self) -> Vec<Topic> {
         let next = self.daemon.next_scan();
         let (is_simulated, has_scene) = (next.array.is_some(), next.scene.is_some());
         let distribution = self.keys.messages().distribution;

@@ -1,11 +1,11 @@
-//! The networks that it is told by.
+//! Selection of network interfaces for DDS.
 
 use std::net::{IpAddr, Ipv4Addr};
 
-/// An interface of this computer with its addresses.
+/// Network interface of this computer with its addresses.
 type Interface = (String, Vec<Ipv4Addr>);
 
-/// The interfaces that there are.
+/// Lists the network interfaces of this computer.
 pub(super) fn interfaces() -> Vec<Interface> {
     let interfaces = netdev::get_interfaces().into_iter();
     interfaces
@@ -16,32 +16,39 @@ pub(super) fn interfaces() -> Vec<Interface> {
         .collect()
 }
 
-/// The addresses that are meant by addresses and names of interfaces.
+/// Resolves addresses and interface names to addresses of this computer.
 ///
 /// # Errors
-/// The first one that is not there.
-pub(super) fn addresses(named: &[String], there: &[Interface]) -> Result<Vec<IpAddr>, String> {
+/// If an address or a name does not exist on this computer.
+pub(super) fn addresses(named: &[String], present: &[Interface]) -> Result<Vec<IpAddr>, String> {
     let mut addresses: Vec<IpAddr> = Vec::new();
     for name in named {
-        let asked: Option<Ipv4Addr> = name.parse().ok();
-        let meant: Vec<Ipv4Addr> = match asked {
-            Some(asked) => {
-                there.iter().flat_map(|(_, all)| all).copied().filter(|one| *one == asked).collect()
-            }
+        let requested: Option<Ipv4Addr> = name.parse().ok();
+        let matching: Vec<Ipv4Addr> = match requested {
+            Some(requested) => present
+                .iter()
+                .flat_map(|(_, addresses)| addresses)
+                .copied()
+                .filter(|address| *address == requested)
+                .collect(),
             None => {
-                let of_name = there.iter().filter(|(interface, _)| interface == name);
-                of_name.flat_map(|(_, all)| all).copied().collect()
+                let interfaces = present.iter().filter(|(interface, _)| interface == name);
+                interfaces.flat_map(|(_, addresses)| addresses).copied().collect()
             }
         };
-        if meant.is_empty() {
-            let there: Vec<String> = there
+        if matching.is_empty() {
+            let present: Vec<String> = present
                 .iter()
-                .flat_map(|(name, all)| all.iter().map(move |one| format!("{one} ({name})")))
+                .flat_map(|(name, addresses)| {
+                    addresses.iter().map(move |address| format!("{address} ({name})"))
+                })
                 .collect();
-            let there = if there.is_empty() { "none to be seen".into() } else { there.join(", ") };
-            return Err(format!("ros.networks has {name}, which this computer has not: {there}"));
+            let present = if present.is_empty() { "none found".into() } else { present.join(", ") };
+            return Err(format!(
+                "ros.networks has {name}, which does not exist on this computer; present: {present}"
+            ));
         }
-        for address in meant.into_iter().map(IpAddr::V4) {
+        for address in matching.into_iter().map(IpAddr::V4) {
             if !addresses.contains(&address) {
                 addresses.push(address);
             }
@@ -55,24 +62,24 @@ mod tests {
     use super::*;
 
     #[test]
-    fn addresses_and_names_of_interfaces_are_found_and_what_is_not_there_is_told() {
+    fn addresses_and_names_are_resolved() {
         let ip = |last| Ipv4Addr::new(192, 168, 1, last);
-        let there = [
+        let present = [
             ("lo".to_owned(), vec![Ipv4Addr::LOCALHOST]),
             ("eth0".to_owned(), vec![ip(7), ip(8)]),
             ("wlan0".to_owned(), Vec::new()),
         ];
         let find = |named: &[&str]| {
-            addresses(&named.iter().map(|name| (*name).to_owned()).collect::<Vec<_>>(), &there)
+            addresses(&named.iter().map(|name| (*name).to_owned()).collect::<Vec<_>>(), &present)
         };
         assert_eq!(find(&["127.0.0.1"]), Ok(vec![Ipv4Addr::LOCALHOST.into()]));
         assert_eq!(find(&["192.168.1.8", "eth0"]), Ok(vec![ip(8).into(), ip(7).into()]));
         for missing in ["wlan0", "10.0.0.1", "eth1", ""] {
-            let told = find(&["lo", missing]).expect_err("not there");
-            assert!(told.contains(missing) && told.contains("192.168.1.7 (eth0)"), "{told}");
+            let error = find(&["lo", missing]).expect_err("missing");
+            assert!(error.contains(missing) && error.contains("192.168.1.7 (eth0)"), "{error}");
         }
-        let told = addresses(&["lo".to_owned()], &[]).expect_err("nothing there");
-        assert!(told.ends_with("none to be seen"), "{told}");
+        let error = addresses(&["lo".to_owned()], &[]).expect_err("no interface");
+        assert!(error.ends_with("none found"), "{error}");
     }
 
     #[test]

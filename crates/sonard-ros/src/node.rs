@@ -1,4 +1,4 @@
-//! The node: a participant of DDS with a writer for each topic. It takes bytes as they are.
+//! ROS 2 node: a DDS participant with a writer of serialized messages for each topic.
 
 use std::{
     collections::BTreeMap,
@@ -25,26 +25,26 @@ use sonard_export::{
 use sonard_records::EventKind;
 
 use super::{
-    budget::Budget,
-    gaps::Gaps,
+    dropped::DroppedMessages,
     networks::{addresses, interfaces},
+    send_limit::SendLimit,
 };
 
-/// What nodes are called.
+/// Name of the node.
 const NAME: &str = "sonard";
-/// Messages that are kept of a topic for those who come late, and of one that stands still.
+/// History depth of a volatile topic, and of a static topic that is kept for late subscribers.
 const DEPTHS: [i32; 2] = [10, 1];
-/// What the kernel may keep for a socket, bytes: nobody sends much.
+/// Socket buffer size, bytes; the traffic is small.
 const SOCKET_BYTES: usize = 1 << 18;
-/// Least time from one refusal that is told to the next.
-const BETWEEN_REFUSALS: Duration = Duration::from_secs(5);
-/// How long the last messages may take to be acknowledged.
-const LAST: Duration = Duration::from_secs(1);
+/// Minimum interval between two logged rejections.
+const REFUSAL_LOG_INTERVAL: Duration = Duration::from_secs(5);
+/// Time allowed for the acknowledgement of the last messages.
+const DRAIN_TIMEOUT: Duration = Duration::from_secs(1);
 
-/// Bytes of a message behind the four that say how it is encoded, which DDS adds itself.
-pub(super) struct AsItIs;
+/// Serialized message without the four bytes of the encapsulation header, which DDS adds.
+pub(super) struct RawBytes;
 
-impl SerializerAdapter<Bytes> for AsItIs {
+impl SerializerAdapter<Bytes> for RawBytes {
     type Error = Infallible;
 
     fn output_encoding() -> RepresentationIdentifier {
@@ -56,14 +56,14 @@ impl SerializerAdapter<Bytes> for AsItIs {
     }
 }
 
-pub(super) type Writer = DataWriter<Bytes, AsItIs>;
+pub(super) type Writer = DataWriter<Bytes, RawBytes>;
 
-/// A message without the four bytes of its encoding.
+/// Strips the four bytes of the encapsulation header from a message.
 pub(super) fn without_encoding(message: &[u8]) -> Bytes {
     Bytes::copy_from_slice(message.get(4..).unwrap_or_default())
 }
 
-/// Reliable, and never waiting for anybody.
+/// Policies of a reliable topic; writing never blocks.
 pub(super) fn reliable(depth: i32, durability: Durability) -> QosPolicies {
     QosPolicyBuilder::new()
         .reliable(rustdds::Duration::ZERO)
@@ -72,38 +72,39 @@ pub(super) fn reliable(depth: i32, durability: Durability) -> QosPolicies {
         .build()
 }
 
-/// The node while it is there.
+/// Node on the network.
 pub(super) struct Node {
     offers: BTreeMap<String, Offer>,
-    /// By which it says who it is.
+    /// Writer of the node's announcement (`ros_discovery_info`).
     announcer: Writer,
     publisher: Publisher,
-    /// Goes last: what is made by it leaves with a word to others.
+    /// Dropped last: the entities it created deregister before.
     pub(super) participant: DomainParticipant,
     daemon: Handle,
-    /// Readers and writers of services, and what listens for poses.
+    /// Readers and writers of the services and of the pose subscription.
     pub(super) services: [Vec<Guid>; 2],
     distribution: Distribution,
     pub(super) namespace: String,
     queue_bytes: usize,
     report: RosReport,
-    gaps: Gaps,
-    /// When a refusal was told last.
-    refused: Option<Instant>,
-    /// Why it can't go on.
+    dropped: DroppedMessages,
+    /// Time of the last logged rejection.
+    rejection_logged: Option<Instant>,
+    /// Failure that ends the node.
     fault: Option<String>,
 }
 
-/// A topic that is offered.
+/// Offered topic with its writer.
 struct Offer {
     topic: Topic,
     writer: Writer,
-    budget: Budget,
+    limit: SendLimit,
     subscriptions: i32,
 }
 
 impl Node {
-    /// Opens the ports of DDS and says who it is; `report` goes on from what it was.
+    /// Opens the ports of DDS and creates the announcement's writer. Counters continue from
+    /// `report`.
     pub(super) fn open(
         keys: &RosKeys,
         daemon: &Handle,
@@ -133,14 +134,14 @@ impl Node {
             namespace: keys.namespace.clone(),
             queue_bytes: keys.queue_kb as usize * 1000,
             report: RosReport { networks, up, since, trouble: None, ..report.clone() },
-            gaps: Gaps::default(),
-            refused: None,
+            dropped: DroppedMessages::default(),
+            rejection_logged: None,
             fault: None,
         })
     }
 
-    /// Says who it is, with what it offers.
-    pub(super) fn announce_itself(&mut self) {
+    /// Publishes the node's announcement with its readers and writers.
+    pub(super) fn announce_node(&mut self) {
         let offered = self.offers.values().map(|offer| offer.writer.guid().to_bytes());
         let [readers, writers] = self.services.clone();
         let node = dds::Node {
@@ -153,11 +154,11 @@ impl Node {
         let message = node.announcement(participant, self.distribution);
         let written = self.announcer.write(without_encoding(&message), Some(now()));
         if let Err(error) = written {
-            self.fault = Some(format!("the node can't say who it is: {error}"));
+            self.fault = Some(format!("the node can't be announced: {error}"));
         }
     }
 
-    /// A writer of its own, of a type as it is called on the wire.
+    /// Creates a writer for a topic and a type, both by their DDS names.
     pub(super) fn writer(
         &self,
         topic: &str,
@@ -177,13 +178,16 @@ impl Node {
         Ok(Offer {
             topic: topic.clone(),
             writer: self.writer(&name, &type_on_wire(topic.type_name()), &policies)?,
-            budget: Budget::new(self.queue_bytes),
+            limit: SendLimit::new(self.queue_bytes),
             subscriptions: 0,
         })
     }
 
-    /// Takes in who came and went, and says how it goes; fails when it can't go on.
-    pub(super) fn look_after(&mut self) -> Result<(), String> {
+    /// Updates the number of subscriptions and reports to the daemon.
+    ///
+    /// # Errors
+    /// Description of a failure that ends the node.
+    pub(super) fn update(&mut self) -> Result<(), String> {
         for offer in self.offers.values_mut() {
             while let Some(status) = offer.writer.try_recv_status() {
                 if let DataWriterStatus::PublicationMatched { current, .. } = status {
@@ -193,36 +197,37 @@ impl Node {
         }
         let subscriptions = self.offers.values().map(|offer| i64::from(offer.subscriptions));
         self.report.subscriptions = subscriptions.sum::<i64>().unsigned_abs();
-        if let Some(words) = self.gaps.say(Instant::now()) {
-            tracing::warn!("ros: {words}");
-            self.daemon.event(EventKind::Gap, format!("ros: {words}"));
+        if let Some(text) = self.dropped.take_report(Instant::now()) {
+            tracing::warn!("ros: {text}");
+            self.daemon.event(EventKind::Gap, format!("ros: {text}"));
         }
         self.daemon.report_ros(self.report.clone());
         self.fault.take().map_or(Ok(()), Err)
     }
 
-    /// Counts what was asked for, before that is answered; why it was refused is told, but not as often as somebody can ask.
+    /// Counts a command before the reply is sent. The log of rejections is rate-limited.
     pub(super) fn count_command<T>(&mut self, done: &Result<T, String>) {
         match done {
             Ok(_) => self.report.commands += 1,
-            Err(why) => {
+            Err(reason) => {
                 self.report.refused += 1;
-                self.report.refusal = Some(why.clone());
-                let is_early = self.refused.is_some_and(|last| last.elapsed() < BETWEEN_REFUSALS);
+                self.report.refusal = Some(reason.clone());
+                let is_early =
+                    self.rejection_logged.is_some_and(|last| last.elapsed() < REFUSAL_LOG_INTERVAL);
                 if !is_early {
-                    self.refused = Some(Instant::now());
-                    tracing::warn!("ros: {why}");
+                    self.rejection_logged = Some(Instant::now());
+                    tracing::warn!("ros: {reason}");
                 }
             }
         }
         self.daemon.report_ros(self.report.clone());
     }
 
-    /// Waits until the last messages are acknowledged, if that does not take long, and leaves.
+    /// Waits up to a second for the last acknowledgements and closes the node.
     pub(super) fn leave(self) -> RosReport {
-        let last = Instant::now() + LAST;
+        let deadline = Instant::now() + DRAIN_TIMEOUT;
         for offer in self.offers.values() {
-            let left = last.saturating_duration_since(Instant::now());
+            let left = deadline.saturating_duration_since(Instant::now());
             drop(offer.writer.wait_for_acknowledgments(left));
         }
         self.report
@@ -238,32 +243,35 @@ impl Audience for Node {
             }
             match self.offer(topic) {
                 Ok(offer) => drop(self.offers.insert(topic.name.clone(), offer)),
-                Err(error) => self.fault = Some(format!("{} is not offered: {error}", topic.name)),
+                Err(error) => {
+                    self.fault = Some(format!("{} can't be offered: {error}", topic.name));
+                }
             }
         }
         self.report.topics = self.offers.len() as u64;
-        self.announce_itself();
+        self.announce_node();
     }
 
     fn tell(&mut self, message: &LiveMessage<'_>) {
         let Some(offer) = self.offers.get_mut(message.topic) else { return };
         let (writer, bytes) = (&offer.writer, message.bytes.len());
-        let all_taken = || matches!(writer.wait_for_acknowledgments(Duration::ZERO), Ok(true));
-        let written = match offer.budget.has_room(bytes, all_taken) {
+        let all_acknowledged =
+            || matches!(writer.wait_for_acknowledgments(Duration::ZERO), Ok(true));
+        let written = match offer.limit.has_room(bytes, all_acknowledged) {
             true => writer.write(without_encoding(message.bytes), Some(now())).map_err(Some),
             false => Err(None),
         };
         match written {
             Ok(()) => {
-                offer.budget.put(bytes);
+                offer.limit.add(bytes);
                 self.report.messages += 1;
             }
             Err(None | Some(WriteError::WouldBlock { .. })) => {
                 self.report.left_out += 1;
-                self.gaps.add(message.topic);
+                self.dropped.add(message.topic);
             }
             Err(Some(error)) => {
-                self.fault = Some(format!("{} can't be told: {error}", message.topic));
+                self.fault = Some(format!("{} can't be published: {error}", message.topic));
             }
         }
     }

@@ -1,5 +1,5 @@
-//! What whoever is on the network can have done, with the rules of the API: services start and stop scans
-//! (`std_srvs/srv/Trigger`), a topic says where the robot is.
+//! Commands from the ROS network, with the rules of the API: services start and stop scans
+//! (`std_srvs/srv/Trigger`), a topic sets the robot's pose.
 
 use std::{convert::Infallible, time::Duration};
 
@@ -20,15 +20,15 @@ use tokio::time::timeout;
 
 use super::{
     initial_pose::InitialPose,
-    node::{AsItIs, Node, Writer, now, reliable, without_encoding},
+    node::{Node, RawBytes, Writer, now, reliable, without_encoding},
 };
 
-/// How often it is looked whether a service was called.
-pub(super) const LOOK: Duration = Duration::from_millis(100);
-/// Requests that wait, and that are answered at a look: who sends more gets no answer to some.
-pub(super) const MOST_REQUESTS: i32 = 4;
-/// How long the daemon may take to answer.
-const PATIENCE: Duration = Duration::from_secs(2);
+/// Poll interval of service calls.
+pub(super) const POLL_INTERVAL: Duration = Duration::from_millis(100);
+/// Maximum number of queued requests, all processed at one poll; further requests get no reply.
+pub(super) const MAX_REQUESTS: i32 = 4;
+/// Time allowed for the daemon's reply.
+const REPLY_TIMEOUT: Duration = Duration::from_secs(2);
 
 #[derive(Debug, Clone, Copy)]
 enum Command {
@@ -40,13 +40,13 @@ impl Command {
     const ALL: [(Self, &'static str); 2] =
         [(Self::Start, "/sonar/start"), (Self::Stop, "/sonar/stop")];
 
-    /// Has it done; what there is to say of it, or why not.
-    async fn carry_out(self, daemon: &Handle) -> Result<String, String> {
+    /// Executes the command. Returns the text of the reply, or the reason of the rejection.
+    async fn execute(self, daemon: &Handle) -> Result<String, String> {
         in_time(async {
             match self {
                 Self::Start => {
-                    let begun = daemon.start(ScanRequest::default()).await?;
-                    Ok(format!("request {}", begun.request))
+                    let started = daemon.start(ScanRequest::default()).await?;
+                    Ok(format!("request {}", started.request))
                 }
                 Self::Stop => daemon.order(Order::Stop).await.map(|()| "stopped".to_owned()),
             }
@@ -55,15 +55,15 @@ impl Command {
     }
 }
 
-/// What came of something that the daemon does, or why not.
+/// Waits for the daemon with a timeout; converts a rejection to text.
 pub(super) async fn in_time<T>(
     done: impl Future<Output = Result<T, Refusal>>,
 ) -> Result<T, String> {
-    let answer = timeout(PATIENCE, done).await.map_err(|_| "the daemon is busy".to_owned())?;
+    let answer = timeout(REPLY_TIMEOUT, done).await.map_err(|_| "the daemon is busy".to_owned())?;
     answer.map_err(|refusal| format!("{}; {}", refusal.message, refusal.help))
 }
 
-/// What is offered and listened for.
+/// Offered services and subscriptions.
 pub(super) struct Services {
     services: Vec<Service>,
     initial_pose: Option<InitialPose>,
@@ -71,19 +71,19 @@ pub(super) struct Services {
 
 struct Service {
     command: Command,
-    requests: SimpleDataReader<Bytes, AsItIs>,
+    requests: SimpleDataReader<Bytes, RawBytes>,
     replies: Writer,
 }
 
 impl Services {
-    /// None of them.
+    /// Creates an empty set, for a node without commands.
     pub(super) const fn none() -> Self {
         Self { services: Vec::new(), initial_pose: None }
     }
 
-    /// All of them, as the node's.
+    /// Creates all services and subscriptions on a node.
     pub(super) fn offer(node: &mut Node) -> CreateResult<Self> {
-        let policies = reliable(MOST_REQUESTS, Durability::Volatile);
+        let policies = reliable(MAX_REQUESTS, Durability::Volatile);
         let subscriber = node.participant.create_subscriber(&policies)?;
         let mut services = Vec::new();
         for (command, name) in Command::ALL {
@@ -94,7 +94,7 @@ impl Services {
             node.services[1].push(replies.guid().to_bytes());
             services.push(Service { command, requests, replies });
         }
-        let initial_pose = Some(InitialPose::listen(node, &subscriber)?);
+        let initial_pose = Some(InitialPose::subscribe(node, &subscriber)?);
         Ok(Self { services, initial_pose })
     }
 
@@ -102,17 +102,17 @@ impl Services {
         !self.services.is_empty()
     }
 
-    /// Does what was asked for since the last time.
-    pub(super) async fn answer(&self, daemon: &Handle, node: &mut Node) {
+    /// Executes the commands received since the last call.
+    pub(super) async fn process(&self, daemon: &Handle, node: &mut Node) {
         if let Some(initial_pose) = &self.initial_pose {
-            initial_pose.obey(daemon, node).await;
+            initial_pose.apply_latest(daemon, node).await;
         }
         for service in &self.services {
             service.requests.drain_read_notifications();
-            for _ in 0..MOST_REQUESTS {
-                // What can't be read asks for nothing.
+            for _ in 0..MAX_REQUESTS {
+                // Unreadable requests are ignored.
                 let Ok(Some(request)) = service.requests.try_take_one() else { break };
-                let done = service.command.carry_out(daemon).await;
+                let done = service.command.execute(daemon).await;
                 node.count_command(&done);
                 service.reply(&request, done);
             }
@@ -124,8 +124,8 @@ impl Service {
     fn reply(&self, request: &DeserializedCacheChange<Bytes>, done: Result<String, String>) {
         let asker = Asker::of_trigger(&request.sample);
         let success = done.is_ok();
-        let message = asker.reply(success, &done.unwrap_or_else(|why| why));
-        // Of who says nothing else of itself, the request's own number.
+        let message = asker.reply(success, &done.unwrap_or_else(|reason| reason));
+        // Without a related identity, the sequence number of the request itself applies.
         let own = request.sequence_number;
         let mut to = request
             .related_sample_identity()
@@ -136,7 +136,7 @@ impl Service {
         let options =
             WriteOptionsBuilder::new().source_timestamp(now()).related_sample_identity(to).build();
         if let Err(error) = self.replies.write_with_options(without_encoding(&message), options) {
-            tracing::warn!("ros: a service is not answered: {error}");
+            tracing::warn!("ros: a service reply could not be sent: {error}");
         }
     }
 }
@@ -147,13 +147,13 @@ fn reader(
     topic: String,
     type_name: &str,
     policies: &QosPolicies,
-) -> CreateResult<SimpleDataReader<Bytes, AsItIs>> {
+) -> CreateResult<SimpleDataReader<Bytes, RawBytes>> {
     let kind = TopicKind::NoKey;
     let topic = node.participant.create_topic(topic, type_name.to_owned(), policies, kind)?;
     subscriber.create_simple_datareader_no_key(&topic, Some(policies.clone()))
 }
 
-impl DeserializerAdapter<Bytes> for AsItIs {
+impl DeserializerAdapter<Bytes> for RawBytes {
     type Error = Infallible;
     type Decoded = Bytes;
 
@@ -166,16 +166,16 @@ impl DeserializerAdapter<Bytes> for AsItIs {
     }
 }
 
-impl DefaultDecoder<Bytes> for AsItIs {
-    type Decoder = Copying;
-    const DECODER: Copying = Copying;
+impl DefaultDecoder<Bytes> for RawBytes {
+    type Decoder = CopyBytes;
+    const DECODER: CopyBytes = CopyBytes;
 }
 
-/// Takes bytes as they are.
+/// Decoder that copies the bytes.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Copying;
+pub(super) struct CopyBytes;
 
-impl Decode<'_, Bytes> for Copying {
+impl Decode<'_, Bytes> for CopyBytes {
     type Error = Infallible;
 
     fn decode_bytes(
@@ -183,8 +183,8 @@ impl Decode<'_, Bytes> for Copying {
         bytes: &[u8],
         _encoding: RepresentationIdentifier,
     ) -> Result<Bytes, Infallible> {
-        /// More than that is no request: it has no fields.
-        const MOST: usize = 64;
-        Ok(Bytes::copy_from_slice(bytes.get(..MOST).unwrap_or(bytes)))
+        /// Maximum length of a request, which has no fields.
+        const MAX_BYTES: usize = 64;
+        Ok(Bytes::copy_from_slice(bytes.get(..MAX_BYTES).unwrap_or(bytes)))
     }
 }

@@ -94,7 +94,7 @@ fn rejected_by_device_or_file() {
         (r#"{"treshold":0.1}"#, 422, "treshold"),
         (r#"{"threshold":0.1}"#, 409, "model.threshold"),
         (r#"{"blanking_us":20000}"#, 409, "listening window"),
-        (r#"{"blanking_us":100}"#, 409, "shortest blanking is 500 us"),
+        (r#"{"blanking_us":100}"#, 409, "minimum blanking is 500 us"),
     ] {
         let reply = daemon.send("PUT", "/v1/sensor", body);
         assert_eq!(reply.status, status, "{body}: {}", reply.json());

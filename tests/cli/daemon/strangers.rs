@@ -100,7 +100,7 @@ fn restart_while_homing() {
         // What its own Home failed at is the only reason for an empty scan: one in five, and not also one
         // for each Home that failed before it. The last one may have been stopped with the daemon.
         let has_reason = |event: &&String| {
-            event.contains("scan given up") || event.contains("the daemon is stopping")
+            event.contains("scan failed") || event.contains("the daemon is stopping")
         };
         let reasons = events.iter().filter(has_reason).count();
         assert!(empty <= reasons, "{faults}: {empty} empty scans: {events:?}");

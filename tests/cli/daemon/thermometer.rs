@@ -65,7 +65,7 @@ fn last_valid_temperature() {
         (Some(ZEROS), "all registers"),
         (Some("85000\n"), "before its first conversion"),
         (Some(""), "it is empty"),
-        (Some("nan\n"), "no number"),
+        (Some("nan\n"), "not a number"),
         (None, "a named pipe"),
     ] {
         match bad {

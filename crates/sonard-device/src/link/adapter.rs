@@ -1,4 +1,4 @@
-//! Properties of a port's driver that disturb the protocol.
+//! Driver settings of a port that interfere with the protocol.
 
 use std::{fs, path::Path};
 
@@ -11,7 +11,7 @@ pub fn latency_timer_ms(device: &Path) -> Option<u32> {
     read_timer(Path::new("/sys/class/tty"), device)
 }
 
-/// `true` if the kernel writes its messages to a port, as it does on a Raspberry Pi's UART by default.
+/// Returns `true` if the port is a kernel console, as a Raspberry Pi's UART is by default.
 #[must_use]
 pub fn is_kernel_console(device: &Path) -> bool {
     let active = fs::read_to_string("/sys/class/tty/console/active").unwrap_or_default();

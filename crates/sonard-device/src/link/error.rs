@@ -10,29 +10,29 @@ use thiserror::Error;
 
 use super::Holders;
 
-/// A serial line that can't be used.
+/// Failure to open a serial line.
 #[derive(Debug, Error)]
 pub enum LinkError {
     /// No path, stable id or USB serial number of that name.
     #[error("there is no serial port {port:?}")]
     NotFound {
-        /// The requested name.
+        /// Port name as requested.
         port: String,
-        /// The ports of this computer.
+        /// Serial ports of this computer, or the error of listing them.
         present: Result<Vec<String>, PortListError>,
     },
-    /// A name that several devices have.
+    /// The name matches several devices.
     #[error("{port:?} matches {} serial ports: {}", matches.len(), matches.join(", "))]
     Ambiguous {
-        /// The requested name.
+        /// Port name as requested.
         port: String,
         /// Full names of the matching ports.
         matches: Vec<String>,
     },
-    /// A part of a name that now matches another device than before.
+    /// The partial name matches another device than before.
     #[error("{port:?} matched {before}, which is gone, and now matches {now}")]
     OtherDevice {
-        /// The requested part of a name.
+        /// Partial name as requested.
         port: String,
         /// Name of the device that was opened before.
         before: String,
@@ -42,45 +42,45 @@ pub enum LinkError {
     /// The stable ids or USB serial numbers can't be looked up.
     #[error("serial port {port:?} can't be looked up: {source}")]
     NotListed {
-        /// The requested name.
+        /// Port name as requested.
         port: String,
-        /// The failed listing.
+        /// Error of listing the ports.
         source: PortListError,
     },
     /// The port exists, but this user may not open it.
     #[error("no permission to open {0}")]
     Permission(PathBuf),
-    /// File permissions allow it, but the cgroup's device policy or a security module does not.
+    /// The cgroup's device policy or a security module denies access despite the file permissions.
     #[error("the device policy of this service or container does not allow {0}")]
     DevicePolicy(PathBuf),
-    /// Another program has it open.
+    /// Another program has the port open.
     #[error("{} is in use by another program{}", port.display(), holders.suffix())]
     Busy {
-        /// The port's path.
+        /// Path of the port.
         port: PathBuf,
-        /// The programs, as far as this user may see them.
+        /// Programs that have the port open, as far as visible to this user.
         holders: Holders,
     },
-    /// A file or a folder, or something else that is no serial line.
+    /// The path is a file, a folder or another kind of device.
     #[error("{0} is not a serial port")]
     NotSerial(PathBuf),
     /// Any other error of the system.
     #[error("cannot open {port}: {source}")]
     Io {
-        /// The port's path.
+        /// Path of the port.
         port: PathBuf,
-        /// The system's error.
+        /// Error of the operating system.
         source: io::Error,
     },
 }
 
-/// A failed listing of serial ports.
+/// Failure to list the serial ports.
 #[derive(Debug, Error)]
 #[error("{}: {source}", folder.display())]
 pub struct PortListError {
-    /// The folder of ports.
+    /// Folder in which the ports were looked up.
     pub folder: PathBuf,
-    /// The system's error.
+    /// Error of the operating system.
     pub source: io::Error,
 }
 
@@ -89,13 +89,13 @@ impl PortListError {
         Self { folder: folder.into(), source }
     }
 
-    /// A remedy.
+    /// Suggests a remedy.
     #[must_use]
     pub fn help(&self) -> String {
         exhausted(&self.source).map_or_else(
             || {
                 format!(
-                    "mount what provides {} (sysfs, udev), or give the port's path, such as \
+                    "mount the file system of {} (sysfs, udev), or give the port's path, such as \
                      /dev/ttyACM0",
                     self.folder.display()
                 )
@@ -106,7 +106,7 @@ impl PortListError {
 }
 
 impl LinkError {
-    /// A remedy.
+    /// Suggests a remedy.
     #[must_use]
     pub fn help(&self) -> String {
         match self {
@@ -136,7 +136,7 @@ impl LinkError {
             Self::DevicePolicy(port) => format!(
                 "under systemd, allow the driver in a drop-in (`DeviceAllow=char-ttyACM rw`) and \
                  restart the service: a driver that was loaded after the service started is not \
-                 allowed yet; in a container, pass {} on",
+                 allowed yet; in a container, pass {} through",
                 port.display()
             ),
             Self::Busy { port, holders } => match holders.advice(port) {
@@ -148,7 +148,7 @@ impl LinkError {
                 ),
             },
             Self::NotSerial(_) => {
-                "give a character device such as /dev/ttyACM0, or the link a mock made".into()
+                "give a character device such as /dev/ttyACM0, or the link of a mock".into()
             }
             Self::Io { source, .. } => exhausted(source).map_or_else(
                 || "unplug the board, plug it in again, and look at `dmesg`".into(),
@@ -158,7 +158,7 @@ impl LinkError {
     }
 }
 
-/// A remedy for an exhausted resource.
+/// Suggests a remedy if a system resource is exhausted.
 fn exhausted(error: &io::Error) -> Option<&'static str> {
     match Errno::from_io_error(error)? {
         Errno::MFILE => Some(
@@ -168,7 +168,7 @@ fn exhausted(error: &io::Error) -> Option<&'static str> {
         Errno::NFILE => {
             Some("this computer has no file descriptors left: see `sysctl fs.file-nr fs.file-max`")
         }
-        Errno::NOMEM => Some("this computer has no memory left: stop what uses it"),
+        Errno::NOMEM => Some("this computer has no memory left: stop other programs"),
         _ => None,
     }
 }
@@ -182,7 +182,7 @@ mod tests {
         for (errno, part) in [
             (Errno::MFILE, "this process has no file descriptors left"),
             (Errno::NFILE, "this computer has no file descriptors left"),
-            (Errno::NOENT, "mount what provides /sys/class/tty"),
+            (Errno::NOENT, "mount the file system of /sys/class/tty"),
         ] {
             let source = PortListError::new(Path::new("/sys/class/tty"), errno.into());
             let error = LinkError::NotListed { port: "Arduino".into(), source };
@@ -195,7 +195,7 @@ mod tests {
     }
 
     #[test]
-    fn unknown_holder_and_unlisted_ports_have_a_remedy() {
+    fn unknown_holder_has_a_remedy() {
         let error = LinkError::Busy { port: "/dev/ttyACM0".into(), holders: Holders::default() };
         assert_eq!(error.to_string(), "/dev/ttyACM0 is in use by another program");
         assert!(error.help().contains("sudo fuser -v /dev/ttyACM0"), "{}", error.help());

@@ -9,32 +9,32 @@ use std::{
 
 /// Device majors of pseudo-terminals.
 const PTS_MAJORS: std::ops::Range<u32> = 136..144;
-/// Characters of a command line that are shown.
-const MAX_COMMAND: usize = 60;
+/// Maximum displayed length of a command line, characters.
+const MAX_COMMAND_CHARS: usize = 60;
 
-/// A process that has a port open.
+/// Process that has a port open.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Holder {
-    /// Process id.
+    /// Process id of the holder.
     pub pid: u32,
-    /// Command line, shortened.
+    /// Command line, truncated to 60 characters.
     pub command: String,
     /// Name of the program.
     program: String,
 }
 
-/// The processes that have a port open, apart from this one.
+/// Processes that have a port open, except for this one.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Holders {
-    /// Those that this user may see.
+    /// Processes visible to this user.
     pub found: Vec<Holder>,
-    /// Further processes may exist whose files this user may not see.
+    /// `true` if further processes may exist whose files are not visible to this user.
     pub is_partial: bool,
 }
 
-/// Looks up the processes that have the port at `path` open, as far as this user may see them.
+/// Looks up the processes that have the port at `path` open, as far as visible to this user.
 ///
-/// A process that plays the device at the other end of a pseudo-terminal is not listed.
+/// A process that acts as the device at the master of a pseudo-terminal is not listed.
 #[must_use]
 pub fn find_holders(path: &Path) -> Holders {
     let Some(port) = PortNode::at(path) else { return Holders::default() };
@@ -53,7 +53,7 @@ pub fn find_holders(path: &Path) -> Holders {
         match port.is_held_by(&process.path()) {
             Ok(true) => holders.found.push(Holder::read(pid, &process.path())),
             Ok(false) => {}
-            // A process that has ended meanwhile holds nothing.
+            // The process has ended meanwhile.
             Err(error) if error.kind() == io::ErrorKind::NotFound => {}
             Err(_) => holders.is_partial = true,
         }
@@ -62,13 +62,13 @@ pub fn find_holders(path: &Path) -> Holders {
     holders
 }
 
-/// `true` where `/proc` is mounted so that processes of other users are missing from it.
+/// Returns `true` if `/proc` is mounted with `hidepid`, without the processes of other users.
 fn hides_processes() -> bool {
     !Path::new("/proc/1/stat").exists()
 }
 
 impl Holders {
-    /// Commands and process ids; `unknown` if there are none.
+    /// Lists commands and process ids; returns `unknown` if there are none.
     #[must_use]
     pub fn describe(&self, unknown: &str) -> String {
         if self.found.is_empty() {
@@ -79,12 +79,12 @@ impl Holders {
         names.collect::<Vec<_>>().join(", ")
     }
 
-    /// The same after a colon; empty if there are none.
+    /// Suffix of an error message: a colon and the list of holders; empty if there are none.
     pub(super) fn suffix(&self) -> String {
         if self.found.is_empty() { String::new() } else { format!(": {}", self.describe("")) }
     }
 
-    /// A remedy for each of them; `None` if there are none.
+    /// Suggests a remedy for each holder; `None` if there are none.
     #[must_use]
     pub fn advice(&self, port: &Path) -> Option<String> {
         let mut advice: Vec<String> = self.found.iter().map(|holder| holder.advice(port)).collect();
@@ -105,7 +105,7 @@ impl Holder {
         if command.is_empty() {
             command.clone_from(&program);
         }
-        if let Some((end, _)) = command.char_indices().nth(MAX_COMMAND) {
+        if let Some((end, _)) = command.char_indices().nth(MAX_COMMAND_CHARS) {
             command.truncate(end);
             command.push_str("...");
         }
@@ -136,10 +136,10 @@ impl Holder {
     }
 }
 
-/// A device node, and what identifies it among open files.
+/// Identity of a device node among open files.
 struct PortNode {
     device: u64,
-    /// File system of a pseudo-terminal: each instance of devpts numbers from 0.
+    /// File system of a pseudo-terminal: every devpts instance numbers its terminals from 0.
     devpts: Option<u64>,
 }
 
@@ -156,7 +156,7 @@ impl PortNode {
     fn is_held_by(&self, process: &Path) -> io::Result<bool> {
         let mut is_held = false;
         for file in fs::read_dir(process.join("fd"))?.flatten() {
-            // Only device nodes are examined further: a file on a dead network share would block.
+            // Only device nodes are examined: a stat on an unreachable network share would block.
             let Ok(target) = fs::read_link(file.path()) else { continue };
             if self.is_other_end(process, &file.file_name(), &target)? {
                 return Ok(false);
@@ -170,7 +170,7 @@ impl PortNode {
         Ok(is_held)
     }
 
-    /// `true` for the master of the pseudo-terminal.
+    /// Returns `true` for the master of the pseudo-terminal.
     fn is_other_end(&self, process: &Path, file: &OsStr, target: &Path) -> io::Result<bool> {
         if self.devpts.is_none() || target.file_name().is_none_or(|name| name != "ptmx") {
             return Ok(false);
@@ -186,7 +186,7 @@ fn is_device_path(target: &Path) -> bool {
     target.is_absolute() && target.components().any(|part| part.as_os_str() == "dev")
 }
 
-/// The path behind symbolic links, as `/proc` and sysfs name it.
+/// Canonical path without symbolic links, as used by `/proc` and sysfs.
 pub(super) fn real_path(path: &Path) -> PathBuf {
     fs::canonicalize(path).unwrap_or_else(|_| path.to_path_buf())
 }
@@ -207,7 +207,7 @@ mod tests {
         let holders = find_holders(pty.path());
         child.kill().expect("it runs");
         child.wait().expect("it ends");
-        let described = holders.describe("nobody");
+        let described = holders.describe("none");
         assert_eq!(described, format!("`sleep 60` (pid {})", child.id()));
         let advice = holders.advice(pty.path()).expect("a remedy");
         assert!(advice.contains(&format!("kill {}", child.id())), "{advice}");

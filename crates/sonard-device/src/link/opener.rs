@@ -1,4 +1,4 @@
-//! Reopening the same device.
+//! Reopening of a port with a check that it is still the same device.
 
 use tokio_serial::SerialStream;
 
@@ -6,21 +6,21 @@ use super::{
     LinkError, holders::real_path, latency_timer_ms, open_path, ports::PortFolders, resolve,
 };
 
-/// Opens a port again and again, and remembers which device a part of a name stood for.
+/// Reopens a port and tracks the device that a partial name resolved to.
 ///
-/// A part of a name that now matches another device is rejected: opening a board resets it, and its
-/// readings would go under the other one's settings.
+/// A partial name that now matches another device is rejected: opening a board resets it, and its
+/// readings would be taken with the settings of the previous device.
 #[derive(Debug, Default)]
 pub struct PortOpener {
     opened: Option<OpenedPart>,
-    /// Name of the device that was opened last.
+    /// Name of the last opened device.
     device: Option<String>,
     change: Option<String>,
-    /// The adapter's latency timer that was reported, milliseconds.
+    /// Last reported latency timer of the adapter, milliseconds.
     latency_ms: Option<u32>,
 }
 
-/// A part of a name, and the full name of the device that was opened by it.
+/// Partial name and the full name of the device that was opened with it.
 #[derive(Debug)]
 struct OpenedPart {
     part: String,
@@ -29,7 +29,7 @@ struct OpenedPart {
 
 impl OpenedPart {
     /// # Errors
-    /// If the part matches another device now.
+    /// If the partial name now matches another device.
     fn check(&self, now: Option<&str>) -> Result<(), LinkError> {
         match now.filter(|now| *now != self.id) {
             None => Ok(()),
@@ -58,7 +58,7 @@ impl PortOpener {
         if let Some(ms) = latency_ms.filter(|_| latency_ms != self.latency_ms) {
             tracing::warn!(
                 "the USB adapter of {port} has a latency timer of {ms} ms: times in records are up to \
-                 {} ms late; `sonard doctor` has the remedy",
+                 {} ms late; `sonard doctor` suggests a remedy",
                 f64::from(ms) / 2.0
             );
         }
@@ -73,7 +73,7 @@ impl PortOpener {
         Ok(line)
     }
 
-    /// Description of a change of the device behind a port since the last opening, once.
+    /// Takes the description of a change of the device since the previous opening, if any.
     pub fn take_change(&mut self) -> Option<String> {
         self.change.take()
     }
@@ -92,7 +92,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn part_of_a_name_stays_with_its_device() {
+    fn partial_name_keeps_its_device() {
         let opened = OpenedPart { part: "Arduino".into(), id: "usb-Arduino_Uno_AAAA-if00".into() };
         assert!(opened.check(Some("usb-Arduino_Uno_AAAA-if00")).is_ok());
         assert!(opened.check(None).is_ok(), "an exact name was given");
@@ -106,7 +106,7 @@ mod tests {
     }
 
     #[test]
-    fn other_device_behind_a_path_is_announced_once() {
+    fn device_change_is_reported_once() {
         let mut opener = PortOpener::default();
         for (device, change) in [
             (Some("usb-Uno_AAAA"), None),
@@ -124,7 +124,7 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn path_may_lead_to_another_device_each_time() {
+    async fn path_may_change_its_device() {
         let mut opener = PortOpener::default();
         for _ in 0..2 {
             let pty = crate::link::Pty::open(None).expect("a pty");

@@ -1,4 +1,4 @@
-//! Serial ports of this computer, from sysfs and udev's stable names. None is opened.
+//! Enumeration of the serial ports of this computer from sysfs and udev, without opening any.
 
 use std::{
     fs, io,
@@ -7,18 +7,18 @@ use std::{
 
 use super::{LinkError, PortListError, holders::real_path};
 
-/// A serial port of this machine, as far as can be told without opening it.
+/// Serial port of this computer, described without opening it.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
 pub struct Candidate {
-    /// Its path.
+    /// Path of the device node.
     pub port: String,
-    /// Its stable name under `/dev/serial/by-id`, which survives replugging.
+    /// Stable name under `/dev/serial/by-id`, which survives replugging.
     pub id: Option<String>,
-    /// What its USB descriptor says: manufacturer, product, serial number.
+    /// USB descriptor: manufacturer, product, serial number.
     pub usb: Option<String>,
 }
 
-/// Lists the serial ports of this machine, those with a stable name first. None is opened.
+/// Lists the serial ports of this computer, ports with a stable name first. No port is opened.
 ///
 /// # Errors
 /// If the system's list of ports can't be read.
@@ -26,26 +26,26 @@ pub fn candidates() -> Result<Vec<Candidate>, PortListError> {
     PortFolders::system().candidates()
 }
 
-/// A port that a name stands for.
+/// Result of resolving a port name.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Resolved {
     pub(super) path: PathBuf,
-    /// Full name under `/dev/serial/by-id`, if a part of it was given.
+    /// Full name under `/dev/serial/by-id`, if a partial name was given.
     pub(super) matched_id: Option<String>,
 }
 
 /// Folders in which the system describes serial ports.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct PortFolders<'a> {
-    /// A folder for each terminal.
+    /// Folder with one subfolder per terminal.
     pub(super) tty: &'a Path,
-    /// Symbolic links by stable names.
+    /// Folder of symbolic links with stable names.
     pub(super) by_id: &'a Path,
-    /// Device nodes.
+    /// Folder of device nodes.
     pub(super) dev: &'a Path,
 }
 
-/// A port as sysfs describes it.
+/// Serial port as described by sysfs.
 #[derive(Debug)]
 struct SystemPort {
     path: PathBuf,
@@ -85,8 +85,7 @@ impl PortFolders<'_> {
         Ok(candidates)
     }
 
-    /// Name of the device at a path, by which it can be told from others: its stable id, else its USB
-    /// descriptor.
+    /// Distinctive name of the device at a path: its stable id, else its USB descriptor.
     pub(super) fn device_name(&self, path: &Path) -> Option<String> {
         let id = id_of(&self.ids().ok()?, path);
         let descriptor = || {
@@ -103,11 +102,11 @@ impl PortFolders<'_> {
         Ok(ports.map(|port| port.path.to_string_lossy().into_owned()).collect())
     }
 
-    /// The port that `name` stands for: a stable id, a USB serial number, or a part of a stable id
-    /// that only one port has. Of several, `preferred` is taken if it is among them.
+    /// Resolves `name`: a stable id, a USB serial number, or an unambiguous part of a stable id.
+    /// `preferred` is chosen if it is among several matches.
     ///
     /// # Errors
-    /// If there is none, there are several, or they can't be listed.
+    /// If there is no match, there are several, or the ports can't be listed.
     pub(super) fn find(&self, name: &str, preferred: Option<&str>) -> Result<Resolved, LinkError> {
         let not_listed = |source| LinkError::NotListed { port: name.to_owned(), source };
         if name.is_empty() || name.contains('/') {
@@ -123,7 +122,7 @@ impl PortFolders<'_> {
         };
         let by_serial = listed.iter().flatten().filter(has_serial).map(|port| port.path.clone());
         let full_path = |path: &Path| path.to_string_lossy().into_owned();
-        if let Some(path) = only_one(by_serial.collect(), name, full_path)? {
+        if let Some(path) = only_device(by_serial.collect(), name, full_path)? {
             return Ok(Resolved { path, matched_id: None });
         }
         let mut matching: Vec<PathBuf> =
@@ -134,7 +133,7 @@ impl PortFolders<'_> {
         {
             matching = vec![path];
         }
-        if let Some(path) = only_one(matching, name, file_name)? {
+        if let Some(path) = only_device(matching, name, file_name)? {
             return Ok(Resolved { matched_id: Some(file_name(&path)), path });
         }
         let present = listed.map_err(not_listed)?;
@@ -142,7 +141,7 @@ impl PortFolders<'_> {
         Err(LinkError::NotFound { port: name.to_owned(), present: Ok(present.collect()) })
     }
 
-    /// Paths of the stable names; none where udev has made none.
+    /// Paths of the stable names; empty if udev created none.
     fn ids(&self) -> Result<Vec<PathBuf>, PortListError> {
         let mut ids = match read_folder(self.by_id) {
             Err(error) if error.kind() == io::ErrorKind::NotFound => Vec::new(),
@@ -160,8 +159,8 @@ impl PortFolders<'_> {
         Ok(ports)
     }
 
-    /// The port behind a folder of sysfs; `None` for consoles, pseudo-terminals and places of a
-    /// UART that are empty.
+    /// Reads the port of a sysfs folder; `None` for consoles, pseudo-terminals and unpopulated
+    /// UART slots.
     fn port(&self, entry: &Path) -> Option<SystemPort> {
         let path = self.dev.join(entry.file_name()?);
         if !path.exists() {
@@ -171,10 +170,10 @@ impl PortFolders<'_> {
             return Some(SystemPort { path, usb: None });
         }
         let device = fs::canonicalize(entry.join("device")).ok()?;
-        let is_empty_place = attribute(entry, "type").is_some_and(|kind| kind == "0");
+        let is_unpopulated = attribute(entry, "type").is_some_and(|kind| kind == "0");
         let subsystem = file_name(&fs::canonicalize(device.join("subsystem")).ok()?);
         match subsystem.as_str() {
-            _ if is_empty_place => None,
+            _ if is_unpopulated => None,
             "usb" | "usb-serial" => Some(SystemPort { usb: usb_device(&device), path }),
             "amba" | "pci" | "pnp" | "platform" | "serial-base" => {
                 Some(SystemPort { path, usb: None })
@@ -191,14 +190,14 @@ impl UsbDevice {
     }
 }
 
-/// The stable name among `ids` of the device at a path.
+/// Looks up the stable name of the device at a path among `ids`.
 fn id_of(ids: &[PathBuf], path: &Path) -> Option<String> {
     let device = fs::canonicalize(path).ok()?;
     let id = ids.iter().find(|id| fs::canonicalize(id).is_ok_and(|path| path == device))?;
     Some(file_name(id))
 }
 
-/// The USB device of an interface, in one of the folders above it.
+/// Reads the USB device of an interface from its parent folders.
 fn usb_device(interface: &Path) -> Option<UsbDevice> {
     let device = interface.ancestors().find(|folder| folder.join("idVendor").exists())?;
     Some(UsbDevice {
@@ -213,8 +212,8 @@ fn attribute(folder: &Path, name: &str) -> Option<String> {
     Some(text.trim().to_owned()).filter(|text| !text.is_empty())
 }
 
-/// The only device among paths; two names of one device are one.
-fn only_one(
+/// Returns the only device among paths; several names of the same device count once.
+fn only_device(
     paths: Vec<PathBuf>,
     name: &str,
     describe: impl Fn(&Path) -> String,
@@ -243,12 +242,12 @@ mod tests {
 
     use super::*;
 
-    /// Folders as the system has them, in a temporary one.
-    struct Fake {
+    /// Temporary copy of the system's port folders.
+    struct FakeFolders {
         root: tempfile::TempDir,
     }
 
-    impl Fake {
+    impl FakeFolders {
         fn new() -> Self {
             let fake = Self { root: tempfile::tempdir().expect("a folder") };
             for folder in ["tty", "by-id", "dev", "bus/usb", "bus/usb-serial", "bus/serial-base"] {
@@ -261,7 +260,7 @@ mod tests {
             self.root.path().join(name)
         }
 
-        /// A terminal, the device of which belongs to a subsystem, below a USB device.
+        /// Adds a terminal whose device belongs to a subsystem, below a USB device.
         fn add(&self, name: &str, subsystem: &str, serial: Option<&str>) {
             let usb = self.path(&format!("devices/{name}"));
             let device = usb.join("interface");
@@ -293,8 +292,8 @@ mod tests {
         }
     }
 
-    fn two_boards() -> Fake {
-        let fake = Fake::new();
+    fn two_boards() -> FakeFolders {
+        let fake = FakeFolders::new();
         for (tty, serial) in [("ttyACM0", "AAAA"), ("ttyACM1", "BBBB")] {
             fake.add(tty, "usb", Some(serial));
             fake.add_id(&format!("usb-Arduino_Uno_{serial}-if00"), tty);
@@ -303,7 +302,7 @@ mod tests {
     }
 
     #[test]
-    fn ports_are_listed_with_stable_name_and_descriptor() {
+    fn ports_are_listed() {
         let fake = two_boards();
         fake.add("ttyS0", "serial-base", None);
         fake.add("ttyS1", "serial-base", None);
@@ -324,7 +323,7 @@ mod tests {
     }
 
     #[test]
-    fn part_that_several_devices_have_lists_them_all() {
+    fn ambiguous_id_lists_all_matches() {
         let fake = two_boards();
         let error = fake.find("Arduino", None).expect_err("two match");
         let text = error.to_string();
@@ -338,8 +337,8 @@ mod tests {
     }
 
     #[test]
-    fn two_names_of_one_device_are_not_ambiguous() {
-        let fake = Fake::new();
+    fn aliases_are_not_ambiguous() {
+        let fake = FakeFolders::new();
         fake.add("ttyACM0", "usb", None);
         fake.add_id("usb-Arduino_AAAA-if00", "ttyACM0");
         fake.add_id("usb-Arduino_AAAA-if00-port0", "ttyACM0");
@@ -348,8 +347,8 @@ mod tests {
     }
 
     #[test]
-    fn serial_number_that_several_ports_have_lists_them_all() {
-        let fake = Fake::new();
+    fn ambiguous_serial_lists_all_ports() {
+        let fake = FakeFolders::new();
         fake.add("ttyUSB0", "usb-serial", Some("0001"));
         fake.add("ttyUSB1", "usb-serial", Some("0001"));
         let error = fake.find("0001", None).expect_err("two match");
@@ -358,7 +357,7 @@ mod tests {
     }
 
     #[test]
-    fn folder_that_cannot_be_read_is_an_error_with_its_name() {
+    fn unreadable_folder_is_named() {
         let fake = two_boards();
         fs::remove_dir_all(fake.path("tty")).expect("removed");
         let error = fake.with(|folders| folders.candidates()).expect_err("no list");

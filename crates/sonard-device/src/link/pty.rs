@@ -1,4 +1,4 @@
-//! A pseudo-terminal that looks like the board's serial port.
+//! Pseudo-terminal that acts as the board's serial port.
 
 use std::{
     ffi::CStr,
@@ -16,11 +16,11 @@ use rustix::{
     termios::{OptionalActions, tcgetattr, tcsetattr},
 };
 
-/// Both ends of a pty, and the symbolic link that names it if one was asked for.
+/// Both ends of a pty, and an optional symbolic link to it.
 #[derive(Debug)]
 pub struct Pty {
     master: OwnedFd,
-    /// Held open so that the master sees no hangup between two users of the port.
+    /// Held open so that the master gets no hangup between two users of the port.
     slave: OwnedFd,
     path: PathBuf,
     link: Option<PathBuf>,
@@ -30,7 +30,7 @@ impl Pty {
     /// Opens a pty in raw mode and points `link` at it.
     ///
     /// # Errors
-    /// What the system says; `AlreadyExists` if `link` is something else than a symbolic link.
+    /// Any system error; `AlreadyExists` if `link` exists and is not a link left by a mock.
     pub fn open(link: Option<&Path>) -> io::Result<Self> {
         let master = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC)?;
         grantpt(&master)?;
@@ -40,18 +40,18 @@ impl Pty {
         rustix::io::ioctl_fionbio(&master, true)?;
         let path = PathBuf::from(std::ffi::OsStr::from_bytes(name.as_bytes()));
         if let Some(link) = link {
-            point(link, &path)?;
+            create_link(link, &path)?;
         }
         Ok(Self { master, slave, path, link: link.map(Path::to_path_buf) })
     }
 
-    /// Where a host opens it: the link if there is one.
+    /// Path for hosts: the link if there is one.
     #[must_use]
     pub fn path(&self) -> &Path {
         self.link.as_deref().unwrap_or(&self.path)
     }
 
-    /// Reads what the host wrote; `WouldBlock` if nothing.
+    /// Reads bytes from the host; `WouldBlock` if there are none.
     ///
     /// # Errors
     /// As read(2).
@@ -67,12 +67,12 @@ impl Pty {
         Ok(rustix::io::write(&self.master, bytes)?)
     }
 
-    /// Lets the next program open the port after one died with it locked.
+    /// Clears the exclusive mode that a killed program left on the port.
     ///
     /// A process killed before it could close leaves the terminal in exclusive mode for as long
-    /// as the master lives, and only a slave descriptor can lift that.
+    /// as the master lives; only a slave descriptor can clear it.
     pub fn clear_exclusive(&self) {
-        // A slave that is gone has no lock either.
+        // A closed slave has no lock either.
         let _ = rustix::termios::ioctl_tiocnxcl(&self.slave);
     }
 }
@@ -94,13 +94,14 @@ impl Drop for Pty {
         if let Some(link) = &self.link
             && fs::read_link(link).is_ok_and(|target| target == self.path)
         {
-            // Nothing more can be done about a link that won't go.
+            // A failure to remove the link can't be handled any further.
             drop(fs::remove_file(link));
         }
     }
 }
 
-/// A fresh pty is cooked: it would echo the mock's own bytes back and turn LF into CRLF.
+/// Opens the slave in raw mode. A new pty is cooked: it would echo the device's own bytes and turn
+/// LF into CRLF.
 fn open_raw(name: &CStr) -> io::Result<OwnedFd> {
     let flags = OFlags::RDWR | OFlags::NOCTTY | OFlags::CLOEXEC;
     let slave = rustix::fs::open(name, flags, Mode::empty())?;
@@ -110,8 +111,8 @@ fn open_raw(name: &CStr) -> io::Result<OwnedFd> {
     Ok(slave)
 }
 
-/// Points `link` at `target`, replacing a link that an earlier mock left, which leads to a terminal.
-fn point(link: &Path, target: &Path) -> io::Result<()> {
+/// Points `link` at `target`, replacing a link to a terminal that an earlier mock left.
+fn create_link(link: &Path, target: &Path) -> io::Result<()> {
     match fs::symlink_metadata(link) {
         Ok(there) if there.is_symlink() && leads_to_terminal(link) => fs::remove_file(link)?,
         Ok(_) => {
@@ -136,7 +137,7 @@ mod tests {
     use std::{io::Write as _, time::Duration};
 
     #[test]
-    fn bytes_pass_unchanged_and_are_not_echoed() {
+    fn pty_is_raw() {
         let pty = Pty::open(None).expect("a pty");
         let mut host = fs::OpenOptions::new().write(true).open(pty.path()).expect("opens");
         host.write_all(b"\x00\x0a\x0d\x03\xff").expect("writes");
@@ -151,7 +152,7 @@ mod tests {
     }
 
     #[test]
-    fn the_link_replaces_a_stale_link_but_no_file_and_goes_with_the_pty() {
+    fn link_replaces_only_stale_links() {
         let folder = tempfile::tempdir().expect("a folder");
         let link = folder.path().join("ranger");
         std::os::unix::fs::symlink("/dev/pts/no-such", &link).expect("a stale link");
@@ -165,8 +166,8 @@ mod tests {
         assert_eq!(error.kind(), io::ErrorKind::AlreadyExists);
         assert_eq!(fs::read(&link).expect("kept"), b"data");
         let other = folder.path().join("current");
-        std::os::unix::fs::symlink(&link, &other).expect("somebody's link");
-        let error = Pty::open(Some(&other)).expect_err("a link of somebody's is in the way");
+        std::os::unix::fs::symlink(&link, &other).expect("a foreign link");
+        let error = Pty::open(Some(&other)).expect_err("a foreign link is in the way");
         assert_eq!(error.kind(), io::ErrorKind::AlreadyExists);
         assert_eq!(fs::read_link(&other).expect("kept"), link);
     }

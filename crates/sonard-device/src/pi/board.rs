@@ -1,6 +1,6 @@
-//! Carries out on pins what the device machine decides.
+//! Execution of the device state machine's actions on pins.
 
-mod under_way;
+mod activity;
 
 use firmware_protocol::{
     device::{Action, Board, Device, EchoReport, IndexSearch, within_half_a_turn},
@@ -10,44 +10,44 @@ use sonard_model::motion::Trapezoid;
 
 use super::pins::{Output, Pins};
 
-use under_way::{Listening, Turn};
+use activity::{Firing, Move};
 
-/// How long BLNK is held, ticks: at least 0.44 ms, so that the echo just heard has passed.
+/// Duration of BLNK, ticks: at least 0.44 ms, so that the detected echo has passed.
 const BLNK_TICKS: u64 = 1_000;
-/// How often the board looks for a first echo that others may follow, ticks.
+/// Poll interval of ECHO while further echoes are expected, ticks.
 pub const LOOK_TICKS: u64 = 200;
 
-/// Settings of the board.
+/// Identity and motor of a Raspberry Pi board.
 #[derive(Debug, Clone, Copy)]
 pub struct PiSettings {
-    /// Boot nonce of the first start; another one than before.
+    /// Boot nonce of the first start; must differ from the previous run.
     pub boot: u16,
-    /// Serial number.
+    /// Serial number reported to the host.
     pub serial: [u8; 10],
-    /// Steps a revolution.
+    /// Motor steps per revolution.
     pub steps_per_revolution: u16,
 }
 
-/// The device machine on pins. Feed it bytes, call [`Self::advance`] whenever
-/// [`Self::next_wake`] has come, and send what [`Self::poll_transmit`] gives.
+/// Device state machine on pins. The caller feeds received bytes, calls [`Self::advance`] at
+/// [`Self::next_wake`], and sends the bytes from [`Self::poll_transmit`].
 #[derive(Debug)]
 pub struct PiBoard<P> {
     pub(super) pins: P,
     settings: PiSettings,
     device: Device,
     boot: u16,
-    /// What the step counter says.
+    /// Value of the step counter.
     position: i32,
-    /// Whether a homing has been done, so that the next can tell the drift.
-    known: bool,
+    /// `true` after a homing, so that the next one can measure the drift.
+    is_homed: bool,
     pressed: bool,
-    turn: Option<Turn>,
-    search: Option<Search>,
-    listening: Option<Listening>,
+    motion: Option<Move>,
+    search: Option<HomeSearch>,
+    firing: Option<Firing>,
 }
 
 #[derive(Debug)]
-struct Search {
+struct HomeSearch {
     index: IndexSearch,
     speed: u16,
     acceleration: u32,
@@ -64,20 +64,20 @@ impl<P: Pins> PiBoard<P> {
             pins,
             settings,
             position: 0,
-            known: false,
+            is_homed: false,
             pressed: false,
-            turn: None,
+            motion: None,
             search: None,
-            listening: None,
+            firing: None,
         }
     }
 
-    /// The pins.
+    /// Mutable access to the pins, for their clock.
     pub const fn pins(&mut self) -> &mut P {
         &mut self.pins
     }
 
-    /// Bytes from the host.
+    /// Processes bytes from the host.
     pub fn handle_bytes(&mut self, bytes: &[u8]) {
         for &byte in bytes {
             let now = self.ticks();
@@ -86,44 +86,44 @@ impl<P: Pins> PiBoard<P> {
         }
     }
 
-    /// Appends what the device has to say.
+    /// Appends the bytes for the host.
     pub fn poll_transmit(&mut self, out: &mut Vec<u8>) {
         out.extend(std::iter::from_fn(|| self.device.poll_byte()));
-        // A restart waits until its acknowledgement is out.
+        // A restart waits until its acknowledgement is sent.
         self.act();
     }
 
-    /// When to call [`Self::advance`] next, ticks of the pins' clock.
+    /// Time of the next call of [`Self::advance`], ticks of the pins' clock.
     pub fn next_wake(&mut self) -> Option<u64> {
         let now = self.pins.now();
         let timer = self.device.poll_timeout().map(|(_, at)| {
             let ahead = at.wrapping_sub(now as u32).cast_signed().max(0);
             now + u64::from(ahead.unsigned_abs())
         });
-        let turn = self.turn.as_ref().map(Turn::due);
-        let listening = self.listening.as_ref().map(|listening| listening.due(now));
-        [timer, turn, listening].into_iter().flatten().min()
+        let motion = self.motion.as_ref().map(Move::due);
+        let firing = self.firing.as_ref().map(|firing| firing.due(now));
+        [timer, motion, firing].into_iter().flatten().min()
     }
 
-    /// Does everything that is due.
+    /// Performs everything that is due.
     pub fn advance(&mut self) {
-        // The lease first: a beam that ends after it must not be followed by another.
+        // The lease comes first: a beam that ends after it must not be followed by another.
         let now = self.ticks();
         self.device.handle_timeout(now);
-        self.watch_emergency();
+        self.check_emergency();
         self.act();
-        self.listen();
+        self.advance_firing();
         self.act();
-        self.turn();
+        self.advance_move();
         self.act();
     }
 
-    /// The machine's clock has 32 bits.
+    /// Time in the machine's 32-bit ticks.
     fn ticks(&mut self) -> u32 {
         self.pins.now() as u32
     }
 
-    fn watch_emergency(&mut self) {
+    fn check_emergency(&mut self) {
         let pressed = self.pins.emergency().unwrap_or(false);
         if pressed && !self.pressed {
             make_safe(&mut self.pins);
@@ -143,14 +143,14 @@ impl<P: Pins> PiBoard<P> {
             match action {
                 Action::Home { speed, acceleration } => self.home(speed, acceleration),
                 Action::Move { target, speed, acceleration } => {
-                    self.begin_turn(target, speed, acceleration, None);
+                    self.begin_move(target, speed, acceleration, None);
                 }
                 Action::StopMotion => self.brake(),
-                Action::ReleaseCoils => self.release(),
+                Action::ReleaseCoils => self.release_coils(),
                 Action::Fire { window_ticks, max_echoes, blanking } => {
                     self.fire(window_ticks, max_echoes, blanking);
                 }
-                Action::AbortFire => self.end_listening(),
+                Action::AbortFire => self.end_firing(),
                 Action::Reset => self.restart(),
             }
         }
@@ -160,88 +160,88 @@ impl<P: Pins> PiBoard<P> {
         self.pins.set(Output::Enable, false);
         if let Some(at_index) = self.pins.at_index() {
             let index = IndexSearch::begin(at_index, self.settings.steps_per_revolution);
-            self.search = Some(Search { index, speed, acceleration });
-            self.search_on();
+            self.search = Some(HomeSearch { index, speed, acceleration });
+            self.continue_search();
         } else {
-            // Held where it is: that is zero now.
+            // Without an index sensor the present position becomes zero.
             self.position = 0;
             let now = self.ticks();
             self.device.handle_homed(now, Ok(0));
         }
     }
 
-    /// The next turn of the search for the index.
-    fn search_on(&mut self) {
-        if let Some(Search { index, speed, acceleration }) = &self.search {
-            let (target, watch) = index.turn(self.position);
-            self.begin_turn(target, *speed, *acceleration, watch);
+    /// Begins the next move of the search for the index.
+    fn continue_search(&mut self) {
+        if let Some(HomeSearch { index, speed, acceleration }) = &self.search {
+            let (target, stop_at) = index.turn(self.position);
+            self.begin_move(target, *speed, *acceleration, stop_at);
         }
     }
 
-    fn begin_turn(&mut self, target: i32, speed: u16, acceleration: u32, watch: Option<bool>) {
+    fn begin_move(&mut self, target: i32, speed: u16, acceleration: u32, stop_at: Option<bool>) {
         self.pins.set(Output::Enable, false);
         let steps = target.wrapping_sub(self.position);
         self.pins.set(Output::Dir, steps >= 0);
-        let motion = Trapezoid::new(steps, speed, acceleration);
+        let profile = Trapezoid::new(steps, speed, acceleration);
         let since = self.pins.now();
-        self.turn = Some(Turn { motion, since, pulses: 0, watch, seen: None });
+        self.motion = Some(Move { profile, since, pulses: 0, stop_at, edge: None });
     }
 
     fn brake(&mut self) {
         self.search = None;
         let now = self.pins.now();
-        match &mut self.turn {
-            Some(turn) => turn.brake(now),
+        match &mut self.motion {
+            Some(motion) => motion.brake(now),
             None => self.device.handle_moved(now as u32, self.position),
         }
     }
 
-    /// The coils lose their current.
-    fn release(&mut self) {
+    /// Switches the coil current off.
+    fn release_coils(&mut self) {
         self.pins.set(Output::Enable, true);
-        self.turn = None;
+        self.motion = None;
         self.search = None;
-        self.known = false;
+        self.is_homed = false;
     }
 
-    /// The pulses that are due, and the end of the move.
-    fn turn(&mut self) {
-        let Some(turn) = &mut self.turn else { return };
+    /// Emits the pulse that is due, or ends the move.
+    fn advance_move(&mut self) {
+        let Some(motion) = &mut self.motion else { return };
         let now = self.pins.now();
-        if turn.watch.is_some() && self.pins.at_index() == turn.watch {
-            turn.seen = Some(self.position);
-            turn.watch = None;
-            turn.brake(now);
+        if motion.stop_at.is_some() && self.pins.at_index() == motion.stop_at {
+            motion.edge = Some(self.position);
+            motion.stop_at = None;
+            motion.brake(now);
         }
-        let due = turn.due();
+        let due = motion.due();
         if due > now {
             return;
         }
-        if turn.is_under_way() {
-            // What is late makes the rest late: pulses never crowd.
-            turn.since += now - due;
-            turn.pulses += 1;
+        if motion.has_pulses_left() {
+            // A late pulse delays all later ones: pulses never crowd.
+            motion.since += now - due;
+            motion.pulses += 1;
             self.pins.pulse();
-            self.position = self.position.wrapping_add(turn.motion.steps().signum());
+            self.position = self.position.wrapping_add(motion.profile.steps().signum());
             return;
         }
-        let seen = turn.seen;
-        self.turn = None;
-        self.arrived(seen);
+        let edge = motion.edge;
+        self.motion = None;
+        self.end_move(edge);
     }
 
-    fn arrived(&mut self, seen: Option<i32>) {
+    fn end_move(&mut self, edge: Option<i32>) {
         let now = self.ticks();
         let Some(search) = &mut self.search else {
             return self.device.handle_moved(now, self.position);
         };
-        let Some(outcome) = search.index.arrived(seen) else { return self.search_on() };
+        let Some(outcome) = search.index.arrived(edge) else { return self.continue_search() };
         self.search = None;
-        let known = std::mem::replace(&mut self.known, outcome.is_ok());
+        let was_homed = std::mem::replace(&mut self.is_homed, outcome.is_ok());
         let revolution = self.settings.steps_per_revolution;
         let drift = outcome.map(|index| {
             self.position = self.position.wrapping_sub(index);
-            if known { within_half_a_turn(index, revolution) } else { 0 }
+            if was_homed { within_half_a_turn(index, revolution) } else { 0 }
         });
         self.device.handle_homed(now, drift);
     }
@@ -259,7 +259,7 @@ impl<P: Pins> PiBoard<P> {
             Blanking::Internal => None,
             Blanking::Short { ticks } => Some(fired + u64::from(ticks)),
         };
-        self.listening = Some(Listening {
+        self.firing = Some(Firing {
             fired,
             until: fired + u64::from(window_ticks),
             binh_at,
@@ -269,43 +269,43 @@ impl<P: Pins> PiBoard<P> {
         });
     }
 
-    /// What the module does meanwhile, and the end of the window.
-    fn listen(&mut self) {
-        let Some(listening) = &mut self.listening else { return };
+    /// Records echoes, drives the blanking inputs, and ends the window.
+    fn advance_firing(&mut self) {
+        let Some(firing) = &mut self.firing else { return };
         let now = self.pins.now();
         while let Some(at) = self.pins.next_echo() {
-            if listening.hears(at) {
-                // Lowers ECHO and keeps the module deaf until the same echo has passed.
+            if firing.record_echo(at) {
+                // Lowers ECHO and blanks the module until the detected echo has passed.
                 self.pins.set(Output::Blnk, true);
-                listening.blnk_until = Some(self.pins.now() + BLNK_TICKS);
+                firing.blnk_until = Some(self.pins.now() + BLNK_TICKS);
             }
         }
-        if now >= listening.until {
+        if now >= firing.until {
             let status = ReadingStatus::Echo;
-            let (fired_ticks, echoes) = (listening.fired as u32, listening.echoes);
-            self.end_listening();
+            let (fired_ticks, echoes) = (firing.fired as u32, firing.echoes);
+            self.end_firing();
             let report = EchoReport { fired_ticks, status, echoes };
             return self.device.handle_echoes(now as u32, &report);
         }
-        if listening.binh_at.take_if(|at| *at <= now).is_some() {
+        if firing.binh_at.take_if(|at| *at <= now).is_some() {
             self.pins.set(Output::Binh, true);
         }
-        if listening.blnk_until.take_if(|at| *at <= now).is_some() {
+        if firing.blnk_until.take_if(|at| *at <= now).is_some() {
             self.pins.set(Output::Blnk, false);
         }
     }
 
-    fn end_listening(&mut self) {
+    fn end_firing(&mut self) {
         for output in [Output::Init, Output::Binh, Output::Blnk] {
             self.pins.set(output, false);
         }
-        self.listening = None;
+        self.firing = None;
     }
 
     fn restart(&mut self) {
         make_safe(&mut self.pins);
-        self.release();
-        self.listening = None;
+        self.release_coils();
+        self.firing = None;
         self.position = 0;
         self.boot = self.boot.checked_add(1).unwrap_or(1);
         let cause = ResetCause::Requested;
@@ -313,12 +313,12 @@ impl<P: Pins> PiBoard<P> {
     }
 }
 
-/// Turns the motor or fires.
+/// Returns `true` for an action that turns the motor or fires.
 const fn is_dangerous(action: &Action) -> bool {
     matches!(action, Action::Home { .. } | Action::Move { .. } | Action::Fire { .. })
 }
 
-/// Nothing fires and nothing turns.
+/// Sets outputs to safe levels: no coil current, no firing.
 fn make_safe(pins: &mut impl Pins) {
     pins.set(Output::Enable, true);
     for output in [Output::Init, Output::Binh, Output::Blnk, Output::Step, Output::Dir] {
@@ -332,7 +332,8 @@ fn identity(
     boot: u16,
     reset_cause: ResetCause,
 ) -> Board {
-    let fitted = |there: bool, capability| if there { capability } else { Capabilities::default() };
+    let fitted =
+        |is_fitted: bool, capability| if is_fitted { capability } else { Capabilities::default() };
     Board {
         boot,
         firmware: FirmwareVersion { major: 0, minor: 1, patch: 0 },

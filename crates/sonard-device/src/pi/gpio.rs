@@ -1,4 +1,4 @@
-//! The pins of a Raspberry Pi, through rppal.
+//! GPIO pins of a Raspberry Pi, through rppal.
 
 use std::time::Duration;
 
@@ -8,11 +8,11 @@ use thiserror::Error;
 
 use super::pins::{Output, Pins};
 
-/// Nanoseconds in a tick.
+/// Nanoseconds per tick.
 const TICK_NS: u64 = 500;
-/// How long STEP stays high.
+/// High time of STEP, ticks.
 const STEP_PULSE_TICKS: u64 = 6;
-/// A rise of INIT that took longer than this is told in the log.
+/// Duration of the rise of INIT above which a warning is logged, ticks.
 const SLOW_RISE_TICKS: u64 = 40;
 
 /// BCM numbers of the pins.
@@ -48,33 +48,33 @@ pub struct PinNumbers {
     pub emergency_stop: Option<u8>,
 }
 
-/// Pins that can't be used.
+/// Failure to use the GPIO pins.
 #[derive(Debug, Error)]
 pub enum GpioError {
-    /// Another computer.
-    #[error("this is no Raspberry Pi (or one that is not known)")]
+    /// The computer is not a known Raspberry Pi.
+    #[error("this is not a Raspberry Pi (or an unknown model)")]
     NotAPi,
-    /// They are there, but this user may not touch them.
+    /// This user has no access to the pins.
     #[error("no permission to use the pins: {0}")]
     Permission(String),
-    /// Anything else.
+    /// Any other error of the GPIO library.
     #[error("cannot use the pins: {0}")]
     Other(rppal::gpio::Error),
 }
 
 impl GpioError {
-    /// What a person can do about it.
+    /// Suggests a remedy.
     #[must_use]
     pub const fn help(&self) -> &'static str {
         match self {
             Self::NotAPi => {
-                "on another computer use a board with the firmware (`sonard scan --port`), or \
-                 `sonard mock` to try without one"
+                "on another computer use a board with the firmware (`sonard scan --port`), or try \
+                 `sonard mock` without a board"
             }
             Self::Permission(_) => {
                 "add yourself to the group `gpio` (`sudo usermod -aG gpio $USER`), then log in again"
             }
-            Self::Other(_) => "check the numbers given, and that no other program uses these pins",
+            Self::Other(_) => "check the pin numbers, and that no other program uses these pins",
         }
     }
 }
@@ -89,7 +89,7 @@ impl From<rppal::gpio::Error> for GpioError {
     }
 }
 
-/// The pins of this computer. They are let go of when this is dropped.
+/// GPIO pins of this computer; released when dropped.
 #[derive(Debug)]
 pub struct GpioPins {
     init: OutputPin,
@@ -104,10 +104,10 @@ pub struct GpioPins {
 }
 
 impl GpioPins {
-    /// Takes the pins: nothing fires and nothing turns.
+    /// Opens the pins at safe levels: no coil current, no firing.
     ///
     /// # Errors
-    /// [`GpioError`] tells another computer, permission and the rest apart.
+    /// If the computer is not a Raspberry Pi, permission is missing, or a pin is in use.
     pub fn open(numbers: &PinNumbers) -> Result<Self, GpioError> {
         let gpio = Gpio::new()?;
         let low = |number| Ok::<_, GpioError>(gpio.get(number)?.into_output_low());
@@ -119,7 +119,7 @@ impl GpioPins {
         let mut echo = gpio.get(numbers.echo)?.into_input();
         echo.set_interrupt(Trigger::RisingEdge, None)?;
         Ok(Self {
-            // The coils first.
+            // The coils are switched off first.
             enable: gpio.get(numbers.enable)?.into_output_high(),
             init: low(numbers.init)?,
             binh: low(numbers.binh)?,
@@ -155,7 +155,7 @@ impl Pins for GpioPins {
         self.init.set_high();
         let took = now() - before;
         if took > SLOW_RISE_TICKS {
-            tracing::warn!("the rise of INIT is known to {} us only", took / 2);
+            tracing::warn!("the time of INIT is uncertain by {} us", took / 2);
         }
         before + took / 2
     }
@@ -187,7 +187,7 @@ impl Pins for GpioPins {
     }
 }
 
-/// The clock that the kernel stamps a pin's interrupts with.
+/// Time on the clock of the kernel's interrupt time stamps, ticks.
 fn now() -> u64 {
     let time = clock_gettime(ClockId::Monotonic);
     let seconds = u64::try_from(time.tv_sec).unwrap_or(0);
@@ -204,7 +204,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn off_a_pi_it_says_so() {
+    fn other_computer_is_an_error() {
         let numbers = PinNumbers {
             init: 17,
             echo: 27,
@@ -222,7 +222,7 @@ mod tests {
     }
 
     #[test]
-    fn the_clock_counts_half_microseconds() {
+    fn clock_counts_half_microseconds() {
         assert_eq!(ticks(Duration::from_millis(3)), 6_000);
         let before = now();
         std::thread::sleep(Duration::from_millis(2));

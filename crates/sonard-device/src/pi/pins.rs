@@ -1,50 +1,50 @@
-//! What a board needs of its pins.
+//! Interface between a board and its pins.
 
-/// The lines that the board drives.
+/// Output lines of the board.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Output {
-    /// Fires the module while it is high.
+    /// Fires the module while high.
     Init,
     /// Ends the module's blanking.
     Binh,
     /// Blanks the module again, after an echo.
     Blnk,
-    /// One step for each rise.
+    /// Advances the motor by a step on each rise.
     Step,
-    /// High for forward.
+    /// Direction of the motor: high for forward.
     Dir,
-    /// Low holds the motor.
+    /// Coil current of the motor: low to hold.
     Enable,
 }
 
 /// Pins and a clock. Times are ticks of 0.5 us since any fixed moment.
 pub trait Pins {
-    /// The clock.
+    /// Present time of the clock.
     fn now(&mut self) -> u64;
 
-    /// Switches an output.
+    /// Sets the level of an output.
     fn set(&mut self, output: Output, high: bool);
 
-    /// Raises INIT, and tells when it rose.
+    /// Raises INIT and returns the time of the rise.
     fn raise_init(&mut self) -> u64;
 
-    /// One pulse on STEP, 2 us at least.
+    /// Emits a pulse of at least 2 us on STEP.
     fn pulse(&mut self);
 
-    /// Level of ECHO.
+    /// Returns the level of ECHO.
     fn echo(&mut self) -> bool;
 
-    /// When ECHO rose, oldest first; each rise is told once.
+    /// Takes the time of the oldest unread rise of ECHO.
     fn next_echo(&mut self) -> Option<u64>;
 
-    /// Forgets every rise of ECHO so far.
+    /// Discards all unread rises of ECHO.
     fn forget_echoes(&mut self) {
         while self.next_echo().is_some() {}
     }
 
-    /// Whether the index sensor is on; `None` without one.
+    /// State of the index sensor; `None` if not fitted.
     fn at_index(&mut self) -> Option<bool>;
 
-    /// Whether the emergency stop is pressed, or its wire broken; `None` without one.
+    /// `Some(true)` if the emergency stop is pressed or its wire broken; `None` if not fitted.
     fn emergency(&mut self) -> Option<bool>;
 }

@@ -1,4 +1,4 @@
-//! Plays the board on a pty.
+//! Service loop of a board on a pty.
 
 use std::{
     io,
@@ -9,19 +9,19 @@ use std::{
 use super::{board::PiBoard, pins::Pins};
 use crate::link::Pty;
 
-/// The last moment before something is due is spent awake: a sleep ends late.
-const AWAKE_TICKS: u64 = 200;
-/// The longest sleep: bytes from the host wait so long at most.
-const NAP_TICKS: u64 = 1_000;
+/// Time before a deadline that is spent spinning, ticks: a sleep ends late.
+const SPIN_TICKS: u64 = 200;
+/// Maximum sleep, ticks, which bounds the latency of bytes from the host.
+const MAX_SLEEP_TICKS: u64 = 1_000;
 const TICK_NS: u64 = 500;
 
-/// Plays until `stop` is set. Blocks: give it a thread of its own.
+/// Serves the board until `stop` is set. Blocks, so it needs a dedicated thread.
 ///
 /// # Errors
-/// When the pty fails.
+/// If the pty fails.
 pub fn serve<P: Pins>(board: &mut PiBoard<P>, pty: &Pty, stop: &AtomicBool) -> io::Result<()> {
     let mut buffer = [0; 256];
-    let mut said = Vec::new();
+    let mut outgoing = Vec::new();
     while !stop.load(Ordering::Relaxed) {
         board.advance();
         match pty.read(&mut buffer) {
@@ -29,19 +29,19 @@ pub fn serve<P: Pins>(board: &mut PiBoard<P>, pty: &Pty, stop: &AtomicBool) -> i
             Err(error) if error.kind() == io::ErrorKind::WouldBlock => {}
             Err(error) => return Err(error),
         }
-        board.poll_transmit(&mut said);
-        if !said.is_empty() {
-            match pty.write(&said) {
-                // A serial line loses what nobody reads; so does a full pty.
+        board.poll_transmit(&mut outgoing);
+        if !outgoing.is_empty() {
+            match pty.write(&outgoing) {
+                // Like a serial line without a reader, a full pty loses bytes.
                 Err(error) if error.kind() != io::ErrorKind::WouldBlock => return Err(error),
-                _ => said.clear(),
+                _ => outgoing.clear(),
             }
         }
         let now = board.pins().now();
-        let wake = board.next_wake().map_or(u64::MAX, |at| at.saturating_sub(AWAKE_TICKS));
-        let nap = wake.saturating_sub(now).min(NAP_TICKS);
-        if nap > 0 {
-            std::thread::sleep(Duration::from_nanos(nap * TICK_NS));
+        let wake = board.next_wake().map_or(u64::MAX, |at| at.saturating_sub(SPIN_TICKS));
+        let sleep = wake.saturating_sub(now).min(MAX_SLEEP_TICKS);
+        if sleep > 0 {
+            std::thread::sleep(Duration::from_nanos(sleep * TICK_NS));
         }
     }
     Ok(())

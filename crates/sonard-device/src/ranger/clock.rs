@@ -4,21 +4,22 @@
 
 use std::collections::VecDeque;
 
-/// How many exchanges the fit looks back on.
+/// Number of latest exchanges in the fit.
 const SAMPLES: usize = 64;
-/// A drift is fitted only over at least this span; below it the nominal rate serves.
+/// Minimum span for fitting a drift; over a shorter span the nominal rate is used.
 const MIN_SPAN_US: f64 = 5e6;
-/// Largest drift that is believed: a board's ceramic resonator is good to half a percent.
+/// Maximum plausible drift: a board's ceramic resonator is accurate to half a percent.
 const MAX_DRIFT: f64 = 0.006;
 
-/// Extends wrapping 32-bit ticks to 64 bits by going to the nearest candidate.
+/// Extends wrapping 32-bit ticks to 64 bits by choosing the nearest candidate.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct TickExtender {
     last: Option<u64>,
 }
 
 impl TickExtender {
-    /// The extended count. Values may come out of order by up to half a wrap (18 minutes).
+    /// Returns the extended count. Values may arrive out of order by up to half a wrap (18
+    /// minutes).
     pub fn extend(&mut self, ticks: u32) -> u64 {
         let Some(last) = self.last else {
             let first = u64::from(ticks);
@@ -32,7 +33,7 @@ impl TickExtender {
     }
 }
 
-/// One exchange: the device read its clock somewhere between the two host times.
+/// Exchange of a request and a reply: the device read its clock between the two host times.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Sample {
     middle_us: f64,
@@ -40,7 +41,7 @@ struct Sample {
     ticks: u64,
 }
 
-/// A straight line through the exchanges that went quickly.
+/// Linear fit of host time over device ticks, from the exchanges with a short round trip.
 #[derive(Debug, Clone)]
 pub struct ClockFit {
     tick_us: f64,
@@ -57,13 +58,13 @@ pub struct HostTime {
 }
 
 impl ClockFit {
-    /// A fit for a device clock of `tick_hz` ticks a second.
+    /// Creates a fit for a device clock of `tick_hz` ticks per second.
     #[must_use]
     pub fn new(tick_hz: u32) -> Self {
         Self { tick_us: 1e6 / f64::from(tick_hz.max(1)), samples: VecDeque::new() }
     }
 
-    /// Adds an exchange. Retried ones must be left out: nobody knows which copy was answered.
+    /// Adds an exchange. Retried exchanges must be omitted: the copy that was answered is unknown.
     pub fn push(&mut self, sent_us: u64, received_us: u64, ticks: u64) {
         if self.samples.len() == SAMPLES {
             self.samples.pop_front();
@@ -73,7 +74,7 @@ impl ClockFit {
         self.samples.push_back(Sample { middle_us, round_trip_us, ticks });
     }
 
-    /// When the device's clock showed `ticks`; `None` before the first exchange.
+    /// Host time at which the device's clock read `ticks`; `None` before the first exchange.
     #[must_use]
     pub fn host_time(&self, ticks: u64) -> Option<HostTime> {
         let quick = self.quick_samples();
@@ -88,7 +89,8 @@ impl ClockFit {
         line.fitted.then(|| line.tick_us / self.tick_us - 1.0)
     }
 
-    /// The exchanges whose round trip is close to the best: a delay on the way shifts the middle.
+    /// Exchanges with a round trip close to the shortest: a delay in one direction biases the
+    /// middle.
     fn quick_samples(&self) -> Vec<Sample> {
         let best = self.samples.iter().map(|s| s.round_trip_us).fold(f64::INFINITY, f64::min);
         self.samples.iter().filter(|s| s.round_trip_us <= 1.5 * best + 200.0).copied().collect()
@@ -104,7 +106,8 @@ struct LinearFit {
 }
 
 impl LinearFit {
-    /// Least squares; the nominal rate if the span is short or the slope is not believable.
+    /// Least-squares fit; falls back to the nominal rate if the span is short or the slope
+    /// implausible.
     fn through(samples: &[Sample], nominal_tick_us: f64) -> Option<Self> {
         let origin = *samples.first()?;
         let points: Vec<(f64, f64)> = samples
@@ -125,7 +128,7 @@ impl LinearFit {
         let slope = if fitted { slope } else { 1.0 };
         let offset_us = mean_y - slope * mean_x;
         let square: f64 = points.iter().map(|p| (p.1 - offset_us - slope * p.0).powi(2)).sum();
-        // Where in the round trip the device read its clock is unknown: uniform over it.
+        // The instant of the device's clock reading is uniformly distributed over the round trip.
         let inside = samples.iter().map(|s| s.round_trip_us).sum::<f64>() / n / 12_f64.sqrt();
         Some(Self {
             origin,
@@ -147,7 +150,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn ticks_extend_over_wraps_and_out_of_order() {
+    fn ticks_extend_over_wraps() {
         let mut extender = TickExtender::default();
         let first = extender.extend(u32::MAX - 10);
         assert_eq!(extender.extend(5), first + 16);
@@ -161,7 +164,7 @@ mod tests {
     }
 
     #[test]
-    fn a_drifting_clock_is_followed_and_slow_exchanges_are_left_out() {
+    fn fit_follows_drift() {
         let mut fit = ClockFit::new(2_000_000);
         // 300 ppm slow: a tick takes 0.50015 us of host time.
         let host_us = |ticks: u64| 7e6 + ticks as f64 * 0.500_15;
@@ -179,7 +182,7 @@ mod tests {
     }
 
     #[test]
-    fn one_exchange_gives_the_nominal_rate_and_none_gives_nothing() {
+    fn one_exchange_gives_nominal_rate() {
         let mut fit = ClockFit::new(2_000_000);
         assert_eq!(fit.host_time(0), None);
         fit.push(1_000, 2_000, 500);

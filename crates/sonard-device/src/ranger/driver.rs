@@ -1,4 +1,4 @@
-//! The only place where the host machine meets a line and a clock.
+//! Host state machine on a real line and clock; the only module that waits for either.
 
 use std::{ops::ControlFlow, time::Duration};
 
@@ -16,10 +16,10 @@ use tokio::{
     time::{Instant, sleep_until},
 };
 
-/// Restarts of a device that is being met, after which it is given up.
-const RESTARTS: u32 = 3;
+/// Maximum number of restarts of a device while it is identified.
+const MAX_RESTARTS: u32 = 3;
 
-/// A host machine on a line. It owns both; whoever wants something of the device asks it.
+/// Host state machine on a line; owns both.
 #[derive(Debug)]
 pub struct Driver<L> {
     line: L,
@@ -30,49 +30,49 @@ pub struct Driver<L> {
     stats: watch::Sender<LinkStats>,
 }
 
-/// The result of a successful command.
+/// Result of a successful command.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Ended {
-    /// An Identify.
+    /// Identity of the device, from an Identify.
     Identified(Identity),
-    /// A sweep: so many readings were delivered.
+    /// End of a sweep.
     Swept {
-        /// Readings delivered.
+        /// Number of readings delivered.
         delivered: u16,
-        /// Complete or stopped.
+        /// Final state of the sweep: complete or stopped.
         end: SweepState,
     },
-    /// Any other command.
+    /// Outcome of any other command.
     Done(Outcome),
 }
 
-/// The reason why a command failed.
+/// Failure of a command.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
 pub enum DriveError {
-    /// It was not begun.
+    /// The command was not started.
     #[error("{0}")]
     NotStarted(StartError),
-    /// It failed.
+    /// The device or the line failed.
     #[error("{0}")]
     Host(HostError),
-    /// Whoever takes the events wanted no more of them; the command is still under way.
-    #[error("given up by the receiver of its readings")]
+    /// The event callback broke off; the command is still running.
+    #[error("aborted by the receiver of its readings")]
     Abandoned,
-    /// The device that answers is not the one that the session describes.
-    #[error("another device answers than the one that was met: {0}")]
+    /// The device is not the one that the session describes.
+    #[error("another device responds than the one identified before: {0}")]
     OtherBoard(BoardChange),
 }
 
 impl DriveError {
-    /// What a person can do about it.
+    /// Suggests a remedy.
     #[must_use]
     pub const fn help(&self) -> &'static str {
         match self {
             Self::NotStarted(_) | Self::Abandoned => "this is a fault of the program: report it",
             Self::Host(error) => host_help(error),
             Self::OtherBoard(_) => {
-                "what it measures must not go under the other one's name: scan again, or put the \
-                 other one back"
+                "its readings must not be recorded under the other device's identity: scan again, \
+                 or reconnect the other device"
             }
         }
     }
@@ -82,32 +82,35 @@ const fn host_help(error: &HostError) -> &'static str {
     match error {
         HostError::NoAnswer { .. } => {
             "check that no other program reads the port (`sudo fuser -v PORT`), that the port is the \
-             ranger's, that the board has power, and the cable; a board that never ran the firmware \
-             does not answer either"
+             ranger's, that the board has power, and the cable; a board without the firmware does \
+             not respond either"
         }
         HostError::NotADevice { .. } => {
-            "check that the port is the ranger's; a modem, a GPS or another firmware speaks \
-             something else"
+            "check that the port is the ranger's; a modem, a GPS or another firmware uses another \
+             protocol"
         }
         HostError::WrongVersion { .. } => {
-            "flash the firmware of this version of sonard, or install the sonard of the firmware's"
+            "flash the firmware of this version of sonard, or install the sonard version of the \
+             firmware"
         }
         HostError::WrongIdentity(_) => {
-            "flash the firmware of this version of sonard; on a board of your own see what \
-             PROTOCOL.md says that a host must refuse"
+            "flash the firmware of this version of sonard; for a board of your own see \"What a \
+             host must refuse\" in PROTOCOL.md"
         }
         HostError::Refused(reason) => refused_help(*reason),
         HostError::Rebooted => {
-            "the board restarts again and again: look at its supply (the module draws 2 A while \
-             firing; it needs 1000 uF beside it)"
+            "the board restarts repeatedly: check its supply (the module draws 2 A while firing \
+             and needs 1000 uF close to it)"
         }
         HostError::Hangup => "the cable was pulled or the board lost power: plug it in, scan again",
         HostError::LeaseExpired => {
-            "this computer was away too long: stop what loads it, scan again"
+            "this computer was blocked for too long: reduce its load, then scan again"
         }
         HostError::EmergencyStop => "release the emergency stop, then scan again",
         HostError::MotionFault => "free the motor, check its supply and current, then scan again",
-        HostError::Stopped => "another program stopped it: make sure that only one uses the port",
+        HostError::Stopped => {
+            "another program stopped the device: make sure that only one uses the port"
+        }
         HostError::Overrun { .. } => {
             "check that the motor turns, its supply and its index sensor; reset the board"
         }
@@ -124,8 +127,8 @@ const fn host_help(error: &HostError) -> &'static str {
 const fn refused_help(reason: NakReason) -> &'static str {
     match reason {
         NakReason::Busy => {
-            "another program gives the ranger work at the same time: make sure that only one uses \
-             the port"
+            "another program uses the ranger at the same time: make sure that only one uses the \
+             port"
         }
         NakReason::WrongBoot
         | NakReason::SequenceReused
@@ -135,8 +138,8 @@ const fn refused_help(reason: NakReason) -> &'static str {
             "reset the board and scan again; if it happens again, report it with the log"
         }
         NakReason::IndexNotFound => {
-            "if the motor did not turn, check its supply and current; if it did, check the index \
-             sensor; `sonard doctor --port PORT` examines both"
+            "if the motor did not turn, check its supply and current; otherwise check the index \
+             sensor; `sonard doctor --port PORT` tests both"
         }
         NakReason::Stopped => host_help(&HostError::Stopped),
         NakReason::EmergencyStop => host_help(&HostError::EmergencyStop),
@@ -151,12 +154,12 @@ const fn refused_help(reason: NakReason) -> &'static str {
         | NakReason::AccelerationOutOfRange
         | NakReason::HoldOutOfRange
         | NakReason::SweepOutOfRange
-        | NakReason::LeaseOutOfRange => "change the setting that the device names",
+        | NakReason::LeaseOutOfRange => "change the setting that the device rejected",
     }
 }
 
 impl<L: AsyncRead + AsyncWrite + Unpin> Driver<L> {
-    /// A driver on an open line.
+    /// Creates a driver on an open line.
     pub fn new(line: L, config: HostConfig) -> Self {
         Self {
             line,
@@ -168,32 +171,32 @@ impl<L: AsyncRead + AsyncWrite + Unpin> Driver<L> {
         }
     }
 
-    /// Gives the line back.
+    /// Returns the line.
     pub fn into_line(self) -> L {
         self.line
     }
 
-    /// The machine, for its statistics.
+    /// Host state machine, for its statistics.
     pub const fn host(&self) -> &Host {
         &self.host
     }
 
-    /// Its statistics for somebody else, also while a command is under way.
+    /// Subscribes to the link statistics, which are updated also while a command runs.
     #[must_use]
     pub fn watch_stats(&self) -> watch::Receiver<LinkStats> {
         self.stats.subscribe()
     }
 
-    /// Microseconds since the driver was made: the time line of the machine's events.
+    /// Microseconds since the driver's creation: the time base of the machine's events.
     pub fn now_us(&self) -> u64 {
         u64::try_from(self.epoch.elapsed().as_micros()).unwrap_or(u64::MAX)
     }
 
-    /// Begins a command; [`Self::finish`] carries it out.
+    /// Starts a command; [`Self::finish`] carries it out.
     ///
     /// # Errors
-    /// When another one is under way or something must come first; a hangup or a restart of the
-    /// device since the command before is told as what it is.
+    /// If another command is running or a prerequisite is missing. A hangup or a restart of the
+    /// device since the previous command is reported as such.
     pub fn start(&mut self, command: Command) -> Result<(), DriveError> {
         if self.hung_up {
             return Err(DriveError::Host(HostError::Hangup));
@@ -205,7 +208,7 @@ impl<L: AsyncRead + AsyncWrite + Unpin> Driver<L> {
         })
     }
 
-    /// Carries out one command and hands every event on the way to `on_event`, which may break
+    /// Carries out one command and passes every intermediate event to `on_event`, which may break
     /// off.
     ///
     /// # Errors
@@ -219,12 +222,12 @@ impl<L: AsyncRead + AsyncWrite + Unpin> Driver<L> {
         self.finish(on_event).await
     }
 
-    /// Asks the device who it is, and stops whatever it still does: a sweep that an earlier program
-    /// left behind goes on for as long as anybody talks to the device, and all else is refused
-    /// meanwhile. Events go to `on_event`.
+    /// Identifies the device and stops its current activity. A sweep left behind by an earlier
+    /// program continues as long as a host communicates, and other commands are refused meanwhile.
+    /// Events go to `on_event`.
     ///
     /// # Errors
-    /// When nothing or something else answers, or the device only restarts.
+    /// If no ranger responds, or the device restarts repeatedly.
     pub async fn take_over(
         &mut self,
         mut on_event: impl FnMut(HostEvent) -> ControlFlow<()>,
@@ -235,14 +238,16 @@ impl<L: AsyncRead + AsyncWrite + Unpin> Driver<L> {
             let Ended::Identified(identity) = ended else { continue };
             match self.stop(&mut on_event).await {
                 Ok(()) => return Ok(identity),
-                // It restarted in between: what it says of itself is no longer true.
-                Err(DriveError::Host(HostError::Rebooted)) if restarts < RESTARTS => restarts += 1,
+                // The device restarted in between: its identity is out of date.
+                Err(DriveError::Host(HostError::Rebooted)) if restarts < MAX_RESTARTS => {
+                    restarts += 1;
+                }
                 Err(error) => return Err(error),
             }
         }
     }
 
-    /// Brings the device to a stand, whatever is under way.
+    /// Stops the device, whatever is running.
     ///
     /// # Errors
     /// As [`Self::start`] and [`Self::finish`].
@@ -261,12 +266,12 @@ impl<L: AsyncRead + AsyncWrite + Unpin> Driver<L> {
         }
     }
 
-    /// Waits for the end of the command under way, handing every other event to `on_event`.
+    /// Waits for the end of the running command, passing every other event to `on_event`.
     ///
-    /// Cancel-safe: what was received stays in the machine, and a later call goes on with it.
+    /// Cancel-safe: received bytes stay in the machine, and a later call continues with them.
     ///
     /// # Errors
-    /// The machine's own, which name the cause.
+    /// Any error of the host state machine.
     pub async fn finish(
         &mut self,
         mut on_event: impl FnMut(HostEvent) -> ControlFlow<()>,
@@ -288,8 +293,7 @@ impl<L: AsyncRead + AsyncWrite + Unpin> Driver<L> {
         }
     }
 
-    /// Waits on a line without work until the device says something by itself; `None` when the
-    /// line was closed.
+    /// Waits on an idle line for an unsolicited event of the device; `None` after a hangup.
     ///
     /// Cancel-safe, as [`Self::finish`].
     pub async fn idle(&mut self) -> Option<HostEvent> {
@@ -302,7 +306,7 @@ impl<L: AsyncRead + AsyncWrite + Unpin> Driver<L> {
         None
     }
 
-    /// The machine's next event.
+    /// Runs the machine until its next event.
     async fn next_event(&mut self) -> HostEvent {
         loop {
             if let Some(event) = self.host.poll_event() {
@@ -315,7 +319,7 @@ impl<L: AsyncRead + AsyncWrite + Unpin> Driver<L> {
         }
     }
 
-    /// Waits for bytes, room for bytes, or the machine's next deadline, and tells the machine.
+    /// Waits for input, output space or the machine's next deadline, and notifies the machine.
     async fn wait(&mut self) {
         let deadline = self.host.poll_timeout();
         let deadline = deadline.map(|(_, at_us)| self.epoch + Duration::from_micros(at_us));
@@ -326,37 +330,37 @@ impl<L: AsyncRead + AsyncWrite + Unpin> Driver<L> {
             }
         };
         let mut buffer = [0; 1024];
-        // After a hangup the line would answer at once, for ever: it is not asked again.
-        let (listening, speaking) = (!self.hung_up, !self.hung_up && !self.outgoing.is_empty());
+        // After a hangup the line is always ready: polling it again would spin.
+        let (can_read, can_write) = (!self.hung_up, !self.hung_up && !self.outgoing.is_empty());
         let (mut reader, mut writer) = tokio::io::split(&mut self.line);
-        let happened = tokio::select! {
-            read = reader.read(&mut buffer), if listening => Happened::Read(read.unwrap_or(0)),
-            written = writer.write(&self.outgoing), if speaking => {
-                Happened::Written(written.unwrap_or(0))
+        let event = tokio::select! {
+            read = reader.read(&mut buffer), if can_read => LineEvent::Read(read.unwrap_or(0)),
+            written = writer.write(&self.outgoing), if can_write => {
+                LineEvent::Written(written.unwrap_or(0))
             }
-            () = timer => Happened::Timeout,
+            () = timer => LineEvent::Timeout,
         };
         let now_us = self.now_us();
-        match happened {
-            Happened::Read(0) | Happened::Written(0) => {
+        match event {
+            LineEvent::Read(0) | LineEvent::Written(0) => {
                 self.hung_up = true;
                 self.outgoing.clear();
                 self.host.handle_hangup(now_us);
             }
-            Happened::Read(count) => {
+            LineEvent::Read(count) => {
                 self.host.handle_bytes(now_us, buffer.get(..count).unwrap_or_default());
             }
-            Happened::Written(count) => drop(self.outgoing.drain(..count)),
-            Happened::Timeout => self.host.handle_timeout(now_us),
+            LineEvent::Written(count) => drop(self.outgoing.drain(..count)),
+            LineEvent::Timeout => self.host.handle_timeout(now_us),
         }
         self.stats.send_replace(*self.host.stats());
     }
 }
 
-enum Happened {
-    /// So many bytes came; 0 at the end of the line.
+enum LineEvent {
+    /// Number of bytes received; 0 after a hangup.
     Read(usize),
-    /// So many bytes went; 0 at the end of the line.
+    /// Number of bytes sent; 0 after a hangup.
     Written(usize),
     Timeout,
 }

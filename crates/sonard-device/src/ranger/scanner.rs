@@ -1,4 +1,4 @@
-//! Takes a scan: sends the plan to the device and turns what comes back into records.
+//! Execution of a scan: sends the plan to the device and records its readings.
 
 use firmware_protocol::{
     host::{BoardChange, Command, HostError, HostEvent, LinkStats, Outcome},
@@ -16,33 +16,33 @@ use uuid::Uuid;
 
 use super::{
     driver::{DriveError, Driver, Ended},
-    job::ScanJob,
-    progress::{Finished, Progress},
+    scan_job::ScanJob,
+    scan_recorder::{FinishedScan, ScanRecorder},
     timing,
     wall_clock::{as_step, confirmed},
 };
 
-/// Restarts of the device without a single new reading after which a scan is given up.
-const FRUITLESS_RESTARTS: u32 = 3;
-/// Exchanges before a scan that give the clock fit its first points.
+/// Maximum number of consecutive device restarts without a new reading; then the scan fails.
+const MAX_FRUITLESS_RESTARTS: u32 = 3;
+/// Number of exchanges before a scan that initialize the clock fit.
 const CLOCK_EXCHANGES: u32 = 4;
 
 /// Summary of a scan.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ScanSummary {
-    /// Its last record.
+    /// Final record of the scan.
     pub end: ScanEnd,
-    /// Whether it was stopped on request.
+    /// `true` if the scan was stopped on request.
     pub stopped: bool,
-    /// Restarts of the device that it survived.
+    /// Number of device restarts during the scan.
     pub restarts: u32,
     /// Relative deviation of the device's clock from its nominal rate; `None` until known.
     pub clock_drift: Option<f64>,
-    /// Why the device could not go home after it, if so. The scan is whole all the same.
+    /// Error of the return home after the scan, if it failed. The scan is complete nevertheless.
     pub not_home: Option<DriveError>,
 }
 
-/// The reason why a scan ended early. Its records up to there are written, `scan_end` included.
+/// Failure that ended a scan early. The records so far are written, `scan_end` included.
 #[derive(Debug, Error)]
 pub enum ScanError {
     /// The plan does not fit the device's motor.
@@ -51,58 +51,58 @@ pub enum ScanError {
     /// The device or the line failed.
     #[error("{0}")]
     Device(#[from] DriveError),
-    /// A record could not be kept.
+    /// A record could not be written.
     #[error("{0}")]
     Sink(#[from] SinkError),
 }
 
-/// A ranger that has told its identity.
+/// Identified ranger on a line.
 #[derive(Debug)]
 pub struct Ranger<L> {
     driver: Driver<L>,
     identity: Identity,
-    /// Wall clock at microsecond 0 of the driver.
+    /// Wall-clock time at microsecond 0 of the driver.
     wall_epoch: Timestamp,
     clock_steps: u32,
 }
 
-/// An unrequested event on an idle line.
+/// Unsolicited event on an idle line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Unasked {
     /// The line was closed.
     Hangup,
-    /// The device restarted: identify it anew.
+    /// The device restarted and must be identified again.
     Restarted,
     /// The device reported a fault.
     Fault(FaultKind),
 }
 
 impl<L: AsyncRead + AsyncWrite + Unpin> Ranger<L> {
-    /// Meets the device on a line, and stops whatever it still does.
+    /// Identifies the device on a line and stops its current activity.
     ///
     /// # Errors
-    /// When nothing or something else answers.
+    /// If no ranger responds.
     pub async fn meet(mut driver: Driver<L>) -> Result<Self, DriveError> {
         let wall_epoch = wall_epoch(Timestamp::now(), driver.now_us());
         let identity = driver.take_over(ignore).await?;
         Ok(Self { driver, identity, wall_epoch, clock_steps: 0 })
     }
 
-    /// Asks the device again who it is, after it restarted; another one may answer now, which
-    /// [`Self::identity`] tells.
+    /// Identifies the device again after a restart. A different board is accepted;
+    /// [`Self::identity`] returns the new identity.
     ///
     /// # Errors
-    /// When nothing or something else answers.
+    /// If no ranger responds.
     pub async fn meet_again(&mut self) -> Result<(), DriveError> {
         self.identity = self.driver.take_over(ignore).await?;
         Ok(())
     }
 
-    /// Makes sure that the board that answers is the one that was met; it may have restarted.
-    /// Whatever it still does is stopped.
+    /// Checks that the board is the one identified before, possibly restarted, and stops its
+    /// current activity.
     ///
     /// # Errors
-    /// When another one answers, or none.
+    /// If another board or none responds.
     pub async fn recognise(&mut self) -> Result<(), DriveError> {
         let identity = self.driver.take_over(ignore).await?;
         if let Some(change) = BoardChange::between(&self.identity, &identity) {
@@ -112,10 +112,10 @@ impl<L: AsyncRead + AsyncWrite + Unpin> Ranger<L> {
         Ok(())
     }
 
-    /// Sets the device up and finds home; returns by how much the index was off, steps.
+    /// Configures the device and homes the motor. Returns the drift found at the index, steps.
     ///
     /// # Errors
-    /// The device's and the line's.
+    /// Any error of the device or the line.
     pub async fn home(&mut self, settings: Settings) -> Result<i32, DriveError> {
         self.driver.perform(Command::Configure(settings), ignore).await?;
         match self.driver.perform(Command::Home, ignore).await? {
@@ -124,15 +124,15 @@ impl<L: AsyncRead + AsyncWrite + Unpin> Ranger<L> {
         }
     }
 
-    /// Asks a device without work how it is.
+    /// Polls the status of an idle device.
     ///
     /// # Errors
-    /// When it does not answer any more.
+    /// If the device does not respond.
     pub async fn check(&mut self) -> Result<(), DriveError> {
         self.driver.perform(Command::Status, ignore).await.map(drop)
     }
 
-    /// Waits until the line is closed or the device says something by itself. Cancel-safe.
+    /// Waits for a hangup or an unsolicited event of the device. Cancel-safe.
     pub async fn unasked(&mut self) -> Unasked {
         loop {
             match self.driver.idle().await {
@@ -144,9 +144,9 @@ impl<L: AsyncRead + AsyncWrite + Unpin> Ranger<L> {
         }
     }
 
-    /// Takes the computer's wall clock anew, and returns by how much it was set meanwhile (or
-    /// drifted away from the clock that never jumps). Done between scans, so that within a scan
-    /// times are consistent.
+    /// Synchronizes with the computer's wall clock. Returns how far it was set since the last
+    /// time, or drifted from the monotonic clock. Called between scans only, so that times within
+    /// a scan are consistent.
     fn reanchor(&mut self) -> SignedDuration {
         let epoch = || wall_epoch(Timestamp::now(), self.driver.now_us());
         let moved = || epoch().duration_since(self.wall_epoch);
@@ -159,37 +159,37 @@ impl<L: AsyncRead + AsyncWrite + Unpin> Ranger<L> {
         moved
     }
 
-    /// How often the computer's wall clock was set; each time is an event of the scan that noticed.
+    /// Number of steps of the computer's wall clock. Each is an event of the scan that detected it.
     #[must_use]
     pub const fn clock_steps(&self) -> u32 {
         self.clock_steps
     }
 
-    /// What the device said of itself.
+    /// Identity that the device reported last.
     pub const fn identity(&self) -> &Identity {
         &self.identity
     }
 
-    /// Numbers about the line.
+    /// Counters of the serial link.
     pub const fn link_stats(&self) -> &LinkStats {
         self.driver.host().stats()
     }
 
-    /// The same for somebody else, also while a scan is under way.
+    /// Subscribes to the counters of the serial link, which are updated also during a scan.
     #[must_use]
     pub fn watch_link(&self) -> watch::Receiver<LinkStats> {
         self.driver.watch_stats()
     }
 
-    /// Takes one scan, from `scan_start` to `scan_end`, handing each record to `sink`.
+    /// Takes one scan, from `scan_start` to `scan_end`, writing each record to `sink`.
     ///
-    /// Asks first who is there, so that no scan begins with a device that is gone or another one.
-    /// Goes home first and, if there is an index sensor, afterwards. A device that restarts
-    /// meanwhile is homed and goes on with what is left, if it is the same board. When `stop` is ready, the motor is
-    /// stopped and the scan closed, with the words of `stop` as an event.
+    /// Re-identifies the device first: a scan never starts on a disconnected or different board.
+    /// Homes the motor before the scan and, with an index sensor, afterwards. If the same board
+    /// restarts meanwhile, it is homed and the remaining beams are measured. When `stop` is ready,
+    /// the motor is stopped and the scan closed, with the text from `stop` as an event.
     ///
     /// # Errors
-    /// The device's, the line's and the log's; what was measured is written all the same.
+    /// Any error of the device, the line or the log. Beams measured so far are recorded.
     pub async fn scan(
         &mut self,
         job: &ScanJob,
@@ -208,71 +208,72 @@ impl<L: AsyncRead + AsyncWrite + Unpin> Ranger<L> {
         let ScanJob { pose, plan, air, request, .. } = *job;
         let start = ScanStart { air, request, ..ScanStart::new(scan, time, pose, plan) };
         sink.record(&Record::ScanStart(start))?;
-        let mut progress = Progress::new(job, scan, motor, self.wall_epoch, &self.identity, sink);
+        let mut recorder =
+            ScanRecorder::new(job, scan, motor, self.wall_epoch, &self.identity, sink);
         if before != self.identity.boot {
-            progress.note(
+            recorder.note(
                 EventKind::Reboot,
-                format!("the device restarted before it (boot {before:04x})"),
+                format!("the device restarted before the scan (boot {before:04x})"),
             );
         }
-        progress.wall_clock_was_set(step);
-        let outcome = self.measure(job, motor, &mut progress, stop).await;
+        recorder.note_earlier_clock_step(step);
+        let outcome = self.measure(job, motor, &mut recorder, stop).await;
         let stopped = matches!(outcome, Ok(Stopped(true)));
         if let Err(ScanError::Device(error)) = &outcome {
-            progress.give_up(error);
+            recorder.abort(error);
         }
         let home = match outcome {
-            Ok(Stopped(false)) => self.home_check(&mut progress).await,
+            Ok(Stopped(false)) => self.home_check(&mut recorder).await,
             _ => Ok(None),
         };
-        progress.look_at_wall_clock();
-        let (set_by, steps) = progress.wall_clock_steps();
+        recorder.check_wall_clock();
+        let (set_by, steps) = recorder.wall_clock_steps();
         self.wall_epoch = self.wall_epoch.checked_add(set_by).unwrap_or(self.wall_epoch);
         self.clock_steps += steps + u32::from(as_step(step).is_some());
         let limit_s = timing::limit_s(&job.plan, &job.settings, motor.1);
         let drift = home.as_ref().ok().copied().flatten();
-        let Finished { end, restarts, clock_drift } = progress.finish(limit_s, drift)?;
+        let FinishedScan { end, restarts, clock_drift } = recorder.finish(limit_s, drift)?;
         let not_home = home.err();
         outcome.map(|_| ScanSummary { end, stopped, restarts, clock_drift, not_home })
     }
 
-    /// Sweeps until nothing is left of the plan.
+    /// Sweeps until every beam of the plan is measured or rejected.
     async fn measure(
         &mut self,
         job: &ScanJob,
         motor: (i32, i32),
-        progress: &mut Progress<'_>,
+        recorder: &mut ScanRecorder<'_>,
         mut stop: std::pin::Pin<&mut impl Future<Output = String>>,
     ) -> Result<Stopped, ScanError> {
         let mut fruitless = 0;
         loop {
-            let before = progress.measured();
+            let before = recorder.measured();
             let outcome = tokio::select! {
                 biased;
-                why = &mut stop => Err(why),
-                outcome = self.sweep_rest(job, motor, progress) => Ok(outcome),
+                reason = &mut stop => Err(reason),
+                outcome = self.sweep_rest(job, motor, recorder) => Ok(outcome),
             };
             match outcome {
-                Err(why) => {
-                    self.halt(progress).await?;
-                    progress.note(EventKind::Stopped, why);
+                Err(reason) => {
+                    self.halt(recorder).await?;
+                    recorder.note(EventKind::Stopped, reason);
                     return Ok(Stopped(true));
                 }
                 Ok(Err(ScanError::Device(DriveError::Abandoned))) => {
-                    self.halt(progress).await?;
-                    return progress.check_sink().map(|()| Stopped(true)).map_err(ScanError::Sink);
+                    self.halt(recorder).await?;
+                    return recorder.check_sink().map(|()| Stopped(true)).map_err(ScanError::Sink);
                 }
                 Ok(Err(ScanError::Device(DriveError::Host(HostError::Rebooted)))) => {
-                    fruitless = if progress.measured() > before { 0 } else { fruitless + 1 };
-                    if fruitless >= FRUITLESS_RESTARTS {
+                    fruitless = if recorder.measured() > before { 0 } else { fruitless + 1 };
+                    if fruitless >= MAX_FRUITLESS_RESTARTS {
                         return Err(DriveError::Host(HostError::Rebooted).into());
                     }
                     self.recognise().await?;
-                    progress.restarted(&self.identity);
+                    recorder.resume_after_restart(&self.identity);
                 }
                 Ok(done) => {
                     done?;
-                    progress.check_sink()?;
+                    recorder.check_sink()?;
                     return Ok(Stopped(false));
                 }
             }
@@ -283,47 +284,50 @@ impl<L: AsyncRead + AsyncWrite + Unpin> Ranger<L> {
         &mut self,
         job: &ScanJob,
         (from_step, stride): (i32, i32),
-        progress: &mut Progress<'_>,
+        recorder: &mut ScanRecorder<'_>,
     ) -> Result<(), ScanError> {
-        // A sweep that an earlier program left behind would go on for as long as anybody talks.
-        self.halt(progress).await?;
-        self.command(Command::Configure(job.settings), progress).await?;
-        self.command(Command::Home, progress).await?;
+        // A sweep left behind by an earlier program would continue as long as a host communicates.
+        self.halt(recorder).await?;
+        self.command(Command::Configure(job.settings), recorder).await?;
+        self.command(Command::Home, recorder).await?;
         for _ in 0..CLOCK_EXCHANGES {
-            self.command(Command::Status, progress).await?;
+            self.command(Command::Status, recorder).await?;
         }
-        while let Some(segment) = progress.next_segment() {
+        while let Some(segment) = recorder.next_segment() {
             let sweep = sweep_of(&segment, from_step, stride, &job.settings);
-            progress.begin(segment);
-            self.command(Command::Sweep(sweep), progress).await?;
-            progress.check_sink()?;
+            recorder.begin(segment);
+            self.command(Command::Sweep(sweep), recorder).await?;
+            recorder.check_sink()?;
         }
         Ok(())
     }
 
-    /// Brings the motor to a stand, whatever is under way.
+    /// Stops the motor, whatever is running.
     ///
     /// # Errors
-    /// The device's and the line's.
+    /// Any error of the device or the line.
     pub async fn stop(&mut self) -> Result<(), DriveError> {
         self.driver.stop(ignore).await
     }
 
-    /// The same, and takes in what was measured until then.
-    async fn halt(&mut self, progress: &mut Progress<'_>) -> Result<(), DriveError> {
-        self.driver.stop(|event| progress.handle(event)).await
+    /// Stops the device and records the readings received until then.
+    async fn halt(&mut self, recorder: &mut ScanRecorder<'_>) -> Result<(), DriveError> {
+        self.driver.stop(|event| recorder.handle(event)).await
     }
 
-    /// Goes home and reports by how much the index was off.
-    async fn home_check(&mut self, progress: &mut Progress<'_>) -> Result<Option<i32>, DriveError> {
+    /// Homes the motor after a scan. Returns the drift found at the index, steps.
+    async fn home_check(
+        &mut self,
+        recorder: &mut ScanRecorder<'_>,
+    ) -> Result<Option<i32>, DriveError> {
         if !self.identity.capabilities.has(Capabilities::INDEX_SENSOR) {
             return Ok(None);
         }
-        match self.command(Command::Home, progress).await {
+        match self.command(Command::Home, recorder).await {
             Ok(Ended::Done(Outcome::Homed { drift_steps })) => Ok(Some(drift_steps)),
             Ok(_) => Ok(None),
             Err(error) => {
-                progress.could_not_go_home(&error);
+                recorder.note_home_failure(&error);
                 Err(error)
             }
         }
@@ -332,15 +336,15 @@ impl<L: AsyncRead + AsyncWrite + Unpin> Ranger<L> {
     async fn command(
         &mut self,
         command: Command,
-        progress: &mut Progress<'_>,
+        recorder: &mut ScanRecorder<'_>,
     ) -> Result<Ended, DriveError> {
-        self.driver.perform(command, |event| progress.handle(event)).await
+        self.driver.perform(command, |event| recorder.handle(event)).await
     }
 }
 
 struct Stopped(bool);
 
-/// The wall clock when the driver's clock began, from both read now.
+/// Wall-clock time at the start of the driver's clock, from simultaneous readings of both.
 fn wall_epoch(wall: Timestamp, driver_us: u64) -> Timestamp {
     let since = SignedDuration::from_micros(i64::try_from(driver_us).unwrap_or(0));
     wall.checked_sub(since).unwrap_or(wall)
@@ -353,7 +357,7 @@ fn ignore(_event: HostEvent) -> ControlFlow<()> {
 fn sweep_of(segment: &Segment, from_step: i32, stride: i32, settings: &Settings) -> Sweep {
     let first_stop = i32::try_from(segment.first_stop).unwrap_or(i32::MAX);
     Sweep {
-        // The machine fills in a number of its own.
+        // The host state machine assigns the number.
         sweep: 0,
         first_step: from_step.saturating_add(first_stop.saturating_mul(stride)),
         stride: i16::try_from(stride).unwrap_or(i16::MAX),
@@ -368,7 +372,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_clock_that_is_set_moves_the_epoch_by_just_that() {
+    fn clock_step_moves_the_epoch() {
         let start: Timestamp = "2026-03-01T10:00:00Z".parse().expect("a time");
         let at = |since_us: i64, set_s: i64| {
             let wall =

@@ -1,4 +1,4 @@
-//! From figures a person gives to the settings a device is told.
+//! Conversion of the user's motion and receiver options to device settings.
 
 use firmware_protocol::messages::{
     Blanking, Capabilities, Identity, Settings,
@@ -7,23 +7,23 @@ use firmware_protocol::messages::{
 use sonard_api::config::MotionKeys;
 use thiserror::Error;
 
-/// Blanking of the module when nothing shortens it, microseconds.
+/// Internal blanking of the module, microseconds.
 const INTERNAL_BLANKING_US: f64 = 2380.0;
 
-/// Settings of motor and listening.
+/// Motor motion and receiver timing.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Motion {
     /// Listening window after each firing, milliseconds; `None`: the time to the maximum range.
     pub window_ms: Option<f64>,
     /// Settling time between the end of a step and firing, milliseconds.
     pub settle_ms: f64,
-    /// Least time between firings, milliseconds.
+    /// Minimum time between firings, milliseconds.
     pub min_interval_ms: f64,
-    /// Echoes to record for each firing, at most.
+    /// Maximum number of echoes to record for each firing.
     pub max_echoes: u8,
-    /// Largest motor speed, steps a second.
+    /// Maximum motor speed, steps per second.
     pub speed: u16,
-    /// Motor acceleration, steps a second squared.
+    /// Motor acceleration, steps per second squared.
     pub acceleration: u32,
 }
 
@@ -40,96 +40,94 @@ impl From<&MotionKeys> for Motion {
     }
 }
 
-/// The range that listening must reach, and the blanking.
+/// Range that the listening window must cover, and the blanking.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Listening {
-    /// Farthest range of interest, metres.
+    /// Maximum range of interest, metres.
     pub max_range_m: f64,
-    /// Speed of sound, metres a second.
+    /// Speed of sound, metres per second.
     pub sound_speed_m_s: f64,
-    /// When the sensor's receiver opens, microseconds after firing.
+    /// End of the receiver's blanking, microseconds after firing.
     pub blanking_us: f64,
 }
 
-/// A listening window that ends before the receiver opens: the ranger would be deaf.
+/// Listening window that ends before blanking: no echo could be detected.
 #[derive(Debug, Clone, Copy, PartialEq, Error)]
 #[error(
-    "the listening window, {window_ms:.2} ms, ends before the receiver opens {blanking_ms:.2} ms after \
-     firing: nothing could be heard"
+    "the listening window of {window_ms:.2} ms ends before blanking ({blanking_ms:.2} ms after \
+     firing): no echo could be detected"
 )]
-pub struct DeafWindow {
-    /// The window, milliseconds.
+pub struct WindowTooShort {
+    /// Length of the listening window, milliseconds.
     pub window_ms: f64,
-    /// When the receiver opens, milliseconds after firing.
+    /// End of the receiver's blanking, milliseconds after firing.
     pub blanking_ms: f64,
-    /// Range that belongs to that time, metres.
-    pub least_range_m: f64,
+    /// Minimum range due to the blanking, metres.
+    pub min_range_m: f64,
 }
 
-impl DeafWindow {
-    /// What would be right.
+impl WindowTooShort {
+    /// Suggests valid settings.
     #[must_use]
     pub fn help(&self) -> String {
-        let Self { blanking_ms, least_range_m, .. } = self;
+        let Self { blanking_ms, min_range_m, .. } = self;
         format!(
             "give a window of more than {blanking_ms:.2} ms, a maximum range of more than \
-             {least_range_m:.2} m, or a shorter blanking"
+             {min_range_m:.2} m, or a shorter blanking"
         )
     }
 }
 
-/// A blanking that a device can't keep.
+/// Blanking that a device does not support.
 #[derive(Debug, Clone, Copy, PartialEq, Error)]
 pub enum BlankingError {
-    /// The module's own can't be shortened there.
-    #[error(
-        "the device can't shorten the module's blanking: it listens from {INTERNAL_BLANKING_US} us on"
-    )]
+    /// The device can't shorten the module's internal blanking.
+    #[error("the device can't shorten the module's blanking of {INTERNAL_BLANKING_US} us")]
     Fixed,
-    /// It can't be so short.
-    #[error("the device's shortest blanking is {least_us} us")]
+    /// The blanking is shorter than the device's minimum.
+    #[error("the device's minimum blanking is {min_us} us")]
     TooShort {
-        /// The least, microseconds.
-        least_us: f64,
+        /// Minimum blanking of the device, microseconds.
+        min_us: f64,
     },
 }
 
-/// Checks that a device of this identity can keep a blanking, microseconds.
+/// Checks that a device of the given identity supports a blanking, microseconds.
 ///
 /// # Errors
-/// When it can't.
+/// If the blanking is shorter than the device allows.
 pub fn check_blanking(blanking_us: f64, identity: &Identity) -> Result<(), BlankingError> {
-    let least_us = f64::from(SHORT_BLANKING_TICKS_MIN) * 1e6 / f64::from(TICK_HZ);
+    let min_us = f64::from(SHORT_BLANKING_TICKS_MIN) * 1e6 / f64::from(TICK_HZ);
     if blanking_us >= INTERNAL_BLANKING_US {
         Ok(())
     } else if !identity.capabilities.has(Capabilities::SHORT_BLANKING) {
         Err(BlankingError::Fixed)
-    } else if blanking_us < least_us {
-        Err(BlankingError::TooShort { least_us })
+    } else if blanking_us < min_us {
+        Err(BlankingError::TooShort { min_us })
     } else {
         Ok(())
     }
 }
 
 impl Motion {
-    /// Checks that something can be heard at all.
+    /// Checks that the listening window extends beyond the blanking.
     ///
     /// # Errors
-    /// When the window is over before the receiver opens.
-    pub fn check_window(&self, listening: &Listening) -> Result<(), DeafWindow> {
+    /// If the window ends before the receiver opens.
+    pub fn check_window(&self, listening: &Listening) -> Result<(), WindowTooShort> {
         let (window_ms, blanking_ms) = (self.window_ms(listening), listening.blanking_us / 1e3);
         if window_ms > blanking_ms {
             return Ok(());
         }
-        let least_range_m = blanking_ms / 1e3 * listening.sound_speed_m_s / 2.0;
-        Err(DeafWindow { window_ms, blanking_ms, least_range_m })
+        let min_range_m = blanking_ms / 1e3 * listening.sound_speed_m_s / 2.0;
+        Err(WindowTooShort { window_ms, blanking_ms, min_range_m })
     }
 
     fn window_ms(&self, listening: &Listening) -> f64 {
         self.window_ms.unwrap_or(2e3 * listening.max_range_m / listening.sound_speed_m_s)
     }
 
-    /// The settings for a device of this identity; what it can't do is left out.
+    /// Builds the settings for a device of the given identity, without unsupported features.
     #[must_use]
     pub fn settings(&self, listening: &Listening, identity: &Identity) -> Settings {
         let can = |capability| identity.capabilities.has(capability);
@@ -140,8 +138,8 @@ impl Motion {
             settle_ticks: ticks(self.settle_ms),
             max_echoes: if can(Capabilities::MULTIPLE_ECHOES) { self.max_echoes } else { 1 },
             blanking: if shorter && can(Capabilities::SHORT_BLANKING) {
-                let wanted = ticks(listening.blanking_us / 1e3);
-                let ticks = u16::try_from(wanted).unwrap_or(u16::MAX);
+                let requested = ticks(listening.blanking_us / 1e3);
+                let ticks = u16::try_from(requested).unwrap_or(u16::MAX);
                 Blanking::Short { ticks: ticks.max(SHORT_BLANKING_TICKS_MIN) }
             } else {
                 Blanking::Internal
@@ -153,9 +151,9 @@ impl Motion {
     }
 }
 
-/// How long a device holds idle coils for a host that says nothing, seconds: three times the
-/// longest wait between two looks at a device without work. A board that can't let go of its coils
-/// would lose its position for nothing.
+/// Time for which a device holds idle coils without a message from the host, seconds: three times
+/// the longest interval between two status polls of an idle device. 0 for a board that can't
+/// release its coils, because it would lose its position without any benefit.
 #[must_use]
 pub const fn hold_s(identity: &Identity) -> u16 {
     if identity.capabilities.has(Capabilities::COIL_RELEASE) { 180 } else { 0 }

@@ -1,14 +1,14 @@
-//! How long a scan has to take.
+//! Physical minimum duration of a scan, and the lease of its sweeps.
 
 use firmware_protocol::messages::{Settings, limits::TICK_HZ};
 use sonard_model::motion::Trapezoid;
 use sonard_records::ScanPlan;
 
-/// What no ordering could avoid between the first firing and the end of the last listening
-/// window, seconds: every window whole, and between stops the step and the rest after it.
+/// Minimum time from the first firing to the end of the last listening window, seconds: all
+/// windows and, between stops, the step and the settling time.
 ///
-/// The sound of one firing has to die away before the next, so windows do not overlap; while
-/// the ranger listens its motor must not move, so steps do not overlap with windows.
+/// Windows do not overlap, because the sound of one firing has to decay before the next. Steps and
+/// windows do not overlap, because the motor must not move while the receiver is open.
 #[must_use]
 pub fn limit_s(plan: &ScanPlan, settings: &Settings, stride: i32) -> f64 {
     let seconds = |ticks: u32| f64::from(ticks) / f64::from(TICK_HZ);
@@ -23,8 +23,8 @@ pub fn limit_s(plan: &ScanPlan, settings: &Settings, stride: i32) -> f64 {
     (stops - 1.0) * between_s + stops * (pings - 1.0) * interval_s + window_s
 }
 
-/// How long a sweep goes on without a word from the host, milliseconds: some ten beams, and
-/// never less than the two seconds that a busy computer may be away.
+/// Lease of a sweep, milliseconds: the time it continues without a message from the host. About
+/// ten beams, and at least two seconds, for which a busy computer may be blocked.
 #[must_use]
 pub(super) fn lease_ms(settings: &Settings) -> u16 {
     let ticks = u64::from(settings.window_ticks) + u64::from(settings.settle_ticks);
@@ -51,9 +51,9 @@ mod tests {
     }
 
     #[test]
-    fn the_limit_is_windows_steps_and_rests() {
+    fn limit_sums_windows_and_steps() {
         let plan = ScanPlan::default();
-        // 400 windows of 20 ms, and 399 times a step of 10 ms and 5 ms of rest.
+        // 400 windows of 20 ms, and 399 times a step of 10 ms and 5 ms of settling.
         let expected = 400.0 * 0.020 + 399.0 * 0.015;
         assert!((limit_s(&plan, &settings(), 1) - expected).abs() < 1e-9);
         let twice = ScanPlan { pings_per_stop: 2, ..plan };
@@ -61,7 +61,7 @@ mod tests {
     }
 
     #[test]
-    fn a_protected_module_may_set_the_pace() {
+    fn limit_respects_min_interval() {
         let slow = Settings { min_interval_ticks: 200_000, ..settings() };
         let expected = 399.0 * 0.1 + 0.020;
         assert!((limit_s(&ScanPlan::default(), &slow, 1) - expected).abs() < 1e-9);

@@ -1,4 +1,4 @@
-//! The computer's wall clock, watched for being set.
+//! Detection of steps of the computer's wall clock.
 
 use std::{
     thread,
@@ -7,16 +7,16 @@ use std::{
 
 use jiff::{SignedDuration, Timestamp};
 
-/// A wall clock that moved by more than this against the one that never jumps was set.
-const STEP: SignedDuration = SignedDuration::from_millis(100);
+/// Deviation between wall clock and monotonic clock above which the wall clock was set.
+const MIN_STEP: SignedDuration = SignedDuration::from_millis(100);
 
-/// By how much the wall clock was set, if that is more than clocks drift apart.
+/// Returns a deviation of the wall clock if it is larger than clock drift explains.
 pub(super) fn as_step(moved: SignedDuration) -> Option<SignedDuration> {
-    (moved.abs() > STEP).then_some(moved)
+    (moved.abs() > MIN_STEP).then_some(moved)
 }
 
-/// By how much the wall clock was set, if several looks agree on that: two clocks can't be read at
-/// the same moment, and who is interrupted in between sees a step that was none.
+/// Returns the step of the wall clock if several measurements agree. The two clocks can't be read
+/// simultaneously: an interruption between the readings looks like a step.
 pub(super) fn confirmed(mut moved: impl FnMut() -> SignedDuration) -> Option<SignedDuration> {
     let step = as_step(moved())?;
     for _ in 0..2 {
@@ -28,43 +28,39 @@ pub(super) fn confirmed(mut moved: impl FnMut() -> SignedDuration) -> Option<Sig
     Some(step)
 }
 
-/// Tells when the wall clock is set, by the clock that never jumps.
+/// Detector of wall-clock steps against the monotonic clock.
 #[derive(Debug)]
 pub(super) struct WallClock {
     began: Instant,
     at: Timestamp,
-    /// What was told already.
-    told: SignedDuration,
+    /// Sum of the steps reported so far.
+    reported: SignedDuration,
     steps: u32,
 }
 
 impl WallClock {
     pub(super) fn new() -> Self {
         let (began, at) = (Instant::now(), Timestamp::now());
-        Self { began, at, told: SignedDuration::ZERO, steps: 0 }
+        Self { began, at, reported: SignedDuration::ZERO, steps: 0 }
     }
 
-    /// By how much it was set since it was asked last.
+    /// Returns the step of the wall clock since the previous call.
     pub(super) fn step(&mut self) -> Option<SignedDuration> {
-        let (began, at, told) = (self.began, self.at, self.told);
-        let step = confirmed(|| moved(at, Timestamp::now(), began.elapsed()) - told)?;
-        self.tell(step);
+        let (began, at, reported) = (self.began, self.at, self.reported);
+        let step = confirmed(|| deviation(at, Timestamp::now(), began.elapsed()) - reported)?;
+        self.reported += step;
+        self.steps += 1;
         Some(step)
     }
 
-    fn tell(&mut self, step: SignedDuration) {
-        self.told += step;
-        self.steps += 1;
-    }
-
-    /// By how much it was set in all, and in how many steps.
-    pub(super) const fn told(&self) -> (SignedDuration, u32) {
-        (self.told, self.steps)
+    /// Sum and number of all steps so far.
+    pub(super) const fn total_step(&self) -> (SignedDuration, u32) {
+        (self.reported, self.steps)
     }
 }
 
-/// By how much more than the time that passed a wall clock went on from `at` to `now`.
-fn moved(at: Timestamp, now: Timestamp, elapsed: Duration) -> SignedDuration {
+/// Advance of the wall clock from `at` to `now` in excess of the elapsed time.
+fn deviation(at: Timestamp, now: Timestamp, elapsed: Duration) -> SignedDuration {
     now.duration_since(at) - SignedDuration::try_from(elapsed).unwrap_or(SignedDuration::MAX)
 }
 
@@ -73,12 +69,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_step_is_what_is_more_than_drift() {
+    fn drift_is_no_step() {
         let start: Timestamp = "2026-03-01T10:00:00Z".parse().expect("a time");
         let step = |elapsed_s: u64, set_ms: i64| {
             let elapsed = Duration::from_secs(elapsed_s);
             let now = start + elapsed + SignedDuration::from_millis(set_ms);
-            as_step(moved(start, now, elapsed)).map(|step| step.as_millis())
+            as_step(deviation(start, now, elapsed)).map(|step| step.as_millis())
         };
         assert_eq!(step(1, 0), None);
         assert_eq!(step(2, 99), None);
@@ -87,17 +83,17 @@ mod tests {
     }
 
     #[test]
-    fn each_step_is_told_once_and_only_when_several_looks_agree() {
+    fn step_is_confirmed_and_reported_once() {
         let mut clock = WallClock::new();
-        assert_eq!(clock.step(), None, "nobody set it");
+        assert_eq!(clock.step(), None, "not set");
         clock.at -= SignedDuration::from_secs(60);
         let step = clock.step().expect("it was set").as_secs_f64();
         assert!((step - 60.0).abs() < 0.1, "{step}");
         assert_eq!(clock.step(), None);
-        assert_eq!(clock.told().1, 1);
+        assert_eq!(clock.total_step().1, 1);
         let seconds = SignedDuration::from_secs;
-        let mut looks = [3600, 0, 3600].into_iter().map(seconds);
-        assert_eq!(confirmed(|| looks.next().expect("no further look")), None);
+        let mut readings = [3600, 0, 3600].into_iter().map(seconds);
+        assert_eq!(confirmed(|| readings.next().expect("no further reading")), None);
         assert_eq!(confirmed(|| seconds(3600)), Some(seconds(3600)));
     }
 }

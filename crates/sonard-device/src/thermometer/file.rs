@@ -1,4 +1,4 @@
-//! Reading a small file that may be anything.
+//! Reading of a thermometer's file, whatever the path refers to.
 
 use std::{
     fs::File,
@@ -10,12 +10,12 @@ use rustix::fs::{FileType, Mode, OFlags};
 
 use super::Fault;
 
-/// Longest text of a thermometer's file, bytes; a page of sysfs.
+/// Maximum length of a thermometer's file, bytes: a page of sysfs.
 const MAX_BYTES: u64 = 4096;
 
-/// Chips that measure a part of the computer: processors, graphics, disks, radios, memory, power.
-/// Beginnings of the names in `name` of hwmon and `type` of thermal zones.
-const INTERNAL: [&str; 31] = [
+/// Name prefixes of chips that measure a part of the computer: processors, graphics, disks, radios,
+/// memory, power. Compared with `name` of hwmon and `type` of thermal zones.
+const INTERNAL_CHIPS: [&str; 31] = [
     "acpitz",
     "amdgpu",
     "ath1",
@@ -49,7 +49,7 @@ const INTERNAL: [&str; 31] = [
     "zenpower",
 ];
 
-/// Text of a regular file, at most a page of it. Neither opening nor reading a named pipe waits.
+/// Reads the text of a regular file of at most a page. A named pipe does not block it.
 pub(super) fn read_file(path: &Path) -> Result<String, Fault> {
     let unreadable = |error: io::Error| Fault::Unreadable(error.to_string());
     let flags = OFlags::RDONLY | OFlags::NONBLOCK | OFlags::NOCTTY | OFlags::CLOEXEC;
@@ -76,17 +76,17 @@ pub(super) fn read_file(path: &Path) -> Result<String, Fault> {
 /// Name of the chip that a file of hwmon or of a thermal zone belongs to.
 pub(super) fn chip(file: &Path) -> Option<String> {
     let (name, folder) = (file.file_name()?.to_str()?, file.parent()?);
-    let beside = match name {
+    let name_file = match name {
         "temp" => "type",
         _ if name.starts_with("temp") && name.ends_with("_input") => "name",
         _ => return None,
     };
-    let text = read_file(&folder.join(beside)).ok()?;
+    let text = read_file(&folder.join(name_file)).ok()?;
     Some(text.trim().to_owned()).filter(|chip| !chip.is_empty())
 }
 
-/// `true` for the name of a chip that does not measure the air.
+/// Returns `true` for the name of a chip that does not measure the air.
 pub(super) fn is_internal(chip: &str) -> bool {
     let chip = chip.to_ascii_lowercase();
-    INTERNAL.iter().any(|start| chip.starts_with(start))
+    INTERNAL_CHIPS.iter().any(|prefix| chip.starts_with(prefix))
 }

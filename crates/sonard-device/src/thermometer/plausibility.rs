@@ -1,73 +1,73 @@
-//! Temperature changes that air can make. Pure: times are given.
+//! Plausibility of temperature changes of air. Pure: times are given.
 
 use std::time::Duration;
 
 use thiserror::Error;
 
-/// Change that is accepted at any time, kelvins: a gust through a door, a sensor's noise.
+/// Maximum step that is accepted at any time, kelvins: a gust through a door, a sensor's noise.
 pub const MAX_STEP_K: f64 = 8.0;
-/// Slope that is accepted for ever, kelvins a second. A sensor that is carried outdoors follows the
-/// air by its time constant, about a minute for a probe in still air.
+/// Maximum slope that is accepted permanently, kelvins per second. A sensor that is carried
+/// outdoors follows the air with its time constant, about a minute for a probe in still air.
 pub const MAX_SLOPE_K_S: f64 = 0.2;
 
-/// Accepts temperatures that change no faster than those of air.
+/// Filter that accepts temperatures that change no faster than those of air.
 ///
-/// A reference follows the accepted temperature at no more than [`MAX_SLOPE_K_S`]; a temperature is
-/// accepted within [`MAX_STEP_K`] of it. A level that is rejected is accepted once it has lasted for as
-/// long as the reference needs to come near: where it is wrong, that can't be seen from the
-/// temperature alone.
+/// A reference follows the accepted temperature at [`MAX_SLOPE_K_S`] or less; a temperature is
+/// accepted within [`MAX_STEP_K`] of the reference. A rejected level is accepted once it has lasted
+/// for as long as the reference needs to approach it: the temperature alone can't show that such a
+/// level is wrong.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Plausibility {
-    state: Option<State>,
+    state: Option<FilterState>,
 }
 
 #[derive(Debug, Clone, PartialEq)]
-struct State {
+struct FilterState {
     reference_c: f64,
     accepted_c: f64,
     accepted_at: Duration,
-    rejected: Option<Level>,
+    rejected: Option<RejectedLevel>,
 }
 
-/// A temperature that is rejected, and since when.
+/// Rejected temperature, and the time of its first rejection.
 #[derive(Debug, Clone, PartialEq)]
-struct Level {
+struct RejectedLevel {
     temperature_c: f64,
     since: Duration,
 }
 
-/// The way in which a temperature was accepted.
+/// Kind of acceptance of a temperature.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Admission {
-    /// At once.
+    /// The temperature was accepted immediately.
     Usual,
-    /// After it had been rejected for some time.
+    /// The temperature was accepted after a period of rejection.
     Persistent {
-        /// The temperature accepted before, degrees Celsius.
+        /// Previously accepted temperature, degrees Celsius.
         from_c: f64,
-        /// Since the first rejection.
+        /// Time since the first rejection.
         waited: Duration,
     },
 }
 
-/// A temperature that changed faster than that of air.
+/// Temperature change that is too fast for air.
 #[derive(Debug, Clone, Copy, PartialEq, Error)]
 #[error("{to_c:.1} C {:.1} s after {from_c:.1} C: air does not change so fast", after.as_secs_f64())]
 pub struct FastChange {
-    /// The last accepted temperature, degrees Celsius.
+    /// Last accepted temperature, degrees Celsius.
     pub from_c: f64,
-    /// The rejected temperature, degrees Celsius.
+    /// Rejected temperature, degrees Celsius.
     pub to_c: f64,
-    /// Since the last accepted temperature.
+    /// Time since the last accepted temperature.
     pub after: Duration,
 }
 
 impl Plausibility {
-    /// Accepts or rejects a temperature, degrees Celsius, that was read at a time since any fixed
-    /// moment.
+    /// Accepts or rejects a temperature in degrees Celsius. `at` is the time of the reading since
+    /// any fixed moment.
     ///
     /// # Errors
-    /// If it changed faster than that of air, or is not finite.
+    /// If the temperature changed too fast for air, or is not finite.
     pub fn admit(&mut self, temperature_c: f64, at: Duration) -> Result<Admission, FastChange> {
         let Some(state) = &mut self.state else {
             if !temperature_c.is_finite() {
@@ -77,7 +77,7 @@ impl Plausibility {
                     after: Duration::ZERO,
                 });
             }
-            self.state = Some(State {
+            self.state = Some(FilterState {
                 reference_c: temperature_c,
                 accepted_c: temperature_c,
                 accepted_at: at,
@@ -85,10 +85,11 @@ impl Plausibility {
             });
             return Ok(Admission::Usual);
         };
-        let same = |level: &&Level| (level.temperature_c - temperature_c).abs() <= MAX_STEP_K;
+        let same =
+            |level: &&RejectedLevel| (level.temperature_c - temperature_c).abs() <= MAX_STEP_K;
         let level = state.rejected.as_ref().filter(same).map(|level| level.since);
-        // A first deviation may have come about at any time since the last reading, one that follows
-        // another deviation only since that.
+        // A first deviation may have developed at any time since the last accepted reading, a
+        // second one only since the first.
         let since = match (&state.rejected, level) {
             (None, _) => state.accepted_at,
             (Some(_), since) => since.unwrap_or(at),
@@ -102,12 +103,16 @@ impl Plausibility {
                 waited: at.saturating_sub(since),
             });
             let usual = (temperature_c - state.reference_c).abs() <= MAX_STEP_K;
-            *state =
-                State { reference_c, accepted_c: temperature_c, accepted_at: at, rejected: None };
+            *state = FilterState {
+                reference_c,
+                accepted_c: temperature_c,
+                accepted_at: at,
+                rejected: None,
+            };
             return Ok(if usual { Admission::Usual } else { admission });
         }
         if level.is_none() {
-            state.rejected = Some(Level { temperature_c, since: at });
+            state.rejected = Some(RejectedLevel { temperature_c, since: at });
         }
         let after = at.saturating_sub(state.accepted_at);
         Err(FastChange { from_c: state.accepted_c, to_c: temperature_c, after })
@@ -120,7 +125,8 @@ mod tests {
 
     use super::*;
 
-    /// Admits a level every so many seconds until it is accepted; the time that took, seconds.
+    /// Offers a level every `every_s` seconds until it is accepted. Returns the time taken,
+    /// seconds.
     fn wait_for(gate: &mut Plausibility, temperature_c: f64, from_s: f64, every_s: f64) -> f64 {
         let mut waited_s = 0.0;
         while gate.admit(temperature_c, Duration::from_secs_f64(from_s + waited_s)).is_err() {
@@ -131,7 +137,7 @@ mod tests {
     }
 
     #[test]
-    fn step_of_20_k_is_rejected_until_it_has_lasted_for_a_minute() {
+    fn large_step_must_last_a_minute() {
         let mut gate = Plausibility::default();
         let second = Duration::from_secs;
         assert_eq!(gate.admit(21.0, second(0)), Ok(Admission::Usual));
@@ -143,7 +149,7 @@ mod tests {
     }
 
     #[test]
-    fn readings_that_jump_about_are_not_accepted_by_waiting() {
+    fn erratic_readings_stay_rejected() {
         let mut gate = Plausibility::default();
         gate.admit(20.0, Duration::ZERO).expect("the first");
         for second in 1..2000 {
@@ -153,14 +159,14 @@ mod tests {
     }
 
     #[test]
-    fn change_over_a_night_without_readings_is_accepted() {
+    fn change_over_a_night_is_accepted() {
         let mut gate = Plausibility::default();
         gate.admit(25.0, Duration::ZERO).expect("the first");
         assert_eq!(gate.admit(2.0, Duration::from_secs(8 * 3600)), Ok(Admission::Usual));
     }
 
     #[test]
-    fn what_is_not_finite_is_rejected_and_forgotten() {
+    fn non_finite_is_rejected() {
         let mut gate = Plausibility::default();
         for at in 0..3 {
             for value in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
@@ -172,7 +178,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn slow_changes_are_accepted_at_once(
+        fn slow_changes_are_accepted(
             start_c in -20.0..50.0_f64,
             steps in prop::collection::vec((0.01..600.0_f64, -1.0..1.0_f64, -2.0..2.0_f64), 1..60),
         ) {
@@ -188,7 +194,7 @@ mod tests {
         }
 
         #[test]
-        fn fast_steps_are_rejected_and_persistent_ones_accepted_in_time(
+        fn persistent_step_is_accepted(
             start_c in -20.0..50.0_f64,
             step_k in prop_oneof![-70.0..-8.5_f64, 8.5..70.0_f64],
             every_s in 0.1..2.0_f64,
@@ -204,7 +210,7 @@ mod tests {
         }
 
         #[test]
-        fn accepted_temperatures_never_differ_by_more_than_allowed(
+        fn accepted_changes_are_bounded(
             readings in prop::collection::vec((0.0..30.0_f64, -60.0..60.0_f64), 1..80),
         ) {
             let mut gate = Plausibility::default();

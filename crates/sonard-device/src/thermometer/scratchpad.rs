@@ -1,4 +1,4 @@
-//! Registers of a DS18B20 and its relatives.
+//! Scratchpad registers of a DS18B20 and similar sensors.
 //!
 //! Datasheets DS18B20 (19-7487, Rev 6), table "Memory map", and DS18S20 (19-5474). Copies of the
 //! sensor differ in the reserved registers.
@@ -26,7 +26,7 @@ impl Scratchpad {
         Ok(Self(registers))
     }
 
-    /// Checks the registers among themselves and with the temperature that the driver took from them.
+    /// Checks the consistency of the registers with each other and with the driver's temperature.
     pub(super) fn check(&self, thousandths: i32) -> Result<(), Fault> {
         let Self(registers @ [low, high, _, _, configuration, reserved, _, per_degree, checksum]) =
             *self;
@@ -58,14 +58,15 @@ impl Scratchpad {
         Ok(())
     }
 
-    /// `true` if the reserved registers are not those of the datasheet.
+    /// Returns `true` if the reserved registers differ from the datasheet.
     pub(super) const fn is_unusual(&self) -> bool {
         let Self([_, _, _, _, _, reserved, _, per_degree, _]) = *self;
         reserved != 0xff || per_degree != 0x10
     }
 }
 
-/// Checksum of 1-wire devices: x^8 + x^5 + x^4 + 1, least significant bit first (Application Note 27).
+/// Checksum of 1-wire devices: x^8 + x^5 + x^4 + 1, least significant bit first (Application Note
+/// 27).
 fn crc8(bytes: &[u8]) -> u8 {
     bytes.iter().fold(0, |crc, byte| {
         (0..8).fold(crc ^ byte, |crc: u8, _| if crc & 1 == 1 { crc >> 1 ^ 0x8c } else { crc >> 1 })
@@ -76,7 +77,7 @@ fn crc8(bytes: &[u8]) -> u8 {
 pub(super) mod tests {
     use super::*;
 
-    /// The two lines of `w1_slave` for registers.
+    /// Formats registers as the two lines of `w1_slave`.
     pub(in crate::thermometer) fn w1_slave(registers: [u8; 8], thousandths: i32) -> String {
         let crc = crc8(&registers);
         let hex: String = registers.iter().map(|register| format!("{register:02x} ")).collect();
@@ -84,7 +85,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn checksum_is_that_of_a_sensor() {
+    fn checksum_matches_a_sensor() {
         assert_eq!(crc8(&[0x72, 0x01, 0x4b, 0x46, 0x7f, 0xff, 0x0e, 0x10]), 0x57);
         assert_eq!(crc8(&[0x50, 0x05, 0x4b, 0x46, 0x7f, 0xff, 0x0c, 0x10]), 0x1c);
         assert_eq!(crc8(&[0; 8]), 0);

@@ -11,7 +11,7 @@ fn temperature_c(text: &str) -> Result<f64, Fault> {
 }
 
 #[test]
-fn both_forms_are_read() {
+fn both_formats_are_parsed() {
     let w1 = "72 01 4b 46 7f ff 0e 10 57 : crc=57 YES\n72 01 4b 46 7f ff 0e 10 57 t=23125\n";
     assert_eq!(temperature_c(w1), Ok(23.125));
     assert_eq!(temperature_c("-1500\n"), Ok(-1.5));
@@ -28,7 +28,7 @@ fn both_forms_are_read() {
 }
 
 #[test]
-fn values_that_a_sensor_cannot_have_are_rejected_by_name() {
+fn impossible_values_are_rejected() {
     let registers = |change: &dyn Fn(&mut [u8; 8])| {
         let mut registers = ZERO_C;
         change(&mut registers);
@@ -51,24 +51,24 @@ fn values_that_a_sensor_cannot_have_are_rejected_by_name() {
         let error = parse(&text).expect_err("it is rejected").to_string();
         assert!(error.contains(part), "{text:?}: {error}");
     }
-    // A copy, with values of its own in reserved registers.
+    // A copy of the sensor with other values in reserved registers.
     let copy = w1_slave([0x90, 0x01, 0x55, 0x05, 0x7f, 0x7e, 0x81, 0x66], 25_000);
     assert!(parse(&copy).expect("it measures").is_unusual);
 }
 
 #[test]
-fn malformed_texts_are_rejected_by_name() {
+fn malformed_text_is_rejected() {
     let cut = w1_slave(ZERO_C, 0);
     for (text, part) in [
         ("", "empty"),
         ("\n", "empty"),
-        ("NaN\n", "\"NaN\" is no number"),
+        ("NaN\n", "\"NaN\" is not a number"),
         ("21", "the end of the line"),
         ("00", "the end of the line"),
-        ("warm", "no number"),
-        ("2.1e4", "no number"),
-        ("99999999999999999999", "no number"),
-        (&cut[..20], "no number"),
+        ("warm", "not a number"),
+        ("2.1e4", "not a number"),
+        ("99999999999999999999", "not a number"),
+        (&cut[..20], "not a number"),
         (&cut[..cut.find("t=").expect("there")], "cut off"),
         (&cut[..cut.find("t=").expect("there") + 2], "cut off"),
         ("00 00 4b : crc=00 YES\n t=0\n", "a register is missing"),
@@ -80,14 +80,14 @@ fn malformed_texts_are_rejected_by_name() {
 
 proptest! {
     #[test]
-    fn any_text_is_read_or_rejected(text in "(?s).{0,200}") {
+    fn any_text_is_handled(text in "(?s).{0,200}") {
         if let Ok(sample) = parse(&text) {
             prop_assert!((-20.0..=50.0).contains(&sample.temperature_c));
         }
     }
 
     #[test]
-    fn any_cut_of_w1_slave_is_the_whole_or_rejected(counts in -320..800_i16, cut in 2..200_usize) {
+    fn truncated_w1_slave_is_rejected(counts in -320..800_i16, cut in 2..200_usize) {
         let [low, high] = counts.to_le_bytes();
         let thousandths = i32::from(counts) * 1000 / 16;
         let whole = w1_slave([low, high, 0x4b, 0x46, 0x7f, 0xff, 0x0c, 0x10], thousandths);
@@ -100,7 +100,7 @@ proptest! {
 }
 
 #[tokio::test]
-async fn file_of_any_kind_is_named_without_waiting() {
+async fn other_files_do_not_block() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = |name: &str| folder.path().join(name);
     fs::create_dir(path("folder")).expect("a folder");
@@ -121,7 +121,7 @@ async fn file_of_any_kind_is_named_without_waiting() {
         ("pipe", "a named pipe"),
         ("socket", "No such device"),
         ("huge", "too long"),
-        ("binary", "no text"),
+        ("binary", "not a text"),
         ("missing", "No such file"),
         ("loop", "symbolic links"),
     ] {
@@ -136,7 +136,7 @@ async fn file_of_any_kind_is_named_without_waiting() {
 }
 
 #[tokio::test]
-async fn sensor_of_the_processor_is_rejected_by_its_chip() {
+async fn internal_chip_is_rejected() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = |name: &str| folder.path().join(name);
     let read = |file: &str| {
@@ -166,7 +166,7 @@ async fn sensor_of_the_processor_is_rejected_by_its_chip() {
 }
 
 #[tokio::test]
-async fn last_valid_value_and_its_age_are_kept() {
+async fn last_valid_value_is_kept() {
     let folder = tempfile::tempdir().expect("a folder");
     let file = folder.path().join("w1_slave");
     fs::write(&file, "21000\n").expect("a file");
@@ -178,7 +178,7 @@ async fn last_valid_value_and_its_age_are_kept() {
         thermometer.read().await.expect_err("rejected");
         let (last_c, age) = thermometer.last_valid().expect("kept");
         assert_eq!(last_c, 21.0);
-        assert!(age > PAUSE, "{age:?}");
+        assert!(age > RETRY_PAUSE, "{age:?}");
     }
     fs::write(&file, "21500\n").expect("a file");
     assert_eq!(thermometer.read().await, Ok(21.5));

@@ -2,79 +2,82 @@ use super::*;
 
 const SHORT: Duration = Duration::from_secs(1);
 
-/// A broker that closes the connection at messages that it does not take.
-struct Strict {
-    takes: fn(&Sending) -> bool,
+/// Simulated broker that closes the connection at rejected messages.
+struct StrictBroker {
+    accepts: fn(&SentMessage) -> bool,
     diagnosis: Diagnosis,
-    /// Messages that are to be sent, each until it is taken or refused.
-    queue: Vec<Sending>,
-    taken: Vec<Sending>,
-    left_out: Vec<(Sending, Cause)>,
+    /// Messages to send until they are accepted or rejected.
+    queue: Vec<SentMessage>,
+    accepted: Vec<SentMessage>,
+    dropped: Vec<(SentMessage, Cause)>,
     connections: usize,
 }
 
-const fn record(number: u64, kind: Kind, bytes: usize) -> Sending {
-    Sending { record: Some(number), kind: Some(kind), bytes }
+const fn record(number: u64, kind: MessageKind, bytes: usize) -> SentMessage {
+    SentMessage { record: Some(number), kind: Some(kind), bytes }
 }
 
-const ONLINE: Sending = Sending { record: None, kind: Some(Kind::Online), bytes: 4 };
+const ONLINE: SentMessage = SentMessage { record: None, kind: Some(MessageKind::Online), bytes: 4 };
 
-impl Strict {
-    fn new(takes: fn(&Sending) -> bool, queue: impl IntoIterator<Item = Sending>) -> Self {
+impl StrictBroker {
+    fn new(
+        accepts: fn(&SentMessage) -> bool,
+        queue: impl IntoIterator<Item = SentMessage>,
+    ) -> Self {
         Self {
-            takes,
+            accepts,
             diagnosis: Diagnosis::default(),
             queue: queue.into_iter().collect(),
-            taken: Vec::new(),
-            left_out: Vec::new(),
+            accepted: Vec::new(),
+            dropped: Vec::new(),
             connections: 0,
         }
     }
 
-    /// One connection, with the greeting first and up to eight messages under way.
+    /// Runs a connection with the `online` message first and up to eight messages in flight.
     fn connect(&mut self) -> Finding {
         self.connections += 1;
-        let mut under_way = Vec::new();
-        if self.diagnosis.refuses(ONLINE.kind, ONLINE.bytes).is_none() {
+        let mut in_flight = Vec::new();
+        if self.diagnosis.rejects(ONLINE.kind, ONLINE.bytes).is_none() {
             self.diagnosis.sent(ONLINE);
-            under_way.push(ONLINE);
+            in_flight.push(ONLINE);
         }
         loop {
-            let most = if self.diagnosis.allows_many() { 8 } else { 1 };
-            while under_way.len() < most {
-                let is_new = |one: &&Sending| !under_way.contains(one);
+            let max_in_flight = if self.diagnosis.allows_many() { 8 } else { 1 };
+            while in_flight.len() < max_in_flight {
+                let is_new = |message: &&SentMessage| !in_flight.contains(message);
                 let Some(next) = self.queue.iter().find(is_new).copied() else { break };
-                if let Some(cause) = self.diagnosis.refuses(next.kind, next.bytes) {
-                    self.queue.retain(|one| *one != next);
-                    self.left_out.push((next, cause));
+                if let Some(cause) = self.diagnosis.rejects(next.kind, next.bytes) {
+                    self.queue.retain(|message| *message != next);
+                    self.dropped.push((next, cause));
                     continue;
                 }
                 self.diagnosis.sent(next);
-                under_way.push(next);
+                in_flight.push(next);
             }
-            if under_way.is_empty() {
+            if in_flight.is_empty() {
                 return Finding::Open;
             }
-            let first = under_way.remove(0);
-            if !(self.takes)(&first) {
+            let first = in_flight.remove(0);
+            if !(self.accepts)(&first) {
                 return self.diagnosis.ended(true, SHORT);
             }
             self.diagnosis.acknowledged(first);
-            self.taken.extend(first.record.map(|_| first));
-            self.queue.retain(|one| *one != first);
+            self.accepted.extend(first.record.map(|_| first));
+            self.queue.retain(|message| *message != first);
         }
     }
 
-    /// Connections until everything is taken or left out, or for so many times.
-    fn deliver(&mut self, most: usize) -> Vec<Cause> {
+    /// Connects until every message is accepted or dropped, at most `max_connections` times.
+    fn deliver(&mut self, max_connections: usize) -> Vec<Cause> {
         let mut causes = Vec::new();
-        while !self.queue.is_empty() && self.connections < most {
+        while !self.queue.is_empty() && self.connections < max_connections {
             match self.connect() {
                 Finding::Open => {}
                 Finding::Cause(cause) => causes.push(cause),
-                Finding::Refused(sending, cause) => {
-                    self.queue.retain(|one| *one != sending);
-                    self.left_out.push((sending, cause));
+                Finding::Rejected(sending, cause) => {
+                    self.queue.retain(|message| *message != sending);
+                    self.dropped.push((sending, cause));
                 }
             }
         }
@@ -82,77 +85,87 @@ impl Strict {
     }
 }
 
-fn numbers(messages: &[Sending]) -> Vec<u64> {
+fn numbers(messages: &[SentMessage]) -> Vec<u64> {
     messages.iter().filter_map(|message| message.record).collect()
 }
 
 #[test]
-fn only_messages_above_the_limit_are_left_out_and_later_ones_without_a_loss() {
+fn size_limit_is_learnt() {
     let messages = (0..60).map(|n| match n % 20 {
-        0 => record(n, Kind::Session, 7000 + n as usize),
-        _ => record(n, Kind::Ping, 300),
+        0 => record(n, MessageKind::Session, 7000 + n as usize),
+        _ => record(n, MessageKind::Ping, 300),
     });
-    let mut broker = Strict::new(|message| message.bytes < 4000, messages);
+    let mut broker = StrictBroker::new(|message| message.bytes < 4000, messages);
     assert_eq!(broker.deliver(100), []);
-    let left_out: Vec<_> = broker.left_out.iter().filter_map(|(one, _)| one.record).collect();
-    assert_eq!(left_out, [0, 20, 40]);
-    assert!(broker.left_out.iter().all(|(_, cause)| matches!(cause, Cause::Size(7000..))));
-    assert_eq!(numbers(&broker.taken), (0..60).filter(|n| n % 20 != 0).collect::<Vec<_>>());
-    assert_eq!(broker.connections, 4, "two losses in a crowd and alone, and the one that works");
+    let dropped: Vec<_> = broker.dropped.iter().filter_map(|(message, _)| message.record).collect();
+    assert_eq!(dropped, [0, 20, 40]);
+    assert!(broker.dropped.iter().all(|(_, cause)| matches!(cause, Cause::Size(7000..))));
+    assert_eq!(numbers(&broker.accepted), (0..60).filter(|n| n % 20 != 0).collect::<Vec<_>>());
+    assert_eq!(broker.connections, 4, "closed with many in flight and twice alone, then working");
 }
 
 #[test]
-fn a_topic_without_permission_is_left_out_and_the_others_are_published() {
-    let kinds = [Kind::ScanStart, Kind::Ping, Kind::Ping, Kind::Event, Kind::ScanEnd];
+fn forbidden_topic_is_dropped() {
+    let kinds = [
+        MessageKind::ScanStart,
+        MessageKind::Ping,
+        MessageKind::Ping,
+        MessageKind::Event,
+        MessageKind::ScanEnd,
+    ];
     let messages = (0..50).map(|n| record(n, kinds[n as usize % 5], 300));
-    let mut broker = Strict::new(|message| message.kind != Some(Kind::Event), messages);
+    let mut broker =
+        StrictBroker::new(|message| message.kind != Some(MessageKind::Event), messages);
     assert_eq!(broker.deliver(100), []);
-    assert_eq!(broker.taken.len(), 40);
-    assert_eq!(broker.left_out.len(), 10);
-    assert!(broker.left_out.iter().all(|(one, cause)| {
-        one.kind == Some(Kind::Event) && *cause == Cause::Kind(Some(Kind::Event))
+    assert_eq!(broker.accepted.len(), 40);
+    assert_eq!(broker.dropped.len(), 10);
+    assert!(broker.dropped.iter().all(|(message, cause)| {
+        message.kind == Some(MessageKind::Event) && *cause == Cause::Kind(Some(MessageKind::Event))
     }));
 }
 
 #[test]
-fn a_broker_that_takes_nothing_costs_no_record() {
-    for takes in [|_: &Sending| false, |message: &Sending| message.kind == Some(Kind::Status)] {
-        let mut broker = Strict::new(takes, (0..10).map(|n| record(n, Kind::Ping, 300)));
+fn no_record_is_dropped_if_all_fail() {
+    for accepts in
+        [|_: &SentMessage| false, |message: &SentMessage| message.kind == Some(MessageKind::Status)]
+    {
+        let mut broker =
+            StrictBroker::new(accepts, (0..10).map(|n| record(n, MessageKind::Ping, 300)));
         let causes = broker.deliver(20);
         assert!(!causes.is_empty() && causes.iter().all(|cause| *cause == Cause::Everything));
-        assert_eq!((broker.queue.len(), broker.left_out.len()), (10, 0));
+        assert_eq!((broker.queue.len(), broker.dropped.len()), (10, 0));
     }
 }
 
 #[test]
-fn another_client_of_the_same_id_is_suspected_if_no_message_is_to_blame() {
+fn duplicate_client_is_suspected() {
     let mut diagnosis = Diagnosis::default();
     for number in 0..10 {
-        for sending in [ONLINE, record(number, Kind::Ping, 300)] {
+        for sending in [ONLINE, record(number, MessageKind::Ping, 300)] {
             diagnosis.sent(sending);
             diagnosis.acknowledged(sending);
         }
         let finding = diagnosis.ended(true, SHORT);
-        let is_row = number + 1 >= u64::from(UNEXPLAINED);
+        let is_row = number + 1 >= u64::from(MAX_UNEXPLAINED);
         assert_eq!(finding == Finding::Cause(Cause::OtherClient), is_row, "{number}");
     }
-    // Others were under way by chance.
+    // Other messages were in flight by chance.
     let mut diagnosis = Diagnosis::default();
     let findings = (0..6).map(|number| {
         diagnosis.sent(ONLINE);
         diagnosis.acknowledged(ONLINE);
-        diagnosis.sent(record(number, Kind::Ping, 300));
+        diagnosis.sent(record(number, MessageKind::Ping, 300));
         diagnosis.ended(true, SHORT)
     });
-    assert!(findings.into_iter().all(|finding| !matches!(finding, Finding::Refused(..))));
-    assert_eq!(diagnosis.ended(true, STEADY), Finding::Open);
+    assert!(findings.into_iter().all(|finding| !matches!(finding, Finding::Rejected(..))));
+    assert_eq!(diagnosis.ended(true, STABLE_AFTER), Finding::Open);
 }
 
 #[test]
-fn losses_by_this_side_or_the_line_blame_nobody() {
+fn line_failures_have_no_cause() {
     let mut diagnosis = Diagnosis::default();
     for _ in 0..20 {
-        diagnosis.sent(record(1, Kind::Session, 7000));
+        diagnosis.sent(record(1, MessageKind::Session, 7000));
         assert_eq!(diagnosis.ended(false, SHORT), Finding::Open);
     }
     assert!(diagnosis.allows_many());

@@ -22,7 +22,7 @@ fn append(folder: &TempDir, log: usize, text: &str) {
     file.write_all(text.as_bytes()).expect("writes");
 }
 
-fn texts(lines: &[Read]) -> Vec<String> {
+fn texts(lines: &[LogLine]) -> Vec<String> {
     let messages = lines.iter().filter_map(|line| line.message.as_ref());
     messages.map(|message| String::from_utf8(message.payload.to_vec()).expect("text")).collect()
 }
@@ -31,21 +31,21 @@ fn open(folder: &TempDir, history: bool) -> (Tail, Option<String>) {
     Tail::open(folder.path(), history).expect("the folder is readable")
 }
 
-fn read(tail: &mut Tail) -> Piece {
+fn read(tail: &mut Tail) -> TailChunk {
     tail.read(usize::MAX).expect("the logs are readable")
 }
 
 #[test]
-fn the_first_time_it_begins_at_the_end_unless_the_history_is_wanted() {
+fn starts_at_the_end_or_with_history() {
     let folder = tempfile::tempdir().expect("a folder");
     append(&folder, 1, &(event(1) + "\n"));
     append(&folder, 2, &(event(2) + "\n"));
-    let (mut all, told) = open(&folder, true);
-    assert_eq!((texts(&read(&mut all).lines), told), (vec![event(1), event(2)], None));
-    // That was remembered: what comes before the broker was there once counts, too.
-    fs::remove_file(folder.path().join("mqtt-place.json")).expect("it was remembered");
-    let (mut tail, told) = open(&folder, false);
-    assert_eq!((read(&mut tail), told), (Piece { is_end: true, ..Piece::default() }, None));
+    let (mut all, gap) = open(&folder, true);
+    assert_eq!((texts(&read(&mut all).lines), gap), (vec![event(1), event(2)], None));
+    // The start is checkpointed: records before the first connection are published, too.
+    fs::remove_file(folder.path().join("mqtt-place.json")).expect("a checkpoint");
+    let (mut tail, gap) = open(&folder, false);
+    assert_eq!((read(&mut tail), gap), (TailChunk { is_end: true, ..TailChunk::default() }, None));
     append(&folder, 2, &(event(3) + "\n"));
     let (mut again, _) = open(&folder, false);
     assert_eq!(texts(&read(&mut again).lines), [event(3)]);
@@ -53,7 +53,7 @@ fn the_first_time_it_begins_at_the_end_unless_the_history_is_wanted() {
 }
 
 #[test]
-fn a_line_is_read_once_it_is_whole_and_what_is_no_record_is_passed_over() {
+fn only_complete_records_are_read() {
     let folder = tempfile::tempdir().expect("a folder");
     append(&folder, 1, "");
     let (mut tail, _) = open(&folder, true);
@@ -64,7 +64,7 @@ fn a_line_is_read_once_it_is_whole_and_what_is_no_record_is_passed_over() {
     append(&folder, 1, "no record\n{\"type\":\"song\"}\n\n");
     let lines = read(&mut tail).lines;
     assert_eq!((lines.len(), texts(&lines)), (4, vec![event(1)]));
-    // A line that no record can be as long as, and a torn one before the next log.
+    // A line too long for a record, and a torn one before the next log.
     append(&folder, 1, &"x".repeat(3 * MAX_LINE_BYTES));
     append(&folder, 1, "\n{\"type\":\"ev");
     append(&folder, 2, &(event(2) + "\n"));
@@ -77,7 +77,7 @@ fn a_line_is_read_once_it_is_whole_and_what_is_no_record_is_passed_over() {
 }
 
 #[test]
-fn a_log_that_is_gone_is_told_and_read_on_from_the_oldest_behind_it() {
+fn removed_log_is_a_gap() {
     let folder = tempfile::tempdir().expect("a folder");
     for log in 1..=4 {
         append(&folder, log, &(event(log) + "\n"));
@@ -89,37 +89,37 @@ fn a_log_that_is_gone_is_told_and_read_on_from_the_oldest_behind_it() {
         fs::remove_file(folder.path().join(name(log))).expect("is there");
     }
     let gap = read(&mut tail);
-    assert!(gap.gap.is_some_and(|told| told.contains(&name(1)) && told.contains(&name(3))));
+    assert!(gap.gap.is_some_and(|text| text.contains(&name(1)) && text.contains(&name(3))));
     assert_eq!(
         (texts(&read(&mut tail).lines), read(&mut tail).gap),
         (vec![event(3), event(4)], None)
     );
-    // Cut shorter than what was read.
+    // Truncated before the position.
     fs::write(folder.path().join(name(4)), "").expect("writes");
-    assert!(read(&mut tail).gap.is_some_and(|told| told.contains("removed or cut")));
+    assert!(read(&mut tail).gap.is_some_and(|text| text.contains("removed or cut")));
 }
 
 #[test]
-fn a_place_that_does_not_fit_any_more_is_told_when_it_is_opened() {
+fn mismatched_checkpoint_is_a_gap() {
     let folder = tempfile::tempdir().expect("a folder");
     append(&folder, 1, &(event(1) + "\n"));
     append(&folder, 2, &(event(2) + "\n"));
     let (mut tail, _) = open(&folder, true);
     read(&mut tail);
-    Bookmark::write(folder.path(), tail.place()).expect("writes");
-    // The same length, and something else in it: a log that a power cut took the end of, and that went on.
+    LogCheckpoint::write(folder.path(), tail.place()).expect("writes");
+    // Same length, other contents: a log that was truncated by a power cut and continued.
     fs::write(folder.path().join(name(2)), event(7) + "\n").expect("writes");
-    let (mut again, told) = open(&folder, false);
-    assert!(told.is_some_and(|told| told.contains(&name(2))));
-    assert_eq!(texts(&read(&mut again).lines), [event(7)], "the log before it was had");
+    let (mut again, gap) = open(&folder, false);
+    assert!(gap.is_some_and(|text| text.contains(&name(2))));
+    assert_eq!(texts(&read(&mut again).lines), [event(7)], "the log before it was published");
     fs::write(folder.path().join("mqtt-place.json"), "{").expect("writes");
-    let (mut all, told) = open(&folder, false);
-    assert!(told.is_some_and(|told| told.contains("not known")));
+    let (mut all, gap) = open(&folder, false);
+    assert!(gap.is_some_and(|text| text.contains("not known")));
     assert_eq!(texts(&read(&mut all).lines), [event(1), event(7)]);
 }
 
 proptest! {
-    /// Whatever is appended, in pieces of any length, to however many logs, with reads of any size between: every
+    /// For appends of any length to any number of logs, with reads of any size in between: every
     /// record is read once, in order.
     #[test]
     fn every_record_is_read_once(

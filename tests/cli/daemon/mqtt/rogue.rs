@@ -41,10 +41,10 @@ fn scans_are_not_delayed() {
         (Manner::Honest, ""),
         (Manner::Deaf, ""),
         (Manner::Curt, "closed the connection"),
-        (Manner::Garbled, "makes no sense"),
-        (Manner::Noisy, "messages a second"),
-        (Manner::Pushy, "messages a second"),
-        (Manner::Bulky, "makes no sense"),
+        (Manner::Garbled, "protocol error"),
+        (Manner::Noisy, "messages per second"),
+        (Manner::Pushy, "messages per second"),
+        (Manner::Bulky, "protocol error"),
     ] {
         assert!(beside(Some((manner, trouble))) > 0, "{manner:?}");
     }

@@ -1,4 +1,4 @@
-//! The state of one scan: which beams are in, what the clocks say, and the records of it.
+//! State of one scan: received beams, clocks, and the records written.
 
 use firmware_protocol::{
     host::{HostError, HostEvent, ReadingFault},
@@ -15,25 +15,26 @@ use uuid::Uuid;
 use super::{
     clock::{ClockFit, TickExtender},
     driver::DriveError,
-    job::ScanJob,
+    scan_job::ScanJob,
     wall_clock::{WallClock, as_step},
 };
 
 /// Device time from the first firing to the last, within one boot.
 #[derive(Debug, Clone, Copy)]
-struct Span {
+struct FiringSpan {
     first: u64,
     last: u64,
 }
 
-/// What there is to say about a scan that is over.
-pub(super) struct Finished {
+/// Results of a finished scan.
+pub(super) struct FinishedScan {
     pub(super) end: ScanEnd,
     pub(super) restarts: u32,
     pub(super) clock_drift: Option<f64>,
 }
 
-pub(super) struct Progress<'a> {
+/// Turns the host's events of one scan into records.
+pub(super) struct ScanRecorder<'a> {
     job: &'a ScanJob,
     scan: Uuid,
     /// First step and stride of the plan.
@@ -44,19 +45,19 @@ pub(super) struct Progress<'a> {
     sink: &'a mut dyn Sink,
     segment: Option<Segment>,
     done: Vec<bool>,
-    /// Beams whose readings made no sense: they are not asked for again.
-    refused: Vec<bool>,
+    /// Beams with an implausible reading, which are not measured again.
+    rejected: Vec<bool>,
     repaired: u32,
     restarts: u32,
     clock: ClockFit,
     extender: TickExtender,
-    span: Option<Span>,
-    /// Ticks of the boots before this one.
+    span: Option<FiringSpan>,
+    /// Measuring time of the boots before the current one, ticks.
     earlier_ticks: u64,
     failed: Option<SinkError>,
 }
 
-impl<'a> Progress<'a> {
+impl<'a> ScanRecorder<'a> {
     pub(super) fn new(
         job: &'a ScanJob,
         scan: Uuid,
@@ -75,7 +76,7 @@ impl<'a> Progress<'a> {
             sink,
             segment: None,
             done: vec![false; job.plan.beams() as usize],
-            refused: vec![false; job.plan.beams() as usize],
+            rejected: vec![false; job.plan.beams() as usize],
             repaired: 0,
             restarts: 0,
             clock: ClockFit::new(identity.tick_hz),
@@ -86,38 +87,39 @@ impl<'a> Progress<'a> {
         }
     }
 
-    /// Readings so far.
+    /// Number of beams measured.
     pub(super) fn measured(&self) -> u32 {
         self.done.iter().filter(|&&done| done).count() as u32
     }
 
     pub(super) fn next_segment(&self) -> Option<Segment> {
-        let settled = self.done.iter().zip(&self.refused).map(|(done, refused)| *done || *refused);
-        Segment::next(&settled.collect::<Vec<_>>(), self.job.plan.pings_per_stop)
+        let closed =
+            self.done.iter().zip(&self.rejected).map(|(done, rejected)| *done || *rejected);
+        Segment::next(&closed.collect::<Vec<_>>(), self.job.plan.pings_per_stop)
     }
 
     pub(super) fn begin(&mut self, segment: Segment) {
         self.segment = Some(segment);
     }
 
-    /// Takes an event in; breaks off when the log can't be written any more.
+    /// Processes an event; breaks off once a record could not be written.
     pub(super) fn handle(&mut self, event: HostEvent) -> ControlFlow<()> {
-        self.take_in(event);
+        self.process(event);
         if self.failed.is_some() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     }
 
-    fn take_in(&mut self, event: HostEvent) {
-        self.look_at_wall_clock();
+    fn process(&mut self, event: HostEvent) {
+        self.check_wall_clock();
         match event {
-            HostEvent::Reading { reading, repaired } => self.reading(&reading, repaired),
+            HostEvent::Reading { reading, repaired } => self.record_reading(&reading, repaired),
             HostEvent::ClockSample { sent_us, received_us, device_ticks, retried } => {
                 let ticks = self.extender.extend(device_ticks);
                 if !retried {
                     self.clock.push(sent_us, received_us, ticks);
                 }
             }
-            HostEvent::ReadingRefused { reading, fault } => self.refuse(&reading, fault),
-            // It comes late: the coils were let go before this scan, which homed first.
+            HostEvent::ReadingRefused { reading, fault } => self.reject(&reading, fault),
+            // A late report: the coils were released before this scan, which homed first.
             HostEvent::Fault(FaultKind::HoldExpired) => {}
             HostEvent::Fault(kind) => self.note(EventKind::Fault, fault_text(kind)),
             HostEvent::Rebooted { old, new } => self.note(
@@ -136,8 +138,8 @@ impl<'a> Progress<'a> {
         }
     }
 
-    /// The device told its identity again after a restart; its clock began anew.
-    pub(super) fn restarted(&mut self, identity: &Identity) {
+    /// Continues with a device that restarted and was identified again. The clock fit starts over.
+    pub(super) fn resume_after_restart(&mut self, identity: &Identity) {
         self.restarts += 1;
         self.identity = *identity;
         self.clock = ClockFit::new(identity.tick_hz);
@@ -145,7 +147,7 @@ impl<'a> Progress<'a> {
         self.earlier_ticks += self.span_ticks();
         self.span = None;
         let detail = format!(
-            "boot {:04x} ({:?}): homing, then the {} beams that are left",
+            "boot {:04x} ({:?}): homing, then the remaining {} beams",
             identity.boot,
             identity.reset_cause,
             self.done.len() as u32 - self.measured()
@@ -153,41 +155,41 @@ impl<'a> Progress<'a> {
         self.note(EventKind::Reconnected, detail);
     }
 
-    /// Tells that the wall clock was set by so much before the scan.
-    pub(super) fn wall_clock_was_set(&mut self, step: SignedDuration) {
+    /// Records a step of the wall clock before the scan.
+    pub(super) fn note_earlier_clock_step(&mut self, step: SignedDuration) {
         if let Some(step) = as_step(step) {
             let step_s = step.as_secs_f64();
-            let detail = format!(
-                "the computer's clock was set by {step_s:+.3} s since it was looked at last"
-            );
+            let detail =
+                format!("the computer's clock was set by {step_s:+.3} s since the previous check");
             self.note(EventKind::ClockStep, detail);
         }
     }
 
-    /// Tells that it was set during the scan, within which times are by the clock as it was.
-    pub(super) fn look_at_wall_clock(&mut self) {
+    /// Records a step of the wall clock during the scan. Times within a scan keep the clock of its
+    /// start.
+    pub(super) fn check_wall_clock(&mut self) {
         if let Some(step) = self.wall_clock.step() {
             let step_s = step.as_secs_f64();
             let detail = format!(
                 "the computer's clock was set by {step_s:+.3} s during the scan: the times of its \
-                 readings go on by the clock as it was when the scan began"
+                 readings continue on the clock of the scan's start"
             );
             self.note(EventKind::ClockStep, detail);
         }
     }
 
-    /// By how much the wall clock was set during the scan, and in how many steps.
+    /// Total step of the wall clock during the scan, and the number of steps.
     pub(super) const fn wall_clock_steps(&self) -> (SignedDuration, u32) {
-        self.wall_clock.told()
+        self.wall_clock.total_step()
     }
 
     pub(super) fn note(&mut self, kind: EventKind, detail: String) {
         self.write(&Record::Event(Event { time: Timestamp::now(), kind, detail }));
     }
 
-    /// Marks every beam that will not come any more.
-    pub(super) fn give_up(&mut self, error: &DriveError) {
-        self.note(kind_of(error), format!("scan given up: {error}"));
+    /// Records the failure of the scan, and every open beam as lost.
+    pub(super) fn abort(&mut self, error: &DriveError) {
+        self.note(event_kind(error), format!("scan failed: {error}"));
         for index in 0..self.done.len() {
             if self.is_open(index) {
                 self.write_lost(index as u32);
@@ -195,9 +197,9 @@ impl<'a> Progress<'a> {
         }
     }
 
-    /// Whether nothing was written of a beam yet.
+    /// Returns `true` if no ping of the beam was written yet.
     fn is_open(&self, index: usize) -> bool {
-        self.done.get(index) == Some(&false) && self.refused.get(index) == Some(&false)
+        self.done.get(index) == Some(&false) && self.rejected.get(index) == Some(&false)
     }
 
     fn write_lost(&mut self, index: u32) {
@@ -205,26 +207,26 @@ impl<'a> Progress<'a> {
         self.write(&Record::Ping(Box::new(ping)));
     }
 
-    /// The device told what can't be: the log says what, and the beam counts as lost.
-    fn refuse(&mut self, reading: &Reading, fault: ReadingFault) {
+    /// Logs an implausible reading and records the beam as lost.
+    fn reject(&mut self, reading: &Reading, fault: ReadingFault) {
         let Some(segment) = self.segment else { return };
         let index = segment.index(u32::from(reading.index), self.job.plan.pings_per_stop);
         if !self.is_open(index as usize) {
             return;
         }
-        self.note(EventKind::Fault, format!("the reading of beam {index} is refused: {fault}"));
-        if let Some(refused) = self.refused.get_mut(index as usize) {
-            *refused = true;
+        self.note(EventKind::Fault, format!("the reading of beam {index} was rejected: {fault}"));
+        if let Some(rejected) = self.rejected.get_mut(index as usize) {
+            *rejected = true;
         }
         self.write_lost(index);
     }
 
-    /// The scan is over, but what it began with is lost.
-    pub(super) fn could_not_go_home(&mut self, error: &DriveError) {
-        self.note(kind_of(error), format!("could not go home after it: {error}"));
+    /// Records that the motor did not return home after a complete scan.
+    pub(super) fn note_home_failure(&mut self, error: &DriveError) {
+        self.note(event_kind(error), format!("could not go home after the scan: {error}"));
     }
 
-    /// Gives back the first failure to write, if there was one.
+    /// Returns the first write error, if any.
     pub(super) fn check_sink(&mut self) -> Result<(), SinkError> {
         self.failed.take().map_or(Ok(()), Err)
     }
@@ -233,10 +235,10 @@ impl<'a> Progress<'a> {
         mut self,
         acoustic_limit_s: f64,
         home_drift_steps: Option<i32>,
-    ) -> Result<Finished, SinkError> {
+    ) -> Result<FinishedScan, SinkError> {
         if let Some(drift) = home_drift_steps.filter(|&drift| drift != 0) {
             let detail = format!(
-                "the index was found {drift} steps off after the scan: its azimuths are doubtful"
+                "the index was found {drift} steps off after the scan: its azimuths are uncertain"
             );
             self.note(EventKind::Fault, detail);
         }
@@ -254,21 +256,21 @@ impl<'a> Progress<'a> {
         };
         self.write(&Record::ScanEnd(end.clone()));
         self.check_sink()?;
-        Ok(Finished { end, restarts: self.restarts, clock_drift: self.clock.drift() })
+        Ok(FinishedScan { end, restarts: self.restarts, clock_drift: self.clock.drift() })
     }
 
-    fn reading(&mut self, reading: &Reading, repaired: bool) {
+    fn record_reading(&mut self, reading: &Reading, repaired: bool) {
         let Some(segment) = self.segment else { return };
         let index = segment.index(u32::from(reading.index), self.job.plan.pings_per_stop);
         if !self.is_open(index as usize) {
             return;
         }
         let fired = self.extender.extend(reading.fired_ticks);
-        let span = self.span.get_or_insert(Span { first: fired, last: fired });
-        *span = Span { first: span.first.min(fired), last: span.last.max(fired) };
+        let span = self.span.get_or_insert(FiringSpan { first: fired, last: fired });
+        *span = FiringSpan { first: span.first.min(fired), last: span.last.max(fired) };
         let ping = self.ping(index, reading, fired, repaired);
         self.write(&Record::Ping(Box::new(ping)));
-        // What is not in the log counts as missing.
+        // A reading that could not be logged counts as missing.
         if let Some(done) = self.done.get_mut(index as usize).filter(|_| self.failed.is_none()) {
             *done = true;
             self.repaired += u32::from(repaired);
@@ -303,7 +305,7 @@ impl<'a> Progress<'a> {
         }
     }
 
-    /// A ping of the plan without a reading.
+    /// Ping of a planned beam without a reading.
     fn blank_ping(&self, index: u32, status: PingStatus) -> Ping {
         let stop = index / self.job.plan.pings_per_stop.max(1);
         let (from, stride) = self.motor;
@@ -314,9 +316,9 @@ impl<'a> Progress<'a> {
         }
     }
 
-    /// Wall clock of a device time, and its standard deviation.
+    /// Wall-clock time of a device time, and the standard deviation in microseconds.
     fn wall_time(&self, ticks: u64) -> (Option<Timestamp>, Option<f64>) {
-        // A clock that jumps has no fit: all that is known is that it is now.
+        // A virtual clock jumps and can't be fitted: only the present time is known.
         if self.identity.capabilities.has(Capabilities::VIRTUAL_CLOCK) {
             return (Some(Timestamp::now()), None);
         }
@@ -337,7 +339,7 @@ impl<'a> Progress<'a> {
     }
 }
 
-fn kind_of(error: &DriveError) -> EventKind {
+fn event_kind(error: &DriveError) -> EventKind {
     match error {
         DriveError::Host(HostError::NoAnswer { .. } | HostError::Hangup) => EventKind::LinkLost,
         _ => EventKind::Fault,

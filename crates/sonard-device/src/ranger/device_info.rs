@@ -1,4 +1,4 @@
-//! What a device says of itself, as it stands in records.
+//! Identity of a device in the form of log records.
 
 use firmware_protocol::{
     host::Serial,
@@ -6,8 +6,8 @@ use firmware_protocol::{
 };
 use sonard_records::{Device, Provenance};
 
-/// Where readings of this device come from. The device says itself what it is: how its port was
-/// opened proves nothing.
+/// Provenance of the device's readings, from the capabilities it reports. The kind of port is no
+/// evidence.
 #[must_use]
 pub const fn provenance(identity: &Identity) -> Provenance {
     if identity.capabilities.has(Capabilities::SIMULATED) {
@@ -19,7 +19,7 @@ pub const fn provenance(identity: &Identity) -> Provenance {
     }
 }
 
-/// The device as it stands in a session's record.
+/// Converts an identity to the device entry of a session record.
 #[must_use]
 pub fn device_record(identity: &Identity) -> Device {
     let firmware = identity.firmware;
@@ -33,7 +33,7 @@ pub fn device_record(identity: &Identity) -> Device {
     }
 }
 
-/// The serial number as text if it is text, else in hexadecimal.
+/// Serial number as text if printable, else in hexadecimal.
 #[must_use]
 pub fn serial_text(identity: &Identity) -> String {
     Serial(&identity.serial).to_string()

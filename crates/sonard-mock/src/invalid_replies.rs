@@ -1,4 +1,4 @@
-//! A mock that says what is not so: each lie is one that a host must see through.
+//! Invalid replies of the mock: one fault for each validation rule of a host.
 
 use std::fmt::Write as _;
 
@@ -7,98 +7,103 @@ use firmware_protocol::{
     messages::{Capabilities, Echoes, Identity, ProtocolId, Reading, ReadingStatus, Reply, limits},
 };
 
-/// What a mock says wrongly. Those of an identity after a restart are told from the second boot on;
-/// those of readings about one beam in a hundred.
+/// Fault of the mock's replies. Faults of the identity after a restart apply from the second boot
+/// on, faults of readings to one beam in a hundred.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Lie {
-    /// Its boot nonce is 0.
+pub enum InvalidReply {
+    /// Boot nonce 0.
     BootZero,
-    /// Its clock does not tick.
+    /// Clock rate 0.
     NoTicks,
-    /// Its clock ticks at half the protocol's rate.
+    /// Half of the protocol's clock rate.
     SlowTicks,
-    /// Its motor has no steps.
+    /// No motor steps per revolution.
     NoSteps,
-    /// It keeps less than a reading.
+    /// Reading buffer smaller than a reading.
     SmallRing,
-    /// After a restart: another serial number.
+    /// After a restart: a different serial number.
     OtherSerial,
-    /// After a restart: twice the steps a revolution.
+    /// After a restart: twice the steps per revolution.
     OtherSteps,
-    /// After a restart: an emulator. Never hardware: no log shall take a mock for that.
+    /// After a restart: an emulator. Never hardware, so that no log attributes mock data to it.
     Emulator,
     /// After a restart: no index sensor.
     NoIndex,
-    /// An echo after the window.
+    /// Echo after the end of the window.
     LateEcho,
-    /// No echo, with echoes.
+    /// Status "no echo" with an echo time.
     SilentEcho,
-    /// An echo, without one.
+    /// Status "echo" without an echo time.
     MissingEcho,
-    /// Echoes that fall.
+    /// Decreasing echo times.
     FallingEchoes,
-    /// More echoes than asked for.
+    /// More echoes than requested.
     ManyEchoes,
-    /// Fired before the sweep.
+    /// Firing time before the sweep.
     FiredBefore,
-    /// Fired at the same time as the beam before.
+    /// Firing time of the previous beam.
     FiredTwice,
-    /// Fired an eighth of a turn of its clock later than it was.
+    /// Firing time late by an eighth of the clock's period.
     FiredLater,
-    /// Another step than the plan's.
+    /// Step that differs from the plan.
     WrongStep,
-    /// A beam that the plan has not.
+    /// Beam index outside of the plan.
     WrongIndex,
-    /// Home is started, and never done.
+    /// Homing that is started and never finished.
     EndlessHome,
-    /// The index is turns away from where it was expected.
+    /// Index several revolutions away from the expected position.
     FarHome,
 }
 
-/// All of them, by the names that a fault specification takes.
-pub const LIES: [(&str, Lie); 21] = [
-    ("boot-zero", Lie::BootZero),
-    ("no-ticks", Lie::NoTicks),
-    ("slow-ticks", Lie::SlowTicks),
-    ("no-steps", Lie::NoSteps),
-    ("small-ring", Lie::SmallRing),
-    ("other-serial", Lie::OtherSerial),
-    ("other-steps", Lie::OtherSteps),
-    ("emulator", Lie::Emulator),
-    ("no-index", Lie::NoIndex),
-    ("late-echo", Lie::LateEcho),
-    ("silent-echo", Lie::SilentEcho),
-    ("missing-echo", Lie::MissingEcho),
-    ("falling-echoes", Lie::FallingEchoes),
-    ("many-echoes", Lie::ManyEchoes),
-    ("fired-before", Lie::FiredBefore),
-    ("fired-twice", Lie::FiredTwice),
-    ("fired-later", Lie::FiredLater),
-    ("wrong-step", Lie::WrongStep),
-    ("wrong-index", Lie::WrongIndex),
-    ("endless-home", Lie::EndlessHome),
-    ("far-home", Lie::FarHome),
+/// All reply faults with their names in a fault specification.
+pub const INVALID_REPLIES: [(&str, InvalidReply); 21] = [
+    ("boot-zero", InvalidReply::BootZero),
+    ("no-ticks", InvalidReply::NoTicks),
+    ("slow-ticks", InvalidReply::SlowTicks),
+    ("no-steps", InvalidReply::NoSteps),
+    ("small-ring", InvalidReply::SmallRing),
+    ("other-serial", InvalidReply::OtherSerial),
+    ("other-steps", InvalidReply::OtherSteps),
+    ("emulator", InvalidReply::Emulator),
+    ("no-index", InvalidReply::NoIndex),
+    ("late-echo", InvalidReply::LateEcho),
+    ("silent-echo", InvalidReply::SilentEcho),
+    ("missing-echo", InvalidReply::MissingEcho),
+    ("falling-echoes", InvalidReply::FallingEchoes),
+    ("many-echoes", InvalidReply::ManyEchoes),
+    ("fired-before", InvalidReply::FiredBefore),
+    ("fired-twice", InvalidReply::FiredTwice),
+    ("fired-later", InvalidReply::FiredLater),
+    ("wrong-step", InvalidReply::WrongStep),
+    ("wrong-index", InvalidReply::WrongIndex),
+    ("endless-home", InvalidReply::EndlessHome),
+    ("far-home", InvalidReply::FarHome),
 ];
 
-impl Lie {
-    /// The lie of a name, or the names there are.
-    pub(super) fn named(name: &str) -> Result<Self, String> {
-        let found = LIES.iter().find(|(known, _)| *known == name).map(|(_, lie)| *lie);
+impl InvalidReply {
+    /// Looks up a fault by name.
+    ///
+    /// # Errors
+    /// The list of valid names.
+    pub(super) fn from_name(name: &str) -> Result<Self, String> {
+        let found = INVALID_REPLIES.iter().find(|(known, _)| *known == name).map(|(_, lie)| *lie);
         found.ok_or_else(|| {
             let mut names = String::from("one of");
-            for (known, _) in LIES {
+            for (known, _) in INVALID_REPLIES {
                 let _ = write!(names, " {known}");
             }
             names
         })
     }
 
-    /// What it makes of a reply.
-    fn told(self, reply: Reply, restarted: bool, fired_before: u32) -> Reply {
+    /// Applies the fault to a reply.
+    fn corrupt(self, reply: Reply, restarted: bool, fired_before: u32) -> Reply {
         match reply {
-            Reply::Identity(identity) => Reply::Identity(self.of_identity(identity, restarted)),
+            Reply::Identity(identity) => {
+                Reply::Identity(self.corrupt_identity(identity, restarted))
+            }
             Reply::Reading(reading) if reading.sweep != 0 && reading.index % 100 == 7 => {
-                Reply::Reading(self.of_reading(reading, fired_before))
+                Reply::Reading(self.corrupt_reading(reading, fired_before))
             }
             Reply::Homed { .. } if self == Self::EndlessHome => Reply::Started,
             Reply::Homed { .. } if self == Self::FarHome => Reply::Homed { drift_steps: 10_000 },
@@ -106,7 +111,7 @@ impl Lie {
         }
     }
 
-    fn of_identity(self, identity: Identity, restarted: bool) -> Identity {
+    fn corrupt_identity(self, identity: Identity, restarted: bool) -> Identity {
         let without = |bits: Capabilities| Capabilities(identity.capabilities.0 & !bits.0);
         match self {
             Self::BootZero => Identity { boot: 0, ..identity },
@@ -131,7 +136,7 @@ impl Lie {
         }
     }
 
-    fn of_reading(self, reading: Reading, fired_before: u32) -> Reading {
+    fn corrupt_reading(self, reading: Reading, fired_before: u32) -> Reading {
         let echoes = |ticks: &[u32]| Echoes::from_ticks(ticks);
         let status = ReadingStatus::Echo;
         match self {
@@ -161,23 +166,23 @@ impl Lie {
     }
 }
 
-/// Tells a lie, and another version of the protocol, in place of what a board says.
+/// Applies a reply fault and another protocol version to the replies of a board.
 #[derive(Debug, Default)]
-pub(super) struct Liar {
-    lie: Option<Lie>,
+pub(super) struct ReplyCorruptor {
+    lie: Option<InvalidReply>,
     version: Option<u8>,
     first_boot: Option<u16>,
-    /// When the latest beam was fired that was told of.
+    /// Firing time of the latest reported beam, ticks.
     fired: u32,
 }
 
-impl Liar {
-    pub(super) fn new(lie: Option<Lie>, version: Option<u8>) -> Self {
+impl ReplyCorruptor {
+    pub(super) fn new(lie: Option<InvalidReply>, version: Option<u8>) -> Self {
         Self { lie, version, ..Self::default() }
     }
 
-    /// The same frames, with whatever is said wrongly.
-    pub(super) fn told(&mut self, bytes: Vec<u8>) -> Vec<u8> {
+    /// Decodes frames, applies the fault, and encodes them again.
+    pub(super) fn corrupt(&mut self, bytes: Vec<u8>) -> Vec<u8> {
         if self.lie.is_none() && self.version.is_none() {
             return bytes;
         }
@@ -187,17 +192,17 @@ impl Liar {
             let Received::Frame(frame) = decoder.push(byte) else { continue };
             let Ok(reply) = Reply::decode(frame.body) else { continue };
             let restarted = *self.first_boot.get_or_insert(frame.header.boot) != frame.header.boot;
-            let mut told = reply;
+            let mut sent = reply;
             if let Some(lie) = self.lie {
-                told = lie.told(told, restarted, self.fired);
+                sent = lie.corrupt(sent, restarted, self.fired);
             }
-            if let (Some(version), Reply::Identity(identity)) = (self.version, &mut told) {
+            if let (Some(version), Reply::Identity(identity)) = (self.version, &mut sent) {
                 identity.protocol = ProtocolId { version, ..identity.protocol };
             }
             if let Reply::Reading(reading) = reply {
                 self.fired = reading.fired_ticks;
             }
-            if let Ok(frame) = Frame::encode(frame.header, &told) {
+            if let Ok(frame) = Frame::encode(frame.header, &sent) {
                 out.extend_from_slice(&frame);
             }
         }

@@ -1,4 +1,4 @@
-//! A scan with everything it needs to know before a port is opened.
+//! Setup of a scan: checked inputs and predictions, before a port is opened.
 
 use std::sync::Arc;
 
@@ -13,68 +13,68 @@ use sonard_model::{
 use sonard_records::{ModelRecord, PlanError, ScanPlan, Session, SimRecord};
 use thiserror::Error;
 
-use super::{DeafWindow, Listening, Motion, ScanJob, device_record, provenance};
+use super::{Listening, Motion, ScanJob, WindowTooShort, device_record, provenance};
 
-/// The inputs of a scan, each of them checked by itself.
+/// Inputs of a scan, each validated on its own.
 #[derive(Debug, Clone)]
 pub struct ScanInputs {
-    /// The scene.
+    /// Room and obstacles, without the robot.
     pub scene: Arc<Scene>,
-    /// Where the ranger stands.
+    /// Pose of the ranger in the scene.
     pub pose: Pose,
-    /// The pose as a person calls it.
+    /// Pose as the user entered it: a name or numbers.
     pub pose_text: String,
-    /// Which azimuths.
+    /// Azimuths and firings per stop.
     pub plan: ScanPlan,
-    /// How the motor turns and the ranger listens.
+    /// Motor motion and receiver timing.
     pub motion: Motion,
-    /// The sensor's data.
+    /// Acoustic data of the ranging module.
     pub sensor: Sensor,
-    /// The air.
+    /// State of the air.
     pub air: Air,
-    /// How echoes are predicted.
+    /// Options of the acoustic model.
     pub options: Options,
 }
 
-/// A scan that can be taken, with what the model says about it.
+/// Scan that is ready to be taken, with its predictions.
 pub struct PreparedScan {
-    /// The scene.
+    /// Room and obstacles, without the robot.
     pub scene: Arc<Scene>,
-    /// Where the ranger stands.
+    /// Pose of the ranger in the scene.
     pub pose: Pose,
-    /// The pose as a person calls it.
+    /// Pose as the user entered it: a name or numbers.
     pub pose_text: String,
-    /// Which azimuths.
+    /// Azimuths and firings per stop.
     pub plan: ScanPlan,
-    /// The model of it.
+    /// Acoustic model of the scene with the robot.
     pub simulator: Simulator,
     motion: Motion,
     listening: Listening,
-    /// The sensor's data.
+    /// Acoustic data of the ranging module.
     pub sensor: Sensor,
-    /// The air.
+    /// State of the air.
     pub air: Air,
-    /// How echoes are predicted.
+    /// Options of the acoustic model.
     pub options: Options,
     predictions: Vec<SimRecord>,
 }
 
-/// Inputs with which a scan can't be taken.
+/// Rejected inputs of a scan.
 #[derive(Debug, Error)]
 pub enum PrepareError {
-    /// The window is over before the receiver opens.
+    /// The listening window ends before the receiver opens.
     #[error("{0}")]
-    Deaf(#[from] DeafWindow),
-    /// The model refuses sensor or options.
+    Deaf(#[from] WindowTooShort),
+    /// The model rejects sensor or options.
     #[error("{0}")]
     Model(#[from] ModelError),
 }
 
 impl PreparedScan {
-    /// Asks the model about every stop.
+    /// Computes the prediction of every stop.
     ///
     /// # Errors
-    /// When nothing can be heard in the listening window, or the model refuses.
+    /// If the listening window ends before the receiver opens, or the model rejects the inputs.
     pub fn of(inputs: ScanInputs) -> Result<Self, PrepareError> {
         let ScanInputs { scene, pose, pose_text, plan, motion, sensor, air, options } = inputs;
         let listening = Listening {
@@ -108,23 +108,23 @@ impl PreparedScan {
         })
     }
 
-    /// When the receiver opens, microseconds after firing.
+    /// End of the receiver's blanking, microseconds after firing.
     #[must_use]
     pub const fn blanking_us(&self) -> f64 {
         self.sensor.blanking_us
     }
 
-    /// The pose as options take it.
+    /// Pose in the syntax of the command line: `x,y,heading`.
     #[must_use]
     pub fn pose_numbers(&self) -> String {
         let Pose { x_m, y_m, heading_deg } = self.pose;
         format!("{x_m},{y_m},{heading_deg}")
     }
 
-    /// The scan for a device of this identity.
+    /// Builds the scan job for a device of the given identity.
     ///
     /// # Errors
-    /// When the plan is not on the motor's steps.
+    /// If an azimuth of the plan is not a multiple of the motor's step.
     pub fn job(&self, identity: &Identity) -> Result<ScanJob, PlanError> {
         self.plan.motor_steps(u32::from(identity.steps_per_revolution))?;
         Ok(ScanJob {
@@ -139,13 +139,13 @@ impl PreparedScan {
         })
     }
 
-    /// The settings for a device of this identity.
+    /// Builds the settings for a device of the given identity.
     #[must_use]
     pub fn settings(&self, identity: &Identity) -> Settings {
         self.motion.settings(&self.listening, identity)
     }
 
-    /// The session's record: what is true for every reading, and who measured.
+    /// Builds the session record: the conditions common to all readings, and the device.
     #[must_use]
     pub fn session(&self, identity: &Identity) -> Session {
         let (sensor, air) = (self.sensor.clone(), &self.air);

@@ -1,5 +1,5 @@
-//! Pins that exist on paper: a module, a motor with an index, and a clock that is told the time.
-//! The shared tests of all boards run on them.
+//! Simulated pins: a module, a motor with an index, and a virtual clock. The conformance tests of
+//! all boards run on them.
 
 use std::collections::VecDeque;
 use std::convert::Infallible;
@@ -10,13 +10,13 @@ use firmware_protocol::conformance_tests;
 use super::{Output, PiBoard, PiSettings, Pins};
 
 const TICKS_PER_US: u64 = 2;
-/// What blanks the module by itself, ticks.
-const INTERNAL_BLANKING: u64 = 4_760;
-/// How long an echo lasts, ticks: 16 cycles at 49.4 kHz.
-const PULSE: u64 = 648;
+/// Internal blanking of the module, ticks.
+const INTERNAL_BLANKING_TICKS: u64 = 4_760;
+/// Duration of an echo, ticks: 16 cycles at 49.4 kHz.
+const PULSE_TICKS: u64 = 648;
 
 #[derive(Debug, Default)]
-struct FakePins {
+struct SimulatedPins {
     now: u64,
     init: bool,
     blnk: bool,
@@ -35,13 +35,14 @@ struct FakePins {
     emergency: Option<bool>,
 }
 
-impl FakePins {
-    /// Lets time pass: ECHO latches where an echo comes while the module listens.
-    fn pass(&mut self, to: u64) {
+impl SimulatedPins {
+    /// Advances time; ECHO latches if an echo arrives while the receiver is open.
+    fn advance_to(&mut self, to: u64) {
         for after in &self.echoes {
             let begins = (self.fired + after).max(self.unblanked).max(self.blnk_fell);
-            let heard = begins < self.fired + after + PULSE && begins > self.now && begins <= to;
-            if self.init && !self.blnk && !self.latched && heard {
+            let detected =
+                begins < self.fired + after + PULSE_TICKS && begins > self.now && begins <= to;
+            if self.init && !self.blnk && !self.latched && detected {
                 self.latched = true;
                 self.rises.push_back(begins);
             }
@@ -50,7 +51,7 @@ impl FakePins {
     }
 }
 
-impl Pins for FakePins {
+impl Pins for SimulatedPins {
     fn now(&mut self) -> u64 {
         self.now
     }
@@ -79,7 +80,7 @@ impl Pins for FakePins {
     fn raise_init(&mut self) -> u64 {
         assert!(!self.init, "INIT was high already");
         (self.init, self.fired, self.firings) = (true, self.now, self.firings + 1);
-        self.unblanked = self.now + INTERNAL_BLANKING;
+        self.unblanked = self.now + INTERNAL_BLANKING_TICKS;
         self.now
     }
 
@@ -105,17 +106,17 @@ impl Pins for FakePins {
     }
 }
 
-/// The board on these pins.
-struct Fake(PiBoard<FakePins>);
+/// Raspberry Pi board on simulated pins.
+struct SimulatedPi(PiBoard<SimulatedPins>);
 
-impl Fake {
-    fn new(pins: FakePins) -> Self {
+impl SimulatedPi {
+    fn new(pins: SimulatedPins) -> Self {
         let settings = PiSettings { boot: 7, serial: *b"PI-FAKE-01", steps_per_revolution: 400 };
         Self(PiBoard::new(pins, settings))
     }
 }
 
-impl DeviceUnderTest for Fake {
+impl DeviceUnderTest for SimulatedPi {
     type Error = Infallible;
 
     fn now_us(&self) -> u64 {
@@ -127,9 +128,9 @@ impl DeviceUnderTest for Fake {
         loop {
             self.0.advance();
             let now = self.0.pins.now;
-            // The processor takes a moment for each round.
+            // Each iteration takes the processor some time.
             let wake = self.0.next_wake().unwrap_or(end).clamp(now + 2, end.max(now + 2));
-            self.0.pins.pass(wake);
+            self.0.pins.advance_to(wake);
             if wake >= end {
                 self.0.advance();
                 return Ok(());
@@ -142,9 +143,9 @@ impl DeviceUnderTest for Fake {
     }
 
     fn receive(&mut self) -> Vec<u8> {
-        let mut said = Vec::new();
-        self.0.poll_transmit(&mut said);
-        said
+        let mut sent = Vec::new();
+        self.0.poll_transmit(&mut sent);
+        sent
     }
 
     fn set_echoes(&mut self, after_us: &[f64]) {
@@ -167,20 +168,23 @@ impl DeviceUnderTest for Fake {
 mod without_an_index {
     use super::*;
 
-    conformance_tests!(Fake::new(FakePins::default()));
+    conformance_tests!(SimulatedPi::new(SimulatedPins::default()));
 }
 
 mod with_an_index {
     use super::*;
 
-    conformance_tests!(Fake::new(FakePins { index: Some(0), ..FakePins::default() }));
+    conformance_tests!(SimulatedPi::new(SimulatedPins {
+        index: Some(0),
+        ..SimulatedPins::default()
+    }));
 
     use firmware_protocol::conformance::Bench;
     use firmware_protocol::host::{Command, HostEvent, Outcome};
     use firmware_protocol::messages::{Blanking, Settings};
 
     #[test]
-    fn home_is_the_same_step_from_everywhere() {
+    fn home_is_unique() {
         let settings = Settings {
             window_ticks: 48_000,
             min_interval_ticks: 0,
@@ -192,15 +196,15 @@ mod with_an_index {
             hold_s: 0,
         };
         for index in [0, 1, 3, 57, 200, 201, 396, -130] {
-            let pins = FakePins { index: Some(index), ..FakePins::default() };
-            let mut bench = Bench::new(Fake::new(pins));
+            let pins = SimulatedPins { index: Some(index), ..SimulatedPins::default() };
+            let mut bench = Bench::new(SimulatedPi::new(pins));
             for command in [Command::Identify, Command::Configure(settings), Command::Home] {
                 bench.perform(command, 20.0).expect("gets ready");
             }
             let turned = bench.device.motor_steps();
             assert_eq!((turned - index).rem_euclid(400), 0, "index at {index}");
             assert!(turned.abs() <= 400, "index at {index}: wound by {turned} steps");
-            // Somebody turns the motor by hand.
+            // The motor is turned by hand.
             bench.perform(Command::MoveTo { step: 50 }, 10.0).expect("moves");
             bench.device.0.pins.steps -= 3;
             let events = bench.perform(Command::Home, 20.0).expect("homes");
@@ -211,13 +215,13 @@ mod with_an_index {
 }
 
 #[test]
-fn an_emergency_stop_ends_everything_at_once() {
+fn emergency_stop_acts_at_once() {
     use firmware_protocol::conformance::Bench;
     use firmware_protocol::host::{Command, HostError, HostEvent};
     use firmware_protocol::messages::NakReason;
 
-    let pins = FakePins { emergency: Some(false), ..FakePins::default() };
-    let mut bench = Bench::new(Fake::new(pins));
+    let pins = SimulatedPins { emergency: Some(false), ..SimulatedPins::default() };
+    let mut bench = Bench::new(SimulatedPi::new(pins));
     let settings = firmware_protocol::messages::Settings {
         window_ticks: 48_000,
         min_interval_ticks: 0,
@@ -246,10 +250,10 @@ fn an_emergency_stop_ends_everything_at_once() {
         )
     };
     assert!(bench.events().iter().any(ended_it), "{:?}", bench.events());
-    let stood = bench.device.motor_steps();
+    let stopped_at = bench.device.motor_steps();
     assert!(bench.perform(Command::Home, 5.0).is_err(), "still pressed");
     bench.device.0.pins.emergency = Some(false);
     bench.run(0.1).expect("runs");
     bench.perform(Command::Home, 5.0).expect("homes");
-    assert_eq!(bench.device.motor_steps(), stood, "home is where it stands, without an index");
+    assert_eq!(bench.device.motor_steps(), stopped_at, "without an index, home is the position");
 }

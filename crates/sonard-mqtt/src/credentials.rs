@@ -1,4 +1,4 @@
-//! How the broker is reached, and as whom.
+//! Address, credentials and TLS settings of the broker.
 
 use std::{fmt, path::Path};
 
@@ -12,30 +12,30 @@ use sonard_records::MAX_LINE_BYTES;
 use thiserror::Error;
 
 use super::{
-    topics::{Kind, Topics},
-    window::MOST_UNDER_WAY,
+    in_flight::MAX_IN_FLIGHT,
+    topics::{MessageKind, Topics},
 };
 
-/// The largest message from the broker that is read, bytes; commands are far smaller. Some dozens of them wait within the
-/// client when a broker sends faster than they are read.
-const MOST_RECEIVED_BYTES: usize = 1 << 15;
-/// What a message has beside its payload, bytes: its head, its topic.
-const BESIDE_BYTES: usize = 1024;
-/// Messages that the client takes over at a time: those of the window, the status, answers.
-const MOST_TAKEN: usize = MOST_UNDER_WAY + 32;
+/// Maximum size of a message from the broker, bytes; commands are far smaller. The client queues
+/// some dozens of them when a broker sends faster than they are processed.
+const MAX_RECEIVED_BYTES: usize = 1 << 15;
+/// Size of a message in addition to its payload, bytes: header and topic.
+const OVERHEAD_BYTES: usize = 1024;
+/// Capacity of the client's queue: the messages in flight, the status, replies.
+const MAX_QUEUED: usize = MAX_IN_FLIGHT + 32;
 
 const PASSWORD: Secret = Secret { what: "password", least: 1, most_bytes: 4096 };
-const KEY: Secret = Secret { what: "key", least: 1, most_bytes: MOST_CERTIFICATE_BYTES };
-const MOST_CERTIFICATE_BYTES: u64 = 1 << 20;
+const KEY: Secret = Secret { what: "key", least: 1, most_bytes: MAX_CERTIFICATE_BYTES };
+const MAX_CERTIFICATE_BYTES: u64 = 1 << 20;
 
-/// An error in the settings of a broker.
+/// Error in the settings of a broker.
 #[derive(Debug, Error)]
 #[error("mqtt.{key} {file}: {message}")]
 pub struct AccountError {
     key: &'static str,
     file: String,
     message: String,
-    /// What a person can do about it.
+    /// Suggested remedy.
     pub help: String,
 }
 
@@ -46,7 +46,7 @@ pub struct Account {
     broker: Broker,
 }
 
-/// Without the password.
+/// Omits the password.
 impl fmt::Debug for Account {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Account").field("broker", &self.broker).finish_non_exhaustive()
@@ -54,26 +54,26 @@ impl fmt::Debug for Account {
 }
 
 impl Account {
-    /// The account that the keys name, with what their files hold; `None` if they name no broker.
+    /// Reads the credentials that the configuration names; `None` if it names no broker.
     ///
     /// # Errors
-    /// When a file can't be used.
+    /// If a file can't be read or has invalid contents.
     pub fn open(keys: &MqttKeys, robot: &str) -> Result<Option<Self>, AccountError> {
-        // What is no broker was refused with the configuration.
+        // An invalid address was rejected with the configuration.
         let Some(broker) = keys.broker.as_deref().and_then(|url| Broker::parse(url).ok()) else {
             return Ok(None);
         };
-        let place = (broker.host.clone(), broker.port);
-        let mut options = MqttOptions::new(format!("sonard-{robot}"), place);
-        let online = Topics::new(keys, robot).of(Kind::Online);
+        let address = (broker.host.clone(), broker.port);
+        let mut options = MqttOptions::new(format!("sonard-{robot}"), address);
+        let online = Topics::new(keys, robot).topic_for(MessageKind::Online);
         options
             .set_keep_alive(keys.keep_alive_s)
-            // What was under way is known here, and given out again.
+            // Messages in flight are tracked here and sent again after a disconnection.
             .set_clean_session(true)
-            .set_inflight(MOST_TAKEN as u16)
-            .set_request_channel_capacity(MOST_TAKEN)
+            .set_inflight(MAX_QUEUED as u16)
+            .set_request_channel_capacity(MAX_QUEUED)
             .set_max_request_batch(64)
-            .set_max_packet_size(MOST_RECEIVED_BYTES, MAX_LINE_BYTES + BESIDE_BYTES)
+            .set_max_packet_size(MAX_RECEIVED_BYTES, MAX_LINE_BYTES + OVERHEAD_BYTES)
             .set_last_will(LastWill::new(online, "false", QoS::AtLeastOnce, true));
         match (&keys.user, &keys.password_file) {
             (Some(user), Some(file)) => {
@@ -91,17 +91,17 @@ impl Account {
         Ok(Some(Self { options, broker }))
     }
 
-    /// What a client is made of.
+    /// Options of the MQTT client.
     pub(super) fn options(&self) -> MqttOptions {
         self.options.clone()
     }
 
-    /// The name that the broker knows this client by.
+    /// Client id for the broker.
     pub(super) fn client_id(&self) -> String {
         self.options.client_id()
     }
 
-    /// The broker's place, as a person says it.
+    /// URL of the broker.
     pub(super) fn broker(&self) -> String {
         let scheme = if self.broker.tls { "mqtts" } else { "mqtt" };
         format!("{scheme}://{}:{}", self.broker.host, self.broker.port)
@@ -117,7 +117,7 @@ fn tls(keys: &MqttKeys) -> Result<Transport, AccountError> {
                 key: "key_file",
                 file: key.clone(),
                 message: format!("no private key can be read from it: {error}"),
-                help: "give the key in PEM: -----BEGIN PRIVATE KEY----- and what follows".into(),
+                help: "give the key in PEM format (-----BEGIN PRIVATE KEY----- ...)".into(),
             })?;
             Some((certificate, text))
         }
@@ -136,18 +136,18 @@ fn tls(keys: &MqttKeys) -> Result<Transport, AccountError> {
         return Err(AccountError {
             key: "certificate_file",
             file: keys.certificate_file.clone().unwrap_or_default(),
-            message: "a certificate of this daemon needs the broker's authority beside it".into(),
+            message: "a client certificate requires the broker's certificate authority".into(),
             help: "set mqtt.ca_file, for instance to /etc/ssl/certs/ca-certificates.crt".into(),
         });
     }
     Ok(trusted)
 }
 
-fn secret(key: &'static str, file: &str, wanted: Secret) -> Result<String, AccountError> {
-    read_secret(Path::new(file), wanted).map_err(|error| {
-        let other =
-            || format!("put the {} in it, readable by the daemon's user alone", wanted.what);
-        let help = SecretError::help(&error, Path::new(file)).unwrap_or_else(other);
+fn secret(key: &'static str, file: &str, expected: Secret) -> Result<String, AccountError> {
+    read_secret(Path::new(file), expected).map_err(|error| {
+        let default =
+            || format!("put the {} in it, readable only by the daemon's user", expected.what);
+        let help = SecretError::help(&error, Path::new(file)).unwrap_or_else(default);
         AccountError { key, file: file.into(), message: error.to_string(), help }
     })
 }
@@ -157,10 +157,9 @@ fn certificates(key: &'static str, file: &str) -> Result<Vec<u8>, AccountError> 
         key,
         file: file.into(),
         message,
-        help: "give a file of certificates in PEM: -----BEGIN CERTIFICATE----- and what follows"
-            .into(),
+        help: "give a file of certificates in PEM format (-----BEGIN CERTIFICATE----- ...)".into(),
     };
-    let read = read_small_file(Path::new(file), MOST_CERTIFICATE_BYTES);
+    let read = read_small_file(Path::new(file), MAX_CERTIFICATE_BYTES);
     let (text, _) = read.map_err(|error| fail(error.to_string()))?;
     let certificates: Result<Vec<_>, _> = CertificateDer::pem_slice_iter(text.as_bytes()).collect();
     match certificates {
@@ -175,7 +174,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn certificates_are_read_before_they_are_needed() {
+    fn certificates_are_validated() {
         let folder = tempfile::tempdir().expect("a folder");
         let file = folder.path().join("ca.pem").display().to_string();
         let read = |text: &str| {

@@ -1,4 +1,4 @@
-//! How long a scan is going to take, and what for.
+//! Estimated duration of a scan, split into acoustics, motor and serial link.
 
 use firmware_protocol::{
     frame::{Frame, Header},
@@ -16,23 +16,23 @@ use super::timing;
 /// Bits on the line for each byte: 8N1.
 const BITS_PER_BYTE: f64 = 10.0;
 
-/// The time of a scan, split by what it goes to; all in seconds.
+/// Estimated duration of a scan by cause, in seconds.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct Budget {
     /// Listening windows, and waits that protect the module from firing too often.
     pub acoustics_s: f64,
-    /// Steps from stop to stop with the rest after each, and the ways from and to home.
+    /// Steps between stops with the settling time after each, and the travel from and to home.
     pub motor_s: f64,
-    /// Bytes that the device waits for, or that nothing else happens beside.
+    /// Transmission time that does not overlap with a measurement.
     pub link_s: f64,
 }
 
 impl Budget {
-    /// Of a scan as [`super::Ranger::scan`] takes it, from its first command until it is home
-    /// again; the motor stands at home before, and the line runs at `baud` bits a second.
+    /// Estimates the duration of [`super::Ranger::scan`] from its first command to the return
+    /// home. The motor is at home initially; the line runs at `baud` bits per second.
     ///
-    /// `motor`: first step and stride of the plan. Readings go over the line while the next beam is
-    /// measured; they count as far as they take longer than that.
+    /// `motor`: first step and stride of the plan. Each reading is transmitted while the next beam
+    /// is measured; only the transmission time in excess of the beam counts.
     #[must_use]
     pub fn of(plan: &ScanPlan, settings: &Settings, motor: (i32, i32), baud: u32) -> Self {
         let (from, stride) = motor;
@@ -57,13 +57,13 @@ impl Budget {
         }
     }
 
-    /// All of it.
+    /// Sum of the three parts, seconds.
     #[must_use]
     pub fn total_s(&self) -> f64 {
         self.acoustics_s + self.motor_s + self.link_s
     }
 
-    /// So many such scans.
+    /// Duration of a number of identical scans.
     #[must_use]
     pub fn times(&self, scans: f64) -> Self {
         Self {
@@ -73,7 +73,7 @@ impl Budget {
         }
     }
 
-    /// This and another one.
+    /// Returns the sum of two durations, part by part.
     #[must_use]
     pub fn plus(&self, other: &Self) -> Self {
         Self {
@@ -84,10 +84,10 @@ impl Budget {
     }
 }
 
-/// Bytes of a reading with so many echoes, numbers as large as they are late in a scan.
+/// Frame length of a reading with `echoes` echoes, bytes, with numbers as large as late in a scan.
 fn reading_bytes(echoes: u8) -> f64 {
-    let late = [60_000, 80_000, 100_000, 110_000, 115_000, 120_000, 124_000, 126_000];
-    let echoes = Echoes::from_ticks(late.get(..usize::from(echoes)).unwrap_or(&late));
+    let large = [60_000, 80_000, 100_000, 110_000, 115_000, 120_000, 124_000, 126_000];
+    let echoes = Echoes::from_ticks(large.get(..usize::from(echoes)).unwrap_or(&large));
     bytes(&Reply::Reading(Reading {
         sweep: 300,
         index: 300,
@@ -98,7 +98,7 @@ fn reading_bytes(echoes: u8) -> f64 {
     }))
 }
 
-/// Bytes of the commands around a sweep and of their replies, which nothing happens beside:
+/// Bytes of the commands around a sweep and of their replies, during which nothing is measured:
 /// Identify, Stop, Configure, Home, four times Status for the clock's fit, Sweep, Home.
 fn exchange_bytes(settings: &Settings) -> f64 {
     let sweep = Sweep {
@@ -120,7 +120,7 @@ fn exchange_bytes(settings: &Settings) -> f64 {
         + 3.0 * bytes(&Reply::Ack)
         + 2.0 * home
         + 4.0 * status
-        // A last word of the sweep's end.
+        // The report of the sweep's end.
         + bytes(&Reply::Alive(Alive::BLANK))
 }
 
@@ -148,11 +148,11 @@ mod tests {
     }
 
     #[test]
-    fn the_parts_are_windows_moves_and_bytes() {
+    fn duration_has_three_parts() {
         let plan = ScanPlan::default();
         let budget = Budget::of(&plan, &settings(), (0, 1), 115_200);
         assert!((budget.acoustics_s - 400.0 * 46_513.0 / 2e6).abs() < 1e-9, "{budget:?}");
-        // 399 steps of 10 ms, 400 rests of 5 ms, and 399 steps home at 800 steps/s.
+        // 399 steps of 10 ms, 400 settling times of 5 ms, and 399 steps home at 800 steps/s.
         let home_s = 399.0 / 800.0 + 800.0 / 40_000.0;
         assert!((budget.motor_s - (3.99 + 2.0 + home_s)).abs() < 1e-9, "{budget:?}");
         // Some 300 bytes at 87 us each.
@@ -162,7 +162,7 @@ mod tests {
     }
 
     #[test]
-    fn a_slow_line_sets_the_pace() {
+    fn slow_line_dominates() {
         let plan = ScanPlan::default();
         let fast = Budget::of(&plan, &settings(), (0, 1), 115_200);
         let slow = Budget::of(&plan, &settings(), (0, 1), 4_800);
@@ -170,7 +170,7 @@ mod tests {
         // Code byte, header, body (1 + 2 + 2 + 2 + 5 + 1, and 1 + 3 for each echo), CRC, delimiter.
         let bytes = f64::from(1 + 4 + (13 + 1 + 3 * 3) + 4 + 1);
         assert_eq!(reading_bytes(3), bytes);
-        // A reading takes 69 ms at 4,800 baud and a beam 38 ms: the difference is waited for.
+        // A reading takes 69 ms at 4,800 baud and a beam 38 ms: the difference adds up.
         let (reading_s, beam_s) =
             (bytes * 10.0 / 4_800.0, timing::limit_s(&plan, &settings(), 1) / 400.0);
         let exchanges_s = exchange_bytes(&settings()) * 10.0 / 4_800.0;
@@ -179,7 +179,7 @@ mod tests {
     }
 
     #[test]
-    fn a_protected_module_waits_are_acoustics() {
+    fn min_interval_counts_as_acoustics() {
         let guarded = Settings { min_interval_ticks: 200_000, ..settings() };
         let budget = Budget::of(&ScanPlan::default(), &guarded, (0, 1), 115_200);
         let limit_s = 399.0 * 0.1 + 46_513.0 / 2e6;
