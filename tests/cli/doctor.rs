@@ -109,9 +109,9 @@ fn clock_rate() {
         let (code, report) = doctor(line.port(), &options);
         let found = findings(&report);
         assert!(found.iter().any(|finding| *finding == "clock clock failed"), "{report:#}");
-        // A host that refuses readings of such a clock on the line says so as well.
-        let others = found.iter().filter(|finding| **finding != "clock clock failed");
-        assert!(others.into_iter().all(|other| *other == "echo device failed"), "{report:#}");
+        // The host may reject readings of such a clock, too, and a busy computer adds a latency warning.
+        let expected = ["clock clock failed", "echo device failed", "line latency warning"];
+        assert!(found.iter().all(|finding| expected.contains(&&**finding)), "{report:#}");
         assert!(report["checks"][6]["detail"].as_str().expect("text").contains(said), "{report:#}");
         assert_eq!(code, Some(1));
     }

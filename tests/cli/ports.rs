@@ -73,7 +73,7 @@ fn no_reply_and_foreign_device() {
     let silent = Pty::open(None).expect("a pty");
     let path = silent.path().to_str().expect("plain path").to_owned();
     let arguments = ["scan", "--port", &path, "--scene", "simple-room", "--pose", "fig9"];
-    check(&arguments, 3, &["did not answer", "cable"]);
+    check(&arguments, 3, &["no reply", "cable"]);
 
     let gps = Pty::open(None).expect("a pty");
     let path = gps.path().to_str().expect("plain path").to_owned();

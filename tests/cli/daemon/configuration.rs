@@ -61,7 +61,7 @@ fn wrong_configurations() {
         (
             "[model]\nengine = \"fan\"\nedge_law = \"utd\"\n",
             &port[..],
-            &["s.toml:3:12", "edge_law is nothing that", "the engine paths"],
+            &["s.toml:3:12", "edge_law is not an option of", "the engine paths"],
         ),
         (
             "[model]\nray_spacing_deg = 0.1\n",
@@ -173,7 +173,7 @@ fn unusable_token_files() {
     let said = start(&token.display().to_string());
     assert!(said.contains("chmod 600") && said.contains("640"), "{said}");
     let said = start("/dev/zero");
-    assert!(said.contains("no regular file"), "{said}");
+    assert!(said.contains("not a regular file"), "{said}");
     // The same file in a client's hands.
     let status = ["status", "--address", "localhost:1", "--token-file", "/dev/zero"];
     assert_eq!(run(&status).status.code(), Some(2));

@@ -72,7 +72,7 @@ fn failed_sync_starts_a_new_log() {
     std::thread::sleep(Duration::from_secs(1));
     assert!(daemon.status()["log"]["error"].is_string());
     assert_eq!(logs(folder.path()).len(), 1);
-    let reports = |daemon: &Daemon| daemon.said().matches("no scan until").count();
+    let reports = |daemon: &Daemon| daemon.said().matches("scanning is paused").count();
     assert_eq!(reports(&daemon), 1, "{}", daemon.said());
     set(folder.path(), "eio", false);
     wait_until("recovery", || daemon.status()["log"]["error"].is_null());

@@ -144,7 +144,7 @@ fn arrays_and_long_scans() {
     };
     let of_array = scans.iter().find(|scan| !scan["end"].is_null()).expect("one");
     let found = findings(of_array).json();
-    assert!(found["lacks"].as_str().is_some_and(|why| why.contains("turns")), "{found}");
+    assert!(found["lacks"].as_str().is_some_and(|why| why.contains("scanning ranger")), "{found}");
     assert_eq!(found["features"], json!([]));
     let long = findings(scans.last().expect("the long one"));
     assert_eq!(long.status, 409, "{}", long.json());

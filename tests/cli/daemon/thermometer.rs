@@ -41,7 +41,7 @@ fn zeros() {
     wait_until("the report", || reasons(&daemon).contains("all registers of the sensor are 00"));
     let now = air(&daemon);
     assert_eq!((&now["temperature_c"], &now["source"]), (&20.0.into(), &"configuration".into()));
-    assert!(daemon.said().contains("all registers of the sensor are 00"), "{}", daemon.said());
+    wait_until("the message", || daemon.said().contains("all registers of the sensor are 00"));
 
     fs::write(&file, ZERO_C).expect("a file");
     wait_until("0 C", || air(&daemon)["temperature_c"] == 0.0);

@@ -78,7 +78,7 @@ fn access_rules_of_the_api() {
     wait_until("they left", || daemon.status()["subscribers"]["now"] == 0);
     let said = daemon.said();
     assert!(!said.contains(TOKEN), "{said}");
-    assert_eq!(said.matches("name the origin in foxglove.origins").count(), 1, "{said}");
+    assert_eq!(said.matches("add the origin to foxglove.origins").count(), 1, "{said}");
     assert_eq!(daemon.stop(), Some(0));
 }
 
