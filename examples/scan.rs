@@ -16,9 +16,9 @@ fn main() -> Result<(), Box<dyn Error>> {
     let simulator = Simulator::new(scene, sensor, Air::default(), Options::default())?;
     let plan = ScanPlan { step_deg: 9.0, ..ScanPlan::default() };
     for (stop, reading) in (0..).zip(simulator.predict(&pose, &plan)?) {
-        let path = reading
-            .arrival
-            .map(|arrival| PathRecord::of(simulator.scene(), &arrival.path, arrival.length_m));
+        let path = reading.arrival.map(|arrival| {
+            PathRecord::from_path(simulator.scene(), &arrival.path, arrival.length_m)
+        });
         let way = path.map_or_else(|| "nothing".to_owned(), |path| path.in_words());
         println!(
             "{:5.1} deg  {:?}  {:?} m  {way}",

@@ -35,7 +35,7 @@ fn sweeps() -> (Extents, Vec<Sweep>) {
         let (id, plan) = (Uuid::from_u128(i.into()), ScanPlan::default());
         let scan = ScanView::simulated(&simulator, id, &pose, &plan, Timestamp::UNIX_EPOCH)
             .expect("few paths");
-        Sweep::of(&scan).expect("a sweep")
+        Sweep::from_scan(&scan).expect("a sweep")
     };
     (extents, (0..20).map(sweep).collect())
 }

@@ -185,8 +185,12 @@ fn world(args: &Args) -> Result<World, Box<dyn Error>> {
     let noise = TofNoise::of_range_mm(args.noise_mm, air.sound_speed_m_s());
     let scene = Arc::new(scene.with_robot_at(&pose));
     let simulator = Simulator::new(scene, sensor, air, Options::default())?;
-    let soundings =
-        Soundings::of(&simulator, &pose, args.steps_per_revolution, args.mounting_offset_deg)?;
+    let soundings = Soundings::from_model(
+        &simulator,
+        &pose,
+        args.steps_per_revolution,
+        args.mounting_offset_deg,
+    )?;
     Ok(World::new(soundings, noise, 0.0, args.seed))
 }
 

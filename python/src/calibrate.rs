@@ -144,7 +144,7 @@ fn sweeps(
     }
     let mut sweeps = Vec::new();
     for (at, scan) in scans.iter().enumerate() {
-        match Sweep::of(scan.get().view()) {
+        match Sweep::from_scan(scan.get().view()) {
             Ok(sweep) => {
                 let pose = poses.as_ref().map_or(sweep.pose, |poses| poses.list[at]);
                 sweeps.push(Sweep { pose, ..sweep });
@@ -162,7 +162,7 @@ fn sweeps(
 /// Returns the model shared by all usable scans.
 fn common_world(py: Python<'_>, scans: &[Py<Scan>]) -> PyResult<World> {
     let mut known: Option<(World, &Arc<Session>)> = None;
-    for scan in scans.iter().map(Py::get).filter(|scan| Sweep::of(scan.view()).is_ok()) {
+    for scan in scans.iter().map(Py::get).filter(|scan| Sweep::from_scan(scan.view()).is_ok()) {
         let Some(session) = &scan.view().session else { continue };
         if known.as_ref().is_some_and(|(_, before)| Arc::ptr_eq(before, session)) {
             continue;

@@ -140,7 +140,7 @@ impl Locator {
             if azimuths_deg.is_some() {
                 return Err(PyValueError::new_err("azimuths_deg must be omitted for a scan"));
             }
-            return inverse::Sweep::of(scan.get().view())
+            return inverse::Sweep::from_scan(scan.get().view())
                 .map_err(|error| new_error::<LogError>(py, &error.to_string(), ""));
         }
         let given = BeamReadings::from_python(readings, azimuths_deg)?;

@@ -109,7 +109,7 @@ fn sweeps<'a>(py: Python<'_>, scans: &'a [Py<Scan>]) -> PyResult<(Vec<Sweep>, &'
     let (mut sweeps, mut first): (Vec<Sweep>, Option<&Scan>) = (Vec::new(), None);
     for scan in scans {
         let view = scan.get().view();
-        match Sweep::of(view) {
+        match Sweep::from_scan(view) {
             Ok(sweep) => sweeps.push(sweep),
             Err(error) => {
                 warn(py, &format!("scan {} skipped: {error}", view.scan))?;

@@ -92,7 +92,7 @@ pub(crate) fn find_features<'py>(
                 help,
             ));
         }
-        match interpret::Sweep::of(view) {
+        match interpret::Sweep::from_scan(view) {
             Ok(sweep) => sweeps.push((view.scan, sweep)),
             Err(error) => {
                 warn(py, &format!("scan {} skipped: {error}", view.scan))?;

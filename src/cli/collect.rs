@@ -222,7 +222,7 @@ fn write_report(root: &Path) -> Outcome {
     let journal = Journal::open(&folder.journal()).map_err(|error| failure_from(&error))?;
     report::write(&folder, journal.history())?;
     let manifest =
-        Manifest::of(&folder, journal.history()).map_err(|error| failure_from(&error))?;
+        Manifest::from_history(&folder, journal.history()).map_err(|error| failure_from(&error))?;
     manifest.write(&folder).map_err(|error| failure_from(&error))
 }
 

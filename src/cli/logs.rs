@@ -105,7 +105,7 @@ fn logs_of_robots(folder: &Path) -> io::Result<Vec<PathBuf>> {
 }
 
 fn kind_of(reader: &mut impl std::io::BufRead) -> FileKind {
-    reader.fill_buf().map_or(FileKind::Binary, FileKind::of)
+    reader.fill_buf().map_or(FileKind::Binary, FileKind::detect)
 }
 
 fn no_record(log: &Path, kind: FileKind) -> Failure {

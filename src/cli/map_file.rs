@@ -46,7 +46,7 @@ pub(super) fn check(folder: &Path, overwrite: Overwrite) -> Outcome {
 
 /// Writes `map.pgm` and `map.yaml` into a folder.
 pub(super) fn write(folder: &Path, grid: &Grid, overwrite: Overwrite) -> Outcome {
-    let yaml = MapYaml::of(grid.shape(), "map.pgm").to_text();
+    let yaml = MapYaml::new(grid.shape(), "map.pgm").to_text();
     let texts = [to_pgm(grid), yaml.into_bytes()];
     FILES.iter().zip(&texts).try_for_each(|((name, product), bytes)| {
         overwrite.save(&folder.join(name), *product, bytes)

@@ -123,7 +123,7 @@ impl MockWorldArgs {
         )
         .map_err(|error| Failure::input(error, "see `sonard mock --help`"))?;
         let steps = self.steps_per_revolution;
-        Soundings::of(&simulator, assumed.pose, steps, self.mounting_offset_deg)
+        Soundings::from_model(&simulator, assumed.pose, steps, self.mounting_offset_deg)
             .map_err(|error| Failure::input(error, "give a simpler scene"))
     }
 

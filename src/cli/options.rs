@@ -166,7 +166,7 @@ impl AirArgs {
 /// Converts the model's options; options of another engine are errors.
 pub(super) fn engine_options(keys: &OptionKeys) -> Result<Options, Failure> {
     keys.options().map_err(|error| {
-        let engines: Vec<_> = error.of.iter().map(|engine| engine.name()).collect();
+        let engines: Vec<_> = error.engines.iter().map(|engine| engine.name()).collect();
         Failure::input(
             format!(
                 "--{}: not an option of the engine {}",

@@ -85,7 +85,7 @@ pub(super) enum Product {
 impl Product {
     /// Returns `true` if a file with this beginning is an older output of the same kind.
     fn replaces(self, head: &[u8]) -> bool {
-        let kind = FileKind::of(head);
+        let kind = FileKind::detect(head);
         match self {
             _ if kind == FileKind::Empty => true,
             Self::Svg => kind == FileKind::Svg,
@@ -307,7 +307,7 @@ impl Overwrite {
             return Ok(place);
         }
         Err(Failure::input(
-            format!("{} exists and is {}", path.display(), FileKind::of(&head)),
+            format!("{} exists and is {}", path.display(), FileKind::detect(&head)),
             "give another file, or --force to overwrite this one",
         ))
     }

@@ -137,7 +137,7 @@ pub(super) fn run(args: &Args) -> Outcome {
 }
 
 fn path_line(simulator: &Simulator, path: &EchoPath) -> PathLine {
-    let record = PathRecord::of(simulator.scene(), &path.path, path.length_m);
+    let record = PathRecord::from_path(simulator.scene(), &path.path, path.length_m);
     PathLine {
         description: record.in_words(),
         length_m: path.length_m,

@@ -126,7 +126,7 @@ fn predict_stepper(
             let Some(axis) = ping.axis(Some(session), pose) else { continue };
             let prediction =
                 point.ping(axis.direction_rad(0.0)).map_err(|error| too_costly(log, &error))?;
-            set_prediction(ping, SimRecord::of(&simulator, &prediction));
+            set_prediction(ping, SimRecord::from_prediction(&simulator, &prediction));
         }
     }
     Ok(())

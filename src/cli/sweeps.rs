@@ -16,7 +16,7 @@ pub(super) fn for_each_sweep(
 ) -> Result<(), Failure> {
     for log in &logs_in(logs)? {
         for_each_scan(log, |scan| {
-            match Sweep::of(&scan) {
+            match Sweep::from_scan(&scan) {
                 Ok(sweep) => take(scan, sweep),
                 Err(error) => {
                     let log = log.display();

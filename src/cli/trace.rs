@@ -155,7 +155,7 @@ impl<'a> PingTrace<'a> {
         let trace = point.trace(direction_rad, until_m, args.step_us)?;
         let record = |sound| {
             let arrival = ObservationPoint::arrival(&point, direction_rad, sound)?;
-            Ok(PathRecord::of(simulator.scene(), &arrival.path, arrival.length_m))
+            Ok(PathRecord::from_path(simulator.scene(), &arrival.path, arrival.length_m))
         };
         let paths =
             trace.peaks.iter().map(|peak| record(&peak.arrival)).collect::<Result<_, _>>()?;

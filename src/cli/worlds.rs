@@ -47,7 +47,7 @@ impl SweepArgs {
         for log in &self.logs {
             for_each_scan(log, |mut scan| {
                 assumptions.apply(&mut scan);
-                match Sweep::of(&scan) {
+                match Sweep::from_scan(&scan) {
                     Ok(sweep) => take(log, sweep, &worlds.world(log, &scan)?),
                     Err(error) => {
                         notice!("warning: {}: {error}; scan skipped", log.display());

@@ -33,7 +33,7 @@ pub(crate) fn write_ideal(folder: &str, scene: &str, out: &str) {
     let (_, ideal) = with_ideal(folder, scene);
     fs::create_dir_all(out).expect("a folder");
     fs::write(format!("{out}/map.pgm"), to_pgm(&ideal)).expect("written");
-    let yaml = MapYaml::of(ideal.shape(), "map.pgm").to_text();
+    let yaml = MapYaml::new(ideal.shape(), "map.pgm").to_text();
     fs::write(format!("{out}/map.yaml"), yaml).expect("written");
 }
 

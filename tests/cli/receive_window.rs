@@ -24,5 +24,8 @@ fn window_shorter_than_blanking() {
     let output = run(&[&daemon[..], &["--set", "motion.window_ms=1"]].concat());
     let text = said(&output);
     assert_eq!(output.status.code(), Some(2), "{text}");
-    assert!(text.contains("motion.window_ms") && text.contains("no echo could be detected"), "{text}");
+    assert!(
+        text.contains("motion.window_ms") && text.contains("no echo could be detected"),
+        "{text}"
+    );
 }

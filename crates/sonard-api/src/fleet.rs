@@ -11,7 +11,7 @@ mod registry;
 mod state;
 mod watch;
 
-pub use member::{Asked, MOST_MEMBERS, Member, MemberError, check_all, members_of, read_members};
+pub use member::{Asked, MAX_MEMBERS, Member, MemberError, check_all, members_of, read_members};
 pub use poll::{Told, ask};
 pub use registry::Roll;
 pub use state::{Seen, Unheard, judge, plain};

@@ -45,7 +45,7 @@ pub struct Figures {
 impl Figures {
     /// Computes the figures of a finished scan.
     #[must_use]
-    pub fn of(view: &ScanView, temperature_change_c: Option<f64>) -> Self {
+    pub fn from_scan(view: &ScanView, temperature_change_c: Option<f64>) -> Self {
         let views = std::slice::from_ref(view);
         let comparison = compare(views).0;
         let beams = view.start.as_ref().map_or(0, |start| start.plan.beams());

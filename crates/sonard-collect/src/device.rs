@@ -89,7 +89,7 @@ pub struct ScanOrder<'a> {
     /// Measured air, if any.
     pub air: Option<ScanAir>,
     /// Reference to the collection, written into the session record.
-    pub of: CollectionRef,
+    pub collection: CollectionRef,
     /// Path of the scan's log.
     pub path: &'a Path,
 }

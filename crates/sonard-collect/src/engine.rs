@@ -247,7 +247,7 @@ impl<D: Device, W: Watcher> Collector<D, W> {
     }
 
     fn write_manifest(&self) -> Result<(), Halt> {
-        let manifest = Manifest::of(&self.folder, self.journal.history())?;
+        let manifest = Manifest::from_history(&self.folder, self.journal.history())?;
         Ok(manifest.write(&self.folder)?)
     }
 

@@ -32,7 +32,7 @@ pub fn budget(plan: &Plan) -> Result<Budget, Halt> {
         blanking_us: plan.sensor.blanking_us,
     };
     let settings = plan.motion().settings(&listening, &assumed_device(steps_per_revolution));
-    Ok(Budget::of(&plan.azimuths, &settings, motor, BAUD))
+    Ok(Budget::for_plan(&plan.azimuths, &settings, motor, BAUD))
 }
 
 /// Estimates the disk space of `scans` scans, bytes.

@@ -112,7 +112,7 @@ impl Manifest {
     ///
     /// # Errors
     /// Returns an error if a file cannot be read or the journal has no plan.
-    pub fn of(folder: &Folder, history: &History) -> Result<Self, FolderError> {
+    pub fn from_history(folder: &Folder, history: &History) -> Result<Self, FolderError> {
         let requested = history.wanted();
         let plan = history.plans.last().ok_or_else(|| FolderError::Damaged {
             path: folder.journal(),

@@ -150,7 +150,7 @@ impl Device for ByDaemon {
     }
 
     async fn take(&mut self, scan: ScanOrder<'_>, beam: &(dyn Fn() + Sync)) -> Result<Taken, Halt> {
-        let ScanOrder { plan, pose, of, path, .. } = scan;
+        let ScanOrder { plan, pose, collection: of, path, .. } = scan;
         let request = ScanRequest { scans: Some(1), plan: Some(plan), pose: Some(pose) };
         let (mut scans, first) = self.begin(&request).await?;
         let began = Instant::now();

@@ -38,7 +38,7 @@ mod tests {
         let (mut verdicts, robot) = (Vec::new(), view.pose().expect("a pose"));
         for line in LOG.lines() {
             let Ok(Record::Ping(ping)) = decode_line(line.as_bytes()) else { continue };
-            let beside = Beside::of(&ping, Some(&view));
+            let beside = Beside::for_ping(&ping, Some(&view));
             let judged = judged_line(format!("{line}\n").as_bytes(), &beside);
             assert!(judged.ends_with(b"}\n"));
             assert!(!judged_line(line.as_bytes(), &beside).ends_with(b"\n"));
@@ -66,17 +66,21 @@ mod tests {
         let robot = Pose { x_m: 1.0, y_m: 2.0, heading_deg: 90.0 };
         let mut ping = view.pings[0].clone();
         (ping.pose, ping.azimuth_deg) = (Some(robot), 0.0);
-        let viewpoint = Beside::of(&ping, Some(&view)).viewpoint.expect("a viewpoint");
+        let viewpoint = Beside::for_ping(&ping, Some(&view)).viewpoint.expect("a viewpoint");
         let error_m = (viewpoint.x_m - 1.0).hypot(viewpoint.y_m - 2.1);
         assert!(error_m < 1e-12, "{viewpoint:?}");
 
         ping.ranger = Some("s0".into());
-        assert_eq!(Beside::of(&ping, Some(&view)).viewpoint, None, "a ranger that the array lacks");
+        assert_eq!(
+            Beside::for_ping(&ping, Some(&view)).viewpoint,
+            None,
+            "a ranger that the array lacks"
+        );
         let ping = view.pings[0].clone();
-        assert_eq!(Beside::of(&ping, None).viewpoint, None);
+        assert_eq!(Beside::for_ping(&ping, None).viewpoint, None);
         view.start = None;
-        assert_eq!(Beside::of(&ping, Some(&view)).viewpoint, None, "a scan without a pose");
+        assert_eq!(Beside::for_ping(&ping, Some(&view)).viewpoint, None, "a scan without a pose");
         view.scan = uuid::Uuid::from_u128(7);
-        assert_eq!(Beside::of(&ping, Some(&view)).viewpoint, None, "another scan");
+        assert_eq!(Beside::for_ping(&ping, Some(&view)).viewpoint, None, "another scan");
     }
 }

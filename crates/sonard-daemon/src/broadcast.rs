@@ -186,7 +186,7 @@ impl Hub {
         }
         if let Record::Ping(ping) = record {
             let wants_verdicts = self.inner.verdict_subscribers.load(Ordering::Relaxed) > 0;
-            let annotations = || Beside::of(ping, lock(&self.inner.scan).view.as_ref());
+            let annotations = || Beside::for_ping(ping, lock(&self.inner.scan).view.as_ref());
             let annotated: Option<Line> =
                 wants_verdicts.then(|| judged_line(&line, &annotations()).into());
             let bytes = line.len() + annotated.as_ref().map_or(0, |line| line.len());

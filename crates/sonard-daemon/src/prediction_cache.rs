@@ -120,8 +120,10 @@ pub(super) fn predict(
                     return Ok(Predicted { refusal: Some(error), ..Predicted::default() });
                 }
             };
-            let predictions =
-                found.iter().map(|prediction| SimRecord::of(&simulator, prediction)).collect();
+            let predictions = found
+                .iter()
+                .map(|prediction| SimRecord::from_prediction(&simulator, prediction))
+                .collect();
             let model = Some(ModelRecord::from(simulator.options()));
             Ok(Predicted { predictions, model, refusal: None })
         });

@@ -121,11 +121,11 @@ impl PublishedStatus {
         Pending {
             plan: Some(next.plan).filter(|plan| *plan != now.plan),
             pose: Some(next.pose).filter(|pose| *pose != now.pose),
-            scene: scene.map(SceneRef::of),
+            scene: scene.map(SceneRef::from_scene),
             air: next.air.differs(&now.air).then(|| next.air.status(at)),
             sensor: Some(&next.setup.sensor)
                 .filter(|sensor| **sensor != now.setup.sensor)
-                .map(SensorFigures::of),
+                .map(SensorFigures::from_sensor),
             setup: Some(&next.setup).filter(|setup| **setup != now.setup).map(|s| (**s).clone()),
         }
     }
@@ -327,9 +327,9 @@ impl DaemonState {
             }),
             plan: current.plan,
             pose: current.pose,
-            scene: current.scene.as_deref().map(SceneRef::of),
+            scene: current.scene.as_deref().map(SceneRef::from_scene),
             air: current.air.status(now),
-            sensor: SensorFigures::of(&current.setup.sensor),
+            sensor: SensorFigures::from_sensor(&current.setup.sensor),
             pending,
             log,
             subscribers,

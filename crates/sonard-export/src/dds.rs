@@ -18,7 +18,7 @@ pub const NODES: (&str, &str) =
 pub const MAP_FRAME: &str = MAP;
 
 /// Maximum length of a namespace, so topics stay within the 255 characters of DDS.
-pub const MOST_NAMESPACE: usize = 100;
+pub const MAX_NAMESPACE_LENGTH: usize = 100;
 
 /// Identifier of a DDS participant, reader or writer.
 pub type Guid = [u8; 16];
@@ -50,7 +50,7 @@ pub fn type_on_wire(name: &str) -> String {
 #[must_use]
 pub fn is_namespace(text: &str) -> bool {
     let Some(names) = text.strip_prefix('/') else { return text.is_empty() };
-    text.len() <= MOST_NAMESPACE && names.split('/').all(is_name)
+    text.len() <= MAX_NAMESPACE_LENGTH && names.split('/').all(is_name)
 }
 
 /// Returns `true` for a valid ROS name: letters, digits and `_`, without a leading digit or a
@@ -184,7 +184,7 @@ mod tests {
         for good in ["", "/kiwi", "/lab/_kiwi_7"] {
             assert!(is_namespace(good), "{good}");
         }
-        let long = format!("/{}", "a".repeat(MOST_NAMESPACE));
+        let long = format!("/{}", "a".repeat(MAX_NAMESPACE_LENGTH));
         for bad in ["kiwi", "/", "/kiwi/", "/7", "/a b", "/a__b", "/a//b", "/é", &long] {
             assert!(!is_namespace(bad), "{bad}");
         }

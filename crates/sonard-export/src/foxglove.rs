@@ -17,7 +17,7 @@ use crate::Topic;
 pub const PROTOCOLS: [&str; 2] = ["foxglove.sdk.v1", "foxglove.websocket.v1"];
 
 /// Maximum length of a client's text message: sufficient to subscribe to a thousand channels.
-pub const MOST_TEXT_BYTES: usize = 1 << 16;
+pub const MAX_TEXT_BYTES: usize = 1 << 16;
 
 /// Number of invalid messages after which a client is disconnected.
 const MAX_FAULTS: u32 = 100;
@@ -77,8 +77,8 @@ struct SubscribeRequest {
 impl Session {
     /// Handles a text message of the client; `is_there` returns `true` for existing channels.
     pub fn take_text(&mut self, text: &str, is_there: impl Fn(u32) -> bool) -> Vec<Step> {
-        if text.len() > MOST_TEXT_BYTES {
-            return self.fault(&format!("text messages have at most {MOST_TEXT_BYTES} bytes"));
+        if text.len() > MAX_TEXT_BYTES {
+            return self.fault(&format!("text messages have at most {MAX_TEXT_BYTES} bytes"));
         }
         let message: ClientMessage = match serde_json::from_str(text) {
             Ok(message) => message,

@@ -120,7 +120,7 @@ impl Sweep {
     ///
     /// # Errors
     /// Scan of an array, of a moving robot, or incomplete.
-    pub fn of(scan: &ScanView) -> Result<Self, SweepError> {
+    pub fn from_scan(scan: &ScanView) -> Result<Self, SweepError> {
         let id = scan.scan;
         let (Some(pose), Some(session)) = (scan.pose(), &scan.session) else {
             return Err(SweepError::Incomplete(id));

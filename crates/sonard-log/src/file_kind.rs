@@ -83,7 +83,7 @@ const RECORD_PREFIX: &str = r#"{"type":""#;
 impl FileKind {
     /// Detects the kind of a file by its first [`HEAD_BYTES`] bytes, or all of a shorter file.
     #[must_use]
-    pub fn of(head: &[u8]) -> Self {
+    pub fn detect(head: &[u8]) -> Self {
         let head = head.strip_prefix(b"\xef\xbb\xbf").unwrap_or(head);
         if head.is_empty() {
             return Self::Empty;
@@ -231,7 +231,7 @@ mod tests {
     fn check(head: impl AsRef<[u8]>, kind: FileKind) {
         let head = head.as_ref();
         assert_eq!(
-            FileKind::of(head),
+            FileKind::detect(head),
             kind,
             "{:?}",
             String::from_utf8_lossy(&head[..head.len().min(80)])
@@ -270,7 +270,7 @@ mod tests {
         check([&[0; 4096][..], b"\n", LOG].concat(), FileKind::Log);
         check([&b"PK\x03\x04 garbage\n"[..], LOG].concat(), FileKind::Log);
         for length in 1..200 {
-            assert!(!FileKind::of(&LOG[..length]).is_no_log(), "{length} bytes");
+            assert!(!FileKind::detect(&LOG[..length]).is_no_log(), "{length} bytes");
         }
     }
 }

@@ -206,6 +206,6 @@ fn reject_other_kind(
     mut reader: Box<dyn BufRead>,
 ) -> Result<Box<dyn BufRead>, StoreError> {
     let fail = |source| StoreError::Read { path: path.into(), source };
-    let kind = FileKind::of(reader.fill_buf().map_err(fail)?);
+    let kind = FileKind::detect(reader.fill_buf().map_err(fail)?);
     if kind.is_no_log() { Err(StoreError::NoLog { path: path.into(), kind }) } else { Ok(reader) }
 }

@@ -76,7 +76,7 @@ pub fn repair(path: &Path) -> Result<Repair, StoreError> {
     }
     if repair.kept == 0 && repair.kept_unread.is_empty() && !repair.left_out.is_empty() {
         // A file without any record is not a log and remains unchanged.
-        let kind = open_for_reading(path)?.fill_buf().map_or(FileKind::Binary, FileKind::of);
+        let kind = open_for_reading(path)?.fill_buf().map_or(FileKind::Binary, FileKind::detect);
         return Err(StoreError::NoLog { path: path.clone(), kind });
     }
     out.flush().map_err(|source| draft.fail(source))?;

@@ -33,7 +33,7 @@ impl Soundings {
     ///
     /// # Errors
     /// If the number of propagation paths exceeds the model's limit.
-    pub fn of(
+    pub fn from_model(
         simulator: &Simulator,
         pose: &Pose,
         steps_per_revolution: u16,

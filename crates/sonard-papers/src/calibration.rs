@@ -97,7 +97,7 @@ pub struct Reliability {
 impl Reliability {
     /// Statistics of all four class probabilities of all arcs.
     #[must_use]
-    pub fn of(arcs: &[Judged]) -> Self {
+    pub fn from_arcs(arcs: &[Judged]) -> Self {
         let mut bins = [Bin::default(); 10];
         let mut brier = 0.0;
         for (claimed, came_true) in arcs.iter().flat_map(Judged::claims) {
@@ -195,7 +195,7 @@ fn simulate_scan(
 
 fn features(scans: &[ScanView], extents: &Extents, settings: &Settings) -> Vec<Feature> {
     let sweeps: Vec<_> =
-        scans.iter().filter_map(|scan| Some((scan.scan, Sweep::of(scan).ok()?))).collect();
+        scans.iter().filter_map(|scan| Some((scan.scan, Sweep::from_scan(scan).ok()?))).collect();
     interpret(&sweeps, extents, settings)
 }
 

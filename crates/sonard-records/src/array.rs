@@ -64,7 +64,7 @@ impl SimRecord {
     #[must_use]
     pub fn of_array(at_pose: &ArrayAtPose<'_>, ranger: usize, prediction: &Prediction) -> Self {
         let crosstalk = crosstalk(at_pose.array(), prediction);
-        Self { crosstalk, ..Self::of(at_pose.simulator(ranger), prediction) }
+        Self { crosstalk, ..Self::from_prediction(at_pose.simulator(ranger), prediction) }
     }
 }
 

@@ -74,15 +74,16 @@ impl ModelRecord {
 impl SimRecord {
     /// Record of a prediction.
     #[must_use]
-    pub fn of(simulator: &Simulator, prediction: &Prediction) -> Self {
+    pub fn from_prediction(simulator: &Simulator, prediction: &Prediction) -> Self {
         let arrival = prediction.arrival.as_ref();
         Self {
             status: prediction.status,
             range_m: prediction.range_m,
             amplitude: prediction.amplitude,
             margin_db: prediction.margin_db,
-            path: arrival
-                .map(|arrival| PathRecord::of(simulator.scene(), &arrival.path, arrival.length_m)),
+            path: arrival.map(|arrival| {
+                PathRecord::from_path(simulator.scene(), &arrival.path, arrival.length_m)
+            }),
             crosstalk: None,
         }
     }
@@ -95,7 +96,7 @@ impl PathRecord {
     /// # Panics
     /// If the path belongs to another scene.
     #[must_use]
-    pub fn of(scene: &Scene, path: &Path, length_m: f64) -> Self {
+    pub fn from_path(scene: &Scene, path: &Path, length_m: f64) -> Self {
         let interaction = |interaction: &Interaction| InteractionRecord {
             kind: interaction.mechanism.into(),
             id: interaction.mechanism.name(scene),

@@ -73,7 +73,7 @@ pub struct Body {
 impl FloorPlan {
     /// Extracts the floor plan of a scene.
     #[must_use]
-    pub fn of(scene: &Scene) -> Self {
+    pub fn from_scene(scene: &Scene) -> Self {
         Self {
             name: scene.name.clone(),
             sha256: scene.sha256.clone(),

@@ -55,7 +55,7 @@ impl PeakLine {
         strongest.sort_by(|a, b| a.tof_us.total_cmp(&b.tof_us));
         let line = |peak: &EnvelopePeak| {
             let arrival = point.arrival(direction_rad, &peak.arrival)?;
-            let path = PathRecord::of(simulator.scene(), &arrival.path, arrival.length_m);
+            let path = PathRecord::from_path(simulator.scene(), &arrival.path, arrival.length_m);
             let polyline = path.polyline(ends).into_iter().map(PlanPoint::from);
             Ok(Self {
                 tof_us: peak.tof_us,

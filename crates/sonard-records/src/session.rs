@@ -100,7 +100,7 @@ impl Session {
 
     /// Sets the scene and its text; a scene built without a file has no text.
     pub fn set_scene(&mut self, scene: &Scene) {
-        self.scene = Some(SceneRef::of(scene));
+        self.scene = Some(SceneRef::from_scene(scene));
         self.scene_text = Some(Arc::clone(&scene.text)).filter(|text| !text.is_empty());
     }
 
@@ -191,7 +191,7 @@ pub struct SceneRef {
 impl SceneRef {
     /// Creates the reference to a scene.
     #[must_use]
-    pub fn of(scene: &Scene) -> Self {
+    pub fn from_scene(scene: &Scene) -> Self {
         Self { name: scene.name.clone(), sha256: scene.sha256.clone() }
     }
 }

@@ -64,7 +64,7 @@ impl Ping {
         azimuth_deg: f64,
         prediction: &Prediction,
     ) -> Self {
-        let record = SimRecord::of(simulator, prediction);
+        let record = SimRecord::from_prediction(simulator, prediction);
         Self {
             step: (azimuth_deg / 360.0 * STEPS_PER_REVOLUTION).round() as i32,
             tof_us: prediction.echoes_us.first().copied(),

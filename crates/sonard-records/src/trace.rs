@@ -25,7 +25,7 @@ pub struct TraceLine {
 impl TraceLine {
     /// Converts a trace whose samples are `step_us` apart.
     #[must_use]
-    pub fn of(simulator: &Simulator, trace: &EchoTrace, step_us: f64) -> Self {
+    pub fn from_trace(simulator: &Simulator, trace: &EchoTrace, step_us: f64) -> Self {
         let group_size = trace.points.len().div_ceil(MAX_POINTS).max(1);
         let groups = || trace.points.chunks(group_size);
         let highest = groups().map(|group| group.iter().map(|p| p.envelope).fold(0.0, f64::max));

@@ -27,7 +27,7 @@ fn world() -> World {
         Options::default(),
     );
     let soundings =
-        Soundings::of(&simulator.expect("a model"), &pose, 400, 0.0).expect("few paths");
+        Soundings::from_model(&simulator.expect("a model"), &pose, 400, 0.0).expect("few paths");
     World::new(soundings, TofNoise::NONE, 0.0, 1)
 }
 

@@ -178,7 +178,7 @@ impl Device for LocalDevice {
     }
 
     async fn take(&mut self, scan: ScanOrder<'_>, beam: &(dyn Fn() + Sync)) -> Result<Taken, Halt> {
-        let ScanOrder { prepared, air, of, path, .. } = scan;
+        let ScanOrder { prepared, air, collection: of, path, .. } = scan;
         let Some(prepared) = prepared else {
             return Err(Halt::wrong("the scan has no predictions", "this is a bug: report it"));
         };

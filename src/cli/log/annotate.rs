@@ -103,7 +103,7 @@ impl ConfidenceAnnotator<'_> {
     /// Returns the confidence of each step of a scan; empty, with a notice, for an unsuitable scan.
     fn confidences(&mut self, scan: &ScanView) -> Result<Confidences, Failure> {
         let Some(session) = &scan.session else { return Ok(Confidences::new()) };
-        let sweep = match Sweep::of(scan) {
+        let sweep = match Sweep::from_scan(scan) {
             Ok(sweep) => sweep,
             Err(error) => {
                 let log = Path::display(&self.args.log);

@@ -21,7 +21,7 @@ pub(super) fn prepare(args: &Args) -> Result<PreparedScan, Failure> {
         air: args.air.air()?,
         options: engine_options(&args.engine)?,
     };
-    PreparedScan::of(inputs).map_err(|error| failure_from(&error))
+    PreparedScan::new(inputs).map_err(|error| failure_from(&error))
 }
 
 fn failure_from(error: &PrepareError) -> Failure {

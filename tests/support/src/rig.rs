@@ -115,7 +115,7 @@ pub fn simple_room() -> Soundings {
     let pose = scene.pose("fig9").expect("its pose");
     let sensor = Sensor::preset("senscomp-6500").expect("a preset");
     let simulator = Simulator::new(Arc::new(scene), sensor, Air::default(), Options::default());
-    Soundings::of(&simulator.expect("a simulator"), &pose, 400, 0.0).expect("few paths")
+    Soundings::from_model(&simulator.expect("a simulator"), &pose, 400, 0.0).expect("few paths")
 }
 
 /// A board without noise and with 400 steps per revolution.

@@ -41,7 +41,7 @@ impl Beam {
                 if farthest_m > 0.0 { max_m.min(farthest_m + TRACE_MARGIN_M) } else { max_m };
             let trace = point.trace(axis.direction_rad(0.0), until_m, STEP_US)?;
             let peaks = PeakLine::of_trace(simulator, point, axis, &trace)?;
-            Ok::<_, TooCostly>((peaks, TraceLine::of(simulator, &trace, STEP_US)))
+            Ok::<_, TooCostly>((peaks, TraceLine::from_trace(simulator, &trace, STEP_US)))
         };
         let (peaks, trace) = sweep.observe(ping, compute)?.transpose()?.unwrap_or_default();
         let viewpoint = reading.beside.viewpoint;

@@ -43,7 +43,7 @@ impl Dispatcher {
                 let simulator = setup.simulator(EngineKind::Paths)?;
                 // Two-way half-amplitude width: the one-way gain is the square root of one half.
                 let half_beam_deg = simulator.beam().angle_at(0.5_f64.sqrt()).to_degrees();
-                let plan = FloorPlan::of(&setup.scene);
+                let plan = FloorPlan::from_scene(&setup.scene);
                 encode(&json!({ "plan": plan, "half_beam_deg": half_beam_deg }))
             }
             Request::StartSweep { engine, pose, plan, measured } => {

@@ -91,17 +91,17 @@ impl Sweep {
         let predict = |simulator: &Simulator, point: &ObservationPoint<'_>, axis: &Pose| {
             let prediction = point.ping(axis.direction_rad(0.0))?;
             let simulated = Ping::simulated(simulator, scan, index, azimuth_deg, &prediction);
-            Ok::<_, TooCostly>((SimRecord::of(simulator, &prediction), simulated))
+            Ok::<_, TooCostly>((SimRecord::from_prediction(simulator, &prediction), simulated))
         };
         let Some((sim, simulated)) = self.observe(&ping, predict)?.transpose()? else {
-            return Ok(JudgedPing::of(ping, &self.view));
+            return Ok(JudgedPing::new(ping, &self.view));
         };
         if self.is_measured {
             let residual_m = ping.range_m.zip(sim.range_m).map(|(range, sim)| range - sim);
-            return Ok(JudgedPing::of(Ping { sim: Some(sim), residual_m, ..ping }, &self.view));
+            return Ok(JudgedPing::new(Ping { sim: Some(sim), residual_m, ..ping }, &self.view));
         }
-        let verdict = Word::of(&Ping { sim: Some(sim), ..simulated.clone() });
-        let mut reading = JudgedPing::of(simulated, &self.view);
+        let verdict = Word::from_ping(&Ping { sim: Some(sim), ..simulated.clone() });
+        let mut reading = JudgedPing::new(simulated, &self.view);
         reading.beside.verdict = verdict;
         Ok(reading)
     }

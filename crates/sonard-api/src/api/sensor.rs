@@ -61,7 +61,7 @@ pub struct SensorFigures {
 impl SensorFigures {
     /// Extracts the settings of a sensor.
     #[must_use]
-    pub fn of(sensor: &Sensor) -> Self {
+    pub fn from_sensor(sensor: &Sensor) -> Self {
         Self {
             name: sensor.name.clone(),
             threshold: sensor.threshold,

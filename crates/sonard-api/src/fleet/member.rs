@@ -11,7 +11,7 @@ use crate::{
 };
 
 /// Maximum number of daemons in a fleet.
-pub const MOST_MEMBERS: usize = 32;
+pub const MAX_MEMBERS: usize = 32;
 
 /// Address and expected robot of a daemon.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -213,10 +213,10 @@ fn at_line(text: &str, error: &toml::de::Error) -> String {
 /// # Errors
 /// Too many daemons, or duplicates.
 pub fn check_all(members: Vec<Member>) -> Result<Vec<Member>, MemberError> {
-    if members.len() > MOST_MEMBERS {
+    if members.len() > MAX_MEMBERS {
         return Err(MemberError {
             message: format!("{} daemons", members.len()),
-            help: format!("the maximum is {MOST_MEMBERS}"),
+            help: format!("the maximum is {MAX_MEMBERS}"),
         });
     }
     for (i, member) in members.iter().enumerate() {

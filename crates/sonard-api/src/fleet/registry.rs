@@ -157,7 +157,7 @@ mod tests {
             "air": {"temperature_c": 20.0, "humidity_percent": 50.0, "pressure_kpa": 101.3,
                     "sound_speed_m_s": 343.0, "source": "configuration", "age_s": null,
                     "stale": false, "error": null},
-            "sensor": SensorFigures::of(&sensor), "pending": Pending::default(),
+            "sensor": SensorFigures::from_sensor(&sensor), "pending": Pending::default(),
             "log": LogStatus::default(), "subscribers": SubscriberReport::default(),
             "configuration": ConfigurationReport::default(), "simulation": null,
         });
@@ -282,7 +282,7 @@ mod tests {
 
     #[test]
     fn largest_fleet_fits_size_limit() {
-        let members: Vec<_> = (0..crate::fleet::MOST_MEMBERS)
+        let members: Vec<_> = (0..crate::fleet::MAX_MEMBERS)
             .map(|i| Member::parse(&format!("{i:0>64}={}:1", "h".repeat(60))).expect("a place"))
             .collect();
         let mut registry = Roll::new(&members, at(0));

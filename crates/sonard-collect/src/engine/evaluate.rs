@@ -33,7 +33,7 @@ impl<D: Device, W: Watcher> Collector<D, W> {
         if lost.is_none() {
             self.losses = None;
         }
-        let figures = Figures::of(&view, change_c);
+        let figures = Figures::from_scan(&view, change_c);
         let findings = check(&figures, &self.plan.keys.checks);
         let mut action = verdict(&findings);
         self.report_findings(slot, &figures, &findings);
@@ -116,7 +116,7 @@ impl<D: Device, W: Watcher> Collector<D, W> {
             let sealed = self.folder.sealed(slot)?;
             let path = self.folder.root().join(&sealed.file);
             let Some(view) = read(&path)? else { continue };
-            let figures = Figures::of(&view, None);
+            let figures = Figures::from_scan(&view, None);
             let findings = check(&figures, &self.plan.keys.checks);
             let entry = take_entry(slot, Some(&view), Outcome::Accepted, sealed, figures, findings);
             self.append(entry)?;
@@ -139,7 +139,7 @@ impl<D: Device, W: Watcher> Collector<D, W> {
     }
 
     fn evaluate_recovered(&mut self, slot: Slot, view: &ScanView) -> Result<(), Halt> {
-        let figures = Figures::of(view, None);
+        let figures = Figures::from_scan(view, None);
         let findings = check(&figures, &self.plan.keys.checks);
         if verdict(&findings) == Action::Note {
             return self.accept(slot, view, figures, findings, None);
@@ -186,7 +186,7 @@ impl<D: Device, W: Watcher> Collector<D, W> {
         };
         let view = scan.map(|(view, ..)| view).or(stored.as_ref());
         let figures = scan.map_or_else(
-            || view.map(|view| Figures::of(view, None)).unwrap_or_default(),
+            || view.map(|view| Figures::from_scan(view, None)).unwrap_or_default(),
             |(_, figures, _)| figures,
         );
         let mut entry = take_entry(slot, view, outcome, sealed, figures, findings);

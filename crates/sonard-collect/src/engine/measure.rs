@@ -65,7 +65,7 @@ impl<D: Device, W: Watcher> Collector<D, W> {
             pose: self.pose(slot.pose).pose,
             prepared: prepared.as_deref(),
             air,
-            of: self.collection_ref(slot),
+            collection: self.collection_ref(slot),
             path: &self.folder.taking(slot),
         };
         let watcher = &self.watcher;
@@ -138,7 +138,7 @@ impl<D: Device, W: Watcher> Collector<D, W> {
             return Ok(Arc::clone(prepared));
         }
         let inputs = self.plan.inputs(&self.pose(number), self.air);
-        let prepared = Arc::new(PreparedScan::of(inputs)?);
+        let prepared = Arc::new(PreparedScan::new(inputs)?);
         self.prepared.insert(number, Arc::clone(&prepared));
         Ok(prepared)
     }

@@ -119,7 +119,7 @@ impl<D: Device, W: Watcher> Collector<D, W> {
             collection: self.id,
             sonard: env!("CARGO_PKG_VERSION").into(),
             keys: serde_json::to_value(&self.plan.keys).unwrap_or_default(),
-            scene: SceneRef::of(scene),
+            scene: SceneRef::from_scene(scene),
             sensor_sha256,
             poses,
         };

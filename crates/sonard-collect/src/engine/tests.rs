@@ -87,7 +87,7 @@ impl Device for FakeDevice {
             self.taken += 1;
             let view = simulate(&self.scene, &order);
             let mut session = view.session.as_deref().cloned().expect("a session");
-            session.collection = Some(Box::new(order.of));
+            session.collection = Some(Box::new(order.collection));
             log.append(&Record::Session(Box::new(session)))?;
             log.append(&Record::ScanStart(view.start.clone().expect("a start")))?;
             for ping in &view.pings {

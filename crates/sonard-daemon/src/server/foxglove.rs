@@ -14,7 +14,7 @@ use axum::extract::ws::{CloseFrame, Message, WebSocket, close_code};
 use sonard_api::config::FoxgloveKeys;
 use sonard_export::{
     Live, LiveMessage, Settings, Topic,
-    foxglove::{MOST_TEXT_BYTES, server_info},
+    foxglove::{MAX_TEXT_BYTES, server_info},
 };
 use sonard_runtime::supervisor::Task;
 use tokio::{
@@ -36,9 +36,9 @@ const IDLE_TIMEOUT: Duration = Duration::from_secs(60);
 /// Time limit of the closing handshake.
 const CLOSE_TIMEOUT: Duration = Duration::from_secs(1);
 
-/// Maximum size of a received message, bytes. Texts longer than `MOST_TEXT_BYTES` are rejected with
+/// Maximum size of a received message, bytes. Texts longer than `MAX_TEXT_BYTES` are rejected with
 /// a reason up to this size.
-pub(super) const MAX_RECEIVED_BYTES: usize = 8 * MOST_TEXT_BYTES;
+pub(super) const MAX_RECEIVED_BYTES: usize = 8 * MAX_TEXT_BYTES;
 /// Read buffer of a viewer's connection, bytes.
 pub(super) const READ_BYTES: usize = 4096;
 /// Maximum size of unsent data of a viewer's connection, bytes: a message, and responses to pings.
@@ -194,7 +194,7 @@ fn receive_error(error: axum::Error) -> Result<CloseFrame, axum::Error> {
     if is_connection_error(&error) {
         return Err(error);
     }
-    let why = format!("{error}; texts have at most {MOST_TEXT_BYTES} bytes");
+    let why = format!("{error}; texts have at most {MAX_TEXT_BYTES} bytes");
     // A close reason is limited to 123 bytes.
     let why: String = why.chars().filter(char::is_ascii).take(120).collect();
     Ok(close_frame(close_code::POLICY, &why))

@@ -34,7 +34,7 @@ impl Budget {
     /// `motor`: first step and stride of the plan. Each reading is transmitted while the next beam
     /// is measured; only the transmission time in excess of the beam counts.
     #[must_use]
-    pub fn of(plan: &ScanPlan, settings: &Settings, motor: (i32, i32), baud: u32) -> Self {
+    pub fn for_plan(plan: &ScanPlan, settings: &Settings, motor: (i32, i32), baud: u32) -> Self {
         let (from, stride) = motor;
         let seconds = |ticks: u32| f64::from(ticks) / f64::from(TICK_HZ);
         let travel_s =
@@ -150,7 +150,7 @@ mod tests {
     #[test]
     fn duration_has_three_parts() {
         let plan = ScanPlan::default();
-        let budget = Budget::of(&plan, &settings(), (0, 1), 115_200);
+        let budget = Budget::for_plan(&plan, &settings(), (0, 1), 115_200);
         assert!((budget.acoustics_s - 400.0 * 46_513.0 / 2e6).abs() < 1e-9, "{budget:?}");
         // 399 steps of 10 ms, 400 settling times of 5 ms, and 399 steps home at 800 steps/s.
         let home_s = 399.0 / 800.0 + 800.0 / 40_000.0;
@@ -164,8 +164,8 @@ mod tests {
     #[test]
     fn slow_line_dominates() {
         let plan = ScanPlan::default();
-        let fast = Budget::of(&plan, &settings(), (0, 1), 115_200);
-        let slow = Budget::of(&plan, &settings(), (0, 1), 4_800);
+        let fast = Budget::for_plan(&plan, &settings(), (0, 1), 115_200);
+        let slow = Budget::for_plan(&plan, &settings(), (0, 1), 4_800);
         assert_eq!(fast.acoustics_s, slow.acoustics_s);
         // Code byte, header, body (1 + 2 + 2 + 2 + 5 + 1, and 1 + 3 for each echo), CRC, delimiter.
         let bytes = f64::from(1 + 4 + (13 + 1 + 3 * 3) + 4 + 1);
@@ -181,7 +181,7 @@ mod tests {
     #[test]
     fn min_interval_counts_as_acoustics() {
         let guarded = Settings { min_interval_ticks: 200_000, ..settings() };
-        let budget = Budget::of(&ScanPlan::default(), &guarded, (0, 1), 115_200);
+        let budget = Budget::for_plan(&ScanPlan::default(), &guarded, (0, 1), 115_200);
         let limit_s = 399.0 * 0.1 + 46_513.0 / 2e6;
         assert!((budget.acoustics_s + 399.0 * 0.015 - limit_s).abs() < 1e-9, "{budget:?}");
     }

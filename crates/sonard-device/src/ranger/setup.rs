@@ -75,7 +75,7 @@ impl PreparedScan {
     ///
     /// # Errors
     /// If the listening window ends before the receiver opens, or the model rejects the inputs.
-    pub fn of(inputs: ScanInputs) -> Result<Self, PrepareError> {
+    pub fn new(inputs: ScanInputs) -> Result<Self, PrepareError> {
         let ScanInputs { scene, pose, pose_text, plan, motion, sensor, air, options } = inputs;
         let listening = Listening {
             max_range_m: options.max_range_m.unwrap_or(sensor.max_range_m),
@@ -91,7 +91,7 @@ impl PreparedScan {
             .predict(&pose, &stops)
             .map_err(ModelError::from)?
             .iter()
-            .map(|prediction| SimRecord::of(&simulator, prediction))
+            .map(|prediction| SimRecord::from_prediction(&simulator, prediction))
             .collect();
         Ok(Self {
             pose,

@@ -55,7 +55,7 @@ impl LiveMap {
         let (Some(start), Some(session)) = (scan.start.as_ref(), scan.session.as_deref()) else {
             return Ok(());
         };
-        let Ok(sweep) = Sweep::of(scan) else { return Ok(()) };
+        let Ok(sweep) = Sweep::from_scan(scan) else { return Ok(()) };
         let (mut map, time) = match std::mem::replace(self, Self::Stopped) {
             Self::Empty => (Box::new(new_map(session)?), start.time),
             Self::Growing { map, time } => (map, time.max(start.time)),

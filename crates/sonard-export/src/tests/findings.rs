@@ -40,7 +40,7 @@ fn features() -> Vec<Feature> {
     let session = scans[0].session.as_deref().expect("it has one");
     let extents = Extents::of_session(session).expect("good");
     let sweeps: Vec<_> =
-        scans.iter().map(|scan| (scan.scan, Sweep::of(scan).expect("good"))).collect();
+        scans.iter().map(|scan| (scan.scan, Sweep::from_scan(scan).expect("good"))).collect();
     let features = interpret(&sweeps, &extents, &Settings::default());
     assert!(!features.is_empty());
     features

@@ -3,7 +3,7 @@ use std::collections::BTreeMap;
 use proptest::prelude::*;
 use serde_json::{Value, json};
 
-use crate::foxglove::{MOST_TEXT_BYTES, Session, Step, advertise};
+use crate::foxglove::{MAX_TEXT_BYTES, Session, Step, advertise};
 
 /// Channels that exist in these tests.
 fn is_there(channel: u32) -> bool {
@@ -48,7 +48,7 @@ fn subscribes_and_frames_messages() {
 fn rejects_invalid_messages() {
     let mut session = Session::default();
     take(&mut session, &subscribe(&[[1, 1]]));
-    let long = "x".repeat(MOST_TEXT_BYTES);
+    let long = "x".repeat(MAX_TEXT_BYTES);
     for (text, words) in [
         ("{", "invalid message"),
         ("", "invalid message"),

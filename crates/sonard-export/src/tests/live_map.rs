@@ -56,7 +56,8 @@ fn mapping_live() -> Live {
 fn recorded(records: &[Record]) -> Vec<u8> {
     let scans = ScanView::from_records(records.iter().cloned());
     let session = scans[0].session.as_deref().expect("it has one");
-    let sweeps: Vec<Sweep> = scans.iter().map(|scan| Sweep::of(scan).expect("good")).collect();
+    let sweeps: Vec<Sweep> =
+        scans.iter().map(|scan| Sweep::from_scan(scan).expect("good")).collect();
     let (extents, mapping) = (Extents::of_session(session).expect("good"), Mapping::default());
     let shape = mapping.shape(&sweeps, mapping.max_range_m(&extents)).expect("small");
     let mut mapper = Mapper::new(&mapping, Grid::new(shape), extents, false, sweeps.len());

@@ -255,7 +255,7 @@ fn echo_path(simulator: &Simulator, firing: &SimulatedFiring) -> Option<String> 
 }
 
 fn path_text(simulator: &Simulator, path: &Path, length_m: f64) -> String {
-    PathRecord::of(simulator.scene(), path, length_m).in_words()
+    PathRecord::from_path(simulator.scene(), path, length_m).in_words()
 }
 
 fn integer<'a>(number: u64) -> Option<Value<'a>> {

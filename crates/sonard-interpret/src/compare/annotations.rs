@@ -41,8 +41,8 @@ pub enum Word {
 impl JudgedPing {
     /// Annotates a reading of a scan.
     #[must_use]
-    pub fn of(ping: Ping, scan: &ScanView) -> Self {
-        let beside = Beside::of(&ping, Some(scan));
+    pub fn new(ping: Ping, scan: &ScanView) -> Self {
+        let beside = Beside::for_ping(&ping, Some(scan));
         Self { ping, beside }
     }
 }
@@ -50,17 +50,17 @@ impl JudgedPing {
 impl Beside {
     /// Annotations of a reading; only session and start of the scan are used.
     #[must_use]
-    pub fn of(ping: &Ping, scan: Option<&ScanView>) -> Self {
+    pub fn for_ping(ping: &Ping, scan: Option<&ScanView>) -> Self {
         let viewpoint = scan.filter(|scan| scan.scan == ping.scan);
         let viewpoint = viewpoint.and_then(|scan| scan.viewpoint(ping));
-        Self { verdict: Word::of(ping), viewpoint }
+        Self { verdict: Word::from_ping(ping), viewpoint }
     }
 }
 
 impl Word {
     /// Classifies a reading against its prediction.
     #[must_use]
-    pub fn of(ping: &Ping) -> Self {
+    pub fn from_ping(ping: &Ping) -> Self {
         judge(ping).verdict.map_or_else(Self::NotCompared, Self::Compared)
     }
 }

@@ -15,7 +15,7 @@ mod merge;
 mod tests;
 
 pub use cluster::clusters;
-pub use error::{MOST_ERROR_M, MapError, map_error};
+pub use error::{MAX_ERROR_M, MapError, map_error};
 pub use fit::{FitSettings, Segment, fit};
 pub use laser::{LaserReturn, LaserScan};
 pub use map::{LineMap, LineMapSettings};

@@ -92,7 +92,7 @@ impl Sweep {
     /// # Errors
     /// The pose is missing or not finite, a ranger is not in the session's array, or there are
     /// fewer than two usable stops.
-    pub fn of(scan: &ScanView) -> Result<Self, SweepError> {
+    pub fn from_scan(scan: &ScanView) -> Result<Self, SweepError> {
         let start = scan.start.as_ref().ok_or(SweepError::NoPose)?;
         let Pose { x_m, y_m, heading_deg } = start.pose;
         if ![x_m, y_m, heading_deg].iter().all(|part| part.is_finite()) {

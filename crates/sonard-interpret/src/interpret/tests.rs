@@ -44,6 +44,6 @@ fn features(scans: &[ScanView], settings: &Settings) -> Vec<Feature> {
     let session = scans[0].session.as_ref().expect("a session");
     let extents = Extents::of_session(session).expect("sensible figures");
     let sweeps: Vec<_> =
-        scans.iter().map(|scan| (scan.scan, Sweep::of(scan).expect("a sweep"))).collect();
+        scans.iter().map(|scan| (scan.scan, Sweep::from_scan(scan).expect("a sweep"))).collect();
     interpret(&sweeps, &extents, settings)
 }

@@ -29,7 +29,7 @@ fn scan_in(scene: &Scene, n: u128) -> Vec<Record> {
     for record in &mut records {
         match record {
             Record::Session(session) => {
-                session.scene = Some(SceneRef::of(scene));
+                session.scene = Some(SceneRef::from_scene(scene));
                 session.scene_text = Some(Arc::clone(&scene.text));
             }
             Record::ScanStart(start) => start.scan = Uuid::from_u128(n),
@@ -126,7 +126,7 @@ fn history_finds_the_text() {
 fn rejects_a_different_text() {
     let (_folder, log) = folder();
     let Record::Session(mut session) = records().swap_remove(0) else { panic!("a session first") };
-    session.scene = Some(SceneRef::of(&simple_room()));
+    session.scene = Some(SceneRef::from_scene(&simple_room()));
     session.scene_text = Some(shipped::text("corridor").expect("shipped").into());
     assert!(matches!(logged_scene(&session, &log), Err(SceneLost::Changed(_))));
     session.scene_text = None;

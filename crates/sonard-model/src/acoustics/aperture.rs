@@ -82,7 +82,7 @@ impl ApertureResponse {
             return None;
         }
         let points = points(&aperture, POINTS)?;
-        let pulse = EchoShape::of(sensor);
+        let pulse = EchoShape::for_sensor(sensor);
         let crossing_us = 2e6 * sensor.half_width_m() / sound_speed_m_s;
         let first_us = pulse.first_us() - crossing_us;
         let last_us = pulse.last_us() + crossing_us;
@@ -294,7 +294,7 @@ mod tests {
         for name in ["senscomp-6500", "fullwave-line"] {
             let sensor = preset(name);
             let response = ApertureResponse::new(&sensor, SPEED_M_S).expect("a face");
-            let pulse = EchoShape::of(&sensor);
+            let pulse = EchoShape::for_sensor(&sensor);
             let echo = response.echo(&far(0.0, 0.0)).expect("an echo");
             for i in -100..440 {
                 let t_us = f64::from(i);
@@ -309,7 +309,7 @@ mod tests {
     fn disc_matches_kuc_siegel() {
         let sensor = preset("senscomp-6500");
         let Aperture::Piston { radius_m, .. } = sensor.aperture else { panic!("a disc") };
-        let pulse = EchoShape::of(&sensor);
+        let pulse = EchoShape::for_sensor(&sensor);
         let (leaving, arriving) = (0.15_f64, -0.3_f64);
         let omega = TAU * sensor.frequency_hz;
         let steps = 160;

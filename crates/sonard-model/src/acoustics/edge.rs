@@ -10,8 +10,8 @@ use std::f64::consts::{FRAC_PI_4, PI, TAU};
 
 use num_complex::Complex64;
 
-pub use post::{MOST_KA, Post};
-pub use strip::{MOST_WAVELENGTHS, Strip};
+pub use post::{MAX_KA, Post};
+pub use strip::{MAX_WAVELENGTHS, Strip};
 pub use view::EdgeView;
 
 /// Law for the echo amplitude of an edge.

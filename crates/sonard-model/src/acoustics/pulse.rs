@@ -53,7 +53,7 @@ impl EchoShape {
     /// A filtered burst is the difference of two error functions. A chirp, whose parts differ in
     /// frequency, is convolved with the filter numerically, with continuous phase across its parts.
     #[must_use]
-    pub fn of(sensor: &Sensor) -> Self {
+    pub fn for_sensor(sensor: &Sensor) -> Self {
         match &sensor.pulse {
             Pulse::Burst { cycles, bandwidth_hz } => {
                 let (length_us, sigma_us) =
@@ -308,7 +308,7 @@ mod tests {
     /// 6.36 mm and 0.1 at 4.94 mm (tests/data/fullwave, `onset_lead_m`).
     #[test]
     fn burst_rise_matches_full_wave() {
-        let shape = EchoShape::of(&sensor(BURST));
+        let shape = EchoShape::for_sensor(&sensor(BURST));
         for (level, lead_mm) in [(0.02, 8.00), (0.05, 6.36), (0.1, 4.94)] {
             let rise_us = shape.rise_us(level).expect("it gets there");
             // The reference's band ends 20 kHz off the carrier, and its samples are 2 us (0.34 mm)
@@ -334,8 +334,8 @@ mod tests {
             ChirpPart { cycles: 6.0, frequency_hz: 49.4e3 },
             ChirpPart { cycles: 10.0, frequency_hz: 49.4e3 },
         ];
-        let chirp = EchoShape::of(&sensor(Pulse::Chirp { parts, bandwidth_hz: 7000.0 }));
-        let burst = EchoShape::of(&sensor(BURST));
+        let chirp = EchoShape::for_sensor(&sensor(Pulse::Chirp { parts, bandwidth_hz: 7000.0 }));
+        let burst = EchoShape::for_sensor(&sensor(BURST));
         for i in -80..400 {
             let t_us = f64::from(i);
             assert!((chirp.at(t_us) - burst.at(t_us)).norm() < 6e-3, "{t_us}");
@@ -347,7 +347,8 @@ mod tests {
     #[test]
     fn off_carrier_part_is_attenuated() {
         let part = |frequency_hz: f64| ChirpPart { cycles: 40.0, frequency_hz };
-        let shape = |parts| EchoShape::of(&sensor(Pulse::Chirp { parts, bandwidth_hz: 7000.0 }));
+        let shape =
+            |parts| EchoShape::for_sensor(&sensor(Pulse::Chirp { parts, bandwidth_hz: 7000.0 }));
         let both = shape(vec![part(49.4e3), part(56.4e3)]);
         let [early, late] = [both.at(400.0), both.at(1200.0)];
         assert!((late.norm() / early.norm() - (-0.5_f64).exp()).abs() < 1e-3);

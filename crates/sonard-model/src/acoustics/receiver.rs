@@ -134,7 +134,7 @@ impl Receiver {
     /// Creates the receiver of a sensor for a speed of sound in m/s.
     #[must_use]
     pub fn new(sensor: &Sensor, sound_speed_m_s: f64) -> Self {
-        let shape = EchoShape::of(sensor);
+        let shape = EchoShape::for_sensor(sensor);
         let response = (sensor.response == Response::Full)
             .then(|| ApertureResponse::new(sensor, sound_speed_m_s))
             .flatten();

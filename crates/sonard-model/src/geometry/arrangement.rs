@@ -54,7 +54,7 @@ impl Arrangement {
     /// Splits segments at crossings and contacts. Of overlapping segments the first one is kept.
     /// The run time is O(n log n) for segments with few neighbours.
     #[must_use]
-    pub fn of(segments: &[(DVec2, DVec2)]) -> Self {
+    pub fn from_segments(segments: &[(DVec2, DVec2)]) -> Self {
         let mut parts: Vec<SegmentPart> = segments
             .iter()
             .zip(0..)
@@ -252,7 +252,7 @@ mod tests {
             ("gap above the tolerance", vec![line, segment(1.0, 1e-4, 1.0, 1.0)], 4, 2),
         ];
         for (name, segments, points, pieces) in cases {
-            let arrangement = Arrangement::of(&segments);
+            let arrangement = Arrangement::from_segments(&segments);
             let counts = (arrangement.points.len(), arrangement.pieces.len());
             assert_eq!(counts, (points, pieces), "{name}");
             for (ends, (a, b)) in arrangement.ends.iter().zip(&segments) {
@@ -270,7 +270,7 @@ mod tests {
                 [segment(x, -0.3, x + 0.2, 5.0), segment(-0.2, x, 5.3, x - 0.1)]
             })
             .collect();
-        let arrangement = Arrangement::of(&grid);
+        let arrangement = Arrangement::from_segments(&grid);
         for (index, &(a, b)) in grid.iter().enumerate() {
             let length: f64 = arrangement
                 .pieces

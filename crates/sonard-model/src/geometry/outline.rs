@@ -125,7 +125,7 @@ mod tests {
             segment(2.0, 0.0, 2.0, 3.0),
             segment(0.5, 0.5, 1.0, 0.5),
         ];
-        let arrangement = Arrangement::of(&two_rooms);
+        let arrangement = Arrangement::from_segments(&two_rooms);
         let mut outlines: Vec<Vec<DVec2>> = arrangement
             .outlines()
             .iter()
@@ -147,7 +147,7 @@ mod tests {
         let corners = [at(0.0, 0.0), at(1.0, 0.0), at(1.0, 1.0), at(0.0, 1.0)];
         let mut segments: Vec<_> = (0..4).map(|i| (corners[i], corners[(i + 1) % 4])).collect();
         segments.push((corners[0], corners[2]));
-        let arrangement = Arrangement::of(&segments);
+        let arrangement = Arrangement::from_segments(&segments);
         let outlines = arrangement.outlines();
         assert_eq!(outlines.len(), 1);
         let outline: Vec<DVec2> =

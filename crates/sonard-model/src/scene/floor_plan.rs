@@ -112,8 +112,9 @@ impl FloorPlan {
         by_rank.sort_by(|&a, &b| compare_ranks(wall(a), wall(b)));
         let ranked: Vec<_> =
             by_rank.iter().map(|&index| turned(index, walls[index as usize])).collect();
-        let arrangement =
-            as_drawn(Arrangement::of(&ranked), &by_rank, |wall| is_turned[wall as usize]);
+        let arrangement = as_drawn(Arrangement::from_segments(&ranked), &by_rank, |wall| {
+            is_turned[wall as usize]
+        });
         changes.extend(covered(scene, &arrangement));
         changes.sort_by_key(Change::key);
         Self { walls, arrangement, changes }

@@ -263,7 +263,7 @@ fn ring_around(plan: &Arrangement, walls: Vec<u32>) -> Option<WallRing> {
     let at = |point: u32| plan.points[point as usize];
     let segments: Vec<_> =
         walls.iter().map(|&wall| plan.ends[wall as usize].map(at)).map(|[a, b]| (a, b)).collect();
-    let own = Arrangement::of(&segments);
+    let own = Arrangement::from_segments(&segments);
     let outline = own.outlines().into_iter().next()?;
     let ring = WallRing::new(walls, &outline, &own);
     (ring.area > 0.0).then_some(ring)

@@ -2,7 +2,7 @@
 
 use rand::RngExt;
 use sonard_model::{
-    acoustics::edge::MOST_KA,
+    acoustics::edge::MAX_KA,
     geometry::{DVec2, wrap_pi},
     model::{
         Mechanism, Reflector,
@@ -132,7 +132,7 @@ fn assert_clear(world: &World, [from, to]: [DVec2; 2], echo: &EchoPath) {
         assert!(!crosses, "{echo:?} crosses wall {number} of {}", world.text());
     }
     // Sound passes a post, too.
-    let most_m = MOST_KA / settings().wave_number_per_m;
+    let most_m = MAX_KA / settings().wave_number_per_m;
     let thick = |round: &&Round| round.radius_m > most_m;
     for (number, round) in world.rounds.iter().filter(thick).enumerate() {
         let share = ((round.center - from).dot(run) / run.length_squared()).clamp(0.0, 1.0);

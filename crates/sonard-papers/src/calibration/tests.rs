@@ -13,7 +13,7 @@ fn classified(seed: u64, rooms: u64) -> Vec<Judged> {
 #[test]
 fn probabilities_are_calibrated() {
     let classified = classified(7, 100);
-    let reliability = Reliability::of(&classified);
+    let reliability = Reliability::from_arcs(&classified);
     println!("{} arcs: {reliability:#.3?}", classified.len());
     assert!(classified.len() > 500, "{}", classified.len());
     assert!(reliability.expected_error < 0.03, "{reliability:#.3?}");
@@ -46,7 +46,7 @@ fn statistics_match_their_definitions() {
     let probabilities = Probabilities { plane: 0.85, corner: 0.1, edge: 0.05, other: 0.0 };
     let classified =
         [Truth::Plane, Truth::Corner].map(|truth| Judged { said: probabilities, truth });
-    let Reliability { bins, expected_error, brier } = Reliability::of(&classified);
+    let Reliability { bins, expected_error, brier } = Reliability::from_arcs(&classified);
     for (at, count, claimed, came_true) in [(0, 4, 0.025, 0.0), (1, 2, 0.1, 0.5), (8, 2, 0.85, 0.5)]
     {
         assert_eq!(bins[at].count, count, "{bins:?}");
@@ -61,9 +61,9 @@ fn statistics_match_their_definitions() {
     assert!((brier - (first + second) / 8.0).abs() < 1e-12, "{brier}");
 
     let certain = Probabilities { edge: 1.0, ..Probabilities::default() };
-    let right = Reliability::of(&[Judged { said: certain, truth: Truth::Edge }]);
+    let right = Reliability::from_arcs(&[Judged { said: certain, truth: Truth::Edge }]);
     assert_eq!((right.expected_error, right.brier, right.bins[9].count), (0.0, 0.0, 1));
-    let wrong = Reliability::of(&[Judged { said: certain, truth: Truth::Other }]);
+    let wrong = Reliability::from_arcs(&[Judged { said: certain, truth: Truth::Other }]);
     assert_eq!((wrong.expected_error, wrong.brier), (0.5, 0.5));
-    assert_eq!(Reliability::of(&[]).brier, 0.0);
+    assert_eq!(Reliability::from_arcs(&[]).brier, 0.0);
 }

@@ -86,7 +86,7 @@ pub(crate) fn run(args: &Args) -> Outcome {
         bar.inc(1);
     }
     bar.finish_and_clear();
-    let reliability = Reliability::of(&arcs);
+    let reliability = Reliability::from_arcs(&arcs);
     let found = Answer::new(args, arcs.len(), &reliability);
     answer(args.json, [&found], |out| found.print(out))?;
     let lines = [found.summary(), format!("{} with its complete receiver", sensor.name)];

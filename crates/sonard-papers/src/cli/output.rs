@@ -88,7 +88,7 @@ pub(crate) fn make_folder(folder: &Path) -> Outcome {
 pub(crate) fn write_map(folder: &Path, grid: &Grid, overwrite: Overwrite) -> Outcome {
     make_folder(folder)?;
     overwrite.save(&folder.join("map.pgm"), &to_pgm(grid))?;
-    let yaml = MapYaml::of(grid.shape(), "map.pgm").to_text();
+    let yaml = MapYaml::new(grid.shape(), "map.pgm").to_text();
     overwrite.save(&folder.join("map.yaml"), yaml.as_bytes())
 }
 

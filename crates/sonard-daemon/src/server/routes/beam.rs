@@ -27,7 +27,7 @@ pub(super) fn describe_beam(view: &ScanView, ping: Ping, scene: Option<&Scene>) 
     };
     let polyline = ping.sound_path().and_then(|path| view.polyline(&ping, path));
     let polyline = polyline.map(|points| points.into_iter().map(PlanPoint::from).collect());
-    Beam { reading: JudgedPing::of(ping, view), echoes, polyline, peaks, trace, lacks }
+    Beam { reading: JudgedPing::new(ping, view), echoes, polyline, peaks, trace, lacks }
 }
 
 fn echoes(view: &ScanView, session: Option<&Session>, ping: &Ping) -> Vec<Echo> {
@@ -91,5 +91,5 @@ fn predict_arrivals(
     let point = simulator.at(axis.position());
     let trace = point.trace(axis.direction_rad(0.0), until_m, STEP_US)?;
     let peaks = PeakLine::of_trace(simulator, &point, axis, &trace)?;
-    Ok((peaks, TraceLine::of(simulator, &trace, STEP_US)))
+    Ok((peaks, TraceLine::from_trace(simulator, &trace, STEP_US)))
 }

@@ -64,7 +64,7 @@ fn interpret_scan(
     let session =
         session.ok_or_else(|| nothing("the log does not contain the scan's session".into()))?;
     let extents = Extents::of_session(session).map_err(|error| nothing(error.to_string()))?;
-    let sweep = Sweep::of(&view).map_err(|error| nothing(error.to_string()))?;
+    let sweep = Sweep::from_scan(&view).map_err(|error| nothing(error.to_string()))?;
     let is_array = session.array.is_some();
     let mut lines = LineMap::new(LineMapSettings::default());
     lines.add_sonar(&sweep);

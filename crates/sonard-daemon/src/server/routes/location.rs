@@ -278,7 +278,7 @@ impl LocatableScan {
     /// of the previous scan is reused if the session is equal. Reads the disk.
     fn load(api: &Api, passage: &Passage, previous: Option<&PreviousScan>) -> Result<Self, String> {
         let view = read(passage).map_err(|failed| failed.problem.error)?;
-        let sweep = Sweep::of(&view).map_err(|error| error.to_string())?;
+        let sweep = Sweep::from_scan(&view).map_err(|error| error.to_string())?;
         let session = view.session.ok_or("the log does not contain the scan's session")?;
         if let Some(previous) = previous.filter(|previous| *previous.session == *session) {
             let (session, world) = (Arc::clone(&previous.session), Arc::clone(&previous.world));

@@ -136,7 +136,7 @@ impl ScanPieces {
         piece.push(b'{');
         match self.form {
             ScanForm::Whole => {
-                let beside = Beside::of(&ping, Some(&self.passage.view));
+                let beside = Beside::for_ping(&ping, Some(&self.passage.view));
                 piece.extend_from_slice(&judged_line(fields, &beside));
             }
             ScanForm::Report => piece.extend_from_slice(fields),

@@ -185,8 +185,8 @@ fn annotate(ping: Ping, view: &ScanView) -> JudgedPing {
         path: ping.path.clone(),
         crosstalk: ping.crosstalk.clone(),
     };
-    let verdict = Word::of(&Ping { sim: Some(sim), ..ping.clone() });
-    let mut annotated = JudgedPing::of(ping, view);
+    let verdict = Word::from_ping(&Ping { sim: Some(sim), ..ping.clone() });
+    let mut annotated = JudgedPing::new(ping, view);
     annotated.beside.verdict = verdict;
     annotated
 }

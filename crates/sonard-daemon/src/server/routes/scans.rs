@@ -152,7 +152,7 @@ async fn scene(
     let scene = scene_of(&api, &passage).await?;
     let taken_in = passage.view.session.as_deref().and_then(|session| session.scene.as_ref());
     match scene.filter(|scene| taken_in.is_some_and(|taken_in| taken_in.sha256 == scene.sha256)) {
-        Some(scene) => Ok(Json(FloorPlan::of(&scene))),
+        Some(scene) => Ok(Json(FloorPlan::from_scene(&scene))),
         None => Err(ApiError::new(
             StatusCode::NOT_FOUND,
             "the log does not contain the scene of this scan",

@@ -17,5 +17,5 @@ async fn scene(State(api): State<Api>) -> Result<Response, ApiError> {
         let help = "configure one in place.scene";
         ApiError::new(StatusCode::NOT_FOUND, "no scene is configured", help)
     })?;
-    Ok(api.scene.response(&scene, FloorPlan::of))
+    Ok(api.scene.response(&scene, FloorPlan::from_scene))
 }

@@ -12,7 +12,7 @@ use super::{
 use crate::compare::Judged;
 
 /// Maximum number of beams kept.
-const MOST_BEAMS: usize = 20_000;
+const MAX_BEAMS: usize = 20_000;
 
 /// Scans with evenly spaced beams, as readings and predictions.
 #[derive(Debug, Default)]
@@ -50,7 +50,7 @@ impl ShiftableScan {
 impl CombinedFit {
     /// Returns `true` if so many more beams may be kept.
     pub(super) const fn has_room(&self, beams: usize) -> bool {
-        self.beams + beams <= MOST_BEAMS
+        self.beams + beams <= MAX_BEAMS
     }
 
     pub(super) fn add(

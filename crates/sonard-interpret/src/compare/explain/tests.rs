@@ -60,7 +60,7 @@ fn compared(truth: &World, assumed: &World) -> Comparison {
         ping.range_m = ping.range_m.map(|range_m| range_m * slower);
         let prediction =
             point.ping(assumed.pose.direction_rad(ping.azimuth_deg)).expect("few paths");
-        ping.sim = Some(SimRecord::of(&simulator, &prediction));
+        ping.sim = Some(SimRecord::from_prediction(&simulator, &prediction));
         (ping.path, ping.amplitude, ping.margin_db) = (None, None, None);
     }
     scan.session = predicted.session;

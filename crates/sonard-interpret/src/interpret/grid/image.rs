@@ -220,7 +220,7 @@ fn number(bytes: &[u8], at: &mut usize) -> Option<usize> {
 impl MapYaml {
     /// Description of a map with the given image file name.
     #[must_use]
-    pub fn of(shape: &GridShape, image: &str) -> Self {
+    pub fn new(shape: &GridShape, image: &str) -> Self {
         Self {
             image: image.to_owned(),
             resolution: shape.resolution_m,

@@ -143,7 +143,7 @@ fn physical_profile_is_closed_form() {
 fn pgm_and_yaml_round_trip() {
     let mut grid = Grid::new(shape(3.0, 0.05));
     grid.add(&beam(Heard::Echo(1.0)), None, &gaussian(), &Trust::default());
-    let yaml = MapYaml::of(grid.shape(), "map.pgm");
+    let yaml = MapYaml::new(grid.shape(), "map.pgm");
     let read = MapYaml::from_text(&yaml.to_text()).expect("a description");
     assert_eq!(read, yaml);
     let back = from_pgm(&to_pgm(&grid), &read).expect("a map");
@@ -158,7 +158,7 @@ fn pgm_and_yaml_round_trip() {
 
 #[test]
 fn map_saver_unknown_is_recognized() {
-    let yaml = MapYaml::of(&shape(0.3, 0.1), "map.pgm");
+    let yaml = MapYaml::new(&shape(0.3, 0.1), "map.pgm");
     let unknown = |pixels: &[u8; 9]| {
         let pgm = [b"P5\n3 3\n255\n", &pixels[..]].concat();
         from_pgm(&pgm, &yaml).expect("a map").probability(0)
@@ -248,7 +248,7 @@ fn plain_and_16_bit_images_decode() {
 #[test]
 fn damaged_files_are_rejected() {
     let grid = Grid::new(shape(1.0, 0.1));
-    let (pgm, yaml) = (to_pgm(&grid), MapYaml::of(grid.shape(), "map.pgm"));
+    let (pgm, yaml) = (to_pgm(&grid), MapYaml::new(grid.shape(), "map.pgm"));
     for cut in 0..pgm.len() {
         assert!(matches!(from_pgm(&pgm[..cut], &yaml), Err(ImageError::Image { .. })), "{cut}");
     }

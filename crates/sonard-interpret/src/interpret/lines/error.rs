@@ -10,12 +10,12 @@ use sonard_model::{
 
 /// Cap on every distance, metres: a missing wall counts the same in a large room as in a small
 /// one.
-pub const MOST_ERROR_M: f64 = 0.5;
+pub const MAX_ERROR_M: f64 = 0.5;
 
 /// Sampling distance along lines, metres.
 const SAMPLE_M: f64 = 0.02;
 
-/// Errors of a line map, metres. Each distance is capped at [`MOST_ERROR_M`].
+/// Errors of a line map, metres. Each distance is capped at [`MAX_ERROR_M`].
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct MapError {
     /// Mean of the line and the endpoint error.
@@ -80,11 +80,11 @@ fn mean_along(segments: &[[DVec2; 2]], distance_m: impl Fn(DVec2) -> f64) -> f64
     }))
 }
 
-/// Weighted mean of distances capped at [`MOST_ERROR_M`]; the cap itself if there is none.
+/// Weighted mean of distances capped at [`MAX_ERROR_M`]; the cap itself if there is none.
 fn mean(distances: impl Iterator<Item = (f64, f64)>) -> f64 {
     let add = |(sum, whole): (f64, f64), (weight, distance_m): (f64, f64)| {
-        (sum + weight * distance_m.min(MOST_ERROR_M), whole + weight)
+        (sum + weight * distance_m.min(MAX_ERROR_M), whole + weight)
     };
     let (sum, whole) = distances.fold((0.0, 0.0), add);
-    if whole > 0.0 { sum / whole } else { MOST_ERROR_M }
+    if whole > 0.0 { sum / whole } else { MAX_ERROR_M }
 }

@@ -7,7 +7,7 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
 use super::{
-    FitSettings, LaserReturn, LaserScan, LineKind, LineMap, LineMapSettings, MOST_ERROR_M, MapLine,
+    FitSettings, LaserReturn, LaserScan, LineKind, LineMap, LineMapSettings, MAX_ERROR_M, MapLine,
     MergeSettings, clusters, fit, map_error, merge,
 };
 use crate::interpret::{Beam, Heard, Sweep};
@@ -350,7 +350,7 @@ fn map_errors_match_closed_forms() {
     let error = |lines: &[MapLine]| map_error(lines, &scene);
     let right = line([0.0, 0.0], [2.0, 0.0], LineKind::Laser, 1.0);
     assert_eq!(error(&[right]).map_error_m, 0.0);
-    assert_eq!(error(&[]).map_error_m, MOST_ERROR_M);
+    assert_eq!(error(&[]).map_error_m, MAX_ERROR_M);
     // Offset from the wall by 1 cm over its whole length.
     let offset = error(&[line([0.0, 0.01], [2.0, 0.01], LineKind::Laser, 1.0)]);
     assert!(

@@ -22,14 +22,17 @@ fn fig13() -> ScanView {
 #[test]
 fn insufficient_scans_are_rejected() {
     let whole = fig13();
-    assert_eq!(Sweep::of(&ScanView { start: None, ..whole.clone() }), Err(SweepError::NoPose));
+    assert_eq!(
+        Sweep::from_scan(&ScanView { start: None, ..whole.clone() }),
+        Err(SweepError::NoPose)
+    );
     let one = ScanView { pings: whole.pings[..1].to_vec(), ..whole.clone() };
-    assert_eq!(Sweep::of(&one), Err(SweepError::TooFew(1)));
+    assert_eq!(Sweep::from_scan(&one), Err(SweepError::TooFew(1)));
     let mut nowhere = whole;
     if let Some(start) = &mut nowhere.start {
         start.pose = Pose { x_m: f64::NAN, y_m: 0.0, heading_deg: 0.0 };
     }
-    assert!(matches!(Sweep::of(&nowhere), Err(SweepError::BadPose { .. })));
+    assert!(matches!(Sweep::from_scan(&nowhere), Err(SweepError::BadPose { .. })));
 }
 
 #[test]
@@ -54,7 +57,7 @@ fn non_finite_readings_count_as_lost() {
     scan.pings[80].azimuth_deg = f64::INFINITY;
     scan.pings[150].status = PingStatus::LinkLost;
     scan.pings[160].range_m = Some(-3.0);
-    let sweep = Sweep::of(&scan).expect("a sweep");
+    let sweep = Sweep::from_scan(&scan).expect("a sweep");
     assert_eq!(sweep.beams.len(), 397);
     assert!(!sweep.beams.iter().any(|beam| matches!(beam.heard, Heard::Echo(m) if m.is_nan())));
     assert_eq!(features(&[scan], &Settings::default()).len(), expected);

@@ -25,7 +25,7 @@ fn scene() -> Arc<Scene> {
 fn two_stops_are_enough() {
     let whole = scan(&simulator(scene()), 1, &Pose { x_m: 1.2, y_m: 1.0, heading_deg: 30.0 });
     let two = ScanView { pings: whole.pings[..2].to_vec(), ..whole };
-    let sweep = Sweep::of(&two).expect("two");
+    let sweep = Sweep::from_scan(&two).expect("two");
     assert_eq!((sweep.beams.len(), sweep.closed), (2, false));
     assert_eq!((sweep.gap_before_deg(0), sweep.gap_before_deg(1)), (None, Some(0.9)));
 }
@@ -36,7 +36,8 @@ fn closed_sweep_has_a_closing_gap() {
     // Two readings in a row may be lost, and not three.
     for (lost, gap_deg) in [(0, Some(0.9)), (2, Some(2.7)), (3, None)] {
         let last = whole.pings.len() - lost;
-        let sweep = Sweep::of(&ScanView { pings: whole.pings[..last].to_vec(), ..whole.clone() });
+        let sweep =
+            Sweep::from_scan(&ScanView { pings: whole.pings[..last].to_vec(), ..whole.clone() });
         let sweep = sweep.expect("a sweep");
         let found_deg = sweep.gap_before_deg(0);
         assert_eq!(sweep.closed, gap_deg.is_some(), "{lost}");
@@ -66,7 +67,7 @@ fn array_beams_are_at_their_rangers() {
         Record::ScanStart(ScanStart::of_array(&model, scan, pose, 1, time)),
     ];
     let view = ScanView::from_records(records.into_iter().chain(pings)).remove(0);
-    let sweep = Sweep::of(&view).expect("a sweep");
+    let sweep = Sweep::from_scan(&view).expect("a sweep");
     assert_eq!(sweep.beams.len(), array.rangers.len());
     assert!(!sweep.closed);
     for beam in &sweep.beams {

@@ -26,7 +26,7 @@ use num_complex::Complex64;
 use super::Aspect;
 
 /// Maximum wave number times radius of a post: 1.7 cm at 49.4 kHz.
-pub const MOST_KA: f64 = 15.0;
+pub const MAX_KA: f64 = 15.0;
 
 /// Number of terms beyond `ka`, where the series decays faster than exponentially.
 const TERMS_BEYOND: f64 = 12.0;
@@ -46,7 +46,7 @@ impl Post {
     #[must_use]
     pub fn new(radius_m: f64, reflectance: f64, wave_number_per_m: f64) -> Option<Self> {
         let ka = wave_number_per_m * radius_m;
-        let fits = 0.0 < ka && ka <= MOST_KA;
+        let fits = 0.0 < ka && ka <= MAX_KA;
         let terms = || terms(ka, reflectance, wave_number_per_m);
         fits.then(|| Self { radius_m, wave_number_per_m, terms: terms() })
     }

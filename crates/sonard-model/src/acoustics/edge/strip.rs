@@ -28,12 +28,12 @@ use num_complex::Complex64;
 
 use super::Aspect;
 
-/// Number of polynomials: the truncation error is below 1e-6 up to [`MOST_WAVELENGTHS`].
+/// Number of polynomials: the truncation error is below 1e-6 up to [`MAX_WAVELENGTHS`].
 const TERMS: usize = 8;
 
 /// Maximum width of a strip, wavelengths. Above it, edge diffraction at its ends is accurate to 0.5
 /// dB for head-on incidence.
-pub const MOST_WAVELENGTHS: f64 = 1.0;
+pub const MAX_WAVELENGTHS: f64 = 1.0;
 
 /// Quadrature points on either side of `kappa`, and upper limit of the integrals.
 const POINTS: u32 = 300;
@@ -54,7 +54,7 @@ impl Strip {
     /// wide.
     #[must_use]
     pub fn new(width_m: f64, reflectance: f64, wave_number_per_m: f64) -> Option<Self> {
-        let is_narrow = width_m * wave_number_per_m <= MOST_WAVELENGTHS * TAU;
+        let is_narrow = width_m * wave_number_per_m <= MAX_WAVELENGTHS * TAU;
         let inverse = || signed_inverse(integrals(0.5 * width_m * wave_number_per_m));
         is_narrow.then(|| Self { width_m, wave_number_per_m, reflectance, inverse: inverse() })
     }

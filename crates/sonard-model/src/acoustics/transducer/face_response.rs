@@ -144,7 +144,7 @@ impl PulsedFace {
         };
         let aperture = unit_half_width(&sensor.aperture);
         let omega = 1e-6 * TAU * sensor.frequency_hz;
-        Self { aperture, omega, pulse: EchoShape::of(sensor), middle_us }
+        Self { aperture, omega, pulse: EchoShape::for_sensor(sensor), middle_us }
     }
 
     /// Peak over time of `|h * pulse|` for a phase at the rim, without the obliquity.

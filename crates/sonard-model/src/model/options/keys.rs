@@ -69,14 +69,14 @@ pub struct ForeignOption {
     /// Engine that was selected.
     pub engine: EngineKind,
     /// Engines with this setting.
-    pub of: &'static [EngineKind],
+    pub engines: &'static [EngineKind],
 }
 
 impl ForeignOption {
     /// Returns a suggested correction.
     #[must_use]
     pub fn help(&self) -> String {
-        let of: Vec<_> = self.of.iter().map(|engine| engine.name()).collect();
+        let of: Vec<_> = self.engines.iter().map(|engine| engine.name()).collect();
         format!("remove it, or choose the engine {}", of.join(" or "))
     }
 }
@@ -122,7 +122,7 @@ impl OptionKeys {
             OPTIONS.iter().find(|(option, of)| !of.contains(&self.engine) && self.is_set(option));
         match foreign {
             None => Ok(known),
-            Some(&(option, of)) => Err(ForeignOption { option, engine: self.engine, of }),
+            Some(&(option, of)) => Err(ForeignOption { option, engine: self.engine, engines: of }),
         }
     }
 

@@ -96,7 +96,7 @@ fn linearized(scan: &mut ScanView, path: PathRecord) -> Option<super::super::Lin
     let mut ping: Ping = predicted.pings[0].clone();
     let point = simulator.at(World::assumed().pose.position());
     let prediction = point.ping(0.0).expect("few paths");
-    let mut sim = sonard_records::SimRecord::of(&simulator, &prediction);
+    let mut sim = sonard_records::SimRecord::from_prediction(&simulator, &prediction);
     sim.path = Some(path);
     ping.sim = Some(sim);
     Explainer::default().pair(scan, &ping, Some(0.0))

@@ -74,7 +74,7 @@ fn trusted_shares(scans: usize, seed: u64) -> Vec<[f64; 2]> {
         let (id, plan) = (Uuid::from_u128(number as u128), ScanPlan::default());
         let scan = ScanView::simulated(&simulator, id, pose, &plan, Timestamp::UNIX_EPOCH)
             .expect("few paths");
-        let sweep = Sweep::of(&scan).expect("a sweep");
+        let sweep = Sweep::from_scan(&scan).expect("a sweep");
         for (beam, assessment) in sweep.beams.iter().zip(prediction.assess(&sweep)) {
             let Some(kind) = kind(&scan.pings[beam.index as usize]) else { continue };
             let [all, trusted] = &mut counts[number / 50][kind];

@@ -218,7 +218,7 @@ mod tests {
             .iter()
             .map(|&[ax, ay, bx, by]| (DVec2::new(ax, ay), DVec2::new(bx, by)))
             .collect();
-        Mesh::new(&Arrangement::of(&segments), HashMap::new(), &[], 10.0).expect("walls")
+        Mesh::new(&Arrangement::from_segments(&segments), HashMap::new(), &[], 10.0).expect("walls")
     }
 
     #[test]

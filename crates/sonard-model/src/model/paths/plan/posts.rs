@@ -77,7 +77,7 @@ mod tests {
         let wave_number_per_m = std::f64::consts::TAU * 49_400.0 / 343.2;
         let taken = |others: &[PlanCircle], walls: &[(DVec2, DVec2)]| {
             let mut circles = [&[thin(0.0, 0.004)], others].concat();
-            let mut plan = Arrangement::of(walls);
+            let mut plan = Arrangement::from_segments(walls);
             let posts = extract_posts(&mut plan, &mut circles, wave_number_per_m);
             for post in &posts {
                 assert_eq!(

@@ -6,7 +6,7 @@ use std::f64::consts::TAU;
 use smallvec::SmallVec;
 
 use crate::{
-    acoustics::edge::{MOST_WAVELENGTHS, Strip},
+    acoustics::edge::{MAX_WAVELENGTHS, Strip},
     geometry::{Arrangement, DVec2, turn_rad},
 };
 
@@ -32,7 +32,7 @@ pub(crate) fn extract_strips(
     lets_pass: impl Fn(u32) -> bool,
     wave_number_per_m: f64,
 ) -> Vec<PlanStrip> {
-    let max_m = TAU * MOST_WAVELENGTHS / wave_number_per_m;
+    let max_m = TAU * MAX_WAVELENGTHS / wave_number_per_m;
     let chains = Chains::new(plan);
     let mut taken = vec![false; plan.pieces.len()];
     let mut strips = Vec::new();
