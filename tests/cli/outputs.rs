@@ -230,7 +230,7 @@ fn pictures_replace_pictures_only() {
         ("room.svg", SCENE, "a scene"),
         ("thesis.svg", "\\documentclass{book}\n", "text"),
         ("plan.png", "[plan]\nstep_deg = 1\n", "TOML"),
-        ("a2.png", "<svg xmlns=\"http://www.w3.org/2000/svg\"/>", "an SVG picture"),
+        ("a2.png", "<svg xmlns=\"http://www.w3.org/2000/svg\"/>", "an SVG image"),
     ] {
         fs::write(place(name), content).expect("writable");
         let refused = draw(name, "");

@@ -85,6 +85,6 @@ fn no_reply_and_foreign_device() {
         }
     });
     let arguments = ["scan", "--port", &path, "--scene", "simple-room", "--pose", "fig9"];
-    check(&arguments, 3, &["no frame", "not a sonard device"]);
+    check(&arguments, 3, &["no valid frame", "not a sonard device"]);
     talking.join().expect("talks");
 }

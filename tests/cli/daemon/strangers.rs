@@ -70,7 +70,7 @@ fn named_board_is_required() {
     daemon.wait_for("wrong_device");
     daemon.wait_until("the name", || {
         let trouble = daemon.status()["link"]["trouble"].clone();
-        trouble.as_str().is_some_and(|trouble| trouble.contains("not MOCK-00001"))
+        trouble.as_str().is_some_and(|trouble| trouble.contains("expected MOCK-00001"))
     });
     daemon.pass(std::time::Duration::from_secs(1));
     daemon.stop();
