@@ -24,7 +24,18 @@ const OPENINGS: [&str; 25] = [
     "Such", "Nothing",
 ];
 /// Folders without texts of the project.
-const SKIPPED: [&str; 6] = ["target", ".git", "node_modules", "fixtures", "data", "corpus"];
+const SKIPPED: [&str; 10] = [
+    "target",
+    "node_modules",
+    "fixtures",
+    "data",
+    "corpus",
+    "artifacts",
+    "build",
+    "dist",
+    "venv",
+    "__pycache__",
+];
 /// The glossary itself has the words that it replaces, and so has this test.
 const EXEMPT: [&str; 3] =
     ["docs/glossary.md", "docs/wording-allowed.txt", "crates/sonard-model/tests/wording.rs"];

@@ -17,6 +17,8 @@ pub const MAX_WIDTH_PX: u32 = 16_384;
 #[derive(Debug, Clone)]
 pub struct Picture {
     document: svg::Document,
+    /// Height per width.
+    aspect: f64,
 }
 
 /// Failure of the conversion to PNG.
@@ -48,12 +50,14 @@ impl Picture {
             .set("width", width_px)
             .set("height", height_px)
             .set("fill", theme::PAPER);
-        Self { document: document(width_px, height_px).add(page).add(content.into_group()) }
+        let document = document(width_px, height_px).add(page).add(content.into_group());
+        Self { document, aspect: height_px / width_px }
     }
 
     /// Picture without a white page, to be drawn over another.
     pub(super) fn without_page(width_px: f64, height_px: f64, content: Layer) -> Self {
-        Self { document: document(width_px, height_px).add(content.into_group()) }
+        let document = document(width_px, height_px).add(content.into_group());
+        Self { document, aspect: height_px / width_px }
     }
 
     /// Formats the picture as an SVG document.
@@ -86,6 +90,11 @@ impl Picture {
         let transform = tiny_skia::Transform::from_scale(scale, scale);
         resvg::render(&tree, transform, &mut pixels.as_mut());
         Ok(pixels)
+    }
+
+    /// Height of the picture per width.
+    pub(super) const fn aspect(&self) -> f64 {
+        self.aspect
     }
 
     /// Draws the picture over pixels, scaled to their width.

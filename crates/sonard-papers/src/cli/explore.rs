@@ -333,7 +333,7 @@ pub(crate) fn write_all(
         (1..=count).filter(|stop| (count - stop).is_multiple_of(every)).collect();
     let bar = progress::bar(frame_stops.len() as u64, "frames");
     let frames = frame_stops.iter().map(|stops| draw(*stops)).inspect(|_| bar.inc(1));
-    let animation = animate(frames, frame_stops.len(), FRAME_PX, FRAME_MS).map_err(reject)?;
+    let animation = animate(frames, FRAME_PX, FRAME_MS).map_err(reject)?;
     bar.finish_and_clear();
     save("exploration.apng", &animation)
 }
