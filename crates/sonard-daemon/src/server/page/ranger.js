@@ -2,7 +2,7 @@
 
 import { Handle } from "./drag-handles.js";
 
-/** @import { Pose } from "../../../web/playground/engine.js" */
+/** @import { Pose } from "../../../../../web/playground/engine.js" */
 
 const RAD_PER_DEG = Math.PI / 180;
 /** Distance of the heading handle from the ranger, pixels. */

@@ -2,7 +2,7 @@
 
 import { arrow, drawVertical } from "./layers.js";
 
-/** @import { Beam, Peak, Trace } from "../../../web/playground/engine.js" */
+/** @import { Beam, Peak, Trace } from "../../../../../web/playground/engine.js" */
 
 const LEFT = 44, RIGHT = 10, TOP = 18, BOTTOM = 24;
 const MAX_DB = 6, MIN_DB = -60;
