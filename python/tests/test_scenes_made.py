@@ -163,8 +163,10 @@ def test_map_matches_command(command: Command, tmp_path: Path) -> None:
     pixels[40:45, 10:15] = 205
     folder = write_map(tmp_path / "office", pixels)
     ways: list[dict[str, Any]] = [{}, {"tolerance_m": 0.2, "least_m": 3.0, "reflectance": 0.5, "name": "mine"}]
+    named = {"least_m": "min-length-m"}
     for options in ways:
-        arguments = [part for name, value in options.items() for part in (f"--{name.replace('_', '-')}", value)]
+        flags = {f"--{named.get(name, name.replace('_', '-'))}": value for name, value in options.items()}
+        arguments = [part for flag in flags.items() for part in flag]
         command("scene", "from-grid", folder, *arguments, "-o", tmp_path / "scene.json", "--force")
         expected = (tmp_path / "scene.json").read_text()
         assert sonard.Scene.from_grid(folder, **options).to_json() == expected
