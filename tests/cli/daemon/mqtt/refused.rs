@@ -25,7 +25,7 @@ fn gaps(folder: &std::path::Path) -> Vec<String> {
 #[test]
 fn too_large_record_is_skipped() {
     let folder = tempfile::tempdir().expect("a folder");
-    let broker = Broker::start(Manner::Limited(2000));
+    let broker = Broker::start(Manner::Limited(4000));
     // A session for each file of the log, and one above the limit in each.
     let daemon = start(folder.path(), &broker, &["--set", "log.rotate_mb=0.01"]);
     daemon.wait_for("ready");
@@ -36,7 +36,7 @@ fn too_large_record_is_skipped() {
         wait_until("a connection", || mqtt(&daemon)["connected"] == true);
         mqtt(&daemon)
     };
-    // The first session and the status cost connections until the limit is known; later ones cost none.
+    // The first session costs connections until the limit is known; later ones cost none.
     let first = publish_scans(1, 1);
     publish_scans(2, 3);
     // The report follows the broker with a delay.
