@@ -67,7 +67,7 @@ mod what_if;
 mod worlds;
 
 pub use failure::{Failure, Outcome};
-pub use run::{EmbeddedControl, EmbeddedDaemon};
+pub use run::EmbeddedDaemon;
 
 use std::{process::ExitCode, sync::Arc};
 

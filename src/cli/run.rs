@@ -33,7 +33,7 @@ use crate::{
     server::{Access, Listeners, Server},
     supervisor::{Supervisor, Task},
 };
-pub use embedded::{EmbeddedControl, EmbeddedDaemon};
+pub use embedded::EmbeddedDaemon;
 use files::Files;
 use load::Loader;
 use mock::Mock;
@@ -313,8 +313,7 @@ fn access(
 /// Reloads the configuration at each SIGHUP.
 async fn reload_on_hangup(mut loader: Loader, daemon: Handle, mut hangups: Hangups) {
     while hangups.recv().await.is_some() {
-        let loaded = loader.load().map(|(settings, _)| Box::new(settings));
-        let loaded = loaded.map_err(|failure| load::one_line(&failure));
+        let loaded = loader.reload();
         match &loaded {
             Ok(_) => tracing::info!("configuration reloaded"),
             Err(error) => tracing::error!("configuration unchanged: {error}"),

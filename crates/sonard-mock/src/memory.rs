@@ -2,7 +2,7 @@
 
 use std::{
     io,
-    sync::{Arc, Mutex, PoisonError},
+    sync::{Arc, Mutex, MutexGuard, PoisonError},
     task::{Context, Poll, Waker},
 };
 
@@ -45,7 +45,7 @@ impl MemorySocket {
     /// # Errors
     /// `NotFound` if no board is plugged in, `ResourceBusy` if another host is connected.
     pub fn connect(&self) -> io::Result<DuplexStream> {
-        let mut state = self.shared.state.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut state = self.state();
         if !state.plugged {
             return Err(io::ErrorKind::NotFound.into());
         }
@@ -59,17 +59,21 @@ impl MemorySocket {
         Ok(host)
     }
 
+    /// State of the socket. No code under the lock panics, so a poisoned lock is still consistent.
+    fn state(&self) -> MutexGuard<'_, SocketState> {
+        self.shared.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
     fn set_plugged(&self, plugged: bool) {
-        let mut state = self.shared.state.lock().unwrap_or_else(PoisonError::into_inner);
-        *state = SocketState { plugged, ..SocketState::default() };
+        *self.state() = SocketState { plugged, ..SocketState::default() };
     }
 
     fn take_offered(&self) -> Option<DuplexStream> {
-        self.shared.state.lock().unwrap_or_else(PoisonError::into_inner).offered.take()
+        self.state().offered.take()
     }
 
     fn release(&self) {
-        let mut state = self.shared.state.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut state = self.state();
         state.in_use = state.offered.is_some();
     }
 }

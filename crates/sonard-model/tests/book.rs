@@ -164,7 +164,8 @@ fn named_paths(text: &str) -> Vec<String> {
 #[test]
 fn named_paths_exist() {
     let (mut missing, mut count) = (Vec::new(), 0);
-    for document in pages().into_iter().chain([PathBuf::from("README.md")]) {
+    let outside = ["ARCHITECTURE.md", "CONTRIBUTING.md", "README.md"].map(PathBuf::from);
+    for document in pages().into_iter().chain(outside) {
         for path in named_paths(&text(&document)) {
             count += 1;
             if !root().join(&path).exists() {
@@ -174,6 +175,8 @@ fn named_paths_exist() {
     }
     assert!(missing.is_empty(), "{missing:#?}");
     assert!(count > 60, "{count} paths were found");
+    let stations = named_paths(&text(Path::new("docs/life-of-an-echo.md")));
+    assert!(stations.len() > 20, "the stations name their files");
 }
 
 /// The introduction stays short.

@@ -7,26 +7,24 @@ const MIN_DELAY: Duration = Duration::from_millis(500);
 /// Upper limit of the delay.
 const MAX_DELAY: Duration = Duration::from_secs(30);
 
-/// Delay before the next attempt; doubles with each attempt.
+/// Delay before the next attempt, with jitter.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Backoff(Duration);
+pub(super) struct Backoff(sonard_runtime::backoff::Backoff);
 
 impl Backoff {
     pub(super) const fn new() -> Self {
-        Self(MIN_DELAY)
+        Self(sonard_runtime::backoff::Backoff::new(MIN_DELAY, MAX_DELAY))
     }
 
     /// Returns the next delay. `jitter` (0 to 1) shortens it by up to a half, so that the robots of
     /// a fleet do not reconnect simultaneously.
     pub(super) fn next(&mut self, jitter: f64) -> Duration {
-        let delay = self.0.mul_f64(1.0 - 0.5 * jitter.clamp(0.0, 1.0));
-        self.0 = (self.0 * 2).min(MAX_DELAY);
-        delay
+        self.0.next_wait().mul_f64(1.0 - 0.5 * jitter.clamp(0.0, 1.0))
     }
 
     /// Resets the delay after a successful connection.
     pub(super) const fn reset(&mut self) {
-        self.0 = MIN_DELAY;
+        self.0.reset();
     }
 }
 

@@ -1,6 +1,6 @@
 //! A daemon within another program.
 
-use std::{ffi::OsStr, io, path::PathBuf};
+use std::{io, path::PathBuf};
 
 use axum::Router;
 use clap::{Args as _, Command, FromArgMatches as _};
@@ -9,7 +9,7 @@ use tokio_util::sync::CancellationToken;
 use super::{Args, load::Loader};
 use crate::{
     cli::Failure,
-    daemon::{self, Daemon, Handle, Journal, JournalThread, OpenPort, Order, Resources},
+    daemon::{self, Handle, Journal, OpenPort, Order, Resources},
     host_gpio::NoGpio,
     link::{Holders, LinkError},
     mock::{MemorySocket, MockPort, Note, Pace},
@@ -17,7 +17,7 @@ use crate::{
     supervisor::{Supervisor, Task},
 };
 
-/// A daemon that runs within the calling program: without sockets, signals and messages on standard error.
+/// Controls of a daemon that runs within the calling program: without sockets, signals and messages on standard error.
 ///
 /// Requests go through [`router`](Self::router). The device is a mock in memory (`--mock`), the simulated array of
 /// `--simulate`, or whatever is plugged into [`socket`](Self::socket). A single-threaded tokio runtime with a paused
@@ -30,20 +30,21 @@ pub struct EmbeddedDaemon {
     /// Port that the daemon opens, whatever `device.port` is.
     pub socket: MemorySocket,
     loader: Loader,
-    daemon: Daemon,
-    log: JournalThread,
-    supervisor: Supervisor,
-    mock_stop: CancellationToken,
+    stop: CancellationToken,
 }
 
 impl EmbeddedDaemon {
-    /// Prepares a daemon with the options of `sonard run`. Must be called within a tokio runtime.
+    /// Prepares a daemon with the options of `sonard run`, and the work that the caller runs as a task. Must be called
+    /// within a tokio runtime.
     ///
     /// # Errors
-    /// Those of `sonard run`: wrong options, configuration or files, or a log that can't be written.
-    pub fn from_options<T: AsRef<OsStr>>(options: &[T]) -> Result<Self, Failure> {
+    /// Those of `sonard run`: wrong options, configuration or files, or a log that can't be written. The work returns the
+    /// first failure of a task, or of closing the log.
+    pub fn from_options(
+        options: &[&str],
+    ) -> Result<(Self, impl Future<Output = Result<(), String>> + Send + use<>), Failure> {
         let command = Args::augment_args(Command::new("run").no_binary_name(true));
-        let matches = command.try_get_matches_from(options.iter().map(AsRef::as_ref));
+        let matches = command.try_get_matches_from(options);
         let args = matches.and_then(|matches| Args::from_arg_matches(&matches));
         let args = args.map_err(|error| Failure::input(error, "see `sonard run --help`"))?;
         let (plays_mock, virtual_time, world) = (args.mock, args.virtual_time, args.world.clone());
@@ -83,21 +84,6 @@ impl EmbeddedDaemon {
         };
         let access = Access::new(&keys.server.hosts, files.token.as_deref());
         let server = Server::new(handle.clone(), log_folder, access, &keys, files.fleet);
-        Ok(Self {
-            handle,
-            router: server.router(),
-            socket,
-            loader,
-            daemon,
-            log,
-            supervisor,
-            mock_stop,
-        })
-    }
-
-    /// Separates the daemon's work from what controls it.
-    pub fn split(self) -> (EmbeddedControl, impl Future<Output = Result<(), String>> + Send) {
-        let Self { handle, router, socket, loader, daemon, log, supervisor, mock_stop } = self;
         let stop = CancellationToken::new();
         let stopped = stop.clone().cancelled_owned();
         let work = async move {
@@ -107,23 +93,9 @@ impl EmbeddedDaemon {
             let last = tokio::task::spawn_blocking(|| log.close()).await.unwrap_or_default();
             outcome.and_then(|()| last.error.map_or(Ok(()), Err))
         };
-        (EmbeddedControl { handle, router, socket, loader, stop }, work)
+        Ok((Self { handle, router: server.router(), socket, loader, stop }, work))
     }
-}
 
-/// Controls of an [`EmbeddedDaemon`] that runs.
-pub struct EmbeddedControl {
-    /// Handle for orders and state.
-    pub handle: Handle,
-    /// HTTP API.
-    pub router: Router,
-    /// Port that the daemon opens.
-    pub socket: MemorySocket,
-    loader: Loader,
-    stop: CancellationToken,
-}
-
-impl EmbeddedControl {
     /// Ends the daemon in order: motor stopped, scan closed, log synced.
     pub fn stop(&self) {
         self.stop.cancel();
@@ -134,9 +106,7 @@ impl EmbeddedControl {
     /// # Errors
     /// A daemon that is stopping takes no configuration. A configuration with errors is reported by the daemon.
     pub async fn reload(&mut self) -> Result<(), String> {
-        let loaded = self.loader.load().map(|(settings, _files)| Box::new(settings));
-        let loaded = loaded.map_err(|failure| super::load::one_line(&failure));
-        let ordered = self.handle.order(Order::Reload(loaded)).await;
+        let ordered = self.handle.order(Order::Reload(self.loader.reload())).await;
         ordered.map_err(|refusal| refusal.message)
     }
 }

@@ -83,6 +83,12 @@ impl Loader {
         Ok((settings, files))
     }
 
+    /// Reads the configuration for a daemon that runs; a failure is one line.
+    pub(super) fn reload(&mut self) -> Result<Box<Settings>, String> {
+        let loaded = self.load().map(|(settings, _files)| Box::new(settings));
+        loaded.map_err(|failure| one_line(&failure))
+    }
+
     fn layers(&self) -> Result<Layers, Failure> {
         let mut layers = Layers::<Keys>::new();
         let (file, requested) = match &self.args.config {
@@ -250,7 +256,7 @@ pub(super) fn effective_configuration(settings: &Settings) -> String {
 }
 
 /// Formats a failure on one line.
-pub(super) fn one_line(failure: &Failure) -> String {
+fn one_line(failure: &Failure) -> String {
     match failure {
         Failure::Found(text) => text.clone().unwrap_or_default(),
         Failure::Input(report) | Failure::Device(report) => match report.help() {

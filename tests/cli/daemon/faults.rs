@@ -4,11 +4,11 @@ use std::time::Duration;
 
 use serde_json::json;
 use sonard::mock::Pace;
-use sonard_test_support::in_process::{Daemon as InProcess, RIG_OPTIONS};
+use sonard_test_support::in_process::Daemon as InProcess;
 
 use super::{
     Daemon, clean_log, logs,
-    rig::{Rig, limit_files},
+    rig::{self, Rig, limit_files},
 };
 use crate::common::wait_until;
 
@@ -86,7 +86,7 @@ fn port_and_device_faults() {
 fn other_ranger_is_rejected() {
     let folder = tempfile::tempdir().expect("a folder");
     let serial = ["--set", "device.serial=SONARD-0007"];
-    let mut daemon = InProcess::start(folder.path(), &[&RIG_OPTIONS[..], &serial].concat());
+    let mut daemon = InProcess::start(folder.path(), &[&rig::OPTIONS[..], &serial].concat());
     daemon.plug("", 1);
     daemon.wait_for("wrong_device");
     let trouble = daemon.status()["link"]["trouble"].clone();

@@ -3,14 +3,14 @@
 use std::collections::BTreeSet;
 
 use serde_json::Value;
-use sonard_test_support::in_process::{Daemon, RIG_OPTIONS};
+use sonard_test_support::{in_process::Daemon, rig};
 
 use super::clean_log;
 use crate::common::Log;
 
 /// A continuously scanning daemon with a board that has faults.
 fn start(folder: &std::path::Path, faults: &str, further: &[&str]) -> Daemon {
-    let options = [&RIG_OPTIONS[..], &["--set", "scanning.mode=continuous"], further].concat();
+    let options = [&rig::OPTIONS[..], &["--set", "scanning.mode=continuous"], further].concat();
     let mut daemon = Daemon::start(folder, &options);
     daemon.plug(faults, 1);
     daemon

@@ -22,6 +22,12 @@ use uuid::Uuid;
 
 use crate::{Log, run, sonard, stderr, wait_until};
 
+/// Options of a mock in the simple room.
+pub(crate) const MOCK: [&str; 5] = ["--mock", "--scene", "simple-room", "--pose", "fig9"];
+/// Options of a simulated array of eight rangers in the laboratory.
+pub(crate) const ARRAY: [&str; 7] =
+    ["--simulate", "--array", "pioneer-8", "--scene", "mcgill-lab", "--pose", "fig4"];
+
 /// A `sonard run` with a folder of its own.
 pub struct Daemon {
     pub child: Child,
@@ -51,8 +57,7 @@ impl Daemon {
 
     /// The same with a mock in the simple room, in real time.
     pub fn start_mock(folder: &Path, further: &[&str]) -> Self {
-        let mock = ["--mock", "--scene", "simple-room", "--pose", "fig9"];
-        Self::start(folder, &[&mock, further].concat())
+        Self::start(folder, &[&MOCK[..], further].concat())
     }
 
     /// The same by a command that ends in the program.
@@ -189,8 +194,7 @@ pub fn start_ahead(folder: &Path, further: &[&str]) -> Daemon {
 
 /// Eight sonars of the model in the laboratory, standing.
 pub fn start_array(folder: &Path, further: &[&str]) -> Daemon {
-    let array = ["--simulate", "--array", "pioneer-8", "--scene", "mcgill-lab", "--pose", "fig4"];
-    Daemon::start(folder, &[&array, further].concat())
+    Daemon::start(folder, &[&ARRAY[..], further].concat())
 }
 
 /// A log of so many scans, ten seconds apart, each of so many beams.

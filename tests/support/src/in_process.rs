@@ -16,32 +16,17 @@ use axum::{
 use http_body_util::BodyExt as _;
 use serde_json::Value;
 use sonard::{
-    cli::{EmbeddedControl, EmbeddedDaemon},
+    cli::EmbeddedDaemon,
     mock::{MockPort, Pace},
     server::Peer,
 };
 use tokio::{runtime::Runtime, sync::oneshot, task::JoinHandle, time::sleep};
 use tower::ServiceExt as _;
 
-use crate::{daemon::Reply, rig};
-
-/// Options for a daemon whose boards are plugged in by [`Daemon::plug`].
-pub const RIG_OPTIONS: [&str; 14] = [
-    "--scene",
-    "simple-room",
-    "--pose",
-    "fig9",
-    "--set",
-    "model.max_range_m=3",
-    "--set",
-    "link.attempts=3",
-    "--set",
-    "link.retry_min_s=0.05",
-    "--set",
-    "link.retry_max_s=0.4",
-    "--set",
-    "link.check_s=0.3",
-];
+use crate::{
+    daemon::{ARRAY, MOCK, Reply},
+    rig,
+};
 
 /// Simulated time that passes before each request.
 const STEP: Duration = Duration::from_millis(20);
@@ -50,10 +35,10 @@ const REAL_STEP: Duration = Duration::from_micros(300);
 /// Simulated time after which a wait fails.
 const LIMIT: Duration = Duration::from_secs(120);
 
-/// An [`EmbeddedDaemon`] with a folder of its own.
+/// An [`EmbeddedDaemon`] with its runtime and a folder of its own.
 pub struct Daemon {
     pub folder: PathBuf,
-    pub control: EmbeddedControl,
+    pub control: EmbeddedDaemon,
     runtime: Runtime,
     running: JoinHandle<Result<(), String>>,
     boots: u16,
@@ -72,9 +57,9 @@ impl Daemon {
         let log = folder.join("log");
         let log = ["--log", log.to_str().expect("plain path")];
         let context = runtime.enter();
-        let daemon = EmbeddedDaemon::from_options(&[&log, options].concat());
-        let daemon = daemon.unwrap_or_else(|failure| panic!("the daemon starts: {failure:?}"));
-        let (control, work) = daemon.split();
+        let prepared = EmbeddedDaemon::from_options(&[&log, options].concat());
+        let (control, work) =
+            prepared.unwrap_or_else(|failure| panic!("the daemon starts: {failure:?}"));
         let running = runtime.spawn(work);
         drop(context);
         Self { folder: folder.into(), control, runtime, running, boots: 0, board: None }
@@ -82,8 +67,7 @@ impl Daemon {
 
     /// Starts a daemon with a mock in the simple room.
     pub fn start_mock(folder: &Path, options: &[&str]) -> Self {
-        let mock = ["--mock", "--scene", "simple-room", "--pose", "fig9"];
-        Self::start(folder, &[&mock, options].concat())
+        Self::start(folder, &[&MOCK[..], options].concat())
     }
 
     /// Plugs a board of the simple room into the daemon's port, in place of an earlier one.
@@ -215,6 +199,5 @@ impl Daemon {
 
 /// Starts a simulated array of eight rangers in the laboratory.
 pub fn start_array(folder: &Path, options: &[&str]) -> Daemon {
-    let array = ["--simulate", "--array", "pioneer-8", "--scene", "mcgill-lab", "--pose", "fig4"];
-    Daemon::start(folder, &[&array, options].concat())
+    Daemon::start(folder, &[&ARRAY[..], options].concat())
 }

@@ -17,6 +17,24 @@ use sonard::{
 };
 use tokio::{runtime::Runtime, sync::oneshot, task::JoinHandle};
 
+/// Options of a daemon that tries again soon when its board is away.
+pub const OPTIONS: [&str; 14] = [
+    "--scene",
+    "simple-room",
+    "--pose",
+    "fig9",
+    "--set",
+    "model.max_range_m=3",
+    "--set",
+    "link.attempts=3",
+    "--set",
+    "link.retry_min_s=0.05",
+    "--set",
+    "link.retry_max_s=0.4",
+    "--set",
+    "link.check_s=0.3",
+];
+
 /// A stable name, and behind it whatever is plugged in: each time another device.
 pub struct Rig {
     link: PathBuf,
@@ -46,18 +64,7 @@ impl Rig {
     /// Options that let a daemon use this and try again soon.
     pub fn options(&self) -> Vec<String> {
         let port = self.link.display().to_string();
-        let mut options: Vec<String> =
-            ["--port", &port, "--scene", "simple-room", "--pose", "fig9"].map(str::to_owned).into();
-        for setting in [
-            "model.max_range_m=3",
-            "link.attempts=3",
-            "link.retry_min_s=0.05",
-            "link.retry_max_s=0.4",
-            "link.check_s=0.3",
-        ] {
-            options.extend(["--set".to_owned(), setting.to_owned()]);
-        }
-        options
+        [&["--port", &port][..], &OPTIONS].concat().into_iter().map(str::to_owned).collect()
     }
 
     /// Plugs a board in, under a device name that was not there before.
