@@ -10,7 +10,7 @@ use sonard::{
     acoustics::{Air, Sensor},
     geometry::wrap_pi,
     model::{Arrival, EdgeLawKind, EngineOptions, FanOptions, Options, PathOptions, Simulator},
-    plot::{Convergence, badge_of, draw_convergence},
+    plot::{Convergence, badge_for, draw_convergence},
     scan::Provenance,
     scene::{Scene, shipped},
 };
@@ -49,7 +49,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         MAX_RANGE_M[0], MAX_RANGE_M[1]
     )];
     let axes = ["angle between the rays of the fan, degrees", "share of echoes that differ"];
-    let badge = badge_of(Some(Provenance::Simulated));
+    let badge = badge_for(Some(Provenance::Simulated));
     let picture =
         draw_convergence("The fan of rays and the exact paths", badge, &lines, axes, &cases);
     fs::write(target, picture.to_png(1200)?)?;

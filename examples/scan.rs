@@ -19,7 +19,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         let path = reading.arrival.map(|arrival| {
             PathRecord::from_path(simulator.scene(), &arrival.path, arrival.length_m)
         });
-        let way = path.map_or_else(|| "nothing".to_owned(), |path| path.in_words());
+        let way = path.map_or_else(|| "nothing".to_owned(), |path| path.describe());
         println!(
             "{:5.1} deg  {:?}  {:?} m  {way}",
             plan.azimuth_deg(stop),

@@ -8,7 +8,7 @@ use sonard::{
     acoustics::{Air, Sensor},
     geometry::{DVec2, Pose},
     interpret::{
-        Extents, Settings, Sweep,
+        Extents, InterpretSettings, Sweep,
         grid::{BeamModel, GaussianBeam, Grid, GridShape, Trust},
         interpret,
         lines::clusters,
@@ -42,7 +42,7 @@ fn sweeps() -> (Extents, Vec<Sweep>) {
 
 fn interpretation(c: &mut Criterion) {
     let (extents, sweeps) = sweeps();
-    let settings = Settings::default();
+    let settings = InterpretSettings::default();
     let one = [(Uuid::nil(), sweeps[0].clone())];
     c.bench_function("interpret a scan", |b| {
         b.iter(|| interpret(black_box(&one), &extents, &settings));

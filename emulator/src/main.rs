@@ -18,7 +18,7 @@ use rand::{RngExt as _, SeedableRng as _};
 use rand_pcg::Pcg64;
 use sonard_device::link::Pty;
 use sonard_emulator::{Emulator, MotorLimits, serve};
-use sonard_mock::{Soundings, World};
+use sonard_mock::{EchoTable, World};
 use sonard_model::{
     acoustics::{Air, Sensor, TofNoise},
     model::{Options, Simulator},
@@ -182,10 +182,10 @@ fn world(args: &Args) -> Result<World, Box<dyn Error>> {
         args.humidity_percent,
         args.pressure_kpa,
     )?;
-    let noise = TofNoise::of_range_mm(args.noise_mm, air.sound_speed_m_s());
+    let noise = TofNoise::from_range_sigma_mm(args.noise_mm, air.sound_speed_m_s());
     let scene = Arc::new(scene.with_robot_at(&pose));
     let simulator = Simulator::new(scene, sensor, air, Options::default())?;
-    let soundings = Soundings::from_model(
+    let soundings = EchoTable::from_model(
         &simulator,
         &pose,
         args.steps_per_revolution,

@@ -248,7 +248,7 @@ impl Device {
     /// Deadline of the running sweep's lease, ticks; `None` without a sweep. A simulation uses it
     /// to limit jumps of its clock to what the host's timeouts allow.
     #[must_use]
-    pub const fn lease_ends(&self) -> Option<u32> {
+    pub const fn lease_deadline(&self) -> Option<u32> {
         self.timers.lease
     }
 

@@ -19,7 +19,7 @@ fn hold_expires_without_index() {
     sim.idle(4_000_000).expect("no hang");
     assert_eq!(sim.world.coils_released, 0, "the coils carry no current yet");
     let events = sim.run(Command::Home).expect("ends");
-    let rejected = HostError::Refused(NakReason::IndexNotFound);
+    let rejected = HostError::Rejected(NakReason::IndexNotFound);
     assert_eq!(events.last(), Some(&HostEvent::Failed(rejected)));
     sim.idle(10_000_000).expect("no hang");
     assert_eq!(sim.world.coils_released, 1);
@@ -75,7 +75,7 @@ fn hold_expires_without_requests() {
     sim.idle(200_000).expect("no hang");
     assert_eq!(sim.world.coils_released, 1);
     let events = sim.run(Command::MoveTo { step: 3 }).expect("ends");
-    assert_eq!(events.last(), Some(&HostEvent::Failed(HostError::Refused(NakReason::NotHomed))));
+    assert_eq!(events.last(), Some(&HostEvent::Failed(HostError::Rejected(NakReason::NotHomed))));
 }
 
 #[test]
@@ -119,7 +119,7 @@ fn home_clears_emergency_stop() {
     assert_eq!(events.last(), Some(&HostEvent::Failed(HostError::EmergencyStop)));
     assert_eq!(sim.world.coils_released, 1);
     let events = sim.run(Command::Sweep(plan(2, 1))).expect("ends");
-    assert_eq!(events.last(), Some(&HostEvent::Failed(HostError::Refused(NakReason::NotHomed))));
+    assert_eq!(events.last(), Some(&HostEvent::Failed(HostError::Rejected(NakReason::NotHomed))));
     let events = sim.run(Command::Home).expect("ends");
     assert_eq!(events.last(), Some(&HostEvent::Done(Outcome::Homed { drift_steps: 2 })));
     assert_eq!(delivered(&sim.run(Command::Sweep(plan(2, 1))).expect("ends")), 2);

@@ -80,7 +80,7 @@ fn run(seed: u64, tally: &mut Tally) {
         }
     }
     let stats = sim.host.stats();
-    assert_eq!(stats.refused, 0, "a valid reply was rejected");
+    assert_eq!(stats.rejected, 0, "a valid reply was rejected");
     tally.repaired += stats.repaired;
     tally.duplicates += stats.duplicates;
     tally.retries += stats.retries;
@@ -290,7 +290,7 @@ fn only_end(events: &[HostEvent]) -> &HostEvent {
 fn count_failure(end: &HostEvent, tally: &mut Tally) {
     if let HostEvent::Failed(error) = end {
         let name = match error {
-            HostError::Refused(reason) => format!("Refused({reason:?})"),
+            HostError::Rejected(reason) => format!("Refused({reason:?})"),
             other => {
                 let text = format!("{other:?}");
                 text.split([' ', '(', '{']).next().unwrap_or_default().to_string()

@@ -40,10 +40,10 @@ fn rejects_invalid_identity() {
     for (altered, fault) in cases {
         let mut rogue = RogueDevice::new();
         rogue.run(Command::Identify, Reply::Identity(altered));
-        let rejected = HostEvent::Failed(HostError::WrongIdentity(fault));
+        let rejected = HostEvent::Failed(HostError::InvalidIdentity(fault));
         assert_eq!(rogue.events, [rejected], "{altered:?}");
         assert!(rogue.host.identity().is_none());
-        assert_eq!(rogue.host.stats().refused, 1);
+        assert_eq!(rogue.host.stats().rejected, 1);
     }
 }
 
@@ -119,7 +119,7 @@ fn rejects_invalid_beam() {
             .events
             .iter()
             .filter_map(|event| match event {
-                HostEvent::ReadingRefused { reading, fault } => Some((reading.index, *fault)),
+                HostEvent::ReadingRejected { reading, fault } => Some((reading.index, *fault)),
                 _ => None,
             })
             .collect();
@@ -135,7 +135,7 @@ fn rejects_invalid_beam() {
             Some(HostEvent::SweepDone { delivered: 11, end: SweepState::Complete, .. })
         );
         assert!(done, "{name}: {end:?}");
-        assert_eq!((rogue.host.stats().readings, rogue.host.stats().refused), (11, 1));
+        assert_eq!((rogue.host.stats().readings, rogue.host.stats().rejected), (11, 1));
     }
 }
 
@@ -157,11 +157,11 @@ fn rejects_invalid_ping() {
         (Reading { step: 9, ..ping }, Some(wrong(0, 9, Some(0)))),
         (
             Reading { status: ReadingStatus::NoEcho, ..ping },
-            Some(HostError::SenselessReading(ReadingFault::EchoUnexpected { echoes: 1 })),
+            Some(HostError::InvalidReading(ReadingFault::EchoUnexpected { echoes: 1 })),
         ),
         (
             Reading { fired_ticks: BEGAN.wrapping_sub(1), ..ping },
-            Some(HostError::SenselessReading(early)),
+            Some(HostError::InvalidReading(early)),
         ),
     ];
     for (altered, error) in cases {
@@ -185,7 +185,7 @@ fn rejects_invalid_reply() {
     assert_eq!(
         rogue.events,
         [ReplyFault::Drift { drift_steps: 201 }, ReplyFault::Position { step: 2_000_000 }]
-            .map(|fault| HostEvent::Failed(HostError::SenselessReply(fault)))
+            .map(|fault| HostEvent::Failed(HostError::InvalidReply(fault)))
     );
 }
 
@@ -245,7 +245,7 @@ fn stops_device_before_failing() {
                 rogue.wait();
                 rogue.alive(13, SweepState::Running);
             },
-            HostError::SenselessReply(ReplyFault::Progress { fired: 13, sent: 13, beams: 12 }),
+            HostError::InvalidReply(ReplyFault::Progress { fired: 13, sent: 13, beams: 12 }),
         ),
         (
             "a rejection in the middle",
@@ -253,7 +253,7 @@ fn stops_device_before_failing() {
                 rogue.wait();
                 rogue.reply(Reply::Nak { reason: NakReason::Busy });
             },
-            HostError::Refused(NakReason::Busy),
+            HostError::Rejected(NakReason::Busy),
         ),
     ];
     for (name, behaviour, expected) in cases {
@@ -314,7 +314,7 @@ fn fault_flood_keeps_end_event() {
     let mut replies = vec![fault; 200];
     replies.push((header, Reply::Nak { reason: NakReason::MotionFault }));
     rogue.send_all(&replies);
-    let end = HostEvent::Failed(HostError::Refused(NakReason::MotionFault));
+    let end = HostEvent::Failed(HostError::Rejected(NakReason::MotionFault));
     assert_eq!(rogue.events.last(), Some(&end));
 }
 

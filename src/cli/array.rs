@@ -3,7 +3,7 @@
 use std::{fs, io, path::Path};
 
 use super::Failure;
-use crate::array::{ArrayError, Course, RangerArray};
+use crate::array::{ArrayError, RobotCourse, RangerArray};
 
 /// Loads an array from a file, or else from the preset of that name.
 pub(super) fn load_array(name: &str) -> Result<RangerArray, Failure> {
@@ -22,7 +22,7 @@ pub(super) fn load_array(name: &str) -> Result<RangerArray, Failure> {
             ArrayError::UnknownPreset { .. } => {
                 format!("no array file `{name}` and no preset of that name")
             }
-            ArrayError::Form { line, column, field, message } => {
+            ArrayError::Malformed { line, column, field, message } => {
                 format!("{name}:{line}:{column}: {field}: {message}")
             }
             other => format!("{name}: {other}"),
@@ -32,7 +32,7 @@ pub(super) fn load_array(name: &str) -> Result<RangerArray, Failure> {
 }
 
 /// Loads a course from a file of poses.
-pub(super) fn load_course(path: &Path) -> Result<Course, Failure> {
+pub(super) fn load_course(path: &Path) -> Result<RobotCourse, Failure> {
     let name = path.display();
     let text = fs::read_to_string(path).map_err(|error| {
         Failure::input(
@@ -40,7 +40,7 @@ pub(super) fn load_course(path: &Path) -> Result<Course, Failure> {
             "give a text file with one pose per line: {\"x_m\": 1.0, \"y_m\": 2.0, \"heading_deg\": 90.0}",
         )
     })?;
-    Course::from_json_lines(&text).map_err(|error| {
+    RobotCourse::from_json_lines(&text).map_err(|error| {
         let message = format!("{name}:{}: {}", error.line, error.message);
         Failure::input(message, "correct that line")
     })

@@ -25,7 +25,7 @@ use super::{
     worlds::SweepArgs,
 };
 use crate::inverse::{
-    Fit, FitError, Fitted, Found, Group, Progress, Search, Sweep, Told, Watch, World, fit_watched,
+    FitOptions, FitError, FitResult, SearchResult, ParameterGroup, FitProgress, Search, FitSweep, ParameterReport, FitObserver, World, fit_observed,
 };
 use checkpoint::{Checkpoint, Head};
 use diagnosis::diagnose;
@@ -39,7 +39,7 @@ pub(super) struct Args {
     sweeps: SweepArgs,
     /// Parameters to fit, separated by commas
     #[arg(long, value_name = "WHAT", value_delimiter = ',', default_value = "pose,air,threshold")]
-    fit: Vec<Group>,
+    fit: Vec<ParameterGroup>,
     /// Prior standard deviation of a parameter, in its unit (repeatable)
     #[arg(long, value_name = "NAME=SIGMA")]
     prior: Vec<PriorSigma>,
@@ -114,12 +114,12 @@ pub(super) fn run(args: &Args) -> Outcome {
     }
     let (sweeps, world) = read(args, &what_if)?;
     let priors = prior::parameters(&args.fit, &args.prior, &world, sweeps.len())?;
-    let fit = Fit { search: args.search, ..Fit::usual(priors, args.max_initial_error_m) };
+    let fit = FitOptions { search: args.search, ..FitOptions::with_priors(priors, args.max_initial_error_m) };
     let head = Head::new(&world, &sweeps, &fit);
     let open = |out: &OutPath| Checkpoint::open(out, args.overwrite, &head);
     let checkpoint = args.out.as_ref().map(open).transpose()?;
     let fitted = find(&world, &sweeps, &fit, checkpoint.as_ref())?;
-    let lines = fitted.told(&world, &sweeps, &fit);
+    let lines = fitted.report(&world, &sweeps, &fit);
     let diagnoses = diagnose(&world, &sweeps, &fitted);
     if args.json {
         diagnoses.iter().for_each(|diagnosis| notice!("{diagnosis}"));
@@ -134,8 +134,8 @@ pub(super) fn run(args: &Args) -> Outcome {
 }
 
 /// Reads the sweeps and the sensor, air and scene that they share.
-fn read(args: &Args, what_if: &WhatIf) -> Result<(Vec<Sweep>, Arc<World>), Failure> {
-    let (mut sweeps, mut world): (Vec<Sweep>, Option<Arc<World>>) = (Vec::new(), None);
+fn read(args: &Args, what_if: &WhatIf) -> Result<(Vec<FitSweep>, Arc<World>), Failure> {
+    let (mut sweeps, mut world): (Vec<FitSweep>, Option<Arc<World>>) = (Vec::new(), None);
     args.sweeps.for_each(what_if, |log, sweep, of| {
         let saved = world.get_or_insert_with(|| Arc::clone(of));
         if saved.sensor != of.sensor || saved.scene.sha256 != of.scene.sha256 {
@@ -156,10 +156,10 @@ fn read(args: &Args, what_if: &WhatIf) -> Result<(Vec<Sweep>, Arc<World>), Failu
 /// Fits the parameters, resuming from a checkpoint, until done or interrupted.
 fn find(
     world: &World,
-    sweeps: &[Sweep],
-    fit: &Fit,
+    sweeps: &[FitSweep],
+    fit: &FitOptions,
     checkpoint: Option<&Checkpoint>,
-) -> Result<Fitted, Failure> {
+) -> Result<FitResult, Failure> {
     let runtime = runtime::new()?;
     let interrupts = {
         let _within = runtime.enter();
@@ -172,7 +172,7 @@ fn find(
     }
     let bar = progress::spinner(&format!("fitting {} scan(s):", sweeps.len()));
     let watcher = Watcher { bar: bar.clone(), interrupts, checkpoint };
-    let fitted = fit_watched(world, sweeps, fit, saved, &watcher);
+    let fitted = fit_observed(world, sweeps, fit, saved, &watcher);
     bar.finish_and_clear();
     fitted.map_err(|error| failure_from(&error, checkpoint))
 }
@@ -184,18 +184,18 @@ struct Watcher<'a> {
     checkpoint: Option<&'a Checkpoint>,
 }
 
-impl Watch for Watcher<'_> {
-    fn progress(&self, progress: Progress) {
+impl FitObserver for Watcher<'_> {
+    fn progress(&self, progress: FitProgress) {
         self.bar.set_message(progress.to_string());
     }
 
-    fn found(&self, found: &Found) {
+    fn found(&self, found: &SearchResult) {
         if let Some(checkpoint) = self.checkpoint {
             self.bar.suspend(|| checkpoint.save(found));
         }
     }
 
-    fn stops(&self) -> bool {
+    fn is_cancelled(&self) -> bool {
         self.interrupts.happened()
     }
 }
@@ -224,7 +224,7 @@ fn failure_from(error: &FitError, checkpoint: Option<&Checkpoint>) -> Failure {
 }
 
 /// Prints the parameters as a table, followed by the summary.
-fn print(out: &mut impl Write, lines: &[Told], summary: &[String]) -> io::Result<()> {
+fn print(out: &mut impl Write, lines: &[ParameterReport], summary: &[String]) -> io::Result<()> {
     let mut table = Table::new();
     table.load_style(RULED);
     table.set_header(["parameter", "initial", "estimate", "\u{b1}", "95 %", ""]);

@@ -26,8 +26,8 @@ use super::{
 };
 use crate::{
     collect::{
-        ByDaemon, Choices, CollectionKeys, Device, Folder, FolderError, JOURNAL, Journal, Manifest,
-        Plan, verify,
+        RemoteDevice, RunOptions, CollectionKeys, ScanDevice, CollectionFolder, FolderError, JOURNAL, CollectionJournal, CollectionManifest,
+        CollectionPlan, verify_collection,
     },
     config::document,
 };
@@ -157,8 +157,8 @@ pub(super) fn run(args: &Args) -> Outcome {
     })
 }
 
-async fn collect(args: &Args, plan: Plan, device: impl Device, interrupts: Interrupts) -> Outcome {
-    let choices = Choices {
+async fn collect(args: &Args, plan: CollectionPlan, device: impl ScanDevice, interrupts: Interrupts) -> Outcome {
+    let choices = RunOptions {
         accept_changed_plan: args.accept_changed_plan,
         retry_given_up: args.retry_failed,
     };
@@ -169,20 +169,20 @@ async fn collect(args: &Args, plan: Plan, device: impl Device, interrupts: Inter
 /// Finds the daemon, and checks that it can take the plan's scans.
 async fn find_daemon(
     args: &Args,
-    plan: &mut Plan,
+    plan: &mut CollectionPlan,
     interrupts: Interrupts,
-) -> Result<ByDaemon, Failure> {
+) -> Result<RemoteDevice, Failure> {
     let notify = |line: &str| notice!("{line}");
-    let (daemon, status) = ByDaemon::find(args.at.client()?, interrupts, notify).await?;
+    let (daemon, status) = RemoteDevice::open(args.at.client()?, interrupts, notify).await?;
     check_scene(status.scene.as_ref(), &plan.scene)?;
     adopt::adopt(plan, &daemon, &status)?;
     Ok(daemon)
 }
 
 fn verify_folder(root: &Path) -> Outcome {
-    let files = Manifest::read(root).map_err(|error| missing_manifest(root, &error))?.files.len();
+    let files = CollectionManifest::read(root).map_err(|error| missing_manifest(root, &error))?.files.len();
     let bar = ProgressBar::new(files as u64);
-    let verified = verify(root, || bar.inc(1)).map_err(|error| failure_from(&error));
+    let verified = verify_collection(root, || bar.inc(1)).map_err(|error| failure_from(&error));
     bar.finish_and_clear();
     let verified = verified?;
     let counts = &verified.manifest.counts;
@@ -212,17 +212,17 @@ fn missing_manifest(root: &Path, error: &FolderError) -> Failure {
 
 /// Writes report and manifest of a folder, unless a collection is running in it.
 fn write_report(root: &Path) -> Outcome {
-    let folder = Folder::at(root);
+    let folder = CollectionFolder::existing(root);
     if !folder.journal().exists() {
         return Err(Failure::input(
             format!("{} is not a collection: it has no {JOURNAL}", root.display()),
             "give the folder of a collection",
         ));
     }
-    let journal = Journal::open(&folder.journal()).map_err(|error| failure_from(&error))?;
+    let journal = CollectionJournal::open(&folder.journal()).map_err(|error| failure_from(&error))?;
     report::write(&folder, journal.history())?;
     let manifest =
-        Manifest::from_history(&folder, journal.history()).map_err(|error| failure_from(&error))?;
+        CollectionManifest::from_history(&folder, journal.history()).map_err(|error| failure_from(&error))?;
     manifest.write(&folder).map_err(|error| failure_from(&error))
 }
 

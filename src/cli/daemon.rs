@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use super::{Failure, Outcome};
 use crate::{
     client::{Client, ClientError, Endpoint, ScansError},
-    fleet::{Asked, Member, MemberError, check_all, read_members},
+    fleet::{PolledDaemon, Member, MemberError, check_members, read_members},
     scan::SceneRef,
     scene::Scene,
     server::read_token,
@@ -75,7 +75,7 @@ pub(super) struct DaemonsArgs {
 /// Daemons selected by the options.
 pub(super) enum Daemons {
     One(Client),
-    Several(Vec<Asked>),
+    Several(Vec<PolledDaemon>),
 }
 
 impl DaemonsArgs {
@@ -93,7 +93,7 @@ impl DaemonsArgs {
     }
 
     /// Returns all selected daemons with their configuration, even if there is only one.
-    pub(super) fn each(&self) -> Result<Vec<Asked>, Failure> {
+    pub(super) fn each(&self) -> Result<Vec<PolledDaemon>, Failure> {
         let wrong = |error: MemberError| Failure::input(&error, &error.help);
         if let Some(file) = &self.fleet {
             return connect_all(read_members(file).map_err(wrong)?);
@@ -101,22 +101,22 @@ impl DaemonsArgs {
         let (socket, address) = (self.socket.as_slice(), self.address.as_slice());
         // A single socket may be the default, which addresses replace.
         let sockets = if socket.len() > 1 || address.is_empty() { socket } else { &[] };
-        let sockets = sockets.iter().map(|path| Ok(Member::at_socket(path.clone())));
+        let sockets = sockets.iter().map(|path| Ok(Member::from_socket(path.clone())));
         let members = sockets.chain(address.iter().map(|address| Member::parse(address)));
         let members: Result<Vec<_>, _> = members.collect();
         let with_token = |member: Member| Member { token_file: self.token_file.clone(), ..member };
         let members = members.map_err(wrong)?.into_iter().map(with_token).collect();
-        connect_all(check_all(members).map_err(wrong)?)
+        connect_all(check_members(members).map_err(wrong)?)
     }
 }
 
 /// Creates a client for each daemon, with its token.
-pub(super) fn connect_all(members: Vec<Member>) -> Result<Vec<Asked>, Failure> {
+pub(super) fn connect_all(members: Vec<Member>) -> Result<Vec<PolledDaemon>, Failure> {
     let connect_all = members.into_iter().map(|member| {
-        let by_tcp = matches!(member.place, Endpoint::Address(_));
+        let by_tcp = matches!(member.endpoint, Endpoint::Address(_));
         let file = member.token_file.as_deref().filter(|_| by_tcp);
-        let client = Client::new(member.place.clone(), file.map(token).transpose()?);
-        Ok(Asked { member, client })
+        let client = Client::new(member.endpoint.clone(), file.map(token).transpose()?);
+        Ok(PolledDaemon { member, client })
     });
     connect_all.collect()
 }
@@ -136,7 +136,7 @@ pub(super) fn failure_from(error: &ClientError) -> Failure {
 /// Converts the error of requested scans that ended early.
 pub(super) fn scans_failure(error: &ScansError) -> Failure {
     match error {
-        ScansError::Forgotten(_) => Failure::Found(Some(error.to_string())),
+        ScansError::Cancelled(_) => Failure::Found(Some(error.to_string())),
         other => Failure::device(other, other.help()),
     }
 }

@@ -10,7 +10,7 @@ mod report;
 mod tap;
 
 use super::{Failure, Outcome, runtime};
-use crate::link::{self, Candidate};
+use crate::link::{self, SerialPortInfo};
 use report::Report;
 
 /// Options of `sonard doctor`.
@@ -63,7 +63,7 @@ usage, 3 no port, no board or no link to it.";
 pub(super) fn run(args: &Args) -> Outcome {
     let Some(port) = &args.port else {
         let candidates =
-            link::candidates().map_err(|error| Failure::device(&error, error.help()))?;
+            link::list_ports().map_err(|error| Failure::device(&error, error.help()))?;
         return list(&candidates, args.json);
     };
     let report = runtime::run_interruptible(async |interrupts| {
@@ -73,12 +73,12 @@ pub(super) fn run(args: &Args) -> Outcome {
     report.outcome()
 }
 
-fn list(candidates: &[Candidate], json: bool) -> Outcome {
+fn list(candidates: &[SerialPortInfo], json: bool) -> Outcome {
     if json {
         let text = serde_json::json!({ "port": null, "candidates": candidates }).to_string();
         print_line!("{text}");
     } else {
-        for Candidate { port, id, usb } in candidates {
+        for SerialPortInfo { port, id, usb } in candidates {
             let name = id.as_deref().unwrap_or(port);
             let path = id.as_ref().map_or_else(String::new, |_| format!("  ({port})"));
             let usb = usb.as_ref().map_or_else(String::new, |usb| format!("  {usb}"));

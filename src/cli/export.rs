@@ -17,7 +17,7 @@ use super::{
 use crate::{
     collect::SCANS,
     export::{
-        CsvExport, Export, ExportError, LogFile, McapExport, ParquetExport, Profile, Settings,
+        CsvExport, Export, ExportError, AttachedLog, McapExport, ParquetExport, Profile, ExportSettings,
     },
 };
 
@@ -168,16 +168,16 @@ impl RecordingArgs {
     const NONE: Self =
         Self { profile: None, field_of_view_deg: None, frame: None, without_log: false };
 
-    fn settings(&self) -> Settings {
-        let by_default = Settings::default();
-        Settings {
+    fn settings(&self) -> ExportSettings {
+        let by_default = ExportSettings::default();
+        ExportSettings {
             profile: match self.profile {
                 Some(ProfileName::Nav2) => Profile::Nav2,
                 Some(ProfileName::Rep117) | None => Profile::Rep117,
             },
             field_of_view_deg: self.field_of_view_deg,
             frame: self.frame.clone().unwrap_or(by_default.frame),
-            ..Settings::default()
+            ..ExportSettings::default()
         }
     }
 }
@@ -293,7 +293,7 @@ fn attach(export: &mut dyn Export, log: &Path, name: &str) -> Result<(), ExportF
     let (mut file, bytes, written) =
         opened.map_err(|source| ExportError::Attach { name: log.display().to_string(), source })?;
     let written = Timestamp::try_from(written).unwrap_or(Timestamp::UNIX_EPOCH);
-    Ok(export.attach(&LogFile { name, bytes, written }, &mut file)?)
+    Ok(export.attach(&AttachedLog { name, bytes, modified: written }, &mut file)?)
 }
 
 /// Name of a log in the export: its file name, preceded by the robot's folder if the log is from a

@@ -4,7 +4,7 @@ use std::{io, process::ExitCode};
 
 use miette::Report;
 
-use crate::{collect::Halt, scan::SinkError};
+use crate::{collect::CollectError, scan::SinkError};
 
 /// Result of a verb.
 pub type Outcome = Result<(), Failure>;
@@ -63,23 +63,23 @@ impl From<SinkError> for Failure {
     }
 }
 
-impl From<Halt> for Failure {
-    fn from(halt: Halt) -> Self {
+impl From<CollectError> for Failure {
+    fn from(halt: CollectError) -> Self {
         match halt {
-            Halt::Stopped(why) => Self::Found(Some(why)),
-            Halt::Wrong { message, help } => Self::input(message, help),
-            Halt::Failed { message, help } => Self::device(message, help),
+            CollectError::Stopped(why) => Self::Found(Some(why)),
+            CollectError::Invalid { message, help } => Self::input(message, help),
+            CollectError::Failed { message, help } => Self::device(message, help),
         }
     }
 }
 
 /// Errors of verbs used by a collection.
-impl From<Failure> for Halt {
+impl From<Failure> for CollectError {
     fn from(failure: Failure) -> Self {
         let help = |report: &Report| report.help().map(|help| help.to_string()).unwrap_or_default();
         match failure {
             Failure::Found(why) => Self::Stopped(why.unwrap_or_default()),
-            Failure::Input(report) => Self::wrong(&report, help(&report)),
+            Failure::Input(report) => Self::invalid(&report, help(&report)),
             Failure::Device(report) => Self::failed(&report, help(&report)),
         }
     }

@@ -14,7 +14,7 @@ use super::{
     picture,
 };
 use crate::{
-    export::{self, ExportError, Findings},
+    export::{self, ExportError, PlaceFindings},
     interpret::{Feature, grid::Grid, lines::MapLine},
     plot::{MAX_WIDTH_PX, Picture},
     scan::{Provenance, ScanView},
@@ -81,7 +81,7 @@ impl FindingTargets<'_> {
     /// Writes all outputs; the picture is drawn only if needed.
     pub(super) fn write(
         &self,
-        place: &Findings<'_>,
+        place: &PlaceFindings<'_>,
         picture: impl FnOnce() -> Result<Picture, Failure>,
     ) -> Outcome {
         let has_picture = self.all.iter().any(|target| matches!(target, Target::Picture(_)));
@@ -106,7 +106,7 @@ pub(super) fn write(
     path: &Path,
     product: Product,
     overwrite: Overwrite,
-    place: &Findings<'_>,
+    place: &PlaceFindings<'_>,
 ) -> Outcome {
     let mut stream = overwrite.begin(path, product)?;
     let written = match product {
@@ -148,9 +148,9 @@ impl ScanOrigin {
         grid: Option<&'a Grid>,
         lines: &'a [MapLine],
         features: &'a [Feature],
-    ) -> Findings<'a> {
+    ) -> PlaceFindings<'a> {
         let Self { time, provenance, scene } = self;
-        Findings {
+        PlaceFindings {
             time: *time,
             provenance: *provenance,
             scene: scene.as_deref(),

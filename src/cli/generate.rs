@@ -17,7 +17,7 @@ use super::{
 };
 use crate::{
     dataset::{DataSet, DataSetError, PartOutcome},
-    generate::{Generator, Manifest, Part, Table},
+    generate::{Generator, DataSetManifest, SetPart, ShardTable},
 };
 
 /// Options of `sonard generate`.
@@ -34,7 +34,7 @@ pub(super) struct Args {
     /// Part of the set to make: every N-th shard starting from the I-th, I from 1 [default: from an
     /// array job's environment, else all]
     #[arg(long, value_name = "I/N", conflicts_with = "instead")]
-    shard: Option<Part>,
+    shard: Option<SetPart>,
     /// Print an example file with all keys explained, and exit; a specification
     #[arg(long)]
     example: bool,
@@ -105,7 +105,7 @@ pub(super) fn run(args: &Args) -> Outcome {
 }
 
 fn read(path: &Path) -> Result<Generator, Failure> {
-    DataSet::read_specification(path, &register_input).map_err(|error| match error.of_disk() {
+    DataSet::read_specification(path, &register_input).map_err(|error| match error.io_error() {
         Some(_) => {
             let help = "give a readable specification: `sonard generate --example` prints one";
             Failure::input(&error, help)
@@ -115,7 +115,7 @@ fn read(path: &Path) -> Result<Generator, Failure> {
 }
 
 fn failure_from(error: &DataSetError) -> Failure {
-    match error.of_disk() {
+    match error.io_error() {
         Some(disk) if !is_wrong_place(disk) => Failure::device(error, error.help()),
         _ => Failure::input(error, error.help()),
     }
@@ -135,15 +135,15 @@ fn describe_size(generator: &Generator) -> String {
     )
 }
 
-fn make(generator: &Generator, out: &Path, part: Part) -> Outcome {
+fn make(generator: &Generator, out: &Path, part: SetPart) -> Outcome {
     let set = DataSet::open(out, generator).map_err(|error| failure_from(&error))?;
     let shards = part.shards(generator.spec().set.shards).count() as u64;
     let bar = progress::bar(generator.readings() * shards, "readings");
-    let made = set.make_part(part, &|readings| bar.inc(readings));
+    let made = set.generate_part(part, &|readings| bar.inc(readings));
     bar.finish_and_clear();
-    let PartOutcome { made, were_there } = made.map_err(|error| failure_from(&error))?;
+    let PartOutcome { generated: made, existed: were_there } = made.map_err(|error| failure_from(&error))?;
     notice!("{made} shards made, {were_there} already complete");
-    match set.seal().map_err(|error| failure_from(&error))? {
+    match set.write_manifest().map_err(|error| failure_from(&error))? {
         Some(manifest) => notice!("{}: {}", out.display(), describe_complete(&manifest)),
         None => {
             let missing = set.missing().map_err(|error| failure_from(&error))?;
@@ -155,9 +155,9 @@ fn make(generator: &Generator, out: &Path, part: Part) -> Outcome {
 }
 
 /// Describes a complete set in one line.
-fn describe_complete(manifest: &Manifest) -> String {
+fn describe_complete(manifest: &DataSetManifest) -> String {
     let totals = &manifest.totals;
-    let readings = totals.rows.get(&Table::Readings).copied().unwrap_or_default();
+    let readings = totals.rows.get(&ShardTable::Readings).copied().unwrap_or_default();
     let redrawn = &totals.redrawn;
     format!(
         "complete: {} shards, {readings} readings, {:.2} bytes per reading; redrawn: {} poses, {} pieces of furniture, {} \
@@ -175,11 +175,11 @@ fn describe_complete(manifest: &Manifest) -> String {
 const MAX_LISTED: usize = 20;
 
 fn verify(folder: &Path, recheck: u32) -> Outcome {
-    let generator = DataSet::specification(folder).map_err(|error| match error.of_disk() {
+    let generator = DataSet::specification(folder).map_err(|error| match error.io_error() {
         Some(_) => Failure::input(&error, "give the folder of a data set, with its spec.json"),
         None => failure_from(&error),
     })?;
-    let set = DataSet::at(folder, &generator);
+    let set = DataSet::existing(folder, &generator);
     let shards = generator.spec().set.shards;
     let all: Vec<u32> = (1..=shards).collect();
     let bar = progress::bar(shards.into(), "shards");
@@ -199,7 +199,7 @@ fn verify(folder: &Path, recheck: u32) -> Outcome {
         let bar = progress::bar(generator.readings() * sample.len() as u64, "readings");
         let drawn: Result<Vec<_>, _> = sample
             .par_iter()
-            .map(|shard| set.check_again(*shard, &|readings| bar.inc(readings)))
+            .map(|shard| set.check_regenerated(*shard, &|readings| bar.inc(readings)))
             .collect();
         bar.finish_and_clear();
         problems.extend(drawn.map_err(|error| failure_from(&error))?.into_iter().flatten());

@@ -27,7 +27,7 @@ use crate::{
     acoustics::{Air, Sensor},
     array::RangerArray,
     geometry::Pose,
-    import::{ImportError, Imported, Mapping, Source, Taken},
+    import::{ImportError, Imported, Mapping, ImportSource, Assumptions},
     plot::draw_scans,
     scan::{ImportRef, Provenance, Record, ScanView, Session},
     scene::{Scene, parse_pose},
@@ -137,7 +137,7 @@ pub(super) fn run(args: &Args) -> Outcome {
             None => bag::concatenate(&files)?,
         })
     };
-    let mut found = Source { open: &open }.examine(mapping, taken).map_err(failure_from)?;
+    let mut found = ImportSource { open: &open }.examine(mapping, taken).map_err(failure_from)?;
     if let Some(sha256) =
         bag::digest_of_databases(&files).map_err(|error| failure_from(error.into()))?
     {
@@ -232,7 +232,7 @@ const PICTURE_WIDTH_PX: u32 = 1000;
 
 /// Prints assumptions, omissions and counts on standard error.
 fn report(args: &Args, found: &Imported, scans: u64) {
-    if found.guessed && !found.mapping.columns.is_empty() {
+    if found.is_inferred && !found.mapping.columns.is_empty() {
         let fields = found.mapping.columns.iter();
         let fields: Vec<_> = fields.map(|(field, column)| format!("{column} -> {field}")).collect();
         notice!("columns: {}", fields.join(", "));
@@ -282,7 +282,7 @@ fn taken(
     array: Option<RangerArray>,
     sensor: &Sensor,
     air: &Air,
-) -> Result<Taken, Failure> {
+) -> Result<Assumptions, Failure> {
     let origin = Pose { x_m: 0.0, y_m: 0.0, heading_deg: 0.0 };
     let pose = match (&args.pose, scene) {
         (Some(pose), Some(scene)) => scene_file::pose(scene, pose)?,
@@ -291,16 +291,16 @@ fn taken(
         }
         (None, _) => origin,
     };
-    Ok(Taken {
+    Ok(Assumptions {
         sha256: String::new(),
         pose,
         array,
         sensor: sensor.name.clone(),
-        longest_m: sensor.max_range_m,
-        least_m: min_range_m(sensor, air),
+        max_range_m: sensor.max_range_m,
+        min_range_m: min_range_m(sensor, air),
         air: *air,
         started: started(&args.file),
-        as_said: args.no_unit_check,
+        skip_checks: args.no_unit_check,
     })
 }
 

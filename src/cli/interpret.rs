@@ -18,7 +18,7 @@ use super::{
     sweeps::for_each_sweep,
 };
 use crate::{
-    interpret::{Extents, Feature, FeatureKind, Noise, Settings, interpret},
+    interpret::{Extents, Feature, FeatureKind, Noise, InterpretSettings, interpret},
     plot::draw_features,
     scan::ScanView,
 };
@@ -42,7 +42,7 @@ pub(super) struct Args {
     scene: Option<PathBuf>,
     /// Strength of an edge's echo, sigma_E; determines the boundary between edges and other
     /// features
-    #[arg(long, value_name = "S", default_value_t = Settings::default().sigma_e, value_parser = positive)]
+    #[arg(long, value_name = "S", default_value_t = InterpretSettings::default().sigma_e, value_parser = positive)]
     sigma_e: f64,
     /// Maximum deviation of a reading from the mean of its arc, millimetres
     #[arg(long, value_name = "MM", default_value_t = 10.0, value_parser = positive)]
@@ -57,7 +57,7 @@ pub(super) struct Args {
     #[arg(long, value_name = "DEG", default_value_t = 0.0, value_parser = not_negative)]
     heading_sigma_deg: f64,
     /// Minimum probability of a reported feature
-    #[arg(long, value_name = "P", default_value_t = Settings::default().min_confidence, value_parser = probability)]
+    #[arg(long, value_name = "P", default_value_t = InterpretSettings::default().min_confidence, value_parser = probability)]
     min_confidence: f64,
 }
 
@@ -108,7 +108,7 @@ fn classify(args: &Args) -> Result<(Vec<ScanView>, Vec<Feature>), Failure> {
     let (mut scans, mut sweeps) = (Vec::new(), Vec::new());
     let mut of_arrays = 0;
     for_each_sweep(&args.logs, |scan, sweep| {
-        if scan.is_of_array() {
+        if scan.is_array_scan() {
             of_arrays += 1;
             return;
         }
@@ -133,15 +133,15 @@ fn classify(args: &Args) -> Result<(Vec<ScanView>, Vec<Feature>), Failure> {
             "interpret the logs of each sensor separately",
         ));
     }
-    let extents = Extents::of_session(&session).map_err(|error| {
+    let extents = Extents::from_session(&session).map_err(|error| {
         Failure::input(format!("session: {error}"), "correct the session's record in the log")
     })?;
     let features = interpret(&sweeps, &extents, &settings(args));
     Ok((scans, features))
 }
 
-fn settings(args: &Args) -> Settings {
-    Settings {
+fn settings(args: &Args) -> InterpretSettings {
+    InterpretSettings {
         sigma_e: args.sigma_e,
         depth_tolerance_m: args.depth_tolerance_mm * 1e-3,
         noise: Noise {
@@ -150,7 +150,7 @@ fn settings(args: &Args) -> Settings {
             heading_deg: args.heading_sigma_deg,
         },
         min_confidence: args.min_confidence,
-        ..Settings::default()
+        ..InterpretSettings::default()
     }
 }
 

@@ -19,7 +19,7 @@ use super::{
     what_if::InsteadArgs,
     worlds::SweepArgs,
 };
-use crate::inverse::{Atlas, Besides, Course, Doubt, Group, Mode, Odometry, World, doubts, locate};
+use crate::inverse::{CoarseGrid, NuisanceEstimate, Tracker, Misfit, ParameterGroup, PoseMode, Odometry, World, diagnose, locate};
 
 /// Options of `sonard locate`.
 #[derive(Debug, clap::Args)]
@@ -32,7 +32,7 @@ pub(super) struct Args {
     spacing_m: Option<f64>,
     /// Parameters to fit, separated by commas
     #[arg(long, value_name = "WHAT", value_delimiter = ',')]
-    fit: Vec<Group>,
+    fit: Vec<ParameterGroup>,
     /// Prior standard deviation of a parameter, in its unit (repeatable)
     #[arg(long, value_name = "NAME=SIGMA", requires = "fit")]
     prior: Vec<PriorSigma>,
@@ -70,7 +70,7 @@ impl CourseArgs {
     /// Returns the odometry model if the scans are consecutive.
     fn odometry(&self) -> Option<Odometry> {
         let &Self { course, drift_m_per_m, drift_deg_per_m, kidnap_probability } = self;
-        course.then_some(Odometry { drift_m_per_m, drift_deg_per_m, carried: kidnap_probability })
+        course.then_some(Odometry { drift_m_per_m, drift_deg_per_m, kidnap_probability })
     }
 }
 
@@ -114,15 +114,15 @@ struct LocatedPose<'a> {
     log: String,
     scan: Uuid,
     #[serde(flatten)]
-    mode: &'a Mode,
+    mode: &'a PoseMode,
     #[serde(skip_serializing_if = "<[_]>::is_empty")]
-    doubts: &'a [Doubt],
+    doubts: &'a [Misfit],
 }
 
 pub(super) fn run(args: &Args) -> Outcome {
     let what_if = args.instead.load()?;
-    let mut current: Option<(Arc<World>, Atlas)> = None;
-    let mut course = args.course.odometry().map(Course::new);
+    let mut current: Option<(Arc<World>, CoarseGrid)> = None;
+    let mut course = args.course.odometry().map(Tracker::new);
     let mut found = false;
     args.sweeps.for_each(&what_if, |log, sweep, world| {
         if current.as_ref().is_none_or(|(of, _)| !Arc::ptr_eq(of, world)) {
@@ -134,13 +134,13 @@ pub(super) fn run(args: &Args) -> Outcome {
             None => locate(world, atlas, &sweep),
         };
         let modes = modes.map_err(|error| failure_from(&error))?;
-        let doubts = doubts(world, atlas, &sweep, &modes);
+        let doubts = diagnose(world, atlas, &sweep, &modes);
         found = true;
         let log = log.display().to_string();
         let located =
-            |mode| LocatedPose { log: log.clone(), scan: sweep.scan, mode, doubts: &doubts };
+            |mode| LocatedPose { log: log.clone(), scan: sweep.scan, mode, doubts: &diagnose };
         answer(args.json, modes.iter().map(located), |out| {
-            print(out, &log, sweep.scan, &modes, &doubts)
+            print(out, &log, sweep.scan, &modes, &diagnose)
         })
     })?;
     if found {
@@ -149,13 +149,13 @@ pub(super) fn run(args: &Args) -> Outcome {
     Err(Failure::input("no scan to locate", "give a log of a ranger on a stepper"))
 }
 
-fn atlas(world: &World, args: &Args) -> Result<Atlas, Failure> {
+fn atlas(world: &World, args: &Args) -> Result<CoarseGrid, Failure> {
     let besides = prior::parameters(&args.fit, &args.prior, world, 1)?;
-    let spacing_m = args.spacing_m.unwrap_or_else(|| Atlas::usual_spacing_m(&world.scene));
+    let spacing_m = args.spacing_m.unwrap_or_else(|| CoarseGrid::default_spacing_m(&world.scene));
     let bar = progress::spinner("predicting on the grid of positions");
-    let atlas = Atlas::new(world, spacing_m).map_err(|error| failure_from(&error))?;
+    let atlas = CoarseGrid::new(world, spacing_m).map_err(|error| failure_from(&error))?;
     bar.finish_and_clear();
-    Ok(atlas.fitting(besides))
+    Ok(atlas.with_nuisance(besides))
 }
 
 fn failure_from(error: &dyn std::fmt::Display) -> Failure {
@@ -166,8 +166,8 @@ fn print(
     out: &mut impl Write,
     log: &str,
     scan: Uuid,
-    modes: &[Mode],
-    doubts: &[Doubt],
+    modes: &[PoseMode],
+    doubts: &[Misfit],
 ) -> io::Result<()> {
     writeln!(out, "{log}: scan {scan}")?;
     let mut table = Table::new();
@@ -183,12 +183,12 @@ fn print(
             format!("{:.2} \u{b1} {:.2}", mode.heading_deg, mode.sigma_heading_deg),
             format!("{:.0} %", 100.0 * mode.explained),
         ];
-        let parameter = |of: &Besides| format!("{:.2} \u{b1} {:.2}", of.value, of.sigma);
+        let parameter = |of: &NuisanceEstimate| format!("{:.2} \u{b1} {:.2}", of.value, of.sigma);
         table.add_row(pose.into_iter().chain(mode.besides.iter().map(parameter)));
     }
     for column in table.column_iter_mut() {
         column.set_cell_alignment(CellAlignment::Right);
     }
     writeln!(out, "{table}")?;
-    doubts.iter().try_for_each(|diagnosis| writeln!(out, "warning: {diagnosis}"))
+    diagnose.iter().try_for_each(|diagnosis| writeln!(out, "warning: {diagnosis}"))
 }

@@ -51,7 +51,7 @@ impl From<StoreError> for Failure {
     fn from(error: StoreError) -> Self {
         match &error {
             StoreError::Unreadable { .. }
-            | StoreError::NoLog { .. }
+            | StoreError::NotALog { .. }
             | StoreError::UnsupportedFormat { .. } => Self::input(&error, error.help()),
             StoreError::Open { source, .. } | StoreError::Write { source, .. }
                 if is_wrong_place(source) =>

@@ -111,7 +111,7 @@ fn kind_of(reader: &mut impl std::io::BufRead) -> FileKind {
 fn no_record(log: &Path, kind: FileKind) -> Failure {
     Failure::input(
         format!("{} contains no records: it looks like {kind}", log.display()),
-        kind.instead_of_a_log(),
+        kind.help_for_log(),
     )
 }
 
@@ -178,7 +178,7 @@ fn each_scan(
             any = true;
             inspect(record);
         });
-    for scan in ScanView::one_by_one(records) {
+    for scan in ScanView::stream(records) {
         if !take(scan) {
             break;
         }

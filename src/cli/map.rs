@@ -19,10 +19,10 @@ use crate::{
     interpret::{
         Extents, Sweep,
         grid::Grid,
-        mapping::{Mapper, Mapping},
+        mapping::{Mapper, MapSettings},
         prediction::Assessment,
     },
-    plot::{MapView, badge_of, draw_map},
+    plot::{MapView, badge_for, draw_map},
     scan::{Provenance, Session},
     scene::Scene,
     store::logged_scene,
@@ -45,7 +45,7 @@ pub(super) struct Args {
     #[arg(long, value_enum, default_value_t = ModelName::Gaussian)]
     model: ModelName,
     /// Side of a cell, metres
-    #[arg(long, value_name = "M", default_value_t = Mapping::default().resolution_m)]
+    #[arg(long, value_name = "M", default_value_t = MapSettings::default().resolution_m)]
     resolution: f64,
     /// Maximum range, metres, instead of the sensor's; longer ranges count as no echo [default: the
     /// sensor's, at most 5]
@@ -61,13 +61,13 @@ pub(super) struct Args {
     #[arg(long, value_name = "DEG")]
     beam_deg: Option<f64>,
     /// Exponent of the decrease of confidence with the feature's distance
-    #[arg(long, value_name = "E", default_value_t = Mapping::default().exponent)]
+    #[arg(long, value_name = "E", default_value_t = MapSettings::default().exponent)]
     exponent: f64,
     /// Extension of walls beyond their observed part, metres
-    #[arg(long, value_name = "M", default_value_t = Mapping::default().extend_m)]
+    #[arg(long, value_name = "M", default_value_t = MapSettings::default().extend_m)]
     extend: f64,
     /// Minimum confidence of the readings used; 0.5 is full confidence
-    #[arg(long, value_name = "C", default_value_t = Mapping::default().least_confidence)]
+    #[arg(long, value_name = "C", default_value_t = MapSettings::default().min_confidence)]
     min_reading_confidence: f64,
     /// Number of times each scan counts [default: 5 divided by the number of scans, rounded up,
     /// because few scans would leave every cell undecided; 1 with --update]
@@ -137,7 +137,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     let refuse = |error: &dyn std::fmt::Display| {
         Failure::input(error.to_string(), "see `sonard map --help`")
     };
-    let extents = Extents::of_session(&session).map_err(|error| {
+    let extents = Extents::from_session(&session).map_err(|error| {
         Failure::input(format!("session: {error}"), "correct the session's record in the log")
     })?;
     let mapping = args.mapping();
@@ -167,10 +167,10 @@ pub(super) fn run(args: &Args) -> Outcome {
     let png = draw_map(&MapView {
         title: title(&session, scene.as_ref()),
         lines: vec![summary.describe_cells()],
-        badge: badge_of(Some(provenance)),
+        badge: badge_for(Some(provenance)),
         grid: &mapped.grid,
         scene: scene.as_ref(),
-        way: &trajectory,
+        trajectory: &trajectory,
     })
     .map_err(|error| refuse(&error))?;
     map_file::write(&args.out, &mapped.grid, args.overwrite)?;
@@ -188,15 +188,15 @@ fn title(session: &Session, scene: Option<&Scene>) -> String {
 }
 
 impl Args {
-    fn mapping(&self) -> Mapping {
-        Mapping {
+    fn mapping(&self) -> MapSettings {
+        MapSettings {
             resolution_m: self.resolution,
             region: self.region.map(|[x0, y0, x1, y1]| [DVec2::new(x0, y0), DVec2::new(x1, y1)]),
-            silent_beyond_m: self.max_range,
+            range_limit_m: self.max_range,
             beam_deg: self.beam_deg,
             exponent: self.exponent,
             extend_m: self.extend,
-            least_confidence: self.min_reading_confidence,
+            min_confidence: self.min_reading_confidence,
             // The existing map has already weighted its scans.
             evidence: self.scan_weight.or_else(|| self.update.is_some().then_some(1)),
             predicts_features: self.feature_prediction == Switch::On,
@@ -254,7 +254,7 @@ fn map(args: &Args, taken: &[(uuid::Uuid, Sweep)], mut mapper: Mapper) -> Result
     let bar = progress::bar(taken.len() as u64, "scans");
     for (scan, sweep) in taken {
         let added = mapper.add(sweep);
-        discarded += added.left_out;
+        discarded += added.discarded;
         readings += sweep.beams.len();
         for (beam, worth) in sweep.beams.iter().zip(added.assessments.unwrap_or_default()) {
             confidence += worth.confidence;

@@ -15,7 +15,7 @@ use super::{
 use crate::{
     acoustics::{Air, Sensor, TofNoise},
     geometry::Pose,
-    mock::{BoardSettings, FAULT_HELP, FaultPlan, MockBoard, Pace, Soundings, World},
+    mock::{BoardSettings, FAULT_HELP, FaultPlan, MockBoard, Pace, EchoTable, World},
     model::{Options, Simulator},
     scene::Scene,
 };
@@ -91,7 +91,7 @@ impl MockWorldArgs {
         let sound_speed_m_s = self.truth_air(assumed.air)?.sound_speed_m_s();
         let soundings = self.soundings(assumed)?;
         let steps = self.steps_per_revolution;
-        let noise = TofNoise::of_range_mm(self.noise_mm, sound_speed_m_s);
+        let noise = TofNoise::from_range_sigma_mm(self.noise_mm, sound_speed_m_s);
         let world = World::new(soundings, noise, self.missed_steps, self.seed);
         // Consecutive mocks are different boots, so the boot number must not come from the seed.
         let boot = rand::rng().random_range(1..=u16::MAX);
@@ -107,7 +107,7 @@ impl MockWorldArgs {
     }
 
     /// Computes the echoes at the assumed pose in the true world.
-    pub(super) fn soundings(&self, assumed: &AssumedModel<'_>) -> Result<Soundings, Failure> {
+    pub(super) fn soundings(&self, assumed: &AssumedModel<'_>) -> Result<EchoTable, Failure> {
         let scene = match &self.truth {
             Some(name) => Arc::new(scene_file::load(name)?),
             None => Arc::clone(assumed.scene),
@@ -123,7 +123,7 @@ impl MockWorldArgs {
         )
         .map_err(|error| Failure::input(error, "see `sonard mock --help`"))?;
         let steps = self.steps_per_revolution;
-        Soundings::from_model(&simulator, assumed.pose, steps, self.mounting_offset_deg)
+        EchoTable::from_model(&simulator, assumed.pose, steps, self.mounting_offset_deg)
             .map_err(|error| Failure::input(error, "give a simpler scene"))
     }
 

@@ -126,11 +126,11 @@ fn sensor_failure(name: &str, error: &SensorError) -> Failure {
                 suggest(name, &names, "presets"),
             )
         }
-        SensorError::Form { line, column, field, message } => Failure::input(
+        SensorError::Malformed { line, column, field, message } => Failure::input(
             format!("{name}:{line}:{column}: {field}: {message}"),
             "start from a preset in the folder sensors/ of the source",
         ),
-        SensorError::Figure { .. } => {
+        SensorError::OutOfRange { .. } => {
             Failure::input(format!("{name}: {error}"), "correct that value in the file")
         }
     }

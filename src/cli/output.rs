@@ -27,8 +27,8 @@ use clap::{
 
 use super::{Failure, Outcome};
 use crate::{
-    export::{CsvExport, McapExport, ParquetExport, begins_geojson},
-    store::{FileKind, HEAD_BYTES, LogWriter, RecordWriter, StoreError, WholeFile},
+    export::{CsvExport, McapExport, ParquetExport, is_geojson},
+    store::{FileKind, HEAD_BYTES, LogWriter, RecordWriter, StoreError, AtomicFile},
 };
 pub(super) use stream::Stream;
 
@@ -94,9 +94,9 @@ impl Product {
             Self::MapYaml => kind == FileKind::MapYaml,
             Self::List(members) => is_list_of(head, members),
             Self::Table => head.starts_with(CsvExport::<Vec<u8>>::head().as_bytes()),
-            Self::TypedTable => ParquetExport::<Vec<u8>>::begins(head),
-            Self::Recording => McapExport::<Vec<u8>>::begins(head),
-            Self::GeoJson => begins_geojson(head),
+            Self::TypedTable => ParquetExport::<Vec<u8>>::is_own_file(head),
+            Self::Recording => McapExport::<Vec<u8>>::is_own_file(head),
+            Self::GeoJson => is_geojson(head),
             Self::Log => false,
         }
     }
@@ -282,7 +282,7 @@ impl Overwrite {
             Some(existing) if !existing.is_file() => {
                 OpenOptions::new().write(true).open(&at).map(Stream::Device)
             }
-            _ => WholeFile::create(&at).and_then(|file| {
+            _ => AtomicFile::create(&at).and_then(|file| {
                 // The permissions of the existing file are kept.
                 existing.map_or(Ok(()), |existing| {
                     file.as_file().set_permissions(existing.permissions())
@@ -335,7 +335,7 @@ pub(super) fn records_to(
         return Ok(Box::new(LogWriter::new(Stream::standard(), name)));
     };
     let stream = overwrite.begin(path, Product::Log)?;
-    Ok(Box::new(LogWriter::new(stream, path).with_scenes_beside()))
+    Ok(Box::new(LogWriter::new(stream, path).with_scene_folder()))
 }
 
 /// Converts the result of writing records; a closed reader is not a failure.

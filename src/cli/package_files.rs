@@ -75,7 +75,7 @@ fn write_keys(page: &mut Roff, entry: &Section) {
     for key in &entry.keys {
         page.control("TP", []);
         page.text([bold(key.name.as_str())]);
-        page.text([roman(format!("{} {}", key.about, key.kind.wanted()))]);
+        page.text([roman(format!("{} {}", key.about, key.kind.description()))]);
         page.control("br", []);
         page.text([roman(describe_default(key))]);
     }

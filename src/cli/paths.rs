@@ -124,7 +124,7 @@ pub(super) fn run(args: &Args) -> Outcome {
         None => [pose.position(); 2],
         Some(azimuth_deg) => {
             let axis = Pose { heading_deg: pose.heading_deg + azimuth_deg, ..pose };
-            simulator.sensor().mounting.viewpoint(&axis).ends()
+            simulator.sensor().mounting.viewpoint(&axis).transducer_positions()
         }
     };
     let printed = paths.each_between(transmitter, receiver, |paths| {
@@ -139,7 +139,7 @@ pub(super) fn run(args: &Args) -> Outcome {
 fn path_line(simulator: &Simulator, path: &EchoPath) -> PathLine {
     let record = PathRecord::from_path(simulator.scene(), &path.path, path.length_m);
     PathLine {
-        description: record.in_words(),
+        description: record.describe(),
         length_m: path.length_m,
         kind: record.kind,
         order: record.order,

@@ -198,7 +198,7 @@ fn failure_from(log: &Path, error: &dyn std::fmt::Display) -> Failure {
 ///
 /// Invalid properties of the air.
 pub(super) fn conditions(log: &Path, session: &Session) -> Result<(Air, Options), Failure> {
-    let (air, options) = session.conditions().map_err(|error| failure_from(log, &error))?;
+    let (air, options) = session.model_conditions().map_err(|error| failure_from(log, &error))?;
     let options = options.unwrap_or_else(|| {
         let engine = EngineKind::default().name();
         let had = session.model.as_ref().map_or("", |model| &model.engine);

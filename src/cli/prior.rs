@@ -3,7 +3,7 @@
 use std::str::FromStr;
 
 use super::Failure;
-use crate::inverse::{Group, GroupError, Prior, World, priors};
+use crate::inverse::{ParameterGroup, GroupError, Prior, World, priors};
 
 /// Value of `--prior`: `NAME=SIGMA`.
 #[derive(Debug, Clone, PartialEq)]
@@ -24,7 +24,7 @@ impl FromStr for PriorSigma {
 
 /// Returns the parameters selected by `--fit`, with the prior deviations of `--prior`.
 pub(super) fn parameters(
-    fit: &[Group],
+    fit: &[ParameterGroup],
     prior: &[PriorSigma],
     world: &World,
     sweeps: usize,

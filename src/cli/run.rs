@@ -138,7 +138,7 @@ pub(super) fn run(args: Args) -> Outcome {
         files::check_places(&settings.keys)?;
         return print(&load::effective_configuration(&settings));
     }
-    let hangup = Hangup::of_this_process();
+    let hangup = Hangup::for_this_process();
     let supervisor = Supervisor::default();
     let runtime = runtime::new()?;
     let outcome = runtime.block_on(async {

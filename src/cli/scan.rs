@@ -25,7 +25,7 @@ use super::{
 };
 use crate::{
     link::{self, BAUD, PortOpener},
-    mock::{MockBoard, MockPort, Soundings},
+    mock::{MockBoard, MockPort, EchoTable},
     model::OptionKeys,
     ranger::{DriveError, Driver, Motion, PreparedScan, Ranger, ScanError, ScanSummary},
     scan::Record,
@@ -234,7 +234,7 @@ async fn measure(
 /// Returns the options of `sonard-emulator` for the mock's world.
 fn emulator_options(args: &Args, setup: &PreparedScan) -> Result<Vec<String>, Failure> {
     let mut options = args.world.emulator(&args.place.scene)?;
-    options.push(format!("--pose={}", setup.pose_numbers()));
+    options.push(format!("--pose={}", setup.pose_argument()));
     options.extend(args.sensor.emulator(&setup.sensor));
     options.extend(args.air.emulator());
     Ok(options)
@@ -251,7 +251,7 @@ pub(super) async fn identify(
     }
     let config = HostConfig { max_attempts: ATTEMPTS, ..HostConfig::new(BAUD, rand::random()) };
     tokio::select! {
-        identified = Ranger::meet(Driver::new(line, config)) => identified.map_err(|error| match &error {
+        identified = Ranger::identify(Driver::new(line, config)) => identified.map_err(|error| match &error {
             DriveError::Host(HostError::NoAnswer { .. } | HostError::NotADevice { .. }) => {
                 let help = link::describe_contention(port);
                 Failure::device(error, help.unwrap_or_else(|| error.help().to_owned()))
@@ -267,7 +267,7 @@ pub(super) async fn identify(
 /// Mock ranger running alongside a scan.
 pub(super) struct Mock {
     port: PathBuf,
-    soundings: mpsc::UnboundedSender<Soundings>,
+    soundings: mpsc::UnboundedSender<EchoTable>,
     stop: oneshot::Sender<()>,
     playing: tokio::task::JoinHandle<std::io::Result<()>>,
 }
@@ -282,7 +282,7 @@ impl Mock {
         let path = link.map_or_else(|| port.path().to_path_buf(), Path::to_path_buf);
         let (soundings, moves) = mpsc::unbounded_channel();
         let (stop, stopped) = oneshot::channel::<()>();
-        let port = port.moved_by(moves);
+        let port = port.with_moves(moves);
         #[allow(
             clippy::disallowed_methods,
             reason = "a mock that ends closes its line, which ends the scan"
@@ -296,7 +296,7 @@ impl Mock {
     }
 
     /// Moves the mock to another pose, by its echoes there.
-    pub(super) fn carry_to(&self, soundings: Soundings) {
+    pub(super) fn carry_to(&self, soundings: EchoTable) {
         // The mock may have ended already.
         drop(self.soundings.send(soundings));
     }

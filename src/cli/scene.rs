@@ -192,7 +192,7 @@ fn with_drawn_poses(mut scene: Scene, pose: Option<&str>) -> Result<Scene, Failu
         scene.robot.clone_from(&robot);
         scene = scene.with_robot_at(pose);
     }
-    Ok(scene.floor_plan().scene(&scene))
+    Ok(scene.floor_plan().planned_scene(&scene))
 }
 
 fn list() -> Outcome {

@@ -8,8 +8,8 @@ use super::{Failure, output::register_input};
 use crate::{
     geometry::Pose,
     scan::Session,
-    scene::{PoseError, Scene, SceneError, shipped, shown, suggest},
-    store::{SceneLost, logged_scene},
+    scene::{PoseError, Scene, SceneError, shipped, sanitize, suggest},
+    store::{SceneUnavailable, logged_scene},
 };
 
 /// Reads and checks a scene from a file, or else the shipped scene of that name.
@@ -46,7 +46,7 @@ pub(super) fn of_session(log: &Path, session: &Session) -> Result<Option<Scene>,
         Err(lost) => lost,
     };
     let named = session.scene.as_ref().map(|scene| &*scene.name).unwrap_or_default();
-    if matches!(lost, SceneLost::Changed(_)) {
+    if matches!(lost, SceneUnavailable::Changed(_)) {
         notice!("warning: {}: {lost}", log.display());
     }
     if shipped::text(named).is_some() {
@@ -118,7 +118,7 @@ const MAX_REGION_BYTES: usize = 10_000;
 
 /// Reports an error with the affected line of the file. The first line contains `file:line:column`.
 fn report(name: &str, text: String, error: &SceneError) -> Report {
-    let label = if error.path.is_empty() { "here".to_owned() } else { shown(&error.path) };
+    let label = if error.path.is_empty() { "here".to_owned() } else { sanitize(&error.path) };
     let diagnostic = MietteDiagnostic::new(format!("{name}:{error}")).with_help(error.help());
     let (before, after) = text.split_at(error.span.start);
     let near = before.rsplit('\n').take(3).chain(after.split('\n').take(3));
@@ -129,7 +129,7 @@ fn report(name: &str, text: String, error: &SceneError) -> Report {
         return Report::new(diagnostic.with_help(format!(
             "{}\nthere: {}",
             error.help(),
-            shown(&excerpt)
+            sanitize(&excerpt)
         )));
     }
     let diagnostic = diagnostic.with_label(LabeledSpan::at(error.span.clone(), label));

@@ -19,7 +19,7 @@ use super::{
 };
 use crate::{
     acoustics::ReceiverNoise,
-    collect::{PoseLine, read_lines},
+    collect::{PoseLine, parse_pose_lines},
     geometry::Pose,
     model::{ModelError, ObservationPoint, OptionKeys, Prediction, Simulator, TooCostly},
     scan::{Ping, Record, ScanEnd, ScanPlan, ScanStart, Session},
@@ -217,7 +217,7 @@ fn simulated_poses(
         let help = "give a CSV or JSON lines file of poses";
         Failure::input(format!("cannot read the poses {name}: {error}"), help)
     })?;
-    let lines = read_lines(&text, scene, Some(0.0)).map_err(|fault| {
+    let lines = parse_pose_lines(&text, scene, Some(0.0)).map_err(|fault| {
         let line = fault.line.map_or_else(String::new, |line| format!("{line}:"));
         Failure::input(format!("{name}:{line} {fault}"), &fault.help)
     })?;

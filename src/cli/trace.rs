@@ -224,7 +224,7 @@ impl<'a> PingTrace<'a> {
                 format!("{:.4}", path.length_m / 2.0),
                 format!("{:.4}", peak.peak.0),
                 format!("{:.1}", 20.0 * peak.peak.0.log10()),
-                path.in_words(),
+                path.describe(),
             ]);
         }
         table
@@ -233,7 +233,7 @@ impl<'a> PingTrace<'a> {
     /// Describes the receiver's output.
     fn describe_detection(&self) -> String {
         let detection = &self.trace.detection;
-        let path = self.path.as_ref().map(PathRecord::in_words);
+        let path = self.path.as_ref().map(PathRecord::describe);
         let by = path.map(|path| format!(" via {path}")).unwrap_or_default();
         let margin_db = detection.margin_db.unwrap_or(f64::NEG_INFINITY);
         match (detection.status, detection.range_m) {
@@ -274,7 +274,7 @@ impl<'a> PingTrace<'a> {
                 receiver.blanking_us
             )],
             trace: &self.trace,
-            names: self.paths.iter().map(PathRecord::in_words).collect(),
+            names: self.paths.iter().map(PathRecord::describe).collect(),
             blanking_us: receiver.blanking_us,
             rearm_us: receiver.rearm_us,
             sound_speed_m_s: receiver.sound_speed_m_s,

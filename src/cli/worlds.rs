@@ -13,7 +13,7 @@ use super::{
     what_if::{AssumptionFilter, WhatIf},
 };
 use crate::{
-    inverse::{Sweep, World},
+    inverse::{FitSweep, World},
     scan::{ScanView, Session},
     scene::Scene,
 };
@@ -39,7 +39,7 @@ impl SweepArgs {
     pub(super) fn for_each(
         &self,
         what_if: &WhatIf,
-        mut take: impl FnMut(&Path, Sweep, &Arc<World>) -> Result<(), Failure>,
+        mut take: impl FnMut(&Path, FitSweep, &Arc<World>) -> Result<(), Failure>,
     ) -> Result<(), Failure> {
         let given = self.scene.as_deref().map(scene_file::load).transpose()?.map(Arc::new);
         let mut worlds = WorldCache { given, current: None };
@@ -47,7 +47,7 @@ impl SweepArgs {
         for log in &self.logs {
             for_each_scan(log, |mut scan| {
                 assumptions.apply(&mut scan);
-                match Sweep::from_scan(&scan) {
+                match FitSweep::from_scan(&scan) {
                     Ok(sweep) => take(log, sweep, &worlds.world(log, &scan)?),
                     Err(error) => {
                         notice!("warning: {}: {error}; scan skipped", log.display());

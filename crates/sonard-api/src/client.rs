@@ -61,25 +61,25 @@ pub enum ClientError {
     },
     /// No response within the timeout.
     #[error("the daemon did not respond within {} s", RESPONSE_TIMEOUT.as_secs())]
-    TooSlow,
+    Timeout,
     /// No data on a live stream, not even its keep-alive lines.
     #[error(
         "no data from the daemon for {} s: it hangs, or the connection is lost",
         live::IDLE_TIMEOUT.as_secs()
     )]
-    Silent,
+    IdleTimeout,
     /// Invalid HTTP, or an interrupted connection.
     #[error("invalid response from the daemon: {0}")]
     Http(#[from] hyper::Error),
     /// Response body that is not the expected JSON.
     #[error("invalid response from the daemon: {0}")]
-    Strange(#[from] serde_json::Error),
+    InvalidResponse(#[from] serde_json::Error),
     /// Response body over the size limit, bytes.
     #[error("the daemon's response is longer than {0} bytes")]
     TooLong(usize),
     /// Error response of the daemon.
     #[error("the daemon rejected the request ({status}): {error}")]
-    Refused {
+    Rejected {
         /// HTTP status of the response.
         status: StatusCode,
         /// Error message of the daemon.
@@ -94,7 +94,7 @@ impl ClientError {
     #[must_use]
     pub fn is_final(&self) -> bool {
         let passing = [StatusCode::REQUEST_TIMEOUT, StatusCode::TOO_MANY_REQUESTS];
-        matches!(self, Self::Refused { status, .. } if status.is_client_error() && !passing.contains(status))
+        matches!(self, Self::Rejected { status, .. } if status.is_client_error() && !passing.contains(status))
     }
 
     /// Returns advice on how to resolve the error.
@@ -104,13 +104,13 @@ impl ClientError {
             Self::NoDaemon { .. } => "start it with `sonard run` or `systemctl start sonard`; \
                  --socket or --address select it; only the socket's group may use it"
                 .into(),
-            Self::TooSlow | Self::Silent => {
+            Self::Timeout | Self::IdleTimeout => {
                 "check the log messages of the daemon (`journalctl -u sonard`)".into()
             }
-            Self::Http(_) | Self::Strange(_) | Self::TooLong(_) => {
+            Self::Http(_) | Self::InvalidResponse(_) | Self::TooLong(_) => {
                 "check that it is a sonard daemon of this version".into()
             }
-            Self::Refused { help, .. } => help.clone(),
+            Self::Rejected { help, .. } => help.clone(),
         }
     }
 }
@@ -197,7 +197,7 @@ impl Client {
             None => request,
         };
         let head = timeout(RESPONSE_TIMEOUT, connect_and_send(&self.place, request, body));
-        let response = head.await.map_err(|_| ClientError::TooSlow)??;
+        let response = head.await.map_err(|_| ClientError::Timeout)??;
         let status = response.status();
         // An unhealthy daemon reports its health with status 503; the body is the expected one.
         if status.is_success() || status == StatusCode::SERVICE_UNAVAILABLE {
@@ -208,7 +208,7 @@ impl Client {
             error: String::from_utf8_lossy(&body).into_owned(),
             help: "check that it is a sonard daemon of this version".into(),
         });
-        Err(ClientError::Refused { status, error, help })
+        Err(ClientError::Rejected { status, error, help })
     }
 }
 
@@ -216,7 +216,7 @@ impl Client {
 async fn read_body(mut body: Incoming, max_bytes: usize) -> Result<Vec<u8>, ClientError> {
     let mut bytes = Vec::new();
     while let Some(frame) =
-        timeout(RESPONSE_TIMEOUT, body.frame()).await.map_err(|_| ClientError::TooSlow)?
+        timeout(RESPONSE_TIMEOUT, body.frame()).await.map_err(|_| ClientError::Timeout)?
     {
         let frame = frame?;
         bytes.extend_from_slice(frame.data_ref().map_or(&[][..], |data| data));

@@ -16,16 +16,16 @@ mod schema;
 
 pub use air::{AirKeys, CollectionAirKeys};
 pub use document::document;
-pub use fleet::{FleetKeys, MAX_ROBOT_NAME, is_robot_name, robot_name_of_host};
+pub use fleet::{FleetKeys, MAX_ROBOT_NAME_CHARS, is_robot_name, robot_name_from_host};
 pub use foxglove::FoxgloveKeys;
 pub use keys::{
     DeviceKeys, GpioKeys, Keys, LinkKeys, LogKeys, Mode, ModelKeys, MotionKeys, PlaceKeys,
     PlanKeys, ScanningKeys, ServerKeys, SimulateKeys,
 };
-pub use layers::{ConfigError, Layers, Origin};
-pub use mqtt::{Broker, MqttKeys};
+pub use layers::{ConfigError, ConfigLayers, Origin};
+pub use mqtt::{BrokerAddress, MqttKeys};
 pub use ros::{RosDistribution, RosKeys, RosProfile};
-pub use schema::{Form, Key, Kind, Section, read_sections, sections};
+pub use schema::{ConfigForm, Key, ValueKind, Section, read_sections, sections};
 
 /// Invalid key of a section, with the error message and its remedy.
 pub type Fault = (&'static str, String, String);

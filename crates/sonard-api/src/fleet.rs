@@ -11,8 +11,8 @@ mod registry;
 mod state;
 mod watch;
 
-pub use member::{Asked, MAX_MEMBERS, Member, MemberError, check_all, members_of, read_members};
-pub use poll::{Told, ask};
-pub use registry::Roll;
-pub use state::{Seen, Unheard, judge, plain};
-pub use watch::watch;
+pub use member::{PolledDaemon, MAX_MEMBERS, Member, MemberError, check_members, members_from_keys, read_members};
+pub use poll::{DaemonReport, poll};
+pub use registry::Registry;
+pub use state::{Observation, PollError, observe, sanitize};
+pub use watch::watch_fleet;

@@ -8,7 +8,7 @@ use super::keys::{Action, CheckKeys};
 
 /// Violation of a quality check by a scan.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Finding {
+pub struct CheckFinding {
     /// Name of the check: its key in `[checks]` without `max_`.
     pub check: String,
     /// Description with the measured values.
@@ -19,7 +19,7 @@ pub struct Finding {
 
 /// Quality figures of a complete scan, for the report and its plots.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
-pub struct Figures {
+pub struct ScanFigures {
     /// Beams of the plan.
     pub beams: u32,
     /// Beams without a usable reading.
@@ -42,7 +42,7 @@ pub struct Figures {
     pub temperature_change_c: Option<f64>,
 }
 
-impl Figures {
+impl ScanFigures {
     /// Computes the figures of a finished scan.
     #[must_use]
     pub fn from_scan(view: &ScanView, temperature_change_c: Option<f64>) -> Self {
@@ -75,7 +75,7 @@ impl Figures {
 /// A scan whose ranger was lost is not incomplete in this sense. It has an end and a reading for
 /// each beam, some of them `link_lost`, and is rated by the checks.
 #[must_use]
-pub fn is_cut(view: &ScanView) -> bool {
+pub fn ended_early(view: &ScanView) -> bool {
     let beams = view.start.as_ref().map_or(u32::MAX, |start| start.plan.beams());
     let stopped = view.events.iter().any(|event| event.kind == EventKind::Stopped);
     view.end.is_none() || stopped || view.pings.len() < beams as usize
@@ -83,13 +83,13 @@ pub fn is_cut(view: &ScanView) -> bool {
 
 /// Applies the plan's checks to a scan's figures.
 #[must_use]
-pub fn check(figures: &Figures, keys: &CheckKeys) -> Vec<Finding> {
+pub fn check_figures(figures: &ScanFigures, keys: &CheckKeys) -> Vec<CheckFinding> {
     let mut findings = Vec::new();
     let mut find = |check: &str, action, detail| {
-        findings.push(Finding { check: check.to_owned(), detail, action });
+        findings.push(CheckFinding { check: check.to_owned(), detail, action });
     };
     if figures.missing > keys.max_missing_beams {
-        let Figures { missing, beams, .. } = figures;
+        let ScanFigures { missing, beams, .. } = figures;
         let detail = format!("{missing} of {beams} beams have no usable reading");
         find("missing_beams", keys.on_missing_beams, detail);
     }
@@ -120,7 +120,7 @@ pub fn check(figures: &Figures, keys: &CheckKeys) -> Vec<Finding> {
 
 /// Returns the strongest action among the findings.
 #[must_use]
-pub fn verdict(findings: &[Finding]) -> Action {
+pub fn strongest_action(findings: &[CheckFinding]) -> Action {
     findings.iter().map(|finding| finding.action).max().unwrap_or_default()
 }
 
@@ -128,46 +128,46 @@ pub fn verdict(findings: &[Finding]) -> Action {
 mod tests {
     use super::*;
 
-    fn good() -> Figures {
-        Figures {
+    fn good() -> ScanFigures {
+        ScanFigures {
             beams: 400,
             compared: 400,
             unexplained_share: Some(0.02),
             home_drift_steps: Some(0),
             temperature_change_c: Some(0.1),
-            ..Figures::default()
+            ..ScanFigures::default()
         }
     }
 
     #[test]
     fn limits_and_strongest_action() {
         let keys = CheckKeys { on_unexplained: Action::Stop, ..CheckKeys::default() };
-        assert_eq!(check(&good(), &keys), []);
+        assert_eq!(check_figures(&good(), &keys), []);
         for (figures, name, action) in [
-            (Figures { missing: 1, ..good() }, "missing_beams", Action::Retake),
-            (Figures { home_drift_steps: Some(-1), ..good() }, "home_drift_steps", Action::Retake),
+            (ScanFigures { missing: 1, ..good() }, "missing_beams", Action::Retake),
+            (ScanFigures { home_drift_steps: Some(-1), ..good() }, "home_drift_steps", Action::Retake),
             (
-                Figures { temperature_change_c: Some(-0.6), ..good() },
+                ScanFigures { temperature_change_c: Some(-0.6), ..good() },
                 "temperature_change_c",
                 Action::Retake,
             ),
             (
-                Figures { unexplained_share: Some(0.51), ..good() },
+                ScanFigures { unexplained_share: Some(0.51), ..good() },
                 "unexplained_share",
                 Action::Stop,
             ),
         ] {
-            let found = check(&figures, &keys);
+            let found = check_figures(&figures, &keys);
             assert_eq!(found.len(), 1, "{found:?}");
             assert_eq!((found[0].check.as_str(), found[0].action), (name, action));
         }
-        let all = Figures {
+        let all = ScanFigures {
             missing: 3,
             unexplained_share: Some(0.9),
             home_drift_steps: Some(4),
             ..good()
         };
-        assert_eq!(verdict(&check(&all, &keys)), Action::Stop);
-        assert_eq!(verdict(&[]), Action::Note);
+        assert_eq!(strongest_action(&check_figures(&all, &keys)), Action::Stop);
+        assert_eq!(strongest_action(&[]), Action::Note);
     }
 }

@@ -2,14 +2,14 @@
 
 use std::{path::Path, time::Duration};
 
-use super::{Borrowed, Halt, Plan, record_scan::Taken};
+use super::{SavedSettings, CollectError, CollectionPlan, record_scan::RecordedScan};
 use sonard_api::AirOrder;
 use sonard_device::ranger::PreparedScan;
 use sonard_model::geometry::Pose;
 use sonard_records::{CollectionRef, Provenance, ScanAir, ScanPlan};
 
 /// Scanning device of a collection: a locally driven ranger, or a daemon with a ranger.
-pub trait Device {
+pub trait ScanDevice {
     /// Returns `true` for a locally driven ranger. Its scans are predicted in this process, and a
     /// simulated one can be moved.
     fn is_local(&self) -> bool;
@@ -18,48 +18,48 @@ pub trait Device {
     ///
     /// # Errors
     /// Returns an error if the ranger cannot be set up.
-    fn prepare(&mut self, plan: &Plan, first: &PreparedScan) -> Result<(), Halt>;
+    fn prepare(&mut self, plan: &CollectionPlan, first: &PreparedScan) -> Result<(), CollectError>;
 
     /// Connects to the ranger and identifies it; a failure is final.
     ///
     /// # Errors
     /// Returns an error if no ranger responds, or a different one than before.
-    fn meet(&mut self) -> impl Future<Output = Result<Connected, Halt>>;
+    fn connect(&mut self) -> impl Future<Output = Result<ConnectedDevice, CollectError>>;
 
     /// Moves a simulated ranger to the pose of the scan.
     ///
     /// # Errors
     /// Returns an error if the ranger cannot be moved.
-    fn carry_to(&mut self, to: &PreparedScan) -> Result<(), Halt>;
+    fn move_to(&mut self, to: &PreparedScan) -> Result<(), CollectError>;
 
     /// Restores the state of an earlier run and sets the time allowed for an absent ranger to
     /// return.
-    fn go_on(&mut self, patience: Duration, borrowed: Option<Borrowed>);
+    fn resume(&mut self, patience: Duration, borrowed: Option<SavedSettings>);
 
     /// Returns the device settings about to be changed, unless all of them are saved already.
     ///
     /// # Errors
     /// Returns an error if the device does not respond.
-    fn to_borrow(
+    fn settings_to_save(
         &self,
         air: Option<&AirOrder>,
-    ) -> impl Future<Output = Result<Option<Borrowed>, Halt>>;
+    ) -> impl Future<Output = Result<Option<SavedSettings>, CollectError>>;
 
     /// Applies the collection's settings, after the previous ones in `before` were journaled.
     ///
     /// # Errors
     /// Returns an error if the device rejects them.
-    fn borrow(
+    fn apply_settings(
         &mut self,
-        before: Option<Borrowed>,
+        before: Option<SavedSettings>,
         air: Option<&AirOrder>,
-    ) -> impl Future<Output = Result<(), Halt>>;
+    ) -> impl Future<Output = Result<(), CollectError>>;
 
     /// Restores the saved settings; returns `true` if there were any.
     ///
     /// # Errors
     /// Returns an error if the device rejects them.
-    fn give_back(&mut self) -> impl Future<Output = Result<bool, Halt>>;
+    fn restore_settings(&mut self) -> impl Future<Output = Result<bool, CollectError>>;
 
     /// Returns the measured air temperature of the device, degrees Celsius, if there is one.
     fn temperature_c(&self) -> impl Future<Output = Option<f64>>;
@@ -68,18 +68,18 @@ pub trait Device {
     ///
     /// # Errors
     /// Returns an error if the file cannot be written or the device cannot measure.
-    fn take(
+    fn record_scan(
         &mut self,
-        scan: ScanOrder<'_>,
+        scan: ScanTask<'_>,
         beam: &(dyn Fn() + Sync),
-    ) -> impl Future<Output = Result<Taken, Halt>>;
+    ) -> impl Future<Output = Result<RecordedScan, CollectError>>;
 
     /// Releases the ranger.
     fn close(self) -> impl Future<Output = ()>;
 }
 
 /// Request for one scan.
-pub struct ScanOrder<'a> {
+pub struct ScanTask<'a> {
     /// Azimuths of the beams.
     pub plan: ScanPlan,
     /// Pose of the ranger.
@@ -96,7 +96,7 @@ pub struct ScanOrder<'a> {
 
 /// Identified ranger.
 #[derive(Debug, Clone)]
-pub struct Connected {
+pub struct ConnectedDevice {
     /// Identity as written into records.
     pub device: sonard_records::Device,
     /// Origin of the readings: hardware, mock or simulation.

@@ -19,15 +19,15 @@ use sonard_runtime::interrupts::Interrupts;
 use uuid::Uuid;
 
 use super::{
-    AfterRetakes, Conditions, Device, Entry, Folder, Halt, Journal, Manifest, NamedPose, Patience,
-    Plan, Slot, Watcher,
+    AfterRetakes, Conditions, ScanDevice, JournalEntry, CollectionFolder, CollectError, CollectionJournal, CollectionManifest, NamedPose, RetrySchedule,
+    CollectionPlan, Slot, Observer,
     estimate::{Pace, disk_bytes},
     pose_source::{PoseSource, answered},
 };
 
 /// Operator's options for one run.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct Choices {
+pub struct RunOptions {
     /// Continue although plan, scene or ranger have changed since the start.
     pub accept_changed_plan: bool,
     /// Retry the scans that were given up.
@@ -36,10 +36,10 @@ pub struct Choices {
 
 /// State of a running collection.
 struct Collector<D, W> {
-    choices: Choices,
-    plan: Plan,
-    folder: Folder,
-    journal: Journal,
+    choices: RunOptions,
+    plan: CollectionPlan,
+    folder: CollectionFolder,
+    journal: CollectionJournal,
     id: Uuid,
     interrupts: Interrupts,
     source: PoseSource,
@@ -56,7 +56,7 @@ struct Collector<D, W> {
     /// Pose of the simulated ranger.
     device_pose: Option<u32>,
     /// Retry delays while scans are lost; `None` after a complete one.
-    losses: Option<Patience>,
+    losses: Option<RetrySchedule>,
     /// Number of rejections in this run, by scan.
     rejections: BTreeMap<Slot, u32>,
     /// Conditions entered at the start of this run.
@@ -77,19 +77,19 @@ enum Next {
 /// # Errors
 /// Returns the reason why scans are missing. Recorded scans are kept, and a run with the same plan
 /// resumes the collection.
-pub async fn collect<D: Device, W: Watcher>(
-    plan: Plan,
-    choices: Choices,
+pub async fn collect<D: ScanDevice, W: Observer>(
+    plan: CollectionPlan,
+    choices: RunOptions,
     device: D,
     watcher: W,
     interrupts: Interrupts,
-) -> Result<(), Halt> {
+) -> Result<(), CollectError> {
     let mut collector = Collector::begin(plan, choices, device, watcher, interrupts).await?;
     let outcome = match collector.start().await {
         Ok(()) => collector.work().await,
         Err(halt) => return Err(halt),
     };
-    collector.watcher.rest();
+    collector.watcher.measuring_paused();
     collector.restore_settings().await;
     // The manifest lists the scans after every outcome.
     let closed = collector.close(outcome.is_ok());
@@ -98,8 +98,8 @@ pub async fn collect<D: Device, W: Watcher>(
     closed
 }
 
-impl<D: Device, W: Watcher> Collector<D, W> {
-    async fn work(&mut self) -> Result<(), Halt> {
+impl<D: ScanDevice, W: Observer> Collector<D, W> {
+    async fn work(&mut self) -> Result<(), CollectError> {
         let mut first = true;
         while let Some(slot) = self.next_slot().await? {
             if !std::mem::take(&mut first) {
@@ -110,14 +110,14 @@ impl<D: Device, W: Watcher> Collector<D, W> {
             self.carry_to(slot.pose)?;
             let taken = self.take(slot).await?;
             if let Next::Stop(reason) = self.evaluate(slot, taken).await? {
-                return Err(Halt::Stopped(format!("{reason}\nrun the same command to resume")));
+                return Err(CollectError::Stopped(format!("{reason}\nrun the same command to resume")));
             }
         }
         Ok(())
     }
 
     /// Returns the next scan to take; `None` once all are accepted or given up.
-    async fn next_slot(&mut self) -> Result<Option<Slot>, Halt> {
+    async fn next_slot(&mut self) -> Result<Option<Slot>, CollectError> {
         loop {
             let accepted: HashSet<Slot> =
                 self.journal.history().accepted().map(|take| take.slot).collect();
@@ -126,7 +126,7 @@ impl<D: Device, W: Watcher> Collector<D, W> {
                 let skipped = given_up.contains(slot) && !self.retries(*slot);
                 !accepted.contains(slot) && !skipped
             };
-            if let Some(slot) = self.journal.history().wanted().into_iter().find(open) {
+            if let Some(slot) = self.journal.history().requested().into_iter().find(open) {
                 return Ok(Some(slot));
             }
             if !self.has_more_poses || !self.request_pose().await? {
@@ -142,7 +142,7 @@ impl<D: Device, W: Watcher> Collector<D, W> {
     }
 
     /// Requests a pose from the source; returns `false` if there are no more.
-    async fn request_pose(&mut self) -> Result<bool, Halt> {
+    async fn request_pose(&mut self) -> Result<bool, CollectError> {
         let number = self.journal.history().poses.keys().last().copied().unwrap_or(0) + 1;
         let count = self.plan.keys.poses.count;
         let has_source = !matches!(self.source, PoseSource::Listed);
@@ -150,37 +150,37 @@ impl<D: Device, W: Watcher> Collector<D, W> {
         if !self.has_more_poses {
             return Ok(false);
         }
-        self.watcher.rest();
+        self.watcher.measuring_paused();
         let scene = Arc::clone(&self.plan.scene);
         let next = self.source.next(number, &scene, &mut self.watcher, &self.interrupts).await?;
         let Some(pose) = next else {
             self.has_more_poses = false;
             return Ok(false);
         };
-        self.append(Entry::Pose { number, pose })?;
+        self.append(JournalEntry::Pose { number, pose })?;
         Ok(true)
     }
 
-    async fn pause(&self) -> Result<(), Halt> {
+    async fn pause(&self) -> Result<(), CollectError> {
         let pause = Duration::from_secs_f64(self.plan.keys.collection.pause_s);
         tokio::select! {
             () = tokio::time::sleep(pause) => Ok(()),
             () = self.interrupts.clone().wait() => {
-                Err(Halt::on_request())
+                Err(CollectError::interrupted())
             }
         }
     }
 
     /// Waits for the operator to confirm the ranger's pose (`poses.confirm`) and prompts for the
     /// conditions there.
-    async fn confirm_pose(&mut self, number: u32) -> Result<(), Halt> {
+    async fn confirm_pose(&mut self, number: u32) -> Result<(), CollectError> {
         let pose = self.pose(number);
         if self.confirmed_pose != Some(number) && self.plan.keys.poses.confirm {
-            self.watcher.rest();
+            self.watcher.measuring_paused();
             let question =
                 format!("put the ranger at {}, pose {number}, and press Enter:", pose.label());
             if answered(&mut self.watcher, &question, &self.interrupts).await?.is_none() {
-                return Err(Halt::wrong(
+                return Err(CollectError::invalid(
                     "poses.confirm needs a terminal to confirm the ranger's pose",
                     "run the command in a terminal, or without poses.confirm",
                 ));
@@ -191,30 +191,30 @@ impl<D: Device, W: Watcher> Collector<D, W> {
     }
 
     /// Moves a simulated ranger to a pose.
-    fn carry_to(&mut self, number: u32) -> Result<(), Halt> {
+    fn carry_to(&mut self, number: u32) -> Result<(), CollectError> {
         if self.device_pose == Some(number) || !self.device.is_local() {
             return Ok(());
         }
         let prepared = self.prepared(number)?;
         self.device_pose = Some(number);
-        self.device.carry_to(&prepared)
+        self.device.move_to(&prepared)
     }
 
     /// Prompts for the conditions of a pose that are not recorded yet.
-    async fn prompt_at_pose(&mut self, number: u32, mut pose: NamedPose) -> Result<(), Halt> {
+    async fn prompt_at_pose(&mut self, number: u32, mut pose: NamedPose) -> Result<(), CollectError> {
         let questions = self.plan.keys.ask.at_pose.clone();
         let open: Vec<_> =
             questions.into_iter().filter(|key| !pose.conditions.contains_key(key)).collect();
         if open.is_empty() {
             return Ok(());
         }
-        self.watcher.rest();
+        self.watcher.measuring_paused();
         for key in open {
             let question = format!("pose {number}, {}: {key}:", pose.label());
             let answer = answered(&mut self.watcher, &question, &self.interrupts).await?;
             pose.conditions.insert(key, answer.unwrap_or_default().into());
         }
-        self.append(Entry::Pose { number, pose })
+        self.append(JournalEntry::Pose { number, pose })
     }
 
     fn pose(&self, number: u32) -> NamedPose {
@@ -242,27 +242,27 @@ impl<D: Device, W: Watcher> Collector<D, W> {
         }
     }
 
-    fn append(&mut self, entry: Entry) -> Result<(), Halt> {
+    fn append(&mut self, entry: JournalEntry) -> Result<(), CollectError> {
         Ok(self.journal.append(entry)?)
     }
 
-    fn write_manifest(&self) -> Result<(), Halt> {
-        let manifest = Manifest::from_history(&self.folder, self.journal.history())?;
+    fn write_manifest(&self) -> Result<(), CollectError> {
+        let manifest = CollectionManifest::from_history(&self.folder, self.journal.history())?;
         Ok(manifest.write(&self.folder)?)
     }
 
     /// Writes the manifest and, for a complete collection, the report; logs a summary.
-    fn close(&self, complete: bool) -> Result<(), Halt> {
+    fn close(&self, complete: bool) -> Result<(), CollectError> {
         let history = self.journal.history();
         if complete {
-            self.watcher.report(&self.folder, history)?;
+            self.watcher.write_report(&self.folder, history)?;
         }
         self.write_manifest()?;
-        let requested = history.wanted();
+        let requested = history.requested();
         let done = history.accepted().count();
         let given_up = requested.iter().filter(|slot| history.is_given_up(**slot)).count();
         let (estimated_s, measured_s) = self.pace.times_s();
-        self.watcher.say(&format!(
+        self.watcher.message(&format!(
             "{done} of {} scans in {}, {} rejected, {given_up} given up; this run: {measured_s:.1} s \
              of scanning, estimated {estimated_s:.1} s",
             requested.len(),
@@ -270,7 +270,7 @@ impl<D: Device, W: Watcher> Collector<D, W> {
             history.set_aside().count(),
         ));
         if complete && given_up > 0 {
-            return Err(Halt::Stopped(format!(
+            return Err(CollectError::Stopped(format!(
                 "{given_up} scans failed (reasons in report.md); --retry-failed retries them"
             )));
         }
@@ -278,15 +278,15 @@ impl<D: Device, W: Watcher> Collector<D, W> {
     }
 
     /// Applies `collection.after_retakes` to a scan whose retakes are used up.
-    fn give_up(&mut self, slot: Slot) -> Result<Next, Halt> {
+    fn give_up(&mut self, slot: Slot) -> Result<Next, CollectError> {
         let retakes = self.plan.keys.collection.retakes;
         let Slot { pose, repeat } = slot;
         let reason = format!("pose {pose}, repeat {repeat}: {retakes} retakes failed");
         match self.plan.keys.collection.after_retakes {
             AfterRetakes::Stop => Ok(Next::Stop(reason)),
             AfterRetakes::GoOn => {
-                self.watcher.say(&format!("{reason}: continuing without this scan"));
-                self.append(Entry::GivenUp { slot, time: jiff::Timestamp::now() })?;
+                self.watcher.message(&format!("{reason}: continuing without this scan"));
+                self.append(JournalEntry::GivenUp { slot, time: jiff::Timestamp::now() })?;
                 Ok(Next::Continue)
             }
         }
@@ -294,16 +294,16 @@ impl<D: Device, W: Watcher> Collector<D, W> {
 }
 
 /// Free disk space at the collection's folder, bytes.
-fn free_bytes(folder: &Folder) -> Option<u64> {
+fn free_bytes(folder: &CollectionFolder) -> Option<u64> {
     let disk = rustix::fs::statvfs(folder.root()).ok()?;
     Some(disk.f_bavail.saturating_mul(disk.f_frsize))
 }
 
 /// Warns if the remaining scans are expected to exceed the free disk space.
-fn warn_of_disk(plan: &Plan, folder: &Folder, scans: u32, watcher: &impl Watcher) {
+fn warn_of_disk(plan: &CollectionPlan, folder: &CollectionFolder, scans: u32, watcher: &impl Observer) {
     let required = disk_bytes(plan, scans);
     if let Some(free) = free_bytes(folder).filter(|&free| required > free as f64) {
-        watcher.say(&format!(
+        watcher.message(&format!(
             "warning: the scans need about {:.0} MB; {:.0} MB of disk are free",
             required / 1e6,
             free as f64 / 1e6

@@ -14,13 +14,13 @@ pub(super) const MOTOR_STEP_HELP: &str =
 
 /// Reason for which a collection stopped, with its remedy.
 #[derive(Debug, Error)]
-pub enum Halt {
+pub enum CollectError {
     /// Stopped by the operator or by a rule of the plan.
     #[error("{0}")]
     Stopped(String),
     /// Request that cannot be carried out.
     #[error("{message}")]
-    Wrong {
+    Invalid {
         /// Description of the fault.
         message: String,
         /// Suggested correction for the user.
@@ -36,10 +36,10 @@ pub enum Halt {
     },
 }
 
-impl Halt {
+impl CollectError {
     /// Creates the error of a request that cannot be carried out.
-    pub fn wrong(message: impl std::fmt::Display, help: impl std::fmt::Display) -> Self {
-        Self::Wrong { message: message.to_string(), help: help.to_string() }
+    pub fn invalid(message: impl std::fmt::Display, help: impl std::fmt::Display) -> Self {
+        Self::Invalid { message: message.to_string(), help: help.to_string() }
     }
 
     /// Creates the error of a failed ranger, serial link or disk.
@@ -49,59 +49,59 @@ impl Halt {
 
     /// Creates the error of a collection stopped by a signal.
     #[must_use]
-    pub fn on_request() -> Self {
+    pub fn interrupted() -> Self {
         Self::Stopped("stopped on request".into())
     }
 }
 
-impl From<FolderError> for Halt {
+impl From<FolderError> for CollectError {
     fn from(error: FolderError) -> Self {
         Self::failed(&error, error.help())
     }
 }
 
-impl From<StoreError> for Halt {
+impl From<StoreError> for CollectError {
     fn from(error: StoreError) -> Self {
         Self::failed(&error, error.help())
     }
 }
 
-impl From<SinkError> for Halt {
+impl From<SinkError> for CollectError {
     fn from(error: SinkError) -> Self {
         Self::failed(&error, error.help())
     }
 }
 
-impl From<ClientError> for Halt {
+impl From<ClientError> for CollectError {
     fn from(error: ClientError) -> Self {
         Self::failed(&error, error.help())
     }
 }
 
-impl From<ScansError> for Halt {
+impl From<ScansError> for CollectError {
     fn from(error: ScansError) -> Self {
         match error {
-            ScansError::Forgotten(_) => Self::Stopped(error.to_string()),
+            ScansError::Cancelled(_) => Self::Stopped(error.to_string()),
             other => Self::failed(&other, other.help()),
         }
     }
 }
 
-impl From<PrepareError> for Halt {
+impl From<PrepareError> for CollectError {
     fn from(error: PrepareError) -> Self {
         match error {
-            PrepareError::Deaf(deaf) => Self::wrong(deaf, deaf.help()),
+            PrepareError::WindowTooShort(deaf) => Self::invalid(deaf, deaf.help()),
             PrepareError::Model(error) => {
-                Self::wrong(error, "correct [sensor] in the plan, or the sensor's data")
+                Self::invalid(error, "correct [sensor] in the plan, or the sensor's data")
             }
         }
     }
 }
 
-impl From<ScanError> for Halt {
+impl From<ScanError> for CollectError {
     fn from(error: ScanError) -> Self {
         match error {
-            ScanError::Plan(error) => Self::wrong(error, MOTOR_STEP_HELP),
+            ScanError::Plan(error) => Self::invalid(error, MOTOR_STEP_HELP),
             ScanError::Device(error) => Self::failed(error, error.help()),
             ScanError::Sink(error) => error.into(),
         }

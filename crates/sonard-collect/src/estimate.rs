@@ -5,10 +5,10 @@ use firmware_protocol::messages::{
 };
 use sonard_device::{
     link::BAUD,
-    ranger::{Budget, Listening},
+    ranger::{ScanDuration, ReceiverTiming},
 };
 
-use super::{Halt, Plan, error::MOTOR_STEP_HELP};
+use super::{CollectError, CollectionPlan, error::MOTOR_STEP_HELP};
 
 /// Mean size of a ping record with prediction, and of a scan's other records, bytes. Measured with
 /// the mock in the shipped scenes.
@@ -19,25 +19,25 @@ const SCAN_BYTES: f64 = 5_000.0;
 ///
 /// # Errors
 /// Returns an error if an azimuth is not a multiple of the motor step or the air is invalid.
-pub fn budget(plan: &Plan) -> Result<Budget, Halt> {
+pub fn budget(plan: &CollectionPlan) -> Result<ScanDuration, CollectError> {
     let steps_per_revolution = plan.steps_per_revolution;
     let motor = plan
         .azimuths
         .motor_steps(steps_per_revolution.into())
-        .map_err(|error| Halt::wrong(error, MOTOR_STEP_HELP))?;
+        .map_err(|error| CollectError::invalid(error, MOTOR_STEP_HELP))?;
     let air = plan.air(plan.keys.air.temperature_c)?;
-    let listening = Listening {
+    let listening = ReceiverTiming {
         max_range_m: plan.keys.sensor.options.max_range_m.unwrap_or(plan.sensor.max_range_m),
         sound_speed_m_s: air.sound_speed_m_s(),
         blanking_us: plan.sensor.blanking_us,
     };
     let settings = plan.motion().settings(&listening, &assumed_device(steps_per_revolution));
-    Ok(Budget::for_plan(&plan.azimuths, &settings, motor, BAUD))
+    Ok(ScanDuration::for_plan(&plan.azimuths, &settings, motor, BAUD))
 }
 
 /// Estimates the disk space of `scans` scans, bytes.
 #[must_use]
-pub fn disk_bytes(plan: &Plan, scans: u32) -> f64 {
+pub fn disk_bytes(plan: &CollectionPlan, scans: u32) -> f64 {
     f64::from(scans) * (SCAN_BYTES + PING_BYTES * f64::from(plan.azimuths.beams()))
 }
 

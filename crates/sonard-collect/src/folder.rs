@@ -14,7 +14,7 @@ use std::{
 };
 
 use sha2::{Digest as _, Sha256};
-use sonard_log::{WholeFile, digest_of, hexadecimal, sync_folder_of};
+use sonard_log::{AtomicFile, file_digest, to_hex, sync_folder_of};
 
 use super::order::Slot;
 
@@ -35,7 +35,7 @@ pub const JOURNAL: &str = "journal.jsonl";
 
 /// File at its final path, with size and digest.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Sealed {
+pub struct SealedFile {
     /// Path relative to the collection's folder.
     pub file: String,
     /// File size, bytes.
@@ -46,11 +46,11 @@ pub struct Sealed {
 
 /// Folder of a collection.
 #[derive(Debug, Clone)]
-pub struct Folder {
+pub struct CollectionFolder {
     root: PathBuf,
 }
 
-impl Folder {
+impl CollectionFolder {
     /// Opens the folder and creates missing subfolders.
     ///
     /// # Errors
@@ -60,7 +60,7 @@ impl Folder {
             && !root.join(JOURNAL).exists()
             && !root.join(TAKING).exists();
         if has_other_files {
-            return Err(FolderError::Strange { path: root.into() });
+            return Err(FolderError::NotACollection { path: root.into() });
         }
         for part in [TAKING, SCANS, SET_ASIDE, INPUTS] {
             let path = root.join(part);
@@ -71,7 +71,7 @@ impl Folder {
 
     /// Creates a handle for reading, without touching the folder.
     #[must_use]
-    pub fn at(root: &Path) -> Self {
+    pub fn existing(root: &Path) -> Self {
         Self { root: root.into() }
     }
 
@@ -89,8 +89,8 @@ impl Folder {
 
     /// Path of a scan while it is recorded.
     #[must_use]
-    pub fn taking(&self, slot: Slot) -> PathBuf {
-        self.root.join(TAKING).join(format!("{}.jsonl", stem(slot)))
+    pub fn draft_path(&self, slot: Slot) -> PathBuf {
+        self.root.join(TAKING).join(format!("{}.jsonl", scan_stem(slot)))
     }
 
     /// Lists the accepted scans by their file names.
@@ -105,7 +105,7 @@ impl Folder {
     ///
     /// # Errors
     /// Returns an error if the folder cannot be read.
-    pub fn left_over(&self) -> Result<Vec<Slot>, FolderError> {
+    pub fn interrupted_scans(&self) -> Result<Vec<Slot>, FolderError> {
         Ok(self.files(TAKING)?.iter().filter_map(|name| slot_of(name)).collect())
     }
 
@@ -113,16 +113,16 @@ impl Folder {
     ///
     /// # Errors
     /// Returns an error if the scan was accepted before, or the disk fails.
-    pub fn accept(&self, slot: Slot) -> Result<Sealed, FolderError> {
-        self.seal(slot, format!("{SCANS}/{}.jsonl", stem(slot)))
+    pub fn accept(&self, slot: Slot) -> Result<SealedFile, FolderError> {
+        self.seal(slot, format!("{SCANS}/{}.jsonl", scan_stem(slot)))
     }
 
     /// Moves an incomplete or rejected scan into `set-aside/`, under the next take number.
     ///
     /// # Errors
     /// Returns an error if the disk fails.
-    pub fn set_aside(&self, slot: Slot) -> Result<Sealed, FolderError> {
-        let stem = stem(slot);
+    pub fn set_aside(&self, slot: Slot) -> Result<SealedFile, FolderError> {
+        let stem = scan_stem(slot);
         let prefix = format!("{stem}-take");
         let takes = self.files(SET_ASIDE)?;
         let last = takes
@@ -145,7 +145,7 @@ impl Folder {
     /// # Errors
     /// Returns an error if the disk fails.
     pub fn discard(&self, slot: Slot) -> Result<(), FolderError> {
-        let path = self.taking(slot);
+        let path = self.draft_path(slot);
         match fs::remove_file(&path) {
             Err(source) if source.kind() != io::ErrorKind::NotFound => {
                 Err(FolderError::io("remove", &path, source))
@@ -158,8 +158,8 @@ impl Folder {
     ///
     /// # Errors
     /// Returns an error if the file cannot be read.
-    pub fn sealed(&self, slot: Slot) -> Result<Sealed, FolderError> {
-        self.look(format!("{SCANS}/{}.jsonl", stem(slot)))
+    pub fn digest_of_scan(&self, slot: Slot) -> Result<SealedFile, FolderError> {
+        self.digest_of_file(format!("{SCANS}/{}.jsonl", scan_stem(slot)))
     }
 
     /// Replaces a file atomically: a crash leaves either the old or the new content.
@@ -171,7 +171,7 @@ impl Folder {
         if let Some(folder) = path.parent() {
             fs::create_dir_all(folder).map_err(|s| FolderError::io("create", folder, s))?;
         }
-        WholeFile::write(&path, bytes).map_err(|source| FolderError::io("write", &path, source))
+        AtomicFile::write(&path, bytes).map_err(|source| FolderError::io("write", &path, source))
     }
 
     /// Removes unfinished files of [`write`](Self::write) after a kill. The caller must hold the
@@ -191,12 +191,12 @@ impl Folder {
     ///
     /// # Errors
     /// Returns an error if the file cannot be read.
-    pub fn look(&self, file: String) -> Result<Sealed, FolderError> {
+    pub fn digest_of_file(&self, file: String) -> Result<SealedFile, FolderError> {
         let path = self.root.join(&file);
         let (bytes, sha256) = File::open(&path)
-            .and_then(|mut file| digest_of(&mut file))
+            .and_then(|mut file| file_digest(&mut file))
             .map_err(|source| FolderError::io("read", &path, source))?;
-        Ok(Sealed { file, bytes, sha256 })
+        Ok(SealedFile { file, bytes, sha256 })
     }
 
     /// Lists all files recursively, relative to the folder and sorted.
@@ -221,9 +221,9 @@ impl Folder {
         Ok(files)
     }
 
-    fn seal(&self, slot: Slot, file: String) -> Result<Sealed, FolderError> {
-        self.rename(&self.taking(slot), &file)?;
-        self.look(file)
+    fn seal(&self, slot: Slot, file: String) -> Result<SealedFile, FolderError> {
+        self.rename(&self.draft_path(slot), &file)?;
+        self.digest_of_file(file)
     }
 
     /// Renames without replacing an existing file, and syncs both folders.
@@ -257,12 +257,12 @@ impl Folder {
 /// SHA-256 of bytes, hexadecimal.
 #[must_use]
 pub fn sha256(bytes: &[u8]) -> String {
-    hexadecimal(&Sha256::digest(bytes))
+    to_hex(&Sha256::digest(bytes))
 }
 
 /// File name of a scan without extension. Names sort in scan order up to 999 poses.
 #[must_use]
-pub fn stem(slot: Slot) -> String {
+pub fn scan_stem(slot: Slot) -> String {
     format!("p{:03}-r{:02}", slot.pose, slot.repeat)
 }
 
@@ -278,7 +278,7 @@ mod tests {
     #[test]
     fn file_names_of_slots() {
         for slot in [Slot { pose: 1, repeat: 2 }, Slot { pose: 1234, repeat: 567 }] {
-            assert_eq!(slot_of(&format!("{}.jsonl", stem(slot))), Some(slot));
+            assert_eq!(slot_of(&format!("{}.jsonl", scan_stem(slot))), Some(slot));
         }
         assert_eq!(slot_of("p001-r01.jsonl.torn-1"), None);
         assert_eq!(slot_of("notes.txt"), None);
@@ -287,24 +287,24 @@ mod tests {
     #[test]
     fn accepts_once_and_numbers_takes() {
         let root = tempfile::tempdir().expect("a folder");
-        let folder = Folder::open(root.path()).expect("created");
+        let folder = CollectionFolder::open(root.path()).expect("created");
         let slot = Slot { pose: 2, repeat: 1 };
-        let take = |text: &str| fs::write(folder.taking(slot), text).expect("writable");
+        let take = |text: &str| fs::write(folder.draft_path(slot), text).expect("writable");
         take("one");
         fs::write(root.path().join("taking/p002-r01.jsonl.torn-1"), "x").expect("writable");
-        assert_eq!(folder.left_over().expect("readable"), [slot]);
+        assert_eq!(folder.interrupted_scans().expect("readable"), [slot]);
         assert_eq!(folder.set_aside(slot).expect("kept").file, "set-aside/p002-r01-take1.jsonl");
         take("two");
         assert_eq!(folder.set_aside(slot).expect("kept").file, "set-aside/p002-r01-take2.jsonl");
         take("abc");
         let sealed = folder.accept(slot).expect("accepted");
-        assert_eq!(sealed, folder.sealed(slot).expect("readable"));
+        assert_eq!(sealed, folder.digest_of_scan(slot).expect("readable"));
         // FIPS 180-2, appendix B.1.
         let known = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad";
         assert_eq!((sealed.bytes, sealed.sha256.as_str()), (3, known));
         take("again");
         assert!(folder.accept(slot).is_err(), "an accepted scan was replaced");
-        assert_eq!(folder.sealed(slot).expect("readable"), sealed);
+        assert_eq!(folder.digest_of_scan(slot).expect("readable"), sealed);
         let files = folder.all_files().expect("readable");
         assert!(files.contains(&"set-aside/p002-r01-take1.jsonl.torn-1".to_owned()), "{files:?}");
     }
@@ -313,14 +313,14 @@ mod tests {
     fn rejects_other_folders() {
         let root = tempfile::tempdir().expect("a folder");
         fs::write(root.path().join("thesis.tex"), "").expect("writable");
-        assert!(matches!(Folder::open(root.path()), Err(FolderError::Strange { .. })));
+        assert!(matches!(CollectionFolder::open(root.path()), Err(FolderError::NotACollection { .. })));
         assert_eq!(fs::read_dir(root.path()).expect("readable").count(), 1);
     }
 
     #[test]
     fn replaces_files_atomically() {
         let root = tempfile::tempdir().expect("a folder");
-        let folder = Folder::open(root.path()).expect("created");
+        let folder = CollectionFolder::open(root.path()).expect("created");
         for text in ["first", "second"] {
             folder.write("manifest.json", text.as_bytes()).expect("written");
         }

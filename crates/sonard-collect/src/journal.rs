@@ -12,12 +12,12 @@ use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use sonard_api::{AirOrder, config::ScanningKeys};
-use sonard_log::{open_own, sync_file};
+use sonard_log::{open_no_follow, sync_file};
 use sonard_records::{Device, Provenance, SceneRef};
 use uuid::Uuid;
 
 use super::{
-    checks::{Figures, Finding},
+    checks::{ScanFigures, CheckFinding},
     folder::FolderError,
     keys::{CollectionKeys, Conditions},
     order::{Slot, slots},
@@ -27,11 +27,11 @@ use super::{
 /// Line of the journal.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "entry", rename_all = "snake_case")]
-pub enum Entry {
+pub enum JournalEntry {
     /// Plan that applies to the following entries.
     Plan(Box<PlanEntry>),
     /// Start of a run.
-    Started(Box<Started>),
+    Started(Box<RunStart>),
     /// Number assigned to a pose, or its updated conditions.
     Pose {
         /// Number of the pose, from 1.
@@ -41,9 +41,9 @@ pub enum Entry {
         pose: NamedPose,
     },
     /// Result of a scan.
-    Take(Box<Take>),
+    Take(Box<ScanAttempt>),
     /// Settings of the daemon before the collection changed them.
-    Borrowed(Borrowed),
+    Borrowed(SavedSettings),
     /// Restoration of the daemon's settings.
     GivenBack {
         /// Time of the restoration.
@@ -80,7 +80,7 @@ pub struct PlanEntry {
 
 /// Start of a run, with the identified device.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Started {
+pub struct RunStart {
     /// Start time.
     pub time: Timestamp,
     /// Identity of the ranger.
@@ -94,19 +94,19 @@ pub struct Started {
 
 /// Settings of a daemon before a collection changed them; unchanged ones are omitted.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-pub struct Borrowed {
+pub struct SavedSettings {
     /// Scan mode and interval.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub scanning: Option<ScanningKeys>,
     /// PoseSource of the air settings.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub air: Option<AirBefore>,
+    pub air: Option<SavedAir>,
 }
 
 /// PoseSource of a daemon's air settings.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum AirBefore {
+pub enum SavedAir {
     /// Configuration and thermometer of the daemon.
     Own,
     /// Values set by a client.
@@ -116,7 +116,7 @@ pub enum AirBefore {
 /// Outcome of a scan.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Outcome {
+pub enum ScanOutcome {
     /// Accepted as part of the collection.
     Accepted,
     /// Rejected by a check; kept in `set-aside/`.
@@ -127,7 +127,7 @@ pub enum Outcome {
 
 /// Result of one attempt at a scan.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Take {
+pub struct ScanAttempt {
     /// Pose and repeat of the scan.
     #[serde(flatten)]
     pub slot: Slot,
@@ -136,7 +136,7 @@ pub struct Take {
     /// Start time of the scan.
     pub started: Option<Timestamp>,
     /// Outcome of the scan.
-    pub outcome: Outcome,
+    pub outcome: ScanOutcome,
     /// Path of the log, relative to the collection's folder.
     pub file: String,
     /// Size of the log, bytes.
@@ -144,10 +144,10 @@ pub struct Take {
     /// SHA-256 of the log, hexadecimal.
     pub sha256: String,
     /// Quality figures of the scan.
-    pub figures: Figures,
+    pub figures: ScanFigures,
     /// Violations of the plan's checks.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub findings: Vec<Finding>,
+    pub findings: Vec<CheckFinding>,
     /// Reason for an early end.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub cut: Option<String>,
@@ -157,37 +157,37 @@ pub struct Take {
 
 /// State of a collection, accumulated from its journal.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct History {
+pub struct CollectionHistory {
     /// Plans in order; the last one is current.
     pub plans: Vec<PlanEntry>,
     /// Starts of runs, in order.
-    pub starts: Vec<Started>,
+    pub starts: Vec<RunStart>,
     /// Poses by their number, from 1.
     pub poses: BTreeMap<u32, NamedPose>,
     /// Results of all attempts, in order.
-    pub takes: Vec<Take>,
+    pub attempts: Vec<ScanAttempt>,
     /// Scans that are not repeated any more.
     pub given_up: BTreeSet<Slot>,
     /// Settings that still have to be restored.
-    pub borrowed: Option<Borrowed>,
+    pub saved_settings: Option<SavedSettings>,
 }
 
-impl History {
-    fn apply(&mut self, entry: Entry) {
+impl CollectionHistory {
+    fn apply(&mut self, entry: JournalEntry) {
         match entry {
-            Entry::Plan(plan) => self.plans.push(*plan),
-            Entry::Started(started) => self.starts.push(*started),
-            Entry::Pose { number, pose } => drop(self.poses.insert(number, pose)),
-            Entry::Take(take) => self.takes.push(*take),
-            Entry::Borrowed(before) => self.borrowed = Some(before),
-            Entry::GivenBack { .. } => self.borrowed = None,
-            Entry::GivenUp { slot, .. } => drop(self.given_up.insert(slot)),
+            JournalEntry::Plan(plan) => self.plans.push(*plan),
+            JournalEntry::Started(started) => self.starts.push(*started),
+            JournalEntry::Pose { number, pose } => drop(self.poses.insert(number, pose)),
+            JournalEntry::Take(take) => self.attempts.push(*take),
+            JournalEntry::Borrowed(before) => self.saved_settings = Some(before),
+            JournalEntry::GivenBack { .. } => self.saved_settings = None,
+            JournalEntry::GivenUp { slot, .. } => drop(self.given_up.insert(slot)),
         }
     }
 
     /// Lists the scans requested by the current plan, in measuring order, for all known poses.
     #[must_use]
-    pub fn wanted(&self) -> Vec<Slot> {
+    pub fn requested(&self) -> Vec<Slot> {
         let Some(plan) = self.plans.last() else { return Vec::new() };
         let keys: CollectionKeys = serde_json::from_value(plan.keys.clone()).unwrap_or_default();
         let all = || self.poses.keys().copied().collect();
@@ -203,25 +203,25 @@ impl History {
     }
 
     /// Iterates over the accepted scans.
-    pub fn accepted(&self) -> impl Iterator<Item = &Take> {
-        self.takes.iter().filter(|take| take.outcome == Outcome::Accepted)
+    pub fn accepted(&self) -> impl Iterator<Item = &ScanAttempt> {
+        self.attempts.iter().filter(|take| take.outcome == ScanOutcome::Accepted)
     }
 
     /// Iterates over the rejected and incomplete scans.
-    pub fn set_aside(&self) -> impl Iterator<Item = &Take> {
-        self.takes.iter().filter(|take| take.outcome != Outcome::Accepted)
+    pub fn set_aside(&self) -> impl Iterator<Item = &ScanAttempt> {
+        self.attempts.iter().filter(|take| take.outcome != ScanOutcome::Accepted)
     }
 }
 
 /// Journal file, locked by this process.
 #[derive(Debug)]
-pub struct Journal {
+pub struct CollectionJournal {
     file: File,
     path: PathBuf,
-    history: History,
+    history: CollectionHistory,
 }
 
-impl Journal {
+impl CollectionJournal {
     /// Opens and reads a journal, or creates it. An incomplete last line is removed: its decision
     /// was not carried out.
     ///
@@ -230,7 +230,7 @@ impl Journal {
     /// is not a valid entry.
     pub fn open(path: &Path) -> Result<Self, FolderError> {
         let fail = |source| FolderError::io("open", path, source);
-        let mut file = open_own(OpenOptions::new().read(true).append(true).create(true), path)
+        let mut file = open_no_follow(OpenOptions::new().read(true).append(true).create(true), path)
             .map_err(fail)?;
         match rustix::fs::flock(&file, rustix::fs::FlockOperation::NonBlockingLockExclusive) {
             Ok(()) => {}
@@ -254,7 +254,7 @@ impl Journal {
 
     /// State accumulated from the journal.
     #[must_use]
-    pub const fn history(&self) -> &History {
+    pub const fn history(&self) -> &CollectionHistory {
         &self.history
     }
 
@@ -262,7 +262,7 @@ impl Journal {
     ///
     /// # Errors
     /// Returns an error if the disk is full or fails; the entry is then removed from the journal.
-    pub fn append(&mut self, entry: Entry) -> Result<(), FolderError> {
+    pub fn append(&mut self, entry: JournalEntry) -> Result<(), FolderError> {
         let fail = |source| FolderError::io("write to", &self.path, source);
         let mut line = serde_json::to_vec(&entry).map_err(|error| fail(error.into()))?;
         line.push(b'\n');
@@ -282,7 +282,7 @@ impl Journal {
 ///
 /// # Errors
 /// Returns an error if the file cannot be read or a line is not a valid entry.
-pub fn read_journal(path: &Path) -> Result<History, FolderError> {
+pub fn read_journal(path: &Path) -> Result<CollectionHistory, FolderError> {
     let text = std::fs::read(path).map_err(|source| FolderError::io("read", path, source))?;
     read(complete_lines(&text), path)
 }
@@ -293,8 +293,8 @@ fn complete_lines(text: &[u8]) -> &[u8] {
     &text[..length]
 }
 
-fn read(text: &[u8], path: &Path) -> Result<History, FolderError> {
-    let mut history = History::default();
+fn read(text: &[u8], path: &Path) -> Result<CollectionHistory, FolderError> {
+    let mut history = CollectionHistory::default();
     let lines = text.split(|&byte| byte == b'\n').enumerate();
     for (index, line) in lines.filter(|(_, line)| !line.is_empty()) {
         let entry = serde_json::from_slice(line).map_err(|error| FolderError::Damaged {
@@ -338,30 +338,30 @@ mod tests {
         }
     }
 
-    fn pose(number: u32) -> Entry {
+    fn pose(number: u32) -> JournalEntry {
         let pose = sonard_model::geometry::Pose { x_m: 0.5, y_m: 0.25, heading_deg: 90.0 };
         let conditions = [("door".to_owned(), Value::from("open"))].into_iter().collect();
-        Entry::Pose { number, pose: NamedPose { name: Some("a".into()), pose, conditions } }
+        JournalEntry::Pose { number, pose: NamedPose { name: Some("a".into()), pose, conditions } }
     }
 
     #[test]
     fn truncation_at_any_byte() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("journal.jsonl");
-        let mut journal = Journal::open(&path).expect("created");
+        let mut journal = CollectionJournal::open(&path).expect("created");
         for number in 1..=3 {
             journal.append(pose(number)).expect("written");
         }
         let slot = Slot { pose: 3, repeat: 2 };
         let time = Timestamp::UNIX_EPOCH;
-        journal.append(Entry::GivenUp { slot, time }).expect("written");
-        assert!(matches!(Journal::open(&path), Err(FolderError::Busy { .. })));
+        journal.append(JournalEntry::GivenUp { slot, time }).expect("written");
+        assert!(matches!(CollectionJournal::open(&path), Err(FolderError::Busy { .. })));
         drop(journal);
         let text = std::fs::read(&path).expect("readable");
         for length in 0..=text.len() {
             std::fs::write(&path, &text[..length]).expect("writable");
             let lines = text[..length].iter().filter(|&&byte| byte == b'\n').count();
-            let mut journal = Journal::open(&path).expect("reopened");
+            let mut journal = CollectionJournal::open(&path).expect("reopened");
             assert_eq!(journal.history().poses.len(), lines.min(3));
             assert_eq!(journal.history().given_up.contains(&slot), lines == 4);
             journal.append(pose(9)).expect("written");
@@ -375,7 +375,7 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("journal.jsonl");
         std::fs::write(&path, "{\"entry\":\"given_up\"}\n").expect("writable");
-        let error = Journal::open(&path).expect_err("damaged");
+        let error = CollectionJournal::open(&path).expect_err("damaged");
         assert!(error.to_string().contains("journal.jsonl:1: missing field"), "{error}");
     }
 }

@@ -8,7 +8,7 @@ use std::sync::LazyLock;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use sonard_api::config::{
-    CollectionAirKeys, DeviceKeys, Form, MotionKeys, PlanKeys, Section, read_sections,
+    CollectionAirKeys, DeviceKeys, ConfigForm, MotionKeys, PlanKeys, Section, read_sections,
 };
 use sonard_model::model::OptionKeys;
 
@@ -286,7 +286,7 @@ impl Default for CheckKeys {
     }
 }
 
-impl Form for CollectionKeys {
+impl ConfigForm for CollectionKeys {
     const HEAD: &'static str = "\
 # Plan of a collection for `sonard collect`, with every key and its default; keys without a default
 # are comments with an example. `sonard collect PLAN.toml --check` validates it, `--plan-only`
@@ -303,10 +303,10 @@ impl Form for CollectionKeys {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use sonard_api::config::{Kind, Layers, document};
+    use sonard_api::config::{ValueKind, ConfigLayers, document};
 
     fn read(text: &str) -> Result<CollectionKeys, sonard_api::config::ConfigError> {
-        Layers::<CollectionKeys>::new().file("plan.toml", text)?.keys()
+        ConfigLayers::<CollectionKeys>::new().with_file("plan.toml", text)?.into_keys()
     }
 
     #[test]
@@ -318,7 +318,7 @@ mod tests {
                 let path = format!("{}.{}", section.name, key.name);
                 assert!(key.about.ends_with('.'), "{path}: {}", key.about);
                 assert!(key.default.is_some() || key.example.is_some(), "{path}");
-                if let Kind::Number { min, max } | Kind::Whole { min, max } = key.kind {
+                if let ValueKind::Number { min, max } | ValueKind::Whole { min, max } = key.kind {
                     assert!(min > f64::MIN && max < f64::MAX, "{path}");
                 }
             }

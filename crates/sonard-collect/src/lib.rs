@@ -33,25 +33,25 @@ mod remote_device;
 mod repeatability;
 mod retry;
 
-pub use checks::{Figures, Finding, check, is_cut, verdict};
-pub use device::{Connected, Device, ScanOrder};
-pub use engine::{Choices, collect};
-pub use error::Halt;
+pub use checks::{ScanFigures, CheckFinding, check_figures, ended_early, strongest_action};
+pub use device::{ConnectedDevice, ScanDevice, ScanTask};
+pub use engine::{RunOptions, collect};
+pub use error::CollectError;
 pub use estimate::{budget, disk_bytes};
-pub use folder::{Folder, FolderError, INPUTS, JOURNAL, SCANS, SET_ASIDE, Sealed, sha256, stem};
+pub use folder::{CollectionFolder, FolderError, INPUTS, JOURNAL, SCANS, SET_ASIDE, SealedFile, sha256, scan_stem};
 pub use journal::{
-    AirBefore, Borrowed, Entry, History, Journal, Outcome, PlanEntry, Started, Take, read_journal,
+    SavedAir, SavedSettings, JournalEntry, CollectionHistory, CollectionJournal, ScanOutcome, PlanEntry, RunStart, ScanAttempt, read_journal,
 };
 pub use keys::{
     Action, AfterRetakes, AirAction, AskKeys, CheckKeys, CollectionKeys, CollectionSection,
     Conditions, Order, PosesKeys, SceneKeys, SensorKeys,
 };
-pub use manifest::{Counts, FileEntry, MANIFEST, Manifest, ScanEntry, Verified, verify};
-pub use observer::Watcher;
+pub use manifest::{CollectionCounts, FileEntry, MANIFEST, CollectionManifest, ScanEntry, Verification, verify_collection};
+pub use observer::Observer;
 pub use order::{Slot, slots};
-pub use plan::{Plan, Poses};
-pub use poses::{NamedPose, PoseFault, PoseLine, numbers_of, read_file, read_lines};
-pub use record_scan::{Taken, take};
-pub use remote_device::{ByDaemon, steps_per_revolution};
+pub use plan::{CollectionPlan, Poses};
+pub use poses::{NamedPose, PoseFault, PoseLine, find_numbers, parse_pose_file, parse_pose_lines};
+pub use record_scan::{RecordedScan, record_scan};
+pub use remote_device::{RemoteDevice, steps_per_revolution};
 pub use repeatability::{BeamSpread, Repeatability, repeatability};
-pub use retry::Patience;
+pub use retry::RetrySchedule;

@@ -15,8 +15,8 @@ use sonard_records::SceneRef;
 use uuid::Uuid;
 
 use super::{
-    folder::{Folder, FolderError, JOURNAL, Sealed},
-    journal::{History, Outcome, Started, read_journal},
+    folder::{CollectionFolder, FolderError, JOURNAL, SealedFile},
+    journal::{CollectionHistory, ScanOutcome, RunStart, read_journal},
     order::Slot,
     poses::NamedPose,
 };
@@ -28,7 +28,7 @@ const FORMAT: u32 = 1;
 
 /// Contents of a collection, with a digest per file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Manifest {
+pub struct CollectionManifest {
     /// Format version of the manifest.
     pub format: u32,
     /// Identifier of the collection.
@@ -42,7 +42,7 @@ pub struct Manifest {
     /// `true` if every scan of the plan is accepted or given up.
     pub complete: bool,
     /// Numbers of scans and beams.
-    pub counts: Counts,
+    pub counts: CollectionCounts,
     /// Effective values of all keys of the plan.
     pub plan: Value,
     /// SHA-256 of the plan's keys as compact JSON, hexadecimal.
@@ -52,7 +52,7 @@ pub struct Manifest {
     /// SHA-256 of the sensor's data, hexadecimal.
     pub sensor_sha256: String,
     /// Starts of runs, with the identified device and the entered conditions.
-    pub starts: Vec<Started>,
+    pub starts: Vec<RunStart>,
     /// Poses by their number, from 1.
     pub poses: BTreeMap<u32, NamedPose>,
     /// All files except the manifest.
@@ -61,7 +61,7 @@ pub struct Manifest {
 
 /// Numbers of scans by outcome, and of beams.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Counts {
+pub struct CollectionCounts {
     /// Scans requested by the plan, for all known poses.
     pub wanted: u32,
     /// Number of accepted scans.
@@ -99,28 +99,28 @@ pub struct ScanEntry {
     /// Identifier of the scan in records.
     pub id: Option<Uuid>,
     /// Outcome of the scan.
-    pub outcome: Outcome,
+    pub outcome: ScanOutcome,
     /// Beams of the scan plan.
     pub beams: u32,
     /// Beams without a usable reading.
     pub missing: u32,
 }
 
-impl Manifest {
+impl CollectionManifest {
     /// Builds the manifest of a folder. Digests of scans are those of the journal, computed at
     /// acceptance; other files are read.
     ///
     /// # Errors
     /// Returns an error if a file cannot be read or the journal has no plan.
-    pub fn from_history(folder: &Folder, history: &History) -> Result<Self, FolderError> {
-        let requested = history.wanted();
+    pub fn from_history(folder: &CollectionFolder, history: &CollectionHistory) -> Result<Self, FolderError> {
+        let requested = history.requested();
         let plan = history.plans.last().ok_or_else(|| FolderError::Damaged {
             path: folder.journal(),
             line: 1,
             message: "the journal has no plan".into(),
         })?;
         let mut files = BTreeMap::new();
-        for take in &history.takes {
+        for take in &history.attempts {
             let scan = ScanEntry {
                 slot: take.slot,
                 id: take.scan,
@@ -138,7 +138,7 @@ impl Manifest {
         }
         for path in folder.all_files()? {
             if path != MANIFEST && !files.contains_key(&path) {
-                let Sealed { file: path, bytes, sha256 } = folder.look(path)?;
+                let SealedFile { file: path, bytes, sha256 } = folder.digest_of_file(path)?;
                 files.insert(path.clone(), FileEntry { path, bytes, sha256, scan: None });
             }
         }
@@ -152,7 +152,7 @@ impl Manifest {
             written: Timestamp::now(),
             sonard: env!("CARGO_PKG_VERSION").into(),
             complete: requested.iter().find(open).is_none(),
-            counts: Counts {
+            counts: CollectionCounts {
                 wanted: requested.len() as u32,
                 accepted: done.len() as u32,
                 set_aside: history.set_aside().count() as u32,
@@ -174,7 +174,7 @@ impl Manifest {
     ///
     /// # Errors
     /// Returns an error if the disk is full or fails; the previous manifest is then kept.
-    pub fn write(&self, folder: &Folder) -> Result<(), FolderError> {
+    pub fn write(&self, folder: &CollectionFolder) -> Result<(), FolderError> {
         let text = serde_json::to_string_pretty(self).unwrap_or_default() + "\n";
         folder.write(MANIFEST, text.as_bytes())
     }
@@ -196,9 +196,9 @@ impl Manifest {
 
 /// Result of verifying a collection.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Verified {
+pub struct Verification {
     /// Manifest that the files were compared with.
-    pub manifest: Manifest,
+    pub manifest: CollectionManifest,
     /// Problems, each with its file; empty if the collection is intact.
     pub problems: Vec<String>,
 }
@@ -208,9 +208,9 @@ pub struct Verified {
 ///
 /// # Errors
 /// Returns an error if the manifest or the folder cannot be read.
-pub fn verify(root: &Path, mut each: impl FnMut()) -> Result<Verified, FolderError> {
-    let manifest = Manifest::read(root)?;
-    let folder = Folder::at(root);
+pub fn verify_collection(root: &Path, mut each: impl FnMut()) -> Result<Verification, FolderError> {
+    let manifest = CollectionManifest::read(root)?;
+    let folder = CollectionFolder::existing(root);
     let mut problems = Vec::new();
     let listed: BTreeSet<&str> = manifest.files.iter().map(|file| file.path.as_str()).collect();
     for path in folder.all_files()? {
@@ -222,7 +222,7 @@ pub fn verify(root: &Path, mut each: impl FnMut()) -> Result<Verified, FolderErr
     for file in &manifest.files {
         problems.extend(difference(&folder, file));
         if let Some(scan) = &file.scan {
-            if scan.outcome == Outcome::Accepted && !seen.insert(scan.slot) {
+            if scan.outcome == ScanOutcome::Accepted && !seen.insert(scan.slot) {
                 let Slot { pose, repeat } = scan.slot;
                 problems.push(format!("{}: pose {pose}, repeat {repeat} twice", file.path));
             }
@@ -238,12 +238,12 @@ pub fn verify(root: &Path, mut each: impl FnMut()) -> Result<Verified, FolderErr
     if !manifest.complete {
         problems.push("the collection is not complete: run the same command to resume".into());
     }
-    Ok(Verified { manifest, problems })
+    Ok(Verification { manifest, problems })
 }
 
-fn difference(folder: &Folder, file: &FileEntry) -> Option<String> {
+fn difference(folder: &CollectionFolder, file: &FileEntry) -> Option<String> {
     let path = &file.path;
-    match folder.look(path.clone()) {
+    match folder.digest_of_file(path.clone()) {
         Err(error) => Some(format!("{path}: {error}")),
         Ok(found) if found.bytes != file.bytes => {
             Some(format!("{path}: {} bytes, {} in the manifest", found.bytes, file.bytes))
@@ -257,13 +257,13 @@ fn difference(folder: &Folder, file: &FileEntry) -> Option<String> {
 
 /// Problems in the log of an accepted scan.
 fn scan_problems(path: &Path, file: &FileEntry, scan: &ScanEntry) -> Vec<String> {
-    if scan.outcome != Outcome::Accepted {
+    if scan.outcome != ScanOutcome::Accepted {
         return Vec::new();
     }
     let Ok(open) = fs::File::open(path) else { return Vec::new() };
     let mut problems = Vec::new();
     let name = &file.path;
-    let checked = check(BufReader::new(open), |finding| {
+    let checked = check_log(BufReader::new(open), |finding| {
         if finding.severity == Severity::Problem {
             problems.push(format!("{name}: {finding}"));
         }

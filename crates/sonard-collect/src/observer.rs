@@ -1,32 +1,32 @@
 //! Progress reports and prompts of a running collection.
 
-use super::{Folder, Halt, History};
+use super::{CollectionFolder, CollectError, CollectionHistory};
 
 /// Receiver of progress reports that answers prompts: a terminal, or an unattended process.
-pub trait Watcher: Send + Sync {
+pub trait Observer: Send + Sync {
     /// Reports the start of a scan, after `done` of `total` scans; `left_s` is the estimated
     /// remaining time in seconds.
-    fn begin(&self, label: &str, done: u32, total: u32, left_s: f64);
+    fn scan_started(&self, label: &str, done: u32, total: u32, left_s: f64);
 
     /// Reports one recorded beam.
-    fn beam(&self);
+    fn beam_recorded(&self);
 
     /// Reports a message to the operator.
-    fn say(&self, line: &str);
+    fn message(&self, line: &str);
 
     /// Reports the number of remaining scans and their estimated duration in seconds.
-    fn announce(&self, scans: u32, left_s: f64);
+    fn scans_planned(&self, scans: u32, left_s: f64);
 
     /// Reports that measuring pauses until the next scan starts.
-    fn rest(&self);
+    fn measuring_paused(&self);
 
     /// Prompts the operator and waits for the answer; `None` without a terminal. Cancel-safe: an
     /// unanswered prompt is repeated by the next call.
-    fn ask(&mut self, question: &str) -> impl Future<Output = Option<String>> + Send;
+    fn prompt(&mut self, question: &str) -> impl Future<Output = Option<String>> + Send;
 
     /// Writes the report of a complete collection, before its manifest is written.
     ///
     /// # Errors
     /// Returns an error if the report cannot be written.
-    fn report(&self, folder: &Folder, history: &History) -> Result<(), Halt>;
+    fn write_report(&self, folder: &CollectionFolder, history: &CollectionHistory) -> Result<(), CollectError>;
 }

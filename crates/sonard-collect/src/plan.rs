@@ -2,8 +2,8 @@
 
 use std::{path::PathBuf, sync::Arc};
 
-use super::{CollectionKeys, Halt, NamedPose};
-use sonard_api::{AirOrder, config::Layers};
+use super::{CollectionKeys, CollectError, NamedPose};
+use sonard_api::{AirOrder, config::ConfigLayers};
 use sonard_device::ranger::{Motion, ScanInputs};
 use sonard_model::{
     acoustics::{Air, Sensor},
@@ -29,7 +29,7 @@ pub enum Poses {
 
 /// Collection plan with its loaded inputs.
 #[derive(Debug)]
-pub struct Plan {
+pub struct CollectionPlan {
     /// Effective values of all keys.
     pub keys: CollectionKeys,
     /// Text of the plan's file.
@@ -49,12 +49,12 @@ pub struct Plan {
     /// Motor steps per revolution.
     pub steps_per_revolution: u16,
     /// Layers of the configuration, with the origin of each key.
-    pub layers: Layers<CollectionKeys>,
+    pub layers: ConfigLayers<CollectionKeys>,
     /// Name of the plan's file in error messages.
     pub name: String,
 }
 
-impl Plan {
+impl CollectionPlan {
     /// Builds the inputs of a scan at a pose in the given air.
     #[must_use]
     pub fn inputs(&self, pose: &NamedPose, air: Air) -> ScanInputs {
@@ -75,10 +75,10 @@ impl Plan {
     ///
     /// # Errors
     /// Returns an error if a value is outside the valid range.
-    pub fn air(&self, temperature_c: f64) -> Result<Air, Halt> {
+    pub fn air(&self, temperature_c: f64) -> Result<Air, CollectError> {
         let keys = &self.keys.air;
         Air::new(temperature_c, keys.humidity_percent, keys.pressure_kpa)
-            .map_err(|error| Halt::failed(error, "degrees Celsius, percent and kilopascals"))
+            .map_err(|error| CollectError::failed(error, "degrees Celsius, percent and kilopascals"))
     }
 
     /// Motion and measurement settings.
@@ -98,15 +98,15 @@ impl Plan {
 
     /// Returns `true` if the plan sets any key of `[air]`.
     #[must_use]
-    pub fn gives_air(&self) -> bool {
-        self.given_air().next().is_some()
+    pub fn sets_air(&self) -> bool {
+        self.air_keys().next().is_some()
     }
 
     /// Returns the air settings for a daemon; `None` if the plan leaves them to the daemon.
     #[must_use]
     pub fn air_order(&self, temperature_c: f64) -> Option<AirOrder> {
-        let given = |key, value| self.is_given("air", key).then_some(value);
-        self.gives_air().then(|| AirOrder {
+        let given = |key, value| self.is_set("air", key).then_some(value);
+        self.sets_air().then(|| AirOrder {
             temperature_c,
             humidity_percent: given("humidity_percent", self.keys.air.humidity_percent),
             pressure_kpa: given("pressure_kpa", self.keys.air.pressure_kpa),
@@ -114,13 +114,13 @@ impl Plan {
     }
 
     /// Lists the keys of `[air]` that the plan sets.
-    pub fn given_air(&self) -> impl Iterator<Item = &'static str> {
-        AIR_KEYS.into_iter().filter(|key| self.is_given("air", key))
+    pub fn air_keys(&self) -> impl Iterator<Item = &'static str> {
+        AIR_KEYS.into_iter().filter(|key| self.is_set("air", key))
     }
 
     /// Returns `true` if a key is set in the plan or by an override.
     #[must_use]
-    pub fn is_given(&self, section: &str, key: &str) -> bool {
+    pub fn is_set(&self, section: &str, key: &str) -> bool {
         self.layers.origin(section, key).is_some()
     }
 }

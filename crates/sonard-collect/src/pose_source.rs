@@ -11,7 +11,7 @@ use sonard_model::scene::Scene;
 use sonard_runtime::interrupts::Interrupts;
 use tokio::sync::mpsc::{Receiver, channel};
 
-use super::{Halt, NamedPose, Poses, Watcher};
+use super::{CollectError, NamedPose, Poses, Observer};
 
 /// Environment variable with the requested pose's number.
 const POSE_VARIABLE: &str = "SONARD_POSE";
@@ -64,9 +64,9 @@ impl PoseSource {
         &mut self,
         number: u32,
         scene: &Scene,
-        watcher: &mut impl Watcher,
+        watcher: &mut impl Observer,
         interrupts: &Interrupts,
-    ) -> Result<Option<NamedPose>, Halt> {
+    ) -> Result<Option<NamedPose>, CollectError> {
         match self {
             Self::Listed => Ok(None),
             Self::Prompt => prompt(number, scene, watcher, interrupts).await,
@@ -75,7 +75,7 @@ impl PoseSource {
                 let output = tokio::task::spawn_blocking(move || run_once(&ran, number));
                 let text = tokio::select! {
                     output = output => output.unwrap_or_else(|error| Err(error.to_string())),
-                    () = interrupts.clone().wait() => return Err(Halt::on_request()),
+                    () = interrupts.clone().wait() => return Err(CollectError::interrupted()),
                 };
                 let text = text.map_err(|reason| failed(command, &reason))?;
                 parse(command, text.trim(), scene)
@@ -87,7 +87,7 @@ impl PoseSource {
                 let Some(stream) = running else { return Ok(None) };
                 let line = tokio::select! {
                     line = stream.lines.recv() => line,
-                    () = interrupts.clone().wait() => return Err(Halt::on_request()),
+                    () = interrupts.clone().wait() => return Err(CollectError::interrupted()),
                 };
                 match line {
                     Some(line) => parse(command, line.trim(), scene),
@@ -109,39 +109,39 @@ impl PoseSource {
 async fn prompt(
     number: u32,
     scene: &Scene,
-    watcher: &mut impl Watcher,
+    watcher: &mut impl Observer,
     interrupts: &Interrupts,
-) -> Result<Option<NamedPose>, Halt> {
+) -> Result<Option<NamedPose>, CollectError> {
     let question = format!("pose {number} (X,Y,DEG or a name; empty line to finish):");
     loop {
         let answer = answered(watcher, &question, interrupts).await?;
         let Some(text) = answer.filter(|text| !text.is_empty()) else { return Ok(None) };
         match NamedPose::parse(&text, scene) {
             Ok(pose) => return Ok(Some(pose)),
-            Err(fault) => watcher.say(&format!("{fault}; {}", fault.help)),
+            Err(fault) => watcher.message(&format!("{fault}; {}", fault.help)),
         }
     }
 }
 
 /// Prompts the operator and returns the answer, unless interrupted.
 pub(super) async fn answered(
-    watcher: &mut impl Watcher,
+    watcher: &mut impl Observer,
     question: &str,
     interrupts: &Interrupts,
-) -> Result<Option<String>, Halt> {
+) -> Result<Option<String>, CollectError> {
     tokio::select! {
-        answer = watcher.ask(question) => Ok(answer),
-        () = interrupts.clone().wait() => Err(Halt::on_request()),
+        answer = watcher.prompt(question) => Ok(answer),
+        () = interrupts.clone().wait() => Err(CollectError::interrupted()),
     }
 }
 
-fn parse(command: &str, text: &str, scene: &Scene) -> Result<Option<NamedPose>, Halt> {
+fn parse(command: &str, text: &str, scene: &Scene) -> Result<Option<NamedPose>, CollectError> {
     if text.is_empty() {
         return Ok(None);
     }
     let pose = NamedPose::parse(text, scene);
     pose.map(Some).map_err(|fault| {
-        Halt::wrong(format!("`{command}` printed no valid pose: {fault}"), &fault.help)
+        CollectError::invalid(format!("`{command}` printed no valid pose: {fault}"), &fault.help)
     })
 }
 
@@ -162,7 +162,7 @@ fn run_once(command: &str, number: u32) -> Result<String, String> {
     Ok(String::from_utf8_lossy(&output.stdout).into_owned())
 }
 
-fn start(command: &str, number: u32) -> Result<PoseStream, Halt> {
+fn start(command: &str, number: u32) -> Result<PoseStream, CollectError> {
     let mut child = shell(command, number)
         .stdout(Stdio::piped())
         .process_group(0)
@@ -183,8 +183,8 @@ fn start(command: &str, number: u32) -> Result<PoseStream, Halt> {
     Ok(PoseStream { child, lines })
 }
 
-fn failed(command: &str, reason: &str) -> Halt {
-    Halt::wrong(
+fn failed(command: &str, reason: &str) -> CollectError {
+    CollectError::invalid(
         format!("`{command}`, the source of poses, failed: {reason}"),
         "test the command alone; recorded scans are kept, and the same `sonard collect` resumes",
     )

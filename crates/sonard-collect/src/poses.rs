@@ -104,7 +104,7 @@ impl NamedPose {
 
     /// Returns `true` if pose and name are equal; conditions may differ.
     #[must_use]
-    pub fn is_place(&self, other: &Self) -> bool {
+    pub fn is_same_place(&self, other: &Self) -> bool {
         self.pose == other.pose && self.name == other.name
     }
 
@@ -119,11 +119,11 @@ impl NamedPose {
 /// Finds the number of each listed pose in a collection; `None` for a new one. A pose listed twice
 /// has two numbers.
 #[must_use]
-pub fn numbers_of(listed: &[NamedPose], known: &BTreeMap<u32, NamedPose>) -> Vec<Option<u32>> {
+pub fn find_numbers(listed: &[NamedPose], known: &BTreeMap<u32, NamedPose>) -> Vec<Option<u32>> {
     let mut free: Vec<(u32, &NamedPose)> =
         known.iter().map(|(number, pose)| (*number, pose)).collect();
     let mut number = |pose: &NamedPose| {
-        let at = free.iter().position(|(_, known)| known.is_place(pose))?;
+        let at = free.iter().position(|(_, known)| known.is_same_place(pose))?;
         Some(free.remove(at).0)
     };
     listed.iter().map(&mut number).collect()
@@ -148,8 +148,8 @@ pub struct PoseLine {
 ///
 /// # Errors
 /// Returns the fault of the first invalid line.
-pub fn read_file(text: &str, scene: &Scene) -> Result<Vec<NamedPose>, PoseFault> {
-    let lines = read_lines(text, scene, None)?.into_iter();
+pub fn parse_pose_file(text: &str, scene: &Scene) -> Result<Vec<NamedPose>, PoseFault> {
+    let lines = parse_pose_lines(text, scene, None)?.into_iter();
     lines
         .map(|PoseLine { line, pose }| {
             pose.and_then(|pose| pose.checked(scene)).map_err(|fault| fault.at(line))
@@ -162,7 +162,7 @@ pub fn read_file(text: &str, scene: &Scene) -> Result<Vec<NamedPose>, PoseFault>
 ///
 /// # Errors
 /// Returns an error if the file is empty or a required column is missing.
-pub fn read_lines(
+pub fn parse_pose_lines(
     text: &str,
     scene: &Scene,
     heading_deg: Option<f64>,
@@ -243,12 +243,12 @@ mod tests {
         assert_eq!((pose.label().as_str(), &pose.conditions["door"]), ("a", &"open".into()));
         assert_eq!(NamedPose::parse("0.5,0.3,90", &room).expect("a pose").label(), "0.5,0.3,90");
         let text = "name, x_m, y_m, heading_deg, carpet\nb,0.5,0.3,0,true\n7,0.6,0.2,45,\n";
-        let poses = read_file(text, &room).expect("poses");
+        let poses = parse_pose_file(text, &room).expect("poses");
         assert_eq!(poses[0].conditions["carpet"], true);
         assert_eq!(poses[1].name.as_deref(), Some("7"));
         assert!(poses[1].conditions.is_empty());
         let lines = format!("{json}\n\n{json}\n");
-        assert_eq!(read_file(&lines, &room).expect("poses").len(), 2);
+        assert_eq!(parse_pose_file(&lines, &room).expect("poses").len(), 2);
     }
 
     proptest! {
@@ -269,7 +269,7 @@ mod tests {
         ) {
             let text = if header { "x_m,y_m,heading_deg\n".to_owned() } else { String::new() };
             let text = text + &pieces.concat();
-            match read_file(&text, &room()) {
+            match parse_pose_file(&text, &room()) {
                 Ok(poses) => prop_assert!(!poses.is_empty()),
                 Err(fault) => {
                     let lines = text.split('\n').count() as u64;
@@ -286,7 +286,7 @@ mod tests {
         let pose = |text| NamedPose::parse(text, &room).expect("a pose");
         let known = [(1, pose("fig9")), (2, pose("fig7")), (4, pose("fig9"))].into();
         let listed = [pose("fig9"), pose("fig9"), pose("0.5,0.3,0"), pose("fig7"), pose("fig9")];
-        assert_eq!(numbers_of(&listed, &known), [Some(1), Some(4), None, Some(2), None]);
+        assert_eq!(find_numbers(&listed, &known), [Some(1), Some(4), None, Some(2), None]);
     }
 
     #[test]
@@ -306,7 +306,7 @@ mod tests {
             ),
             ("{\"x_m\":0.5,\n", Some(1), "not a JSON object"),
         ] {
-            let fault = read_file(text, &room).expect_err(text);
+            let fault = parse_pose_file(text, &room).expect_err(text);
             assert_eq!(fault.line, line, "{text:?}: {fault}");
             assert!(fault.message.contains(message), "{text:?}: {fault}");
             assert!(!fault.help.is_empty());

@@ -11,7 +11,7 @@ use sonard_records::{Event, EventKind, Record, ScanView, Session, Sink, SinkErro
 use sonard_runtime::interrupts::Interrupts;
 use tokio::io::{AsyncRead, AsyncWrite};
 
-use super::Halt;
+use super::CollectError;
 
 /// Sync interval of the scan's log. A power cut invalidates the current scan anyway, so a longer
 /// interval loses nothing.
@@ -19,13 +19,13 @@ const SYNC_INTERVAL: Duration = Duration::from_secs(5);
 
 /// Finished scan whose file is closed and synced.
 #[derive(Debug)]
-pub struct Taken {
+pub struct RecordedScan {
     /// Scan read from the file's records, if present.
     pub view: Option<ScanView>,
     /// Failure that ended the scan, if any.
-    pub lost: Option<Halt>,
+    pub failure: Option<CollectError>,
     /// `true` if the device must be identified again; the scan may still be complete.
-    pub gone: bool,
+    pub needs_reconnect: bool,
     /// `true` if a client stopped the daemon that was taking the scan.
     pub stopped: bool,
     /// Duration by the wall clock, seconds.
@@ -36,13 +36,13 @@ pub struct Taken {
 ///
 /// # Errors
 /// Returns an error if the file cannot be written; the scan in it is then incomplete.
-pub async fn take<L: AsyncRead + AsyncWrite + Unpin>(
+pub async fn record_scan<L: AsyncRead + AsyncWrite + Unpin>(
     ranger: &mut Ranger<L>,
     (job, session): (&ScanJob, Session),
     path: &Path,
     beam: &(dyn Fn() + Sync),
     interrupts: &Interrupts,
-) -> Result<Taken, Halt> {
+) -> Result<RecordedScan, CollectError> {
     let mut sink = ScanSink::open(path, beam)?;
     sink.record(&Record::Session(Box::new(session)))?;
     let began = Instant::now();
@@ -53,14 +53,14 @@ pub async fn take<L: AsyncRead + AsyncWrite + Unpin>(
         Err(error @ ScanError::Device(_)) => (Some(error.into()), true),
         Err(error) => return Err(error.into()),
     };
-    Ok(Taken { view: sink.close()?, lost, gone, stopped: false, wall_s })
+    Ok(RecordedScan { view: sink.close()?, failure: lost, needs_reconnect: gone, stopped: false, wall_s })
 }
 
 /// Appends an event to a rejected scan's file, which marks it without the journal.
 ///
 /// # Errors
 /// Returns an error if the disk is full or fails.
-pub(super) fn mark_rejected(path: &Path, reason: &str) -> Result<(), Halt> {
+pub(super) fn mark_rejected(path: &Path, reason: &str) -> Result<(), CollectError> {
     let event = Event {
         time: jiff::Timestamp::now(),
         kind: EventKind::Gap,
@@ -79,13 +79,13 @@ pub(super) struct ScanSink<'a> {
 }
 
 impl<'a> ScanSink<'a> {
-    pub(super) fn open(path: &Path, beam: &'a (dyn Fn() + Sync)) -> Result<Self, Halt> {
+    pub(super) fn open(path: &Path, beam: &'a (dyn Fn() + Sync)) -> Result<Self, CollectError> {
         let log = LogWriter::open(path)?.with_sync_interval(SYNC_INTERVAL);
         Ok(Self { log, records: Vec::new(), beam })
     }
 
     /// Closes the file and returns its last scan, if any.
-    pub(super) fn close(self) -> Result<Option<ScanView>, Halt> {
+    pub(super) fn close(self) -> Result<Option<ScanView>, CollectError> {
         self.log.close()?;
         Ok(ScanView::from_records(self.records).pop())
     }

@@ -15,8 +15,8 @@ use sonard_runtime::interrupts::Interrupts;
 use tokio::time::{Instant, sleep};
 
 use super::{
-    AirBefore, Borrowed, Connected, Device, Halt, Plan, ScanOrder,
-    record_scan::{ScanSink, Taken},
+    SavedAir, SavedSettings, ConnectedDevice, ScanDevice, CollectError, CollectionPlan, ScanTask,
+    record_scan::{ScanSink, RecordedScan},
 };
 
 /// Retry interval while the daemon or its ranger is unavailable.
@@ -25,14 +25,14 @@ const RETRY_INTERVAL: Duration = Duration::from_secs(1);
 const POLL_INTERVAL: Duration = Duration::from_secs(5);
 
 /// Daemon that takes the scans of a collection.
-pub struct ByDaemon {
+pub struct RemoteDevice {
     client: Client,
     /// Daemon's scan setup at the start of the collection.
     setup: Setup,
     patience: Duration,
     interrupts: Interrupts,
     /// Settings to restore, as far as the collection changed them.
-    borrowed: Option<Borrowed>,
+    borrowed: Option<SavedSettings>,
     /// Reports messages to the operator.
     report: Report,
 }
@@ -51,45 +51,45 @@ pub fn steps_per_revolution(status: &Status) -> Option<u16> {
     status.device.as_ref().and_then(|device| device.steps_per_revolution.try_into().ok())
 }
 
-fn link_failure(link: &LinkReport) -> Halt {
+fn link_failure(link: &LinkReport) -> CollectError {
     let trouble = link.trouble.as_deref().unwrap_or("no details");
-    Halt::failed(
+    CollectError::failed(
         format!("the daemon's ranger is not available ({}): {trouble}", link.state.name()),
         "see `sonard status`; start the collection again to resume it",
     )
 }
 
-impl Device for ByDaemon {
+impl ScanDevice for RemoteDevice {
     fn is_local(&self) -> bool {
         false
     }
 
-    fn prepare(&mut self, _plan: &Plan, _first: &PreparedScan) -> Result<(), Halt> {
+    fn prepare(&mut self, _plan: &CollectionPlan, _first: &PreparedScan) -> Result<(), CollectError> {
         Ok(())
     }
 
-    fn carry_to(&mut self, _to: &PreparedScan) -> Result<(), Halt> {
+    fn move_to(&mut self, _to: &PreparedScan) -> Result<(), CollectError> {
         Ok(())
     }
 
-    fn go_on(&mut self, patience: Duration, borrowed: Option<Borrowed>) {
+    fn resume(&mut self, patience: Duration, borrowed: Option<SavedSettings>) {
         (self.patience, self.borrowed) = (patience, borrowed);
     }
 
     /// Waits until the daemon has a usable ranger.
-    async fn meet(&mut self) -> Result<Connected, Halt> {
+    async fn connect(&mut self) -> Result<ConnectedDevice, CollectError> {
         let status = self.ready().await?;
         match (status.device, status.provenance) {
-            (Some(device), Some(provenance)) => Ok(Connected { device, provenance }),
+            (Some(device), Some(provenance)) => Ok(ConnectedDevice { device, provenance }),
             _ => {
-                Err(Halt::failed("the daemon has not identified its ranger", "see `sonard status`"))
+                Err(CollectError::failed("the daemon has not identified its ranger", "see `sonard status`"))
             }
         }
     }
 
     /// Returns the settings about to be changed. The daemon's own scans are suspended, because the
     /// pose is known only to the collection; the air is set if the plan specifies it.
-    async fn to_borrow(&self, air: Option<&AirOrder>) -> Result<Option<Borrowed>, Halt> {
+    async fn settings_to_save(&self, air: Option<&AirOrder>) -> Result<Option<SavedSettings>, CollectError> {
         let status = self.ready().await?;
         let ScanningReport { mode, every_s, .. } = status.scanning;
         let mut before = self.borrowed.clone();
@@ -99,8 +99,8 @@ impl Device for ByDaemon {
         if air.is_some_and(|air| !is_ordered(next_air(&status), air)) {
             // The API's air is an earlier setting by a client and must be restored as such.
             let own = || match next_air(&status).source {
-                AirSource::Api => AirBefore::Given(as_order(next_air(&status))),
-                _ => AirBefore::Own,
+                AirSource::Api => SavedAir::Given(as_order(next_air(&status))),
+                _ => SavedAir::Own,
             };
             before.get_or_insert_default().air.get_or_insert_with(own);
         }
@@ -108,11 +108,11 @@ impl Device for ByDaemon {
     }
 
     /// Switches the daemon to scans on request and sets the plan's air.
-    async fn borrow(
+    async fn apply_settings(
         &mut self,
-        before: Option<Borrowed>,
+        before: Option<SavedSettings>,
         air: Option<&AirOrder>,
-    ) -> Result<(), Halt> {
+    ) -> Result<(), CollectError> {
         if before.is_some() {
             self.borrowed = before;
         }
@@ -126,15 +126,15 @@ impl Device for ByDaemon {
     }
 
     /// Restores scan mode and air; returns `true` if anything was saved.
-    async fn give_back(&mut self) -> Result<bool, Halt> {
+    async fn restore_settings(&mut self) -> Result<bool, CollectError> {
         let Some(before) = self.borrowed.take() else { return Ok(false) };
         if let Some(ScanningKeys { mode, every_s }) = before.scanning {
             let scanning = Scanning { mode, every_s: Some(every_s) };
             self.put("/v1/scanning", &scanning).await?;
         }
         match before.air {
-            Some(AirBefore::Given(air)) => self.put("/v1/air", &air).await?,
-            Some(AirBefore::Own) => {
+            Some(SavedAir::Given(air)) => self.put("/v1/air", &air).await?,
+            Some(SavedAir::Own) => {
                 self.client.delete("/v1/air").await?;
             }
             None => {}
@@ -149,8 +149,8 @@ impl Device for ByDaemon {
         (air.source != AirSource::Configuration).then_some(air.temperature_c)
     }
 
-    async fn take(&mut self, scan: ScanOrder<'_>, beam: &(dyn Fn() + Sync)) -> Result<Taken, Halt> {
-        let ScanOrder { plan, pose, collection: of, path, .. } = scan;
+    async fn record_scan(&mut self, scan: ScanTask<'_>, beam: &(dyn Fn() + Sync)) -> Result<RecordedScan, CollectError> {
+        let ScanTask { plan, pose, collection: of, path, .. } = scan;
         let request = ScanRequest { scans: Some(1), plan: Some(plan), pose: Some(pose) };
         let (mut scans, first) = self.begin(&request).await?;
         let began = Instant::now();
@@ -181,26 +181,26 @@ impl Device for ByDaemon {
         }
         let wall_s = began.elapsed().as_secs_f64();
         let stopped = stopped && !self.interrupts.happened();
-        Ok(Taken { view: sink.close()?, gone: lost.is_some(), lost, stopped, wall_s })
+        Ok(RecordedScan { view: sink.close()?, needs_reconnect: lost.is_some(), failure: lost, stopped, wall_s })
     }
 
     async fn close(self) {}
 }
 
-impl ByDaemon {
+impl RemoteDevice {
     /// Connects to a daemon and reads its setup without changing it. Messages to the operator go to
     /// `report`.
     ///
     /// # Errors
     /// Returns an error if the daemon does not respond, or only simulates.
-    pub async fn find(
+    pub async fn open(
         client: Client,
         interrupts: Interrupts,
         report: impl Fn(&str) + Send + Sync + 'static,
-    ) -> Result<(Self, Status), Halt> {
+    ) -> Result<(Self, Status), CollectError> {
         let status: Status = client.get_json("/v1/status").await?;
         if status.simulation.is_some() {
-            return Err(Halt::wrong(
+            return Err(CollectError::invalid(
                 "the daemon simulates an array and measures nothing",
                 "use a daemon that drives a ranger, or see `sonard simulate --array`",
             ));
@@ -219,18 +219,18 @@ impl ByDaemon {
 
     /// Requests a scan and waits for its first record; the request is repeated if the daemon
     /// restarts meanwhile.
-    async fn begin(&self, request: &ScanRequest) -> Result<(RequestedScans, Record), Halt> {
+    async fn begin(&self, request: &ScanRequest) -> Result<(RequestedScans, Record), CollectError> {
         loop {
             self.ready().await?;
-            let mut scans = match RequestedScans::ask(self.client.clone(), request).await {
+            let mut scans = match RequestedScans::request(self.client.clone(), request).await {
                 Ok(scans) => scans,
                 Err(error) if error.is_final() => return Err(error.into()),
                 Err(_) => continue,
             };
             match self.first_record(&mut scans).await? {
                 Ok(record) => return Ok((scans, record)),
-                Err(error @ ScansError::Forgotten(_)) => {
-                    return Err(Halt::Stopped(format!("{error}\nrun the same command to resume")));
+                Err(error @ ScansError::Cancelled(_)) => {
+                    return Err(CollectError::Stopped(format!("{error}\nrun the same command to resume")));
                 }
                 Err(_) => {}
             }
@@ -240,27 +240,27 @@ impl ByDaemon {
     async fn first_record(
         &self,
         scans: &mut RequestedScans,
-    ) -> Result<Result<Record, ScansError>, Halt> {
+    ) -> Result<Result<Record, ScansError>, CollectError> {
         loop {
             tokio::select! {
                 record = scans.next() => return Ok(record),
                 () = sleep(POLL_INTERVAL) => drop(self.ready().await?),
                 () = self.interrupts.clone().wait() => {
                     drop(scans.cancel().await);
-                    return Err(Halt::on_request());
+                    return Err(CollectError::interrupted());
                 }
             }
         }
     }
 
     /// Waits until the daemon responds and has its ranger, at most `collection.patience_s`.
-    async fn ready(&self) -> Result<Status, Halt> {
+    async fn ready(&self) -> Result<Status, CollectError> {
         let (deadline, mut reported) = (Instant::now() + self.patience, false);
         loop {
             let failure = match self.status().await {
                 Ok(status) if status.link.state.is_up() => return Ok(status),
                 Ok(status) => link_failure(&status.link),
-                Err(failure @ Halt::Failed { .. }) => failure,
+                Err(failure @ CollectError::Failed { .. }) => failure,
                 Err(failure) => return Err(failure),
             };
             if Instant::now() + RETRY_INTERVAL > deadline {
@@ -271,16 +271,16 @@ impl ByDaemon {
             }
             tokio::select! {
                 () = sleep(RETRY_INTERVAL) => {}
-                () = self.interrupts.clone().wait() => return Err(Halt::on_request()),
+                () = self.interrupts.clone().wait() => return Err(CollectError::interrupted()),
             }
         }
     }
 
     /// Status of the daemon, provided that its setup is unchanged.
-    async fn status(&self) -> Result<Status, Halt> {
+    async fn status(&self) -> Result<Status, CollectError> {
         let setup: Setup = self.client.get_json("/v1/setup").await?;
         if setup != self.setup {
-            return Err(Halt::wrong(
+            return Err(CollectError::invalid(
                 "the daemon's sensor, model or motion changed since the collection started",
                 "restore its configuration (a sensor set by a client: DELETE /v1/sensor), or start the \
                  collection again to list the changes",
@@ -289,7 +289,7 @@ impl ByDaemon {
         Ok(self.client.get_json("/v1/status").await?)
     }
 
-    async fn put(&self, path: &str, body: &impl Serialize) -> Result<(), Halt> {
+    async fn put(&self, path: &str, body: &impl Serialize) -> Result<(), CollectError> {
         Ok(self.client.put(path, body).await?)
     }
 }

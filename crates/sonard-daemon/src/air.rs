@@ -9,7 +9,7 @@ use sonard_records::{AirSource, ScanAir};
 use sonard_runtime::supervisor::{Supervisor, Task};
 use tokio::{sync::watch, time::Instant};
 
-use super::{limits::ordered_air, order_error::Refusal};
+use super::{limits::air_from_order, order_error::OrderError};
 
 /// Minimum temperature change for new predictions, degrees Celsius. A smaller change shifts a range
 /// by less than 0.02 percent.
@@ -75,8 +75,8 @@ impl AirControl {
     ///
     /// # Errors
     /// When a value is out of range; the air is then unchanged.
-    pub(super) fn order(&mut self, order: &AirOrder, now: Instant) -> Result<(), Refusal> {
-        let air = ordered_air(order, self.humidity_percent, self.pressure_kpa)?;
+    pub(super) fn order(&mut self, order: &AirOrder, now: Instant) -> Result<(), OrderError> {
+        let air = air_from_order(order, self.humidity_percent, self.pressure_kpa)?;
         (self.humidity_percent, self.pressure_kpa) = (air.humidity_percent(), air.pressure_kpa());
         self.temperature_c = air.temperature_c();
         (self.source, self.at) = (AirSource::Api, Some(now));

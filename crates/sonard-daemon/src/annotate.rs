@@ -1,10 +1,10 @@
 //! Annotation of readings with verdict and viewpoint.
 
-use sonard_api::Beside;
+use sonard_api::Annotations;
 
 /// Appends the fields of `beside` to a reading's line, a JSON object with or without a newline.
 #[must_use]
-pub fn judged_line(line: &[u8], beside: &Beside) -> Vec<u8> {
+pub fn annotated_line(line: &[u8], beside: &Annotations) -> Vec<u8> {
     let (object, newline) = match line.strip_suffix(b"\n") {
         Some(object) => (object, &b"\n"[..]),
         None => (line, &b""[..]),
@@ -38,10 +38,10 @@ mod tests {
         let (mut verdicts, robot) = (Vec::new(), view.pose().expect("a pose"));
         for line in LOG.lines() {
             let Ok(Record::Ping(ping)) = decode_line(line.as_bytes()) else { continue };
-            let beside = Beside::for_ping(&ping, Some(&view));
-            let judged = judged_line(format!("{line}\n").as_bytes(), &beside);
+            let beside = Annotations::for_ping(&ping, Some(&view));
+            let judged = annotated_line(format!("{line}\n").as_bytes(), &beside);
             assert!(judged.ends_with(b"}\n"));
-            assert!(!judged_line(line.as_bytes(), &beside).ends_with(b"\n"));
+            assert!(!annotated_line(line.as_bytes(), &beside).ends_with(b"\n"));
             let mut judged: serde_json::Value = serde_json::from_slice(&judged).expect("JSON");
             let fields = judged.as_object_mut().expect("an object");
             let verdict = fields.remove("verdict").expect("a verdict");
@@ -66,21 +66,21 @@ mod tests {
         let robot = Pose { x_m: 1.0, y_m: 2.0, heading_deg: 90.0 };
         let mut ping = view.pings[0].clone();
         (ping.pose, ping.azimuth_deg) = (Some(robot), 0.0);
-        let viewpoint = Beside::for_ping(&ping, Some(&view)).viewpoint.expect("a viewpoint");
+        let viewpoint = Annotations::for_ping(&ping, Some(&view)).viewpoint.expect("a viewpoint");
         let error_m = (viewpoint.x_m - 1.0).hypot(viewpoint.y_m - 2.1);
         assert!(error_m < 1e-12, "{viewpoint:?}");
 
         ping.ranger = Some("s0".into());
         assert_eq!(
-            Beside::for_ping(&ping, Some(&view)).viewpoint,
+            Annotations::for_ping(&ping, Some(&view)).viewpoint,
             None,
             "a ranger that the array lacks"
         );
         let ping = view.pings[0].clone();
-        assert_eq!(Beside::for_ping(&ping, None).viewpoint, None);
+        assert_eq!(Annotations::for_ping(&ping, None).viewpoint, None);
         view.start = None;
-        assert_eq!(Beside::for_ping(&ping, Some(&view)).viewpoint, None, "a scan without a pose");
+        assert_eq!(Annotations::for_ping(&ping, Some(&view)).viewpoint, None, "a scan without a pose");
         view.scan = uuid::Uuid::from_u128(7);
-        assert_eq!(Beside::for_ping(&ping, Some(&view)).viewpoint, None, "another scan");
+        assert_eq!(Annotations::for_ping(&ping, Some(&view)).viewpoint, None, "another scan");
     }
 }

@@ -14,14 +14,14 @@ use std::sync::{
     atomic::{AtomicU64, AtomicUsize, Ordering},
 };
 
-use sonard_api::Beside;
+use sonard_api::Annotations;
 use sonard_records::{PingStatus, Record, ScanStart, ScanView, Session, encode_line};
 use tokio::sync::watch;
 use uuid::Uuid;
 
-use super::annotate::judged_line;
-pub use deadband::Moved;
-pub(crate) use ring::Shelf;
+use super::annotate::annotated_line;
+pub use deadband::DeadbandFilter;
+pub(crate) use ring::Ring;
 pub use subscribers::ClientGuard;
 use subscribers::{CountGuard, SubscriberCounts};
 
@@ -34,16 +34,16 @@ const MAX_CONTROL_BYTES: usize = 4 << 20;
 
 /// Filter and format of a subscription.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Wanted {
+pub struct SubscriptionFilter {
     /// Deadband of the range, metres: a reading is sent only if its range differs by more from the
     /// last one sent in its direction, or its status changed. `None` sends all readings.
-    pub moved_m: Option<f64>,
+    pub deadband_m: Option<f64>,
     /// Adds verdict and viewpoint ([`Beside`]) to each reading.
     pub verdicts: bool,
 }
 
 /// Line of a stream: a JSON text with its newline, shared by all subscribers.
-pub type Line = Arc<[u8]>;
+pub type StreamLine = Arc<[u8]>;
 
 /// Broadcast of records and finished scans to subscribers. Cheap to clone; clones share their
 /// state.
@@ -79,17 +79,17 @@ struct RunningScan {
 
 #[derive(Debug)]
 struct Buffers {
-    readings: Shelf<BufferedReading>,
-    controls: Shelf<BufferedControl>,
-    scans: Shelf<Uuid>,
+    readings: Ring<BufferedReading>,
+    controls: Ring<BufferedControl>,
+    scans: Ring<Uuid>,
     closed: bool,
 }
 
 #[derive(Debug)]
 struct BufferedReading {
-    line: Line,
+    line: StreamLine,
     /// Line with verdict and viewpoint, if a subscriber requested them.
-    annotated: Option<Line>,
+    annotated: Option<StreamLine>,
     step: i32,
     ranger: Option<Box<str>>,
     status: PingStatus,
@@ -98,7 +98,7 @@ struct BufferedReading {
 
 #[derive(Debug)]
 struct BufferedControl {
-    line: Line,
+    line: StreamLine,
     /// Number of the first reading after this record.
     before: u64,
 }
@@ -108,9 +108,9 @@ impl Hub {
     #[must_use]
     pub fn new(readings: usize) -> Self {
         let buffers = Buffers {
-            readings: Shelf::new(readings, MAX_READING_BYTES),
-            controls: Shelf::new(MAX_CONTROLS, MAX_CONTROL_BYTES),
-            scans: Shelf::new(MAX_CONTROLS, MAX_CONTROL_BYTES),
+            readings: Ring::new(readings, MAX_READING_BYTES),
+            controls: Ring::new(MAX_CONTROLS, MAX_CONTROL_BYTES),
+            scans: Ring::new(MAX_CONTROLS, MAX_CONTROL_BYTES),
             closed: false,
         };
         let inner = Inner {
@@ -129,7 +129,7 @@ impl Hub {
 
     /// Subscribes a client to records, from the next one on.
     #[must_use]
-    pub fn subscribe(&self, wanted: Wanted) -> Subscription {
+    pub fn subscribe(&self, wanted: SubscriptionFilter) -> Subscription {
         let verdicts = usize::from(wanted.verdicts);
         self.subscribe_counted(wanted, SubscriberCounts { subscribers: 1, records: 1, verdicts })
     }
@@ -138,12 +138,12 @@ impl Hub {
     #[must_use]
     pub fn follow(&self) -> Subscription {
         self.subscribe_counted(
-            Wanted::default(),
+            SubscriptionFilter::default(),
             SubscriberCounts { records: 1, ..SubscriberCounts::default() },
         )
     }
 
-    fn subscribe_counted(&self, wanted: Wanted, counts: SubscriberCounts) -> Subscription {
+    fn subscribe_counted(&self, wanted: SubscriptionFilter, counts: SubscriberCounts) -> Subscription {
         let guard = CountGuard::new(self, counts);
         let changed = self.inner.records.subscribe();
         let buffers = lock(&self.inner.buffers);
@@ -151,7 +151,7 @@ impl Hub {
             reading: buffers.readings.end(),
             control: buffers.controls.end(),
             wanted,
-            moved: Moved::new(wanted.moved_m),
+            moved: DeadbandFilter::new(wanted.deadband_m),
             changed,
             guard,
         }
@@ -160,7 +160,7 @@ impl Hub {
     /// Counts a client served through a [`follow`](Self::follow) subscription, until the returned
     /// value is dropped.
     #[must_use]
-    pub fn attend(&self) -> ClientGuard {
+    pub fn register_client(&self) -> ClientGuard {
         ClientGuard::new(self)
     }
 
@@ -186,9 +186,9 @@ impl Hub {
         }
         if let Record::Ping(ping) = record {
             let wants_verdicts = self.inner.verdict_subscribers.load(Ordering::Relaxed) > 0;
-            let annotations = || Beside::for_ping(ping, lock(&self.inner.scan).view.as_ref());
-            let annotated: Option<Line> =
-                wants_verdicts.then(|| judged_line(&line, &annotations()).into());
+            let annotations = || Annotations::for_ping(ping, lock(&self.inner.scan).view.as_ref());
+            let annotated: Option<StreamLine> =
+                wants_verdicts.then(|| annotated_line(&line, &annotations()).into());
             let bytes = line.len() + annotated.as_ref().map_or(0, |line| line.len());
             let reading = BufferedReading {
                 line: line.into(),
@@ -198,18 +198,18 @@ impl Hub {
                 status: ping.status,
                 range_m: ping.range_m,
             };
-            lock(&self.inner.buffers).readings.put(bytes, reading);
+            lock(&self.inner.buffers).readings.push(bytes, reading);
         } else {
             let mut buffers = lock(&self.inner.buffers);
             let (bytes, before) = (line.len(), buffers.readings.end());
-            buffers.controls.put(bytes, BufferedControl { line: line.into(), before });
+            buffers.controls.push(bytes, BufferedControl { line: line.into(), before });
         }
         self.inner.records.send_replace(());
     }
 
     /// Publishes the id of a finished scan.
     pub fn publish_scan(&self, scan: Uuid) {
-        lock(&self.inner.buffers).scans.put(size_of::<Uuid>(), scan);
+        lock(&self.inner.buffers).scans.push(size_of::<Uuid>(), scan);
         self.inner.scans.send_replace(());
     }
 
@@ -257,15 +257,15 @@ pub struct Subscription {
     reading: u64,
     /// Number of the next other record.
     control: u64,
-    wanted: Wanted,
-    moved: Moved,
+    wanted: SubscriptionFilter,
+    moved: DeadbandFilter,
     changed: watch::Receiver<()>,
     guard: CountGuard,
 }
 
 /// Next item of a subscription.
 enum NextItem {
-    Line(Line),
+    Line(StreamLine),
     /// Reading within the deadband.
     Filtered,
     /// All buffered items were returned.
@@ -275,7 +275,7 @@ enum NextItem {
 
 impl Subscription {
     /// Waits for the next line. Returns `None` at the end of the stream. Cancel-safe.
-    pub async fn next(&mut self) -> Option<Line> {
+    pub async fn next(&mut self) -> Option<StreamLine> {
         loop {
             // A record published after this line completes `changed` below.
             self.changed.mark_unchanged();

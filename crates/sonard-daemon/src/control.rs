@@ -22,8 +22,8 @@ use uuid::Uuid;
 use super::{
     air::{AirControl, Reading, watch_thermometer},
     journal::Journal,
-    order_error::Refusal,
-    schedule::{Asked, Schedule},
+    order_error::OrderError,
+    schedule::{QueuedScans, Schedule},
     settings::Settings,
     state::{DaemonState, ScanSettings},
 };
@@ -35,7 +35,7 @@ const STOP_CHECK: Duration = Duration::from_millis(50);
 #[derive(Debug)]
 pub enum Order {
     /// Take scans, or resume those of the mode.
-    Start(Asked),
+    Start(QueuedScans),
     /// Cancel a request, and end the running scan if it belongs to the request.
     Cancel(Uuid),
     /// Change the mode, and the interval in seconds of the schedule mode.
@@ -49,22 +49,22 @@ pub enum Order {
     /// Use this air until the next change by any source.
     Air(AirOrder),
     /// Use the air of the configuration and the thermometer again.
-    OwnAir,
+    ResetAir,
     /// Use this sensor from the next scan on.
     Sensor(Box<SensorOrder>),
     /// Use the sensor of the configuration again.
-    OwnSensor,
+    ResetSensor,
     /// Apply the reloaded configuration, or report the error of the reload.
     Reload(Result<Box<Settings>, String>),
 }
 
 /// An order with the channel of its result.
 #[derive(Debug)]
-pub struct Request {
+pub struct OrderRequest {
     /// The order to carry out.
     pub order: Order,
     /// Channel of the result; a closed one is ignored.
-    pub reply: oneshot::Sender<Result<(), Refusal>>,
+    pub reply: oneshot::Sender<Result<(), OrderError>>,
 }
 
 /// Event that the device task has to handle.
@@ -109,7 +109,7 @@ pub(super) struct Control {
     pub(super) identity: Option<Identity>,
     /// Predictions are outdated: scene, model or sensor changed.
     pub(super) stale: bool,
-    requests: mpsc::Receiver<Request>,
+    requests: mpsc::Receiver<OrderRequest>,
     supervisor: Supervisor,
     thermometer: watch::Receiver<Option<Reading>>,
     journal: Journal,
@@ -121,7 +121,7 @@ impl Control {
     pub(super) fn new(
         settings: Settings,
         gpio: Box<dyn HostGpio>,
-        requests: mpsc::Receiver<Request>,
+        requests: mpsc::Receiver<OrderRequest>,
         (supervisor, state): (Supervisor, Arc<DaemonState>),
         journal: Journal,
     ) -> Self {
@@ -214,7 +214,7 @@ impl Control {
         }
     }
 
-    fn carry_out(&mut self, Request { order, reply }: Request) -> Option<Interrupt> {
+    fn carry_out(&mut self, OrderRequest { order, reply }: OrderRequest) -> Option<Interrupt> {
         let (result, interrupt) = match order {
             Order::Start(request) => {
                 let result = self.start(request);
@@ -235,12 +235,12 @@ impl Control {
             Order::Air(order) => {
                 (self.air.order(&order, Instant::now()), Some(Interrupt::ScheduleChanged))
             }
-            Order::OwnAir => {
+            Order::ResetAir => {
                 self.reset_air();
                 (Ok(()), Some(Interrupt::ScheduleChanged))
             }
             Order::Sensor(order) => (self.set_sensor(&order), Some(Interrupt::ScheduleChanged)),
-            Order::OwnSensor => {
+            Order::ResetSensor => {
                 self.use_sensor(self.configured_sensor.clone());
                 (Ok(()), Some(Interrupt::ScheduleChanged))
             }
@@ -266,7 +266,7 @@ impl Control {
     /// Applies a new configuration. Its changes override earlier orders.
     fn reload(&mut self, mut settings: Settings) -> Interrupt {
         let configured = std::mem::replace(&mut self.configured_sensor, settings.sensor.clone());
-        if configured == settings.sensor && settings.goes_with(&self.settings.sensor) {
+        if configured == settings.sensor && settings.is_valid_with(&self.settings.sensor) {
             settings.sensor = self.settings.sensor.clone();
         }
         let before = std::mem::replace(&mut self.settings, settings);

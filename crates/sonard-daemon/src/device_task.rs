@@ -13,7 +13,7 @@ use firmware_protocol::{
 use sonard_api::{ScanTotals, Trouble};
 use sonard_device::{
     link::{self, BAUD, Line, LinkError},
-    ranger::{DriveError, Driver, Ranger, Unasked, serial_text},
+    ranger::{DriveError, Driver, Ranger, DeviceEvent, serial_text},
 };
 use sonard_records::{EventKind, Session};
 use tokio::time::{Instant, sleep_until};
@@ -146,11 +146,11 @@ impl DeviceTask {
             (Some(line), _) => {
                 let config =
                     HostConfig { max_attempts: attempts, ..HostConfig::new(BAUD, rand::random()) };
-                with_orders(&mut self.control, Ranger::meet(Driver::new(line, config))).await
+                with_orders(&mut self.control, Ranger::identify(Driver::new(line, config))).await
             }
             (None, Some(mut ranger)) => {
                 let again = async {
-                    ranger.meet_again().await?;
+                    ranger.reidentify().await?;
                     Ok(ranger)
                 };
                 with_orders(&mut self.control, again).await
@@ -186,7 +186,7 @@ impl DeviceTask {
         }
         self.last_identity = Some(identity);
         self.control.identity = Some(identity);
-        self.line_figures.live = Some(ranger.watch_link());
+        self.line_figures.live = Some(ranger.subscribe_link_stats());
         self.ranger = Some(ranger);
         self.handle(LinkInput::Identified);
     }
@@ -222,7 +222,7 @@ impl DeviceTask {
     async fn serve(&mut self) {
         let due = match self.control.schedule.due(self.control.now()) {
             // No scan starts unless its readings can be logged.
-            Due::Now if self.out.journal.is_well() => return self.scan().await,
+            Due::Now if self.out.journal.is_writable() => return self.scan().await,
             Due::Now | Due::OnRequest => None,
             Due::At(at) => Some(self.control.epoch + at),
         };
@@ -233,28 +233,28 @@ impl DeviceTask {
         let wake = self.next_check.min(Instant::now() + HEARTBEAT);
         let wake = due.map_or(wake, |due| due.min(wake));
         tokio::select! {
-            event = ranger.unasked() => self.handle_device_event(event),
+            event = ranger.next_event() => self.handle_device_event(event),
             interrupt = self.control.next() => self.react(interrupt),
             () = sleep_until(wake) => self.check_if_due().await,
         }
     }
 
-    fn handle_device_event(&mut self, event: Unasked) {
+    fn handle_device_event(&mut self, event: DeviceEvent) {
         match event {
-            Unasked::Hangup => {
+            DeviceEvent::Hangup => {
                 self.fail(Trouble::Lost, "the port was closed: check the cable".into());
             }
-            Unasked::Restarted => {
+            DeviceEvent::Restarted => {
                 let detail = "the device restarted while idle: homing again".to_owned();
                 self.out.event(EventKind::Reboot, detail);
                 self.handle(LinkInput::Restarted);
             }
             // Homing clears an expired hold.
-            Unasked::Fault(FaultKind::HoldExpired) => self.handle(LinkInput::Restarted),
-            Unasked::Fault(FaultKind::EmergencyStop) => {
+            DeviceEvent::Fault(FaultKind::HoldExpired) => self.handle(LinkInput::Restarted),
+            DeviceEvent::Fault(FaultKind::EmergencyStop) => {
                 self.handle_device_stop(&DriveError::Host(HostError::EmergencyStop));
             }
-            Unasked::Fault(kind) => {
+            DeviceEvent::Fault(kind) => {
                 self.fail(Trouble::Fault, format!("the device stopped: {kind}"));
             }
         }
@@ -267,10 +267,10 @@ impl DeviceTask {
         self.next_check = Instant::now() + self.check_interval();
         self.out.state.beat();
         let Some(ranger) = &mut self.ranger else { return };
-        match with_orders(&mut self.control, ranger.check()).await {
+        match with_orders(&mut self.control, ranger.poll_status()).await {
             Err(interrupt) => self.react(interrupt),
             Ok(Err(DriveError::Host(HostError::Rebooted))) => {
-                self.handle_device_event(Unasked::Restarted);
+                self.handle_device_event(DeviceEvent::Restarted);
             }
             Ok(Err(error)) => self.device_failed(&error),
             Ok(Ok(())) => {}
@@ -289,7 +289,7 @@ impl DeviceTask {
     fn device_failed(&mut self, error: &DriveError) {
         use HostError as Host;
         let trouble = match error {
-            DriveError::Host(Host::EmergencyStop | Host::Refused(NakReason::EmergencyStop)) => {
+            DriveError::Host(Host::EmergencyStop | Host::Rejected(NakReason::EmergencyStop)) => {
                 return self.handle_device_stop(error);
             }
             DriveError::OtherBoard(_) => {

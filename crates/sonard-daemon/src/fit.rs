@@ -3,7 +3,7 @@
 use std::{collections::BTreeMap, sync::Arc};
 
 use sonard_api::ScanFit;
-use sonard_interpret::compare::{Explanation, agrees, compare, judge, quantile};
+use sonard_interpret::compare::{Explanation, agrees, compare, classify, quantile};
 use sonard_records::{Ping, ScanEnd, ScanStart, ScanView, Session};
 
 /// Maximum number of readings of a scan that is explained. They are kept in memory until the scan
@@ -37,7 +37,7 @@ impl FitAccumulator {
     }
 
     pub(super) fn add(&mut self, ping: &Ping) {
-        let comparison = judge(ping);
+        let comparison = classify(ping);
         let predicted_m = ping.sim.as_ref().and_then(|sim| sim.range_m);
         let residual_m = comparison.residual_m.filter(|_| comparison.verdict.is_ok());
         match residual_m.zip(ping.range_m.zip(predicted_m)) {

@@ -203,7 +203,7 @@ impl Journal {
 
     /// Returns `true` if records can be written.
     #[must_use]
-    pub fn is_well(&self) -> bool {
+    pub fn is_writable(&self) -> bool {
         self.status.borrow().error.is_none()
     }
 

@@ -44,7 +44,7 @@ use sonard_api::{
     ScanRequest, ScanTotals, ServerReport, Setup, SimulationReport, Started, Status,
     SubscriberReport,
 };
-use sonard_device::host_gpio::{HostGpio, NoGpio};
+use sonard_device::host_gpio::{HostGpio, NoHostGpio};
 use sonard_model::scene::Scene;
 use sonard_records::{Event, EventKind, Record, Session};
 use sonard_runtime::supervisor::{Supervisor, Task, TaskFailure};
@@ -54,19 +54,19 @@ use tokio::{
 };
 use uuid::Uuid;
 
-pub use annotate::judged_line;
-pub(crate) use broadcast::Shelf;
-pub use broadcast::{ClientGuard, Hub, Line, Moved, ScanSubscription, Subscription, Wanted};
-pub use control::{Order, Request};
+pub use annotate::annotated_line;
+pub(crate) use broadcast::Ring;
+pub use broadcast::{ClientGuard, Hub, StreamLine, DeadbandFilter, ScanSubscription, Subscription, SubscriptionFilter};
+pub use control::{Order, OrderRequest};
 pub use device_task::OpenPort;
 pub use journal::{Journal, JournalThread};
-pub use limits::{check_device, check_plan, check_pose, ordered_air};
+pub use limits::{check_device, check_plan, check_pose, air_from_order};
 pub use link_state::{LinkInput, LinkMachine, LinkStep, RetryBounds, Transition};
-pub use live_messages::{Audience, Follower};
-pub use order_error::{Refusal, RefusalKind};
-pub use schedule::{Asked, Due, Schedule};
-pub use sensor::ordered_sensor;
-pub use settings::{Mismatch, OptionalOutputs, Settings, Simulated};
+pub use live_messages::{LiveMessageSink, MessageConverter};
+pub use order_error::{OrderError, OrderErrorKind};
+pub use schedule::{QueuedScans, Due, Schedule};
+pub use sensor::sensor_from_order;
+pub use settings::{SettingsConflict, OptionalOutputs, Settings, ArraySimulation};
 pub use state::NextScan;
 
 use air::AirControl;
@@ -94,7 +94,7 @@ pub struct Resources {
 /// Interface of the running daemon for its clients: orders, status, live records. Cheap to clone.
 #[derive(Debug, Clone)]
 pub struct Handle {
-    orders: mpsc::Sender<Request>,
+    orders: mpsc::Sender<OrderRequest>,
     state: Arc<DaemonState>,
     hub: Hub,
     journal: Journal,
@@ -133,7 +133,7 @@ pub fn prepare_simulated(
     supervisor: Supervisor,
     settings: Settings,
 ) -> (Daemon, Handle) {
-    wire(Box::new(NoGpio), journal, supervisor, settings, |control, out| {
+    wire(Box::new(NoHostGpio), journal, supervisor, settings, |control, out| {
         Worker::Array(Box::new(SimulatedArray::new(control, out)))
     })
 }
@@ -197,14 +197,14 @@ impl Handle {
     ///
     /// # Errors
     /// When the order is rejected, or the daemon is stopping.
-    pub async fn order(&self, order: Order) -> Result<(), Refusal> {
-        let gone = || Refusal {
-            kind: RefusalKind::Stopping,
+    pub async fn order(&self, order: Order) -> Result<(), OrderError> {
+        let gone = || OrderError {
+            kind: OrderErrorKind::Stopping,
             message: "the daemon is stopping".into(),
             help: "retry once it is running again".into(),
         };
         let (reply, answer) = oneshot::channel();
-        self.orders.send(Request { order, reply }).await.map_err(|_| gone())?;
+        self.orders.send(OrderRequest { order, reply }).await.map_err(|_| gone())?;
         answer.await.map_err(|_| gone())?
     }
 
@@ -212,17 +212,17 @@ impl Handle {
     ///
     /// # Errors
     /// Those of [`order`](Self::order), and a request of zero scans.
-    pub async fn start(&self, request: ScanRequest) -> Result<Started, Refusal> {
+    pub async fn start(&self, request: ScanRequest) -> Result<Started, OrderError> {
         let ScanRequest { scans, plan, pose } = request;
         if scans == Some(0) {
-            return Err(Refusal {
-                kind: RefusalKind::Wrong,
+            return Err(OrderError {
+                kind: OrderErrorKind::Invalid,
                 message: "scans is 0".into(),
                 help: "set it to 1 or more, or omit it".into(),
             });
         }
         let request = Uuid::new_v4();
-        self.order(Order::Start(Asked { request, scans, plan, pose })).await?;
+        self.order(Order::Start(QueuedScans { request, scans, plan, pose })).await?;
         Ok(Started { accepted: true, request })
     }
 

@@ -11,7 +11,7 @@ use sonard_model::{
 };
 use sonard_records::{PlanError, ScanPlan};
 
-use super::order_error::{Refusal, RefusalKind};
+use super::order_error::{OrderError, OrderErrorKind};
 
 /// Checks the azimuths of a scan, also against the motor if a device is connected.
 ///
@@ -22,18 +22,18 @@ pub fn check_plan(
     plan: &ScanPlan,
     of_array: bool,
     device: Option<&Identity>,
-) -> Result<(), Refusal> {
+) -> Result<(), OrderError> {
     if of_array {
-        return Err(Refusal {
-            kind: RefusalKind::Conflict,
+        return Err(OrderError {
+            kind: OrderErrorKind::Conflict,
             message: "an array has no plan: its rangers are fixed".into(),
             help: "to change them, set simulate.array in the configuration".into(),
         });
     }
-    let reject = |error: PlanError| Refusal {
+    let reject = |error: PlanError| OrderError {
         kind: match error {
-            PlanError::OffMotorGrid { .. } => RefusalKind::Conflict,
-            _ => RefusalKind::Wrong,
+            PlanError::OffMotorGrid { .. } => OrderErrorKind::Conflict,
+            _ => OrderErrorKind::Invalid,
         },
         message: error.to_string(),
         help: "a full revolution is from_deg 0, to_deg 360, step_deg 0.9, pings_per_stop 1".into(),
@@ -54,11 +54,11 @@ pub fn check_pose(
     pose: &Pose,
     scene: Option<&Scene>,
     array: Option<&RangerArray>,
-) -> Result<(), Refusal> {
+) -> Result<(), OrderError> {
     let is_finite = [pose.x_m, pose.y_m, pose.heading_deg].iter().all(|value| value.is_finite());
     if !is_finite {
-        return Err(Refusal {
-            kind: RefusalKind::Wrong,
+        return Err(OrderError {
+            kind: OrderErrorKind::Invalid,
             message: "the pose has a value that is not finite".into(),
             help: "give x_m and y_m in metres, heading_deg in degrees".into(),
         });
@@ -76,18 +76,18 @@ pub fn check_pose(
 ///
 /// # Errors
 /// If a value is out of range.
-pub fn ordered_air(
+pub fn air_from_order(
     order: &AirOrder,
     humidity_percent: f64,
     pressure_kpa: f64,
-) -> Result<Air, Refusal> {
+) -> Result<Air, OrderError> {
     let air = Air::new(
         order.temperature_c,
         order.humidity_percent.unwrap_or(humidity_percent),
         order.pressure_kpa.unwrap_or(pressure_kpa),
     );
-    air.map_err(|error| Refusal {
-        kind: RefusalKind::Wrong,
+    air.map_err(|error| OrderError {
+        kind: OrderErrorKind::Invalid,
         message: error.to_string(),
         help: "temperatures are degrees Celsius, pressures kilopascals".into(),
     })
@@ -97,7 +97,7 @@ pub fn ordered_air(
 ///
 /// # Errors
 /// If the blanking is shorter than the device supports.
-pub fn check_device(sensor: &Sensor, before: &Sensor, device: &Identity) -> Result<(), Refusal> {
+pub fn check_device(sensor: &Sensor, before: &Sensor, device: &Identity) -> Result<(), OrderError> {
     if sensor.blanking_us == before.blanking_us {
         return Ok(());
     }
@@ -105,6 +105,6 @@ pub fn check_device(sensor: &Sensor, before: &Sensor, device: &Identity) -> Resu
         .map_err(|error| conflict(&error, "keep blanking_us unchanged, or increase it".into()))
 }
 
-fn conflict(error: &impl std::fmt::Display, help: String) -> Refusal {
-    Refusal { kind: RefusalKind::Conflict, message: error.to_string(), help }
+fn conflict(error: &impl std::fmt::Display, help: String) -> OrderError {
+    OrderError { kind: OrderErrorKind::Conflict, message: error.to_string(), help }
 }

@@ -5,9 +5,9 @@ use thiserror::Error;
 /// Rejection of an order, with its reason and a hint.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[error("{message}")]
-pub struct Refusal {
+pub struct OrderError {
     /// Category of the rejection.
-    pub kind: RefusalKind,
+    pub kind: OrderErrorKind,
     /// Description of the problem.
     pub message: String,
     /// Hint for the correction.
@@ -16,13 +16,13 @@ pub struct Refusal {
 
 /// Category of a rejection.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum RefusalKind {
+pub enum OrderErrorKind {
     /// The order is invalid at any time.
-    Wrong,
+    Invalid,
     /// The order conflicts with the current state: scene, motor, queued requests.
     Conflict,
     /// The order refers to an object that does not exist, or no longer exists.
-    Unknown,
+    NotFound,
     /// The daemon is stopping.
     Stopping,
 }

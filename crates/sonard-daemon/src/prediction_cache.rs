@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use firmware_protocol::messages::Identity;
 use jiff::Timestamp;
-use sonard_device::ranger::{Listening, ScanJob, device_record, provenance};
+use sonard_device::ranger::{ReceiverTiming, ScanJob, device_record, provenance};
 use sonard_model::{
     acoustics::Air,
     geometry::Pose,
@@ -87,8 +87,8 @@ impl PredictionCache {
 }
 
 /// Receive window: maximum range and blanking.
-pub(super) fn listening(settings: &Settings, air: &Air) -> Listening {
-    Listening {
+pub(super) fn listening(settings: &Settings, air: &Air) -> ReceiverTiming {
+    ReceiverTiming {
         max_range_m: settings.max_range_m(),
         sound_speed_m_s: air.sound_speed_m_s(),
         blanking_us: settings.sensor.blanking_us,

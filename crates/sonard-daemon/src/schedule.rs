@@ -12,7 +12,7 @@ const MAX_REQUESTS: usize = 64;
 
 /// Request for a number of scans.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Asked {
+pub struct QueuedScans {
     /// Id of the request, recorded in its scans.
     pub request: Uuid,
     /// Number of scans. `None` resumes the scans of the mode; it means one scan in the on-request
@@ -30,7 +30,7 @@ pub struct Schedule {
     mode: Mode,
     every: Duration,
     /// Queued requests, each with the number of scans that have not begun.
-    queue: VecDeque<(Asked, u32)>,
+    queue: VecDeque<(QueuedScans, u32)>,
     /// The scans of the mode are paused until the next start. A change of mode keeps the pause.
     paused: bool,
     /// Due time of the next scan in the schedule mode.
@@ -64,7 +64,7 @@ impl Schedule {
 
     /// Queues a request, or resumes the scans of the mode if it has no number of scans. Returns
     /// `false` if the queue is full.
-    pub fn start(&mut self, request: Asked) -> bool {
+    pub fn start(&mut self, request: QueuedScans) -> bool {
         let is_special = request.plan.is_some() || request.pose.is_some();
         let default_scans = u32::from(self.mode == Mode::OnRequest || is_special);
         let scans = request.scans.unwrap_or(default_scans);
@@ -94,7 +94,7 @@ impl Schedule {
 
     /// Request of the next scan; `None` if it is a scan of the mode.
     #[must_use]
-    pub fn next(&self) -> Option<Asked> {
+    pub fn next(&self) -> Option<QueuedScans> {
         self.queue.front().map(|(request, _)| *request)
     }
 
@@ -148,8 +148,8 @@ mod tests {
         Duration::from_secs(s)
     }
 
-    fn request(scans: Option<u32>) -> Asked {
-        Asked { request: Uuid::from_u128(7), scans, plan: None, pose: None }
+    fn request(scans: Option<u32>) -> QueuedScans {
+        QueuedScans { request: Uuid::from_u128(7), scans, plan: None, pose: None }
     }
 
     #[test]
@@ -220,8 +220,8 @@ mod tests {
     fn request_with_a_plan() {
         let mut schedule = Schedule::new(Mode::Continuous, s(60), s(0));
         schedule.stop();
-        let own = Asked { plan: Some(ScanPlan::default()), ..request(None) };
-        let other = Asked { request: Uuid::from_u128(8), scans: Some(3), ..own };
+        let own = QueuedScans { plan: Some(ScanPlan::default()), ..request(None) };
+        let other = QueuedScans { request: Uuid::from_u128(8), scans: Some(3), ..own };
         assert!(schedule.start(own) && schedule.start(other));
         assert_eq!((schedule.next(), schedule.requested()), (Some(own), 4));
         schedule.begun(s(0));

@@ -18,10 +18,10 @@ pub enum SecretError {
     Unreadable(#[from] io::Error),
     /// Folder, pipe or device instead of a file.
     #[error("not a regular file")]
-    NoFile,
+    NotRegularFile,
     /// File that others than its owner may read.
     #[error("permissions {:03o}: others than the owner may read the {what}", mode & 0o777)]
-    Open {
+    TooPermissive {
         /// Kind of secret.
         what: &'static str,
         /// File mode.
@@ -32,7 +32,7 @@ pub enum SecretError {
     TooLarge(u64),
     /// File that is not UTF-8 text.
     #[error("not UTF-8 text")]
-    NoText,
+    NotText,
     /// Secret too short to be safe.
     #[error("the {what} is shorter than {least} characters")]
     TooShort {
@@ -47,30 +47,30 @@ impl SecretError {
     /// Returns advice on the file's permissions; `None` for other errors.
     #[must_use]
     pub fn help(&self, path: &Path) -> Option<String> {
-        matches!(self, Self::Open { .. }).then(|| format!("chmod 600 {}", path.display()))
+        matches!(self, Self::TooPermissive { .. }).then(|| format!("chmod 600 {}", path.display()))
     }
 }
 
 /// Kind of a secret and its limits.
 #[derive(Debug, Clone, Copy)]
-pub struct Secret {
+pub struct SecretKind {
     /// Name in error messages.
-    pub what: &'static str,
+    pub name: &'static str,
     /// Minimum length, characters.
-    pub least: usize,
+    pub min_chars: usize,
     /// Maximum size of the file, bytes.
-    pub most_bytes: u64,
+    pub max_bytes: u64,
 }
 
 /// Reads the secret from a file that only its owner may read, and trims white space.
 ///
 /// # Errors
 /// Anything but a small regular file with text. Never blocks on pipes or devices.
-pub fn read_secret(path: &Path, secret: Secret) -> Result<String, SecretError> {
-    let Secret { what, least, most_bytes } = secret;
+pub fn read_secret(path: &Path, secret: SecretKind) -> Result<String, SecretError> {
+    let SecretKind { name: what, min_chars: least, max_bytes: most_bytes } = secret;
     let (text, mode) = read_small_file(path, most_bytes)?;
     if mode & 0o077 != 0 {
-        return Err(SecretError::Open { what, mode });
+        return Err(SecretError::TooPermissive { what, mode });
     }
     let secret = text.trim().to_owned();
     if secret.len() < least { Err(SecretError::TooShort { what, least }) } else { Ok(secret) }
@@ -86,13 +86,13 @@ pub fn read_small_file(path: &Path, max_bytes: u64) -> Result<(String, u32), Sec
     let file = OpenOptions::new().read(true).custom_flags(nonblocking).open(path)?;
     let metadata = file.metadata()?;
     if !metadata.is_file() {
-        return Err(SecretError::NoFile);
+        return Err(SecretError::NotRegularFile);
     }
     let mut bytes = Vec::new();
     file.take(max_bytes + 1).read_to_end(&mut bytes)?;
     if bytes.len() as u64 > max_bytes {
         return Err(SecretError::TooLarge(max_bytes));
     }
-    let text = String::from_utf8(bytes).map_err(|_| SecretError::NoText)?;
+    let text = String::from_utf8(bytes).map_err(|_| SecretError::NotText)?;
     Ok((text, metadata.permissions().mode()))
 }

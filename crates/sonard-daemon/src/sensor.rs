@@ -1,22 +1,22 @@
 //! Sensor set by an order.
 
-use super::order_error::{Refusal, RefusalKind};
+use super::order_error::{OrderError, OrderErrorKind};
 use sonard_api::{SensorOrder, Setup};
-use sonard_device::ranger::{Listening, Motion};
+use sonard_device::ranger::{ReceiverTiming, Motion};
 use sonard_model::acoustics::Sensor;
 
 /// Sensor of an order, applied to the configured one and checked against the configuration.
 ///
 /// # Errors
 /// When the sensor is invalid, or the order conflicts with the configuration.
-pub fn ordered_sensor(
+pub fn sensor_from_order(
     order: &SensorOrder,
     setup: &Setup,
     of_array: bool,
     sound_speed_m_s: f64,
-) -> Result<Sensor, Refusal> {
-    let sensor = order.applied_to(&setup.sensor).map_err(|error| Refusal {
-        kind: RefusalKind::Wrong,
+) -> Result<Sensor, OrderError> {
+    let sensor = order.apply_to(&setup.sensor).map_err(|error| OrderError {
+        kind: OrderErrorKind::Invalid,
         message: error.to_string(),
         help: "GET /v1/sensors lists the presets with their values".into(),
     })?;
@@ -29,7 +29,7 @@ pub fn ordered_sensor(
     // A simulated ranger receives until the next ranger of its array fires.
     if !of_array {
         let max_range_m = setup.model.options.max_range_m.unwrap_or(sensor.max_range_m);
-        let listening = Listening { max_range_m, sound_speed_m_s, blanking_us: sensor.blanking_us };
+        let listening = ReceiverTiming { max_range_m, sound_speed_m_s, blanking_us: sensor.blanking_us };
         Motion::from(&setup.motion)
             .check_window(&listening)
             .map_err(|error| conflict(error.to_string(), &error.help()))?;
@@ -37,6 +37,6 @@ pub fn ordered_sensor(
     Ok(sensor)
 }
 
-fn conflict(message: String, help: &str) -> Refusal {
-    Refusal { kind: RefusalKind::Conflict, message, help: help.into() }
+fn conflict(message: String, help: &str) -> OrderError {
+    OrderError { kind: OrderErrorKind::Conflict, message, help: help.into() }
 }

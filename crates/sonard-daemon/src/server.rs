@@ -38,8 +38,8 @@ use axum::{
     middleware::{self, Next},
     response::{IntoResponse, Response},
 };
-use sonard_api::{config::Keys, fleet::Asked};
-use sonard_log::History;
+use sonard_api::{config::Keys, fleet::PolledDaemon};
+use sonard_log::LogIndex;
 use sonard_model::scene::Scene;
 use sonard_records::Session;
 use tokio::{
@@ -72,7 +72,7 @@ pub(crate) struct Api {
     log_folder: Arc<PathBuf>,
     document: Bytes,
     access: Arc<Access>,
-    history: Arc<Mutex<History>>,
+    history: Arc<Mutex<LogIndex>>,
     /// Foxglove viewers, if enabled.
     foxglove: Option<Arc<Viewers>>,
     /// Set once a rejected viewer origin has been logged: browsers hide the reason from the page.
@@ -113,7 +113,7 @@ impl Server {
         log_folder: PathBuf,
         access: Access,
         keys: &Keys,
-        fleet: Vec<Asked>,
+        fleet: Vec<PolledDaemon>,
     ) -> Self {
         let endpoints = routes::endpoints();
         let viewers = &keys.foxglove;
@@ -125,11 +125,11 @@ impl Server {
         let slots = Arc::new(Slots::new(shares));
         let api = Api {
             daemon: daemon.clone(),
-            history: Arc::new(Mutex::new(History::new(log_folder.clone()))),
+            history: Arc::new(Mutex::new(LogIndex::new(log_folder.clone()))),
             foxglove: foxglove.clone(),
             has_logged_origin: Arc::default(),
             fleet: (!fleet.is_empty())
-                .then(|| sonard_api::fleet::watch(fleet, daemon.supervisor())),
+                .then(|| sonard_api::fleet::watch_fleet(fleet, daemon.supervisor())),
             playground: keys.playground.as_deref().map(|folder| Path::new(folder).into()),
             predicting: Arc::new(Semaphore::new(1)),
             locating: Arc::new(Semaphore::new(1)),

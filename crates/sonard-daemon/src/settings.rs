@@ -10,13 +10,13 @@ use std::{
 use super::{link_state::RetryBounds, prediction_cache::listening};
 use sonard_api::{
     Setup,
-    config::{Keys, MAX_ROBOT_NAME, is_robot_name},
+    config::{Keys, MAX_ROBOT_NAME_CHARS, is_robot_name},
 };
 use sonard_device::ranger::Motion;
 use sonard_log::Rotation;
 use sonard_model::{
     acoustics::{Air, Sensor},
-    array::{Course, RangerArray},
+    array::{RobotCourse, RangerArray},
     geometry::Pose,
     model::Options,
     scene::Scene,
@@ -35,7 +35,7 @@ pub struct Settings {
     /// Position and heading of the ranger.
     pub pose: Pose,
     /// Array simulated in place of a device, if there is one.
-    pub simulated: Option<Simulated>,
+    pub simulated: Option<ArraySimulation>,
     /// Optional outputs supported by this build.
     pub outputs: OptionalOutputs,
     /// SHA-256 of the contents of files that are read only at the start, by the keys that name
@@ -54,16 +54,16 @@ pub struct OptionalOutputs {
 
 /// Simulated array and its motion.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Simulated {
+pub struct ArraySimulation {
     /// Array of fixed rangers.
     pub array: Arc<RangerArray>,
     /// Trajectory of the robot with times; `None` for a robot at rest.
-    pub course: Option<Arc<Course>>,
+    pub course: Option<Arc<RobotCourse>>,
 }
 
 /// Conflict between configuration values that are each in range.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Mismatch {
+pub struct SettingsConflict {
     /// Section of the conflicting key.
     pub section: &'static str,
     /// Name of the conflicting key.
@@ -150,16 +150,16 @@ impl Settings {
     ///
     /// # Errors
     /// The first conflict found.
-    pub fn check(&self) -> Result<(), Mismatch> {
+    pub fn check(&self) -> Result<(), SettingsConflict> {
         let air = &self.keys.air;
-        self.plan().check().map_err(|error| Mismatch {
+        self.plan().check().map_err(|error| SettingsConflict {
             section: "plan",
             key: "to_deg",
             message: error.to_string(),
             help: "a full revolution is from_deg = 0, to_deg = 360, step_deg = 0.9".into(),
         })?;
         let air = Air::new(air.temperature_c, air.humidity_percent, air.pressure_kpa).map_err(
-            |error| Mismatch {
+            |error| SettingsConflict {
                 section: "air",
                 key: "temperature_c",
                 message: error.to_string(),
@@ -170,14 +170,14 @@ impl Settings {
         if self.simulated.is_none() {
             let has_window = self.keys.motion.window_ms.is_some();
             let checked = self.motion().check_window(&listening(self, &air));
-            checked.map_err(|error| Mismatch {
+            checked.map_err(|error| SettingsConflict {
                 section: if has_window { "motion" } else { "model" },
                 key: if has_window { "window_ms" } else { "max_range_m" },
                 message: error.to_string(),
                 help: error.help(),
             })?;
         }
-        self.keys.model.options.options().map_err(|foreign| Mismatch {
+        self.keys.model.options.options().map_err(|foreign| SettingsConflict {
             section: "model",
             key: foreign.option,
             message: foreign.to_string(),
@@ -189,10 +189,10 @@ impl Settings {
             ("ros", self.keys.ros.check(self.outputs.ros)),
             ("mqtt", self.keys.mqtt.check(self.outputs.mqtt)),
         ] {
-            checked.map_err(|(key, message, help)| Mismatch { section, key, message, help })?;
+            checked.map_err(|(key, message, help)| SettingsConflict { section, key, message, help })?;
         }
         if self.keys.link.retry_max_s < self.keys.link.retry_min_s {
-            return Err(Mismatch {
+            return Err(SettingsConflict {
                 section: "link",
                 key: "retry_max_s",
                 message: "link.retry_max_s is less than link.retry_min_s".into(),
@@ -204,14 +204,14 @@ impl Settings {
 
     /// Returns `true` if the settings are valid with another sensor.
     #[must_use]
-    pub fn goes_with(&self, sensor: &Sensor) -> bool {
+    pub fn is_valid_with(&self, sensor: &Sensor) -> bool {
         Self { sensor: sensor.clone(), ..self.clone() }.check().is_ok()
     }
 
-    fn check_server(&self) -> Result<(), Mismatch> {
+    fn check_server(&self) -> Result<(), SettingsConflict> {
         let server = &self.keys.server;
         if server.socket_permissions().is_none() {
-            return Err(Mismatch {
+            return Err(SettingsConflict {
                 section: "server",
                 key: "socket_mode",
                 message: format!("server.socket_mode is {}", server.socket_mode),
@@ -221,7 +221,7 @@ impl Settings {
         }
         let Some(listen) = &server.listen else { return Ok(()) };
         let invalid = |message: String, help: &str| {
-            Err(Mismatch { section: "server", key: "listen", message, help: help.into() })
+            Err(SettingsConflict { section: "server", key: "listen", message, help: help.into() })
         };
         let Ok(address) = listen.parse::<SocketAddr>() else {
             return invalid(
@@ -242,17 +242,17 @@ impl Settings {
         Ok(())
     }
 
-    fn check_robot(&self) -> Result<(), Mismatch> {
+    fn check_robot(&self) -> Result<(), SettingsConflict> {
         let robot = &self.keys.fleet.robot;
         if is_robot_name(robot) {
             return Ok(());
         }
-        Err(Mismatch {
+        Err(SettingsConflict {
             section: "fleet",
             key: "robot",
             message: format!("fleet.robot is {robot:?}"),
             help: format!(
-                "use at most {MAX_ROBOT_NAME} letters, digits, `-`, `_` and `.`, as in kiwi-7"
+                "use at most {MAX_ROBOT_NAME_CHARS} letters, digits, `-`, `_` and `.`, as in kiwi-7"
             ),
         })
     }

@@ -77,7 +77,7 @@ impl SimulatedArray {
         loop {
             let due = match self.control.schedule.due(self.control.now()) {
                 // No round starts unless its readings can be logged.
-                Due::Now if self.out.journal.is_well() => {
+                Due::Now if self.out.journal.is_writable() => {
                     if self.run_round().await.is_break() {
                         break;
                     }
@@ -279,7 +279,7 @@ impl SimulatedArray {
             let report = control.settings.simulated.as_ref().map(|simulated| {
                 let array = &simulated.array;
                 let now = SimulationReport::new(array);
-                let before = published.simulation.take().filter(|report| report.is_of(array));
+                let before = published.simulation.take().filter(|report| report.matches_array(array));
                 let readings = before.map_or(now.readings, |before| before.readings);
                 let (driving, skipped) = (motion.is_driving(), firing_grid.skipped());
                 SimulationReport { driving, skipped, readings, ..now }

@@ -162,7 +162,7 @@ fn add_stats(mut totals: LineTotals, stats: &LinkStats) -> LineTotals {
     totals.framing_errors += u64::from(dropped.stuffing) + u64::from(dropped.too_long);
     totals.retries += stats.retries;
     totals.repaired += stats.repaired;
-    totals.refused += stats.refused;
+    totals.refused += stats.rejected;
     totals
 }
 

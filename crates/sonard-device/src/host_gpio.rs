@@ -31,9 +31,9 @@ pub trait HostGpio: Send {
 
 /// Host without GPIO pins.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct NoGpio;
+pub struct NoHostGpio;
 
-impl HostGpio for NoGpio {}
+impl HostGpio for NoHostGpio {}
 
 /// Failure to use the configured pins.
 #[derive(Debug, Error)]
@@ -87,7 +87,7 @@ pub fn check(keys: &GpioKeys) -> Result<(), HostGpioError> {
 /// notice would be worse than no daemon.
 pub fn open(keys: &GpioKeys) -> Result<Box<dyn HostGpio>, HostGpioError> {
     if *keys == GpioKeys::default() {
-        return Ok(Box::new(NoGpio));
+        return Ok(Box::new(NoHostGpio));
     }
     #[cfg(feature = "pi")]
     return match raspberry_pi::BcmPins::open(keys) {

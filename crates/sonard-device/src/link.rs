@@ -26,7 +26,7 @@ pub use adapter::{is_kernel_console, latency_timer_ms};
 pub use error::{LinkError, PortListError};
 pub use holders::{Holder, Holders, find_holders};
 pub use opener::PortOpener;
-pub use ports::{Candidate, candidates};
+pub use ports::{SerialPortInfo, list_ports};
 use ports::{PortFolders, Resolved};
 pub use pty::Pty;
 
@@ -75,7 +75,7 @@ pub fn device_path(port: &str) -> Result<PathBuf, LinkError> {
 pub fn describe_contention(port: &str) -> Option<String> {
     let path = device_path(port).ok()?;
     let holders = find_holders(&path);
-    let advice = holders.advice(&path)?;
+    let advice = holders.remedy(&path)?;
     Some(format!(
         "{} has the port open, too, and may consume its bytes: {advice}",
         holders.describe("")

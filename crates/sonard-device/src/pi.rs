@@ -24,7 +24,7 @@ mod serve;
 #[cfg(test)]
 mod simulated_pins;
 
-pub use board::{LOOK_TICKS, PiBoard, PiSettings};
+pub use board::{ECHO_POLL_TICKS, PiBoard, PiSettings};
 pub use gpio::{GpioError, GpioPins, PinNumbers};
-pub use pins::{Output, Pins};
+pub use pins::{OutputPin, Pins};
 pub use serve::serve;

@@ -38,7 +38,7 @@ pub struct Thermometer {
     /// Name of the chip at the first reading.
     chip: Option<String>,
     /// Pending read attempt.
-    pending: Option<oneshot::Receiver<Result<Sample, Fault>>>,
+    pending: Option<oneshot::Receiver<Result<Sample, ThermometerFault>>>,
     remark: Option<String>,
     has_remarked_registers: bool,
 }
@@ -50,12 +50,12 @@ pub struct ThermometerError {
     /// Path of the thermometer's file.
     pub file: PathBuf,
     /// Cause of the failure.
-    pub fault: Fault,
+    pub fault: ThermometerFault,
 }
 
 /// Cause of a failed or rejected reading.
 #[derive(Debug, Clone, PartialEq, Error)]
-pub enum Fault {
+pub enum ThermometerFault {
     /// The file can't be opened or read.
     #[error("{0}")]
     Unreadable(String),
@@ -96,7 +96,7 @@ pub enum Fault {
     PowerOnValue,
     /// The temperature is outside of the model's range for air.
     #[error("{0}")]
-    NotOfAir(String),
+    OutOfAirRange(String),
     /// The sensor measures a part of the computer.
     #[error(
         "it belongs to {0}, which does not measure the air: give the path of the air's sensor (hwmon \
@@ -125,7 +125,7 @@ struct Sample {
     is_unusual: bool,
 }
 
-impl Fault {
+impl ThermometerFault {
     /// Returns `true` if an immediate retry may succeed.
     const fn is_transient(&self) -> bool {
         !matches!(
@@ -185,15 +185,15 @@ impl Thermometer {
         self.remark.take()
     }
 
-    async fn read_once(&mut self) -> Result<f64, Fault> {
+    async fn read_once(&mut self) -> Result<f64, ThermometerFault> {
         let sample = self.sample().await?;
         if let (Some(before), Some(now)) = (&self.chip, &sample.chip)
             && before != now
         {
-            return Err(Fault::OtherChip { before: before.clone(), now: now.clone() });
+            return Err(ThermometerFault::OtherChip { before: before.clone(), now: now.clone() });
         }
         let admitted = self.plausibility.admit(sample.temperature_c, self.epoch.elapsed());
-        if let Admission::Persistent { from_c, waited } = admitted.map_err(Fault::TooFast)? {
+        if let Admission::Persistent { from_c, waited } = admitted.map_err(ThermometerFault::TooFast)? {
             self.remark = Some(format!(
                 "{}: {:.1} C after {from_c:.1} C is accepted, because it has lasted for {:.0} s",
                 self.file.display(),
@@ -214,7 +214,7 @@ impl Thermometer {
 
     /// Reads a sample on a separate thread. A driver may block forever; the thread neither occupies
     /// the runtime nor prevents the program from exiting.
-    async fn sample(&mut self) -> Result<Sample, Fault> {
+    async fn sample(&mut self) -> Result<Sample, ThermometerFault> {
         let mut pending = match self.pending.take() {
             Some(pending) => pending,
             None => {
@@ -226,48 +226,48 @@ impl Thermometer {
                     reason = "its end is received as the end of a channel"
                 )]
                 let started = thread.spawn(move || drop(send.send(read_sample(&file))));
-                started.map_err(|error| Fault::Unreadable(format!("no thread for it: {error}")))?;
+                started.map_err(|error| ThermometerFault::Unreadable(format!("no thread for it: {error}")))?;
                 receive
             }
         };
         match timeout(READ_TIMEOUT, &mut pending).await {
             Ok(Ok(sample)) => sample,
-            Ok(Err(_)) => Err(Fault::Unreadable("the reading thread has ended".into())),
+            Ok(Err(_)) => Err(ThermometerFault::Unreadable("the reading thread has ended".into())),
             Err(_) => {
                 self.pending = Some(pending);
-                Err(Fault::TimedOut)
+                Err(ThermometerFault::TimedOut)
             }
         }
     }
 }
 
-fn read_sample(file: &Path) -> Result<Sample, Fault> {
+fn read_sample(file: &Path) -> Result<Sample, ThermometerFault> {
     let chip = file::chip(file);
     if let Some(chip) = chip.as_deref().filter(|chip| file::is_internal(chip)) {
-        return Err(Fault::NotAmbient(chip.to_owned()));
+        return Err(ThermometerFault::NotAmbient(chip.to_owned()));
     }
     parse(&read_file(file)?).map(|sample| Sample { chip, ..sample })
 }
 
 /// Parses a number of thousandths of a degree, or the two lines of `w1_slave`: registers with their
 /// checksum and a `YES`, and `t=` with the number.
-fn parse(text: &str) -> Result<Sample, Fault> {
+fn parse(text: &str) -> Result<Sample, ThermometerFault> {
     if text.trim().is_empty() {
-        return Err(Fault::Empty);
+        return Err(ThermometerFault::Empty);
     }
     if !text.contains("crc=") && !text.contains("t=") {
         // The first register of a truncated `w1_slave` looks like a number.
         let number = text.trim();
         if !text.ends_with('\n') && number.len() <= 2 && number != "0" {
-            return Err(Fault::CutOff("the end of the line"));
+            return Err(ThermometerFault::CutOff("the end of the line"));
         }
         let thousandths = parse_thousandths(text)?;
         let temperature_c = check_air(thousandths)?;
         return Ok(Sample { temperature_c, chip: None, is_unusual: false });
     }
-    let (head, number) = text.split_once("t=").ok_or(Fault::CutOff("the temperature"))?;
+    let (head, number) = text.split_once("t=").ok_or(ThermometerFault::CutOff("the temperature"))?;
     if !head.contains("YES") {
-        return Err(Fault::Checksum);
+        return Err(ThermometerFault::Checksum);
     }
     let scratchpad = Scratchpad::parse(head)?;
     let thousandths = parse_thousandths(number)?;
@@ -276,22 +276,22 @@ fn parse(text: &str) -> Result<Sample, Fault> {
     Ok(Sample { temperature_c, chip: None, is_unusual: scratchpad.is_unusual() })
 }
 
-fn parse_thousandths(text: &str) -> Result<i32, Fault> {
+fn parse_thousandths(text: &str) -> Result<i32, ThermometerFault> {
     let text = text.trim();
     text.parse().map_err(|_| match text {
-        "" => Fault::CutOff("the temperature"),
-        _ => Fault::NotANumber(text.chars().take(40).collect()),
+        "" => ThermometerFault::CutOff("the temperature"),
+        _ => ThermometerFault::NotANumber(text.chars().take(40).collect()),
     })
 }
 
-fn check_air(thousandths: i32) -> Result<f64, Fault> {
+fn check_air(thousandths: i32) -> Result<f64, ThermometerFault> {
     if thousandths == scratchpad::POWER_ON_THOUSANDTHS {
-        return Err(Fault::PowerOnValue);
+        return Err(ThermometerFault::PowerOnValue);
     }
     let temperature_c = f64::from(thousandths) / 1e3;
     match Air::new(temperature_c, 50.0, 101.325) {
         Ok(_) => Ok(temperature_c),
-        Err(error) => Err(Fault::NotOfAir(error.to_string())),
+        Err(error) => Err(ThermometerFault::OutOfAirRange(error.to_string())),
     }
 }
 

@@ -13,7 +13,7 @@ use std::{
 };
 
 use jiff::Timestamp;
-use sonard_export::{Export as _, LogFile, McapExport, Profile, Settings};
+use sonard_export::{Export as _, AttachedLog, McapExport, Profile, ExportSettings};
 use sonard_records::{ScanView, decode_line};
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -24,12 +24,12 @@ fn main() -> Result<(), Box<dyn Error>> {
         Some("nav2") => Profile::Nav2,
         _ => Profile::Rep117,
     };
-    let mut export = Box::new(McapExport::new(out, Settings { profile, ..Settings::default() })?);
+    let mut export = Box::new(McapExport::new(out, ExportSettings { profile, ..ExportSettings::default() })?);
     let lines = BufReader::new(File::open(&log)?).split(b'\n').map_while(Result::ok);
     let records = lines.filter_map(|line| decode_line(&line).ok());
     let start = Instant::now();
     let (mut readings, mut writing_s) = (0, 0.0);
-    for scan in ScanView::one_by_one(records) {
+    for scan in ScanView::stream(records) {
         readings += scan.pings.len();
         let start = Instant::now();
         if let Some(why) = export.scan(&log, &scan)? {
@@ -40,7 +40,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut file = File::open(&log)?;
     let name = log.rsplit('/').next().unwrap_or(&log);
     let bytes = file.metadata()?.len();
-    export.attach(&LogFile { name, bytes, written: Timestamp::UNIX_EPOCH }, &mut file)?;
+    export.attach(&AttachedLog { name, bytes, modified: Timestamp::UNIX_EPOCH }, &mut file)?;
     export.finish()?;
     println!(
         "{readings} readings: {:.0} per second, {:.0} per second without reading the log",

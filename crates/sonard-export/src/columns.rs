@@ -13,7 +13,7 @@ use sonard_records::{CrosstalkRecord, PathRecord, Ping, ScanView, Session, SimRe
 
 /// Reading with the context of its scan.
 #[derive(Debug, Clone, Copy)]
-pub struct Row<'a> {
+pub struct ReadingRow<'a> {
     /// File name of the log.
     log: &'a str,
     /// Number of the session among the exported ones, from 1.
@@ -23,7 +23,7 @@ pub struct Row<'a> {
     viewpoint: Option<Viewpoint>,
 }
 
-impl<'a> Row<'a> {
+impl<'a> ReadingRow<'a> {
     /// Creates the row of a reading.
     pub(crate) fn new(
         log: &'a str,
@@ -66,7 +66,7 @@ impl<'a> Row<'a> {
 
 /// Type of the values of a column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Kind {
+pub enum ColumnKind {
     /// Text, encoded as UTF-8.
     Text,
     /// Signed 64-bit integer.
@@ -105,26 +105,26 @@ pub enum Value<'a> {
 impl Value<'_> {
     /// Returns the kind of column that the value belongs to.
     #[must_use]
-    pub const fn kind(&self) -> Kind {
+    pub const fn kind(&self) -> ColumnKind {
         match self {
-            Self::Text(_) => Kind::Text,
-            Self::Integer(_) => Kind::Integer,
-            Self::Number(_) => Kind::Number,
-            Self::Flag(_) => Kind::Flag,
-            Self::Time(_) => Kind::Time,
-            Self::Integers(_) => Kind::Integers,
-            Self::Numbers(_) => Kind::Numbers,
+            Self::Text(_) => ColumnKind::Text,
+            Self::Integer(_) => ColumnKind::Integer,
+            Self::Number(_) => ColumnKind::Number,
+            Self::Flag(_) => ColumnKind::Flag,
+            Self::Time(_) => ColumnKind::Time,
+            Self::Integers(_) => ColumnKind::Integers,
+            Self::Numbers(_) => ColumnKind::Numbers,
         }
     }
 }
 
 /// Name and type of a column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Field {
+pub struct ColumnType {
     /// Column name, with the unit.
     pub name: &'static str,
     /// Type of the cells.
-    pub kind: Kind,
+    pub kind: ColumnKind,
     /// True if single precision is sufficient; binary formats then store four bytes instead of
     /// eight.
     pub is_single: bool,
@@ -132,50 +132,50 @@ pub struct Field {
 
 /// Column of a table of readings.
 #[derive(Debug, Clone, Copy)]
-pub struct Column {
+pub struct TableColumn {
     /// Column name, with the unit.
     pub name: &'static str,
     /// Type of the cells.
-    pub kind: Kind,
+    pub kind: ColumnKind,
     /// True if single precision is sufficient; binary formats then store four bytes instead of
     /// eight.
     pub is_single: bool,
-    cell: for<'a> fn(&Row<'a>) -> Option<Value<'a>>,
+    cell: for<'a> fn(&ReadingRow<'a>) -> Option<Value<'a>>,
 }
 
-impl Column {
+impl TableColumn {
     /// Returns name and type of the column.
     #[must_use]
-    pub const fn field(&self) -> Field {
-        Field { name: self.name, kind: self.kind, is_single: self.is_single }
+    pub const fn field(&self) -> ColumnType {
+        ColumnType { name: self.name, kind: self.kind, is_single: self.is_single }
     }
 
     /// Returns the cell of a reading; `None` for a value missing in the log.
     #[must_use]
-    pub fn cell<'a>(&self, row: &Row<'a>) -> Option<Value<'a>> {
+    pub fn cell<'a>(&self, row: &ReadingRow<'a>) -> Option<Value<'a>> {
         (self.cell)(row)
     }
 }
 
-const fn text(name: &'static str, cell: for<'a> fn(&Row<'a>) -> Option<Value<'a>>) -> Column {
-    Column { name, kind: Kind::Text, is_single: false, cell }
+const fn text(name: &'static str, cell: for<'a> fn(&ReadingRow<'a>) -> Option<Value<'a>>) -> TableColumn {
+    TableColumn { name, kind: ColumnKind::Text, is_single: false, cell }
 }
 
-const fn integer(name: &'static str, cell: for<'a> fn(&Row<'a>) -> Option<Value<'a>>) -> Column {
-    Column { name, kind: Kind::Integer, is_single: false, cell }
+const fn integer(name: &'static str, cell: for<'a> fn(&ReadingRow<'a>) -> Option<Value<'a>>) -> TableColumn {
+    TableColumn { name, kind: ColumnKind::Integer, is_single: false, cell }
 }
 
-const fn number(name: &'static str, cell: for<'a> fn(&Row<'a>) -> Option<Value<'a>>) -> Column {
-    Column { name, kind: Kind::Number, is_single: false, cell }
+const fn number(name: &'static str, cell: for<'a> fn(&ReadingRow<'a>) -> Option<Value<'a>>) -> TableColumn {
+    TableColumn { name, kind: ColumnKind::Number, is_single: false, cell }
 }
 
 /// Column of a measured or predicted quantity: seven digits resolve a micrometre in ten metres.
-const fn single(name: &'static str, cell: for<'a> fn(&Row<'a>) -> Option<Value<'a>>) -> Column {
-    Column { name, kind: Kind::Number, is_single: true, cell }
+const fn single(name: &'static str, cell: for<'a> fn(&ReadingRow<'a>) -> Option<Value<'a>>) -> TableColumn {
+    TableColumn { name, kind: ColumnKind::Number, is_single: true, cell }
 }
 
-const fn time(name: &'static str, cell: for<'a> fn(&Row<'a>) -> Option<Value<'a>>) -> Column {
-    Column { name, kind: Kind::Time, is_single: false, cell }
+const fn time(name: &'static str, cell: for<'a> fn(&ReadingRow<'a>) -> Option<Value<'a>>) -> TableColumn {
+    TableColumn { name, kind: ColumnKind::Time, is_single: false, cell }
 }
 
 /// Returns the serialized name of an enum value, as written in a log.
@@ -191,7 +191,7 @@ fn enum_text<'a>(value: impl Serialize) -> Option<Value<'a>> {
 }
 
 fn path_text(path: &PathRecord) -> Value<'_> {
-    Value::Text(path.in_words().into())
+    Value::Text(path.describe().into())
 }
 
 fn sender(crosstalk: &CrosstalkRecord) -> Value<'_> {
@@ -199,7 +199,7 @@ fn sender(crosstalk: &CrosstalkRecord) -> Value<'_> {
 }
 
 /// All columns, in table order.
-pub const COLUMNS: &[Column] = &[
+pub const COLUMNS: &[TableColumn] = &[
     text("log", |row| Some(Value::Text(row.log.into()))),
     integer("session", |row| row.session.map(|number| Value::Integer(number.into()))),
     time("session_started", |row| Some(Value::Time(row.session_record()?.started))),
@@ -239,15 +239,15 @@ pub const COLUMNS: &[Column] = &[
     integer("fired_ticks", |row| {
         row.ping.fired_ticks.and_then(|ticks| i64::try_from(ticks).ok()).map(Value::Integer)
     }),
-    Column {
+    TableColumn {
         name: "echo_ticks",
-        kind: Kind::Integers,
+        kind: ColumnKind::Integers,
         is_single: false,
         cell: |row| Some(Value::Integers(&row.ping.echo_ticks)),
     },
-    Column {
+    TableColumn {
         name: "repaired",
-        kind: Kind::Flag,
+        kind: ColumnKind::Flag,
         is_single: false,
         cell: |row| Some(Value::Flag(row.ping.repaired)),
     },

@@ -13,7 +13,7 @@ use sonard_model::geometry::Pose;
 use sonard_records::{Ping, ScanView, Session};
 
 use crate::{
-    LeftOut,
+    SkippedScan,
     ros::{
         cdr::Encode,
         interface::{Interface, LASER_SCAN, MARKERS, POINT_CLOUD, TRANSFORMS},
@@ -25,7 +25,7 @@ use frames::RangerPose;
 pub(crate) use readings::{FiringTimes, plan_order};
 use readings::{RangeReading, SessionParameters, laser_scan, paths, points};
 use scene::outlines;
-pub use settings::{Distribution, Profile, Settings};
+pub use settings::{Distribution, Profile, ExportSettings};
 use topics::ReadingTopic;
 pub use topics::Topic;
 use topics::{FIXED_TRANSFORMS, SCENE};
@@ -48,7 +48,7 @@ pub(crate) trait MessageSink {
 /// Converter of readings and scans to messages.
 #[derive(Debug)]
 pub(crate) struct Converter {
-    settings: Settings,
+    settings: ExportSettings,
     /// Parameters of the current session.
     parameters: Option<SessionParameters>,
     topics: Vec<Topic>,
@@ -74,7 +74,7 @@ struct OpenReading {
 }
 
 impl Converter {
-    pub(crate) fn new(settings: Settings) -> Self {
+    pub(crate) fn new(settings: ExportSettings) -> Self {
         let end = Stamp(0);
         Self {
             settings,
@@ -87,7 +87,7 @@ impl Converter {
     }
 
     /// Starts a session; returns the reason if its scans cannot be converted.
-    pub(crate) fn begin_session(&mut self, session: &Session) -> Result<(), LeftOut> {
+    pub(crate) fn begin_session(&mut self, session: &Session) -> Result<(), SkippedScan> {
         (self.parameters, self.topics, self.static_messages) = (None, Vec::new(), None);
         let parameters = SessionParameters::new(session, &self.settings)?;
         let scene = outlines(session);
@@ -185,7 +185,7 @@ impl Converter {
     }
 }
 
-impl Settings {
+impl ExportSettings {
     /// Writes the transforms of moving frames at a time.
     fn write_transforms<O: MessageSink>(
         &self,
@@ -231,7 +231,7 @@ impl SessionParameters {
     /// Writes measured range, predicted range and residual, as far as they are known.
     fn write<O: MessageSink>(
         &self,
-        settings: &Settings,
+        settings: &ExportSettings,
         ping: &Ping,
         fired: Stamp,
         out: &mut O,

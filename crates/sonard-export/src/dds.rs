@@ -11,7 +11,7 @@ use crate::{
 };
 
 /// Discovery topic of nodes, and its message type.
-pub const NODES: (&str, &str) =
+pub const DISCOVERY_TOPIC: (&str, &str) =
     ("ros_discovery_info", "rmw_dds_common::msg::dds_::ParticipantEntitiesInfo_");
 
 /// World frame, in which poses are given.
@@ -65,7 +65,7 @@ pub fn is_name(text: &str) -> bool {
 
 /// Node with its DDS endpoints.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Node {
+pub struct NodeInfo {
     /// Namespace, empty or such as `/kiwi`.
     pub namespace: String,
     /// Node name within the namespace.
@@ -76,7 +76,7 @@ pub struct Node {
     pub writers: Vec<Guid>,
 }
 
-impl Node {
+impl NodeInfo {
     /// Encodes the discovery message of the participant's only node:
     /// `rmw_dds_common/ParticipantEntitiesInfo`.
     #[must_use]
@@ -91,7 +91,7 @@ impl Node {
 }
 
 struct Announcement<'a> {
-    node: &'a Node,
+    node: &'a NodeInfo,
     participant: Guid,
     guid_bytes: usize,
 }
@@ -113,26 +113,26 @@ impl Encode for Announcement<'_> {
 }
 
 /// DDS names of the request and reply types of `std_srvs/srv/Trigger`.
-pub const TRIGGER: [&str; 2] =
+pub const TRIGGER_TYPES: [&str; 2] =
     ["std_srvs::srv::dds_::Trigger_Request_", "std_srvs::srv::dds_::Trigger_Response_"];
 
 /// Identification of a service request, which depends on the client's middleware.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Asker {
+pub enum Requester {
     /// Header in the message: client and sequence number (`rmw_cyclonedds`).
-    Within([u8; Self::BYTES]),
+    InMessage([u8; Self::BYTES]),
     /// Sample identity outside of the message, as in DDS-RPC (`rmw_fastrtps`).
-    Beside,
+    OutOfBand,
 }
 
-impl Asker {
+impl Requester {
     const BYTES: usize = 16;
 
     /// Identifies a `Trigger` request, which has no fields, by its bytes after the encapsulation
     /// header.
     #[must_use]
-    pub fn of_trigger(request: &[u8]) -> Self {
-        request.first_chunk().map_or(Self::Beside, |header| Self::Within(*header))
+    pub fn from_trigger(request: &[u8]) -> Self {
+        request.first_chunk().map_or(Self::OutOfBand, |header| Self::InMessage(*header))
     }
 
     /// Encodes the reply with its success flag and message.
@@ -143,14 +143,14 @@ impl Asker {
 }
 
 struct TriggerReply<'a> {
-    to: Asker,
+    to: Requester,
     success: bool,
     message: &'a str,
 }
 
 impl Encode for TriggerReply<'_> {
     fn encode(&self, cdr: &mut CdrWriter) {
-        if let Asker::Within(header) = self.to {
+        if let Requester::InMessage(header) = self.to {
             header.iter().for_each(|byte| cdr.u8(*byte));
         }
         cdr.flag(self.success);
@@ -194,7 +194,7 @@ mod tests {
     #[test]
     fn encodes_discovery_message() {
         let guid = |first: u8| std::array::from_fn::<u8, 16, _>(|at| first + at as u8);
-        let node = Node {
+        let node = NodeInfo {
             namespace: "/kiwi".into(),
             name: "sonard".into(),
             readers: vec![guid(1)],
@@ -223,14 +223,14 @@ mod tests {
     fn replies_match_requests() {
         // A message without fields is one byte, and padding.
         for request in [&[][..], &[0], &[0, 0, 0, 0]] {
-            let asker = Asker::of_trigger(request);
-            assert_eq!(asker, Asker::Beside);
+            let asker = Requester::from_trigger(request);
+            assert_eq!(asker, Requester::OutOfBand);
             let reply = asker.reply(true, "ok");
             assert_eq!(reply, [0, 1, 0, 0, 1, 0, 0, 0, 3, 0, 0, 0, b'o', b'k', 0]);
         }
         let header: [u8; 16] = std::array::from_fn(|at| at as u8);
-        let asker = Asker::of_trigger(&[&header[..], &[0]].concat());
-        assert_eq!(asker, Asker::Within(header));
+        let asker = Requester::from_trigger(&[&header[..], &[0]].concat());
+        assert_eq!(asker, Requester::InMessage(header));
         let reply = asker.reply(false, "");
         assert_eq!(reply[4..], [&header[..], &[0, 0, 0, 0, 1, 0, 0, 0, 0]].concat());
     }

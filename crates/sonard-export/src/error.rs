@@ -22,7 +22,7 @@ pub enum ExportError {
 
 /// Reason why a format cannot represent a scan.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
-pub enum LeftOut {
+pub enum SkippedScan {
     /// Missing session record, so the sensor is unknown.
     #[error("session record missing: sensor unknown")]
     NoSession,

@@ -22,11 +22,11 @@ use crate::{
         message::{Header, Marker, MarkerShape, Markers, OccupancyGrid, Stamp},
     },
 };
-pub use geojson::{begins_geojson, to_geojson};
+pub use geojson::{is_geojson, to_geojson};
 
 /// Interpretation results of a place, in local metres.
 #[derive(Debug, Clone, Copy)]
-pub struct Findings<'a> {
+pub struct PlaceFindings<'a> {
     /// Start of the last interpreted scan.
     pub time: Option<Timestamp>,
     /// Origin of the readings.
@@ -46,7 +46,7 @@ pub struct Findings<'a> {
 ///
 /// # Errors
 /// Returns the write error of the output.
-pub fn write_findings(out: impl Write, place: &Findings<'_>) -> Result<(), ExportError> {
+pub fn write_findings(out: impl Write, place: &PlaceFindings<'_>) -> Result<(), ExportError> {
     let mut messages = RecordingWriter::new(out)?;
     let stamp = Stamp(place.time.map_or(0, nanoseconds));
     let header = Header { stamp, frame: MAP };

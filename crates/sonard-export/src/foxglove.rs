@@ -27,7 +27,7 @@ const MAX_STATUS_CHARACTERS: usize = 200;
 
 /// Severity of a status message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Level {
+pub enum StatusLevel {
     /// Information without consequences.
     Info = 0,
     /// Missing data that the client may need.
@@ -38,20 +38,20 @@ pub enum Level {
 
 /// Action to take after a client message.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Step {
+pub enum ViewerAction {
     /// Send messages of this channel from now on, beginning with its retained message.
-    Begin(u32),
+    StartChannel(u32),
     /// Stop sending messages of this channel.
-    Cease(u32),
+    StopChannel(u32),
     /// Send this text to the client.
-    Say(String),
+    SendText(String),
     /// Close the connection.
-    End,
+    Close,
 }
 
 /// Subscriptions of a client, limited to one per existing channel.
 #[derive(Debug, Clone, Default)]
-pub struct Session {
+pub struct ViewerSession {
     /// Client's subscription id, by channel.
     subscriptions: BTreeMap<u32, u32>,
     faults: u32,
@@ -74,9 +74,9 @@ struct SubscribeRequest {
     channel: u32,
 }
 
-impl Session {
+impl ViewerSession {
     /// Handles a text message of the client; `is_there` returns `true` for existing channels.
-    pub fn take_text(&mut self, text: &str, is_there: impl Fn(u32) -> bool) -> Vec<Step> {
+    pub fn handle_text(&mut self, text: &str, is_there: impl Fn(u32) -> bool) -> Vec<ViewerAction> {
         if text.len() > MAX_TEXT_BYTES {
             return self.fault(&format!("text messages have at most {MAX_TEXT_BYTES} bytes"));
         }
@@ -95,7 +95,7 @@ impl Session {
     }
 
     /// Handles a binary message of the client, which could only be a publication.
-    pub fn take_binary(&mut self) -> Vec<Step> {
+    pub fn handle_binary(&mut self) -> Vec<ViewerAction> {
         self.fault("client publications not supported: this server only publishes")
     }
 
@@ -103,7 +103,7 @@ impl Session {
         &mut self,
         requests: &[SubscribeRequest],
         is_there: impl Fn(u32) -> bool,
-    ) -> Vec<Step> {
+    ) -> Vec<ViewerAction> {
         let (mut steps, mut rejected) = (Vec::new(), Rejections::default());
         for SubscribeRequest { id, channel } in requests {
             if !is_there(*channel) {
@@ -114,14 +114,14 @@ impl Session {
                 rejected.add(|| format!("subscription {id} already used for another channel"));
             } else {
                 self.subscriptions.insert(*channel, *id);
-                steps.push(Step::Begin(*channel));
+                steps.push(ViewerAction::StartChannel(*channel));
             }
         }
         steps.extend(self.report(rejected));
         steps
     }
 
-    fn unsubscribe(&mut self, ids: &[u32]) -> Vec<Step> {
+    fn unsubscribe(&mut self, ids: &[u32]) -> Vec<ViewerAction> {
         let (mut steps, mut rejected) = (Vec::new(), Rejections::default());
         for id in ids {
             let found = self.subscriptions.iter().find(|(_, used)| *used == id);
@@ -130,14 +130,14 @@ impl Session {
                 continue;
             };
             self.subscriptions.remove(&channel);
-            steps.push(Step::Cease(channel));
+            steps.push(ViewerAction::StopChannel(channel));
         }
         steps.extend(self.report(rejected));
         steps
     }
 
     /// Removes subscriptions to channels that no longer exist.
-    pub fn keep_only(&mut self, is_there: impl Fn(u32) -> bool) {
+    pub fn retain_channels(&mut self, is_there: impl Fn(u32) -> bool) {
         self.subscriptions.retain(|channel, _| is_there(*channel));
     }
 
@@ -159,15 +159,15 @@ impl Session {
         Some(frame)
     }
 
-    fn report(&mut self, rejected: Rejections) -> Vec<Step> {
+    fn report(&mut self, rejected: Rejections) -> Vec<ViewerAction> {
         rejected.message().map_or_else(Vec::new, |message| self.fault(&message))
     }
 
-    fn fault(&mut self, what: &str) -> Vec<Step> {
+    fn fault(&mut self, what: &str) -> Vec<ViewerAction> {
         self.faults = self.faults.saturating_add(1);
         let shown: String = what.chars().take(MAX_STATUS_CHARACTERS).collect();
-        let status = Step::Say(status(Level::Error, &shown));
-        if self.faults < MAX_FAULTS { vec![status] } else { vec![status, Step::End] }
+        let status = ViewerAction::SendText(status(StatusLevel::Error, &shown));
+        if self.faults < MAX_FAULTS { vec![status] } else { vec![status, ViewerAction::Close] }
     }
 }
 
@@ -234,6 +234,6 @@ pub fn unadvertise(channels: &[u32]) -> String {
 
 /// Encodes a status message.
 #[must_use]
-pub fn status(level: Level, message: &str) -> String {
+pub fn status(level: StatusLevel, message: &str) -> String {
     json!({ "op": "status", "level": level as u8, "message": message }).to_string()
 }

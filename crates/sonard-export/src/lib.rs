@@ -31,11 +31,11 @@ use jiff::Timestamp;
 
 use sonard_records::ScanView;
 
-pub use columns::{COLUMNS, Column, Field, Kind, Row, Value};
-pub use conversion::{Distribution, Profile, Settings, Topic};
-pub use error::{ExportError, LeftOut};
-pub use findings::{Findings, begins_geojson, to_geojson, write_findings};
-pub use live::{Live, LiveMessage};
+pub use columns::{COLUMNS, TableColumn, ColumnType, ColumnKind, ReadingRow, Value};
+pub use conversion::{Distribution, Profile, ExportSettings, Topic};
+pub use error::{ExportError, SkippedScan};
+pub use findings::{PlaceFindings, is_geojson, to_geojson, write_findings};
+pub use live::{LiveConverter, LiveMessage};
 #[cfg(feature = "parquet")]
 pub use parquet::{ParquetExport, TypedTable};
 pub use recording::McapExport;
@@ -47,14 +47,14 @@ pub trait Export {
     ///
     /// # Errors
     /// Returns the write error of the output.
-    fn scan(&mut self, log: &str, scan: &ScanView) -> Result<Option<LeftOut>, ExportError>;
+    fn scan(&mut self, log: &str, scan: &ScanView) -> Result<Option<SkippedScan>, ExportError>;
 
     /// Attaches the log itself, in formats that support attachments; other formats ignore it.
     ///
     /// # Errors
     /// Returns the write error of the output, or an error if the log is unreadable or shorter than
     /// stated.
-    fn attach(&mut self, log: &LogFile<'_>, bytes: &mut dyn Read) -> Result<(), ExportError> {
+    fn attach(&mut self, log: &AttachedLog<'_>, bytes: &mut dyn Read) -> Result<(), ExportError> {
         let _ = (log, bytes);
         Ok(())
     }
@@ -68,13 +68,13 @@ pub trait Export {
 
 /// Log to attach to an export.
 #[derive(Debug, Clone, Copy)]
-pub struct LogFile<'a> {
+pub struct AttachedLog<'a> {
     /// File name without folders.
     pub name: &'a str,
     /// Length of the log.
     pub bytes: u64,
     /// Time of the last modification.
-    pub written: Timestamp,
+    pub modified: Timestamp,
 }
 
 #[cfg(test)]

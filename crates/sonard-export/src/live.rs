@@ -7,7 +7,7 @@ use std::{convert::Infallible, sync::Arc};
 use sonard_records::{Ping, Record, ScanStart, ScanView, Session};
 
 use crate::{
-    LeftOut, Settings, Topic,
+    SkippedScan, ExportSettings, Topic,
     conversion::{Converter, FiringTimes, MessageSink, plan_order},
     live::map::LiveMap,
     recording::nanoseconds,
@@ -36,7 +36,7 @@ pub struct LiveMessage<'a> {
 /// Converter of records, in log order and with times, to messages. Memory is bounded: at most the
 /// readings of a scan of 4096 and an optional map.
 #[derive(Debug)]
-pub struct Live {
+pub struct LiveConverter {
     converter: Converter,
     topics: Vec<Topic>,
     map: Option<LiveMap>,
@@ -53,10 +53,10 @@ struct PartialScan {
     is_too_long: bool,
 }
 
-impl Live {
+impl LiveConverter {
     /// Creates a converter without a session.
     #[must_use]
-    pub fn new(settings: Settings) -> Self {
+    pub fn new(settings: ExportSettings) -> Self {
         let converter = Converter::new(settings);
         let topics = Vec::new();
         Self { converter, topics, map: None, session: None, scan: None, buffer: Vec::new() }
@@ -84,11 +84,11 @@ impl Live {
     /// # Errors
     /// Returns the reason if a session cannot be converted, so that its scans are skipped, or if a
     /// scan ends the map.
-    pub fn take(
+    pub fn convert(
         &mut self,
         record: Record,
         callback: impl FnMut(LiveMessage<'_>),
-    ) -> Result<(), LeftOut> {
+    ) -> Result<(), SkippedScan> {
         let mut sink = CallbackSink { callback, buffer: std::mem::take(&mut self.buffer) };
         let result = match record {
             Record::Session(session) => {
@@ -117,7 +117,7 @@ impl Live {
         result
     }
 
-    fn begin_session(&mut self, session: Arc<Session>) -> Result<(), LeftOut> {
+    fn begin_session(&mut self, session: Arc<Session>) -> Result<(), SkippedScan> {
         let begun = self.converter.begin_session(&session);
         self.topics = self.converter.topics().to_vec();
         self.topics.extend(self.map.is_some().then(Topic::map));
@@ -129,7 +129,7 @@ impl Live {
     fn map_unfinished_scan(
         &mut self,
         out: &mut impl MessageSink<Error = Infallible>,
-    ) -> Result<(), LeftOut> {
+    ) -> Result<(), SkippedScan> {
         let scan = self.scan.take();
         scan.map_or(Ok(()), |scan| self.map(&scan, out))
     }
@@ -138,7 +138,7 @@ impl Live {
         &mut self,
         scan: &PartialScan,
         out: &mut impl MessageSink<Error = Infallible>,
-    ) -> Result<(), LeftOut> {
+    ) -> Result<(), SkippedScan> {
         match &mut self.map {
             Some(map) if !scan.is_too_long => map.add(&scan.view, self.converter.end(), out),
             _ => Ok(()),
@@ -160,7 +160,7 @@ impl Live {
         &mut self,
         scan: &PartialScan,
         out: &mut impl MessageSink<Error = Infallible>,
-    ) -> Result<(), LeftOut> {
+    ) -> Result<(), SkippedScan> {
         if scan.is_too_long {
             return Ok(());
         }

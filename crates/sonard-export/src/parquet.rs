@@ -10,7 +10,7 @@ use ::parquet::errors::ParquetError;
 
 use sonard_records::ScanView;
 
-use crate::{COLUMNS, Column, Export, ExportError, LeftOut, Row, session_numbers::SessionNumbers};
+use crate::{COLUMNS, TableColumn, Export, ExportError, SkippedScan, ReadingRow, session_numbers::SessionNumbers};
 pub use typed::TypedTable;
 
 /// Parquet export with one reading per row, in the typed columns of [`COLUMNS`], compressed by
@@ -29,31 +29,31 @@ impl<W: Write + Send> ParquetExport<W> {
     /// # Errors
     /// Returns the write error of the output.
     pub fn new(out: W) -> Result<Self, ExportError> {
-        let fields: Vec<_> = COLUMNS.iter().map(Column::field).collect();
+        let fields: Vec<_> = COLUMNS.iter().map(TableColumn::field).collect();
         let out = TypedTable::new(out, "reading", &fields)?;
         Ok(Self { out, sessions: SessionNumbers::default() })
     }
 
     /// Returns `true` if `head` is the beginning of such a table.
     #[must_use]
-    pub fn begins(head: &[u8]) -> bool {
-        TypedTable::<W>::begins(head)
+    pub fn is_own_file(head: &[u8]) -> bool {
+        TypedTable::<W>::is_own_file(head)
     }
 
     /// Adds an entry to the metadata of the table, such as its origin.
-    pub fn remark(&mut self, key: &str, value: String) {
-        self.out.remark(key, value);
+    pub fn add_metadata(&mut self, key: &str, value: String) {
+        self.out.add_metadata(key, value);
     }
 }
 
 impl<W: Write + Send> Export for ParquetExport<W> {
-    fn scan(&mut self, log: &str, scan: &ScanView) -> Result<Option<LeftOut>, ExportError> {
+    fn scan(&mut self, log: &str, scan: &ScanView) -> Result<Option<SkippedScan>, ExportError> {
         let session = self.sessions.number(scan.session.as_ref());
         if let (Some((number, true)), Some(session)) = (session, scan.session.as_deref()) {
             self.out.add_session(number, session);
         }
         for ping in &scan.pings {
-            let row = Row::new(log, session.map(|(number, _)| number), scan, ping);
+            let row = ReadingRow::new(log, session.map(|(number, _)| number), scan, ping);
             self.out.row(COLUMNS.iter().map(|column| column.cell(&row)))?;
         }
         Ok(None)

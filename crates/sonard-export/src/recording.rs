@@ -13,9 +13,9 @@ use mcap::records::AttachmentHeader;
 use sonard_records::{Ping, ScanView};
 
 use crate::{
-    Export, ExportError, LeftOut, LogFile,
+    Export, ExportError, SkippedScan, AttachedLog,
     columns::serialized_name,
-    conversion::{Converter, Profile, Settings, plan_order},
+    conversion::{Converter, Profile, ExportSettings, plan_order},
     ros::message::Stamp,
     session_numbers::SessionNumbers,
 };
@@ -41,7 +41,7 @@ impl<W: Write> McapExport<W> {
     ///
     /// # Errors
     /// Returns the write error of the output.
-    pub fn new(out: W, settings: Settings) -> Result<Self, ExportError> {
+    pub fn new(out: W, settings: ExportSettings) -> Result<Self, ExportError> {
         Ok(Self {
             messages: RecordingWriter::new(out)?,
             profile: settings.profile,
@@ -54,7 +54,7 @@ impl<W: Write> McapExport<W> {
 
     /// Returns `true` if `head` is the beginning of such a recording.
     #[must_use]
-    pub fn begins(head: &[u8]) -> bool {
+    pub fn is_own_file(head: &[u8]) -> bool {
         messages::begins(head)
     }
 
@@ -87,11 +87,11 @@ impl<W: Write> McapExport<W> {
 }
 
 impl<W: Write> Export for McapExport<W> {
-    fn scan(&mut self, _log: &str, scan: &ScanView) -> Result<Option<LeftOut>, ExportError> {
+    fn scan(&mut self, _log: &str, scan: &ScanView) -> Result<Option<SkippedScan>, ExportError> {
         let (Some(session), Some((_, is_new))) =
             (scan.session.as_deref(), self.sessions.number(scan.session.as_ref()))
         else {
-            return Ok(Some(LeftOut::NoSession));
+            return Ok(Some(SkippedScan::NoSession));
         };
         if (is_new || !self.converter.is_in_session())
             && let Err(why) = self.converter.begin_session(session)
@@ -99,17 +99,17 @@ impl<W: Write> Export for McapExport<W> {
             return Ok(Some(why));
         }
         if scan.pose().is_none() {
-            return Ok(Some(LeftOut::NoPose));
+            return Ok(Some(SkippedScan::NoPose));
         }
         self.provenances.extend(serialized_name(session.provenance));
         self.write_scan(scan).map(|()| None)
     }
 
-    fn attach(&mut self, log: &LogFile<'_>, bytes: &mut dyn Read) -> Result<(), ExportError> {
+    fn attach(&mut self, log: &AttachedLog<'_>, bytes: &mut dyn Read) -> Result<(), ExportError> {
         let attach_error = |source| ExportError::Attach { name: log.name.to_owned(), source };
         let header = AttachmentHeader {
             log_time: self.converter.end().0,
-            create_time: nanoseconds(log.written),
+            create_time: nanoseconds(log.modified),
             name: log.name.to_owned(),
             media_type: "application/x-ndjson".to_owned(),
         };

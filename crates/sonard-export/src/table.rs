@@ -7,7 +7,7 @@ use std::{
 
 use sonard_records::ScanView;
 
-use crate::{COLUMNS, Export, ExportError, LeftOut, Row, Value, session_numbers::SessionNumbers};
+use crate::{COLUMNS, Export, ExportError, SkippedScan, ReadingRow, Value, session_numbers::SessionNumbers};
 
 /// CSV export with one reading per line, after a header with the names of [`COLUMNS`] (RFC 4180,
 /// line feeds).
@@ -39,7 +39,7 @@ impl<W: Write> CsvExport<W> {
         names.join(",")
     }
 
-    fn row(&mut self, row: &Row<'_>) -> Result<(), ExportError> {
+    fn row(&mut self, row: &ReadingRow<'_>) -> Result<(), ExportError> {
         for column in COLUMNS {
             self.cell.clear();
             if let Some(value) = column.cell(row) {
@@ -52,10 +52,10 @@ impl<W: Write> CsvExport<W> {
 }
 
 impl<W: Write> Export for CsvExport<W> {
-    fn scan(&mut self, log: &str, scan: &ScanView) -> Result<Option<LeftOut>, ExportError> {
+    fn scan(&mut self, log: &str, scan: &ScanView) -> Result<Option<SkippedScan>, ExportError> {
         let session = self.sessions.number(scan.session.as_ref()).map(|(number, _)| number);
         for ping in &scan.pings {
-            self.row(&Row::new(log, session, scan, ping))?;
+            self.row(&ReadingRow::new(log, session, scan, ping))?;
         }
         Ok(None)
     }

@@ -11,11 +11,11 @@ use serde::{
 
 /// Distribution of a number.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Spread {
+pub enum NumberDistribution {
     /// Constant: `0.5`.
     Fixed(f64),
     /// Uniform distribution: `[0.3, 0.7]`.
-    Even([f64; 2]),
+    Uniform([f64; 2]),
     /// Truncated normal distribution: `{ mean = 20, sigma = 3, least = 10, most = 30 }`.
     Normal {
         /// Mean before truncation.
@@ -35,23 +35,23 @@ pub enum Spread {
 /// the bounds.
 const MAX_DRAWS: usize = 1000;
 
-impl Spread {
+impl NumberDistribution {
     /// Returns the minimum of the distribution.
     #[must_use]
-    pub fn least(&self) -> f64 {
+    pub fn min(&self) -> f64 {
         match self {
             Self::Fixed(number) => *number,
-            Self::Even([least, _]) | Self::Normal { least, .. } => *least,
+            Self::Uniform([least, _]) | Self::Normal { least, .. } => *least,
             Self::AnyOf(numbers) => numbers.iter().copied().fold(f64::INFINITY, f64::min),
         }
     }
 
     /// Returns the maximum of the distribution.
     #[must_use]
-    pub fn most(&self) -> f64 {
+    pub fn max(&self) -> f64 {
         match self {
             Self::Fixed(number) => *number,
-            Self::Even([_, most]) | Self::Normal { most, .. } => *most,
+            Self::Uniform([_, most]) | Self::Normal { most, .. } => *most,
             Self::AnyOf(numbers) => numbers.iter().copied().fold(f64::NEG_INFINITY, f64::max),
         }
     }
@@ -60,8 +60,8 @@ impl Spread {
     pub fn draw(&self, rng: &mut impl Rng) -> f64 {
         match self {
             Self::Fixed(number) => *number,
-            Self::Even([least, most]) if least < most => rng.random_range(*least..*most),
-            Self::Even([least, _]) => *least,
+            Self::Uniform([least, most]) if least < most => rng.random_range(*least..*most),
+            Self::Uniform([least, _]) => *least,
             Self::Normal { mean, sigma, least, most } => {
                 let mut draw = || {
                     let unit: f64 = StandardNormal.sample(rng);
@@ -77,14 +77,14 @@ impl Spread {
     /// Draws a count: for `[2, 4]` 2, 3 or 4, for other distributions rounded to a whole number.
     pub fn count(&self, rng: &mut impl Rng) -> usize {
         match self {
-            Self::Even([least, most]) => rng.random_range(*least as usize..=*most as usize),
+            Self::Uniform([least, most]) => rng.random_range(*least as usize..=*most as usize),
             other => other.draw(rng).round() as usize,
         }
     }
 
     /// Checks bounds and parameters.
     fn check(self) -> Result<Self, &'static str> {
-        let (least, most) = (self.least(), self.most());
+        let (least, most) = (self.min(), self.max());
         if !(least.is_finite() && most.is_finite()) {
             return Err("a distribution needs finite numbers, and any_of at least one");
         }
@@ -111,52 +111,52 @@ struct DistributionKeys {
 }
 
 impl DistributionKeys {
-    fn spread(self) -> Result<Spread, &'static str> {
+    fn spread(self) -> Result<NumberDistribution, &'static str> {
         match self {
             Self { mean: None, sigma: None, least: None, most: None, any_of: Some(numbers) } => {
-                Ok(Spread::AnyOf(numbers))
+                Ok(NumberDistribution::AnyOf(numbers))
             }
             Self { mean: Some(mean), sigma: Some(sigma), least, most, any_of: None } => {
                 // Truncated at six sigma, which one number in 10^9 exceeds.
                 let least = least.unwrap_or(mean - 6.0 * sigma);
-                Ok(Spread::Normal { mean, sigma, least, most: most.unwrap_or(mean + 6.0 * sigma) })
+                Ok(NumberDistribution::Normal { mean, sigma, least, most: most.unwrap_or(mean + 6.0 * sigma) })
             }
             _ => Err("give mean and sigma (optionally least and most), or only any_of"),
         }
     }
 }
 
-impl<'de> Deserialize<'de> for Spread {
+impl<'de> Deserialize<'de> for NumberDistribution {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         struct DistributionVisitor;
         impl<'de> Visitor<'de> for DistributionVisitor {
-            type Value = Spread;
+            type Value = NumberDistribution;
 
             fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
                 f.write_str("a number, [least, most], { mean = , sigma = } or { any_of = [ , ] }")
             }
 
-            fn visit_f64<E>(self, number: f64) -> Result<Spread, E> {
-                Ok(Spread::Fixed(number))
+            fn visit_f64<E>(self, number: f64) -> Result<NumberDistribution, E> {
+                Ok(NumberDistribution::Fixed(number))
             }
 
-            fn visit_i64<E>(self, number: i64) -> Result<Spread, E> {
-                Ok(Spread::Fixed(number as f64))
+            fn visit_i64<E>(self, number: i64) -> Result<NumberDistribution, E> {
+                Ok(NumberDistribution::Fixed(number as f64))
             }
 
-            fn visit_u64<E>(self, number: u64) -> Result<Spread, E> {
-                Ok(Spread::Fixed(number as f64))
+            fn visit_u64<E>(self, number: u64) -> Result<NumberDistribution, E> {
+                Ok(NumberDistribution::Fixed(number as f64))
             }
 
-            fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<Spread, A::Error> {
+            fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<NumberDistribution, A::Error> {
                 let mut next = || list.next_element::<f64>();
                 match (next()?, next()?, next()?) {
-                    (Some(least), Some(most), None) => Ok(Spread::Even([least, most])),
+                    (Some(least), Some(most), None) => Ok(NumberDistribution::Uniform([least, most])),
                     _ => Err(A::Error::custom("a list is [least, most]; for a choice use any_of")),
                 }
             }
 
-            fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<Spread, A::Error> {
+            fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<NumberDistribution, A::Error> {
                 let keys = DistributionKeys::deserialize(MapAccessDeserializer::new(map))?;
                 keys.spread().map_err(A::Error::custom)
             }
@@ -165,7 +165,7 @@ impl<'de> Deserialize<'de> for Spread {
     }
 }
 
-impl Serialize for Spread {
+impl Serialize for NumberDistribution {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         #[derive(Serialize)]
         struct NormalKeys {
@@ -180,7 +180,7 @@ impl Serialize for Spread {
         }
         match self {
             Self::Fixed(number) => number.serialize(serializer),
-            Self::Even(ends) => ends.serialize(serializer),
+            Self::Uniform(ends) => ends.serialize(serializer),
             Self::Normal { mean, sigma, least, most } => {
                 let (mean, sigma, least, most) = (*mean, *sigma, *least, *most);
                 NormalKeys { mean, sigma, least, most }.serialize(serializer)
@@ -197,7 +197,7 @@ mod tests {
 
     use super::*;
 
-    fn read(text: &str) -> Result<Spread, String> {
+    fn read(text: &str) -> Result<NumberDistribution, String> {
         serde_json::from_str(text).map_err(|error| error.to_string())
     }
 
@@ -214,7 +214,7 @@ mod tests {
         ] {
             let spread = read(text).expect(text);
             let numbers: Vec<f64> = (0..2000).map(|_| spread.draw(&mut rng)).collect();
-            let (least, most) = (spread.least(), spread.most());
+            let (least, most) = (spread.min(), spread.max());
             assert!(numbers.iter().all(|number| (least..=most).contains(number)), "{text}");
             let near = 0.02 * (most - least);
             assert!(numbers.iter().any(|number| *number <= least + near), "{text}");
@@ -227,7 +227,7 @@ mod tests {
     #[test]
     fn counts_are_uniform() {
         let mut rng = Pcg64::seed_from_u64(1);
-        let spread = Spread::Even([2.0, 4.0]);
+        let spread = NumberDistribution::Uniform([2.0, 4.0]);
         let mut seen = [0; 6];
         for _ in 0..3000 {
             seen[spread.count(&mut rng)] += 1;

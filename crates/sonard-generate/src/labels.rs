@@ -94,7 +94,7 @@ fn joints(scene: &Scene) -> Vec<SceneFeature> {
         places.iter().flat_map(|place| sectors(scene, *place)).collect();
     let probes: Vec<DVec2> =
         sectors.iter().map(|sector| sector.at + PROBE_M * sector.middle).collect();
-    let is_open = scene.can_stand(&probes);
+    let is_open = scene.are_accessible(&probes);
     let open = sectors.into_iter().zip(is_open).filter(|(_, is_open)| *is_open);
     open.map(|(sector, _)| {
         let [a, b] = sector.walls.map(|wall| &*scene.walls[wall].id);

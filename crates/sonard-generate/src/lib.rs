@@ -46,10 +46,10 @@ mod table;
 #[cfg(test)]
 mod tests;
 
-pub use distribution::Spread;
-pub use manifest::{FileFacts, Manifest, ManifestError, ShardFacts};
-pub use partition::{Part, PartError};
-pub use sample::Redrawn;
-pub use shard::{Generator, Made, ShardError};
+pub use distribution::NumberDistribution;
+pub use manifest::{FileFacts, DataSetManifest, ManifestError, ShardFacts};
+pub use partition::{SetPart, SetPartError};
+pub use sample::RejectedDraws;
+pub use shard::{Generator, ShardCounts, ShardError};
 pub use spec::{Spec, SpecError};
-pub use table::Table;
+pub use table::ShardTable;

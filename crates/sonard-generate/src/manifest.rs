@@ -8,11 +8,11 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use crate::{
-    sample::Redrawn,
+    sample::RejectedDraws,
     seed::sha256,
-    shard::{Generator, Made},
+    shard::{Generator, ShardCounts},
     summary::ShardIdentity,
-    table::Table,
+    table::ShardTable,
 };
 
 /// Facts about a file of a shard.
@@ -33,7 +33,7 @@ pub struct ShardFacts {
     #[serde(flatten)]
     summary: ShardIdentity,
     /// Numbers of rejected draws.
-    pub redrawn: Redrawn,
+    pub redrawn: RejectedDraws,
     /// Files of the shard by name.
     pub files: BTreeMap<String, FileFacts>,
 }
@@ -79,10 +79,10 @@ impl ShardFacts {
     pub fn new(
         generator: &Generator,
         shard: u32,
-        made: &Made,
-        files: &BTreeMap<Table, (u64, String)>,
+        made: &ShardCounts,
+        files: &BTreeMap<ShardTable, (u64, String)>,
     ) -> Self {
-        let facts = |(table, (bytes, sha256)): (&Table, &(u64, String))| {
+        let facts = |(table, (bytes, sha256)): (&ShardTable, &(u64, String))| {
             let facts =
                 FileFacts { rows: made.rows(*table), bytes: *bytes, sha256: sha256.clone() };
             (table.file().to_owned(), facts)
@@ -123,7 +123,7 @@ impl ShardFacts {
             return Err(ManifestError::Number { found: found.shard, expected: expected.shard });
         }
         let tables = generator.tables();
-        let is_listed = |table: &Table| facts.files.contains_key(table.file());
+        let is_listed = |table: &ShardTable| facts.files.contains_key(table.file());
         match facts.files.len() == tables.len() && tables.iter().all(is_listed) {
             true => Ok(facts),
             false => Err(ManifestError::Files),
@@ -140,7 +140,7 @@ impl ShardFacts {
 /// Content of `manifest.json`. It depends only on the set, so concurrent writers of the last shard
 /// produce equal files.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct Manifest {
+pub struct DataSetManifest {
     format: u32,
     name: String,
     about: String,
@@ -151,7 +151,7 @@ pub struct Manifest {
     /// Number of shards.
     pub shards: u32,
     /// Sums over all shards.
-    pub totals: Totals,
+    pub totals: DataSetTotals,
     /// Digest of the set, computed from the names and digests of all files, one line each.
     pub sha256: String,
     /// Files by shard.
@@ -160,28 +160,28 @@ pub struct Manifest {
 
 /// Sums over all shards of a set.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize)]
-pub struct Totals {
+pub struct DataSetTotals {
     /// Number of rows by table.
-    pub rows: BTreeMap<Table, u64>,
+    pub rows: BTreeMap<ShardTable, u64>,
     /// Total size in bytes.
     pub bytes: u64,
     /// Numbers of rejected draws.
-    pub redrawn: Redrawn,
+    pub redrawn: RejectedDraws,
 }
 
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 struct ShardFiles {
     shard: u32,
-    redrawn: Redrawn,
+    redrawn: RejectedDraws,
     files: BTreeMap<String, FileFacts>,
 }
 
-impl Manifest {
+impl DataSetManifest {
     /// Creates the manifest of a complete set from the facts of its shards, in order.
     #[must_use]
     pub fn new(generator: &Generator, shards: &[ShardFacts]) -> Self {
         let summary = generator.summary(1);
-        let mut totals = Totals::default();
+        let mut totals = DataSetTotals::default();
         let mut lines = String::new();
         for facts in shards {
             totals.redrawn += facts.redrawn;

@@ -9,14 +9,14 @@ use thiserror::Error;
 /// Part I of N consists of the shards I, I + N, I + 2 N, ..., so a set may have more shards than
 /// there are processes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Part {
+pub struct SetPart {
     index: u32,
     of: u32,
 }
 
 /// Error of parsing or creating a part.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
-pub enum PartError {
+pub enum SetPartError {
     /// Text that is not two numbers.
     #[error("`{0}` is not I/N: give two whole numbers, as in 3/20")]
     Form(String),
@@ -30,7 +30,7 @@ pub enum PartError {
     },
 }
 
-impl Part {
+impl SetPart {
     /// The whole set as a single part.
     pub const WHOLE: Self = Self { index: 1, of: 1 };
 
@@ -38,10 +38,10 @@ impl Part {
     ///
     /// # Errors
     /// Returns an error unless `index` is in 1 to `of`.
-    pub const fn new(index: u32, of: u32) -> Result<Self, PartError> {
+    pub const fn new(index: u32, of: u32) -> Result<Self, SetPartError> {
         match index >= 1 && index <= of {
             true => Ok(Self { index, of }),
-            false => Err(PartError::Range { index, of }),
+            false => Err(SetPartError::Range { index, of }),
         }
     }
 
@@ -51,19 +51,19 @@ impl Part {
     }
 }
 
-impl FromStr for Part {
-    type Err = PartError;
+impl FromStr for SetPart {
+    type Err = SetPartError;
 
-    fn from_str(text: &str) -> Result<Self, PartError> {
+    fn from_str(text: &str) -> Result<Self, SetPartError> {
         let numbers = text
             .split_once('/')
             .and_then(|(index, of)| Some((index.trim().parse().ok()?, of.trim().parse().ok()?)));
-        let (index, of) = numbers.ok_or_else(|| PartError::Form(text.to_owned()))?;
+        let (index, of) = numbers.ok_or_else(|| SetPartError::Form(text.to_owned()))?;
         Self::new(index, of)
     }
 }
 
-impl fmt::Display for Part {
+impl fmt::Display for SetPart {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}/{}", self.index, self.of)
     }
@@ -77,7 +77,7 @@ mod tests {
     fn parts_cover_the_set_once() {
         for shards in [1, 5, 12] {
             for of in [1, 2, 5, 20] {
-                let parts = (1..=of).map(|index| Part::new(index, of).expect("a part"));
+                let parts = (1..=of).map(|index| SetPart::new(index, of).expect("a part"));
                 let mut all: Vec<u32> = parts.flat_map(|part| part.shards(shards)).collect();
                 all.sort_unstable();
                 assert_eq!(all, (1..=shards).collect::<Vec<_>>(), "{of} parts");
@@ -87,11 +87,11 @@ mod tests {
 
     #[test]
     fn rejects_invalid_parts() {
-        assert_eq!("3/20".parse(), Part::new(3, 20));
+        assert_eq!("3/20".parse(), SetPart::new(3, 20));
         for (text, part) in
             [("3", "as in 3/20"), ("a/b", "as in 3/20"), ("0/4", "from 1/4"), ("5/4", "to 4/4")]
         {
-            let error = text.parse::<Part>().expect_err(text).to_string();
+            let error = text.parse::<SetPart>().expect_err(text).to_string();
             assert!(error.contains(part), "{error}");
         }
     }

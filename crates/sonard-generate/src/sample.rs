@@ -17,13 +17,13 @@ use sonard_model::{
 
 use crate::{
     seed::{RandomStream, rng},
-    spec::{LoadedSpec, SceneKeys},
+    spec::{LoadedSpec, SpecSceneKeys},
 };
 
 /// Numbers of rejected draws.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Redrawn {
+pub struct RejectedDraws {
     /// Scenes without room for furniture or poses, or with invalid walls.
     pub scenes: u64,
     /// Positions of furniture with a collision.
@@ -34,7 +34,7 @@ pub struct Redrawn {
     pub costly: u64,
 }
 
-impl std::ops::AddAssign for Redrawn {
+impl std::ops::AddAssign for RejectedDraws {
     fn add_assign(&mut self, more: Self) {
         self.scenes += more.scenes;
         self.furniture += more.furniture;
@@ -65,7 +65,7 @@ pub(crate) struct SampledScene {
     pub(crate) noise: ReceiverNoise,
     /// Generator for replacements of poses.
     pub(crate) rng: Pcg64,
-    pub(crate) redrawn: Redrawn,
+    pub(crate) redrawn: RejectedDraws,
 }
 
 /// Reason for rejecting a draw.
@@ -94,7 +94,7 @@ impl Rejection {
 /// Returns the reason for rejection if no draw fits.
 pub(crate) fn scene(loaded: &LoadedSpec, number: u64) -> Result<SampledScene, &'static str> {
     let mut rng = rng(&loaded.sha256, RandomStream::Scene(number));
-    let mut redrawn = Redrawn::default();
+    let mut redrawn = RejectedDraws::default();
     let mut last = Rejection::Scene;
     for _ in 0..MAX_SCENES {
         match attempt(loaded, &mut rng, &mut redrawn) {
@@ -130,7 +130,7 @@ type Attempt = (usize, Scene, Vec<Pose>, Option<f64>);
 fn attempt(
     loaded: &LoadedSpec,
     rng: &mut Pcg64,
-    redrawn: &mut Redrawn,
+    redrawn: &mut RejectedDraws,
 ) -> Result<Attempt, Rejection> {
     let spec = &loaded.spec;
     let kind = weighted(&spec.scene, rng);
@@ -158,7 +158,7 @@ pub(crate) fn replacement_pose(loaded: &LoadedSpec, drawn: &mut SampledScene) ->
     poses(loaded, &scene, 1, &mut drawn.rng, &mut drawn.redrawn).ok()?.pop()
 }
 
-fn weighted(kinds: &[SceneKeys], rng: &mut impl Rng) -> usize {
+fn weighted(kinds: &[SpecSceneKeys], rng: &mut impl Rng) -> usize {
     let all: f64 = kinds.iter().map(|kind| kind.weight).sum();
     let mut left = all * rng.random::<f64>();
     for (index, kind) in kinds.iter().enumerate() {
@@ -177,7 +177,7 @@ fn poses(
     scene: &Scene,
     count: usize,
     rng: &mut Pcg64,
-    redrawn: &mut Redrawn,
+    redrawn: &mut RejectedDraws,
 ) -> Result<Vec<Pose>, Rejection> {
     let keys = &loaded.spec.poses;
     let walls = scene.walls.iter().map(|wall| (wall.a.min(wall.b), wall.a.max(wall.b)));
@@ -202,7 +202,7 @@ fn poses(
             })
             .collect();
         tried += positions.len();
-        let is_free = scene.can_stand(&positions.iter().map(Pose::position).collect::<Vec<_>>());
+        let is_free = scene.are_accessible(&positions.iter().map(Pose::position).collect::<Vec<_>>());
         let before = poses.len();
         poses.extend(positions.iter().zip(is_free).filter_map(|(pose, is_free)| {
             let is_clear = scene.clearance_m(pose.position()) >= keys.clearance_m;

@@ -13,15 +13,15 @@ use sonard_export::ExportError;
 use sonard_model::{
     geometry::Pose,
     model::{ModelError, Options, Simulator, TooCostly},
-    plan::ScanPlan,
+    scan_plan::ScanPlan,
 };
 use thiserror::Error;
 
 use crate::{
-    sample::{self, Redrawn, SampledScene},
+    sample::{self, RejectedDraws, SampledScene},
     spec::{LoadedSpec, Spec, SpecError, from_json, from_toml},
     summary::ShardIdentity,
-    table::Table,
+    table::ShardTable,
 };
 use rows::PoseReadings;
 use writer::TableWriter;
@@ -36,16 +36,16 @@ pub struct Generator {
 
 /// Numbers of rows and rejected draws of a generated shard.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Made {
-    rows: BTreeMap<Table, u64>,
+pub struct ShardCounts {
+    rows: BTreeMap<ShardTable, u64>,
     /// Numbers of rejected draws.
-    pub redrawn: Redrawn,
+    pub redrawn: RejectedDraws,
 }
 
-impl Made {
+impl ShardCounts {
     /// Returns the number of rows of a table.
     #[must_use]
-    pub fn rows(&self, table: Table) -> u64 {
+    pub fn rows(&self, table: ShardTable) -> u64 {
         self.rows.get(&table).copied().unwrap_or_default()
     }
 }
@@ -148,8 +148,8 @@ impl Generator {
 
     /// Returns the tables of each shard.
     #[must_use]
-    pub fn tables(&self) -> Vec<Table> {
-        Table::for_spec(self.spec())
+    pub fn tables(&self) -> Vec<ShardTable> {
+        ShardTable::for_spec(self.spec())
     }
 
     /// Returns the number of readings per shard, for progress reports.
@@ -168,15 +168,15 @@ impl Generator {
     pub fn shard(
         &self,
         number: u32,
-        create: &mut dyn FnMut(Table) -> io::Result<Box<dyn Write + Send>>,
+        create: &mut dyn FnMut(ShardTable) -> io::Result<Box<dyn Write + Send>>,
         progress: &dyn Fn(u64),
-    ) -> Result<Made, ShardError> {
+    ) -> Result<ShardCounts, ShardError> {
         let set = &self.spec().set;
         if !(1..=set.shards).contains(&number) {
             return Err(ShardError::Number { number, of: set.shards });
         }
         let mut tables = TableWriter::create(self.spec(), &self.summary(number).to_json(), create)?;
-        let (mut redrawn, mut last) = (Redrawn::default(), None);
+        let (mut redrawn, mut last) = (RejectedDraws::default(), None);
         let before = u64::from(number - 1) * u64::from(set.scenes);
         for scene in (1..=u64::from(set.scenes)).map(|scene| before + scene) {
             let mut drawn = sample::scene(&self.loaded, scene)
@@ -185,7 +185,7 @@ impl Generator {
             self.write_scene(&mut drawn, simulator, &mut tables, progress)?;
             redrawn += drawn.redrawn;
         }
-        Ok(Made { rows: tables.finish()?, redrawn })
+        Ok(ShardCounts { rows: tables.finish()?, redrawn })
     }
 
     /// Returns the simulator of a sampled scene; reuses the parts of the last simulator that did

@@ -8,9 +8,9 @@ mod read;
 use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
-use sonard_model::{model::OptionKeys, plan::ScanPlan};
+use sonard_model::{model::OptionKeys, scan_plan::ScanPlan};
 
-use crate::distribution::Spread;
+use crate::distribution::NumberDistribution;
 
 pub use error::SpecError;
 pub(crate) use read::{LoadedSpec, from_json, from_toml};
@@ -22,7 +22,7 @@ pub struct Spec {
     /// Size of the set.
     pub set: SetKeys,
     /// Kinds of scenes, of which each scene is one.
-    pub scene: Vec<SceneKeys>,
+    pub scene: Vec<SpecSceneKeys>,
     /// Surface materials by name.
     #[serde(default = "default_materials")]
     pub materials: BTreeMap<String, MaterialKeys>,
@@ -37,10 +37,10 @@ pub struct Spec {
     pub poses: PoseKeys,
     /// Azimuths of a scan.
     #[serde(default)]
-    pub plan: PlanKeys,
+    pub plan: SpecPlanKeys,
     /// Sensors of the rangers.
     #[serde(default)]
-    pub sensor: SensorKeys,
+    pub sensor: SpecSensorKeys,
     /// Distributions of the air.
     #[serde(default)]
     pub air: AirKeys,
@@ -78,30 +78,30 @@ pub struct SetKeys {
 /// Kind of scenes, with the distributions of its rooms.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct SceneKeys {
+pub struct SpecSceneKeys {
     /// Relative frequency of this kind.
     #[serde(default = "default_weight")]
     pub weight: f64,
     /// Shape of the room.
-    pub shape: Shape,
+    pub shape: RoomShape,
     /// Shipped scene, or file next to the specification; only for shape `file`.
     #[serde(default)]
     pub file: Option<String>,
     /// Extent along x before rotation, metres; not for shape `file`.
     #[serde(default)]
-    pub width_m: Option<Spread>,
+    pub width_m: Option<NumberDistribution>,
     /// Extent along y before rotation, metres; not for shape `file`.
     #[serde(default)]
-    pub depth_m: Option<Spread>,
+    pub depth_m: Option<NumberDistribution>,
     /// Share of width and depth that is cut away; only for shapes `l` and `t`.
     #[serde(default)]
-    pub notch: Option<Spread>,
+    pub notch: Option<NumberDistribution>,
     /// Number of corners; only for shape `polygon`.
     #[serde(default)]
-    pub corners: Option<Spread>,
+    pub corners: Option<NumberDistribution>,
     /// Rotation, degrees; not for shape `file`.
     #[serde(default)]
-    pub turn_deg: Option<Spread>,
+    pub turn_deg: Option<NumberDistribution>,
     /// Materials of the walls, one drawn for each wall; all materials if empty. Not for shape
     /// `file`.
     #[serde(default)]
@@ -111,7 +111,7 @@ pub struct SceneKeys {
 /// Shape of a room seen from above.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Shape {
+pub enum RoomShape {
     /// Rectangle with four walls.
     Rectangle,
     /// Rectangle without one corner.
@@ -129,10 +129,10 @@ pub enum Shape {
 #[serde(deny_unknown_fields)]
 pub struct MaterialKeys {
     /// Amplitude of the specular reflection, 0 to 1.
-    pub reflectance: Spread,
+    pub reflectance: NumberDistribution,
     /// Scattered share of the energy that is not absorbed, 0 to 1.
     #[serde(default = "zero")]
-    pub roughness: Spread,
+    pub roughness: NumberDistribution,
 }
 
 /// Furniture of generated scenes.
@@ -140,23 +140,23 @@ pub struct MaterialKeys {
 #[serde(deny_unknown_fields, default)]
 pub struct FurnitureKeys {
     /// Number of boxes per scene.
-    pub boxes: Spread,
+    pub boxes: NumberDistribution,
     /// Side length of a box, metres.
-    pub box_m: Spread,
+    pub box_m: NumberDistribution,
     /// Rotation of a box relative to the room, degrees.
-    pub box_turn_deg: Spread,
+    pub box_turn_deg: NumberDistribution,
     /// Number of cylinders per scene.
-    pub cylinders: Spread,
+    pub cylinders: NumberDistribution,
     /// Radius of a cylinder, metres.
-    pub radius_m: Spread,
+    pub radius_m: NumberDistribution,
     /// Number of partitions, which extend from walls.
-    pub partitions: Spread,
+    pub partitions: NumberDistribution,
     /// Length of a partition, metres.
-    pub partition_m: Spread,
+    pub partition_m: NumberDistribution,
     /// Minimum gap between pieces and to walls, metres.
     pub gap_m: f64,
     /// Height of boxes and cylinders, metres; only in scenes with heights.
-    pub height_m: Option<Spread>,
+    pub height_m: Option<NumberDistribution>,
     /// Materials of the furniture, one drawn for each piece; all materials if empty.
     pub materials: Vec<String>,
 }
@@ -166,9 +166,9 @@ pub struct FurnitureKeys {
 #[serde(deny_unknown_fields)]
 pub struct HeightKeys {
     /// Height of the ceiling above the floor, metres.
-    pub ceiling_m: Spread,
+    pub ceiling_m: NumberDistribution,
     /// Height of the transducer above the floor, metres.
-    pub sensor_m: Spread,
+    pub sensor_m: NumberDistribution,
     /// Materials of the floor, one drawn for each scene; all materials if empty.
     #[serde(default)]
     pub floor: Vec<String>,
@@ -184,13 +184,13 @@ pub struct PoseKeys {
     /// Minimum distance to all surfaces, metres.
     pub clearance_m: f64,
     /// Direction of azimuth 0, degrees counter-clockwise from +x.
-    pub heading_deg: Spread,
+    pub heading_deg: NumberDistribution,
 }
 
 /// Azimuths of a scan.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
-pub struct PlanKeys {
+pub struct SpecPlanKeys {
     /// First azimuth of the scan, degrees.
     pub from_deg: f64,
     /// End of the range, exclusive, degrees.
@@ -204,7 +204,7 @@ pub struct PlanKeys {
 /// Sensors of the rangers.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
-pub struct SensorKeys {
+pub struct SpecSensorKeys {
     /// Presets, or files next to the specification; one is drawn for each scene.
     pub any_of: Vec<String>,
 }
@@ -214,11 +214,11 @@ pub struct SensorKeys {
 #[serde(deny_unknown_fields, default)]
 pub struct AirKeys {
     /// Temperature of the air, degrees Celsius.
-    pub temperature_c: Spread,
+    pub temperature_c: NumberDistribution,
     /// Relative humidity of the air, percent.
-    pub humidity_percent: Spread,
+    pub humidity_percent: NumberDistribution,
     /// Static pressure of the air, kilopascals.
-    pub pressure_kpa: Spread,
+    pub pressure_kpa: NumberDistribution,
 }
 
 /// Distributions of the noise of a scene's readings.
@@ -226,9 +226,9 @@ pub struct AirKeys {
 #[serde(deny_unknown_fields, default)]
 pub struct NoiseKeys {
     /// RMS noise at the receiver's input, as the amplitude of an echo from 1 m.
-    pub floor: Spread,
+    pub floor: NumberDistribution,
     /// Standard deviation of additional jitter of the time of flight, microseconds.
-    pub jitter_us: Spread,
+    pub jitter_us: NumberDistribution,
 }
 
 /// Recorded columns and tables in addition to status and range.
@@ -258,13 +258,13 @@ pub struct KeepKeys {
 impl Default for FurnitureKeys {
     fn default() -> Self {
         Self {
-            boxes: Spread::Fixed(0.0),
-            box_m: Spread::Even([0.3, 0.8]),
-            box_turn_deg: Spread::Even([0.0, 90.0]),
-            cylinders: Spread::Fixed(0.0),
-            radius_m: Spread::Even([0.02, 0.2]),
-            partitions: Spread::Fixed(0.0),
-            partition_m: Spread::Even([0.5, 1.5]),
+            boxes: NumberDistribution::Fixed(0.0),
+            box_m: NumberDistribution::Uniform([0.3, 0.8]),
+            box_turn_deg: NumberDistribution::Uniform([0.0, 90.0]),
+            cylinders: NumberDistribution::Fixed(0.0),
+            radius_m: NumberDistribution::Uniform([0.02, 0.2]),
+            partitions: NumberDistribution::Fixed(0.0),
+            partition_m: NumberDistribution::Uniform([0.5, 1.5]),
             gap_m: 0.3,
             height_m: None,
             materials: Vec::new(),
@@ -274,25 +274,25 @@ impl Default for FurnitureKeys {
 
 impl Default for PoseKeys {
     fn default() -> Self {
-        Self { clearance_m: 0.1, heading_deg: Spread::Even([0.0, 360.0]) }
+        Self { clearance_m: 0.1, heading_deg: NumberDistribution::Uniform([0.0, 360.0]) }
     }
 }
 
-impl Default for PlanKeys {
+impl Default for SpecPlanKeys {
     fn default() -> Self {
         let ScanPlan { from_deg, to_deg, step_deg, pings_per_stop } = ScanPlan::default();
         Self { from_deg, to_deg, step_deg, pings_per_stop }
     }
 }
 
-impl From<&PlanKeys> for ScanPlan {
-    fn from(keys: &PlanKeys) -> Self {
-        let PlanKeys { from_deg, to_deg, step_deg, pings_per_stop } = *keys;
+impl From<&SpecPlanKeys> for ScanPlan {
+    fn from(keys: &SpecPlanKeys) -> Self {
+        let SpecPlanKeys { from_deg, to_deg, step_deg, pings_per_stop } = *keys;
         Self { from_deg, to_deg, step_deg, pings_per_stop }
     }
 }
 
-impl Default for SensorKeys {
+impl Default for SpecSensorKeys {
     fn default() -> Self {
         Self { any_of: vec!["senscomp-6500".to_owned()] }
     }
@@ -301,16 +301,16 @@ impl Default for SensorKeys {
 impl Default for AirKeys {
     fn default() -> Self {
         Self {
-            temperature_c: Spread::Fixed(20.0),
-            humidity_percent: Spread::Fixed(50.0),
-            pressure_kpa: Spread::Fixed(101.325),
+            temperature_c: NumberDistribution::Fixed(20.0),
+            humidity_percent: NumberDistribution::Fixed(50.0),
+            pressure_kpa: NumberDistribution::Fixed(101.325),
         }
     }
 }
 
 impl Default for NoiseKeys {
     fn default() -> Self {
-        Self { floor: Spread::Fixed(0.0), jitter_us: Spread::Fixed(0.0) }
+        Self { floor: NumberDistribution::Fixed(0.0), jitter_us: NumberDistribution::Fixed(0.0) }
     }
 }
 
@@ -330,7 +330,7 @@ impl Default for KeepKeys {
 }
 
 fn default_materials() -> BTreeMap<String, MaterialKeys> {
-    let plaster = MaterialKeys { reflectance: Spread::Fixed(0.97), roughness: zero() };
+    let plaster = MaterialKeys { reflectance: NumberDistribution::Fixed(0.97), roughness: zero() };
     [("plaster".to_owned(), plaster)].into()
 }
 
@@ -338,6 +338,6 @@ const fn default_weight() -> f64 {
     1.0
 }
 
-const fn zero() -> Spread {
-    Spread::Fixed(0.0)
+const fn zero() -> NumberDistribution {
+    NumberDistribution::Fixed(0.0)
 }

@@ -1,14 +1,14 @@
 //! Tables of a shard and their columns.
 
 use serde::{Deserialize, Serialize};
-use sonard_export::{Field, Kind};
+use sonard_export::{ColumnType, ColumnKind};
 
 use crate::spec::{KeepKeys, Spec};
 
 /// Table of a shard.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Table {
+pub enum ShardTable {
     /// Scenes, one per row, with sampled values and the scene file.
     Scenes,
     /// Readings, one firing per row.
@@ -24,11 +24,11 @@ pub enum Table {
 /// Column with its description for the data card.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct ColumnInfo {
-    pub(crate) field: Field,
+    pub(crate) field: ColumnType,
     pub(crate) about: &'static str,
 }
 
-impl Table {
+impl ShardTable {
     /// Returns the tables of a specification, in writing order.
     pub(crate) fn for_spec(spec: &Spec) -> Vec<Self> {
         let keep = &spec.keep;
@@ -81,27 +81,27 @@ impl Table {
 
 const fn column(
     name: &'static str,
-    kind: Kind,
+    kind: ColumnKind,
     is_single: bool,
     about: &'static str,
 ) -> ColumnInfo {
-    ColumnInfo { field: Field { name, kind, is_single }, about }
+    ColumnInfo { field: ColumnType { name, kind, is_single }, about }
 }
 
 const fn text(name: &'static str, about: &'static str) -> ColumnInfo {
-    column(name, Kind::Text, false, about)
+    column(name, ColumnKind::Text, false, about)
 }
 
 const fn integer(name: &'static str, about: &'static str) -> ColumnInfo {
-    column(name, Kind::Integer, false, about)
+    column(name, ColumnKind::Integer, false, about)
 }
 
 const fn number(name: &'static str, about: &'static str) -> ColumnInfo {
-    column(name, Kind::Number, false, about)
+    column(name, ColumnKind::Number, false, about)
 }
 
 const fn single(name: &'static str, about: &'static str) -> ColumnInfo {
-    column(name, Kind::Number, true, about)
+    column(name, ColumnKind::Number, true, about)
 }
 
 const SCENE: ColumnInfo = integer("scene", "number of the scene in the set, from 1");
@@ -157,7 +157,7 @@ const FEATURE: ColumnInfo = text(
 );
 const ENVELOPE: ColumnInfo = column(
     "envelope",
-    Kind::Numbers,
+    ColumnKind::Numbers,
     false,
     "envelope of the firing from time 0, sampled every keep.trace_step_us; without noise",
 );
@@ -207,7 +207,7 @@ const OCCUPANCY: &[ColumnInfo] = &[
     integer("height", "number of cells along y"),
     column(
         "cells",
-        Kind::Integers,
+        ColumnKind::Integers,
         false,
         "row by row from the lower left corner: 0 free, 1 occupied, 2 not visible from the poses",
     ),

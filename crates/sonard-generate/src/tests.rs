@@ -11,7 +11,7 @@ use parquet::{
 use proptest::prelude::*;
 use sonard_model::scene::Scene;
 
-use crate::{Generator, Made, Manifest, ManifestError, ShardError, ShardFacts, SpecError, Table};
+use crate::{Generator, ShardCounts, DataSetManifest, ManifestError, ShardError, ShardFacts, SpecError, ShardTable};
 
 const EVERYTHING: &str = r#"
 [set]
@@ -97,10 +97,10 @@ impl Write for Memory {
     }
 }
 
-type Files = BTreeMap<Table, Vec<u8>>;
+type Files = BTreeMap<ShardTable, Vec<u8>>;
 
-fn shard(generator: &Generator, number: u32) -> (Made, Files) {
-    let mut files: BTreeMap<Table, Memory> = BTreeMap::new();
+fn shard(generator: &Generator, number: u32) -> (ShardCounts, Files) {
+    let mut files: BTreeMap<ShardTable, Memory> = BTreeMap::new();
     let mut create = |table| {
         let memory = files.entry(table).or_default();
         Ok(Box::new(memory.clone()) as Box<dyn Write + Send>)
@@ -149,7 +149,7 @@ fn shards_are_reproducible() {
     let commented = EVERYTHING.replace("[heights]", "# as rooms are\n[heights]");
     assert_eq!(generator(&commented).sha256(), one.sha256());
     let reseeded = generator(&EVERYTHING.replace("shards = 2", "shards = 2\nseed = 1"));
-    assert_ne!(shard(&reseeded, 1).1[&Table::Scenes], first.1[&Table::Scenes]);
+    assert_ne!(shard(&reseeded, 1).1[&ShardTable::Scenes], first.1[&ShardTable::Scenes]);
 }
 
 #[test]
@@ -157,15 +157,15 @@ fn recorded_columns_match_the_scene() {
     let generator = generator(EVERYTHING);
     let (made, files) = shard(&generator, 2);
     assert_eq!(generator.tables().len(), 5);
-    let read: BTreeMap<Table, _> =
+    let read: BTreeMap<ShardTable, _> =
         files.iter().map(|(table, bytes)| (*table, rows(bytes))).collect();
     for (table, rows) in &read {
         assert_eq!(made.rows(*table), rows.len() as u64, "{table:?}");
         assert!(!rows.is_empty(), "{table:?}");
     }
-    assert_eq!(made.rows(Table::Scenes), 3);
-    assert_eq!(made.rows(Table::Readings), 3 * 2 * 12);
-    let scenes: BTreeMap<i64, Scene> = read[&Table::Scenes]
+    assert_eq!(made.rows(ShardTable::Scenes), 3);
+    assert_eq!(made.rows(ShardTable::Readings), 3 * 2 * 12);
+    let scenes: BTreeMap<i64, Scene> = read[&ShardTable::Scenes]
         .iter()
         .map(|row| {
             let scene = Scene::from_json(text(&row["scene_text"]).expect("text")).expect("a scene");
@@ -174,7 +174,7 @@ fn recorded_columns_match_the_scene() {
         .collect();
     assert_eq!(scenes.keys().copied().collect::<Vec<_>>(), [4, 5, 6]);
     let mut echoes = 0;
-    for row in &read[&Table::Readings] {
+    for row in &read[&ShardTable::Readings] {
         let of = |name: &str| number(&row[name]);
         let scene = &scenes[&(of("scene").expect("a number") as i64)];
         let at = [of("x_m"), of("y_m")].map(|place| place.expect("a number"));
@@ -194,7 +194,7 @@ fn recorded_columns_match_the_scene() {
         assert!(matches!(&row["envelope"], Field::ListInternal(list) if list.len() > 40));
     }
     assert!(echoes > 20, "{echoes}");
-    for row in &read[&Table::Occupancy] {
+    for row in &read[&ShardTable::Occupancy] {
         let Field::ListInternal(cells) = &row["cells"] else { panic!("a list") };
         let all = number(&row["width"]).expect("cells") * number(&row["height"]).expect("cells");
         assert_eq!(cells.len() as f64, all);
@@ -213,7 +213,7 @@ fn ranges_take_three_bytes_each() {
     );
     let (made, files) = shard(&generator, 1);
     let all: usize = files.values().map(Vec::len).sum();
-    let bytes = all as f64 / made.rows(Table::Readings) as f64;
+    let bytes = all as f64 / made.rows(ShardTable::Readings) as f64;
     assert!(bytes < 3.5, "{bytes} bytes per reading");
 }
 
@@ -223,7 +223,7 @@ fn counts_rejected_draws() {
                    width_m = 3\ndepth_m = 3\n[furniture]\nboxes = 2\nbox_m = 0.5\ngap_m = 0.1\n[plan]\nstep_deg = 90";
     let generator = generator(crowded);
     let (made, _) = shard(&generator, 1);
-    assert_eq!((made.rows(Table::Scenes), made.rows(Table::Readings)), (4, 4 * 5 * 4));
+    assert_eq!((made.rows(ShardTable::Scenes), made.rows(ShardTable::Readings)), (4, 4 * 5 * 4));
     assert!(made.redrawn.furniture > 0 && made.redrawn.poses > 0, "{:?}", made.redrawn);
     // A scene without any acceptable draw is an error.
     let never = self::generator(&crowded.replace("box_m = 0.5", "box_m = 3"));
@@ -366,10 +366,10 @@ fn facts_match_only_their_shard() {
     let fewer = text.replace("echoes.parquet", "echos.parquet");
     assert_eq!(read(&own, 1, &fewer), ManifestError::Files);
     assert!(matches!(read(&own, 1, &text[..40]), ManifestError::Form(_)));
-    let manifest = Manifest::new(&own, &[facts(&own, 1), facts(&own, 2)]);
-    assert_eq!(manifest.totals.rows[&Table::Scenes], 2);
+    let manifest = DataSetManifest::new(&own, &[facts(&own, 1), facts(&own, 2)]);
+    assert_eq!(manifest.totals.rows[&ShardTable::Scenes], 2);
     let card = manifest.card(&own);
-    for column in rows(&shard(&own, 1).1[&Table::Readings])[0].keys() {
+    for column in rows(&shard(&own, 1).1[&ShardTable::Readings])[0].keys() {
         assert!(card.contains(&format!("| `{column}` |")), "{column}\n{card}");
     }
 }

@@ -8,12 +8,12 @@ use sonard_model::{
     geometry::Pose,
 };
 
-use crate::{ImportError, Location, Mapping, time::TimeReader};
+use crate::{ImportError, FileLocation, Mapping, time::TimeReader};
 
 /// Ranges of all rangers of an array at one time.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct ArrayRound {
-    pub(crate) place: Location,
+    pub(crate) place: FileLocation,
     pub(crate) time: Option<Timestamp>,
     /// Pose of the robot, if the log stated one before.
     pub(crate) pose: Option<Pose>,
@@ -186,7 +186,7 @@ impl<'a> RoundReader<'a> {
     /// Returns an error if the number or the positions of the rangers change.
     pub(crate) fn push(
         &mut self,
-        place: Location,
+        place: FileLocation,
         message: LogMessage,
     ) -> Result<Option<ArrayRound>, ImportError> {
         let LogMessage { device, content } = message;
@@ -242,7 +242,7 @@ impl<'a> RoundReader<'a> {
 
     fn set_geometry(
         &mut self,
-        place: Location,
+        place: FileLocation,
         geometry: Vec<[f64; 3]>,
     ) -> Result<(), ImportError> {
         match &self.geometry {
@@ -290,7 +290,7 @@ pub(crate) fn pose(x_m: f64, y_m: f64, heading_rad: f64) -> Pose {
 
 /// Parses one word of a line as a number.
 pub(crate) fn number(
-    place: Location,
+    place: FileLocation,
     words: &[&str],
     at: usize,
     what: &str,
@@ -307,7 +307,7 @@ pub(crate) fn number(
 
 /// Parses ranges; `inf` and `nan`, as printed by C, become infinite.
 pub(crate) fn ranges(
-    place: Location,
+    place: FileLocation,
     words: &[&str],
     from: usize,
     count: usize,
@@ -321,7 +321,7 @@ pub(crate) fn ranges(
 
 /// Parses `count` consecutive words as numbers.
 pub(crate) fn numbers(
-    place: Location,
+    place: FileLocation,
     words: &[&str],
     from: usize,
     count: usize,
@@ -334,7 +334,7 @@ pub(crate) fn numbers(
 pub(crate) const MAX_RANGERS: usize = 256;
 
 /// Parses the number of rangers at the beginning of a line.
-pub(crate) fn count(place: Location, words: &[&str], at: usize) -> Result<usize, ImportError> {
+pub(crate) fn count(place: FileLocation, words: &[&str], at: usize) -> Result<usize, ImportError> {
     let count = number(place, words, at, "number of rangers")?;
     if count.fract() == 0.0 && (1.0..=MAX_RANGERS as f64).contains(&count) {
         return Ok(count as usize);

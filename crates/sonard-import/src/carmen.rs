@@ -5,7 +5,7 @@
 //! messages, comments and parameters are skipped.
 
 use crate::{
-    ImportError, Location,
+    ImportError, FileLocation,
     array_rounds::{self, LogDevice, LogMessage, MessageContent, count, number, numbers},
 };
 
@@ -16,7 +16,7 @@ const TRAILING_WORDS: usize = 3;
 ///
 /// # Errors
 /// Returns an error for a malformed message.
-pub(crate) fn message(place: Location, line: &str) -> Result<Option<LogMessage>, ImportError> {
+pub(crate) fn message(place: FileLocation, line: &str) -> Result<Option<LogMessage>, ImportError> {
     let words: Vec<&str> = line.split_whitespace().collect();
     let content = match words.first() {
         Some(&"ODOM") => pose(place, &words, false)?,
@@ -27,14 +27,14 @@ pub(crate) fn message(place: Location, line: &str) -> Result<Option<LogMessage>,
     Ok(Some(LogMessage { device: LogDevice::default(), content }))
 }
 
-fn pose(place: Location, words: &[&str], is_true: bool) -> Result<MessageContent, ImportError> {
+fn pose(place: FileLocation, words: &[&str], is_true: bool) -> Result<MessageContent, ImportError> {
     let [x_m, y_m, heading_rad] =
         [(1, "x"), (2, "y"), (3, "theta")].map(|(at, what)| number(place, words, at, what));
     Ok(MessageContent::Pose { pose: array_rounds::pose(x_m?, y_m?, heading_rad?), is_true })
 }
 
 /// Parses a SONAR line; its layout follows from the number of words.
-fn ranges(place: Location, words: &[&str]) -> Result<MessageContent, ImportError> {
+fn ranges(place: FileLocation, words: &[&str]) -> Result<MessageContent, ImportError> {
     let fits = |at: usize| {
         let count: usize = words.get(at)?.parse().ok().filter(|count| *count > 0)?;
         let rest = words.len().checked_sub(at + 1 + count + TRAILING_WORDS)?;

@@ -1,23 +1,23 @@
 //! Recognition of quantities and units in the column names of a table.
 
-use crate::{Field, Quantity};
+use crate::{Field, FieldQuantity};
 
 /// Meaning of a column name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum NameMeaning {
     Field(Field),
     /// Quantity without a unit.
-    Quantity(Quantity),
+    Quantity(FieldQuantity),
     /// Unit without a quantity.
     Unit(&'static str),
     Unknown,
 }
 
-use Quantity::{Azimuth, Bearing, Heading, Range, Scan, Status, Temperature, Time, Tof, X, Y};
+use FieldQuantity::{Azimuth, Bearing, Heading, Range, Scan, Status, Temperature, Time, Tof, X, Y};
 
 /// Words for a quantity, the more specific first. The unit resolves words that several quantities
 /// share.
-const QUANTITY_WORDS: &[(&str, &[Quantity])] = &[
+const QUANTITY_WORDS: &[(&str, &[FieldQuantity])] = &[
     ("flight", &[Tof]),
     ("tof", &[Tof]),
     ("laufzeit", &[Tof]),
@@ -249,7 +249,7 @@ pub(crate) fn is_clockwise(name: &str) -> bool {
 pub(crate) fn meaning(name: &str) -> NameMeaning {
     let words = words(name);
     let has = |known: &[&str]| words.iter().any(|word| known.contains(&word.as_str()));
-    if let Some(field) = Field::named(&name.trim().to_lowercase()) {
+    if let Some(field) = Field::from_name(&name.trim().to_lowercase()) {
         return NameMeaning::Field(field);
     }
     if has(&NON_READING_WORDS) {
@@ -326,7 +326,7 @@ mod tests {
         ] {
             assert_eq!(
                 meaning(name),
-                NameMeaning::Field(Field::named(field).expect("a field")),
+                NameMeaning::Field(Field::from_name(field).expect("a field")),
                 "{name}"
             );
         }

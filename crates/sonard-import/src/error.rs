@@ -6,7 +6,7 @@ use thiserror::Error;
 
 /// Position of a reading or an error within a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Location {
+pub enum FileLocation {
     /// Line number, from 1.
     Line(u64),
     /// Message of a recording, from 1, counting only messages with readings.
@@ -20,7 +20,7 @@ pub enum Location {
     },
 }
 
-impl fmt::Display for Location {
+impl fmt::Display for FileLocation {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Line(line) => write!(f, "line {line}"),
@@ -43,7 +43,7 @@ pub enum ImportError {
     #[error("{place}{}: {what}", column.as_ref().map(|column| format!(", {column}")).unwrap_or_default())]
     At {
         /// Position of the invalid value.
-        place: Location,
+        place: FileLocation,
         /// Field, and the column mapped to it.
         column: Option<String>,
         /// Description of the fault.
@@ -61,7 +61,7 @@ pub enum ImportError {
     },
     /// Values that are implausible for the mapped quantity or unit.
     #[error("{what}")]
-    Doubtful {
+    Implausible {
         /// Evidence against the mapping.
         what: String,
         /// Alternative interpretations, each with its option.
@@ -74,7 +74,7 @@ impl ImportError {
         Self::Mapping { what: what.into(), help: help.into() }
     }
 
-    pub(crate) fn at(place: Location, what: impl Into<String>, help: impl Into<String>) -> Self {
+    pub(crate) fn at(place: FileLocation, what: impl Into<String>, help: impl Into<String>) -> Self {
         Self::At { place, column: None, what: what.into(), help: help.into() }
     }
 
@@ -83,7 +83,7 @@ impl ImportError {
     pub fn help(&self) -> &str {
         match self {
             Self::Io(_) => "check the file",
-            Self::At { help, .. } | Self::Mapping { help, .. } | Self::Doubtful { help, .. } => {
+            Self::At { help, .. } | Self::Mapping { help, .. } | Self::Implausible { help, .. } => {
                 help
             }
         }

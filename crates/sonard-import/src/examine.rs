@@ -5,7 +5,7 @@ use std::io::Read;
 use serde_json::Value;
 
 use crate::{
-    Column, Field, ImportError, Imported, Location, Quantity, Reading, Row, Source,
+    Column, Field, ImportError, Imported, FileLocation, FieldQuantity, ImportedReading, Row, ImportSource,
     array_rounds::{self, DeviceCounts, LogMessage, RoundReader},
     format::ReadLine,
     json::{self, FirstEntry},
@@ -25,7 +25,7 @@ use crate::{
 /// Rows of a table or of JSON.
 type Rows<'a> = Box<dyn Iterator<Item = Result<Row, ImportError>> + 'a>;
 
-impl Source<'_> {
+impl ImportSource<'_> {
     pub(crate) fn examine_rows(
         &self,
         survey: &Survey,
@@ -75,7 +75,7 @@ impl Source<'_> {
         found.notes.extend(times);
         found.note_ends(survey, faults);
         (found.readings, found.echoes) = (stats.ranges.readings, stats.ranges.echoes);
-        found.has_poses = found.mapping.field(Quantity::X).is_some();
+        found.has_poses = found.mapping.field(FieldQuantity::X).is_some();
         Ok(())
     }
 
@@ -96,7 +96,7 @@ impl Source<'_> {
             found.header = Some(header);
             (names, Some(columns))
         };
-        if !found.guessed {
+        if !found.is_inferred {
             return Ok(names);
         }
         if let Some(rangers) = rangers {
@@ -178,7 +178,7 @@ impl Source<'_> {
     }
 
     pub(crate) fn examine_ros_text(&self, found: &mut Imported) -> Result<(), ImportError> {
-        found.guessed = false;
+        found.is_inferred = false;
         let mut stats = SweepStats::new();
         let mut reader = ros_text::MessageConverter::new(&found.mapping);
         let units = UnitContext {
@@ -224,7 +224,7 @@ impl Source<'_> {
         read: ReadLine,
         found: &mut Imported,
     ) -> Result<(), ImportError> {
-        found.guessed = false;
+        found.is_inferred = false;
         let mut counts = DeviceCounts::default();
         for message in messages(read, found.decoded((self.open)()?)) {
             counts.add(&message?.1);
@@ -296,12 +296,12 @@ impl Source<'_> {
 /// Rejects a file whose ranges are all beyond the `max_range` of their messages.
 pub(crate) fn check_beyond(
     notes: &crate::limits::LimitNotes,
-    assumptions: &crate::Taken,
+    assumptions: &crate::Assumptions,
 ) -> Result<(), ImportError> {
-    if assumptions.as_said || !notes.all_beyond_max() {
+    if assumptions.skip_checks || !notes.all_beyond_max() {
         return Ok(());
     }
-    Err(ImportError::Doubtful {
+    Err(ImportError::Implausible {
         what: format!(
             "all {} ranges are beyond max_range = {} of their messages",
             notes.readings,
@@ -317,10 +317,10 @@ fn check_one_row(found: &Imported, readings: u64) -> Result<(), ImportError> {
         return Ok(());
     };
     let (values, columns) = (header.cells.len(), found.mapping.columns.len());
-    if readings != 1 || values < 2 * columns.max(2) || found.taken.as_said {
+    if readings != 1 || values < 2 * columns.max(2) || found.taken.skip_checks {
         return Ok(());
     }
-    Err(ImportError::Doubtful {
+    Err(ImportError::Implausible {
         what: format!("the file is one row of {values} values, of which {columns} are read"),
         help: "are line ends missing? Give one reading per line; --no-unit-check reads the row as it is"
             .to_owned(),
@@ -331,7 +331,7 @@ fn check_one_row(found: &Imported, readings: u64) -> Result<(), ImportError> {
 fn missing_array_unit(found: &Imported, rangers: usize) -> ImportError {
     let name = found.taken.array.as_ref().map_or("", |array| &array.name);
     let column = Column::Several((1..=rangers).collect());
-    let options = Field::of_quantity(Quantity::Range)
+    let options = Field::of_quantity(FieldQuantity::Range)
         .take(3)
         .map(|field| columns_option([(field, column.clone())], &[]));
     let options: Vec<String> = options.collect();
@@ -416,11 +416,11 @@ impl Imported {
                 Ok(readings) => readings.into_iter().map(Ok).collect::<Vec<_>>(),
                 Err(error) => vec![Err(error)],
             };
-            each.into_iter().map(move |reading: Result<Reading, ImportError>| {
+            each.into_iter().map(move |reading: Result<ImportedReading, ImportError>| {
                 reading.map(|reading| {
                     let tof_us = reading.range_m.map(|range_m| 2e6 * range_m / assumed_m_s);
                     let range_m = tof_us.map(|tof_us| tof_us * 1e-6 * air_m_s / 2.0);
-                    Reading { tof_us, range_m, ..reading }
+                    ImportedReading { tof_us, range_m, ..reading }
                 })
             })
         });
@@ -430,7 +430,7 @@ impl Imported {
     /// Splits readings into scans and converts them to records.
     fn cut<'a>(
         &'a self,
-        mut readings: impl Iterator<Item = Result<Reading, ImportError>> + 'a,
+        mut readings: impl Iterator<Item = Result<ImportedReading, ImportError>> + 'a,
     ) -> Box<dyn Iterator<Item = ScanRecords> + 'a> {
         let (mut splitter, mut number) = (Some(ScanSplitter::default()), 0);
         Box::new(std::iter::from_fn(move || {
@@ -481,7 +481,7 @@ impl Imported {
 fn messages(
     read: ReadLine,
     source: impl Read,
-) -> impl Iterator<Item = Result<(Location, LogMessage), ImportError>> {
+) -> impl Iterator<Item = Result<(FileLocation, LogMessage), ImportError>> {
     LineReader::new(source, LineEnding::Lines).filter_map(move |line| {
         let message = line.and_then(|line| {
             let message = read(line.place(), &line.text)?;

@@ -9,7 +9,7 @@ use crate::ImportError;
 
 /// Physical or descriptive quantity of a column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum Quantity {
+pub enum FieldQuantity {
     /// Direction of the beam from the robot's heading.
     Azimuth,
     /// Direction of the beam in the world.
@@ -34,10 +34,10 @@ pub enum Quantity {
     Status,
 }
 
-impl Quantity {
+impl FieldQuantity {
     /// Returns the English name of the quantity, for messages.
     #[must_use]
-    pub const fn words(self) -> &'static str {
+    pub const fn label(self) -> &'static str {
         match self {
             Self::Azimuth => "azimuth",
             Self::Bearing => "bearing",
@@ -54,7 +54,7 @@ impl Quantity {
     }
 }
 
-impl Quantity {
+impl FieldQuantity {
     /// Returns `true` for a direction, a range or a time of flight.
     pub(crate) const fn is_measurement(self) -> bool {
         matches!(self, Self::Azimuth | Self::Bearing | Self::Range | Self::Tof)
@@ -65,38 +65,38 @@ const DEG: f64 = 180.0 / std::f64::consts::PI;
 
 /// Field names with quantity and scale factor to degrees, metres, microseconds, seconds or degrees
 /// Celsius. Fields without a factor hold text.
-const FIELDS: [(&str, Quantity, Option<f64>); 31] = [
-    ("azimuth_deg", Quantity::Azimuth, Some(1.0)),
-    ("azimuth_rad", Quantity::Azimuth, Some(DEG)),
-    ("bearing_deg", Quantity::Bearing, Some(1.0)),
-    ("bearing_rad", Quantity::Bearing, Some(DEG)),
-    ("range_m", Quantity::Range, Some(1.0)),
-    ("range_cm", Quantity::Range, Some(0.01)),
-    ("range_mm", Quantity::Range, Some(0.001)),
-    ("range_in", Quantity::Range, Some(0.0254)),
-    ("range_ft", Quantity::Range, Some(0.3048)),
-    ("tof_us", Quantity::Tof, Some(1.0)),
-    ("tof_ms", Quantity::Tof, Some(1e3)),
-    ("tof_s", Quantity::Tof, Some(1e6)),
-    ("time", Quantity::Time, None),
-    ("time_s", Quantity::Time, Some(1.0)),
-    ("time_ms", Quantity::Time, Some(1e-3)),
-    ("time_us", Quantity::Time, Some(1e-6)),
-    ("time_ns", Quantity::Time, Some(1e-9)),
-    ("scan", Quantity::Scan, None),
-    ("x_m", Quantity::X, Some(1.0)),
-    ("x_cm", Quantity::X, Some(0.01)),
-    ("x_mm", Quantity::X, Some(0.001)),
-    ("y_m", Quantity::Y, Some(1.0)),
-    ("y_cm", Quantity::Y, Some(0.01)),
-    ("y_mm", Quantity::Y, Some(0.001)),
-    ("heading_deg", Quantity::Heading, Some(1.0)),
-    ("heading_rad", Quantity::Heading, Some(DEG)),
-    ("temperature_c", Quantity::Temperature, Some(1.0)),
-    ("temperature_k", Quantity::Temperature, Some(1.0)),
-    ("status", Quantity::Status, None),
-    ("azimuth_grad", Quantity::Azimuth, Some(0.9)),
-    ("bearing_grad", Quantity::Bearing, Some(0.9)),
+const FIELDS: [(&str, FieldQuantity, Option<f64>); 31] = [
+    ("azimuth_deg", FieldQuantity::Azimuth, Some(1.0)),
+    ("azimuth_rad", FieldQuantity::Azimuth, Some(DEG)),
+    ("bearing_deg", FieldQuantity::Bearing, Some(1.0)),
+    ("bearing_rad", FieldQuantity::Bearing, Some(DEG)),
+    ("range_m", FieldQuantity::Range, Some(1.0)),
+    ("range_cm", FieldQuantity::Range, Some(0.01)),
+    ("range_mm", FieldQuantity::Range, Some(0.001)),
+    ("range_in", FieldQuantity::Range, Some(0.0254)),
+    ("range_ft", FieldQuantity::Range, Some(0.3048)),
+    ("tof_us", FieldQuantity::Tof, Some(1.0)),
+    ("tof_ms", FieldQuantity::Tof, Some(1e3)),
+    ("tof_s", FieldQuantity::Tof, Some(1e6)),
+    ("time", FieldQuantity::Time, None),
+    ("time_s", FieldQuantity::Time, Some(1.0)),
+    ("time_ms", FieldQuantity::Time, Some(1e-3)),
+    ("time_us", FieldQuantity::Time, Some(1e-6)),
+    ("time_ns", FieldQuantity::Time, Some(1e-9)),
+    ("scan", FieldQuantity::Scan, None),
+    ("x_m", FieldQuantity::X, Some(1.0)),
+    ("x_cm", FieldQuantity::X, Some(0.01)),
+    ("x_mm", FieldQuantity::X, Some(0.001)),
+    ("y_m", FieldQuantity::Y, Some(1.0)),
+    ("y_cm", FieldQuantity::Y, Some(0.01)),
+    ("y_mm", FieldQuantity::Y, Some(0.001)),
+    ("heading_deg", FieldQuantity::Heading, Some(1.0)),
+    ("heading_rad", FieldQuantity::Heading, Some(DEG)),
+    ("temperature_c", FieldQuantity::Temperature, Some(1.0)),
+    ("temperature_k", FieldQuantity::Temperature, Some(1.0)),
+    ("status", FieldQuantity::Status, None),
+    ("azimuth_grad", FieldQuantity::Azimuth, Some(0.9)),
+    ("bearing_grad", FieldQuantity::Bearing, Some(0.9)),
 ];
 
 /// A quantity in a unit, such as `range_cm`.
@@ -111,7 +111,7 @@ impl Field {
 
     /// Returns the field with this name.
     #[must_use]
-    pub fn named(name: &str) -> Option<Self> {
+    pub fn from_name(name: &str) -> Option<Self> {
         FIELDS.iter().position(|(known, ..)| *known == name).map(Self)
     }
 
@@ -123,7 +123,7 @@ impl Field {
 
     /// Returns the quantity that the field holds.
     #[must_use]
-    pub const fn quantity(self) -> Quantity {
+    pub const fn quantity(self) -> FieldQuantity {
         FIELDS[self.0].1
     }
 
@@ -146,12 +146,12 @@ impl Field {
     }
 
     /// Returns the field of a quantity in a unit.
-    pub(crate) fn with_unit(quantity: Quantity, unit: Option<&str>) -> Option<Self> {
+    pub(crate) fn with_unit(quantity: FieldQuantity, unit: Option<&str>) -> Option<Self> {
         Self::all().find(|field| field.quantity() == quantity && field.unit() == unit)
     }
 
     /// Returns all fields of a quantity.
-    pub(crate) fn of_quantity(quantity: Quantity) -> impl Iterator<Item = Self> {
+    pub(crate) fn of_quantity(quantity: FieldQuantity) -> impl Iterator<Item = Self> {
         Self::all().filter(move |field| field.quantity() == quantity)
     }
 }
@@ -172,7 +172,7 @@ impl std::str::FromStr for Field {
     type Err = ImportError;
 
     fn from_str(name: &str) -> Result<Self, ImportError> {
-        Self::named(name).ok_or_else(|| {
+        Self::from_name(name).ok_or_else(|| {
             let known: Vec<_> = Self::all().map(Self::name).collect();
             ImportError::mapping(
                 format!("unknown field `{name}`"),

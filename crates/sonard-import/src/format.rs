@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::{ImportError, Location, array_rounds::LogMessage, carmen, player, recording::MAGIC};
+use crate::{ImportError, FileLocation, array_rounds::LogMessage, carmen, player, recording::MAGIC};
 
 /// Format of a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -24,7 +24,7 @@ pub enum Format {
 }
 
 /// Parses one line of a robot's log; `None` for lines without ranges or a pose.
-pub(crate) type ReadLine = fn(Location, &str) -> Result<Option<LogMessage>, ImportError>;
+pub(crate) type ReadLine = fn(FileLocation, &str) -> Result<Option<LogMessage>, ImportError>;
 
 /// Structure of a format, which selects its reader.
 #[derive(Debug, Clone, Copy)]
@@ -117,7 +117,7 @@ impl Format {
 
     /// Returns the format with this name.
     #[must_use]
-    pub fn named(name: &str) -> Option<Self> {
+    pub fn from_name(name: &str) -> Option<Self> {
         FORMATS.iter().find(|entry| entry.name == name).map(|entry| entry.format)
     }
 
@@ -346,7 +346,7 @@ mod tests {
     #[test]
     fn registry_is_consistent() {
         for entry in &FORMATS {
-            assert_eq!(Format::named(entry.name), Some(entry.format));
+            assert_eq!(Format::from_name(entry.name), Some(entry.format));
             assert_eq!(serde_json::to_value(entry.format).expect("a name"), entry.name);
             assert_eq!(FORMATS.iter().filter(|other| other.format == entry.format).count(), 1);
         }

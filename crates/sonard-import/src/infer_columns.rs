@@ -1,7 +1,7 @@
 //! Inference of a mapping from column names.
 
 use crate::{
-    Column, Field, ImportError, Mapping, Quantity,
+    Column, Field, ImportError, Mapping, FieldQuantity,
     column_names::{self, NameMeaning},
     mapping::columns_option,
 };
@@ -12,7 +12,7 @@ pub(crate) struct ColumnCandidates {
     /// Columns with known quantity and unit.
     found: Vec<(Field, String)>,
     /// Columns of a quantity without a unit.
-    without_unit: Vec<(Quantity, String)>,
+    without_unit: Vec<(FieldQuantity, String)>,
     /// Columns with only a unit.
     unit_alone: Vec<(&'static str, String)>,
     /// Columns that are not used.
@@ -38,27 +38,27 @@ impl ColumnCandidates {
         candidates
     }
 
-    fn has(&self, quantity: Quantity) -> bool {
+    fn has(&self, quantity: FieldQuantity) -> bool {
         self.found.iter().any(|(field, _)| field.quantity() == quantity)
     }
 
     fn has_direction(&self) -> bool {
-        self.has(Quantity::Azimuth) || self.has(Quantity::Bearing)
+        self.has(FieldQuantity::Azimuth) || self.has(FieldQuantity::Bearing)
     }
 
     fn has_range(&self) -> bool {
-        self.has(Quantity::Range) || self.has(Quantity::Tof)
+        self.has(FieldQuantity::Range) || self.has(FieldQuantity::Tof)
     }
 
     /// Interprets yaw as the azimuth of the ranger's mount, if there is no other direction and no
     /// position.
     fn take_yaw_as_azimuth(&mut self) {
-        if self.has_direction() || self.has(Quantity::X) {
+        if self.has_direction() || self.has(FieldQuantity::X) {
             return;
         }
         for (field, _) in &mut self.found {
-            if field.quantity() == Quantity::Heading
-                && let Some(azimuth) = Field::with_unit(Quantity::Azimuth, field.unit())
+            if field.quantity() == FieldQuantity::Heading
+                && let Some(azimuth) = Field::with_unit(FieldQuantity::Azimuth, field.unit())
             {
                 *field = azimuth;
             }
@@ -80,7 +80,7 @@ impl ColumnCandidates {
 
     /// Returns the range columns of an array: more than two, adjacent and in one unit.
     pub(crate) fn array_columns(&self, names: &[String]) -> Option<(Field, Vec<usize>)> {
-        let ranges = self.found.iter().filter(|(field, _)| field.quantity() == Quantity::Range);
+        let ranges = self.found.iter().filter(|(field, _)| field.quantity() == FieldQuantity::Range);
         let ranges: Vec<&(Field, String)> = ranges.collect();
         let (field, _) = ranges.first()?;
         let place = |name: &String| names.iter().position(|known| known == name).map(|at| at + 1);
@@ -111,7 +111,7 @@ impl ColumnCandidates {
                 return Err(ImportError::mapping(
                     format!(
                         "`{duplicate}` and `{name}` may both be the {}",
-                        field.quantity().words()
+                        field.quantity().label()
                     ),
                     format!("choose: {first} or {second}"),
                 ));
@@ -122,7 +122,7 @@ impl ColumnCandidates {
 
     /// Returns the columns that may hold one of the quantities, with a field for each possible
     /// unit.
-    fn offers(&self, quantities: [Quantity; 2]) -> Vec<(Field, &str)> {
+    fn offers(&self, quantities: [FieldQuantity; 2]) -> Vec<(Field, &str)> {
         let fields = |(unit, name): &(&'static str, String)| {
             let fields = quantities.map(|quantity| Field::with_unit(quantity, Some(unit)));
             fields.into_iter().flatten().next().map(|field| (field, name.clone()))
@@ -150,16 +150,16 @@ impl ColumnCandidates {
         if !needs_direction && !needs_range {
             return Ok(());
         }
-        let directions = self.offers([Quantity::Azimuth, Quantity::Bearing]);
-        let ranges = self.offers([Quantity::Range, Quantity::Tof]);
+        let directions = self.offers([FieldQuantity::Azimuth, FieldQuantity::Bearing]);
+        let ranges = self.offers([FieldQuantity::Range, FieldQuantity::Tof]);
         let lacks = match (needs_direction, needs_range) {
             (true, true) => "no column is recognized as a direction or a range",
             (true, false) => "no column is mapped to azimuth or bearing",
             _ => "no column is mapped to range or time of flight",
         };
         let without_unit = self.without_unit.iter().find(|(quantity, _)| match quantity {
-            Quantity::Azimuth | Quantity::Bearing => needs_direction,
-            Quantity::Range | Quantity::Tof => needs_range,
+            FieldQuantity::Azimuth | FieldQuantity::Bearing => needs_direction,
+            FieldQuantity::Range | FieldQuantity::Tof => needs_range,
             _ => false,
         });
         let what = match without_unit {
@@ -223,7 +223,7 @@ impl Mapping {
         candidates.found.retain(|(field, _)| {
             !matches!(
                 field.quantity(),
-                Quantity::Range | Quantity::Tof | Quantity::Azimuth | Quantity::Bearing
+                FieldQuantity::Range | FieldQuantity::Tof | FieldQuantity::Azimuth | FieldQuantity::Bearing
             )
         });
         self.columns =
@@ -242,7 +242,7 @@ impl Mapping {
         candidates.check_missing(self, names)?;
         let mut notes = Vec::new();
         let yaw = candidates.found.iter().find(|(field, name)| {
-            field.quantity() == Quantity::Azimuth && column_names::is_yaw(name)
+            field.quantity() == FieldQuantity::Azimuth && column_names::is_yaw(name)
         });
         if let Some((_, name)) = yaw {
             notes.push(format!("`{name}` taken as the azimuth: no other column is a direction"));

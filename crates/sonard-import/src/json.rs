@@ -5,7 +5,7 @@ use std::{borrow::Cow, io::Read};
 use serde_json::Value;
 
 use crate::{
-    Column, ImportError, Location, Mapping, Row,
+    Column, ImportError, FileLocation, Mapping, Row,
     lines::{LineEnding, LineReader, TextLine},
 };
 
@@ -89,7 +89,7 @@ fn is_scalar_row(value: &Value) -> bool {
 pub(crate) fn parse(first_line: u64, text: &str) -> Object {
     read(text).map_err(|error| {
         let line = first_line + (error.line() as u64).saturating_sub(1);
-        ImportError::at(Location::Line(line), format!("invalid JSON: {error}"), "correct the file")
+        ImportError::at(FileLocation::Line(line), format!("invalid JSON: {error}"), "correct the file")
     })
 }
 
@@ -134,7 +134,7 @@ fn rows_of(
     mapping: &Mapping,
     of_array: bool,
 ) -> Result<Vec<Row>, ImportError> {
-    let whole = Location::Entry { object: number, number: None };
+    let whole = FileLocation::Entry { object: number, number: None };
     let members = mapping
         .columns
         .values()
@@ -172,7 +172,7 @@ fn rows_of(
         return Ok(vec![Row { place: whole, cells: cells.collect() }]);
     };
     let row = |at: usize| Row {
-        place: Location::Entry { object: number, number: Some(at as u64 + 1) },
+        place: FileLocation::Entry { object: number, number: Some(at as u64 + 1) },
         cells: members
             .iter()
             .map(|member| vec![cell(member.as_array().map_or(*member, |values| &values[at]))])
@@ -183,7 +183,7 @@ fn rows_of(
 
 /// Returns the values of a column: a member by its path, or elements of a list by their numbers.
 fn member<'a>(
-    whole: Location,
+    whole: FileLocation,
     object: &'a Value,
     column: &Column,
 ) -> Result<Vec<&'a Value>, ImportError> {
@@ -208,7 +208,7 @@ fn member<'a>(
     numbers.iter().map(value).collect()
 }
 
-fn named<'a>(whole: Location, object: &'a Value, path: &str) -> Result<&'a Value, ImportError> {
+fn named<'a>(whole: FileLocation, object: &'a Value, path: &str) -> Result<&'a Value, ImportError> {
     let step = |value: &'a Value, name: &str| match value {
         Value::Object(members) => members.get(name),
         Value::Array(values) => values.get(name.parse::<usize>().ok()?),

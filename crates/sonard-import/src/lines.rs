@@ -2,7 +2,7 @@
 
 use std::io::{BufRead as _, BufReader, Read};
 
-use crate::{ImportError, Location};
+use crate::{ImportError, FileLocation};
 
 /// Maximum length of a line.
 const MAX_LINE_BYTES: usize = 1 << 20;
@@ -29,8 +29,8 @@ pub(crate) struct TextLine {
 }
 
 impl TextLine {
-    pub(crate) const fn place(&self) -> Location {
-        Location::Line(self.number)
+    pub(crate) const fn place(&self) -> FileLocation {
+        FileLocation::Line(self.number)
     }
 }
 
@@ -70,7 +70,7 @@ impl<R: Read> LineReader<R> {
             if bytes.len() > MAX_LINE_BYTES {
                 let what = format!("longer than {MAX_LINE_BYTES} bytes");
                 let help = "give a file with one reading per line";
-                return Err(ImportError::at(Location::Line(self.count + 1), what, help));
+                return Err(ImportError::at(FileLocation::Line(self.count + 1), what, help));
             }
             let used = end.map_or(piece.len(), |end| end + 1);
             self.is_after_return = end.is_some_and(|end| piece[end] == b'\r');

@@ -6,7 +6,7 @@ use jiff::Timestamp;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::{Field, Format, ImportError, Quantity, array_rounds::MAX_RANGERS};
+use crate::{Field, Format, ImportError, FieldQuantity, array_rounds::MAX_RANGERS};
 
 /// Column of a table, or member of a JSON object, mapped to a field.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -171,7 +171,7 @@ impl Mapping {
     ///
     /// # Errors
     /// Returns an error for an unknown field or a field given twice.
-    pub fn columns_of(text: &str) -> Result<BTreeMap<Field, Column>, ImportError> {
+    pub fn parse_columns(text: &str) -> Result<BTreeMap<Field, Column>, ImportError> {
         let mut columns = BTreeMap::new();
         for pair in text.split(',') {
             let help = "write FIELD=COLUMN, with the number of the column (from 1) or its name: \
@@ -191,7 +191,7 @@ impl Mapping {
 
     /// Returns the mapped field of a quantity.
     #[must_use]
-    pub fn field(&self, quantity: Quantity) -> Option<Field> {
+    pub fn field(&self, quantity: FieldQuantity) -> Option<Field> {
         self.columns.keys().copied().find(|field| field.quantity() == quantity)
     }
 
@@ -229,20 +229,20 @@ impl Mapping {
         for field in self.columns.keys() {
             if let Some(other) = seen.insert(field.quantity(), field) {
                 return Err(ImportError::mapping(
-                    format!("{other} and {field} are both the {}", field.quantity().words()),
+                    format!("{other} and {field} are both the {}", field.quantity().label()),
                     "leave one of them out",
                 ));
             }
         }
         let has = |quantity| seen.contains_key(&quantity);
         for (preferred, alternative) in
-            [(Quantity::Azimuth, Quantity::Bearing), (Quantity::Range, Quantity::Tof)]
+            [(FieldQuantity::Azimuth, FieldQuantity::Bearing), (FieldQuantity::Range, FieldQuantity::Tof)]
         {
-            let (name, alternative_name) = (preferred.words(), alternative.words());
-            let is_fixed = preferred == Quantity::Azimuth && self.azimuth_deg.is_some();
+            let (name, alternative_name) = (preferred.label(), alternative.label());
+            let is_fixed = preferred == FieldQuantity::Azimuth && self.azimuth_deg.is_some();
             match (has(preferred), has(alternative)) {
                 (false, false)
-                    if is_fixed || (preferred == Quantity::Azimuth && self.has_array_columns()) => {
+                    if is_fixed || (preferred == FieldQuantity::Azimuth && self.has_array_columns()) => {
                 }
                 (true, _) | (_, true) if is_fixed => {
                     let what = "both --azimuth-deg and a column give the direction";
@@ -261,7 +261,7 @@ impl Mapping {
                 _ => {}
             }
         }
-        if has(Quantity::X) != has(Quantity::Y) {
+        if has(FieldQuantity::X) != has(FieldQuantity::Y) {
             return Err(ImportError::mapping(
                 "only one of x and y is mapped",
                 "map both, or neither",

@@ -7,7 +7,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::Location;
+use crate::FileLocation;
 
 /// Number of distinct values, the greatest ones, that are counted exactly.
 const MAX_VALUES: usize = 64;
@@ -54,7 +54,7 @@ type Directions = [u64; 6];
 #[derive(Debug, Clone)]
 struct ValueCount {
     count: u64,
-    first: Location,
+    first: FileLocation,
     directions: Directions,
 }
 
@@ -67,7 +67,7 @@ pub(crate) struct RangeHistogram {
     /// Counts of the greatest values; the bits of positive floats sort like the numbers.
     values: BTreeMap<u64, ValueCount>,
     /// Counts of values of zero or less.
-    non_positive: BTreeMap<i64, (f64, u64, Location)>,
+    non_positive: BTreeMap<i64, (f64, u64, FileLocation)>,
     is_non_positive_full: bool,
     /// Logarithmic bins of 1 %, to detect a constant with noise.
     bins: BTreeMap<i32, Bin>,
@@ -89,7 +89,7 @@ pub(crate) struct NoEchoConstant {
     pub(crate) is_cluster: bool,
     pub(crate) count: u64,
     pub(crate) of: u64,
-    pub(crate) first: Option<Location>,
+    pub(crate) first: Option<FileLocation>,
     /// Evidence, for the message.
     pub(crate) why: &'static str,
 }
@@ -108,7 +108,7 @@ fn usual_gap(falling: &[(f64, &ValueCount)], value: f64) -> f64 {
 pub(crate) struct NonPositive {
     pub(crate) value: f64,
     pub(crate) count: u64,
-    pub(crate) first: Location,
+    pub(crate) first: FileLocation,
 }
 
 const MAX_NON_POSITIVE: usize = 16;
@@ -128,7 +128,7 @@ impl RangeHistogram {
 
     /// Counts a range in the unit of the file; `direction` is an angle in degrees or the index of a
     /// ranger.
-    pub(crate) fn add(&mut self, place: Location, value: f64, direction: f64) {
+    pub(crate) fn add(&mut self, place: FileLocation, value: f64, direction: f64) {
         if !value.is_finite() {
             return;
         }
@@ -300,7 +300,7 @@ mod tests {
     fn sweep(longest: f64, range: impl Fn(usize) -> f64) -> Option<NoEchoConstant> {
         let mut histogram = RangeHistogram::new(DirectionKind::Angles);
         for at in 0..120 {
-            histogram.add(Location::Line(at as u64 + 1), range(at), 3.0 * at as f64);
+            histogram.add(FileLocation::Line(at as u64 + 1), range(at), 3.0 * at as f64);
         }
         histogram.constant(longest)
     }
@@ -374,10 +374,10 @@ mod tests {
             for ranger in 0..8 {
                 let own = 1.0 + 0.1 * ranger as f64 + 0.01 * round as f64;
                 let value = if (1..7).contains(&ranger) { 5.0 } else { own };
-                histogram.add(Location::Line(round), value, f64::from(ranger));
+                histogram.add(FileLocation::Line(round), value, f64::from(ranger));
                 // One ranger that drives along a wall.
                 single.add(
-                    Location::Line(round),
+                    FileLocation::Line(round),
                     if ranger == 3 { 5.0 } else { own },
                     f64::from(ranger),
                 );
@@ -391,7 +391,7 @@ mod tests {
     fn lists_non_positive_values() {
         let mut histogram = RangeHistogram::new(DirectionKind::Angles);
         for (at, value) in [-1.0, 0.0, -1.0, 5.0, f64::NAN].into_iter().enumerate() {
-            histogram.add(Location::Line(at as u64 + 1), value, 0.0);
+            histogram.add(FileLocation::Line(at as u64 + 1), value, 0.0);
         }
         let non_positive: Vec<_> = histogram
             .non_positive()
@@ -409,7 +409,7 @@ mod tests {
         ) {
             let mut histogram = RangeHistogram::new(DirectionKind::Angles);
             for (value, direction) in values {
-                histogram.add(Location::Line(1), value, direction);
+                histogram.add(FileLocation::Line(1), value, direction);
             }
             let _ = histogram.constant(longest);
             prop_assert!(histogram.values.len() <= MAX_VALUES && histogram.non_positive.len() <= MAX_NON_POSITIVE);

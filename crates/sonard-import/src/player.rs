@@ -14,7 +14,7 @@
 //! interfaces and comments are skipped.
 
 use crate::{
-    ImportError, Location,
+    ImportError, FileLocation,
     array_rounds::{self, LogDevice, LogMessage, MessageContent, count, number, numbers, ranges},
 };
 
@@ -33,7 +33,7 @@ type MessageType = Option<(u32, u32)>;
 ///
 /// # Errors
 /// Returns an error for a malformed message.
-pub(crate) fn message(place: Location, line: &str) -> Result<Option<LogMessage>, ImportError> {
+pub(crate) fn message(place: FileLocation, line: &str) -> Result<Option<LogMessage>, ImportError> {
     if line.trim_start().starts_with('#') {
         return Ok(None);
     }
@@ -74,7 +74,7 @@ fn old_start(words: &[&str]) -> usize {
 }
 
 fn sonar(
-    place: Location,
+    place: FileLocation,
     words: &[&str],
     from: usize,
     kind: MessageType,
@@ -109,7 +109,7 @@ fn sonar(
 }
 
 fn ranger(
-    place: Location,
+    place: FileLocation,
     words: &[&str],
     from: usize,
     kind: MessageType,
@@ -137,7 +137,7 @@ fn ranger(
 
 /// Parses ranger positions of `each` numbers: x, y and finally the yaw.
 fn positions(
-    place: Location,
+    place: FileLocation,
     words: &[&str],
     from: usize,
     count: usize,
@@ -153,7 +153,7 @@ fn positions(
 }
 
 fn parse_ranges(
-    place: Location,
+    place: FileLocation,
     words: &[&str],
     from: usize,
     count: usize,
@@ -164,7 +164,7 @@ fn parse_ranges(
     Ok(MessageContent::Ranges { seconds: Some(seconds), ranges, geometry })
 }
 
-fn position(place: Location, words: &[&str], from: usize) -> Result<MessageContent, ImportError> {
+fn position(place: FileLocation, words: &[&str], from: usize) -> Result<MessageContent, ImportError> {
     let [x_m, y_m, heading_rad] =
         [(0, "x"), (1, "y"), (2, "angle")].map(|(at, what)| number(place, words, from + at, what));
     Ok(MessageContent::Pose { pose: array_rounds::pose(x_m?, y_m?, heading_rad?), is_true: false })

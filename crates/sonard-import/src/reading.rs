@@ -4,7 +4,7 @@ use jiff::Timestamp;
 use sonard_model::{acoustics::Air, geometry::Pose, reading::PingStatus};
 
 use crate::{
-    Field, ImportError, Location, Mapping, Quantity, Taken,
+    Field, ImportError, FileLocation, Mapping, FieldQuantity, Assumptions,
     array_rounds::ArrayRound,
     mapping::Decimal,
     number::{self, DecimalEvidence},
@@ -15,7 +15,7 @@ use crate::{
 /// ranger of an array; `None` is an empty cell.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Row {
-    pub(crate) place: Location,
+    pub(crate) place: FileLocation,
     pub(crate) cells: Vec<Vec<Option<String>>>,
 }
 
@@ -31,9 +31,9 @@ pub(crate) struct RawReading {
 
 /// Single firing, in the units and conventions of a log.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Reading {
+pub struct ImportedReading {
     /// Position in the file.
-    pub place: Location,
+    pub place: FileLocation,
     /// Direction of the beam, degrees counter-clockwise: from the heading, or a bearing from the x
     /// axis.
     pub direction_deg: f64,
@@ -50,7 +50,7 @@ pub struct Reading {
     /// Scan identifier, where the file has one.
     pub scan: Option<String>,
     /// Position of the robot, x and y in metres.
-    pub place_m: Option<[f64; 2]>,
+    pub position_m: Option<[f64; 2]>,
     /// Heading of the robot, degrees.
     pub heading_deg: Option<f64>,
     /// Air at the reading, where the file contains its temperature.
@@ -59,10 +59,10 @@ pub struct Reading {
     pub(crate) raw: RawReading,
 }
 
-impl Reading {
+impl ImportedReading {
     /// Returns the pose of the robot, completed from `fallback`.
     pub(crate) fn pose(&self, fallback: &Pose) -> Pose {
-        let [x_m, y_m] = self.place_m.unwrap_or([fallback.x_m, fallback.y_m]);
+        let [x_m, y_m] = self.position_m.unwrap_or([fallback.x_m, fallback.y_m]);
         Pose { x_m, y_m, heading_deg: self.heading_deg.unwrap_or(fallback.heading_deg) }
     }
 }
@@ -72,7 +72,7 @@ impl Reading {
 pub(crate) struct RowReader<'a> {
     mapping: &'a Mapping,
     fields: Vec<Field>,
-    assumptions: &'a Taken,
+    assumptions: &'a Assumptions,
     decimal: Decimal,
     pub(crate) times: TimeReader<'a>,
 }
@@ -82,7 +82,7 @@ impl<'a> RowReader<'a> {
     /// Returns an error for an invalid UTC offset in the mapping.
     pub(crate) fn new(
         mapping: &'a Mapping,
-        assumptions: &'a Taken,
+        assumptions: &'a Assumptions,
         decimal: Decimal,
     ) -> Result<Self, ImportError> {
         let fields = mapping.columns.keys().copied().collect();
@@ -96,13 +96,13 @@ impl<'a> RowReader<'a> {
     }
 
     /// Returns the cells of a quantity.
-    fn cells<'r>(&self, row: &'r Row, quantity: Quantity) -> Option<(Field, &'r [Option<String>])> {
+    fn cells<'r>(&self, row: &'r Row, quantity: FieldQuantity) -> Option<(Field, &'r [Option<String>])> {
         let place = self.fields.iter().position(|field| field.quantity() == quantity)?;
         Some((self.fields[place], row.cells.get(place)?))
     }
 
     /// Returns the first cell of a quantity, if it is not empty.
-    fn cell<'r>(&self, row: &'r Row, quantity: Quantity) -> Option<(Field, &'r str)> {
+    fn cell<'r>(&self, row: &'r Row, quantity: FieldQuantity) -> Option<(Field, &'r str)> {
         let (field, cells) = self.cells(row, quantity)?;
         cells.first()?.as_deref().map(|cell| (field, cell))
     }
@@ -110,13 +110,13 @@ impl<'a> RowReader<'a> {
     fn number_of(
         &self,
         row: &Row,
-        quantity: Quantity,
+        quantity: FieldQuantity,
     ) -> Result<Option<(Field, f64)>, ImportError> {
         let Some((field, cell)) = self.cell(row, quantity) else { return Ok(None) };
         Ok(self.number(row.place, field, cell)?.map(|number| (field, number)))
     }
 
-    fn scaled(&self, row: &Row, quantity: Quantity) -> Result<Option<f64>, ImportError> {
+    fn scaled(&self, row: &Row, quantity: FieldQuantity) -> Result<Option<f64>, ImportError> {
         let found = self.number_of(row, quantity)?;
         Ok(found.map(|(field, number)| field.scaled(number)))
     }
@@ -125,15 +125,15 @@ impl<'a> RowReader<'a> {
     ///
     /// # Errors
     /// Returns an error with field and column for an invalid value.
-    pub(crate) fn read(&mut self, row: &Row) -> Result<Reading, ImportError> {
-        let is_bearing = self.mapping.field(Quantity::Bearing).is_some();
-        let direction = if is_bearing { Quantity::Bearing } else { Quantity::Azimuth };
+    pub(crate) fn read(&mut self, row: &Row) -> Result<ImportedReading, ImportError> {
+        let is_bearing = self.mapping.field(FieldQuantity::Bearing).is_some();
+        let direction = if is_bearing { FieldQuantity::Bearing } else { FieldQuantity::Azimuth };
         let fixed = self.mapping.azimuth_deg;
         let found = self.number_of(row, direction)?;
         let found = found.map(|(field, number)| (number, field.scaled(number)));
         let (raw_direction, direction_deg) =
             found.or(fixed.map(|deg| (deg, deg))).ok_or_else(|| {
-                let what = format!("no {} in this row", direction.words());
+                let what = format!("no {} in this row", direction.label());
                 ImportError::at(
                     row.place,
                     what,
@@ -141,26 +141,26 @@ impl<'a> RowReader<'a> {
                 )
             })?;
         let sense = if self.mapping.clockwise { -1.0 } else { 1.0 };
-        let status = match self.cell(row, Quantity::Status) {
+        let status = match self.cell(row, FieldQuantity::Status) {
             Some((_, word)) => Some(self.status(row.place, word)?),
             None => None,
         };
-        let air = match self.scaled(row, Quantity::Temperature)? {
+        let air = match self.scaled(row, FieldQuantity::Temperature)? {
             Some(temperature_c) => Some(self.air(row.place, temperature_c)?),
             None => None,
         };
         let sound_speed_m_s = air.unwrap_or(self.assumptions.air).sound_speed_m_s();
-        let measured = match self.number_of(row, Quantity::Range)? {
+        let measured = match self.number_of(row, FieldQuantity::Range)? {
             Some(range) => Some(range),
-            None => self.number_of(row, Quantity::Tof)?,
+            None => self.number_of(row, FieldQuantity::Tof)?,
         };
         let is_without = status.is_some_and(|status| status != PingStatus::Echo);
         let measured = measured.filter(|_| !is_without);
         let tof_us =
             measured.and_then(|(field, number)| self.tof_us(field, number, sound_speed_m_s));
         let range_m = tof_us.map(|tof_us| tof_us * 1e-6 * sound_speed_m_s / 2.0);
-        let [x, y] = [self.scaled(row, Quantity::X)?, self.scaled(row, Quantity::Y)?];
-        Ok(Reading {
+        let [x, y] = [self.scaled(row, FieldQuantity::X)?, self.scaled(row, FieldQuantity::Y)?];
+        Ok(ImportedReading {
             place: row.place,
             direction_deg: fixed.unwrap_or(self.mapping.zero_deg + sense * direction_deg),
             is_bearing,
@@ -172,9 +172,9 @@ impl<'a> RowReader<'a> {
             range_m,
             tof_us,
             time: self.time(row)?,
-            scan: self.cell(row, Quantity::Scan).map(|(_, scan)| scan.to_owned()),
-            place_m: x.zip(y).map(|(x, y)| [x, y]),
-            heading_deg: self.scaled(row, Quantity::Heading)?,
+            scan: self.cell(row, FieldQuantity::Scan).map(|(_, scan)| scan.to_owned()),
+            position_m: x.zip(y).map(|(x, y)| [x, y]),
+            heading_deg: self.scaled(row, FieldQuantity::Heading)?,
             air,
             raw: RawReading { direction: raw_direction, range: measured.map(|(_, number)| number) },
         })
@@ -185,7 +185,7 @@ impl<'a> RowReader<'a> {
     /// # Errors
     /// Returns an error with field and column for an invalid value.
     pub(crate) fn round(&mut self, row: &Row) -> Result<ArrayRound, ImportError> {
-        let found = self.cells(row, Quantity::Range).or_else(|| self.cells(row, Quantity::Tof));
+        let found = self.cells(row, FieldQuantity::Range).or_else(|| self.cells(row, FieldQuantity::Tof));
         let Some((field, cells)) = found else {
             return Err(ImportError::mapping("no column has a range", "name one with --columns"));
         };
@@ -200,8 +200,8 @@ impl<'a> RowReader<'a> {
             Some(tof_us * 1e-6 * sound_speed_m_s / 2.0)
         };
         let ranges_m = raw.iter().map(range_m).collect();
-        let [x, y] = [self.scaled(row, Quantity::X)?, self.scaled(row, Quantity::Y)?];
-        let heading_deg = self.scaled(row, Quantity::Heading)?;
+        let [x, y] = [self.scaled(row, FieldQuantity::X)?, self.scaled(row, FieldQuantity::Y)?];
+        let heading_deg = self.scaled(row, FieldQuantity::Heading)?;
         let fallback = self.assumptions.pose;
         let pose = (x.is_some() || heading_deg.is_some()).then(|| Pose {
             x_m: x.unwrap_or(fallback.x_m),
@@ -211,8 +211,8 @@ impl<'a> RowReader<'a> {
         Ok(ArrayRound { place: row.place, time: self.time(row)?, pose, ranges_m, raw })
     }
 
-    fn air(&self, place: Location, temperature_c: f64) -> Result<Air, ImportError> {
-        let Taken { air, .. } = self.assumptions;
+    fn air(&self, place: FileLocation, temperature_c: f64) -> Result<Air, ImportError> {
+        let Assumptions { air, .. } = self.assumptions;
         Air::new(temperature_c, air.humidity_percent(), air.pressure_kpa())
             .map_err(|error| ImportError::at(place, error.to_string(), "is the unit right?"))
     }
@@ -224,7 +224,7 @@ impl<'a> RowReader<'a> {
             return None;
         }
         Some(match field.quantity() {
-            Quantity::Tof => field.scaled(number),
+            FieldQuantity::Tof => field.scaled(number),
             // A ranger measures time; its program computed the range with a sound speed of its own.
             _ => {
                 let assumed_m_s = self.mapping.sound_speed_m_s.unwrap_or(sound_speed_m_s);
@@ -236,7 +236,7 @@ impl<'a> RowReader<'a> {
     /// Parses a number; `None` for the usual markers of a missing value.
     fn number(
         &self,
-        place: Location,
+        place: FileLocation,
         field: Field,
         cell: &str,
     ) -> Result<Option<f64>, ImportError> {
@@ -245,7 +245,7 @@ impl<'a> RowReader<'a> {
             _ => {}
         }
         match number::parse(cell, self.decimal) {
-            Some(number) if !number.is_finite() && field.quantity() != Quantity::Range => Err(self
+            Some(number) if !number.is_finite() && field.quantity() != FieldQuantity::Range => Err(self
                 .invalid_value(
                     place,
                     field,
@@ -264,7 +264,7 @@ impl<'a> RowReader<'a> {
         }
     }
 
-    fn status(&self, place: Location, word: &str) -> Result<PingStatus, ImportError> {
+    fn status(&self, place: FileLocation, word: &str) -> Result<PingStatus, ImportError> {
         serde_json::from_value(word.to_lowercase().into()).map_err(|_| {
             let what = format!("unknown status `{}`", shortened(word));
             ImportError::at(place, what, "use echo, no_echo, min_range or link_lost")
@@ -272,7 +272,7 @@ impl<'a> RowReader<'a> {
     }
 
     fn time(&mut self, row: &Row) -> Result<Option<Timestamp>, ImportError> {
-        let Some((field, cell)) = self.cell(row, Quantity::Time) else { return Ok(None) };
+        let Some((field, cell)) = self.cell(row, FieldQuantity::Time) else { return Ok(None) };
         let read = if field.name() == "time" {
             self.times.parse_text(cell)
         } else {
@@ -284,7 +284,7 @@ impl<'a> RowReader<'a> {
 
     fn invalid_value(
         &self,
-        place: Location,
+        place: FileLocation,
         field: Field,
         what: String,
         help: &str,

@@ -25,7 +25,7 @@ use sonard_model::{
 use sonard_records::Record;
 
 use crate::{
-    ImportError, Location, Mapping, Taken,
+    ImportError, FileLocation, Mapping, Assumptions,
     examine::check_beyond,
     limits::{LimitNotes, Limits, RangeClass},
     unit_check::{RangeStats, UnitContext},
@@ -123,7 +123,7 @@ impl Bag {
     pub(crate) fn examine(
         &self,
         open: &dyn Fn() -> std::io::Result<Box<dyn Read>>,
-        (units, assumptions): (&UnitContext, &Taken),
+        (units, assumptions): (&UnitContext, &Assumptions),
         ranges: &mut RangeStats,
     ) -> Result<Vec<String>, ImportError> {
         let mut limits = LimitNotes::default();
@@ -131,7 +131,7 @@ impl Bag {
         let stated_m = Some(self.max_stated_range * units.mapping.metres());
         let stated_m = stated_m.filter(|stated_m| *stated_m <= MAX_STATED_M).unwrap_or(0.0);
         let assumptions =
-            &Taken { longest_m: assumptions.longest_m.max(stated_m), ..assumptions.clone() };
+            &Assumptions { max_range_m: assumptions.max_range_m.max(stated_m), ..assumptions.clone() };
         for (number, message) in (1..).zip(MessageReader::new(open()?, &READINGS)) {
             let message = message?;
             let Some((ranger, topic, source)) = self.topic_of(&message) else { continue };
@@ -142,7 +142,7 @@ impl Bag {
             counts.2 = counts.2.take().or(found.why);
             for readings in found.readings {
                 let direction = if self.rotates { readings.direction_deg } else { ranger as f64 };
-                let place = Location::Message(number);
+                let place = FileLocation::Message(number);
                 ranges.add(place, direction, readings.raw, readings.range_m, (units, assumptions));
             }
         }
@@ -207,7 +207,7 @@ impl Bag {
         &'a self,
         source: impl Read + 'a,
         mapping: &'a Mapping,
-        assumptions: &'a Taken,
+        assumptions: &'a Assumptions,
     ) -> Result<impl Iterator<Item = Result<Vec<Record>, ImportError>> + 'a, ImportError> {
         let ids = if self.rotates { Vec::new() } else { self.ids().collect() };
         let mut collector = ScanCollector::new(assumptions, mapping.sound_speed_m_s, ids);

@@ -11,7 +11,7 @@ use serde_json::Value;
 use sonard_model::reading::PingStatus;
 
 use crate::{
-    ImportError, Location, Mapping, Reading, json,
+    ImportError, FileLocation, Mapping, ImportedReading, json,
     limits::{LimitNotes, Limits, RangeClass},
     lines::{LineEnding, LineReader},
     reading::RawReading,
@@ -75,7 +75,7 @@ fn document(lines: &mut LineReader<impl Read>) -> Result<(u64, String, bool), Im
 }
 
 fn yaml(number: u64, first_line: u64, text: &str) -> Result<Value, ImportError> {
-    let place = Location::Entry { object: number, number: None };
+    let place = FileLocation::Entry { object: number, number: None };
     // `ros2 topic echo` abbreviates long lists by default.
     let is_shortened = text.lines().any(|line| matches!(line.trim(), "- '...'" | "- ..." | "..."));
     if is_shortened {
@@ -132,9 +132,9 @@ impl<'a> MessageConverter<'a> {
 
     /// # Errors
     /// Returns an error for a message without valid angles.
-    pub(crate) fn read(&mut self, message: &Value) -> Result<Vec<Reading>, ImportError> {
+    pub(crate) fn read(&mut self, message: &Value) -> Result<Vec<ImportedReading>, ImportError> {
         self.count += 1;
-        let place = Location::Entry { object: self.count, number: None };
+        let place = FileLocation::Entry { object: self.count, number: None };
         let Some(message) = unwrap_published(message) else {
             self.others += 1;
             return Ok(Vec::new());
@@ -160,8 +160,8 @@ impl<'a> MessageConverter<'a> {
             };
             let sense = if self.mapping.clockwise { -1.0 } else { 1.0 };
             let delay_ns = (delay_s * 1e9).round();
-            Some(Reading {
-                place: Location::Entry { object: self.count, number },
+            Some(ImportedReading {
+                place: FileLocation::Entry { object: self.count, number },
                 direction_deg: self.mapping.zero_deg + sense * direction_deg,
                 is_bearing: false,
                 status,
@@ -171,7 +171,7 @@ impl<'a> MessageConverter<'a> {
                     Timestamp::from_nanosecond(time.as_nanosecond() + delay_ns as i128).ok()
                 }),
                 scan: scan.map(str::to_owned),
-                place_m: None,
+                position_m: None,
                 heading_deg: None,
                 air: None,
                 raw: RawReading { direction: direction_deg, range },

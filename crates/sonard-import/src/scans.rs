@@ -4,13 +4,13 @@ use jiff::Timestamp;
 use sha2::{Digest as _, Sha256};
 use sonard_model::{
     geometry::{Pose, wrap_360, wrap_pi},
-    plan::ScanPlan,
+    scan_plan::ScanPlan,
     reading::PingStatus,
 };
 use sonard_records::{AirSource, Ping, Record, ScanAir, ScanEnd, ScanStart};
 use uuid::Uuid;
 
-use crate::{Reading, Taken, array_rounds::ArrayRound, sweep_end::SweepDetector};
+use crate::{ImportedReading, Assumptions, array_rounds::ArrayRound, sweep_end::SweepDetector};
 
 /// Motor steps per revolution, the unit of `Ping::step`.
 const STEPS_PER_REVOLUTION: f64 = 400.0;
@@ -28,17 +28,17 @@ fn turn_deg(from_deg: f64, to_deg: f64) -> f64 {
 /// robot's pose or at the end of a sweep.
 #[derive(Debug, Default)]
 pub(crate) struct ScanSplitter {
-    readings: Vec<Reading>,
+    readings: Vec<ImportedReading>,
     sweep: SweepDetector,
 }
 
 impl ScanSplitter {
     /// Adds the next reading and returns the previous scan if that is complete.
-    pub(crate) fn push(&mut self, reading: Reading) -> Option<Vec<Reading>> {
+    pub(crate) fn push(&mut self, reading: ImportedReading) -> Option<Vec<ImportedReading>> {
         let is_swept = self.sweep.is_next(reading.direction_deg);
         let is_next = self.readings.last().is_some_and(|last| {
             let moved =
-                (&reading.place_m, &reading.heading_deg) != (&last.place_m, &last.heading_deg);
+                (&reading.position_m, &reading.heading_deg) != (&last.position_m, &last.heading_deg);
             match (&reading.scan, &last.scan) {
                 (Some(this), Some(before)) => this != before,
                 _ => moved || is_swept,
@@ -53,14 +53,14 @@ impl ScanSplitter {
     }
 
     /// Returns the last scan.
-    pub(crate) fn finish(self) -> Option<Vec<Reading>> {
+    pub(crate) fn finish(self) -> Option<Vec<ImportedReading>> {
         Some(self.readings).filter(|readings| !readings.is_empty())
     }
 }
 
 /// Derives the identifier of a scan from file hash and number, so that repeated imports give equal
 /// scans.
-fn scan_id(assumptions: &Taken, number: u64) -> Uuid {
+fn scan_id(assumptions: &Assumptions, number: u64) -> Uuid {
     let mut hash = Sha256::new();
     hash.update(assumptions.sha256.as_bytes());
     hash.update(number.to_le_bytes());
@@ -71,10 +71,10 @@ fn scan_id(assumptions: &Taken, number: u64) -> Uuid {
 }
 
 /// Builds the records of a scan by one rotating ranger.
-pub(crate) fn records(assumptions: &Taken, number: u64, readings: &[Reading]) -> Vec<Record> {
+pub(crate) fn records(assumptions: &Assumptions, number: u64, readings: &[ImportedReading]) -> Vec<Record> {
     let scan = scan_id(assumptions, number);
     let pose = readings[0].pose(&assumptions.pose);
-    let azimuth_deg = |reading: &Reading| {
+    let azimuth_deg = |reading: &ImportedReading| {
         let turned = if reading.is_bearing { pose.heading_deg } else { 0.0 };
         wrap_360(reading.direction_deg - turned)
     };
@@ -103,7 +103,7 @@ pub(crate) fn records(assumptions: &Taken, number: u64, readings: &[Reading]) ->
 }
 
 /// Builds the records of one round of an array.
-pub(crate) fn round(assumptions: &Taken, number: u64, round: &ArrayRound) -> Vec<Record> {
+pub(crate) fn round(assumptions: &Assumptions, number: u64, round: &ArrayRound) -> Vec<Record> {
     let scan = scan_id(assumptions, number);
     let rangers = assumptions.array.iter().flat_map(|array| &array.rangers);
     let pings = (0..).zip(rangers.zip(&round.ranges_m)).map(|(index, (ranger, range_m))| {
@@ -133,13 +133,13 @@ pub(crate) fn round(assumptions: &Taken, number: u64, round: &ArrayRound) -> Vec
 #[derive(Debug)]
 pub(crate) struct ArrayFiring<'a> {
     pub(crate) ranger: &'a str,
-    pub(crate) reading: Reading,
+    pub(crate) reading: ImportedReading,
 }
 
 /// Builds the records of one round of an array whose counting_plan have their own times and poses.
 #[cfg(feature = "recordings")]
 pub(crate) fn array_round_records(
-    assumptions: &Taken,
+    assumptions: &Assumptions,
     number: u64,
     firings: &[ArrayFiring<'_>],
 ) -> Vec<Record> {
@@ -161,7 +161,7 @@ pub(crate) fn array_round_records(
 }
 
 fn scan_records(
-    assumptions: &Taken,
+    assumptions: &Assumptions,
     scan: Uuid,
     pose: Pose,
     plan: ScanPlan,

@@ -20,14 +20,14 @@ use crate::{
 };
 
 /// File that can be opened repeatedly.
-pub struct Source<'a> {
+pub struct ImportSource<'a> {
     /// Opens the file at its beginning.
     pub open: &'a dyn Fn() -> io::Result<Box<dyn Read>>,
 }
 
 /// Assumptions for what a file does not contain.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Taken {
+pub struct Assumptions {
     /// SHA-256 of the file, hexadecimal; set by [`Source::examine`].
     pub sha256: String,
     /// Pose of the robot, for the parts missing in the file.
@@ -37,15 +37,15 @@ pub struct Taken {
     /// Name of the sensor.
     pub sensor: String,
     /// Maximum range of the sensor, metres.
-    pub longest_m: f64,
+    pub max_range_m: f64,
     /// Minimum range of the sensor at its shortest blanking, metres.
-    pub least_m: f64,
+    pub min_range_m: f64,
     /// Air, for files without temperature.
     pub air: Air,
     /// Start time, for files without times.
     pub started: Timestamp,
     /// True to skip the plausibility checks of units and no-echo values.
-    pub as_said: bool,
+    pub skip_checks: bool,
 }
 
 /// Examined file with its complete mapping.
@@ -56,9 +56,9 @@ pub struct Imported {
     /// Complete mapping, including inferred columns.
     pub mapping: Mapping,
     /// True if the columns were inferred from their names.
-    pub guessed: bool,
+    pub is_inferred: bool,
     /// Assumptions, completed with the file's hash and its array.
-    pub taken: Taken,
+    pub taken: Assumptions,
     /// Number of readings in the file.
     pub readings: u64,
     /// Number of readings with a range.
@@ -77,14 +77,14 @@ pub struct Imported {
     pub(crate) bag: Option<Bag>,
 }
 
-impl Source<'_> {
+impl ImportSource<'_> {
     /// Reads the whole file: detects its format, parses every line, and checks that its values are
     /// plausible for the mapping.
     ///
     /// # Errors
     /// Returns the first invalid value, or the evidence against the mapping, with the option that
     /// resolves it.
-    pub fn examine(&self, mapping: Mapping, assumptions: Taken) -> Result<Imported, ImportError> {
+    pub fn examine(&self, mapping: Mapping, assumptions: Assumptions) -> Result<Imported, ImportError> {
         let survey = Survey::read((self.open)()?)?;
         let (encoding, head) = self.text(&survey, &mapping)?;
         let format = mapping.format.unwrap_or_else(|| Format::detect(&survey.head, &head));
@@ -97,9 +97,9 @@ impl Source<'_> {
         }
         let mut found = Imported {
             format,
-            guessed: mapping.columns.is_empty(),
+            is_inferred: mapping.columns.is_empty(),
             mapping: Mapping { format: Some(format), ..mapping },
-            taken: Taken { sha256: survey.sha256.clone(), ..assumptions },
+            taken: Assumptions { sha256: survey.sha256.clone(), ..assumptions },
             readings: 0,
             echoes: 0,
             has_poses: false,
@@ -166,7 +166,7 @@ impl Source<'_> {
             ));
         }
         let bag = Bag::survey(self.open, &found.mapping, &found.taken)?;
-        found.guessed = false;
+        found.is_inferred = false;
         found.has_poses = bag.has_poses;
         found.taken.array = bag.array(&found.taken.sensor);
         if let Some(array) = &found.taken.array {
@@ -202,7 +202,7 @@ impl Source<'_> {
 ///
 /// # Errors
 /// Returns an error if reading fails.
-pub fn digest(mut source: impl Read) -> io::Result<String> {
+pub fn sha256_hex(mut source: impl Read) -> io::Result<String> {
     let mut hash = Sha256::new();
     let mut piece = vec![0; 1 << 16];
     loop {

@@ -5,7 +5,7 @@ use std::io::Read;
 use csv::{ReaderBuilder, StringRecord, Trim};
 
 use crate::{
-    Column, ImportError, Location, Mapping, Row,
+    Column, ImportError, FileLocation, Mapping, Row,
     layout::{Separator, TableLayout},
     lines::{LineEnding, LineReader, TextLine},
 };
@@ -16,7 +16,7 @@ pub(crate) struct RowFaults {
     /// Number of rows that lack columns which the mapping does not use.
     pub(crate) short: u64,
     /// Last row, if it is unterminated and lacks a mapped column.
-    pub(crate) cut: Option<Location>,
+    pub(crate) cut: Option<FileLocation>,
 }
 
 /// Iterator over the rows of a table, with the cells of the mapped columns in mapping order.

@@ -14,26 +14,26 @@ use jiff::Timestamp;
 use sonard_model::{acoustics::Air, geometry::Pose};
 use sonard_records::{Ping, Record, ScanStart};
 
-use crate::{ImportError, Imported, Mapping, Source, Taken};
+use crate::{ImportError, Imported, Mapping, ImportSource, Assumptions};
 
 /// Assumptions for a file without further information.
-fn assumptions() -> Taken {
-    Taken {
+fn assumptions() -> Assumptions {
+    Assumptions {
         sha256: String::new(),
         pose: Pose { x_m: 1.0, y_m: 2.0, heading_deg: 30.0 },
         array: None,
         sensor: "hc-sr04".to_owned(),
-        longest_m: 4.0,
-        least_m: 0.02,
+        max_range_m: 4.0,
+        min_range_m: 0.02,
         air: Air::default(),
         started: Timestamp::UNIX_EPOCH,
-        as_said: false,
+        skip_checks: false,
     }
 }
 
-fn examine(text: &[u8], mapping: Mapping, assumptions: Taken) -> Result<Imported, ImportError> {
+fn examine(text: &[u8], mapping: Mapping, assumptions: Assumptions) -> Result<Imported, ImportError> {
     let open = || -> io::Result<Box<dyn Read>> { Ok(Box::new(Cursor::new(text.to_vec()))) };
-    Source { open: &open }.examine(mapping, assumptions)
+    ImportSource { open: &open }.examine(mapping, assumptions)
 }
 
 /// Imports a file and returns all records.
@@ -44,7 +44,7 @@ fn import(text: &str, mapping: Mapping) -> Result<Vec<Record>, ImportError> {
 }
 
 fn columns(text: &str) -> Mapping {
-    Mapping { columns: Mapping::columns_of(text).expect("columns"), ..Mapping::default() }
+    Mapping { columns: Mapping::parse_columns(text).expect("columns"), ..Mapping::default() }
 }
 
 fn pings(records: &[Record]) -> Vec<Ping> {

@@ -1,7 +1,7 @@
 //! Plausibility checks of units, angles, positions and no-echo values of a file.
 
 use crate::{
-    Field, ImportError, Location, Mapping, Quantity, Reading, Taken,
+    Field, ImportError, FileLocation, Mapping, FieldQuantity, ImportedReading, Assumptions,
     mapping::RangeUnit,
     no_echo_constant::{DirectionKind, RangeHistogram},
 };
@@ -31,13 +31,13 @@ pub(crate) struct UnitContext<'a> {
 impl UnitContext<'_> {
     fn field(&self) -> Option<Field> {
         let field = |quantity| self.mapping.field(quantity);
-        field(Quantity::Range).or_else(|| field(Quantity::Tof)).filter(|_| self.has_columns)
+        field(FieldQuantity::Range).or_else(|| field(FieldQuantity::Tof)).filter(|_| self.has_columns)
     }
 
     /// Returns the length in metres of one unit of the file's ranges.
     fn metres(&self, sound_speed_m_s: f64) -> f64 {
         match self.field() {
-            Some(field) if field.quantity() == Quantity::Tof => {
+            Some(field) if field.quantity() == FieldQuantity::Tof => {
                 field.scaled(1.0) * 1e-6 * sound_speed_m_s / 2.0
             }
             Some(field) => field.scaled(1.0),
@@ -47,19 +47,19 @@ impl UnitContext<'_> {
 
     /// Returns the options for units with which the median range is measurable and the 98th
     /// percentile is plausible.
-    fn unit_options(&self, ranges: &RangeStats, assumptions: &Taken) -> Vec<String> {
+    fn unit_options(&self, ranges: &RangeStats, assumptions: &Assumptions) -> Vec<String> {
         let [median, high] =
             [0.5, 0.98].map(|share| ranges.histogram.quantile(share).unwrap_or(0.0));
-        let near_m = assumptions.least_m.max(MIN_NEAR_M);
+        let near_m = assumptions.min_range_m.max(MIN_NEAR_M);
         let fits = |metres: f64| {
-            (near_m..=assumptions.longest_m).contains(&(median * metres))
-                && high * metres <= FAR * assumptions.longest_m
+            (near_m..=assumptions.max_range_m).contains(&(median * metres))
+                && high * metres <= FAR * assumptions.max_range_m
         };
         if !self.has_columns {
             let fitting = RangeUnit::ALL.into_iter().filter(|(_, unit)| fits(unit.metres()));
             return fitting.map(|(name, _)| format!("--range-unit {name}")).collect();
         }
-        let fields = Field::of_quantity(Quantity::Range).filter(|field| fits(field.scaled(1.0)));
+        let fields = Field::of_quantity(FieldQuantity::Range).filter(|field| fits(field.scaled(1.0)));
         let fields = fields.filter(|field| Some(*field) != self.field());
         fields.map(|field| self.mapping.columns_option_with(field, self.names)).collect()
     }
@@ -83,7 +83,7 @@ pub(crate) struct RangeStats {
     histogram: RangeHistogram,
     /// Number and first of the ranges beyond [`FAR`] times the sensor's maximum range.
     far: u64,
-    first_far: Option<(Location, f64)>,
+    first_far: Option<(FileLocation, f64)>,
     /// Number of ranges below the sensor's minimum range.
     near: u64,
     zeros: u64,
@@ -99,11 +99,11 @@ impl RangeStats {
     /// in degrees or the index of a ranger.
     pub(crate) fn add(
         &mut self,
-        place: Location,
+        place: FileLocation,
         direction: f64,
         raw: Option<f64>,
         range_m: Option<f64>,
-        (units, assumptions): (&UnitContext, &Taken),
+        (units, assumptions): (&UnitContext, &Assumptions),
     ) {
         self.readings += 1;
         let raw = raw.filter(|raw| !units.mapping.is_no_echo(*raw));
@@ -114,11 +114,11 @@ impl RangeStats {
         }
         let Some(range_m) = range_m else { return };
         self.echoes += 1;
-        if range_m > FAR * assumptions.longest_m {
+        if range_m > FAR * assumptions.max_range_m {
             self.far += 1;
             self.first_far = self.first_far.or(Some((place, range_m)));
         }
-        self.near += u64::from(range_m < assumptions.least_m.max(MIN_NEAR_M));
+        self.near += u64::from(range_m < assumptions.min_range_m.max(MIN_NEAR_M));
     }
 
     /// Checks the ranges for implausible values and returns notes on values that were read as no
@@ -126,10 +126,10 @@ impl RangeStats {
     pub(crate) fn check(
         &self,
         units: &UnitContext,
-        assumptions: &Taken,
+        assumptions: &Assumptions,
     ) -> Result<Vec<String>, ImportError> {
         self.check_non_positive(units)?;
-        if !assumptions.as_said {
+        if !assumptions.skip_checks {
             self.check_constant(units, assumptions)?;
             self.check_far(units, assumptions)?;
             self.check_near(units, assumptions)?;
@@ -145,7 +145,7 @@ impl RangeStats {
         let Some(first) = non_positive.first() else { return Ok(()) };
         let values: Vec<f64> = non_positive.iter().map(|non_positive| non_positive.value).collect();
         let what = match units.field() {
-            Some(field) => field.quantity().words(),
+            Some(field) => field.quantity().label(),
             None => "range",
         };
         let column = units.field().and_then(|field| {
@@ -163,8 +163,8 @@ impl RangeStats {
         })
     }
 
-    fn check_constant(&self, units: &UnitContext, assumptions: &Taken) -> Result<(), ImportError> {
-        let longest = assumptions.longest_m / units.metres(assumptions.air.sound_speed_m_s());
+    fn check_constant(&self, units: &UnitContext, assumptions: &Assumptions) -> Result<(), ImportError> {
+        let longest = assumptions.max_range_m / units.metres(assumptions.air.sound_speed_m_s());
         let Some(constant) = self.histogram.constant(longest) else { return Ok(()) };
         // If most ranges are beyond the sensor's range for another reason than this constant, the
         // unit is wrong.
@@ -175,7 +175,7 @@ impl RangeStats {
         let first = constant.first.map(|first| format!(" (first at {first})")).unwrap_or_default();
         let unit = units.unit();
         Err(if constant.is_cluster {
-            ImportError::Doubtful {
+            ImportError::Implausible {
                 what: format!(
                     "{count} of {of} ranges are {value} or more {unit}: {}",
                     constant.why
@@ -185,7 +185,7 @@ impl RangeStats {
                 ),
             }
         } else {
-            ImportError::Doubtful {
+            ImportError::Implausible {
                 what: format!("{count} of {of} ranges are {value} {unit}{first}: {}", constant.why),
                 help: format!(
                     "if it means no echo: {}; if it is a distance: --no-unit-check",
@@ -195,20 +195,20 @@ impl RangeStats {
         })
     }
 
-    fn check_far(&self, units: &UnitContext, assumptions: &Taken) -> Result<(), ImportError> {
+    fn check_far(&self, units: &UnitContext, assumptions: &Assumptions) -> Result<(), ImportError> {
         let Some((place, range_m)) = self.first_far else { return Ok(()) };
         let (far, echoes) = (self.far, self.echoes);
         let all = if far == echoes { "all".to_owned() } else { far.to_string() };
         let what = format!(
             "{all} of {echoes} ranges are beyond {:.1} m, twice the maximum range of the sensor {} (first at {place}: \
                           {range_m:.2} m {})",
-            FAR * assumptions.longest_m,
+            FAR * assumptions.max_range_m,
             assumptions.sensor,
             units.unit(),
         );
         let metres = units.metres(assumptions.air.sound_speed_m_s());
         let options = units.unit_options(self, assumptions);
-        let none_from = 2.0 * assumptions.longest_m / metres;
+        let none_from = 2.0 * assumptions.max_range_m / metres;
         let help = if 2 * far >= echoes && !options.is_empty() {
             format!("is the unit right? {}; --no-unit-check skips this check", options.join(" | "))
         } else if 2 * far >= echoes {
@@ -219,14 +219,14 @@ impl RangeStats {
                 "mixed units? If they mean no echo: --no-echo-from={none_from:.3}; --no-unit-check skips this check"
             )
         };
-        Err(ImportError::Doubtful { what, help })
+        Err(ImportError::Implausible { what, help })
     }
 
-    fn check_near(&self, units: &UnitContext, assumptions: &Taken) -> Result<(), ImportError> {
+    fn check_near(&self, units: &UnitContext, assumptions: &Assumptions) -> Result<(), ImportError> {
         if self.near == 0 || 2 * self.near < self.echoes {
             return Ok(());
         }
-        let near_m = assumptions.least_m.max(MIN_NEAR_M);
+        let near_m = assumptions.min_range_m.max(MIN_NEAR_M);
         let what = format!(
             "{} of {} ranges are below {:.0} mm {}, implausibly short for the sensor {}",
             self.near,
@@ -248,7 +248,7 @@ impl RangeStats {
                 )
             }
         };
-        Err(ImportError::Doubtful { what, help })
+        Err(ImportError::Implausible { what, help })
     }
 }
 
@@ -274,7 +274,7 @@ impl SweepStats {
         }
     }
 
-    pub(crate) fn add(&mut self, reading: &Reading, units: (&UnitContext, &Taken)) {
+    pub(crate) fn add(&mut self, reading: &ImportedReading, units: (&UnitContext, &Assumptions)) {
         let direction = reading.raw.direction;
         self.ranges.add(
             reading.place,
@@ -286,7 +286,7 @@ impl SweepStats {
         self.low = self.low.min(direction);
         self.high = self.high.max(direction);
         self.all_integers &= (direction - direction.round()).abs() < 1e-9;
-        if let Some((place_m, range_m)) = reading.place_m.zip(reading.range_m) {
+        if let Some((place_m, range_m)) = reading.position_m.zip(reading.range_m) {
             self.places.add(place_m, range_m, reading.direction_deg);
         }
     }
@@ -295,7 +295,7 @@ impl SweepStats {
     pub(crate) fn check(
         &self,
         units: &UnitContext,
-        assumptions: &Taken,
+        assumptions: &Assumptions,
     ) -> Result<Vec<String>, ImportError> {
         if self.ranges.readings == 0 {
             return Err(ImportError::mapping(
@@ -303,7 +303,7 @@ impl SweepStats {
                 "give a file with readings",
             ));
         }
-        if !assumptions.as_said {
+        if !assumptions.skip_checks {
             self.check_angles(units)?;
             self.check_places(units)?;
         }
@@ -312,7 +312,7 @@ impl SweepStats {
 
     fn check_angles(&self, units: &UnitContext) -> Result<(), ImportError> {
         let field = |quantity| units.mapping.field(quantity);
-        let field = field(Quantity::Azimuth).or_else(|| field(Quantity::Bearing));
+        let field = field(FieldQuantity::Azimuth).or_else(|| field(FieldQuantity::Bearing));
         let Some(field) = field.filter(|_| self.ranges.readings >= MIN_READINGS) else {
             return Ok(());
         };
@@ -323,7 +323,7 @@ impl SweepStats {
             .map(|field| units.mapping.columns_option_with(field, units.names))
             .unwrap_or_default();
         if field.is_radians() && max_angle > 4.0 * std::f64::consts::TAU {
-            return Err(ImportError::Doubtful {
+            return Err(ImportError::Implausible {
                 what: format!(
                     "{field} spans {low:.1} to {high:.1} rad, {:.0} revolutions",
                     max_angle / std::f64::consts::TAU
@@ -333,7 +333,7 @@ impl SweepStats {
         }
         let is_like_radians = max_angle <= MAX_RAD && !self.all_integers && high - low > 0.3;
         if field.unit() == Some("deg") && is_like_radians {
-            return Err(ImportError::Doubtful {
+            return Err(ImportError::Implausible {
                 what: format!("{field} spans {low:.3} to {high:.3}, which looks like radians"),
                 help: format!(
                     "if these are radians: {option}; if they are degrees: --no-unit-check"
@@ -349,15 +349,15 @@ impl SweepStats {
         }
         let columns = units.mapping.columns.iter();
         let columns: Vec<_> = columns
-            .filter(|(field, _)| !matches!(field.quantity(), Quantity::X | Quantity::Y))
+            .filter(|(field, _)| !matches!(field.quantity(), FieldQuantity::X | FieldQuantity::Y))
             .map(|(field, column)| (*field, column.clone()))
             .collect();
-        let named: Vec<String> = [Quantity::X, Quantity::Y]
+        let named: Vec<String> = [FieldQuantity::X, FieldQuantity::Y]
             .iter()
             .filter_map(|quantity| units.mapping.columns.get(&units.mapping.field(*quantity)?))
             .map(ToString::to_string)
             .collect();
-        Err(ImportError::Doubtful {
+        Err(ImportError::Implausible {
             what: format!(
                 "{} follow from direction and range: they are the position of the echo, not of the robot",
                 named.join(" and ")

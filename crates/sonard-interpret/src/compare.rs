@@ -30,8 +30,8 @@ use serde::{Deserialize, Serialize};
 use sonard_model::geometry::Pose;
 use sonard_records::{PathKind, Ping, PingStatus, ScanView, SimRecord};
 
-pub use annotations::{Beside, JudgedPing, Word};
-pub use explain::{Estimate, Explanation, Quantity};
+pub use annotations::{Annotations, AnnotatedPing, Classification};
+pub use explain::{ChangeEstimate, Explanation, ChangedQuantity};
 pub use statistics::{keep_every_second, quantile};
 
 /// Absolute tolerance within which two ranges agree, metres.
@@ -80,7 +80,7 @@ pub enum NotCompared {
 
 /// Reading classified against its prediction.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Judged<'a> {
+pub struct ClassifiedPing<'a> {
     /// Reading with its prediction.
     pub ping: &'a Ping,
     /// Classification, or the reason why the reading can't be compared.
@@ -115,9 +115,9 @@ pub struct Comparison {
     /// Beams without an echo in both.
     pub both_silent: u32,
     /// Beams by verdict.
-    pub verdicts: Counts,
+    pub verdicts: VerdictCounts,
     /// Median absolute residual over `both_echo` by verdict, metres.
-    pub median_abs_residual_by_verdict_m: ByVerdict,
+    pub median_abs_residual_by_verdict_m: MedianByVerdict,
     /// Beams that could not be compared, by reason.
     pub not_compared: NotComparedCounts,
     /// Readings superseded by a later reading of the same beam.
@@ -132,7 +132,7 @@ pub struct Comparison {
 
 /// Number of beams with each verdict.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
-pub struct Counts {
+pub struct VerdictCounts {
     /// Beams classified as [`Verdict::Direct`].
     pub direct: u32,
     /// Beams classified as [`Verdict::Multiple`].
@@ -149,7 +149,7 @@ pub struct Counts {
 
 /// Statistic for each verdict that a pair of echoes can have; `null` without a pair.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
-pub struct ByVerdict {
+pub struct MedianByVerdict {
     /// Value over pairs with [`Verdict::Direct`].
     pub direct: Option<f64>,
     /// Value over pairs with [`Verdict::Multiple`].
@@ -185,7 +185,7 @@ impl NotComparedCounts {
 
 /// Compares every beam of the scans and returns the statistics with the classified beams.
 #[must_use]
-pub fn compare(scans: &[ScanView]) -> (Comparison, Vec<Judged<'_>>) {
+pub fn compare(scans: &[ScanView]) -> (Comparison, Vec<ClassifiedPing<'_>>) {
     let mut comparer = Comparer::default();
     let classified = scans.iter().flat_map(|scan| comparer.add(scan)).collect();
     (comparer.finish(), classified)
@@ -202,13 +202,13 @@ pub struct Comparer {
 
 impl Comparer {
     /// Compares a scan and returns its classified beams.
-    pub fn add<'a>(&mut self, scan: &'a ScanView) -> Vec<Judged<'a>> {
+    pub fn add<'a>(&mut self, scan: &'a ScanView) -> Vec<ClassifiedPing<'a>> {
         let beams = last_readings(&scan.pings);
         self.comparison.scans += 1;
         self.comparison.duplicates += (scan.pings.len() - beams.len()) as u32;
         let bits = |pose: Pose| [pose.x_m, pose.y_m, pose.heading_deg].map(f64::to_bits);
         self.poses.extend(scan.pose().map(bits));
-        let classified: Vec<Judged<'a>> = beams.into_iter().map(judge).collect();
+        let classified: Vec<ClassifiedPing<'a>> = beams.into_iter().map(classify).collect();
         for beam in &classified {
             self.comparison.count(beam);
             let residual_m = beam.verdict.ok().zip(beam.residual_m);
@@ -231,7 +231,7 @@ impl Comparer {
 
 /// Classifies one reading against its prediction.
 #[must_use]
-pub fn judge(ping: &Ping) -> Judged<'_> {
+pub fn classify(ping: &Ping) -> ClassifiedPing<'_> {
     let detections = detection(ping.status, ping.range_m).and_then(|measured| {
         let sim = ping.sim.as_ref().ok_or(NotCompared::NoPrediction)?;
         Ok((measured, detection(sim.status, sim.range_m)?, sim))
@@ -246,7 +246,7 @@ pub fn judge(ping: &Ping) -> Judged<'_> {
         }
         Err(reason) => (Err(reason), None),
     };
-    Judged { ping, verdict, residual_m }
+    ClassifiedPing { ping, verdict, residual_m }
 }
 
 /// Returns `true` if a measured and a predicted range, in metres, agree within the tolerances.
@@ -322,7 +322,7 @@ fn last_readings(pings: &[Ping]) -> Vec<&Ping> {
 }
 
 impl Comparison {
-    fn count(&mut self, beam: &Judged<'_>) {
+    fn count(&mut self, beam: &ClassifiedPing<'_>) {
         let verdict = match beam.verdict {
             Ok(verdict) => verdict,
             Err(reason) => return *self.not_compared.counter_mut(reason) += 1,
@@ -357,7 +357,7 @@ impl Comparison {
         self.median_abs_residual_m = quantile(residuals(None, f64::abs), 0.5);
         self.p90_abs_residual_m = quantile(residuals(None, f64::abs), 0.9);
         self.median_residual_m = quantile(residuals(None, |m| m), 0.5);
-        self.median_abs_residual_by_verdict_m = ByVerdict {
+        self.median_abs_residual_by_verdict_m = MedianByVerdict {
             direct: median_of(Verdict::Direct),
             multiple: median_of(Verdict::Multiple),
             edge: median_of(Verdict::Edge),
@@ -366,7 +366,7 @@ impl Comparison {
     }
 }
 
-impl Counts {
+impl VerdictCounts {
     fn counter_mut(&mut self, verdict: Verdict) -> &mut u32 {
         match verdict {
             Verdict::Direct => &mut self.direct,

@@ -29,7 +29,7 @@ use methods::{BeamModel, Grid, Histograms, nearest_hit};
 use rand::SeedableRng as _;
 use rand_pcg::Pcg64;
 use rooms::{place, readings};
-use sonard_inverse::{Atlas, Sweep, World, locate};
+use sonard_inverse::{CoarseGrid, FitSweep, World, locate};
 use sonard_model::{
     acoustics::{Air, Sensor},
     geometry::{Pose, wrap_180},
@@ -77,7 +77,7 @@ struct Tally {
 
 fn compared_in(name: &str, count: u64, seed: u64) {
     let world = world_of(name, EngineKind::Paths);
-    let atlas = match Atlas::new(&world, Atlas::usual_spacing_m(&world.scene)) {
+    let atlas = match CoarseGrid::new(&world, CoarseGrid::default_spacing_m(&world.scene)) {
         Ok(atlas) => atlas,
         Err(error) => return println!("{name:24} {error}"),
     };
@@ -86,10 +86,10 @@ fn compared_in(name: &str, count: u64, seed: u64) {
         let pose = place(&world.scene, rng)?;
         let beams = readings(&world, &pose, 0.0, rng)?;
         let unknown = Pose { x_m: 0.0, y_m: 0.0, heading_deg: 0.0 };
-        Some((pose, Sweep { scan: Uuid::nil(), pose: unknown, beams }))
+        Some((pose, FitSweep { scan: Uuid::nil(), pose: unknown, beams }))
     };
     let grid = Grid::new(&world_of(name, EngineKind::Cone), REACH_M);
-    let training: Vec<(Pose, Sweep)> =
+    let training: Vec<(Pose, FitSweep)> =
         (0..TRAINING_SWEEPS).filter_map(|_| taken(&mut rng)).collect();
     let beam_model = BeamModel::learned(&grid, &training);
     let histograms = Histograms::learned(&world, &grid, &mut rng);

@@ -17,7 +17,7 @@ use rand::{RngExt as _, SeedableRng as _};
 use rand_distr::{Distribution as _, StandardNormal};
 use rand_pcg::Pcg64;
 use rooms::{BEAMS, place, readings};
-use sonard_inverse::{Atlas, Course, Mode, Odometry, Sweep, World, locate};
+use sonard_inverse::{CoarseGrid, Tracker, PoseMode, Odometry, FitSweep, World, locate};
 use sonard_model::{
     acoustics::{Air, Sensor},
     geometry::{DVec2, Pose, wrap_180},
@@ -64,7 +64,7 @@ fn driven_in(name: &str, count: u64, seed: u64, beams: usize) {
     let sensor = Sensor::preset("senscomp-6500").expect("a preset");
     let mut world = World::new(scene, sensor, Air::default(), Options::default());
     world.options.max_range_m = Some(4.0);
-    let atlas = match Atlas::new(&world, Atlas::usual_spacing_m(&world.scene)) {
+    let atlas = match CoarseGrid::new(&world, CoarseGrid::default_spacing_m(&world.scene)) {
         Ok(atlas) => atlas,
         Err(error) => return println!("{name:24} {error}"),
     };
@@ -84,10 +84,10 @@ fn driven_in(name: &str, count: u64, seed: u64, beams: usize) {
     );
 }
 
-fn drive(world: &World, atlas: &Atlas, beams: usize, rng: &mut Pcg64, tally: &mut Tally) {
+fn drive(world: &World, atlas: &CoarseGrid, beams: usize, rng: &mut Pcg64, tally: &mut Tally) {
     let Some(mut pose) = place(&world.scene, rng) else { return };
     let mut told = Pose { x_m: 0.0, y_m: 0.0, heading_deg: 0.0 };
-    let mut course = Course::new(Odometry::default());
+    let mut course = Tracker::new(Odometry::default());
     let mut is_again = false;
     for at in 0..SWEEPS {
         if at == CARRIED {
@@ -98,13 +98,13 @@ fn drive(world: &World, atlas: &Atlas, beams: usize, rng: &mut Pcg64, tally: &mu
         }
         let Some(all) = readings(world, &pose, 0.0, rng) else { return };
         let every = (all.len() / beams).max(1);
-        let sweep = Sweep {
+        let sweep = FitSweep {
             scan: Uuid::nil(),
             pose: told,
             beams: all.into_iter().step_by(every).collect(),
         };
         let right = equivalent_poses(world, &pose);
-        let is_right = |modes: &[Mode]| {
+        let is_right = |modes: &[PoseMode]| {
             let found = modes.first();
             found.is_some_and(|mode| right.iter().any(|pose| is_there(mode, pose, beams)))
         };
@@ -147,7 +147,7 @@ fn moved(pose: &Pose, ahead_m: f64, turn_deg: f64) -> Pose {
     Pose { x_m: at.x, y_m: at.y, heading_deg }
 }
 
-fn is_there(mode: &Mode, pose: &Pose, beams: usize) -> bool {
+fn is_there(mode: &PoseMode, pose: &Pose, beams: usize) -> bool {
     let (most_m, most_deg) = if beams < 100 { (0.1, 5.0) } else { (0.02, 1.0) };
     DVec2::new(mode.x_m, mode.y_m).distance(pose.position()) < most_m
         && wrap_180(mode.heading_deg - pose.heading_deg).abs() < most_deg

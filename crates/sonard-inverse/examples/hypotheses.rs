@@ -14,7 +14,7 @@ use error_model::ERRORS;
 use rand::SeedableRng as _;
 use rand_pcg::Pcg64;
 use rooms::{place, readings};
-use sonard_inverse::{Hypotheses, Parameter, Sweep, World};
+use sonard_inverse::{Hypotheses, Parameter, FitSweep, World};
 use sonard_model::{
     acoustics::{Air, Sensor},
     geometry::Pose,
@@ -59,7 +59,7 @@ fn times(name: &str, to_m: f64) -> Option<(f64, f64)> {
     for _ in 0..PLACES {
         let pose = place(&world.scene, &mut rng)?;
         let sweep =
-            Sweep { scan: Uuid::nil(), pose, beams: readings(&world, &pose, 0.0, &mut rng)? };
+            FitSweep { scan: Uuid::nil(), pose, beams: readings(&world, &pose, 0.0, &mut rng)? };
         let off = Pose { x_m: pose.x_m + 0.02, ..pose };
         let simulator = world.simulator(&off).ok()?;
         alone.push(best_ms(|| {

@@ -19,7 +19,7 @@ use std::{
 use rand::SeedableRng as _;
 use rand_pcg::Pcg64;
 use rooms::{BEAMS, place, readings};
-use sonard_inverse::{Atlas, Heard, Mode, Sweep, World, locate};
+use sonard_inverse::{CoarseGrid, FiringOutcome, PoseMode, FitSweep, World, locate};
 use sonard_model::{
     acoustics::{Air, Sensor},
     geometry::{Pose, wrap_180},
@@ -53,7 +53,7 @@ fn located_in(name: &str, count: u64, seed: u64, beams: usize) {
     let mut world = World::new(scene, sensor, Air::default(), Options::default());
     world.options.max_range_m = Some(4.0);
     let began = cpu_s();
-    let atlas = match Atlas::new(&world, Atlas::usual_spacing_m(&world.scene)) {
+    let atlas = match CoarseGrid::new(&world, CoarseGrid::default_spacing_m(&world.scene)) {
         Ok(atlas) => atlas,
         Err(error) => return println!("{name:24} {error}"),
     };
@@ -66,7 +66,7 @@ fn located_in(name: &str, count: u64, seed: u64, beams: usize) {
         let every = (all.len() / beams).max(1);
         let unknown = Pose { x_m: 0.0, y_m: 0.0, heading_deg: 0.0 };
         let beams_of = all.into_iter().step_by(every).collect();
-        let sweep = Sweep { scan: Uuid::nil(), pose: unknown, beams: beams_of };
+        let sweep = FitSweep { scan: Uuid::nil(), pose: unknown, beams: beams_of };
         let began = cpu_s();
         let modes = locate(&world, &atlas, &sweep).unwrap_or_default();
         times.push(cpu_s() - began);
@@ -77,7 +77,7 @@ fn located_in(name: &str, count: u64, seed: u64, beams: usize) {
         sure += u32::from(found.is_some_and(|mode| mode.probability > 0.5));
         if found.is_none() {
             let how = if is_told { "told as unknown" } else { "not found" };
-            let echoes = sweep.beams.iter().filter(|beam| matches!(beam.heard, Heard::Echo { .. }));
+            let echoes = sweep.beams.iter().filter(|beam| matches!(beam.outcome, FiringOutcome::Echo { .. }));
             println!("{name}: {how} by {} echoes: {pose:?} in {modes:?}", echoes.count());
         }
     }
@@ -103,18 +103,18 @@ const fn near(beams: usize) -> (f64, f64) {
     if beams < 100 { (0.1, 5.0) } else { (0.02, 1.0) }
 }
 
-fn off(mode: &Mode, pose: &Pose) -> (f64, f64, f64) {
+fn off(mode: &PoseMode, pose: &Pose) -> (f64, f64, f64) {
     let turned_deg = wrap_180(mode.heading_deg - pose.heading_deg);
     (mode.x_m - pose.x_m, mode.y_m - pose.y_m, turned_deg)
 }
 
-fn is_there(mode: &Mode, pose: &Pose, beams: usize) -> bool {
+fn is_there(mode: &PoseMode, pose: &Pose, beams: usize) -> bool {
     let ((x_m, y_m, turned_deg), (most_m, most_deg)) = (off(mode, pose), near(beams));
     x_m.hypot(y_m) < most_m && turned_deg.abs() < most_deg
 }
 
 /// Checks that an uncertain pose contains the truth in its 95 % interval.
-fn is_told(mode: &Mode, pose: &Pose, beams: usize) -> bool {
+fn is_told(mode: &PoseMode, pose: &Pose, beams: usize) -> bool {
     // Each of three is within so many standard deviations in 98.3 % of cases, all in 95 %.
     const SIGMAS: f64 = 2.39;
     let ((x_m, y_m, turned_deg), (most_m, most_deg)) = (off(mode, pose), near(beams));

@@ -35,7 +35,7 @@ use error_model::ERRORS;
 use perturbed::{Kinds, PerturbedWorld};
 use rayon::prelude::*;
 use rooms::{BEAMS, NOISE_MM};
-use sonard_inverse::{Parameter, Search, bound, fit, fit_from};
+use sonard_inverse::{Parameter, Search, cramer_rao_bound, fit, fit_from};
 
 /// Estimate of one parameter in a trial.
 #[derive(Clone)]
@@ -97,10 +97,10 @@ fn main() {
 fn trial(number: u64, seed: u64, kinds: Kinds) -> Option<Trial> {
     let perturbed = PerturbedWorld::random(seed.wrapping_mul(1_000_003) + number, kinds)?;
     let true_sweeps = std::slice::from_ref(&perturbed.true_sweep);
-    let bounds = bound(&perturbed.truth, true_sweeps, &perturbed.fit, &ERRORS).ok()?;
+    let bounds = cramer_rao_bound(&perturbed.truth, true_sweeps, &perturbed.fit, &ERRORS).ok()?;
     let unobstructed_sweeps = std::slice::from_ref(&perturbed.unobstructed);
     let unobstructed =
-        bound(&perturbed.truth, unobstructed_sweeps, &perturbed.fit, &ERRORS).ok()?;
+        cramer_rao_bound(&perturbed.truth, unobstructed_sweeps, &perturbed.fit, &ERRORS).ok()?;
     let began = Instant::now();
     let assumed_sweeps = std::slice::from_ref(&perturbed.assumed_sweep);
     let fitted = fit(&perturbed.assumed, assumed_sweeps, &perturbed.fit).ok()?;

@@ -7,7 +7,7 @@ use sonard_model::{
     scene::Scene,
 };
 
-use crate::motion::Motion;
+use crate::motion::SceneMotion;
 
 /// Curvature below which a point is not constrained, reciprocal metres.
 const MIN_BEND: f64 = 1e-9;
@@ -99,7 +99,7 @@ impl Bearing {
 
     /// Derivatives of the departure and arrival directions with respect to a parameter with the
     /// given motion, radians per unit.
-    pub(crate) fn derivatives(&self, scene: &Scene, motion: &Motion) -> [f64; 2] {
+    pub(crate) fn derivatives(&self, scene: &Scene, motion: &SceneMotion) -> [f64; 2] {
         let last = self.points.len() - 1;
         let velocity =
             |at: usize| motion.of_plan(scene, self.points[at].mechanism, self.points[at].at);

@@ -2,7 +2,7 @@
 
 use smallvec::SmallVec;
 use sonard_model::{
-    acoustics::{Combining, Detector, Listening, PulseArrival, Receiver, Rise},
+    acoustics::{Combining, Detector, DetectorBank, PulseArrival, Receiver, EchoRise},
     model::{Arrival, FiringArrivals, ObservationPoint, TooCostly},
     reading::PingStatus,
 };
@@ -69,7 +69,7 @@ pub(crate) struct ThresholdScan {
 
 /// Detection by a receiver at one threshold.
 struct ReportedRise {
-    rise: Rise,
+    rise: EchoRise,
     /// Threshold, decibels above the nominal one.
     by_db: f64,
     /// Peak of the envelope.
@@ -98,7 +98,7 @@ impl ThresholdScan {
         if phases == Phases::Unknown && receiver.combining == Combining::Coherent {
             receiver.combining = Combining::Incoherent;
         }
-        let min_margin_db = receiver.least_margin_db();
+        let min_margin_db = receiver.min_margin_db();
         Self { receiver, min_margin_db, span_db, ends: [-span_db, span_db].map(factor) }
     }
 
@@ -116,11 +116,11 @@ impl ThresholdScan {
     }
 
     /// Scans upwards. A higher threshold is crossed no earlier, so time runs forward as well.
-    fn scan(&self, firing: &FiringArrivals, listening: &mut Listening, found: &mut CandidateList) {
+    fn scan(&self, firing: &FiringArrivals, listening: &mut DetectorBank, found: &mut CandidateList) {
         let mut last: Option<ReportedRise> = None;
         let (mut by_db, mut ready_us) = (-self.span_db, 0.0);
         while by_db < self.span_db && found.len() < MAX_CANDIDATES {
-            let Some(rise) = listening.rise(self.factor(by_db), ready_us) else {
+            let Some(rise) = listening.first_rise(self.factor(by_db), ready_us) else {
                 // No echo at any higher threshold.
                 found.push(ThresholdCandidate::no_echo(self.span_db));
                 return;
@@ -145,7 +145,7 @@ impl ThresholdScan {
     /// well.
     fn at_likely_threshold(
         &self,
-        listening: &mut Listening,
+        listening: &mut DetectorBank,
         first: ReportedRise,
         ready_us: f64,
     ) -> (ReportedRise, f64) {
@@ -154,7 +154,7 @@ impl ThresholdScan {
         if first.by_db >= at_db {
             return (first, until_db);
         }
-        let rise = listening.rise(self.factor(at_db), ready_us);
+        let rise = listening.first_rise(self.factor(at_db), ready_us);
         let Some(rise) = rise.filter(|rise| self.is_same(&first, rise, at_db)) else {
             return (first, until_db);
         };
@@ -190,9 +190,9 @@ impl ThresholdScan {
     }
 
     /// Rise detected at a threshold, with the reach of its envelope.
-    fn reported(listening: &mut Listening, rise: Rise, by_db: f64) -> ReportedRise {
+    fn reported(listening: &mut DetectorBank, rise: EchoRise, by_db: f64) -> ReportedRise {
         let (peak, margin_db) = listening.peak(&rise);
-        let (reaches_db, is_lone) = (by_db + margin_db.max(0.0), listening.is_lone());
+        let (reaches_db, is_lone) = (by_db + margin_db.max(0.0), listening.is_isolated());
         ReportedRise { rise, by_db, peak, reaches_db, is_lone }
     }
 
@@ -216,7 +216,7 @@ impl ThresholdScan {
 
     /// Detection limit of a reported rise: the peak of its envelope, unless another arrival follows
     /// so closely that the peak belongs to that one.
-    fn lost(&self, listening: &mut Listening, reported: &ReportedRise, ready_us: f64) -> f64 {
+    fn lost(&self, listening: &mut DetectorBank, reported: &ReportedRise, ready_us: f64) -> f64 {
         let ReportedRise { by_db: from_db, reaches_db, is_lone, .. } = *reported;
         let span_db = self.span_db;
         if is_lone {
@@ -227,7 +227,7 @@ impl ThresholdScan {
             return reaches_db.min(span_db.max(from_db));
         }
         let mut is_reported = |by_db: f64| {
-            let rise = listening.rise(self.factor(by_db), ready_us);
+            let rise = listening.first_rise(self.factor(by_db), ready_us);
             rise.is_some_and(|rise| self.is_same(reported, &rise, by_db))
         };
         match is_reported(beyond_db) {
@@ -240,7 +240,7 @@ impl ThresholdScan {
     /// envelope: of the same arrival, and not later than its time walk. Overlapping arrivals may
     /// fade before the next one continues the envelope; then a slightly higher threshold delays the
     /// echo by centimetres.
-    fn is_same(&self, reported: &ReportedRise, higher: &Rise, higher_db: f64) -> bool {
+    fn is_same(&self, reported: &ReportedRise, higher: &EchoRise, higher_db: f64) -> bool {
         let lower = &reported.rise;
         let is_same_arrival = match (&lower.arrival, &higher.arrival) {
             (Some(a), Some(b)) => (a.length_m - b.length_m).abs() < 1e-6,

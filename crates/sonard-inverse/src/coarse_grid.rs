@@ -12,8 +12,8 @@ use thiserror::Error;
 
 use crate::{
     fit::Prior,
-    progress::{Unwatched, Watch},
-    sweep::{RangeOutcome, Sweep},
+    progress::{NoObserver, FitObserver},
+    sweep::{RangeOutcome, FitSweep},
     world::{SimulatorSet, World, WorldError},
 };
 
@@ -39,7 +39,7 @@ const MARGIN_M: f64 = 1.0;
 
 /// Predicted readings of a world on a grid of positions.
 #[derive(Clone)]
-pub struct Atlas {
+pub struct CoarseGrid {
     spacing_m: f64,
     /// Likely positions: surrounded by walls, or all free ones if there are none.
     usual: GridRegion,
@@ -64,7 +64,7 @@ struct GridRegion {
 
 /// Failure to build a grid.
 #[derive(Debug, Clone, PartialEq, Error)]
-pub enum AtlasError {
+pub enum CoarseGridError {
     /// Invalid sensor, options or poses.
     #[error(transparent)]
     World(#[from] WorldError),
@@ -84,24 +84,24 @@ pub(crate) struct PoseMatch {
     pub(crate) cost: f32,
 }
 
-impl Atlas {
+impl CoarseGrid {
     /// Predicts readings on a grid of the given spacing, metres: at free positions surrounded by
     /// walls, or in a scene without such positions, at all free ones up to a metre outside.
     ///
     /// # Errors
     /// Invalid world, or a scene without free position.
-    pub fn new(world: &World, spacing_m: f64) -> Result<Self, AtlasError> {
-        Self::watched(world, spacing_m, &Unwatched)
+    pub fn new(world: &World, spacing_m: f64) -> Result<Self, CoarseGridError> {
+        Self::observed(world, spacing_m, &NoObserver)
     }
 
     /// Predicts like [`new`](Self::new), with cancellation by `watch`.
     ///
     /// # Errors
     /// As [`new`](Self::new), and [`AtlasError::Stopped`].
-    pub fn watched(world: &World, spacing_m: f64, watch: &dyn Watch) -> Result<Self, AtlasError> {
+    pub fn observed(world: &World, spacing_m: f64, watch: &dyn FitObserver) -> Result<Self, CoarseGridError> {
         let (places, spacing_m) = free_positions(&world.scene, spacing_m);
         if places.is_empty() {
-            return Err(AtlasError::NoPlace);
+            return Err(CoarseGridError::NoPlace);
         }
         let is_usual = |place: &DVec2| is_surrounded(&world.scene, *place);
         let (mut usual, mut outside): (Vec<_>, Vec<_>) = places.into_iter().partition(is_usual);
@@ -122,7 +122,7 @@ impl Atlas {
     /// Adds nuisance parameters to be fitted with the pose of each sweep, such as the threshold of
     /// a ranger other than the calibrated one. Priors of single sweeps are ignored.
     #[must_use]
-    pub fn fitting(mut self, mut priors: Vec<Prior>) -> Self {
+    pub fn with_nuisance(mut self, mut priors: Vec<Prior>) -> Self {
         priors.retain(|prior| prior.parameter.sweep().is_none());
         self.besides = priors;
         self
@@ -130,7 +130,7 @@ impl Atlas {
 
     /// Suitable spacing for a scene, metres: finer for smaller scenes.
     #[must_use]
-    pub fn usual_spacing_m(scene: &Scene) -> f64 {
+    pub fn default_spacing_m(scene: &Scene) -> f64 {
         let (min_m, max_m) = USUAL_SPACING_M;
         extent(scene).map_or(max_m, |(low, high)| {
             let size = high - low;
@@ -162,7 +162,7 @@ impl Atlas {
     }
 
     /// Best-matching poses among the likely positions, best first, without near duplicates.
-    pub(crate) fn matches(&self, world: &World, sweep: &Sweep, count: usize) -> Vec<PoseMatch> {
+    pub(crate) fn matches(&self, world: &World, sweep: &FitSweep, count: usize) -> Vec<PoseMatch> {
         let GridRegion { places, ranges_m } = &self.usual;
         self.matches_of(places, ranges_m, world, sweep, count)
     }
@@ -171,10 +171,10 @@ impl Atlas {
     pub(crate) fn matches_outside(
         &self,
         world: &World,
-        sweep: &Sweep,
+        sweep: &FitSweep,
         count: usize,
-        watch: &dyn Watch,
-    ) -> Result<Vec<PoseMatch>, AtlasError> {
+        watch: &dyn FitObserver,
+    ) -> Result<Vec<PoseMatch>, CoarseGridError> {
         let ranges_m = match self.outside_m.get() {
             Some(known) => known,
             None => {
@@ -190,7 +190,7 @@ impl Atlas {
         places: &[DVec2],
         ranges_m: &[f32],
         world: &World,
-        sweep: &Sweep,
+        sweep: &FitSweep,
         count: usize,
     ) -> Vec<PoseMatch> {
         let measured = resampled(world, sweep);
@@ -229,13 +229,13 @@ fn readings(
     models: &SimulatorSet,
     shift_m: f64,
     places: &[DVec2],
-    watch: &dyn Watch,
-) -> Result<Vec<f32>, AtlasError> {
+    watch: &dyn FitObserver,
+) -> Result<Vec<f32>, CoarseGridError> {
     let shown = |range_m: Option<f64>| range_m.map_or(SILENCE_M, |far_m| (far_m + shift_m) as f32);
     let mut ranges_m = vec![SILENCE_M; DIRECTIONS * places.len()];
     let predict = |(ranges_m, place): (&mut [f32], &DVec2)| {
-        if watch.stops() {
-            return Err(AtlasError::Stopped);
+        if watch.is_cancelled() {
+            return Err(CoarseGridError::Stopped);
         }
         let pose = Pose { x_m: place.x, y_m: place.y, heading_deg: 0.0 };
         models.at(&pose, |_, point| {
@@ -267,7 +267,7 @@ fn without_robot(scene: &std::sync::Arc<Scene>) -> std::sync::Arc<Scene> {
 
 /// Nearest reading of a sweep for each grid direction, as direction index and range. Directions
 /// without a nearby reading and readings below the minimum range are omitted.
-fn resampled(world: &World, sweep: &Sweep) -> Vec<(usize, f32)> {
+fn resampled(world: &World, sweep: &FitSweep) -> Vec<(usize, f32)> {
     let step_deg = 360.0 / DIRECTIONS as f64;
     let mut nearest: Vec<Option<(f64, f32)>> = vec![None; DIRECTIONS];
     let sound_speed_m_s = world.air.sound_speed_m_s();
@@ -276,7 +276,7 @@ fn resampled(world: &World, sweep: &Sweep) -> Vec<(usize, f32)> {
             (world.heading_zero_deg + world.gear * beam.azimuth_deg).rem_euclid(360.0);
         let place = azimuth_deg / step_deg;
         let off = (place - place.round()).abs();
-        let range_m = match beam.heard.outcome(sound_speed_m_s) {
+        let range_m = match beam.outcome.outcome(sound_speed_m_s) {
             RangeOutcome::Echo { range_m } => range_m as f32,
             RangeOutcome::NoEcho => SILENCE_M,
             RangeOutcome::BelowMinRange => continue,
@@ -342,7 +342,7 @@ fn free_positions(scene: &Scene, spacing_m: f64) -> (Vec<DVec2>, f64) {
         .flat_map(|y| (0..columns).map(move |x| DVec2::new(f64::from(x), f64::from(y))))
         .map(|cell| low + spacing_m * cell)
         .collect();
-    let is_free = scene.can_stand(&all);
+    let is_free = scene.are_accessible(&all);
     let places = all.into_iter().zip(is_free).filter(|(_, is_free)| *is_free);
     (places.map(|(place, _)| place).collect(), spacing_m)
 }

@@ -8,11 +8,11 @@ use sonard_model::{
 };
 
 use crate::{
-    coarse_grid::Atlas,
+    coarse_grid::CoarseGrid,
     fit::FitError,
-    locate::{Mode, explaining, modes},
-    progress::{Unwatched, Watch},
-    sweep::Sweep,
+    locate::{PoseMode, explaining, modes},
+    progress::{NoObserver, FitObserver},
+    sweep::FitSweep,
     world::World,
 };
 
@@ -24,12 +24,12 @@ pub struct Odometry {
     /// Standard deviation of the heading per metre driven, degrees.
     pub drift_deg_per_m: f64,
     /// Kidnap probability between sweeps, 0 to 1.
-    pub carried: f64,
+    pub kidnap_probability: f64,
 }
 
 impl Default for Odometry {
     fn default() -> Self {
-        Self { drift_m_per_m: 0.05, drift_deg_per_m: 5.0, carried: 0.02 }
+        Self { drift_m_per_m: 0.05, drift_deg_per_m: 5.0, kidnap_probability: 0.02 }
     }
 }
 
@@ -45,7 +45,7 @@ const DRIFT_OF_TURN: f64 = 0.03;
 /// previous sweep and the odometry in between. After a kidnapping all poses are equally likely a
 /// priori. In a different scene than that of the previous sweep the filter is reset.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Course {
+pub struct Tracker {
     odometry: Odometry,
     last: Option<LastSweep>,
 }
@@ -57,7 +57,7 @@ struct LastSweep {
     /// Pose by odometry.
     odometry: Pose,
     /// Posterior poses.
-    modes: Vec<Mode>,
+    modes: Vec<PoseMode>,
 }
 
 /// Pose predicted from a mode of the previous sweep and odometry.
@@ -68,7 +68,7 @@ struct PredictedPose {
     sigma_deg: f64,
 }
 
-impl Course {
+impl Tracker {
     /// Tracker without prior knowledge.
     #[must_use]
     pub const fn new(odometry: Odometry) -> Self {
@@ -83,23 +83,23 @@ impl Course {
     pub fn next(
         &mut self,
         world: &World,
-        atlas: &Atlas,
-        sweep: &Sweep,
-    ) -> Result<Vec<Mode>, FitError> {
-        self.next_watched(world, atlas, sweep, &Unwatched)
+        atlas: &CoarseGrid,
+        sweep: &FitSweep,
+    ) -> Result<Vec<PoseMode>, FitError> {
+        self.next_observed(world, atlas, sweep, &NoObserver)
     }
 
     /// Locates like [`next`](Self::next), with cancellation by `watch`.
     ///
     /// # Errors
     /// As [`next`](Self::next), and [`FitError::Stopped`].
-    pub fn next_watched(
+    pub fn next_observed(
         &mut self,
         world: &World,
-        atlas: &Atlas,
-        sweep: &Sweep,
-        watch: &dyn Watch,
-    ) -> Result<Vec<Mode>, FitError> {
+        atlas: &CoarseGrid,
+        sweep: &FitSweep,
+        watch: &dyn FitObserver,
+    ) -> Result<Vec<PoseMode>, FitError> {
         let expected = self.expected(&world.scene, &sweep.pose);
         let poses: Vec<Pose> = expected.iter().map(|expected| expected.pose).collect();
         let found = explaining(world, atlas, sweep, &poses, watch)?;
@@ -125,7 +125,7 @@ impl Course {
         modes.iter().map(|mode| self.moved(mode, driven, turned_deg)).collect()
     }
 
-    fn moved(&self, mode: &Mode, driven: DVec2, turned_deg: f64) -> PredictedPose {
+    fn moved(&self, mode: &PoseMode, driven: DVec2, turned_deg: f64) -> PredictedPose {
         let distance_m = driven.length();
         let to = DVec2::from_angle(mode.heading_deg.to_radians()).rotate(driven);
         let pose = Pose {
@@ -147,7 +147,7 @@ impl Course {
 
     /// Log-ratio of the prior density of a pose to a uniform density over a volume in square metres
     /// times degrees.
-    fn log_prior(&self, mode: &Mode, expected: &[PredictedPose], volume: f64) -> f64 {
+    fn log_prior(&self, mode: &PoseMode, expected: &[PredictedPose], volume: f64) -> f64 {
         if expected.is_empty() {
             return 0.0;
         }
@@ -161,7 +161,7 @@ impl Course {
             (-0.5 * squares).exp() / (TAU.powf(1.5) * sigma_m.powi(2) * sigma_deg)
         };
         let likely: f64 = expected.iter().map(|of| of.probability * density(of)).sum();
-        let carried = self.odometry.carried;
+        let carried = self.odometry.kidnap_probability;
         (carried + (1.0 - carried) * volume * likely).ln()
     }
 }

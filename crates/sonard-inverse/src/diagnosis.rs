@@ -6,16 +6,16 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    coarse_grid::Atlas,
-    locate::Mode,
-    sweep::{Beam, Heard, Sweep},
+    coarse_grid::CoarseGrid,
+    locate::PoseMode,
+    sweep::{SweepFiring, FiringOutcome, FitSweep},
     world::World,
 };
 
 /// Likely cause of a poor fit of a sweep.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "kind", rename_all = "snake_case")]
-pub enum Doubt {
+pub enum Misfit {
     /// Scene that explains few of the readings whatever is changed: another place, or another time.
     OtherPlace {
         /// Fraction of the readings that are explained.
@@ -32,7 +32,7 @@ pub enum Doubt {
     },
 }
 
-impl fmt::Display for Doubt {
+impl fmt::Display for Misfit {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::OtherPlace { explained } => write!(
@@ -64,36 +64,36 @@ const FACTORS: [f64; 8] = [0.01, 100.0, 0.001, 1000.0, 0.0254, 0.3048, 0.5, 2.0]
 
 /// Diagnoses a sweep whose best pose explains little of it; empty for others.
 #[must_use]
-pub fn doubts(world: &World, atlas: &Atlas, sweep: &Sweep, modes: &[Mode]) -> Vec<Doubt> {
+pub fn diagnose(world: &World, atlas: &CoarseGrid, sweep: &FitSweep, modes: &[PoseMode]) -> Vec<Misfit> {
     let explained = modes.iter().map(|mode| mode.explained).fold(0.0, f64::max);
     if explained >= MIN_EXPLAINED {
         return Vec::new();
     }
-    let cost = |sweep: &Sweep| {
+    let cost = |sweep: &FitSweep| {
         let best = atlas.matches(world, sweep, 1);
         best.first().map_or(f32::INFINITY, |best| best.cost)
     };
     let now = cost(sweep);
-    let changed = |change: &dyn Fn(Beam) -> Beam| Sweep {
+    let changed = |change: &dyn Fn(SweepFiring) -> SweepFiring| FitSweep {
         beams: sweep.beams.iter().copied().map(change).collect(),
         ..sweep.clone()
     };
     let turned = |factor: f64| {
-        cost(&changed(&|beam| Beam { azimuth_deg: factor * beam.azimuth_deg, ..beam }))
+        cost(&changed(&|beam| SweepFiring { azimuth_deg: factor * beam.azimuth_deg, ..beam }))
     };
     let scaled = |factor: f64| {
-        cost(&changed(&|beam| match beam.heard {
-            Heard::Echo { tof_us } => {
-                Beam { heard: Heard::Echo { tof_us: factor * tof_us }, ..beam }
+        cost(&changed(&|beam| match beam.outcome {
+            FiringOutcome::Echo { tof_us } => {
+                SweepFiring { outcome: FiringOutcome::Echo { tof_us: factor * tof_us }, ..beam }
             }
-            Heard::Silence | Heard::Near => beam,
+            FiringOutcome::NoEcho | FiringOutcome::BelowMinRange => beam,
         }))
     };
-    let tried = [(Doubt::Clockwise, turned(-1.0)), (Doubt::Radians, turned(1f64.to_degrees()))];
-    let units = FACTORS.map(|factor| (Doubt::Unit { factor }, scaled(factor)));
+    let tried = [(Misfit::Clockwise, turned(-1.0)), (Misfit::Radians, turned(1f64.to_degrees()))];
+    let units = FACTORS.map(|factor| (Misfit::Unit { factor }, scaled(factor)));
     let best = tried.into_iter().chain(units).min_by(|a, b| a.1.total_cmp(&b.1));
     match best {
         Some((cause, cost)) if cost < FAR_BETTER * now => vec![cause],
-        _ => vec![Doubt::OtherPlace { explained }],
+        _ => vec![Misfit::OtherPlace { explained }],
     }
 }

@@ -23,11 +23,11 @@ use crate::{
     likelihood::ErrorModel,
     linear::LinearizedModel,
     parameter::Parameter,
-    progress::{Unwatched, Watch},
-    sweep::Sweep,
+    progress::{NoObserver, FitObserver},
+    sweep::FitSweep,
     world::{SimulatorSet, World, WorldError},
 };
-pub use checkpoint::Found;
+pub use checkpoint::SearchResult;
 pub use local::fit_from;
 pub(crate) use local::{RoughFit, approach, fit_near};
 
@@ -42,17 +42,17 @@ pub struct Prior {
 
 /// Settings of a fit.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Fit {
+pub struct FitOptions {
     /// Parameters with their priors.
     pub priors: Vec<Prior>,
     /// Initial standard deviation of ranges, metres: the maximum error of predictions.
-    pub widest_m: f64,
+    pub initial_sigma_m: f64,
     /// Maximum initial error of headings, degrees.
-    pub widest_turn_deg: f64,
+    pub max_turn_deg: f64,
     /// Minimum standard deviation of ranges, metres.
-    pub least_sigma_m: f64,
+    pub min_sigma_m: f64,
     /// Minimum standard deviation of the threshold, decibels.
-    pub least_sigma_db: f64,
+    pub min_sigma_db: f64,
     /// Search effort and outlier model.
     pub search: Search,
 }
@@ -75,7 +75,7 @@ pub enum Search {
 
 /// Estimate of one parameter.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Estimate {
+pub struct ParameterEstimate {
     /// Change of the parameter from its initial value, in its unit.
     pub change: f64,
     /// Standard deviation, including other optima that explain the readings nearly as well.
@@ -86,9 +86,9 @@ pub struct Estimate {
 
 /// Result of a fit.
 #[derive(Debug, Clone)]
-pub struct Fitted {
+pub struct FitResult {
     /// Estimates in the order of the parameters.
-    pub estimates: Vec<Estimate>,
+    pub estimates: Vec<ParameterEstimate>,
     /// Covariance of the changes about this optimum alone, in the order of the parameters.
     pub covariance: DMatrix<f64>,
     /// World with all changes applied.
@@ -146,12 +146,12 @@ pub(crate) fn one_of_many<T>(result: Result<T, FitError>) -> Result<Option<T>, F
 
 /// State of a running fit.
 struct Fitter<'a> {
-    fit: &'a Fit,
-    watch: &'a dyn Watch,
+    fit: &'a FitOptions,
+    watch: &'a dyn FitObserver,
     /// Recorded results of the next searches, when resumed.
-    known: slice::Iter<'a, Found>,
+    known: slice::Iter<'a, SearchResult>,
     start: &'a World,
-    sweeps: &'a [Sweep],
+    sweeps: &'a [FitSweep],
     parameters: Vec<&'a Parameter>,
     /// Changes since the start.
     values: DVector<f64>,
@@ -188,8 +188,8 @@ const NOT_FITTED_DB: f64 = 0.5;
 ///
 /// # Errors
 /// Invalid world, or readings that don't constrain the parameters.
-pub fn fit(world: &World, sweeps: &[Sweep], fit: &Fit) -> Result<Fitted, FitError> {
-    fit_watched(world, sweeps, fit, &[], &Unwatched)
+pub fn fit(world: &World, sweeps: &[FitSweep], fit: &FitOptions) -> Result<FitResult, FitError> {
+    fit_observed(world, sweeps, fit, &[], &NoObserver)
 }
 
 /// Fits like [`fit`], reports progress and intermediate results to `watch`, and resumes from
@@ -198,13 +198,13 @@ pub fn fit(world: &World, sweeps: &[Sweep], fit: &Fit) -> Result<Fitted, FitErro
 /// # Errors
 /// As [`fit`]; [`FitError::Stopped`] if cancelled, [`FitError::OtherFit`] if `known` does not
 /// match.
-pub fn fit_watched(
+pub fn fit_observed(
     world: &World,
-    sweeps: &[Sweep],
-    fit: &Fit,
-    known: &[Found],
-    watch: &dyn Watch,
-) -> Result<Fitted, FitError> {
+    sweeps: &[FitSweep],
+    fit: &FitOptions,
+    known: &[SearchResult],
+    watch: &dyn FitObserver,
+) -> Result<FitResult, FitError> {
     let models = SimulatorSet::new(&world.with_face_on_axis())?;
     let mut fitter = Fitter::new(models, world, sweeps, fit, watch)?;
     fitter.known = known.iter();
@@ -217,14 +217,14 @@ pub fn fit_watched(
 ///
 /// # Errors
 /// As [`fit`].
-pub fn bound(
+pub fn cramer_rao_bound(
     world: &World,
-    sweeps: &[Sweep],
-    fit: &Fit,
+    sweeps: &[FitSweep],
+    fit: &FitOptions,
     errors: &ErrorModel,
 ) -> Result<Vec<f64>, FitError> {
     let models = SimulatorSet::new(&world.with_face_on_axis())?;
-    let mut fitter = Fitter::new(models, world, sweeps, fit, &Unwatched)?;
+    let mut fitter = Fitter::new(models, world, sweeps, fit, &NoObserver)?;
     fitter.phases = Phases::Known;
     fitter.be_exact();
     let curve = fitter.linear()?.curve(&fitter.still(), errors);
@@ -236,9 +236,9 @@ impl<'a> Fitter<'a> {
     fn new(
         models: SimulatorSet,
         start: &'a World,
-        sweeps: &'a [Sweep],
-        fit: &'a Fit,
-        watch: &'a dyn Watch,
+        sweeps: &'a [FitSweep],
+        fit: &'a FitOptions,
+        watch: &'a dyn FitObserver,
     ) -> Result<Self, FitError> {
         if fit.priors.is_empty() || sweeps.is_empty() {
             return Err(FitError::Nothing);
@@ -264,13 +264,13 @@ impl<'a> Fitter<'a> {
     fn rough_errors(&self) -> ErrorModel {
         let World { options, sensor, .. } = self.start;
         let reach_m = options.max_range_m.unwrap_or(sensor.max_range_m);
-        let errors = ErrorModel::rough(self.fit.widest_m, continuation::STAGES[0].1, reach_m);
+        let errors = ErrorModel::rough(self.fit.initial_sigma_m, continuation::STAGES[0].1, reach_m);
         if self.fit.search == Search::Furnished { errors } else { errors.without_arcs() }
     }
 
     /// Minimum standard deviation of ranges, metres; at least that of their quantization.
     fn least_sigma_m(&self) -> f64 {
-        self.fit.least_sigma_m.max(self.start.sensor.range_step_m / 12f64.sqrt())
+        self.fit.min_sigma_m.max(self.start.sensor.range_step_m / 12f64.sqrt())
     }
 
     fn covariance(&self, mut information: DMatrix<f64>) -> Option<DMatrix<f64>> {
@@ -338,7 +338,7 @@ impl<'a> Fitter<'a> {
 
     /// World at the current values, with updated simulators; called before each prediction.
     fn moved_world(&mut self) -> Result<World, FitError> {
-        if self.watch.stops() {
+        if self.watch.is_cancelled() {
             return Err(FitError::Stopped);
         }
         let world = self.world()?;
@@ -356,7 +356,7 @@ impl<'a> Fitter<'a> {
     }
 
     /// Result at an optimum; other optima add `beside` to the variances.
-    fn end(mut self, best: Optimum, beside: &DVector<f64>) -> Result<Fitted, FitError> {
+    fn end(mut self, best: Optimum, beside: &DVector<f64>) -> Result<FitResult, FitError> {
         let Optimum { values, phases, errors, .. } = self.exactly(best)?;
         (self.values, self.phases) = (values, phases);
         let linear = self.linear()?;
@@ -375,9 +375,9 @@ impl<'a> Fitter<'a> {
         }
         let estimates = self.values.iter().enumerate().map(|(at, &change)| {
             let sigma = (covariance[(at, at)] + beside[at]).max(0.0).sqrt();
-            Estimate { change, sigma, identified: sigma < 0.5 * self.fit.priors[at].sigma }
+            ParameterEstimate { change, sigma, identified: sigma < 0.5 * self.fit.priors[at].sigma }
         });
-        Ok(Fitted {
+        Ok(FitResult {
             estimates: estimates.collect(),
             covariance,
             world: self.world()?,

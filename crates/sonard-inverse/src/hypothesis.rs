@@ -9,7 +9,7 @@ use crate::{
     likelihood::ErrorModel,
     linear::LinearizedModel,
     parameter::Parameter,
-    sweep::Sweep,
+    sweep::FitSweep,
     world::{SimulatorSet, World, WorldError},
 };
 
@@ -52,7 +52,7 @@ impl Hypotheses {
     /// More paths than can be found.
     pub fn log_likelihood(
         &self,
-        sweep: &Sweep,
+        sweep: &FitSweep,
         pose: &Pose,
         errors: &ErrorModel,
     ) -> Result<LogLikelihood, WorldError> {

@@ -25,9 +25,9 @@ use self::{
 use crate::{
     candidates::{CandidateList, Phases, SPAN_DB, ThresholdCandidate, ThresholdScan},
     likelihood_terms::{CandidateReading, ReadingModel, SparseRow},
-    motion::Motion,
+    motion::SceneMotion,
     parameter::Parameter,
-    sweep::{Beam, RangeOutcome, Sweep},
+    sweep::{SweepFiring, RangeOutcome, FitSweep},
     time_walk::TimeWalk,
     world::World,
 };
@@ -43,7 +43,7 @@ pub(crate) struct JacobianBuilder<'a> {
     world: &'a World,
     parameters: &'a [&'a Parameter],
     /// Motion that is independent of the beam direction, by parameter.
-    steady: Vec<Option<Motion>>,
+    steady: Vec<Option<SceneMotion>>,
     /// Beam pattern after a small change, and the change, by parameter of the beam.
     changed_beams: Vec<Option<(BeamPattern, f64)>>,
     /// Time walk with a slightly narrower and a slightly wider band, if that is a parameter.
@@ -96,7 +96,7 @@ impl<'a> JacobianBuilder<'a> {
         simulator: &Simulator,
         point: &ObservationPoint,
         number: usize,
-        sweep: &Sweep,
+        sweep: &FitSweep,
         pose: &Pose,
     ) -> Result<Vec<ReadingModel>, TooCostly> {
         let listener = ThresholdScan::new(simulator.receiver(), self.phases, self.span_db);
@@ -111,7 +111,7 @@ impl<'a> JacobianBuilder<'a> {
             let firing = FiringGeometry::new(simulator, pose, direction_rad, beam);
             let possible = self.all_possible(&listener, point, &firing, &mut known)?;
             readings
-                .push(ReadingModel { measured: beam.heard.outcome(self.reference_m_s), possible });
+                .push(ReadingModel { measured: beam.outcome.outcome(self.reference_m_s), possible });
         }
         Ok(readings)
     }
@@ -122,7 +122,7 @@ impl<'a> JacobianBuilder<'a> {
         &self,
         simulator: &Simulator,
         point: &ObservationPoint,
-        sweep: &Sweep,
+        sweep: &FitSweep,
         pose: &Pose,
         turns_deg: &[f64],
     ) -> Result<Vec<Vec<ReadingModel>>, TooCostly> {
@@ -130,7 +130,7 @@ impl<'a> JacobianBuilder<'a> {
         let all: Vec<u32> = (0..self.parameters.len() as u32).collect();
         let mut paths = PathCache::new(self, all);
         let mut known: HashMap<i64, SmallVec<[CandidateReading; 2]>> = HashMap::new();
-        let mut readings = |beam: &Beam, by_deg: f64| {
+        let mut readings = |beam: &SweepFiring, by_deg: f64| {
             let direction_rad = self.world.direction_rad(pose, beam.azimuth_deg);
             let place = (wrap_360(direction_rad.to_degrees() + by_deg) / GRID_DEG).round() as i64;
             let possible = match known.entry(place) {
@@ -142,7 +142,7 @@ impl<'a> JacobianBuilder<'a> {
                     unknown.insert(possible).clone()
                 }
             };
-            Ok(ReadingModel { measured: beam.heard.outcome(self.reference_m_s), possible })
+            Ok(ReadingModel { measured: beam.outcome.outcome(self.reference_m_s), possible })
         };
         let mut turned =
             |by_deg: &f64| sweep.beams.iter().map(|beam| readings(beam, *by_deg)).collect();
@@ -301,8 +301,8 @@ impl<'a> JacobianBuilder<'a> {
         if mounting.is_on_axis() || !firing.simulator.sensor().mounting.is_on_axis() {
             return None;
         }
-        let places = mounting.places(DVec2::ZERO, firing.direction_rad);
-        let moved = path.moved(firing, &Motion { transducer: places, ..Motion::default() });
+        let places = mounting.transducer_positions(DVec2::ZERO, firing.direction_rad);
+        let moved = path.moved(firing, &SceneMotion { transducer: places, ..SceneMotion::default() });
         let louder_db = |(off_rad, turn_rad): (f64, f64)| {
             level_db(firing.simulator.beam(), off_rad, off_rad + turn_rad)
         };

@@ -36,19 +36,19 @@ mod time_walk;
 mod walls;
 mod world;
 
-pub use coarse_grid::{Atlas, AtlasError};
-pub use course::{Course, Odometry};
-pub use diagnosis::{Doubt, doubts};
+pub use coarse_grid::{CoarseGrid, CoarseGridError};
+pub use course::{Tracker, Odometry};
+pub use diagnosis::{Misfit, diagnose};
 pub use fit::{
-    Estimate, Fit, FitError, Fitted, Found, Prior, Search, bound, fit, fit_from, fit_watched,
+    ParameterEstimate, FitOptions, FitError, FitResult, SearchResult, Prior, Search, cramer_rao_bound, fit, fit_from, fit_observed,
 };
 pub use hypothesis::{Hypotheses, LogLikelihood};
 pub use likelihood::ErrorModel;
-pub use locate::{Besides, Mode, locate, locate_watched};
-pub use motion::{Motion, length_rate};
+pub use locate::{NuisanceEstimate, PoseMode, locate, locate_observed};
+pub use motion::{SceneMotion, length_derivative};
 pub use parameter::Parameter;
-pub use parameter_groups::{Group, GroupError, name, priors};
-pub use progress::{Progress, Unwatched, Watch};
-pub use report::Told;
-pub use sweep::{Beam, Heard, Sweep, SweepError};
+pub use parameter_groups::{ParameterGroup, GroupError, name, priors};
+pub use progress::{FitProgress, NoObserver, FitObserver};
+pub use report::ParameterReport;
+pub use sweep::{SweepFiring, FiringOutcome, FitSweep, FitSweepError};
 pub use world::{World, WorldError};

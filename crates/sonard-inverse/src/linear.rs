@@ -11,7 +11,7 @@ use crate::{
     likelihood_terms::{LikelihoodTerms, ReadingModel, SparseRow},
     outlier_hmm::{self, Emission, OutlierCounts, StatePosterior},
     parameter::Parameter,
-    sweep::{RangeOutcome, Sweep},
+    sweep::{RangeOutcome, FitSweep},
     time_walk::TimeWalk,
     world::{SimulatorSet, World, WorldError},
 };
@@ -47,10 +47,10 @@ impl LinearizedModel {
     pub(crate) fn about(
         models: &SimulatorSet,
         rates: &JacobianBuilder,
-        sweeps: &[Sweep],
+        sweeps: &[FitSweep],
         poses: &[Pose],
     ) -> Result<Self, WorldError> {
-        let of = |(number, (sweep, pose)): (usize, (&Sweep, &Pose))| {
+        let of = |(number, (sweep, pose)): (usize, (&FitSweep, &Pose))| {
             models.at(pose, |simulator, point| {
                 Ok(rates.sweep(simulator, point, number, sweep, pose)?)
             })
@@ -70,7 +70,7 @@ impl LinearizedModel {
     pub(crate) fn turned(
         models: &SimulatorSet,
         world: &World,
-        sweep: &Sweep,
+        sweep: &FitSweep,
         pose: &Pose,
         turns_deg: &[f64],
         thresholds_db: &[f64],

@@ -6,18 +6,18 @@ use serde::{Deserialize, Serialize};
 use sonard_model::geometry::{Pose, wrap_180};
 
 use crate::{
-    coarse_grid::{Atlas, AtlasError, PoseMatch, is_apart},
-    fit::{self, Fit, FitError, Fitted, Prior, RoughFit, approach, fit_near, one_of_many},
+    coarse_grid::{CoarseGrid, CoarseGridError, PoseMatch, is_apart},
+    fit::{self, FitOptions, FitError, FitResult, Prior, RoughFit, approach, fit_near, one_of_many},
     likelihood::READINGS_PER_ARC,
     parameter::Parameter,
-    progress::{Unwatched, Watch},
-    sweep::{Beam, Sweep},
+    progress::{NoObserver, FitObserver},
+    sweep::{SweepFiring, FitSweep},
     world::{SimulatorSet, World},
 };
 
 /// Pose hypothesis of a sweep with its posterior probability.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct Mode {
+pub struct PoseMode {
     /// World x coordinate, metres.
     pub x_m: f64,
     /// World y coordinate, metres.
@@ -36,12 +36,12 @@ pub struct Mode {
     pub explained: f64,
     /// Nuisance parameters fitted with the pose; see [`Atlas::fitting`].
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub besides: Vec<Besides>,
+    pub besides: Vec<NuisanceEstimate>,
 }
 
 /// Estimate of a nuisance parameter.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct Besides {
+pub struct NuisanceEstimate {
     /// Name of the parameter.
     pub name: String,
     /// Value, in the unit used in files.
@@ -50,12 +50,12 @@ pub struct Besides {
     pub sigma: f64,
 }
 
-impl Mode {
+impl PoseMode {
     /// Hypothesis from a fit, with probability 1; nuisance parameters are relative to `world`.
-    fn of(fitted: &Fitted, world: &World, besides: &[Prior]) -> Self {
+    fn of(fitted: &FitResult, world: &World, besides: &[Prior]) -> Self {
         let (pose, of) = (&fitted.poses[0], &fitted.estimates);
-        let reports = fitted.told(world, &[], &with_pose(ROUGH_WIDEST, besides));
-        let besides = reports.into_iter().skip(POSE).map(|report| Besides {
+        let reports = fitted.report(world, &[], &with_pose(ROUGH_WIDEST, besides));
+        let besides = reports.into_iter().skip(POSE).map(|report| NuisanceEstimate {
             name: report.name,
             value: report.value,
             sigma: report.sigma,
@@ -107,20 +107,20 @@ const FAR_BELOW_WHOLE: f64 = 120.0;
 ///
 /// # Errors
 /// Invalid world.
-pub fn locate(world: &World, atlas: &Atlas, sweep: &Sweep) -> Result<Vec<Mode>, FitError> {
-    locate_watched(world, atlas, sweep, &Unwatched)
+pub fn locate(world: &World, atlas: &CoarseGrid, sweep: &FitSweep) -> Result<Vec<PoseMode>, FitError> {
+    locate_observed(world, atlas, sweep, &NoObserver)
 }
 
 /// Locates like [`locate`], with cancellation by `watch`.
 ///
 /// # Errors
 /// As [`locate`], and [`FitError::Stopped`].
-pub fn locate_watched(
+pub fn locate_observed(
     world: &World,
-    atlas: &Atlas,
-    sweep: &Sweep,
-    watch: &dyn Watch,
-) -> Result<Vec<Mode>, FitError> {
+    atlas: &CoarseGrid,
+    sweep: &FitSweep,
+    watch: &dyn FitObserver,
+) -> Result<Vec<PoseMode>, FitError> {
     Ok(modes(&explaining(world, atlas, sweep, &[], watch)?, world, atlas, |_| 0.0))
 }
 
@@ -131,11 +131,11 @@ pub fn locate_watched(
 /// its readings is below that of a range error of a metre.
 pub(crate) fn explaining(
     world: &World,
-    atlas: &Atlas,
-    sweep: &Sweep,
+    atlas: &CoarseGrid,
+    sweep: &FitSweep,
     expected: &[Pose],
-    watch: &dyn Watch,
-) -> Result<Vec<Fitted>, FitError> {
+    watch: &dyn FitObserver,
+) -> Result<Vec<FitResult>, FitError> {
     let besides = &atlas.besides;
     let search = PoseSearch { models: atlas.models(world)?, world, sweep, besides, watch };
     let matches = atlas.matches(world, sweep, ROUGH_OPEN);
@@ -152,9 +152,9 @@ pub(crate) fn explaining(
         let (rough, whole) = looked_at(is_open);
         match atlas.matches_outside(world, sweep, rough, watch) {
             Ok(matches) => found.extend(search.improved(matches.iter().map(|of| &of.pose), whole)?),
-            Err(AtlasError::Stopped) => return Err(FitError::Stopped),
-            Err(AtlasError::World(error)) => return Err(error.into()),
-            Err(AtlasError::NoPlace) => {}
+            Err(CoarseGridError::Stopped) => return Err(FitError::Stopped),
+            Err(CoarseGridError::World(error)) => return Err(error.into()),
+            Err(CoarseGridError::NoPlace) => {}
         }
     }
     found.sort_by(|a, b| b.log_posterior.total_cmp(&a.log_posterior));
@@ -167,7 +167,7 @@ const fn looked_at(is_open: bool) -> (usize, usize) {
 }
 
 /// Returns `true` if a position is so uncertain that others are likely.
-fn is_hardly_held(found: &Fitted) -> bool {
+fn is_hardly_held(found: &FitResult) -> bool {
     let of = &found.estimates;
     of_place(of[0].sigma, of[1].sigma) > OPEN_M
 }
@@ -181,10 +181,10 @@ fn of_place(sigma_x_m: f64, sigma_y_m: f64) -> f64 {
 struct PoseSearch<'a> {
     models: SimulatorSet,
     world: &'a World,
-    sweep: &'a Sweep,
+    sweep: &'a FitSweep,
     /// Priors of nuisance parameters.
     besides: &'a [Prior],
-    watch: &'a dyn Watch,
+    watch: &'a dyn FitObserver,
 }
 
 impl PoseSearch<'_> {
@@ -193,25 +193,25 @@ impl PoseSearch<'_> {
         &self,
         starts: impl Iterator<Item = &'p Pose>,
         count: usize,
-    ) -> Result<Vec<Fitted>, FitError> {
+    ) -> Result<Vec<FitResult>, FitError> {
         let &Self { ref models, world, sweep, besides, watch } = self;
         let few = thinned(sweep, FEW_BEAMS);
         let settings = with_pose(ROUGH_WIDEST, besides);
         let mut rough: Vec<RoughFit> = Vec::new();
         for pose in starts {
-            let near = Sweep { pose: *pose, ..few.clone() };
+            let near = FitSweep { pose: *pose, ..few.clone() };
             let found = approach(models.clone(), world, &near, &settings, watch);
             rough.extend(one_of_many(found)?);
         }
         rough.sort_by(|a, b| b.log_posterior.total_cmp(&a.log_posterior));
         let best = rough.first().map_or(0.0, |best| best.log_posterior);
         rough.retain(|found| found.log_posterior > best - FAR_BELOW);
-        let mut whole: Vec<Fitted> = Vec::new();
+        let mut whole: Vec<FitResult> = Vec::new();
         let mut nearly = f64::NEG_INFINITY;
         for found in distinct(rough, 0.05, |found| &found.pose).into_iter().take(count) {
             // The error of a rough fit is little more than the scatter of its readings.
             let widest_m = (3.0 * found.sigma_m).clamp(MIN_WIDEST_M, 0.03);
-            let near = Sweep { pose: found.pose, ..sweep.clone() };
+            let near = FitSweep { pose: found.pose, ..sweep.clone() };
             let settings = with_pose((widest_m, WHOLE_TURN_DEG), besides);
             let least = nearly - FAR_BELOW_WHOLE;
             let found = fit_near(models.clone(), world, &near, &settings, least, watch);
@@ -228,27 +228,27 @@ impl PoseSearch<'_> {
 const POSE: usize = 3;
 
 /// Fit of a pose with a maximum error in metres and degrees, and of nuisance parameters.
-fn with_pose((widest_m, widest_turn_deg): (f64, f64), besides: &[Prior]) -> Fit {
+fn with_pose((widest_m, widest_turn_deg): (f64, f64), besides: &[Prior]) -> FitOptions {
     let of = |parameter, sigma| Prior { parameter, sigma };
     let pose: [Prior; POSE] =
         [of(Parameter::X(0), 0.5), of(Parameter::Y(0), 0.5), of(Parameter::Heading(0), 20.0)];
     let priors = pose.into_iter().chain(besides.iter().cloned()).collect();
     let search = fit::Search::Quick;
-    Fit { widest_turn_deg, least_sigma_m: 5e-4, search, ..Fit::usual(priors, widest_m) }
+    FitOptions { max_turn_deg: widest_turn_deg, min_sigma_m: 5e-4, search, ..FitOptions::with_priors(priors, widest_m) }
 }
 
 /// Evenly spread subset of a sweep's beams, up to two thirds with an echo: echoes identify a
 /// position, and in front of two walls hardly any other beam has one.
-fn thinned(sweep: &Sweep, count: usize) -> Sweep {
-    let (echoes, silent): (Vec<&Beam>, Vec<&Beam>) =
+fn thinned(sweep: &FitSweep, count: usize) -> FitSweep {
+    let (echoes, silent): (Vec<&SweepFiring>, Vec<&SweepFiring>) =
         sweep.beams.iter().partition(|beam| beam.is_echo());
     let of_silent = silent.len().min(count - echoes.len().min(2 * count / 3));
     let of_echoes = echoes.len().min(count - of_silent);
     let beams = evenly(&echoes, of_echoes).chain(evenly(&silent, of_silent)).copied().collect();
-    Sweep { beams, ..sweep.clone() }
+    FitSweep { beams, ..sweep.clone() }
 }
 
-fn evenly<'a>(of: &'a [&'a Beam], count: usize) -> impl Iterator<Item = &'a Beam> {
+fn evenly<'a>(of: &'a [&'a SweepFiring], count: usize) -> impl Iterator<Item = &'a SweepFiring> {
     (0..count).map(move |at| of[at * of.len() / count])
 }
 
@@ -266,14 +266,14 @@ fn distinct<T>(sorted: Vec<T>, within_m: f64, pose: impl Fn(&T) -> &Pose) -> Vec
 /// Hypotheses with posterior probabilities: evidence by the Laplace approximation, times the prior
 /// given by `log_prior`.
 pub(crate) fn modes(
-    found: &[Fitted],
+    found: &[FitResult],
     world: &World,
-    atlas: &Atlas,
-    log_prior: impl Fn(&Mode) -> f64,
-) -> Vec<Mode> {
-    let of = |fitted: &Fitted| Mode::of(fitted, world, &atlas.besides);
-    let mut modes: Vec<Mode> = found.iter().map(of).collect();
-    let evidence = |fitted: &Fitted| {
+    atlas: &CoarseGrid,
+    log_prior: impl Fn(&PoseMode) -> f64,
+) -> Vec<PoseMode> {
+    let of = |fitted: &FitResult| PoseMode::of(fitted, world, &atlas.besides);
+    let mut modes: Vec<PoseMode> = found.iter().map(of).collect();
+    let evidence = |fitted: &FitResult| {
         (fitted.log_posterior + 0.5 * log_volume(&fitted.covariance)) / READINGS_PER_ARC
     };
     let all: Vec<f64> =

@@ -10,7 +10,7 @@ use sonard_model::{
 
 /// Velocities of the scene and transducer with respect to one parameter, metres per unit.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Motion {
+pub struct SceneMotion {
     /// Velocities of transmitter and receiver, in the plane.
     pub transducer: [DVec2; 2],
     /// Upward velocity of both.
@@ -21,10 +21,10 @@ pub struct Motion {
     pub cylinders: Vec<(u32, DVec2, f64)>,
 }
 
-impl Motion {
+impl SceneMotion {
     /// Motion of the transducer as a whole.
     #[must_use]
-    pub fn of_transducer(velocity: DVec2) -> Self {
+    pub fn for_transducer(velocity: DVec2) -> Self {
         Self { transducer: [velocity; 2], ..Self::default() }
     }
 
@@ -105,7 +105,7 @@ impl Motion {
 /// point, and `-u . dx` for an end with departure or arrival direction `u`. Tests verify finite
 /// differences to 1e-5, relative to a metre per unit.
 #[must_use]
-pub fn length_rate(path: &Path, ends: [DVec2; 2], z_m: f64, scene: &Scene, motion: &Motion) -> f64 {
+pub fn length_derivative(path: &Path, ends: [DVec2; 2], z_m: f64, scene: &Scene, motion: &SceneMotion) -> f64 {
     let interactions = &path.interactions;
     let point = |at: usize| interactions[at].point.extend(interactions[at].z_m.unwrap_or(z_m));
     let (Some(last), [transmitter, receiver]) =

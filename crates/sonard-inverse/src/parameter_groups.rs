@@ -10,7 +10,7 @@ use crate::{fit::Prior, parameter::Parameter, world::World};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "clap", derive(clap::ValueEnum))]
 #[serde(rename_all = "lowercase")]
-pub enum Group {
+pub enum ParameterGroup {
     /// Pose of the ranger in each scan.
     Pose,
     /// Azimuth zero of the stepper.
@@ -127,7 +127,7 @@ pub fn name(parameter: &Parameter, world: &World) -> String {
 /// Prior of a parameter that is not fitted, invalid standard deviation, or a group that does not
 /// apply.
 pub fn priors(
-    groups: &[Group],
+    groups: &[ParameterGroup],
     given: &[(String, f64)],
     world: &World,
     sweeps: usize,
@@ -156,33 +156,33 @@ pub fn priors(
     Ok(all.into_iter().zip(&names).map(with_prior).collect())
 }
 
-fn of_group(group: Group, world: &World, sweeps: usize) -> Result<Vec<Parameter>, GroupError> {
+fn of_group(group: ParameterGroup, world: &World, sweeps: usize) -> Result<Vec<Parameter>, GroupError> {
     let has_heights = world.scene.floor_z_m.is_some() || world.scene.ceiling_z_m.is_some();
     Ok(match group {
-        Group::Pose => (0..sweeps)
+        ParameterGroup::Pose => (0..sweeps)
             .flat_map(|at| [Parameter::X(at), Parameter::Y(at), Parameter::Heading(at)])
             .collect(),
-        Group::Heading => vec![Parameter::HeadingZero],
-        Group::Gear => vec![Parameter::Gear],
-        Group::Mounting => vec![Parameter::Ahead, Parameter::Left],
-        Group::Height if !has_heights => return Err(GroupError::NoHeight),
-        Group::Height => vec![Parameter::Height],
-        Group::Air => vec![Parameter::SoundSpeed],
-        Group::Delay => vec![Parameter::Delay],
-        Group::Threshold => vec![Parameter::Threshold],
-        Group::Rise => vec![Parameter::ThresholdRise],
-        Group::Beam => vec![Parameter::Aperture],
-        Group::Pulse => vec![Parameter::Bandwidth],
-        Group::Skirts => match world.sensor.aperture {
+        ParameterGroup::Heading => vec![Parameter::HeadingZero],
+        ParameterGroup::Gear => vec![Parameter::Gear],
+        ParameterGroup::Mounting => vec![Parameter::Ahead, Parameter::Left],
+        ParameterGroup::Height if !has_heights => return Err(GroupError::NoHeight),
+        ParameterGroup::Height => vec![Parameter::Height],
+        ParameterGroup::Air => vec![Parameter::SoundSpeed],
+        ParameterGroup::Delay => vec![Parameter::Delay],
+        ParameterGroup::Threshold => vec![Parameter::Threshold],
+        ParameterGroup::Rise => vec![Parameter::ThresholdRise],
+        ParameterGroup::Beam => vec![Parameter::Aperture],
+        ParameterGroup::Pulse => vec![Parameter::Bandwidth],
+        ParameterGroup::Skirts => match world.sensor.aperture {
             Aperture::Piston { skirts_db: Some(_), .. } => vec![Parameter::Skirts],
             _ => return Err(GroupError::NoSkirts { sensor: world.sensor.name.clone() }),
         },
-        Group::Materials => {
+        ParameterGroup::Materials => {
             world.scene.materials.keys().cloned().map(Parameter::Reflectance).collect()
         }
-        Group::Roughness => {
+        ParameterGroup::Roughness => {
             world.scene.materials.keys().cloned().map(Parameter::Roughness).collect()
         }
-        Group::Walls => (0..world.scene.walls.len()).map(Parameter::Wall).collect(),
+        ParameterGroup::Walls => (0..world.scene.walls.len()).map(Parameter::Wall).collect(),
     })
 }

@@ -2,52 +2,52 @@
 
 use std::fmt;
 
-use crate::fit::Found;
+use crate::fit::SearchResult;
 
 /// Observer of a fit or a search for poses; see [`Unwatched`] for none.
-pub trait Watch: Sync {
+pub trait FitObserver: Sync {
     /// Reports the progress of a fit.
-    fn progress(&self, _progress: Progress) {}
+    fn progress(&self, _progress: FitProgress) {}
 
     /// Reports the result of a search as a checkpoint; results given as known are not repeated.
-    fn found(&self, _found: &Found) {}
+    fn found(&self, _found: &SearchResult) {}
 
     /// Returns `true` to cancel; polled before each prediction, and must remain `true` once set.
-    fn stops(&self) -> bool {
+    fn is_cancelled(&self) -> bool {
         false
     }
 }
 
 /// Observer that does nothing and never cancels.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct Unwatched;
+pub struct NoObserver;
 
-impl Watch for Unwatched {}
+impl FitObserver for NoObserver {}
 
 /// Progress of a fit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Progress {
+pub enum FitProgress {
     /// Continuation from wide to observed scatter: stage out of all, from 1.
-    Approaching {
+    Continuation {
         /// Current stage, from 1.
-        spread: usize,
+        stage: usize,
         /// Number of stages in all.
         of: usize,
     },
     /// Restarts near the optimum: start out of all, from 1.
-    Searching {
+    Restart {
         /// Current start, from 1.
-        place: usize,
+        start: usize,
         /// Number of starts in all.
         of: usize,
     },
 }
 
-impl fmt::Display for Progress {
+impl fmt::Display for FitProgress {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Approaching { spread, of } => write!(f, "start {spread} of {of}"),
-            Self::Searching { place, of } => write!(f, "restart {place} of {of}"),
+            Self::Continuation { stage: spread, of } => write!(f, "start {spread} of {of}"),
+            Self::Restart { start: place, of } => write!(f, "restart {place} of {of}"),
         }
     }
 }

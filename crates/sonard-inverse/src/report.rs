@@ -6,16 +6,16 @@ use sonard_model::acoustics::{Aperture, Sensor};
 use uuid::Uuid;
 
 use crate::{
-    fit::{Estimate, Fit, Fitted, Prior, Search},
+    fit::{ParameterEstimate, FitOptions, FitResult, Prior, Search},
     parameter::Parameter,
     parameter_groups::name,
-    sweep::Sweep,
+    sweep::FitSweep,
     world::World,
 };
 
 /// Estimate in the unit used in files; logarithms and relative changes of the fit are converted.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Told {
+pub struct ParameterReport {
     /// Name of the parameter.
     pub name: String,
     /// Scan id, for a parameter of a single sweep.
@@ -41,7 +41,7 @@ pub struct Told {
     pub at_limit: bool,
 }
 
-impl Told {
+impl ParameterReport {
     /// Remark for a report.
     #[must_use]
     pub const fn remark(&self) -> &'static str {
@@ -62,17 +62,17 @@ impl Told {
     }
 }
 
-impl Fit {
+impl FitOptions {
     /// Settings for priors and an initial standard deviation of ranges, metres; others are
     /// defaults.
     #[must_use]
-    pub const fn usual(priors: Vec<Prior>, widest_m: f64) -> Self {
+    pub const fn with_priors(priors: Vec<Prior>, widest_m: f64) -> Self {
         Self {
             priors,
-            widest_m,
-            widest_turn_deg: WIDEST_TURN_DEG,
-            least_sigma_m: 2e-4,
-            least_sigma_db: 0.5,
+            initial_sigma_m: widest_m,
+            max_turn_deg: WIDEST_TURN_DEG,
+            min_sigma_m: 2e-4,
+            min_sigma_db: 0.5,
             search: Search::Thorough,
         }
     }
@@ -87,11 +87,11 @@ const MAX_CORRELATION: f64 = 0.95;
 /// Tolerance for values at a limit.
 const ROUNDING: f64 = 1e-9;
 
-impl Fitted {
+impl FitResult {
     /// Reports the estimates in the order of the priors; `world` is the initial one.
     #[must_use]
-    pub fn told(&self, world: &World, sweeps: &[Sweep], fit: &Fit) -> Vec<Told> {
-        let of = |(prior, estimate): (&Prior, &Estimate)| {
+    pub fn report(&self, world: &World, sweeps: &[FitSweep], fit: &FitOptions) -> Vec<ParameterReport> {
+        let of = |(prior, estimate): (&Prior, &ParameterEstimate)| {
             let parameter = &prior.parameter;
             let value = |by: f64| value(world, sweeps, parameter, by);
             let (min, max) = world.limits(parameter);
@@ -100,7 +100,7 @@ impl Fitted {
             let per_unit = |sigma: f64| {
                 0.5 * (value(estimate.change + sigma) - value(estimate.change - sigma)).abs()
             };
-            Told {
+            ParameterReport {
                 name: name(parameter, world),
                 scan: parameter.sweep().and_then(|at| sweeps.get(at)).map(|sweep| sweep.scan),
                 value: value(estimate.change),
@@ -119,7 +119,7 @@ impl Fitted {
 
     /// Returns `true` if more than 30 % of the readings are not explained.
     #[must_use]
-    pub const fn is_doubtful(&self) -> bool {
+    pub const fn is_poorly_explained(&self) -> bool {
         self.errors.explained() < 0.7
     }
 
@@ -132,7 +132,7 @@ impl Fitted {
 
     /// Index pairs of strongly correlated estimates with their correlation, strongest first.
     #[must_use]
-    pub fn hardly_told_apart(&self) -> Vec<(usize, usize, f64)> {
+    pub fn strongly_correlated(&self) -> Vec<(usize, usize, f64)> {
         let all = self.correlations();
         let pairs = (0..all.nrows()).flat_map(|row| (0..row).map(move |column| (column, row)));
         let correlated = pairs.map(|(column, row)| (column, row, all[(row, column)]));
@@ -169,7 +169,7 @@ impl Fitted {
 }
 
 /// Value of a parameter after a change, in the unit used in files.
-fn value(world: &World, sweeps: &[Sweep], parameter: &Parameter, by: f64) -> f64 {
+fn value(world: &World, sweeps: &[FitSweep], parameter: &Parameter, by: f64) -> f64 {
     let pose = |at: usize| sweeps.get(at).map(|sweep| sweep.pose);
     let mounting = &world.sensor.mounting;
     match parameter {

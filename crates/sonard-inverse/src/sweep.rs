@@ -7,58 +7,58 @@ use uuid::Uuid;
 
 /// Readings of a ranger on a stepper from one position.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Sweep {
+pub struct FitSweep {
     /// Scan of the readings.
     pub scan: Uuid,
     /// Initial pose of the ranger.
     pub pose: Pose,
     /// Firings with a valid outcome.
-    pub beams: Vec<Beam>,
+    pub beams: Vec<SweepFiring>,
 }
 
 /// Firing with its outcome.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Beam {
+pub struct SweepFiring {
     /// Azimuth of the stepper, degrees counter-clockwise from the heading.
     pub azimuth_deg: f64,
     /// Outcome of the firing.
-    pub heard: Heard,
+    pub outcome: FiringOutcome,
 }
 
-impl Beam {
+impl SweepFiring {
     pub(crate) const fn is_echo(&self) -> bool {
-        matches!(self.heard, Heard::Echo { .. })
+        matches!(self.outcome, FiringOutcome::Echo { .. })
     }
 }
 
 /// Outcome of a firing with its time of flight.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Heard {
+pub enum FiringOutcome {
     /// First echo after firing.
     Echo {
         /// Time of flight, microseconds.
         tof_us: f64,
     },
     /// No echo within the measurement window.
-    Silence,
+    NoEcho,
     /// Target below the minimum range: signal present at the end of blanking.
-    Near,
+    BelowMinRange,
 }
 
-impl Heard {
+impl FiringOutcome {
     /// Range of an echo for a speed of sound, metres.
     #[must_use]
     pub fn range_m(&self, sound_speed_m_s: f64) -> Option<f64> {
         match self {
             Self::Echo { tof_us } => Some(0.5e-6 * sound_speed_m_s * tof_us),
-            Self::Silence | Self::Near => None,
+            Self::NoEcho | Self::BelowMinRange => None,
         }
     }
 
     pub(crate) fn outcome(&self, sound_speed_m_s: f64) -> RangeOutcome {
         match (self, self.range_m(sound_speed_m_s)) {
             (_, Some(range_m)) => RangeOutcome::Echo { range_m },
-            (Self::Near, None) => RangeOutcome::BelowMinRange,
+            (Self::BelowMinRange, None) => RangeOutcome::BelowMinRange,
             (_, None) => RangeOutcome::NoEcho,
         }
     }
@@ -90,7 +90,7 @@ impl RangeOutcome {
 
 /// Reason why a scan can't be used.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
-pub enum SweepError {
+pub enum FitSweepError {
     /// Missing start or session record.
     #[error("scan {0}: the log lacks its start or its session")]
     Incomplete(Uuid),
@@ -115,43 +115,43 @@ const MIN_BEAMS: usize = 8;
 /// Fraction of echoes below which echoes are few.
 const FEW_ECHOES: f64 = 0.12;
 
-impl Sweep {
+impl FitSweep {
     /// Readings of a logged scan.
     ///
     /// # Errors
     /// Scan of an array, of a moving robot, or incomplete.
-    pub fn from_scan(scan: &ScanView) -> Result<Self, SweepError> {
+    pub fn from_scan(scan: &ScanView) -> Result<Self, FitSweepError> {
         let id = scan.scan;
         let (Some(pose), Some(session)) = (scan.pose(), &scan.session) else {
-            return Err(SweepError::Incomplete(id));
+            return Err(FitSweepError::Incomplete(id));
         };
         if session.array.is_some() {
-            return Err(SweepError::OfArray(id));
+            return Err(FitSweepError::OfArray(id));
         }
         if scan.pings.iter().any(|ping| ping.pose.is_some_and(|own| own != pose)) {
-            return Err(SweepError::Moved(id));
+            return Err(FitSweepError::Moved(id));
         }
         let tof_us_per_m = 2e6 / session.air.sound_speed_m_s;
-        let beams: Vec<Beam> = scan
+        let beams: Vec<SweepFiring> = scan
             .pings
             .iter()
             .filter_map(|ping| {
                 let heard = match ping.status {
                     PingStatus::Echo => {
                         let of_range = || ping.range_m.map(|range_m| range_m * tof_us_per_m);
-                        Heard::Echo { tof_us: ping.tof_us.or_else(of_range)? }
+                        FiringOutcome::Echo { tof_us: ping.tof_us.or_else(of_range)? }
                     }
-                    PingStatus::NoEcho => Heard::Silence,
-                    PingStatus::MinRange => Heard::Near,
+                    PingStatus::NoEcho => FiringOutcome::NoEcho,
+                    PingStatus::MinRange => FiringOutcome::BelowMinRange,
                     PingStatus::LinkLost | PingStatus::StepDoubtful | PingStatus::ModuleFault => {
                         return None;
                     }
                 };
-                Some(Beam { azimuth_deg: ping.azimuth_deg, heard })
+                Some(SweepFiring { azimuth_deg: ping.azimuth_deg, outcome: heard })
             })
             .collect();
         if beams.len() < MIN_BEAMS {
-            return Err(SweepError::TooFew { scan: id, beams: beams.len() });
+            return Err(FitSweepError::TooFew { scan: id, beams: beams.len() });
         }
         Ok(Self { scan: id, pose, beams })
     }

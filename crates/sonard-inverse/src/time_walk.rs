@@ -36,7 +36,7 @@ impl TimeWalk {
     /// Tabulates a receiver's time walk at a wavelength, for ranges scaled by `stretch`.
     pub(crate) fn new(receiver: &Receiver, wavelength_m: f64, stretch: f64) -> Self {
         let root = |step: usize| step as f64 * MAX_DB.sqrt() / STEPS as f64;
-        let lost_db = receiver.least_margin_db();
+        let lost_db = receiver.min_margin_db();
         let late_m = |step: usize| stretch * receiver.time_walk_m(lost_db + root(step).powi(2));
         Self { late_m: (0..=STEPS).map(late_m).collect(), wavelength_m }
     }

@@ -12,7 +12,7 @@ use sonard_model::{
 use thiserror::Error;
 
 use crate::{
-    motion::Motion,
+    motion::SceneMotion,
     parameter::Parameter,
     walls::{self, moved_ends},
 };
@@ -118,7 +118,7 @@ impl World {
                 }
                 Parameter::SoundSpeed => {
                     let speed_m_s = world.air.sound_speed_m_s() * (1.0 + by);
-                    world.air = world.air.warmed_to_sound_speed(speed_m_s)?;
+                    world.air = world.air.with_temperature_for_sound_speed(speed_m_s)?;
                 }
                 Parameter::Delay => world.delay_m += by,
                 Parameter::Threshold => world.sensor.threshold *= 10f64.powf(by / 20.0),
@@ -183,13 +183,13 @@ impl World {
     }
 
     /// Motion by a parameter, if independent of the beam direction.
-    pub(crate) fn steady_motion(&self, parameter: &Parameter) -> Option<Motion> {
+    pub(crate) fn steady_motion(&self, parameter: &Parameter) -> Option<SceneMotion> {
         match parameter {
             Parameter::X(_) => Some(self.with_body(DVec2::X)),
             Parameter::Y(_) => Some(self.with_body(DVec2::Y)),
-            Parameter::Height => Some(Motion { up: 1.0, ..Motion::default() }),
+            Parameter::Height => Some(SceneMotion { up: 1.0, ..SceneMotion::default() }),
             Parameter::Wall(wall) => {
-                Some(Motion { walls: walls::velocities(&self.scene, *wall), ..Motion::default() })
+                Some(SceneMotion { walls: walls::velocities(&self.scene, *wall), ..SceneMotion::default() })
             }
             _ => None,
         }
@@ -201,11 +201,11 @@ impl World {
         parameter: &Parameter,
         direction_rad: f64,
         azimuth_deg: f64,
-    ) -> Option<Motion> {
+    ) -> Option<SceneMotion> {
         let ahead = DVec2::from_angle(direction_rad);
         match parameter {
-            Parameter::Ahead => Some(Motion::of_transducer(ahead)),
-            Parameter::Left => Some(Motion::of_transducer(ahead.perp())),
+            Parameter::Ahead => Some(SceneMotion::for_transducer(ahead)),
+            Parameter::Left => Some(SceneMotion::for_transducer(ahead.perp())),
             Parameter::Heading(_) | Parameter::HeadingZero => {
                 self.turned(direction_rad, 1f64.to_radians())
             }
@@ -215,18 +215,18 @@ impl World {
     }
 
     /// Motion of an off-axis transducer by a rotation.
-    fn turned(&self, direction_rad: f64, by_rad: f64) -> Option<Motion> {
+    fn turned(&self, direction_rad: f64, by_rad: f64) -> Option<SceneMotion> {
         let mounting = &self.sensor.mounting;
         if mounting.is_on_axis() {
             return None;
         }
-        let places = mounting.places(DVec2::ZERO, direction_rad);
-        Some(Motion { transducer: places.map(|place| by_rad * place.perp()), ..Motion::default() })
+        let places = mounting.transducer_positions(DVec2::ZERO, direction_rad);
+        Some(SceneMotion { transducer: places.map(|place| by_rad * place.perp()), ..SceneMotion::default() })
     }
 
     /// Motion of the transducer together with the robot's body.
-    fn with_body(&self, velocity: DVec2) -> Motion {
-        let mut motion = Motion::of_transducer(velocity);
+    fn with_body(&self, velocity: DVec2) -> SceneMotion {
+        let mut motion = SceneMotion::for_transducer(velocity);
         if let Some(robot) = &self.scene.robot {
             let around = self.scene.with_robot_at(&ANYWHERE);
             debug_assert!(around.walls.len() + around.cylinders.len() > 0, "{robot:?}");

@@ -25,7 +25,7 @@ const MODE: u32 = 0o666;
 /// Where the file system supports `O_TMPFILE`, the draft has no name, so a killed program
 /// leaves no file behind.
 #[derive(Debug)]
-pub struct WholeFile {
+pub struct AtomicFile {
     draft: Draft,
     path: PathBuf,
 }
@@ -36,7 +36,7 @@ enum Draft {
     Named(NamedTempFile),
 }
 
-impl WholeFile {
+impl AtomicFile {
     /// Creates a draft for `path` in the same folder, with permissions set by the umask.
     ///
     /// # Errors
@@ -57,7 +57,7 @@ impl WholeFile {
     ///
     /// # Errors
     /// Returns the error of the system; the existing file is then kept.
-    pub fn take_place(self) -> io::Result<()> {
+    pub fn commit(self) -> io::Result<()> {
         sync_file(self.as_file())?;
         let Self { draft, path } = self;
         let persisted = match draft {
@@ -79,7 +79,7 @@ impl WholeFile {
     pub fn write(path: &Path, bytes: &[u8]) -> io::Result<()> {
         let mut file = Self::create(path)?;
         file.write_all(bytes)?;
-        file.take_place()
+        file.commit()
     }
 
     /// Open file of the draft.
@@ -92,7 +92,7 @@ impl WholeFile {
     }
 }
 
-impl Write for WholeFile {
+impl Write for AtomicFile {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         self.as_file().write(bytes)
     }
@@ -156,11 +156,11 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("scan.jsonl");
         std::fs::write(&path, "before").expect("writes");
-        let mut file = WholeFile::create(&path).expect("created");
+        let mut file = AtomicFile::create(&path).expect("created");
         file.write_all(b"after").expect("writes");
         assert_eq!(names_in(folder.path()), ["scan.jsonl"]);
         assert_eq!(std::fs::read(&path).expect("reads"), b"before");
-        file.take_place().expect("replaced");
+        file.commit().expect("replaced");
         assert_eq!(names_in(folder.path()), ["scan.jsonl"]);
         assert_eq!(std::fs::read(&path).expect("reads"), b"after");
     }
@@ -170,12 +170,12 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("scan.jsonl");
         let draft = hidden_names(&prefix(&path)).tempfile_in(folder.path()).expect("created");
-        let mut file = WholeFile { draft: Draft::Named(draft), path: path.clone() };
+        let mut file = AtomicFile { draft: Draft::Named(draft), path: path.clone() };
         file.write_all(b"after").expect("writes");
-        file.take_place().expect("replaced");
+        file.commit().expect("replaced");
         assert_eq!(names_in(folder.path()), ["scan.jsonl"]);
         let mode = |path| std::fs::metadata(path).expect("exists").permissions().mode();
-        let unnamed = WholeFile::create(&folder.path().join("other")).expect("created");
+        let unnamed = AtomicFile::create(&folder.path().join("other")).expect("created");
         let Draft::Unnamed(other) = &unnamed.draft else { panic!("O_TMPFILE is supported") };
         let mode_of_other = other.metadata().expect("exists").permissions().mode();
         assert_eq!(mode(&path) & 0o777, mode_of_other & 0o777, "same permissions");

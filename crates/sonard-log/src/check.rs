@@ -12,11 +12,11 @@ use std::{
 use jiff::{SignedDuration, Timestamp};
 use sonard_model::array::{MountedRanger, RangerArray};
 use sonard_records::{
-    Event, EventKind, FaultKind, Ping, PingStatus, Record, ScanEnd, ScanPlan, ScanStart, Session,
+    Event, EventKind, RecordErrorKind, Ping, PingStatus, Record, ScanEnd, ScanPlan, ScanStart, Session,
 };
 use uuid::Uuid;
 
-pub use finding::{Finding, FindingKind, Severity, Totals};
+pub use finding::{LogFinding, FindingKind, Severity, LogTotals};
 use open_scan::OpenScan;
 
 use super::{Line, read_log};
@@ -32,7 +32,7 @@ const TIME_TOLERANCE: SignedDuration = SignedDuration::from_secs(1);
 ///
 /// # Errors
 /// Returns an error if reading fails.
-pub fn check<R: BufRead>(reader: R, mut report: impl FnMut(Finding)) -> io::Result<Totals> {
+pub fn check_log<R: BufRead>(reader: R, mut report: impl FnMut(LogFinding)) -> io::Result<LogTotals> {
     let mut checker = Checker::default();
     for line in read_log(reader) {
         checker.line(&line?);
@@ -46,8 +46,8 @@ pub fn check<R: BufRead>(reader: R, mut report: impl FnMut(Finding)) -> io::Resu
 /// Incremental form of [`check`], for callers that supply the lines.
 #[derive(Debug, Default)]
 pub struct Checker {
-    totals: Totals,
-    findings: Vec<Finding>,
+    totals: LogTotals,
+    findings: Vec<LogFinding>,
     /// Number of the current line.
     at: u64,
     session: bool,
@@ -66,10 +66,10 @@ impl Checker {
         self.at = line.number;
         self.totals.lines += 1;
         match &line.record {
-            Err(error) if error.fault.kind == FaultKind::Torn => {
+            Err(error) if error.fault.kind == RecordErrorKind::Truncated => {
                 self.problem(FindingKind::TornTail, error.fault.to_string());
             }
-            Err(error) if error.fault.kind == FaultKind::UnsupportedFormat => {
+            Err(error) if error.fault.kind == RecordErrorKind::UnsupportedFormat => {
                 self.session = true;
                 self.problem(FindingKind::UnsupportedFormat, error.fault.to_string());
             }
@@ -96,13 +96,13 @@ impl Checker {
     }
 
     /// Returns the findings since the last call.
-    pub fn take_findings(&mut self) -> impl Iterator<Item = Finding> + use<> {
+    pub fn take_findings(&mut self) -> impl Iterator<Item = LogFinding> + use<> {
         mem::take(&mut self.findings).into_iter()
     }
 
     /// Numbers of records and findings so far.
     #[must_use]
-    pub fn totals(&self) -> Totals {
+    pub fn totals(&self) -> LogTotals {
         self.totals
     }
 
@@ -274,12 +274,12 @@ impl Checker {
 
     fn problem(&mut self, kind: FindingKind, detail: String) {
         self.totals.problems += 1;
-        self.findings.push(Finding { line: self.at, severity: Severity::Problem, kind, detail });
+        self.findings.push(LogFinding { line: self.at, severity: Severity::Problem, kind, detail });
     }
 
     fn warn(&mut self, kind: FindingKind, detail: String) {
         self.totals.warnings += 1;
-        self.findings.push(Finding { line: self.at, severity: Severity::Warning, kind, detail });
+        self.findings.push(LogFinding { line: self.at, severity: Severity::Warning, kind, detail });
     }
 }
 

@@ -32,7 +32,7 @@ pub enum StoreError {
     },
     /// File of another kind.
     #[error("{} is {kind}, not a log", path.display())]
-    NoLog {
+    NotALog {
         /// Path of the file.
         path: PathBuf,
         /// Detected kind of the file.
@@ -120,7 +120,7 @@ impl StoreError {
             | Self::Write { source, path }
             | Self::Sync { source, path, .. } => help_for(source, path),
             Self::UnsupportedFormat { .. } => "`sonard log verify` lists the readable lines".into(),
-            Self::NoLog { kind, .. } => kind.instead_of_a_log().into(),
+            Self::NotALog { kind, .. } => kind.help_for_log().into(),
             Self::Busy { .. } => {
                 "wait until that process ends, stop it, or choose another file".into()
             }

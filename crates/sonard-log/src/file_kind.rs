@@ -103,7 +103,7 @@ impl FileKind {
 
     /// Returns `true` if the file cannot be a log, not even a damaged one.
     #[must_use]
-    pub const fn is_no_log(self) -> bool {
+    pub const fn cannot_be_log(self) -> bool {
         !matches!(
             self,
             Self::Empty | Self::Log | Self::JsonLines | Self::Text | Self::Csv | Self::Binary
@@ -112,7 +112,7 @@ impl FileKind {
 
     /// Remedy for a file of this kind where a log is expected.
     #[must_use]
-    pub const fn instead_of_a_log(self) -> &'static str {
+    pub const fn help_for_log(self) -> &'static str {
         match self {
             Self::Gzip => "unpack it: zcat FILE | sonard ... -",
             Self::Compressed => "unpack it first",
@@ -270,7 +270,7 @@ mod tests {
         check([&[0; 4096][..], b"\n", LOG].concat(), FileKind::Log);
         check([&b"PK\x03\x04 garbage\n"[..], LOG].concat(), FileKind::Log);
         for length in 1..200 {
-            assert!(!FileKind::detect(&LOG[..length]).is_no_log(), "{length} bytes");
+            assert!(!FileKind::detect(&LOG[..length]).cannot_be_log(), "{length} bytes");
         }
     }
 }

@@ -239,7 +239,7 @@ impl LogFolder {
 
     fn open_writer(&self) -> Result<LogWriter, StoreError> {
         let writer = LogWriter::open(&self.path)?;
-        Ok(writer.with_sync_interval(self.rotation.sync_interval).with_scenes_beside())
+        Ok(writer.with_sync_interval(self.rotation.sync_interval).with_scene_folder())
     }
 
     /// Closes a log that rejects further records. After a failed sync a new file is started, since

@@ -1,6 +1,6 @@
 //! Interface of output formats for records.
 
-use super::{LogWriter, Medium, StoreError};
+use super::{LogWriter, LogOutput, StoreError};
 use sonard_records::Record;
 
 /// Writer of a log's records in one output format. [`LogWriter`] implements JSON Lines; other
@@ -20,7 +20,7 @@ pub trait RecordWriter {
     fn finish(self: Box<Self>) -> Result<(), StoreError>;
 }
 
-impl<M: Medium> RecordWriter for LogWriter<M> {
+impl<M: LogOutput> RecordWriter for LogWriter<M> {
     fn write(&mut self, record: &Record) -> Result<(), StoreError> {
         self.append(record)
     }
@@ -28,6 +28,6 @@ impl<M: Medium> RecordWriter for LogWriter<M> {
     fn finish(mut self: Box<Self>) -> Result<(), StoreError> {
         self.sync()?;
         let path = self.path().to_path_buf();
-        self.medium_mut().finish().map_err(|source| StoreError::Write { path, source })
+        self.output_mut().finish().map_err(|source| StoreError::Write { path, source })
     }
 }

@@ -7,7 +7,7 @@ use std::{
 };
 
 use sonard_interpret::interpret::grid::{
-    Grid, ImageError, MapYaml, TraceSettings, WallLine, from_pgm, from_pixels, trace,
+    Grid, ImageError, MapYaml, TraceSettings, TracedLine, from_pgm, from_pixels, trace,
 };
 use sonard_model::{geometry::DVec2, scene::Surfaces};
 use thiserror::Error;
@@ -40,7 +40,7 @@ pub enum GridFileFault {
     IsImage,
     /// Map rotated about its lower left corner, radians.
     #[error("the map is rotated by {0} radians (the third number of `origin`)")]
-    Turned(f64),
+    Rotated(f64),
     /// Invalid or too large PNG.
     #[error("PNG: {0}")]
     Png(#[from] png::DecodingError),
@@ -51,7 +51,7 @@ impl GridFileError {
     #[must_use]
     pub const fn help(&self) -> &'static str {
         match self.fault {
-            GridFileFault::Turned(_) => {
+            GridFileFault::Rotated(_) => {
                 "use an axis-aligned map; `sonard scene from-grid` reads rotated ones"
             }
             GridFileFault::Image(_) => {
@@ -83,7 +83,7 @@ pub fn read(path: &Path, note: impl FnMut(&Path)) -> Result<Grid, GridFileError>
     let (grid, yaml) = read_as(path, with_shades, note)?;
     match yaml.origin[2] {
         0.0 => Ok(grid),
-        yaw => Err(GridFileError { path: path.to_path_buf(), fault: GridFileFault::Turned(yaw) }),
+        yaw => Err(GridFileError { path: path.to_path_buf(), fault: GridFileFault::Rotated(yaw) }),
     }
 }
 
@@ -102,10 +102,10 @@ pub fn read_walls(
     note: impl FnMut(&Path),
 ) -> Result<(Surfaces, MapYaml), GridFileError> {
     let (grid, yaml) = read_as(path, |yaml| yaml, note)?;
-    let defaults = TraceSettings::of_cells(grid.shape().resolution_m);
+    let defaults = TraceSettings::for_cells(grid.shape().resolution_m);
     let settings = TraceSettings {
         tolerance_m: tolerance_m.unwrap_or(defaults.tolerance_m),
-        least_m: min_length_m.unwrap_or(defaults.least_m),
+        min_length_m: min_length_m.unwrap_or(defaults.min_length_m),
         // Walls mapped by sonar are ragged; other maps have exact rows.
         keeps_rows: !yaml.is_graded && tolerance_m.is_none(),
         ..defaults
@@ -117,7 +117,7 @@ pub fn read_walls(
         _ => origin + rotation.rotate(corner - origin),
     };
     let mut surfaces = Surfaces::default();
-    for WallLine { corners, is_closed } in trace(&grid, &settings) {
+    for TracedLine { corners, is_closed } in trace(&grid, &settings) {
         surfaces.walls("wall", corners.into_iter().map(rotated).collect(), is_closed);
     }
     Ok((surfaces, yaml))

@@ -12,7 +12,7 @@ use std::{
 };
 
 use sonard_records::{
-    FaultKind, MAX_LINE_BYTES, Ping, Provenance, Record, ScanEnd, ScanStart, ScanView, SceneRef,
+    RecordErrorKind, MAX_LINE_BYTES, Ping, Provenance, Record, ScanEnd, ScanStart, ScanView, SceneRef,
     decode_line,
 };
 use uuid::Uuid;
@@ -27,14 +27,14 @@ const PING_PREFIX: &[u8] = br#"{"type":"ping","#;
 
 /// Index of the scans in a folder of logs.
 #[derive(Debug)]
-pub struct History {
+pub struct LogIndex {
     folder: PathBuf,
     logs: BTreeMap<String, Index>,
 }
 
 /// Summary of a logged scan.
 #[derive(Debug, Clone, PartialEq)]
-pub struct PastScan {
+pub struct LoggedScan {
     /// Name of the log.
     pub log: String,
     /// First record of the scan.
@@ -79,7 +79,7 @@ struct SessionPlace {
 
 /// Location of a scan's records in a log, for reading line by line.
 #[derive(Debug, Clone)]
-pub struct Passage {
+pub struct ScanSpan {
     /// Scan without readings and events.
     pub view: ScanView,
     /// Path of the log.
@@ -88,7 +88,7 @@ pub struct Passage {
     to: u64,
 }
 
-impl History {
+impl LogIndex {
     /// Creates an empty index of the logs in `folder`.
     #[must_use]
     pub fn new(folder: PathBuf) -> Self {
@@ -99,7 +99,7 @@ impl History {
     ///
     /// # Errors
     /// Returns an error if the folder or a log cannot be read.
-    pub fn newest(&mut self, max: usize) -> io::Result<Vec<PastScan>> {
+    pub fn newest(&mut self, max: usize) -> io::Result<Vec<LoggedScan>> {
         Ok(self.list(None, max)?.unwrap_or_default())
     }
 
@@ -108,11 +108,11 @@ impl History {
     ///
     /// # Errors
     /// Returns an error if the folder or a log cannot be read.
-    pub fn before(&mut self, scan: Uuid, max: usize) -> io::Result<Option<Vec<PastScan>>> {
+    pub fn before(&mut self, scan: Uuid, max: usize) -> io::Result<Option<Vec<LoggedScan>>> {
         self.list(Some(scan), max)
     }
 
-    fn list(&mut self, mut before: Option<Uuid>, max: usize) -> io::Result<Option<Vec<PastScan>>> {
+    fn list(&mut self, mut before: Option<Uuid>, max: usize) -> io::Result<Option<Vec<LoggedScan>>> {
         let mut listed = Vec::new();
         for log in self.recent()? {
             let mut scans = self.update(&log)?.scans.iter().rev();
@@ -136,12 +136,12 @@ impl History {
     ///
     /// # Errors
     /// Returns an error if the folder or a log cannot be read.
-    pub fn passage(&mut self, scan: Uuid) -> io::Result<Option<Passage>> {
+    pub fn scan_span(&mut self, scan: Uuid) -> io::Result<Option<ScanSpan>> {
         for log in self.recent()? {
             let path = self.folder.join(&log);
             let scans = &self.update(&log)?.scans;
             if let Some(lines) = scans.iter().rev().find(|lines| lines.scan == scan) {
-                return lines.passage(path);
+                return lines.scan_span(path);
             }
         }
         Ok(None)
@@ -206,7 +206,7 @@ impl Index {
                 self.session = Some(Arc::new(SessionPlace { at, text_at, provenance, scene }));
             }
             // Scans of another log format have no readable session.
-            Some(Err(fault)) if fault.kind == FaultKind::UnsupportedFormat => self.session = None,
+            Some(Err(fault)) if fault.kind == RecordErrorKind::UnsupportedFormat => self.session = None,
             Some(Ok(Record::ScanStart(start))) => {
                 let session = self.session.clone();
                 let (scan, to) = (start.scan, self.read_to);
@@ -243,9 +243,9 @@ impl ScanLines {
         Ok(Some((start, end)))
     }
 
-    fn summary(&self, log: &str, file: &mut BufReader<File>) -> io::Result<Option<PastScan>> {
+    fn summary(&self, log: &str, file: &mut BufReader<File>) -> io::Result<Option<LoggedScan>> {
         let session = self.session.as_ref();
-        Ok(self.bounds(file)?.map(|(start, end)| PastScan {
+        Ok(self.bounds(file)?.map(|(start, end)| LoggedScan {
             log: log.to_owned(),
             start,
             end,
@@ -254,7 +254,7 @@ impl ScanLines {
         }))
     }
 
-    fn passage(&self, path: PathBuf) -> io::Result<Option<Passage>> {
+    fn scan_span(&self, path: PathBuf) -> io::Result<Option<ScanSpan>> {
         let mut file = BufReader::new(File::open(&path)?);
         let Some((start, end)) = self.bounds(&mut file)? else { return Ok(None) };
         // An earlier session with the scene's text precedes the scan's own session.
@@ -267,18 +267,18 @@ impl ScanLines {
         records.push(Record::ScanStart(start));
         records.extend(end.map(Record::ScanEnd));
         let view = ScanView::from_records(records).pop();
-        Ok(view.map(|view| Passage { view, path, from: self.from, to: self.to }))
+        Ok(view.map(|view| ScanSpan { view, path, from: self.from, to: self.to }))
     }
 }
 
-impl Passage {
+impl ScanSpan {
     /// Iterates over the lines of the readings (`true`) or of all other records (`false`), in log
     /// order and including newlines.
     ///
     /// # Errors
     /// Returns an error if the log cannot be opened.
-    pub fn lines(&self, readings: bool) -> io::Result<PassageLines> {
-        PassageLines::open(&self.path, self.from, self.to, readings)
+    pub fn lines(&self, readings: bool) -> io::Result<ScanSpanLines> {
+        ScanSpanLines::open(&self.path, self.from, self.to, readings)
     }
 
     /// Returns the last reading of a beam, and the highest beam index of the scan.
@@ -308,12 +308,12 @@ impl Passage {
 
 /// Iterator of [`Passage::lines`], with one line in memory at a time.
 #[derive(Debug)]
-pub struct PassageLines {
+pub struct ScanSpanLines {
     file: io::Take<BufReader<File>>,
     readings: bool,
 }
 
-impl PassageLines {
+impl ScanSpanLines {
     fn open(path: &Path, from: u64, to: u64, readings: bool) -> io::Result<Self> {
         let mut file = BufReader::with_capacity(1 << 15, File::open(path)?);
         file.seek(SeekFrom::Start(from))?;
@@ -321,7 +321,7 @@ impl PassageLines {
     }
 }
 
-impl Iterator for PassageLines {
+impl Iterator for ScanSpanLines {
     type Item = io::Result<Vec<u8>>;
 
     fn next(&mut self) -> Option<Self::Item> {

@@ -25,19 +25,19 @@ mod sink_file;
 mod sync;
 mod writer;
 
-pub use atomic_file::WholeFile;
-pub use check::{Checker, Finding, FindingKind, Severity, Totals, check};
+pub use atomic_file::AtomicFile;
+pub use check::{Checker, LogFinding, FindingKind, Severity, LogTotals, check_log};
 pub use error::StoreError;
 pub use file_kind::{FileKind, HEAD_BYTES};
 pub use folder::{LogFile, LogFolder, Rotation, log_files};
 pub use format::RecordWriter;
-pub use history::{History, Passage, PassageLines, PastScan};
-pub use log_position::{MARK_BYTES, Mark, digest_of, hexadecimal, read_small};
-pub use open::{Recovered, is_being_written, open_own};
+pub use history::{LogIndex, ScanSpan, ScanSpanLines, LoggedScan};
+pub use log_position::{FINGERPRINT_BYTES, PositionFingerprint, file_digest, to_hex, read_small_json};
+pub use open::{Recovered, is_locked, open_no_follow};
 pub use reader::{Line, LineError, Lines, Loaded, load, open_for_reading, read_log};
-pub use repair::{LeftOut, Repair, repair};
-pub use scenes::{MAX_LOGGED_SCENE_BYTES, SceneLost, logged_scene};
-pub use sink_file::{Displacement, FileMedium, Medium, Pipe};
+pub use repair::{RemovedLine, Repair, repair};
+pub use scenes::{MAX_LOGGED_SCENE_BYTES, SceneUnavailable, logged_scene};
+pub use sink_file::{Displacement, FileOutput, LogOutput, PipeOutput};
 pub use sync::{sync_file, sync_folder, sync_folder_of};
 pub use writer::{LogWriter, SYNC_INTERVAL};
 

@@ -16,7 +16,7 @@ use rustix::{
 use sonard_records::{Event, EventKind, MAX_LINE_BYTES};
 
 use super::{
-    FileMedium, Medium, Pipe, StoreError, reader,
+    FileOutput, LogOutput, PipeOutput, StoreError, reader,
     sync::{is_unsupported, sync_file, sync_folder_of},
 };
 
@@ -55,13 +55,13 @@ impl Recovered {
 /// Opens, locks and repairs a log for a [`super::LogWriter`].
 pub(super) fn open_file(
     path: &Path,
-) -> Result<(Box<dyn Medium + Send>, Option<Recovered>), StoreError> {
+) -> Result<(Box<dyn LogOutput + Send>, Option<Recovered>), StoreError> {
     let fail = |source| StoreError::Open { path: path.into(), source };
     let existing = fs::symlink_metadata(path);
     if existing.as_ref().is_ok_and(|meta| !meta.is_file() && !meta.is_dir() && !meta.is_symlink()) {
         // A FIFO or a device is neither locked nor repaired.
-        let file = open_own(OpenOptions::new().append(true), path).map_err(fail)?;
-        return Ok((Box::new(Pipe(file)), None));
+        let file = open_no_follow(OpenOptions::new().append(true), path).map_err(fail)?;
+        return Ok((Box::new(PipeOutput(file)), None));
     }
     let file = open_locked(path)?;
     if existing.is_err()
@@ -72,7 +72,7 @@ pub(super) fn open_file(
         return Err(fail(error));
     }
     let recovered = repair_end(&file, path).map_err(fail)?;
-    Ok((Box::new(FileMedium::new(file).map_err(fail)?), recovered))
+    Ok((Box::new(FileOutput::new(file).map_err(fail)?), recovered))
 }
 
 /// Opens a file for modification and rejects symbolic links, whose target may not belong to this
@@ -80,7 +80,7 @@ pub(super) fn open_file(
 ///
 /// # Errors
 /// Returns the error of the system, or an error for a symbolic link.
-pub fn open_own(options: &mut OpenOptions, path: &Path) -> io::Result<File> {
+pub fn open_no_follow(options: &mut OpenOptions, path: &Path) -> io::Result<File> {
     let opened = options.custom_flags(OFlags::NOFOLLOW.bits().cast_signed()).open(path);
     opened.map_err(|error| match fs::symlink_metadata(path) {
         Ok(there) if there.is_symlink() => io::Error::new(
@@ -96,7 +96,7 @@ pub fn open_own(options: &mut OpenOptions, path: &Path) -> io::Result<File> {
 fn open_locked(path: &Path) -> Result<File, StoreError> {
     let fail = |source| StoreError::Open { path: path.into(), source };
     loop {
-        let file = open_own(OpenOptions::new().read(true).append(true).create(true), path)
+        let file = open_no_follow(OpenOptions::new().read(true).append(true).create(true), path)
             .map_err(fail)?;
         let ours = file.metadata().map_err(fail)?;
         if !ours.is_file() {
@@ -131,7 +131,7 @@ pub(super) fn lock(file: &File, path: &Path) -> Result<(), StoreError> {
 
 /// Returns `true` if a process is writing or repairing the log.
 #[must_use]
-pub fn is_being_written(file: &File) -> bool {
+pub fn is_locked(file: &File) -> bool {
     let busy = flock(file, FlockOperation::NonBlockingLockShared);
     if busy.is_ok() {
         // Released immediately: the lock was only a test.

@@ -6,7 +6,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use sonard_records::{FaultKind, MAX_LINE_BYTES, Record, RecordError, decode_line};
+use sonard_records::{RecordErrorKind, MAX_LINE_BYTES, Record, RecordError, decode_line};
 
 use super::{FileKind, HEAD_BYTES, StoreError};
 
@@ -54,7 +54,7 @@ impl LineError {
     /// [`StoreError::UnsupportedFormat`] if the line is a session of another format.
     pub fn reject_other_format(self, path: &Path) -> Result<Self, StoreError> {
         match self.fault.kind {
-            FaultKind::UnsupportedFormat => {
+            RecordErrorKind::UnsupportedFormat => {
                 Err(StoreError::UnsupportedFormat { path: path.into(), fault: self })
             }
             _ => Ok(self),
@@ -144,7 +144,7 @@ pub(super) fn decode(bytes: &[u8], number: u64, ended: bool) -> Result<Record, R
 
 fn torn_fault(length: u64) -> RecordError {
     RecordError {
-        kind: FaultKind::Torn,
+        kind: RecordErrorKind::Truncated,
         column: None,
         field: None,
         message: format!("the last line is torn: it ends within a record after {length} byte(s)"),
@@ -153,7 +153,7 @@ fn torn_fault(length: u64) -> RecordError {
 
 fn too_long_fault(length: u64) -> RecordError {
     RecordError {
-        kind: FaultKind::TooLong,
+        kind: RecordErrorKind::TooLong,
         column: None,
         field: None,
         message: format!("{length} bytes long; a record has at most {MAX_LINE_BYTES}"),
@@ -207,5 +207,5 @@ fn reject_other_kind(
 ) -> Result<Box<dyn BufRead>, StoreError> {
     let fail = |source| StoreError::Read { path: path.into(), source };
     let kind = FileKind::detect(reader.fill_buf().map_err(fail)?);
-    if kind.is_no_log() { Err(StoreError::NoLog { path: path.into(), kind }) } else { Ok(reader) }
+    if kind.cannot_be_log() { Err(StoreError::NotALog { path: path.into(), kind }) } else { Ok(reader) }
 }

@@ -6,18 +6,18 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use sonard_records::{FaultKind, RecordError};
+use sonard_records::{RecordErrorKind, RecordError};
 
 use super::{
     FileKind, Line, LineError, StoreError,
-    open::{lock, open_own, with_suffix},
+    open::{lock, open_no_follow, with_suffix},
     open_for_reading, read_log,
     sync::{sync_file, sync_folder_of},
 };
 
 /// Line removed by a repair.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct LeftOut {
+pub struct RemovedLine {
     /// Line number in the original, from 1.
     pub line: u64,
     /// Offset in the original, bytes.
@@ -34,11 +34,11 @@ pub struct Repair {
     /// Number of records kept byte for byte.
     pub kept: u64,
     /// Removed torn last line, if any.
-    pub torn: Option<LeftOut>,
+    pub torn: Option<RemovedLine>,
     /// `true` if the last record was complete and only its newline was added.
     pub newline_added: bool,
     /// Other removed lines.
-    pub left_out: Vec<LeftOut>,
+    pub removed: Vec<RemovedLine>,
     /// Complete records kept byte for byte although this version cannot read them: another version
     /// may.
     pub kept_unread: Vec<LineError>,
@@ -62,7 +62,7 @@ pub fn repair(path: &Path) -> Result<Repair, StoreError> {
     // Rejects files of other kinds.
     drop(open_for_reading(path)?);
     let open = |source| StoreError::Open { path: path.clone(), source };
-    let file = open_own(OpenOptions::new().read(true), path).map_err(open)?;
+    let file = open_no_follow(OpenOptions::new().read(true), path).map_err(open)?;
     if !file.metadata().map_err(open)?.is_file() {
         return Err(open(io::Error::new(io::ErrorKind::InvalidInput, "it is not a regular file")));
     }
@@ -74,10 +74,10 @@ pub fn repair(path: &Path) -> Result<Repair, StoreError> {
         let line = line.map_err(|source| StoreError::Read { path: path.clone(), source })?;
         repair.process(&line, &mut out).map_err(|source| draft.fail(source))?;
     }
-    if repair.kept == 0 && repair.kept_unread.is_empty() && !repair.left_out.is_empty() {
+    if repair.kept == 0 && repair.kept_unread.is_empty() && !repair.removed.is_empty() {
         // A file without any record is not a log and remains unchanged.
         let kind = open_for_reading(path)?.fill_buf().map_or(FileKind::Binary, FileKind::detect);
-        return Err(StoreError::NoLog { path: path.clone(), kind });
+        return Err(StoreError::NotALog { path: path.clone(), kind });
     }
     out.flush().map_err(|source| draft.fail(source))?;
     drop(out);
@@ -95,25 +95,25 @@ impl Repair {
                 self.newline_added = !line.ended;
                 return keep(line, out);
             }
-            Err(error) if error.fault.is_whole_record() => {
+            Err(error) if error.fault.is_complete_object() => {
                 self.kept_unread.push(error.clone());
                 return keep(line, out);
             }
             Err(error) => error.fault.clone(),
         };
-        let torn = fault.kind == FaultKind::Torn;
+        let torn = fault.kind == RecordErrorKind::Truncated;
         let Line { number, offset, length, .. } = *line;
-        let left_out = LeftOut { line: number, offset, length, fault };
+        let left_out = RemovedLine { line: number, offset, length, fault };
         if torn {
             self.torn = Some(left_out);
         } else {
-            self.left_out.push(left_out);
+            self.removed.push(left_out);
         }
         Ok(())
     }
 
     fn has_changes(&self) -> bool {
-        self.torn.is_some() || self.newline_added || !self.left_out.is_empty()
+        self.torn.is_some() || self.newline_added || !self.removed.is_empty()
     }
 }
 

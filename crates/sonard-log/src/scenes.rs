@@ -10,7 +10,7 @@ use sonard_model::scene::Scene;
 use sonard_records::{Record, SceneRef, Session};
 use thiserror::Error;
 
-use super::{StoreError, WholeFile};
+use super::{StoreError, AtomicFile};
 
 /// Maximum length of a scene's text in a session record, bytes: its escaped form fits in a line.
 pub const MAX_LOGGED_SCENE_BYTES: usize = 1 << 18;
@@ -20,10 +20,10 @@ const FOLDER: &str = "scenes";
 
 /// Reason why the scene of a log is unavailable.
 #[derive(Debug, Error)]
-pub enum SceneLost {
+pub enum SceneUnavailable {
     /// Scene missing from the record and from the folder for long texts.
     #[error("the log does not contain its scene `{}`", .0.name)]
-    NotThere(SceneRef),
+    Missing(SceneRef),
     /// Scene whose text differs from the one that the model used.
     #[error("the log's text of its scene `{}` was changed: its SHA-256 differs", .0.name)]
     Changed(SceneRef),
@@ -34,16 +34,16 @@ pub enum SceneLost {
 ///
 /// # Errors
 /// Returns an error if the scene's text is missing or was changed.
-pub fn logged_scene(session: &Session, log: &Path) -> Result<Option<Scene>, SceneLost> {
+pub fn logged_scene(session: &Session, log: &Path) -> Result<Option<Scene>, SceneUnavailable> {
     let Some(named) = &session.scene else { return Ok(None) };
     let from_file = || fs::read_to_string(scene_path(log, &named.sha256)?).ok();
     let text = match &session.scene_text {
         Some(text) => text.to_string(),
-        None => from_file().ok_or_else(|| SceneLost::NotThere(named.clone()))?,
+        None => from_file().ok_or_else(|| SceneUnavailable::Missing(named.clone()))?,
     };
     match Scene::from_json(&text) {
         Ok(scene) if scene.sha256 == named.sha256 => Ok(Some(scene)),
-        _ => Err(SceneLost::Changed(named.clone())),
+        _ => Err(SceneUnavailable::Changed(named.clone())),
     }
 }
 
@@ -103,7 +103,7 @@ fn write_text(log: &Path, scene: &SceneRef, text: &str) -> Result<(), StoreError
     }
     let write = || {
         fs::create_dir_all(path.parent().unwrap_or(log))?;
-        WholeFile::write(&path, text.as_bytes())
+        AtomicFile::write(&path, text.as_bytes())
     };
     write().map_err(|source| StoreError::Write { path: path.clone(), source })
 }

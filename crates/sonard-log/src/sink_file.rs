@@ -11,7 +11,7 @@ use std::{
 use super::sync::sync_file;
 
 /// File operations of [`super::LogWriter`]. Tests implement them with faults.
-pub trait Medium: fmt::Debug {
+pub trait LogOutput: fmt::Debug {
     /// Appends bytes with one write and returns the number written, which may be smaller.
     ///
     /// # Errors
@@ -28,7 +28,7 @@ pub trait Medium: fmt::Debug {
     ///
     /// # Errors
     /// Returns an error if truncation fails; the log then ends in a torn line.
-    fn take_back(&mut self, bytes: u64) -> io::Result<()>;
+    fn remove_last(&mut self, bytes: u64) -> io::Result<()>;
 
     /// Expected length from the written bytes; 0 for outputs without a length.
     fn length(&self) -> u64 {
@@ -62,7 +62,7 @@ pub trait Medium: fmt::Debug {
     }
 }
 
-impl<M: Medium + ?Sized> Medium for Box<M> {
+impl<M: LogOutput + ?Sized> LogOutput for Box<M> {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         (**self).write(bytes)
     }
@@ -71,8 +71,8 @@ impl<M: Medium + ?Sized> Medium for Box<M> {
         (**self).sync()
     }
 
-    fn take_back(&mut self, bytes: u64) -> io::Result<()> {
-        (**self).take_back(bytes)
+    fn remove_last(&mut self, bytes: u64) -> io::Result<()> {
+        (**self).remove_last(bytes)
     }
 
     fn length(&self) -> u64 {
@@ -123,13 +123,13 @@ impl fmt::Display for Displacement {
 
 /// Regular file, opened for appending and locked.
 #[derive(Debug)]
-pub struct FileMedium {
+pub struct FileOutput {
     file: File,
     /// Length from the written bytes.
     length: u64,
 }
 
-impl FileMedium {
+impl FileOutput {
     /// Wraps an open file.
     ///
     /// # Errors
@@ -140,7 +140,7 @@ impl FileMedium {
     }
 }
 
-impl Medium for FileMedium {
+impl LogOutput for FileOutput {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         let written = self.file.write(bytes)?;
         self.length += written as u64;
@@ -151,7 +151,7 @@ impl Medium for FileMedium {
         sync_file(&self.file)
     }
 
-    fn take_back(&mut self, bytes: u64) -> io::Result<()> {
+    fn remove_last(&mut self, bytes: u64) -> io::Result<()> {
         // Uses the current length: if another program truncated the file, a stored length would
         // extend the file with NUL bytes.
         let length = self.file.metadata()?.len();
@@ -193,9 +193,9 @@ impl Medium for FileMedium {
 
 /// Standard output or another writer, which is flushed but not synced.
 #[derive(Debug)]
-pub struct Pipe<W>(pub W);
+pub struct PipeOutput<W>(pub W);
 
-impl<W: Write + fmt::Debug> Medium for Pipe<W> {
+impl<W: Write + fmt::Debug> LogOutput for PipeOutput<W> {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         self.0.write(bytes)
     }
@@ -204,7 +204,7 @@ impl<W: Write + fmt::Debug> Medium for Pipe<W> {
         self.0.flush()
     }
 
-    fn take_back(&mut self, bytes: u64) -> io::Result<()> {
+    fn remove_last(&mut self, bytes: u64) -> io::Result<()> {
         if bytes == 0 { Ok(()) } else { Err(io::ErrorKind::Unsupported.into()) }
     }
 }

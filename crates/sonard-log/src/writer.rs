@@ -9,7 +9,7 @@ use std::{
 use sonard_records::{Record, encode_line};
 
 use super::{
-    Displacement, Medium, Pipe, StoreError,
+    Displacement, LogOutput, PipeOutput, StoreError,
     open::{Recovered, open_file},
     scenes::SceneStore,
 };
@@ -24,7 +24,7 @@ pub const SYNC_INTERVAL: Duration = Duration::from_secs(2);
 /// [`append`](Self::append) and [`sync_if_due`](Self::sync_if_due) check. A killed process loses no
 /// appended record; a power failure loses the unsynced ones.
 #[derive(Debug)]
-pub struct LogWriter<M: Medium = Box<dyn Medium + Send>> {
+pub struct LogWriter<M: LogOutput = Box<dyn LogOutput + Send>> {
     medium: M,
     path: PathBuf,
     line: Vec<u8>,
@@ -61,11 +61,11 @@ impl LogWriter {
     /// Creates a writer to standard output.
     #[must_use]
     pub fn stdout() -> Self {
-        Self::new(Box::new(Pipe(io::stdout())), Path::new("standard output"))
+        Self::new(Box::new(PipeOutput(io::stdout())), Path::new("standard output"))
     }
 }
 
-impl<M: Medium> LogWriter<M> {
+impl<M: LogOutput> LogWriter<M> {
     /// Creates a writer to `medium`; `path` names it in errors.
     pub fn new(medium: M, path: &Path) -> Self {
         Self {
@@ -91,7 +91,7 @@ impl<M: Medium> LogWriter<M> {
 
     /// Stores scenes that are too long for a line in the log's folder.
     #[must_use]
-    pub fn with_scenes_beside(mut self) -> Self {
+    pub fn with_scene_folder(mut self) -> Self {
         self.scenes = SceneStore::in_folder_of(&self.path);
         self
     }
@@ -179,7 +179,7 @@ impl<M: Medium> LogWriter<M> {
     }
 
     /// Output of the writer, for operations after the last record.
-    pub fn medium_mut(&mut self) -> &mut M {
+    pub fn output_mut(&mut self) -> &mut M {
         &mut self.medium
     }
 
@@ -249,7 +249,7 @@ impl<M: Medium> LogWriter<M> {
         let path = self.path.clone();
         match written {
             0 => Err(StoreError::Write { path, source }),
-            _ if self.medium.take_back(written as u64).is_ok() => {
+            _ if self.medium.remove_last(written as u64).is_ok() => {
                 Err(StoreError::Write { path, source })
             }
             _ => {
@@ -260,7 +260,7 @@ impl<M: Medium> LogWriter<M> {
     }
 }
 
-impl<M: Medium> Drop for LogWriter<M> {
+impl<M: LogOutput> Drop for LogWriter<M> {
     fn drop(&mut self) {
         // Errors cannot be returned here; callers use close() to receive them.
         if !self.failed {

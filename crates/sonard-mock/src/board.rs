@@ -147,7 +147,7 @@ impl MockBoard {
 
     /// Time to the end of the sweep's lease, ticks.
     fn lease_left(&self) -> Option<u64> {
-        let ends = self.device.lease_ends()?;
+        let ends = self.device.lease_deadline()?;
         Some(u64::from(ends.wrapping_sub(self.now as u32).cast_signed().max(0).unsigned_abs()))
     }
 
@@ -293,7 +293,7 @@ impl MockBoard {
                 Action::Reset => self.restart(ResetCause::Requested),
             }
             if matches!(action, Action::Home { .. } | Action::Move { .. })
-                && let Some(fault) = self.faults.at_motion()
+                && let Some(fault) = self.faults.draw_motion_fault()
             {
                 self.inject(fault);
             }
@@ -312,7 +312,7 @@ impl MockBoard {
         let (step, until) = match self.activity {
             Activity::Moving { motion, from, since, .. } => {
                 let (gone, stopped_s) =
-                    motion.braked_at((self.now - since) as f64 / f64::from(TICK_HZ));
+                    motion.braking_stop((self.now - since) as f64 / f64::from(TICK_HZ));
                 self.world.turn(gone);
                 (from + gone, since + ticks(stopped_s))
             }
@@ -325,7 +325,7 @@ impl MockBoard {
     /// Switches the coil current off; the motor stays about where it was.
     fn release_coils(&mut self) {
         if let Activity::Moving { motion, from, since, .. } = self.activity {
-            let (gone, _) = motion.braked_at((self.now - since) as f64 / f64::from(TICK_HZ));
+            let (gone, _) = motion.braking_stop((self.now - since) as f64 / f64::from(TICK_HZ));
             self.world.turn(gone);
             self.step = from + gone;
         }
@@ -335,7 +335,7 @@ impl MockBoard {
     }
 
     fn fire(&mut self, window_ticks: u32, max_echoes: u8) {
-        let (stuck, no_echo) = self.faults.of_module();
+        let (stuck, no_echo) = self.faults.draw_module_faults();
         if stuck {
             // Without a firing the result is available at once.
             let report = Box::new(EchoReport {
@@ -358,7 +358,7 @@ impl MockBoard {
         self.activity = Activity::Listening { report, until: fired + u64::from(window_ticks) };
         self.fired += 1;
         self.notes.push(Note::Fired(self.fired));
-        if let Some(fault) = self.faults.at_firing() {
+        if let Some(fault) = self.faults.draw_firing_fault() {
             self.inject(fault);
         }
     }

@@ -191,7 +191,7 @@ impl Faults {
     }
 
     /// Draws the fault of the device at a firing, if any.
-    pub fn at_firing(&mut self) -> Option<DeviceFault> {
+    pub fn draw_firing_fault(&mut self) -> Option<DeviceFault> {
         let FaultPlan { stall, stall_ms, reset, hangup, .. } = self.plan;
         // All three are drawn each time, so that no probability affects the sequence of another.
         let draws = [self.happens(reset), self.happens(hangup), self.happens(stall)];
@@ -202,7 +202,7 @@ impl Faults {
     }
 
     /// Draws the fault of the device at the start of a move, if any.
-    pub fn at_motion(&mut self) -> Option<DeviceFault> {
+    pub fn draw_motion_fault(&mut self) -> Option<DeviceFault> {
         let FaultPlan { motor_reset, motor_hangup, .. } = self.plan;
         let draws = [self.happens(motor_reset), self.happens(motor_hangup)];
         [DeviceFault::Reset, DeviceFault::Hangup]
@@ -212,7 +212,7 @@ impl Faults {
     }
 
     /// Draws the faults of the module at a firing: ECHO stuck high, no echo.
-    pub fn of_module(&mut self) -> (bool, bool) {
+    pub fn draw_module_faults(&mut self) -> (bool, bool) {
         let FaultPlan { stuck_echo, no_echo, .. } = self.plan;
         (self.happens(stuck_echo), self.happens(no_echo))
     }
@@ -268,6 +268,6 @@ mod tests {
         let mut got = Vec::new();
         faults.garble(&[1, 2, 3], &mut got);
         assert_eq!(got, [1, 2, 3]);
-        assert_eq!((faults.delay_ms(), faults.at_firing()), (0, None));
+        assert_eq!((faults.delay_ms(), faults.draw_firing_fault()), (0, None));
     }
 }

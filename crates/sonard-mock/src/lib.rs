@@ -23,4 +23,4 @@ pub use invalid_replies::{INVALID_REPLIES, InvalidReply};
 pub use memory::MemorySocket;
 pub use note::Note;
 pub use serve::MockPort;
-pub use world::{Soundings, World};
+pub use world::{EchoTable, World};

@@ -19,7 +19,7 @@ use super::{
     identity::Pace,
     memory::{MemoryLine, MemorySocket},
     note::Note,
-    world::Soundings,
+    world::EchoTable,
 };
 
 /// Interval at which a lock left behind by a killed host is cleared.
@@ -38,7 +38,7 @@ pub struct MockPort {
     to_host: DelayedBytes,
     to_board: DelayedBytes,
     lock_check: Instant,
-    moves: Option<UnboundedReceiver<Soundings>>,
+    moves: Option<UnboundedReceiver<EchoTable>>,
 }
 
 /// Board's side of the port.
@@ -162,7 +162,7 @@ impl MockPort {
     /// Sets a channel of echoes for a board that is moved. A received table applies from then on,
     /// and before any byte sent later.
     #[must_use]
-    pub fn moved_by(self, moves: UnboundedReceiver<Soundings>) -> Self {
+    pub fn with_moves(self, moves: UnboundedReceiver<EchoTable>) -> Self {
         Self { moves: Some(moves), ..self }
     }
 
@@ -188,7 +188,7 @@ impl MockPort {
         loop {
             while let Some(soundings) = self.moves.as_mut().and_then(|moves| moves.try_recv().ok())
             {
-                self.board.world().set_soundings(soundings);
+                self.board.world().set_echo_table(soundings);
             }
             let due = self.due();
             self.board.advance(due);

@@ -9,7 +9,7 @@ use firmware_protocol::{
 use sonard_model::{acoustics::TofNoise, model::Prediction};
 use sonard_records::PingStatus;
 
-use super::{BoardSettings, FaultPlan, MockBoard, Note, Pace, Soundings, WakeKind, World};
+use super::{BoardSettings, FaultPlan, MockBoard, Note, Pace, EchoTable, WakeKind, World};
 
 const TICKS_PER_US: u64 = 2;
 
@@ -26,7 +26,7 @@ pub(super) fn board(faults: FaultPlan) -> MockBoard {
             crosstalk: None,
         })
         .collect();
-    let world = World::new(Soundings::from_predictions(&predictions), TofNoise::NONE, 0.0, 1);
+    let world = World::new(EchoTable::from_predictions(&predictions), TofNoise::NONE, 0.0, 1);
     let settings = BoardSettings {
         boot: 7,
         clock: u32::MAX - 1_000_000,
@@ -207,7 +207,7 @@ mod conformance {
                 echoes_us: after_us.iter().copied().collect(),
                 crosstalk: None,
             };
-            self.world().set_soundings(Soundings::from_predictions(&[everywhere]));
+            self.world().set_echo_table(EchoTable::from_predictions(&[everywhere]));
         }
 
         fn take_firings(&mut self) -> usize {

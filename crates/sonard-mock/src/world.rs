@@ -14,7 +14,7 @@ use sonard_records::{PingStatus, ScanPlan};
 
 /// Predicted echoes for each motor step of a revolution.
 #[derive(Debug, Clone)]
-pub struct Soundings {
+pub struct EchoTable {
     rows: Vec<EchoRow>,
 }
 
@@ -26,7 +26,7 @@ struct EchoRow {
     first_is_blanking: bool,
 }
 
-impl Soundings {
+impl EchoTable {
     /// Computes the echoes for every step of a revolution.
     ///
     /// `mounting_offset_deg`: angle of the transducer on the motor's shaft.
@@ -70,7 +70,7 @@ impl Soundings {
 /// Simulated motor and echoes.
 #[derive(Debug)]
 pub struct World {
-    soundings: Soundings,
+    soundings: EchoTable,
     noise: TofNoise,
     missed_step_rate: f64,
     /// True position of the motor, steps.
@@ -82,13 +82,13 @@ impl World {
     /// Creates a world with the motor at home. `missed_step_rate`: probability per move that it
     /// ends one step short.
     #[must_use]
-    pub fn new(soundings: Soundings, noise: TofNoise, missed_step_rate: f64, seed: u64) -> Self {
+    pub fn new(soundings: EchoTable, noise: TofNoise, missed_step_rate: f64, seed: u64) -> Self {
         let rng = Pcg64::seed_from_u64(seed);
         Self { soundings, noise, missed_step_rate: missed_step_rate.clamp(0.0, 1.0), step: 0, rng }
     }
 
     /// Replaces the echoes, for instance after a move of the robot.
-    pub fn set_soundings(&mut self, soundings: Soundings) {
+    pub fn set_echo_table(&mut self, soundings: EchoTable) {
         self.soundings = soundings;
     }
 
@@ -134,12 +134,12 @@ mod tests {
     use super::*;
     use smallvec::smallvec;
 
-    fn soundings() -> Soundings {
+    fn soundings() -> EchoTable {
         let row = |echoes_us: &[f64], first_is_blanking| EchoRow {
             echoes_us: echoes_us.into(),
             first_is_blanking,
         };
-        Soundings {
+        EchoTable {
             rows: vec![
                 row(&[3000.0, 5000.0], false),
                 row(&[2380.0, 6000.0], true),

@@ -15,7 +15,7 @@ use sonard_model::{
     acoustics::{Air, Sensor},
     geometry::{DVec2, Pose},
     model::{Options, Simulator},
-    plan::ScanPlan,
+    scan_plan::ScanPlan,
     scene::{Scene, SceneBuilder},
 };
 
@@ -155,17 +155,17 @@ fn furniture(
     let id = format!("piece{piece}");
     let walls = |builder: SceneBuilder| builder.room(&id, &corners, material);
     match rng.random_range(0..10) {
-        0..4 => walls(builder).standing_from(0.0, rng.random_range(0.3..1.0)),
-        4 => walls(builder).standing_from(0.0, rng.random_range(1.2..2.0)),
+        0..4 => walls(builder).z_range(0.0, rng.random_range(0.3..1.0)),
+        4 => walls(builder).z_range(0.0, rng.random_range(1.2..2.0)),
         5 => walls(builder),
-        6 => walls(builder).standing_from(rng.random_range(1.0..1.6), ceiling_m),
+        6 => walls(builder).z_range(rng.random_range(1.0..1.6), ceiling_m),
         _ => {
             let (radius_m, top_m) = (rng.random_range(0.01..0.03), rng.random_range(0.4..0.75));
             let legs = corners.iter().zip(0..);
             legs.fold(builder, |builder, (corner, leg)| {
                 builder
                     .cylinder(&format!("{id}.leg{leg}"), *corner, radius_m, material)
-                    .standing_from(0.0, top_m)
+                    .z_range(0.0, top_m)
             })
         }
     }

@@ -15,8 +15,8 @@ pub use aperture::{ApertureResponse, Image, Incidence};
 pub use face::{Disc, Face, FaceAspect};
 pub use pulse::EchoShape;
 pub use receiver::{
-    Combining, Detection, EchoTrace, EnvelopePeak, Incident, Latch, Listening, PulseArrival,
-    Receiver, ReceiverNoise, Rise, TracePoint, classify_tof,
+    Combining, Detection, EchoTrace, EnvelopePeak, Incident, Latch, DetectorBank, PulseArrival,
+    Receiver, ReceiverNoise, EchoRise, TracePoint, classify_tof,
 };
 pub use sensor::{
     Aperture, BeamPoint, ChirpPart, Detector, EdgeLawKind, Gain, GainStep, Mounting, Pulse,

@@ -19,13 +19,13 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 pub use body::{Body, BodyShape};
-pub use course::{Course, CourseError};
+pub use course::{RobotCourse, CourseError};
 pub use error::{ArrayError, ArrayPoseError};
-pub use firing::{OtherFiring, Turn};
+pub use firing::{InterferingFiring, FiringSlot};
 
 use crate::{
     geometry::{DVec2, Pose, wrap_360},
-    plan::ScanPlan,
+    scan_plan::ScanPlan,
     scene::Scene,
 };
 
@@ -58,7 +58,7 @@ pub struct RangerArray {
     /// Firing order by id. Ids may be repeated or left out; a list of ids is fired simultaneously.
     /// Default: all rangers in the order above, one after the other.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub firing_order: Vec<Turn>,
+    pub firing_order: Vec<FiringSlot>,
     /// Body of the robot, which blocks sound. Default: the robot of the scene, if it has one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub body: Option<Body>,
@@ -87,7 +87,7 @@ pub struct MountedRanger {
 impl MountedRanger {
     /// World pose of the ranger on a robot at a pose.
     #[must_use]
-    pub fn pose_on(&self, robot: &Pose) -> Pose {
+    pub fn world_pose(&self, robot: &Pose) -> Pose {
         let turn = DVec2::from_angle(robot.direction_rad(0.0));
         let place = robot.position() + turn.rotate(DVec2::new(self.x_m, self.y_m));
         let heading_deg = robot.heading_deg + self.bearing_deg;
@@ -155,12 +155,12 @@ impl RangerArray {
         for (at, ranger) in self.rangers.iter().enumerate() {
             let field = |name| format!("rangers[{at}].{name}");
             if ranger.id.is_empty() {
-                return Err(ArrayError::NoId { field: field("id") });
+                return Err(ArrayError::MissingId { field: field("id") });
             }
             let before = self.rangers[..at].iter().position(|other| other.id == ranger.id);
             if let Some(first) = before {
                 let (field, id) = (field("id"), ranger.id.clone());
-                return Err(ArrayError::SameId { field, id, first });
+                return Err(ArrayError::DuplicateId { field, id, first });
             }
             within(field("x_m"), ranger.x_m, -10.0, 10.0)?;
             within(field("y_m"), ranger.y_m, -10.0, 10.0)?;
@@ -194,7 +194,7 @@ impl RangerArray {
     /// Robot poses of `rounds` rounds from a pose on. The robot rotates in place by equal parts of
     /// the angle between two rangers of an even ring, so that the directions are evenly spaced.
     #[must_use]
-    pub fn turned(&self, pose: &Pose, rounds: u32) -> Vec<Pose> {
+    pub fn rotated_poses(&self, pose: &Pose, rounds: u32) -> Vec<Pose> {
         let step_deg = self.plan(rounds).step_deg;
         let heading_deg = |round| wrap_360(pose.heading_deg + f64::from(round) * step_deg);
         let turned = (1..rounds).map(|round| Pose { heading_deg: heading_deg(round), ..*pose });
@@ -203,7 +203,7 @@ impl RangerArray {
 
     /// Scene with the body of this array's robot as its robot.
     #[must_use]
-    pub fn in_scene(&self, scene: &Scene) -> Scene {
+    pub fn scene_with_body(&self, scene: &Scene) -> Scene {
         let own = self.body.as_ref().map(Body::robot);
         Scene { robot: own.or_else(|| scene.robot.clone()), ..scene.clone() }
     }
@@ -227,10 +227,10 @@ impl RangerArray {
         poses: &[Pose],
     ) -> Result<(), (usize, ArrayPoseError)> {
         let faces = |robot: &Pose| {
-            let faces = self.rangers.iter().map(|ranger| ranger.pose_on(robot).position());
+            let faces = self.rangers.iter().map(|ranger| ranger.world_pose(robot).position());
             (*robot, faces.collect())
         };
-        let checked = self.in_scene(scene).check_many_places(poses.iter().map(faces));
+        let checked = self.scene_with_body(scene).check_many_face_positions(poses.iter().map(faces));
         checked.map_err(|(at, (ranger, error))| {
             let ranger = ranger.map(|ranger| self.rangers[ranger].id.clone());
             (at, ArrayPoseError { ranger, error })
@@ -243,6 +243,6 @@ fn within(field: impl Into<String>, value: f64, min: f64, max: f64) -> Result<()
     if (min..=max).contains(&value) {
         Ok(())
     } else {
-        Err(ArrayError::Figure { field: field.into(), value, min, max })
+        Err(ArrayError::OutOfRange { field: field.into(), value, min, max })
     }
 }

@@ -6,7 +6,7 @@ mod outline;
 mod snap;
 mod union_find;
 
-pub use arrangement::{Arrangement, Piece, between};
+pub use arrangement::{Arrangement, SegmentPiece, edge_key};
 pub use glam::DVec2;
 pub use mirror::Mirror;
 pub use outline::{enclosed_area, encloses};
@@ -55,7 +55,7 @@ impl Pose {
 /// Uses the arc tangent, which is accurate to rounding. The arc cosine of a dot product loses half
 /// of the digits for nearly equal directions.
 #[must_use]
-pub fn turn_rad(from: DVec2, to: DVec2) -> f64 {
+pub fn signed_angle_rad(from: DVec2, to: DVec2) -> f64 {
     from.perp_dot(to).atan2(from.dot(to))
 }
 

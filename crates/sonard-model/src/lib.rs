@@ -33,7 +33,7 @@ pub mod array;
 pub mod geometry;
 pub mod model;
 pub mod motion;
-pub mod plan;
+pub mod scan_plan;
 pub mod reading;
 pub mod scene;
 pub mod viewpoint;

@@ -33,7 +33,7 @@ impl Trapezoid {
     /// Stop of a motor that begins to brake at `time_s`: position in steps from the start, and time
     /// in seconds after the start.
     #[must_use]
-    pub fn braked_at(&self, time_s: f64) -> (i32, f64) {
+    pub fn braking_stop(&self, time_s: f64) -> (i32, f64) {
         let (travelled, speed) = self.state_at(time_s);
         let distance = f64::from(self.steps.unsigned_abs());
         let stop = (travelled + speed * speed / (2.0 * self.acceleration)).round().min(distance);
@@ -43,7 +43,7 @@ impl Trapezoid {
     /// Time of pulse `number` (from 1 on), seconds after the start: the motor passes the midpoint
     /// between two steps.
     #[must_use]
-    pub fn pulse_s(&self, number: u32) -> f64 {
+    pub fn pulse_time_s(&self, number: u32) -> f64 {
         let distance = f64::from(self.steps.unsigned_abs());
         let travelled = (f64::from(number) - 0.5).clamp(0.0, distance);
         let ramp = self.peak * self.peak / (2.0 * self.acceleration);
@@ -59,7 +59,7 @@ impl Trapezoid {
     /// Same move, braked from `time_s` on, to the position of [`Self::braked_at`].
     #[must_use]
     pub fn braked(&self, time_s: f64) -> Self {
-        let (stop, _) = self.braked_at(time_s);
+        let (stop, _) = self.braking_stop(time_s);
         let (travelled, speed) = self.state_at(time_s);
         let slowing = f64::from(self.steps.unsigned_abs()) - travelled
             <= speed * speed / (2.0 * self.acceleration) + 0.5;
@@ -111,7 +111,7 @@ mod tests {
         for (steps, speed, acceleration) in [(1, 800, 40_000), (7, 800, 40_000), (-400, 800, 9_000)]
         {
             let motion = Trapezoid::new(steps, speed, acceleration);
-            let pulses: Vec<f64> = (1..=steps.unsigned_abs()).map(|k| motion.pulse_s(k)).collect();
+            let pulses: Vec<f64> = (1..=steps.unsigned_abs()).map(|k| motion.pulse_time_s(k)).collect();
             for (k, at_s) in pulses.iter().enumerate() {
                 let (travelled, _) = motion.state_at(*at_s);
                 assert!(
@@ -133,10 +133,10 @@ mod tests {
         for hundredth in 1..165 {
             let time_s = f64::from(hundredth) / 100.0;
             let braked = motion.braked(time_s);
-            assert_eq!(braked.steps(), motion.braked_at(time_s).0);
+            assert_eq!(braked.steps(), motion.braking_stop(time_s).0);
             let (travelled, _) = motion.state_at(time_s);
             for k in 1..=travelled as u32 {
-                let off_s = braked.pulse_s(k) - motion.pulse_s(k);
+                let off_s = braked.pulse_time_s(k) - motion.pulse_time_s(k);
                 // Rounding of the final position by half a step, at the current speed.
                 assert!(off_s.abs() < 0.01, "{time_s}: pulse {k} is {off_s} s off");
             }
@@ -148,13 +148,13 @@ mod tests {
         let motion = Trapezoid::new(-1000, 500, 1000);
         let mut last = 0;
         for tenth in 0..=30 {
-            let (stop, at_s) = motion.braked_at(f64::from(tenth) / 10.0);
+            let (stop, at_s) = motion.braking_stop(f64::from(tenth) / 10.0);
             assert!((-1000..=last).contains(&stop), "{tenth}: {stop} after {last}");
             assert!(at_s >= f64::from(tenth) / 10.0);
             last = stop;
         }
         assert_eq!(last, -1000);
         // Braking from full speed takes v^2 / 2a = 125 steps.
-        assert_eq!(motion.braked_at(1.0).0, -(375 + 125));
+        assert_eq!(motion.braking_stop(1.0).0, -(375 + 125));
     }
 }

@@ -22,8 +22,8 @@ mod surfaces;
 mod tests;
 
 pub use builder::SceneBuilder;
-pub use error::{SceneError, SceneProblem, shown, suggest};
-pub use floor_plan::{Change, DEFAULT_SNAP_M, FloorPlan};
+pub use error::{SceneError, SceneProblem, sanitize, suggest};
+pub use floor_plan::{PlanChange, DEFAULT_SNAP_M, FloorPlan};
 pub use pose::{PoseError, parse_pose};
 pub use robot::{Robot, RobotShape};
 pub use schema::json_schema;

@@ -43,7 +43,7 @@ impl Viewpoint {
 
     /// Positions of transmitter and receiver, metres.
     #[must_use]
-    pub fn ends(&self) -> [DVec2; 2] {
+    pub fn transducer_positions(&self) -> [DVec2; 2] {
         let left = DVec2::from_angle(self.direction_rad()).perp();
         [0.5, -0.5].map(|side| self.position() + side * self.separation_m * left)
     }
@@ -67,7 +67,7 @@ impl Mounting {
     #[must_use]
     pub fn viewpoint(&self, axis: &Pose) -> Viewpoint {
         let direction_deg = wrap_360(axis.heading_deg);
-        let [transmitter, receiver] = self.places(axis.position(), direction_deg.to_radians());
+        let [transmitter, receiver] = self.transducer_positions(axis.position(), direction_deg.to_radians());
         let [x_m, y_m] = (0.5 * (transmitter + receiver)).to_array();
         Viewpoint {
             x_m,
@@ -94,8 +94,8 @@ mod tests {
             let axis = Pose { x_m: 1.0, y_m: 2.0, heading_deg };
             let viewpoint = mounting.viewpoint(&axis);
             assert!(viewpoint.position().distance(middle.into()) < 1e-12, "{heading_deg}");
-            let places = mounting.places(axis.position(), heading_deg.to_radians());
-            for (end, place) in viewpoint.ends().into_iter().zip(places) {
+            let places = mounting.transducer_positions(axis.position(), heading_deg.to_radians());
+            for (end, place) in viewpoint.transducer_positions().into_iter().zip(places) {
                 assert!(end.distance(place) < 1e-12, "{heading_deg}");
             }
             let ahead = viewpoint.point_at(2.0) - viewpoint.position();

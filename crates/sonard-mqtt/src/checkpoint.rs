@@ -9,7 +9,7 @@ use std::{
 
 use serde::{Deserialize, Serialize};
 use sha2::{Digest as _, Sha256};
-use sonard_log::{MARK_BYTES, WholeFile, hexadecimal, read_small};
+use sonard_log::{FINGERPRINT_BYTES, AtomicFile, to_hex, read_small_json};
 
 use super::in_flight::LogPosition;
 
@@ -45,7 +45,7 @@ impl LogCheckpoint {
     /// # Errors
     /// If the file can't be read or parsed.
     pub(super) fn read(folder: &Path) -> io::Result<Option<Self>> {
-        read_small(&path_in(folder), MAX_FILE_BYTES)
+        read_small_json(&path_in(folder), MAX_FILE_BYTES)
     }
 
     /// Writes a checkpoint atomically: after a crash either the new or the previous one is valid.
@@ -59,7 +59,7 @@ impl LogCheckpoint {
             other => other?,
         };
         let checkpoint = Self { file: position.file.to_string(), bytes: position.bytes, sha256 };
-        WholeFile::write(&path_in(folder), &serde_json::to_vec(&checkpoint)?)
+        AtomicFile::write(&path_in(folder), &serde_json::to_vec(&checkpoint)?)
     }
 }
 
@@ -69,12 +69,12 @@ fn path_in(folder: &Path) -> PathBuf {
 
 /// Computes the SHA-256 of up to [`MARK_BYTES`] bytes before a position.
 fn hash_before(folder: &Path, position: &LogPosition) -> io::Result<String> {
-    let from = position.bytes.saturating_sub(MARK_BYTES);
+    let from = position.bytes.saturating_sub(FINGERPRINT_BYTES);
     let mut bytes = vec![0; usize::try_from(position.bytes - from).unwrap_or_default()];
     // A damaged file name must not lead out of the folder.
     let name = Path::new(&*position.file).file_name().ok_or(io::ErrorKind::NotFound)?;
     File::open(folder.join(name))?.read_exact_at(&mut bytes, from)?;
-    Ok(hexadecimal(&Sha256::digest(&bytes)))
+    Ok(to_hex(&Sha256::digest(&bytes)))
 }
 
 #[cfg(test)]

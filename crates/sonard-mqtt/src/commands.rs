@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 use serde::de::DeserializeOwned;
 use serde_json::{Value, json};
 use sonard_api::{Problem, ScanRequest, Strict, has_list};
-use sonard_daemon::{Handle, Order, Refusal};
+use sonard_daemon::{Handle, Order, OrderError};
 use tokio::task::JoinHandle;
 
 /// Maximum number of queued commands.
@@ -76,7 +76,7 @@ impl Command {
         match done {
             Ok(Some(request)) => Ok(json!({"command": name, "accepted": true, "request": request})),
             Ok(None) => Ok(json!({"command": name, "accepted": true})),
-            Err(Refusal { message, help, .. }) => Err(problem(&message, &help)),
+            Err(OrderError { message, help, .. }) => Err(problem(&message, &help)),
         }
     }
 }

@@ -15,7 +15,7 @@ use tokio::{
     time::{Instant, timeout},
 };
 
-use super::{certificate, credentials::Account, diagnosis::SentMessage, topics::MessageKind};
+use super::{certificate, credentials::Credentials, diagnosis::SentMessage, topics::MessageKind};
 
 /// Capacity of the event channel.
 const EVENT_CAPACITY: usize = 16;
@@ -66,7 +66,7 @@ pub(super) struct Connection {
 
 impl Connection {
     /// Starts connecting to the broker.
-    pub(super) fn open(account: &Account) -> Result<Self, String> {
+    pub(super) fn open(account: &Credentials) -> Result<Self, String> {
         let options = account.options();
         let capacity = options.request_channel_capacity();
         let built = AsyncClient::builder(options).capacity(capacity).try_build();

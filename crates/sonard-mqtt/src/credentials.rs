@@ -6,8 +6,8 @@ use rumqttc::{
     LastWill, MqttOptions, QoS, Transport,
     tokio_rustls::rustls::pki_types::{CertificateDer, PrivateKeyDer, pem::PemObject as _},
 };
-use sonard_api::config::{Broker, MqttKeys};
-use sonard_daemon::secret::{Secret, SecretError, read_secret, read_small_file};
+use sonard_api::config::{BrokerAddress, MqttKeys};
+use sonard_daemon::secret::{SecretKind, SecretError, read_secret, read_small_file};
 use sonard_records::MAX_LINE_BYTES;
 use thiserror::Error;
 
@@ -24,14 +24,14 @@ const OVERHEAD_BYTES: usize = 1024;
 /// Capacity of the client's queue: the messages in flight, the status, replies.
 const MAX_QUEUED: usize = MAX_IN_FLIGHT + 32;
 
-const PASSWORD: Secret = Secret { what: "password", least: 1, most_bytes: 4096 };
-const KEY: Secret = Secret { what: "key", least: 1, most_bytes: MAX_CERTIFICATE_BYTES };
+const PASSWORD: SecretKind = SecretKind { name: "password", min_chars: 1, max_bytes: 4096 };
+const KEY: SecretKind = SecretKind { name: "key", min_chars: 1, max_bytes: MAX_CERTIFICATE_BYTES };
 const MAX_CERTIFICATE_BYTES: u64 = 1 << 20;
 
 /// Error in the settings of a broker.
 #[derive(Debug, Error)]
 #[error("mqtt.{key} {file}: {message}")]
-pub struct AccountError {
+pub struct CredentialsError {
     key: &'static str,
     file: String,
     message: String,
@@ -41,26 +41,26 @@ pub struct AccountError {
 
 /// Address and credentials of a broker.
 #[derive(Clone)]
-pub struct Account {
+pub struct Credentials {
     options: MqttOptions,
-    broker: Broker,
+    broker: BrokerAddress,
 }
 
 /// Omits the password.
-impl fmt::Debug for Account {
+impl fmt::Debug for Credentials {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Account").field("broker", &self.broker).finish_non_exhaustive()
     }
 }
 
-impl Account {
+impl Credentials {
     /// Reads the credentials that the configuration names; `None` if it names no broker.
     ///
     /// # Errors
     /// If a file can't be read or has invalid contents.
-    pub fn open(keys: &MqttKeys, robot: &str) -> Result<Option<Self>, AccountError> {
+    pub fn open(keys: &MqttKeys, robot: &str) -> Result<Option<Self>, CredentialsError> {
         // An invalid address was rejected with the configuration.
-        let Some(broker) = keys.broker.as_deref().and_then(|url| Broker::parse(url).ok()) else {
+        let Some(broker) = keys.broker.as_deref().and_then(|url| BrokerAddress::parse(url).ok()) else {
             return Ok(None);
         };
         let address = (broker.host.clone(), broker.port);
@@ -108,12 +108,12 @@ impl Account {
     }
 }
 
-fn tls(keys: &MqttKeys) -> Result<Transport, AccountError> {
+fn tls(keys: &MqttKeys) -> Result<Transport, CredentialsError> {
     let client = match (&keys.certificate_file, &keys.key_file) {
         (Some(certificate), Some(key)) => {
             let certificate = certificates("certificate_file", certificate)?;
             let text = secret("key_file", key, KEY)?.into_bytes();
-            PrivateKeyDer::from_pem_slice(&text).map_err(|error| AccountError {
+            PrivateKeyDer::from_pem_slice(&text).map_err(|error| CredentialsError {
                 key: "key_file",
                 file: key.clone(),
                 message: format!("no private key can be read from it: {error}"),
@@ -126,14 +126,14 @@ fn tls(keys: &MqttKeys) -> Result<Transport, AccountError> {
     if let Some(file) = &keys.ca_file {
         return Ok(Transport::tls(certificates("ca_file", file)?, client, None));
     }
-    let trusted = Transport::try_tls_with_default_config().map_err(|error| AccountError {
+    let trusted = Transport::try_tls_with_default_config().map_err(|error| CredentialsError {
         key: "broker",
         file: keys.broker.clone().unwrap_or_default(),
         message: format!("this computer's trusted certificates can't be read: {error}"),
         help: "install ca-certificates, or set mqtt.ca_file".into(),
     })?;
     if client.is_some() {
-        return Err(AccountError {
+        return Err(CredentialsError {
             key: "certificate_file",
             file: keys.certificate_file.clone().unwrap_or_default(),
             message: "a client certificate requires the broker's certificate authority".into(),
@@ -143,17 +143,17 @@ fn tls(keys: &MqttKeys) -> Result<Transport, AccountError> {
     Ok(trusted)
 }
 
-fn secret(key: &'static str, file: &str, expected: Secret) -> Result<String, AccountError> {
+fn secret(key: &'static str, file: &str, expected: SecretKind) -> Result<String, CredentialsError> {
     read_secret(Path::new(file), expected).map_err(|error| {
         let default =
-            || format!("put the {} in it, readable only by the daemon's user", expected.what);
+            || format!("put the {} in it, readable only by the daemon's user", expected.name);
         let help = SecretError::help(&error, Path::new(file)).unwrap_or_else(default);
-        AccountError { key, file: file.into(), message: error.to_string(), help }
+        CredentialsError { key, file: file.into(), message: error.to_string(), help }
     })
 }
 
-fn certificates(key: &'static str, file: &str) -> Result<Vec<u8>, AccountError> {
-    let fail = |message: String| AccountError {
+fn certificates(key: &'static str, file: &str) -> Result<Vec<u8>, CredentialsError> {
+    let fail = |message: String| CredentialsError {
         key,
         file: file.into(),
         message,

@@ -110,7 +110,7 @@ impl InFlightQueue {
     }
 
     /// Appends the next line of the log.
-    pub fn put(&mut self, read: LogLine) {
+    pub fn push(&mut self, read: LogLine) {
         let is_done = read.message.is_none();
         let entry = Entry { message: read.message, after: read.after, is_done };
         self.passed_over += u64::from(is_done);
@@ -120,7 +120,7 @@ impl InFlightQueue {
     }
 
     /// Takes the next record to send on this connection, with its sequence number.
-    pub fn give(&mut self) -> Option<(u64, RecordMessage)> {
+    pub fn pop_next(&mut self) -> Option<(u64, RecordMessage)> {
         while self.sent < MAX_IN_FLIGHT {
             let entry = self.entries.get(self.sent)?;
             self.sent += 1;
@@ -147,7 +147,7 @@ impl InFlightQueue {
     }
 
     /// Drops a record that the broker rejects. Returns the position after the record.
-    pub fn leave_out(&mut self, number: u64, now: Duration) -> Option<LogPosition> {
+    pub fn reject(&mut self, number: u64, now: Duration) -> Option<LogPosition> {
         let at = usize::try_from(number.checked_sub(self.first)?).ok()?;
         let entry = self.entries.get_mut(at).filter(|entry| !entry.is_done)?;
         entry.is_done = true;
@@ -166,7 +166,7 @@ impl InFlightQueue {
 
     /// Position to checkpoint, if a checkpoint is due.
     #[must_use]
-    pub fn due(&self, now: Duration) -> Option<&LogPosition> {
+    pub fn due_checkpoint(&self, now: Duration) -> Option<&LogPosition> {
         let is_old = self.since.is_some_and(|since| now >= since + CHECKPOINT_INTERVAL);
         let is_far = self.uncheckpointed >= CHECKPOINT_RECORDS;
         Some(&self.place).filter(|_| self.moved && (is_old || is_far))
@@ -174,12 +174,12 @@ impl InFlightQueue {
 
     /// Position to checkpoint at shutdown, unless it is the last checkpoint.
     #[must_use]
-    pub fn last(&self) -> Option<&LogPosition> {
+    pub fn final_checkpoint(&self) -> Option<&LogPosition> {
         Some(&self.place).filter(|_| self.moved)
     }
 
     /// Notes a written checkpoint.
-    pub fn remembered(&mut self, place: &LogPosition, now: Duration) {
+    pub fn checkpointed(&mut self, place: &LogPosition, now: Duration) {
         self.moved = self.place != *place;
         self.uncheckpointed = 0;
         self.since = self.moved.then_some(now);
@@ -187,7 +187,7 @@ impl InFlightQueue {
 
     /// Position up to which everything is acknowledged.
     #[must_use]
-    pub const fn place(&self) -> &LogPosition {
+    pub const fn position(&self) -> &LogPosition {
         &self.place
     }
 

@@ -31,7 +31,7 @@ use sonard_runtime::supervisor::Task;
 use tokio::{task::JoinHandle, time::Instant};
 use tokio_util::sync::CancellationToken;
 
-pub use credentials::{Account, AccountError};
+pub use credentials::{Credentials, CredentialsError};
 pub use in_flight::{InFlightQueue, LogLine, LogPosition, MAX_IN_FLIGHT, RecordMessage};
 pub use topics::{MessageKind, Topics};
 
@@ -56,7 +56,7 @@ impl Mqtt {
     /// # Errors
     /// If the logs can't be read.
     pub fn start(
-        account: Account,
+        account: Credentials,
         keys: &MqttKeys,
         robot: &str,
         daemon: Handle,

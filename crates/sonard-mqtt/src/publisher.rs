@@ -18,7 +18,7 @@ use super::{
     backoff::Backoff,
     commands::{CommandHandler, ReceivedCommand},
     connection::{BrokerEvent, Connection, Disconnection},
-    credentials::Account,
+    credentials::Credentials,
     diagnosis::{Cause, Diagnosis, Finding, STABLE_AFTER, SentMessage},
     in_flight::InFlightQueue,
     log_worker::{LogJob, LogJobResult, LogWorker, RunningLogJob, wait_for_job},
@@ -44,7 +44,7 @@ const SUBSCRIPTION: SentMessage = SentMessage { record: None, kind: None, bytes:
 
 /// State of the publishing task.
 pub(super) struct Publisher {
-    pub(super) account: Account,
+    pub(super) account: Credentials,
     pub(super) topics: Topics,
     pub(super) commands: bool,
     pub(super) status_interval: Duration,
@@ -105,7 +105,7 @@ impl Publisher {
                 () = sleep(delay) => {}
             }
         }
-        if let (Some(log), Some(place)) = (self.log.take(), self.in_flight.last()) {
+        if let (Some(log), Some(place)) = (self.log.take(), self.in_flight.final_checkpoint()) {
             let job = LogJob { checkpoint: Some(place.clone()), ..LogJob::default() };
             // After a failure to write the checkpoint, the records are sent again.
             drop(log.run(job).await);
@@ -181,7 +181,7 @@ impl Publisher {
     fn drop_message(&mut self, sending: SentMessage, cause: Cause) {
         let text = self.describe(cause, sending.kind);
         if let Some(number) = sending.record {
-            let place = self.in_flight.leave_out(number, self.epoch.elapsed());
+            let place = self.in_flight.reject(number, self.epoch.elapsed());
             // A rejected kind is logged only once.
             let is_known =
                 matches!(cause, Cause::Kind(_)) && self.faults.cause == Some(text.clone());
@@ -281,7 +281,7 @@ impl Publisher {
     /// Sends records as far as the limits allow.
     fn send_pending(&mut self, connection: &Connection) -> Result<(), String> {
         while self.may_send(connection) {
-            let Some((number, message)) = self.in_flight.give() else { break };
+            let Some((number, message)) = self.in_flight.pop_next() else { break };
             let (kind, bytes) = (Some(message.kind), message.payload.len());
             let sending = SentMessage { record: Some(number), kind, bytes };
             if let Some(cause) = self.diagnosis.rejects(kind, bytes) {
@@ -325,7 +325,7 @@ impl Publisher {
         let room = Some(self.in_flight.room()).filter(|room| *room > 0);
         let job = LogJob {
             read: room.filter(|_| connected.read_up_to != Some(written)),
-            checkpoint: self.in_flight.due(self.epoch.elapsed()).cloned(),
+            checkpoint: self.in_flight.due_checkpoint(self.epoch.elapsed()).cloned(),
             behind: None,
         };
         self.start_job(job, connected, written);
@@ -360,7 +360,7 @@ impl Publisher {
         let mut fault = None;
         if let Some((place, written)) = result.checkpoint {
             match written {
-                Ok(()) => self.in_flight.remembered(&place, self.epoch.elapsed()),
+                Ok(()) => self.in_flight.checkpointed(&place, self.epoch.elapsed()),
                 Err(error) => fault = Some(error),
             }
         }
@@ -372,7 +372,7 @@ impl Publisher {
                 if let Some(gap) = chunk.gap {
                     self.daemon.event(EventKind::Gap, format!("mqtt: {gap}"));
                 }
-                chunk.lines.into_iter().for_each(|line| self.in_flight.put(line));
+                chunk.lines.into_iter().for_each(|line| self.in_flight.push(line));
             }
             Some(Err(error)) => {
                 connected.read_up_to = None;
@@ -450,7 +450,7 @@ impl Publisher {
             connected.status.acknowledged();
         }
         if connected.job.is_none() {
-            let behind = Some(self.in_flight.place().clone());
+            let behind = Some(self.in_flight.position().clone());
             self.start_job(LogJob { behind, ..LogJob::default() }, connected, 0);
         }
         Ok(())

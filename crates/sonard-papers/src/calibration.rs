@@ -21,7 +21,7 @@ use sonard_records::{PathKind, Ping, PingStatus, ScanPlan, ScanView};
 use uuid::Uuid;
 
 use crate::trial::random_room;
-use sonard_interpret::interpret::{Extents, Feature, Probabilities, Settings, Sweep, interpret};
+use sonard_interpret::interpret::{Extents, Feature, Probabilities, InterpretSettings, Sweep, interpret};
 
 /// Boxes and partitions of successive rooms.
 const ROOMS: [(usize, usize); 4] = [(0, 0), (3, 0), (0, 1), (2, 2)];
@@ -38,7 +38,7 @@ const CORNER_M: f64 = 0.005;
 
 /// True cause of an arc.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Truth {
+pub enum ArcCause {
     /// Reflection from a wall.
     Plane,
     /// Reflection from a concave corner.
@@ -51,42 +51,42 @@ pub enum Truth {
 
 /// Arc with its class probabilities and its true cause.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Judged {
+pub struct ClassifiedArc {
     /// Class probabilities that the interpretation assigned.
-    pub said: Probabilities,
+    pub probabilities: Probabilities,
     /// True cause from the predicted paths.
-    pub truth: Truth,
+    pub truth: ArcCause,
 }
 
-impl Judged {
+impl ClassifiedArc {
     /// Predicted probability of each class, and its occurrence.
     fn claims(&self) -> [(f64, bool); 4] {
-        let Probabilities { plane, corner, edge, other } = self.said;
+        let Probabilities { plane, corner, edge, other } = self.probabilities;
         [
-            (plane, self.truth == Truth::Plane),
-            (corner, self.truth == Truth::Corner),
-            (edge, self.truth == Truth::Edge),
-            (other, self.truth == Truth::Other),
+            (plane, self.truth == ArcCause::Plane),
+            (corner, self.truth == ArcCause::Corner),
+            (edge, self.truth == ArcCause::Edge),
+            (other, self.truth == ArcCause::Other),
         ]
     }
 }
 
 /// Predictions whose probabilities lie in one interval.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Bin {
+pub struct ReliabilityBin {
     /// Number of predictions in the bin.
     pub count: usize,
     /// Mean predicted probability in the bin.
-    pub claimed: f64,
+    pub mean_predicted: f64,
     /// Observed frequency of the predicted classes.
-    pub came_true: f64,
+    pub observed: f64,
 }
 
 /// Statistics of a reliability diagram.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Reliability {
     /// Ten bins of width 0.1 in the predicted probability.
-    pub bins: [Bin; 10],
+    pub bins: [ReliabilityBin; 10],
     /// Expected calibration error: mean absolute difference of mean predicted probability and
     /// observed frequency, weighted by the bins' counts (Naeini, Cooper and Hauskrecht, AAAI 2015).
     pub expected_error: f64,
@@ -97,23 +97,23 @@ pub struct Reliability {
 impl Reliability {
     /// Statistics of all four class probabilities of all arcs.
     #[must_use]
-    pub fn from_arcs(arcs: &[Judged]) -> Self {
-        let mut bins = [Bin::default(); 10];
+    pub fn from_arcs(arcs: &[ClassifiedArc]) -> Self {
+        let mut bins = [ReliabilityBin::default(); 10];
         let mut brier = 0.0;
-        for (claimed, came_true) in arcs.iter().flat_map(Judged::claims) {
+        for (claimed, came_true) in arcs.iter().flat_map(ClassifiedArc::claims) {
             let truth = f64::from(u8::from(came_true));
             let bin = &mut bins[((10.0 * claimed) as usize).min(9)];
             bin.count += 1;
-            bin.claimed += claimed;
-            bin.came_true += truth;
+            bin.mean_predicted += claimed;
+            bin.observed += truth;
             brier += (claimed - truth).powi(2);
         }
         let all = (4 * arcs.len()).max(1) as f64;
         let mut expected_error = 0.0;
         for bin in bins.iter_mut().filter(|bin| bin.count > 0) {
-            expected_error += (bin.claimed - bin.came_true).abs() / all;
-            bin.claimed /= bin.count as f64;
-            bin.came_true /= bin.count as f64;
+            expected_error += (bin.mean_predicted - bin.observed).abs() / all;
+            bin.mean_predicted /= bin.count as f64;
+            bin.observed /= bin.count as f64;
         }
         Self { bins, expected_error, brier: brier / all }
     }
@@ -126,7 +126,7 @@ impl Reliability {
 /// probabilities (masked, truncated, too close) are omitted. The result is empty for an invalid
 /// sensor and for a room with more paths than the model can find.
 #[must_use]
-pub fn judge_room(seed: u64, number: u64, sensor: &Sensor, settings: &Settings) -> Vec<Judged> {
+pub fn classify_room(seed: u64, number: u64, sensor: &Sensor, settings: &InterpretSettings) -> Vec<ClassifiedArc> {
     let mut rng = Pcg64::seed_from_u64(seed.wrapping_mul(1_000_003) ^ number);
     let (boxes, partitions) = ROOMS[number as usize % ROOMS.len()];
     let scene = random_room("room", boxes, partitions, &mut rng);
@@ -148,7 +148,7 @@ pub fn judge_room(seed: u64, number: u64, sensor: &Sensor, settings: &Settings) 
     let truth = |feature: &Feature| {
         let scan = scans.iter().find(|scan| scan.scan == feature.scan)?;
         let truth = truth(feature, scan, simulator.scene())?;
-        Some(Judged { said: feature.probabilities, truth })
+        Some(ClassifiedArc { probabilities: feature.probabilities, truth })
     };
     let is_classified = |feature: &&Feature| feature.probabilities != Probabilities::default();
     found.iter().filter(is_classified).filter_map(truth).collect()
@@ -193,14 +193,14 @@ fn simulate_scan(
     Ok(scan)
 }
 
-fn features(scans: &[ScanView], extents: &Extents, settings: &Settings) -> Vec<Feature> {
+fn features(scans: &[ScanView], extents: &Extents, settings: &InterpretSettings) -> Vec<Feature> {
     let sweeps: Vec<_> =
         scans.iter().filter_map(|scan| Some((scan.scan, Sweep::from_scan(scan).ok()?))).collect();
     interpret(&sweeps, extents, settings)
 }
 
 /// Most frequent cause of the echoes of an arc.
-fn truth(feature: &Feature, scan: &ScanView, scene: &Scene) -> Option<Truth> {
+fn truth(feature: &Feature, scan: &ScanView, scene: &Scene) -> Option<ArcCause> {
     let [first, last] = feature.beams;
     let within = |index: u32| match first <= last {
         true => (first..=last).contains(&index),
@@ -213,22 +213,22 @@ fn truth(feature: &Feature, scan: &ScanView, scene: &Scene) -> Option<Truth> {
             votes[ping_truth(ping, scene, from) as usize] += 1;
         }
     }
-    [Truth::Plane, Truth::Corner, Truth::Edge, Truth::Other]
+    [ArcCause::Plane, ArcCause::Corner, ArcCause::Edge, ArcCause::Other]
         .into_iter()
         .max_by_key(|truth| votes[*truth as usize])
 }
 
-fn ping_truth(ping: &Ping, scene: &Scene, from: DVec2) -> Truth {
-    let Some(path) = &ping.path else { return Truth::Other };
+fn ping_truth(ping: &Ping, scene: &Scene, from: DVec2) -> ArcCause {
+    let Some(path) = &ping.path else { return ArcCause::Other };
     let to_corner = || {
         let ends = scene.walls.iter().flat_map(|wall| [wall.a, wall.b]);
         ends.into_iter().any(|end| (end.distance(from) - path.length_m / 2.0).abs() < CORNER_M)
     };
     match (path.kind, path.order) {
-        (PathKind::Specular, 1) => Truth::Plane,
-        (PathKind::Diffracted, 0) => Truth::Edge,
-        (PathKind::Specular, 2) if to_corner() => Truth::Corner,
-        _ => Truth::Other,
+        (PathKind::Specular, 1) => ArcCause::Plane,
+        (PathKind::Diffracted, 0) => ArcCause::Edge,
+        (PathKind::Specular, 2) if to_corner() => ArcCause::Corner,
+        _ => ArcCause::Other,
     }
 }
 

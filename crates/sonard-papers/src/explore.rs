@@ -14,9 +14,9 @@ mod robot;
 #[cfg(test)]
 mod tests;
 
-pub use follow::{explore, explore_watched};
+pub use follow::{explore, explore_observed};
 pub use laser::Laser;
-pub use robot::{Drive, Ranger, Robot, RobotSettings, SimulatedRobot};
+pub use robot::{DriveOutcome, SonarLayout, Robot, RobotSettings, SimulatedRobot};
 
 use serde::Serialize;
 
@@ -63,7 +63,7 @@ pub struct ExploreSettings {
     /// Maximum distance between stops with the laser only, which has a longer range, metres.
     pub laser_stride_m: f64,
     /// Minimum distance of the robot's centre from known obstacles, metres.
-    pub keep_off_m: f64,
+    pub min_clearance_m: f64,
     /// Maximum number of stops.
     pub max_stops: usize,
     /// Settings of the line map.
@@ -76,14 +76,14 @@ impl Default for ExploreSettings {
             standoff_m: 1.0,
             sonar_stride_m: 0.45,
             laser_stride_m: 1.0,
-            keep_off_m: 0.28,
+            min_clearance_m: 0.28,
             max_stops: 400,
             // `gap_m`: sonar follows a wall only up to a gap before the corner that the laser
             // measures, and both parts are one wall. `least_length_m`: sonar lines at a corner that
             // the laser measured are too short for walls.
             map: LineMapSettings {
                 contradicts_m: 0.03,
-                sonar: FitSettings { least_length_m: 0.15, ..FitSettings::default() },
+                sonar: FitSettings { min_length_m: 0.15, ..FitSettings::default() },
                 merge: MergeSettings { gap_m: 0.5, ..MergeSettings::default() },
                 ..LineMapSettings::default()
             },
@@ -134,7 +134,7 @@ pub struct Exploration {
     /// Distance driven by odometry, metres.
     pub travel_m: f64,
     /// Number of collisions with obstacles.
-    pub bumps: u32,
+    pub collisions: u32,
     /// Whether everything was explored before the maximum number of stops.
     pub finished: bool,
 }

@@ -9,13 +9,13 @@ pub use reliability::draw_reliability;
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::calibration::{Bin, Reliability};
+    use crate::calibration::{ReliabilityBin, Reliability};
 
     #[test]
     fn every_filled_bin_has_a_mark() {
-        let mut bins = [Bin::default(); 10];
-        bins[0] = Bin { count: 90, claimed: 0.02, came_true: 0.03 };
-        bins[9] = Bin { count: 10, claimed: 0.97, came_true: 0.9 };
+        let mut bins = [ReliabilityBin::default(); 10];
+        bins[0] = ReliabilityBin { count: 90, mean_predicted: 0.02, observed: 0.03 };
+        bins[9] = ReliabilityBin { count: 10, mean_predicted: 0.97, observed: 0.9 };
         let reliability = Reliability { bins, expected_error: 0.016, brier: 0.03 };
         let svg = draw_reliability("reliability", &[], &reliability).to_svg();
         assert_eq!(svg.matches("mean predicted probability 0.").count(), 2, "{svg}");

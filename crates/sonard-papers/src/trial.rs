@@ -14,7 +14,7 @@ use rand_distr::{Distribution, StandardNormal};
 pub use rooms::{gallery, random_room};
 
 use sonard_interpret::interpret::{
-    Beam, Extents, Heard, Sweep,
+    SweepBeam, Extents, BeamOutcome, Sweep,
     grid::{
         BeamModel, GaussianBeam, Grid, GridShape, MapScore, PathSettings, ScoreError, Trust, ideal,
         score,
@@ -63,7 +63,7 @@ pub struct TrialSettings {
 
 /// Readings of a robot along a course through a scene.
 #[derive(Debug, Clone)]
-pub struct Course {
+pub struct SimulatedCourse {
     /// Ideal map of the scene.
     pub ideal: Grid,
     /// Sets of readings in order of time.
@@ -72,14 +72,14 @@ pub struct Course {
 
 /// Maps of one course without and with Feature Prediction.
 #[derive(Debug, Clone)]
-pub struct Trial {
+pub struct MappingTrial {
     /// Maps without and with Feature Prediction.
     pub maps: [Grid; 2],
     /// Scores of both maps.
     pub scores: [MapScore; 2],
 }
 
-impl Course {
+impl SimulatedCourse {
     /// Simulates a robot that drives through a scene from a start position; `None` if it can't move
     /// there.
     ///
@@ -107,7 +107,7 @@ impl Course {
         extents: &Extents,
         max_range_m: f64,
         settings: &TrialSettings,
-    ) -> Result<Trial, ScoreError> {
+    ) -> Result<MappingTrial, ScoreError> {
         let extent_deg = extents.plane_corner_deg(1.0, 1.0);
         let (prediction, beam_deg) = match settings.arrangement {
             Arrangement::Ring(_) => (PredictionSettings::ring(max_range_m), 25.0),
@@ -130,7 +130,7 @@ impl Course {
         }
         let paths = PathSettings::default();
         let scores = [score(&maps[0], &self.ideal, &paths)?, score(&maps[1], &self.ideal, &paths)?];
-        Ok(Trial { maps, scores })
+        Ok(MappingTrial { maps, scores })
     }
 }
 
@@ -194,16 +194,16 @@ fn read(
 ) -> Result<Sweep, TooCostly> {
     let mut reading =
         |prediction: &Prediction| simulate_reading(prediction, settings.range_sigma_m, rng);
-    let (mut beams, step_deg): (Vec<Beam>, f64) = match &settings.arrangement {
+    let (mut beams, step_deg): (Vec<SweepBeam>, f64) = match &settings.arrangement {
         Arrangement::Ring(array) => {
             let beam = |(index, at): (u32, usize)| {
                 let ranger = &array.rangers[at];
                 let (azimuth_deg, mount) =
                     (ranger.azimuth_deg(), DVec2::new(ranger.x_m, ranger.y_m));
-                let mounted = ranger.pose_on(pose);
+                let mounted = ranger.world_pose(pose);
                 let point = simulator.at(mounted.position());
                 let heard = reading(&point.ping(mounted.direction_rad(0.0))?);
-                Ok(Beam { azimuth_deg, index, heard, mount })
+                Ok(SweepBeam { azimuth_deg, index, outcome: heard, mount })
             };
             let beams = (0..).zip(array.round()).map(beam);
             (beams.collect::<Result<_, TooCostly>>()?, RING_STEP_DEG)
@@ -213,7 +213,7 @@ fn read(
             let beam = |index: u32| {
                 let azimuth_deg = 0.9 * f64::from(index);
                 let heard = reading(&point.ping(pose.direction_rad(azimuth_deg))?);
-                Ok(Beam { azimuth_deg, index, heard, mount: DVec2::ZERO })
+                Ok(SweepBeam { azimuth_deg, index, outcome: heard, mount: DVec2::ZERO })
             };
             ((0..400).map(beam).collect::<Result<_, TooCostly>>()?, 0.9)
         }
@@ -227,13 +227,13 @@ fn read(
 const RING_STEP_DEG: f64 = 25.0;
 
 /// Reading of a prediction with range noise.
-pub(crate) fn simulate_reading(prediction: &Prediction, sigma_m: f64, rng: &mut impl Rng) -> Heard {
+pub(crate) fn simulate_reading(prediction: &Prediction, sigma_m: f64, rng: &mut impl Rng) -> BeamOutcome {
     match (prediction.status, prediction.range_m) {
         (PingStatus::Echo, Some(range_m)) => {
             let unit: f64 = StandardNormal.sample(rng);
-            Heard::Echo((range_m + sigma_m * unit).max(0.01))
+            BeamOutcome::Echo((range_m + sigma_m * unit).max(0.01))
         }
-        (PingStatus::MinRange, _) => Heard::Near,
-        _ => Heard::Silent,
+        (PingStatus::MinRange, _) => BeamOutcome::BelowMinRange,
+        _ => BeamOutcome::NoEcho,
     }
 }

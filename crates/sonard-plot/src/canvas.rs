@@ -64,7 +64,7 @@ impl Rect {
     }
 
     /// Returns `true` if the interiors of both overlap.
-    pub fn meets(&self, other: &Self) -> bool {
+    pub fn overlaps(&self, other: &Self) -> bool {
         self.left < other.right
             && other.left < self.right
             && self.top < other.bottom
@@ -85,7 +85,7 @@ pub enum Anchor {
 
 /// Shape of a mark; each kind of reading has its own.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Shape {
+pub enum MarkShape {
     /// Filled circle.
     Dot,
     /// Filled square.
@@ -205,7 +205,7 @@ impl Layer {
     }
 
     /// Adds a mark of approximately this radius, with an optional tooltip.
-    pub fn mark(&mut self, shape: Shape, at: Px, radius_px: f64, hint: Option<&str>) {
+    pub fn mark(&mut self, shape: MarkShape, at: Px, radius_px: f64, hint: Option<&str>) {
         let node = mark(shape, at, radius_px);
         self.node(match hint {
             Some(hint) => with_hint(node, hint),
@@ -239,19 +239,19 @@ impl Layer {
     }
 }
 
-fn mark(shape: Shape, at: Px, r: f64) -> Element {
+fn mark(shape: MarkShape, at: Px, r: f64) -> Element {
     let polygon = |corners: &[(f64, f64)]| {
         let points: Vec<Px> = corners.iter().map(|(x, y)| at + r * Px::new(*x, *y)).collect();
         closed(&points).into()
     };
     match shape {
-        Shape::Dot => {
+        MarkShape::Dot => {
             Circle::new().set("cx", tidy(at.x)).set("cy", tidy(at.y)).set("r", tidy(r)).into()
         }
-        Shape::Square => polygon(&[(-0.9, -0.9), (0.9, -0.9), (0.9, 0.9), (-0.9, 0.9)]),
-        Shape::Triangle => polygon(&[(0.0, -1.3), (1.15, 0.8), (-1.15, 0.8)]),
-        Shape::Diamond => polygon(&[(0.0, -1.35), (1.35, 0.0), (0.0, 1.35), (-1.35, 0.0)]),
-        Shape::Cross => {
+        MarkShape::Square => polygon(&[(-0.9, -0.9), (0.9, -0.9), (0.9, 0.9), (-0.9, 0.9)]),
+        MarkShape::Triangle => polygon(&[(0.0, -1.3), (1.15, 0.8), (-1.15, 0.8)]),
+        MarkShape::Diamond => polygon(&[(0.0, -1.35), (1.35, 0.0), (0.0, 1.35), (-1.35, 0.0)]),
+        MarkShape::Cross => {
             let (w, l) = (0.35, 1.25);
             let arm = |s: f64, t: f64| ((s - t) * 0.7, (s + t) * 0.7);
             polygon(&[

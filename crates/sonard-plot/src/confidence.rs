@@ -1,11 +1,11 @@
 //! Floor plan with the readings coloured by confidence.
 
 use super::{
-    canvas::{Layer, Shape},
-    legend::{Entry, Sample},
+    canvas::{Layer, MarkShape},
+    legend::{LegendEntry, LegendSample},
     legend_entries, overlay,
     picture::Picture,
-    plan::Plan,
+    plan::PlanProjection,
     theme,
 };
 use sonard_model::scene::Scene;
@@ -13,11 +13,11 @@ use sonard_records::{Ping, PingStatus, ScanView};
 
 /// Classes of confidence, highest first: lower limit, label, shape and colour. 0.48 is the default
 /// of `sonard map`; 0.25 is the minimum for a feature that should have been detected.
-const CLASSES: [(f64, &str, Shape, &str); 4] = [
-    (0.48, "0.48 to 0.5: trusted", Shape::Dot, theme::BLUE),
-    (0.40, "0.40 to 0.48", Shape::Triangle, theme::GREEN),
-    (0.25, "0.25 to 0.40", Shape::Diamond, theme::ORANGE),
-    (0.0, "below 0.25: contradicted by a predicted feature", Shape::Square, theme::VERMILLION),
+const CLASSES: [(f64, &str, MarkShape, &str); 4] = [
+    (0.48, "0.48 to 0.5: trusted", MarkShape::Dot, theme::BLUE),
+    (0.40, "0.40 to 0.48", MarkShape::Triangle, theme::GREEN),
+    (0.25, "0.25 to 0.40", MarkShape::Diamond, theme::ORANGE),
+    (0.0, "below 0.25: contradicted by a predicted feature", MarkShape::Square, theme::VERMILLION),
 ];
 
 /// Draws the readings with a range by their confidence from Feature Prediction (`sonard log
@@ -27,10 +27,10 @@ pub fn draw_confidence(scans: &[ScanView], scene: Option<&Scene>) -> Picture {
     let classified: Vec<Vec<(usize, &Ping)>> = scans.iter().map(classify).collect();
     let count = |class: usize| classified.iter().flatten().filter(|(of, _)| *of == class).count();
     let classes = CLASSES.iter().enumerate().map(|(class, (_, label, shape, colour))| {
-        let sample = Sample::Mark { shape: *shape, colour };
-        Entry::new(sample, format!("{label} ({})", count(class)))
+        let sample = LegendSample::Mark { shape: *shape, colour };
+        LegendEntry::new(sample, format!("{label} ({})", count(class)))
     });
-    let entries: Vec<Entry> =
+    let entries: Vec<LegendEntry> =
         classes.chain(scene.map(legend_entries::materials).into_iter().flatten()).collect();
     let confidences = scans.iter().flat_map(|scan| &scan.pings).filter_map(|ping| ping.confidence);
     let (sum, count) =
@@ -40,7 +40,7 @@ pub fn draw_confidence(scans: &[ScanView], scene: Option<&Scene>) -> Picture {
     } else {
         format!("mean confidence of {count} readings: {:.3}", sum / f64::from(count))
     };
-    let draw = |plan: &Plan| {
+    let draw = |plan: &PlanProjection| {
         scans.iter().zip(&classified).filter_map(|(scan, pings)| layer(plan, scan, pings)).collect()
     };
     overlay::draw(scans, scene, finding, &[], draw, |_| None, &entries)
@@ -55,7 +55,7 @@ fn classify(scan: &ScanView) -> Vec<(usize, &Ping)> {
     scan.pings.iter().filter_map(|ping| Some((class(ping)?, ping))).collect()
 }
 
-fn layer(plan: &Plan, scan: &ScanView, pings: &[(usize, &Ping)]) -> Option<Layer> {
+fn layer(plan: &PlanProjection, scan: &ScanView, pings: &[(usize, &Ping)]) -> Option<Layer> {
     scan.pose()?;
     let mut layer = Layer::new("confidences");
     // Low confidence is drawn on top.

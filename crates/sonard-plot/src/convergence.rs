@@ -1,9 +1,9 @@
 //! Errors of a method against its resolution, on logarithmic axes.
 
 use super::{
-    canvas::{Anchor, Layer, Px, Rect, Shape},
+    canvas::{Anchor, Layer, Px, Rect, MarkShape},
     caption,
-    legend::{self, Entry, Sample},
+    legend::{self, LegendEntry, LegendSample},
     picture::Picture,
     theme,
 };
@@ -46,8 +46,8 @@ pub fn draw_convergence(
         let colour = COLOURS[number % COLOURS.len()];
         let dash = theme::WALL_DASHES[number / COLOURS.len() % theme::WALL_DASHES.len()];
         page.add(curve(&axes, case, colour, dash));
-        let sample = Sample::Line { colour, width_px: 2.0, dash };
-        entries.push(Entry::new(sample, case.name.as_str()));
+        let sample = LegendSample::Line { colour, width_px: 2.0, dash };
+        entries.push(LegendEntry::new(sample, case.name.as_str()));
     }
     page.text(Px::new(left, panel.top - 8.0), Anchor::Start, theme::TEXT_PX, up);
     let middle = Px::new(panel.center().x, panel.bottom + 36.0);
@@ -142,7 +142,7 @@ fn curve(axes: &LogAxes, case: &Convergence, colour: &'static str, dash: &'stati
     line.runs([points.iter().map(|(at, _)| *at).collect::<Vec<_>>()]);
     let mut marks = Layer::new("marks").with("fill", colour);
     for (at, hint) in &points {
-        marks.mark(Shape::Dot, *at, MARK_PX, Some(&format!("{}, {hint}", case.name)));
+        marks.mark(MarkShape::Dot, *at, MARK_PX, Some(&format!("{}, {hint}", case.name)));
     }
     layer.extend([line, marks]);
     layer

@@ -2,9 +2,9 @@
 //! the arc; a reading without echo is an outline up to the maximum range.
 
 use super::{
-    canvas::{Anchor, Layer, Px, Shape},
+    canvas::{Anchor, Layer, Px, MarkShape},
     floor::MIN_RANGE_DASH,
-    plan::Plan,
+    plan::PlanProjection,
     readings::{PlottedBeam, PlottedScan},
     theme,
 };
@@ -27,12 +27,12 @@ pub(super) struct FanStyle {
 
 impl FanStyle {
     /// Draws every fan, with a dot at its ranger.
-    pub(super) fn draw(&self, plan: &Plan, scan: &PlottedScan) -> Layer {
+    pub(super) fn draw(&self, plan: &PlanProjection, scan: &PlottedScan) -> Layer {
         let mut layer = Layer::new("fans");
         let mut faces = Layer::new("faces").with("fill", theme::INK);
         for (beam, at) in scan.beams.iter().filter_map(|beam| Some((beam, beam.viewpoint?))) {
             layer.add(self.fan(plan, beam, &at));
-            faces.mark(Shape::Dot, plan.px(at.position()), 1.6, None);
+            faces.mark(MarkShape::Dot, plan.px(at.position()), 1.6, None);
         }
         layer.add(faces);
         if scan.beams.len() <= MAX_LABELLED {
@@ -42,7 +42,7 @@ impl FanStyle {
     }
 
     /// Draws the name of each ranger in its fan.
-    fn names(&self, plan: &Plan, scan: &PlottedScan) -> Layer {
+    fn names(&self, plan: &PlanProjection, scan: &PlottedScan) -> Layer {
         let mut names = Layer::new("rangers").with("fill", theme::QUIET).haloed();
         for beam in &scan.beams {
             let (Some(viewpoint), Some(name)) = (&beam.viewpoint, &beam.ranger) else { continue };
@@ -57,7 +57,7 @@ impl FanStyle {
         names
     }
 
-    fn fan(&self, plan: &Plan, beam: &PlottedBeam, from: &Viewpoint) -> Layer {
+    fn fan(&self, plan: &PlanProjection, beam: &PlottedBeam, from: &Viewpoint) -> Layer {
         let colour = beam.kind.colour();
         let arc = self.arc(plan, from, beam.range_m.unwrap_or(self.max_range_m));
         let outline = [&[plan.px(from.position())], arc.as_slice()].concat();
@@ -75,7 +75,7 @@ impl FanStyle {
     }
 
     /// Draws the arcs of the minimum range.
-    pub(super) fn min_range(&self, plan: &Plan, scan: &PlottedScan) -> Layer {
+    pub(super) fn min_range(&self, plan: &PlanProjection, scan: &PlottedScan) -> Layer {
         let mut layer = Layer::new("min-range")
             .stroked(theme::PURPLE, 1.0)
             .with("stroke-dasharray", MIN_RANGE_DASH);
@@ -86,7 +86,7 @@ impl FanStyle {
         layer
     }
 
-    fn arc(&self, plan: &Plan, from: &Viewpoint, range_m: f64) -> Vec<Px> {
+    fn arc(&self, plan: &PlanProjection, from: &Viewpoint, range_m: f64) -> Vec<Px> {
         let point = |i: i32| {
             let off_rad = self.half_rad * (2.0 * f64::from(i) / f64::from(PIECES) - 1.0);
             let direction = DVec2::from_angle(from.direction_rad() + off_rad);

@@ -1,11 +1,11 @@
 //! Floor plan with the features found by the interpretation.
 
 use super::{
-    canvas::{Anchor, Layer, Px, Shape},
-    legend::{Entry, Sample},
+    canvas::{Anchor, Layer, Px, MarkShape},
+    legend::{LegendEntry, LegendSample},
     legend_entries, overlay,
     picture::Picture,
-    plan::Plan,
+    plan::PlanProjection,
     scan_caption, theme,
 };
 use sonard_interpret::interpret::{Feature, FeatureKind};
@@ -22,11 +22,11 @@ const KINDS: [FeatureKind; 4] =
 /// the floor plan with the readings as small dots; lines lead to the proposed next poses.
 #[must_use]
 pub fn draw_features(scans: &[ScanView], scene: Option<&Scene>, features: &[Feature]) -> Picture {
-    let over = |plan: &Plan| {
+    let over = |plan: &PlanProjection| {
         let arcs = features.iter().map(|feature| arc(plan, scans, feature));
         arcs.chain([next_places(plan, scans, features)]).collect()
     };
-    let labels = |plan: &Plan| Some(names(plan, scene, scans, features));
+    let labels = |plan: &PlanProjection| Some(names(plan, scene, scans, features));
     overlay::draw(scans, scene, counts(features), &[], over, labels, &entries(features, scene))
 }
 
@@ -59,26 +59,26 @@ const fn colour(kind: FeatureKind) -> &'static str {
     }
 }
 
-const fn shape(kind: FeatureKind) -> Shape {
+const fn shape(kind: FeatureKind) -> MarkShape {
     match kind {
-        FeatureKind::Plane => Shape::Square,
-        FeatureKind::Corner => Shape::Triangle,
-        FeatureKind::Edge => Shape::Diamond,
-        FeatureKind::Unresolved => Shape::Cross,
+        FeatureKind::Plane => MarkShape::Square,
+        FeatureKind::Corner => MarkShape::Triangle,
+        FeatureKind::Edge => MarkShape::Diamond,
+        FeatureKind::Unresolved => MarkShape::Cross,
     }
 }
 
-fn entries(features: &[Feature], scene: Option<&Scene>) -> Vec<Entry> {
+fn entries(features: &[Feature], scene: Option<&Scene>) -> Vec<LegendEntry> {
     let present = KINDS.into_iter().filter(|kind| features.iter().any(|f| f.kind == *kind));
     let kinds = present.map(|kind| {
-        Entry::new(Sample::Mark { shape: shape(kind), colour: colour(kind) }, name(kind))
+        LegendEntry::new(LegendSample::Mark { shape: shape(kind), colour: colour(kind) }, name(kind))
     });
-    let dot = Sample::Mark { shape: Shape::Dot, colour: theme::NO_ECHO };
-    let next = Sample::Line { colour: theme::ORANGE, width_px: 2.0, dash: "none" };
+    let dot = LegendSample::Mark { shape: MarkShape::Dot, colour: theme::NO_ECHO };
+    let next = LegendSample::Line { colour: theme::ORANGE, width_px: 2.0, dash: "none" };
     let proposes = features.iter().any(|feature| feature.next.is_some());
     kinds
-        .chain([Entry::new(dot, "reading")])
-        .chain(proposes.then(|| Entry::new(next, "proposed next pose")))
+        .chain([LegendEntry::new(dot, "reading")])
+        .chain(proposes.then(|| LegendEntry::new(next, "proposed next pose")))
         .chain(scene.map(legend_entries::materials).into_iter().flatten())
         .collect()
 }
@@ -88,7 +88,7 @@ fn pose_of(scans: &[ScanView], feature: &Feature) -> Option<Pose> {
     scans.iter().find(|scan| scan.scan == feature.scan).and_then(scan_caption::pose_of)
 }
 
-fn arc(plan: &Plan, scans: &[ScanView], feature: &Feature) -> Layer {
+fn arc(plan: &PlanProjection, scans: &[ScanView], feature: &Feature) -> Layer {
     let colour = colour(feature.kind);
     let mut layer = Layer::new("feature").stroked(colour, 2.6);
     let (Some(pose), Some(range_m)) = (pose_of(scans, feature), feature.range_m) else {
@@ -103,7 +103,7 @@ fn arc(plan: &Plan, scans: &[ScanView], feature: &Feature) -> Layer {
 }
 
 /// Arc of a feature on the page; empty where only the direction is known.
-fn arc_of(plan: &Plan, scans: &[ScanView], feature: &Feature) -> Vec<Px> {
+fn arc_of(plan: &PlanProjection, scans: &[ScanView], feature: &Feature) -> Vec<Px> {
     let (Some(pose), Some(range_m)) = (pose_of(scans, feature), feature.range_m) else {
         return Vec::new();
     };
@@ -128,7 +128,7 @@ fn hint(feature: &Feature) -> String {
 }
 
 /// Draws class, extent and, if known, beta next to each mark.
-fn names(plan: &Plan, scene: Option<&Scene>, scans: &[ScanView], features: &[Feature]) -> Layer {
+fn names(plan: &PlanProjection, scene: Option<&Scene>, scans: &[ScanView], features: &[Feature]) -> Layer {
     let mut labels = plan.labels(scene);
     for feature in features {
         arc_of(plan, scans, feature).windows(2).for_each(|two| labels.keep_off(two[0], two[1]));
@@ -176,7 +176,7 @@ fn rounded(value: f64, digits: f64) -> f64 {
     (value * digits).round() / digits + 0.0
 }
 
-fn next_places(plan: &Plan, scans: &[ScanView], features: &[Feature]) -> Layer {
+fn next_places(plan: &PlanProjection, scans: &[ScanView], features: &[Feature]) -> Layer {
     let mut layer = Layer::new("next").stroked(theme::ORANGE, 2.0);
     for feature in features {
         if let (Some(pose), Some(next)) = (pose_of(scans, feature), feature.next) {

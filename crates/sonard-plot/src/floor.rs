@@ -4,7 +4,7 @@
 use super::{
     canvas::{Anchor, Layer, Px},
     labels::Labels,
-    plan::Plan,
+    plan::PlanProjection,
     readings::{PlottedBeam, PlottedScan, ReadingKind},
     theme,
 };
@@ -18,7 +18,7 @@ const RING_PX: f64 = 3.4;
 /// Scan with its pose and floor plan.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Floor<'a> {
-    pub(super) plan: &'a Plan,
+    pub(super) plan: &'a PlanProjection,
     pub(super) pose: Pose,
     pub(super) scan: &'a PlottedScan,
 }

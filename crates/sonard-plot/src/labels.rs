@@ -57,7 +57,7 @@ impl Labels {
             crosses(from, to, size / 2.0)
         };
         let free = self.panel.encloses(&around)
-            && !self.taken.iter().any(|other| other.meets(&around))
+            && !self.taken.iter().any(|other| other.overlaps(&around))
             && !self.lines.iter().any(crossed);
         if free {
             self.taken.push(around);

@@ -1,26 +1,26 @@
 //! Legends: rows of samples with their labels.
 
 use super::{
-    canvas::{Anchor, Layer, Px, Rect, Shape, text_width_px},
+    canvas::{Anchor, Layer, Px, Rect, MarkShape, text_width_px},
     theme,
 };
 
 /// Legend entry.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Entry {
+pub struct LegendEntry {
     /// Drawn sample.
-    pub sample: Sample,
+    pub sample: LegendSample,
     /// Meaning of the sample.
     pub text: String,
 }
 
 /// Sample drawn before the label.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Sample {
+pub enum LegendSample {
     /// Mark of a reading.
     Mark {
         /// Shape of the mark.
-        shape: Shape,
+        shape: MarkShape,
         /// Fill.
         colour: &'static str,
     },
@@ -52,9 +52,9 @@ pub enum Sample {
     Outward,
 }
 
-impl Entry {
+impl LegendEntry {
     /// Entry of a sample and its meaning.
-    pub fn new(sample: Sample, text: impl Into<String>) -> Self {
+    pub fn new(sample: LegendSample, text: impl Into<String>) -> Self {
         Self { sample, text: text.into() }
     }
 }
@@ -65,7 +65,7 @@ const GAP_PX: f64 = 20.0;
 
 /// Draws the entries from `at` (upper left) in rows of at most `width_px`; returns the layer
 /// and its height.
-pub fn draw(entries: &[Entry], at: Px, width_px: f64) -> (Layer, f64) {
+pub fn draw(entries: &[LegendEntry], at: Px, width_px: f64) -> (Layer, f64) {
     let mut layer = Layer::new("legend");
     let (mut x, mut row) = (0.0, 0.0);
     for entry in entries {
@@ -83,41 +83,41 @@ pub fn draw(entries: &[Entry], at: Px, width_px: f64) -> (Layer, f64) {
     (layer, rows * ROW_PX)
 }
 
-fn sample(sample: &Sample, at: Px) -> Layer {
+fn sample(sample: &LegendSample, at: Px) -> Layer {
     let middle = at + Px::new(SAMPLE_PX / 2.0 - 3.0, 0.0);
     let left = at + Px::new(1.0, 0.0);
     let right = at + Px::new(SAMPLE_PX - 6.0, 0.0);
     match sample {
-        Sample::Mark { shape, colour } => {
+        LegendSample::Mark { shape, colour } => {
             let mut layer = Layer::new("sample").with("fill", *colour);
             layer.mark(*shape, middle, 4.0, None);
             layer
         }
-        Sample::Ring { colour } => {
+        LegendSample::Ring { colour } => {
             let mut layer = Layer::new("sample").stroked(colour, 1.0);
             layer.line(left, middle - Px::new(3.5, 0.0));
             layer.circle(middle, 3.5);
             layer
         }
-        Sample::Line { colour, width_px, dash } => {
+        LegendSample::Line { colour, width_px, dash } => {
             let mut layer =
                 Layer::new("sample").stroked(colour, *width_px).with("stroke-dasharray", *dash);
             layer.line(left, right);
             layer
         }
-        Sample::Patch { colour } => {
+        LegendSample::Patch { colour } => {
             let mut layer = Layer::new("sample").stroked(theme::FRAME, 1.0).with("fill", *colour);
             layer.rect(Rect::new(left.x, at.y - 6.0, right.x - left.x, 12.0), 0.0);
             layer
         }
-        Sample::Tick { colour } => {
+        LegendSample::Tick { colour } => {
             let mut layer = Layer::new("sample").stroked(colour, 1.3);
             for shift in [-5.0, 0.0, 5.0] {
                 layer.line(middle + Px::new(shift, -4.0), middle + Px::new(shift, 4.0));
             }
             layer
         }
-        Sample::Outward => {
+        LegendSample::Outward => {
             let mut layer = Layer::new("sample").with("fill", theme::INK);
             let [nose, tail] = [Px::new(6.0, 0.0), Px::new(-4.0, 5.0)];
             layer.polygon(&[middle + nose, middle + tail, middle + Px::new(tail.x, -tail.y)]);

@@ -24,10 +24,10 @@ fn path_of_a_beam_has_a_badge() {
         let view = PathView {
             title: "a path".into(),
             lines: Vec::new(),
-            badge: badge_of(Some(provenance)),
+            badge: badge_for(Some(provenance)),
             scene: &scene,
             pose,
-            looks: pose,
+            transducer: pose,
             azimuth_deg: 0.0,
             range_m: Some(0.5),
             points: vec![pose.position(), pose.position() + DVec2::X, pose.position()],
@@ -63,7 +63,7 @@ fn series_and_convergence_have_a_badge() {
     assert!(series(&some).contains("MOCK, not hardware"));
     assert!(series(&[]).contains("PROVENANCE UNKNOWN"));
     assert!(!series(&some[..1]).contains("class=\"provenance\""));
-    let badge = badge_of(Some(Provenance::Simulated));
+    let badge = badge_for(Some(Provenance::Simulated));
     let converged = draw_convergence("fan", badge, &[], ["spacing", "share"], &[]).to_svg();
     assert!(converged.contains("SIMULATED"));
 }
@@ -85,14 +85,14 @@ fn map_has_frame_and_badge() {
     let grid = Grid::new(shape);
     let draw = |badge| {
         let (title, lines) = ("a map".to_owned(), Vec::new());
-        let view = MapView { title, lines, badge, grid: &grid, scene: Some(&room()), way: &[] };
+        let view = MapView { title, lines, badge, grid: &grid, scene: Some(&room()), trajectory: &[] };
         Pixmap::decode_png(&draw_map(&view).expect("drawn")).expect("a PNG")
     };
     let red = |image: &Pixmap| {
         let is_red = |p: &&resvg::tiny_skia::PremultipliedColorU8| p.red() > 180 && p.blue() < 60;
         image.pixels().iter().filter(is_red).count()
     };
-    let [plain, marked] = [draw(None), draw(badge_of(Some(Provenance::Simulated)))];
+    let [plain, marked] = [draw(None), draw(badge_for(Some(Provenance::Simulated)))];
     assert_eq!(red(&plain), 0);
     assert!(red(&marked) > 200, "a badge");
     let is_grey = |p: &&resvg::tiny_skia::PremultipliedColorU8| p.red() == 127;

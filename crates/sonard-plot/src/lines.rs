@@ -1,11 +1,11 @@
 //! Floor plan with the lines fitted to scans.
 
 use super::{
-    canvas::{Layer, Shape},
-    legend::{Entry, Sample},
+    canvas::{Layer, MarkShape},
+    legend::{LegendEntry, LegendSample},
     legend_entries, overlay,
     picture::Picture,
-    plan::Plan,
+    plan::PlanProjection,
     theme,
 };
 use sonard_interpret::interpret::lines::{LineKind, MapLine};
@@ -23,28 +23,28 @@ const KINDS: [(LineKind, &str, &str); 3] = [
 #[must_use]
 pub fn draw_lines(scans: &[ScanView], scene: Option<&Scene>, lines: &[MapLine]) -> Picture {
     let samples = entries(lines);
-    let dot = Sample::Mark { shape: Shape::Dot, colour: theme::NO_ECHO };
-    let entries: Vec<Entry> = samples
+    let dot = LegendSample::Mark { shape: MarkShape::Dot, colour: theme::NO_ECHO };
+    let entries: Vec<LegendEntry> = samples
         .into_iter()
-        .chain([Entry::new(dot, "reading")])
+        .chain([LegendEntry::new(dot, "reading")])
         .chain(scene.map(legend_entries::materials).into_iter().flatten())
         .collect();
     let finding = format!("{} lines", lines.len());
-    let draw = |plan: &Plan| lines.iter().map(|line| layer(plan, line)).collect();
+    let draw = |plan: &PlanProjection| lines.iter().map(|line| layer(plan, line)).collect();
     let ends: Vec<DVec2> = lines.iter().flat_map(|line| line.ends).collect();
     overlay::draw(scans, scene, finding, &ends, draw, |_| None, &entries)
 }
 
 /// Legend entries for the kinds of lines present.
-pub fn entries<'a>(lines: impl IntoIterator<Item = &'a MapLine>) -> Vec<Entry> {
+pub fn entries<'a>(lines: impl IntoIterator<Item = &'a MapLine>) -> Vec<LegendEntry> {
     let present: Vec<LineKind> = lines.into_iter().map(|line| line.kind).collect();
     let kinds = KINDS.iter().filter(|(kind, ..)| present.contains(kind));
-    let sample = |colour| Sample::Line { colour, width_px: 2.6, dash: "none" };
-    kinds.map(|(_, name, colour)| Entry::new(sample(colour), *name)).collect()
+    let sample = |colour| LegendSample::Line { colour, width_px: 2.6, dash: "none" };
+    kinds.map(|(_, name, colour)| LegendEntry::new(sample(colour), *name)).collect()
 }
 
 /// Line with its confirmed ends.
-pub fn layer(plan: &Plan, line: &MapLine) -> Layer {
+pub fn layer(plan: &PlanProjection, line: &MapLine) -> Layer {
     let colour = KINDS
         .iter()
         .find(|(kind, ..)| *kind == line.kind)
@@ -56,7 +56,7 @@ pub fn layer(plan: &Plan, line: &MapLine) -> Layer {
     layer.line(a, b);
     let mut ends = Layer::new("ends").with("fill", colour);
     for (at, _) in [a, b].into_iter().zip(line.terminal).filter(|(_, terminal)| *terminal) {
-        ends.mark(Shape::Dot, at, 3.5, None);
+        ends.mark(MarkShape::Dot, at, 3.5, None);
     }
     layer.add(ends);
     layer

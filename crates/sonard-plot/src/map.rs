@@ -6,9 +6,9 @@ use super::{
     PlotError,
     canvas::{Layer, Px, Rect},
     caption,
-    legend::{self, Entry, Sample},
+    legend::{self, LegendEntry, LegendSample},
     picture::Picture,
-    plan::{Bounds, Plan},
+    plan::{Bounds, PlanProjection},
     theme,
 };
 use sonard_interpret::interpret::grid::Grid;
@@ -32,7 +32,7 @@ pub struct MapView<'a> {
     /// Scene whose walls are overlaid.
     pub scene: Option<&'a Scene>,
     /// Trajectory of the robot, metres.
-    pub way: &'a [DVec2],
+    pub trajectory: &'a [DVec2],
 }
 
 /// Draws a map as a PNG: free is white, occupied black, unknown grey. Overlaid are the walls of the
@@ -44,8 +44,8 @@ pub fn draw_map(view: &MapView) -> Result<Vec<u8>, PlotError> {
     let (heading, top) = caption::draw(&view.title, view.badge, &view.lines);
     let (left, right) = (theme::MARGIN_PX + 38.0, theme::PAGE_PX - theme::MARGIN_PX);
     let region = region(view.grid);
-    let height = Plan::height_for(&region, right - left, [160.0, 1400.0]);
-    let plan = Plan::fit(region, Rect::new(left, top + 22.0, right - left, height));
+    let height = PlanProjection::height_for(&region, right - left, [160.0, 1400.0]);
+    let plan = PlanProjection::fit(region, Rect::new(left, top + 22.0, right - left, height));
     let below = Px::new(left, plan.panel.bottom + 24.0);
     let (key, key_height) = legend::draw(&entries(view), below, right - left);
     let page_px = below.y + key_height + theme::MARGIN_PX / 2.0;
@@ -73,7 +73,7 @@ fn region(grid: &Grid) -> Bounds {
 }
 
 /// Width at which single cells are visible, within bounds.
-fn width_px(view: &MapView, plan: &Plan) -> u32 {
+fn width_px(view: &MapView, plan: &PlanProjection) -> u32 {
     let cell_px = plan.length_px(view.grid.shape().resolution_m);
     let desired = theme::PAGE_PX * (CELL_PX / cell_px).max(1.0);
     let max_width = MAX_SIDE_PX * theme::PAGE_PX / (plan.panel.bottom + 100.0);
@@ -81,7 +81,7 @@ fn width_px(view: &MapView, plan: &Plan) -> u32 {
 }
 
 /// Paints the cells into the panel, darker for a higher probability of occupancy.
-fn paint(pixels: &mut Pixmap, grid: &Grid, plan: &Plan) {
+fn paint(pixels: &mut Pixmap, grid: &Grid, plan: &PlanProjection) {
     let (width, scale) = (pixels.width() as usize, f64::from(pixels.width()) / theme::PAGE_PX);
     let shape = grid.shape();
     for (at, pixel) in pixels.pixels_mut().iter_mut().enumerate() {
@@ -97,7 +97,7 @@ fn paint(pixels: &mut Pixmap, grid: &Grid, plan: &Plan) {
     }
 }
 
-fn walls(view: &MapView, plan: &Plan) -> Layer {
+fn walls(view: &MapView, plan: &PlanProjection) -> Layer {
     let mut layer = Layer::new("walls").stroked(theme::BLUE, WALL_PX);
     for wall in view.scene.iter().flat_map(|scene| &scene.walls) {
         layer.line(plan.px(wall.a), plan.px(wall.b));
@@ -110,10 +110,10 @@ fn walls(view: &MapView, plan: &Plan) -> Layer {
 
 const WALL_PX: f64 = 1.2;
 
-fn trajectory(view: &MapView, plan: &Plan) -> Layer {
+fn trajectory(view: &MapView, plan: &PlanProjection) -> Layer {
     let mut layer = Layer::new("trajectory").stroked(theme::ORANGE, 1.4);
     let points: Vec<Px> =
-        view.way.iter().filter(|at| at.is_finite()).map(|at| plan.px(*at)).collect();
+        view.trajectory.iter().filter(|at| at.is_finite()).map(|at| plan.px(*at)).collect();
     if let (Some(start), 1) = (points.first(), points.len()) {
         layer.circle(*start, 3.0);
     }
@@ -121,18 +121,18 @@ fn trajectory(view: &MapView, plan: &Plan) -> Layer {
     layer
 }
 
-fn entries(view: &MapView) -> Vec<Entry> {
-    let line = |colour, width_px| Sample::Line { colour, width_px, dash: "none" };
+fn entries(view: &MapView) -> Vec<LegendEntry> {
+    let line = |colour, width_px| LegendSample::Line { colour, width_px, dash: "none" };
     let mut entries = vec![
-        Entry::new(Sample::Patch { colour: theme::PAPER }, "free"),
-        Entry::new(Sample::Patch { colour: UNKNOWN }, "unknown"),
-        Entry::new(Sample::Patch { colour: "#000000" }, "occupied"),
+        LegendEntry::new(LegendSample::Patch { colour: theme::PAPER }, "free"),
+        LegendEntry::new(LegendSample::Patch { colour: UNKNOWN }, "unknown"),
+        LegendEntry::new(LegendSample::Patch { colour: "#000000" }, "occupied"),
     ];
     if view.scene.is_some() {
-        entries.push(Entry::new(line(theme::BLUE, WALL_PX), "walls of the scene"));
+        entries.push(LegendEntry::new(line(theme::BLUE, WALL_PX), "walls of the scene"));
     }
-    if !view.way.is_empty() {
-        entries.push(Entry::new(line(theme::ORANGE, 1.4), "trajectory"));
+    if !view.trajectory.is_empty() {
+        entries.push(LegendEntry::new(line(theme::ORANGE, 1.4), "trajectory"));
     }
     entries
 }

@@ -1,11 +1,11 @@
 //! Floor plan with the readings as small dots, as background of findings.
 
 use super::{
-    canvas::{Layer, Px, Rect, Shape},
+    canvas::{Layer, Px, Rect, MarkShape},
     caption,
-    legend::{self, Entry},
+    legend::{self, LegendEntry},
     picture::Picture,
-    plan::{Bounds, Plan},
+    plan::{Bounds, PlanProjection},
     readings::PlottedScan,
     region, scan_caption, theme,
 };
@@ -25,9 +25,9 @@ pub(super) fn draw(
     scene: Option<&Scene>,
     finding: String,
     found: &[DVec2],
-    over: impl FnOnce(&Plan) -> Vec<Layer>,
-    labels: impl FnOnce(&Plan) -> Option<Layer>,
-    entries: &[Entry],
+    over: impl FnOnce(&PlanProjection) -> Vec<Layer>,
+    labels: impl FnOnce(&PlanProjection) -> Option<Layer>,
+    entries: &[LegendEntry],
 ) -> Picture {
     let readings: Vec<PlottedScan> = scans.iter().map(PlottedScan::from_scan).collect();
     let placed: Vec<(Pose, &PlottedScan)> = scans
@@ -45,8 +45,8 @@ pub(super) fn draw(
     };
     let region = around.including(found.iter().copied());
     let (left, right) = (theme::MARGIN_PX + 38.0, theme::PAGE_PX - theme::MARGIN_PX);
-    let height = Plan::height_for(&region, right - left, [320.0, 760.0]);
-    let plan = Plan::fit(region, Rect::new(left, top + 22.0, right - left, height));
+    let height = PlanProjection::height_for(&region, right - left, [320.0, 760.0]);
+    let plan = PlanProjection::fit(region, Rect::new(left, top + 22.0, right - left, height));
 
     let mut inside = Layer::new("inside").clipped("overlay-window", plan.panel);
     inside.extend(scene.map(|scene| plan.walls(scene)));
@@ -66,12 +66,12 @@ pub(super) fn draw(
     Picture::new(theme::PAGE_PX, below.y + key_height + theme::MARGIN_PX / 2.0, page)
 }
 
-fn dots(plan: &Plan, pose: &Pose, readings: &PlottedScan) -> Layer {
+fn dots(plan: &PlanProjection, pose: &Pose, readings: &PlottedScan) -> Layer {
     let mut layer = Layer::new("readings").with("fill", theme::NO_ECHO);
     for beam in &readings.beams {
         if let Some(range_m) = beam.range_m {
             let at = plan.px(beam.point(pose, range_m));
-            layer.mark(Shape::Dot, at, 1.4, None);
+            layer.mark(MarkShape::Dot, at, 1.4, None);
         }
     }
     layer

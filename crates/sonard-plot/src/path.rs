@@ -4,10 +4,10 @@ use super::{
     canvas::{Anchor, Layer, Px, Rect},
     caption,
     labels::Labels,
-    legend::{self, Entry, Sample},
+    legend::{self, LegendEntry, LegendSample},
     legend_entries,
     picture::Picture,
-    plan::{Bounds, Plan},
+    plan::{Bounds, PlanProjection},
     theme,
 };
 use sonard_model::{
@@ -29,7 +29,7 @@ pub struct PathView<'a> {
     /// Pose of the ranger.
     pub pose: Pose,
     /// Position of the transducer; its heading is the beam direction.
-    pub looks: Pose,
+    pub transducer: Pose,
     /// Beam direction, degrees from the scan's heading.
     pub azimuth_deg: f64,
     /// Reported range, metres.
@@ -45,8 +45,8 @@ pub fn draw_path(view: &PathView) -> Picture {
     let (heading, top) = caption::draw(&view.title, view.badge, &view.lines);
     let (left, right) = (theme::MARGIN_PX + 38.0, theme::PAGE_PX - theme::MARGIN_PX);
     let region = region(view);
-    let height = Plan::height_for(&region, right - left, [300.0, 700.0]);
-    let plan = Plan::fit(region, Rect::new(left, top + 22.0, right - left, height));
+    let height = PlanProjection::height_for(&region, right - left, [300.0, 700.0]);
+    let plan = PlanProjection::fit(region, Rect::new(left, top + 22.0, right - left, height));
     let mut labels = plan.labels(Some(view.scene));
     let mut page = Layer::new("path-of-a-beam");
     page.add(heading);
@@ -62,11 +62,11 @@ pub fn draw_path(view: &PathView) -> Picture {
     page.add(plan.scale_bar());
     let below = Px::new(left, plan.panel.bottom + 24.0);
     let mut entries = vec![
-        Entry::new(line(theme::VERMILLION, "none"), "propagation path"),
-        Entry::new(line(theme::SKY, "5 4"), "beam axis"),
+        LegendEntry::new(line(theme::VERMILLION, "none"), "propagation path"),
+        LegendEntry::new(line(theme::SKY, "5 4"), "beam axis"),
     ];
     if view.range_m.is_some() {
-        entries.push(Entry::new(Sample::Ring { colour: theme::BLUE }, "reported range"));
+        entries.push(LegendEntry::new(LegendSample::Ring { colour: theme::BLUE }, "reported range"));
     }
     entries.extend(legend_entries::materials(view.scene));
     let (key, key_height) = legend::draw(&entries, below, right - left);
@@ -74,13 +74,13 @@ pub fn draw_path(view: &PathView) -> Picture {
     Picture::new(theme::PAGE_PX, below.y + key_height + theme::MARGIN_PX / 2.0, page)
 }
 
-const fn line(colour: &'static str, dash: &'static str) -> Sample {
-    Sample::Line { colour, width_px: 2.0, dash }
+const fn line(colour: &'static str, dash: &'static str) -> LegendSample {
+    LegendSample::Line { colour, width_px: 2.0, dash }
 }
 
 /// Bounds of the path and the reading with a margin, and of the near part of the room.
 fn region(view: &PathView) -> Bounds {
-    let read = view.range_m.map(|range_m| view.looks.point_at(0.0, range_m));
+    let read = view.range_m.map(|range_m| view.transducer.point_at(0.0, range_m));
     let here = [view.pose.position()].into_iter().chain(read).chain(view.points.iter().copied());
     let path = Bounds::around(here).unwrap_or(Bounds { min: DVec2::ZERO, max: DVec2::ONE });
     let reach = path.size().max_element().max(0.1);
@@ -89,10 +89,10 @@ fn region(view: &PathView) -> Bounds {
     path.including(walls.map(|end| end.clamp(near.min, near.max))).grown(0.12 * reach)
 }
 
-fn beam(view: &PathView, plan: &Plan) -> Layer {
+fn beam(view: &PathView, plan: &PlanProjection) -> Layer {
     let reach_m = view.range_m.unwrap_or_else(|| plan.view.size().max_element());
-    let from = plan.px(view.looks.position());
-    let to = view.looks.point_at(0.0, reach_m);
+    let from = plan.px(view.transducer.position());
+    let to = view.transducer.point_at(0.0, reach_m);
     let mut layer = Layer::new("axis").stroked(theme::SKY, 2.0).with("stroke-dasharray", "5 4");
     layer.line(from, plan.px(to));
     let mut ring = Layer::new("reading").stroked(theme::BLUE, 1.6);
@@ -103,7 +103,7 @@ fn beam(view: &PathView, plan: &Plan) -> Layer {
     layer
 }
 
-fn path(view: &PathView, plan: &Plan, labels: &mut Labels) -> Layer {
+fn path(view: &PathView, plan: &PlanProjection, labels: &mut Labels) -> Layer {
     let stretches = apart(&view.points.iter().map(|point| plan.px(*point)).collect::<Vec<_>>());
     let mut layer = Layer::new("path").stroked(theme::VERMILLION, 1.8);
     let mut heads = Layer::new("heads").with("fill", theme::VERMILLION).with("stroke", "none");

@@ -35,7 +35,7 @@ impl Bounds {
     }
 
     /// Bounds of the walls and cylinders of a scene.
-    pub fn of_scene(scene: &Scene) -> Option<Self> {
+    pub fn from_scene(scene: &Scene) -> Option<Self> {
         let ends = scene.walls.iter().flat_map(|wall| [wall.a, wall.b]);
         let discs = scene.cylinders.iter().flat_map(|cylinder| {
             let reach = DVec2::splat(cylinder.radius_m);
@@ -63,7 +63,7 @@ impl Bounds {
 
 /// Placement of a floor plan on the page.
 #[derive(Debug, Clone, Copy)]
-pub struct Plan {
+pub struct PlanProjection {
     /// Panel on the page, pixels.
     pub panel: Rect,
     /// Visible region, metres.
@@ -71,7 +71,7 @@ pub struct Plan {
     px_per_m: f64,
 }
 
-impl Plan {
+impl PlanProjection {
     /// Fits a region into a panel; spare space at the sides extends the view.
     pub fn fit(region: Bounds, panel: Rect) -> Self {
         let size = region.size().max(DVec2::splat(1e-3));
@@ -186,7 +186,7 @@ impl Plan {
     /// Draws the names of walls and cylinders where they fit.
     pub(crate) fn names(&self, scene: &Scene, labels: &mut Labels) -> Layer {
         let mut layer = Layer::new("names").with("fill", theme::QUIET).haloed();
-        let middle = Bounds::of_scene(scene).map_or(DVec2::ZERO, |b| (b.min + b.max) / 2.0);
+        let middle = Bounds::from_scene(scene).map_or(DVec2::ZERO, |b| (b.min + b.max) / 2.0);
         let mut groups: Vec<(&str, Bounds)> = Vec::new();
         for wall in &scene.walls {
             let [a, b] = [self.px(wall.a), self.px(wall.b)];

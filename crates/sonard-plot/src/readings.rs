@@ -1,8 +1,8 @@
 //! PlottedScan prepared for drawing, from any kind of log. PlottedScan with a prediction are
 //! classified by [`sonard_interpret::compare`], so that pictures and tables agree.
 
-use super::{canvas::Shape, fans::FanStyle, theme};
-use sonard_interpret::compare::{Judged, Verdict, compare};
+use super::{canvas::MarkShape, fans::FanStyle, theme};
+use sonard_interpret::compare::{ClassifiedPing, Verdict, compare};
 use sonard_model::{
     acoustics::BeamPattern,
     geometry::{DVec2, Pose, wrap_360},
@@ -52,13 +52,13 @@ impl ReadingKind {
         }
     }
 
-    pub(super) const fn shape(self) -> Shape {
+    pub(super) const fn shape(self) -> MarkShape {
         match self {
-            Self::Multiple => Shape::Square,
-            Self::Edge => Shape::Triangle,
-            Self::MinRange => Shape::Diamond,
-            Self::Unexplained => Shape::Cross,
-            _ => Shape::Dot,
+            Self::Multiple => MarkShape::Square,
+            Self::Edge => MarkShape::Triangle,
+            Self::MinRange => MarkShape::Diamond,
+            Self::Unexplained => MarkShape::Cross,
+            _ => MarkShape::Dot,
         }
     }
 
@@ -133,8 +133,8 @@ impl PlottedScan {
     pub(super) fn from_scan(view: &ScanView) -> Self {
         let min_range_m = view.session.as_deref().and_then(min_range_m);
         let (_, classified) = compare(std::slice::from_ref(view));
-        let has_one_place = view.has_one_place();
-        let plotted = |classified: &Judged<'_>| {
+        let has_one_place = view.is_from_one_position();
+        let plotted = |classified: &ClassifiedPing<'_>| {
             let reading = reading(classified, min_range_m);
             if has_one_place { reading } else { mounted(view, classified.ping, reading) }
         };
@@ -204,7 +204,7 @@ fn mounted(view: &ScanView, ping: &Ping, reading: PlottedBeam) -> PlottedBeam {
     PlottedBeam { azimuth_deg, viewpoint, ranger: ping.ranger.clone(), ..reading }
 }
 
-fn reading(classified: &Judged<'_>, min_range_m: Option<f64>) -> PlottedBeam {
+fn reading(classified: &ClassifiedPing<'_>, min_range_m: Option<f64>) -> PlottedBeam {
     let ping = classified.ping;
     let or_min_range = |status: PingStatus, range_m: Option<f64>| match status {
         PingStatus::Echo => length(range_m),
@@ -230,7 +230,7 @@ fn reading(classified: &Judged<'_>, min_range_m: Option<f64>) -> PlottedBeam {
     }
 }
 
-fn kind_with_range(classified: &Judged<'_>) -> ReadingKind {
+fn kind_with_range(classified: &ClassifiedPing<'_>) -> ReadingKind {
     match (classified.verdict, classified.ping.status) {
         (Ok(Verdict::Direct), _) => ReadingKind::Direct,
         (Ok(Verdict::Multiple), _) => ReadingKind::Multiple,
@@ -242,7 +242,7 @@ fn kind_with_range(classified: &Judged<'_>) -> ReadingKind {
     }
 }
 
-fn kind_without_range(classified: &Judged<'_>) -> ReadingKind {
+fn kind_without_range(classified: &ClassifiedPing<'_>) -> ReadingKind {
     match (classified.ping.status, classified.verdict) {
         (PingStatus::NoEcho, Ok(Verdict::Unexplained)) => ReadingKind::MissedEcho,
         (PingStatus::NoEcho, _) => ReadingKind::NoEcho,
@@ -273,7 +273,7 @@ fn hint(ping: &Ping, kind: ReadingKind, range_m: Option<f64>, model_m: Option<f6
         text += &format!(", predicted {model:.3} m");
     }
     if let Some(path) = ping.sound_path().filter(|path| !path.interactions.is_empty()) {
-        text += &format!(" via {}", path.in_words());
+        text += &format!(" via {}", path.describe());
     }
     text
 }

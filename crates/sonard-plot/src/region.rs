@@ -20,7 +20,7 @@ const OUTSIDE_FRACTION: f64 = 0.01;
 pub(super) fn region(scans: &[(Pose, &PlottedScan)], scene: Option<&Scene>) -> Bounds {
     let points: Vec<DVec2> = scans.iter().flat_map(|(pose, scan)| points(pose, scan)).collect();
     let poses = || scans.iter().map(|(pose, _)| pose.position());
-    let walls = scene.and_then(Bounds::of_scene);
+    let walls = scene.and_then(Bounds::from_scene);
     let region = match walls {
         Some(walls) => {
             let room = walls.including(poses().filter(|at| near(&walls, *at)));

@@ -3,7 +3,7 @@
 use super::{
     canvas::{Anchor, Layer, Px, Rect},
     caption,
-    legend::{self, Entry, Sample},
+    legend::{self, LegendEntry, LegendSample},
     legend_entries,
     picture::Picture,
     readings::PlottedScan,
@@ -48,8 +48,8 @@ pub fn draw_residuals(scans: &[ScanView], scene: Option<&Scene>) -> Picture {
     let legend_width = theme::PAGE_PX - 2.0 * theme::MARGIN_PX;
     let mut entries = legend_entries::with_range(&readings);
     if readings.iter().any(|scan| scan.has_model) {
-        let sample = Sample::Line { colour: theme::SKY, width_px: 7.0, dash: "none" };
-        entries.push(Entry::new(sample, "prediction"));
+        let sample = LegendSample::Line { colour: theme::SKY, width_px: 7.0, dash: "none" };
+        entries.push(LegendEntry::new(sample, "prediction"));
     }
     let (key, height) = legend::draw(&entries, below, legend_width);
     page.add(key);

@@ -6,7 +6,7 @@ use super::{
     floor::Floor,
     legend, legend_entries,
     picture::Picture,
-    plan::Plan,
+    plan::PlanProjection,
     readings::PlottedScan,
     region, scan_caption, scan_strips,
     strip::AzimuthAxis,
@@ -43,7 +43,7 @@ pub fn draw_scans(scans: &[ScanView], scene: Option<&Scene>) -> Picture {
 
     let region = region::region(&placed, scene);
     let layout = Layout::choose(&region, top + 22.0);
-    let plan = Plan::fit(region, layout.plan);
+    let plan = PlanProjection::fit(region, layout.plan);
     let azimuths =
         AzimuthAxis::from_plan(scans.first().and_then(|s| Some(&s.start.as_ref()?.plan)));
 
@@ -81,7 +81,7 @@ impl Layout {
     fn in_columns(region: &super::plan::Bounds, top: f64) -> Self {
         let left = theme::MARGIN_PX + 36.0;
         let plan_width = 540.0;
-        let height = Plan::height_for(region, plan_width, [430.0, 640.0]);
+        let height = PlanProjection::height_for(region, plan_width, [430.0, 640.0]);
         let strip_left = left + plan_width + 66.0;
         let strip_width = theme::PAGE_PX - theme::MARGIN_PX - strip_left;
         let strip_height = (height - 46.0) / 2.0;
@@ -96,7 +96,7 @@ impl Layout {
     fn stacked(region: &super::plan::Bounds, top: f64) -> Self {
         let left = theme::MARGIN_PX + 50.0;
         let width = theme::PAGE_PX - theme::MARGIN_PX - left;
-        let height = Plan::height_for(region, width, [180.0, 460.0]);
+        let height = PlanProjection::height_for(region, width, [180.0, 460.0]);
         let strip = |y: f64| Rect::new(left, y, width, 150.0);
         let strips_top = top + height + 48.0;
         Self {
@@ -130,18 +130,18 @@ impl<'a> PosedScans<'a> {
         by_pose
     }
 
-    fn predicted(&self, plan: &'a Plan) -> Floor<'_> {
+    fn predicted(&self, plan: &'a PlanProjection) -> Floor<'_> {
         Floor { plan, pose: self.pose, scan: self.first }
     }
 
-    fn measured(&self, plan: &'a Plan) -> Floor<'_> {
+    fn measured(&self, plan: &'a PlanProjection) -> Floor<'_> {
         Floor { plan, pose: self.pose, scan: &self.all }
     }
 }
 
 /// Floor plan, and the number of readings outside it.
 fn floor_plan(
-    plan: &Plan,
+    plan: &PlanProjection,
     scans: &[(Pose, &PlottedScan)],
     scene: Option<&Scene>,
 ) -> (Layer, usize) {

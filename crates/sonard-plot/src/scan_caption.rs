@@ -31,16 +31,16 @@ pub fn badge_among(sources: impl IntoIterator<Item = Provenance>) -> Option<&'st
     let mut hardware = None;
     for provenance in sources {
         if provenance != Provenance::Hardware {
-            return badge_of(Some(provenance));
+            return badge_for(Some(provenance));
         }
         hardware = Some(provenance);
     }
-    badge_of(hardware)
+    badge_for(hardware)
 }
 
 /// Badge in the corner of every picture of readings: their provenance, `None` for hardware.
 #[must_use]
-pub fn badge_of(provenance: Option<Provenance>) -> Option<&'static str> {
+pub fn badge_for(provenance: Option<Provenance>) -> Option<&'static str> {
     match provenance {
         Some(Provenance::Hardware) => None,
         Some(Provenance::Emulator) => Some("EMULATOR, not hardware"),

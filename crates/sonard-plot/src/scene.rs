@@ -6,7 +6,7 @@ use super::{
     labels::Labels,
     legend, legend_entries,
     picture::Picture,
-    plan::{Bounds, Plan},
+    plan::{Bounds, PlanProjection},
     theme,
 };
 use sonard_model::{geometry::DVec2, scene::Scene};
@@ -18,8 +18,8 @@ pub fn draw_scene(scene: &Scene) -> Picture {
     let (heading, top) = caption::draw(&scene.name, None, &notes(scene));
     let region = region(scene);
     let (left, right) = (theme::MARGIN_PX + 38.0, theme::PAGE_PX - theme::MARGIN_PX);
-    let height = Plan::height_for(&region, right - left, [220.0, 640.0]);
-    let plan = Plan::fit(region, Rect::new(left, top + 22.0, right - left, height));
+    let height = PlanProjection::height_for(&region, right - left, [220.0, 640.0]);
+    let plan = PlanProjection::fit(region, Rect::new(left, top + 22.0, right - left, height));
     let mut labels = plan.labels(Some(scene));
 
     let mut page = Layer::new("scene");
@@ -55,10 +55,10 @@ fn notes(scene: &Scene) -> Vec<String> {
 /// Bounds of everything drawn, with a margin; a square metre if there is nothing.
 fn region(scene: &Scene) -> Bounds {
     let poses = scene.poses.values().flat_map(|pose| {
-        let body = Bounds::of_scene(&scene.with_robot_at(pose)).map(|b| [b.min, b.max]);
+        let body = Bounds::from_scene(&scene.with_robot_at(pose)).map(|b| [b.min, b.max]);
         body.into_iter().flatten().chain([pose.position()])
     });
-    let all = match Bounds::of_scene(scene) {
+    let all = match Bounds::from_scene(scene) {
         Some(walls) => Some(walls.including(poses)),
         None => Bounds::around(poses),
     };
@@ -67,7 +67,7 @@ fn region(scene: &Scene) -> Bounds {
     all.grown(if size > 0.0 { 0.08 * size } else { 0.5 })
 }
 
-fn poses(plan: &Plan, scene: &Scene, labels: &mut Labels) -> Layer {
+fn poses(plan: &PlanProjection, scene: &Scene, labels: &mut Labels) -> Layer {
     let mut layer = Layer::new("poses");
     for (name, pose) in &scene.poses {
         layer.add(plan.body(scene, pose));

@@ -1,9 +1,9 @@
 //! Quantities stacked over a common axis, such as drift over days or spread over azimuths.
 
 use super::{
-    canvas::{Anchor, Layer, Px, Rect, Shape},
+    canvas::{Anchor, Layer, Px, Rect, MarkShape},
     caption,
-    legend::{self, Entry, Sample},
+    legend::{self, LegendEntry, LegendSample},
     picture::Picture,
     theme, ticks,
 };
@@ -18,14 +18,14 @@ pub struct Series {
     /// Name of the quantity, with its unit.
     pub title: String,
     /// Values, in any order.
-    pub points: Vec<Point>,
+    pub points: Vec<SeriesPoint>,
     /// Lower and upper limit of valid values.
     pub limits: Option<[f64; 2]>,
 }
 
 /// Value of a series.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Point {
+pub struct SeriesPoint {
     /// Position on the common axis.
     pub x: f64,
     /// Value of the quantity.
@@ -33,7 +33,7 @@ pub struct Point {
     /// Tooltip of the mark.
     pub hint: String,
     /// Whether the value is rejected, and drawn as a cross.
-    pub aside: bool,
+    pub rejected: bool,
 }
 
 /// Draws quantities stacked over a common axis with the title `x_title`, including its unit.
@@ -64,11 +64,11 @@ pub fn draw_series(
     let middle = Px::new(left + width / 2.0, bottom + 34.0);
     page.text(middle, Anchor::Middle, theme::SMALL_PX, x_title);
     bottom += 34.0 + theme::MARGIN_PX;
-    if strips.iter().flat_map(|strip| &strip.points).any(|point| point.aside) {
-        let entry = |shape, colour, text| Entry::new(Sample::Mark { shape, colour }, text);
+    if strips.iter().flat_map(|strip| &strip.points).any(|point| point.rejected) {
+        let entry = |shape, colour, text| LegendEntry::new(LegendSample::Mark { shape, colour }, text);
         let entries = [
-            entry(Shape::Dot, theme::BLUE, "accepted"),
-            entry(Shape::Cross, theme::VERMILLION, "rejected"),
+            entry(MarkShape::Dot, theme::BLUE, "accepted"),
+            entry(MarkShape::Cross, theme::VERMILLION, "rejected"),
         ];
         let (key, height) = legend::draw(&entries, Px::new(left, bottom), width);
         page.add(key);
@@ -147,9 +147,9 @@ fn draw_strip(strip: &Series, panel: Rect, along: Axis, last: bool) -> Layer {
     let drawn = strip.points.iter().filter(|point| point.x.is_finite() && point.y.is_finite());
     for point in drawn {
         let at = Px::new(x(point.x), y(point.y));
-        let (marks, shape) = match point.aside {
-            false => (&mut accepted, Shape::Dot),
-            true => (&mut rejected, Shape::Cross),
+        let (marks, shape) = match point.rejected {
+            false => (&mut accepted, MarkShape::Dot),
+            true => (&mut rejected, MarkShape::Cross),
         };
         marks.mark(shape, at, MARK_PX, Some(&point.hint));
     }
@@ -169,11 +169,11 @@ mod tests {
     use super::*;
 
     fn series(values: &[f64]) -> Series {
-        let point = |(i, y): (usize, &f64)| Point {
+        let point = |(i, y): (usize, &f64)| SeriesPoint {
             x: 0.5 * i as f64,
             y: *y,
             hint: format!("scan {i}"),
-            aside: i == 2,
+            rejected: i == 2,
         };
         let points = values.iter().enumerate().map(point).collect();
         Series { title: "temperature, C".into(), points, limits: Some([19.5, 20.5]) }

@@ -6,7 +6,7 @@ use super::{
     floor::Floor,
     legend, legend_entries,
     picture::Picture,
-    plan::Plan,
+    plan::PlanProjection,
     readings::PlottedScan,
     region, scan_caption, theme,
 };
@@ -43,10 +43,10 @@ pub fn draw_side_by_side(scans: &[ScanView], scene: Option<&Scene>) -> Picture {
     let left = theme::MARGIN_PX + 34.0;
     let room = theme::PAGE_PX - theme::MARGIN_PX - left + GAP_PX;
     let width = room / shown.len().max(1) as f64 - GAP_PX;
-    let height = Plan::height_for(&region, width, [180.0, 420.0]);
+    let height = PlanProjection::height_for(&region, width, [180.0, 420.0]);
     for (i, view) in shown.iter().enumerate() {
         let panel = Rect::new(left + i as f64 * (width + GAP_PX), top + 40.0, width, height);
-        let plan = Plan::fit(region, panel);
+        let plan = PlanProjection::fit(region, panel);
         page.add(floor(&plan, i, view, &readings[i], scene));
         let mut titles = Layer::new("engine");
         let above = |rise: f64| Px::new(panel.left, panel.top - rise);
@@ -62,7 +62,7 @@ pub fn draw_side_by_side(scans: &[ScanView], scene: Option<&Scene>) -> Picture {
 }
 
 fn floor(
-    plan: &Plan,
+    plan: &PlanProjection,
     number: usize,
     view: &ScanView,
     scan: &PlottedScan,

@@ -1,7 +1,7 @@
 //! Strips of a quantity against azimuth.
 
 use super::{
-    canvas::{Anchor, Layer, Px, Rect, Shape},
+    canvas::{Anchor, Layer, Px, Rect, MarkShape},
     theme, ticks,
 };
 use sonard_model::geometry::wrap_360;
@@ -157,7 +157,7 @@ impl AzimuthStrip {
         &self,
         layer: &mut Layer,
         (azimuth_deg, value): (f64, f64),
-        (shape, radius_px): (Shape, f64),
+        (shape, radius_px): (MarkShape, f64),
         hint: &str,
     ) {
         let (x, y) = (self.x(azimuth_deg), self.y(value));

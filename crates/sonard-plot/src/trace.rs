@@ -2,10 +2,10 @@
 //! ECHO output.
 
 use super::{
-    canvas::{Anchor, Layer, Px, Rect, Shape},
+    canvas::{Anchor, Layer, Px, Rect, MarkShape},
     caption,
     labels::Labels,
-    legend::{self, Entry, Sample},
+    legend::{self, LegendEntry, LegendSample},
     picture::Picture,
     theme, ticks,
 };
@@ -254,7 +254,7 @@ impl TracePanels {
             let y = self.level_y(point.map_or(1.0, |point| point.threshold));
             let range_m = self.sound_speed_m_s * echo_us * 1e-6 / 2.0;
             let hint = format!("ECHO rises at {echo_us:.1} us, {range_m:.4} m");
-            layer.mark(Shape::Triangle, Px::new(self.x(echo_us), y + 7.0), 4.5, Some(&hint));
+            layer.mark(MarkShape::Triangle, Px::new(self.x(echo_us), y + 7.0), 4.5, Some(&hint));
         }
         layer
     }
@@ -314,17 +314,17 @@ impl TracePanels {
     }
 }
 
-fn legend_entries() -> Vec<Entry> {
-    let line = |colour| Sample::Line { colour, width_px: 2.0, dash: "none" };
+fn legend_entries() -> Vec<LegendEntry> {
+    let line = |colour| LegendSample::Line { colour, width_px: 2.0, dash: "none" };
     vec![
-        Entry::new(line(theme::ORANGE), "transmit pulse (clipped)"),
-        Entry::new(line(theme::BLUE), "echo envelope"),
-        Entry::new(line(theme::VERMILLION), "detection threshold"),
-        Entry::new(
-            Sample::Mark { shape: Shape::Triangle, colour: theme::VERMILLION },
+        LegendEntry::new(line(theme::ORANGE), "transmit pulse (clipped)"),
+        LegendEntry::new(line(theme::BLUE), "echo envelope"),
+        LegendEntry::new(line(theme::VERMILLION), "detection threshold"),
+        LegendEntry::new(
+            LegendSample::Mark { shape: MarkShape::Triangle, colour: theme::VERMILLION },
             "ECHO rises",
         ),
-        Entry::new(Sample::Line { colour: theme::SKY, width_px: 9.0, dash: "none" }, "blanking"),
+        LegendEntry::new(LegendSample::Line { colour: theme::SKY, width_px: 9.0, dash: "none" }, "blanking"),
     ]
 }
 

@@ -5,7 +5,7 @@ use uuid::Uuid;
 
 use super::{CrosstalkRecord, Ping, Provenance, ScanEnd, ScanStart, Session, SimRecord};
 use sonard_model::{
-    array::{OtherFiring, RangerArray},
+    array::{InterferingFiring, RangerArray},
     geometry::Pose,
     model::{ArrayAtPose, ArrayModel, Prediction},
 };
@@ -69,7 +69,7 @@ impl SimRecord {
 }
 
 fn crosstalk(array: &RangerArray, prediction: &Prediction) -> Option<CrosstalkRecord> {
-    let OtherFiring { ranger, before_us } = prediction.crosstalk?;
+    let InterferingFiring { ranger, before_us } = prediction.crosstalk?;
     Some(CrosstalkRecord { ranger: array.rangers[ranger].id.clone(), before_us })
 }
 
@@ -143,7 +143,7 @@ mod tests {
         let view = ScanView::from_records(through_text).remove(0);
         assert_eq!((view.pings[0].pose, view.pings[1].pose), (None, Some(to)));
         for (ping, robot) in view.pings.iter().zip([from, to]) {
-            let mounted = model.array().rangers[1].pose_on(&robot);
+            let mounted = model.array().rangers[1].world_pose(&robot);
             let viewpoint = view.viewpoint(ping).expect("a viewpoint");
             assert!(viewpoint.position().distance(mounted.position()) < 1e-12);
             assert_eq!(viewpoint.direction_deg, wrap_360(mounted.heading_deg));

@@ -12,7 +12,7 @@ pub const MAX_LINE_BYTES: usize = 1 << 20;
 
 /// Kind of an error in a log line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum FaultKind {
+pub enum RecordErrorKind {
     /// Blank line without a record.
     Empty,
     /// Line longer than [`MAX_LINE_BYTES`].
@@ -30,14 +30,14 @@ pub enum FaultKind {
     /// Session of a log format other than [`LOG_FORMAT`].
     UnsupportedFormat,
     /// Incomplete last line, truncated within the record.
-    Torn,
+    Truncated,
 }
 
 /// Error of a line that is not a valid record.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 pub struct RecordError {
     /// Kind of the error.
-    pub kind: FaultKind,
+    pub kind: RecordErrorKind,
     /// Byte position on the line, from 1, where the error was detected, if it has a position.
     pub column: Option<usize>,
     /// Path of the field, such as `sim.path.interactions[2]`.
@@ -62,8 +62,8 @@ impl RecordError {
     /// Returns `true` if the line is a complete JSON object with a `type`, which another version of
     /// the program may support.
     #[must_use]
-    pub fn is_whole_record(&self) -> bool {
-        use FaultKind as Kind;
+    pub fn is_complete_object(&self) -> bool {
+        use RecordErrorKind as Kind;
         matches!(self.kind, Kind::UnknownType | Kind::BadField | Kind::UnsupportedFormat)
     }
 }
@@ -125,7 +125,7 @@ pub fn decode_line(bytes: &[u8]) -> Result<Record, RecordError> {
         "scan_end" => decode_fields(text).map(Record::ScanEnd),
         "event" => decode_fields(text).map(Record::Event),
         other => Err(RecordError {
-            kind: FaultKind::UnknownType,
+            kind: RecordErrorKind::UnknownType,
             column: None,
             field: Some("type".into()),
             message: format!(
@@ -146,24 +146,24 @@ fn as_text(bytes: &[u8]) -> Result<&str, RecordError> {
     let fault =
         |kind, column, message: String| Err(RecordError { kind, column, field: None, message });
     if bytes.trim_ascii().is_empty() {
-        return fault(FaultKind::Empty, None, "empty line: expected one record per line".into());
+        return fault(RecordErrorKind::Empty, None, "empty line: expected one record per line".into());
     }
     if let Some(at) = bytes.iter().position(|&byte| byte == 0) {
         let count = bytes.iter().filter(|&&byte| byte == 0).count();
         let message =
             format!("{count} NUL byte(s): space reserved but not written before a power failure");
-        return fault(FaultKind::NotText, Some(at + 1), message);
+        return fault(RecordErrorKind::NotText, Some(at + 1), message);
     }
     match std::str::from_utf8(bytes) {
         // serde would accept an array for a struct.
         Ok(text) if !text.trim_start().starts_with('{') => {
-            fault(FaultKind::NotJson, Some(1), "expected a JSON object, { ... }".into())
+            fault(RecordErrorKind::NotJson, Some(1), "expected a JSON object, { ... }".into())
         }
         Ok(text) => Ok(text),
         Err(error) => {
             let at = error.valid_up_to();
             let message = format!("byte 0x{:02x} is not UTF-8", bytes[at]);
-            fault(FaultKind::NotText, Some(at + 1), message)
+            fault(RecordErrorKind::NotText, Some(at + 1), message)
         }
     }
 }
@@ -172,7 +172,7 @@ fn as_text(bytes: &[u8]) -> Result<&str, RecordError> {
 fn tag_fault(text: &str, error: &serde_json::Error) -> RecordError {
     if serde_json::from_str::<serde::de::IgnoredAny>(text).is_ok() {
         return RecordError {
-            kind: FaultKind::NoType,
+            kind: RecordErrorKind::NoType,
             column: None,
             field: Some("type".into()),
             message: format!("{}: expected \"type\":\"ping\" or another record", plain(error)),
@@ -182,7 +182,7 @@ fn tag_fault(text: &str, error: &serde_json::Error) -> RecordError {
         serde_json::error::Category::Eof => "the JSON object is not closed".into(),
         _ => plain(error),
     };
-    RecordError { kind: FaultKind::NotJson, column: Some(error.column()), field: None, message }
+    RecordError { kind: RecordErrorKind::NotJson, column: Some(error.column()), field: None, message }
 }
 
 /// Decodes a session. The format is checked first, because fields of another format may differ.
@@ -198,7 +198,7 @@ fn decode_session(text: &str) -> Result<Record, RecordError> {
             let writer =
                 if sonard.is_empty() { "its writer".into() } else { format!("sonard {sonard}") };
             Err(RecordError {
-                kind: FaultKind::UnsupportedFormat,
+                kind: RecordErrorKind::UnsupportedFormat,
                 column: None,
                 field: Some("format".into()),
                 message: format!(
@@ -220,7 +220,7 @@ fn decode_fields<T: DeserializeOwned>(text: &str) -> Result<T, RecordError> {
             let path = error.path().to_string();
             let error = error.inner();
             RecordError {
-                kind: FaultKind::BadField,
+                kind: RecordErrorKind::BadField,
                 column: Some(error.column()),
                 field: (path != ".").then_some(path),
                 message: plain(error),

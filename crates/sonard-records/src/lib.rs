@@ -19,7 +19,7 @@ mod trace;
 mod view;
 mod viewpoint;
 
-pub use codec::{EncodeError, FaultKind, MAX_LINE_BYTES, RecordError, decode_line, encode_line};
+pub use codec::{EncodeError, RecordErrorKind, MAX_LINE_BYTES, RecordError, decode_line, encode_line};
 pub use floor_plan::{Body, Circle, FloorPlan, PlanPoint, WallLine};
 pub use path::{InteractionKind, InteractionRecord, PathRecord, Point};
 pub use peak::PeakLine;
@@ -27,14 +27,14 @@ pub use record::{
     AirSource, CrosstalkRecord, Event, EventKind, Ping, Record, STOPPED_ON_REQUEST, ScanAir,
     ScanEnd, ScanStart, SimRecord,
 };
-pub use remaining::Segment;
+pub use remaining::BeamRun;
 pub use session::{
     AirRecord, CollectionRef, Device, ImportRef, LOG_FORMAT, ModelRecord, Provenance, SceneRef,
     Session,
 };
 pub use sink::{Sink, SinkError};
 pub use sonard_model::{
-    plan::{PlanError, ScanPlan},
+    scan_plan::{PlanError, ScanPlan},
     reading::{PathKind, PingStatus},
 };
 pub use trace::TraceLine;

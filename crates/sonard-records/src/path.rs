@@ -99,14 +99,14 @@ impl InteractionRecord {
 impl PathRecord {
     /// Ids of the interactions in order, edges marked as such.
     #[must_use]
-    pub fn in_words(&self) -> String {
+    pub fn describe(&self) -> String {
         let parts: Vec<String> = self.interactions.iter().map(InteractionRecord::label).collect();
         parts.join(", ")
     }
 
     /// Returns `true` if the path interacts with a wall, cylinder or edge.
     #[must_use]
-    pub fn meets(&self, id: &str) -> bool {
+    pub fn includes(&self, id: &str) -> bool {
         self.interactions.iter().any(|interaction| interaction.id == id)
     }
 
@@ -186,7 +186,7 @@ mod tests {
             {"kind":"diffraction","id":"p.a","point":[0.5,0.25]},
             {"kind":"reflection","id":"south","point":[0.5,0.0]}],"length_m":1}"#;
         let path = read(text).expect(text);
-        assert_eq!(path.in_words(), "edge p.a, south");
-        assert_eq!(["p.a", "south", "p"].map(|id| path.meets(id)), [true, true, false]);
+        assert_eq!(path.describe(), "edge p.a, south");
+        assert_eq!(["p.a", "south", "p"].map(|id| path.includes(id)), [true, true, false]);
     }
 }

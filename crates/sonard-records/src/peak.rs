@@ -38,14 +38,14 @@ impl PeakLine {
     ///
     /// # Errors
     /// If there are more paths than the model can trace.
-    pub fn of_trace(
+    pub fn from_trace(
         simulator: &Simulator,
         point: &ObservationPoint<'_>,
         axis: &Pose,
         trace: &EchoTrace,
     ) -> Result<Vec<Self>, TooCostly> {
         let direction_rad = axis.direction_rad(0.0);
-        let ends = simulator.sensor().mounting.viewpoint(axis).ends();
+        let ends = simulator.sensor().mounting.viewpoint(axis).transducer_positions();
         let receiver = simulator.receiver();
         let relative = |peak: &EnvelopePeak| peak.peak.0 / receiver.threshold_at(peak.tof_us);
         let mut strongest: Vec<&EnvelopePeak> =

@@ -2,7 +2,7 @@
 
 /// Run of beams that one sweep can cover.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Segment {
+pub struct BeamRun {
     /// First stop, index into the plan's stops.
     pub first_stop: u32,
     /// Number of consecutive stops.
@@ -13,13 +13,13 @@ pub struct Segment {
     pub pings: u32,
 }
 
-impl Segment {
+impl BeamRun {
     /// First run of beams not yet `done` (index: stop times pings-per-stop plus ping); `None` if
     /// all are.
     ///
     /// A partially measured stop becomes a run of its own, so that no beam is fired twice.
     #[must_use]
-    pub fn next(done: &[bool], pings_per_stop: u32) -> Option<Self> {
+    pub fn first_missing(done: &[bool], pings_per_stop: u32) -> Option<Self> {
         let per_stop = pings_per_stop.max(1) as usize;
         let first = done.iter().position(|&done| !done)?;
         let (stop, ping) = (first / per_stop, first % per_stop);
@@ -61,10 +61,10 @@ mod tests {
 
     #[test]
     fn new_plan_is_one_run() {
-        let segment = Segment::next(&[false; 12], 3).expect("all beams remain");
-        assert_eq!(segment, Segment { first_stop: 0, stops: 4, first_ping: 0, pings: 3 });
-        assert_eq!(Segment::next(&[true; 12], 3), None);
-        assert_eq!(Segment::next(&[], 3), None);
+        let segment = BeamRun::first_missing(&[false; 12], 3).expect("all beams remain");
+        assert_eq!(segment, BeamRun { first_stop: 0, stops: 4, first_ping: 0, pings: 3 });
+        assert_eq!(BeamRun::first_missing(&[true; 12], 3), None);
+        assert_eq!(BeamRun::first_missing(&[], 3), None);
     }
 
     proptest! {
@@ -79,7 +79,7 @@ mod tests {
                 .collect();
             let missing = done.iter().filter(|&&done| !done).count();
             let mut fired = 0;
-            while let Some(segment) = Segment::next(&done, pings_per_stop) {
+            while let Some(segment) = BeamRun::first_missing(&done, pings_per_stop) {
                 prop_assert!(segment.beams() > 0);
                 for local in 0..segment.beams() {
                     let index = segment.index(local, pings_per_stop) as usize;

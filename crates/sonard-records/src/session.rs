@@ -109,7 +109,7 @@ impl Session {
     ///
     /// # Errors
     /// If the air is out of the range of the model.
-    pub fn conditions(&self) -> Result<(Air, Option<Options>), AirError> {
+    pub fn model_conditions(&self) -> Result<(Air, Option<Options>), AirError> {
         let options =
             self.model.as_ref().map_or_else(|| Some(Options::default()), ModelRecord::options);
         Ok((Air::try_from(&self.air)?, options))

@@ -43,7 +43,7 @@ impl ScanView {
     /// A scan without an end record is yielded before the first scan that begins after its last
     /// record and ends, or at the end of the log. A reading after its scan's end record forms a
     /// scan of its own; logs of this program have none.
-    pub fn one_by_one(records: impl IntoIterator<Item = Record>) -> impl Iterator<Item = Self> {
+    pub fn stream(records: impl IntoIterator<Item = Record>) -> impl Iterator<Item = Self> {
         ScanStream {
             records: records.into_iter().fuse(),
             assembler: ScanAssembler::default(),
@@ -247,7 +247,7 @@ mod tests {
         let whole = ScanView::from_records(records.clone());
         let read = std::cell::Cell::new(0);
         let counted = records.into_iter().inspect(|_| read.set(read.get() + 1));
-        let given: Vec<_> = ScanView::one_by_one(counted).map(|view| (read.get(), view)).collect();
+        let given: Vec<_> = ScanView::stream(counted).map(|view| (read.get(), view)).collect();
         assert_eq!(given.iter().map(|(_, view)| view).collect::<Vec<_>>(), Vec::from_iter(&whole));
         assert_eq!(given.iter().map(|(read, _)| *read).collect::<Vec<_>>(), [3, 8, 8, 10]);
     }
@@ -265,7 +265,7 @@ mod tests {
             end(long),
             ping(short, 1),
         ];
-        let given: Vec<_> = ScanView::one_by_one(records)
+        let given: Vec<_> = ScanView::stream(records)
             .map(|view| (view.scan, view.start.is_some(), view.pings.len()))
             .collect();
         assert_eq!(given, [(short, true, 1), (long, true, 2), (short, false, 1)]);

@@ -25,15 +25,15 @@ impl Session {
 
     /// Sensor that took a reading, at the height of its ranger.
     #[must_use]
-    pub fn sensor_of(&self, ping: &Ping) -> Sensor {
+    pub fn sensor_for(&self, ping: &Ping) -> Sensor {
         Sensor { mounting: self.mounting_of(ping), ..self.sensor.clone() }
     }
 
     /// Scene with the body of the session's robot: the array's, or else the scene's own.
     #[must_use]
-    pub fn scene_around(&self, scene: &Scene, robot: &Pose) -> Scene {
+    pub fn scene_with_robot(&self, scene: &Scene, robot: &Pose) -> Scene {
         match &self.array {
-            Some(array) => array.in_scene(scene).with_robot_at(robot),
+            Some(array) => array.scene_with_body(scene).with_robot_at(robot),
             None => scene.with_robot_at(robot),
         }
     }
@@ -48,7 +48,7 @@ impl Ping {
     pub fn axis(&self, session: Option<&Session>, robot: &Pose) -> Option<Pose> {
         let robot = self.pose.as_ref().unwrap_or(robot);
         if self.ranger.is_some() {
-            return Some(session?.ranger_of(self)?.pose_on(robot));
+            return Some(session?.ranger_of(self)?.world_pose(robot));
         }
         Some(Pose { heading_deg: robot.heading_deg + self.azimuth_deg, ..*robot })
     }
@@ -73,7 +73,7 @@ impl ScanView {
     /// Returns `true` if all readings were taken at one position: by a ranger on a stepper with its
     /// face on the axis, on a stationary robot.
     #[must_use]
-    pub fn has_one_place(&self) -> bool {
+    pub fn is_from_one_position(&self) -> bool {
         let on_axis = |session: &Session| {
             let mounting = &session.sensor.mounting;
             session.array.is_none() && mounting.ahead_m == 0.0 && mounting.left_m == 0.0
@@ -84,7 +84,7 @@ impl ScanView {
 
     /// Returns `true` for an array scan, `false` for a ranger on a stepper.
     #[must_use]
-    pub fn is_of_array(&self) -> bool {
+    pub fn is_array_scan(&self) -> bool {
         self.session.as_ref().is_some_and(|session| session.array.is_some())
     }
 }

@@ -22,8 +22,8 @@ use std::{
 
 use jiff::Timestamp;
 use sonard_api::{RosReport, config::RosKeys};
-use sonard_daemon::{Audience as _, Follower, Handle};
-use sonard_export::{Live, Topic};
+use sonard_daemon::{LiveMessageSink as _, MessageConverter, Handle};
+use sonard_export::{LiveConverter, Topic};
 use sonard_runtime::supervisor::Task;
 use tokio::{
     runtime::Handle as Runtime,
@@ -135,8 +135,8 @@ impl RosThread {
             false => Services::none(),
         };
         node.set_topics(&self.expected_topics());
-        let live = Live::new(self.keys.messages()).with_map(self.keys.map);
-        let mut follower = Follower::begin(&self.daemon, live, &mut node);
+        let live = LiveConverter::new(self.keys.message_settings()).with_map(self.keys.map);
+        let mut follower = MessageConverter::subscribe(&self.daemon, live, &mut node);
         let ended = self.publish(&mut follower, &mut node, &services).await;
         self.report = node.leave();
         ended
@@ -144,7 +144,7 @@ impl RosThread {
 
     async fn publish(
         &self,
-        follower: &mut Follower,
+        follower: &mut MessageConverter,
         node: &mut Node,
         services: &Services,
     ) -> Result<(), String> {
@@ -166,7 +166,7 @@ impl RosThread {
     fn expected_topics(&self) -> Vec<Topic> {
         let next = self.daemon.next_scan();
         let (is_simulated, has_scene) = (next.array.is_some(), next.scene.is_some());
-        let distribution = self.keys.messages().distribution;
+        let distribution = self.keys.message_settings().distribution;
         let predicts = has_scene && !is_simulated;
         let mut expected =
             Topic::expected(next.array.as_deref(), predicts, has_scene, distribution);

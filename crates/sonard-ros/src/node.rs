@@ -17,10 +17,10 @@ use rustdds::{
     policy::{Durability, History},
 };
 use sonard_api::{RosReport, config::RosKeys};
-use sonard_daemon::{Audience, Handle};
+use sonard_daemon::{LiveMessageSink, Handle};
 use sonard_export::{
     Distribution, LiveMessage, Topic,
-    dds::{self, Guid, NODES, topic_on_wire, type_on_wire},
+    dds::{self, Guid, DISCOVERY_TOPIC, topic_on_wire, type_on_wire},
 };
 use sonard_records::EventKind;
 
@@ -119,7 +119,7 @@ impl Node {
         let publisher = participant.create_publisher(&QosPolicies::qos_none())?;
         let announcer = {
             let policies = reliable(1, Durability::TransientLocal);
-            writer(&participant, &publisher, NODES.0, NODES.1, &policies)?
+            writer(&participant, &publisher, DISCOVERY_TOPIC.0, DISCOVERY_TOPIC.1, &policies)?
         };
         let networks = networks.iter().map(IpAddr::to_string).collect();
         let (up, since) = (true, Timestamp::now());
@@ -130,7 +130,7 @@ impl Node {
             announcer,
             offers: BTreeMap::new(),
             services: [Vec::new(), Vec::new()],
-            distribution: keys.messages().distribution,
+            distribution: keys.message_settings().distribution,
             namespace: keys.namespace.clone(),
             queue_bytes: keys.queue_kb as usize * 1000,
             report: RosReport { networks, up, since, trouble: None, ..report.clone() },
@@ -144,7 +144,7 @@ impl Node {
     pub(super) fn announce_node(&mut self) {
         let offered = self.offers.values().map(|offer| offer.writer.guid().to_bytes());
         let [readers, writers] = self.services.clone();
-        let node = dds::Node {
+        let node = dds::NodeInfo {
             namespace: self.namespace.clone(),
             name: NAME.into(),
             readers,
@@ -169,7 +169,7 @@ impl Node {
     }
 
     fn offer(&self, topic: &Topic) -> CreateResult<Offer> {
-        let (depth, durability) = match topic.stands_still() {
+        let (depth, durability) = match topic.is_static() {
             true => (DEPTHS[1], Durability::TransientLocal),
             false => (DEPTHS[0], Durability::Volatile),
         };
@@ -234,7 +234,7 @@ impl Node {
     }
 }
 
-impl Audience for Node {
+impl LiveMessageSink for Node {
     fn set_topics(&mut self, topics: &[Topic]) {
         self.offers.retain(|_, offer| topics.contains(&offer.topic));
         for topic in topics {
@@ -252,7 +252,7 @@ impl Audience for Node {
         self.announce_node();
     }
 
-    fn tell(&mut self, message: &LiveMessage<'_>) {
+    fn send(&mut self, message: &LiveMessage<'_>) {
         let Some(offer) = self.offers.get_mut(message.topic) else { return };
         let (writer, bytes) = (&offer.writer, message.bytes.len());
         let all_acknowledged =
@@ -276,12 +276,12 @@ impl Audience for Node {
         }
     }
 
-    fn announce(&mut self, words: String) {
+    fn report_loss(&mut self, words: String) {
         tracing::warn!("ros: {words}");
         self.daemon.event(EventKind::Gap, format!("ros: {words}"));
     }
 
-    fn told(&mut self) {}
+    fn end_of_record(&mut self) {}
 }
 
 fn writer(

@@ -14,8 +14,8 @@ use rustdds::{
     policy::Durability,
 };
 use sonard_api::ScanRequest;
-use sonard_daemon::{Handle, Order, Refusal};
-use sonard_export::dds::{Asker, TRIGGER, service_on_wire};
+use sonard_daemon::{Handle, Order, OrderError};
+use sonard_export::dds::{Requester, TRIGGER_TYPES, service_on_wire};
 use tokio::time::timeout;
 
 use super::{
@@ -57,7 +57,7 @@ impl Command {
 
 /// Waits for the daemon with a timeout; converts a rejection to text.
 pub(super) async fn in_time<T>(
-    done: impl Future<Output = Result<T, Refusal>>,
+    done: impl Future<Output = Result<T, OrderError>>,
 ) -> Result<T, String> {
     let answer = timeout(REPLY_TIMEOUT, done).await.map_err(|_| "the daemon is busy".to_owned())?;
     answer.map_err(|refusal| format!("{}; {}", refusal.message, refusal.help))
@@ -88,8 +88,8 @@ impl Services {
         let mut services = Vec::new();
         for (command, name) in Command::ALL {
             let [request, reply] = service_on_wire(&node.namespace, name);
-            let requests = reader(node, &subscriber, request, TRIGGER[0], &policies)?;
-            let replies = node.writer(&reply, TRIGGER[1], &policies)?;
+            let requests = reader(node, &subscriber, request, TRIGGER_TYPES[0], &policies)?;
+            let replies = node.writer(&reply, TRIGGER_TYPES[1], &policies)?;
             node.services[0].push(requests.guid().to_bytes());
             node.services[1].push(replies.guid().to_bytes());
             services.push(Service { command, requests, replies });
@@ -122,7 +122,7 @@ impl Services {
 
 impl Service {
     fn reply(&self, request: &DeserializedCacheChange<Bytes>, done: Result<String, String>) {
-        let asker = Asker::of_trigger(&request.sample);
+        let asker = Requester::from_trigger(&request.sample);
         let success = done.is_ok();
         let message = asker.reply(success, &done.unwrap_or_else(|reason| reason));
         // Without a related identity, the sequence number of the request itself applies.

@@ -42,7 +42,7 @@ pub enum Hangup {
 impl Hangup {
     /// Effect for this process. Must be called before a handler for SIGHUP is installed.
     #[must_use]
-    pub fn of_this_process() -> Self {
+    pub fn for_this_process() -> Self {
         let has_terminal = File::open("/dev/tty").is_ok();
         if has_terminal && !is_ignored(Number::HUP) { Self::Stop } else { Self::Reload }
     }
@@ -73,7 +73,7 @@ impl Interrupts {
     /// them. Must be called within a tokio runtime.
     #[must_use]
     pub fn listen() -> Self {
-        let (interrupts, handlers) = Self::install(Hangup::of_this_process());
+        let (interrupts, handlers) = Self::install(Hangup::for_this_process());
         #[allow(
             clippy::disallowed_methods,
             reason = "verbs that end with their work have no supervisor"

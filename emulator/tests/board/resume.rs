@@ -57,7 +57,7 @@ fn scan(dips_at: &[usize]) -> (ScanSummary, Vec<Record>) {
 async fn record_scan(port: &str) -> (ScanSummary, Vec<Record>) {
     let line = link::open(port).expect("opens");
     let config = HostConfig { max_attempts: 7, ..HostConfig::new(link::BAUD, 1) };
-    let mut ranger = Ranger::meet(Driver::new(line, config)).await.expect("answers");
+    let mut ranger = Ranger::identify(Driver::new(line, config)).await.expect("answers");
     let job = ScanJob {
         pose: Pose { x_m: 0.0, y_m: 0.0, heading_deg: 0.0 },
         plan: ScanPlan { to_deg: f64::from(BEAMS) * 0.9, ..ScanPlan::default() },

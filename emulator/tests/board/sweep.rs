@@ -6,12 +6,12 @@ use std::sync::Arc;
 use crate::common::{SETTINGS, readings, ready};
 use firmware_protocol::host::Command;
 use firmware_protocol::messages::{ReadingStatus, Settings, Sweep, limits::TICK_HZ};
-use sonard_device::ranger::limit_s;
-use sonard_mock::{Soundings, World};
+use sonard_device::ranger::min_duration_s;
+use sonard_mock::{EchoTable, World};
 use sonard_model::{
     acoustics::{Air, Sensor, TofNoise},
     model::{Options, Simulator},
-    plan::ScanPlan,
+    scan_plan::ScanPlan,
     scene::Scene,
 };
 
@@ -27,7 +27,7 @@ fn world() -> World {
         Options::default(),
     );
     let soundings =
-        Soundings::from_model(&simulator.expect("a model"), &pose, 400, 0.0).expect("few paths");
+        EchoTable::from_model(&simulator.expect("a model"), &pose, 400, 0.0).expect("few paths");
     World::new(soundings, TofNoise::NONE, 0.0, 1)
 }
 
@@ -51,7 +51,7 @@ fn duration_is_near_minimum() {
     let (first, last) = (readings[0], readings[399]);
     let span = last.fired_ticks.wrapping_sub(first.fired_ticks) + FOUR_METRES.window_ticks;
     let duration_s = f64::from(span) / f64::from(TICK_HZ);
-    let limit = limit_s(&ScanPlan::default(), &FOUR_METRES, 1);
+    let limit = min_duration_s(&ScanPlan::default(), &FOUR_METRES, 1);
     let (to_device, from_device) = (bench.bytes.0 - before.0, bench.bytes.1 - before.1);
     println!("{duration_s:.4} s, limit {limit:.4} s, ratio {:.4}", duration_s / limit);
     println!("{to_device} bytes to the device, {from_device} from it");

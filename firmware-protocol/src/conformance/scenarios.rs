@@ -117,7 +117,7 @@ pub fn reports_multiple_echoes(mut bench: Bench<impl DeviceUnderTest>) {
         let refused = bench.perform(multiple, 2.0).expect_err("is refused");
         let reason = NakReason::EchoesOutOfRange;
         assert!(
-            matches!(refused, BenchError::Host(HostError::Refused(actual)) if actual == reason)
+            matches!(refused, BenchError::Host(HostError::Rejected(actual)) if actual == reason)
         );
         return;
     }

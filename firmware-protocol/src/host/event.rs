@@ -25,7 +25,7 @@ pub enum HostEvent {
     },
     /// Invalid reading of a sweep. The beam is not requested again, and its reading is not
     /// delivered.
-    ReadingRefused {
+    ReadingRejected {
         /// Reading as received.
         reading: Reading,
         /// Rule that the reading violates.
@@ -113,9 +113,9 @@ pub enum HostError {
         firmware: FirmwareVersion,
     },
     /// The identity of the device is invalid.
-    WrongIdentity(IdentityFault),
+    InvalidIdentity(IdentityFault),
     /// The device rejected the request.
-    Refused(NakReason),
+    Rejected(NakReason),
     /// The device restarted during the command.
     Rebooted,
     /// The line was closed.
@@ -141,9 +141,9 @@ pub enum HostError {
     /// The device no longer stores the sweep.
     SweepLost,
     /// The reading of a Ping is invalid; it was not delivered.
-    SenselessReading(ReadingFault),
+    InvalidReading(ReadingFault),
     /// A reply is invalid.
-    SenselessReply(ReplyFault),
+    InvalidReply(ReplyFault),
     /// A reading does not match the plan; it was not delivered.
     WrongReading {
         /// Index of the reading.
@@ -176,10 +176,10 @@ impl fmt::Display for HostError {
                 ours.version,
                 ours.schema,
             ),
-            Self::WrongIdentity(fault) => {
+            Self::InvalidIdentity(fault) => {
                 write!(formatter, "the identity of the device is invalid: {fault}")
             }
-            Self::Refused(reason) => write!(formatter, "the device rejected the request: {reason}"),
+            Self::Rejected(reason) => write!(formatter, "the device rejected the request: {reason}"),
             Self::Rebooted => formatter.write_str("the device restarted"),
             Self::Hangup => formatter.write_str("the line was closed"),
             Self::LeaseExpired => write!(formatter, "{}", FaultKind::LeaseExpired),
@@ -195,10 +195,10 @@ impl fmt::Display for HostError {
                     "the device still reports the request as in progress after {waited_ms} ms"
                 )
             }
-            Self::SenselessReading(fault) => {
+            Self::InvalidReading(fault) => {
                 write!(formatter, "invalid reading: {fault}")
             }
-            Self::SenselessReply(fault) => {
+            Self::InvalidReply(fault) => {
                 write!(formatter, "invalid reply: {fault}")
             }
             Self::SweepLost => formatter.write_str("the device no longer stores the sweep"),

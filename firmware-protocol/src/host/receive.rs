@@ -52,8 +52,8 @@ impl Host {
     }
 
     fn wrong_identity(&mut self, fault: IdentityFault) {
-        self.stats.refused += 1;
-        self.fail(HostError::WrongIdentity(fault));
+        self.stats.rejected += 1;
+        self.fail(HostError::InvalidIdentity(fault));
     }
 
     fn identified(&mut self, identity: &Identity) {
@@ -191,9 +191,9 @@ impl Host {
         match (*reply, *request) {
             (Reply::Nak { reason: NakReason::SequenceReused }, _) => self.renumber(now_us),
             (Reply::Nak { reason }, Request::KeepAlive { .. } | Request::Resend { .. }) => {
-                self.stop_and_fail(now_us, HostError::Refused(reason));
+                self.stop_and_fail(now_us, HostError::Rejected(reason));
             }
-            (Reply::Nak { reason }, _) => self.fail(HostError::Refused(reason)),
+            (Reply::Nak { reason }, _) => self.fail(HostError::Rejected(reason)),
             (Reply::Started, _) if self.is_started() => self.count_stale(),
             (Reply::Started, _) => {
                 self.time_reply(now_us, wire_len);
@@ -261,7 +261,7 @@ impl Host {
                 self.finish(Outcome::Pinged);
             }
             Err(error) => {
-                self.stats.refused += 1;
+                self.stats.rejected += 1;
                 self.fail(error);
             }
         }
@@ -281,7 +281,7 @@ impl Host {
             check_after(self.device_time.floor(sent_us), reading.fired_ticks)?;
             self.check_past(now_us, reading, PING_SLACK_US)
         };
-        check().map_err(HostError::SenselessReading)
+        check().map_err(HostError::InvalidReading)
     }
 
     /// Rejects a reading from the future, unless the device's clock jumps.
@@ -313,8 +313,8 @@ impl Host {
     }
 
     fn reject_reply(&mut self, fault: ReplyFault) {
-        self.stats.refused += 1;
-        self.fail(HostError::SenselessReply(fault));
+        self.stats.rejected += 1;
+        self.fail(HostError::InvalidReply(fault));
     }
 
     pub(super) fn report_clock(&mut self, now_us: u64, device_ticks: u32) {

@@ -22,7 +22,7 @@ pub struct LinkStats {
     /// Readings received more than once.
     pub duplicates: u64,
     /// Invalid readings, identities and replies.
-    pub refused: u64,
+    pub rejected: u64,
     /// Frames dropped on reception.
     pub dropped: LinkCounters,
 }

@@ -79,8 +79,8 @@ impl Host {
         if let Some(track) = &mut self.track {
             track.settle(reading.index);
         }
-        self.stats.refused += 1;
-        self.report(HostEvent::ReadingRefused { reading: *reading, fault });
+        self.stats.rejected += 1;
+        self.report(HostEvent::ReadingRejected { reading: *reading, fault });
     }
 
     fn beam_settled(&mut self, now_us: u64) {
@@ -144,7 +144,7 @@ impl Host {
 
     /// Fails the command. A device that ended the sweep by itself needs no Stop.
     fn sweep_failed(&mut self, now_us: u64, error: HostError) {
-        self.stats.refused += u64::from(matches!(error, HostError::SenselessReply(_)));
+        self.stats.rejected += u64::from(matches!(error, HostError::InvalidReply(_)));
         if has_ended(&error) { self.fail(error) } else { self.stop_and_fail(now_us, error) }
     }
 

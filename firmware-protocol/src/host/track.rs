@@ -118,7 +118,7 @@ impl Track {
         if sent <= fired && fired <= beams && (!complete || fired == beams) {
             return Ok(());
         }
-        Err(HostError::SenselessReply(ReplyFault::Progress { fired, sent, beams }))
+        Err(HostError::InvalidReply(ReplyFault::Progress { fired, sent, beams }))
     }
 
     /// Records that the device has sent all beams below `sent` and fired `fired` beams.

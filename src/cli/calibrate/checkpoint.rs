@@ -24,8 +24,8 @@ use crate::{
         Failure, Outcome,
         output::{Overwrite, Product, make_folder},
     },
-    inverse::{Fit, Found, Sweep, World},
-    store::{hexadecimal, open_own},
+    inverse::{FitOptions, SearchResult, FitSweep, World},
+    store::{to_hex, open_no_follow},
 };
 
 /// File name in the output folder.
@@ -51,12 +51,12 @@ pub(super) struct Head {
 
 impl Head {
     /// Digest of a fit's readings, scene, sensor, air, model and priors.
-    pub(super) fn new(world: &World, sweeps: &[Sweep], fit: &Fit) -> Self {
+    pub(super) fn new(world: &World, sweeps: &[FitSweep], fit: &FitOptions) -> Self {
         let mut digest = DigestWriter(Sha256::new());
         // `Debug` covers all fields, including future ones, and prints floats with round-trip
         // precision.
         let _ = write!(digest, "{world:?} {sweeps:?} {fit:?}");
-        let calibration_sha256 = hexadecimal(&digest.0.finalize());
+        let calibration_sha256 = to_hex(&digest.0.finalize());
         Self { calibration_sha256, version: env!("CARGO_PKG_VERSION").to_owned() }
     }
 }
@@ -74,7 +74,7 @@ impl fmt::Write for DigestWriter {
 /// Contents of the lines after the first.
 #[derive(Debug, Clone, PartialEq, Default)]
 struct Saved {
-    found: Vec<Found>,
+    found: Vec<SearchResult>,
     has_results: bool,
     /// Length of the complete lines, bytes.
     complete: usize,
@@ -117,7 +117,7 @@ impl Checkpoint {
         let fail = |error: io::Error| Failure::unwritable(&path.display(), &error);
         let options = &mut OpenOptions::new();
         let mut file =
-            open_own(options.read(true).append(true).create(true), &path).map_err(fail)?;
+            open_no_follow(options.read(true).append(true).create(true), &path).map_err(fail)?;
         match flock(&file, FlockOperation::NonBlockingLockExclusive) {
             Ok(()) => {}
             Err(Errno::WOULDBLOCK) => {
@@ -148,7 +148,7 @@ impl Checkpoint {
     }
 
     /// Returns the saved searches.
-    pub(super) fn saved(&self) -> &[Found] {
+    pub(super) fn saved(&self) -> &[SearchResult] {
         &self.saved.found
     }
 
@@ -157,10 +157,10 @@ impl Checkpoint {
     }
 
     /// Appends the result of a search; logs a warning on failure.
-    pub(super) fn save(&self, found: &Found) {
+    pub(super) fn save(&self, found: &SearchResult) {
         let line = json(found);
         // A non-finite number would not survive the round trip.
-        let is_right = serde_json::from_str::<Found>(&line).is_ok_and(|read| read == *found);
+        let is_right = serde_json::from_str::<SearchResult>(&line).is_ok_and(|read| read == *found);
         self.append(is_right.then_some(line));
     }
 
@@ -253,8 +253,8 @@ mod tests {
         Head { calibration_sha256: digest.to_owned(), version: "1".to_owned() }
     }
 
-    fn place(value: f64) -> Found {
-        Found::Place { values: vec![value, -1.0 / 3.0], log_posterior: 1e-300 }
+    fn place(value: f64) -> SearchResult {
+        SearchResult::Place { values: vec![value, -1.0 / 3.0], log_posterior: 1e-300 }
     }
 
     fn has_results(folder: &Path) -> bool {
@@ -269,7 +269,7 @@ mod tests {
     fn resumes_after_cut_at_any_byte() {
         let folder = tempfile::tempdir().expect("a folder");
         let folder = &folder.path().join("out");
-        let found: Vec<Found> = [0.1, f64::MIN_POSITIVE, 5e-324, -0.0, 1.0 / 7.0].map(place).into();
+        let found: Vec<SearchResult> = [0.1, f64::MIN_POSITIVE, 5e-324, -0.0, 1.0 / 7.0].map(place).into();
         let begun = open(folder, "a").expect("it is new");
         found.iter().for_each(|found| begun.save(found));
         assert!(open(folder, "a").is_err(), "two at a time");

@@ -1,6 +1,6 @@
 //! Diagnosis of readings that a calibration leaves unexplained.
 
-use crate::inverse::{Atlas, Fitted, Mode, Sweep, World, doubts, locate};
+use crate::inverse::{CoarseGrid, FitResult, PoseMode, FitSweep, World, diagnose, locate};
 
 /// Minimum share of explained readings for an alternative pose to be suggested.
 const MIN_EXPLAINED: f64 = 0.7;
@@ -8,17 +8,17 @@ const MIN_EXPLAINED: f64 = 0.7;
 /// Describes likely causes for the sweeps of a poor fit: wrong unit, reversed sense of rotation,
 /// wrong pose or wrong room. Each sweep is located in the initial scene, because a failed fit
 /// distorts sensor and walls to match readings of other objects.
-pub(super) fn diagnose(world: &World, sweeps: &[Sweep], fitted: &Fitted) -> Vec<String> {
-    if !fitted.is_doubtful() {
+pub(super) fn diagnose(world: &World, sweeps: &[FitSweep], fitted: &FitResult) -> Vec<String> {
+    if !fitted.is_poorly_explained() {
         return Vec::new();
     }
     notice!("many readings are unexplained: looking for the cause");
-    let Ok(atlas) = Atlas::new(world, Atlas::usual_spacing_m(&world.scene)) else {
+    let Ok(atlas) = CoarseGrid::new(world, CoarseGrid::default_spacing_m(&world.scene)) else {
         return Vec::new();
     };
-    let of = |sweep: &Sweep| {
+    let of = |sweep: &FitSweep| {
         let modes = locate(world, &atlas, sweep).ok()?;
-        let wrong = doubts(world, &atlas, sweep, &modes);
+        let wrong = diagnose(world, &atlas, sweep, &modes);
         let elsewhere =
             || modes.iter().find(|mode| mode.explained >= MIN_EXPLAINED).map(describe_pose);
         let reason = wrong.first().map(ToString::to_string).or_else(elsewhere)?;
@@ -27,7 +27,7 @@ pub(super) fn diagnose(world: &World, sweeps: &[Sweep], fitted: &Fitted) -> Vec<
     sweeps.iter().filter_map(of).collect()
 }
 
-fn describe_pose(mode: &Mode) -> String {
+fn describe_pose(mode: &PoseMode) -> String {
     format!(
         "the initial scene explains {:.0} % of its readings from the pose {:.2},{:.2},{:.0}: check the scan's pose",
         100.0 * mode.explained,

@@ -9,7 +9,7 @@ use crate::{
         Outcome,
         output::{Overwrite, Product, make_folder},
     },
-    inverse::{Fitted, Sweep, Told, World},
+    inverse::{FitResult, FitSweep, ParameterReport, World},
     scan::AirRecord,
 };
 
@@ -27,7 +27,7 @@ const FILES: [&str; 7] = [
 const MAX_PAIRS: usize = 8;
 
 /// Summarizes the quality of the fit, with the given diagnoses, one sentence per line.
-pub(super) fn summarize(lines: &[Told], fitted: &Fitted, diagnoses: Vec<String>) -> Vec<String> {
+pub(super) fn summarize(lines: &[ParameterReport], fitted: &FitResult, diagnoses: Vec<String>) -> Vec<String> {
     let errors = &fitted.errors;
     let mut text = vec![format!(
         "{} readings: {:.0} % explained, ranges within {:.1} mm (standard deviation), strengths within {:.1} dB",
@@ -44,7 +44,7 @@ pub(super) fn summarize(lines: &[Told], fitted: &Fitted, diagnoses: Vec<String>)
             errors.arc_beams
         ));
     }
-    if fitted.is_doubtful() {
+    if fitted.is_poorly_explained() {
         let furniture =
             if is_furnished { "" } else { ", or allow for furniture with --search furnished" };
         text.push(format!(
@@ -53,9 +53,9 @@ pub(super) fn summarize(lines: &[Told], fitted: &Fitted, diagnoses: Vec<String>)
         ));
     }
     text.extend(diagnoses);
-    let pairs = fitted.hardly_told_apart();
+    let pairs = fitted.strongly_correlated();
     for &(a, b, correlation) in pairs.iter().take(MAX_PAIRS) {
-        let [a, b] = [&lines[a], &lines[b]].map(Told::title);
+        let [a, b] = [&lines[a], &lines[b]].map(ParameterReport::title);
         text.push(format!("strongly correlated: {a} and {b} ({correlation:.2})"));
     }
     if pairs.len() > MAX_PAIRS {
@@ -85,9 +85,9 @@ pub(super) fn write_folder(
     folder: &Path,
     overwrite: Overwrite,
     world: &World,
-    sweeps: &[Sweep],
-    fitted: &Fitted,
-    lines: &[Told],
+    sweeps: &[FitSweep],
+    fitted: &FitResult,
+    lines: &[ParameterReport],
     summary: &[String],
 ) -> Outcome {
     make_folder(folder)?;
@@ -107,7 +107,7 @@ pub(super) fn write_folder(
         correlations(lines, fitted),
         poses,
         json(&fitted.sensor(&world.sensor)),
-        fitted.world.scene.rewritten(),
+        fitted.world.scene.updated_text(),
         json(&AirRecord::from(&fitted.world.air)),
         format_report(lines, summary),
     ];
@@ -123,8 +123,8 @@ fn json(value: &impl Serialize) -> String {
 }
 
 /// Formats the correlation matrix as CSV with the parameters' titles as headers.
-fn correlations(lines: &[Told], fitted: &Fitted) -> String {
-    let titles = || lines.iter().map(Told::title);
+fn correlations(lines: &[ParameterReport], fitted: &FitResult) -> String {
+    let titles = || lines.iter().map(ParameterReport::title);
     let figures = fitted.correlations();
     let mut table = csv::Writer::from_writer(Vec::new());
     let mut rows = vec![[String::new()].into_iter().chain(titles()).collect::<Vec<_>>()];
@@ -139,7 +139,7 @@ fn correlations(lines: &[Told], fitted: &Fitted) -> String {
     String::from_utf8_lossy(&bytes).into_owned()
 }
 
-fn format_report(lines: &[Told], summary: &[String]) -> String {
+fn format_report(lines: &[ParameterReport], summary: &[String]) -> String {
     let mut text = String::from("# Calibration\n\n");
     for line in summary {
         let _ = writeln!(text, "{line}\n");

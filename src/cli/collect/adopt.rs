@@ -8,7 +8,7 @@ use crate::{
     acoustics::Sensor,
     api::{Setup, Status},
     cli::{Failure, options::load_sensor},
-    collect::{ByDaemon, Plan, steps_per_revolution},
+    collect::{RemoteDevice, CollectionPlan, steps_per_revolution},
     model::OptionKeys,
 };
 
@@ -17,14 +17,14 @@ use crate::{
 /// # Errors
 ///
 /// The plan sets other values; the message lists each key to change.
-pub(super) fn adopt(plan: &mut Plan, daemon: &ByDaemon, status: &Status) -> Result<(), Failure> {
+pub(super) fn adopt(plan: &mut CollectionPlan, daemon: &RemoteDevice, status: &Status) -> Result<(), Failure> {
     let setup = daemon.setup();
     let mut differences = adopt_motion(plan, setup);
     differences.extend(adopt_sensor(plan, setup)?);
-    if setup.thermometer && plan.gives_air() {
+    if setup.thermometer && plan.sets_air() {
         differences.push(format!(
             "{} is given, and the daemon reads a thermometer of its own (air.file)",
-            plan.given_air().map(|key| format!("air.{key}")).collect::<Vec<_>>().join(", ")
+            plan.air_keys().map(|key| format!("air.{key}")).collect::<Vec<_>>().join(", ")
         ));
     }
     if !differences.is_empty() {
@@ -38,12 +38,12 @@ pub(super) fn adopt(plan: &mut Plan, daemon: &ByDaemon, status: &Status) -> Resu
     Ok(())
 }
 
-fn adopt_motion(plan: &mut Plan, setup: &Setup) -> Vec<String> {
+fn adopt_motion(plan: &mut CollectionPlan, setup: &Setup) -> Vec<String> {
     let [ours, daemon] = [&plan.keys.motion, &setup.motion]
         .map(|keys| serde_json::to_value(keys).unwrap_or_default());
     let keys = daemon.as_object().into_iter().flatten();
     let differ = keys
-        .filter(|(key, theirs)| plan.is_given("motion", key) && ours[key.as_str()] != **theirs)
+        .filter(|(key, theirs)| plan.is_set("motion", key) && ours[key.as_str()] != **theirs)
         .map(|(key, theirs)| {
             describe_difference(plan, "motion", key, &ours[key], &format!("motion.{key}"), theirs)
         })
@@ -52,7 +52,7 @@ fn adopt_motion(plan: &mut Plan, setup: &Setup) -> Vec<String> {
     differ
 }
 
-fn adopt_sensor(plan: &mut Plan, setup: &Setup) -> Result<Vec<String>, Failure> {
+fn adopt_sensor(plan: &mut CollectionPlan, setup: &Setup) -> Result<Vec<String>, Failure> {
     let keys = &plan.keys.sensor;
     let reach_m = setup.model.options.max_range_m.unwrap_or(setup.sensor.max_range_m);
     let adopted = OptionKeys { max_range_m: Some(reach_m), ..setup.model.options };
@@ -60,7 +60,7 @@ fn adopt_sensor(plan: &mut Plan, setup: &Setup) -> Result<Vec<String>, Failure> 
     let (ours, theirs) = (to_json(keys.options), to_json(OptionKeys { threshold, ..adopted }));
     let options = theirs.as_object().into_iter().flatten();
     let mut differ: Vec<String> = options
-        .filter(|(key, theirs)| plan.is_given("sensor", key) && ours[key.as_str()] != **theirs)
+        .filter(|(key, theirs)| plan.is_set("sensor", key) && ours[key.as_str()] != **theirs)
         .map(|(key, theirs)| {
             describe_difference(
                 plan,
@@ -72,7 +72,7 @@ fn adopt_sensor(plan: &mut Plan, setup: &Setup) -> Result<Vec<String>, Failure> 
             )
         })
         .collect();
-    let base = match plan.is_given("sensor", "sensor") {
+    let base = match plan.is_set("sensor", "sensor") {
         true => load_sensor(&keys.sensor)?,
         false => setup.sensor.clone(),
     };
@@ -95,7 +95,7 @@ fn adopt_sensor(plan: &mut Plan, setup: &Setup) -> Result<Vec<String>, Failure> 
 }
 
 fn describe_difference(
-    plan: &Plan,
+    plan: &CollectionPlan,
     section: &str,
     key: &str,
     ours: &Value,

@@ -10,14 +10,14 @@ use super::Args;
 use crate::{
     acoustics::{Air, Sensor},
     cli::{Failure, options::load_sensor, scene_file},
-    collect::{CollectionKeys, NamedPose, Order, Plan, PoseFault, Poses, read_file},
-    config::{ConfigError, Layers},
+    collect::{CollectionKeys, NamedPose, Order, CollectionPlan, PoseFault, Poses, parse_pose_file},
+    config::{ConfigError, ConfigLayers},
     scan::ScanPlan,
     scene::Scene,
 };
 
 /// Loads the plan with the overrides of the options.
-pub(super) fn load(args: &Args) -> Result<Plan, Failure> {
+pub(super) fn load(args: &Args) -> Result<CollectionPlan, Failure> {
     let path = args.plan.clone().unwrap_or_default();
     let text = fs::read_to_string(&path).map_err(|error| {
         Failure::input(
@@ -27,11 +27,11 @@ pub(super) fn load(args: &Args) -> Result<Plan, Failure> {
     })?;
     let name = path.display().to_string();
     let mut layers =
-        Layers::<CollectionKeys>::new().file(&name, &text).map_err(|error| failure_from(&error))?;
+        ConfigLayers::<CollectionKeys>::new().with_file(&name, &text).map_err(|error| failure_from(&error))?;
     for setting in &args.set {
-        layers = layers.option("--set", setting).map_err(|error| failure_from(&error))?;
+        layers = layers.with_option("--set", setting).map_err(|error| failure_from(&error))?;
     }
-    let keys = layers.clone().keys().map_err(|error| failure_from(&error))?;
+    let keys = layers.clone().into_keys().map_err(|error| failure_from(&error))?;
     let at = Origins { layers: &layers, file: &name };
     let scene_text = scene_file::read(&keys.place.scene)?;
     let scene = Arc::new(scene_file::load(&keys.place.scene)?);
@@ -52,7 +52,7 @@ pub(super) fn load(args: &Args) -> Result<Plan, Failure> {
         .as_deref()
         .map_or_else(|| PathBuf::from(&keys.collection.folder), Path::to_path_buf);
     let steps_per_revolution = args.world.steps_per_revolution();
-    Ok(Plan {
+    Ok(CollectionPlan {
         keys,
         text,
         folder,
@@ -88,7 +88,7 @@ fn check(keys: &CollectionKeys, poses: &Poses, at: &Origins<'_>) -> Result<(), F
 }
 
 /// Describes a valid plan in a few lines.
-pub(super) fn describe(plan: &Plan) -> String {
+pub(super) fn describe(plan: &CollectionPlan) -> String {
     let poses = match (&plan.poses, plan.pose_count()) {
         (Poses::Listed(poses), _) => {
             let names: Vec<_> = poses.iter().map(NamedPose::label).collect();
@@ -123,7 +123,7 @@ impl Fault {
 
 /// Origins of values: plan file, environment and options.
 pub(super) struct Origins<'a> {
-    pub(super) layers: &'a Layers<CollectionKeys>,
+    pub(super) layers: &'a ConfigLayers<CollectionKeys>,
     pub(super) file: &'a str,
 }
 
@@ -215,7 +215,7 @@ fn load_poses(file: &Path, scene: &Scene) -> Result<Vec<NamedPose>, Failure> {
             "poses.file names a CSV or JSON lines file, relative to the working directory",
         )
     })?;
-    read_file(&text, scene).map_err(|fault: PoseFault| {
+    parse_pose_file(&text, scene).map_err(|fault: PoseFault| {
         let line = fault.line.map_or_else(String::new, |line| format!("{line}:"));
         Failure::input(format!("{name}:{line} {fault}"), &fault.help)
     })

@@ -15,7 +15,7 @@ use crate::{
         runtime::Interrupts,
         scan::{self, Mock, emulator::Emulator, setup::assumed},
     },
-    collect::{Borrowed, Connected, Device, Halt, Patience, Plan, ScanOrder, Taken, take},
+    collect::{SavedSettings, ConnectedDevice, ScanDevice, CollectError, RetrySchedule, CollectionPlan, ScanTask, RecordedScan, record_scan},
     link::PortOpener,
     ranger::{PreparedScan, Ranger, ScanError, device_record, provenance},
     scan::Session,
@@ -43,7 +43,7 @@ pub(super) struct LocalDevice {
 
 impl LocalDevice {
     /// Creates the device that the options or the plan name.
-    pub(super) fn new(args: &Args, plan: &Plan, interrupts: Interrupts) -> Self {
+    pub(super) fn new(args: &Args, plan: &CollectionPlan, interrupts: Interrupts) -> Self {
         let keys = &plan.keys;
         let source = if args.mock {
             Source::Mock(None)
@@ -61,7 +61,7 @@ impl LocalDevice {
     }
 
     /// Returns the ranger, identifying it first if necessary; failures are not retried.
-    async fn ranger(&mut self) -> Result<&mut Ranger<SerialStream>, Halt> {
+    async fn ranger(&mut self) -> Result<&mut Ranger<SerialStream>, CollectError> {
         let ranger = match self.ranger.take() {
             Some(ranger) => ranger,
             None => {
@@ -71,7 +71,7 @@ impl LocalDevice {
         };
         let identity = *ranger.identity();
         if let Some(change) = self.first.and_then(|first| BoardChange::between(&first, &identity)) {
-            return Err(Halt::failed(
+            return Err(CollectError::failed(
                 format!("a different ranger is connected than at the start: {change}"),
                 "connect the first ranger, or restart the collection: it reports what it needs",
             ));
@@ -81,35 +81,35 @@ impl LocalDevice {
     }
 
     /// Returns the ranger, reconnecting until the plan's timeout expires.
-    async fn find(&mut self) -> Result<&mut Ranger<SerialStream>, Halt> {
-        let (mut patience, mut notified) = (Patience::with_absence(self.patience), false);
+    async fn find(&mut self) -> Result<&mut Ranger<SerialStream>, CollectError> {
+        let (mut patience, mut notified) = (RetrySchedule::for_absent_device(self.patience), false);
         loop {
             let halt = match self.ranger().await {
                 // A direct return would extend the first borrow through the loop.
                 Ok(_) => return self.ranger().await,
-                Err(halt @ Halt::Failed { .. }) => halt,
+                Err(halt @ CollectError::Failed { .. }) => halt,
                 Err(halt) => return Err(halt),
             };
-            let Some(wait) = patience.next_wait() else { return Err(halt) };
+            let Some(wait) = patience.next_delay() else { return Err(halt) };
             if !std::mem::replace(&mut notified, true) {
                 notice!("waiting for the ranger: {halt}");
             }
             tokio::select! {
                 () = sleep(wait) => {}
-                () = self.interrupts.clone().wait() => return Err(Halt::on_request()),
+                () = self.interrupts.clone().wait() => return Err(CollectError::interrupted()),
             }
         }
     }
 
     /// Starts an emulated board at a pose; its pose is fixed at start.
-    fn start_emulator(&mut self, at: &PreparedScan) -> Result<(), Halt> {
+    fn start_emulator(&mut self, at: &PreparedScan) -> Result<(), CollectError> {
         let Source::Emulator { sensor, air, running } = &mut self.source else { return Ok(()) };
         self.ranger = None;
         *running = None;
         let [temperature_c, humidity_percent, pressure_kpa] = air;
         let mut options = self.world.emulator(self.scene.as_ref())?;
         options.extend([
-            format!("--pose={}", at.pose_numbers()),
+            format!("--pose={}", at.pose_argument()),
             format!("--sensor={sensor}"),
             format!("--blanking-us={}", at.blanking_us()),
             format!("--temperature-c={temperature_c}"),
@@ -131,16 +131,16 @@ impl LocalDevice {
     }
 }
 
-impl Device for LocalDevice {
+impl ScanDevice for LocalDevice {
     fn is_local(&self) -> bool {
         true
     }
 
-    fn go_on(&mut self, patience: Duration, _borrowed: Option<Borrowed>) {
+    fn resume(&mut self, patience: Duration, _borrowed: Option<SavedSettings>) {
         self.patience = patience;
     }
 
-    fn prepare(&mut self, _plan: &Plan, first: &PreparedScan) -> Result<(), Halt> {
+    fn prepare(&mut self, _plan: &CollectionPlan, first: &PreparedScan) -> Result<(), CollectError> {
         if let Source::Mock(mock) = &mut self.source {
             let link = std::env::temp_dir().join(format!("sonard-mock-{}", std::process::id()));
             *mock = Some(Mock::start(self.world.board(&assumed(first))?, Some(&link))?);
@@ -148,28 +148,28 @@ impl Device for LocalDevice {
         self.start_emulator(first)
     }
 
-    async fn meet(&mut self) -> Result<Connected, Halt> {
+    async fn connect(&mut self) -> Result<ConnectedDevice, CollectError> {
         let identity = self.ranger().await?.identity();
-        Ok(Connected { device: device_record(identity), provenance: provenance(identity) })
+        Ok(ConnectedDevice { device: device_record(identity), provenance: provenance(identity) })
     }
 
     /// Only a mock can be moved; a real ranger is placed by the operator.
-    fn carry_to(&mut self, to: &PreparedScan) -> Result<(), Halt> {
+    fn move_to(&mut self, to: &PreparedScan) -> Result<(), CollectError> {
         if let Source::Mock(Some(mock)) = &self.source {
             mock.carry_to(self.world.soundings(&assumed(to))?);
         }
         self.start_emulator(to)
     }
 
-    async fn to_borrow(&self, _air: Option<&AirOrder>) -> Result<Option<Borrowed>, Halt> {
+    async fn settings_to_save(&self, _air: Option<&AirOrder>) -> Result<Option<SavedSettings>, CollectError> {
         Ok(None)
     }
 
-    async fn borrow(&mut self, _: Option<Borrowed>, _: Option<&AirOrder>) -> Result<(), Halt> {
+    async fn apply_settings(&mut self, _: Option<SavedSettings>, _: Option<&AirOrder>) -> Result<(), CollectError> {
         Ok(())
     }
 
-    async fn give_back(&mut self) -> Result<bool, Halt> {
+    async fn restore_settings(&mut self) -> Result<bool, CollectError> {
         Ok(false)
     }
 
@@ -177,10 +177,10 @@ impl Device for LocalDevice {
         None
     }
 
-    async fn take(&mut self, scan: ScanOrder<'_>, beam: &(dyn Fn() + Sync)) -> Result<Taken, Halt> {
-        let ScanOrder { prepared, air, collection: of, path, .. } = scan;
+    async fn record_scan(&mut self, scan: ScanTask<'_>, beam: &(dyn Fn() + Sync)) -> Result<RecordedScan, CollectError> {
+        let ScanTask { prepared, air, collection: of, path, .. } = scan;
         let Some(prepared) = prepared else {
-            return Err(Halt::wrong("the scan has no predictions", "this is a bug: report it"));
+            return Err(CollectError::invalid("the scan has no predictions", "this is a bug: report it"));
         };
         let interrupts = self.interrupts.clone();
         let ranger = self.find().await?;
@@ -188,8 +188,8 @@ impl Device for LocalDevice {
         let mut job = prepared.job(&identity).map_err(ScanError::from)?;
         job.air = air;
         let session = Session { collection: Some(Box::new(of)), ..prepared.session(&identity) };
-        let taken = take(ranger, (&job, session), path, beam, &interrupts).await?;
-        if taken.gone {
+        let taken = record_scan(ranger, (&job, session), path, beam, &interrupts).await?;
+        if taken.needs_reconnect {
             self.ranger = None;
         }
         Ok(taken)

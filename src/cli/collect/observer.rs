@@ -5,7 +5,7 @@ use std::time::Duration;
 use indicatif::{HumanDuration, ProgressBar, ProgressStyle};
 
 use super::{report, terminal::Terminal};
-use crate::collect::{Folder, Halt, History, Watcher};
+use crate::collect::{CollectionFolder, CollectError, CollectionHistory, Observer};
 
 /// Terminal of a collection: a bar over all beams, messages above it, and questions.
 pub(super) struct TerminalObserver {
@@ -25,8 +25,8 @@ impl TerminalObserver {
     }
 }
 
-impl Watcher for TerminalObserver {
-    fn begin(&self, doing: &str, done: u32, of: u32, left_s: f64) {
+impl Observer for TerminalObserver {
+    fn scan_started(&self, doing: &str, done: u32, of: u32, left_s: f64) {
         if self.bar.is_finished() {
             self.bar.reset();
         }
@@ -35,29 +35,29 @@ impl Watcher for TerminalObserver {
         self.bar.set_message(format!("{doing}, {} left,", human_duration(left_s)));
     }
 
-    fn beam(&self) {
+    fn beam_recorded(&self) {
         self.bar.inc(1);
     }
 
     /// Prints a line above the bar.
-    fn say(&self, line: &str) {
+    fn message(&self, line: &str) {
         self.bar.suspend(|| notice!("{line}"));
     }
 
-    fn announce(&self, scans: u32, left_s: f64) {
+    fn scans_planned(&self, scans: u32, left_s: f64) {
         notice!("{scans} scans to take, about {}", human_duration(left_s));
     }
 
     /// Removes the bar until the next scan begins: an earlier redraw would cover a question.
-    fn rest(&self) {
+    fn measuring_paused(&self) {
         self.bar.finish_and_clear();
     }
 
-    async fn ask(&mut self, question: &str) -> Option<String> {
+    async fn prompt(&mut self, question: &str) -> Option<String> {
         self.terminal.prompt(question).await
     }
 
-    fn report(&self, folder: &Folder, history: &History) -> Result<(), Halt> {
+    fn write_report(&self, folder: &CollectionFolder, history: &CollectionHistory) -> Result<(), CollectError> {
         report::write(folder, history)
     }
 }

@@ -5,19 +5,19 @@ use serde_json::json;
 use super::{Args, observer::human_duration};
 use crate::{
     cli::Failure,
-    collect::{Plan, Poses, budget, disk_bytes},
-    ranger::Budget,
+    collect::{CollectionPlan, Poses, budget, disk_bytes},
+    ranger::ScanDuration,
 };
 
 /// Formats the estimate as text, or as one JSON object.
-pub(super) fn render(plan: &Plan, args: &Args) -> Result<String, Failure> {
+pub(super) fn render(plan: &CollectionPlan, args: &Args) -> Result<String, Failure> {
     let estimate = Estimate::from_plan(plan)?;
     Ok(if args.json { format!("{}\n", estimate.object(plan)) } else { estimate.describe(plan) })
 }
 
 /// Estimated duration of a plan, as far as it is known.
 struct Estimate {
-    scan: Budget,
+    scan: ScanDuration,
     scans: Option<u32>,
     pauses_s: f64,
     /// `true` if people have to act between scans.
@@ -25,7 +25,7 @@ struct Estimate {
 }
 
 impl Estimate {
-    fn from_plan(plan: &Plan) -> Result<Self, Failure> {
+    fn from_plan(plan: &CollectionPlan) -> Result<Self, Failure> {
         let collection = &plan.keys.collection;
         let scans = plan.pose_count().map(|poses| poses.saturating_mul(collection.repeats));
         let pauses = f64::from(scans.unwrap_or(0).saturating_sub(1));
@@ -36,8 +36,8 @@ impl Estimate {
         Ok(Self { scan: budget(plan)?, scans, pauses_s, people })
     }
 
-    fn object(&self, plan: &Plan) -> serde_json::Value {
-        let split = |budget: &Budget| {
+    fn object(&self, plan: &CollectionPlan) -> serde_json::Value {
+        let split = |budget: &ScanDuration| {
             json!({
                 "acoustics_s": budget.acoustics_s,
                 "motor_s": budget.motor_s,
@@ -61,8 +61,8 @@ impl Estimate {
         })
     }
 
-    fn describe(&self, plan: &Plan) -> String {
-        let line = |name: &str, budget: &Budget| {
+    fn describe(&self, plan: &CollectionPlan) -> String {
+        let line = |name: &str, budget: &ScanDuration| {
             format!(
                 "{name:<12}{:>12} = {} acoustics + {} motor + {} link",
                 seconds(budget.total_s()),

@@ -6,11 +6,11 @@ use jiff::Timestamp;
 
 use crate::{
     collect::{
-        BeamSpread, CheckKeys, CollectionKeys, Conditions, Figures, Folder, Halt, History, INPUTS,
-        NamedPose, Outcome, Repeatability, Take, repeatability,
+        BeamSpread, CheckKeys, CollectionKeys, Conditions, ScanFigures, CollectionFolder, CollectError, CollectionHistory, INPUTS,
+        NamedPose, ScanOutcome, Repeatability, ScanAttempt, repeatability,
     },
     compare::{Comparison, compare},
-    plot::{Picture, Point, Series, badge_among, draw_scans, draw_scene, draw_series},
+    plot::{Picture, SeriesPoint, Series, badge_among, draw_scans, draw_scene, draw_series},
     scan::ScanView,
     scene::Scene,
     store::load,
@@ -32,9 +32,9 @@ of a beam's range over the repeats.
 ";
 
 /// Writes report and pictures into the folder.
-pub(super) fn write(folder: &Folder, history: &History) -> Result<(), Halt> {
+pub(super) fn write(folder: &CollectionFolder, history: &CollectionHistory) -> Result<(), CollectError> {
     let Some(plan) = history.plans.last() else {
-        return Err(Halt::wrong("there is no plan in the journal", "nothing was collected yet"));
+        return Err(CollectError::invalid("there is no plan in the journal", "nothing was collected yet"));
     };
     let keys: CollectionKeys = serde_json::from_value(plan.keys.clone()).unwrap_or_default();
     let scene = scene(folder)?;
@@ -54,10 +54,10 @@ pub(super) fn write(folder: &Folder, history: &History) -> Result<(), Halt> {
 
 /// Formats the table of poses, and draws the scans at each.
 fn poses(
-    folder: &Folder,
-    history: &History,
+    folder: &CollectionFolder,
+    history: &CollectionHistory,
     scene: Option<&Scene>,
-) -> Result<(String, String), Halt> {
+) -> Result<(String, String), CollectError> {
     let (mut table, mut details) = (TABLE.to_owned(), String::new());
     let mut repeated = Vec::new();
     for (&number, pose) in &history.poses {
@@ -84,9 +84,9 @@ fn poses(
 }
 
 /// Formats the header: counts, dates, devices, scene and sensor.
-fn format_head(history: &History, keys: &CollectionKeys) -> String {
-    let requested = history.wanted();
-    let accepted: Vec<&Take> = history.accepted().collect();
+fn format_head(history: &CollectionHistory, keys: &CollectionKeys) -> String {
+    let requested = history.requested();
+    let accepted: Vec<&ScanAttempt> = history.accepted().collect();
     let given_up = requested.iter().filter(|slot| history.is_given_up(**slot)).count();
     let beams: u64 = accepted.iter().map(|take| u64::from(take.figures.beams)).sum();
     let missing: u64 = accepted.iter().map(|take| u64::from(take.figures.missing)).sum();
@@ -168,11 +168,11 @@ impl Row<'_> {
 }
 
 /// Lists rejected scans, failed poses, and accepted scans with findings, with reasons.
-fn format_exceptions(history: &History) -> String {
+fn format_exceptions(history: &CollectionHistory) -> String {
     let mut text = String::new();
     let mut aside = String::new();
     for take in history.set_aside() {
-        let what = if take.outcome == Outcome::Cut { "interrupted" } else { "rejected" };
+        let what = if take.outcome == ScanOutcome::Cut { "interrupted" } else { "rejected" };
         let reasons = take.cut.clone().unwrap_or_else(|| reasons(take));
         let _ = writeln!(aside, "| {} | {what} | {reasons} |", take.file);
     }
@@ -199,13 +199,13 @@ fn format_exceptions(history: &History) -> String {
     text
 }
 
-fn reasons(take: &Take) -> String {
+fn reasons(take: &ScanAttempt) -> String {
     let details: Vec<_> = take.findings.iter().map(|finding| finding.detail.as_str()).collect();
     details.join("; ")
 }
 
 /// Draws the scene with the collection's poses instead of its own.
-fn overview(scene: &Scene, history: &History) -> Picture {
+fn overview(scene: &Scene, history: &CollectionHistory) -> Picture {
     let name = |number: u32, pose: &NamedPose| match &pose.name {
         Some(name) => format!("{number} {name}"),
         None => number.to_string(),
@@ -216,27 +216,27 @@ fn overview(scene: &Scene, history: &History) -> Picture {
 }
 
 /// Returns the label of readings that are not from a real ranger.
-fn badge(history: &History) -> Option<&'static str> {
+fn badge(history: &CollectionHistory) -> Option<&'static str> {
     badge_among(history.starts.iter().map(|start| start.provenance))
 }
 
 /// Draws figures of every scan over time, including rejected ones.
-fn drift(history: &History, checks: &CheckKeys) -> Picture {
-    let first = history.takes.iter().filter_map(|take| take.started).min().unwrap_or_default();
+fn drift(history: &CollectionHistory, checks: &CheckKeys) -> Picture {
+    let first = history.attempts.iter().filter_map(|take| take.started).min().unwrap_or_default();
     let hours = |at: Timestamp| at.duration_since(first).as_secs_f64() / 3600.0;
-    let times = history.takes.iter().filter_map(|take| take.started);
+    let times = history.attempts.iter().filter_map(|take| take.started);
     let last_h = times.map(hours).fold(0.0, f64::max);
     let (scale, unit) = if last_h < 1.0 { (60.0, "minutes") } else { (1.0, "hours") };
-    let strip = |title: &str, limits, of: &dyn Fn(&Figures) -> Option<f64>| {
-        let point = |take: &Take| {
-            Some(Point {
+    let strip = |title: &str, limits, of: &dyn Fn(&ScanFigures) -> Option<f64>| {
+        let point = |take: &ScanAttempt| {
+            Some(SeriesPoint {
                 x: scale * hours(take.started?),
                 y: of(&take.figures)?,
                 hint: take.file.clone(),
-                aside: take.outcome != Outcome::Accepted,
+                rejected: take.outcome != ScanOutcome::Accepted,
             })
         };
-        let points = history.takes.iter().filter_map(point).collect();
+        let points = history.attempts.iter().filter_map(point).collect();
         Series { title: title.into(), points, limits }
     };
     let off = f64::from(checks.max_home_drift_steps);
@@ -266,11 +266,11 @@ fn spreads(
     let strips: Vec<Series> = poses
         .into_iter()
         .map(|(label, of, beams)| {
-            let point = |beam: BeamSpread| Point {
+            let point = |beam: BeamSpread| SeriesPoint {
                 x: beam.azimuth_deg,
                 y: 1e3 * beam.spread_m,
                 hint: format!("{:.1}\u{b0}: {:.2} mm", beam.azimuth_deg, 1e3 * beam.spread_m),
-                aside: false,
+                rejected: false,
             };
             Series {
                 title: format!("{label}: standard deviation over {} scans, mm", of.scans),
@@ -288,8 +288,8 @@ fn spreads(
 }
 
 /// Loads the accepted scans of a pose, by repeat.
-fn views(folder: &Folder, history: &History, pose: u32) -> Result<Vec<ScanView>, Halt> {
-    let mut takes: Vec<&Take> = history.accepted().filter(|take| take.slot.pose == pose).collect();
+fn views(folder: &CollectionFolder, history: &CollectionHistory, pose: u32) -> Result<Vec<ScanView>, CollectError> {
+    let mut takes: Vec<&ScanAttempt> = history.accepted().filter(|take| take.slot.pose == pose).collect();
     takes.sort_by_key(|take| take.slot.repeat);
     let mut views = Vec::new();
     for take in takes {
@@ -299,15 +299,15 @@ fn views(folder: &Folder, history: &History, pose: u32) -> Result<Vec<ScanView>,
     Ok(views)
 }
 
-fn scene(folder: &Folder) -> Result<Option<Scene>, Halt> {
+fn scene(folder: &CollectionFolder) -> Result<Option<Scene>, CollectError> {
     let path = folder.root().join(INPUTS).join("scene.json");
     let Ok(text) = std::fs::read_to_string(&path) else { return Ok(None) };
     Scene::from_json(&text).map(Some).map_err(|error| {
-        Halt::wrong(format!("{}: {error}", path.display()), "the file was modified: restore it")
+        CollectError::invalid(format!("{}: {error}", path.display()), "the file was modified: restore it")
     })
 }
 
-fn draw(folder: &Folder, name: &str, picture: &Picture) -> Result<(), Halt> {
+fn draw(folder: &CollectionFolder, name: &str, picture: &Picture) -> Result<(), CollectError> {
     Ok(folder.write(&format!("{PICTURES}/{name}.svg"), picture.to_svg().as_bytes())?)
 }
 

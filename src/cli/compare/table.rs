@@ -5,7 +5,7 @@ use std::io::{self, Write};
 use comfy_table::{CellAlignment, LineStyle, Table, TableStyle};
 
 use crate::{
-    compare::{Comparison, Estimate, Explanation, Judged, Verdict, keep_every_second},
+    compare::{Comparison, ChangeEstimate, Explanation, ClassifiedPing, Verdict, keep_every_second},
     scan::{PathKind, PathRecord, Ping, PingStatus},
 };
 
@@ -105,7 +105,7 @@ fn explanations(found: &[Explanation]) -> Table {
     let mut table = Table::new();
     table.load_style(RULED).set_header(["change", "by", "explains", "gain"]);
     for Explanation { change, estimates, gain, explains } in found.iter().take(MAX_EXPLANATIONS) {
-        let by: Vec<String> = estimates.iter().map(Estimate::to_string).collect();
+        let by: Vec<String> = estimates.iter().map(ChangeEstimate::to_string).collect();
         let explains = format!("{explains} readings");
         table.add_row([change.replace('_', " "), by.join(", "), explains, format!("{gain:.0}")]);
     }
@@ -177,7 +177,7 @@ impl WorstBeams {
     }
 
     /// Adds the beams of a scan.
-    pub(super) fn add(&mut self, classified: &[Judged<'_>]) {
+    pub(super) fn add(&mut self, classified: &[ClassifiedPing<'_>]) {
         for beam in classified.iter().filter(|beam| beam.verdict == Ok(Verdict::Unexplained)) {
             let keep = || Beam { ping: beam.ping.clone(), residual_m: beam.residual_m };
             match beam.residual_m {
@@ -246,7 +246,7 @@ fn millimetres(value_m: Option<f64>) -> String {
 
 /// Describes a path, for example `3 reflections: south, north, south`.
 pub(in crate::cli) fn describe_path(path: &PathRecord) -> String {
-    let surfaces = path.in_words();
+    let surfaces = path.describe();
     match (path.kind, path.order) {
         (PathKind::Diffracted, _) => surfaces,
         (PathKind::Scattered, _) => format!("scattered by {surfaces}"),

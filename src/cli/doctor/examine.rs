@@ -28,7 +28,7 @@ use super::{
 use crate::{
     cli::{runtime::Interrupts, scan::ATTEMPTS},
     link::{self, BAUD, LinkError},
-    ranger::{DriveError, Driver, Ended, hold_s, serial_text},
+    ranger::{DriveError, Driver, CommandResult, hold_s, serial_text},
 };
 
 /// Steps that the motor is turned forth and back.
@@ -157,7 +157,7 @@ impl BoardUnderTest {
     /// Identifies the board and stops its current operation.
     async fn identify(&mut self) -> Result<Identity, DriveError> {
         let Self { driver, restarts, exchanges } = self;
-        let identified = driver.take_over(|event| {
+        let identified = driver.identify_and_stop(|event| {
             if matches!(event, HostEvent::Rebooted { .. }) {
                 *restarts += 1;
                 exchanges.clear();
@@ -211,7 +211,7 @@ impl BoardUnderTest {
         let mut drift = None;
         for command in [Command::Configure(settings), Command::Home, turn, back] {
             match self.perform(command).await {
-                Ok((Ended::Done(Outcome::Homed { drift_steps }), _)) => drift = Some(drift_steps),
+                Ok((CommandResult::Done(Outcome::Homed { drift_steps }), _)) => drift = Some(drift_steps),
                 Ok(_) => {}
                 Err(error) => return motor_failed(&error),
             }
@@ -256,7 +256,7 @@ impl BoardUnderTest {
         echo::check_echoes(&readings, SETTINGS.window_ticks)
     }
 
-    async fn perform(&mut self, command: Command) -> Result<(Ended, CommandReadings), DriveError> {
+    async fn perform(&mut self, command: Command) -> Result<(CommandResult, CommandReadings), DriveError> {
         let mut collected = CommandReadings::default();
         let Self { driver, restarts, exchanges } = self;
         let ended = driver
@@ -339,7 +339,7 @@ fn no_answer(error: &DriveError) -> Check {
             format!("{bytes} bytes were received, but no valid frame"),
             ForeignSender::OtherRate.help(),
         ),
-        DriveError::Host(HostError::WrongIdentity(_)) => {
+        DriveError::Host(HostError::InvalidIdentity(_)) => {
             Check::failed("board", Cause::WrongFirmware, error.to_string(), error.help())
         }
         DriveError::Host(HostError::WrongVersion { .. }) => {
@@ -413,7 +413,7 @@ fn last_reset(identity: &Identity) -> Check {
 }
 
 fn motor_failed(error: &DriveError) -> Check {
-    let refused = |reason| matches!(error, DriveError::Host(HostError::Refused(r)) if *r == reason);
+    let refused = |reason| matches!(error, DriveError::Host(HostError::Rejected(r)) if *r == reason);
     if refused(NakReason::IndexNotFound) {
         return Check::failed(
             "motor",

@@ -39,7 +39,7 @@ impl PortMonitor {
     /// Checks whether another program has the port open.
     pub(super) fn check_port(&self) -> Check {
         let holders = link::find_holders(&self.path);
-        if let Some(advice) = holders.advice(&self.path) {
+        if let Some(advice) = holders.remedy(&self.path) {
             return port_shared(&holders, advice);
         }
         if link::is_kernel_console(&self.path) {
@@ -72,7 +72,7 @@ impl PortMonitor {
         let changes = describe_changes(before, &tcgetattr(line).ok()?)?;
         let holders = link::find_holders(&self.path);
         let who = holders.describe("another program");
-        let help = holders.advice(&self.path).unwrap_or_else(|| {
+        let help = holders.remedy(&self.path).unwrap_or_else(|| {
             "find what changes them (`stty`, a udev rule, a login service) and stop it".into()
         });
         Some(Check::failed(
@@ -86,7 +86,7 @@ impl PortMonitor {
     /// Explains from received and sent bytes why a board did not reply.
     pub(super) fn explain(&self, received: &[u8], sent: &[u8]) -> Option<Check> {
         let holders = link::find_holders(&self.path);
-        if let Some(advice) = holders.advice(&self.path) {
+        if let Some(advice) = holders.remedy(&self.path) {
             return Some(Check { check: "board", ..port_shared(&holders, advice) });
         }
         if let Some(check) = self.check_settings() {

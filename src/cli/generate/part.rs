@@ -1,7 +1,7 @@
 //! Part of a set that this process makes, from the option or an array job's environment.
 
 use super::Failure;
-use crate::generate::Part;
+use crate::generate::SetPart;
 
 /// Variables of systems that count from 0 without stating the size of the array, which must be the
 /// number of shards.
@@ -10,10 +10,10 @@ const SLURM: &str = "SLURM_ARRAY_TASK_ID";
 
 /// Determines the part; logs a line on standard error unless it is determined by the option alone.
 pub(super) fn part(
-    given: Option<Part>,
+    given: Option<SetPart>,
     variable: &dyn Fn(&str) -> Option<String>,
     shards: u32,
-) -> Result<Part, Failure> {
+) -> Result<SetPart, Failure> {
     let (part, note) = determine(given, variable, shards)?;
     if let Some(note) = note {
         notice!("{note}");
@@ -22,13 +22,13 @@ pub(super) fn part(
 }
 
 fn determine(
-    given: Option<Part>,
+    given: Option<SetPart>,
     variable: &dyn Fn(&str) -> Option<String>,
     shards: u32,
-) -> Result<(Part, Option<String>), Failure> {
+) -> Result<(SetPart, Option<String>), Failure> {
     let names = [SLURM].into_iter().chain(FROM_ZERO);
     let Some(name) = names.into_iter().find(|name| variable(name).is_some()) else {
-        return Ok((given.unwrap_or(Part::WHOLE), None));
+        return Ok((given.unwrap_or(SetPart::WHOLE), None));
     };
     if let Some(part) = given {
         return Ok((part, Some(format!("part {part}, from --shard; {name} is ignored"))));
@@ -44,7 +44,7 @@ fn determine(
 }
 
 /// Slurm arrays start at any index and may have a stride.
-fn slurm_part(variable: &dyn Fn(&str) -> Option<String>) -> Result<Part, Failure> {
+fn slurm_part(variable: &dyn Fn(&str) -> Option<String>) -> Result<SetPart, Failure> {
     let id = number(SLURM, variable)?;
     let or = |name, default| match variable(name) {
         Some(_) => number(name, variable),
@@ -72,8 +72,8 @@ fn number(name: &str, variable: &dyn Fn(&str) -> Option<String>) -> Result<u32, 
     })
 }
 
-fn new(name: &str, index: u32, of: u32) -> Result<Part, Failure> {
-    Part::new(index, of).map_err(|error| {
+fn new(name: &str, index: u32, of: u32) -> Result<SetPart, Failure> {
+    SetPart::new(index, of).map_err(|error| {
         Failure::input(
             format!("{name}: {error}"),
             "use an array with one index per shard, or state the part with --shard I/N",

@@ -107,5 +107,5 @@ pub(super) fn digest_of_databases(files: &[PathBuf]) -> io::Result<Option<String
     for file in files {
         all = Box::new(all.chain(File::open(file)?));
     }
-    import::digest(all).map(Some)
+    import::sha256_hex(all).map(Some)
 }

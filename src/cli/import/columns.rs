@@ -83,7 +83,7 @@ const DECIMALS: [(&str, Decimal); 2] = [("point", Decimal::Point), ("comma", Dec
 fn format() -> ValueParser {
     let names = FORMATS.iter().map(|entry| PossibleValue::new(entry.name).help(entry.about));
     let parser = PossibleValuesParser::new(names.collect::<Vec<_>>());
-    parser.try_map(|name| Format::named(&name).ok_or("no format of that name")).into()
+    parser.try_map(|name| Format::from_name(&name).ok_or("no format of that name")).into()
 }
 
 fn one_of<T: Copy + Send + Sync + 'static>(values: &'static [(&'static str, T)]) -> ValueParser {
@@ -101,7 +101,7 @@ impl ColumnArgs {
             None => Mapping::default(),
         };
         if let Some(columns) = &self.columns {
-            mapping.columns = Mapping::columns_of(columns)
+            mapping.columns = Mapping::parse_columns(columns)
                 .map_err(|error| Failure::input(format!("--columns: {error}"), error.help()))?;
         }
         mapping.format = self.format.or(mapping.format);

@@ -15,7 +15,7 @@ use crate::{
     geometry::wrap_360,
     interpret::{
         Extents, Sweep,
-        mapping::{MAX_RANGE_M, Mapping},
+        mapping::{MAX_RANGE_M, MapSettings},
         prediction::{FeaturePrediction, PredictionSettings},
     },
     scan::{Ping, PingStatus, ScanView, Session},
@@ -40,7 +40,7 @@ pub(in crate::cli) struct Args {
     #[arg(long, value_name = "E", default_value_t = 2.0)]
     exponent: f64,
     /// Extension of walls beyond their observed part, metres
-    #[arg(long, value_name = "M", default_value_t = Mapping::default().extend_m)]
+    #[arg(long, value_name = "M", default_value_t = MapSettings::default().extend_m)]
     extend: f64,
 }
 
@@ -128,7 +128,7 @@ impl ConfidenceAnnotator<'_> {
 }
 
 fn settings(args: &Args, session: &Session) -> Result<PredictionSettings, Failure> {
-    let extents = Extents::of_session(session).map_err(|error| {
+    let extents = Extents::from_session(session).map_err(|error| {
         Failure::input(format!("session: {error}"), "correct the session's record in the log")
     })?;
     let max_range_m = args.max_range.unwrap_or(extents.max_range_m.min(MAX_RANGE_M));

@@ -33,12 +33,12 @@ pub(super) fn run(args: &Args) -> Outcome {
     if let Err(error) = print(&mut io::stdout().lock(), &args.log, &done) {
         Failure::from_write("standard output", &error)?;
     }
-    if done.left_out.is_empty() { Ok(()) } else { Err(Failure::Found(None)) }
+    if done.removed.is_empty() { Ok(()) } else { Err(Failure::Found(None)) }
 }
 
 fn print(out: &mut impl Write, log: &Path, done: &Repair) -> io::Result<()> {
     let name = log.display();
-    for left in &done.left_out {
+    for left in &done.removed {
         writeln!(
             out,
             "{name}:{}: removed {} byte(s) at byte {}: {}",

@@ -10,7 +10,7 @@ use serde::Serialize;
 
 use super::{Failure, Outcome};
 use crate::store::{
-    Finding, FindingKind, Severity, StoreError, Totals, check, is_being_written, open_for_reading,
+    LogFinding, FindingKind, Severity, StoreError, LogTotals, check, is_locked, open_for_reading,
 };
 
 /// Maximum number of printed findings per log without --all.
@@ -55,12 +55,12 @@ pub(super) fn run(args: &Args) -> Outcome {
     if clean { Ok(()) } else { Err(Failure::Found(None)) }
 }
 
-fn verify(log: &Path, args: &Args) -> Result<Totals, Failure> {
+fn verify(log: &Path, args: &Args) -> Result<LogTotals, Failure> {
     let reader = open_for_reading(log)?;
     let mut out = io::stdout().lock();
     let mut printed = Ok(());
     let (mut shown, mut damaged, mut hidden, mut torn) = (0, 0, 0, false);
-    let totals = check(reader, |finding| {
+    let totals = check_log(reader, |finding| {
         torn |= matches!(finding.kind, FindingKind::TornTail | FindingKind::NoNewline);
         damaged += u64::from(finding.kind == FindingKind::Damaged);
         let enough = shown == MAX_SHOWN
@@ -86,7 +86,7 @@ fn verify(log: &Path, args: &Args) -> Result<Totals, Failure> {
 fn print_finding(
     out: &mut impl Write,
     log: &Path,
-    finding: &Finding,
+    finding: &LogFinding,
     json: bool,
 ) -> io::Result<()> {
     if json {
@@ -94,7 +94,7 @@ fn print_finding(
         struct FindingLine<'a> {
             log: &'a Path,
             #[serde(flatten)]
-            finding: &'a Finding,
+            finding: &'a LogFinding,
         }
         serde_json::to_writer(&mut *out, &FindingLine { log, finding })?;
         return writeln!(out);
@@ -106,13 +106,13 @@ fn print_finding(
     writeln!(out, "{}:{}: {severity}: {}", log.display(), finding.line, finding.detail)
 }
 
-fn print_totals_json(out: &mut impl Write, log: &Path, totals: Totals) -> io::Result<()> {
+fn print_totals_json(out: &mut impl Write, log: &Path, totals: LogTotals) -> io::Result<()> {
     #[derive(Serialize)]
     struct TotalsLine<'a> {
         log: &'a Path,
         clean: bool,
         #[serde(flatten)]
-        totals: Totals,
+        totals: LogTotals,
     }
     serde_json::to_writer(&mut *out, &TotalsLine { log, clean: totals.problems == 0, totals })?;
     writeln!(out)
@@ -121,7 +121,7 @@ fn print_totals_json(out: &mut impl Write, log: &Path, totals: Totals) -> io::Re
 fn print_totals(
     out: &mut impl Write,
     log: &Path,
-    totals: Totals,
+    totals: LogTotals,
     hidden: u64,
     torn: bool,
 ) -> io::Result<()> {
@@ -129,7 +129,7 @@ fn print_totals(
     if hidden > 0 {
         writeln!(out, "{log}: {hidden} more; use --all to list them")?;
     }
-    let Totals { lines, sessions, scans, pings, events, problems, warnings } = totals;
+    let LogTotals { lines, sessions, scans, pings, events, problems, warnings } = totals;
     let verdict = match (problems, warnings) {
         (0, 0) => "clean".into(),
         (0, warnings) => format!("clean, {warnings} warning(s)"),
@@ -141,7 +141,7 @@ fn print_totals(
         "{log}: {verdict} ({lines} lines: {sessions} session(s), {scans} scan(s), {pings} \
          readings, {events} event(s))"
     )?;
-    let written_now = torn && File::open(log.to_string()).is_ok_and(|file| is_being_written(&file));
+    let written_now = torn && File::open(log.to_string()).is_ok_and(|file| is_locked(&file));
     match (torn, written_now) {
         (true, true) => {
             writeln!(out, "{log}: file in use; check again when it is complete")

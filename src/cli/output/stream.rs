@@ -6,13 +6,13 @@ use std::{
     mem,
 };
 
-use crate::store::{Medium, WholeFile};
+use crate::store::{LogOutput, AtomicFile};
 
 /// Destination of a verb's output.
 #[derive(Debug)]
 pub(in crate::cli) enum Stream {
     Standard(BufWriter<Stdout>),
-    File(BufWriter<WholeFile>),
+    File(BufWriter<AtomicFile>),
     Device(File),
     /// No further output is possible.
     Finished,
@@ -28,7 +28,7 @@ impl Stream {
         self.flush()?;
         match mem::replace(self, Self::Finished) {
             Self::File(file) => {
-                file.into_inner().map_err(io::IntoInnerError::into_error)?.take_place()
+                file.into_inner().map_err(io::IntoInnerError::into_error)?.commit()
             }
             Self::Standard(_) | Self::Device(_) | Self::Finished => Ok(()),
         }
@@ -55,7 +55,7 @@ impl Write for Stream {
     }
 }
 
-impl Medium for Stream {
+impl LogOutput for Stream {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         Write::write(self, bytes)
     }
@@ -64,7 +64,7 @@ impl Medium for Stream {
         self.flush()
     }
 
-    fn take_back(&mut self, bytes: u64) -> io::Result<()> {
+    fn remove_last(&mut self, bytes: u64) -> io::Result<()> {
         if bytes == 0 { Ok(()) } else { Err(io::ErrorKind::Unsupported.into()) }
     }
 

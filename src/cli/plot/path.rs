@@ -5,7 +5,7 @@ use std::fmt;
 use crate::{
     cli::Failure,
     geometry::wrap_pi,
-    plot::{PathView, Picture, badge_of, draw_path},
+    plot::{PathView, Picture, badge_for, draw_path},
     scan::{PathRecord, Ping, PingStatus, ScanView},
     scene::Scene,
 };
@@ -60,10 +60,10 @@ pub(super) fn draw(
     Ok(draw_path(&PathView {
         title: format!("{}, beam {index} at azimuth {azimuth_deg}\u{b0}", scene.name),
         lines: vec![describe_reading(ping), describe_path(record)],
-        badge: badge_of(ping.provenance.or(view.session.as_ref().map(|s| s.provenance))),
+        badge: badge_for(ping.provenance.or(view.session.as_ref().map(|s| s.provenance))),
         scene,
         pose,
-        looks: viewpoint.pose(),
+        transducer: viewpoint.pose(),
         azimuth_deg,
         range_m: ping.range_m,
         points,
@@ -102,7 +102,7 @@ fn describe_reading(ping: &Ping) -> String {
 }
 
 fn describe_path(record: &PathRecord) -> String {
-    format!("path of {:.4} m: {}", record.length_m, record.in_words())
+    format!("path of {:.4} m: {}", record.length_m, record.describe())
 }
 
 fn no_beam(views: &[ScanView], beam: Beam) -> Failure {

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 #[cfg(feature = "mqtt")]
-use crate::mqtt::{Account, Mqtt};
+use crate::mqtt::{Credentials, Mqtt};
 use crate::{
     cli::Failure,
     config::Keys,
@@ -13,7 +13,7 @@ use crate::{
 /// Configured broker, before and after its connection is started.
 pub(super) struct Broker {
     #[cfg(feature = "mqtt")]
-    credentials: Option<Account>,
+    credentials: Option<Credentials>,
     #[cfg(feature = "mqtt")]
     publisher: Option<Mqtt>,
 }
@@ -22,7 +22,7 @@ pub(super) struct Broker {
 impl Broker {
     /// Reads the credentials named in the configuration.
     pub(super) fn open(keys: &Keys) -> Result<Self, Failure> {
-        let credentials = Account::open(&keys.mqtt, &keys.fleet.robot);
+        let credentials = Credentials::open(&keys.mqtt, &keys.fleet.robot);
         let credentials =
             credentials.map_err(|error| Failure::input(&error, error.help.clone()))?;
         Ok(Self { credentials, publisher: None })

@@ -10,7 +10,7 @@ use super::{Args, load::Loader};
 use crate::{
     cli::Failure,
     daemon::{self, Handle, Journal, OpenPort, Order, Resources},
-    host_gpio::NoGpio,
+    host_gpio::NoHostGpio,
     link::{Holders, LinkError},
     mock::{MemorySocket, MockPort, Note, Pace},
     server::{Access, Server},
@@ -76,7 +76,7 @@ impl EmbeddedDaemon {
             Some(_) => daemon::prepare_simulated(journal, supervisor.clone(), settings),
             None => {
                 let open_port = open_memory(socket.clone());
-                let gpio = Box::new(NoGpio);
+                let gpio = Box::new(NoHostGpio);
                 let resources =
                     Resources { open_port, gpio, journal, supervisor: supervisor.clone() };
                 daemon::prepare(resources, settings)

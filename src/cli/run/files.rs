@@ -16,7 +16,7 @@ use crate::{
     cli::{Failure, Outcome, daemon::connect_all},
     config::{FleetKeys, Keys},
     daemon::JournalThread,
-    fleet::{Asked, members_of},
+    fleet::{PolledDaemon, members_from_keys},
     server::{read_token, token_help},
     store::StoreError,
 };
@@ -33,7 +33,7 @@ pub(super) struct Files {
     /// The token of `server.token_file`.
     pub(super) token: Option<String>,
     /// Clients of the other daemons of the fleet.
-    pub(super) fleet: Vec<Asked>,
+    pub(super) fleet: Vec<PolledDaemon>,
     pub(super) broker: Broker,
 }
 
@@ -51,7 +51,7 @@ impl Files {
 
 /// Digests of the files' contents, by the keys that name them, for a comparison after a reload. An
 /// unreadable file has none; reading it is an error elsewhere.
-pub(super) fn digests(keys: &Keys, fleet: &[Asked]) -> BTreeMap<&'static str, [u8; 32]> {
+pub(super) fn digests(keys: &Keys, fleet: &[PolledDaemon]) -> BTreeMap<&'static str, [u8; 32]> {
     let Keys { server, mqtt, fleet: list, .. } = keys;
     let path = |file: &Option<String>| file.iter().map(PathBuf::from).collect::<Vec<_>>();
     let tokens = fleet.iter().filter_map(|client| client.member.token_file.clone()).collect();
@@ -91,8 +91,8 @@ fn token(file: &str) -> Result<String, Failure> {
     })
 }
 
-fn fleet(keys: &FleetKeys) -> Result<Vec<Asked>, Failure> {
-    let members = members_of(keys)
+fn fleet(keys: &FleetKeys) -> Result<Vec<PolledDaemon>, Failure> {
+    let members = members_from_keys(keys)
         .map_err(|error| Failure::input(format!("[fleet]: {error}"), &error.help))?;
     connect_all(members)
 }

@@ -20,8 +20,8 @@ use crate::{
         options::load_sensor,
         scene_file,
     },
-    config::{ConfigError, Keys, Layers, Mode, robot_name_of_host},
-    daemon::{Mismatch, OptionalOutputs, Settings, Simulated},
+    config::{ConfigError, Keys, ConfigLayers, Mode, robot_name_from_host},
+    daemon::{SettingsConflict, OptionalOutputs, Settings, ArraySimulation},
     host_gpio,
     scene::{PoseError, parse_pose},
 };
@@ -48,14 +48,14 @@ impl Loader {
     /// `--check`.
     pub(super) fn load(&mut self) -> Result<(Settings, Files), Failure> {
         let layers = self.layers()?;
-        let mut keys = layers.clone().keys().map_err(|error| failure_from(&error))?;
+        let mut keys = layers.clone().into_keys().map_err(|error| failure_from(&error))?;
         self.fill_in(&layers, &mut keys);
         let mut settings = match self.args.simulate {
             true => simulated(keys, layers.origin("model", "sensor").is_some())?,
             false => settings(keys)?,
         };
         settings.check().map_err(|mismatch| {
-            let Mismatch { section, key, .. } = mismatch;
+            let SettingsConflict { section, key, .. } = mismatch;
             let origin = layers
                 .origin(section, key)
                 .map_or_else(|| format!("{section}.{key}"), ToString::to_string);
@@ -89,8 +89,8 @@ impl Loader {
         loaded.map_err(|failure| one_line(&failure))
     }
 
-    fn layers(&self) -> Result<Layers, Failure> {
-        let mut layers = Layers::<Keys>::new();
+    fn layers(&self) -> Result<ConfigLayers, Failure> {
+        let mut layers = ConfigLayers::<Keys>::new();
         let (file, requested) = match &self.args.config {
             Some(file) => (file.clone(), true),
             None => (PathBuf::from(FILE), false),
@@ -98,7 +98,7 @@ impl Loader {
         match fs::read_to_string(&file) {
             Ok(text) => {
                 layers = layers
-                    .file(&file.display().to_string(), &text)
+                    .with_file(&file.display().to_string(), &text)
                     .map_err(|error| failure_from(&error))?;
             }
             Err(error) if error.kind() == io::ErrorKind::NotFound && !requested => {}
@@ -113,7 +113,7 @@ impl Loader {
         let variables = env::vars_os().filter_map(|(name, value)| {
             Some((name.into_string().ok()?, value.into_string().ok()?))
         });
-        layers = layers.environment(variables).map_err(|error| failure_from(&error))?;
+        layers = layers.with_environment(variables).map_err(|error| failure_from(&error))?;
         let args = &self.args;
         let path = |path: &Option<PathBuf>| path.clone().map(PathBuf::into_os_string);
         let text = |text: &Option<String>| text.clone().map(OsString::from);
@@ -126,7 +126,7 @@ impl Loader {
             ("--array", "simulate.array", text(&args.array)),
         ];
         for setting in &self.args.set {
-            layers = layers.option("--set", setting).map_err(|error| failure_from(&error))?;
+            layers = layers.with_option("--set", setting).map_err(|error| failure_from(&error))?;
         }
         for (option, key, value) in shortcuts {
             if let Some(value) = value {
@@ -138,7 +138,7 @@ impl Loader {
                     )
                 })?;
                 layers = layers
-                    .option(option, &format!("{key}={value}"))
+                    .with_option(option, &format!("{key}={value}"))
                     .map_err(|error| failure_from(&error))?;
             }
         }
@@ -147,7 +147,7 @@ impl Loader {
 
     /// Fills in values from system and systemd, which replace defaults, and the mock's port, which
     /// overrides all.
-    fn fill_in(&self, layers: &Layers, keys: &mut Keys) {
+    fn fill_in(&self, layers: &ConfigLayers, keys: &mut Keys) {
         // systemd separates several folders by colons; the first is used.
         let first = |variable| {
             let folders = env::var(variable).ok()?;
@@ -165,7 +165,7 @@ impl Loader {
         }
         let host = rustix::system::uname();
         if layers.origin("fleet", "robot").is_none()
-            && let Some(name) = host.nodename().to_str().ok().and_then(robot_name_of_host)
+            && let Some(name) = host.nodename().to_str().ok().and_then(robot_name_from_host)
         {
             keys.fleet.robot = name;
         }
@@ -211,7 +211,7 @@ fn simulated(mut keys: Keys, sensor_chosen: bool) -> Result<Settings, Failure> {
     let mut array = load_array(&requested.array)?;
     array.interval_ms = requested.interval_ms.unwrap_or(array.interval_ms);
     let course = requested.course.as_ref().map(|file| load_course(Path::new(file))).transpose()?;
-    let course = course.map(|course| course.timed(requested.speed_m_s));
+    let course = course.map(|course| course.with_times(requested.speed_m_s));
     if !sensor_chosen {
         keys.model.sensor.clone_from(&array.sensor);
     }
@@ -237,7 +237,7 @@ fn simulated(mut keys: Keys, sensor_chosen: bool) -> Result<Settings, Failure> {
         })?;
     }
     let sensor = load_sensor(&keys.model.sensor)?;
-    let simulated = Simulated { array: Arc::new(array), course: course.map(Arc::new) };
+    let simulated = ArraySimulation { array: Arc::new(array), course: course.map(Arc::new) };
     Ok(Settings {
         keys,
         scene: Some(Arc::new(scene)),

@@ -26,7 +26,7 @@ pub(super) fn run(args: &Args) -> Outcome {
             client.get_json("/v1/status").await.map_err(|error| failure_from(&error))?;
         check_scene(status.scene.as_ref(), &scene)?;
         let requested =
-            RequestedScans::ask(client, &request).await.map_err(|error| failure_from(&error))?;
+            RequestedScans::request(client, &request).await.map_err(|error| failure_from(&error))?;
         notice!("the daemon takes {} scan(s), {}", args.repeat, describe_wait(&status));
         let followed = scans.follow(requested, &interrupts).await;
         scans.output.end_scan();

@@ -139,5 +139,5 @@ fn open_log(folder: &Path) -> Result<(LogWriter, Option<ExistingLog>), Failure> 
     let path = folder.join(LOG);
     let existing = ExistingLog::read(&path)?;
     let log = LogWriter::open(&path)?;
-    Ok((log.with_scenes_beside(), existing))
+    Ok((log.with_scene_folder(), existing))
 }

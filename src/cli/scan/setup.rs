@@ -26,7 +26,7 @@ pub(super) fn prepare(args: &Args) -> Result<PreparedScan, Failure> {
 
 fn failure_from(error: &PrepareError) -> Failure {
     match error {
-        PrepareError::Deaf(error) => Failure::input(error, error.help()),
+        PrepareError::WindowTooShort(error) => Failure::input(error, error.help()),
         PrepareError::Model(error) => Failure::input(error, "see `sonard scan --help`"),
     }
 }

@@ -131,7 +131,7 @@ fn traffic(earlier: &LinkStats, current: &LinkStats) -> String {
         100.0 * sent as f64 / (sent + received).max(1) as f64,
         damaged(current) - damaged(earlier),
         current.retries - earlier.retries,
-        current.refused - earlier.refused,
+        current.rejected - earlier.rejected,
     )
 }
 

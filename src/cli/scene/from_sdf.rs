@@ -195,7 +195,7 @@ impl World<'_> {
         match self.frame(element, scope, 0)? {
             Ok(frame) => Ok(Some(frame)),
             Err(missing) => {
-                self.found.leave_out("poses relative to missing frames");
+                self.found.count_ignored("poses relative to missing frames");
                 self.notes.push(format!(
                     "ignored: {} of `{name}`, whose pose is relative to `{missing}`",
                     element.tag_name().name()

@@ -75,7 +75,7 @@ impl MadeArgs {
         for note in notes {
             notice!("warning: {shown}: {note}");
         }
-        for (what, count) in found.left_out() {
+        for (what, count) in found.ignored() {
             notice!("warning: {shown}: ignored: {count} {what}");
         }
         if found.is_empty() {

@@ -41,11 +41,11 @@ pub(super) fn run(args: &Args, name: &str) -> Outcome {
     let array = load_array(name)?;
     let scene = scene_file::load(&args.scene)?;
     let SimulatedPoses { poses, skipped } = simulated_poses(args, &scene, |pose| {
-        let checked = array.check_poses(&scene, &array.turned(pose, args.array.rounds));
+        let checked = array.check_poses(&scene, &array.rotated_poses(pose, args.array.rounds));
         checked.map_err(|(_, error)| (error.to_string(), error.help()))
     })?;
     let rounds: Vec<Vec<Pose>> =
-        poses.iter().map(|pose| array.turned(pose, args.array.rounds)).collect();
+        poses.iter().map(|pose| array.rotated_poses(pose, args.array.rounds)).collect();
     let (sensor, air) = (args.sensor.sensor_or(&array.sensor)?, args.air.air()?);
     let model =
         ArrayModel::new(Arc::new(array), &scene, &sensor, air, engine_options(&args.engine)?)

@@ -9,7 +9,7 @@ use tokio::task::JoinSet;
 use crate::{
     api::{FleetState, Health, Status},
     cli::{Failure, Outcome, compare::RULED, runtime},
-    fleet::{Asked, Seen, ask, judge},
+    fleet::{PolledDaemon, Observation, poll, observe},
 };
 
 /// Object of `--json` for a daemon.
@@ -24,7 +24,7 @@ struct FleetRow<'a> {
 }
 
 /// Queries all daemons in parallel, and prints the results in their order.
-pub(super) fn run(daemons: &[Asked], json: bool) -> Outcome {
+pub(super) fn run(daemons: &[PolledDaemon], json: bool) -> Outcome {
     let seen = runtime::new()?.block_on(query_all(daemons));
     let rows: Vec<_> = daemons.iter().zip(&seen).map(|(of, seen)| fleet_row(of, seen)).collect();
     let mut text = match json {
@@ -43,19 +43,19 @@ pub(super) fn run(daemons: &[Asked], json: bool) -> Outcome {
     if well { Ok(()) } else { Err(Failure::Found(None)) }
 }
 
-async fn query_all(daemons: &[Asked]) -> Vec<Seen> {
+async fn query_all(daemons: &[PolledDaemon]) -> Vec<Observation> {
     let mut tasks = JoinSet::new();
-    for (number, Asked { member, client }) in daemons.iter().enumerate() {
+    for (number, PolledDaemon { member, client }) in daemons.iter().enumerate() {
         let (robot, client) = (member.robot.clone(), client.clone());
-        tasks.spawn(async move { (number, judge(robot.as_deref(), ask(&client).await)) });
+        tasks.spawn(async move { (number, observe(robot.as_deref(), poll(&client).await)) });
     }
     let mut seen = tasks.join_all().await;
     seen.sort_by_key(|(number, _)| *number);
     seen.into_iter().map(|(_, seen)| seen).collect()
 }
 
-fn fleet_row<'a>(of: &'a Asked, seen: &'a Seen) -> FleetRow<'a> {
-    let report = seen.told.as_ref();
+fn fleet_row<'a>(of: &'a PolledDaemon, seen: &'a Observation) -> FleetRow<'a> {
+    let report = seen.report.as_ref();
     FleetRow {
         robot: report.map(|report| &*report.status.robot).or(of.member.robot.as_deref()),
         address: of.member.address(),

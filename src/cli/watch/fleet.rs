@@ -9,7 +9,7 @@ use crate::{
     api::FleetState,
     cli::{Failure, Outcome},
     client::ClientError,
-    fleet::{Asked, ask, judge, plain},
+    fleet::{PolledDaemon, poll, observe, sanitize},
 };
 
 /// Maximum length of a daemon's line, bytes; a complete scan is one line.
@@ -25,7 +25,7 @@ enum Line {
 }
 
 /// Follows all daemons until the output is closed.
-pub(super) async fn watch(daemons: Vec<Asked>, path: &str, json: bool) -> Outcome {
+pub(super) async fn watch(daemons: Vec<PolledDaemon>, path: &str, json: bool) -> Outcome {
     let (send, mut lines) = mpsc::channel(LINE_CAPACITY);
     let mut following = JoinSet::new();
     for one in daemons {
@@ -64,14 +64,14 @@ fn format_line(robot: &str, record: &[u8]) -> String {
 }
 
 /// Follows one daemon indefinitely; repeated errors are reported once.
-async fn follow(one: Asked, path: String, send: mpsc::Sender<Line>) {
+async fn follow(one: PolledDaemon, path: String, send: mpsc::Sender<Line>) {
     let mut expected = one.member.robot.clone();
     let mut last = String::new();
     let mut backoff = RECONNECT;
     loop {
         let address = one.member.address();
-        let seen = judge(expected.as_deref(), ask(&one.client).await);
-        let why = match seen.told {
+        let seen = observe(expected.as_deref(), poll(&one.client).await);
+        let why = match seen.report {
             Some(report) if matches!(seen.state, FleetState::Well | FleetState::NotWell) => {
                 let robot = expected.get_or_insert(report.status.robot).clone();
                 let connected = format!("{robot} connected at {address}");
@@ -104,14 +104,14 @@ async fn notify(send: &mpsc::Sender<Line>, last: &mut String, news: String) -> b
 
 /// Forwards lines until the stream ends; returns the reason, or `None` if the receiver is closed.
 async fn forward(
-    one: &Asked,
+    one: &PolledDaemon,
     path: &str,
     robot: &str,
     send: &mpsc::Sender<Line>,
 ) -> Option<String> {
     let lines = match one.client.live(path).await {
         Ok(lines) => lines,
-        Err(error) => return Some(plain(&error.to_string())),
+        Err(error) => return Some(sanitize(&error.to_string())),
     };
     let mut lines = lines.with_max_line_bytes(MAX_LINE_BYTES);
     loop {
@@ -119,9 +119,9 @@ async fn forward(
             Ok(Some(line)) => line,
             Ok(None) => return Some("stream ended".into()),
             Err(ClientError::Http(error)) => {
-                return Some(plain(&format!("connection lost: {error}")));
+                return Some(sanitize(&format!("connection lost: {error}")));
             }
-            Err(error) => return Some(plain(&error.to_string())),
+            Err(error) => return Some(sanitize(&error.to_string())),
         };
         // A program other than the daemon could send anything, including terminal control
         // sequences.

@@ -13,7 +13,7 @@ use sonard::{
     acoustics::Sensor,
     api::{LinkState, Trouble},
     config::{Keys, Mode},
-    daemon::{Asked, Handle, Journal, OptionalOutputs, Order, Resources, Settings, prepare},
+    daemon::{QueuedScans, Handle, Journal, OptionalOutputs, Order, Resources, Settings, prepare},
     host_gpio::HostGpio,
     link,
     mock::Pace,
@@ -163,7 +163,7 @@ fn play(rig: &mut Rig, runtime: &Runtime, daemon: &Handle, switches: &Switches) 
 
 fn start() -> Order {
     let request = uuid::Uuid::new_v4();
-    Order::Start(Asked { request, scans: None, plan: None, pose: None })
+    Order::Start(QueuedScans { request, scans: None, plan: None, pose: None })
 }
 
 #[test]

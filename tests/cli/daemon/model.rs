@@ -47,7 +47,7 @@ fn preview_matches_the_prediction() {
     for (expected, reading) in expected.pings.iter().zip(taken["pings"].as_array().expect("them")) {
         let said = reading["sim"]["range_m"].as_f64();
         assert_eq!(expected.ping.range_m, said, "{reading}");
-        let verdict = serde_json::to_value(expected.beside.verdict).expect("JSON");
+        let verdict = serde_json::to_value(expected.annotations.verdict).expect("JSON");
         assert!(verdict.is_string() && verdict != "unexplained", "{verdict}");
     }
     // What it leaves out is as in the next scan.

@@ -11,7 +11,7 @@ use std::{
 use sonard::{
     acoustics::{Air, Sensor, TofNoise},
     link::{self, Pty},
-    mock::{BoardSettings, FaultPlan, MockBoard, MockPort, Note, Pace, Soundings, World},
+    mock::{BoardSettings, FaultPlan, MockBoard, MockPort, Note, Pace, EchoTable, World},
     model::{Options, Simulator},
     scene::{Scene, shipped},
 };
@@ -39,7 +39,7 @@ pub const OPTIONS: [&str; 14] = [
 pub struct Rig {
     link: PathBuf,
     runtime: Runtime,
-    soundings: Soundings,
+    soundings: EchoTable,
     pace: Pace,
     boots: u16,
     plugged: Option<(oneshot::Sender<()>, JoinHandle<std::io::Result<()>>)>,
@@ -116,18 +116,18 @@ impl Rig {
 }
 
 /// Echoes of the simple room at its pose `fig9`.
-pub fn simple_room() -> Soundings {
+pub fn simple_room() -> EchoTable {
     let text = shipped::text("simple-room").expect("a shipped scene");
     let scene = Scene::from_json(text).expect("a scene");
     let pose = scene.pose("fig9").expect("its pose");
     let sensor = Sensor::preset("senscomp-6500").expect("a preset");
     let simulator = Simulator::new(Arc::new(scene), sensor, Air::default(), Options::default());
-    Soundings::from_model(&simulator.expect("a simulator"), &pose, 400, 0.0).expect("few paths")
+    EchoTable::from_model(&simulator.expect("a simulator"), &pose, 400, 0.0).expect("few paths")
 }
 
 /// A board without noise and with 400 steps per revolution.
 pub fn board(
-    soundings: Soundings,
+    soundings: EchoTable,
     boot: u16,
     faults: FaultPlan,
     seed: u64,

@@ -2,14 +2,14 @@
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use sonard_interpret::compare::JudgedPing;
+use sonard_interpret::compare::AnnotatedPing;
 use sonard_records::{PeakLine, PlanPoint, TraceLine};
 
 /// Measurement and prediction of one beam.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Beam {
     /// Reading, with its classification against the model.
-    pub reading: JudgedPing,
+    pub reading: AnnotatedPing,
     /// Measured echoes, in order of arrival.
     pub echoes: Vec<Echo>,
     /// Propagation path of the reading, or else of the predicted echo, as a polyline in the floor

@@ -2,7 +2,7 @@
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use sonard_inverse::{Doubt, Mode};
+use sonard_inverse::{Misfit, PoseMode};
 use uuid::Uuid;
 
 /// Estimated poses of a scan.
@@ -11,9 +11,9 @@ pub struct Location {
     /// Id of the scan.
     pub scan: Uuid,
     /// Poses that fit the readings, most probable first.
-    pub poses: Vec<Mode>,
+    pub poses: Vec<PoseMode>,
     /// Possible causes if no pose fits the readings.
-    pub doubts: Vec<Doubt>,
+    pub doubts: Vec<Misfit>,
     /// Reason why the scan could not be located.
     pub lacks: Option<String>,
 }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use jiff::Timestamp;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use sonard_interpret::compare::JudgedPing;
+use sonard_interpret::compare::AnnotatedPing;
 use sonard_model::geometry::Pose;
 use sonard_records::{Event, Ping, Provenance, ScanEnd, ScanPlan, ScanStart, Session};
 use uuid::Uuid;
@@ -39,7 +39,7 @@ pub struct WholeScan {
     /// Start record of the scan.
     pub start: Option<ScanStart>,
     /// Annotated readings, in the order of the log.
-    pub pings: Vec<JudgedPing>,
+    pub pings: Vec<AnnotatedPing>,
     /// Events during the scan.
     pub events: Vec<Event>,
     /// End of the scan; `null` for one that is in progress or was interrupted.

@@ -84,7 +84,7 @@ impl SensorOrder {
     ///
     /// # Errors
     /// Unknown preset, or a value out of range.
-    pub fn applied_to(&self, sensor: &Sensor) -> Result<Sensor, SensorError> {
+    pub fn apply_to(&self, sensor: &Sensor) -> Result<Sensor, SensorError> {
         self.check()?;
         let mut changed = match &self.preset {
             Some(name) => Sensor::preset(name)?,
@@ -111,7 +111,7 @@ impl SensorOrder {
     fn check(&self) -> Result<(), SensorError> {
         let within = |field, value: Option<f64>, from: f64, to: f64, expected| match value {
             Some(value) if !(from..=to).contains(&value) => {
-                Err(SensorError::Figure { field, value, expected })
+                Err(SensorError::OutOfRange { field, value, expected })
             }
             _ => Ok(()),
         };
@@ -147,14 +147,14 @@ mod tests {
     fn omitted_fields_keep_their_values() {
         let mut before = Sensor::preset("senscomp-6500").expect("a preset");
         before.integration_us = 17.0;
-        let changed = order(r#"{"threshold": 0.05}"#).applied_to(&before).expect("valid");
+        let changed = order(r#"{"threshold": 0.05}"#).apply_to(&before).expect("valid");
         assert_eq!((changed.threshold, changed.integration_us), (0.05, 17.0));
         let other = order(r#"{"preset": "hc-sr04", "blanking_us": 400}"#);
-        let other = other.applied_to(&before).expect("valid");
+        let other = other.apply_to(&before).expect("valid");
         let preset = Sensor::preset("hc-sr04").expect("a preset");
         assert_eq!(other, Sensor { blanking_us: 400.0, ..preset });
         let gain = order(r#"{"gain": {"kind": "compensating"}}"#);
-        assert_eq!(gain.applied_to(&before).map(|sensor| sensor.gain), Ok(Gain::default()));
+        assert_eq!(gain.apply_to(&before).map(|sensor| sensor.gain), Ok(Gain::default()));
     }
 
     #[test]
@@ -176,7 +176,7 @@ mod tests {
             ),
             (r#"{"gain": {"kind": "steps", "steps": []}}"#, "count"),
         ] {
-            let error = order(text).applied_to(&before).expect_err(text).to_string();
+            let error = order(text).apply_to(&before).expect_err(text).to_string();
             assert!(error.contains(part), "{text}: {error}");
         }
     }

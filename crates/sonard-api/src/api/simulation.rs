@@ -51,7 +51,7 @@ impl SimulationReport {
 
     /// Returns `true` if the readings belong to rangers with the ids and bearings of `array`.
     #[must_use]
-    pub fn is_of(&self, array: &RangerArray) -> bool {
+    pub fn matches_array(&self, array: &RangerArray) -> bool {
         let reported = self.readings.iter().map(|reading| (&reading.id, reading.bearing_deg));
         reported.eq(array.rangers.iter().map(|ranger| (&ranger.id, ranger.bearing_deg)))
     }

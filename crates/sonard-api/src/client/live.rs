@@ -65,7 +65,7 @@ impl LiveLines {
             let frame = match timeout_at(deadline, self.body.frame()).await {
                 Ok(frame) => frame,
                 Err(_) => {
-                    timeout(GRACE, self.body.frame()).await.map_err(|_| ClientError::Silent)?
+                    timeout(GRACE, self.body.frame()).await.map_err(|_| ClientError::IdleTimeout)?
                 }
             };
             self.deadline = None;

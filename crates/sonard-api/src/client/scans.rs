@@ -49,10 +49,10 @@ pub enum ScansError {
     Client(#[from] ClientError),
     /// End of the stream of records.
     #[error("the daemon ended the stream of records")]
-    Ended,
+    StreamEnded,
     /// Request cancelled by a stop, or scan that can't be taken, with the daemon's reason.
     #[error("{}", .0.as_deref().unwrap_or("the daemon was stopped"))]
-    Forgotten(Option<String>),
+    Cancelled(Option<String>),
     /// Dropped readings can't be fetched, because the daemon has begun another scan.
     #[error("readings were dropped, and the daemon has begun another scan")]
     Overtaken,
@@ -64,10 +64,10 @@ impl ScansError {
     pub fn help(&self) -> String {
         match self {
             Self::Client(error) => error.help(),
-            Self::Ended => {
+            Self::StreamEnded => {
                 "check the log messages of the daemon (`journalctl -u sonard`); received records are kept".into()
             }
-            Self::Forgotten(_) => "request the scans again".into(),
+            Self::Cancelled(_) => "request the scans again".into(),
             Self::Overtaken => "the daemon's log contains them: GET /v1/logs".into(),
         }
     }
@@ -78,7 +78,7 @@ impl RequestedScans {
     ///
     /// # Errors
     /// No response, or a rejected request.
-    pub async fn ask(client: Client, request: &ScanRequest) -> Result<Self, ClientError> {
+    pub async fn request(client: Client, request: &ScanRequest) -> Result<Self, ClientError> {
         // The subscription precedes the request, so no record is missed.
         let stream = client.live("/v1/live/records").await?;
         let Started { request, .. } = client.post("/v1/start", request).await?;
@@ -113,7 +113,7 @@ impl RequestedScans {
             }
             match timeout(CHECK_INTERVAL, self.stream.next()).await.map(Result::transpose) {
                 Ok(Some(line)) => self.line = Some(line?),
-                Ok(None) => return Err(ScansError::Ended),
+                Ok(None) => return Err(ScansError::StreamEnded),
                 Err(_elapsed) if self.current.is_none() => self.check_pending().await?,
                 Err(_elapsed) => {}
             }
@@ -128,7 +128,7 @@ impl RequestedScans {
         let body = CancelRequest { request: self.request };
         match self.client.post::<Accepted>("/v1/cancel", &body).await {
             // A rejection means that the request has ended already.
-            Ok(_) | Err(ClientError::Refused { .. }) => {}
+            Ok(_) | Err(ClientError::Rejected { .. }) => {}
             Err(error) => return Err(error.into()),
         }
         let mut records = Vec::new();
@@ -228,7 +228,7 @@ impl RequestedScans {
         let is_unknown = status.scanning.requested == 0 && status.scan.is_none();
         self.unknown_checks = if is_unknown { self.unknown_checks + 1 } else { 0 };
         if self.unknown_checks == 2 {
-            Err(ScansError::Forgotten(self.reason.take()))
+            Err(ScansError::Cancelled(self.reason.take()))
         } else {
             Ok(())
         }

@@ -2,14 +2,14 @@
 
 use std::fmt::Write as _;
 
-use super::schema::{Form, Key};
+use super::schema::{ConfigForm, Key};
 
 const WIDTH: usize = 98;
 
 /// Returns the configuration file with every key and its documentation; for `sonard run` the text
 /// of `config/sonard.toml`.
 #[must_use]
-pub fn document<K: Form>() -> String {
+pub fn document<K: ConfigForm>() -> String {
     let mut text = K::HEAD.to_owned();
     for section in K::sections() {
         text += "\n";
@@ -24,9 +24,9 @@ pub fn document<K: Form>() -> String {
 }
 
 fn write_key(text: &mut String, key: &Key) {
-    comment(text, &format!("{} {}", key.about, key.kind.wanted()));
+    comment(text, &format!("{} {}", key.about, key.kind.description()));
     let _ = match (&key.default, &key.example) {
-        (Some(default), _) if key.default_yields => {
+        (Some(default), _) if key.is_soft_default => {
             writeln!(text, "# {} = {}", key.name, key.kind.toml(default))
         }
         (Some(default), _) => writeln!(text, "{} = {}", key.name, key.kind.toml(default)),
@@ -46,7 +46,7 @@ fn comment(text: &mut String, about: &str) {
 #[cfg(test)]
 mod tests {
     use super::{
-        super::{Keys, Kind, Layers, sections},
+        super::{Keys, ValueKind, ConfigLayers, sections},
         *,
     };
 
@@ -67,7 +67,7 @@ mod tests {
 
     #[test]
     fn shipped_file_equals_defaults() {
-        let read = |text: &str| Layers::new().file("sonard.toml", text).and_then(Layers::keys);
+        let read = |text: &str| ConfigLayers::new().with_file("sonard.toml", text).and_then(ConfigLayers::into_keys);
         assert_eq!(read(SHIPPED), Ok(Keys::default()));
         // Comments of the form `key = value` are turned into settings.
         let sets = |line: &str| line.split_once(" = ").is_some_and(|(key, _)| !key.contains(' '));
@@ -82,10 +82,10 @@ mod tests {
 
     #[test]
     fn shipped_file_omits_soft_defaults() {
-        let read = Layers::<Keys>::new().file("sonard.toml", SHIPPED).expect("valid");
+        let read = ConfigLayers::<Keys>::new().with_file("sonard.toml", SHIPPED).expect("valid");
         let mut yielding = Vec::new();
         for section in sections() {
-            for key in section.keys.iter().filter(|key| key.default_yields) {
+            for key in section.keys.iter().filter(|key| key.is_soft_default) {
                 yielding.push(format!("{}.{}", section.name, key.name));
                 assert_eq!(read.origin(&section.name, &key.name), None, "{}", key.name);
             }
@@ -102,7 +102,7 @@ mod tests {
             assert!(!section.about.is_empty() && !section.keys.is_empty(), "{}", section.name);
             for key in &section.keys {
                 assert!(key.about.ends_with('.'), "{}.{}: {}", section.name, key.name, key.about);
-                if let Kind::Number { min, max } | Kind::Whole { min, max } = key.kind {
+                if let ValueKind::Number { min, max } | ValueKind::Whole { min, max } = key.kind {
                     assert!(min > f64::MIN && max < f64::MAX, "{}.{}", section.name, key.name);
                 }
                 assert!(key.default.is_some() || key.example.is_some(), "{}", key.name);

@@ -4,7 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Maximum length of a robot's name, characters.
-pub const MAX_ROBOT_NAME: usize = 64;
+pub const MAX_ROBOT_NAME_CHARS: usize = 64;
 
 /// Name of this robot, and other robots to poll.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -40,18 +40,18 @@ impl Default for FleetKeys {
 #[must_use]
 pub fn is_robot_name(text: &str) -> bool {
     let fits = |byte: u8| byte.is_ascii_alphanumeric() || b"-_.".contains(&byte);
-    (1..=MAX_ROBOT_NAME).contains(&text.len())
+    (1..=MAX_ROBOT_NAME_CHARS).contains(&text.len())
         && text.bytes().all(fits)
         && text.bytes().any(|byte| byte != b'.')
 }
 
 /// Derives a robot's name from a host name; `None` if it has no letter or digit.
 #[must_use]
-pub fn robot_name_of_host(host: &str) -> Option<String> {
+pub fn robot_name_from_host(host: &str) -> Option<String> {
     let fits = |letter: char| letter.is_ascii_alphanumeric() || "-_.".contains(letter);
     let name: String = host
         .chars()
-        .take(MAX_ROBOT_NAME)
+        .take(MAX_ROBOT_NAME_CHARS)
         .map(|letter| if fits(letter) { letter } else { '-' })
         .collect();
     name.bytes().any(|byte| byte.is_ascii_alphanumeric()).then_some(name)
@@ -74,17 +74,17 @@ mod tests {
 
     #[test]
     fn host_name_is_sanitized() {
-        assert_eq!(robot_name_of_host("kiwi.lan").as_deref(), Some("kiwi.lan"));
-        assert_eq!(robot_name_of_host("my robot/1").as_deref(), Some("my-robot-1"));
-        assert_eq!(robot_name_of_host(""), None);
-        assert_eq!(robot_name_of_host("(none)").as_deref(), Some("-none-"));
-        assert_eq!(robot_name_of_host("\u{3042}\u{3044}"), None);
+        assert_eq!(robot_name_from_host("kiwi.lan").as_deref(), Some("kiwi.lan"));
+        assert_eq!(robot_name_from_host("my robot/1").as_deref(), Some("my-robot-1"));
+        assert_eq!(robot_name_from_host(""), None);
+        assert_eq!(robot_name_from_host("(none)").as_deref(), Some("-none-"));
+        assert_eq!(robot_name_from_host("\u{3042}\u{3044}"), None);
     }
 
     proptest! {
         #[test]
         fn derived_names_are_valid(host in "\\PC{0,80}") {
-            if let Some(name) = robot_name_of_host(&host) {
+            if let Some(name) = robot_name_from_host(&host) {
                 prop_assert!(is_robot_name(&name), "{name}");
             }
         }

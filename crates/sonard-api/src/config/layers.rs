@@ -10,14 +10,14 @@ use toml::{Value, de::DeTable};
 
 use super::{
     keys::Keys,
-    schema::{Form, Key, Kind, Section},
+    schema::{ConfigForm, Key, ValueKind, Section},
 };
 
 pub use error::{ConfigError, Origin};
 
 /// Configuration values collected so far; later sources override earlier ones.
 #[derive(Debug, Clone, Default)]
-pub struct Layers<K = Keys> {
+pub struct ConfigLayers<K = Keys> {
     given: BTreeMap<(String, String), (Value, Origin)>,
     form: PhantomData<K>,
 }
@@ -26,13 +26,13 @@ pub struct Layers<K = Keys> {
 static FREE_KEY: Key = Key {
     name: String::new(),
     about: String::new(),
-    kind: Kind::Any,
+    kind: ValueKind::Scalar,
     default: None,
     example: None,
-    default_yields: false,
+    is_soft_default: false,
 };
 
-impl<K: Form> Layers<K> {
+impl<K: ConfigForm> ConfigLayers<K> {
     /// Configuration with default values only.
     #[must_use]
     pub const fn new() -> Self {
@@ -43,7 +43,7 @@ impl<K: Form> Layers<K> {
     ///
     /// # Errors
     /// Invalid TOML, or an unknown section or key.
-    pub fn file(mut self, name: &str, text: &str) -> Result<Self, ConfigError> {
+    pub fn with_file(mut self, name: &str, text: &str) -> Result<Self, ConfigError> {
         let at = |span: Range<usize>| position(name, text, span.start);
         let syntax = |error: toml::de::Error| ConfigError {
             origin: at(error.span().unwrap_or(0..0)),
@@ -80,7 +80,7 @@ impl<K: Form> Layers<K> {
     ///
     /// # Errors
     /// Unknown key, or a value of the wrong type.
-    pub fn environment(
+    pub fn with_environment(
         mut self,
         variables: impl IntoIterator<Item = (String, String)>,
     ) -> Result<Self, ConfigError> {
@@ -99,7 +99,7 @@ impl<K: Form> Layers<K> {
     ///
     /// # Errors
     /// Wrong syntax, unknown key, or a value of the wrong type.
-    pub fn option(mut self, option: &str, setting: &str) -> Result<Self, ConfigError> {
+    pub fn with_option(mut self, option: &str, setting: &str) -> Result<Self, ConfigError> {
         let origin = Origin::Option(format!("{option} {setting}"));
         let parts =
             setting.split_once('=').and_then(|(name, value)| Some((name.split_once('.')?, value)));
@@ -119,7 +119,7 @@ impl<K: Form> Layers<K> {
     ///
     /// # Errors
     /// First value that is of the wrong type or out of range.
-    pub fn keys(self) -> Result<K, ConfigError> {
+    pub fn into_keys(self) -> Result<K, ConfigError> {
         let mut table = toml::Table::new();
         for ((section, name), (value, origin)) in &self.given {
             let key = find_key::<K>(section, name, origin)?;
@@ -155,17 +155,17 @@ impl<K: Form> Layers<K> {
     ) -> Result<(), ConfigError> {
         let key = find_key::<K>(section, name, &origin)?;
         let value = match key.kind {
-            Kind::Text | Kind::Choice(_) => Value::String(text.to_owned()),
-            Kind::Texts => {
+            ValueKind::Text | ValueKind::Choice(_) => Value::String(text.to_owned()),
+            ValueKind::Texts => {
                 let parts = text.split(',').map(str::trim).filter(|part| !part.is_empty());
                 Value::Array(parts.map(|part| Value::String(part.to_owned())).collect())
             }
-            Kind::Any => toml::from_str::<toml::Table>(&format!("value = {text}"))
+            ValueKind::Scalar => toml::from_str::<toml::Table>(&format!("value = {text}"))
                 .ok()
                 .and_then(|mut table| table.remove("value"))
                 .unwrap_or_else(|| Value::String(text.to_owned())),
             // "nan" is a number in TOML; the range check rejects it.
-            Kind::Number { .. } | Kind::Whole { .. } | Kind::Switch => {
+            ValueKind::Number { .. } | ValueKind::Whole { .. } | ValueKind::Switch => {
                 toml::from_str::<toml::Table>(&format!("value = {text}"))
                     .ok()
                     .and_then(|mut table| table.remove("value"))
@@ -181,7 +181,7 @@ impl<K: Form> Layers<K> {
     }
 }
 
-fn check_section<K: Form>(name: &str, origin: &Origin) -> Result<(), ConfigError> {
+fn check_section<K: ConfigForm>(name: &str, origin: &Origin) -> Result<(), ConfigError> {
     if K::sections().iter().any(|known| known.name == name) {
         return Ok(());
     }
@@ -193,7 +193,7 @@ fn check_section<K: Form>(name: &str, origin: &Origin) -> Result<(), ConfigError
     })
 }
 
-fn find_key<K: Form>(
+fn find_key<K: ConfigForm>(
     section: &str,
     name: &str,
     origin: &Origin,
@@ -228,22 +228,22 @@ fn validate(
 ) -> Result<Option<Value>, ConfigError> {
     let reject = || Err(invalid(section, name, key, &value.to_string(), origin.clone()));
     match (&key.kind, value) {
-        (Kind::Number { min, max }, Value::Float(number)) if (*min..=*max).contains(number) => {}
-        (Kind::Number { min, max } | Kind::Whole { min, max }, Value::Integer(number))
+        (ValueKind::Number { min, max }, Value::Float(number)) if (*min..=*max).contains(number) => {}
+        (ValueKind::Number { min, max } | ValueKind::Whole { min, max }, Value::Integer(number))
             if (*min..=*max).contains(&(*number as f64)) => {}
-        (Kind::Switch, Value::Boolean(_)) => {}
-        (Kind::Choice(words), Value::String(word)) if words.contains(word) => {}
-        (Kind::Choice(words), Value::String(word)) => {
+        (ValueKind::Switch, Value::Boolean(_)) => {}
+        (ValueKind::Choice(words), Value::String(word)) if words.contains(word) => {}
+        (ValueKind::Choice(words), Value::String(word)) => {
             let error = invalid(section, name, key, &value.to_string(), origin.clone());
             return Err(ConfigError { help: suggest(word, words, "choices"), ..error });
         }
-        (Kind::Text, Value::String(text)) if text.is_empty() && key.default.is_none() => {
+        (ValueKind::Text, Value::String(text)) if text.is_empty() && key.default.is_none() => {
             return Ok(None);
         }
-        (Kind::Text, Value::String(_)) => {}
-        (Kind::Any, Value::String(_) | Value::Integer(_) | Value::Boolean(_)) => {}
-        (Kind::Any, Value::Float(number)) if number.is_finite() => {}
-        (Kind::Texts, Value::Array(texts)) if texts.iter().all(Value::is_str) => {}
+        (ValueKind::Text, Value::String(_)) => {}
+        (ValueKind::Scalar, Value::String(_) | Value::Integer(_) | Value::Boolean(_)) => {}
+        (ValueKind::Scalar, Value::Float(number)) if number.is_finite() => {}
+        (ValueKind::Texts, Value::Array(texts)) if texts.iter().all(Value::is_str) => {}
         _ => return reject(),
     }
     Ok(Some(value.clone()))
@@ -253,7 +253,7 @@ fn invalid(section: &str, name: &str, key: &Key, value: &str, origin: Origin) ->
     ConfigError {
         origin,
         message: format!("{section}.{name} is {value}"),
-        help: format!("expected: {}", key.kind.wanted()),
+        help: format!("expected: {}", key.kind.description()),
     }
 }
 
@@ -274,7 +274,7 @@ mod tests {
     use proptest::prelude::*;
 
     fn read(text: &str) -> Result<Keys, ConfigError> {
-        Layers::new().file("s.toml", text)?.keys()
+        ConfigLayers::new().with_file("s.toml", text)?.into_keys()
     }
 
     #[test]
@@ -282,11 +282,11 @@ mod tests {
         let file = "[plan]\nstep_deg = 3.6\nto_deg = 90\n[device]\nport = \"a\"\n";
         let environment =
             [("SONARD_PLAN_STEP_DEG", "1.8"), ("SONARD_DEVICE_PORT", "b"), ("HOME", "x")];
-        let keys = Layers::<Keys>::new()
-            .file("s.toml", file)
-            .and_then(|l| l.environment(environment.map(|(k, v)| (k.into(), v.into()))))
-            .and_then(|l| l.option("--set", "device.port=c"))
-            .and_then(Layers::keys)
+        let keys = ConfigLayers::<Keys>::new()
+            .with_file("s.toml", file)
+            .and_then(|l| l.with_environment(environment.map(|(k, v)| (k.into(), v.into()))))
+            .and_then(|l| l.with_option("--set", "device.port=c"))
+            .and_then(ConfigLayers::into_keys)
             .expect("valid");
         assert_eq!((keys.plan.step_deg, keys.plan.to_deg), (1.8, 90.0));
         assert_eq!(keys.device.port.as_deref(), Some("c"));
@@ -327,7 +327,7 @@ mod tests {
             ("plan.step_deg=fast", "plan.step_deg is fast"),
             ("plan.hosts=1", "unknown key hosts"),
         ] {
-            let error = Layers::<Keys>::new().option("--set", option).expect_err(option);
+            let error = ConfigLayers::<Keys>::new().with_option("--set", option).expect_err(option);
             assert!(error.to_string().contains(message), "{error}");
         }
     }
@@ -340,9 +340,9 @@ mod tests {
 
     #[test]
     fn list_from_comma_separated_text() {
-        let keys = Layers::<Keys>::new()
-            .option("--set", "server.hosts=robot, robot.local")
-            .and_then(Layers::keys);
+        let keys = ConfigLayers::<Keys>::new()
+            .with_option("--set", "server.hosts=robot, robot.local")
+            .and_then(ConfigLayers::into_keys);
         assert_eq!(keys.expect("reads").server.hosts, ["robot", "robot.local"]);
     }
 

@@ -75,7 +75,7 @@ impl Default for MqttKeys {
 
 /// Address of an MQTT broker.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Broker {
+pub struct BrokerAddress {
     /// Host name or address; an IPv6 address in brackets.
     pub host: String,
     /// TCP port.
@@ -84,7 +84,7 @@ pub struct Broker {
     pub tls: bool,
 }
 
-impl Broker {
+impl BrokerAddress {
     /// Parses `mqtt://HOST:PORT` or `mqtts://HOST:PORT`; the port is optional.
     ///
     /// # Errors
@@ -142,7 +142,7 @@ impl MqttKeys {
             ));
         }
         let broker =
-            Broker::parse(url).map_err(|help| ("broker", format!("mqtt.broker is {url}"), help))?;
+            BrokerAddress::parse(url).map_err(|help| ("broker", format!("mqtt.broker is {url}"), help))?;
         if !is_prefix(&self.topic) {
             let help = "names separated by /, without +, # and spaces: sonard, or plant/sonard";
             return Err(("topic", format!("mqtt.topic is {:?}", self.topic), help.into()));
@@ -150,7 +150,7 @@ impl MqttKeys {
         self.check_secrets(&broker)
     }
 
-    fn check_secrets(&self, broker: &Broker) -> Result<(), Fault> {
+    fn check_secrets(&self, broker: &BrokerAddress) -> Result<(), Fault> {
         if self.password_file.is_some() && self.user.is_none() {
             let help = "set mqtt.user";
             return Err(("password_file", "a password without a user".into(), help.into()));
@@ -185,7 +185,7 @@ mod tests {
 
     #[test]
     fn broker_urls() {
-        let read = |url| Broker::parse(url).map(|b| (b.host, b.port, b.tls));
+        let read = |url| BrokerAddress::parse(url).map(|b| (b.host, b.port, b.tls));
         assert_eq!(read("mqtt://broker.local:1884"), Ok(("broker.local".into(), 1884, false)));
         assert_eq!(read("mqtts://10.0.0.7/"), Ok(("10.0.0.7".into(), 8883, true)));
         assert_eq!(read("mqtt://[::1]:1883"), Ok(("[::1]".into(), 1883, false)));

@@ -5,7 +5,7 @@ use std::net::Ipv4Addr;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use sonard_export::{
-    Settings,
+    ExportSettings,
     dds::{is_name, is_namespace},
 };
 
@@ -95,10 +95,10 @@ impl Default for RosKeys {
 impl RosKeys {
     /// Returns the settings of the message encoder.
     #[must_use]
-    pub fn messages(&self) -> Settings {
+    pub fn message_settings(&self) -> ExportSettings {
         use sonard_export::{Distribution, Profile};
 
-        Settings {
+        ExportSettings {
             profile: match self.profile {
                 RosProfile::Rep117 => Profile::Rep117,
                 RosProfile::Nav2 => Profile::Nav2,

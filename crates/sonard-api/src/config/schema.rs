@@ -10,7 +10,7 @@ use super::keys::Keys;
 
 /// Type of a configuration file. Sections, keys, texts, ranges and defaults are derived from its
 /// JSON schema.
-pub trait Form: Default + Serialize + DeserializeOwned + JsonSchema {
+pub trait ConfigForm: Default + Serialize + DeserializeOwned + JsonSchema {
     /// Comment at the head of the documented configuration file.
     const HEAD: &'static str;
     /// Command that prints the documented configuration file.
@@ -21,7 +21,7 @@ pub trait Form: Default + Serialize + DeserializeOwned + JsonSchema {
     fn sections() -> &'static [Section];
 }
 
-impl Form for Keys {
+impl ConfigForm for Keys {
     const HEAD: &'static str = "\
 # Configuration of `sonard run`, with every key and its default. Defaults that depend on how the
 # daemon is started are commented out, and so are examples of keys without a default. Environment
@@ -62,19 +62,19 @@ pub struct Key {
     /// Description of the key.
     pub about: String,
     /// Type and range of values.
-    pub kind: Kind,
+    pub kind: ValueKind,
     /// Default value; `None` for an optional key.
     pub default: Option<Value>,
     /// Example value, for keys without a default.
     pub example: Option<Value>,
     /// `true` if the environment of the program (such as systemd's directories) overrides the
     /// default. A documented file must not set such a default.
-    pub default_yields: bool,
+    pub is_soft_default: bool,
 }
 
 /// Type and range of a key's values.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Kind {
+pub enum ValueKind {
     /// Finite number within a range.
     Number {
         /// Minimum of the range, inclusive.
@@ -98,13 +98,13 @@ pub enum Kind {
     /// List of strings.
     Texts,
     /// String, number or boolean.
-    Any,
+    Scalar,
 }
 
-impl Kind {
+impl ValueKind {
     /// Describes the allowed values in a sentence.
     #[must_use]
-    pub fn wanted(&self) -> String {
+    pub fn description(&self) -> String {
         match self {
             Self::Number { min, max } => format!("Number, {min} to {max}."),
             Self::Whole { min, max } => format!("Whole number, {min} to {max}."),
@@ -112,7 +112,7 @@ impl Kind {
             Self::Choice(words) => format!("One of \"{}\".", words.join("\", \"")),
             Self::Text => "Text.".into(),
             Self::Texts => "List of texts.".into(),
-            Self::Any => "Text, number, true or false.".into(),
+            Self::Scalar => "Text, number, true or false.".into(),
         }
     }
 
@@ -135,7 +135,7 @@ pub fn sections() -> &'static [Section] {
 
 /// Reads the sections of a configuration type from its schema.
 #[must_use]
-pub fn read_sections<K: Form>() -> Vec<Section> {
+pub fn read_sections<K: ConfigForm>() -> Vec<Section> {
     let generator = SchemaSettings::default().with(|s| s.inline_subschemas = true);
     let schema = generator.into_generator().into_root_schema_for::<K>().to_value();
     let defaults = serde_json::to_string(&K::default()).unwrap_or_default();
@@ -169,14 +169,14 @@ fn read_key(name: &str, of: &Value) -> Key {
         kind: kind(of),
         default: of.get("default").filter(|default| !default.is_null()).cloned(),
         example: of.get("examples").and_then(|examples| examples.get(0)).cloned(),
-        default_yields: of.get(DEFAULT_YIELDS).is_some_and(|yields| *yields == true),
+        is_soft_default: of.get(DEFAULT_YIELDS).is_some_and(|yields| *yields == true),
     }
 }
 
-fn kind(of: &Value) -> Kind {
+fn kind(of: &Value) -> ValueKind {
     let words = choices(of);
     if !words.is_empty() {
-        return Kind::Choice(words);
+        return ValueKind::Choice(words);
     }
     let bound = |name, otherwise| of.get(name).and_then(Value::as_f64).unwrap_or(otherwise);
     let (min, max) = (bound("minimum", f64::MIN), bound("maximum", f64::MAX));
@@ -186,11 +186,11 @@ fn kind(of: &Value) -> Kind {
         None => false,
     };
     match () {
-        () if is("integer") => Kind::Whole { min, max },
-        () if is("number") => Kind::Number { min, max },
-        () if is("boolean") => Kind::Switch,
-        () if is("array") => Kind::Texts,
-        () => Kind::Text,
+        () if is("integer") => ValueKind::Whole { min, max },
+        () if is("number") => ValueKind::Number { min, max },
+        () if is("boolean") => ValueKind::Switch,
+        () if is("array") => ValueKind::Texts,
+        () => ValueKind::Text,
     }
 }
 

@@ -7,7 +7,7 @@ use thiserror::Error;
 
 use crate::{
     client::{Client, Endpoint},
-    config::{FleetKeys, Keys, Layers, is_robot_name},
+    config::{FleetKeys, Keys, ConfigLayers, is_robot_name},
 };
 
 /// Maximum number of daemons in a fleet.
@@ -19,14 +19,14 @@ pub struct Member {
     /// Expected name of the robot, if configured.
     pub robot: Option<String>,
     /// Address of the daemon.
-    pub place: Endpoint,
+    pub endpoint: Endpoint,
     /// File with the access token of the daemon.
     pub token_file: Option<PathBuf>,
 }
 
 /// Daemon of a fleet with its client.
 #[derive(Clone)]
-pub struct Asked {
+pub struct PolledDaemon {
     /// Address and expected robot.
     pub member: Member,
     /// Client of the daemon.
@@ -68,19 +68,19 @@ impl Member {
                    plain HTTP, so use a tunnel on untrusted networks"
                     .into(),
         })?;
-        Ok(Self { robot: robot.map(str::to_owned), place, token_file: None })
+        Ok(Self { robot: robot.map(str::to_owned), endpoint: place, token_file: None })
     }
 
     /// Daemon at a unix socket.
     #[must_use]
-    pub const fn at_socket(path: PathBuf) -> Self {
-        Self { robot: None, place: Endpoint::Socket(path), token_file: None }
+    pub const fn from_socket(path: PathBuf) -> Self {
+        Self { robot: None, endpoint: Endpoint::Socket(path), token_file: None }
     }
 
     /// Address for display.
     #[must_use]
     pub fn address(&self) -> String {
-        match &self.place {
+        match &self.endpoint {
             Endpoint::Socket(path) => path.display().to_string(),
             Endpoint::Address(address) => address.clone(),
         }
@@ -88,8 +88,8 @@ impl Member {
 
     /// URL of the live page, if the daemon is reached over TCP.
     #[must_use]
-    pub fn page(&self) -> Option<String> {
-        match &self.place {
+    pub fn page_url(&self) -> Option<String> {
+        match &self.endpoint {
             Endpoint::Socket(_) => None,
             Endpoint::Address(address) => Some(format!("http://{address}/")),
         }
@@ -112,11 +112,11 @@ fn read_endpoint(text: &str) -> Option<Endpoint> {
 ///
 /// # Errors
 /// Invalid address, unreadable file, or too many daemons.
-pub fn members_of(keys: &FleetKeys) -> Result<Vec<Member>, MemberError> {
+pub fn members_from_keys(keys: &FleetKeys) -> Result<Vec<Member>, MemberError> {
     let mut members = Vec::new();
     for text in &keys.daemons {
         let member = Member::parse(text)?;
-        let token_file = match member.place {
+        let token_file = match member.endpoint {
             Endpoint::Address(_) => keys.token_file.as_ref().map(PathBuf::from),
             Endpoint::Socket(_) => None,
         };
@@ -125,7 +125,7 @@ pub fn members_of(keys: &FleetKeys) -> Result<Vec<Member>, MemberError> {
     if let Some(file) = &keys.file {
         members.extend(read_members(Path::new(file))?);
     }
-    check_all(members)
+    check_members(members)
 }
 
 /// Structure of a file with a list of daemons.
@@ -164,10 +164,10 @@ pub fn read_members(path: &Path) -> Result<Vec<Member>, MemberError> {
     let table: toml::Table =
         toml::from_str(&text).map_err(|error| invalid(at_line(&text, &error)))?;
     if table.contains_key("fleet") && !table.contains_key("daemon") {
-        let layers = Layers::<Keys>::new().file(&name.to_string(), &text);
-        let keys = layers.and_then(Layers::keys).map_err(|error| invalid(error.to_string()))?;
+        let layers = ConfigLayers::<Keys>::new().with_file(&name.to_string(), &text);
+        let keys = layers.and_then(ConfigLayers::into_keys).map_err(|error| invalid(error.to_string()))?;
         // `fleet.file` is ignored here: a file that names itself would recurse for ever.
-        let members = members_of(&FleetKeys { file: None, ..keys.fleet })?;
+        let members = members_from_keys(&FleetKeys { file: None, ..keys.fleet })?;
         return if members.is_empty() {
             Err(invalid("fleet.daemons is empty".into()))
         } else {
@@ -183,7 +183,7 @@ pub fn read_members(path: &Path) -> Result<Vec<Member>, MemberError> {
     if members.is_empty() {
         return Err(invalid("no daemon in the list".into()));
     }
-    check_all(members)
+    check_members(members)
 }
 
 /// Converts an entry of the file. A relative path of a token file is relative to the list.
@@ -212,7 +212,7 @@ fn at_line(text: &str, error: &toml::de::Error) -> String {
 ///
 /// # Errors
 /// Too many daemons, or duplicates.
-pub fn check_all(members: Vec<Member>) -> Result<Vec<Member>, MemberError> {
+pub fn check_members(members: Vec<Member>) -> Result<Vec<Member>, MemberError> {
     if members.len() > MAX_MEMBERS {
         return Err(MemberError {
             message: format!("{} daemons", members.len()),
@@ -220,7 +220,7 @@ pub fn check_all(members: Vec<Member>) -> Result<Vec<Member>, MemberError> {
         });
     }
     for (i, member) in members.iter().enumerate() {
-        if members.iter().take(i).any(|before| before.place == member.place) {
+        if members.iter().take(i).any(|before| before.endpoint == member.endpoint) {
             return Err(MemberError {
                 message: format!("{} is listed twice", member.address()),
                 help: "list each daemon once".into(),
@@ -247,10 +247,10 @@ mod tests {
         let parsed = |text: &str| Member::parse(text).expect(text);
         let kiwi = parsed("kiwi=http://10.0.0.7:8765/");
         assert_eq!(kiwi.robot.as_deref(), Some("kiwi"));
-        assert_eq!(kiwi.place, Endpoint::Address("10.0.0.7:8765".into()));
-        assert_eq!(kiwi.page().as_deref(), Some("http://10.0.0.7:8765/"));
-        assert_eq!(parsed("[::1]:80").place, Endpoint::Address("[::1]:80".into()));
-        assert_eq!(parsed("/run/a=b.sock"), Member::at_socket("/run/a=b.sock".into()));
+        assert_eq!(kiwi.endpoint, Endpoint::Address("10.0.0.7:8765".into()));
+        assert_eq!(kiwi.page_url().as_deref(), Some("http://10.0.0.7:8765/"));
+        assert_eq!(parsed("[::1]:80").endpoint, Endpoint::Address("[::1]:80".into()));
+        assert_eq!(parsed("/run/a=b.sock"), Member::from_socket("/run/a=b.sock".into()));
         for bad in ["", "kiwi", "kiwi=", "a b=h:1", "h:port", "h:99999", "https://h:1", "h:1/x"] {
             assert!(Member::parse(bad).is_err(), "{bad}");
         }
@@ -270,7 +270,7 @@ mod tests {
         );
         let members = members.expect("valid");
         assert_eq!(members[0].token_file.as_deref(), Some(&*folder.path().join("kiwi.token")));
-        assert_eq!(members[1].place, Endpoint::Socket("/run/s".into()));
+        assert_eq!(members[1].endpoint, Endpoint::Socket("/run/s".into()));
         let members = read("[fleet]\ndaemons = [\"a=h:1\", \"/s\"]\ntoken_file = \"/t\"\n");
         let members = members.expect("valid");
         assert_eq!(members[0].token_file.as_deref(), Some(Path::new("/t")));

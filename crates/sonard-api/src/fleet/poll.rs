@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use tokio::time::timeout;
 
-use super::Unheard;
+use super::PollError;
 use crate::{
     api::{Health, Status},
     client::{Client, ClientError},
@@ -17,7 +17,7 @@ const MAX_BYTES: usize = 256 * 1024;
 
 /// Status and health reported by a daemon.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Told {
+pub struct DaemonReport {
     /// Status of the daemon.
     pub status: Status,
     /// Health of the daemon.
@@ -28,7 +28,7 @@ pub struct Told {
 ///
 /// # Errors
 /// No valid response within the time limit.
-pub async fn ask(client: &Client) -> Result<Told, Unheard> {
+pub async fn poll(client: &Client) -> Result<DaemonReport, PollError> {
     let both = async {
         tokio::try_join!(
             client.get_json_within("/v1/status", MAX_BYTES),
@@ -37,24 +37,24 @@ pub async fn ask(client: &Client) -> Result<Told, Unheard> {
     };
     let response = timeout(POLL_TIMEOUT, both).await;
     let timed_out =
-        || Unheard::Silent(format!("no response within {:.1} s", POLL_TIMEOUT.as_secs_f64()));
+        || PollError::NoResponse(format!("no response within {:.1} s", POLL_TIMEOUT.as_secs_f64()));
     let (status, health) =
         response.map_err(|_| timed_out())?.map_err(|error| poll_error(&error))?;
-    Ok(Told { status, health })
+    Ok(DaemonReport { status, health })
 }
 
-fn poll_error(error: &ClientError) -> Unheard {
+fn poll_error(error: &ClientError) -> PollError {
     let message = error.to_string();
     match error {
-        ClientError::NoDaemon { .. } | ClientError::TooSlow => Unheard::Silent(message),
+        ClientError::NoDaemon { .. } | ClientError::Timeout => PollError::NoResponse(message),
         // A connection that breaks before any response is a daemon that exits; a response that is
         // not HTTP comes from another program.
-        ClientError::Http(error) if !error.is_parse() => Unheard::Silent(message),
-        ClientError::Refused { status, .. }
+        ClientError::Http(error) if !error.is_parse() => PollError::NoResponse(message),
+        ClientError::Rejected { status, .. }
             if [401, 403, 429].contains(&status.as_u16()) || status.is_server_error() =>
         {
-            Unheard::Refusing(message)
+            PollError::Rejected(message)
         }
-        _ => Unheard::Strange(message),
+        _ => PollError::Invalid(message),
     }
 }

@@ -5,25 +5,25 @@ use std::time::Duration;
 use jiff::{SignedDuration, Timestamp};
 use uuid::Uuid;
 
-use super::{Member, Told, Unheard, judge};
+use super::{Member, DaemonReport, PollError, observe};
 use crate::api::{Fleet, FleetPicture, FleetReport, FleetRobot, FleetScan, FleetState};
 
 /// States of all robots, in the order of the configuration.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Roll {
+pub struct Registry {
     robots: Vec<FleetRobot>,
     /// Monotonic time of the last report of each robot.
     reported_at: Vec<Option<Duration>>,
 }
 
-impl Roll {
+impl Registry {
     /// Creates a registry of robots that have not been polled yet.
     #[must_use]
     pub fn new<'a>(members: impl IntoIterator<Item = &'a Member>, now: Timestamp) -> Self {
         let robot = |member: &Member| FleetRobot {
             robot: member.robot.clone(),
             address: member.address(),
-            page: member.page(),
+            page: member.page_url(),
             state: FleetState::Unasked,
             since: now,
             heard: None,
@@ -37,19 +37,19 @@ impl Roll {
 
     /// Updates a robot with the result of a poll. `now` is the wall clock time, `at` a monotonic
     /// time. An unknown `number` has no effect.
-    pub fn take(
+    pub fn update(
         &mut self,
         number: usize,
-        polled: Result<Told, Unheard>,
+        polled: Result<DaemonReport, PollError>,
         (now, at): (Timestamp, Duration),
     ) {
         let Some(robot) = self.robots.get_mut(number) else { return };
-        let seen = judge(robot.robot.as_deref(), polled);
+        let seen = observe(robot.robot.as_deref(), polled);
         if robot.state != seen.state {
             (robot.state, robot.since) = (seen.state, now);
         }
         robot.wrong = seen.wrong;
-        if let Some(report) = seen.told {
+        if let Some(report) = seen.report {
             robot.heard = Some(now);
             if let Some(reported_at) = self.reported_at.get_mut(number) {
                 *reported_at = Some(at);
@@ -64,13 +64,13 @@ impl Roll {
 
     /// Returns the last scan of a robot if its picture is missing.
     #[must_use]
-    pub fn lacks_picture(&self, number: usize) -> Option<Uuid> {
+    pub fn missing_picture(&self, number: usize) -> Option<Uuid> {
         let last = self.robots.get(number)?.report.as_ref()?.last_scan.as_ref()?;
         last.picture.is_none().then_some(last.scan)
     }
 
     /// Stores the picture of a scan, if it is still the robot's last one.
-    pub fn show(&mut self, number: usize, scan: Uuid, picture: FleetPicture) {
+    pub fn set_picture(&mut self, number: usize, scan: Uuid, picture: FleetPicture) {
         let robot = self.robots.get_mut(number);
         let last = robot.and_then(|robot| robot.report.as_mut()?.last_scan.as_mut());
         if let Some(last) = last.filter(|last| last.scan == scan) {
@@ -106,14 +106,14 @@ impl Roll {
     }
 }
 
-fn fleet_report(report: &Told, before: Option<FleetScan>, now: Timestamp) -> FleetReport {
+fn fleet_report(report: &DaemonReport, before: Option<FleetScan>, now: Timestamp) -> FleetReport {
     let (status, health) = (&report.status, &report.health);
     let age =
         status.last_reading_age_s.and_then(|age_s| SignedDuration::try_from_secs_f64(age_s).ok());
     let picture_of =
         |scan: Uuid| before.filter(|before| before.scan == scan).and_then(|before| before.picture);
     FleetReport {
-        sonard: super::plain(&status.sonard),
+        sonard: super::sanitize(&status.sonard),
         link: status.link.state,
         provenance: status.provenance,
         scan: status.scan.clone(),
@@ -142,7 +142,7 @@ mod tests {
     use serde_json::json;
 
     /// Report of a healthy robot with a last scan.
-    fn sample_report(robot: &str, scan: Uuid) -> Told {
+    fn sample_report(robot: &str, scan: Uuid) -> DaemonReport {
         let zero = Timestamp::UNIX_EPOCH;
         let sensor = Sensor::preset("senscomp-6500").expect("a preset");
         let status = json!({
@@ -168,7 +168,7 @@ mod tests {
             "scans": ScanTotals::default(), "clock": ClockReport::default(), "fit": fit,
             "reading_lateness_s": null,
         });
-        Told {
+        DaemonReport {
             status: serde_json::from_value(status).expect("a status"),
             health: serde_json::from_value(health).expect("a health"),
         }
@@ -180,9 +180,9 @@ mod tests {
         walls_m: Vec::new(),
     };
 
-    fn registry() -> Roll {
+    fn registry() -> Registry {
         let members = ["kiwi=/a", "/b"].map(|text| Member::parse(text).expect("a place"));
-        Roll::new(&members, Timestamp::UNIX_EPOCH)
+        Registry::new(&members, Timestamp::UNIX_EPOCH)
     }
 
     fn at(second: i64) -> Timestamp {
@@ -194,7 +194,7 @@ mod tests {
         (at(second.cast_signed()), Duration::from_secs(second))
     }
 
-    fn state(registry: &Roll, number: usize) -> (FleetState, Timestamp) {
+    fn state(registry: &Registry, number: usize) -> (FleetState, Timestamp) {
         let robot = &registry.fleet(Duration::ZERO).robots[number];
         (robot.state, robot.since)
     }
@@ -202,49 +202,49 @@ mod tests {
     #[test]
     fn outage_starts_at_first_failure() {
         let mut registry = registry();
-        let gone = || Err(Unheard::Silent("no response".into()));
-        registry.take(0, gone(), now(2));
-        registry.take(0, gone(), now(4));
+        let gone = || Err(PollError::NoResponse("no response".into()));
+        registry.update(0, gone(), now(2));
+        registry.update(0, gone(), now(4));
         assert_eq!(state(&registry, 0), (FleetState::Silent, at(2)));
         assert_eq!(state(&registry, 1), (FleetState::Unasked, at(0)));
-        registry.take(0, Err(Unheard::Refusing("no".into())), now(6));
+        registry.update(0, Err(PollError::Rejected("no".into())), now(6));
         assert_eq!(state(&registry, 0), (FleetState::Refusing, at(6)));
-        registry.take(7, gone(), now(8));
-        registry.show(7, Uuid::nil(), PICTURE);
+        registry.update(7, gone(), now(8));
+        registry.set_picture(7, Uuid::nil(), PICTURE);
         assert_eq!(registry.fleet(Duration::ZERO).robots.len(), 2);
     }
 
     #[test]
     fn first_name_becomes_expected() {
         let (mut registry, scan) = (registry(), Uuid::from_u128(1));
-        registry.take(1, Ok(sample_report("mango", scan)), now(10));
+        registry.update(1, Ok(sample_report("mango", scan)), now(10));
         let mango = registry.fleet(Duration::ZERO).robots[1].clone();
         assert_eq!((mango.state, mango.robot.as_deref()), (FleetState::Well, Some("mango")));
         let report = mango.report.expect("a report");
         assert_eq!((report.last_reading, report.last_reading_age_s), (Some(at(8)), Some(2.0)));
         assert_eq!(mango.wrong, ["2 beams missing in the last scan"]);
-        registry.take(1, Ok(sample_report("papaya", scan)), now(12));
+        registry.update(1, Ok(sample_report("papaya", scan)), now(12));
         let mango = registry.fleet(Duration::ZERO).robots[1].clone();
         assert_eq!((mango.state, mango.since), (FleetState::OtherRobot, at(12)));
         assert_eq!((mango.robot.as_deref(), mango.heard), (Some("mango"), Some(at(10))));
         assert_eq!(mango.report, Some(report));
-        registry.take(1, Ok(sample_report("a/b", scan)), now(14));
+        registry.update(1, Ok(sample_report("a/b", scan)), now(14));
         assert_eq!(state(&registry, 1), (FleetState::Strange, at(14)));
     }
 
     #[test]
     fn age_ignores_wall_clock_steps() {
         let (mut registry, scan) = (registry(), Uuid::from_u128(1));
-        let age_s = |registry: &Roll, at| registry.fleet(Duration::from_secs(at)).robots[0].heard_s;
+        let age_s = |registry: &Registry, at| registry.fleet(Duration::from_secs(at)).robots[0].heard_s;
         assert_eq!(age_s(&registry, 5), None);
-        registry.take(
+        registry.update(
             0,
             Ok(sample_report("kiwi", scan)),
             (at(1_800_000_000), Duration::from_secs(10)),
         );
-        registry.take(
+        registry.update(
             0,
-            Err(Unheard::Silent("no response".into())),
+            Err(PollError::NoResponse("no response".into())),
             (at(5), Duration::from_secs(12)),
         );
         assert_eq!(age_s(&registry, 17), Some(7.0));
@@ -254,23 +254,23 @@ mod tests {
     #[test]
     fn picture_belongs_to_its_scan() {
         let (mut registry, scan, next) = (registry(), Uuid::from_u128(1), Uuid::from_u128(2));
-        registry.take(0, Ok(sample_report("kiwi", scan)), now(1));
-        assert_eq!(registry.lacks_picture(0), Some(scan));
-        registry.show(0, next, PICTURE);
-        assert_eq!(registry.lacks_picture(0), Some(scan), "that was another scan");
-        registry.show(0, scan, PICTURE);
-        registry.take(0, Ok(sample_report("kiwi", scan)), now(3));
-        assert_eq!(registry.lacks_picture(0), None);
-        registry.take(0, Ok(sample_report("kiwi", next)), now(5));
-        assert_eq!(registry.lacks_picture(0), Some(next));
+        registry.update(0, Ok(sample_report("kiwi", scan)), now(1));
+        assert_eq!(registry.missing_picture(0), Some(scan));
+        registry.set_picture(0, next, PICTURE);
+        assert_eq!(registry.missing_picture(0), Some(scan), "that was another scan");
+        registry.set_picture(0, scan, PICTURE);
+        registry.update(0, Ok(sample_report("kiwi", scan)), now(3));
+        assert_eq!(registry.missing_picture(0), None);
+        registry.update(0, Ok(sample_report("kiwi", next)), now(5));
+        assert_eq!(registry.missing_picture(0), Some(next));
     }
 
     #[test]
     fn duplicate_names_are_flagged_once() {
         let (mut registry, scan) = (registry(), Uuid::from_u128(1));
-        registry.take(1, Ok(sample_report("kiwi", scan)), now(1));
-        registry.take(0, Ok(sample_report("kiwi", scan)), now(1));
-        registry.take(0, Ok(sample_report("kiwi", scan)), now(3));
+        registry.update(1, Ok(sample_report("kiwi", scan)), now(1));
+        registry.update(0, Ok(sample_report("kiwi", scan)), now(1));
+        registry.update(0, Ok(sample_report("kiwi", scan)), now(3));
         let wrong: Vec<_> =
             registry.fleet(Duration::ZERO).robots.iter().map(|robot| robot.wrong.len()).collect();
         assert_eq!(wrong, [1, 2]);
@@ -285,13 +285,13 @@ mod tests {
         let members: Vec<_> = (0..crate::fleet::MAX_MEMBERS)
             .map(|i| Member::parse(&format!("{i:0>64}={}:1", "h".repeat(60))).expect("a place"))
             .collect();
-        let mut registry = Roll::new(&members, at(0));
+        let mut registry = Registry::new(&members, at(0));
         for (number, member) in members.iter().enumerate() {
             let mut report = sample_report(member.robot.as_deref().expect("a name"), Uuid::nil());
             report.status.sonard = "\u{1F916}".repeat(10_000);
             report.health.reasons = vec!["\u{1F916}\"\\".repeat(10_000); 100];
             report.health.healthy = false;
-            registry.take(number, Ok(report), now(1));
+            registry.update(number, Ok(report), now(1));
         }
         let bytes = serde_json::to_vec(&registry.fleet(Duration::ZERO)).expect("JSON").len();
         assert!(bytes < 100_000, "{bytes} bytes without pictures");

@@ -1,6 +1,6 @@
 //! Derives a robot's state from the result of a poll. Pure.
 
-use super::Told;
+use super::DaemonReport;
 
 use crate::{api::FleetState, config::is_robot_name};
 
@@ -11,35 +11,35 @@ const MAX_CHARACTERS: usize = 120;
 
 /// Failed poll of a daemon, with the error message.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Unheard {
+pub enum PollError {
     /// No response within the time limit.
-    Silent(String),
+    NoResponse(String),
     /// Rejected request.
-    Refusing(String),
+    Rejected(String),
     /// Response that is not that of a daemon of this version.
-    Strange(String),
+    Invalid(String),
 }
 
 /// State of a robot derived from one poll.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Seen {
+pub struct Observation {
     /// Observed state.
     pub state: FleetState,
     /// Problems, sanitized for display.
     pub wrong: Vec<String>,
     /// Report of the daemon, if it belongs to the expected robot.
-    pub told: Option<Told>,
+    pub report: Option<DaemonReport>,
 }
 
 /// Derives the state of the robot `expected` from the result of a poll.
 #[must_use]
-pub fn judge(expected: Option<&str>, polled: Result<Told, Unheard>) -> Seen {
-    let without = |state, why: &str| Seen { state, wrong: vec![plain(why)], told: None };
+pub fn observe(expected: Option<&str>, polled: Result<DaemonReport, PollError>) -> Observation {
+    let without = |state, why: &str| Observation { state, wrong: vec![sanitize(why)], report: None };
     let report = match polled {
         Ok(report) => report,
-        Err(Unheard::Silent(why)) => return without(FleetState::Silent, &why),
-        Err(Unheard::Refusing(why)) => return without(FleetState::Refusing, &why),
-        Err(Unheard::Strange(why)) => return without(FleetState::Strange, &why),
+        Err(PollError::NoResponse(why)) => return without(FleetState::Silent, &why),
+        Err(PollError::Rejected(why)) => return without(FleetState::Refusing, &why),
+        Err(PollError::Invalid(why)) => return without(FleetState::Strange, &why),
     };
     let robot = &report.status.robot;
     if !is_robot_name(robot) {
@@ -55,16 +55,16 @@ pub fn judge(expected: Option<&str>, polled: Result<Told, Unheard>) -> Seen {
     let rejected = status.configuration.error.as_ref();
     let rejected = rejected.map(|error| format!("configuration rejected: {error}"));
     let wrong = health.reasons.iter().cloned().chain(missing_beams).chain(rejected);
-    Seen {
+    Observation {
         state: if health.healthy { FleetState::Well } else { FleetState::NotWell },
-        wrong: wrong.take(MAX_REASONS).map(|why| plain(&why)).collect(),
-        told: Some(report),
+        wrong: wrong.take(MAX_REASONS).map(|why| sanitize(&why)).collect(),
+        report: Some(report),
     }
 }
 
 /// Sanitizes a text from another host: one line of limited length, without control characters.
 #[must_use]
-pub fn plain(text: &str) -> String {
+pub fn sanitize(text: &str) -> String {
     let text = text.split_whitespace().collect::<Vec<_>>().join(" ");
     let shown =
         text.chars().map(|character| if is_plain(character) { character } else { '\u{fffd}' });
@@ -88,21 +88,21 @@ mod tests {
 
     #[test]
     fn remote_texts_are_sanitized() {
-        assert_eq!(plain("a\x1b[2Jb\n c"), "a\u{fffd}[2Jb c");
-        assert_eq!(plain("x\u{202e}y"), "x\u{fffd}y");
-        let long = plain(&"<html>".repeat(1000));
+        assert_eq!(sanitize("a\x1b[2Jb\n c"), "a\u{fffd}[2Jb c");
+        assert_eq!(sanitize("x\u{202e}y"), "x\u{fffd}y");
+        let long = sanitize(&"<html>".repeat(1000));
         assert_eq!(long.chars().count(), MAX_CHARACTERS);
     }
 
     #[test]
     fn failed_polls() {
         for (error, state) in [
-            (Unheard::Silent("gone".into()), FleetState::Silent),
-            (Unheard::Refusing("no".into()), FleetState::Refusing),
-            (Unheard::Strange("html".into()), FleetState::Strange),
+            (PollError::NoResponse("gone".into()), FleetState::Silent),
+            (PollError::Rejected("no".into()), FleetState::Refusing),
+            (PollError::Invalid("html".into()), FleetState::Strange),
         ] {
-            let seen = judge(Some("kiwi"), Err(error));
-            assert_eq!((seen.state, seen.wrong.len(), seen.told), (state, 1, None));
+            let seen = observe(Some("kiwi"), Err(error));
+            assert_eq!((seen.state, seen.wrong.len(), seen.report), (state, 1, None));
         }
     }
 }

@@ -12,7 +12,7 @@ use tokio::{
 };
 use uuid::Uuid;
 
-use super::{Asked, Roll, Told, Unheard, ask, picture};
+use super::{PolledDaemon, Registry, DaemonReport, PollError, poll, picture};
 use crate::{api::FleetPicture, client::Client};
 
 /// Poll interval.
@@ -25,7 +25,7 @@ const MAX_TRIES: u8 = 3;
 
 /// Message of a polling task.
 enum PollMessage {
-    Report(Box<Result<Told, Unheard>>),
+    Report(Box<Result<DaemonReport, PollError>>),
     Picture(Uuid, Option<FleetPicture>),
 }
 
@@ -40,15 +40,15 @@ struct PictureRequest {
 /// Polls daemons every 2 s while a receiver of the result exists: a [`Fleet`](crate::api::Fleet) as
 /// JSON, serialized once for all receivers. Must be called within a tokio runtime.
 #[must_use]
-pub fn watch(fleet: Vec<Asked>, supervisor: &Supervisor) -> watch::Receiver<Bytes> {
-    let registry = Roll::new(fleet.iter().map(|daemon| &daemon.member), Timestamp::now());
+pub fn watch_fleet(fleet: Vec<PolledDaemon>, supervisor: &Supervisor) -> watch::Receiver<Bytes> {
+    let registry = Registry::new(fleet.iter().map(|daemon| &daemon.member), Timestamp::now());
     let (sender, receiver) = watch::channel(serialize(&registry, Duration::ZERO));
     drop(supervisor.spawn_finite(Task::Fleet, run(registry, fleet, sender)));
     receiver
 }
 
 /// Updates and publishes the registry until all receivers are dropped.
-async fn run(mut registry: Roll, fleet: Vec<Asked>, sender: watch::Sender<Bytes>) {
+async fn run(mut registry: Registry, fleet: Vec<PolledDaemon>, sender: watch::Sender<Bytes>) {
     let began = Instant::now();
     let (send, mut messages) = mpsc::channel(fleet.len().max(1));
     // The polling tasks end with this task.
@@ -72,14 +72,14 @@ async fn run(mut registry: Roll, fleet: Vec<Asked>, sender: watch::Sender<Bytes>
         };
         match message {
             PollMessage::Report(report) => {
-                registry.take(number, *report, (Timestamp::now(), began.elapsed()));
+                registry.update(number, *report, (Timestamp::now(), began.elapsed()));
             }
             PollMessage::Picture(scan, picture) => {
                 request.is_pending = false;
-                picture.into_iter().for_each(|picture| registry.show(number, scan, picture));
+                picture.into_iter().for_each(|picture| registry.set_picture(number, scan, picture));
             }
         }
-        if let Some(scan) = request.next(registry.lacks_picture(number)) {
+        if let Some(scan) = request.next(registry.missing_picture(number)) {
             let (client, send) = (client.clone(), send.clone());
             let permits = Arc::clone(&fetching);
             polling.spawn(async move {
@@ -119,14 +119,14 @@ async fn poll_forever(number: usize, client: Client, send: mpsc::Sender<(usize, 
     ticks.set_missed_tick_behavior(MissedTickBehavior::Delay);
     loop {
         ticks.tick().await;
-        let report = Box::new(ask(&client).await);
+        let report = Box::new(poll(&client).await);
         if send.send((number, PollMessage::Report(report))).await.is_err() {
             return;
         }
     }
 }
 
-fn serialize(registry: &Roll, at: Duration) -> Bytes {
+fn serialize(registry: &Registry, at: Duration) -> Bytes {
     serde_json::to_vec(&registry.fleet(at)).unwrap_or_default().into()
 }
 

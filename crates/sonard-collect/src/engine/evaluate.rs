@@ -8,34 +8,34 @@ use tokio::time::sleep;
 
 use super::{
     super::{
-        Action, Device, Entry, Figures, Finding, Halt, Outcome, Patience, Sealed, Slot, Take,
-        Watcher, check, is_cut,
+        Action, ScanDevice, JournalEntry, ScanFigures, CheckFinding, CollectError, ScanOutcome, RetrySchedule, SealedFile, Slot, ScanAttempt,
+        Observer, check_figures, ended_early,
         pose_source::answered,
-        record_scan::{self, Taken},
-        verdict,
+        record_scan::{self, RecordedScan},
+        strongest_action,
     },
     Collector, Next,
 };
 
-impl<D: Device, W: Watcher> Collector<D, W> {
+impl<D: ScanDevice, W: Observer> Collector<D, W> {
     /// Accepts a scan or sets it aside, and returns the next step.
     pub(super) async fn evaluate(
         &mut self,
         slot: Slot,
-        (taken, change_c): (Taken, Option<f64>),
-    ) -> Result<Next, Halt> {
-        let Taken { view, lost, stopped, wall_s, gone: _ } = taken;
+        (taken, change_c): (RecordedScan, Option<f64>),
+    ) -> Result<Next, CollectError> {
+        let RecordedScan { view, failure: lost, stopped, wall_s, needs_reconnect: _ } = taken;
         let lost = lost
             .or_else(|| view.as_ref().filter(|view| lacks_readings(view)).map(|_| ranger_lost()));
-        let Some(view) = view.filter(|view| !is_cut(view) && is_measured(view)) else {
+        let Some(view) = view.filter(|view| !ended_early(view) && is_measured(view)) else {
             return self.set_aside_incomplete(slot, lost, stopped).await;
         };
         if lost.is_none() {
             self.losses = None;
         }
-        let figures = Figures::from_scan(&view, change_c);
-        let findings = check(&figures, &self.plan.keys.checks);
-        let mut action = verdict(&findings);
+        let figures = ScanFigures::from_scan(&view, change_c);
+        let findings = check_figures(&figures, &self.plan.keys.checks);
+        let mut action = strongest_action(&findings);
         self.report_findings(slot, &figures, &findings);
         if action == Action::Ask {
             action = self.prompt_action().await?;
@@ -46,7 +46,7 @@ impl<D: Device, W: Watcher> Collector<D, W> {
         }
         let reason = rejection_reason(&findings);
         let scan = Some((&view, figures, wall_s));
-        self.set_aside(slot, scan, Outcome::Refused, findings, &reason)?;
+        self.set_aside(slot, scan, ScanOutcome::Refused, findings, &reason)?;
         if self.interrupts.happened() {
             return Ok(Next::Stop("stopped on request".into()));
         }
@@ -63,9 +63,9 @@ impl<D: Device, W: Watcher> Collector<D, W> {
     async fn set_aside_incomplete(
         &mut self,
         slot: Slot,
-        lost: Option<Halt>,
+        lost: Option<CollectError>,
         stopped: bool,
-    ) -> Result<Next, Halt> {
+    ) -> Result<Next, CollectError> {
         let stop = match (self.interrupts.happened(), stopped) {
             (true, _) => Some("stopped on request"),
             (_, true) => Some("the daemon was stopped by another client"),
@@ -73,9 +73,9 @@ impl<D: Device, W: Watcher> Collector<D, W> {
         };
         // Scans lost before their first reading are removed, or repeated losses would fill the
         // folder.
-        if stop.is_some() || read(&self.folder.taking(slot))?.is_some_and(|view| is_measured(&view))
+        if stop.is_some() || read(&self.folder.draft_path(slot))?.is_some_and(|view| is_measured(&view))
         {
-            self.set_aside(slot, None, Outcome::Cut, Vec::new(), "incomplete")?;
+            self.set_aside(slot, None, ScanOutcome::Cut, Vec::new(), "incomplete")?;
         } else {
             self.folder.discard(slot)?;
         }
@@ -87,18 +87,18 @@ impl<D: Device, W: Watcher> Collector<D, W> {
 
     /// Waits after a lost scan, longer after each one. A loss is independent of the pose, so it
     /// does not count as a retake; the collection ends after `collection.patience_s`.
-    async fn wait_for_ranger(&mut self, lost: Halt) -> Result<Next, Halt> {
+    async fn wait_for_ranger(&mut self, lost: CollectError) -> Result<Next, CollectError> {
         let patience = Duration::from_secs_f64(self.plan.keys.collection.patience_s);
-        let losses = self.losses.get_or_insert_with(|| Patience::with_losses(patience));
-        let (Halt::Failed { .. }, Some(wait)) = (&lost, losses.next_wait()) else {
+        let losses = self.losses.get_or_insert_with(|| RetrySchedule::for_lost_scans(patience));
+        let (CollectError::Failed { .. }, Some(wait)) = (&lost, losses.next_delay()) else {
             return match lost {
                 // The daemon dropped the request.
-                Halt::Stopped(reason) => Ok(Next::Stop(reason)),
+                CollectError::Stopped(reason) => Ok(Next::Stop(reason)),
                 lost => Err(lost),
             };
         };
         self.watcher
-            .say(&format!("ranger lost; repeating the scan in {} s: {lost}", wait.as_secs()));
+            .message(&format!("ranger lost; repeating the scan in {} s: {lost}", wait.as_secs()));
         tokio::select! {
             () = sleep(wait) => Ok(Next::Continue),
             () = self.interrupts.clone().wait() => Ok(Next::Stop("stopped on request".into())),
@@ -107,59 +107,59 @@ impl<D: Device, W: Watcher> Collector<D, W> {
 
     /// Recovers the scans of an interrupted run: complete ones are evaluated like new scans, others
     /// are set aside.
-    pub(super) fn recover_scans(&mut self) -> Result<(), Halt> {
+    pub(super) fn recover_scans(&mut self) -> Result<(), CollectError> {
         // The rename accepts a scan; its journal entry may be missing after a crash.
         let history = self.journal.history();
         let journaled: HashSet<Slot> = history.accepted().map(|take| take.slot).collect();
         let scans = self.folder.scans()?;
         for slot in scans.into_iter().filter(|slot| !journaled.contains(slot)) {
-            let sealed = self.folder.sealed(slot)?;
+            let sealed = self.folder.digest_of_scan(slot)?;
             let path = self.folder.root().join(&sealed.file);
             let Some(view) = read(&path)? else { continue };
-            let figures = Figures::from_scan(&view, None);
-            let findings = check(&figures, &self.plan.keys.checks);
-            let entry = take_entry(slot, Some(&view), Outcome::Accepted, sealed, figures, findings);
+            let figures = ScanFigures::from_scan(&view, None);
+            let findings = check_figures(&figures, &self.plan.keys.checks);
+            let entry = take_entry(slot, Some(&view), ScanOutcome::Accepted, sealed, figures, findings);
             self.append(entry)?;
         }
-        for slot in self.folder.left_over()? {
-            let path = self.folder.taking(slot);
+        for slot in self.folder.interrupted_scans()? {
+            let path = self.folder.draft_path(slot);
             // Opening removes an incomplete last line.
             LogWriter::open(&path).and_then(LogWriter::close)?;
-            let view = read(&path)?.filter(|view| !is_cut(view));
-            let done = self.folder.sealed(slot).is_ok();
+            let view = read(&path)?.filter(|view| !ended_early(view));
+            let done = self.folder.digest_of_scan(slot).is_ok();
             match view {
                 Some(view) if !done => self.evaluate_recovered(slot, &view)?,
                 _ => {
                     let reason = "the program ended during the scan";
-                    self.set_aside(slot, None, Outcome::Cut, Vec::new(), reason)?;
+                    self.set_aside(slot, None, ScanOutcome::Cut, Vec::new(), reason)?;
                 }
             }
         }
         Ok(())
     }
 
-    fn evaluate_recovered(&mut self, slot: Slot, view: &ScanView) -> Result<(), Halt> {
-        let figures = Figures::from_scan(view, None);
-        let findings = check(&figures, &self.plan.keys.checks);
-        if verdict(&findings) == Action::Note {
+    fn evaluate_recovered(&mut self, slot: Slot, view: &ScanView) -> Result<(), CollectError> {
+        let figures = ScanFigures::from_scan(view, None);
+        let findings = check_figures(&figures, &self.plan.keys.checks);
+        if strongest_action(&findings) == Action::Note {
             return self.accept(slot, view, figures, findings, None);
         }
         let reason = rejection_reason(&findings);
         let wall_s = f64::NAN;
-        self.set_aside(slot, Some((view, figures, wall_s)), Outcome::Refused, findings, &reason)
+        self.set_aside(slot, Some((view, figures, wall_s)), ScanOutcome::Refused, findings, &reason)
     }
 
     fn accept(
         &mut self,
         slot: Slot,
         view: &ScanView,
-        figures: Figures,
-        findings: Vec<Finding>,
+        figures: ScanFigures,
+        findings: Vec<CheckFinding>,
         wall_s: Option<f64>,
-    ) -> Result<(), Halt> {
+    ) -> Result<(), CollectError> {
         let sealed = self.folder.accept(slot)?;
-        let mut entry = take_entry(slot, Some(view), Outcome::Accepted, sealed, figures, findings);
-        if let Entry::Take(take) = &mut entry {
+        let mut entry = take_entry(slot, Some(view), ScanOutcome::Accepted, sealed, figures, findings);
+        if let JournalEntry::Take(take) = &mut entry {
             take.wall_s = wall_s;
         }
         self.append(entry)?;
@@ -172,12 +172,12 @@ impl<D: Device, W: Watcher> Collector<D, W> {
     fn set_aside(
         &mut self,
         slot: Slot,
-        scan: Option<(&ScanView, Figures, f64)>,
-        outcome: Outcome,
-        findings: Vec<Finding>,
+        scan: Option<(&ScanView, ScanFigures, f64)>,
+        outcome: ScanOutcome,
+        findings: Vec<CheckFinding>,
         reason: &str,
-    ) -> Result<(), Halt> {
-        let path = self.folder.taking(slot);
+    ) -> Result<(), CollectError> {
+        let path = self.folder.draft_path(slot);
         record_scan::mark_rejected(&path, reason)?;
         let sealed = self.folder.set_aside(slot)?;
         let stored = match scan {
@@ -186,19 +186,19 @@ impl<D: Device, W: Watcher> Collector<D, W> {
         };
         let view = scan.map(|(view, ..)| view).or(stored.as_ref());
         let figures = scan.map_or_else(
-            || view.map(|view| Figures::from_scan(view, None)).unwrap_or_default(),
+            || view.map(|view| ScanFigures::from_scan(view, None)).unwrap_or_default(),
             |(_, figures, _)| figures,
         );
         let mut entry = take_entry(slot, view, outcome, sealed, figures, findings);
-        if let Entry::Take(take) = &mut entry {
+        if let JournalEntry::Take(take) = &mut entry {
             take.wall_s = scan.map(|(.., wall_s)| wall_s).filter(|wall_s| wall_s.is_finite());
-            take.cut = (outcome == Outcome::Cut).then(|| reason.to_owned());
+            take.cut = (outcome == ScanOutcome::Cut).then(|| reason.to_owned());
         }
         self.append(entry)
     }
 
     /// Counts a rejection; the scan is given up once `collection.retakes` are used.
-    fn count_rejection(&mut self, slot: Slot) -> Result<Next, Halt> {
+    fn count_rejection(&mut self, slot: Slot) -> Result<Next, CollectError> {
         let rejections = self.rejections.entry(slot).or_default();
         *rejections += 1;
         if *rejections > self.plan.keys.collection.retakes {
@@ -207,8 +207,8 @@ impl<D: Device, W: Watcher> Collector<D, W> {
         Ok(Next::Continue)
     }
 
-    async fn prompt_action(&mut self) -> Result<Action, Halt> {
-        self.watcher.rest();
+    async fn prompt_action(&mut self) -> Result<Action, CollectError> {
+        self.watcher.measuring_paused();
         loop {
             let question = "keep it, retake it or stop? [k/r/s]";
             let answer = answered(&mut self.watcher, question, &self.interrupts).await?;
@@ -222,11 +222,11 @@ impl<D: Device, W: Watcher> Collector<D, W> {
     }
 
     /// Reports a line about a scan and a line about each finding.
-    fn report_findings(&self, slot: Slot, figures: &Figures, findings: &[Finding]) {
+    fn report_findings(&self, slot: Slot, figures: &ScanFigures, findings: &[CheckFinding]) {
         let percent = |share: Option<f64>| {
             share.map_or_else(|| "-".into(), |share| format!("{:.0} %", 100.0 * share))
         };
-        self.watcher.say(&format!(
+        self.watcher.message(&format!(
             "pose {} ({}), repeat {}: {} of {} beams, {} of the echoes agree",
             slot.pose,
             self.pose(slot.pose).label(),
@@ -242,7 +242,7 @@ impl<D: Device, W: Watcher> Collector<D, W> {
                 Action::Ask => "prompting",
                 Action::Stop => "stopping",
             };
-            self.watcher.say(&format!("  {}: {consequence}", finding.detail));
+            self.watcher.message(&format!("  {}: {consequence}", finding.detail));
         }
     }
 }
@@ -257,15 +257,15 @@ fn lacks_readings(view: &ScanView) -> bool {
     view.pings.iter().any(|ping| ping.status == PingStatus::LinkLost)
 }
 
-fn ranger_lost() -> Halt {
-    Halt::failed(
+fn ranger_lost() -> CollectError {
+    CollectError::failed(
         "the ranger was lost during the scan",
         "check its cable and supply with `sonard doctor --port PORT`",
     )
 }
 
 /// Details of all findings that reject a scan.
-fn rejection_reason(findings: &[Finding]) -> String {
+fn rejection_reason(findings: &[CheckFinding]) -> String {
     let details: Vec<_> = findings
         .iter()
         .filter(|finding| finding.action != Action::Note)
@@ -277,13 +277,13 @@ fn rejection_reason(findings: &[Finding]) -> String {
 fn take_entry(
     slot: Slot,
     view: Option<&ScanView>,
-    outcome: Outcome,
-    sealed: Sealed,
-    figures: Figures,
-    findings: Vec<Finding>,
-) -> Entry {
+    outcome: ScanOutcome,
+    sealed: SealedFile,
+    figures: ScanFigures,
+    findings: Vec<CheckFinding>,
+) -> JournalEntry {
     let start = view.and_then(|view| view.start.as_ref());
-    Entry::Take(Box::new(Take {
+    JournalEntry::Take(Box::new(ScanAttempt {
         slot,
         scan: view.map(|view| view.scan),
         started: start.map(|start| start.time),
@@ -299,7 +299,7 @@ fn take_entry(
 }
 
 /// Reads the first scan of a file, if any.
-fn read(path: &Path) -> Result<Option<ScanView>, Halt> {
+fn read(path: &Path) -> Result<Option<ScanView>, CollectError> {
     let loaded = load(path)?;
     Ok(ScanView::from_records(loaded.records).into_iter().next())
 }

@@ -7,14 +7,14 @@ use sonard_device::ranger::PreparedScan;
 use sonard_records::{AirSource, ScanAir};
 
 use super::{
-    super::{AirAction, Device, Entry, Halt, ScanOrder, Slot, Watcher, record_scan::Taken},
+    super::{AirAction, ScanDevice, JournalEntry, CollectError, ScanTask, Slot, Observer, record_scan::RecordedScan},
     Collector,
 };
 
-impl<D: Device, W: Watcher> Collector<D, W> {
+impl<D: ScanDevice, W: Observer> Collector<D, W> {
     /// Reads the thermometer before a scan and applies `checks.on_temperature_drift` if the air
     /// drifted from the session's.
-    pub(super) async fn update_air(&mut self) -> Result<(), Halt> {
+    pub(super) async fn update_air(&mut self) -> Result<(), CollectError> {
         let Some(now_c) = self.temperature().await else { return Ok(()) };
         let keys = &self.plan.keys.checks;
         let drift_c = now_c - self.air.temperature_c();
@@ -23,10 +23,10 @@ impl<D: Device, W: Watcher> Collector<D, W> {
         }
         let drift = format!("air temperature {now_c:.2} C, {drift_c:+.2} C from the session's");
         match keys.on_temperature_drift {
-            AirAction::Note => self.watcher.say(&format!("warning: {drift}")),
-            AirAction::Stop => return Err(Halt::Stopped(format!("stopped: {drift}"))),
+            AirAction::Note => self.watcher.message(&format!("warning: {drift}")),
+            AirAction::Stop => return Err(CollectError::Stopped(format!("stopped: {drift}"))),
             AirAction::NewSession => {
-                self.watcher.say(&format!(
+                self.watcher.message(&format!(
                     "{drift}: predictions and ranges use the new temperature from now on"
                 ));
                 self.air = self.plan.air(now_c)?;
@@ -39,13 +39,13 @@ impl<D: Device, W: Watcher> Collector<D, W> {
     }
 
     /// Takes a scan; returns it with the temperature change during it, degrees Celsius.
-    pub(super) async fn take(&mut self, slot: Slot) -> Result<(Taken, Option<f64>), Halt> {
+    pub(super) async fn take(&mut self, slot: Slot) -> Result<(RecordedScan, Option<f64>), CollectError> {
         let history = self.journal.history();
         let done = history.accepted().count() as u32;
-        let total = history.wanted().len() as u32;
+        let total = history.requested().len() as u32;
         let label = self.pose(slot.pose).label();
         let doing = format!("{label}, scan {} of {total}", done + 1);
-        self.watcher.begin(&doing, done, total, self.pace.left_s(total.saturating_sub(done)));
+        self.watcher.scan_started(&doing, done, total, self.pace.left_s(total.saturating_sub(done)));
         let before_c = self.temperature().await;
         // Without a valid temperature now, the last valid one is recorded with its age.
         let age_s = self.temperature_age_s().or(before_c.map(|_| 0.0));
@@ -60,38 +60,38 @@ impl<D: Device, W: Watcher> Collector<D, W> {
             true => Some(self.prepared(slot.pose)?),
             false => None,
         };
-        let order = ScanOrder {
+        let order = ScanTask {
             plan: self.plan.azimuths,
             pose: self.pose(slot.pose).pose,
             prepared: prepared.as_deref(),
             air,
             collection: self.collection_ref(slot),
-            path: &self.folder.taking(slot),
+            path: &self.folder.draft_path(slot),
         };
         let watcher = &self.watcher;
-        let taken = self.device.take(order, &|| watcher.beam()).await?;
+        let taken = self.device.record_scan(order, &|| watcher.beam_recorded()).await?;
         let after_c = self.temperature().await;
         let change_c = before_c.zip(after_c).map(|(before_c, after_c)| after_c - before_c);
         Ok((taken, change_c))
     }
 
     /// Applies the collection's settings to the device, after journaling the previous ones.
-    async fn apply_settings(&mut self) -> Result<(), Halt> {
+    async fn apply_settings(&mut self) -> Result<(), CollectError> {
         let air = self.plan.air_order(self.air.temperature_c());
-        let before = self.device.to_borrow(air.as_ref()).await?;
+        let before = self.device.settings_to_save(air.as_ref()).await?;
         if let Some(before) = &before {
-            self.append(Entry::Borrowed(before.clone()))?;
+            self.append(JournalEntry::Borrowed(before.clone()))?;
         }
-        self.device.borrow(before, air.as_ref()).await
+        self.device.apply_settings(before, air.as_ref()).await
     }
 
     /// Restores the device's previous settings.
     pub(super) async fn restore_settings(&mut self) {
-        match self.device.give_back().await {
-            Ok(false) | Err(Halt::Stopped(_)) => {}
+        match self.device.restore_settings().await {
+            Ok(false) | Err(CollectError::Stopped(_)) => {}
             // If this entry is lost, the next run restores the settings once more.
-            Ok(true) => drop(self.append(Entry::GivenBack { time: Timestamp::now() })),
-            Err(halt) => self.watcher.say(&format!(
+            Ok(true) => drop(self.append(JournalEntry::GivenBack { time: Timestamp::now() })),
+            Err(halt) => self.watcher.message(&format!(
                 "warning: the daemon still has the collection's settings: {halt}\n\
                  start the collection again, or set the daemon's mode with PUT /v1/scanning"
             )),
@@ -100,13 +100,13 @@ impl<D: Device, W: Watcher> Collector<D, W> {
 
     /// Reads the current air temperature, degrees Celsius; `None` without a valid one.
     async fn temperature(&mut self) -> Option<f64> {
-        if !self.device.is_local() && !self.plan.gives_air() {
+        if !self.device.is_local() && !self.plan.sets_air() {
             return self.device.temperature_c().await;
         }
         let thermometer = self.thermometer.as_mut()?;
         let read = thermometer.read().await;
         if let Some(remark) = thermometer.take_remark() {
-            self.watcher.say(&format!("warning: {remark}"));
+            self.watcher.message(&format!("warning: {remark}"));
         }
         match read {
             Ok(temperature_c) => Some(temperature_c),
@@ -115,7 +115,7 @@ impl<D: Device, W: Watcher> Collector<D, W> {
                     let age_s = age.as_secs_f64();
                     format!("; the last valid temperature, {last_c:.2} C, is {age_s:.0} s old")
                 });
-                self.watcher.say(&format!(
+                self.watcher.message(&format!(
                     "warning: the thermometer has no valid temperature: {error}{last}"
                 ));
                 None
@@ -125,7 +125,7 @@ impl<D: Device, W: Watcher> Collector<D, W> {
 
     /// Age of the last valid temperature, seconds; `None` without a thermometer in the plan.
     fn temperature_age_s(&self) -> Option<f64> {
-        if !self.device.is_local() && !self.plan.gives_air() {
+        if !self.device.is_local() && !self.plan.sets_air() {
             return None;
         }
         let (_, age) = self.thermometer.as_ref()?.last_valid()?;
@@ -133,7 +133,7 @@ impl<D: Device, W: Watcher> Collector<D, W> {
     }
 
     /// Returns the scan setup of a pose, with predictions in the air of the session.
-    pub(super) fn prepared(&mut self, number: u32) -> Result<Arc<PreparedScan>, Halt> {
+    pub(super) fn prepared(&mut self, number: u32) -> Result<Arc<PreparedScan>, CollectError> {
         if let Some(prepared) = self.prepared.get(&number) {
             return Ok(Arc::clone(prepared));
         }

@@ -14,46 +14,46 @@ use uuid::Uuid;
 
 use super::{
     super::{
-        Conditions, Connected, Device, Entry, Folder, Halt, INPUTS, Journal, Plan, PlanEntry,
-        Poses, Started, Watcher,
+        Conditions, ConnectedDevice, ScanDevice, JournalEntry, CollectionFolder, CollectError, INPUTS, CollectionJournal, CollectionPlan, PlanEntry,
+        Poses, RunStart, Observer,
         estimate::{Pace, budget},
-        numbers_of,
+        find_numbers,
         plan_changes::plan_changes,
         pose_source::{PoseSource, answered},
         sha256,
     },
-    Choices, Collector, warn_of_disk,
+    RunOptions, Collector, warn_of_disk,
 };
 
-impl<D: Device, W: Watcher> Collector<D, W> {
+impl<D: ScanDevice, W: Observer> Collector<D, W> {
     pub(super) async fn begin(
-        plan: Plan,
-        choices: Choices,
+        plan: CollectionPlan,
+        choices: RunOptions,
         mut device: D,
         watcher: W,
         interrupts: Interrupts,
-    ) -> Result<Self, Halt> {
+    ) -> Result<Self, CollectError> {
         let mut thermometer = plan.keys.air.file.as_deref().map(Thermometer::new);
         let measured_c = match &mut thermometer {
             Some(thermometer) => Some(thermometer.read().await.map_err(|error| {
-                Halt::failed(
+                CollectError::failed(
                     format!("the thermometer has no valid temperature: {error}"),
                     "correct air.file in the plan, or leave it out",
                 )
             })?),
             None => None,
         };
-        let air_c = match device.is_local() || plan.gives_air() {
+        let air_c = match device.is_local() || plan.sets_air() {
             true => measured_c,
             false => device.temperature_c().await,
         };
         let air = plan.air(air_c.unwrap_or(plan.keys.air.temperature_c))?;
-        let folder = Folder::open(&plan.folder)?;
-        let journal = Journal::open(&folder.journal())?;
+        let folder = CollectionFolder::open(&plan.folder)?;
+        let journal = CollectionJournal::open(&folder.journal())?;
         let id = journal.history().plans.last().map_or_else(Uuid::new_v4, |plan| plan.collection);
         let scan_s = budget(&plan)?.total_s();
         let patience = Duration::from_secs_f64(plan.keys.collection.patience_s);
-        device.go_on(patience, journal.history().borrowed.clone());
+        device.resume(patience, journal.history().saved_settings.clone());
         let mut collector = Self {
             choices,
             source: PoseSource::from(&plan.poses),
@@ -83,7 +83,7 @@ impl<D: Device, W: Watcher> Collector<D, W> {
     }
 
     /// Records the plan in the journal, or compares it with the recorded one.
-    fn adopt_plan(&mut self) -> Result<(), Halt> {
+    fn adopt_plan(&mut self) -> Result<(), CollectError> {
         let sensor = serde_json::to_string_pretty(&self.plan.sensor).unwrap_or_default();
         let sensor_sha256 = sha256(sensor.as_bytes());
         if !self.journal.history().plans.is_empty() {
@@ -92,7 +92,7 @@ impl<D: Device, W: Watcher> Collector<D, W> {
                 return Ok(());
             }
             if !self.choices.accept_changed_plan {
-                return Err(Halt::wrong(
+                return Err(CollectError::invalid(
                     format!(
                         "{} holds a collection with a different plan: {}",
                         self.folder.root().display(),
@@ -123,21 +123,21 @@ impl<D: Device, W: Watcher> Collector<D, W> {
             sensor_sha256,
             poses,
         };
-        self.append(Entry::Plan(Box::new(plan)))
+        self.append(JournalEntry::Plan(Box::new(plan)))
     }
 
     /// Assigns numbers to new listed poses and returns the numbers of all in order.
-    fn number_poses(&mut self) -> Result<Option<Vec<u32>>, Halt> {
+    fn number_poses(&mut self) -> Result<Option<Vec<u32>>, CollectError> {
         let Poses::Listed(listed) = self.plan.poses.clone() else { return Ok(None) };
         let known = &self.journal.history().poses;
         let mut last = known.keys().last().copied().unwrap_or(0);
         let mut numbers = Vec::new();
-        for (pose, number) in listed.iter().zip(numbers_of(&listed, known)) {
+        for (pose, number) in listed.iter().zip(find_numbers(&listed, known)) {
             numbers.push(match number {
                 Some(number) => number,
                 None => {
                     last += 1;
-                    self.append(Entry::Pose { number: last, pose: pose.clone() })?;
+                    self.append(JournalEntry::Pose { number: last, pose: pose.clone() })?;
                     last
                 }
             });
@@ -146,10 +146,10 @@ impl<D: Device, W: Watcher> Collector<D, W> {
     }
 
     /// Connects to the device, unless no scan is left.
-    pub(super) async fn start(&mut self) -> Result<(), Halt> {
+    pub(super) async fn start(&mut self) -> Result<(), CollectError> {
         let history = self.journal.history();
         let done: HashSet<_> = history.accepted().map(|take| take.slot).collect();
-        let requested = history.wanted();
+        let requested = history.requested();
         let open: Vec<_> = requested
             .iter()
             .filter(|slot| !done.contains(slot))
@@ -161,7 +161,7 @@ impl<D: Device, W: Watcher> Collector<D, W> {
         }
         let left = open.len() as u32;
         if listed {
-            self.watcher.announce(left, self.pace.left_s(left));
+            self.watcher.scans_planned(left, self.pace.left_s(left));
             warn_of_disk(&self.plan, &self.folder, left, &self.watcher);
         }
         let first = match open.first() {
@@ -171,7 +171,7 @@ impl<D: Device, W: Watcher> Collector<D, W> {
                 if !self.request_pose().await? {
                     return Ok(());
                 }
-                self.journal.history().wanted().first().map_or(1, |slot| slot.pose)
+                self.journal.history().requested().first().map_or(1, |slot| slot.pose)
             }
         };
         if self.device.is_local() {
@@ -179,19 +179,19 @@ impl<D: Device, W: Watcher> Collector<D, W> {
             self.device_pose = Some(first);
             self.device.prepare(&self.plan, &prepared)?;
         }
-        let Connected { device, provenance } = self.device.meet().await?;
+        let ConnectedDevice { device, provenance } = self.device.connect().await?;
         self.check_device(&device.serial)?;
         self.prompt_at_start().await?;
         let time = Timestamp::now();
-        let started = Started { time, device, provenance, conditions: self.conditions.clone() };
-        self.append(Entry::Started(Box::new(started)))
+        let started = RunStart { time, device, provenance, conditions: self.conditions.clone() };
+        self.append(JournalEntry::Started(Box::new(started)))
     }
 
     /// Rejects a ranger whose serial number differs from the plan's or the journal's.
-    fn check_device(&self, serial: &str) -> Result<(), Halt> {
+    fn check_device(&self, serial: &str) -> Result<(), CollectError> {
         let expected = self.plan.keys.device.serial.as_deref();
         if let Some(expected) = expected.filter(|expected| *expected != serial) {
-            return Err(Halt::failed(
+            return Err(CollectError::failed(
                 format!("the ranger's serial number is {serial}, not {expected}"),
                 format!("connect {expected}, or change device.serial in the plan"),
             ));
@@ -199,7 +199,7 @@ impl<D: Device, W: Watcher> Collector<D, W> {
         let before = self.journal.history().starts.last().map(|start| start.device.serial.as_str());
         match before {
             Some(before) if before != serial && !self.choices.accept_changed_plan => {
-                Err(Halt::failed(
+                Err(CollectError::failed(
                     format!("the ranger's serial number is {serial}; previous scans used {before}"),
                     format!("connect {before}, or continue with {serial} by --accept-changed-plan"),
                 ))
@@ -208,7 +208,7 @@ impl<D: Device, W: Watcher> Collector<D, W> {
         }
     }
 
-    async fn prompt_at_start(&mut self) -> Result<(), Halt> {
+    async fn prompt_at_start(&mut self) -> Result<(), CollectError> {
         for key in self.plan.keys.ask.at_start.clone() {
             let answer = answered(&mut self.watcher, &format!("{key}:"), &self.interrupts).await?;
             self.conditions.insert(key, answer.unwrap_or_default().into());

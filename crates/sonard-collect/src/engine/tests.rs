@@ -7,7 +7,7 @@ use std::{
 };
 
 use jiff::Timestamp;
-use sonard_api::{AirOrder, config::Layers};
+use sonard_api::{AirOrder, config::ConfigLayers};
 use sonard_log::LogWriter;
 use sonard_model::{
     acoustics::Sensor,
@@ -18,7 +18,7 @@ use sonard_records::{Device as DeviceRecord, Provenance, Record, ScanPlan, ScanV
 use sonard_runtime::interrupts::Interrupts;
 
 use super::*;
-use crate::{Borrowed, CollectionKeys, Connected, History, Poses, ScanOrder, Taken, read_journal};
+use crate::{SavedSettings, CollectionKeys, ConnectedDevice, CollectionHistory, Poses, ScanTask, RecordedScan, read_journal};
 
 /// Remote device whose readings are the model's; the first `lost` scans fail.
 struct FakeDevice {
@@ -29,18 +29,18 @@ struct FakeDevice {
     restored: Arc<Mutex<u32>>,
 }
 
-impl Device for FakeDevice {
+impl ScanDevice for FakeDevice {
     fn is_local(&self) -> bool {
         false
     }
 
-    fn prepare(&mut self, _: &Plan, _: &PreparedScan) -> Result<(), Halt> {
+    fn prepare(&mut self, _: &CollectionPlan, _: &PreparedScan) -> Result<(), CollectError> {
         unreachable!("only for local devices")
     }
 
-    fn go_on(&mut self, _: Duration, _: Option<Borrowed>) {}
+    fn resume(&mut self, _: Duration, _: Option<SavedSettings>) {}
 
-    async fn meet(&mut self) -> Result<Connected, Halt> {
+    async fn connect(&mut self) -> Result<ConnectedDevice, CollectError> {
         let device = DeviceRecord {
             serial: "REMOTE".into(),
             firmware: "1".into(),
@@ -49,22 +49,22 @@ impl Device for FakeDevice {
             tick_hz: 2_000_000,
             steps_per_revolution: 400,
         };
-        Ok(Connected { device, provenance: Provenance::Simulated })
+        Ok(ConnectedDevice { device, provenance: Provenance::Simulated })
     }
 
-    fn carry_to(&mut self, _: &PreparedScan) -> Result<(), Halt> {
+    fn move_to(&mut self, _: &PreparedScan) -> Result<(), CollectError> {
         unreachable!("only for local devices")
     }
 
-    async fn to_borrow(&self, _: Option<&AirOrder>) -> Result<Option<Borrowed>, Halt> {
+    async fn settings_to_save(&self, _: Option<&AirOrder>) -> Result<Option<SavedSettings>, CollectError> {
         Ok(None)
     }
 
-    async fn borrow(&mut self, _: Option<Borrowed>, _: Option<&AirOrder>) -> Result<(), Halt> {
+    async fn apply_settings(&mut self, _: Option<SavedSettings>, _: Option<&AirOrder>) -> Result<(), CollectError> {
         Ok(())
     }
 
-    async fn give_back(&mut self) -> Result<bool, Halt> {
+    async fn restore_settings(&mut self) -> Result<bool, CollectError> {
         *self.restored.lock().expect("not poisoned") += 1;
         Ok(false)
     }
@@ -73,16 +73,16 @@ impl Device for FakeDevice {
         None
     }
 
-    async fn take(
+    async fn record_scan(
         &mut self,
-        order: ScanOrder<'_>,
+        order: ScanTask<'_>,
         beam: &(dyn Fn() + Sync),
-    ) -> Result<Taken, Halt> {
+    ) -> Result<RecordedScan, CollectError> {
         assert!(order.prepared.is_none(), "a remote device predicts by itself");
         let mut log = LogWriter::open(order.path)?;
         let (view, lost) = if self.lost > 0 {
             self.lost -= 1;
-            (None, Some(Halt::failed("no response", "wait")))
+            (None, Some(CollectError::failed("no response", "wait")))
         } else {
             self.taken += 1;
             let view = simulate(&self.scene, &order);
@@ -98,13 +98,13 @@ impl Device for FakeDevice {
             (Some(view), None)
         };
         log.close()?;
-        Ok(Taken { view, gone: lost.is_some(), lost, stopped: false, wall_s: 0.1 })
+        Ok(RecordedScan { view, needs_reconnect: lost.is_some(), failure: lost, stopped: false, wall_s: 0.1 })
     }
 
     async fn close(self) {}
 }
 
-fn simulate(scene: &Scene, order: &ScanOrder<'_>) -> ScanView {
+fn simulate(scene: &Scene, order: &ScanTask<'_>) -> ScanView {
     let sensor = Sensor::preset("senscomp-6500").expect("a preset");
     let scene = Arc::new(scene.with_robot_at(&order.pose));
     let simulator =
@@ -117,44 +117,44 @@ fn simulate(scene: &Scene, order: &ScanOrder<'_>) -> ScanView {
 #[derive(Default)]
 struct FakeWatcher(Arc<Mutex<Vec<String>>>);
 
-impl Watcher for FakeWatcher {
-    fn begin(&self, label: &str, _: u32, _: u32, _: f64) {
-        self.say(label);
+impl Observer for FakeWatcher {
+    fn scan_started(&self, label: &str, _: u32, _: u32, _: f64) {
+        self.message(label);
     }
 
-    fn beam(&self) {}
+    fn beam_recorded(&self) {}
 
-    fn say(&self, line: &str) {
+    fn message(&self, line: &str) {
         self.0.lock().expect("not poisoned").push(line.to_owned());
     }
 
-    fn announce(&self, scans: u32, _: f64) {
-        self.say(&format!("{scans} scans"));
+    fn scans_planned(&self, scans: u32, _: f64) {
+        self.message(&format!("{scans} scans"));
     }
 
-    fn rest(&self) {}
+    fn measuring_paused(&self) {}
 
-    async fn ask(&mut self, _: &str) -> Option<String> {
+    async fn prompt(&mut self, _: &str) -> Option<String> {
         None
     }
 
-    fn report(&self, _: &Folder, history: &History) -> Result<(), Halt> {
-        self.say(&format!("report of {} scans", history.accepted().count()));
+    fn write_report(&self, _: &CollectionFolder, history: &CollectionHistory) -> Result<(), CollectError> {
+        self.message(&format!("report of {} scans", history.accepted().count()));
         Ok(())
     }
 }
 
-fn plan(folder: &Path, extra_keys: &str) -> Plan {
+fn plan(folder: &Path, extra_keys: &str) -> CollectionPlan {
     let text = format!(
         "[place]\nscene = \"simple-room\"\n[poses]\nlist = [\"fig7\", \"fig9\"]\n\
          [plan]\nto_deg = 18\nstep_deg = 1.8\n{extra_keys}"
     );
-    let layers = Layers::<CollectionKeys>::new().file("plan.toml", &text).expect("valid");
-    let keys = layers.clone().keys().expect("valid");
+    let layers = ConfigLayers::<CollectionKeys>::new().with_file("plan.toml", &text).expect("valid");
+    let keys = layers.clone().into_keys().expect("valid");
     let scene_text = shipped::text("simple-room").expect("shipped").to_owned();
     let scene = Arc::new(Scene::from_json(&scene_text).expect("a scene"));
     let poses = ["fig7", "fig9"].map(|name| NamedPose::parse(name, &scene).expect("a pose"));
-    Plan {
+    CollectionPlan {
         azimuths: ScanPlan { to_deg: 18.0, step_deg: 1.8, ..ScanPlan::default() },
         keys,
         text,
@@ -169,7 +169,7 @@ fn plan(folder: &Path, extra_keys: &str) -> Plan {
     }
 }
 
-async fn run(folder: &Path, extra_keys: &str, lost: u32) -> (Result<(), Halt>, Vec<String>) {
+async fn run(folder: &Path, extra_keys: &str, lost: u32) -> (Result<(), CollectError>, Vec<String>) {
     let plan = plan(folder, extra_keys);
     let (restored, messages) = (Arc::default(), Arc::default());
     let device = FakeDevice {
@@ -179,7 +179,7 @@ async fn run(folder: &Path, extra_keys: &str, lost: u32) -> (Result<(), Halt>, V
         restored: Arc::clone(&restored),
     };
     let watcher = FakeWatcher(Arc::clone(&messages));
-    let outcome = collect(plan, Choices::default(), device, watcher, Interrupts::listen()).await;
+    let outcome = collect(plan, RunOptions::default(), device, watcher, Interrupts::listen()).await;
     let messages = messages.lock().expect("not poisoned").clone();
     if !messages.is_empty() {
         assert_eq!(*restored.lock().expect("not poisoned"), 1);
@@ -196,15 +196,15 @@ async fn takes_every_scan_once() {
     outcome.expect("complete");
     assert_eq!(messages.first().map(String::as_str), Some("4 scans"), "{messages:?}");
     assert!(messages.contains(&"report of 4 scans".to_owned()), "{messages:?}");
-    let history = read_journal(&Folder::at(&root).journal()).expect("readable");
+    let history = read_journal(&CollectionFolder::existing(&root).journal()).expect("readable");
     let taken: Vec<_> = history.accepted().map(|take| (take.slot.pose, take.slot.repeat)).collect();
     assert_eq!(taken, [(1, 1), (1, 2), (2, 1), (2, 2)]);
-    assert_eq!(Folder::at(&root).scans().expect("readable").len(), 4);
+    assert_eq!(CollectionFolder::existing(&root).scans().expect("readable").len(), 4);
     // A second run has nothing to do, and a different plan is rejected.
     run(&root, twice, 0).await.0.expect("complete");
     let (other, _) = run(&root, "[collection]\nrepeats = 3\n", 0).await;
     assert!(
-        matches!(&other, Err(Halt::Wrong { message, .. }) if message.contains("repeats")),
+        matches!(&other, Err(CollectError::Invalid { message, .. }) if message.contains("repeats")),
         "{other:?}"
     );
 }
@@ -218,5 +218,5 @@ async fn retries_until_the_deadline() {
     assert!(messages.iter().any(|line| line.contains(retry)), "{messages:?}");
     let (outcome, _) =
         run(&folder.path().join("never"), "[collection]\npatience_s = 0\n", u32::MAX).await;
-    assert!(matches!(&outcome, Err(Halt::Failed { .. })), "{outcome:?}");
+    assert!(matches!(&outcome, Err(CollectError::Failed { .. })), "{outcome:?}");
 }

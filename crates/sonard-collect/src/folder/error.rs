@@ -22,7 +22,7 @@ pub enum FolderError {
     },
     /// Folder with files that are not a collection.
     #[error("{} is not empty and not a collection", path.display())]
-    Strange {
+    NotACollection {
         /// Path of the folder.
         path: PathBuf,
     },
@@ -63,7 +63,7 @@ impl FolderError {
                 }
                 _ => "check the path and the disk; recorded scans are kept",
             },
-            Self::Strange { .. } => "choose another --out: a collection needs its own folder",
+            Self::NotACollection { .. } => "choose another --out: a collection needs its own folder",
             Self::Busy { .. } => "wait until that process ends, or choose another --out",
             Self::Damaged { .. } => {
                 "compare the file with a copy: it was changed. The logs in scans/ are valid \

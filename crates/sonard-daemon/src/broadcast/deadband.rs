@@ -10,13 +10,13 @@ const MAX_DIRECTIONS: usize = 1600;
 /// Deadband filter of a subscriber: the last status and range sent in each direction (a motor step,
 /// or a ranger of an array).
 #[derive(Debug, Clone, Default)]
-pub struct Moved {
+pub struct DeadbandFilter {
     moved_m: Option<f64>,
     sent: HashMap<(i32, u16), (PingStatus, Option<f64>)>,
     rangers: Vec<Box<str>>,
 }
 
-impl Moved {
+impl DeadbandFilter {
     /// Creates a filter with a deadband in metres; `None` passes all readings.
     #[must_use]
     pub fn new(moved_m: Option<f64>) -> Self {
@@ -25,13 +25,13 @@ impl Moved {
 
     /// Returns `true` if the filter passes all readings.
     #[must_use]
-    pub const fn is_everything(&self) -> bool {
+    pub const fn passes_all(&self) -> bool {
         self.moved_m.is_none()
     }
 
     /// Returns `true` if a reading differs by more than the deadband, or in its status, from the
     /// last one sent in its direction. The reading is then remembered as sent.
-    pub fn is_news_of(&mut self, ping: &Ping) -> bool {
+    pub fn pass_ping(&mut self, ping: &Ping) -> bool {
         self.pass(ping.step, ping.ranger.as_deref(), ping.status, ping.range_m)
     }
 
@@ -78,7 +78,7 @@ mod tests {
 
     #[test]
     fn directions_are_bounded() {
-        let mut moved = Moved::new(Some(0.1));
+        let mut moved = DeadbandFilter::new(Some(0.1));
         for sweep in 0..3 {
             for step in 0..MAX_DIRECTIONS as i32 {
                 let passed = moved.pass(step, None, PingStatus::Echo, Some(1.0));

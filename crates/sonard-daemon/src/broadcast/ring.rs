@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 /// Ring buffer of the newest items, numbered from 0, bounded by their count and their bytes.
 #[derive(Debug)]
-pub(crate) struct Shelf<T> {
+pub(crate) struct Ring<T> {
     items: VecDeque<(usize, T)>,
     /// Number of the oldest item, or of the next one if the buffer is empty.
     first: u64,
@@ -13,14 +13,14 @@ pub(crate) struct Shelf<T> {
     max_bytes: usize,
 }
 
-impl<T> Shelf<T> {
+impl<T> Ring<T> {
     pub(crate) const fn new(max_items: usize, max_bytes: usize) -> Self {
         Self { items: VecDeque::new(), first: 0, bytes: 0, max_items, max_bytes }
     }
 
     /// Appends an item of the given size in bytes. Returns the items that are evicted; the newest
     /// item is kept whatever its size.
-    pub(crate) fn put(&mut self, bytes: usize, item: T) -> Vec<T> {
+    pub(crate) fn push(&mut self, bytes: usize, item: T) -> Vec<T> {
         let mut evicted = Vec::new();
         let bytes = bytes + size_of::<(usize, T)>();
         self.bytes += bytes;
@@ -67,14 +67,14 @@ mod tests {
     #[test]
     fn evicts_by_count_and_bytes() {
         let cost = |bytes: usize| bytes - size_of::<(usize, u8)>();
-        let mut ring = Shelf::new(3, 1000);
-        let evicted: Vec<u8> = (0..5_u8).flat_map(|item| ring.put(cost(100), item)).collect();
+        let mut ring = Ring::new(3, 1000);
+        let evicted: Vec<u8> = (0..5_u8).flat_map(|item| ring.push(cost(100), item)).collect();
         assert_eq!(evicted, [0, 1]);
         assert_eq!((ring.first(), ring.end()), (2, 5));
         assert_eq!((ring.get(1), ring.get(2), ring.get(5)), (None, Some(&2), None));
-        assert_eq!(ring.put(cost(850), 5), [2, 3]);
+        assert_eq!(ring.push(cost(850), 5), [2, 3]);
         assert_eq!((ring.first(), ring.bytes), (4, 950));
-        ring.put(5000, 6);
+        ring.push(5000, 6);
         assert_eq!(
             (ring.first(), ring.get(6)),
             (6, Some(&6)),

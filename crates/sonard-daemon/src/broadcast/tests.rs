@@ -31,7 +31,7 @@ async fn all(subscription: &mut Subscription, hub: &Hub) -> Vec<serde_json::Valu
 #[tokio::test]
 async fn slow_subscriber_gets_drop_count() {
     let hub = Hub::new(10);
-    let mut slow = hub.subscribe(Wanted::default());
+    let mut slow = hub.subscribe(SubscriptionFilter::default());
     hub.publish(&control());
     for step in 0..25 {
         hub.publish(&ping(step, Some(1.0)));
@@ -49,7 +49,7 @@ async fn slow_subscriber_gets_drop_count() {
 #[tokio::test]
 async fn drop_counts_around_a_scan_start() {
     let hub = Hub::new(2);
-    let mut slow = hub.subscribe(Wanted::default());
+    let mut slow = hub.subscribe(SubscriptionFilter::default());
     (0..5).for_each(|step| hub.publish(&ping(step, Some(1.0))));
     hub.publish(&control());
     (5..10).for_each(|step| hub.publish(&ping(step, Some(1.0))));
@@ -64,7 +64,7 @@ async fn drop_counts_around_a_scan_start() {
 #[tokio::test]
 async fn deadband_suppresses_readings() {
     let hub = Hub::new(100);
-    let mut some = hub.subscribe(Wanted { moved_m: Some(0.05), ..Wanted::default() });
+    let mut some = hub.subscribe(SubscriptionFilter { deadband_m: Some(0.05), ..SubscriptionFilter::default() });
     for (step, range_m) in [
         (0, Some(1.0)),
         (0, Some(1.04)),
@@ -90,8 +90,8 @@ async fn verdicts_are_sent_on_request() {
     // A subscription in mid-scan has the viewpoint of the running scan.
     hub.publish(&session());
     hub.publish(&control());
-    let mut annotated = hub.subscribe(Wanted { verdicts: true, ..Wanted::default() });
-    let mut plain = hub.subscribe(Wanted::default());
+    let mut annotated = hub.subscribe(SubscriptionFilter { verdicts: true, ..SubscriptionFilter::default() });
+    let mut plain = hub.subscribe(SubscriptionFilter::default());
     hub.publish(&ping(0, Some(1.0)));
     let annotated = all(&mut annotated, &hub).await.remove(0);
     assert_eq!(annotated["verdict"].as_str().map(str::is_empty), Some(false));
@@ -116,7 +116,7 @@ async fn scan_subscriber_is_cut_off() {
 #[tokio::test]
 async fn idle_subscriber_is_cut_off() {
     let hub = Hub::new(10);
-    let mut idle = hub.subscribe(Wanted::default());
+    let mut idle = hub.subscribe(SubscriptionFilter::default());
     for _ in 0..=MAX_CONTROLS {
         hub.publish(&control());
     }
@@ -129,7 +129,7 @@ async fn idle_subscriber_is_cut_off() {
 #[tokio::test]
 async fn buffers_are_bounded_in_bytes() {
     let hub = Hub::new(100_000);
-    let slow: Vec<Subscription> = (0..100).map(|_| hub.subscribe(Wanted::default())).collect();
+    let slow: Vec<Subscription> = (0..100).map(|_| hub.subscribe(SubscriptionFilter::default())).collect();
     for step in 0..50_000 {
         hub.publish(&ping(step, Some(1.0)));
     }

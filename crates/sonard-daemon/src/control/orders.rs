@@ -14,17 +14,17 @@ use uuid::Uuid;
 use super::{Control, Interrupt};
 use crate::{
     limits::{check_device, check_plan, check_pose},
-    order_error::{Refusal, RefusalKind},
-    schedule::Asked,
-    sensor::ordered_sensor,
+    order_error::{OrderError, OrderErrorKind},
+    schedule::QueuedScans,
+    sensor::sensor_from_order,
     settings::Settings,
 };
 
 impl Control {
-    pub(super) fn start(&mut self, request: Asked) -> Result<(), Refusal> {
+    pub(super) fn start(&mut self, request: QueuedScans) -> Result<(), OrderError> {
         if self.pressed {
-            return Err(Refusal {
-                kind: RefusalKind::Conflict,
+            return Err(OrderError {
+                kind: OrderErrorKind::Conflict,
                 message: "the emergency stop is pressed".into(),
                 help: "release it first".into(),
             });
@@ -34,14 +34,14 @@ impl Control {
         if self.schedule.start(request) {
             return Ok(());
         }
-        Err(Refusal {
-            kind: RefusalKind::Conflict,
+        Err(OrderError {
+            kind: OrderErrorKind::Conflict,
             message: "too many requests are queued".into(),
             help: "wait until some are complete, or clear the queue with POST /v1/stop".into(),
         })
     }
 
-    pub(super) fn cancel(&mut self, request: Uuid) -> (Result<(), Refusal>, Option<Interrupt>) {
+    pub(super) fn cancel(&mut self, request: Uuid) -> (Result<(), OrderError>, Option<Interrupt>) {
         let was_queued = self.schedule.cancel(request);
         if self.serving == Some(request) {
             return (Ok(()), Some(Interrupt::Stop));
@@ -51,14 +51,14 @@ impl Control {
         }
         let message = format!("there is no request {request}");
         let help = "use the id returned by POST /v1/start; the request may be complete".into();
-        (Err(Refusal { kind: RefusalKind::Unknown, message, help }), None)
+        (Err(OrderError { kind: OrderErrorKind::NotFound, message, help }), None)
     }
 
-    pub(super) fn set_mode(&mut self, mode: Mode, every_s: Option<f64>) -> Result<(), Refusal> {
+    pub(super) fn set_mode(&mut self, mode: Mode, every_s: Option<f64>) -> Result<(), OrderError> {
         let every_s = every_s.unwrap_or(self.scanning.every_s);
         if !(1.0..=604_800.0).contains(&every_s) {
-            return Err(Refusal {
-                kind: RefusalKind::Wrong,
+            return Err(OrderError {
+                kind: OrderErrorKind::Invalid,
                 message: format!("every_s is {every_s}"),
                 help: "use 1 to 604800 seconds".into(),
             });
@@ -68,32 +68,32 @@ impl Control {
         Ok(())
     }
 
-    pub(super) fn set_plan(&mut self, plan: ScanPlan) -> Result<(), Refusal> {
+    pub(super) fn set_plan(&mut self, plan: ScanPlan) -> Result<(), OrderError> {
         self.check_plan(&plan)?;
         self.plan = plan;
         Ok(())
     }
 
-    fn check_plan(&self, plan: &ScanPlan) -> Result<(), Refusal> {
+    fn check_plan(&self, plan: &ScanPlan) -> Result<(), OrderError> {
         check_plan(plan, self.settings.simulated.is_some(), self.identity.as_ref())
     }
 
-    pub(super) fn set_pose(&mut self, pose: Pose) -> Result<(), Refusal> {
+    pub(super) fn set_pose(&mut self, pose: Pose) -> Result<(), OrderError> {
         self.check_pose(&pose)?;
         self.pose = pose;
         Ok(())
     }
 
     /// Checks that the ranger, or the simulated robot, can be at a pose of the current scene.
-    pub(crate) fn check_pose(&self, pose: &Pose) -> Result<(), Refusal> {
+    pub(crate) fn check_pose(&self, pose: &Pose) -> Result<(), OrderError> {
         let Settings { scene, simulated, .. } = &self.settings;
         check_pose(pose, scene.as_deref(), simulated.as_ref().map(|simulated| &*simulated.array))
     }
 
-    pub(super) fn set_sensor(&mut self, order: &SensorOrder) -> Result<(), Refusal> {
+    pub(super) fn set_sensor(&mut self, order: &SensorOrder) -> Result<(), OrderError> {
         let sound_speed_m_s = self.air.status(Instant::now()).sound_speed_m_s;
         let of_array = self.settings.simulated.is_some();
-        let sensor = ordered_sensor(order, &self.setup, of_array, sound_speed_m_s)?;
+        let sensor = sensor_from_order(order, &self.setup, of_array, sound_speed_m_s)?;
         if let Some(identity) = &self.identity {
             check_device(&sensor, &self.settings.sensor, identity)?;
         }

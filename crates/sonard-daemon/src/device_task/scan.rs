@@ -12,7 +12,7 @@ use uuid::Uuid;
 
 use super::{
     super::{
-        control::Interrupt, link_state::LinkInput, prediction_cache::predict, schedule::Asked,
+        control::Interrupt, link_state::LinkInput, prediction_cache::predict, schedule::QueuedScans,
     },
     DeviceTask, with_orders,
 };
@@ -49,7 +49,7 @@ impl DeviceTask {
     /// restart since the last scan is the same device, but starts a session.
     async fn verify_identity(&mut self) -> Option<Identity> {
         let ranger = self.ranger.as_mut()?;
-        match with_orders(&mut self.control, ranger.recognise()).await {
+        match with_orders(&mut self.control, ranger.verify_identity()).await {
             Err(interrupt) => self.react(interrupt),
             Ok(Err(error)) => self.device_failed(&error),
             Ok(Ok(())) => {
@@ -62,7 +62,7 @@ impl DeviceTask {
 
     /// Prepares the next scan and writes its session to the log. Returns `None` if the scan can't
     /// be taken now.
-    async fn prepare(&mut self, identity: &Identity, asked: Option<Asked>) -> Option<ScanJob> {
+    async fn prepare(&mut self, identity: &Identity, asked: Option<QueuedScans>) -> Option<ScanJob> {
         if std::mem::take(&mut self.control.stale) {
             self.predictions.clear();
         }
@@ -99,7 +99,7 @@ impl DeviceTask {
 
     /// Pauses scanning, or cancels only the request if the failure comes from its own plan or pose.
     /// A retry would fail again until an order or the configuration changes the scan.
-    fn abandon_scans(&mut self, why: &str, asked: Option<Asked>) -> Option<ScanJob> {
+    fn abandon_scans(&mut self, why: &str, asked: Option<QueuedScans>) -> Option<ScanJob> {
         match asked.filter(|request| request.plan.is_some() || request.pose.is_some()) {
             Some(request) => drop(self.control.schedule.cancel(request.request)),
             None => self.control.schedule.stop(),
@@ -161,7 +161,7 @@ impl DeviceTask {
                 Interrupt::Stop => STOPPED_ON_REQUEST,
                 Interrupt::EmergencyStop(true) => "the emergency stop was pressed",
                 Interrupt::PortChanged => "the configured port changed",
-                Interrupt::Log if !self.out.journal.is_well() => "the log can't be written",
+                Interrupt::Log if !self.out.journal.is_writable() => "the log can't be written",
                 Interrupt::Log
                 | Interrupt::Start
                 | Interrupt::ScheduleChanged

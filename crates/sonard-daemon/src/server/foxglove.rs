@@ -13,7 +13,7 @@ use std::{
 use axum::extract::ws::{CloseFrame, Message, WebSocket, close_code};
 use sonard_api::config::FoxgloveKeys;
 use sonard_export::{
-    Live, LiveMessage, Settings, Topic,
+    LiveConverter, LiveMessage, ExportSettings, Topic,
     foxglove::{MAX_TEXT_BYTES, server_info},
 };
 use sonard_runtime::supervisor::Task;
@@ -24,7 +24,7 @@ use tokio::{
 use uuid::Uuid;
 
 use super::Principal;
-use crate::{Audience, Follower, Handle};
+use crate::{LiveMessageSink, MessageConverter, Handle};
 use message_queue::{Delivery, MAX_MESSAGE_BYTES, Outgoing, Viewer, ViewerQueue};
 
 /// Minimum interval between messages read from a viewer.
@@ -71,8 +71,8 @@ impl Viewers {
             session: Uuid::new_v4().to_string(),
         });
         let mut sink = QueueSink(Arc::clone(&viewers));
-        let live = Live::new(Settings::default()).with_map(keys.map);
-        let follower = Follower::begin(daemon, live, &mut sink);
+        let live = LiveConverter::new(ExportSettings::default()).with_map(keys.map);
+        let follower = MessageConverter::subscribe(daemon, live, &mut sink);
         drop(daemon.supervisor().spawn(Task::LiveMessages, follow(follower, sink)));
         viewers
     }
@@ -93,7 +93,7 @@ impl Viewers {
 
     /// Serves a viewer until it disconnects or is disconnected.
     pub(super) async fn serve(self: Arc<Self>, mut socket: WebSocket) {
-        let _attendance = self.daemon.hub().attend();
+        let _attendance = self.daemon.hub().register_client();
         match self.send_messages(&mut socket).await {
             Ok(frame) => close_socket(&mut socket, frame).await,
             Err(error) if is_write_timeout(&error) => self.daemon.hub().count_cut_off(),
@@ -165,25 +165,25 @@ impl Viewers {
 /// Sink of the follower that fills the queue.
 struct QueueSink(Arc<Viewers>);
 
-impl Audience for QueueSink {
+impl LiveMessageSink for QueueSink {
     fn set_topics(&mut self, topics: &[Topic]) {
         self.0.queue().set_topics(topics);
     }
 
-    fn tell(&mut self, message: &LiveMessage<'_>) {
+    fn send(&mut self, message: &LiveMessage<'_>) {
         self.0.queue().put(message);
     }
 
-    fn announce(&mut self, text: String) {
+    fn report_loss(&mut self, text: String) {
         self.0.queue().announce(text);
     }
 
-    fn told(&mut self) {
+    fn end_of_record(&mut self) {
         self.0.changed.send_replace(());
     }
 }
 
-async fn follow(mut follower: Follower, mut sink: QueueSink) {
+async fn follow(mut follower: MessageConverter, mut sink: QueueSink) {
     while follower.next(&mut sink).await {}
     sink.0.queue().close();
     sink.0.changed.send_replace(());

@@ -16,7 +16,7 @@ use serde::{Serialize, de::DeserializeOwned};
 use sonard_api::{Problem, Strict, has_list};
 
 use super::access::AccessDenied;
-use crate::{Refusal, RefusalKind};
+use crate::{OrderError, OrderErrorKind};
 
 /// Error response: HTTP status and JSON body.
 #[derive(Debug, Clone)]
@@ -86,13 +86,13 @@ impl IntoResponse for ApiError {
     }
 }
 
-impl From<Refusal> for ApiError {
-    fn from(refusal: Refusal) -> Self {
+impl From<OrderError> for ApiError {
+    fn from(refusal: OrderError) -> Self {
         let status = match refusal.kind {
-            RefusalKind::Wrong => StatusCode::UNPROCESSABLE_ENTITY,
-            RefusalKind::Conflict => StatusCode::CONFLICT,
-            RefusalKind::Unknown => StatusCode::NOT_FOUND,
-            RefusalKind::Stopping => StatusCode::SERVICE_UNAVAILABLE,
+            OrderErrorKind::Invalid => StatusCode::UNPROCESSABLE_ENTITY,
+            OrderErrorKind::Conflict => StatusCode::CONFLICT,
+            OrderErrorKind::NotFound => StatusCode::NOT_FOUND,
+            OrderErrorKind::Stopping => StatusCode::SERVICE_UNAVAILABLE,
         };
         Self::new(status, refusal.message, refusal.help)
     }

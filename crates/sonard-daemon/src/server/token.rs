@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
-use crate::secret::{Secret, SecretError, read_secret};
+use crate::secret::{SecretKind, SecretError, read_secret};
 
 /// Limits of a token file; `openssl rand -hex 8` generates 16 characters.
-const TOKEN: Secret = Secret { what: "token", least: 16, most_bytes: 4096 };
+const TOKEN: SecretKind = SecretKind { name: "token", min_chars: 16, max_bytes: 4096 };
 
 /// Reads the token from a file that only its owner may read.
 ///
@@ -61,7 +61,7 @@ mod tests {
         rustix::fs::mkfifoat(rustix::fs::CWD, &pipe, mode).expect("a pipe");
         for path in [&pipe, folder.path(), Path::new("/dev/zero"), Path::new("/no/such/file")] {
             let error = read_token(path).expect_err("no token");
-            assert!(matches!(error, SecretError::NoFile | SecretError::Unreadable(_)), "{error}");
+            assert!(matches!(error, SecretError::NotRegularFile | SecretError::Unreadable(_)), "{error}");
         }
     }
 }

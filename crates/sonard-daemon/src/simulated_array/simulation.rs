@@ -6,7 +6,7 @@ use rand::SeedableRng as _;
 use rand_pcg::Pcg64;
 use sonard_model::{
     acoustics::{Air, TofNoise},
-    array::Course,
+    array::RobotCourse,
     geometry::Pose,
     model::ArrayModel,
 };
@@ -45,7 +45,7 @@ impl Simulation {
             model: Arc::new(model),
             air,
             readings: vec![None; firings],
-            noise: TofNoise::of_range_mm(keys.noise_mm, air.sound_speed_m_s()),
+            noise: TofNoise::from_range_sigma_mm(keys.noise_mm, air.sound_speed_m_s()),
             rng: Pcg64::seed_from_u64(keys.seed),
         })
     }
@@ -56,7 +56,7 @@ impl Simulation {
 
     /// Indices of the rangers that fire in each slot of a round.
     pub(super) fn turns(&self) -> Vec<Vec<usize>> {
-        self.model.array().turns()
+        self.model.array().slots()
     }
 
     pub(super) fn matches(&self, air: &Air) -> bool {
@@ -111,7 +111,7 @@ fn evaluate(model: &ArrayModel, firing: usize, pose: Pose) -> Result<Ping, Strin
 
 /// Motion of the robot: along the configured course, until it ends or an order sets another pose.
 pub(super) struct RobotMotion {
-    course: Option<Arc<Course>>,
+    course: Option<Arc<RobotCourse>>,
     /// Departure from the first pose; `None` at rest.
     departed: Option<Instant>,
     /// Last pose set by the course.

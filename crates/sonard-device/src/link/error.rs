@@ -139,7 +139,7 @@ impl LinkError {
                  allowed yet; in a container, pass {} through",
                 port.display()
             ),
-            Self::Busy { port, holders } => match holders.advice(port) {
+            Self::Busy { port, holders } => match holders.remedy(port) {
                 Some(advice) => format!("{advice}; `sudo fuser -v {}` lists them", port.display()),
                 None => format!(
                     "find the program with `sudo fuser -v {}` and stop it; a running daemon owns \

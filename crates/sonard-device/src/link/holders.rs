@@ -86,7 +86,7 @@ impl Holders {
 
     /// Suggests a remedy for each holder; `None` if there are none.
     #[must_use]
-    pub fn advice(&self, port: &Path) -> Option<String> {
+    pub fn remedy(&self, port: &Path) -> Option<String> {
         let mut advice: Vec<String> = self.found.iter().map(|holder| holder.advice(port)).collect();
         advice.dedup();
         (!advice.is_empty()).then(|| advice.join("; "))
@@ -209,7 +209,7 @@ mod tests {
         child.wait().expect("it ends");
         let described = holders.describe("none");
         assert_eq!(described, format!("`sleep 60` (pid {})", child.id()));
-        let advice = holders.advice(pty.path()).expect("a remedy");
+        let advice = holders.remedy(pty.path()).expect("a remedy");
         assert!(advice.contains(&format!("kill {}", child.id())), "{advice}");
         assert_eq!(find_holders(pty.path()).found, []);
     }
@@ -244,7 +244,7 @@ mod tests {
             let holder = Holder { pid: 7, command: program.into(), program: program.into() };
             assert!(holder.advice(port).contains(remedy), "{program}");
         }
-        assert_eq!(Holders::default().advice(port), None);
+        assert_eq!(Holders::default().remedy(port), None);
         assert_eq!(Holders::default().describe("another program"), "another program");
     }
 }

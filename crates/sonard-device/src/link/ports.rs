@@ -9,7 +9,7 @@ use super::{LinkError, PortListError, holders::real_path};
 
 /// Serial port of this computer, described without opening it.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
-pub struct Candidate {
+pub struct SerialPortInfo {
     /// Path of the device node.
     pub port: String,
     /// Stable name under `/dev/serial/by-id`, which survives replugging.
@@ -22,7 +22,7 @@ pub struct Candidate {
 ///
 /// # Errors
 /// If the system's list of ports can't be read.
-pub fn candidates() -> Result<Vec<Candidate>, PortListError> {
+pub fn list_ports() -> Result<Vec<SerialPortInfo>, PortListError> {
     PortFolders::system().candidates()
 }
 
@@ -70,12 +70,12 @@ impl PortFolders<'static> {
 }
 
 impl PortFolders<'_> {
-    pub(super) fn candidates(&self) -> Result<Vec<Candidate>, PortListError> {
+    pub(super) fn candidates(&self) -> Result<Vec<SerialPortInfo>, PortListError> {
         let ids = self.ids()?;
-        let mut candidates: Vec<Candidate> = self
+        let mut candidates: Vec<SerialPortInfo> = self
             .ports()?
             .into_iter()
-            .map(|SystemPort { path, usb }| Candidate {
+            .map(|SystemPort { path, usb }| SerialPortInfo {
                 id: id_of(&ids, &path),
                 port: path.to_string_lossy().into_owned(),
                 usb: usb.map(UsbDevice::describe),

@@ -8,14 +8,14 @@ use firmware_protocol::{
 };
 use sonard_model::motion::Trapezoid;
 
-use super::pins::{Output, Pins};
+use super::pins::{OutputPin, Pins};
 
 use activity::{Firing, Move};
 
 /// Duration of BLNK, ticks: at least 0.44 ms, so that the detected echo has passed.
 const BLNK_TICKS: u64 = 1_000;
 /// Poll interval of ECHO while further echoes are expected, ticks.
-pub const LOOK_TICKS: u64 = 200;
+pub const ECHO_POLL_TICKS: u64 = 200;
 
 /// Identity and motor of a Raspberry Pi board.
 #[derive(Debug, Clone, Copy)]
@@ -157,7 +157,7 @@ impl<P: Pins> PiBoard<P> {
     }
 
     fn home(&mut self, speed: u16, acceleration: u32) {
-        self.pins.set(Output::Enable, false);
+        self.pins.set(OutputPin::Enable, false);
         if let Some(at_index) = self.pins.at_index() {
             let index = IndexSearch::begin(at_index, self.settings.steps_per_revolution);
             self.search = Some(HomeSearch { index, speed, acceleration });
@@ -179,9 +179,9 @@ impl<P: Pins> PiBoard<P> {
     }
 
     fn begin_move(&mut self, target: i32, speed: u16, acceleration: u32, stop_at: Option<bool>) {
-        self.pins.set(Output::Enable, false);
+        self.pins.set(OutputPin::Enable, false);
         let steps = target.wrapping_sub(self.position);
-        self.pins.set(Output::Dir, steps >= 0);
+        self.pins.set(OutputPin::Dir, steps >= 0);
         let profile = Trapezoid::new(steps, speed, acceleration);
         let since = self.pins.now();
         self.motion = Some(Move { profile, since, pulses: 0, stop_at, edge: None });
@@ -198,7 +198,7 @@ impl<P: Pins> PiBoard<P> {
 
     /// Switches the coil current off.
     fn release_coils(&mut self) {
-        self.pins.set(Output::Enable, true);
+        self.pins.set(OutputPin::Enable, true);
         self.motion = None;
         self.search = None;
         self.is_homed = false;
@@ -253,7 +253,7 @@ impl<P: Pins> PiBoard<P> {
             let report = EchoReport { fired_ticks, status, echoes: Echoes::new() };
             return self.device.handle_echoes(fired_ticks, &report);
         }
-        self.pins.forget_echoes();
+        self.pins.discard_echoes();
         let fired = self.pins.raise_init();
         let binh_at = match blanking {
             Blanking::Internal => None,
@@ -276,7 +276,7 @@ impl<P: Pins> PiBoard<P> {
         while let Some(at) = self.pins.next_echo() {
             if firing.record_echo(at) {
                 // Lowers ECHO and blanks the module until the detected echo has passed.
-                self.pins.set(Output::Blnk, true);
+                self.pins.set(OutputPin::Blnk, true);
                 firing.blnk_until = Some(self.pins.now() + BLNK_TICKS);
             }
         }
@@ -288,15 +288,15 @@ impl<P: Pins> PiBoard<P> {
             return self.device.handle_echoes(now as u32, &report);
         }
         if firing.binh_at.take_if(|at| *at <= now).is_some() {
-            self.pins.set(Output::Binh, true);
+            self.pins.set(OutputPin::Binh, true);
         }
         if firing.blnk_until.take_if(|at| *at <= now).is_some() {
-            self.pins.set(Output::Blnk, false);
+            self.pins.set(OutputPin::Blnk, false);
         }
     }
 
     fn end_firing(&mut self) {
-        for output in [Output::Init, Output::Binh, Output::Blnk] {
+        for output in [OutputPin::Init, OutputPin::Binh, OutputPin::Blnk] {
             self.pins.set(output, false);
         }
         self.firing = None;
@@ -320,8 +320,8 @@ const fn is_dangerous(action: &Action) -> bool {
 
 /// Sets outputs to safe levels: no coil current, no firing.
 fn make_safe(pins: &mut impl Pins) {
-    pins.set(Output::Enable, true);
-    for output in [Output::Init, Output::Binh, Output::Blnk, Output::Step, Output::Dir] {
+    pins.set(OutputPin::Enable, true);
+    for output in [OutputPin::Init, OutputPin::Binh, OutputPin::Blnk, OutputPin::Step, OutputPin::Dir] {
         pins.set(output, false);
     }
 }

@@ -6,7 +6,7 @@ use rppal::gpio::{Gpio, InputPin, OutputPin, Trigger};
 use rustix::time::{ClockId, clock_gettime};
 use thiserror::Error;
 
-use super::pins::{Output, Pins};
+use super::pins::{OutputPin, Pins};
 
 /// Nanoseconds per tick.
 const TICK_NS: u64 = 500;
@@ -138,14 +138,14 @@ impl Pins for GpioPins {
         now()
     }
 
-    fn set(&mut self, output: Output, high: bool) {
+    fn set(&mut self, output: OutputPin, high: bool) {
         let pin = match output {
-            Output::Init => &mut self.init,
-            Output::Binh => &mut self.binh,
-            Output::Blnk => &mut self.blnk,
-            Output::Step => &mut self.step,
-            Output::Dir => &mut self.dir,
-            Output::Enable => &mut self.enable,
+            OutputPin::Init => &mut self.init,
+            OutputPin::Binh => &mut self.binh,
+            OutputPin::Blnk => &mut self.blnk,
+            OutputPin::Step => &mut self.step,
+            OutputPin::Dir => &mut self.dir,
+            OutputPin::Enable => &mut self.enable,
         };
         pin.write(high.into());
     }

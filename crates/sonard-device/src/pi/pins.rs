@@ -2,7 +2,7 @@
 
 /// Output lines of the board.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Output {
+pub enum OutputPin {
     /// Fires the module while high.
     Init,
     /// Ends the module's blanking.
@@ -23,7 +23,7 @@ pub trait Pins {
     fn now(&mut self) -> u64;
 
     /// Sets the level of an output.
-    fn set(&mut self, output: Output, high: bool);
+    fn set(&mut self, output: OutputPin, high: bool);
 
     /// Raises INIT and returns the time of the rise.
     fn raise_init(&mut self) -> u64;
@@ -38,7 +38,7 @@ pub trait Pins {
     fn next_echo(&mut self) -> Option<u64>;
 
     /// Discards all unread rises of ECHO.
-    fn forget_echoes(&mut self) {
+    fn discard_echoes(&mut self) {
         while self.next_echo().is_some() {}
     }
 

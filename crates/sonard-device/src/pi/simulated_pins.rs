@@ -7,7 +7,7 @@ use std::convert::Infallible;
 use firmware_protocol::conformance::DeviceUnderTest;
 use firmware_protocol::conformance_tests;
 
-use super::{Output, PiBoard, PiSettings, Pins};
+use super::{OutputPin, PiBoard, PiSettings, Pins};
 
 const TICKS_PER_US: u64 = 2;
 /// Internal blanking of the module, ticks.
@@ -56,24 +56,24 @@ impl Pins for SimulatedPins {
         self.now
     }
 
-    fn set(&mut self, output: Output, high: bool) {
+    fn set(&mut self, output: OutputPin, high: bool) {
         match output {
-            Output::Init => {
+            OutputPin::Init => {
                 self.init = high;
                 self.latched &= high;
             }
-            Output::Binh if high => self.unblanked = self.unblanked.min(self.now),
-            Output::Binh => {}
-            Output::Blnk => {
+            OutputPin::Binh if high => self.unblanked = self.unblanked.min(self.now),
+            OutputPin::Binh => {}
+            OutputPin::Blnk => {
                 if self.blnk && !high {
                     self.blnk_fell = self.now;
                 }
                 self.blnk = high;
                 self.latched &= !high;
             }
-            Output::Step => {}
-            Output::Dir => self.forward = high,
-            Output::Enable => self.enabled = !high,
+            OutputPin::Step => {}
+            OutputPin::Dir => self.forward = high,
+            OutputPin::Enable => self.enabled = !high,
         }
     }
 
@@ -245,7 +245,7 @@ fn emergency_stop_acts_at_once() {
         matches!(
             event,
             HostEvent::Failed(
-                HostError::EmergencyStop | HostError::Refused(NakReason::EmergencyStop)
+                HostError::EmergencyStop | HostError::Rejected(NakReason::EmergencyStop)
             )
         )
     };

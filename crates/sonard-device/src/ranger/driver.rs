@@ -32,7 +32,7 @@ pub struct Driver<L> {
 
 /// Result of a successful command.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Ended {
+pub enum CommandResult {
     /// Identity of the device, from an Identify.
     Identified(Identity),
     /// End of a sweep.
@@ -93,11 +93,11 @@ const fn host_help(error: &HostError) -> &'static str {
             "flash the firmware of this version of sonard, or install the sonard version of the \
              firmware"
         }
-        HostError::WrongIdentity(_) => {
+        HostError::InvalidIdentity(_) => {
             "flash the firmware of this version of sonard; for a board of your own see \"What a \
              host must refuse\" in PROTOCOL.md"
         }
-        HostError::Refused(reason) => refused_help(*reason),
+        HostError::Rejected(reason) => refused_help(*reason),
         HostError::Rebooted => {
             "the board restarts repeatedly: check its supply (the module draws 2 A while firing \
              and needs 1000 uF close to it)"
@@ -117,8 +117,8 @@ const fn host_help(error: &HostError) -> &'static str {
         HostError::Stalled { .. }
         | HostError::SweepLost
         | HostError::WrongReading { .. }
-        | HostError::SenselessReading(_)
-        | HostError::SenselessReply(_) => {
+        | HostError::InvalidReading(_)
+        | HostError::InvalidReply(_) => {
             "reset the board and scan again; if it happens again, report it with the log"
         }
     }
@@ -183,7 +183,7 @@ impl<L: AsyncRead + AsyncWrite + Unpin> Driver<L> {
 
     /// Subscribes to the link statistics, which are updated also while a command runs.
     #[must_use]
-    pub fn watch_stats(&self) -> watch::Receiver<LinkStats> {
+    pub fn subscribe_stats(&self) -> watch::Receiver<LinkStats> {
         self.stats.subscribe()
     }
 
@@ -217,7 +217,7 @@ impl<L: AsyncRead + AsyncWrite + Unpin> Driver<L> {
         &mut self,
         command: Command,
         on_event: impl FnMut(HostEvent) -> ControlFlow<()>,
-    ) -> Result<Ended, DriveError> {
+    ) -> Result<CommandResult, DriveError> {
         self.start(command)?;
         self.finish(on_event).await
     }
@@ -228,14 +228,14 @@ impl<L: AsyncRead + AsyncWrite + Unpin> Driver<L> {
     ///
     /// # Errors
     /// If no ranger responds, or the device restarts repeatedly.
-    pub async fn take_over(
+    pub async fn identify_and_stop(
         &mut self,
         mut on_event: impl FnMut(HostEvent) -> ControlFlow<()>,
     ) -> Result<Identity, DriveError> {
         let mut restarts = 0;
         loop {
             let ended = self.perform(Command::Identify, &mut on_event).await?;
-            let Ended::Identified(identity) = ended else { continue };
+            let CommandResult::Identified(identity) = ended else { continue };
             match self.stop(&mut on_event).await {
                 Ok(()) => return Ok(identity),
                 // The device restarted in between: its identity is out of date.
@@ -259,7 +259,7 @@ impl<L: AsyncRead + AsyncWrite + Unpin> Driver<L> {
         loop {
             // The end of what was stopped may come first.
             match self.finish(&mut on_event).await {
-                Ok(Ended::Done(Outcome::Stopped)) => return Ok(()),
+                Ok(CommandResult::Done(Outcome::Stopped)) => return Ok(()),
                 Ok(_) | Err(DriveError::Host(HostError::Stopped) | DriveError::Abandoned) => {}
                 Err(error) => return Err(error),
             }
@@ -275,14 +275,14 @@ impl<L: AsyncRead + AsyncWrite + Unpin> Driver<L> {
     pub async fn finish(
         &mut self,
         mut on_event: impl FnMut(HostEvent) -> ControlFlow<()>,
-    ) -> Result<Ended, DriveError> {
+    ) -> Result<CommandResult, DriveError> {
         loop {
             match self.next_event().await {
-                HostEvent::Identified(identity) => return Ok(Ended::Identified(identity)),
+                HostEvent::Identified(identity) => return Ok(CommandResult::Identified(identity)),
                 HostEvent::SweepDone { delivered, end, .. } => {
-                    return Ok(Ended::Swept { delivered, end });
+                    return Ok(CommandResult::Swept { delivered, end });
                 }
-                HostEvent::Done(outcome) => return Ok(Ended::Done(outcome)),
+                HostEvent::Done(outcome) => return Ok(CommandResult::Done(outcome)),
                 HostEvent::Failed(error) => return Err(DriveError::Host(error)),
                 event => {
                     if on_event(event).is_break() {

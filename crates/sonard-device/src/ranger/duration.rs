@@ -18,7 +18,7 @@ const BITS_PER_BYTE: f64 = 10.0;
 
 /// Estimated duration of a scan by cause, in seconds.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
-pub struct Budget {
+pub struct ScanDuration {
     /// Listening windows, and waits that protect the module from firing too often.
     pub acoustics_s: f64,
     /// Steps between stops with the settling time after each, and the travel from and to home.
@@ -27,7 +27,7 @@ pub struct Budget {
     pub link_s: f64,
 }
 
-impl Budget {
+impl ScanDuration {
     /// Estimates the duration of [`super::Ranger::scan`] from its first command to the return
     /// home. The motor is at home initially; the line runs at `baud` bits per second.
     ///
@@ -43,7 +43,7 @@ impl Budget {
         let stops = plan.stops();
         let between_s = f64::from(stops.saturating_sub(1)) * (travel_s(stride) + settle_s);
         let last = from + stride * i32::try_from(stops.saturating_sub(1)).unwrap_or(0);
-        let swept_s = timing::limit_s(plan, settings, stride);
+        let swept_s = timing::min_duration_s(plan, settings, stride);
         let byte_s = BITS_PER_BYTE / f64::from(baud);
         let reading_s = reading_bytes(settings.max_echoes) * byte_s;
         let beams = f64::from(plan.beams());
@@ -150,29 +150,29 @@ mod tests {
     #[test]
     fn duration_has_three_parts() {
         let plan = ScanPlan::default();
-        let budget = Budget::for_plan(&plan, &settings(), (0, 1), 115_200);
+        let budget = ScanDuration::for_plan(&plan, &settings(), (0, 1), 115_200);
         assert!((budget.acoustics_s - 400.0 * 46_513.0 / 2e6).abs() < 1e-9, "{budget:?}");
         // 399 steps of 10 ms, 400 settling times of 5 ms, and 399 steps home at 800 steps/s.
         let home_s = 399.0 / 800.0 + 800.0 / 40_000.0;
         assert!((budget.motor_s - (3.99 + 2.0 + home_s)).abs() < 1e-9, "{budget:?}");
         // Some 300 bytes at 87 us each.
         assert!((0.015..0.035).contains(&budget.link_s), "{budget:?}");
-        let limit_s = timing::limit_s(&plan, &settings(), 1);
+        let limit_s = timing::min_duration_s(&plan, &settings(), 1);
         assert!((budget.total_s() - budget.link_s - limit_s - home_s - 0.005).abs() < 1e-9);
     }
 
     #[test]
     fn slow_line_dominates() {
         let plan = ScanPlan::default();
-        let fast = Budget::for_plan(&plan, &settings(), (0, 1), 115_200);
-        let slow = Budget::for_plan(&plan, &settings(), (0, 1), 4_800);
+        let fast = ScanDuration::for_plan(&plan, &settings(), (0, 1), 115_200);
+        let slow = ScanDuration::for_plan(&plan, &settings(), (0, 1), 4_800);
         assert_eq!(fast.acoustics_s, slow.acoustics_s);
         // Code byte, header, body (1 + 2 + 2 + 2 + 5 + 1, and 1 + 3 for each echo), CRC, delimiter.
         let bytes = f64::from(1 + 4 + (13 + 1 + 3 * 3) + 4 + 1);
         assert_eq!(reading_bytes(3), bytes);
         // A reading takes 69 ms at 4,800 baud and a beam 38 ms: the difference adds up.
         let (reading_s, beam_s) =
-            (bytes * 10.0 / 4_800.0, timing::limit_s(&plan, &settings(), 1) / 400.0);
+            (bytes * 10.0 / 4_800.0, timing::min_duration_s(&plan, &settings(), 1) / 400.0);
         let exchanges_s = exchange_bytes(&settings()) * 10.0 / 4_800.0;
         let expected_s = 400.0 * (reading_s - beam_s) + reading_s + exchanges_s;
         assert!((slow.link_s - expected_s).abs() < 1e-9 && slow.link_s > 10.0, "{slow:?}");
@@ -181,7 +181,7 @@ mod tests {
     #[test]
     fn min_interval_counts_as_acoustics() {
         let guarded = Settings { min_interval_ticks: 200_000, ..settings() };
-        let budget = Budget::for_plan(&ScanPlan::default(), &guarded, (0, 1), 115_200);
+        let budget = ScanDuration::for_plan(&ScanPlan::default(), &guarded, (0, 1), 115_200);
         let limit_s = 399.0 * 0.1 + 46_513.0 / 2e6;
         assert!((budget.acoustics_s + 399.0 * 0.015 - limit_s).abs() < 1e-9, "{budget:?}");
     }

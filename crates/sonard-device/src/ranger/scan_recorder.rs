@@ -7,7 +7,7 @@ use firmware_protocol::{
 use jiff::{SignedDuration, Timestamp};
 use sonard_model::acoustics::classify_tof;
 use sonard_records::{
-    Event, EventKind, Ping, PingStatus, Record, ScanEnd, Segment, Sink, SinkError,
+    Event, EventKind, Ping, PingStatus, Record, ScanEnd, BeamRun, Sink, SinkError,
 };
 use std::ops::ControlFlow;
 use uuid::Uuid;
@@ -43,7 +43,7 @@ pub(super) struct ScanRecorder<'a> {
     wall_clock: WallClock,
     identity: Identity,
     sink: &'a mut dyn Sink,
-    segment: Option<Segment>,
+    segment: Option<BeamRun>,
     done: Vec<bool>,
     /// Beams with an implausible reading, which are not measured again.
     rejected: Vec<bool>,
@@ -92,13 +92,13 @@ impl<'a> ScanRecorder<'a> {
         self.done.iter().filter(|&&done| done).count() as u32
     }
 
-    pub(super) fn next_segment(&self) -> Option<Segment> {
+    pub(super) fn next_segment(&self) -> Option<BeamRun> {
         let closed =
             self.done.iter().zip(&self.rejected).map(|(done, rejected)| *done || *rejected);
-        Segment::next(&closed.collect::<Vec<_>>(), self.job.plan.pings_per_stop)
+        BeamRun::first_missing(&closed.collect::<Vec<_>>(), self.job.plan.pings_per_stop)
     }
 
-    pub(super) fn begin(&mut self, segment: Segment) {
+    pub(super) fn begin(&mut self, segment: BeamRun) {
         self.segment = Some(segment);
     }
 
@@ -118,7 +118,7 @@ impl<'a> ScanRecorder<'a> {
                     self.clock.push(sent_us, received_us, ticks);
                 }
             }
-            HostEvent::ReadingRefused { reading, fault } => self.reject(&reading, fault),
+            HostEvent::ReadingRejected { reading, fault } => self.reject(&reading, fault),
             // A late report: the coils were released before this scan, which homed first.
             HostEvent::Fault(FaultKind::HoldExpired) => {}
             HostEvent::Fault(kind) => self.note(EventKind::Fault, fault_text(kind)),

@@ -5,7 +5,7 @@ use firmware_protocol::{
     messages::{Capabilities, FaultKind, Identity, Settings, Sweep},
 };
 use jiff::{SignedDuration, Timestamp};
-use sonard_records::{EventKind, PlanError, Record, ScanEnd, ScanStart, Segment, Sink, SinkError};
+use sonard_records::{EventKind, PlanError, Record, ScanEnd, ScanStart, BeamRun, Sink, SinkError};
 use std::ops::ControlFlow;
 use thiserror::Error;
 use tokio::{
@@ -15,7 +15,7 @@ use tokio::{
 use uuid::Uuid;
 
 use super::{
-    driver::{DriveError, Driver, Ended},
+    driver::{DriveError, Driver, CommandResult},
     scan_job::ScanJob,
     scan_recorder::{FinishedScan, ScanRecorder},
     timing,
@@ -68,7 +68,7 @@ pub struct Ranger<L> {
 
 /// Unsolicited event on an idle line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Unasked {
+pub enum DeviceEvent {
     /// The line was closed.
     Hangup,
     /// The device restarted and must be identified again.
@@ -82,9 +82,9 @@ impl<L: AsyncRead + AsyncWrite + Unpin> Ranger<L> {
     ///
     /// # Errors
     /// If no ranger responds.
-    pub async fn meet(mut driver: Driver<L>) -> Result<Self, DriveError> {
+    pub async fn identify(mut driver: Driver<L>) -> Result<Self, DriveError> {
         let wall_epoch = wall_epoch(Timestamp::now(), driver.now_us());
-        let identity = driver.take_over(ignore).await?;
+        let identity = driver.identify_and_stop(ignore).await?;
         Ok(Self { driver, identity, wall_epoch, clock_steps: 0 })
     }
 
@@ -93,8 +93,8 @@ impl<L: AsyncRead + AsyncWrite + Unpin> Ranger<L> {
     ///
     /// # Errors
     /// If no ranger responds.
-    pub async fn meet_again(&mut self) -> Result<(), DriveError> {
-        self.identity = self.driver.take_over(ignore).await?;
+    pub async fn reidentify(&mut self) -> Result<(), DriveError> {
+        self.identity = self.driver.identify_and_stop(ignore).await?;
         Ok(())
     }
 
@@ -103,8 +103,8 @@ impl<L: AsyncRead + AsyncWrite + Unpin> Ranger<L> {
     ///
     /// # Errors
     /// If another board or none responds.
-    pub async fn recognise(&mut self) -> Result<(), DriveError> {
-        let identity = self.driver.take_over(ignore).await?;
+    pub async fn verify_identity(&mut self) -> Result<(), DriveError> {
+        let identity = self.driver.identify_and_stop(ignore).await?;
         if let Some(change) = BoardChange::between(&self.identity, &identity) {
             return Err(DriveError::OtherBoard(change));
         }
@@ -119,7 +119,7 @@ impl<L: AsyncRead + AsyncWrite + Unpin> Ranger<L> {
     pub async fn home(&mut self, settings: Settings) -> Result<i32, DriveError> {
         self.driver.perform(Command::Configure(settings), ignore).await?;
         match self.driver.perform(Command::Home, ignore).await? {
-            Ended::Done(Outcome::Homed { drift_steps }) => Ok(drift_steps),
+            CommandResult::Done(Outcome::Homed { drift_steps }) => Ok(drift_steps),
             _ => Ok(0),
         }
     }
@@ -128,17 +128,17 @@ impl<L: AsyncRead + AsyncWrite + Unpin> Ranger<L> {
     ///
     /// # Errors
     /// If the device does not respond.
-    pub async fn check(&mut self) -> Result<(), DriveError> {
+    pub async fn poll_status(&mut self) -> Result<(), DriveError> {
         self.driver.perform(Command::Status, ignore).await.map(drop)
     }
 
     /// Waits for a hangup or an unsolicited event of the device. Cancel-safe.
-    pub async fn unasked(&mut self) -> Unasked {
+    pub async fn next_event(&mut self) -> DeviceEvent {
         loop {
             match self.driver.idle().await {
-                None => return Unasked::Hangup,
-                Some(HostEvent::Rebooted { .. }) => return Unasked::Restarted,
-                Some(HostEvent::Fault(kind)) => return Unasked::Fault(kind),
+                None => return DeviceEvent::Hangup,
+                Some(HostEvent::Rebooted { .. }) => return DeviceEvent::Restarted,
+                Some(HostEvent::Fault(kind)) => return DeviceEvent::Fault(kind),
                 Some(_) => {}
             }
         }
@@ -177,8 +177,8 @@ impl<L: AsyncRead + AsyncWrite + Unpin> Ranger<L> {
 
     /// Subscribes to the counters of the serial link, which are updated also during a scan.
     #[must_use]
-    pub fn watch_link(&self) -> watch::Receiver<LinkStats> {
-        self.driver.watch_stats()
+    pub fn subscribe_link_stats(&self) -> watch::Receiver<LinkStats> {
+        self.driver.subscribe_stats()
     }
 
     /// Takes one scan, from `scan_start` to `scan_end`, writing each record to `sink`.
@@ -201,7 +201,7 @@ impl<L: AsyncRead + AsyncWrite + Unpin> Ranger<L> {
         let steps_per_revolution = u32::from(self.identity.steps_per_revolution);
         let motor = job.plan.motor_steps(steps_per_revolution)?;
         let before = self.identity.boot;
-        self.recognise().await?;
+        self.verify_identity().await?;
         let scan = Uuid::new_v4();
         let step = self.reanchor();
         let time = Timestamp::now();
@@ -230,7 +230,7 @@ impl<L: AsyncRead + AsyncWrite + Unpin> Ranger<L> {
         let (set_by, steps) = recorder.wall_clock_steps();
         self.wall_epoch = self.wall_epoch.checked_add(set_by).unwrap_or(self.wall_epoch);
         self.clock_steps += steps + u32::from(as_step(step).is_some());
-        let limit_s = timing::limit_s(&job.plan, &job.settings, motor.1);
+        let limit_s = timing::min_duration_s(&job.plan, &job.settings, motor.1);
         let drift = home.as_ref().ok().copied().flatten();
         let FinishedScan { end, restarts, clock_drift } = recorder.finish(limit_s, drift)?;
         let not_home = home.err();
@@ -268,7 +268,7 @@ impl<L: AsyncRead + AsyncWrite + Unpin> Ranger<L> {
                     if fruitless >= MAX_FRUITLESS_RESTARTS {
                         return Err(DriveError::Host(HostError::Rebooted).into());
                     }
-                    self.recognise().await?;
+                    self.verify_identity().await?;
                     recorder.resume_after_restart(&self.identity);
                 }
                 Ok(done) => {
@@ -324,7 +324,7 @@ impl<L: AsyncRead + AsyncWrite + Unpin> Ranger<L> {
             return Ok(None);
         }
         match self.command(Command::Home, recorder).await {
-            Ok(Ended::Done(Outcome::Homed { drift_steps })) => Ok(Some(drift_steps)),
+            Ok(CommandResult::Done(Outcome::Homed { drift_steps })) => Ok(Some(drift_steps)),
             Ok(_) => Ok(None),
             Err(error) => {
                 recorder.note_home_failure(&error);
@@ -337,7 +337,7 @@ impl<L: AsyncRead + AsyncWrite + Unpin> Ranger<L> {
         &mut self,
         command: Command,
         recorder: &mut ScanRecorder<'_>,
-    ) -> Result<Ended, DriveError> {
+    ) -> Result<CommandResult, DriveError> {
         self.driver.perform(command, |event| recorder.handle(event)).await
     }
 }
@@ -354,7 +354,7 @@ fn ignore(_event: HostEvent) -> ControlFlow<()> {
     ControlFlow::Continue(())
 }
 
-fn sweep_of(segment: &Segment, from_step: i32, stride: i32, settings: &Settings) -> Sweep {
+fn sweep_of(segment: &BeamRun, from_step: i32, stride: i32, settings: &Settings) -> Sweep {
     let first_stop = i32::try_from(segment.first_stop).unwrap_or(i32::MAX);
     Sweep {
         // The host state machine assigns the number.

@@ -42,7 +42,7 @@ impl From<&MotionKeys> for Motion {
 
 /// Range that the listening window must cover, and the blanking.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Listening {
+pub struct ReceiverTiming {
     /// Maximum range of interest, metres.
     pub max_range_m: f64,
     /// Speed of sound, metres per second.
@@ -114,7 +114,7 @@ impl Motion {
     ///
     /// # Errors
     /// If the window ends before the receiver opens.
-    pub fn check_window(&self, listening: &Listening) -> Result<(), WindowTooShort> {
+    pub fn check_window(&self, listening: &ReceiverTiming) -> Result<(), WindowTooShort> {
         let (window_ms, blanking_ms) = (self.window_ms(listening), listening.blanking_us / 1e3);
         if window_ms > blanking_ms {
             return Ok(());
@@ -123,13 +123,13 @@ impl Motion {
         Err(WindowTooShort { window_ms, blanking_ms, min_range_m })
     }
 
-    fn window_ms(&self, listening: &Listening) -> f64 {
+    fn window_ms(&self, listening: &ReceiverTiming) -> f64 {
         self.window_ms.unwrap_or(2e3 * listening.max_range_m / listening.sound_speed_m_s)
     }
 
     /// Builds the settings for a device of the given identity, without unsupported features.
     #[must_use]
-    pub fn settings(&self, listening: &Listening, identity: &Identity) -> Settings {
+    pub fn settings(&self, listening: &ReceiverTiming, identity: &Identity) -> Settings {
         let can = |capability| identity.capabilities.has(capability);
         let shorter = listening.blanking_us < INTERNAL_BLANKING_US;
         Settings {

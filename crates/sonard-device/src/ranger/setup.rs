@@ -13,7 +13,7 @@ use sonard_model::{
 use sonard_records::{ModelRecord, PlanError, ScanPlan, Session, SimRecord};
 use thiserror::Error;
 
-use super::{Listening, Motion, ScanJob, WindowTooShort, device_record, provenance};
+use super::{ReceiverTiming, Motion, ScanJob, WindowTooShort, device_record, provenance};
 
 /// Inputs of a scan, each validated on its own.
 #[derive(Debug, Clone)]
@@ -49,7 +49,7 @@ pub struct PreparedScan {
     /// Acoustic model of the scene with the robot.
     pub simulator: Simulator,
     motion: Motion,
-    listening: Listening,
+    listening: ReceiverTiming,
     /// Acoustic data of the ranging module.
     pub sensor: Sensor,
     /// State of the air.
@@ -64,7 +64,7 @@ pub struct PreparedScan {
 pub enum PrepareError {
     /// The listening window ends before the receiver opens.
     #[error("{0}")]
-    Deaf(#[from] WindowTooShort),
+    WindowTooShort(#[from] WindowTooShort),
     /// The model rejects sensor or options.
     #[error("{0}")]
     Model(#[from] ModelError),
@@ -77,7 +77,7 @@ impl PreparedScan {
     /// If the listening window ends before the receiver opens, or the model rejects the inputs.
     pub fn new(inputs: ScanInputs) -> Result<Self, PrepareError> {
         let ScanInputs { scene, pose, pose_text, plan, motion, sensor, air, options } = inputs;
-        let listening = Listening {
+        let listening = ReceiverTiming {
             max_range_m: options.max_range_m.unwrap_or(sensor.max_range_m),
             sound_speed_m_s: air.sound_speed_m_s(),
             blanking_us: sensor.blanking_us,
@@ -116,7 +116,7 @@ impl PreparedScan {
 
     /// Pose in the syntax of the command line: `x,y,heading`.
     #[must_use]
-    pub fn pose_numbers(&self) -> String {
+    pub fn pose_argument(&self) -> String {
         let Pose { x_m, y_m, heading_deg } = self.pose;
         format!("{x_m},{y_m},{heading_deg}")
     }

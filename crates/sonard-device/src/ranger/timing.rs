@@ -10,7 +10,7 @@ use sonard_records::ScanPlan;
 /// Windows do not overlap, because the sound of one firing has to decay before the next. Steps and
 /// windows do not overlap, because the motor must not move while the receiver is open.
 #[must_use]
-pub fn limit_s(plan: &ScanPlan, settings: &Settings, stride: i32) -> f64 {
+pub fn min_duration_s(plan: &ScanPlan, settings: &Settings, stride: i32) -> f64 {
     let seconds = |ticks: u32| f64::from(ticks) / f64::from(TICK_HZ);
     let window_s = seconds(settings.window_ticks);
     let interval_s = window_s.max(seconds(settings.min_interval_ticks));
@@ -55,15 +55,15 @@ mod tests {
         let plan = ScanPlan::default();
         // 400 windows of 20 ms, and 399 times a step of 10 ms and 5 ms of settling.
         let expected = 400.0 * 0.020 + 399.0 * 0.015;
-        assert!((limit_s(&plan, &settings(), 1) - expected).abs() < 1e-9);
+        assert!((min_duration_s(&plan, &settings(), 1) - expected).abs() < 1e-9);
         let twice = ScanPlan { pings_per_stop: 2, ..plan };
-        assert!((limit_s(&twice, &settings(), 1) - expected - 400.0 * 0.020).abs() < 1e-9);
+        assert!((min_duration_s(&twice, &settings(), 1) - expected - 400.0 * 0.020).abs() < 1e-9);
     }
 
     #[test]
     fn limit_respects_min_interval() {
         let slow = Settings { min_interval_ticks: 200_000, ..settings() };
         let expected = 399.0 * 0.1 + 0.020;
-        assert!((limit_s(&ScanPlan::default(), &slow, 1) - expected).abs() < 1e-9);
+        assert!((min_duration_s(&ScanPlan::default(), &slow, 1) - expected).abs() < 1e-9);
     }
 }

@@ -8,7 +8,7 @@ use std::{
 
 use rustix::fs::{FileType, Mode, OFlags};
 
-use super::Fault;
+use super::ThermometerFault;
 
 /// Maximum length of a thermometer's file, bytes: a page of sysfs.
 const MAX_BYTES: u64 = 4096;
@@ -50,27 +50,27 @@ const INTERNAL_CHIPS: [&str; 31] = [
 ];
 
 /// Reads the text of a regular file of at most a page. A named pipe does not block it.
-pub(super) fn read_file(path: &Path) -> Result<String, Fault> {
-    let unreadable = |error: io::Error| Fault::Unreadable(error.to_string());
+pub(super) fn read_file(path: &Path) -> Result<String, ThermometerFault> {
+    let unreadable = |error: io::Error| ThermometerFault::Unreadable(error.to_string());
     let flags = OFlags::RDONLY | OFlags::NONBLOCK | OFlags::NOCTTY | OFlags::CLOEXEC;
     let file =
         rustix::fs::open(path, flags, Mode::empty()).map_err(|error| unreadable(error.into()))?;
     let kind = rustix::fs::fstat(&file).map_err(|error| unreadable(error.into()))?.st_mode;
     match FileType::from_raw_mode(kind) {
         FileType::RegularFile => {}
-        FileType::Directory => return Err(Fault::NotAFile("a folder")),
-        FileType::Fifo => return Err(Fault::NotAFile("a named pipe")),
-        FileType::Socket => return Err(Fault::NotAFile("a socket")),
-        _ => return Err(Fault::NotAFile("a device")),
+        FileType::Directory => return Err(ThermometerFault::NotAFile("a folder")),
+        FileType::Fifo => return Err(ThermometerFault::NotAFile("a named pipe")),
+        FileType::Socket => return Err(ThermometerFault::NotAFile("a socket")),
+        _ => return Err(ThermometerFault::NotAFile("a device")),
     }
     let mut bytes = Vec::new();
     File::from(file).take(MAX_BYTES + 1).read_to_end(&mut bytes).map_err(unreadable)?;
     if bytes.len() as u64 > MAX_BYTES {
-        return Err(Fault::TooLong);
+        return Err(ThermometerFault::TooLong);
     }
-    let text = String::from_utf8(bytes).map_err(|_| Fault::NotText)?;
+    let text = String::from_utf8(bytes).map_err(|_| ThermometerFault::NotText)?;
     let is_text = |c: char| !c.is_control() || matches!(c, '\n' | '\r' | '\t');
-    if text.chars().all(is_text) { Ok(text) } else { Err(Fault::NotText) }
+    if text.chars().all(is_text) { Ok(text) } else { Err(ThermometerFault::NotText) }
 }
 
 /// Name of the chip that a file of hwmon or of a thermal zone belongs to.

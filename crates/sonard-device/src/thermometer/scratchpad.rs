@@ -3,7 +3,7 @@
 //! Datasheets DS18B20 (19-7487, Rev 6), table "Memory map", and DS18S20 (19-5474). Copies of the
 //! sensor differ in the reserved registers.
 
-use super::Fault;
+use super::ThermometerFault;
 
 /// Temperature register before the first conversion, thousandths of a degree.
 pub(super) const POWER_ON_THOUSANDTHS: i32 = 85_000;
@@ -14,29 +14,29 @@ pub(super) struct Scratchpad([u8; 9]);
 
 impl Scratchpad {
     /// Reads the hexadecimal registers at the start of a line of `w1_slave`.
-    pub(super) fn parse(line: &str) -> Result<Self, Fault> {
+    pub(super) fn parse(line: &str) -> Result<Self, ThermometerFault> {
         let mut registers = [0; 9];
         let mut words = line.split_ascii_whitespace();
         for register in &mut registers {
             let word = words.next().filter(|word| word.len() == 2);
             *register = word
                 .and_then(|word| u8::from_str_radix(word, 16).ok())
-                .ok_or(Fault::CutOff("a register"))?;
+                .ok_or(ThermometerFault::CutOff("a register"))?;
         }
         Ok(Self(registers))
     }
 
     /// Checks the consistency of the registers with each other and with the driver's temperature.
-    pub(super) fn check(&self, thousandths: i32) -> Result<(), Fault> {
+    pub(super) fn check(&self, thousandths: i32) -> Result<(), ThermometerFault> {
         let Self(registers @ [low, high, _, _, configuration, reserved, _, per_degree, checksum]) =
             *self;
         if registers.iter().all(|register| *register == low) {
-            return Err(Fault::StuckBus(low));
+            return Err(ThermometerFault::StuckBus(low));
         }
         if crc8(&registers[..8]) != checksum {
-            return Err(Fault::Checksum);
+            return Err(ThermometerFault::Checksum);
         }
-        let impossible = |what: String| Err(Fault::ImpossibleRegisters(what));
+        let impossible = |what: String| Err(ThermometerFault::ImpossibleRegisters(what));
         // A DS18S20 has no configuration: both registers are reserved.
         let is_ds18s20 = configuration == 0xff && reserved == 0xff && per_degree == 0x10;
         if !is_ds18s20 && configuration & 0x90 != 0x10 {

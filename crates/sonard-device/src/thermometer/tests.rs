@@ -6,7 +6,7 @@ use super::{scratchpad::tests::w1_slave, *};
 
 const ZERO_C: [u8; 8] = [0x00, 0x00, 0x4b, 0x46, 0x7f, 0xff, 0x10, 0x10];
 
-fn temperature_c(text: &str) -> Result<f64, Fault> {
+fn temperature_c(text: &str) -> Result<f64, ThermometerFault> {
     parse(text).map(|sample| sample.temperature_c)
 }
 

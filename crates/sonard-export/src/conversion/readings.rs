@@ -8,10 +8,10 @@ use sonard_records::{PathKind, Ping, PingStatus, Point, ScanView, Session};
 
 use super::{
     frames::RangerFrames,
-    settings::{Profile, Settings},
+    settings::{Profile, ExportSettings},
 };
 use crate::{
-    LeftOut,
+    SkippedScan,
     ros::message::{Header, LaserScan, Marker, MarkerShape, PointCloud, PointNumber, Stamp},
 };
 
@@ -30,9 +30,9 @@ pub(super) struct SessionParameters {
 const HALF_POWER: f64 = 0.707_945_784_384_138;
 
 impl SessionParameters {
-    pub(super) fn new(session: &Session, settings: &Settings) -> Result<Self, LeftOut> {
+    pub(super) fn new(session: &Session, settings: &ExportSettings) -> Result<Self, SkippedScan> {
         let extents =
-            Extents::of_session(session).map_err(|error| LeftOut::Session(error.to_string()))?;
+            Extents::from_session(session).map_err(|error| SkippedScan::Session(error.to_string()))?;
         let speed_m_s = session.air.sound_speed_m_s;
         let by_beam = || 2.0 * BeamPattern::new(&session.sensor, speed_m_s).angle_at(HALF_POWER);
         let requested = settings.field_of_view_deg.map(f64::to_radians);
@@ -163,7 +163,7 @@ pub(super) fn laser_scan<'a>(
     let session = scan.session.as_ref()?;
     let plan = scan.start.as_ref()?.plan;
     let is_planar =
-        !scan.is_of_array() && scan.has_one_place() && session.sensor.mounting.tilt_deg == 0.0;
+        !scan.is_array_scan() && scan.is_from_one_position() && session.sensor.mounting.tilt_deg == 0.0;
     if !is_planar || plan.check().is_err() || plan.pings_per_stop != 1 {
         return None;
     }
@@ -256,7 +256,7 @@ fn path_of(scan: &ScanView, ping: &Ping, kind: PathKind) -> Option<Vec<[f64; 3]>
         Point::Plan([x, y]) => [x, y, z_m],
         Point::Space(at) => at,
     };
-    let [transmitter, receiver] = scan.ends(ping, path)?.map(|end| [end.x, end.y, z_m]);
+    let [transmitter, receiver] = scan.transducer_positions(ping, path)?.map(|end| [end.x, end.y, z_m]);
     let reflections = path.interactions.iter().map(|interaction| corner(interaction.point));
     Some([transmitter].into_iter().chain(reflections).chain([receiver]).collect())
 }

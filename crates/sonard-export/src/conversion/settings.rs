@@ -34,7 +34,7 @@ pub enum Distribution {
 
 /// Settings of the conversion to messages.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Settings {
+pub struct ExportSettings {
     /// Encoding of missing echoes.
     pub profile: Profile,
     /// Distribution whose message definitions are used.
@@ -48,7 +48,7 @@ pub struct Settings {
     pub frame: String,
 }
 
-impl Default for Settings {
+impl Default for ExportSettings {
     fn default() -> Self {
         Self {
             profile: Profile::default(),

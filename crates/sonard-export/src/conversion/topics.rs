@@ -61,7 +61,7 @@ pub struct Topic {
     pub name: String,
     /// True if the last message remains valid and late subscribers should receive it; false for
     /// topics of individual readings.
-    pub is_kept: bool,
+    pub is_retained: bool,
     interface: Interface,
 }
 
@@ -83,13 +83,13 @@ impl Topic {
     /// Returns the topic of the map built so far.
     #[must_use]
     pub fn map() -> Self {
-        Self { name: MAP_TOPIC.to_owned(), is_kept: true, interface: OCCUPANCY_GRID }
+        Self { name: MAP_TOPIC.to_owned(), is_retained: true, interface: OCCUPANCY_GRID }
     }
 
     /// Returns `true` for static content, which every late subscriber must receive ("transient
     /// local" in ROS 2).
     #[must_use]
-    pub fn stands_still(&self) -> bool {
+    pub fn is_static(&self) -> bool {
         is_static_topic(&self.name)
     }
 
@@ -132,7 +132,7 @@ fn topics_of_rangers(
     draws_scene: bool,
     distribution: Distribution,
 ) -> Vec<Topic> {
-    let kept = |name: &str, interface| Topic { name: name.to_owned(), is_kept: true, interface };
+    let kept = |name: &str, interface| Topic { name: name.to_owned(), is_retained: true, interface };
     let mut topics = vec![kept(FIXED_TRANSFORMS, TRANSFORMS), kept(TRANSFORMS_TOPIC, TRANSFORMS)];
     if draws_scene {
         topics.push(kept(SCENE, MARKERS));
@@ -151,7 +151,7 @@ fn topics_of_rangers(
         let kinds = kinds.filter(|kind| predicts || *kind == ReadingTopic::Range);
         topics.extend(kinds.map(|kind| Topic {
             name: kind.topic(ranger),
-            is_kept: false,
+            is_retained: false,
             interface: kind.interface(distribution),
         }));
     }

@@ -3,7 +3,7 @@
 use serde_json::{Map, Value, json};
 use sonard_interpret::interpret::{Feature, lines::MapLine};
 
-use super::Findings;
+use super::PlaceFindings;
 use crate::columns::serialized_name;
 
 /// Beginning of GeoJSON files by this program.
@@ -11,7 +11,7 @@ const HEAD: &str = r#"{"sonard":"#;
 
 /// Returns `true` if `head` is the beginning of GeoJSON by this program.
 #[must_use]
-pub fn begins_geojson(head: &[u8]) -> bool {
+pub fn is_geojson(head: &[u8]) -> bool {
     head.starts_with(HEAD.as_bytes())
 }
 
@@ -21,7 +21,7 @@ pub fn begins_geojson(head: &[u8]) -> bool {
 /// are metres in the local frame, as stated by the member `sonard`. No member of the format keeps
 /// GDAL from reading them as degrees.
 #[must_use]
-pub fn to_geojson(place: &Findings<'_>) -> String {
+pub fn to_geojson(place: &PlaceFindings<'_>) -> String {
     let header = json!({
         "version": env!("CARGO_PKG_VERSION"),
         "units": "metres",

@@ -5,12 +5,12 @@ use std::convert::Infallible;
 use jiff::Timestamp;
 use sonard_interpret::interpret::{
     Extents, Sweep,
-    mapping::{GrowingMap, Mapping},
+    mapping::{GrowingMap, MapSettings},
 };
 use sonard_records::{ScanView, Session};
 
 use crate::{
-    LeftOut,
+    SkippedScan,
     conversion::{MAP, MAP_TOPIC, MessageSink},
     recording::nanoseconds,
     ros::{
@@ -51,7 +51,7 @@ impl LiveMap {
         scan: &ScanView,
         at: Stamp,
         out: &mut impl MessageSink<Error = Infallible>,
-    ) -> Result<(), LeftOut> {
+    ) -> Result<(), SkippedScan> {
         let (Some(start), Some(session)) = (scan.start.as_ref(), scan.session.as_deref()) else {
             return Ok(());
         };
@@ -61,7 +61,7 @@ impl LiveMap {
             Self::Growing { map, time } => (map, time.max(start.time)),
             Self::Stopped => return Ok(()),
         };
-        let grid = map.add(sweep).map_err(|error| LeftOut::Map(error.to_string()))?;
+        let grid = map.add(sweep).map_err(|error| SkippedScan::Map(error.to_string()))?;
         *self = Self::Growing { map, time };
         let header = Header { stamp: Stamp(nanoseconds(time)), frame: MAP };
         let message = OccupancyGrid { header, grid: &grid };
@@ -71,7 +71,7 @@ impl LiveMap {
 }
 
 /// Creates the map with the parameters of the first scan's session.
-fn new_map(session: &Session) -> Result<GrowingMap, LeftOut> {
-    let extents = Extents::of_session(session).map_err(|error| LeftOut::Map(error.to_string()))?;
-    Ok(GrowingMap::new(Mapping::default(), extents, session.array.is_some(), MAX_CELLS))
+fn new_map(session: &Session) -> Result<GrowingMap, SkippedScan> {
+    let extents = Extents::from_session(session).map_err(|error| SkippedScan::Map(error.to_string()))?;
+    Ok(GrowingMap::new(MapSettings::default(), extents, session.array.is_some(), MAX_CELLS))
 }

@@ -17,7 +17,7 @@ use ::parquet::{
 };
 use std::sync::Arc;
 
-use crate::{Field, Kind, Value};
+use crate::{ColumnType, ColumnKind, Value};
 
 /// Buffered cells of one column.
 #[derive(Debug)]
@@ -56,19 +56,19 @@ struct DistinctTexts {
 }
 
 /// Returns the Parquet type of a column; every cell may be null.
-pub(super) fn parquet_type(column: &Field) -> Result<Type, ParquetError> {
+pub(super) fn parquet_type(column: &ColumnType) -> Result<Type, ParquetError> {
     let (physical, logical) = match column.kind {
-        Kind::Text => (Physical::BYTE_ARRAY, Some(LogicalType::String)),
-        Kind::Integer => (Physical::INT64, None),
-        Kind::Number if column.is_single => (Physical::FLOAT, None),
-        Kind::Number => (Physical::DOUBLE, None),
-        Kind::Flag => (Physical::BOOLEAN, None),
-        Kind::Time => (Physical::INT64, Some(LogicalType::timestamp(true, TimeUnit::NANOS))),
-        Kind::Integers => {
+        ColumnKind::Text => (Physical::BYTE_ARRAY, Some(LogicalType::String)),
+        ColumnKind::Integer => (Physical::INT64, None),
+        ColumnKind::Number if column.is_single => (Physical::FLOAT, None),
+        ColumnKind::Number => (Physical::DOUBLE, None),
+        ColumnKind::Flag => (Physical::BOOLEAN, None),
+        ColumnKind::Time => (Physical::INT64, Some(LogicalType::timestamp(true, TimeUnit::NANOS))),
+        ColumnKind::Integers => {
             let count = Some(LogicalType::integer(32, false));
             return list_of(column.name, Physical::INT32, count);
         }
-        Kind::Numbers => return list_of(column.name, Physical::FLOAT, None),
+        ColumnKind::Numbers => return list_of(column.name, Physical::FLOAT, None),
     };
     Type::primitive_type_builder(column.name, physical)
         .with_repetition(Repetition::OPTIONAL)
@@ -98,23 +98,23 @@ fn list_of(
 }
 
 /// Returns the path of a column's values in the schema.
-pub(super) fn leaf_path(column: &Field) -> ColumnPath {
-    let is_list = matches!(column.kind, Kind::Integers | Kind::Numbers);
+pub(super) fn leaf_path(column: &ColumnType) -> ColumnPath {
+    let is_list = matches!(column.kind, ColumnKind::Integers | ColumnKind::Numbers);
     let below: &[&str] = if is_list { &["list", "element"] } else { &[] };
     ColumnPath::new([column.name].iter().chain(below).map(ToString::to_string).collect())
 }
 
 impl ColumnBuffer {
     /// Creates an empty buffer.
-    pub(super) fn new(column: &Field) -> Self {
+    pub(super) fn new(column: &ColumnType) -> Self {
         let values = match column.kind {
-            Kind::Text => Values::Text(DistinctTexts::default()),
-            Kind::Integer | Kind::Time => Values::Whole(Vec::new()),
-            Kind::Number if column.is_single => Values::Single(Vec::new()),
-            Kind::Number => Values::Double(Vec::new()),
-            Kind::Flag => Values::Flag(Vec::new()),
-            Kind::Integers => Values::List(Elements::Whole(Vec::new()), Vec::new()),
-            Kind::Numbers => Values::List(Elements::Single(Vec::new()), Vec::new()),
+            ColumnKind::Text => Values::Text(DistinctTexts::default()),
+            ColumnKind::Integer | ColumnKind::Time => Values::Whole(Vec::new()),
+            ColumnKind::Number if column.is_single => Values::Single(Vec::new()),
+            ColumnKind::Number => Values::Double(Vec::new()),
+            ColumnKind::Flag => Values::Flag(Vec::new()),
+            ColumnKind::Integers => Values::List(Elements::Whole(Vec::new()), Vec::new()),
+            ColumnKind::Numbers => Values::List(Elements::Single(Vec::new()), Vec::new()),
         };
         Self { values, definitions: Vec::new() }
     }

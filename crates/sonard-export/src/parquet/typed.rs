@@ -18,7 +18,7 @@ use super::{
     file_metadata::FileMetadata,
     write_error,
 };
-use crate::{ExportError, Field, Kind, Value};
+use crate::{ExportError, ColumnType, ColumnKind, Value};
 
 /// Parquet table of nullable, typed columns, compressed by Snappy and written row by row.
 pub struct TypedTable<W: Write + Send> {
@@ -45,7 +45,7 @@ impl<W: Write + Send> TypedTable<W> {
     ///
     /// # Errors
     /// Returns the write error of the output.
-    pub fn new(out: W, row: &str, fields: &[Field]) -> Result<Self, ExportError> {
+    pub fn new(out: W, row: &str, fields: &[ColumnType]) -> Result<Self, ExportError> {
         let schema = schema(row, fields).map_err(write_error)?;
         let mut out = SerializedFileWriter::new(out, schema, Arc::new(properties(fields)))
             .map_err(write_error)?;
@@ -61,12 +61,12 @@ impl<W: Write + Send> TypedTable<W> {
 
     /// Returns `true` if `head` is the beginning of such a table.
     #[must_use]
-    pub fn begins(head: &[u8]) -> bool {
+    pub fn is_own_file(head: &[u8]) -> bool {
         head.strip_prefix(MAGIC).is_some_and(|rest| rest.starts_with(b"sonard "))
     }
 
     /// Adds an entry to the metadata of the table, such as its origin.
-    pub fn remark(&mut self, key: &str, value: String) {
+    pub fn add_metadata(&mut self, key: &str, value: String) {
         self.metadata.add(key, value);
     }
 
@@ -122,7 +122,7 @@ impl<W: Write + Send> TypedTable<W> {
     }
 }
 
-fn schema(row: &str, fields: &[Field]) -> Result<TypePtr, ParquetError> {
+fn schema(row: &str, fields: &[ColumnType]) -> Result<TypePtr, ParquetError> {
     let fields = fields.iter().map(|field| parquet_type(field).map(Arc::new));
     let fields = fields.collect::<Result<_, _>>()?;
     Type::group_type_builder(row).with_fields(fields).build().map(Arc::new)
@@ -130,14 +130,14 @@ fn schema(row: &str, fields: &[Field]) -> Result<TypePtr, ParquetError> {
 
 /// Returns the writer properties: dictionaries for repeating positions, differences for counters,
 /// and separated byte streams for measured values, so that equal bytes are adjacent.
-fn properties(fields: &[Field]) -> WriterProperties {
+fn properties(fields: &[ColumnType]) -> WriterProperties {
     let by_default = WriterProperties::builder()
         .set_compression(Compression::SNAPPY)
         .set_statistics_enabled(EnabledStatistics::Chunk)
         .set_offset_index_disabled(true);
     let all = fields.iter().fold(by_default, |properties, field| {
         let Some(encoding) = encoding(field) else { return properties };
-        let by_dictionary = field.kind == Kind::Number && !field.is_single;
+        let by_dictionary = field.kind == ColumnKind::Number && !field.is_single;
         properties
             .set_column_encoding(leaf_path(field), encoding)
             .set_column_dictionary_enabled(leaf_path(field), by_dictionary)
@@ -146,10 +146,10 @@ fn properties(fields: &[Field]) -> WriterProperties {
 }
 
 /// Returns the encoding of a column without a dictionary.
-const fn encoding(field: &Field) -> Option<Encoding> {
+const fn encoding(field: &ColumnType) -> Option<Encoding> {
     match field.kind {
-        Kind::Integer | Kind::Time | Kind::Integers => Some(Encoding::DELTA_BINARY_PACKED),
-        Kind::Number | Kind::Numbers => Some(Encoding::BYTE_STREAM_SPLIT),
-        Kind::Text | Kind::Flag => None,
+        ColumnKind::Integer | ColumnKind::Time | ColumnKind::Integers => Some(Encoding::DELTA_BINARY_PACKED),
+        ColumnKind::Number | ColumnKind::Numbers => Some(Encoding::BYTE_STREAM_SPLIT),
+        ColumnKind::Text | ColumnKind::Flag => None,
     }
 }

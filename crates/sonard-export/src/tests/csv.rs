@@ -109,7 +109,7 @@ fn columns_have_unique_names_and_kinds() {
     assert_eq!(names.len(), COLUMNS.len());
     for scan in measured() {
         for ping in &scan.pings {
-            let row = crate::Row::new("small.jsonl", Some(1), &scan, ping);
+            let row = crate::ReadingRow::new("small.jsonl", Some(1), &scan, ping);
             for column in COLUMNS {
                 let kind = column.cell(&row).map_or(column.kind, |value| value.kind());
                 assert_eq!(kind, column.kind, "{}", column.name);

@@ -4,7 +4,7 @@ use byteorder::LittleEndian;
 use serde::Deserialize;
 use serde_json::Value;
 use sonard_interpret::interpret::{
-    Extents, Feature, Settings, Sweep,
+    Extents, Feature, InterpretSettings, Sweep,
     grid::{Grid, GridShape},
     interpret,
     lines::{LineKind, MapLine},
@@ -13,7 +13,7 @@ use sonard_model::geometry::DVec2;
 use sonard_records::Provenance;
 
 use crate::{
-    Findings, begins_geojson,
+    PlaceFindings, is_geojson,
     ros::interface::{MARKERS, OCCUPANCY_GRID},
     to_geojson, write_findings,
 };
@@ -38,26 +38,26 @@ fn lines() -> Vec<MapLine> {
 fn features() -> Vec<Feature> {
     let scans = simulated();
     let session = scans[0].session.as_deref().expect("it has one");
-    let extents = Extents::of_session(session).expect("good");
+    let extents = Extents::from_session(session).expect("good");
     let sweeps: Vec<_> =
         scans.iter().map(|scan| (scan.scan, Sweep::from_scan(scan).expect("good"))).collect();
-    let features = interpret(&sweeps, &extents, &Settings::default());
+    let features = interpret(&sweeps, &extents, &InterpretSettings::default());
     assert!(!features.is_empty());
     features
 }
 
 fn grid() -> Grid {
     let shape = GridShape::covering(DVec2::new(-1.0, 2.0), DVec2::new(-0.8, 2.1), 0.05);
-    Grid::of_probabilities(shape.expect("good"), &[0.1, 0.9, 0.5, 0.26, 0.999])
+    Grid::from_probabilities(shape.expect("good"), &[0.1, 0.9, 0.5, 0.26, 0.999])
 }
 
 const fn place<'a>(
     grid: Option<&'a Grid>,
     lines: &'a [MapLine],
     features: &'a [Feature],
-) -> Findings<'a> {
+) -> PlaceFindings<'a> {
     let (provenance, scene) = (Some(Provenance::Simulated), Some("simple-room"));
-    Findings { time: None, provenance, scene, grid, lines, features }
+    PlaceFindings { time: None, provenance, scene, grid, lines, features }
 }
 
 #[derive(Debug, Deserialize)]
@@ -115,7 +115,7 @@ fn geojson_has_lines_and_features() {
     (features[0].x_m, features[0].y_m) = (None, None);
     let text = to_geojson(&place(None, &lines, &features));
     assert!(
-        begins_geojson(text.as_bytes()) && !begins_geojson(b"{\"type\":\"FeatureCollection\"}")
+        is_geojson(text.as_bytes()) && !is_geojson(b"{\"type\":\"FeatureCollection\"}")
     );
     let read: Value = serde_json::from_str(&text).expect("JSON");
     assert_eq!(read["type"], "FeatureCollection");

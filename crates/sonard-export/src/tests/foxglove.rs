@@ -3,15 +3,15 @@ use std::collections::BTreeMap;
 use proptest::prelude::*;
 use serde_json::{Value, json};
 
-use crate::foxglove::{MAX_TEXT_BYTES, Session, Step, advertise};
+use crate::foxglove::{MAX_TEXT_BYTES, ViewerSession, ViewerAction, advertise};
 
 /// Channels that exist in these tests.
 fn is_there(channel: u32) -> bool {
     (1..=6).contains(&channel)
 }
 
-fn take(session: &mut Session, order: &Value) -> Vec<Step> {
-    session.take_text(&order.to_string(), is_there)
+fn take(session: &mut ViewerSession, order: &Value) -> Vec<ViewerAction> {
+    session.handle_text(&order.to_string(), is_there)
 }
 
 fn subscribe(requests: &[[u32; 2]]) -> Value {
@@ -20,8 +20,8 @@ fn subscribe(requests: &[[u32; 2]]) -> Value {
 }
 
 /// Returns the message of a status, which must be the only step.
-fn rejection(steps: &[Step]) -> String {
-    let [Step::Say(text)] = steps else { panic!("{steps:?}") };
+fn rejection(steps: &[ViewerAction]) -> String {
+    let [ViewerAction::SendText(text)] = steps else { panic!("{steps:?}") };
     let status: Value = serde_json::from_str(text).expect("JSON");
     assert_eq!((&status["op"], &status["level"]), (&json!("status"), &json!(2)));
     status["message"].as_str().expect("words").to_owned()
@@ -29,24 +29,24 @@ fn rejection(steps: &[Step]) -> String {
 
 #[test]
 fn subscribes_and_frames_messages() {
-    let mut session = Session::default();
+    let mut session = ViewerSession::default();
     assert_eq!(
         take(&mut session, &subscribe(&[[70, 3], [71, 1]])),
-        [Step::Begin(3), Step::Begin(1)]
+        [ViewerAction::StartChannel(3), ViewerAction::StartChannel(1)]
     );
     let frame = session.frame(3, 0x0102_0304_0506_0708, b"body").expect("subscribed");
     assert_eq!(frame, b"\x01\x46\0\0\0\x08\x07\x06\x05\x04\x03\x02\x01body");
     assert_eq!(session.frame(2, 0, b"body"), None);
     let order = json!({"op": "unsubscribe", "subscriptionIds": [70]});
-    assert_eq!(take(&mut session, &order), [Step::Cease(3)]);
+    assert_eq!(take(&mut session, &order), [ViewerAction::StopChannel(3)]);
     assert_eq!((session.frame(3, 0, b""), session.channels().collect::<Vec<_>>()), (None, vec![1]));
-    session.keep_only(|channel| channel == 2);
+    session.retain_channels(|channel| channel == 2);
     assert_eq!(session.frame(1, 0, b""), None, "the channel no longer exists");
 }
 
 #[test]
 fn rejects_invalid_messages() {
-    let mut session = Session::default();
+    let mut session = ViewerSession::default();
     take(&mut session, &subscribe(&[[1, 1]]));
     let long = "x".repeat(MAX_TEXT_BYTES);
     for (text, words) in [
@@ -69,22 +69,22 @@ fn rejects_invalid_messages() {
         (&format!(r#"{{"op":"{}"}}"#, &long[20..]), "only publishes"),
         (&"[".repeat(60_000), "invalid message"),
     ] {
-        let message = rejection(&session.take_text(text, is_there));
+        let message = rejection(&session.handle_text(text, is_there));
         let is_expected = message.contains(words) || message.chars().count() == 200;
         assert!(is_expected && message.chars().count() <= 200, "{message}");
     }
-    assert!(rejection(&session.take_binary()).contains("only publishes"));
+    assert!(rejection(&session.handle_binary()).contains("only publishes"));
     assert_eq!(session.channels().collect::<Vec<_>>(), [1]);
 }
 
 #[test]
 fn bounds_subscriptions() {
-    let mut session = Session::default();
+    let mut session = ViewerSession::default();
     let requests: Vec<[u32; 2]> = (0..2000).map(|number| [number, number]).collect();
     let steps = take(&mut session, &subscribe(&requests));
-    let statuses = steps.iter().filter(|step| matches!(step, Step::Say(_))).count();
+    let statuses = steps.iter().filter(|step| matches!(step, ViewerAction::SendText(_))).count();
     assert_eq!((steps.len(), statuses, session.channels().count()), (7, 1, 6), "{steps:?}");
-    let Some(Step::Say(text)) = steps.last() else { panic!("{steps:?}") };
+    let Some(ViewerAction::SendText(text)) = steps.last() else { panic!("{steps:?}") };
     assert!(text.contains("unknown channel 0, and 1993 more"), "{text}");
     let requests: Vec<[u32; 2]> = (0..10_000).map(|number| [number, number]).collect();
     assert!(rejection(&take(&mut session, &subscribe(&requests))).contains("at most"));
@@ -92,16 +92,16 @@ fn bounds_subscriptions() {
 
 #[test]
 fn closes_after_repeated_faults() {
-    let mut session = Session::default();
-    let ended = (1..=100).find(|_| session.take_text("?", is_there).contains(&Step::End));
+    let mut session = ViewerSession::default();
+    let ended = (1..=100).find(|_| session.handle_text("?", is_there).contains(&ViewerAction::Close));
     assert_eq!(ended, Some(100));
 }
 
 #[test]
 fn advertises_message_types() {
-    let mut live = crate::Live::new(crate::Settings::default());
+    let mut live = crate::LiveConverter::new(crate::ExportSettings::default());
     for record in super::scans::measured_records() {
-        live.take(record, |_| ()).expect("a whole session");
+        live.convert(record, |_| ()).expect("a whole session");
     }
     let text = advertise((1..).zip(live.topics()));
     let advertised: Value = serde_json::from_str(&text).expect("JSON");
@@ -131,14 +131,14 @@ proptest! {
     /// subscription id.
     #[test]
     fn steps_match_subscriptions(texts in prop::collection::vec(text(), 0..40)) {
-        let (mut session, mut begun) = (Session::default(), BTreeMap::new());
+        let (mut session, mut begun) = (ViewerSession::default(), BTreeMap::new());
         for text in texts {
-            for step in session.take_text(&text, is_there) {
+            for step in session.handle_text(&text, is_there) {
                 match step {
-                    Step::Begin(channel) => prop_assert!(begun.insert(channel, ()).is_none()),
-                    Step::Cease(channel) => prop_assert!(begun.remove(&channel).is_some()),
-                    Step::Say(text) => prop_assert!(serde_json::from_str::<Value>(&text).is_ok()),
-                    Step::End => {}
+                    ViewerAction::StartChannel(channel) => prop_assert!(begun.insert(channel, ()).is_none()),
+                    ViewerAction::StopChannel(channel) => prop_assert!(begun.remove(&channel).is_some()),
+                    ViewerAction::SendText(text) => prop_assert!(serde_json::from_str::<Value>(&text).is_ok()),
+                    ViewerAction::Close => {}
                 }
             }
             prop_assert!(begun.keys().all(|channel| is_there(*channel)));

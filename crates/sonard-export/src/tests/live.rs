@@ -2,23 +2,23 @@ use std::collections::BTreeMap;
 
 use sonard_records::{PingStatus, Record};
 
-use crate::{Distribution, Export as _, Live, McapExport, Settings, Topic};
+use crate::{Distribution, Export as _, LiveConverter, McapExport, ExportSettings, Topic};
 
 use super::scans::{measured, measured_records, of_array};
 
 type Messages = BTreeMap<String, Vec<(u64, Vec<u8>)>>;
 
-fn converted(records: impl IntoIterator<Item = Record>) -> (Live, Messages) {
-    converted_with(Settings::default(), records)
+fn converted(records: impl IntoIterator<Item = Record>) -> (LiveConverter, Messages) {
+    converted_with(ExportSettings::default(), records)
 }
 
 fn converted_with(
-    settings: Settings,
+    settings: ExportSettings,
     records: impl IntoIterator<Item = Record>,
-) -> (Live, Messages) {
-    let (mut live, mut messages) = (Live::new(settings), Messages::new());
+) -> (LiveConverter, Messages) {
+    let (mut live, mut messages) = (LiveConverter::new(settings), Messages::new());
     for record in records {
-        live.take(record, |message| {
+        live.convert(record, |message| {
             let copy = (message.at_ns, message.bytes.to_vec());
             messages.entry(message.topic.to_owned()).or_default().push(copy);
         })
@@ -30,7 +30,7 @@ fn converted_with(
 /// Messages of a recording of the same scans.
 fn recorded() -> Messages {
     let mut bytes = Vec::new();
-    let mut export = Box::new(McapExport::new(&mut bytes, Settings::default()).expect("memory"));
+    let mut export = Box::new(McapExport::new(&mut bytes, ExportSettings::default()).expect("memory"));
     for scan in measured() {
         export.scan("small.jsonl", &scan).expect("memory");
     }
@@ -64,29 +64,29 @@ fn topics_follow_the_session() {
     let (live, _) = converted([Record::Session(Box::new(session))]);
     let names: Vec<_> = live.topics().iter().map(|topic| topic.name.as_str()).collect();
     assert!(names.contains(&"/sonar/s0/range") && !names.contains(&"/sonar/scan"), "{names:?}");
-    assert!(live.topics().iter().all(|topic| topic.is_kept != topic.name.ends_with("/range")));
-    assert_eq!(Live::new(Settings::default()).topics(), []);
+    assert!(live.topics().iter().all(|topic| topic.is_retained != topic.name.ends_with("/range")));
+    assert_eq!(LiveConverter::new(ExportSettings::default()).topics(), []);
 }
 
 #[test]
 fn expected_topics_match_session() {
     let jazzy = Distribution::Jazzy;
     let (live, _) = converted(measured_records());
-    let draws = |live: &Live| live.topics().iter().any(|topic| topic.name == "/sonar/scene");
-    let predicts = |live: &Live| live.topics().iter().any(|topic| topic.name == "/sonar/residual");
+    let draws = |live: &LiveConverter| live.topics().iter().any(|topic| topic.name == "/sonar/scene");
+    let predicts = |live: &LiveConverter| live.topics().iter().any(|topic| topic.name == "/sonar/residual");
     assert!(predicts(&live));
     assert_eq!(Topic::expected(None, true, draws(&live), jazzy), live.topics());
 
     let session = of_array().remove(0).session.expect("it has one");
-    let mut live = Live::new(Settings::default());
-    live.take(Record::Session(Box::new((*session).clone())), |_| {}).expect("a whole session");
+    let mut live = LiveConverter::new(ExportSettings::default());
+    live.convert(Record::Session(Box::new((*session).clone())), |_| {}).expect("a whole session");
     let expected = Topic::expected(session.array.as_ref(), predicts(&live), draws(&live), jazzy);
     assert_eq!(expected, live.topics());
 }
 
 #[test]
 fn humble_range_lacks_variance() {
-    let humble = Settings { distribution: Distribution::Humble, ..Settings::default() };
+    let humble = ExportSettings { distribution: Distribution::Humble, ..ExportSettings::default() };
     let (live, of_humble) = converted_with(humble, measured_records());
     let (_, of_jazzy) = converted(measured_records());
     for (topic, messages) in &of_jazzy {
@@ -100,7 +100,7 @@ fn humble_range_lacks_variance() {
 
 #[test]
 fn robot_placement_is_optional() {
-    let elsewhere = Settings { places_robot: false, ..Settings::default() };
+    let elsewhere = ExportSettings { places_robot: false, ..ExportSettings::default() };
     let (_, placed) = converted_with(elsewhere, measured_records());
     let (_, all) = converted(measured_records());
     let has = |bytes: &[u8], name: &[u8]| bytes.windows(name.len()).any(|part| part == name);
@@ -115,12 +115,12 @@ fn invalid_session_has_no_topics() {
     let scan = measured().remove(0);
     let mut session = scan.session.as_deref().expect("it has one").clone();
     session.sensor.frequency_hz = -1.0;
-    let mut live = Live::new(Settings::default());
+    let mut live = LiveConverter::new(ExportSettings::default());
     let reject = |_: crate::LiveMessage<'_>| panic!("no message expected");
-    assert!(live.take(Record::Session(Box::new(session)), reject).is_err());
+    assert!(live.convert(Record::Session(Box::new(session)), reject).is_err());
     assert_eq!(live.topics(), []);
     for record in measured_records().into_iter().skip(1) {
-        live.take(record, reject).expect("skipped");
+        live.convert(record, reject).expect("skipped");
     }
 }
 

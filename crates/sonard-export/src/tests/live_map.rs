@@ -1,13 +1,13 @@
 use sonard_interpret::interpret::{
     Extents, Sweep,
     grid::Grid,
-    mapping::{Mapper, Mapping},
+    mapping::{Mapper, MapSettings},
 };
 use sonard_model::geometry::Pose;
 use sonard_records::{Record, ScanView};
 use uuid::Uuid;
 
-use crate::{Findings, LeftOut, Live, Settings, Topic, write_findings};
+use crate::{PlaceFindings, SkippedScan, LiveConverter, ExportSettings, Topic, write_findings};
 
 use super::scans::measured_records;
 
@@ -35,10 +35,10 @@ fn session() -> Record {
 }
 
 /// Returns the maps of records with their times, and the errors.
-fn maps(live: &mut Live, records: &[Record]) -> (Vec<(u64, Vec<u8>)>, Vec<LeftOut>) {
+fn maps(live: &mut LiveConverter, records: &[Record]) -> (Vec<(u64, Vec<u8>)>, Vec<SkippedScan>) {
     let (mut maps, mut left_out) = (Vec::new(), Vec::new());
     for record in records {
-        let result = live.take(record.clone(), |message| {
+        let result = live.convert(record.clone(), |message| {
             if message.topic == "/map" {
                 maps.push((message.at_ns, message.bytes.to_vec()));
             }
@@ -48,8 +48,8 @@ fn maps(live: &mut Live, records: &[Record]) -> (Vec<(u64, Vec<u8>)>, Vec<LeftOu
     (maps, left_out)
 }
 
-fn mapping_live() -> Live {
-    Live::new(Settings::default()).with_map(true)
+fn mapping_live() -> LiveConverter {
+    LiveConverter::new(ExportSettings::default()).with_map(true)
 }
 
 /// Returns the map message of a recording of these records.
@@ -58,7 +58,7 @@ fn recorded(records: &[Record]) -> Vec<u8> {
     let session = scans[0].session.as_deref().expect("it has one");
     let sweeps: Vec<Sweep> =
         scans.iter().map(|scan| Sweep::from_scan(scan).expect("good")).collect();
-    let (extents, mapping) = (Extents::of_session(session).expect("good"), Mapping::default());
+    let (extents, mapping) = (Extents::from_session(session).expect("good"), MapSettings::default());
     let shape = mapping.shape(&sweeps, mapping.max_range_m(&extents)).expect("small");
     let mut mapper = Mapper::new(&mapping, Grid::new(shape), extents, false, sweeps.len());
     sweeps.iter().for_each(|sweep| drop(mapper.add(sweep)));
@@ -67,7 +67,7 @@ fn recorded(records: &[Record]) -> Vec<u8> {
     let time = scans.iter().filter_map(|scan| Some(scan.start.as_ref()?.time)).max();
     let (lines, features) = (&[], &[]);
     let place =
-        Findings { time, provenance: None, scene: None, grid: Some(&grid), lines, features };
+        PlaceFindings { time, provenance: None, scene: None, grid: Some(&grid), lines, features };
     let mut bytes = Vec::new();
     write_findings(&mut bytes, &place).expect("memory takes it");
     let mut messages = mcap::MessageStream::new(&bytes).expect("a recording");
@@ -80,7 +80,7 @@ fn maps_all_scans_so_far() {
     unfinished.retain(|record| !matches!(record, Record::ScanEnd(_)));
     let scans = [scan_aside(1, 0.0), unfinished, scan_aside(3, -0.7)];
     let (mut live, mut so_far, mut found) = (mapping_live(), vec![session()], Vec::new());
-    drop(live.take(session(), |_| {}));
+    drop(live.convert(session(), |_| {}));
     assert!(live.topics().contains(&Topic::map()));
     for scan in &scans {
         let (maps, left_out) = maps(&mut live, scan);
@@ -109,7 +109,7 @@ fn continues_in_a_new_session() {
     assert_eq!((first.len(), second.len()), (1, 1));
     assert!(second[0].1 == recorded(&records) && second[0].0 >= first[0].0);
 
-    let mut without = Live::new(Settings::default());
+    let mut without = LiveConverter::new(ExportSettings::default());
     assert_eq!(maps(&mut without, &records), (Vec::new(), Vec::new()));
     assert!(!without.topics().contains(&Topic::map()));
 }
@@ -120,7 +120,7 @@ fn stops_once_at_a_large_place() {
     let near = [vec![session()], scan_aside(1, 0.0)].concat();
     assert_eq!(maps(&mut live, &near).0.len(), 1);
     let (found, left_out) = maps(&mut live, &scan_aside(2, 1e4));
-    let [LeftOut::Map(why)] = &left_out[..] else { panic!("{left_out:?}") };
+    let [SkippedScan::Map(why)] = &left_out[..] else { panic!("{left_out:?}") };
     assert!(found.is_empty() && why.contains("more than 500000 cells"), "{why}");
     assert!(left_out[0].to_string().contains("sonard map"));
     assert_eq!(maps(&mut live, &scan_aside(3, 0.0)), (Vec::new(), Vec::new()));

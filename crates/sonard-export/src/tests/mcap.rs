@@ -8,14 +8,14 @@ use jiff::Timestamp;
 use serde::{Deserialize, de::DeserializeOwned};
 
 use crate::{
-    Export as _, ExportError, LeftOut, LogFile, McapExport, Profile, Settings,
+    Export as _, ExportError, SkippedScan, AttachedLog, McapExport, Profile, ExportSettings,
     ros::interface::{FLOAT, Interface, LASER_SCAN, MARKERS, POINT_CLOUD, RANGE, TRANSFORMS},
 };
 use sonard_records::{PingStatus, ScanView};
 
 use super::scans::{Full, bare, every_status, measured, of_array, simulated};
 
-fn recorded_with(scans: &[ScanView], settings: Settings) -> Vec<u8> {
+fn recorded_with(scans: &[ScanView], settings: ExportSettings) -> Vec<u8> {
     let mut bytes = Vec::new();
     let mut export = Box::new(McapExport::new(&mut bytes, settings).expect("memory takes it"));
     for scan in scans {
@@ -26,7 +26,7 @@ fn recorded_with(scans: &[ScanView], settings: Settings) -> Vec<u8> {
 }
 
 fn recorded(scans: &[ScanView]) -> Vec<u8> {
-    recorded_with(scans, Settings::default())
+    recorded_with(scans, ExportSettings::default())
 }
 
 /// Time and bytes of a message.
@@ -130,7 +130,7 @@ fn range_matches_reading() {
 fn profiles_encode_missing_echoes() {
     let scans = [every_status()];
     let found = |profile| {
-        let settings = Settings { profile, ..Settings::default() };
+        let settings = ExportSettings { profile, ..ExportSettings::default() };
         let topics = by_topic(&recorded_with(&scans, settings));
         let ranges: Vec<Range> = decoded(&topics["/sonar/range"]);
         let limits = (ranges[0].min_range, ranges[0].max_range);
@@ -260,29 +260,29 @@ fn synthetic_times_are_sequential() {
 fn attaches_the_log() {
     let text = "{\"type\":\"session\"}\n".repeat(10_000);
     let mut bytes = Vec::new();
-    let mut export = Box::new(McapExport::new(&mut bytes, Settings::default()).expect("memory"));
+    let mut export = Box::new(McapExport::new(&mut bytes, ExportSettings::default()).expect("memory"));
     let written = Timestamp::UNIX_EPOCH;
-    let log = LogFile { name: "small.jsonl", bytes: text.len() as u64, written };
+    let log = AttachedLog { name: "small.jsonl", bytes: text.len() as u64, modified: written };
     export.attach(&log, &mut text.as_bytes()).expect("attached");
     export.finish().expect("memory");
     let summary = mcap::Summary::read(&bytes).expect("reads").expect("it has one");
     let found = mcap::read::attachment(&bytes, &summary.attachment_indexes[0]).expect("reads");
     assert_eq!((found.name.as_str(), &*found.data), ("small.jsonl", text.as_bytes()));
     // A log that has become shorter is an error.
-    let mut export = McapExport::new(Vec::new(), Settings::default()).expect("memory");
+    let mut export = McapExport::new(Vec::new(), ExportSettings::default()).expect("memory");
     let short = export.attach(&log, &mut &text.as_bytes()[1..]);
     assert!(matches!(short, Err(ExportError::Attach { .. })), "{short:?}");
 }
 
 #[test]
 fn skips_scans_without_session_or_pose() {
-    let mut export = McapExport::new(Vec::new(), Settings::default()).expect("memory");
+    let mut export = McapExport::new(Vec::new(), ExportSettings::default()).expect("memory");
     for scan in bare() {
-        assert_eq!(export.scan("a", &scan).expect("memory"), Some(LeftOut::NoSession));
+        assert_eq!(export.scan("a", &scan).expect("memory"), Some(SkippedScan::NoSession));
     }
     for mut scan in measured() {
         scan.start = None;
-        assert_eq!(export.scan("a", &scan).expect("memory"), Some(LeftOut::NoPose));
+        assert_eq!(export.scan("a", &scan).expect("memory"), Some(SkippedScan::NoPose));
     }
     for mut scan in measured() {
         let mut session = scan.session.as_deref().expect("it has one").clone();
@@ -290,7 +290,7 @@ fn skips_scans_without_session_or_pose() {
         scan.session = Some(session.into());
         for _ in 0..2 {
             let left_out = export.scan("a", &scan).expect("memory");
-            assert!(matches!(left_out, Some(LeftOut::Session(_))), "{left_out:?}");
+            assert!(matches!(left_out, Some(SkippedScan::Session(_))), "{left_out:?}");
         }
     }
 }
@@ -303,7 +303,7 @@ fn topics_declare_types_and_qos() {
     let mut scans = measured();
     scans.extend(of_array());
     let recording = recorded(&scans);
-    assert!(McapExport::<Vec<u8>>::begins(&recording));
+    assert!(McapExport::<Vec<u8>>::is_own_file(&recording));
     let summary = mcap::Summary::read(&recording).expect("reads").expect("it has one");
     let known: BTreeMap<_, _> = INTERFACES.iter().map(|each| (each.name, each)).collect();
     let mut used = BTreeSet::new();
@@ -327,7 +327,7 @@ fn topics_declare_types_and_qos() {
 #[test]
 fn reports_full_disk() {
     let mut export =
-        Box::new(McapExport::new(Full(500), Settings::default()).expect("its head fits"));
+        Box::new(McapExport::new(Full(500), ExportSettings::default()).expect("its head fits"));
     let result = measured().iter().try_for_each(|scan| export.scan("a", scan).map(drop));
     match result.and_then(|()| export.finish()) {
         Err(ExportError::Write(error)) => assert_eq!(error.kind(), io::ErrorKind::StorageFull),

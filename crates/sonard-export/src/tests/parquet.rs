@@ -7,7 +7,7 @@ use ::parquet::{
 use sonard_records::{Ping, PingStatus, ScanView};
 
 use crate::{
-    COLUMNS, Column, CsvExport, Export as _, ExportError, Kind, ParquetExport, Row, Value,
+    COLUMNS, TableColumn, CsvExport, Export as _, ExportError, ColumnKind, ParquetExport, ReadingRow, Value,
 };
 
 use super::scans::{Full, bare, every_status, measured, of_array, simulated};
@@ -15,7 +15,7 @@ use super::scans::{Full, bare, every_status, measured, of_array, simulated};
 fn exported(scans: &[ScanView]) -> Vec<u8> {
     let mut bytes = Vec::new();
     let mut export = Box::new(ParquetExport::new(&mut bytes).expect("memory takes it"));
-    export.remark("shard", "3 of 8".to_owned());
+    export.add_metadata("shard", "3 of 8".to_owned());
     for scan in scans {
         assert_eq!(export.scan("small.jsonl", scan).expect("memory takes it"), None);
     }
@@ -35,7 +35,7 @@ fn rows(bytes: Vec<u8>) -> Vec<BTreeMap<String, Field>> {
 }
 
 /// Returns the expected cell in Parquet.
-fn cell(column: &Column, row: &Row<'_>) -> Field {
+fn cell(column: &TableColumn, row: &ReadingRow<'_>) -> Field {
     let Some(value) = column.cell(row) else { return Field::Null };
     match value {
         Value::Text(text) => Field::Str(text.into_owned()),
@@ -67,11 +67,11 @@ fn cells_have_their_types() {
         assert_eq!(rows.len(), pings.clone().count());
         for (read, (scan, ping)) in rows.iter().zip(pings) {
             let number = scan.session.is_some().then_some(1);
-            let row = Row::new("small.jsonl", number, scan, ping);
+            let row = ReadingRow::new("small.jsonl", number, scan, ping);
             assert_eq!(read.len(), COLUMNS.len());
             for column in COLUMNS {
                 match column.kind {
-                    Kind::Integers => assert_eq!(list(&read[column.name]), *ping.echo_ticks),
+                    ColumnKind::Integers => assert_eq!(list(&read[column.name]), *ping.echo_ticks),
                     _ => assert_eq!(read[column.name], cell(column, &row), "{}", column.name),
                 }
             }
@@ -137,9 +137,9 @@ fn long_texts_end_a_group() {
 #[test]
 fn detected_by_its_head() {
     let bytes = exported(&measured());
-    assert!(ParquetExport::<Vec<u8>>::begins(&bytes));
+    assert!(ParquetExport::<Vec<u8>>::is_own_file(&bytes));
     for other in [&bytes[..4], b"PAR1\x15\x04", b"sonard 0.1.0", b""] {
-        assert!(!ParquetExport::<Vec<u8>>::begins(other), "{other:?}");
+        assert!(!ParquetExport::<Vec<u8>>::is_own_file(other), "{other:?}");
     }
 }
 

@@ -2,30 +2,30 @@
 
 use std::fmt::Write as _;
 
-use sonard_export::Kind;
+use sonard_export::ColumnKind;
 
-use super::Manifest;
+use super::DataSetManifest;
 use crate::{
-    distribution::Spread,
+    distribution::NumberDistribution,
     shard::Generator,
-    spec::{SceneKeys, Shape, Spec},
-    table::Table,
+    spec::{SpecSceneKeys, RoomShape, Spec},
+    table::ShardTable,
 };
 
 /// Writes the card. Writing to a string cannot fail.
-pub(super) fn card(manifest: &Manifest, generator: &Generator) -> String {
+pub(super) fn card(manifest: &DataSetManifest, generator: &Generator) -> String {
     let spec = generator.spec();
     let mut text = format!("# {}\n\n", manifest.name);
     if !manifest.about.is_empty() {
         let _ = writeln!(text, "{}\n", manifest.about);
     }
-    let rows = |table: Table| manifest.totals.rows.get(&table).copied().unwrap_or_default();
-    let readings = rows(Table::Readings);
+    let rows = |table: ShardTable| manifest.totals.rows.get(&table).copied().unwrap_or_default();
+    let readings = rows(ShardTable::Readings);
     let _ = writeln!(
         text,
         "{readings} simulated readings of ultrasonic rangers in {} scenes, {} poses in each; {} shards, {} bytes, \
          {:.1} bytes per reading.\n",
-        rows(Table::Scenes),
+        rows(ShardTable::Scenes),
         spec.set.poses,
         manifest.shards,
         manifest.totals.bytes,
@@ -118,11 +118,11 @@ fn write_measurement(text: &mut String, spec: &Spec) {
     let _ = writeln!(text, "- Engine: {}\n", spec.model.engine.name());
 }
 
-fn scene(kind: &SceneKeys) -> String {
+fn scene(kind: &SpecSceneKeys) -> String {
     match (kind.shape, &kind.file) {
-        (Shape::File, Some(name)) => format!("`{name}`"),
+        (RoomShape::File, Some(name)) => format!("`{name}`"),
         (shape, _) => {
-            let side = |spread: &Option<Spread>| {
+            let side = |spread: &Option<NumberDistribution>| {
                 spread.as_ref().map_or_else(String::new, |spread| distribution_text(spread, " m"))
             };
             format!(
@@ -135,21 +135,21 @@ fn scene(kind: &SceneKeys) -> String {
     }
 }
 
-fn distribution_text(spread: &Spread, unit: &str) -> String {
+fn distribution_text(spread: &NumberDistribution, unit: &str) -> String {
     match spread {
-        Spread::Fixed(number) => format!("{number}{unit}"),
-        Spread::Even([least, most]) => format!("{least} to {most}{unit}"),
-        Spread::Normal { mean, sigma, least, most } => {
+        NumberDistribution::Fixed(number) => format!("{number}{unit}"),
+        NumberDistribution::Uniform([least, most]) => format!("{least} to {most}{unit}"),
+        NumberDistribution::Normal { mean, sigma, least, most } => {
             format!("{mean} ± {sigma}{unit} (within {least} to {most})")
         }
-        Spread::AnyOf(numbers) => {
+        NumberDistribution::AnyOf(numbers) => {
             let numbers: Vec<_> = numbers.iter().map(ToString::to_string).collect();
             format!("one of {}{unit}", numbers.join(", "))
         }
     }
 }
 
-fn write_generation(text: &mut String, manifest: &Manifest) {
+fn write_generation(text: &mut String, manifest: &DataSetManifest) {
     let rejected = &manifest.totals.redrawn;
     let _ = writeln!(
         text,
@@ -177,14 +177,14 @@ fn write_tables(text: &mut String, generator: &Generator) {
         text.push_str("| column | type | meaning |\n| --- | --- | --- |\n");
         for column in table.columns(&generator.spec().keep) {
             let kind = match column.field.kind {
-                Kind::Text => "text",
-                Kind::Integer => "integer",
-                Kind::Number if column.field.is_single => "float",
-                Kind::Number => "double",
-                Kind::Flag => "boolean",
-                Kind::Time => "time",
-                Kind::Integers => "list of integers",
-                Kind::Numbers => "list of floats",
+                ColumnKind::Text => "text",
+                ColumnKind::Integer => "integer",
+                ColumnKind::Number if column.field.is_single => "float",
+                ColumnKind::Number => "double",
+                ColumnKind::Flag => "boolean",
+                ColumnKind::Time => "time",
+                ColumnKind::Integers => "list of integers",
+                ColumnKind::Numbers => "list of floats",
             };
             let _ = writeln!(text, "| `{}` | {kind} | {} |", column.field.name, column.about);
         }

@@ -3,7 +3,7 @@
 use rand::{Rng, RngExt as _};
 use sonard_model::geometry::{DVec2, distance_to_segment, encloses};
 
-use super::{Redrawn, Rejection, room::RoomOutline};
+use super::{RejectedDraws, Rejection, room::RoomOutline};
 use crate::spec::FurnitureKeys;
 
 /// Piece of furniture in plan view.
@@ -32,7 +32,7 @@ pub(super) fn furnish(
     outline: &RoomOutline,
     keys: &FurnitureKeys,
     rng: &mut impl Rng,
-    redrawn: &mut Redrawn,
+    redrawn: &mut RejectedDraws,
 ) -> Result<Vec<Furniture>, Rejection> {
     let mut room =
         FurnishedRoom { outline, walls: outline.walls().collect(), occupied: Vec::new() };

@@ -6,8 +6,8 @@ use rand::{Rng, RngExt as _};
 use sonard_model::geometry::DVec2;
 
 use crate::{
-    distribution::Spread,
-    spec::{SceneKeys, Shape},
+    distribution::NumberDistribution,
+    spec::{SpecSceneKeys, RoomShape},
 };
 
 /// Corners of a room, counter-clockwise.
@@ -30,22 +30,22 @@ const UNEVEN: f64 = 0.3;
 const INDENT: f64 = 0.3;
 
 /// Samples the outline of a room; shape `file` has none and is not passed.
-pub(super) fn outline(keys: &SceneKeys, rng: &mut impl Rng) -> RoomOutline {
-    let draw = |spread: &Option<Spread>, default: Spread, rng: &mut _| {
+pub(super) fn outline(keys: &SpecSceneKeys, rng: &mut impl Rng) -> RoomOutline {
+    let draw = |spread: &Option<NumberDistribution>, default: NumberDistribution, rng: &mut _| {
         spread.as_ref().unwrap_or(&default).draw(rng)
     };
-    let width_m = draw(&keys.width_m, Spread::Fixed(4.0), rng);
-    let depth_m = draw(&keys.depth_m, Spread::Fixed(4.0), rng);
-    let mut notch = || draw(&keys.notch, Spread::Even([0.3, 0.6]), rng);
+    let width_m = draw(&keys.width_m, NumberDistribution::Fixed(4.0), rng);
+    let depth_m = draw(&keys.depth_m, NumberDistribution::Fixed(4.0), rng);
+    let mut notch = || draw(&keys.notch, NumberDistribution::Uniform([0.3, 0.6]), rng);
     let corners = match keys.shape {
-        Shape::Rectangle | Shape::File => {
+        RoomShape::Rectangle | RoomShape::File => {
             vec![[0.0, 0.0], [width_m, 0.0], [width_m, depth_m], [0.0, depth_m]]
         }
-        Shape::L => {
+        RoomShape::L => {
             let (x, y) = (width_m * (1.0 - notch()), depth_m * (1.0 - notch()));
             vec![[0.0, 0.0], [width_m, 0.0], [width_m, y], [x, y], [x, depth_m], [0.0, depth_m]]
         }
-        Shape::T => {
+        RoomShape::T => {
             let (x, y) = (0.5 * width_m * notch(), depth_m * notch());
             vec![
                 [x, 0.0],
@@ -58,13 +58,13 @@ pub(super) fn outline(keys: &SceneKeys, rng: &mut impl Rng) -> RoomOutline {
                 [x, y],
             ]
         }
-        Shape::Polygon => {
-            let default = Spread::Even([5.0, 8.0]);
+        RoomShape::Polygon => {
+            let default = NumberDistribution::Uniform([5.0, 8.0]);
             let count = keys.corners.as_ref().unwrap_or(&default).count(rng);
             polygon(count, DVec2::new(width_m, depth_m), rng)
         }
     };
-    let turn_deg = draw(&keys.turn_deg, Spread::Fixed(0.0), rng);
+    let turn_deg = draw(&keys.turn_deg, NumberDistribution::Fixed(0.0), rng);
     let turn = DVec2::from_angle(turn_deg.to_radians());
     // Rooms without rotation avoid rounding errors.
     let turned = |corner: [f64; 2]| match turn_deg == 0.0 {

@@ -7,7 +7,7 @@ use serde::Serialize;
 use sonard_model::{geometry::DVec2, scene::Scene};
 
 use super::{Rejection, furnish::Furniture, room::RoomOutline};
-use crate::spec::{SceneKeys, Spec};
+use crate::spec::{SpecSceneKeys, Spec};
 
 /// Scene file. A struct keeps the order of members independent of the build, unlike a JSON map.
 #[derive(Serialize)]
@@ -64,7 +64,7 @@ struct CylinderEntry<'a> {
 /// Returns an error for an invalid scene, such as walls of zero length or zero angle.
 pub(super) fn scene(
     spec: &Spec,
-    keys: &SceneKeys,
+    keys: &SpecSceneKeys,
     outline: &RoomOutline,
     pieces: &[Furniture],
     rng: &mut impl Rng,

@@ -4,7 +4,7 @@ use sonard_model::{
     acoustics::ReceiverNoise,
     geometry::Pose,
     model::{Arrival, Prediction, Simulator, TooCostly},
-    plan::ScanPlan,
+    scan_plan::ScanPlan,
 };
 
 use crate::{

@@ -7,7 +7,7 @@ use std::{
 
 use serde::Serialize;
 use smallvec::SmallVec;
-use sonard_export::{ExportError, Field, TypedTable, Value};
+use sonard_export::{ExportError, ColumnType, TypedTable, Value};
 use sonard_interpret::interpret::grid::{GridShape, ideal};
 use sonard_model::{
     geometry::DVec2,
@@ -21,7 +21,7 @@ use crate::{
     sample::SampledScene,
     shard::ShardError,
     spec::{KeepKeys, Spec},
-    table::Table,
+    table::ShardTable,
 };
 
 type Row<'a> = SmallVec<[Option<Value<'a>>; 20]>;
@@ -29,7 +29,7 @@ type Row<'a> = SmallVec<[Option<Value<'a>>; 20]>;
 /// Open tables with their numbers of rows.
 pub(super) struct TableWriter {
     keep: KeepKeys,
-    open: BTreeMap<Table, (TypedTable<Box<dyn Write + Send>>, u64)>,
+    open: BTreeMap<ShardTable, (TypedTable<Box<dyn Write + Send>>, u64)>,
 }
 
 impl TableWriter {
@@ -37,21 +37,21 @@ impl TableWriter {
     pub(super) fn create(
         spec: &Spec,
         identity: &str,
-        create: &mut dyn FnMut(Table) -> io::Result<Box<dyn Write + Send>>,
+        create: &mut dyn FnMut(ShardTable) -> io::Result<Box<dyn Write + Send>>,
     ) -> Result<Self, ShardError> {
         let mut open = BTreeMap::new();
-        for table in Table::for_spec(spec) {
+        for table in ShardTable::for_spec(spec) {
             let columns = table.columns(&spec.keep);
-            let fields: Vec<Field> = columns.iter().map(|column| column.field).collect();
+            let fields: Vec<ColumnType> = columns.iter().map(|column| column.field).collect();
             let mut typed = TypedTable::new(create(table)?, table.row(), &fields)?;
-            typed.remark("sonard.shard", identity.to_owned());
+            typed.add_metadata("sonard.shard", identity.to_owned());
             open.insert(table, (typed, 0));
         }
         Ok(Self { keep: spec.keep.clone(), open })
     }
 
     /// Finishes all tables and returns their numbers of rows.
-    pub(super) fn finish(self) -> Result<BTreeMap<Table, u64>, ShardError> {
+    pub(super) fn finish(self) -> Result<BTreeMap<ShardTable, u64>, ShardError> {
         let mut all = BTreeMap::new();
         for (table, (typed, rows)) in self.open {
             typed.finish()?;
@@ -60,7 +60,7 @@ impl TableWriter {
         Ok(all)
     }
 
-    fn row(&mut self, table: Table, row: Row<'_>) -> Result<(), ExportError> {
+    fn row(&mut self, table: ShardTable, row: Row<'_>) -> Result<(), ExportError> {
         let Some((typed, rows)) = self.open.get_mut(&table) else { return Ok(()) };
         *rows += 1;
         typed.row(row)
@@ -74,7 +74,7 @@ impl TableWriter {
     ) -> Result<(), ExportError> {
         let (air, noise) = (&drawn.air, &drawn.noise);
         self.row(
-            Table::Scenes,
+            ShardTable::Scenes,
             Row::from_iter([
                 integer(drawn.number),
                 integer(drawn.kind as u64 + 1),
@@ -108,7 +108,7 @@ impl TableWriter {
             });
             let path = self.keep.path.then(|| echo_path(simulator, firing)).flatten();
             let row = self.reading(simulator, at, (firing, index), path.as_deref(), ideal_m);
-            self.row(Table::Readings, row)?;
+            self.row(ShardTable::Readings, row)?;
             for echo in &firing.echoes {
                 let path = path_text(simulator, &echo.path, echo.length_m);
                 let row = Row::from_iter([
@@ -121,7 +121,7 @@ impl TableWriter {
                     number(echo.amplitude),
                     text(&path),
                 ]);
-                self.row(Table::Echoes, row)?;
+                self.row(ShardTable::Echoes, row)?;
             }
         }
         Ok(())
@@ -194,7 +194,7 @@ impl TableWriter {
                     feature.radius_m.map(Value::Number),
                     feature.opening_deg.map(Value::Number),
                 ]);
-                self.row(Table::Features, row)?;
+                self.row(ShardTable::Features, row)?;
             }
         }
         if self.keep.occupancy_m > 0.0 {
@@ -220,7 +220,7 @@ impl TableWriter {
             integer(shape.height as u64),
             Some(Value::Integers(&cells)),
         ]);
-        Ok(self.row(Table::Occupancy, row)?)
+        Ok(self.row(ShardTable::Occupancy, row)?)
     }
 }
 
@@ -255,7 +255,7 @@ fn echo_path(simulator: &Simulator, firing: &SimulatedFiring) -> Option<String> 
 }
 
 fn path_text(simulator: &Simulator, path: &Path, length_m: f64) -> String {
-    PathRecord::from_path(simulator.scene(), path, length_m).in_words()
+    PathRecord::from_path(simulator.scene(), path, length_m).describe()
 }
 
 fn integer<'a>(number: u64) -> Option<Value<'a>> {

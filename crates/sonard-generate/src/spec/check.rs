@@ -2,10 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use sonard_model::{acoustics::Sensor, plan::ScanPlan, scene::Scene};
+use sonard_model::{acoustics::Sensor, scan_plan::ScanPlan, scene::Scene};
 
-use super::{KeepKeys, SceneKeys, Shape, Spec, error::SpecFault};
-use crate::distribution::Spread;
+use super::{KeepKeys, SpecSceneKeys, RoomShape, Spec, error::SpecFault};
+use crate::distribution::NumberDistribution;
 
 /// Maximum numbers of shards, of scenes per shard, and of poses per scene.
 const MAX_SHARDS: u32 = 1_000_000;
@@ -77,7 +77,7 @@ fn check_set(spec: &Spec) -> Result<(), SpecFault> {
     Ok(())
 }
 
-fn check_scene(path: &str, keys: &SceneKeys, spec: &Spec) -> Result<(), SpecFault> {
+fn check_scene(path: &str, keys: &SpecSceneKeys, spec: &Spec) -> Result<(), SpecFault> {
     let field_path = |field: &str| format!("{path}.{field}");
     number(field_path("weight"), keys.weight, 0.0, 1e9)?;
     if keys.weight == 0.0 && spec.scene.len() == 1 {
@@ -87,8 +87,8 @@ fn check_scene(path: &str, keys: &SceneKeys, spec: &Spec) -> Result<(), SpecFaul
             "give 1",
         ));
     }
-    let is_file = keys.shape == Shape::File;
-    let has_notch = matches!(keys.shape, Shape::L | Shape::T);
+    let is_file = keys.shape == RoomShape::File;
+    let has_notch = matches!(keys.shape, RoomShape::L | RoomShape::T);
     let shape = format!("{:?}", keys.shape).to_lowercase();
     for (field, is_given, is_allowed) in [
         ("file", keys.file.is_some(), is_file),
@@ -106,7 +106,7 @@ fn check_scene(path: &str, keys: &SceneKeys, spec: &Spec) -> Result<(), SpecFaul
     }
     for (field, is_given, is_allowed) in [
         ("notch", keys.notch.is_some(), has_notch),
-        ("corners", keys.corners.is_some(), keys.shape == Shape::Polygon),
+        ("corners", keys.corners.is_some(), keys.shape == RoomShape::Polygon),
         ("turn_deg", keys.turn_deg.is_some(), !is_file),
         ("walls", !keys.walls.is_empty(), !is_file),
     ] {
@@ -157,7 +157,7 @@ fn check_furniture(spec: &Spec) -> Result<(), SpecFault> {
     let Some(heights) = &spec.heights else { return Ok(()) };
     within("heights.ceiling_m", &heights.ceiling_m, 0.1, MAX_ROOM_M)?;
     // The transducer must be below every possible ceiling.
-    within("heights.sensor_m", &heights.sensor_m, 0.01, heights.ceiling_m.least() - 0.01)?;
+    within("heights.sensor_m", &heights.sensor_m, 0.01, heights.ceiling_m.min() - 0.01)?;
     materials("heights.floor", &heights.floor, spec)?;
     materials("heights.ceiling", &heights.ceiling, spec)
 }
@@ -196,9 +196,9 @@ fn materials(path: &str, names: &[String], spec: &Spec) -> Result<(), SpecFault>
     Ok(())
 }
 
-fn count(path: impl Into<String>, spread: &Spread, least: f64, most: f64) -> Result<(), SpecFault> {
+fn count(path: impl Into<String>, spread: &NumberDistribution, least: f64, most: f64) -> Result<(), SpecFault> {
     let path = path.into();
-    if spread.least().fract() != 0.0 || spread.most().fract() != 0.0 {
+    if spread.min().fract() != 0.0 || spread.max().fract() != 0.0 {
         return Err(SpecFault::new(path, "it counts things", "give whole numbers"));
     }
     within(path, spread, least, most)
@@ -206,16 +206,16 @@ fn count(path: impl Into<String>, spread: &Spread, least: f64, most: f64) -> Res
 
 fn within(
     path: impl Into<String>,
-    spread: &Spread,
+    spread: &NumberDistribution,
     least: f64,
     most: f64,
 ) -> Result<(), SpecFault> {
-    match spread.least() >= least && spread.most() <= most {
+    match spread.min() >= least && spread.max() <= most {
         true => Ok(()),
         false => {
-            let message = match spread.least() == spread.most() {
-                true => format!("it is {}", spread.least()),
-                false => format!("it can be {} to {}", spread.least(), spread.most()),
+            let message = match spread.min() == spread.max() {
+                true => format!("it is {}", spread.min()),
+                false => format!("it can be {} to {}", spread.min(), spread.max()),
             };
             Err(SpecFault::new(path, message, format!("give {least} to {most}")))
         }

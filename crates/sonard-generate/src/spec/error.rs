@@ -8,7 +8,7 @@ pub struct SpecError {
     /// File name, as given by the caller.
     pub file: String,
     /// Line and column from 1, if known.
-    pub place: Option<(usize, usize)>,
+    pub position: Option<(usize, usize)>,
     /// Path of the field, such as `scene[0].width_m`; empty for the whole file.
     pub field: String,
     /// Description of the fault.
@@ -20,7 +20,7 @@ pub struct SpecError {
 impl fmt::Display for SpecError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&self.file)?;
-        if let Some((line, column)) = self.place {
+        if let Some((line, column)) = self.position {
             write!(f, ":{line}:{column}")?;
         }
         match self.field.is_empty() {

@@ -52,7 +52,7 @@ pub(crate) fn from_toml(
     let at = |offset: usize| Some(place(text, offset));
     let syntax = |error: toml::de::Error| SpecError {
         file: file.to_owned(),
-        place: error.span().and_then(|span| at(span.start)),
+        position: error.span().and_then(|span| at(span.start)),
         field: String::new(),
         message: error.message().to_owned(),
         help: "the file is TOML: [section] lines, with key = value lines after them".to_owned(),
@@ -60,7 +60,7 @@ pub(crate) fn from_toml(
     let spans = DeTable::parse(text).map_err(syntax)?;
     let locate = |fault: SpecFault| SpecError {
         file: file.to_owned(),
-        place: offset_of(spans.get_ref(), &fault.field).and_then(at),
+        position: offset_of(spans.get_ref(), &fault.field).and_then(at),
         field: fault.field,
         message: fault.message,
         help: fault.help,
@@ -72,7 +72,7 @@ pub(crate) fn from_toml(
         let place = inner.span().and_then(|span| at(span.start));
         let (message, help) = split_message(inner.message());
         let field = if field == "." { String::new() } else { field };
-        SpecError { file: file.to_owned(), place, field, message, help }
+        SpecError { file: file.to_owned(), position: place, field, message, help }
     })?;
     let files = ReferencedFiles::read(&spec, read).map_err(locate)?;
     files.load(spec).map_err(locate)
@@ -82,7 +82,7 @@ pub(crate) fn from_toml(
 pub(crate) fn from_json(file: &str, text: &str) -> Result<LoadedSpec, SpecError> {
     let fault = |field: String, place, message: String, help: String| SpecError {
         file: file.to_owned(),
-        place,
+        position: place,
         field,
         message,
         help,

@@ -5,7 +5,7 @@ use sonard_records::Record;
 
 use super::{PlacedReading, message::timestamp};
 use crate::{
-    Location, Reading, Taken,
+    FileLocation, ImportedReading, Assumptions,
     reading::RawReading,
     scans::{self, ArrayFiring, MAX_FIRINGS},
     sweep_end::SweepDetector,
@@ -14,7 +14,7 @@ use crate::{
 /// Splits a stream of readings into scans: for a rotating ranger where it returns to its first
 /// direction, for an array where a ranger fires again.
 pub(super) struct ScanCollector<'a> {
-    assumptions: &'a Taken,
+    assumptions: &'a Assumptions,
     /// Sound speed with which the ranges were computed, if they are to be corrected, m/s.
     assumed_m_s: Option<f64>,
     /// Names of the rangers of an array; empty for a rotating ranger.
@@ -30,7 +30,7 @@ pub(super) struct ScanCollector<'a> {
 const SAME_DEG: f64 = 1e-3;
 
 impl<'a> ScanCollector<'a> {
-    pub(super) fn new(assumptions: &'a Taken, assumed_m_s: Option<f64>, ids: Vec<String>) -> Self {
+    pub(super) fn new(assumptions: &'a Assumptions, assumed_m_s: Option<f64>, ids: Vec<String>) -> Self {
         let (readings, is_away, sweep, scans) = (Vec::new(), false, SweepDetector::default(), 0);
         Self { assumptions, assumed_m_s, ids, readings, is_away, sweep, scans }
     }
@@ -84,13 +84,13 @@ impl<'a> ScanCollector<'a> {
         self.is_away && (is_back || is_swept)
     }
 
-    fn reading(&self, readings: &PlacedReading) -> Reading {
+    fn reading(&self, readings: &PlacedReading) -> ImportedReading {
         let sound_m_s = self.assumptions.air.sound_speed_m_s();
         let tof_us = readings.range_m.map(|m| 2e6 * m / self.assumed_m_s.unwrap_or(sound_m_s));
         let corrected_m = |tof_us: f64| tof_us * 1e-6 * sound_m_s / 2.0;
-        Reading {
+        ImportedReading {
             // Messages have no line numbers; their errors were reported by the examination.
-            place: Location::Line(self.scans),
+            place: FileLocation::Line(self.scans),
             direction_deg: readings.direction_deg,
             is_bearing: false,
             status: readings.status,
@@ -102,7 +102,7 @@ impl<'a> ScanCollector<'a> {
             tof_us,
             time: Some(timestamp(readings.time_ns)),
             scan: None,
-            place_m: readings.pose.map(|pose| [pose.x_m, pose.y_m]),
+            position_m: readings.pose.map(|pose| [pose.x_m, pose.y_m]),
             heading_deg: readings.pose.map(|pose| pose.heading_deg),
             air: None,
             raw: RawReading::default(),

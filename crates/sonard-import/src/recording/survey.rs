@@ -16,7 +16,7 @@ use super::{
     pose_error,
     transforms::{FrameTree, TransformError},
 };
-use crate::{ImportError, Mapping, Taken};
+use crate::{ImportError, Mapping, Assumptions};
 
 /// Names of the robot's frame, the preferred first.
 const ROBOT: [&str; 3] = ["base_link", "base_footprint", "base"];
@@ -104,7 +104,7 @@ impl Bag {
     pub(crate) fn survey(
         open: &dyn Fn() -> std::io::Result<Box<dyn Read>>,
         mapping: &Mapping,
-        assumptions: &Taken,
+        assumptions: &Assumptions,
     ) -> Result<Self, ImportError> {
         let summary = RecordingSummary::read(open)?;
         let topics = select(&summary.kinds, mapping)?;
@@ -141,7 +141,7 @@ impl Bag {
                 "select one: --topic TOPIC",
             ));
         }
-        if !assumptions.as_said {
+        if !assumptions.skip_checks {
             bag.check_tilts()?;
         }
         bag.note_clock(&summary, mapping, first_ns);
@@ -281,7 +281,7 @@ impl Bag {
                 false => (mounted.elevation_deg().abs(), "beam inclined"),
             };
             if tilt_deg > MAX_TILT_DEG {
-                return Err(ImportError::Doubtful {
+                return Err(ImportError::Implausible {
                     what: format!(
                         "{topic}: {what} by {tilt_deg:.1} degrees against the robot (pitch or roll of frame `{}`), so ranges \
                                                  are not horizontal distances",

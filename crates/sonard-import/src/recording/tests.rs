@@ -15,7 +15,7 @@ use sonard_model::{acoustics::Air, geometry::Pose, reading::PingStatus};
 use sonard_records::{Ping, Record, ScanStart};
 
 use super::{LASER_SCAN, RANGE, TRANSFORMS, read_message};
-use crate::{Format, ImportError, Imported, Mapping, Source, Taken};
+use crate::{Format, ImportError, Imported, Mapping, ImportSource, Assumptions};
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Order {
@@ -114,23 +114,23 @@ impl Bag {
     }
 }
 
-fn assumptions() -> Taken {
-    Taken {
+fn assumptions() -> Assumptions {
+    Assumptions {
         sha256: String::new(),
         pose: Pose { x_m: 7.0, y_m: 8.0, heading_deg: 9.0 },
         array: None,
         sensor: "hc-sr04".to_owned(),
-        longest_m: 4.0,
-        least_m: 0.02,
+        max_range_m: 4.0,
+        min_range_m: 0.02,
         air: Air::default(),
         started: "2026-01-01T00:00:00Z".parse().expect("a time"),
-        as_said: false,
+        skip_checks: false,
     }
 }
 
 fn examine(bytes: &[u8], mapping: Mapping) -> Result<Imported, ImportError> {
     let open = || -> io::Result<Box<dyn io::Read>> { Ok(Box::new(Cursor::new(bytes.to_vec()))) };
-    Source { open: &open }.examine(mapping, assumptions())
+    ImportSource { open: &open }.examine(mapping, assumptions())
 }
 
 fn scans(bytes: &[u8], mapping: Mapping) -> Result<Vec<(ScanStart, Vec<Ping>)>, ImportError> {
@@ -330,7 +330,7 @@ fn rejects_truncated_recordings() {
     let sqlite = error_text(examine(b"SQLite format 3\0\x10\0", Mapping::default()));
     assert!(sqlite.contains("SQLite database"), "{sqlite}");
     let mapping = || Mapping {
-        columns: Mapping::columns_of("azimuth_deg=1,range_m=2").expect("columns"),
+        columns: Mapping::parse_columns("azimuth_deg=1,range_m=2").expect("columns"),
         ..Mapping::default()
     };
     assert!(error_text(examine(&whole, mapping())).contains("defines its own fields"));

@@ -3,7 +3,7 @@
 use super::*;
 
 fn mapped(header: &str, row: &str) -> Result<Imported, ImportError> {
-    let unchecked = Taken { as_said: true, ..assumptions() };
+    let unchecked = Assumptions { skip_checks: true, ..assumptions() };
     examine(format!("{header}\n{row}\n{row}\n").as_bytes(), Mapping::default(), unchecked)
 }
 
@@ -82,10 +82,10 @@ fn fixed_ranger_needs_no_direction() {
 #[test]
 fn array_rows_are_rounds() {
     let array = sonard_model::array::RangerArray::preset("pioneer-8").expect("shipped");
-    let of_array = || Taken {
+    let of_array = || Assumptions {
         array: Some(array.clone()),
         sensor: "pioneer".to_owned(),
-        longest_m: 6.8,
+        max_range_m: 6.8,
         ..assumptions()
     };
     let rows = "1.50\t2.50\t4.10\t4.20\t4.30\t4.40\t2.00\t1.00\n1.51\t2.49\t4.10\t4.20\t4.30\t4.40\t2.00\t1.01\n";

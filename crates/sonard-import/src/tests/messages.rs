@@ -48,7 +48,7 @@ fn missing_positions_need_an_array() {
             without.contains("does not contain the positions of its 2 rangers")
                 && without.contains("--array")
         );
-        let with = Taken { array: array.clone(), ..assumptions() };
+        let with = Assumptions { array: array.clone(), ..assumptions() };
         let found = examine(line.as_bytes(), Mapping::default(), with).expect("right");
         assert_eq!((found.readings, found.echoes, found.has_poses), (2, 2, false), "{line}");
     }
@@ -78,7 +78,7 @@ fn reads_old_player_log() {
         examine(PLAYER.as_bytes(), Mapping::default(), assumptions()).expect("right").taken.array;
     let old =
         "10.0 robot 6665 position 0 1.0 2.0 0.0 0 0 0\n10.1 robot 6665 sonar 0 2 1.500 2.500\n";
-    let found = examine(old.as_bytes(), Mapping::default(), Taken { array, ..assumptions() })
+    let found = examine(old.as_bytes(), Mapping::default(), Assumptions { array, ..assumptions() })
         .expect("right");
     assert_eq!((found.format, found.readings, found.has_poses), (Format::Player, 2, true));
 }

@@ -114,9 +114,9 @@ fn even_directions_are_a_plan() {
 fn infers_header_or_offers_options() {
     let guess = |header: &str| {
         let text = format!("{header}\n{}\n", vec!["1"; header.split(',').count()].join(","));
-        let unchecked = Taken { as_said: true, ..assumptions() };
+        let unchecked = Assumptions { skip_checks: true, ..assumptions() };
         examine(text.as_bytes(), Mapping::default(), unchecked).map(|found| {
-            assert!(found.guessed && found.format == Format::Csv);
+            assert!(found.is_inferred && found.format == Format::Csv);
             let columns = found.mapping.columns.into_iter();
             columns.map(|(field, column)| format!("{field}={column}")).collect::<Vec<_>>().join(" ")
         })
@@ -204,7 +204,7 @@ fn errors_name_position_and_remedy() {
         assert!(message.contains(words), "{text:?}: {message}");
     }
     for text in ["azimuth_deg", "angle=1", "azimuth_deg=0", "azimuth_deg=1,azimuth_deg=2"] {
-        error_text(Mapping::columns_of(text));
+        error_text(Mapping::parse_columns(text));
     }
     assert_eq!(
         columns("range_m=a=b").columns.values().next(),
@@ -248,7 +248,7 @@ fn rejects_implausible_units() {
         }
         let message = error_text(found);
         assert!(message.contains(words), "{message}");
-        let unchecked = Taken { as_said: true, ..assumptions() };
+        let unchecked = Assumptions { skip_checks: true, ..assumptions() };
         examine(text.as_bytes(), mapping, unchecked).expect("unchecked");
     }
 }
@@ -286,7 +286,7 @@ proptest! {
         by_number in any::<bool>(),
     ) {
         let mapping = if by_number { columns("azimuth_deg=1,range_m=2") } else { columns("azimuth_deg=a,range_m=b") };
-        let unchecked = Taken { as_said: true, ..assumptions() };
+        let unchecked = Assumptions { skip_checks: true, ..assumptions() };
         if let Ok(found) = examine(&bytes, mapping, unchecked) {
             let scans: Vec<_> = found.scans(&bytes[..]).expect("as before").collect();
             let records: Vec<_> = scans.into_iter().flat_map(|scan| scan.expect("as before")).collect();

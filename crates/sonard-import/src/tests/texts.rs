@@ -130,7 +130,7 @@ fn reads_streams_without_line_ends() {
 #[test]
 fn notes_assumptions_on_times() {
     let started =
-        Taken { started: "2026-11-27T08:00:00Z".parse().expect("a time"), ..assumptions() };
+        Assumptions { started: "2026-11-27T08:00:00Z".parse().expect("a time"), ..assumptions() };
     for (column, cells, first, note) in [
         (
             "time",

@@ -32,9 +32,9 @@ use self::{
     fit::{LinearFit, fit},
     shift::{BeamShifts, HeadingLikelihood, ThresholdLikelihood},
 };
-use super::{Judged, keep_every_second};
+use super::{ClassifiedPing, keep_every_second};
 
-pub use explanation::{Estimate, Explanation, Quantity};
+pub use explanation::{ChangeEstimate, Explanation, ChangedQuantity};
 
 /// Changes with a smaller gain in log-likelihood are noise.
 const MIN_GAIN: f64 = 10.0;
@@ -67,7 +67,7 @@ pub(super) struct Explainer {
 
 impl Explainer {
     /// Adds a scan with its classified beams.
-    pub(super) fn add(&mut self, scan: &ScanView, beams: &[Judged<'_>]) {
+    pub(super) fn add(&mut self, scan: &ScanView, beams: &[ClassifiedPing<'_>]) {
         let shifts = scan.start.as_ref().and_then(|start| BeamShifts::for_scan(&start.plan, beams));
         let shifts = shifts
             .filter(|shifts| self.shifts.get_or_insert_with(|| shifts.clone()).is_like(shifts));
@@ -116,7 +116,7 @@ impl Explainer {
     ) -> Option<LinearizedPair> {
         let sim = ping.sim.as_ref().filter(|sim| sim.crosstalk.is_none())?;
         let path = sim.path.as_ref()?;
-        let points = path.polyline(scan.viewpoint(ping)?.ends());
+        let points = path.polyline(scan.viewpoint(ping)?.transducer_positions());
         let is_level =
             path.interactions.iter().all(|point| point.id != "floor" && point.id != "ceiling");
         if !is_level {
@@ -164,12 +164,12 @@ impl Explainer {
             fit(self.pairs.iter().map(|pair| (pair.residual_m, gradient(pair))))
         };
         let position = solve(&|pair| pair.d_position.extend(0.0));
-        found.extend(self.explanation("pose", &[(Quantity::XM, 0), (Quantity::YM, 1)], position));
+        found.extend(self.explanation("pose", &[(ChangedQuantity::XM, 0), (ChangedQuantity::YM, 1)], position));
         // The measured range scales with the speed of sound: opposite sign in the residual.
         let speed = solve(&|pair| DVec3::new(0.0, 0.0, -pair.measured_m));
-        found.extend(self.explanation("sound_speed", &[(Quantity::Percent, 2)], speed));
+        found.extend(self.explanation("sound_speed", &[(ChangedQuantity::Percent, 2)], speed));
         let offset = solve(&|_| DVec3::NEG_X);
-        found.extend(self.explanation("range_offset", &[(Quantity::OffsetM, 0)], offset));
+        found.extend(self.explanation("range_offset", &[(ChangedQuantity::OffsetM, 0)], offset));
         for (name, number) in self.walls.iter().zip(0..) {
             let wall = solve(&|pair| {
                 let derivative = pair.d_walls.iter().find(|(wall, _)| *wall == number);
@@ -177,7 +177,7 @@ impl Explainer {
             });
             found.extend(self.explanation(
                 &format!("wall {name}"),
-                &[(Quantity::OffsetM, 0)],
+                &[(ChangedQuantity::OffsetM, 0)],
                 wall,
             ));
         }
@@ -188,7 +188,7 @@ impl Explainer {
             |found: &Explanation, share: f64| f64::from(found.explains) >= share * self.seen as f64;
         found.retain(|found| {
             let is_significant =
-                |estimate: &Estimate| estimate.value.abs() > MIN_SIGMAS * estimate.sigma;
+                |estimate: &ChangeEstimate| estimate.value.abs() > MIN_SIGMAS * estimate.sigma;
             let is_wall = found.change.starts_with("wall ");
             let min_share = if is_wall { MIN_SHARE_WALL } else { MIN_SHARE_SINGLE };
             // A threshold explains missing echoes, not pairs.
@@ -209,7 +209,7 @@ impl Explainer {
     fn explanation(
         &self,
         change: &str,
-        values: &[(Quantity, usize)],
+        values: &[(ChangedQuantity, usize)],
         fit: Option<LinearFit>,
     ) -> Option<Explanation> {
         let fit = fit?;

@@ -61,7 +61,7 @@ fn each_pair_of_outcomes_is_classified() {
         ((StepDoubtful, None), Some(echo), Specular, 1, Err(NotCompared::StepDoubtful)),
     ] {
         let ping = ping(measured, simulated, kind, order);
-        assert_eq!(judge(&ping).verdict, expected, "{measured:?} {simulated:?} {kind:?} {order}");
+        assert_eq!(classify(&ping).verdict, expected, "{measured:?} {simulated:?} {kind:?} {order}");
     }
 }
 
@@ -71,7 +71,7 @@ fn fixture_is_counted() {
     let (comparison, classified) = compare(&scans);
     assert_eq!(classified.len(), 7);
     let each_once =
-        Counts { direct: 1, multiple: 1, edge: 1, min_range: 1, silent: 1, unexplained: 1 };
+        VerdictCounts { direct: 1, multiple: 1, edge: 1, min_range: 1, silent: 1, unexplained: 1 };
     assert_eq!(comparison.verdicts, each_once);
     let Comparison { beams, both_echo, agree, near, both_silent, .. } = comparison;
     assert_eq!((beams, both_echo, agree, near, both_silent), (6, 4, 3, 1, 1));

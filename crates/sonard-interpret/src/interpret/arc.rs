@@ -3,7 +3,7 @@
 use sonard_model::geometry::{DVec2, wrap_pi};
 
 use super::{
-    Extents, Reason, Region, Settings, Side, Sweep, UniformSum,
+    Extents, Reason, Region, InterpretSettings, RegionBorder, Sweep, UniformSum,
     posterior::{ExtentLikelihood, mean_density},
 };
 
@@ -46,13 +46,13 @@ impl Arc {
         sweep: &Sweep,
         region: Region,
         extents: &Extents,
-        settings: &Settings,
+        settings: &InterpretSettings,
     ) -> Self {
         let noise = settings.noise;
         let border = extents.border_sigma_deg(region.extent_deg(), noise.amplitude);
         let border_sigma_deg = border.hypot(noise.azimuth_deg);
         let extent_likelihood = region.range_m.map_or(ExtentLikelihood::NONE, |range_m| {
-            let error = UniformSum::of_extent(region.gaps_deg, border_sigma_deg);
+            let error = UniformSum::for_extent(region.gaps_deg, border_sigma_deg);
             let (seen_deg, min_level) = (region.extent_deg(), extents.min_detected(range_m));
             let [min_edge, min_plane] = [min_level / extents.edge_level(range_m, 1.0), min_level];
             let plane_corner =
@@ -121,9 +121,9 @@ impl Arc {
         let sides = self.region.sides;
         if self.region.range_m.is_none() || self.is_remainder {
             Some(Reason::MinRange)
-        } else if sides.contains(&Side::Covered) {
+        } else if sides.contains(&RegionBorder::Covered) {
             Some(Reason::Interference)
-        } else if sides.contains(&Side::Cut) {
+        } else if sides.contains(&RegionBorder::Cut) {
             Some(Reason::CutOff)
         } else {
             None

@@ -3,7 +3,7 @@
 use uuid::Uuid;
 
 use super::{
-    Extents, Feature, FeatureKind, Probabilities, Reason, Settings, Sweep, UniformSum,
+    Extents, Feature, FeatureKind, Probabilities, Reason, InterpretSettings, Sweep, UniformSum,
     arc::Arc,
     next_view::propose,
     posterior::{TurnLikelihood, probabilities},
@@ -24,7 +24,7 @@ pub(super) const ROUNDING_DEG: f64 = 1e-9;
 /// are those of the sensor. An element detected in several scans is one feature of the first;
 /// repeated scans from one pose are merged into the first as well.
 #[must_use]
-pub fn interpret(scans: &[(Uuid, Sweep)], extents: &Extents, settings: &Settings) -> Vec<Feature> {
+pub fn interpret(scans: &[(Uuid, Sweep)], extents: &Extents, settings: &InterpretSettings) -> Vec<Feature> {
     let scans = &merge_repeats(scans);
     let arcs: Vec<Arc> = scans
         .iter()
@@ -78,7 +78,7 @@ impl ArcClass {
         places: &[DVec2],
         taken: &mut [bool],
         extents: &Extents,
-        settings: &Settings,
+        settings: &InterpretSettings,
     ) -> Self {
         let arc = &arcs[at];
         if let Some(reason) = arc.fault() {
@@ -117,7 +117,7 @@ impl ArcClass {
         arc: &Arc,
         scans: &[(Uuid, Sweep)],
         extents: &Extents,
-        settings: &Settings,
+        settings: &InterpretSettings,
     ) -> Feature {
         let range_m = arc.region.range_m;
         let (best, confidence) = self.probabilities.best();
@@ -189,7 +189,7 @@ impl ExpectedView {
         arcs: &[Arc],
         taken: &[bool],
         extents: &Extents,
-        settings: &Settings,
+        settings: &InterpretSettings,
     ) -> Result<Option<Reobservation>, Reason> {
         let mut fitting = Vec::new();
         let mut faulty = None;
@@ -252,13 +252,13 @@ impl ExpectedView {
         [1.0, self.gain.abs()].map(|gain| {
             let first_deg = arc.region.gaps_deg.map(|gap| gain * gap);
             let sigmas = [gain * arc.border_sigma_deg, sigma_deg];
-            UniformSum::of_beta([first_deg, gaps_deg], sigmas, heading_deg)
+            UniformSum::for_beta([first_deg, gaps_deg], sigmas, heading_deg)
         })
     }
 
     /// Minimum `beta` of a corner that separates it from a plane, if the second position sees the
     /// element as the first did, degrees: (25), and with noise the extension of section IX.
-    pub(super) fn min_beta_deg(&self, arc: &Arc, settings: &Settings) -> f64 {
+    pub(super) fn min_beta_deg(&self, arc: &Arc, settings: &InterpretSettings) -> f64 {
         let as_before = (arc.region.gaps_deg, arc.border_sigma_deg);
         let [as_plane, as_corner] = self.errors(arc, as_before, settings.noise.heading_deg);
         apart(&as_plane, &as_corner)
@@ -294,7 +294,7 @@ fn open_reason(
     hidden_by: usize,
     second: Option<&Reobservation>,
     failure: Option<Reason>,
-    settings: &Settings,
+    settings: &InterpretSettings,
 ) -> Option<Reason> {
     let Probabilities { plane, corner, edge, other } = *probabilities;
     let min_confidence = settings.min_confidence;
@@ -322,7 +322,7 @@ mod tests {
     fn reason(probabilities: [f64; 4], hidden_by: usize) -> Option<Reason> {
         let [plane, corner, edge, other] = probabilities;
         let probabilities = Probabilities { plane, corner, edge, other };
-        open_reason(&probabilities, hidden_by, None, None, &Settings::default())
+        open_reason(&probabilities, hidden_by, None, None, &InterpretSettings::default())
     }
 
     #[test]

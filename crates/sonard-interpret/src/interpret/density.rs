@@ -32,14 +32,14 @@ impl UniformSum {
     /// Error of an angular extent whose two borders lie in gaps of these widths between beams;
     /// `sigma` is the standard deviation of each border (19).
     #[must_use]
-    pub fn of_extent(gaps: [f64; 2], sigma: f64) -> Self {
+    pub fn for_extent(gaps: [f64; 2], sigma: f64) -> Self {
         Self::new(&gaps, SQRT_2 * sigma)
     }
 
     /// Error of `beta` from the gaps at the borders of both regions; `sigmas` are the standard
     /// deviations of each border in the two scans, `heading` that of the turn between them (23).
     #[must_use]
-    pub fn of_beta(gaps: [[f64; 2]; 2], sigmas: [f64; 2], heading: f64) -> Self {
+    pub fn for_beta(gaps: [[f64; 2]; 2], sigmas: [f64; 2], heading: f64) -> Self {
         let [[a, b], [c, d]] = gaps.map(|pair| pair.map(|gap| gap / 2.0));
         let borders: f64 = sigmas.iter().map(|sigma| sigma.powi(2) / 2.0).sum();
         Self::new(&[a, b, c, d], (borders + heading.powi(2)).sqrt())

@@ -50,7 +50,7 @@ impl Extents {
         let speed_m_s = air.sound_speed_m_s();
         let wavelength_m = speed_m_s / sensor.frequency_hz;
         let half_width_m = sensor.half_width_m();
-        let absorption = if compensated || sensor.gain.makes_up_for_air() {
+        let absorption = if compensated || sensor.gain.compensates_absorption() {
             0.0
         } else {
             air.absorption_db_per_m(sensor.frequency_hz)
@@ -73,7 +73,7 @@ impl Extents {
     ///
     /// # Errors
     /// Invalid sensor or air data.
-    pub fn of_session(session: &Session) -> Result<Self, ExtentError> {
+    pub fn from_session(session: &Session) -> Result<Self, ExtentError> {
         let setting =
             |name: &str| session.model.as_ref().and_then(|model| model.settings.get(name));
         let number = |name: &str| setting(name).and_then(serde_json::Value::as_f64);

@@ -6,7 +6,7 @@ use uuid::Uuid;
 
 /// Settings of the interpretation.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Settings {
+pub struct InterpretSettings {
     /// Assumed scattering strength of edges, which sets the boundary. Bozma and Kuc measured 0.095
     /// for theirs.
     pub sigma_e: f64,
@@ -17,7 +17,7 @@ pub struct Settings {
     /// Maximum deviation of a reading from the mean of its region, metres.
     pub depth_tolerance_m: f64,
     /// Maximum number of consecutive outliers bridged inside a region.
-    pub most_holes: usize,
+    pub max_holes: usize,
     /// Noise in addition to the quantization.
     pub noise: Noise,
     /// Minimum probability for a feature to be classified.
@@ -26,14 +26,14 @@ pub struct Settings {
     pub translation_margin: f64,
 }
 
-impl Default for Settings {
+impl Default for InterpretSettings {
     fn default() -> Self {
         Self {
             sigma_e: 0.095,
             sigma_e_range: [0.035, 0.10],
             reflectance_range: [0.7, 1.0],
             depth_tolerance_m: 0.010,
-            most_holes: 1,
+            max_holes: 1,
             noise: Noise::default(),
             min_confidence: 0.9,
             translation_margin: 1.2,

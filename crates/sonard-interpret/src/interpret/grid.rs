@@ -22,7 +22,7 @@ pub use ideal::ideal;
 pub use image::{ImageError, MapMode, MapYaml, from_pgm, from_pixels, to_pgm};
 pub use score::{MapScore, PathSettings, ScoreError, score};
 pub(super) use tiles::Tiles;
-pub use trace::{TraceSettings, WallLine, trace};
+pub use trace::{TraceSettings, TracedLine, trace};
 
 use thiserror::Error;
 
@@ -146,14 +146,14 @@ pub struct Grid {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Trust {
     /// Readings below this confidence are discarded.
-    pub least_confidence: f64,
+    pub min_confidence: f64,
     /// Whether the space before the feature that contradicts a reading gets full weight.
     pub keep_clear: bool,
 }
 
 impl Default for Trust {
     fn default() -> Self {
-        Self { least_confidence: 0.0, keep_clear: true }
+        Self { min_confidence: 0.0, keep_clear: true }
     }
 }
 
@@ -195,7 +195,7 @@ impl Grid {
 
     /// Map of given probabilities, row by row from the lower left; missing ones are unknown.
     #[must_use]
-    pub fn of_probabilities(shape: GridShape, probabilities: &[f64]) -> Self {
+    pub fn from_probabilities(shape: GridShape, probabilities: &[f64]) -> Self {
         let log_odds = |p: &f64| {
             let p = p.clamp(1e-9, 1.0 - 1e-9);
             ((p / (1.0 - p)).ln() as f32).clamp(-MAX_LOG_ODDS, MAX_LOG_ODDS)

@@ -16,7 +16,7 @@ mod tests;
 
 pub use cluster::clusters;
 pub use error::{MAX_ERROR_M, MapError, map_error};
-pub use fit::{FitSettings, Segment, fit};
+pub use fit::{FitSettings, FittedSegment, fit};
 pub use laser::{LaserReturn, LaserScan};
 pub use map::{LineMap, LineMapSettings};
 pub use merge::{MergeSettings, merge};
@@ -73,7 +73,7 @@ impl MapLine {
 
     /// Intersection of the lines through two segments, if their angle is at least `min_deg`.
     #[must_use]
-    pub fn meets(&self, other: &Self, min_deg: f64) -> Option<DVec2> {
+    pub fn intersection(&self, other: &Self, min_deg: f64) -> Option<DVec2> {
         let (along, across) = (self.direction(), other.direction());
         let sine = along.perp_dot(across);
         let place_m = (other.ends[0] - self.ends[0]).perp_dot(across) / sine;

@@ -5,7 +5,7 @@ mod growing;
 pub use growing::{GrowError, GrowingMap};
 
 use super::{
-    Extents, Heard, Sweep,
+    Extents, BeamOutcome, Sweep,
     grid::{BeamModel, GaussianBeam, Grid, GridError, GridShape, PhysicalBeam, Trust},
     prediction::{Assessment, FeaturePrediction, PredictionSettings},
 };
@@ -22,14 +22,14 @@ const ENOUGH_SCANS: usize = 5;
 
 /// Settings of a map; those that are `None` are derived from the scans.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Mapping {
+pub struct MapSettings {
     /// Side of a cell, metres.
     pub resolution_m: f64,
     /// Lower left and upper right corner of the map, metres; defaults to the detected region.
     pub region: Option<[DVec2; 2]>,
     /// Ranges beyond this count as no echo, metres; defaults to the sensor's maximum range, at most
     /// [`MAX_RANGE_M`].
-    pub silent_beyond_m: Option<f64>,
+    pub range_limit_m: Option<f64>,
     /// Full beam width, degrees; defaults to a plane's extent, for an array to its nominal width.
     pub beam_deg: Option<f64>,
     /// Exponent of the confidence as a function of the distance of a feature.
@@ -37,7 +37,7 @@ pub struct Mapping {
     /// Assumed extension of walls beyond their observed part, metres.
     pub extend_m: f64,
     /// Minimum confidence of a reading, at most 0.5 (full confidence); others are discarded.
-    pub least_confidence: f64,
+    pub min_confidence: f64,
     /// Weight of each scan; defaults to a weight at which few scans decide their cells.
     pub evidence: Option<u8>,
     /// Whether readings that contradict predicted features have less weight.
@@ -46,17 +46,17 @@ pub struct Mapping {
     pub is_physical: bool,
 }
 
-impl Default for Mapping {
+impl Default for MapSettings {
     /// Best settings found on random rooms.
     fn default() -> Self {
         Self {
             resolution_m: 0.05,
             region: None,
-            silent_beyond_m: None,
+            range_limit_m: None,
             beam_deg: None,
             exponent: 2.0,
             extend_m: 2.0,
-            least_confidence: 0.48,
+            min_confidence: 0.48,
             evidence: None,
             predicts_features: true,
             is_physical: false,
@@ -64,11 +64,11 @@ impl Default for Mapping {
     }
 }
 
-impl Mapping {
+impl MapSettings {
     /// Maximum range of mapped readings of a sensor, metres.
     #[must_use]
     pub fn max_range_m(&self, extents: &Extents) -> f64 {
-        self.silent_beyond_m.unwrap_or_else(|| extents.max_range_m.min(MAX_RANGE_M))
+        self.range_limit_m.unwrap_or_else(|| extents.max_range_m.min(MAX_RANGE_M))
     }
 
     /// Grid over the requested region, else around poses and echoes within range.
@@ -130,8 +130,8 @@ impl Mapping {
 
 /// Bounding box of the ranger position and the echoes within range, lower left and upper right.
 fn bounds(sweep: &Sweep, max_range_m: f64) -> [DVec2; 2] {
-    let echoes = sweep.beams.iter().filter_map(|beam| match beam.heard {
-        Heard::Echo(m) if m <= max_range_m => Some(sweep.point(beam, m)),
+    let echoes = sweep.beams.iter().filter_map(|beam| match beam.outcome {
+        BeamOutcome::Echo(m) if m <= max_range_m => Some(sweep.point(beam, m)),
         _ => None,
     });
     let position = sweep.pose.position();
@@ -165,14 +165,14 @@ pub struct Added {
     /// Assessments of the beams, if features are predicted.
     pub assessments: Option<Vec<Assessment>>,
     /// Readings discarded for low confidence.
-    pub left_out: usize,
+    pub discarded: usize,
 }
 
 impl Mapper {
     /// Mapper onto a grid, for an expected number of scans; `of_array` for several fixed rangers.
     #[must_use]
     pub fn new(
-        mapping: &Mapping,
+        mapping: &MapSettings,
         grid: Grid,
         extents: Extents,
         of_array: bool,
@@ -190,7 +190,7 @@ impl Mapper {
         for _ in 0..self.evidence {
             left_out = self.grid.add(sweep, assessments.as_deref(), model, trust);
         }
-        Added { assessments, left_out }
+        Added { assessments, discarded: left_out }
     }
 
     /// Returns the finished map.
@@ -201,11 +201,11 @@ impl Mapper {
 }
 
 impl Assessor {
-    fn new(mapping: &Mapping, extents: Extents, of_array: bool) -> Self {
+    fn new(mapping: &MapSettings, extents: Extents, of_array: bool) -> Self {
         let max_range_m = mapping.max_range_m(&extents);
         let (model, prediction) = mapping.beam(extents, max_range_m, of_array);
         let predictor = mapping.predicts_features.then(|| FeaturePrediction::new(prediction));
-        let trust = Trust { least_confidence: mapping.least_confidence, keep_clear: true };
+        let trust = Trust { min_confidence: mapping.min_confidence, keep_clear: true };
         Self { model, predictor, trust }
     }
 

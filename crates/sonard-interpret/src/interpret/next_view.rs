@@ -3,7 +3,7 @@
 use std::cmp::Reverse;
 
 use super::{
-    Extents, Feature, NextPosition, Reason, Settings,
+    Extents, Feature, NextPosition, Reason, InterpretSettings,
     arc::Arc,
     classify::{ExpectedView, ROUNDING_DEG},
 };
@@ -21,20 +21,20 @@ const CLEARANCE_M: f64 = 0.05;
 /// Minimum translation that separates plane from corner with certainty at a range, metres (25);
 /// `reach_deg` is the bound on the error of `beta`: one step without noise.
 #[must_use]
-pub fn least_translation_m(range_m: f64, reach_deg: f64) -> f64 {
+pub fn min_translation_m(range_m: f64, reach_deg: f64) -> f64 {
     range_m * (2.0 * reach_deg).to_radians().sin()
 }
 
 /// Minimum width of a plane detected from both ends of a translation, metres (27).
 #[must_use]
-pub fn least_plane_m(range_m: f64, delta_m: f64, half_width_m: f64) -> f64 {
+pub fn min_plane_m(range_m: f64, delta_m: f64, half_width_m: f64) -> f64 {
     let share = (delta_m / range_m).min(1.0);
     delta_m * (1.0 - share * share).sqrt() + 2.0 * half_width_m
 }
 
 /// Minimum length of each side of a corner that is resolved from its ends, metres (26), (28).
 #[must_use]
-pub fn least_corner_m(half_beam_deg: f64, half_width_m: f64) -> f64 {
+pub fn min_corner_m(half_beam_deg: f64, half_width_m: f64) -> f64 {
     half_width_m / (2.0 * half_beam_deg).to_radians().sin()
 }
 
@@ -46,7 +46,7 @@ pub(super) fn propose(
     arcs: &[&Arc],
     features: &mut [Feature],
     extents: &Extents,
-    settings: &Settings,
+    settings: &InterpretSettings,
 ) {
     let waits = |feature: &Feature| {
         matches!(feature.reason, Some(Reason::SecondPosition | Reason::Translation))
@@ -76,7 +76,7 @@ struct Planner<'a> {
     arcs: &'a [&'a Arc],
     scan: usize,
     extents: &'a Extents,
-    settings: &'a Settings,
+    settings: &'a InterpretSettings,
 }
 
 impl Planner<'_> {
@@ -89,7 +89,7 @@ impl Planner<'_> {
             let Some(range_m) = arc.region.range_m else { continue };
             let Some(here) = ExpectedView::at(arc, arc.from) else { continue };
             let min_deg = here.min_beta_deg(arc, self.settings);
-            let min_m = least_translation_m(range_m, min_deg / 2.0);
+            let min_m = min_translation_m(range_m, min_deg / 2.0);
             let delta_m = self.settings.translation_margin * min_m;
             let gamma_rad = (delta_m / range_m).clamp(-1.0, 1.0).acos();
             for direction in [arc.bearing_rad + gamma_rad, arc.bearing_rad - gamma_rad] {
@@ -149,8 +149,8 @@ impl Planner<'_> {
             direction_deg: wrap_360(travel.to_angle().to_degrees() - arc.heading_deg),
             delta_m: travel.length(),
             decides,
-            least_plane_m: least_plane_m(range_m, travel.length(), half_width_m),
-            least_corner_m: least_corner_m(self.extents.half_beam_deg(), half_width_m),
+            least_plane_m: min_plane_m(range_m, travel.length(), half_width_m),
+            least_corner_m: min_corner_m(self.extents.half_beam_deg(), half_width_m),
         })
     }
 }

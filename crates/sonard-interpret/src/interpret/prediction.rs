@@ -13,11 +13,11 @@ mod obstacle;
 #[cfg(test)]
 mod tests;
 
-pub use confidence::{combine, of_angle, of_distance};
-pub use line::Line;
+pub use confidence::{combine, confidence_by_angle, confidence_by_distance};
+pub use line::PredictedWall;
 
 use self::obstacle::Obstacle;
-use crate::interpret::{Heard, Sweep};
+use crate::interpret::{BeamOutcome, Sweep};
 use sonard_model::geometry::{DVec2, wrap_pi};
 
 /// Settings of Feature Prediction.
@@ -38,11 +38,11 @@ pub struct PredictionSettings {
     /// Maximum gap between such features along the wall, metres.
     pub gap_m: f64,
     /// Confidence below which a feature of a single reading is dropped.
-    pub least_confidence: f64,
+    pub min_confidence: f64,
     /// `T_d`: features last seen from farther than this are forgotten, metres.
     pub forget_m: f64,
     /// `T_L`: features shorter than this are dropped after a split, metres.
-    pub least_length_m: f64,
+    pub min_length_m: f64,
     /// Assumed extension of a feature of several readings beyond its ends, for beams that could not
     /// detect it there, metres; limited by [`Self::end_m`] where it was split. Not in the paper
     /// (0): its ring of wide beams sees more of a wall at once than a narrow beam.
@@ -53,7 +53,7 @@ pub struct PredictionSettings {
     /// detected: otherwise it is split, degrees. The paper uses `omega`; but at the edge of its arc
     /// a wall is detected only half of the time, so every wall would be split on both sides of its
     /// perpendicular.
-    pub heard_deg: f64,
+    pub certain_deg: f64,
     /// Maximum extension of a feature where it was split, metres. A smaller value trusts more
     /// correct readings on a long course; a larger one reduces the false paths of a map. 0.2, 0.5
     /// and 1 m trust 87, 84 and 78 % of them in the last fifty of 500 scans of an L-shaped room,
@@ -72,12 +72,12 @@ impl PredictionSettings {
             max_range_m,
             near_m: 0.10,
             gap_m: 0.30,
-            least_confidence: 0.40,
+            min_confidence: 0.40,
             forget_m: 4.0,
-            least_length_m: 0.15,
+            min_length_m: 0.15,
             extend_m: 0.0,
             shorten_m: 0.05,
-            heard_deg: 5.0,
+            certain_deg: 5.0,
             end_m: 0.5,
         }
     }
@@ -112,7 +112,7 @@ const NEUTRAL: Assessment = Assessment { confidence: 0.5, clear_m: None };
 pub struct FeaturePrediction {
     settings: PredictionSettings,
     /// Local map `L`.
-    local: Vec<Line>,
+    local: Vec<PredictedWall>,
 }
 
 impl FeaturePrediction {
@@ -124,7 +124,7 @@ impl FeaturePrediction {
 
     /// Features near the robot.
     #[must_use]
-    pub fn local(&self) -> &[Line] {
+    pub fn local(&self) -> &[PredictedWall] {
         &self.local
     }
 
@@ -153,13 +153,13 @@ impl FeaturePrediction {
         let sides = |axis_rad: f64| {
             [axis_rad, axis_rad - half_rad, axis_rad + half_rad].map(DVec2::from_angle)
         };
-        let ray = |(index, beam): (usize, &super::Beam)| {
+        let ray = |(index, beam): (usize, &super::SweepBeam)| {
             let axis_rad = sweep.pose.direction_rad(beam.azimuth_deg);
-            let (range_m, echo) = match beam.heard {
-                Heard::Echo(range_m) => (range_m.min(self.settings.max_range_m), true),
-                Heard::Silent => (self.settings.max_range_m, false),
+            let (range_m, echo) = match beam.outcome {
+                BeamOutcome::Echo(range_m) => (range_m.min(self.settings.max_range_m), true),
+                BeamOutcome::NoEcho => (self.settings.max_range_m, false),
                 // A reading below the minimum range carries no information on what lies beyond.
-                Heard::Near => (0.0, false),
+                BeamOutcome::BelowMinRange => (0.0, false),
             };
             let echo = echo && range_m < self.settings.max_range_m;
             let from = sweep.place(beam);
@@ -169,20 +169,20 @@ impl FeaturePrediction {
     }
 
     /// Predicts the features of the scan (steps 1 and 2): the sonar map `S`.
-    fn predict(&self, beams: &[SonarBeam]) -> Vec<Line> {
+    fn predict(&self, beams: &[SonarBeam]) -> Vec<PredictedWall> {
         let half_rad = (self.settings.beam_deg / 2.0).to_radians();
         let omega_rad = self.settings.omega_deg.to_radians();
-        let mut seen: Vec<Line> = Vec::new();
+        let mut seen: Vec<PredictedWall> = Vec::new();
         for beam in beams.iter().filter(|beam| beam.echo) {
             let reading = (beam.index, beam.from, beam.axis_rad, beam.range_m);
-            let line = Line::from_reading(reading, half_rad, omega_rad);
+            let line = PredictedWall::from_reading(reading, half_rad, omega_rad);
             // Neighbouring beams see the same wall, so recent features are the likely matches.
             match seen.iter_mut().rev().find(|other| self.similar(other, &line)) {
                 Some(other) => other.merge(&line),
                 None => seen.push(line),
             }
         }
-        let mut merged: Vec<Line> = Vec::with_capacity(seen.len());
+        let mut merged: Vec<PredictedWall> = Vec::with_capacity(seen.len());
         for line in seen {
             match merged.iter_mut().find(|other| self.similar(other, &line)) {
                 Some(other) => other.merge(&line),
@@ -192,12 +192,12 @@ impl FeaturePrediction {
         merged
     }
 
-    fn similar(&self, a: &Line, b: &Line) -> bool {
+    fn similar(&self, a: &PredictedWall, b: &PredictedWall) -> bool {
         a.is_similar(b, self.settings.near_m, self.settings.gap_m)
     }
 
     /// Drops features of a single beam that others contradict (step 3).
-    fn drop_contradicted(&self, beams: &[SonarBeam], seen: &mut Vec<Line>) {
+    fn drop_contradicted(&self, beams: &[SonarBeam], seen: &mut Vec<PredictedWall>) {
         let maps = [self.obstacles(seen), self.obstacles(&self.local)];
         let contradicted: Vec<bool> = seen
             .iter()
@@ -205,7 +205,7 @@ impl FeaturePrediction {
                 let [only] = line.readings.as_slice() else { return false };
                 let beam = &beams[*only as usize];
                 maps.iter().any(|map| {
-                    self.assessment(beam, map).confidence < self.settings.least_confidence
+                    self.assessment(beam, map).confidence < self.settings.min_confidence
                 })
             })
             .collect();
@@ -217,7 +217,7 @@ impl FeaturePrediction {
     ///
     /// It may reunite several, such as the parts of a split wall. Otherwise they would contradict
     /// a reading twice, and multiply with every scan.
-    fn keep(&mut self, mut line: Line, robot: DVec2) {
+    fn keep(&mut self, mut line: PredictedWall, robot: DVec2) {
         line.fix(robot);
         let Self { settings, local } = self;
         let (near_m, gap_m) = (settings.near_m, settings.gap_m);
@@ -230,7 +230,7 @@ impl FeaturePrediction {
         local.push(line);
     }
 
-    fn obstacles<'a>(&self, map: &'a [Line]) -> Vec<Obstacle<'a>> {
+    fn obstacles<'a>(&self, map: &'a [PredictedWall]) -> Vec<Obstacle<'a>> {
         Obstacle::all(map, self.settings.extend_m)
     }
 
@@ -248,9 +248,9 @@ impl FeaturePrediction {
                 continue;
             }
             let confidence = if hidden {
-                of_distance(crossing_m / beam.range_m, self.settings.exponent)
+                confidence_by_distance(crossing_m / beam.range_m, self.settings.exponent)
             } else {
-                of_angle(cos_theta.acos() / omega_rad)
+                confidence_by_angle(cos_theta.acos() / omega_rad)
             };
             assessment.confidence = combine(assessment.confidence, confidence);
             assessment.clear_m =
@@ -269,8 +269,8 @@ impl FeaturePrediction {
 
     /// Splits a feature at the first beam that should have detected it, and its parts at later
     /// ones; the remainders go into the local map.
-    fn split_from(&mut self, beams: &[SonarBeam], line: Line) {
-        let cos_detected = self.settings.heard_deg.to_radians().cos();
+    fn split_from(&mut self, beams: &[SonarBeam], line: PredictedWall) {
+        let cos_detected = self.settings.certain_deg.to_radians().cos();
         let obstacle = Obstacle::new(&line, 0.0);
         let missed = |beam: &SonarBeam| {
             let far_m = beam.range_m - self.settings.near_m;
@@ -285,7 +285,7 @@ impl FeaturePrediction {
         };
         let PredictionSettings { shorten_m, end_m, .. } = self.settings;
         for part in line.split(at, shorten_m, end_m) {
-            if part.length_m() >= self.settings.least_length_m {
+            if part.length_m() >= self.settings.min_length_m {
                 self.split_from(&beams[next..], part);
             }
         }

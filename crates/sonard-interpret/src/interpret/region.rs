@@ -1,12 +1,12 @@
 //! Segmentation of scans into regions of constant depth.
 
-use super::{Heard, Settings, Sweep};
+use super::{BeamOutcome, InterpretSettings, Sweep};
 use crate::compare::quantile;
 use sonard_model::geometry::wrap_360;
 
 /// Boundary of a region on one side.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Side {
+pub enum RegionBorder {
     /// Boundary of the element's own arc, next to no echo or something farther.
     Own,
     /// Boundary by something nearer, whose echo arrived first.
@@ -25,7 +25,7 @@ pub struct Region {
     /// Angles from the preceding beam to the first, and from the last to the following, degrees.
     pub gaps_deg: [f64; 2],
     /// Boundaries on both sides.
-    pub sides: [Side; 2],
+    pub sides: [RegionBorder; 2],
     /// Median range, metres; `None` for a target below the minimum range.
     pub range_m: Option<f64>,
     /// Number of beams.
@@ -50,7 +50,7 @@ impl Region {
     /// Returns `true` if both boundaries are the element's own.
     #[must_use]
     pub fn is_whole(&self) -> bool {
-        self.sides == [Side::Own; 2]
+        self.sides == [RegionBorder::Own; 2]
     }
 
     /// Middles of the gaps in which the region begins and ends (11).
@@ -65,7 +65,7 @@ impl Region {
 /// A beam belongs to a region if its range is within the settings' tolerance of the region's
 /// mean; a few outliers inside are bridged. Beams without echo form no region.
 #[must_use]
-pub fn regions(sweep: &Sweep, settings: &Settings) -> Vec<Region> {
+pub fn regions(sweep: &Sweep, settings: &InterpretSettings) -> Vec<Region> {
     let finder = Finder { sweep, tolerance_m: settings.depth_tolerance_m };
     let count = sweep.beams.len();
     let start = (0..count).find(|&at| finder.begins(at)).unwrap_or(0);
@@ -73,8 +73,8 @@ pub fn regions(sweep: &Sweep, settings: &Settings) -> Vec<Region> {
     let mut done = 0;
     while done < count {
         let first = start + done;
-        let last = finder.last_of(first, count - done, settings.most_holes);
-        if !matches!(finder.heard(first), Heard::Silent) {
+        let last = finder.last_of(first, count - done, settings.max_holes);
+        if !matches!(finder.heard(first), BeamOutcome::NoEcho) {
             found.push(finder.region(first, last));
         }
         done += last - first + 1;
@@ -90,8 +90,8 @@ struct Finder<'a> {
 }
 
 impl Finder<'_> {
-    fn heard(&self, at: usize) -> Heard {
-        self.sweep.beams[at % self.sweep.beams.len()].heard
+    fn heard(&self, at: usize) -> BeamOutcome {
+        self.sweep.beams[at % self.sweep.beams.len()].outcome
     }
 
     fn gap_before_deg(&self, at: usize) -> Option<f64> {
@@ -104,10 +104,10 @@ impl Finder<'_> {
         self.gap_before_deg(at).is_none() || !self.same(before, self.heard(at))
     }
 
-    fn same(&self, a: Heard, b: Heard) -> bool {
+    fn same(&self, a: BeamOutcome, b: BeamOutcome) -> bool {
         match (a, b) {
-            (Heard::Echo(a), Heard::Echo(b)) => (a - b).abs() <= self.tolerance_m,
-            (Heard::Near, Heard::Near) | (Heard::Silent, Heard::Silent) => true,
+            (BeamOutcome::Echo(a), BeamOutcome::Echo(b)) => (a - b).abs() <= self.tolerance_m,
+            (BeamOutcome::BelowMinRange, BeamOutcome::BelowMinRange) | (BeamOutcome::NoEcho, BeamOutcome::NoEcho) => true,
             _ => false,
         }
     }
@@ -116,18 +116,18 @@ impl Finder<'_> {
     fn last_of(&self, first: usize, count: usize, max_holes: usize) -> usize {
         let (mut last, mut at) = (first, first + 1);
         let (mut sum_m, mut members) = (0.0, 0.0);
-        if let Heard::Echo(range_m) = self.heard(first) {
+        if let BeamOutcome::Echo(range_m) = self.heard(first) {
             (sum_m, members) = (range_m, 1.0);
         }
-        let bridged = if matches!(self.heard(first), Heard::Echo(_)) { max_holes } else { 0 };
+        let bridged = if matches!(self.heard(first), BeamOutcome::Echo(_)) { max_holes } else { 0 };
         while at < first + count && at - last <= bridged + 1 && self.gap_before_deg(at).is_some() {
             let mean = match self.heard(first) {
-                Heard::Echo(_) => Heard::Echo(sum_m / members),
+                BeamOutcome::Echo(_) => BeamOutcome::Echo(sum_m / members),
                 other => other,
             };
             if self.same(mean, self.heard(at)) {
                 last = at;
-                if let Heard::Echo(range_m) = self.heard(at) {
+                if let BeamOutcome::Echo(range_m) = self.heard(at) {
                     (sum_m, members) = (sum_m + range_m, members + 1.0);
                 }
             }
@@ -142,23 +142,23 @@ impl Finder<'_> {
         let turned = |at: usize| beam(at).azimuth_deg + if at >= beams.len() { 360.0 } else { 0.0 };
         let ranges: Vec<f64> = (first..=last)
             .filter_map(|at| match self.heard(at) {
-                Heard::Echo(range_m) => Some(range_m),
+                BeamOutcome::Echo(range_m) => Some(range_m),
                 _ => None,
             })
             .collect();
         let range_m = match self.heard(first) {
-            Heard::Echo(_) => quantile(ranges, 0.5),
+            BeamOutcome::Echo(_) => quantile(ranges, 0.5),
             _ => None,
         };
         let whole_turn = last - first + 1 == beams.len() && self.sweep.closed;
         let side = |outside: usize, gap_deg: Option<f64>| match (gap_deg, self.heard(outside)) {
-            _ if whole_turn => (Side::Cut, self.sweep.step_deg),
-            (None, _) => (Side::Cut, self.sweep.step_deg),
-            (Some(gap), Heard::Near) => (Side::Covered, gap),
-            (Some(gap), Heard::Echo(other)) if range_m.is_some_and(|here| other < here) => {
-                (Side::Covered, gap)
+            _ if whole_turn => (RegionBorder::Cut, self.sweep.step_deg),
+            (None, _) => (RegionBorder::Cut, self.sweep.step_deg),
+            (Some(gap), BeamOutcome::BelowMinRange) => (RegionBorder::Covered, gap),
+            (Some(gap), BeamOutcome::Echo(other)) if range_m.is_some_and(|here| other < here) => {
+                (RegionBorder::Covered, gap)
             }
-            (Some(gap), _) => (Side::Own, gap),
+            (Some(gap), _) => (RegionBorder::Own, gap),
         };
         let before = side(first + beams.len() - 1, self.gap_before_deg(first));
         let after = side(last + 1, self.gap_before_deg(last + 1));

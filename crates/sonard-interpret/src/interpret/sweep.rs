@@ -14,24 +14,24 @@ const SAME_STOP_DEG: f64 = 1e-6;
 
 /// Outcome of the measurement at one stop.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Heard {
+pub enum BeamOutcome {
     /// Echo at a range in metres.
     Echo(f64),
     /// Target below the minimum range: sound arrived before the end of blanking.
-    Near,
+    BelowMinRange,
     /// No echo within the maximum range.
-    Silent,
+    NoEcho,
 }
 
 /// Stop with a valid reading.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Beam {
+pub struct SweepBeam {
     /// Azimuth, degrees in [0, 360).
     pub azimuth_deg: f64,
     /// Index in the plan of the first reading at the stop.
     pub index: u32,
     /// Outcome of the measurement.
-    pub heard: Heard,
+    pub outcome: BeamOutcome,
     /// Transducer position, metres ahead and to the left of the sweep's pose: zero for one on a
     /// stepper.
     pub mount: DVec2,
@@ -45,7 +45,7 @@ pub struct Sweep {
     /// Angle between neighbouring stops, degrees.
     pub step_deg: f64,
     /// Stops, in order of azimuth.
-    pub beams: Vec<Beam>,
+    pub beams: Vec<SweepBeam>,
     /// Whether the first stop follows the last one around the full turn.
     pub closed: bool,
 }
@@ -110,20 +110,20 @@ impl Sweep {
             quantile(gaps.collect(), 0.5).unwrap_or(360.0)
         };
         let closing_deg = beams[0].azimuth_deg + 360.0 - beams[beams.len() - 1].azimuth_deg;
-        let closed = closing_deg < MAX_GAP_STEPS * step_deg && !scan.is_of_array();
+        let closed = closing_deg < MAX_GAP_STEPS * step_deg && !scan.is_array_scan();
         Ok(Self { pose: start.pose, step_deg, beams, closed })
     }
 
     /// World position of a beam's transducer, metres.
     #[must_use]
-    pub fn place(&self, beam: &Beam) -> DVec2 {
+    pub fn place(&self, beam: &SweepBeam) -> DVec2 {
         let turn = DVec2::from_angle(self.pose.direction_rad(0.0));
         self.pose.position() + turn.rotate(beam.mount)
     }
 
     /// World position of the point at `range_m` along a beam, metres.
     #[must_use]
-    pub fn point(&self, beam: &Beam, range_m: f64) -> DVec2 {
+    pub fn point(&self, beam: &SweepBeam, range_m: f64) -> DVec2 {
         let direction_rad = self.pose.direction_rad(beam.azimuth_deg);
         self.place(beam) + range_m * DVec2::from_angle(direction_rad)
     }
@@ -151,7 +151,7 @@ pub(super) fn merge_repeats(scans: &[(Uuid, Sweep)]) -> Vec<(Uuid, Sweep)> {
         }
         let repeats: Vec<&Sweep> =
             scans[at..].iter().map(|(_, later)| later).filter(|later| same(later)).collect();
-        let mut beams: Vec<Beam> = repeats.iter().flat_map(|sweep| sweep.beams.clone()).collect();
+        let mut beams: Vec<SweepBeam> = repeats.iter().flat_map(|sweep| sweep.beams.clone()).collect();
         if repeats.len() > 1 {
             beams.sort_by(|a, b| a.azimuth_deg.total_cmp(&b.azimuth_deg));
             beams = beams.chunk_by(same_stop).map(merge_stop).collect();
@@ -165,26 +165,26 @@ pub(super) fn merge_repeats(scans: &[(Uuid, Sweep)]) -> Vec<(Uuid, Sweep)> {
 /// Maximum gap between neighbours, steps: two lost readings in a row.
 const MAX_GAP_STEPS: f64 = 3.5;
 
-fn stops(scan: &ScanView, pose: &Pose) -> Result<Vec<Beam>, SweepError> {
-    let has_one_place = scan.has_one_place();
-    let mut by_index: BTreeMap<u32, Beam> = BTreeMap::new();
+fn stops(scan: &ScanView, pose: &Pose) -> Result<Vec<SweepBeam>, SweepError> {
+    let has_one_place = scan.is_from_one_position();
+    let mut by_index: BTreeMap<u32, SweepBeam> = BTreeMap::new();
     for ping in &scan.pings {
         if let Some(beam) = beam(ping) {
             let beam = if has_one_place { beam } else { mounted(scan, ping, beam, pose)? };
             by_index.insert(ping.index, beam);
         }
     }
-    let mut beams: Vec<Beam> = by_index.into_values().collect();
+    let mut beams: Vec<SweepBeam> = by_index.into_values().collect();
     beams.sort_by(|a, b| a.azimuth_deg.total_cmp(&b.azimuth_deg));
     Ok(beams.chunk_by(same_stop).map(merge_stop).collect())
 }
 
-fn same_stop(a: &Beam, b: &Beam) -> bool {
+fn same_stop(a: &SweepBeam, b: &SweepBeam) -> bool {
     (b.azimuth_deg - a.azimuth_deg).abs() < SAME_STOP_DEG && a.mount == b.mount
 }
 
 /// Beam with the position and direction of its transducer relative to the scan's pose.
-fn mounted(scan: &ScanView, ping: &Ping, beam: Beam, pose: &Pose) -> Result<Beam, SweepError> {
+fn mounted(scan: &ScanView, ping: &Ping, beam: SweepBeam, pose: &Pose) -> Result<SweepBeam, SweepError> {
     let viewpoint = scan.viewpoint(ping).ok_or_else(|| SweepError::UnknownRanger {
         index: ping.index,
         id: ping.ranger.clone().unwrap_or_default(),
@@ -192,40 +192,40 @@ fn mounted(scan: &ScanView, ping: &Ping, beam: Beam, pose: &Pose) -> Result<Beam
     let turn_back = DVec2::from_angle(-pose.direction_rad(0.0));
     let mount = turn_back.rotate(viewpoint.position() - pose.position());
     let azimuth_deg = wrap_360(viewpoint.direction_deg - pose.heading_deg);
-    Ok(Beam { azimuth_deg, mount, ..beam })
+    Ok(SweepBeam { azimuth_deg, mount, ..beam })
 }
 
-fn beam(ping: &Ping) -> Option<Beam> {
+fn beam(ping: &Ping) -> Option<SweepBeam> {
     let outcome = match ping.status {
-        PingStatus::Echo => Heard::Echo(ping.range_m.filter(|r| r.is_finite() && *r > 0.0)?),
-        PingStatus::MinRange => Heard::Near,
-        PingStatus::NoEcho => Heard::Silent,
+        PingStatus::Echo => BeamOutcome::Echo(ping.range_m.filter(|r| r.is_finite() && *r > 0.0)?),
+        PingStatus::MinRange => BeamOutcome::BelowMinRange,
+        PingStatus::NoEcho => BeamOutcome::NoEcho,
         PingStatus::LinkLost | PingStatus::StepDoubtful | PingStatus::ModuleFault => return None,
     };
     let azimuth_deg = Some(ping.azimuth_deg).filter(|azimuth| azimuth.is_finite())?;
     let azimuth_deg = wrap_360(azimuth_deg);
-    Some(Beam { azimuth_deg, index: ping.index, heard: outcome, mount: DVec2::ZERO })
+    Some(SweepBeam { azimuth_deg, index: ping.index, outcome, mount: DVec2::ZERO })
 }
 
-fn merge_stop(same: &[Beam]) -> Beam {
+fn merge_stop(same: &[SweepBeam]) -> SweepBeam {
     let count =
-        |matches: fn(&Heard) -> bool| same.iter().filter(|beam| matches(&beam.heard)).count();
-    let near = count(|outcome| matches!(outcome, Heard::Near));
-    let no_echo = count(|outcome| matches!(outcome, Heard::Silent));
+        |matches: fn(&BeamOutcome) -> bool| same.iter().filter(|beam| matches(&beam.outcome)).count();
+    let near = count(|outcome| matches!(outcome, BeamOutcome::BelowMinRange));
+    let no_echo = count(|outcome| matches!(outcome, BeamOutcome::NoEcho));
     let echoes: Vec<f64> = same
         .iter()
-        .filter_map(|beam| match beam.heard {
-            Heard::Echo(range_m) => Some(range_m),
+        .filter_map(|beam| match beam.outcome {
+            BeamOutcome::Echo(range_m) => Some(range_m),
             _ => None,
         })
         .collect();
     let outcome = if near >= no_echo && near > echoes.len() {
-        Heard::Near
+        BeamOutcome::BelowMinRange
     } else if no_echo > echoes.len() {
-        Heard::Silent
+        BeamOutcome::NoEcho
     } else {
-        quantile(echoes, 0.5).map_or(Heard::Silent, Heard::Echo)
+        quantile(echoes, 0.5).map_or(BeamOutcome::NoEcho, BeamOutcome::Echo)
     };
     let index = same.iter().map(|beam| beam.index).min().unwrap_or_default();
-    Beam { heard: outcome, index, ..same[0] }
+    SweepBeam { outcome, index, ..same[0] }
 }

@@ -13,7 +13,7 @@ use std::sync::Arc;
 use jiff::Timestamp;
 use uuid::Uuid;
 
-use super::{Extents, Feature, Settings, Sweep, interpret};
+use super::{Extents, Feature, InterpretSettings, Sweep, interpret};
 use sonard_model::{
     acoustics::{Air, Sensor},
     geometry::Pose,
@@ -40,9 +40,9 @@ fn scan(simulator: &Simulator, number: u128, pose: &Pose) -> ScanView {
     ScanView::simulated(simulator, id, pose, &plan, Timestamp::UNIX_EPOCH).expect("few paths")
 }
 
-fn features(scans: &[ScanView], settings: &Settings) -> Vec<Feature> {
+fn features(scans: &[ScanView], settings: &InterpretSettings) -> Vec<Feature> {
     let session = scans[0].session.as_ref().expect("a session");
-    let extents = Extents::of_session(session).expect("sensible figures");
+    let extents = Extents::from_session(session).expect("sensible figures");
     let sweeps: Vec<_> =
         scans.iter().map(|scan| (scan.scan, Sweep::from_scan(scan).expect("a sweep"))).collect();
     interpret(&sweeps, &extents, settings)

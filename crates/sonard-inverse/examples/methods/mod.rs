@@ -2,7 +2,7 @@
 
 use rand::RngExt as _;
 use rand_pcg::Pcg64;
-use sonard_inverse::{Heard, Sweep, World};
+use sonard_inverse::{FiringOutcome, FitSweep, World};
 use sonard_model::{
     geometry::{DVec2, Pose, wrap_180},
     model::Simulator,
@@ -53,11 +53,11 @@ impl Grid {
     }
 
     /// Azimuths and ranges of a sweep.
-    pub(crate) fn readings(&self, sweep: &Sweep) -> Vec<(f64, Option<f64>)> {
-        let reading = |beam: &sonard_inverse::Beam| {
-            (beam.azimuth_deg, beam.heard.range_m(self.sound_speed_m_s))
+    pub(crate) fn readings(&self, sweep: &FitSweep) -> Vec<(f64, Option<f64>)> {
+        let reading = |beam: &sonard_inverse::SweepFiring| {
+            (beam.azimuth_deg, beam.outcome.range_m(self.sound_speed_m_s))
         };
-        sweep.beams.iter().filter(|beam| beam.heard != Heard::Near).map(reading).collect()
+        sweep.beams.iter().filter(|beam| beam.outcome != FiringOutcome::BelowMinRange).map(reading).collect()
     }
 
     /// Most likely pose after refinement of the four best grid poses.
@@ -167,7 +167,7 @@ pub(crate) struct BeamModel {
 
 impl BeamModel {
     /// Maximum-likelihood components for sweeps at known poses (expectation maximization).
-    pub(crate) fn learned(grid: &Grid, training: &[(Pose, Sweep)]) -> Self {
+    pub(crate) fn learned(grid: &Grid, training: &[(Pose, FitSweep)]) -> Self {
         let pairs: Vec<(Option<f64>, Option<f64>)> = training
             .iter()
             .flat_map(|(pose, sweep)| {
@@ -249,8 +249,8 @@ impl Histograms {
             let beams = readings(world, &pose, 0.0, rng)?;
             let mut ranges: Ranges = vec![None; DIRECTIONS];
             let mut measured = Vec::new();
-            for beam in beams.into_iter().filter(|beam| beam.heard != Heard::Near) {
-                let read = beam.heard.range_m(grid.sound_speed_m_s);
+            for beam in beams.into_iter().filter(|beam| beam.outcome != FiringOutcome::BelowMinRange) {
+                let read = beam.outcome.range_m(grid.sound_speed_m_s);
                 let direction = ((beam.azimuth_deg + heading_deg) / STEP_DEG).round();
                 ranges[direction.rem_euclid(DIRECTIONS as f64) as usize % DIRECTIONS] = read;
                 measured.push((beam.azimuth_deg, read));

@@ -4,7 +4,7 @@ use std::{f64::consts::TAU, sync::Arc};
 
 use rand::{RngExt as _, SeedableRng as _};
 use rand_pcg::Pcg64;
-use sonard_inverse::{Fit, Parameter, Prior, Search, Sweep, World};
+use sonard_inverse::{FitOptions, Parameter, Prior, Search, FitSweep, World};
 use sonard_model::{
     acoustics::{Air, Sensor},
     geometry::{DVec2, Pose},
@@ -36,12 +36,12 @@ pub(crate) struct PerturbedWorld {
     pub(crate) truth: World,
     pub(crate) assumed: World,
     /// Sweep with its true pose.
-    pub(crate) true_sweep: Sweep,
+    pub(crate) true_sweep: FitSweep,
     /// Sweep without the furniture.
-    pub(crate) unobstructed: Sweep,
+    pub(crate) unobstructed: FitSweep,
     /// Sweep with the assumed pose.
-    pub(crate) assumed_sweep: Sweep,
-    pub(crate) fit: Fit,
+    pub(crate) assumed_sweep: FitSweep,
+    pub(crate) fit: FitOptions,
     /// Change of each parameter from the assumed to the true world.
     pub(crate) expected: Vec<f64>,
 }
@@ -95,23 +95,23 @@ impl PerturbedWorld {
         let read = |world: &World, rng: &mut Pcg64| readings(world, &pose, ERRORS.sigma_db, rng);
         let unobstructed = read(&truth, &mut rng.clone())?;
         let beams = read(&measured, &mut rng)?;
-        let true_sweep = Sweep { scan: Uuid::nil(), pose, beams };
-        let unobstructed = Sweep { beams: unobstructed, ..true_sweep.clone() };
+        let true_sweep = FitSweep { scan: Uuid::nil(), pose, beams };
+        let unobstructed = FitSweep { beams: unobstructed, ..true_sweep.clone() };
         let assumed_pose = Pose {
             x_m: pose.x_m + shift.x,
             y_m: pose.y_m + shift.y,
             heading_deg: pose.heading_deg + turn_deg,
         };
-        let assumed_sweep = Sweep { pose: assumed_pose, ..true_sweep.clone() };
+        let assumed_sweep = FitSweep { pose: assumed_pose, ..true_sweep.clone() };
         let expected = changes.iter().map(|(_, by, _)| *by).collect();
         let priors =
             changes.into_iter().map(|(parameter, _, sigma)| Prior { parameter, sigma }).collect();
-        let fit = Fit {
+        let fit = FitOptions {
             priors,
-            widest_m: 0.15,
-            widest_turn_deg: 12.0,
-            least_sigma_m: 2e-4,
-            least_sigma_db: 0.1,
+            initial_sigma_m: 0.15,
+            max_turn_deg: 12.0,
+            min_sigma_m: 2e-4,
+            min_sigma_db: 0.1,
             search: kinds.search.unwrap_or(match kinds.furniture {
                 true => Search::Furnished,
                 false => Search::Thorough,

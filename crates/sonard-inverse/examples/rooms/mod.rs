@@ -3,9 +3,9 @@
 use rand::RngExt as _;
 use rand_distr::{Distribution as _, StandardNormal};
 use rand_pcg::Pcg64;
-use sonard_inverse::{Beam, Heard, World};
+use sonard_inverse::{SweepFiring, FiringOutcome, World};
 use sonard_model::{
-    acoustics::{Rise, TofNoise},
+    acoustics::{EchoRise, TofNoise},
     geometry::{DVec2, Pose},
     reading::PingStatus,
     scene::Scene,
@@ -23,27 +23,27 @@ pub(crate) fn readings(
     pose: &Pose,
     sigma_db: f64,
     rng: &mut Pcg64,
-) -> Option<Vec<Beam>> {
+) -> Option<Vec<SweepFiring>> {
     let simulator = truth.simulator(pose).ok()?;
     let (point, speed_m_s) = (simulator.at(pose.position()), simulator.sound_speed_m_s());
-    let noise = TofNoise::of_range_mm(NOISE_MM, speed_m_s);
+    let noise = TofNoise::from_range_sigma_mm(NOISE_MM, speed_m_s);
     let beam = |at: u32| {
         let azimuth_deg = 360.0 * f64::from(at) / f64::from(BEAMS);
         let direction_rad = truth.direction_rad(pose, azimuth_deg);
         let factor = if sigma_db > 0.0 { threshold_factor(sigma_db, rng) } else { 1.0 };
         let rise = point.hear(direction_rad, |firing| {
-            firing.listen(simulator.receiver(), |listening| listening.rise(factor, 0.0))
+            firing.listen(simulator.receiver(), |listening| listening.first_rise(factor, 0.0))
         });
         let late_us = noise.sample_us(rng);
         let heard = match rise.ok()? {
-            Some(Rise { status: PingStatus::Echo, range_m, .. }) => {
-                Heard::Echo { tof_us: 2e6 * range_m / speed_m_s + late_us }
+            Some(EchoRise { status: PingStatus::Echo, range_m, .. }) => {
+                FiringOutcome::Echo { tof_us: 2e6 * range_m / speed_m_s + late_us }
             }
-            None => Heard::Silence,
-            Some(Rise { status: PingStatus::MinRange, .. }) => Heard::Near,
+            None => FiringOutcome::NoEcho,
+            Some(EchoRise { status: PingStatus::MinRange, .. }) => FiringOutcome::BelowMinRange,
             Some(_) => return None,
         };
-        Some(Beam { azimuth_deg, heard })
+        Some(SweepFiring { azimuth_deg, outcome: heard })
     };
     Some((0..BEAMS).filter_map(beam).collect())
 }

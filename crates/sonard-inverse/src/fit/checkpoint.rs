@@ -12,7 +12,7 @@ use crate::likelihood::ErrorModel;
 /// Result of one search of a fit.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "search", rename_all = "snake_case", deny_unknown_fields)]
-pub enum Found {
+pub enum SearchResult {
     /// Stage of the continuation from a wide to the observed error model.
     Spread {
         /// Changes of the parameters since the start, each in its unit.
@@ -42,7 +42,7 @@ pub enum Found {
     Nothing,
 }
 
-impl Found {
+impl SearchResult {
     fn values(&self) -> &[f64] {
         match self {
             Self::Spread { values, .. } | Self::End { values, .. } | Self::Place { values, .. } => {
@@ -57,11 +57,11 @@ impl Fitter<'_> {
     /// Runs the next search, or replays its recorded result.
     pub(super) fn found(
         &mut self,
-        search: impl FnOnce(&mut Self) -> Result<Found, FitError>,
-    ) -> Result<Found, FitError> {
+        search: impl FnOnce(&mut Self) -> Result<SearchResult, FitError>,
+    ) -> Result<SearchResult, FitError> {
         match self.known.next() {
             // A recorded failure is repeated to obtain its error.
-            Some(Found::Nothing) => search(self),
+            Some(SearchResult::Nothing) => search(self),
             Some(found) if found.values().len() == self.parameters.len() => Ok(found.clone()),
             Some(_) => Err(FitError::OtherFit),
             None => {
@@ -69,7 +69,7 @@ impl Fitter<'_> {
                 match &found {
                     Ok(found) => self.watch.found(found),
                     Err(error) if error.ends_all() => {}
-                    Err(_) => self.watch.found(&Found::Nothing),
+                    Err(_) => self.watch.found(&SearchResult::Nothing),
                 }
                 found
             }

@@ -4,11 +4,11 @@ use nalgebra::DVector;
 
 use super::{
     FitError, Fitter, Optimum, Search,
-    checkpoint::{Found, listed},
+    checkpoint::{SearchResult, listed},
     one_of_many,
 };
 use crate::{
-    candidates::Phases, likelihood::ErrorModel, linear::LinearizedModel, progress::Progress,
+    candidates::Phases, likelihood::ErrorModel, linear::LinearizedModel, progress::FitProgress,
 };
 
 /// Stages: standard deviation of ranges relative to the widest, and of the threshold, decibels. The
@@ -40,7 +40,7 @@ impl Fitter<'_> {
         for stage in stages {
             let from = *errors;
             let found = self.found(|fitter| fitter.narrowed(from, stage))?;
-            let Found::Spread { values, errors: narrowed, is_last } = found else {
+            let SearchResult::Spread { values, errors: narrowed, is_last } = found else {
                 return Err(FitError::OtherFit);
             };
             (self.values, *errors) = (DVector::from_vec(values), narrowed);
@@ -52,16 +52,16 @@ impl Fitter<'_> {
     }
 
     /// Runs one stage.
-    fn narrowed(&mut self, mut errors: ErrorModel, stage: usize) -> Result<Found, FitError> {
+    fn narrowed(&mut self, mut errors: ErrorModel, stage: usize) -> Result<SearchResult, FitError> {
         let ((share, sigma_db), (step_deg, steps)) = (STAGES[stage], TURNS[stage]);
-        self.watch.progress(Progress::Approaching { spread: stage + 1, of: STAGES.len() });
-        let steps = steps.min((self.fit.widest_turn_deg / step_deg) as i32);
+        self.watch.progress(FitProgress::Continuation { stage: stage + 1, of: STAGES.len() });
+        let steps = steps.min((self.fit.max_turn_deg / step_deg) as i32);
         // Never narrower than the observed scatter: otherwise a few readings that happen to agree
         // would dominate, and all others count as clutter.
         let linear = self.linear()?;
         let spread = self.spread(&linear, &errors);
-        errors.sigma_m = (self.fit.widest_m * share).max(spread.sigma_m.min(errors.sigma_m));
-        errors.sigma_db = sigma_db.max(self.fit.least_sigma_db);
+        errors.sigma_m = (self.fit.initial_sigma_m * share).max(spread.sigma_m.min(errors.sigma_m));
+        errors.sigma_db = sigma_db.max(self.fit.min_sigma_db);
         let is_turned = self.turn(&errors, step_deg, steps)?;
         let mut moved = f64::INFINITY;
         for _ in 0..3 {
@@ -72,8 +72,8 @@ impl Fitter<'_> {
             }
         }
         // The observed scatter is reached and nothing moves: narrower stages change nothing.
-        let is_last = !is_turned && moved < 0.02 && errors.sigma_m > self.fit.widest_m * share;
-        Ok(Found::Spread { values: listed(&self.values), errors, is_last })
+        let is_last = !is_turned && moved < 0.02 && errors.sigma_m > self.fit.initial_sigma_m * share;
+        Ok(SearchResult::Spread { values: listed(&self.values), errors, is_last })
     }
 
     /// Log-posterior at the current values.
@@ -111,7 +111,7 @@ impl Fitter<'_> {
     pub(super) fn settled(&mut self, from: ErrorModel) -> Result<Optimum, FitError> {
         let phases = self.phases;
         match self.found(|fitter| fitter.likeliest_here(from))? {
-            Found::End { values, errors, log_posterior } => Ok(Optimum {
+            SearchResult::End { values, errors, log_posterior } => Ok(Optimum {
                 value: log_posterior,
                 values: DVector::from_vec(values),
                 errors,
@@ -139,7 +139,7 @@ impl Fitter<'_> {
         self.polished(settled)
     }
 
-    fn likeliest_here(&mut self, from: ErrorModel) -> Result<Found, FitError> {
+    fn likeliest_here(&mut self, from: ErrorModel) -> Result<SearchResult, FitError> {
         let linear = self.linear()?;
         let mut errors = self.spread(&linear, &from);
         let mut best = (self.value(&linear, &errors), self.values.clone());
@@ -168,7 +168,7 @@ impl Fitter<'_> {
             }
         }
         self.values = best.1;
-        Ok(Found::End { values: listed(&self.values), errors, log_posterior: best.0 })
+        Ok(SearchResult::End { values: listed(&self.values), errors, log_posterior: best.0 })
     }
 
     /// Optimal step of the linearization from the current values.

@@ -5,12 +5,12 @@ use std::slice;
 use nalgebra::DVector;
 use sonard_model::geometry::Pose;
 
-use super::{Fit, FitError, Fitted, Fitter, continuation::STAGES};
+use super::{FitOptions, FitError, FitResult, Fitter, continuation::STAGES};
 use crate::{
     candidates::Phases,
     likelihood::ErrorModel,
-    progress::{Unwatched, Watch},
-    sweep::Sweep,
+    progress::{NoObserver, FitObserver},
+    sweep::FitSweep,
     world::{SimulatorSet, World},
 };
 
@@ -35,14 +35,14 @@ pub(crate) struct RoughFit {
 /// If the number of values differs from that of the parameters.
 pub fn fit_from(
     world: &World,
-    sweeps: &[Sweep],
-    fit: &Fit,
+    sweeps: &[FitSweep],
+    fit: &FitOptions,
     start: &[f64],
     errors: &ErrorModel,
-) -> Result<Fitted, FitError> {
+) -> Result<FitResult, FitError> {
     assert_eq!(start.len(), fit.priors.len(), "one value for each parameter");
     let models = SimulatorSet::new(&world.with_face_on_axis())?;
-    let mut fitter = Fitter::new(models, world, sweeps, fit, &Unwatched)?;
+    let mut fitter = Fitter::new(models, world, sweeps, fit, &NoObserver)?;
     fitter.values = DVector::from_row_slice(start);
     fitter.phases = Phases::Known;
     let end = fitter.settled(*errors)?;
@@ -55,9 +55,9 @@ pub fn fit_from(
 pub(crate) fn approach(
     models: SimulatorSet,
     world: &World,
-    sweep: &Sweep,
-    fit: &Fit,
-    watch: &dyn Watch,
+    sweep: &FitSweep,
+    fit: &FitOptions,
+    watch: &dyn FitObserver,
 ) -> Result<RoughFit, FitError> {
     let mut fitter = Fitter::new(models, world, slice::from_ref(sweep), fit, watch)?;
     Ok(fitter.approached((0..STAGES.len()).step_by(2))?.0)
@@ -68,11 +68,11 @@ pub(crate) fn approach(
 pub(crate) fn fit_near(
     models: SimulatorSet,
     world: &World,
-    sweep: &Sweep,
-    fit: &Fit,
+    sweep: &FitSweep,
+    fit: &FitOptions,
     least: f64,
-    watch: &dyn Watch,
-) -> Result<Option<(Fitted, f64)>, FitError> {
+    watch: &dyn FitObserver,
+) -> Result<Option<(FitResult, f64)>, FitError> {
     let mut fitter = Fitter::new(models, world, slice::from_ref(sweep), fit, watch)?;
     let (RoughFit { log_posterior, .. }, errors) = fitter.approached(NEAR.into_iter())?;
     if log_posterior < least {

@@ -9,7 +9,7 @@ use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 use super::{
     FitError, Fitter, Optimum, Search,
-    checkpoint::{Found, listed},
+    checkpoint::{SearchResult, listed},
     continuation::STAGES,
     one_of_many,
     refine::FAR_BELOW,
@@ -17,7 +17,7 @@ use super::{
 use crate::{
     candidates::Phases,
     likelihood::{ErrorModel, READINGS_PER_ARC},
-    progress::Progress,
+    progress::FitProgress,
 };
 
 /// Number of directions searched.
@@ -159,7 +159,7 @@ impl Fitter<'_> {
         (place, of): (usize, usize),
     ) -> Result<Option<StartPoint>, FitError> {
         self.place_by(|fitter| {
-            fitter.watch.progress(Progress::Searching { place, of });
+            fitter.watch.progress(FitProgress::Restart { start: place, of });
             fitter.improved(start, errors)
         })
     }
@@ -167,11 +167,11 @@ impl Fitter<'_> {
     /// Point found by a search; `None` if prediction fails.
     pub(super) fn place_by(
         &mut self,
-        search: impl FnOnce(&mut Self) -> Result<Found, FitError>,
+        search: impl FnOnce(&mut Self) -> Result<SearchResult, FitError>,
     ) -> Result<Option<StartPoint>, FitError> {
         match one_of_many(self.found(search))? {
             None => Ok(None),
-            Some(Found::Place { values, log_posterior: value }) => {
+            Some(SearchResult::Place { values, log_posterior: value }) => {
                 Ok(Some(StartPoint { values: DVector::from_vec(values), value }))
             }
             Some(_) => Err(FitError::OtherFit),
@@ -196,7 +196,7 @@ impl Fitter<'_> {
     }
 
     /// Improves a start by two sets of steps.
-    fn improved(&mut self, start: DVector<f64>, errors: &ErrorModel) -> Result<Found, FitError> {
+    fn improved(&mut self, start: DVector<f64>, errors: &ErrorModel) -> Result<SearchResult, FitError> {
         self.values = start;
         for _ in 0..2 {
             let linear = self.linear()?;
@@ -204,7 +204,7 @@ impl Fitter<'_> {
         }
         let linear = self.linear()?;
         let log_posterior = self.value(&linear, errors);
-        Ok(Found::Place { values: listed(&self.values), log_posterior })
+        Ok(SearchResult::Place { values: listed(&self.values), log_posterior })
     }
 
     /// Additional variances due to other points that explain the readings nearly as well.
@@ -233,7 +233,7 @@ impl Fitter<'_> {
         let of_best = self.value(&linear, &close);
         // The optimum differs slightly with a wider error model; points near either are the same.
         let home = match one_of_many(self.improved(best.values.clone(), &close))? {
-            Some(Found::Place { values, log_posterior }) if log_posterior > of_best => {
+            Some(SearchResult::Place { values, log_posterior }) if log_posterior > of_best => {
                 StartPoint { values: DVector::from_vec(values), value: log_posterior }
             }
             _ => StartPoint { values: best.values.clone(), value: of_best },

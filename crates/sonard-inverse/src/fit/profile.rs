@@ -10,13 +10,13 @@ use nalgebra::DVector;
 
 use super::{
     FitError, Fitter, Optimum,
-    checkpoint::{Found, listed},
+    checkpoint::{SearchResult, listed},
     one_of_many,
     perturbation::{CLOSE, ROUGH, StartPoint, keep_likelier, widened},
     refine::FAR_BELOW,
 };
 use crate::{
-    candidates::Phases, likelihood::ErrorModel, parameter::Parameter, progress::Progress,
+    candidates::Phases, likelihood::ErrorModel, parameter::Parameter, progress::FitProgress,
     time_walk::WELL_KNOWN,
 };
 
@@ -138,7 +138,7 @@ impl Fitter<'_> {
                 let start = self.limited(from + sign * apart * *sigma * direction);
                 let place = number + side * steps + step;
                 let found = self.place_by(|fitter| {
-                    fitter.watch.progress(Progress::Searching { place, of });
+                    fitter.watch.progress(FitProgress::Restart { start: place, of });
                     fitter.held = Some(fitter.along(direction));
                     let looked = fitter.looked(start, looks);
                     fitter.held = None;
@@ -165,7 +165,7 @@ impl Fitter<'_> {
         &mut self,
         start: DVector<f64>,
         looks: [(Phases, ErrorModel); 2],
-    ) -> Result<Found, FitError> {
+    ) -> Result<SearchResult, FitError> {
         self.values = start;
         for (phases, errors) in &looks {
             self.phases = *phases;
@@ -175,7 +175,7 @@ impl Fitter<'_> {
         let linear = self.linear()?;
         let errors = self.spread(&linear, &looks[1].1);
         let log_posterior = self.value(&linear, &errors);
-        Ok(Found::Place { values: listed(&self.values), log_posterior })
+        Ok(SearchResult::Place { values: listed(&self.values), log_posterior })
     }
 }
 

@@ -12,7 +12,7 @@ use rand_pcg::Pcg64;
 
 use super::{
     FitError, Fitter, Optimum,
-    checkpoint::{Found, listed},
+    checkpoint::{SearchResult, listed},
     one_of_many,
 };
 use crate::{candidates::Phases, likelihood::ErrorModel};
@@ -51,7 +51,7 @@ impl Fitter<'_> {
         }
         let found = self.found(|fitter| fitter.polish(from));
         let (values, errors, log_posterior) = match one_of_many(found)? {
-            Some(Found::End { values, errors, log_posterior }) => (values, errors, log_posterior),
+            Some(SearchResult::End { values, errors, log_posterior }) => (values, errors, log_posterior),
             Some(_) => return Err(FitError::OtherFit),
             None => return Ok(end),
         };
@@ -62,7 +62,7 @@ impl Fitter<'_> {
         Ok(Optimum { value: log_posterior, values, errors, phases: Phases::Known })
     }
 
-    fn polish(&mut self, end: &Optimum) -> Result<Found, FitError> {
+    fn polish(&mut self, end: &Optimum) -> Result<SearchResult, FitError> {
         (self.values, self.phases) = (end.values.clone(), end.phases);
         let linear = self.linear()?;
         let mut errors = self.spread(&linear, &end.errors);
@@ -95,7 +95,7 @@ impl Fitter<'_> {
             }
         }
         let (log_posterior, values) = best;
-        Ok(Found::End { values: listed(&values), errors, log_posterior })
+        Ok(SearchResult::End { values: listed(&values), errors, log_posterior })
     }
 
     /// Best of some points along the weakly constrained directions, beyond the reach of the random

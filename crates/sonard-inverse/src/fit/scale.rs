@@ -38,7 +38,7 @@ impl Fitter<'_> {
             // The median of inliers depends little on the tail: 0.6745 of a normal distribution
             // alone, and 0.72 with a tail of 10 % and twice the length.
             let sigma_m = median_m / (0.6745 + 0.455 * tail_share);
-            let sigma_m = sigma_m.min(self.fit.widest_m).max(self.least_sigma_m());
+            let sigma_m = sigma_m.min(self.fit.initial_sigma_m).max(self.least_sigma_m());
             ErrorModel { sigma_m, tail_share, ..spread }
         };
         let spread = likeliest(&mut TAILS.iter().map(of_tail), spread);
@@ -46,7 +46,7 @@ impl Fitter<'_> {
             if self.is_beyond_phases(&spread) { DB_PER_REFLECTION } else { 0.0 };
         let spread = ErrorModel { sigma_db_per_reflection, ..spread };
         let of_threshold = |&sigma_db: &f64| ErrorModel { sigma_db, ..spread };
-        let tried = SPREADS_DB.iter().filter(|sigma_db| **sigma_db >= self.fit.least_sigma_db);
+        let tried = SPREADS_DB.iter().filter(|sigma_db| **sigma_db >= self.fit.min_sigma_db);
         likeliest(&mut tried.map(of_threshold), spread)
     }
 }

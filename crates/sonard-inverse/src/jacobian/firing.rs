@@ -6,7 +6,7 @@ use sonard_model::{
     model::{Arrival, Simulator},
 };
 
-use crate::sweep::Beam;
+use crate::sweep::SweepFiring;
 
 /// FiringGeometry with its geometry.
 pub(super) struct FiringGeometry<'a> {
@@ -26,9 +26,9 @@ impl<'a> FiringGeometry<'a> {
         simulator: &'a Simulator,
         pose: &Pose,
         direction_rad: f64,
-        beam: &Beam,
+        beam: &SweepFiring,
     ) -> Self {
-        let ends = simulator.sensor().mounting.places(pose.position(), direction_rad);
+        let ends = simulator.sensor().mounting.transducer_positions(pose.position(), direction_rad);
         Self { simulator, azimuth_deg: beam.azimuth_deg, direction_rad, ends }
     }
 

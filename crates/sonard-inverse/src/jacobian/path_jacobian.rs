@@ -11,7 +11,7 @@ use sonard_model::{
 use super::{FiringGeometry, JacobianBuilder, material_rate_db};
 use crate::{
     bearing::Bearing,
-    motion::{Motion, length_rate},
+    motion::{SceneMotion, length_derivative},
 };
 
 /// Cache of path Jacobians for firings from one position.
@@ -80,12 +80,12 @@ impl PathJacobian {
     }
 
     /// Derivative for a motion of transducer and scene.
-    pub(super) fn moved(&self, firing: &FiringGeometry, motion: &Motion) -> PathDerivative {
+    pub(super) fn moved(&self, firing: &FiringGeometry, motion: &SceneMotion) -> PathDerivative {
         let scene = firing.simulator.scene();
         let z_m = firing.simulator.sensor_z_m().unwrap_or(0.0);
         let bearing = self.bearing.as_ref();
         PathDerivative {
-            longer_m: length_rate(&self.path, self.ends, z_m, scene, motion),
+            longer_m: length_derivative(&self.path, self.ends, z_m, scene, motion),
             turned_rad: bearing.map_or([0.0; 2], |bearing| bearing.derivatives(scene, motion)),
             louder_db: 0.0,
         }

@@ -14,13 +14,13 @@ use sonard_model::{
 
 use super::{first_pose, recovery::sweep, world};
 use crate::{
-    Atlas, AtlasError, ErrorModel, Fit, FitError, Fitted, Found, Heard, Parameter, Prior, Sweep,
-    Unwatched, Watch, World, fit_watched, locate_watched,
+    CoarseGrid, CoarseGridError, ErrorModel, FitOptions, FitError, FitResult, SearchResult, FiringOutcome, Parameter, Prior, FitSweep,
+    NoObserver, FitObserver, World, fit_observed, locate_observed,
 };
 
 /// Observer that records results, and cancels after a number of them.
 struct Recorder {
-    found: Mutex<Vec<Found>>,
+    found: Mutex<Vec<SearchResult>>,
     max: usize,
 }
 
@@ -29,24 +29,24 @@ impl Recorder {
         Self { found: Mutex::default(), max }
     }
 
-    fn found(self) -> Vec<Found> {
+    fn found(self) -> Vec<SearchResult> {
         self.found.into_inner().expect("no panic")
     }
 }
 
-impl Watch for Recorder {
-    fn found(&self, found: &Found) {
+impl FitObserver for Recorder {
+    fn found(&self, found: &SearchResult) {
         self.found.lock().expect("no panic").push(found.clone());
     }
 
-    fn stops(&self) -> bool {
+    fn is_cancelled(&self) -> bool {
         self.found.lock().expect("no panic").len() >= self.max
     }
 }
 
 /// Short fit: few readings of a corner by the fastest engine, one in four of a person who walks
 /// about, so that it restarts elsewhere.
-fn short(parameters: &[(Parameter, f64)]) -> (World, Vec<Sweep>, Fit) {
+fn short(parameters: &[(Parameter, f64)]) -> (World, Vec<FitSweep>, FitOptions) {
     let mut here = world("right-angle-corner", "senscomp-6500");
     here.options = Options {
         engine: EngineOptions::Cone(ConeOptions::default()),
@@ -56,24 +56,24 @@ fn short(parameters: &[(Parameter, f64)]) -> (World, Vec<Sweep>, Fit) {
     let pose = first_pose(&here.scene);
     let initial = Pose { x_m: pose.x_m + 0.05, ..pose };
     let truth = here.changed(&[(&Parameter::Threshold, 2.0)]).expect("a world");
-    let noise = TofNoise::of_range_mm(1.0, truth.air.sound_speed_m_s());
+    let noise = TofNoise::from_range_sigma_mm(1.0, truth.air.sound_speed_m_s());
     let mut sweep = sweep(&truth, &pose, &initial, 24, noise, 2);
     let late_us = [700.0, 2900.0, 1300.0].into_iter().cycle();
     for (beam, late_us) in sweep.beams.iter_mut().step_by(4).zip(late_us) {
-        beam.heard = Heard::Echo { tof_us: 3000.0 + late_us };
+        beam.outcome = FiringOutcome::Echo { tof_us: 3000.0 + late_us };
     }
     let of = |(parameter, sigma): &(Parameter, f64)| Prior {
         parameter: parameter.clone(),
         sigma: *sigma,
     };
-    (here, vec![sweep], Fit::usual(parameters.iter().map(of).collect(), 0.1))
+    (here, vec![sweep], FitOptions::with_priors(parameters.iter().map(of).collect(), 0.1))
 }
 
 const PLACE: [(Parameter, f64); 3] =
     [(Parameter::X(0), 0.1), (Parameter::Y(0), 0.1), (Parameter::Threshold, 6.0)];
 
 /// All values of a result as bits.
-fn bits(fitted: &Fitted) -> Vec<u64> {
+fn bits(fitted: &FitResult) -> Vec<u64> {
     let of = fitted.estimates.iter().flat_map(|estimate| [estimate.change, estimate.sigma]);
     let errors = &fitted.errors;
     let further = [errors.sigma_m, errors.sigma_db, errors.clutter, fitted.log_posterior];
@@ -86,25 +86,25 @@ fn bits(fitted: &Fitted) -> Vec<u64> {
 fn cancel_and_resume(parameters: &[(Parameter, f64)], every: usize) {
     let (here, sweeps, what) = short(parameters);
     let keeper = Recorder::until(usize::MAX);
-    let whole = fit_watched(&here, &sweeps, &what, &[], &keeper).expect("a fit");
+    let whole = fit_observed(&here, &sweeps, &what, &[], &keeper).expect("a fit");
     let all = keeper.found();
-    let count = |kind: fn(&Found) -> bool| all.iter().filter(|found| kind(found)).count();
+    let count = |kind: fn(&SearchResult) -> bool| all.iter().filter(|found| kind(found)).count();
     // Restarts, searches along two directions, and follows the best.
-    assert!(count(|found| matches!(found, Found::End { .. })) >= 6, "{all:?}");
-    assert!(count(|found| matches!(found, Found::Place { .. } | Found::Nothing)) >= 12, "{all:?}");
+    assert!(count(|found| matches!(found, SearchResult::End { .. })) >= 6, "{all:?}");
+    assert!(count(|found| matches!(found, SearchResult::Place { .. } | SearchResult::Nothing)) >= 12, "{all:?}");
     (0..all.len()).into_par_iter().step_by(every).for_each(|cut| {
         let keeper = Recorder::until(cut);
-        let stopped = fit_watched(&here, &sweeps, &what, &[], &keeper);
+        let stopped = fit_observed(&here, &sweeps, &what, &[], &keeper);
         assert_eq!(stopped.err(), Some(FitError::Stopped), "{cut}");
         let known = keeper.found();
         assert_eq!(known, all[..cut], "{cut}");
         let keeper = Recorder::until(usize::MAX);
-        let again = fit_watched(&here, &sweeps, &what, &known, &keeper).expect("a fit");
+        let again = fit_observed(&here, &sweeps, &what, &known, &keeper).expect("a fit");
         assert_eq!(bits(&again), bits(&whole), "{cut}");
         assert_eq!(keeper.found(), all[cut..], "{cut}");
     });
     let nothing_left = Recorder::until(usize::MAX);
-    let again = fit_watched(&here, &sweeps, &what, &all, &nothing_left).expect("a fit");
+    let again = fit_observed(&here, &sweeps, &what, &all, &nothing_left).expect("a fit");
     assert_eq!(bits(&again), bits(&whole));
     assert_eq!(nothing_left.found(), []);
 }
@@ -123,10 +123,10 @@ fn resumed_fit_with_heading_is_bit_identical() {
 fn foreign_checkpoint_is_rejected() {
     let (here, sweeps, what) = short(&PLACE);
     let errors = ErrorModel::rough(0.1, 6.0, 5.0);
-    let place = Found::Place { values: vec![0.0; 3], log_posterior: 0.0 };
-    let short = Found::Spread { values: vec![0.0; 2], errors, is_last: false };
+    let place = SearchResult::Place { values: vec![0.0; 3], log_posterior: 0.0 };
+    let short = SearchResult::Spread { values: vec![0.0; 2], errors, is_last: false };
     for known in [place, short] {
-        let fitted = fit_watched(&here, &sweeps, &what, &[known], &Unwatched);
+        let fitted = fit_observed(&here, &sweeps, &what, &[known], &NoObserver);
         assert_eq!(fitted.err(), Some(FitError::OtherFit));
     }
 }
@@ -137,8 +137,8 @@ struct Canceller {
     max: usize,
 }
 
-impl Watch for Canceller {
-    fn stops(&self) -> bool {
+impl FitObserver for Canceller {
+    fn is_cancelled(&self) -> bool {
         self.polls.fetch_add(1, Ordering::Relaxed) >= self.max
     }
 }
@@ -146,11 +146,11 @@ impl Watch for Canceller {
 #[test]
 fn search_for_poses_is_cancelled() {
     let (here, sweeps, _) = short(&PLACE);
-    let atlas = Atlas::new(&here, 0.3).expect("an atlas");
+    let atlas = CoarseGrid::new(&here, 0.3).expect("an atlas");
     for max in [0, 3, 20] {
         let watch = || Canceller { polls: AtomicUsize::new(0), max };
-        let modes = locate_watched(&here, &atlas, &sweeps[0], &watch());
+        let modes = locate_observed(&here, &atlas, &sweeps[0], &watch());
         assert_eq!(modes.err(), Some(FitError::Stopped), "{max}");
-        assert_eq!(Atlas::watched(&here, 0.3, &watch()).err(), Some(AtlasError::Stopped), "{max}");
+        assert_eq!(CoarseGrid::observed(&here, 0.3, &watch()).err(), Some(CoarseGridError::Stopped), "{max}");
     }
 }

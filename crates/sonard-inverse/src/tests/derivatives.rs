@@ -10,7 +10,7 @@ use sonard_model::{
 
 use super::{first_pose, shipped, world};
 use crate::{
-    Motion, Parameter, World, bearing::Bearing, jacobian::material_rate_db, length_rate, walls,
+    SceneMotion, Parameter, World, bearing::Bearing, jacobian::material_rate_db, length_derivative, walls,
 };
 
 /// Half step of a finite difference, metres.
@@ -41,14 +41,14 @@ fn arrivals(world: &World, pose: &Pose, direction_rad: f64) -> BTreeMap<Key, Arr
 fn compare(
     name: &str,
     moved: impl Fn(f64) -> (World, Pose),
-    motion: impl Fn(&World, f64) -> Motion,
+    motion: impl Fn(&World, f64) -> SceneMotion,
 ) -> usize {
     let (here, pose) = moved(0.0);
     let mut compared = 0;
     for step in 0..24 {
         let azimuth_deg = 15.0 * f64::from(step);
         let direction_rad = here.direction_rad(&pose, azimuth_deg);
-        let ends = here.sensor.mounting.places(pose.position(), direction_rad);
+        let ends = here.sensor.mounting.transducer_positions(pose.position(), direction_rad);
         let simulator = here.simulator(&pose).expect("a model");
         let z_m = simulator.sensor_z_m().unwrap_or(0.0);
         let [before, after] = [-BY_M, BY_M].map(|by| {
@@ -60,7 +60,7 @@ fn compare(
             let (Some(before), Some(after)) = (before.get(&key), after.get(&key)) else { continue };
             let expected = (after.length_m - before.length_m) / (2.0 * BY_M);
             let motion = motion(&here, direction_rad);
-            let rate = length_rate(&arrival.path, ends, z_m, simulator.scene(), &motion);
+            let rate = length_derivative(&arrival.path, ends, z_m, simulator.scene(), &motion);
             let error = (rate - expected).abs();
             assert!(error < 1e-5, "{name}: {rate} for {expected} of {key:?} at {azimuth_deg}");
             let directions = |of: &Arrival| [of.departure_rad, of.arrival_rad];
@@ -238,7 +238,7 @@ fn moving_and_growing_cylinders() {
     let mut here = world("simple-room", "senscomp-6500");
     here.options.max_range_m = Some(2.5);
     let pose = scene.poses["here"];
-    let of = |change: &dyn Fn(&mut Scene, f64), motion: Motion| {
+    let of = |change: &dyn Fn(&mut Scene, f64), motion: SceneMotion| {
         compare(
             "cylinder",
             |by| {
@@ -249,9 +249,9 @@ fn moving_and_growing_cylinders() {
             |_, _| motion.clone(),
         )
     };
-    let moving = |velocity: DVec2, growth: f64| Motion {
+    let moving = |velocity: DVec2, growth: f64| SceneMotion {
         cylinders: vec![(0, velocity, growth)],
-        ..Motion::default()
+        ..SceneMotion::default()
     };
     let compared = of(&|scene, by| scene.cylinders[0].center.x += by, moving(DVec2::X, 0.0))
         + of(&|scene, by| scene.cylinders[0].center.y += by, moving(DVec2::Y, 0.0))

@@ -8,7 +8,7 @@ use sonard_model::{
 
 use super::world;
 use crate::{
-    Beam, Heard, Parameter, Sweep, World, candidates::Phases, jacobian::JacobianBuilder,
+    SweepFiring, FiringOutcome, Parameter, FitSweep, World, candidates::Phases, jacobian::JacobianBuilder,
     likelihood_terms::CandidateReading,
 };
 
@@ -30,8 +30,8 @@ fn first_possible(
     step_deg: usize,
 ) -> Vec<CandidateReading> {
     let azimuths = (-40..=40).step_by(step_deg).map(f64::from);
-    let beams = azimuths.map(|azimuth_deg| Beam { azimuth_deg, heard: Heard::Silence }).collect();
-    let sweep = Sweep { scan: uuid::Uuid::nil(), pose: *pose, beams };
+    let beams = azimuths.map(|azimuth_deg| SweepFiring { azimuth_deg, outcome: FiringOutcome::NoEcho }).collect();
+    let sweep = FitSweep { scan: uuid::Uuid::nil(), pose: *pose, beams };
     let of: Vec<&Parameter> = parameters.iter().collect();
     let builder = JacobianBuilder::new(world, &of, world.air.sound_speed_m_s(), Phases::Known);
     let simulator = world.simulator(pose).expect("a model");

@@ -3,10 +3,10 @@
 use rand::SeedableRng as _;
 use rand_distr::{Distribution as _, Normal};
 use rand_pcg::Pcg64;
-use sonard_model::{acoustics::Rise, geometry::Pose, reading::PingStatus};
+use sonard_model::{acoustics::EchoRise, geometry::Pose, reading::PingStatus};
 
 use super::{SIGMA_DB, as_read, before_a_wall};
-use crate::{Beam, Heard, Hypotheses, Parameter, Sweep, World};
+use crate::{SweepFiring, FiringOutcome, Hypotheses, Parameter, FitSweep, World};
 
 /// Just below the minimum range of 0.41 m: on the axis the echo falls into blanking, off it rises
 /// later.
@@ -17,27 +17,27 @@ fn at(x_m: f64) -> Pose {
 }
 
 /// Readings from the origin with varying thresholds.
-fn read(here: &World, rng: &mut Pcg64) -> Sweep {
+fn read(here: &World, rng: &mut Pcg64) -> FitSweep {
     let normal = Normal::new(0.0, SIGMA_DB).expect("a distribution");
     let simulator = here.simulator(&at(0.0)).expect("a model");
     let point = simulator.at(at(0.0).position());
     let mut outcome = |azimuth_deg: f64| {
         let factor = 10f64.powf(normal.sample(rng) / 20.0);
         let rise = point.hear(here.direction_rad(&at(0.0), azimuth_deg), |firing| {
-            firing.listen(simulator.receiver(), |listening| listening.rise(factor, 0.0))
+            firing.listen(simulator.receiver(), |listening| listening.first_rise(factor, 0.0))
         });
         match rise.expect("paths") {
-            Some(Rise { status: PingStatus::MinRange, .. }) => Heard::Near,
-            Some(Rise { range_m, .. }) => {
-                Heard::Echo { tof_us: 2e6 * range_m / simulator.sound_speed_m_s() }
+            Some(EchoRise { status: PingStatus::MinRange, .. }) => FiringOutcome::BelowMinRange,
+            Some(EchoRise { range_m, .. }) => {
+                FiringOutcome::Echo { tof_us: 2e6 * range_m / simulator.sound_speed_m_s() }
             }
-            None => Heard::Silence,
+            None => FiringOutcome::NoEcho,
         }
     };
     let azimuths_deg = (-60..60).map(|at| 0.25 * f64::from(at));
     let beams =
-        azimuths_deg.map(|azimuth_deg| Beam { azimuth_deg, heard: outcome(azimuth_deg) }).collect();
-    Sweep { scan: uuid::Uuid::nil(), pose: at(0.0), beams }
+        azimuths_deg.map(|azimuth_deg| SweepFiring { azimuth_deg, outcome: outcome(azimuth_deg) }).collect();
+    FitSweep { scan: uuid::Uuid::nil(), pose: at(0.0), beams }
 }
 
 /// The threshold affects which beams at the ends of an arc are below the minimum range: its score
@@ -52,16 +52,16 @@ fn threshold_score_is_unbiased() {
     let mut mixed = 0;
     for _ in 0..SWEEPS {
         let sweep = read(&here, &mut rng);
-        let score = |sweep: &Sweep| {
+        let score = |sweep: &FitSweep| {
             hypotheses.log_likelihood(sweep, &at(0.0), &errors).expect("paths").gradient[0]
         };
         let score_of_all = score(&sweep);
         sum += score_of_all;
         squares += score_of_all * score_of_all;
-        let (near, others): (Vec<Beam>, Vec<Beam>) =
-            sweep.beams.iter().partition(|beam| beam.heard == Heard::Near);
+        let (near, others): (Vec<SweepFiring>, Vec<SweepFiring>) =
+            sweep.beams.iter().partition(|beam| beam.outcome == FiringOutcome::BelowMinRange);
         mixed += near.len();
-        without += score(&Sweep { beams: others, ..sweep.clone() });
+        without += score(&FitSweep { beams: others, ..sweep.clone() });
     }
     assert!(mixed > 1000, "{mixed} beams below the minimum range");
     let [mean, biased] = [sum, without].map(|of| of / f64::from(SWEEPS));
@@ -76,7 +76,7 @@ fn threshold_score_is_unbiased() {
 fn minimum_range_constrains_the_wall() {
     let (here, errors) = (before_a_wall(WALL_M, 2.0), as_read(2.0));
     let mut read = read(&here, &mut Pcg64::seed_from_u64(6));
-    read.beams.retain(|beam| beam.heard == Heard::Near);
+    read.beams.retain(|beam| beam.outcome == FiringOutcome::BelowMinRange);
     let hypotheses = Hypotheses::new(here, vec![Parameter::X(0)]).expect("a model");
     let likely =
         |x_m: f64| hypotheses.log_likelihood(&read, &at(x_m), &errors).expect("paths").value;

@@ -12,7 +12,7 @@ use uuid::Uuid;
 
 use super::{first_pose, world};
 use crate::{
-    Atlas, Beam, ErrorModel, Fit, Group, Heard, Mode, Parameter, Prior, Search, Sweep, World, fit,
+    CoarseGrid, SweepFiring, ErrorModel, FitOptions, ParameterGroup, FiringOutcome, PoseMode, Parameter, Prior, Search, FitSweep, World, fit,
     fit_from, locate, priors,
 };
 
@@ -24,7 +24,7 @@ pub(super) fn sweep(
     beams: u32,
     noise: TofNoise,
     seed: u64,
-) -> Sweep {
+) -> FitSweep {
     let mut rng = Pcg64::seed_from_u64(seed);
     let simulator = world.simulator(pose).expect("a model");
     let point = simulator.at(pose.position());
@@ -35,14 +35,14 @@ pub(super) fn sweep(
         let late_us = noise.sample_us(&mut rng);
         let tof_us = |range_m: f64| (range_m + world.delay_m) * us_per_m + late_us;
         let outcome = match (read.status, read.range_m) {
-            (PingStatus::Echo, Some(range_m)) => Heard::Echo { tof_us: tof_us(range_m) },
-            (PingStatus::NoEcho, _) => Heard::Silence,
-            (PingStatus::MinRange, _) => Heard::Near,
+            (PingStatus::Echo, Some(range_m)) => FiringOutcome::Echo { tof_us: tof_us(range_m) },
+            (PingStatus::NoEcho, _) => FiringOutcome::NoEcho,
+            (PingStatus::MinRange, _) => FiringOutcome::BelowMinRange,
             _ => return None,
         };
-        Some(Beam { azimuth_deg, heard: outcome })
+        Some(SweepFiring { azimuth_deg, outcome })
     });
-    Sweep { scan: Uuid::nil(), pose: *initial, beams: beams.collect() }
+    FitSweep { scan: Uuid::nil(), pose: *initial, beams: beams.collect() }
 }
 
 /// Initial pose with an error of 5 cm, 6 cm and 5 degrees.
@@ -59,10 +59,10 @@ fn pose_air_and_threshold() {
     truth.air = Air::new(10.0, 50.0, 101.325).expect("air");
     let faster = truth.air.sound_speed_m_s() / here.air.sound_speed_m_s() - 1.0;
     let initial = displaced(&pose);
-    let noise = TofNoise::of_range_mm(1.0, truth.air.sound_speed_m_s());
+    let noise = TofNoise::from_range_sigma_mm(1.0, truth.air.sound_speed_m_s());
     let sweep = sweep(&truth, &pose, &initial, 400, noise, 1);
     let of = |parameter, sigma| Prior { parameter, sigma };
-    let what = Fit {
+    let what = FitOptions {
         priors: vec![
             of(Parameter::X(0), 0.1),
             of(Parameter::Y(0), 0.1),
@@ -70,10 +70,10 @@ fn pose_air_and_threshold() {
             of(Parameter::SoundSpeed, 0.015),
             of(Parameter::Threshold, 6.0),
         ],
-        widest_m: 0.1,
-        widest_turn_deg: 12.0,
-        least_sigma_m: 2e-4,
-        least_sigma_db: 0.5,
+        initial_sigma_m: 0.1,
+        max_turn_deg: 12.0,
+        min_sigma_m: 2e-4,
+        min_sigma_db: 0.5,
         search: Search::Quick,
     };
     let fitted = fit(&here, &[sweep], &what).expect("a fit");
@@ -97,15 +97,15 @@ fn wall_roughness() {
     let roughness = Parameter::Roughness("brick".to_owned());
     let truth = here.changed(&[(&roughness, 0.15)]).expect("a world");
     assert_eq!(truth.scene.walls[0].material, truth.scene.materials["brick"]);
-    let noise = TofNoise::of_range_mm(1.0, truth.air.sound_speed_m_s());
+    let noise = TofNoise::from_range_sigma_mm(1.0, truth.air.sound_speed_m_s());
     // From two positions: for a single sweep, phases could explain scattered sound as well.
     let other = Pose { x_m: 2.0, y_m: 1.3, heading_deg: 0.0 };
     let sweeps = [pose, other].map(|pose| sweep(&truth, &pose, &pose, 240, noise, 3));
     let given = [("roughness brick".to_owned(), 0.3)];
-    let priors = priors(&[Group::Roughness], &given, &here, 2).expect("it is fitted");
-    let what = Fit::usual(priors, 0.02);
+    let priors = priors(&[ParameterGroup::Roughness], &given, &here, 2).expect("it is fitted");
+    let what = FitOptions::with_priors(priors, 0.02);
     let fitted = fit(&here, &sweeps, &what).expect("a fit");
-    let report = &fitted.told(&here, &sweeps, &what)[0];
+    let report = &fitted.report(&here, &sweeps, &what)[0];
     assert!((report.value - 0.35).abs() < 2.0 * report.sigma && report.identified, "{report:?}");
     let scene = &fitted.world.scene;
     let found = scene.walls[0].material.roughness;
@@ -231,8 +231,8 @@ type Trial = (&'static str, usize, [f64; 3], [f64; 6]);
 /// Sweep with its initial world and settings.
 struct Misjudged {
     here: World,
-    sweep: Sweep,
-    what: Fit,
+    sweep: FitSweep,
+    what: FitOptions,
     /// Changes to the truth, by parameter.
     expected: [f64; 6],
 }
@@ -256,10 +256,10 @@ fn misjudged((scene, wall, [x_m, y_m, heading_deg], expected): Trial, seed: u64)
         y_m: y_m - expected[1],
         heading_deg: heading_deg - expected[2],
     };
-    let noise = TofNoise::of_range_mm(1.0, truth.air.sound_speed_m_s());
+    let noise = TofNoise::from_range_sigma_mm(1.0, truth.air.sound_speed_m_s());
     let sweep = sweep(&truth, &pose, &initial, 400, noise, seed);
     let priors = parameters.map(|(parameter, sigma)| Prior { parameter, sigma });
-    let what = Fit::usual(priors.into(), 0.15);
+    let what = FitOptions::with_priors(priors.into(), 0.15);
     Misjudged { here, sweep, what, expected }
 }
 
@@ -281,7 +281,7 @@ fn missing_objects_bias_nothing() {
     let furnished = World { scene: scene.into(), ..here.clone() };
     let truth = furnished.changed(&[(&Parameter::Threshold, 3.0)]).expect("a world");
     let initial = displaced(&pose);
-    let noise = TofNoise::of_range_mm(1.0, truth.air.sound_speed_m_s());
+    let noise = TofNoise::from_range_sigma_mm(1.0, truth.air.sound_speed_m_s());
     let sweep = sweep(&truth, &pose, &initial, 400, noise, 1);
     let priors = [
         (Parameter::X(0), 0.06),
@@ -290,7 +290,7 @@ fn missing_objects_bias_nothing() {
         (Parameter::Threshold, 4.0),
     ];
     let priors = priors.map(|(parameter, sigma)| Prior { parameter, sigma }).into();
-    let what = Fit { search: Search::Furnished, ..Fit::usual(priors, 0.1) };
+    let what = FitOptions { search: Search::Furnished, ..FitOptions::with_priors(priors, 0.1) };
     let fitted = fit(&here, &[sweep], &what).expect("a fit");
     let explained = fitted.errors.explained();
     assert!((0.3..0.95).contains(&explained), "{:?}", fitted.errors);
@@ -319,10 +319,10 @@ fn mounting_offset_and_heading() {
     let of_sensor: Vec<_> = changes[3..].iter().map(|(of, by, _)| (of, *by)).collect();
     let truth = here.changed(&of_sensor).expect("a world");
     let initial = displaced(&pose);
-    let noise = TofNoise::of_range_mm(1.0, truth.air.sound_speed_m_s());
+    let noise = TofNoise::from_range_sigma_mm(1.0, truth.air.sound_speed_m_s());
     let sweep = sweep(&truth, &pose, &initial, 200, noise, 1);
     let priors = changes.clone().map(|(parameter, _, sigma)| Prior { parameter, sigma }).into();
-    let what = Fit { search: Search::Thorough, ..Fit::usual(priors, 0.1) };
+    let what = FitOptions { search: Search::Thorough, ..FitOptions::with_priors(priors, 0.1) };
     let fitted = fit(&here, &[sweep], &what).expect("a fit");
     for (estimate, (of, expected, _)) in fitted.estimates.iter().zip(&changes) {
         let off = (estimate.change - expected).abs();
@@ -345,10 +345,10 @@ fn bandwidth_by_time_walk() {
     let mut here = there.clone();
     let too_narrow = 0.6_f64;
     here.sensor.pulse.widen_band(too_narrow);
-    let groups = [Group::Pose, Group::Threshold, Group::Pulse];
-    let what = Fit::usual(priors(&groups, &[], &here, 1).expect("priors"), 0.03);
+    let groups = [ParameterGroup::Pose, ParameterGroup::Threshold, ParameterGroup::Pulse];
+    let what = FitOptions::with_priors(priors(&groups, &[], &here, 1).expect("priors"), 0.03);
     let fitted = fit(&here, &[sweep], &what).expect("a fit");
-    let band = fitted.told(&here, &[], &what).pop().expect("the band is the last");
+    let band = fitted.report(&here, &[], &what).pop().expect("the band is the last");
     assert_eq!(band.name, "bandwidth");
     let expected_hz = there.sensor.pulse.bandwidth_hz();
     assert!(band.identified && band.sigma < 0.2 * expected_hz, "{band:?}");
@@ -368,17 +368,17 @@ fn value_at_a_limit_is_reported() {
     here.sensor.threshold *= 10f64.powf(9.0 / 20.0);
     here.sensor.threshold_rise_db_per_m = 0.5;
     let of = |parameter, sigma| Prior { parameter, sigma };
-    let what = Fit {
+    let what = FitOptions {
         priors: vec![of(Parameter::ThresholdRise, 5.0), of(Parameter::Threshold, 0.01)],
-        widest_m: 0.02,
-        widest_turn_deg: 0.0,
-        least_sigma_m: 2e-4,
-        least_sigma_db: 0.5,
+        initial_sigma_m: 0.02,
+        max_turn_deg: 0.0,
+        min_sigma_m: 2e-4,
+        min_sigma_db: 0.5,
         search: Search::Quick,
     };
     let fitted = fit(&here, &sweeps, &what).expect("a fit");
     assert_eq!(fitted.world.sensor.threshold_rise_db_per_m, 0.0);
-    let report = &fitted.told(&here, &sweeps, &what)[0];
+    let report = &fitted.report(&here, &sweeps, &what)[0];
     assert!(report.at_limit && report.value == 0.0 && report.low == 0.0, "{report:?}");
     assert!(report.sigma > 0.0 && report.high > 0.0, "{report:?}");
     assert_eq!(report.remark(), "at its limit");
@@ -399,16 +399,16 @@ fn quantization_bounds_the_scatter() {
         Pose { x_m: pose.x_m + 0.03, y_m: pose.y_m - 0.02, heading_deg: pose.heading_deg };
     let sweep = sweep(&here, &pose, &initial, 120, TofNoise::NONE, 1);
     let of = |parameter, sigma| Prior { parameter, sigma };
-    let what = Fit {
+    let what = FitOptions {
         priors: vec![
             of(Parameter::X(0), 0.1),
             of(Parameter::Y(0), 0.1),
             of(Parameter::Heading(0), 8.0),
         ],
-        widest_m: 0.1,
-        widest_turn_deg: 12.0,
-        least_sigma_m: 2e-4,
-        least_sigma_db: 0.5,
+        initial_sigma_m: 0.1,
+        max_turn_deg: 12.0,
+        min_sigma_m: 2e-4,
+        min_sigma_db: 0.5,
         search: Search::Quick,
     };
     let fitted = fit(&here, &[sweep], &what).expect("a fit");
@@ -423,9 +423,9 @@ fn quantization_bounds_the_scatter() {
 #[test]
 fn sweep_is_located_globally() {
     let here = world("simple-room", "senscomp-6500");
-    let atlas = Atlas::new(&here, 0.1).expect("an atlas");
+    let atlas = CoarseGrid::new(&here, 0.1).expect("an atlas");
     let mut rng = Pcg64::seed_from_u64(3);
-    let noise = TofNoise::of_range_mm(1.0, here.air.sound_speed_m_s());
+    let noise = TofNoise::from_range_sigma_mm(1.0, here.air.sound_speed_m_s());
     for trial in 0..6 {
         let pose = loop {
             let heading_deg = rng.random_range(-180.0..180.0);
@@ -460,10 +460,10 @@ fn sweep_is_located_at_unlikely_positions() {
         let mut here = world(scene, "senscomp-6500");
         here.options.max_range_m = Some(4.0);
         let pose = Pose { x_m, y_m, heading_deg };
-        let noise = TofNoise::of_range_mm(1.0, here.air.sound_speed_m_s());
+        let noise = TofNoise::from_range_sigma_mm(1.0, here.air.sound_speed_m_s());
         let unknown = Pose { x_m: 0.0, y_m: 0.0, heading_deg: 0.0 };
         let swept = sweep(&here, &pose, &unknown, 400, noise, 1);
-        let atlas = Atlas::new(&here, Atlas::usual_spacing_m(&here.scene)).expect("an atlas");
+        let atlas = CoarseGrid::new(&here, CoarseGrid::default_spacing_m(&here.scene)).expect("an atlas");
         assert_found(&locate(&here, &atlas, &swept).expect("modes"), &pose);
     }
 }
@@ -476,14 +476,14 @@ fn another_unit_is_located_with_its_threshold() {
     (here.options.max_range_m, weak.options.max_range_m) = (Some(4.0), Some(4.0));
     weak.sensor.threshold *= 10f64.powf(LESS_DB / 20.0);
     let pose = Pose { x_m: 1.0, y_m: 1.0, heading_deg: 25.0 };
-    let noise = TofNoise::of_range_mm(1.0, here.air.sound_speed_m_s());
+    let noise = TofNoise::from_range_sigma_mm(1.0, here.air.sound_speed_m_s());
     let unknown = Pose { x_m: 0.0, y_m: 0.0, heading_deg: 0.0 };
     let swept = sweep(&weak, &pose, &unknown, 120, noise, 5);
-    let atlas = Atlas::new(&here, 0.1).expect("an atlas");
+    let atlas = CoarseGrid::new(&here, 0.1).expect("an atlas");
     let sensitivity = Prior { parameter: Parameter::Threshold, sigma: 6.0 };
     let poses = [Parameter::X(0), Parameter::Heading(0)];
     let priors = poses.map(|parameter| Prior { parameter, sigma: 1.0 });
-    let atlas = atlas.fitting(priors.into_iter().chain([sensitivity]).collect());
+    let atlas = atlas.with_nuisance(priors.into_iter().chain([sensitivity]).collect());
     let modes = locate(&here, &atlas, &swept).expect("modes");
     assert_found(&modes[..1], &pose);
     let [nuisance] = &modes[0].besides[..] else { panic!("{modes:?}") };
@@ -492,7 +492,7 @@ fn another_unit_is_located_with_its_threshold() {
     assert!(off_db.abs() < 1.0 && nuisance.sigma < 1.0, "{nuisance:?}: {off_db}");
 }
 
-fn assert_found(modes: &[Mode], pose: &Pose) {
+fn assert_found(modes: &[PoseMode], pose: &Pose) {
     let is_right = modes.iter().any(|mode| {
         let off_m = (mode.x_m - pose.x_m).hypot(mode.y_m - pose.y_m);
         off_m < 0.02 && wrap_180(mode.heading_deg - pose.heading_deg).abs() < 1.0

@@ -5,49 +5,49 @@ use rand::SeedableRng as _;
 use rand_distr::{Distribution as _, Normal};
 use rand_pcg::Pcg64;
 use sonard_model::{
-    acoustics::{Rise, TofNoise},
+    acoustics::{EchoRise, TofNoise},
     geometry::Pose,
 };
 
 use super::{SIGMA_DB, as_read, before_a_wall};
 use crate::{
-    Beam, ErrorModel, Heard, Hypotheses, Parameter, Sweep, World, candidates::Phases,
+    SweepFiring, ErrorModel, FiringOutcome, Hypotheses, Parameter, FitSweep, World, candidates::Phases,
     jacobian::JacobianBuilder,
 };
 
 const AT: Pose = Pose { x_m: 0.0, y_m: 0.0, heading_deg: 0.0 };
 
-fn sweep(azimuths_deg: impl Iterator<Item = f64>, outcome: impl Fn(f64) -> Heard) -> Sweep {
-    let beam = |azimuth_deg| Beam { azimuth_deg, heard: outcome(azimuth_deg) };
+fn sweep(azimuths_deg: impl Iterator<Item = f64>, outcome: impl Fn(f64) -> FiringOutcome) -> FitSweep {
+    let beam = |azimuth_deg| SweepFiring { azimuth_deg, outcome: outcome(azimuth_deg) };
     let beams = azimuths_deg.map(beam);
-    Sweep { scan: uuid::Uuid::nil(), pose: AT, beams: beams.collect() }
+    FitSweep { scan: uuid::Uuid::nil(), pose: AT, beams: beams.collect() }
 }
 
 /// Readings at a step in degrees, with noise, for a varying threshold.
-fn read(here: &World, every_deg: f64, rng: &mut Pcg64) -> Sweep {
+fn read(here: &World, every_deg: f64, rng: &mut Pcg64) -> FitSweep {
     let normal = Normal::new(0.0, SIGMA_DB).expect("a distribution");
-    let noise = TofNoise::of_range_mm(1.0, here.air.sound_speed_m_s());
+    let noise = TofNoise::from_range_sigma_mm(1.0, here.air.sound_speed_m_s());
     let us_per_m = 2e6 / here.air.sound_speed_m_s();
     let to = (20.0 / every_deg) as i32;
-    let mut read = sweep((-to..to).map(|at| every_deg * f64::from(at)), |_| Heard::Silence);
+    let mut read = sweep((-to..to).map(|at| every_deg * f64::from(at)), |_| FiringOutcome::NoEcho);
     for beam in &mut read.beams {
         let rise = rises(here, beam.azimuth_deg, &[normal.sample(rng)])[0];
         if let Some(rise) = rise {
             let tof_us = us_per_m * rise.range_m + noise.sample_us(rng);
-            beam.heard = Heard::Echo { tof_us };
+            beam.outcome = FiringOutcome::Echo { tof_us };
         }
     }
     read
 }
 
 /// Detections in a direction at thresholds relative to the nominal one, decibels.
-fn rises(here: &World, azimuth_deg: f64, by_db: &[f64]) -> Vec<Option<Rise>> {
+fn rises(here: &World, azimuth_deg: f64, by_db: &[f64]) -> Vec<Option<EchoRise>> {
     let simulator = here.simulator(&AT).expect("a model");
     let direction_rad = here.direction_rad(&AT, azimuth_deg);
     let detected = simulator.at(AT.position()).hear(direction_rad, |firing| {
         let rise = |by_db: &f64| {
             let factor = 10f64.powf(by_db / 20.0);
-            firing.listen(simulator.receiver(), |listening| listening.rise(factor, 0.0))
+            firing.listen(simulator.receiver(), |listening| listening.first_rise(factor, 0.0))
         };
         by_db.iter().map(rise).collect()
     });
@@ -65,7 +65,7 @@ fn expected_ranges_match_simulation() {
     let azimuths_deg = || (0..400).map(|at| 0.05 * f64::from(at));
     let builder = JacobianBuilder::new(&here, &[], here.air.sound_speed_m_s(), Phases::Known);
     let simulator = here.simulator(&AT).expect("a model");
-    let azimuths = sweep(azimuths_deg(), |_| Heard::Silence);
+    let azimuths = sweep(azimuths_deg(), |_| FiringOutcome::NoEcho);
     let point = simulator.at(AT.position());
     let readings = builder.sweep(&simulator, &point, 0, &azimuths, &AT).expect("candidates");
     let walk = builder.time_walk(simulator.receiver());

@@ -56,7 +56,7 @@ pub enum FindingKind {
 
 /// Finding in a log.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct Finding {
+pub struct LogFinding {
     /// Line number, from 1; for findings at the end of the log, the last line.
     pub line: u64,
     /// Severity of the finding.
@@ -67,7 +67,7 @@ pub struct Finding {
     pub detail: String,
 }
 
-impl fmt::Display for Finding {
+impl fmt::Display for LogFinding {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let warning = if self.severity == Severity::Warning { "warning: " } else { "" };
         write!(f, "line {}: {warning}{}", self.line, self.detail)
@@ -76,7 +76,7 @@ impl fmt::Display for Finding {
 
 /// Numbers of records in a log.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
-pub struct Totals {
+pub struct LogTotals {
     /// Lines, damaged ones included.
     pub lines: u64,
     /// Number of sessions.

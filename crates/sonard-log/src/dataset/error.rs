@@ -13,7 +13,7 @@ use thiserror::Error;
 pub enum DataSetError {
     /// Folder that is used for other files.
     #[error("{} contains {name} and is not a data set", root.display())]
-    Strange {
+    NotADataSet {
         /// Path of the folder.
         root: PathBuf,
         /// Name of a file in the folder.
@@ -35,7 +35,7 @@ pub enum DataSetError {
     },
     /// Incomplete shard.
     #[error("{} lacks {lacks}", path.display())]
-    NotWhole {
+    Incomplete {
         /// Path of the shard's folder.
         path: PathBuf,
         /// Missing file or size.
@@ -73,13 +73,13 @@ impl DataSetError {
     #[must_use]
     pub fn help(&self) -> String {
         match self {
-            Self::Strange { .. } | Self::OtherSet { .. } => {
+            Self::NotADataSet { .. } | Self::OtherSet { .. } => {
                 "choose an empty or a new folder: each set needs its own folder".to_owned()
             }
             Self::Foreign { .. } => {
                 "choose another folder, or remove that shard to regenerate it".to_owned()
             }
-            Self::NotWhole { .. } => "remove that folder to regenerate the shard".to_owned(),
+            Self::Incomplete { .. } => "remove that folder to regenerate the shard".to_owned(),
             Self::Specification(error) => error.help.clone(),
             Self::Shard { error: ShardError::DoesNotFit { .. }, .. } => {
                 "correct the specification: a retry draws the same values".to_owned()
@@ -98,7 +98,7 @@ impl DataSetError {
 
     /// Returns the error of the operating system, if that is the cause.
     #[must_use]
-    pub const fn of_disk(&self) -> Option<&io::Error> {
+    pub const fn io_error(&self) -> Option<&io::Error> {
         match self {
             Self::Io { source, .. } | Self::Shard { error: ShardError::Write(source), .. } => {
                 Some(source)

@@ -17,8 +17,8 @@ fn generator(text: &str) -> Generator {
     Generator::from_toml("small.toml", text, &none).expect("a specification")
 }
 
-fn make_all(set: &DataSet<'_>) -> Vec<Outcome> {
-    (1..=3).map(|shard| set.make(shard, &|_| {}).expect("it can be made")).collect()
+fn make_all(set: &DataSet<'_>) -> Vec<ShardOutcome> {
+    (1..=3).map(|shard| set.generate(shard, &|_| {}).expect("it can be made")).collect()
 }
 
 fn names(root: &Path) -> Vec<String> {
@@ -40,13 +40,13 @@ fn generates_and_seals_a_set() {
     let count = |more: u64| {
         readings.fetch_add(more, Ordering::Relaxed);
     };
-    assert_eq!(set.make(2, &count).expect("made"), Outcome::Made);
+    assert_eq!(set.generate(2, &count).expect("made"), ShardOutcome::Generated);
     assert_eq!((readings.into_inner(), generator.readings()), (120, 120));
     assert_eq!(set.missing().expect("readable"), [1, 3]);
-    assert_eq!(set.seal().expect("readable"), None);
+    assert_eq!(set.write_manifest().expect("readable"), None);
     assert_eq!(names(&root), ["shard-00002", "spec.json"]);
-    assert_eq!(make_all(&set), [Outcome::Made, Outcome::WasThere, Outcome::Made]);
-    let manifest = set.seal().expect("writable").expect("whole");
+    assert_eq!(make_all(&set), [ShardOutcome::Generated, ShardOutcome::Existed, ShardOutcome::Generated]);
+    let manifest = set.write_manifest().expect("writable").expect("whole");
     assert_eq!(manifest.shards, 3);
     assert_eq!(
         names(&root),
@@ -60,14 +60,14 @@ fn generates_and_seals_a_set() {
     let specification = DataSet::specification(&root).expect("as it was written");
     let other = DataSet::open(&other_root, &specification).expect("a new folder");
     for shard in [3, 1, 2] {
-        other.make(shard, &|_| {}).expect("made");
+        other.generate(shard, &|_| {}).expect("made");
     }
-    assert_eq!(other.seal().expect("writable"), Some(manifest));
+    assert_eq!(other.write_manifest().expect("writable"), Some(manifest));
     let text = |root: &Path| fs::read_to_string(root.join(MANIFEST)).expect("there");
     assert_eq!(text(&root), text(&other_root));
     // An edited card is kept.
     fs::write(root.join(CARD), "mine").expect("writable");
-    set.seal().expect("writable");
+    set.write_manifest().expect("writable");
     assert_eq!(fs::read_to_string(root.join(CARD)).expect("there"), "mine");
 }
 
@@ -88,7 +88,7 @@ fn removes_stale_drafts() {
     }
     assert_eq!(set.missing().expect("readable"), [1, 2, 3]);
     // The draft of a running process is kept.
-    assert_eq!(set.make(1, &|_| {}).expect("made"), Outcome::Made);
+    assert_eq!(set.generate(1, &|_| {}).expect("made"), ShardOutcome::Generated);
     assert!(!cut.exists() && !last.exists());
     assert!(whole.path().exists());
     let late = whole.rename_to(&folder.path().join("shard-00001"));
@@ -101,30 +101,30 @@ fn rejects_foreign_files() {
     let folder = tempfile::tempdir().expect("a folder");
     let (own, other) = (generator(SPEC), generator(&SPEC.replace("poses = 3", "poses = 2")));
     let set = DataSet::open(folder.path(), &own).expect("an empty folder");
-    set.make(1, &|_| {}).expect("made");
+    set.generate(1, &|_| {}).expect("made");
     let error = DataSet::open(folder.path(), &other).expect_err("another set's");
     assert!(error.to_string().contains("of another specification"), "{error}");
     assert!(error.help().contains("new folder"));
     // Shard copied from another set.
     let elsewhere = tempfile::tempdir().expect("a folder");
-    DataSet::open(elsewhere.path(), &other).expect("empty").make(2, &|_| {}).expect("made");
+    DataSet::open(elsewhere.path(), &other).expect("empty").generate(2, &|_| {}).expect("made");
     fs::rename(elsewhere.path().join("shard-00002"), folder.path().join("shard-00002"))
         .expect("one disk");
-    let error = set.make(2, &|_| {}).expect_err("foreign").to_string();
+    let error = set.generate(2, &|_| {}).expect_err("foreign").to_string();
     assert!(error.contains("shard-00002: different specification"), "{error}");
     fs::rename(folder.path().join("shard-00001"), folder.path().join("shard-00003"))
         .expect("one disk");
-    let error = set.make(3, &|_| {}).expect_err("renamed").to_string();
+    let error = set.generate(3, &|_| {}).expect_err("renamed").to_string();
     assert!(error.contains("shard 1 instead of 3"), "{error}");
     let facts = folder.path().join("shard-00003").join(FACTS);
     let text = fs::read_to_string(&facts).expect("there");
     fs::write(&facts, text.replace("\"drawing\": ", "\"drawing\": 9")).expect("writable");
-    let error = set.make(3, &|_| {}).expect_err("older").to_string();
+    let error = set.generate(3, &|_| {}).expect_err("older").to_string();
     assert!(error.contains("readings may differ"), "{error}");
     // Folder with other files.
     let error =
         DataSet::open(folder.path().join("shard-00003").as_path(), &own).expect_err("strange");
-    assert!(matches!(error, DataSetError::Strange { .. }), "{error}");
+    assert!(matches!(error, DataSetError::NotADataSet { .. }), "{error}");
 }
 
 #[test]
@@ -134,9 +134,9 @@ fn reports_damage() {
     let set = DataSet::open(folder.path(), &generator).expect("an empty folder");
     make_all(&set);
     assert_eq!(set.check_manifest().expect("readable"), ["manifest.json is missing"]);
-    set.seal().expect("writable");
+    set.write_manifest().expect("writable");
     assert_eq!(set.check_manifest().expect("readable"), [] as [&str; 0]);
-    assert_eq!(set.check_again(2, &|_| {}).expect("drawn"), [] as [&str; 0]);
+    assert_eq!(set.check_regenerated(2, &|_| {}).expect("drawn"), [] as [&str; 0]);
     let readings = folder.path().join("shard-00002/readings.parquet");
     let whole = fs::read(&readings).expect("there");
     // A flipped bit, which keeps the size.
@@ -152,10 +152,10 @@ fn reports_damage() {
         "{:?}",
         set.check_digests(2)
     );
-    assert!(matches!(set.make(2, &|_| {}), Err(DataSetError::NotWhole { .. })));
+    assert!(matches!(set.generate(2, &|_| {}), Err(DataSetError::Incomplete { .. })));
     fs::remove_dir_all(folder.path().join("shard-00002")).expect("writable");
     assert_eq!(set.check_digests(2), ["shard-00002 is missing"]);
-    set.make(2, &|_| {}).expect("made");
+    set.generate(2, &|_| {}).expect("made");
     // Digests adapted to a changed file.
     let facts = folder.path().join("shard-00001").join(FACTS);
     let scenes = folder.path().join("shard-00001/scenes.parquet");
@@ -169,7 +169,7 @@ fn reports_damage() {
     fs::write(&facts, facts_json.to_string()).expect("writable");
     assert_eq!(set.check_digests(1), [] as [&str; 0]);
     assert_eq!(set.check_manifest().expect("readable"), ["manifest.json: differs from the shards"]);
-    let problems = set.check_again(1, &|_| {}).expect("drawn");
+    let problems = set.check_regenerated(1, &|_| {}).expect("drawn");
     assert_eq!(problems, ["shard-00001/scenes.parquet: differs from the regenerated file"]);
     fs::write(folder.path().join("notes.txt"), "mine").expect("writable");
     let problems = set.check_manifest().expect("readable");

@@ -8,13 +8,13 @@ use std::{
 };
 
 use sha2::{Digest as _, Sha256};
-use sonard_generate::{ShardFacts, Table};
+use sonard_generate::{ShardFacts, ShardTable};
 
 use super::{
     CARD, DataSet, DataSetError, MANIFEST, SPECIFICATION, shard_name, sync_and_digest,
     visible_names,
 };
-use crate::hexadecimal;
+use crate::to_hex;
 
 impl DataSet<'_> {
     /// Compares the files of a shard with its recorded digests; returns a message per problem.
@@ -47,13 +47,13 @@ impl DataSet<'_> {
     ///
     /// # Errors
     /// Returns an error if the shard cannot be generated.
-    pub fn check_again(
+    pub fn check_regenerated(
         &self,
         shard: u32,
         progress: &dyn Fn(u64),
     ) -> Result<Vec<String>, DataSetError> {
         let Some(facts) = self.facts(shard)? else { return Ok(Vec::new()) };
-        let mut hashes: BTreeMap<Table, Hasher> = BTreeMap::new();
+        let mut hashes: BTreeMap<ShardTable, Hasher> = BTreeMap::new();
         let mut create = |table| -> io::Result<Box<dyn Write + Send>> {
             Ok(Box::new(hashes.entry(table).or_default().clone()))
         };
@@ -105,7 +105,7 @@ struct Hasher(Arc<Mutex<(u64, Sha256)>>);
 impl Hasher {
     fn digest(&self) -> (u64, String) {
         let held = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        (held.0, hexadecimal(&held.1.clone().finalize()))
+        (held.0, to_hex(&held.1.clone().finalize()))
     }
 }
 

@@ -1,14 +1,14 @@
 //! Findings of the log check.
 
 use super::*;
-use crate::{FindingKind, Severity, Totals, check};
+use crate::{FindingKind, Severity, LogTotals, check};
 
 /// Line and kind of each finding.
 type Found = Vec<(u64, FindingKind)>;
 
-fn found(log: &str) -> (Found, Found, Totals) {
+fn found(log: &str) -> (Found, Found, LogTotals) {
     let (mut problems, mut warnings) = (Vec::new(), Vec::new());
-    let totals = check(log.as_bytes(), |finding| match finding.severity {
+    let totals = check_log(log.as_bytes(), |finding| match finding.severity {
         Severity::Problem => problems.push((finding.line, finding.kind)),
         Severity::Warning => warnings.push((finding.line, finding.kind)),
     })
@@ -38,7 +38,7 @@ fn replaced(number: usize, from: &str, to: &str) -> String {
 fn the_fixture_is_clean() {
     let (problems, warnings, totals) = found(LOG);
     assert_eq!((problems, warnings), (vec![], vec![]));
-    let Totals { lines, sessions, scans, pings, events, .. } = totals;
+    let LogTotals { lines, sessions, scans, pings, events, .. } = totals;
     assert_eq!((lines, sessions, scans, pings, events), (11, 1, 1, 7, 1));
 }
 

@@ -10,7 +10,7 @@ use proptest::prelude::*;
 use sonard_records::{EventKind, encode_line};
 
 use super::*;
-use crate::{LogWriter, Medium, Recovered, StoreError};
+use crate::{LogWriter, LogOutput, Recovered, StoreError};
 
 /// File in memory with limited space, partial writes and optionally without truncation.
 #[derive(Debug, Default)]
@@ -25,7 +25,7 @@ struct Disk {
     synced: Vec<usize>,
 }
 
-impl Medium for &mut Disk {
+impl LogOutput for &mut Disk {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         self.writes += 1;
         let count = bytes.len().min(self.room - self.bytes.len()).min(self.piece);
@@ -44,7 +44,7 @@ impl Medium for &mut Disk {
         Ok(())
     }
 
-    fn take_back(&mut self, bytes: u64) -> io::Result<()> {
+    fn remove_last(&mut self, bytes: u64) -> io::Result<()> {
         if self.rigid {
             return Err(io::ErrorKind::Unsupported.into());
         }

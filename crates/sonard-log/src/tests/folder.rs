@@ -47,7 +47,7 @@ fn faults(folder: &Path) -> (u64, u64) {
     let mut sum = (0, 0);
     for name in names(folder) {
         let reader = open_for_reading(&folder.join(&name)).expect("readable");
-        let totals = check(reader, |finding| println!("{name}: {finding}")).expect("readable");
+        let totals = check_log(reader, |finding| println!("{name}: {finding}")).expect("readable");
         sum = (sum.0 + totals.problems, sum.1 + totals.warnings);
     }
     sum
@@ -164,7 +164,7 @@ fn does_not_continue_other_format() {
     let [first, second] = &names(folder.path())[..] else { panic!("two logs") };
     assert_eq!(fs::read_to_string(folder.path().join(first)).expect("readable"), other);
     let findings =
-        crate::check(&fs::read(folder.path().join(second)).expect("readable")[..], |finding| {
+        crate::check_log(&fs::read(folder.path().join(second)).expect("readable")[..], |finding| {
             panic!("{finding}")
         });
     assert_eq!(findings.expect("readable").scans, 1);

@@ -5,7 +5,7 @@ use std::{fmt::Write as _, fs, path::PathBuf};
 use super::{folder, read, records};
 use sonard_records::{Record, decode_line};
 
-use crate::{LogWriter, Pipe, RecordWriter, StoreError};
+use crate::{LogWriter, PipeOutput, RecordWriter, StoreError};
 
 /// Table of azimuths and ranges, one reading per line.
 struct Table {
@@ -40,7 +40,7 @@ fn two_formats_from_one_source() {
     let (folder, log) = folder();
     let table = folder.path().join("table.csv");
     let file = fs::File::create(&log).expect("it is new");
-    write_all(Box::new(LogWriter::new(Pipe(file), &log)));
+    write_all(Box::new(LogWriter::new(PipeOutput(file), &log)));
     let lines = read(&log);
     let written: Vec<_> =
         lines.lines().map(|line| decode_line(line.as_bytes()).expect("clean")).collect();

@@ -5,7 +5,7 @@ use std::{fs, io::Write as _, path::Path};
 use uuid::Uuid;
 
 use super::{LOG, folder};
-use crate::{History, Passage, PastScan};
+use crate::{LogIndex, ScanSpan, LoggedScan};
 
 /// Lines of the fixture with scan number `n`.
 fn scan(n: u128) -> String {
@@ -23,11 +23,11 @@ fn append(folder: &Path, log: &str, text: &str) {
     file.write_all(text.as_bytes()).expect("written");
 }
 
-fn ids(scans: &[PastScan]) -> Vec<u128> {
+fn ids(scans: &[LoggedScan]) -> Vec<u128> {
     scans.iter().map(|past| past.start.scan.as_u128()).collect()
 }
 
-fn readings(passage: &Passage) -> usize {
+fn readings(passage: &ScanSpan) -> usize {
     passage.lines(true).expect("readable").inspect(|line| assert!(line.is_ok())).count()
 }
 
@@ -35,7 +35,7 @@ fn readings(passage: &Passage) -> usize {
 fn newest_first_in_growing_logs() {
     let (folder, _) = folder();
     let folder = folder.path();
-    let mut history = History::new(folder.into());
+    let mut history = LogIndex::new(folder.into());
     assert_eq!(ids(&history.newest(5).expect("readable")), []);
     append(folder, "sonard-20261120T000000Z.jsonl", &(scan(1) + &scan(2)));
     append(folder, "sonard-20261121T000000Z.jsonl", &scan(3));
@@ -56,8 +56,8 @@ fn newest_first_in_growing_logs() {
     append(folder, "sonard-20261121T000000Z.jsonl", whole);
     let newest = history.newest(1).expect("readable");
     assert_eq!((ids(&newest), newest[0].end.is_none()), (vec![4], true));
-    let pings = |history: &mut History, n: u128| {
-        let passage = history.passage(Uuid::from_u128(n)).expect("readable")?;
+    let pings = |history: &mut LogIndex, n: u128| {
+        let passage = history.scan_span(Uuid::from_u128(n)).expect("readable")?;
         let view = &passage.view;
         Some((readings(&passage), view.session.is_some(), view.end.is_some()))
     };
@@ -75,12 +75,12 @@ fn removed_and_repaired_logs() {
     let (old, new) = ("sonard-20261120T000000Z.jsonl", "sonard-20261121T000000Z.jsonl");
     append(folder, old, &scan(1));
     append(folder, new, &(scan(2) + &scan(3)));
-    let mut history = History::new(folder.into());
+    let mut history = LogIndex::new(folder.into());
     assert_eq!(ids(&history.newest(5).expect("readable")), [3, 2, 1]);
     fs::remove_file(folder.join(old)).expect("exists");
     fs::write(folder.join(new), scan(2)).expect("written");
     assert_eq!(ids(&history.newest(5).expect("readable")), [2]);
-    assert!(history.passage(Uuid::from_u128(3)).expect("readable").is_none());
+    assert!(history.scan_span(Uuid::from_u128(3)).expect("readable").is_none());
 }
 
 #[test]
@@ -89,9 +89,9 @@ fn damaged_and_overlong_lines() {
     let folder = folder.path();
     let noise = format!("{{\"type\":\"scan_start\",\n{}\n\n", "x".repeat(3 << 20));
     append(folder, "sonard-20261121T000000Z.jsonl", &(scan(1) + &noise + &scan(2)));
-    let mut history = History::new(folder.into());
+    let mut history = LogIndex::new(folder.into());
     assert_eq!(ids(&history.newest(5).expect("readable")), [2, 1]);
-    let passage = history.passage(Uuid::from_u128(2)).expect("readable").expect("exists");
+    let passage = history.scan_span(Uuid::from_u128(2)).expect("readable").expect("exists");
     assert_eq!(readings(&passage), 7);
     // Readings and other lines together are complete.
     let others = passage.lines(false).expect("readable").count();

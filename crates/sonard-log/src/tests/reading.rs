@@ -3,7 +3,7 @@
 use std::io::{self, BufRead, BufReader, Read};
 
 use proptest::prelude::*;
-use sonard_records::{FaultKind, MAX_LINE_BYTES};
+use sonard_records::{RecordErrorKind, MAX_LINE_BYTES};
 
 use super::*;
 use crate::{Line, read_log};
@@ -12,7 +12,7 @@ fn lines(bytes: &[u8]) -> Vec<Line> {
     read_log(bytes).map(|line| line.expect("memory can be read")).collect()
 }
 
-fn faults(bytes: &[u8]) -> Vec<(u64, FaultKind)> {
+fn faults(bytes: &[u8]) -> Vec<(u64, RecordErrorKind)> {
     let fault = |line: Line| line.record.err().map(|error| (error.line, error.fault.kind));
     lines(bytes).into_iter().filter_map(fault).collect()
 }
@@ -38,15 +38,15 @@ fn damage_affects_single_lines() {
     let session = LOG.lines().next().expect("a session");
     let end = LOG.lines().nth(9).expect("an end");
     let log = format!("{session}\nrubbish\n\n{end}\n\0\0\0\n{{\"type\":\"pong\"}}\n{end}\n{{\"ty");
-    let (empty, text) = (FaultKind::Empty, FaultKind::NotText);
+    let (empty, text) = (RecordErrorKind::Empty, RecordErrorKind::NotText);
     assert_eq!(
         faults(log.as_bytes()),
         [
-            (2, FaultKind::NotJson),
+            (2, RecordErrorKind::NotJson),
             (3, empty),
             (5, text),
-            (6, FaultKind::UnknownType),
-            (8, FaultKind::Torn)
+            (6, RecordErrorKind::UnknownType),
+            (8, RecordErrorKind::Truncated)
         ]
     );
 }
@@ -57,7 +57,7 @@ fn windows_line_ends_and_bom() {
     assert_eq!(faults(windows.as_bytes()), []);
     // Within the file, a byte-order mark is damage.
     let late = LOG.replace("\n{\"type\":\"scan_end\"", "\n\u{feff}{\"type\":\"scan_end\"");
-    assert_eq!(faults(late.as_bytes()), [(10, FaultKind::NotJson)]);
+    assert_eq!(faults(late.as_bytes()), [(10, RecordErrorKind::NotJson)]);
 }
 
 #[test]
@@ -70,7 +70,7 @@ fn memory_is_bounded() {
     assert_eq!(lines.len(), 3);
     assert_eq!(lines[1].length, 64 << 20);
     assert!(lines[1].bytes.capacity() <= 4 * MAX_LINE_BYTES, "{}", lines[1].bytes.capacity());
-    assert_eq!(lines[1].record.as_ref().err().map(|e| e.fault.kind), Some(FaultKind::TooLong));
+    assert_eq!(lines[1].record.as_ref().err().map(|e| e.fault.kind), Some(RecordErrorKind::TooLong));
     assert!(lines[2].record.is_ok());
     assert_eq!(lines[2].offset, good.len() as u64 + (64 << 20) + 1);
 }

@@ -16,7 +16,7 @@ fn truncation_at_any_byte() {
             .map(|line| format!("{}\n", line.trim_end()))
             .collect();
         assert_eq!(read(&log), whole, "cut at {cut}");
-        assert_eq!(done.left_out, [], "cut at {cut}");
+        assert_eq!(done.removed, [], "cut at {cut}");
         assert_eq!(done.kept as usize, whole.lines().count(), "cut at {cut}");
         assert_eq!(load(&log).expect("exists").damaged, [], "cut at {cut}");
         match done.original {
@@ -40,7 +40,7 @@ fn copies_lines_byte_for_byte() {
     written(&log, format!("{odd}rubbish\n{odd}"));
     let done = repair(&log).expect("repaired");
     assert_eq!(read(&log), format!("{odd}{odd}"));
-    let places: Vec<_> = done.left_out.iter().map(|l| (l.line, l.offset, l.length)).collect();
+    let places: Vec<_> = done.removed.iter().map(|l| (l.line, l.offset, l.length)).collect();
     assert_eq!(places, [(12, odd.len() as u64, 7)]);
 }
 
@@ -71,7 +71,7 @@ fn keeps_unreadable_records() {
         errors.iter().map(|error| error.line).collect()
     };
     assert_eq!((done.kept, numbers(&done.kept_unread)), (8, vec![1, 7, 10]));
-    assert_eq!(done.left_out.iter().map(|left| left.line).collect::<Vec<_>>(), [12, 13]);
+    assert_eq!(done.removed.iter().map(|left| left.line).collect::<Vec<_>>(), [12, 13]);
     assert_eq!(read(&log), other);
     assert_eq!(repair(&log).expect("exists").original, None);
 }

@@ -9,7 +9,7 @@ use uuid::Uuid;
 
 use super::{folder, records};
 use crate::{
-    History, LogFolder, LogWriter, MAX_LOGGED_SCENE_BYTES, Rotation, SceneLost, load, log_files,
+    LogIndex, LogFolder, LogWriter, MAX_LOGGED_SCENE_BYTES, Rotation, SceneUnavailable, load, log_files,
     logged_scene,
 };
 
@@ -97,9 +97,9 @@ fn long_text_is_stored_in_a_file() {
     let first = folder.join(&logs[0].name);
     let session = &sessions(&first)[0];
     fs::write(&kept, "{}").expect("writable");
-    assert!(matches!(logged_scene(session, &first), Err(SceneLost::Changed(_))));
+    assert!(matches!(logged_scene(session, &first), Err(SceneUnavailable::Changed(_))));
     fs::remove_file(&kept).expect("there");
-    assert!(matches!(logged_scene(session, &first), Err(SceneLost::NotThere(_))));
+    assert!(matches!(logged_scene(session, &first), Err(SceneUnavailable::Missing(_))));
 }
 
 #[test]
@@ -112,10 +112,10 @@ fn history_finds_the_text() {
         scan_in(&scene, n).iter().for_each(|record| writer.append(record).expect("room"));
     }
     drop(writer);
-    let mut history = History::new(folder.path().into());
+    let mut history = LogIndex::new(folder.path().into());
     for n in 1..3 {
         let id = Uuid::from_u128(n);
-        let passage = history.passage(id).expect("readable").expect("there");
+        let passage = history.scan_span(id).expect("readable").expect("there");
         assert_eq!((passage.view.pings.len(), &passage.path), (0, &log));
         let session = passage.view.session.expect("there");
         assert_eq!(session.scene_text.as_deref(), Some(&*scene.text), "scan {n}");
@@ -128,9 +128,9 @@ fn rejects_a_different_text() {
     let Record::Session(mut session) = records().swap_remove(0) else { panic!("a session first") };
     session.scene = Some(SceneRef::from_scene(&simple_room()));
     session.scene_text = Some(shipped::text("corridor").expect("shipped").into());
-    assert!(matches!(logged_scene(&session, &log), Err(SceneLost::Changed(_))));
+    assert!(matches!(logged_scene(&session, &log), Err(SceneUnavailable::Changed(_))));
     session.scene_text = None;
-    assert!(matches!(logged_scene(&session, &log), Err(SceneLost::NotThere(_))));
+    assert!(matches!(logged_scene(&session, &log), Err(SceneUnavailable::Missing(_))));
     session.scene = None;
     assert!(logged_scene(&session, &log).expect("none was given").is_none());
 }

@@ -126,7 +126,7 @@ async fn scan(lie: InvalidReply) -> Result<(Result<ScanSummary, ScanError>, Reco
     let (stop, stopped) = oneshot::channel::<()>();
     let serving = tokio::spawn(port.run(async move { drop(stopped.await) }, |_| {}));
     let line = link::open(&path).expect("opens");
-    let identified = Ranger::meet(Driver::new(line, HostConfig::new(link::BAUD, 1))).await;
+    let identified = Ranger::identify(Driver::new(line, HostConfig::new(link::BAUD, 1))).await;
     let outcome = match identified {
         Err(error) => Err(error.to_string()),
         Ok(mut ranger) => {

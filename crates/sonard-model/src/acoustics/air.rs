@@ -81,7 +81,7 @@ impl Air {
     ///
     /// # Errors
     /// If the speed is out of range (200 to 500) or not a number.
-    pub fn warmed_to_sound_speed(self, sound_speed_m_s: f64) -> Result<Self, AirError> {
+    pub fn with_temperature_for_sound_speed(self, sound_speed_m_s: f64) -> Result<Self, AirError> {
         let given = self.with_sound_speed(sound_speed_m_s)?;
         if self.sound_speed_override_m_s.is_some() {
             return Ok(given);
@@ -216,19 +216,19 @@ mod tests {
                 let expected = expected.expect("in range");
                 let air = Air::new(20.0, humidity_percent, pressure_kpa).expect("in range");
                 let speed_m_s = expected.sound_speed_m_s();
-                let warmed = air.warmed_to_sound_speed(speed_m_s).expect("in range");
+                let warmed = air.with_temperature_for_sound_speed(speed_m_s).expect("in range");
                 assert!((warmed.temperature_c() - temperature_c).abs() < 1e-9, "{warmed:?}");
                 assert!((warmed.sound_speed_m_s() - speed_m_s).abs() < 1e-10, "{warmed:?}");
             }
         }
         for (speed_m_s, temperature_c) in [(250.0, -20.0), (450.0, 50.0)] {
-            let air = Air::default().warmed_to_sound_speed(speed_m_s).expect("in range");
+            let air = Air::default().with_temperature_for_sound_speed(speed_m_s).expect("in range");
             assert_eq!((air.sound_speed_m_s(), air.temperature_c()), (speed_m_s, temperature_c));
         }
         let given = Air::default().with_sound_speed(340.0).expect("in range");
-        let other = given.warmed_to_sound_speed(341.0).expect("in range");
+        let other = given.with_temperature_for_sound_speed(341.0).expect("in range");
         assert_eq!((other.sound_speed_m_s(), other.temperature_c()), (341.0, 20.0));
-        assert!(given.warmed_to_sound_speed(f64::NAN).is_err());
+        assert!(given.with_temperature_for_sound_speed(f64::NAN).is_err());
     }
 
     #[test]

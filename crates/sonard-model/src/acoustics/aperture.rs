@@ -66,10 +66,10 @@ pub enum Image {
     /// Odd number of mirror reflections: left and right swapped.
     Swapped,
     /// Point scatterer: the image does not depend on the point of departure.
-    Lost,
+    PointScatterer,
     /// Edge diffraction: independent of the point of departure, but with an aspect that varies
     /// across the face.
-    Bent(EdgeView),
+    Diffracted(EdgeView),
 }
 
 impl ApertureResponse {
@@ -154,11 +154,11 @@ impl ApertureResponse {
         let bend_m = |x: f64, y: f64| match image {
             Image::Upright => (x + y).powi(2) / (2.0 * length_m),
             Image::Swapped => (x - y).powi(2) / (2.0 * length_m),
-            Image::Lost => (x * x + y * y) / length_m,
-            Image::Bent(edge) => edge.bend_m(x, y),
+            Image::PointScatterer => (x * x + y * y) / length_m,
+            Image::Diffracted(edge) => edge.curvature_m(x, y),
         };
         let shares = match image {
-            Image::Bent(edge) => Some(edge.shares()),
+            Image::Diffracted(edge) => Some(edge.relative_field()),
             _ => None,
         };
         let edge_share =

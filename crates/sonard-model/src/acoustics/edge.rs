@@ -78,7 +78,7 @@ impl EdgeLaw {
 
     /// Returns `true` if a wedge has an echo under this law.
     #[must_use]
-    pub fn answers(&self, wedge: &Wedge) -> bool {
+    pub fn diffracts(&self, wedge: &Wedge) -> bool {
         match self {
             Self::Utd => !wedge.is_regular(),
             Self::KucSiegel | Self::BozmaKuc { .. } => wedge.is_convex(),

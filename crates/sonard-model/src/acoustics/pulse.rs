@@ -174,13 +174,13 @@ impl EchoShape {
 
     /// Maximum slope of the envelope, per microsecond.
     #[must_use]
-    pub fn steepest(&self) -> f64 {
+    pub fn max_slope(&self) -> f64 {
         self.steepest
     }
 
     /// Maximum modulus up to a time.
     #[must_use]
-    pub fn most_until(&self, t_us: f64) -> f64 {
+    pub fn max_until(&self, t_us: f64) -> f64 {
         let place = (t_us - self.first_us) / self.step_us;
         if place < 0.0 {
             return 0.0;
@@ -222,7 +222,7 @@ impl EchoShape {
 
     /// Maximum modulus from a time on; the inverse of [`fall_us`](Self::fall_us).
     #[must_use]
-    pub fn most_from(&self, t_us: f64) -> f64 {
+    pub fn max_from(&self, t_us: f64) -> f64 {
         let place = (t_us - self.first_us) / self.step_us;
         if place < 0.0 {
             return self.peak();
@@ -323,9 +323,9 @@ mod tests {
         // The remaining maximum falls to each level when that level is crossed for the last time.
         for level in [0.02, 0.3, 0.99] {
             let fall_us = shape.fall_us(level).expect("it gets there");
-            assert!((shape.most_from(fall_us) - level).abs() < 1e-9, "{level}");
+            assert!((shape.max_from(fall_us) - level).abs() < 1e-9, "{level}");
         }
-        assert_eq!((shape.most_from(-1e3), shape.most_from(1e4)), (1.0, 0.0));
+        assert_eq!((shape.max_from(-1e3), shape.max_from(1e4)), (1.0, 0.0));
     }
 
     #[test]

@@ -30,7 +30,7 @@ use std::f64::consts::TAU;
 
 pub use self::{
     detection::Detection,
-    detector_bank::{Listening, Rise},
+    detector_bank::{DetectorBank, EchoRise},
     noise::ReceiverNoise,
     trace::{EchoTrace, EnvelopePeak, TracePoint},
 };
@@ -174,7 +174,7 @@ impl Receiver {
 
     /// Returns `true` if detection needs an [`Incident`] for each arrival.
     #[must_use]
-    pub const fn asks_incidents(&self) -> bool {
+    pub const fn needs_incidents(&self) -> bool {
         self.response.is_some() && !matches!(self.combining, Combining::Ideal)
     }
 
@@ -302,14 +302,14 @@ impl Receiver {
     /// Minimum peak level of a detectable isolated echo, decibels above the effective threshold:
     /// the level at which the envelope stays above the threshold for the integration time.
     #[must_use]
-    pub fn least_margin_db(&self) -> f64 {
+    pub fn min_margin_db(&self) -> f64 {
         if self.combining == Combining::Ideal {
             return 0.0;
         }
         let is_detected = |margin_db: f64| {
             let level = 10f64.powf(-margin_db / 20.0);
             let rise_us = self.shape.rise_us(level);
-            rise_us.is_some_and(|us| self.shape.most_from(us + self.integration_us) >= level)
+            rise_us.is_some_and(|us| self.shape.max_from(us + self.integration_us) >= level)
         };
         // Invariant: detected at the larger margin, not at the smaller one. A pulse shorter than
         // the integration time is never detected.

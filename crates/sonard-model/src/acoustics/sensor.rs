@@ -136,7 +136,7 @@ pub enum Response {
 pub enum SensorError {
     /// Invalid JSON, or not a sensor's structure.
     #[error("line {line}, column {column}: {field}: {message}")]
-    Form {
+    Malformed {
         /// Line in the text, from 1.
         line: usize,
         /// Column in the line, from 1.
@@ -148,7 +148,7 @@ pub enum SensorError {
     },
     /// Value out of range.
     #[error("{field} is {value}: it must be {expected}")]
-    Figure {
+    OutOfRange {
         /// Path of the field.
         field: &'static str,
         /// Value outside the range.
@@ -268,7 +268,7 @@ fn form_error(field: String, error: &serde_json::Error) -> SensorError {
     let message = error.to_string();
     // serde_json appends the position, which is reported separately.
     let message = message.split(" at line ").next().unwrap_or_default().to_owned();
-    SensorError::Form { line: error.line(), column: error.column(), field, message }
+    SensorError::Malformed { line: error.line(), column: error.column(), field, message }
 }
 
 #[cfg(test)]

@@ -25,7 +25,7 @@ impl TofNoise {
     /// Noise with a normal standard deviation of `sigma_mm` of range. One reading in ten is in the
     /// tail, whose mean is twice that value.
     #[must_use]
-    pub fn of_range_mm(sigma_mm: f64, sound_speed_m_s: f64) -> Self {
+    pub fn from_range_sigma_mm(sigma_mm: f64, sound_speed_m_s: f64) -> Self {
         let sigma_us = 2.0 * sigma_mm * 1e3 / sound_speed_m_s;
         Self { sigma_us, tail_share: 0.1, tail_us: 2.0 * sigma_us }
     }
@@ -48,7 +48,7 @@ mod tests {
 
     #[test]
     fn far_tail_is_longer() {
-        let noise = TofNoise::of_range_mm(1.0, 343.0);
+        let noise = TofNoise::from_range_sigma_mm(1.0, 343.0);
         let mut rng = Pcg64::seed_from_u64(5);
         let errors: Vec<f64> = (0..200_000).map(|_| noise.sample_us(&mut rng)).collect();
         let mean = errors.iter().sum::<f64>() / errors.len() as f64;

@@ -11,7 +11,7 @@ const TURN_DEG_S: f64 = 60.0;
 
 /// Poses that a robot passes in sequence.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Course {
+pub struct RobotCourse {
     poses: Vec<Pose>,
     /// Times at the poses, seconds; empty where the file gives no times.
     times_s: Vec<f64>,
@@ -39,7 +39,7 @@ struct Waypoint {
     heading_deg: f64,
 }
 
-impl Course {
+impl RobotCourse {
     /// Parses lines of JSON, `{"x_m": 1, "y_m": 2, "heading_deg": 90}`, either all with an
     /// increasing `time_s` or all without. Empty lines are ignored.
     ///
@@ -131,7 +131,7 @@ impl Course {
     /// Adds times for a robot that drives at this speed, m/s. A course that has times keeps them,
     /// counted from its first pose.
     #[must_use]
-    pub fn timed(mut self, speed_m_s: f64) -> Self {
+    pub fn with_times(mut self, speed_m_s: f64) -> Self {
         if let Some(first_s) = self.times_s.first().copied() {
             self.times_s.iter_mut().for_each(|time_s| *time_s -= first_s);
             return self;

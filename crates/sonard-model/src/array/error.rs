@@ -9,7 +9,7 @@ use crate::scene::{PoseError, suggest};
 pub enum ArrayError {
     /// Invalid JSON, or not an array's structure.
     #[error("line {line}, column {column}: {field}: {message}")]
-    Form {
+    Malformed {
         /// Line in the text, from 1.
         line: usize,
         /// Column in the line, from 1.
@@ -21,7 +21,7 @@ pub enum ArrayError {
     },
     /// Value out of range.
     #[error("{field} is {value}: it must be from {min} to {max}")]
-    Figure {
+    OutOfRange {
         /// Path of the field.
         field: String,
         /// Value outside the range.
@@ -43,13 +43,13 @@ pub enum ArrayError {
     },
     /// Ranger without an id.
     #[error("{field} is empty: every ranger needs an id")]
-    NoId {
+    MissingId {
         /// Path of the field.
         field: String,
     },
     /// Two rangers with the same id.
     #[error("{field} is \"{id}\", the id of rangers[{first}]: every ranger needs a unique id")]
-    SameId {
+    DuplicateId {
         /// Path of the second id.
         field: String,
         /// Id that both rangers have.
@@ -59,7 +59,7 @@ pub enum ArrayError {
     },
     /// Id in the firing order that no ranger has.
     #[error("{field} is \"{id}\": no ranger has that id")]
-    NoSuchRanger {
+    UnknownRanger {
         /// Path of the field.
         field: String,
         /// Id that no ranger has.
@@ -69,7 +69,7 @@ pub enum ArrayError {
     },
     /// Empty list of simultaneous firings.
     #[error("{field} is an empty list: it must have the id of at least one ranger")]
-    EmptyTurn {
+    EmptySlot {
         /// Path of the field.
         field: String,
     },
@@ -96,21 +96,21 @@ impl ArrayError {
         let message = error.to_string();
         // serde_json appends the position, which is reported separately.
         let message = message.split(" at line ").next().unwrap_or_default().to_owned();
-        Self::Form { line: error.line(), column: error.column(), field, message }
+        Self::Malformed { line: error.line(), column: error.column(), field, message }
     }
 
     /// Hint for correcting the error.
     #[must_use]
     pub fn help(&self) -> String {
         match self {
-            Self::Form { .. } => "start from a preset in the folder arrays/ of the source".into(),
-            Self::Figure { .. }
+            Self::Malformed { .. } => "start from a preset in the folder arrays/ of the source".into(),
+            Self::OutOfRange { .. }
             | Self::Count { .. }
-            | Self::NoId { .. }
-            | Self::SameId { .. }
-            | Self::EmptyTurn { .. }
+            | Self::MissingId { .. }
+            | Self::DuplicateId { .. }
+            | Self::EmptySlot { .. }
             | Self::FiredTwice { .. } => "correct it in the array's file".into(),
-            Self::NoSuchRanger { id, known, .. } => suggest(id, known, "rangers"),
+            Self::UnknownRanger { id, known, .. } => suggest(id, known, "rangers"),
             Self::UnknownPreset { name, known } => suggest(name, known, "presets"),
         }
     }

@@ -46,7 +46,7 @@ fn rangers_move_with_the_robot() {
     let array = preset("pioneer-8");
     let robot = Pose { x_m: 2.0, y_m: 1.0, heading_deg: 90.0 };
     // s3 is 166 mm ahead and 27 mm to the left; the robot points along +y.
-    let s3 = array.ranger("s3").expect("there").pose_on(&robot);
+    let s3 = array.ranger("s3").expect("there").world_pose(&robot);
     assert!((s3.position() - DVec2::new(2.0 - 0.027, 1.166)).length() < 1e-12, "{s3:?}");
     assert_eq!(s3.heading_deg, 100.0);
 }
@@ -56,7 +56,7 @@ fn firing_order_defaults_to_all() {
     let mut array = preset("pioneer-7");
     assert_eq!(array.round().collect::<Vec<_>>(), [0, 1, 2, 3, 4, 5, 6]);
     assert_eq!((array.plan(1).beams(), array.plan(3).beams()), (7, 21));
-    array.firing_order = ["s3", "s2", "s3"].map(Turn::from).into();
+    array.firing_order = ["s3", "s2", "s3"].map(FiringSlot::from).into();
     assert_eq!(array.check(), Ok(()));
     assert_eq!(array.round().collect::<Vec<_>>(), [3, 2, 3]);
     for rounds in 1..=200 {
@@ -88,7 +88,7 @@ fn rejects_invalid_data() {
     }
     let mut array = preset("ring-12");
     array.rangers[3].y_m = f64::NAN;
-    assert!(matches!(array.check(), Err(ArrayError::Figure { .. })), "NaN");
+    assert!(matches!(array.check(), Err(ArrayError::OutOfRange { .. })), "NaN");
     array.rangers.clear();
     assert!(matches!(array.check(), Err(ArrayError::Count { field: "rangers", .. })));
     let unknown = RangerArray::preset("pioner-8").expect_err("no such preset");
@@ -132,7 +132,7 @@ fn pose_error_names_the_ranger() {
 #[test]
 fn course_interpolates_poses() {
     let text = "{\"x_m\":0,\"y_m\":0}\n\n{\"x_m\":1,\"y_m\":0,\"heading_deg\":350}\n";
-    let course = Course::from_json_lines(text).expect("two poses").timed(0.5);
+    let course = RobotCourse::from_json_lines(text).expect("two poses").with_times(0.5);
     assert_eq!((course.poses().len(), course.duration_s()), (2, 2.0));
     let half = course.pose_at(1.0);
     assert_eq!((half.x_m, half.y_m), (0.5, 0.0));
@@ -142,10 +142,10 @@ fn course_interpolates_poses() {
     assert_eq!(course.pose_at(2.0), course.poses()[1]);
     assert_eq!(course.pose_at(99.0), course.poses()[1]);
     let timed = "{\"time_s\":5,\"x_m\":0,\"y_m\":0}\n{\"time_s\":9,\"x_m\":1,\"y_m\":0}";
-    let timed = Course::from_json_lines(timed).expect("times").timed(123.0);
+    let timed = RobotCourse::from_json_lines(timed).expect("times").with_times(123.0);
     assert_eq!((timed.duration_s(), timed.pose_at(1.0).x_m), (4.0, 0.25));
     let turning = "{\"x_m\":0,\"y_m\":0}\n{\"x_m\":0,\"y_m\":0,\"heading_deg\":90}";
-    let turning = Course::from_json_lines(turning).expect("a turn").timed(0.5);
+    let turning = RobotCourse::from_json_lines(turning).expect("a turn").with_times(0.5);
     assert!((turning.duration_s() - 1.5).abs() < 1e-12, "60 degrees per second");
 }
 
@@ -164,7 +164,7 @@ fn rejects_invalid_courses() {
         ),
         ("{\"x_m\":1e999,\"y_m\":0}", 1, "number"),
     ] {
-        let error = Course::from_json_lines(text).expect_err(part);
+        let error = RobotCourse::from_json_lines(text).expect_err(part);
         assert_eq!(error.line, line, "{error}");
         assert!(error.message.contains(part), "{error} lacks {part}");
     }
@@ -175,10 +175,10 @@ fn course_from_poses_and_lines() {
     let at = |x_m, heading_deg| Pose { x_m, y_m: 0.0, heading_deg };
     let poses = [at(0.0, 0.0), at(1.0, 350.0)];
     let text = "{\"time_s\":5,\"x_m\":0,\"y_m\":0}\n{\"time_s\":9,\"x_m\":1,\"y_m\":0,\"heading_deg\":350}";
-    let course = Course::new(&poses, Some(&[5.0, 9.0])).expect("two poses");
-    assert_eq!(course, Course::from_json_lines(text).expect("two lines"));
-    assert_eq!(course.timed(1.0).times_s(), [0.0, 4.0]);
-    assert_eq!(Course::new(&poses, None).expect("two poses").timed(0.5).times_s(), [0.0, 2.0]);
+    let course = RobotCourse::new(&poses, Some(&[5.0, 9.0])).expect("two poses");
+    assert_eq!(course, RobotCourse::from_json_lines(text).expect("two lines"));
+    assert_eq!(course.with_times(1.0).times_s(), [0.0, 4.0]);
+    assert_eq!(RobotCourse::new(&poses, None).expect("two poses").with_times(0.5).times_s(), [0.0, 2.0]);
     for (poses, times_s, line, part) in [
         (&poses[..0], None, 1, "no pose"),
         (&poses[..], Some(&[1.0][..]), 2, "2 poses, but 1 times"),
@@ -186,7 +186,7 @@ fn course_from_poses_and_lines() {
         (&poses[..], Some(&[1.0, f64::NAN][..]), 2, "finite"),
         (&[at(f64::INFINITY, 0.0)][..], None, 1, "finite"),
     ] {
-        let error = Course::new(poses, times_s).expect_err(part);
+        let error = RobotCourse::new(poses, times_s).expect_err(part);
         assert!(error.line == line && error.message.contains(part), "{error} lacks {part}");
     }
 }
@@ -196,7 +196,7 @@ fn rounds_follow_and_rotate() {
     let mut array = preset("ring-12");
     array.interval_ms = 50.0;
     array.firing_order =
-        vec![Turn::Together(vec!["s0".into(), "s6".into()]), Turn::from("s3"), Turn::from("s0")];
+        vec![FiringSlot::Simultaneous(vec!["s0".into(), "s6".into()]), FiringSlot::from("s3"), FiringSlot::from("s0")];
     assert_eq!(array.firing_times_s(0), [0.0; 0]);
     let expected = [0.0, 0.0, 0.05, 0.1, 0.15, 0.15, 0.2, 0.25];
     let times_s = array.firing_times_s(2);
@@ -206,7 +206,7 @@ fn rounds_follow_and_rotate() {
     }
     let ring = preset("ring-12");
     let from = Pose { x_m: 1.0, y_m: 2.0, heading_deg: -350.0 };
-    let turned = ring.turned(&from, 3);
+    let turned = ring.rotated_poses(&from, 3);
     assert_eq!(turned[0], from);
     let headings: Vec<f64> = turned.iter().map(|pose| pose.heading_deg.round()).collect();
     assert_eq!(headings, [-350.0, 20.0, 30.0]);

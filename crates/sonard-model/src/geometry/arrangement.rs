@@ -27,7 +27,7 @@ pub struct Arrangement {
     /// End points of the pieces, without duplicates.
     pub points: Vec<DVec2>,
     /// Pieces of the segments; no two connect the same points.
-    pub pieces: Vec<Piece>,
+    pub pieces: Vec<SegmentPiece>,
     /// Overlapping segments that were given later, by the key ([`between`]) of the piece that
     /// covers them.
     pub covered: HashMap<[u32; 2], Vec<u32>>,
@@ -37,7 +37,7 @@ pub struct Arrangement {
 
 /// Part of a segment between two points of an [`Arrangement`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Piece {
+pub struct SegmentPiece {
     /// Indices of the end points, in the segment's direction.
     pub ends: [u32; 2],
     /// Index of the segment.
@@ -46,7 +46,7 @@ pub struct Piece {
 
 /// Key of a piece, independent of its direction: the indices of its ends in ascending order.
 #[must_use]
-pub fn between([a, b]: [u32; 2]) -> [u32; 2] {
+pub fn edge_key([a, b]: [u32; 2]) -> [u32; 2] {
     [a.min(b), a.max(b)]
 }
 
@@ -220,10 +220,10 @@ fn collect(parts: &[SegmentPart], joined: Joined, segments: usize) -> Arrangemen
         if ends[0] == ends[1] {
             continue;
         }
-        if seen.insert(between(ends)) {
-            result.pieces.push(Piece { ends, segment: part.segment });
+        if seen.insert(edge_key(ends)) {
+            result.pieces.push(SegmentPiece { ends, segment: part.segment });
         } else {
-            result.covered.entry(between(ends)).or_default().push(part.segment);
+            result.covered.entry(edge_key(ends)).or_default().push(part.segment);
         }
     }
     result

@@ -22,19 +22,19 @@ impl Mirror {
 
     /// Signed distance of a point from the line, positive on the side of the normal, metres.
     #[must_use]
-    pub fn height_m(&self, point: DVec2) -> f64 {
+    pub fn signed_distance_m(&self, point: DVec2) -> f64 {
         self.normal.dot(point) - self.offset_m
     }
 
     /// Mirror image of a point.
     #[must_use]
     pub fn image(&self, point: DVec2) -> DVec2 {
-        point - 2.0 * self.height_m(point) * self.normal
+        point - 2.0 * self.signed_distance_m(point) * self.normal
     }
 
     /// Mirror image of a direction.
     #[must_use]
-    pub fn turn(&self, direction: DVec2) -> DVec2 {
+    pub fn image_of_direction(&self, direction: DVec2) -> DVec2 {
         direction - 2.0 * self.normal.dot(direction) * self.normal
     }
 
@@ -65,6 +65,6 @@ mod tests {
         let mirror = Mirror::through(DVec2::ZERO, DVec2::new(1.0, 3.0));
         let direction = DVec2::from_angle(0.4);
         let conjugate = DVec2::new(direction.x, -direction.y);
-        assert!((mirror.rotor().rotate(conjugate) - mirror.turn(direction)).length() < 1e-15);
+        assert!((mirror.rotor().rotate(conjugate) - mirror.image_of_direction(direction)).length() < 1e-15);
     }
 }

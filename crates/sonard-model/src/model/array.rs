@@ -82,7 +82,7 @@ impl ArrayModel {
                 heights.push(ranger.z_m);
             }
         }
-        let scene = Arc::new(array.in_scene(scene));
+        let scene = Arc::new(array.scene_with_body(scene));
         let simulator = |z_m: &Option<f64>| {
             let mounting = Mounting { z_m: z_m.or(sensor.mounting.z_m), ..sensor.mounting };
             Simulator::new(Arc::clone(&scene), Sensor { mounting, ..sensor.clone() }, air, options)
@@ -152,7 +152,7 @@ impl Crosstalk {
         let absorption_np_per_m = simulator.path_settings().absorption_np_per_m;
         let slot_m = array.interval_ms * 1e-3 * receiver.sound_speed_m_s;
         let slots_back = crosstalk_slots(receiver, absorption_np_per_m, slot_m);
-        if slots_back == 0 && !array.fires_together() {
+        if slots_back == 0 && !array.has_simultaneous_firings() {
             return None;
         }
         let longest_m = 2.0 * receiver.max_range_m + slots_back as f64 * slot_m;
@@ -242,10 +242,10 @@ impl ArrayAtPose<'_> {
         let aimed = |ranger: usize, end: usize| {
             let pose = self.mounted(ranger);
             let direction_rad = pose.direction_rad(0.0);
-            let places = simulator.sensor().mounting.places(pose.position(), direction_rad);
+            let places = simulator.sensor().mounting.transducer_positions(pose.position(), direction_rad);
             TransducerPose { place: places[end], direction_rad }
         };
-        let firings = self.model.array.others(firing, crosstalk.slots_back);
+        let firings = self.model.array.interfering_firings(firing, crosstalk.slots_back);
         Some(OtherFirings {
             engine: &crosstalk.engines[self.height(ranger)],
             receiver: aimed(ranger, 1),
@@ -265,6 +265,6 @@ impl ArrayAtPose<'_> {
     }
 
     fn mounted(&self, ranger: usize) -> Pose {
-        self.model.array.rangers[ranger].pose_on(&self.pose)
+        self.model.array.rangers[ranger].world_pose(&self.pose)
     }
 }

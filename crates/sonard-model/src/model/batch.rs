@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::{Prediction, Simulator, TooCostly};
-use crate::{geometry::Pose, plan::ScanPlan};
+use crate::{geometry::Pose, scan_plan::ScanPlan};
 
 impl Simulator {
     /// [`predict`](Self::predict) for each pose, on all cores; the results equal those of one core,

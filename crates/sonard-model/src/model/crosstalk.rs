@@ -13,7 +13,7 @@ use super::{
 };
 use crate::{
     acoustics::{Incident, PulseArrival, Receiver},
-    array::OtherFiring,
+    array::InterferingFiring,
 };
 
 /// Number of samples of a receive window at which the bound on earlier firings is evaluated.
@@ -48,12 +48,12 @@ pub(super) struct OtherFirings<'a> {
     pub(super) sound_speed_m_s: f64,
     /// Length of the receive window there and back, metres.
     pub(super) window_m: f64,
-    pub(super) firings: Vec<(OtherFiring, TransducerPose)>,
+    pub(super) firings: Vec<(InterferingFiring, TransducerPose)>,
 }
 
 /// Sound received from another firing.
 struct StraySound<'a> {
-    firing: OtherFiring,
+    firing: InterferingFiring,
     /// Difference between true and apparent path length, metres.
     ahead_m: f64,
     paths: CrosstalkPaths<'a>,
@@ -67,7 +67,7 @@ impl<'a> OtherFirings<'a> {
 
     /// Returns the sound of the other firings that arrives within a length there and back, metres.
     fn within(&self, length_m: f64) -> Result<Vec<StraySound<'a>>, TooCostly> {
-        let received = |&(firing, transmitter): &(OtherFiring, TransducerPose)| {
+        let received = |&(firing, transmitter): &(InterferingFiring, TransducerPose)| {
             let ahead_m = firing.before_us * 1e-6 * self.sound_speed_m_s;
             // Relative to its own amplitude, a sound is strongest at the end of the window.
             let floor = self.engine.floor() * (1.0 + ahead_m / self.window_m);
@@ -164,7 +164,7 @@ impl MixedArrivals<'_> {
         sorted: &MergedArrivals,
         arrival: &PulseArrival,
         own: (&dyn Arrivals, f64),
-    ) -> (Arrival, Option<OtherFiring>) {
+    ) -> (Arrival, Option<InterferingFiring>) {
         let (source, original) = &sorted.origins[arrival.index as usize];
         match source {
             None => (own.0.arrival(own.1, original), None),

@@ -119,7 +119,7 @@ pub trait Arrivals: Send + Sync {
         let arrival = self.arrival(direction_rad, arrival);
         let image = match arrival.path.kind() {
             PathKind::Specular => mirrored(arrival.path.interactions.len()),
-            PathKind::Diffracted | PathKind::Scattered => Image::Lost,
+            PathKind::Diffracted | PathKind::Scattered => Image::PointScatterer,
         };
         let off_rad = |end_rad: f64| wrap_pi(end_rad - direction_rad);
         Incident {

@@ -14,7 +14,7 @@ use super::{
 };
 use crate::{
     acoustics::{
-        Detection, EchoTrace, Incident, Latch, Listening, PulseArrival, Receiver, ReceiverNoise,
+        Detection, EchoTrace, Incident, Latch, DetectorBank, PulseArrival, Receiver, ReceiverNoise,
     },
     geometry::DVec2,
 };
@@ -267,7 +267,7 @@ impl<'a> ObservationPoint<'a> {
             return visit(all);
         }
         let mounting = &self.simulator.sensor().mounting;
-        visit(&self.simulator.arrivals_between(mounting.places(self.position, direction_rad)))
+        visit(&self.simulator.arrivals_between(mounting.transducer_positions(self.position, direction_rad)))
     }
 }
 
@@ -290,7 +290,7 @@ impl FiringArrivals<'_> {
     pub fn detect(&self, receiver: &Receiver, latch: Latch, ready_us: f64) -> Detection {
         let incident = |arrival: &PulseArrival| Some(self.firing.incident(arrival));
         let incident: &dyn Fn(&PulseArrival) -> Option<Incident> =
-            if receiver.asks_incidents() { &incident } else { &|_| None };
+            if receiver.needs_incidents() { &incident } else { &|_| None };
         let (detection, needed_m) =
             receiver.detect_within(self.reach_m, self.arrivals, incident, latch, ready_us);
         self.needs(needed_m);
@@ -298,13 +298,13 @@ impl FiringArrivals<'_> {
     }
 
     /// Evaluates receivers that differ from `receiver` in their thresholds only.
-    pub fn listen<T>(&self, receiver: &Receiver, detect: impl FnOnce(&mut Listening) -> T) -> T {
+    pub fn listen<T>(&self, receiver: &Receiver, detect: impl FnOnce(&mut DetectorBank) -> T) -> T {
         let incident = |arrival: &PulseArrival| Some(self.firing.incident(arrival));
         let incident: &dyn Fn(&PulseArrival) -> Option<Incident> =
-            if receiver.asks_incidents() { &incident } else { &|_| None };
-        let mut listening = receiver.listen(self.reach_m, self.arrivals, incident);
+            if receiver.needs_incidents() { &incident } else { &|_| None };
+        let mut listening = receiver.detector_bank(self.reach_m, self.arrivals, incident);
         let result = detect(&mut listening);
-        self.needs(listening.needed_m());
+        self.needs(listening.max_relevant_length_m());
         result
     }
 

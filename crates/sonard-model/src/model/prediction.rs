@@ -3,7 +3,7 @@
 use smallvec::SmallVec;
 
 use super::engine::Arrival;
-use crate::{array::OtherFiring, reading::PingStatus};
+use crate::{array::InterferingFiring, reading::PingStatus};
 
 /// Predicted reading of a firing.
 #[derive(Debug, Clone, PartialEq)]
@@ -25,5 +25,5 @@ pub struct Prediction {
     pub echoes_us: SmallVec<[f64; 8]>,
     /// Firing that emitted the arrival, if it was crosstalk. Its path begins at that firing's
     /// ranger, and is longer than twice the range if that was an earlier firing.
-    pub crosstalk: Option<OtherFiring>,
+    pub crosstalk: Option<InterferingFiring>,
 }

@@ -56,7 +56,7 @@ impl Reflectors {
     pub fn new(scene: &Scene, plan: &FloorPlan) -> Self {
         let mirror = |wall: u32| mirrored(&scene.walls[wall as usize].material);
         let walls = plan.walls.iter().zip(0..);
-        let stretches = plan.stretches();
+        let stretches = plan.uncovered_stretches();
         Self {
             walls: walls.map(|(&ends, wall)| WallSegment::new(ends, mirror(wall))).collect(),
             segments: stretches

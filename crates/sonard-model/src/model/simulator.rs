@@ -14,7 +14,7 @@ use super::{
 use crate::{
     acoustics::{Air, BeamPattern, Disc, Receiver, Sensor, SensorError},
     geometry::{DVec2, Pose},
-    plan::ScanPlan,
+    scan_plan::ScanPlan,
     scene::Scene,
 };
 
@@ -110,7 +110,7 @@ impl RangerSetup {
         settings: paths::Settings,
     ) -> PathEngine {
         let engine = PathEngine::new(scene, self.beam.clone(), face, settings);
-        engine.through_nulls(self.receiver.asks_incidents())
+        engine.through_nulls(self.receiver.needs_incidents())
     }
 }
 

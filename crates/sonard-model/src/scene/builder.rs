@@ -87,7 +87,7 @@ impl SceneBuilder {
     /// Sets the lower and upper height, metres, of the walls or the cylinder added last, instead of
     /// floor to ceiling.
     #[must_use]
-    pub fn standing_from(mut self, bottom_z_m: f64, top_z_m: f64) -> Self {
+    pub fn z_range(mut self, bottom_z_m: f64, top_z_m: f64) -> Self {
         if let Some(Value::Array(list)) = self.last.and_then(|list| self.file.get_mut(list))
             && let Some(last) = list.last_mut()
         {

@@ -35,13 +35,13 @@ impl SceneError {
     /// Description of the error, with the offending text.
     #[must_use]
     pub fn message(&self) -> String {
-        shown(&self.problem.to_string())
+        sanitize(&self.problem.to_string())
     }
 
     /// Hint for correcting the error.
     #[must_use]
     pub fn help(&self) -> String {
-        shown(&self.problem.help())
+        sanitize(&self.problem.help())
     }
 }
 
@@ -49,7 +49,7 @@ impl fmt::Display for SceneError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}:{}: ", self.line, self.column)?;
         if !self.path.is_empty() {
-            write!(f, "{}: ", shown(&self.path))?;
+            write!(f, "{}: ", sanitize(&self.path))?;
         }
         f.write_str(&self.message())
     }
@@ -63,7 +63,7 @@ const MAX_SHOWN: usize = 1000;
 /// Sanitizes a text for a terminal: escapes control characters and truncates the middle of a long
 /// text.
 #[must_use]
-pub fn shown(text: &str) -> String {
+pub fn sanitize(text: &str) -> String {
     let written = |found: char| {
         let escaped = found.is_control().then(|| found.escape_debug());
         escaped.into_iter().flatten().chain((!found.is_control()).then_some(found))

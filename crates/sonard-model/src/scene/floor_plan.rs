@@ -3,7 +3,7 @@
 use std::cmp::Ordering;
 
 use super::{Scene, Wall};
-use crate::geometry::{Arrangement, DVec2, Piece, SnapCause, between, snap};
+use crate::geometry::{Arrangement, DVec2, SegmentPiece, SnapCause, edge_key, snap};
 
 /// Default snap tolerance, metres: a quarter of the wavelength at 50 kHz, and twice the typical
 /// error of a corner drawn by hand.
@@ -28,12 +28,12 @@ pub struct FloorPlan {
     /// reflectance, then the lowest roughness, then the greatest length, then the first by id.
     pub arrangement: Arrangement,
     /// Differences from the walls as drawn, in the order of the walls.
-    pub changes: Vec<Change>,
+    pub changes: Vec<PlanChange>,
 }
 
 /// Difference between a wall of the plan and the wall as drawn.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Change {
+pub enum PlanChange {
     /// End that was moved.
     Moved {
         /// Index of the wall in the scene.
@@ -105,9 +105,9 @@ impl FloorPlan {
                 SnapCause::Past(segment) => SnapCause::Past(by_position[segment as usize]),
                 SnapCause::Turned => SnapCause::Turned,
             };
-            Change::Moved { wall, at_b, from: change.from, to: change.to, cause }
+            PlanChange::Moved { wall, at_b, from: change.from, to: change.to, cause }
         });
-        let mut changes: Vec<Change> = moved.collect();
+        let mut changes: Vec<PlanChange> = moved.collect();
         let mut by_rank = by_position;
         by_rank.sort_by(|&a, &b| compare_ranks(wall(a), wall(b)));
         let ranked: Vec<_> =
@@ -116,13 +116,13 @@ impl FloorPlan {
             is_turned[wall as usize]
         });
         changes.extend(covered(scene, &arrangement));
-        changes.sort_by_key(Change::key);
+        changes.sort_by_key(PlanChange::key);
         Self { walls, arrangement, changes }
     }
 
     /// Scene with its walls replaced by those of the plan.
     #[must_use]
-    pub fn scene(&self, scene: &Scene) -> Scene {
+    pub fn planned_scene(&self, scene: &Scene) -> Scene {
         let mut planned = scene.clone();
         for (wall, &(a, b)) in planned.walls.iter_mut().zip(&self.walls) {
             (wall.a, wall.b) = (a, b);
@@ -132,16 +132,16 @@ impl FloorPlan {
 
     /// Uncovered stretches of each wall: index of the wall and end points, metres.
     #[must_use]
-    pub fn stretches(&self) -> Vec<(u32, (DVec2, DVec2))> {
+    pub fn uncovered_stretches(&self) -> Vec<(u32, (DVec2, DVec2))> {
         let mut pieces = self.arrangement.pieces.clone();
         let at = |point: u32| self.arrangement.points[point as usize];
-        let along = |piece: &Piece| {
+        let along = |piece: &SegmentPiece| {
             let (a, b) = self.walls[piece.segment as usize];
             (at(piece.ends[0]) - a).dot(b - a)
         };
         pieces.sort_by(|p, q| p.segment.cmp(&q.segment).then(along(p).total_cmp(&along(q))));
-        let continues = |p: &Piece, q: &Piece| p.segment == q.segment && p.ends[1] == q.ends[0];
-        let whole = |stretch: &[Piece]| {
+        let continues = |p: &SegmentPiece, q: &SegmentPiece| p.segment == q.segment && p.ends[1] == q.ends[0];
+        let whole = |stretch: &[SegmentPiece]| {
             let (wall, ends) =
                 (stretch[0].segment, [stretch[0].ends[0], stretch[stretch.len() - 1].ends[1]]);
             let (a, b) = self.walls[wall as usize];
@@ -158,7 +158,7 @@ impl FloorPlan {
     #[must_use]
     pub fn straight_joints(&self, scene: &Scene) -> Vec<bool> {
         let mut around: Vec<Vec<(u32, u32)>> = vec![Vec::new(); self.arrangement.points.len()];
-        for Piece { ends: [a, b], segment } in &self.arrangement.pieces {
+        for SegmentPiece { ends: [a, b], segment } in &self.arrangement.pieces {
             around[*a as usize].push((*b, *segment));
             around[*b as usize].push((*a, *segment));
         }
@@ -178,7 +178,7 @@ impl FloorPlan {
 
     /// Arrangement restricted to the walls for which `is_there` returns `true`.
     #[must_use]
-    pub fn of_walls(&self, is_there: impl Fn(u32) -> bool) -> Arrangement {
+    pub fn restricted_to(&self, is_there: impl Fn(u32) -> bool) -> Arrangement {
         let mut kept = self.arrangement.clone();
         kept.covered.clear();
         kept.pieces = self
@@ -186,7 +186,7 @@ impl FloorPlan {
             .pieces
             .iter()
             .filter_map(|piece| {
-                let ends = between(piece.ends);
+                let ends = edge_key(piece.ends);
                 let covered = self.arrangement.covered.get(&ends).into_iter().flatten();
                 let mut here = [piece.segment].into_iter().chain(covered.copied());
                 let segment = here.by_ref().find(|&wall| is_there(wall))?;
@@ -194,14 +194,14 @@ impl FloorPlan {
                 if !others.is_empty() {
                     kept.covered.insert(ends, others);
                 }
-                Some(Piece { segment, ..*piece })
+                Some(SegmentPiece { segment, ..*piece })
             })
             .collect();
         kept
     }
 }
 
-impl Change {
+impl PlanChange {
     /// Description of the change, with position and size.
     #[must_use]
     pub fn describe(&self, scene: &Scene) -> String {
@@ -278,10 +278,10 @@ fn as_drawn(
 }
 
 /// Walls that overlap another one within common heights.
-fn covered(scene: &Scene, arrangement: &Arrangement) -> Vec<Change> {
+fn covered(scene: &Scene, arrangement: &Arrangement) -> Vec<PlanChange> {
     let mut found: std::collections::BTreeMap<(u32, u32), f64> = std::collections::BTreeMap::new();
     for piece in &arrangement.pieces {
-        let here = arrangement.covered.get(&between(piece.ends)).into_iter().flatten();
+        let here = arrangement.covered.get(&edge_key(piece.ends)).into_iter().flatten();
         let [a, b] = piece.ends.map(|end| arrangement.points[end as usize]);
         for &wall in here {
             if share_heights(&scene.walls[wall as usize], &scene.walls[piece.segment as usize]) {
@@ -289,7 +289,7 @@ fn covered(scene: &Scene, arrangement: &Arrangement) -> Vec<Change> {
             }
         }
     }
-    found.into_iter().map(|((wall, by), length_m)| Change::Covered { wall, by, length_m }).collect()
+    found.into_iter().map(|((wall, by), length_m)| PlanChange::Covered { wall, by, length_m }).collect()
 }
 
 fn share_heights(a: &Wall, b: &Wall) -> bool {

@@ -222,7 +222,7 @@ impl Scene {
     ///
     /// # Errors
     /// Returns the error of the pose, or the index of the first face that fails with its error.
-    pub fn check_places(
+    pub fn check_face_positions(
         &self,
         pose: &Pose,
         places: &[DVec2],
@@ -235,7 +235,7 @@ impl Scene {
     ///
     /// # Errors
     /// Returns the index of the first pose that fails, with the error of [`Self::check_places`].
-    pub fn check_many_places(
+    pub fn check_many_face_positions(
         &self,
         poses: impl IntoIterator<Item = (Pose, Vec<DVec2>)>,
     ) -> Result<(), (usize, (Option<usize>, PoseError))> {
@@ -272,7 +272,7 @@ impl Scene {
     /// Accessibility of positions for the face of a ranger, by the rules of
     /// [`check_places`](Self::check_places).
     #[must_use]
-    pub fn can_stand(&self, places: &[DVec2]) -> Vec<bool> {
+    pub fn are_accessible(&self, places: &[DVec2]) -> Vec<bool> {
         let outlines = SceneOutlines::from_scene(self);
         places.iter().map(|place| self.check_place(&outlines, *place).is_ok()).collect()
     }

@@ -8,7 +8,7 @@ impl Scene {
     /// Text of the scene file with the current positions of its walls and reflectances of its
     /// materials. Everything else is unchanged.
     #[must_use]
-    pub fn rewritten(&self) -> String {
+    pub fn updated_text(&self) -> String {
         let Ok(mut file) = serde_json::from_str::<Value>(&self.text) else {
             // The text of a parsed scene is valid JSON.
             return self.text.to_string();
@@ -55,7 +55,7 @@ mod tests {
     fn updates_only_moved_walls() {
         for name in shipped::names() {
             let scene = Scene::from_json(shipped::text(name).expect("shipped")).expect("a scene");
-            let again = Scene::from_json(&scene.rewritten()).expect("a scene");
+            let again = Scene::from_json(&scene.updated_text()).expect("a scene");
             assert_eq!(again.walls, scene.walls, "{name}");
             assert_eq!(
                 (again.poses, again.materials),
@@ -65,7 +65,7 @@ mod tests {
             // Small enough that all named poses stay accessible.
             let by = DVec2::new(0.02, -0.01);
             moved.walls.iter_mut().for_each(|wall| (wall.a, wall.b) = (wall.a + by, wall.b + by));
-            let again = Scene::from_json(&moved.rewritten()).expect("a scene");
+            let again = Scene::from_json(&moved.updated_text()).expect("a scene");
             assert_eq!(again.walls, moved.walls, "{name}");
         }
     }

@@ -64,12 +64,12 @@ impl Surfaces {
     }
 
     /// Counts an element that is not converted to walls.
-    pub fn leave_out(&mut self, what: &'static str) {
+    pub fn count_ignored(&mut self, what: &'static str) {
         *self.left_out.entry(what).or_default() += 1;
     }
 
     /// Ignored kinds of elements, with their counts.
-    pub fn left_out(&self) -> impl Iterator<Item = (&'static str, usize)> + '_ {
+    pub fn ignored(&self) -> impl Iterator<Item = (&'static str, usize)> + '_ {
         self.left_out.iter().map(|(what, count)| (*what, *count))
     }
 
@@ -134,8 +134,8 @@ mod tests {
     #[test]
     fn counts_ignored_elements() {
         let mut found = Surfaces::default();
-        ["texts", "arcs", "texts"].into_iter().for_each(|what| found.leave_out(what));
-        assert_eq!(found.left_out().collect::<Vec<_>>(), [("arcs", 1), ("texts", 2)]);
+        ["texts", "arcs", "texts"].into_iter().for_each(|what| found.count_ignored(what));
+        assert_eq!(found.ignored().collect::<Vec<_>>(), [("arcs", 1), ("texts", 2)]);
     }
 
     #[test]

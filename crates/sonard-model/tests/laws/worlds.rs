@@ -328,7 +328,7 @@ impl Heights {
 
 fn with_limits(builder: SceneBuilder, z_m: Option<[f64; 2]>) -> SceneBuilder {
     match z_m {
-        Some([bottom_z_m, top_z_m]) => builder.standing_from(bottom_z_m, top_z_m),
+        Some([bottom_z_m, top_z_m]) => builder.z_range(bottom_z_m, top_z_m),
         None => builder,
     }
 }

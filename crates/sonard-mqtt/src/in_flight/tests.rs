@@ -81,14 +81,14 @@ impl Bench {
             if self.queue.room() == 0 {
                 return;
             }
-            self.queue.put(line(self.next_line));
+            self.queue.push(line(self.next_line));
             self.next_line += 1;
         }
     }
 
     fn give(&mut self, most: usize) {
         for _ in 0..most {
-            let Some((number, message)) = self.queue.give() else { return };
+            let Some((number, message)) = self.queue.pop_next() else { return };
             let line = number_in(&message);
             self.under_way.push((number, line));
             self.order.push(line);
@@ -123,8 +123,8 @@ impl Bench {
             Step::Disconnect => self.disconnect(),
             Step::Checkpoint(seconds) => {
                 self.now += Duration::from_secs(*seconds);
-                if let Some(place) = self.queue.due(self.now).cloned() {
-                    self.queue.remembered(&place, self.now);
+                if let Some(place) = self.queue.due_checkpoint(self.now).cloned() {
+                    self.queue.checkpointed(&place, self.now);
                     self.remembered = place;
                 }
             }
@@ -138,7 +138,7 @@ impl Bench {
 
     fn check(&self, max_bytes: usize) -> Result<(), TestCaseError> {
         // The broker received every line before the checkpoint and before the present position.
-        for place in [self.queue.place(), &self.remembered] {
+        for place in [self.queue.position(), &self.remembered] {
             let before = (0..place.bytes).filter(|line| line % 5 != 4);
             for line in before {
                 prop_assert!(self.received.contains(&line), "line {line} is missing");
@@ -172,7 +172,7 @@ proptest! {
                 bench.acknowledge(0);
             }
         }
-        prop_assert_eq!(bench.queue.place(), &place(end));
+        prop_assert_eq!(bench.queue.position(), &place(end));
         prop_assert_eq!(bench.queue.waiting(), 0);
         bench.check(max_bytes)?;
     }
@@ -185,15 +185,15 @@ fn checkpoint_is_due_by_time_or_count() {
     bench.give(1);
     bench.acknowledge(0);
     let after = |millis| Duration::from_millis(millis);
-    assert_eq!(bench.queue.due(after(1999)), None);
-    assert_eq!(bench.queue.due(after(2000)), Some(&place(1)));
-    bench.queue.remembered(&place(1), after(2000));
-    assert_eq!((bench.queue.due(after(9000)), bench.queue.last()), (None, None));
+    assert_eq!(bench.queue.due_checkpoint(after(1999)), None);
+    assert_eq!(bench.queue.due_checkpoint(after(2000)), Some(&place(1)));
+    bench.queue.checkpointed(&place(1), after(2000));
+    assert_eq!((bench.queue.due_checkpoint(after(9000)), bench.queue.final_checkpoint()), (None, None));
     for _ in 0..1000 {
         bench.give(1);
         bench.acknowledge(0);
     }
-    assert!(bench.queue.due(after(2000)).is_some_and(|place| place.bytes > 1200));
+    assert!(bench.queue.due_checkpoint(after(2000)).is_some_and(|place| place.bytes > 1200));
     assert_eq!(bench.queue.acknowledged(), 1001);
     assert_eq!(bench.queue.passed_over(), 400);
 }
@@ -204,11 +204,11 @@ fn acknowledgement_out_of_order() {
     bench.read(4);
     bench.give(4);
     bench.queue.acknowledge(2, NOW);
-    assert_eq!((bench.queue.place(), bench.queue.waiting()), (&place(0), 3));
+    assert_eq!((bench.queue.position(), bench.queue.waiting()), (&place(0), 3));
     bench.disconnect();
     bench.give(4);
     assert_eq!(bench.order, [0, 1, 3]);
     bench.queue.acknowledge(0, NOW);
     bench.queue.acknowledge(1, NOW);
-    assert_eq!(bench.queue.place(), &place(3));
+    assert_eq!(bench.queue.position(), &place(3));
 }

@@ -1,13 +1,13 @@
 //! Calibration of the probabilities in random rooms, with the complete receiver.
 
-use super::{Judged, Reliability, Truth, judge_room};
-use sonard_interpret::interpret::{Probabilities, Settings};
+use super::{ClassifiedArc, Reliability, ArcCause, classify_room};
+use sonard_interpret::interpret::{Probabilities, InterpretSettings};
 use sonard_model::acoustics::Sensor;
 
-fn classified(seed: u64, rooms: u64) -> Vec<Judged> {
+fn classified(seed: u64, rooms: u64) -> Vec<ClassifiedArc> {
     let sensor = Sensor::preset("senscomp-6500").expect("a preset");
-    let settings = Settings::default();
-    (0..rooms).flat_map(|number| judge_room(seed, number, &sensor, &settings)).collect()
+    let settings = InterpretSettings::default();
+    (0..rooms).flat_map(|number| classify_room(seed, number, &sensor, &settings)).collect()
 }
 
 #[test]
@@ -24,11 +24,11 @@ fn probabilities_are_calibrated() {
 fn confident_arcs_are_correct() {
     let mut counts = [0_usize; 2];
     for arc in classified(8, 100) {
-        let probabilities = arc.said;
+        let probabilities = arc.probabilities;
         for (claimed, truth) in [
-            (probabilities.plane, Truth::Plane),
-            (probabilities.corner, Truth::Corner),
-            (probabilities.edge, Truth::Edge),
+            (probabilities.plane, ArcCause::Plane),
+            (probabilities.corner, ArcCause::Corner),
+            (probabilities.edge, ArcCause::Edge),
         ] {
             if claimed >= 0.9 {
                 counts[usize::from(arc.truth == truth)] += 1;
@@ -45,13 +45,13 @@ fn confident_arcs_are_correct() {
 fn statistics_match_their_definitions() {
     let probabilities = Probabilities { plane: 0.85, corner: 0.1, edge: 0.05, other: 0.0 };
     let classified =
-        [Truth::Plane, Truth::Corner].map(|truth| Judged { said: probabilities, truth });
+        [ArcCause::Plane, ArcCause::Corner].map(|truth| ClassifiedArc { probabilities, truth });
     let Reliability { bins, expected_error, brier } = Reliability::from_arcs(&classified);
     for (at, count, claimed, came_true) in [(0, 4, 0.025, 0.0), (1, 2, 0.1, 0.5), (8, 2, 0.85, 0.5)]
     {
         assert_eq!(bins[at].count, count, "{bins:?}");
-        assert!((bins[at].claimed - claimed).abs() < 1e-12, "{bins:?}");
-        assert!((bins[at].came_true - came_true).abs() < 1e-12, "{bins:?}");
+        assert!((bins[at].mean_predicted - claimed).abs() < 1e-12, "{bins:?}");
+        assert!((bins[at].observed - came_true).abs() < 1e-12, "{bins:?}");
     }
     assert_eq!(bins.iter().map(|bin| bin.count).sum::<usize>(), 8);
     // (|1.7 - 1| + |0.2 - 1| + |0.1 - 0|) / 8
@@ -61,9 +61,9 @@ fn statistics_match_their_definitions() {
     assert!((brier - (first + second) / 8.0).abs() < 1e-12, "{brier}");
 
     let certain = Probabilities { edge: 1.0, ..Probabilities::default() };
-    let right = Reliability::from_arcs(&[Judged { said: certain, truth: Truth::Edge }]);
+    let right = Reliability::from_arcs(&[ClassifiedArc { probabilities: certain, truth: ArcCause::Edge }]);
     assert_eq!((right.expected_error, right.brier, right.bins[9].count), (0.0, 0.0, 1));
-    let wrong = Reliability::from_arcs(&[Judged { said: certain, truth: Truth::Other }]);
+    let wrong = Reliability::from_arcs(&[ClassifiedArc { probabilities: certain, truth: ArcCause::Other }]);
     assert_eq!((wrong.expected_error, wrong.brier), (0.5, 0.5));
     assert_eq!(Reliability::from_arcs(&[]).brier, 0.0);
 }

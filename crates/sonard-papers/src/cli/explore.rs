@@ -19,8 +19,8 @@ use sonard_model::{
 };
 use sonard_papers::{
     explore::{
-        Exploration, ExploreSettings, Ranger, RobotSettings, Sensing, SimulatedRobot, Stop,
-        explore_watched,
+        Exploration, ExploreSettings, SonarLayout, RobotSettings, Sensing, SimulatedRobot, Stop,
+        explore_observed,
     },
     pictures::draw_exploration,
 };
@@ -177,11 +177,11 @@ pub(crate) fn explored(
     }
     let rng = Pcg64::seed_from_u64(seed);
     let mut robot = SimulatedRobot::new(simulator, pose, robot, rng);
-    let made = explore_watched(&mut robot, sensing, settings, |so_far| {
+    let made = explore_observed(&mut robot, sensing, settings, |so_far| {
         bar.set_position(so_far.stops.len() as u64);
         bar.set_message(format!("{:.0} m driven", so_far.travel_m));
     });
-    match robot.refusal() {
+    match robot.error() {
         Some(error) => Err(Failure::input(error, "see `sonard-papers explore --help`")),
         None => Ok(made),
     }
@@ -212,8 +212,8 @@ impl RobotArgs {
             }
         }
         let ranger = match self.ranger {
-            RangerName::Ring => Ranger::Ring,
-            RangerName::Stepper => Ranger::Stepper,
+            RangerName::Ring => SonarLayout::Ring,
+            RangerName::Stepper => SonarLayout::Stepper,
         };
         let robot = RobotSettings {
             ranger,
@@ -256,7 +256,7 @@ impl Summary {
             laser_shots: made.laser_shots,
             sonar_readings: made.sonar_readings,
             travel_m: made.travel_m,
-            bumps: made.bumps,
+            bumps: made.collisions,
             lines: made.lines().len(),
             error: map_error(made.lines(), scene),
         }

@@ -5,9 +5,9 @@ use std::io::{self, Write};
 use comfy_table::{CellAlignment, Table};
 use serde::Serialize;
 
-use sonard_interpret::interpret::Settings;
+use sonard_interpret::interpret::InterpretSettings;
 use sonard_papers::{
-    calibration::{Judged, Reliability, judge_room},
+    calibration::{ClassifiedArc, Reliability, classify_room},
     pictures::draw_reliability,
 };
 
@@ -78,11 +78,11 @@ struct Row {
 pub(crate) fn run(args: &Args) -> Outcome {
     let sensor = load_sensor(&args.sensor)?;
     args.picture.check()?;
-    let settings = Settings::default();
+    let settings = InterpretSettings::default();
     let bar = progress::bar(args.trials, "rooms");
-    let mut arcs: Vec<Judged> = Vec::new();
+    let mut arcs: Vec<ClassifiedArc> = Vec::new();
     for number in 0..args.trials {
-        arcs.extend(judge_room(args.seed, number, &sensor, &settings));
+        arcs.extend(classify_room(args.seed, number, &sensor, &settings));
         bar.inc(1);
     }
     bar.finish_and_clear();
@@ -98,8 +98,8 @@ impl Answer {
     fn new(args: &Args, arcs: usize, reliability: &Reliability) -> Self {
         let bins = reliability.bins.iter().map(|bin| Row {
             claims: bin.count,
-            claimed: bin.claimed,
-            came_true: bin.came_true,
+            claimed: bin.mean_predicted,
+            came_true: bin.observed,
         });
         Self {
             rooms: args.trials,

@@ -15,7 +15,7 @@ use serde::Serialize;
 use sonard_interpret::interpret::{
     Extents,
     grid::{MapScore, Trust},
-    mapping::{MAX_RANGE_M, Mapping},
+    mapping::{MAX_RANGE_M, MapSettings},
 };
 use sonard_model::{
     acoustics::{Air, Sensor},
@@ -24,8 +24,8 @@ use sonard_model::{
     model::{Options, PathOptions, Simulator},
     scene::{Scene, shipped},
 };
-use sonard_papers::trial::{Arrangement, Course, Trial, TrialSettings, random_room};
-use sonard_plot::{MapView, badge_of, draw_map};
+use sonard_papers::trial::{Arrangement, SimulatedCourse, MappingTrial, TrialSettings, random_room};
+use sonard_plot::{MapView, badge_for, draw_map};
 use sonard_records::Provenance;
 
 use super::{
@@ -58,13 +58,13 @@ pub(crate) struct Args {
     #[arg(long, value_name = "E", default_value_t = 2.0)]
     exponent: f64,
     /// Extension of walls beyond their observed part, metres
-    #[arg(long, value_name = "M", default_value_t = Mapping::default().extend_m)]
+    #[arg(long, value_name = "M", default_value_t = MapSettings::default().extend_m)]
     extend: f64,
     /// Weight complete readings, including their free space before the feature, as in the paper
     #[arg(long)]
     whole_readings: bool,
     /// Discard readings of lower confidence; 0.5 is full confidence
-    #[arg(long, value_name = "C", default_value_t = Mapping::default().least_confidence)]
+    #[arg(long, value_name = "C", default_value_t = MapSettings::default().min_confidence)]
     min_reading_confidence: f64,
     /// Detect one arrival at a time and time it by its path alone
     #[arg(long)]
@@ -166,7 +166,7 @@ fn trial(args: &Args, course: usize) -> Result<Row, Failure> {
         exponent: args.exponent,
         extend_m: args.extend,
         trust: Trust {
-            least_confidence: args.min_reading_confidence,
+            min_confidence: args.min_reading_confidence,
             keep_clear: !args.whole_readings,
         },
     };
@@ -182,7 +182,7 @@ fn trial(args: &Args, course: usize) -> Result<Row, Failure> {
     };
     let simulator =
         Simulator::new(Arc::new(scene), sensor, air, options).map_err(|error| reject(&error))?;
-    let driven = Course::through(&simulator, start, &settings, &mut rng)
+    let driven = SimulatedCourse::through(&simulator, start, &settings, &mut rng)
         .map_err(|error| reject(&error))?
         .ok_or_else(|| reject(&format!("{name}: the scene has no free space for the robot")))?;
     let trial = driven.map(&extents, silent_beyond_m, &settings).map_err(|error| reject(&error))?;
@@ -212,8 +212,8 @@ fn save(
     (folder, overwrite): (&Path, Overwrite),
     stem: &str,
     scene: &Scene,
-    course: &Course,
-    trial: &Trial,
+    course: &SimulatedCourse,
+    trial: &MappingTrial,
 ) -> Outcome {
     let trajectory: Vec<DVec2> = course.sweeps.iter().map(|sweep| sweep.pose.position()).collect();
     let pictures =
@@ -223,10 +223,10 @@ fn save(
         let view = MapView {
             title: format!("{}, {kind}", scene.name),
             lines: Vec::new(),
-            badge: badge_of(Some(Provenance::Simulated)),
+            badge: badge_for(Some(Provenance::Simulated)),
             grid: map,
             scene: Some(scene),
-            way: &trajectory,
+            trajectory: &trajectory,
         };
         let png = draw_map(&view)
             .map_err(|error| Failure::input(error, "choose a coarser --resolution"))?;

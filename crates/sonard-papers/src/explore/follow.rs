@@ -4,10 +4,10 @@ use super::{
     Exploration, ExploreSettings, Sensing, Stop, Task,
     ground::FloorGrid,
     objects::Objects,
-    robot::{Drive, Robot},
+    robot::{DriveOutcome, Robot},
 };
 use sonard_interpret::interpret::{
-    Heard,
+    BeamOutcome,
     lines::{LaserScan, LineKind, LineMap, MapLine},
 };
 use sonard_model::geometry::DVec2;
@@ -48,12 +48,12 @@ pub fn explore(
     sensing: Sensing,
     settings: &ExploreSettings,
 ) -> Exploration {
-    explore_watched(robot, sensing, settings, |_| {})
+    explore_observed(robot, sensing, settings, |_| {})
 }
 
 /// Explores as [`explore`] does, with a callback after each stop.
 #[must_use]
-pub fn explore_watched(
+pub fn explore_observed(
     robot: &mut impl Robot,
     sensing: Sensing,
     settings: &ExploreSettings,
@@ -146,10 +146,10 @@ impl<R: Robot> Explorer<'_, R> {
         self.log.travel_m += from.distance(at);
         self.history.last = Some(goal.target);
         self.history.drives.push(goal.target);
-        if drive == Drive::Bumped {
-            self.log.bumps += 1;
+        if drive == DriveOutcome::Collided {
+            self.log.collisions += 1;
             let ahead = (goal.next - from).normalize_or_zero();
-            self.history.bumps.push(at + self.settings.keep_off_m * ahead);
+            self.history.bumps.push(at + self.settings.min_clearance_m * ahead);
         }
         self.stop(goal.task, Some(goal.target));
         if at.distance(goal.view) < ARRIVED_M {
@@ -222,7 +222,7 @@ impl<R: Robot> Explorer<'_, R> {
         let (tip, outwards) = outwards(line, end);
         let robot = self.robot.pose().position();
         let corner_with = |other: &MapLine| {
-            let corner = line.meets(other, CORNER_DEG)?;
+            let corner = line.intersection(other, CORNER_DEG)?;
             let beyond_m = outwards.dot(corner - tip);
             let near = (-JOINED_M..CORNER_REACH_M).contains(&beyond_m)
                 && other.distance_m(corner) < CORNER_REACH_M
@@ -238,7 +238,7 @@ impl<R: Robot> Explorer<'_, R> {
         let robot = self.robot.pose().position();
         let lines = self.map.lines();
         let visited: Vec<DVec2> = self.log.stops.iter().map(|stop| stop.pose.position()).collect();
-        let keep_off_m = self.settings.keep_off_m;
+        let keep_off_m = self.settings.min_clearance_m;
         let ground = FloorGrid::around(robot, lines, &self.history.bumps, &visited, keep_off_m)?;
         if lines.is_empty() {
             return self.approach(&ground);
@@ -345,8 +345,8 @@ impl<R: Robot> Explorer<'_, R> {
     fn approach(&self, ground: &FloorGrid) -> Option<Goal> {
         let stop = self.log.stops.last()?;
         let echoes = stop.sonar.iter().flat_map(|sweep| {
-            sweep.beams.iter().filter_map(|beam| match beam.heard {
-                Heard::Echo(range_m) => Some((range_m, stop.pose.direction_rad(beam.azimuth_deg))),
+            sweep.beams.iter().filter_map(|beam| match beam.outcome {
+                BeamOutcome::Echo(range_m) => Some((range_m, stop.pose.direction_rad(beam.azimuth_deg))),
                 _ => None,
             })
         });

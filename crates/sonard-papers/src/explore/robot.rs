@@ -5,7 +5,7 @@ use rand_distr::{Distribution, StandardNormal};
 
 use super::laser::{Laser, join_shots};
 use crate::trial::simulate_reading;
-use sonard_interpret::interpret::{Beam, Heard, Sweep, lines::LaserScan};
+use sonard_interpret::interpret::{SweepBeam, BeamOutcome, Sweep, lines::LaserScan};
 use sonard_model::{
     geometry::{DVec2, Pose, wrap_360, wrap_pi},
     model::{Simulator, TooCostly, raycast::Reflectors},
@@ -22,21 +22,21 @@ pub trait Robot {
     /// Takes a full turn of laser shots; returns the scan and the number of shots.
     fn laser_turn(&mut self) -> (LaserScan, u32);
     /// Drives straight to a position or to the first obstacle.
-    fn drive(&mut self, to: DVec2) -> Drive;
+    fn drive(&mut self, to: DVec2) -> DriveOutcome;
 }
 
 /// Outcome of a drive.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Drive {
+pub enum DriveOutcome {
     /// Arrived at the requested position.
-    There,
+    Arrived,
     /// Collided with an obstacle and backed off.
-    Bumped,
+    Collided,
 }
 
 /// Arrangement of the robot's sonars.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Ranger {
+pub enum SonarLayout {
     /// Twelve sonars at equal angles; the robot turns by 2 degrees between readings: 180 at each
     /// stop.
     Ring,
@@ -44,7 +44,7 @@ pub enum Ranger {
     Stepper,
 }
 
-impl Ranger {
+impl SonarLayout {
     /// Azimuths of the readings at each stop and their spacing, degrees.
     fn azimuths_deg(self) -> (impl Iterator<Item = f64>, f64) {
         let (count, step_deg) = match self {
@@ -59,7 +59,7 @@ impl Ranger {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RobotSettings {
     /// Arrangement of the sonars.
-    pub ranger: Ranger,
+    pub ranger: SonarLayout,
     /// Properties of the laser.
     pub laser: Laser,
     /// Radius of the body, metres. The body does not affect the sound.
@@ -75,7 +75,7 @@ impl Default for RobotSettings {
     /// Ring with a body of 12 inches like the paper's B12, and exact odometry as in the paper.
     fn default() -> Self {
         Self {
-            ranger: Ranger::Ring,
+            ranger: SonarLayout::Ring,
             laser: Laser::default(),
             radius_m: 0.15,
             range_sigma_m: 0.005,
@@ -109,7 +109,7 @@ impl<'a, R: Rng> SimulatedRobot<'a, R> {
     /// Last error of the model. The affected sonar readings lack an echo, so the exploration is
     /// invalid.
     #[must_use]
-    pub const fn refusal(&self) -> Option<&TooCostly> {
+    pub const fn error(&self) -> Option<&TooCostly> {
         self.error.as_ref()
     }
 
@@ -174,10 +174,10 @@ impl<R: Rng> Robot for SimulatedRobot<'_, R> {
                 Ok(prediction) => simulate_reading(&prediction, sigma_m, &mut self.rng),
                 Err(error) => {
                     self.error = Some(error);
-                    Heard::Silent
+                    BeamOutcome::NoEcho
                 }
             };
-            Beam { azimuth_deg, index, heard, mount: DVec2::ZERO }
+            SweepBeam { azimuth_deg, index, outcome: heard, mount: DVec2::ZERO }
         });
         Sweep { beams: beams.collect(), pose: self.odometry, step_deg, closed: true }
     }
@@ -196,11 +196,11 @@ impl<R: Rng> Robot for SimulatedRobot<'_, R> {
         (join_shots(pose, &shots), count)
     }
 
-    fn drive(&mut self, to: DVec2) -> Drive {
+    fn drive(&mut self, to: DVec2) -> DriveOutcome {
         let offset = to - self.odometry.position();
         let length_m = offset.length();
         if length_m == 0.0 {
-            return Drive::There;
+            return DriveOutcome::Arrived;
         }
         let turn_rad = wrap_pi(offset.to_angle() - self.odometry.direction_rad(0.0));
         let true_turn_rad = turn_rad * (1.0 + self.noise());
@@ -209,9 +209,9 @@ impl<R: Rng> Robot for SimulatedRobot<'_, R> {
         let direction = DVec2::from_angle(self.truth.direction_rad(0.0));
         let free_m = self.free_distance_m(direction, length_m * stretch);
         let (driven_m, drive) = if free_m < length_m * stretch {
-            ((free_m - BACK_OFF_M).max(0.0), Drive::Bumped)
+            ((free_m - BACK_OFF_M).max(0.0), DriveOutcome::Collided)
         } else {
-            (free_m, Drive::There)
+            (free_m, DriveOutcome::Arrived)
         };
         let true_place = self.truth.position() + driven_m * direction;
         let place = self.odometry.position() + driven_m / stretch * offset / length_m;

@@ -79,13 +79,13 @@ fn walls_stop_robot_at_its_radius() {
     let simulator = simulator(scene(ROOM));
     let settings = RobotSettings::default();
     let mut robot = SimulatedRobot::new(&simulator, MIDDLE, settings, rng(3));
-    assert_eq!(robot.drive(DVec2::new(3.0, 1.0)), Drive::There);
+    assert_eq!(robot.drive(DVec2::new(3.0, 1.0)), DriveOutcome::Arrived);
     assert!(robot.pose().position().distance(DVec2::new(3.0, 1.0)) < 1e-9);
-    assert_eq!(robot.drive(DVec2::new(9.0, 1.0)), Drive::Bumped);
+    assert_eq!(robot.drive(DVec2::new(9.0, 1.0)), DriveOutcome::Collided);
     let clearance_m = simulator.scene().clearance_m(robot.truth().position());
     assert!((settings.radius_m..settings.radius_m + 0.06).contains(&clearance_m), "{clearance_m}");
     // The robot can leave the wall and drive along it, but not through it.
-    assert_eq!(robot.drive(robot.pose().position() + DVec2::new(0.0, 0.5)), Drive::There);
+    assert_eq!(robot.drive(robot.pose().position() + DVec2::new(0.0, 0.5)), DriveOutcome::Arrived);
     for _ in 0..5 {
         robot.drive(robot.pose().position() + DVec2::new(0.5, 0.2));
     }
@@ -122,7 +122,7 @@ impl Robot for NoReadings {
     fn laser_turn(&mut self) -> (LaserScan, u32) {
         (LaserScan { pose: self.0, returns: Vec::new() }, 16)
     }
-    fn drive(&mut self, _: DVec2) -> Drive {
+    fn drive(&mut self, _: DVec2) -> DriveOutcome {
         panic!("there is nothing to drive to")
     }
 }
@@ -153,7 +153,7 @@ fn exploration_is_reproducible() {
     let simulator = simulator(scene(ROOM));
     let make = || explored(&simulator, MIDDLE, Sensing::JustInTime, 7).0;
     let made = make();
-    assert!(made.finished && made.bumps == 0, "{} stops", made.stops.len());
+    assert!(made.finished && made.collisions == 0, "{} stops", made.stops.len());
     assert_eq!(made, make());
 }
 
@@ -175,7 +175,7 @@ fn just_in_time_matches_laser_only() {
         let shots = [laser.0.laser_shots, just_in_time.0.laser_shots];
         assert!(4 * shots[1] <= shots[0], "room {number}: {shots:?} shots");
         assert!(laser.0.finished && just_in_time.0.finished, "room {number}");
-        assert_eq!((laser.0.bumps, just_in_time.0.bumps), (0, 0), "room {number}");
+        assert_eq!((laser.0.collisions, just_in_time.0.collisions), (0, 0), "room {number}");
     }
     let mean = |kind: usize| {
         rooms.iter().map(|room| room[kind].1.map_error_m).sum::<f64>() / rooms.len() as f64

@@ -5,11 +5,11 @@ use sonard_interpret::interpret::lines::LaserScan;
 use sonard_model::{geometry::DVec2, scene::Scene};
 use sonard_plot::{
     Picture,
-    canvas::{Anchor, Layer, Px, Rect, Shape},
+    canvas::{Anchor, Layer, Px, Rect, MarkShape},
     caption,
-    legend::{self, Entry, Sample},
+    legend::{self, LegendEntry, LegendSample},
     lines,
-    plan::{Bounds, Plan},
+    plan::{Bounds, PlanProjection},
     theme,
 };
 
@@ -39,8 +39,8 @@ pub fn draw_exploration(
         caption::draw(&title, Some("SIMULATED, nothing measured"), &[statistics(shown)]);
     let region = region(&exploration.stops, scene);
     let (left, right) = (theme::MARGIN_PX + 38.0, theme::PAGE_PX - theme::MARGIN_PX);
-    let height = Plan::height_for(&region, right - left, [320.0, 760.0]);
-    let plan = Plan::fit(region, Rect::new(left, top + 22.0, right - left, height));
+    let height = PlanProjection::height_for(&region, right - left, [320.0, 760.0]);
+    let plan = PlanProjection::fit(region, Rect::new(left, top + 22.0, right - left, height));
     let mut page = Layer::new("exploration");
     page.add(heading);
     page.add(floor(&plan, 0, shown, scene));
@@ -62,12 +62,12 @@ pub fn draw_explorations(made: &[(Sensing, &Exploration)], scene: Option<&Scene>
     let left = theme::MARGIN_PX + 34.0;
     let room = theme::PAGE_PX - theme::MARGIN_PX - left + GAP_PX;
     let width = room / made.len().max(1) as f64 - GAP_PX;
-    let height = Plan::height_for(&region, width, [180.0, 420.0]);
+    let height = PlanProjection::height_for(&region, width, [180.0, 420.0]);
     let mut page = Layer::new("explorations");
     page.add(heading);
     for (number, (sensing, exploration)) in made.iter().enumerate() {
         let at = left + number as f64 * (width + GAP_PX);
-        let plan = Plan::fit(region, Rect::new(at, top + 40.0, width, height));
+        let plan = PlanProjection::fit(region, Rect::new(at, top + 40.0, width, height));
         page.add(floor(&plan, number, &exploration.stops, scene));
         let mut titles = Layer::new("sensing");
         let above = |rise: f64| Px::new(at, top + 40.0 - rise);
@@ -101,7 +101,7 @@ fn statistics(stops: &[Stop]) -> String {
 
 fn region<'a>(stops: impl IntoIterator<Item = &'a Stop>, scene: Option<&Scene>) -> Bounds {
     let trajectory = Bounds::around(stops.into_iter().map(|stop| stop.pose.position()));
-    let walls = scene.and_then(Bounds::of_scene);
+    let walls = scene.and_then(Bounds::from_scene);
     let both = match (walls, trajectory) {
         (Some(walls), Some(trajectory)) => Some(walls.including([trajectory.min, trajectory.max])),
         (walls, trajectory) => walls.or(trajectory),
@@ -110,7 +110,7 @@ fn region<'a>(stops: impl IntoIterator<Item = &'a Stop>, scene: Option<&Scene>) 
 }
 
 /// Floor plan with trajectory, laser fields of view and the map at the last stop.
-fn floor(plan: &Plan, number: usize, stops: &[Stop], scene: Option<&Scene>) -> Layer {
+fn floor(plan: &PlanProjection, number: usize, stops: &[Stop], scene: Option<&Scene>) -> Layer {
     let mut inside =
         Layer::new("inside").clipped(&format!("exploration-window-{number}"), plan.panel);
     let mut views =
@@ -127,7 +127,7 @@ fn floor(plan: &Plan, number: usize, stops: &[Stop], scene: Option<&Scene>) -> L
     trajectory.runs([stops.iter().map(|stop| plan.px(stop.pose.position())).collect::<Vec<_>>()]);
     let mut places = Layer::new("stops").with("fill", theme::ORANGE).with("stroke", "none");
     for stop in stops {
-        places.mark(Shape::Dot, plan.px(stop.pose.position()), 2.2, None);
+        places.mark(MarkShape::Dot, plan.px(stop.pose.position()), 2.2, None);
     }
     inside.add(trajectory);
     inside.add(places);
@@ -142,7 +142,7 @@ fn floor(plan: &Plan, number: usize, stops: &[Stop], scene: Option<&Scene>) -> L
 }
 
 /// Outline of a laser field of view.
-fn view(plan: &Plan, scan: &LaserScan) -> Vec<Px> {
+fn view(plan: &PlanProjection, scan: &LaserScan) -> Vec<Px> {
     let every = scan.returns.len().div_ceil(VIEW_POINTS * (1 + scan.returns.len() / 512)).max(1);
     let rim = scan.returns.iter().step_by(every).map(|reading| {
         let range_m = reading.range_m.map_or(VIEW_M, |range_m| range_m.min(VIEW_M));
@@ -151,17 +151,17 @@ fn view(plan: &Plan, scan: &LaserScan) -> Vec<Px> {
     std::iter::once(plan.px(scan.pose.position())).chain(rim).collect()
 }
 
-fn entries<'a>(stops: impl IntoIterator<Item = &'a Stop>) -> Vec<Entry> {
+fn entries<'a>(stops: impl IntoIterator<Item = &'a Stop>) -> Vec<LegendEntry> {
     let lines: Vec<_> = stops.into_iter().flat_map(|stop| &stop.lines).collect();
-    let trajectory = Sample::Line { colour: theme::ORANGE, width_px: 1.4, dash: "none" };
-    let wall = Sample::Line { colour: theme::WALL, width_px: theme::WALL_PX, dash: "none" };
-    let dot = Sample::Mark { shape: Shape::Dot, colour: theme::NO_ECHO };
+    let trajectory = LegendSample::Line { colour: theme::ORANGE, width_px: 1.4, dash: "none" };
+    let wall = LegendSample::Line { colour: theme::WALL, width_px: theme::WALL_PX, dash: "none" };
+    let dot = LegendSample::Mark { shape: MarkShape::Dot, colour: theme::NO_ECHO };
     let others = [
-        Entry::new(dot, "confirmed endpoint"),
-        Entry::new(trajectory, "trajectory and stops"),
-        Entry::new(wall, "wall"),
-        Entry::new(
-            Sample::Mark { shape: Shape::Square, colour: theme::NO_ECHO },
+        LegendEntry::new(dot, "confirmed endpoint"),
+        LegendEntry::new(trajectory, "trajectory and stops"),
+        LegendEntry::new(wall, "wall"),
+        LegendEntry::new(
+            LegendSample::Mark { shape: MarkShape::Square, colour: theme::NO_ECHO },
             "laser field of view",
         ),
     ];

@@ -1,11 +1,11 @@
 //! Reliability diagrams: observed frequency over mean predicted probability.
 
-use crate::calibration::{Bin, Reliability};
+use crate::calibration::{ReliabilityBin, Reliability};
 use sonard_plot::{
     Picture,
-    canvas::{Anchor, Layer, Px, Rect, Shape},
+    canvas::{Anchor, Layer, Px, Rect, MarkShape},
     caption,
-    legend::{self, Entry, Sample},
+    legend::{self, LegendEntry, LegendSample},
     theme, ticks,
 };
 
@@ -29,9 +29,9 @@ pub fn draw_reliability(title: &str, lines: &[String], reliability: &Reliability
     page.add(bars(counts, &reliability.bins));
     let below = Px::new(left, counts.bottom + 50.0);
     let entries = [
-        Entry::new(Sample::Mark { shape: Shape::Dot, colour: theme::BLUE }, "bins of 0.1"),
-        Entry::new(
-            Sample::Line { colour: theme::QUIET, width_px: 1.2, dash: "6 4" },
+        LegendEntry::new(LegendSample::Mark { shape: MarkShape::Dot, colour: theme::BLUE }, "bins of 0.1"),
+        LegendEntry::new(
+            LegendSample::Line { colour: theme::QUIET, width_px: 1.2, dash: "6 4" },
             "perfectly calibrated",
         ),
     ];
@@ -65,17 +65,17 @@ fn frame(panel: Rect) -> Layer {
 }
 
 /// Marks of the filled bins at their mean predicted probabilities, joined by a line.
-fn points(panel: Rect, bins: &[Bin]) -> Layer {
-    let filled: Vec<&Bin> = bins.iter().filter(|bin| bin.count > 0).collect();
+fn points(panel: Rect, bins: &[ReliabilityBin]) -> Layer {
+    let filled: Vec<&ReliabilityBin> = bins.iter().filter(|bin| bin.count > 0).collect();
     let mut line = Layer::new("line").stroked(theme::BLUE, 1.4);
-    line.runs([filled.iter().map(|b| at(panel, b.claimed, b.came_true)).collect::<Vec<_>>()]);
+    line.runs([filled.iter().map(|b| at(panel, b.mean_predicted, b.observed)).collect::<Vec<_>>()]);
     let mut marks = Layer::new("bins").with("fill", theme::BLUE);
     for bin in filled {
         let hint = format!(
             "{} predictions, mean predicted probability {:.3}, observed frequency {:.3}",
-            bin.count, bin.claimed, bin.came_true
+            bin.count, bin.mean_predicted, bin.observed
         );
-        marks.mark(Shape::Dot, at(panel, bin.claimed, bin.came_true), 5.0, Some(&hint));
+        marks.mark(MarkShape::Dot, at(panel, bin.mean_predicted, bin.observed), 5.0, Some(&hint));
     }
     let mut layer = Layer::new("points");
     layer.extend([line, marks]);
@@ -83,7 +83,7 @@ fn points(panel: Rect, bins: &[Bin]) -> Layer {
 }
 
 /// Histogram of predictions on a logarithmic scale, because max are near 0 or 1.
-fn bars(panel: Rect, bins: &[Bin]) -> Layer {
+fn bars(panel: Rect, bins: &[ReliabilityBin]) -> Layer {
     let max = bins.iter().map(|bin| bin.count).max().unwrap_or(1).max(10) as f64;
     let height = |count: f64| (1.0 + count).log10() / (1.0 + max).log10();
     let mut layer = Layer::new("counts");

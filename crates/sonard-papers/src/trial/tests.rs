@@ -5,7 +5,7 @@ use std::sync::Arc;
 use rand::SeedableRng;
 use rand_pcg::Pcg64;
 
-use super::{Arrangement, Course, TrialSettings, random_room};
+use super::{Arrangement, SimulatedCourse, TrialSettings, random_room};
 use sonard_interpret::interpret::grid::Trust;
 use sonard_model::{
     acoustics::{Air, Sensor},
@@ -98,7 +98,7 @@ fn robot_drives_ahead_clear_of_walls() {
     };
     let mut rng = Pcg64::seed_from_u64(4);
     let through = |start, rng: &mut Pcg64| {
-        Course::through(&simulator, start, &settings, rng).expect("few paths")
+        SimulatedCourse::through(&simulator, start, &settings, rng).expect("few paths")
     };
     let course = through(DVec2::new(1.2, 1.0), &mut rng).expect("a course");
     assert_eq!(course.sweeps.len(), 60);

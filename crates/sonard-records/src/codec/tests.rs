@@ -25,7 +25,7 @@ fn fixture_round_trips() {
 }
 
 /// Asserts kind, column and field of the error of a line.
-fn check(line: impl AsRef<[u8]>, kind: FaultKind, column: Option<usize>, field: &str) {
+fn check(line: impl AsRef<[u8]>, kind: RecordErrorKind, column: Option<usize>, field: &str) {
     let shown = String::from_utf8_lossy(line.as_ref()).into_owned();
     let fault = decode_line(line.as_ref()).expect_err(&shown);
     assert_eq!(
@@ -39,26 +39,26 @@ fn check(line: impl AsRef<[u8]>, kind: FaultKind, column: Option<usize>, field: 
 #[test]
 fn damage_is_located() {
     let ping = line_of("ping");
-    check("", FaultKind::Empty, None, "");
-    check(" \r", FaultKind::Empty, None, "");
-    check("garbage", FaultKind::NotJson, Some(1), "");
-    check("[1]", FaultKind::NotJson, Some(1), "");
-    check(&ping[..40], FaultKind::NotJson, Some(40), "");
-    check(b"\0\0\0\0", FaultKind::NotText, Some(1), "");
-    check(b"{\"type\":\"ev\xffnt\"}", FaultKind::NotText, Some(12), "");
-    check("{}", FaultKind::NoType, None, "type");
-    check(r#"{"type":7}"#, FaultKind::NoType, None, "type");
-    check(r#"{"type":"pong"}"#, FaultKind::UnknownType, None, "type");
-    check(format!("{ping} {ping}"), FaultKind::NotJson, Some(ping.len() + 2), "");
+    check("", RecordErrorKind::Empty, None, "");
+    check(" \r", RecordErrorKind::Empty, None, "");
+    check("garbage", RecordErrorKind::NotJson, Some(1), "");
+    check("[1]", RecordErrorKind::NotJson, Some(1), "");
+    check(&ping[..40], RecordErrorKind::NotJson, Some(40), "");
+    check(b"\0\0\0\0", RecordErrorKind::NotText, Some(1), "");
+    check(b"{\"type\":\"ev\xffnt\"}", RecordErrorKind::NotText, Some(12), "");
+    check("{}", RecordErrorKind::NoType, None, "type");
+    check(r#"{"type":7}"#, RecordErrorKind::NoType, None, "type");
+    check(r#"{"type":"pong"}"#, RecordErrorKind::UnknownType, None, "type");
+    check(format!("{ping} {ping}"), RecordErrorKind::NotJson, Some(ping.len() + 2), "");
     let wrong = ping.replace("\"order\":1", "\"order\":-1");
     let column = wrong.find(":-1").expect("just put there") + 3;
-    check(&wrong, FaultKind::BadField, Some(column), "sim.path.order");
+    check(&wrong, RecordErrorKind::BadField, Some(column), "sim.path.order");
     for other in ["0", "2", "4294967296"] {
         let session = line_of("session").replace("\"format\":1", &format!("\"format\":{other}"));
-        check(&session, FaultKind::UnsupportedFormat, None, "format");
+        check(&session, RecordErrorKind::UnsupportedFormat, None, "format");
         check(
             session.replace("\"started\"", "\"begun\""),
-            FaultKind::UnsupportedFormat,
+            RecordErrorKind::UnsupportedFormat,
             None,
             "format",
         );
@@ -69,13 +69,13 @@ fn damage_is_located() {
         );
     }
     let session = line_of("session").replace("\"format\":1", "\"format\":-1");
-    assert_eq!(decode_line(session.as_bytes()).expect_err("negative").kind, FaultKind::BadField);
-    check("[".repeat(100_000), FaultKind::NotJson, Some(1), "");
+    assert_eq!(decode_line(session.as_bytes()).expect_err("negative").kind, RecordErrorKind::BadField);
+    check("[".repeat(100_000), RecordErrorKind::NotJson, Some(1), "");
     let deep =
         line_of("session").replace("\"lossless\":false", &format!("\"x\":{}", "[".repeat(9999)));
-    check(&deep, FaultKind::NotJson, Some(deep.len() - 1), "");
+    check(&deep, RecordErrorKind::NotJson, Some(deep.len() - 1), "");
     let deep = deep.replace("[}", &format!("[{}}}", "]".repeat(9999)));
-    assert_eq!(decode_line(deep.as_bytes()).expect_err("too deep").kind, FaultKind::BadField);
+    assert_eq!(decode_line(deep.as_bytes()).expect_err("too deep").kind, RecordErrorKind::BadField);
 }
 
 #[test]

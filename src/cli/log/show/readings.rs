@@ -25,7 +25,7 @@ impl Readings {
         let records = read_log(open_for_reading(&log)?)
             .map_while(Result::ok)
             .filter_map(|line| line.record.ok());
-        Ok(Self { scans: Box::new(ScanView::one_by_one(records)), buffered: HashMap::new() })
+        Ok(Self { scans: Box::new(ScanView::stream(records)), buffered: HashMap::new() })
     }
 
     /// Returns the readings of a scan, in the order of the log.

@@ -63,7 +63,7 @@ impl World<'_> {
     }
 
     fn ignore(&mut self, uri: &str) -> Outcome {
-        self.found.leave_out("models from elsewhere (include)");
+        self.found.count_ignored("models from elsewhere (include)");
         self.notes.push(format!(
             "ignored: the model `{uri}`; put its folder next to the world to include it"
         ));

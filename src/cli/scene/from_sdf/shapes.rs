@@ -33,7 +33,7 @@ impl World<'_> {
                 "plane" => self.plane(shape, name, frame)?,
                 "empty" => {}
                 kind => {
-                    self.found.leave_out("meshes, spheres and other shapes");
+                    self.found.count_ignored("meshes, spheres and other shapes");
                     self.notes.push(format!("ignored: {kind} of `{name}`"));
                 }
             }
@@ -96,7 +96,7 @@ impl World<'_> {
     }
 
     fn ignore_tilted(&mut self, name: &str) {
-        self.found.leave_out(TILTED);
+        self.found.count_ignored(TILTED);
         self.notes.push(format!("ignored: a tilted object of `{name}`"));
     }
 

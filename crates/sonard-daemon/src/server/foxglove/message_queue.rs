@@ -11,10 +11,10 @@ use std::{
 
 use sonard_export::{
     LiveMessage, Topic,
-    foxglove::{Level, Session, Step, advertise, status, unadvertise},
+    foxglove::{StatusLevel, ViewerSession, ViewerAction, advertise, status, unadvertise},
 };
 
-use crate::Shelf;
+use crate::Ring;
 
 /// Maximum size of a message, bytes; longer ones are dropped. Each viewer can have one such message
 /// in flight.
@@ -30,7 +30,7 @@ pub(super) struct ViewerQueue {
     channel_count: u32,
     /// Number of changes of the channels so far.
     changes: u64,
-    messages: Shelf<QueuedMessage>,
+    messages: Ring<QueuedMessage>,
     /// Number of notices to all viewers so far, and the last one.
     notices: (u64, String),
     is_closed: bool,
@@ -80,7 +80,7 @@ impl ViewerQueue {
             channels: BTreeMap::new(),
             channel_count: 0,
             changes: 0,
-            messages: Shelf::new(MAX_MESSAGES, max_bytes),
+            messages: Ring::new(MAX_MESSAGES, max_bytes),
             notices: (0, String::new()),
             is_closed: false,
         }
@@ -116,8 +116,8 @@ impl ViewerQueue {
         }
         let bytes = Arc::from(message.bytes);
         let message = QueuedMessage { channel: *id, number, at_ns: message.at_ns, bytes };
-        channel.latched = channel.topic.is_kept.then(|| Arc::new(message.clone()));
-        for dropped in self.messages.put(message.bytes.len(), message) {
+        channel.latched = channel.topic.is_retained.then(|| Arc::new(message.clone()));
+        for dropped in self.messages.push(message.bytes.len(), message) {
             if let Some(channel) = self.channels.get_mut(&dropped.channel) {
                 channel.first = dropped.number + 1;
             }
@@ -142,7 +142,7 @@ impl ViewerQueue {
 /// Reading position and subscriptions of a viewer. Its memory is bounded by the number of channels.
 #[derive(Debug)]
 pub(super) struct Viewer {
-    session: Session,
+    session: ViewerSession,
     /// Position in the queue.
     position: u64,
     /// Number of the next message of each subscribed channel.
@@ -164,10 +164,10 @@ impl Viewer {
         let mut texts = VecDeque::from([greeting]);
         if queue.channels.is_empty() {
             let text = "no topics yet: they are advertised with the first scan";
-            texts.push_back(status(Level::Info, text));
+            texts.push_back(status(StatusLevel::Info, text));
         }
         Self {
-            session: Session::default(),
+            session: ViewerSession::default(),
             position: queue.messages.end(),
             due: BTreeMap::new(),
             latched_due: BTreeSet::new(),
@@ -181,32 +181,32 @@ impl Viewer {
 
     /// Handles a text message of the viewer.
     pub(super) fn take_text(&mut self, text: &str, queue: &ViewerQueue) {
-        let steps = self.session.take_text(text, |channel| queue.has(channel));
+        let steps = self.session.handle_text(text, |channel| queue.has(channel));
         self.apply(steps, queue);
     }
 
     /// Handles a binary message of the viewer.
     pub(super) fn take_binary(&mut self, queue: &ViewerQueue) {
-        let steps = self.session.take_binary();
+        let steps = self.session.handle_binary();
         self.apply(steps, queue);
     }
 
-    fn apply(&mut self, steps: Vec<Step>, queue: &ViewerQueue) {
+    fn apply(&mut self, steps: Vec<ViewerAction>, queue: &ViewerQueue) {
         for step in steps {
             match step {
-                Step::Begin(channel) => {
+                ViewerAction::StartChannel(channel) => {
                     let Some(begun) = queue.channels.get(&channel) else { continue };
                     self.due.insert(channel, begun.end);
                     if begun.latched.is_some() {
                         self.latched_due.insert(channel);
                     }
                 }
-                Step::Cease(channel) => {
+                ViewerAction::StopChannel(channel) => {
                     self.due.remove(&channel);
                     self.latched_due.remove(&channel);
                 }
-                Step::Say(text) => self.texts.push_back(text),
-                Step::End => self.is_rejected = true,
+                ViewerAction::SendText(text) => self.texts.push_back(text),
+                ViewerAction::Close => self.is_rejected = true,
             }
         }
     }
@@ -216,7 +216,7 @@ impl Viewer {
         self.update_channels(queue);
         if self.notices != queue.notices.0 {
             self.notices = queue.notices.0;
-            self.texts.push_back(status(Level::Warning, &queue.notices.1));
+            self.texts.push_back(status(StatusLevel::Warning, &queue.notices.1));
         }
         let missed = self.skip_dropped(queue);
         if missed > 0 {
@@ -243,7 +243,7 @@ impl Viewer {
         let current: BTreeSet<u32> = queue.channels.keys().copied().collect();
         let gone: Vec<u32> = self.advertised.difference(&current).copied().collect();
         if !gone.is_empty() {
-            self.session.keep_only(|channel| queue.has(channel));
+            self.session.retain_channels(|channel| queue.has(channel));
             self.due.retain(|channel, _| queue.has(*channel));
             self.latched_due.retain(|channel| queue.has(*channel));
             self.texts.push_back(unadvertise(&gone));
@@ -312,7 +312,7 @@ impl Viewer {
 }
 
 fn missed_status(messages: u64) -> String {
-    status(Level::Warning, &format!("{messages} messages left out"))
+    status(StatusLevel::Warning, &format!("{messages} messages left out"))
 }
 
 #[cfg(test)]

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use sonard_api::{Beam, Echo, JudgedPing, PeakLine, PlanPoint, TraceLine};
+use sonard_api::{Beam, Echo, AnnotatedPing, PeakLine, PlanPoint, TraceLine};
 use sonard_model::{
     acoustics::Air,
     geometry::Pose,
@@ -27,7 +27,7 @@ pub(super) fn describe_beam(view: &ScanView, ping: Ping, scene: Option<&Scene>) 
     };
     let polyline = ping.sound_path().and_then(|path| view.polyline(&ping, path));
     let polyline = polyline.map(|points| points.into_iter().map(PlanPoint::from).collect());
-    Beam { reading: JudgedPing::new(ping, view), echoes, polyline, peaks, trace, lacks }
+    Beam { reading: AnnotatedPing::new(ping, view), echoes, polyline, peaks, trace, lacks }
 }
 
 fn echoes(view: &ScanView, session: Option<&Session>, ping: &Ping) -> Vec<Echo> {
@@ -61,8 +61,8 @@ fn predict(
     let options = model.options().ok_or("the scan's model is not supported by this version")?;
     let air = air(view, session).map_err(|error| error.to_string())?;
     let axis = ping.axis(Some(session), &pose).ok_or("the logged array has no such ranger")?;
-    let scene = Arc::new(session.scene_around(scene, &ping.pose.unwrap_or(pose)));
-    let sensor = session.sensor_of(ping);
+    let scene = Arc::new(session.scene_with_robot(scene, &ping.pose.unwrap_or(pose)));
+    let sensor = session.sensor_for(ping);
     let last_echo_m = [ping.range_m, ping.sim.as_ref().and_then(|sim| sim.range_m)];
     let last_echo_m = last_echo_m.into_iter().flatten().fold(0.0, f64::max);
     let until_m = options.max_range_m.unwrap_or(sensor.max_range_m);
@@ -90,6 +90,6 @@ fn predict_arrivals(
 ) -> Result<(Vec<PeakLine>, TraceLine), TooCostly> {
     let point = simulator.at(axis.position());
     let trace = point.trace(axis.direction_rad(0.0), until_m, STEP_US)?;
-    let peaks = PeakLine::of_trace(simulator, &point, axis, &trace)?;
+    let peaks = PeakLine::from_trace(simulator, &point, axis, &trace)?;
     Ok((peaks, TraceLine::from_trace(simulator, &trace, STEP_US)))
 }

@@ -98,7 +98,7 @@ async fn air(State(api): State<Api>, JsonBody(order): JsonBody<AirOrder>) -> Com
 }
 
 async fn reset_air(State(api): State<Api>) -> CommandResult {
-    execute(&api, Order::OwnAir).await
+    execute(&api, Order::ResetAir).await
 }
 
 async fn sensor(State(api): State<Api>, JsonBody(order): JsonBody<SensorOrder>) -> CommandResult {
@@ -106,7 +106,7 @@ async fn sensor(State(api): State<Api>, JsonBody(order): JsonBody<SensorOrder>) 
 }
 
 async fn reset_sensor(State(api): State<Api>) -> CommandResult {
-    execute(&api, Order::OwnSensor).await
+    execute(&api, Order::ResetSensor).await
 }
 
 async fn execute(api: &Api, order: Order) -> CommandResult {

@@ -6,13 +6,13 @@ use axum::{Json, extract::State, http::StatusCode};
 use serde_json::json;
 use sonard_api::{Findings, FoundFeature, FoundLine, MapCells};
 use sonard_interpret::interpret::{
-    Extents, Feature, Settings, Sweep,
+    Extents, Feature, InterpretSettings, Sweep,
     grid::Grid,
     interpret,
     lines::{LineMap, LineMapSettings, MapLine},
-    mapping::{Mapper, Mapping},
+    mapping::{Mapper, MapSettings},
 };
-use sonard_log::Passage;
+use sonard_log::ScanSpan;
 use sonard_records::{Record, ScanView, decode_line};
 use tokio::sync::OwnedSemaphorePermit;
 
@@ -55,7 +55,7 @@ async fn findings(
 }
 
 fn interpret_scan(
-    passage: &Passage,
+    passage: &ScanSpan,
     _permit: Option<OwnedSemaphorePermit>,
 ) -> Result<Findings, ApiError> {
     let view = read(passage)?;
@@ -63,7 +63,7 @@ fn interpret_scan(
     let session = view.session.as_deref();
     let session =
         session.ok_or_else(|| nothing("the log does not contain the scan's session".into()))?;
-    let extents = Extents::of_session(session).map_err(|error| nothing(error.to_string()))?;
+    let extents = Extents::from_session(session).map_err(|error| nothing(error.to_string()))?;
     let sweep = Sweep::from_scan(&view).map_err(|error| nothing(error.to_string()))?;
     let is_array = session.array.is_some();
     let mut lines = LineMap::new(LineMapSettings::default());
@@ -72,7 +72,7 @@ fn interpret_scan(
     let sweeps = [(view.scan, sweep)];
     // Features are derived from arcs, which need a scanning ranger.
     let features =
-        if is_array { Vec::new() } else { interpret(&sweeps, &extents, &Settings::default()) };
+        if is_array { Vec::new() } else { interpret(&sweeps, &extents, &InterpretSettings::default()) };
     let lacks = is_array.then(|| "features need a scanning ranger".to_owned());
     Ok(Findings {
         map,
@@ -83,7 +83,7 @@ fn interpret_scan(
 }
 
 /// Reads the scan with its readings; the last one of a repeated beam counts.
-pub(super) fn read(passage: &Passage) -> Result<ScanView, ApiError> {
+pub(super) fn read(passage: &ScanSpan) -> Result<ScanView, ApiError> {
     let mut view = passage.view.clone();
     let mut count = 0;
     for line in passage.lines(true).map_err(|error| unreadable(&error))? {
@@ -104,7 +104,7 @@ pub(super) fn read(passage: &Passage) -> Result<ScanView, ApiError> {
 }
 
 fn map(sweep: &Sweep, extents: &Extents, is_array: bool) -> Option<MapCells> {
-    let mut mapping = Mapping::default();
+    let mut mapping = MapSettings::default();
     let max_range_m = mapping.max_range_m(extents);
     let mut shape = mapping.shape([sweep], max_range_m).ok()?;
     let coarser = (shape.cells() as f64 / MAX_CELLS).sqrt();

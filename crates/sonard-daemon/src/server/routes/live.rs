@@ -12,7 +12,7 @@ use futures_util::{Stream, StreamExt as _, stream};
 use schemars::JsonSchema;
 use serde::Deserialize;
 use serde_json::json;
-use sonard_api::{Beside, ScanReport};
+use sonard_api::{Annotations, ScanReport};
 use sonard_records::Record;
 use tokio::{sync::OwnedSemaphorePermit, time::timeout};
 
@@ -21,7 +21,7 @@ use super::{
     scans::wait_written,
 };
 use crate::{
-    Moved, ScanSubscription, Subscription, Wanted,
+    DeadbandFilter, ScanSubscription, Subscription, SubscriptionFilter,
     server::{
         Api, Principal,
         openapi::Route,
@@ -63,7 +63,7 @@ struct LiveRecord {
     record: Record,
     /// Annotations of a reading, with `verdicts`.
     #[serde(flatten)]
-    beside: Option<Beside>,
+    beside: Option<Annotations>,
 }
 
 pub(super) fn endpoints() -> Vec<Route> {
@@ -101,7 +101,7 @@ async fn live_records(
     QueryParams(options): QueryParams<StreamOptions>,
 ) -> Result<Response, ApiError> {
     let (format, slot) = prepare(&api, principal, &headers, options)?;
-    let filter = Wanted { moved_m: options.moved_m, verdicts: options.verdicts };
+    let filter = SubscriptionFilter { deadband_m: options.moved_m, verdicts: options.verdicts };
     let subscription = api.daemon.hub().subscribe(filter);
     let lines = stream::unfold((subscription, slot), move |(mut subscription, slot)| async move {
         let line = next_line(&mut subscription, format).await?;
@@ -121,7 +121,7 @@ async fn live_scans(
         subscription: api.daemon.hub().subscribe_scans(),
         api,
         format,
-        moved: Moved::new(options.moved_m),
+        moved: DeadbandFilter::new(options.moved_m),
         current: None,
         _slot: slot,
     };
@@ -210,7 +210,7 @@ struct ScanStream {
     subscription: ScanSubscription,
     api: Api,
     format: StreamFormat,
-    moved: Moved,
+    moved: DeadbandFilter,
     /// Scan that is being sent.
     current: Option<ScanPieces>,
     _slot: Option<OwnedSemaphorePermit>,

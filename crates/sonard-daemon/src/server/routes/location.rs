@@ -18,8 +18,8 @@ use futures_util::stream;
 use serde::Deserialize;
 use serde_json::json;
 use sonard_api::Location;
-use sonard_inverse::{Atlas, Course, Odometry, Sweep, Watch, World, doubts, locate_watched};
-use sonard_log::{History, Passage};
+use sonard_inverse::{CoarseGrid, Tracker, Odometry, FitSweep, FitObserver, World, diagnose, locate_observed};
+use sonard_log::{LogIndex, ScanSpan};
 use sonard_records::Session;
 use tokio::{
     sync::{OwnedSemaphorePermit, mpsc},
@@ -128,14 +128,14 @@ async fn course(
 ) -> Result<Response, ApiError> {
     let odometry = odometry(query)?;
     let from = Uuid::parse_str(&scan).map_err(|_| scan_not_found())?;
-    let find = move |history: &mut History| scans_between(history, from, query.to);
+    let find = move |history: &mut LogIndex| scans_between(history, from, query.to);
     let scans = in_history(&api, find).await?.ok_or_else(|| {
         let error = format!("scan {from} is not among the {MAX_SCANS} scans up to the last one");
         ApiError::new(StatusCode::NOT_FOUND, error, "GET /v1/scans lists the scans, newest first")
     })?;
     let permit = acquire_permit(&api).await?;
     Ok(stream_results("application/x-ndjson", permit, move |sender| {
-        let mut locator = ScanLocator::new(Some(Course::new(odometry)));
+        let mut locator = ScanLocator::new(Some(Tracker::new(odometry)));
         // Localization stops if the client has disconnected.
         let _ = scans.into_iter().try_for_each(|scan| {
             let location = match load_scan(&api, scan, &locator) {
@@ -164,14 +164,14 @@ fn odometry(query: CourseQuery) -> Result<Odometry, ApiError> {
             defaults.drift_deg_per_m,
             180.0,
         )?,
-        carried: within("carried", query.carried, defaults.carried, 1.0)?,
+        kidnap_probability: within("carried", query.carried, defaults.kidnap_probability, 1.0)?,
     })
 }
 
 /// Returns the scans from `from` to `to` or to the newest, oldest first; `None` if `from` is not
 /// among the last ones before `to`.
 fn scans_between(
-    history: &mut History,
+    history: &mut LogIndex,
     from: Uuid,
     to: Option<Uuid>,
 ) -> io::Result<Option<Vec<Uuid>>> {
@@ -252,22 +252,22 @@ impl ResultSender {
     }
 }
 
-impl Watch for ResultSender {
-    fn stops(&self) -> bool {
+impl FitObserver for ResultSender {
+    fn is_cancelled(&self) -> bool {
         self.0.is_closed()
     }
 }
 
 /// Scan with the scene and model needed to locate it.
 struct LocatableScan {
-    sweep: Sweep,
+    sweep: FitSweep,
     session: Arc<Session>,
     world: Arc<World>,
 }
 
 /// Loads a scan of the logs.
 fn load_scan(api: &Api, scan: Uuid, locator: &ScanLocator) -> Result<LocatableScan, String> {
-    let found = api.history.lock().unwrap_or_else(PoisonError::into_inner).passage(scan);
+    let found = api.history.lock().unwrap_or_else(PoisonError::into_inner).scan_span(scan);
     let passage = found.map_err(|error| format!("cannot read the logs: {error}"))?;
     let passage = passage.ok_or("the newest logs do not contain this scan")?;
     LocatableScan::load(api, &passage, locator.previous.as_ref())
@@ -276,9 +276,9 @@ fn load_scan(api: &Api, scan: Uuid, locator: &ScanLocator) -> Result<LocatableSc
 impl LocatableScan {
     /// Prepares a scan for localization, or returns the reason why it can't be located. The world
     /// of the previous scan is reused if the session is equal. Reads the disk.
-    fn load(api: &Api, passage: &Passage, previous: Option<&PreviousScan>) -> Result<Self, String> {
+    fn load(api: &Api, passage: &ScanSpan, previous: Option<&PreviousScan>) -> Result<Self, String> {
         let view = read(passage).map_err(|failed| failed.problem.error)?;
-        let sweep = Sweep::from_scan(&view).map_err(|error| error.to_string())?;
+        let sweep = FitSweep::from_scan(&view).map_err(|error| error.to_string())?;
         let session = view.session.ok_or("the log does not contain the scan's session")?;
         if let Some(previous) = previous.filter(|previous| *previous.session == *session) {
             let (session, world) = (Arc::clone(&previous.session), Arc::clone(&previous.world));
@@ -290,7 +290,7 @@ impl LocatableScan {
             scene.filter(|scene| own_scene.is_none_or(|own| own.sha256 == scene.sha256)).ok_or(
                 "the log does not contain the scan's scene, and the current scene is another one",
             )?;
-        let (air, options) = session.conditions().map_err(|error| error.to_string())?;
+        let (air, options) = session.model_conditions().map_err(|error| error.to_string())?;
         let options = options.ok_or("the scan's model is not supported by this version")?;
         let world = Arc::new(World::new(scene, session.sensor.clone(), air, options));
         Ok(Self { sweep, session, world })
@@ -301,26 +301,26 @@ impl LocatableScan {
 struct PreviousScan {
     session: Arc<Session>,
     world: Arc<World>,
-    atlas: Atlas,
+    atlas: CoarseGrid,
 }
 
 /// Locates scans one after the other.
 struct ScanLocator {
-    course: Option<Course>,
+    course: Option<Tracker>,
     previous: Option<PreviousScan>,
 }
 
 impl ScanLocator {
-    const fn new(course: Option<Course>) -> Self {
+    const fn new(course: Option<Tracker>) -> Self {
         Self { course, previous: None }
     }
 
-    fn locate(&mut self, place: LocatableScan, watch: &dyn Watch) -> Location {
+    fn locate(&mut self, place: LocatableScan, watch: &dyn FitObserver) -> Location {
         let scan = place.sweep.scan;
         self.try_locate(place, watch).unwrap_or_else(|why| unlocated(scan, why))
     }
 
-    fn try_locate(&mut self, place: LocatableScan, watch: &dyn Watch) -> Result<Location, String> {
+    fn try_locate(&mut self, place: LocatableScan, watch: &dyn FitObserver) -> Result<Location, String> {
         let LocatableScan { sweep, session, world } = place;
         // Only one atlas is kept, because each can have many megabytes.
         let previous =
@@ -328,19 +328,19 @@ impl ScanLocator {
         let previous = match previous {
             Some(previous) => previous,
             None => {
-                let spacing_m = Atlas::usual_spacing_m(&world.scene);
-                let atlas = Atlas::watched(&world, spacing_m, watch);
+                let spacing_m = CoarseGrid::default_spacing_m(&world.scene);
+                let atlas = CoarseGrid::observed(&world, spacing_m, watch);
                 let atlas = atlas.map_err(|error| error.to_string())?;
                 PreviousScan { session, world: Arc::clone(&world), atlas }
             }
         };
         let PreviousScan { atlas, .. } = self.previous.insert(previous);
         let poses = match &mut self.course {
-            Some(course) => course.next_watched(&world, atlas, &sweep, watch),
-            None => locate_watched(&world, atlas, &sweep, watch),
+            Some(course) => course.next_observed(&world, atlas, &sweep, watch),
+            None => locate_observed(&world, atlas, &sweep, watch),
         };
         let poses = poses.map_err(|error| error.to_string())?;
-        let diagnoses = doubts(&world, atlas, &sweep, &poses);
+        let diagnoses = diagnose(&world, atlas, &sweep, &poses);
         Ok(Location { scan: sweep.scan, poses, doubts: diagnoses, lacks: None })
     }
 }

@@ -8,7 +8,7 @@ use axum::{
 };
 use serde_json::json;
 use sha2::{Digest as _, Sha256};
-use sonard_log::hexadecimal;
+use sonard_log::to_hex;
 
 use super::{fleet::PAGE as FLEET, playground::is_playground};
 use crate::server::{
@@ -162,7 +162,7 @@ fn asset_response(media: &'static str, text: String, headers: &HeaderMap) -> Res
 /// Entity tag of a text, from its hash.
 #[expect(clippy::indexing_slicing, reason = "a SHA-256 has 32 bytes")]
 fn tag(text: &str) -> String {
-    format!("\"{}\"", hexadecimal(&Sha256::digest(text.as_bytes())[..8]))
+    format!("\"{}\"", to_hex(&Sha256::digest(text.as_bytes())[..8]))
 }
 
 #[cfg(test)]

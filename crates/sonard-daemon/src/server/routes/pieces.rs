@@ -6,12 +6,12 @@ use std::{io, sync::Arc};
 use axum::body::Bytes;
 use futures_util::{Stream, stream};
 use serde::{Serialize, de::IgnoredAny};
-use sonard_api::Beside;
-use sonard_log::{Passage, PassageLines};
+use sonard_api::Annotations;
+use sonard_log::{ScanSpan, ScanSpanLines};
 use sonard_records::{Record, decode_line};
 use tokio::sync::Semaphore;
 
-use crate::{Moved, judged_line};
+use crate::{DeadbandFilter, annotated_line};
 
 /// Size of a piece, bytes; the last line may exceed it.
 const PIECE_BYTES: usize = 32 * 1024;
@@ -29,10 +29,10 @@ pub(super) enum ScanForm {
 
 /// State of a scan that is being streamed.
 pub(super) struct ScanPieces {
-    passage: Passage,
+    passage: ScanSpan,
     form: ScanForm,
     /// Filter of readings that have not moved.
-    moved: Moved,
+    moved: DeadbandFilter,
     part: ScanPart,
     /// `true` while the current JSON list is empty.
     first: bool,
@@ -42,14 +42,14 @@ pub(super) struct ScanPieces {
 
 enum ScanPart {
     Head,
-    Readings(PassageLines),
-    Events(PassageLines),
+    Readings(ScanSpanLines),
+    Events(ScanSpanLines),
     Tail,
     Done,
 }
 
 impl ScanPieces {
-    pub(super) const fn new(passage: Passage, form: ScanForm, moved: Moved) -> Self {
+    pub(super) const fn new(passage: ScanSpan, form: ScanForm, moved: DeadbandFilter) -> Self {
         Self { passage, form, moved, part: ScanPart::Head, first: true, enclosure: [b"", b""] }
     }
 
@@ -60,7 +60,7 @@ impl ScanPieces {
     }
 
     /// Returns the filter state for the next scan of the stream.
-    pub(super) fn into_moved(self) -> Moved {
+    pub(super) fn into_moved(self) -> DeadbandFilter {
         self.moved
     }
 
@@ -116,7 +116,7 @@ impl ScanPieces {
     fn write_reading(&mut self, piece: &mut Vec<u8>, line: &[u8]) {
         let line = line.trim_ascii_end();
         let Some(fields) = line.strip_prefix(TAG) else { return };
-        if self.form == ScanForm::Report && self.moved.is_everything() {
+        if self.form == ScanForm::Report && self.moved.passes_all() {
             // The line is copied as it is, provided that it is complete.
             let scan = format!(r#""scan":"{}","#, self.passage.view.scan);
             let whole = fields.starts_with(scan.as_bytes())
@@ -129,15 +129,15 @@ impl ScanPieces {
             return;
         }
         let Ok(Record::Ping(ping)) = decode_line(line) else { return };
-        if ping.scan != self.passage.view.scan || !self.moved.is_news_of(&ping) {
+        if ping.scan != self.passage.view.scan || !self.moved.pass_ping(&ping) {
             return;
         }
         self.separate(piece);
         piece.push(b'{');
         match self.form {
             ScanForm::Whole => {
-                let beside = Beside::for_ping(&ping, Some(&self.passage.view));
-                piece.extend_from_slice(&judged_line(fields, &beside));
+                let beside = Annotations::for_ping(&ping, Some(&self.passage.view));
+                piece.extend_from_slice(&annotated_line(fields, &beside));
             }
             ScanForm::Report => piece.extend_from_slice(fields),
         }

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use axum::{Json, extract::State, http::StatusCode};
 use jiff::Timestamp;
-use sonard_api::{AirOrder, JudgedPing, PreviewRequest, WholeScan, Word};
+use sonard_api::{AirOrder, AnnotatedPing, PreviewRequest, WholeScan, Classification};
 use sonard_model::{
     acoustics::{Air, Sensor},
     array::RangerArray,
@@ -16,7 +16,7 @@ use sonard_records::{Ping, ScanPlan, ScanStart, ScanView, Session, SimRecord};
 use uuid::Uuid;
 
 use crate::{
-    NextScan, check_device, check_plan, check_pose, ordered_air, ordered_sensor,
+    NextScan, check_device, check_plan, check_pose, air_from_order, sensor_from_order,
     server::{
         Api,
         openapi::Route,
@@ -84,11 +84,11 @@ impl HypotheticalScan {
             humidity_percent: None,
             pressure_kpa: None,
         });
-        let air = ordered_air(&order, current.humidity_percent, current.pressure_kpa)?;
+        let air = air_from_order(&order, current.humidity_percent, current.pressure_kpa)?;
         let mut sensor = next.setup.sensor.clone();
         if let Some(order) = request.sensor {
             let of_array = next.array.is_some();
-            sensor = ordered_sensor(&order, &next.setup, of_array, air.sound_speed_m_s())?;
+            sensor = sensor_from_order(&order, &next.setup, of_array, air.sound_speed_m_s())?;
             if let Some(device) = &next.device {
                 check_device(&sensor, &next.setup.sensor, device)?;
             }
@@ -176,7 +176,7 @@ fn preview_response(mut view: ScanView, session: Session) -> WholeScan {
 }
 
 /// Annotates a simulated reading, which agrees with the model by definition.
-fn annotate(ping: Ping, view: &ScanView) -> JudgedPing {
+fn annotate(ping: Ping, view: &ScanView) -> AnnotatedPing {
     let sim = SimRecord {
         status: ping.status,
         range_m: ping.range_m,
@@ -185,8 +185,8 @@ fn annotate(ping: Ping, view: &ScanView) -> JudgedPing {
         path: ping.path.clone(),
         crosstalk: ping.crosstalk.clone(),
     };
-    let verdict = Word::from_ping(&Ping { sim: Some(sim), ..ping.clone() });
-    let mut annotated = JudgedPing::new(ping, view);
-    annotated.beside.verdict = verdict;
+    let verdict = Classification::from_ping(&Ping { sim: Some(sim), ..ping.clone() });
+    let mut annotated = AnnotatedPing::new(ping, view);
+    annotated.annotations.verdict = verdict;
     annotated
 }

@@ -10,7 +10,7 @@ use super::{
     scans::{scan_response, wait_written},
 };
 use crate::{
-    Moved,
+    DeadbandFilter,
     server::{Api, openapi::Route, response::ApiError},
 };
 
@@ -62,7 +62,7 @@ async fn latest(State(api): State<Api>) -> Result<Response, ApiError> {
             help,
         )
     })?;
-    Ok(scan_response(&api, ScanPieces::new(passage, ScanForm::Report, Moved::default())))
+    Ok(scan_response(&api, ScanPieces::new(passage, ScanForm::Report, DeadbandFilter::default())))
 }
 
 async fn session(State(api): State<Api>) -> Result<Response, ApiError> {

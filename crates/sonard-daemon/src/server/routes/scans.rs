@@ -15,7 +15,7 @@ use axum::{
 use serde::Deserialize;
 use serde_json::json;
 use sonard_api::{Beam, FloorPlan, ListedScan, WholeScan};
-use sonard_log::{History, Passage, PastScan, logged_scene};
+use sonard_log::{LogIndex, ScanSpan, LoggedScan, logged_scene};
 use sonard_model::scene::Scene;
 use tokio::time::{Instant, sleep};
 use uuid::Uuid;
@@ -25,7 +25,7 @@ use super::{
     pieces::{ScanForm, ScanPieces, stream},
 };
 use crate::{
-    Moved,
+    DeadbandFilter,
     server::{
         Api,
         openapi::Route,
@@ -110,7 +110,7 @@ async fn whole(
     PathParams(scan): PathParams<String>,
 ) -> Result<Response, ApiError> {
     let passage = find(&api, &scan).await?;
-    Ok(scan_response(&api, ScanPieces::new(passage, ScanForm::Whole, Moved::default())))
+    Ok(scan_response(&api, ScanPieces::new(passage, ScanForm::Whole, DeadbandFilter::default())))
 }
 
 /// Streams a scan as JSON.
@@ -163,14 +163,14 @@ async fn scene(
 
 /// Returns the scene of a scan: the current one if it matches, or else the one in its log. The
 /// current one is also returned if the log has none.
-async fn scene_of(api: &Api, passage: &Passage) -> Result<Option<Arc<Scene>>, ApiError> {
+async fn scene_of(api: &Api, passage: &ScanSpan) -> Result<Option<Arc<Scene>>, ApiError> {
     let (current, passage) = (api.daemon.scene(), passage.clone());
     let finding = tokio::task::spawn_blocking(move || load_scene(current, &passage));
     finding.await.map_err(|error| internal_error(&error))
 }
 
 /// Blocking part of [`scene_of`]. May read the disk.
-pub(super) fn load_scene(current: Option<Arc<Scene>>, passage: &Passage) -> Option<Arc<Scene>> {
+pub(super) fn load_scene(current: Option<Arc<Scene>>, passage: &ScanSpan) -> Option<Arc<Scene>> {
     let session = passage.view.session.as_deref();
     let taken_in = session.and_then(|session| session.scene.as_ref());
     let fits = |scene: &Scene| taken_in.is_none_or(|taken_in| taken_in.sha256 == scene.sha256);
@@ -181,13 +181,13 @@ pub(super) fn load_scene(current: Option<Arc<Scene>>, passage: &Passage) -> Opti
     logged.map(Arc::new).or(current)
 }
 
-pub(super) async fn find(api: &Api, scan: &str) -> Result<Passage, ApiError> {
+pub(super) async fn find(api: &Api, scan: &str) -> Result<ScanSpan, ApiError> {
     let id = Uuid::parse_str(scan).map_err(|_| scan_not_found())?;
-    in_history(api, move |history| history.passage(id)).await?.ok_or_else(scan_not_found)
+    in_history(api, move |history| history.scan_span(id)).await?.ok_or_else(scan_not_found)
 }
 
 /// Finds a scan. If it has just ended, waits until all of it is in the log.
-pub(super) async fn find_written(api: &Api, scan: &str) -> Result<Passage, ApiError> {
+pub(super) async fn find_written(api: &Api, scan: &str) -> Result<ScanSpan, ApiError> {
     let passage = find(api, scan).await?;
     if passage.view.end.is_none() && api.daemon.latest_scan() == Some(passage.view.scan) {
         return Ok(wait_written(api, passage.view.scan).await?.unwrap_or(passage));
@@ -201,11 +201,11 @@ pub(super) fn scan_not_found() -> ApiError {
 }
 
 /// Waits until all of a completed scan is in the log; `None` on timeout.
-pub(super) async fn wait_written(api: &Api, scan: Uuid) -> Result<Option<Passage>, ApiError> {
+pub(super) async fn wait_written(api: &Api, scan: Uuid) -> Result<Option<ScanSpan>, ApiError> {
     let mut wait = Duration::from_millis(5);
     let until = Instant::now() + WRITE_TIMEOUT;
     loop {
-        let passage = in_history(api, move |history| history.passage(scan)).await?;
+        let passage = in_history(api, move |history| history.scan_span(scan)).await?;
         if let Some(passage) = passage.filter(|passage| passage.view.end.is_some()) {
             return Ok(Some(passage));
         }
@@ -220,7 +220,7 @@ pub(super) async fn wait_written(api: &Api, scan: Uuid) -> Result<Option<Passage
 /// Queries the logs on a blocking thread.
 pub(super) async fn in_history<T: Send + 'static>(
     api: &Api,
-    query: impl FnOnce(&mut History) -> io::Result<T> + Send + 'static,
+    query: impl FnOnce(&mut LogIndex) -> io::Result<T> + Send + 'static,
 ) -> Result<T, ApiError> {
     let history = Arc::clone(&api.history);
     let querying = tokio::task::spawn_blocking(move || {
@@ -242,7 +242,7 @@ pub(super) fn internal_error(error: &tokio::task::JoinError) -> ApiError {
 }
 
 /// Converts a scan of the history to a list entry.
-fn list_entry(past: PastScan) -> ListedScan {
+fn list_entry(past: LoggedScan) -> ListedScan {
     ListedScan {
         scan: past.start.scan,
         time: past.start.time,

@@ -3,7 +3,7 @@
 use firmware_protocol::messages::{Echoes, limits::TICK_HZ};
 use sonard_model::motion::Trapezoid;
 
-use super::LOOK_TICKS;
+use super::ECHO_POLL_TICKS;
 
 /// Current move of the motor.
 #[derive(Debug)]
@@ -36,7 +36,7 @@ impl Move {
     /// Time of the next pulse, or of the end of the move after the last one.
     pub(super) fn due(&self) -> u64 {
         let at_s = if self.has_pulses_left() {
-            self.profile.pulse_s(self.pulses + 1)
+            self.profile.pulse_time_s(self.pulses + 1)
         } else {
             self.profile.duration_s()
         };
@@ -55,7 +55,7 @@ impl Move {
 impl Firing {
     pub(super) fn due(&self, now: u64) -> u64 {
         let poll =
-            (self.echoes.len() + 1 < usize::from(self.max_echoes)).then_some(now + LOOK_TICKS);
+            (self.echoes.len() + 1 < usize::from(self.max_echoes)).then_some(now + ECHO_POLL_TICKS);
         [Some(self.until), self.binh_at, self.blnk_until, poll]
             .into_iter()
             .flatten()

@@ -86,8 +86,8 @@ fn rejects_tilted_planes_and_beams() {
         "{message}"
     );
     let open = || -> io::Result<Box<dyn io::Read>> { Ok(Box::new(Cursor::new(bytes.clone()))) };
-    let unchecked = Taken { as_said: true, ..assumptions() };
-    Source { open: &open }.examine(Mapping::default(), unchecked).expect("unchecked");
+    let unchecked = Assumptions { skip_checks: true, ..assumptions() };
+    ImportSource { open: &open }.examine(Mapping::default(), unchecked).expect("unchecked");
     let down = vec![placed(0.0, "base_link", "cliff", [0.0; 3], [0.0, 90.0, 0.0])];
     let bag = Bag::new(Order::Little)
         .add("/tf_static", TRANSFORMS, 1.0, &down)

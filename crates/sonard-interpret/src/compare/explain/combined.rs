@@ -4,12 +4,12 @@
 use glam::DVec3;
 
 use super::{
-    explanation::{Estimate, Explanation, LinearizedPair, Quantity},
+    explanation::{ChangeEstimate, Explanation, LinearizedPair, ChangedQuantity},
     fit::{LinearFit, Linearized, fit},
     likelihood::is_near,
     shift::{BeamShifts, echo_log_likelihood, mismatch_log_likelihood, parabola},
 };
-use crate::compare::Judged;
+use crate::compare::ClassifiedPing;
 
 /// Maximum number of beams kept.
 const MAX_BEAMS: usize = 20_000;
@@ -56,7 +56,7 @@ impl CombinedFit {
     pub(super) fn add(
         &mut self,
         shifts: &BeamShifts,
-        beams: &[Judged<'_>],
+        beams: &[ClassifiedPing<'_>],
         pairs: Vec<Option<LinearizedPair>>,
     ) {
         self.max_shift = shifts.max_shift;
@@ -119,12 +119,12 @@ impl CombinedFit {
             false => (0.0, 0.5),
         };
         let (current, current_explained) = self.likelihood(0, |(residual_m, _)| residual_m);
-        let heading = Estimate {
-            name: Quantity::HeadingDeg,
+        let heading = ChangeEstimate {
+            name: ChangedQuantity::HeadingDeg,
             value: (best as f64 - max_shift as f64 + peak) * step_deg,
             sigma: sigma * step_deg,
         };
-        let values = [(Quantity::XM, 0), (Quantity::YM, 1), (Quantity::Percent, 2)];
+        let values = [(ChangedQuantity::XM, 0), (ChangedQuantity::YM, 1), (ChangedQuantity::Percent, 2)];
         let mut estimates: Vec<_> =
             values.into_iter().map(|(name, at)| fit.estimate(name, at)).collect();
         estimates.insert(2, heading);

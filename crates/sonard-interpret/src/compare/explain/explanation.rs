@@ -13,7 +13,7 @@ pub struct Explanation {
     /// or `together` for pose, heading and speed of sound at once.
     pub change: String,
     /// Estimated values of the change.
-    pub estimates: Vec<Estimate>,
+    pub estimates: Vec<ChangeEstimate>,
     /// Gain in log-likelihood of all readings, nats.
     pub gain: f64,
     /// Readings explained by the change and not before: residuals within twice the standard
@@ -23,9 +23,9 @@ pub struct Explanation {
 
 /// Estimated value of a change.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct Estimate {
+pub struct ChangeEstimate {
     /// Estimated quantity, with its unit.
-    pub name: Quantity,
+    pub name: ChangedQuantity,
     /// Value to be added to the current one.
     pub value: f64,
     /// Standard deviation of the value.
@@ -35,7 +35,7 @@ pub struct Estimate {
 /// Quantity altered by a change, with its unit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
-pub enum Quantity {
+pub enum ChangedQuantity {
     /// Position of the ranger along x, metres.
     XM,
     /// Position of the ranger along y, metres.
@@ -60,17 +60,17 @@ impl fmt::Display for Explanation {
     }
 }
 
-impl fmt::Display for Estimate {
+impl fmt::Display for ChangeEstimate {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { name, value, sigma } = self;
         match name {
-            Quantity::XM => write!(f, "x {:+.0} mm +- {:.1}", 1e3 * value, 1e3 * sigma),
-            Quantity::YM => write!(f, "y {:+.0} mm +- {:.1}", 1e3 * value, 1e3 * sigma),
-            Quantity::OffsetM => write!(f, "{:+.0} mm +- {:.1}", 1e3 * value, 1e3 * sigma),
-            Quantity::HeadingDeg => write!(f, "{value:+.2} degrees +- {sigma:.2}"),
-            Quantity::ThresholdDb => write!(f, "{value:+.1} dB +- {sigma:.1}"),
+            ChangedQuantity::XM => write!(f, "x {:+.0} mm +- {:.1}", 1e3 * value, 1e3 * sigma),
+            ChangedQuantity::YM => write!(f, "y {:+.0} mm +- {:.1}", 1e3 * value, 1e3 * sigma),
+            ChangedQuantity::OffsetM => write!(f, "{:+.0} mm +- {:.1}", 1e3 * value, 1e3 * sigma),
+            ChangedQuantity::HeadingDeg => write!(f, "{value:+.2} degrees +- {sigma:.2}"),
+            ChangedQuantity::ThresholdDb => write!(f, "{value:+.1} dB +- {sigma:.1}"),
             // The speed of sound is proportional to the square root of the absolute temperature.
-            Quantity::Percent => {
+            ChangedQuantity::Percent => {
                 let warmer_c = 2.0 * value / 100.0 * 293.0;
                 write!(f, "{value:+.2} % +- {sigma:.2} (air {warmer_c:+.1} C)")
             }

@@ -3,7 +3,7 @@
 use glam::{DMat3, DVec3};
 
 use super::{
-    explanation::{Estimate, Quantity},
+    explanation::{ChangeEstimate, ChangedQuantity},
     likelihood::{SIGMA_M, densities, is_near, log_likelihood},
 };
 
@@ -36,9 +36,9 @@ pub(super) struct LinearFit {
 
 impl LinearFit {
     /// Estimate of one of the values; a fraction becomes percent.
-    pub(super) fn estimate(&self, name: Quantity, at: usize) -> Estimate {
+    pub(super) fn estimate(&self, name: ChangedQuantity, at: usize) -> ChangeEstimate {
         let scale = if at == 2 { 100.0 } else { 1.0 };
-        Estimate { name, value: self.value[at] * scale, sigma: self.sigma[at] * scale }
+        ChangeEstimate { name, value: self.value[at] * scale, sigma: self.sigma[at] * scale }
     }
 
     /// Residual that remains after the fit, metres.

@@ -5,10 +5,10 @@ use std::ops::Range;
 use sonard_records::{Ping, ScanPlan};
 
 use super::{
-    explanation::{Estimate, Explanation, Quantity},
+    explanation::{ChangeEstimate, Explanation, ChangedQuantity},
     likelihood::{has_echo, is_near, log_likelihood},
 };
-use crate::compare::Judged;
+use crate::compare::ClassifiedPing;
 
 /// Maximum heading change on either side, degrees.
 const MAX_HEADING_DEG: f64 = 12.0;
@@ -30,7 +30,7 @@ impl ShiftLikelihoods {
 
     /// Explanation by the most likely shift, unless that is zero or at an end; `step` is the
     /// spacing.
-    fn explanation(&self, change: &str, name: Quantity, step: f64) -> Option<Explanation> {
+    fn explanation(&self, change: &str, name: ChangedQuantity, step: f64) -> Option<Explanation> {
         let (middle, likelihood) = (self.0.len() / 2, |at: usize| self.0[at].0);
         let best = (0..self.0.len()).max_by(|&a, &b| likelihood(a).total_cmp(&likelihood(b)))?;
         if best == 0 || best + 1 >= self.0.len() || best == middle {
@@ -41,7 +41,7 @@ impl ShiftLikelihoods {
         let value = (best as f64 - middle as f64 + peak) * step;
         Some(Explanation {
             change: change.to_owned(),
-            estimates: vec![Estimate { name, value, sigma: sigma * step }],
+            estimates: vec![ChangeEstimate { name, value, sigma: sigma * step }],
             gain: likelihood(best) - likelihood(middle),
             explains: self.0[best].1.saturating_sub(self.0[middle].1),
         })
@@ -61,7 +61,7 @@ pub(super) struct BeamShifts {
 
 impl BeamShifts {
     /// Shifts for a scan; `None` unless its beams are complete, in order and evenly spaced.
-    pub(super) fn for_scan(plan: &ScanPlan, beams: &[Judged<'_>]) -> Option<Self> {
+    pub(super) fn for_scan(plan: &ScanPlan, beams: &[ClassifiedPing<'_>]) -> Option<Self> {
         let (count, step_deg) = (beams.len(), plan.step_deg);
         let is_whole = plan.pings_per_stop == 1 && plan.beams() as usize == count && count >= 8;
         let in_order = beams.iter().zip(0..).all(|(beam, index)| beam.ping.index == index);
@@ -87,7 +87,7 @@ impl BeamShifts {
 pub(super) struct HeadingLikelihood(ShiftLikelihoods);
 
 impl HeadingLikelihood {
-    pub(super) fn add(&mut self, shifts: &BeamShifts, beams: &[Judged<'_>]) {
+    pub(super) fn add(&mut self, shifts: &BeamShifts, beams: &[ClassifiedPing<'_>]) {
         let count = beams.len();
         for (at, (sum, explained)) in self.0.iter_mut(2 * shifts.max_shift + 1) {
             for beam in shifts.compared.clone() {
@@ -103,7 +103,7 @@ impl HeadingLikelihood {
     }
 
     pub(super) fn explanation(&self, step_deg: f64) -> Option<Explanation> {
-        self.0.explanation("heading", Quantity::HeadingDeg, step_deg)
+        self.0.explanation("heading", ChangedQuantity::HeadingDeg, step_deg)
     }
 }
 
@@ -177,7 +177,7 @@ impl ThresholdLikelihood {
         if self.counts.contains(&0) {
             return None;
         }
-        self.shifts.explanation("threshold", Quantity::ThresholdDb, STEP_DB)
+        self.shifts.explanation("threshold", ChangedQuantity::ThresholdDb, STEP_DB)
     }
 }
 

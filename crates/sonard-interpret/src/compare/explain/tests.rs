@@ -9,7 +9,7 @@ use sonard_model::{
     acoustics::{Air, Sensor},
     geometry::Pose,
     model::{PathOptions, Simulator},
-    plan::ScanPlan,
+    scan_plan::ScanPlan,
     scene::{Scene, shipped},
 };
 use sonard_records::{ScanView, SimRecord};

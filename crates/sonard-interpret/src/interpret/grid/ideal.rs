@@ -29,7 +29,7 @@ pub fn ideal(scene: &Scene, shape: GridShape, places: &[DVec2]) -> Grid {
         ];
         open.extend(sides.into_iter().filter(|(inside, _)| *inside).map(|(_, side)| side));
     }
-    Grid::of_probabilities(shape, &cells)
+    Grid::from_probabilities(shape, &cells)
 }
 
 /// Marks the cells crossed by a segment. Steps are short enough to leave no gap for a

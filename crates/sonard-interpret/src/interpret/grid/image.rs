@@ -140,7 +140,7 @@ pub fn from_pixels(
     };
     let rows = pixels.chunks(shape.width).rev();
     let cells: Vec<f64> = rows.flat_map(|row| row.iter().map(probability)).collect();
-    Ok(Grid::of_probabilities(shape, &cells))
+    Ok(Grid::from_probabilities(shape, &cells))
 }
 
 /// Shades written by ROS's map_saver: occupied, unknown and free. A map of probabilities has

@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use super::{BeamModel, GridShape, MAX_LOG_ODDS, ScanEvidence, Trust};
-use crate::interpret::{Beam, Heard, prediction::Assessment};
+use crate::interpret::{SweepBeam, BeamOutcome, prediction::Assessment};
 use sonard_model::geometry::DVec2;
 
 /// Number of directions: 0.75 degrees each, finer than the motor's steps.
@@ -41,15 +41,15 @@ impl PolarTable {
         // without overlap.
         let share = (sweep.step_deg / model.width_deg()).clamp(0.0, 1.0);
         let mut profiles = [vec![0.0; distances], vec![0.0; distances]];
-        let here = |(_, beam): &(usize, &Beam)| beam.mount == mount;
+        let here = |(_, beam): &(usize, &SweepBeam)| beam.mount == mount;
         for (at, beam) in sweep.beams.iter().enumerate().filter(here) {
             let assessment = assessments.and_then(|assessments| assessments.get(at));
-            let (range_m, echo) = match beam.heard {
-                Heard::Echo(range_m) if range_m <= model.max_range_m() => (range_m, true),
-                Heard::Echo(_) | Heard::Silent => (model.max_range_m(), false),
-                Heard::Near => continue,
+            let (range_m, echo) = match beam.outcome {
+                BeamOutcome::Echo(range_m) if range_m <= model.max_range_m() => (range_m, true),
+                BeamOutcome::Echo(_) | BeamOutcome::NoEcho => (model.max_range_m(), false),
+                BeamOutcome::BelowMinRange => continue,
             };
-            if assessment.is_some_and(|assessment| assessment.confidence < trust.least_confidence) {
+            if assessment.is_some_and(|assessment| assessment.confidence < trust.min_confidence) {
                 table.discarded += 1;
                 if !trust.keep_clear {
                     continue;
@@ -168,7 +168,7 @@ impl WeightedReading<'_> {
         if self.trust.keep_clear && assessment.clear_m.is_some_and(|clear_m| distance_m < clear_m) {
             return 1.0;
         }
-        if assessment.confidence < self.trust.least_confidence {
+        if assessment.confidence < self.trust.min_confidence {
             return 0.0;
         }
         (2.0 * assessment.confidence).clamp(0.0, 1.0)

@@ -33,14 +33,14 @@ pub struct PathSettings {
     /// Spacing of the lattice, metres.
     pub spacing_m: f64,
     /// Maximum number of start points.
-    pub most_starts: usize,
+    pub max_starts: usize,
     /// Cells below this probability are free; unknown ones (0.5) are not.
     pub free_below: f64,
 }
 
 impl Default for PathSettings {
     fn default() -> Self {
-        Self { spacing_m: 0.5, most_starts: 64, free_below: 0.45 }
+        Self { spacing_m: 0.5, max_starts: 64, free_below: 0.45 }
     }
 }
 
@@ -128,7 +128,7 @@ fn false_paths(
         })
         .filter(|at| free[*at])
         .collect();
-    let every = lattice.len().div_ceil(settings.most_starts.max(1)).max(1);
+    let every = lattice.len().div_ceil(settings.max_starts.max(1)).max(1);
     let (mut hit, mut tried) = (0, 0);
     for (number, &start) in lattice.iter().enumerate().step_by(every) {
         let paths = ShortestPaths::from_start(shape, &free, &wall, start);

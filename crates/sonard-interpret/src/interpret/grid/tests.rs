@@ -4,7 +4,7 @@ use super::{
     BeamModel, GaussianBeam, Grid, GridError, GridShape, ImageError, MapYaml, PathSettings,
     PhysicalBeam, Trust, from_pgm, ideal, score, to_pgm,
 };
-use crate::interpret::{Beam, Extents, Heard, Sweep, prediction::Assessment};
+use crate::interpret::{SweepBeam, Extents, BeamOutcome, Sweep, prediction::Assessment};
 use sonard_model::{
     acoustics::{Air, Sensor},
     geometry::{DVec2, Pose},
@@ -20,8 +20,8 @@ fn gaussian() -> BeamModel {
 }
 
 /// One beam along +x from (1, 2).
-fn beam(outcome: Heard) -> Sweep {
-    let beams = vec![Beam { azimuth_deg: 0.0, index: 0, heard: outcome, mount: DVec2::ZERO }];
+fn beam(outcome: BeamOutcome) -> Sweep {
+    let beams = vec![SweepBeam { azimuth_deg: 0.0, index: 0, outcome: outcome, mount: DVec2::ZERO }];
     let pose = Pose { x_m: 1.0, y_m: 2.0, heading_deg: 0.0 };
     Sweep { pose, step_deg: 25.0, beams, closed: false }
 }
@@ -37,7 +37,7 @@ fn echo_frees_before_and_fills_at_range() {
             .expect("figures");
     for model in [gaussian(), BeamModel::Physical(Box::new(PhysicalBeam::new(extents, 5.0)))] {
         let mut grid = Grid::new(shape(5.0, 0.05));
-        grid.add(&beam(Heard::Echo(2.0)), None, &model, &Trust::default());
+        grid.add(&beam(BeamOutcome::Echo(2.0)), None, &model, &Trust::default());
         assert!(at(&grid, 2.0, 2.0) < 0.5, "free before");
         assert!(at(&grid, 3.0, 2.0) > 0.5, "occupied there");
         assert_eq!(at(&grid, 4.0, 2.0), 0.5, "unknown behind");
@@ -50,25 +50,25 @@ fn echo_frees_before_and_fills_at_range() {
 fn low_confidence_keeps_cleared_space() {
     let assessment = Assessment { confidence: 0.1, clear_m: Some(1.0) };
     let mut trusted = Grid::new(shape(5.0, 0.05));
-    trusted.add(&beam(Heard::Echo(2.0)), None, &gaussian(), &Trust::default());
+    trusted.add(&beam(BeamOutcome::Echo(2.0)), None, &gaussian(), &Trust::default());
     let add = |trust: Trust| {
         let mut grid = Grid::new(shape(5.0, 0.05));
-        let discarded = grid.add(&beam(Heard::Echo(2.0)), Some(&[assessment]), &gaussian(), &trust);
+        let discarded = grid.add(&beam(BeamOutcome::Echo(2.0)), Some(&[assessment]), &gaussian(), &trust);
         (grid, discarded)
     };
-    let (kept, _) = add(Trust { least_confidence: 0.0, keep_clear: true });
+    let (kept, _) = add(Trust { min_confidence: 0.0, keep_clear: true });
     assert_eq!(at(&kept, 1.5, 2.0), at(&trusted, 1.5, 2.0));
     assert!(at(&kept, 2.5, 2.0) > at(&trusted, 2.5, 2.0));
-    let (dropped, discarded) = add(Trust { least_confidence: 0.3, keep_clear: true });
+    let (dropped, discarded) = add(Trust { min_confidence: 0.3, keep_clear: true });
     assert_eq!((discarded, at(&dropped, 2.5, 2.0)), (1, 0.5));
-    let (without, _) = add(Trust { least_confidence: 0.3, keep_clear: false });
+    let (without, _) = add(Trust { min_confidence: 0.3, keep_clear: false });
     assert_eq!(without, Grid::new(shape(5.0, 0.05)));
 }
 
 #[test]
 fn scans_from_outside_reach_in() {
     let mut grid = Grid::new(shape(5.0, 0.05));
-    let mut outside = beam(Heard::Echo(2.0));
+    let mut outside = beam(BeamOutcome::Echo(2.0));
     outside.pose.x_m = -1.0;
     grid.add(&outside, None, &gaussian(), &Trust::default());
     assert!(at(&grid, 0.5, 2.0) < 0.5, "reached from outside");
@@ -142,7 +142,7 @@ fn physical_profile_is_closed_form() {
 #[test]
 fn pgm_and_yaml_round_trip() {
     let mut grid = Grid::new(shape(3.0, 0.05));
-    grid.add(&beam(Heard::Echo(1.0)), None, &gaussian(), &Trust::default());
+    grid.add(&beam(BeamOutcome::Echo(1.0)), None, &gaussian(), &Trust::default());
     let yaml = MapYaml::new(grid.shape(), "map.pgm");
     let read = MapYaml::from_text(&yaml.to_text()).expect("a description");
     assert_eq!(read, yaml);
@@ -338,9 +338,9 @@ fn paths_through_a_missing_wall_are_false() {
             .map(|at| if wall && at % shape.width == 20 { 1.0 } else { 0.0 })
             .collect()
     };
-    let ideal = Grid::of_probabilities(shape, &cells(true));
-    let map = Grid::of_probabilities(shape, &cells(false));
-    let settings = PathSettings { spacing_m: 1.0, most_starts: 100, free_below: 0.45 };
+    let ideal = Grid::from_probabilities(shape, &cells(true));
+    let map = Grid::from_probabilities(shape, &cells(false));
+    let settings = PathSettings { spacing_m: 1.0, max_starts: 100, free_below: 0.45 };
     let found = score(&map, &ideal, &settings).expect("one shape");
     // 16 points, 8 on each side: 120 pairs, 64 of them across.
     assert_eq!(found.paths, 120);

@@ -7,7 +7,7 @@ use sonard_model::geometry::{DVec2, distance_to_segment, enclosed_area};
 
 /// Polyline along walls, with free space on its left.
 #[derive(Debug, Clone, PartialEq)]
-pub struct WallLine {
+pub struct TracedLine {
     /// Corners, metres.
     pub corners: Vec<DVec2>,
     /// Whether a wall leads from the last corner back to the first.
@@ -28,7 +28,7 @@ pub struct TraceSettings {
     /// diagonal of a cell leaves steps in walls that do not run along the rows.
     pub tolerance_m: f64,
     /// Minimum length of a line, metres; shorter ones are specks.
-    pub least_m: f64,
+    pub min_length_m: f64,
     /// Keep walls along rows and columns of cells in place: only stairs become slanting walls.
     pub keeps_rows: bool,
 }
@@ -36,13 +36,13 @@ pub struct TraceSettings {
 impl TraceSettings {
     /// Settings for a map with cells of this size.
     #[must_use]
-    pub const fn of_cells(resolution_m: f64) -> Self {
+    pub const fn for_cells(resolution_m: f64) -> Self {
         Self {
             occupied: 0.65,
             free: 0.49,
             gap_cells: 2,
             tolerance_m: 1.5 * resolution_m,
-            least_m: 4.0 * resolution_m,
+            min_length_m: 4.0 * resolution_m,
             keeps_rows: false,
         }
     }
@@ -57,7 +57,7 @@ pub(super) type Node = (i64, i64);
 /// single face. Occupied cells that touch at a corner are connected. Lines are simplified with the
 /// Douglas-Peucker algorithm.
 #[must_use]
-pub fn trace(grid: &Grid, settings: &TraceSettings) -> Vec<WallLine> {
+pub fn trace(grid: &Grid, settings: &TraceSettings) -> Vec<TracedLine> {
     let shape = grid.shape();
     let place =
         |node: &Node| shape.origin + shape.resolution_m * DVec2::new(node.0 as f64, node.1 as f64);
@@ -74,8 +74,8 @@ pub fn trace(grid: &Grid, settings: &TraceSettings) -> Vec<WallLine> {
         let length_m = (points.len() - usize::from(!is_closed)) as f64 * shape.resolution_m;
         // A ring thinner than the tolerance degenerates to a line without area.
         let is_ring = is_closed && line.len() > 2 && enclosed_area(&line) != 0.0;
-        (length_m >= settings.least_m && line.len() > 1)
-            .then_some(WallLine { corners: line, is_closed: is_ring })
+        (length_m >= settings.min_length_m && line.len() > 1)
+            .then_some(TracedLine { corners: line, is_closed: is_ring })
     });
     lines.collect()
 }
@@ -230,14 +230,14 @@ mod tests {
     use crate::interpret::grid::{GridShape, ideal};
     use sonard_model::scene::Scene;
 
-    fn traced(scene: &Scene, resolution_m: f64, start: [f64; 2]) -> Vec<WallLine> {
+    fn traced(scene: &Scene, resolution_m: f64, start: [f64; 2]) -> Vec<TracedLine> {
         let ends = || scene.walls.iter().flat_map(|wall| [wall.a, wall.b]);
         let margin = DVec2::splat(0.3);
         let low = ends().reduce(DVec2::min).expect("walls") - margin;
         let high = ends().reduce(DVec2::max).expect("walls") + margin;
         let shape = GridShape::covering(low, high, resolution_m).expect("a grid");
         let grid = ideal(scene, shape, &[start.into()]);
-        trace(&grid, &TraceSettings::of_cells(resolution_m))
+        trace(&grid, &TraceSettings::for_cells(resolution_m))
     }
 
     #[test]
@@ -283,30 +283,30 @@ mod tests {
             cells[at * 5 + at] = 1.0;
         }
         let settings =
-            TraceSettings { least_m: 0.0, tolerance_m: 0.0, ..TraceSettings::of_cells(1.0) };
-        let lines = trace(&Grid::of_probabilities(shape, &cells), &settings);
+            TraceSettings { min_length_m: 0.0, tolerance_m: 0.0, ..TraceSettings::for_cells(1.0) };
+        let lines = trace(&Grid::from_probabilities(shape, &cells), &settings);
         // One line above the diagonal and one below.
         assert_eq!(lines.len(), 2, "{lines:#?}");
         // A wall with unknown cells on one side has a single face.
         let mut cells = vec![0.5; 25];
         cells[10..15].fill(1.0);
         cells[15..25].fill(0.0);
-        let lines = trace(&Grid::of_probabilities(shape, &cells), &settings);
+        let lines = trace(&Grid::from_probabilities(shape, &cells), &settings);
         assert_eq!(lines.len(), 1);
         assert_eq!(lines[0].corners, [DVec2::new(0.0, 3.0), DVec2::new(5.0, 3.0)]);
         // Cells that fade out before a wall are free; those fading farther away belong to no wall.
         let mut cells = vec![0.5; 25];
         cells[20..25].fill(1.0);
         cells[5..10].fill(0.2);
-        assert_eq!(trace(&Grid::of_probabilities(shape, &cells), &settings).len(), 1);
+        assert_eq!(trace(&Grid::from_probabilities(shape, &cells), &settings).len(), 1);
         cells[5..10].fill(0.5);
         cells[..5].fill(0.2);
-        assert_eq!(trace(&Grid::of_probabilities(shape, &cells), &settings), []);
+        assert_eq!(trace(&Grid::from_probabilities(shape, &cells), &settings), []);
         // Specks are dropped on request.
         let mut cells = vec![0.0; 25];
         cells[12] = 1.0;
-        let grid = Grid::of_probabilities(shape, &cells);
+        let grid = Grid::from_probabilities(shape, &cells);
         assert_eq!(trace(&grid, &settings).len(), 1);
-        assert_eq!(trace(&grid, &TraceSettings { least_m: 5.0, ..settings }), []);
+        assert_eq!(trace(&grid, &TraceSettings { min_length_m: 5.0, ..settings }), []);
     }
 }

@@ -8,20 +8,20 @@ pub struct FitSettings {
     /// Maximum distance of a point from its segment, metres.
     pub tolerance_m: f64,
     /// Minimum number of points of a segment.
-    pub least_points: usize,
+    pub min_points: usize,
     /// Minimum length of a segment, metres.
-    pub least_length_m: f64,
+    pub min_length_m: f64,
 }
 
 impl Default for FitSettings {
     fn default() -> Self {
-        Self { tolerance_m: 0.03, least_points: 3, least_length_m: 0.05 }
+        Self { tolerance_m: 0.03, min_points: 3, min_length_m: 0.05 }
     }
 }
 
 /// Segment fitted to points.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Segment {
+pub struct FittedSegment {
     /// End points, in the order of the points.
     pub ends: [DVec2; 2],
     /// Confidence from 0 to 1: `(1 - rms / tolerance) (1 - 2 / n)` for n points with deviation
@@ -38,13 +38,13 @@ pub struct Segment {
 /// Split: a run is cut at the point farthest from the line through its ends, if that deviates by
 /// more than the tolerance. Merge: neighbouring runs that fit a common line are joined.
 #[must_use]
-pub fn fit(points: &[DVec2], settings: &FitSettings) -> Vec<Segment> {
+pub fn fit(points: &[DVec2], settings: &FitSettings) -> Vec<FittedSegment> {
     let points: Vec<DVec2> = points.iter().copied().filter(|point| point.is_finite()).collect();
     let mut cuts = Vec::new();
     split(&points, 0, settings, &mut cuts);
     let runs = join(&points, &cuts, settings);
     runs.into_iter()
-        .filter(|(from, to)| to - from >= settings.least_points.max(2))
+        .filter(|(from, to)| to - from >= settings.min_points.max(2))
         .filter_map(|(from, to)| segment(&points[from..to], from, settings))
         .collect()
 }
@@ -86,7 +86,7 @@ fn fits(points: &[DVec2], tolerance_m: f64) -> bool {
     points.iter().all(|point| along.perp_dot(*point - middle).abs() <= tolerance_m)
 }
 
-fn segment(points: &[DVec2], from: usize, settings: &FitSettings) -> Option<Segment> {
+fn segment(points: &[DVec2], from: usize, settings: &FitSettings) -> Option<FittedSegment> {
     let (middle, along) = line(points);
     let place = |point: &DVec2| along.dot(*point - middle);
     let (low, high) = points
@@ -99,7 +99,7 @@ fn segment(points: &[DVec2], from: usize, settings: &FitSettings) -> Option<Segm
     let square: f64 = points.iter().map(|point| along.perp_dot(*point - middle).powi(2)).sum();
     let rms_m = (square / count).sqrt();
     let confidence = (1.0 - rms_m / settings.tolerance_m).clamp(0.0, 1.0) * (1.0 - 2.0 / count);
-    (high - low >= settings.least_length_m).then_some(Segment {
+    (high - low >= settings.min_length_m).then_some(FittedSegment {
         ends: if forward { ends } else { [ends[1], ends[0]] },
         confidence,
         from,

@@ -75,7 +75,7 @@ impl LaserScan {
         }
         join_corners(&mut lines);
         // A short piece between two corners that coincide has no length left.
-        lines.retain(|line| line.length_m() >= settings.laser.least_length_m);
+        lines.retain(|line| line.length_m() >= settings.laser.min_length_m);
         lines
     }
 
@@ -135,7 +135,7 @@ fn join_corners(lines: &mut [MapLine]) {
             let pairs = [0, 1].into_iter().flat_map(|i| [0, 1].map(|j| (i, j)));
             for (i, j) in pairs {
                 let (a, b) = (lines[first].ends[i], lines[second].ends[j]);
-                let Some(corner) = lines[first].meets(&lines[second], CORNER_DEG) else { continue };
+                let Some(corner) = lines[first].intersection(&lines[second], CORNER_DEG) else { continue };
                 if a.distance(b) < CORNER_M
                     && a.distance(corner) < CORNER_M
                     && b.distance(corner) < CORNER_M

@@ -1,7 +1,7 @@
 //! Line map built incrementally from sonar and laser scans.
 
 use super::{FitSettings, LaserScan, LineKind, MapLine, MergeSettings, clusters, fit, merge};
-use crate::interpret::{Heard, Sweep};
+use crate::interpret::{BeamOutcome, Sweep};
 use sonard_model::geometry::DVec2;
 
 /// Settings of a line map.
@@ -26,7 +26,7 @@ pub struct LineMapSettings {
     pub opaque: bool,
     /// Contradicted length from which a sonar line is dropped entirely, and minimum length of
     /// the remainder of a cut line, metres.
-    pub least_rest_m: f64,
+    pub min_rest_m: f64,
     /// Fit of sonar segments.
     pub sonar: FitSettings,
     /// Fit of laser segments.
@@ -45,9 +45,9 @@ impl Default for LineMapSettings {
             laser_radius_m: 0.02,
             laser_logical_m: 2.0,
             opaque: true,
-            least_rest_m: 0.15,
+            min_rest_m: 0.15,
             sonar: FitSettings::default(),
-            laser: FitSettings { tolerance_m: 0.02, least_points: 5, least_length_m: 0.03 },
+            laser: FitSettings { tolerance_m: 0.02, min_points: 5, min_length_m: 0.03 },
             merge: MergeSettings::default(),
         }
     }
@@ -90,8 +90,8 @@ impl LineMap {
         let echoes: Vec<DVec2> = sweep
             .beams
             .iter()
-            .filter_map(|beam| match beam.heard {
-                Heard::Echo(range_m) => Some(sweep.point(beam, range_m)),
+            .filter_map(|beam| match beam.outcome {
+                BeamOutcome::Echo(range_m) => Some(sweep.point(beam, range_m)),
                 _ => None,
             })
             .collect();
@@ -160,7 +160,7 @@ impl LineMap {
 
     /// Cuts out of the sonar lines everything that the latest laser scan contradicts.
     fn cut_cleared(&mut self, latest: &LaserScan) {
-        let LineMapSettings { contradicts_m, laser_logical_m, least_rest_m, .. } = self.settings;
+        let LineMapSettings { contradicts_m, laser_logical_m, min_rest_m: least_rest_m, .. } = self.settings;
         let is_absent = |point| latest.clears(point, laser_logical_m, contradicts_m);
         let cut = |line: &MapLine| {
             if line.kind != LineKind::Sonar {
@@ -187,7 +187,7 @@ impl LineMap {
 
     /// Cuts out of the sonar lines everything close to the robot that is not detected there.
     fn cut_around(&mut self, robot: DVec2, detected: &[DVec2]) {
-        let LineMapSettings { known_m, contradicts_m, least_rest_m, .. } = self.settings;
+        let LineMapSettings { known_m, contradicts_m, min_rest_m: least_rest_m, .. } = self.settings;
         let lines = std::mem::take(&mut self.lines);
         let cut = |line: MapLine| {
             // Only a part of a specular wall returns an echo; it confirms the whole.

@@ -10,7 +10,7 @@ use super::{
     FitSettings, LaserReturn, LaserScan, LineKind, LineMap, LineMapSettings, MAX_ERROR_M, MapLine,
     MergeSettings, clusters, fit, map_error, merge,
 };
-use crate::interpret::{Beam, Heard, Sweep};
+use crate::interpret::{SweepBeam, BeamOutcome, Sweep};
 use sonard_model::geometry::{DVec2, Pose};
 
 /// Graph by definition, from all pairs.
@@ -185,8 +185,8 @@ fn distant_or_crossing_lines_stay_two() {
 fn sweep(place: DVec2, points: &[DVec2]) -> Sweep {
     let beams = (0..).zip(points).map(|(index, point)| {
         let off = *point - place;
-        let (azimuth_deg, outcome) = (off.to_angle().to_degrees(), Heard::Echo(off.length()));
-        Beam { azimuth_deg, index, heard: outcome, mount: DVec2::ZERO }
+        let (azimuth_deg, outcome) = (off.to_angle().to_degrees(), BeamOutcome::Echo(off.length()));
+        SweepBeam { azimuth_deg, index, outcome, mount: DVec2::ZERO }
     });
     let pose = Pose { x_m: place.x, y_m: place.y, heading_deg: 0.0 };
     Sweep { pose, step_deg: 0.9, beams: beams.collect(), closed: true }

@@ -2,7 +2,7 @@
 
 use thiserror::Error;
 
-use super::{Assessor, ENOUGH_SCANS, Mapping, bounds, union};
+use super::{Assessor, ENOUGH_SCANS, MapSettings, bounds, union};
 use crate::interpret::{
     Extents, Sweep,
     grid::{Grid, GridError, GridShape, ScanEvidence, Tiles},
@@ -24,7 +24,7 @@ const MAX_FEATURES: usize = 4096;
 /// allowed cell, up to 4096 features, and the first five scans.
 #[derive(Debug)]
 pub struct GrowingMap {
-    mapping: Mapping,
+    mapping: MapSettings,
     max_range_m: f64,
     assessor: Assessor,
     max_cells: usize,
@@ -57,8 +57,8 @@ impl GrowingMap {
     /// Empty map for a sensor of these extents with a maximum number of cells; `of_array` for
     /// several fixed rangers. The region of the settings is ignored.
     #[must_use]
-    pub fn new(mapping: Mapping, extents: Extents, of_array: bool, max_cells: usize) -> Self {
-        let mapping = Mapping { region: None, ..mapping };
+    pub fn new(mapping: MapSettings, extents: Extents, of_array: bool, max_cells: usize) -> Self {
+        let mapping = MapSettings { region: None, ..mapping };
         Self {
             max_range_m: mapping.max_range_m(&extents),
             assessor: Assessor::new(&mapping, extents, of_array),
@@ -136,7 +136,7 @@ mod tests {
     };
 
     use super::*;
-    use crate::interpret::{Beam, Heard, mapping::Mapper};
+    use crate::interpret::{SweepBeam, BeamOutcome, mapping::Mapper};
 
     fn extents() -> Extents {
         let sensor = Sensor::preset("senscomp-6500").expect("a preset");
@@ -148,19 +148,19 @@ mod tests {
         let along = f64::from(number);
         let beams = (0..100).map(|index| {
             let outcome = match (index + 7 * number) % 9 {
-                0 => Heard::Silent,
-                1 => Heard::Near,
-                _ => Heard::Echo(1.5 + 0.8 * (0.13 * f64::from(index) + 0.7 * along).sin()),
+                0 => BeamOutcome::NoEcho,
+                1 => BeamOutcome::BelowMinRange,
+                _ => BeamOutcome::Echo(1.5 + 0.8 * (0.13 * f64::from(index) + 0.7 * along).sin()),
             };
             let mount = if index % 2 == 0 { DVec2::ZERO } else { DVec2::new(0.1, -0.03) };
-            Beam { azimuth_deg: 3.6 * f64::from(index), index, heard: outcome, mount }
+            SweepBeam { azimuth_deg: 3.6 * f64::from(index), index, outcome, mount }
         });
         let (x_m, y_m) = (-3.0 + 0.61 * along, 0.4 * along.sin());
         let pose = Pose { x_m, y_m, heading_deg: 31.0 * along };
         Sweep { pose, step_deg: 3.6, beams: beams.collect(), closed: true }
     }
 
-    fn all_at_once(mapping: &Mapping, of_array: bool, sweeps: &[Sweep]) -> Grid {
+    fn all_at_once(mapping: &MapSettings, of_array: bool, sweeps: &[Sweep]) -> Grid {
         let shape = mapping.shape(sweeps, mapping.max_range_m(&extents())).expect("a grid");
         let mut mapper = Mapper::new(mapping, Grid::new(shape), extents(), of_array, sweeps.len());
         sweeps.iter().for_each(|sweep| drop(mapper.add(sweep)));
@@ -169,8 +169,8 @@ mod tests {
 
     #[test]
     fn each_step_equals_a_full_rebuild() {
-        let coarse = Mapping { resolution_m: 0.13, predicts_features: false, ..Mapping::default() };
-        for (mapping, of_array) in [(Mapping::default(), false), (coarse, true)] {
+        let coarse = MapSettings { resolution_m: 0.13, predicts_features: false, ..MapSettings::default() };
+        for (mapping, of_array) in [(MapSettings::default(), false), (coarse, true)] {
             let mut growing = GrowingMap::new(mapping, extents(), of_array, 100_000);
             let mut sweeps = Vec::new();
             for number in 0..12 {
@@ -185,7 +185,7 @@ mod tests {
 
     #[test]
     fn too_large_a_place_ends_it() {
-        let mut growing = GrowingMap::new(Mapping::default(), extents(), false, 10_000);
+        let mut growing = GrowingMap::new(MapSettings::default(), extents(), false, 10_000);
         let error = (0..).map(|number| growing.add(sweep(number))).find_map(Result::err);
         assert_eq!(error, Some(GrowError::TooManyCells { max: 10_000 }));
         assert!((1..=40_000).contains(&growing.tiles.kept()), "{}", growing.tiles.kept());
@@ -195,10 +195,10 @@ mod tests {
     fn scattered_rangers_stay_in_bounds() {
         let beams = (0..4096).map(|index| {
             let mount = DVec2::new(f64::from(index), 0.0) * 20.0;
-            Beam { azimuth_deg: 1.0, index, heard: Heard::Silent, mount }
+            SweepBeam { azimuth_deg: 1.0, index, outcome: BeamOutcome::NoEcho, mount }
         });
         let scattered = Sweep { beams: beams.collect(), ..sweep(0) };
-        let mut growing = GrowingMap::new(Mapping::default(), extents(), true, 100_000);
+        let mut growing = GrowingMap::new(MapSettings::default(), extents(), true, 100_000);
         assert!(matches!(growing.add(scattered), Err(GrowError::TooManyCells { .. })));
         assert!(growing.tiles.kept() <= 4 * 100_000);
     }
@@ -206,7 +206,7 @@ mod tests {
     #[test]
     fn invalid_poses_are_rejected() {
         let at = |x_m: f64| {
-            let mut growing = GrowingMap::new(Mapping::default(), extents(), false, 100_000);
+            let mut growing = GrowingMap::new(MapSettings::default(), extents(), false, 100_000);
             growing.add(Sweep { pose: Pose { x_m, ..sweep(0).pose }, ..sweep(0) })
         };
         for x_m in [1e300, f64::INFINITY, f64::NAN] {

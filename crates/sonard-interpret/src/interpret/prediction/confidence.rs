@@ -4,7 +4,7 @@
 /// perpendicular. `part` is the angle from the feature's normal over `omega`, 0 to 1;
 /// the result is 0.25 to 0.5.
 #[must_use]
-pub fn of_angle(part: f64) -> f64 {
+pub fn confidence_by_angle(part: f64) -> f64 {
     (1.0 + part.clamp(0.0, 1.0)) / 4.0
 }
 
@@ -12,7 +12,7 @@ pub fn of_angle(part: f64) -> f64 {
 /// features, behind which more space would wrongly be mapped as free. `part` is the distance of
 /// the feature over the range of the reading, 0 to 1; the result is 0 to 0.5.
 #[must_use]
-pub fn of_distance(part: f64, exponent: f64) -> f64 {
+pub fn confidence_by_distance(part: f64, exponent: f64) -> f64 {
     part.clamp(0.0, 1.0).powf(exponent) / 2.0
 }
 

@@ -8,7 +8,7 @@ const NORMAL_TOLERANCE_RAD: f64 = 0.05;
 
 /// Straight section of wall with the possible directions of its normal.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Line {
+pub struct PredictedWall {
     /// Start point, metres.
     pub a: DVec2,
     /// End point, metres.
@@ -23,14 +23,14 @@ pub struct Line {
     pub seen_from: DVec2,
     /// Maximum extension beyond `a` and `b`, metres: short where the wall was split for a missing
     /// echo, infinite where nothing is known.
-    pub may_go_on_m: [f64; 2],
+    pub max_extension_m: [f64; 2],
     /// Readings of the current scan that belong to the feature, in ascending order.
     pub readings: Vec<u32>,
     /// Ranger position and mean range, for a feature of a single scan.
     reference: Option<(DVec2, f64)>,
 }
 
-impl Line {
+impl PredictedWall {
     /// Feature of one reading, across its beam and as long as the beam is wide there (step 1); the
     /// normal may deviate from the beam's axis by `spread_rad`.
     pub(super) fn from_reading(
@@ -47,7 +47,7 @@ impl Line {
             normal_rad: axis_rad,
             spread_rad,
             support: 1.0,
-            may_go_on_m: [f64::INFINITY; 2],
+            max_extension_m: [f64::INFINITY; 2],
             seen_from: from,
             readings: vec![index],
             reference: Some((from, range_m)),
@@ -97,9 +97,9 @@ impl Line {
         let place = |along_m: f64| offset_m * normal + along_m * normal.perp();
         let [start, end] = [low.min(other_low), high.max(other_high)];
         // Bounds on the extension apply to the whole, unless it was seen farther out.
-        let min_m = (low - self.may_go_on_m[0]).max(other_low - other.may_go_on_m[0]);
-        let max_m = (high + self.may_go_on_m[1]).min(other_high + other.may_go_on_m[1]);
-        self.may_go_on_m = [(start - min_m).max(0.0), (max_m - end).max(0.0)];
+        let min_m = (low - self.max_extension_m[0]).max(other_low - other.max_extension_m[0]);
+        let max_m = (high + self.max_extension_m[1]).min(other_high + other.max_extension_m[1]);
+        self.max_extension_m = [(start - min_m).max(0.0), (max_m - end).max(0.0)];
         (self.a, self.b) = (place(start), place(end));
         (self.normal_rad, self.spread_rad) = (normal_rad, spread_rad);
         self.support = support;
@@ -126,9 +126,9 @@ impl Line {
         let part = |a: DVec2, b: DVec2, may_go_on_m: [f64; 2]| {
             let forward = (b - a).dot(along) > 0.0;
             let b = if forward { b } else { a };
-            Self { a, b, may_go_on_m, ..self.clone() }
+            Self { a, b, max_extension_m: may_go_on_m, ..self.clone() }
         };
-        let [before, after] = self.may_go_on_m;
+        let [before, after] = self.max_extension_m;
         [
             part(self.a, at - shorten_m * along, [before, end_m]),
             part(at + shorten_m * along, self.b, [end_m, after]),

@@ -1,11 +1,11 @@
 //! Intersection of beams with a predicted feature.
 
-use super::{Line, SonarBeam};
+use super::{PredictedWall, SonarBeam};
 use sonard_model::geometry::DVec2;
 
 /// Predicted feature with the quantities that every beam needs precomputed.
 pub(super) struct Obstacle<'a> {
-    pub(super) line: &'a Line,
+    pub(super) line: &'a PredictedWall,
     /// Vector from the start to the end, metres.
     along: DVec2,
     /// Unit normal.
@@ -19,14 +19,14 @@ pub(super) struct Obstacle<'a> {
 impl<'a> Obstacle<'a> {
     /// Obstacles for the features of a map, with an optional extension of up to `extend_m` beyond
     /// their ends.
-    pub(super) fn all(map: &'a [Line], extend_m: f64) -> Vec<Self> {
+    pub(super) fn all(map: &'a [PredictedWall], extend_m: f64) -> Vec<Self> {
         map.iter().map(|line| Self::new(line, extend_m)).collect()
     }
 
-    pub(super) fn new(line: &'a Line, extend_m: f64) -> Self {
+    pub(super) fn new(line: &'a PredictedWall, extend_m: f64) -> Self {
         let along = line.b - line.a;
         let length_m = along.length().max(f64::MIN_POSITIVE);
-        let beyond = line.may_go_on_m.map(|max_m| extend_m.clamp(0.0, max_m) / length_m);
+        let beyond = line.max_extension_m.map(|max_m| extend_m.clamp(0.0, max_m) / length_m);
         let outer = [line.a - beyond[0] * along, line.b + beyond[1] * along];
         Self { line, along, normal: DVec2::from_angle(line.normal_rad), outer, beyond }
     }

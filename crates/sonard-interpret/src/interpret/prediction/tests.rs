@@ -2,18 +2,18 @@
 
 mod course;
 
-use super::{FeaturePrediction, PredictionSettings, combine, of_angle, of_distance};
-use crate::interpret::{Beam, Heard, Sweep};
+use super::{FeaturePrediction, PredictionSettings, combine, confidence_by_angle, confidence_by_distance};
+use crate::interpret::{SweepBeam, BeamOutcome, Sweep};
 use sonard_model::geometry::{DVec2, Pose};
 
 const MAX_RANGE_M: f64 = 5.0;
 
 /// Ring of readings: azimuth and range, 0 for no echo.
 fn ring(pose: Pose, readings: &[(f64, f64)]) -> Sweep {
-    let beam = |(index, &(azimuth_deg, range_m)): (u32, &(f64, f64))| Beam {
+    let beam = |(index, &(azimuth_deg, range_m)): (u32, &(f64, f64))| SweepBeam {
         azimuth_deg,
         index,
-        heard: if range_m > 0.0 { Heard::Echo(range_m) } else { Heard::Silent },
+        outcome: if range_m > 0.0 { BeamOutcome::Echo(range_m) } else { BeamOutcome::NoEcho },
         mount: DVec2::ZERO,
     };
     let beams = (0..).zip(readings).map(beam).collect();
@@ -28,10 +28,10 @@ fn prediction() -> FeaturePrediction {
 
 #[test]
 fn confidences_are_within_stated_ranges() {
-    assert_eq!((of_angle(0.0), of_angle(1.0)), (0.25, 0.5));
-    assert_eq!((of_distance(0.0, 2.0), of_distance(1.0, 2.0)), (0.0, 0.5));
-    assert_eq!(of_distance(0.5, 2.0), 0.125);
-    assert_eq!(of_distance(0.5, 1.0), 0.25);
+    assert_eq!((confidence_by_angle(0.0), confidence_by_angle(1.0)), (0.25, 0.5));
+    assert_eq!((confidence_by_distance(0.0, 2.0), confidence_by_distance(1.0, 2.0)), (0.0, 0.5));
+    assert_eq!(confidence_by_distance(0.5, 2.0), 0.125);
+    assert_eq!(confidence_by_distance(0.5, 1.0), 0.25);
     for confidence in [0.0, 0.1, 0.3, 0.5] {
         assert!((combine(0.5, confidence) - confidence).abs() < 1e-15, "0.5 is neutral");
     }
@@ -92,7 +92,7 @@ fn undetected_wall_is_split() {
     prediction.assess(&ring(ORIGIN, &[(0.0, 0.0)]));
     let parts = prediction.local();
     assert_eq!(parts.len(), 2, "{parts:?}");
-    let shortened_m = before_m - parts.iter().map(super::Line::length_m).sum::<f64>();
+    let shortened_m = before_m - parts.iter().map(super::PredictedWall::length_m).sum::<f64>();
     assert!((shortened_m - 0.1).abs() < 1e-9);
     for turn_deg in [-10.0, -5.0, 5.0, 10.0, -14.0, 14.0, -17.0, 17.0, -19.0, 19.0, -21.0, 21.0] {
         prediction.assess(&ring(Pose { heading_deg: turn_deg, ..ORIGIN }, &[(0.0, 0.0)]));
@@ -160,6 +160,6 @@ fn empty_and_near_readings_are_neutral() {
     let mut prediction = prediction();
     assert_eq!(prediction.assess(&ring(ORIGIN, &[])), []);
     let mut near = ring(ORIGIN, &[(0.0, 1.0), (5.0, 0.0)]);
-    near.beams[1].heard = Heard::Near;
+    near.beams[1].outcome = BeamOutcome::BelowMinRange;
     assert_eq!(prediction.assess(&near)[1].confidence, 0.5);
 }

@@ -4,7 +4,7 @@ use uuid::Uuid;
 
 use super::{features, scan, simulator};
 use crate::interpret::{
-    Extents, FeatureKind, Heard, Reason, Settings, Sweep, SweepError, interpret,
+    Extents, FeatureKind, BeamOutcome, Reason, InterpretSettings, Sweep, SweepError, interpret,
 };
 use sonard_model::{
     geometry::{Pose, wrap_360},
@@ -41,26 +41,26 @@ fn no_echo_yields_no_features() {
     for ping in &mut empty.pings {
         (ping.status, ping.range_m) = (PingStatus::NoEcho, None);
     }
-    assert_eq!(features(&[empty], &Settings::default()), []);
-    assert_eq!(interpret(&[], &extents(), &Settings::default()), []);
+    assert_eq!(features(&[empty], &InterpretSettings::default()), []);
+    assert_eq!(interpret(&[], &extents(), &InterpretSettings::default()), []);
 }
 
 fn extents() -> Extents {
-    Extents::of_session(fig13().session.as_ref().expect("a session")).expect("figures")
+    Extents::from_session(fig13().session.as_ref().expect("a session")).expect("figures")
 }
 
 #[test]
 fn non_finite_readings_count_as_lost() {
     let mut scan = fig13();
-    let expected = features(std::slice::from_ref(&scan), &Settings::default()).len();
+    let expected = features(std::slice::from_ref(&scan), &InterpretSettings::default()).len();
     scan.pings[5].range_m = Some(f64::NAN);
     scan.pings[80].azimuth_deg = f64::INFINITY;
     scan.pings[150].status = PingStatus::LinkLost;
     scan.pings[160].range_m = Some(-3.0);
     let sweep = Sweep::from_scan(&scan).expect("a sweep");
     assert_eq!(sweep.beams.len(), 397);
-    assert!(!sweep.beams.iter().any(|beam| matches!(beam.heard, Heard::Echo(m) if m.is_nan())));
-    assert_eq!(features(&[scan], &Settings::default()).len(), expected);
+    assert!(!sweep.beams.iter().any(|beam| matches!(beam.outcome, BeamOutcome::Echo(m) if m.is_nan())));
+    assert_eq!(features(&[scan], &InterpretSettings::default()).len(), expected);
 }
 
 #[test]
@@ -72,7 +72,7 @@ fn same_position_does_not_decide() {
     for ping in &mut two.pings {
         ping.azimuth_deg = wrap_360(ping.azimuth_deg - 45.0);
     }
-    let features = features(&[one, two], &Settings::default());
+    let features = features(&[one, two], &InterpretSettings::default());
     assert_eq!(features.len(), 6);
     for feature in features.iter().filter(|feature| feature.extent_deg > 15.0) {
         assert_eq!(feature.kind, FeatureKind::Unresolved);
@@ -91,9 +91,9 @@ fn repeats_are_merged() {
         (odd.status, odd.range_m) = (PingStatus::Echo, Some(0.2));
         scan
     });
-    let features = features(&repeats, &Settings::default());
+    let features = features(&repeats, &InterpretSettings::default());
     assert_eq!(features.len(), 6, "{features:#?}");
-    let alone = super::features(&[fig13()], &Settings::default());
+    let alone = super::features(&[fig13()], &InterpretSettings::default());
     for (feature, alone) in features.iter().zip(&alone) {
         assert_eq!((feature.beams, feature.reason), (alone.beams, alone.reason));
         assert_eq!(feature.scan, Uuid::from_u128(1));
@@ -106,7 +106,7 @@ fn circle_around_the_ranger_is_no_arc() {
     for ping in &mut round.pings {
         (ping.status, ping.range_m) = (PingStatus::Echo, Some(1.0));
     }
-    let features = features(&[round], &Settings::default());
+    let features = features(&[round], &InterpretSettings::default());
     assert_eq!(features.len(), 1);
     assert_eq!(
         (features[0].kind, features[0].reason),
@@ -118,7 +118,7 @@ fn circle_around_the_ranger_is_no_arc() {
 fn partial_sweep_cuts_off_its_ends() {
     let mut part = fig13();
     part.pings.retain(|ping| ping.azimuth_deg < 75.0);
-    let features = features(&[part], &Settings::default());
+    let features = features(&[part], &InterpretSettings::default());
     let reasons: Vec<_> = features.iter().map(|feature| feature.reason).collect();
     assert_eq!(reasons, [Some(Reason::CutOff), None, Some(Reason::CutOff)]);
 }
@@ -129,7 +129,7 @@ fn covered_arc_is_interference() {
     for ping in &mut covered.pings[90..100] {
         (ping.status, ping.range_m) = (PingStatus::Echo, Some(0.3));
     }
-    let features = features(&[covered], &Settings::default());
+    let features = features(&[covered], &InterpretSettings::default());
     let plane = features.iter().find(|f| f.range_m.is_some_and(|m| (m - 0.7).abs() < 1e-3));
     assert_eq!(plane.and_then(|plane| plane.reason), Some(Reason::Interference));
 }
@@ -144,7 +144,7 @@ fn covered_second_view_is_interference() {
     let [one, two] =
         [(1, places[0]), (2, places[1])].map(|(number, at)| scan(&simulator, number, &at));
     let planes = |scans: &[ScanView]| -> Vec<_> {
-        let all = features(scans, &Settings::default()).into_iter();
+        let all = features(scans, &InterpretSettings::default()).into_iter();
         all.filter(|feature| feature.kind == FeatureKind::Plane).collect()
     };
     let seen = planes(&[one.clone(), two.clone()]);
@@ -161,7 +161,7 @@ fn covered_second_view_is_interference() {
         for ping in covered.pings.iter_mut().filter(|ping| is_before(ping)) {
             (ping.status, ping.range_m) = (PingStatus::Echo, Some(0.5 * range_m));
         }
-        let all = features(&[one.clone(), covered], &Settings::default());
+        let all = features(&[one.clone(), covered], &InterpretSettings::default());
         let again =
             all.iter().find(|feature| (feature.scan, feature.beams) == (plane.scan, plane.beams));
         let again = again.expect("the first scan is unchanged");

@@ -16,7 +16,7 @@ const SAMPLES: usize = 20_000;
 
 #[test]
 fn extent_error_is_equation_19() {
-    let error = UniformSum::of_extent([STEP; 2], 0.0);
+    let error = UniformSum::for_extent([STEP; 2], 0.0);
     for i in -12..=12 {
         let x = f64::from(i) * 0.1;
         let paper = if x.abs() < STEP { 1.0 / STEP - x.abs() / STEP.powi(2) } else { 0.0 };
@@ -27,7 +27,7 @@ fn extent_error_is_equation_19() {
 
 #[test]
 fn beta_error_is_equation_23() {
-    let error = UniformSum::of_beta([[STEP; 2]; 2], [0.0; 2], 0.0);
+    let error = UniformSum::for_beta([[STEP; 2]; 2], [0.0; 2], 0.0);
     let d4 = STEP.powi(4);
     for i in -11..=11 {
         let x = f64::from(i) * 0.1;
@@ -101,8 +101,8 @@ fn sampled_errors_follow_the_densities() {
             extent_errors.push(estimated - extent);
             beta_errors.push(first_middle - second_middle);
         }
-        let extent_error = UniformSum::of_extent([STEP; 2], sigma);
-        let beta_error = UniformSum::of_beta([[STEP; 2]; 2], [sigma; 2], 0.0);
+        let extent_error = UniformSum::for_extent([STEP; 2], sigma);
+        let beta_error = UniformSum::for_beta([[STEP; 2]; 2], [sigma; 2], 0.0);
         let far = ks_distance(extent_errors, |x| extent_error.cumulative(x));
         assert!(far < bound, "extent, sigma {sigma}: {far} against {bound}");
         let far = ks_distance(beta_errors, |x| beta_error.cumulative(x));
@@ -119,7 +119,7 @@ fn wrong_density_is_detected() {
             estimate(&mut rng, 3.0, extent, 0.0).1 - extent
         })
         .collect();
-    let wider = UniformSum::of_extent([STEP * 1.05; 2], 0.0);
+    let wider = UniformSum::for_extent([STEP * 1.05; 2], 0.0);
     let bound = KS_BOUND / (SAMPLES as f64).sqrt();
     assert!(ks_distance(samples, |x| wider.cumulative(x)) > bound);
 }

@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use super::{features, scan, simulator};
 use crate::interpret::{
-    Extents, Feature, FeatureKind, Probabilities, Reason, Settings, least_corner_m, least_plane_m,
-    least_translation_m,
+    Extents, Feature, FeatureKind, Probabilities, Reason, InterpretSettings, min_corner_m, min_plane_m,
+    min_translation_m,
 };
 use sonard_model::{
     acoustics::{Air, Sensor},
@@ -30,7 +30,7 @@ fn seen(poses: &[&str]) -> Vec<Feature> {
         .zip(1..)
         .map(|(name, number)| scan(&simulator, number, &scene.pose(name).expect("a pose")))
         .collect();
-    features(&scans, &Settings::default())
+    features(&scans, &InterpretSettings::default())
 }
 
 /// Feature in a direction, degrees.
@@ -76,11 +76,11 @@ fn largest_step_is_equation_20() {
 #[test]
 fn minimum_sizes_are_reproduced() {
     let extents = extents();
-    let delta_m = least_translation_m(2.0, STEP_DEG);
+    let delta_m = min_translation_m(2.0, STEP_DEG);
     assert!((delta_m - 0.0628).abs() < 1e-4);
-    let plane_m = least_plane_m(2.0, delta_m, extents.half_width_m());
+    let plane_m = min_plane_m(2.0, delta_m, extents.half_width_m());
     assert!((plane_m - 0.10).abs() < 0.005, "{plane_m}");
-    let corner_m = least_corner_m(11.8, extents.half_width_m());
+    let corner_m = min_corner_m(11.8, extents.half_width_m());
     assert!((corner_m - 0.043).abs() < 0.001, "{corner_m}");
 }
 
@@ -89,7 +89,7 @@ fn figure_14_satisfies_equation_25() {
     // asin(6.9 cm / r) = 6.8 degrees puts the paper's corner at 58 cm.
     let range_m = 0.069 / 6.8_f64.to_radians().sin();
     assert!((range_m - 0.583).abs() < 0.001);
-    assert!(least_translation_m(range_m, STEP_DEG) < 0.051);
+    assert!(min_translation_m(range_m, STEP_DEG) < 0.051);
 }
 
 #[test]
@@ -148,13 +148,13 @@ fn proposed_position_decides() {
     let scene = Arc::new(Scene::from_json(text).expect("a scene"));
     let simulator = simulator(scene.clone());
     let first = scan(&simulator, 1, &scene.pose("fig13").expect("a pose"));
-    let next = features(std::slice::from_ref(&first), &Settings::default())
+    let next = features(std::slice::from_ref(&first), &InterpretSettings::default())
         .iter()
         .find_map(|feature| feature.next)
         .expect("a proposal");
     let place = sonard_model::geometry::Pose { x_m: next.x_m, y_m: next.y_m, heading_deg: 0.0 };
     let both = [first, scan(&simulator, 2, &place)];
-    let kinds: Vec<_> = features(&both, &Settings::default()).iter().map(|f| f.kind).collect();
+    let kinds: Vec<_> = features(&both, &InterpretSettings::default()).iter().map(|f| f.kind).collect();
     let count = |kind| kinds.iter().filter(|k| **k == kind).count();
     assert_eq!((count(FeatureKind::Plane), count(FeatureKind::Corner)), (3, 1), "{kinds:?}");
     assert_eq!((count(FeatureKind::Edge), kinds.len()), (2, 6), "{kinds:?}");

@@ -74,7 +74,7 @@ fn array_beams_are_at_their_rangers() {
         let ranger = &array.rangers[beam.index as usize];
         let mount = DVec2::new(ranger.x_m, ranger.y_m);
         assert!(beam.mount.distance(mount) < 1e-5, "{beam:?} {ranger:?}");
-        let at = ranger.pose_on(&pose);
+        let at = ranger.world_pose(&pose);
         assert!(sweep.place(beam).distance(at.position()) < 1e-5, "{beam:?}");
         let along = DVec2::from_angle(at.direction_rad(0.0));
         let point = sweep.point(beam, 2.0) - sweep.place(beam);

@@ -6,7 +6,7 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
 use super::{features, scan, simulator};
-use crate::interpret::{Extents, Feature, FeatureKind, Settings};
+use crate::interpret::{Extents, Feature, FeatureKind, InterpretSettings};
 use sonard_model::{
     geometry::{DVec2, Pose, wrap_pi},
     model::Simulator,
@@ -236,7 +236,7 @@ enum Trial {
 }
 
 /// Scans a world from the origin and from each proposed position.
-fn explore(rng: &mut Pcg64, spoil: Option<Disturbance>, settings: &Settings) -> Trial {
+fn explore(rng: &mut Pcg64, spoil: Option<Disturbance>, settings: &InterpretSettings) -> Trial {
     let world = World::random(rng);
     let simulator = world.simulator();
     let extents = Extents::new(simulator.sensor(), simulator.air(), true).expect("figures");
@@ -274,7 +274,7 @@ fn is_classified(element: &Element, found: &[Feature]) -> bool {
 }
 
 /// Number of worlds within the constraints that are classified correctly, and the first failure.
-fn count_right(seed: u64, spoil: Option<Disturbance>, settings: &Settings) -> (usize, String) {
+fn count_right(seed: u64, spoil: Option<Disturbance>, settings: &InterpretSettings) -> (usize, String) {
     let mut rng = Pcg64::seed_from_u64(seed);
     let (mut right, mut fit, mut tried, mut first_wrong) = (0, 0, 0, String::new());
     while fit < WORLDS {
@@ -293,14 +293,14 @@ fn count_right(seed: u64, spoil: Option<Disturbance>, settings: &Settings) -> (u
 
 #[test]
 fn noiseless_worlds_are_all_correct() {
-    let (right, what) = count_right(1, None, &Settings::default());
+    let (right, what) = count_right(1, None, &InterpretSettings::default());
     assert_eq!(right, WORLDS, "{what}");
 }
 
 #[test]
 fn quantized_worlds_are_99_percent_correct() {
     let spoil = Disturbance { range_step_m: 0.001, azimuth_deg: 0.45 };
-    let mut settings = Settings::default();
+    let mut settings = InterpretSettings::default();
     settings.noise.azimuth_deg = 0.9 / 12_f64.sqrt();
     let (right, what) = count_right(2, Some(spoil), &settings);
     assert!(right * 100 >= 99 * WORLDS, "{what}");
@@ -325,7 +325,7 @@ fn crowded(rng: &mut Pcg64) -> (World, [ScanView; 2], Vec<Feature>) {
         let heading_deg = rng.random_range(0.0..360.0);
         take(&simulator, number, &Pose { x_m: at.x, y_m: at.y, heading_deg }, None)
     });
-    let found = features(&scans, &Settings::default());
+    let found = features(&scans, &InterpretSettings::default());
     (world, scans, found)
 }
 

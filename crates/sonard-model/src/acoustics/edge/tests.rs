@@ -196,7 +196,7 @@ fn at(view: &EdgeView, left_m: f64) -> Complex64 {
 #[test]
 fn view_compensates_lost_echo() {
     let view = near_the_end();
-    let (middle, share) = (at(&view, 0.0), view.shares());
+    let (middle, share) = (at(&view, 0.0), view.relative_field());
     for left_mm in -19..=19 {
         let left_m = 1e-3 * f64::from(left_mm);
         let excess = at(&view, left_m) - share(left_m, left_m) * middle;
@@ -208,7 +208,7 @@ fn view_compensates_lost_echo() {
 
 #[test]
 fn view_is_continuous() {
-    let share = near_the_end().shares();
+    let share = near_the_end().relative_field();
     let at = |i: i32| 1e-4 * f64::from(i);
     let shares: Vec<Complex64> = (-190..=190).map(|i| share(at(i), at(i))).collect();
     for pair in shares.windows(2) {

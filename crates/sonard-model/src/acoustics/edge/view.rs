@@ -29,7 +29,7 @@ impl EdgeView {
     /// Field relative to that from middle to middle, without the phase of the path difference. The
     /// arguments are the points of departure and arrival on the face, metres to the left when
     /// facing the direction of departure and of arrival.
-    pub fn shares(&self) -> impl Fn(f64, f64) -> Complex64 + use<> {
+    pub fn relative_field(&self) -> impl Fn(f64, f64) -> Complex64 + use<> {
         let view = *self;
         let field =
             move |aspect: &Aspect| view.wedge.uniform(aspect, &view.aspect, view.wave_number_per_m);
@@ -44,7 +44,7 @@ impl EdgeView {
 
     /// Path excess due to wavefront curvature, metres, to second order.
     #[must_use]
-    pub fn bend_m(&self, sent_m: f64, received_m: f64) -> f64 {
+    pub fn curvature_m(&self, sent_m: f64, received_m: f64) -> f64 {
         let [out_m, back_m] = self.legs_m;
         sent_m * sent_m / (2.0 * out_m) + received_m * received_m / (2.0 * back_m)
     }

@@ -5,14 +5,14 @@ use crate::reading::PingStatus;
 
 /// Receivers that differ only in their threshold, applied to one firing. The arrivals are summed
 /// once for all of them.
-pub struct Listening<'a> {
+pub struct DetectorBank<'a> {
     receiver: &'a Receiver,
     envelope: EnvelopeSum<'a>,
 }
 
 /// First rise of ECHO at one of the thresholds.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Rise {
+pub struct EchoRise {
     /// Outcome: `Echo` or `MinRange`.
     pub status: PingStatus,
     /// Half the detected path, or the range of the end of blanking, metres.
@@ -28,29 +28,29 @@ impl Receiver {
     /// Prepares the detection of one firing at several thresholds. Arrivals are known up to a
     /// round-trip length in metres; `incident` as for [`detect_at_face`](Self::detect_at_face).
     #[must_use]
-    pub fn listen<'a>(
+    pub fn detector_bank<'a>(
         &'a self,
         length_m: f64,
         arrivals: &'a [PulseArrival],
         incident: &'a dyn Fn(&PulseArrival) -> Option<Incident>,
-    ) -> Listening<'a> {
+    ) -> DetectorBank<'a> {
         let mut envelope = EnvelopeSum::new(self, arrivals, incident);
         envelope.limit_known_length(length_m);
-        Listening { receiver: self, envelope }
+        DetectorBank { receiver: self, envelope }
     }
 }
 
-impl Listening<'_> {
+impl DetectorBank<'_> {
     /// First rise of a receiver with `factor` times the threshold that cannot be raised before
     /// `ready_us`, microseconds; `None` without an echo.
     #[must_use]
-    pub fn rise(&mut self, factor: f64, ready_us: f64) -> Option<Rise> {
+    pub fn first_rise(&mut self, factor: f64, ready_us: f64) -> Option<EchoRise> {
         let receiver = self.receiver;
         let from_us = receiver.scan_start_us(ready_us);
         self.envelope.threshold_factor = factor;
         if let Some((passed_us, arrival)) = self.envelope.isolated_rise_at(from_us) {
             let (status, arrival) = (PingStatus::Echo, Some(arrival));
-            return Some(Rise { status, range_m: receiver.range_m(passed_us), arrival, passed_us });
+            return Some(EchoRise { status, range_m: receiver.range_m(passed_us), arrival, passed_us });
         }
         self.envelope.rewind_to(from_us);
         let at_us = self.envelope.next_rise(from_us)?;
@@ -62,27 +62,27 @@ impl Listening<'_> {
         };
         let range_m = receiver.range_m(at_us + later_us);
         let arrival = self.envelope.cause(at_us);
-        Some(Rise { status, range_m, arrival, passed_us: at_us })
+        Some(EchoRise { status, range_m, arrival, passed_us: at_us })
     }
 
     /// Returns `true` if the last rise belongs to an isolated arrival. Its detection then follows
     /// from the pulse shape alone at all higher thresholds for which the margin suffices. Always
     /// `false` for detectors that do not use the envelope.
     #[must_use]
-    pub fn is_lone(&self) -> bool {
+    pub fn is_isolated(&self) -> bool {
         self.envelope.is_isolated()
     }
 
     /// Peak of the envelope for the last rise, and its level above the threshold, decibels.
     #[must_use]
-    pub fn peak(&mut self, rise: &Rise) -> (f64, f64) {
+    pub fn peak(&mut self, rise: &EchoRise) -> (f64, f64) {
         self.receiver.peak(&mut self.envelope, rise.passed_us, rise.arrival.as_ref())
     }
 
     /// Maximum round-trip length, metres, of arrivals that can influence the results so far; `None`
     /// if unknown longer ones could.
     #[must_use]
-    pub fn needed_m(&self) -> Option<f64> {
+    pub fn max_relevant_length_m(&self) -> Option<f64> {
         (!self.envelope.exceeds_horizon()).then(|| self.envelope.needed_m())
     }
 }

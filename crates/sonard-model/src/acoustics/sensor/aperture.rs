@@ -113,7 +113,7 @@ impl Aperture {
 }
 
 fn check_points(points: &[BeamPoint]) -> Result<(), SensorError> {
-    let wrong = |field, value, expected| Err(SensorError::Figure { field, value, expected });
+    let wrong = |field, value, expected| Err(SensorError::OutOfRange { field, value, expected });
     let (angle, level) = ("aperture.points.angle_deg", "aperture.points.level_db");
     if points.len() < 2 {
         return wrong("aperture.points (how many)", points.len() as f64, "at least two");

@@ -34,5 +34,5 @@ pub(super) fn check_firings(firings: u32) -> Result<(), SensorError> {
         return Ok(());
     }
     let (field, value) = ("averaged_firings", f64::from(firings));
-    Err(SensorError::Figure { field, value, expected: "from 1 to 100" })
+    Err(SensorError::OutOfRange { field, value, expected: "from 1 to 100" })
 }

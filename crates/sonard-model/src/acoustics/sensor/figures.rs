@@ -47,5 +47,5 @@ fn hold(
     value: f64,
     expected: &'static str,
 ) -> Result<(), SensorError> {
-    if holds { Ok(()) } else { Err(SensorError::Figure { field, value, expected }) }
+    if holds { Ok(()) } else { Err(SensorError::OutOfRange { field, value, expected }) }
 }

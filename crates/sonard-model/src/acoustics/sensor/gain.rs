@@ -48,7 +48,7 @@ impl Default for Gain {
 impl Gain {
     /// Returns `true` if air absorption is compensated.
     #[must_use]
-    pub const fn makes_up_for_air(&self) -> bool {
+    pub const fn compensates_absorption(&self) -> bool {
         matches!(self, Self::Compensating { air: true, .. })
     }
 
@@ -70,12 +70,12 @@ impl Gain {
                 other => {
                     let value = other.unwrap_or(f64::NAN);
                     let expected = "later than the step before, and null for the last step only";
-                    return Err(SensorError::Figure { field, value, expected });
+                    return Err(SensorError::OutOfRange { field, value, expected });
                 }
             }
             if !step.gain_db.is_finite() {
                 let (field, value) = ("gain.steps.gain_db", step.gain_db);
-                return Err(SensorError::Figure { field, value, expected: "a finite number" });
+                return Err(SensorError::OutOfRange { field, value, expected: "a finite number" });
             }
         }
         Ok(())

@@ -30,7 +30,7 @@ impl Mounting {
     /// Positions of transmitter and receiver for a rotation axis at `axis` and a beam in
     /// `direction_rad`.
     #[must_use]
-    pub fn places(&self, axis: DVec2, direction_rad: f64) -> [DVec2; 2] {
+    pub fn transducer_positions(&self, axis: DVec2, direction_rad: f64) -> [DVec2; 2] {
         let turn = DVec2::from_angle(direction_rad);
         [0.5, -0.5].map(|side| {
             let left_m = self.left_m + side * self.separation_m;

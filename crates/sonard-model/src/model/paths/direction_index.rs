@@ -4,7 +4,7 @@
 use std::f64::consts::{PI, TAU};
 
 use super::{echo::PathEcho, pattern::PatternEnvelope};
-use crate::geometry::{turn_rad, wrap_pi};
+use crate::geometry::{signed_angle_rad, wrap_pi};
 
 /// Number of direction bins.
 const BINS: usize = 360;
@@ -45,7 +45,7 @@ impl DirectionEntry {
         envelope: &PatternEnvelope,
         floor: f64,
     ) -> Option<Self> {
-        let half_rad = 0.5 * turn_rad(echo.departure, echo.arrival);
+        let half_rad = 0.5 * signed_angle_rad(echo.departure, echo.arrival);
         let level = floor / echo.amplitude;
         let wide = envelope.reach_rad(level) - half_rad.abs();
         if wide < 0.0 {

@@ -239,7 +239,7 @@ impl<'a> PathArrivals<'a> {
                 PathKind::Diffracted | PathKind::Scattered => None,
             })
             .try_fold(passages, |sum, count| Some(sum + count?))
-            .map_or(Image::Lost, mirrored)
+            .map_or(Image::PointScatterer, mirrored)
     }
 }
 

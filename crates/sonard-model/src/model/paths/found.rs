@@ -106,9 +106,9 @@ impl FoundEchoes {
             PathKind::Specular => mirrored(paths.reflection_count(traced, echo)),
             PathKind::Diffracted => {
                 let view = single::view(&paths.plan, &traced.out, traced.back(), echo);
-                view.map_or(Image::Lost, Image::Bent)
+                view.map_or(Image::PointScatterer, Image::Diffracted)
             }
-            PathKind::Scattered => Image::Lost,
+            PathKind::Scattered => Image::PointScatterer,
         };
         let [leaving_rad, arriving_rad] = [
             wrap_pi(echo.departure.to_angle() - axes_rad[0]),

@@ -65,7 +65,7 @@ impl Paths {
 /// Prepares the floor plan of the objects at relevant heights.
 fn plan(scene: &Scene, drawn: &FloorPlan, heights: &Heights, settings: Settings) -> TracingPlan {
     let is_there = |wall: u32| heights.is_relevant(scene.walls[wall as usize].z_m);
-    let mut arrangement: Arrangement = drawn.of_walls(is_there);
+    let mut arrangement: Arrangement = drawn.restricted_to(is_there);
     let segments: &[(DVec2, DVec2)] = &drawn.walls;
     let gains: Vec<_> = scene.walls.iter().map(|wall| mirror_gain(&wall.material)).collect();
     let climbs = heights.climbs(&settings);

@@ -121,8 +121,8 @@ pub(super) fn wall_contacts(
         .walls_back(&plan.walls, leg)
         .map(|wall| {
             let mirror = &plan.walls[wall as usize].mirror;
-            to -= mirror.height_m(to) / mirror.normal.dot(run) * run;
-            run = mirror.turn(run);
+            to -= mirror.signed_distance_m(to) / mirror.normal.dot(run) * run;
+            run = mirror.image_of_direction(run);
             (to, Mechanism::Reflection(Reflector::Wall(wall)))
         })
         .collect();

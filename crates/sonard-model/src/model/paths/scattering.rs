@@ -101,7 +101,7 @@ impl<'a> LitPart<'a> {
         let LitWall { beam, wall, span_m: [low_m, high_m] } = lit;
         let wall_mirror = &plan.walls[*wall as usize];
         let Mirror { normal, .. } = wall_mirror.mirror;
-        let height_m = wall_mirror.mirror.height_m(beam.image);
+        let height_m = wall_mirror.mirror.signed_distance_m(beam.image);
         if height_m == 0.0 || !is_viable(&plan.settings, beam, wall_mirror, height_m.abs()) {
             return None;
         }

@@ -73,7 +73,7 @@ fn unrestricted_m(receiver: &Receiver) -> f64 {
 }
 
 fn absorption_db_per_m(sensor: &Sensor, air: &Air, lossless: bool) -> f64 {
-    if lossless || sensor.gain.makes_up_for_air() {
+    if lossless || sensor.gain.compensates_absorption() {
         return 0.0;
     }
     air.absorption_db_per_m(sensor.frequency_hz)

@@ -56,7 +56,7 @@ fn rangers_equal_single_rangers() {
     let robot = Pose { x_m: 1.1, y_m: 1.7, heading_deg: 37.0 };
     let placed = model.at(robot).expect("a pose");
     for (at, ranger) in model.array().rangers.iter().enumerate() {
-        let pose = ranger.pose_on(&robot);
+        let pose = ranger.world_pose(&robot);
         let alone = single.at(pose.position()).ping(pose.direction_rad(0.0)).expect("few paths");
         assert_eq!(placed.ping(at).expect("few paths"), alone, "{}", ranger.id);
     }
@@ -104,7 +104,7 @@ fn body_moves_and_blocks() {
             assert!(off_m.is_some_and(|m| m < 0.01), "{ranger}: {own:?} {alone:?}");
         }
         // No arrival has passed through the body.
-        let mounted = with.array().rangers[0].pose_on(&robot);
+        let mounted = with.array().rangers[0].world_pose(&robot);
         let point = placed.simulator(0).at(mounted.position());
         for arrival in point.arrivals(mounted.direction_rad(0.0)).expect("few paths") {
             let through = std::f64::consts::PI + mounted.direction_rad(0.0);

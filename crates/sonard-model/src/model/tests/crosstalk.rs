@@ -6,7 +6,7 @@ use proptest::prelude::*;
 
 use crate::{
     acoustics::{Air, Sensor},
-    array::{MountedRanger, OtherFiring, RangerArray, Turn},
+    array::{MountedRanger, InterferingFiring, RangerArray, FiringSlot},
     geometry::Pose,
     model::{ArrayModel, Options, PathOptions, Prediction, Simulator},
     reading::PingStatus,
@@ -27,7 +27,7 @@ fn wall(wall_m: f64) -> Scene {
 }
 
 /// Rangers that all point to +x, at these offsets to the left.
-fn side_by_side(left_m: &[f64], interval_ms: f64, order: Vec<Turn>) -> RangerArray {
+fn side_by_side(left_m: &[f64], interval_ms: f64, order: Vec<FiringSlot>) -> RangerArray {
     let ranger = |(number, &y_m): (usize, &f64)| MountedRanger {
         id: format!("s{number}"),
         x_m: 0.0,
@@ -72,7 +72,7 @@ fn ghost_of_the_previous_slot() {
     assert_eq!(prediction.status, PingStatus::Echo);
     let range_m = prediction.range_m.expect("a range");
     assert!((range_m - 0.5 * (length_m - 3.4)).abs() < 1e-9, "{range_m}");
-    let other = OtherFiring { ranger: 0, before_us: 10_000.0 };
+    let other = InterferingFiring { ranger: 0, before_us: 10_000.0 };
     assert_eq!(prediction.crosstalk, Some(other));
     let arrival = prediction.arrival.expect("an arrival");
     assert!((arrival.length_m - length_m).abs() < 1e-9, "{}", arrival.length_m);
@@ -92,7 +92,7 @@ fn ghost_of_its_own_last_round() {
     let prediction = predict(&model(array.clone(), &scene, PathOptions::default()), ORIGIN, 0);
     let range_m = prediction.range_m.expect("a ghost");
     assert!((range_m - 1.3).abs() < 1e-9, "{range_m}");
-    assert_eq!(prediction.crosstalk, Some(OtherFiring { ranger: 0, before_us: 10_000.0 }));
+    assert_eq!(prediction.crosstalk, Some(InterferingFiring { ranger: 0, before_us: 10_000.0 }));
     let alone = PathOptions { without_crosstalk: true, ..PathOptions::default() };
     let prediction = predict(&model(array, &scene, alone), ORIGIN, 0);
     assert_eq!((prediction.status, prediction.crosstalk), (PingStatus::NoEcho, None));
@@ -104,7 +104,7 @@ fn ghost_of_its_own_last_round() {
 /// applies once.
 #[test]
 fn simultaneous_firing() {
-    let together = vec![Turn::Together(vec!["s0".into(), "s1".into()])];
+    let together = vec![FiringSlot::Simultaneous(vec!["s0".into(), "s1".into()])];
     let mut array = side_by_side(&[0.1, -0.1], 100.0, together);
     let both = model(array.clone(), &wall(3.0), PathOptions::default());
     for firing in [0, 1] {
@@ -120,7 +120,7 @@ fn simultaneous_firing() {
     array.rangers[1].bearing_deg = -away_rad.to_degrees();
     let turned = model(array, &wall(3.0), PathOptions::default());
     let prediction = predict(&turned, ORIGIN, 1);
-    assert_eq!(prediction.crosstalk, Some(OtherFiring { ranger: 0, before_us: 0.0 }));
+    assert_eq!(prediction.crosstalk, Some(InterferingFiring { ranger: 0, before_us: 0.0 }));
     let range_m = prediction.range_m.expect("the wall");
     assert!((range_m - f64::hypot(3.0, 0.1)).abs() < 1e-9, "{range_m}");
 }
@@ -128,7 +128,7 @@ fn simultaneous_firing() {
 /// Two that face each other, 2 m apart, receive each other directly: half the distance.
 #[test]
 fn direct_path_of_facing_rangers() {
-    let together = vec![Turn::Together(vec!["s0".into(), "s1".into()])];
+    let together = vec![FiringSlot::Simultaneous(vec!["s0".into(), "s1".into()])];
     let mut array = side_by_side(&[0.0, 0.0], 50.0, together);
     (array.rangers[1].x_m, array.rangers[1].bearing_deg) = (2.0, 180.0);
     let open = Scene::builder("open").build().expect("a scene");
@@ -146,7 +146,7 @@ fn direct_path_of_facing_rangers() {
 /// Above a floor the direct path comes first, followed by its mirror image by the floor.
 #[test]
 fn direct_path_by_the_floor() {
-    let together = vec![Turn::Together(vec!["s0".into(), "s1".into()])];
+    let together = vec![FiringSlot::Simultaneous(vec!["s0".into(), "s1".into()])];
     let mut array = side_by_side(&[0.0, 0.0], 100.0, together);
     (array.rangers[1].x_m, array.rangers[1].bearing_deg) = (2.0, 180.0);
     array.rangers.iter_mut().for_each(|ranger| ranger.z_m = Some(0.5));
@@ -227,13 +227,13 @@ proptest! {
         if tilted {
             (scene.floor_z_m, scene.ceiling_z_m) = (Some(0.0), Some(2.4));
         }
-        let together = vec![Turn::Together(vec!["s0".into(), "s1".into()])];
+        let together = vec![FiringSlot::Simultaneous(vec!["s0".into(), "s1".into()])];
         let mut array = side_by_side(&[0.0, 0.0], 20.0, together);
         for (ranger, (x_m, y_m, bearing_deg)) in array.rangers.iter_mut().zip(places) {
             (ranger.x_m, ranger.y_m, ranger.bearing_deg) = (x_m, y_m, bearing_deg);
         }
         let can_stand =
-            |ranger: &MountedRanger| scene.check_pose(&ranger.pose_on(&ORIGIN)).is_ok();
+            |ranger: &MountedRanger| scene.check_pose(&ranger.world_pose(&ORIGIN)).is_ok();
         prop_assume!(array.rangers.iter().all(can_stand));
         let model = model(array, &scene, PathOptions::default());
         let placed = model.at(ORIGIN).expect("a pose");

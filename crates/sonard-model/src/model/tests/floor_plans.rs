@@ -10,7 +10,7 @@ use rand_pcg::Pcg64;
 use super::*;
 use crate::{
     model::{Mechanism, Prediction},
-    plan::ScanPlan,
+    scan_plan::ScanPlan,
     scene::DEFAULT_SNAP_M,
 };
 

@@ -42,7 +42,7 @@ struct Room {
 
 impl Room {
     fn new(scene: &Scene, z_m: Option<f64>) -> Self {
-        Self { scene: scene.floor_plan().scene(scene), z_m }
+        Self { scene: scene.floor_plan().planned_scene(scene), z_m }
     }
 
     /// Checks that a path obeys the laws; `length_off_m` is the tolerance of its length.
@@ -99,7 +99,7 @@ impl Room {
             // Beyond its end, its neighbour in the plan may have been snapped to it.
             let beyond_m = distance_to_segment(point, wall.a, wall.b);
             assert!(beyond_m < 1e-4, "{interaction:?} {beyond_m}");
-            self.mirror(index).height_m(point).abs().max(off_height_m)
+            self.mirror(index).signed_distance_m(point).abs().max(off_height_m)
         };
         let off_z_m = |wanted_m: Option<f64>| {
             z_m.zip(wanted_m).map_or(f64::INFINITY, |(is, should)| (is - should).abs())
@@ -321,7 +321,7 @@ struct FanRounds {
 fn check_arrival(simulator: &Simulator, arrival: &Arrival, at: DVec2, fan_rounds: &mut FanRounds) {
     let (path, ends) = (&arrival.path, [at; 2]);
     let drawn = simulator.scene();
-    let plan = Room { scene: drawn.ray_plan().scene(drawn), z_m: None };
+    let plan = Room { scene: drawn.ray_plan().planned_scene(drawn), z_m: None };
     let off_m = || length_m(&points(path, ends, None)) - arrival.length_m;
     let round =
         path.reflectors().filter(|reflector| matches!(reflector, Reflector::Cylinder(_))).count();

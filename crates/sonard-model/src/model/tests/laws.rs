@@ -5,7 +5,7 @@ use proptest::prelude::*;
 use super::*;
 use crate::{
     model::{Mechanism, Prediction},
-    plan::ScanPlan,
+    scan_plan::ScanPlan,
 };
 
 /// A room with a slanted partition and a post, and a place in it.

@@ -40,7 +40,7 @@ fn check(scene: &str, sensor: &str, max_range_m: f64) -> usize {
             let together = point.hear(direction_rad, |firing| {
                 firing.listen(usual, |listening| {
                     factors.map(|by| {
-                        let rise = listening.rise(by, 0.0);
+                        let rise = listening.first_rise(by, 0.0);
                         (rise, rise.map(|rise| listening.peak(&rise)))
                     })
                 })

@@ -3,7 +3,7 @@
 use super::*;
 use crate::{
     model::{Mechanism, Prediction},
-    plan::ScanPlan,
+    scan_plan::ScanPlan,
     reading::PingStatus,
 };
 

@@ -1,6 +1,6 @@
 use proptest::prelude::*;
 use serde_json::{Value, json};
-use sonard_export::{Live, Settings};
+use sonard_export::{LiveConverter, ExportSettings};
 use sonard_records::{Record, decode_line};
 
 use super::*;
@@ -9,10 +9,10 @@ const LOG: &str = include_str!("../../../../../../tests/fixtures/small.jsonl");
 
 /// Topics of a scanning ranger.
 fn topics() -> Vec<Topic> {
-    let mut live = Live::new(Settings::default());
+    let mut live = LiveConverter::new(ExportSettings::default());
     let record = decode_line(LOG.lines().next().expect("a session").as_bytes()).expect("clean");
     assert!(matches!(record, Record::Session(_)));
-    live.take(record, |_| ()).expect("a whole session");
+    live.convert(record, |_| ()).expect("a whole session");
     live.topics().to_vec()
 }
 

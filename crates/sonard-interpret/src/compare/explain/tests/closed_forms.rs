@@ -7,7 +7,7 @@ use sonard_records::{
 };
 
 use super::{
-    super::{Explainer, Quantity, fit::fit},
+    super::{Explainer, ChangedQuantity, fit::fit},
     World,
 };
 
@@ -38,9 +38,9 @@ fn linear_changes_are_exact() {
     });
     let found = fit(all).expect("enough");
     assert!((found.value - truth).length() < 2e-5, "{found:?}");
-    let percent = found.estimate(Quantity::Percent, 2);
+    let percent = found.estimate(ChangedQuantity::Percent, 2);
     assert_eq!((percent.value, percent.sigma), (100.0 * found.value.z, 100.0 * found.sigma.z));
-    let y = found.estimate(Quantity::YM, 1);
+    let y = found.estimate(ChangedQuantity::YM, 1);
     assert_eq!((y.value, y.sigma), (found.value.y, found.sigma.y));
 }
 

@@ -62,7 +62,7 @@ impl ActivePulse {
             has_field: false,
             strength,
             with_others: others + strength,
-            steepest: size * own.steepest(),
+            steepest: size * own.max_slope(),
             shape,
         }
     }

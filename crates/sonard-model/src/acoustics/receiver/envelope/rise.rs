@@ -203,7 +203,7 @@ impl EnvelopeSum<'_> {
             return None;
         }
         let done_us = rise_us + self.receiver.integration_us - pulse.tof_us + self.receiver.lead_us;
-        Some((rise_us, self.shape(pulse).most_from(done_us) >= level_at(rise_us)))
+        Some((rise_us, self.shape(pulse).max_from(done_us) >= level_at(rise_us)))
     }
 
     /// Returns `true` if the only active pulse begins after the last one ended and ends before the

@@ -74,8 +74,8 @@ impl RayBeam {
     pub(crate) fn reflected(&self, mirror: &Mirror, rotor: DVec2) -> Self {
         Self {
             image: mirror.image(self.image),
-            right: mirror.turn(self.left),
-            left: mirror.turn(self.right),
+            right: mirror.image_of_direction(self.left),
+            left: mirror.image_of_direction(self.right),
             turn: self.departure(rotor),
             mirrored: !self.mirrored,
             order: self.order + 1,

@@ -9,7 +9,7 @@ use super::{
     lit::LitCylinder,
 };
 use crate::{
-    geometry::{DVec2, turn_rad},
+    geometry::{DVec2, signed_angle_rad},
     model::paths::plan::{AngleSpan, Cylinders, PlanCircle, SurfaceArc},
 };
 
@@ -88,7 +88,7 @@ fn lit_by(circle: &PlanCircle, beam: &RayBeam) -> Option<AngleSpan> {
         return None;
     }
     let tangent_rad = sine.asin();
-    let off_axis = |border: DVec2| turn_rad(-to_image, border);
+    let off_axis = |border: DVec2| signed_angle_rad(-to_image, border);
     let (mut right, mut left) = (off_axis(beam.right), off_axis(beam.left));
     if right > left {
         // The beam contains the direction away from the circle, and at most one side of the circle.

@@ -65,7 +65,7 @@ impl Beams {
                 }
                 BeamNode::Wall { wall, before } => {
                     at = before;
-                    run = walls[wall as usize].mirror.turn(run);
+                    run = walls[wall as usize].mirror.image_of_direction(run);
                 }
             }
         }
@@ -91,7 +91,7 @@ impl Beams {
                     }
                     BeamNode::Wall { wall, before } => {
                         at = before;
-                        run = walls[wall as usize].mirror.turn(run);
+                        run = walls[wall as usize].mirror.image_of_direction(run);
                         return Some(wall);
                     }
                 }

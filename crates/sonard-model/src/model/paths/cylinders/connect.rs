@@ -17,7 +17,7 @@ use super::{
     strength::Strength,
 };
 use crate::{
-    geometry::turn_rad,
+    geometry::signed_angle_rad,
     model::{
         SearchPart,
         paths::{
@@ -219,7 +219,7 @@ impl<'a> Connector<'a> {
         let amplitude = self.amplitude(&contacts, circle, gain);
         let departures = [out.departure(a.at_rad), back.departure(b.at_rad)];
         let pattern_gain =
-            self.bound.map_or(1.0, |bound| bound.at(turn_rad(departures[0], departures[1]).abs()));
+            self.bound.map_or(1.0, |bound| bound.at(signed_angle_rad(departures[0], departures[1]).abs()));
         let floor = settings.contact_floor(out.half_path.level > 0, length_m);
         let fits = length_m <= settings.max_path_m && amplitude * pattern_gain >= floor;
         fits.then_some(ConnectedPair {

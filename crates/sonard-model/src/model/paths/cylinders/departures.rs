@@ -1,6 +1,6 @@
 //! Directions of departure of a half-path.
 
-use crate::geometry::{DVec2, turn_rad, wrap_pi};
+use crate::geometry::{DVec2, signed_angle_rad, wrap_pi};
 
 /// Interval of directions in which the rays of a half-path leave.
 #[derive(Debug, Clone, Copy)]
@@ -11,7 +11,7 @@ pub(crate) struct Departures {
 
 impl Departures {
     pub(crate) fn between(a: DVec2, b: DVec2) -> Self {
-        let half_rad = 0.5 * turn_rad(a, b);
+        let half_rad = 0.5 * signed_angle_rad(a, b);
         Self { middle_rad: wrap_pi(a.to_angle() + half_rad), half_rad: half_rad.abs() }
     }
 

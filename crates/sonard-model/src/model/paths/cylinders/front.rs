@@ -59,9 +59,9 @@ impl Front {
 
     fn off_wall(&self, wall: &WallMirror) -> Self {
         let mirror = &wall.mirror;
-        let distance_m = -mirror.height_m(self.origin) / mirror.normal.dot(self.along);
+        let distance_m = -mirror.signed_distance_m(self.origin) / mirror.normal.dot(self.along);
         let hit = self.moved(distance_m);
-        Self { along: mirror.turn(self.along), ..hit }
+        Self { along: mirror.image_of_direction(self.along), ..hit }
     }
 
     /// Advances the front to the outside of a circle. Also returns the normal there and the cosine

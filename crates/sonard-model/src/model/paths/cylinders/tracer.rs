@@ -57,7 +57,7 @@ impl Images {
     /// Appends the image by one more wall.
     fn by(self, mirror: &Mirror) -> Self {
         let Self { x, y, origin } = self;
-        Self { x: mirror.turn(x), y: mirror.turn(y), origin: mirror.image(origin) }
+        Self { x: mirror.image_of_direction(x), y: mirror.image_of_direction(y), origin: mirror.image(origin) }
     }
 
     fn of_direction(&self, direction: DVec2) -> DVec2 {
@@ -112,7 +112,7 @@ impl<'a> Tracer<'a> {
                     let origin = images.of_point(front.origin);
                     let along = images.of_direction(front.along);
                     let mirror = &self.plan.walls[*last as usize].mirror;
-                    let distance_m = -mirror.height_m(origin) / mirror.normal.dot(along);
+                    let distance_m = -mirror.signed_distance_m(origin) / mirror.normal.dot(along);
                     Front { origin, along, ..front }.moved(distance_m)
                 }
             };

@@ -15,7 +15,7 @@ use rstar::{
 
 use super::images::{HorizontalMirror, VerticalImage, images};
 use crate::{
-    geometry::{Arrangement, DVec2, Piece, between},
+    geometry::{Arrangement, DVec2, SegmentPiece, edge_key},
     model::{
         Reflector,
         paths::{
@@ -168,8 +168,8 @@ impl Heights {
         if !self.rises() {
             return HashMap::new();
         }
-        let others = |piece: &Piece| {
-            let ends = between(piece.ends);
+        let others = |piece: &SegmentPiece| {
+            let ends = edge_key(piece.ends);
             let mut stack = vec![piece.segment];
             for &wall in plan.covered.get(&ends)? {
                 if stack.iter().all(|&other| self.are_apart(wall, other)) {

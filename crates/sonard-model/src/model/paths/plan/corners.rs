@@ -305,7 +305,7 @@ fn sectors(faces: &[(f64, u32)], gains: &[f64], law: EdgeLaw) -> SmallVec<[AirSe
             reflectance: [gains[wall as usize], gains[next as usize]],
         };
         let faces = [from_rad, to_rad].map(DVec2::from_angle);
-        AirSector { from_rad, faces, wedge, diffracts: law.answers(&wedge) }
+        AirSector { from_rad, faces, wedge, diffracts: law.diffracts(&wedge) }
     };
     faces.iter().zip(next).map(sector).collect()
 }

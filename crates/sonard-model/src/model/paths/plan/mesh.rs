@@ -7,7 +7,7 @@ use rstar::{RTree, primitives::GeomWithData};
 use smallvec::SmallVec;
 use spade::{ConstrainedDelaunayTriangulation, Point2, Triangulation};
 
-use crate::geometry::{Arrangement, DVec2, between, distance_to_segment};
+use crate::geometry::{Arrangement, DVec2, edge_key, distance_to_segment};
 
 /// Triangles between the walls, inside a box around the scene.
 #[derive(Debug)]
@@ -86,7 +86,7 @@ impl Mesh {
         }
         let corners = self.triangles[triangle as usize].corners;
         let ends = [corners[side], corners[(side + 1) % 3]];
-        self.stacked.get(&between(ends)).map_or(&[], Vec::as_slice)
+        self.stacked.get(&edge_key(ends)).map_or(&[], Vec::as_slice)
     }
 
     /// Returns a corner of a triangle.
@@ -185,11 +185,11 @@ fn behind(edge: Edge) -> u32 {
 
 fn triangles(cdt: &Cdt, plan: &Arrangement) -> Vec<Triangle> {
     let wall_of: HashMap<[u32; 2], u32> =
-        plan.pieces.iter().map(|piece| (between(piece.ends), piece.segment)).collect();
+        plan.pieces.iter().map(|piece| (edge_key(piece.ends), piece.segment)).collect();
     let side = |edge: Edge| {
         let ends = edge.vertices().map(|vertex| vertex.index() as u32);
         if edge.is_constraint_edge()
-            && let Some(&wall) = wall_of.get(&between(ends))
+            && let Some(&wall) = wall_of.get(&edge_key(ends))
         {
             return TriangleSide::Wall(wall);
         }

@@ -7,7 +7,7 @@ use smallvec::SmallVec;
 
 use crate::{
     acoustics::edge::{MAX_WAVELENGTHS, Strip},
-    geometry::{Arrangement, DVec2, turn_rad},
+    geometry::{Arrangement, DVec2, signed_angle_rad},
 };
 
 /// Bend within which consecutive pieces of a wall are one, radians.
@@ -97,7 +97,7 @@ impl<'a> Chains<'a> {
             };
             let far = self.other_end(next, at);
             let so_far = self.position(at) - self.position(point);
-            let bend_rad = turn_rad(so_far, self.position(far) - self.position(at));
+            let bend_rad = signed_angle_rad(so_far, self.position(far) - self.position(at));
             if bend_rad.abs() > STRAIGHT_RAD {
                 return None;
             }

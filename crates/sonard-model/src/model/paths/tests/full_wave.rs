@@ -85,7 +85,7 @@ impl Chain {
         let bent = echo.path.kind() == PathKind::Diffracted;
         let side = if reflectors(&echo.path).len() % 2 == 1 { -1.0 } else { 1.0 };
         let point = |i: i32| self.half_width_m * (f64::from(2 * i + 1) / f64::from(POINTS) - 1.0);
-        let shares = edge.map(|edge| edge.shares());
+        let shares = edge.map(|edge| edge.relative_field());
         let mut sum = Complex64::ZERO;
         for u in (0..POINTS).map(point) {
             for v in (0..POINTS).map(point) {

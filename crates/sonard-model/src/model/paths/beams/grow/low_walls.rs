@@ -69,7 +69,7 @@ impl Grower<'_> {
 fn distances_m(wall_mirror: &WallMirror, [low_m, high_m]: [f64; 2], from: DVec2) -> [f64; 2] {
     let mirror = &wall_mirror.mirror;
     let foot_m = mirror.normal.perp().dot(from);
-    let off_m = mirror.height_m(from).powi(2);
+    let off_m = mirror.signed_distance_m(from).powi(2);
     let lateral_m = [low_m - foot_m, foot_m - high_m];
     let nearest_m = lateral_m[0].max(lateral_m[1]).max(0.0);
     let farthest_m = lateral_m[0].abs().max(lateral_m[1].abs());

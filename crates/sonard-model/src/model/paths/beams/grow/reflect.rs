@@ -79,8 +79,8 @@ impl Grower<'_> {
         side: usize,
     ) -> f64 {
         let mirror = &wall_mirror.mirror;
-        let height = mirror.height_m(beam.image);
-        let behind = mirror.height_m(self.target) * height < 0.0;
+        let height = mirror.signed_distance_m(beam.image);
+        let behind = mirror.signed_distance_m(self.target) * height < 0.0;
         let through = if behind { beam } else { next };
         let run = self.target - through.image;
         if through.holds(run) {
@@ -113,7 +113,7 @@ impl Grower<'_> {
             [side, (side + 1) % 3].map(|corner| along.dot(self.mesh.corner(beam.triangle, corner)));
         let (low, high) = (ends[0].min(ends[1]), ends[0].max(ends[1]));
         let by = |border: DVec2| {
-            let hit = beam.image - mirror.height_m(beam.image) / mirror.normal.dot(border) * border;
+            let hit = beam.image - mirror.signed_distance_m(beam.image) / mirror.normal.dot(border) * border;
             along.dot(hit).max(low).min(high)
         };
         let (right, left) = (by(beam.right), by(beam.left));

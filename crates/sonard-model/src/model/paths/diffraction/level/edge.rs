@@ -89,7 +89,7 @@ impl LevelEdge {
         image: &VerticalImage,
         index: u16,
     ) -> Option<EdgeBeam<'a>> {
-        let before_m = self.mirror.height_m(lit.beam.image);
+        let before_m = self.mirror.signed_distance_m(lit.beam.image);
         if before_m.abs() <= TIE_M {
             return None;
         }
