@@ -76,7 +76,7 @@ fn small_room() {
     let listen = time(|| {
         heard = 0;
         for i in 0..400 {
-            place.listen(f64::from(i) * TAU / 400.0, &mut sounds);
+            place.collect_arrivals(f64::from(i) * TAU / 400.0, &mut sounds);
             heard += sounds.len();
         }
     });
@@ -136,8 +136,8 @@ impl PrintedFan {
             half_face_m: simulator.sensor().half_width_m(),
             wavelength_m: simulator.sound_speed_m_s() / frequency_hz,
             absorption_db_per_m: simulator.air().absorption_db_per_m(frequency_hz),
-            longest_m: 2.0 * receiver.max_range_m,
-            weakest: receiver.threshold,
+            max_path_m: 2.0 * receiver.max_range_m,
+            min_amplitude: receiver.threshold,
             max_order: u32::MAX,
         };
         let fan = Fan::new(scene, beam, settings);
@@ -218,12 +218,12 @@ fn l_room() {
     let corners = corners.map(DVec2::from_array);
     let walls = corners.iter().zip(corners.iter().cycle().skip(1)).map(|(&a, &b)| (a, b));
     let room = plan_scene(walls.collect());
-    let settings = sonard::model::paths::Settings {
+    let settings = sonard::model::paths::PathSettings {
         max_path_m: 200.0,
         max_order: Some(8),
         floor: 1e-6,
-        repeated_contacts_above: 1.0,
-        crowded_m: 0.0,
+        repeated_contact_ratio: 1.0,
+        unrestricted_m: 0.0,
         edge_law: None,
         double_diffraction: false,
         absorption_np_per_m: 0.0,

@@ -105,9 +105,9 @@ def located_by(sweeps, placed):
 def by_others(found):
     """The same poses, each with what was found besides in the other sweeps of its run: the median."""
     def own(sweep, mode):
-        others = [of["besides"] for other, of in found if other["group"] == sweep["group"] and other is not sweep]
-        besides = [dict(one, value=median(of[at]["value"] for of in others)) for at, one in enumerate(mode["besides"])]
-        return sweep, dict(mode, besides=besides)
+        others = [of["nuisance"] for other, of in found if other["group"] == sweep["group"] and other is not sweep]
+        besides = [dict(one, value=median(of[at]["value"] for of in others)) for at, one in enumerate(mode["nuisance"])]
+        return sweep, dict(mode, nuisance=besides)
     return [own(*pair) for pair in found]
 
 
@@ -145,7 +145,7 @@ def by_run(work, sweeps, placed, courses, sensor):
     for run, count in counts.items():
         of = [at for at, sweep in enumerate(sweeps) if run in ("all", sweep["group"])]
         counted = how_many(*([all[at] for at in of] for all in (sweeps, placed, courses)))
-        own = [median(value["value"] for at in of for value in placed[at][0]["besides"] if value["name"] == name)
+        own = [median(value["value"] for at in of for value in placed[at][0]["nuisance"] if value["name"] == name)
                for name in ("threshold_db", "ahead_m")]
         rows.append([run, "%.1f dB, %.0f mm" % (own[0], 1e3 * own[1]), *counted,
                      "%s of %d" % (share(count["near"], count["echo"]), count["echo"]),
@@ -219,7 +219,7 @@ def is_echo_of(model, measured):
 
 def of_its_own(work, sensor, sweep, mode):
     """The sensor with what was found with a pose."""
-    found = {of["name"]: of["value"] for of in mode.get("besides", ())}
+    found = {of["name"]: of["value"] for of in mode.get("nuisance", ())}
     if not found:
         return sensor
     with open(sensor) as file:

@@ -16,7 +16,7 @@ from dask.distributed import Client, LocalCluster
 
 def make(spec: str, out: str, number: int, parts: int) -> int:
     # One thread: Dask has a task for each core.
-    return sonard.generate(spec, out, part=(number, parts), threads=1)["made"]
+    return sonard.generate(spec, out, part=(number, parts), threads=1)["generated"]
 
 
 def main() -> None:

@@ -19,7 +19,7 @@ import sonard
 @ray.remote(num_cpus=1, max_retries=3)
 def make(spec: str, out: str, number: int, parts: int) -> int:
     # One thread: Ray has a task for each core.
-    return sonard.generate(spec, out, part=(number, parts), threads=1)["made"]
+    return sonard.generate(spec, out, part=(number, parts), threads=1)["generated"]
 
 
 def main() -> None:

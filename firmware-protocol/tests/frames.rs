@@ -57,7 +57,7 @@ fn any_reading() -> impl Strategy<Value = Reading> {
                 ReadingStatus::Echo,
                 ReadingStatus::NoEcho,
                 ReadingStatus::ModuleFault,
-                ReadingStatus::StepDoubtful,
+                ReadingStatus::StepUncertain,
             ][usize::from(status)],
             echoes: Echoes::from_ticks(&echoes),
         },
@@ -214,7 +214,7 @@ fn extremes_fit() {
         index: BEAMS_MAX,
         step: -POSITION_MAX,
         fired_ticks: u32::MAX,
-        status: ReadingStatus::StepDoubtful,
+        status: ReadingStatus::StepUncertain,
         echoes: Echoes::from_ticks(&[WINDOW_TICKS_MAX]),
     };
     let header = Header { boot: u16::MAX, seq: u16::MAX };

@@ -3,19 +3,19 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use sonard::export::foxglove::{Session, Step};
+use sonard::export::foxglove::{ViewerAction, ViewerSession};
 
 fuzz_target!(|bytes: &[u8]| {
     let is_there = |channel: u32| (1..=4).contains(&channel);
-    let mut session = Session::default();
+    let mut session = ViewerSession::default();
     for text in bytes.split(|byte| *byte == b'\n') {
         let steps = match std::str::from_utf8(text) {
-            Ok(text) => session.take_text(text, is_there),
-            Err(_) => session.take_binary(),
+            Ok(text) => session.handle_text(text, is_there),
+            Err(_) => session.handle_binary(),
         };
         assert!(steps.len() <= 10, "{steps:?}");
         for step in &steps {
-            if let Step::Say(said) = step {
+            if let ViewerAction::SendText(said) = step {
                 assert!(said.len() < 2000, "{said}");
             }
         }

@@ -6,7 +6,7 @@ use libfuzzer_sys::fuzz_target;
 use sonard::{
     compare::compare,
     scan::{ScanView, decode_line, encode_line},
-    store::{check, read_log},
+    store::{check_log, read_log},
 };
 
 fuzz_target!(|bytes: &[u8]| {
@@ -25,7 +25,7 @@ fuzz_target!(|bytes: &[u8]| {
         let again = decode_line(written.trim_ascii_end()).expect("and read again");
         assert_eq!(&again, record);
     }
-    check(bytes, |_| {}).expect("memory can be read");
+    check_log(bytes, |_| {}).expect("memory can be read");
     let scans = ScanView::from_records(records);
     let (comparison, judged) = compare(&scans);
     assert_eq!((comparison.beams + comparison.not_compared.total()) as usize, judged.len());

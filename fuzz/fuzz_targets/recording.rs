@@ -7,7 +7,7 @@ use libfuzzer_sys::fuzz_target;
 use sonard::{
     acoustics::Air,
     geometry::Pose,
-    import::{Format, Mapping, Source, Taken, read_message},
+    import::{Assumptions, Format, ImportSource, Mapping, read_message},
 };
 
 fuzz_target!(|bytes: &[u8]| {
@@ -20,19 +20,19 @@ fuzz_target!(|bytes: &[u8]| {
     }
     let whole = [b"\x89MCAP0\r\n", bytes].concat();
     let open = || -> io::Result<Box<dyn Read>> { Ok(Box::new(Cursor::new(whole.clone()))) };
-    let taken = Taken {
+    let taken = Assumptions {
         sha256: String::new(),
         pose: Pose { x_m: 0.0, y_m: 0.0, heading_deg: 0.0 },
         array: None,
         sensor: "hc-sr04".to_owned(),
-        longest_m: 4.0,
-        least_m: 0.02,
+        max_range_m: 4.0,
+        min_range_m: 0.02,
         air: Air::default(),
         started: "1970-01-01T00:00:00Z".parse().expect("a time"),
-        as_said: false,
+        skip_checks: false,
     };
     let mapping = Mapping { format: Some(Format::Mcap), ..Mapping::default() };
-    if let Ok(found) = (Source { open: &open }).examine(mapping, taken) {
+    if let Ok(found) = (ImportSource { open: &open }).examine(mapping, taken) {
         let scans = found.scans(Cursor::new(whole.clone())).expect("a recording");
         assert!(scans.count() > 0 || found.readings == 0);
     }

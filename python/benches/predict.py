@@ -9,7 +9,7 @@ import time
 import numpy as np
 
 import sonard
-from sonard._sonard import _seconds_of_predict_many
+from sonard._sonard import _time_predict_many
 
 
 def main() -> None:
@@ -18,7 +18,7 @@ def main() -> None:
     rng = np.random.default_rng(1)
     ends = scene.walls.reshape(-1, 2)
     drawn = rng.uniform(ends.min(axis=0), ends.max(axis=0), (4000, 2))
-    places = drawn[scene.can_stand(drawn)][:400]
+    places = drawn[scene.are_accessible(drawn)][:400]
     poses = np.column_stack([places, rng.uniform(-180, 180, len(places))])
 
     def here() -> float:
@@ -26,7 +26,7 @@ def main() -> None:
         model.predict(poses)
         return time.perf_counter() - began
 
-    rounds = [(here(), _seconds_of_predict_many(model, poses)) for _ in range(7)]
+    rounds = [(here(), _time_predict_many(model, poses)) for _ in range(7)]
     python_s, rust_s = (min(times) for times in zip(*rounds, strict=True))
     print(f"{len(poses)} scans: {len(poses) * 400 / python_s:,.0f} readings per second, {rust_s / python_s:.2f} of the speed of Rust")
 

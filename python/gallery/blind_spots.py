@@ -16,7 +16,7 @@ model = sonard.Model(scene, max_range_m=6.0)
 step_m = 0.1
 xs, ys = np.arange(0.05, 4, step_m), np.arange(0.05, 3, step_m)
 grid = np.stack(np.meshgrid(xs, ys), axis=-1)
-free = scene.can_stand(grid)
+free = scene.are_accessible(grid)
 places = grid[free]
 poses = np.column_stack([places, np.zeros(len(places))])
 

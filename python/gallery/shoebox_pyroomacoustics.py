@@ -28,7 +28,7 @@ def by_sonard(size: list[float], place: list[float], order: int) -> tuple[NDArra
         sensor = sensor.replace(mounting={"z_m": place[2]})
     model = sonard.Model(scene, sensor, lossless=True, max_order=order, max_range_m=100.0)
     began = time.perf_counter()
-    paths = model.paths([*place[:2], 0.0], weakest=1e-6)
+    paths = model.paths([*place[:2], 0.0], min_amplitude=1e-6)
     took_s = time.perf_counter() - began
     walls = [path for path in paths if path.order == len(path.interactions)]
     return np.array([image(path, np.array(place)) for path in walls]), took_s

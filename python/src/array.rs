@@ -116,15 +116,15 @@ impl RangerArray {
 
     /// Firing slots of a round, each a list of the names of the rangers that fire simultaneously.
     #[getter]
-    fn turns(&self) -> Vec<Vec<&str>> {
+    fn slots(&self) -> Vec<Vec<&str>> {
         let id = |ranger: usize| &*self.array.rangers[ranger].id;
-        self.array.turns().into_iter().map(|turn| turn.into_iter().map(id).collect()).collect()
+        self.array.slots().into_iter().map(|turn| turn.into_iter().map(id).collect()).collect()
     }
 
     /// Names of the rangers in the order in which a round fires them.
     #[getter]
     fn round(&self) -> Vec<&str> {
-        self.turns().concat()
+        self.slots().concat()
     }
 
     /// Body of the robot, which is opaque to sound, as in the data file; ``None`` without a body.
@@ -159,14 +159,14 @@ impl RangerArray {
     /// -------
     /// ndarray of float64, shape (..., rangers, 3)
     ///     x and y of each ranger's face (metres) and the direction of its beam axis (degrees).
-    fn poses_on<'py>(
+    fn ranger_poses<'py>(
         &self,
         py: Python<'py>,
         poses: &Bound<'py, PyAny>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let PoseArray { list, shape } = PoseArray::from_python(poses)?;
         let on = list.iter().flat_map(|robot| {
-            let poses = self.array.rangers.iter().map(|ranger| ranger.pose_on(robot));
+            let poses = self.array.rangers.iter().map(|ranger| ranger.world_pose(robot));
             poses.flat_map(|pose| [pose.x_m, pose.y_m, pose.heading_deg])
         });
         arrays::shaped(py, on.collect(), &[&*shape, &[self.array.rangers.len(), 3]].concat())

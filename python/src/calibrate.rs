@@ -8,7 +8,9 @@ use pyo3::{
     types::{PyDict, PyTuple},
 };
 use sonard::{
-    inverse::{self, Fit, Fitted, Group, Sweep, Told, World},
+    inverse::{
+        self, FitOptions, FitResult as Fitted, FitSweep, ParameterGroup, ParameterReport, World,
+    },
     scan::Session,
 };
 use sonard_model::geometry::Pose;
@@ -54,7 +56,7 @@ const DEFAULT_FIT: [&str; 3] = ["pose", "air", "threshold"];
 /// poses : array_like, shape (scans, 3), optional
 ///     Prior poses of the ranger: x and y (metres) and heading (degrees). Default to those of the
 ///     scans.
-/// widest_m : float
+/// max_initial_error_m : float
 ///     Largest initial error of predicted ranges, metres, 0.005 to 1.
 /// search : {'thorough', 'quick', 'furnished'}
 ///     Effort of the search: 'quick' is four to ten times as fast and misses the best explanation
@@ -73,9 +75,9 @@ const DEFAULT_FIT: [&str; 3] = ["pose", "air", "threshold"];
 ///     If a requested parameter cannot be fitted.
 #[pyfunction]
 #[expect(clippy::too_many_arguments, reason = "they are keywords where they are used")]
-#[pyo3(signature = (scans, model = None, *, fit = None, priors = None, poses = None, widest_m = 0.1,
+#[pyo3(signature = (scans, model = None, *, fit = None, priors = None, poses = None, max_initial_error_m = 0.1,
     search = "thorough"),
-    text_signature = "(scans, model=None, *, fit=('pose', 'air', 'threshold'), priors=None, poses=None, widest_m=0.1, search='thorough')")]
+    text_signature = "(scans, model=None, *, fit=('pose', 'air', 'threshold'), priors=None, poses=None, max_initial_error_m=0.1, search='thorough')")]
 pub(crate) fn calibrate<'py>(
     py: Python<'py>,
     scans: &Bound<'py, PyAny>,
@@ -83,16 +85,19 @@ pub(crate) fn calibrate<'py>(
     fit: Option<Vec<String>>,
     priors: Option<BTreeMap<String, f64>>,
     poses: Option<&Bound<'py, PyAny>>,
-    widest_m: f64,
+    max_initial_error_m: f64,
     search: &str,
 ) -> PyResult<Bound<'py, PyAny>> {
-    if !(0.005..=1.0).contains(&widest_m) {
-        let message = format!("widest_m is {widest_m}: it must be from 0.005 to 1");
+    if !(0.005..=1.0).contains(&max_initial_error_m) {
+        let message =
+            format!("max_initial_error_m is {max_initial_error_m}: it must be from 0.005 to 1");
         return Err(PyValueError::new_err(message));
     }
     let names = fit.unwrap_or_else(|| DEFAULT_FIT.map(str::to_owned).to_vec());
-    let groups =
-        names.iter().map(|name| parse_name(py, "fit", name)).collect::<PyResult<Vec<Group>>>()?;
+    let groups = names
+        .iter()
+        .map(|name| parse_name(py, "fit", name))
+        .collect::<PyResult<Vec<ParameterGroup>>>()?;
     let scans = scans_of(scans)?;
     let sweeps = sweeps(py, &scans, poses)?;
     let prior = match model {
@@ -103,19 +108,21 @@ pub(crate) fn calibrate<'py>(
     let priors = inverse::priors(&groups, &sigmas, &prior, sweeps.len());
     let priors =
         priors.map_err(|error| new_error::<OptionError>(py, &error.to_string(), &error.help()))?;
-    let settings =
-        Fit { search: parse_name(py, "search", search)?, ..Fit::usual(priors, widest_m) };
+    let settings = FitOptions {
+        search: parse_name(py, "search", search)?,
+        ..FitOptions::with_priors(priors, max_initial_error_m)
+    };
     let pool = pool(py, None)?;
     let fitted = py.detach(|| pool.install(|| inverse::fit(&prior, &sweeps, &settings)));
     let fitted = fitted.map_err(|error| {
         let help = "check that the poses are inside the scene, or fit fewer parameters";
         new_error::<SonardError>(py, &error.to_string(), help)
     })?;
-    if fitted.is_doubtful() {
+    if fitted.is_poorly_explained() {
         let share = 100.0 * (1.0 - fitted.errors.explained());
         warn(py, &format!("{share:.0} % of the readings are not explained: check the scene"))?;
     }
-    let report = fitted.told(&prior, &sweeps, &settings);
+    let report = fitted.report(&prior, &sweeps, &settings);
     FitResult { prior, sweeps, fitted, report }.into_python(py)
 }
 
@@ -124,7 +131,7 @@ fn sweeps(
     py: Python<'_>,
     scans: &[Py<Scan>],
     poses: Option<&Bound<'_, PyAny>>,
-) -> PyResult<Vec<Sweep>> {
+) -> PyResult<Vec<FitSweep>> {
     let poses = poses.map(PoseArray::from_python).transpose()?;
     if let Some(PoseArray { shape, .. }) = &poses
         && **shape != [scans.len()]
@@ -144,10 +151,10 @@ fn sweeps(
     }
     let mut sweeps = Vec::new();
     for (at, scan) in scans.iter().enumerate() {
-        match Sweep::from_scan(scan.get().view()) {
+        match FitSweep::from_scan(scan.get().view()) {
             Ok(sweep) => {
                 let pose = poses.as_ref().map_or(sweep.pose, |poses| poses.list[at]);
-                sweeps.push(Sweep { pose, ..sweep });
+                sweeps.push(FitSweep { pose, ..sweep });
             }
             Err(error) => warn(py, &format!("{error}; scan skipped"))?,
         }
@@ -162,7 +169,7 @@ fn sweeps(
 /// Returns the model shared by all usable scans.
 fn common_world(py: Python<'_>, scans: &[Py<Scan>]) -> PyResult<World> {
     let mut known: Option<(World, &Arc<Session>)> = None;
-    for scan in scans.iter().map(Py::get).filter(|scan| Sweep::from_scan(scan.view()).is_ok()) {
+    for scan in scans.iter().map(Py::get).filter(|scan| FitSweep::from_scan(scan.view()).is_ok()) {
         let Some(session) = &scan.view().session else { continue };
         if known.as_ref().is_some_and(|(_, before)| Arc::ptr_eq(before, session)) {
             continue;
@@ -188,9 +195,9 @@ fn common_world(py: Python<'_>, scans: &[Py<Scan>]) -> PyResult<World> {
 struct FitResult {
     /// Prior values.
     prior: World,
-    sweeps: Vec<Sweep>,
+    sweeps: Vec<FitSweep>,
     fitted: Fitted,
-    report: Vec<Told>,
+    report: Vec<ParameterReport>,
 }
 
 impl FitResult {
@@ -198,7 +205,9 @@ impl FitResult {
         let Fitted { world, poses, errors, .. } = &self.fitted;
         let estimates = self.report.iter().map(|parameter| {
             let scan = parameter.scan.map(|scan| scan.to_string());
-            let Told { name, value, change, sigma, low, high, prior, prior_sigma, .. } = parameter;
+            let ParameterReport {
+                name, value, change, sigma, low, high, prior, prior_sigma, ..
+            } = parameter;
             let fields = (
                 name,
                 scan,
@@ -258,7 +267,7 @@ impl FitResult {
     /// stepper.
     fn model(&self, py: Python<'_>) -> PyResult<Model> {
         let world = &self.fitted.world;
-        let scene = Scene::from_json(py, &world.scene.rewritten())?;
+        let scene = Scene::from_json(py, &world.scene.updated_text())?;
         let sensor = Sensor { sensor: self.fitted.sensor(&self.prior.sensor) };
         Model::build(py, Py::new(py, scene)?, Py::new(py, sensor)?, world.air.into(), world.options)
     }

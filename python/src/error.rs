@@ -10,7 +10,7 @@ use pyo3::{
 };
 use sonard_model::{
     acoustics, array, model,
-    scene::{self, shown},
+    scene::{self, sanitize},
 };
 
 create_exception!(
@@ -81,7 +81,7 @@ pub(crate) fn set_attribute<'py, T: IntoPyObject<'py>>(
 pub(crate) fn scene(py: Python<'_>, error: &scene::SceneError, text_is_given: bool) -> PyErr {
     let place = match &*error.path {
         "" => String::new(),
-        path => format!("{}: ", shown(path)),
+        path => format!("{}: ", sanitize(path)),
     };
     let message =
         if text_is_given { error.to_string() } else { format!("{place}{}", error.message()) };
@@ -89,7 +89,7 @@ pub(crate) fn scene(py: Python<'_>, error: &scene::SceneError, text_is_given: bo
     let line = text_is_given.then_some(error.line);
     set_attribute(py, &exception, "line", line);
     set_attribute(py, &exception, "column", line.map(|_| error.column));
-    set_attribute(py, &exception, "path", shown(&error.path));
+    set_attribute(py, &exception, "path", sanitize(&error.path));
     exception
 }
 
@@ -121,10 +121,11 @@ pub(crate) fn array(py: Python<'_>, error: &array::ArrayError) -> PyErr {
 /// Converts an error in the data of a sensor.
 pub(crate) fn sensor(py: Python<'_>, error: &acoustics::SensorError) -> PyErr {
     let help = match error {
-        acoustics::SensorError::Form { .. } => {
+        acoustics::SensorError::Malformed { .. } => {
             "start from a preset (`Sensor.preset(...).to_json()`)"
         }
-        acoustics::SensorError::Figure { .. } | acoustics::SensorError::UnknownPreset { .. } => "",
+        acoustics::SensorError::OutOfRange { .. }
+        | acoustics::SensorError::UnknownPreset { .. } => "",
     };
     new_error::<SensorError>(py, &error.to_string(), help)
 }

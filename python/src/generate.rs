@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use pyo3::{prelude::*, types::PyDict};
 use sonard::{
     dataset::{DataSet, DataSetError},
-    generate::{Part, Table},
+    generate::{SetPart, ShardTable},
 };
 
 use crate::{
@@ -29,7 +29,7 @@ use crate::{
 /// Returns
 /// -------
 /// dict
-///     ``made`` and ``were_there``: numbers of shards; ``sha256``, ``readings``, ``bytes`` of the
+///     ``generated`` and ``existed``: numbers of shards; ``sha256``, ``readings``, ``bytes`` of the
 ///     data set, or ``None`` while shards are missing.
 #[pyfunction]
 #[pyo3(signature = (spec, out, *, part = None, threads = None))]
@@ -41,22 +41,22 @@ pub(crate) fn generate<'py>(
     threads: Option<usize>,
 ) -> PyResult<Bound<'py, PyDict>> {
     let (number, of) = part.unwrap_or((1, 1));
-    let part = Part::new(number, of)
+    let part = SetPart::new(number, of)
         .map_err(|error| new_error::<SonardError>(py, &error.to_string(), ""))?;
     let pool = pool(py, threads)?;
     let made = py.detach(move || {
         let generator = DataSet::read_specification(&spec, &|_| {})?;
         let set = DataSet::open(&out, &generator)?;
-        let made = pool.install(|| set.make_part(part, &|_| {}))?;
-        Ok((made, set.seal()?))
+        let made = pool.install(|| set.generate_part(part, &|_| {}))?;
+        Ok((made, set.write_manifest()?))
     });
     let (made, whole) = made.map_err(|error| to_exception(py, error))?;
     let summary = PyDict::new(py);
-    summary.set_item("made", made.made)?;
-    summary.set_item("were_there", made.were_there)?;
+    summary.set_item("generated", made.generated)?;
+    summary.set_item("existed", made.existed)?;
     let totals = whole.as_ref().map(|manifest| &manifest.totals);
     summary.set_item("sha256", whole.as_ref().map(|manifest| &*manifest.sha256))?;
-    summary.set_item("readings", totals.map(|totals| totals.rows.get(&Table::Readings)))?;
+    summary.set_item("readings", totals.map(|totals| totals.rows.get(&ShardTable::Readings)))?;
     summary.set_item("bytes", totals.map(|totals| totals.bytes))?;
     Ok(summary)
 }

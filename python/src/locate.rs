@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use pyo3::{exceptions::PyValueError, prelude::*};
-use sonard::inverse::{self, Group};
+use sonard::inverse::{self, ParameterGroup};
 use sonard_model::{geometry::Pose, reading::PingStatus};
 use uuid::Uuid;
 
@@ -44,7 +44,7 @@ use crate::{
 pub(crate) struct Locator {
     model: Py<Model>,
     world: inverse::World,
-    atlas: inverse::Atlas,
+    atlas: inverse::CoarseGrid,
     spacing_m: f64,
     fit: Vec<String>,
     priors: BTreeMap<String, f64>,
@@ -65,7 +65,8 @@ impl Locator {
         priors: Option<BTreeMap<String, f64>>,
     ) -> PyResult<Self> {
         let world = model.get().world();
-        let spacing_m = spacing_m.unwrap_or_else(|| inverse::Atlas::usual_spacing_m(&world.scene));
+        let spacing_m =
+            spacing_m.unwrap_or_else(|| inverse::CoarseGrid::default_spacing_m(&world.scene));
         if !(0.01..=2.0).contains(&spacing_m) {
             let message = format!("spacing_m is {spacing_m}: it must be from 0.01 to 2");
             return Err(PyValueError::new_err(message));
@@ -73,9 +74,9 @@ impl Locator {
         let (fit, priors) = (fit.unwrap_or_default(), priors.unwrap_or_default());
         let extra_priors = extra_priors(py, &fit, &priors, &world)?;
         let pool = pool(py, None)?;
-        let atlas = py.detach(|| pool.install(|| inverse::Atlas::new(&world, spacing_m)));
+        let atlas = py.detach(|| pool.install(|| inverse::CoarseGrid::new(&world, spacing_m)));
         let atlas = atlas.map_err(|error| new_error::<SonardError>(py, &error.to_string(), ""))?;
-        Ok(Self { model, world, atlas: atlas.fitting(extra_priors), spacing_m, fit, priors })
+        Ok(Self { model, world, atlas: atlas.with_nuisance(extra_priors), spacing_m, fit, priors })
     }
 
     /// Poses that explain a sweep, most probable first.
@@ -109,7 +110,7 @@ impl Locator {
         let found = py.detach(|| {
             pool.install(|| {
                 let modes = inverse::locate(&self.world, &self.atlas, &sweep)?;
-                let diagnoses = inverse::doubts(&self.world, &self.atlas, &sweep, &modes);
+                let diagnoses = inverse::diagnose(&self.world, &self.atlas, &sweep, &modes);
                 Ok::<_, inverse::FitError>((modes, diagnoses))
             })
         });
@@ -135,27 +136,27 @@ impl Locator {
         py: Python<'_>,
         readings: &Bound<'_, PyAny>,
         azimuths_deg: Option<&Bound<'_, PyAny>>,
-    ) -> PyResult<inverse::Sweep> {
+    ) -> PyResult<inverse::FitSweep> {
         if let Ok(scan) = readings.cast::<Scan>() {
             if azimuths_deg.is_some() {
                 return Err(PyValueError::new_err("azimuths_deg must be omitted for a scan"));
             }
-            return inverse::Sweep::from_scan(scan.get().view())
+            return inverse::FitSweep::from_scan(scan.get().view())
                 .map_err(|error| new_error::<LogError>(py, &error.to_string(), ""));
         }
         let given = BeamReadings::from_python(readings, azimuths_deg)?;
         let us_per_m = 2e6 / self.world.air.sound_speed_m_s();
-        let beams: Vec<inverse::Beam> = given
+        let beams: Vec<inverse::SweepFiring> = given
             .beams
             .into_iter()
             .filter_map(|(azimuth_deg, status, range_m)| {
                 let outcome = match status {
-                    PingStatus::Echo => inverse::Heard::Echo { tof_us: range_m * us_per_m },
-                    PingStatus::NoEcho => inverse::Heard::Silence,
-                    PingStatus::MinRange => inverse::Heard::Near,
+                    PingStatus::Echo => inverse::FiringOutcome::Echo { tof_us: range_m * us_per_m },
+                    PingStatus::NoEcho => inverse::FiringOutcome::NoEcho,
+                    PingStatus::MinRange => inverse::FiringOutcome::BelowMinRange,
                     _ => return None,
                 };
-                Some(inverse::Beam { azimuth_deg, heard: outcome })
+                Some(inverse::SweepFiring { azimuth_deg, outcome })
             })
             .collect();
         if beams.len() < MIN_BEAMS {
@@ -165,7 +166,7 @@ impl Locator {
             )));
         }
         let pose = Pose { x_m: 0.0, y_m: 0.0, heading_deg: 0.0 };
-        Ok(inverse::Sweep { scan: Uuid::nil(), pose, beams })
+        Ok(inverse::FitSweep { scan: Uuid::nil(), pose, beams })
     }
 }
 
@@ -176,8 +177,10 @@ fn extra_priors(
     priors: &BTreeMap<String, f64>,
     world: &inverse::World,
 ) -> PyResult<Vec<inverse::Prior>> {
-    let groups =
-        fit.iter().map(|name| parse_name(py, "fit", name)).collect::<PyResult<Vec<Group>>>()?;
+    let groups = fit
+        .iter()
+        .map(|name| parse_name(py, "fit", name))
+        .collect::<PyResult<Vec<ParameterGroup>>>()?;
     let given: Vec<(String, f64)> = priors.clone().into_iter().collect();
     let found = inverse::priors(&groups, &given, world, 1);
     found.map_err(|error| new_error::<OptionError>(py, &error.to_string(), &error.help()))

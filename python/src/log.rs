@@ -86,7 +86,7 @@ pub(crate) fn read_log(py: Python<'_>, path: PathBuf) -> PyResult<Log> {
         }
         Err(error) => {
             let help = match &error {
-                StoreError::NoLog { kind, .. } => kind.instead_of_a_log(),
+                StoreError::NotALog { kind, .. } => kind.help_for_log(),
                 _ => "",
             };
             Err(new_error::<LogError>(py, &error.to_string(), help))

@@ -5,7 +5,7 @@ use sonard::{
     interpret::{
         Extents, Sweep,
         grid::Grid,
-        mapping::{Mapper, Mapping},
+        mapping::{MapSettings, Mapper},
     },
     scan::Session,
 };
@@ -29,13 +29,13 @@ use crate::{
 ///     Side of a cell, metres.
 /// region : tuple of float, optional
 ///     Region of the map, x0, y0, x1, y1 in metres. Defaults to the region observed by the scans.
-/// silent_beyond_m : float, optional
+/// max_range_m : float, optional
 ///     Ranges beyond this count as no echo, metres. Defaults to the range of the sensor, at most 5.
 /// feature_prediction : bool
 ///     Reduce the weight of readings that contradict predicted walls.
 /// extend_m : float
 ///     Length by which walls are extended beyond their observed part, metres.
-/// least_confidence : float
+/// min_reading_confidence : float
 ///     Minimum confidence of the readings used; 0.5 is full confidence.
 ///
 /// Returns
@@ -43,32 +43,32 @@ use crate::{
 /// Map
 ///     Same result as ``sonard map`` for these scans.
 #[pyfunction]
-#[pyo3(name = "map", signature = (scans, *, resolution_m = 0.05, region = None, silent_beyond_m = None, feature_prediction = true, extend_m = 2.0, least_confidence = 0.48))]
+#[pyo3(name = "map", signature = (scans, *, resolution_m = 0.05, region = None, max_range_m = None, feature_prediction = true, extend_m = 2.0, min_reading_confidence = 0.48))]
 #[expect(clippy::too_many_arguments, reason = "they are keywords where they are used")]
 pub(crate) fn make_map<'py>(
     py: Python<'py>,
     scans: &Bound<'py, PyAny>,
     resolution_m: f64,
     region: Option<[f64; 4]>,
-    silent_beyond_m: Option<f64>,
+    max_range_m: Option<f64>,
     feature_prediction: bool,
     extend_m: f64,
-    least_confidence: f64,
+    min_reading_confidence: f64,
 ) -> PyResult<Bound<'py, PyAny>> {
-    let lengths_m = [Some(resolution_m), silent_beyond_m, Some(extend_m), Some(least_confidence)];
+    let lengths_m = [Some(resolution_m), max_range_m, Some(extend_m), Some(min_reading_confidence)];
     checked(lengths_m)?;
-    let mapping = Mapping {
+    let mapping = MapSettings {
         resolution_m,
         region: region.map(|[x0, y0, x1, y1]| [DVec2::new(x0, y0), DVec2::new(x1, y1)]),
-        silent_beyond_m,
+        range_limit_m: max_range_m,
         extend_m,
-        least_confidence,
+        min_confidence: min_reading_confidence,
         predicts_features: feature_prediction,
-        ..Mapping::default()
+        ..MapSettings::default()
     };
     let scans = scans_of(scans)?;
     let (sweeps, session) = sweeps(py, &scans)?;
-    let extents = Extents::of_session(session)
+    let extents = Extents::from_session(session)
         .map_err(|error| new_error::<LogError>(py, &format!("session: {error}"), ""))?;
     let shape = mapping
         .shape(&sweeps, mapping.max_range_m(&extents))
@@ -90,9 +90,9 @@ fn checked(values: [Option<f64>; 4]) -> PyResult<()> {
     let above_0 = f64::MIN_POSITIVE;
     let names = [
         ("resolution_m", above_0),
-        ("silent_beyond_m", above_0),
+        ("max_range_m", above_0),
         ("extend_m", 0.0),
-        ("least_confidence", 0.0),
+        ("min_reading_confidence", 0.0),
     ];
     for ((name, min), value) in names.into_iter().zip(values) {
         if let Some(value) = value.filter(|value| !(min..=1e6).contains(value)) {

@@ -253,7 +253,7 @@ impl Model {
     /// pose : array_like, shape (3,)
     ///     x and y (metres) and heading (degrees), which matters only if the scene contains a
     ///     robot's body.
-    /// weakest : float
+    /// min_amplitude : float
     ///     Minimum amplitude of the paths, 0.000001 to 1, relative to a head-on, perfect wall.
     ///     Paths that touch cylinders more than once, or a cylinder and an edge, are listed from
     ///     ten times this amplitude.
@@ -264,13 +264,13 @@ impl Model {
     ///     A path that can be traversed in both directions is listed twice, with departure and
     ///     arrival swapped. The amplitude excludes the beam pattern: it is the echo of a ranger
     ///     that faces the path.
-    #[pyo3(signature = (pose, weakest = 0.001))]
+    #[pyo3(signature = (pose, min_amplitude = 0.001))]
     fn paths<'py>(
         &self,
         pose: &Bound<'py, PyAny>,
-        weakest: f64,
+        min_amplitude: f64,
     ) -> PyResult<Vec<Bound<'py, PyAny>>> {
-        single::paths(self, pose, weakest)
+        single::paths(self, pose, min_amplitude)
     }
 
     /// Computes the signal of a firing against time, as on an oscilloscope.
@@ -281,24 +281,24 @@ impl Model {
     ///     x and y (metres) and heading (degrees).
     /// azimuth_deg : float
     ///     Azimuth of the firing, degrees counter-clockwise from the heading.
-    /// until_m : float, optional
+    /// max_range_m : float, optional
     ///     End of the trace as a range, metres. Defaults to the maximum range.
     /// step_us : float
     ///     Sampling interval, microseconds, 1 to 1000.
-    #[pyo3(signature = (pose, azimuth_deg = 0.0, until_m = None, step_us = 5.0))]
+    #[pyo3(signature = (pose, azimuth_deg = 0.0, max_range_m = None, step_us = 5.0))]
     fn trace<'py>(
         &self,
         pose: &Bound<'py, PyAny>,
         azimuth_deg: f64,
-        until_m: Option<f64>,
+        max_range_m: Option<f64>,
         step_us: f64,
     ) -> PyResult<Bound<'py, PyAny>> {
-        single::trace(self, pose, azimuth_deg, until_m, step_us)
+        single::trace(self, pose, azimuth_deg, max_range_m, step_us)
     }
 
     fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
         let (scene, sensor) = (&self.scene.get().scene.name, &self.sensor.get().sensor.name);
-        Ok(format!("<Model of '{sensor}' in '{scene}', {}>", options::shown(py, &self.options)?))
+        Ok(format!("<Model of '{sensor}' in '{scene}', {}>", options::sanitize(py, &self.options)?))
     }
 
     fn __getnewargs_ex__<'py>(

@@ -48,7 +48,7 @@ pub(crate) fn given<'py>(py: Python<'py>, options: &Options) -> PyResult<Bound<'
 }
 
 /// Formats the engine and the other options for a representation.
-pub(crate) fn shown(py: Python<'_>, options: &Options) -> PyResult<String> {
+pub(crate) fn sanitize(py: Python<'_>, options: &Options) -> PyResult<String> {
     let given = given(py, options)?;
     let given = given.iter().map(|(name, value)| {
         Ok(format!(", {}={}", name.extract::<String>()?, value.repr()?.extract::<String>()?))

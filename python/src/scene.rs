@@ -128,7 +128,7 @@ impl Scene {
     /// tolerance_m : float, optional
     ///     Maximum distance of a wall from the sides of the traced cells, metres. Defaults to one
     ///     and a half cells.
-    /// least_m : float, optional
+    /// min_length_m : float, optional
     ///     Minimum perimeter of an outline, metres; shorter ones are dropped. Defaults to four
     ///     cells.
     /// reflectance : float
@@ -137,17 +137,23 @@ impl Scene {
     /// name : str, optional
     ///     Name of the scene. Defaults to that of the file.
     #[staticmethod]
-    #[pyo3(signature = (path, *, tolerance_m = None, least_m = None, reflectance = 0.97, name = None))]
+    #[pyo3(signature = (path, *, tolerance_m = None, min_length_m = None, reflectance = 0.97, name = None))]
     fn from_grid(
         py: Python<'_>,
         path: &Bound<'_, PyAny>,
         tolerance_m: Option<f64>,
-        least_m: Option<f64>,
+        min_length_m: Option<f64>,
         reflectance: f64,
         name: Option<&str>,
     ) -> PyResult<Self> {
-        let scene =
-            grid::traced(py, &path.extract::<PathBuf>()?, tolerance_m, least_m, reflectance, name)?;
+        let scene = grid::traced(
+            py,
+            &path.extract::<PathBuf>()?,
+            tolerance_m,
+            min_length_m,
+            reflectance,
+            name,
+        )?;
         Ok(Self { scene: Arc::new(scene) })
     }
 
@@ -263,14 +269,14 @@ impl Scene {
     /// Returns
     /// -------
     /// ndarray of bool, shape (...)
-    fn can_stand<'py>(
+    fn are_accessible<'py>(
         &self,
         py: Python<'py>,
         places: &Bound<'py, PyAny>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let (places, shape) = arrays::points(places, "places")?;
         let scene = &self.scene;
-        let free: Vec<bool> = py.detach(|| scene.can_stand(&places));
+        let free: Vec<bool> = py.detach(|| scene.are_accessible(&places));
         PyArray1::from_vec(py, free).call_method1("reshape", (PyTuple::new(py, shape)?,))
     }
 

@@ -84,7 +84,7 @@ pub(crate) fn find_features<'py>(
     let mut first: Option<&Scan> = None;
     for scan in &scans {
         let (scan, view) = (scan.get(), scan.get().view());
-        if view.is_of_array() {
+        if view.is_array_scan() {
             let help = "arcs require a single rotating ranger";
             return Err(new_error::<LogError>(
                 py,
@@ -110,10 +110,13 @@ pub(crate) fn find_features<'py>(
         let message = "no scan with session to interpret";
         return Err(new_error::<LogError>(py, message, ""));
     };
-    let extents = Extents::of_session(first.session_of(py)?)
+    let extents = Extents::from_session(first.session_of(py)?)
         .map_err(|error| new_error::<LogError>(py, &format!("session: {error}"), ""))?;
-    let settings =
-        interpret::Settings { min_confidence, depth_tolerance_m, ..interpret::Settings::default() };
+    let settings = interpret::InterpretSettings {
+        min_confidence,
+        depth_tolerance_m,
+        ..interpret::InterpretSettings::default()
+    };
     let pool = pool(py, None)?;
     let features =
         py.detach(|| pool.install(|| interpret::interpret(&sweeps, &extents, &settings)));

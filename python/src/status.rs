@@ -10,7 +10,7 @@ pub(crate) const fn code(status: PingStatus) -> u8 {
         PingStatus::NoEcho => 1,
         PingStatus::MinRange => 2,
         PingStatus::LinkLost => 3,
-        PingStatus::StepDoubtful => 4,
+        PingStatus::StepUncertain => 4,
         PingStatus::ModuleFault => 5,
     }
 }
@@ -22,7 +22,7 @@ pub(crate) fn member<'py>(py: Python<'py>, status: PingStatus) -> PyResult<Bound
 
 /// Returns the status with the given code, if there is one.
 pub(crate) fn from_code(number: u8) -> Option<PingStatus> {
-    use PingStatus::{Echo, LinkLost, MinRange, ModuleFault, NoEcho, StepDoubtful};
-    let all = [Echo, NoEcho, MinRange, LinkLost, StepDoubtful, ModuleFault];
+    use PingStatus::{Echo, LinkLost, MinRange, ModuleFault, NoEcho, StepUncertain};
+    let all = [Echo, NoEcho, MinRange, LinkLost, StepUncertain, ModuleFault];
     all.into_iter().find(|status| code(*status) == number)
 }

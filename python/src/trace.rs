@@ -23,10 +23,10 @@ impl TraceResult {
         scene: &Scene,
         point: &ObservationPoint<'_>,
         direction_rad: f64,
-        until_m: f64,
+        max_range_m: f64,
         step_us: f64,
     ) -> Result<Self, TooCostly> {
-        let trace = point.trace(direction_rad, until_m, step_us)?;
+        let trace = point.trace(direction_rad, max_range_m, step_us)?;
         let path = |peak: &EnvelopePeak| {
             let arrival = point.arrival(direction_rad, &peak.arrival)?;
             Ok(PathResult::from_arrival(scene, &arrival))

@@ -49,5 +49,5 @@ def places_in(scene: sonard.Scene, count: int, seed: int = 1) -> NDArray[np.floa
     places = np.empty((0, 2))
     while len(places) < count:
         drawn = rng.uniform(ends.min(axis=0), ends.max(axis=0), (4 * count, 2))
-        places = np.concatenate([places, drawn[scene.can_stand(drawn)]])
+        places = np.concatenate([places, drawn[scene.are_accessible(drawn)]])
     return np.column_stack([places[:count], rng.uniform(-180, 180, count)])

@@ -211,12 +211,12 @@ def test_course_file(tmp_path: Path) -> None:
 
 def test_array_properties(tmp_path: Path) -> None:
     array = sonard.RangerArray.preset("ring-12")
-    assert array.name == "ring-12" and len(array.ids) == 12 and array.round == [id for turn in array.turns for id in turn]
+    assert array.name == "ring-12" and len(array.ids) == 12 and array.round == [id for turn in array.slots for id in turn]
     assert repr(array).startswith("<RangerArray 'ring-12': 12 rangers '") and array.description
     assert array.mounts.shape == (12, 3) and array.mounts[1, 2] == 30.0
     assert sonard.RangerArray.preset("pioneer-8").mounts[0, 2] == 90.0
     assert isinstance(array.sources, dict) and array.sensor in sonard.Sensor.preset_names()
-    on = array.poses_on([[1.0, 2.0, 90.0]])
+    on = array.ranger_poses([[1.0, 2.0, 90.0]])
     assert on.shape == (1, 12, 3)
     # The first ranger is in front of a robot with heading +y.
     np.testing.assert_allclose(on[0, 0], [1.0, 2.0 + array.mounts[0, 0], 90.0], atol=1e-12)
@@ -225,7 +225,7 @@ def test_array_properties(tmp_path: Path) -> None:
     (tmp_path / "ring.json").write_text(array.to_json())
     assert sonard.RangerArray.load(tmp_path / "ring.json") == array != sonard.RangerArray.preset("pioneer-8")
     pair = sonard.RangerArray.from_json(PAIR)
-    assert pair.turns == [["left", "right"], ["astern"]] and pair.round == ["left", "right", "astern"]
+    assert pair.slots == [["left", "right"], ["astern"]] and pair.round == ["left", "right", "astern"]
     np.testing.assert_allclose(pair.firing_times_s(2), [0, 0, 0.03, 0.06, 0.06, 0.09])
 
 

@@ -121,7 +121,7 @@ def test_error_messages(log: Path, command: Command, tmp_path: Path) -> None:
         (sonard.OptionError, "expected one of `quick`", {"search": "everywhere"}),
         (sonard.SonardError, "no parameter to fit", {"fit": []}),
         (TypeError, "str", {"fit": "pose"}),
-        (ValueError, "widest_m is 0", {"widest_m": 0.0}),
+        (ValueError, "max_initial_error_m is 0", {"max_initial_error_m": 0.0}),
         (ValueError, r"poses has the shape (2, 3): it must be (1, 3)", {"poses": [BELIEVED] * 2}),
         (ValueError, "poses[0]: values must be finite", {"poses": [(0.8, np.inf, 0.0)]}),
     ]:

@@ -35,9 +35,9 @@ def test_parts_match_command(tmp_path: Path) -> None:
     spec.write_text(SPEC)
     subprocess.run([PROGRAM, "generate", spec, "--out", tmp_path / "command", "--shard", "1/1"], check=True)
     made = sonard.generate(spec, tmp_path / "set", part=(2, 3), threads=1)
-    assert made == {"made": 1, "were_there": 0, "sha256": None, "readings": None, "bytes": None}
+    assert made == {"generated": 1, "existed": 0, "sha256": None, "readings": None, "bytes": None}
     made = sonard.generate(str(spec), tmp_path / "set")
-    assert (made["made"], made["were_there"], made["readings"]) == (3, 1, 4 * 3 * 400)
+    assert (made["generated"], made["existed"], made["readings"]) == (3, 1, 4 * 3 * 400)
     assert files(tmp_path / "set") == files(tmp_path / "command")
 
 

@@ -164,12 +164,12 @@ def test_locate_fits_threshold() -> None:
     scan = sonard.Model("simple-room", insensitive, max_range_m=3).predict([0.3, 0.3, 20.0])
     model = sonard.Model("simple-room", usual, max_range_m=3)
     locator = sonard.Locator(model, fit=["threshold"], priors={"threshold_db": 4.0})
-    (threshold,) = locator.locate(scan)[0]["besides"]
+    (threshold,) = locator.locate(scan)[0]["nuisance"]
     usual_db = 20 * np.log10(usual.threshold)
     assert threshold["name"] == "threshold_db" and abs(threshold["value"] - usual_db - 6.02) < 1
-    again = pickle.loads(pickle.dumps(locator)).locate(scan)[0]["besides"]
+    again = pickle.loads(pickle.dumps(locator)).locate(scan)[0]["nuisance"]
     assert again == [threshold]
-    assert "besides" not in sonard.Locator(model).locate(scan)[0]
+    assert "nuisance" not in sonard.Locator(model).locate(scan)[0]
     with pytest.raises(sonard.OptionError, match="`gear` is not fitted"):
         sonard.Locator(model, fit=["threshold"], priors={"gear": 1.0})
 

@@ -39,7 +39,7 @@ def test_trace_matches_command(command: Command) -> None:
         "trace", "--scene", "echo-traces", "--pose", "d", "--until", 3, "--step-us", 20, "--json"
     )
     scene = sonard.Scene.shipped("echo-traces")
-    trace = sonard.Model(scene).trace(scene.poses["d"], until_m=3.0, step_us=20.0)
+    trace = sonard.Model(scene).trace(scene.poses["d"], max_range_m=3.0, step_us=20.0)
     for field in ["t_us", "envelope", "threshold", "gain_db"]:
         np.testing.assert_array_equal(getattr(trace, field), line[field])
     np.testing.assert_array_equal(trace.echoes_us, line["detection"]["tof_us"])
@@ -68,7 +68,7 @@ def test_room_by_hand() -> None:
     readings = sonard.Model(scene).predict([1.0, 1.0, 0.0], [0.0, 90.0])
     # A weak echo crosses the threshold slightly later (time walk).
     assert 3.0 <= readings["range_m"][0] < 3.005 and 2.0 <= readings["range_m"][1] < 2.005
-    np.testing.assert_array_equal(scene.can_stand([[1.0, 1.0], [5.0, 1.0], [3.0, 2.5]]), [True, False, False])
+    np.testing.assert_array_equal(scene.are_accessible([[1.0, 1.0], [5.0, 1.0], [3.0, 2.5]]), [True, False, False])
     np.testing.assert_allclose(scene.clearance_m([[[1.0, 1.0], [3.0, 2.5]]]), np.array([[1.0, -0.1]]))
     line = sonard.Scene.from_points(corners[:2], closed=False)
     assert line.walls.tolist() == [[[0, 0], [4, 0]]]
@@ -143,7 +143,7 @@ def test_pickling_model(model: sonard.Model) -> None:
 
 def test_pickling_results() -> None:
     path = MODEL.paths(FIG9)[5]
-    reading, trace = MODEL.reading(FIG9), MODEL.trace(FIG9, until_m=1.0)
+    reading, trace = MODEL.reading(FIG9), MODEL.trace(FIG9, max_range_m=1.0)
     for value in [path, reading, trace, trace.peaks[0]]:
         again = pickle.loads(pickle.dumps(value))
         assert repr(again) == repr(value) and type(again) is type(value)

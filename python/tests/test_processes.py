@@ -142,7 +142,7 @@ def test_memory_is_constant() -> None:
             readings = MODEL.predict(POSES)
             assert readings.size == 8000
             MODEL.reading(POSES[0])
-            MODEL.paths(POSES[0], weakest=0.1)
+            MODEL.paths(POSES[0], min_amplitude=0.1)
             with pytest.raises(sonard.PoseError):
                 MODEL.predict([9, 9, 9])
 

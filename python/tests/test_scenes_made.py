@@ -31,7 +31,7 @@ def test_polygon_with_hole() -> None:
     np.testing.assert_array_equal(scene.walls, expected.walls)
     assert scene.wall_ids[0] == "polygon-0.0" and scene.wall_ids[4] == "polygon-0-hole-0.0"
     places = [[0.5, 0.5], [1.2, 1.2], [5.0, 1.0]]
-    assert scene.can_stand(places).tolist() == expected.can_stand(places).tolist() == [True, False, False]
+    assert scene.are_accessible(places).tolist() == expected.are_accessible(places).tolist() == [True, False, False]
     pose = [0.5, 0.5, 0.0]
     assert sonard.Model(scene).predict(pose).tobytes() == sonard.Model(expected).predict(pose).tobytes()
 
@@ -90,7 +90,7 @@ def test_shapely_matches_points() -> None:
     places = rng.uniform(-1, 5, (500, 2))
     inside = shapely.contains_xy(room.difference(column), *places.T)
     near = shapely.distance(shapely.points(places), shapely.union_all([room.boundary, column.boundary, board])) < 2e-3
-    agree = scene.can_stand(places) == inside
+    agree = scene.are_accessible(places) == inside
     assert (agree | near).all() and inside.sum() > 100
     for empty in [shapely.Polygon(), shapely.GeometryCollection(), []]:
         with pytest.raises(ValueError, match="shapes contain no line"):
@@ -162,8 +162,8 @@ def test_map_matches_command(command: Command, tmp_path: Path) -> None:
     pixels[20:30, 30:50] = 0
     pixels[40:45, 10:15] = 205
     folder = write_map(tmp_path / "office", pixels)
-    ways: list[dict[str, Any]] = [{}, {"tolerance_m": 0.2, "least_m": 3.0, "reflectance": 0.5, "name": "mine"}]
-    named = {"least_m": "min-length-m"}
+    ways: list[dict[str, Any]] = [{}, {"tolerance_m": 0.2, "min_length_m": 3.0, "reflectance": 0.5, "name": "mine"}]
+    named = {"min_length_m": "min-length-m"}
     for options in ways:
         flags = {f"--{named.get(name, name.replace('_', '-'))}": value for name, value in options.items()}
         arguments = [part for flag in flags.items() for part in flag]
@@ -172,7 +172,7 @@ def test_map_matches_command(command: Command, tmp_path: Path) -> None:
         assert sonard.Scene.from_grid(folder, **options).to_json() == expected
         assert sonard.Scene.from_grid(str(folder / "map.yaml"), **{"name": "office", **options}).to_json() == expected
     scene = sonard.Scene.from_grid(folder)
-    assert scene.name == "office" and scene.can_stand([[0.0, 3.0], [1.0, 3.75]]).tolist() == [True, False]
+    assert scene.name == "office" and scene.are_accessible([[0.0, 3.0], [1.0, 3.75]]).tolist() == [True, False]
 
 
 def test_invalid_maps(tmp_path: Path) -> None:
@@ -180,8 +180,8 @@ def test_invalid_maps(tmp_path: Path) -> None:
     with pytest.raises(sonard.SceneError, match="the map contains no wall") as caught:
         sonard.Scene.from_grid(folder)
     assert "occupied cells" in caught.value.help
-    with pytest.raises(ValueError, match="least_m is -1"):
-        sonard.Scene.from_grid(folder, least_m=-1)
+    with pytest.raises(ValueError, match="min_length_m is -1"):
+        sonard.Scene.from_grid(folder, min_length_m=-1)
     (folder / "map.pgm").write_bytes(b"P5\n20 20\n255\n..")
     with pytest.raises(sonard.SceneError, match="map.pgm: byte 2: the image ends before"):
         sonard.Scene.from_grid(folder)

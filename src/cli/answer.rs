@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::{Failure, Outcome};
 
 /// Prints records as JSON, one per line, or as text written by `table`.
-pub(super) fn answer<T: Serialize>(
+pub(super) fn print_result<T: Serialize>(
     json: bool,
     records: impl IntoIterator<Item = T>,
     table: impl FnOnce(&mut StdoutLock<'_>) -> io::Result<()>,

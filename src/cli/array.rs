@@ -3,7 +3,7 @@
 use std::{fs, io, path::Path};
 
 use super::Failure;
-use crate::array::{ArrayError, RobotCourse, RangerArray};
+use crate::array::{ArrayError, RangerArray, RobotCourse};
 
 /// Loads an array from a file, or else from the preset of that name.
 pub(super) fn load_array(name: &str) -> Result<RangerArray, Failure> {

@@ -14,7 +14,7 @@ use indicatif::ProgressBar;
 
 use super::{
     Failure, Outcome,
-    answer::answer,
+    answer::print_result,
     compare::RULED,
     numbers::within,
     output::{OutPath, Overwrite},
@@ -25,10 +25,11 @@ use super::{
     worlds::SweepArgs,
 };
 use crate::inverse::{
-    FitOptions, FitError, FitResult, SearchResult, ParameterGroup, FitProgress, Search, FitSweep, ParameterReport, FitObserver, World, fit_observed,
+    FitError, FitObserver, FitOptions, FitProgress, FitResult, FitSweep, ParameterGroup,
+    ParameterReport, Search, SearchResult, World, fit_observed,
 };
 use checkpoint::{Checkpoint, Head};
-use diagnosis::diagnose;
+use diagnosis::describe_misfits;
 use report::write_folder;
 
 /// Options of `sonard calibrate`.
@@ -114,13 +115,16 @@ pub(super) fn run(args: &Args) -> Outcome {
     }
     let (sweeps, world) = read(args, &what_if)?;
     let priors = prior::parameters(&args.fit, &args.prior, &world, sweeps.len())?;
-    let fit = FitOptions { search: args.search, ..FitOptions::with_priors(priors, args.max_initial_error_m) };
+    let fit = FitOptions {
+        search: args.search,
+        ..FitOptions::with_priors(priors, args.max_initial_error_m)
+    };
     let head = Head::new(&world, &sweeps, &fit);
     let open = |out: &OutPath| Checkpoint::open(out, args.overwrite, &head);
     let checkpoint = args.out.as_ref().map(open).transpose()?;
     let fitted = find(&world, &sweeps, &fit, checkpoint.as_ref())?;
     let lines = fitted.report(&world, &sweeps, &fit);
-    let diagnoses = diagnose(&world, &sweeps, &fitted);
+    let diagnoses = describe_misfits(&world, &sweeps, &fitted);
     if args.json {
         diagnoses.iter().for_each(|diagnosis| notice!("{diagnosis}"));
     }
@@ -130,7 +134,7 @@ pub(super) fn run(args: &Args) -> Outcome {
         write_folder(out, overwrite, &world, &sweeps, &fitted, &lines, &summary)?;
         checkpoint.remove()?;
     }
-    answer(args.json, &lines, |out| print(out, &lines, &summary))
+    print_result(args.json, &lines, |out| print(out, &lines, &summary))
 }
 
 /// Reads the sweeps and the sensor, air and scene that they share.

@@ -26,8 +26,8 @@ use super::{
 };
 use crate::{
     collect::{
-        RemoteDevice, RunOptions, CollectionKeys, ScanDevice, CollectionFolder, FolderError, JOURNAL, CollectionJournal, CollectionManifest,
-        CollectionPlan, verify_collection,
+        CollectionFolder, CollectionJournal, CollectionKeys, CollectionManifest, CollectionPlan,
+        FolderError, JOURNAL, RemoteDevice, RunOptions, ScanDevice, verify_collection,
     },
     config::document,
 };
@@ -157,7 +157,12 @@ pub(super) fn run(args: &Args) -> Outcome {
     })
 }
 
-async fn collect(args: &Args, plan: CollectionPlan, device: impl ScanDevice, interrupts: Interrupts) -> Outcome {
+async fn collect(
+    args: &Args,
+    plan: CollectionPlan,
+    device: impl ScanDevice,
+    interrupts: Interrupts,
+) -> Outcome {
     let choices = RunOptions {
         accept_changed_plan: args.accept_changed_plan,
         retry_given_up: args.retry_failed,
@@ -180,7 +185,8 @@ async fn find_daemon(
 }
 
 fn verify_folder(root: &Path) -> Outcome {
-    let files = CollectionManifest::read(root).map_err(|error| missing_manifest(root, &error))?.files.len();
+    let files =
+        CollectionManifest::read(root).map_err(|error| missing_manifest(root, &error))?.files.len();
     let bar = ProgressBar::new(files as u64);
     let verified = verify_collection(root, || bar.inc(1)).map_err(|error| failure_from(&error));
     bar.finish_and_clear();
@@ -219,10 +225,11 @@ fn write_report(root: &Path) -> Outcome {
             "give the folder of a collection",
         ));
     }
-    let journal = CollectionJournal::open(&folder.journal()).map_err(|error| failure_from(&error))?;
+    let journal =
+        CollectionJournal::open(&folder.journal()).map_err(|error| failure_from(&error))?;
     report::write(&folder, journal.history())?;
-    let manifest =
-        CollectionManifest::from_history(&folder, journal.history()).map_err(|error| failure_from(&error))?;
+    let manifest = CollectionManifest::from_history(&folder, journal.history())
+        .map_err(|error| failure_from(&error))?;
     manifest.write(&folder).map_err(|error| failure_from(&error))
 }
 

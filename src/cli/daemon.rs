@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use super::{Failure, Outcome};
 use crate::{
     client::{Client, ClientError, Endpoint, ScansError},
-    fleet::{PolledDaemon, Member, MemberError, check_members, read_members},
+    fleet::{Member, MemberError, PolledDaemon, check_members, read_members},
     scan::SceneRef,
     scene::Scene,
     server::read_token,

@@ -17,7 +17,8 @@ use super::{
 use crate::{
     collect::SCANS,
     export::{
-        CsvExport, Export, ExportError, AttachedLog, McapExport, ParquetExport, Profile, ExportSettings,
+        AttachedLog, CsvExport, Export, ExportError, ExportSettings, McapExport, ParquetExport,
+        Profile,
     },
 };
 

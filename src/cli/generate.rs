@@ -17,7 +17,7 @@ use super::{
 };
 use crate::{
     dataset::{DataSet, DataSetError, PartOutcome},
-    generate::{Generator, DataSetManifest, SetPart, ShardTable},
+    generate::{DataSetManifest, Generator, SetPart, ShardTable},
 };
 
 /// Options of `sonard generate`.
@@ -141,7 +141,8 @@ fn make(generator: &Generator, out: &Path, part: SetPart) -> Outcome {
     let bar = progress::bar(generator.readings() * shards, "readings");
     let made = set.generate_part(part, &|readings| bar.inc(readings));
     bar.finish_and_clear();
-    let PartOutcome { generated: made, existed: were_there } = made.map_err(|error| failure_from(&error))?;
+    let PartOutcome { generated: made, existed: were_there } =
+        made.map_err(|error| failure_from(&error))?;
     notice!("{made} shards made, {were_there} already complete");
     match set.write_manifest().map_err(|error| failure_from(&error))? {
         Some(manifest) => notice!("{}: {}", out.display(), describe_complete(&manifest)),
@@ -158,7 +159,7 @@ fn make(generator: &Generator, out: &Path, part: SetPart) -> Outcome {
 fn describe_complete(manifest: &DataSetManifest) -> String {
     let totals = &manifest.totals;
     let readings = totals.rows.get(&ShardTable::Readings).copied().unwrap_or_default();
-    let redrawn = &totals.redrawn;
+    let redrawn = &totals.rejected_draws;
     format!(
         "complete: {} shards, {readings} readings, {:.2} bytes per reading; redrawn: {} poses, {} pieces of furniture, {} \
          scenes; SHA-256 {}",

@@ -27,7 +27,7 @@ use crate::{
     acoustics::{Air, Sensor},
     array::RangerArray,
     geometry::Pose,
-    import::{ImportError, Imported, Mapping, ImportSource, Assumptions},
+    import::{Assumptions, ImportError, ImportSource, Imported, Mapping},
     plot::draw_scans,
     scan::{ImportRef, Provenance, Record, ScanView, Session},
     scene::{Scene, parse_pose},
@@ -141,7 +141,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     if let Some(sha256) =
         bag::digest_of_databases(&files).map_err(|error| failure_from(error.into()))?
     {
-        found.taken.sha256 = sha256;
+        found.assumptions.sha256 = sha256;
     }
     let session = session(args, &found, scene.as_ref(), sensor, &air);
     if let Some(picture) = &picture {
@@ -240,7 +240,7 @@ fn report(args: &Args, found: &Imported, scans: u64) {
     for note in &found.notes {
         notice!("note: {note}");
     }
-    if found.format.entry().has_columns && found.taken.array.is_none() {
+    if found.format.entry().has_columns && found.assumptions.array.is_none() {
         let Mapping { clockwise, zero_deg, azimuth_deg, .. } = found.mapping;
         if !clockwise && zero_deg == 0.0 && azimuth_deg.is_none() {
             notice!(
@@ -253,7 +253,7 @@ fn report(args: &Args, found: &Imported, scans: u64) {
         "{scans} scans, {} readings: {} with a range, {no_range} without; sensor {}",
         found.readings,
         found.echoes,
-        found.taken.sensor
+        found.assumptions.sensor
     );
     if !has_poses(args, found) {
         notice!("note: pose unknown: give --pose, or columns x_m, y_m and heading_deg");
@@ -328,14 +328,14 @@ fn session(
         _ => serde_json::Map::new(),
     };
     let name = args.file.file_name().unwrap_or(args.file.as_os_str());
-    let mut session = Session::new(found.taken.started, Provenance::Imported, sensor, air);
-    session.array.clone_from(&found.taken.array);
+    let mut session = Session::new(found.assumptions.started, Provenance::Imported, sensor, air);
+    session.array.clone_from(&found.assumptions.array);
     if let Some(scene) = scene {
         session.set_scene(scene);
     }
     session.imported = Some(Box::new(ImportRef {
         file: name.to_string_lossy().into_owned(),
-        sha256: found.taken.sha256.clone(),
+        sha256: found.assumptions.sha256.clone(),
         mapping,
         poses_known: has_poses(args, found),
     }));

@@ -9,7 +9,7 @@ use comfy_table::{CellAlignment, Table};
 
 use super::{
     Failure, Outcome,
-    answer::answer,
+    answer::print_result,
     compare::RULED,
     findings::{FindingsArgs, ScanOrigin},
     logs::first_log,
@@ -18,7 +18,7 @@ use super::{
     sweeps::for_each_sweep,
 };
 use crate::{
-    interpret::{Extents, Feature, FeatureKind, Noise, InterpretSettings, interpret},
+    interpret::{Extents, Feature, FeatureKind, InterpretSettings, Noise, interpret},
     plot::draw_features,
     scan::ScanView,
 };
@@ -94,7 +94,7 @@ error.";
 pub(super) fn run(args: &Args) -> Outcome {
     let targets = args.files.targets()?;
     let (scans, features) = classify(args)?;
-    answer(args.json, &features, |out| print(out, &features))?;
+    print_result(args.json, &features, |out| print(out, &features))?;
     let mut origin = ScanOrigin::default();
     scans.iter().for_each(|scan| origin.add(scan));
     targets.write(&origin.place(None, &[], &features), || {
@@ -191,8 +191,8 @@ fn print(out: &mut impl Write, features: &[Feature]) -> io::Result<()> {
                 next.x_m,
                 next.y_m,
                 next.decides,
-                100.0 * next.least_plane_m,
-                100.0 * next.least_corner_m
+                100.0 * next.min_plane_m,
+                100.0 * next.min_corner_m
             )?;
         }
     }

@@ -9,7 +9,7 @@ use std::{
 
 use super::{
     Failure, Outcome,
-    answer::answer,
+    answer::print_result,
     findings::{FindingsArgs, ScanOrigin},
     logs::{DrawnScans, first_log},
     picture::scene_for,
@@ -78,7 +78,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     }
     let targets = args.files.targets()?;
     let LineMapInput { scans, origin, map, discarded } = read_logs(args)?;
-    answer(args.json, map.lines().iter().map(record), |out| print(out, &map, discarded))?;
+    print_result(args.json, map.lines().iter().map(record), |out| print(out, &map, discarded))?;
     targets.write(&origin.place(None, map.lines(), &[]), || {
         let scene = scene_for(&first_log(&args.logs), &scans, args.scene.as_deref())?;
         Ok(draw_lines(&scans, scene.as_ref(), map.lines()))

@@ -11,7 +11,7 @@ use uuid::Uuid;
 
 use super::{
     Failure, Outcome,
-    answer::answer,
+    answer::print_result,
     compare::RULED,
     numbers::within,
     prior::{self, PriorSigma},
@@ -19,7 +19,10 @@ use super::{
     what_if::InsteadArgs,
     worlds::SweepArgs,
 };
-use crate::inverse::{CoarseGrid, NuisanceEstimate, Tracker, Misfit, ParameterGroup, PoseMode, Odometry, World, diagnose, locate};
+use crate::inverse::{
+    CoarseGrid, Misfit, NuisanceEstimate, Odometry, ParameterGroup, PoseMode, Tracker, World,
+    diagnose, locate,
+};
 
 /// Options of `sonard locate`.
 #[derive(Debug, clap::Args)]
@@ -104,8 +107,8 @@ Examples:
   sonard locate sweep.jsonl --scene my-room.json --sensor lego-nxt --fit threshold   # another unit
 
 Fields of --json: log, scan, x_m, y_m, heading_deg, probability, sigma_x_m, sigma_y_m, \
-sigma_heading_deg, explained (share of the readings), besides (name, value and sigma of the \
-parameters of --fit), doubts (likely errors).
+sigma_heading_deg, explained (share of the readings), nuisance (name, value and sigma of the \
+parameters of --fit), diagnoses (likely errors).
 
 Exit codes: 0 done, 2 wrong usage or input.";
 
@@ -116,7 +119,7 @@ struct LocatedPose<'a> {
     #[serde(flatten)]
     mode: &'a PoseMode,
     #[serde(skip_serializing_if = "<[_]>::is_empty")]
-    doubts: &'a [Misfit],
+    diagnoses: &'a [Misfit],
 }
 
 pub(super) fn run(args: &Args) -> Outcome {
@@ -134,13 +137,13 @@ pub(super) fn run(args: &Args) -> Outcome {
             None => locate(world, atlas, &sweep),
         };
         let modes = modes.map_err(|error| failure_from(&error))?;
-        let doubts = diagnose(world, atlas, &sweep, &modes);
+        let diagnoses = diagnose(world, atlas, &sweep, &modes);
         found = true;
         let log = log.display().to_string();
         let located =
-            |mode| LocatedPose { log: log.clone(), scan: sweep.scan, mode, doubts: &diagnose };
-        answer(args.json, modes.iter().map(located), |out| {
-            print(out, &log, sweep.scan, &modes, &diagnose)
+            |mode| LocatedPose { log: log.clone(), scan: sweep.scan, mode, diagnoses: &diagnoses };
+        print_result(args.json, modes.iter().map(located), |out| {
+            print(out, &log, sweep.scan, &modes, &diagnoses)
         })
     })?;
     if found {
@@ -150,12 +153,12 @@ pub(super) fn run(args: &Args) -> Outcome {
 }
 
 fn atlas(world: &World, args: &Args) -> Result<CoarseGrid, Failure> {
-    let besides = prior::parameters(&args.fit, &args.prior, world, 1)?;
+    let nuisance = prior::parameters(&args.fit, &args.prior, world, 1)?;
     let spacing_m = args.spacing_m.unwrap_or_else(|| CoarseGrid::default_spacing_m(&world.scene));
     let bar = progress::spinner("predicting on the grid of positions");
     let atlas = CoarseGrid::new(world, spacing_m).map_err(|error| failure_from(&error))?;
     bar.finish_and_clear();
-    Ok(atlas.with_nuisance(besides))
+    Ok(atlas.with_nuisance(nuisance))
 }
 
 fn failure_from(error: &dyn std::fmt::Display) -> Failure {
@@ -167,14 +170,14 @@ fn print(
     log: &str,
     scan: Uuid,
     modes: &[PoseMode],
-    doubts: &[Misfit],
+    diagnoses: &[Misfit],
 ) -> io::Result<()> {
     writeln!(out, "{log}: scan {scan}")?;
     let mut table = Table::new();
     table.load_style(RULED);
-    let besides = modes.first().map_or(&[][..], |mode| &mode.besides);
+    let nuisance = modes.first().map_or(&[][..], |mode| &mode.nuisance);
     let head = ["probability", "x m", "y m", "heading deg", "explained"].map(str::to_owned);
-    table.set_header(head.into_iter().chain(besides.iter().map(|of| of.name.clone())));
+    table.set_header(head.into_iter().chain(nuisance.iter().map(|of| of.name.clone())));
     for mode in modes {
         let pose = [
             format!("{:.3}", mode.probability),
@@ -184,11 +187,11 @@ fn print(
             format!("{:.0} %", 100.0 * mode.explained),
         ];
         let parameter = |of: &NuisanceEstimate| format!("{:.2} \u{b1} {:.2}", of.value, of.sigma);
-        table.add_row(pose.into_iter().chain(mode.besides.iter().map(parameter)));
+        table.add_row(pose.into_iter().chain(mode.nuisance.iter().map(parameter)));
     }
     for column in table.column_iter_mut() {
         column.set_cell_alignment(CellAlignment::Right);
     }
     writeln!(out, "{table}")?;
-    diagnose.iter().try_for_each(|diagnosis| writeln!(out, "warning: {diagnosis}"))
+    diagnoses.iter().try_for_each(|diagnosis| writeln!(out, "warning: {diagnosis}"))
 }

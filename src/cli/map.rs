@@ -6,7 +6,7 @@ use std::path::PathBuf;
 
 use super::{
     Failure, Outcome,
-    answer::answer,
+    answer::print_result,
     findings::{self, ScanOrigin},
     logs::first_log,
     map_file,
@@ -19,7 +19,7 @@ use crate::{
     interpret::{
         Extents, Sweep,
         grid::Grid,
-        mapping::{Mapper, MapSettings},
+        mapping::{MapSettings, Mapper},
         prediction::Assessment,
     },
     plot::{MapView, badge_for, draw_map},
@@ -177,7 +177,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     args.overwrite.save(&args.out.join("map.png"), Product::Png, &png)?;
     let place = origin.place(Some(&mapped.grid), &[], &[]);
     findings::write(&args.out.join("map.mcap"), Product::Recording, args.overwrite, &place)?;
-    answer(args.json, [&summary], |out| summary.print(out))
+    print_result(args.json, [&summary], |out| summary.print(out))
 }
 
 /// Title with the name of the mapped room.

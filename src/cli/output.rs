@@ -28,7 +28,7 @@ use clap::{
 use super::{Failure, Outcome};
 use crate::{
     export::{CsvExport, McapExport, ParquetExport, is_geojson},
-    store::{FileKind, HEAD_BYTES, LogWriter, RecordWriter, StoreError, AtomicFile},
+    store::{AtomicFile, FileKind, HEAD_BYTES, LogWriter, RecordWriter, StoreError},
 };
 pub(super) use stream::Stream;
 

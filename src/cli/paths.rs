@@ -117,8 +117,10 @@ pub(super) fn run(args: &Args) -> Outcome {
     let scene = Arc::new(scene.with_robot_at(&pose));
     let simulator = Simulator::new(scene, args.sensor.sensor()?, args.air.air()?, options)
         .map_err(|error| Failure::input(error, "see `sonard paths --help`"))?;
-    let settings =
-        crate::model::paths::Settings { floor: args.min_amplitude, ..simulator.path_settings() };
+    let settings = crate::model::paths::PathSettings {
+        floor: args.min_amplitude,
+        ..simulator.path_settings()
+    };
     let paths = Paths::new(simulator.scene(), settings);
     let [transmitter, receiver] = match args.azimuth_deg {
         None => [pose.position(); 2],
@@ -127,7 +129,7 @@ pub(super) fn run(args: &Args) -> Outcome {
             simulator.sensor().mounting.viewpoint(&axis).transducer_positions()
         }
     };
-    let printed = paths.each_between(transmitter, receiver, |paths| {
+    let printed = paths.visit_between(transmitter, receiver, |paths| {
         let count = paths.len();
         let lines = paths.map(|path| path_line(&simulator, &path));
         if args.json { write_json(lines) } else { write_table(lines, count) }

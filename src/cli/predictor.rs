@@ -150,7 +150,7 @@ fn predict_array(scan: &mut ScanView, pose: &Pose, model: &ArrayModel) -> Result
         let prediction =
             in_round.map_or_else(|| at_pose.ping(ranger), |firing| at_pose.ping_in_round(firing));
         let prediction = prediction.map_err(|error| failure_from(error.into()))?;
-        set_prediction(ping, SimRecord::of_array(&at_pose, ranger, &prediction));
+        set_prediction(ping, SimRecord::for_array(&at_pose, ranger, &prediction));
     }
     Ok(())
 }

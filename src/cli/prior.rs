@@ -3,7 +3,7 @@
 use std::str::FromStr;
 
 use super::Failure;
-use crate::inverse::{ParameterGroup, GroupError, Prior, World, priors};
+use crate::inverse::{GroupError, ParameterGroup, Prior, World, priors};
 
 /// Value of `--prior`: `NAME=SIGMA`.
 #[derive(Debug, Clone, PartialEq)]

@@ -25,7 +25,7 @@ use super::{
 };
 use crate::{
     link::{self, BAUD, PortOpener},
-    mock::{MockBoard, MockPort, EchoTable},
+    mock::{EchoTable, MockBoard, MockPort},
     model::OptionKeys,
     ranger::{DriveError, Driver, Motion, PreparedScan, Ranger, ScanError, ScanSummary},
     scan::Record,

@@ -8,7 +8,7 @@ use super::{Failure, output::register_input};
 use crate::{
     geometry::Pose,
     scan::Session,
-    scene::{PoseError, Scene, SceneError, shipped, sanitize, suggest},
+    scene::{PoseError, Scene, SceneError, sanitize, shipped, suggest},
     store::{SceneUnavailable, logged_scene},
 };
 

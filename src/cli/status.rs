@@ -117,14 +117,14 @@ fn describe(status: &Status, health: &Health) -> String {
 
 /// Describes the state of the ROS 2 node.
 fn ros(report: &RosReport) -> String {
-    let RosReport { domain, messages, left_out, subscriptions, .. } = report;
+    let RosReport { domain, messages, dropped, subscriptions, .. } = report;
     let networks = report.networks.join(", ");
-    if let Some(why) = &report.trouble {
+    if let Some(why) = &report.error {
         return format!("  ros      domain {domain} not connected: {why}");
     }
     let refusal = report.refusal.as_ref().map(|why| format!("; last rejected: {why}"));
     format!(
-        "  ros      domain {domain} on {networks}; {subscriptions} subscriptions, {messages} messages, {left_out} \
+        "  ros      domain {domain} on {networks}; {subscriptions} subscriptions, {messages} messages, {dropped} \
          dropped{}",
         refusal.unwrap_or_default()
     )
@@ -132,16 +132,16 @@ fn ros(report: &RosReport) -> String {
 
 /// Describes the state of the MQTT broker.
 fn broker(report: &MqttReport) -> String {
-    let MqttReport { broker, acknowledged, left_out, behind_bytes, .. } = report;
-    let left_out = match left_out {
+    let MqttReport { broker, acknowledged, skipped, lag_bytes, .. } = report;
+    let skipped = match skipped {
         0 => String::new(),
         count => format!("{count} skipped, "),
     };
     let connection = if report.connected { "connected" } else { "not connected" };
-    let why = report.trouble.as_ref().map(|why| format!(" ({why})")).unwrap_or_default();
-    let behind_kb = *behind_bytes as f64 / 1e3;
+    let why = report.error.as_ref().map(|why| format!(" ({why})")).unwrap_or_default();
+    let behind_kb = *lag_bytes as f64 / 1e3;
     format!(
-        "  mqtt     {broker} {connection}{why}; {acknowledged} records acknowledged, {left_out}{behind_kb:.0} kB behind"
+        "  mqtt     {broker} {connection}{why}; {acknowledged} records acknowledged, {skipped}{behind_kb:.0} kB behind"
     )
 }
 
@@ -193,7 +193,7 @@ fn device(status: &Status, health: &Health) -> Vec<String> {
         format!(
             "  link     {} CRC errors, {} requests repeated, {} readings re-requested, {} rejected, {} \
          disconnects",
-            line.crc_errors, line.retries, line.repaired, line.refused, line.losses,
+            line.crc_errors, line.retries, line.repaired, line.rejected, line.losses,
         ),
     ]
 }

@@ -152,7 +152,7 @@ fn format_record(line: &[u8]) -> String {
                 PingStatus::NoEcho => "no echo",
                 PingStatus::MinRange => "minimum range",
                 PingStatus::LinkLost => "link lost",
-                PingStatus::StepDoubtful => "step uncertain",
+                PingStatus::StepUncertain => "step uncertain",
                 PingStatus::ModuleFault => "module fault",
             };
             let model = ping

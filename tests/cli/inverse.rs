@@ -87,9 +87,9 @@ fn symmetric_and_wrong_rooms() {
     let mode = found.iter().find(is_there).expect("the right one");
     assert!((number(mode, "y_m") - 0.085).abs() < 0.02, "{mode}");
     assert!(number(mode, "heading_deg").abs() < 1.0, "{mode}");
-    assert!(number(mode, "explained") > 0.95 && mode["doubts"].is_null(), "{mode}");
+    assert!(number(mode, "explained") > 0.95 && mode["diagnoses"].is_null(), "{mode}");
     let elsewhere = lines(&["locate", &log, "--scene", "oblique-corner", "--json"]);
-    assert!(elsewhere[0]["doubts"][0]["kind"].is_string(), "{}", elsewhere[0]);
+    assert!(elsewhere[0]["diagnoses"][0]["kind"].is_string(), "{}", elsewhere[0]);
 }
 
 /// A ranger less sensitive than the one that `locate` is told of, and one whose log says so.
@@ -113,7 +113,7 @@ fn threshold_with_pose() {
         let found = lines(&[&fit[..], &[log.as_str()], &told[..]].concat());
         let off_m = (number(&found[0], "x_m") - 1.0).hypot(number(&found[0], "y_m") - 1.3);
         assert!(off_m < 0.02, "{sensor:?}: {}", found[0]);
-        let besides = &found[0]["besides"][0];
+        let besides = &found[0]["nuisance"][0];
         assert_eq!(besides["name"], "threshold_db");
         let off_db = number(besides, "value") - 20.0 * THRESHOLD.log10();
         assert!(off_db.abs() < 1.0 && number(besides, "sigma") < 1.0, "{sensor:?}: {besides}");

@@ -247,7 +247,7 @@ def wait_for_rest(daemon):
     until("the scans", lambda: is_idle(daemon))
     # Longer than it takes to tell how far behind the broker is.
     time.sleep(2.5)
-    until("all of it", lambda: daemon.mqtt()["connected"] and daemon.mqtt()["behind_bytes"] == 0)
+    until("all of it", lambda: daemon.mqtt()["connected"] and daemon.mqtt()["lag_bytes"] == 0)
 
 
 def kills(work):
@@ -313,7 +313,7 @@ def catch_up(work):
     until("a connection", lambda: daemon.mqtt()["connected"])
     before, cpu_s = time.monotonic(), daemon.cpu_s()
     first = daemon.mqtt()["acknowledged"]
-    until("all of it", lambda: daemon.mqtt()["behind_bytes"] == 0 and daemon.mqtt()["waiting"] == 0)
+    until("all of it", lambda: daemon.mqtt()["lag_bytes"] == 0 and daemon.mqtt()["waiting"] == 0)
     took, used = time.monotonic() - before, daemon.cpu_s() - cpu_s
     sent = daemon.mqtt()["acknowledged"] - first
     print(f"catching up: at least {sent / took:.0f} records/s ({sent} in {took:.2f} s, {used:.2f} s of processor time)")
@@ -361,7 +361,7 @@ def secrets(work):
 
     for wrong, told in [(("wrong", "ca"), "password"), (("right", "other"), "TLS")]:
         daemon = Daemon(folder, settings(*wrong))
-        until(told, lambda: told in (daemon.mqtt()["trouble"] or ""))
+        until(told, lambda: told in (daemon.mqtt()["error"] or ""))
         print(f"told: {daemon.mqtt()['trouble']}")
         assert not daemon.mqtt()["connected"]
         daemon.stop()

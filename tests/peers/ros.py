@@ -243,7 +243,7 @@ def compare(name, options, rangers=(), namespace="", **keys):
     late(daemon, subscriber, types, namespace, expected)
     known_as(subscriber, namespace, is_humble, offered)
     status = daemon.status()["ros"]
-    assert status["left_out"] == 0 and status["messages"] >= compared, status
+    assert status["dropped"] == 0 and status["messages"] >= compared, status
     figures = daemon.ask("GET", "/metrics")
     assert "sonard_ros_up 1" in figures and "sonard_ros_left_out_messages_total 0" in figures, figures
     daemon.stop()
@@ -417,7 +417,7 @@ def stuck():
     time.sleep(3)
     before_kb, before = daemon.memory_kb(), daemon.status()
     os.kill(other, signal.SIGSTOP)
-    until(lambda: daemon.status()["ros"]["left_out"] > before["ros"]["left_out"] + 50, "messages left out", 60)
+    until(lambda: daemon.status()["ros"]["dropped"] > before["ros"]["dropped"] + 50, "messages left out", 60)
     after_kb, after = daemon.memory_kb(), daemon.status()
     until(lambda: daemon.status()["last_reading_age_s"] < 5, "readings go on", 30)
     gaps = [line for file in daemon.log.glob("*.jsonl") for line in file.read_text().splitlines()
@@ -432,7 +432,7 @@ def stuck():
     os.kill(other, signal.SIGKILL)
     os.waitpid(other, 0)
     daemon.stop()
-    print(f"ros: a subscriber that stopped reading: {after['ros']['left_out']} messages left out, "
+    print(f"ros: a subscriber that stopped reading: {after['ros']['dropped']} messages left out, "
           f"memory {before_kb} -> {after_kb} kB, told {len(gaps)} times, others go on")
 
 

@@ -49,6 +49,6 @@ pub use status::{
 };
 
 // Types of the API that the model crates define.
-pub use sonard_interpret::compare::{Annotations, AnnotatedPing, Classification};
+pub use sonard_interpret::compare::{AnnotatedPing, Annotations, Classification};
 pub use sonard_inverse::{Misfit, PoseMode};
 pub use sonard_records::{Body, Circle, FloorPlan, PeakLine, PlanPoint, TraceLine, WallLine};

@@ -25,7 +25,7 @@ pub use keys::{
 pub use layers::{ConfigError, ConfigLayers, Origin};
 pub use mqtt::{BrokerAddress, MqttKeys};
 pub use ros::{RosDistribution, RosKeys, RosProfile};
-pub use schema::{ConfigForm, Key, ValueKind, Section, read_sections, sections};
+pub use schema::{ConfigForm, Key, Section, ValueKind, read_sections, sections};
 
 /// Invalid key of a section, with the error message and its remedy.
 pub type Fault = (&'static str, String, String);

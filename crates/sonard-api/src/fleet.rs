@@ -11,7 +11,9 @@ mod registry;
 mod state;
 mod watch;
 
-pub use member::{PolledDaemon, MAX_MEMBERS, Member, MemberError, check_members, members_from_keys, read_members};
+pub use member::{
+    MAX_MEMBERS, Member, MemberError, PolledDaemon, check_members, members_from_keys, read_members,
+};
 pub use poll::{DaemonReport, poll};
 pub use registry::Registry;
 pub use state::{Observation, PollError, observe, sanitize};

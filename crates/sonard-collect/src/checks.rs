@@ -145,7 +145,11 @@ mod tests {
         assert_eq!(check_figures(&good(), &keys), []);
         for (figures, name, action) in [
             (ScanFigures { missing: 1, ..good() }, "missing_beams", Action::Retake),
-            (ScanFigures { home_drift_steps: Some(-1), ..good() }, "home_drift_steps", Action::Retake),
+            (
+                ScanFigures { home_drift_steps: Some(-1), ..good() },
+                "home_drift_steps",
+                Action::Retake,
+            ),
             (
                 ScanFigures { temperature_change_c: Some(-0.6), ..good() },
                 "temperature_change_c",

@@ -2,7 +2,7 @@
 
 use std::{path::Path, time::Duration};
 
-use super::{SavedSettings, CollectError, CollectionPlan, record_scan::RecordedScan};
+use super::{CollectError, CollectionPlan, SavedSettings, record_scan::RecordedScan};
 use sonard_api::AirOrder;
 use sonard_device::ranger::PreparedScan;
 use sonard_model::geometry::Pose;

@@ -19,8 +19,8 @@ use sonard_runtime::interrupts::Interrupts;
 use uuid::Uuid;
 
 use super::{
-    AfterRetakes, Conditions, ScanDevice, JournalEntry, CollectionFolder, CollectError, CollectionJournal, CollectionManifest, NamedPose, RetrySchedule,
-    CollectionPlan, Slot, Observer,
+    AfterRetakes, CollectError, CollectionFolder, CollectionJournal, CollectionManifest,
+    CollectionPlan, Conditions, JournalEntry, NamedPose, Observer, RetrySchedule, ScanDevice, Slot,
     estimate::{Pace, disk_bytes},
     pose_source::{PoseSource, answered},
 };
@@ -110,7 +110,9 @@ impl<D: ScanDevice, W: Observer> Collector<D, W> {
             self.carry_to(slot.pose)?;
             let taken = self.take(slot).await?;
             if let Next::Stop(reason) = self.evaluate(slot, taken).await? {
-                return Err(CollectError::Stopped(format!("{reason}\nrun the same command to resume")));
+                return Err(CollectError::Stopped(format!(
+                    "{reason}\nrun the same command to resume"
+                )));
             }
         }
         Ok(())
@@ -201,7 +203,11 @@ impl<D: ScanDevice, W: Observer> Collector<D, W> {
     }
 
     /// Prompts for the conditions of a pose that are not recorded yet.
-    async fn prompt_at_pose(&mut self, number: u32, mut pose: NamedPose) -> Result<(), CollectError> {
+    async fn prompt_at_pose(
+        &mut self,
+        number: u32,
+        mut pose: NamedPose,
+    ) -> Result<(), CollectError> {
         let questions = self.plan.keys.ask.at_pose.clone();
         let open: Vec<_> =
             questions.into_iter().filter(|key| !pose.conditions.contains_key(key)).collect();
@@ -284,7 +290,7 @@ impl<D: ScanDevice, W: Observer> Collector<D, W> {
         let reason = format!("pose {pose}, repeat {repeat}: {retakes} retakes failed");
         match self.plan.keys.collection.after_retakes {
             AfterRetakes::Stop => Ok(Next::Stop(reason)),
-            AfterRetakes::GoOn => {
+            AfterRetakes::Continue => {
                 self.watcher.message(&format!("{reason}: continuing without this scan"));
                 self.append(JournalEntry::GivenUp { slot, time: jiff::Timestamp::now() })?;
                 Ok(Next::Continue)
@@ -300,7 +306,12 @@ fn free_bytes(folder: &CollectionFolder) -> Option<u64> {
 }
 
 /// Warns if the remaining scans are expected to exceed the free disk space.
-fn warn_of_disk(plan: &CollectionPlan, folder: &CollectionFolder, scans: u32, watcher: &impl Observer) {
+fn warn_of_disk(
+    plan: &CollectionPlan,
+    folder: &CollectionFolder,
+    scans: u32,
+    watcher: &impl Observer,
+) {
     let required = disk_bytes(plan, scans);
     if let Some(free) = free_bytes(folder).filter(|&free| required > free as f64) {
         watcher.message(&format!(

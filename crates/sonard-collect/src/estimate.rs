@@ -5,7 +5,7 @@ use firmware_protocol::messages::{
 };
 use sonard_device::{
     link::BAUD,
-    ranger::{ScanDuration, ReceiverTiming},
+    ranger::{ReceiverTiming, ScanDuration},
 };
 
 use super::{CollectError, CollectionPlan, error::MOTOR_STEP_HELP};

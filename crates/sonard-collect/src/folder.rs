@@ -14,7 +14,7 @@ use std::{
 };
 
 use sha2::{Digest as _, Sha256};
-use sonard_log::{AtomicFile, file_digest, to_hex, sync_folder_of};
+use sonard_log::{AtomicFile, file_digest, sync_folder_of, to_hex};
 
 use super::order::Slot;
 
@@ -313,7 +313,10 @@ mod tests {
     fn rejects_other_folders() {
         let root = tempfile::tempdir().expect("a folder");
         fs::write(root.path().join("thesis.tex"), "").expect("writable");
-        assert!(matches!(CollectionFolder::open(root.path()), Err(FolderError::NotACollection { .. })));
+        assert!(matches!(
+            CollectionFolder::open(root.path()),
+            Err(FolderError::NotACollection { .. })
+        ));
         assert_eq!(fs::read_dir(root.path()).expect("readable").count(), 1);
     }
 

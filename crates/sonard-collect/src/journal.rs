@@ -17,7 +17,7 @@ use sonard_records::{Device, Provenance, SceneRef};
 use uuid::Uuid;
 
 use super::{
-    checks::{ScanFigures, CheckFinding},
+    checks::{CheckFinding, ScanFigures},
     folder::FolderError,
     keys::{CollectionKeys, Conditions},
     order::{Slot, slots},
@@ -41,11 +41,11 @@ pub enum JournalEntry {
         pose: NamedPose,
     },
     /// Result of a scan.
-    Take(Box<ScanAttempt>),
+    Attempt(Box<ScanAttempt>),
     /// Settings of the daemon before the collection changed them.
-    Borrowed(SavedSettings),
+    SavedSettings(SavedSettings),
     /// Restoration of the daemon's settings.
-    GivenBack {
+    RestoredSettings {
         /// Time of the restoration.
         time: Timestamp,
     },
@@ -98,19 +98,19 @@ pub struct SavedSettings {
     /// Scan mode and interval.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub scanning: Option<ScanningKeys>,
-    /// PoseSource of the air settings.
+    /// Source of the air settings.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub air: Option<SavedAir>,
 }
 
-/// PoseSource of a daemon's air settings.
+/// Source of a daemon's air settings.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum SavedAir {
     /// Configuration and thermometer of the daemon.
-    Own,
+    Daemon,
     /// Values set by a client.
-    Given(AirOrder),
+    Client(AirOrder),
 }
 
 /// Outcome of a scan.
@@ -120,9 +120,9 @@ pub enum ScanOutcome {
     /// Accepted as part of the collection.
     Accepted,
     /// Rejected by a check; kept in `set-aside/`.
-    Refused,
+    Rejected,
     /// Ended early; kept in `set-aside/`.
-    Cut,
+    Incomplete,
 }
 
 /// Result of one attempt at a scan.
@@ -150,7 +150,7 @@ pub struct ScanAttempt {
     pub findings: Vec<CheckFinding>,
     /// Reason for an early end.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub cut: Option<String>,
+    pub incomplete_reason: Option<String>,
     /// Duration by the wall clock, seconds; `null` if unknown.
     pub wall_s: Option<f64>,
 }
@@ -178,9 +178,9 @@ impl CollectionHistory {
             JournalEntry::Plan(plan) => self.plans.push(*plan),
             JournalEntry::Started(started) => self.starts.push(*started),
             JournalEntry::Pose { number, pose } => drop(self.poses.insert(number, pose)),
-            JournalEntry::Take(take) => self.attempts.push(*take),
-            JournalEntry::Borrowed(before) => self.saved_settings = Some(before),
-            JournalEntry::GivenBack { .. } => self.saved_settings = None,
+            JournalEntry::Attempt(take) => self.attempts.push(*take),
+            JournalEntry::SavedSettings(before) => self.saved_settings = Some(before),
+            JournalEntry::RestoredSettings { .. } => self.saved_settings = None,
             JournalEntry::GivenUp { slot, .. } => drop(self.given_up.insert(slot)),
         }
     }
@@ -230,8 +230,9 @@ impl CollectionJournal {
     /// is not a valid entry.
     pub fn open(path: &Path) -> Result<Self, FolderError> {
         let fail = |source| FolderError::io("open", path, source);
-        let mut file = open_no_follow(OpenOptions::new().read(true).append(true).create(true), path)
-            .map_err(fail)?;
+        let mut file =
+            open_no_follow(OpenOptions::new().read(true).append(true).create(true), path)
+                .map_err(fail)?;
         match rustix::fs::flock(&file, rustix::fs::FlockOperation::NonBlockingLockExclusive) {
             Ok(()) => {}
             Err(rustix::io::Errno::WOULDBLOCK) => {

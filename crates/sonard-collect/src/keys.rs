@@ -8,7 +8,7 @@ use std::sync::LazyLock;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use sonard_api::config::{
-    CollectionAirKeys, DeviceKeys, ConfigForm, MotionKeys, PlanKeys, Section, read_sections,
+    CollectionAirKeys, ConfigForm, DeviceKeys, MotionKeys, PlanKeys, Section, read_sections,
 };
 use sonard_model::model::OptionKeys;
 
@@ -75,7 +75,7 @@ pub struct CollectionSection {
     /// Time before the collection stops if the ranger is gone or loses its scans, seconds. Retries
     /// within that time are increasingly rare. The same command resumes a stopped collection.
     #[schemars(range(min = 0, max = 604_800))]
-    pub patience_s: f64,
+    pub retry_limit_s: f64,
 }
 
 /// Order of the scans.
@@ -97,7 +97,7 @@ pub enum Order {
 pub enum AfterRetakes {
     /// Continue without the scan.
     #[default]
-    GoOn,
+    Continue,
     /// Stop the collection.
     Stop,
 }
@@ -245,7 +245,7 @@ impl Default for CollectionSection {
             pause_s: 0.0,
             retakes: 3,
             after_retakes: AfterRetakes::default(),
-            patience_s: 600.0,
+            retry_limit_s: 600.0,
         }
     }
 }
@@ -303,7 +303,7 @@ impl ConfigForm for CollectionKeys {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use sonard_api::config::{ValueKind, ConfigLayers, document};
+    use sonard_api::config::{ConfigLayers, ValueKind, document};
 
     fn read(text: &str) -> Result<CollectionKeys, sonard_api::config::ConfigError> {
         ConfigLayers::<CollectionKeys>::new().with_file("plan.toml", text)?.into_keys()

@@ -33,20 +33,26 @@ mod remote_device;
 mod repeatability;
 mod retry;
 
-pub use checks::{ScanFigures, CheckFinding, check_figures, ended_early, strongest_action};
+pub use checks::{CheckFinding, ScanFigures, check_figures, ended_early, strongest_action};
 pub use device::{ConnectedDevice, ScanDevice, ScanTask};
 pub use engine::{RunOptions, collect};
 pub use error::CollectError;
 pub use estimate::{budget, disk_bytes};
-pub use folder::{CollectionFolder, FolderError, INPUTS, JOURNAL, SCANS, SET_ASIDE, SealedFile, sha256, scan_stem};
+pub use folder::{
+    CollectionFolder, FolderError, INPUTS, JOURNAL, SCANS, SET_ASIDE, SealedFile, scan_stem, sha256,
+};
 pub use journal::{
-    SavedAir, SavedSettings, JournalEntry, CollectionHistory, CollectionJournal, ScanOutcome, PlanEntry, RunStart, ScanAttempt, read_journal,
+    CollectionHistory, CollectionJournal, JournalEntry, PlanEntry, RunStart, SavedAir,
+    SavedSettings, ScanAttempt, ScanOutcome, read_journal,
 };
 pub use keys::{
     Action, AfterRetakes, AirAction, AskKeys, CheckKeys, CollectionKeys, CollectionSection,
     Conditions, Order, PosesKeys, SceneKeys, SensorKeys,
 };
-pub use manifest::{CollectionCounts, FileEntry, MANIFEST, CollectionManifest, ScanEntry, Verification, verify_collection};
+pub use manifest::{
+    CollectionCounts, CollectionManifest, FileEntry, MANIFEST, ScanEntry, Verification,
+    verify_collection,
+};
 pub use observer::Observer;
 pub use order::{Slot, slots};
 pub use plan::{CollectionPlan, Poses};

@@ -10,13 +10,13 @@ use std::{
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
-use sonard_log::{Severity, check, load};
+use sonard_log::{Severity, check_log, load};
 use sonard_records::SceneRef;
 use uuid::Uuid;
 
 use super::{
     folder::{CollectionFolder, FolderError, JOURNAL, SealedFile},
-    journal::{CollectionHistory, ScanOutcome, RunStart, read_journal},
+    journal::{CollectionHistory, RunStart, ScanOutcome, read_journal},
     order::Slot,
     poses::NamedPose,
 };
@@ -112,7 +112,10 @@ impl CollectionManifest {
     ///
     /// # Errors
     /// Returns an error if a file cannot be read or the journal has no plan.
-    pub fn from_history(folder: &CollectionFolder, history: &CollectionHistory) -> Result<Self, FolderError> {
+    pub fn from_history(
+        folder: &CollectionFolder,
+        history: &CollectionHistory,
+    ) -> Result<Self, FolderError> {
         let requested = history.requested();
         let plan = history.plans.last().ok_or_else(|| FolderError::Damaged {
             path: folder.journal(),

@@ -1,6 +1,6 @@
 //! Progress reports and prompts of a running collection.
 
-use super::{CollectionFolder, CollectError, CollectionHistory};
+use super::{CollectError, CollectionFolder, CollectionHistory};
 
 /// Receiver of progress reports that answers prompts: a terminal, or an unattended process.
 pub trait Observer: Send + Sync {
@@ -28,5 +28,9 @@ pub trait Observer: Send + Sync {
     ///
     /// # Errors
     /// Returns an error if the report cannot be written.
-    fn write_report(&self, folder: &CollectionFolder, history: &CollectionHistory) -> Result<(), CollectError>;
+    fn write_report(
+        &self,
+        folder: &CollectionFolder,
+        history: &CollectionHistory,
+    ) -> Result<(), CollectError>;
 }

@@ -2,7 +2,7 @@
 
 use std::{path::PathBuf, sync::Arc};
 
-use super::{CollectionKeys, CollectError, NamedPose};
+use super::{CollectError, CollectionKeys, NamedPose};
 use sonard_api::{AirOrder, config::ConfigLayers};
 use sonard_device::ranger::{Motion, ScanInputs};
 use sonard_model::{
@@ -14,7 +14,7 @@ use sonard_records::ScanPlan;
 /// Keys of the plan's `[air]` section.
 const AIR_KEYS: [&str; 4] = ["temperature_c", "humidity_percent", "pressure_kpa", "file"];
 
-/// PoseSource of a collection's poses.
+/// Source of a collection's poses.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Poses {
     /// Poses listed in the plan or in a file.
@@ -67,7 +67,7 @@ impl CollectionPlan {
             sensor: self.sensor.clone(),
             air,
             // Options that the engine does not support are rejected when the plan is read.
-            options: self.keys.sensor.options.options_of_engine(),
+            options: self.keys.sensor.options.engine_options(),
         }
     }
 
@@ -77,8 +77,9 @@ impl CollectionPlan {
     /// Returns an error if a value is outside the valid range.
     pub fn air(&self, temperature_c: f64) -> Result<Air, CollectError> {
         let keys = &self.keys.air;
-        Air::new(temperature_c, keys.humidity_percent, keys.pressure_kpa)
-            .map_err(|error| CollectError::failed(error, "degrees Celsius, percent and kilopascals"))
+        Air::new(temperature_c, keys.humidity_percent, keys.pressure_kpa).map_err(|error| {
+            CollectError::failed(error, "degrees Celsius, percent and kilopascals")
+        })
     }
 
     /// Motion and measurement settings.

@@ -2,13 +2,17 @@
 
 use serde_json::Value;
 
-use super::{CollectionKeys, CollectionHistory, CollectionPlan, Poses, find_numbers};
+use super::{CollectionHistory, CollectionKeys, CollectionPlan, Poses, find_numbers};
 
 /// Keys that do not affect the collected scans.
 const IGNORED_KEYS: [&str; 3] = ["collection.folder", "collection.patience_s", "device.port"];
 
 /// Lists the differences from the journal's last plan, one message each.
-pub(super) fn plan_changes(history: &CollectionHistory, now: &CollectionPlan, sensor_sha256: &str) -> Vec<String> {
+pub(super) fn plan_changes(
+    history: &CollectionHistory,
+    now: &CollectionPlan,
+    sensor_sha256: &str,
+) -> Vec<String> {
     let Some(before) = history.plans.last() else { return Vec::new() };
     let keys = serde_json::to_value(&now.keys).unwrap_or_default();
     let mut changes = Vec::new();
@@ -24,7 +28,8 @@ pub(super) fn plan_changes(history: &CollectionHistory, now: &CollectionPlan, se
     }
     if let (Poses::Listed(listed), Some(known)) = (&now.poses, &before.poses)
         && changes.is_empty()
-        && find_numbers(listed, &history.poses) != known.iter().map(|n| Some(*n)).collect::<Vec<_>>()
+        && find_numbers(listed, &history.poses)
+            != known.iter().map(|n| Some(*n)).collect::<Vec<_>>()
     {
         changes.push("poses in the file changed".into());
     }

@@ -11,7 +11,7 @@ use sonard_model::scene::Scene;
 use sonard_runtime::interrupts::Interrupts;
 use tokio::sync::mpsc::{Receiver, channel};
 
-use super::{CollectError, NamedPose, Poses, Observer};
+use super::{CollectError, NamedPose, Observer, Poses};
 
 /// Environment variable with the requested pose's number.
 const POSE_VARIABLE: &str = "SONARD_POSE";

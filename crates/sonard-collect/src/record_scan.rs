@@ -53,7 +53,13 @@ pub async fn record_scan<L: AsyncRead + AsyncWrite + Unpin>(
         Err(error @ ScanError::Device(_)) => (Some(error.into()), true),
         Err(error) => return Err(error.into()),
     };
-    Ok(RecordedScan { view: sink.close()?, failure: lost, needs_reconnect: gone, stopped: false, wall_s })
+    Ok(RecordedScan {
+        view: sink.close()?,
+        failure: lost,
+        needs_reconnect: gone,
+        stopped: false,
+        wall_s,
+    })
 }
 
 /// Appends an event to a rejected scan's file, which marks it without the journal.

@@ -15,8 +15,8 @@ use sonard_runtime::interrupts::Interrupts;
 use tokio::time::{Instant, sleep};
 
 use super::{
-    SavedAir, SavedSettings, ConnectedDevice, ScanDevice, CollectError, CollectionPlan, ScanTask,
-    record_scan::{ScanSink, RecordedScan},
+    CollectError, CollectionPlan, ConnectedDevice, SavedAir, SavedSettings, ScanDevice, ScanTask,
+    record_scan::{RecordedScan, ScanSink},
 };
 
 /// Retry interval while the daemon or its ranger is unavailable.
@@ -52,7 +52,7 @@ pub fn steps_per_revolution(status: &Status) -> Option<u16> {
 }
 
 fn link_failure(link: &LinkReport) -> CollectError {
-    let trouble = link.trouble.as_deref().unwrap_or("no details");
+    let trouble = link.error.as_deref().unwrap_or("no details");
     CollectError::failed(
         format!("the daemon's ranger is not available ({}): {trouble}", link.state.name()),
         "see `sonard status`; start the collection again to resume it",
@@ -64,7 +64,11 @@ impl ScanDevice for RemoteDevice {
         false
     }
 
-    fn prepare(&mut self, _plan: &CollectionPlan, _first: &PreparedScan) -> Result<(), CollectError> {
+    fn prepare(
+        &mut self,
+        _plan: &CollectionPlan,
+        _first: &PreparedScan,
+    ) -> Result<(), CollectError> {
         Ok(())
     }
 
@@ -81,15 +85,19 @@ impl ScanDevice for RemoteDevice {
         let status = self.ready().await?;
         match (status.device, status.provenance) {
             (Some(device), Some(provenance)) => Ok(ConnectedDevice { device, provenance }),
-            _ => {
-                Err(CollectError::failed("the daemon has not identified its ranger", "see `sonard status`"))
-            }
+            _ => Err(CollectError::failed(
+                "the daemon has not identified its ranger",
+                "see `sonard status`",
+            )),
         }
     }
 
     /// Returns the settings about to be changed. The daemon's own scans are suspended, because the
     /// pose is known only to the collection; the air is set if the plan specifies it.
-    async fn settings_to_save(&self, air: Option<&AirOrder>) -> Result<Option<SavedSettings>, CollectError> {
+    async fn settings_to_save(
+        &self,
+        air: Option<&AirOrder>,
+    ) -> Result<Option<SavedSettings>, CollectError> {
         let status = self.ready().await?;
         let ScanningReport { mode, every_s, .. } = status.scanning;
         let mut before = self.borrowed.clone();
@@ -99,8 +107,8 @@ impl ScanDevice for RemoteDevice {
         if air.is_some_and(|air| !is_ordered(next_air(&status), air)) {
             // The API's air is an earlier setting by a client and must be restored as such.
             let own = || match next_air(&status).source {
-                AirSource::Api => SavedAir::Given(as_order(next_air(&status))),
-                _ => SavedAir::Own,
+                AirSource::Api => SavedAir::Client(as_order(next_air(&status))),
+                _ => SavedAir::Daemon,
             };
             before.get_or_insert_default().air.get_or_insert_with(own);
         }
@@ -133,8 +141,8 @@ impl ScanDevice for RemoteDevice {
             self.put("/v1/scanning", &scanning).await?;
         }
         match before.air {
-            Some(SavedAir::Given(air)) => self.put("/v1/air", &air).await?,
-            Some(SavedAir::Own) => {
+            Some(SavedAir::Client(air)) => self.put("/v1/air", &air).await?,
+            Some(SavedAir::Daemon) => {
                 self.client.delete("/v1/air").await?;
             }
             None => {}
@@ -149,7 +157,11 @@ impl ScanDevice for RemoteDevice {
         (air.source != AirSource::Configuration).then_some(air.temperature_c)
     }
 
-    async fn record_scan(&mut self, scan: ScanTask<'_>, beam: &(dyn Fn() + Sync)) -> Result<RecordedScan, CollectError> {
+    async fn record_scan(
+        &mut self,
+        scan: ScanTask<'_>,
+        beam: &(dyn Fn() + Sync),
+    ) -> Result<RecordedScan, CollectError> {
         let ScanTask { plan, pose, collection: of, path, .. } = scan;
         let request = ScanRequest { scans: Some(1), plan: Some(plan), pose: Some(pose) };
         let (mut scans, first) = self.begin(&request).await?;
@@ -181,7 +193,13 @@ impl ScanDevice for RemoteDevice {
         }
         let wall_s = began.elapsed().as_secs_f64();
         let stopped = stopped && !self.interrupts.happened();
-        Ok(RecordedScan { view: sink.close()?, needs_reconnect: lost.is_some(), failure: lost, stopped, wall_s })
+        Ok(RecordedScan {
+            view: sink.close()?,
+            needs_reconnect: lost.is_some(),
+            failure: lost,
+            stopped,
+            wall_s,
+        })
     }
 
     async fn close(self) {}
@@ -230,7 +248,9 @@ impl RemoteDevice {
             match self.first_record(&mut scans).await? {
                 Ok(record) => return Ok((scans, record)),
                 Err(error @ ScansError::Cancelled(_)) => {
-                    return Err(CollectError::Stopped(format!("{error}\nrun the same command to resume")));
+                    return Err(CollectError::Stopped(format!(
+                        "{error}\nrun the same command to resume"
+                    )));
                 }
                 Err(_) => {}
             }

@@ -53,7 +53,7 @@ mod tests {
             assert_eq!(judged, before);
         }
         let expected =
-            ["direct", "multiple", "edge", "min_range", "silent", "unexplained", "link_lost"];
+            ["direct", "multiple", "edge", "min_range", "no_echo", "unexplained", "link_lost"];
         assert_eq!(verdicts, expected);
     }
 
@@ -79,7 +79,11 @@ mod tests {
         let ping = view.pings[0].clone();
         assert_eq!(Annotations::for_ping(&ping, None).viewpoint, None);
         view.start = None;
-        assert_eq!(Annotations::for_ping(&ping, Some(&view)).viewpoint, None, "a scan without a pose");
+        assert_eq!(
+            Annotations::for_ping(&ping, Some(&view)).viewpoint,
+            None,
+            "a scan without a pose"
+        );
         view.scan = uuid::Uuid::from_u128(7);
         assert_eq!(Annotations::for_ping(&ping, Some(&view)).viewpoint, None, "another scan");
     }

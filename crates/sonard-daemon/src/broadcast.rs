@@ -143,7 +143,11 @@ impl Hub {
         )
     }
 
-    fn subscribe_counted(&self, wanted: SubscriptionFilter, counts: SubscriberCounts) -> Subscription {
+    fn subscribe_counted(
+        &self,
+        wanted: SubscriptionFilter,
+        counts: SubscriberCounts,
+    ) -> Subscription {
         let guard = CountGuard::new(self, counts);
         let changed = self.inner.records.subscribe();
         let buffers = lock(&self.inner.buffers);

@@ -13,7 +13,7 @@ use firmware_protocol::{
 use sonard_api::{ScanTotals, Trouble};
 use sonard_device::{
     link::{self, BAUD, Line, LinkError},
-    ranger::{DriveError, Driver, Ranger, DeviceEvent, serial_text},
+    ranger::{DeviceEvent, DriveError, Driver, Ranger, serial_text},
 };
 use sonard_records::{EventKind, Session};
 use tokio::time::{Instant, sleep_until};
@@ -370,7 +370,7 @@ impl DeviceTask {
     }
 
     fn check_interval(&self) -> Duration {
-        Duration::from_secs_f64(self.control.settings.keys.link.check_s)
+        Duration::from_secs_f64(self.control.settings.keys.link.status_interval_s)
     }
 }
 

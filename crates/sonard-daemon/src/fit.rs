@@ -3,7 +3,7 @@
 use std::{collections::BTreeMap, sync::Arc};
 
 use sonard_api::ScanFit;
-use sonard_interpret::compare::{Explanation, agrees, compare, classify, quantile};
+use sonard_interpret::compare::{Explanation, agrees, classify, compare, quantile};
 use sonard_records::{Ping, ScanEnd, ScanStart, ScanView, Session};
 
 /// Maximum number of readings of a scan that is explained. They are kept in memory until the scan

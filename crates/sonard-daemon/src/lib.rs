@@ -56,17 +56,20 @@ use uuid::Uuid;
 
 pub use annotate::annotated_line;
 pub(crate) use broadcast::Ring;
-pub use broadcast::{ClientGuard, Hub, StreamLine, DeadbandFilter, ScanSubscription, Subscription, SubscriptionFilter};
+pub use broadcast::{
+    ClientGuard, DeadbandFilter, Hub, ScanSubscription, StreamLine, Subscription,
+    SubscriptionFilter,
+};
 pub use control::{Order, OrderRequest};
 pub use device_task::OpenPort;
 pub use journal::{Journal, JournalThread};
-pub use limits::{check_device, check_plan, check_pose, air_from_order};
+pub use limits::{air_from_order, check_device, check_plan, check_pose};
 pub use link_state::{LinkInput, LinkMachine, LinkStep, RetryBounds, Transition};
 pub use live_messages::{LiveMessageSink, MessageConverter};
 pub use order_error::{OrderError, OrderErrorKind};
-pub use schedule::{QueuedScans, Due, Schedule};
+pub use schedule::{Due, QueuedScans, Schedule};
 pub use sensor::sensor_from_order;
-pub use settings::{SettingsConflict, OptionalOutputs, Settings, ArraySimulation};
+pub use settings::{ArraySimulation, OptionalOutputs, Settings, SettingsConflict};
 pub use state::NextScan;
 
 use air::AirControl;

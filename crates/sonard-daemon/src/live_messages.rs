@@ -6,7 +6,7 @@ use super::{
     Handle,
     broadcast::{StreamLine, Subscription},
 };
-use sonard_export::{SkippedScan, LiveConverter, LiveMessage, Topic};
+use sonard_export::{LiveConverter, LiveMessage, SkippedScan, Topic};
 use sonard_records::{Record, Session, decode_line};
 
 /// Output of live messages.
@@ -31,7 +31,11 @@ pub struct MessageConverter {
 impl MessageConverter {
     /// Subscribes to the records of a daemon. The current session is taken as context; a running
     /// scan is not replayed.
-    pub fn subscribe(daemon: &Handle, live: LiveConverter, audience: &mut impl LiveMessageSink) -> Self {
+    pub fn subscribe(
+        daemon: &Handle,
+        live: LiveConverter,
+        audience: &mut impl LiveMessageSink,
+    ) -> Self {
         let records = daemon.hub().follow();
         let mut follower = Self { daemon: daemon.clone(), records, live };
         if let Some(session) = daemon.session() {

@@ -2,7 +2,7 @@
 
 use super::order_error::{OrderError, OrderErrorKind};
 use sonard_api::{SensorOrder, Setup};
-use sonard_device::ranger::{ReceiverTiming, Motion};
+use sonard_device::ranger::{Motion, ReceiverTiming};
 use sonard_model::acoustics::Sensor;
 
 /// Sensor of an order, applied to the configured one and checked against the configuration.
@@ -29,7 +29,8 @@ pub fn sensor_from_order(
     // A simulated ranger receives until the next ranger of its array fires.
     if !of_array {
         let max_range_m = setup.model.options.max_range_m.unwrap_or(sensor.max_range_m);
-        let listening = ReceiverTiming { max_range_m, sound_speed_m_s, blanking_us: sensor.blanking_us };
+        let listening =
+            ReceiverTiming { max_range_m, sound_speed_m_s, blanking_us: sensor.blanking_us };
         Motion::from(&setup.motion)
             .check_window(&listening)
             .map_err(|error| conflict(error.to_string(), &error.help()))?;

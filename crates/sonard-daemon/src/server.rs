@@ -163,7 +163,7 @@ impl Server {
             foxglove,
             slots,
             rejecting_slots: Arc::new(Semaphore::new(rejecting)),
-            stall: Duration::from_secs_f64(keys.stall_s),
+            stall: Duration::from_secs_f64(keys.write_timeout_s),
         }
     }
 

@@ -16,7 +16,7 @@ use sonard_device::ranger::Motion;
 use sonard_log::Rotation;
 use sonard_model::{
     acoustics::{Air, Sensor},
-    array::{RobotCourse, RangerArray},
+    array::{RangerArray, RobotCourse},
     geometry::Pose,
     model::Options,
     scene::Scene,
@@ -108,7 +108,7 @@ impl Settings {
     #[must_use]
     pub fn options(&self) -> Options {
         // `check` rejects options that the engine does not support.
-        self.keys.model.options.options_of_engine()
+        self.keys.model.options.engine_options()
     }
 
     /// Maximum range of the model, metres.
@@ -189,7 +189,12 @@ impl Settings {
             ("ros", self.keys.ros.check(self.outputs.ros)),
             ("mqtt", self.keys.mqtt.check(self.outputs.mqtt)),
         ] {
-            checked.map_err(|(key, message, help)| SettingsConflict { section, key, message, help })?;
+            checked.map_err(|(key, message, help)| SettingsConflict {
+                section,
+                key,
+                message,
+                help,
+            })?;
         }
         if self.keys.link.retry_max_s < self.keys.link.retry_min_s {
             return Err(SettingsConflict {

@@ -116,7 +116,7 @@ impl SimulatedArray {
         let air = self.control.air.settled();
         let start = ScanStart {
             air: Some(self.control.air.scan_air(&air, Instant::now())),
-            ..ScanStart::of_array(&model, round.scan, round.pose, 1, Timestamp::now())
+            ..ScanStart::for_array(&model, round.scan, round.pose, 1, Timestamp::now())
         };
         self.put(&Record::ScanStart(start));
         let (mut index, mut fired, mut interrupted) = (0, 0, None);
@@ -139,7 +139,12 @@ impl SimulatedArray {
         }
         let missing = turns.iter().map(Vec::len).sum::<usize>() as u32 - fired;
         let counts = [fired, missing];
-        self.put(&Record::ScanEnd(ScanEnd::of_array(&model, round.scan, counts, Timestamp::now())));
+        self.put(&Record::ScanEnd(ScanEnd::for_array(
+            &model,
+            round.scan,
+            counts,
+            Timestamp::now(),
+        )));
         self.count(counts);
         match interrupted {
             Some(Interrupt::Shutdown) => ControlFlow::Break(()),
@@ -221,7 +226,7 @@ impl SimulatedArray {
         }
         let Some(simulation) = &self.simulation else { return Ok(()) };
         let session =
-            self.out.with_robot_name(Session::of_array(&simulation.model(), Timestamp::now()));
+            self.out.with_robot_name(Session::for_array(&simulation.model(), Timestamp::now()));
         let same = self.session.as_ref().is_some_and(|before| {
             *before == Session { started: before.started, ..session.clone() }
         });
@@ -279,7 +284,8 @@ impl SimulatedArray {
             let report = control.settings.simulated.as_ref().map(|simulated| {
                 let array = &simulated.array;
                 let now = SimulationReport::new(array);
-                let before = published.simulation.take().filter(|report| report.matches_array(array));
+                let before =
+                    published.simulation.take().filter(|report| report.matches_array(array));
                 let readings = before.map_or(now.readings, |before| before.readings);
                 let (driving, skipped) = (motion.is_driving(), firing_grid.skipped());
                 SimulationReport { driving, skipped, readings, ..now }

@@ -162,7 +162,7 @@ fn add_stats(mut totals: LineTotals, stats: &LinkStats) -> LineTotals {
     totals.framing_errors += u64::from(dropped.stuffing) + u64::from(dropped.too_long);
     totals.retries += stats.retries;
     totals.repaired += stats.repaired;
-    totals.refused += stats.rejected;
+    totals.rejected += stats.rejected;
     totals
 }
 
@@ -303,7 +303,7 @@ impl DaemonState {
                 since: published.since,
                 for_s: Some(now.saturating_duration_since(published.changed).as_secs_f64()),
                 port: published.port,
-                trouble: published.trouble,
+                error: published.trouble,
                 failures: published.failures,
                 retry_in_s: until(published.retry_at),
             },
@@ -361,7 +361,7 @@ impl DaemonState {
         if air.stale {
             reasons.push("the air temperature is stale".into());
         }
-        reasons.extend(lock(&self.server).trouble.iter().cloned());
+        reasons.extend(lock(&self.server).errors.iter().cloned());
         let (fit, last_scan_age_s, reading_lateness_s) = {
             let scans = self.scans();
             let age_s = scans.ended.map(|ended| ended.elapsed().as_secs_f64());

@@ -127,7 +127,7 @@ mod raspberry_pi {
                 // The line has a pull-up on the microcontroller's side: high means released.
                 reset: pin(keys.reset_pin)?.map(|pin| pin.into_output_high()),
                 power: pin(keys.power_pin)?.map(|pin| pin.into_output_low()),
-                light: pin(keys.light_pin)?.map(|pin| pin.into_output_low()),
+                light: pin(keys.status_led_pin)?.map(|pin| pin.into_output_low()),
                 home: pin(keys.home_pin)?.map(|pin| pin.into_input_pullup()),
                 stop: pin(keys.stop_pin)?.map(|pin| pin.into_input_pullup()),
             })

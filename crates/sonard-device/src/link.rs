@@ -26,8 +26,8 @@ pub use adapter::{is_kernel_console, latency_timer_ms};
 pub use error::{LinkError, PortListError};
 pub use holders::{Holder, Holders, find_holders};
 pub use opener::PortOpener;
-pub use ports::{SerialPortInfo, list_ports};
 use ports::{PortFolders, Resolved};
+pub use ports::{SerialPortInfo, list_ports};
 pub use pty::Pty;
 
 /// Byte stream to a device: a serial port or an in-memory pipe.

@@ -26,5 +26,5 @@ mod simulated_pins;
 
 pub use board::{ECHO_POLL_TICKS, PiBoard, PiSettings};
 pub use gpio::{GpioError, GpioPins, PinNumbers};
-pub use pins::{OutputPin, Pins};
+pub use pins::{BoardOutput, Pins};
 pub use serve::serve;

@@ -16,10 +16,10 @@ mod wall_clock;
 
 pub use clock::{ClockFit, HostTime, TickExtender};
 pub use device_info::{device_record, provenance, serial_text};
-pub use driver::{DriveError, Driver, CommandResult};
+pub use driver::{CommandResult, DriveError, Driver};
 pub use duration::ScanDuration;
 pub use scan_job::ScanJob;
-pub use scanner::{Ranger, ScanError, ScanSummary, DeviceEvent};
-pub use settings::{BlankingError, ReceiverTiming, Motion, WindowTooShort, check_blanking, hold_s};
+pub use scanner::{DeviceEvent, Ranger, ScanError, ScanSummary};
+pub use settings::{BlankingError, Motion, ReceiverTiming, WindowTooShort, check_blanking, hold_s};
 pub use setup::{PrepareError, PreparedScan, ScanInputs};
 pub use timing::min_duration_s;

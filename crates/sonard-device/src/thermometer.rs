@@ -193,7 +193,9 @@ impl Thermometer {
             return Err(ThermometerFault::OtherChip { before: before.clone(), now: now.clone() });
         }
         let admitted = self.plausibility.admit(sample.temperature_c, self.epoch.elapsed());
-        if let Admission::Persistent { from_c, waited } = admitted.map_err(ThermometerFault::TooFast)? {
+        if let Admission::Persistent { from_c, waited } =
+            admitted.map_err(ThermometerFault::TooFast)?
+        {
             self.remark = Some(format!(
                 "{}: {:.1} C after {from_c:.1} C is accepted, because it has lasted for {:.0} s",
                 self.file.display(),
@@ -226,7 +228,9 @@ impl Thermometer {
                     reason = "its end is received as the end of a channel"
                 )]
                 let started = thread.spawn(move || drop(send.send(read_sample(&file))));
-                started.map_err(|error| ThermometerFault::Unreadable(format!("no thread for it: {error}")))?;
+                started.map_err(|error| {
+                    ThermometerFault::Unreadable(format!("no thread for it: {error}"))
+                })?;
                 receive
             }
         };
@@ -265,7 +269,8 @@ fn parse(text: &str) -> Result<Sample, ThermometerFault> {
         let temperature_c = check_air(thousandths)?;
         return Ok(Sample { temperature_c, chip: None, is_unusual: false });
     }
-    let (head, number) = text.split_once("t=").ok_or(ThermometerFault::CutOff("the temperature"))?;
+    let (head, number) =
+        text.split_once("t=").ok_or(ThermometerFault::CutOff("the temperature"))?;
     if !head.contains("YES") {
         return Err(ThermometerFault::Checksum);
     }

@@ -13,7 +13,7 @@ use std::{
 };
 
 use jiff::Timestamp;
-use sonard_export::{Export as _, AttachedLog, McapExport, Profile, ExportSettings};
+use sonard_export::{AttachedLog, Export as _, ExportSettings, McapExport, Profile};
 use sonard_records::{ScanView, decode_line};
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -24,7 +24,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         Some("nav2") => Profile::Nav2,
         _ => Profile::Rep117,
     };
-    let mut export = Box::new(McapExport::new(out, ExportSettings { profile, ..ExportSettings::default() })?);
+    let mut export =
+        Box::new(McapExport::new(out, ExportSettings { profile, ..ExportSettings::default() })?);
     let lines = BufReader::new(File::open(&log)?).split(b'\n').map_while(Result::ok);
     let records = lines.filter_map(|line| decode_line(&line).ok());
     let start = Instant::now();

@@ -146,7 +146,7 @@ pub struct TableColumn {
 impl TableColumn {
     /// Returns name and type of the column.
     #[must_use]
-    pub const fn field(&self) -> ColumnType {
+    pub const fn column_type(&self) -> ColumnType {
         ColumnType { name: self.name, kind: self.kind, is_single: self.is_single }
     }
 
@@ -157,24 +157,39 @@ impl TableColumn {
     }
 }
 
-const fn text(name: &'static str, cell: for<'a> fn(&ReadingRow<'a>) -> Option<Value<'a>>) -> TableColumn {
+const fn text(
+    name: &'static str,
+    cell: for<'a> fn(&ReadingRow<'a>) -> Option<Value<'a>>,
+) -> TableColumn {
     TableColumn { name, kind: ColumnKind::Text, is_single: false, cell }
 }
 
-const fn integer(name: &'static str, cell: for<'a> fn(&ReadingRow<'a>) -> Option<Value<'a>>) -> TableColumn {
+const fn integer(
+    name: &'static str,
+    cell: for<'a> fn(&ReadingRow<'a>) -> Option<Value<'a>>,
+) -> TableColumn {
     TableColumn { name, kind: ColumnKind::Integer, is_single: false, cell }
 }
 
-const fn number(name: &'static str, cell: for<'a> fn(&ReadingRow<'a>) -> Option<Value<'a>>) -> TableColumn {
+const fn number(
+    name: &'static str,
+    cell: for<'a> fn(&ReadingRow<'a>) -> Option<Value<'a>>,
+) -> TableColumn {
     TableColumn { name, kind: ColumnKind::Number, is_single: false, cell }
 }
 
 /// Column of a measured or predicted quantity: seven digits resolve a micrometre in ten metres.
-const fn single(name: &'static str, cell: for<'a> fn(&ReadingRow<'a>) -> Option<Value<'a>>) -> TableColumn {
+const fn single(
+    name: &'static str,
+    cell: for<'a> fn(&ReadingRow<'a>) -> Option<Value<'a>>,
+) -> TableColumn {
     TableColumn { name, kind: ColumnKind::Number, is_single: true, cell }
 }
 
-const fn time(name: &'static str, cell: for<'a> fn(&ReadingRow<'a>) -> Option<Value<'a>>) -> TableColumn {
+const fn time(
+    name: &'static str,
+    cell: for<'a> fn(&ReadingRow<'a>) -> Option<Value<'a>>,
+) -> TableColumn {
     TableColumn { name, kind: ColumnKind::Time, is_single: false, cell }
 }
 

@@ -25,7 +25,7 @@ use frames::RangerPose;
 pub(crate) use readings::{FiringTimes, plan_order};
 use readings::{RangeReading, SessionParameters, laser_scan, paths, points};
 use scene::outlines;
-pub use settings::{Distribution, Profile, ExportSettings};
+pub use settings::{Distribution, ExportSettings, Profile};
 use topics::ReadingTopic;
 pub use topics::Topic;
 use topics::{FIXED_TRANSFORMS, SCENE};

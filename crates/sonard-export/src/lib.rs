@@ -31,8 +31,8 @@ use jiff::Timestamp;
 
 use sonard_records::ScanView;
 
-pub use columns::{COLUMNS, TableColumn, ColumnType, ColumnKind, ReadingRow, Value};
-pub use conversion::{Distribution, Profile, ExportSettings, Topic};
+pub use columns::{COLUMNS, ColumnKind, ColumnType, ReadingRow, TableColumn, Value};
+pub use conversion::{Distribution, ExportSettings, Profile, Topic};
 pub use error::{ExportError, SkippedScan};
 pub use findings::{PlaceFindings, is_geojson, to_geojson, write_findings};
 pub use live::{LiveConverter, LiveMessage};

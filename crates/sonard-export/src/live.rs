@@ -7,7 +7,7 @@ use std::{convert::Infallible, sync::Arc};
 use sonard_records::{Ping, Record, ScanStart, ScanView, Session};
 
 use crate::{
-    SkippedScan, ExportSettings, Topic,
+    ExportSettings, SkippedScan, Topic,
     conversion::{Converter, FiringTimes, MessageSink, plan_order},
     live::map::LiveMap,
     recording::nanoseconds,

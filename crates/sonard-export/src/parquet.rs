@@ -10,7 +10,10 @@ use ::parquet::errors::ParquetError;
 
 use sonard_records::ScanView;
 
-use crate::{COLUMNS, TableColumn, Export, ExportError, SkippedScan, ReadingRow, session_numbers::SessionNumbers};
+use crate::{
+    COLUMNS, Export, ExportError, ReadingRow, SkippedScan, TableColumn,
+    session_numbers::SessionNumbers,
+};
 pub use typed::TypedTable;
 
 /// Parquet export with one reading per row, in the typed columns of [`COLUMNS`], compressed by
@@ -29,7 +32,7 @@ impl<W: Write + Send> ParquetExport<W> {
     /// # Errors
     /// Returns the write error of the output.
     pub fn new(out: W) -> Result<Self, ExportError> {
-        let fields: Vec<_> = COLUMNS.iter().map(TableColumn::field).collect();
+        let fields: Vec<_> = COLUMNS.iter().map(TableColumn::column_type).collect();
         let out = TypedTable::new(out, "reading", &fields)?;
         Ok(Self { out, sessions: SessionNumbers::default() })
     }

@@ -13,9 +13,9 @@ use mcap::records::AttachmentHeader;
 use sonard_records::{Ping, ScanView};
 
 use crate::{
-    Export, ExportError, SkippedScan, AttachedLog,
+    AttachedLog, Export, ExportError, SkippedScan,
     columns::serialized_name,
-    conversion::{Converter, Profile, ExportSettings, plan_order},
+    conversion::{Converter, ExportSettings, Profile, plan_order},
     ros::message::Stamp,
     session_numbers::SessionNumbers,
 };

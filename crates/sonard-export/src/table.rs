@@ -7,7 +7,9 @@ use std::{
 
 use sonard_records::ScanView;
 
-use crate::{COLUMNS, Export, ExportError, SkippedScan, ReadingRow, Value, session_numbers::SessionNumbers};
+use crate::{
+    COLUMNS, Export, ExportError, ReadingRow, SkippedScan, Value, session_numbers::SessionNumbers,
+};
 
 /// CSV export with one reading per line, after a header with the names of [`COLUMNS`] (RFC 4180,
 /// line feeds).

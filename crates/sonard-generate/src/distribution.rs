@@ -105,21 +105,26 @@ impl NumberDistribution {
 struct DistributionKeys {
     mean: Option<f64>,
     sigma: Option<f64>,
-    least: Option<f64>,
-    most: Option<f64>,
+    min: Option<f64>,
+    max: Option<f64>,
     any_of: Option<Vec<f64>>,
 }
 
 impl DistributionKeys {
     fn spread(self) -> Result<NumberDistribution, &'static str> {
         match self {
-            Self { mean: None, sigma: None, least: None, most: None, any_of: Some(numbers) } => {
+            Self { mean: None, sigma: None, min: None, max: None, any_of: Some(numbers) } => {
                 Ok(NumberDistribution::AnyOf(numbers))
             }
-            Self { mean: Some(mean), sigma: Some(sigma), least, most, any_of: None } => {
+            Self { mean: Some(mean), sigma: Some(sigma), min: least, max: most, any_of: None } => {
                 // Truncated at six sigma, which one number in 10^9 exceeds.
                 let least = least.unwrap_or(mean - 6.0 * sigma);
-                Ok(NumberDistribution::Normal { mean, sigma, least, most: most.unwrap_or(mean + 6.0 * sigma) })
+                Ok(NumberDistribution::Normal {
+                    mean,
+                    sigma,
+                    least,
+                    most: most.unwrap_or(mean + 6.0 * sigma),
+                })
             }
             _ => Err("give mean and sigma (optionally least and most), or only any_of"),
         }
@@ -148,10 +153,15 @@ impl<'de> Deserialize<'de> for NumberDistribution {
                 Ok(NumberDistribution::Fixed(number as f64))
             }
 
-            fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<NumberDistribution, A::Error> {
+            fn visit_seq<A: SeqAccess<'de>>(
+                self,
+                mut list: A,
+            ) -> Result<NumberDistribution, A::Error> {
                 let mut next = || list.next_element::<f64>();
                 match (next()?, next()?, next()?) {
-                    (Some(least), Some(most), None) => Ok(NumberDistribution::Uniform([least, most])),
+                    (Some(least), Some(most), None) => {
+                        Ok(NumberDistribution::Uniform([least, most]))
+                    }
                     _ => Err(A::Error::custom("a list is [least, most]; for a choice use any_of")),
                 }
             }

@@ -47,7 +47,7 @@ mod table;
 mod tests;
 
 pub use distribution::NumberDistribution;
-pub use manifest::{FileFacts, DataSetManifest, ManifestError, ShardFacts};
+pub use manifest::{DataSetManifest, FileFacts, ManifestError, ShardFacts};
 pub use partition::{SetPart, SetPartError};
 pub use sample::RejectedDraws;
 pub use shard::{Generator, ShardCounts, ShardError};

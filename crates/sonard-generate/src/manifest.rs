@@ -33,7 +33,7 @@ pub struct ShardFacts {
     #[serde(flatten)]
     summary: ShardIdentity,
     /// Numbers of rejected draws.
-    pub redrawn: RejectedDraws,
+    pub rejected_draws: RejectedDraws,
     /// Files of the shard by name.
     pub files: BTreeMap<String, FileFacts>,
 }
@@ -89,7 +89,7 @@ impl ShardFacts {
         };
         Self {
             summary: generator.summary(shard),
-            redrawn: made.redrawn,
+            rejected_draws: made.redrawn,
             files: files.iter().map(facts).collect(),
         }
     }
@@ -110,9 +110,10 @@ impl ShardFacts {
                 expected: head(&expected.spec_sha256),
             });
         }
-        let drawn_by = |by: &ShardIdentity| format!("{} (drawing {})", by.sonard, by.drawing);
-        if (&found.sonard, found.drawing, found.format)
-            != (&expected.sonard, expected.drawing, expected.format)
+        let drawn_by =
+            |by: &ShardIdentity| format!("{} (drawing {})", by.sonard, by.sampling_version);
+        if (&found.sonard, found.sampling_version, found.format)
+            != (&expected.sonard, expected.sampling_version, expected.format)
         {
             return Err(ManifestError::Version {
                 found: drawn_by(found),
@@ -145,7 +146,7 @@ pub struct DataSetManifest {
     name: String,
     about: String,
     sonard: String,
-    drawing: u32,
+    sampling_version: u32,
     /// SHA-256 of `spec.json`.
     spec_sha256: String,
     /// Number of shards.
@@ -166,13 +167,13 @@ pub struct DataSetTotals {
     /// Total size in bytes.
     pub bytes: u64,
     /// Numbers of rejected draws.
-    pub redrawn: RejectedDraws,
+    pub rejected_draws: RejectedDraws,
 }
 
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 struct ShardFiles {
     shard: u32,
-    redrawn: RejectedDraws,
+    rejected_draws: RejectedDraws,
     files: BTreeMap<String, FileFacts>,
 }
 
@@ -184,7 +185,7 @@ impl DataSetManifest {
         let mut totals = DataSetTotals::default();
         let mut lines = String::new();
         for facts in shards {
-            totals.redrawn += facts.redrawn;
+            totals.rejected_draws += facts.rejected_draws;
             for table in generator.tables() {
                 let Some(file) = facts.files.get(table.file()) else { continue };
                 *totals.rows.entry(table).or_default() += file.rows;
@@ -198,7 +199,7 @@ impl DataSetManifest {
             name: set.name.clone(),
             about: set.about.clone(),
             sonard: summary.sonard,
-            drawing: summary.drawing,
+            sampling_version: summary.sampling_version,
             spec_sha256: summary.spec_sha256,
             shards: set.shards,
             totals,
@@ -207,7 +208,7 @@ impl DataSetManifest {
                 .iter()
                 .map(|facts| ShardFiles {
                     shard: facts.summary.shard,
-                    redrawn: facts.redrawn,
+                    rejected_draws: facts.rejected_draws,
                     files: facts.files.clone(),
                 })
                 .collect(),

@@ -65,7 +65,7 @@ pub(crate) struct SampledScene {
     pub(crate) noise: ReceiverNoise,
     /// Generator for replacements of poses.
     pub(crate) rng: Pcg64,
-    pub(crate) redrawn: RejectedDraws,
+    pub(crate) rejected_draws: RejectedDraws,
 }
 
 /// Reason for rejecting a draw.
@@ -112,7 +112,7 @@ pub(crate) fn scene(loaded: &LoadedSpec, number: u64) -> Result<SampledScene, &'
                     air,
                     noise,
                     rng,
-                    redrawn,
+                    rejected_draws: redrawn,
                 });
             }
             Err(rejection) => {
@@ -155,7 +155,7 @@ fn attempt(
 /// Samples a replacement of a pose with too many paths; `None` if there is none.
 pub(crate) fn replacement_pose(loaded: &LoadedSpec, drawn: &mut SampledScene) -> Option<Pose> {
     let scene = Arc::clone(&drawn.scene);
-    poses(loaded, &scene, 1, &mut drawn.rng, &mut drawn.redrawn).ok()?.pop()
+    poses(loaded, &scene, 1, &mut drawn.rng, &mut drawn.rejected_draws).ok()?.pop()
 }
 
 fn weighted(kinds: &[SpecSceneKeys], rng: &mut impl Rng) -> usize {
@@ -202,7 +202,8 @@ fn poses(
             })
             .collect();
         tried += positions.len();
-        let is_free = scene.are_accessible(&positions.iter().map(Pose::position).collect::<Vec<_>>());
+        let is_free =
+            scene.are_accessible(&positions.iter().map(Pose::position).collect::<Vec<_>>());
         let before = poses.len();
         poses.extend(positions.iter().zip(is_free).filter_map(|(pose, is_free)| {
             let is_clear = scene.clearance_m(pose.position()) >= keys.clearance_m;

@@ -118,7 +118,7 @@ impl Generator {
 
     fn new(loaded: LoadedSpec) -> Self {
         let (plan, options) =
-            (ScanPlan::from(&loaded.spec.plan), loaded.spec.model.options_of_engine());
+            (ScanPlan::from(&loaded.spec.plan), loaded.spec.model.engine_options());
         Self { loaded, plan, options }
     }
 
@@ -183,7 +183,7 @@ impl Generator {
                 .map_err(|why| ShardError::DoesNotFit { scene, why: why.to_owned() })?;
             let simulator = self.simulator(&drawn, &mut last)?;
             self.write_scene(&mut drawn, simulator, &mut tables, progress)?;
-            redrawn += drawn.redrawn;
+            redrawn += drawn.rejected_draws;
         }
         Ok(ShardCounts { rows: tables.finish()?, redrawn })
     }
@@ -250,7 +250,7 @@ impl Generator {
                 Ok(at) => return Ok(at),
                 Err(error) => last = Some(error),
             }
-            drawn.redrawn.costly += 1;
+            drawn.rejected_draws.costly += 1;
             match sample::replacement_pose(&self.loaded, drawn) {
                 Some(other) => pose = other,
                 None => break,

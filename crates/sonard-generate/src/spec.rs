@@ -241,11 +241,11 @@ pub struct KeepKeys {
     pub path: bool,
     /// Minimum amplitude, relative to a head-on wall, of the echoes in a table of all echoes; 0 for
     /// none.
-    pub echoes_down_to: f64,
+    pub min_echo_amplitude: f64,
     /// Maximum range of recorded envelopes, metres; 0 for none.
-    pub trace_to_m: f64,
+    pub envelope_range_m: f64,
     /// Sample interval of envelopes, microseconds.
-    pub trace_step_us: f64,
+    pub envelope_step_us: f64,
     /// Distance along the beam axis to the nearest surface.
     pub ideal_range: bool,
     /// Feature label of the detected echo (plane, corner, edge, ...), and a table of the planes,
@@ -319,9 +319,9 @@ impl Default for KeepKeys {
         Self {
             strength: false,
             path: false,
-            echoes_down_to: 0.0,
-            trace_to_m: 0.0,
-            trace_step_us: 20.0,
+            min_echo_amplitude: 0.0,
+            envelope_range_m: 0.0,
+            envelope_step_us: 20.0,
             ideal_range: false,
             features: false,
             occupancy_m: 0.0,

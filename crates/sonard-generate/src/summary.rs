@@ -14,7 +14,7 @@ pub(crate) struct ShardIdentity {
     /// Version of the program.
     pub(crate) sonard: String,
     /// Version of the sampling procedure.
-    pub(crate) drawing: u32,
+    pub(crate) sampling_version: u32,
     pub(crate) spec_sha256: String,
     pub(crate) shard: u32,
     pub(crate) of: u32,
@@ -25,7 +25,7 @@ impl ShardIdentity {
         Self {
             format: FORMAT,
             sonard: env!("CARGO_PKG_VERSION").to_owned(),
-            drawing: DRAWING,
+            sampling_version: DRAWING,
             spec_sha256: loaded.sha256.clone(),
             shard,
             of: loaded.spec.set.shards,

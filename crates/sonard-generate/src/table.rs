@@ -1,7 +1,7 @@
 //! Tables of a shard and their columns.
 
 use serde::{Deserialize, Serialize};
-use sonard_export::{ColumnType, ColumnKind};
+use sonard_export::{ColumnKind, ColumnType};
 
 use crate::spec::{KeepKeys, Spec};
 
@@ -35,7 +35,7 @@ impl ShardTable {
         [
             (Self::Scenes, true),
             (Self::Readings, true),
-            (Self::Echoes, keep.echoes_down_to > 0.0),
+            (Self::Echoes, keep.min_echo_amplitude > 0.0),
             (Self::Features, keep.features),
             (Self::Occupancy, keep.occupancy_m > 0.0),
         ]
@@ -170,7 +170,7 @@ fn readings(keep: &KeepKeys) -> Vec<ColumnInfo> {
         (&PATH, keep.path),
         (&[IDEAL], keep.ideal_range),
         (&[FEATURE], keep.features),
-        (&[ENVELOPE], keep.trace_to_m > 0.0),
+        (&[ENVELOPE], keep.envelope_range_m > 0.0),
     ];
     parts.into_iter().filter(|(_, is_kept)| *is_kept).flat_map(|(part, _)| part.to_vec()).collect()
 }

@@ -11,7 +11,10 @@ use parquet::{
 use proptest::prelude::*;
 use sonard_model::scene::Scene;
 
-use crate::{Generator, ShardCounts, DataSetManifest, ManifestError, ShardError, ShardFacts, SpecError, ShardTable};
+use crate::{
+    DataSetManifest, Generator, ManifestError, ShardCounts, ShardError, ShardFacts, ShardTable,
+    SpecError,
+};
 
 const EVERYTHING: &str = r#"
 [set]

@@ -8,7 +8,7 @@ use sonard_model::{
     geometry::Pose,
 };
 
-use crate::{ImportError, FileLocation, Mapping, time::TimeReader};
+use crate::{FileLocation, ImportError, Mapping, time::TimeReader};
 
 /// Ranges of all rangers of an array at one time.
 #[derive(Debug, Clone, PartialEq)]

@@ -5,7 +5,7 @@
 //! messages, comments and parameters are skipped.
 
 use crate::{
-    ImportError, FileLocation,
+    FileLocation, ImportError,
     array_rounds::{self, LogDevice, LogMessage, MessageContent, count, number, numbers},
 };
 

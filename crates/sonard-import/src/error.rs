@@ -74,7 +74,11 @@ impl ImportError {
         Self::Mapping { what: what.into(), help: help.into() }
     }
 
-    pub(crate) fn at(place: FileLocation, what: impl Into<String>, help: impl Into<String>) -> Self {
+    pub(crate) fn at(
+        place: FileLocation,
+        what: impl Into<String>,
+        help: impl Into<String>,
+    ) -> Self {
         Self::At { place, column: None, what: what.into(), help: help.into() }
     }
 

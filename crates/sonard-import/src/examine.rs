@@ -5,7 +5,8 @@ use std::io::Read;
 use serde_json::Value;
 
 use crate::{
-    Column, Field, ImportError, Imported, FileLocation, FieldQuantity, ImportedReading, Row, ImportSource,
+    Column, Field, FieldQuantity, FileLocation, ImportError, ImportSource, Imported,
+    ImportedReading, Row,
     array_rounds::{self, DeviceCounts, LogMessage, RoundReader},
     format::ReadLine,
     json::{self, FirstEntry},
@@ -34,7 +35,7 @@ impl ImportSource<'_> {
     ) -> Result<(), ImportError> {
         let names = self.names(head, found)?;
         found.mapping.check()?;
-        let rangers = found.taken.array.as_ref().map(|array| array.rangers.len());
+        let rangers = found.assumptions.array.as_ref().map(|array| array.rangers.len());
         if found.is_of_array() {
             return self.examine_rounds(&names, found);
         }
@@ -46,7 +47,7 @@ impl ImportSource<'_> {
         }
         let mut faults = RowFaults::default();
         let mut stats = SweepStats::new();
-        let mut reader = RowReader::new(&found.mapping, &found.taken, found.decimal())?;
+        let mut reader = RowReader::new(&found.mapping, &found.assumptions, found.decimal())?;
         let units = UnitContext {
             mapping: &found.mapping,
             names: &names,
@@ -58,18 +59,18 @@ impl ImportSource<'_> {
                 let source = found.decoded((self.open)()?);
                 let mut rows = table::TableRows::new(source, header, &found.mapping)?;
                 for row in rows.by_ref() {
-                    stats.add(&reader.read(&row?)?, (&units, &found.taken));
+                    stats.add(&reader.read(&row?)?, (&units, &found.assumptions));
                 }
                 faults = rows.faults;
             }
             None => {
                 for row in found.rows((self.open)()?)? {
-                    stats.add(&reader.read(&row?)?, (&units, &found.taken));
+                    stats.add(&reader.read(&row?)?, (&units, &found.assumptions));
                 }
             }
         }
         check_one_row(found, stats.ranges.readings)?;
-        let notes = stats.check(&units, &found.taken)?;
+        let notes = stats.check(&units, &found.assumptions)?;
         let times = reader.times.notes();
         found.notes.extend(notes);
         found.notes.extend(times);
@@ -81,7 +82,7 @@ impl ImportSource<'_> {
 
     /// Returns the column names; detects the layout of a table and completes the mapping.
     fn names(&self, head: &str, found: &mut Imported) -> Result<Vec<String>, ImportError> {
-        let rangers = found.taken.array.as_ref().map(|array| array.rangers.len());
+        let rangers = found.assumptions.array.as_ref().map(|array| array.rangers.len());
         let (names, columns) = if found.format == crate::Format::Json {
             match self.json_entry(head, found)? {
                 FirstEntry::Names(names) => (names, None),
@@ -128,14 +129,14 @@ impl ImportSource<'_> {
 
     /// Examines rows that are rounds of an array.
     fn examine_rounds(&self, names: &[String], found: &mut Imported) -> Result<(), ImportError> {
-        let Some(array) = &found.taken.array else {
+        let Some(array) = &found.assumptions.array else {
             return Err(ImportError::mapping(
                 "several columns of ranges need an array",
                 "give the array: --array NAME or FILE",
             ));
         };
         let count = array.rangers.len();
-        let mut reader = RowReader::new(&found.mapping, &found.taken, found.decimal())?;
+        let mut reader = RowReader::new(&found.mapping, &found.assumptions, found.decimal())?;
         let mut ranges = RangeStats::new(DirectionKind::Rangers);
         let units = UnitContext {
             mapping: &found.mapping,
@@ -160,7 +161,7 @@ impl ImportSource<'_> {
             }
             has_poses |= round.pose.is_some();
             for (place, (raw, range_m)) in round.raw.iter().zip(&round.ranges_m).enumerate() {
-                ranges.add(round.place, place as f64, *raw, *range_m, (&units, &found.taken));
+                ranges.add(round.place, place as f64, *raw, *range_m, (&units, &found.assumptions));
             }
         }
         if ranges.readings == 0 {
@@ -169,7 +170,7 @@ impl ImportSource<'_> {
                 "give a file with readings",
             ));
         }
-        let notes = ranges.check(&units, &found.taken)?;
+        let notes = ranges.check(&units, &found.assumptions)?;
         let times = reader.times.notes();
         found.notes.extend(notes.into_iter().chain(times));
         found.has_poses = has_poses;
@@ -193,11 +194,11 @@ impl ImportSource<'_> {
             let message = message?;
             has_fixed |= !ros_text::is_scan(&message);
             for reading in reader.read(&message)? {
-                stats.add(&reading, (&units, &found.taken));
+                stats.add(&reading, (&units, &found.assumptions));
             }
         }
-        check_beyond(&reader.notes, &found.taken)?;
-        let notes = stats.check(&units, &found.taken)?;
+        check_beyond(&reader.notes, &found.assumptions)?;
+        let notes = stats.check(&units, &found.assumptions)?;
         found.notes.extend(reader.notes.lines());
         found.notes.extend(notes);
         if reader.others > 0 {
@@ -232,7 +233,8 @@ impl ImportSource<'_> {
         let (devices, notes) = counts.select(found.mapping.device.as_deref())?;
         found.notes.extend(notes);
         found.devices = devices;
-        let mut rounds = RoundReader::new(&found.mapping, &found.devices, found.taken.started)?;
+        let mut rounds =
+            RoundReader::new(&found.mapping, &found.devices, found.assumptions.started)?;
         let mut ranges = RangeStats::new(DirectionKind::Rangers);
         let units = UnitContext {
             mapping: &found.mapping,
@@ -246,7 +248,7 @@ impl ImportSource<'_> {
             let Some(round) = rounds.push(place, message)? else { continue };
             has_poses |= round.pose.is_some();
             for (ranger, (raw, range_m)) in round.raw.iter().zip(&round.ranges_m).enumerate() {
-                ranges.add(place, ranger as f64, *raw, *range_m, (&units, &found.taken));
+                ranges.add(place, ranger as f64, *raw, *range_m, (&units, &found.assumptions));
             }
         }
         let Some(count) = rounds.rangers else {
@@ -255,7 +257,7 @@ impl ImportSource<'_> {
                 "give a log with sonar data",
             ));
         };
-        let (array, note) = match (&rounds.geometry, &found.taken.array) {
+        let (array, note) = match (&rounds.geometry, &found.assumptions.array) {
             (Some(geometry), given) => {
                 let note = given.as_ref().map(|given| {
                     format!(
@@ -263,7 +265,7 @@ impl ImportSource<'_> {
                         given.name
                     )
                 });
-                (array_rounds::array(geometry, &found.taken.sensor), note)
+                (array_rounds::array(geometry, &found.assumptions.sensor), note)
             }
             (None, Some(array)) => (array.clone(), None),
             (None, None) => {
@@ -283,12 +285,12 @@ impl ImportSource<'_> {
                 "give the array with which the log was recorded",
             ));
         }
-        let notes = ranges.check(&units, &found.taken)?;
+        let notes = ranges.check(&units, &found.assumptions)?;
         let times = rounds.times.notes();
         (found.readings, found.echoes) = (ranges.readings, ranges.echoes);
         found.notes.extend(note.into_iter().chain(notes).chain(times));
         found.has_poses = has_poses;
-        found.taken.array = Some(array);
+        found.assumptions.array = Some(array);
         Ok(())
     }
 }
@@ -317,7 +319,7 @@ fn check_one_row(found: &Imported, readings: u64) -> Result<(), ImportError> {
         return Ok(());
     };
     let (values, columns) = (header.cells.len(), found.mapping.columns.len());
-    if readings != 1 || values < 2 * columns.max(2) || found.taken.skip_checks {
+    if readings != 1 || values < 2 * columns.max(2) || found.assumptions.skip_checks {
         return Ok(());
     }
     Err(ImportError::Implausible {
@@ -329,7 +331,7 @@ fn check_one_row(found: &Imported, readings: u64) -> Result<(), ImportError> {
 
 /// Builds the error that requests the unit of rows with one value per ranger of the array.
 fn missing_array_unit(found: &Imported, rangers: usize) -> ImportError {
-    let name = found.taken.array.as_ref().map_or("", |array| &array.name);
+    let name = found.assumptions.array.as_ref().map_or("", |array| &array.name);
     let column = Column::Several((1..=rangers).collect());
     let options = Field::of_quantity(FieldQuantity::Range)
         .take(3)
@@ -360,7 +362,7 @@ impl Imported {
     /// Returns `true` if each row is a round of an array.
     pub(crate) fn is_of_array(&self) -> bool {
         self.mapping.has_array_columns()
-            || (self.format == crate::Format::Json && self.taken.array.is_some())
+            || (self.format == crate::Format::Json && self.assumptions.array.is_some())
     }
 
     fn decimal(&self) -> Decimal {
@@ -397,7 +399,7 @@ impl Imported {
         &'a self,
         source: impl Read + 'a,
     ) -> Result<Box<dyn Iterator<Item = ScanRecords> + 'a>, ImportError> {
-        let mut reader = RowReader::new(&self.mapping, &self.taken, self.decimal())?;
+        let mut reader = RowReader::new(&self.mapping, &self.assumptions, self.decimal())?;
         let readings = self.rows(source)?.map(move |row| reader.read(&row?));
         Ok(self.cut(readings))
     }
@@ -408,7 +410,7 @@ impl Imported {
     ) -> Result<Box<dyn Iterator<Item = ScanRecords> + 'a>, ImportError> {
         let mut reader = ros_text::MessageConverter::new(&self.mapping);
         let messages = ros_text::messages(self.decoded(source), self.is_json)?;
-        let air_m_s = self.taken.air.sound_speed_m_s();
+        let air_m_s = self.assumptions.air.sound_speed_m_s();
         let assumed_m_s = self.mapping.sound_speed_m_s.unwrap_or(air_m_s);
         let readings = messages.flat_map(move |message: Result<Value, ImportError>| {
             let read = message.and_then(|message| reader.read(&message));
@@ -446,7 +448,7 @@ impl Imported {
                 }
             };
             number += 1;
-            Some(Ok(scans::records(&self.taken, number, &scan)))
+            Some(Ok(scans::records(&self.assumptions, number, &scan)))
         }))
     }
 
@@ -454,10 +456,12 @@ impl Imported {
         &'a self,
         source: impl Read + 'a,
     ) -> Result<Box<dyn Iterator<Item = ScanRecords> + 'a>, ImportError> {
-        let mut reader = RowReader::new(&self.mapping, &self.taken, self.decimal())?;
+        let mut reader = RowReader::new(&self.mapping, &self.assumptions, self.decimal())?;
         let rounds = self.rows(source)?.map(move |row| reader.round(&row?));
         Ok(Box::new(
-            (1..).zip(rounds).map(|(number, round)| Ok(scans::round(&self.taken, number, &round?))),
+            (1..)
+                .zip(rounds)
+                .map(|(number, round)| Ok(scans::round(&self.assumptions, number, &round?))),
         ))
     }
 
@@ -466,13 +470,15 @@ impl Imported {
         read: ReadLine,
         source: impl Read + 'a,
     ) -> Result<Box<dyn Iterator<Item = ScanRecords> + 'a>, ImportError> {
-        let mut rounds = RoundReader::new(&self.mapping, &self.devices, self.taken.started)?;
+        let mut rounds = RoundReader::new(&self.mapping, &self.devices, self.assumptions.started)?;
         let found = messages(read, self.decoded(source)).filter_map(move |message| {
             let round = message.and_then(|(place, message)| rounds.push(place, message));
             round.transpose()
         });
         Ok(Box::new(
-            (1..).zip(found).map(|(number, round)| Ok(scans::round(&self.taken, number, &round?))),
+            (1..)
+                .zip(found)
+                .map(|(number, round)| Ok(scans::round(&self.assumptions, number, &round?))),
         ))
     }
 }

@@ -3,7 +3,9 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::{ImportError, FileLocation, array_rounds::LogMessage, carmen, player, recording::MAGIC};
+use crate::{
+    FileLocation, ImportError, array_rounds::LogMessage, carmen, player, recording::MAGIC,
+};
 
 /// Format of a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]

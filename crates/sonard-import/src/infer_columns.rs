@@ -1,7 +1,7 @@
 //! Inference of a mapping from column names.
 
 use crate::{
-    Column, Field, ImportError, Mapping, FieldQuantity,
+    Column, Field, FieldQuantity, ImportError, Mapping,
     column_names::{self, NameMeaning},
     mapping::columns_option,
 };
@@ -80,7 +80,8 @@ impl ColumnCandidates {
 
     /// Returns the range columns of an array: more than two, adjacent and in one unit.
     pub(crate) fn array_columns(&self, names: &[String]) -> Option<(Field, Vec<usize>)> {
-        let ranges = self.found.iter().filter(|(field, _)| field.quantity() == FieldQuantity::Range);
+        let ranges =
+            self.found.iter().filter(|(field, _)| field.quantity() == FieldQuantity::Range);
         let ranges: Vec<&(Field, String)> = ranges.collect();
         let (field, _) = ranges.first()?;
         let place = |name: &String| names.iter().position(|known| known == name).map(|at| at + 1);
@@ -223,7 +224,10 @@ impl Mapping {
         candidates.found.retain(|(field, _)| {
             !matches!(
                 field.quantity(),
-                FieldQuantity::Range | FieldQuantity::Tof | FieldQuantity::Azimuth | FieldQuantity::Bearing
+                FieldQuantity::Range
+                    | FieldQuantity::Tof
+                    | FieldQuantity::Azimuth
+                    | FieldQuantity::Bearing
             )
         });
         self.columns =

@@ -5,7 +5,7 @@ use std::{borrow::Cow, io::Read};
 use serde_json::Value;
 
 use crate::{
-    Column, ImportError, FileLocation, Mapping, Row,
+    Column, FileLocation, ImportError, Mapping, Row,
     lines::{LineEnding, LineReader, TextLine},
 };
 
@@ -89,7 +89,11 @@ fn is_scalar_row(value: &Value) -> bool {
 pub(crate) fn parse(first_line: u64, text: &str) -> Object {
     read(text).map_err(|error| {
         let line = first_line + (error.line() as u64).saturating_sub(1);
-        ImportError::at(FileLocation::Line(line), format!("invalid JSON: {error}"), "correct the file")
+        ImportError::at(
+            FileLocation::Line(line),
+            format!("invalid JSON: {error}"),
+            "correct the file",
+        )
     })
 }
 

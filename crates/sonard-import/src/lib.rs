@@ -42,13 +42,13 @@ mod text;
 mod time;
 mod unit_check;
 
-pub use error::{ImportError, FileLocation};
+pub use error::{FileLocation, ImportError};
 pub use field::{Field, FieldQuantity};
 pub use format::{FORMATS, Format, FormatEntry};
 pub use mapping::{Column, Decimal, Mapping, RangeUnit};
 pub use reading::ImportedReading;
 #[cfg(feature = "recordings")]
 pub use recording::{MESSAGE_TYPES, read_message};
-pub use source::{Imported, ImportSource, Assumptions, sha256_hex};
+pub use source::{Assumptions, ImportSource, Imported, sha256_hex};
 
 use reading::Row;

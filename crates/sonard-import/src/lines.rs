@@ -2,7 +2,7 @@
 
 use std::io::{BufRead as _, BufReader, Read};
 
-use crate::{ImportError, FileLocation};
+use crate::{FileLocation, ImportError};
 
 /// Maximum length of a line.
 const MAX_LINE_BYTES: usize = 1 << 20;

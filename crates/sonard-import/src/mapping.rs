@@ -6,7 +6,7 @@ use jiff::Timestamp;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::{Field, Format, ImportError, FieldQuantity, array_rounds::MAX_RANGERS};
+use crate::{Field, FieldQuantity, Format, ImportError, array_rounds::MAX_RANGERS};
 
 /// Column of a table, or member of a JSON object, mapped to a field.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -235,15 +235,16 @@ impl Mapping {
             }
         }
         let has = |quantity| seen.contains_key(&quantity);
-        for (preferred, alternative) in
-            [(FieldQuantity::Azimuth, FieldQuantity::Bearing), (FieldQuantity::Range, FieldQuantity::Tof)]
-        {
+        for (preferred, alternative) in [
+            (FieldQuantity::Azimuth, FieldQuantity::Bearing),
+            (FieldQuantity::Range, FieldQuantity::Tof),
+        ] {
             let (name, alternative_name) = (preferred.label(), alternative.label());
             let is_fixed = preferred == FieldQuantity::Azimuth && self.azimuth_deg.is_some();
             match (has(preferred), has(alternative)) {
                 (false, false)
-                    if is_fixed || (preferred == FieldQuantity::Azimuth && self.has_array_columns()) => {
-                }
+                    if is_fixed
+                        || (preferred == FieldQuantity::Azimuth && self.has_array_columns()) => {}
                 (true, _) | (_, true) if is_fixed => {
                     let what = "both --azimuth-deg and a column give the direction";
                     return Err(ImportError::mapping(what, "leave one of them out"));

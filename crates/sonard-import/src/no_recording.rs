@@ -9,7 +9,7 @@ use sonard_model::array::RangerArray;
 use sonard_records::Record;
 
 use crate::{
-    ImportError, Mapping, Taken,
+    ImportError, Mapping, Assumptions,
     unit_check::{RangeStats, UnitContext},
 };
 
@@ -27,7 +27,7 @@ impl Bag {
     pub(crate) fn survey(
         _open: &dyn Fn() -> io::Result<Box<dyn Read>>,
         _mapping: &Mapping,
-        _taken: &Taken,
+        _taken: &Assumptions,
     ) -> Result<Self, ImportError> {
         Err(ImportError::mapping(
             "this build cannot read recordings",
@@ -42,7 +42,7 @@ impl Bag {
     pub(crate) fn examine(
         &self,
         _open: &dyn Fn() -> io::Result<Box<dyn Read>>,
-        _units: (&UnitContext, &Taken),
+        _units: (&UnitContext, &Assumptions),
         _ranges: &mut RangeStats,
     ) -> Result<Vec<String>, ImportError> {
         Ok(Vec::new())
@@ -52,7 +52,7 @@ impl Bag {
         &self,
         _source: impl Read,
         _mapping: &Mapping,
-        _taken: &Taken,
+        _taken: &Assumptions,
     ) -> Result<iter::Empty<Result<Vec<Record>, ImportError>>, ImportError> {
         Ok(iter::empty())
     }

@@ -14,7 +14,7 @@
 //! interfaces and comments are skipped.
 
 use crate::{
-    ImportError, FileLocation,
+    FileLocation, ImportError,
     array_rounds::{self, LogDevice, LogMessage, MessageContent, count, number, numbers, ranges},
 };
 
@@ -164,7 +164,11 @@ fn parse_ranges(
     Ok(MessageContent::Ranges { seconds: Some(seconds), ranges, geometry })
 }
 
-fn position(place: FileLocation, words: &[&str], from: usize) -> Result<MessageContent, ImportError> {
+fn position(
+    place: FileLocation,
+    words: &[&str],
+    from: usize,
+) -> Result<MessageContent, ImportError> {
     let [x_m, y_m, heading_rad] =
         [(0, "x"), (1, "y"), (2, "angle")].map(|(at, what)| number(place, words, from + at, what));
     Ok(MessageContent::Pose { pose: array_rounds::pose(x_m?, y_m?, heading_rad?), is_true: false })

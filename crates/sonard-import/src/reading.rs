@@ -4,7 +4,7 @@ use jiff::Timestamp;
 use sonard_model::{acoustics::Air, geometry::Pose, reading::PingStatus};
 
 use crate::{
-    Field, ImportError, FileLocation, Mapping, FieldQuantity, Assumptions,
+    Assumptions, Field, FieldQuantity, FileLocation, ImportError, Mapping,
     array_rounds::ArrayRound,
     mapping::Decimal,
     number::{self, DecimalEvidence},
@@ -33,7 +33,7 @@ pub(crate) struct RawReading {
 #[derive(Debug, Clone, PartialEq)]
 pub struct ImportedReading {
     /// Position in the file.
-    pub place: FileLocation,
+    pub location: FileLocation,
     /// Direction of the beam, degrees counter-clockwise: from the heading, or a bearing from the x
     /// axis.
     pub direction_deg: f64,
@@ -96,7 +96,11 @@ impl<'a> RowReader<'a> {
     }
 
     /// Returns the cells of a quantity.
-    fn cells<'r>(&self, row: &'r Row, quantity: FieldQuantity) -> Option<(Field, &'r [Option<String>])> {
+    fn cells<'r>(
+        &self,
+        row: &'r Row,
+        quantity: FieldQuantity,
+    ) -> Option<(Field, &'r [Option<String>])> {
         let place = self.fields.iter().position(|field| field.quantity() == quantity)?;
         Some((self.fields[place], row.cells.get(place)?))
     }
@@ -161,7 +165,7 @@ impl<'a> RowReader<'a> {
         let range_m = tof_us.map(|tof_us| tof_us * 1e-6 * sound_speed_m_s / 2.0);
         let [x, y] = [self.scaled(row, FieldQuantity::X)?, self.scaled(row, FieldQuantity::Y)?];
         Ok(ImportedReading {
-            place: row.place,
+            location: row.place,
             direction_deg: fixed.unwrap_or(self.mapping.zero_deg + sense * direction_deg),
             is_bearing,
             status: status.unwrap_or(if range_m.is_some() {
@@ -185,7 +189,8 @@ impl<'a> RowReader<'a> {
     /// # Errors
     /// Returns an error with field and column for an invalid value.
     pub(crate) fn round(&mut self, row: &Row) -> Result<ArrayRound, ImportError> {
-        let found = self.cells(row, FieldQuantity::Range).or_else(|| self.cells(row, FieldQuantity::Tof));
+        let found =
+            self.cells(row, FieldQuantity::Range).or_else(|| self.cells(row, FieldQuantity::Tof));
         let Some((field, cells)) = found else {
             return Err(ImportError::mapping("no column has a range", "name one with --columns"));
         };
@@ -245,13 +250,14 @@ impl<'a> RowReader<'a> {
             _ => {}
         }
         match number::parse(cell, self.decimal) {
-            Some(number) if !number.is_finite() && field.quantity() != FieldQuantity::Range => Err(self
-                .invalid_value(
+            Some(number) if !number.is_finite() && field.quantity() != FieldQuantity::Range => {
+                Err(self.invalid_value(
                     place,
                     field,
                     format!("{cell} is not finite"),
                     "correct that value",
-                )),
+                ))
+            }
             Some(number) => Ok(Some(number)),
             None => {
                 let what = format!("`{}` is not a number", shortened(cell));

@@ -25,7 +25,7 @@ use sonard_model::{
 use sonard_records::Record;
 
 use crate::{
-    ImportError, FileLocation, Mapping, Assumptions,
+    Assumptions, FileLocation, ImportError, Mapping,
     examine::check_beyond,
     limits::{LimitNotes, Limits, RangeClass},
     unit_check::{RangeStats, UnitContext},
@@ -130,8 +130,10 @@ impl Bag {
         let mut skipped: BTreeMap<&str, (u64, u64, Option<TransformError>)> = BTreeMap::new();
         let stated_m = Some(self.max_stated_range * units.mapping.metres());
         let stated_m = stated_m.filter(|stated_m| *stated_m <= MAX_STATED_M).unwrap_or(0.0);
-        let assumptions =
-            &Assumptions { max_range_m: assumptions.max_range_m.max(stated_m), ..assumptions.clone() };
+        let assumptions = &Assumptions {
+            max_range_m: assumptions.max_range_m.max(stated_m),
+            ..assumptions.clone()
+        };
         for (number, message) in (1..).zip(MessageReader::new(open()?, &READINGS)) {
             let message = message?;
             let Some((ranger, topic, source)) = self.topic_of(&message) else { continue };

@@ -11,7 +11,7 @@ use serde_json::Value;
 use sonard_model::reading::PingStatus;
 
 use crate::{
-    ImportError, FileLocation, Mapping, ImportedReading, json,
+    FileLocation, ImportError, ImportedReading, Mapping, json,
     limits::{LimitNotes, Limits, RangeClass},
     lines::{LineEnding, LineReader},
     reading::RawReading,
@@ -161,7 +161,7 @@ impl<'a> MessageConverter<'a> {
             let sense = if self.mapping.clockwise { -1.0 } else { 1.0 };
             let delay_ns = (delay_s * 1e9).round();
             Some(ImportedReading {
-                place: FileLocation::Entry { object: self.count, number },
+                location: FileLocation::Entry { object: self.count, number },
                 direction_deg: self.mapping.zero_deg + sense * direction_deg,
                 is_bearing: false,
                 status,

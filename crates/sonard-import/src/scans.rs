@@ -4,13 +4,13 @@ use jiff::Timestamp;
 use sha2::{Digest as _, Sha256};
 use sonard_model::{
     geometry::{Pose, wrap_360, wrap_pi},
-    scan_plan::ScanPlan,
     reading::PingStatus,
+    scan_plan::ScanPlan,
 };
 use sonard_records::{AirSource, Ping, Record, ScanAir, ScanEnd, ScanStart};
 use uuid::Uuid;
 
-use crate::{ImportedReading, Assumptions, array_rounds::ArrayRound, sweep_end::SweepDetector};
+use crate::{Assumptions, ImportedReading, array_rounds::ArrayRound, sweep_end::SweepDetector};
 
 /// Motor steps per revolution, the unit of `Ping::step`.
 const STEPS_PER_REVOLUTION: f64 = 400.0;
@@ -37,8 +37,8 @@ impl ScanSplitter {
     pub(crate) fn push(&mut self, reading: ImportedReading) -> Option<Vec<ImportedReading>> {
         let is_swept = self.sweep.is_next(reading.direction_deg);
         let is_next = self.readings.last().is_some_and(|last| {
-            let moved =
-                (&reading.position_m, &reading.heading_deg) != (&last.position_m, &last.heading_deg);
+            let moved = (&reading.position_m, &reading.heading_deg)
+                != (&last.position_m, &last.heading_deg);
             match (&reading.scan, &last.scan) {
                 (Some(this), Some(before)) => this != before,
                 _ => moved || is_swept,
@@ -71,7 +71,11 @@ fn scan_id(assumptions: &Assumptions, number: u64) -> Uuid {
 }
 
 /// Builds the records of a scan by one rotating ranger.
-pub(crate) fn records(assumptions: &Assumptions, number: u64, readings: &[ImportedReading]) -> Vec<Record> {
+pub(crate) fn records(
+    assumptions: &Assumptions,
+    number: u64,
+    readings: &[ImportedReading],
+) -> Vec<Record> {
     let scan = scan_id(assumptions, number);
     let pose = readings[0].pose(&assumptions.pose);
     let azimuth_deg = |reading: &ImportedReading| {
@@ -128,7 +132,7 @@ pub(crate) fn round(assumptions: &Assumptions, number: u64, round: &ArrayRound) 
     )
 }
 
-/// ArrayFiring of one ranger of an array.
+/// Firing of one ranger of an array.
 #[cfg(feature = "recordings")]
 #[derive(Debug)]
 pub(crate) struct ArrayFiring<'a> {

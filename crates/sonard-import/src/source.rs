@@ -58,7 +58,7 @@ pub struct Imported {
     /// True if the columns were inferred from their names.
     pub is_inferred: bool,
     /// Assumptions, completed with the file's hash and its array.
-    pub taken: Assumptions,
+    pub assumptions: Assumptions,
     /// Number of readings in the file.
     pub readings: u64,
     /// Number of readings with a range.
@@ -84,7 +84,11 @@ impl ImportSource<'_> {
     /// # Errors
     /// Returns the first invalid value, or the evidence against the mapping, with the option that
     /// resolves it.
-    pub fn examine(&self, mapping: Mapping, assumptions: Assumptions) -> Result<Imported, ImportError> {
+    pub fn examine(
+        &self,
+        mapping: Mapping,
+        assumptions: Assumptions,
+    ) -> Result<Imported, ImportError> {
         let survey = Survey::read((self.open)()?)?;
         let (encoding, head) = self.text(&survey, &mapping)?;
         let format = mapping.format.unwrap_or_else(|| Format::detect(&survey.head, &head));
@@ -99,7 +103,7 @@ impl ImportSource<'_> {
             format,
             is_inferred: mapping.columns.is_empty(),
             mapping: Mapping { format: Some(format), ..mapping },
-            taken: Assumptions { sha256: survey.sha256.clone(), ..assumptions },
+            assumptions: Assumptions { sha256: survey.sha256.clone(), ..assumptions },
             readings: 0,
             echoes: 0,
             has_poses: false,
@@ -159,17 +163,17 @@ impl ImportSource<'_> {
     }
 
     fn examine_recording(&self, found: &mut Imported) -> Result<(), ImportError> {
-        if found.taken.array.is_some() {
+        if found.assumptions.array.is_some() {
             return Err(ImportError::mapping(
                 "a recording contains the positions of its rangers",
                 "leave --array out",
             ));
         }
-        let bag = Bag::survey(self.open, &found.mapping, &found.taken)?;
+        let bag = Bag::survey(self.open, &found.mapping, &found.assumptions)?;
         found.is_inferred = false;
         found.has_poses = bag.has_poses;
-        found.taken.array = bag.array(&found.taken.sensor);
-        if let Some(array) = &found.taken.array {
+        found.assumptions.array = bag.array(&found.assumptions.sensor);
+        if let Some(array) = &found.assumptions.array {
             array.check().map_err(|error| {
                 ImportError::mapping(
                     format!("rangers of the recording: {error}"),
@@ -177,7 +181,7 @@ impl ImportSource<'_> {
                 )
             })?;
         }
-        let direction_kind = if found.taken.array.is_some() {
+        let direction_kind = if found.assumptions.array.is_some() {
             DirectionKind::Rangers
         } else {
             DirectionKind::Angles
@@ -189,9 +193,9 @@ impl ImportSource<'_> {
             zero_is_no_echo: true,
         };
         let mut ranges = RangeStats::new(direction_kind);
-        let notes = bag.examine(self.open, (&units, &found.taken), &mut ranges)?;
+        let notes = bag.examine(self.open, (&units, &found.assumptions), &mut ranges)?;
         found.notes.extend(notes);
-        found.notes.extend(ranges.check(&units, &found.taken)?);
+        found.notes.extend(ranges.check(&units, &found.assumptions)?);
         (found.readings, found.echoes) = (ranges.readings, ranges.echoes);
         found.bag = Some(bag);
         Ok(())
@@ -238,7 +242,7 @@ impl Imported {
             FormatKind::RosText => self.scans_of_messages(source),
             FormatKind::Lines(read) => self.rounds_of_lines(read, source),
             FormatKind::Recording => match &self.bag {
-                Some(bag) => Ok(Box::new(bag.scans(source, &self.mapping, &self.taken)?)),
+                Some(bag) => Ok(Box::new(bag.scans(source, &self.mapping, &self.assumptions)?)),
                 None => Ok(Box::new(std::iter::empty())),
             },
         }

@@ -5,7 +5,7 @@ use std::io::Read;
 use csv::{ReaderBuilder, StringRecord, Trim};
 
 use crate::{
-    Column, ImportError, FileLocation, Mapping, Row,
+    Column, FileLocation, ImportError, Mapping, Row,
     layout::{Separator, TableLayout},
     lines::{LineEnding, LineReader, TextLine},
 };

@@ -14,7 +14,7 @@ use jiff::Timestamp;
 use sonard_model::{acoustics::Air, geometry::Pose};
 use sonard_records::{Ping, Record, ScanStart};
 
-use crate::{ImportError, Imported, Mapping, ImportSource, Assumptions};
+use crate::{Assumptions, ImportError, ImportSource, Imported, Mapping};
 
 /// Assumptions for a file without further information.
 fn assumptions() -> Assumptions {
@@ -31,7 +31,11 @@ fn assumptions() -> Assumptions {
     }
 }
 
-fn examine(text: &[u8], mapping: Mapping, assumptions: Assumptions) -> Result<Imported, ImportError> {
+fn examine(
+    text: &[u8],
+    mapping: Mapping,
+    assumptions: Assumptions,
+) -> Result<Imported, ImportError> {
     let open = || -> io::Result<Box<dyn Read>> { Ok(Box::new(Cursor::new(text.to_vec()))) };
     ImportSource { open: &open }.examine(mapping, assumptions)
 }

@@ -18,11 +18,11 @@ const DAY_JUMP: SignedDuration = SignedDuration::from_hours(12);
 /// Counts of assumptions made about the times of a file.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(crate) struct TimeAssumptions {
-    /// TimeReader without a time zone.
+    /// Number of times without a time zone.
     pub(crate) without_zone: u64,
-    /// TimeReader of day without a date.
+    /// Number of times of day without a date.
     pub(crate) without_date: u64,
-    /// TimeReader counted from the start of a board.
+    /// Number of times counted from the start of a board.
     pub(crate) from_start: u64,
     /// Wraps of such a counter at 2^32, and restarts from zero.
     pub(crate) wraps: u64,
@@ -217,7 +217,8 @@ impl<'a> TimeReader<'a> {
         }
         if without_zone > 0 && self.mapping.utc_offset.is_none() {
             notes.push(
-                "times have no time zone: taken as UTC; change it with --utc-parse_utc_offset +01:00".to_owned(),
+                "times have no time zone: taken as UTC; change it with --utc-offset +01:00"
+                    .to_owned(),
             );
         }
         if from_start > 0 {
@@ -306,7 +307,7 @@ fn parse_utc_offset(text: &str) -> Result<Offset, ImportError> {
     let invalid = || {
         ImportError::mapping(
             format!("`{text}` is not a UTC parse_utc_offset"),
-            "write it as --utc-parse_utc_offset +01:00",
+            "write it as --utc-offset +01:00",
         )
     };
     let plain: String = text.trim().chars().filter(|c| *c != ':').collect();

@@ -1,7 +1,7 @@
 //! Plausibility checks of units, angles, positions and no-echo values of a file.
 
 use crate::{
-    Field, ImportError, FileLocation, Mapping, FieldQuantity, ImportedReading, Assumptions,
+    Assumptions, Field, FieldQuantity, FileLocation, ImportError, ImportedReading, Mapping,
     mapping::RangeUnit,
     no_echo_constant::{DirectionKind, RangeHistogram},
 };
@@ -31,7 +31,9 @@ pub(crate) struct UnitContext<'a> {
 impl UnitContext<'_> {
     fn field(&self) -> Option<Field> {
         let field = |quantity| self.mapping.field(quantity);
-        field(FieldQuantity::Range).or_else(|| field(FieldQuantity::Tof)).filter(|_| self.has_columns)
+        field(FieldQuantity::Range)
+            .or_else(|| field(FieldQuantity::Tof))
+            .filter(|_| self.has_columns)
     }
 
     /// Returns the length in metres of one unit of the file's ranges.
@@ -59,7 +61,8 @@ impl UnitContext<'_> {
             let fitting = RangeUnit::ALL.into_iter().filter(|(_, unit)| fits(unit.metres()));
             return fitting.map(|(name, _)| format!("--range-unit {name}")).collect();
         }
-        let fields = Field::of_quantity(FieldQuantity::Range).filter(|field| fits(field.scaled(1.0)));
+        let fields =
+            Field::of_quantity(FieldQuantity::Range).filter(|field| fits(field.scaled(1.0)));
         let fields = fields.filter(|field| Some(*field) != self.field());
         fields.map(|field| self.mapping.columns_option_with(field, self.names)).collect()
     }
@@ -163,7 +166,11 @@ impl RangeStats {
         })
     }
 
-    fn check_constant(&self, units: &UnitContext, assumptions: &Assumptions) -> Result<(), ImportError> {
+    fn check_constant(
+        &self,
+        units: &UnitContext,
+        assumptions: &Assumptions,
+    ) -> Result<(), ImportError> {
         let longest = assumptions.max_range_m / units.metres(assumptions.air.sound_speed_m_s());
         let Some(constant) = self.histogram.constant(longest) else { return Ok(()) };
         // If most ranges are beyond the sensor's range for another reason than this constant, the
@@ -222,7 +229,11 @@ impl RangeStats {
         Err(ImportError::Implausible { what, help })
     }
 
-    fn check_near(&self, units: &UnitContext, assumptions: &Assumptions) -> Result<(), ImportError> {
+    fn check_near(
+        &self,
+        units: &UnitContext,
+        assumptions: &Assumptions,
+    ) -> Result<(), ImportError> {
         if self.near == 0 || 2 * self.near < self.echoes {
             return Ok(());
         }
@@ -277,7 +288,7 @@ impl SweepStats {
     pub(crate) fn add(&mut self, reading: &ImportedReading, units: (&UnitContext, &Assumptions)) {
         let direction = reading.raw.direction;
         self.ranges.add(
-            reading.place,
+            reading.location,
             reading.direction_deg,
             reading.raw.range,
             reading.range_m,

@@ -30,8 +30,8 @@ use serde::{Deserialize, Serialize};
 use sonard_model::geometry::Pose;
 use sonard_records::{PathKind, Ping, PingStatus, ScanView, SimRecord};
 
-pub use annotations::{Annotations, AnnotatedPing, Classification};
-pub use explain::{ChangeEstimate, Explanation, ChangedQuantity};
+pub use annotations::{AnnotatedPing, Annotations, Classification};
+pub use explain::{ChangeEstimate, ChangedQuantity, Explanation};
 pub use statistics::{keep_every_second, quantile};
 
 /// Absolute tolerance within which two ranges agree, metres.
@@ -54,7 +54,7 @@ pub enum Verdict {
     /// Both are at minimum range, or one is and the ranges agree.
     MinRange,
     /// Neither measurement nor prediction has an echo.
-    Silent,
+    NoEcho,
     /// Disagreement: an echo in only one of the two, different ranges, or equal ranges without a
     /// predicted path.
     Unexplained,
@@ -69,7 +69,7 @@ pub enum NotCompared {
     /// Reading lost on the serial link.
     LinkLost,
     /// Uncertain motor position: the motor or the model may be off the logged step.
-    StepDoubtful,
+    StepUncertain,
     /// Ranging module failed to fire.
     ModuleFault,
     /// No prediction logged for the reading.
@@ -111,9 +111,9 @@ pub struct Comparison {
     /// Beams with an echo in the model and none measured.
     pub simulated_only: u32,
     /// Beams detected by both, at least one of them below the minimum range.
-    pub near: u32,
+    pub min_range: u32,
     /// Beams without an echo in both.
-    pub both_silent: u32,
+    pub both_no_echo: u32,
     /// Beams by verdict.
     pub verdicts: VerdictCounts,
     /// Median absolute residual over `both_echo` by verdict, metres.
@@ -165,8 +165,8 @@ pub struct MedianByVerdict {
 pub struct NotComparedCounts {
     /// Beams excluded by [`NotCompared::LinkLost`].
     pub link_lost: u32,
-    /// Beams excluded by [`NotCompared::StepDoubtful`].
-    pub step_doubtful: u32,
+    /// Beams excluded by [`NotCompared::StepUncertain`].
+    pub step_uncertain: u32,
     /// Beams excluded by [`NotCompared::ModuleFault`].
     pub module_fault: u32,
     /// Beams excluded by [`NotCompared::NoPrediction`].
@@ -179,7 +179,11 @@ impl NotComparedCounts {
     /// Sum over all reasons.
     #[must_use]
     pub fn total(&self) -> u32 {
-        self.link_lost + self.step_doubtful + self.module_fault + self.no_prediction + self.no_range
+        self.link_lost
+            + self.step_uncertain
+            + self.module_fault
+            + self.no_prediction
+            + self.no_range
     }
 }
 
@@ -273,14 +277,14 @@ fn detection(status: PingStatus, range_m: Option<f64>) -> Result<Detection, NotC
         PingStatus::MinRange => Ok(Detection::MinRange(range_m)),
         PingStatus::Echo => range_m.map(Detection::Echo).ok_or(NotCompared::NoRange),
         PingStatus::LinkLost => Err(NotCompared::LinkLost),
-        PingStatus::StepDoubtful => Err(NotCompared::StepDoubtful),
+        PingStatus::StepUncertain => Err(NotCompared::StepUncertain),
         PingStatus::ModuleFault => Err(NotCompared::ModuleFault),
     }
 }
 
 fn classify_pair(measured: Detection, simulated: Detection, sim: &SimRecord) -> Verdict {
     match (measured, simulated) {
-        (Detection::NoEcho, Detection::NoEcho) => Verdict::Silent,
+        (Detection::NoEcho, Detection::NoEcho) => Verdict::NoEcho,
         (Detection::MinRange(_), Detection::MinRange(_)) => Verdict::MinRange,
         (Detection::MinRange(Some(a)), Detection::Echo(b))
         | (Detection::Echo(a), Detection::MinRange(Some(b)))
@@ -333,10 +337,10 @@ impl Comparison {
         let simulated = beam.ping.sim.as_ref().map_or(PingStatus::NoEcho, |sim| sim.status);
         *match (measured, simulated) {
             (PingStatus::Echo, PingStatus::Echo) => &mut self.both_echo,
-            (PingStatus::NoEcho, PingStatus::NoEcho) => &mut self.both_silent,
+            (PingStatus::NoEcho, PingStatus::NoEcho) => &mut self.both_no_echo,
             (_, PingStatus::NoEcho) => &mut self.measured_only,
             (PingStatus::NoEcho, _) => &mut self.simulated_only,
-            _ => &mut self.near,
+            _ => &mut self.min_range,
         } += 1;
         let agree = beam.ping.range_m.zip(beam.residual_m);
         self.agree += u32::from(agree.is_some_and(|(range_m, m)| agrees(range_m, range_m - m)));
@@ -373,7 +377,7 @@ impl VerdictCounts {
             Verdict::Multiple => &mut self.multiple,
             Verdict::Edge => &mut self.edge,
             Verdict::MinRange => &mut self.min_range,
-            Verdict::Silent => &mut self.silent,
+            Verdict::NoEcho => &mut self.silent,
             Verdict::Unexplained => &mut self.unexplained,
         }
     }
@@ -383,7 +387,7 @@ impl NotComparedCounts {
     fn counter_mut(&mut self, reason: NotCompared) -> &mut u32 {
         match reason {
             NotCompared::LinkLost => &mut self.link_lost,
-            NotCompared::StepDoubtful => &mut self.step_doubtful,
+            NotCompared::StepUncertain => &mut self.step_uncertain,
             NotCompared::ModuleFault => &mut self.module_fault,
             NotCompared::NoPrediction => &mut self.no_prediction,
             NotCompared::NoRange => &mut self.no_range,

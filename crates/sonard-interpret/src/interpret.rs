@@ -32,7 +32,9 @@ mod tests;
 pub use classify::interpret;
 pub use density::UniformSum;
 pub use extent::{ExtentError, Extents};
-pub use feature::{Feature, FeatureKind, NextPosition, Noise, Probabilities, Reason, InterpretSettings};
+pub use feature::{
+    Feature, FeatureKind, InterpretSettings, NextPosition, Noise, Probabilities, Reason,
+};
 pub use next_view::{min_corner_m, min_plane_m, min_translation_m};
 pub use region::{Region, RegionBorder, regions};
-pub use sweep::{SweepBeam, BeamOutcome, Sweep, SweepError};
+pub use sweep::{BeamOutcome, Sweep, SweepBeam, SweepError};

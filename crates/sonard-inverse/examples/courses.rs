@@ -17,7 +17,7 @@ use rand::{RngExt as _, SeedableRng as _};
 use rand_distr::{Distribution as _, StandardNormal};
 use rand_pcg::Pcg64;
 use rooms::{BEAMS, place, readings};
-use sonard_inverse::{CoarseGrid, Tracker, PoseMode, Odometry, FitSweep, World, locate};
+use sonard_inverse::{CoarseGrid, FitSweep, Odometry, PoseMode, Tracker, World, locate};
 use sonard_model::{
     acoustics::{Air, Sensor},
     geometry::{DVec2, Pose, wrap_180},

@@ -14,7 +14,7 @@ use error_model::ERRORS;
 use rand::SeedableRng as _;
 use rand_pcg::Pcg64;
 use rooms::{place, readings};
-use sonard_inverse::{Hypotheses, Parameter, FitSweep, World};
+use sonard_inverse::{FitSweep, Hypotheses, Parameter, World};
 use sonard_model::{
     acoustics::{Air, Sensor},
     geometry::Pose,

@@ -19,7 +19,7 @@ use std::{
 use rand::SeedableRng as _;
 use rand_pcg::Pcg64;
 use rooms::{BEAMS, place, readings};
-use sonard_inverse::{CoarseGrid, FiringOutcome, PoseMode, FitSweep, World, locate};
+use sonard_inverse::{CoarseGrid, FiringOutcome, FitSweep, PoseMode, World, locate};
 use sonard_model::{
     acoustics::{Air, Sensor},
     geometry::{Pose, wrap_180},
@@ -77,7 +77,10 @@ fn located_in(name: &str, count: u64, seed: u64, beams: usize) {
         sure += u32::from(found.is_some_and(|mode| mode.probability > 0.5));
         if found.is_none() {
             let how = if is_told { "told as unknown" } else { "not found" };
-            let echoes = sweep.beams.iter().filter(|beam| matches!(beam.outcome, FiringOutcome::Echo { .. }));
+            let echoes = sweep
+                .beams
+                .iter()
+                .filter(|beam| matches!(beam.outcome, FiringOutcome::Echo { .. }));
             println!("{name}: {how} by {} echoes: {pose:?} in {modes:?}", echoes.count());
         }
     }

@@ -39,7 +39,7 @@ struct PathVertex {
     adjoint: DVec2,
 }
 
-/// PathLeg between neighbouring points, or between a point and an end.
+/// Leg of a path between neighbouring points, or between a point and an end.
 #[derive(Clone, Copy)]
 struct PathLeg {
     unit: DVec2,

@@ -1,8 +1,8 @@
-//! ThresholdCandidate readings of one firing as a function of the detection threshold.
+//! Candidate readings of one firing as a function of the detection threshold.
 
 use smallvec::SmallVec;
 use sonard_model::{
-    acoustics::{Combining, Detector, DetectorBank, PulseArrival, Receiver, EchoRise},
+    acoustics::{Combining, Detector, DetectorBank, EchoRise, PulseArrival, Receiver},
     model::{Arrival, FiringArrivals, ObservationPoint, TooCostly},
     reading::PingStatus,
 };
@@ -35,7 +35,7 @@ pub(crate) enum Phases {
 /// First echo for an interval of thresholds.
 #[derive(Debug, Clone)]
 pub(crate) struct ThresholdCandidate {
-    /// ReportedRise range, metres; `None` without echo.
+    /// Reported range, metres; `None` without echo.
     pub(crate) range_m: Option<f64>,
     /// Whether the signal is present at the end of blanking, so that the minimum range is reported.
     pub(crate) is_near: bool,
@@ -52,7 +52,7 @@ pub(crate) struct ThresholdCandidate {
     pub(crate) is_of_one: bool,
 }
 
-/// CandidateList of a firing from the lowest threshold up; the last holds for all higher
+/// Candidates of a firing from the lowest threshold up; the last holds for all higher
 /// thresholds.
 pub(crate) type CandidateList = SmallVec<[ThresholdCandidate; 3]>;
 
@@ -109,14 +109,21 @@ impl ThresholdScan {
         direction_rad: f64,
         found: &mut CandidateList,
     ) -> Result<(), TooCostly> {
-        point.hear(direction_rad, |firing| {
+        point.evaluate(direction_rad, |firing| {
             found.clear();
-            firing.listen(&self.receiver, |listening| self.scan(firing, listening, found));
+            firing.evaluate_thresholds(&self.receiver, |listening| {
+                self.scan(firing, listening, found);
+            });
         })
     }
 
     /// Scans upwards. A higher threshold is crossed no earlier, so time runs forward as well.
-    fn scan(&self, firing: &FiringArrivals, listening: &mut DetectorBank, found: &mut CandidateList) {
+    fn scan(
+        &self,
+        firing: &FiringArrivals,
+        listening: &mut DetectorBank,
+        found: &mut CandidateList,
+    ) {
         let mut last: Option<ReportedRise> = None;
         let (mut by_db, mut ready_us) = (-self.span_db, 0.0);
         while by_db < self.span_db && found.len() < MAX_CANDIDATES {
@@ -285,7 +292,7 @@ impl ThresholdCandidate {
         }
     }
 
-    /// ThresholdCandidate without echo, for all higher thresholds.
+    /// Candidate without echo, for all higher thresholds.
     const fn no_echo(until_db: f64) -> Self {
         let (range_m, arrival) = (None, None);
         Self {

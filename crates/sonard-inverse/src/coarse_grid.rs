@@ -12,8 +12,8 @@ use thiserror::Error;
 
 use crate::{
     fit::Prior,
-    progress::{NoObserver, FitObserver},
-    sweep::{RangeOutcome, FitSweep},
+    progress::{FitObserver, NoObserver},
+    sweep::{FitSweep, RangeOutcome},
     world::{SimulatorSet, World, WorldError},
 };
 
@@ -76,7 +76,7 @@ pub enum CoarseGridError {
     Stopped,
 }
 
-/// ThresholdCandidate pose of a sweep.
+/// Candidate pose of a sweep.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct PoseMatch {
     pub(crate) pose: Pose,
@@ -98,7 +98,11 @@ impl CoarseGrid {
     ///
     /// # Errors
     /// As [`new`](Self::new), and [`AtlasError::Stopped`].
-    pub fn observed(world: &World, spacing_m: f64, watch: &dyn FitObserver) -> Result<Self, CoarseGridError> {
+    pub fn observed(
+        world: &World,
+        spacing_m: f64,
+        watch: &dyn FitObserver,
+    ) -> Result<Self, CoarseGridError> {
         let (places, spacing_m) = free_positions(&world.scene, spacing_m);
         if places.is_empty() {
             return Err(CoarseGridError::NoPlace);

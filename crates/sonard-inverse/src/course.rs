@@ -11,7 +11,7 @@ use crate::{
     coarse_grid::CoarseGrid,
     fit::FitError,
     locate::{PoseMode, explaining, modes},
-    progress::{NoObserver, FitObserver},
+    progress::{FitObserver, NoObserver},
     sweep::FitSweep,
     world::World,
 };

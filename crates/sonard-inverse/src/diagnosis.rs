@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use crate::{
     coarse_grid::CoarseGrid,
     locate::PoseMode,
-    sweep::{SweepFiring, FiringOutcome, FitSweep},
+    sweep::{FiringOutcome, FitSweep, SweepFiring},
     world::World,
 };
 
@@ -64,7 +64,12 @@ const FACTORS: [f64; 8] = [0.01, 100.0, 0.001, 1000.0, 0.0254, 0.3048, 0.5, 2.0]
 
 /// Diagnoses a sweep whose best pose explains little of it; empty for others.
 #[must_use]
-pub fn diagnose(world: &World, atlas: &CoarseGrid, sweep: &FitSweep, modes: &[PoseMode]) -> Vec<Misfit> {
+pub fn diagnose(
+    world: &World,
+    atlas: &CoarseGrid,
+    sweep: &FitSweep,
+    modes: &[PoseMode],
+) -> Vec<Misfit> {
     let explained = modes.iter().map(|mode| mode.explained).fold(0.0, f64::max);
     if explained >= MIN_EXPLAINED {
         return Vec::new();

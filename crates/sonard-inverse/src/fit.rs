@@ -23,7 +23,7 @@ use crate::{
     likelihood::ErrorModel,
     linear::LinearizedModel,
     parameter::Parameter,
-    progress::{NoObserver, FitObserver},
+    progress::{FitObserver, NoObserver},
     sweep::FitSweep,
     world::{SimulatorSet, World, WorldError},
 };
@@ -160,7 +160,7 @@ struct Fitter<'a> {
     phases: Phases,
     /// Whether predictions use the actual transducer position instead of the axis.
     is_exact: bool,
-    /// LinearizedModel combination of the parameters held constant by steps.
+    /// Linear combination of the parameters held constant by steps.
     held: Option<DVector<f64>>,
     /// Most recent linearization and its point.
     last: Option<(DVector<f64>, Phases, Rc<LinearizedModel>)>,
@@ -264,7 +264,8 @@ impl<'a> Fitter<'a> {
     fn rough_errors(&self) -> ErrorModel {
         let World { options, sensor, .. } = self.start;
         let reach_m = options.max_range_m.unwrap_or(sensor.max_range_m);
-        let errors = ErrorModel::rough(self.fit.initial_sigma_m, continuation::STAGES[0].1, reach_m);
+        let errors =
+            ErrorModel::rough(self.fit.initial_sigma_m, continuation::STAGES[0].1, reach_m);
         if self.fit.search == Search::Furnished { errors } else { errors.without_arcs() }
     }
 

@@ -1,4 +1,4 @@
-//! ThresholdCandidate readings of each firing, with their Jacobian.
+//! Candidate readings of each firing, with their Jacobian.
 
 mod firing;
 mod path_jacobian;
@@ -27,7 +27,7 @@ use crate::{
     likelihood_terms::{CandidateReading, ReadingModel, SparseRow},
     motion::SceneMotion,
     parameter::Parameter,
-    sweep::{SweepFiring, RangeOutcome, FitSweep},
+    sweep::{FitSweep, RangeOutcome, SweepFiring},
     time_walk::TimeWalk,
     world::World,
 };
@@ -110,8 +110,10 @@ impl<'a> JacobianBuilder<'a> {
             let direction_rad = self.world.direction_rad(pose, beam.azimuth_deg);
             let firing = FiringGeometry::new(simulator, pose, direction_rad, beam);
             let possible = self.all_possible(&listener, point, &firing, &mut known)?;
-            readings
-                .push(ReadingModel { measured: beam.outcome.outcome(self.reference_m_s), possible });
+            readings.push(ReadingModel {
+                measured: beam.outcome.outcome(self.reference_m_s),
+                possible,
+            });
         }
         Ok(readings)
     }
@@ -302,7 +304,8 @@ impl<'a> JacobianBuilder<'a> {
             return None;
         }
         let places = mounting.transducer_positions(DVec2::ZERO, firing.direction_rad);
-        let moved = path.moved(firing, &SceneMotion { transducer: places, ..SceneMotion::default() });
+        let moved =
+            path.moved(firing, &SceneMotion { transducer: places, ..SceneMotion::default() });
         let louder_db = |(off_rad, turn_rad): (f64, f64)| {
             level_db(firing.simulator.beam(), off_rad, off_rad + turn_rad)
         };

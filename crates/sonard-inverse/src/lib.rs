@@ -37,18 +37,19 @@ mod walls;
 mod world;
 
 pub use coarse_grid::{CoarseGrid, CoarseGridError};
-pub use course::{Tracker, Odometry};
+pub use course::{Odometry, Tracker};
 pub use diagnosis::{Misfit, diagnose};
 pub use fit::{
-    ParameterEstimate, FitOptions, FitError, FitResult, SearchResult, Prior, Search, cramer_rao_bound, fit, fit_from, fit_observed,
+    FitError, FitOptions, FitResult, ParameterEstimate, Prior, Search, SearchResult,
+    cramer_rao_bound, fit, fit_from, fit_observed,
 };
 pub use hypothesis::{Hypotheses, LogLikelihood};
 pub use likelihood::ErrorModel;
 pub use locate::{NuisanceEstimate, PoseMode, locate, locate_observed};
 pub use motion::{SceneMotion, length_derivative};
 pub use parameter::Parameter;
-pub use parameter_groups::{ParameterGroup, GroupError, name, priors};
-pub use progress::{FitProgress, NoObserver, FitObserver};
+pub use parameter_groups::{GroupError, ParameterGroup, name, priors};
+pub use progress::{FitObserver, FitProgress, NoObserver};
 pub use report::ParameterReport;
-pub use sweep::{SweepFiring, FiringOutcome, FitSweep, FitSweepError};
+pub use sweep::{FiringOutcome, FitSweep, FitSweepError, SweepFiring};
 pub use world::{World, WorldError};

@@ -19,7 +19,7 @@ pub struct ErrorModel {
     /// Standard deviation of the range of an echo, metres.
     pub sigma_m: f64,
     /// Fraction of echoes in the far tail, 0 to 1.
-    pub tail_share: f64,
+    pub tail_weight: f64,
     /// Mean excess range of those, as a multiple of `sigma_m`.
     pub tail_ratio: f64,
     /// Standard deviation of the threshold from firing to firing, decibels; includes level errors
@@ -30,16 +30,16 @@ pub struct ErrorModel {
     #[serde(default)]
     pub sigma_db_per_reflection: f64,
     /// Fraction of single outliers among readings outside outlier arcs.
-    pub clutter: f64,
+    pub outlier_share: f64,
     /// Fraction of readings in arcs of objects that the scene lacks: people, furniture, the robot
     /// itself. 0 disables the outlier state.
-    pub arcs: f64,
+    pub outlier_arc_share: f64,
     /// Mean length of such arcs, readings.
-    pub arc_beams: f64,
+    pub outlier_arc_beams: f64,
     /// Fraction of all outliers without echo.
-    pub clutter_silent: f64,
+    pub outlier_no_echo_share: f64,
     /// Maximum range of outliers, metres; their density is uniform.
-    pub clutter_m: f64,
+    pub outlier_max_range_m: f64,
 }
 
 /// Fraction of readings within an arc that resemble the preceding one: no echo as well, or a
@@ -58,22 +58,22 @@ impl ErrorModel {
     pub const fn rough(sigma_m: f64, sigma_db: f64, reach_m: f64) -> Self {
         Self {
             sigma_m,
-            tail_share: 0.1,
+            tail_weight: 0.1,
             tail_ratio: 2.0,
             sigma_db,
             sigma_db_per_reflection: 0.0,
-            clutter: 0.1,
-            arcs: 0.1,
-            arc_beams: 8.0,
-            clutter_silent: 0.3,
-            clutter_m: reach_m,
+            outlier_share: 0.1,
+            outlier_arc_share: 0.1,
+            outlier_arc_beams: 8.0,
+            outlier_no_echo_share: 0.3,
+            outlier_max_range_m: reach_m,
         }
     }
 
     /// Error model without outlier arcs, only with single outliers. Used for the comparison of
     /// poses, which would otherwise absorb everything unexplained into arcs.
     pub(crate) const fn without_arcs(self) -> Self {
-        Self { arcs: 0.0, ..self }
+        Self { outlier_arc_share: 0.0, ..self }
     }
 
     /// Error model with another standard deviation of ranges; the far tail keeps its length.
@@ -85,7 +85,7 @@ impl ErrorModel {
     /// with an exponentially distributed excess (`TofNoise`), whose density is the convolution of
     /// both.
     pub(crate) fn range(&self, error_m: f64) -> [f64; 2] {
-        let Self { sigma_m, tail_share, .. } = *self;
+        let Self { sigma_m, tail_weight: tail_share, .. } = *self;
         let normal = (-0.5 * (error_m / sigma_m).powi(2)).exp() / (sigma_m * TAU.sqrt());
         let tail_m = self.tail_ratio * sigma_m;
         // The convolution solves f' = (normal - f) / tail.
@@ -120,16 +120,18 @@ impl ErrorModel {
     /// Prior probability that the scene explains a reading, 0 to 1.
     #[must_use]
     pub const fn explained(&self) -> f64 {
-        (1.0 - self.arcs) * (1.0 - self.clutter)
+        (1.0 - self.outlier_arc_share) * (1.0 - self.outlier_share)
     }
 
     /// Density of a single outlier: of a range in metres, or the probability of a reading without
     /// one.
     pub(crate) fn of_clutter(&self, outcome: RangeOutcome) -> f64 {
         match outcome {
-            RangeOutcome::Echo { .. } => (1.0 - self.clutter_silent) / self.clutter_m,
-            RangeOutcome::NoEcho => self.clutter_silent,
-            RangeOutcome::BelowMinRange => (1.0 - self.clutter_silent) * NEAR,
+            RangeOutcome::Echo { .. } => {
+                (1.0 - self.outlier_no_echo_share) / self.outlier_max_range_m
+            }
+            RangeOutcome::NoEcho => self.outlier_no_echo_share,
+            RangeOutcome::BelowMinRange => (1.0 - self.outlier_no_echo_share) * NEAR,
         }
     }
 
@@ -157,8 +159,8 @@ impl ErrorModel {
 
     /// Transition probabilities between the scene and the outlier state.
     pub(crate) fn changes(&self) -> [[f64; 2]; 2] {
-        let leaves = 1.0 / self.arc_beams;
-        let enters = (leaves * self.arcs / (1.0 - self.arcs)).min(0.5);
+        let leaves = 1.0 / self.outlier_arc_beams;
+        let enters = (leaves * self.outlier_arc_share / (1.0 - self.outlier_arc_share)).min(0.5);
         [[1.0 - enters, enters], [leaves, 1.0 - leaves]]
     }
 }
@@ -199,7 +201,7 @@ mod tests {
             let slope = model.range(error_m)[1];
             assert!((slope - (high - low) / 2e-7).abs() < 1e-2 * slope.abs().max(1.0), "{error_m}");
         }
-        let normal = ErrorModel { tail_share: 0.0, ..model };
+        let normal = ErrorModel { tail_weight: 0.0, ..model };
         let [with_tail, without] =
             [model, normal].map(|model| model.range_information() * model.sigma_m.powi(2));
         // The integration limit of five standard deviations omits 2e-5.

@@ -12,10 +12,10 @@ use crate::{
 /// Derivatives of a quantity with respect to some parameters, as a sparse row of the Jacobian.
 pub(crate) type SparseRow = SmallVec<[(u32, f64); 4]>;
 
-/// ThresholdCandidate reading of a firing.
+/// Candidate reading of a firing.
 #[derive(Debug, Clone)]
 pub(crate) struct CandidateReading {
-    /// RangeOutcome; the range of an echo is evaluated at `margin_db` above the threshold.
+    /// Outcome; the range of an echo is evaluated at `margin_db` above the threshold.
     pub(crate) outcome: RangeOutcome,
     /// Margin above the threshold, decibels; infinite if the range does not depend on the
     /// threshold.
@@ -30,10 +30,10 @@ pub(crate) struct CandidateReading {
     pub(crate) further_reflections: f64,
 }
 
-/// ExpectedRange range of a candidate over the thresholds at which it is reported.
+/// Expected range of a candidate over the thresholds at which it is reported.
 #[derive(Clone, Copy)]
 pub(crate) struct ExpectedRange {
-    /// ExpectedRange range, metres at the reference speed of sound.
+    /// Expected range, metres at the reference speed of sound.
     pub(crate) range_m: f64,
     /// Derivative by the upper end of the threshold interval, m/dB (time walk); part of the
     /// Jacobian only if ranges are accurate enough.
@@ -60,7 +60,7 @@ pub(crate) struct LikelihoodTerms {
 
 /// Contribution of one candidate.
 pub(crate) struct CandidateTerm {
-    /// ExpectedRange range, if an echo was measured.
+    /// Expected range, if an echo was measured.
     pub(crate) expected: Option<ExpectedRange>,
     /// Posterior probability of the candidate.
     pub(crate) share: f64,
@@ -68,12 +68,12 @@ pub(crate) struct CandidateTerm {
     pub(crate) by_range: f64,
     /// Derivative of the log-density by the upper end of the threshold interval, at constant range.
     pub(crate) by_until: f64,
-    /// ExpectedRange information on that end.
+    /// Expected information on that end.
     pub(crate) expected_of_until: f64,
 }
 
 impl CandidateReading {
-    /// ExpectedRange range after a change of the parameters, for a threshold interval; `None`
+    /// Expected range after a change of the parameters, for a threshold interval; `None`
     /// without echo.
     pub(crate) fn expected(
         &self,
@@ -137,14 +137,14 @@ impl ReadingModel {
         errors: &ErrorModel,
         walk: &TimeWalk,
     ) -> LikelihoodTerms {
-        let explained = 1.0 - errors.clutter;
-        let unexplained = errors.clutter * errors.of_clutter(self.measured);
+        let explained = 1.0 - errors.outlier_share;
+        let unexplained = errors.outlier_share * errors.of_clutter(self.measured);
         let untils_db: SmallVec<[f64; 3]> = self
             .possible
             .iter()
             .map(|possible| after(possible.until_db, &possible.until_rates, change))
             .collect();
-        // ExpectedRange ranges matter only for a measured echo.
+        // Expected ranges matter only for a measured echo.
         let expected: SmallVec<[Option<ExpectedRange>; 3]> = self
             .possible
             .iter()
@@ -232,7 +232,7 @@ fn after(value: f64, rates: &SparseRow, change: &DVector<f64>) -> f64 {
     value + rates.iter().map(|&(at, rate)| rate * change[at as usize]).sum::<f64>()
 }
 
-/// ExpectedRange information of one binary reading on the position of a probit step, at `place`
+/// Expected information of one binary reading on the position of a probit step, at `place`
 /// standard deviations: `density^2 / (up_to (1 - up_to))`.
 fn expected_of_step(place: f64) -> f64 {
     let up_to = normal_up_to(place);

@@ -11,7 +11,7 @@ use crate::{
     likelihood_terms::{LikelihoodTerms, ReadingModel, SparseRow},
     outlier_hmm::{self, Emission, OutlierCounts, StatePosterior},
     parameter::Parameter,
-    sweep::{RangeOutcome, FitSweep},
+    sweep::{FitSweep, RangeOutcome},
     time_walk::TimeWalk,
     world::{SimulatorSet, World, WorldError},
 };
@@ -169,11 +169,11 @@ impl LinearizedModel {
 pub(crate) struct Residuals {
     /// Residuals of echoes from their likeliest candidate, with its posterior probability.
     pub(crate) of_ranges: Vec<(f64, f64)>,
-    /// ExpectedRange number of single outliers.
+    /// Expected number of single outliers.
     pub(crate) unexplained: f64,
-    /// ExpectedRange number of single outliers without echo.
+    /// Expected number of single outliers without echo.
     pub(crate) silent_unexplained: f64,
-    /// ExpectedRange numbers of readings in outlier arcs.
+    /// Expected numbers of readings in outlier arcs.
     pub(crate) counts: OutlierCounts,
 }
 

@@ -7,11 +7,13 @@ use sonard_model::geometry::{Pose, wrap_180};
 
 use crate::{
     coarse_grid::{CoarseGrid, CoarseGridError, PoseMatch, is_apart},
-    fit::{self, FitOptions, FitError, FitResult, Prior, RoughFit, approach, fit_near, one_of_many},
+    fit::{
+        self, FitError, FitOptions, FitResult, Prior, RoughFit, approach, fit_near, one_of_many,
+    },
     likelihood::READINGS_PER_ARC,
     parameter::Parameter,
-    progress::{NoObserver, FitObserver},
-    sweep::{SweepFiring, FitSweep},
+    progress::{FitObserver, NoObserver},
+    sweep::{FitSweep, SweepFiring},
     world::{SimulatorSet, World},
 };
 
@@ -36,7 +38,7 @@ pub struct PoseMode {
     pub explained: f64,
     /// Nuisance parameters fitted with the pose; see [`Atlas::fitting`].
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub besides: Vec<NuisanceEstimate>,
+    pub nuisance: Vec<NuisanceEstimate>,
 }
 
 /// Estimate of a nuisance parameter.
@@ -69,7 +71,7 @@ impl PoseMode {
             sigma_y_m: of[1].sigma,
             sigma_heading_deg: of[2].sigma,
             explained: fitted.errors.explained(),
-            besides: besides.collect(),
+            nuisance: besides.collect(),
         }
     }
 
@@ -107,7 +109,11 @@ const FAR_BELOW_WHOLE: f64 = 120.0;
 ///
 /// # Errors
 /// Invalid world.
-pub fn locate(world: &World, atlas: &CoarseGrid, sweep: &FitSweep) -> Result<Vec<PoseMode>, FitError> {
+pub fn locate(
+    world: &World,
+    atlas: &CoarseGrid,
+    sweep: &FitSweep,
+) -> Result<Vec<PoseMode>, FitError> {
     locate_observed(world, atlas, sweep, &NoObserver)
 }
 
@@ -234,7 +240,12 @@ fn with_pose((widest_m, widest_turn_deg): (f64, f64), besides: &[Prior]) -> FitO
         [of(Parameter::X(0), 0.5), of(Parameter::Y(0), 0.5), of(Parameter::Heading(0), 20.0)];
     let priors = pose.into_iter().chain(besides.iter().cloned()).collect();
     let search = fit::Search::Quick;
-    FitOptions { max_turn_deg: widest_turn_deg, min_sigma_m: 5e-4, search, ..FitOptions::with_priors(priors, widest_m) }
+    FitOptions {
+        max_turn_deg: widest_turn_deg,
+        min_sigma_m: 5e-4,
+        search,
+        ..FitOptions::with_priors(priors, widest_m)
+    }
 }
 
 /// Evenly spread subset of a sweep's beams, up to two thirds with an echo: echoes identify a

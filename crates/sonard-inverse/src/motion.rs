@@ -105,7 +105,13 @@ impl SceneMotion {
 /// point, and `-u . dx` for an end with departure or arrival direction `u`. Tests verify finite
 /// differences to 1e-5, relative to a metre per unit.
 #[must_use]
-pub fn length_derivative(path: &Path, ends: [DVec2; 2], z_m: f64, scene: &Scene, motion: &SceneMotion) -> f64 {
+pub fn length_derivative(
+    path: &Path,
+    ends: [DVec2; 2],
+    z_m: f64,
+    scene: &Scene,
+    motion: &SceneMotion,
+) -> f64 {
     let interactions = &path.interactions;
     let point = |at: usize| interactions[at].point.extend(interactions[at].z_m.unwrap_or(z_m));
     let (Some(last), [transmitter, receiver]) =

@@ -62,7 +62,7 @@ pub(crate) fn log_likelihood(readings: impl Iterator<Item = Emission>, errors: &
 
 /// Log-likelihood and state posteriors of the readings of a sweep (forward-backward algorithm).
 pub(crate) fn states(readings: &[Emission], errors: &ErrorModel) -> StatePosterior {
-    if errors.arcs == 0.0 {
+    if errors.outlier_arc_share == 0.0 {
         return alone(readings);
     }
     let steps: Vec<ForwardStep> = Forward::new(readings.iter().copied(), errors).collect();
@@ -100,7 +100,7 @@ fn alone(readings: &[Emission]) -> StatePosterior {
     }
 }
 
-/// ForwardStep of the forward recursion.
+/// Step of the forward recursion.
 #[derive(Debug, Clone, Copy)]
 struct ForwardStep {
     /// State probabilities, given this reading and all before.
@@ -140,7 +140,10 @@ impl<I: Iterator<Item = Emission>> Iterator for Forward<'_, I> {
             }
         };
         let prior = |to: usize| match self.before {
-            None => [1.0 - self.errors.arcs, self.errors.arcs][to] * densities[0][to],
+            None => {
+                [1.0 - self.errors.outlier_arc_share, self.errors.outlier_arc_share][to]
+                    * densities[0][to]
+            }
             Some((_, before)) => {
                 let pass =
                     |from: usize| before[from] * self.changes[from][to] * densities[from][to];
@@ -188,7 +191,7 @@ mod tests {
             let own = usize::from(is_else[at]);
             let before = at.checked_sub(1).map(|before| usize::from(is_else[before]));
             joint *= match before {
-                None => [1.0 - errors.arcs, errors.arcs][own],
+                None => [1.0 - errors.outlier_arc_share, errors.outlier_arc_share][own],
                 Some(before) => changes[before][own],
             };
             joint *= match (own, before) {
@@ -205,7 +208,7 @@ mod tests {
     #[test]
     fn recursions_sum_over_all_sequences() {
         let readings = readings();
-        let errors = ErrorModel { arc_beams: 3.0, ..ErrorModel::rough(0.002, 1.0, 4.0) };
+        let errors = ErrorModel { outlier_arc_beams: 3.0, ..ErrorModel::rough(0.002, 1.0, 4.0) };
         let (mut all, mut staying, mut leaving) = (0.0, 0.0, 0.0);
         let mut of_scene = vec![0.0; readings.len()];
         for sequence in 0u32..1 << readings.len() {
@@ -252,7 +255,7 @@ mod tests {
     /// A sweep that is a single outlier arc does not overflow.
     #[test]
     fn whole_sweep_can_be_an_arc() {
-        let errors = ErrorModel { arcs: 1e-3, ..ErrorModel::rough(0.002, 1.0, 4.0) };
+        let errors = ErrorModel { outlier_arc_share: 1e-3, ..ErrorModel::rough(0.002, 1.0, 4.0) };
         let states = states(&[echo(0.7, 1e-4); 400], &errors);
         assert!((states.counts.of_else - 400.0).abs() < 1e-3, "{:?}", states.counts);
         assert!(states.of_scene.iter().all(|of_scene| (0.0..1e-3).contains(of_scene)));

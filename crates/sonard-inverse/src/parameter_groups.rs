@@ -156,7 +156,11 @@ pub fn priors(
     Ok(all.into_iter().zip(&names).map(with_prior).collect())
 }
 
-fn of_group(group: ParameterGroup, world: &World, sweeps: usize) -> Result<Vec<Parameter>, GroupError> {
+fn of_group(
+    group: ParameterGroup,
+    world: &World,
+    sweeps: usize,
+) -> Result<Vec<Parameter>, GroupError> {
     let has_heights = world.scene.floor_z_m.is_some() || world.scene.ceiling_z_m.is_some();
     Ok(match group {
         ParameterGroup::Pose => (0..sweeps)

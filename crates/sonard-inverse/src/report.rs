@@ -6,7 +6,7 @@ use sonard_model::acoustics::{Aperture, Sensor};
 use uuid::Uuid;
 
 use crate::{
-    fit::{ParameterEstimate, FitOptions, FitResult, Prior, Search},
+    fit::{FitOptions, FitResult, ParameterEstimate, Prior, Search},
     parameter::Parameter,
     parameter_groups::name,
     sweep::FitSweep,
@@ -90,7 +90,12 @@ const ROUNDING: f64 = 1e-9;
 impl FitResult {
     /// Reports the estimates in the order of the priors; `world` is the initial one.
     #[must_use]
-    pub fn report(&self, world: &World, sweeps: &[FitSweep], fit: &FitOptions) -> Vec<ParameterReport> {
+    pub fn report(
+        &self,
+        world: &World,
+        sweeps: &[FitSweep],
+        fit: &FitOptions,
+    ) -> Vec<ParameterReport> {
         let of = |(prior, estimate): (&Prior, &ParameterEstimate)| {
             let parameter = &prior.parameter;
             let value = |by: f64| value(world, sweeps, parameter, by);

@@ -143,7 +143,7 @@ impl FitSweep {
                     }
                     PingStatus::NoEcho => FiringOutcome::NoEcho,
                     PingStatus::MinRange => FiringOutcome::BelowMinRange,
-                    PingStatus::LinkLost | PingStatus::StepDoubtful | PingStatus::ModuleFault => {
+                    PingStatus::LinkLost | PingStatus::StepUncertain | PingStatus::ModuleFault => {
                         return None;
                     }
                 };

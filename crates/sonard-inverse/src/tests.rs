@@ -35,7 +35,11 @@ const SIGMA_DB: f64 = 0.5;
 
 /// Error model of readings with such thresholds, up to a maximum range.
 fn as_read(reach_m: f64) -> ErrorModel {
-    ErrorModel { clutter: 1e-3, arcs: 0.0, ..ErrorModel::rough(1e-3, SIGMA_DB, reach_m) }
+    ErrorModel {
+        outlier_share: 1e-3,
+        outlier_arc_share: 0.0,
+        ..ErrorModel::rough(1e-3, SIGMA_DB, reach_m)
+    }
 }
 
 /// World with a single wall at a distance in metres.

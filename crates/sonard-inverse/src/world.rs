@@ -188,9 +188,10 @@ impl World {
             Parameter::X(_) => Some(self.with_body(DVec2::X)),
             Parameter::Y(_) => Some(self.with_body(DVec2::Y)),
             Parameter::Height => Some(SceneMotion { up: 1.0, ..SceneMotion::default() }),
-            Parameter::Wall(wall) => {
-                Some(SceneMotion { walls: walls::velocities(&self.scene, *wall), ..SceneMotion::default() })
-            }
+            Parameter::Wall(wall) => Some(SceneMotion {
+                walls: walls::velocities(&self.scene, *wall),
+                ..SceneMotion::default()
+            }),
             _ => None,
         }
     }
@@ -221,7 +222,10 @@ impl World {
             return None;
         }
         let places = mounting.transducer_positions(DVec2::ZERO, direction_rad);
-        Some(SceneMotion { transducer: places.map(|place| by_rad * place.perp()), ..SceneMotion::default() })
+        Some(SceneMotion {
+            transducer: places.map(|place| by_rad * place.perp()),
+            ..SceneMotion::default()
+        })
     }
 
     /// Motion of the transducer together with the robot's body.

@@ -12,11 +12,12 @@ use std::{
 use jiff::{SignedDuration, Timestamp};
 use sonard_model::array::{MountedRanger, RangerArray};
 use sonard_records::{
-    Event, EventKind, RecordErrorKind, Ping, PingStatus, Record, ScanEnd, ScanPlan, ScanStart, Session,
+    Event, EventKind, Ping, PingStatus, Record, RecordErrorKind, ScanEnd, ScanPlan, ScanStart,
+    Session,
 };
 use uuid::Uuid;
 
-pub use finding::{LogFinding, FindingKind, Severity, LogTotals};
+pub use finding::{FindingKind, LogFinding, LogTotals, Severity};
 use open_scan::OpenScan;
 
 use super::{Line, read_log};
@@ -32,7 +33,10 @@ const TIME_TOLERANCE: SignedDuration = SignedDuration::from_secs(1);
 ///
 /// # Errors
 /// Returns an error if reading fails.
-pub fn check_log<R: BufRead>(reader: R, mut report: impl FnMut(LogFinding)) -> io::Result<LogTotals> {
+pub fn check_log<R: BufRead>(
+    reader: R,
+    mut report: impl FnMut(LogFinding),
+) -> io::Result<LogTotals> {
     let mut checker = Checker::default();
     for line in read_log(reader) {
         checker.line(&line?);
@@ -224,7 +228,7 @@ impl Checker {
         }
         let planned_deg = plan.azimuth_deg(index / plan.pings_per_stop);
         let off = !self.imported && is_off(ping.azimuth_deg, planned_deg);
-        if off && ping.status != PingStatus::StepDoubtful {
+        if off && ping.status != PingStatus::StepUncertain {
             let is_deg = ping.azimuth_deg;
             let detail =
                 format!("beam {index}: azimuth_deg is {is_deg}; the plan has {planned_deg}");

@@ -18,7 +18,7 @@ use std::{
 };
 
 use rayon::prelude::*;
-use sonard_generate::{Generator, DataSetManifest, SetPart, ShardFacts, ShardTable};
+use sonard_generate::{DataSetManifest, Generator, SetPart, ShardFacts, ShardTable};
 
 use crate::{AtomicFile, file_digest, sync_file};
 use draft::ShardDraft;
@@ -126,7 +126,11 @@ impl<'a> DataSet<'a> {
     ///
     /// # Errors
     /// Returns an error if the shard's folder has different contents, or writing fails.
-    pub fn generate(&self, shard: u32, progress: &dyn Fn(u64)) -> Result<ShardOutcome, DataSetError> {
+    pub fn generate(
+        &self,
+        shard: u32,
+        progress: &dyn Fn(u64),
+    ) -> Result<ShardOutcome, DataSetError> {
         if self.facts(shard)?.is_some() {
             return Ok(ShardOutcome::Existed);
         }

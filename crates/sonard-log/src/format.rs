@@ -1,6 +1,6 @@
 //! Interface of output formats for records.
 
-use super::{LogWriter, LogOutput, StoreError};
+use super::{LogOutput, LogWriter, StoreError};
 use sonard_records::Record;
 
 /// Writer of a log's records in one output format. [`LogWriter`] implements JSON Lines; other

@@ -12,8 +12,8 @@ use std::{
 };
 
 use sonard_records::{
-    RecordErrorKind, MAX_LINE_BYTES, Ping, Provenance, Record, ScanEnd, ScanStart, ScanView, SceneRef,
-    decode_line,
+    MAX_LINE_BYTES, Ping, Provenance, Record, RecordErrorKind, ScanEnd, ScanStart, ScanView,
+    SceneRef, decode_line,
 };
 use uuid::Uuid;
 
@@ -112,7 +112,11 @@ impl LogIndex {
         self.list(Some(scan), max)
     }
 
-    fn list(&mut self, mut before: Option<Uuid>, max: usize) -> io::Result<Option<Vec<LoggedScan>>> {
+    fn list(
+        &mut self,
+        mut before: Option<Uuid>,
+        max: usize,
+    ) -> io::Result<Option<Vec<LoggedScan>>> {
         let mut listed = Vec::new();
         for log in self.recent()? {
             let mut scans = self.update(&log)?.scans.iter().rev();
@@ -206,7 +210,9 @@ impl Index {
                 self.session = Some(Arc::new(SessionPlace { at, text_at, provenance, scene }));
             }
             // Scans of another log format have no readable session.
-            Some(Err(fault)) if fault.kind == RecordErrorKind::UnsupportedFormat => self.session = None,
+            Some(Err(fault)) if fault.kind == RecordErrorKind::UnsupportedFormat => {
+                self.session = None;
+            }
             Some(Ok(Record::ScanStart(start))) => {
                 let session = self.session.clone();
                 let (scan, to) = (start.scan, self.read_to);

@@ -26,13 +26,15 @@ mod sync;
 mod writer;
 
 pub use atomic_file::AtomicFile;
-pub use check::{Checker, LogFinding, FindingKind, Severity, LogTotals, check_log};
+pub use check::{Checker, FindingKind, LogFinding, LogTotals, Severity, check_log};
 pub use error::StoreError;
 pub use file_kind::{FileKind, HEAD_BYTES};
 pub use folder::{LogFile, LogFolder, Rotation, log_files};
 pub use format::RecordWriter;
-pub use history::{LogIndex, ScanSpan, ScanSpanLines, LoggedScan};
-pub use log_position::{FINGERPRINT_BYTES, PositionFingerprint, file_digest, to_hex, read_small_json};
+pub use history::{LogIndex, LoggedScan, ScanSpan, ScanSpanLines};
+pub use log_position::{
+    FINGERPRINT_BYTES, PositionFingerprint, file_digest, read_small_json, to_hex,
+};
 pub use open::{Recovered, is_locked, open_no_follow};
 pub use reader::{Line, LineError, Lines, Loaded, load, open_for_reading, read_log};
 pub use repair::{RemovedLine, Repair, repair};

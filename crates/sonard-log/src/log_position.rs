@@ -74,7 +74,8 @@ mod tests {
     #[test]
     fn fingerprint_of_chunks() {
         let bytes: Vec<u8> = (0..=255).cycle().take(1000).collect();
-        let (mut whole, mut pieces) = (PositionFingerprint::default(), PositionFingerprint::default());
+        let (mut whole, mut pieces) =
+            (PositionFingerprint::default(), PositionFingerprint::default());
         whole.advance(&bytes);
         bytes.chunks(7).for_each(|piece| pieces.advance(piece));
         assert_eq!((whole.sha256(), whole.0.len()), (pieces.sha256(), 256));

@@ -6,7 +6,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use sonard_records::{RecordErrorKind, MAX_LINE_BYTES, Record, RecordError, decode_line};
+use sonard_records::{MAX_LINE_BYTES, Record, RecordError, RecordErrorKind, decode_line};
 
 use super::{FileKind, HEAD_BYTES, StoreError};
 
@@ -207,5 +207,9 @@ fn reject_other_kind(
 ) -> Result<Box<dyn BufRead>, StoreError> {
     let fail = |source| StoreError::Read { path: path.into(), source };
     let kind = FileKind::detect(reader.fill_buf().map_err(fail)?);
-    if kind.cannot_be_log() { Err(StoreError::NotALog { path: path.into(), kind }) } else { Ok(reader) }
+    if kind.cannot_be_log() {
+        Err(StoreError::NotALog { path: path.into(), kind })
+    } else {
+        Ok(reader)
+    }
 }

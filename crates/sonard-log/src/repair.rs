@@ -6,7 +6,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use sonard_records::{RecordErrorKind, RecordError};
+use sonard_records::{RecordError, RecordErrorKind};
 
 use super::{
     FileKind, Line, LineError, StoreError,

@@ -10,7 +10,7 @@ use sonard_model::scene::Scene;
 use sonard_records::{Record, SceneRef, Session};
 use thiserror::Error;
 
-use super::{StoreError, AtomicFile};
+use super::{AtomicFile, StoreError};
 
 /// Maximum length of a scene's text in a session record, bytes: its escaped form fits in a line.
 pub const MAX_LOGGED_SCENE_BYTES: usize = 1 << 18;

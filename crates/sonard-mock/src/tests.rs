@@ -9,7 +9,7 @@ use firmware_protocol::{
 use sonard_model::{acoustics::TofNoise, model::Prediction};
 use sonard_records::PingStatus;
 
-use super::{BoardSettings, FaultPlan, MockBoard, Note, Pace, EchoTable, WakeKind, World};
+use super::{BoardSettings, EchoTable, FaultPlan, MockBoard, Note, Pace, WakeKind, World};
 
 const TICKS_PER_US: u64 = 2;
 

@@ -15,8 +15,8 @@ pub use aperture::{ApertureResponse, Image, Incidence};
 pub use face::{Disc, Face, FaceAspect};
 pub use pulse::EchoShape;
 pub use receiver::{
-    Combining, Detection, EchoTrace, EnvelopePeak, Incident, Latch, DetectorBank, PulseArrival,
-    Receiver, ReceiverNoise, EchoRise, TracePoint, classify_tof,
+    Combining, Detection, DetectorBank, EchoRise, EchoTrace, EnvelopePeak, Incident, Latch,
+    PulseArrival, Receiver, ReceiverNoise, TracePoint, classify_tof,
 };
 pub use sensor::{
     Aperture, BeamPoint, ChirpPart, Detector, EdgeLawKind, Gain, GainStep, Mounting, Pulse,

@@ -19,9 +19,9 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 pub use body::{Body, BodyShape};
-pub use course::{RobotCourse, CourseError};
+pub use course::{CourseError, RobotCourse};
 pub use error::{ArrayError, ArrayPoseError};
-pub use firing::{InterferingFiring, FiringSlot};
+pub use firing::{FiringSlot, InterferingFiring};
 
 use crate::{
     geometry::{DVec2, Pose, wrap_360},
@@ -230,7 +230,8 @@ impl RangerArray {
             let faces = self.rangers.iter().map(|ranger| ranger.world_pose(robot).position());
             (*robot, faces.collect())
         };
-        let checked = self.scene_with_body(scene).check_many_face_positions(poses.iter().map(faces));
+        let checked =
+            self.scene_with_body(scene).check_many_face_positions(poses.iter().map(faces));
         checked.map_err(|(at, (ranger, error))| {
             let ranger = ranger.map(|ranger| self.rangers[ranger].id.clone());
             (at, ArrayPoseError { ranger, error })

@@ -33,7 +33,7 @@ pub mod array;
 pub mod geometry;
 pub mod model;
 pub mod motion;
-pub mod scan_plan;
 pub mod reading;
+pub mod scan_plan;
 pub mod scene;
 pub mod viewpoint;

@@ -111,7 +111,8 @@ mod tests {
         for (steps, speed, acceleration) in [(1, 800, 40_000), (7, 800, 40_000), (-400, 800, 9_000)]
         {
             let motion = Trapezoid::new(steps, speed, acceleration);
-            let pulses: Vec<f64> = (1..=steps.unsigned_abs()).map(|k| motion.pulse_time_s(k)).collect();
+            let pulses: Vec<f64> =
+                (1..=steps.unsigned_abs()).map(|k| motion.pulse_time_s(k)).collect();
             for (k, at_s) in pulses.iter().enumerate() {
                 let (travelled, _) = motion.state_at(*at_s);
                 assert!(

@@ -17,7 +17,7 @@ pub enum PingStatus {
     /// Reading lost between the device and the host.
     LinkLost,
     /// Measured, but the motor position is uncertain.
-    StepDoubtful,
+    StepUncertain,
     /// The module could not be fired: its ECHO line was stuck.
     ModuleFault,
 }
@@ -50,8 +50,8 @@ mod tests {
 
     #[test]
     fn range_by_status() {
-        use PingStatus::{Echo, LinkLost, MinRange, ModuleFault, NoEcho, StepDoubtful};
-        let all = [Echo, NoEcho, MinRange, LinkLost, StepDoubtful, ModuleFault];
+        use PingStatus::{Echo, LinkLost, MinRange, ModuleFault, NoEcho, StepUncertain};
+        let all = [Echo, NoEcho, MinRange, LinkLost, StepUncertain, ModuleFault];
         assert_eq!(all.map(PingStatus::has_range), [true, false, true, false, false, false]);
     }
 }

@@ -23,7 +23,7 @@ mod tests;
 
 pub use builder::SceneBuilder;
 pub use error::{SceneError, SceneProblem, sanitize, suggest};
-pub use floor_plan::{PlanChange, DEFAULT_SNAP_M, FloorPlan};
+pub use floor_plan::{DEFAULT_SNAP_M, FloorPlan, PlanChange};
 pub use pose::{PoseError, parse_pose};
 pub use robot::{Robot, RobotShape};
 pub use schema::json_schema;

@@ -67,7 +67,8 @@ impl Mounting {
     #[must_use]
     pub fn viewpoint(&self, axis: &Pose) -> Viewpoint {
         let direction_deg = wrap_360(axis.heading_deg);
-        let [transmitter, receiver] = self.transducer_positions(axis.position(), direction_deg.to_radians());
+        let [transmitter, receiver] =
+            self.transducer_positions(axis.position(), direction_deg.to_radians());
         let [x_m, y_m] = (0.5 * (transmitter + receiver)).to_array();
         Viewpoint {
             x_m,

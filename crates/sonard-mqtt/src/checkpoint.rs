@@ -9,7 +9,7 @@ use std::{
 
 use serde::{Deserialize, Serialize};
 use sha2::{Digest as _, Sha256};
-use sonard_log::{FINGERPRINT_BYTES, AtomicFile, to_hex, read_small_json};
+use sonard_log::{AtomicFile, FINGERPRINT_BYTES, read_small_json, to_hex};
 
 use super::in_flight::LogPosition;
 

@@ -7,7 +7,7 @@ use rumqttc::{
     tokio_rustls::rustls::pki_types::{CertificateDer, PrivateKeyDer, pem::PemObject as _},
 };
 use sonard_api::config::{BrokerAddress, MqttKeys};
-use sonard_daemon::secret::{SecretKind, SecretError, read_secret, read_small_file};
+use sonard_daemon::secret::{SecretError, SecretKind, read_secret, read_small_file};
 use sonard_records::MAX_LINE_BYTES;
 use thiserror::Error;
 
@@ -60,7 +60,8 @@ impl Credentials {
     /// If a file can't be read or has invalid contents.
     pub fn open(keys: &MqttKeys, robot: &str) -> Result<Option<Self>, CredentialsError> {
         // An invalid address was rejected with the configuration.
-        let Some(broker) = keys.broker.as_deref().and_then(|url| BrokerAddress::parse(url).ok()) else {
+        let Some(broker) = keys.broker.as_deref().and_then(|url| BrokerAddress::parse(url).ok())
+        else {
             return Ok(None);
         };
         let address = (broker.host.clone(), broker.port);

@@ -24,7 +24,7 @@ pub(super) const STABLE_AFTER: Duration = Duration::from_secs(120);
 pub(super) struct SentMessage {
     /// Sequence number, if the message is a record.
     pub(super) record: Option<u64>,
-    /// MessageKind of the message; `None` for the subscription to commands.
+    /// Kind of the message; `None` for the subscription to commands.
     pub(super) kind: Option<MessageKind>,
     /// Length of the payload.
     pub(super) bytes: usize,

@@ -32,7 +32,7 @@ pub struct LogPosition {
 /// Message with a record for the broker.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct RecordMessage {
-    /// MessageKind of the record, which selects the topic.
+    /// Kind of the record, which selects the topic.
     pub kind: MessageKind,
     /// Line of the log, without newline.
     pub payload: Bytes,

@@ -72,15 +72,15 @@ impl Mqtt {
             broker: account.broker(),
             connected: false,
             since: Timestamp::now(),
-            trouble: None,
+            error: None,
             connections: 0,
             acknowledged: 0,
             waiting: 0,
-            behind_bytes: tail.behind(tail.place())?,
-            passed_over: 0,
-            left_out: 0,
+            lag_bytes: tail.behind(tail.place())?,
+            skipped_lines: 0,
+            skipped: 0,
             commands: 0,
-            refused: 0,
+            rejected: 0,
         };
         daemon.report_mqtt(report.clone());
         let supervisor = daemon.supervisor().clone();

@@ -234,7 +234,7 @@ impl Publisher {
                     BrokerEvent::Published(_) | BrokerEvent::Connected => {}
                 },
                 (reply, is_accepted) = connected.commands.next() => {
-                    *(if is_accepted { &mut self.report.commands } else { &mut self.report.refused }) += 1;
+                    *(if is_accepted { &mut self.report.commands } else { &mut self.report.rejected }) += 1;
                     self.send_reply(connected, &reply);
                 }
                 done = wait_for_job(&mut connected.job) => {
@@ -381,7 +381,7 @@ impl Publisher {
             None => {}
         }
         if let Some(bytes) = result.behind_bytes {
-            self.report.behind_bytes = bytes;
+            self.report.lag_bytes = bytes;
         }
         connected.retry_at = fault.as_ref().map(|_| Instant::now() + DISK_RETRY_DELAY);
         self.faults.log = fault.map(|error| format!("the log: {error}"));
@@ -396,7 +396,7 @@ impl Publisher {
             is_repeated: publish.dup,
         };
         if let Err(reply) = connected.commands.queue(&received) {
-            self.report.refused += 1;
+            self.report.rejected += 1;
             self.send_reply(connected, &reply);
         }
     }
@@ -495,12 +495,12 @@ impl Publisher {
 
     fn report_state(&mut self) {
         self.report.acknowledged = self.in_flight.acknowledged();
-        self.report.passed_over = self.in_flight.passed_over();
+        self.report.skipped_lines = self.in_flight.passed_over();
         self.report.waiting = self.in_flight.waiting() as u64;
-        self.report.left_out = self.in_flight.left_out();
+        self.report.skipped = self.in_flight.left_out();
         let Faults { line, log, commands, cause } = &self.faults;
         let first = [cause, line, log, commands].into_iter().flatten().next();
-        self.report.trouble = first.cloned();
+        self.report.error = first.cloned();
         self.daemon.report_mqtt(self.report.clone());
     }
 }

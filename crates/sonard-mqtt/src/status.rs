@@ -26,7 +26,7 @@ impl StatusSchedule {
     pub(super) fn due(&mut self, status: &Status, now: Duration) -> Option<Bytes> {
         let key = (
             status.link.state,
-            status.link.trouble.clone(),
+            status.link.error.clone(),
             status.scanning.paused,
             status.scan.as_ref().map(|scan| scan.scan),
             status.log.error.clone(),

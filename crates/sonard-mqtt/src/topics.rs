@@ -3,7 +3,7 @@
 use sonard_api::config::MqttKeys;
 use sonard_records::Record;
 
-/// MessageKind of a message.
+/// Kind of a published record, which determines its topic.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum MessageKind {
     /// Presence of the daemon, `true` or `false`; retained.

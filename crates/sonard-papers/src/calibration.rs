@@ -21,7 +21,9 @@ use sonard_records::{PathKind, Ping, PingStatus, ScanPlan, ScanView};
 use uuid::Uuid;
 
 use crate::trial::random_room;
-use sonard_interpret::interpret::{Extents, Feature, Probabilities, InterpretSettings, Sweep, interpret};
+use sonard_interpret::interpret::{
+    Extents, Feature, InterpretSettings, Probabilities, Sweep, interpret,
+};
 
 /// Boxes and partitions of successive rooms.
 const ROOMS: [(usize, usize); 4] = [(0, 0), (3, 0), (0, 1), (2, 2)];
@@ -126,7 +128,12 @@ impl Reliability {
 /// probabilities (masked, truncated, too close) are omitted. The result is empty for an invalid
 /// sensor and for a room with more paths than the model can find.
 #[must_use]
-pub fn classify_room(seed: u64, number: u64, sensor: &Sensor, settings: &InterpretSettings) -> Vec<ClassifiedArc> {
+pub fn classify_room(
+    seed: u64,
+    number: u64,
+    sensor: &Sensor,
+    settings: &InterpretSettings,
+) -> Vec<ClassifiedArc> {
     let mut rng = Pcg64::seed_from_u64(seed.wrapping_mul(1_000_003) ^ number);
     let (boxes, partitions) = ROOMS[number as usize % ROOMS.len()];
     let scene = random_room("room", boxes, partitions, &mut rng);

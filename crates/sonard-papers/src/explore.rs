@@ -16,7 +16,7 @@ mod tests;
 
 pub use follow::{explore, explore_observed};
 pub use laser::Laser;
-pub use robot::{DriveOutcome, SonarLayout, Robot, RobotSettings, SimulatedRobot};
+pub use robot::{DriveOutcome, Robot, RobotSettings, SimulatedRobot, SonarLayout};
 
 use serde::Serialize;
 

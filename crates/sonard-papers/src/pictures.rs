@@ -9,7 +9,7 @@ pub use reliability::draw_reliability;
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::calibration::{ReliabilityBin, Reliability};
+    use crate::calibration::{Reliability, ReliabilityBin};
 
     #[test]
     fn every_filled_bin_has_a_mark() {

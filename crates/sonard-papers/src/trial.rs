@@ -14,7 +14,7 @@ use rand_distr::{Distribution, StandardNormal};
 pub use rooms::{gallery, random_room};
 
 use sonard_interpret::interpret::{
-    SweepBeam, Extents, BeamOutcome, Sweep,
+    BeamOutcome, Extents, Sweep, SweepBeam,
     grid::{
         BeamModel, GaussianBeam, Grid, GridShape, MapScore, PathSettings, ScoreError, Trust, ideal,
         score,
@@ -227,7 +227,11 @@ fn read(
 const RING_STEP_DEG: f64 = 25.0;
 
 /// Reading of a prediction with range noise.
-pub(crate) fn simulate_reading(prediction: &Prediction, sigma_m: f64, rng: &mut impl Rng) -> BeamOutcome {
+pub(crate) fn simulate_reading(
+    prediction: &Prediction,
+    sigma_m: f64,
+    rng: &mut impl Rng,
+) -> BeamOutcome {
     match (prediction.status, prediction.range_m) {
         (PingStatus::Echo, Some(range_m)) => {
             let unit: f64 = StandardNormal.sample(rng);

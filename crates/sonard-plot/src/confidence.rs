@@ -46,7 +46,7 @@ pub fn draw_confidence(scans: &[ScanView], scene: Option<&Scene>) -> Picture {
     overlay::draw(scans, scene, finding, &[], draw, |_| None, &entries)
 }
 
-/// PlottedScan with a range and a confidence, each with its class.
+/// Readings with a range and a confidence, each with the index of its class.
 fn classify(scan: &ScanView) -> Vec<(usize, &Ping)> {
     let class = |ping: &Ping| {
         let confidence = ping.confidence.filter(|_| ping.status == PingStatus::Echo)?;

@@ -1,7 +1,7 @@
 //! Errors of a method against its resolution, on logarithmic axes.
 
 use super::{
-    canvas::{Anchor, Layer, Px, Rect, MarkShape},
+    canvas::{Anchor, Layer, MarkShape, Px, Rect},
     caption,
     legend::{self, LegendEntry, LegendSample},
     picture::Picture,

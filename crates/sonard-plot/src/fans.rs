@@ -2,7 +2,7 @@
 //! the arc; a reading without echo is an outline up to the maximum range.
 
 use super::{
-    canvas::{Anchor, Layer, Px, MarkShape},
+    canvas::{Anchor, Layer, MarkShape, Px},
     floor::MIN_RANGE_DASH,
     plan::PlanProjection,
     readings::{PlottedBeam, PlottedScan},

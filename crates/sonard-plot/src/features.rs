@@ -1,7 +1,7 @@
 //! Floor plan with the features found by the interpretation.
 
 use super::{
-    canvas::{Anchor, Layer, Px, MarkShape},
+    canvas::{Anchor, Layer, MarkShape, Px},
     legend::{LegendEntry, LegendSample},
     legend_entries, overlay,
     picture::Picture,
@@ -71,7 +71,10 @@ const fn shape(kind: FeatureKind) -> MarkShape {
 fn entries(features: &[Feature], scene: Option<&Scene>) -> Vec<LegendEntry> {
     let present = KINDS.into_iter().filter(|kind| features.iter().any(|f| f.kind == *kind));
     let kinds = present.map(|kind| {
-        LegendEntry::new(LegendSample::Mark { shape: shape(kind), colour: colour(kind) }, name(kind))
+        LegendEntry::new(
+            LegendSample::Mark { shape: shape(kind), colour: colour(kind) },
+            name(kind),
+        )
     });
     let dot = LegendSample::Mark { shape: MarkShape::Dot, colour: theme::NO_ECHO };
     let next = LegendSample::Line { colour: theme::ORANGE, width_px: 2.0, dash: "none" };
@@ -128,7 +131,12 @@ fn hint(feature: &Feature) -> String {
 }
 
 /// Draws class, extent and, if known, beta next to each mark.
-fn names(plan: &PlanProjection, scene: Option<&Scene>, scans: &[ScanView], features: &[Feature]) -> Layer {
+fn names(
+    plan: &PlanProjection,
+    scene: Option<&Scene>,
+    scans: &[ScanView],
+    features: &[Feature],
+) -> Layer {
     let mut labels = plan.labels(scene);
     for feature in features {
         arc_of(plan, scans, feature).windows(2).for_each(|two| labels.keep_off(two[0], two[1]));

@@ -166,7 +166,7 @@ impl Floor<'_> {
         Some((from + distance * outward, outward))
     }
 
-    /// PlottedScan outside the view, grouped by direction.
+    /// Readings outside the view, grouped by direction.
     fn clusters_outside(&self) -> Vec<Cluster> {
         let mut clusters: Vec<Cluster> = Vec::new();
         for beam in &self.scan.beams {

@@ -1,7 +1,7 @@
 //! Legends: rows of samples with their labels.
 
 use super::{
-    canvas::{Anchor, Layer, Px, Rect, MarkShape, text_width_px},
+    canvas::{Anchor, Layer, MarkShape, Px, Rect, text_width_px},
     theme,
 };
 

@@ -10,20 +10,26 @@ use super::{
 use sonard_model::scene::Scene;
 
 /// Entries for a floor plan or polar plot of scans; `outside` counts readings outside the view.
-pub(super) fn all(scans: &[PlottedScan], scene: Option<&Scene>, outside: usize) -> Vec<LegendEntry> {
+pub(super) fn all(
+    scans: &[PlottedScan],
+    scene: Option<&Scene>,
+    outside: usize,
+) -> Vec<LegendEntry> {
     let mut entries = with_range(scans);
     for (kind, n) in present(scans, &ReadingKind::WITHOUT_RANGE) {
         let sample = LegendSample::Tick { colour: kind.colour() };
         entries.push(LegendEntry::new(sample, format!("{} ({n})", kind.label())));
     }
     if outside > 0 {
-        entries.push(LegendEntry::new(LegendSample::Outward, format!("outside the view ({outside})")));
+        entries
+            .push(LegendEntry::new(LegendSample::Outward, format!("outside the view ({outside})")));
     }
     if scans.iter().any(|scan| scan.has_model) {
         entries.push(LegendEntry::new(LegendSample::Ring { colour: theme::SKY }, "prediction"));
     }
     if let Some(range_m) = scans.iter().find_map(|scan| scan.min_range_m) {
-        let sample = LegendSample::Line { colour: theme::PURPLE, width_px: 1.0, dash: MIN_RANGE_DASH };
+        let sample =
+            LegendSample::Line { colour: theme::PURPLE, width_px: 1.0, dash: MIN_RANGE_DASH };
         entries.push(LegendEntry::new(sample, format!("minimum range (blanking), {range_m:.2} m")));
     }
     entries.extend(scene.map(materials).into_iter().flatten());

@@ -85,7 +85,8 @@ fn map_has_frame_and_badge() {
     let grid = Grid::new(shape);
     let draw = |badge| {
         let (title, lines) = ("a map".to_owned(), Vec::new());
-        let view = MapView { title, lines, badge, grid: &grid, scene: Some(&room()), trajectory: &[] };
+        let view =
+            MapView { title, lines, badge, grid: &grid, scene: Some(&room()), trajectory: &[] };
         Pixmap::decode_png(&draw_map(&view).expect("drawn")).expect("a PNG")
     };
     let red = |image: &Pixmap| {

@@ -58,6 +58,6 @@ pub use residuals::draw_residuals;
 pub use scan::{draw_scan, draw_scans};
 pub use scan_caption::{badge_among, badge_for};
 pub use scene::draw_scene;
-pub use series::{SeriesPoint, Series, draw_series};
+pub use series::{Series, SeriesPoint, draw_series};
 pub use side_by_side::draw_side_by_side;
 pub use trace::{TraceView, draw_trace};

@@ -1,7 +1,7 @@
 //! Floor plan with the readings as small dots, as background of findings.
 
 use super::{
-    canvas::{Layer, Px, Rect, MarkShape},
+    canvas::{Layer, MarkShape, Px, Rect},
     caption,
     legend::{self, LegendEntry},
     picture::Picture,

@@ -66,7 +66,8 @@ pub fn draw_path(view: &PathView) -> Picture {
         LegendEntry::new(line(theme::SKY, "5 4"), "beam axis"),
     ];
     if view.range_m.is_some() {
-        entries.push(LegendEntry::new(LegendSample::Ring { colour: theme::BLUE }, "reported range"));
+        entries
+            .push(LegendEntry::new(LegendSample::Ring { colour: theme::BLUE }, "reported range"));
     }
     entries.extend(legend_entries::materials(view.scene));
     let (key, key_height) = legend::draw(&entries, below, right - left);

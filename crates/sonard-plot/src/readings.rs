@@ -1,4 +1,4 @@
-//! PlottedScan prepared for drawing, from any kind of log. PlottedScan with a prediction are
+//! Readings prepared for drawing, from any kind of log. Readings with a prediction are
 //! classified by [`sonard_interpret::compare`], so that pictures and tables agree.
 
 use super::{canvas::MarkShape, fans::FanStyle, theme};
@@ -10,7 +10,7 @@ use sonard_model::{
 };
 use sonard_records::{PathKind, PathRecord, Ping, PingStatus, ScanView, Session};
 
-/// ReadingKind of a reading by its outcome and classification.
+/// Kind of a reading by its outcome and classification.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub(super) enum ReadingKind {
     /// Echo without a prediction.
@@ -190,7 +190,7 @@ fn fan(session: &Session) -> Option<FanStyle> {
     Some(FanStyle { half_rad: BeamPattern::new(sensor, speed_m_s).angle_at(0.5), max_range_m })
 }
 
-/// PlottedBeam with its viewpoint, and its azimuth relative to the scan's pose.
+/// Adds the viewpoint of a reading, and its azimuth relative to the scan's pose.
 fn mounted(view: &ScanView, ping: &Ping, reading: PlottedBeam) -> PlottedBeam {
     let viewpoint = view.viewpoint(ping).filter(|viewpoint| {
         viewpoint.position().is_finite() && viewpoint.direction_deg.is_finite()
@@ -236,7 +236,7 @@ fn kind_with_range(classified: &ClassifiedPing<'_>) -> ReadingKind {
         (Ok(Verdict::Multiple), _) => ReadingKind::Multiple,
         (Ok(Verdict::Edge), _) => ReadingKind::Edge,
         (Ok(Verdict::MinRange), _) | (Err(_), PingStatus::MinRange) => ReadingKind::MinRange,
-        (Ok(Verdict::Unexplained | Verdict::Silent), _) => ReadingKind::Unexplained,
+        (Ok(Verdict::Unexplained | Verdict::NoEcho), _) => ReadingKind::Unexplained,
         // Without a comparison, a simulated reading still has its path.
         (Err(_), _) => classified.ping.path.as_ref().map_or(ReadingKind::Echo, path_kind),
     }

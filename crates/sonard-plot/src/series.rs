@@ -1,7 +1,7 @@
 //! Quantities stacked over a common axis, such as drift over days or spread over azimuths.
 
 use super::{
-    canvas::{Anchor, Layer, Px, Rect, MarkShape},
+    canvas::{Anchor, Layer, MarkShape, Px, Rect},
     caption,
     legend::{self, LegendEntry, LegendSample},
     picture::Picture,
@@ -65,7 +65,8 @@ pub fn draw_series(
     page.text(middle, Anchor::Middle, theme::SMALL_PX, x_title);
     bottom += 34.0 + theme::MARGIN_PX;
     if strips.iter().flat_map(|strip| &strip.points).any(|point| point.rejected) {
-        let entry = |shape, colour, text| LegendEntry::new(LegendSample::Mark { shape, colour }, text);
+        let entry =
+            |shape, colour, text| LegendEntry::new(LegendSample::Mark { shape, colour }, text);
         let entries = [
             entry(MarkShape::Dot, theme::BLUE, "accepted"),
             entry(MarkShape::Cross, theme::VERMILLION, "rejected"),

@@ -1,7 +1,7 @@
 //! Strips of a quantity against azimuth.
 
 use super::{
-    canvas::{Anchor, Layer, Px, Rect, MarkShape},
+    canvas::{Anchor, Layer, MarkShape, Px, Rect},
     theme, ticks,
 };
 use sonard_model::geometry::wrap_360;

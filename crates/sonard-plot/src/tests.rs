@@ -269,7 +269,7 @@ fn any_status() -> impl Strategy<Value = PingStatus> {
         PingStatus::NoEcho,
         PingStatus::MinRange,
         PingStatus::LinkLost,
-        PingStatus::StepDoubtful,
+        PingStatus::StepUncertain,
         PingStatus::ModuleFault,
     ])
 }

@@ -2,7 +2,7 @@
 //! ECHO output.
 
 use super::{
-    canvas::{Anchor, Layer, Px, Rect, MarkShape},
+    canvas::{Anchor, Layer, MarkShape, Px, Rect},
     caption,
     labels::Labels,
     legend::{self, LegendEntry, LegendSample},
@@ -324,7 +324,10 @@ fn legend_entries() -> Vec<LegendEntry> {
             LegendSample::Mark { shape: MarkShape::Triangle, colour: theme::VERMILLION },
             "ECHO rises",
         ),
-        LegendEntry::new(LegendSample::Line { colour: theme::SKY, width_px: 9.0, dash: "none" }, "blanking"),
+        LegendEntry::new(
+            LegendSample::Line { colour: theme::SKY, width_px: 9.0, dash: "none" },
+            "blanking",
+        ),
     ]
 }
 

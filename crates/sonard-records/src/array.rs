@@ -13,7 +13,7 @@ use sonard_model::{
 impl Session {
     /// Session of a simulated array.
     #[must_use]
-    pub fn of_array(model: &ArrayModel, started: Timestamp) -> Self {
+    pub fn for_array(model: &ArrayModel, started: Timestamp) -> Self {
         let array = Some(model.array().as_ref().clone());
         Self { array, ..Self::simulated(model.simulator(), started) }
     }
@@ -22,7 +22,7 @@ impl Session {
 impl ScanStart {
     /// Start of a simulated scan of `rounds` rounds of an array.
     #[must_use]
-    pub fn of_array(
+    pub fn for_array(
         model: &ArrayModel,
         scan: Uuid,
         pose: Pose,
@@ -37,7 +37,7 @@ impl ScanStart {
 impl Ping {
     /// Predicted reading of an array's ranger, in a scan that began at `scan_pose`.
     #[must_use]
-    pub fn of_array(
+    pub fn for_array(
         at_pose: &ArrayAtPose<'_>,
         scan: Uuid,
         scan_pose: &Pose,
@@ -62,7 +62,7 @@ impl Ping {
 impl SimRecord {
     /// Record of a prediction for an array's ranger.
     #[must_use]
-    pub fn of_array(at_pose: &ArrayAtPose<'_>, ranger: usize, prediction: &Prediction) -> Self {
+    pub fn for_array(at_pose: &ArrayAtPose<'_>, ranger: usize, prediction: &Prediction) -> Self {
         let crosstalk = crosstalk(at_pose.array(), prediction);
         Self { crosstalk, ..Self::from_prediction(at_pose.simulator(ranger), prediction) }
     }
@@ -76,7 +76,7 @@ fn crosstalk(array: &RangerArray, prediction: &Prediction) -> Option<CrosstalkRe
 impl ScanEnd {
     /// End of an array scan, with the numbers of measured and missing beams.
     #[must_use]
-    pub fn of_array(
+    pub fn for_array(
         model: &ArrayModel,
         scan: Uuid,
         [beams, missing]: [u32; 2],
@@ -119,7 +119,7 @@ mod tests {
         let [from, to] = [0.0, 10.0].map(|heading_deg| Pose { x_m: 1.0, y_m: 1.0, heading_deg });
         let pings = [from, to].into_iter().zip(0..).map(|(pose, index)| {
             let at_pose = model.at(pose).expect("a valid pose");
-            Record::Ping(Box::new(Ping::of_array(
+            Record::Ping(Box::new(Ping::for_array(
                 &at_pose,
                 scan,
                 &from,
@@ -129,8 +129,8 @@ mod tests {
             )))
         });
         let records = [
-            Record::Session(Box::new(Session::of_array(&model, time))),
-            Record::ScanStart(ScanStart::of_array(&model, scan, from, 1, time)),
+            Record::Session(Box::new(Session::for_array(&model, time))),
+            Record::ScanStart(ScanStart::for_array(&model, scan, from, 1, time)),
         ];
         let records = records.into_iter().chain(pings.collect::<Vec<_>>());
         let through_text = records.map(|record| {

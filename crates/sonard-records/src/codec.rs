@@ -146,7 +146,11 @@ fn as_text(bytes: &[u8]) -> Result<&str, RecordError> {
     let fault =
         |kind, column, message: String| Err(RecordError { kind, column, field: None, message });
     if bytes.trim_ascii().is_empty() {
-        return fault(RecordErrorKind::Empty, None, "empty line: expected one record per line".into());
+        return fault(
+            RecordErrorKind::Empty,
+            None,
+            "empty line: expected one record per line".into(),
+        );
     }
     if let Some(at) = bytes.iter().position(|&byte| byte == 0) {
         let count = bytes.iter().filter(|&&byte| byte == 0).count();
@@ -182,7 +186,12 @@ fn tag_fault(text: &str, error: &serde_json::Error) -> RecordError {
         serde_json::error::Category::Eof => "the JSON object is not closed".into(),
         _ => plain(error),
     };
-    RecordError { kind: RecordErrorKind::NotJson, column: Some(error.column()), field: None, message }
+    RecordError {
+        kind: RecordErrorKind::NotJson,
+        column: Some(error.column()),
+        field: None,
+        message,
+    }
 }
 
 /// Decodes a session. The format is checked first, because fields of another format may differ.

@@ -67,7 +67,7 @@ impl ModelRecord {
             return None;
         }
         let keys: OptionKeys = serde_json::from_value(settings.into()).ok()?;
-        Some(keys.options_of_engine())
+        Some(keys.engine_options())
     }
 }
 

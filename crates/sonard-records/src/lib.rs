@@ -19,7 +19,9 @@ mod trace;
 mod view;
 mod viewpoint;
 
-pub use codec::{EncodeError, RecordErrorKind, MAX_LINE_BYTES, RecordError, decode_line, encode_line};
+pub use codec::{
+    EncodeError, MAX_LINE_BYTES, RecordError, RecordErrorKind, decode_line, encode_line,
+};
 pub use floor_plan::{Body, Circle, FloorPlan, PlanPoint, WallLine};
 pub use path::{InteractionKind, InteractionRecord, PathRecord, Point};
 pub use peak::PeakLine;
@@ -34,8 +36,8 @@ pub use session::{
 };
 pub use sink::{Sink, SinkError};
 pub use sonard_model::{
-    scan_plan::{PlanError, ScanPlan},
     reading::{PathKind, PingStatus},
+    scan_plan::{PlanError, ScanPlan},
 };
 pub use trace::TraceLine;
 pub use view::ScanView;

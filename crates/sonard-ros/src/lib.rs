@@ -22,7 +22,7 @@ use std::{
 
 use jiff::Timestamp;
 use sonard_api::{RosReport, config::RosKeys};
-use sonard_daemon::{LiveMessageSink as _, MessageConverter, Handle};
+use sonard_daemon::{Handle, LiveMessageSink as _, MessageConverter};
 use sonard_export::{LiveConverter, Topic};
 use sonard_runtime::supervisor::Task;
 use tokio::{
@@ -59,13 +59,13 @@ impl Ros {
             networks: keys.networks.clone(),
             up: false,
             since: Timestamp::now(),
-            trouble: None,
+            error: None,
             topics: 0,
             subscriptions: 0,
             messages: 0,
-            left_out: 0,
+            dropped: 0,
             commands: 0,
-            refused: 0,
+            rejected: 0,
             refusal: None,
         };
         daemon.report_ros(report.clone());
@@ -103,12 +103,12 @@ impl RosThread {
                 Ok(Err(trouble)) => trouble,
                 Err(_) => "internal error of the DDS library".to_owned(),
             };
-            if self.report.trouble.as_ref() != Some(&trouble) {
+            if self.report.error.as_ref() != Some(&trouble) {
                 tracing::warn!("ros: {trouble}");
             }
             let (up, since, trouble) = (false, Timestamp::now(), Some(trouble));
             (self.report.topics, self.report.subscriptions) = (0, 0);
-            self.report = RosReport { up, since, trouble, ..self.report.clone() };
+            self.report = RosReport { up, since, error: trouble, ..self.report.clone() };
             self.daemon.report_ros(self.report.clone());
             let waited = runtime.block_on(async {
                 tokio::select! {

@@ -17,10 +17,10 @@ use rustdds::{
     policy::{Durability, History},
 };
 use sonard_api::{RosReport, config::RosKeys};
-use sonard_daemon::{LiveMessageSink, Handle};
+use sonard_daemon::{Handle, LiveMessageSink};
 use sonard_export::{
     Distribution, LiveMessage, Topic,
-    dds::{self, Guid, DISCOVERY_TOPIC, topic_on_wire, type_on_wire},
+    dds::{self, DISCOVERY_TOPIC, Guid, topic_on_wire, type_on_wire},
 };
 use sonard_records::EventKind;
 
@@ -133,7 +133,7 @@ impl Node {
             distribution: keys.message_settings().distribution,
             namespace: keys.namespace.clone(),
             queue_bytes: keys.queue_kb as usize * 1000,
-            report: RosReport { networks, up, since, trouble: None, ..report.clone() },
+            report: RosReport { networks, up, since, error: None, ..report.clone() },
             dropped: DroppedMessages::default(),
             rejection_logged: None,
             fault: None,
@@ -210,7 +210,7 @@ impl Node {
         match done {
             Ok(_) => self.report.commands += 1,
             Err(reason) => {
-                self.report.refused += 1;
+                self.report.rejected += 1;
                 self.report.refusal = Some(reason.clone());
                 let is_early =
                     self.rejection_logged.is_some_and(|last| last.elapsed() < REFUSAL_LOG_INTERVAL);
@@ -267,7 +267,7 @@ impl LiveMessageSink for Node {
                 self.report.messages += 1;
             }
             Err(None | Some(WriteError::WouldBlock { .. })) => {
-                self.report.left_out += 1;
+                self.report.dropped += 1;
                 self.dropped.add(message.topic);
             }
             Err(Some(error)) => {

@@ -153,7 +153,7 @@ const fn unpack(byte: u8) -> (ReadingStatus, u8) {
         0 => ReadingStatus::Echo,
         1 => ReadingStatus::NoEcho,
         2 => ReadingStatus::ModuleFault,
-        _ => ReadingStatus::StepDoubtful,
+        _ => ReadingStatus::StepUncertain,
     };
     let echo_count = byte & 0x0f;
     (status, if echo_count > MAX_ECHOES { MAX_ECHOES } else { echo_count })
@@ -202,7 +202,7 @@ mod tests {
     fn push(ring: &mut ReadingRing, number: u32, echo_count: u8) -> Decoded {
         let first = number / 7 % (WINDOW_TICKS_MAX - 8);
         let ticks: Vec<u32> = (first..).take(echo_count.into()).collect();
-        let status = [ReadingStatus::Echo, ReadingStatus::StepDoubtful][(number % 2) as usize];
+        let status = [ReadingStatus::Echo, ReadingStatus::StepUncertain][(number % 2) as usize];
         ring.push(number, status, &ticks);
         (number, status, encode(|out| Echoes::from_ticks(&ticks).put(out)))
     }

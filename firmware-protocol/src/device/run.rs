@@ -104,7 +104,7 @@ impl Device {
         let echoes = report.echoes.get(..count).unwrap_or_default();
         let status = match report.status {
             ReadingStatus::Echo | ReadingStatus::NoEcho if !self.homed => {
-                ReadingStatus::StepDoubtful
+                ReadingStatus::StepUncertain
             }
             ReadingStatus::Echo if echoes.is_empty() => ReadingStatus::NoEcho,
             status => status,

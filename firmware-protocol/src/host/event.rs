@@ -179,7 +179,9 @@ impl fmt::Display for HostError {
             Self::InvalidIdentity(fault) => {
                 write!(formatter, "the identity of the device is invalid: {fault}")
             }
-            Self::Rejected(reason) => write!(formatter, "the device rejected the request: {reason}"),
+            Self::Rejected(reason) => {
+                write!(formatter, "the device rejected the request: {reason}")
+            }
             Self::Rebooted => formatter.write_str("the device restarted"),
             Self::Hangup => formatter.write_str("the line was closed"),
             Self::LeaseExpired => write!(formatter, "{}", FaultKind::LeaseExpired),

@@ -1,4 +1,4 @@
-//! OpenRequest of a request and its reply: numbering, deadlines, repetition.
+//! Exchange of a request and its reply: numbering, deadlines, repetition.
 
 use super::config::{SEQ_GAP_MAX, STOP_ATTEMPTS};
 use super::deadline::{beam_us, longest_frame_us, slew_us, wire_us};

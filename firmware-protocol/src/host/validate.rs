@@ -241,21 +241,21 @@ mod tests {
 
     #[test]
     fn status_agrees_with_echoes() {
-        use ReadingStatus::{Echo, ModuleFault, NoEcho, StepDoubtful};
+        use ReadingStatus::{Echo, ModuleFault, NoEcho, StepUncertain};
         let late = ReadingFault::EchoAfterWindow { ticks: 48_001, window: 48_000 };
         for (status, echoes, expected) in [
             (Echo, &[9_000][..], Ok(())),
             (Echo, &[9_000, 48_000], Ok(())),
             (NoEcho, &[], Ok(())),
             (ModuleFault, &[], Ok(())),
-            (StepDoubtful, &[], Ok(())),
-            (StepDoubtful, &[9_000], Ok(())),
+            (StepUncertain, &[], Ok(())),
+            (StepUncertain, &[9_000], Ok(())),
             (Echo, &[], Err(ReadingFault::EchoMissing)),
             (NoEcho, &[9_000], Err(ReadingFault::EchoUnexpected { echoes: 1 })),
             (ModuleFault, &[9_000], Err(ReadingFault::EchoUnexpected { echoes: 1 })),
             (Echo, &[1, 2, 3], Err(ReadingFault::TooManyEchoes { echoes: 3, requested: 2 })),
             (Echo, &[9_000, 9_000], Err(ReadingFault::EchoesOutOfOrder)),
-            (StepDoubtful, &[9_000, 8_000], Err(ReadingFault::EchoesOutOfOrder)),
+            (StepUncertain, &[9_000, 8_000], Err(ReadingFault::EchoesOutOfOrder)),
             (Echo, &[48_001], Err(late)),
         ] {
             let reading = Reading {

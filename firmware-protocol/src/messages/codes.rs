@@ -118,7 +118,7 @@ wire_enum! {
         /// The ECHO line was high before firing, so the module was not fired.
         2 ModuleFault,
         /// Echoes as measured, but the position is uncertain.
-        3 StepDoubtful,
+        3 StepUncertain,
     }
 }
 

@@ -25,7 +25,7 @@ fn reading(sweeps: BoxedStrategy<u16>) -> impl Strategy<Value = Reading> {
         ReadingStatus::Echo,
         ReadingStatus::NoEcho,
         ReadingStatus::ModuleFault,
-        ReadingStatus::StepDoubtful,
+        ReadingStatus::StepUncertain,
     ]);
     let echoes = prop::collection::vec(prop_oneof![0..45_000_u32, 0..2_000_000_u32], 0..5);
     let step_off = prop_oneof![9 => Just(0_i32), 1 => any::<i32>()];
@@ -114,7 +114,7 @@ fn assert_plausible(events: &[HostEvent]) {
         assert!(echoes.windows(2).all(|pair| pair[0] < pair[1]), "{reading:?}");
         match status {
             ReadingStatus::Echo => assert!(!echoes.is_empty(), "{reading:?}"),
-            ReadingStatus::StepDoubtful => {}
+            ReadingStatus::StepUncertain => {}
             _ => assert!(echoes.is_empty(), "{reading:?}"),
         }
         let window_open = status != ReadingStatus::ModuleFault;

@@ -24,7 +24,7 @@ use crate::{
 ///     second.
 #[pyclass(frozen, module = "sonard")]
 pub(crate) struct Course {
-    course: array::Course,
+    course: array::RobotCourse,
 }
 
 /// Minimum and maximum speed, metres per second, as for the daemon.
@@ -46,11 +46,11 @@ impl Course {
             return Err(PyValueError::new_err(message));
         }
         let times_s = times_s.map(|given| arrays::list(given, "times_s")).transpose()?;
-        let course = array::Course::new(&list, times_s.as_deref()).map_err(|error| {
+        let course = array::RobotCourse::new(&list, times_s.as_deref()).map_err(|error| {
             let message = format!("poses[{}]: {}", error.line - 1, error.message);
             new_error::<ArrayError>(py, &message, "")
         })?;
-        Ok(Self { course: course.timed(checked_speed(speed_m_s)?) })
+        Ok(Self { course: course.with_times(checked_speed(speed_m_s)?) })
     }
 
     /// Reads a trajectory from a file with a line {"x_m": 1.0, "y_m": 2.0, "heading_deg": 90.0} for
@@ -61,11 +61,11 @@ impl Course {
         let name = path.display().to_string();
         let text =
             fs::read_to_string(&path).map_err(|error| error::unreadable(py, path, &error))?;
-        let course = array::Course::from_json_lines(&text).map_err(|error| {
+        let course = array::RobotCourse::from_json_lines(&text).map_err(|error| {
             let message = format!("{name}:{}: {}", error.line, error.message);
             new_error::<ArrayError>(py, &message, "")
         })?;
-        Ok(Self { course: course.timed(checked_speed(speed_m_s)?) })
+        Ok(Self { course: course.with_times(checked_speed(speed_m_s)?) })
     }
 
     /// Poses of the trajectory: array of shape (n, 3) of x and y (metres) and heading (degrees).

@@ -253,7 +253,7 @@ impl ArrayModel {
         let (array, scene) = (&self.rangers().name, &self.bare_scene().name);
         Ok(format!(
             "<ArrayModel of '{array}' in '{scene}', {}>",
-            options::shown(py, &self.options)?
+            options::sanitize(py, &self.options)?
         ))
     }
 

@@ -30,7 +30,7 @@ pub(super) fn predict<'py>(
     let rounds = checked_rounds(rounds)?;
     let array = model.rangers();
     let firing_poses: Vec<Pose> =
-        poses.list.iter().flat_map(|pose| array.turned(pose, rounds)).collect();
+        poses.list.iter().flat_map(|pose| array.rotated_poses(pose, rounds)).collect();
     checked(model, py, &firing_poses, |at| poses.index(at / rounds as usize))?;
     let firing_poses: Vec<FiringPose> =
         firing_poses.into_iter().map(|pose| FiringPose { pose, first: 0 }).collect();

@@ -6,7 +6,7 @@ use pyo3::{exceptions::PyValueError, prelude::*, types::PyTuple};
 use sonard_model::{
     geometry::Pose,
     model::{ModelError, Simulator},
-    plan::ScanPlan,
+    scan_plan::ScanPlan,
 };
 
 use super::{Model, parts::Parts};
@@ -126,7 +126,7 @@ fn fire_all(
 /// Measures the time of the library's `predict_many` for default scans at some poses, in seconds,
 /// as a reference for `benches/predict.py`.
 #[pyfunction]
-#[pyo3(name = "_seconds_of_predict_many", signature = (model, poses, threads = None))]
+#[pyo3(name = "_time_predict_many", signature = (model, poses, threads = None))]
 pub(crate) fn seconds_of_predict_many(
     py: Python<'_>,
     model: &Bound<'_, Model>,

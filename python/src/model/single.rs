@@ -28,20 +28,21 @@ pub(super) fn reading<'py>(
 pub(super) fn paths<'py>(
     model: &Model,
     given: &Bound<'py, PyAny>,
-    weakest: f64,
+    min_amplitude: f64,
 ) -> PyResult<Vec<Bound<'py, PyAny>>> {
     let py = given.py();
-    if !(1e-6..=1.0).contains(&weakest) {
+    if !(1e-6..=1.0).contains(&min_amplitude) {
         return Err(PyValueError::new_err(format!(
-            "weakest is {weakest}: it must be from 0.000001 to 1"
+            "min_amplitude is {min_amplitude}: it must be from 0.000001 to 1"
         )));
     }
     let pose = model.checked(given)?;
     let simulator = model.simulator_at(py, &pose)?;
     let found = py.detach(|| {
-        let settings = model_paths::Settings { floor: weakest, ..simulator.path_settings() };
+        let settings =
+            model_paths::PathSettings { floor: min_amplitude, ..simulator.path_settings() };
         let paths = model_paths::Paths::new(simulator.scene(), settings);
-        paths.each_between(pose.position(), pose.position(), |echoes| {
+        paths.visit_between(pose.position(), pose.position(), |echoes| {
             echoes.map(|echo| PathResult::from_echo(simulator.scene(), &echo)).collect::<Vec<_>>()
         })
     });
@@ -53,16 +54,16 @@ pub(super) fn trace<'py>(
     model: &Model,
     given: &Bound<'py, PyAny>,
     azimuth_deg: f64,
-    until_m: Option<f64>,
+    max_range_m: Option<f64>,
     step_us: f64,
 ) -> PyResult<Bound<'py, PyAny>> {
     let py = given.py();
     let pose = model.checked(given)?;
     let direction_rad = predict::direction_rad(&pose, azimuth_deg)?;
     let simulator = model.simulator_at(py, &pose)?;
-    let until_m = until_m.unwrap_or(simulator.receiver().max_range_m);
+    let max_range_m = max_range_m.unwrap_or(simulator.receiver().max_range_m);
     for (name, value, [min, max]) in
-        [("until_m", until_m, [0.05, 100.0]), ("step_us", step_us, [1.0, 1000.0])]
+        [("max_range_m", max_range_m, [0.05, 100.0]), ("step_us", step_us, [1.0, 1000.0])]
     {
         if !(min..=max).contains(&value) {
             let message = format!("{name} is {value}: it must be from {min} to {max}");
@@ -71,7 +72,7 @@ pub(super) fn trace<'py>(
     }
     let trace = py.detach(|| {
         let point = simulator.at(pose.position());
-        TraceResult::compute(simulator.scene(), &point, direction_rad, until_m, step_us)
+        TraceResult::compute(simulator.scene(), &point, direction_rad, max_range_m, step_us)
     });
     trace.map_err(|error| error::too_costly(py, &error))?.into_python(py)
 }

@@ -13,18 +13,17 @@ pub(super) fn traced(
     py: Python<'_>,
     path: &Path,
     tolerance_m: Option<f64>,
-    least_m: Option<f64>,
+    min_length_m: Option<f64>,
     reflectance: f64,
     name: Option<&str>,
 ) -> PyResult<scene::Scene> {
-    for (name, value) in [("tolerance_m", tolerance_m), ("least_m", least_m)] {
+    for (name, value) in [("tolerance_m", tolerance_m), ("min_length_m", min_length_m)] {
         check_range(name, value.unwrap_or_default(), [0.0, 1e6])?;
     }
-    let found = py.detach(|| grid_file::read_walls(path, tolerance_m, least_m, |_| {}));
+    let found = py.detach(|| grid_file::read_walls(path, tolerance_m, min_length_m, |_| {}));
     let (found, _) = found.map_err(|error| to_exception(py, &error))?;
     if found.is_empty() {
-        let help =
-            "use a map with occupied cells (above 0.65) next to free ones, or a smaller least_m";
+        let help = "use a map with occupied cells (above 0.65) next to free ones, or a smaller min_length_m";
         let message = format!("{}: the map contains no wall", path.display());
         return Err(new_error::<SceneError>(py, &message, help));
     }
@@ -42,6 +41,8 @@ fn to_exception(py: Python<'_>, error: &GridFileError) -> PyErr {
         GridFileFault::IsImage
         | GridFileFault::Map(_)
         | GridFileFault::Png(_)
-        | GridFileFault::Turned(_) => new_error::<SceneError>(py, &error.to_string(), error.help()),
+        | GridFileFault::Rotated(_) => {
+            new_error::<SceneError>(py, &error.to_string(), error.help())
+        }
     }
 }

@@ -24,8 +24,8 @@ use crate::{
         Failure, Outcome,
         output::{Overwrite, Product, make_folder},
     },
-    inverse::{FitOptions, SearchResult, FitSweep, World},
-    store::{to_hex, open_no_follow},
+    inverse::{FitOptions, FitSweep, SearchResult, World},
+    store::{open_no_follow, to_hex},
 };
 
 /// File name in the output folder.
@@ -269,7 +269,8 @@ mod tests {
     fn resumes_after_cut_at_any_byte() {
         let folder = tempfile::tempdir().expect("a folder");
         let folder = &folder.path().join("out");
-        let found: Vec<SearchResult> = [0.1, f64::MIN_POSITIVE, 5e-324, -0.0, 1.0 / 7.0].map(place).into();
+        let found: Vec<SearchResult> =
+            [0.1, f64::MIN_POSITIVE, 5e-324, -0.0, 1.0 / 7.0].map(place).into();
         let begun = open(folder, "a").expect("it is new");
         found.iter().for_each(|found| begun.save(found));
         assert!(open(folder, "a").is_err(), "two at a time");

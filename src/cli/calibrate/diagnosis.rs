@@ -1,6 +1,6 @@
 //! Diagnosis of readings that a calibration leaves unexplained.
 
-use crate::inverse::{CoarseGrid, FitResult, PoseMode, FitSweep, World, diagnose, locate};
+use crate::inverse::{CoarseGrid, FitResult, FitSweep, PoseMode, World, diagnose, locate};
 
 /// Minimum share of explained readings for an alternative pose to be suggested.
 const MIN_EXPLAINED: f64 = 0.7;
@@ -8,7 +8,11 @@ const MIN_EXPLAINED: f64 = 0.7;
 /// Describes likely causes for the sweeps of a poor fit: wrong unit, reversed sense of rotation,
 /// wrong pose or wrong room. Each sweep is located in the initial scene, because a failed fit
 /// distorts sensor and walls to match readings of other objects.
-pub(super) fn diagnose(world: &World, sweeps: &[FitSweep], fitted: &FitResult) -> Vec<String> {
+pub(super) fn describe_misfits(
+    world: &World,
+    sweeps: &[FitSweep],
+    fitted: &FitResult,
+) -> Vec<String> {
     if !fitted.is_poorly_explained() {
         return Vec::new();
     }

@@ -27,7 +27,11 @@ const FILES: [&str; 7] = [
 const MAX_PAIRS: usize = 8;
 
 /// Summarizes the quality of the fit, with the given diagnoses, one sentence per line.
-pub(super) fn summarize(lines: &[ParameterReport], fitted: &FitResult, diagnoses: Vec<String>) -> Vec<String> {
+pub(super) fn summarize(
+    lines: &[ParameterReport],
+    fitted: &FitResult,
+    diagnoses: Vec<String>,
+) -> Vec<String> {
     let errors = &fitted.errors;
     let mut text = vec![format!(
         "{} readings: {:.0} % explained, ranges within {:.1} mm (standard deviation), strengths within {:.1} dB",
@@ -36,12 +40,12 @@ pub(super) fn summarize(lines: &[ParameterReport], fitted: &FitResult, diagnoses
         1e3 * errors.sigma_m,
         errors.sigma_db
     )];
-    let is_furnished = errors.arcs > 0.0;
+    let is_furnished = errors.outlier_arc_share > 0.0;
     if is_furnished {
         text.push(format!(
             "{:.0} % are attributed to objects that are not in the scene, {:.0} beams wide on average",
-            100.0 * errors.arcs,
-            errors.arc_beams
+            100.0 * errors.outlier_arc_share,
+            errors.outlier_arc_beams
         ));
     }
     if fitted.is_poorly_explained() {

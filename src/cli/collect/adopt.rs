@@ -8,7 +8,7 @@ use crate::{
     acoustics::Sensor,
     api::{Setup, Status},
     cli::{Failure, options::load_sensor},
-    collect::{RemoteDevice, CollectionPlan, steps_per_revolution},
+    collect::{CollectionPlan, RemoteDevice, steps_per_revolution},
     model::OptionKeys,
 };
 
@@ -17,7 +17,11 @@ use crate::{
 /// # Errors
 ///
 /// The plan sets other values; the message lists each key to change.
-pub(super) fn adopt(plan: &mut CollectionPlan, daemon: &RemoteDevice, status: &Status) -> Result<(), Failure> {
+pub(super) fn adopt(
+    plan: &mut CollectionPlan,
+    daemon: &RemoteDevice,
+    status: &Status,
+) -> Result<(), Failure> {
     let setup = daemon.setup();
     let mut differences = adopt_motion(plan, setup);
     differences.extend(adopt_sensor(plan, setup)?);

@@ -10,7 +10,9 @@ use super::Args;
 use crate::{
     acoustics::{Air, Sensor},
     cli::{Failure, options::load_sensor, scene_file},
-    collect::{CollectionKeys, NamedPose, Order, CollectionPlan, PoseFault, Poses, parse_pose_file},
+    collect::{
+        CollectionKeys, CollectionPlan, NamedPose, Order, PoseFault, Poses, parse_pose_file,
+    },
     config::{ConfigError, ConfigLayers},
     scan::ScanPlan,
     scene::Scene,
@@ -26,8 +28,9 @@ pub(super) fn load(args: &Args) -> Result<CollectionPlan, Failure> {
         )
     })?;
     let name = path.display().to_string();
-    let mut layers =
-        ConfigLayers::<CollectionKeys>::new().with_file(&name, &text).map_err(|error| failure_from(&error))?;
+    let mut layers = ConfigLayers::<CollectionKeys>::new()
+        .with_file(&name, &text)
+        .map_err(|error| failure_from(&error))?;
     for setting in &args.set {
         layers = layers.with_option("--set", setting).map_err(|error| failure_from(&error))?;
     }

@@ -15,7 +15,10 @@ use crate::{
         runtime::Interrupts,
         scan::{self, Mock, emulator::Emulator, setup::assumed},
     },
-    collect::{SavedSettings, ConnectedDevice, ScanDevice, CollectError, RetrySchedule, CollectionPlan, ScanTask, RecordedScan, record_scan},
+    collect::{
+        CollectError, CollectionPlan, ConnectedDevice, RecordedScan, RetrySchedule, SavedSettings,
+        ScanDevice, ScanTask, record_scan,
+    },
     link::PortOpener,
     ranger::{PreparedScan, Ranger, ScanError, device_record, provenance},
     scan::Session,
@@ -140,7 +143,11 @@ impl ScanDevice for LocalDevice {
         self.patience = patience;
     }
 
-    fn prepare(&mut self, _plan: &CollectionPlan, first: &PreparedScan) -> Result<(), CollectError> {
+    fn prepare(
+        &mut self,
+        _plan: &CollectionPlan,
+        first: &PreparedScan,
+    ) -> Result<(), CollectError> {
         if let Source::Mock(mock) = &mut self.source {
             let link = std::env::temp_dir().join(format!("sonard-mock-{}", std::process::id()));
             *mock = Some(Mock::start(self.world.board(&assumed(first))?, Some(&link))?);
@@ -161,11 +168,18 @@ impl ScanDevice for LocalDevice {
         self.start_emulator(to)
     }
 
-    async fn settings_to_save(&self, _air: Option<&AirOrder>) -> Result<Option<SavedSettings>, CollectError> {
+    async fn settings_to_save(
+        &self,
+        _air: Option<&AirOrder>,
+    ) -> Result<Option<SavedSettings>, CollectError> {
         Ok(None)
     }
 
-    async fn apply_settings(&mut self, _: Option<SavedSettings>, _: Option<&AirOrder>) -> Result<(), CollectError> {
+    async fn apply_settings(
+        &mut self,
+        _: Option<SavedSettings>,
+        _: Option<&AirOrder>,
+    ) -> Result<(), CollectError> {
         Ok(())
     }
 
@@ -177,10 +191,17 @@ impl ScanDevice for LocalDevice {
         None
     }
 
-    async fn record_scan(&mut self, scan: ScanTask<'_>, beam: &(dyn Fn() + Sync)) -> Result<RecordedScan, CollectError> {
+    async fn record_scan(
+        &mut self,
+        scan: ScanTask<'_>,
+        beam: &(dyn Fn() + Sync),
+    ) -> Result<RecordedScan, CollectError> {
         let ScanTask { prepared, air, collection: of, path, .. } = scan;
         let Some(prepared) = prepared else {
-            return Err(CollectError::invalid("the scan has no predictions", "this is a bug: report it"));
+            return Err(CollectError::invalid(
+                "the scan has no predictions",
+                "this is a bug: report it",
+            ));
         };
         let interrupts = self.interrupts.clone();
         let ranger = self.find().await?;

@@ -5,7 +5,7 @@ use std::time::Duration;
 use indicatif::{HumanDuration, ProgressBar, ProgressStyle};
 
 use super::{report, terminal::Terminal};
-use crate::collect::{CollectionFolder, CollectError, CollectionHistory, Observer};
+use crate::collect::{CollectError, CollectionFolder, CollectionHistory, Observer};
 
 /// Terminal of a collection: a bar over all beams, messages above it, and questions.
 pub(super) struct TerminalObserver {
@@ -57,7 +57,11 @@ impl Observer for TerminalObserver {
         self.terminal.prompt(question).await
     }
 
-    fn write_report(&self, folder: &CollectionFolder, history: &CollectionHistory) -> Result<(), CollectError> {
+    fn write_report(
+        &self,
+        folder: &CollectionFolder,
+        history: &CollectionHistory,
+    ) -> Result<(), CollectError> {
         report::write(folder, history)
     }
 }

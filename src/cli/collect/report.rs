@@ -6,11 +6,12 @@ use jiff::Timestamp;
 
 use crate::{
     collect::{
-        BeamSpread, CheckKeys, CollectionKeys, Conditions, ScanFigures, CollectionFolder, CollectError, CollectionHistory, INPUTS,
-        NamedPose, ScanOutcome, Repeatability, ScanAttempt, repeatability,
+        BeamSpread, CheckKeys, CollectError, CollectionFolder, CollectionHistory, CollectionKeys,
+        Conditions, INPUTS, NamedPose, Repeatability, ScanAttempt, ScanFigures, ScanOutcome,
+        repeatability,
     },
     compare::{Comparison, compare},
-    plot::{Picture, SeriesPoint, Series, badge_among, draw_scans, draw_scene, draw_series},
+    plot::{Picture, Series, SeriesPoint, badge_among, draw_scans, draw_scene, draw_series},
     scan::ScanView,
     scene::Scene,
     store::load,
@@ -32,9 +33,15 @@ of a beam's range over the repeats.
 ";
 
 /// Writes report and pictures into the folder.
-pub(super) fn write(folder: &CollectionFolder, history: &CollectionHistory) -> Result<(), CollectError> {
+pub(super) fn write(
+    folder: &CollectionFolder,
+    history: &CollectionHistory,
+) -> Result<(), CollectError> {
     let Some(plan) = history.plans.last() else {
-        return Err(CollectError::invalid("there is no plan in the journal", "nothing was collected yet"));
+        return Err(CollectError::invalid(
+            "there is no plan in the journal",
+            "nothing was collected yet",
+        ));
     };
     let keys: CollectionKeys = serde_json::from_value(plan.keys.clone()).unwrap_or_default();
     let scene = scene(folder)?;
@@ -172,8 +179,8 @@ fn format_exceptions(history: &CollectionHistory) -> String {
     let mut text = String::new();
     let mut aside = String::new();
     for take in history.set_aside() {
-        let what = if take.outcome == ScanOutcome::Cut { "interrupted" } else { "rejected" };
-        let reasons = take.cut.clone().unwrap_or_else(|| reasons(take));
+        let what = if take.outcome == ScanOutcome::Incomplete { "interrupted" } else { "rejected" };
+        let reasons = take.incomplete_reason.clone().unwrap_or_else(|| reasons(take));
         let _ = writeln!(aside, "| {} | {what} | {reasons} |", take.file);
     }
     if !aside.is_empty() {
@@ -288,8 +295,13 @@ fn spreads(
 }
 
 /// Loads the accepted scans of a pose, by repeat.
-fn views(folder: &CollectionFolder, history: &CollectionHistory, pose: u32) -> Result<Vec<ScanView>, CollectError> {
-    let mut takes: Vec<&ScanAttempt> = history.accepted().filter(|take| take.slot.pose == pose).collect();
+fn views(
+    folder: &CollectionFolder,
+    history: &CollectionHistory,
+    pose: u32,
+) -> Result<Vec<ScanView>, CollectError> {
+    let mut takes: Vec<&ScanAttempt> =
+        history.accepted().filter(|take| take.slot.pose == pose).collect();
     takes.sort_by_key(|take| take.slot.repeat);
     let mut views = Vec::new();
     for take in takes {
@@ -303,7 +315,10 @@ fn scene(folder: &CollectionFolder) -> Result<Option<Scene>, CollectError> {
     let path = folder.root().join(INPUTS).join("scene.json");
     let Ok(text) = std::fs::read_to_string(&path) else { return Ok(None) };
     Scene::from_json(&text).map(Some).map_err(|error| {
-        CollectError::invalid(format!("{}: {error}", path.display()), "the file was modified: restore it")
+        CollectError::invalid(
+            format!("{}: {error}", path.display()),
+            "the file was modified: restore it",
+        )
     })
 }
 

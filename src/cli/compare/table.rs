@@ -5,7 +5,9 @@ use std::io::{self, Write};
 use comfy_table::{CellAlignment, LineStyle, Table, TableStyle};
 
 use crate::{
-    compare::{Comparison, ChangeEstimate, Explanation, ClassifiedPing, Verdict, keep_every_second},
+    compare::{
+        ChangeEstimate, ClassifiedPing, Comparison, Explanation, Verdict, keep_every_second,
+    },
     scan::{PathKind, PathRecord, Ping, PingStatus},
 };
 
@@ -57,7 +59,7 @@ fn print_numbers(out: &mut impl Write, comparison: &Comparison) -> io::Result<()
     let skipped = comparison.not_compared;
     for (count, why) in [
         (skipped.link_lost, "not compared: the reading was lost"),
-        (skipped.step_doubtful, "not compared: motor steps may be lost"),
+        (skipped.step_uncertain, "not compared: motor steps may be lost"),
         (skipped.module_fault, "not compared: the module did not fire"),
         (skipped.no_prediction, "not compared: no prediction"),
         (skipped.no_range, "not compared: echo without a range"),

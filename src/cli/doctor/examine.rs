@@ -28,7 +28,7 @@ use super::{
 use crate::{
     cli::{runtime::Interrupts, scan::ATTEMPTS},
     link::{self, BAUD, LinkError},
-    ranger::{DriveError, Driver, CommandResult, hold_s, serial_text},
+    ranger::{CommandResult, DriveError, Driver, hold_s, serial_text},
 };
 
 /// Steps that the motor is turned forth and back.
@@ -84,7 +84,7 @@ pub(super) async fn examine(port: &str, args: &Args, interrupts: Interrupts) -> 
                     report.checks.splice(1..1, cause);
                 }
                 Err(error) => {
-                    let check = explain_silence(&error, board, &monitor).await;
+                    let check = explain_missing_identity(&error, board, &monitor).await;
                     report.checks.push(check);
                 }
             }
@@ -211,7 +211,9 @@ impl BoardUnderTest {
         let mut drift = None;
         for command in [Command::Configure(settings), Command::Home, turn, back] {
             match self.perform(command).await {
-                Ok((CommandResult::Done(Outcome::Homed { drift_steps }), _)) => drift = Some(drift_steps),
+                Ok((CommandResult::Done(Outcome::Homed { drift_steps }), _)) => {
+                    drift = Some(drift_steps);
+                }
                 Ok(_) => {}
                 Err(error) => return motor_failed(&error),
             }
@@ -256,7 +258,10 @@ impl BoardUnderTest {
         echo::check_echoes(&readings, SETTINGS.window_ticks)
     }
 
-    async fn perform(&mut self, command: Command) -> Result<(CommandResult, CommandReadings), DriveError> {
+    async fn perform(
+        &mut self,
+        command: Command,
+    ) -> Result<(CommandResult, CommandReadings), DriveError> {
         let mut collected = CommandReadings::default();
         let Self { driver, restarts, exchanges } = self;
         let ended = driver
@@ -289,7 +294,7 @@ const REACTION: Duration = Duration::from_millis(700);
 
 /// Explains why a board did not identify itself. Other users of the line are considered first,
 /// because they are easier to remedy than a missing firmware.
-async fn explain_silence(
+async fn explain_missing_identity(
     error: &DriveError,
     board: BoardUnderTest,
     monitor: &PortMonitor,
@@ -413,7 +418,8 @@ fn last_reset(identity: &Identity) -> Check {
 }
 
 fn motor_failed(error: &DriveError) -> Check {
-    let refused = |reason| matches!(error, DriveError::Host(HostError::Rejected(r)) if *r == reason);
+    let refused =
+        |reason| matches!(error, DriveError::Host(HostError::Rejected(r)) if *r == reason);
     if refused(NakReason::IndexNotFound) {
         return Check::failed(
             "motor",

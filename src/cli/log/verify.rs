@@ -10,7 +10,8 @@ use serde::Serialize;
 
 use super::{Failure, Outcome};
 use crate::store::{
-    LogFinding, FindingKind, Severity, StoreError, LogTotals, check, is_locked, open_for_reading,
+    FindingKind, LogFinding, LogTotals, Severity, StoreError, check_log, is_locked,
+    open_for_reading,
 };
 
 /// Maximum number of printed findings per log without --all.

@@ -18,7 +18,7 @@ pub(super) struct Summary<'a> {
     readings: usize,
     feature_prediction: bool,
     mean_confidence: Option<f64>,
-    left_out: usize,
+    discarded: usize,
     poses_outside: usize,
     resolution_m: f64,
     width: usize,
@@ -44,7 +44,7 @@ impl Mapped {
             readings: self.readings,
             feature_prediction: args.feature_prediction == Switch::On,
             mean_confidence: predicted.then(|| self.confidence / self.readings as f64),
-            left_out: self.discarded,
+            discarded: self.discarded,
             poses_outside: self.poses_outside,
             resolution_m: shape.resolution_m,
             width: shape.width,
@@ -89,7 +89,11 @@ impl Summary<'_> {
             self.unknown_cells
         )?;
         if let Some(confidence) = self.mean_confidence {
-            writeln!(out, "mean confidence {confidence:.3}, {} readings discarded", self.left_out)?;
+            writeln!(
+                out,
+                "mean confidence {confidence:.3}, {} readings discarded",
+                self.discarded
+            )?;
         }
         if self.evidence > 1 {
             writeln!(out, "scan weight {} (--scan-weight)", self.evidence)?;

@@ -6,7 +6,7 @@ use std::{
     mem,
 };
 
-use crate::store::{LogOutput, AtomicFile};
+use crate::store::{AtomicFile, LogOutput};
 
 /// Destination of a verb's output.
 #[derive(Debug)]
@@ -27,9 +27,7 @@ impl Stream {
     pub(in crate::cli) fn finish(&mut self) -> io::Result<()> {
         self.flush()?;
         match mem::replace(self, Self::Finished) {
-            Self::File(file) => {
-                file.into_inner().map_err(io::IntoInnerError::into_error)?.commit()
-            }
+            Self::File(file) => file.into_inner().map_err(io::IntoInnerError::into_error)?.commit(),
             Self::Standard(_) | Self::Device(_) | Self::Finished => Ok(()),
         }
     }

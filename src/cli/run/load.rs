@@ -20,8 +20,8 @@ use crate::{
         options::load_sensor,
         scene_file,
     },
-    config::{ConfigError, Keys, ConfigLayers, Mode, robot_name_from_host},
-    daemon::{SettingsConflict, OptionalOutputs, Settings, ArraySimulation},
+    config::{ConfigError, ConfigLayers, Keys, Mode, robot_name_from_host},
+    daemon::{ArraySimulation, OptionalOutputs, Settings, SettingsConflict},
     host_gpio,
     scene::{PoseError, parse_pose},
 };

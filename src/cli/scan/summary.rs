@@ -81,7 +81,7 @@ fn beams(end: &ScanEnd, view: Option<&ScanView>) -> String {
         count(PingStatus::NoEcho),
     );
     for (status, name) in
-        [(PingStatus::StepDoubtful, "step uncertain"), (PingStatus::ModuleFault, "module fault")]
+        [(PingStatus::StepUncertain, "step uncertain"), (PingStatus::ModuleFault, "module fault")]
     {
         if count(status) > 0 {
             text += &format!(", {} {name}", count(status));

@@ -81,27 +81,27 @@ impl ArraySimulator<'_> {
         out: &mut dyn RecordWriter,
         simulated_poses: &[Vec<Pose>],
     ) -> Result<(), SimulationFailure> {
-        out.write(&Record::Session(Box::new(Session::of_array(self.model, Timestamp::now()))))?;
+        out.write(&Record::Session(Box::new(Session::for_array(self.model, Timestamp::now()))))?;
         let round: Vec<usize> = self.model.array().round().collect();
         let firings = round.len() * simulated_poses.iter().map(Vec::len).sum::<usize>();
         let progress = progress::bar(firings as u64, "beams");
         for rounds in simulated_poses {
             let Some(first) = rounds.first() else { continue };
             let (scan, count) = (Uuid::new_v4(), rounds.len() as u32);
-            let start = ScanStart::of_array(self.model, scan, *first, count, Timestamp::now());
+            let start = ScanStart::for_array(self.model, scan, *first, count, Timestamp::now());
             out.write(&Record::ScanStart(start))?;
             let mut index = 0;
             for pose in rounds {
                 let at_pose = self.model.at(*pose).map_err(SimulationFailure::Model)?;
                 for (firing, &ranger) in round.iter().enumerate() {
                     let prediction = self.predict(&at_pose, firing)?;
-                    let ping = Ping::of_array(&at_pose, scan, first, index, ranger, &prediction);
+                    let ping = Ping::for_array(&at_pose, scan, first, index, ranger, &prediction);
                     out.write(&Record::Ping(Box::new(ping)))?;
                     index += 1;
                     progress.inc(1);
                 }
             }
-            let end = ScanEnd::of_array(self.model, scan, [index, 0], Timestamp::now());
+            let end = ScanEnd::for_array(self.model, scan, [index, 0], Timestamp::now());
             out.write(&Record::ScanEnd(end))?;
         }
         progress.finish_and_clear();

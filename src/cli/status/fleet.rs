@@ -9,7 +9,7 @@ use tokio::task::JoinSet;
 use crate::{
     api::{FleetState, Health, Status},
     cli::{Failure, Outcome, compare::RULED, runtime},
-    fleet::{PolledDaemon, Observation, poll, observe},
+    fleet::{Observation, PolledDaemon, observe, poll},
 };
 
 /// Object of `--json` for a daemon.
@@ -39,7 +39,7 @@ pub(super) fn run(daemons: &[PolledDaemon], json: bool) -> Outcome {
         let message = format!("{missing} of {} daemons did not respond", rows.len());
         return Err(Failure::device(message, "see the reasons in the table"));
     }
-    let well = rows.iter().all(|row| row.state == FleetState::Well);
+    let well = rows.iter().all(|row| row.state == FleetState::Healthy);
     if well { Ok(()) } else { Err(Failure::Found(None)) }
 }
 
@@ -106,8 +106,8 @@ fn table(rows: &[FleetRow]) -> Table {
 fn describe_state(row: &FleetRow) -> String {
     match (row.status, row.state) {
         (Some(status), _) => status.link.state.name().replace('_', " "),
-        (None, FleetState::Silent) => "OFFLINE".into(),
-        (None, FleetState::Refusing) => "REJECTED".into(),
+        (None, FleetState::NoResponse) => "OFFLINE".into(),
+        (None, FleetState::Rejected) => "REJECTED".into(),
         (None, FleetState::OtherRobot) => "OTHER ROBOT".into(),
         (None, _) => "NO DAEMON".into(),
     }

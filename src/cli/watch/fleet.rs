@@ -9,7 +9,7 @@ use crate::{
     api::FleetState,
     cli::{Failure, Outcome},
     client::ClientError,
-    fleet::{PolledDaemon, poll, observe, sanitize},
+    fleet::{PolledDaemon, observe, poll, sanitize},
 };
 
 /// Maximum length of a daemon's line, bytes; a complete scan is one line.
@@ -72,7 +72,7 @@ async fn follow(one: PolledDaemon, path: String, send: mpsc::Sender<Line>) {
         let address = one.member.address();
         let seen = observe(expected.as_deref(), poll(&one.client).await);
         let why = match seen.report {
-            Some(report) if matches!(seen.state, FleetState::Well | FleetState::NotWell) => {
+            Some(report) if matches!(seen.state, FleetState::Healthy | FleetState::Unhealthy) => {
                 let robot = expected.get_or_insert(report.status.robot).clone();
                 let connected = format!("{robot} connected at {address}");
                 if !notify(&send, &mut last, connected).await {

@@ -84,8 +84,11 @@ fn daemon_settings_are_restored() {
     let before = daemon.health()["scans"]["completed"].as_u64();
     wait_until("its own scans", || daemon.health()["scans"]["completed"].as_u64() > before);
     // Held once, at the beginning: between these scans there was none of the daemon's own.
-    assert_eq!((case.entries("borrowed").len(), case.entries("given_back").len()), (1, 1));
-    assert_eq!(case.entries("borrowed")[0]["scanning"]["mode"], "continuous");
+    assert_eq!(
+        (case.entries("saved_settings").len(), case.entries("restored_settings").len()),
+        (1, 1)
+    );
+    assert_eq!(case.entries("saved_settings")[0]["scanning"]["mode"], "continuous");
     let again = collect(&case, &daemon);
     assert_eq!(again.status.code(), Some(0), "{}", said(&again));
     assert_eq!(daemon.stop(), Some(0));

@@ -13,7 +13,7 @@ use sonard::{
     acoustics::Sensor,
     api::{LinkState, Trouble},
     config::{Keys, Mode},
-    daemon::{QueuedScans, Handle, Journal, OptionalOutputs, Order, Resources, Settings, prepare},
+    daemon::{Handle, Journal, OptionalOutputs, Order, QueuedScans, Resources, Settings, prepare},
     host_gpio::HostGpio,
     link,
     mock::Pace,
@@ -151,7 +151,7 @@ fn play(rig: &mut Rig, runtime: &Runtime, daemon: &Handle, switches: &Switches) 
     // Released, it waits for somebody to start it.
     switches.pressed.store(false, SeqCst);
     wait_until("the release", || state() == LinkState::AwaitingStart);
-    let trouble = daemon.status().link.trouble;
+    let trouble = daemon.status().link.error;
     assert!(trouble.is_some_and(|trouble| trouble.contains("/v1/start")));
     std::thread::sleep(Duration::from_millis(400));
     assert_eq!((state(), daemon.health().scans.beams), (LinkState::AwaitingStart, beams));

@@ -36,7 +36,7 @@ fn unplugged_ranger() {
     let status = daemon.status();
     assert!(status["link"]["retry_in_s"].as_f64().is_some_and(|wait_s| wait_s <= 0.4));
     assert!(
-        status["link"]["trouble"].as_str().is_some_and(|t| t.contains("no serial port")),
+        status["link"]["error"].as_str().is_some_and(|t| t.contains("no serial port")),
         "{status}"
     );
     assert_eq!(daemon.get("/v1/health").status, 503);
@@ -65,13 +65,13 @@ fn port_and_device_faults() {
     rig.plug("version=9", 1);
     let daemon = start(&rig, folder.path(), &[]);
     daemon.wait_for("wrong_firmware");
-    assert!(daemon.status()["link"]["trouble"].as_str().is_some_and(|t| t.contains("protocol 9")));
+    assert!(daemon.status()["link"]["error"].as_str().is_some_and(|t| t.contains("protocol 9")));
     let silent = rig.plug_silent();
     daemon.wait_for("not_answering");
     drop(silent);
     let busy = rig.plug_busy();
     daemon.wait_for("busy");
-    assert!(daemon.status()["link"]["trouble"].as_str().is_some_and(|t| t.contains("fuser")));
+    assert!(daemon.status()["link"]["error"].as_str().is_some_and(|t| t.contains("fuser")));
     drop(busy);
     std::fs::write(folder.path().join("ranger"), "a file").expect("the name is free");
     daemon.wait_for("forbidden");
@@ -89,7 +89,7 @@ fn other_ranger_is_rejected() {
     let mut daemon = InProcess::start(folder.path(), &[&rig::OPTIONS[..], &serial].concat());
     daemon.plug("", 1);
     daemon.wait_for("wrong_device");
-    let trouble = daemon.status()["link"]["trouble"].clone();
+    let trouble = daemon.status()["link"]["error"].clone();
     assert!(
         trouble.as_str().is_some_and(|t| t.contains("MOCK-00001") && t.contains("SONARD-0007")),
         "{trouble}"

@@ -27,7 +27,7 @@ fn said(output: &Output) -> String {
 fn status_of_three_robots() {
     let folder = tempfile::tempdir().expect("a folder");
     let mut fleet = Fleet::start(folder.path());
-    wait_until("three that are well", || fleet.states() == ["well", "well", "well"]);
+    wait_until("three that are well", || fleet.states() == ["healthy", "healthy", "healthy"]);
     wait_until("pictures", || {
         let has = |one: &Value| one["report"]["last_scan"]["picture"]["points_m"].is_array();
         fleet.told().iter().all(has)
@@ -39,13 +39,13 @@ fn status_of_three_robots() {
     assert_eq!(output.status.code(), Some(0), "{}{}", said(&output), stderr(&output));
 
     fleet.rig.unplug();
-    wait_until("the unplugged one", || fleet.states() == ["not_well", "well", "well"]);
+    wait_until("the unplugged one", || fleet.states() == ["unhealthy", "healthy", "healthy"]);
     let output = fleet.status();
     assert_eq!(output.status.code(), Some(1), "{}", said(&output));
-    assert!(fleet.told()[0]["wrong"][0].as_str().expect("why").contains("the link is"));
+    assert!(fleet.told()[0]["problems"][0].as_str().expect("why").contains("the link is"));
 
     fleet.robots[1].take().expect("it runs").kill();
-    wait_until("the killed one", || fleet.states() == ["not_well", "silent", "well"]);
+    wait_until("the killed one", || fleet.states() == ["unhealthy", "no_response", "healthy"]);
     let output = fleet.status();
     assert_eq!(output.status.code(), Some(3), "{}", said(&output));
     let table = said(&output);
@@ -55,21 +55,24 @@ fn status_of_three_robots() {
     assert!(row("kiwi").contains("the link is"), "{table}");
     // What it was last is still there, and since when it is silent.
     let mango = &fleet.told()[1];
-    assert!(mango["heard"].is_string() && mango["report"]["last_scan"].is_object(), "{mango}");
+    assert!(
+        mango["last_report"].is_string() && mango["report"]["last_scan"].is_object(),
+        "{mango}"
+    );
     // Another robot at its place is not taken for it.
     let listen = format!("server.listen={}", mango["address"].as_str().expect("an address"));
     let elsewhere = folder.path().join("papaya");
     fs::create_dir(&elsewhere).expect("it is new");
     let named = ["--set", &listen, "--set", "fleet.robot=papaya"];
     let papaya = Daemon::start_mock(&elsewhere, &named);
-    wait_until("another", || fleet.states() == ["not_well", "other_robot", "well"]);
-    assert_eq!(fleet.told()[1]["wrong"][0], "papaya responds in place of mango");
+    wait_until("another", || fleet.states() == ["unhealthy", "other_robot", "healthy"]);
+    assert_eq!(fleet.told()[1]["problems"][0], "papaya responds in place of mango");
     assert_eq!(fleet.status().status.code(), Some(3));
     papaya.kill();
-    wait_until("silence", || fleet.states() == ["not_well", "silent", "well"]);
+    wait_until("silence", || fleet.states() == ["unhealthy", "no_response", "healthy"]);
 
     fleet.rig.plug("", 2);
-    wait_until("the one that is back", || fleet.states() == ["well", "silent", "well"]);
+    wait_until("the one that is back", || fleet.states() == ["healthy", "no_response", "healthy"]);
 }
 
 #[test]
@@ -170,11 +173,19 @@ fn unreachable_and_foreign_daemons() {
     let states: Vec<&str> = rows.iter().map(|row| row["state"].as_str().expect("text")).collect();
     assert_eq!(
         states,
-        ["other_robot", "silent", "strange", "strange", "strange", "strange", "silent"],
+        [
+            "other_robot",
+            "no_response",
+            "invalid_response",
+            "invalid_response",
+            "invalid_response",
+            "invalid_response",
+            "no_response"
+        ],
         "{said}"
     );
-    assert_eq!(rows[0]["wrong"][0], "kiwi responds in place of mango");
-    assert!(rows[3]["wrong"][0].as_str().expect("why").contains("longer than"), "{said}");
+    assert_eq!(rows[0]["problems"][0], "kiwi responds in place of mango");
+    assert!(rows[3]["problems"][0].as_str().expect("why").contains("longer than"), "{said}");
     // What the system's buffers hold, and no more, was taken of what has no end: two questions.
     let taken = taken.load(Ordering::Relaxed);
     assert!(taken < 24 << 20, "{taken} bytes");
@@ -188,7 +199,15 @@ fn unreachable_and_foreign_daemons() {
         let robots = fleet["robots"].as_array().expect("robots").clone();
         robots.iter().map(|one| one["state"].as_str().expect("text").to_owned()).collect::<Vec<_>>()
     };
-    let wanted = ["well", "silent", "strange", "strange", "strange", "strange", "silent"];
+    let wanted = [
+        "healthy",
+        "no_response",
+        "invalid_response",
+        "invalid_response",
+        "invalid_response",
+        "invalid_response",
+        "no_response",
+    ];
     wait_until("each as it is", || states() == wanted);
     assert!(!asking.get("/v1/fleet").body.contains(&0x1b));
 }
@@ -225,7 +244,7 @@ fn api_hides_tokens() {
     assert!(shown.ends_with(TOKEN), "{shown}");
     until_it_listens(&asking);
     wait_until("the refusal", || {
-        asking.get("/v1/fleet").json()["robots"][0]["state"] == "refusing"
+        asking.get("/v1/fleet").json()["robots"][0]["state"] == "rejected"
     });
     let told = String::from_utf8(asking.get("/v1/fleet").body).expect("text");
     assert!(!told.contains(TOKEN) && !told.contains("token_file"), "{told}");

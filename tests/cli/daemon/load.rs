@@ -23,7 +23,7 @@ fn core_share(daemon: &Daemon, over: Duration) -> f64 {
 fn start(rig: &Rig, folder: &std::path::Path, further: &[&str]) -> Daemon {
     let options = rig.options();
     let options: Vec<&str> = options.iter().map(String::as_str).collect();
-    Daemon::start(folder, &[&options[..], &["--set", "link.check_s=5"], further].concat())
+    Daemon::start(folder, &[&options[..], &["--set", "link.status_interval_s=5"], further].concat())
 }
 
 #[test]
@@ -74,7 +74,7 @@ fn dead_subscribers() {
         "model.max_range_m=0.6",
         "motion.min_interval_ms=8",
         "plan.pings_per_stop=20",
-        "server.stall_s=2",
+        "server.write_timeout_s=2",
         "server.queue=64",
     ];
     let further: Vec<&str> = further.iter().flat_map(|setting| ["--set", setting]).collect();
@@ -168,8 +168,10 @@ fn large_scans_to_slow_clients() {
     let folder = tempfile::tempdir().expect("a folder");
     let many =
         ["--virtual-time", "--set", "plan.pings_per_stop=160", "--set", "model.max_range_m=1"];
-    let daemon =
-        Daemon::start_mock(folder.path(), &[&many[..], &["--set", "server.stall_s=30"]].concat());
+    let daemon = Daemon::start_mock(
+        folder.path(),
+        &[&many[..], &["--set", "server.write_timeout_s=30"]].concat(),
+    );
     daemon.wait_for("ready");
     let over = AtomicBool::new(false);
     let (idle_kb, taken_kb) = std::thread::scope(|scope| {
@@ -201,7 +203,7 @@ fn large_scans_to_slow_clients() {
         "scanning.mode=continuous",
         "model.max_range_m=0.6",
         "motion.min_interval_ms=8",
-        "server.stall_s=30",
+        "server.write_timeout_s=30",
     ];
     let further: Vec<&str> = further.iter().flat_map(|setting| ["--set", setting]).collect();
     let daemon = start(&rig, folder.path(), &further);

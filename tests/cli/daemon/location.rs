@@ -60,7 +60,7 @@ fn located(log: &Path, further: &[&str]) -> Vec<Value> {
 
 /// Whether the poses of a location are those that the program listed of its scan.
 fn assert_same(location: &Location, listed: &[Value]) {
-    assert_eq!(location.lacks, None);
+    assert_eq!(location.unavailable_reason, None);
     let scan = location.scan.to_string();
     let listed: Vec<&Value> = listed.iter().filter(|line| line["scan"] == *scan).collect();
     assert_eq!(location.poses.len(), listed.len(), "{location:?}");
@@ -136,7 +136,9 @@ fn reasons_without_location() {
     let course = daemon.get(&format!("/v1/scans/{scan}/course"));
     assert_eq!(course.status, 200);
     let told: Location = serde_json::from_value(course.json()).expect("a location");
-    assert!(told.poses.is_empty() && told.lacks.expect("words").contains("at least 8"));
+    assert!(
+        told.poses.is_empty() && told.unavailable_reason.expect("words").contains("at least 8")
+    );
 }
 
 #[test]

@@ -111,7 +111,7 @@ fn map_lines_and_features() {
     let found = daemon.get(&format!("/v1/scans/{id}/findings")).json();
     let read: Findings = serde_json::from_value(found.clone()).expect("findings");
     assert_eq!(serde_json::to_value(&read).expect("JSON"), found);
-    assert_eq!(read.lacks, None);
+    assert_eq!(read.unavailable_reason, None);
     let map = read.map.expect("a map");
     assert_eq!(map.cells.len() % map.width, 0);
     assert!(map.cells.len() <= 41_000 && map.cells.iter().all(|cell| (-1..=100).contains(cell)));
@@ -144,7 +144,10 @@ fn arrays_and_long_scans() {
     };
     let of_array = scans.iter().find(|scan| !scan["end"].is_null()).expect("one");
     let found = findings(of_array).json();
-    assert!(found["lacks"].as_str().is_some_and(|why| why.contains("scanning ranger")), "{found}");
+    assert!(
+        found["unavailable_reason"].as_str().is_some_and(|why| why.contains("scanning ranger")),
+        "{found}"
+    );
     assert_eq!(found["features"], json!([]));
     let long = findings(scans.last().expect("the long one"));
     assert_eq!(long.status, 409, "{}", long.json());

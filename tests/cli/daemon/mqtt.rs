@@ -35,7 +35,7 @@ fn mqtt(daemon: &Daemon) -> Value {
 }
 
 fn wait_for_trouble(daemon: &Daemon, words: &str) {
-    wait_until(words, || mqtt(daemon)["trouble"].as_str().is_some_and(|told| told.contains(words)));
+    wait_until(words, || mqtt(daemon)["error"].as_str().is_some_and(|told| told.contains(words)));
 }
 
 /// What of the records tells one from another: a scan's by scan and index.
@@ -86,8 +86,8 @@ fn records_and_presence() {
     let report = mqtt(&daemon);
     assert_eq!((&report["connected"], &report["connections"]), (&json!(true), &json!(1)));
     assert_eq!((report["acknowledged"].as_u64(), &report["waiting"]), (count, &json!(0)));
-    assert_eq!(report["trouble"], Value::Null);
-    wait_until("the place", || mqtt(&daemon)["behind_bytes"] == 0);
+    assert_eq!(report["error"], Value::Null);
+    wait_until("the place", || mqtt(&daemon)["lag_bytes"] == 0);
     let metrics = String::from_utf8(daemon.get("/metrics").body).expect("text");
     assert!(metrics.contains("\nsonard_mqtt_connected 1"), "{metrics}");
     wait_until("the status", || !broker.of("sonard/kiwi/status").is_empty());

@@ -24,9 +24,12 @@ fn recovers_and_logs_each_beam() {
     let mut rig = Rig::new(folder.path(), Pace::Virtual);
     rig.plug("", 1);
     let mut options = rig.options();
-    for setting in
-        ["scanning.mode=continuous", "plan.to_deg=90", "server.stall_s=1", "log.rotate_mb=2"]
-    {
+    for setting in [
+        "scanning.mode=continuous",
+        "plan.to_deg=90",
+        "server.write_timeout_s=1",
+        "log.rotate_mb=2",
+    ] {
         options.extend(["--set".to_owned(), setting.to_owned()]);
     }
     let options: Vec<&str> = options.iter().map(String::as_str).collect();

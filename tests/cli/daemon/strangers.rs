@@ -69,7 +69,7 @@ fn named_board_is_required() {
     let daemon = start(folder.path(), "reset=0.01,lie=other-serial", &serial);
     daemon.wait_for("wrong_device");
     daemon.wait_until("the name", || {
-        let trouble = daemon.status()["link"]["trouble"].clone();
+        let trouble = daemon.status()["link"]["error"].clone();
         trouble.as_str().is_some_and(|trouble| trouble.contains("expected MOCK-00001"))
     });
     daemon.pass(std::time::Duration::from_secs(1));

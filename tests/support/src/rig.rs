@@ -11,7 +11,7 @@ use std::{
 use sonard::{
     acoustics::{Air, Sensor, TofNoise},
     link::{self, Pty},
-    mock::{BoardSettings, FaultPlan, MockBoard, MockPort, Note, Pace, EchoTable, World},
+    mock::{BoardSettings, EchoTable, FaultPlan, MockBoard, MockPort, Note, Pace, World},
     model::{Options, Simulator},
     scene::{Scene, shipped},
 };
@@ -32,7 +32,7 @@ pub const OPTIONS: [&str; 14] = [
     "--set",
     "link.retry_max_s=0.4",
     "--set",
-    "link.check_s=0.3",
+    "link.status_interval_s=0.3",
 ];
 
 /// A stable name, and behind it whatever is plugged in: each time another device.

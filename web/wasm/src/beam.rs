@@ -1,7 +1,7 @@
 //! Details of one beam: echo trace, and the propagation paths of its predicted arrivals.
 
 use serde::Serialize;
-use sonard_interpret::compare::JudgedPing;
+use sonard_interpret::compare::AnnotatedPing;
 use sonard_model::{
     geometry::Pose,
     model::{ObservationPoint, Simulator, TooCostly},
@@ -19,7 +19,7 @@ const STEP_US: f64 = 20.0;
 #[derive(Debug, Serialize)]
 pub(crate) struct Beam {
     /// Reading with its annotations.
-    reading: JudgedPing,
+    reading: AnnotatedPing,
     /// Propagation path of the reading: transmitter, interactions, receiver.
     polyline: Option<Vec<PlanPoint>>,
     /// Predicted arrivals in order of time, including those below the threshold.
@@ -40,13 +40,13 @@ impl Beam {
             let until_m =
                 if farthest_m > 0.0 { max_m.min(farthest_m + TRACE_MARGIN_M) } else { max_m };
             let trace = point.trace(axis.direction_rad(0.0), until_m, STEP_US)?;
-            let peaks = PeakLine::of_trace(simulator, point, axis, &trace)?;
+            let peaks = PeakLine::from_trace(simulator, point, axis, &trace)?;
             Ok::<_, TooCostly>((peaks, TraceLine::from_trace(simulator, &trace, STEP_US)))
         };
         let (peaks, trace) = sweep.observe(ping, compute)?.transpose()?.unwrap_or_default();
-        let viewpoint = reading.beside.viewpoint;
+        let viewpoint = reading.annotations.viewpoint;
         let line = reading.ping.sound_path().zip(viewpoint);
-        let line = line.map(|(path, viewpoint)| path.polyline(viewpoint.ends()));
+        let line = line.map(|(path, viewpoint)| path.polyline(viewpoint.transducer_positions()));
         let polyline = line.map(|points| points.into_iter().map(PlanPoint::from).collect());
         Ok(Self { reading, polyline, peaks, trace })
     }

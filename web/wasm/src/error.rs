@@ -5,7 +5,7 @@ use sonard_import::ImportError;
 use sonard_model::{
     acoustics::{AirError, SensorError},
     model::{ModelError, TooCostly},
-    plan::PlanError,
+    scan_plan::PlanError,
     scene::{PoseError, SceneError},
 };
 

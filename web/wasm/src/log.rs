@@ -4,13 +4,13 @@ use std::io::{self, Cursor, Read};
 
 use jiff::Timestamp;
 use serde::Serialize;
-use sonard_import::{Mapping, Source, Taken};
+use sonard_import::{Assumptions, ImportSource, Mapping};
 use sonard_model::{
     acoustics::{Air, Sensor},
     geometry::Pose,
 };
 use sonard_records::{
-    AirRecord, FaultKind, ModelRecord, Provenance, Record, ScanPlan, ScanView, Session, decode_line,
+    AirRecord, RecordErrorKind, ModelRecord, Provenance, Record, ScanPlan, ScanView, Session, decode_line,
 };
 
 use crate::RequestError;
@@ -64,7 +64,7 @@ pub(crate) fn scans(text: &str, pose: Pose) -> Result<Vec<ScanView>, RequestErro
     let first = text.lines().find(|line| !line.trim().is_empty()).unwrap_or_default();
     let records = match decode_line(first.as_bytes()) {
         Ok(_) => decode_log(text)?,
-        Err(fault) if fault.kind == FaultKind::UnsupportedFormat => {
+        Err(fault) if fault.kind == RecordErrorKind::UnsupportedFormat => {
             return Err(RequestError::new(&fault.to_string(), "use a log of this version"));
         }
         Err(_) => import_table(text, pose)?,
@@ -97,22 +97,22 @@ fn decode_log(text: &str) -> Result<Vec<Record>, RequestError> {
 
 fn import_table(text: &str, pose: Pose) -> Result<Vec<Record>, RequestError> {
     let (sensor, air) = (Sensor::preset("senscomp-6500")?, Air::default());
-    let taken = Taken {
+    let taken = Assumptions {
         sha256: String::new(),
         pose,
         array: None,
         sensor: sensor.name.clone(),
-        longest_m: sensor.max_range_m,
-        least_m: 0.0,
+        max_range_m: sensor.max_range_m,
+        min_range_m: 0.0,
         air,
         started: Timestamp::UNIX_EPOCH,
-        as_said: false,
+        skip_checks: false,
     };
     let open =
         || -> io::Result<Box<dyn Read>> { Ok(Box::new(Cursor::new(text.as_bytes().to_vec()))) };
-    let found = Source { open: &open }.examine(Mapping::default(), taken)?;
+    let found = ImportSource { open: &open }.examine(Mapping::default(), taken)?;
     let mut session = Session::new(Timestamp::UNIX_EPOCH, Provenance::Imported, sensor, &air);
-    session.array.clone_from(&found.taken.array);
+    session.array.clone_from(&found.assumptions.array);
     let mut records = vec![Record::Session(Box::new(session))];
     for scan in found.scans(open()?)? {
         records.extend(scan?);

@@ -5,7 +5,7 @@ use sonard_model::{
     acoustics::Sensor,
     geometry::Pose,
     model::{EngineKind, OptionKeys},
-    plan::ScanPlan,
+    scan_plan::ScanPlan,
 };
 
 /// Request of the page, tagged by `type`.

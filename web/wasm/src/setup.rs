@@ -60,7 +60,7 @@ impl Setup {
         match self.simulators.entry(engine.name()) {
             Entry::Occupied(entry) => Ok(Arc::clone(entry.get())),
             Entry::Vacant(entry) => {
-                let options = OptionKeys { engine, ..self.options }.options_of_engine();
+                let options = OptionKeys { engine, ..self.options }.engine_options();
                 let scene = Arc::clone(&self.scene);
                 let simulator = Simulator::new(scene, self.sensor.clone(), self.air, options)?;
                 Ok(Arc::clone(entry.insert(Arc::new(simulator))))

@@ -3,11 +3,11 @@
 use std::sync::Arc;
 
 use jiff::Timestamp;
-use sonard_interpret::compare::{JudgedPing, Word};
+use sonard_interpret::compare::{AnnotatedPing, Classification};
 use sonard_model::{
     geometry::Pose,
     model::{ObservationPoint, Simulator, TooCostly},
-    plan::ScanPlan,
+    scan_plan::ScanPlan,
 };
 use sonard_records::{Ping, PingStatus, ScanStart, ScanView, Session, SimRecord};
 use uuid::Uuid;
@@ -62,7 +62,7 @@ impl Sweep {
     }
 
     /// Computes the next readings, at most `count`.
-    pub(crate) fn next_readings(&mut self, count: usize) -> Result<Vec<JudgedPing>, RequestError> {
+    pub(crate) fn next_readings(&mut self, count: usize) -> Result<Vec<AnnotatedPing>, RequestError> {
         let end = self.view.pings.len().min(self.next + count);
         let readings = (self.next..end).map(|position| self.reading(position)).collect();
         self.next = end;
@@ -75,7 +75,7 @@ impl Sweep {
     }
 
     /// Annotated reading without its path, which is part of [`Beam`](crate::beam::Beam).
-    fn reading(&mut self, position: usize) -> Result<JudgedPing, RequestError> {
+    fn reading(&mut self, position: usize) -> Result<AnnotatedPing, RequestError> {
         let mut reading = self.annotated(position)?;
         reading.ping.path = None;
         if let Some(sim) = &mut reading.ping.sim {
@@ -85,7 +85,7 @@ impl Sweep {
     }
 
     /// Reading with prediction and verdict. A simulated reading is classified by its own path.
-    pub(crate) fn annotated(&mut self, position: usize) -> Result<JudgedPing, RequestError> {
+    pub(crate) fn annotated(&mut self, position: usize) -> Result<AnnotatedPing, RequestError> {
         let ping = self.view.pings[position].clone();
         let (scan, index, azimuth_deg) = (ping.scan, ping.index, ping.azimuth_deg);
         let predict = |simulator: &Simulator, point: &ObservationPoint<'_>, axis: &Pose| {
@@ -94,15 +94,15 @@ impl Sweep {
             Ok::<_, TooCostly>((SimRecord::from_prediction(simulator, &prediction), simulated))
         };
         let Some((sim, simulated)) = self.observe(&ping, predict)?.transpose()? else {
-            return Ok(JudgedPing::new(ping, &self.view));
+            return Ok(AnnotatedPing::new(ping, &self.view));
         };
         if self.is_measured {
             let residual_m = ping.range_m.zip(sim.range_m).map(|(range, sim)| range - sim);
-            return Ok(JudgedPing::new(Ping { sim: Some(sim), residual_m, ..ping }, &self.view));
+            return Ok(AnnotatedPing::new(Ping { sim: Some(sim), residual_m, ..ping }, &self.view));
         }
-        let verdict = Word::from_ping(&Ping { sim: Some(sim), ..simulated.clone() });
-        let mut reading = JudgedPing::new(simulated, &self.view);
-        reading.beside.verdict = verdict;
+        let verdict = Classification::from_ping(&Ping { sim: Some(sim), ..simulated.clone() });
+        let mut reading = AnnotatedPing::new(simulated, &self.view);
+        reading.annotations.verdict = verdict;
         Ok(reading)
     }
 

@@ -22,7 +22,7 @@ pub struct Beam {
     /// no prediction could be computed.
     pub trace: Option<TraceLine>,
     /// Reason why no prediction could be computed.
-    pub lacks: Option<String>,
+    pub unavailable_reason: Option<String>,
 }
 
 /// Echo detected by the ranger.

@@ -15,7 +15,7 @@ pub struct Findings {
     /// Planes, corners and edges, classified by their arcs.
     pub features: Vec<FoundFeature>,
     /// Description of results that could not be computed, with the reason.
-    pub lacks: Option<String>,
+    pub unavailable_reason: Option<String>,
 }
 
 /// Occupancy grid of square cells.

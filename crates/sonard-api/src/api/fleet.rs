@@ -30,12 +30,12 @@ pub struct FleetRobot {
     /// Time of the last change of `state`.
     pub since: Timestamp,
     /// Time of the last report received from the robot.
-    pub heard: Option<Timestamp>,
+    pub last_report: Option<Timestamp>,
     /// Time since the last report, seconds, by a monotonic clock.
     #[serde(default)]
-    pub heard_s: Option<f64>,
+    pub last_report_age_s: Option<f64>,
     /// Problems of the robot; empty if there are none.
-    pub wrong: Vec<String>,
+    pub problems: Vec<String>,
     /// Last report received from the robot.
     pub report: Option<FleetReport>,
 }
@@ -45,17 +45,17 @@ pub struct FleetRobot {
 #[serde(rename_all = "snake_case")]
 pub enum FleetState {
     /// The robot has not been polled yet.
-    Unasked,
+    NotPolled,
     /// The robot reports itself healthy.
-    Well,
+    Healthy,
     /// The robot reports problems.
-    NotWell,
+    Unhealthy,
     /// No response within the time limit.
-    Silent,
+    NoResponse,
     /// The daemon rejects the request.
-    Refusing,
+    Rejected,
     /// The response is not that of a daemon of this version.
-    Strange,
+    InvalidResponse,
     /// A daemon of another robot responds.
     OtherRobot,
 }

@@ -73,7 +73,7 @@ pub struct LineTotals {
     /// Lost readings that were fetched again.
     pub repaired: u64,
     /// Readings and responses rejected as invalid.
-    pub refused: u64,
+    pub rejected: u64,
     /// Number of times that the connection to a device in use was lost.
     pub losses: u64,
 }

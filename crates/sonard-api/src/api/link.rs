@@ -17,7 +17,7 @@ pub struct LinkReport {
     /// Serial port, as configured.
     pub port: String,
     /// Last error and its remedy, while the device is unusable.
-    pub trouble: Option<String>,
+    pub error: Option<String>,
     /// Failures since the device was last usable.
     pub failures: u32,
     /// Time until the next attempt, seconds.

@@ -13,7 +13,7 @@ pub struct Location {
     /// Poses that fit the readings, most probable first.
     pub poses: Vec<PoseMode>,
     /// Possible causes if no pose fits the readings.
-    pub doubts: Vec<Misfit>,
+    pub diagnoses: Vec<Misfit>,
     /// Reason why the scan could not be located.
-    pub lacks: Option<String>,
+    pub unavailable_reason: Option<String>,
 }

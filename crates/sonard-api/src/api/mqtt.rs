@@ -14,7 +14,7 @@ pub struct MqttReport {
     /// Time of the last change of `connected`.
     pub since: Timestamp,
     /// Current error, if any.
-    pub trouble: Option<String>,
+    pub error: Option<String>,
     /// Number of connections since the start.
     pub connections: u64,
     /// Records acknowledged by the broker since the start.
@@ -22,14 +22,14 @@ pub struct MqttReport {
     /// Records sent but not acknowledged yet.
     pub waiting: u64,
     /// Log data after the last acknowledged record, bytes.
-    pub behind_bytes: u64,
+    pub lag_bytes: u64,
     /// Log lines skipped because they hold no record.
-    pub passed_over: u64,
+    pub skipped_lines: u64,
     /// Records rejected by the broker; they are skipped, and remain in the log.
     #[serde(default)]
-    pub left_out: u64,
+    pub skipped: u64,
     /// Number of accepted commands.
     pub commands: u64,
     /// Number of rejected commands.
-    pub refused: u64,
+    pub rejected: u64,
 }

@@ -16,7 +16,7 @@ pub struct RosReport {
     /// Time of the last change of `up`.
     pub since: Timestamp,
     /// Current error, if any.
-    pub trouble: Option<String>,
+    pub error: Option<String>,
     /// Number of published topics.
     pub topics: u64,
     /// Number of matched subscriptions.
@@ -24,11 +24,11 @@ pub struct RosReport {
     /// Messages published since the start.
     pub messages: u64,
     /// Messages dropped because the queue was full or they were too long.
-    pub left_out: u64,
+    pub dropped: u64,
     /// Accepted commands: successful service calls and applied poses.
     pub commands: u64,
     /// Rejected commands: failed service calls and poses.
-    pub refused: u64,
+    pub rejected: u64,
     /// Reason of the last rejection.
     pub refusal: Option<String>,
 }

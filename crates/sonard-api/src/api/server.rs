@@ -9,5 +9,5 @@ pub struct ServerReport {
     /// Paths of unix sockets and URLs that accept connections.
     pub listening: Vec<String>,
     /// Configured endpoints that are unavailable, each with the reason.
-    pub trouble: Vec<String>,
+    pub errors: Vec<String>,
 }

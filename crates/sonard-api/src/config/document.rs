@@ -46,7 +46,7 @@ fn comment(text: &mut String, about: &str) {
 #[cfg(test)]
 mod tests {
     use super::{
-        super::{Keys, ValueKind, ConfigLayers, sections},
+        super::{ConfigLayers, Keys, ValueKind, sections},
         *,
     };
 
@@ -67,7 +67,9 @@ mod tests {
 
     #[test]
     fn shipped_file_equals_defaults() {
-        let read = |text: &str| ConfigLayers::new().with_file("sonard.toml", text).and_then(ConfigLayers::into_keys);
+        let read = |text: &str| {
+            ConfigLayers::new().with_file("sonard.toml", text).and_then(ConfigLayers::into_keys)
+        };
         assert_eq!(read(SHIPPED), Ok(Keys::default()));
         // Comments of the form `key = value` are turned into settings.
         let sets = |line: &str| line.split_once(" = ").is_some_and(|(key, _)| !key.contains(' '));

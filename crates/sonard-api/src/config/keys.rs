@@ -216,7 +216,7 @@ pub struct LinkKeys {
     pub retry_max_s: f64,
     /// Interval between status requests to an idle device, seconds.
     #[schemars(range(min = 0.1, max = 60))]
-    pub check_s: f64,
+    pub status_interval_s: f64,
 }
 
 /// Behaviour after an emergency stop.
@@ -269,7 +269,7 @@ pub struct ServerKeys {
     pub queue: u32,
     /// Time after which a client that stops reading is disconnected, seconds (restart).
     #[schemars(range(min = 0.1, max = 600))]
-    pub stall_s: f64,
+    pub write_timeout_s: f64,
 }
 
 /// Pins of a Raspberry Pi.
@@ -291,7 +291,7 @@ pub struct GpioKeys {
     pub stop_pin: Option<u8>,
     /// Output of the indicator light, high while the ranger is ready or scanning (restart).
     #[schemars(range(min = 0, max = 27), example = 24)]
-    pub light_pin: Option<u8>,
+    pub status_led_pin: Option<u8>,
 }
 
 impl Default for PlaceKeys {
@@ -358,7 +358,7 @@ impl Default for LogKeys {
 
 impl Default for LinkKeys {
     fn default() -> Self {
-        Self { attempts: 7, retry_min_s: 0.2, retry_max_s: 5.0, check_s: 5.0 }
+        Self { attempts: 7, retry_min_s: 0.2, retry_max_s: 5.0, status_interval_s: 5.0 }
     }
 }
 
@@ -386,7 +386,7 @@ impl Default for ServerKeys {
             max_requests_per_s: 200.0,
             max_body_kb: 64,
             queue: 512,
-            stall_s: 10.0,
+            write_timeout_s: 10.0,
         }
     }
 }

@@ -10,7 +10,7 @@ use toml::{Value, de::DeTable};
 
 use super::{
     keys::Keys,
-    schema::{ConfigForm, Key, ValueKind, Section},
+    schema::{ConfigForm, Key, Section, ValueKind},
 };
 
 pub use error::{ConfigError, Origin};
@@ -228,9 +228,12 @@ fn validate(
 ) -> Result<Option<Value>, ConfigError> {
     let reject = || Err(invalid(section, name, key, &value.to_string(), origin.clone()));
     match (&key.kind, value) {
-        (ValueKind::Number { min, max }, Value::Float(number)) if (*min..=*max).contains(number) => {}
-        (ValueKind::Number { min, max } | ValueKind::Whole { min, max }, Value::Integer(number))
-            if (*min..=*max).contains(&(*number as f64)) => {}
+        (ValueKind::Number { min, max }, Value::Float(number))
+            if (*min..=*max).contains(number) => {}
+        (
+            ValueKind::Number { min, max } | ValueKind::Whole { min, max },
+            Value::Integer(number),
+        ) if (*min..=*max).contains(&(*number as f64)) => {}
         (ValueKind::Switch, Value::Boolean(_)) => {}
         (ValueKind::Choice(words), Value::String(word)) if words.contains(word) => {}
         (ValueKind::Choice(words), Value::String(word)) => {

@@ -141,8 +141,8 @@ impl MqttKeys {
                 help.into(),
             ));
         }
-        let broker =
-            BrokerAddress::parse(url).map_err(|help| ("broker", format!("mqtt.broker is {url}"), help))?;
+        let broker = BrokerAddress::parse(url)
+            .map_err(|help| ("broker", format!("mqtt.broker is {url}"), help))?;
         if !is_prefix(&self.topic) {
             let help = "names separated by /, without +, # and spaces: sonard, or plant/sonard";
             return Err(("topic", format!("mqtt.topic is {:?}", self.topic), help.into()));

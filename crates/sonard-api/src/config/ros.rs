@@ -38,7 +38,7 @@ pub struct RosKeys {
     pub field_of_view_deg: Option<f64>,
     /// Publish the transform from map to base_link on /tf (restart). Disable it if the robot's own
     /// software publishes that transform.
-    pub places_robot: bool,
+    pub publish_robot_pose: bool,
     /// Publish a map of all scans since the start after each scan (restart), computed as by `sonard
     /// map`. Disable it if another node publishes /map.
     pub map: bool,
@@ -84,7 +84,7 @@ impl Default for RosKeys {
             distribution: RosDistribution::default(),
             frame: "sonar".into(),
             field_of_view_deg: None,
-            places_robot: true,
+            publish_robot_pose: true,
             map: false,
             commands: false,
             queue_kb: 512,
@@ -107,7 +107,7 @@ impl RosKeys {
                 RosDistribution::Humble => Distribution::Humble,
                 RosDistribution::Jazzy => Distribution::Jazzy,
             },
-            places_robot: self.places_robot,
+            places_robot: self.publish_robot_pose,
             field_of_view_deg: self.field_of_view_deg,
             frame: self.frame.clone(),
         }

@@ -7,7 +7,7 @@ use thiserror::Error;
 
 use crate::{
     client::{Client, Endpoint},
-    config::{FleetKeys, Keys, ConfigLayers, is_robot_name},
+    config::{ConfigLayers, FleetKeys, Keys, is_robot_name},
 };
 
 /// Maximum number of daemons in a fleet.
@@ -165,7 +165,8 @@ pub fn read_members(path: &Path) -> Result<Vec<Member>, MemberError> {
         toml::from_str(&text).map_err(|error| invalid(at_line(&text, &error)))?;
     if table.contains_key("fleet") && !table.contains_key("daemon") {
         let layers = ConfigLayers::<Keys>::new().with_file(&name.to_string(), &text);
-        let keys = layers.and_then(ConfigLayers::into_keys).map_err(|error| invalid(error.to_string()))?;
+        let keys =
+            layers.and_then(ConfigLayers::into_keys).map_err(|error| invalid(error.to_string()))?;
         // `fleet.file` is ignored here: a file that names itself would recurse for ever.
         let members = members_from_keys(&FleetKeys { file: None, ..keys.fleet })?;
         return if members.is_empty() {

@@ -5,7 +5,7 @@ use std::time::Duration;
 use jiff::{SignedDuration, Timestamp};
 use uuid::Uuid;
 
-use super::{Member, DaemonReport, PollError, observe};
+use super::{DaemonReport, Member, PollError, observe};
 use crate::api::{Fleet, FleetPicture, FleetReport, FleetRobot, FleetScan, FleetState};
 
 /// States of all robots, in the order of the configuration.
@@ -24,11 +24,11 @@ impl Registry {
             robot: member.robot.clone(),
             address: member.address(),
             page: member.page_url(),
-            state: FleetState::Unasked,
+            state: FleetState::NotPolled,
             since: now,
-            heard: None,
-            heard_s: None,
-            wrong: Vec::new(),
+            last_report: None,
+            last_report_age_s: None,
+            problems: Vec::new(),
             report: None,
         };
         let robots: Vec<_> = members.into_iter().map(robot).collect();
@@ -48,9 +48,9 @@ impl Registry {
         if robot.state != seen.state {
             (robot.state, robot.since) = (seen.state, now);
         }
-        robot.wrong = seen.wrong;
+        robot.problems = seen.wrong;
         if let Some(report) = seen.report {
-            robot.heard = Some(now);
+            robot.last_report = Some(now);
             if let Some(reported_at) = self.reported_at.get_mut(number) {
                 *reported_at = Some(at);
             }
@@ -83,7 +83,7 @@ impl Registry {
     pub fn fleet(&self, at: Duration) -> Fleet {
         let mut robots = self.robots.clone();
         for (robot, reported_at) in robots.iter_mut().zip(&self.reported_at) {
-            robot.heard_s =
+            robot.last_report_age_s =
                 reported_at.map(|reported_at| at.saturating_sub(reported_at).as_secs_f64());
         }
         Fleet { robots }
@@ -96,11 +96,11 @@ impl Registry {
             let Some(name) = &robot.robot else { continue };
             let namesakes = names.iter().filter(|other| other.as_ref() == Some(name)).count();
             let problem = format!("{namesakes} robots have the name {name}: set fleet.robot");
-            robot.wrong.retain(|why| !why.ends_with(": set fleet.robot"));
+            robot.problems.retain(|why| !why.ends_with(": set fleet.robot"));
             if namesakes > 1
                 && names.iter().position(|other| other.as_ref() == Some(name)) != Some(number)
             {
-                robot.wrong.push(problem);
+                robot.problems.push(problem);
             }
         }
     }
@@ -205,10 +205,10 @@ mod tests {
         let gone = || Err(PollError::NoResponse("no response".into()));
         registry.update(0, gone(), now(2));
         registry.update(0, gone(), now(4));
-        assert_eq!(state(&registry, 0), (FleetState::Silent, at(2)));
-        assert_eq!(state(&registry, 1), (FleetState::Unasked, at(0)));
+        assert_eq!(state(&registry, 0), (FleetState::NoResponse, at(2)));
+        assert_eq!(state(&registry, 1), (FleetState::NotPolled, at(0)));
         registry.update(0, Err(PollError::Rejected("no".into())), now(6));
-        assert_eq!(state(&registry, 0), (FleetState::Refusing, at(6)));
+        assert_eq!(state(&registry, 0), (FleetState::Rejected, at(6)));
         registry.update(7, gone(), now(8));
         registry.set_picture(7, Uuid::nil(), PICTURE);
         assert_eq!(registry.fleet(Duration::ZERO).robots.len(), 2);
@@ -219,23 +219,25 @@ mod tests {
         let (mut registry, scan) = (registry(), Uuid::from_u128(1));
         registry.update(1, Ok(sample_report("mango", scan)), now(10));
         let mango = registry.fleet(Duration::ZERO).robots[1].clone();
-        assert_eq!((mango.state, mango.robot.as_deref()), (FleetState::Well, Some("mango")));
+        assert_eq!((mango.state, mango.robot.as_deref()), (FleetState::Healthy, Some("mango")));
         let report = mango.report.expect("a report");
         assert_eq!((report.last_reading, report.last_reading_age_s), (Some(at(8)), Some(2.0)));
-        assert_eq!(mango.wrong, ["2 beams missing in the last scan"]);
+        assert_eq!(mango.problems, ["2 beams missing in the last scan"]);
         registry.update(1, Ok(sample_report("papaya", scan)), now(12));
         let mango = registry.fleet(Duration::ZERO).robots[1].clone();
         assert_eq!((mango.state, mango.since), (FleetState::OtherRobot, at(12)));
-        assert_eq!((mango.robot.as_deref(), mango.heard), (Some("mango"), Some(at(10))));
+        assert_eq!((mango.robot.as_deref(), mango.last_report), (Some("mango"), Some(at(10))));
         assert_eq!(mango.report, Some(report));
         registry.update(1, Ok(sample_report("a/b", scan)), now(14));
-        assert_eq!(state(&registry, 1), (FleetState::Strange, at(14)));
+        assert_eq!(state(&registry, 1), (FleetState::InvalidResponse, at(14)));
     }
 
     #[test]
     fn age_ignores_wall_clock_steps() {
         let (mut registry, scan) = (registry(), Uuid::from_u128(1));
-        let age_s = |registry: &Registry, at| registry.fleet(Duration::from_secs(at)).robots[0].heard_s;
+        let age_s = |registry: &Registry, at| {
+            registry.fleet(Duration::from_secs(at)).robots[0].last_report_age_s
+        };
         assert_eq!(age_s(&registry, 5), None);
         registry.update(
             0,
@@ -271,11 +273,15 @@ mod tests {
         registry.update(1, Ok(sample_report("kiwi", scan)), now(1));
         registry.update(0, Ok(sample_report("kiwi", scan)), now(1));
         registry.update(0, Ok(sample_report("kiwi", scan)), now(3));
-        let wrong: Vec<_> =
-            registry.fleet(Duration::ZERO).robots.iter().map(|robot| robot.wrong.len()).collect();
+        let wrong: Vec<_> = registry
+            .fleet(Duration::ZERO)
+            .robots
+            .iter()
+            .map(|robot| robot.problems.len())
+            .collect();
         assert_eq!(wrong, [1, 2]);
         assert_eq!(
-            registry.fleet(Duration::ZERO).robots[1].wrong[1],
+            registry.fleet(Duration::ZERO).robots[1].problems[1],
             "2 robots have the name kiwi: set fleet.robot"
         );
     }

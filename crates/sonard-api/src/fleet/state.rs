@@ -34,16 +34,17 @@ pub struct Observation {
 /// Derives the state of the robot `expected` from the result of a poll.
 #[must_use]
 pub fn observe(expected: Option<&str>, polled: Result<DaemonReport, PollError>) -> Observation {
-    let without = |state, why: &str| Observation { state, wrong: vec![sanitize(why)], report: None };
+    let without =
+        |state, why: &str| Observation { state, wrong: vec![sanitize(why)], report: None };
     let report = match polled {
         Ok(report) => report,
-        Err(PollError::NoResponse(why)) => return without(FleetState::Silent, &why),
-        Err(PollError::Rejected(why)) => return without(FleetState::Refusing, &why),
-        Err(PollError::Invalid(why)) => return without(FleetState::Strange, &why),
+        Err(PollError::NoResponse(why)) => return without(FleetState::NoResponse, &why),
+        Err(PollError::Rejected(why)) => return without(FleetState::Rejected, &why),
+        Err(PollError::Invalid(why)) => return without(FleetState::InvalidResponse, &why),
     };
     let robot = &report.status.robot;
     if !is_robot_name(robot) {
-        return without(FleetState::Strange, &format!("invalid robot name {robot:?}"));
+        return without(FleetState::InvalidResponse, &format!("invalid robot name {robot:?}"));
     }
     if let Some(expected) = expected.filter(|expected| expected != robot) {
         let why = format!("{robot} responds in place of {expected}");
@@ -56,7 +57,7 @@ pub fn observe(expected: Option<&str>, polled: Result<DaemonReport, PollError>) 
     let rejected = rejected.map(|error| format!("configuration rejected: {error}"));
     let wrong = health.reasons.iter().cloned().chain(missing_beams).chain(rejected);
     Observation {
-        state: if health.healthy { FleetState::Well } else { FleetState::NotWell },
+        state: if health.healthy { FleetState::Healthy } else { FleetState::Unhealthy },
         wrong: wrong.take(MAX_REASONS).map(|why| sanitize(&why)).collect(),
         report: Some(report),
     }
@@ -97,9 +98,9 @@ mod tests {
     #[test]
     fn failed_polls() {
         for (error, state) in [
-            (PollError::NoResponse("gone".into()), FleetState::Silent),
-            (PollError::Rejected("no".into()), FleetState::Refusing),
-            (PollError::Invalid("html".into()), FleetState::Strange),
+            (PollError::NoResponse("gone".into()), FleetState::NoResponse),
+            (PollError::Rejected("no".into()), FleetState::Rejected),
+            (PollError::Invalid("html".into()), FleetState::InvalidResponse),
         ] {
             let seen = observe(Some("kiwi"), Err(error));
             assert_eq!((seen.state, seen.wrong.len(), seen.report), (state, 1, None));

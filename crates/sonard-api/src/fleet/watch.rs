@@ -12,7 +12,7 @@ use tokio::{
 };
 use uuid::Uuid;
 
-use super::{PolledDaemon, Registry, DaemonReport, PollError, poll, picture};
+use super::{DaemonReport, PollError, PolledDaemon, Registry, picture, poll};
 use crate::{api::FleetPicture, client::Client};
 
 /// Poll interval.

@@ -8,8 +8,8 @@ use tokio::time::sleep;
 
 use super::{
     super::{
-        Action, ScanDevice, JournalEntry, ScanFigures, CheckFinding, CollectError, ScanOutcome, RetrySchedule, SealedFile, Slot, ScanAttempt,
-        Observer, check_figures, ended_early,
+        Action, CheckFinding, CollectError, JournalEntry, Observer, RetrySchedule, ScanAttempt,
+        ScanDevice, ScanFigures, ScanOutcome, SealedFile, Slot, check_figures, ended_early,
         pose_source::answered,
         record_scan::{self, RecordedScan},
         strongest_action,
@@ -46,7 +46,7 @@ impl<D: ScanDevice, W: Observer> Collector<D, W> {
         }
         let reason = rejection_reason(&findings);
         let scan = Some((&view, figures, wall_s));
-        self.set_aside(slot, scan, ScanOutcome::Refused, findings, &reason)?;
+        self.set_aside(slot, scan, ScanOutcome::Rejected, findings, &reason)?;
         if self.interrupts.happened() {
             return Ok(Next::Stop("stopped on request".into()));
         }
@@ -73,9 +73,10 @@ impl<D: ScanDevice, W: Observer> Collector<D, W> {
         };
         // Scans lost before their first reading are removed, or repeated losses would fill the
         // folder.
-        if stop.is_some() || read(&self.folder.draft_path(slot))?.is_some_and(|view| is_measured(&view))
+        if stop.is_some()
+            || read(&self.folder.draft_path(slot))?.is_some_and(|view| is_measured(&view))
         {
-            self.set_aside(slot, None, ScanOutcome::Cut, Vec::new(), "incomplete")?;
+            self.set_aside(slot, None, ScanOutcome::Incomplete, Vec::new(), "incomplete")?;
         } else {
             self.folder.discard(slot)?;
         }
@@ -88,7 +89,7 @@ impl<D: ScanDevice, W: Observer> Collector<D, W> {
     /// Waits after a lost scan, longer after each one. A loss is independent of the pose, so it
     /// does not count as a retake; the collection ends after `collection.patience_s`.
     async fn wait_for_ranger(&mut self, lost: CollectError) -> Result<Next, CollectError> {
-        let patience = Duration::from_secs_f64(self.plan.keys.collection.patience_s);
+        let patience = Duration::from_secs_f64(self.plan.keys.collection.retry_limit_s);
         let losses = self.losses.get_or_insert_with(|| RetrySchedule::for_lost_scans(patience));
         let (CollectError::Failed { .. }, Some(wait)) = (&lost, losses.next_delay()) else {
             return match lost {
@@ -118,7 +119,8 @@ impl<D: ScanDevice, W: Observer> Collector<D, W> {
             let Some(view) = read(&path)? else { continue };
             let figures = ScanFigures::from_scan(&view, None);
             let findings = check_figures(&figures, &self.plan.keys.checks);
-            let entry = take_entry(slot, Some(&view), ScanOutcome::Accepted, sealed, figures, findings);
+            let entry =
+                take_entry(slot, Some(&view), ScanOutcome::Accepted, sealed, figures, findings);
             self.append(entry)?;
         }
         for slot in self.folder.interrupted_scans()? {
@@ -131,7 +133,7 @@ impl<D: ScanDevice, W: Observer> Collector<D, W> {
                 Some(view) if !done => self.evaluate_recovered(slot, &view)?,
                 _ => {
                     let reason = "the program ended during the scan";
-                    self.set_aside(slot, None, ScanOutcome::Cut, Vec::new(), reason)?;
+                    self.set_aside(slot, None, ScanOutcome::Incomplete, Vec::new(), reason)?;
                 }
             }
         }
@@ -146,7 +148,13 @@ impl<D: ScanDevice, W: Observer> Collector<D, W> {
         }
         let reason = rejection_reason(&findings);
         let wall_s = f64::NAN;
-        self.set_aside(slot, Some((view, figures, wall_s)), ScanOutcome::Refused, findings, &reason)
+        self.set_aside(
+            slot,
+            Some((view, figures, wall_s)),
+            ScanOutcome::Rejected,
+            findings,
+            &reason,
+        )
     }
 
     fn accept(
@@ -158,8 +166,9 @@ impl<D: ScanDevice, W: Observer> Collector<D, W> {
         wall_s: Option<f64>,
     ) -> Result<(), CollectError> {
         let sealed = self.folder.accept(slot)?;
-        let mut entry = take_entry(slot, Some(view), ScanOutcome::Accepted, sealed, figures, findings);
-        if let JournalEntry::Take(take) = &mut entry {
+        let mut entry =
+            take_entry(slot, Some(view), ScanOutcome::Accepted, sealed, figures, findings);
+        if let JournalEntry::Attempt(take) = &mut entry {
             take.wall_s = wall_s;
         }
         self.append(entry)?;
@@ -190,9 +199,10 @@ impl<D: ScanDevice, W: Observer> Collector<D, W> {
             |(_, figures, _)| figures,
         );
         let mut entry = take_entry(slot, view, outcome, sealed, figures, findings);
-        if let JournalEntry::Take(take) = &mut entry {
+        if let JournalEntry::Attempt(take) = &mut entry {
             take.wall_s = scan.map(|(.., wall_s)| wall_s).filter(|wall_s| wall_s.is_finite());
-            take.cut = (outcome == ScanOutcome::Cut).then(|| reason.to_owned());
+            take.incomplete_reason =
+                (outcome == ScanOutcome::Incomplete).then(|| reason.to_owned());
         }
         self.append(entry)
     }
@@ -283,7 +293,7 @@ fn take_entry(
     findings: Vec<CheckFinding>,
 ) -> JournalEntry {
     let start = view.and_then(|view| view.start.as_ref());
-    JournalEntry::Take(Box::new(ScanAttempt {
+    JournalEntry::Attempt(Box::new(ScanAttempt {
         slot,
         scan: view.map(|view| view.scan),
         started: start.map(|start| start.time),
@@ -293,7 +303,7 @@ fn take_entry(
         sha256: sealed.sha256,
         figures,
         findings,
-        cut: None,
+        incomplete_reason: None,
         wall_s: None,
     }))
 }

@@ -7,7 +7,10 @@ use sonard_device::ranger::PreparedScan;
 use sonard_records::{AirSource, ScanAir};
 
 use super::{
-    super::{AirAction, ScanDevice, JournalEntry, CollectError, ScanTask, Slot, Observer, record_scan::RecordedScan},
+    super::{
+        AirAction, CollectError, JournalEntry, Observer, ScanDevice, ScanTask, Slot,
+        record_scan::RecordedScan,
+    },
     Collector,
 };
 
@@ -39,13 +42,21 @@ impl<D: ScanDevice, W: Observer> Collector<D, W> {
     }
 
     /// Takes a scan; returns it with the temperature change during it, degrees Celsius.
-    pub(super) async fn take(&mut self, slot: Slot) -> Result<(RecordedScan, Option<f64>), CollectError> {
+    pub(super) async fn take(
+        &mut self,
+        slot: Slot,
+    ) -> Result<(RecordedScan, Option<f64>), CollectError> {
         let history = self.journal.history();
         let done = history.accepted().count() as u32;
         let total = history.requested().len() as u32;
         let label = self.pose(slot.pose).label();
         let doing = format!("{label}, scan {} of {total}", done + 1);
-        self.watcher.scan_started(&doing, done, total, self.pace.left_s(total.saturating_sub(done)));
+        self.watcher.scan_started(
+            &doing,
+            done,
+            total,
+            self.pace.left_s(total.saturating_sub(done)),
+        );
         let before_c = self.temperature().await;
         // Without a valid temperature now, the last valid one is recorded with its age.
         let age_s = self.temperature_age_s().or(before_c.map(|_| 0.0));
@@ -80,7 +91,7 @@ impl<D: ScanDevice, W: Observer> Collector<D, W> {
         let air = self.plan.air_order(self.air.temperature_c());
         let before = self.device.settings_to_save(air.as_ref()).await?;
         if let Some(before) = &before {
-            self.append(JournalEntry::Borrowed(before.clone()))?;
+            self.append(JournalEntry::SavedSettings(before.clone()))?;
         }
         self.device.apply_settings(before, air.as_ref()).await
     }
@@ -90,7 +101,9 @@ impl<D: ScanDevice, W: Observer> Collector<D, W> {
         match self.device.restore_settings().await {
             Ok(false) | Err(CollectError::Stopped(_)) => {}
             // If this entry is lost, the next run restores the settings once more.
-            Ok(true) => drop(self.append(JournalEntry::GivenBack { time: Timestamp::now() })),
+            Ok(true) => {
+                drop(self.append(JournalEntry::RestoredSettings { time: Timestamp::now() }));
+            }
             Err(halt) => self.watcher.message(&format!(
                 "warning: the daemon still has the collection's settings: {halt}\n\
                  start the collection again, or set the daemon's mode with PUT /v1/scanning"

@@ -14,15 +14,15 @@ use uuid::Uuid;
 
 use super::{
     super::{
-        Conditions, ConnectedDevice, ScanDevice, JournalEntry, CollectionFolder, CollectError, INPUTS, CollectionJournal, CollectionPlan, PlanEntry,
-        Poses, RunStart, Observer,
+        CollectError, CollectionFolder, CollectionJournal, CollectionPlan, Conditions,
+        ConnectedDevice, INPUTS, JournalEntry, Observer, PlanEntry, Poses, RunStart, ScanDevice,
         estimate::{Pace, budget},
         find_numbers,
         plan_changes::plan_changes,
         pose_source::{PoseSource, answered},
         sha256,
     },
-    RunOptions, Collector, warn_of_disk,
+    Collector, RunOptions, warn_of_disk,
 };
 
 impl<D: ScanDevice, W: Observer> Collector<D, W> {
@@ -52,7 +52,7 @@ impl<D: ScanDevice, W: Observer> Collector<D, W> {
         let journal = CollectionJournal::open(&folder.journal())?;
         let id = journal.history().plans.last().map_or_else(Uuid::new_v4, |plan| plan.collection);
         let scan_s = budget(&plan)?.total_s();
-        let patience = Duration::from_secs_f64(plan.keys.collection.patience_s);
+        let patience = Duration::from_secs_f64(plan.keys.collection.retry_limit_s);
         device.resume(patience, journal.history().saved_settings.clone());
         let mut collector = Self {
             choices,

@@ -18,7 +18,10 @@ use sonard_records::{Device as DeviceRecord, Provenance, Record, ScanPlan, ScanV
 use sonard_runtime::interrupts::Interrupts;
 
 use super::*;
-use crate::{SavedSettings, CollectionKeys, ConnectedDevice, CollectionHistory, Poses, ScanTask, RecordedScan, read_journal};
+use crate::{
+    CollectionHistory, CollectionKeys, ConnectedDevice, Poses, RecordedScan, SavedSettings,
+    ScanTask, read_journal,
+};
 
 /// Remote device whose readings are the model's; the first `lost` scans fail.
 struct FakeDevice {
@@ -56,11 +59,18 @@ impl ScanDevice for FakeDevice {
         unreachable!("only for local devices")
     }
 
-    async fn settings_to_save(&self, _: Option<&AirOrder>) -> Result<Option<SavedSettings>, CollectError> {
+    async fn settings_to_save(
+        &self,
+        _: Option<&AirOrder>,
+    ) -> Result<Option<SavedSettings>, CollectError> {
         Ok(None)
     }
 
-    async fn apply_settings(&mut self, _: Option<SavedSettings>, _: Option<&AirOrder>) -> Result<(), CollectError> {
+    async fn apply_settings(
+        &mut self,
+        _: Option<SavedSettings>,
+        _: Option<&AirOrder>,
+    ) -> Result<(), CollectError> {
         Ok(())
     }
 
@@ -98,7 +108,13 @@ impl ScanDevice for FakeDevice {
             (Some(view), None)
         };
         log.close()?;
-        Ok(RecordedScan { view, needs_reconnect: lost.is_some(), failure: lost, stopped: false, wall_s: 0.1 })
+        Ok(RecordedScan {
+            view,
+            needs_reconnect: lost.is_some(),
+            failure: lost,
+            stopped: false,
+            wall_s: 0.1,
+        })
     }
 
     async fn close(self) {}
@@ -138,7 +154,11 @@ impl Observer for FakeWatcher {
         None
     }
 
-    fn write_report(&self, _: &CollectionFolder, history: &CollectionHistory) -> Result<(), CollectError> {
+    fn write_report(
+        &self,
+        _: &CollectionFolder,
+        history: &CollectionHistory,
+    ) -> Result<(), CollectError> {
         self.message(&format!("report of {} scans", history.accepted().count()));
         Ok(())
     }
@@ -149,7 +169,8 @@ fn plan(folder: &Path, extra_keys: &str) -> CollectionPlan {
         "[place]\nscene = \"simple-room\"\n[poses]\nlist = [\"fig7\", \"fig9\"]\n\
          [plan]\nto_deg = 18\nstep_deg = 1.8\n{extra_keys}"
     );
-    let layers = ConfigLayers::<CollectionKeys>::new().with_file("plan.toml", &text).expect("valid");
+    let layers =
+        ConfigLayers::<CollectionKeys>::new().with_file("plan.toml", &text).expect("valid");
     let keys = layers.clone().into_keys().expect("valid");
     let scene_text = shipped::text("simple-room").expect("shipped").to_owned();
     let scene = Arc::new(Scene::from_json(&scene_text).expect("a scene"));
@@ -169,7 +190,11 @@ fn plan(folder: &Path, extra_keys: &str) -> CollectionPlan {
     }
 }
 
-async fn run(folder: &Path, extra_keys: &str, lost: u32) -> (Result<(), CollectError>, Vec<String>) {
+async fn run(
+    folder: &Path,
+    extra_keys: &str,
+    lost: u32,
+) -> (Result<(), CollectError>, Vec<String>) {
     let plan = plan(folder, extra_keys);
     let (restored, messages) = (Arc::default(), Arc::default());
     let device = FakeDevice {

@@ -63,7 +63,9 @@ impl FolderError {
                 }
                 _ => "check the path and the disk; recorded scans are kept",
             },
-            Self::NotACollection { .. } => "choose another --out: a collection needs its own folder",
+            Self::NotACollection { .. } => {
+                "choose another --out: a collection needs its own folder"
+            }
             Self::Busy { .. } => "wait until that process ends, or choose another --out",
             Self::Damaged { .. } => {
                 "compare the file with a copy: it was changed. The logs in scans/ are valid \

@@ -64,7 +64,8 @@ async fn drop_counts_around_a_scan_start() {
 #[tokio::test]
 async fn deadband_suppresses_readings() {
     let hub = Hub::new(100);
-    let mut some = hub.subscribe(SubscriptionFilter { deadband_m: Some(0.05), ..SubscriptionFilter::default() });
+    let mut some = hub
+        .subscribe(SubscriptionFilter { deadband_m: Some(0.05), ..SubscriptionFilter::default() });
     for (step, range_m) in [
         (0, Some(1.0)),
         (0, Some(1.04)),
@@ -90,7 +91,8 @@ async fn verdicts_are_sent_on_request() {
     // A subscription in mid-scan has the viewpoint of the running scan.
     hub.publish(&session());
     hub.publish(&control());
-    let mut annotated = hub.subscribe(SubscriptionFilter { verdicts: true, ..SubscriptionFilter::default() });
+    let mut annotated =
+        hub.subscribe(SubscriptionFilter { verdicts: true, ..SubscriptionFilter::default() });
     let mut plain = hub.subscribe(SubscriptionFilter::default());
     hub.publish(&ping(0, Some(1.0)));
     let annotated = all(&mut annotated, &hub).await.remove(0);
@@ -129,7 +131,8 @@ async fn idle_subscriber_is_cut_off() {
 #[tokio::test]
 async fn buffers_are_bounded_in_bytes() {
     let hub = Hub::new(100_000);
-    let slow: Vec<Subscription> = (0..100).map(|_| hub.subscribe(SubscriptionFilter::default())).collect();
+    let slow: Vec<Subscription> =
+        (0..100).map(|_| hub.subscribe(SubscriptionFilter::default())).collect();
     for step in 0..50_000 {
         hub.publish(&ping(step, Some(1.0)));
     }

@@ -62,7 +62,11 @@ impl DeviceTask {
 
     /// Prepares the next scan and writes its session to the log. Returns `None` if the scan can't
     /// be taken now.
-    async fn prepare(&mut self, identity: &Identity, asked: Option<QueuedScans>) -> Option<ScanJob> {
+    async fn prepare(
+        &mut self,
+        identity: &Identity,
+        asked: Option<QueuedScans>,
+    ) -> Option<ScanJob> {
         if std::mem::take(&mut self.control.stale) {
             self.predictions.clear();
         }

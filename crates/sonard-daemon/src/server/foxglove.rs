@@ -13,7 +13,7 @@ use std::{
 use axum::extract::ws::{CloseFrame, Message, WebSocket, close_code};
 use sonard_api::config::FoxgloveKeys;
 use sonard_export::{
-    LiveConverter, LiveMessage, ExportSettings, Topic,
+    ExportSettings, LiveConverter, LiveMessage, Topic,
     foxglove::{MAX_TEXT_BYTES, server_info},
 };
 use sonard_runtime::supervisor::Task;
@@ -24,7 +24,7 @@ use tokio::{
 use uuid::Uuid;
 
 use super::Principal;
-use crate::{LiveMessageSink, MessageConverter, Handle};
+use crate::{Handle, LiveMessageSink, MessageConverter};
 use message_queue::{Delivery, MAX_MESSAGE_BYTES, Outgoing, Viewer, ViewerQueue};
 
 /// Minimum interval between messages read from a viewer.

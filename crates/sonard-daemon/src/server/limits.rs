@@ -26,7 +26,7 @@ pub(super) struct Slots {
     max_per_address: usize,
 }
 
-/// ConnectionSlot of a connection, released when dropped.
+/// Slot of a connection, released when dropped.
 #[derive(Debug)]
 pub(super) struct ConnectionSlot {
     _permit: OwnedSemaphorePermit,

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::secret::{SecretKind, SecretError, read_secret};
+use crate::secret::{SecretError, SecretKind, read_secret};
 
 /// Limits of a token file; `openssl rand -hex 8` generates 16 characters.
 const TOKEN: SecretKind = SecretKind { name: "token", min_chars: 16, max_bytes: 4096 };
@@ -61,7 +61,10 @@ mod tests {
         rustix::fs::mkfifoat(rustix::fs::CWD, &pipe, mode).expect("a pipe");
         for path in [&pipe, folder.path(), Path::new("/dev/zero"), Path::new("/no/such/file")] {
             let error = read_token(path).expect_err("no token");
-            assert!(matches!(error, SecretError::NotRegularFile | SecretError::Unreadable(_)), "{error}");
+            assert!(
+                matches!(error, SecretError::NotRegularFile | SecretError::Unreadable(_)),
+                "{error}"
+            );
         }
     }
 }

@@ -106,7 +106,7 @@ fn evaluate(model: &ArrayModel, firing: usize, pose: Pose) -> Result<Ping, Strin
     let ranger = model.array().round().nth(firing).ok_or("the round has no such firing")?;
     let placed = model.at(pose).map_err(|error| error.to_string())?;
     let prediction = placed.ping_in_round(firing).map_err(|error| error.to_string())?;
-    Ok(Ping::of_array(&placed, Uuid::nil(), &pose, 0, ranger, &prediction))
+    Ok(Ping::for_array(&placed, Uuid::nil(), &pose, 0, ranger, &prediction))
 }
 
 /// Motion of the robot: along the configured course, until it ends or an order sets another pose.

@@ -8,7 +8,7 @@ use firmware_protocol::{
 };
 use sonard_model::motion::Trapezoid;
 
-use super::pins::{OutputPin, Pins};
+use super::pins::{BoardOutput, Pins};
 
 use activity::{Firing, Move};
 
@@ -157,7 +157,7 @@ impl<P: Pins> PiBoard<P> {
     }
 
     fn home(&mut self, speed: u16, acceleration: u32) {
-        self.pins.set(OutputPin::Enable, false);
+        self.pins.set(BoardOutput::Enable, false);
         if let Some(at_index) = self.pins.at_index() {
             let index = IndexSearch::begin(at_index, self.settings.steps_per_revolution);
             self.search = Some(HomeSearch { index, speed, acceleration });
@@ -179,9 +179,9 @@ impl<P: Pins> PiBoard<P> {
     }
 
     fn begin_move(&mut self, target: i32, speed: u16, acceleration: u32, stop_at: Option<bool>) {
-        self.pins.set(OutputPin::Enable, false);
+        self.pins.set(BoardOutput::Enable, false);
         let steps = target.wrapping_sub(self.position);
-        self.pins.set(OutputPin::Dir, steps >= 0);
+        self.pins.set(BoardOutput::Dir, steps >= 0);
         let profile = Trapezoid::new(steps, speed, acceleration);
         let since = self.pins.now();
         self.motion = Some(Move { profile, since, pulses: 0, stop_at, edge: None });
@@ -198,7 +198,7 @@ impl<P: Pins> PiBoard<P> {
 
     /// Switches the coil current off.
     fn release_coils(&mut self) {
-        self.pins.set(OutputPin::Enable, true);
+        self.pins.set(BoardOutput::Enable, true);
         self.motion = None;
         self.search = None;
         self.is_homed = false;
@@ -276,7 +276,7 @@ impl<P: Pins> PiBoard<P> {
         while let Some(at) = self.pins.next_echo() {
             if firing.record_echo(at) {
                 // Lowers ECHO and blanks the module until the detected echo has passed.
-                self.pins.set(OutputPin::Blnk, true);
+                self.pins.set(BoardOutput::Blnk, true);
                 firing.blnk_until = Some(self.pins.now() + BLNK_TICKS);
             }
         }
@@ -288,15 +288,15 @@ impl<P: Pins> PiBoard<P> {
             return self.device.handle_echoes(now as u32, &report);
         }
         if firing.binh_at.take_if(|at| *at <= now).is_some() {
-            self.pins.set(OutputPin::Binh, true);
+            self.pins.set(BoardOutput::Binh, true);
         }
         if firing.blnk_until.take_if(|at| *at <= now).is_some() {
-            self.pins.set(OutputPin::Blnk, false);
+            self.pins.set(BoardOutput::Blnk, false);
         }
     }
 
     fn end_firing(&mut self) {
-        for output in [OutputPin::Init, OutputPin::Binh, OutputPin::Blnk] {
+        for output in [BoardOutput::Init, BoardOutput::Binh, BoardOutput::Blnk] {
             self.pins.set(output, false);
         }
         self.firing = None;
@@ -320,8 +320,14 @@ const fn is_dangerous(action: &Action) -> bool {
 
 /// Sets outputs to safe levels: no coil current, no firing.
 fn make_safe(pins: &mut impl Pins) {
-    pins.set(OutputPin::Enable, true);
-    for output in [OutputPin::Init, OutputPin::Binh, OutputPin::Blnk, OutputPin::Step, OutputPin::Dir] {
+    pins.set(BoardOutput::Enable, true);
+    for output in [
+        BoardOutput::Init,
+        BoardOutput::Binh,
+        BoardOutput::Blnk,
+        BoardOutput::Step,
+        BoardOutput::Dir,
+    ] {
         pins.set(output, false);
     }
 }

@@ -6,7 +6,7 @@ use rppal::gpio::{Gpio, InputPin, OutputPin, Trigger};
 use rustix::time::{ClockId, clock_gettime};
 use thiserror::Error;
 
-use super::pins::{OutputPin, Pins};
+use super::pins::{BoardOutput, Pins};
 
 /// Nanoseconds per tick.
 const TICK_NS: u64 = 500;
@@ -138,14 +138,14 @@ impl Pins for GpioPins {
         now()
     }
 
-    fn set(&mut self, output: OutputPin, high: bool) {
+    fn set(&mut self, output: BoardOutput, high: bool) {
         let pin = match output {
-            OutputPin::Init => &mut self.init,
-            OutputPin::Binh => &mut self.binh,
-            OutputPin::Blnk => &mut self.blnk,
-            OutputPin::Step => &mut self.step,
-            OutputPin::Dir => &mut self.dir,
-            OutputPin::Enable => &mut self.enable,
+            BoardOutput::Init => &mut self.init,
+            BoardOutput::Binh => &mut self.binh,
+            BoardOutput::Blnk => &mut self.blnk,
+            BoardOutput::Step => &mut self.step,
+            BoardOutput::Dir => &mut self.dir,
+            BoardOutput::Enable => &mut self.enable,
         };
         pin.write(high.into());
     }

@@ -2,7 +2,7 @@
 
 /// Output lines of the board.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum OutputPin {
+pub enum BoardOutput {
     /// Fires the module while high.
     Init,
     /// Ends the module's blanking.
@@ -23,7 +23,7 @@ pub trait Pins {
     fn now(&mut self) -> u64;
 
     /// Sets the level of an output.
-    fn set(&mut self, output: OutputPin, high: bool);
+    fn set(&mut self, output: BoardOutput, high: bool);
 
     /// Raises INIT and returns the time of the rise.
     fn raise_init(&mut self) -> u64;

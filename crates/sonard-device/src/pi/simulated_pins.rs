@@ -7,7 +7,7 @@ use std::convert::Infallible;
 use firmware_protocol::conformance::DeviceUnderTest;
 use firmware_protocol::conformance_tests;
 
-use super::{OutputPin, PiBoard, PiSettings, Pins};
+use super::{BoardOutput, PiBoard, PiSettings, Pins};
 
 const TICKS_PER_US: u64 = 2;
 /// Internal blanking of the module, ticks.
@@ -56,24 +56,24 @@ impl Pins for SimulatedPins {
         self.now
     }
 
-    fn set(&mut self, output: OutputPin, high: bool) {
+    fn set(&mut self, output: BoardOutput, high: bool) {
         match output {
-            OutputPin::Init => {
+            BoardOutput::Init => {
                 self.init = high;
                 self.latched &= high;
             }
-            OutputPin::Binh if high => self.unblanked = self.unblanked.min(self.now),
-            OutputPin::Binh => {}
-            OutputPin::Blnk => {
+            BoardOutput::Binh if high => self.unblanked = self.unblanked.min(self.now),
+            BoardOutput::Binh => {}
+            BoardOutput::Blnk => {
                 if self.blnk && !high {
                     self.blnk_fell = self.now;
                 }
                 self.blnk = high;
                 self.latched &= !high;
             }
-            OutputPin::Step => {}
-            OutputPin::Dir => self.forward = high,
-            OutputPin::Enable => self.enabled = !high,
+            BoardOutput::Step => {}
+            BoardOutput::Dir => self.forward = high,
+            BoardOutput::Enable => self.enabled = !high,
         }
     }
 

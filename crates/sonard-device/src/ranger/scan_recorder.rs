@@ -7,7 +7,7 @@ use firmware_protocol::{
 use jiff::{SignedDuration, Timestamp};
 use sonard_model::acoustics::classify_tof;
 use sonard_records::{
-    Event, EventKind, Ping, PingStatus, Record, ScanEnd, BeamRun, Sink, SinkError,
+    BeamRun, Event, EventKind, Ping, PingStatus, Record, ScanEnd, Sink, SinkError,
 };
 use std::ops::ControlFlow;
 use uuid::Uuid;
@@ -282,7 +282,7 @@ impl<'a> ScanRecorder<'a> {
         let tof_us = reading.echoes.first().map(|&ticks| f64::from(ticks) * tick_us);
         let status = match (reading.status, tof_us) {
             (ReadingStatus::ModuleFault, _) => PingStatus::ModuleFault,
-            (ReadingStatus::StepDoubtful, _) => PingStatus::StepDoubtful,
+            (ReadingStatus::StepUncertain, _) => PingStatus::StepUncertain,
             (_, tof_us) => classify_tof(tof_us, self.job.blanking_us),
         };
         let range_m = tof_us

@@ -5,7 +5,7 @@ use firmware_protocol::{
     messages::{Capabilities, FaultKind, Identity, Settings, Sweep},
 };
 use jiff::{SignedDuration, Timestamp};
-use sonard_records::{EventKind, PlanError, Record, ScanEnd, ScanStart, BeamRun, Sink, SinkError};
+use sonard_records::{BeamRun, EventKind, PlanError, Record, ScanEnd, ScanStart, Sink, SinkError};
 use std::ops::ControlFlow;
 use thiserror::Error;
 use tokio::{
@@ -15,7 +15,7 @@ use tokio::{
 use uuid::Uuid;
 
 use super::{
-    driver::{DriveError, Driver, CommandResult},
+    driver::{CommandResult, DriveError, Driver},
     scan_job::ScanJob,
     scan_recorder::{FinishedScan, ScanRecorder},
     timing,

@@ -13,7 +13,7 @@ use sonard_model::{
 use sonard_records::{ModelRecord, PlanError, ScanPlan, Session, SimRecord};
 use thiserror::Error;
 
-use super::{ReceiverTiming, Motion, ScanJob, WindowTooShort, device_record, provenance};
+use super::{Motion, ReceiverTiming, ScanJob, WindowTooShort, device_record, provenance};
 
 /// Inputs of a scan, each validated on its own.
 #[derive(Debug, Clone)]

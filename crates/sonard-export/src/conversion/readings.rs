@@ -8,7 +8,7 @@ use sonard_records::{PathKind, Ping, PingStatus, Point, ScanView, Session};
 
 use super::{
     frames::RangerFrames,
-    settings::{Profile, ExportSettings},
+    settings::{ExportSettings, Profile},
 };
 use crate::{
     SkippedScan,
@@ -31,8 +31,8 @@ const HALF_POWER: f64 = 0.707_945_784_384_138;
 
 impl SessionParameters {
     pub(super) fn new(session: &Session, settings: &ExportSettings) -> Result<Self, SkippedScan> {
-        let extents =
-            Extents::from_session(session).map_err(|error| SkippedScan::Session(error.to_string()))?;
+        let extents = Extents::from_session(session)
+            .map_err(|error| SkippedScan::Session(error.to_string()))?;
         let speed_m_s = session.air.sound_speed_m_s;
         let by_beam = || 2.0 * BeamPattern::new(&session.sensor, speed_m_s).angle_at(HALF_POWER);
         let requested = settings.field_of_view_deg.map(f64::to_radians);
@@ -56,7 +56,7 @@ impl SessionParameters {
             PingStatus::Echo => reading.range_m.map(|range_m| range_m as f32),
             PingStatus::NoEcho => Some(no_echo),
             PingStatus::MinRange => Some(too_near),
-            PingStatus::LinkLost | PingStatus::StepDoubtful | PingStatus::ModuleFault => None,
+            PingStatus::LinkLost | PingStatus::StepUncertain | PingStatus::ModuleFault => None,
         }
     }
 }
@@ -162,8 +162,9 @@ pub(super) fn laser_scan<'a>(
 ) -> Option<LaserScan<'a>> {
     let session = scan.session.as_ref()?;
     let plan = scan.start.as_ref()?.plan;
-    let is_planar =
-        !scan.is_array_scan() && scan.is_from_one_position() && session.sensor.mounting.tilt_deg == 0.0;
+    let is_planar = !scan.is_array_scan()
+        && scan.is_from_one_position()
+        && session.sensor.mounting.tilt_deg == 0.0;
     if !is_planar || plan.check().is_err() || plan.pings_per_stop != 1 {
         return None;
     }
@@ -256,7 +257,8 @@ fn path_of(scan: &ScanView, ping: &Ping, kind: PathKind) -> Option<Vec<[f64; 3]>
         Point::Plan([x, y]) => [x, y, z_m],
         Point::Space(at) => at,
     };
-    let [transmitter, receiver] = scan.transducer_positions(ping, path)?.map(|end| [end.x, end.y, z_m]);
+    let [transmitter, receiver] =
+        scan.transducer_positions(ping, path)?.map(|end| [end.x, end.y, z_m]);
     let reflections = path.interactions.iter().map(|interaction| corner(interaction.point));
     Some([transmitter].into_iter().chain(reflections).chain([receiver]).collect())
 }

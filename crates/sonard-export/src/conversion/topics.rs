@@ -132,7 +132,8 @@ fn topics_of_rangers(
     draws_scene: bool,
     distribution: Distribution,
 ) -> Vec<Topic> {
-    let kept = |name: &str, interface| Topic { name: name.to_owned(), is_retained: true, interface };
+    let kept =
+        |name: &str, interface| Topic { name: name.to_owned(), is_retained: true, interface };
     let mut topics = vec![kept(FIXED_TRANSFORMS, TRANSFORMS), kept(TRANSFORMS_TOPIC, TRANSFORMS)];
     if draws_scene {
         topics.push(kept(SCENE, MARKERS));

@@ -72,6 +72,7 @@ impl LiveMap {
 
 /// Creates the map with the parameters of the first scan's session.
 fn new_map(session: &Session) -> Result<GrowingMap, SkippedScan> {
-    let extents = Extents::from_session(session).map_err(|error| SkippedScan::Map(error.to_string()))?;
+    let extents =
+        Extents::from_session(session).map_err(|error| SkippedScan::Map(error.to_string()))?;
     Ok(GrowingMap::new(MapSettings::default(), extents, session.array.is_some(), MAX_CELLS))
 }

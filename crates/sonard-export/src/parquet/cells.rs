@@ -17,7 +17,7 @@ use ::parquet::{
 };
 use std::sync::Arc;
 
-use crate::{ColumnType, ColumnKind, Value};
+use crate::{ColumnKind, ColumnType, Value};
 
 /// Buffered cells of one column.
 #[derive(Debug)]

@@ -18,7 +18,7 @@ use super::{
     file_metadata::FileMetadata,
     write_error,
 };
-use crate::{ExportError, ColumnType, ColumnKind, Value};
+use crate::{ColumnKind, ColumnType, ExportError, Value};
 
 /// Parquet table of nullable, typed columns, compressed by Snappy and written row by row.
 pub struct TypedTable<W: Write + Send> {
@@ -148,7 +148,9 @@ fn properties(fields: &[ColumnType]) -> WriterProperties {
 /// Returns the encoding of a column without a dictionary.
 const fn encoding(field: &ColumnType) -> Option<Encoding> {
     match field.kind {
-        ColumnKind::Integer | ColumnKind::Time | ColumnKind::Integers => Some(Encoding::DELTA_BINARY_PACKED),
+        ColumnKind::Integer | ColumnKind::Time | ColumnKind::Integers => {
+            Some(Encoding::DELTA_BINARY_PACKED)
+        }
         ColumnKind::Number | ColumnKind::Numbers => Some(Encoding::BYTE_STREAM_SPLIT),
         ColumnKind::Text | ColumnKind::Flag => None,
     }

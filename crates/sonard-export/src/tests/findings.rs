@@ -114,9 +114,7 @@ fn geojson_has_lines_and_features() {
     let (lines, mut features) = (lines(), features());
     (features[0].x_m, features[0].y_m) = (None, None);
     let text = to_geojson(&place(None, &lines, &features));
-    assert!(
-        is_geojson(text.as_bytes()) && !is_geojson(b"{\"type\":\"FeatureCollection\"}")
-    );
+    assert!(is_geojson(text.as_bytes()) && !is_geojson(b"{\"type\":\"FeatureCollection\"}"));
     let read: Value = serde_json::from_str(&text).expect("JSON");
     assert_eq!(read["type"], "FeatureCollection");
     assert_eq!(read["sonard"]["units"], "metres");

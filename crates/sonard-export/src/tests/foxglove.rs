@@ -3,7 +3,7 @@ use std::collections::BTreeMap;
 use proptest::prelude::*;
 use serde_json::{Value, json};
 
-use crate::foxglove::{MAX_TEXT_BYTES, ViewerSession, ViewerAction, advertise};
+use crate::foxglove::{MAX_TEXT_BYTES, ViewerAction, ViewerSession, advertise};
 
 /// Channels that exist in these tests.
 fn is_there(channel: u32) -> bool {
@@ -93,7 +93,8 @@ fn bounds_subscriptions() {
 #[test]
 fn closes_after_repeated_faults() {
     let mut session = ViewerSession::default();
-    let ended = (1..=100).find(|_| session.handle_text("?", is_there).contains(&ViewerAction::Close));
+    let ended =
+        (1..=100).find(|_| session.handle_text("?", is_there).contains(&ViewerAction::Close));
     assert_eq!(ended, Some(100));
 }
 

@@ -2,7 +2,7 @@ use std::collections::BTreeMap;
 
 use sonard_records::{PingStatus, Record};
 
-use crate::{Distribution, Export as _, LiveConverter, McapExport, ExportSettings, Topic};
+use crate::{Distribution, Export as _, ExportSettings, LiveConverter, McapExport, Topic};
 
 use super::scans::{measured, measured_records, of_array};
 
@@ -30,7 +30,8 @@ fn converted_with(
 /// Messages of a recording of the same scans.
 fn recorded() -> Messages {
     let mut bytes = Vec::new();
-    let mut export = Box::new(McapExport::new(&mut bytes, ExportSettings::default()).expect("memory"));
+    let mut export =
+        Box::new(McapExport::new(&mut bytes, ExportSettings::default()).expect("memory"));
     for scan in measured() {
         export.scan("small.jsonl", &scan).expect("memory");
     }
@@ -72,8 +73,10 @@ fn topics_follow_the_session() {
 fn expected_topics_match_session() {
     let jazzy = Distribution::Jazzy;
     let (live, _) = converted(measured_records());
-    let draws = |live: &LiveConverter| live.topics().iter().any(|topic| topic.name == "/sonar/scene");
-    let predicts = |live: &LiveConverter| live.topics().iter().any(|topic| topic.name == "/sonar/residual");
+    let draws =
+        |live: &LiveConverter| live.topics().iter().any(|topic| topic.name == "/sonar/scene");
+    let predicts =
+        |live: &LiveConverter| live.topics().iter().any(|topic| topic.name == "/sonar/residual");
     assert!(predicts(&live));
     assert_eq!(Topic::expected(None, true, draws(&live), jazzy), live.topics());
 

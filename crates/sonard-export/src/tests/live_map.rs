@@ -1,13 +1,13 @@
 use sonard_interpret::interpret::{
     Extents, Sweep,
     grid::Grid,
-    mapping::{Mapper, MapSettings},
+    mapping::{MapSettings, Mapper},
 };
 use sonard_model::geometry::Pose;
 use sonard_records::{Record, ScanView};
 use uuid::Uuid;
 
-use crate::{PlaceFindings, SkippedScan, LiveConverter, ExportSettings, Topic, write_findings};
+use crate::{ExportSettings, LiveConverter, PlaceFindings, SkippedScan, Topic, write_findings};
 
 use super::scans::measured_records;
 
@@ -58,7 +58,8 @@ fn recorded(records: &[Record]) -> Vec<u8> {
     let session = scans[0].session.as_deref().expect("it has one");
     let sweeps: Vec<Sweep> =
         scans.iter().map(|scan| Sweep::from_scan(scan).expect("good")).collect();
-    let (extents, mapping) = (Extents::from_session(session).expect("good"), MapSettings::default());
+    let (extents, mapping) =
+        (Extents::from_session(session).expect("good"), MapSettings::default());
     let shape = mapping.shape(&sweeps, mapping.max_range_m(&extents)).expect("small");
     let mut mapper = Mapper::new(&mapping, Grid::new(shape), extents, false, sweeps.len());
     sweeps.iter().for_each(|sweep| drop(mapper.add(sweep)));

@@ -8,7 +8,7 @@ use jiff::Timestamp;
 use serde::{Deserialize, de::DeserializeOwned};
 
 use crate::{
-    Export as _, ExportError, SkippedScan, AttachedLog, McapExport, Profile, ExportSettings,
+    AttachedLog, Export as _, ExportError, ExportSettings, McapExport, Profile, SkippedScan,
     ros::interface::{FLOAT, Interface, LASER_SCAN, MARKERS, POINT_CLOUD, RANGE, TRANSFORMS},
 };
 use sonard_records::{PingStatus, ScanView};
@@ -260,7 +260,8 @@ fn synthetic_times_are_sequential() {
 fn attaches_the_log() {
     let text = "{\"type\":\"session\"}\n".repeat(10_000);
     let mut bytes = Vec::new();
-    let mut export = Box::new(McapExport::new(&mut bytes, ExportSettings::default()).expect("memory"));
+    let mut export =
+        Box::new(McapExport::new(&mut bytes, ExportSettings::default()).expect("memory"));
     let written = Timestamp::UNIX_EPOCH;
     let log = AttachedLog { name: "small.jsonl", bytes: text.len() as u64, modified: written };
     export.attach(&log, &mut text.as_bytes()).expect("attached");

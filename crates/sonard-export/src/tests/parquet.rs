@@ -7,7 +7,8 @@ use ::parquet::{
 use sonard_records::{Ping, PingStatus, ScanView};
 
 use crate::{
-    COLUMNS, TableColumn, CsvExport, Export as _, ExportError, ColumnKind, ParquetExport, ReadingRow, Value,
+    COLUMNS, ColumnKind, CsvExport, Export as _, ExportError, ParquetExport, ReadingRow,
+    TableColumn, Value,
 };
 
 use super::scans::{Full, bare, every_status, measured, of_array, simulated};

@@ -69,9 +69,9 @@ pub(super) fn of_array() -> Vec<ScanView> {
 
 /// Scan with a reading of each status, the echo at 1.25 m.
 pub(super) fn every_status() -> ScanView {
-    use PingStatus::{Echo, LinkLost, MinRange, ModuleFault, NoEcho, StepDoubtful};
+    use PingStatus::{Echo, LinkLost, MinRange, ModuleFault, NoEcho, StepUncertain};
     let mut scan = simulated().remove(0);
-    let statuses = [Echo, NoEcho, MinRange, LinkLost, StepDoubtful, ModuleFault];
+    let statuses = [Echo, NoEcho, MinRange, LinkLost, StepUncertain, ModuleFault];
     let pings = statuses.iter().zip(0..).map(|(status, index)| {
         let mut ping = Ping::new(scan.scan, index, 0.9 * f64::from(index), *status);
         // The end of the blanking is not a range.

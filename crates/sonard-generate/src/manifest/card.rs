@@ -8,7 +8,7 @@ use super::DataSetManifest;
 use crate::{
     distribution::NumberDistribution,
     shard::Generator,
-    spec::{SpecSceneKeys, RoomShape, Spec},
+    spec::{RoomShape, Spec, SpecSceneKeys},
     table::ShardTable,
 };
 
@@ -150,7 +150,7 @@ fn distribution_text(spread: &NumberDistribution, unit: &str) -> String {
 }
 
 fn write_generation(text: &mut String, manifest: &DataSetManifest) {
-    let rejected = &manifest.totals.redrawn;
+    let rejected = &manifest.totals.rejected_draws;
     let _ = writeln!(
         text,
         "## Generation\n\n\

@@ -7,7 +7,7 @@ use sonard_model::geometry::DVec2;
 
 use crate::{
     distribution::NumberDistribution,
-    spec::{SpecSceneKeys, RoomShape},
+    spec::{RoomShape, SpecSceneKeys},
 };
 
 /// Corners of a room, counter-clockwise.

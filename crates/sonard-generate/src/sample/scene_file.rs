@@ -7,7 +7,7 @@ use serde::Serialize;
 use sonard_model::{geometry::DVec2, scene::Scene};
 
 use super::{Rejection, furnish::Furniture, room::RoomOutline};
-use crate::spec::{SpecSceneKeys, Spec};
+use crate::spec::{Spec, SpecSceneKeys};
 
 /// Scene file. A struct keeps the order of members independent of the build, unlike a JSON map.
 #[derive(Serialize)]

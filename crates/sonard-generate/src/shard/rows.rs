@@ -58,17 +58,18 @@ impl PoseReadings {
                 true => point.ping(direction_rad)?,
                 false => point.ping_in_noise(direction_rad, noise, &mut rng)?,
             };
-            let echoes = match keep.echoes_down_to > 0.0 {
+            let echoes = match keep.min_echo_amplitude > 0.0 {
                 true => {
                     let mut echoes = point.arrivals(direction_rad)?;
-                    echoes.retain(|echo| echo.amplitude >= keep.echoes_down_to);
+                    echoes.retain(|echo| echo.amplitude >= keep.min_echo_amplitude);
                     echoes
                 }
                 false => Vec::new(),
             };
-            let envelope = match keep.trace_to_m > 0.0 {
+            let envelope = match keep.envelope_range_m > 0.0 {
                 true => {
-                    let trace = point.trace(direction_rad, keep.trace_to_m, keep.trace_step_us)?;
+                    let trace =
+                        point.trace(direction_rad, keep.envelope_range_m, keep.envelope_step_us)?;
                     trace.points.iter().map(|sample| sample.envelope as f32).collect()
                 }
                 false => Vec::new(),

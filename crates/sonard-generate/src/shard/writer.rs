@@ -7,7 +7,7 @@ use std::{
 
 use serde::Serialize;
 use smallvec::SmallVec;
-use sonard_export::{ExportError, ColumnType, TypedTable, Value};
+use sonard_export::{ColumnType, ExportError, TypedTable, Value};
 use sonard_interpret::interpret::grid::{GridShape, ideal};
 use sonard_model::{
     geometry::DVec2,
@@ -169,7 +169,7 @@ impl TableWriter {
             let feature = |path: &Path| labels::feature_of(path, simulator.scene());
             row.push(echo.and_then(|arrival| text(feature(&arrival.path))));
         }
-        if keep.trace_to_m > 0.0 {
+        if keep.envelope_range_m > 0.0 {
             row.push(Some(Value::Numbers(&firing.envelope)));
         }
         row

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use sonard_model::{acoustics::Sensor, scan_plan::ScanPlan, scene::Scene};
 
-use super::{KeepKeys, SpecSceneKeys, RoomShape, Spec, error::SpecFault};
+use super::{KeepKeys, RoomShape, Spec, SpecSceneKeys, error::SpecFault};
 use crate::distribution::NumberDistribution;
 
 /// Maximum numbers of shards, of scenes per shard, and of poses per scene.
@@ -163,12 +163,12 @@ fn check_furniture(spec: &Spec) -> Result<(), SpecFault> {
 }
 
 fn check_keep(keep: &KeepKeys) -> Result<(), SpecFault> {
-    number("keep.echoes_down_to", keep.echoes_down_to, 0.0, 1.0)?;
-    number("keep.trace_to_m", keep.trace_to_m, 0.0, 100.0)?;
-    number("keep.trace_step_us", keep.trace_step_us, 1.0, 10_000.0)?;
+    number("keep.echoes_down_to", keep.min_echo_amplitude, 0.0, 1.0)?;
+    number("keep.trace_to_m", keep.envelope_range_m, 0.0, 100.0)?;
+    number("keep.trace_step_us", keep.envelope_step_us, 1.0, 10_000.0)?;
     number("keep.occupancy_m", keep.occupancy_m, 0.0, 10.0)?;
     // Two-way, at a lower bound of the sound speed.
-    let samples = 2e6 * keep.trace_to_m / 200.0 / keep.trace_step_us;
+    let samples = 2e6 * keep.envelope_range_m / 200.0 / keep.envelope_step_us;
     if samples > MAX_SAMPLES {
         let message =
             format!("an envelope would have {samples:.0} samples, more than {MAX_SAMPLES}");
@@ -196,7 +196,12 @@ fn materials(path: &str, names: &[String], spec: &Spec) -> Result<(), SpecFault>
     Ok(())
 }
 
-fn count(path: impl Into<String>, spread: &NumberDistribution, least: f64, most: f64) -> Result<(), SpecFault> {
+fn count(
+    path: impl Into<String>,
+    spread: &NumberDistribution,
+    least: f64,
+    most: f64,
+) -> Result<(), SpecFault> {
     let path = path.into();
     if spread.min().fract() != 0.0 || spread.max().fract() != 0.0 {
         return Err(SpecFault::new(path, "it counts things", "give whole numbers"));

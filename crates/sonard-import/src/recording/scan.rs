@@ -5,7 +5,7 @@ use sonard_records::Record;
 
 use super::{PlacedReading, message::timestamp};
 use crate::{
-    FileLocation, ImportedReading, Assumptions,
+    Assumptions, FileLocation, ImportedReading,
     reading::RawReading,
     scans::{self, ArrayFiring, MAX_FIRINGS},
     sweep_end::SweepDetector,
@@ -30,7 +30,11 @@ pub(super) struct ScanCollector<'a> {
 const SAME_DEG: f64 = 1e-3;
 
 impl<'a> ScanCollector<'a> {
-    pub(super) fn new(assumptions: &'a Assumptions, assumed_m_s: Option<f64>, ids: Vec<String>) -> Self {
+    pub(super) fn new(
+        assumptions: &'a Assumptions,
+        assumed_m_s: Option<f64>,
+        ids: Vec<String>,
+    ) -> Self {
         let (readings, is_away, sweep, scans) = (Vec::new(), false, SweepDetector::default(), 0);
         Self { assumptions, assumed_m_s, ids, readings, is_away, sweep, scans }
     }
@@ -90,7 +94,7 @@ impl<'a> ScanCollector<'a> {
         let corrected_m = |tof_us: f64| tof_us * 1e-6 * sound_m_s / 2.0;
         ImportedReading {
             // Messages have no line numbers; their errors were reported by the examination.
-            place: FileLocation::Line(self.scans),
+            location: FileLocation::Line(self.scans),
             direction_deg: readings.direction_deg,
             is_bearing: false,
             status: readings.status,

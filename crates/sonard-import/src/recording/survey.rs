@@ -16,7 +16,7 @@ use super::{
     pose_error,
     transforms::{FrameTree, TransformError},
 };
-use crate::{ImportError, Mapping, Assumptions};
+use crate::{Assumptions, ImportError, Mapping};
 
 /// Names of the robot's frame, the preferred first.
 const ROBOT: [&str; 3] = ["base_link", "base_footprint", "base"];

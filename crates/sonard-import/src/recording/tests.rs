@@ -15,7 +15,7 @@ use sonard_model::{acoustics::Air, geometry::Pose, reading::PingStatus};
 use sonard_records::{Ping, Record, ScanStart};
 
 use super::{LASER_SCAN, RANGE, TRANSFORMS, read_message};
-use crate::{Format, ImportError, Imported, Mapping, ImportSource, Assumptions};
+use crate::{Assumptions, Format, ImportError, ImportSource, Imported, Mapping};
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Order {
@@ -183,7 +183,7 @@ fn interpolates_poses_in_both_orders() {
     let found = examine(&driving(Order::Big).bytes(), Mapping::default()).expect("a recording");
     assert_eq!((found.format, found.readings, found.echoes), (Format::Mcap, 3, 1));
     assert!(found.has_poses && found.mapping.columns.is_empty());
-    let array = found.taken.array.expect("an array");
+    let array = found.assumptions.array.expect("an array");
     assert_eq!((array.rangers[0].x_m, array.rangers[0].bearing_deg), (0.2, 0.0));
 }
 
@@ -298,7 +298,7 @@ fn selects_topics() {
         )
     };
     let found = examine(&bag().bytes(), Mapping::default()).expect("a recording");
-    assert_eq!(found.taken.array.expect("an array").rangers.len(), 2);
+    assert_eq!(found.assumptions.array.expect("an array").rangers.len(), 2);
     let one = |topic: &str| Mapping { topics: vec![topic.to_owned()], ..Mapping::default() };
     let found = examine(&bag().bytes(), one("/rear/range")).expect("a recording");
     assert_eq!((found.readings, found.echoes), (1, 1));

@@ -20,7 +20,7 @@ fn carmen_log_is_an_array() {
     let mapping = Mapping { none_from: Some(5.0), ..Mapping::default() };
     let found = examine(CARMEN.as_bytes(), mapping.clone(), assumptions()).expect("right");
     assert_eq!((found.format, found.readings, found.echoes), (Format::Carmen, 4, 3));
-    let array = found.taken.array.as_ref().expect("an array");
+    let array = found.assumptions.array.as_ref().expect("an array");
     array.check().expect("one that can be");
     assert_eq!((array.rangers[1].y_m, array.rangers[1].bearing_deg), (0.1, 90.0));
     let records = import(CARMEN, mapping).expect("right");
@@ -40,8 +40,10 @@ fn carmen_log_is_an_array() {
 /// Lines without positions, and older ones without the cone angle.
 #[test]
 fn missing_positions_need_an_array() {
-    let array =
-        examine(CARMEN.as_bytes(), Mapping::default(), assumptions()).expect("right").taken.array;
+    let array = examine(CARMEN.as_bytes(), Mapping::default(), assumptions())
+        .expect("right")
+        .assumptions
+        .array;
     for line in ["SONAR 0.26 2 1.5 2.5 10.0 host 0.3\n", "SONAR 2 1.5 2.5 10.0 host 0.3\n"] {
         let without = error_text(examine(line.as_bytes(), Mapping::default(), assumptions()));
         assert!(
@@ -74,8 +76,10 @@ fn player_log_is_an_array() {
 /// Lines without type and subtype, from versions before 2.
 #[test]
 fn reads_old_player_log() {
-    let array =
-        examine(PLAYER.as_bytes(), Mapping::default(), assumptions()).expect("right").taken.array;
+    let array = examine(PLAYER.as_bytes(), Mapping::default(), assumptions())
+        .expect("right")
+        .assumptions
+        .array;
     let old =
         "10.0 robot 6665 position 0 1.0 2.0 0.0 0 0 0\n10.1 robot 6665 sonar 0 2 1.500 2.500\n";
     let found = examine(old.as_bytes(), Mapping::default(), Assumptions { array, ..assumptions() })

@@ -34,7 +34,7 @@ use self::{
 };
 use super::{ClassifiedPing, keep_every_second};
 
-pub use explanation::{ChangeEstimate, Explanation, ChangedQuantity};
+pub use explanation::{ChangeEstimate, ChangedQuantity, Explanation};
 
 /// Changes with a smaller gain in log-likelihood are noise.
 const MIN_GAIN: f64 = 10.0;
@@ -164,7 +164,11 @@ impl Explainer {
             fit(self.pairs.iter().map(|pair| (pair.residual_m, gradient(pair))))
         };
         let position = solve(&|pair| pair.d_position.extend(0.0));
-        found.extend(self.explanation("pose", &[(ChangedQuantity::XM, 0), (ChangedQuantity::YM, 1)], position));
+        found.extend(self.explanation(
+            "pose",
+            &[(ChangedQuantity::XM, 0), (ChangedQuantity::YM, 1)],
+            position,
+        ));
         // The measured range scales with the speed of sound: opposite sign in the residual.
         let speed = solve(&|pair| DVec3::new(0.0, 0.0, -pair.measured_m));
         found.extend(self.explanation("sound_speed", &[(ChangedQuantity::Percent, 2)], speed));

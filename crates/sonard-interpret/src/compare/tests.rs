@@ -30,8 +30,8 @@ fn ping(
 #[test]
 fn each_pair_of_outcomes_is_classified() {
     use PathKind::{Diffracted, Specular};
-    use PingStatus::{Echo, LinkLost, MinRange, ModuleFault, NoEcho, StepDoubtful};
-    use Verdict::{Direct, Edge, MinRange as Near, Multiple, Silent, Unexplained};
+    use PingStatus::{Echo, LinkLost, MinRange, ModuleFault, NoEcho, StepUncertain};
+    use Verdict::{Direct, Edge, MinRange as Near, Multiple, NoEcho as BothNoEcho, Unexplained};
     let (echo, no_echo) = ((Echo, Some(1.0)), (NoEcho, None));
     let near = (MinRange, Some(0.41));
     for (measured, simulated, kind, order, expected) in [
@@ -49,7 +49,7 @@ fn each_pair_of_outcomes_is_classified() {
         ((Echo, Some(0.415)), Some(near), Specular, 1, Ok(Near)),
         (near, Some(echo), Specular, 1, Ok(Unexplained)),
         (near, Some(no_echo), Specular, 1, Ok(Unexplained)),
-        (no_echo, Some(no_echo), Specular, 1, Ok(Silent)),
+        (no_echo, Some(no_echo), Specular, 1, Ok(BothNoEcho)),
         (no_echo, Some(echo), Specular, 1, Ok(Unexplained)),
         (echo, Some(no_echo), Specular, 1, Ok(Unexplained)),
         (echo, None, Specular, 1, Err(NotCompared::NoPrediction)),
@@ -58,10 +58,14 @@ fn each_pair_of_outcomes_is_classified() {
         (echo, Some((Echo, None)), Specular, 1, Err(NotCompared::NoRange)),
         ((LinkLost, None), Some(echo), Specular, 1, Err(NotCompared::LinkLost)),
         ((ModuleFault, None), Some(echo), Specular, 1, Err(NotCompared::ModuleFault)),
-        ((StepDoubtful, None), Some(echo), Specular, 1, Err(NotCompared::StepDoubtful)),
+        ((StepUncertain, None), Some(echo), Specular, 1, Err(NotCompared::StepUncertain)),
     ] {
         let ping = ping(measured, simulated, kind, order);
-        assert_eq!(classify(&ping).verdict, expected, "{measured:?} {simulated:?} {kind:?} {order}");
+        assert_eq!(
+            classify(&ping).verdict,
+            expected,
+            "{measured:?} {simulated:?} {kind:?} {order}"
+        );
     }
 }
 
@@ -73,7 +77,8 @@ fn fixture_is_counted() {
     let each_once =
         VerdictCounts { direct: 1, multiple: 1, edge: 1, min_range: 1, silent: 1, unexplained: 1 };
     assert_eq!(comparison.verdicts, each_once);
-    let Comparison { beams, both_echo, agree, near, both_silent, .. } = comparison;
+    let Comparison { beams, both_echo, agree, min_range: near, both_no_echo: both_silent, .. } =
+        comparison;
     assert_eq!((beams, both_echo, agree, near, both_silent), (6, 4, 3, 1, 1));
     assert_eq!(comparison.not_compared, NotComparedCounts { link_lost: 1, ..Default::default() });
     // |r| is 1.0, 3.2, 4.8 and 300 mm.
@@ -133,8 +138,8 @@ proptest::proptest! {
     fn counts_add_up(
         sides in proptest::collection::vec((0..5_usize, 0..6_usize, 0.3..2.0_f64, 0.3..2.0_f64), 0..60)
     ) {
-        use PingStatus::{Echo, LinkLost, MinRange, NoEcho, StepDoubtful};
-        let statuses = [Echo, NoEcho, MinRange, LinkLost, StepDoubtful];
+        use PingStatus::{Echo, LinkLost, MinRange, NoEcho, StepUncertain};
+        let statuses = [Echo, NoEcho, MinRange, LinkLost, StepUncertain];
         let outcome = |status: PingStatus, m: f64| (status, status.has_range().then_some(m));
         let pings = sides.iter().enumerate().map(|(index, &(m, s, a, b))| {
             let simulated = statuses.get(s).map(|&status| outcome(status, b));
@@ -149,7 +154,7 @@ proptest::proptest! {
         let v = c.verdicts;
         let verdicts = v.direct + v.multiple + v.edge + v.min_range + v.silent + v.unexplained;
         proptest::prop_assert_eq!(verdicts, c.beams);
-        let split = c.both_echo + c.measured_only + c.simulated_only + c.near + c.both_silent;
+        let split = c.both_echo + c.measured_only + c.simulated_only + c.min_range + c.both_no_echo;
         proptest::prop_assert_eq!(split, c.beams);
         proptest::prop_assert_eq!(c.beams + c.not_compared.total(), sides.len() as u32);
         proptest::prop_assert_eq!(c.agree, v.direct + v.multiple + v.edge);

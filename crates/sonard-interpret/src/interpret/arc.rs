@@ -3,7 +3,7 @@
 use sonard_model::geometry::{DVec2, wrap_pi};
 
 use super::{
-    Extents, Reason, Region, InterpretSettings, RegionBorder, Sweep, UniformSum,
+    Extents, InterpretSettings, Reason, Region, RegionBorder, Sweep, UniformSum,
     posterior::{ExtentLikelihood, mean_density},
 };
 

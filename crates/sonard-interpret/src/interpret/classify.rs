@@ -3,7 +3,7 @@
 use uuid::Uuid;
 
 use super::{
-    Extents, Feature, FeatureKind, Probabilities, Reason, InterpretSettings, Sweep, UniformSum,
+    Extents, Feature, FeatureKind, InterpretSettings, Probabilities, Reason, Sweep, UniformSum,
     arc::Arc,
     next_view::propose,
     posterior::{TurnLikelihood, probabilities},
@@ -24,7 +24,11 @@ pub(super) const ROUNDING_DEG: f64 = 1e-9;
 /// are those of the sensor. An element detected in several scans is one feature of the first;
 /// repeated scans from one pose are merged into the first as well.
 #[must_use]
-pub fn interpret(scans: &[(Uuid, Sweep)], extents: &Extents, settings: &InterpretSettings) -> Vec<Feature> {
+pub fn interpret(
+    scans: &[(Uuid, Sweep)],
+    extents: &Extents,
+    settings: &InterpretSettings,
+) -> Vec<Feature> {
     let scans = &merge_repeats(scans);
     let arcs: Vec<Arc> = scans
         .iter()
@@ -146,7 +150,7 @@ impl ArcClass {
     }
 }
 
-/// ExpectedView observation of an element from another position.
+/// Expected observation of an element from another position.
 pub(super) struct ExpectedView {
     /// Ranges of a plane, and of a corner or edge, metres.
     ranges_m: [f64; 2],

@@ -150,13 +150,13 @@ pub struct Feature {
     pub reason: Option<Reason>,
     /// Probabilities of all classes.
     pub probabilities: Probabilities,
-    /// ExpectedView extent of a plane or corner of reflectance 1, degrees (15).
+    /// Expected extent of a plane or corner of reflectance 1, degrees (15).
     pub extent_plane_corner_deg: Option<f64>,
-    /// ExpectedView extent of an edge, degrees (16).
+    /// Expected extent of an edge, degrees (16).
     pub extent_edge_deg: Option<f64>,
     /// Boundary `b(r)` between the two extents, degrees (17).
     pub boundary_deg: Option<f64>,
-    /// ExpectedView `beta_deg` of a corner (22a); that of a plane is 0.
+    /// Expected `beta_deg` of a corner (22a); that of a plane is 0.
     pub beta_corner_deg: Option<f64>,
     /// Proposed position of the scan that decides the class.
     pub next: Option<NextPosition>,
@@ -180,7 +180,7 @@ pub struct NextPosition {
     /// Number of open features decided by a scan from there.
     pub decides: usize,
     /// Minimum width of a plane to be detected from both positions, metres (27).
-    pub least_plane_m: f64,
+    pub min_plane_m: f64,
     /// Minimum length of each side of a corner, metres (26), (28).
-    pub least_corner_m: f64,
+    pub min_corner_m: f64,
 }

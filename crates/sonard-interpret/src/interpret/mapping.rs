@@ -5,7 +5,7 @@ mod growing;
 pub use growing::{GrowError, GrowingMap};
 
 use super::{
-    Extents, BeamOutcome, Sweep,
+    BeamOutcome, Extents, Sweep,
     grid::{BeamModel, GaussianBeam, Grid, GridError, GridShape, PhysicalBeam, Trust},
     prediction::{Assessment, FeaturePrediction, PredictionSettings},
 };

@@ -3,7 +3,7 @@
 use std::cmp::Reverse;
 
 use super::{
-    Extents, Feature, NextPosition, Reason, InterpretSettings,
+    Extents, Feature, InterpretSettings, NextPosition, Reason,
     arc::Arc,
     classify::{ExpectedView, ROUNDING_DEG},
 };
@@ -149,8 +149,8 @@ impl Planner<'_> {
             direction_deg: wrap_360(travel.to_angle().to_degrees() - arc.heading_deg),
             delta_m: travel.length(),
             decides,
-            least_plane_m: min_plane_m(range_m, travel.length(), half_width_m),
-            least_corner_m: min_corner_m(self.extents.half_beam_deg(), half_width_m),
+            min_plane_m: min_plane_m(range_m, travel.length(), half_width_m),
+            min_corner_m: min_corner_m(self.extents.half_beam_deg(), half_width_m),
         })
     }
 }

@@ -204,9 +204,8 @@ impl FeaturePrediction {
             .map(|line| {
                 let [only] = line.readings.as_slice() else { return false };
                 let beam = &beams[*only as usize];
-                maps.iter().any(|map| {
-                    self.assessment(beam, map).confidence < self.settings.min_confidence
-                })
+                maps.iter()
+                    .any(|map| self.assessment(beam, map).confidence < self.settings.min_confidence)
             })
             .collect();
         let mut contradicted = contradicted.into_iter();

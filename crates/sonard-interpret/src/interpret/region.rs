@@ -107,7 +107,8 @@ impl Finder<'_> {
     fn same(&self, a: BeamOutcome, b: BeamOutcome) -> bool {
         match (a, b) {
             (BeamOutcome::Echo(a), BeamOutcome::Echo(b)) => (a - b).abs() <= self.tolerance_m,
-            (BeamOutcome::BelowMinRange, BeamOutcome::BelowMinRange) | (BeamOutcome::NoEcho, BeamOutcome::NoEcho) => true,
+            (BeamOutcome::BelowMinRange, BeamOutcome::BelowMinRange)
+            | (BeamOutcome::NoEcho, BeamOutcome::NoEcho) => true,
             _ => false,
         }
     }

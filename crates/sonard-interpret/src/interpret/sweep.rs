@@ -151,7 +151,8 @@ pub(super) fn merge_repeats(scans: &[(Uuid, Sweep)]) -> Vec<(Uuid, Sweep)> {
         }
         let repeats: Vec<&Sweep> =
             scans[at..].iter().map(|(_, later)| later).filter(|later| same(later)).collect();
-        let mut beams: Vec<SweepBeam> = repeats.iter().flat_map(|sweep| sweep.beams.clone()).collect();
+        let mut beams: Vec<SweepBeam> =
+            repeats.iter().flat_map(|sweep| sweep.beams.clone()).collect();
         if repeats.len() > 1 {
             beams.sort_by(|a, b| a.azimuth_deg.total_cmp(&b.azimuth_deg));
             beams = beams.chunk_by(same_stop).map(merge_stop).collect();
@@ -184,7 +185,12 @@ fn same_stop(a: &SweepBeam, b: &SweepBeam) -> bool {
 }
 
 /// Beam with the position and direction of its transducer relative to the scan's pose.
-fn mounted(scan: &ScanView, ping: &Ping, beam: SweepBeam, pose: &Pose) -> Result<SweepBeam, SweepError> {
+fn mounted(
+    scan: &ScanView,
+    ping: &Ping,
+    beam: SweepBeam,
+    pose: &Pose,
+) -> Result<SweepBeam, SweepError> {
     let viewpoint = scan.viewpoint(ping).ok_or_else(|| SweepError::UnknownRanger {
         index: ping.index,
         id: ping.ranger.clone().unwrap_or_default(),
@@ -200,7 +206,7 @@ fn beam(ping: &Ping) -> Option<SweepBeam> {
         PingStatus::Echo => BeamOutcome::Echo(ping.range_m.filter(|r| r.is_finite() && *r > 0.0)?),
         PingStatus::MinRange => BeamOutcome::BelowMinRange,
         PingStatus::NoEcho => BeamOutcome::NoEcho,
-        PingStatus::LinkLost | PingStatus::StepDoubtful | PingStatus::ModuleFault => return None,
+        PingStatus::LinkLost | PingStatus::StepUncertain | PingStatus::ModuleFault => return None,
     };
     let azimuth_deg = Some(ping.azimuth_deg).filter(|azimuth| azimuth.is_finite())?;
     let azimuth_deg = wrap_360(azimuth_deg);
@@ -208,8 +214,9 @@ fn beam(ping: &Ping) -> Option<SweepBeam> {
 }
 
 fn merge_stop(same: &[SweepBeam]) -> SweepBeam {
-    let count =
-        |matches: fn(&BeamOutcome) -> bool| same.iter().filter(|beam| matches(&beam.outcome)).count();
+    let count = |matches: fn(&BeamOutcome) -> bool| {
+        same.iter().filter(|beam| matches(&beam.outcome)).count()
+    };
     let near = count(|outcome| matches!(outcome, BeamOutcome::BelowMinRange));
     let no_echo = count(|outcome| matches!(outcome, BeamOutcome::NoEcho));
     let echoes: Vec<f64> = same

@@ -57,7 +57,12 @@ impl Grid {
         let reading = |beam: &sonard_inverse::SweepFiring| {
             (beam.azimuth_deg, beam.outcome.range_m(self.sound_speed_m_s))
         };
-        sweep.beams.iter().filter(|beam| beam.outcome != FiringOutcome::BelowMinRange).map(reading).collect()
+        sweep
+            .beams
+            .iter()
+            .filter(|beam| beam.outcome != FiringOutcome::BelowMinRange)
+            .map(reading)
+            .collect()
     }
 
     /// Most likely pose after refinement of the four best grid poses.
@@ -249,7 +254,9 @@ impl Histograms {
             let beams = readings(world, &pose, 0.0, rng)?;
             let mut ranges: Ranges = vec![None; DIRECTIONS];
             let mut measured = Vec::new();
-            for beam in beams.into_iter().filter(|beam| beam.outcome != FiringOutcome::BelowMinRange) {
+            for beam in
+                beams.into_iter().filter(|beam| beam.outcome != FiringOutcome::BelowMinRange)
+            {
                 let read = beam.outcome.range_m(grid.sound_speed_m_s);
                 let direction = ((beam.azimuth_deg + heading_deg) / STEP_DEG).round();
                 ranges[direction.rem_euclid(DIRECTIONS as f64) as usize % DIRECTIONS] = read;

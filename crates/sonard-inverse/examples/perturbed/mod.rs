@@ -4,7 +4,7 @@ use std::{f64::consts::TAU, sync::Arc};
 
 use rand::{RngExt as _, SeedableRng as _};
 use rand_pcg::Pcg64;
-use sonard_inverse::{FitOptions, Parameter, Prior, Search, FitSweep, World};
+use sonard_inverse::{FitOptions, FitSweep, Parameter, Prior, Search, World};
 use sonard_model::{
     acoustics::{Air, Sensor},
     geometry::{DVec2, Pose},

@@ -3,7 +3,7 @@
 use rand::RngExt as _;
 use rand_distr::{Distribution as _, StandardNormal};
 use rand_pcg::Pcg64;
-use sonard_inverse::{SweepFiring, FiringOutcome, World};
+use sonard_inverse::{FiringOutcome, SweepFiring, World};
 use sonard_model::{
     acoustics::{EchoRise, TofNoise},
     geometry::{DVec2, Pose},
@@ -31,8 +31,10 @@ pub(crate) fn readings(
         let azimuth_deg = 360.0 * f64::from(at) / f64::from(BEAMS);
         let direction_rad = truth.direction_rad(pose, azimuth_deg);
         let factor = if sigma_db > 0.0 { threshold_factor(sigma_db, rng) } else { 1.0 };
-        let rise = point.hear(direction_rad, |firing| {
-            firing.listen(simulator.receiver(), |listening| listening.first_rise(factor, 0.0))
+        let rise = point.evaluate(direction_rad, |firing| {
+            firing.evaluate_thresholds(simulator.receiver(), |listening| {
+                listening.first_rise(factor, 0.0)
+            })
         });
         let late_us = noise.sample_us(rng);
         let heard = match rise.ok()? {

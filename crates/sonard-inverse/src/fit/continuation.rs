@@ -72,7 +72,8 @@ impl Fitter<'_> {
             }
         }
         // The observed scatter is reached and nothing moves: narrower stages change nothing.
-        let is_last = !is_turned && moved < 0.02 && errors.sigma_m > self.fit.initial_sigma_m * share;
+        let is_last =
+            !is_turned && moved < 0.02 && errors.sigma_m > self.fit.initial_sigma_m * share;
         Ok(SearchResult::Spread { values: listed(&self.values), errors, is_last })
     }
 

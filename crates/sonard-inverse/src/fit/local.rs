@@ -5,11 +5,11 @@ use std::slice;
 use nalgebra::DVector;
 use sonard_model::geometry::Pose;
 
-use super::{FitOptions, FitError, FitResult, Fitter, continuation::STAGES};
+use super::{FitError, FitOptions, FitResult, Fitter, continuation::STAGES};
 use crate::{
     candidates::Phases,
     likelihood::ErrorModel,
-    progress::{NoObserver, FitObserver},
+    progress::{FitObserver, NoObserver},
     sweep::FitSweep,
     world::{SimulatorSet, World},
 };

@@ -71,7 +71,7 @@ impl Fitter<'_> {
             return Ok(Vec::new());
         }
         let arcs = if self.fit.search == Search::Furnished { DRAWN_ARCS } else { 0.0 };
-        let errors = ErrorModel { arcs, ..widened(&self.rough_errors(), ROUGH) };
+        let errors = ErrorModel { outlier_arc_share: arcs, ..widened(&self.rough_errors(), ROUGH) };
         let errors = ErrorModel { sigma_m: ROUGH.0, sigma_db: ROUGH.1, ..errors };
         let mut rng = Pcg64::seed_from_u64(1);
         let sigmas = self.prior_sigmas();

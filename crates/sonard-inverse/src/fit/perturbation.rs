@@ -196,7 +196,11 @@ impl Fitter<'_> {
     }
 
     /// Improves a start by two sets of steps.
-    fn improved(&mut self, start: DVector<f64>, errors: &ErrorModel) -> Result<SearchResult, FitError> {
+    fn improved(
+        &mut self,
+        start: DVector<f64>,
+        errors: &ErrorModel,
+    ) -> Result<SearchResult, FitError> {
         self.values = start;
         for _ in 0..2 {
             let linear = self.linear()?;
@@ -318,7 +322,7 @@ pub(super) fn widened(
     ErrorModel {
         sigma_m: errors.sigma_m.max(sigma_m),
         sigma_db: errors.sigma_db.max(sigma_db),
-        clutter: errors.clutter.max(clutter),
+        outlier_share: errors.outlier_share.max(clutter),
         ..*errors
     }
 }

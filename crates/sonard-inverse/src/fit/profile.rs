@@ -153,7 +153,7 @@ impl Fitter<'_> {
         Ok(before.into_iter().rev().chain(behind).collect())
     }
 
-    /// LinearizedModel functional that measures the position along a direction, in prior standard
+    /// Linear functional that measures the position along a direction, in prior standard
     /// deviations.
     fn along(&self, direction: &DVector<f64>) -> DVector<f64> {
         let sigmas = self.prior_sigmas();
@@ -180,5 +180,5 @@ impl Fitter<'_> {
 }
 
 fn spread_by(errors: &ErrorModel, (sigma_m, sigma_db, clutter): (f64, f64, f64)) -> ErrorModel {
-    ErrorModel { sigma_m, sigma_db, clutter, ..*errors }
+    ErrorModel { sigma_m, sigma_db, outlier_share: clutter, ..*errors }
 }

@@ -51,7 +51,9 @@ impl Fitter<'_> {
         }
         let found = self.found(|fitter| fitter.polish(from));
         let (values, errors, log_posterior) = match one_of_many(found)? {
-            Some(SearchResult::End { values, errors, log_posterior }) => (values, errors, log_posterior),
+            Some(SearchResult::End { values, errors, log_posterior }) => {
+                (values, errors, log_posterior)
+            }
             Some(_) => return Err(FitError::OtherFit),
             None => return Ok(end),
         };

@@ -39,7 +39,7 @@ impl Fitter<'_> {
             // alone, and 0.72 with a tail of 10 % and twice the length.
             let sigma_m = median_m / (0.6745 + 0.455 * tail_share);
             let sigma_m = sigma_m.min(self.fit.initial_sigma_m).max(self.least_sigma_m());
-            ErrorModel { sigma_m, tail_share, ..spread }
+            ErrorModel { sigma_m, tail_weight: tail_share, ..spread }
         };
         let spread = likeliest(&mut TAILS.iter().map(of_tail), spread);
         let sigma_db_per_reflection =
@@ -63,16 +63,17 @@ fn of_clutter(residuals: &Residuals, errors: &ErrorModel) -> ErrorModel {
     let (prior, silent) = PRIOR_SILENT;
     let of_scene = (counts.all - counts.of_else).max(1.0);
     let clutter = (unexplained / of_scene).clamp(0.002, 0.5);
-    if errors.arcs == 0.0 {
-        return ErrorModel { clutter, ..*errors };
+    if errors.outlier_arc_share == 0.0 {
+        return ErrorModel { outlier_share: clutter, ..*errors };
     }
     let silences = counts.silent_of_else + silent_unexplained + prior * silent;
     ErrorModel {
-        clutter,
-        arcs: (counts.of_else / counts.all.max(1.0)).clamp(0.002, 0.7),
-        arc_beams: ((counts.staying + counts.leaving + arcs * beams) / (counts.leaving + arcs))
+        outlier_share: clutter,
+        outlier_arc_share: (counts.of_else / counts.all.max(1.0)).clamp(0.002, 0.7),
+        outlier_arc_beams: ((counts.staying + counts.leaving + arcs * beams)
+            / (counts.leaving + arcs))
             .clamp(2.0, 60.0),
-        clutter_silent: (silences / (counts.of_else + unexplained + prior)).clamp(0.05, 0.8),
+        outlier_no_echo_share: (silences / (counts.of_else + unexplained + prior)).clamp(0.05, 0.8),
         ..*errors
     }
 }

@@ -1,4 +1,4 @@
-//! FiringGeometry geometry, and slopes of the beam pattern off the axis.
+//! Geometry of a firing, and slopes of the beam pattern off the axis.
 
 use sonard_model::{
     acoustics::BeamPattern,
@@ -8,7 +8,7 @@ use sonard_model::{
 
 use crate::sweep::SweepFiring;
 
-/// FiringGeometry with its geometry.
+/// Firing with its simulator and geometry.
 pub(super) struct FiringGeometry<'a> {
     pub(super) simulator: &'a Simulator,
     /// Azimuth of the stepper, degrees.

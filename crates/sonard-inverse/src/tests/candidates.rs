@@ -34,7 +34,8 @@ fn jumps_from(here: &World, x_m: f64) -> u32 {
         listener.candidates(&point, direction_rad, &mut found).expect("paths");
         let mut read_m = |by_db: f64| {
             receiver.threshold = simulator.receiver().threshold * 10f64.powf(by_db / 20.0);
-            let read = point.hear(direction_rad, |ear| ear.detect(&receiver, Latch::First, 0.0));
+            let read =
+                point.evaluate(direction_rad, |ear| ear.detect(&receiver, Latch::First, 0.0));
             read.expect("paths").range_m
         };
         for at in -40..40 {
@@ -72,7 +73,7 @@ fn candidates_match_detections() {
             for by_db in [-9.3, -4.1, -1.7, 0.0, 0.8, 2.9, 6.2, 10.4] {
                 receiver.threshold = simulator.receiver().threshold * 10f64.powf(by_db / 20.0);
                 let read = point
-                    .hear(direction_rad, |ear| ear.detect(&receiver, Latch::First, 0.0))
+                    .evaluate(direction_rad, |ear| ear.detect(&receiver, Latch::First, 0.0))
                     .expect("paths");
                 let at = found.iter().position(|candidate| by_db < candidate.until_db);
                 let candidate = &found[at.unwrap_or(found.len() - 1)];

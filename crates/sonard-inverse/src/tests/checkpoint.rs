@@ -14,8 +14,9 @@ use sonard_model::{
 
 use super::{first_pose, recovery::sweep, world};
 use crate::{
-    CoarseGrid, CoarseGridError, ErrorModel, FitOptions, FitError, FitResult, SearchResult, FiringOutcome, Parameter, Prior, FitSweep,
-    NoObserver, FitObserver, World, fit_observed, locate_observed,
+    CoarseGrid, CoarseGridError, ErrorModel, FiringOutcome, FitError, FitObserver, FitOptions,
+    FitResult, FitSweep, NoObserver, Parameter, Prior, SearchResult, World, fit_observed,
+    locate_observed,
 };
 
 /// Observer that records results, and cancels after a number of them.
@@ -76,7 +77,7 @@ const PLACE: [(Parameter, f64); 3] =
 fn bits(fitted: &FitResult) -> Vec<u64> {
     let of = fitted.estimates.iter().flat_map(|estimate| [estimate.change, estimate.sigma]);
     let errors = &fitted.errors;
-    let further = [errors.sigma_m, errors.sigma_db, errors.clutter, fitted.log_posterior];
+    let further = [errors.sigma_m, errors.sigma_db, errors.outlier_share, fitted.log_posterior];
     let poses = fitted.poses.iter().flat_map(|pose| [pose.x_m, pose.y_m, pose.heading_deg]);
     let covariance = fitted.covariance.iter().copied();
     of.chain(further).chain(poses).chain(covariance).map(f64::to_bits).collect()
@@ -91,7 +92,10 @@ fn cancel_and_resume(parameters: &[(Parameter, f64)], every: usize) {
     let count = |kind: fn(&SearchResult) -> bool| all.iter().filter(|found| kind(found)).count();
     // Restarts, searches along two directions, and follows the best.
     assert!(count(|found| matches!(found, SearchResult::End { .. })) >= 6, "{all:?}");
-    assert!(count(|found| matches!(found, SearchResult::Place { .. } | SearchResult::Nothing)) >= 12, "{all:?}");
+    assert!(
+        count(|found| matches!(found, SearchResult::Place { .. } | SearchResult::Nothing)) >= 12,
+        "{all:?}"
+    );
     (0..all.len()).into_par_iter().step_by(every).for_each(|cut| {
         let keeper = Recorder::until(cut);
         let stopped = fit_observed(&here, &sweeps, &what, &[], &keeper);
@@ -151,6 +155,10 @@ fn search_for_poses_is_cancelled() {
         let watch = || Canceller { polls: AtomicUsize::new(0), max };
         let modes = locate_observed(&here, &atlas, &sweeps[0], &watch());
         assert_eq!(modes.err(), Some(FitError::Stopped), "{max}");
-        assert_eq!(CoarseGrid::observed(&here, 0.3, &watch()).err(), Some(CoarseGridError::Stopped), "{max}");
+        assert_eq!(
+            CoarseGrid::observed(&here, 0.3, &watch()).err(),
+            Some(CoarseGridError::Stopped),
+            "{max}"
+        );
     }
 }

@@ -16,7 +16,8 @@ fn fitted(noise_mm: f64) -> (FitResult, [f64; 3]) {
     let sweep = sweep(&here, &pose, &initial, 240, noise, 1);
     let of = |parameter, sigma| Prior { parameter, sigma };
     let priors = [(Parameter::X(0), 0.05), (Parameter::Y(0), 0.05), (Parameter::Heading(0), 4.0)];
-    let what = FitOptions::with_priors(priors.map(|(parameter, sigma)| of(parameter, sigma)).into(), 0.06);
+    let what =
+        FitOptions::with_priors(priors.map(|(parameter, sigma)| of(parameter, sigma)).into(), 0.06);
     let fitted = fit(&here, &[sweep], &what).expect("a fit");
     let found = fitted.poses[0];
     let off = [found.x_m - pose.x_m, found.y_m - pose.y_m, found.heading_deg - pose.heading_deg];

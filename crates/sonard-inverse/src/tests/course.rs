@@ -10,7 +10,7 @@ use sonard_model::{
 };
 
 use super::recovery::sweep;
-use crate::{CoarseGrid, Tracker, PoseMode, Odometry, FitSweep, World, locate};
+use crate::{CoarseGrid, FitSweep, Odometry, PoseMode, Tracker, World, locate};
 
 /// Room whose ends look alike when rotated by 180 degrees, with a short wall near its middle that
 /// breaks the symmetry.

@@ -10,7 +10,8 @@ use sonard_model::{
 
 use super::{first_pose, shipped, world};
 use crate::{
-    SceneMotion, Parameter, World, bearing::Bearing, jacobian::material_rate_db, length_derivative, walls,
+    Parameter, SceneMotion, World, bearing::Bearing, jacobian::material_rate_db, length_derivative,
+    walls,
 };
 
 /// Half step of a finite difference, metres.

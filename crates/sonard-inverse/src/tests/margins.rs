@@ -8,8 +8,8 @@ use sonard_model::{
 
 use super::world;
 use crate::{
-    SweepFiring, FiringOutcome, Parameter, FitSweep, World, candidates::Phases, jacobian::JacobianBuilder,
-    likelihood_terms::CandidateReading,
+    FiringOutcome, FitSweep, Parameter, SweepFiring, World, candidates::Phases,
+    jacobian::JacobianBuilder, likelihood_terms::CandidateReading,
 };
 
 const AT: Pose = Pose { x_m: 0.0, y_m: 0.0, heading_deg: 0.0 };
@@ -30,7 +30,9 @@ fn first_possible(
     step_deg: usize,
 ) -> Vec<CandidateReading> {
     let azimuths = (-40..=40).step_by(step_deg).map(f64::from);
-    let beams = azimuths.map(|azimuth_deg| SweepFiring { azimuth_deg, outcome: FiringOutcome::NoEcho }).collect();
+    let beams = azimuths
+        .map(|azimuth_deg| SweepFiring { azimuth_deg, outcome: FiringOutcome::NoEcho })
+        .collect();
     let sweep = FitSweep { scan: uuid::Uuid::nil(), pose: *pose, beams };
     let of: Vec<&Parameter> = parameters.iter().collect();
     let builder = JacobianBuilder::new(world, &of, world.air.sound_speed_m_s(), Phases::Known);

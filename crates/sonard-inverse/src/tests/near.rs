@@ -6,7 +6,7 @@ use rand_pcg::Pcg64;
 use sonard_model::{acoustics::EchoRise, geometry::Pose, reading::PingStatus};
 
 use super::{SIGMA_DB, as_read, before_a_wall};
-use crate::{SweepFiring, FiringOutcome, Hypotheses, Parameter, FitSweep, World};
+use crate::{FiringOutcome, FitSweep, Hypotheses, Parameter, SweepFiring, World};
 
 /// Just below the minimum range of 0.41 m: on the axis the echo falls into blanking, off it rises
 /// later.
@@ -23,8 +23,10 @@ fn read(here: &World, rng: &mut Pcg64) -> FitSweep {
     let point = simulator.at(at(0.0).position());
     let mut outcome = |azimuth_deg: f64| {
         let factor = 10f64.powf(normal.sample(rng) / 20.0);
-        let rise = point.hear(here.direction_rad(&at(0.0), azimuth_deg), |firing| {
-            firing.listen(simulator.receiver(), |listening| listening.first_rise(factor, 0.0))
+        let rise = point.evaluate(here.direction_rad(&at(0.0), azimuth_deg), |firing| {
+            firing.evaluate_thresholds(simulator.receiver(), |listening| {
+                listening.first_rise(factor, 0.0)
+            })
         });
         match rise.expect("paths") {
             Some(EchoRise { status: PingStatus::MinRange, .. }) => FiringOutcome::BelowMinRange,
@@ -35,8 +37,9 @@ fn read(here: &World, rng: &mut Pcg64) -> FitSweep {
         }
     };
     let azimuths_deg = (-60..60).map(|at| 0.25 * f64::from(at));
-    let beams =
-        azimuths_deg.map(|azimuth_deg| SweepFiring { azimuth_deg, outcome: outcome(azimuth_deg) }).collect();
+    let beams = azimuths_deg
+        .map(|azimuth_deg| SweepFiring { azimuth_deg, outcome: outcome(azimuth_deg) })
+        .collect();
     FitSweep { scan: uuid::Uuid::nil(), pose: at(0.0), beams }
 }
 

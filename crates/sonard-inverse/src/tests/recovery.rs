@@ -12,8 +12,8 @@ use uuid::Uuid;
 
 use super::{first_pose, world};
 use crate::{
-    CoarseGrid, SweepFiring, ErrorModel, FitOptions, ParameterGroup, FiringOutcome, PoseMode, Parameter, Prior, Search, FitSweep, World, fit,
-    fit_from, locate, priors,
+    CoarseGrid, ErrorModel, FiringOutcome, FitOptions, FitSweep, Parameter, ParameterGroup,
+    PoseMode, Prior, Search, SweepFiring, World, fit, fit_from, locate, priors,
 };
 
 /// Simulated sweep with noise, and with an initial pose.
@@ -207,7 +207,8 @@ fn position_on_a_ridge() {
             [-0.0930, -0.0975, -6.4, 0.0136, -3.91, 0.0150],
         ),
     ];
-    let spread = ErrorModel { clutter: 0.002, ..ErrorModel::rough(1e-3, 0.5, 4.0).without_arcs() };
+    let spread =
+        ErrorModel { outlier_share: 0.002, ..ErrorModel::rough(1e-3, 0.5, 4.0).without_arcs() };
     let mut missed = Vec::new();
     for (trial, seed) in
         on_ridges.into_iter().flat_map(|trial| (2..=3).map(move |seed| (trial, seed)))
@@ -463,7 +464,8 @@ fn sweep_is_located_at_unlikely_positions() {
         let noise = TofNoise::from_range_sigma_mm(1.0, here.air.sound_speed_m_s());
         let unknown = Pose { x_m: 0.0, y_m: 0.0, heading_deg: 0.0 };
         let swept = sweep(&here, &pose, &unknown, 400, noise, 1);
-        let atlas = CoarseGrid::new(&here, CoarseGrid::default_spacing_m(&here.scene)).expect("an atlas");
+        let atlas =
+            CoarseGrid::new(&here, CoarseGrid::default_spacing_m(&here.scene)).expect("an atlas");
         assert_found(&locate(&here, &atlas, &swept).expect("modes"), &pose);
     }
 }
@@ -486,7 +488,7 @@ fn another_unit_is_located_with_its_threshold() {
     let atlas = atlas.with_nuisance(priors.into_iter().chain([sensitivity]).collect());
     let modes = locate(&here, &atlas, &swept).expect("modes");
     assert_found(&modes[..1], &pose);
-    let [nuisance] = &modes[0].besides[..] else { panic!("{modes:?}") };
+    let [nuisance] = &modes[0].nuisance[..] else { panic!("{modes:?}") };
     assert_eq!(nuisance.name, "threshold_db");
     let off_db = nuisance.value - 20.0 * weak.sensor.threshold.log10();
     assert!(off_db.abs() < 1.0 && nuisance.sigma < 1.0, "{nuisance:?}: {off_db}");

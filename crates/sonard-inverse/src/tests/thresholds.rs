@@ -11,13 +11,16 @@ use sonard_model::{
 
 use super::{SIGMA_DB, as_read, before_a_wall};
 use crate::{
-    SweepFiring, ErrorModel, FiringOutcome, Hypotheses, Parameter, FitSweep, World, candidates::Phases,
-    jacobian::JacobianBuilder,
+    ErrorModel, FiringOutcome, FitSweep, Hypotheses, Parameter, SweepFiring, World,
+    candidates::Phases, jacobian::JacobianBuilder,
 };
 
 const AT: Pose = Pose { x_m: 0.0, y_m: 0.0, heading_deg: 0.0 };
 
-fn sweep(azimuths_deg: impl Iterator<Item = f64>, outcome: impl Fn(f64) -> FiringOutcome) -> FitSweep {
+fn sweep(
+    azimuths_deg: impl Iterator<Item = f64>,
+    outcome: impl Fn(f64) -> FiringOutcome,
+) -> FitSweep {
     let beam = |azimuth_deg| SweepFiring { azimuth_deg, outcome: outcome(azimuth_deg) };
     let beams = azimuths_deg.map(beam);
     FitSweep { scan: uuid::Uuid::nil(), pose: AT, beams: beams.collect() }
@@ -44,10 +47,12 @@ fn read(here: &World, every_deg: f64, rng: &mut Pcg64) -> FitSweep {
 fn rises(here: &World, azimuth_deg: f64, by_db: &[f64]) -> Vec<Option<EchoRise>> {
     let simulator = here.simulator(&AT).expect("a model");
     let direction_rad = here.direction_rad(&AT, azimuth_deg);
-    let detected = simulator.at(AT.position()).hear(direction_rad, |firing| {
+    let detected = simulator.at(AT.position()).evaluate(direction_rad, |firing| {
         let rise = |by_db: &f64| {
             let factor = 10f64.powf(by_db / 20.0);
-            firing.listen(simulator.receiver(), |listening| listening.first_rise(factor, 0.0))
+            firing.evaluate_thresholds(simulator.receiver(), |listening| {
+                listening.first_rise(factor, 0.0)
+            })
         };
         by_db.iter().map(rise).collect()
     });

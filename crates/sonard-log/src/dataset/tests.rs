@@ -45,7 +45,10 @@ fn generates_and_seals_a_set() {
     assert_eq!(set.missing().expect("readable"), [1, 3]);
     assert_eq!(set.write_manifest().expect("readable"), None);
     assert_eq!(names(&root), ["shard-00002", "spec.json"]);
-    assert_eq!(make_all(&set), [ShardOutcome::Generated, ShardOutcome::Existed, ShardOutcome::Generated]);
+    assert_eq!(
+        make_all(&set),
+        [ShardOutcome::Generated, ShardOutcome::Existed, ShardOutcome::Generated]
+    );
     let manifest = set.write_manifest().expect("writable").expect("whole");
     assert_eq!(manifest.shards, 3);
     assert_eq!(

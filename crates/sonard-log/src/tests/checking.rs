@@ -1,7 +1,7 @@
 //! Findings of the log check.
 
 use super::*;
-use crate::{FindingKind, Severity, LogTotals, check};
+use crate::{FindingKind, LogTotals, Severity, check_log};
 
 /// Line and kind of each finding.
 type Found = Vec<(u64, FindingKind)>;

@@ -10,7 +10,7 @@ use proptest::prelude::*;
 use sonard_records::{EventKind, encode_line};
 
 use super::*;
-use crate::{LogWriter, LogOutput, Recovered, StoreError};
+use crate::{LogOutput, LogWriter, Recovered, StoreError};
 
 /// File in memory with limited space, partial writes and optionally without truncation.
 #[derive(Debug, Default)]

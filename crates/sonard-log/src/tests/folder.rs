@@ -6,7 +6,7 @@ use jiff::Timestamp;
 use sonard_records::{Record, decode_line};
 use uuid::Uuid;
 
-use crate::{LogFolder, Rotation, check, load, log_files, open_for_reading};
+use crate::{LogFolder, Rotation, check_log, load, log_files, open_for_reading};
 
 const LOG: &str = include_str!("../../../../tests/fixtures/small.jsonl");
 

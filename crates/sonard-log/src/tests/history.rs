@@ -5,7 +5,7 @@ use std::{fs, io::Write as _, path::Path};
 use uuid::Uuid;
 
 use super::{LOG, folder};
-use crate::{LogIndex, ScanSpan, LoggedScan};
+use crate::{LogIndex, LoggedScan, ScanSpan};
 
 /// Lines of the fixture with scan number `n`.
 fn scan(n: u128) -> String {

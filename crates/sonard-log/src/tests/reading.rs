@@ -3,7 +3,7 @@
 use std::io::{self, BufRead, BufReader, Read};
 
 use proptest::prelude::*;
-use sonard_records::{RecordErrorKind, MAX_LINE_BYTES};
+use sonard_records::{MAX_LINE_BYTES, RecordErrorKind};
 
 use super::*;
 use crate::{Line, read_log};
@@ -70,7 +70,10 @@ fn memory_is_bounded() {
     assert_eq!(lines.len(), 3);
     assert_eq!(lines[1].length, 64 << 20);
     assert!(lines[1].bytes.capacity() <= 4 * MAX_LINE_BYTES, "{}", lines[1].bytes.capacity());
-    assert_eq!(lines[1].record.as_ref().err().map(|e| e.fault.kind), Some(RecordErrorKind::TooLong));
+    assert_eq!(
+        lines[1].record.as_ref().err().map(|e| e.fault.kind),
+        Some(RecordErrorKind::TooLong)
+    );
     assert!(lines[2].record.is_ok());
     assert_eq!(lines[2].offset, good.len() as u64 + (64 << 20) + 1);
 }

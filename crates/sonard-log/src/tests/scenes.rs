@@ -9,8 +9,8 @@ use uuid::Uuid;
 
 use super::{folder, records};
 use crate::{
-    LogIndex, LogFolder, LogWriter, MAX_LOGGED_SCENE_BYTES, Rotation, SceneUnavailable, load, log_files,
-    logged_scene,
+    LogFolder, LogIndex, LogWriter, MAX_LOGGED_SCENE_BYTES, Rotation, SceneUnavailable, load,
+    log_files, logged_scene,
 };
 
 fn simple_room() -> Scene {

@@ -103,7 +103,9 @@ impl ArrayError {
     #[must_use]
     pub fn help(&self) -> String {
         match self {
-            Self::Malformed { .. } => "start from a preset in the folder arrays/ of the source".into(),
+            Self::Malformed { .. } => {
+                "start from a preset in the folder arrays/ of the source".into()
+            }
             Self::OutOfRange { .. }
             | Self::Count { .. }
             | Self::MissingId { .. }

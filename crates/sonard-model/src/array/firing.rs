@@ -48,8 +48,9 @@ impl RangerArray {
         if self.firing_order.is_empty() {
             return (0..self.rangers.len()).map(|ranger| vec![ranger]).collect();
         }
-        let indices =
-            |turn: &FiringSlot| turn.ids().iter().filter_map(|id| self.index_of(id)).collect::<Vec<_>>();
+        let indices = |turn: &FiringSlot| {
+            turn.ids().iter().filter_map(|id| self.index_of(id)).collect::<Vec<_>>()
+        };
         self.firing_order.iter().map(indices).collect()
     }
 

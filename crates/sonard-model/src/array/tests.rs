@@ -178,7 +178,10 @@ fn course_from_poses_and_lines() {
     let course = RobotCourse::new(&poses, Some(&[5.0, 9.0])).expect("two poses");
     assert_eq!(course, RobotCourse::from_json_lines(text).expect("two lines"));
     assert_eq!(course.with_times(1.0).times_s(), [0.0, 4.0]);
-    assert_eq!(RobotCourse::new(&poses, None).expect("two poses").with_times(0.5).times_s(), [0.0, 2.0]);
+    assert_eq!(
+        RobotCourse::new(&poses, None).expect("two poses").with_times(0.5).times_s(),
+        [0.0, 2.0]
+    );
     for (poses, times_s, line, part) in [
         (&poses[..0], None, 1, "no pose"),
         (&poses[..], Some(&[1.0][..]), 2, "2 poses, but 1 times"),
@@ -195,8 +198,11 @@ fn course_from_poses_and_lines() {
 fn rounds_follow_and_rotate() {
     let mut array = preset("ring-12");
     array.interval_ms = 50.0;
-    array.firing_order =
-        vec![FiringSlot::Simultaneous(vec!["s0".into(), "s6".into()]), FiringSlot::from("s3"), FiringSlot::from("s0")];
+    array.firing_order = vec![
+        FiringSlot::Simultaneous(vec!["s0".into(), "s6".into()]),
+        FiringSlot::from("s3"),
+        FiringSlot::from("s0"),
+    ];
     assert_eq!(array.firing_times_s(0), [0.0; 0]);
     let expected = [0.0, 0.0, 0.05, 0.1, 0.15, 0.15, 0.2, 0.25];
     let times_s = array.firing_times_s(2);

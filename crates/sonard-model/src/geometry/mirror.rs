@@ -65,6 +65,9 @@ mod tests {
         let mirror = Mirror::through(DVec2::ZERO, DVec2::new(1.0, 3.0));
         let direction = DVec2::from_angle(0.4);
         let conjugate = DVec2::new(direction.x, -direction.y);
-        assert!((mirror.rotor().rotate(conjugate) - mirror.image_of_direction(direction)).length() < 1e-15);
+        assert!(
+            (mirror.rotor().rotate(conjugate) - mirror.image_of_direction(direction)).length()
+                < 1e-15
+        );
     }
 }

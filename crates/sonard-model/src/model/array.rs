@@ -242,7 +242,8 @@ impl ArrayAtPose<'_> {
         let aimed = |ranger: usize, end: usize| {
             let pose = self.mounted(ranger);
             let direction_rad = pose.direction_rad(0.0);
-            let places = simulator.sensor().mounting.transducer_positions(pose.position(), direction_rad);
+            let places =
+                simulator.sensor().mounting.transducer_positions(pose.position(), direction_rad);
             TransducerPose { place: places[end], direction_rad }
         };
         let firings = self.model.array.interfering_firings(firing, crosstalk.slots_back);

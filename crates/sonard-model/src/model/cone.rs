@@ -83,7 +83,7 @@ impl ConeArrivals<'_> {
 }
 
 impl Arrivals for ConeArrivals<'_> {
-    fn listen(&self, direction_rad: f64, arrivals: &mut Vec<PulseArrival>) {
+    fn collect_arrivals(&self, direction_rad: f64, arrivals: &mut Vec<PulseArrival>) {
         arrivals.clear();
         arrivals.extend(self.nearest(direction_rad).map(|arrival| PulseArrival {
             length_m: arrival.length_m,

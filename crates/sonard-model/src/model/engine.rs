@@ -72,9 +72,9 @@ pub trait Arrivals: Send + Sync {
     /// Replaces `arrivals` with those of a firing in world direction `direction_rad`, shortest path
     /// first, weighted with the beam pattern. Includes arrivals too weak to be detected, as far as
     /// the engine finds them.
-    fn listen(&self, direction_rad: f64, arrivals: &mut Vec<PulseArrival>);
+    fn collect_arrivals(&self, direction_rad: f64, arrivals: &mut Vec<PulseArrival>);
 
-    /// As [`listen`](Self::listen), limited to arrivals up to a length
+    /// As [`collect_arrivals`](Self::collect_arrivals), limited to arrivals up to a length
     /// there and back, in metres.
     fn collect_arrivals_within(
         &self,
@@ -82,7 +82,7 @@ pub trait Arrivals: Send + Sync {
         length_m: f64,
         arrivals: &mut Vec<PulseArrival>,
     ) {
-        self.listen(direction_rad, arrivals);
+        self.collect_arrivals(direction_rad, arrivals);
         arrivals.retain(|arrival| arrival.length_m <= length_m);
     }
 
@@ -109,10 +109,10 @@ pub trait Arrivals: Send + Sync {
     }
 
     /// Returns the full description of an arrival that
-    /// [`listen`](Self::listen) returned for the same direction.
+    /// [`collect_arrivals`](Self::collect_arrivals) returned for the same direction.
     fn arrival(&self, direction_rad: f64, arrival: &PulseArrival) -> Arrival;
 
-    /// Returns the incidence of an arrival that [`listen`](Self::listen)
+    /// Returns the incidence of an arrival that [`collect_arrivals`](Self::collect_arrivals)
     /// returned for the same direction. The full response of the face needs it for each arrival of
     /// a firing.
     fn incident(&self, direction_rad: f64, arrival: &PulseArrival) -> Incident {
@@ -136,7 +136,7 @@ pub trait Arrivals: Send + Sync {
     /// Returns all arrivals of a firing in full, shortest path first.
     fn arrivals(&self, direction_rad: f64) -> Vec<Arrival> {
         let mut arrivals = Vec::new();
-        self.listen(direction_rad, &mut arrivals);
+        self.collect_arrivals(direction_rad, &mut arrivals);
         arrivals.iter().map(|arrival| self.arrival(direction_rad, arrival)).collect()
     }
 }

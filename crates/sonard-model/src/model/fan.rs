@@ -64,9 +64,9 @@ pub struct FanSettings {
     /// Absorption of the air, decibels per metre.
     pub absorption_db_per_m: f64,
     /// Longest path there and back, metres.
-    pub longest_m: f64,
+    pub max_path_m: f64,
     /// Amplitude below which a path is dropped.
-    pub weakest: f64,
+    pub min_amplitude: f64,
     /// Maximum number of mirror reflections.
     pub max_order: u32,
 }
@@ -155,7 +155,7 @@ impl Fan {
             self.push_next(ray, index, position, &mut heap);
         }
         while let Some(event) = heap.pop() {
-            if event.distance_m > self.settings.longest_m {
+            if event.distance_m > self.settings.max_path_m {
                 return None;
             }
             match event.kind {

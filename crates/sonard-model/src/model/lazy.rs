@@ -74,7 +74,7 @@ pub(super) struct NearArrivals<'a> {
 }
 
 impl Arrivals for NearArrivals<'_> {
-    fn listen(&self, direction_rad: f64, arrivals: &mut Vec<PulseArrival>) {
+    fn collect_arrivals(&self, direction_rad: f64, arrivals: &mut Vec<PulseArrival>) {
         self.arrivals.collect_arrivals_within(direction_rad, self.reach_m, arrivals);
     }
 

@@ -14,7 +14,7 @@ use super::{
 };
 use crate::{
     acoustics::{
-        Detection, EchoTrace, Incident, Latch, DetectorBank, PulseArrival, Receiver, ReceiverNoise,
+        Detection, DetectorBank, EchoTrace, Incident, Latch, PulseArrival, Receiver, ReceiverNoise,
     },
     geometry::DVec2,
 };
@@ -54,7 +54,7 @@ impl<'a> ObservationPoint<'a> {
     ///
     /// # Errors
     /// As [`Self::ping`].
-    pub fn hear<T>(
+    pub fn evaluate<T>(
         &self,
         direction_rad: f64,
         detect: impl FnMut(&FiringArrivals) -> T,
@@ -103,7 +103,7 @@ impl<'a> ObservationPoint<'a> {
         let mut arrivals = Vec::with_capacity(USUAL_ARRIVALS);
         self.at(direction_rad, |all| {
             let ((result, needed_m), _) = all.nearest(|near| {
-                near.listen(direction_rad, &mut arrivals);
+                near.collect_arrivals(direction_rad, &mut arrivals);
                 let firing = FiringArrivals {
                     firing: DirectedArrivals { from: near, direction_rad },
                     arrivals: &arrivals,
@@ -140,7 +140,7 @@ impl<'a> ObservationPoint<'a> {
         let (receiver, mut own) = (self.simulator.receiver(), Vec::new());
         self.at(direction_rad, |all| {
             let ((detection, sorted, needed_m), near) = all.nearest(|near| {
-                near.listen(direction_rad, &mut own);
+                near.collect_arrivals(direction_rad, &mut own);
                 let sorted = mixed.sorted(&own);
                 let firing = DirectedArrivals { from: near, direction_rad };
                 let incident = |arrival: &PulseArrival| {
@@ -267,7 +267,11 @@ impl<'a> ObservationPoint<'a> {
             return visit(all);
         }
         let mounting = &self.simulator.sensor().mounting;
-        visit(&self.simulator.arrivals_between(mounting.transducer_positions(self.position, direction_rad)))
+        visit(
+            &self
+                .simulator
+                .arrivals_between(mounting.transducer_positions(self.position, direction_rad)),
+        )
     }
 }
 
@@ -298,7 +302,11 @@ impl FiringArrivals<'_> {
     }
 
     /// Evaluates receivers that differ from `receiver` in their thresholds only.
-    pub fn listen<T>(&self, receiver: &Receiver, detect: impl FnOnce(&mut DetectorBank) -> T) -> T {
+    pub fn evaluate_thresholds<T>(
+        &self,
+        receiver: &Receiver,
+        detect: impl FnOnce(&mut DetectorBank) -> T,
+    ) -> T {
         let incident = |arrival: &PulseArrival| Some(self.firing.incident(arrival));
         let incident: &dyn Fn(&PulseArrival) -> Option<Incident> =
             if receiver.needs_incidents() { &incident } else { &|_| None };
@@ -336,7 +344,7 @@ struct DirectedArrivals<'a> {
 impl DirectedArrivals<'_> {
     fn arrivals(&self) -> Vec<PulseArrival> {
         let mut arrivals = Vec::new();
-        self.from.listen(self.direction_rad, &mut arrivals);
+        self.from.collect_arrivals(self.direction_rad, &mut arrivals);
         arrivals
     }
 

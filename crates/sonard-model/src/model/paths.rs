@@ -7,7 +7,7 @@
 //! images grows without bounds, but few are visible from the receiver. Beam tracing finds only
 //! those (Heckbert and Hanrahan 1984; Funkhouser et al., JASA 115, 2004). A beam is the set of all
 //! rays from one image that were reflected by the same walls. The floor plan is triangulated once,
-//! with the walls as sides of triangles (`plan`). A beam walks from triangle to triangle. At the
+//! with the walls as sides of triangles (`floor`). A beam walks from triangle to triangle. At the
 //! far corner of a triangle it splits in two; at a wall it continues from the next image.
 //! Visibility therefore needs no search: a beam crosses exactly what its rays see, and a step costs
 //! the same in a plan of ten walls and of ten thousand. Each ray from the source is in exactly one
@@ -41,7 +41,7 @@
 //!
 //! Free ends and corners other than `pi / m` diffract sound (`diffraction`): all echoes with one
 //! diffraction and any reflections before and after, and on request
-//! ([`Settings::double_diffraction`]) with two. The strength is that of
+//! ([`PathSettings::double_diffraction`]) with two. The strength is that of
 //! [`crate::acoustics::edge`].
 //!
 //! # Cylinders
@@ -54,7 +54,7 @@
 //! where an engine supplies it. Between a round body and a wall next to it that is a dozen. The
 //! amplitude floor of echoes that touch cylinders more than once is ten times that of the others.
 //!
-//! Thin free-standing cylinders are posts (`plan`). Like an edge they diffract from a point, their
+//! Thin free-standing cylinders are posts (`floor`). Like an edge they diffract from a point, their
 //! axis, by the exact series of cylindrical waves, and beams pass them. For thicker cylinders the
 //! creeping wave and the field in the shadow are omitted. Head-on at a cylinder of 5 cm and 49.4
 //! kHz (`ka = 23`) the creeping wave is 48 dB below the mirror's echo (from the series, in the
@@ -92,7 +92,7 @@
 //! # Layers
 //!
 //! Each mechanism has a folder and data of its own; ARCHITECTURE.md lists their order, lowest
-//! first. `echo` and `settings` are at the bottom, then the `plan` of the scene, `beams` in it and
+//! first. `echo` and `settings` are at the bottom, then the `floor` of the scene, `beams` in it and
 //! the mechanisms built on beams. On top `enumerate` runs every mechanism in turn, and
 //! `interactions` reconstructs the surfaces along a path.
 
@@ -105,11 +105,11 @@ mod echo;
 mod effort;
 mod engine;
 mod enumerate;
+mod floor;
 mod found;
 mod height;
 mod interactions;
 mod pattern;
-mod plan;
 mod prepare;
 mod rays;
 mod scattering;
@@ -124,4 +124,4 @@ pub(super) use crosstalk::{CrosstalkPaths, TransducerPose};
 pub use engine::PathEngine;
 pub use interactions::EchoPath;
 pub use prepare::Paths;
-pub use settings::{DEFAULT_REPEATED_CONTACT_RATIO, Settings, usual_z_m};
+pub use settings::{DEFAULT_REPEATED_CONTACT_RATIO, PathSettings, default_sensor_z_m};

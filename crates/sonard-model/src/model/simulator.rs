@@ -107,7 +107,7 @@ impl RangerSetup {
         &self,
         scene: &Scene,
         face: Option<Disc>,
-        settings: paths::Settings,
+        settings: paths::PathSettings,
     ) -> PathEngine {
         let engine = PathEngine::new(scene, self.beam.clone(), face, settings);
         engine.through_nulls(self.receiver.needs_incidents())
@@ -215,7 +215,7 @@ impl Simulator {
     /// Returns the settings of [`paths::Paths`] for this sensor, air and options; for another
     /// engine with the defaults of `paths`.
     #[must_use]
-    pub fn path_settings(&self) -> paths::Settings {
+    pub fn path_settings(&self) -> paths::PathSettings {
         let options = self.ranger.options.engine.paths().copied().unwrap_or_default();
         let RangerSetup { sensor, air, receiver, scatter_height_rad, .. } = &self.ranger;
         path_settings(sensor, air, &options, receiver, *scatter_height_rad)
@@ -225,7 +225,7 @@ impl Simulator {
     /// `None` if the simulator's own engine is not `paths`.
     pub(super) fn stray_engine(&self, max_path_m: f64) -> Option<PathEngine> {
         self.ranger.options.engine.paths()?;
-        let settings = paths::Settings { max_path_m, direct: true, ..self.path_settings() };
+        let settings = paths::PathSettings { max_path_m, direct: true, ..self.path_settings() };
         Some(self.ranger.path_engine(&self.scene, None, settings))
     }
 
@@ -258,7 +258,7 @@ impl Simulator {
 pub fn sensor_z_m(scene: &Scene, sensor: &Sensor) -> Option<f64> {
     let (floor_z_m, ceiling_z_m) = (scene.floor_z_m, scene.ceiling_z_m);
     floor_z_m.or(ceiling_z_m)?;
-    Some(sensor.mounting.z_m.unwrap_or_else(|| paths::usual_z_m(floor_z_m, ceiling_z_m)))
+    Some(sensor.mounting.z_m.unwrap_or_else(|| paths::default_sensor_z_m(floor_z_m, ceiling_z_m)))
 }
 
 #[cfg(test)]

@@ -140,7 +140,8 @@ impl FloorPlan {
             (at(piece.ends[0]) - a).dot(b - a)
         };
         pieces.sort_by(|p, q| p.segment.cmp(&q.segment).then(along(p).total_cmp(&along(q))));
-        let continues = |p: &SegmentPiece, q: &SegmentPiece| p.segment == q.segment && p.ends[1] == q.ends[0];
+        let continues =
+            |p: &SegmentPiece, q: &SegmentPiece| p.segment == q.segment && p.ends[1] == q.ends[0];
         let whole = |stretch: &[SegmentPiece]| {
             let (wall, ends) =
                 (stretch[0].segment, [stretch[0].ends[0], stretch[stretch.len() - 1].ends[1]]);
@@ -289,7 +290,10 @@ fn covered(scene: &Scene, arrangement: &Arrangement) -> Vec<PlanChange> {
             }
         }
     }
-    found.into_iter().map(|((wall, by), length_m)| PlanChange::Covered { wall, by, length_m }).collect()
+    found
+        .into_iter()
+        .map(|((wall, by), length_m)| PlanChange::Covered { wall, by, length_m })
+        .collect()
 }
 
 fn share_heights(a: &Wall, b: &Wall) -> bool {

@@ -6,7 +6,7 @@ use sonard_model::{
     geometry::{DVec2, wrap_pi},
     model::{
         Mechanism, Reflector,
-        paths::{EchoPath, Settings},
+        paths::{EchoPath, PathSettings},
     },
 };
 
@@ -52,7 +52,7 @@ fn is_same(a: &EchoPath, b: &EchoPath, turned: Turned) -> bool {
 pub(crate) fn assert_has_all(
     all: &[EchoPath],
     of: &[EchoPath],
-    settings: &Settings,
+    settings: &PathSettings,
     turned: Turned,
 ) {
     for echo in of.iter().filter(|echo| is_well_within(echo, settings)) {
@@ -63,7 +63,7 @@ pub(crate) fn assert_has_all(
 
 /// Asserts that two listings have the same echoes, apart from those at their very limits.
 #[track_caller]
-pub(crate) fn assert_same(a: &[EchoPath], b: &[EchoPath], settings: &Settings, turned: Turned) {
+pub(crate) fn assert_same(a: &[EchoPath], b: &[EchoPath], settings: &PathSettings, turned: Turned) {
     assert_has_all(b, a, settings, turned);
     let back = Turned { by_rad: -turned.by_rad, ..turned };
     assert_has_all(a, b, settings, back);
@@ -73,18 +73,18 @@ pub(crate) fn assert_same(a: &[EchoPath], b: &[EchoPath], settings: &Settings, t
 }
 
 /// Returns `true` if an echo is above its floor and within reach by more than rounding.
-pub(crate) fn is_well_within(echo: &EchoPath, settings: &Settings) -> bool {
+pub(crate) fn is_well_within(echo: &EchoPath, settings: &PathSettings) -> bool {
     echo.amplitude > 1.0001 * floor_of(echo, settings) && echo.length_m < settings.max_path_m - 1e-6
 }
 
 /// Amplitude floor of the listing for such paths.
-pub(crate) fn floor_of(echo: &EchoPath, settings: &Settings) -> f64 {
+pub(crate) fn floor_of(echo: &EchoPath, settings: &PathSettings) -> f64 {
     let is_round = |m: &Mechanism| matches!(m, Mechanism::Reflection(Reflector::Cylinder(_)));
     let is_bend = |m: &Mechanism| matches!(m, Mechanism::Diffraction(_));
     let contacts = echo.path.mechanisms().filter(is_round).count();
     let diffractors = echo.path.mechanisms().filter(is_bend).count();
     let is_kept = contacts < 2 && (contacts == 0 || diffractors == 0);
-    if is_kept { settings.floor } else { settings.repeated_contacts_above * settings.floor }
+    if is_kept { settings.floor } else { settings.repeated_contact_ratio * settings.floor }
 }
 
 fn nearest<'a>(all: &'a [EchoPath], echo: &EchoPath) -> Option<&'a EchoPath> {

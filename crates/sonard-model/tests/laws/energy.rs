@@ -2,7 +2,7 @@
 
 use rand::RngExt;
 use sonard_model::{
-    model::paths::{EchoPath, Settings},
+    model::paths::{EchoPath, PathSettings},
     reading::PathKind,
 };
 
@@ -14,7 +14,7 @@ use crate::{
 #[test]
 fn mirrored_echoes_gain_nothing() {
     on_random_worlds("strength", WITH_LEGS_PAIR, |world, _| {
-        let lossless = Settings { absorption_np_per_m: 0.0, max_path_m: 3.0, ..settings() };
+        let lossless = PathSettings { absorption_np_per_m: 0.0, max_path_m: 3.0, ..settings() };
         let rigid = world.with_reflectance(|_| 1.0);
         let mirrored = |echo: &EchoPath| echo.path.kind() == PathKind::Specular;
         for echo in rigid.echoes(&lossless).into_iter().filter(mirrored) {
@@ -53,8 +53,10 @@ fn absorption_grows_with_length() {
     on_random_worlds("air", WITH_LEGS_PAIR, |world, random| {
         let more_np_per_m = random.random_range(0.0..0.3);
         let own = settings();
-        let dull =
-            Settings { absorption_np_per_m: own.absorption_np_per_m + more_np_per_m, ..settings() };
+        let dull = PathSettings {
+            absorption_np_per_m: own.absorption_np_per_m + more_np_per_m,
+            ..settings()
+        };
         let (loud, faint) = (world.echoes(&own), world.echoes(&dull));
         let weakened: Vec<_> = loud
             .into_iter()

@@ -3,7 +3,7 @@
 use rand::{Rng, RngExt};
 use sonard_model::{
     geometry::DVec2,
-    model::paths::{EchoPath, Settings},
+    model::paths::{EchoPath, PathSettings},
 };
 
 use crate::{
@@ -59,7 +59,7 @@ fn reverse_paths_are_listed() {
 /// nothing else.
 #[test]
 fn pair_in_a_rectangle() {
-    let listed = Settings {
+    let listed = PathSettings {
         max_path_m: 6.0,
         floor: 1e-4,
         edge_law: None,
@@ -134,7 +134,7 @@ fn longer_range_only_adds() {
         (WITH_HEIGHTS_AND_LEGS_PAIR, "range heights"),
     ] {
         on_random_worlds(name, kind, |world, random| {
-            let near = Settings { max_path_m: random.random_range(1.0..4.5), ..settings() };
+            let near = PathSettings { max_path_m: random.random_range(1.0..4.5), ..settings() };
             let within: Vec<_> = world
                 .echoes(&settings())
                 .into_iter()
@@ -153,7 +153,7 @@ fn lower_floor_only_adds() {
         (WITH_HEIGHTS_AND_LEGS_PAIR, "floor heights"),
     ] {
         on_random_worlds(name, kind, |world, random| {
-            let loud = Settings { floor: random.random_range(0.01..0.05), ..settings() };
+            let loud = PathSettings { floor: random.random_range(0.01..0.05), ..settings() };
             let above = |echoes: Vec<EchoPath>| -> Vec<EchoPath> {
                 echoes.into_iter().filter(|e| e.amplitude >= floor_of(e, &loud)).collect()
             };
@@ -174,7 +174,7 @@ fn higher_order_only_adds() {
     ] {
         on_random_worlds(name, kind, |world, random| {
             let bound = random.random_range(0..5);
-            let low = Settings { max_order: Some(bound), ..settings() };
+            let low = PathSettings { max_order: Some(bound), ..settings() };
             let up_to: Vec<_> = world
                 .echoes(&settings())
                 .into_iter()

@@ -6,7 +6,7 @@ use sonard_model::{
     geometry::{DVec2, wrap_pi},
     model::{
         Mechanism, Reflector,
-        paths::{EchoPath, Settings},
+        paths::{EchoPath, PathSettings},
     },
 };
 
@@ -77,7 +77,7 @@ fn normal_at(world: &World, surface: Reflector, at: DVec2) -> DVec2 {
 #[test]
 fn paths_are_clear_of_obstacles() {
     let crowded = Kind { partitions: 0, rounds: 3, ..FURNISHED };
-    let deep = Settings { floor: 0.004, max_path_m: 3.0, ..settings() };
+    let deep = PathSettings { floor: 0.004, max_path_m: 3.0, ..settings() };
     for (kind, name, settings) in [
         (FURNISHED_PAIR, "clear", settings()),
         (WITH_LEGS_PAIR, "clear legs", settings()),
@@ -95,7 +95,8 @@ fn paths_are_clear_of_obstacles() {
 /// Three cylinders in the open, each of which hides some of the others.
 #[test]
 fn paths_by_three_cylinders() {
-    let listed = Settings { floor: 1e-3, absorption_np_per_m: 0.0, max_path_m: 8.0, ..settings() };
+    let listed =
+        PathSettings { floor: 1e-3, absorption_np_per_m: 0.0, max_path_m: 8.0, ..settings() };
     for case in 0..cases() {
         let mut random = generator("three", case);
         let mut world =

@@ -1,7 +1,7 @@
 //! Rough walls, whose patches scatter with individual phases.
 
 use rand::RngExt;
-use sonard_model::{geometry::DVec2, model::paths::Settings};
+use sonard_model::{geometry::DVec2, model::paths::PathSettings};
 
 use crate::{
     compare::{AS_IS, Turned, assert_same},
@@ -17,14 +17,14 @@ const ROUGH: Kind = Kind {
     has_heights: false,
 };
 
-fn listed() -> Settings {
-    Settings { edge_law: None, floor: 0.005, max_path_m: 4.0, ..settings() }
+fn listed() -> PathSettings {
+    PathSettings { edge_law: None, floor: 0.005, max_path_m: 4.0, ..settings() }
 }
 
 /// Settings of the comparison: the last patches before the maximum range may be cut there, by a
 /// hand's breadth.
-fn compared() -> Settings {
-    Settings { max_path_m: 3.9, ..listed() }
+fn compared() -> PathSettings {
+    PathSettings { max_path_m: 3.9, ..listed() }
 }
 
 #[test]

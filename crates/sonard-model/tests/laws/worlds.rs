@@ -9,7 +9,7 @@ use rand_pcg::Pcg64;
 use sonard_model::{
     acoustics::edge::EdgeLaw,
     geometry::{DVec2, distance_to_segment},
-    model::paths::{DEFAULT_REPEATED_CONTACT_RATIO, EchoPath, Paths, Settings},
+    model::paths::{DEFAULT_REPEATED_CONTACT_RATIO, EchoPath, PathSettings, Paths},
     scene::{Scene, SceneBuilder},
 };
 
@@ -150,13 +150,13 @@ impl Drop for FailureReport<'_> {
 }
 
 /// Settings of the listings: paths to 5 m by UTD, with usual absorption in air.
-pub(crate) fn settings() -> Settings {
-    Settings {
+pub(crate) fn settings() -> PathSettings {
+    PathSettings {
         max_path_m: 5.0,
         max_order: None,
         floor: 0.01,
-        repeated_contacts_above: DEFAULT_REPEATED_CONTACT_RATIO,
-        crowded_m: 0.0,
+        repeated_contact_ratio: DEFAULT_REPEATED_CONTACT_RATIO,
+        unrestricted_m: 0.0,
         edge_law: Some(EdgeLaw::Utd),
         double_diffraction: false,
         absorption_np_per_m: 0.19,
@@ -294,10 +294,10 @@ impl World {
     }
 
     /// Lists all echoes.
-    pub(crate) fn echoes(&self, settings: &Settings) -> Vec<EchoPath> {
+    pub(crate) fn echoes(&self, settings: &PathSettings) -> Vec<EchoPath> {
         let [transmitter, receiver] = self.ends;
         let sensor_z_m = self.heights.map(|heights| heights.sensor_z_m);
-        let paths = Paths::new(&self.scene(), Settings { sensor_z_m, ..settings.clone() });
+        let paths = Paths::new(&self.scene(), PathSettings { sensor_z_m, ..settings.clone() });
         paths.enumerate_between(transmitter, receiver).expect("few paths")
     }
 }

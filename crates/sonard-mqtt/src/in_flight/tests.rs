@@ -188,7 +188,10 @@ fn checkpoint_is_due_by_time_or_count() {
     assert_eq!(bench.queue.due_checkpoint(after(1999)), None);
     assert_eq!(bench.queue.due_checkpoint(after(2000)), Some(&place(1)));
     bench.queue.checkpointed(&place(1), after(2000));
-    assert_eq!((bench.queue.due_checkpoint(after(9000)), bench.queue.final_checkpoint()), (None, None));
+    assert_eq!(
+        (bench.queue.due_checkpoint(after(9000)), bench.queue.final_checkpoint()),
+        (None, None)
+    );
     for _ in 0..1000 {
         bench.give(1);
         bench.acknowledge(0);

@@ -1,7 +1,7 @@
 //! Calibration of the probabilities in random rooms, with the complete receiver.
 
-use super::{ClassifiedArc, Reliability, ArcCause, classify_room};
-use sonard_interpret::interpret::{Probabilities, InterpretSettings};
+use super::{ArcCause, ClassifiedArc, Reliability, classify_room};
+use sonard_interpret::interpret::{InterpretSettings, Probabilities};
 use sonard_model::acoustics::Sensor;
 
 fn classified(seed: u64, rooms: u64) -> Vec<ClassifiedArc> {
@@ -61,9 +61,11 @@ fn statistics_match_their_definitions() {
     assert!((brier - (first + second) / 8.0).abs() < 1e-12, "{brier}");
 
     let certain = Probabilities { edge: 1.0, ..Probabilities::default() };
-    let right = Reliability::from_arcs(&[ClassifiedArc { probabilities: certain, truth: ArcCause::Edge }]);
+    let right =
+        Reliability::from_arcs(&[ClassifiedArc { probabilities: certain, truth: ArcCause::Edge }]);
     assert_eq!((right.expected_error, right.brier, right.bins[9].count), (0.0, 0.0, 1));
-    let wrong = Reliability::from_arcs(&[ClassifiedArc { probabilities: certain, truth: ArcCause::Other }]);
+    let wrong =
+        Reliability::from_arcs(&[ClassifiedArc { probabilities: certain, truth: ArcCause::Other }]);
     assert_eq!((wrong.expected_error, wrong.brier), (0.5, 0.5));
     assert_eq!(Reliability::from_arcs(&[]).brier, 0.0);
 }

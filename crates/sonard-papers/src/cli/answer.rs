@@ -14,7 +14,7 @@ pub(crate) const RULED: TableStyle = TableStyle::new()
     .bottom_border(LineStyle::none().fill('─').junction('─'));
 
 /// Prints records as JSON Lines, or formatted by `table`. A closed pipe is not an error.
-pub(crate) fn answer<T: Serialize>(
+pub(crate) fn print_result<T: Serialize>(
     json: bool,
     records: impl IntoIterator<Item = T>,
     table: impl FnOnce(&mut StdoutLock<'_>) -> io::Result<()>,

@@ -19,7 +19,7 @@ use sonard_model::{
 };
 use sonard_papers::{
     explore::{
-        Exploration, ExploreSettings, SonarLayout, RobotSettings, Sensing, SimulatedRobot, Stop,
+        Exploration, ExploreSettings, RobotSettings, Sensing, SimulatedRobot, SonarLayout, Stop,
         explore_observed,
     },
     pictures::draw_exploration,
@@ -28,7 +28,7 @@ use sonard_plot::{PlotError, animate};
 
 use super::{
     Failure, Outcome,
-    answer::answer,
+    answer::print_result,
     input::{AcousticArgs, PlaceArgs},
     output::{Overwrite, line_record, make_folder},
     progress,
@@ -149,7 +149,7 @@ pub(crate) fn run(args: &Args) -> Outcome {
     if let Some(folder) = &args.out {
         write_all((folder, args.overwrite), &made, sensing, scene)?;
     }
-    answer(args.json, [&summary], |out| summary.print(out))?;
+    print_result(args.json, [&summary], |out| summary.print(out))?;
     if made.finished {
         return Ok(());
     }
@@ -240,7 +240,7 @@ pub(crate) struct Summary {
     pub(crate) laser_shots: u32,
     pub(crate) sonar_readings: usize,
     pub(crate) travel_m: f64,
-    pub(crate) bumps: u32,
+    pub(crate) collisions: u32,
     pub(crate) lines: usize,
     #[serde(flatten)]
     pub(crate) error: MapError,
@@ -256,7 +256,7 @@ impl Summary {
             laser_shots: made.laser_shots,
             sonar_readings: made.sonar_readings,
             travel_m: made.travel_m,
-            bumps: made.collisions,
+            collisions: made.collisions,
             lines: made.lines().len(),
             error: map_error(made.lines(), scene),
         }
@@ -271,7 +271,7 @@ impl Summary {
             self.travel_m,
             self.laser_shots,
             self.sonar_readings,
-            self.bumps
+            self.collisions
         )?;
         writeln!(
             out,

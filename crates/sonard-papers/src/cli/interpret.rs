@@ -13,7 +13,7 @@ use sonard_papers::{
 
 use super::{
     Outcome,
-    answer::{RULED, answer},
+    answer::{RULED, print_result},
     input::load_sensor,
     output::PictureArgs,
     progress,
@@ -70,9 +70,9 @@ struct Answer {
 
 #[derive(Debug, Serialize)]
 struct Row {
-    claims: usize,
-    claimed: f64,
-    came_true: f64,
+    count: usize,
+    mean_predicted: f64,
+    observed: f64,
 }
 
 pub(crate) fn run(args: &Args) -> Outcome {
@@ -88,7 +88,7 @@ pub(crate) fn run(args: &Args) -> Outcome {
     bar.finish_and_clear();
     let reliability = Reliability::from_arcs(&arcs);
     let found = Answer::new(args, arcs.len(), &reliability);
-    answer(args.json, [&found], |out| found.print(out))?;
+    print_result(args.json, [&found], |out| found.print(out))?;
     let lines = [found.summary(), format!("{} with its complete receiver", sensor.name)];
     let picture = draw_reliability("Probabilities of planes, corners, edges", &lines, &reliability);
     args.picture.write(&picture)
@@ -97,9 +97,9 @@ pub(crate) fn run(args: &Args) -> Outcome {
 impl Answer {
     fn new(args: &Args, arcs: usize, reliability: &Reliability) -> Self {
         let bins = reliability.bins.iter().map(|bin| Row {
-            claims: bin.count,
-            claimed: bin.mean_predicted,
-            came_true: bin.observed,
+            count: bin.count,
+            mean_predicted: bin.mean_predicted,
+            observed: bin.observed,
         });
         Self {
             rooms: args.trials,
@@ -122,13 +122,12 @@ impl Answer {
         let mut table = Table::new();
         table.load_style(RULED).set_header(["bin", "mean predicted", "observed", "count"]);
         for (bin, row) in self.bins.iter().enumerate() {
-            let share =
-                |share: f64| if row.claims > 0 { format!("{share:.3}") } else { "-".into() };
+            let share = |share: f64| if row.count > 0 { format!("{share:.3}") } else { "-".into() };
             table.add_row([
                 format!("{:.1} to {:.1}", bin as f64 / 10.0, (bin + 1) as f64 / 10.0),
-                share(row.claimed),
-                share(row.came_true),
-                row.claims.to_string(),
+                share(row.mean_predicted),
+                share(row.observed),
+                row.count.to_string(),
             ]);
         }
         for column in table.column_iter_mut().skip(1) {

@@ -24,13 +24,15 @@ use sonard_model::{
     model::{Options, PathOptions, Simulator},
     scene::{Scene, shipped},
 };
-use sonard_papers::trial::{Arrangement, SimulatedCourse, MappingTrial, TrialSettings, random_room};
+use sonard_papers::trial::{
+    Arrangement, MappingTrial, SimulatedCourse, TrialSettings, random_room,
+};
 use sonard_plot::{MapView, badge_for, draw_map};
 use sonard_records::Provenance;
 
 use super::{
     Failure, Outcome,
-    answer::{RULED, answer},
+    answer::{RULED, print_result},
     output::{Overwrite, make_folder},
     progress,
 };
@@ -127,7 +129,7 @@ pub(crate) fn run(args: &Args) -> Outcome {
         make_folder(folder)?;
     }
     let rows = trials(args)?;
-    answer(args.json, &rows, |out| print(out, &rows))
+    print_result(args.json, &rows, |out| print(out, &rows))
 }
 
 /// Maps all courses in parallel.

@@ -25,7 +25,7 @@ use sonard_papers::{
 
 use super::{
     Failure, Outcome,
-    answer::{RULED, answer},
+    answer::{RULED, print_result},
     explore::{RobotArgs, Summary, explored, write_all},
     output::Overwrite,
     progress,
@@ -81,7 +81,7 @@ pub(crate) fn run(args: &Args) -> Outcome {
         (0..args.rooms).into_par_iter().map(|number| room(args, number, &bar)).collect();
     bar.finish_and_clear();
     let rows: Vec<Row> = rooms?.into_iter().flatten().collect();
-    answer(args.json, &rows, |out| print(out, &rows))
+    print_result(args.json, &rows, |out| print(out, &rows))
 }
 
 /// Explores summary room with each kind of sensing.
@@ -187,7 +187,7 @@ fn line(room: &str, sensing: Sensing, group: &[&Summary]) -> Vec<String> {
         sensing.name().into(),
         format!("{:.0}", mean(group, |summary| f64::from(summary.laser_shots))),
         format!("{:.0} m", mean(group, |summary| summary.travel_m)),
-        format!("{:.0}", mean(group, |summary| f64::from(summary.bumps))),
+        format!("{:.0}", mean(group, |summary| f64::from(summary.collisions))),
         millimetres(|summary| summary.error.line_error_m),
         millimetres(|summary| summary.error.endpoint_error_m),
         millimetres(|summary| summary.error.map_error_m),

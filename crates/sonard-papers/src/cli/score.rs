@@ -10,7 +10,7 @@ use sonard_model::geometry::{DVec2, Pose};
 
 use super::{
     Failure, Outcome,
-    answer::answer,
+    answer::print_result,
     input::{load_scene, read_map},
     output::{Overwrite, write_map},
 };
@@ -75,7 +75,7 @@ pub(crate) fn run(args: &Args) -> Outcome {
     let found = score(&map, &ideal, &settings).map_err(|error| {
         Failure::input(error, "give maps of one region and resolution (sonard map --region)")
     })?;
-    answer(args.json, [&found], |out| print(out, &found))
+    print_result(args.json, [&found], |out| print(out, &found))
 }
 
 /// Whether a path names a map, not a scene.

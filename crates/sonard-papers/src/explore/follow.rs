@@ -346,7 +346,9 @@ impl<R: Robot> Explorer<'_, R> {
         let stop = self.log.stops.last()?;
         let echoes = stop.sonar.iter().flat_map(|sweep| {
             sweep.beams.iter().filter_map(|beam| match beam.outcome {
-                BeamOutcome::Echo(range_m) => Some((range_m, stop.pose.direction_rad(beam.azimuth_deg))),
+                BeamOutcome::Echo(range_m) => {
+                    Some((range_m, stop.pose.direction_rad(beam.azimuth_deg)))
+                }
                 _ => None,
             })
         });

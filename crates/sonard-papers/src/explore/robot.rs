@@ -5,7 +5,7 @@ use rand_distr::{Distribution, StandardNormal};
 
 use super::laser::{Laser, join_shots};
 use crate::trial::simulate_reading;
-use sonard_interpret::interpret::{SweepBeam, BeamOutcome, Sweep, lines::LaserScan};
+use sonard_interpret::interpret::{BeamOutcome, Sweep, SweepBeam, lines::LaserScan};
 use sonard_model::{
     geometry::{DVec2, Pose, wrap_360, wrap_pi},
     model::{Simulator, TooCostly, raycast::Reflectors},

@@ -5,7 +5,7 @@ use sonard_interpret::interpret::lines::LaserScan;
 use sonard_model::{geometry::DVec2, scene::Scene};
 use sonard_plot::{
     Picture,
-    canvas::{Anchor, Layer, Px, Rect, MarkShape},
+    canvas::{Anchor, Layer, MarkShape, Px, Rect},
     caption,
     legend::{self, LegendEntry, LegendSample},
     lines,

@@ -1,9 +1,9 @@
 //! Reliability diagrams: observed frequency over mean predicted probability.
 
-use crate::calibration::{ReliabilityBin, Reliability};
+use crate::calibration::{Reliability, ReliabilityBin};
 use sonard_plot::{
     Picture,
-    canvas::{Anchor, Layer, Px, Rect, MarkShape},
+    canvas::{Anchor, Layer, MarkShape, Px, Rect},
     caption,
     legend::{self, LegendEntry, LegendSample},
     theme, ticks,
@@ -29,7 +29,10 @@ pub fn draw_reliability(title: &str, lines: &[String], reliability: &Reliability
     page.add(bars(counts, &reliability.bins));
     let below = Px::new(left, counts.bottom + 50.0);
     let entries = [
-        LegendEntry::new(LegendSample::Mark { shape: MarkShape::Dot, colour: theme::BLUE }, "bins of 0.1"),
+        LegendEntry::new(
+            LegendSample::Mark { shape: MarkShape::Dot, colour: theme::BLUE },
+            "bins of 0.1",
+        ),
         LegendEntry::new(
             LegendSample::Line { colour: theme::QUIET, width_px: 1.2, dash: "6 4" },
             "perfectly calibrated",

@@ -46,7 +46,7 @@ pub fn gallery(name: &str, rng: &mut impl Rng) -> Scene {
     room.scene(name, turn, material)
 }
 
-/// RoomBuilder under construction with its first corner at the origin.
+/// Room under construction with its first corner at the origin.
 struct RoomBuilder {
     size: DVec2,
     start: DVec2,

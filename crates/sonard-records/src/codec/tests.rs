@@ -69,7 +69,10 @@ fn damage_is_located() {
         );
     }
     let session = line_of("session").replace("\"format\":1", "\"format\":-1");
-    assert_eq!(decode_line(session.as_bytes()).expect_err("negative").kind, RecordErrorKind::BadField);
+    assert_eq!(
+        decode_line(session.as_bytes()).expect_err("negative").kind,
+        RecordErrorKind::BadField
+    );
     check("[".repeat(100_000), RecordErrorKind::NotJson, Some(1), "");
     let deep =
         line_of("session").replace("\"lossless\":false", &format!("\"x\":{}", "[".repeat(9999)));

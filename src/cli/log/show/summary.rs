@@ -52,7 +52,7 @@ pub(super) struct Scan {
     pub(super) min_range: u32,
     pub(super) no_echo: u32,
     pub(super) link_lost: u32,
-    pub(super) step_doubtful: u32,
+    pub(super) step_uncertain: u32,
     pub(super) module_fault: u32,
     pub(super) median_abs_residual_m: Option<f64>,
     pub(super) end: Option<ScanEnd>,
@@ -129,7 +129,7 @@ impl Scan {
             PingStatus::MinRange => &mut self.min_range,
             PingStatus::NoEcho => &mut self.no_echo,
             PingStatus::LinkLost => &mut self.link_lost,
-            PingStatus::StepDoubtful => &mut self.step_doubtful,
+            PingStatus::StepUncertain => &mut self.step_uncertain,
             PingStatus::ModuleFault => &mut self.module_fault,
         } += 1;
         self.residuals_m.extend(ping.residual_m.filter(|m| m.is_finite()).map(f64::abs));

@@ -165,7 +165,7 @@ fn scan_table(scans: &[&Scan]) -> Table {
             scan.min_range.to_string(),
             scan.no_echo.to_string(),
             scan.link_lost.to_string(),
-            scan.step_doubtful.to_string(),
+            scan.step_uncertain.to_string(),
             scan.end.as_ref().map_or("?".into(), |end| end.repaired.to_string()),
             scan.median_abs_residual_m.map_or("-".into(), |m| format!("{:.1}", m * 1e3)),
             took,
@@ -191,7 +191,7 @@ fn format_ping(ping: &Ping) -> String {
         PingStatus::NoEcho => "no echo",
         PingStatus::MinRange => "min range",
         PingStatus::LinkLost => "link lost",
-        PingStatus::StepDoubtful => "uncertain",
+        PingStatus::StepUncertain => "uncertain",
         PingStatus::ModuleFault => "not fired",
     };
     let sim = ping.sim.as_ref();

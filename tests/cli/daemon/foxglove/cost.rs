@@ -25,8 +25,10 @@ fn viewer(daemon: &Daemon) -> Viewer<std::os::unix::net::UnixStream> {
 #[test]
 fn stalled_viewer_gets_a_count() {
     let folder = tempfile::tempdir().expect("a folder");
-    let daemon =
-        busy(folder.path(), &["--set", "foxglove.queue_kb=16", "--set", "server.stall_s=60"]);
+    let daemon = busy(
+        folder.path(),
+        &["--set", "foxglove.queue_kb=16", "--set", "server.write_timeout_s=60"],
+    );
     let mut slow = viewer(&daemon);
     let before = daemon.health()["scans"]["completed"].as_u64().expect("a count");
     // More than sockets take in between.
@@ -42,7 +44,7 @@ fn stalled_viewer_gets_a_count() {
 #[test]
 fn dead_viewers_are_disconnected() {
     let folder = tempfile::tempdir().expect("a folder");
-    let daemon = busy(folder.path(), &["--set", "server.stall_s=3"]);
+    let daemon = busy(folder.path(), &["--set", "server.write_timeout_s=3"]);
     let mut awake = viewer(&daemon);
     // Until as much waits as may.
     drop(awake.for_a_while(Duration::from_secs(8)));

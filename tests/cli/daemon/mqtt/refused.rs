@@ -40,11 +40,11 @@ fn too_large_record_is_skipped() {
     let first = publish_scans(1, 1);
     publish_scans(2, 3);
     // The report follows the broker with a delay.
-    wait_until("dropped sessions", || mqtt(&daemon)["left_out"].as_u64() >= Some(2));
+    wait_until("dropped sessions", || mqtt(&daemon)["skipped"].as_u64() >= Some(2));
     let report = mqtt(&daemon);
     assert_eq!(report["connections"], first["connections"], "{report}");
     wait_for_trouble(&daemon, "closes the connection at messages of");
-    wait_until("events", || gaps(folder.path()).len() as u64 == mqtt(&daemon)["left_out"]);
+    wait_until("events", || gaps(folder.path()).len() as u64 == mqtt(&daemon)["skipped"]);
     let gaps = gaps(folder.path());
     assert!(gaps.iter().all(|gap| gap.contains("sonard/kiwi/session")), "{gaps:?}");
     assert!(daemon.said().contains("max_packet_size"), "{}", daemon.said());
@@ -67,7 +67,7 @@ fn forbidden_topic_is_reported() {
     let scans = || published(&broker).iter().filter(|kind| *kind == "scan_end").count();
     wait_until("the other records", || scans() == 2);
     wait_for_trouble(&daemon, "sonard/kiwi/scan_start");
-    assert_eq!(mqtt(&daemon)["left_out"], 2);
+    assert_eq!(mqtt(&daemon)["skipped"], 2);
     assert_eq!(gaps(folder.path()).len(), 1, "of a whole topic one event is enough");
     assert_eq!(daemon.stop(), Some(0));
 }
@@ -80,7 +80,7 @@ fn stalled_broker_catches_up() {
     daemon.wait_for("ready");
     take_scans(&daemon, 1);
     wait_for_trouble(&daemon, "permit this client to publish to sonard/kiwi/#");
-    assert_eq!(mqtt(&daemon)["left_out"], 0);
+    assert_eq!(mqtt(&daemon)["skipped"], 0);
     broker.become_(Manner::Honest);
     wait_until("all records", || {
         records(&broker).len() == super::logged(&clean_log(folder.path())).len()
@@ -101,7 +101,7 @@ fn duplicate_client_id_backs_off() {
     assert!(late < early && late <= 6, "{early} connections, then {late}");
     for daemon in &daemons {
         wait_for_trouble(daemon, "another client uses the id sonard-kiwi");
-        assert_eq!(mqtt(daemon)["left_out"], 0);
+        assert_eq!(mqtt(daemon)["skipped"], 0);
     }
     for daemon in daemons {
         assert_eq!(daemon.stop(), Some(0));

@@ -25,7 +25,10 @@ fn reload_of_scene_and_array() {
     let first = scans.as_array().and_then(|scans| scans.last()).expect("scans")["scan"].clone();
     let first = first.as_str().expect("an id").to_owned();
     assert_eq!(daemon.get(&format!("/v1/scans/{first}/scene")).json()["name"], "mcgill-lab");
-    assert_eq!(daemon.get(&format!("/v1/scans/{first}/beams/0")).json()["lacks"], Value::Null);
+    assert_eq!(
+        daemon.get(&format!("/v1/scans/{first}/beams/0")).json()["unavailable_reason"],
+        Value::Null
+    );
     // A configuration that makes no sense changes nothing and is told.
     fs::write(&file, text("two-surface-room", "pioneer-9", 2.0)).expect("writes");
     daemon.reload();

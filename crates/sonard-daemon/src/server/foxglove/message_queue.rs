@@ -11,7 +11,7 @@ use std::{
 
 use sonard_export::{
     LiveMessage, Topic,
-    foxglove::{StatusLevel, ViewerSession, ViewerAction, advertise, status, unadvertise},
+    foxglove::{StatusLevel, ViewerAction, ViewerSession, advertise, status, unadvertise},
 };
 
 use crate::Ring;

@@ -84,7 +84,7 @@ impl Keeper {
             self.tcp.iter().filter_map(TcpEndpoint::bound).map(|at| format!("http://{at}"));
         ServerReport {
             listening: reachable.chain(addresses).collect(),
-            trouble: self.troubles.iter().map(|(name, why)| format!("{name}: {why}")).collect(),
+            errors: self.troubles.iter().map(|(name, why)| format!("{name}: {why}")).collect(),
         }
     }
 }

@@ -72,7 +72,7 @@ export class BeamPanel {
 
   /** Predicted arrivals; a click on one draws its propagation path. */
   arrivals(beam) {
-    if (beam.lacks) return [note(`No paths: ${beam.lacks}.`)];
+    if (beam.unavailable_reason) return [note(`No paths: ${beam.unavailable_reason}.`)];
     const list = document.createElement("ul");
     list.className = "peaks";
     const peaks = beam.peaks ?? [];

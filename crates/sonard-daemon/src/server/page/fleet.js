@@ -13,10 +13,10 @@ const byId = (/** @type {string} */ id) => /** @type {any} */ (document.getEleme
 
 /** Lamp and text of the states in which a robot sends no report of its own. */
 const STATES = {
-  unasked: ["wait", "not polled yet"],
-  silent: ["bad", "offline"],
-  refusing: ["bad", "access denied"],
-  strange: ["bad", "unreachable"],
+  not_polled: ["wait", "not polled yet"],
+  no_response: ["bad", "offline"],
+  rejected: ["bad", "access denied"],
+  invalid_response: ["bad", "unreachable"],
   other_robot: ["bad", "different robot at this address"],
 };
 
@@ -52,9 +52,9 @@ class Card {
       this.title.replaceChildren(robot.page ? make("a", { href: robot.page, rel: "noreferrer" }, name) : name);
     }
     this.item.dataset.lamp = lamp;
-    format.setText(this.state, robot.state === "well" ? state : `${state} since ${format.time(robot.since)}`);
-    format.setText(this.problems, robot.wrong.join("; "));
-    this.problems.hidden = robot.wrong.length === 0;
+    format.setText(this.state, robot.state === "healthy" ? state : `${state} since ${format.time(robot.since)}`);
+    format.setText(this.problems, robot.problems.join("; "));
+    this.problems.hidden = robot.problems.length === 0;
     this.item.classList.toggle("stale", !isReporting(robot));
     format.showFacts(this.facts, facts(robot));
     this.draw(robot.report?.last_scan?.picture ?? null, name);
@@ -93,17 +93,17 @@ class Card {
 }
 
 /** Returns `true` if the state comes from the robot's own report. */
-const isReporting = ({ state }) => state === "well" || state === "not_well";
+const isReporting = ({ state }) => state === "healthy" || state === "unhealthy";
 
 /** Lamp and text of a robot. */
 function stateOf({ state, report }) {
   if (STATES[state]) return STATES[state];
   const [lamp, text] = format.linkState(report.link);
-  return state === "not_well" ? ["bad", text] : [lamp, text];
+  return state === "unhealthy" ? ["bad", text] : [lamp, text];
 }
 
 function facts(robot) {
-  const { report, address, heard_s } = robot;
+  const { report, address, last_report_age_s } = robot;
   if (!report) return [["Address", address]];
   const { scan, last_reading_age_s, last_scan, provenance } = report;
   const share = last_scan?.agree_fraction ?? null;
@@ -111,12 +111,12 @@ function facts(robot) {
   return [
     ["Readings", format.provenanceLabel(provenance) ?? (provenance ? "hardware" : "–")],
     ["Scan", !isReporting(robot) ? "–" : scan ? `${scan.done} of ${format.count(scan.beams, "beam")}` : "none running"],
-    ["Last reading", last_reading_age_s === null ? "–" : `${ago(last_reading_age_s + heard_s)} ago`],
+    ["Last reading", last_reading_age_s === null ? "–" : `${ago(last_reading_age_s + last_report_age_s)} ago`],
     ["Last scan", last_scan ? format.clock(last_scan.ended) : "–"],
     ["Agreement", share === null ? "–" : `${(100 * share).toFixed(0)} %`],
     ["Median residual", residual_m === null ? "–" : `${(1e3 * residual_m).toFixed(1)} mm`],
     ["Missing beams", last_scan ? `${last_scan.missing}` : "–"],
-    ["Last contact", `${ago(heard_s)} ago`],
+    ["Last contact", `${ago(last_report_age_s)} ago`],
     ["Address", address],
   ];
 }
@@ -140,11 +140,11 @@ function show({ robots }) {
 /** Healthy, offline and faulty robots; a live region that screen readers read when it changes. */
 function summaryText(robots) {
   const namesOf = (filter) => robots.filter(filter).map(({ robot, address }) => robot ?? address);
-  const healthy = namesOf(({ state }) => state === "well").length;
+  const healthy = namesOf(({ state }) => state === "healthy").length;
   const parts = [`${healthy} of ${robots.length} healthy`];
-  const offline = namesOf(({ state }) => state === "silent");
+  const offline = namesOf(({ state }) => state === "no_response");
   if (offline.length) parts.push(`offline: ${offline.join(", ")}`);
-  const faulty = namesOf(({ state }) => state !== "well" && state !== "silent" && state !== "unasked");
+  const faulty = namesOf(({ state }) => state !== "healthy" && state !== "no_response" && state !== "not_polled");
   if (faulty.length) parts.push(`fault: ${faulty.join(", ")}`);
   return parts.join("; ");
 }

@@ -81,7 +81,7 @@ export class Overlays {
     this.loading = scan.id;
     try {
       this.found = { id: scan.id, ...(await requestJson(`/v1/scans/${scan.id}/findings`)) };
-      if (this.found.lacks) this.announce(sentences(this.found.lacks));
+      if (this.found.unavailable_reason) this.announce(sentences(this.found.unavailable_reason));
     } catch (/** @type {any} */ error) {
       this.announce(failure("Not computed", error));
     }

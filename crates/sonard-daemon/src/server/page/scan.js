@@ -4,7 +4,7 @@ import { markOf } from "./verdicts.js";
 import { count } from "./format.js";
 
 /** Verdicts of readings, or missing echoes, that agree with the model. */
-const AGREEING = ["direct", "multiple", "edge", "min_range", "silent"];
+const AGREEING = ["direct", "multiple", "edge", "min_range", "no_echo"];
 
 export class Scan {
   constructor(start, session = null) {

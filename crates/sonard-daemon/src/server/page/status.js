@@ -82,7 +82,7 @@ function mode({ mode, paused, requested, next_in_s }) {
 function trouble({ link, log, configuration }) {
   const [lamp, text] = format.linkState(link.state);
   const parts = [];
-  if (lamp === "bad") parts.push(`Ranger: ${text}`, link.trouble);
+  if (lamp === "bad") parts.push(`Ranger: ${text}`, link.error);
   if (log.error) parts.push(`Log: ${log.error}`, "Scanning is suspended until the log is writable");
   if (configuration.error) parts.push(`Configuration rejected: ${configuration.error}`);
   return format.sentences(...parts);

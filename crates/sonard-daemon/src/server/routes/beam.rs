@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use sonard_api::{Beam, Echo, AnnotatedPing, PeakLine, PlanPoint, TraceLine};
+use sonard_api::{AnnotatedPing, Beam, Echo, PeakLine, PlanPoint, TraceLine};
 use sonard_model::{
     acoustics::Air,
     geometry::Pose,
@@ -27,7 +27,14 @@ pub(super) fn describe_beam(view: &ScanView, ping: Ping, scene: Option<&Scene>) 
     };
     let polyline = ping.sound_path().and_then(|path| view.polyline(&ping, path));
     let polyline = polyline.map(|points| points.into_iter().map(PlanPoint::from).collect());
-    Beam { reading: AnnotatedPing::new(ping, view), echoes, polyline, peaks, trace, lacks }
+    Beam {
+        reading: AnnotatedPing::new(ping, view),
+        echoes,
+        polyline,
+        peaks,
+        trace,
+        unavailable_reason: lacks,
+    }
 }
 
 fn echoes(view: &ScanView, session: Option<&Session>, ping: &Ping) -> Vec<Echo> {

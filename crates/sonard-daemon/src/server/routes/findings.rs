@@ -10,7 +10,7 @@ use sonard_interpret::interpret::{
     grid::Grid,
     interpret,
     lines::{LineMap, LineMapSettings, MapLine},
-    mapping::{Mapper, MapSettings},
+    mapping::{MapSettings, Mapper},
 };
 use sonard_log::ScanSpan;
 use sonard_records::{Record, ScanView, decode_line};
@@ -71,14 +71,17 @@ fn interpret_scan(
     let map = map(&sweep, &extents, is_array);
     let sweeps = [(view.scan, sweep)];
     // Features are derived from arcs, which need a scanning ranger.
-    let features =
-        if is_array { Vec::new() } else { interpret(&sweeps, &extents, &InterpretSettings::default()) };
+    let features = if is_array {
+        Vec::new()
+    } else {
+        interpret(&sweeps, &extents, &InterpretSettings::default())
+    };
     let lacks = is_array.then(|| "features need a scanning ranger".to_owned());
     Ok(Findings {
         map,
         lines: lines.lines().iter().map(found_line).collect(),
         features: features.iter().filter_map(found_feature).collect(),
-        lacks,
+        unavailable_reason: lacks,
     })
 }
 

@@ -18,7 +18,9 @@ use futures_util::stream;
 use serde::Deserialize;
 use serde_json::json;
 use sonard_api::Location;
-use sonard_inverse::{CoarseGrid, Tracker, Odometry, FitSweep, FitObserver, World, diagnose, locate_observed};
+use sonard_inverse::{
+    CoarseGrid, FitObserver, FitSweep, Odometry, Tracker, World, diagnose, locate_observed,
+};
 use sonard_log::{LogIndex, ScanSpan};
 use sonard_records::Session;
 use tokio::{
@@ -276,7 +278,11 @@ fn load_scan(api: &Api, scan: Uuid, locator: &ScanLocator) -> Result<LocatableSc
 impl LocatableScan {
     /// Prepares a scan for localization, or returns the reason why it can't be located. The world
     /// of the previous scan is reused if the session is equal. Reads the disk.
-    fn load(api: &Api, passage: &ScanSpan, previous: Option<&PreviousScan>) -> Result<Self, String> {
+    fn load(
+        api: &Api,
+        passage: &ScanSpan,
+        previous: Option<&PreviousScan>,
+    ) -> Result<Self, String> {
         let view = read(passage).map_err(|failed| failed.problem.error)?;
         let sweep = FitSweep::from_scan(&view).map_err(|error| error.to_string())?;
         let session = view.session.ok_or("the log does not contain the scan's session")?;
@@ -320,7 +326,11 @@ impl ScanLocator {
         self.try_locate(place, watch).unwrap_or_else(|why| unlocated(scan, why))
     }
 
-    fn try_locate(&mut self, place: LocatableScan, watch: &dyn FitObserver) -> Result<Location, String> {
+    fn try_locate(
+        &mut self,
+        place: LocatableScan,
+        watch: &dyn FitObserver,
+    ) -> Result<Location, String> {
         let LocatableScan { sweep, session, world } = place;
         // Only one atlas is kept, because each can have many megabytes.
         let previous =
@@ -341,11 +351,11 @@ impl ScanLocator {
         };
         let poses = poses.map_err(|error| error.to_string())?;
         let diagnoses = diagnose(&world, atlas, &sweep, &poses);
-        Ok(Location { scan: sweep.scan, poses, doubts: diagnoses, lacks: None })
+        Ok(Location { scan: sweep.scan, poses, diagnoses, unavailable_reason: None })
     }
 }
 
 /// Result for a scan that could not be located.
 const fn unlocated(scan: Uuid, why: String) -> Location {
-    Location { scan, poses: Vec::new(), doubts: Vec::new(), lacks: Some(why) }
+    Location { scan, poses: Vec::new(), diagnoses: Vec::new(), unavailable_reason: Some(why) }
 }

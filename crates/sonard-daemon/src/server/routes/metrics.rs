@@ -83,9 +83,9 @@ fn registry(daemon: &Handle) -> Registry {
 fn register_ros(registry: &mut Registry, report: &RosReport) {
     for (name, help, value) in [
         ("ros_messages", "Messages published to ROS 2", report.messages),
-        ("ros_left_out_messages", "Messages to ROS 2 that were dropped", report.left_out),
+        ("ros_left_out_messages", "Messages to ROS 2 that were dropped", report.dropped),
         ("ros_commands", "Accepted commands of ROS 2", report.commands),
-        ("ros_refused_commands", "Rejected commands of ROS 2", report.refused),
+        ("ros_refused_commands", "Rejected commands of ROS 2", report.rejected),
     ] {
         registry.register(name, help, ConstCounter::new(value));
     }
@@ -105,7 +105,7 @@ fn register_mqtt(registry: &mut Registry, report: &MqttReport) {
             report.acknowledged,
         ),
         ("mqtt_commands", "Commands accepted through the MQTT broker", report.commands),
-        ("mqtt_refused_commands", "Commands rejected through the MQTT broker", report.refused),
+        ("mqtt_refused_commands", "Commands rejected through the MQTT broker", report.rejected),
     ] {
         registry.register(name, help, ConstCounter::new(value));
     }
@@ -123,7 +123,7 @@ fn register_mqtt(registry: &mut Registry, report: &MqttReport) {
         (
             "mqtt_behind_bytes",
             "Log data not acknowledged by the MQTT broker",
-            report.behind_bytes as f64,
+            report.lag_bytes as f64,
         ),
     ] {
         registry.register(name, help, ConstGauge::new(value));
@@ -143,7 +143,7 @@ fn counters(status: &Status, health: &Health) -> [(&'static str, &'static str, u
         (
             "line_refused_readings",
             "Readings and responses rejected as invalid",
-            health.line.refused,
+            health.line.rejected,
         ),
         ("link_losses", "Lost connections to a device in use", health.line.losses),
         ("scans_completed", "Scans with all beams measured", health.scans.completed),

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use axum::{Json, extract::State, http::StatusCode};
 use jiff::Timestamp;
-use sonard_api::{AirOrder, AnnotatedPing, PreviewRequest, WholeScan, Classification};
+use sonard_api::{AirOrder, AnnotatedPing, Classification, PreviewRequest, WholeScan};
 use sonard_model::{
     acoustics::{Air, Sensor},
     array::RangerArray,
@@ -16,7 +16,7 @@ use sonard_records::{Ping, ScanPlan, ScanStart, ScanView, Session, SimRecord};
 use uuid::Uuid;
 
 use crate::{
-    NextScan, check_device, check_plan, check_pose, air_from_order, sensor_from_order,
+    NextScan, air_from_order, check_device, check_plan, check_pose, sensor_from_order,
     server::{
         Api,
         openapi::Route,
@@ -93,7 +93,7 @@ impl HypotheticalScan {
                 check_device(&sensor, &next.setup.sensor, device)?;
             }
         }
-        let options = next.setup.model.options.options_of_engine();
+        let options = next.setup.model.options.engine_options();
         Ok(Self { pose, plan, air, sensor, options, scene, array: next.array })
     }
 
@@ -123,15 +123,15 @@ impl HypotheticalScan {
         let (id, time) = (Uuid::new_v4(), Timestamp::now());
         let fire = |(firing, ranger): (usize, usize)| {
             let prediction = point.ping_in_round(firing)?;
-            Ok(Ping::of_array(&point, id, &self.pose, firing as u32, ranger, &prediction))
+            Ok(Ping::for_array(&point, id, &self.pose, firing as u32, ranger, &prediction))
         };
         let pings = rangers.iter().copied().enumerate().map(fire);
         let pings = pings.collect::<Result<_, TooCostly>>().map_err(|error| model_error(&error))?;
-        let session = Session::of_array(&model, time);
+        let session = Session::for_array(&model, time);
         let view = ScanView {
             scan: id,
             session: Some(Arc::new(session.clone())),
-            start: Some(ScanStart::of_array(&model, id, self.pose, 1, time)),
+            start: Some(ScanStart::for_array(&model, id, self.pose, 1, time)),
             pings,
             events: Vec::new(),
             end: None,

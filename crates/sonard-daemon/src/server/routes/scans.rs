@@ -15,7 +15,7 @@ use axum::{
 use serde::Deserialize;
 use serde_json::json;
 use sonard_api::{Beam, FloorPlan, ListedScan, WholeScan};
-use sonard_log::{LogIndex, ScanSpan, LoggedScan, logged_scene};
+use sonard_log::{LogIndex, LoggedScan, ScanSpan, logged_scene};
 use sonard_model::scene::Scene;
 use tokio::time::{Instant, sleep};
 use uuid::Uuid;

@@ -4,7 +4,7 @@
 use glam::DVec3;
 
 use super::{
-    explanation::{ChangeEstimate, Explanation, LinearizedPair, ChangedQuantity},
+    explanation::{ChangeEstimate, ChangedQuantity, Explanation, LinearizedPair},
     fit::{LinearFit, Linearized, fit},
     likelihood::is_near,
     shift::{BeamShifts, echo_log_likelihood, mismatch_log_likelihood, parabola},
@@ -124,7 +124,8 @@ impl CombinedFit {
             value: (best as f64 - max_shift as f64 + peak) * step_deg,
             sigma: sigma * step_deg,
         };
-        let values = [(ChangedQuantity::XM, 0), (ChangedQuantity::YM, 1), (ChangedQuantity::Percent, 2)];
+        let values =
+            [(ChangedQuantity::XM, 0), (ChangedQuantity::YM, 1), (ChangedQuantity::Percent, 2)];
         let mut estimates: Vec<_> =
             values.into_iter().map(|(name, at)| fit.estimate(name, at)).collect();
         estimates.insert(2, heading);

@@ -34,6 +34,6 @@ pub(super) fn has_echo(status: PingStatus) -> Option<bool> {
     match status {
         PingStatus::Echo | PingStatus::MinRange => Some(true),
         PingStatus::NoEcho => Some(false),
-        PingStatus::LinkLost | PingStatus::StepDoubtful | PingStatus::ModuleFault => None,
+        PingStatus::LinkLost | PingStatus::StepUncertain | PingStatus::ModuleFault => None,
     }
 }

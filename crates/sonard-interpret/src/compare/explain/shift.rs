@@ -5,7 +5,7 @@ use std::ops::Range;
 use sonard_records::{Ping, ScanPlan};
 
 use super::{
-    explanation::{ChangeEstimate, Explanation, ChangedQuantity},
+    explanation::{ChangeEstimate, ChangedQuantity, Explanation},
     likelihood::{has_echo, is_near, log_likelihood},
 };
 use crate::compare::ClassifiedPing;

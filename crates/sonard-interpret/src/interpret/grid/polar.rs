@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use super::{BeamModel, GridShape, MAX_LOG_ODDS, ScanEvidence, Trust};
-use crate::interpret::{SweepBeam, BeamOutcome, prediction::Assessment};
+use crate::interpret::{BeamOutcome, SweepBeam, prediction::Assessment};
 use sonard_model::geometry::DVec2;
 
 /// Number of directions: 0.75 degrees each, finer than the motor's steps.
@@ -152,7 +152,7 @@ impl PolarTable {
     }
 }
 
-/// WeightedReading with its confidence.
+/// Reading weighted with its confidence.
 struct WeightedReading<'a> {
     range_m: f64,
     echo: bool,

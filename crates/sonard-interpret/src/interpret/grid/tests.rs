@@ -4,7 +4,7 @@ use super::{
     BeamModel, GaussianBeam, Grid, GridError, GridShape, ImageError, MapYaml, PathSettings,
     PhysicalBeam, Trust, from_pgm, ideal, score, to_pgm,
 };
-use crate::interpret::{SweepBeam, Extents, BeamOutcome, Sweep, prediction::Assessment};
+use crate::interpret::{BeamOutcome, Extents, Sweep, SweepBeam, prediction::Assessment};
 use sonard_model::{
     acoustics::{Air, Sensor},
     geometry::{DVec2, Pose},
@@ -21,7 +21,7 @@ fn gaussian() -> BeamModel {
 
 /// One beam along +x from (1, 2).
 fn beam(outcome: BeamOutcome) -> Sweep {
-    let beams = vec![SweepBeam { azimuth_deg: 0.0, index: 0, outcome: outcome, mount: DVec2::ZERO }];
+    let beams = vec![SweepBeam { azimuth_deg: 0.0, index: 0, outcome, mount: DVec2::ZERO }];
     let pose = Pose { x_m: 1.0, y_m: 2.0, heading_deg: 0.0 };
     Sweep { pose, step_deg: 25.0, beams, closed: false }
 }
@@ -53,7 +53,8 @@ fn low_confidence_keeps_cleared_space() {
     trusted.add(&beam(BeamOutcome::Echo(2.0)), None, &gaussian(), &Trust::default());
     let add = |trust: Trust| {
         let mut grid = Grid::new(shape(5.0, 0.05));
-        let discarded = grid.add(&beam(BeamOutcome::Echo(2.0)), Some(&[assessment]), &gaussian(), &trust);
+        let discarded =
+            grid.add(&beam(BeamOutcome::Echo(2.0)), Some(&[assessment]), &gaussian(), &trust);
         (grid, discarded)
     };
     let (kept, _) = add(Trust { min_confidence: 0.0, keep_clear: true });

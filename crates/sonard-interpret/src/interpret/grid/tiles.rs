@@ -87,7 +87,7 @@ struct TileOverlap {
     count: usize,
 }
 
-/// TileOverlap of a tile that starts `first` cells after the start of a part of `count` cells.
+/// Overlap of a tile that starts `first` cells after the start of a part of `count` cells.
 fn overlap(first: f64, count: usize) -> TileOverlap {
     let within = |cell: f64| cell.clamp(0.0, count as f64);
     let (start, end) = (within(first), within(first + SIDE as f64));

@@ -135,7 +135,9 @@ fn join_corners(lines: &mut [MapLine]) {
             let pairs = [0, 1].into_iter().flat_map(|i| [0, 1].map(|j| (i, j)));
             for (i, j) in pairs {
                 let (a, b) = (lines[first].ends[i], lines[second].ends[j]);
-                let Some(corner) = lines[first].intersection(&lines[second], CORNER_DEG) else { continue };
+                let Some(corner) = lines[first].intersection(&lines[second], CORNER_DEG) else {
+                    continue;
+                };
                 if a.distance(b) < CORNER_M
                     && a.distance(corner) < CORNER_M
                     && b.distance(corner) < CORNER_M

@@ -160,7 +160,8 @@ impl LineMap {
 
     /// Cuts out of the sonar lines everything that the latest laser scan contradicts.
     fn cut_cleared(&mut self, latest: &LaserScan) {
-        let LineMapSettings { contradicts_m, laser_logical_m, min_rest_m: least_rest_m, .. } = self.settings;
+        let LineMapSettings { contradicts_m, laser_logical_m, min_rest_m: least_rest_m, .. } =
+            self.settings;
         let is_absent = |point| latest.clears(point, laser_logical_m, contradicts_m);
         let cut = |line: &MapLine| {
             if line.kind != LineKind::Sonar {
@@ -187,7 +188,8 @@ impl LineMap {
 
     /// Cuts out of the sonar lines everything close to the robot that is not detected there.
     fn cut_around(&mut self, robot: DVec2, detected: &[DVec2]) {
-        let LineMapSettings { known_m, contradicts_m, min_rest_m: least_rest_m, .. } = self.settings;
+        let LineMapSettings { known_m, contradicts_m, min_rest_m: least_rest_m, .. } =
+            self.settings;
         let lines = std::mem::take(&mut self.lines);
         let cut = |line: MapLine| {
             // Only a part of a specular wall returns an echo; it confirms the whole.

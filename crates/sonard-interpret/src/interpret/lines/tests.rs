@@ -10,7 +10,7 @@ use super::{
     FitSettings, LaserReturn, LaserScan, LineKind, LineMap, LineMapSettings, MAX_ERROR_M, MapLine,
     MergeSettings, clusters, fit, map_error, merge,
 };
-use crate::interpret::{SweepBeam, BeamOutcome, Sweep};
+use crate::interpret::{BeamOutcome, Sweep, SweepBeam};
 use sonard_model::geometry::{DVec2, Pose};
 
 /// Graph by definition, from all pairs.

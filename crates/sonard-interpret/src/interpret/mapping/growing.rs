@@ -136,7 +136,7 @@ mod tests {
     };
 
     use super::*;
-    use crate::interpret::{SweepBeam, BeamOutcome, mapping::Mapper};
+    use crate::interpret::{BeamOutcome, SweepBeam, mapping::Mapper};
 
     fn extents() -> Extents {
         let sensor = Sensor::preset("senscomp-6500").expect("a preset");
@@ -169,7 +169,8 @@ mod tests {
 
     #[test]
     fn each_step_equals_a_full_rebuild() {
-        let coarse = MapSettings { resolution_m: 0.13, predicts_features: false, ..MapSettings::default() };
+        let coarse =
+            MapSettings { resolution_m: 0.13, predicts_features: false, ..MapSettings::default() };
         for (mapping, of_array) in [(MapSettings::default(), false), (coarse, true)] {
             let mut growing = GrowingMap::new(mapping, extents(), of_array, 100_000);
             let mut sweeps = Vec::new();

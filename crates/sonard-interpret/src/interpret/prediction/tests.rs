@@ -2,8 +2,10 @@
 
 mod course;
 
-use super::{FeaturePrediction, PredictionSettings, combine, confidence_by_angle, confidence_by_distance};
-use crate::interpret::{SweepBeam, BeamOutcome, Sweep};
+use super::{
+    FeaturePrediction, PredictionSettings, combine, confidence_by_angle, confidence_by_distance,
+};
+use crate::interpret::{BeamOutcome, Sweep, SweepBeam};
 use sonard_model::geometry::{DVec2, Pose};
 
 const MAX_RANGE_M: f64 = 5.0;

@@ -4,7 +4,7 @@ use uuid::Uuid;
 
 use super::{features, scan, simulator};
 use crate::interpret::{
-    Extents, FeatureKind, BeamOutcome, Reason, InterpretSettings, Sweep, SweepError, interpret,
+    BeamOutcome, Extents, FeatureKind, InterpretSettings, Reason, Sweep, SweepError, interpret,
 };
 use sonard_model::{
     geometry::{Pose, wrap_360},
@@ -59,7 +59,9 @@ fn non_finite_readings_count_as_lost() {
     scan.pings[160].range_m = Some(-3.0);
     let sweep = Sweep::from_scan(&scan).expect("a sweep");
     assert_eq!(sweep.beams.len(), 397);
-    assert!(!sweep.beams.iter().any(|beam| matches!(beam.outcome, BeamOutcome::Echo(m) if m.is_nan())));
+    assert!(
+        !sweep.beams.iter().any(|beam| matches!(beam.outcome, BeamOutcome::Echo(m) if m.is_nan()))
+    );
     assert_eq!(features(&[scan], &InterpretSettings::default()).len(), expected);
 }
 

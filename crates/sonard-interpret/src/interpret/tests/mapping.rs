@@ -1,7 +1,7 @@
 //! Extent of the mapped region, and weights of scans.
 
 use crate::interpret::{
-    SweepBeam, BeamOutcome, Sweep,
+    BeamOutcome, Sweep, SweepBeam,
     mapping::{MAX_RANGE_M, MapSettings},
 };
 use sonard_model::geometry::{DVec2, Pose};
@@ -25,7 +25,12 @@ fn few_scans_have_more_weight() {
 #[test]
 fn mapped_region_has_a_margin() {
     let mapping = MapSettings::default();
-    let sweeps = [sweep(&[BeamOutcome::Echo(2.0), BeamOutcome::Echo(4.5), BeamOutcome::NoEcho, BeamOutcome::BelowMinRange])];
+    let sweeps = [sweep(&[
+        BeamOutcome::Echo(2.0),
+        BeamOutcome::Echo(4.5),
+        BeamOutcome::NoEcho,
+        BeamOutcome::BelowMinRange,
+    ])];
     // Echoes reach x = 3.02; those beyond 4 m are ignored.
     let shape = mapping.shape(&sweeps, 4.0).expect("few cells");
     assert!(shape.origin.distance(DVec2::new(0.5, 1.5)) < 1e-9, "{shape:?}");

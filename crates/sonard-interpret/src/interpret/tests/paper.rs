@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use super::{features, scan, simulator};
 use crate::interpret::{
-    Extents, Feature, FeatureKind, Probabilities, Reason, InterpretSettings, min_corner_m, min_plane_m,
-    min_translation_m,
+    Extents, Feature, FeatureKind, InterpretSettings, Probabilities, Reason, min_corner_m,
+    min_plane_m, min_translation_m,
 };
 use sonard_model::{
     acoustics::{Air, Sensor},
@@ -154,7 +154,8 @@ fn proposed_position_decides() {
         .expect("a proposal");
     let place = sonard_model::geometry::Pose { x_m: next.x_m, y_m: next.y_m, heading_deg: 0.0 };
     let both = [first, scan(&simulator, 2, &place)];
-    let kinds: Vec<_> = features(&both, &InterpretSettings::default()).iter().map(|f| f.kind).collect();
+    let kinds: Vec<_> =
+        features(&both, &InterpretSettings::default()).iter().map(|f| f.kind).collect();
     let count = |kind| kinds.iter().filter(|k| **k == kind).count();
     assert_eq!((count(FeatureKind::Plane), count(FeatureKind::Corner)), (3, 1), "{kinds:?}");
     assert_eq!((count(FeatureKind::Edge), kinds.len()), (2, 6), "{kinds:?}");

@@ -60,11 +60,11 @@ fn array_beams_are_at_their_rangers() {
     let pings = (0..array.rangers.len()).map(|ranger| {
         let prediction = station.ping(ranger).expect("few paths");
         let index = ranger as u32;
-        Record::Ping(Box::new(Ping::of_array(&station, scan, &pose, index, ranger, &prediction)))
+        Record::Ping(Box::new(Ping::for_array(&station, scan, &pose, index, ranger, &prediction)))
     });
     let records = [
-        Record::Session(Box::new(Session::of_array(&model, time))),
-        Record::ScanStart(ScanStart::of_array(&model, scan, pose, 1, time)),
+        Record::Session(Box::new(Session::for_array(&model, time))),
+        Record::ScanStart(ScanStart::for_array(&model, scan, pose, 1, time)),
     ];
     let view = ScanView::from_records(records.into_iter().chain(pings)).remove(0);
     let sweep = Sweep::from_scan(&view).expect("a sweep");

@@ -274,7 +274,11 @@ fn is_classified(element: &Element, found: &[Feature]) -> bool {
 }
 
 /// Number of worlds within the constraints that are classified correctly, and the first failure.
-fn count_right(seed: u64, spoil: Option<Disturbance>, settings: &InterpretSettings) -> (usize, String) {
+fn count_right(
+    seed: u64,
+    spoil: Option<Disturbance>,
+    settings: &InterpretSettings,
+) -> (usize, String) {
     let mut rng = Pcg64::seed_from_u64(seed);
     let (mut right, mut fit, mut tried, mut first_wrong) = (0, 0, 0, String::new());
     while fit < WORLDS {

@@ -50,7 +50,12 @@ impl DetectorBank<'_> {
         self.envelope.threshold_factor = factor;
         if let Some((passed_us, arrival)) = self.envelope.isolated_rise_at(from_us) {
             let (status, arrival) = (PingStatus::Echo, Some(arrival));
-            return Some(EchoRise { status, range_m: receiver.range_m(passed_us), arrival, passed_us });
+            return Some(EchoRise {
+                status,
+                range_m: receiver.range_m(passed_us),
+                arrival,
+                passed_us,
+            });
         }
         self.envelope.rewind_to(from_us);
         let at_us = self.envelope.next_rise(from_us)?;

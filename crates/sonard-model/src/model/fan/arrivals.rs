@@ -29,7 +29,7 @@ impl<'a> FanArrivals<'a> {
                 let (candidate, hit) = ray.advance(fan, position);
                 candidate.into_iter().for_each(|candidate| closest.offer(candidate));
                 let Some(hit) = hit else { break };
-                if ray.travelled_m() + hit.distance_m > fan.settings.longest_m {
+                if ray.travelled_m() + hit.distance_m > fan.settings.max_path_m {
                     break;
                 }
                 for candidate in ray.diffract(&hit, fan, position) {
@@ -52,14 +52,14 @@ impl<'a> FanArrivals<'a> {
 }
 
 impl Arrivals for FanArrivals<'_> {
-    fn listen(&self, direction_rad: f64, arrivals: &mut Vec<PulseArrival>) {
+    fn collect_arrivals(&self, direction_rad: f64, arrivals: &mut Vec<PulseArrival>) {
         arrivals.clear();
         let facing = DVec2::from_angle(direction_rad);
         arrivals.extend(self.weighings.iter().zip(0..).filter_map(|(weighing, index)| {
             let amplitude = weighing.amplitude(&self.fan.beam, facing);
             let length_m = weighing.length_m;
             let arrival = PulseArrival { length_m, amplitude, phase_rad: 0.0, index };
-            (amplitude >= self.fan.settings.weakest).then_some(arrival)
+            (amplitude >= self.fan.settings.min_amplitude).then_some(arrival)
         }));
     }
 

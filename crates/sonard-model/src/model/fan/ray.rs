@@ -112,7 +112,7 @@ impl FanRay {
             return None;
         }
         let gain = self.gain * target.tube_gain() * fan.settings.through_air(target.length_m);
-        if target.length_m > fan.settings.longest_m || gain < fan.settings.weakest {
+        if target.length_m > fan.settings.max_path_m || gain < fan.settings.min_amplitude {
             return None;
         }
         Some(FanCandidate {
@@ -157,7 +157,7 @@ impl FanRay {
             * fan.wall_ends.mirror[&edge]
             * settings.edge_ratio(target.length_m, back_m)
             * settings.through_air(length_m);
-        let matters = length_m <= settings.longest_m && gain >= settings.weakest;
+        let matters = length_m <= settings.max_path_m && gain >= settings.min_amplitude;
         if !matters || !fan.reflectors.sees(position, point) {
             return None;
         }
@@ -180,8 +180,8 @@ impl FanRay {
         let left = self.gain * settings.through_air(self.travelled_m);
         hit.from_end_m > END_MARGIN_M
             && self.walls.len() <= settings.max_order as usize
-            && self.travelled_m <= settings.longest_m
-            && left >= settings.weakest
+            && self.travelled_m <= settings.max_path_m
+            && left >= settings.min_amplitude
     }
 
     fn turn(&mut self, hit: &Hit, reflectors: &Reflectors) {

@@ -117,7 +117,7 @@ impl OptionKeys {
     /// # Errors
     /// The first option that the engine does not have.
     pub fn options(&self) -> Result<Options, ForeignOption> {
-        let known = self.options_of_engine();
+        let known = self.engine_options();
         let foreign =
             OPTIONS.iter().find(|(option, of)| !of.contains(&self.engine) && self.is_set(option));
         match foreign {
@@ -129,7 +129,7 @@ impl OptionKeys {
     /// Returns the options of the engine; others are ignored. Early logs contain those of every
     /// engine.
     #[must_use]
-    pub fn options_of_engine(&self) -> Options {
+    pub fn engine_options(&self) -> Options {
         let engine = match self.engine {
             EngineKind::Paths => EngineOptions::Paths(PathOptions {
                 response: self.response,
@@ -209,7 +209,7 @@ mod tests {
     fn foreign_options_are_rejected() {
         let engines = [EngineKind::Paths, EngineKind::Fan, EngineKind::Cone];
         for engine in engines {
-            let own = OptionKeys::from(&everything(engine).options_of_engine());
+            let own = OptionKeys::from(&everything(engine).engine_options());
             assert_eq!(OptionKeys::from(&own.options().expect("its own")), own);
             assert_eq!(
                 (own.engine, own.max_range_m, own.threshold),

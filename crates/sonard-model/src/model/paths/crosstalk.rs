@@ -1,7 +1,7 @@
 //! Crosstalk: the path search between two transducers, weighted with the beam pattern of each about
 //! its own axis.
 //!
-//! Includes the direct path between both ([`Settings::direct`](super::Settings::direct)),
+//! Includes the direct path between both ([`PathSettings::direct`](super::PathSettings::direct)),
 //! which a ranger's own echoes do not have. Multiple reflections between the faces of an array are
 //! omitted.
 
@@ -49,7 +49,7 @@ impl PathEngine {
 
 impl CrosstalkPaths<'_> {
     /// Arrivals at the receiver, shortest path first, as in
-    /// [`Arrivals::listen`](crate::model::Arrivals::listen).
+    /// [`Arrivals::collect_arrivals`](crate::model::Arrivals::collect_arrivals).
     pub(crate) fn arrivals(&self) -> impl Iterator<Item = PulseArrival> {
         let floor = self.found.paths.plan.settings.floor;
         self.found.echoes.iter().zip(0..).filter_map(move |(echo, index)| {

@@ -22,7 +22,7 @@ pub(crate) struct PathEcho {
     /// receiver.
     pub(crate) slopes: [u32; 2],
     /// `true` if the path touches cylinders more than once, or a cylinder and an upright edge: see
-    /// [`Settings::contact_floor`](super::settings::Settings::contact_floor).
+    /// [`PathSettings::contact_floor`](super::settings::PathSettings::contact_floor).
     pub(crate) is_repeated: bool,
     pub(crate) via: Via,
 }

@@ -6,7 +6,7 @@
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use super::settings::Settings;
+use super::settings::PathSettings;
 use crate::model::{SearchPart, TooCostly};
 
 /// Effort limit of the search of one observation point.
@@ -59,13 +59,13 @@ impl Effort {
     }
 
     /// Returns the error if a limit was exceeded.
-    pub(crate) fn check(&self, settings: &Settings) -> Result<(), TooCostly> {
+    pub(crate) fn check(&self, settings: &PathSettings) -> Result<(), TooCostly> {
         if !self.is_over() {
             return Ok(());
         }
         let steps = |part: &SearchPart| self.steps[*part as usize].load(Ordering::Relaxed);
         let part = SearchPart::ALL.into_iter().max_by_key(steps).unwrap_or(SearchPart::Beams);
-        let Settings { max_path_m, double_diffraction, .. } = *settings;
+        let PathSettings { max_path_m, double_diffraction, .. } = *settings;
         Err(TooCostly { part, max_path_m, double_diffraction })
     }
 }

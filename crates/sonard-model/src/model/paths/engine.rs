@@ -4,11 +4,11 @@ use std::f64::consts::PI;
 
 use super::{
     direction_index::{DirectionEntry, DirectionIndex},
+    floor::TracingPlan,
     found::{EchoPulse, FoundEchoes},
     pattern::{PatternEnvelope, TwoWayBound},
-    plan::TracingPlan,
     prepare::Paths,
-    settings::Settings,
+    settings::PathSettings,
     transducer::{DirectedPath, FaceEchoes, MULTIPLE_FLOOR_RATIO, MultipleEcho},
 };
 use crate::{
@@ -21,8 +21,8 @@ use crate::{
 
 /// Exact engine: echo paths, a beam pattern and a reflecting transducer face.
 ///
-/// [`Settings::floor`] is also the smallest amplitude that
-/// [`Arrivals::listen`] returns.
+/// [`PathSettings::floor`] is also the smallest amplitude that
+/// [`Arrivals::collect_arrivals`] returns.
 #[derive(Debug)]
 pub struct PathEngine {
     pub(super) paths: Paths,
@@ -39,7 +39,12 @@ pub struct PathEngine {
 impl PathEngine {
     /// Prepares a scene for a ranger. Without a face, sound passes the transducer unhindered.
     #[must_use]
-    pub fn new(scene: &Scene, beam: BeamPattern, face: Option<Disc>, settings: Settings) -> Self {
+    pub fn new(
+        scene: &Scene,
+        beam: BeamPattern,
+        face: Option<Disc>,
+        settings: PathSettings,
+    ) -> Self {
         let envelope = PatternEnvelope::new(&beam);
         let needs_bound = !scene.cylinders.is_empty() && settings.tilt_rad == 0.0;
         // Smallest loss of a path that the face reflects into another.
@@ -244,7 +249,7 @@ impl<'a> PathArrivals<'a> {
 }
 
 impl Arrivals for PathArrivals<'_> {
-    fn listen(&self, direction_rad: f64, arrivals: &mut Vec<PulseArrival>) {
+    fn collect_arrivals(&self, direction_rad: f64, arrivals: &mut Vec<PulseArrival>) {
         self.collect_arrivals_within(direction_rad, f64::INFINITY, arrivals);
     }
 
@@ -342,14 +347,14 @@ mod tests {
         let scene = Scene::from_json(shipped::text("two-surface-room").expect("shipped"));
         let scene = scene.expect("a scene");
         let sensor = Sensor::preset("senscomp-6500").expect("a preset");
-        let settings = Settings { max_path_m: 3.0, floor: 2e-3, ..LOSSLESS };
+        let settings = PathSettings { max_path_m: 3.0, floor: 2e-3, ..LOSSLESS };
         let described = |through_nulls: bool, direction_rad: f64| {
             let beam = BeamPattern::new(&sensor, 343.0);
             let engine = PathEngine::new(&scene, beam, None, settings.clone());
             let engine = engine.through_nulls(through_nulls);
             let mut described: Vec<PulseArrival> = Vec::new();
             let arrivals = engine.arrivals_at(DVec2::new(1.2, 0.9)).expect("few paths");
-            arrivals.listen(direction_rad, &mut described);
+            arrivals.collect_arrivals(direction_rad, &mut described);
             described.len()
         };
         let mut more = 0;

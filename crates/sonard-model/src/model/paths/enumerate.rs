@@ -5,10 +5,10 @@ use super::{
     cylinders,
     diffraction::{double, level, single},
     echo::{PathEcho, Via, sorted},
+    floor::ALL_SLOPES,
     height::VerticalImage,
     interactions::EchoPath,
     pattern::TwoWayBound,
-    plan::ALL_SLOPES,
     prepare::Paths,
     rays::Rays,
     scattering,
@@ -39,7 +39,7 @@ impl Paths {
         transmitter: DVec2,
         receiver: DVec2,
     ) -> Result<Vec<EchoPath>, TooCostly> {
-        self.each_between(transmitter, receiver, |paths| paths.collect())
+        self.visit_between(transmitter, receiver, |paths| paths.collect())
     }
 
     /// Passes an iterator over all echo paths from a transmitter to a receiver to `visit`, shortest
@@ -47,7 +47,7 @@ impl Paths {
     ///
     /// # Errors
     /// When there are too many.
-    pub fn each_between<T>(
+    pub fn visit_between<T>(
         &self,
         transmitter: DVec2,
         receiver: DVec2,

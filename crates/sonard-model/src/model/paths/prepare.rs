@@ -5,12 +5,12 @@ use std::sync::Arc;
 use super::{
     diffraction::EdgeToEdge,
     effort::{BOUND, Bound, Effort},
-    height::Heights,
-    plan::{
+    floor::{
         Corners, Cylinders, Mesh, PlanCircle, Raised, TracingPlan, WallMirror, extract_posts,
         extract_strips, mirror_gain, scattered,
     },
-    settings::{Settings, usual_z_m},
+    height::Heights,
+    settings::{PathSettings, default_sensor_z_m},
 };
 use crate::{
     acoustics::edge::EdgeLaw,
@@ -32,9 +32,9 @@ pub struct Paths {
 impl Paths {
     /// Prepares a scene with the settings of the search.
     #[must_use]
-    pub fn new(scene: &Scene, settings: Settings) -> Self {
+    pub fn new(scene: &Scene, settings: PathSettings) -> Self {
         let drawn = scene.floor_plan();
-        let usual = || usual_z_m(scene.floor_z_m, scene.ceiling_z_m);
+        let usual = || default_sensor_z_m(scene.floor_z_m, scene.ceiling_z_m);
         let z_m = settings.sensor_z_m.unwrap_or_else(usual);
         let heights = Heights::new(scene, &drawn.walls, z_m, &settings);
         let plan = plan(scene, &drawn, &heights, settings);
@@ -63,7 +63,12 @@ impl Paths {
 }
 
 /// Prepares the floor plan of the objects at relevant heights.
-fn plan(scene: &Scene, drawn: &FloorPlan, heights: &Heights, settings: Settings) -> TracingPlan {
+fn plan(
+    scene: &Scene,
+    drawn: &FloorPlan,
+    heights: &Heights,
+    settings: PathSettings,
+) -> TracingPlan {
     let is_there = |wall: u32| heights.is_relevant(scene.walls[wall as usize].z_m);
     let mut arrangement: Arrangement = drawn.restricted_to(is_there);
     let segments: &[(DVec2, DVec2)] = &drawn.walls;

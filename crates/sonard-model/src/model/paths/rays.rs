@@ -5,7 +5,7 @@ use smallvec::SmallVec;
 use super::{
     beams::{Beams, RayLeg, UnfoldedRay},
     cylinders::{CylinderRay, CylinderRays, OneWay, SpreadRay, Tracer, surfaces_to},
-    plan::TracingPlan,
+    floor::TracingPlan,
 };
 use crate::{
     geometry::DVec2,

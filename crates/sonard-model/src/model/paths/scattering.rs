@@ -16,7 +16,7 @@
 //!
 //! In the plan a wall is a row of patches of an angle `da` each, as high as the beam: `W` is `da`
 //! times the integral of the two-way pattern's square over the rise
-//! ([`Settings::scatter_height_rad`]). Patches are small compared with beam and pulse.
+//! ([`PathSettings::scatter_height_rad`]). Patches are small compared with beam and pulse.
 //! Each has its own echo and phase. Uniformly distributed phases, as those of a rough
 //! surface, let the powers of neighbours add.
 //!
@@ -34,8 +34,8 @@ use std::f64::consts::{PI, TAU};
 use super::{
     beams::{LitWall, RayBeam, RayLeg},
     echo::{PathEcho, Via},
-    plan::{ALL_SLOPES, TracingPlan, WallMirror},
-    settings::Settings,
+    floor::{ALL_SLOPES, TracingPlan, WallMirror},
+    settings::PathSettings,
     tolerance::TIE_M,
 };
 use crate::{
@@ -129,7 +129,12 @@ impl<'a> LitPart<'a> {
 /// Returns `true` if any patch of a wall can be detected that an image of the start, at this height
 /// in front of the wall, illuminates by a beam. The decisive patch is at the foot, nearest and
 /// head-on. All beams of a surface ([`LitPart::surface`]) have the same result.
-fn is_viable(settings: &Settings, beam: &RayBeam, wall_mirror: &WallMirror, height_m: f64) -> bool {
+fn is_viable(
+    settings: &PathSettings,
+    beam: &RayBeam,
+    wall_mirror: &WallMirror,
+    height_m: f64,
+) -> bool {
     let share = share(wall_mirror, 1.0, PATCH_RAD, settings);
     let bound = beam.gain * beam.gain * share.sqrt() * settings.air_gain(2.0 * height_m);
     // Patches may be larger than that by rounding.
@@ -240,7 +245,7 @@ impl PatchRow {
 }
 
 /// Power from a patch relative to that of a head-on mirror.
-fn share(wall_mirror: &WallMirror, cosine: f64, angle_rad: f64, settings: &Settings) -> f64 {
+fn share(wall_mirror: &WallMirror, cosine: f64, angle_rad: f64, settings: &PathSettings) -> f64 {
     4.0 / PI * wall_mirror.scatter * cosine * angle_rad * settings.scatter_height_rad
 }
 
@@ -248,7 +253,7 @@ fn share(wall_mirror: &WallMirror, cosine: f64, angle_rad: f64, settings: &Setti
 mod tests {
     use super::*;
     use crate::{
-        model::paths::plan::{mirror_gain, scattered},
+        model::paths::floor::{mirror_gain, scattered},
         scene::Material,
     };
 
@@ -294,7 +299,8 @@ mod tests {
             scatter: 0.36,
             z_m: None,
         };
-        let settings = Settings { scatter_height_rad: 0.2, ..crate::model::paths::tests::LOSSLESS };
+        let settings =
+            PathSettings { scatter_height_rad: 0.2, ..crate::model::paths::tests::LOSSLESS };
         let (range_m, cosine, angle_rad): (f64, f64, f64) = (1.7, 0.6, 0.01);
         let area = range_m * angle_rad / cosine * range_m * 0.2;
         let meets = area * cosine / (4.0 * PI * range_m * range_m);

@@ -2,14 +2,14 @@
 
 use crate::acoustics::edge::EdgeLaw;
 
-/// Usual [`Settings::repeated_contacts_above`]: with the weakest 20 dB below the threshold,
+/// Usual [`PathSettings::repeated_contact_ratio`]: with the weakest 20 dB below the threshold,
 /// down to the threshold itself. In a room with a round body their number grows a hundredfold per
 /// 20 dB.
 pub const DEFAULT_REPEATED_CONTACT_RATIO: f64 = 10.0;
 
 /// Limits of the path search, and the physics along paths.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Settings {
+pub struct PathSettings {
     /// Longest path there and back, metres.
     pub max_path_m: f64,
     /// Maximum number of mirror reflections; `None` for no limit except length and amplitude.
@@ -18,10 +18,10 @@ pub struct Settings {
     pub floor: f64,
     /// Floor, relative to `floor`, of echoes that touch cylinders more than once, or a cylinder and
     /// an upright edge; see [`DEFAULT_REPEATED_CONTACT_RATIO`]. 1 treats them like all others.
-    pub repeated_contacts_above: f64,
+    pub repeated_contact_ratio: f64,
     /// Longest path, metres, up to which these echoes are also followed down to `floor`: all
     /// earlier arrivals may still overlap when the receiver opens.
-    pub crowded_m: f64,
+    pub unrestricted_m: f64,
     /// Edge law; `None` for mirror reflections only.
     pub edge_law: Option<EdgeLaw>,
     /// Adds paths with two diffractions at upright edges, by the same law at each.
@@ -31,7 +31,7 @@ pub struct Settings {
     /// Wave number `2 pi f / c`, radians per metre.
     pub wave_number_per_m: f64,
     /// Height of the transducer in a scene with heights, metres;
-    /// `None`: see [`usual_z_m`].
+    /// `None`: see [`default_sensor_z_m`].
     pub sensor_z_m: Option<f64>,
     /// Elevation of the transducer's axis, radians.
     pub tilt_rad: f64,
@@ -46,13 +46,13 @@ pub struct Settings {
 /// Default height of a transducer, metres: half a metre above the floor, or half way up to a low
 /// ceiling.
 #[must_use]
-pub fn usual_z_m(floor_z_m: Option<f64>, ceiling_z_m: Option<f64>) -> f64 {
+pub fn default_sensor_z_m(floor_z_m: Option<f64>, ceiling_z_m: Option<f64>) -> f64 {
     let floor_z_m = floor_z_m.or(ceiling_z_m.map(|ceiling| ceiling - 1.0)).unwrap_or(0.0);
     let middle_m = ceiling_z_m.map_or(f64::INFINITY, |ceiling| 0.5 * (ceiling - floor_z_m));
     floor_z_m + middle_m.min(0.5)
 }
 
-impl Settings {
+impl PathSettings {
     pub(crate) fn allows(&self, order: u16) -> bool {
         self.max_order.is_none_or(|bound| order <= bound)
     }
@@ -74,10 +74,10 @@ impl Settings {
     /// Amplitude floor of echoes of at least this length. It is raised for those that touch
     /// cylinders more than once, or a cylinder and an edge.
     pub(crate) fn contact_floor(&self, is_repeated: bool, min_m: f64) -> f64 {
-        if !is_repeated || min_m <= self.crowded_m {
+        if !is_repeated || min_m <= self.unrestricted_m {
             self.floor
         } else {
-            self.repeated_contacts_above * self.floor
+            self.repeated_contact_ratio * self.floor
         }
     }
 }
@@ -96,7 +96,7 @@ mod tests {
             (None, Some(2.0), 1.5),
             (None, None, 0.5),
         ] {
-            let found_m = usual_z_m(floor_z_m, ceiling_z_m);
+            let found_m = default_sensor_z_m(floor_z_m, ceiling_z_m);
             assert!(
                 (found_m - expected_m).abs() < 1e-12,
                 "{floor_z_m:?} {ceiling_z_m:?}: {found_m}"
@@ -106,10 +106,10 @@ mod tests {
 
     #[test]
     fn contact_floor_by_length() {
-        let settings = Settings {
+        let settings = PathSettings {
             floor: 0.002,
-            repeated_contacts_above: 10.0,
-            crowded_m: 0.8,
+            repeated_contact_ratio: 10.0,
+            unrestricted_m: 0.8,
             absorption_np_per_m: 0.2,
             max_order: Some(3),
             ..crate::model::paths::tests::LOSSLESS
@@ -121,7 +121,7 @@ mod tests {
         // exp(-0.2 l) is 0.002 after 31 m.
         assert!((settings.air_gain(settings.detectable_m()) - 0.002).abs() < 1e-12);
         assert!((settings.same_loss_m(0.5) - 0.5_f64.ln() / -0.2).abs() < 1e-12);
-        let lossless = Settings { absorption_np_per_m: 0.0, ..settings };
+        let lossless = PathSettings { absorption_np_per_m: 0.0, ..settings };
         assert_eq!((lossless.same_loss_m(0.5), lossless.detectable_m()), (0.0, 20.0));
     }
 }

@@ -35,12 +35,12 @@ use crate::{
     scene::{DEFAULT_SNAP_M, Material, Scene, Wall},
 };
 
-pub(in crate::model) const LOSSLESS: Settings = Settings {
+pub(in crate::model) const LOSSLESS: PathSettings = PathSettings {
     max_path_m: 20.0,
     max_order: None,
     floor: 1e-4,
-    repeated_contacts_above: DEFAULT_REPEATED_CONTACT_RATIO,
-    crowded_m: 0.0,
+    repeated_contact_ratio: DEFAULT_REPEATED_CONTACT_RATIO,
+    unrestricted_m: 0.0,
     edge_law: None,
     double_diffraction: false,
     absorption_np_per_m: 0.0,
@@ -54,7 +54,7 @@ pub(in crate::model) const LOSSLESS: Settings = Settings {
 impl Paths {
     /// Follows all beams at any height.
     fn without_cuts(mut self) -> Self {
-        let climbs = plan::Climbs { ends_beams: false, ..plan::Climbs::clone(&self.plan.climbs) };
+        let climbs = floor::Climbs { ends_beams: false, ..floor::Climbs::clone(&self.plan.climbs) };
         self.plan.climbs = climbs.into();
         Self { bound: effort::Bound { steps: u64::MAX, bytes: u64::MAX }, ..self }
     }

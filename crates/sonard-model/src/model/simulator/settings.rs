@@ -38,7 +38,7 @@ pub(super) fn path_settings(
     options: &PathOptions,
     receiver: &Receiver,
     scatter_height_rad: f64,
-) -> paths::Settings {
+) -> paths::PathSettings {
     let wave_number_per_m = TAU * sensor.frequency_hz / receiver.sound_speed_m_s;
     let law = match options.edge_law.or(sensor.edge_law) {
         None | Some(EdgeLawKind::Utd) => EdgeLaw::Utd,
@@ -48,12 +48,12 @@ pub(super) fn path_settings(
             far_field_m: sensor.half_width_m().powi(2) * wave_number_per_m / TAU,
         },
     };
-    paths::Settings {
+    paths::PathSettings {
         max_path_m: 2.0 * receiver.max_range_m,
         max_order: options.max_order.map(|order| order.try_into().unwrap_or(u16::MAX)),
         floor: receiver.threshold * 10f64.powf(-PATHS_KEPT_DB / 20.0),
-        repeated_contacts_above: paths::DEFAULT_REPEATED_CONTACT_RATIO,
-        crowded_m: unrestricted_m(receiver),
+        repeated_contact_ratio: paths::DEFAULT_REPEATED_CONTACT_RATIO,
+        unrestricted_m: unrestricted_m(receiver),
         edge_law: Some(law),
         double_diffraction: options.double_diffraction,
         absorption_np_per_m: absorption_db_per_m(sensor, air, options.lossless) / (20.0 * LOG10_E),
@@ -90,8 +90,8 @@ pub(super) fn fan_settings(
         half_face_m: sensor.half_width_m(),
         wavelength_m: receiver.sound_speed_m_s / sensor.frequency_hz,
         absorption_db_per_m: absorption_db_per_m(sensor, air, options.lossless),
-        longest_m: 2.0 * receiver.max_range_m,
-        weakest: receiver.threshold * 10f64.powf(-MARGIN_KEPT_DB / 20.0),
+        max_path_m: 2.0 * receiver.max_range_m,
+        min_amplitude: receiver.threshold * 10f64.powf(-MARGIN_KEPT_DB / 20.0),
         max_order: options.max_order.unwrap_or(u32::MAX),
     }
 }

@@ -6,7 +6,7 @@ use proptest::prelude::*;
 
 use crate::{
     acoustics::{Air, Sensor},
-    array::{MountedRanger, InterferingFiring, RangerArray, FiringSlot},
+    array::{FiringSlot, InterferingFiring, MountedRanger, RangerArray},
     geometry::Pose,
     model::{ArrayModel, Options, PathOptions, Prediction, Simulator},
     reading::PingStatus,

@@ -3,8 +3,8 @@
 use super::*;
 use crate::{
     model::{Mechanism, Prediction},
-    scan_plan::ScanPlan,
     reading::PingStatus,
+    scan_plan::ScanPlan,
 };
 
 const STEP_DEG: f64 = 0.9;

@@ -333,7 +333,7 @@ proptest! {
             prop_assert!(one.0 == other.1 && one.1 == other.0, "{one:?} {other:?}");
         }
         readings(&drawn, DVec2::splat(-0.05), EngineKind::Cone);
-        let settings = crate::model::paths::Settings { max_path_m: 0.3, ..crate::model::paths::tests::LOSSLESS };
+        let settings = crate::model::paths::PathSettings { max_path_m: 0.3, ..crate::model::paths::tests::LOSSLESS };
         let found = crate::model::paths::Paths::new(&drawn, settings).enumerate(DVec2::splat(-0.05));
         prop_assert!(found.iter().flatten().all(|echo| echo.length_m.is_finite()));
     }

@@ -11,7 +11,7 @@ use crate::{
     geometry::{DVec2, Mirror, distance_to_segment, wrap_pi},
     model::{
         Edge, Interaction, Mechanism,
-        paths::{EchoPath, Paths, Settings},
+        paths::{EchoPath, PathSettings, Paths},
     },
 };
 
@@ -211,7 +211,7 @@ fn random_scenes_obey_the_laws() {
         };
         let from = place();
         let to = if case % 2 == 0 { from } else { place() };
-        let settings = Settings {
+        let settings = PathSettings {
             max_path_m: 3.0,
             floor: 6e-3,
             edge_law: Some(EdgeLaw::Utd),

@@ -101,8 +101,8 @@ fn arrivals_match_the_appendix() {
         half_face_m: 0.0193,
         wavelength_m: 0.007,
         absorption_db_per_m: 1.6,
-        longest_m: 6.0,
-        weakest: 1e-4,
+        max_path_m: 6.0,
+        min_amplitude: 1e-4,
         max_order: u32::MAX,
     };
     let fan = Fan::new(&room, BeamPattern::new(&sensor, 343.99), settings);

@@ -37,8 +37,8 @@ fn check(scene: &str, sensor: &str, max_range_m: f64) -> usize {
             let direction_rad = random.random_range(-3.1..3.1);
             let factors = BY_DB.map(|by_db| 10f64.powf(by_db / 20.0));
             let usual = simulator.receiver();
-            let together = point.hear(direction_rad, |firing| {
-                firing.listen(usual, |listening| {
+            let together = point.evaluate(direction_rad, |firing| {
+                firing.evaluate_thresholds(usual, |listening| {
                     factors.map(|by| {
                         let rise = listening.first_rise(by, 0.0);
                         (rise, rise.map(|rise| listening.peak(&rise)))
@@ -49,8 +49,8 @@ fn check(scene: &str, sensor: &str, max_range_m: f64) -> usize {
             for ((rise, peak), by) in together.into_iter().zip(factors) {
                 let mut receiver = usual.clone();
                 receiver.threshold *= by;
-                let alone =
-                    point.hear(direction_rad, |firing| firing.detect(&receiver, Latch::First, 0.0));
+                let alone = point
+                    .evaluate(direction_rad, |firing| firing.detect(&receiver, Latch::First, 0.0));
                 let alone = alone.expect("few paths");
                 let place = format!("{} {pose:?} {direction_rad} {by}", scene.name);
                 let status = rise.map_or(PingStatus::NoEcho, |rise| rise.status);

@@ -3,8 +3,8 @@
 use super::*;
 use crate::{
     model::{Mechanism, Prediction},
-    scan_plan::ScanPlan,
     reading::PingStatus,
+    scan_plan::ScanPlan,
 };
 
 fn scan(scene_name: &str, pose_name: &str, step_deg: f64) -> (Simulator, Vec<(f64, Prediction)>) {

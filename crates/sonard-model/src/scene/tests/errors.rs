@@ -16,8 +16,8 @@ fn check(part: &str, bad: &str, points_at: &str, expect: &str, help: &str) {
         text.lines().nth(line).into_iter().flat_map(|l| l.chars().skip(column)).collect();
     let first_line = points_at.lines().next().unwrap_or_default();
     assert!(from_there.starts_with(first_line), "{error}");
-    let shown = error.to_string();
-    let shown = sanitize.strip_prefix(&place).expect("line and column come first");
+    let message = error.to_string();
+    let shown = message.strip_prefix(&place).expect("line and column come first");
     assert!(shown.starts_with(expect), "got `{shown}`, expected `{expect}`");
     assert!(error.help().contains(help), "help `{}` lacks `{help}`", error.help());
 }

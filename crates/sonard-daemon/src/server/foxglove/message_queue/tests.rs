@@ -1,6 +1,6 @@
 use proptest::prelude::*;
 use serde_json::{Value, json};
-use sonard_export::{LiveConverter, ExportSettings};
+use sonard_export::{ExportSettings, LiveConverter};
 use sonard_records::{Record, decode_line};
 
 use super::*;

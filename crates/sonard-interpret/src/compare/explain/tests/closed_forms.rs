@@ -7,7 +7,7 @@ use sonard_records::{
 };
 
 use super::{
-    super::{Explainer, ChangedQuantity, fit::fit},
+    super::{ChangedQuantity, Explainer, fit::fit},
     World,
 };
 

@@ -16,7 +16,7 @@ use crate::{
     model::{
         SearchPart,
         paths::{
-            plan::{ALL_SLOPES, Mesh, TracingPlan, TriangleSide},
+            floor::{ALL_SLOPES, Mesh, TracingPlan, TriangleSide},
             tolerance::TIE_M,
         },
     },

@@ -1,7 +1,7 @@
 //! Surfaces that beams illuminate.
 
 use super::beam::RayBeam;
-use crate::model::paths::plan::AngleSpan;
+use crate::model::paths::floor::AngleSpan;
 
 /// A beam, all of which hits one cylinder.
 #[derive(Debug, Clone, Copy)]

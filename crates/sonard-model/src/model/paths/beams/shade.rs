@@ -10,7 +10,7 @@ use super::{
 };
 use crate::{
     geometry::{DVec2, signed_angle_rad},
-    model::paths::plan::{AngleSpan, Cylinders, PlanCircle, SurfaceArc},
+    model::paths::floor::{AngleSpan, Cylinders, PlanCircle, SurfaceArc},
 };
 
 /// Returns the parts of a beam that pass the cylinders in its triangle, from right to left. The

@@ -12,7 +12,7 @@ use std::ops::Range;
 
 use smallvec::SmallVec;
 
-use crate::model::paths::plan::{ALL_SLOPES, united};
+use crate::model::paths::floor::{ALL_SLOPES, united};
 
 /// Tolerance of distances to walls, for snapped walls and rays on ties, metres.
 const LOOSE_M: f64 = 1e-5;

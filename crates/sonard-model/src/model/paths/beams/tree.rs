@@ -5,7 +5,7 @@ use super::{
     lit::{LitCylinder, LitWall},
     slopes::Slopes,
 };
-use crate::{geometry::DVec2, model::paths::plan::WallMirror};
+use crate::{geometry::DVec2, model::paths::floor::WallMirror};
 
 /// Node of a beam without a reflection. The numbers just below it are those of the beams from a
 /// corner, one for each triangle around that corner.

@@ -23,8 +23,8 @@ use crate::{
         paths::{
             beams::{LitCylinder, RayLeg},
             echo::{PathEcho, Via},
+            floor::{PlanCircle, TracingPlan},
             pattern::TwoWayBound,
-            plan::{PlanCircle, TracingPlan},
         },
     },
 };
@@ -218,8 +218,9 @@ impl<'a> Connector<'a> {
         let length_m = a.length_m + off(a) + b.length_m + off(b);
         let amplitude = self.amplitude(&contacts, circle, gain);
         let departures = [out.departure(a.at_rad), back.departure(b.at_rad)];
-        let pattern_gain =
-            self.bound.map_or(1.0, |bound| bound.at(signed_angle_rad(departures[0], departures[1]).abs()));
+        let pattern_gain = self
+            .bound
+            .map_or(1.0, |bound| bound.at(signed_angle_rad(departures[0], departures[1]).abs()));
         let floor = settings.contact_floor(out.half_path.level > 0, length_m);
         let fits = length_m <= settings.max_path_m && amplitude * pattern_gain >= floor;
         fits.then_some(ConnectedPair {

@@ -3,7 +3,7 @@
 use super::front::Front;
 use crate::{
     geometry::{DVec2, wrap_pi},
-    model::paths::plan::PlanCircle,
+    model::paths::floor::PlanCircle,
 };
 
 /// A ray at its contact with a cylinder.

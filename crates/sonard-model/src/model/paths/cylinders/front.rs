@@ -4,7 +4,7 @@ use crate::{
     geometry::DVec2,
     model::{
         Reflector,
-        paths::plan::{PlanCircle, TracingPlan, WallMirror},
+        paths::floor::{PlanCircle, TracingPlan, WallMirror},
     },
 };
 

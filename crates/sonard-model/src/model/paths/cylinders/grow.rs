@@ -31,7 +31,7 @@ use crate::{
         Reflector, SearchPart,
         paths::{
             beams::{Beams, LitCylinder, UnfoldedRay},
-            plan::{AngleSpan, PlanCircle, TracingPlan, TriangleSide},
+            floor::{AngleSpan, PlanCircle, TracingPlan, TriangleSide},
         },
     },
 };

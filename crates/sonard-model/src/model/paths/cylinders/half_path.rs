@@ -17,7 +17,7 @@ use crate::{
     geometry::DVec2,
     model::paths::{
         beams::{LitCylinder, RayLeg},
-        plan::{AngleSpan, TracingPlan},
+        floor::{AngleSpan, TracingPlan},
     },
 };
 

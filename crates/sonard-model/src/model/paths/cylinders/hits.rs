@@ -18,7 +18,7 @@ use crate::{
     geometry::DVec2,
     model::{
         Reflector,
-        paths::plan::{AngleSpan, PlanCircle, SurfaceArc},
+        paths::floor::{AngleSpan, PlanCircle, SurfaceArc},
     },
 };
 

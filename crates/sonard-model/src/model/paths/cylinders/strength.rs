@@ -15,7 +15,7 @@
 //! converge. The best `x` and `y` of the possible partners of a half-path therefore bound every
 //! echo of the half-path and its continuations.
 
-use crate::model::paths::settings::Settings;
+use crate::model::paths::settings::PathSettings;
 
 /// Margin in power by which rays of a tube may exceed the sampled rays. The tube's part of a
 /// cylinder turns by 0.7 radians at most.
@@ -35,7 +35,7 @@ impl Strength {
         gain: f64,
         [length_m, width_m, growth]: [f64; 3],
         radius_m: f64,
-        settings: &Settings,
+        settings: &PathSettings,
     ) -> Self {
         let power = (gain * settings.air_gain(length_m)).powi(2);
         Self { x: power / (growth + 2.0 * width_m / radius_m), y: power * length_m / width_m }

@@ -8,7 +8,7 @@ use super::{
 };
 use crate::{
     geometry::DVec2,
-    model::paths::{beams::Beams, echo::PathEcho, pattern::TwoWayBound, plan::TracingPlan},
+    model::paths::{beams::Beams, echo::PathEcho, floor::TracingPlan, pattern::TwoWayBound},
 };
 
 /// Echoes by way of cylinders, and rays to edges.

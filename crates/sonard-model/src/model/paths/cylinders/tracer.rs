@@ -12,7 +12,7 @@ use crate::{
         Reflector,
         paths::{
             beams::{LitCylinder, RayLeg},
-            plan::{PlanCircle, TracingPlan},
+            floor::{PlanCircle, TracingPlan},
         },
     },
 };
@@ -57,7 +57,11 @@ impl Images {
     /// Appends the image by one more wall.
     fn by(self, mirror: &Mirror) -> Self {
         let Self { x, y, origin } = self;
-        Self { x: mirror.image_of_direction(x), y: mirror.image_of_direction(y), origin: mirror.image(origin) }
+        Self {
+            x: mirror.image_of_direction(x),
+            y: mirror.image_of_direction(y),
+            origin: mirror.image(origin),
+        }
     }
 
     fn of_direction(&self, direction: DVec2) -> DVec2 {

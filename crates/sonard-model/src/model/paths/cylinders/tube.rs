@@ -11,7 +11,7 @@ use super::{
 use crate::{
     geometry::DVec2,
     model::paths::{
-        plan::{AngleSpan, PlanCircle},
+        floor::{AngleSpan, PlanCircle},
         tolerance::TIE_M,
     },
 };

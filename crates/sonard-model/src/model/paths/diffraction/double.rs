@@ -43,9 +43,9 @@ use crate::{
         paths::{
             beams::UnfoldedRay,
             echo::{PathEcho, Via},
-            plan::{Facing, Flank, PlanCorner, TracingPlan},
+            floor::{Facing, Flank, PlanCorner, TracingPlan},
             rays::Rays,
-            settings::Settings,
+            settings::PathSettings,
         },
     },
 };
@@ -123,7 +123,7 @@ struct EdgePair<'a> {
 /// Connects rays out, from edge to edge and back.
 struct DoubleSearch<'a> {
     plan: &'a TracingPlan,
-    settings: &'a Settings,
+    settings: &'a PathSettings,
     law: EdgeLaw,
     paths: Vec<DoubleDiffraction>,
     echoes: Vec<PathEcho>,

@@ -4,9 +4,9 @@ use crate::model::paths::{
     beams::UnfoldedRay,
     cylinders::SpreadRay,
     echo::drop_repeats,
-    plan::{ALL_SLOPES, PlanCorner},
+    floor::{ALL_SLOPES, PlanCorner},
     rays::Rays,
-    settings::Settings,
+    settings::PathSettings,
     tolerance::{SAME_M, SAME_RAD},
 };
 
@@ -107,6 +107,6 @@ pub(crate) fn is_same_departure(a: &UnfoldedRay, b: &UnfoldedRay) -> bool {
 
 /// Amplitude floor of echoes of a length, out on one ray to an edge and back on one to the same or
 /// another edge.
-pub(crate) fn floor(settings: &Settings, out: &EdgeRay, back: &EdgeRay, length_m: f64) -> f64 {
+pub(crate) fn floor(settings: &PathSettings, out: &EdgeRay, back: &EdgeRay, length_m: f64) -> f64 {
     settings.contact_floor(out.is_spread || back.is_spread, length_m)
 }

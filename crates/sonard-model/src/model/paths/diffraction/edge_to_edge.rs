@@ -8,8 +8,8 @@ use super::edge_ray::is_same_departure;
 use crate::model::paths::{
     beams::{Beams, UnfoldedRay},
     effort::{BOUND, Effort},
-    plan::{ALONG_RAD, Mesh, TracingPlan},
-    settings::Settings,
+    floor::{ALONG_RAD, Mesh, TracingPlan},
+    settings::PathSettings,
     tolerance::SAME_M,
 };
 
@@ -44,7 +44,7 @@ impl Default for EdgeToEdge {
 }
 
 impl EdgeToEdge {
-    pub(crate) fn new(mesh: &Mesh, settings: &Settings) -> Self {
+    pub(crate) fn new(mesh: &Mesh, settings: &PathSettings) -> Self {
         let from = mesh.points.iter().map(|_| OnceLock::new()).collect();
         let effort = Arc::new(Effort::new(BOUND));
         Self { from, around: mesh.around_points(), max_path_m: settings.max_path_m, effort }

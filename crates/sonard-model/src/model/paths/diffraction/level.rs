@@ -49,8 +49,8 @@ use crate::{
         paths::{
             beams::{Beams, LitWall, RayLeg, UnfoldedRay},
             echo::{PathEcho, Via, drop_repeats},
+            floor::{ALL_SLOPES, TracingPlan},
             height::{Heights, PathEnds},
-            plan::{ALL_SLOPES, TracingPlan},
             rays::wall_contacts,
             tolerance::{SAME_M, SAME_RAD},
         },

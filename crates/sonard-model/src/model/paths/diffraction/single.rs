@@ -10,9 +10,9 @@ use crate::{
         paths::{
             echo::{PathEcho, Via},
             effort::Effort,
-            plan::{PlanCorner, TracingPlan},
+            floor::{PlanCorner, TracingPlan},
             rays::Rays,
-            settings::Settings,
+            settings::PathSettings,
         },
     },
 };
@@ -83,7 +83,7 @@ pub(crate) fn lead_m(plan: &TracingPlan, out: &Rays, back: &Rays, echo: &PathEch
 struct SingleSearch<'a> {
     law: EdgeLaw,
     plan: &'a TracingPlan,
-    settings: &'a Settings,
+    settings: &'a PathSettings,
     effort: &'a Effort,
 }
 

@@ -7,7 +7,7 @@ use crate::{
     geometry::DVec2,
     model::{
         Mechanism, Reflector,
-        paths::{plan::Cylinders, tolerance::TIE_M},
+        paths::{floor::Cylinders, tolerance::TIE_M},
     },
 };
 

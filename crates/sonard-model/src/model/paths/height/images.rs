@@ -15,8 +15,8 @@ use crate::{
     geometry::DVec2,
     model::paths::{
         echo::{PathEcho, Via},
-        plan::ALL_SLOPES,
-        settings::Settings,
+        floor::ALL_SLOPES,
+        settings::PathSettings,
     },
 };
 
@@ -35,7 +35,7 @@ pub(crate) struct VerticalImage {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct HorizontalMirror {
     pub(crate) z_m: f64,
-    /// See [`mirror_gain`](crate::model::paths::plan::mirror_gain).
+    /// See [`mirror_gain`](crate::model::paths::floor::mirror_gain).
     pub(crate) gain: f64,
 }
 
@@ -45,7 +45,7 @@ pub(crate) fn images(
     floor: Option<HorizontalMirror>,
     ceiling: Option<HorizontalMirror>,
     z_m: f64,
-    settings: &Settings,
+    settings: &PathSettings,
 ) -> Vec<VerticalImage> {
     let reach_m = settings.max_path_m;
     let below = floor.map(|floor| z_m - floor.z_m);
@@ -99,7 +99,7 @@ impl VerticalImage {
         &self,
         plan: &PathEcho,
         index: u16,
-        settings: &Settings,
+        settings: &PathSettings,
     ) -> Option<PathEcho> {
         // Scattered sound returns along its own path; level edges have their own images by floor
         // and ceiling.
@@ -136,7 +136,7 @@ impl VerticalImage {
         &self,
         index: u16,
         apart: DVec2,
-        settings: &Settings,
+        settings: &PathSettings,
     ) -> Option<PathEcho> {
         let along = apart.try_normalize().unwrap_or(DVec2::X);
         let nowhere = PathEcho {

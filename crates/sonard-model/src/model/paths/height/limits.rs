@@ -19,8 +19,8 @@ use crate::{
     model::{
         Reflector,
         paths::{
-            plan::{Climbs, Spans, WallClimbs, mirror_gain, united},
-            settings::Settings,
+            floor::{Climbs, Spans, WallClimbs, mirror_gain, united},
+            settings::PathSettings,
             tolerance::TIE_M,
         },
     },
@@ -56,7 +56,7 @@ impl Heights {
         scene: &Scene,
         segments: &[(DVec2, DVec2)],
         z_m: f64,
-        settings: &Settings,
+        settings: &PathSettings,
     ) -> Self {
         let walls: Vec<_> = scene.walls.iter().map(|wall| wall.z_m).collect();
         let limited = (0..)
@@ -106,7 +106,7 @@ impl Heights {
     }
 
     /// Climbs by wall at which sound hits and passes it; empty if no path rises.
-    pub(crate) fn climbs(&self, settings: &Settings) -> Climbs {
+    pub(crate) fn climbs(&self, settings: &PathSettings) -> Climbs {
         if !self.rises() {
             return Climbs::default();
         }

@@ -29,7 +29,7 @@ fn rounds_spread_as_matrix_power() {
     let (gap, height, r) = (0.095, 0.085, 0.15);
     let mut plan = scene(&[[-30.0, 0.0, 30.0, 0.0]]);
     plan.cylinders = vec![body(DVec2::new(0.0, gap + r), r)];
-    let settings = Settings { max_path_m: 4.0, floor: 1e-5, ..LOSSLESS };
+    let settings = PathSettings { max_path_m: 4.0, floor: 1e-5, ..LOSSLESS };
     let echoes = Paths::new(&plan, settings).enumerate(DVec2::new(0.0, height)).expect("few paths");
 
     // From the body to the wall and back: `w += D g`, then `g += 2 w / r`.
@@ -112,7 +112,7 @@ fn energy_equals_random_rays() {
     const RAYS: u32 = 600_000;
     let (from, at, reach_m, radius_m) = (DVec2::new(0.3, 0.2), DVec2::new(0.25, 0.5), 1.9, 0.005);
     let room = narrow_room();
-    let settings = Settings { max_path_m: reach_m, floor: 1e-5, ..LOSSLESS };
+    let settings = PathSettings { max_path_m: reach_m, floor: 1e-5, ..LOSSLESS };
     let echoes = Paths::new(&room, settings).enumerate_between(from, at).expect("few paths");
     assert!(echoes.len() > 40, "{}", echoes.len());
     let share: f64 = echoes.iter().map(|echo| echo.amplitude.powi(2) / echo.length_m).sum();
@@ -127,7 +127,8 @@ fn energy_equals_random_rays() {
 
 #[test]
 fn body_paths_are_reciprocal() {
-    let paths = Paths::new(&narrow_room(), Settings { max_path_m: 2.5, floor: 1e-3, ..LOSSLESS });
+    let paths =
+        Paths::new(&narrow_room(), PathSettings { max_path_m: 2.5, floor: 1e-3, ..LOSSLESS });
     let (t, r) = (DVec2::new(0.3, 0.2), DVec2::new(0.774, 0.05));
     let (there, back) = (
         paths.enumerate_between(t, r).expect("few paths"),
@@ -150,7 +151,7 @@ fn body_paths_are_reciprocal() {
 #[test]
 fn contacts_end_with_detectability() {
     let most = |floor: f64| {
-        let paths = Paths::new(&narrow_room(), Settings { max_path_m: 3.0, floor, ..LOSSLESS });
+        let paths = Paths::new(&narrow_room(), PathSettings { max_path_m: 3.0, floor, ..LOSSLESS });
         let at_body = |echo: &EchoPath| {
             reflectors(&echo.path).iter().filter(|wall| **wall == Reflector::Cylinder(0)).count()
         };

@@ -7,8 +7,8 @@ use crate::model::{
 };
 
 /// Settings as for `senscomp-6500` at its full range.
-fn settings() -> Settings {
-    Settings {
+fn settings() -> PathSettings {
+    PathSettings {
         max_path_m: 21.4,
         floor: 0.00175,
         absorption_np_per_m: 0.189,
@@ -63,7 +63,7 @@ fn star(corners: usize) -> Scene {
 }
 
 /// Number of paths, unless there are too many, and the steps of the search.
-fn searched(room: &Scene, at: DVec2, settings: Settings) -> (Result<usize, TooCostly>, u64) {
+fn searched(room: &Scene, at: DVec2, settings: PathSettings) -> (Result<usize, TooCostly>, u64) {
     let paths = Paths::new(room, settings);
     let search = Paths { plan: paths.plan.for_search(paths.bound), ..paths.clone() };
     let (_, echoes) = search.trace_all(at, at, None);
@@ -87,7 +87,7 @@ fn low_boxes_are_searched_fully() {
 
 #[test]
 fn effort_limit_holds() {
-    let double = Settings { double_diffraction: true, ..settings() };
+    let double = PathSettings { double_diffraction: true, ..settings() };
     for (room, settings) in [(ring(60), settings()), (star(200), double)] {
         let (found, steps) = searched(&room, DVec2::new(0.1, 0.05), settings);
         assert!(steps <= 2 * BOUND.steps + AT_ONCE, "{steps} {found:?}");
@@ -96,12 +96,12 @@ fn effort_limit_holds() {
 
 #[test]
 fn error_names_the_excess() {
-    let refused = |room: &Scene, settings: Settings, bound: Bound| {
+    let refused = |room: &Scene, settings: PathSettings, bound: Bound| {
         let paths = Paths { bound, ..Paths::new(room, settings) };
         paths.enumerate(DVec2::new(0.1, 0.05)).expect_err("too many paths")
     };
     let steps = Bound { steps: 20_000, ..BOUND };
-    let mirrors = Settings { edge_law: None, ..settings() };
+    let mirrors = PathSettings { edge_law: None, ..settings() };
     let of_beams = refused(&ring(60), mirrors, steps);
     assert_eq!(of_beams.part, SearchPart::Beams);
     let message = of_beams.to_string();
@@ -110,7 +110,7 @@ fn error_names_the_excess() {
         "{message}"
     );
     assert!(!message.contains("double-diffraction"), "{message}");
-    let double = Settings { double_diffraction: true, max_path_m: 6.0, ..settings() };
+    let double = PathSettings { double_diffraction: true, max_path_m: 6.0, ..settings() };
     assert!(refused(&star(200), double.clone(), steps).to_string().contains("double-diffraction"));
     // Memory is limited as work is.
     let bytes = Bound { bytes: 10_000, ..BOUND };

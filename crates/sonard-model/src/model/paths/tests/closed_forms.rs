@@ -15,7 +15,7 @@ fn dihedral(opening_rad: f64, turn_rad: f64) -> Scene {
 fn wall_head_on() {
     let mut wall = scene(&[[-1.0, 0.5, 4.0, 0.5]]);
     wall.walls[0].material = Material { reflectance: 0.9, roughness: 0.19 };
-    let settings = Settings { absorption_np_per_m: 0.2, ..LOSSLESS };
+    let settings = PathSettings { absorption_np_per_m: 0.2, ..LOSSLESS };
     for side in [-1.0, 1.0] {
         let at = DVec2::new(0.3, 0.5 + side * 0.7);
         let echoes = Paths::new(&wall, settings.clone()).enumerate(at).expect("few paths");
@@ -35,7 +35,7 @@ fn wall_head_on() {
 fn right_angled_corner_has_one_echo() {
     for turn in [0.0, 0.3, 1.234, 4.0] {
         let at = 0.8 * DVec2::from_angle(turn + 0.61);
-        let settings = Settings { max_path_m: 10.0, edge_law: Some(EdgeLaw::Utd), ..LOSSLESS };
+        let settings = PathSettings { max_path_m: 10.0, edge_law: Some(EdgeLaw::Utd), ..LOSSLESS };
         let echoes =
             Paths::new(&dihedral(FRAC_PI_2, turn), settings).enumerate(at).expect("few paths");
         let double: Vec<_> = echoes.iter().filter(|e| reflectors(&e.path).len() == 2).collect();
@@ -56,7 +56,7 @@ fn dihedral_images() {
         for share in [0.21, 0.37, 0.83] {
             let (angle, turn) = (share * opening, 0.7);
             let at = 1.3 * DVec2::from_angle(turn + angle);
-            let settings = Settings { max_path_m: 4.0, ..LOSSLESS };
+            let settings = PathSettings { max_path_m: 4.0, ..LOSSLESS };
             let echoes =
                 Paths::new(&dihedral(opening, turn), settings).enumerate(at).expect("few paths");
             let mut expected: Vec<f64> = (-20..=20)
@@ -85,7 +85,7 @@ fn dihedral_images() {
 fn straight_joints_are_invisible() {
     // The foot of the normal is exactly on a joint.
     let wall = scene(&[[-3.0, 0.0, 0.25, 0.0], [0.25, 0.0, 0.3, 0.0], [0.3, 0.0, 4.0, 0.0]]);
-    let settings = Settings { edge_law: Some(EdgeLaw::Utd), max_path_m: 4.0, ..LOSSLESS };
+    let settings = PathSettings { edge_law: Some(EdgeLaw::Utd), max_path_m: 4.0, ..LOSSLESS };
     for x in [0.25, 0.26, 0.3] {
         let echoes =
             Paths::new(&wall, settings.clone()).enumerate(DVec2::new(x, 0.9)).expect("few paths");
@@ -97,7 +97,7 @@ fn straight_joints_are_invisible() {
 #[test]
 fn wall_end_is_half_a_wall() {
     let wall = scene(&[[0.0, 0.0, 9.0, 0.0]]);
-    let settings = Settings { edge_law: Some(EdgeLaw::Utd), max_path_m: 4.0, ..LOSSLESS };
+    let settings = PathSettings { edge_law: Some(EdgeLaw::Utd), max_path_m: 4.0, ..LOSSLESS };
     let echoes = Paths::new(&wall, settings).enumerate(DVec2::new(0.0, 0.5)).expect("few paths");
     assert_eq!(echoes.len(), 2);
     let total: f64 = echoes.iter().map(|echo| echo.amplitude * echo.phase_rad.cos()).sum();
@@ -108,7 +108,7 @@ fn wall_end_is_half_a_wall() {
 fn edge_along_its_wall() {
     // Facing the end of a plate: only the near end is visible.
     let wall = scene(&[[0.0, 0.0, 1.0, 0.0]]);
-    let settings = Settings { edge_law: Some(EdgeLaw::KucSiegel), ..LOSSLESS };
+    let settings = PathSettings { edge_law: Some(EdgeLaw::KucSiegel), ..LOSSLESS };
     let echoes = Paths::new(&wall, settings).enumerate(DVec2::new(-0.5, 0.0)).expect("few paths");
     assert_eq!(echoes.len(), 1);
     let end = Diffractor::Upright(Edge { wall: 0, at_b: false });

@@ -36,7 +36,7 @@ fn nearest_point_and_spreading() {
 fn cylinder_hides_the_wall() {
     let mut plan = scene(&[[-5.0, 3.0, 5.0, 3.0]]);
     plan.cylinders = vec![cylinder(0.0, 1.5, 0.2)];
-    let settings = Settings { max_order: Some(1), ..LOSSLESS };
+    let settings = PathSettings { max_order: Some(1), ..LOSSLESS };
     let paths = Paths::new(&plan, settings);
     let kinds = |x: f64| {
         let echoes = paths.enumerate(DVec2::new(x, 0.0)).expect("few paths");
@@ -53,7 +53,7 @@ fn shortest_path_by_wall() {
     let mut plan = scene(&[[-5.0, 0.0, 5.0, 0.0]]);
     plan.cylinders = vec![cylinder(0.9, 0.8, 0.25)];
     let at = DVec2::new(-0.4, 0.5);
-    let settings = Settings { max_path_m: 6.0, ..LOSSLESS };
+    let settings = PathSettings { max_path_m: 6.0, ..LOSSLESS };
     let echoes = Paths::new(&plan, settings).enumerate(at).expect("few paths");
     let below = DVec2::new(at.x, -at.y);
     let over = |p: DVec2, q: DVec2| {
@@ -134,7 +134,7 @@ fn shortest_path_by_two_cylinders() {
     let mut plan = scene(&[[-3.0, -0.9, 3.0, -0.9]]);
     plan.cylinders = vec![cylinder(1.0, 0.3, 0.25), cylinder(-0.9, 0.6, 0.35)];
     let at = DVec2::new(0.1, -0.2);
-    let echoes = Paths::new(&plan, Settings { max_path_m: 6.0, ..LOSSLESS })
+    let echoes = Paths::new(&plan, PathSettings { max_path_m: 6.0, ..LOSSLESS })
         .enumerate(at)
         .expect("few paths");
     let (a, b, w) = (Reflector::Cylinder(0), Reflector::Cylinder(1), Reflector::Wall(0));
@@ -162,7 +162,7 @@ fn spreading_equals_ray_divergence() {
     let mut plan = scene(&[]);
     plan.cylinders = vec![cylinder(0.8, 0.3, 0.25), cylinder(-0.9, 0.1, 0.35)];
     let at = DVec2::new(0.1, 0.0);
-    let echoes = Paths::new(&plan, Settings { max_path_m: 6.0, ..LOSSLESS })
+    let echoes = Paths::new(&plan, PathSettings { max_path_m: 6.0, ..LOSSLESS })
         .enumerate(at)
         .expect("few paths");
     let echo = echoes.iter().find(|echo| reflectors(&echo.path).len() == 2).expect("by both");
@@ -195,7 +195,7 @@ fn huge_cylinder_is_a_wall() {
     round.cylinders = vec![cylinder(0.0, -1e5, 1e5)];
     let flat = scene(&[[-1.5, 1.0, 1.0, 1.0], [1.0, 1.0, 1.3, 0.4], [-60.0, 0.0, 60.0, 0.0]]);
     let settings =
-        Settings { max_path_m: 7.0, edge_law: Some(EdgeLaw::Utd), floor: 1e-3, ..LOSSLESS };
+        PathSettings { max_path_m: 7.0, edge_law: Some(EdgeLaw::Utd), floor: 1e-3, ..LOSSLESS };
     let at = DVec2::new(0.2, 0.35);
     let all = |plan: &Scene| Paths::new(plan, settings.clone()).enumerate(at).expect("few paths");
     let (round, flat) = (all(&round), all(&flat));
@@ -223,7 +223,7 @@ fn edge_by_way_of_cylinder() {
     plan.cylinders = vec![cylinder(-1.0, 0.3, 0.3)];
     let at = DVec2::new(0.0, 0.0);
     let settings =
-        Settings { max_path_m: 6.0, edge_law: Some(EdgeLaw::Utd), floor: 1e-5, ..LOSSLESS };
+        PathSettings { max_path_m: 6.0, edge_law: Some(EdgeLaw::Utd), floor: 1e-5, ..LOSSLESS };
     let echoes = Paths::new(&plan, settings).enumerate(at).expect("few paths");
     let edge = DVec2::new(0.0, 1.2);
     let by = (0..1_000_000)
@@ -264,7 +264,7 @@ fn omitted_weak_echoes_are_harmless() {
             .expect("valid options");
         let beam = BeamPattern::new(&sensor, simulator.sound_speed_m_s());
         let own = simulator.path_settings();
-        let engines = [own.clone(), Settings { repeated_contacts_above: 1.0, ..own }]
+        let engines = [own.clone(), PathSettings { repeated_contact_ratio: 1.0, ..own }]
             .map(|settings| PathEngine::new(&plan, beam.clone(), None, settings));
         let both = engines
             .each_ref()
@@ -272,7 +272,8 @@ fn omitted_weak_echoes_are_harmless() {
         for azimuth in 0..120 {
             let [some, every] = both.each_ref().map(|engine| {
                 let mut arrivals = Vec::new();
-                engine.listen(pose.direction_rad(3.0 * f64::from(azimuth)), &mut arrivals);
+                engine
+                    .collect_arrivals(pose.direction_rad(3.0 * f64::from(azimuth)), &mut arrivals);
                 simulator.receiver().detect(&arrivals)
             });
             all += 1;
@@ -293,7 +294,7 @@ fn order_limits_the_search() {
     let mut plan = scene(&[]);
     plan.cylinders = vec![cylinder(1.0, 0.3, 0.25), cylinder(-0.9, 0.6, 0.35)];
     let steps = |max_order: u16| {
-        let settings = Settings { max_path_m: 6.0, max_order: Some(max_order), ..LOSSLESS };
+        let settings = PathSettings { max_path_m: 6.0, max_order: Some(max_order), ..LOSSLESS };
         let paths = Paths::new(&plan, settings);
         let search = Paths { plan: paths.plan.for_search(paths.bound), ..paths };
         search.trace_all(at, at, None);

@@ -48,7 +48,7 @@ impl Chain {
         let echoes = (0..=steps)
             .map(|i| {
                 let f = reference.f0 - BAND_HZ + STEP_HZ * f64::from(i);
-                let settings = Settings {
+                let settings = PathSettings {
                     max_path_m: 4.1,
                     floor: 1e-5,
                     edge_law: Some(EdgeLaw::Utd),

@@ -129,7 +129,7 @@ fn field_matches_macdonald() {
     ] {
         for step in -60..=60 {
             let above_m = 0.01 * f64::from(step) + 1e-4;
-            let settings = Settings { floor: 1e-9, ..at_height(above_m) };
+            let settings = PathSettings { floor: 1e-9, ..at_height(above_m) };
             let echoes = Paths::new(&half_plane(), settings)
                 .enumerate_between(source, target)
                 .expect("few paths");

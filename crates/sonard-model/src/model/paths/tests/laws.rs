@@ -21,8 +21,8 @@ fn clutter() -> Vec<[f64; 4]> {
     ]
 }
 
-fn settings() -> Settings {
-    Settings {
+fn settings() -> PathSettings {
+    PathSettings {
         max_path_m: 9.0,
         floor: 1e-3,
         edge_law: Some(EdgeLaw::Utd),
@@ -108,7 +108,7 @@ fn echoes_turn_with_the_world() {
 
 #[test]
 fn no_energy_gain() {
-    let lossless = Settings { absorption_np_per_m: 0.0, ..settings() };
+    let lossless = PathSettings { absorption_np_per_m: 0.0, ..settings() };
     let loud = Paths::new(&scene(&clutter()), lossless).enumerate(AT).expect("few paths");
     assert!(loud.iter().all(|echo| echo.amplitude <= 1.0 + 1e-12));
 
@@ -117,7 +117,7 @@ fn no_energy_gain() {
         for wall in &mut plan.walls {
             wall.material.reflectance = reflectance;
         }
-        Paths::new(&plan, Settings { absorption_np_per_m, ..settings() })
+        Paths::new(&plan, PathSettings { absorption_np_per_m, ..settings() })
             .enumerate(AT)
             .expect("few paths")
     };
@@ -136,7 +136,7 @@ fn no_energy_gain() {
 fn wider_limits_only_add() {
     let plan = scene(&clutter());
     let few = Paths::new(&plan, settings()).enumerate(AT).expect("few paths");
-    let more = Settings { floor: 2e-4, max_path_m: 11.0, ..settings() };
+    let more = PathSettings { floor: 2e-4, max_path_m: 11.0, ..settings() };
     let many = Paths::new(&plan, more).enumerate(AT).expect("few paths");
     let kept: Vec<_> =
         many.iter().filter(|e| e.amplitude >= 1e-3 && e.length_m <= 9.0).cloned().collect();
@@ -154,7 +154,7 @@ fn opening_corner_is_continuous() {
         let b = 9.0 * DVec2::from_angle(opening);
         let corner = scene(&[[0.0, 0.0, 9.0, 0.0], [b.x, b.y, 0.0, 0.0]]);
         let at = range * DVec2::from_angle(0.6);
-        let settings = Settings { max_path_m: 1.7, edge_law: Some(EdgeLaw::Utd), ..LOSSLESS };
+        let settings = PathSettings { max_path_m: 1.7, edge_law: Some(EdgeLaw::Utd), ..LOSSLESS };
         let echoes = Paths::new(&corner, settings).enumerate(at).expect("few paths");
         // The echoes of the single walls are shorter.
         let of_corner = echoes.iter().filter(|echo| echo.length_m > 1.5);

@@ -10,8 +10,13 @@ use super::{
 };
 use crate::model::{Mechanism, Reflector};
 
-pub(super) fn at_height(z_m: f64) -> Settings {
-    Settings { sensor_z_m: Some(z_m), max_path_m: 8.0, edge_law: Some(EdgeLaw::Utd), ..LOSSLESS }
+pub(super) fn at_height(z_m: f64) -> PathSettings {
+    PathSettings {
+        sensor_z_m: Some(z_m),
+        max_path_m: 8.0,
+        edge_law: Some(EdgeLaw::Utd),
+        ..LOSSLESS
+    }
 }
 
 pub(super) fn is_by_level_edge(echo: &EchoPath) -> bool {
@@ -77,7 +82,7 @@ fn upper_edge_of_a_low_wall() {
 #[test]
 fn upper_edge_is_continuous() {
     let field = |z_m: f64| {
-        let settings = Settings { max_path_m: 2.3, ..at_height(z_m) };
+        let settings = PathSettings { max_path_m: 2.3, ..at_height(z_m) };
         let echoes = Paths::new(&low_wall(), settings).enumerate(DVec2::ZERO).expect("few paths");
         // Without arrivals by the floor.
         let level =
@@ -231,8 +236,8 @@ const T: DVec2 = DVec2::new(0.13, -0.21);
 const R: DVec2 = DVec2::new(-0.35, 0.17);
 
 /// Weaker echoes are not compared, so that none is lost at the floor of the settings.
-fn in_the_room(z_m: f64) -> Settings {
-    Settings { max_path_m: 5.0, floor: 1e-3, ..at_height(z_m) }
+fn in_the_room(z_m: f64) -> PathSettings {
+    PathSettings { max_path_m: 5.0, floor: 1e-3, ..at_height(z_m) }
 }
 
 #[test]
@@ -320,7 +325,7 @@ fn pieces_are_one_edge() {
 /// Heights at which mirrored paths begin or end, and the jump of the sum of all sound there.
 fn jumps(plan: &Scene, heights_m: [f64; 2], [from, to]: [DVec2; 2]) -> Vec<(f64, f64, f64)> {
     let echoes = |z_m: f64| {
-        let settings = Settings { max_order: Some(2), floor: 1e-6, ..at_height(z_m) };
+        let settings = PathSettings { max_order: Some(2), floor: 1e-6, ..at_height(z_m) };
         Paths::new(plan, settings).enumerate_between(from, to).expect("few paths")
     };
     // Long paths fade, so that none enters the reach at once.

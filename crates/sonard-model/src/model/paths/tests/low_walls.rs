@@ -74,7 +74,7 @@ fn height_cuts_lose_no_echo() {
         let mut place = || DVec2::new(random.random_range(0.1..2.1), random.random_range(0.1..1.6));
         let from = place();
         let to = if case % 3 == 0 { place() } else { from };
-        let settings = Settings {
+        let settings = PathSettings {
             max_path_m: 5.0,
             // Without the ends, beams between low walls double at each.
             max_order: Some(4),

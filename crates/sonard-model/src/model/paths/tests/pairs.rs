@@ -7,8 +7,8 @@ const T: DVec2 = DVec2::new(0.3, 0.2);
 const R: DVec2 = DVec2::new(0.7, 0.25);
 
 /// Settings with echoes by several contacts down to the common floor.
-fn to_the_floor() -> Settings {
-    Settings { repeated_contacts_above: 1.0, ..LOSSLESS }
+fn to_the_floor() -> PathSettings {
+    PathSettings { repeated_contact_ratio: 1.0, ..LOSSLESS }
 }
 
 /// A wall whose end is visible from both, and a cylinder.
@@ -27,7 +27,7 @@ fn plan() -> Scene {
 #[test]
 fn lengths_of_both_halves() {
     let settings =
-        Settings { max_path_m: 6.0, edge_law: Some(EdgeLaw::Utd), floor: 1e-5, ..LOSSLESS };
+        PathSettings { max_path_m: 6.0, edge_law: Some(EdgeLaw::Utd), floor: 1e-5, ..LOSSLESS };
     let echoes = Paths::new(&plan(), settings).enumerate_between(T, R).expect("few paths");
     let below = DVec2::new(R.x, -0.8 - R.y);
     let edge = DVec2::new(0.4, 1.5);
@@ -66,8 +66,12 @@ fn lengths_of_both_halves() {
 
 #[test]
 fn paths_are_reciprocal() {
-    let settings =
-        Settings { max_path_m: 6.0, edge_law: Some(EdgeLaw::Utd), floor: 1e-4, ..to_the_floor() };
+    let settings = PathSettings {
+        max_path_m: 6.0,
+        edge_law: Some(EdgeLaw::Utd),
+        floor: 1e-4,
+        ..to_the_floor()
+    };
     let paths = Paths::new(&plan(), settings);
     let (there, back) = (
         paths.enumerate_between(T, R).expect("few paths"),
@@ -91,7 +95,7 @@ fn paths_are_reciprocal() {
 #[test]
 fn coincident_pair() {
     let settings =
-        Settings { max_path_m: 5.0, edge_law: Some(EdgeLaw::Utd), floor: 1e-3, ..LOSSLESS };
+        PathSettings { max_path_m: 5.0, edge_law: Some(EdgeLaw::Utd), floor: 1e-3, ..LOSSLESS };
     let paths = Paths::new(&plan(), settings);
     let one = paths.enumerate(T).expect("few paths");
     let two = paths.enumerate_between(T, T + DVec2::new(1e-7, 0.0)).expect("few paths");
@@ -109,7 +113,7 @@ fn coincident_pair() {
 #[test]
 fn wall_in_front_of_a_pair() {
     let wall = scene(&[[-1.0, 0.0, 1.0, 0.0]]);
-    let paths = Paths::new(&wall, Settings { max_path_m: 8.0, ..LOSSLESS });
+    let paths = Paths::new(&wall, PathSettings { max_path_m: 8.0, ..LOSSLESS });
     for step in -9..=9 {
         for (off_m, half) in [(0.07, DVec2::new(0.013, 0.0)), (0.03, DVec2::new(0.01, 0.008))] {
             let middle = DVec2::new(0.1 * f64::from(step), -off_m);
@@ -129,7 +133,7 @@ fn wall_in_front_of_a_pair() {
 fn floor_and_ceiling() {
     let mut room = scene(&[[-9.0, 5.0, 9.0, 5.0]]);
     (room.floor_z_m, room.ceiling_z_m) = (Some(0.0), Some(2.5));
-    let settings = Settings { max_path_m: 6.0, sensor_z_m: Some(0.9), ..LOSSLESS };
+    let settings = PathSettings { max_path_m: 6.0, sensor_z_m: Some(0.9), ..LOSSLESS };
     let paths = Paths::new(&room, settings);
     let apart_m = T.distance(R);
     let found = |echoes: Vec<EchoPath>| -> Vec<f64> {
@@ -157,9 +161,11 @@ fn floor_and_ceiling() {
 #[test]
 fn maximum_length_holds() {
     let max_path_m = 3.4;
-    let all = Settings { max_path_m: 8.0, edge_law: Some(EdgeLaw::Utd), floor: 1e-5, ..LOSSLESS };
+    let all =
+        PathSettings { max_path_m: 8.0, edge_law: Some(EdgeLaw::Utd), floor: 1e-5, ..LOSSLESS };
     let all = Paths::new(&plan(), all).enumerate_between(T, R).expect("few paths");
-    let settings = Settings { max_path_m, edge_law: Some(EdgeLaw::Utd), floor: 1e-5, ..LOSSLESS };
+    let settings =
+        PathSettings { max_path_m, edge_law: Some(EdgeLaw::Utd), floor: 1e-5, ..LOSSLESS };
     let short = Paths::new(&plan(), settings).enumerate_between(T, R).expect("few paths");
     let lengths = |echoes: &[EchoPath]| -> Vec<f64> {
         let near = echoes.iter().filter(|echo| echo.length_m <= max_path_m);

@@ -28,7 +28,7 @@ fn images_match_pyroomacoustics() {
     let vectors: Vectors = serde_json::from_str(&text).expect("vectors");
     assert_eq!(vectors.cases.len(), 200);
     let settings =
-        Settings { max_path_m: 100.0, max_order: Some(vectors.order), floor: 1e-9, ..LOSSLESS };
+        PathSettings { max_path_m: 100.0, max_order: Some(vectors.order), floor: 1e-9, ..LOSSLESS };
     for (number, case) in vectors.cases.iter().enumerate() {
         let corners: Vec<_> = case.corners.iter().copied().map(DVec2::from_array).collect();
         let at = DVec2::from_array(case.at);

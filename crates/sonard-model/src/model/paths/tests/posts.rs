@@ -12,8 +12,8 @@ fn post(center: DVec2, radius_m: f64) -> Cylinder {
     Cylinder { id: Arc::from("leg"), center, radius_m, material, z_m: None }
 }
 
-fn settings() -> Settings {
-    Settings { floor: 1e-9, edge_law: Some(EdgeLaw::Utd), max_path_m: 5.0, ..LOSSLESS }
+fn settings() -> PathSettings {
+    PathSettings { floor: 1e-9, edge_law: Some(EdgeLaw::Utd), max_path_m: 5.0, ..LOSSLESS }
 }
 
 /// Sum of all arrivals, relative to the field of a head-on wall over `length_m`.
@@ -40,7 +40,7 @@ fn field_matches_exact_series() {
     for radius_m in [0.003, 0.008, 0.015] {
         let mut scene = scene(&[]);
         scene.cylinders = vec![post(DVec2::ZERO, radius_m)];
-        let paths = Paths::new(&scene, Settings { direct: true, ..settings() });
+        let paths = Paths::new(&scene, PathSettings { direct: true, ..settings() });
         for step in 0..72 {
             let receiver = 0.9 * DVec2::from_angle(f64::from(step).to_radians() * 5.0 + 0.01);
             let straight_m = transmitter.distance(receiver);

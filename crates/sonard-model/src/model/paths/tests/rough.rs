@@ -14,7 +14,7 @@ const HEIGHT_RAD: f64 = 0.16;
 fn power(reflectance: f64, roughness: f64, aside_rad: f64, sensor: &Sensor) -> (f64, f64) {
     let mut plan = scene(&[[-40.0, 1.0, 40.0, 1.0]]);
     plan.walls[0].material = Material { reflectance, roughness };
-    let settings = Settings { scatter_height_rad: HEIGHT_RAD, floor: 1e-7, ..LOSSLESS };
+    let settings = PathSettings { scatter_height_rad: HEIGHT_RAD, floor: 1e-7, ..LOSSLESS };
     let beam = BeamPattern::new(sensor, 343.99);
     let engine = PathEngine::new(&plan, beam, None, settings);
     let arrivals =

@@ -23,7 +23,7 @@ const LINTEL: [f64; 2] = [1.5, 2.5];
 const AT: DVec2 = DVec2::new(1.0, 1.2);
 
 fn echoes(room: &Scene, z_m: f64, edge_law: Option<EdgeLaw>) -> Vec<EchoPath> {
-    let settings = Settings {
+    let settings = PathSettings {
         sensor_z_m: Some(z_m),
         max_path_m: 8.0,
         max_order: Some(3),

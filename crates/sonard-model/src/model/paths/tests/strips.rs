@@ -5,15 +5,15 @@ use num_complex::Complex64;
 use super::*;
 
 /// Sum of the echoes of an isolated wall, from 0.5 m off its middle.
-fn field(walls: &[[f64; 4]], at: DVec2, settings: &Settings) -> f64 {
+fn field(walls: &[[f64; 4]], at: DVec2, settings: &PathSettings) -> f64 {
     let echoes = Paths::new(&scene(walls), settings.clone()).enumerate(at).expect("few paths");
     let k = settings.wave_number_per_m;
     let echo = |e: &EchoPath| Complex64::from_polar(e.amplitude, e.phase_rad - k * e.length_m);
     echoes.iter().map(echo).sum::<Complex64>().norm()
 }
 
-fn settings() -> Settings {
-    Settings { floor: 1e-9, edge_law: Some(EdgeLaw::Utd), max_path_m: 3.0, ..LOSSLESS }
+fn settings() -> PathSettings {
+    PathSettings { floor: 1e-9, edge_law: Some(EdgeLaw::Utd), max_path_m: 3.0, ..LOSSLESS }
 }
 
 /// Levels of a boundary integral in the plane, as in `acoustics::edge::strip`: a hair of 0.14 mm, a
@@ -46,7 +46,7 @@ fn strip_matches_boundary_integral() {
 #[test]
 fn hair_is_negligible() {
     let wall = [-2.0, 1.0, 2.0, 1.0];
-    let settings = Settings { max_path_m: 2.2, ..settings() };
+    let settings = PathSettings { max_path_m: 2.2, ..settings() };
     let empty = field(&[wall], DVec2::ZERO, &settings);
     for x_m in [0.0, 0.000_03, 0.1, 0.4] {
         let hair = [x_m - 0.000_05, 0.5, x_m + 0.000_05, 0.5];
@@ -58,7 +58,7 @@ fn hair_is_negligible() {
 /// Equal with one and two diffractions: a strip's own field includes the sound along it.
 #[test]
 fn no_double_diffraction() {
-    let double = Settings { double_diffraction: true, ..settings() };
+    let double = PathSettings { double_diffraction: true, ..settings() };
     let strip = [[-0.002, 0.0, 0.002, 0.0]];
     let at = DVec2::new(0.2, 0.4);
     let [single, twice] = [settings(), double].map(|settings| field(&strip, at, &settings));

@@ -28,8 +28,8 @@ impl Vectors {
         serde_json::from_str(&text).expect("vectors")
     }
 
-    fn settings(&self, double_diffraction: bool) -> Settings {
-        Settings {
+    fn settings(&self, double_diffraction: bool) -> PathSettings {
+        PathSettings {
             max_path_m: 3.0,
             floor: 1e-7,
             edge_law: Some(EdgeLaw::Utd),
@@ -52,7 +52,7 @@ impl Case {
     }
 
     /// Relative errors of the field, each with the share of single diffraction and mirrors.
-    fn errors(&self, settings: &Settings) -> Vec<(DVec2, f64, f64)> {
+    fn errors(&self, settings: &PathSettings) -> Vec<(DVec2, f64, f64)> {
         let plan = self.plan();
         let paths = Paths::new(&plan, settings.clone());
         let source = DVec2::from_array(self.source);
@@ -128,8 +128,8 @@ fn quantile(values: &[f64], part: f64) -> f64 {
     sorted[((sorted.len() - 1) as f64 * part).round() as usize]
 }
 
-fn double() -> Settings {
-    Settings {
+fn double() -> PathSettings {
+    PathSettings {
         max_path_m: 4.0,
         floor: 1e-5,
         edge_law: Some(EdgeLaw::Utd),
@@ -201,7 +201,7 @@ fn paths_are_reciprocal() {
     for wall in &mut plan.walls {
         wall.material.reflectance = 0.9;
     }
-    let paths = Paths::new(&plan, Settings { floor: 3e-5, ..double() });
+    let paths = Paths::new(&plan, PathSettings { floor: 3e-5, ..double() });
     let (here, there) = (DVec2::new(-0.1, -0.3), DVec2::new(0.3, 0.2));
     for [one, other] in [[here, here], [here, there]] {
         let out = bent_twice(paths.enumerate_between(one, other).expect("few paths"));
@@ -236,7 +236,8 @@ fn leaving_the_shadow_is_continuous() {
     let edge = DVec2::new(0.5, 0.2);
     // On the far side of the second screen, through the line from the first end past the second.
     let fields = |double_diffraction: bool| -> Vec<Complex64> {
-        let paths = Paths::new(&plan, Settings { double_diffraction, max_path_m: 2.4, ..double() });
+        let paths =
+            Paths::new(&plan, PathSettings { double_diffraction, max_path_m: 2.4, ..double() });
         let at = |i: i32| {
             let angle = edge.to_angle() + 0.001 * f64::from(i - 60);
             let to = edge + 0.6 * DVec2::from_angle(angle);
@@ -274,7 +275,7 @@ fn along_a_plate() {
     for echo in &echoes {
         assert!((echo.length_m - way_m).abs() < 1e-12);
     }
-    let single = Settings { double_diffraction: false, ..double() };
+    let single = PathSettings { double_diffraction: false, ..double() };
     assert!(bent_twice(Paths::new(&plan, single).enumerate(at).expect("few paths")).is_empty());
 }
 
@@ -284,7 +285,7 @@ fn along_a_plate() {
 fn longer_search_adds_longer_paths() {
     let plan = scene(&[[4.0, 0.3, 5.5, 1.8], [3.0, -4.0, 4.5, -5.5]]);
     let found = |max_path_m: f64| {
-        let settings = Settings {
+        let settings = PathSettings {
             max_path_m,
             floor: 1e-9,
             edge_law: Some(EdgeLaw::Utd),

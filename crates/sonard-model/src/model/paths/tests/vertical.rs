@@ -8,8 +8,8 @@ use crate::{
     model::{Engine, Reflector},
 };
 
-fn at_height(z_m: f64) -> Settings {
-    Settings { sensor_z_m: Some(z_m), max_path_m: 8.0, ..LOSSLESS }
+fn at_height(z_m: f64) -> PathSettings {
+    PathSettings { sensor_z_m: Some(z_m), max_path_m: 8.0, ..LOSSLESS }
 }
 
 #[test]
@@ -40,7 +40,7 @@ fn box_is_the_image_lattice() {
         [[0.0, 0.0], [size[0], 0.0], [size[0], size[1]], [0.0, size[1]]].map(DVec2::from_array);
     let mut room = polygon(&corners);
     (room.floor_z_m, room.ceiling_z_m) = (Some(0.0), Some(size[2]));
-    let settings = Settings { max_path_m: 6.0, ..at_height(at[2]) };
+    let settings = PathSettings { max_path_m: 6.0, ..at_height(at[2]) };
     let echoes =
         Paths::new(&room, settings).enumerate(DVec2::new(at[0], at[1])).expect("few paths");
     let along = |axis: usize| {
@@ -77,7 +77,7 @@ fn materials_of_floor_and_ceiling() {
     for wall in &mut room.walls {
         wall.material = material(0.8, 0.0);
     }
-    let settings = Settings { max_path_m: 6.0, floor: 0.02, ..at_height(0.3) };
+    let settings = PathSettings { max_path_m: 6.0, floor: 0.02, ..at_height(0.3) };
     let echoes =
         Paths::new(&room, settings.clone()).enumerate(DVec2::new(0.4, 0.25)).expect("few paths");
     for echo in &echoes {
@@ -98,7 +98,7 @@ fn materials_of_floor_and_ceiling() {
         ceiling_material: Material::RIGID,
         ..room.clone()
     };
-    let all = Paths::new(&rigid, Settings { floor: 1e-4, ..settings })
+    let all = Paths::new(&rigid, PathSettings { floor: 1e-4, ..settings })
         .enumerate(DVec2::new(0.4, 0.25))
         .expect("few paths");
     let strong = all.iter().filter(|echo| {
@@ -120,7 +120,7 @@ fn tilted_beam_finds_the_floor() {
     let sensor = Sensor::preset("senscomp-6500").expect("a preset");
     let beam = BeamPattern::new(&sensor, 343.99);
     let amplitude_at = |tilt_rad: f64, walls: &[Reflector]| {
-        let settings = Settings { tilt_rad, floor: 1e-6, ..at_height(h) };
+        let settings = PathSettings { tilt_rad, floor: 1e-6, ..at_height(h) };
         let engine = PathEngine::new(&room, beam.clone(), None, settings);
         let place = engine.arrivals_at(DVec2::ZERO).expect("few paths");
         let arrivals = place.arrivals(FRAC_PI_2);
@@ -141,9 +141,9 @@ fn tilted_beam_finds_the_floor() {
 #[test]
 fn planar_scene_ignores_height() {
     let plan = scene(&[[-1.0, 0.5, 4.0, 0.5], [0.3, -1.0, 4.0, 0.2]]);
-    let settings = Settings { edge_law: Some(EdgeLaw::Utd), ..LOSSLESS };
+    let settings = PathSettings { edge_law: Some(EdgeLaw::Utd), ..LOSSLESS };
     let flat = Paths::new(&plan, settings.clone()).enumerate(DVec2::ZERO).expect("few paths");
-    let high = Settings { sensor_z_m: Some(3.0), ..settings };
+    let high = PathSettings { sensor_z_m: Some(3.0), ..settings };
     assert_eq!(Paths::new(&plan, high).enumerate(DVec2::ZERO).expect("few paths"), flat);
     assert!(flat.len() > 3);
 }
@@ -155,7 +155,7 @@ fn low_wall_blocks_below_its_edge() {
     room.walls[0].z_m = Some([0.0, 0.3]);
     let (low, high, floor) = (Reflector::Wall(0), Reflector::Wall(1), Reflector::Floor);
     let paths_from = |room: &Scene, z_m: f64| {
-        let settings = Settings { max_order: Some(2), ..at_height(z_m) };
+        let settings = PathSettings { max_order: Some(2), ..at_height(z_m) };
         let mut paths_from: Vec<_> = Paths::new(room, settings)
             .enumerate(DVec2::ZERO)
             .expect("few paths")
@@ -209,7 +209,7 @@ fn corners_of_low_walls() {
             [DVec2::ZERO, DVec2::new(-1.0, 0.0), DVec2::new(0.0, 1.0)].map(|p| frame.rotate(p));
         let mut plan = scene(&[[a.x, a.y, corner.x, corner.y], [corner.x, corner.y, b.x, b.y]]);
         plan.floor_z_m = Some(0.0);
-        let settings = Settings { edge_law: Some(EdgeLaw::Utd), ..at_height(0.3) };
+        let settings = PathSettings { edge_law: Some(EdgeLaw::Utd), ..at_height(0.3) };
         let level = |plan: &Scene, at: DVec2| -> Vec<f64> {
             let mut echoes =
                 Paths::new(plan, settings.clone()).enumerate(frame.rotate(at)).expect("few paths");

@@ -16,7 +16,7 @@ use crate::{
         direction_index::{DirectionEntry, DirectionIndex, wrap_once},
         echo::PathEcho,
         pattern::PatternEnvelope,
-        settings::Settings,
+        settings::PathSettings,
         tolerance::SAME_RAD,
     },
 };
@@ -39,7 +39,7 @@ impl FaceEchoes {
         face: Disc,
         echoes: &[PathEcho],
         envelope: &PatternEnvelope,
-        settings: &Settings,
+        settings: &PathSettings,
     ) -> Self {
         let floor = MULTIPLE_FLOOR_RATIO * settings.floor;
         // A nearer wall is not in the far field of the disc's zones.

@@ -9,7 +9,7 @@ use crate::{
     model::paths::{
         echo::{PathEcho, Via},
         pattern::PatternEnvelope,
-        settings::Settings,
+        settings::PathSettings,
     },
 };
 
@@ -18,13 +18,13 @@ const DISC: Disc = Disc {
     wave_number_per_m: TAU * 49_400.0 / 343.99,
 };
 
-fn settings(max_path_m: f64) -> Settings {
-    Settings {
+fn settings(max_path_m: f64) -> PathSettings {
+    PathSettings {
         max_path_m,
         max_order: None,
         floor: 1e-3,
-        repeated_contacts_above: 1.0,
-        crowded_m: 0.0,
+        repeated_contact_ratio: 1.0,
+        unrestricted_m: 0.0,
         edge_law: None,
         double_diffraction: false,
         absorption_np_per_m: 0.0,

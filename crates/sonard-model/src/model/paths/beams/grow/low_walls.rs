@@ -7,7 +7,7 @@ use crate::{
         SearchPart,
         paths::{
             beams::beam::RayBeam,
-            plan::{ALL_SLOPES, WallMirror},
+            floor::{ALL_SLOPES, WallMirror},
         },
     },
 };

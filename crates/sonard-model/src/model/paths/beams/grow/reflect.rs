@@ -5,7 +5,7 @@ use crate::{
     geometry::DVec2,
     model::paths::{
         beams::{beam::RayBeam, lit::LitWall, tree::BeamNode},
-        plan::WallMirror,
+        floor::WallMirror,
     },
 };
 
@@ -113,7 +113,8 @@ impl Grower<'_> {
             [side, (side + 1) % 3].map(|corner| along.dot(self.mesh.corner(beam.triangle, corner)));
         let (low, high) = (ends[0].min(ends[1]), ends[0].max(ends[1]));
         let by = |border: DVec2| {
-            let hit = beam.image - mirror.signed_distance_m(beam.image) / mirror.normal.dot(border) * border;
+            let hit = beam.image
+                - mirror.signed_distance_m(beam.image) / mirror.normal.dot(border) * border;
             along.dot(hit).max(low).min(high)
         };
         let (right, left) = (by(beam.right), by(beam.left));

@@ -10,8 +10,8 @@ use crate::{
         SearchPart,
         paths::{
             beams::{Beams, LitWall},
+            floor::{TracingPlan, WallMirror},
             height::VerticalImage,
-            plan::{TracingPlan, WallMirror},
             tolerance::TIE_M,
         },
     },

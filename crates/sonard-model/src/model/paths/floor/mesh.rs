@@ -7,7 +7,7 @@ use rstar::{RTree, primitives::GeomWithData};
 use smallvec::SmallVec;
 use spade::{ConstrainedDelaunayTriangulation, Point2, Triangulation};
 
-use crate::geometry::{Arrangement, DVec2, edge_key, distance_to_segment};
+use crate::geometry::{Arrangement, DVec2, distance_to_segment, edge_key};
 
 /// Triangles between the walls, inside a box around the scene.
 #[derive(Debug)]

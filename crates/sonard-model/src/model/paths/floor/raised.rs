@@ -1,6 +1,6 @@
 //! Gain by which floor and ceiling can raise the echoes of upright edges above those in the plan.
 
-use crate::model::paths::settings::Settings;
+use crate::model::paths::settings::PathSettings;
 
 /// Shortest tabulated length, metres: below the distance from a ranger's face to anything.
 const SHORTEST_M: f64 = 1e-3;
@@ -23,7 +23,7 @@ pub(crate) struct Raised {
 
 impl Raised {
     /// Tabulates the bounds of images with these gains and heights above the ranger, metres.
-    pub(crate) fn new(images: &[[f64; 2]], settings: &Settings) -> Self {
+    pub(crate) fn new(images: &[[f64; 2]], settings: &PathSettings) -> Self {
         let longest = (settings.max_path_m / SHORTEST_M).max(1.0);
         let count = longest.log(RATIO) as i32 + 1;
         let bounds = |number: i32| {

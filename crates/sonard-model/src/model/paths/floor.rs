@@ -23,13 +23,13 @@ pub(crate) use walls::{WallMirror, mirror_gain, scattered};
 
 use super::{
     effort::{Bound, Effort},
-    settings::Settings,
+    settings::PathSettings,
 };
 
 /// Floor plan of a scene, prepared for tracing.
 #[derive(Debug, Clone)]
 pub(crate) struct TracingPlan {
-    pub(crate) settings: Settings,
+    pub(crate) settings: PathSettings,
     /// Effort of the current search.
     pub(crate) effort: Arc<Effort>,
     /// Mirrors by wall of the scene.
@@ -51,7 +51,7 @@ impl TracingPlan {
     /// Returns a copy for paths up to a length, metres, which is at most the one it was prepared
     /// for.
     pub(crate) fn within(&self, max_path_m: f64) -> Self {
-        let settings = Settings { max_path_m, ..self.settings.clone() };
+        let settings = PathSettings { max_path_m, ..self.settings.clone() };
         Self { settings, ..self.clone() }
     }
 
