@@ -73,7 +73,7 @@ printf 'scanning    %6s %% of a core (400 beams a scan, 10 m, 3 echoes, predicti
 printf 'resident    %6s kB, at most %s kB\n' "$(memory "$daemon" VmRSS)" "$(memory "$daemon" VmHWM)"
 figures=$(ask /metrics)
 count() { awk -v name="$1" '$1 == name {print $2}' <<<"$figures"; }
-for name in sonard_ros_messages_total sonard_ros_left_out_messages_total sonard_mqtt_acknowledged_records_total; do
+for name in sonard_ros_messages_total sonard_ros_dropped_messages_total sonard_mqtt_acknowledged_records_total; do
   value=$(count "$name")
   if [ -n "$value" ]; then printf '%-12s%s\n' "" "$name $value"; fi
 done

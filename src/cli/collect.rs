@@ -116,7 +116,7 @@ Examples:
   sonard collect --verify collection
   sonard compare collection/scans/*.jsonl
 
-In the folder: scans/ (valid scans), set-aside/ (interrupted or rejected), journal.jsonl, manifest.json,
+In the folder: scans/ (valid scans), rejected/ (interrupted or rejected), journal.jsonl, manifest.json,
 report.md with report/, inputs/ (plan, scene and sensor as used).
 
 Exit codes: 0 all scans are complete, 1 interrupted, some scans failed, or --verify found a fault, 2 wrong

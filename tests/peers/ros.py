@@ -245,7 +245,7 @@ def compare(name, options, rangers=(), namespace="", **keys):
     status = daemon.status()["ros"]
     assert status["dropped"] == 0 and status["messages"] >= compared, status
     figures = daemon.ask("GET", "/metrics")
-    assert "sonard_ros_up 1" in figures and "sonard_ros_left_out_messages_total 0" in figures, figures
+    assert "sonard_ros_up 1" in figures and "sonard_ros_dropped_messages_total 0" in figures, figures
     daemon.stop()
     print(f"ros: {name}: {compared} messages of {len(expected)} topics are those of the recording, "
           f"{len(readings)} readings those of the log ({dict(silent)})")

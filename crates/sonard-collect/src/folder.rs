@@ -1,9 +1,9 @@
 //! Folder layout of a collection and atomic acceptance of scans.
 //!
-//! Each scan is recorded into its own log in `taking/` and accepted by renaming the log into
+//! Each scan is recorded into its own log in `in-progress/` and accepted by renaming the log into
 //! `scans/`, with pose and repeat in its name. A rename is atomic, so after a crash at any time
 //! each scan is present once or not at all. Incomplete and rejected scans are renamed into
-//! `set-aside/`.
+//! `rejected/`.
 
 mod error;
 
@@ -21,11 +21,11 @@ use super::order::Slot;
 pub use error::FolderError;
 
 /// Subfolder of scans being recorded: empty unless the program is running or was killed.
-pub(super) const TAKING: &str = "taking";
+pub(super) const IN_PROGRESS: &str = "in-progress";
 /// Subfolder of accepted scans.
 pub const SCANS: &str = "scans";
 /// Subfolder of incomplete and rejected scans.
-pub const SET_ASIDE: &str = "set-aside";
+pub const REJECTED: &str = "rejected";
 /// Subfolder with copies of plan, scene and sensor.
 pub const INPUTS: &str = "inputs";
 /// Suffix of files that are still being written.
@@ -58,11 +58,11 @@ impl CollectionFolder {
     pub fn open(root: &Path) -> Result<Self, FolderError> {
         let has_other_files = fs::read_dir(root).is_ok_and(|mut entries| entries.next().is_some())
             && !root.join(JOURNAL).exists()
-            && !root.join(TAKING).exists();
+            && !root.join(IN_PROGRESS).exists();
         if has_other_files {
             return Err(FolderError::NotACollection { path: root.into() });
         }
-        for part in [TAKING, SCANS, SET_ASIDE, INPUTS] {
+        for part in [IN_PROGRESS, SCANS, REJECTED, INPUTS] {
             let path = root.join(part);
             fs::create_dir_all(&path).map_err(|source| FolderError::io("create", &path, source))?;
         }
@@ -90,7 +90,7 @@ impl CollectionFolder {
     /// Path of a scan while it is recorded.
     #[must_use]
     pub fn draft_path(&self, slot: Slot) -> PathBuf {
-        self.root.join(TAKING).join(format!("{}.jsonl", scan_stem(slot)))
+        self.root.join(IN_PROGRESS).join(format!("{}.jsonl", scan_stem(slot)))
     }
 
     /// Lists the accepted scans by their file names.
@@ -106,7 +106,7 @@ impl CollectionFolder {
     /// # Errors
     /// Returns an error if the folder cannot be read.
     pub fn interrupted_scans(&self) -> Result<Vec<Slot>, FolderError> {
-        Ok(self.files(TAKING)?.iter().filter_map(|name| slot_of(name)).collect())
+        Ok(self.files(IN_PROGRESS)?.iter().filter_map(|name| slot_of(name)).collect())
     }
 
     /// Accepts a scan by renaming its file, which must be synced and closed.
@@ -117,27 +117,27 @@ impl CollectionFolder {
         self.seal(slot, format!("{SCANS}/{}.jsonl", scan_stem(slot)))
     }
 
-    /// Moves an incomplete or rejected scan into `set-aside/`, under the next take number.
+    /// Moves an incomplete or rejected scan into `rejected/`, under the next attempt number.
     ///
     /// # Errors
     /// Returns an error if the disk fails.
     pub fn set_aside(&self, slot: Slot) -> Result<SealedFile, FolderError> {
         let stem = scan_stem(slot);
-        let prefix = format!("{stem}-take");
-        let takes = self.files(SET_ASIDE)?;
-        let last = takes
+        let prefix = format!("{stem}-attempt");
+        let attempts = self.files(REJECTED)?;
+        let last = attempts
             .iter()
             .filter_map(|name| name.strip_prefix(&prefix)?.split('.').next()?.parse::<u32>().ok());
-        let take = last.max().unwrap_or(0) + 1;
-        let name = format!("{stem}-take{take}.jsonl");
+        let attempt = last.max().unwrap_or(0) + 1;
+        let name = format!("{stem}-attempt{attempt}.jsonl");
         // Torn ends removed from the log are moved along.
         let torn = format!("{stem}.jsonl.torn-");
-        for name in self.files(TAKING)?.iter().filter(|name| name.starts_with(&torn)) {
+        for name in self.files(IN_PROGRESS)?.iter().filter(|name| name.starts_with(&torn)) {
             let to =
-                format!("{SET_ASIDE}/{}", name.replacen(&stem, &format!("{stem}-take{take}"), 1));
-            self.rename(&self.root.join(TAKING).join(name), &to)?;
+                format!("{REJECTED}/{}", name.replacen(&stem, &format!("{stem}-attempt{attempt}"), 1));
+            self.rename(&self.root.join(IN_PROGRESS).join(name), &to)?;
         }
-        self.seal(slot, format!("{SET_ASIDE}/{name}"))
+        self.seal(slot, format!("{REJECTED}/{name}"))
     }
 
     /// Removes a scan without readings.
@@ -289,24 +289,24 @@ mod tests {
         let root = tempfile::tempdir().expect("a folder");
         let folder = CollectionFolder::open(root.path()).expect("created");
         let slot = Slot { pose: 2, repeat: 1 };
-        let take = |text: &str| fs::write(folder.draft_path(slot), text).expect("writable");
-        take("one");
-        fs::write(root.path().join("taking/p002-r01.jsonl.torn-1"), "x").expect("writable");
+        let attempt = |text: &str| fs::write(folder.draft_path(slot), text).expect("writable");
+        attempt("one");
+        fs::write(root.path().join("in-progress/p002-r01.jsonl.torn-1"), "x").expect("writable");
         assert_eq!(folder.interrupted_scans().expect("readable"), [slot]);
-        assert_eq!(folder.set_aside(slot).expect("kept").file, "set-aside/p002-r01-take1.jsonl");
-        take("two");
-        assert_eq!(folder.set_aside(slot).expect("kept").file, "set-aside/p002-r01-take2.jsonl");
-        take("abc");
+        assert_eq!(folder.set_aside(slot).expect("kept").file, "rejected/p002-r01-attempt1.jsonl");
+        attempt("two");
+        assert_eq!(folder.set_aside(slot).expect("kept").file, "rejected/p002-r01-attempt2.jsonl");
+        attempt("abc");
         let sealed = folder.accept(slot).expect("accepted");
         assert_eq!(sealed, folder.digest_of_scan(slot).expect("readable"));
         // FIPS 180-2, appendix B.1.
         let known = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad";
         assert_eq!((sealed.bytes, sealed.sha256.as_str()), (3, known));
-        take("again");
+        attempt("again");
         assert!(folder.accept(slot).is_err(), "an accepted scan was replaced");
         assert_eq!(folder.digest_of_scan(slot).expect("readable"), sealed);
         let files = folder.all_files().expect("readable");
-        assert!(files.contains(&"set-aside/p002-r01-take1.jsonl.torn-1".to_owned()), "{files:?}");
+        assert!(files.contains(&"rejected/p002-r01-attempt1.jsonl.torn-1".to_owned()), "{files:?}");
     }
 
     #[test]

@@ -119,9 +119,9 @@ pub enum SavedAir {
 pub enum ScanOutcome {
     /// Accepted as part of the collection.
     Accepted,
-    /// Rejected by a check; kept in `set-aside/`.
+    /// Rejected by a check; kept in `rejected/`.
     Rejected,
-    /// Ended early; kept in `set-aside/`.
+    /// Ended early; kept in `rejected/`.
     Incomplete,
 }
 

@@ -2,11 +2,11 @@
 //!
 //! ```text
 //!  plan.toml ──> CollectionKeys ──> slots (pose, repeat) ──> one scan at a time
-//!                                                               │
-//!   taking/p001-r01.jsonl <── records ── Ranger ────────────────┘
+//!                                                                    │
+//!   in-progress/p001-r01.jsonl <── records ── Ranger ────────────────┘
 //!        │ checks
 //!        ├── accepted: renamed into scans/     entry in journal.jsonl, digests in manifest.json
-//!        └── rejected or incomplete: renamed into set-aside/, then repeated
+//!        └── rejected or incomplete: renamed into rejected/, then repeated
 //! ```
 //!
 //! [`collect`] takes the scans with any [`Device`] and reports to a [`Watcher`]. The command
@@ -39,7 +39,7 @@ pub use engine::{RunOptions, collect};
 pub use error::CollectError;
 pub use estimate::{budget, disk_bytes};
 pub use folder::{
-    CollectionFolder, FolderError, INPUTS, JOURNAL, SCANS, SET_ASIDE, SealedFile, scan_stem, sha256,
+    CollectionFolder, FolderError, INPUTS, JOURNAL, SCANS, REJECTED, SealedFile, scan_stem, sha256,
 };
 pub use journal::{
     CollectionHistory, CollectionJournal, JournalEntry, PlanEntry, RunStart, SavedAir,

@@ -66,7 +66,7 @@ pub struct CollectionCounts {
     pub wanted: u32,
     /// Number of accepted scans.
     pub accepted: u32,
-    /// Incomplete and rejected scans in `set-aside/`.
+    /// Incomplete and rejected scans in `rejected/`.
     pub set_aside: u32,
     /// Scans that are not repeated any more.
     pub given_up: u32,

@@ -26,7 +26,7 @@ pub struct RecordedScan {
     pub failure: Option<CollectError>,
     /// `true` if the device must be identified again; the scan may still be complete.
     pub needs_reconnect: bool,
-    /// `true` if a client stopped the daemon that was taking the scan.
+    /// `true` if a client stopped the daemon during the scan.
     pub stopped: bool,
     /// Duration by the wall clock, seconds.
     pub wall_s: f64,

@@ -34,12 +34,12 @@ pub enum SecretError {
     #[error("not UTF-8 text")]
     NotText,
     /// Secret too short to be safe.
-    #[error("the {what} is shorter than {least} characters")]
+    #[error("the {what} is shorter than {min_chars} characters")]
     TooShort {
         /// Kind of secret.
         what: &'static str,
         /// Minimum length, characters.
-        least: usize,
+        min_chars: usize,
     },
 }
 
@@ -67,13 +67,13 @@ pub struct SecretKind {
 /// # Errors
 /// Anything but a small regular file with text. Never blocks on pipes or devices.
 pub fn read_secret(path: &Path, secret: SecretKind) -> Result<String, SecretError> {
-    let SecretKind { name: what, min_chars: least, max_bytes: most_bytes } = secret;
-    let (text, mode) = read_small_file(path, most_bytes)?;
+    let SecretKind { name: what, min_chars, max_bytes } = secret;
+    let (text, mode) = read_small_file(path, max_bytes)?;
     if mode & 0o077 != 0 {
         return Err(SecretError::TooPermissive { what, mode });
     }
     let secret = text.trim().to_owned();
-    if secret.len() < least { Err(SecretError::TooShort { what, least }) } else { Ok(secret) }
+    if secret.len() < min_chars { Err(SecretError::TooShort { what, min_chars }) } else { Ok(secret) }
 }
 
 /// Reads the text of a regular file of at most `max_bytes`, with the file's mode.

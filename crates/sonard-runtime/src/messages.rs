@@ -63,7 +63,7 @@ struct QueueState {
     /// A message taken from the queue is being written.
     is_writing: bool,
     dropped: u64,
-    /// Of those, the ones that no message has reported yet.
+    /// Dropped messages that no message has reported yet.
     unreported: u64,
 }
 

@@ -150,7 +150,7 @@ impl Supervisor {
     /// Starts a thread that runs until the daemon stops. `None` is its output after a panic.
     ///
     /// # Errors
-    /// When the system refuses another thread.
+    /// If the system cannot create another thread.
     pub fn spawn_thread<T: Send + 'static>(
         &self,
         task: Task,

@@ -47,7 +47,7 @@ fn spawn(case: &Case, daemon: &Daemon) -> std::process::Child {
 }
 
 fn is_taking(case: &Case) -> bool {
-    case.path("out/taking").exists() && !case.files("taking").is_empty()
+    case.path("out/in-progress").exists() && !case.files("in-progress").is_empty()
 }
 
 #[test]
@@ -160,8 +160,8 @@ fn resumes_and_restores_the_daemon() {
     let stopped = spawn(&case, &daemon);
     // The daemon may still be at the scan of the one that was killed, which is set aside first.
     wait_until("a scan", || {
-        case.path("out/set-aside").exists()
-            && case.files("set-aside").len() == 1
+        case.path("out/rejected").exists()
+            && case.files("rejected").len() == 1
             && is_taking(&case)
     });
     assert_eq!(daemon.send("POST", "/v1/stop", "").status, 202);
@@ -179,16 +179,16 @@ fn resumes_and_restores_the_daemon() {
     interrupt(interrupted.id());
     let output = interrupted.wait_with_output().expect("it ends");
     assert_eq!(output.status.code(), Some(1), "{}", said(&output));
-    assert_eq!(case.files("taking"), Vec::<String>::new());
+    assert_eq!(case.files("in-progress"), Vec::<String>::new());
     assert_eq!(daemon.status()["scanning"]["mode"], "continuous");
 
     let output = collect(&case, &daemon);
     assert_eq!(output.status.code(), Some(0), "{}", said(&output));
     case.assert_each_scan_once(1, 4, 25);
     let cut: Vec<Log> = case
-        .files("set-aside")
+        .files("rejected")
         .iter()
-        .map(|name| Log::read(&case.path("out/set-aside").join(name)))
+        .map(|name| Log::read(&case.path("out/rejected").join(name)))
         .collect();
     assert!(cut.len() >= 2, "{} scans were cut", cut.len());
     assert_eq!(daemon.status()["scanning"]["mode"], "continuous");

@@ -12,15 +12,15 @@ fn missed_steps_cause_a_retake() {
     let case = Case::new(&format!("{POSE}[collection]\nrepeats = 6\nretakes = 50\n"));
     let output = case.collect_all(&["--missed-steps", "0.03", "--seed", "3"]);
     case.assert_each_scan_once(1, 6, 25);
-    let aside = case.files("set-aside");
+    let aside = case.files("rejected");
     assert!(!aside.is_empty(), "no scan was refused: {}", stderr(&output));
     for name in &aside {
-        let log = crate::common::Log::read(&case.path("out/set-aside").join(name));
+        let log = crate::common::Log::read(&case.path("out/rejected").join(name));
         assert_ne!(log.end()["home_drift_steps"], 0, "{name}");
         let events = log.events();
         assert!(events.iter().any(|event| event.contains("does not count")), "{events:?}");
     }
-    for take in case.entries("take") {
+    for take in case.entries("attempt") {
         let drift = take["figures"]["home_drift_steps"].as_i64().expect("a figure");
         assert_eq!(take["outcome"] == "accepted", drift == 0, "{take}");
     }
@@ -39,8 +39,8 @@ fn retakes_exhausted() {
     let output = case.collect(&["--missed-steps", "1"]);
     assert_eq!(output.status.code(), Some(1), "{}", stderr(&output));
     let aside =
-        ["p001-r01", "p001-r02"].map(|stem| [1, 2, 3].map(|n| format!("{stem}-take{n}.jsonl")));
-    assert_eq!(case.files("set-aside"), aside.concat());
+        ["p001-r01", "p001-r02"].map(|stem| [1, 2, 3].map(|n| format!("{stem}-attempt{n}.jsonl")));
+    assert_eq!(case.files("rejected"), aside.concat());
     assert_eq!(case.manifest()["counts"]["given_up"], 2);
     let report = case.text("out/report.md");
     assert!(report.contains("## Failed") && report.contains("Scanning time 0 s"), "{report}");
@@ -53,7 +53,7 @@ fn retakes_exhausted() {
     let case = Case::new(&(plan + "after_retakes = \"stop\"\n"));
     let output = case.collect(&["--missed-steps", "1"]);
     assert!(output.status.code() == Some(1) && said(&output).contains("2 retakes failed"));
-    assert_eq!(case.files("set-aside").len(), 3);
+    assert_eq!(case.files("rejected").len(), 3);
 
     let case = Case::new(&format!("{POSE}[checks]\non_home_drift = \"note\"\n"));
     case.collect_all(&["--missed-steps", "1"]);
@@ -68,7 +68,7 @@ fn missing_beams_and_wrong_scene() {
     let output = case.collect(&["--truth", "corridor"]);
     let text = said(&output);
     assert!(output.status.code() == Some(1) && text.contains("check pose and scene"), "{text}");
-    assert_eq!(case.files("set-aside").len(), 1);
+    assert_eq!(case.files("rejected").len(), 1);
     case.collect_all(&[]);
 
     let case = Case::new(&format!("{POSE}[collection]\nretakes = 40\n"));
@@ -127,7 +127,7 @@ fn air_change_within_a_scan() {
     let plan = format!("{}[air]\nfile = \"{}\"\n", case.text("plan.toml"), thermometer.display());
     case.write("plan.toml", &plan);
     case.write("thermometer", "20000\n");
-    let taking = case.path("out/taking/p001-r01.jsonl");
+    let taking = case.path("out/in-progress/p001-r01.jsonl");
     // Somebody opens a door during the first scan.
     let warming = thread::spawn(move || {
         wait_until("the scan", || taking.exists());
@@ -140,6 +140,6 @@ fn air_change_within_a_scan() {
         "{}",
         stderr(&output)
     );
-    assert_eq!(case.files("set-aside").len(), 1);
+    assert_eq!(case.files("rejected").len(), 1);
     case.assert_each_scan_once(1, 1, 25);
 }

@@ -39,18 +39,18 @@ fn resumes_after_kill() {
         let mut child = spawn(&case, &["--realtime", "--set", "plan.to_deg=36"]);
         // Not before it has come to something: a scan under way, or one more that counts.
         wait_until("a scan", || {
-            case.path("out/taking").exists() && !case.files("taking").is_empty()
+            case.path("out/in-progress").exists() && !case.files("in-progress").is_empty()
                 || case.path("out/scans").exists() && case.files("scans").len() > before
         });
         std::thread::sleep(Duration::from_millis(random.random_range(0..900)));
         child.kill().expect("it runs");
         child.wait().expect("it ends");
         // A power cut takes what was not synced, wherever that ends.
-        for name in case.files("taking") {
+        for name in case.files("in-progress") {
             if random.random_bool(0.5) {
                 continue;
             }
-            let path = case.path("out/taking").join(name);
+            let path = case.path("out/in-progress").join(name);
             let bytes = fs::read(&path).expect("readable");
             fs::write(&path, &bytes[..random.random_range(0..=bytes.len())]).expect("writable");
             torn += 1;
@@ -59,10 +59,10 @@ fn resumes_after_kill() {
     let before = case.files("scans").len();
     case.collect_all(&["--set", "plan.to_deg=36"]);
     case.assert_each_scan_once(2, repeats, 10);
-    let cut = case.entries("take").iter().filter(|take| take["outcome"] == "cut").count();
+    let cut = case.entries("attempt").iter().filter(|take| take["outcome"] == "incomplete").count();
     println!("killed {kills} times, {torn} files torn, {cut} scans cut, {before} whole meanwhile");
     assert!(cut > 0 && before > 0, "{cut} scans cut, {before} whole");
-    assert_eq!(case.entries("take").len() as u64, 2 * repeats + cut as u64);
+    assert_eq!(case.entries("attempt").len() as u64, 2 * repeats + cut as u64);
 }
 
 #[test]
@@ -70,17 +70,17 @@ fn resumes_after_interrupt() {
     let case = Case::new("[poses]\nlist = [\"fig9\"]\n[collection]\nrepeats = 3\n");
     let child = spawn(&case, &["--realtime"]);
     wait_until("a scan", || {
-        case.path("out/taking").exists()
-            && case.files("taking").iter().any(|name| {
-                fs::metadata(case.path("out/taking").join(name))
+        case.path("out/in-progress").exists()
+            && case.files("in-progress").iter().any(|name| {
+                fs::metadata(case.path("out/in-progress").join(name))
                     .is_ok_and(|file| file.len() > 9_000)
             })
     });
     interrupt(child.id());
     let output = child.wait_with_output().expect("it ends");
     assert_eq!(output.status.code(), Some(1), "{}", stderr(&output));
-    assert_eq!(case.files("taking"), Vec::<String>::new());
-    assert_eq!(case.files("set-aside").len(), 1);
+    assert_eq!(case.files("in-progress"), Vec::<String>::new());
+    assert_eq!(case.files("rejected").len(), 1);
     assert_eq!(case.manifest()["complete"], false);
     assert!(case.verify().1.contains("not complete"));
     case.collect_all(&[]);
@@ -108,11 +108,11 @@ fn lost_ranger() {
     let port = mock.port().to_owned();
     let child = spawn(&case, &["--port", &port]);
     wait_until("some readings", || {
-        let taking = case.path("out/taking/p001-r01.jsonl");
+        let taking = case.path("out/in-progress/p001-r01.jsonl");
         fs::read_to_string(taking).is_ok_and(|log| log.matches("\"ping\"").count() >= 3)
     });
     drop(mock);
-    wait_until("the refusal", || !case.files("set-aside").is_empty());
+    wait_until("the refusal", || !case.files("rejected").is_empty());
     // Another boot of the same ranger under the same name.
     drop(fs::remove_file(folder.path().join("ranger")));
     let mock = MockProcess::start(folder.path(), &["--realtime"]);
@@ -131,7 +131,7 @@ fn running_sweep_is_stopped() {
     let mock = MockProcess::start(folder.path(), &["--realtime"]);
     let mut first = spawn(&case, &["--port", mock.port()]);
     wait_until("some readings", || {
-        let taking = case.path("out/taking/p001-r01.jsonl");
+        let taking = case.path("out/in-progress/p001-r01.jsonl");
         fs::read_to_string(taking).is_ok_and(|log| log.matches("\"ping\"").count() >= 3)
     });
     first.kill().expect("it runs");
@@ -139,7 +139,7 @@ fn running_sweep_is_stopped() {
     case.collect_all(&["--port", mock.port()]);
     case.assert_each_scan_once(1, 2, 25);
     // Nothing but what the first run had begun.
-    assert_eq!(case.files("set-aside"), ["p001-r01-take1.jsonl"]);
+    assert_eq!(case.files("rejected"), ["p001-r01-attempt1.jsonl"]);
 }
 
 #[test]
@@ -152,7 +152,7 @@ fn failing_ranger_backs_off() {
     assert!(text.contains("supply"), "{text}");
     let tries = text.matches("ranger lost").count();
     assert!((2..=4).contains(&tries), "{tries} tries: {text}");
-    assert_eq!(case.files("set-aside"), Vec::<String>::new());
+    assert_eq!(case.files("rejected"), Vec::<String>::new());
     assert_eq!(case.manifest()["counts"]["given_up"], 0, "its pose is not to blame");
     // With another ranger it goes on.
     case.collect_all(&["--set", "collection.repeats=2", "--accept-changed-plan"]);
@@ -162,7 +162,7 @@ fn failing_ranger_backs_off() {
 fn folder_is_locked() {
     let case = Case::new("[poses]\nlist = [\"fig9\"]\n[collection]\nrepeats = 3\n");
     let mut child = spawn(&case, &["--realtime"]);
-    wait_until("a scan", || case.path("out/taking").exists() && !case.files("taking").is_empty());
+    wait_until("a scan", || case.path("out/in-progress").exists() && !case.files("in-progress").is_empty());
     let second = case.collect(&[]);
     let text = said(&second);
     assert!(second.status.code() == Some(3) && text.contains("another process"), "{text}");

@@ -17,7 +17,7 @@ fn report_and_manifest() {
     assert_eq!((&of["name"], &of["conditions"]["carpet"]), (&"shelf".into(), &false.into()));
     // In the order of the seed, which is not that of the poses.
     let order: Vec<_> = case
-        .entries("take")
+        .entries("attempt")
         .iter()
         .map(|take| (take["pose"].clone(), take["repeat"].clone()))
         .collect();
@@ -141,7 +141,7 @@ fn estimate_matches_the_duration() {
     assert!(!case.path("out").exists(), "it was only asked");
 
     case.collect_all(&[&turn[..], &["--realtime"]].concat());
-    let takes = case.entries("take");
+    let takes = case.entries("attempt");
     let mut measured: Vec<f64> = takes.iter().map(|take| figure(&take["wall_s"])).collect();
     measured.sort_by(f64::total_cmp);
     let estimated_s = figure(&scan["total_s"]);

@@ -49,13 +49,13 @@ fn prompt_about_a_failed_check() {
     let case = Case::new(plan);
     let output = answered(&case, "what?\nr\nk\n", &["--missed-steps", "1"]);
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
-    assert_eq!(case.files("set-aside"), ["p001-r01-take1.jsonl"]);
+    assert_eq!(case.files("rejected"), ["p001-r01-attempt1.jsonl"]);
     case.assert_each_scan_once(1, 1, 25);
     // Nobody there: it stops, and nothing is lost.
     let case = Case::new(plan);
     let output = answered(&case, "", &["--missed-steps", "1"]);
     assert_eq!(output.status.code(), Some(1), "{}", stderr(&output));
-    assert_eq!((case.files("scans").len(), case.files("set-aside").len()), (0, 1));
+    assert_eq!((case.files("scans").len(), case.files("rejected").len()), (0, 1));
 }
 
 #[test]

@@ -126,7 +126,7 @@ impl Case {
             }
         }
         assert_eq!(self.files("scans"), names);
-        assert_eq!(self.files("taking"), Vec::<String>::new());
+        assert_eq!(self.files("in-progress"), Vec::<String>::new());
         let (code, said) = self.verify();
         assert_eq!(code, Some(0), "{said}");
         let manifest = self.manifest();

@@ -56,7 +56,7 @@ fn at_a_terminal_enter_goes_on_and_an_interrupt_can_be_gone_on_from() {
     let (said, code) = ada.interrupts_at("put the ranger at fig7");
     assert!(code == 1 && said.contains("1 of 2 scans") && said.contains("stopped"), "{said}");
     assert!(!said.contains(" beams"), "a bar was drawn over the question: {said:?}");
-    assert_eq!(case.files("taking"), Vec::<String>::new());
+    assert_eq!(case.files("in-progress"), Vec::<String>::new());
     assert_eq!(case.manifest()["complete"], false);
 
     let mut bob = Person::starts(&case);

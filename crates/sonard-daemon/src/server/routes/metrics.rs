@@ -83,9 +83,9 @@ fn registry(daemon: &Handle) -> Registry {
 fn register_ros(registry: &mut Registry, report: &RosReport) {
     for (name, help, value) in [
         ("ros_messages", "Messages published to ROS 2", report.messages),
-        ("ros_left_out_messages", "Messages to ROS 2 that were dropped", report.dropped),
+        ("ros_dropped_messages", "Messages to ROS 2 that were dropped", report.dropped),
         ("ros_commands", "Accepted commands of ROS 2", report.commands),
-        ("ros_refused_commands", "Rejected commands of ROS 2", report.rejected),
+        ("ros_rejected_commands", "Rejected commands of ROS 2", report.rejected),
     ] {
         registry.register(name, help, ConstCounter::new(value));
     }
@@ -105,7 +105,7 @@ fn register_mqtt(registry: &mut Registry, report: &MqttReport) {
             report.acknowledged,
         ),
         ("mqtt_commands", "Commands accepted through the MQTT broker", report.commands),
-        ("mqtt_refused_commands", "Commands rejected through the MQTT broker", report.rejected),
+        ("mqtt_rejected_commands", "Commands rejected through the MQTT broker", report.rejected),
     ] {
         registry.register(name, help, ConstCounter::new(value));
     }
@@ -141,7 +141,7 @@ fn counters(status: &Status, health: &Health) -> [(&'static str, &'static str, u
         ("line_retries", "Retransmitted requests", health.line.retries),
         ("line_repaired_readings", "Readings fetched again", health.line.repaired),
         (
-            "line_refused_readings",
+            "line_rejected_readings",
             "Readings and responses rejected as invalid",
             health.line.rejected,
         ),
