@@ -4,6 +4,7 @@
 //! reads the daemon's configuration file, [`client`] connects to a daemon, and [`fleet`] polls
 //! several of them. Programs that only read logs need `sonard-log` instead.
 #![cfg_attr(not(test), warn(clippy::disallowed_methods))]
+#![warn(clippy::expect_used, clippy::indexing_slicing, clippy::panic)]
 
 mod api;
 pub mod client;

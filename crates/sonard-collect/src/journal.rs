@@ -290,8 +290,8 @@ pub fn read_journal(path: &Path) -> Result<CollectionHistory, FolderError> {
 
 /// Text up to its last line feed.
 fn complete_lines(text: &[u8]) -> &[u8] {
-    let length = text.iter().rposition(|&byte| byte == b'\n').map_or(0, |at| at + 1);
-    &text[..length]
+    let last = text.iter().rposition(|&byte| byte == b'\n');
+    last.and_then(|at| text.get(..=at)).unwrap_or_default()
 }
 
 fn read(text: &[u8], path: &Path) -> Result<CollectionHistory, FolderError> {

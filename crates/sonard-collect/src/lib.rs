@@ -12,6 +12,7 @@
 //! [`collect`] takes the scans with any [`Device`] and reports to a [`Watcher`]. The command
 //! `sonard collect` adds options, terminal and figures.
 #![cfg_attr(not(test), warn(clippy::disallowed_methods))]
+#![warn(clippy::expect_used, clippy::indexing_slicing, clippy::panic)]
 
 mod checks;
 mod device;

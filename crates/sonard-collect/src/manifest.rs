@@ -147,11 +147,12 @@ impl CollectionManifest {
         }
         let done: BTreeSet<Slot> = history.accepted().map(|take| take.slot).collect();
         let open = |slot: &&Slot| !done.contains(slot) && !history.given_up.contains(slot);
+        let name = plan.keys.get("collection").and_then(|keys| keys.get("name")?.as_str());
         let keys = serde_json::to_vec(&plan.keys).unwrap_or_default();
         Ok(Self {
             format: FORMAT,
             collection: plan.collection,
-            name: plan.keys["collection"]["name"].as_str().unwrap_or_default().to_owned(),
+            name: name.unwrap_or_default().to_owned(),
             written: Timestamp::now(),
             sonard: env!("CARGO_PKG_VERSION").into(),
             complete: requested.iter().find(open).is_none(),

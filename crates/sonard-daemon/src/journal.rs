@@ -408,7 +408,10 @@ impl JournalWriter {
         self.write();
         let failed = self.status.borrow().error.clone();
         self.progress.begin();
-        let closed = self.log.close();
+        let closed = self.log.close(Timestamp::now());
+        if let Some(incident) = self.log.take_incident() {
+            tracing::warn!("the log: {incident}");
+        }
         self.publish(None);
         let mut last = self.status.borrow().clone();
         last.error = match (failed, closed) {

@@ -1,6 +1,7 @@
 //! Folder of logs with rotation: every file starts with a session and contains complete scans.
 
 mod replacement;
+mod retained;
 
 use std::{
     fs::{self, File},
@@ -11,11 +12,12 @@ use std::{
 };
 
 use jiff::{Timestamp, tz::TimeZone};
-use sonard_records::{Event, EventKind, Record, ScanStart, Session};
+use sonard_records::{Event, EventKind, Record, Session};
 
-use super::{LogWriter, StoreError, read_log, sync::sync_folder_of};
+use super::{Displacement, LogWriter, StoreError, read_log, sync::sync_folder_of};
 
 use replacement::Replacement;
+use retained::RetainedLines;
 
 const PREFIX: &str = "sonard-";
 const SUFFIX: &str = ".jsonl";
@@ -57,9 +59,9 @@ pub struct LogFolder {
     has_no_scan: bool,
     /// `true` while the file lacks the current session.
     lacks_session: bool,
-    /// Offset of the current scan in the file, bytes, and its first record.
-    scan: Option<(u64, Box<ScanStart>)>,
-    /// Contents of the next file, if the current one cannot be continued.
+    /// Lines that are written again if the file is removed or truncated.
+    retained: RetainedLines,
+    /// Abandoned file, until a new one has its beginning.
     replacement: Option<Replacement>,
     /// Appended and synced records of earlier files.
     appended_before: u64,
@@ -116,9 +118,9 @@ impl LogFolder {
             writer: None,
             day,
             session: None,
-            has_no_scan: false,
+            has_no_scan: true,
             lacks_session: false,
-            scan: None,
+            retained: RetainedLines::default(),
             replacement: None,
             appended_before: 0,
             synced_before: 0,
@@ -131,7 +133,7 @@ impl LogFolder {
         if ends_within_scan(&log.path).map_err(fail)? {
             let detail = "the program ended within the previous scan".to_owned();
             let event = Event { time: now, kind: EventKind::Gap, detail };
-            let writer = log.writer(now)?;
+            let (writer, _) = log.writer(now)?;
             writer.append(&Record::Event(event))?;
             writer.sync()?;
         }
@@ -153,19 +155,14 @@ impl LogFolder {
                 self.put_session(now)?;
             }
         }
-        let offset = self.writer(now)?.length();
         let outcome = self.write(record, now);
         if matches!(outcome, Ok(()) | Err(StoreError::Sync { .. })) {
             match record {
                 Record::Session(session) => {
                     (self.session, self.lacks_session) = (Some(session.clone()), false);
                 }
-                Record::ScanStart(start) => {
-                    self.scan = Some((offset, Box::new(start.clone())));
-                    self.has_no_scan = false;
-                }
-                Record::ScanEnd(_) => self.scan = None,
-                Record::Ping(_) | Record::Event(_) => {}
+                Record::ScanStart(_) => self.has_no_scan = false,
+                Record::Ping(_) | Record::ScanEnd(_) | Record::Event(_) => {}
             }
         }
         outcome
@@ -177,8 +174,8 @@ impl LogFolder {
     /// # Errors
     /// Returns the errors of [`LogWriter::sync`].
     pub fn sync_if_due(&mut self, now: Timestamp) -> Result<(), StoreError> {
-        let outcome = self.writer(now)?.sync_if_due(Instant::now());
-        self.handle_failure(outcome)
+        let outcome = self.writer(now)?.0.sync_if_due(Instant::now());
+        self.handle_failure(outcome, now)
     }
 
     /// Sets new limits, effective from the next scan.
@@ -211,22 +208,40 @@ impl LogFolder {
         self.uncertain
     }
 
-    /// Syncs and closes the log.
+    /// Syncs and closes the log, after a last [`inspect`](Self::inspect).
     ///
     /// # Errors
-    /// Returns the errors of [`LogWriter::sync`].
-    pub fn close(&mut self) -> Result<(), StoreError> {
+    /// Returns the errors of [`LogWriter::sync`] and [`inspect`](Self::inspect).
+    pub fn close(&mut self, now: Timestamp) -> Result<(), StoreError> {
+        self.inspect(now)?;
+        if self.replacement.is_some() {
+            self.begin_replacement(now)?;
+        }
         let outcome = self.writer.as_mut().map_or(Ok(()), LogWriter::sync);
-        self.release_writer();
+        drop(self.release_writer());
         outcome
     }
 
     fn write(&mut self, record: &Record, now: Timestamp) -> Result<(), StoreError> {
-        let outcome = self.writer(now)?.append(record);
-        self.handle_failure(outcome)
+        let (writer, retained) = self.writer(now)?;
+        let outcome = writer.append(record);
+        if matches!(outcome, Ok(()) | Err(StoreError::Sync { .. })) {
+            retained.push(writer.last_line(), record);
+        }
+        self.handle_failure(outcome, now)
     }
 
-    fn writer(&mut self, now: Timestamp) -> Result<&mut LogWriter, StoreError> {
+    /// Writer of the current file, which is opened if needed, and the lines to be written again.
+    fn writer(
+        &mut self,
+        now: Timestamp,
+    ) -> Result<(&mut LogWriter, &mut RetainedLines), StoreError> {
+        // A file with records that was removed while it was closed is not created anew.
+        let is_closed = self.writer.is_none() && self.replacement.is_none();
+        if is_closed && !self.has_no_scan && self.lacks_file() {
+            let detail = format!("{} {}", self.file_name(), Displacement::Removed);
+            self.replace(detail, Some(Displacement::Removed), now);
+        }
         if self.replacement.is_some() {
             self.begin_replacement(now)?;
         }
@@ -234,7 +249,12 @@ impl LogFolder {
             Some(writer) => writer,
             None => self.open_writer()?,
         };
-        Ok(self.writer.insert(writer))
+        Ok((self.writer.insert(writer), &mut self.retained))
+    }
+
+    /// Returns `true` if no file has the current path.
+    fn lacks_file(&self) -> bool {
+        fs::symlink_metadata(&self.path).is_err_and(|error| error.kind() == io::ErrorKind::NotFound)
     }
 
     fn open_writer(&self) -> Result<LogWriter, StoreError> {
@@ -244,30 +264,44 @@ impl LogFolder {
 
     /// Closes a log that rejects further records. After a failed sync a new file is started, since
     /// a later sync of the old one does not cover earlier records. After a torn record the log is
-    /// reopened and repaired.
-    fn handle_failure(&mut self, outcome: Result<(), StoreError>) -> Result<(), StoreError> {
+    /// reopened and repaired, if it is still in place.
+    fn handle_failure(
+        &mut self,
+        outcome: Result<(), StoreError>,
+        now: Timestamp,
+    ) -> Result<(), StoreError> {
         use StoreError::{Failed, Sync, Torn};
-        match &outcome {
-            Err(Sync { source, unsynced, .. }) => {
+        let Err(error) = &outcome else { return outcome };
+        let displacement =
+            self.writer.as_ref().and_then(|writer| writer.displacement().ok().flatten());
+        match error {
+            Sync { source, unsynced, .. } => {
                 let file = self.file_name();
                 let detail = format!(
                     "{file} could not be synced ({source}): its last {unsynced} record(s) may not be on \
                      the disk"
                 );
-                self.replace(detail, Vec::new());
+                self.replace(detail, displacement, now);
             }
-            Err(Torn { .. } | Failed { .. }) => self.release_writer(),
+            Torn { .. } | Failed { .. } => match displacement {
+                Some(displacement @ (Displacement::Removed | Displacement::Moved)) => {
+                    let detail = format!("{} {displacement}", self.file_name());
+                    self.replace(detail, Some(displacement), now);
+                }
+                _ => drop(self.release_writer()),
+            },
             _ => {}
         }
         outcome
     }
 
-    /// Closes the file and adds its counts to the totals.
-    fn release_writer(&mut self) {
-        if let Some(writer) = self.writer.take() {
-            self.appended_before += writer.appended();
-            self.synced_before += writer.synced();
-        }
+    /// Takes the open writer and adds its counts to the totals; the file is closed unless the caller
+    /// keeps it.
+    fn release_writer(&mut self) -> Option<LogWriter> {
+        let writer = self.writer.take()?;
+        self.appended_before += writer.appended();
+        self.synced_before += writer.synced();
+        Some(writer)
     }
 
     /// Repeats the current session in a file that lacks one; retried with the next scan after a
@@ -293,17 +327,19 @@ impl LogFolder {
     fn rotate_if_due(&mut self, now: Timestamp) -> Result<(), StoreError> {
         let bytes = fs::metadata(&self.path).map_or(0, |metadata| metadata.len());
         let too_old = self.rotation.daily && self.day != day(now);
-        if self.scan.is_some() || self.has_no_scan || !(bytes > self.rotation.max_bytes || too_old)
-        {
+        let is_due = bytes > self.rotation.max_bytes || too_old;
+        let is_between_files = self.has_no_scan || self.replacement.is_some();
+        if !is_due || is_between_files || self.retained.is_in_scan() {
             return Ok(());
         }
         if let Some(writer) = &mut self.writer {
             let synced = writer.sync();
             let path = self.path.clone();
             // The following record is not in any log; `Sync` would indicate the opposite.
-            self.handle_failure(synced).map_err(|_| StoreError::Failed { path })?;
-            self.release_writer();
+            self.handle_failure(synced, now).map_err(|_| StoreError::Failed { path })?;
+            drop(self.release_writer());
         }
+        self.retained.restart();
         self.name_next_file(now);
         self.writer(now)?;
         self.remove_oldest();

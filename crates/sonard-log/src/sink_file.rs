@@ -1,10 +1,14 @@
 //! Outputs of the log writer: a regular file, or a pipe without truncation.
 
 use std::{
+    collections::HashSet,
     fmt,
     fs::{self, File},
     io::{self, Write},
-    os::unix::fs::{FileExt as _, MetadataExt as _},
+    os::{
+        fd::AsRawFd as _,
+        unix::fs::{FileExt as _, MetadataExt as _},
+    },
     path::Path,
 };
 
@@ -30,11 +34,6 @@ pub trait LogOutput: fmt::Debug {
     /// Returns an error if truncation fails; the log then ends in a torn line.
     fn remove_last(&mut self, bytes: u64) -> io::Result<()>;
 
-    /// Expected length from the written bytes; 0 for outputs without a length.
-    fn length(&self) -> u64 {
-        0
-    }
-
     /// Compares the open file with the file at `path`; `None` if they agree or cannot be compared.
     ///
     /// # Errors
@@ -44,12 +43,12 @@ pub trait LogOutput: fmt::Debug {
         Ok(None)
     }
 
-    /// Reads back all bytes from an offset.
+    /// Removes complete lines that occur in `lines` from the end, and returns the new length, bytes.
     ///
     /// # Errors
-    /// Returns an error if the output is not readable.
-    fn read_from(&self, offset: u64) -> io::Result<Vec<u8>> {
-        let _ = offset;
+    /// Returns an error if the output cannot be truncated.
+    fn withdraw(&mut self, lines: &[u8]) -> io::Result<u64> {
+        let _ = lines;
         Err(io::ErrorKind::Unsupported.into())
     }
 
@@ -75,16 +74,12 @@ impl<M: LogOutput + ?Sized> LogOutput for Box<M> {
         (**self).remove_last(bytes)
     }
 
-    fn length(&self) -> u64 {
-        (**self).length()
-    }
-
     fn displacement(&self, path: &Path) -> io::Result<Option<Displacement>> {
         (**self).displacement(path)
     }
 
-    fn read_from(&self, offset: u64) -> io::Result<Vec<u8>> {
-        (**self).read_from(offset)
+    fn withdraw(&mut self, lines: &[u8]) -> io::Result<u64> {
+        (**self).withdraw(lines)
     }
 
     fn finish(&mut self) -> io::Result<()> {
@@ -109,6 +104,18 @@ pub enum Displacement {
     },
 }
 
+impl Displacement {
+    /// Returns `true` if records are no longer reachable by any path, or not from the next close on.
+    #[must_use]
+    pub const fn loses_records(self) -> bool {
+        match self {
+            Self::Removed => true,
+            Self::Moved => false,
+            Self::Resized { expected, found } => found < expected,
+        }
+    }
+}
+
 impl fmt::Display for Displacement {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -119,6 +126,14 @@ impl fmt::Display for Displacement {
             }
         }
     }
+}
+
+/// Returns `true` if the file was removed but its file system keeps it under a hidden name until it
+/// is closed: NFS and FUSE.
+fn is_removed_when_closed(file: &File) -> bool {
+    let path = fs::read_link(format!("/proc/self/fd/{}", file.as_raw_fd())).unwrap_or_default();
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    name.starts_with(".nfs") || name.starts_with(".fuse_hidden")
 }
 
 /// Regular file, opened for appending and locked.
@@ -160,10 +175,6 @@ impl LogOutput for FileOutput {
         Ok(())
     }
 
-    fn length(&self) -> u64 {
-        self.length
-    }
-
     fn displacement(&self, path: &Path) -> io::Result<Option<Displacement>> {
         use io::ErrorKind as Kind;
         let open = self.file.metadata()?;
@@ -180,14 +191,24 @@ impl LogOutput for FileOutput {
                 (found != expected).then_some(Displacement::Resized { expected, found })
             }
             (false, 0, _) => Some(Displacement::Removed),
+            (false, ..) if is_removed_when_closed(&self.file) => Some(Displacement::Removed),
             (false, ..) => Some(Displacement::Moved),
         })
     }
 
-    fn read_from(&self, offset: u64) -> io::Result<Vec<u8>> {
-        let mut bytes = vec![0; usize::try_from(self.length.saturating_sub(offset)).unwrap_or(0)];
-        self.file.read_exact_at(&mut bytes, offset)?;
-        Ok(bytes)
+    fn withdraw(&mut self, lines: &[u8]) -> io::Result<u64> {
+        let known: HashSet<&[u8]> = lines.split_inclusive(|&byte| byte == b'\n').collect();
+        let length = self.file.metadata()?.len();
+        let mut end = vec![0; lines.len().min(usize::try_from(length).unwrap_or(usize::MAX))];
+        let end_at = length - end.len() as u64;
+        self.file.read_exact_at(&mut end, end_at)?;
+        let found = end.split_inclusive(|&byte| byte == b'\n').rev();
+        let repeated = found.take_while(|line| known.contains(line));
+        let length = length - repeated.map(|line| line.len() as u64).sum::<u64>();
+        self.file.set_len(length)?;
+        self.length = length;
+        sync_file(&self.file)?;
+        Ok(length)
     }
 }
 

@@ -5,6 +5,7 @@ mod faults;
 mod folder;
 mod format;
 mod history;
+mod lost_files;
 mod reading;
 mod repairing;
 mod scenes;

@@ -183,14 +183,14 @@ impl<M: LogOutput> LogWriter<M> {
         &mut self.medium
     }
 
-    /// Length of the log from the written bytes; 0 for outputs without a length.
-    pub(super) fn length(&self) -> u64 {
-        self.medium.length()
+    /// Line of the last appended record, with its newline.
+    pub(super) fn last_line(&self) -> &[u8] {
+        &self.line
     }
 
-    /// Reads back all bytes from an offset.
-    pub(super) fn read_from(&self, offset: u64) -> io::Result<Vec<u8>> {
-        self.medium.read_from(offset)
+    /// Removes lines that occur in `lines` from the end of the log; returns its new length, bytes.
+    pub(super) fn withdraw(&mut self, lines: &[u8]) -> io::Result<u64> {
+        self.medium.withdraw(lines)
     }
 
     /// Compares the open file with the file at the log's path.

@@ -1,4 +1,4 @@
-//! Messages for TLS errors, with a hint for an unset clock.
+//! Messages for TLS errors, with a hint for a clock that is not set.
 
 use std::io;
 
@@ -7,35 +7,57 @@ use rumqttc::{
     TlsError,
     tokio_rustls::rustls::{CertificateError, Error},
 };
-
-/// Release time of this program, seconds since 1970 (2026-01-01): an earlier clock is unset.
-const RELEASED_S: i64 = 1_767_225_600;
+use sonard_runtime::wall_clock::{ClockEvidence, ClockState};
 
 /// Describes a TLS error at a time of the computer's clock. Repeated attempts give the same text.
-pub(super) fn describe(error: &TlsError, now: Timestamp) -> String {
-    let today = now.strftime("%Y-%m-%d");
+pub(super) fn describe(
+    error: &TlsError,
+    now: Timestamp,
+    evidence: impl FnOnce() -> ClockEvidence,
+) -> String {
     match certificate_error(error) {
         Some(CertificateError::NotValidYet | CertificateError::NotValidYetContext { .. }) => {
-            not_valid_yet(now)
+            not_valid_yet(now, evidence().state(now.into()))
         }
-        Some(CertificateError::Expired | CertificateError::ExpiredContext { .. }) => format!(
-            "its certificate has expired by this computer's clock ({today}): renew it, or set the clock"
-        ),
+        Some(CertificateError::Expired | CertificateError::ExpiredContext { .. }) => {
+            expired(now, evidence().state(now.into()))
+        }
         _ => format!("TLS: {error}"),
     }
 }
 
-fn not_valid_yet(now: Timestamp) -> String {
+fn not_valid_yet(now: Timestamp, clock: ClockState) -> String {
     let today = now.strftime("%Y-%m-%d");
-    if now.as_second() < RELEASED_S {
-        return format!(
+    match clock {
+        ClockState::Behind => format!(
             "its certificate is not valid yet because this computer's clock is not set ({today}): \
              retrying until the clock is set"
-        );
+        ),
+        ClockState::Unsynchronized => format!(
+            "its certificate is not valid yet by this computer's clock ({today}), which no time source \
+             has set: retrying; `timedatectl` shows why the clock is not synchronised"
+        ),
+        ClockState::Synchronized => format!(
+            "its certificate is not valid yet by this computer's clock ({today}), which a time source \
+             has set: check the certificate"
+        ),
+        ClockState::Unknown => format!(
+            "its certificate is not valid yet by this computer's clock ({today}): compare the clocks"
+        ),
     }
-    format!(
-        "its certificate is not valid yet by this computer's clock ({today}): compare the clocks"
-    )
+}
+
+fn expired(now: Timestamp, clock: ClockState) -> String {
+    let today = now.strftime("%Y-%m-%d");
+    match clock {
+        // A clock that is behind makes certificates valid for longer.
+        ClockState::Synchronized | ClockState::Behind => {
+            format!("its certificate has expired by this computer's clock ({today}): renew it")
+        }
+        ClockState::Unsynchronized | ClockState::Unknown => format!(
+            "its certificate has expired by this computer's clock ({today}): renew it, or set the clock"
+        ),
+    }
 }
 
 /// Extracts the error of the broker's certificate, if any.
@@ -68,15 +90,33 @@ mod tests {
     fn unset_clock_is_named() {
         let not_yet = || Error::InvalidCertificate(CertificateError::NotValidYet);
         let wrapped = TlsError::Io(io::Error::new(io::ErrorKind::InvalidData, not_yet()));
+        let passed = Some(at(1_700_000_000).into());
         for error in [TlsError::TLS(not_yet()), wrapped] {
-            let unset = describe(&error, at(3600));
-            assert!(unset.contains("clock is not set (1970-01-01)"), "{unset}");
-            let set = describe(&error, at(RELEASED_S + 3600));
-            assert!(set.contains("compare the clocks") && !set.contains("not set"), "{set}");
+            for (is_synchronized, second, text) in [
+                (Some(false), 3600, "clock is not set (1970-01-01)"),
+                (None, 1_699_999_999, "clock is not set (2023-11-14)"),
+                // A board that starts at the build date of its system.
+                (Some(false), 1_700_000_001, "which no time source has set: retrying"),
+                (Some(true), 1_700_000_001, "check the certificate"),
+                (None, 1_700_000_001, "compare the clocks"),
+            ] {
+                let evidence = ClockEvidence { is_synchronized, passed };
+                let described = describe(&error, at(second), || evidence);
+                assert!(described.contains(text), "{described}");
+            }
         }
-        let expired = TlsError::TLS(Error::InvalidCertificate(CertificateError::Expired));
-        assert!(describe(&expired, at(RELEASED_S)).contains("expired"));
-        let other = TlsError::TLS(Error::InvalidCertificate(CertificateError::UnknownIssuer));
-        assert!(describe(&other, at(0)).starts_with("TLS: "));
+    }
+
+    #[test]
+    fn other_certificate_errors() {
+        let described = |error, is_synchronized| {
+            let evidence = ClockEvidence { is_synchronized, passed: None };
+            let error = TlsError::TLS(Error::InvalidCertificate(error));
+            describe(&error, at(1_700_000_000), || evidence)
+        };
+        let expired = |is_synchronized| described(CertificateError::Expired, is_synchronized);
+        assert!(expired(Some(false)).ends_with("renew it, or set the clock"));
+        assert!(expired(Some(true)).ends_with("(2023-11-14): renew it"));
+        assert!(described(CertificateError::UnknownIssuer, None).starts_with("TLS: "));
     }
 }

@@ -9,6 +9,7 @@ use rumqttc::{
     AsyncClient, ClientError, ConnectReturnCode, ConnectionError, Event, EventLoop, Incoming,
     Publish, PublishOptions, QoS, StateError,
 };
+use sonard_runtime::wall_clock::ClockEvidence;
 use tokio::{
     sync::mpsc,
     task::JoinHandle,
@@ -198,7 +199,9 @@ fn describe(error: &ConnectionError) -> String {
             "it does not respond to pings".into()
         }
         ConnectionError::MqttState(error) => format!("protocol error: {error}"),
-        ConnectionError::Tls(error) => certificate::describe(error, Timestamp::now()),
+        ConnectionError::Tls(error) => {
+            certificate::describe(error, Timestamp::now(), ClockEvidence::collect)
+        }
         other => other.to_string(),
     }
 }

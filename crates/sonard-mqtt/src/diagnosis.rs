@@ -26,8 +26,16 @@ pub(super) struct SentMessage {
     pub(super) record: Option<u64>,
     /// Kind of the message; `None` for the subscription to commands.
     pub(super) kind: Option<MessageKind>,
-    /// Length of the payload.
+    /// Length of topic and payload, bytes.
     pub(super) bytes: usize,
+}
+
+impl SentMessage {
+    /// Returns `true` for the same record, or another message of the same kind: the length of a
+    /// repeated status differs.
+    fn is_repeated_by(&self, later: &Self) -> bool {
+        (self.record, self.kind) == (later.record, later.kind)
+    }
 }
 
 /// Finding after the end of a connection.
@@ -103,15 +111,16 @@ pub(super) struct Diagnosis {
     waiting: usize,
     /// Message in flight, if it is the only one.
     alone: Option<SentMessage>,
-    /// Message that was alone in flight at the latest disconnections, and their number.
+    /// Message that was alone in flight at the latest disconnections, with its smallest length, and
+    /// their number.
     suspect: Option<(SentMessage, u8)>,
     /// `true` if the broker acknowledged a message on this connection.
     has_accepted: bool,
-    /// Maximum accepted payload on any connection, bytes.
+    /// Maximum accepted length on any connection, bytes.
     accepted_bytes: usize,
     /// Kinds of message accepted on any connection.
     accepted_kinds: Vec<Option<MessageKind>>,
-    /// Minimum rejected payload, bytes.
+    /// Minimum rejected length, bytes.
     limit_bytes: Option<usize>,
     denied: Vec<Option<MessageKind>>,
     unexplained: u8,
@@ -152,9 +161,9 @@ impl Diagnosis {
         if !self.accepted_kinds.contains(&sending.kind) {
             self.accepted_kinds.push(sending.kind);
         }
-        if self.suspect.is_some_and(|(suspect, _)| suspect == sending) {
-            self.suspect = None;
-        }
+        self.suspect.take_if(|(suspect, _)| {
+            suspect.is_repeated_by(&sending) && suspect.bytes <= sending.bytes
+        });
         self.waiting = self.waiting.saturating_sub(1);
         self.careful = self.careful.saturating_sub(1);
         self.alone = self.alone.filter(|alone| *alone != sending);
@@ -180,13 +189,14 @@ impl Diagnosis {
         if waiting > 0 {
             self.careful = MAX_IN_FLIGHT;
         }
-        let strikes = match (alone, self.suspect) {
-            (Some(alone), Some((suspect, strikes))) if alone == suspect => strikes + 1,
-            (Some(_), _) => 1,
-            (None, _) => 0,
-        };
-        self.suspect = alone.map(|alone| (alone, strikes));
-        match alone.filter(|_| strikes >= MAX_STRIKES) {
+        self.suspect = alone.map(|alone| match self.suspect {
+            Some((suspect, strikes)) if suspect.is_repeated_by(&alone) => {
+                let bytes = suspect.bytes.min(alone.bytes);
+                (SentMessage { bytes, ..alone }, strikes + 1)
+            }
+            _ => (alone, 1),
+        });
+        match self.suspect.filter(|(_, strikes)| *strikes >= MAX_STRIKES).map(|(alone, _)| alone) {
             Some(alone) if has_accepted => self.reject(alone),
             Some(alone) if alone.kind == Some(MessageKind::Online) => {
                 // The first message; the next one shows whether it is the only rejected one.

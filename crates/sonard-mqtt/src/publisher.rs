@@ -173,6 +173,12 @@ impl Publisher {
             Finding::Cause(cause) => self.report_cause(self.describe(cause, None)),
             Finding::Rejected(sending, cause) => {
                 self.drop_message(sending, cause);
+                if let (None, Some(kind)) = (sending.record, sending.kind) {
+                    let topic = self.topics.topic_for(kind);
+                    let text = self.describe(cause, sending.kind);
+                    let detail = format!("mqtt: a message for {topic} was not published: {text}");
+                    self.daemon.event(EventKind::Gap, detail);
+                }
                 backoff.reset();
             }
         }
@@ -186,7 +192,8 @@ impl Publisher {
             let is_known =
                 matches!(cause, Cause::Kind(_)) && self.faults.cause == Some(text.clone());
             if let (Some(place), Some(kind), false) = (place, sending.kind, is_known) {
-                let (topic, bytes) = (self.topics.topic_for(kind), sending.bytes);
+                let topic = self.topics.topic_for(kind);
+                let bytes = sending.bytes.saturating_sub(topic.len());
                 let detail = format!(
                     "mqtt: a record for {topic} was dropped, {bytes} bytes before byte {} of {}: {text}",
                     place.bytes, place.file
@@ -282,13 +289,14 @@ impl Publisher {
     fn send_pending(&mut self, connection: &Connection) -> Result<(), String> {
         while self.may_send(connection) {
             let Some((number, message)) = self.in_flight.pop_next() else { break };
-            let (kind, bytes) = (Some(message.kind), message.payload.len());
+            let topic = self.topics.topic_for(message.kind);
+            let (kind, bytes) = (Some(message.kind), topic.len() + message.payload.len());
             let sending = SentMessage { record: Some(number), kind, bytes };
             if let Some(cause) = self.diagnosis.rejects(kind, bytes) {
                 self.drop_message(sending, cause);
                 continue;
             }
-            connection.send(self.topics.topic_for(message.kind), sending, message.payload)?;
+            connection.send(topic, sending, message.payload)?;
             self.diagnosis.sent(sending);
         }
         Ok(())
@@ -306,12 +314,14 @@ impl Publisher {
         kind: MessageKind,
         payload: Bytes,
     ) -> Result<bool, String> {
-        let sending = SentMessage { record: None, kind: Some(kind), bytes: payload.len() };
+        let topic = self.topics.topic_for(kind);
+        let bytes = topic.len() + payload.len();
+        let sending = SentMessage { record: None, kind: Some(kind), bytes };
         if let Some(cause) = self.diagnosis.rejects(sending.kind, sending.bytes) {
             self.drop_message(sending, cause);
             return Ok(false);
         }
-        connection.send(self.topics.topic_for(kind), sending, payload)?;
+        connection.send(topic, sending, payload)?;
         self.diagnosis.sent(sending);
         Ok(true)
     }

@@ -5,7 +5,7 @@
 use std::{
     collections::{BTreeMap, HashSet},
     env, fs,
-    io::{BufRead as _, BufReader, Write as _},
+    io::{self, BufRead as _, BufReader, Write as _},
     os::unix::net::UnixStream,
     path::{Path, PathBuf},
     sync::{
@@ -35,6 +35,8 @@ enum Fault {
     SilentDevice,
     NoisyLine,
     LogRemoved,
+    LogTruncated,
+    LogRenamed,
     FolderMoved,
     SyncFails,
     SyncHangs,
@@ -44,11 +46,13 @@ enum Fault {
     Suspended,
 }
 
-const FAULTS: [Fault; 11] = [
+const FAULTS: [Fault; 13] = [
     Fault::Unplugged,
     Fault::SilentDevice,
     Fault::NoisyLine,
     Fault::LogRemoved,
+    Fault::LogTruncated,
+    Fault::LogRenamed,
     Fault::FolderMoved,
     Fault::SyncFails,
     Fault::SyncHangs,
@@ -65,8 +69,10 @@ struct Chaos {
     folder: PathBuf,
     rig: Rig,
     daemon: Daemon,
-    /// Logs and folders of logs that faults took away.
-    taken: Vec<PathBuf>,
+    /// Renamed logs and moved folders.
+    moved: Vec<PathBuf>,
+    /// Copies of removed and truncated logs.
+    copies: Vec<PathBuf>,
     silent: Option<Pty>,
     clients: Vec<UnixStream>,
     seed: u64,
@@ -81,19 +87,13 @@ impl Chaos {
             Fault::NoisyLine => {
                 self.rig.plug("flip=0.001,drop=0.001,double=0.001,reset=0.01", self.seed);
             }
-            // Nothing is written between the copy and the removal.
-            Fault::LogRemoved => self.while_suspended(|chaos| {
-                let Some(log) = logs(&chaos.folder).pop() else { return };
-                let copy = chaos.folder.join(format!("removed-{}.jsonl", chaos.taken.len()));
-                fs::copy(&log, &copy).expect("there is room");
-                fs::remove_file(&log).expect("it is there");
-                chaos.taken.push(copy);
-            }),
-            Fault::FolderMoved => {
-                let moved = self.folder.join(format!("moved-{}", self.taken.len()));
-                fs::rename(self.folder.join("log"), &moved).expect("it is there");
-                self.taken.push(moved);
+            Fault::LogRemoved => self.with_copy(|log| fs::remove_file(log)),
+            Fault::LogTruncated => self.with_copy(|log| fs::write(log, "")),
+            Fault::LogRenamed => {
+                let Some(log) = self.newest_log() else { return };
+                self.take(&log, ".jsonl");
             }
+            Fault::FolderMoved => self.take(&self.folder.join("log"), ""),
             Fault::SyncFails => fs::write(faults.join("eio"), "").expect("there is room"),
             Fault::SyncHangs => fs::write(faults.join("slow"), "").expect("there is room"),
             Fault::DiskFull => limit_files(self.daemon.id(), Some(1)),
@@ -124,26 +124,49 @@ impl Chaos {
             Fault::DiskFull => limit_files(self.daemon.id(), None),
             Fault::ClientFlood => self.clients.clear(),
             Fault::Suspended => self.daemon.signal(Signal::CONT),
-            Fault::LogRemoved | Fault::FolderMoved | Fault::Reload => {}
+            Fault::LogRemoved
+            | Fault::LogTruncated
+            | Fault::LogRenamed
+            | Fault::FolderMoved
+            | Fault::Reload => {}
         }
     }
 
-    fn while_suspended(&mut self, act: impl FnOnce(&mut Self)) {
+    /// Copies the newest log and acts on it. Nothing is written in between.
+    fn with_copy(&mut self, act: impl FnOnce(&Path) -> io::Result<()>) {
         self.daemon.signal(Signal::STOP);
         std::thread::sleep(Duration::from_millis(50));
-        act(self);
+        if let Some(log) = self.newest_log() {
+            let copy = self.folder.join(format!("copy-{}.jsonl", self.copies.len()));
+            fs::copy(&log, &copy).expect("there is room");
+            act(&log).expect("it is there");
+            self.copies.push(copy);
+        }
         self.daemon.signal(Signal::CONT);
     }
 
-    /// Every log that was ever written.
-    fn all_logs(&self) -> Vec<PathBuf> {
+    fn newest_log(&self) -> Option<PathBuf> {
+        // The folder is missing until a log is written after an earlier fault.
+        if self.folder.join("log").is_dir() { logs(&self.folder).pop() } else { None }
+    }
+
+    /// Renames a log or its folder.
+    fn take(&mut self, path: &Path, extension: &str) {
+        let moved = self.folder.join(format!("moved-{}{extension}", self.moved.len()));
+        if fs::rename(path, &moved).is_ok() {
+            self.moved.push(moved);
+        }
+    }
+
+    /// Logs that the daemon wrote, wherever they are now.
+    fn written_logs(&self) -> Vec<PathBuf> {
         let mut all = logs(&self.folder);
-        for taken in &self.taken {
-            match fs::read_dir(taken) {
+        for moved in &self.moved {
+            match fs::read_dir(moved) {
                 Ok(entries) => all.extend(
                     entries.flatten().map(|entry| entry.path()).filter(|path| is_log(path)),
                 ),
-                Err(_) => all.push(taken.clone()),
+                Err(_) => all.push(moved.clone()),
             }
         }
         all
@@ -164,6 +187,8 @@ fn conflict(one: Fault, other: Fault) -> bool {
     let kind = |fault| match fault {
         Fault::Unplugged | Fault::SilentDevice | Fault::NoisyLine => 0,
         Fault::LogRemoved
+        | Fault::LogTruncated
+        | Fault::LogRenamed
         | Fault::FolderMoved
         | Fault::SyncFails
         | Fault::SyncHangs
@@ -224,7 +249,8 @@ fn random_faults_lose_no_reading() {
         folder: folder.path().into(),
         rig,
         daemon,
-        taken: Vec::new(),
+        moved: Vec::new(),
+        copies: Vec::new(),
         silent: None,
         clients: Vec::new(),
         seed: 2,
@@ -260,8 +286,10 @@ fn random_faults_lose_no_reading() {
     follower.join().expect("no panic");
     let messages = chaos.daemon.said();
     assert!(!messages.contains("panicked") && !messages.contains("internal error"), "{messages}");
-    let mut logged = HashSet::new();
-    for log in chaos.all_logs() {
+    let (mut logged, mut lines, mut repeated) = (HashSet::new(), HashSet::new(), 0);
+    let copies = chaos.copies.iter().map(|copy| (copy.clone(), true));
+    let written = chaos.written_logs().into_iter().map(|log| (log, false));
+    for (log, is_copy) in copies.chain(written) {
         let verified = run(&["log", "verify", log.to_str().expect("plain path")]);
         let found = String::from_utf8_lossy(&verified.stdout).into_owned();
         assert_eq!(verified.status.code(), Some(0), "{}: {found}", log.display());
@@ -270,16 +298,18 @@ fn random_faults_lose_no_reading() {
             if record["type"] == "ping" {
                 let scan = record["scan"].as_str().expect("a scan").to_owned();
                 logged.insert((scan, record["index"].as_u64().expect("an index")));
+                repeated += u64::from(!is_copy && !lines.insert(line.to_owned()));
             }
         }
     }
     let received = received.lock().expect("no panic");
     let lost = received.difference(&logged).count();
     println!(
-        "{tally:?} in {:.0} s; {} readings received live, {lost} of them not logged",
+        "{tally:?} in {:.0} s; {} readings received live, {lost} of them not logged, {repeated} logged \
+         twice",
         began.elapsed().as_secs_f64(),
         received.len()
     );
     assert!(received.len() > 100, "the follower received nothing");
-    assert_eq!(lost, 0, "{messages}");
+    assert_eq!((lost, repeated), (0, 0), "{messages}");
 }

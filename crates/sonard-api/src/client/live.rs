@@ -77,7 +77,7 @@ impl LiveLines {
     /// Returns the first complete line, if one has been received. A scan can be a line of many
     /// megabytes, so each byte is searched only once.
     fn take_line(&mut self) -> Option<Vec<u8>> {
-        let end = self.rest[self.searched..].iter().position(|&byte| byte == b'\n');
+        let end = self.rest.iter().skip(self.searched).position(|&byte| byte == b'\n');
         let Some(end) = end else {
             self.searched = self.rest.len();
             return None;

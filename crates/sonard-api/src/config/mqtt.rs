@@ -5,8 +5,10 @@ use serde::{Deserialize, Serialize};
 
 use super::Fault;
 
-/// Default ports of MQTT and of MQTT over TLS.
-const PORTS: [u16; 2] = [1883, 8883];
+/// Default TCP port without TLS.
+const PORT: u16 = 1883;
+/// Default TCP port over TLS.
+const TLS_PORT: u16 = 8883;
 /// Maximum length of a topic prefix and of a robot's name, bytes. A topic is limited to 65,535
 /// bytes.
 const MAX_NAME_BYTES: usize = 200;
@@ -105,7 +107,7 @@ impl BrokerAddress {
             Some((host, port)) if !port.ends_with(']') => {
                 (host, port.parse().map_err(|_| expected())?)
             }
-            _ => (place, PORTS[usize::from(tls)]),
+            _ => (place, if tls { TLS_PORT } else { PORT }),
         };
         let in_brackets = host.strip_prefix('[').and_then(|rest| rest.strip_suffix(']'));
         let is_host = match in_brackets {

@@ -3,62 +3,55 @@
 use std::fs;
 
 use jiff::Timestamp;
-use sonard_records::{Event, EventKind, Record, decode_line};
+use sonard_records::{Event, EventKind, Record, decode_line, encode_line};
 
 use super::{LogFolder, LogWriter};
 use crate::{Displacement, StoreError};
 
-/// Maximum size of a scan's records that are copied from a removed file, bytes.
-const MAX_CARRIED_BYTES: u64 = 64 << 20;
-
-/// Contents of the file that replaces the current one.
-#[derive(Debug)]
+/// File that is to be replaced.
+#[derive(Debug, Default)]
 pub(super) struct Replacement {
-    /// Descriptions of gaps, written as events.
-    gaps: Vec<String>,
-    /// Lines of the current scan, copied from a removed file.
-    carried: Vec<u8>,
+    /// Number of its records that are written again.
+    repeated: u64,
+    /// Number of synced records among the repeated ones.
+    repeated_synced: u64,
+    /// Truncated file, from which the repeated records are removed.
+    truncated: Option<LogWriter>,
 }
 
 impl LogFolder {
-    /// Compares the open file with the file at its path and starts a new one if they differ. The
-    /// current scan is finished in a moved file, and copied from a removed one. To be called every
-    /// few seconds; the cost is two stat(2).
+    /// Compares the open file with the file at its path and starts a new one if they differ. To be
+    /// called every few seconds; the cost is two stat(2).
+    ///
+    /// - Removed or truncated file: its records since the last call, and the current scan, are
+    ///   written to the new file.
+    /// - Moved, replaced or hidden file: it keeps its records, and the current scan is finished in
+    ///   it.
     ///
     /// # Errors
     /// Returns an error if the new file cannot be written; retried with the next call or record.
     pub fn inspect(&mut self, now: Timestamp) -> Result<(), StoreError> {
         let Some(writer) = &self.writer else { return Ok(()) };
         // Ignores paths that cannot be examined.
-        let Ok(Some(displacement)) = writer.displacement() else { return Ok(()) };
+        let Ok(displacement) = writer.displacement() else { return Ok(()) };
+        if !displacement.is_some_and(Displacement::loses_records) {
+            self.retained.confirm();
+        }
+        let Some(displacement) = displacement else { return Ok(()) };
         let detail = format!("{} {displacement}", self.file_name());
-        match (displacement, &self.scan) {
-            (Displacement::Moved, Some(_)) => {
+        if displacement == Displacement::Moved {
+            if self.retained.is_in_scan() {
                 if !self.is_displaced {
                     self.incident = Some(format!("{detail}; its scan is finished there"));
                 }
                 self.is_displaced = true;
-                Ok(())
+                return Ok(());
             }
-            (Displacement::Moved, None) => {
-                let synced = self.writer.as_mut().map_or(Ok(()), LogWriter::sync);
-                self.handle_failure(synced).ok();
-                self.replace(detail, Vec::new());
-                self.writer(now).map(drop)
-            }
-            (Displacement::Removed, Some((offset, _)))
-                if writer.length().saturating_sub(*offset) <= MAX_CARRIED_BYTES =>
-            {
-                // Unreadable records become part of the gap.
-                let carried = writer.read_from(*offset).unwrap_or_default();
-                self.replace(detail, carried);
-                self.writer(now).map(drop)
-            }
-            _ => {
-                self.replace(detail, Vec::new());
-                self.writer(now).map(drop)
-            }
+            let synced = self.writer.as_mut().map_or(Ok(()), LogWriter::sync);
+            self.handle_failure(synced, now).ok();
         }
+        self.replace(detail, Some(displacement), now);
+        self.writer(now).map(drop)
     }
 
     /// Returns the description of a replacement since the last call.
@@ -71,80 +64,101 @@ impl LogFolder {
         self.path.file_name().unwrap_or_default().to_string_lossy().into_owned()
     }
 
-    /// Closes the file; the next record starts a new one with an event about the gap.
-    pub(super) fn replace(&mut self, gap: String, carried: Vec<u8>) {
-        if let Some(writer) = &self.writer {
-            self.uncertain += writer.appended() - writer.synced();
+    /// Closes the file; the next record starts a new one with an event about the gap. Records that
+    /// the displacement loses are written again.
+    pub(super) fn replace(
+        &mut self,
+        mut gap: String,
+        displacement: Option<Displacement>,
+        now: Timestamp,
+    ) {
+        // Until a replacement exists, a further gap only adds an event.
+        if self.replacement.is_none() {
+            let is_lost = displacement.is_some_and(Displacement::loses_records);
+            match self.retained.discarded() {
+                n @ 1.. if is_lost => gap += &format!("; its last {n} record(s) are lost"),
+                _ => {}
+            }
+            if !is_lost {
+                self.retained.restart();
+            }
+            let writer = self.release_writer();
+            let repeated = if is_lost { self.retained.count() } else { 0 };
+            let unsynced = self.appended_before - self.synced_before - self.uncertain;
+            self.uncertain += unsynced.saturating_sub(repeated);
+            let is_truncated = is_lost && displacement != Some(Displacement::Removed);
+            self.replacement = Some(Replacement {
+                repeated,
+                repeated_synced: repeated.saturating_sub(unsynced),
+                truncated: writer.filter(|_| is_truncated),
+            });
         }
-        self.release_writer();
         self.is_displaced = false;
         self.incident = Some(gap.clone());
-        match &mut self.replacement {
-            Some(replacement) => replacement.gaps.push(gap),
-            None => self.replacement = Some(Replacement { gaps: vec![gap], carried }),
+        let event = Record::Event(Event { time: now, kind: EventKind::Gap, detail: gap });
+        let mut line = Vec::new();
+        // Only numbers can be invalid in a record.
+        if encode_line(&event, &mut line).is_ok() {
+            self.retained.push(&line, &event);
         }
     }
 
-    /// Creates the replacement with the current session, the current scan and the gaps. On failure
-    /// the new file is removed.
+    /// Creates the replacement with the current session and the retained lines. On failure the new
+    /// file is removed.
     pub(super) fn begin_replacement(&mut self, now: Timestamp) -> Result<(), StoreError> {
         let fail = |source| StoreError::Open { path: self.folder.clone(), source };
         fs::create_dir_all(&self.folder).map_err(fail)?;
         self.name_next_file(now);
         let mut writer = self.open_writer()?;
-        let begun = self.write_beginning(&mut writer, now);
-        match begun {
-            Ok(offset) => {
-                if let (Some(offset), Some((at, _))) = (offset, &mut self.scan) {
-                    *at = offset;
-                }
-                self.has_no_scan = self.scan.is_none();
-                self.lacks_session = self.session.is_none();
-                self.replacement = None;
-                self.writer = Some(writer);
-                Ok(())
-            }
-            Err(error) => {
-                drop(writer);
-                // All its records are written again by the next attempt.
-                let _ = fs::remove_file(&self.path);
-                Err(match error {
-                    // The following record is not in any log; `Sync` would indicate the opposite.
-                    StoreError::Sync { path, source, .. } => StoreError::Write { path, source },
-                    error => error,
-                })
-            }
+        if let Err(error) = self.write_beginning(&mut writer) {
+            drop(writer);
+            // All its records are written again by the next attempt.
+            let _ = fs::remove_file(&self.path);
+            return Err(match error {
+                // The following record is not in any log; `Sync` would indicate the opposite.
+                StoreError::Sync { path, source, .. } => StoreError::Write { path, source },
+                error => error,
+            });
         }
+        self.has_no_scan = !self.retained.is_in_scan();
+        self.lacks_session = self.session.is_none();
+        self.writer = Some(writer);
+        let replaced = self.replacement.take().unwrap_or_default();
+        self.appended_before = self.appended_before.saturating_sub(replaced.repeated);
+        self.synced_before = self.synced_before.saturating_sub(replaced.repeated_synced);
+        if let Some(truncated) = replaced.truncated {
+            self.withdraw_repeated(truncated);
+        }
+        Ok(())
     }
 
-    /// Writes and syncs the first records; returns the offset of the current scan, bytes.
-    fn write_beginning(
-        &self,
-        writer: &mut LogWriter,
-        now: Timestamp,
-    ) -> Result<Option<u64>, StoreError> {
-        let Some(Replacement { gaps, carried }) = &self.replacement else { return Ok(None) };
+    /// Writes and syncs the first records.
+    fn write_beginning(&self, writer: &mut LogWriter) -> Result<(), StoreError> {
         if let Some(session) = &self.session {
             writer.append(&Record::Session(session.clone()))?;
         }
-        let offset = writer.length();
-        if let Some((_, start)) = &self.scan {
-            let lines = carried.split_inclusive(|&byte| byte == b'\n');
-            let lines = lines.map(|line| line.trim_ascii_end());
-            let records: Vec<_> =
-                lines.filter_map(|line| Some((line, decode_line(line).ok()?))).collect();
-            if records.is_empty() {
-                writer.append(&Record::ScanStart((**start).clone()))?;
-            }
-            for (line, record) in &records {
-                writer.append_line(line, record)?;
+        for line in self.retained.lines().split_inclusive(|&byte| byte == b'\n') {
+            let line = line.trim_ascii_end();
+            if let Ok(record) = decode_line(line) {
+                writer.append_line(line, &record)?;
             }
         }
-        for gap in gaps {
-            let event = Event { time: now, kind: EventKind::Gap, detail: gap.clone() };
-            writer.append(&Record::Event(event))?;
+        writer.sync()
+    }
+
+    /// Removes records that were written again from the end of a truncated file, and the file if
+    /// nothing else is in it.
+    fn withdraw_repeated(&self, mut truncated: LogWriter) {
+        let withdrawn = truncated.withdraw(self.retained.lines()).and_then(|length| {
+            let is_in_place = truncated.displacement()?.is_none();
+            if length == 0 && is_in_place { fs::remove_file(truncated.path()) } else { Ok(()) }
+        });
+        if let Err(error) = withdrawn {
+            tracing::warn!(
+                "{} may repeat records of {} ({error}): remove the older file",
+                truncated.path().display(),
+                self.path.display()
+            );
         }
-        writer.sync()?;
-        Ok(self.scan.as_ref().map(|_| offset))
     }
 }

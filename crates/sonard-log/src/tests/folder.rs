@@ -69,7 +69,7 @@ fn session_after_failed_rotation() {
     fs::remove_file(&folder).expect("removed");
     fs::rename(&away, &folder).expect("renamed");
     append_all(&mut log, &second[1..], tomorrow);
-    log.close().expect("syncs");
+    log.close(tomorrow).expect("syncs");
     // The event about the moved folder is later than the fixture's records.
     assert_eq!((names(&folder).len(), faults(&folder)), (2, (0, 1)));
 }
@@ -83,7 +83,7 @@ fn rotation_between_scans() {
     // The next scan has no session of its own: the new file repeats the current one.
     append_all(&mut log, &scan(2)[1..], now);
     append_all(&mut log, &scan(3)[1..], now);
-    log.close().expect("syncs");
+    log.close(now).expect("syncs");
     let names = names(folder.path());
     assert_eq!(names.len(), 3, "{names:?}");
     for name in &names {
@@ -128,7 +128,7 @@ fn continues_after_a_crash() {
 
     let mut log = LogFolder::open(folder.path(), rotation(1 << 20), now).expect("opens");
     append_all(&mut log, &scan(2), now);
-    log.close().expect("syncs");
+    log.close(now).expect("syncs");
     assert_eq!(names(folder.path()).len(), 1);
     assert_eq!(faults(folder.path()).0, 0, "an event explains the gap");
     let text = fs::read_to_string(&path).expect("readable");
@@ -160,7 +160,7 @@ fn does_not_continue_other_format() {
     fs::write(folder.path().join("sonard-20260301T100000Z.jsonl"), &other).expect("written");
     let mut log = LogFolder::open(folder.path(), rotation(1 << 20), now).expect("opens");
     append_all(&mut log, &scan(1), now);
-    log.close().expect("syncs");
+    log.close(now).expect("syncs");
     let [first, second] = &names(folder.path())[..] else { panic!("two logs") };
     assert_eq!(fs::read_to_string(folder.path().join(first)).expect("readable"), other);
     let findings =

@@ -170,3 +170,29 @@ fn line_failures_have_no_cause() {
     }
     assert!(diagnosis.allows_many());
 }
+
+#[test]
+fn status_of_varying_length() {
+    let mut broker = StrictBroker::new(|message| message.bytes < 2000, []);
+    let mut lost = Vec::new();
+    for n in 0..400 {
+        // Each connection sends the current status, the length of which differs.
+        broker.queue.retain(|message| message.record.is_some());
+        let bytes = 2001 + n * 7919 % 200;
+        broker.queue.push(SentMessage { record: None, kind: Some(MessageKind::Status), bytes });
+        broker.queue.push(record(n as u64, MessageKind::Ping, 300));
+        match broker.connect() {
+            Finding::Open if broker.queue.is_empty() => {}
+            Finding::Open => lost.push(n),
+            Finding::Rejected(sending, cause) => {
+                assert!(sending.kind == Some(MessageKind::Status) && sending.bytes > 2000);
+                assert!(matches!(cause, Cause::Size(2001..)), "{cause:?}");
+                lost.push(n);
+            }
+            Finding::Cause(cause) => panic!("{cause:?}"),
+        }
+    }
+    // Each limit costs three connections, and the next one is smaller.
+    assert!(lost.len() <= 30 && lost.iter().all(|n| *n < 250), "{lost:?}");
+    assert_eq!(broker.accepted.len(), 400);
+}
