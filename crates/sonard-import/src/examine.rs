@@ -1,6 +1,6 @@
 //! Examination of text files, and their second reading for records.
 
-use std::io::Read;
+use std::{collections::VecDeque, io::Read};
 
 use serde_json::Value;
 
@@ -33,7 +33,7 @@ impl Source<'_> {
         found: &mut Imported,
     ) -> Result<(), ImportError> {
         let names = self.names(head, found)?;
-        found.mapping.check()?;
+        found.mapping.check_fields(found.is_of_array())?;
         let rangers = found.taken.array.as_ref().map(|array| array.rangers.len());
         if found.is_of_array() {
             return self.examine_rounds(&names, found);
@@ -103,8 +103,8 @@ impl Source<'_> {
             if found.mapping.infer_array(&names, rangers) {
                 return Ok(names);
             }
-            if names.is_empty() && columns == Some(rangers) {
-                return Err(missing_array_unit(found, rangers));
+            if let Some(columns) = columns.filter(|_| names.is_empty()) {
+                return Err(missing_array_unit(found, columns, rangers));
             }
         }
         if names.is_empty() {
@@ -180,29 +180,34 @@ impl Source<'_> {
     pub(crate) fn examine_ros_text(&self, found: &mut Imported) -> Result<(), ImportError> {
         found.guessed = false;
         let mut stats = SweepStats::new();
-        let mut reader = ros_text::MessageConverter::new(&found.mapping);
+        let mut reader = ros_text::MessageConverter::new(&found.mapping, found.taken.started)?;
         let units = UnitContext {
             mapping: &found.mapping,
             names: &[],
             has_columns: false,
             zero_is_no_echo: true,
         };
+        let (mut assumptions, metres) = (found.taken.clone(), found.mapping.metres());
         let source = found.decoded((self.open)()?);
         let mut has_fixed = false;
         for message in ros_text::messages(source, found.is_json)? {
             let message = message?;
-            has_fixed |= !ros_text::is_scan(&message);
-            for reading in reader.read(&message)? {
-                stats.add(&reading, (&units, &found.taken));
+            has_fixed |= ros_text::is_range(&message);
+            let readings = reader.read(&message)?;
+            // The messages state the range of their sensor.
+            assumptions.longest_m = assumptions.longest_m.max(reader.notes.max_stated_m(metres));
+            for reading in readings {
+                stats.add(&reading, (&units, &assumptions));
             }
         }
-        check_beyond(&reader.notes, &found.taken)?;
-        let notes = stats.check(&units, &found.taken)?;
+        check_messages(&reader.notes, &found.taken)?;
+        let notes = stats.check(&units, &assumptions)?;
         found.notes.extend(reader.notes.lines());
+        found.notes.extend(reader.times.notes());
         found.notes.extend(notes);
         if reader.others > 0 {
             found.notes.push(format!(
-                "skipped: {} messages other than LaserScan and Range",
+                "skipped: {} messages, cut off or other than LaserScan and Range",
                 reader.others
             ));
         }
@@ -222,12 +227,20 @@ impl Source<'_> {
     pub(crate) fn examine_lines(
         &self,
         read: ReadLine,
+        survey: &Survey,
         found: &mut Imported,
     ) -> Result<(), ImportError> {
         found.guessed = false;
         let mut counts = DeviceCounts::default();
-        for message in messages(read, found.decoded((self.open)()?)) {
+        let mut cut = None;
+        let note_cut = |place| cut = Some(place);
+        for message in messages(read, found.decoded((self.open)()?), note_cut) {
             counts.add(&message?.1);
+        }
+        if let Some(place) = cut {
+            found.notes.push(format!("{place} is incomplete: skipped"));
+        } else if !survey.ends_with_line_end() {
+            found.notes.push("the last line has no line end: it may be truncated".to_owned());
         }
         let (devices, notes) = counts.select(found.mapping.device.as_deref())?;
         found.notes.extend(notes);
@@ -241,7 +254,7 @@ impl Source<'_> {
             zero_is_no_echo: true,
         };
         let mut has_poses = false;
-        for message in messages(read, found.decoded((self.open)()?)) {
+        for message in messages(read, found.decoded((self.open)()?), |_| ()) {
             let (place, message) = message?;
             let Some(round) = rounds.push(place, message)? else { continue };
             has_poses |= round.pose.is_some();
@@ -273,6 +286,12 @@ impl Source<'_> {
                 ));
             }
         };
+        if rounds.skipped > 0 && ranges.readings == 0 {
+            return Err(ImportError::mapping(
+                format!("all {} rounds are before the first pose of the log", rounds.skipped),
+                "give a log in which poses precede the ranges",
+            ));
+        }
         if array.rangers.len() != count {
             return Err(ImportError::mapping(
                 format!(
@@ -285,6 +304,12 @@ impl Source<'_> {
         }
         let notes = ranges.check(&units, &found.taken)?;
         let times = rounds.times.notes();
+        if rounds.skipped > 0 {
+            found.notes.push(format!(
+                "{} rounds before the first pose skipped, position unknown",
+                rounds.skipped
+            ));
+        }
         (found.readings, found.echoes) = (ranges.readings, ranges.echoes);
         found.notes.extend(note.into_iter().chain(notes).chain(times));
         found.has_poses = has_poses;
@@ -293,22 +318,17 @@ impl Source<'_> {
     }
 }
 
-/// Rejects a file whose ranges are all beyond the `max_range` of their messages.
-pub(crate) fn check_beyond(
+/// Rejects messages whose ranges are all outside their limits, or whose angles are degrees.
+pub(crate) fn check_messages(
     notes: &crate::limits::LimitNotes,
     assumptions: &crate::Taken,
 ) -> Result<(), ImportError> {
-    if assumptions.as_said || !notes.all_beyond_max() {
-        return Ok(());
+    match notes.doubt() {
+        Some((what, help)) if !assumptions.as_said => {
+            Err(ImportError::Doubtful { what, help: help.to_owned() })
+        }
+        _ => Ok(()),
     }
-    Err(ImportError::Doubtful {
-        what: format!(
-            "all {} ranges are beyond max_range = {} of their messages",
-            notes.readings,
-            notes.max()
-        ),
-        help: "are ranges and limits in different units? Correct the driver; --no-unit-check reads all as no echo".to_owned(),
-    })
 }
 
 /// Rejects a table of a single long row, which has probably lost its line ends.
@@ -328,8 +348,28 @@ fn check_one_row(found: &Imported, readings: u64) -> Result<(), ImportError> {
 }
 
 /// Builds the error that requests the unit of rows with one value per ranger of the array.
-fn missing_array_unit(found: &Imported, rangers: usize) -> ImportError {
+fn missing_array_unit(found: &Imported, columns: usize, rangers: usize) -> ImportError {
     let name = found.taken.array.as_ref().map_or("", |array| &array.name);
+    if columns != rangers {
+        let ends = if columns > rangers { vec![rangers, columns] } else { Vec::new() };
+        let field = Field::of_quantity(Quantity::Range).take(1);
+        let options = field.flat_map(|field| {
+            ends.iter().map(move |end| {
+                let column = Column::Several((end + 1 - rangers..=*end).collect());
+                columns_option([(field, column)], &[])
+            })
+        });
+        let options: Vec<String> = options.collect();
+        let help = match options.is_empty() {
+            true => "give the array with which the file was recorded".to_owned(),
+            false => {
+                format!("map the columns of its ranges, with their unit: {}", options.join(" | "))
+            }
+        };
+        let what =
+            format!("each row has {columns} values, but the array {name} has {rangers} rangers");
+        return ImportError::mapping(what, help);
+    }
     let column = Column::Several((1..=rangers).collect());
     let options = Field::of_quantity(Quantity::Range)
         .take(3)
@@ -369,9 +409,12 @@ impl Imported {
     }
 
     fn note_ends(&mut self, survey: &Survey, faults: RowFaults) {
-        if let Some(place) = faults.cut {
-            self.notes.push(format!("{place} is incomplete (a column is missing): skipped"));
-        } else if self.header.as_ref().is_some_and(|header| header.ends == LineEnding::Lines)
+        let cut = faults.cut.iter().flatten();
+        self.notes.extend(
+            cut.map(|place| format!("{place} is incomplete (a column is missing): skipped")),
+        );
+        if faults.cut[1].is_none()
+            && self.header.as_ref().is_some_and(|header| header.ends == LineEnding::Lines)
             && !survey.ends_with_line_end()
         {
             self.notes
@@ -406,7 +449,7 @@ impl Imported {
         &'a self,
         source: impl Read + 'a,
     ) -> Result<Box<dyn Iterator<Item = ScanRecords> + 'a>, ImportError> {
-        let mut reader = ros_text::MessageConverter::new(&self.mapping);
+        let mut reader = ros_text::MessageConverter::new(&self.mapping, self.taken.started)?;
         let messages = ros_text::messages(self.decoded(source), self.is_json)?;
         let air_m_s = self.taken.air.sound_speed_m_s();
         let assumed_m_s = self.mapping.sound_speed_m_s.unwrap_or(air_m_s);
@@ -433,16 +476,16 @@ impl Imported {
         mut readings: impl Iterator<Item = Result<Reading, ImportError>> + 'a,
     ) -> Box<dyn Iterator<Item = ScanRecords> + 'a> {
         let (mut splitter, mut number) = (Some(ScanSplitter::default()), 0);
+        let mut ready = VecDeque::new();
         Box::new(std::iter::from_fn(move || {
             let scan = loop {
+                if let Some(scan) = ready.pop_front() {
+                    break scan;
+                }
                 match readings.next() {
-                    Some(Ok(reading)) => {
-                        if let Some(scan) = splitter.as_mut()?.push(reading) {
-                            break scan;
-                        }
-                    }
+                    Some(Ok(reading)) => ready.extend(splitter.as_mut()?.push(reading)),
                     Some(Err(error)) => return Some(Err(error)),
-                    None => break splitter.take()?.finish()?,
+                    None => ready.extend(splitter.take()?.finish()),
                 }
             };
             number += 1;
@@ -467,7 +510,7 @@ impl Imported {
         source: impl Read + 'a,
     ) -> Result<Box<dyn Iterator<Item = ScanRecords> + 'a>, ImportError> {
         let mut rounds = RoundReader::new(&self.mapping, &self.devices, self.taken.started)?;
-        let found = messages(read, self.decoded(source)).filter_map(move |message| {
+        let found = messages(read, self.decoded(source), |_| ()).filter_map(move |message| {
             let round = message.and_then(|(place, message)| rounds.push(place, message));
             round.transpose()
         });
@@ -477,15 +520,20 @@ impl Imported {
     }
 }
 
-/// Parses the range and pose messages of a robot's log, with their positions in the file.
+/// Parses the range and pose messages of a robot's log, with their positions in the file. A last
+/// line that is cut off is passed to `note_cut` and skipped.
 fn messages(
     read: ReadLine,
     source: impl Read,
+    mut note_cut: impl FnMut(Location),
 ) -> impl Iterator<Item = Result<(Location, LogMessage), ImportError>> {
     LineReader::new(source, LineEnding::Lines).filter_map(move |line| {
-        let message = line.and_then(|line| {
-            let message = read(line.place(), &line.text)?;
-            Ok(message.map(|message| (line.place(), message)))
+        let message = line.and_then(|line| match read(line.place(), &line.text) {
+            Err(_) if !line.is_ended => {
+                note_cut(line.place());
+                Ok(None)
+            }
+            message => Ok(message?.map(|message| (line.place(), message))),
         });
         message.transpose()
     })
