@@ -96,9 +96,9 @@ fixed rangers are an array. Ranges at or below min_range are at minimum range, t
 max_range and those of 0 are no echo, NaN is no reading.";
 
 const HELP: &str = "\
-Fields: azimuth_deg|rad|grad (from the heading) or bearing_deg|rad|grad (in the world); range_m|cm|mm|in|ft or \
+Fields: azimuth_deg|rad|grad (from the heading) or bearing_deg|rad|grad (in the world); range_m|cm|mm|in|ft (or dm|yd|um|km) or \
 tof_us|ms|s; time (2026-01-31T12:00:00Z) or time_s|ms|us|ns (since 1970); scan; x_m|cm|mm, y_m|cm|mm, \
-heading_deg|rad; temperature_c|k; status.
+heading_deg|rad; temperature_c|k|f; status.
 
 Examples:
   sonard import sweep.csv -o sweep.jsonl

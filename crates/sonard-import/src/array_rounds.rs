@@ -1,6 +1,6 @@
 //! Rounds of an array: all of its ranges in one message of a robot's log, or in one row of a table.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use jiff::Timestamp;
 use sonard_model::{
@@ -42,16 +42,27 @@ pub(crate) struct LogMessage {
     pub(crate) content: MessageContent,
 }
 
+/// Interface of the sonars in a CARMEN log.
+pub(crate) const CARMEN_SONAR: &str = "SONAR";
+
 /// Device of a robot.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Default)]
 pub(crate) struct LogDevice {
-    /// Host and robot, `HOST:ROBOT`.
+    /// Host and robot, `HOST:ROBOT`; the sending host in CARMEN logs.
     pub(crate) robot: String,
     pub(crate) interface: String,
     pub(crate) index: String,
 }
 
 impl LogDevice {
+    /// Returns the option value that selects the device.
+    fn selector(&self) -> String {
+        match self.index.as_str() {
+            "" => self.robot.clone(),
+            index => format!("{}:{index}", self.robot),
+        }
+    }
+
     /// Returns `true` if an option selects this device, by its full name or the end of it.
     fn is_selected_by(&self, requested: &str) -> bool {
         let name = format!(":{}:{}", self.robot, self.index);
@@ -61,7 +72,7 @@ impl LogDevice {
 
 impl std::fmt::Display for LogDevice {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "{} {}:{}", self.interface, self.robot, self.index)
+        write!(f, "{} {}", self.interface, self.selector())
     }
 }
 
@@ -71,6 +82,8 @@ pub(crate) struct DeviceCounts {
     /// Ranging devices, in order of first appearance.
     ranges: Vec<(LogDevice, u64)>,
     poses: BTreeMap<LogDevice, u64>,
+    /// Devices with poses better than odometry.
+    true_poses: BTreeSet<LogDevice>,
 }
 
 /// Devices selected for the import.
@@ -78,11 +91,20 @@ pub(crate) struct DeviceCounts {
 pub(crate) struct SelectedDevices {
     ranges: Option<LogDevice>,
     pose: Option<LogDevice>,
+    /// True if the poses are those of any device: programs of one robot may run on several hosts.
+    is_any_pose: bool,
+    /// True if the log has poses better than odometry, which is then ignored.
+    has_true_poses: bool,
 }
 
 impl DeviceCounts {
     pub(crate) fn add(&mut self, message: &LogMessage) {
         let device = &message.device;
+        if matches!(message.content, MessageContent::Pose { is_true: true, .. })
+            && self.true_poses.len() < MAX_RANGERS
+        {
+            self.true_poses.insert(device.clone());
+        }
         match message.content {
             MessageContent::Ranges { .. } => {
                 match self.ranges.iter().position(|(known, _)| known == device) {
@@ -124,25 +146,35 @@ impl DeviceCounts {
         }
         let of_robot =
             |device: &&LogDevice| ranges.is_some_and(|ranges| device.robot == ranges.robot);
-        let pose = self.poses.keys().find(of_robot);
+        let is_any_pose = matches!(&self.ranges[..], [(only, _)] if only.interface == CARMEN_SONAR);
+        let pose = self.poses.keys().find(|device| is_any_pose || of_robot(device));
+        let has_true_poses = match (is_any_pose, pose) {
+            (true, _) => !self.true_poses.is_empty(),
+            (false, Some(pose)) => self.true_poses.contains(pose),
+            (false, None) => false,
+        };
         let others = self.ranges.iter().filter(|(device, _)| Some(device) != ranges);
+        let another = others.clone().next().map(|(device, _)| device.selector());
         let others: Vec<String> =
             others.map(|(device, count)| format!("{device} ({count} messages)")).collect();
-        let other_poses = self.poses.iter().filter(|(device, _)| Some(*device) != pose);
+        let other_poses =
+            self.poses.iter().filter(|(device, _)| !is_any_pose && Some(*device) != pose);
         let other_poses: Vec<String> =
             other_poses.map(|(device, count)| format!("{device} ({count} messages)")).collect();
         let mut notes = Vec::new();
         if let Some(ranges) = ranges.filter(|_| !others.is_empty()) {
             notes.push(format!(
-                "several devices: importing {ranges}; skipped: {}; select another with --device ROBOT:INDEX",
-                others.join(", ")
+                "several devices: importing {ranges}; skipped: {}; select another with --device {}",
+                others.join(", "),
+                another.unwrap_or_default()
             ));
         }
         if ranges.is_some() && !other_poses.is_empty() {
             let used = pose.map_or("none".to_owned(), ToString::to_string);
             notes.push(format!("poses taken from {used}; skipped: {}", other_poses.join(", ")));
         }
-        Ok((SelectedDevices { ranges: ranges.cloned(), pose: pose.cloned() }, notes))
+        let (ranges, pose) = (ranges.cloned(), pose.cloned());
+        Ok((SelectedDevices { ranges, pose, is_any_pose, has_true_poses }, notes))
     }
 }
 
@@ -154,7 +186,8 @@ pub(crate) struct RoundReader<'a> {
     /// Positions of the rangers, from the log.
     pub(crate) geometry: Option<Vec<[f64; 3]>>,
     pose: Option<Pose>,
-    has_true_poses: bool,
+    /// Number of rounds before the first pose of a log with poses.
+    pub(crate) skipped: u64,
     /// Number of ranges in the first message with ranges.
     pub(crate) rangers: Option<usize>,
     pub(crate) times: TimeReader<'a>,
@@ -169,15 +202,7 @@ impl<'a> RoundReader<'a> {
         started: Timestamp,
     ) -> Result<Self, ImportError> {
         let times = TimeReader::new(mapping, started)?;
-        Ok(Self {
-            mapping,
-            selected,
-            geometry: None,
-            pose: None,
-            has_true_poses: false,
-            rangers: None,
-            times,
-        })
+        Ok(Self { mapping, selected, geometry: None, pose: None, skipped: 0, rangers: None, times })
     }
 
     /// Processes a message and returns the round that it contains, if any.
@@ -199,12 +224,10 @@ impl<'a> RoundReader<'a> {
                 Ok(None)
             }
             MessageContent::Pose { pose, is_true } => {
-                if is_of(&self.selected.pose) {
-                    self.has_true_poses |= is_true;
-                    // A log with true poses also contains odometry, which is ignored.
-                    if is_true || !self.has_true_poses {
-                        self.pose = Some(pose);
-                    }
+                // A log with true poses also contains odometry, which is ignored.
+                let is_better = is_true || !self.selected.has_true_poses;
+                if is_better && (self.selected.is_any_pose || is_of(&self.selected.pose)) {
+                    self.pose = Some(pose);
                 }
                 Ok(None)
             }
@@ -221,6 +244,10 @@ impl<'a> RoundReader<'a> {
                         what,
                         "import the log of one array at a time",
                     ));
+                }
+                if self.selected.pose.is_some() && self.pose.is_none() {
+                    self.skipped += 1;
+                    return Ok(None);
                 }
                 let time = seconds.map(|seconds| self.times.number(None, seconds));
                 let time = time

@@ -2,15 +2,19 @@
 //!
 //! `SONAR cone_angle count ranges... [x y theta of each...] time host logger_time`, in metres and
 //! radians; older logs lack the cone angle. `ODOM x y theta ...`, `TRUEPOS x y theta ...`. Other
-//! messages, comments and parameters are skipped.
+//! messages, comments and parameters are skipped. The host distinguishes the robots of a log.
 
 use crate::{
-    FileLocation, ImportError,
-    array_rounds::{self, LogDevice, LogMessage, MessageContent, count, number, numbers},
+    ImportError, FileLocation,
+    array_rounds::{
+        self, CARMEN_SONAR, LogDevice, LogMessage, MessageContent, count, number, numbers,
+    },
 };
 
 /// Number of words after ranges and positions: send time, host and log time.
 const TRAILING_WORDS: usize = 3;
+/// Place of the sending host, counted from the end of a line.
+const HOST_FROM_END: usize = 2;
 
 /// Parses a line; `None` for lines without ranges or a pose.
 ///
@@ -24,7 +28,15 @@ pub(crate) fn message(place: FileLocation, line: &str) -> Result<Option<LogMessa
         Some(&"SONAR") => ranges(place, &words)?,
         _ => return Ok(None),
     };
-    Ok(Some(LogMessage { device: LogDevice::default(), content }))
+    let host = words.len().checked_sub(HOST_FROM_END).and_then(|at| words.get(at));
+    let host = host.filter(|host| host.parse::<f64>().is_err()).copied().unwrap_or_default();
+    let interface = match content {
+        MessageContent::Pose { .. } => "position",
+        _ => CARMEN_SONAR,
+    };
+    let device =
+        LogDevice { robot: host.to_owned(), interface: interface.to_owned(), index: String::new() };
+    Ok(Some(LogMessage { device, content }))
 }
 
 fn pose(place: FileLocation, words: &[&str], is_true: bool) -> Result<MessageContent, ImportError> {

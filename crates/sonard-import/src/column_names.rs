@@ -31,6 +31,9 @@ const QUANTITY_WORDS: &[(&str, &[FieldQuantity])] = &[
     ("durata", &[Tof]),
     ("travel", &[Tof, Range]),
     ("pulse", &[Tof]),
+    ("pulsewidth", &[Tof]),
+    ("roundtrip", &[Tof]),
+    ("ping", &[Tof]),
     ("pulso", &[Tof]),
     ("puls", &[Tof]),
     ("azimuth", &[Azimuth]),
@@ -56,7 +59,17 @@ const QUANTITY_WORDS: &[(&str, &[FieldQuantity])] = &[
     ("kat", &[Azimuth]),
     ("vinkel", &[Azimuth]),
     ("kulma", &[Azimuth]),
+    ("úhel", &[Azimuth]),
+    ("uhel", &[Azimuth]),
+    ("uhol", &[Azimuth]),
+    ("szög", &[Azimuth]),
+    ("açı", &[Azimuth]),
+    ("aci", &[Azimuth]),
     ("угол", &[Azimuth]),
+    ("角度", &[Azimuth]),
+    ("方位角", &[Azimuth]),
+    ("각도", &[Azimuth]),
+    ("rotation", &[Azimuth]),
     ("bearing", &[Bearing]),
     ("bearings", &[Bearing]),
     ("peilung", &[Bearing]),
@@ -78,7 +91,16 @@ const QUANTITY_WORDS: &[(&str, &[FieldQuantity])] = &[
     ("avstånd", &[Range]),
     ("avstand", &[Range]),
     ("etäisyys", &[Range]),
+    ("vzdálenost", &[Range]),
+    ("vzdialenosť", &[Range]),
+    ("távolság", &[Range]),
+    ("mesafe", &[Range]),
+    ("uzaklık", &[Range]),
     ("расстояние", &[Range]),
+    ("дальность", &[Range]),
+    ("距离", &[Range]),
+    ("距離", &[Range]),
+    ("거리", &[Range]),
     ("sonar", &[Range]),
     ("ultrasonic", &[Range]),
     ("echo", &[Tof, Range]),
@@ -95,6 +117,9 @@ const QUANTITY_WORDS: &[(&str, &[FieldQuantity])] = &[
     ("tiempo", &[Time]),
     ("tempo", &[Time]),
     ("tijd", &[Time]),
+    ("elapsed", &[Time]),
+    ("uptime", &[Time]),
+    ("t", &[Time]),
     ("scan", &[Scan]),
     ("sweep", &[Scan]),
     ("x", &[X]),
@@ -119,6 +144,18 @@ const UNIT_WORDS: &[(&str, &str)] = &[
     ("graus", "deg"),
     ("degré", "deg"),
     ("degrés", "deg"),
+    ("grader", "deg"),
+    ("aste", "deg"),
+    ("astetta", "deg"),
+    ("stopnie", "deg"),
+    ("stupně", "deg"),
+    ("stupňů", "deg"),
+    ("fok", "deg"),
+    ("derece", "deg"),
+    ("град", "deg"),
+    ("градусы", "deg"),
+    ("度", "deg"),
+    ("도", "deg"),
     ("rad", "rad"),
     ("rads", "rad"),
     ("radian", "rad"),
@@ -126,6 +163,8 @@ const UNIT_WORDS: &[(&str, &str)] = &[
     ("radiant", "rad"),
     ("gon", "grad"),
     ("m", "m"),
+    ("м", "m"),
+    ("米", "m"),
     ("meter", "m"),
     ("meters", "m"),
     ("metre", "m"),
@@ -135,16 +174,30 @@ const UNIT_WORDS: &[(&str, &str)] = &[
     ("centimeters", "cm"),
     ("centimetres", "cm"),
     ("zentimeter", "cm"),
+    ("см", "cm"),
+    ("厘米", "cm"),
+    ("センチ", "cm"),
     ("mm", "mm"),
     ("millimeter", "mm"),
     ("millimeters", "mm"),
     ("millimetres", "mm"),
+    ("мм", "mm"),
+    ("毫米", "mm"),
+    ("dm", "dm"),
+    ("um", "um"),
+    ("micron", "um"),
+    ("microns", "um"),
+    ("km", "km"),
     ("in", "in"),
     ("inch", "in"),
     ("inches", "in"),
     ("zoll", "in"),
     ("ft", "ft"),
     ("feet", "ft"),
+    ("foot", "ft"),
+    ("yd", "yd"),
+    ("yard", "yd"),
+    ("yards", "yd"),
     ("us", "us"),
     ("usec", "us"),
     ("micros", "us"),
@@ -170,10 +223,12 @@ const UNIT_WORDS: &[(&str, &str)] = &[
     ("celsius", "c"),
     ("k", "k"),
     ("kelvin", "k"),
+    ("f", "f"),
+    ("fahrenheit", "f"),
 ];
 
 /// Words of columns without readings: limits, steps, standard deviations, and pitch or roll angles.
-const NON_READING_WORDS: [&str; 34] = [
+const NON_READING_WORDS: [&str; 42] = [
     "min",
     "minimum",
     "max",
@@ -181,6 +236,14 @@ const NON_READING_WORDS: [&str; 34] = [
     "limit",
     "least",
     "greatest",
+    "longest",
+    "shortest",
+    "lowest",
+    "highest",
+    "threshold",
+    "cutoff",
+    "blanking",
+    "oneway",
     "increment",
     "inc",
     "step",
@@ -245,6 +308,22 @@ pub(crate) fn is_clockwise(name: &str) -> bool {
     words(name).iter().any(|word| word == "cw" || word == "clockwise")
 }
 
+/// Returns `true` for the name of a unit.
+pub(crate) fn is_unit(word: &str) -> bool {
+    let words = words(word);
+    let is_known =
+        |word: &String| word == "grad" || UNIT_WORDS.iter().any(|(known, _)| known == word);
+    !words.is_empty() && words.iter().all(is_known)
+}
+
+/// Returns `true` for a name that rules out readings: a limit, a step, a quality.
+pub(crate) fn is_no_reading(name: &str) -> bool {
+    let words = words(name);
+    let has = |word: &str| words.iter().any(|known| known == word);
+    NON_READING_WORDS.iter().any(|word| has(word))
+        || ECHO_POSITION_WORDS.iter().any(|word| has(word))
+}
+
 /// Returns the meaning of a column name.
 pub(crate) fn meaning(name: &str) -> NameMeaning {
     let words = words(name);
@@ -252,7 +331,10 @@ pub(crate) fn meaning(name: &str) -> NameMeaning {
     if let Some(field) = Field::from_name(&name.trim().to_lowercase()) {
         return NameMeaning::Field(field);
     }
-    if has(&NON_READING_WORDS) {
+    // A pulse has a width and a travel time.
+    let is_pulse = has(&["pulse"]) && has(&["width"]);
+    let is_one_way = words.windows(2).any(|pair| pair[0] == "one" && pair[1] == "way");
+    if is_one_way || (has(&NON_READING_WORDS) && !is_pulse) {
         return NameMeaning::Unknown;
     }
     let is_german_degree = has(&["grad"]) && has(&GERMAN_DIRECTION_WORDS);
@@ -260,6 +342,10 @@ pub(crate) fn meaning(name: &str) -> NameMeaning {
         let unit = UNIT_WORDS.iter().find(|(known, _)| known == word).map(|(_, unit)| *unit);
         unit.or_else(|| (word == "grad" && is_german_degree).then_some("deg"))
     });
+    // A lone `t` may be a time or a temperature.
+    if unit.is_none() && words == ["t"] {
+        return NameMeaning::Unknown;
+    }
     let quantities = || {
         let named =
             QUANTITY_WORDS.iter().filter(|(known, _)| words.iter().any(|word| word == known));
@@ -323,6 +409,20 @@ mod tests {
             ("temp_c", "temperature_c"),
             ("scan_id", "scan"),
             ("yaw_deg", "heading_deg"),
+            ("vinkel (grader)", "azimuth_deg"),
+            ("úhel_stupně", "azimuth_deg"),
+            ("açı_derece", "azimuth_deg"),
+            ("угол_град", "azimuth_deg"),
+            ("расстояние_см", "range_cm"),
+            ("角度(度)", "azimuth_deg"),
+            ("距離(cm)", "range_cm"),
+            ("pulse_width_us", "tof_us"),
+            ("roundtrip_us", "tof_us"),
+            ("range_yd", "range_yd"),
+            ("distance_um", "range_um"),
+            ("temperature_f", "temperature_f"),
+            ("uptime_ms", "time_ms"),
+            ("t_s", "time_s"),
         ] {
             assert_eq!(
                 meaning(name),
@@ -346,6 +446,8 @@ mod tests {
             "echo_x_cm",
             "target_y_m",
             "range_std_m",
+            "longest_range_m",
+            "one_way_tof_us",
             "foo",
             "class",
         ] {

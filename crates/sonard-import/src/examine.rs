@@ -1,6 +1,6 @@
 //! Examination of text files, and their second reading for records.
 
-use std::io::Read;
+use std::{collections::VecDeque, io::Read};
 
 use serde_json::Value;
 
@@ -34,7 +34,7 @@ impl ImportSource<'_> {
         found: &mut Imported,
     ) -> Result<(), ImportError> {
         let names = self.names(head, found)?;
-        found.mapping.check()?;
+        found.mapping.check_fields(found.is_of_array())?;
         let rangers = found.assumptions.array.as_ref().map(|array| array.rangers.len());
         if found.is_of_array() {
             return self.examine_rounds(&names, found);
@@ -104,8 +104,8 @@ impl ImportSource<'_> {
             if found.mapping.infer_array(&names, rangers) {
                 return Ok(names);
             }
-            if names.is_empty() && columns == Some(rangers) {
-                return Err(missing_array_unit(found, rangers));
+            if let Some(columns) = columns.filter(|_| names.is_empty()) {
+                return Err(missing_array_unit(found, columns, rangers));
             }
         }
         if names.is_empty() {
@@ -181,29 +181,34 @@ impl ImportSource<'_> {
     pub(crate) fn examine_ros_text(&self, found: &mut Imported) -> Result<(), ImportError> {
         found.is_inferred = false;
         let mut stats = SweepStats::new();
-        let mut reader = ros_text::MessageConverter::new(&found.mapping);
+        let mut reader = ros_text::MessageConverter::new(&found.mapping, found.taken.started)?;
         let units = UnitContext {
             mapping: &found.mapping,
             names: &[],
             has_columns: false,
             zero_is_no_echo: true,
         };
+        let (mut assumptions, metres) = (found.taken.clone(), found.mapping.metres());
         let source = found.decoded((self.open)()?);
         let mut has_fixed = false;
         for message in ros_text::messages(source, found.is_json)? {
             let message = message?;
-            has_fixed |= !ros_text::is_scan(&message);
-            for reading in reader.read(&message)? {
-                stats.add(&reading, (&units, &found.assumptions));
+            has_fixed |= ros_text::is_range(&message);
+            let readings = reader.read(&message)?;
+            // The messages state the range of their sensor.
+            assumptions.max_range_m = assumptions.max_range_m.max(reader.notes.max_stated_m(metres));
+            for reading in readings {
+                stats.add(&reading, (&units, &assumptions));
             }
         }
-        check_beyond(&reader.notes, &found.assumptions)?;
-        let notes = stats.check(&units, &found.assumptions)?;
+        check_messages(&reader.notes, &found.assumptions)?;
+        let notes = stats.check(&units, &assumptions)?;
         found.notes.extend(reader.notes.lines());
+        found.notes.extend(reader.times.notes());
         found.notes.extend(notes);
         if reader.others > 0 {
             found.notes.push(format!(
-                "skipped: {} messages other than LaserScan and Range",
+                "skipped: {} messages, cut off or other than LaserScan and Range",
                 reader.others
             ));
         }
@@ -223,12 +228,20 @@ impl ImportSource<'_> {
     pub(crate) fn examine_lines(
         &self,
         read: ReadLine,
+        survey: &Survey,
         found: &mut Imported,
     ) -> Result<(), ImportError> {
         found.is_inferred = false;
         let mut counts = DeviceCounts::default();
-        for message in messages(read, found.decoded((self.open)()?)) {
+        let mut cut = None;
+        let note_cut = |place| cut = Some(place);
+        for message in messages(read, found.decoded((self.open)()?), note_cut) {
             counts.add(&message?.1);
+        }
+        if let Some(place) = cut {
+            found.notes.push(format!("{place} is incomplete: skipped"));
+        } else if !survey.ends_with_line_end() {
+            found.notes.push("the last line has no line end: it may be truncated".to_owned());
         }
         let (devices, notes) = counts.select(found.mapping.device.as_deref())?;
         found.notes.extend(notes);
@@ -243,7 +256,7 @@ impl ImportSource<'_> {
             zero_is_no_echo: true,
         };
         let mut has_poses = false;
-        for message in messages(read, found.decoded((self.open)()?)) {
+        for message in messages(read, found.decoded((self.open)()?), |_| ()) {
             let (place, message) = message?;
             let Some(round) = rounds.push(place, message)? else { continue };
             has_poses |= round.pose.is_some();
@@ -275,6 +288,12 @@ impl ImportSource<'_> {
                 ));
             }
         };
+        if rounds.skipped > 0 && ranges.readings == 0 {
+            return Err(ImportError::mapping(
+                format!("all {} rounds are before the first pose of the log", rounds.skipped),
+                "give a log in which poses precede the ranges",
+            ));
+        }
         if array.rangers.len() != count {
             return Err(ImportError::mapping(
                 format!(
@@ -287,6 +306,12 @@ impl ImportSource<'_> {
         }
         let notes = ranges.check(&units, &found.assumptions)?;
         let times = rounds.times.notes();
+        if rounds.skipped > 0 {
+            found.notes.push(format!(
+                "{} rounds before the first pose skipped, position unknown",
+                rounds.skipped
+            ));
+        }
         (found.readings, found.echoes) = (ranges.readings, ranges.echoes);
         found.notes.extend(note.into_iter().chain(notes).chain(times));
         found.has_poses = has_poses;
@@ -295,22 +320,17 @@ impl ImportSource<'_> {
     }
 }
 
-/// Rejects a file whose ranges are all beyond the `max_range` of their messages.
-pub(crate) fn check_beyond(
+/// Rejects messages whose ranges are all outside their limits, or whose angles are degrees.
+pub(crate) fn check_messages(
     notes: &crate::limits::LimitNotes,
     assumptions: &crate::Assumptions,
 ) -> Result<(), ImportError> {
-    if assumptions.skip_checks || !notes.all_beyond_max() {
-        return Ok(());
+    match notes.doubt() {
+        Some((what, help)) if !assumptions.skip_checks => {
+            Err(ImportError::Doubtful { what, help: help.to_owned() })
+        }
+        _ => Ok(()),
     }
-    Err(ImportError::Implausible {
-        what: format!(
-            "all {} ranges are beyond max_range = {} of their messages",
-            notes.readings,
-            notes.max()
-        ),
-        help: "are ranges and limits in different units? Correct the driver; --no-unit-check reads all as no echo".to_owned(),
-    })
 }
 
 /// Rejects a table of a single long row, which has probably lost its line ends.
@@ -330,8 +350,28 @@ fn check_one_row(found: &Imported, readings: u64) -> Result<(), ImportError> {
 }
 
 /// Builds the error that requests the unit of rows with one value per ranger of the array.
-fn missing_array_unit(found: &Imported, rangers: usize) -> ImportError {
+fn missing_array_unit(found: &Imported, columns: usize, rangers: usize) -> ImportError {
     let name = found.assumptions.array.as_ref().map_or("", |array| &array.name);
+    if columns != rangers {
+        let ends = if columns > rangers { vec![rangers, columns] } else { Vec::new() };
+        let field = Field::of_quantity(FieldQuantity::Range).take(1);
+        let options = field.flat_map(|field| {
+            ends.iter().map(move |end| {
+                let column = Column::Several((end + 1 - rangers..=*end).collect());
+                columns_option([(field, column)], &[])
+            })
+        });
+        let options: Vec<String> = options.collect();
+        let help = match options.is_empty() {
+            true => "give the array with which the file was recorded".to_owned(),
+            false => {
+                format!("map the columns of its ranges, with their unit: {}", options.join(" | "))
+            }
+        };
+        let what =
+            format!("each row has {columns} values, but the array {name} has {rangers} rangers");
+        return ImportError::mapping(what, help);
+    }
     let column = Column::Several((1..=rangers).collect());
     let options = Field::of_quantity(FieldQuantity::Range)
         .take(3)
@@ -371,9 +411,12 @@ impl Imported {
     }
 
     fn note_ends(&mut self, survey: &Survey, faults: RowFaults) {
-        if let Some(place) = faults.cut {
-            self.notes.push(format!("{place} is incomplete (a column is missing): skipped"));
-        } else if self.header.as_ref().is_some_and(|header| header.ends == LineEnding::Lines)
+        let cut = faults.cut.iter().flatten();
+        self.notes.extend(
+            cut.map(|place| format!("{place} is incomplete (a column is missing): skipped")),
+        );
+        if faults.cut[1].is_none()
+            && self.header.as_ref().is_some_and(|header| header.ends == LineEnding::Lines)
             && !survey.ends_with_line_end()
         {
             self.notes
@@ -408,7 +451,7 @@ impl Imported {
         &'a self,
         source: impl Read + 'a,
     ) -> Result<Box<dyn Iterator<Item = ScanRecords> + 'a>, ImportError> {
-        let mut reader = ros_text::MessageConverter::new(&self.mapping);
+        let mut reader = ros_text::MessageConverter::new(&self.mapping, self.taken.started)?;
         let messages = ros_text::messages(self.decoded(source), self.is_json)?;
         let air_m_s = self.assumptions.air.sound_speed_m_s();
         let assumed_m_s = self.mapping.sound_speed_m_s.unwrap_or(air_m_s);
@@ -435,16 +478,16 @@ impl Imported {
         mut readings: impl Iterator<Item = Result<ImportedReading, ImportError>> + 'a,
     ) -> Box<dyn Iterator<Item = ScanRecords> + 'a> {
         let (mut splitter, mut number) = (Some(ScanSplitter::default()), 0);
+        let mut ready = VecDeque::new();
         Box::new(std::iter::from_fn(move || {
             let scan = loop {
+                if let Some(scan) = ready.pop_front() {
+                    break scan;
+                }
                 match readings.next() {
-                    Some(Ok(reading)) => {
-                        if let Some(scan) = splitter.as_mut()?.push(reading) {
-                            break scan;
-                        }
-                    }
+                    Some(Ok(reading)) => ready.extend(splitter.as_mut()?.push(reading)),
                     Some(Err(error)) => return Some(Err(error)),
-                    None => break splitter.take()?.finish()?,
+                    None => ready.extend(splitter.take()?.finish()),
                 }
             };
             number += 1;
@@ -471,7 +514,7 @@ impl Imported {
         source: impl Read + 'a,
     ) -> Result<Box<dyn Iterator<Item = ScanRecords> + 'a>, ImportError> {
         let mut rounds = RoundReader::new(&self.mapping, &self.devices, self.assumptions.started)?;
-        let found = messages(read, self.decoded(source)).filter_map(move |message| {
+        let found = messages(read, self.decoded(source), |_| ()).filter_map(move |message| {
             let round = message.and_then(|(place, message)| rounds.push(place, message));
             round.transpose()
         });
@@ -483,15 +526,20 @@ impl Imported {
     }
 }
 
-/// Parses the range and pose messages of a robot's log, with their positions in the file.
+/// Parses the range and pose messages of a robot's log, with their positions in the file. A last
+/// line that is cut off is passed to `note_cut` and skipped.
 fn messages(
     read: ReadLine,
     source: impl Read,
+    mut note_cut: impl FnMut(FileLocation),
 ) -> impl Iterator<Item = Result<(FileLocation, LogMessage), ImportError>> {
     LineReader::new(source, LineEnding::Lines).filter_map(move |line| {
-        let message = line.and_then(|line| {
-            let message = read(line.place(), &line.text)?;
-            Ok(message.map(|message| (line.place(), message)))
+        let message = line.and_then(|line| match read(line.place(), &line.text) {
+            Err(_) if !line.is_ended => {
+                note_cut(line.place());
+                Ok(None)
+            }
+            message => Ok(message?.map(|message| (line.place(), message))),
         });
         message.transpose()
     })

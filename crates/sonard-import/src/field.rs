@@ -55,6 +55,16 @@ impl FieldQuantity {
 }
 
 impl FieldQuantity {
+    /// Returns the quantity that stands for all with the same role in a reading: azimuth or bearing,
+    /// range or time of flight.
+    pub(crate) const fn role(self) -> Self {
+        match self {
+            Self::Bearing => Self::Azimuth,
+            Self::Tof => Self::Range,
+            other => other,
+        }
+    }
+
     /// Returns `true` for a direction, a range or a time of flight.
     pub(crate) const fn is_measurement(self) -> bool {
         matches!(self, Self::Azimuth | Self::Bearing | Self::Range | Self::Tof)
@@ -65,7 +75,7 @@ const DEG: f64 = 180.0 / std::f64::consts::PI;
 
 /// Field names with quantity and scale factor to degrees, metres, microseconds, seconds or degrees
 /// Celsius. Fields without a factor hold text.
-const FIELDS: [(&str, FieldQuantity, Option<f64>); 31] = [
+const FIELDS: [(&str, FieldQuantity, Option<f64>); 36] = [
     ("azimuth_deg", FieldQuantity::Azimuth, Some(1.0)),
     ("azimuth_rad", FieldQuantity::Azimuth, Some(DEG)),
     ("bearing_deg", FieldQuantity::Bearing, Some(1.0)),
@@ -97,6 +107,11 @@ const FIELDS: [(&str, FieldQuantity, Option<f64>); 31] = [
     ("status", FieldQuantity::Status, None),
     ("azimuth_grad", FieldQuantity::Azimuth, Some(0.9)),
     ("bearing_grad", FieldQuantity::Bearing, Some(0.9)),
+    ("range_dm", FieldQuantity::Range, Some(0.1)),
+    ("range_yd", FieldQuantity::Range, Some(0.9144)),
+    ("range_um", FieldQuantity::Range, Some(1e-6)),
+    ("range_km", FieldQuantity::Range, Some(1e3)),
+    ("temperature_f", FieldQuantity::Temperature, Some(1.0)),
 ];
 
 /// A quantity in a unit, such as `range_cm`.
@@ -129,8 +144,10 @@ impl Field {
 
     /// Converts a number to degrees, metres, microseconds, seconds or degrees Celsius.
     pub(crate) fn scaled(self, number: f64) -> f64 {
-        if self.name() == "temperature_k" {
-            return number - 273.15;
+        match self.name() {
+            "temperature_k" => return number - 273.15,
+            "temperature_f" => return (number - 32.0) / 1.8,
+            _ => {}
         }
         number * FIELDS[self.0].2.unwrap_or(1.0)
     }
@@ -143,6 +160,11 @@ impl Field {
     /// Returns the unit suffix of the name; `None` for text.
     pub(crate) fn unit(self) -> Option<&'static str> {
         FIELDS[self.0].2.and(self.name().rsplit_once('_')).map(|(_, unit)| unit)
+    }
+
+    /// Returns `true` for units that are offered where the unit is unknown.
+    pub(crate) fn is_usual(self) -> bool {
+        !matches!(self.unit(), Some("dm" | "yd" | "um" | "km"))
     }
 
     /// Returns the field of a quantity in a unit.

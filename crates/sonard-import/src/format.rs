@@ -151,7 +151,7 @@ fn is_ros_text(text: &str) -> bool {
             matches!(before, '"' | '\'' | '\n' | ' ' | '{' | ',') && after.starts_with(':')
         })
     };
-    (has("angle_min") && has("angle_increment") && has("ranges"))
+    (has("angle_min") && (has("angle_increment") || has("angle_max")) && has("ranges"))
         || (has("radiation_type") && has("min_range") && has("range"))
 }
 
@@ -169,6 +169,81 @@ const UNSUPPORTED_KINDS: &[UnsupportedKind] = &[
         what: "a ROS 1 recording",
         help: "convert it: `rosbags-convert --src FILE.bag --dst FOLDER --dst-storage mcap`, then import the folder",
         matches: |bytes, _| bytes.starts_with(b"#ROSBAG V"),
+    },
+    UnsupportedKind {
+        what: "a ROS 1 recording of an old version",
+        help: "convert it: `rosbag fix FILE.bag NEW.bag` with ROS 1, then `rosbags-convert --src NEW.bag --dst FOLDER --dst-storage mcap`",
+        matches: |bytes, _| bytes.starts_with(b"#ROSRECORD") || bytes.starts_with(b"#ROSLOG"),
+    },
+    UnsupportedKind {
+        what: "the description of a ROS 2 recording",
+        help: "give the folder that contains it",
+        matches: |_, text| text.trim_start().starts_with("rosbag2_bagfile_information:"),
+    },
+    UnsupportedKind {
+        what: "a text in UTF-32",
+        help: "save it as UTF-8: `iconv -f UTF-32 -t UTF-8 FILE`",
+        matches: |bytes, _| {
+            bytes.starts_with(b"\xff\xfe\0\0") || bytes.starts_with(b"\0\0\xfe\xff")
+        },
+    },
+    UnsupportedKind {
+        what: "a point cloud (PCD, PLY or LAS)",
+        help: "give the readings from which it was made: directions and ranges",
+        matches: |bytes, text| {
+            let first = text.trim_start().trim_start_matches("# ");
+            first.starts_with(".PCD v")
+                || text.starts_with("ply\n")
+                || text.starts_with("ply\r")
+                || bytes.starts_with(b"LASF")
+        },
+    },
+    UnsupportedKind {
+        what: "compressed by 7-Zip, RAR or LZ4, or a tar archive",
+        help: "unpack it first",
+        matches: |bytes, _| {
+            let starts = [&b"7z\xbc\xaf\x27\x1c"[..], b"Rar!\x1a\x07", b"\x04\x22\x4d\x18"];
+            starts.iter().any(|magic| bytes.starts_with(magic))
+                || bytes.get(257..262) == Some(&b"ustar"[..])
+        },
+    },
+    UnsupportedKind {
+        what: "a Python pickle",
+        help: "write its readings as text: `json.dump(readings, open('FILE.json', 'w'))`",
+        matches: |bytes, _| matches!(bytes, [0x80, 2..=5, ..]),
+    },
+    UnsupportedKind {
+        what: "an Arrow or Feather file",
+        help: "write it as CSV: python3 -c \"import pandas; pandas.read_feather('FILE').to_csv('FILE.csv', index=False)\"",
+        matches: |bytes, _| bytes.starts_with(b"ARROW1"),
+    },
+    UnsupportedKind {
+        what: "a NetCDF file",
+        help: "write the readings as text: `ncdump FILE`",
+        matches: |bytes, _| bytes.starts_with(b"CDF\x01") || bytes.starts_with(b"CDF\x02"),
+    },
+    UnsupportedKind {
+        what: "a sound recording",
+        help: "give ranges or times of flight that were measured in it",
+        matches: |bytes, _| {
+            (bytes.starts_with(b"RIFF") && bytes.get(8..12) == Some(&b"WAVE"[..]))
+                || bytes.starts_with(b"fLaC")
+                || bytes.starts_with(b"OggS")
+        },
+    },
+    UnsupportedKind {
+        what: "a formatted document (RTF)",
+        help: "save it as plain text",
+        matches: |bytes, _| bytes.starts_with(b"{\\rtf"),
+    },
+    UnsupportedKind {
+        what: "a web page",
+        help: "save the data of its table as CSV",
+        matches: |_, text| {
+            let start: String = text.trim_start().chars().take(14).collect();
+            let start = start.to_lowercase();
+            start.starts_with("<!doctype html") || start.starts_with("<html")
+        },
     },
     UnsupportedKind {
         what: "an SQLite database, as used by some ROS 2 recordings",
@@ -386,6 +461,14 @@ mod tests {
             (&b"#ROSBAG V2.0\nE\0"[..], "ROS 1", "rosbags-convert"),
             (b"\x93NUMPY\x01\0", "NumPy", "np.savetxt"),
             (b"\x1f\x8b\x08\0", "gzip", "gunzip"),
+            (b"#ROSRECORD V1.1\n", "ROS 1", "rosbag fix"),
+            (b"\xff\xfe\0\0a\0\0\0", "UTF-32", "iconv"),
+            (b"7z\xbc\xaf\x27\x1c\0\x04", "7-Zip", "unpack"),
+            (b"\x80\x04\x95", "pickle", "json.dump"),
+            (b"# .PCD v0.7\nVERSION 0.7\n", "point cloud", "ranges"),
+            (b"{\\rtf1 0,100}", "RTF", "plain text"),
+            (b"<!DOCTYPE html>\n<html>", "web page", "CSV"),
+            (b"rosbag2_bagfile_information:\n  version: 5\n", "ROS 2", "folder"),
             (b"PK\x03\x04....[Content_Types].xml", "spreadsheet", "CSV"),
             (b"PK\x03\x04....arr_0.npy", "npz", "savetxt"),
             (b"PK\x03\x04....a.csv", "ZIP", "unzip"),

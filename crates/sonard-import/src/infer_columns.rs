@@ -53,8 +53,15 @@ impl ColumnCandidates {
     /// Interprets yaw as the azimuth of the ranger's mount, if there is no other direction and no
     /// position.
     fn take_yaw_as_azimuth(&mut self) {
-        if self.has_direction() || self.has(FieldQuantity::X) {
+        let is_direction = |quantity: FieldQuantity| quantity.role() == FieldQuantity::Azimuth;
+        let has_other = self.without_unit.iter().any(|(quantity, _)| is_direction(*quantity));
+        if self.has_direction() || has_other || self.has(FieldQuantity::X) {
             return;
+        }
+        for (quantity, _) in &mut self.without_unit {
+            if *quantity == Quantity::Heading {
+                *quantity = Quantity::Azimuth;
+            }
         }
         for (field, _) in &mut self.found {
             if field.quantity() == FieldQuantity::Heading
@@ -65,11 +72,10 @@ impl ColumnCandidates {
         }
     }
 
-    /// Formats `--columns` for all found columns, with `with` in place of those of the same
-    /// quantity.
+    /// Formats `--columns` for all found columns, with `with` in place of those with the same role.
     fn option(&self, with: &[(Field, &str)], names: &[String]) -> String {
-        let is_replaced =
-            |field: &Field| with.iter().any(|(other, _)| other.quantity() == field.quantity());
+        let role = |field: &Field| field.quantity().role();
+        let is_replaced = |field: &Field| with.iter().any(|(other, _)| role(other) == role(field));
         let kept = self.found.iter().filter(|(field, _)| !is_replaced(field));
         let with = with.iter().map(|(field, name)| (*field, (*name).to_owned()));
         let mut all: Vec<(Field, String)> = with.chain(kept.cloned()).collect();
@@ -80,16 +86,24 @@ impl ColumnCandidates {
 
     /// Returns the range columns of an array: more than two, adjacent and in one unit.
     pub(crate) fn array_columns(&self, names: &[String]) -> Option<(Field, Vec<usize>)> {
-        let ranges =
-            self.found.iter().filter(|(field, _)| field.quantity() == FieldQuantity::Range);
-        let ranges: Vec<&(Field, String)> = ranges.collect();
-        let (field, _) = ranges.first()?;
-        let place = |name: &String| names.iter().position(|known| known == name).map(|at| at + 1);
-        let places: Vec<usize> = ranges.iter().filter_map(|(_, name)| place(name)).collect();
-        let are_side_by_side = places.windows(2).all(|pair| pair[1] == pair[0] + 1);
-        let are_alike = ranges.iter().all(|(other, _)| other == field);
-        (places.len() > 2 && places.len() == ranges.len() && are_side_by_side && are_alike)
-            .then_some((*field, places))
+        let ranges = self.found.iter().filter(|(field, _)| field.quantity() == FieldQuantity::Range);
+        let ranges: Vec<(Field, &String)> = ranges.map(|(field, name)| (*field, name)).collect();
+        if !ranges.is_empty() {
+            return adjacent(&ranges, names);
+        }
+        // Columns that are named after the rangers, with the unit only: `s0 [cm]`.
+        let by_unit = self.unit_alone.iter().filter_map(|(unit, name)| {
+            Field::with_unit(FieldQuantity::Range, Some(unit)).map(|field| (field, name))
+        });
+        adjacent(&by_unit.collect::<Vec<_>>(), names)
+    }
+
+    /// Returns the numbers of the range columns of an array that lack a unit.
+    fn array_columns_without_unit(&self, names: &[String]) -> Option<Vec<usize>> {
+        let any = Field::of_quantity(FieldQuantity::Range).next()?;
+        let ranges = self.without_unit.iter().filter(|(quantity, _)| *quantity == FieldQuantity::Range);
+        let ranges: Vec<(Field, &String)> = ranges.map(|(_, name)| (any, name)).collect();
+        adjacent(&ranges, names).map(|(_, places)| places)
     }
 
     /// Rejects two columns of one quantity.
@@ -104,16 +118,18 @@ impl ColumnCandidates {
             ));
         }
         for (at, (field, name)) in self.found.iter().enumerate() {
-            let duplicate =
-                self.found[..at].iter().find(|(other, _)| other.quantity() == field.quantity());
+            let is_same_role =
+                |(other, _): &&(Field, String)| other.quantity().role() == field.quantity().role();
+            let duplicate = self.found[..at].iter().find(is_same_role);
             if let Some((other, duplicate)) = duplicate {
                 let [first, second] = [(*other, duplicate.as_str()), (*field, name.as_str())]
                     .map(|choice| self.option(&[choice], names));
+                let words = match other.quantity() == field.quantity() {
+                    true => field.quantity().words(),
+                    false => "measured quantity",
+                };
                 return Err(ImportError::mapping(
-                    format!(
-                        "`{duplicate}` and `{name}` may both be the {}",
-                        field.quantity().label()
-                    ),
+                    format!("`{duplicate}` and `{name}` may both be the {words}"),
                     format!("choose: {first} or {second}"),
                 ));
             }
@@ -138,9 +154,30 @@ impl ColumnCandidates {
         let without =
             self.without_unit.iter().filter(|(quantity, _)| quantities.contains(quantity));
         for (quantity, name) in without {
-            offers.extend(Field::of_quantity(*quantity).map(|field| (field, name.as_str())));
+            let fields = Field::of_quantity(*quantity).filter(|field| field.is_usual());
+            offers.extend(fields.map(|field| (field, name.as_str())));
         }
         offers
+    }
+
+    /// Returns the columns of unknown meaning that may be the direction or the range: a time whose
+    /// unit is also one of times of flight, or else any unused column, in the usual units.
+    fn unnamed_offers(&self, needs_direction: bool, needs_range: bool) -> [Vec<(Field, &str)>; 2] {
+        let times = self.found.iter().filter(|(field, _)| field.quantity() == Quantity::Time);
+        let times = times.filter_map(|(field, name)| {
+            let unit = field.unit().filter(|_| needs_range)?;
+            Field::with_unit(Quantity::Tof, Some(unit)).map(|field| (field, name.as_str()))
+        });
+        let unused = self.unused.iter().filter(|name| !column_names::is_no_reading(name));
+        let unused: Vec<&str> = unused.map(String::as_str).collect();
+        let each = |quantities: &[Quantity], needed: bool| -> Vec<(Field, &str)> {
+            let fields =
+                quantities.iter().flat_map(|quantity| Field::of_quantity(*quantity).take(3));
+            let fields: Vec<Field> = fields.filter(|_| needed).collect();
+            unused.iter().flat_map(|name| fields.iter().map(|field| (*field, *name))).collect()
+        };
+        let ranges = times.chain(each(&[Quantity::Range, Quantity::Tof], needs_range));
+        [each(&[Quantity::Azimuth], needs_direction && unused.len() == 1), ranges.collect()]
     }
 
     /// Checks that a direction and a range are mapped; the error offers complete options with the
@@ -153,11 +190,15 @@ impl ColumnCandidates {
         }
         let directions = self.offers([FieldQuantity::Azimuth, FieldQuantity::Bearing]);
         let ranges = self.offers([FieldQuantity::Range, FieldQuantity::Tof]);
+        if let Some(places) = self.array_columns_without_unit(names) {
+            return Err(missing_array_unit(&places, names));
+        }
         let lacks = match (needs_direction, needs_range) {
             (true, true) => "no column is recognized as a direction or a range",
             (true, false) => "no column is mapped to azimuth or bearing",
             _ => "no column is mapped to range or time of flight",
         };
+        let unnamed = self.unnamed_offers(needs_direction, needs_range);
         let without_unit = self.without_unit.iter().find(|(quantity, _)| match quantity {
             FieldQuantity::Azimuth | FieldQuantity::Bearing => needs_direction,
             FieldQuantity::Range | FieldQuantity::Tof => needs_range,
@@ -166,6 +207,12 @@ impl ColumnCandidates {
         let what = match without_unit {
             Some((_, name)) => format!("the unit of column `{name}` is unknown"),
             None => format!("{lacks}; the columns are `{}`", names.join("`, `")),
+        };
+        let [directions, ranges] = match unnamed {
+            [more_directions, more_ranges] => [
+                if directions.is_empty() { more_directions } else { directions },
+                if ranges.is_empty() { more_ranges } else { ranges },
+            ],
         };
         // Every combination of a direction and a range, if both are missing.
         let directions = if needs_direction { directions } else { Vec::new() };
@@ -197,12 +244,9 @@ impl ColumnCandidates {
                 "if the ranger is fixed, give its direction and choose a unit: --azimuth-deg DEG {}",
                 with.join(" | --azimuth-deg DEG ")
             );
-        } else if options.is_empty() {
-            let place = if needs_range { "range_cm" } else { "azimuth_deg" };
-            help = format!(
-                "map the columns, by name or number, with units: --columns azimuth_deg=1,{place}=2, or other fields \
-                                 of `sonard import --help`"
-            );
+        } else if options.is_empty() && needs_range {
+            help = "give a file with ranges or times of flight; fields are listed by `sonard import --help`"
+                .to_owned();
         }
         Err(ImportError::mapping(what, help))
     }
@@ -210,6 +254,30 @@ impl ColumnCandidates {
 
 /// Maximum number of options in a message.
 const MAX_OFFERS: usize = 6;
+
+/// Returns the common field and the numbers of columns that may be the ranges of an array: more than
+/// two, adjacent and of one field.
+fn adjacent(ranges: &[(Field, &String)], names: &[String]) -> Option<(Field, Vec<usize>)> {
+    let (field, _) = ranges.first()?;
+    let place = |name: &String| names.iter().position(|known| known == name).map(|at| at + 1);
+    let places: Vec<usize> = ranges.iter().filter_map(|(_, name)| place(name)).collect();
+    let are_side_by_side = places.windows(2).all(|pair| pair[1] == pair[0] + 1);
+    let are_alike = ranges.iter().all(|(other, _)| other == field);
+    (places.len() > 2 && places.len() == ranges.len() && are_side_by_side && are_alike)
+        .then_some((*field, places))
+}
+
+/// Rejects a LaserScan in columns, in which the beams have no angles of their own.
+fn check_laser_columns(names: &[String]) -> Result<(), ImportError> {
+    let has = |word: &str| names.iter().any(|name| name.contains(word));
+    if !(has("angle_min") && has("angle_increment")) {
+        return Ok(());
+    }
+    Err(ImportError::mapping(
+        "the table is a LaserScan in columns, as printed by `rostopic echo -p`",
+        "print it as YAML, without -p: `rostopic echo /scan > scan.yaml`, and import that",
+    ))
+}
 
 impl Mapping {
     /// Maps the ranges of an array and the other named columns; returns `false` unless there is one
@@ -241,6 +309,7 @@ impl Mapping {
     /// # Errors
     /// Returns an error for two columns of one quantity, or for a name without a unit.
     pub(crate) fn infer_columns(&mut self, names: &[String]) -> Result<Vec<String>, ImportError> {
+        check_laser_columns(names)?;
         let candidates = ColumnCandidates::from_names(names);
         candidates.check_duplicates(names)?;
         candidates.check_missing(self, names)?;
@@ -267,4 +336,16 @@ impl Mapping {
             candidates.found.into_iter().map(|(field, name)| (field, Column::Name(name))).collect();
         Ok(notes)
     }
+}
+
+/// Builds the error that requests the unit of the range columns of an array.
+fn missing_array_unit(places: &[usize], names: &[String]) -> ImportError {
+    let options = Field::of_quantity(Quantity::Range)
+        .take(3)
+        .map(|field| columns_option([(field, Column::Several(places.to_vec()))], names));
+    let options: Vec<String> = options.map(|option| format!("--array NAME {option}")).collect();
+    ImportError::mapping(
+        format!("{} columns are ranges without a unit: one per ranger of an array?", places.len()),
+        format!("give the array and select the unit: {}", options.join(" | ")),
+    )
 }

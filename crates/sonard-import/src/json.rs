@@ -66,18 +66,53 @@ pub(crate) fn objects<'a>(
             let first = std::iter::once(parse(1, &text));
             let rest =
                 lines.filter(|line| !line.as_ref().is_ok_and(|line| line.text.trim().is_empty()));
-            return Ok(Box::new(first.chain(rest.map(|line| {
+            let objects = first.chain(rest.map(|line| {
                 let line = line?;
                 parse(line.number, &line.text)
-            }))));
+            }));
+            return Ok(Box::new(objects.flat_map(|object| match object {
+                Ok(object) => entries_of_object(object).into_iter().map(Ok).collect::<Vec<_>>(),
+                Err(error) => vec![Err(error)],
+            })));
         }
     }
-    let values = match parse(1, &text)? {
+    let plain = quote_non_finite(text.trim_end());
+    let documents = serde_json::Deserializer::from_str(&plain).into_iter::<Value>();
+    let documents = documents.map(|document| document.map_err(|error| invalid(1, &error, &text)));
+    let documents = documents.collect::<Result<Vec<Value>, _>>()?;
+    let values = documents.into_iter().flat_map(|value| match value {
         value if is_scalar_row(&value) => vec![value],
         Value::Array(values) => values,
-        value => vec![value],
-    };
-    Ok(Box::new(values.into_iter().map(Ok)))
+        value => entries_of_object(value),
+    });
+    Ok(Box::new(values.map(Ok)))
+}
+
+/// Returns the objects of the only list of objects in an object, or the object itself. Documents
+/// often wrap their readings: `{"data": [{...}, {...}]}`.
+fn entries_of_object(value: Value) -> Vec<Value> {
+    match wrapped_list(&value, MAX_WRAPPERS) {
+        Some(entries) => entries.clone(),
+        None => vec![value],
+    }
+}
+
+/// Maximum number of objects around a list of readings.
+const MAX_WRAPPERS: u32 = 3;
+
+fn wrapped_list(value: &Value, depth: u32) -> Option<&Vec<Value>> {
+    let members = value.as_object()?;
+    let is_list = |value: &Value| value.as_array().is_some_and(|list| !list.is_empty());
+    let lists: Vec<&Vec<Value>> =
+        members.values().filter(|value| is_list(value)).filter_map(Value::as_array).collect();
+    match lists[..] {
+        [entries] => entries.iter().all(Value::is_object).then_some(entries),
+        [] if depth > 0 => {
+            let mut inner = members.values().filter_map(|value| wrapped_list(value, depth - 1));
+            inner.next().filter(|_| inner.next().is_none())
+        }
+        _ => None,
+    }
 }
 
 /// Returns `true` for a list of at least two scalars, a row of numbers.
@@ -87,22 +122,27 @@ fn is_scalar_row(value: &Value) -> bool {
 }
 
 pub(crate) fn parse(first_line: u64, text: &str) -> Object {
-    read(text).map_err(|error| {
-        let line = first_line + (error.line() as u64).saturating_sub(1);
-        ImportError::at(
-            FileLocation::Line(line),
-            format!("invalid JSON: {error}"),
-            "correct the file",
-        )
-    })
+    read(text).map_err(|error| invalid(first_line, &error, text))
+}
+
+fn invalid(first_line: u64, error: &serde_json::Error, text: &str) -> ImportError {
+    let line = first_line + (error.line() as u64).saturating_sub(1);
+    let help = match error.is_eof() {
+        true => "the file is cut off: complete or remove its last entry",
+        false if text.contains("{'") || text.contains("['") => {
+            "strings need double quotes: write Python objects with `json.dumps`, not with `print`"
+        }
+        false => "correct the file",
+    };
+    ImportError::at(FileLocation::Line(line), format!("invalid JSON: {error}"), help)
 }
 
 fn read(text: &str) -> serde_json::Result<Value> {
-    serde_json::from_str(&replace_non_finite(text))
+    serde_json::from_str(&quote_non_finite(text.trim_end()))
 }
 
-/// Replaces `NaN`, `Infinity` and `-Infinity`, as written by Python, by `null`: no echo.
-fn replace_non_finite(text: &str) -> Cow<'_, str> {
+/// Quotes `NaN`, `Infinity` and `-Infinity`, as written by Python, which JSON does not have.
+fn quote_non_finite(text: &str) -> Cow<'_, str> {
     const NON_FINITE: [&str; 4] = ["-Infinity", "Infinity", "NaN", "nan"];
     if !NON_FINITE.iter().any(|name| text.contains(name)) {
         return Cow::Borrowed(text);
@@ -113,7 +153,7 @@ fn replace_non_finite(text: &str) -> Cow<'_, str> {
         let name = NON_FINITE.iter().find(|name| !is_string && rest.starts_with(**name));
         let consumed = match (name, next) {
             (Some(name), _) => {
-                plain.push_str("null");
+                plain.extend(["\"", name, "\""]);
                 name.len()
             }
             (None, '\\') if is_string => {
@@ -256,10 +296,10 @@ impl FirstEntry {
     /// Classifies the first value of a file, or the first element of a list of objects.
     pub(crate) fn from_value(value: &Value) -> Self {
         let first = match value {
-            Value::Array(values) if !is_scalar_row(value) => values.first().unwrap_or(&Value::Null),
-            value => value,
+            Value::Array(values) if !is_scalar_row(value) => values.first(),
+            value => wrapped_list(value, MAX_WRAPPERS).map_or(Some(value), |list| list.first()),
         };
-        match first {
+        match first.unwrap_or(&Value::Null) {
             Value::Object(members) => Self::Names(members.keys().cloned().collect()),
             Value::Array(values) => Self::List(values.len()),
             _ => Self::Other,
@@ -268,7 +308,7 @@ impl FirstEntry {
 
     /// Classifies the first value of a head; `None` if the value is incomplete.
     pub(crate) fn from_head(head: &str) -> Option<Self> {
-        let text = replace_non_finite(head);
+        let text = quote_non_finite(head);
         let first = serde_json::Deserializer::from_str(&text).into_iter::<Value>().next();
         first.and_then(Result::ok).map(|value| Self::from_value(&value))
     }
@@ -279,14 +319,34 @@ mod tests {
     use super::*;
 
     #[test]
-    fn non_finite_numbers_become_null() {
+    fn non_finite_numbers_are_quoted() {
         for (text, plain) in [
-            ("[NaN, -Infinity, Infinity]", "[null, null, null]"),
-            ("{\"NaN\": NaN, \"a\\\"NaN\": 1}", "{\"NaN\": null, \"a\\\"NaN\": 1}"),
-            ("{\"NaN\\\\\": NaN}", "{\"NaN\\\\\": null}"),
+            ("[NaN, -Infinity, Infinity]", "[\"NaN\", \"-Infinity\", \"Infinity\"]"),
+            ("{\"NaN\": NaN, \"a\\\"NaN\": 1}", "{\"NaN\": \"NaN\", \"a\\\"NaN\": 1}"),
+            ("{\"NaN\\\\\": NaN}", "{\"NaN\\\\\": \"NaN\"}"),
             ("[1, 2]", "[1, 2]"),
         ] {
-            assert_eq!(replace_non_finite(text), plain);
+            assert_eq!(quote_non_finite(text), plain);
+        }
+    }
+
+    #[test]
+    fn wrapped_and_joined_documents() {
+        let entry = "{\"a\": 1, \"b\": [2]}";
+        for text in [
+            format!("{{\"data\": [{entry}, {entry}]}}"),
+            format!("{{\"meta\": {{\"v\": 1}},\n\"scan\": {{\"of\": [{entry}, {entry}]}}}}"),
+            format!("{entry}{entry}"),
+            format!("{{\n\"a\": 1,\n\"b\": [2]}}\n{entry}"),
+            format!("[{entry}, {entry}]"),
+        ] {
+            let objects = objects(text.as_bytes()).expect("JSON");
+            let objects: Vec<Value> = objects.map(|object| object.expect("an object")).collect();
+            assert_eq!(objects, vec![parse(1, entry).expect("JSON"); 2], "{text}");
+        }
+        // Two lists, or a list of columns, are not wrappers.
+        for text in ["{\"a\": [{}], \"b\": [{}]}", "{\"a\": [1, 2], \"b\": [3, 4]}"] {
+            assert_eq!(objects(text.as_bytes()).expect("JSON").count(), 1, "{text}");
         }
     }
 

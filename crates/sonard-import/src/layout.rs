@@ -38,8 +38,16 @@ pub(crate) struct TableLayout {
     pub(crate) cells: Vec<String>,
     /// True if `cells` are names.
     pub(crate) has_names: bool,
-    /// True if the names come from a comment line.
-    pub(crate) is_comment: bool,
+    /// True if the first row holds the names, as opposed to a comment or the rows themselves.
+    pub(crate) has_name_row: bool,
+    /// True if a row of units follows the names.
+    pub(crate) has_unit_row: bool,
+    /// True if the first row lacks columns, as in a capture that begins within a row.
+    pub(crate) is_first_cut: bool,
+    /// Label of each cell, as in `angle:15,distance:31`; empty without labels.
+    labels: Vec<String>,
+    /// True if a terminal program put the time before each row: `12:00:15.015 -> 15,31`.
+    has_arrow: bool,
     /// True if the first line is `sep=;`, as written by Excel.
     pub(crate) has_separator_line: bool,
     /// Notes on the layout, for the user.
@@ -75,34 +83,110 @@ impl TableLayout {
                 "give a table of readings",
             ));
         };
-        let texts: Vec<&str> = rows.iter().map(|(_, line)| *line).collect();
-        let separator = stated.map_or_else(|| detect_separator(&texts), Separator::Byte);
-        let cells = split(separator, first).unwrap_or_default();
-        // A first line with a number is a reading, which must not be lost as a header.
-        let is_number = |cell: &String| is_number(cell);
-        let has_names = !cells.iter().any(is_number) && cells.iter().any(|cell| !cell.is_empty());
-        let mut header = Self {
-            separator,
+        let has_arrow = rows.iter().all(|(_, line)| stamped(line).is_some());
+        if has_arrow {
+            notes.push("the time before `->` in each line is column 1".to_owned());
+        }
+        let texts = rows.iter().map(|(_, line)| match stamped(line) {
+            Some((_, row)) if has_arrow => row,
+            _ => *line,
+        });
+        let texts: Vec<&str> = texts.collect();
+        let mut layout = Self {
+            separator: stated
+                .map(Separator::Byte)
+                .or_else(|| labelled_separator(&texts))
+                .unwrap_or_else(|| detect_separator(&texts)),
             ends,
-            decimal: detect_decimal(&texts[usize::from(has_names)..], separator, mapping)?,
-            cells,
-            has_names,
-            is_comment: false,
+            decimal: Decimal::Point,
+            cells: Vec::new(),
+            has_names: false,
+            has_name_row: false,
+            has_unit_row: false,
+            is_first_cut: false,
+            labels: Vec::new(),
+            has_arrow,
             has_separator_line: stated.is_some(),
             notes,
         };
-        if header.decimal == Decimal::Comma && mapping.decimal.is_none() {
-            header.notes.push("numbers have a decimal comma".to_owned());
-        }
-        if ends == LineEnding::Stops {
-            (header.cells, header.has_names) = (vec!["1".to_owned(), "2".to_owned()], false);
-        } else if !has_names {
-            header.take_names(lines[..first_at].iter().rev().find_map(|line| comment(line)));
+        layout.cells = layout.split(first).unwrap_or_default();
+        layout.find_names(&rows, &lines[..first_at]);
+        let values = &texts[usize::from(layout.has_name_row)..];
+        layout.decimal = detect_decimal(values, layout.separator, mapping)?;
+        if layout.decimal == Decimal::Comma && mapping.decimal.is_none() {
+            layout.notes.push("numbers have a decimal comma".to_owned());
         }
         let named =
-            header.cells.iter().rposition(|cell| !cell.is_empty()).map_or(0, |last| last + 1);
-        header.cells.truncate(named.max(1));
-        Ok(header)
+            layout.cells.iter().rposition(|cell| !cell.is_empty()).map_or(0, |last| last + 1);
+        layout.cells.truncate(named.max(1));
+        Ok(layout)
+    }
+
+    /// Finds the names of the columns: in the first row, in each cell, or in the comment above.
+    fn find_names(&mut self, rows: &[(usize, &str)], above: &[&str]) {
+        if self.ends == LineEnding::Stops {
+            self.cells = vec!["1".to_owned(), "2".to_owned()];
+            return;
+        }
+        let second = rows.get(1).and_then(|(_, line)| self.split(line).ok()).unwrap_or_default();
+        if let Some(labels) = labels(&self.cells, &second) {
+            self.notes.push("column names taken from the labels of the values".to_owned());
+            let names = labels.iter().map(|label| match label.is_empty() {
+                true => "time".to_owned(),
+                false => label.trim_end_matches([':', '=']).to_owned(),
+            });
+            (self.cells, self.has_names, self.labels) = (names.collect(), true, labels);
+            return;
+        }
+        // A first line with a number is a reading, which must not be lost as a header.
+        let own = usize::from(self.has_arrow);
+        let is_number = |cell: &String| is_number(cell);
+        let first = self.cells.get(own..).unwrap_or_default();
+        if !first.iter().any(is_number) && first.iter().any(|cell| !cell.is_empty()) {
+            (self.has_names, self.has_name_row) = (true, true);
+            self.take_units(&second);
+            if self.has_arrow {
+                "time".clone_into(&mut self.cells[0]);
+            }
+            return;
+        }
+        if second.len() > self.cells.len() {
+            (self.cells, self.is_first_cut) = (second, true);
+        }
+        self.take_names(above.iter().rev().find_map(|line| comment(line)));
+    }
+
+    /// Joins a row of units below the names with them: `angle`, `[deg]` becomes `angle [deg]`.
+    fn take_units(&mut self, second: &[String]) {
+        let unit = |cell: &String| {
+            let unit = cell.trim_matches(['[', ']', '(', ')']);
+            (unit.is_empty() || column_names::is_unit(unit)).then(|| unit.to_owned())
+        };
+        let units: Option<Vec<String>> = second.iter().map(unit).collect();
+        let Some(units) = units.filter(|units| units.iter().any(|unit| !unit.is_empty())) else {
+            return;
+        };
+        self.notes.push("units taken from the row below the column names".to_owned());
+        self.has_unit_row = true;
+        for (name, unit) in self.cells.iter_mut().zip(&units).filter(|(_, unit)| !unit.is_empty()) {
+            *name = format!("{name} [{unit}]");
+        }
+    }
+
+    /// Splits a line into its values, without their labels.
+    pub(crate) fn split(&self, line: &str) -> Result<Vec<String>, String> {
+        let parted = stamped(line).filter(|_| self.has_arrow);
+        let mut cells = split(self.separator, parted.map_or(line, |(_, row)| row))?;
+        if self.has_arrow {
+            cells.insert(0, parted.map_or_else(String::new, |(time, _)| time.to_owned()));
+        }
+        for (cell, label) in cells.iter_mut().zip(&self.labels) {
+            if let Some((_, value)) = labelled(cell).filter(|(found, _)| found == label) {
+                let value = value.trim_end_matches(|c: char| c.is_alphabetic()).trim();
+                *cell = value.to_owned();
+            }
+        }
+        Ok(cells)
     }
 
     /// Takes column names from the comment above the first row, if it has one name per value.
@@ -122,7 +206,7 @@ impl TableLayout {
         });
         if let Some(names) = names {
             self.notes.push(format!("column names taken from the comment `{comment}`"));
-            (self.cells, self.has_names, self.is_comment) = (names, true, true);
+            (self.cells, self.has_names) = (names, true);
         }
     }
 
@@ -159,6 +243,50 @@ fn is_number(cell: &str) -> bool {
     number::parse(cell, Decimal::Point).is_some() || number::parse(cell, Decimal::Comma).is_some()
 }
 
+/// Separates the time that a terminal program puts before a line: `12:00:15.015 -> 15,31`.
+fn stamped(line: &str) -> Option<(&str, &str)> {
+    let (time, row) = line.split_once(" -> ")?;
+    let is_time = time.len() >= 8
+        && time.matches(':').count() == 2
+        && time.bytes().all(|byte| byte.is_ascii_digit() || matches!(byte, b':' | b'.'));
+    is_time.then_some((time, row))
+}
+
+/// Returns the labels of the cells of two rows, as sent to plotters (`angle:15,distance:31 cm`):
+/// alike in both, and followed by numbers. The label of a cell of the time is empty.
+fn labels(first: &[String], second: &[String]) -> Option<Vec<String>> {
+    if first.is_empty() || first.len() != second.len() {
+        return None;
+    }
+    let label = |(a, b): (&String, &String)| {
+        if a.contains(':') && a.starts_with(|c: char| c.is_ascii_digit()) {
+            return Some(String::new());
+        }
+        let (label, value) = labelled(a)?;
+        let unit = value.trim_start_matches(|c: char| !c.is_alphabetic());
+        let number = value.trim_end_matches(|c: char| c.is_alphabetic()).trim();
+        let is_same = labelled(b).is_some_and(|(other, _)| other == label);
+        let is_known = unit.is_empty() || column_names::is_unit(unit);
+        (is_same && is_known && is_number(number)).then_some(label)
+    };
+    let labels: Vec<String> = first.iter().zip(second).map(label).collect::<Option<_>>()?;
+    labels.iter().any(|label| !label.is_empty()).then_some(labels)
+}
+
+/// Separates the label of a value, with its unit if the value has one: `dist: 31 cm` is labelled
+/// `dist cm:`.
+fn labelled(cell: &str) -> Option<(String, &str)> {
+    let at = cell.find([':', '='])?;
+    let (name, value) = (cell[..at].trim(), cell[at + 1..].trim());
+    let unit = value.trim_start_matches(|c: char| !c.is_alphabetic());
+    let is_name = name.starts_with(char::is_alphabetic);
+    let label = match unit.is_empty() {
+        true => format!("{name}:"),
+        false => format!("{name} {unit}:"),
+    };
+    is_name.then_some((label, value))
+}
+
 /// Parses Excel's separator line.
 fn separator_line(line: &str) -> Option<u8> {
     let line = line.trim().trim_matches('"');
@@ -171,6 +299,15 @@ fn separator_line(line: &str) -> Option<u8> {
         [one] if one.is_ascii() => Some(*one),
         _ => None,
     }
+}
+
+/// Returns the separator of labelled values, which may have blanks within them.
+fn labelled_separator(rows: &[&str]) -> Option<Separator> {
+    let [first, second, ..] = rows else { return None };
+    SEPARATORS.into_iter().find(|separator| {
+        let rows = [first, second].map(|row| split(*separator, row).unwrap_or_default());
+        labels(&rows[0], &rows[1]).is_some()
+    })
 }
 
 /// Chooses the separator that gives the most numbers and splits every row.
@@ -307,11 +444,32 @@ mod tests {
             "%a\n% angle_deg range_cm\n\n0 100\n",
         ] {
             let found = header(text);
-            assert!(found.has_names && found.is_comment && found.cells.len() == 2, "{text}");
+            assert!(found.has_names && !found.has_name_row && found.cells.len() == 2, "{text}");
         }
         for text in ["# by hand today\n0 100\n", "# first sweep\n0 100 5\n", "# by hand\n0 100\n"] {
             assert!(!header(text).has_names, "{text}");
         }
+    }
+
+    #[test]
+    fn takes_labels_units_and_times() {
+        let names = |text: &str| header(text).cells;
+        for text in ["angle:15,dist:31\nangle:16,dist:32\n", "angle=15;dist=31\nangle=16;dist=32\n"]
+        {
+            let found = header(text);
+            assert_eq!(found.cells, ["angle", "dist"], "{text}");
+            let row = text.lines().next().expect("a row");
+            assert_eq!(found.split(row).expect("a row"), ["15", "31"]);
+        }
+        let text = "Angle: 15 deg, Distance: 31 cm\nAngle: 16 deg, Distance: 32 cm\n";
+        assert_eq!(names(text), ["Angle deg", "Distance cm"]);
+        assert_eq!(names("a,d\n[deg],[cm]\n1,2\n"), ["a [deg]", "d [cm]"]);
+        assert_eq!(names("a,d\nx,y\n1,2\n"), ["a", "d"]);
+        let found = header("12:00:15.015 -> a,d\n12:00:15.115 -> 16,32\n");
+        assert_eq!(found.cells, ["time", "a", "d"]);
+        let row = found.split("12:00:15.115 -> 16,32").expect("a row");
+        assert_eq!(row, ["12:00:15.115", "16", "32"]);
+        assert!(header("1\n0,100\n5,101\n").is_first_cut);
     }
 
     #[test]

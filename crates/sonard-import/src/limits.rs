@@ -31,8 +31,26 @@ pub(crate) struct LimitNotes {
     fixed_distance: u64,
     fixed_m: f64,
     beyond_max: u64,
+    below_min: u64,
+    /// Number of finite ranges greater than zero.
+    finite: u64,
+    /// NaN, and null in JSON.
+    invalid: u64,
+    nulls: u64,
     max: f64,
+    min: f64,
+    /// Greatest finite `max_range`, in the unit of the messages.
+    max_stated: f64,
+    /// Greatest magnitude of an angle, radians.
+    max_angle_rad: f64,
 }
+
+/// Limit of any ultrasonic ranger, metres; a greater `max_range` is in another unit.
+pub(crate) const MAX_STATED_M: f64 = 60.0;
+/// Greatest plausible angle of a LaserScan, radians: a revolution, with rounding.
+const MAX_ANGLE_RAD: f64 = std::f64::consts::TAU + 0.1;
+/// Number of ranges below which a robot may just be near a wall.
+const MIN_NEAR_READINGS: u64 = 4;
 
 impl Limits {
     /// Classifies a range by the mapping and the limits, and counts assumptions in `notes`.
@@ -43,7 +61,11 @@ impl Limits {
         notes: &mut LimitNotes,
     ) -> RangeClass {
         notes.readings += 1;
+        if self.max.is_finite() {
+            notes.max_stated = notes.max_stated.max(self.max);
+        }
         if range.is_nan() {
+            notes.invalid += 1;
             return RangeClass::Invalid;
         }
         if range.is_finite() && mapping.is_no_echo(range) {
@@ -55,6 +77,7 @@ impl Limits {
             notes.zeros += 1;
             return RangeClass::NoRange(PingStatus::NoEcho);
         }
+        notes.finite += u64::from(range.is_finite());
         let has_limits = self.max > 0.0 && self.max >= self.min && !self.min.is_nan();
         if !has_limits {
             notes.without_limits += 1;
@@ -77,6 +100,10 @@ impl Limits {
             });
         }
         if range == f64::NEG_INFINITY || range <= self.min.max(0.0) {
+            if range.is_finite() {
+                notes.below_min += 1;
+                notes.min = self.min;
+            }
             RangeClass::NoRange(PingStatus::MinRange)
         } else if range == f64::INFINITY {
             RangeClass::NoRange(PingStatus::NoEcho)
@@ -122,16 +149,65 @@ impl LimitNotes {
                 self.beyond_max, self.max
             ));
         }
+        if self.nulls > 0 {
+            lines.push(format!(
+                "{} of {of} ranges are null, which rosbridge writes for infinity and NaN: read as no echo",
+                self.nulls
+            ));
+        }
+        if self.invalid > 0 {
+            lines.push(format!("{} of {of} ranges are NaN: skipped as invalid", self.invalid));
+        }
         lines
     }
 
-    /// Returns `true` if all ranges are finite and beyond `max_range`, as a wrong unit causes.
-    pub(crate) const fn all_beyond_max(&self) -> bool {
-        self.readings > 0 && self.beyond_max == self.readings
+    /// Counts a beam at this angle.
+    pub(crate) fn add_angle(&mut self, angle_rad: f64) {
+        if angle_rad.is_finite() {
+            self.max_angle_rad = self.max_angle_rad.max(angle_rad.abs());
+        }
     }
 
-    pub(crate) const fn max(&self) -> f64 {
-        self.max
+    /// Counts ranges that are null in JSON.
+    pub(crate) const fn add_nulls(&mut self, count: usize) {
+        self.nulls += count as u64;
+    }
+
+    /// Returns the greatest plausible `max_range` of the messages, metres; `metres` is the length of
+    /// their unit.
+    pub(crate) fn max_stated_m(&self, metres: f64) -> f64 {
+        let stated_m = self.max_stated * metres;
+        if stated_m <= MAX_STATED_M { stated_m } else { 0.0 }
+    }
+
+    /// Returns evidence of wrong units, with advice: all ranges beyond `max_range`, all below
+    /// `min_range`, or angles in degrees.
+    pub(crate) fn doubt(&self) -> Option<(String, &'static str)> {
+        if self.max_angle_rad > MAX_ANGLE_RAD {
+            let what = format!(
+                "angles reach {:.1} rad, which looks like degrees; a LaserScan has radians",
+                self.max_angle_rad
+            );
+            let help = "correct angle_min and angle_increment of the driver; --no-unit-check takes them as radians";
+            return Some((what, help));
+        }
+        if self.readings > 0 && self.beyond_max == self.readings {
+            let what = format!(
+                "all {} ranges are beyond max_range = {} of their messages",
+                self.readings, self.max
+            );
+            let help = "are ranges and limits in different units? Correct the driver; --no-unit-check reads all as no echo";
+            return Some((what, help));
+        }
+        if self.below_min >= MIN_NEAR_READINGS && self.below_min == self.finite {
+            let what = format!(
+                "all {} ranges are at or below min_range = {} of their messages",
+                self.below_min, self.min
+            );
+            let help = "are ranges and limits in different units? Correct the driver; --no-unit-check takes all as too near";
+            return Some((what, help));
+        }
+        None
     }
 }
 

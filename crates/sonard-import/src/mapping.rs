@@ -211,10 +211,11 @@ impl Mapping {
         values.map(|value| format!("--no-echo={value}")).collect::<Vec<_>>().join(" ")
     }
 
-    /// Formats `--columns` with `field` in place of the field of the same quantity.
+    /// Formats `--columns` with `field` in place of the field with the same role.
     pub(crate) fn columns_option_with(&self, field: Field, names: &[String]) -> String {
         let columns = self.columns.iter().map(|(known, column)| {
-            let known = if known.quantity() == field.quantity() { field } else { *known };
+            let is_replaced = known.quantity().role() == field.quantity().role();
+            let known = if is_replaced { field } else { *known };
             (known, column.clone())
         });
         columns_option(columns, names)
@@ -225,6 +226,14 @@ impl Mapping {
     /// # Errors
     /// Returns an error for a missing or duplicate quantity.
     pub fn check(&self) -> Result<(), ImportError> {
+        self.check_fields(self.has_array_columns())
+    }
+
+    /// Checks that the mapping is complete and unambiguous; rounds of an array need no direction.
+    ///
+    /// # Errors
+    /// Returns an error for a missing or duplicate quantity.
+    pub(crate) fn check_fields(&self, is_array: bool) -> Result<(), ImportError> {
         let mut seen = BTreeMap::new();
         for field in self.columns.keys() {
             if let Some(other) = seen.insert(field.quantity(), field) {
@@ -242,9 +251,7 @@ impl Mapping {
             let (name, alternative_name) = (preferred.label(), alternative.label());
             let is_fixed = preferred == FieldQuantity::Azimuth && self.azimuth_deg.is_some();
             match (has(preferred), has(alternative)) {
-                (false, false)
-                    if is_fixed
-                        || (preferred == FieldQuantity::Azimuth && self.has_array_columns()) => {}
+                (false, false) if is_fixed || (preferred == FieldQuantity::Azimuth && is_array) => {}
                 (true, _) | (_, true) if is_fixed => {
                     let what = "both --azimuth-deg and a column give the direction";
                     return Err(ImportError::mapping(what, "leave one of them out"));
@@ -283,6 +290,7 @@ pub(crate) fn columns_option(
     columns: impl IntoIterator<Item = (Field, Column)>,
     names: &[String],
 ) -> String {
+    let is_repeated = |name: &String| names.iter().filter(|known| *known == name).nth(1).is_some();
     let pair = |(field, column): (Field, Column)| {
         let place = |name: &str| names.iter().position(|known| known == name).map(|at| at + 1);
         let text = match column {
@@ -291,7 +299,9 @@ pub(crate) fn columns_option(
                 [first, .., last] => format!("{first}-{last}"),
                 _ => numbers.iter().map(usize::to_string).collect(),
             },
-            Column::Name(name) if name.contains(',') || name.trim() != name => {
+            Column::Name(name)
+                if name.contains([',', '=']) || name.trim() != name || is_repeated(&name) =>
+            {
                 place(&name).map_or(name, |place| place.to_string())
             }
             Column::Name(name) => name,

@@ -9,11 +9,15 @@ use std::collections::BTreeMap;
 
 use crate::FileLocation;
 
-/// Number of distinct values, the greatest ones, that are counted exactly.
-const MAX_VALUES: usize = 64;
+/// Maximum number of distinct values that are counted.
+const MAX_VALUES: usize = 1024;
+/// Number of the greatest values that are always counted, however rare.
+const TOP_VALUES: usize = 64;
 /// Minimum share of its arc that a wall at one distance fills; a constant interleaved with ranges
 /// fills less.
 const MIN_FILL: f64 = 0.93;
+/// Minimum share of the ranges in its directions that a wall has.
+const MIN_SHARE: f64 = 0.6;
 /// Full registers and round numbers used by drivers, in the unit of the file.
 const CODES: [f64; 19] = [
     255.0,
@@ -64,8 +68,11 @@ pub(crate) struct RangeHistogram {
     kind: DirectionKind,
     count: u64,
     visited: Directions,
-    /// Counts of the greatest values; the bits of positive floats sort like the numbers.
+    /// Counts of the greatest and of the frequent values; the bits of positive floats sort like the
+    /// numbers.
     values: BTreeMap<u64, ValueCount>,
+    /// Count up to which values below the greatest were dropped.
+    dropped: u64,
     /// Counts of values of zero or less.
     non_positive: BTreeMap<i64, (f64, u64, FileLocation)>,
     is_non_positive_full: bool,
@@ -81,7 +88,7 @@ struct Bin {
 }
 
 /// Constant that is probably written for no echo.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct NoEchoConstant {
     /// Value in the unit of the file; the minimum of a cluster.
     pub(crate) value: f64,
@@ -120,6 +127,7 @@ impl RangeHistogram {
             count: 0,
             visited: [0; 6],
             values: BTreeMap::new(),
+            dropped: 0,
             non_positive: BTreeMap::new(),
             is_non_positive_full: false,
             bins: BTreeMap::new(),
@@ -150,7 +158,7 @@ impl RangeHistogram {
         seen.count += 1;
         mark(&mut seen.directions);
         if self.values.len() > MAX_VALUES {
-            self.values.pop_first();
+            self.drop_rare_values();
         }
         let bin = (value.ln() * 100.0).floor() as i32;
         let bin = self.bins.entry(bin);
@@ -158,6 +166,17 @@ impl RangeHistogram {
         bin.count += 1;
         bin.min = bin.min.min(value);
         mark(&mut bin.directions);
+    }
+
+    /// Drops the rarest values below the greatest ones, until half of the room is free (lossy
+    /// counting).
+    fn drop_rare_values(&mut self) {
+        let top = self.values.keys().rev().nth(TOP_VALUES - 1).copied().unwrap_or_default();
+        while self.values.len() > MAX_VALUES / 2 {
+            self.dropped += 1;
+            let dropped = self.dropped;
+            self.values.retain(|bits, seen| *bits >= top || seen.count > dropped);
+        }
     }
 
     /// Returns the values of zero or less, the most frequent first.
@@ -190,42 +209,53 @@ impl RangeHistogram {
         let falling: Vec<(f64, &ValueCount)> =
             self.values.iter().rev().map(|(bits, seen)| (f64::from_bits(*bits), seen)).collect();
         let of = self.count;
+        let mut counts: Vec<u64> = falling.iter().map(|(_, seen)| seen.count).collect();
+        counts.sort_unstable_by(|a, b| b.cmp(a));
+        let [most, second] = [0, 1].map(|rank| counts.get(rank).copied().unwrap_or(0));
+        let cluster = self.cluster(longest);
         for (rank, &(value, seen)) in falling.iter().enumerate() {
-            let others = falling.iter().filter(|(other, _)| *other != value);
-            let max_other_count = others.map(|(_, seen)| seen.count).max().unwrap_or(0);
-            let next_lower = falling.get(rank + 1).map(|(value, _)| *value);
-            let is_apart = next_lower.is_some_and(|next_lower| {
-                let gap = value - next_lower;
-                gap > 0.05 * value && gap > 4.0 * usual_gap(&falling, value)
-            });
+            let max_other_count = if seen.count == most { second } else { most };
             let share = seen.count as f64 / of as f64;
-            let many = self.is_scattered(&seen.directions);
+            let is_top = rank == 0;
             let is_frequent = seen.count >= 6 && share >= 0.05 && seen.count >= 5 * max_other_count;
+            if !is_top && !is_frequent {
+                continue;
+            }
+            let is_apart = || {
+                let next_lower = falling.get(rank + 1).map(|(value, _)| *value);
+                next_lower.is_some_and(|next_lower| {
+                    let gap = value - next_lower;
+                    gap > 0.05 * value && gap > 4.0 * usual_gap(&falling, value)
+                })
+            };
+            let many = self.is_scattered(&seen.directions, seen.count);
             let is_at_longest = value >= AT_LONGEST * longest;
             let is_code = CODES.contains(&value);
-            let is_top = rank == 0;
-            let why =
-                if is_at_longest && seen.count >= 3 && share >= 0.01 && (is_top || is_frequent) {
-                    Some("at or beyond the maximum range of the sensor")
-                } else if is_code
-                    && seen.count >= 3
-                    && is_top
-                    && (many || (value >= 1023.0 && is_apart))
-                {
-                    Some("a number that drivers write for no echo")
-                } else if is_top && is_apart && many && seen.count >= 3 && share >= 0.03 {
-                    Some("the greatest value, apart from the others and in many directions")
-                } else if many && is_frequent && max_other_count > 0 && (is_top || share >= 0.1) {
-                    Some("far more frequent than any other value, and in many directions")
-                } else {
-                    None
-                };
+            let why = if is_at_longest && seen.count >= 3 && share >= 0.01 {
+                Some("at or beyond the maximum range of the sensor")
+            } else if is_code
+                && seen.count >= 3
+                && is_top
+                && (many || (value >= 1023.0 && is_apart()))
+            {
+                Some("a number that drivers write for no echo")
+            } else if is_top && seen.count >= 3 && share >= 0.03 && many && is_apart() {
+                Some("the greatest value, apart from the others and in many directions")
+            } else if many && is_frequent && max_other_count > 0 && (is_top || share >= 0.1) {
+                Some("far more frequent than any other value, and in many directions")
+            } else {
+                None
+            };
             if let Some(why) = why {
                 let (count, first) = (seen.count, Some(seen.first));
+                // One value of a noisy constant.
+                if let Some(cluster) = cluster.filter(|cluster| cluster.count > 2 * count) {
+                    return Some(cluster);
+                }
                 return Some(NoEchoConstant { value, is_cluster: false, count, of, first, why });
             }
         }
-        self.cluster(longest)
+        cluster
     }
 
     /// Detects a constant with noise: a narrow group of the greatest values, apart from the others.
@@ -248,7 +278,7 @@ impl RangeHistogram {
         }
         // Narrower than 10 %, and 10 % above the next lower value.
         let is_narrow = top - last < 10 && gap.is_some_and(|gap| gap > 10);
-        let many = self.is_scattered(&directions);
+        let many = self.is_scattered(&directions, count);
         let share = count as f64 / self.count as f64;
         let is_far = min >= 0.95 * longest;
         let distinct = self.values.range(min.to_bits()..).count();
@@ -262,9 +292,9 @@ impl RangeHistogram {
         })
     }
 
-    /// Returns `true` if no single wall explains these directions: a wall fills one arc of the
-    /// measured directions.
-    fn is_scattered(&self, directions: &Directions) -> bool {
+    /// Returns `true` if no single wall explains these directions of `count` ranges: a wall fills one
+    /// arc of the measured directions, with most of its ranges.
+    fn is_scattered(&self, directions: &Directions, count: u64) -> bool {
         let has = |directions: &Directions, at: usize| directions[at / 64] >> (at % 64) & 1 == 1;
         let visited: Vec<usize> = (0..360).filter(|at| has(&self.visited, *at)).collect();
         let is_hit: Vec<bool> = visited.iter().map(|at| has(directions, *at)).collect();
@@ -272,13 +302,18 @@ impl RangeHistogram {
         if self.kind == DirectionKind::Rangers {
             return hits > 1;
         }
+        // Over many sweeps a constant occurs in every direction, but only at times.
+        let expected = self.count as f64 * hits as f64 / visited.len().max(1) as f64;
+        if 2 * hits > visited.len() && (count as f64) < MIN_SHARE * expected {
+            return true;
+        }
         // The longest circular run of measured directions without a hit lies outside the arc. Runs
         // of up to two are tolerated within it.
-        let count = visited.len();
+        let bins = visited.len();
         let Some(first) = is_hit.iter().position(|is_hit| *is_hit) else { return false };
         let (mut gap, mut longest, mut gaps) = (0, 0, 0);
-        for bin in 1..=count {
-            if !is_hit[(first + bin) % count] {
+        for bin in 1..=bins {
+            if !is_hit[(first + bin) % bins] {
                 gap += 1;
                 continue;
             }
@@ -286,7 +321,7 @@ impl RangeHistogram {
             gaps += usize::from(gap > 2);
             gap = 0;
         }
-        let arc = count - longest;
+        let arc = bins - longest;
         gaps > 1 || (hits as f64) < MIN_FILL * arc as f64
     }
 }
@@ -364,6 +399,26 @@ mod tests {
         let found =
             sweep(400.0, |at| if at % 3 == 0 { noisy(at) } else { wall(at) }).expect("found");
         assert!(found.is_cluster && found.value >= 395.0 && found.count == 40, "{found:?}");
+    }
+
+    #[test]
+    fn finds_noisy_max_range_with_repeats() {
+        // Tenths of a centimetre repeat: the whole group is one constant.
+        let noisy = |at: usize| 398.0 + (at * 7919 % 11) as f64 / 10.0;
+        let found = sweep(400.0, |at| if at % 2 == 0 { noisy(at) } else { wall(at) });
+        let found = found.expect("found");
+        assert!(found.is_cluster && found.count == 60, "{found:?}");
+    }
+
+    #[test]
+    fn finds_low_constant_among_many_values() {
+        let mut histogram = RangeHistogram::new(DirectionKind::Angles);
+        for at in 0..9000_usize {
+            let value = if at % 4 == 0 { 2.0 } else { 100.0 + at as f64 * 0.013 };
+            histogram.add(Location::Line(at as u64 + 1), value, 0.7 * at as f64);
+        }
+        let found = histogram.constant(400.0).expect("found");
+        assert_eq!((found.value, found.count), (2.0, 2250));
     }
 
     #[test]

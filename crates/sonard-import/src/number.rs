@@ -5,6 +5,9 @@ use crate::mapping::Decimal;
 /// Parses the number of a text cell; `None` if the text is not a number.
 pub(crate) fn parse(cell: &str, decimal: Decimal) -> Option<f64> {
     let cell = cell.trim();
+    // Word processors and some spreadsheets write the typographic minus sign.
+    let minus = cell.strip_prefix('\u{2212}').map(|digits| format!("-{digits}"));
+    let cell = minus.as_deref().unwrap_or(cell);
     if !cell.contains(',') && (decimal == Decimal::Point || !is_grouped(cell, '.')) {
         return cell.parse().ok();
     }
@@ -78,6 +81,7 @@ mod tests {
             ("1.234,5", Some(1234.5), None),
             ("1,234.5", None, Some(1234.5)),
             ("-0,25", Some(-0.25), None),
+            ("\u{2212}15", Some(-15.0), Some(-15.0)),
             ("1,2,3", None, None),
             ("12:00", None, None),
             ("", None, None),

@@ -245,23 +245,29 @@ impl<'a> RowReader<'a> {
         field: Field,
         cell: &str,
     ) -> Result<Option<f64>, ImportError> {
-        match cell.to_lowercase().as_str() {
-            "nan" | "null" | "none" | "na" | "n/a" | "-" => return Ok(None),
-            _ => {}
+        if is_missing(cell, field.quantity()) {
+            return Ok(None);
         }
+        let is_range = matches!(field.quantity(), Quantity::Range | Quantity::Tof);
         match number::parse(cell, self.decimal) {
-            Some(number) if !number.is_finite() && field.quantity() != FieldQuantity::Range => {
-                Err(self.invalid_value(
-                    place,
-                    field,
-                    format!("{cell} is not finite"),
-                    "correct that value",
-                ))
-            }
+            Some(number) if !number.is_finite() && !is_range => Err(self.invalid_value(
+                place,
+                field,
+                format!("{cell} is not finite"),
+                "correct that value",
+            )),
             Some(number) => Ok(Some(number)),
             None => {
                 let what = format!("`{}` is not a number", shortened(cell));
+                let with_unit = cell.trim_end_matches(|c: char| c.is_alphabetic() || c == '\u{b0}');
+                let has_unit = number::parse(with_unit, self.decimal).is_some();
                 let help = match number::decimal_evidence(cell) {
+                    DecimalEvidence::Unknown if has_unit => {
+                        "remove the unit from the values, and name it in the column or with --columns"
+                    }
+                    DecimalEvidence::Unknown if is_range => {
+                        "is it the right column? see --columns; if the word means no echo, leave the value empty"
+                    }
                     DecimalEvidence::Unknown => "is it the right column? see --columns",
                     _ => "is the comma a decimal sign? --decimal comma",
                 };
@@ -299,6 +305,21 @@ impl<'a> RowReader<'a> {
         ImportError::At { place, column, what, help: help.to_owned() }
     }
 }
+
+/// Returns `true` for the usual markers of a missing value; for a range, also for words that mean
+/// no echo.
+fn is_missing(cell: &str, quantity: Quantity) -> bool {
+    let cell = cell.to_lowercase();
+    let is_dashes = !cell.is_empty() && cell.bytes().all(|byte| byte == b'-');
+    let is_range = matches!(quantity, Quantity::Range | Quantity::Tof);
+    is_dashes
+        || matches!(cell.as_str(), "nan" | "null" | "none" | "nil" | "na" | "n/a" | "#n/a" | "n.a.")
+        || (is_range && NO_ECHO_WORDS.contains(&cell.as_str()))
+}
+
+/// Words that programs write in place of a range where no echo was received.
+const NO_ECHO_WORDS: [&str; 8] =
+    ["no echo", "no_echo", "noecho", "out of range", "out_of_range", "timeout", "ol", "overflow"];
 
 /// Truncates a text for an error message.
 fn shortened(text: &str) -> String {

@@ -25,9 +25,9 @@ use sonard_model::{
 use sonard_records::Record;
 
 use crate::{
-    Assumptions, FileLocation, ImportError, Mapping,
-    examine::check_beyond,
-    limits::{LimitNotes, Limits, RangeClass},
+    ImportError, FileLocation, Mapping, Assumptions,
+    examine::check_messages,
+    limits::{LimitNotes, Limits, MAX_STATED_M, RangeClass},
     unit_check::{RangeStats, UnitContext},
 };
 use cdr::{CdrError, CdrReader, Decoded};
@@ -100,6 +100,8 @@ struct MessageReadings {
     readings: Vec<PlacedReading>,
     skipped: u64,
     why: Option<TransformError>,
+    /// Greatest tilt of the robot in the world, degrees.
+    tilt_deg: f64,
 }
 
 const RANGE: &str = "sensor_msgs/msg/Range";
@@ -111,8 +113,8 @@ pub const MESSAGE_TYPES: [&str; 3] = [RANGE, LASER_SCAN, TRANSFORMS];
 
 /// Rotation below which a ranger counts as fixed, degrees.
 const FIXED_DEG: f64 = 0.05;
-/// Limit of any ultrasonic ranger, metres; a greater `range_max` is in another unit.
-const MAX_STATED_M: f64 = 60.0;
+/// Tilt of the robot from which a note is printed, degrees.
+const MAX_TILT_DEG: f64 = 5.0;
 
 impl Bag {
     /// Reads all readings once; adds their ranges to `ranges` and returns notes on skipped
@@ -127,6 +129,7 @@ impl Bag {
         ranges: &mut RangeStats,
     ) -> Result<Vec<String>, ImportError> {
         let mut limits = LimitNotes::default();
+        let mut tilt_deg: f64 = 0.0;
         let mut skipped: BTreeMap<&str, (u64, u64, Option<TransformError>)> = BTreeMap::new();
         let stated_m = Some(self.max_stated_range * units.mapping.metres());
         let stated_m = stated_m.filter(|stated_m| *stated_m <= MAX_STATED_M).unwrap_or(0.0);
@@ -142,13 +145,14 @@ impl Bag {
             counts.0 += found.skipped;
             counts.1 += found.skipped + found.readings.len() as u64;
             counts.2 = counts.2.take().or(found.why);
+            tilt_deg = tilt_deg.max(found.tilt_deg);
             for readings in found.readings {
                 let direction = if self.rotates { readings.direction_deg } else { ranger as f64 };
                 let place = FileLocation::Message(number);
                 ranges.add(place, direction, readings.raw, readings.range_m, (units, assumptions));
             }
         }
-        check_beyond(&limits, assumptions)?;
+        check_messages(&limits, assumptions)?;
         let mut notes = self.notes.clone();
         for (topic, (missing, of, why)) in skipped {
             let Some(why) = why else { continue };
@@ -157,6 +161,11 @@ impl Bag {
             }
             notes.push(format!(
                 "{topic}: {missing} of {of} readings skipped, position unknown: {why}"
+            ));
+        }
+        if tilt_deg > MAX_TILT_DEG {
+            notes.push(format!(
+                "the robot is tilted by up to {tilt_deg:.1} degrees; its ranges are taken as horizontal"
             ));
         }
         notes.extend(limits.lines());
@@ -285,13 +294,23 @@ impl Bag {
     ) -> Result<MessageReadings, ImportError> {
         let metres = mapping.metres();
         let mut found = MessageReadings::default();
+        let scan = match source.is_scan {
+            true => Some(decode(message, LaserScanMessage::decode)?),
+            false => None,
+        };
+        if let Some(scan) = &scan {
+            let last = scan.ranges_m.len().saturating_sub(1) as f64;
+            let (first_rad, step_rad) = (f64::from(scan.first_rad), f64::from(scan.step_rad));
+            notes.add_angle(first_rad);
+            notes.add_angle(first_rad + last * step_rad);
+        }
         let mut place = |time_ns: i64, turned_deg: f64, range: f32, limits: Limits| {
             let (status, raw) = match limits.classify(as_written(range), mapping, notes) {
                 RangeClass::Invalid => return Ok(()),
                 RangeClass::NoRange(status) => (status, None),
                 RangeClass::Echo(range) => (PingStatus::Echo, Some(range)),
             };
-            let (in_robot, pose) = match self.placed(source, time_ns) {
+            let (in_robot, pose, tilt_deg) = match self.placed(source, time_ns) {
                 Ok(placed) => placed,
                 Err(why @ (TransformError::Missing { .. } | TransformError::Gap { .. })) => {
                     found.skipped += 1;
@@ -300,6 +319,7 @@ impl Bag {
                 }
                 Err(error) => return Err(pose_error(&message.channel.topic, &error)),
             };
+            found.tilt_deg = found.tilt_deg.max(tilt_deg);
             let direction_deg = billionths(in_robot.beam_deg(turned_deg));
             // An infinite angle is not a direction.
             if direction_deg.is_finite() {
@@ -316,13 +336,12 @@ impl Bag {
             Ok(())
         };
         let limits = |[min, max]: [f32; 2]| Limits { min: as_written(min), max: as_written(max) };
-        if !source.is_scan {
+        let Some(mut scan) = scan else {
             let mut range = decode(message, RangeMessage::decode)?;
             self.clock.stamp(&mut range.header, message);
             place(range.header.stamp_ns, 0.0, range.range_m, limits(range.limits_m))?;
             return Ok(found);
-        }
-        let mut scan = decode(message, LaserScanMessage::decode)?;
+        };
         self.clock.stamp(&mut scan.header, message);
         let limits = limits(scan.limits_m);
         for (beam, range) in (0_u32..).zip(&scan.ranges_m) {
@@ -334,33 +353,35 @@ impl Bag {
         Ok(found)
     }
 
-    /// Returns the placement of a ranger on its robot, and the pose of the robot.
+    /// Returns the placement of a ranger on its robot, and the pose and the tilt (degrees) of the
+    /// robot.
     fn placed(
         &self,
         source: &Topic,
         time_ns: i64,
-    ) -> Result<(Placement, Option<Pose>), TransformError> {
+    ) -> Result<(Placement, Option<Pose>, f64), TransformError> {
         let in_robot = self.frames.place(&source.placed_as, &source.robot, time_ns)?;
-        let pose = match source.world == source.robot {
-            true => None,
-            false => Some(self.pose(source, time_ns)?),
-        };
-        Ok((in_robot, pose))
+        if source.world == source.robot {
+            return Ok((in_robot, None, 0.0));
+        }
+        let (pose, tilt_deg) = self.pose(source, time_ns)?;
+        Ok((in_robot, Some(pose), tilt_deg))
     }
 
-    /// Returns the pose of the robot; for a rotating ranger, with the position of its rotation
-    /// axis.
-    fn pose(&self, source: &Topic, time_ns: i64) -> Result<Pose, TransformError> {
+    /// Returns the pose and the tilt (degrees) of the robot; for a rotating ranger, with the position
+    /// of its rotation axis.
+    fn pose(&self, source: &Topic, time_ns: i64) -> Result<(Pose, f64), TransformError> {
         let robot = self.frames.place(&source.robot, &source.world, time_ns)?;
         let at = match self.rotates {
             true => self.frames.place(&source.axis, &source.world, time_ns)?.at,
             false => robot.at,
         };
-        Ok(Pose {
+        let pose = Pose {
             x_m: billionths(at.x),
             y_m: billionths(at.y),
             heading_deg: billionths(robot.yaw_deg()),
-        })
+        };
+        Ok((pose, robot.tilt_deg()))
     }
 }
 

@@ -15,6 +15,7 @@ use crate::{
     limits::{LimitNotes, Limits, RangeClass},
     lines::{LineEnding, LineReader},
     reading::RawReading,
+    time::{MIN_CLOCK_S, TimeReader},
 };
 
 /// Maximum size of a message.
@@ -43,7 +44,10 @@ pub(crate) fn messages<'a>(
                 continue;
             }
             number += 1;
-            return Some(yaml(number, first, &text));
+            let read = yaml(number, first, &text);
+            // `rostopic echo` that is interrupted leaves a part of a message.
+            let is_cut = is_last && number > 1 && read.is_err();
+            return Some(if is_cut { Ok(Value::Null) } else { read });
         }
     })))
 }
@@ -121,13 +125,17 @@ pub(crate) struct MessageConverter<'a> {
     mapping: &'a Mapping,
     count: u64,
     pub(crate) notes: LimitNotes,
-    /// Number of messages other than LaserScan and Range.
+    pub(crate) times: TimeReader<'a>,
+    /// Number of messages that are cut off, or other than LaserScan and Range.
     pub(crate) others: u64,
 }
 
 impl<'a> MessageConverter<'a> {
-    pub(crate) fn new(mapping: &'a Mapping) -> Self {
-        Self { mapping, count: 0, notes: LimitNotes::default(), others: 0 }
+    /// # Errors
+    /// Returns an error for an invalid UTC offset in the mapping.
+    pub(crate) fn new(mapping: &'a Mapping, started: Timestamp) -> Result<Self, ImportError> {
+        let times = TimeReader::new(mapping, started)?;
+        Ok(Self { mapping, count: 0, notes: LimitNotes::default(), times, others: 0 })
     }
 
     /// # Errors
@@ -145,8 +153,25 @@ impl<'a> MessageConverter<'a> {
             min: limit(&["range_min", "min_range"], 0.0),
             max: limit(&["range_max", "max_range"], f64::INFINITY),
         };
-        let time = time(message);
+        let time = match stamp_s(message) {
+            Some(_) if nanoseconds(message) >= MIN_CLOCK_NS => {
+                Timestamp::from_nanosecond(nanoseconds(message)).ok()
+            }
+            Some(seconds) => {
+                let time = self.times.number(None, seconds);
+                Some(time.map_err(|(what, help)| ImportError::at(place, what, help))?)
+            }
+            None => None,
+        };
         let topic_scan = self.count.to_string();
+        let beams = message.get("ranges").and_then(Value::as_array);
+        if let Some(ranges) = beams {
+            let last = ranges.len().saturating_sub(1) as f64;
+            let angle = |name: &'static str| number(&[name]).unwrap_or(0.0);
+            self.notes.add_angle(angle("angle_min"));
+            self.notes.add_angle(angle("angle_min") + last * angle("angle_increment"));
+            self.notes.add_nulls(ranges.iter().filter(|range| range.is_null()).count());
+        }
         let mut convert = |number: Option<u64>,
                            direction_deg: f64,
                            range: f64,
@@ -177,13 +202,13 @@ impl<'a> MessageConverter<'a> {
                 raw: RawReading { direction: direction_deg, range },
             })
         };
-        if let Some(ranges) = message.get("ranges").and_then(Value::as_array) {
+        if let Some(ranges) = beams {
             let need = |name: &str| {
                 number(&[name]).filter(|number| number.is_finite()).ok_or_else(|| {
                     ImportError::at(
                         place,
-                        format!("`{name}` is not a number"),
-                        "give a complete LaserScan",
+                        format!("the LaserScan has no valid `{name}`"),
+                        "give complete messages, with angle_min, angle_increment and ranges",
                     )
                 })
             };
@@ -193,7 +218,8 @@ impl<'a> MessageConverter<'a> {
             let readings = (0_u32..).zip(ranges).filter_map(|(beam, range)| {
                 let beam_at = f64::from(beam);
                 let direction_deg = plain_deg(first_rad + beam_at * step_rad);
-                let range = float(range).unwrap_or(f64::NAN);
+                let range = if range.is_null() { Some(f64::INFINITY) } else { float(range) };
+                let range = range.unwrap_or(f64::NAN);
                 convert(
                     Some(u64::from(beam) + 1),
                     direction_deg,
@@ -215,13 +241,21 @@ fn plain_deg(angle_rad: f64) -> f64 {
     (angle_rad.to_degrees() * 1e4).round() / 1e4
 }
 
-/// Returns the message, unwrapped from a rosbridge publication.
+/// Returns the message, unwrapped from a rosbridge publication and other wrappers.
 fn unwrap_published(value: &Value) -> Option<&Value> {
-    let is_message = |value: &&Value| value.get("ranges").is_some() || value.get("range").is_some();
-    let unwrap_published =
-        ["msg", "message", "data", "scan"].iter().find_map(|name| value.get(*name));
-    Some(value).filter(is_message).or_else(|| unwrap_published.filter(is_message))
+    let is_message = |value: &Value| value.get("ranges").is_some() || value.get("range").is_some();
+    let mut value = value;
+    for _ in 0..=MAX_WRAPPERS {
+        if is_message(value) {
+            return Some(value);
+        }
+        value = ["msg", "message", "data", "scan"].iter().find_map(|name| value.get(*name))?;
+    }
+    None
 }
+
+/// Maximum number of objects around a message.
+const MAX_WRAPPERS: usize = 3;
 
 /// Parses a number that may be a text: YAML and rosbridge use `.inf`, `inf` and `"Infinity"`.
 fn float(value: &Value) -> Option<f64> {
@@ -237,17 +271,25 @@ fn float(value: &Value) -> Option<f64> {
     }
 }
 
-/// Returns the time stamp of the message header.
-fn time(message: &Value) -> Option<Timestamp> {
-    let stamp = message.get("header")?.get("stamp")?;
-    let part = |names: [&str; 2]| names.iter().find_map(|name| stamp.get(*name)?.as_i64());
-    let seconds = part(["sec", "secs"])?;
-    let nanoseconds = part(["nanosec", "nsecs"]).unwrap_or(0);
-    let time = i128::from(seconds) * 1_000_000_000 + i128::from(nanoseconds);
-    Timestamp::from_nanosecond(time).ok().filter(|time| time.as_second() > 0)
+/// Returns the time stamp of the message header, seconds; `None` if the message has none or 0.
+fn stamp_s(message: &Value) -> Option<f64> {
+    let nanoseconds = nanoseconds(message);
+    (nanoseconds != 0).then_some(nanoseconds as f64 * 1e-9)
 }
 
-/// Returns `true` for a LaserScan.
-pub(crate) fn is_scan(message: &Value) -> bool {
-    unwrap_published(message).is_some_and(|message| message.get("ranges").is_some())
+/// Nanoseconds since 1970 below which a stamp counts from the start of a board or a simulation.
+const MIN_CLOCK_NS: i128 = MIN_CLOCK_S as i128 * 1_000_000_000;
+
+/// Returns the time stamp of the message header, nanoseconds; 0 if the message has none.
+fn nanoseconds(message: &Value) -> i128 {
+    let stamp = message.get("header").and_then(|header| header.get("stamp"));
+    let part = |names: [&str; 2]| names.iter().find_map(|name| stamp?.get(*name)?.as_i64());
+    let seconds = part(["sec", "secs"]).unwrap_or(0);
+    let nanoseconds = part(["nanosec", "nsecs"]).unwrap_or(0);
+    i128::from(seconds) * 1_000_000_000 + i128::from(nanoseconds)
+}
+
+/// Returns `true` for a Range message, which has no direction.
+pub(crate) fn is_range(message: &Value) -> bool {
+    unwrap_published(message).is_some_and(|message| message.get("ranges").is_none())
 }

@@ -14,7 +14,7 @@ use crate::{Assumptions, ImportedReading, array_rounds::ArrayRound, sweep_end::S
 
 /// Motor steps per revolution, the unit of `Ping::step`.
 const STEPS_PER_REVOLUTION: f64 = 400.0;
-/// Maximum number of counting_plan per scan, as in a plan; longer scans are split.
+/// Maximum number of readings per scan, as in a plan; longer scans are split.
 pub(crate) const MAX_FIRINGS: usize = 65_535;
 /// Tolerance of the step of an evenly spaced plan, degrees.
 const EVEN_DEG: f64 = 1e-3;
@@ -30,31 +30,64 @@ fn turn_deg(from_deg: f64, to_deg: f64) -> f64 {
 pub(crate) struct ScanSplitter {
     readings: Vec<ImportedReading>,
     sweep: SweepDetector,
+    /// Scan that a full circle completed, with the sense of its rotation. The reading back at its
+    /// beginning belongs to it if the next one turns round.
+    circle: Option<(Vec<Reading>, f64)>,
 }
 
 impl ScanSplitter {
-    /// Adds the next reading and returns the previous scan if that is complete.
-    pub(crate) fn push(&mut self, reading: ImportedReading) -> Option<Vec<ImportedReading>> {
+    /// Adds the next reading and returns the scans that are complete.
+    pub(crate) fn push(&mut self, reading: ImportedReading) -> impl Iterator<Item = Vec<ImportedReading>> + use<> {
+        let circle = self.circle.take().map(|(mut scan, sense)| {
+            let own = self.readings.last().filter(|own| is_same_scan(own, &reading));
+            let turns_round = own.is_some_and(|own| {
+                turn_deg(own.direction_deg, reading.direction_deg) * sense < 0.0
+            });
+            if turns_round {
+                scan.append(&mut self.readings);
+                self.sweep = SweepDetector::default();
+            }
+            scan
+        });
+        let next = self.push_to_sweep(reading);
+        circle.into_iter().chain(next)
+    }
+
+    fn push_to_sweep(&mut self, reading: ImportedReading) -> Option<Vec<ImportedReading>> {
         let is_swept = self.sweep.is_next(reading.direction_deg);
         let is_next = self.readings.last().is_some_and(|last| {
-            let moved = (&reading.position_m, &reading.heading_deg)
-                != (&last.position_m, &last.heading_deg);
-            match (&reading.scan, &last.scan) {
-                (Some(this), Some(before)) => this != before,
-                _ => moved || is_swept,
-            }
+            let has_ids = reading.scan.is_some() && last.scan.is_some();
+            !is_same_scan(last, &reading) || (is_swept && !has_ids)
+        });
+        let circle_sense = self.sweep.circle_sense().filter(|_| {
+            let last = self.readings.last();
+            is_swept && last.is_some_and(|last| is_same_scan(last, &reading))
         });
         if is_next || self.readings.len() == MAX_FIRINGS {
             self.sweep.restart(reading.direction_deg);
-            return Some(std::mem::replace(&mut self.readings, vec![reading]));
+            let scan = std::mem::replace(&mut self.readings, vec![reading]);
+            if let Some(sense) = circle_sense {
+                self.circle = Some((scan, sense));
+                return None;
+            }
+            return Some(scan);
         }
         self.readings.push(reading);
         None
     }
 
-    /// Returns the last scan.
-    pub(crate) fn finish(self) -> Option<Vec<ImportedReading>> {
-        Some(self.readings).filter(|readings| !readings.is_empty())
+    /// Returns the last scans.
+    pub(crate) fn finish(self) -> impl Iterator<Item = Vec<ImportedReading>> {
+        let last = Some(self.readings).filter(|readings| !readings.is_empty());
+        self.circle.map(|(scan, _)| scan).into_iter().chain(last)
+    }
+}
+
+/// Returns `true` if two successive readings have equal scan identifiers, or else one pose.
+fn is_same_scan(last: &ImportedReading, next: &ImportedReading) -> bool {
+    match (&last.scan, &next.scan) {
+        (Some(last), Some(next)) => last == next,
+        _ => (&last.position_m, &last.heading_deg) == (&next.position_m, &next.heading_deg),
     }
 }
 
@@ -140,7 +173,7 @@ pub(crate) struct ArrayFiring<'a> {
     pub(crate) reading: ImportedReading,
 }
 
-/// Builds the records of one round of an array whose counting_plan have their own times and poses.
+/// Builds the records of one round of an array whose firings have their own times and poses.
 #[cfg(feature = "recordings")]
 pub(crate) fn array_round_records(
     assumptions: &Assumptions,

@@ -120,7 +120,7 @@ impl ImportSource<'_> {
         match entry.kind {
             FormatKind::Rows => self.examine_rows(&survey, &head, &mut found)?,
             FormatKind::RosText => self.examine_ros_text(&mut found)?,
-            FormatKind::Lines(read) => self.examine_lines(read, &mut found)?,
+            FormatKind::Lines(read) => self.examine_lines(read, &survey, &mut found)?,
             FormatKind::Recording => self.examine_recording(&mut found)?,
         }
         Ok(found)
@@ -145,6 +145,11 @@ impl ImportSource<'_> {
             })?;
             check_supported(encoding)?;
             return Ok((encoding, text::head(survey, encoding)));
+        }
+        // The mark of UTF-32 begins with that of UTF-16.
+        let is_binary = format::unsupported(&survey.head, "").filter(|_| mapping.format.is_none());
+        if let Some(error) = is_binary {
+            return Err(error);
         }
         let Some(encoding) = survey.encoding() else {
             return Err(format::unsupported(&survey.head, "").unwrap_or_else(|| {

@@ -21,6 +21,8 @@ pub(crate) struct SweepDetector {
     sense: f64,
     steps: u32,
     run_deg: f64,
+    /// Sense of the sweep that a full circle ended, at the first reading of the next.
+    circle_sense: Option<f64>,
 }
 
 impl SweepDetector {
@@ -37,9 +39,12 @@ impl SweepDetector {
         let is_reversal = is_back && self.steps >= MIN_STEPS && step_deg.abs() > JITTER * usual_deg;
         // The tolerance allows for rounding of the angles.
         if is_reversal || travel_deg > 360.0 - SAME_DEG {
+            let circle_sense = Some(self.sense).filter(|sense| !is_reversal && *sense != 0.0);
             self.begin(direction_deg);
+            self.circle_sense = circle_sense;
             return true;
         }
+        self.circle_sense = None;
         (self.last_deg, self.travel_deg) = (direction_deg, travel_deg);
         if step_deg.abs() > SAME_DEG {
             if is_back || self.sense == 0.0 {
@@ -53,6 +58,11 @@ impl SweepDetector {
 
     fn begin(&mut self, direction_deg: f64) {
         *self = Self { first_deg: Some(direction_deg), last_deg: direction_deg, ..Self::default() };
+    }
+
+    /// Sense of the rotation if the last reading completed a full circle.
+    pub(crate) const fn circle_sense(&self) -> Option<f64> {
+        self.circle_sense
     }
 
     /// Starts a sweep at this direction.

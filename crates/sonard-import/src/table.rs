@@ -15,8 +15,8 @@ use crate::{
 pub(crate) struct RowFaults {
     /// Number of rows that lack columns which the mapping does not use.
     pub(crate) short: u64,
-    /// Last row, if it is unterminated and lacks a mapped column.
-    pub(crate) cut: Option<FileLocation>,
+    /// First row of a capture, and unterminated last row, that lack a mapped column.
+    pub(crate) cut: [Option<FileLocation>; 2],
 }
 
 /// Iterator over the rows of a table, with the cells of the mapped columns in mapping order.
@@ -26,7 +26,10 @@ pub(crate) struct TableRows<R> {
     /// Indices of the mapped columns, from 0, in mapping order.
     places: Vec<Vec<usize>>,
     has_passed_names: bool,
+    /// Text of the row of names, which files joined from several repeat.
+    name_row: Option<String>,
     to_skip: u64,
+    is_first: bool,
     pub(crate) faults: RowFaults,
 }
 
@@ -48,8 +51,10 @@ impl<R: Read> TableRows<R> {
             lines: LineReader::new(source, layout.ends),
             places: places.collect::<Result<_, _>>()?,
             layout: layout.clone(),
-            has_passed_names: !layout.has_names || layout.is_comment,
+            has_passed_names: !layout.has_name_row,
+            name_row: None,
             to_skip: u64::from(layout.has_separator_line),
+            is_first: true,
             faults: RowFaults::default(),
         })
     }
@@ -57,7 +62,10 @@ impl<R: Read> TableRows<R> {
     fn row(&mut self, line: &TextLine) -> Result<Option<Row>, ImportError> {
         let place = line.place();
         let text = without_comment(&line.text);
-        let cells = split(self.layout.separator, text)
+        let is_first = std::mem::take(&mut self.is_first);
+        let cells = self
+            .layout
+            .split(text)
             .map_err(|what| ImportError::at(place, what, "correct that line"))?;
         let columns = self.layout.cells.len();
         let used = cells.iter().rposition(|cell| !cell.is_empty()).map_or(0, |last| last + 1);
@@ -74,10 +82,11 @@ impl<R: Read> TableRows<R> {
         }
         let lacks = self.places.iter().flatten().any(|place| *place >= cells.len());
         // A captured stream may also begin within a record.
-        let is_first = self.layout.ends == LineEnding::Stops && line.number == 1;
+        let is_first =
+            is_first && (self.layout.ends == LineEnding::Stops || self.layout.is_first_cut);
         let is_without = cells.first().is_some_and(String::is_empty);
         if (lacks && (!line.is_ended || is_first)) || (is_without && is_first) {
-            self.faults.cut = Some(place);
+            self.faults.cut[usize::from(!is_first)] = Some(place);
             return Ok(None);
         }
         if lacks {
@@ -112,6 +121,12 @@ impl<R: Read> Iterator for TableRows<R> {
                 continue;
             }
             if !std::mem::replace(&mut self.has_passed_names, true) {
+                self.to_skip = u64::from(self.layout.has_unit_row);
+                self.name_row = Some(line.text);
+                continue;
+            }
+            if self.name_row.as_ref() == Some(&line.text) {
+                self.to_skip = u64::from(self.layout.has_unit_row);
                 continue;
             }
             if let Some(row) = self.row(&line).transpose() {
@@ -142,8 +157,9 @@ fn without_comment(line: &str) -> &str {
         let before = line[..*at].chars().next_back();
         before.is_some_and(char::is_whitespace) && !line[..*at].contains('"')
     };
-    let begins = line.match_indices(['#', '%']).map(|(at, _)| at);
-    line.get(..begins.into_iter().find(is_start).unwrap_or(line.len())).unwrap_or(line)
+    let signs = COMMENTS.iter().flat_map(|sign| line.match_indices(sign).map(|(at, _)| at));
+    let begin = signs.filter(is_start).min().unwrap_or(line.len());
+    line.get(..begin).unwrap_or(line)
 }
 
 /// Splits a line into its values.

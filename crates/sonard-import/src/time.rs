@@ -2,7 +2,7 @@
 
 use jiff::{
     SignedDuration, Timestamp, civil,
-    fmt::strtime,
+    fmt::{rfc2822, strtime},
     tz::{Offset, TimeZone},
 };
 
@@ -18,11 +18,11 @@ const DAY_JUMP: SignedDuration = SignedDuration::from_hours(12);
 /// Counts of assumptions made about the times of a file.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(crate) struct TimeAssumptions {
-    /// Number of times without a time zone.
+    /// Times without a time zone.
     pub(crate) without_zone: u64,
-    /// Number of times of day without a date.
+    /// Times of day without a date.
     pub(crate) without_date: u64,
-    /// Number of times counted from the start of a board.
+    /// Times counted from the start of a board.
     pub(crate) from_start: u64,
     /// Wraps of such a counter at 2^32, and restarts from zero.
     pub(crate) wraps: u64,
@@ -40,19 +40,18 @@ pub(crate) struct TimeReader<'a> {
     started: Timestamp,
     pub(crate) assumed: TimeAssumptions,
     last_clock: Option<civil::DateTime>,
-    /// First and last counter value, and the parse_utc_offset added for wraps and restarts,
-    /// seconds.
+    /// First and last counter value, and the offset added for wraps and restarts, seconds.
     first_s: Option<f64>,
     last_s: f64,
     added_s: f64,
 }
 
-/// Description of an invalid time, and format_advice for the user.
+/// Description of an invalid time, and advice for the user.
 type InvalidTime = (String, String);
 
 impl<'a> TimeReader<'a> {
     /// # Errors
-    /// Returns an error for an invalid UTC parse_utc_offset.
+    /// Returns an error for an invalid UTC offset.
     pub(crate) fn new(mapping: &'a Mapping, started: Timestamp) -> Result<Self, ImportError> {
         let zone = match &mapping.utc_offset {
             Some(text) => TimeZone::fixed(parse_utc_offset(text)?),
@@ -75,7 +74,7 @@ impl<'a> TimeReader<'a> {
         if let Some(format) = &self.mapping.time_format {
             return self.parse_format(format, cell).map(Some);
         }
-        if let Ok(time) = cell.parse::<Timestamp>() {
+        if let Some(time) = zoned(cell) {
             return Ok(Some(time));
         }
         if let Ok(number) = cell.parse::<f64>() {
@@ -84,12 +83,20 @@ impl<'a> TimeReader<'a> {
         let cell = with_point(cell);
         let civil = cell.parse::<civil::DateTime>().ok();
         let civil = civil.or_else(|| {
-            CIVIL.iter().find_map(|format| civil::DateTime::strptime(format, &cell).ok())
+            let mut formats = CIVIL.iter();
+            // `%Y` also matches two digits, as a year of the first century.
+            formats.find_map(|format| {
+                let civil = civil::DateTime::strptime(format, &cell).ok();
+                civil.filter(|civil| civil.year() >= MIN_YEAR)
+            })
         });
-        match (civil, cell.parse::<civil::Time>()) {
+        let time = cell.parse::<civil::Time>().ok();
+        let time = time
+            .or_else(|| OF_DAY.iter().find_map(|format| civil::Time::strptime(format, &cell).ok()));
+        match (civil, time) {
             (Some(civil), _) => self.local(civil).map(Some),
-            (None, Ok(time)) => self.of_day(time).map(Some),
-            (None, Err(_)) => Err((
+            (None, Some(time)) => self.of_day(time).map(Some),
+            (None, None) => Err((
                 format!("`{}` is not a time", cell.chars().take(40).collect::<String>()),
                 format_advice(&cell),
             )),
@@ -110,8 +117,15 @@ impl<'a> TimeReader<'a> {
             let since_s = self.since_start(field, seconds);
             self.started.as_nanosecond().saturating_add(1000 * (since_s * 1e6).round() as i128)
         };
-        Timestamp::from_nanosecond(nanoseconds).map_err(|error| {
-            (error.to_string(), "times count from 1970: is the unit right?".to_owned())
+        Timestamp::from_nanosecond(nanoseconds).map_err(|_| {
+            let field = field.map_or("time_s", Field::name);
+            let what = format!("{seconds:.0} s since 1970 is beyond the year 9999");
+            (
+                what,
+                format!(
+                    "map the column in its unit, such as time_ms or time_us instead of {field}"
+                ),
+            )
         })
     }
 
@@ -123,7 +137,10 @@ impl<'a> TimeReader<'a> {
             Some("us") => 1e-6,
             _ => 0.0,
         };
-        let first_s = *self.first_s.get_or_insert(seconds);
+        let first_s = *self.first_s.get_or_insert_with(|| {
+            self.last_s = seconds;
+            seconds
+        });
         if seconds + self.added_s < self.last_s {
             let back_s = self.last_s - self.added_s - seconds;
             if unit_s > 0.0 && back_s > 0.5 * WRAP * unit_s {
@@ -251,7 +268,7 @@ impl<'a> TimeReader<'a> {
 const RESTART_S: f64 = 0.5;
 
 /// Unambiguous formats of local times.
-const CIVIL: [&str; 10] = [
+const CIVIL: [&str; 13] = [
     "%d.%m.%Y %H:%M:%S%.f",
     "%d.%m.%Y %H:%M",
     "%d.%m.%Y, %H:%M:%S%.f",
@@ -262,7 +279,27 @@ const CIVIL: [&str; 10] = [
     "%d-%b-%Y %H:%M:%S%.f",
     "%d %b %Y %H:%M:%S%.f",
     "%a %b %e %H:%M:%S %Y",
+    "%d.%m.%y %H:%M:%S%.f",
+    "%d.%m.%y %H:%M",
+    "%Y-%m-%d %I:%M:%S%.f %p",
 ];
+
+/// Formats of times of day, besides ISO 8601.
+const OF_DAY: [&str; 2] = ["%I:%M:%S%.f %p", "%I:%M %p"];
+
+/// Earliest year of a reading.
+const MIN_YEAR: i16 = 1970;
+
+/// Parses a time with its zone: ISO 8601, also with a blank before the zone, or RFC 2822.
+fn zoned(cell: &str) -> Option<Timestamp> {
+    let utc = ["UTC", "GMT"].iter().find_map(|zone| cell.strip_suffix(zone));
+    let utc = utc.map(|local| format!("{}Z", local.trim_end()));
+    let spaced = cell.rsplit_once(' ').filter(|(_, zone)| zone.starts_with(['+', '-']));
+    let spaced = spaced.map(|(local, zone)| format!("{local}{zone}"));
+    let forms = [Some(cell.to_owned()), utc, spaced];
+    let time = forms.into_iter().flatten().find_map(|form| form.parse().ok());
+    time.or_else(|| rfc2822::parse(cell).ok().map(|zoned| zoned.timestamp()))
+}
 
 /// Replaces a decimal comma of the seconds by a point.
 fn with_point(cell: &str) -> String {
@@ -278,7 +315,7 @@ fn with_point(cell: &str) -> String {
     }
 }
 
-/// Returns format_advice for a time that is ambiguous or not recognized.
+/// Returns advice for a time that is ambiguous or not recognized.
 fn format_advice(cell: &str) -> String {
     if cell.contains('/') {
         let clock = match (cell.to_uppercase().ends_with('M'), cell.matches(':').count()) {
@@ -306,7 +343,7 @@ fn format_advice(cell: &str) -> String {
 fn parse_utc_offset(text: &str) -> Result<Offset, ImportError> {
     let invalid = || {
         ImportError::mapping(
-            format!("`{text}` is not a UTC parse_utc_offset"),
+            format!("`{text}` is not a UTC offset"),
             "write it as --utc-offset +01:00",
         )
     };
@@ -335,8 +372,8 @@ mod tests {
     const STARTED: &str = "2026-11-27T08:00:00Z";
 
     fn read(mapping: &Mapping, cells: &[&str]) -> (Vec<String>, String) {
-        let mut times = TimeReader::new(mapping, STARTED.parse().expect("a time"))
-            .expect("an parse_utc_offset");
+        let mut times =
+            TimeReader::new(mapping, STARTED.parse().expect("a time")).expect("an offset");
         let read = cells.iter().map(|cell| match times.parse_text(cell) {
             Ok(Some(time)) => time.to_string(),
             Ok(None) => "-".to_owned(),
@@ -358,12 +395,18 @@ mod tests {
             ("31.01.2026 12:00:00", "2026-01-31T12:00:00Z"),
             ("2026/01/31 12:00:00.5", "2026-01-31T12:00:00.5Z"),
             ("31-Jan-2026 12:00:00", "2026-01-31T12:00:00Z"),
+            ("31.1.26 12:00:00", "2026-01-31T12:00:00Z"),
+            ("2026-01-31 02:30:00 PM", "2026-01-31T14:30:00Z"),
+            ("2026-01-31 12:00:00 UTC", "2026-01-31T12:00:00Z"),
+            ("2026-01-31 12:00:00.5 +01:00", "2026-01-31T11:00:00.5Z"),
+            ("Sat, 31 Jan 2026 12:00:00 GMT", "2026-01-31T12:00:00Z"),
             ("1700000000.5", "2023-11-14T22:13:20.5Z"),
             ("1700000000500", "2023-11-14T22:13:20.5Z"),
         ] {
             let (read, notes) = read(&plain, &[cell]);
             assert_eq!(read, [time], "{cell}");
-            let has_zone = cell.contains(['Z', '+']) || cell.starts_with("17");
+            let has_zone = cell.contains(['Z', '+', 'T']) && cell != "2026-01-31T12:00:00.25";
+            let has_zone = has_zone || cell.starts_with("17");
             assert_eq!(notes.contains("taken as UTC"), !has_zone, "{cell}: {notes}");
         }
         let offset = Mapping { utc_offset: Some("+01:00".to_owned()), ..Mapping::default() };
@@ -406,9 +449,9 @@ mod tests {
     #[test]
     fn counters_wrap_and_restart() {
         let mapping = Mapping::default();
-        let mut times = TimeReader::new(&mapping, STARTED.parse().expect("a time"))
-            .expect("an parse_utc_offset");
-        let field = Field::from_name("time_ms");
+        let mut times =
+            TimeReader::new(&mapping, STARTED.parse().expect("a time")).expect("an offset");
+        let field = Field::named("time_ms");
         let read = [4_294_967_000.0, 4_294_967_200.0, 104.0, 304.0, 100_304.0, 4.0, 1004.0];
         let read =
             read.map(|ms| times.number(field, ms * 1e-3).expect("in range").as_millisecond());

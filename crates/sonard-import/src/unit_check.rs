@@ -13,7 +13,13 @@ const MIN_NEAR_M: f64 = 0.04;
 /// Maximum magnitude of an angle in radians, with rounding.
 const MAX_RAD: f64 = std::f64::consts::TAU + 0.02;
 /// Minimum number of readings for the check of angles.
-const MIN_READINGS: u64 = 3;
+const MIN_READINGS: u64 = 2;
+/// Minimum span of directions that are checked for radians; a resting ranger has none.
+const MIN_SPAN: f64 = 0.05;
+/// Multiple of the sensor's maximum range beyond which most ranges are implausible.
+const BEYOND: f64 = 1.05;
+/// Minimum number of such ranges.
+const MIN_BEYOND: u64 = 3;
 
 /// Mapping and column names, from which messages build the option that resolves an implausible
 /// value.
@@ -38,13 +44,8 @@ impl UnitContext<'_> {
 
     /// Returns the length in metres of one unit of the file's ranges.
     fn metres(&self, sound_speed_m_s: f64) -> f64 {
-        match self.field() {
-            Some(field) if field.quantity() == FieldQuantity::Tof => {
-                field.scaled(1.0) * 1e-6 * sound_speed_m_s / 2.0
-            }
-            Some(field) => field.scaled(1.0),
-            None => self.mapping.metres(),
-        }
+        let metres = |field| metres_per_unit(field, sound_speed_m_s);
+        self.field().map_or_else(|| self.mapping.metres(), metres)
     }
 
     /// Returns the options for units with which the median range is measurable and the 98th
@@ -61,8 +62,10 @@ impl UnitContext<'_> {
             let fitting = RangeUnit::ALL.into_iter().filter(|(_, unit)| fits(unit.metres()));
             return fitting.map(|(name, _)| format!("--range-unit {name}")).collect();
         }
-        let fields =
-            Field::of_quantity(FieldQuantity::Range).filter(|field| fits(field.scaled(1.0)));
+        let sound_speed_m_s = assumptions.air.sound_speed_m_s();
+        let fields = Field::of_quantity(FieldQuantity::Range).filter(|field| field.is_usual());
+        let fields = fields.chain(Field::of_quantity(FieldQuantity::Tof));
+        let fields = fields.filter(|field| fits(metres_per_unit(*field, sound_speed_m_s)));
         let fields = fields.filter(|field| Some(*field) != self.field());
         fields.map(|field| self.mapping.columns_option_with(field, self.names)).collect()
     }
@@ -78,6 +81,14 @@ impl UnitContext<'_> {
     }
 }
 
+/// Returns the length in metres of one unit of a range or a time of flight.
+fn metres_per_unit(field: Field, sound_speed_m_s: f64) -> f64 {
+    match field.quantity() {
+        Quantity::Tof => field.scaled(1.0) * 1e-6 * sound_speed_m_s / 2.0,
+        _ => field.scaled(1.0),
+    }
+}
+
 /// Statistics of all ranges of a file.
 #[derive(Debug)]
 pub(crate) struct RangeStats {
@@ -87,6 +98,8 @@ pub(crate) struct RangeStats {
     /// Number and first of the ranges beyond [`FAR`] times the sensor's maximum range.
     far: u64,
     first_far: Option<(FileLocation, f64)>,
+    /// Number of ranges beyond [`BEYOND`] times the sensor's maximum range.
+    beyond: u64,
     /// Number of ranges below the sensor's minimum range.
     near: u64,
     zeros: u64,
@@ -95,7 +108,16 @@ pub(crate) struct RangeStats {
 impl RangeStats {
     pub(crate) const fn new(kind: DirectionKind) -> Self {
         let histogram = RangeHistogram::new(kind);
-        Self { readings: 0, echoes: 0, histogram, far: 0, first_far: None, near: 0, zeros: 0 }
+        Self {
+            readings: 0,
+            echoes: 0,
+            histogram,
+            far: 0,
+            first_far: None,
+            beyond: 0,
+            near: 0,
+            zeros: 0,
+        }
     }
 
     /// Adds a reading with its range in the unit of the file and in metres; `direction` is an angle
@@ -121,6 +143,7 @@ impl RangeStats {
             self.far += 1;
             self.first_far = self.first_far.or(Some((place, range_m)));
         }
+        self.beyond += u64::from(range_m > BEYOND * assumptions.max_range_m);
         self.near += u64::from(range_m < assumptions.min_range_m.max(MIN_NEAR_M));
     }
 
@@ -137,10 +160,32 @@ impl RangeStats {
             self.check_far(units, assumptions)?;
             self.check_near(units, assumptions)?;
         }
-        Ok(match self.zeros {
-            0 => Vec::new(),
-            zeros => vec![format!("{zeros} of {} ranges are 0: read as no echo", self.readings)],
-        })
+        Ok(self.notes(assumptions))
+    }
+
+    /// Returns one line for each kind of range that the sensor cannot measure.
+    fn notes(&self, assumptions: &Taken) -> Vec<String> {
+        let Taken { sensor, longest_m, least_m, .. } = assumptions;
+        let mut notes = Vec::new();
+        if self.zeros > 0 {
+            notes
+                .push(format!("{} of {} ranges are 0: read as no echo", self.zeros, self.readings));
+        }
+        if self.beyond > 0 {
+            notes.push(format!(
+                "{} of {} ranges are beyond {longest_m} m, the maximum range of the sensor {sensor}",
+                self.beyond, self.echoes
+            ));
+        }
+        if self.near > 0 {
+            notes.push(format!(
+                "{} of {} ranges are below {:.0} mm, too near for the sensor {sensor}",
+                self.near,
+                self.echoes,
+                1e3 * least_m.max(MIN_NEAR_M)
+            ));
+        }
+        notes
     }
 
     fn check_non_positive(&self, units: &UnitContext) -> Result<(), ImportError> {
@@ -203,7 +248,9 @@ impl RangeStats {
     }
 
     fn check_far(&self, units: &UnitContext, assumptions: &Assumptions) -> Result<(), ImportError> {
-        let Some((place, range_m)) = self.first_far else { return Ok(()) };
+        let Some((place, range_m)) = self.first_far else {
+            return self.check_beyond(units, assumptions);
+        };
         let (far, echoes) = (self.far, self.echoes);
         let all = if far == echoes { "all".to_owned() } else { far.to_string() };
         let what = format!(
@@ -229,11 +276,22 @@ impl RangeStats {
         Err(ImportError::Implausible { what, help })
     }
 
-    fn check_near(
-        &self,
-        units: &UnitContext,
-        assumptions: &Assumptions,
-    ) -> Result<(), ImportError> {
+    /// Rejects ranges of which most are beyond the sensor's maximum range.
+    fn check_beyond(&self, units: &UnitContext, assumptions: &Assumptions) -> Result<(), ImportError> {
+        if self.beyond < MIN_BEYOND || 2 * self.beyond <= self.echoes {
+            return Ok(());
+        }
+        let Assumptions { sensor, max_range_m, .. } = assumptions;
+        let what = format!(
+            "{} of {} ranges are beyond {max_range_m} m {}, the maximum range of the sensor {sensor}",
+            self.beyond,
+            self.echoes,
+            units.unit(),
+        );
+        Err(self.doubtful_unit(what, units, assumptions))
+    }
+
+    fn check_near(&self, units: &UnitContext, assumptions: &Assumptions) -> Result<(), ImportError> {
         if self.near == 0 || 2 * self.near < self.echoes {
             return Ok(());
         }
@@ -246,6 +304,11 @@ impl RangeStats {
             units.unit(),
             assumptions.sensor,
         );
+        Err(self.doubtful_unit(what, units, assumptions))
+    }
+
+    /// Builds the error for ranges that are implausible in their unit, with the units that fit.
+    fn doubtful_unit(&self, what: String, units: &UnitContext, assumptions: &Taken) -> ImportError {
         let options = units.unit_options(self, assumptions);
         let help = match options.is_empty() {
             true => {
@@ -259,34 +322,135 @@ impl RangeStats {
                 )
             }
         };
-        Err(ImportError::Implausible { what, help })
+        ImportError::Doubtful { what, help }
     }
+}
+
+/// Statistics of the angles of a column, in its unit.
+#[derive(Debug)]
+struct AngleStats {
+    count: u64,
+    low: f64,
+    high: f64,
+    all_integers: bool,
+    /// True if all angles are multiples of pi / 4.
+    all_eighths: bool,
+    last: f64,
+    changes: u64,
+    /// First step between angles, and number and sum of the steps that are close to it.
+    first_step: f64,
+    usual_steps: u64,
+    usual_sum: f64,
+}
+
+impl Default for AngleStats {
+    fn default() -> Self {
+        Self {
+            count: 0,
+            low: f64::INFINITY,
+            high: f64::NEG_INFINITY,
+            all_integers: true,
+            all_eighths: true,
+            last: 0.0,
+            changes: 0,
+            first_step: 0.0,
+            usual_steps: 0,
+            usual_sum: 0.0,
+        }
+    }
+}
+
+impl AngleStats {
+    fn add(&mut self, angle: f64) {
+        let step = angle - self.last;
+        if self.count > 0 && step.abs() > 1e-9 {
+            self.changes += 1;
+            if self.first_step == 0.0 {
+                self.first_step = step;
+            }
+            if (step - self.first_step).abs() <= 0.2 * self.first_step.abs() {
+                self.usual_steps += 1;
+                self.usual_sum += step;
+            }
+        }
+        self.count += 1;
+        self.last = angle;
+        self.low = self.low.min(angle);
+        self.high = self.high.max(angle);
+        self.all_integers &= is_multiple(angle, 1.0, 1e-9);
+        self.all_eighths &= is_multiple(angle, std::f64::consts::FRAC_PI_4, 6e-4);
+    }
+
+    fn max(&self) -> f64 {
+        self.low.abs().max(self.high.abs())
+    }
+
+    fn span(&self) -> f64 {
+        self.high - self.low
+    }
+
+    /// Mean step of a regular sweep.
+    fn usual_step(&self) -> Option<f64> {
+        let is_regular = self.usual_steps >= 8 && 5 * self.usual_steps >= 4 * self.changes;
+        is_regular.then(|| (self.usual_sum / self.usual_steps as f64).abs())
+    }
+
+    /// Returns `true` if directions of more than a revolution are steps of a round angle in
+    /// radians, and of none in degrees.
+    fn turns_in_radians(&self) -> bool {
+        let is_round = |step_deg: f64| {
+            is_multiple(step_deg, 0.05, 0.004)
+                || (step_deg > 0.09 && is_multiple(360.0 / step_deg, 1.0, 0.01))
+        };
+        !self.all_integers
+            && self.usual_step().is_some_and(|step| !is_round(step) && is_round(step.to_degrees()))
+    }
+
+    /// Returns `true` if angles in degrees are more likely radians: decimals within a revolution.
+    fn directions_look_like_radians(&self) -> bool {
+        let is_within = self.max() <= MAX_RAD && !self.all_integers && self.span() > MIN_SPAN;
+        is_within || (self.max() > MAX_RAD && self.turns_in_radians())
+    }
+
+    /// Returns `true` if headings in degrees are more likely radians: they turn far, or are
+    /// fractions of pi. A robot that drives straight has small headings in degrees.
+    fn headings_look_like_radians(&self) -> bool {
+        let is_turning = self.changes >= 2 && self.span() > 1.0;
+        let is_fraction = self.all_eighths && self.max() > 0.5;
+        self.max() <= MAX_RAD && !self.all_integers && (is_turning || is_fraction)
+    }
+}
+
+/// Returns `true` if a number is a multiple of a unit, within a tolerance.
+fn is_multiple(number: f64, unit: f64, tolerance: f64) -> bool {
+    (number - (number / unit).round() * unit).abs() < tolerance
 }
 
 /// Statistics of all readings of one rotating ranger.
 #[derive(Debug)]
 pub(crate) struct SweepStats {
     pub(crate) ranges: RangeStats,
-    /// Extremes of the directions, in the unit of the file.
-    low: f64,
-    high: f64,
-    all_integers: bool,
+    /// Directions, in the unit of the file.
+    directions: AngleStats,
+    /// Headings, in degrees.
+    headings: AngleStats,
     places: EchoPositions,
+    /// The same, with directions from the x axis for a robot with a heading.
+    turned_places: EchoPositions,
 }
 
 impl SweepStats {
     pub(crate) fn new() -> Self {
         Self {
             ranges: RangeStats::new(DirectionKind::Angles),
-            low: f64::INFINITY,
-            high: f64::NEG_INFINITY,
-            all_integers: true,
+            directions: AngleStats::default(),
+            headings: AngleStats::default(),
             places: EchoPositions::default(),
+            turned_places: EchoPositions::default(),
         }
     }
 
     pub(crate) fn add(&mut self, reading: &ImportedReading, units: (&UnitContext, &Assumptions)) {
-        let direction = reading.raw.direction;
         self.ranges.add(
             reading.location,
             reading.direction_deg,
@@ -294,11 +458,14 @@ impl SweepStats {
             reading.range_m,
             units,
         );
-        self.low = self.low.min(direction);
-        self.high = self.high.max(direction);
-        self.all_integers &= (direction - direction.round()).abs() < 1e-9;
-        if let Some((place_m, range_m)) = reading.position_m.zip(reading.range_m) {
+        self.directions.add(reading.raw.direction);
+        if let Some(heading_deg) = reading.heading_deg {
+            self.headings.add(heading_deg);
+        }
+        if let Some((position_m, range_m)) = reading.position_m.zip(reading.range_m) {
             self.places.add(place_m, range_m, reading.direction_deg);
+            let heading_deg = reading.heading_deg.unwrap_or(0.0);
+            self.turned_places.add(place_m, range_m, reading.direction_deg + heading_deg);
         }
     }
 
@@ -316,6 +483,7 @@ impl SweepStats {
         }
         if !assumptions.skip_checks {
             self.check_angles(units)?;
+            self.check_headings(units)?;
             self.check_places(units)?;
         }
         self.ranges.check(units, assumptions)
@@ -327,35 +495,60 @@ impl SweepStats {
         let Some(field) = field.filter(|_| self.ranges.readings >= MIN_READINGS) else {
             return Ok(());
         };
-        let (low, high) = (self.low, self.high);
-        let max_angle = low.abs().max(high.abs());
+        let AngleStats { low, high, .. } = self.directions;
+        let max_angle = self.directions.max();
         let other_unit = if field.is_radians() { "deg" } else { "rad" };
         let option = Field::with_unit(field.quantity(), Some(other_unit))
             .map(|field| units.mapping.columns_option_with(field, units.names))
             .unwrap_or_default();
-        if field.is_radians() && max_angle > 4.0 * std::f64::consts::TAU {
-            return Err(ImportError::Implausible {
+        let are_degrees = max_angle > 4.0 * std::f64::consts::TAU
+            || (max_angle > MAX_RAD && self.directions.all_integers);
+        if field.is_radians() && are_degrees {
+            return Err(ImportError::Doubtful {
                 what: format!(
-                    "{field} spans {low:.1} to {high:.1} rad, {:.0} revolutions",
+                    "{field} spans {low:.1} to {high:.1} rad, {:.1} revolutions",
                     max_angle / std::f64::consts::TAU
                 ),
                 help: format!("if these are degrees: {option}; --no-unit-check skips this check"),
             });
         }
-        let is_like_radians = max_angle <= MAX_RAD && !self.all_integers && high - low > 0.3;
-        if field.unit() == Some("deg") && is_like_radians {
-            return Err(ImportError::Implausible {
+        if field.unit() == Some("deg") && self.directions.directions_look_like_radians() {
+            return Err(ImportError::Doubtful {
                 what: format!("{field} spans {low:.3} to {high:.3}, which looks like radians"),
                 help: format!(
                     "if these are radians: {option}; if they are degrees: --no-unit-check"
                 ),
             });
         }
+        let step = self.directions.usual_step().unwrap_or(0.0);
+        if field.unit() == Some("deg") && step >= 360.0 {
+            return Err(ImportError::Doubtful {
+                what: format!("{field} changes by {step:.0} degrees from reading to reading"),
+                help: "is it the right column, and its unit? --no-unit-check skips this check"
+                    .to_owned(),
+            });
+        }
         Ok(())
     }
 
+    fn check_headings(&self, units: &UnitContext) -> Result<(), ImportError> {
+        let field = units.mapping.field(Quantity::Heading);
+        let Some(field) = field.filter(|field| field.unit() == Some("deg")) else { return Ok(()) };
+        if !self.headings.headings_look_like_radians() {
+            return Ok(());
+        }
+        let AngleStats { low, high, .. } = self.headings;
+        let option = Field::with_unit(Quantity::Heading, Some("rad"))
+            .map(|field| units.mapping.columns_option_with(field, units.names))
+            .unwrap_or_default();
+        Err(ImportError::Doubtful {
+            what: format!("{field} spans {low:.3} to {high:.3}, which looks like radians"),
+            help: format!("if these are radians: {option}; if they are degrees: --no-unit-check"),
+        })
+    }
+
     fn check_places(&self, units: &UnitContext) -> Result<(), ImportError> {
-        if !self.places.follow_readings() {
+        if !self.places.follow_readings() && !self.turned_places.follow_readings() {
             return Ok(());
         }
         let columns = units.mapping.columns.iter();
@@ -381,15 +574,18 @@ impl SweepStats {
     }
 }
 
-/// Test whether positions in the file are those of echoes: their difference to range times (cos,
-/// sin) of the direction is then constant.
+/// Evidence that positions in the file are those of echoes: they are then an affine function of
+/// range times (cos, sin) of the direction, which covers axes exchanged, mirrored, scaled and
+/// turned for plotting.
 #[derive(Debug, Default)]
 struct EchoPositions {
     count: u64,
     own: Extent,
-    /// Extent of the difference for the usual plotting conventions: x and y by cosine and sine,
-    /// exchanged, or mirrored.
-    offsets: [Extent; 4],
+    /// Extent of the unit vectors of the directions.
+    directions: Extent,
+    /// Extent of the difference for the usual plotting conventions, for few readings.
+    offsets: [Extent; 8],
+    fit: AffineFit,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -420,16 +616,81 @@ impl EchoPositions {
         self.count += 1;
         self.own.add([x, y]);
         let (sin, cos) = direction_deg.to_radians().sin_cos();
+        self.directions.add([cos, sin]);
         let (a, b) = (range_m * cos, range_m * sin);
-        for (offset, [u, v]) in self.offsets.iter_mut().zip([[a, b], [b, a], [a, -b], [-a, b]]) {
+        let signs = [(a, b), (a, -b), (-a, b), (-a, -b)];
+        let axes = signs.into_iter().flat_map(|(u, v)| [[u, v], [v, u]]);
+        for (offset, [u, v]) in self.offsets.iter_mut().zip(axes) {
             offset.add([x - u, y - v]);
         }
+        self.fit.add([a, b], [x, y]);
     }
 
     fn follow_readings(&self) -> bool {
-        let size_m = self.own.size();
-        self.count >= 4
-            && size_m > 0.05
-            && self.offsets.iter().any(|offset| offset.size() < 0.05 * size_m)
+        let (size_m, spread) = (self.own.size(), self.directions.size());
+        // Without a turn, a robot that approaches a wall moves as its range falls.
+        if self.count < 4 || size_m <= 0.05 || spread < 0.1 {
+            return false;
+        }
+        self.offsets.iter().any(|offset| offset.size() < 0.05 * size_m)
+            || (self.count >= 8
+                && spread > 0.8
+                && self.fit.residual().is_some_and(|residual_m| residual_m < 0.004 * size_m))
+    }
+}
+
+/// Least-squares fit of positions by an affine function of two numbers.
+#[derive(Debug, Default)]
+struct AffineFit {
+    /// Sums of the products of (1, a, b).
+    normal: [[f64; 3]; 3],
+    /// Sums of (1, a, b) times x and y, and of the squares of x and y, from the first position.
+    products: [[f64; 3]; 2],
+    squares: [f64; 2],
+    first: Option<[f64; 2]>,
+}
+
+impl AffineFit {
+    fn add(&mut self, [a, b]: [f64; 2], place: [f64; 2]) {
+        let first = *self.first.get_or_insert(place);
+        let row = [1.0, a, b];
+        for (sums, u) in self.normal.iter_mut().zip(row) {
+            for (sum, v) in sums.iter_mut().zip(row) {
+                *sum += u * v;
+            }
+        }
+        for axis in 0..2 {
+            let coordinate = place[axis] - first[axis];
+            self.squares[axis] += coordinate * coordinate;
+            for (sum, u) in self.products[axis].iter_mut().zip(row) {
+                *sum += u * coordinate;
+            }
+        }
+    }
+
+    /// Root of the mean squared residual of the worse axis; `None` if the directions or ranges do
+    /// not determine the function.
+    fn residual(&self) -> Option<f64> {
+        let [p, q, r] = self.normal;
+        let determinant = |p: [f64; 3], q: [f64; 3], r: [f64; 3]| {
+            p[0] * (q[1] * r[2] - q[2] * r[1]) - p[1] * (q[0] * r[2] - q[2] * r[0])
+                + p[2] * (q[0] * r[1] - q[1] * r[0])
+        };
+        let whole = determinant(p, q, r);
+        if whole <= 1e-9 * p[0] * q[1] * r[2] {
+            return None;
+        }
+        let squared = (0..2).map(|axis| {
+            // The matrix is symmetric, so rows replace columns.
+            let right = self.products[axis];
+            let factors = [
+                determinant(right, q, r) / whole,
+                determinant(p, right, r) / whole,
+                determinant(p, q, right) / whole,
+            ];
+            let explained: f64 = factors.iter().zip(right).map(|(factor, sum)| factor * sum).sum();
+            ((self.squares[axis] - explained) / p[0]).max(0.0)
+        });
+        squared.reduce(f64::max).map(f64::sqrt)
     }
 }

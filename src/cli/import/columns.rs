@@ -32,7 +32,8 @@ pub(super) struct ColumnArgs {
     /// LaserScan]
     #[arg(long, value_name = "TOPIC")]
     topic: Vec<String>,
-    /// Device in a Player log of several: HOST:ROBOT:INDEX, or the end of it [default: the first]
+    /// Device in a log of several: HOST:ROBOT:INDEX of Player, or the end of it; the host of CARMEN
+    /// [default: the first]
     #[arg(long, value_name = "DEVICE")]
     device: Option<String>,
     /// Azimuths and bearings are clockwise
@@ -47,10 +48,10 @@ pub(super) struct ColumnArgs {
     #[arg(long, value_name = "DEG", allow_negative_numbers = true)]
     azimuth_deg: Option<f64>,
     /// Range, in the file's unit, that means no echo (repeatable)
-    #[arg(long, value_name = "VALUE", allow_negative_numbers = true)]
+    #[arg(long, alias = "none", value_name = "VALUE", allow_negative_numbers = true)]
     no_echo: Vec<f64>,
     /// Range, in the file's unit, at and above which there is no echo
-    #[arg(long, value_name = "VALUE")]
+    #[arg(long, alias = "none-from", value_name = "VALUE")]
     no_echo_from: Option<f64>,
     /// Speed of sound with which the file's ranges were computed, metres per second; they are
     /// converted to the speed of sound in the air

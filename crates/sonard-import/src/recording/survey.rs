@@ -141,6 +141,7 @@ impl Bag {
                 "select one: --topic TOPIC",
             ));
         }
+        bag.check_robots()?;
         if !assumptions.skip_checks {
             bag.check_tilts()?;
         }
@@ -243,7 +244,7 @@ impl Bag {
         };
         let path = self.frames.path_to_root(placed_as)?;
         let world = path.last().copied().unwrap_or_default();
-        let robot = ROBOT.into_iter().find(|name| path.contains(name)).unwrap_or(world);
+        let robot = robot_frame(&path).unwrap_or(world);
         // A Range reading of a rotating frame has its origin in the parent; a LaserScan in its own
         // frame.
         let above = path.get(1).copied().filter(|_| !is_scan && placed_as != robot);
@@ -272,6 +273,28 @@ impl Bag {
         }
     }
 
+    /// Rejects rangers on several robots.
+    fn check_robots(&self) -> Result<(), ImportError> {
+        let mut robots: BTreeMap<&str, Vec<&str>> = BTreeMap::new();
+        // Without transforms, the root of a tree stands for the robot.
+        let is_named = |source: &Topic| robot_frame(&[&source.robot]).is_some();
+        for (topic, source) in self.topics.iter().filter(|(_, source)| is_named(source)) {
+            robots.entry(&source.robot).or_default().push(topic);
+        }
+        if robots.len() < 2 {
+            return Ok(());
+        }
+        let names: Vec<&str> = robots.keys().copied().collect();
+        let option = |topics: &Vec<&str>| {
+            topics.iter().map(|topic| format!("--topic {topic}")).collect::<Vec<_>>().join(" ")
+        };
+        let options: Vec<String> = robots.values().map(option).collect();
+        Err(ImportError::mapping(
+            format!("the rangers are on several robots: {}", names.join(", ")),
+            format!("select the topics of one: {}", options.join(" | ")),
+        ))
+    }
+
     /// Rejects rangers whose beams leave the horizontal plane.
     fn check_tilts(&self) -> Result<(), ImportError> {
         for (topic, source) in &self.topics {
@@ -295,6 +318,14 @@ impl Bag {
         }
         Ok(())
     }
+}
+
+/// Finds the robot's frame in a path of frames, also in a namespace (`robot1/base_link`).
+fn robot_frame<'a>(path: &[&'a str]) -> Option<&'a str> {
+    let has_name = |frame: &str, name: &str| {
+        frame == name || frame.strip_suffix(name).is_some_and(|space| space.ends_with('/'))
+    };
+    ROBOT.into_iter().find_map(|name| path.iter().copied().find(|frame| has_name(frame, name)))
 }
 
 /// Reads the transforms of the needed frames; those of wheels and arms are skipped.

@@ -114,3 +114,25 @@ fn array_rows_are_rounds() {
     let message = error_text(examine(rows.as_bytes(), columns("range_m=1-7"), of_array()));
     assert!(message.contains("7 ranges") && message.contains("8 rangers"), "{message}");
 }
+
+#[test]
+fn offers_the_right_quantity() {
+    for (header, row, offered) in [
+        ("angle_deg,duration_us,distance_cm", "1,8700,150", "range_cm=distance_cm"),
+        ("angle_deg,duration_us,distance_cm", "1,8700,150", "tof_us=duration_us"),
+        ("angle_deg,time_us", "1,8700", "azimuth_deg=angle_deg,tof_us=time_us"),
+        ("yaw,dist_cm", "1,150", "azimuth_deg=yaw,range_cm=dist_cm"),
+        ("angle_deg,value", "1,150", "range_cm=value"),
+        ("angle_deg,distance_cm,distance_cm", "1,150,3", "range_cm=2"),
+    ] {
+        let message = error_text(mapped(header, row));
+        assert!(message.contains(offered), "{header}: {message}");
+        assert!(!message.contains("max"), "{message}");
+    }
+    let names = "field.angle_min,field.angle_max,field.angle_increment,field.ranges0,field.ranges1";
+    let message = error_text(mapped(names, "-1,1,2,1.0,1.1"));
+    assert!(
+        message.contains("LaserScan in columns") && message.contains("without -p"),
+        "{message}"
+    );
+}

@@ -212,3 +212,65 @@ fn offers_range_unit() {
         .map(|(is, should): (&f64, f64)| (is - should).abs());
     assert!(ranges.len() == 4 && off.fold(0.0, f64::max) < 1e-12, "{ranges:?}");
 }
+
+/// Two robots that log to one file differ in their hosts.
+#[test]
+fn carmen_robots_are_told_apart() {
+    let line = |host: &str, at: u32, range: &str| {
+        format!(
+            "ODOM {at} 0 0 0 0 0 1000.{at} {host} 0.{at}\nSONAR 0.26 2 {range} 1.5 0.2 0 0 0 0.1 1.57 1000.{at} {host} 0.{at}\n"
+        )
+    };
+    let text: String = (1..4)
+        .map(|at| line("lena", at, &format!("1.{at}")) + &line("otto", at + 5, &format!("0.{at}")))
+        .collect();
+    for (device, x_m, range_m) in [(None, 1.0, 1.1), (Some("otto".to_owned()), 6.0, 0.1)] {
+        let mapping = Mapping { device, ..Mapping::default() };
+        let found = examine(text.as_bytes(), mapping.clone(), assumptions()).expect("one robot");
+        assert!(found.notes.join(" ").contains("several devices"), "{:?}", found.notes);
+        let records = import(&text, mapping).expect("one robot");
+        assert_eq!(starts(&records).len(), 3);
+        assert_eq!(
+            (starts(&records)[0].pose.x_m, pings(&records)[0].range_m),
+            (x_m, Some(range_m))
+        );
+    }
+    // Programs of one robot may run on several hosts.
+    let text = text.replace("lena 0.1\nSONAR", "base 0.1\nSONAR");
+    let single: String = text
+        .lines()
+        .filter(|line| !line.contains("otto"))
+        .map(|line| format!("{line}\n"))
+        .collect();
+    assert!(examine(single.as_bytes(), Mapping::default(), assumptions()).expect("one").has_poses);
+}
+
+#[test]
+fn rounds_before_the_first_pose_are_skipped() {
+    let sonar = "SONAR 0.26 2 1.0 1.5 0.2 0 0 0 0.1 1.57 1000.1 host 0.1\n";
+    let odometry = "ODOM 3 0 0 0 0 0 1000.2 host 0.2\n";
+    let truth = "TRUEPOS 4 0 0 0 0 0 1000.3 host 0.3\n";
+    let text = format!("{sonar}{odometry}{sonar}{sonar}");
+    let found = examine(text.as_bytes(), Mapping::default(), assumptions()).expect("a log");
+    assert!(
+        found.readings == 4 && found.notes.join(" ").contains("1 rounds before the first pose")
+    );
+    let text = format!("{sonar}{odometry}{sonar}{truth}{sonar}");
+    let records = import(&text, Mapping::default()).expect("a log");
+    assert_eq!((starts(&records).len(), starts(&records)[0].pose.x_m), (1, 4.0));
+    let message = error_text(import(&format!("{sonar}{odometry}"), Mapping::default()));
+    assert!(message.contains("before the first pose"), "{message}");
+}
+
+#[test]
+fn cut_last_line_is_skipped() {
+    let sonar = "SONAR 0.26 2 1.0 1.5 0.2 0 0 0 0.1 1.57 1000.1 host 0.1\n";
+    for (text, readings, note) in [
+        (format!("{sonar}{}", &sonar[..30]), 2, "line 2 is incomplete"),
+        (format!("{sonar}{}", sonar.trim_end()), 4, "the last line has no line end"),
+    ] {
+        let found = examine(text.as_bytes(), Mapping::default(), assumptions()).expect("a log");
+        assert_eq!(found.readings, readings, "{text}");
+        assert!(found.notes.join(" ").contains(note), "{:?}", found.notes);
+    }
+}

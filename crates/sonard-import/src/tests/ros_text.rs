@@ -1,5 +1,7 @@
 //! LaserScan and Range messages as JSON and as YAML.
 
+use sonard_model::reading::PingStatus;
+
 use super::*;
 use crate::Format;
 
@@ -16,7 +18,9 @@ fn read(text: &str) -> Vec<(f64, Option<f64>)> {
 
 #[test]
 fn reads_laser_scan_json() {
-    let expected = [(302.704, Some(1.0)), (331.352, Some(1.1)), (28.648, None), (57.296, None)];
+    // rosbridge writes null for infinity and NaN.
+    let expected =
+        [(302.704, Some(1.0)), (331.352, Some(1.1)), (0.0, None), (28.648, None), (57.296, None)];
     for text in [
         SCAN.to_owned(),
         format!("[{SCAN}]"),
@@ -32,7 +36,7 @@ fn reads_laser_scan_json() {
     let found = examine(SCAN.as_bytes(), Mapping::default(), assumptions()).expect("a scan");
     assert_eq!(found.format, Format::RosText);
     let notes = found.notes.join("\n");
-    for part in ["ranges are 0", "beyond max_range", "the file has no frames"] {
+    for part in ["ranges are 0", "are null", "beyond max_range", "the file has no frames"] {
         assert!(notes.contains(part), "{part}: {notes}");
     }
 }
@@ -82,4 +86,45 @@ fn reads_lists_of_pairs() {
             pings(&records).iter().map(|ping| (ping.azimuth_deg, ping.range_m.is_some())).collect();
         assert_eq!(read, [(0.0, true), (10.0, true), (20.0, false)], "{text}");
     }
+}
+
+#[test]
+fn non_finite_ranges_follow_rep_117() {
+    let text = SCAN.replace("1.1, null, 0.0", "Infinity, -Infinity, NaN");
+    let records = import(&text, Mapping::default()).expect("a scan");
+    let statuses: Vec<PingStatus> = pings(&records).iter().map(|ping| ping.status).collect();
+    use PingStatus::{Echo, MinRange, NoEcho};
+    assert_eq!(statuses, [Echo, NoEcho, MinRange, NoEcho]);
+    let found = examine(text.as_bytes(), Mapping::default(), assumptions()).expect("a scan");
+    assert!(found.notes.join(" ").contains("1 of 5 ranges are NaN"), "{:?}", found.notes);
+}
+
+#[test]
+fn rejects_angles_in_degrees() {
+    let text = SCAN.replace("-1.0", "-90.0").replace("0.5,", "45.0,");
+    let message = error_text(import(&text, Mapping::default()));
+    assert!(
+        message.contains("looks like degrees") && message.contains("--no-unit-check"),
+        "{message}"
+    );
+}
+
+#[test]
+fn stamps_of_a_board_are_no_dates() {
+    let text = SCAN.replace("1760000000", "12");
+    let found = examine(text.as_bytes(), Mapping::default(), assumptions()).expect("a scan");
+    assert!(found.notes.join(" ").contains("start of the board"), "{:?}", found.notes);
+    let started = Some("2026-01-31T12:00:00Z".parse().expect("a time"));
+    let records = import(&text, Mapping { started, ..Mapping::default() }).expect("a scan");
+    assert_eq!(pings(&records)[0].time, started);
+}
+
+#[test]
+fn cut_message_is_skipped() {
+    let message = "angle_min: 0.0\nangle_increment: 0.5\nranges: [1.0, 2.0]\n---\n";
+    let text = format!("{message}{}", &message[..message.len() - 12]);
+    let found = examine(text.as_bytes(), Mapping::default(), assumptions()).expect("a scan");
+    let notes = found.notes.join(" ");
+    assert!(found.readings == 2 && notes.contains("skipped: 1 messages, cut off"), "{notes}");
+    assert!(!notes.contains("have no direction"), "{notes}");
 }

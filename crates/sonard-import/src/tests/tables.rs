@@ -3,6 +3,8 @@
 use proptest::prelude::*;
 use sonard_model::reading::PingStatus;
 
+use sonard_model::array::RangerArray;
+
 use super::*;
 use crate::{Column, Format};
 
@@ -293,4 +295,81 @@ proptest! {
             prop_assert_eq!(pings(&records).len() as u64, found.readings);
         }
     }
+}
+
+/// Captures of terminals and plotters for boards.
+#[test]
+fn reads_captures_of_boards() {
+    let values = |text: &str, mapping: Mapping| -> Vec<(f64, Option<f64>)> {
+        let records = import(text, mapping).unwrap_or_else(|error| panic!("{text}: {error}"));
+        pings(&records).iter().map(|ping| (ping.azimuth_deg, ping.range_m)).collect()
+    };
+    let expected = [(15.0, Some(0.31)), (16.0, Some(0.32)), (17.0, Some(0.33))];
+    let auto = Mapping::default;
+    for (text, mapping) in [
+        ("angle_deg:15,dist_cm:31\nangle_deg:16,dist_cm:32\nangle_deg:17,dist_cm:33\n", auto()),
+        (
+            "Angle: 15 deg, Distance: 31 cm\nAngle: 16 deg, Distance: 32 cm\nAngle: 17 deg, Distance: 33 cm\n",
+            auto(),
+        ),
+        ("angle,distance\n[deg],[cm]\n15,31\n16,32\n17,33\n", auto()),
+        ("angle_deg,dist_cm\n15,31\n16,32\nangle_deg,dist_cm\n17,33\n", auto()),
+        ("1\n15,31\n16,32\n17,33\n", columns("azimuth_deg=1,range_cm=2")),
+        ("15,31 // first\n16,32 # second\n17,33\n", columns("azimuth_deg=1,range_cm=2")),
+    ] {
+        assert_eq!(values(text, mapping), expected, "{text}");
+    }
+    let text = "12:00:15.015 -> 15,31\n12:00:15.115 -> 16,32\n";
+    let records = import(text, columns("time=1,azimuth_deg=2,range_cm=3")).expect("stamped");
+    let time = pings(&records)[1].time.expect("a time");
+    assert_eq!((time.as_millisecond() % 60_000, pings(&records)[1].range_m), (15_115, Some(0.32)));
+}
+
+#[test]
+fn words_mean_no_echo() {
+    for word in ["out of range", "---", "No echo", "n/a", "timeout"] {
+        let text = format!("angle_deg,distance_cm\n0,100\n5,{word}\n10,102\n");
+        let records = import(&text, Mapping::default()).unwrap_or_else(|error| panic!("{error}"));
+        assert_eq!(pings(&records)[1].range_m, None, "{word}");
+    }
+    let message = error_text(import("angle_deg,distance_cm\n0,far\n", Mapping::default()));
+    assert!(message.contains("`far` is not a number") && message.contains("leave the value empty"));
+    let message = error_text(import("angle_deg,distance_cm\n0,31cm\n", Mapping::default()));
+    assert!(message.contains("remove the unit"), "{message}");
+}
+
+/// A circle that turns back ends at the reading that closes it.
+#[test]
+fn full_circle_and_back() {
+    let there = (0..=36).map(|at| 10 * at);
+    let angles = there.clone().chain(there.clone().rev().skip(1)).chain(there.skip(1));
+    let rows: String =
+        angles.zip(0..).map(|(angle, at)| format!("{angle},{}\n", 100 + at % 9)).collect();
+    let records = import(&rows, columns("azimuth_deg=1,range_cm=2")).expect("three scans");
+    let ends = records.iter().filter_map(|record| match record {
+        Record::ScanEnd(end) => Some(end.beams),
+        _ => None,
+    });
+    assert_eq!(ends.collect::<Vec<_>>(), [37, 36, 36]);
+}
+
+/// One range column per ranger, by names that have only the unit.
+#[test]
+fn array_columns_without_quantity() {
+    let array = RangerArray::preset("pioneer-8").expect("a preset");
+    let with = || Taken { array: Some(array.clone()), ..assumptions() };
+    let names: Vec<String> = (0..8).map(|at| format!("s{at} [cm]")).collect();
+    let row = (0..8).map(|at| (100 + 10 * at).to_string()).collect::<Vec<_>>().join(",");
+    let text = format!("x_m,y_m,{}\n1,2,{row}\n1.5,2,{row}\n", names.join(","));
+    let found = examine(text.as_bytes(), Mapping::default(), with()).expect("rounds");
+    assert_eq!((found.readings, found.has_poses), (16, true));
+    let text = text.replace(" [cm]", "").replace('s', "sonar");
+    let message = error_text(examine(text.as_bytes(), Mapping::default(), with()));
+    assert!(message.contains("--columns range_cm=3-10"), "{message}");
+    let text = format!("1700000000,{row}\n1700000001,{row}\n");
+    let message = error_text(examine(text.as_bytes(), Mapping::default(), with()));
+    assert!(message.contains("has 9 values") && message.contains("range_m=2-9"), "{message}");
+    let json = "[{\"ranges\": [1, 1.1, 1.2, 1.3, 1.4, 1.5, 1.6, 1.7]}]";
+    let found = examine(json.as_bytes(), columns("range_m=ranges"), with()).expect("a round");
+    assert_eq!(found.readings, 8);
 }

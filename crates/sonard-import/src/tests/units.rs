@@ -100,3 +100,105 @@ fn rejects_positions_of_echoes() {
     let mapping = columns("azimuth_deg=1,range_cm=2,x_cm=3,y_cm=4");
     assert!(examine(driven.as_bytes(), mapping, assumptions()).expect("a course").has_poses);
 }
+
+/// Radians over more than a revolution, in a narrow sector, and as headings.
+#[test]
+fn finds_radians_beyond_one_turn() {
+    let table = |angles: &[f64]| -> String {
+        let rows =
+            angles.iter().zip(0..).map(|(angle, at)| format!("{angle:.4},{}\n", 120 + at % 7));
+        format!("angle_deg,distance_cm\n{}", rows.collect::<String>())
+    };
+    let steps = |count: u32, step_deg: f64| -> Vec<f64> {
+        (0..count).map(|at| (f64::from(at) * step_deg).to_radians()).collect()
+    };
+    for angles in
+        [steps(100, 10.0), steps(300, 1.8), steps(9, 1.0), steps(2, 90.0), steps(64, 5.625)]
+    {
+        let message =
+            error_text(examine(table(&angles).as_bytes(), Mapping::default(), assumptions()));
+        assert!(
+            message.contains("looks like radians") && message.contains("azimuth_rad=angle_deg"),
+            "{message}"
+        );
+    }
+    // Degrees with decimals beyond a revolution of radians, by usual and by unusual steps.
+    for step_deg in [0.9, 1.125, 0.45, 3.6, 1.8, 0.703_125] {
+        let angles: Vec<f64> = (0..200).map(|at| step_deg * f64::from(at)).collect();
+        examine(table(&angles).as_bytes(), Mapping::default(), assumptions()).expect("degrees");
+    }
+    // Whole numbers are degrees.
+    let whole: String = (0..20).map(|at| format!("{at},{}\n", 120 + at % 7)).collect();
+    let message =
+        error_text(examine(whole.as_bytes(), columns("azimuth_rad=1,range_cm=2"), assumptions()));
+    assert!(message.contains("--columns azimuth_deg=1,range_cm=2"), "{message}");
+}
+
+#[test]
+fn finds_headings_in_radians() {
+    let table = |headings: &[&str]| -> String {
+        let rows = headings.iter().zip(0..).flat_map(|(heading, at)| {
+            (0..12).map(move |beam| format!("{},{},{at},2,{heading}\n", 30 * beam, 120 + beam % 5))
+        });
+        format!("angle_deg,distance_cm,x_m,y_m,heading_deg\n{}", rows.collect::<String>())
+    };
+    for headings in [&["0", "0.7", "1.4", "2.1"][..], &["1.5708", "1.5708"], &["-3.142", "0"]] {
+        let message =
+            error_text(examine(table(headings).as_bytes(), Mapping::default(), assumptions()));
+        assert!(message.contains("heading_rad=heading_deg"), "{message}");
+    }
+    for headings in [&["0", "15", "30"][..], &["0.1", "0.4", "0.2"], &["2.5"], &["90", "90.5"]] {
+        examine(table(headings).as_bytes(), Mapping::default(), assumptions()).expect("degrees");
+    }
+}
+
+#[test]
+fn offers_units_of_time_and_length() {
+    let table = |scale: f64| -> String {
+        (0..36)
+            .map(|at| format!("{},{:.1}\n", 10 * at, scale * (1.2 + 0.01 * f64::from(at))))
+            .collect()
+    };
+    for (scale, given, right) in [
+        (5830.0, "range_cm=2", "tof_us=2"),
+        (5.83, "tof_us=2", "tof_ms=2"),
+        (100.0, "tof_us=2", "range_cm=2"),
+    ] {
+        let mapping = columns(&format!("azimuth_deg=1,{given}"));
+        let message = error_text(examine(table(scale).as_bytes(), mapping, assumptions()));
+        assert!(message.contains(&format!("--columns azimuth_deg=1,{right}")), "{message}");
+    }
+    // Most ranges just beyond what the sensor measures, or a few of them.
+    let mapping = || columns("azimuth_deg=1,range_m=2");
+    let message = error_text(examine(table(4.0).as_bytes(), mapping(), assumptions()));
+    assert!(message.contains("the maximum range of the sensor hc-sr04"), "{message}");
+    let found = examine(table(3.0).as_bytes(), mapping(), assumptions()).expect("plausible");
+    assert!(found.notes.join(" ").contains("beyond 4 m"), "{:?}", found.notes);
+}
+
+/// Positions of echoes in plots: scaled, turned, with any axes.
+#[test]
+fn finds_plotted_positions() {
+    let table = |place: &dyn Fn(f64, f64) -> [f64; 2], heading: &str| -> String {
+        let row = |at: i32| {
+            let (angle, range) = (f64::from(10 * at), 120.0 + f64::from(at * 7 % 5));
+            let [x, y] = place(range, angle.to_radians());
+            format!("{angle},{range},{x:.1},{y:.1},{heading}\n")
+        };
+        (0..18).map(row).collect()
+    };
+    let mapping = || columns("azimuth_deg=1,range_cm=2,x_cm=3,y_cm=4,heading_deg=5");
+    for text in [
+        table(&|range, turn| [-range * turn.cos(), -range * turn.sin()], "0"),
+        table(&|range, turn| [2.0 * range * turn.cos(), 2.0 * range * turn.sin()], "0"),
+        table(&|range, turn| [100.0 - range * turn.sin(), 50.0 - range * turn.cos()], "0"),
+        table(&|range, turn| [range * (turn + 0.4).cos(), range * (turn + 0.4).sin()], "0"),
+    ] {
+        let message = error_text(examine(text.as_bytes(), mapping(), assumptions()));
+        assert!(message.contains("the position of the echo"), "{message}");
+    }
+    // A fixed ranger on a robot that approaches a wall.
+    let row = |at: i32| format!("0,{},{},0,0\n", 300 - 5 * at, 5 * at);
+    let text: String = (0..30).map(row).collect();
+    examine(text.as_bytes(), mapping(), assumptions()).expect("a course");
+}

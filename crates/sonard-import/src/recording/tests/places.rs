@@ -239,3 +239,46 @@ fn sweeps_end_on_reversal() {
     let scans = scans(&bag.bytes(), Mapping::default()).expect("a recording");
     assert_eq!(scans.iter().map(|(_, pings)| pings.len()).collect::<Vec<_>>(), [7, 6, 6]);
 }
+
+#[test]
+fn rejects_rangers_of_several_robots() {
+    let mut bag = Bag::new(Order::Little);
+    for robot in ["r1", "r2"] {
+        let [base, sonar] = ["base_link", "sonar"].map(|name| format!("{robot}/{name}"));
+        bag = bag.mounts(&base, &sonar, [0.1, 0.0, 0.0]);
+        for at in 0..3 {
+            let time_s = 1_700_000_000.0 + f64::from(at);
+            let moved = transform(time_s, "map", &base, [f64::from(at), 0.0, 0.0]);
+            bag = bag.add("/tf", super::TRANSFORMS, time_s, &[moved].to_vec());
+            bag = bag.range(&format!("/{robot}/sonar"), time_s, &sonar, 1.0);
+        }
+    }
+    let bytes = bag.bytes();
+    let message = error_text(examine(&bytes, Mapping::default()));
+    assert!(
+        message.contains("several robots") && message.contains("--topic /r2/sonar"),
+        "{message}"
+    );
+    let topics = vec!["/r2/sonar".to_owned()];
+    let scans = scans(&bytes, Mapping { topics, ..Mapping::default() }).expect("one robot");
+    let places: Vec<f64> = scans.iter().map(|(start, _)| start.pose.x_m).collect();
+    assert_eq!(places, [0.0, 1.0, 2.0]);
+}
+
+#[test]
+fn rejects_scans_in_degrees_and_near_ranges() {
+    let scan = LaserScan(
+        header(1_700_000_000.0, "laser"),
+        [-90.0, 90.0, 90.0, 0.0, 0.0, 0.1, 10.0],
+        vec![1.0, 1.1, 1.2],
+        Vec::new(),
+    );
+    let bytes = Bag::new(Order::Little).add("/scan", LASER_SCAN, 1_700_000_000.0, &scan).bytes();
+    let message = error_text(examine(&bytes, Mapping::default()));
+    assert!(message.contains("looks like degrees"), "{message}");
+    let near = (0..5).fold(Bag::new(Order::Little), |bag, at| {
+        bag.range("/sonar", 1_700_000_000.0 + f64::from(at), "sonar", 0.012)
+    });
+    let message = error_text(examine(&near.bytes(), Mapping::default()));
+    assert!(message.contains("at or below min_range"), "{message}");
+}
