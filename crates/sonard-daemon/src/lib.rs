@@ -58,7 +58,7 @@ pub use annotate::judged_line;
 pub(crate) use broadcast::Shelf;
 pub use broadcast::{ClientGuard, Hub, Line, Moved, ScanSubscription, Subscription, Wanted};
 pub use control::{Order, Request};
-pub use device_task::OpenPort;
+pub use device_task::{OpenPort, Relocate, Relocating};
 pub use journal::{Journal, JournalThread};
 pub use limits::{check_device, check_plan, check_pose, ordered_air};
 pub use link_state::{LinkInput, LinkMachine, LinkStep, RetryBounds, Transition};
@@ -83,6 +83,8 @@ const MAX_QUEUED_ORDERS: usize = 64;
 pub struct Resources {
     /// Opens the serial port by its name.
     pub open_port: OpenPort,
+    /// Moves a simulated device; `None` for a device that the robot carries.
+    pub relocate: Option<Relocate>,
     /// GPIO pins of the host computer.
     pub gpio: Box<dyn HostGpio>,
     /// Access to the log's writer thread.
@@ -119,9 +121,9 @@ enum Worker {
 /// within a multi-threaded tokio runtime.
 #[must_use]
 pub fn prepare(resources: Resources, settings: Settings) -> (Daemon, Handle) {
-    let Resources { open_port, gpio, journal, supervisor } = resources;
+    let Resources { open_port, relocate, gpio, journal, supervisor } = resources;
     wire(gpio, journal, supervisor, settings, |control, out| {
-        Worker::Ranger(Box::new(DeviceTask::new(control, open_port, out)))
+        Worker::Ranger(Box::new(DeviceTask::new(control, open_port, relocate, out)))
     })
 }
 
@@ -198,10 +200,9 @@ impl Handle {
     /// # Errors
     /// When the order is rejected, or the daemon is stopping.
     pub async fn order(&self, order: Order) -> Result<(), Refusal> {
-        let gone = || Refusal {
-            kind: RefusalKind::Stopping,
-            message: "the daemon is stopping".into(),
-            help: "retry once it is running again".into(),
+        let gone = || {
+            let help = "retry once it is running again";
+            Refusal::new(RefusalKind::Stopping, "the daemon is stopping", help)
         };
         let (reply, answer) = oneshot::channel();
         self.orders.send(Request { order, reply }).await.map_err(|_| gone())?;
@@ -215,11 +216,8 @@ impl Handle {
     pub async fn start(&self, request: ScanRequest) -> Result<Started, Refusal> {
         let ScanRequest { scans, plan, pose } = request;
         if scans == Some(0) {
-            return Err(Refusal {
-                kind: RefusalKind::Wrong,
-                message: "scans is 0".into(),
-                help: "set it to 1 or more, or omit it".into(),
-            });
+            let help = "set it to 1 or more, or omit it";
+            return Err(Refusal::new(RefusalKind::Wrong, "scans is 0", help));
         }
         let request = Uuid::new_v4();
         self.order(Order::Start(Asked { request, scans, plan, pose })).await?;
