@@ -29,6 +29,8 @@ const PENS = {
   lobe: { label: "main lobe up to the reading", colour: "--muted", width: 1, symbol: "lobe" },
   preview: { label: "preview of the next scan", colour: "--good", width: 1.3, symbol: "square" },
   hypothesis: { label: "position under the selected hypothesis", colour: "--bad", width: 2, dash: [7, 3] },
+  front: { label: "wave front that is detected", colour: "--path", width: 2.5, symbol: "arc" },
+  faint: { label: "wave front that is not detected", colour: "--muted", width: 1.5, symbol: "arc" },
   outside: { label: "outside the view", colour: "--ink", width: 1, symbol: "arrow" },
 };
 

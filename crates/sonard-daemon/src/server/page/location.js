@@ -4,7 +4,7 @@
 import { requestJson } from "./api.js";
 import { make } from "./dom.js";
 import { rounded } from "./ranger.js";
-import { failure, sentences, setText } from "./format.js";
+import { count, failure, sentences, setText } from "./format.js";
 
 export class Locator {
   /**
@@ -33,7 +33,7 @@ export class Locator {
     this.button.disabled = true;
     try {
       const { poses, doubts, lacks } = await requestJson(`/v1/scans/${scan.id}/location`);
-      const [pose] = poses;
+      const pose = nearestOf(poses, scan.start.pose);
       if (pose) this.show({ scan: scan.id, pose }, poseText(pose, poses.length));
       else this.show(null, sentences(lacks ?? "no pose fits the readings", ...doubts.map(doubtText)));
     } catch (/** @type {any} */ error) {
@@ -68,9 +68,16 @@ export class Locator {
   }
 }
 
+/** Pose nearest to the assumed one among those that are at least half as probable as the best. */
+function nearestOf(poses, { x_m, y_m }) {
+  const likely = poses.filter(({ probability }) => 2 * probability >= poses[0].probability);
+  const distance_m = (pose) => Math.hypot(pose.x_m - x_m, pose.y_m - y_m);
+  return likely.reduce((best, pose) => (best && distance_m(best) <= distance_m(pose) ? best : pose), null);
+}
+
 function poseText({ x_m, y_m, heading_deg, probability, sigma_x_m, sigma_y_m, sigma_heading_deg, explained }, hypotheses) {
   const sigmas = `±${(1e3 * Math.max(sigma_x_m, sigma_y_m)).toFixed(1)} mm, ±${sigma_heading_deg.toFixed(2)}°`;
-  const others = hypotheses > 1 ? `, ${hypotheses - 1} other poses possible` : "";
+  const others = hypotheses > 1 ? `; ${count(hypotheses - 1, "other pose")} possible` : "";
   return `(${x_m.toFixed(3)}, ${y_m.toFixed(3)}) m, heading ${heading_deg.toFixed(1)}°, ${sigmas}; probability ${probability.toFixed(2)}, ${(100 * explained).toFixed(0)} % of the readings explained${others}`;
 }
 

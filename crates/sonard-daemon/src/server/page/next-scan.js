@@ -330,8 +330,9 @@ export class NextScan {
   drawUnder(layer, plan) {
     if (!this.draft) return;
     this.ranger.place(this.draft.pose);
+    if (!this.scan) return;
     const c = layer.pen("preview", plan.palette);
-    for (const ping of this.scan?.beams.values() ?? []) {
+    for (const ping of this.scan.beams.values()) {
       const at = positionOf(ping);
       if (at && !plan.view.isOutside(plan.view.px(at))) square(c, plan.view.px(at), 3.5);
     }

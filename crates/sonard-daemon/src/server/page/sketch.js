@@ -101,7 +101,10 @@ export class Sketch {
     const { end, turn } = this.ray(ping);
     const from = this.from(ping);
     const radius = ping.range_m === null ? Math.hypot(end[0] - from[0], end[1] - from[1]) : ping.range_m * this.view.scale;
-    drawSector(this.layer.pen("lobe", this.palette), from, turn, halfLobe(this.scan.session), radius);
+    const c = this.layer.pen("lobe", this.palette);
+    c.globalAlpha = 0.6;
+    drawSector(c, from, turn, halfLobe(this.scan.session), radius);
+    c.globalAlpha = 1;
   }
 
   transducer(ping) {

@@ -63,8 +63,8 @@ export class Strip {
 
   /** Returns `true` if the scan's readings have no predictions, as those of a simulation. */
   isEmpty() {
-    const readings = [...(this.scan?.beams.values() ?? [])];
-    return readings.length > 0 && !readings.some(({ sim }) => sim);
+    const isSimulated = this.scan?.session?.provenance === "simulated";
+    return isSimulated && ![...this.scan.beams.values()].some(({ sim }) => sim);
   }
 
   /** Names of an array's rangers, each of which has a column. @returns {string[] | undefined} */

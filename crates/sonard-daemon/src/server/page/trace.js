@@ -26,6 +26,8 @@ export class EchoTrace {
     this.selected = null;
     /** @type {Record<string, string> | null} */
     this.palette = null;
+    /** Time after firing up to which the trace is emphasized, microseconds; `null` for all of it. @type {number | null} */
+    this.cursor_us = null;
     this.onPick = onPick;
     new ResizeObserver(() => this.resize()).observe(canvas);
     canvas.addEventListener("click", (event) => this.pick(event.offsetX));
@@ -59,6 +61,7 @@ export class EchoTrace {
     this.drawBlanking(palette, trace);
     this.drawLine(trace.threshold, palette["--min-range"], [5, 4]);
     this.drawLine(trace.envelope, palette["--direct"], []);
+    if (this.cursor_us !== null) this.drawCursor(palette, this.cursor_us * trace.m_per_us);
     for (const peak of peaks) this.drawPeak(palette, peak);
     for (const echo of this.beam.echoes ?? []) this.drawEcho(palette, echo);
     if (reading.range_m !== null) this.drawRange(reading.range_m, palette["--wall"]);
@@ -159,6 +162,15 @@ export class EchoTrace {
     c.lineTo(x - half, this.height - BOTTOM + 2 * half);
     c.lineTo(x + half, this.height - BOTTOM + 2 * half);
     c.fill();
+  }
+
+  /** Fades what is to come. @param {Record<string, string>} palette @param {number} range_m */
+  drawCursor(palette, range_m) {
+    const [x, right] = [this.x(range_m), this.width - RIGHT];
+    [this.c.fillStyle, this.c.globalAlpha] = [palette["--panel"], 0.72];
+    if (x < right) this.c.fillRect(x, TOP, right - x, this.height - TOP - BOTTOM);
+    this.c.globalAlpha = 1;
+    drawVertical(this.c, Math.min(x, right), [TOP, this.height - BOTTOM], palette["--path"]);
   }
 
   /** @param {number} range_m @param {string} colour */

@@ -214,6 +214,7 @@ export class Waterfall {
     const values = this.values();
     const ranges = values.map(({ m }) => m).filter((m) => m < Infinity);
     setText(this.label, this.seriesText(values, ranges));
+    this.series.style.visibility = ranges.length ? "" : "hidden";
     if (!ranges.length) return;
     const [min, max] = [Math.min(...ranges), Math.max(...ranges)];
     const margin = Math.max(0.001, 0.1 * (max - min));
