@@ -34,7 +34,7 @@ bundle() { "$tools/esbuild" "$1" --bundle --minify --format=iife --charset=utf8 
 bundle web/playground/main.js "$page/playground.js"
 bundle web/playground/worker.js "$target/playground-worker.js"
 # A page opened from disk can neither fetch a module nor start a worker from a file, so a script contains both.
-node web/pack.mjs "$wasm" "$target/playground-worker.js" >"$page/model-data.js"
+node web/pack.mjs "$wasm" "$target/playground-worker.js" "$tools/.." >"$page/model-data.js"
 cp web/playground/{index.html,playground.css} crates/sonard-daemon/src/server/page/{style.css,icon.svg} "$page"
 
 bytes=0

@@ -21,8 +21,9 @@ use crate::{
 };
 
 /// Names of the options below, for verbs that work without a mock.
-pub(super) const OPTIONS: [&str; 9] = [
+pub(super) const OPTIONS: [&str; 10] = [
     "truth",
+    "truth_pose",
     "truth_temperature_c",
     "realtime",
     "seed",
@@ -40,6 +41,10 @@ pub(super) struct MockWorldArgs {
     /// True scene of the mock, if different from --scene
     #[arg(long, value_name = "SCENE")]
     truth: Option<PathBuf>,
+    /// True pose of the mock, X,Y,DEG or the name of a pose in its scene; without it, the mock is
+    /// where the scan assumes it, and follows a changed pose
+    #[arg(long, value_name = "POSE", allow_hyphen_values = true)]
+    truth_pose: Option<String>,
     /// Air temperature of the mock's world, degrees Celsius, if different
     #[arg(long, value_name = "C", allow_negative_numbers = true)]
     truth_temperature_c: Option<f64>,
@@ -106,24 +111,28 @@ impl MockWorldArgs {
         Ok(MockBoard::new(settings, world))
     }
 
-    /// Computes the echoes at the assumed pose in the true world.
+    /// Computes the echoes in the true world, at the true pose or else the assumed one.
     pub(super) fn soundings(&self, assumed: &AssumedModel<'_>) -> Result<EchoTable, Failure> {
         let scene = match &self.truth {
             Some(name) => Arc::new(scene_file::load(name)?),
             None => Arc::clone(assumed.scene),
         };
+        let pose = match &self.truth_pose {
+            Some(pose) => scene_file::pose(&scene, pose)?,
+            None => *assumed.pose,
+        };
         let air = self.truth_air(assumed.air)?;
         // The mock covers whatever window it receives, so the model must reach as far.
         let options = Options { max_range_m: None, ..*assumed.options };
         let simulator = Simulator::new(
-            Arc::new(scene.with_robot_at(assumed.pose)),
+            Arc::new(scene.with_robot_at(&pose)),
             assumed.sensor.clone(),
             air,
             options,
         )
         .map_err(|error| Failure::input(error, "see `sonard mock --help`"))?;
         let steps = self.steps_per_revolution;
-        EchoTable::from_model(&simulator, assumed.pose, steps, self.mounting_offset_deg)
+        EchoTable::from_model(&simulator, &pose, steps, self.mounting_offset_deg)
             .map_err(|error| Failure::input(error, "give a simpler scene"))
     }
 
@@ -142,6 +151,9 @@ impl MockWorldArgs {
         let unsupported = |option: &str, instead: &str| {
             Err(Failure::input(format!("the emulator does not support {option}"), instead))
         };
+        if self.truth_pose.is_some() {
+            return unsupported("--truth-pose", "use --mock");
+        }
         if self.faults.is_some() {
             return unsupported(
                 "--faults",

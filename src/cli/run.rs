@@ -24,7 +24,7 @@ use super::{
     runtime::{self, Interrupts},
 };
 use crate::{
-    daemon::{self, Handle, Journal, OpenPort, Order, Resources, Settings},
+    daemon::{self, Handle, Journal, OpenPort, Order, Relocate, Resources, Settings},
     host_gpio,
     interrupts::{FORCED_END, Hangup},
     link::PortOpener,
@@ -144,17 +144,19 @@ pub(super) fn run(args: Args) -> Outcome {
     let outcome = runtime.block_on(async {
         let (interrupts, handlers) = Interrupts::install(hangup);
         drop(supervisor.spawn(Task::Signals, handlers.receive()));
-        let mock = match mock {
-            true => Some(Mock::start(&world, virtual_time, &settings, &supervisor)?),
+        let (mock, relocate) = match mock {
+            true => Some(Mock::start(world, virtual_time, &settings, &supervisor)?),
             false => None,
-        };
+        }
+        .unzip();
         if let Some(mock) = &mock {
             loader.fix_port(mock.port());
             settings.keys.device.port = Some(mock.port());
         }
         let served = async {
             let outcome =
-                serve(loader, settings, files, &interrupts, hangup, supervisor.clone()).await;
+                serve(loader, settings, files, relocate, (&interrupts, hangup), supervisor.clone())
+                    .await;
             supervisor.stopping().cancel();
             if let Some(mock) = mock {
                 mock.stop().await;
@@ -189,8 +191,8 @@ async fn serve(
     loader: Loader,
     settings: Settings,
     files: Files,
-    interrupts: &Interrupts,
-    hangup: Hangup,
+    relocate: Option<Relocate>,
+    (interrupts, hangup): (&Interrupts, Hangup),
     supervisor: Supervisor,
 ) -> Outcome {
     // With a handler, exceeding the file-size limit is an error of the write instead of the end of
@@ -222,7 +224,8 @@ async fn serve(
         Some(gpio) => {
             let announced = Arc::new(OnceLock::<Handle>::new());
             let open_port = open_and_announce(Arc::clone(&announced));
-            let resources = Resources { open_port, gpio, journal, supervisor: supervisor.clone() };
+            let supervisor = supervisor.clone();
+            let resources = Resources { open_port, relocate, gpio, journal, supervisor };
             let prepared = daemon::prepare(resources, settings.clone());
             drop(announced.set(prepared.1.clone()));
             prepared

@@ -9,7 +9,6 @@ const byId = (id) => /** @type {HTMLButtonElement} */ (document.getElementById(i
 
 /** Snap distance to corners, pixels. */
 const SNAP_PX = 14;
-const MAX_UNDO = 50;
 
 /** @typedef {import("./room.js").Point} Point */
 
@@ -17,10 +16,9 @@ export class Editor {
   /**
    * @param {HTMLElement} stage
    * @param {any} view of the plan
-   * @param {(scene: import("./room.js").SceneFile, final: boolean) => void} onScene
-   * @param {(pose: import("./engine.js").Pose) => void} onPose
+   * @param {(scene: import("./room.js").SceneFile, final: boolean, pose?: import("./engine.js").Pose) => void} onScene
    */
-  constructor(stage, view, onScene, onPose) {
+  constructor(stage, view, onScene) {
     this.stage = stage;
     this.view = view;
     this.onScene = onScene;
@@ -32,8 +30,6 @@ export class Editor {
     /** Start of the next wall. @type {Point | null} */
     this.from = null;
     this.adding = false;
-    /** JSON of earlier scenes, for undo. @type {string[]} */
-    this.undoStack = [];
     /** Scene at the start of a drag. Edits start from it, so that a corner dragged across another is not joined with it. */
     this.dragStart = /** @type {import("./room.js").SceneFile | null} */ (null);
     byId("edit").addEventListener("click", () => this.toggle(!this.open));
@@ -41,12 +37,9 @@ export class Editor {
     byId("add-pillar").addEventListener("click", () => this.change((scene) => addPillar(scene, this.middle())));
     byId("new-room").addEventListener("click", () => {
       const room = newRoom();
-      this.saveForUndo();
-      onPose(room.poses?.start ?? { x_m: 1, y_m: 1, heading_deg: 0 });
-      this.onScene(room, true);
+      this.onScene(room, true, room.poses?.start);
       this.view.show(this.view.mode);
     });
-    byId("undo").addEventListener("click", () => this.undo());
     stage.addEventListener("click", (event) => this.click(event), { capture: true });
     stage.addEventListener("keydown", (event) => {
       if (event.key === "Escape") this.add(false);
@@ -98,7 +91,6 @@ export class Editor {
         name: "Corner",
         className: "",
         onMove: (at, handle) => {
-          if (!this.dragStart) this.saveForUndo();
           this.dragStart ??= this.scene;
           handle.place(at);
           this.move(this.dragStart, index, at);
@@ -168,22 +160,9 @@ export class Editor {
 
   /** @param {(scene: import("./room.js").SceneFile) => void} edit */
   change(edit) {
-    this.saveForUndo();
     const scene = structuredClone(this.scene);
     edit(scene);
     this.onScene(scene, true);
-  }
-
-  saveForUndo() {
-    this.undoStack.push(JSON.stringify(this.scene));
-    if (this.undoStack.length > MAX_UNDO) this.undoStack.shift();
-    byId("undo").disabled = false;
-  }
-
-  undo() {
-    const scene = this.undoStack.pop();
-    byId("undo").disabled = this.undoStack.length === 0;
-    if (scene) this.onScene(JSON.parse(scene), true);
   }
 
   /** @returns {Point} */

@@ -17,11 +17,13 @@ import { Editor } from "./editor.js";
 import { Files } from "./files.js";
 import { Logs } from "./logs.js";
 import { Model } from "./model.js";
+import { Pulse } from "./pulse.js";
 import { newRoom } from "./room.js";
 import { decompress, showLink, stateFromLink } from "./share.js";
 import { defaultState, planOf, settingsOf } from "./state.js";
 import { setLamp, showProblem, summaryOf } from "./status-text.js";
 import { Tour } from "./tour.js";
+import { poseWithinWalls } from "./walls.js";
 
 /** @typedef {import("./state.js").State} State */
 
@@ -33,6 +35,11 @@ const MAX_BYTES = 16 << 20;
 const SUMMARY_DELAY_MS = 400;
 /** Maximum number of stored sweep times. */
 const MAX_TIMES = 2000;
+const MAX_UNDO = 50;
+/** Changes of the same settings within this time are undone together, milliseconds. */
+const SAME_CHANGE_MS = 800;
+/** Width below which the echo trace is shown under the plan while a pulse is played. */
+const NARROW = matchMedia("(max-width: 899px)");
 
 /** @type {Map<string, import("./room.js").SceneFile>} */
 const rooms = new Map();
@@ -47,6 +54,12 @@ let scan = null;
 /** @type {import("./engine.js").Beam | null} */
 let beam = null;
 let half_beam_deg = 8;
+/** States before the last changes. @type {State[]} */
+const undoStack = [];
+/** State after a room, a step or a link was opened. @type {State | null} */
+let opened = null;
+/** Names and time of the last change; `null` after a drag has ended. @type {{keys: string, at_ms: number} | null} */
+let lastChange = null;
 /** Times from the request of a sweep to its picture, milliseconds. @type {number[]} */
 const times_ms = [];
 
@@ -60,8 +73,9 @@ const trace = new EchoTrace(byId("trace"), selectArrival);
 const panel = /** @type {any} */ (new BeamPanel(byId("beam-panel"), showPath));
 const sideBySide = new SideBySide(byId("figures"), select);
 const controls = new Controls(state, (changes) => change(changes));
-const ranger = new Ranger(byId("stage"), plan.view, (pose) => change({ pose }, true), endDrag);
-const editor = new Editor(byId("stage"), plan.view, (scene, final) => change({ scene }, !final), (pose) => change({ pose }));
+const pulse = new Pulse(plan, trace, () => byId("stage").scrollIntoView({ block: "nearest" }));
+const ranger = new Ranger(byId("stage"), plan.view, (pose) => change({ pose: poseWithinWalls(plan.scene, state.pose, pose) }, true), endDrag);
+const editor = new Editor(byId("stage"), plan.view, (scene, final, pose) => change(pose ? { scene, pose } : { scene }, !final));
 const files = new Files({ room: openEditedRoom, log: openLog, onError: (problem) => showProblem(problem) });
 const logs = new Logs(sensors, { onShow: showLogged, onSensors: fillSensors, onClose: () => change({ sensor: knownSensor() }) });
 const tour = new Tour(({ title, text, scene, range_m, ...shown }) => {
@@ -82,6 +96,7 @@ addTools(plan, () => {
  */
 function change(changes, dragging = false) {
   const { scene } = state;
+  keepForUndo(changes, dragging);
   state = { ...state, ...changes };
   plan.held = dragging;
   if (state.scene !== scene) showScene();
@@ -98,9 +113,37 @@ function change(changes, dragging = false) {
   requestView();
 }
 
+/** Keeps the state before a change, unless it continues the last one. @param {Partial<State>} changes @param {boolean} dragging */
+function keepForUndo(changes, dragging) {
+  const [keys, at_ms] = [Object.keys(changes).sort().join(), performance.now()];
+  const continues = lastChange?.keys === keys && (dragging || plan.held || at_ms - lastChange.at_ms < SAME_CHANGE_MS);
+  lastChange = { keys, at_ms };
+  if (!continues) undoStack.push(state);
+  if (undoStack.length > MAX_UNDO) undoStack.shift();
+  byId("undo").disabled = false;
+  byId("reset").disabled = opened === null;
+}
+
+/** Shows an earlier state. @param {State | null | undefined} earlier */
+function restore(earlier) {
+  if (!earlier) return;
+  const { beam } = state;
+  lastChange = null;
+  change({ ...earlier, beam });
+  lastChange = null;
+}
+
+function undo() {
+  restore(undoStack.pop());
+  // The restored state is not a change of its own.
+  undoStack.pop();
+  byId("undo").disabled = undoStack.length === 0;
+}
+
 /** Fits the view again after a drag. */
 function endDrag() {
   plan.held = false;
+  lastChange = null;
   if (scan) redraw();
 }
 
@@ -224,6 +267,7 @@ function showBeam(details) {
   if (drawn) list.scrollTop = drawn.offsetTop - list.clientHeight / 2;
   trace.redraw(palette);
   trace.show(beam, peakOfReading(beam));
+  pulse.show(beam);
   plan.select(ping ?? null, details.polyline);
 }
 
@@ -254,6 +298,7 @@ function showError(problem) {
     redraw();
     panel.clear();
     trace.show(null);
+    pulse.show(null);
     plan.select(null);
   }
   setLamp("bad", problem.message.includes("outside") ? "outside the room" : "no readings");
@@ -263,6 +308,7 @@ function showError(problem) {
 /** Moves arcs and handles to their positions in the current view. */
 function placeHandles() {
   if (scan && plan.palette) drawArcs(arcs, plan, state.arcs ? half_beam_deg : null);
+  pulse.draw();
   if (!plan.view.width || !plan.view.box) return;
   ranger.place(state.pose);
   editor.show(state.scene);
@@ -293,6 +339,9 @@ function openRoom(scene, further = {}) {
   editor.toggle(false);
   change({ scene, pose, beam: 0, height_m: null, sensor: knownSensor(), ...further });
   byId("pose").value = "";
+  [opened, lastChange] = [state, null];
+  undoStack.length = 0;
+  for (const id of ["undo", "reset"]) byId(id).disabled = true;
 }
 
 /** @param {import("./room.js").SceneFile} scene */
@@ -351,6 +400,18 @@ function addListeners() {
   byId("compare").addEventListener("change", () => change({ compare: byId("compare").checked }));
   byId("table").addEventListener("toggle", () => scan && redraw());
   byId("beam").addEventListener("input", () => select(Number(byId("beam").value)));
+  byId("undo").addEventListener("click", undo);
+  byId("reset").addEventListener("click", () => restore(opened));
+  addEventListener("keydown", (event) => {
+    const isEditing = /** @type {any} */ (event.target).matches?.("input:not([type=range]), textarea");
+    if (!isEditing && (event.ctrlKey || event.metaKey) && event.key === "z" && undoStack.length) {
+      event.preventDefault();
+      undo();
+    }
+  });
+  const placeTrace = () => (NARROW.matches ? byId("pulse").append(byId("trace")) : byId("beam-panel").before(byId("trace")));
+  NARROW.addEventListener("change", placeTrace);
+  placeTrace();
   byId("save").addEventListener("click", () => files.save({ ...state.scene, poses: { ...state.scene.poses, here: state.pose } }));
   byId("share").addEventListener("click", () => showLink(state));
   addEventListener("hashchange", () => openLink());
@@ -386,12 +447,13 @@ async function start() {
   if (await openLink()) return;
   tour.goTo(0);
   if (location.hash.length > 1) setText(byId("tour-text"), "This link is incomplete.");
+
 }
 
 /** Interface for tests and the browser's console. */
 Object.assign(globalThis, {
   playground: {
-    plan, times_ms, change, select,
+    plan, times_ms, change, select, pulse,
     state: () => state,
     scan: () => scan,
     beam: () => beam,

@@ -23,7 +23,8 @@ export const STEPS = [
     text:
       "The wall below is 85 mm away, but the measured range is 0.83 m. While transmitting, the receiver is blanked: the " +
       "wall's own echo ends before the blanking does. The detected echo was reflected three times: by the near wall, the " +
-      "far wall, and the near wall again. Move the ranger up until the near wall is detected directly.",
+      "far wall, and the near wall again. Play the pulse to see it travel; then move the ranger up until the near wall is " +
+      "detected directly.",
     scene: "simple-room",
     pose: { x_m: 0.774, y_m: 0.085, heading_deg: 0 },
     beam: 300,
@@ -79,7 +80,8 @@ export const STEPS = [
     text:
       "The same pose in three models. A cone, as in most simulators, reports the nearest object within the beam: it never " +
       "predicts false walls or missing echoes. A fan of rays includes reflections, but treats each echo separately. The " +
-      "exact paths, summed in the receiver, predict what the sensor reports.",
+      "exact paths, summed in the receiver, predict what the sensor reports. Now draw a room of your own with Edit room, or " +
+      "open a log and drag the ranger to where it was measured.",
     scene: "simple-room",
     pose: { x_m: 0.774, y_m: 0.085, heading_deg: 0 },
     beam: 300,

@@ -12,7 +12,7 @@ export class Tour {
     this.onStep = onStep;
     this.step = -1;
     byId("tour-back").addEventListener("click", () => this.goTo(this.step - 1));
-    byId("tour-next").addEventListener("click", () => this.goTo(this.step + 1));
+    byId("tour-next").addEventListener("click", () => this.goTo((this.step + 1) % STEPS.length));
   }
 
   /** @param {number} step */
@@ -41,6 +41,6 @@ export class Tour {
     setText(byId("tour-count"), position);
     setText(byId("tour-text"), text);
     byId("tour-back").disabled = this.step < 1;
-    byId("tour-next").disabled = this.step + 1 >= STEPS.length;
+    setText(byId("tour-next"), this.step + 1 < STEPS.length ? "Next" : "Start again");
   }
 }

@@ -3,6 +3,7 @@
 //! `GET /v1/openapi.json` is generated from these types and from the record types of
 //! [`sonard_records`].
 
+mod access;
 mod air;
 mod beam;
 mod body;
@@ -14,16 +15,17 @@ mod location;
 mod logs;
 mod mqtt;
 mod orders;
-mod preview;
 mod problem;
 mod ros;
 mod scans;
 mod sensor;
 mod server;
+mod settings;
 mod setup;
 mod simulation;
 mod status;
 
+pub use access::{AccessReport, WriteAccess};
 pub use air::{AirOrder, AirStatus};
 pub use beam::{Beam, Echo};
 pub use body::{Strict, has_list};
@@ -35,12 +37,12 @@ pub use location::Location;
 pub use logs::LogEntry;
 pub use mqtt::MqttReport;
 pub use orders::{Accepted, CancelRequest, ScanRequest, Scanning, Started};
-pub use preview::PreviewRequest;
 pub use problem::Problem;
 pub use ros::RosReport;
 pub use scans::{ListedScan, ScanReport, WholeScan};
 pub use sensor::{SensorFigures, SensorOrder};
 pub use server::ServerReport;
+pub use settings::SettingsOrder;
 pub use setup::Setup;
 pub use simulation::{RangerReading, SimulationReport};
 pub use status::{

@@ -6,7 +6,7 @@ use std::{sync::Arc, time::Duration};
 
 use firmware_protocol::messages::Identity;
 use sonard_api::{
-    AirOrder, ConfigurationReport, SensorOrder, Setup,
+    AirOrder, ConfigurationReport, SensorOrder, SettingsOrder, Setup,
     config::{Mode, ScanningKeys},
 };
 use sonard_device::host_gpio::HostGpio;
@@ -50,6 +50,8 @@ pub enum Order {
     Air(AirOrder),
     /// Use the air of the configuration and the thermometer again.
     ResetAir,
+    /// Use these settings from the next scan on: all of them, or none if one is rejected.
+    Settings(Box<SettingsOrder>),
     /// Use this sensor from the next scan on.
     Sensor(Box<SensorOrder>),
     /// Use the sensor of the configuration again.
@@ -240,6 +242,9 @@ impl Control {
                 (Ok(()), Some(Interrupt::ScheduleChanged))
             }
             Order::Sensor(order) => (self.set_sensor(&order), Some(Interrupt::ScheduleChanged)),
+            Order::Settings(order) => {
+                (self.set_settings(*order), Some(Interrupt::ScheduleChanged))
+            }
             Order::ResetSensor => {
                 self.use_sensor(self.configured_sensor.clone());
                 (Ok(()), Some(Interrupt::ScheduleChanged))

@@ -4,17 +4,18 @@
 mod publish;
 mod scan;
 
-use std::time::Duration;
+use std::{pin::Pin, sync::Arc, time::Duration};
 
 use firmware_protocol::{
     host::{BoardChange, HostConfig, HostError},
-    messages::{FaultKind, Identity, NakReason},
+    messages::{RecordErrorKind, Identity, NakReason},
 };
 use sonard_api::{ScanTotals, Trouble};
 use sonard_device::{
     link::{self, BAUD, Line, LinkError},
     ranger::{DeviceEvent, DriveError, Driver, Ranger, serial_text},
 };
+use sonard_model::{geometry::Pose, scene::Scene};
 use sonard_records::{EventKind, Session};
 use tokio::time::{Instant, sleep_until};
 
@@ -38,10 +39,18 @@ const HEARTBEAT: Duration = Duration::from_secs(1);
 /// Function that opens the serial port with the given name.
 pub type OpenPort = Box<dyn FnMut(&str) -> Result<Box<dyn Line>, LinkError> + Send>;
 
+/// Function that moves a simulated device to the scene and pose of the next scan. The future can be
+/// dropped; a failure ends the scan with its message.
+pub type Relocate = Box<dyn FnMut(Arc<Scene>, Pose) -> Relocating + Send>;
+
+/// Move of a simulated device.
+pub type Relocating = Pin<Box<dyn Future<Output = Result<(), String>> + Send>>;
+
 pub(super) struct DeviceTask {
     control: Control,
     machine: LinkMachine,
     open_port: OpenPort,
+    relocate: Option<Relocate>,
     ranger: Option<Ranger<Box<dyn Line>>>,
     line: Option<Box<dyn Line>>,
     predictions: PredictionCache,
@@ -57,12 +66,18 @@ pub(super) struct DeviceTask {
 }
 
 impl DeviceTask {
-    pub(super) fn new(control: Control, open_port: OpenPort, out: RecordFanOut) -> Self {
+    pub(super) fn new(
+        control: Control,
+        open_port: OpenPort,
+        relocate: Option<Relocate>,
+        out: RecordFanOut,
+    ) -> Self {
         let machine = LinkMachine::new(control.settings.retry_bounds(), control.now());
         Self {
             control,
             machine,
             open_port,
+            relocate,
             ranger: None,
             line: None,
             predictions: PredictionCache::default(),
@@ -250,8 +265,8 @@ impl DeviceTask {
                 self.handle(LinkInput::Restarted);
             }
             // Homing clears an expired hold.
-            DeviceEvent::Fault(FaultKind::HoldExpired) => self.handle(LinkInput::Restarted),
-            DeviceEvent::Fault(FaultKind::EmergencyStop) => {
+            DeviceEvent::Fault(RecordErrorKind::HoldExpired) => self.handle(LinkInput::Restarted),
+            DeviceEvent::Fault(RecordErrorKind::EmergencyStop) => {
                 self.handle_device_stop(&DriveError::Host(HostError::EmergencyStop));
             }
             DeviceEvent::Fault(kind) => {

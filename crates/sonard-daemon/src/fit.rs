@@ -9,6 +9,8 @@ use sonard_records::{Ping, ScanEnd, ScanStart, ScanView, Session};
 /// Maximum number of readings of a scan that is explained. They are kept in memory until the scan
 /// ends, about a kilobyte each.
 const MAX_READINGS: usize = 4096;
+/// Minimum number of residuals of a scan that is explained: a few readings fit many hypotheses.
+const MIN_RESIDUALS: usize = 30;
 /// Maximum number of explanations reported for a scan.
 const MAX_EXPLANATIONS: usize = 6;
 
@@ -78,8 +80,12 @@ impl FitAccumulator {
 }
 
 /// Finds hypotheses that fit a scan better than its settings, by decreasing gain. Takes
-/// milliseconds.
+/// milliseconds. A scan with fewer than `MIN_RESIDUALS` has none.
 pub(super) fn explanations(scan: ScanView) -> Vec<Explanation> {
+    let residuals = scan.pings.iter().filter(|ping| judge(ping).residual_m.is_some()).count();
+    if residuals < MIN_RESIDUALS {
+        return Vec::new();
+    }
     let mut found = compare(&[scan]).0.explanations;
     found.truncate(MAX_EXPLANATIONS);
     found

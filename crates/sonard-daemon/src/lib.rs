@@ -56,12 +56,9 @@ use uuid::Uuid;
 
 pub use annotate::annotated_line;
 pub(crate) use broadcast::Ring;
-pub use broadcast::{
-    ClientGuard, DeadbandFilter, Hub, ScanSubscription, StreamLine, Subscription,
-    SubscriptionFilter,
-};
+pub use broadcast::{ClientGuard, Hub, StreamLine, DeadbandFilter, ScanSubscription, Subscription, SubscriptionFilter};
 pub use control::{Order, OrderRequest};
-pub use device_task::OpenPort;
+pub use device_task::{OpenPort, Relocate, Relocating};
 pub use journal::{Journal, JournalThread};
 pub use limits::{air_from_order, check_device, check_plan, check_pose};
 pub use link_state::{LinkInput, LinkMachine, LinkStep, RetryBounds, Transition};
@@ -86,6 +83,8 @@ const MAX_QUEUED_ORDERS: usize = 64;
 pub struct Resources {
     /// Opens the serial port by its name.
     pub open_port: OpenPort,
+    /// Moves a simulated device; `None` for a device that the robot carries.
+    pub relocate: Option<Relocate>,
     /// GPIO pins of the host computer.
     pub gpio: Box<dyn HostGpio>,
     /// Access to the log's writer thread.
@@ -122,9 +121,9 @@ enum Worker {
 /// within a multi-threaded tokio runtime.
 #[must_use]
 pub fn prepare(resources: Resources, settings: Settings) -> (Daemon, Handle) {
-    let Resources { open_port, gpio, journal, supervisor } = resources;
+    let Resources { open_port, relocate, gpio, journal, supervisor } = resources;
     wire(gpio, journal, supervisor, settings, |control, out| {
-        Worker::Ranger(Box::new(DeviceTask::new(control, open_port, out)))
+        Worker::Ranger(Box::new(DeviceTask::new(control, open_port, relocate, out)))
     })
 }
 
@@ -201,10 +200,9 @@ impl Handle {
     /// # Errors
     /// When the order is rejected, or the daemon is stopping.
     pub async fn order(&self, order: Order) -> Result<(), OrderError> {
-        let gone = || OrderError {
-            kind: OrderErrorKind::Stopping,
-            message: "the daemon is stopping".into(),
-            help: "retry once it is running again".into(),
+        let gone = || {
+            let help = "retry once it is running again";
+            OrderError::new(OrderErrorKind::Stopping, "the daemon is stopping", help)
         };
         let (reply, answer) = oneshot::channel();
         self.orders.send(OrderRequest { order, reply }).await.map_err(|_| gone())?;
@@ -218,11 +216,8 @@ impl Handle {
     pub async fn start(&self, request: ScanRequest) -> Result<Started, OrderError> {
         let ScanRequest { scans, plan, pose } = request;
         if scans == Some(0) {
-            return Err(OrderError {
-                kind: OrderErrorKind::Invalid,
-                message: "scans is 0".into(),
-                help: "set it to 1 or more, or omit it".into(),
-            });
+            let help = "set it to 1 or more, or omit it";
+            return Err(OrderError::new(OrderErrorKind::Invalid, "scans is 0", help));
         }
         let request = Uuid::new_v4();
         self.order(Order::Start(QueuedScans { request, scans, plan, pose })).await?;

@@ -24,19 +24,25 @@ pub fn check_plan(
     device: Option<&Identity>,
 ) -> Result<(), OrderError> {
     if of_array {
-        return Err(OrderError {
-            kind: OrderErrorKind::Conflict,
-            message: "an array has no plan: its rangers are fixed".into(),
-            help: "to change them, set simulate.array in the configuration".into(),
-        });
+        let message = "an array has no plan: its rangers are fixed";
+        let help = "to change them, set simulate.array in the configuration";
+        return Err(OrderError::new(OrderErrorKind::Conflict, message, help).at("plan"));
     }
-    let reject = |error: PlanError| OrderError {
-        kind: match error {
-            PlanError::OffMotorGrid { .. } => OrderErrorKind::Conflict,
-            _ => OrderErrorKind::Invalid,
-        },
-        message: error.to_string(),
-        help: "a full revolution is from_deg 0, to_deg 360, step_deg 0.9, pings_per_stop 1".into(),
+    let reject = |error: PlanError| {
+        let (kind, field) = match error {
+            PlanError::OffMotorGrid { step_deg, .. } if step_deg == plan.step_deg => {
+                (OrderErrorKind::Conflict, "step_deg")
+            }
+            PlanError::OffMotorGrid { .. } => (OrderErrorKind::Conflict, "from_deg"),
+            PlanError::NotFinite { field, .. } => (OrderErrorKind::Invalid, field),
+            PlanError::StepNotPositive(_) | PlanError::TooManyBeams(_) => {
+                (OrderErrorKind::Invalid, "step_deg")
+            }
+            PlanError::BadRange { .. } => (OrderErrorKind::Invalid, "to_deg"),
+            PlanError::BadPings(_) => (OrderErrorKind::Invalid, "pings_per_stop"),
+        };
+        let help = "a full revolution is from_deg 0, to_deg 360, step_deg 0.9, pings_per_stop 1";
+        OrderError::new(kind, error.to_string(), help).at(format!("plan.{field}"))
     };
     plan.check().map_err(reject)?;
     if let Some(device) = device {
@@ -57,18 +63,16 @@ pub fn check_pose(
 ) -> Result<(), OrderError> {
     let is_finite = [pose.x_m, pose.y_m, pose.heading_deg].iter().all(|value| value.is_finite());
     if !is_finite {
-        return Err(OrderError {
-            kind: OrderErrorKind::Invalid,
-            message: "the pose has a value that is not finite".into(),
-            help: "give x_m and y_m in metres, heading_deg in degrees".into(),
-        });
+        let message = "the pose has a value that is not finite";
+        let help = "give x_m and y_m in metres, heading_deg in degrees";
+        return Err(OrderError::new(OrderErrorKind::Invalid, message, help).at("pose"));
     }
     let Some(scene) = scene else { return Ok(()) };
     match array {
         Some(array) => {
-            array.check_pose(scene, pose).map_err(|error| conflict(&error, error.help()))
+            array.check_pose(scene, pose).map_err(|error| conflict(&error, error.help(), "pose"))
         }
-        None => scene.check_pose(pose).map_err(|error| conflict(&error, error.help())),
+        None => scene.check_pose(pose).map_err(|error| conflict(&error, error.help(), "pose")),
     }
 }
 
@@ -86,10 +90,9 @@ pub fn air_from_order(
         order.humidity_percent.unwrap_or(humidity_percent),
         order.pressure_kpa.unwrap_or(pressure_kpa),
     );
-    air.map_err(|error| OrderError {
-        kind: OrderErrorKind::Invalid,
-        message: error.to_string(),
-        help: "temperatures are degrees Celsius, pressures kilopascals".into(),
+    air.map_err(|error| {
+        let help = "temperatures are degrees Celsius, pressures kilopascals";
+        OrderError::new(OrderErrorKind::Invalid, error.to_string(), help).at(format!("air.{}", error.field))
     })
 }
 
@@ -101,10 +104,12 @@ pub fn check_device(sensor: &Sensor, before: &Sensor, device: &Identity) -> Resu
     if sensor.blanking_us == before.blanking_us {
         return Ok(());
     }
-    check_blanking(sensor.blanking_us, device)
-        .map_err(|error| conflict(&error, "keep blanking_us unchanged, or increase it".into()))
+    check_blanking(sensor.blanking_us, device).map_err(|error| {
+        let help = "keep blanking_us unchanged, or increase it".into();
+        conflict(&error, help, "sensor.blanking_us")
+    })
 }
 
-fn conflict(error: &impl std::fmt::Display, help: String) -> OrderError {
-    OrderError { kind: OrderErrorKind::Conflict, message: error.to_string(), help }
+fn conflict(error: &impl std::fmt::Display, help: String, field: &str) -> OrderError {
+    OrderError::new(OrderErrorKind::Conflict, error.to_string(), help).at(field)
 }

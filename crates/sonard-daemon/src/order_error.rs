@@ -12,6 +12,22 @@ pub struct OrderError {
     pub message: String,
     /// Hint for the correction.
     pub help: String,
+    /// Setting at fault, such as `sensor.blanking_us` or `pose`, if it is a single one.
+    pub field: Option<String>,
+}
+
+impl OrderError {
+    /// Rejection without a setting at fault.
+    #[must_use]
+    pub fn new(kind: OrderErrorKind, message: impl Into<String>, help: impl Into<String>) -> Self {
+        Self { kind, message: message.into(), help: help.into(), field: None }
+    }
+
+    /// Rejection for the value of a setting.
+    #[must_use]
+    pub fn at(self, field: impl Into<String>) -> Self {
+        Self { field: Some(field.into()), ..self }
+    }
 }
 
 /// Category of a rejection.

@@ -3,7 +3,7 @@
 use super::order_error::{OrderError, OrderErrorKind};
 use sonard_api::{SensorOrder, Setup};
 use sonard_device::ranger::{Motion, ReceiverTiming};
-use sonard_model::acoustics::Sensor;
+use sonard_model::acoustics::{Sensor, SensorError};
 
 /// Sensor of an order, applied to the configured one and checked against the configuration.
 ///
@@ -15,29 +15,35 @@ pub fn sensor_from_order(
     of_array: bool,
     sound_speed_m_s: f64,
 ) -> Result<Sensor, OrderError> {
-    let sensor = order.apply_to(&setup.sensor).map_err(|error| OrderError {
-        kind: OrderErrorKind::Invalid,
-        message: error.to_string(),
-        help: "GET /v1/sensors lists the presets with their values".into(),
+    let sensor = order.apply_to(&setup.sensor).map_err(|error| {
+        let field = match &error {
+            SensorError::OutOfRange { field, .. } => format!("sensor.{field}"),
+            SensorError::UnknownPreset { .. } | SensorError::Malformed { .. } => "sensor.preset".into(),
+        };
+        let help = "GET /v1/sensors lists the presets with their values";
+        OrderError::new(OrderErrorKind::Invalid, error.to_string(), help).at(field)
     })?;
     if let (Some(configured), Some(_)) = (setup.model.options.threshold, order.threshold) {
         return Err(conflict(
             format!("model.threshold = {configured} in the configuration overrides the order"),
             "remove model.threshold from the configuration, or threshold from the order",
+            "sensor.threshold",
         ));
     }
     // A simulated ranger receives until the next ranger of its array fires.
     if !of_array {
         let max_range_m = setup.model.options.max_range_m.unwrap_or(sensor.max_range_m);
-        let listening =
-            ReceiverTiming { max_range_m, sound_speed_m_s, blanking_us: sensor.blanking_us };
+        let listening = ReceiverTiming { max_range_m, sound_speed_m_s, blanking_us: sensor.blanking_us };
+        // Without a preset only the blanking affects the window.
+        let field =
+            if order.preset.is_some() { "sensor.preset" } else { "sensor.blanking_us" };
         Motion::from(&setup.motion)
             .check_window(&listening)
-            .map_err(|error| conflict(error.to_string(), &error.help()))?;
+            .map_err(|error| conflict(error.to_string(), &error.help(), field))?;
     }
     Ok(sensor)
 }
 
-fn conflict(message: String, help: &str) -> OrderError {
-    OrderError { kind: OrderErrorKind::Conflict, message, help: help.into() }
+fn conflict(message: String, help: &str, field: &str) -> OrderError {
+    OrderError::new(OrderErrorKind::Conflict, message, help).at(field)
 }

@@ -76,7 +76,9 @@ impl Command {
         match done {
             Ok(Some(request)) => Ok(json!({"command": name, "accepted": true, "request": request})),
             Ok(None) => Ok(json!({"command": name, "accepted": true})),
-            Err(OrderError { message, help, .. }) => Err(problem(&message, &help)),
+            Err(OrderError { message, help, field, .. }) => {
+                Err(Problem { error: message, help, field })
+            }
         }
     }
 }
@@ -92,7 +94,7 @@ fn read_body<T: DeserializeOwned>(body: &[u8]) -> Result<T, Problem> {
 }
 
 fn problem(error: &str, help: &str) -> Problem {
-    Problem { error: error.into(), help: help.into() }
+    Problem { error: error.into(), help: help.into(), field: None }
 }
 
 /// Reply to a rejected command.

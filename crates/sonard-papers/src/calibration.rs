@@ -28,8 +28,9 @@ use sonard_interpret::interpret::{
 /// Boxes and partitions of successive rooms.
 const ROOMS: [(usize, usize); 4] = [(0, 0), (3, 0), (0, 1), (2, 2)];
 
-/// Minimum distance of a scan position from walls, metres.
-const CLEARANCE_M: f64 = 0.35;
+/// Minimum distance of a scan position from walls, metres: less than the sensor's minimum range, as
+/// on a small robot.
+const CLEARANCE_M: f64 = 0.08;
 
 /// Standard deviation of a range, metres.
 const RANGE_SIGMA_M: f64 = 0.002;

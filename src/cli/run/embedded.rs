@@ -57,10 +57,13 @@ impl EmbeddedDaemon {
         let socket = MemorySocket::default();
         // Ends after the daemon, which stops the motor first.
         let mock_stop = CancellationToken::new();
+        let mut relocate = None;
         if plays_mock {
             let pace = if virtual_time { Pace::Virtual } else { Pace::RealTime };
-            let port =
-                MockPort::in_memory(super::mock::board(&world, pace, &settings)?, socket.clone());
+            let board = super::mock::board(&world, pace, &settings)?;
+            let (mover, moves) = super::mock::follow(world, &settings)?;
+            relocate = Some(mover);
+            let port = MockPort::in_memory(board, socket.clone()).moved_by(moves);
             let stop = mock_stop.clone().cancelled_owned();
             let note = |note: Note| tracing::debug!("mock: {note}");
             drop(
@@ -77,8 +80,8 @@ impl EmbeddedDaemon {
             None => {
                 let open_port = open_memory(socket.clone());
                 let gpio = Box::new(NoHostGpio);
-                let resources =
-                    Resources { open_port, gpio, journal, supervisor: supervisor.clone() };
+                let supervisor = supervisor.clone();
+                let resources = Resources { open_port, relocate, gpio, journal, supervisor };
                 daemon::prepare(resources, settings)
             }
         };

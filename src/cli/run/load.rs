@@ -256,7 +256,7 @@ pub(super) fn effective_configuration(settings: &Settings) -> String {
 }
 
 /// Formats a failure on one line.
-fn one_line(failure: &Failure) -> String {
+pub(super) fn one_line(failure: &Failure) -> String {
     match failure {
         Failure::Found(text) => text.clone().unwrap_or_default(),
         Failure::Input(report) | Failure::Device(report) => match report.help() {

@@ -56,6 +56,7 @@ fn responses_match_the_openapi() {
         ("/v1/plan", json!({"from_deg": 0.0, "to_deg": 9.0, "step_deg": 0.9, "pings_per_stop": 1})),
         ("/v1/pose", json!({"x_m": 0.5, "y_m": 0.3, "heading_deg": 0.0})),
         ("/v1/air", json!({"temperature_c": 22.5})),
+        ("/v1/settings", json!({"air": {"temperature_c": 22.0}})),
         ("/v1/preview", json!({"sensor": {"preset": "polaroid-chirp"}})),
         ("/v1/sensor", json!({"threshold": 0.03, "gain": {"kind": "compensating"}})),
     ];

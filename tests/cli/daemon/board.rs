@@ -94,6 +94,7 @@ fn run(
     let gpio = Box::new(Switchboard(Arc::clone(&switches)));
     let resources = Resources {
         open_port: Box::new(|port| Ok(Box::new(link::open(port)?))),
+        relocate: None,
         gpio,
         journal,
         supervisor,

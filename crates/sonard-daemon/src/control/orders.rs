@@ -3,7 +3,7 @@
 use std::{sync::Arc, time::Duration};
 
 use sonard_api::{
-    SensorOrder,
+    SensorOrder, SettingsOrder,
     config::{Mode, ScanningKeys},
 };
 use sonard_model::{acoustics::Sensor, geometry::Pose};
@@ -23,22 +23,16 @@ use crate::{
 impl Control {
     pub(super) fn start(&mut self, request: QueuedScans) -> Result<(), OrderError> {
         if self.pressed {
-            return Err(OrderError {
-                kind: OrderErrorKind::Conflict,
-                message: "the emergency stop is pressed".into(),
-                help: "release it first".into(),
-            });
+            let message = "the emergency stop is pressed";
+            return Err(OrderError::new(OrderErrorKind::Conflict, message, "release it first"));
         }
         request.plan.map_or(Ok(()), |plan| self.check_plan(&plan))?;
         request.pose.map_or(Ok(()), |pose| self.check_pose(&pose))?;
         if self.schedule.start(request) {
             return Ok(());
         }
-        Err(OrderError {
-            kind: OrderErrorKind::Conflict,
-            message: "too many requests are queued".into(),
-            help: "wait until some are complete, or clear the queue with POST /v1/stop".into(),
-        })
+        let help = "wait until some are complete, or clear the queue with POST /v1/stop";
+        Err(OrderError::new(OrderErrorKind::Conflict, "too many requests are queued", help))
     }
 
     pub(super) fn cancel(&mut self, request: Uuid) -> (Result<(), OrderError>, Option<Interrupt>) {
@@ -50,18 +44,15 @@ impl Control {
             return (Ok(()), Some(Interrupt::ScheduleChanged));
         }
         let message = format!("there is no request {request}");
-        let help = "use the id returned by POST /v1/start; the request may be complete".into();
-        (Err(OrderError { kind: OrderErrorKind::NotFound, message, help }), None)
+        let help = "use the id returned by POST /v1/start; the request may be complete";
+        (Err(OrderError::new(OrderErrorKind::NotFound, message, help)), None)
     }
 
     pub(super) fn set_mode(&mut self, mode: Mode, every_s: Option<f64>) -> Result<(), OrderError> {
         let every_s = every_s.unwrap_or(self.scanning.every_s);
         if !(1.0..=604_800.0).contains(&every_s) {
-            return Err(OrderError {
-                kind: OrderErrorKind::Invalid,
-                message: format!("every_s is {every_s}"),
-                help: "use 1 to 604800 seconds".into(),
-            });
+            let message = format!("every_s is {every_s}");
+            return Err(OrderError::new(OrderErrorKind::Invalid, message, "use 1 to 604800 seconds"));
         }
         self.scanning = ScanningKeys { mode, every_s };
         self.schedule.set_mode(mode, Duration::from_secs_f64(every_s), self.now());
@@ -92,12 +83,37 @@ impl Control {
 
     pub(super) fn set_sensor(&mut self, order: &SensorOrder) -> Result<(), OrderError> {
         let sound_speed_m_s = self.air.status(Instant::now()).sound_speed_m_s;
+        let sensor = self.checked_sensor(order, sound_speed_m_s)?;
+        self.use_sensor(sensor);
+        Ok(())
+    }
+
+    fn checked_sensor(&self, order: &SensorOrder, sound_speed_m_s: f64) -> Result<Sensor, OrderError> {
         let of_array = self.settings.simulated.is_some();
         let sensor = sensor_from_order(order, &self.setup, of_array, sound_speed_m_s)?;
         if let Some(identity) = &self.identity {
             check_device(&sensor, &self.settings.sensor, identity)?;
         }
-        self.use_sensor(sensor);
+        Ok(sensor)
+    }
+
+    /// Changes several settings, or none if one of them is rejected.
+    pub(super) fn set_settings(&mut self, order: SettingsOrder) -> Result<(), OrderError> {
+        let SettingsOrder { pose, plan, air, sensor } = order;
+        plan.map_or(Ok(()), |plan| self.check_plan(&plan))?;
+        pose.map_or(Ok(()), |pose| self.check_pose(&pose))?;
+        let now = Instant::now();
+        let mut next_air = self.air.clone();
+        air.map_or(Ok(()), |order| next_air.order(&order, now))?;
+        let sound_speed_m_s = next_air.status(now).sound_speed_m_s;
+        let sensor = sensor.map(|order| self.checked_sensor(&order, sound_speed_m_s)).transpose()?;
+        // Nothing below can fail.
+        self.plan = plan.unwrap_or(self.plan);
+        self.pose = pose.unwrap_or(self.pose);
+        self.air = next_air;
+        if let Some(sensor) = sensor {
+            self.use_sensor(sensor);
+        }
         Ok(())
     }
 

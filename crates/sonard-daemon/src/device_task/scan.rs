@@ -94,6 +94,18 @@ impl DeviceTask {
                 }
             }
         }
+        if let Some((relocate, scene)) = self.relocate.as_mut().zip(self.control.settings.scene.clone())
+        {
+            let moving = relocate(scene, pose);
+            match with_orders(&mut self.control, moving).await {
+                Err(interrupt) => {
+                    self.react(interrupt);
+                    return None;
+                }
+                Ok(Err(why)) => return self.abandon_scans(&why, asked),
+                Ok(Ok(())) => {}
+            }
+        }
         let session = self.predictions.session(&self.control.settings, &air, identity);
         self.publish_session(session);
         let scan_air = self.control.air.scan_air(&air, Instant::now());

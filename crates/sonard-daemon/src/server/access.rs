@@ -16,6 +16,7 @@ use axum::{
 };
 use serde::Deserialize;
 use sha2::{Digest as _, Sha256};
+use sonard_api::WriteAccess;
 
 use super::routes::{FOXGLOVE, is_public};
 
@@ -118,6 +119,16 @@ impl Access {
             return Ok(Principal::Guest);
         }
         Err(self.token_error())
+    }
+
+    /// Permission of a client to change settings.
+    #[must_use]
+    pub const fn write_access(&self, principal: Principal) -> WriteAccess {
+        match principal {
+            Principal::Socket | Principal::Token => WriteAccess::Yes,
+            Principal::Guest if self.token.is_some() => WriteAccess::Token,
+            Principal::Guest => WriteAccess::No,
+        }
     }
 
     fn check_origin(&self, uri: &Uri, headers: &HeaderMap) -> Result<(), AccessDenied> {
@@ -269,6 +280,20 @@ mod tests {
         assert_eq!(check(Peer::Network, "bearer secret"), Ok(Principal::Token));
         assert_eq!(check(Peer::Loopback, "Bearer wrong"), Ok(Principal::Guest));
         assert_eq!(check(Peer::Loopback, "Basic secret"), Ok(Principal::Guest));
+    }
+
+    #[test]
+    fn write_access_depends_on_the_token() {
+        let (open, closed) = (Access::new(&[], Some("secret")), Access::default());
+        for (access, principal, write) in [
+            (&open, Principal::Socket, WriteAccess::Yes),
+            (&open, Principal::Token, WriteAccess::Yes),
+            (&open, Principal::Guest, WriteAccess::Token),
+            (&closed, Principal::Socket, WriteAccess::Yes),
+            (&closed, Principal::Guest, WriteAccess::No),
+        ] {
+            assert_eq!(access.write_access(principal), write, "{principal:?}");
+        }
     }
 
     #[test]

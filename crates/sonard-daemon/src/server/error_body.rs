@@ -52,6 +52,7 @@ fn with_body(bytes: &[u8]) -> Option<Vec<u8>> {
     let problem = Problem {
         error: format!("invalid request: {reason}"),
         help: "use HTTP/1.1, with a request head of less than 32 kB".into(),
+        field: None,
     };
     let body = serde_json::to_string(&problem).ok()?;
     let length = body.len();

@@ -71,7 +71,7 @@ impl ApiError {
         error: impl Into<String>,
         help: impl Into<String>,
     ) -> Self {
-        Self { status, problem: Problem { error: error.into(), help: help.into() } }
+        Self { status, problem: Problem { error: error.into(), help: help.into(), field: None } }
     }
 }
 
@@ -94,7 +94,8 @@ impl From<OrderError> for ApiError {
             OrderErrorKind::NotFound => StatusCode::NOT_FOUND,
             OrderErrorKind::Stopping => StatusCode::SERVICE_UNAVAILABLE,
         };
-        Self::new(status, refusal.message, refusal.help)
+        let OrderError { message, help, field, .. } = refusal;
+        Self { status, problem: Problem { error: message, help, field } }
     }
 }
 

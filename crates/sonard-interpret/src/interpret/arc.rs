@@ -63,7 +63,13 @@ impl Arc {
                 mean_density(&error, seen_deg, settings.sigma_e_range, min_edge, |strength| {
                     extents.edge_deg(range_m, strength)
                 });
-            ExtentLikelihood::new(plane_corner, edge, extents.plane_corner_deg(range_m, 1.0))
+            let plane_deg = extents.plane_corner_deg(range_m, 1.0);
+            ExtentLikelihood::new(plane_corner, edge, plane_deg).with_repeat(
+                seen_deg,
+                plane_deg,
+                range_m,
+                extents.min_range_m,
+            )
         });
         let is_remainder = region.range_m.is_some_and(|m| m < extents.min_range_m + LATE_M);
         Self {
@@ -92,12 +98,12 @@ impl Arc {
     /// Number of nearer arcs of the scan that would hide this one if they were extended walls. An
     /// arc whose plane crosses this direction at a shorter range counts once, and twice if it lies
     /// in that direction itself. Edges hide nothing; a partly covered arc counts by its visible
-    /// part.
+    /// part, and a possible repeat as the wall that it repeats.
     pub(super) fn hidden_by(&self, arcs: &[Self], min_range_m: f64) -> usize {
         let Some(range_m) = self.region.range_m else { return 0 };
         let hides = |other: &&Self| {
             let is_wall = if other.region.is_whole() {
-                !other.is_edge()
+                !other.is_edge() || other.may_be_repeat()
             } else {
                 other.region.extent_deg() >= MIN_WALL_DEG
             };
@@ -114,6 +120,11 @@ impl Arc {
                 usize::from(crosses) * (1 + usize::from(ahead))
             })
             .sum()
+    }
+
+    /// Returns `true` if the arc may be the repeat of a wall within the blanking interval.
+    pub(super) const fn may_be_repeat(&self) -> bool {
+        self.extent_likelihood.may_be_repeat()
     }
 
     /// Reason why the arc can't be classified by itself, if any.

@@ -112,7 +112,8 @@ impl ArcClass {
                 .partial_cmp(&(b.decides, b.beta_corner_deg))
                 .unwrap_or(std::cmp::Ordering::Equal)
         });
-        let reason = open_reason(&probabilities, hidden_by, second.as_ref(), failure, settings);
+        let is_reflection = hidden_by > 0 || arc.may_be_repeat();
+        let reason = open_reason(&probabilities, is_reflection, second.as_ref(), failure, settings);
         Self { reason, probabilities, second }
     }
 
@@ -295,14 +296,14 @@ fn apart(a: &UniformSum, b: &UniformSum) -> f64 {
 /// Reason why the class stays open, if it does.
 fn open_reason(
     probabilities: &Probabilities,
-    hidden_by: usize,
+    is_reflection: bool,
     second: Option<&Reobservation>,
     failure: Option<Reason>,
     settings: &InterpretSettings,
 ) -> Option<Reason> {
     let Probabilities { plane, corner, edge, other } = *probabilities;
     let min_confidence = settings.min_confidence;
-    let odd = if hidden_by > 0 { Reason::Reflections } else { Reason::Extent };
+    let odd = if is_reflection { Reason::Reflections } else { Reason::Extent };
     if edge >= min_confidence {
         return None;
     }
@@ -323,21 +324,20 @@ fn open_reason(
 mod tests {
     use super::*;
 
-    fn reason(probabilities: [f64; 4], hidden_by: usize) -> Option<Reason> {
+    fn reason(probabilities: [f64; 4], is_reflection: bool) -> Option<Reason> {
         let [plane, corner, edge, other] = probabilities;
         let probabilities = Probabilities { plane, corner, edge, other };
-        open_reason(&probabilities, hidden_by, None, None, &InterpretSettings::default())
+        open_reason(&probabilities, is_reflection, None, None, &InterpretSettings::default())
     }
 
     #[test]
     fn open_classes_have_a_reason() {
-        // An arc behind a nearer wall is a multiple reflection; otherwise its extent is odd.
-        assert_eq!(reason([0.2, 0.1, 0.0, 0.7], 0), Some(Reason::Extent));
-        assert_eq!(reason([0.2, 0.1, 0.0, 0.7], 1), Some(Reason::Reflections));
-        assert_eq!(reason([0.2, 0.1, 0.0, 0.7], 3), Some(Reason::Reflections));
-        assert_eq!(reason([0.0, 0.0, 0.99, 0.01], 1), None);
+        // Behind a nearer wall an arc is a multiple reflection; otherwise its extent is odd.
+        assert_eq!(reason([0.2, 0.1, 0.0, 0.7], false), Some(Reason::Extent));
+        assert_eq!(reason([0.2, 0.1, 0.0, 0.7], true), Some(Reason::Reflections));
+        assert_eq!(reason([0.0, 0.0, 0.99, 0.01], true), None);
         // The extent separates an edge from the others; a second position separates the others.
-        assert_eq!(reason([0.3, 0.2, 0.5, 0.0], 2), Some(Reason::Extent));
-        assert_eq!(reason([0.6, 0.39, 0.0, 0.01], 0), Some(Reason::SecondPosition));
+        assert_eq!(reason([0.3, 0.2, 0.5, 0.0], true), Some(Reason::Extent));
+        assert_eq!(reason([0.6, 0.39, 0.0, 0.01], false), Some(Reason::SecondPosition));
     }
 }

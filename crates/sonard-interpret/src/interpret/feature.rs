@@ -89,7 +89,8 @@ pub enum Reason {
     CutOff,
     /// Extent that matches neither an edge nor a plane or corner.
     Extent,
-    /// Arc behind possible walls: a likely multiple reflection.
+    /// Arc behind possible walls, or near enough to be the repeated echo of a wall within the
+    /// blanking interval: a likely multiple reflection.
     Reflections,
     /// Target below the minimum range.
     MinRange,

@@ -1,5 +1,6 @@
 //! Interpretation against the paper's figures and densities, and on random worlds.
 
+mod blanked;
 mod degenerate;
 mod densities;
 mod mapping;

@@ -119,7 +119,9 @@ fn downloads() {
     {
         assert!(svg.contains(drawn), "{drawn} is not in the picture");
     }
-    assert!(svg.matches("<path").count() > 100, "{} paths", svg.matches("<path").count());
+    // Marks of one kind are one path.
+    let (paths, marks) = (svg.matches("<path").count(), svg.matches('M').count());
+    assert!(marks > 200 && paths < marks / 2, "{marks} marks in {paths} paths");
     let parsed = browser.eval(
         "saved[0].text().then((text) => \
          new DOMParser().parseFromString(text, 'image/svg+xml').querySelector('parsererror') === null)",
@@ -169,8 +171,9 @@ fn overlays() {
     let legend = |label: &str| browser.text("#legend").contains(label);
     for (kind, label, layer) in [
         ("map", "map: free", "under"),
-        ("lines", "fitted line", "under"),
-        ("features", "plane (P)", "over"),
+        ("map", "map: occupied", "above"),
+        ("lines", "fitted line", "above"),
+        ("features", "plane (P)", "above"),
     ] {
         assert!(!legend(label));
         let drawn = || super::count_pixels(&browser, layer, "d[i + 3] > 20");
@@ -280,9 +283,12 @@ fn sensor_change_is_previewed() {
     enter("name", "hc-sr04");
     browser.until("document.getElementById('next-blanking_us').value === '117'");
     assert_eq!(shown("threshold"), daemon.get("/v1/sensors").json()[5]["threshold"].to_string());
-    until_has(&browser, "#next-status", "would change");
+    until_has(&browser, "#next-status", "Preview unavailable: the device's minimum blanking");
+    until_has(&browser, "#next-fault", "Keep Blanking (µs) unchanged");
+    let marked = "document.querySelector('#next-table [aria-invalid]').id";
+    assert_eq!(browser.eval(marked), "next-blanking_us");
     browser.click("#apply");
-    until_has(&browser, "#next-status", "Sensor not changed: ");
+    until_has(&browser, "#next-status", "Nothing changed: ");
     let rejection = browser.text("#next-status");
     assert!(rejection.contains("blanking") && rejection.contains("500 us"), "{rejection}");
     enter("name", "senscomp-6500");
@@ -319,11 +325,11 @@ fn late_preview_keeps_the_rejection() {
          f.dispatchEvent(new Event('input')); })()",
     );
     browser.click("#apply");
-    until_has(&browser, "#next-status", "Sensor not changed");
+    until_has(&browser, "#next-status", "Nothing changed");
     browser.eval("window.release()");
     browser.until("window.responses > 0");
     browser.until_drawn();
-    until_has(&browser, "#next-status", "Sensor not changed");
+    until_has(&browser, "#next-status", "Nothing changed");
     until_has(&browser, "#next-table", "senscomp-6500");
 }
 
@@ -337,6 +343,11 @@ fn array_is_moved() {
     let browser = Browser::open(&daemon.address(), DESK);
     browser.eval(&format!("sessionStorage.setItem('sonard-token', '{TOKEN}')"));
     until_has(&browser, "#legend", "transducer");
+    // Readings have their causes, and the lobes of their rangers; there is nothing to compare.
+    until_has(&browser, "#legend", "main lobe up to the reading");
+    until_has(&browser, "#legend", "direct echo (");
+    assert_eq!(browser.eval("document.getElementById('residuals').hidden"), true);
+    assert!(!browser.text("#health").contains("Serial link"), "{}", browser.text("#health"));
     assert!(browser.text("#conditions").contains("8 rangers"), "{}", browser.text("#conditions"));
     browser.click("#change");
     until_has(&browser, "#next-status", "Preview (8 beams)");
@@ -350,5 +361,184 @@ fn array_is_moved() {
     until_has(&browser, "#summary", "Applied: pose");
     let after_m = daemon.status()["pose"]["x_m"].as_f64().expect("metres");
     assert!((before_m - after_m - 0.01).abs() < 1e-6, "{before_m} and {after_m}");
+    assert_clean(&browser);
+}
+
+#[test]
+fn settings_change_together() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (daemon, browser) = editing_settings(folder.path());
+    let before = daemon.status();
+    let enter = |id: &str, value: &str| {
+        browser.eval(&format!(
+            "(() => {{ const f = document.getElementById('next-{id}'); f.value = {value:?}; \
+             f.dispatchEvent(new Event('input')); }})()"
+        ));
+    };
+    // A field without a number can't be applied.
+    enter("y_m", "");
+    until_has(&browser, "#next-fault", "Enter a number.");
+    assert_eq!(browser.eval("document.getElementById('apply').disabled"), true);
+    enter("y_m", "0.3");
+    browser.until("document.querySelector('#next-table .fault').hidden");
+    until_has(&browser, "#next-status", "Preview (100 beams)");
+    // One setting that the device does not support rejects the others, too.
+    enter("step_deg", "1");
+    until_has(&browser, "#next-status", "Preview unavailable");
+    browser.click("#apply");
+    until_has(&browser, "#next-status", "Nothing changed: ");
+    until_has(&browser, "#next-fault", "Step (°) 1 is not a whole number of the motor's steps");
+    assert_eq!(daemon.status()["pose"], before["pose"]);
+    enter("step_deg", "7.2");
+    enter("temperature_c", "25");
+    until_has(&browser, "#next-status", "Preview (50 beams)");
+    browser.click("#apply");
+    until_has(&browser, "#summary", "Applied: pose, sweep, air");
+    let status = daemon.status();
+    let now = (&status["pose"]["y_m"], &status["plan"]["step_deg"]);
+    assert_eq!(now, (&json!(0.3), &json!(7.2)));
+    assert_eq!(status["air"]["temperature_c"], 25.0);
+    let other: Vec<String> =
+        browser.warnings().into_iter().filter(|text| !text.contains("409")).collect();
+    assert_eq!(other, Vec::<String>::new(), "apart from the browser's message about status 409");
+}
+
+#[test]
+fn findings_during_a_scan() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (daemon, browser) = with_two_scans(folder.path(), &[]);
+    browser.click("#show-features");
+    until_has(&browser, "#legend", "plane (P)");
+    assert_eq!(browser.eval("document.getElementById('findings-status').hidden"), true);
+    scan_once(&daemon);
+    browser.until("document.getElementById('progress').value > 5");
+    until_has(&browser, "#findings-status", "Features of the last complete scan, ");
+    until_has(&browser, "#legend", "plane (P)");
+    browser.until(COMPLETE);
+    browser.until("document.getElementById('findings-status').hidden");
+    // The pointer shows the probability of a feature, and the value of a reading.
+    let scan = daemon.get("/v1/scans?limit=1").json()[0]["scan"].clone();
+    let id = scan.as_str().expect("an id");
+    let found = daemon.get(&format!("/v1/scans/{id}/findings")).json();
+    let at = browser.eval(&format!(
+        "import('/page/main.js').then(({{plan}}) => {{ const at = plan.view.px({}); \
+         const r = document.getElementById('over').getBoundingClientRect(); \
+         return [r.left + at[0], r.top + at[1]]; }})",
+        found["features"][0]["at"]
+    ));
+    let event = json!({"type": "mouseMoved", "x": at[0], "y": at[1]});
+    browser.devtools("Input.dispatchMouseEvent", &event);
+    until_has(&browser, ".tip", "probability");
+    select_beam(&browser, 75);
+    browser.devtools("Input.dispatchMouseEvent", &json!({"type": "mouseMoved", "x": 5, "y": 5}));
+    until_has(&browser, ".tip", "beam 75, azimuth 270.0°");
+    assert_clean(&browser);
+}
+
+#[test]
+fn arrivals_have_outcomes() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (daemon, browser) = with_two_scans(folder.path(), &[]);
+    select_beam(&browser, 75);
+    let outcomes = browser.eval(
+        "[...document.querySelectorAll('.peaks button')].map((b) => b.children[2].textContent)",
+    );
+    let outcomes: Vec<&str> =
+        outcomes.as_array().expect("a list").iter().map(|text| text.as_str().expect("a text")).collect();
+    // The south wall is 85 mm away, and its first echoes arrive while the receiver is blanked.
+    assert_eq!(outcomes[0], "blanked", "{outcomes:?}");
+    for outcome in ["detected as echo 1", "detected as echo 2", "below threshold"] {
+        assert!(outcomes.contains(&outcome), "{outcome} is not in {outcomes:?}");
+    }
+    // The trace reaches beyond the last measured echo.
+    let scan = daemon.get("/v1/scans?limit=1").json()[0]["scan"].clone();
+    let path = format!("/v1/scans/{}/beams/75", scan.as_str().expect("an id"));
+    let beam = daemon.get(&path).json();
+    let last = beam["echoes"].as_array().and_then(|echoes| echoes.last()).expect("echoes");
+    let last_m = last["range_m"].as_f64().expect("a range");
+    let [step_us, m_per_us] =
+        ["step_us", "m_per_us"].map(|key| beam["trace"][key].as_f64().expect("a number"));
+    let samples = beam["trace"]["envelope"].as_array().expect("samples").len();
+    assert!(samples as f64 * step_us * m_per_us > last_m, "{samples} samples, {last_m} m");
+    let facts = browser.text("#beam-panel .facts");
+    assert!(facts.contains("Half the path length0.827"), "{facts}");
+    assert_clean(&browser);
+}
+
+#[test]
+fn links_csv_units_and_location() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (daemon, browser) = with_two_scans(folder.path(), &[]);
+    let scans = daemon.get("/v1/scans").json();
+    let oldest = scans[1]["scan"].as_str().expect("an id");
+    // A link shows its scan and its beam; both follow the selection.
+    browser.eval(&format!("(location.hash = '#scan={oldest}&beam=30')"));
+    browser.until("document.querySelector('#live').ariaPressed === 'false'");
+    until_has(&browser, "#beam-label", "beam 30, azimuth 108.0°");
+    browser.go();
+    until_has(&browser, "#beam-label", "beam 30, azimuth 108.0°");
+    browser.click("#live");
+    browser.until("location.hash === '#beam=30'");
+    let unit = |name: &str| {
+        browser.eval(&format!(
+            "(() => {{ const u = document.getElementById('unit'); u.value = {name:?}; \
+             u.dispatchEvent(new Event('change')); }})()"
+        ));
+    };
+    unit("cm");
+    until_has(&browser, "#beam-label", "227.");
+    until_has(&browser, "#beam-label", " cm, predicted ");
+    unit("m");
+    until_has(&browser, "#beam-label", "2.27");
+    browser.eval(
+        "(() => { globalThis.saved = []; const make = URL.createObjectURL; \
+         URL.createObjectURL = (blob) => { saved.push(blob); return make(blob); }; \
+         HTMLAnchorElement.prototype.click = function () { saved.push(this.download); }; })()",
+    );
+    let save = |kind: &str| {
+        browser.eval("globalThis.saved.length = 0");
+        browser.click(&format!("[data-kind={kind}]"));
+        browser.until("globalThis.saved.length === 2");
+        browser.eval("saved[0].text()").as_str().expect("a text").to_owned()
+    };
+    let csv = save("csv");
+    let lines: Vec<&str> = csv.lines().collect();
+    assert!(lines[0].starts_with("beam,ranger,azimuth_deg,status,range_m,"), "{csv}");
+    assert_eq!(lines.len(), 101);
+    assert!(lines[31].starts_with("30,,108,echo,2.27"), "{}", lines[31]);
+    let csv = save("beam");
+    let lines: Vec<&str> = csv.lines().collect();
+    assert_eq!((lines[0], lines.len()), ("scan,time,azimuth_deg,range_m", 3), "{csv}");
+    assert!(lines[1].starts_with(oldest) && lines[1].contains(",108,2.27"), "{csv}");
+    // The estimated pose is drawn and can be proposed; writing takes the token.
+    browser.click("#locate");
+    browser.until("document.getElementById('located').textContent.startsWith('(0.774, 0.085) m')");
+    until_has(&browser, "#legend", "located pose");
+    assert_eq!(browser.eval("document.getElementById('use-pose').checkVisibility()"), false);
+    assert_clean(&browser);
+}
+
+#[test]
+fn newest_scan_is_the_same() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (daemon, browser) = with_two_scans(folder.path(), &[]);
+    browser.click("#over-time summary");
+    scan_once(&daemon);
+    browser.until("document.getElementById('progress').value > 5");
+    // Time line, list and waterfall count the running scan.
+    until_has(&browser, "#scrub-label", "scan 3 of 3");
+    until_has(&browser, "#scans-list li", "running");
+    until_has(&browser, "#over-time .hint", "3 of 3 scans");
+    browser.until(COMPLETE);
+    until_has(&browser, "#scans-list li", "100 beams");
+    // A scan with another plan has its own azimuths.
+    let plan = r#"{"scans":1,"plan":{"from_deg":180,"to_deg":360,"step_deg":7.2,"pings_per_stop":1}}"#;
+    assert_eq!(daemon.send("POST", "/v1/start", plan).status, 202);
+    daemon.wait_for_scans(4);
+    until_has(&browser, "#scan-label", "25 of 25");
+    browser.eval("document.getElementById('beam').focus()");
+    select_beam(&browser, 12);
+    until_has(&browser, "#beam-label", "beam 12, azimuth 266.4°");
+    until_has(&browser, "#series-label", "Beam 12 in 4 scans");
     assert_clean(&browser);
 }

@@ -42,6 +42,72 @@ fn requested_scans() {
 }
 
 #[test]
+fn settings_change_together_or_not() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let daemon = InProcess::start_mock(folder.path(), &SHORT);
+    daemon.wait_for("ready");
+    let before = daemon.status();
+    let good = json!({
+        "pose": {"x_m": 0.5, "y_m": 0.3, "heading_deg": 90.0},
+        "plan": {"from_deg": 0.0, "to_deg": 18.0, "step_deg": 0.9, "pings_per_stop": 1},
+        "air": {"temperature_c": 25.0},
+        "sensor": {"threshold": 0.03},
+    });
+    for (part, value, status, field) in [
+        ("pose", json!({"x_m": 9.0, "y_m": 0.3, "heading_deg": 0.0}), 409, "pose"),
+        ("air", json!({"temperature_c": 99.0}), 422, "air.temperature_c"),
+        ("sensor", json!({"preset": "hc-sr04"}), 409, "sensor.blanking_us"),
+        ("sensor", json!({"threshold": 5.0}), 422, "sensor.threshold"),
+        (
+            "plan",
+            json!({"from_deg": 0.0, "to_deg": 9.0, "step_deg": 1.0, "pings_per_stop": 1}),
+            409,
+            "plan.step_deg",
+        ),
+    ] {
+        let mut order = good.clone();
+        order[part] = value;
+        let reply = daemon.send("PUT", "/v1/settings", &order.to_string());
+        assert_eq!((reply.status, &reply.json()["field"]), (status, &json!(field)), "{order}");
+        let now = daemon.status();
+        for part in ["pose", "plan", "air", "sensor"] {
+            assert_eq!(now[part], before[part], "{order}");
+        }
+    }
+    assert_eq!(daemon.send("PUT", "/v1/settings", &good.to_string()).status, 202);
+    let now = daemon.status();
+    assert_eq!((&now["pose"], &now["plan"]), (&good["pose"], &good["plan"]));
+    assert_eq!(now["air"]["temperature_c"], 25.0);
+    assert_eq!(now["sensor"]["threshold"], 0.03);
+    // What is left out stays.
+    let air = json!({"air": {"temperature_c": 21.0}}).to_string();
+    assert_eq!(daemon.send("PUT", "/v1/settings", &air).status, 202);
+    assert_eq!(daemon.status()["pose"], good["pose"]);
+    daemon.stop();
+}
+
+/// Residuals of a scan taken after the pose was changed.
+fn median_residual_m(further: &[&str]) -> f64 {
+    let folder = tempfile::tempdir().expect("a folder");
+    let options = [&["--set", "plan.step_deg=3.6"], further].concat();
+    let daemon = InProcess::start_mock(folder.path(), &options);
+    daemon.wait_for("ready");
+    let pose = r#"{"x_m":0.5,"y_m":0.3,"heading_deg":90}"#;
+    assert_eq!(daemon.send("PUT", "/v1/pose", pose).status, 202);
+    assert_eq!(daemon.send("POST", "/v1/start", r#"{"scans":1}"#).status, 202);
+    daemon.wait_for_scans(1);
+    let fit = daemon.health()["fit"].clone();
+    daemon.stop();
+    fit["median_abs_residual_m"].as_f64().expect("a fit")
+}
+
+#[test]
+fn mock_follows_the_pose() {
+    assert!(median_residual_m(&[]) < 0.002);
+    assert!(median_residual_m(&["--truth-pose", "fig9"]) > 0.02);
+}
+
+#[test]
 fn stop_and_resume() {
     let folder = tempfile::tempdir().expect("a folder");
     let daemon = InProcess::start_mock(folder.path(), &["--set", "scanning.mode=continuous"]);

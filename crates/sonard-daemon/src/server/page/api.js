@@ -14,6 +14,8 @@ export class ApiError extends Error {
     super(problem.error);
     this.status = status;
     this.help = problem.help;
+    /** Setting at fault, such as `sensor.blanking_us`. @type {string | undefined} */
+    this.field = problem.field;
   }
 }
 
@@ -23,6 +25,21 @@ let retryNow = () => {};
 let prompt = null;
 /** Whether the last token dialog was cancelled; reads then fail without another dialog. */
 let cancelled = false;
+
+/** Called after a token was entered. */
+let tokenEntered = () => {};
+/** @param {() => void} listener */
+export const onToken = (listener) => (tokenEntered = listener);
+
+/** Prompts for the token until it is valid, or the dialog is cancelled. */
+export async function enterToken() {
+  let why = "starting scans and changing settings takes the token of server.token_file";
+  while (await promptForToken({ message: why })) {
+    const { write } = await requestJson("/v1/access");
+    if (write === "yes") return;
+    why = "the token is wrong";
+  }
+}
 
 /** @typedef {{method?: string, body?: object, signal?: AbortSignal}} Request */
 
@@ -35,9 +52,12 @@ export const requestFile = async (path) => (await fetchAuthorized(path, {})).blo
 /** @param {string} path @param {Request} request */
 async function fetchAuthorized(path, { method = "GET", body, signal } = {}) {
   for (;;) {
+    const token = storedToken();
     const response = await send(path, { method, body, signal });
     if (response.ok || (path === "/v1/health" && response.status === 503)) return response;
     const error = await errorOf(response);
+    // Another request has prompted for the token meanwhile.
+    if (error.status === 401 && storedToken() !== token) continue;
     const needsToken = error.status === 401 && (method !== "GET" || !cancelled);
     if (!needsToken || !(await promptForToken(error))) throw error;
   }
@@ -69,11 +89,13 @@ export async function subscribe(path, onLine, onState) {
 /** Reconnects the stream without waiting for the back-off. */
 export const reconnectNow = () => retryNow();
 
+const storedToken = () => sessionStorage.getItem(TOKEN_KEY);
+
 /** @param {string} path @param {Request} request */
 function send(path, { method = "GET", body, signal } = {}) {
   /** @type {Record<string, string>} */
   const headers = {};
-  const token = sessionStorage.getItem(TOKEN_KEY);
+  const token = storedToken();
   if (token) headers.Authorization = `Bearer ${token}`;
   if (body !== undefined) headers["Content-Type"] = "application/json";
   const text = body === undefined ? undefined : JSON.stringify(body);
@@ -82,7 +104,7 @@ function send(path, { method = "GET", body, signal } = {}) {
 
 async function errorOf(response) {
   const problem = await response.json().catch(() => ({}));
-  return new ApiError(response.status, { error: problem.error ?? response.statusText, help: problem.help ?? "" });
+  return new ApiError(response.status, { error: response.statusText, help: "", ...problem });
 }
 
 async function readEvents(body, onLine, stop) {
@@ -118,6 +140,7 @@ function showDialog(error) {
         if (entered) sessionStorage.setItem(TOKEN_KEY, input.value.trim());
         input.value = "";
         cancelled = !entered;
+        if (entered) tokenEntered();
         done(entered);
       },
       { once: true },

@@ -1,5 +1,6 @@
 // Panel of the selected beam: the reading, then its measured echoes and predicted arrivals once they are loaded.
 
+import { outcomesOf } from "./arrivals.js";
 import { MARKS } from "./verdicts.js";
 import * as format from "./format.js";
 
@@ -36,6 +37,8 @@ export class BeamPanel {
     const sameBeam = ping.index === this.ping?.index;
     this.ping = ping;
     this.facts.replaceChildren(...reading(ping));
+    // The height stays until the details are loaded, so that what is below does not jump.
+    this.panel.style.minHeight = `${this.panel.offsetHeight}px`;
     if (!sameBeam) this.details.replaceChildren();
     this.panel.replaceChildren(this.facts, this.details);
     if (this.fetchDetails && (!sameBeam || !this.loading)) {
@@ -68,6 +71,7 @@ export class BeamPanel {
   /** Shows measured echoes and predicted arrivals; a simulated reading has no echo list. */
   showDetails(beam) {
     this.details.replaceChildren(...(beam.echoes ? echoes(beam) : []), ...this.arrivals(beam));
+    this.panel.style.minHeight = "";
   }
 
   /** Predicted arrivals; a click on one draws its propagation path. */
@@ -76,18 +80,19 @@ export class BeamPanel {
     const list = document.createElement("ul");
     list.className = "peaks";
     const peaks = beam.peaks ?? [];
+    const outcomes = outcomesOf(beam);
     const drawn = peakOfReading(peaks, beam);
-    for (const peak of peaks) list.append(this.arrival(peak, peak === drawn, list));
+    for (const peak of peaks) list.append(this.arrival(peak, outcomes.get(peak) ?? "", peak === drawn, list));
     if (!list.children.length) return [heading("Predicted arrivals"), note("no arrival near the threshold")];
-    return [heading("Predicted arrivals: range, level above threshold, path"), list];
+    return [heading("Predicted arrivals: half the path length, level above threshold, outcome, path"), list];
   }
 
-  arrival(peak, drawn, list) {
+  arrival(peak, outcome, drawn, list) {
     const item = document.createElement("li");
     const button = item.appendChild(document.createElement("button"));
     button.type = "button";
     button.ariaPressed = String(drawn);
-    const texts = [format.metres(peak.range_m), format.decibels(peak.margin_db), format.interactions(peak.path)];
+    const texts = [format.distance(peak.range_m), format.decibels(peak.margin_db), outcome, format.interactions(peak.path)];
     for (const text of texts) button.appendChild(document.createElement("span")).textContent = text;
     button.addEventListener("click", () => {
       for (const sibling of list.querySelectorAll("button")) sibling.ariaPressed = String(sibling === button);
@@ -109,8 +114,8 @@ function peakOfReading(peaks, { polyline, reading }) {
 /** One-line description of a reading, as shown next to the slider and read out by screen readers. */
 export function describeReading(ping) {
   const parts = [`beam ${ping.index}${ranger(ping)}, azimuth ${format.degrees(ping.azimuth_deg)}`, MARKS[ping.mark].label];
-  if (ping.range_m !== null) parts.push(format.metres(ping.range_m));
-  if (ping.sim?.range_m != null) parts.push(`predicted ${format.metres(ping.sim.range_m)}`);
+  if (ping.range_m !== null) parts.push(format.distance(ping.range_m));
+  if (ping.sim?.range_m != null) parts.push(`predicted ${format.distance(ping.sim.range_m)}`);
   return parts.join(", ");
 }
 
@@ -127,7 +132,7 @@ function reading(ping) {
   title.className = "reading";
   const about = document.createElement("small");
   about.textContent = ` ${MARKS[ping.mark].label}`;
-  title.append(ping.range_m === null ? "no range" : format.metres(ping.range_m), about);
+  title.append(ping.range_m === null ? "no range" : format.distance(ping.range_m), about);
   const list = document.createElement("dl");
   list.className = "facts";
   const facts = [
@@ -137,13 +142,13 @@ function reading(ping) {
   ];
   if (ping.sim) {
     facts.push(
-      ["Predicted range", ping.sim.range_m === null ? ping.sim.status.replace("_", " ") : format.metres(ping.sim.range_m)],
+      ["Predicted range", ping.sim.range_m === null ? ping.sim.status.replace("_", " ") : format.distance(ping.sim.range_m)],
       ["Residual", format.millimetres(ping.residual_m)],
       ["Level above threshold", ping.sim.margin_db === null ? "–" : format.decibels(ping.sim.margin_db)],
-      ["Path", format.pathLabel(ping.sim.path)],
+      ...pathFacts(ping.sim.path),
     );
   } else if (ping.path) {
-    facts.push(["Level above threshold", format.decibels(ping.margin_db)], ["Path", format.pathLabel(ping.path)]);
+    facts.push(["Level above threshold", format.decibels(ping.margin_db)], ...pathFacts(ping.path));
   }
   const crosstalk = ping.crosstalk ?? ping.sim?.crosstalk;
   if (crosstalk) facts.push(["Crosstalk", format.crosstalkLabel(crosstalk)]);
@@ -152,6 +157,12 @@ function reading(ping) {
   return [title, list];
 }
 
+/** Path and half its length, which is less than the range: an echo is detected after its start. */
+const pathFacts = (path) => [
+  ["Half the path length", format.distance(path ? path.length_m / 2 : null)],
+  ["Path", format.pathLabel(path)],
+];
+
 function echoes({ echoes }) {
   if (!echoes.length) return [heading("Measured echoes"), note("none")];
   const list = document.createElement("ol");
@@ -159,7 +170,7 @@ function echoes({ echoes }) {
   for (const [i, echo] of echoes.entries()) {
     const time = echo.tof_us === null ? "" : `, ${echo.tof_us.toFixed(1)} µs`;
     list.appendChild(document.createElement("li")).textContent =
-      `${i + 1}. ${format.metres(echo.range_m)}${time} (${echo.ticks} ticks)`;
+      `${i + 1}. ${format.distance(echo.range_m)}${time} (${echo.ticks} ticks)`;
   }
   return [heading("Measured echoes"), list];
 }

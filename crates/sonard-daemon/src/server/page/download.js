@@ -1,4 +1,4 @@
-// Downloads: the scan (JSON), its log (JSON Lines), and the floor plan (PNG, SVG).
+// Downloads: the scan (JSON, CSV), its log (JSON Lines), a beam over time (CSV), and the floor plan (PNG, SVG).
 
 import { requestFile } from "./api.js";
 import { renderPng, renderSvg } from "./picture.js";
@@ -7,11 +7,17 @@ import { clock, count, failure, provenanceLabel } from "./format.js";
 /**
  * @param {HTMLElement} place with a button for each kind
  * @param {any} plan
- * @param {{scan: () => any, log: (scan: string) => string | undefined, announce: (text: string) => void}} callbacks
+ * @param {{scan: () => any, log: (scan: string) => string | undefined, beam: () => Promise<string | null>, announce: (text: string) => void}} callbacks
  */
-export function addDownloads(place, plan, { scan, log, announce }) {
+export function addDownloads(place, plan, { scan, log, beam, announce }) {
   const kinds = {
     scan: async ({ id }) => [await requestFile(`/v1/scans/${id}`), "json"],
+    csv: async (shown) => [csvFile(scanCsv(shown)), "csv"],
+    beam: async () => {
+      const text = await beam();
+      if (text === null) throw new Error("no beam is selected");
+      return [csvFile(text), "csv"];
+    },
     log: async ({ id }) => [await requestFile(`/v1/logs/${log(id)}`), "jsonl"],
     png: async (shown) => [await renderPng(plan, captionOf(plan, shown)), "png"],
     svg: async (shown) => [renderSvg(plan, captionOf(plan, shown)), "svg"],
@@ -23,13 +29,26 @@ export function addDownloads(place, plan, { scan, log, announce }) {
     if (!shown) return announce("There is no scan yet.");
     try {
       const [blob, extension] = await kinds[kind](shown);
-      const name = kind === "log" ? log(shown.id) : `${stem(shown)}.${extension}`;
+      const name = kind === "log" ? log(shown.id) : `${kind === "beam" ? "beam-over-time" : stem(shown)}.${extension}`;
       save(blob, name);
       announce(`${name}: ${size(blob.size)}.`);
     } catch (/** @type {any} */ error) {
       announce(failure("Download failed", error));
     }
   });
+}
+
+const csvFile = (/** @type {string} */ text) => new Blob([text], { type: "text/csv" });
+
+/** Readings as CSV; empty where a value is missing. */
+function scanCsv({ beams }) {
+  const head = "beam,ranger,azimuth_deg,status,range_m,tof_us,predicted_m,residual_m,verdict,x_m,y_m,direction_deg";
+  const lines = [...beams.values()].sort((a, b) => a.index - b.index).map((ping) => {
+    const { x_m, y_m, direction_deg } = ping.viewpoint ?? {};
+    const { index, ranger, azimuth_deg, status, range_m, tof_us, sim, residual_m, verdict } = ping;
+    return [index, ranger, azimuth_deg, status, range_m, tof_us, sim?.range_m, residual_m, verdict, x_m, y_m, direction_deg].join();
+  });
+  return `${head}\n${lines.join("\n")}\n`;
 }
 
 /** File name that sorts by time. */

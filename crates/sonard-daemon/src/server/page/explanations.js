@@ -26,7 +26,7 @@ export class Explanations {
     this.selected = null;
     this.list = make("ul", { id: "hypotheses-list", className: "peaks" });
     this.hint = make("p", { className: "hint", textContent: "±: one standard deviation. Gain: increase of log-likelihood." });
-    this.preview = make("button", { type: "button", id: "hypotheses-preview", textContent: "Preview", hidden: true });
+    this.preview = make("button", { type: "button", id: "hypotheses-preview", textContent: "Preview", className: "writes", hidden: true });
     this.preview.addEventListener("click", () => this.propose());
     section.append(make("h3", { textContent: "Better-fitting hypotheses" }), this.list, make("p", { className: "row" }, this.preview, this.hint));
     plan.overlays.push(this);

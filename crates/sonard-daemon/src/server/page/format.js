@@ -1,6 +1,16 @@
 // Text of figures and records, with units.
 
-export const metres = (m) => (m === null || m === undefined ? "–" : `${m.toFixed(m < 10 ? 4 : 3)} m`);
+/** Units of distances: number per metre, and decimals. */
+const UNITS = { m: [1, 4], cm: [100, 2], in: [1 / 0.0254, 3] };
+let unit = "m";
+
+export const setUnit = (/** @type {string} */ name) => (unit = name);
+export const unitName = () => unit;
+/** Converts metres to the chosen unit. @param {number} m */
+export const inUnit = (m) => m * UNITS[unit][0];
+/** Number of a distance without its unit. @param {number | null | undefined} m */
+export const distanceFigure = (m) => (m === null || m === undefined ? "–" : inUnit(m).toFixed(UNITS[unit][1] - (m < 10 ? 0 : 1)));
+export const distance = (m) => (m === null || m === undefined ? "–" : `${distanceFigure(m)} ${unit}`);
 export function millimetres(m) {
   if (m === null || m === undefined) return "–";
   const size = Math.abs(1e3 * m).toFixed(1);

@@ -14,7 +14,7 @@ export class Gestures {
    * @param {HTMLElement} canvas element that receives pointer events
    * @param {import("./view.js").View} view
    * @param {{onMove: () => void, onClick: (px: number[]) => void, onHover: (px: number[]) => void,
-   *   onKey: (event: KeyboardEvent) => boolean}} callbacks
+   *   onLeave: () => void, onKey: (event: KeyboardEvent) => boolean}} callbacks
    */
   constructor(stage, canvas, view, callbacks) {
     this.stage = stage;
@@ -28,6 +28,7 @@ export class Gestures {
     canvas.addEventListener("wheel", (event) => this.wheel(event), { passive: false });
     canvas.addEventListener("pointerdown", (event) => this.down(event));
     canvas.addEventListener("pointermove", (event) => this.move(event));
+    canvas.addEventListener("pointerleave", () => callbacks.onLeave());
     canvas.addEventListener("pointerup", (event) => this.up(event));
     canvas.addEventListener("pointercancel", (event) => this.up(event));
     canvas.addEventListener("click", (event) => callbacks.onClick([event.offsetX, event.offsetY]));

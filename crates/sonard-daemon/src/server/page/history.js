@@ -68,6 +68,27 @@ export class History {
     this.update();
   }
 
+  /** Adds the scan that has just begun. */
+  begin({ id, start }) {
+    if (this.scans.some(({ scan }) => scan === id)) return;
+    this.scans = [{ scan: id, time: start.time, log: undefined, end: null }, ...this.scans].slice(0, MAX_SCANS);
+    this.update();
+  }
+
+  /** Marks a scan of the list as ended, until the list is read again. */
+  end({ scan: id, beams, missing }) {
+    const known = this.scans.find(({ scan }) => scan === id);
+    if (known) known.end = { beams, missing };
+    this.update();
+    this.refreshSoon();
+  }
+
+  /** Newest complete scan of the list, as a scan without its readings. */
+  completed() {
+    const known = this.scans.find(({ end }) => end);
+    return known ? (this.cache.get(known.scan) ?? { id: known.scan, start: { time: known.time } }) : null;
+  }
+
   async loadOlder() {
     const last = this.scans.at(-1);
     if (!last) return;

@@ -22,9 +22,15 @@ const PENS = {
   occupied: { label: "map: occupied", colour: "--ink", width: 1, symbol: "cell" },
   free: { label: "map: free", colour: "--direct", width: 1, symbol: "cell" },
   found: { label: "fitted line", colour: "--good", width: 3 },
+  unconfirmed: { label: "fitted line without a wall of the scene", colour: "--bad", width: 2, dash: [6, 3] },
   feature: { label: "plane (P), corner (C), edge (E), unresolved (?)", colour: "--min-range", width: 1.5, symbol: "ring" },
+  contradicted: { label: "contradicts the prediction (!)", colour: "--bad", width: 2, symbol: "ring" },
+  located: { label: "located pose", colour: "--bad", width: 2, dash: [2, 3] },
+  lobe: { label: "main lobe up to the reading", colour: "--muted", width: 1, symbol: "lobe" },
   preview: { label: "preview of the next scan", colour: "--good", width: 1.3, symbol: "square" },
   hypothesis: { label: "position under the selected hypothesis", colour: "--bad", width: 2, dash: [7, 3] },
+  front: { label: "wave front that is detected", colour: "--path", width: 2.5, symbol: "arc" },
+  faint: { label: "wave front that is not detected", colour: "--muted", width: 1.5, symbol: "arc" },
   outside: { label: "outside the view", colour: "--ink", width: 1, symbol: "arrow" },
 };
 
@@ -156,6 +162,16 @@ export function drawFace(c, [x, y], turn, half) {
   line(c, [[x - dx, y - dy], [x + dx, y + dy]]);
 }
 
+/** Sector of a circle around a direction. @param {any} c @param {number[]} at @param {number} turn @param {number} half radians @param {number} radius */
+export function drawSector(c, [x, y], turn, half, radius) {
+  c.beginPath();
+  c.moveTo(x, y);
+  c.lineTo(x + radius * Math.cos(turn - half), y + radius * Math.sin(turn - half));
+  c.arc(x, y, radius, turn - half, turn + half);
+  c.lineTo(x, y);
+  c.stroke();
+}
+
 /** Draws a pen's legend symbol, 24 by 16 pixels. */
 export function drawSample(c, name, palette) {
   setPen(c, name, palette);
@@ -170,6 +186,8 @@ export function drawSample(c, name, palette) {
       return c.stroke();
     case "ring":
       return circle(c, [12, 8], 6);
+    case "lobe":
+      return drawSector(c, [2, 8], 0, 0.4, 20);
     case "leg":
       line(c, [[1, 8], [23, 8]]);
       return arrow(c, [12, 8], 0, [6, 4, 4]);

@@ -1,11 +1,13 @@
 // Entry point of the live page: connects the live stream and the log with plan, residuals, table and panels.
 
-import { reconnectNow, requestJson, subscribe } from "./api.js";
+import { enterToken, onToken, reconnectNow, requestJson, subscribe } from "./api.js";
 import { BeamPanel, describeReading } from "./beam.js";
 import { addControls } from "./control.js";
 import { addDownloads } from "./download.js";
 import { Explanations } from "./explanations.js";
 import { History } from "./history.js";
+import { readLink, writeLink } from "./link.js";
+import { Locator } from "./location.js";
 import { NextScan } from "./next-scan.js";
 import { Overlays } from "./overlays.js";
 import { Plan } from "./plan.js";
@@ -18,7 +20,7 @@ import { addTools } from "./tools.js";
 import { EchoTrace } from "./trace.js";
 import { colours, updateLegend } from "./verdicts.js";
 import { Waterfall } from "./waterfall.js";
-import { clock, count, setText } from "./format.js";
+import { clock, count, setText, setUnit } from "./format.js";
 
 const byId = (/** @type {string} */ id) => /** @type {any} */ (document.getElementById(id));
 const slider = byId("beam");
@@ -34,6 +36,8 @@ let selected = null;
 let changed = false;
 /** Scan whose `scan_start` was missed, and which was therefore requested from the log. */
 let missed = null;
+/** Set once the address was followed; until then it is not changed. */
+let linked = false;
 /** Request of the newest scan from the log, and whether to repeat it afterwards. */
 let catchingUp = null;
 let repeatCatchUp = false;
@@ -70,14 +74,20 @@ const waterfall = new Waterfall(byId("over-time"), {
   },
 });
 const announce = (text) => summary.setResult(text);
-addControls(byId("control"), byId("stop"), announce);
-const overlays = new Overlays(byId("overlays"), plan, strip, announce);
+const updateControls = addControls(byId("control"), announce);
+const overlays = new Overlays(byId("overlays"), plan, strip, { announce, completed: () => history.completed() });
 const nextScan = new NextScan(byId("next"), plan, announce);
 const explanations = new Explanations(byId("hypotheses"), plan, {
   show: (id) => history.show(id),
   propose: (change) => nextScan.propose(change),
 });
-addDownloads(byId("downloads"), plan, { scan: () => shown, log: (id) => history.logOf(id), announce });
+const locator = new Locator(byId("location"), plan, (change) => nextScan.propose(change));
+addDownloads(byId("downloads"), plan, {
+  scan: () => shown,
+  log: (id) => history.logOf(id),
+  beam: async () => (selected ? waterfall.csv() : null),
+  announce,
+});
 
 /** Shows a scan, or redraws the shown one. */
 function show(scan) {
@@ -90,8 +100,24 @@ function show(scan) {
   if (isOther) keepSelection();
   overlays.update();
   explanations.redraw();
+  locator.update();
   redraw();
   loadScene();
+  keepLink();
+}
+
+/** Puts the shown scan, unless it is the live one, and the selected beam into the address. */
+function keepLink() {
+  if (linked) writeLink(history.shown?.id ?? null, selected?.index ?? null);
+}
+
+/** Shows the scan and the beam of the address. */
+async function followLink() {
+  const { scan, beam } = readLink();
+  if (scan && scan !== history.shown?.id) await history.show(scan);
+  else if (!scan && history.shown) history.showLive();
+  if (beam !== null && beam !== selected?.index) select(beam);
+  linked = true;
 }
 
 /** Keeps the selected beam in another scan. Its previous reading stays until the running scan replaces it. */
@@ -159,6 +185,7 @@ function selectReading(ping) {
   const same = selected?.index === ping.index && JSON.stringify(selected.viewpoint) === JSON.stringify(ping.viewpoint);
   const path = same ? plan.path : null;
   selected = ping;
+  keepLink();
   slider.value = ping.index;
   updateSelectionText();
   plan.select(ping, path);
@@ -186,6 +213,7 @@ function updateSelectionText() {
 
 function deselect() {
   selected = null;
+  keepLink();
   slider.value = 0;
   slider.removeAttribute("aria-valuetext");
   setText(byId("beam-label"), "none selected");
@@ -216,6 +244,7 @@ export function handleRecord(record) {
       break;
     case "scan_start":
       live = startScan(record);
+      history.begin(live);
       if (history.shown === null) {
         show(live);
         summary.scanStarted(live);
@@ -237,7 +266,7 @@ export function handleRecord(record) {
         overlays.redraw();
         summary.scanEnded(live);
       }
-      history.refreshSoon();
+      history.end(record);
       break;
     case "event":
       summary.showEvent(record);
@@ -262,7 +291,10 @@ function catchUp() {
 async function readNewest() {
   await Promise.all([loadScene(), history.refresh()]);
   const newest = history.scans[0]?.scan;
-  if (!newest) return;
+  if (!newest) {
+    linked = true;
+    return;
+  }
   const requests = Promise.all([requestJson(`/v1/scans/${newest}`), requestJson("/v1/status")]);
   const [record, status] = await requests.catch(() => []);
   if (!record?.start) return;
@@ -282,6 +314,7 @@ async function readNewest() {
     show(live);
     summary.showScan(live);
   }
+  if (!linked) await followLink();
 }
 
 /** Loads the scene of the shown scan: the current one, or the one in the scan's log. */
@@ -303,6 +336,14 @@ slider.addEventListener("input", () => select(Number(slider.value)));
 slider.addEventListener("focus", () => {
   if (!selected && shown?.beams.size) select(Number(slider.value));
 });
+byId("unit").addEventListener("change", (event) => {
+  setUnit(event.currentTarget.value);
+  if (selected) selectReading(selected);
+  redraw();
+});
+byId("unlock").addEventListener("click", enterToken);
+onToken(updateAccess);
+addEventListener("hashchange", followLink);
 byId("fit").addEventListener("change", (event) => {
   plan.show(event.currentTarget.value);
   changed = true;
@@ -312,7 +353,14 @@ matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
   redraw();
 });
 
+/** Shows the controls that this client may use. */
+async function updateAccess() {
+  const access = await requestJson("/v1/access").catch(() => null);
+  if (access) document.body.dataset.write = access.write;
+}
+
 updateTexts();
+updateAccess();
 let connected = true;
 let version = null;
 pollStatus((status, health) => {
@@ -323,9 +371,13 @@ pollStatus((status, health) => {
   if (status && !connected) {
     reconnectNow();
     catchUp();
+    updateAccess();
   }
   connected = status !== null;
-  if (status) nextScan.update(status);
+  if (status) {
+    nextScan.update(status);
+    updateControls(status);
+  }
   if (health) explanations.update(health);
 });
 subscribe("/v1/live/records?format=sse&verdicts=true", handleRecord, (streaming) => {

@@ -8,7 +8,7 @@ import { Ranger, rounded } from "./ranger.js";
 import { Scan } from "./scan.js";
 import { positionOf } from "./sketch.js";
 import { MARKS, marksIn } from "./verdicts.js";
-import { count, failure, setText } from "./format.js";
+import { count, failure, sentences, setText } from "./format.js";
 
 /** Delay between the last edit and the request of a preview. */
 const PREVIEW_DELAY_MS = 120;
@@ -57,6 +57,8 @@ export class NextScan {
     this.request = new AbortController();
     /** Message why the draft was not applied; shown until the draft changes. */
     this.rejection = "";
+    /** Fields without a number. @type {Set<HTMLElement>} */
+    this.incomplete = new Set();
     this.build(section);
     plan.overlays.push(this);
   }
@@ -69,6 +71,7 @@ export class NextScan {
     };
     this.editButton = button("change", "Change", () => (this.draft ? this.cancel() : this.edit()));
     this.editButton.ariaPressed = "false";
+    this.editButton.classList.add("writes");
     this.applyButton = button("apply", "Apply", () => this.apply());
     this.applyButton.className = "go";
     this.rows = ROWS.map(([label, part, key, step]) => {
@@ -76,11 +79,12 @@ export class NextScan {
       const field = Object.assign(input, { id: `next-${key}`, ariaLabel: `${label}, new value` });
       field.addEventListener("input", () => this.readField(part, key, field));
       const cells = [make("td"), make("td"), make("td", { className: "draft" }, field)];
-      return { part, key, field, row: make("tr", {}, make("th", { scope: "row", textContent: label }), ...cells), cells };
+      return { label, part, key, field, row: make("tr", {}, make("th", { scope: "row", textContent: label }), ...cells), cells };
     });
     const head = ["Setting", "Current", "Next scan", "New value"].map((textContent) => make("th", { scope: "col", textContent }));
     head[3].className = "draft";
     this.table = make("table", { id: "next-table" }, make("thead", {}, make("tr", {}, ...head)), make("tbody", {}, ...this.rows.map(({ row }) => row)));
+    this.fault = make("tr", { className: "fault", hidden: true }, make("td", { colSpan: 4, id: "next-fault" }));
     this.message = make("p", { id: "next-status", className: "hint", role: "status" });
     this.buttons = make("p", { className: "buttons", hidden: true }, this.applyButton);
     section.append(this.table, this.message, this.buttons);
@@ -146,14 +150,46 @@ export class NextScan {
     this.request.abort();
     clearTimeout(this.previewTimer);
     [this.draft, this.scan, this.baseline] = [null, null, null];
+    this.incomplete.clear();
     this.editButton.ariaPressed = "false";
     this.editButton.textContent = "Change";
     this.section.classList.remove("changing");
     this.buttons.hidden = true;
     this.showHandles(false);
     setText(this.message, "");
+    this.clearFault();
     this.plan.held = false;
     this.plan.redraw();
+  }
+
+  /** Shows a message below the field of a setting. @param {any} row @param {string} text */
+  showFault({ field, row }, text) {
+    this.clearFault();
+    row.after(this.fault);
+    setText(this.fault.firstChild, text);
+    this.fault.hidden = false;
+    field.ariaInvalid = "true";
+    field.setAttribute("aria-describedby", "next-fault");
+  }
+
+  clearFault() {
+    this.fault.hidden = true;
+    for (const { field } of this.rows) {
+      field.removeAttribute("aria-invalid");
+      field.removeAttribute("aria-describedby");
+    }
+  }
+
+  /** Shows a rejection at its field; returns the text with the field's label in place of its name. @param {string} what @param {any} error */
+  rejectionText(what, error) {
+    const [part, name] = (error.field ?? "").split(".");
+    const key = name === "preset" ? "name" : name;
+    const row = this.rows.find((row) => row.part === part && row.key === key) ?? this.rows.find((row) => row.part === part);
+    if (!row) return failure(what, error);
+    const labelled = (/** @type {string} */ text) => this.rows.reduce((all, { part: of, key, label }) => (of === part ? all.replaceAll(new RegExp(`\\b${key}\\b`, "g"), label) : all), text);
+    const [message, help] = [labelled(error.message), labelled(error.help ?? "")];
+    this.showFault(row, sentences(message, help));
+    return sentences(`${what}: ${message}`);
   }
 
   showHandles(shown) {
@@ -205,7 +241,12 @@ export class NextScan {
 
   readField(part, key, field) {
     if (field.localName === "select") return this.readList(key, field.value);
-    if (field.value === "" || !Number.isFinite(field.valueAsNumber)) return;
+    if (field.value === "" || !Number.isFinite(field.valueAsNumber)) {
+      this.incomplete.add(field);
+      this.applyButton.disabled = true;
+      return this.showFault(this.rows.find((row) => row.field === field), "Enter a number.");
+    }
+    this.incomplete.delete(field);
     this.draft[part][key] = field.valueAsNumber;
     this.ranger.place(this.draft.pose);
     this.previewSoon();
@@ -214,6 +255,7 @@ export class NextScan {
   previewSoon() {
     clearTimeout(this.previewTimer);
     this.rejection = "";
+    if (!this.incomplete.size) this.clearFault();
     this.previewTimer = setTimeout(() => this.preview(), PREVIEW_DELAY_MS);
   }
 
@@ -226,13 +268,13 @@ export class NextScan {
       if (signal.aborted) return;
       this.scan = Scan.fromJson(response);
       this.showPreview(`Preview (${count(this.scan.beams.size, "beam")}): ${markCounts(this.scan)}${this.changes()}. Not applied yet.`);
-      this.applyButton.disabled = false;
+      this.applyButton.disabled = this.incomplete.size > 0;
     } catch (/** @type {any} */ error) {
       if (signal.aborted) return;
       this.scan = null;
       // Settings without a preview, for instance without a scene, can still be applied.
-      this.applyButton.disabled = error.status === undefined;
-      this.showPreview(failure("Preview unavailable", error));
+      this.applyButton.disabled = error.status === undefined || this.incomplete.size > 0;
+      this.showPreview(this.rejectionText("Preview unavailable", error));
     }
     this.plan.redraw();
   }
@@ -268,18 +310,17 @@ export class NextScan {
     return changed ? `; ${count(changed, "beam")} would change` : "";
   }
 
-  /** Sends the parts of the draft that differ from the upcoming settings. */
+  /** Sends the parts of the draft that differ from the upcoming settings; the daemon changes all of them or none. */
   async apply() {
     const [upcoming, { draft }] = [this.upcoming(), this];
     const parts = PARTS.filter((part) => JSON.stringify(draft[part]) !== JSON.stringify(upcoming[part]));
     const bodies = this.requestsFor(draft);
     if (!parts.length) return this.reject("No changes to apply.");
-    for (const part of parts) {
-      try {
-        await requestJson(`/v1/${part}`, { method: "PUT", body: bodies[part] });
-      } catch (/** @type {any} */ error) {
-        return this.reject(failure(`${LABELS[part]} not changed`, error));
-      }
+    try {
+      const body = Object.fromEntries(parts.map((part) => [part, bodies[part]]));
+      await requestJson("/v1/settings", { method: "PUT", body });
+    } catch (/** @type {any} */ error) {
+      return this.reject(this.rejectionText("Nothing changed", error));
     }
     this.cancel();
     const names = parts.map((part) => LABELS[part].toLowerCase());
@@ -289,8 +330,9 @@ export class NextScan {
   drawUnder(layer, plan) {
     if (!this.draft) return;
     this.ranger.place(this.draft.pose);
+    if (!this.scan) return;
     const c = layer.pen("preview", plan.palette);
-    for (const ping of this.scan?.beams.values() ?? []) {
+    for (const ping of this.scan.beams.values()) {
       const at = positionOf(ping);
       if (at && !plan.view.isOutside(plan.view.px(at))) square(c, plan.view.px(at), 3.5);
     }

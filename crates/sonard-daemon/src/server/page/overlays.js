@@ -3,7 +3,7 @@
 
 import { requestJson } from "./api.js";
 import { make } from "./dom.js";
-import { drawFeatures, drawFindings } from "./findings.js";
+import { describeCell, describeFinding, drawFeature, drawLine, drawMap, markContradictions } from "./findings.js";
 import { disc, line } from "./layers.js";
 import { positionOf } from "./sketch.js";
 import { clock, count, failure, millimetres, sentences, setText } from "./format.js";
@@ -14,11 +14,17 @@ const MODES = { overlay: "overlaid", average: "average", difference: "difference
 const MIN_DIFFERENCE_M = 1e-3;
 
 export class Overlays {
-  /** @param {HTMLElement} section @param {any} plan @param {any} strip @param {(text: string) => void} announce */
-  constructor(section, plan, strip, announce) {
+  /**
+   * @param {HTMLElement} section
+   * @param {any} plan
+   * @param {any} strip
+   * @param {{announce: (text: string) => void, completed: () => any}} callbacks `completed()` returns the newest complete scan
+   */
+  constructor(section, plan, strip, { announce, completed }) {
     this.plan = plan;
     this.strip = strip;
     this.announce = announce;
+    this.completed = completed;
     /** Enabled findings. */
     this.enabled = new Set();
     this.found = null;
@@ -31,7 +37,8 @@ export class Overlays {
     this.mode = make("select", { id: "pinned-mode", ariaLabel: "Display of the pinned scan", disabled: true });
     this.mode.append(...Object.entries(MODES).map(([value, text]) => new Option(text, value)));
     this.status = make("p", { id: "pinned-status", className: "hint", hidden: true });
-    section.append(make("p", { className: "row" }, ...this.boxes, this.pin, this.mode), this.status);
+    this.source = make("p", { id: "findings-status", className: "hint", hidden: true });
+    section.append(make("p", { className: "row" }, ...this.boxes, this.pin, this.mode), this.source, this.status);
     this.pin.addEventListener("click", () => this.setPinned(this.pinned ? null : this.plan.scan));
     this.mode.addEventListener("change", () => this.redraw());
     plan.overlays.push(this);
@@ -74,19 +81,45 @@ export class Overlays {
     this.loadFindings();
   }
 
-  /** Loads the findings of the shown scan once it is complete. */
+  /** Scan whose findings are shown: the shown one, or during a scan the last complete one. */
+  subject() {
+    const { scan } = this.plan;
+    return scan?.running && !scan.replayed ? (scan.previous ?? this.completed()) : scan;
+  }
+
+  /** Loads the findings of a complete scan. */
   async loadFindings() {
-    const scan = this.plan.scan;
-    if (!this.enabled.size || !scan || scan.running || this.found?.id === scan.id || this.loading === scan.id) return;
-    this.loading = scan.id;
+    const subject = this.subject();
+    const isOther = this.plan.scan?.id !== subject?.id;
+    this.source.hidden = !this.enabled.size || !isOther || !subject;
+    if (isOther && subject) setText(this.source, `${findingNames(this.enabled)} of the last complete scan, ${clock(subject.start.time)}`);
+    if (!this.enabled.size || !subject || this.found?.id === subject.id || this.loading === subject.id) return;
+    this.loading = subject.id;
     try {
-      this.found = { id: scan.id, ...(await requestJson(`/v1/scans/${scan.id}/findings`)) };
-      if (this.found.unavailable_reason) this.announce(sentences(this.found.unavailable_reason));
+      const found = { id: subject.id, ...(await requestJson(`/v1/scans/${subject.id}/findings`)) };
+      markContradictions(found, subject, this.plan.sceneFits() ? this.plan.scene : null);
+      this.found = found;
+      if (found.unavailable_reason) this.announce(sentences(found.unavailable_reason));
     } catch (/** @type {any} */ error) {
       this.announce(failure("Not computed", error));
     }
     this.loading = null;
-    if (this.plan.scan?.id === scan.id && this.found?.id === scan.id) this.plan.redraw();
+    if (this.shown()) this.plan.redraw();
+  }
+
+  /** Loaded findings, if they are those to be shown. */
+  shown() {
+    return this.enabled.size && this.found && this.found.id === this.subject()?.id ? this.found : null;
+  }
+
+  describeAt(px, plan) {
+    const found = this.shown();
+    return found ? describeFinding(found, this.enabled, plan.view, px) : undefined;
+  }
+
+  describeUnder(px, plan) {
+    const found = this.shown();
+    return found?.map && this.enabled.has("map") ? describeCell(found.map, plan.view, px) : undefined;
   }
 
   /** Range difference between shown and pinned scan, metres; `null` unless both have a range. */
@@ -96,7 +129,8 @@ export class Overlays {
   }
 
   drawUnder(layer, plan) {
-    if (this.found && this.found.id === plan.scan?.id) drawFindings(layer, plan, this.found, this.enabled);
+    const found = this.shown();
+    if (found?.map && this.enabled.has("map")) drawMap(layer, plan, found.map, false);
     if (!this.pinned) return;
     const mode = this.mode.value;
     if (mode === "average") return this.drawAverage(layer, plan);
@@ -104,8 +138,13 @@ export class Overlays {
     plan.sketch(layer, this.pinned).dots([...this.pinned.beams.values()], "pinned");
   }
 
-  drawOver(layer, plan) {
-    if (this.found && this.found.id === plan.scan?.id && this.enabled.has("features")) drawFeatures(layer, plan, this.found);
+  /** Draws what was found above the readings. */
+  drawAbove(layer, plan) {
+    const found = this.shown();
+    if (!found) return;
+    if (found.map && this.enabled.has("map")) drawMap(layer, plan, found.map, true);
+    if (this.enabled.has("lines")) for (const segment of found.lines) drawLine(layer, plan, segment);
+    if (this.enabled.has("features")) for (const feature of found.features) drawFeature(layer, plan, feature);
   }
 
   drawAverage(layer, plan) {
@@ -137,4 +176,10 @@ export class Overlays {
     const p95_mm = 1e3 * sizes[Math.floor(0.95 * (sizes.length - 1))];
     return `${pinned}: ${count(all.length, "beam")} in common, median difference ${millimetres(sorted[sorted.length >> 1])}, 95 % within ${p95_mm.toFixed(1)} mm.`;
   }
+}
+
+/** Names of findings as the start of a sentence. @param {Set<string>} enabled */
+function findingNames(enabled) {
+  const names = Object.keys(KINDS).filter((kind) => enabled.has(kind));
+  return sentences(names.join(", ").replace(/, ([^,]*)$/, " and $1")).slice(0, -1);
 }

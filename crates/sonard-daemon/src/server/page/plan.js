@@ -1,20 +1,24 @@
-// Floor plan on four layers: ground (grid, walls), under (previous scan, overlays), marks (readings, drawn as they
-// arrive), and over (robot, current beam, selection, propagation path, lengths), which changes with every beam.
+// Floor plan on five layers: ground (grid, walls), under (previous scan, overlays), marks (readings, drawn as they
+// arrive), above (findings), and over (robot, current beam, selection, propagation path, lengths), which changes with
+// every beam.
 
+import { describeReading } from "./beam.js";
 import { make } from "./dom.js";
 import { Gestures } from "./gestures.js";
 import { drawGrid, drawScaleBar, drawScene } from "./ground.js";
 import { arrow, circle, drawPose, Layer, line, PEN_NAMES } from "./layers.js";
 import { positionOf, Sketch } from "./sketch.js";
+import { Tip } from "./tip.js";
 import { View } from "./view.js";
 import { angleOffAxis, robotToWorld } from "./viewpoint.js";
 
-const HIT_PX = 24;
+/** Maximum distance of a clicked and of a hovered reading, pixels. */
+const HIT_PX = 24, HOVER_PX = 12;
 const RAD_PER_DEG = Math.PI / 180;
 /** Number of readings above which a gesture moves the layers and redraws them only after it rests. */
 const MAX_REDRAWN_READINGS = 4000;
 const REST_MS = 120;
-const LAYERS = ["ground", "under", "marks", "over"];
+const LAYERS = ["ground", "under", "marks", "above", "over"];
 
 export class Plan {
   /** `onPick(index)` is called with the clicked beam; `label` is the accessible name of the plan. */
@@ -27,7 +31,13 @@ export class Plan {
     this.ground = this.layers[0];
     this.under = this.layers[1];
     this.marks = this.layers[2];
-    this.over = this.layers[3];
+    this.above = this.layers[3];
+    this.over = this.layers[4];
+    this.tip = new Tip(stage);
+    /** Reading whose tip is shown while the pointer is over nothing else. */
+    this.tipped = null;
+    /** Frame in which the tip of a hovered point is shown. @type {number | null} */
+    this.hovering = null;
     /** Frame in which a moved view is drawn. @type {number | null} */
     this.moving = null;
     /** Timer of the full redraw after a gesture. */
@@ -46,7 +56,11 @@ export class Plan {
     this.onPick = onPick;
     /** Measuring tool, if the page has one. */
     this.measure = null;
-    /** Objects that draw below or above the readings. @type {{drawUnder?: Function, drawOver?: Function}[]} */
+    /**
+     * Objects that draw below or above the readings, and that describe what they drew at a pixel: `describeAt`
+     * before the readings, `describeUnder` after them.
+     * @type {{drawUnder?: Function, drawAbove?: Function, drawOver?: Function, describeAt?: Function, describeUnder?: Function}[]}
+     */
     this.overlays = [];
     this.onView = () => {};
     new ResizeObserver(() => this.resize()).observe(stage);
@@ -54,7 +68,8 @@ export class Plan {
     this.gestures = new Gestures(stage, this.over.canvas, this.view, {
       onMove: () => this.moveView(),
       onClick: (px) => (tool() ?? { click: (at) => this.pick(at) }).click(px),
-      onHover: (px) => tool()?.hover(px),
+      onHover: (px) => (tool() ?? this).hover(px),
+      onLeave: () => this.leave(),
       onKey: (event) => tool()?.key(event) || this.key(event),
     });
   }
@@ -78,7 +93,9 @@ export class Plan {
     this.drawUnder();
     this.marks.clear(this.view);
     this.drawReadings(this.readings());
+    this.drawAbove();
     this.drawOver();
+    this.showTip();
     this.onView();
   }
 
@@ -88,8 +105,9 @@ export class Plan {
       this.moving = null;
       if (this.readings().length + this.previousReadings().length <= MAX_REDRAWN_READINGS) return this.redraw();
       this.drawGround();
-      for (const layer of [this.under, this.marks]) layer.shift(this.view);
+      for (const layer of [this.under, this.marks, this.above]) layer.shift(this.view);
       this.drawOver();
+      this.showTip();
       clearTimeout(this.resting);
       this.resting = setTimeout(() => this.redraw(), REST_MS);
     });
@@ -108,6 +126,7 @@ export class Plan {
   select(ping, path = null) {
     this.selected = ping;
     this.path = path;
+    this.showTip(ping);
     if (this.view.width) this.drawOver();
   }
 
@@ -204,16 +223,17 @@ export class Plan {
 
   /** Draws all layers on one canvas context, for a picture. */
   drawOn(c) {
-    const own = [this.ground, this.under, this.marks, this.over];
+    const own = [this.ground, this.under, this.marks, this.above, this.over];
     const all = new Layer(null, c);
     // The shared context accumulates the layers.
     all.clear = () => {};
-    this.ground = this.under = this.marks = this.over = all;
+    this.ground = this.under = this.marks = this.above = this.over = all;
     this.drawGround();
     this.drawUnder();
     this.drawReadings(this.readings());
+    this.drawAbove();
     this.drawOver();
-    [this.ground, this.under, this.marks, this.over] = own;
+    [this.ground, this.under, this.marks, this.above, this.over] = own;
   }
 
   sketch(layer, scan = this.scan) {
@@ -242,6 +262,11 @@ export class Plan {
 
   drawReadings(pings) {
     if (this.scan) this.sketch(this.marks).readings(pings);
+  }
+
+  drawAbove() {
+    this.above.clear(this.view);
+    for (const overlay of this.overlays) overlay.drawAbove?.(this.above, this);
   }
 
   drawOver() {
@@ -298,8 +323,14 @@ export class Plan {
   }
 
   /** Picks the beam whose mark is nearest to a click, else the one whose direction is. */
-  pick([x, y]) {
-    let [best, nearest_px] = [null, HIT_PX];
+  pick(px) {
+    const best = this.readingAt(px, HIT_PX) ?? this.beamTowards(this.view.world(px));
+    if (best) this.onPick(best.index);
+  }
+
+  /** Reading whose mark is nearest to a pixel, within `max_px`. */
+  readingAt([x, y], max_px) {
+    let [best, nearest_px] = [null, max_px];
     for (const ping of this.readings()) {
       const at = positionOf(ping);
       if (!at) continue;
@@ -307,8 +338,33 @@ export class Plan {
       const distance_px = Math.hypot(u - x, v - y);
       if (distance_px < nearest_px) [best, nearest_px] = [ping, distance_px];
     }
-    best ??= this.beamTowards(this.view.world([x, y]));
-    if (best) this.onPick(best.index);
+    return best;
+  }
+
+  /** Shows what is drawn at a pixel, at most once per frame. */
+  hover(px) {
+    cancelAnimationFrame(this.hovering);
+    this.hovering = requestAnimationFrame(() => {
+      const ask = (/** @type {"describeAt" | "describeUnder"} */ how) => this.overlays.map((overlay) => overlay[how]?.(px, this)).find((text) => text);
+      const reading = () => this.readingAt(px, HOVER_PX);
+      const text = ask("describeAt") ?? (reading() ? describeReading(reading()) : ask("describeUnder"));
+      if (text) this.tip.show(text, px);
+      else this.showTip();
+    });
+  }
+
+  leave() {
+    cancelAnimationFrame(this.hovering);
+    this.showTip();
+  }
+
+  /** Shows the value of a reading next to its mark, until another one is given; `null` hides it. */
+  showTip(ping = this.tipped) {
+    this.tipped = ping;
+    const at = ping && this.scan && !this.measure?.on && this.view.width ? positionOf(ping) : null;
+    const px = at && this.view.px(at);
+    if (px && !this.view.isOutside(px)) this.tip.show(describeReading(ping), px);
+    else this.tip.hide();
   }
 
   beamTowards(point) {

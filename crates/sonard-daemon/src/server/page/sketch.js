@@ -1,6 +1,6 @@
 // Readings on the floor plan, each drawn from its own viewpoint.
 
-import { arrow, disc, drawFace } from "./layers.js";
+import { arrow, disc, drawFace, drawSector } from "./layers.js";
 import { MARKS, draw } from "./verdicts.js";
 import { pointAt } from "./viewpoint.js";
 
@@ -34,7 +34,10 @@ export class Sketch {
     const placed = pings.filter((ping) => ping.viewpoint);
     this.minRangeArcs(placed);
     for (const ping of placed) {
-      if (ping.ranger) this.transducer(ping);
+      if (ping.ranger) {
+        this.lobe(ping);
+        this.transducer(ping);
+      }
       if (ping.sim?.range_m != null) this.mark("prediction", ping, ping.sim.range_m);
     }
     for (const ping of placed) {
@@ -93,6 +96,17 @@ export class Sketch {
     }
   }
 
+  /** Draws the main lobe of a ranger at rest on its robot, up to its reading or the edge of the view. */
+  lobe(ping) {
+    const { end, turn } = this.ray(ping);
+    const from = this.from(ping);
+    const radius = ping.range_m === null ? Math.hypot(end[0] - from[0], end[1] - from[1]) : ping.range_m * this.view.scale;
+    const c = this.layer.pen("lobe", this.palette);
+    c.globalAlpha = 0.6;
+    drawSector(c, from, turn, halfLobe(this.scan.session), radius);
+    c.globalAlpha = 1;
+  }
+
   transducer(ping) {
     const c = this.layer.pen("transducer", this.palette);
     drawFace(c, this.from(ping), this.ray(ping).turn, Math.max(3, FACE_M * this.view.scale));
@@ -115,4 +129,11 @@ export class Sketch {
     const size = this.occupied.size;
     return this.occupied.add(`${kind} ${Math.round(x)} ${Math.round(y)}`).size > size;
   }
+}
+
+/** Half angle of the main lobe, radians: asin(0.61 lambda / a) for a piston of radius a, else that of the minimum-range arc. */
+function halfLobe(session) {
+  const { aperture, frequency_hz } = session?.sensor ?? {};
+  if (!aperture?.radius_m) return ARC_DEG * RAD_PER_DEG;
+  return Math.asin(Math.min(1, (0.61 * session.air.sound_speed_m_s) / frequency_hz / aperture.radius_m));
 }

@@ -94,15 +94,19 @@ function showHealth(status, health) {
   setLamp(byId("healthy"), health.healthy ? "good" : "bad", text);
   const device = status.device;
   const quantity = (figure, unit, digits = 1) => (figure === null ? "–" : `${figure.toFixed(digits)} ${unit}`);
+  // A simulation has neither a port nor a clock.
+  const ofDevice = (/** @type {string[][]} */ ...facts) => (status.simulation ? [] : facts);
   format.showFacts(byId("health"), [
     ["Device", device ? `${device.serial}, firmware ${device.firmware}` : status.simulation ? "none (simulation)" : "–"],
-    ["Port", port(status.link)],
+    ...ofDevice(["Port", port(status.link)]),
     ["Scans", `${scans.completed} completed, ${scans.stopped} stopped, ${scans.failed} failed`],
     ["Beams", `${scans.beams} measured, ${scans.missing} missing`],
-    ["Serial link", `${line.crc_errors} checksum errors, ${line.framing_errors} framing errors`],
-    ["Repairs", `${line.retries} retries, ${line.repaired} readings re-requested`],
-    ["Losses", `${format.count(line.losses, "disconnect")}, ${format.count(scans.restarts, "device reset")}`],
-    ["Clock", `${quantity(clock.drift_ppm, "ppm")} drift, ${quantity(clock.sigma_us, "µs")} sigma`],
+    ...ofDevice(
+      ["Serial link", `${line.crc_errors} checksum errors, ${line.framing_errors} framing errors`],
+      ["Repairs", `${line.retries} retries, ${line.repaired} readings re-requested`],
+      ["Losses", `${format.count(line.losses, "disconnect")}, ${format.count(scans.restarts, "device reset")}`],
+      ["Clock", `${quantity(clock.drift_ppm, "ppm")} drift, ${quantity(clock.sigma_us, "µs")} sigma`],
+    ),
     ["Log", status.log.file ? `${status.log.file.split("/").at(-1)}, ${status.log.waiting} queued` : "–"],
     ["Records", `${status.log.written} written, ${status.log.synced} synced`],
     ["Clients", `${status.subscribers.now}, ${status.subscribers.dropped_readings} readings dropped`],

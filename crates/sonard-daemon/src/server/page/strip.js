@@ -15,6 +15,7 @@ export class Strip {
     const canvas = make("canvas", { id: "strip", role: "img", ariaLabel: `Residual: ${CAPTION}` });
     this.title = make("h2", { textContent: "Residual" });
     this.caption = make("p", { textContent: CAPTION });
+    this.section = section;
     section.append(make("div", { className: "head" }, this.title, this.caption), canvas);
     this.c = canvas.getContext("2d");
     this.width = 0;
@@ -43,20 +44,32 @@ export class Strip {
 
   redraw(palette = this.palette) {
     this.palette = palette;
+    this.section.hidden = this.isEmpty();
     if (!this.width) return;
     this.setScale();
     this.c.clearRect(0, 0, this.width, this.height);
     this.drawAxes();
     for (const ping of this.drawn()) this.drawResidual(ping);
-    if (this.selected) drawVertical(this.c, this.x(this.selected.azimuth_deg), [TOP, this.height - BOTTOM], this.palette["--ray"]);
+    if (this.selected) drawVertical(this.c, this.x(this.selected), [TOP, this.height - BOTTOM], this.palette["--ray"]);
   }
 
   /** Draws the readings received since the last frame. */
   addReadings(pings) {
-    if (!this.width) return;
+    if (!this.width || this.section.hidden) return;
     const fresh = pings.filter((ping) => this.valueOf(ping) !== null);
     if (fresh.some((ping) => Math.abs(1e3 * this.valueOf(ping)) > this.max_mm)) return this.redraw();
     for (const ping of fresh) this.drawResidual(ping);
+  }
+
+  /** Returns `true` if the scan's readings have no predictions, as those of a simulation. */
+  isEmpty() {
+    const isSimulated = this.scan?.session?.provenance === "simulated";
+    return isSimulated && ![...this.scan.beams.values()].some(({ sim }) => sim);
+  }
+
+  /** Names of an array's rangers, each of which has a column. @returns {string[] | undefined} */
+  get rangers() {
+    return this.scan?.session?.array?.rangers?.map((ranger) => ranger.id);
   }
 
   /** Readings with a value. */
@@ -87,7 +100,8 @@ export class Strip {
     return this.scan?.start.plan ?? { from_deg: 0, to_deg: 360 };
   }
 
-  x(azimuth_deg) {
+  x({ index, azimuth_deg }) {
+    if (this.rangers) return LEFT + ((index + 0.5) / this.scan.planned) * (this.width - LEFT - RIGHT);
     const { from_deg, to_deg } = this.plan;
     const along = (((azimuth_deg - from_deg) % 360) + 360) % 360;
     return LEFT + (along / (to_deg - from_deg)) * (this.width - LEFT - RIGHT);
@@ -119,6 +133,10 @@ export class Strip {
       c.stroke();
       c.fillText(mm > 0 ? `+${mm}` : mm < 0 ? `−${-mm}` : "0", LEFT - 6, y);
     }
+    c.textAlign = "center";
+    const { rangers } = this;
+    rangers?.forEach((id, index) => c.fillText(id, this.x({ index, azimuth_deg: 0 }), this.height - 7));
+    if (rangers) return;
     const { from_deg, to_deg } = this.plan;
     const span = to_deg - from_deg;
     const step = [1, 2, 5, 10, 15, 30, 45, 90].find((step) => span / step <= Math.max(3, (right - LEFT) / 60)) ?? 90;
@@ -132,13 +150,13 @@ export class Strip {
   drawResidual(ping) {
     const mm = 1e3 * this.valueOf(ping);
     const mark = MARKS[ping.mark].shape === "tick" ? "unexplained" : ping.mark;
-    draw(this.c, mark, this.x(ping.azimuth_deg), this.y(mm), 2.2, this.palette[MARKS[mark].colour]);
+    draw(this.c, mark, this.x(ping), this.y(mm), 2.2, this.palette[MARKS[mark].colour]);
   }
 
   pick(x) {
     const pings = [...(this.scan?.beams.values() ?? [])];
     if (!pings.length) return;
-    const distance = (ping) => Math.abs(this.x(ping.azimuth_deg) - x);
+    const distance = (ping) => Math.abs(this.x(ping) - x);
     this.onPick(pings.reduce((a, b) => (distance(b) < distance(a) ? b : a)).index);
   }
 }

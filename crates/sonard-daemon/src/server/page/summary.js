@@ -12,6 +12,8 @@ export class Summary {
     this.timer = null;
     /** Latest news of the scan, deferred until the timer ends. */
     this.pending = null;
+    /** Summary of the last complete scan, which stays while the next one is running. */
+    this.last = "";
   }
 
   /** Shows a text at once. */
@@ -37,10 +39,11 @@ export class Summary {
   }
 
   scanStarted(scan) {
-    this.setNews(`Scanning ${count(scan.planned, "beam")}`);
+    this.setNews(sentences(`Scanning ${count(scan.planned, "beam")}`, this.last && `last scan: ${this.last}`));
   }
 
   scanEnded(scan) {
+    this.last = scan.summary();
     this.setNews(sentences(scan.isStopped ? scan.summary() : `Scan complete: ${scan.summary()}`));
   }
 

@@ -13,9 +13,11 @@ export class SvgContext {
   constructor(width, height) {
     this.width = width;
     this.height = height;
-    /** @type {string[]} */
+    /** Elements; the data of consecutive paths with equal attributes are joined. @type {(string | {open: string, data: string[]})[]} */
     this.parts = [];
     this.path = "";
+    /** Full circle that is the whole path. @type {number[] | null} */
+    this.circle = null;
     /** @type {object[]} */
     this.saved = [];
     this.measure = new OffscreenCanvas(1, 1).getContext("2d");
@@ -36,7 +38,7 @@ export class SvgContext {
   file(title) {
     const { width, height } = this;
     const head = `<svg xmlns="http://www.w3.org/2000/svg" width="${n(width)}" height="${n(height)}" viewBox="0 0 ${n(width)} ${n(height)}">`;
-    return `${head}<title>${escaped(title)}</title>\n${this.parts.join("\n")}\n</svg>\n`;
+    return `${head}<title>${escaped(title)}</title>\n${this.parts.map(textOf).join("\n")}\n</svg>\n`;
   }
 
   /** Draws into a nested viewport, clipped at a box. @param {number[]} box @param {() => void} draw */
@@ -72,6 +74,7 @@ export class SvgContext {
 
   beginPath() {
     this.path = "";
+    this.circle = null;
   }
 
   moveTo(x, y) {
@@ -86,6 +89,7 @@ export class SvgContext {
   arc(x, y, r, from, to) {
     const end = (turn) => `${n(x + r * Math.cos(turn))} ${n(y + r * Math.sin(turn))}`;
     const isFullCircle = to - from >= 2 * Math.PI - 1e-9;
+    this.circle = isFullCircle && !this.path ? [x, y, r] : null;
     this.path += `${this.path ? "L" : "M"}${end(from)}`;
     // SVG omits an arc whose end equals its start, so a full circle takes two.
     if (isFullCircle) this.path += `A${n(r)} ${n(r)} 0 0 1 ${end(from + Math.PI)}`;
@@ -95,11 +99,29 @@ export class SvgContext {
   stroke() {
     const dash = this.dash.length ? ` stroke-dasharray="${this.dash.join(" ")}"` : "";
     const join = this.lineJoin === "miter" ? "" : ` stroke-linejoin="${this.lineJoin}"`;
-    this.put(`path d="${this.path}" fill="none" stroke="${this.strokeStyle}" stroke-width="${this.lineWidth}"${dash}${join}`);
+    this.putPath(this.path, `fill="none" stroke="${this.strokeStyle}" stroke-width="${this.lineWidth}"${dash}${join}`);
   }
 
   fill() {
-    this.put(`path d="${this.path}" fill="${this.fillStyle}"`);
+    if (!this.circle) return this.putPath(this.path, `fill="${this.fillStyle}"`);
+    // The round cap of a line without length is the shortest disc.
+    const [x, y, r] = this.circle;
+    this.putPath(`M${n(x)} ${n(y)}h0`, `fill="none" stroke="${this.fillStyle}" stroke-width="${n(2 * r)}" stroke-linecap="round"`);
+  }
+
+  /** @param {string} data @param {string} attributes */
+  putPath(data, attributes) {
+    const open = `path ${attributes}${this.placement()}`;
+    const last = this.parts.at(-1);
+    // Overlaps of translucent parts would change.
+    if (typeof last === "object" && last.open === open && this.globalAlpha === 1) last.data.push(data);
+    else this.parts.push({ open, data: [data] });
+  }
+
+  /** Opacity and transform of the next element. */
+  placement() {
+    const alpha = this.globalAlpha < 1 ? ` opacity="${this.globalAlpha}"` : "";
+    return `${alpha}${this.transform ? ` transform="${this.transform}"` : ""}`;
   }
 
   fillRect(x, y, width, height) {
@@ -123,8 +145,9 @@ export class SvgContext {
 
   /** @param {string} open @param {string} [content] */
   put(open, content) {
-    const alpha = this.globalAlpha < 1 ? ` opacity="${this.globalAlpha}"` : "";
-    const turn = this.transform ? ` transform="${this.transform}"` : "";
-    this.parts.push(`<${open}${alpha}${turn}${content === undefined ? "/>" : `>${content}</text>`}`);
+    this.parts.push(`<${open}${this.placement()}${content === undefined ? "/>" : `>${content}</text>`}`);
   }
 }
+
+/** @param {string | {open: string, data: string[]}} part */
+const textOf = (part) => (typeof part === "string" ? part : `<${part.open} d="${part.data.join("")}"/>`);

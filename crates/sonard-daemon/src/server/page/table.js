@@ -2,10 +2,10 @@
 
 import { make } from "./dom.js";
 import { MARKS } from "./verdicts.js";
-import { setText } from "./format.js";
+import { distanceFigure, setText, unitName } from "./format.js";
 
 const TITLE = "Table of beams";
-const COLUMNS = ["Beam", "Azimuth (°)", "Range (m)", "Predicted (m)", "Residual (mm)", "Verdict"];
+const columns = () => ["Beam", "Azimuth (°)", `Range (${unitName()})`, `Predicted (${unitName()})`, "Residual (mm)", "Verdict"];
 /** Maximum number of rows, to keep the page responsive. */
 const MAX_ROWS = 4000;
 const cell = (figure, digits) => (figure === null || figure === undefined ? "–" : figure.toFixed(digits));
@@ -14,7 +14,8 @@ export class BeamTable {
   constructor(details) {
     this.details = details;
     this.body = make("tbody");
-    const head = make("tr", {}, ...COLUMNS.map((textContent) => make("th", { scope: "col", textContent })));
+    this.heads = columns().map((textContent) => make("th", { scope: "col", textContent }));
+    const head = make("tr", {}, ...this.heads);
     const scroll = make("div", { className: "scroll", role: "region", ariaLabel: TITLE, tabIndex: 0 });
     scroll.append(make("table", {}, make("thead", {}, head), this.body));
     this.more = make("p", { className: "hint" });
@@ -25,6 +26,7 @@ export class BeamTable {
   }
 
   redraw() {
+    columns().forEach((text, i) => setText(this.heads[i], text));
     this.rows.clear();
     this.body.replaceChildren();
     if (this.scan) this.addReadings([...this.scan.beams.values()]);
@@ -59,7 +61,7 @@ function makeRow(ping) {
   head.textContent = ping.index;
   const residual_mm = ping.residual_m === null ? null : 1e3 * ping.residual_m;
   for (const text of [
-    cell(ping.azimuth_deg, 1), cell(ping.range_m, 4), cell(ping.sim?.range_m, 4), cell(residual_mm, 1), MARKS[ping.mark].label,
+    cell(ping.azimuth_deg, 1), distanceFigure(ping.range_m), distanceFigure(ping.sim?.range_m), cell(residual_mm, 1), MARKS[ping.mark].label,
   ]) {
     row.appendChild(document.createElement("td")).textContent = text;
   }

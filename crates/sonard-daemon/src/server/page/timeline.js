@@ -26,6 +26,7 @@ export class TimeLine {
     /** Oldest first. @type {any[]} */
     this.scans = [];
     this.shown = null;
+    this.more = false;
     this.palette = null;
     this.slider.addEventListener("input", () => {
       const scan = this.scans[this.slider.value];
@@ -43,6 +44,7 @@ export class TimeLine {
     this.slider.max = Math.max(0, scans.length - 1);
     this.slider.disabled = scans.length === 0;
     this.older.disabled = !more;
+    this.more = more;
     const at = shown === null ? scans.length - 1 : this.scans.findIndex(({ scan }) => scan === shown);
     this.slider.value = at < 0 ? 0 : at;
     this.updateLabel(this.scans[at]);
@@ -52,7 +54,7 @@ export class TimeLine {
   updateLabel(scan) {
     if (!scan) return setText(this.label, this.scans.length ? "scan not in the list" : "no scan yet");
     const at = this.scans.indexOf(scan) + 1;
-    const text = `scan ${at} of ${this.scans.length}, ${clock(scan.time)}, ${scan.end ? count(scan.end.beams, "beam") : this.isRunning(scan.scan) ? "running" : "incomplete"}`;
+    const text = `scan ${at} of ${this.scans.length}${this.more ? " loaded" : ""}, ${clock(scan.time)}, ${scan.end ? count(scan.end.beams, "beam") : this.isRunning(scan.scan) ? "running" : "incomplete"}`;
     setText(this.label, text);
     this.slider.setAttribute("aria-valuetext", text);
   }

@@ -1,12 +1,12 @@
 // Echo trace of a beam: predicted envelope and detection threshold (dB) versus range, with measured echoes.
 
-import { arrow, drawVertical } from "./layers.js";
+import { arrow, drawVertical, line } from "./layers.js";
+import { inUnit, unitName } from "./format.js";
 
 /** @import { Beam, Peak, Trace } from "../../../../../web/playground/engine.js" */
 
 const LEFT = 44, RIGHT = 10, TOP = 18, BOTTOM = 24;
 const MAX_DB = 6, MIN_DB = -60;
-const STEPS_M = [0.05, 0.1, 0.2, 0.5, 1, 2, 5];
 const HIT_PX = 20;
 const FONT = "11px system-ui, sans-serif";
 
@@ -26,6 +26,8 @@ export class EchoTrace {
     this.selected = null;
     /** @type {Record<string, string> | null} */
     this.palette = null;
+    /** Time after firing up to which the trace is emphasized, microseconds; `null` for all of it. @type {number | null} */
+    this.cursor_us = null;
     this.onPick = onPick;
     new ResizeObserver(() => this.resize()).observe(canvas);
     canvas.addEventListener("click", (event) => this.pick(event.offsetX));
@@ -59,6 +61,7 @@ export class EchoTrace {
     this.drawBlanking(palette, trace);
     this.drawLine(trace.threshold, palette["--min-range"], [5, 4]);
     this.drawLine(trace.envelope, palette["--direct"], []);
+    if (this.cursor_us !== null) this.drawCursor(palette, this.cursor_us * trace.m_per_us);
     for (const peak of peaks) this.drawPeak(palette, peak);
     for (const echo of this.beam.echoes ?? []) this.drawEcho(palette, echo);
     if (reading.range_m !== null) this.drawRange(reading.range_m, palette["--wall"]);
@@ -100,14 +103,15 @@ export class EchoTrace {
       c.stroke();
       c.fillText(db ? `−${-db}` : "0 dB", LEFT - 5, y);
     }
-    const step = STEPS_M.find((m) => this.max_m / m <= Math.max(2, (right - LEFT) / 52)) ?? 5;
+    const max = inUnit(this.max_m);
+    const step = niceStep(max / Math.max(2, (right - LEFT) / 52));
     c.textAlign = "center";
-    for (let i = 0; i * step <= this.max_m + 1e-9; i++) {
-      const [x, m] = [this.x(i * step), i * step];
-      if (x < right - 14) c.fillText(String(Number(m.toFixed(2))), x, this.height - 10);
+    for (let i = 0; i * step <= max + 1e-9; i++) {
+      const x = this.x((i * step * this.max_m) / max);
+      if (x < right - 14) c.fillText(String(Number((i * step).toFixed(2))), x, this.height - 10);
     }
     c.textAlign = "right";
-    c.fillText("m", right, this.height - 10);
+    c.fillText(unitName(), right, this.height - 10);
   }
 
   /**
@@ -160,6 +164,15 @@ export class EchoTrace {
     c.fill();
   }
 
+  /** Fades what is to come. @param {Record<string, string>} palette @param {number} range_m */
+  drawCursor(palette, range_m) {
+    const [x, right] = [this.x(range_m), this.width - RIGHT];
+    [this.c.fillStyle, this.c.globalAlpha] = [palette["--panel"], 0.72];
+    if (x < right) this.c.fillRect(x, TOP, right - x, this.height - TOP - BOTTOM);
+    this.c.globalAlpha = 1;
+    drawVertical(this.c, Math.min(x, right), [TOP, this.height - BOTTOM], palette["--path"]);
+  }
+
   /** @param {number} range_m @param {string} colour */
   drawRange(range_m, colour) {
     const x = this.x(range_m);
@@ -174,23 +187,30 @@ export class EchoTrace {
     arrow(this.c, [x, TOP + 4], Math.PI / 2, [5, 4, 4]);
   }
 
-  /** @param {Record<string, string>} palette */
+  /** Draws the legend with the symbols of the plot. @param {Record<string, string>} palette */
   drawLegend(palette) {
     const { c } = this;
+    const across = (/** @type {number} */ x, /** @type {number[]} */ dash) => {
+      c.setLineDash(dash);
+      c.lineWidth = 1.4;
+      line(c, [[x, 9], [x + 14, 9]]);
+      c.setLineDash([]);
+    };
+    /** @type {[string, string, (x: number, colour: string) => void][]} */
     const entries = [
-      ["envelope", "--direct"],
-      ["threshold", "--min-range"],
-      ["reading", "--wall"],
+      ["envelope", "--direct", (x) => across(x, [])],
+      ["threshold", "--min-range", (x) => across(x, [5, 4])],
+      ["reading", "--wall", (x, colour) => drawVertical(c, x + 7, [3, 15], colour)],
+      ["arrival", "--muted", (x) => arrow(c, [x + 7, 9], -Math.PI / 2, [3, 3, 3])],
     ];
-    if (this.beam?.echoes?.length) entries.push(["echoes", "--ray"]);
-    c.textAlign = "left";
-    let x = LEFT;
-    for (const [text, colour] of entries) {
-      c.fillStyle = palette[colour];
-      c.fillRect(x, 8, 12, 2);
-      c.fillStyle = palette["--muted"];
-      c.fillText(text, x + 16, 9);
-      x += 28 + c.measureText(text).width;
+    if (this.beam?.echoes?.length) entries.push(["echo", "--ray", (x) => arrow(c, [x + 7, 9], Math.PI / 2, [5, 4, 4])]);
+    let x = 8;
+    for (const [text, name, drawSymbol] of entries) {
+      c.strokeStyle = c.fillStyle = palette[name];
+      drawSymbol(x, palette[name]);
+      [c.fillStyle, c.textAlign] = [palette["--muted"], "left"];
+      c.fillText(text, x + 17, 9);
+      x += 27 + c.measureText(text).width;
     }
   }
 
@@ -203,4 +223,10 @@ export class EchoTrace {
     );
     if (nearest && distance(nearest) <= HIT_PX) this.onPick(nearest);
   }
+}
+
+/** Least step of the series 1, 2, 5 that is at least `min`. @param {number} min */
+function niceStep(min) {
+  const decade = 10 ** Math.floor(Math.log10(min));
+  return (/** @type {number} */ ([1, 2, 5, 10].find((factor) => factor * decade >= min - 1e-12)) ?? 10) * decade;
 }

@@ -19,9 +19,16 @@ export const MARKS = {
 /** Mark of a reading, from its status and the daemon's verdict. */
 export function markOf(ping) {
   const hasRange = ping.range_m !== null && (ping.status === "echo" || ping.status === "min_range");
-  if (hasRange) return ping.verdict in MARKS ? ping.verdict : ping.status === "echo" ? "echo" : "min_range";
+  if (hasRange && ping.verdict in MARKS) return ping.verdict;
+  if (hasRange) return ping.status !== "echo" ? "min_range" : ping.path ? causeOf(ping) : "echo";
   if (ping.status !== "no_echo") return "invalid";
   return ping.verdict === "unexplained" ? "missed_echo" : "no_echo";
+}
+
+/** Mark of a simulated reading, by its propagation path. */
+function causeOf({ path: { kind, order } }) {
+  if (kind === "diffracted") return "edge";
+  return order > 1 ? "multiple" : "direct";
 }
 
 /** Draws a mark of half-width r at x, y; `direction` is the outward direction of a tick, radians. */

@@ -2,13 +2,15 @@
 
 import { make } from "./dom.js";
 import { drawVertical } from "./layers.js";
-import { clock, count, degrees, metres, setText } from "./format.js";
+import { clock, count, degrees, distance, distanceFigure, setText, time as timeOfDay } from "./format.js";
 
 /** Maximum numbers of rows and columns; adjacent beams share a column if a scan has more. */
 const MAX_ROWS = 200, MAX_COLUMNS = 1024;
 /** Scans loaded from the log when the section is opened, and the maximum number of beams of such a scan. */
 const MAX_LOADED = 40, MAX_LOADED_BEAMS = 4000;
-const ROW_PX = 4, LEFT = 46, RIGHT = 10, FOOT = 18;
+const ROW_PX = 4, LEFT = 62, RIGHT = 10, FOOT = 18, BAR = 18;
+/** Least distance of two times at the left, and width of the colour bar, pixels. */
+const TIME_PX = 14, BAR_PX = 120;
 const SERIES_PX = 110, TOP = 8;
 const FONT = "11px system-ui, sans-serif";
 /** Viridis, from near (dark) to far (light); monotonic in lightness, so it needs no colour vision. */
@@ -27,7 +29,7 @@ export class Waterfall {
     this.caption = make("p", { className: "hint" });
     this.label = make("p", { id: "series-label", className: "hint" });
     details.append(make("summary", { textContent: "Scans over time" }), this.caption, this.canvas, this.label, this.series);
-    /** Newest first. @type {{id: string, time: number, planned: number, ranges: Float32Array, plan: any}[]} */
+    /** Newest first. @type {{id: string, time: number, planned: number, ranges: Float32Array, plan: any, rangers?: string[]}[]} */
     this.rows = [];
     this.selected = null;
     this.palette = null;
@@ -45,7 +47,8 @@ export class Waterfall {
     const existing = this.rows.find(({ id }) => id === scan.id);
     if (existing) return existing;
     const ranges = new Float32Array(Math.min(MAX_COLUMNS, Math.max(1, scan.planned))).fill(NaN);
-    const row = { id: scan.id, time: Date.parse(scan.start.time), planned: scan.planned, ranges, plan: scan.start.plan };
+    const rangers = scan.session?.array?.rangers?.map((ranger) => ranger.id);
+    const row = { id: scan.id, time: Date.parse(scan.start.time), planned: scan.planned, ranges, plan: scan.start.plan, rangers };
     const at = this.rows.findIndex(({ time }) => time <= row.time);
     this.rows.splice(at < 0 ? this.rows.length : at, 0, row);
     this.rows.length = Math.min(this.rows.length, MAX_ROWS);
@@ -65,13 +68,13 @@ export class Waterfall {
     this.redrawSoon();
   }
 
-  /** Loads past scans one after the other while the section is open. */
-  async load() {
+  /** Loads past scans one after the other while the section is open, or for a file. */
+  async load(forFile = false) {
     this.redrawSoon();
-    if (this.loading || !this.details.open) return;
+    if ((this.loading && !forFile) || !(forFile || this.details.open)) return;
     this.loading = true;
     for (const { scan: id, end } of this.callbacks.known().slice(0, MAX_LOADED)) {
-      if (!this.details.open) break;
+      if (!forFile && !this.details.open) break;
       if (this.rows.some((row) => row.id === id) || !end || end.beams > MAX_LOADED_BEAMS) continue;
       const scan = await this.callbacks.get(id).catch(() => null);
       if (scan) this.add(scan, [...scan.beams.values()]);
@@ -92,8 +95,9 @@ export class Waterfall {
   redraw() {
     const farthest = this.rows.flatMap(({ ranges }) => ranges.reduce((max, m) => (m > max && m < Infinity ? m : max), 0));
     this.max_m = Math.max(0.5, ...farthest);
-    setText(this.caption, `one row per scan, newest on top; colour: range, dark 0 m to light ${metres(this.max_m)}; blank: no echo`);
-    const c = this.size(this.canvas, ROW_PX * Math.max(8, this.rows.length) + FOOT);
+    const known = this.callbacks.known().length;
+    setText(this.caption, `${this.rows.length} of ${count(known, "scan")}, one row each, newest on top; blank: no echo`);
+    const c = this.size(this.canvas, ROW_PX * Math.max(8, this.rows.length) + FOOT + BAR);
     this.drawRows(c);
     this.drawSeries(this.size(this.series, SERIES_PX));
   }
@@ -109,29 +113,68 @@ export class Waterfall {
     return c;
   }
 
+  /** Azimuths of all rows, degrees. */
+  span() {
+    const plans = this.rows.map(({ plan }) => plan);
+    return [Math.min(...plans.map(({ from_deg }) => from_deg)), Math.max(...plans.map(({ to_deg }) => to_deg))];
+  }
+
+  /** Left and right end of a row, pixels: a ranger of an array has a column, another scan its azimuths. @param {any} row */
+  extent({ plan, rangers }) {
+    const [from_deg, to_deg] = rangers ? [plan.from_deg, plan.to_deg] : this.span();
+    const px = (deg) => LEFT + ((deg - from_deg) / (to_deg - from_deg)) * (this.width - LEFT - RIGHT);
+    return [px(plan.from_deg), px(plan.to_deg)];
+  }
+
   drawRows(c) {
-    const across = this.width - LEFT - RIGHT;
     c.imageSmoothingEnabled = false;
+    let next = 0;
     this.rows.forEach((row, i) => {
       const image = new OffscreenCanvas(row.ranges.length, 1);
       const look = image.getContext("2d");
       const data = look.createImageData(row.ranges.length, 1);
       row.ranges.forEach((m, at) => data.data.set(this.colour(m), 4 * at));
       look.putImageData(data, 0, 0);
-      c.drawImage(image, LEFT, i * ROW_PX, across, ROW_PX);
+      const [from, to] = this.extent(row);
+      c.drawImage(image, from, i * ROW_PX, to - from, ROW_PX);
+      if (i * ROW_PX < next) return;
+      next = i * ROW_PX + TIME_PX;
+      [c.fillStyle, c.textAlign] = [this.palette["--muted"], "right"];
+      c.fillText(timeOfDay(row.time), LEFT - 4, i * ROW_PX + 6);
     });
     const bottom = ROW_PX * Math.max(8, this.rows.length);
     c.fillStyle = this.palette["--muted"];
     const [newest] = this.rows;
+    c.textAlign = "left";
     if (!newest) return c.fillText("no scan yet", LEFT, 10);
-    const { from_deg, to_deg } = newest.plan;
+    this.drawAxis(c, newest, bottom + FOOT / 2);
+    this.drawColourBar(c, bottom + FOOT);
+    if (this.selected) drawVertical(c, this.x(newest), [0, bottom], this.palette["--path"]);
+  }
+
+  /** Labels the columns with azimuths, or with the rangers of an array. */
+  drawAxis(c, newest, y) {
+    const across = this.width - LEFT - RIGHT;
+    c.textAlign = "center";
+    newest.rangers?.forEach((id, i) => c.fillText(id, LEFT + ((i + 0.5) / newest.rangers.length) * across, y));
+    if (newest.rangers) return;
+    const [from_deg, to_deg] = this.span();
     for (const share of [0, 0.25, 0.5, 0.75, 1]) {
       c.textAlign = share === 1 ? "right" : share === 0 ? "left" : "center";
-      c.fillText(degrees(from_deg + share * (to_deg - from_deg)), LEFT + share * across, bottom + FOOT / 2);
+      c.fillText(degrees(from_deg + share * (to_deg - from_deg)), LEFT + share * across, y);
     }
+  }
+
+  drawColourBar(c, top) {
+    const gradient = c.createLinearGradient(LEFT, 0, LEFT + BAR_PX, 0);
+    COLOUR_MAP.forEach((colour, i) => gradient.addColorStop(i / (COLOUR_MAP.length - 1), `rgb(${colour})`));
+    c.fillStyle = gradient;
+    c.fillRect(LEFT, top + 4, BAR_PX, 8);
+    c.fillStyle = this.palette["--muted"];
     c.textAlign = "right";
-    for (let i = 0; i < this.rows.length; i += 10) c.fillText(i ? `−${i}` : "newest", LEFT - 4, i * ROW_PX + 6);
-    if (this.selected) drawVertical(c, this.x(this.selected.index, newest.planned), [0, bottom], this.palette["--path"]);
+    c.fillText("range 0", LEFT - 4, top + 9);
+    c.textAlign = "left";
+    c.fillText(distance(this.max_m), LEFT + BAR_PX + 5, top + 9);
   }
 
   /** Colour of a range; transparent if the reading is missing or without echo. @returns {number[]} */
@@ -142,23 +185,36 @@ export class Waterfall {
     return [...from.map((value, i) => value + (at % 1) * (to[i] - value)), 255];
   }
 
-  x(index, planned) {
-    return LEFT + ((index + 0.5) / planned) * (this.width - LEFT - RIGHT);
+  /** Horizontal place of the selected beam in a row, pixels. */
+  x(row) {
+    const [from, to] = this.extent(row);
+    return from + ((this.indexIn(row) + 0.5) / row.planned) * (to - from);
   }
 
-  /** Range of the selected beam in each row with as many beams as the newest, oldest first. */
+  /** Index of the selected beam's ranger or azimuth in a row; `NaN` if the row has none such. */
+  indexIn({ plan, planned, rangers }) {
+    const { index, azimuth_deg } = this.selected;
+    if (rangers) return index < planned ? index : NaN;
+    const { from_deg, step_deg, pings_per_stop } = plan;
+    const along_deg = (((azimuth_deg - from_deg) % 360) + 360) % 360;
+    const stop = Math.round(along_deg / step_deg);
+    const isAtStop = Math.abs(along_deg - stop * step_deg) < 0.05;
+    const at = stop * pings_per_stop + (index % pings_per_stop);
+    return isAtStop && at < planned ? at : NaN;
+  }
+
+  /** Range of the selected beam in each row that has its azimuth, oldest first. */
   values() {
-    const [newest] = this.rows;
-    if (!this.selected || !newest) return [];
-    const same = this.rows.filter(({ planned }) => planned === newest.planned);
-    const value = ({ ranges, planned, time, id }) => ({ id, time, m: ranges[Math.floor((this.selected.index / planned) * ranges.length)] });
-    return same.map(value).filter(({ m }) => !Number.isNaN(m)).reverse();
+    if (!this.selected) return [];
+    const value = (row) => ({ id: row.id, time: row.time, m: row.ranges[Math.floor((this.indexIn(row) / row.planned) * row.ranges.length)] });
+    return this.rows.map(value).filter(({ m }) => m !== undefined && !Number.isNaN(m)).reverse();
   }
 
   drawSeries(c) {
     const values = this.values();
     const ranges = values.map(({ m }) => m).filter((m) => m < Infinity);
     setText(this.label, this.seriesText(values, ranges));
+    this.series.style.visibility = ranges.length ? "" : "hidden";
     if (!ranges.length) return;
     const [min, max] = [Math.min(...ranges), Math.max(...ranges)];
     const margin = Math.max(0.001, 0.1 * (max - min));
@@ -173,7 +229,7 @@ export class Waterfall {
       c.moveTo(LEFT, y(m));
       c.lineTo(this.width - RIGHT, y(m));
       c.stroke();
-      if (m === min || max - min > 0) c.fillText(m.toFixed(4), LEFT - 4, y(m));
+      if (m === min || max - min > 0) c.fillText(distanceFigure(m), LEFT - 4, y(m));
     }
     values.forEach(({ m }, i) => {
       c.fillStyle = this.palette[m < Infinity ? "--direct" : "--no-echo"];
@@ -190,19 +246,28 @@ export class Waterfall {
 
   seriesText(values, ranges) {
     if (!this.selected) return "Select a beam to see its ranges over time.";
-    const name = `Beam ${this.selected.index} in ${count(values.length, "scan")}`;
+    const name = `Beam ${this.selected.ranger ?? this.selected.index} in ${count(values.length, "scan")}`;
     if (!ranges.length) return `${name}: no range.`;
     const mean_m = ranges.reduce((sum, m) => sum + m, 0) / ranges.length;
     const sigma_m = Math.sqrt(ranges.reduce((sum, m) => sum + (m - mean_m) ** 2, 0) / Math.max(1, ranges.length - 1));
     const without = values.length - ranges.length;
-    return `${name}: mean ${metres(mean_m)}, standard deviation ${(1e3 * sigma_m).toFixed(2)} mm${without ? `, no echo in ${without}` : ""}.`;
+    return `${name}: mean ${distance(mean_m)}, standard deviation ${(1e3 * sigma_m).toFixed(2)} mm${without ? `, no echo in ${without}` : ""}.`;
   }
 
   /** Picks the scan of a row and the beam of a column. */
   pick([x, y]) {
     const row = this.rows[Math.floor(y / ROW_PX)];
     if (!row) return;
-    const share = Math.max(0, Math.min(0.9999, (x - LEFT) / (this.width - LEFT - RIGHT)));
-    this.callbacks.onPick(row.id, Math.floor(share * row.planned));
+    const [from, to] = this.extent(row);
+    const share = (x - from) / (to - from);
+    if (share >= 0 && share < 1) this.callbacks.onPick(row.id, Math.floor(share * row.planned));
+  }
+
+  /** Ranges of the selected beam over time as CSV. Loads past scans first. */
+  async csv() {
+    await this.load(true);
+    const azimuth_deg = this.selected.azimuth_deg;
+    const lines = this.values().map(({ id, time, m }) => [id, new Date(time).toISOString(), azimuth_deg, m < Infinity ? m : ""].join());
+    return `scan,time,azimuth_deg,range_m\n${lines.join("\n")}\n`;
   }
 }

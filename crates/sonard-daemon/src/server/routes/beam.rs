@@ -21,7 +21,8 @@ const STEP_US: f64 = 20.0;
 pub(super) fn describe_beam(view: &ScanView, ping: Ping, scene: Option<&Scene>) -> Beam {
     let session = view.session.as_deref();
     let echoes = echoes(view, session, &ping);
-    let (peaks, trace, lacks) = match predict(view, session, &ping, scene) {
+    let measured_m = echoes.iter().filter_map(|echo| echo.range_m).fold(0.0, f64::max);
+    let (peaks, trace, lacks) = match predict(view, session, &ping, scene, measured_m) {
         Ok((peaks, trace)) => (Some(peaks), Some(trace), None),
         Err(lacks) => (None, None, Some(lacks)),
     };
@@ -56,6 +57,7 @@ fn predict(
     session: Option<&Session>,
     ping: &Ping,
     scene: Option<&Scene>,
+    measured_m: f64,
 ) -> Result<(Vec<PeakLine>, TraceLine), String> {
     let (session, pose) =
         session.zip(view.pose()).ok_or("the log does not contain the scan's session")?;
@@ -71,7 +73,7 @@ fn predict(
     let scene = Arc::new(session.scene_with_robot(scene, &ping.pose.unwrap_or(pose)));
     let sensor = session.sensor_for(ping);
     let last_echo_m = [ping.range_m, ping.sim.as_ref().and_then(|sim| sim.range_m)];
-    let last_echo_m = last_echo_m.into_iter().flatten().fold(0.0, f64::max);
+    let last_echo_m = last_echo_m.into_iter().flatten().fold(measured_m, f64::max);
     let until_m = options.max_range_m.unwrap_or(sensor.max_range_m);
     let until_m = if last_echo_m > 0.0 { until_m.min(last_echo_m + MARGIN_M) } else { until_m };
     let options = Options { max_range_m: Some(until_m), ..options };

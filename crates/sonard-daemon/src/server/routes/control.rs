@@ -1,7 +1,9 @@
 //! Handlers of requests that change settings, and that start and stop scans.
 
-use axum::{Json, extract::State, http::StatusCode};
-use sonard_api::{Accepted, AirOrder, CancelRequest, ScanRequest, Scanning, SensorOrder, Started};
+use axum::{Extension, Json, extract::State, http::StatusCode};
+use sonard_api::{
+    Accepted, AccessReport, AirOrder, CancelRequest, ScanRequest, Scanning, SensorOrder, SettingsOrder, Started,
+};
 use sonard_model::geometry::Pose;
 use sonard_records::ScanPlan;
 
@@ -9,6 +11,7 @@ use crate::{
     Order,
     server::{
         Api,
+        access::Principal,
         openapi::Route,
         response::{ApiError, JsonBody},
     },
@@ -19,6 +22,8 @@ type CommandResult = Result<(StatusCode, Json<Accepted>), ApiError>;
 pub(super) fn endpoints() -> Vec<Route> {
     let accepted = "Accepted; takes effect with the next scan";
     vec![
+        Route::get("/v1/access", access, "Permission of this client to change settings")
+            .responds::<AccessReport>(200, "Permission"),
         Route::post("/v1/start", start, "Start scans, or resume the scan mode")
             .accepts::<ScanRequest>()
             .responds::<Started>(202, "Accepted"),
@@ -32,6 +37,9 @@ pub(super) fn endpoints() -> Vec<Route> {
             .responds::<Accepted>(202, "Accepted"),
         Route::post("/v1/stop", stop, "End the current scan and stop scanning until a start")
             .responds::<Accepted>(202, "Accepted"),
+        Route::put("/v1/settings", settings, "Set several of plan, pose, air and sensor, or none")
+            .accepts::<SettingsOrder>()
+            .responds::<Accepted>(202, accepted),
         Route::put("/v1/plan", plan, "Set the azimuths of scans")
             .accepts::<ScanPlan>()
             .responds::<Accepted>(202, accepted),
@@ -53,6 +61,13 @@ pub(super) fn endpoints() -> Vec<Route> {
         Route::delete("/v1/sensor", reset_sensor, "Reset the sensor to the configuration")
             .responds::<Accepted>(202, accepted),
     ]
+}
+
+async fn access(
+    State(api): State<Api>,
+    Extension(principal): Extension<Principal>,
+) -> Json<AccessReport> {
+    Json(AccessReport { write: api.access.write_access(principal) })
 }
 
 async fn start(
@@ -83,6 +98,13 @@ async fn set_scanning(
 
 async fn stop(State(api): State<Api>) -> CommandResult {
     execute(&api, Order::Stop).await
+}
+
+async fn settings(
+    State(api): State<Api>,
+    JsonBody(order): JsonBody<SettingsOrder>,
+) -> CommandResult {
+    execute(&api, Order::Settings(Box::new(order))).await
 }
 
 async fn plan(State(api): State<Api>, JsonBody(plan): JsonBody<ScanPlan>) -> CommandResult {

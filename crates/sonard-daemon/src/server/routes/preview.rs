@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use axum::{Json, extract::State, http::StatusCode};
 use jiff::Timestamp;
-use sonard_api::{AirOrder, AnnotatedPing, Classification, PreviewRequest, WholeScan};
+use sonard_api::{AirOrder, AnnotatedPing, Classification, SettingsOrder, WholeScan};
 use sonard_model::{
     acoustics::{Air, Sensor},
     array::RangerArray,
@@ -34,14 +34,14 @@ pub(super) fn endpoints() -> Vec<Route> {
             preview,
             "Predict a scan before it is taken. Changes no settings",
         )
-        .accepts::<PreviewRequest>()
+        .accepts::<SettingsOrder>()
         .responds::<WholeScan>(200, "The predicted scan"),
     ]
 }
 
 async fn preview(
     State(api): State<Api>,
-    JsonBody(request): JsonBody<PreviewRequest>,
+    JsonBody(request): JsonBody<SettingsOrder>,
 ) -> Result<Json<WholeScan>, ApiError> {
     let scan = HypotheticalScan::new(request, api.daemon.next_scan())?;
     // One prediction at a time, even if clients disconnect meanwhile, because predictions take
@@ -70,7 +70,7 @@ struct HypotheticalScan {
 }
 
 impl HypotheticalScan {
-    fn new(request: PreviewRequest, next: NextScan) -> Result<Self, ApiError> {
+    fn new(request: SettingsOrder, next: NextScan) -> Result<Self, ApiError> {
         let scene = next
             .scene
             .clone()
@@ -141,7 +141,7 @@ impl HypotheticalScan {
 }
 
 /// Returns the requested plan, checked against the limit of beams.
-fn plan(request: &PreviewRequest, next: &NextScan) -> Result<ScanPlan, ApiError> {
+fn plan(request: &SettingsOrder, next: &NextScan) -> Result<ScanPlan, ApiError> {
     let array = next.array.as_ref();
     let plan = request.plan.or_else(|| Some(array?.plan(1))).unwrap_or(next.plan);
     if request.plan.is_some() {

@@ -36,6 +36,27 @@ fn priors_and_likelihoods_multiply() {
     assert_eq!(nothing, Probabilities { other: 1.0, ..Probabilities::default() });
 }
 
+/// The repeated echo of a blanked wall competes with an edge of the same extent.
+#[test]
+fn near_narrow_arcs_may_be_repeats() {
+    let extent = ExtentLikelihood::new(0.2, 0.1, 20.0);
+    let near = |seen_deg, range_m| extent.with_repeat(seen_deg, 20.0, range_m, 0.4);
+    let like_plane = 0.99 * 0.2 + 0.01 / 30.0;
+    let kinds = (1.0 - 0.021) * 0.69;
+    let plane = kinds * 0.70 * like_plane;
+    let corner = kinds * 0.06 * like_plane;
+    let edge = kinds * 0.24 * (0.7 * 0.1 + 0.3 / 30.0);
+    let other = 0.021 * (0.65 * 0.2 + 0.35 / 30.0);
+    let repeat = (1.0 - 0.021) * 0.31 / (0.36 * 20.0);
+    check(&probabilities(&near(5.0, 0.5), 0, []), [plane, corner, edge, other + repeat]);
+    // The arc of a repeat is wider than a tenth of a plane's, and narrower than half of it.
+    for seen_deg in [1.0, 12.0] {
+        check(&probabilities(&near(seen_deg, 0.5), 0, []), [plane, corner, edge, other]);
+    }
+    // At 1.7 times the minimum range and beyond, the wall itself is detected.
+    assert_eq!(probabilities(&near(5.0, 0.68), 0, []), probabilities(&extent, 0, []));
+}
+
 /// Noise moves the border like an equal relative change of the threshold.
 #[test]
 fn border_sigma_follows_the_threshold() {

@@ -1,0 +1,91 @@
+// Pose of the shown scan estimated from its readings (`GET /v1/scans/{scan}/location`): listed, drawn on the plan, and
+// proposed for the next scan.
+
+import { requestJson } from "./api.js";
+import { make } from "./dom.js";
+import { rounded } from "./ranger.js";
+import { count, failure, sentences, setText } from "./format.js";
+
+export class Locator {
+  /**
+   * @param {HTMLElement} section
+   * @param {any} plan
+   * @param {(change: (draft: any) => void) => void} propose
+   */
+  constructor(section, plan, propose) {
+    this.plan = plan;
+    this.propose = propose;
+    /** Scan of the estimate, and the most probable pose. @type {{scan: string, pose: any} | null} */
+    this.located = null;
+    this.button = make("button", { type: "button", id: "locate", textContent: "Locate" });
+    this.use = make("button", { type: "button", id: "use-pose", className: "writes", textContent: "Use this pose", hidden: true });
+    this.result = make("span", { id: "located", role: "status", className: "hint" });
+    section.append(make("p", { className: "row" }, this.button, this.result, this.use));
+    this.button.addEventListener("click", () => this.locate());
+    this.use.addEventListener("click", () => this.proposePose());
+    plan.overlays.push(this);
+  }
+
+  async locate() {
+    const { scan } = this.plan;
+    if (!scan || scan.running) return setText(this.result, "Locate takes a complete scan.");
+    this.show(null, "Locating …");
+    this.button.disabled = true;
+    try {
+      const { poses, doubts, lacks } = await requestJson(`/v1/scans/${scan.id}/location`);
+      const pose = nearestOf(poses, scan.start.pose);
+      if (pose) this.show({ scan: scan.id, pose }, poseText(pose, poses.length));
+      else this.show(null, sentences(lacks ?? "no pose fits the readings", ...doubts.map(doubtText)));
+    } catch (/** @type {any} */ error) {
+      this.show(null, failure("Not located", error));
+    }
+    this.button.disabled = false;
+  }
+
+  show(located, text) {
+    this.located = located;
+    setText(this.result, text);
+    this.use.hidden = !located;
+    this.plan.drawOver();
+    this.plan.onView();
+  }
+
+  /** Forgets the estimate of a scan that is no longer shown. */
+  update() {
+    if (this.located && this.located.scan !== this.plan.scan?.id) this.show(null, "");
+  }
+
+  proposePose() {
+    const { x_m, y_m, heading_deg } = this.located.pose;
+    this.propose((draft) => {
+      draft.pose = { x_m: rounded(x_m, 4), y_m: rounded(y_m, 4), heading_deg: rounded(heading_deg, 2) };
+    });
+  }
+
+  /** @param {any} layer @param {any} plan */
+  drawOver(layer, plan) {
+    if (this.located && this.located.scan === plan.scan?.id) plan.drawRobot(this.located.pose, "located", "located");
+  }
+}
+
+/** Pose nearest to the assumed one among those that are at least half as probable as the best. */
+function nearestOf(poses, { x_m, y_m }) {
+  const likely = poses.filter(({ probability }) => 2 * probability >= poses[0].probability);
+  const distance_m = (pose) => Math.hypot(pose.x_m - x_m, pose.y_m - y_m);
+  return likely.reduce((best, pose) => (best && distance_m(best) <= distance_m(pose) ? best : pose), null);
+}
+
+function poseText({ x_m, y_m, heading_deg, probability, sigma_x_m, sigma_y_m, sigma_heading_deg, explained }, hypotheses) {
+  const sigmas = `±${(1e3 * Math.max(sigma_x_m, sigma_y_m)).toFixed(1)} mm, ±${sigma_heading_deg.toFixed(2)}°`;
+  const others = hypotheses > 1 ? `; ${count(hypotheses - 1, "other pose")} possible` : "";
+  return `(${x_m.toFixed(3)}, ${y_m.toFixed(3)}) m, heading ${heading_deg.toFixed(1)}°, ${sigmas}; probability ${probability.toFixed(2)}, ${(100 * explained).toFixed(0)} % of the readings explained${others}`;
+}
+
+const DOUBTS = {
+  other_place: ({ explained }) => `no pose of this scene explains more than ${(100 * explained).toFixed(0)} % of the readings`,
+  clockwise: () => "the readings fit better with clockwise azimuths",
+  radians: () => "the readings fit better with azimuths in radians",
+  unit: ({ factor }) => `the readings fit better with ranges in another unit (factor ${factor})`,
+};
+
+const doubtText = (doubt) => DOUBTS[doubt.kind]?.(doubt) ?? doubt.kind.replaceAll("_", " ");
