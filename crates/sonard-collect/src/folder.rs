@@ -133,8 +133,10 @@ impl CollectionFolder {
         // Torn ends removed from the log are moved along.
         let torn = format!("{stem}.jsonl.torn-");
         for name in self.files(IN_PROGRESS)?.iter().filter(|name| name.starts_with(&torn)) {
-            let to =
-                format!("{REJECTED}/{}", name.replacen(&stem, &format!("{stem}-attempt{attempt}"), 1));
+            let to = format!(
+                "{REJECTED}/{}",
+                name.replacen(&stem, &format!("{stem}-attempt{attempt}"), 1)
+            );
             self.rename(&self.root.join(IN_PROGRESS).join(name), &to)?;
         }
         self.seal(slot, format!("{REJECTED}/{name}"))

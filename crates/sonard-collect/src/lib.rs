@@ -40,7 +40,7 @@ pub use engine::{RunOptions, collect};
 pub use error::CollectError;
 pub use estimate::{budget, disk_bytes};
 pub use folder::{
-    CollectionFolder, FolderError, INPUTS, JOURNAL, SCANS, REJECTED, SealedFile, scan_stem, sha256,
+    CollectionFolder, FolderError, INPUTS, JOURNAL, REJECTED, SCANS, SealedFile, scan_stem, sha256,
 };
 pub use journal::{
     CollectionHistory, CollectionJournal, JournalEntry, PlanEntry, RunStart, SavedAir,

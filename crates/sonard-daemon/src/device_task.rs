@@ -8,7 +8,7 @@ use std::{pin::Pin, sync::Arc, time::Duration};
 
 use firmware_protocol::{
     host::{BoardChange, HostConfig, HostError},
-    messages::{RecordErrorKind, Identity, NakReason},
+    messages::{FaultKind, Identity, NakReason},
 };
 use sonard_api::{ScanTotals, Trouble};
 use sonard_device::{
@@ -265,8 +265,8 @@ impl DeviceTask {
                 self.handle(LinkInput::Restarted);
             }
             // Homing clears an expired hold.
-            DeviceEvent::Fault(RecordErrorKind::HoldExpired) => self.handle(LinkInput::Restarted),
-            DeviceEvent::Fault(RecordErrorKind::EmergencyStop) => {
+            DeviceEvent::Fault(FaultKind::HoldExpired) => self.handle(LinkInput::Restarted),
+            DeviceEvent::Fault(FaultKind::EmergencyStop) => {
                 self.handle_device_stop(&DriveError::Host(HostError::EmergencyStop));
             }
             DeviceEvent::Fault(kind) => {

@@ -82,7 +82,7 @@ impl FitAccumulator {
 /// Finds hypotheses that fit a scan better than its settings, by decreasing gain. Takes
 /// milliseconds. A scan with fewer than `MIN_RESIDUALS` has none.
 pub(super) fn explanations(scan: ScanView) -> Vec<Explanation> {
-    let residuals = scan.pings.iter().filter(|ping| judge(ping).residual_m.is_some()).count();
+    let residuals = scan.pings.iter().filter(|ping| classify(ping).residual_m.is_some()).count();
     if residuals < MIN_RESIDUALS {
         return Vec::new();
     }

@@ -56,7 +56,10 @@ use uuid::Uuid;
 
 pub use annotate::annotated_line;
 pub(crate) use broadcast::Ring;
-pub use broadcast::{ClientGuard, Hub, StreamLine, DeadbandFilter, ScanSubscription, Subscription, SubscriptionFilter};
+pub use broadcast::{
+    ClientGuard, DeadbandFilter, Hub, ScanSubscription, StreamLine, Subscription,
+    SubscriptionFilter,
+};
 pub use control::{Order, OrderRequest};
 pub use device_task::{OpenPort, Relocate, Relocating};
 pub use journal::{Journal, JournalThread};

@@ -92,7 +92,8 @@ pub fn air_from_order(
     );
     air.map_err(|error| {
         let help = "temperatures are degrees Celsius, pressures kilopascals";
-        OrderError::new(OrderErrorKind::Invalid, error.to_string(), help).at(format!("air.{}", error.field))
+        OrderError::new(OrderErrorKind::Invalid, error.to_string(), help)
+            .at(format!("air.{}", error.field))
     })
 }
 

@@ -73,7 +73,11 @@ pub fn read_secret(path: &Path, secret: SecretKind) -> Result<String, SecretErro
         return Err(SecretError::TooPermissive { what, mode });
     }
     let secret = text.trim().to_owned();
-    if secret.len() < min_chars { Err(SecretError::TooShort { what, min_chars }) } else { Ok(secret) }
+    if secret.len() < min_chars {
+        Err(SecretError::TooShort { what, min_chars })
+    } else {
+        Ok(secret)
+    }
 }
 
 /// Reads the text of a regular file of at most `max_bytes`, with the file's mode.

@@ -18,7 +18,9 @@ pub fn sensor_from_order(
     let sensor = order.apply_to(&setup.sensor).map_err(|error| {
         let field = match &error {
             SensorError::OutOfRange { field, .. } => format!("sensor.{field}"),
-            SensorError::UnknownPreset { .. } | SensorError::Malformed { .. } => "sensor.preset".into(),
+            SensorError::UnknownPreset { .. } | SensorError::Malformed { .. } => {
+                "sensor.preset".into()
+            }
         };
         let help = "GET /v1/sensors lists the presets with their values";
         OrderError::new(OrderErrorKind::Invalid, error.to_string(), help).at(field)
@@ -33,10 +35,10 @@ pub fn sensor_from_order(
     // A simulated ranger receives until the next ranger of its array fires.
     if !of_array {
         let max_range_m = setup.model.options.max_range_m.unwrap_or(sensor.max_range_m);
-        let listening = ReceiverTiming { max_range_m, sound_speed_m_s, blanking_us: sensor.blanking_us };
+        let listening =
+            ReceiverTiming { max_range_m, sound_speed_m_s, blanking_us: sensor.blanking_us };
         // Without a preset only the blanking affects the window.
-        let field =
-            if order.preset.is_some() { "sensor.preset" } else { "sensor.blanking_us" };
+        let field = if order.preset.is_some() { "sensor.preset" } else { "sensor.blanking_us" };
         Motion::from(&setup.motion)
             .check_window(&listening)
             .map_err(|error| conflict(error.to_string(), &error.help(), field))?;

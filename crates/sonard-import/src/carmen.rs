@@ -5,7 +5,7 @@
 //! messages, comments and parameters are skipped. The host distinguishes the robots of a log.
 
 use crate::{
-    ImportError, FileLocation,
+    FileLocation, ImportError,
     array_rounds::{
         self, CARMEN_SONAR, LogDevice, LogMessage, MessageContent, count, number, numbers,
     },

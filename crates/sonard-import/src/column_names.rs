@@ -7,7 +7,7 @@ use crate::{Field, FieldQuantity};
 pub(crate) enum NameMeaning {
     Field(Field),
     /// Quantity without a unit.
-    Quantity(FieldQuantity),
+    FieldQuantity(FieldQuantity),
     /// Unit without a quantity.
     Unit(&'static str),
     Unknown,
@@ -366,7 +366,7 @@ pub(crate) fn meaning(name: &str) -> NameMeaning {
             field.map_or(NameMeaning::Unknown, NameMeaning::Field)
         }
         (_, Some(unit)) => NameMeaning::Unit(unit),
-        (Some(quantity), None) => NameMeaning::Quantity(quantity),
+        (Some(quantity), None) => NameMeaning::FieldQuantity(quantity),
         (None, None) => NameMeaning::Unknown,
     }
 }
@@ -453,8 +453,8 @@ mod tests {
         ] {
             assert_eq!(meaning(name), NameMeaning::Unknown, "{name}");
         }
-        assert_eq!(meaning("angle"), NameMeaning::Quantity(Azimuth));
-        assert_eq!(meaning("angle_grad"), NameMeaning::Quantity(Azimuth));
+        assert_eq!(meaning("angle"), NameMeaning::FieldQuantity(Azimuth));
+        assert_eq!(meaning("angle_grad"), NameMeaning::FieldQuantity(Azimuth));
         assert_eq!(meaning("Messwert_cm"), NameMeaning::Unit("cm"));
         assert_eq!(meaning("angle_cm"), NameMeaning::Unit("cm"));
         assert!(is_clockwise("angle_cw_deg") && !is_clockwise("angle_ccw_deg"));

@@ -181,14 +181,15 @@ impl ImportSource<'_> {
     pub(crate) fn examine_ros_text(&self, found: &mut Imported) -> Result<(), ImportError> {
         found.is_inferred = false;
         let mut stats = SweepStats::new();
-        let mut reader = ros_text::MessageConverter::new(&found.mapping, found.taken.started)?;
+        let mut reader =
+            ros_text::MessageConverter::new(&found.mapping, found.assumptions.started)?;
         let units = UnitContext {
             mapping: &found.mapping,
             names: &[],
             has_columns: false,
             zero_is_no_echo: true,
         };
-        let (mut assumptions, metres) = (found.taken.clone(), found.mapping.metres());
+        let (mut assumptions, metres) = (found.assumptions.clone(), found.mapping.metres());
         let source = found.decoded((self.open)()?);
         let mut has_fixed = false;
         for message in ros_text::messages(source, found.is_json)? {
@@ -196,7 +197,8 @@ impl ImportSource<'_> {
             has_fixed |= ros_text::is_range(&message);
             let readings = reader.read(&message)?;
             // The messages state the range of their sensor.
-            assumptions.max_range_m = assumptions.max_range_m.max(reader.notes.max_stated_m(metres));
+            assumptions.max_range_m =
+                assumptions.max_range_m.max(reader.notes.max_stated_m(metres));
             for reading in readings {
                 stats.add(&reading, (&units, &assumptions));
             }
@@ -327,7 +329,7 @@ pub(crate) fn check_messages(
 ) -> Result<(), ImportError> {
     match notes.doubt() {
         Some((what, help)) if !assumptions.skip_checks => {
-            Err(ImportError::Doubtful { what, help: help.to_owned() })
+            Err(ImportError::Implausible { what, help: help.to_owned() })
         }
         _ => Ok(()),
     }
@@ -451,7 +453,7 @@ impl Imported {
         &'a self,
         source: impl Read + 'a,
     ) -> Result<Box<dyn Iterator<Item = ScanRecords> + 'a>, ImportError> {
-        let mut reader = ros_text::MessageConverter::new(&self.mapping, self.taken.started)?;
+        let mut reader = ros_text::MessageConverter::new(&self.mapping, self.assumptions.started)?;
         let messages = ros_text::messages(self.decoded(source), self.is_json)?;
         let air_m_s = self.assumptions.air.sound_speed_m_s();
         let assumed_m_s = self.mapping.sound_speed_m_s.unwrap_or(air_m_s);

@@ -27,7 +27,7 @@ impl ColumnCandidates {
             candidates.is_clockwise |= column_names::is_clockwise(name);
             match column_names::meaning(name) {
                 NameMeaning::Field(field) => candidates.found.push((field, name.clone())),
-                NameMeaning::Quantity(quantity) => {
+                NameMeaning::FieldQuantity(quantity) => {
                     candidates.without_unit.push((quantity, name.clone()));
                 }
                 NameMeaning::Unit(unit) => candidates.unit_alone.push((unit, name.clone())),
@@ -59,8 +59,8 @@ impl ColumnCandidates {
             return;
         }
         for (quantity, _) in &mut self.without_unit {
-            if *quantity == Quantity::Heading {
-                *quantity = Quantity::Azimuth;
+            if *quantity == FieldQuantity::Heading {
+                *quantity = FieldQuantity::Azimuth;
             }
         }
         for (field, _) in &mut self.found {
@@ -86,7 +86,8 @@ impl ColumnCandidates {
 
     /// Returns the range columns of an array: more than two, adjacent and in one unit.
     pub(crate) fn array_columns(&self, names: &[String]) -> Option<(Field, Vec<usize>)> {
-        let ranges = self.found.iter().filter(|(field, _)| field.quantity() == FieldQuantity::Range);
+        let ranges =
+            self.found.iter().filter(|(field, _)| field.quantity() == FieldQuantity::Range);
         let ranges: Vec<(Field, &String)> = ranges.map(|(field, name)| (*field, name)).collect();
         if !ranges.is_empty() {
             return adjacent(&ranges, names);
@@ -101,7 +102,8 @@ impl ColumnCandidates {
     /// Returns the numbers of the range columns of an array that lack a unit.
     fn array_columns_without_unit(&self, names: &[String]) -> Option<Vec<usize>> {
         let any = Field::of_quantity(FieldQuantity::Range).next()?;
-        let ranges = self.without_unit.iter().filter(|(quantity, _)| *quantity == FieldQuantity::Range);
+        let ranges =
+            self.without_unit.iter().filter(|(quantity, _)| *quantity == FieldQuantity::Range);
         let ranges: Vec<(Field, &String)> = ranges.map(|(_, name)| (any, name)).collect();
         adjacent(&ranges, names).map(|(_, places)| places)
     }
@@ -125,7 +127,7 @@ impl ColumnCandidates {
                 let [first, second] = [(*other, duplicate.as_str()), (*field, name.as_str())]
                     .map(|choice| self.option(&[choice], names));
                 let words = match other.quantity() == field.quantity() {
-                    true => field.quantity().words(),
+                    true => field.quantity().label(),
                     false => "measured quantity",
                 };
                 return Err(ImportError::mapping(
@@ -163,21 +165,21 @@ impl ColumnCandidates {
     /// Returns the columns of unknown meaning that may be the direction or the range: a time whose
     /// unit is also one of times of flight, or else any unused column, in the usual units.
     fn unnamed_offers(&self, needs_direction: bool, needs_range: bool) -> [Vec<(Field, &str)>; 2] {
-        let times = self.found.iter().filter(|(field, _)| field.quantity() == Quantity::Time);
+        let times = self.found.iter().filter(|(field, _)| field.quantity() == FieldQuantity::Time);
         let times = times.filter_map(|(field, name)| {
             let unit = field.unit().filter(|_| needs_range)?;
-            Field::with_unit(Quantity::Tof, Some(unit)).map(|field| (field, name.as_str()))
+            Field::with_unit(FieldQuantity::Tof, Some(unit)).map(|field| (field, name.as_str()))
         });
         let unused = self.unused.iter().filter(|name| !column_names::is_no_reading(name));
         let unused: Vec<&str> = unused.map(String::as_str).collect();
-        let each = |quantities: &[Quantity], needed: bool| -> Vec<(Field, &str)> {
+        let each = |quantities: &[FieldQuantity], needed: bool| -> Vec<(Field, &str)> {
             let fields =
                 quantities.iter().flat_map(|quantity| Field::of_quantity(*quantity).take(3));
             let fields: Vec<Field> = fields.filter(|_| needed).collect();
             unused.iter().flat_map(|name| fields.iter().map(|field| (*field, *name))).collect()
         };
-        let ranges = times.chain(each(&[Quantity::Range, Quantity::Tof], needs_range));
-        [each(&[Quantity::Azimuth], needs_direction && unused.len() == 1), ranges.collect()]
+        let ranges = times.chain(each(&[FieldQuantity::Range, FieldQuantity::Tof], needs_range));
+        [each(&[FieldQuantity::Azimuth], needs_direction && unused.len() == 1), ranges.collect()]
     }
 
     /// Checks that a direction and a range are mapped; the error offers complete options with the
@@ -340,7 +342,7 @@ impl Mapping {
 
 /// Builds the error that requests the unit of the range columns of an array.
 fn missing_array_unit(places: &[usize], names: &[String]) -> ImportError {
-    let options = Field::of_quantity(Quantity::Range)
+    let options = Field::of_quantity(FieldQuantity::Range)
         .take(3)
         .map(|field| columns_option([(field, Column::Several(places.to_vec()))], names));
     let options: Vec<String> = options.map(|option| format!("--array NAME {option}")).collect();

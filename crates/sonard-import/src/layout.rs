@@ -198,7 +198,7 @@ impl TableLayout {
             let are_names = names.iter().all(|name| !name.is_empty() && !is_number(name));
             let is_known = names.iter().any(|name| match column_names::meaning(name) {
                 NameMeaning::Field(field) => field.quantity().is_measurement(),
-                NameMeaning::Quantity(quantity) => quantity.is_measurement(),
+                NameMeaning::FieldQuantity(quantity) => quantity.is_measurement(),
                 _ => false,
             });
             (names.len() == self.cells.len() && names.len() > 1 && are_names && is_known)

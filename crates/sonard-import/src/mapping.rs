@@ -251,7 +251,8 @@ impl Mapping {
             let (name, alternative_name) = (preferred.label(), alternative.label());
             let is_fixed = preferred == FieldQuantity::Azimuth && self.azimuth_deg.is_some();
             match (has(preferred), has(alternative)) {
-                (false, false) if is_fixed || (preferred == FieldQuantity::Azimuth && is_array) => {}
+                (false, false) if is_fixed || (preferred == FieldQuantity::Azimuth && is_array) => {
+                }
                 (true, _) | (_, true) if is_fixed => {
                     let what = "both --azimuth-deg and a column give the direction";
                     return Err(ImportError::mapping(what, "leave one of them out"));

@@ -415,7 +415,7 @@ mod tests {
         let mut histogram = RangeHistogram::new(DirectionKind::Angles);
         for at in 0..9000_usize {
             let value = if at % 4 == 0 { 2.0 } else { 100.0 + at as f64 * 0.013 };
-            histogram.add(Location::Line(at as u64 + 1), value, 0.7 * at as f64);
+            histogram.add(FileLocation::Line(at as u64 + 1), value, 0.7 * at as f64);
         }
         let found = histogram.constant(400.0).expect("found");
         assert_eq!((found.value, found.count), (2.0, 2250));

@@ -9,7 +9,7 @@ use sonard_model::array::RangerArray;
 use sonard_records::Record;
 
 use crate::{
-    ImportError, Mapping, Assumptions,
+    Assumptions, ImportError, Mapping,
     unit_check::{RangeStats, UnitContext},
 };
 

@@ -248,7 +248,7 @@ impl<'a> RowReader<'a> {
         if is_missing(cell, field.quantity()) {
             return Ok(None);
         }
-        let is_range = matches!(field.quantity(), Quantity::Range | Quantity::Tof);
+        let is_range = matches!(field.quantity(), FieldQuantity::Range | FieldQuantity::Tof);
         match number::parse(cell, self.decimal) {
             Some(number) if !number.is_finite() && !is_range => Err(self.invalid_value(
                 place,
@@ -308,10 +308,10 @@ impl<'a> RowReader<'a> {
 
 /// Returns `true` for the usual markers of a missing value; for a range, also for words that mean
 /// no echo.
-fn is_missing(cell: &str, quantity: Quantity) -> bool {
+fn is_missing(cell: &str, quantity: FieldQuantity) -> bool {
     let cell = cell.to_lowercase();
     let is_dashes = !cell.is_empty() && cell.bytes().all(|byte| byte == b'-');
-    let is_range = matches!(quantity, Quantity::Range | Quantity::Tof);
+    let is_range = matches!(quantity, FieldQuantity::Range | FieldQuantity::Tof);
     is_dashes
         || matches!(cell.as_str(), "nan" | "null" | "none" | "nil" | "na" | "n/a" | "#n/a" | "n.a.")
         || (is_range && NO_ECHO_WORDS.contains(&cell.as_str()))

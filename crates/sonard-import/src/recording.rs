@@ -25,7 +25,7 @@ use sonard_model::{
 use sonard_records::Record;
 
 use crate::{
-    ImportError, FileLocation, Mapping, Assumptions,
+    Assumptions, FileLocation, ImportError, Mapping,
     examine::check_messages,
     limits::{LimitNotes, Limits, MAX_STATED_M, RangeClass},
     unit_check::{RangeStats, UnitContext},

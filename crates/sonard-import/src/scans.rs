@@ -32,12 +32,15 @@ pub(crate) struct ScanSplitter {
     sweep: SweepDetector,
     /// Scan that a full circle completed, with the sense of its rotation. The reading back at its
     /// beginning belongs to it if the next one turns round.
-    circle: Option<(Vec<Reading>, f64)>,
+    circle: Option<(Vec<ImportedReading>, f64)>,
 }
 
 impl ScanSplitter {
     /// Adds the next reading and returns the scans that are complete.
-    pub(crate) fn push(&mut self, reading: ImportedReading) -> impl Iterator<Item = Vec<ImportedReading>> + use<> {
+    pub(crate) fn push(
+        &mut self,
+        reading: ImportedReading,
+    ) -> impl Iterator<Item = Vec<ImportedReading>> + use<> {
         let circle = self.circle.take().map(|(mut scan, sense)| {
             let own = self.readings.last().filter(|own| is_same_scan(own, &reading));
             let turns_round = own.is_some_and(|own| {

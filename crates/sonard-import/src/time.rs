@@ -451,7 +451,7 @@ mod tests {
         let mapping = Mapping::default();
         let mut times =
             TimeReader::new(&mapping, STARTED.parse().expect("a time")).expect("an offset");
-        let field = Field::named("time_ms");
+        let field = Field::from_name("time_ms");
         let read = [4_294_967_000.0, 4_294_967_200.0, 104.0, 304.0, 100_304.0, 4.0, 1004.0];
         let read =
             read.map(|ms| times.number(field, ms * 1e-3).expect("in range").as_millisecond());

@@ -84,7 +84,7 @@ impl UnitContext<'_> {
 /// Returns the length in metres of one unit of a range or a time of flight.
 fn metres_per_unit(field: Field, sound_speed_m_s: f64) -> f64 {
     match field.quantity() {
-        Quantity::Tof => field.scaled(1.0) * 1e-6 * sound_speed_m_s / 2.0,
+        FieldQuantity::Tof => field.scaled(1.0) * 1e-6 * sound_speed_m_s / 2.0,
         _ => field.scaled(1.0),
     }
 }
@@ -164,8 +164,8 @@ impl RangeStats {
     }
 
     /// Returns one line for each kind of range that the sensor cannot measure.
-    fn notes(&self, assumptions: &Taken) -> Vec<String> {
-        let Taken { sensor, longest_m, least_m, .. } = assumptions;
+    fn notes(&self, assumptions: &Assumptions) -> Vec<String> {
+        let Assumptions { sensor, max_range_m, min_range_m, .. } = assumptions;
         let mut notes = Vec::new();
         if self.zeros > 0 {
             notes
@@ -173,7 +173,7 @@ impl RangeStats {
         }
         if self.beyond > 0 {
             notes.push(format!(
-                "{} of {} ranges are beyond {longest_m} m, the maximum range of the sensor {sensor}",
+                "{} of {} ranges are beyond {max_range_m} m, the maximum range of the sensor {sensor}",
                 self.beyond, self.echoes
             ));
         }
@@ -182,7 +182,7 @@ impl RangeStats {
                 "{} of {} ranges are below {:.0} mm, too near for the sensor {sensor}",
                 self.near,
                 self.echoes,
-                1e3 * least_m.max(MIN_NEAR_M)
+                1e3 * min_range_m.max(MIN_NEAR_M)
             ));
         }
         notes
@@ -277,7 +277,11 @@ impl RangeStats {
     }
 
     /// Rejects ranges of which most are beyond the sensor's maximum range.
-    fn check_beyond(&self, units: &UnitContext, assumptions: &Assumptions) -> Result<(), ImportError> {
+    fn check_beyond(
+        &self,
+        units: &UnitContext,
+        assumptions: &Assumptions,
+    ) -> Result<(), ImportError> {
         if self.beyond < MIN_BEYOND || 2 * self.beyond <= self.echoes {
             return Ok(());
         }
@@ -291,7 +295,11 @@ impl RangeStats {
         Err(self.doubtful_unit(what, units, assumptions))
     }
 
-    fn check_near(&self, units: &UnitContext, assumptions: &Assumptions) -> Result<(), ImportError> {
+    fn check_near(
+        &self,
+        units: &UnitContext,
+        assumptions: &Assumptions,
+    ) -> Result<(), ImportError> {
         if self.near == 0 || 2 * self.near < self.echoes {
             return Ok(());
         }
@@ -308,7 +316,12 @@ impl RangeStats {
     }
 
     /// Builds the error for ranges that are implausible in their unit, with the units that fit.
-    fn doubtful_unit(&self, what: String, units: &UnitContext, assumptions: &Taken) -> ImportError {
+    fn doubtful_unit(
+        &self,
+        what: String,
+        units: &UnitContext,
+        assumptions: &Assumptions,
+    ) -> ImportError {
         let options = units.unit_options(self, assumptions);
         let help = match options.is_empty() {
             true => {
@@ -322,7 +335,7 @@ impl RangeStats {
                 )
             }
         };
-        ImportError::Doubtful { what, help }
+        ImportError::Implausible { what, help }
     }
 }
 
@@ -463,9 +476,9 @@ impl SweepStats {
             self.headings.add(heading_deg);
         }
         if let Some((position_m, range_m)) = reading.position_m.zip(reading.range_m) {
-            self.places.add(place_m, range_m, reading.direction_deg);
+            self.places.add(position_m, range_m, reading.direction_deg);
             let heading_deg = reading.heading_deg.unwrap_or(0.0);
-            self.turned_places.add(place_m, range_m, reading.direction_deg + heading_deg);
+            self.turned_places.add(position_m, range_m, reading.direction_deg + heading_deg);
         }
     }
 
@@ -504,7 +517,7 @@ impl SweepStats {
         let are_degrees = max_angle > 4.0 * std::f64::consts::TAU
             || (max_angle > MAX_RAD && self.directions.all_integers);
         if field.is_radians() && are_degrees {
-            return Err(ImportError::Doubtful {
+            return Err(ImportError::Implausible {
                 what: format!(
                     "{field} spans {low:.1} to {high:.1} rad, {:.1} revolutions",
                     max_angle / std::f64::consts::TAU
@@ -513,7 +526,7 @@ impl SweepStats {
             });
         }
         if field.unit() == Some("deg") && self.directions.directions_look_like_radians() {
-            return Err(ImportError::Doubtful {
+            return Err(ImportError::Implausible {
                 what: format!("{field} spans {low:.3} to {high:.3}, which looks like radians"),
                 help: format!(
                     "if these are radians: {option}; if they are degrees: --no-unit-check"
@@ -522,7 +535,7 @@ impl SweepStats {
         }
         let step = self.directions.usual_step().unwrap_or(0.0);
         if field.unit() == Some("deg") && step >= 360.0 {
-            return Err(ImportError::Doubtful {
+            return Err(ImportError::Implausible {
                 what: format!("{field} changes by {step:.0} degrees from reading to reading"),
                 help: "is it the right column, and its unit? --no-unit-check skips this check"
                     .to_owned(),
@@ -532,16 +545,16 @@ impl SweepStats {
     }
 
     fn check_headings(&self, units: &UnitContext) -> Result<(), ImportError> {
-        let field = units.mapping.field(Quantity::Heading);
+        let field = units.mapping.field(FieldQuantity::Heading);
         let Some(field) = field.filter(|field| field.unit() == Some("deg")) else { return Ok(()) };
         if !self.headings.headings_look_like_radians() {
             return Ok(());
         }
         let AngleStats { low, high, .. } = self.headings;
-        let option = Field::with_unit(Quantity::Heading, Some("rad"))
+        let option = Field::with_unit(FieldQuantity::Heading, Some("rad"))
             .map(|field| units.mapping.columns_option_with(field, units.names))
             .unwrap_or_default();
-        Err(ImportError::Doubtful {
+        Err(ImportError::Implausible {
             what: format!("{field} spans {low:.3} to {high:.3}, which looks like radians"),
             help: format!("if these are radians: {option}; if they are degrees: --no-unit-check"),
         })

@@ -63,7 +63,7 @@ impl EmbeddedDaemon {
             let board = super::mock::board(&world, pace, &settings)?;
             let (mover, moves) = super::mock::follow(world, &settings)?;
             relocate = Some(mover);
-            let port = MockPort::in_memory(board, socket.clone()).moved_by(moves);
+            let port = MockPort::in_memory(board, socket.clone()).with_moves(moves);
             let stop = mock_stop.clone().cancelled_owned();
             let note = |note: Note| tracing::debug!("mock: {note}");
             drop(

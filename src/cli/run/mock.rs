@@ -20,7 +20,7 @@ use crate::{
     },
     daemon::{Relocate, Settings},
     geometry::Pose,
-    mock::{MockBoard, MockPort, Pace, EchoTable},
+    mock::{EchoTable, MockBoard, MockPort, Pace},
     model::Options,
     scene::Scene,
     supervisor::{Supervisor, Task},
@@ -53,12 +53,11 @@ pub(super) fn follow(
             if *placed.lock().unwrap_or_else(PoisonError::into_inner) == place {
                 return Ok(());
             }
-            let computing = tokio::task::spawn_blocking(move || {
-                world.soundings(&start.assumed(&scene, &pose))
-            });
+            let computing =
+                tokio::task::spawn_blocking(move || world.soundings(&start.assumed(&scene, &pose)));
             let computed = computing.await.map_err(|error| error.to_string())?;
-            let computed =
-                computed.map_err(|failure| format!("the mock can't move: {}", one_line(&failure)))?;
+            let computed = computed
+                .map_err(|failure| format!("the mock can't move: {}", one_line(&failure)))?;
             // The mock may have ended already.
             drop(soundings.send(computed));
             *placed.lock().unwrap_or_else(PoisonError::into_inner) = place;
@@ -117,7 +116,7 @@ impl Mock {
         let port = MockPort::open(board, Some(&link)).map_err(|error| {
             Failure::device(format!("cannot make a pty: {error}"), "check that /dev/pts is mounted")
         })?;
-        let port = port.moved_by(moves);
+        let port = port.with_moves(moves);
         let stop = CancellationToken::new();
         let stopped = stop.clone().cancelled_owned();
         let note = |note: crate::mock::Note| tracing::debug!("mock: {note}");

@@ -160,9 +160,7 @@ fn resumes_and_restores_the_daemon() {
     let stopped = spawn(&case, &daemon);
     // The daemon may still be at the scan of the one that was killed, which is set aside first.
     wait_until("a scan", || {
-        case.path("out/rejected").exists()
-            && case.files("rejected").len() == 1
-            && is_taking(&case)
+        case.path("out/rejected").exists() && case.files("rejected").len() == 1 && is_taking(&case)
     });
     assert_eq!(daemon.send("POST", "/v1/stop", "").status, 202);
     let output = stopped.wait_with_output().expect("it ends");

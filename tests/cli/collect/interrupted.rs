@@ -162,7 +162,9 @@ fn failing_ranger_backs_off() {
 fn folder_is_locked() {
     let case = Case::new("[poses]\nlist = [\"fig9\"]\n[collection]\nrepeats = 3\n");
     let mut child = spawn(&case, &["--realtime"]);
-    wait_until("a scan", || case.path("out/in-progress").exists() && !case.files("in-progress").is_empty());
+    wait_until("a scan", || {
+        case.path("out/in-progress").exists() && !case.files("in-progress").is_empty()
+    });
     let second = case.collect(&[]);
     let text = said(&second);
     assert!(second.status.code() == Some(3) && text.contains("another process"), "{text}");

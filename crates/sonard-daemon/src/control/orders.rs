@@ -52,7 +52,11 @@ impl Control {
         let every_s = every_s.unwrap_or(self.scanning.every_s);
         if !(1.0..=604_800.0).contains(&every_s) {
             let message = format!("every_s is {every_s}");
-            return Err(OrderError::new(OrderErrorKind::Invalid, message, "use 1 to 604800 seconds"));
+            return Err(OrderError::new(
+                OrderErrorKind::Invalid,
+                message,
+                "use 1 to 604800 seconds",
+            ));
         }
         self.scanning = ScanningKeys { mode, every_s };
         self.schedule.set_mode(mode, Duration::from_secs_f64(every_s), self.now());
@@ -88,7 +92,11 @@ impl Control {
         Ok(())
     }
 
-    fn checked_sensor(&self, order: &SensorOrder, sound_speed_m_s: f64) -> Result<Sensor, OrderError> {
+    fn checked_sensor(
+        &self,
+        order: &SensorOrder,
+        sound_speed_m_s: f64,
+    ) -> Result<Sensor, OrderError> {
         let of_array = self.settings.simulated.is_some();
         let sensor = sensor_from_order(order, &self.setup, of_array, sound_speed_m_s)?;
         if let Some(identity) = &self.identity {
@@ -106,7 +114,8 @@ impl Control {
         let mut next_air = self.air.clone();
         air.map_or(Ok(()), |order| next_air.order(&order, now))?;
         let sound_speed_m_s = next_air.status(now).sound_speed_m_s;
-        let sensor = sensor.map(|order| self.checked_sensor(&order, sound_speed_m_s)).transpose()?;
+        let sensor =
+            sensor.map(|order| self.checked_sensor(&order, sound_speed_m_s)).transpose()?;
         // Nothing below can fail.
         self.plan = plan.unwrap_or(self.plan);
         self.pose = pose.unwrap_or(self.pose);

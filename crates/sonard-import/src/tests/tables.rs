@@ -357,7 +357,7 @@ fn full_circle_and_back() {
 #[test]
 fn array_columns_without_quantity() {
     let array = RangerArray::preset("pioneer-8").expect("a preset");
-    let with = || Taken { array: Some(array.clone()), ..assumptions() };
+    let with = || Assumptions { array: Some(array.clone()), ..assumptions() };
     let names: Vec<String> = (0..8).map(|at| format!("s{at} [cm]")).collect();
     let row = (0..8).map(|at| (100 + 10 * at).to_string()).collect::<Vec<_>>().join(",");
     let text = format!("x_m,y_m,{}\n1,2,{row}\n1.5,2,{row}\n", names.join(","));

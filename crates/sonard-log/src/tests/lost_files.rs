@@ -12,7 +12,7 @@ use sonard_records::{Record, decode_line};
 use uuid::Uuid;
 
 use super::LOG;
-use crate::{LogFolder, Rotation, check, log_files, open_for_reading};
+use crate::{LogFolder, Rotation, check_log, log_files, open_for_reading};
 
 /// Folder of logs within a parent folder, with the time of all its records.
 struct Rig {
@@ -82,7 +82,7 @@ fn readings(folder: &Path) -> Counts {
     for file in log_files(folder).expect("readable") {
         let path = folder.join(&file.name);
         let reader = open_for_reading(&path).expect("readable");
-        let totals = check(reader, |finding| println!("{}: {finding}", file.name));
+        let totals = check_log(reader, |finding| println!("{}: {finding}", file.name));
         assert_eq!(totals.expect("readable").problems, 0, "{}", file.name);
         for line in fs::read_to_string(&path).expect("readable").lines() {
             if let Record::Ping(ping) = decode_line(line.as_bytes()).expect("valid") {

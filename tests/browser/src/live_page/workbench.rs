@@ -443,8 +443,12 @@ fn arrivals_have_outcomes() {
     let outcomes = browser.eval(
         "[...document.querySelectorAll('.peaks button')].map((b) => b.children[2].textContent)",
     );
-    let outcomes: Vec<&str> =
-        outcomes.as_array().expect("a list").iter().map(|text| text.as_str().expect("a text")).collect();
+    let outcomes: Vec<&str> = outcomes
+        .as_array()
+        .expect("a list")
+        .iter()
+        .map(|text| text.as_str().expect("a text"))
+        .collect();
     // The south wall is 85 mm away, and its first echoes arrive while the receiver is blanked.
     assert_eq!(outcomes[0], "blanked", "{outcomes:?}");
     for outcome in ["detected as echo 1", "detected as echo 2", "below threshold"] {
@@ -532,7 +536,8 @@ fn newest_scan_is_the_same() {
     browser.until(COMPLETE);
     until_has(&browser, "#scans-list li", "100 beams");
     // A scan with another plan has its own azimuths.
-    let plan = r#"{"scans":1,"plan":{"from_deg":180,"to_deg":360,"step_deg":7.2,"pings_per_stop":1}}"#;
+    let plan =
+        r#"{"scans":1,"plan":{"from_deg":180,"to_deg":360,"step_deg":7.2,"pings_per_stop":1}}"#;
     assert_eq!(daemon.send("POST", "/v1/start", plan).status, 202);
     daemon.wait_for_scans(4);
     until_has(&browser, "#scan-label", "25 of 25");
