@@ -1,8 +1,8 @@
 //! How the fan of rays comes closer to the exact paths as its rays do, in every shipped scene:
 //! `cargo run --release --example fan_convergence -- PICTURE.png`.
 //!
-//! Both engines hear through the same ideal receiver, with Kuc and Siegel's law at edges and a face that
-//! reflects nothing, since the fan knows no other; so what differs is the geometry alone.
+//! Both engines hear through the same ideal receiver, with Kuc and Siegel's law at edges and a face
+//! that reflects nothing, since the fan knows no other; so what differs is the geometry alone.
 
 use std::{error::Error, fs, sync::Arc};
 
@@ -27,7 +27,8 @@ const STEP_DEG: f64 = 9.0;
 
 const THRESHOLD: f64 = 0.02;
 
-/// Echoes that agree in length, departure and strength to within this are one: metres, radians, share.
+/// Echoes that agree in length, departure and strength to within this are one: metres, radians,
+/// share.
 const SAME: [f64; 3] = [1e-3, 0.01, 0.05];
 
 fn main() -> Result<(), Box<dyn Error>> {

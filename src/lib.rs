@@ -2,10 +2,10 @@
 //!
 //! The data flow, in the order of the modules:
 //!
-//! From a [`scene`] (walls and cylinders with materials) and the [`acoustics`] of air, transducer and receiver, a
-//! [`model`] predicts the reading at each azimuth of a [`scan`]; the same records hold measured readings, and
-//! [`compare`] compares the two. [`plot`] draws all of it. An [`array`](mod@array) has several rangers at fixed bearings
-//! instead of one that turns.
+//! From a [`scene`] (walls and cylinders with materials) and the [`acoustics`] of air, transducer
+//! and receiver, a [`model`] predicts the reading at each azimuth of a [`scan`]; the same records
+//! hold measured readings, and [`compare`] compares the two. [`plot`] draws all of it. An
+//! [`array`](mod@array) has several rangers at fixed bearings instead of one that turns.
 //!
 //! ```
 //! use std::sync::Arc;
@@ -34,8 +34,8 @@
 //!
 //! Those modules are pure: no clock, no file, no socket, and random numbers are passed in. They
 //! build without the feature `daemon`. Behind it, [`link`] opens serial lines, [`ranger`]
-//! drives the protocol, [`mock`] plays the device from the model, [`store`] keeps logs, and [`collect`]
-//! keeps a collection of scans that is taken over days.
+//! drives the protocol, [`mock`] plays the device from the model, [`store`] keeps logs, and
+//! [`collect`] keeps a collection of scans that is taken over days.
 #![cfg_attr(docsrs, feature(doc_cfg))]
 #![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 

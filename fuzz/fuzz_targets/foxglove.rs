@@ -1,5 +1,5 @@
-//! Any texts of a viewer, line by line: nothing panics, nothing is subscribed to that is not there, and no answer is longer
-//! than what it answers asks for.
+//! Any texts of a viewer, line by line: nothing panics, nothing is subscribed to that is not there,
+//! and no answer is longer than what it answers asks for.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;

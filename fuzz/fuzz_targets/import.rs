@@ -1,4 +1,5 @@
-//! Any bytes as a file of each format that is a text: nothing panics, and what was counted is what comes out.
+//! Any bytes as a file of each format that is a text: nothing panics, and what was counted is what
+//! comes out.
 #![no_main]
 
 use std::io::{self, Cursor, Read};

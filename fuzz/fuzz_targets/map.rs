@@ -1,4 +1,5 @@
-//! Any bytes as the description and the image of a map: nothing panics, and memory follows the bytes.
+//! Any bytes as the description and the image of a map: nothing panics, and memory follows the
+//! bytes.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;

@@ -1,4 +1,5 @@
-//! Any bytes as a recording of ROS 2, and as a message in one: nothing panics, and memory follows the bytes.
+//! Any bytes as a recording of ROS 2, and as a message in one: nothing panics, and memory follows
+//! the bytes.
 #![no_main]
 
 use std::io::{self, Cursor, Read};

@@ -257,8 +257,8 @@ impl ColumnCandidates {
 /// Maximum number of options in a message.
 const MAX_OFFERS: usize = 6;
 
-/// Returns the common field and the numbers of columns that may be the ranges of an array: more than
-/// two, adjacent and of one field.
+/// Returns the common field and the numbers of columns that may be the ranges of an array: more
+/// than two, adjacent and of one field.
 fn adjacent(ranges: &[(Field, &String)], names: &[String]) -> Option<(Field, Vec<usize>)> {
     let (field, _) = ranges.first()?;
     let place = |name: &String| names.iter().position(|known| known == name).map(|at| at + 1);

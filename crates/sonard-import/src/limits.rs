@@ -173,8 +173,8 @@ impl LimitNotes {
         self.nulls += count as u64;
     }
 
-    /// Returns the greatest plausible `max_range` of the messages, metres; `metres` is the length of
-    /// their unit.
+    /// Returns the greatest plausible `max_range` of the messages, metres; `metres` is the length
+    /// of their unit.
     pub(crate) fn max_stated_m(&self, metres: f64) -> f64 {
         let stated_m = self.max_stated * metres;
         if stated_m <= MAX_STATED_M { stated_m } else { 0.0 }

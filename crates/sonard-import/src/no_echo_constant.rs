@@ -292,8 +292,8 @@ impl RangeHistogram {
         })
     }
 
-    /// Returns `true` if no single wall explains these directions of `count` ranges: a wall fills one
-    /// arc of the measured directions, with most of its ranges.
+    /// Returns `true` if no single wall explains these directions of `count` ranges: a wall fills
+    /// one arc of the measured directions, with most of its ranges.
     fn is_scattered(&self, directions: &Directions, count: u64) -> bool {
         let has = |directions: &Directions, at: usize| directions[at / 64] >> (at % 64) & 1 == 1;
         let visited: Vec<usize> = (0..360).filter(|at| has(&self.visited, *at)).collect();

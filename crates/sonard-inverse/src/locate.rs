@@ -54,7 +54,7 @@ pub struct NuisanceEstimate {
 
 impl PoseMode {
     /// Hypothesis from a fit, with probability 1; nuisance parameters are relative to `world`.
-    fn of(fitted: &FitResult, world: &World, besides: &[Prior]) -> Self {
+    fn from_fit(fitted: &FitResult, world: &World, besides: &[Prior]) -> Self {
         let (pose, of) = (&fitted.poses[0], &fitted.estimates);
         let reports = fitted.report(world, &[], &with_pose(ROUGH_WIDEST, besides));
         let besides = reports.into_iter().skip(POSE).map(|report| NuisanceEstimate {
@@ -282,7 +282,7 @@ pub(crate) fn modes(
     atlas: &CoarseGrid,
     log_prior: impl Fn(&PoseMode) -> f64,
 ) -> Vec<PoseMode> {
-    let of = |fitted: &FitResult| PoseMode::of(fitted, world, &atlas.besides);
+    let of = |fitted: &FitResult| PoseMode::from_fit(fitted, world, &atlas.besides);
     let mut modes: Vec<PoseMode> = found.iter().map(of).collect();
     let evidence = |fitted: &FitResult| {
         (fitted.log_posterior + 0.5 * log_volume(&fitted.covariance)) / READINGS_PER_ARC

@@ -295,8 +295,8 @@ impl LogFolder {
         outcome
     }
 
-    /// Takes the open writer and adds its counts to the totals; the file is closed unless the caller
-    /// keeps it.
+    /// Takes the open writer and adds its counts to the totals; the file is closed unless the
+    /// caller keeps it.
     fn release_writer(&mut self) -> Option<LogWriter> {
         let writer = self.writer.take()?;
         self.appended_before += writer.appended();

@@ -43,7 +43,8 @@ pub trait LogOutput: fmt::Debug {
         Ok(None)
     }
 
-    /// Removes complete lines that occur in `lines` from the end, and returns the new length, bytes.
+    /// Removes complete lines that occur in `lines` from the end, and returns the new length,
+    /// bytes.
     ///
     /// # Errors
     /// Returns an error if the output cannot be truncated.
@@ -105,7 +106,8 @@ pub enum Displacement {
 }
 
 impl Displacement {
-    /// Returns `true` if records are no longer reachable by any path, or not from the next close on.
+    /// Returns `true` if records are no longer reachable by any path, or not from the next close
+    /// on.
     #[must_use]
     pub const fn loses_records(self) -> bool {
         match self {

@@ -4,9 +4,11 @@ use resvg::tiny_skia;
 
 use super::{PlotError, picture::Picture};
 
-/// Encodes pictures as an endless animation; each is shown for `frame_ms`, the last ten times as long.
+/// Encodes pictures as an endless animation; each is shown for `frame_ms`, the last ten times as
+/// long.
 ///
-/// All frames have the height of the tallest picture: legends whose texts change may wrap to another number of lines.
+/// All frames have the height of the tallest picture: legends whose texts change may wrap to
+/// another number of lines.
 ///
 /// # Errors
 /// No picture, a size out of bounds, or a failure of rendering or encoding.

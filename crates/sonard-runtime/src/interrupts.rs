@@ -48,7 +48,7 @@ impl Hangup {
     }
 }
 
-/// Whether this process ignores a signal, by the mask in `/proc/self/status`.
+/// Returns `true` if this process ignores a signal, by the mask in `/proc/self/status`.
 fn is_ignored(signal: Number) -> bool {
     let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
     let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
@@ -117,7 +117,7 @@ impl Interrupts {
         "stopped on request".into()
     }
 
-    /// Whether an end has been requested.
+    /// Returns `true` once an end has been requested.
     #[must_use]
     pub fn happened(&self) -> bool {
         *self.0.borrow() >= StopRequest::Orderly

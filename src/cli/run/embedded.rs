@@ -17,11 +17,13 @@ use crate::{
     supervisor::{Supervisor, Task},
 };
 
-/// Controls of a daemon that runs within the calling program: without sockets, signals and messages on standard error.
+/// Controls of a daemon that runs within the calling program: without sockets, signals and messages
+/// on standard error.
 ///
-/// Requests go through [`router`](Self::router). The device is a mock in memory (`--mock`), the simulated array of
-/// `--simulate`, or whatever is plugged into [`socket`](Self::socket). A single-threaded tokio runtime with a paused
-/// clock can run it, so that tests wait for no real second.
+/// Requests go through [`router`](Self::router). The device is a mock in memory (`--mock`), the
+/// simulated array of
+/// `--simulate`, or whatever is plugged into [`socket`](Self::socket). A single-threaded tokio
+/// runtime with a paused clock can run it, so that tests wait for no real second.
 pub struct EmbeddedDaemon {
     /// Handle for orders and state.
     pub handle: Handle,
@@ -34,12 +36,12 @@ pub struct EmbeddedDaemon {
 }
 
 impl EmbeddedDaemon {
-    /// Prepares a daemon with the options of `sonard run`, and the work that the caller runs as a task. Must be called
-    /// within a tokio runtime.
+    /// Prepares a daemon with the options of `sonard run`, and the work that the caller runs as a
+    /// task. Must be called within a tokio runtime.
     ///
     /// # Errors
-    /// Those of `sonard run`: wrong options, configuration or files, or a log that can't be written. The work returns the
-    /// first failure of a task, or of closing the log.
+    /// Those of `sonard run`: wrong options, configuration or files, or a log that can't be
+    /// written. The work returns the first failure of a task, or of closing the log.
     pub fn from_options(
         options: &[&str],
     ) -> Result<(Self, impl Future<Output = Result<(), String>> + Send + use<>), Failure> {
@@ -107,7 +109,8 @@ impl EmbeddedDaemon {
     /// Reads the configuration again, as `sonard run` does at SIGHUP.
     ///
     /// # Errors
-    /// A daemon that is stopping takes no configuration. A configuration with errors is reported by the daemon.
+    /// A daemon that is stopping takes no configuration. A configuration with errors is reported by
+    /// the daemon.
     pub async fn reload(&mut self) -> Result<(), String> {
         let ordered = self.handle.order(Order::Reload(self.loader.reload())).await;
         ordered.map_err(|refusal| refusal.message)

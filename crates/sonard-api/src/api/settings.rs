@@ -8,7 +8,8 @@ use sonard_records::ScanPlan;
 use super::{AirOrder, SensorOrder};
 
 /// Request body of `PUT /v1/settings`, which changes several settings at once, and of
-/// `POST /v1/preview`, which predicts a scan with them. Omitted settings are those of the next scan.
+/// `POST /v1/preview`, which predicts a scan with them. Omitted settings are those of the next
+/// scan.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SettingsOrder {

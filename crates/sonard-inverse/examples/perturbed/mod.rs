@@ -69,8 +69,8 @@ impl PerturbedWorld {
         let wall = rng.random_range(0..assumed.scene.walls.len());
         let warmer = Air::new(20.0 + air_c, 50.0, 101.325).ok()?.sound_speed_m_s();
         let faster = warmer / assumed.air.sound_speed_m_s() - 1.0;
-        // Changes from the assumed world to the truth, with the standard deviations of their uniform
-        // distributions.
+        // Changes from the assumed world to the truth, with the standard deviations of their
+        // uniform distributions.
         let mut changes = vec![
             (Parameter::X(0), -shift.x, 0.058),
             (Parameter::Y(0), -shift.y, 0.058),

@@ -80,7 +80,8 @@ fn runs(nodes: &[Node], is_closed: bool) -> Vec<StraightRun> {
     runs
 }
 
-/// Groups consecutive runs into flights, each with runs in at most two directions that are not opposite.
+/// Groups consecutive runs into flights, each with runs in at most two directions that are not
+/// opposite.
 fn flights(runs: &[StraightRun]) -> Vec<&[StraightRun]> {
     let mut flights = Vec::new();
     let mut begin = 0;
