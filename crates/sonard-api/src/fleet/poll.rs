@@ -49,7 +49,7 @@ fn poll_error(error: &ClientError) -> Unheard {
         ClientError::NoDaemon { .. } | ClientError::TooSlow => Unheard::Silent(message),
         // A connection that breaks before any response is a daemon that exits; a response that is
         // not HTTP comes from another program.
-        ClientError::Http(error) if !error.is_parse() => Unheard::Silent(message),
+        ClientError::Closed(_) => Unheard::Silent(message),
         ClientError::Refused { status, .. }
             if [401, 403, 429].contains(&status.as_u16()) || status.is_server_error() =>
         {

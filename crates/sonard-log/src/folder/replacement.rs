@@ -27,6 +27,7 @@ impl LogFolder {
     ///   written to the new file.
     /// - Moved, replaced or hidden file: it keeps its records, and the current scan is finished in
     ///   it.
+    /// - File with text of another program: it keeps its readable records.
     ///
     /// # Errors
     /// Returns an error if the new file cannot be written; retried with the next call or record.
@@ -34,7 +35,7 @@ impl LogFolder {
         let Some(writer) = &self.writer else { return Ok(()) };
         // Ignores paths that cannot be examined.
         let Ok(displacement) = writer.displacement() else { return Ok(()) };
-        if !displacement.is_some_and(Displacement::loses_records) {
+        if matches!(displacement, None | Some(Displacement::Moved)) {
             self.retained.confirm();
         }
         let Some(displacement) = displacement else { return Ok(()) };
@@ -79,11 +80,17 @@ impl LogFolder {
                 n @ 1.. if is_lost => gap += &format!("; its last {n} record(s) are lost"),
                 _ => {}
             }
-            if !is_lost {
-                self.retained.restart();
-            }
             let writer = self.release_writer();
-            let repeated = if is_lost { self.retained.count() } else { 0 };
+            let mut repeated = self.retained.count();
+            if !is_lost {
+                // Another program's text within a line makes that line unreadable.
+                let is_changed = matches!(displacement, Some(Displacement::Resized { .. }));
+                let changed = writer.as_ref().filter(|_| is_changed);
+                let missing = changed.and_then(|log| log.missing(self.retained.lines()).ok());
+                let missing = missing.unwrap_or_default();
+                repeated = missing.iter().filter(|&&byte| byte == b'\n').count() as u64;
+                self.retained.restart_with(&missing);
+            }
             let unsynced = self.appended_before - self.synced_before - self.uncertain;
             self.uncertain += unsynced.saturating_sub(repeated);
             let is_truncated = is_lost && displacement != Some(Displacement::Removed);
