@@ -89,7 +89,8 @@ impl LogFolder {
                 let missing = changed.and_then(|log| log.missing(self.retained.lines()).ok());
                 let missing = missing.unwrap_or_default();
                 repeated = missing.iter().filter(|&&byte| byte == b'\n').count() as u64;
-                self.retained.restart_with(&missing);
+                let note = format!("the other records of this scan are in {}", self.file_name());
+                self.retained.restart_with(&missing, &gap_line(note, now).0);
             }
             let unsynced = self.appended_before - self.synced_before - self.uncertain;
             self.uncertain += unsynced.saturating_sub(repeated);
@@ -102,12 +103,8 @@ impl LogFolder {
         }
         self.is_displaced = false;
         self.incident = Some(gap.clone());
-        let event = Record::Event(Event { time: now, kind: EventKind::Gap, detail: gap });
-        let mut line = Vec::new();
-        // Only numbers can be invalid in a record.
-        if encode_line(&event, &mut line).is_ok() {
-            self.retained.push(&line, &event);
-        }
+        let (line, event) = gap_line(gap, now);
+        self.retained.push(&line, &event);
     }
 
     /// Creates the replacement with the current session and the retained lines. On failure the new
@@ -168,4 +165,13 @@ impl LogFolder {
             );
         }
     }
+}
+
+/// Creates an event about a gap, as line and record.
+fn gap_line(detail: String, time: Timestamp) -> (Vec<u8>, Record) {
+    let event = Record::Event(Event { time, kind: EventKind::Gap, detail });
+    let mut line = Vec::new();
+    // Only numbers can be invalid in a record.
+    let _ = encode_line(&event, &mut line);
+    (line, event)
 }

@@ -5,7 +5,6 @@ use std::collections::HashSet;
 use sonard_records::Record;
 
 const SCAN_START: &[u8] = b"{\"type\":\"scan_start\"";
-const SCAN_END: &[u8] = b"{\"type\":\"scan_end\"";
 /// Maximum size of the retained lines, bytes. Above it, the lines of the current scan before the
 /// last check are discarded first.
 const MAX_RETAINED_BYTES: usize = 16 << 20;
@@ -71,12 +70,12 @@ impl RetainedLines {
 
     /// Discards all lines but the first one of the current scan, with which the next file begins.
     pub(super) fn restart(&mut self) {
-        self.restart_with(&[]);
+        self.restart_with(&[], &[]);
     }
 
-    /// Discards all lines but the given ones, the first and the last line of their scans, and the
-    /// first line of the current scan.
-    pub(super) fn restart_with(&mut self, kept: &[u8]) {
+    /// Discards all lines but the given ones, the first line of their scans, which is followed by
+    /// `note`, and the first line of the current scan.
+    pub(super) fn restart_with(&mut self, kept: &[u8], note: &[u8]) {
         let kept: HashSet<&[u8]> = split_lines(kept).collect();
         let lines: Vec<&[u8]> = split_lines(&self.lines).collect();
         let (mut remaining, mut scan_at) = (Vec::new(), 0);
@@ -86,11 +85,13 @@ impl RetainedLines {
                 scan_at = remaining.len();
             }
             if scan.iter().any(|line| kept.contains(line)) {
-                let is_needed = |line: &&&[u8]| {
-                    let is_bound = line.starts_with(SCAN_START) || line.starts_with(SCAN_END);
-                    is_bound || kept.contains(**line)
-                };
-                remaining.extend(scan.iter().filter(is_needed).copied().flatten());
+                for line in scan {
+                    if line.starts_with(SCAN_START) {
+                        remaining.extend([line, note].concat());
+                    } else if kept.contains(line) {
+                        remaining.extend_from_slice(line);
+                    }
+                }
             } else if is_current {
                 remaining.extend_from_slice(&self.scan_start);
             }
