@@ -208,7 +208,7 @@ check_log_folder() {
   mkdir -p "$drop_in"
   printf '[Service]\nReadWritePaths=%s\n' "$folder" >"$drop_in/log.conf"
   systemctl daemon-reload
-  systemctl reset-failed sonard@away.service
+  systemctl reset-failed sonard@away.service 2>/dev/null || true
   start sonard@away.service
   within 20 healthy /run/sonard/away/sonard.sock
   ls "$folder"/*.jsonl >/dev/null || fail "no log in $folder"
