@@ -193,6 +193,62 @@ check_folders() {
   [ -z "$said" ] || fail "$said"
 }
 
+# A log folder outside of /var/lib/sonard: the rejection names the drop-in, with which it works.
+check_log_folder() {
+  step "a log folder elsewhere, by a drop-in"
+  local folder=/srv/sonar-logs since drop_in=/etc/systemd/system/sonard@away.service.d
+  install -d -o sonard -g sonard "$folder"
+  configure away away
+  sed -i "s|^# folder = .*|folder = \"$folder\"|" /etc/sonard/away.toml
+  start ranger@away.service
+  since=$(date '+%F %T')
+  systemctl start --no-block sonard@away.service
+  within 20 drop_in_is_suggested "$since" "$folder"
+  systemctl stop sonard@away.service
+  mkdir -p "$drop_in"
+  printf '[Service]\nReadWritePaths=%s\n' "$folder" >"$drop_in/log.conf"
+  systemctl daemon-reload
+  systemctl reset-failed sonard@away.service 2>/dev/null || true
+  start sonard@away.service
+  within 20 healthy /run/sonard/away/sonard.sock
+  ls "$folder"/*.jsonl >/dev/null || fail "no log in $folder"
+  systemctl stop sonard@away.service
+}
+
+drop_in_is_suggested() {
+  local said
+  said=$(said_since sonard@away.service "$1")
+  [[ $said == *"systemctl edit sonard@away.service"* && $said == *"ReadWritePaths=$2"* ]]
+}
+
+# Device nodes without hardware: what the policy allows has no device, anything else is forbidden.
+check_devices() {
+  step "device policy"
+  mknod --mode=660 /dev/ttyS63 c 4 127 && mknod --mode=660 /dev/other c 10 229 ||
+    { step "device policy: LEFT OUT, because no device node can be made here"; return 0; }
+  chgrp dialout /dev/ttyS63 /dev/other
+  if systemd-run --quiet --wait --property=DevicePolicy=strict dd if=/dev/urandom of=/dev/null count=1 2>/dev/null; then
+    step "device policy: LEFT OUT, because the control groups here do not enforce it"
+    return 0
+  fi
+  configure serial serial
+  sed -i 's|^port = .*|port = "/dev/ttyS63"|' /etc/sonard/serial.toml
+  configure other other
+  sed -i 's|^port = .*|port = "/dev/other"|' /etc/sonard/other.toml
+  systemctl start --no-block sonard@serial.service sonard@other.service
+  within 20 link_is serial "no hardware"
+  within 20 link_is other "device policy"
+  mkdir -p /etc/systemd/system/sonard@other.service.d
+  printf '[Service]\nDeviceAllow=/dev/other rw\n' >/etc/systemd/system/sonard@other.service.d/device.conf
+  systemctl daemon-reload
+  systemctl restart --no-block sonard@other.service
+  within 20 link_is_not other "device policy"
+  systemctl stop sonard@serial.service sonard@other.service
+}
+
+link_is() { [[ $(get "/run/sonard/$1/sonard.sock" status) == *"$2"* ]]; }
+link_is_not() { local said; said=$(get "/run/sonard/$1/sonard.sock" status) && [[ $said != *"$2"* ]]; }
+
 check_package() {
   step "upgrade while all run"
   dpkg --install --force-confdef --force-confold /root/later.deb >/root/dpkg 2>&1 || fail "$(cat /root/dpkg)"
@@ -212,5 +268,7 @@ check_watchdog
 check_instances
 check_stop
 check_folders
+check_log_folder
+check_devices
 if [ -e /root/later.deb ]; then check_package; fi
 printf 'all checks passed\n'

@@ -100,7 +100,7 @@ UNIT
 boot() {
   local root=$1 hierarchy
   local options=(--directory="$root" --machine="$group" --register=no --private-network --boot
-    --console=pipe --quiet --link-journal=no)
+    --console=pipe --quiet --link-journal=no --capability=CAP_MKNOD)
   # Without a systemd here nobody gives the container a unit of its own.
   [ -d /run/systemd/system ] || options+=(--keep-unit)
   (

@@ -280,6 +280,9 @@ fn open_and_announce(daemon: Arc<OnceLock<Handle>>) -> OpenPort {
     let mut ports = PortOpener::default();
     Box::new(move |port| {
         let line = ports.open(port)?;
+        if let Some(daemon) = daemon.get() {
+            daemon.report_latency_timer(ports.latency_timer_ms());
+        }
         if let Some(change) = ports.take_change() {
             tracing::warn!("{change}");
             if let Some(daemon) = daemon.get() {

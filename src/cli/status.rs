@@ -177,7 +177,7 @@ fn pending(pending: &Pending) -> Option<String> {
 /// Describes the ranger and its serial link.
 fn device(status: &Status, health: &Health) -> Vec<String> {
     let (device, line) = (status.device.as_ref(), &health.line);
-    vec![
+    let mut lines = vec![
         format!(
             "{} on {}; daemon up {}",
             link_state(&status.link),
@@ -195,7 +195,14 @@ fn device(status: &Status, health: &Health) -> Vec<String> {
          disconnects",
             line.crc_errors, line.retries, line.repaired, line.rejected, line.losses,
         ),
-    ]
+    ];
+    if let Some(ms) = status.link.latency_timer_ms {
+        lines.push(format!(
+            "  adapter  latency timer {ms} ms: times in records are up to {} ms late (remedy: sonard doctor)",
+            f64::from(ms) / 2.0
+        ));
+    }
+    lines
 }
 
 /// Describes the simulated array and its readings.

@@ -124,7 +124,7 @@ async fn follow(args: &Args, mut lines: LiveLines) -> StreamEnd {
         let line = match lines.next().await {
             Ok(Some(line)) => line,
             Ok(None) => return StreamEnd::Daemon("the daemon ended the stream".into()),
-            Err(ClientError::Http(error)) => {
+            Err(ClientError::Closed(error)) => {
                 return StreamEnd::Daemon(format!("connection lost: {error}"));
             }
             Err(error) => return StreamEnd::Daemon(error.to_string()),

@@ -12,6 +12,7 @@ mod explained;
 mod faults;
 mod fleet;
 mod foxglove;
+mod host;
 mod kill;
 mod listening;
 mod load;

@@ -68,9 +68,12 @@ pub enum ClientError {
         live::IDLE_TIMEOUT.as_secs()
     )]
     IdleTimeout,
-    /// Invalid HTTP, or an interrupted connection.
+    /// Connection that ended without a complete response.
+    #[error("the daemon closed the connection: {0}")]
+    Closed(hyper::Error),
+    /// Response that is not HTTP.
     #[error("invalid response from the daemon: {0}")]
-    Http(#[from] hyper::Error),
+    NotHttp(hyper::Error),
     /// Response body that is not the expected JSON.
     #[error("invalid response from the daemon: {0}")]
     InvalidResponse(#[from] serde_json::Error),
@@ -87,6 +90,12 @@ pub enum ClientError {
         /// Advice on how to correct the request.
         help: String,
     },
+}
+
+impl From<hyper::Error> for ClientError {
+    fn from(error: hyper::Error) -> Self {
+        if error.is_parse() { Self::NotHttp(error) } else { Self::Closed(error) }
+    }
 }
 
 impl ClientError {
@@ -107,7 +116,10 @@ impl ClientError {
             Self::Timeout | Self::IdleTimeout => {
                 "check the log messages of the daemon (`journalctl -u sonard`)".into()
             }
-            Self::Http(_) | Self::InvalidResponse(_) | Self::TooLong(_) => {
+            Self::Closed(_) => "it is stopping, or has too many clients: try again; \
+                 `journalctl -u sonard` shows its messages"
+                .into(),
+            Self::NotHttp(_) | Self::InvalidResponse(_) | Self::TooLong(_) => {
                 "check that it is a sonard daemon of this version".into()
             }
             Self::Rejected { help, .. } => help.clone(),

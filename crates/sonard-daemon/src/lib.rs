@@ -234,6 +234,12 @@ impl Handle {
         self.hub.publish(&record);
     }
 
+    /// Publishes the latency timer of the port's adapter in the status, milliseconds; `None` if it
+    /// has no effect.
+    pub fn report_latency_timer(&self, latency_ms: Option<u32>) {
+        self.state.report_latency_timer(latency_ms);
+    }
+
     /// Publishes the server's addresses and faults in the status.
     pub fn report_server(&self, report: ServerReport) {
         self.state.report_server(report);

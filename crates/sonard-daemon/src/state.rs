@@ -176,6 +176,8 @@ pub(super) struct DaemonState {
     /// Heartbeats of the device task, which the watchdog of systemd examines.
     beats: AtomicU64,
     beams_done: AtomicU32,
+    /// Latency timer of the port's adapter, milliseconds; 0 without an effect.
+    latency_timer_ms: AtomicU32,
     scans: Mutex<ScanSummaries>,
     server: Mutex<ServerReport>,
     ros: Mutex<Option<RosReport>>,
@@ -213,6 +215,7 @@ impl DaemonState {
             published: watch::Sender::new(published),
             beats: AtomicU64::new(0),
             beams_done: AtomicU32::new(0),
+            latency_timer_ms: AtomicU32::new(0),
             scans: Mutex::default(),
             server: Mutex::default(),
             ros: Mutex::default(),
@@ -306,6 +309,8 @@ impl DaemonState {
                 error: published.trouble,
                 failures: published.failures,
                 retry_in_s: until(published.retry_at),
+                latency_timer_ms: Some(self.latency_timer_ms.load(Ordering::Relaxed))
+                    .filter(|ms| *ms > 0),
             },
             device: published.device,
             provenance: published.provenance,
@@ -383,6 +388,11 @@ impl DaemonState {
     /// Stores the server's addresses and faults.
     pub(super) fn report_server(&self, report: ServerReport) {
         *lock(&self.server) = report;
+    }
+
+    /// Stores the latency timer of the port's adapter.
+    pub(super) fn report_latency_timer(&self, latency_ms: Option<u32>) {
+        self.latency_timer_ms.store(latency_ms.unwrap_or(0), Ordering::Relaxed);
     }
 
     /// Stores the state of the ROS 2 node.

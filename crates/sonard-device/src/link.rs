@@ -15,7 +15,7 @@ use std::{
 };
 
 use rustix::{
-    fs::{Access, Mode, OFlags},
+    fs::{Mode, OFlags},
     io::Errno,
 };
 use serialport::{ClearBuffer, ErrorKind, SerialPort as _};
@@ -117,12 +117,6 @@ fn is_no_terminal(path: &Path) -> Result<bool, Errno> {
     Ok(!rustix::termios::isatty(file))
 }
 
-/// Returns `true` if a cgroup's device policy denies access (EPERM) rather than the file's
-/// permissions (EACCES).
-fn is_denied_by_policy(path: &Path) -> bool {
-    rustix::fs::access(path, Access::READ_OK | Access::WRITE_OK) == Err(Errno::PERM)
-}
-
 fn classify(path: &Path, error: serialport::Error) -> LinkError {
     let port = path.to_path_buf();
     match error.kind {
@@ -130,19 +124,27 @@ fn classify(path: &Path, error: serialport::Error) -> LinkError {
         ErrorKind::NoDevice | ErrorKind::Io(io::ErrorKind::ResourceBusy) if path.exists() => {
             LinkError::Busy { holders: find_holders(path), port }
         }
-        ErrorKind::Io(io::ErrorKind::PermissionDenied) if is_denied_by_policy(path) => {
-            LinkError::DevicePolicy(port)
-        }
         ErrorKind::Io(io::ErrorKind::PermissionDenied) => LinkError::Permission(port),
         ErrorKind::NoDevice | ErrorKind::Io(io::ErrorKind::NotFound) => LinkError::NotFound {
             port: port.display().to_string(),
             present: PortFolders::system().present(),
         },
-        _ => match is_no_terminal(path) {
-            Ok(true) => LinkError::NotSerial(port),
-            Ok(false) => LinkError::Io { port, source: error.into() },
-            Err(error) => LinkError::Io { port, source: error.into() },
-        },
+        _ => classify_reopening(port, is_no_terminal(path), error),
+    }
+}
+
+/// Classifies an error without a number by a second opening of the port.
+fn classify_reopening(
+    port: PathBuf,
+    is_no_terminal: Result<bool, Errno>,
+    error: serialport::Error,
+) -> LinkError {
+    match is_no_terminal {
+        Ok(true) => LinkError::NotSerial(port),
+        Ok(false) => LinkError::Io { port, source: error.into() },
+        // File permissions deny access by EACCES.
+        Err(Errno::PERM) => LinkError::DevicePolicy(port),
+        Err(error) => LinkError::Io { port, source: error.into() },
     }
 }
 
@@ -156,6 +158,18 @@ mod tests {
         assert!(error.to_string().contains("/dev/no-such-port"));
         assert!(matches!(error, LinkError::NotFound { .. }));
         assert!(error.help().contains("--mock"));
+    }
+
+    #[test]
+    fn device_policy_is_named() {
+        let unknown = || serialport::Error::new(ErrorKind::Unknown, "EPERM");
+        let classified = |outcome| classify_reopening("/dev/ttyACM0".into(), outcome, unknown());
+        let error = classified(Err(Errno::PERM));
+        assert!(matches!(error, LinkError::DevicePolicy(_)), "{error}");
+        assert!(error.help().contains("DeviceAllow="), "{}", error.help());
+        let error = classified(Err(Errno::NXIO));
+        assert!(error.help().contains("no hardware"), "{}", error.help());
+        assert!(matches!(classified(Ok(true)), LinkError::NotSerial(_)));
     }
 
     #[test]

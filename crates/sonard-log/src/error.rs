@@ -9,7 +9,7 @@ use rustix::{fs::statvfs, io::Errno};
 use sonard_records::{EncodeError, SinkError};
 use thiserror::Error;
 
-use super::{FileKind, LineError};
+use super::{Displacement, FileKind, LineError};
 
 /// Error in opening, reading, writing, syncing or repairing a log.
 #[derive(Debug, Error)]
@@ -92,6 +92,14 @@ pub enum StoreError {
         /// Number of records appended since the last successful sync.
         unsynced: u64,
     },
+    /// Log that was removed, moved or changed by another program while it was written.
+    #[error("{} {displacement} while it was written", path.display())]
+    Displaced {
+        /// Path of the log.
+        path: PathBuf,
+        /// Difference between the written log and the file at its path.
+        displacement: Displacement,
+    },
     /// Log that rejects records after an earlier failure.
     #[error("{} rejects records after an earlier failure", path.display())]
     Failed {
@@ -126,6 +134,12 @@ impl StoreError {
             }
             Self::Torn { source, path } => {
                 format!("{}; then `sonard log repair {}`", help_for(source, path), path.display())
+            }
+            Self::Displaced { displacement: Displacement::Moved, .. } => {
+                "the records are in the moved file".into()
+            }
+            Self::Displaced { .. } => {
+                "take the scan again, and leave its folder alone until the end".into()
             }
             Self::Failed { .. } => "reopen the log: that repairs its end".into(),
             Self::Record { .. } => "this is a bug of the program: please report it".into(),

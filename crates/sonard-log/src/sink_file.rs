@@ -4,7 +4,7 @@ use std::{
     collections::HashSet,
     fmt,
     fs::{self, File},
-    io::{self, Write},
+    io::{self, Seek as _, SeekFrom, Write},
     os::{
         fd::AsRawFd as _,
         unix::fs::{FileExt as _, MetadataExt as _},
@@ -12,7 +12,10 @@ use std::{
     path::Path,
 };
 
-use super::sync::sync_file;
+use super::sync::{sync_file, sync_folder_of};
+
+/// Maximum length of a file's end that is searched for lines, bytes.
+const MAX_SEARCHED_BYTES: u64 = 64 << 20;
 
 /// File operations of [`super::LogWriter`]. Tests implement them with faults.
 pub trait LogOutput: fmt::Debug {
@@ -53,6 +56,24 @@ pub trait LogOutput: fmt::Debug {
         Err(io::ErrorKind::Unsupported.into())
     }
 
+    /// Returns those of the given lines that the output does not contain, with the newlines.
+    ///
+    /// # Errors
+    /// Returns an error if the output is not readable.
+    fn missing(&self, lines: &[u8]) -> io::Result<Vec<u8>> {
+        let _ = lines;
+        Err(io::ErrorKind::Unsupported.into())
+    }
+
+    /// Writes the whole content to a new file at `path`.
+    ///
+    /// # Errors
+    /// Returns an error if the output is not readable, or the file exists or cannot be written.
+    fn restore(&mut self, path: &Path) -> io::Result<()> {
+        let _ = path;
+        Err(io::ErrorKind::Unsupported.into())
+    }
+
     /// Moves the output to its final path after the last sync, where an output has one.
     ///
     /// # Errors
@@ -81,6 +102,14 @@ impl<M: LogOutput + ?Sized> LogOutput for Box<M> {
 
     fn withdraw(&mut self, lines: &[u8]) -> io::Result<u64> {
         (**self).withdraw(lines)
+    }
+
+    fn missing(&self, lines: &[u8]) -> io::Result<Vec<u8>> {
+        (**self).missing(lines)
+    }
+
+    fn restore(&mut self, path: &Path) -> io::Result<()> {
+        (**self).restore(path)
     }
 
     fn finish(&mut self) -> io::Result<()> {
@@ -211,6 +240,30 @@ impl LogOutput for FileOutput {
         self.length = length;
         sync_file(&self.file)?;
         Ok(length)
+    }
+
+    fn missing(&self, lines: &[u8]) -> io::Result<Vec<u8>> {
+        let from = self.length.saturating_sub(lines.len() as u64);
+        let length = self.file.metadata()?.len().saturating_sub(from);
+        if length > MAX_SEARCHED_BYTES {
+            return Err(io::ErrorKind::FileTooLarge.into());
+        }
+        let mut end = vec![0; usize::try_from(length).unwrap_or(0)];
+        self.file.read_exact_at(&mut end, from)?;
+        let found: HashSet<&[u8]> = end.split_inclusive(|&byte| byte == b'\n').collect();
+        let lines = lines.split_inclusive(|&byte| byte == b'\n');
+        Ok(lines.filter(|line| !found.contains(line)).collect::<Vec<_>>().concat())
+    }
+
+    fn restore(&mut self, path: &Path) -> io::Result<()> {
+        let mut copy = File::create_new(path)?;
+        self.file.seek(SeekFrom::Start(0))?;
+        let copied = io::copy(&mut self.file, &mut copy).and_then(|_| sync_file(&copy));
+        if let Err(error) = copied.and_then(|()| sync_folder_of(path)) {
+            let _ = fs::remove_file(path);
+            return Err(error);
+        }
+        Ok(())
     }
 }
 

@@ -170,12 +170,20 @@ impl<M: LogOutput> LogWriter<M> {
         Ok(())
     }
 
-    /// Syncs and closes the log.
+    /// Syncs and closes the log. A removed file is written again.
     ///
     /// # Errors
-    /// Returns the errors of [`sync`](Self::sync).
+    /// Returns the errors of [`sync`](Self::sync), and [`StoreError::Displaced`] if the path does
+    /// not name a file with the written records.
     pub fn close(mut self) -> Result<(), StoreError> {
-        self.sync()
+        self.sync()?;
+        // Ignores paths that cannot be examined.
+        let Ok(Some(displacement)) = self.displacement() else { return Ok(()) };
+        if displacement == Displacement::Removed && self.medium.restore(&self.path).is_ok() {
+            tracing::warn!("{} was removed and is written again", self.path.display());
+            return Ok(());
+        }
+        Err(StoreError::Displaced { path: self.path.clone(), displacement })
     }
 
     /// Output of the writer, for operations after the last record.
@@ -191,6 +199,11 @@ impl<M: LogOutput> LogWriter<M> {
     /// Removes lines that occur in `lines` from the end of the log; returns its new length, bytes.
     pub(super) fn withdraw(&mut self, lines: &[u8]) -> io::Result<u64> {
         self.medium.withdraw(lines)
+    }
+
+    /// Returns those of the given lines that the log does not contain.
+    pub(super) fn missing(&self, lines: &[u8]) -> io::Result<Vec<u8>> {
+        self.medium.missing(lines)
     }
 
     /// Compares the open file with the file at the log's path.

@@ -19,78 +19,59 @@ use thiserror::Error;
 use tokio::{sync::watch, task::JoinHandle};
 use tokio_util::sync::CancellationToken;
 
-/// Name of a long-lived task.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Task {
-    /// Owner of the serial port, or of the simulated array.
-    Device,
-    /// Writer of the log folder (a thread).
-    Log,
-    /// Watch on the time that the log's writes and syncs take.
-    LogWatch,
-    /// Notifications to systemd.
-    Notifications,
-    /// Periodic reading of the thermometer.
-    Thermometer,
-    /// Accept loop of a listening socket.
-    Server,
-    /// Restoration of listening sockets.
-    Listeners,
-    /// Conversion of records to viewers' messages.
-    LiveMessages,
-    /// Polling of the fleet's other daemons.
-    Fleet,
-    /// Publication of records to an MQTT broker.
-    Mqtt,
-    /// Publication of messages to ROS 2 (a thread).
-    Ros,
-    /// Reloads of the configuration.
-    Reload,
-    /// Reception of stop signals.
-    Signals,
-    /// Mock device of `sonard run --mock`.
-    Mock,
+/// Defines [`Task`] from one table, so that [`Task::ALL`] contains every task.
+macro_rules! tasks {
+    ($($(#[$doc:meta])+ $task:ident = $name:literal,)+) => {
+        /// Name of a long-lived task.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+        pub enum Task {
+            $($(#[$doc])+ $task,)+
+        }
+
+        impl Task {
+            /// All tasks.
+            pub const ALL: [Self; [$($name),+].len()] = [$(Self::$task),+];
+
+            /// Name in messages.
+            #[must_use]
+            pub const fn name(self) -> &'static str {
+                match self {
+                    $(Self::$task => $name,)+
+                }
+            }
+        }
+    };
 }
 
-impl Task {
-    /// All tasks.
-    pub const ALL: [Self; 14] = [
-        Self::Device,
-        Self::Log,
-        Self::LogWatch,
-        Self::Notifications,
-        Self::Thermometer,
-        Self::Server,
-        Self::Listeners,
-        Self::LiveMessages,
-        Self::Fleet,
-        Self::Mqtt,
-        Self::Ros,
-        Self::Reload,
-        Self::Signals,
-        Self::Mock,
-    ];
-
-    /// Name in messages.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Device => "device",
-            Self::Log => "log",
-            Self::LogWatch => "log-watch",
-            Self::Notifications => "notifications",
-            Self::Thermometer => "thermometer",
-            Self::Server => "server",
-            Self::Listeners => "listeners",
-            Self::LiveMessages => "live-messages",
-            Self::Fleet => "fleet",
-            Self::Mqtt => "mqtt",
-            Self::Ros => "ros",
-            Self::Reload => "reload",
-            Self::Signals => "signals",
-            Self::Mock => "mock",
-        }
-    }
+tasks! {
+    /// Owner of the serial port, or of the simulated array.
+    Device = "device",
+    /// Writer of the log folder (a thread).
+    Log = "log",
+    /// Watch on the time that the log's writes and syncs take.
+    LogWatch = "log-watch",
+    /// Notifications to systemd.
+    Notifications = "notifications",
+    /// Periodic reading of the thermometer.
+    Thermometer = "thermometer",
+    /// Accept loop of a listening socket.
+    Server = "server",
+    /// Restoration of listening sockets.
+    Listeners = "listeners",
+    /// Conversion of records to viewers' messages.
+    LiveMessages = "live-messages",
+    /// Polling of the fleet's other daemons.
+    Fleet = "fleet",
+    /// Publication of records to an MQTT broker.
+    Mqtt = "mqtt",
+    /// Publication of messages to ROS 2 (a thread).
+    Ros = "ros",
+    /// Reloads of the configuration.
+    Reload = "reload",
+    /// Reception of stop signals.
+    Signals = "signals",
+    /// Mock device of `sonard run --mock`.
+    Mock = "mock",
 }
 
 impl fmt::Display for Task {

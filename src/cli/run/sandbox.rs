@@ -36,8 +36,11 @@ fn absolute(folder: &Path) -> PathBuf {
 
 /// Name of the service that this process belongs to, from `/proc/self/cgroup`.
 fn unit_name(cgroup: &str) -> Option<&str> {
-    let path = cgroup.lines().find_map(|line| line.strip_prefix("0::"))?;
-    let unit = path.rsplit('/').find(|part| part.ends_with(".service"))?;
+    // The hierarchy of version 2, and systemd's own one of version 1.
+    let mut paths = cgroup.lines().filter_map(|line| {
+        line.strip_prefix("0::").or_else(|| Some(line.split_once(":name=systemd:")?.1))
+    });
+    let unit = paths.find_map(|path| path.rsplit('/').find(|part| part.ends_with(".service")))?;
     // A user session is a service, too, but without these restrictions.
     (!unit.starts_with("user@")).then_some(unit)
 }
@@ -88,6 +91,7 @@ mod tests {
             ),
             ("12:pids:/x\n0::/system.slice/sonard.service/child\n", Some("sonard.service")),
             ("0::/user.slice/user-1000.slice/user@1000.service/app.slice/x.scope\n", None),
+            ("1:name=systemd:/system.slice/sonard.service\n0::/\n", Some("sonard.service")),
             ("0::/\n", None),
             ("", None),
         ] {

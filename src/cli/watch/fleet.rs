@@ -118,7 +118,7 @@ async fn forward(
         let line = match lines.next().await {
             Ok(Some(line)) => line,
             Ok(None) => return Some("stream ended".into()),
-            Err(ClientError::Http(error)) => {
+            Err(ClientError::Closed(error)) => {
                 return Some(sanitize(&format!("connection lost: {error}")));
             }
             Err(error) => return Some(sanitize(&error.to_string())),

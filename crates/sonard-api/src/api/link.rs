@@ -22,6 +22,10 @@ pub struct LinkReport {
     pub failures: u32,
     /// Time until the next attempt, seconds.
     pub retry_in_s: Option<f64>,
+    /// Latency timer of the port's USB adapter above 1 ms, milliseconds. Times in records are late
+    /// by up to half of it.
+    #[serde(default)]
+    pub latency_timer_ms: Option<u32>,
 }
 
 /// State of the link to the device.

@@ -49,7 +49,7 @@ fn poll_error(error: &ClientError) -> PollError {
         ClientError::NoDaemon { .. } | ClientError::Timeout => PollError::NoResponse(message),
         // A connection that breaks before any response is a daemon that exits; a response that is
         // not HTTP comes from another program.
-        ClientError::Http(error) if !error.is_parse() => PollError::NoResponse(message),
+        ClientError::Closed(_) => PollError::NoResponse(message),
         ClientError::Rejected { status, .. }
             if [401, 403, 429].contains(&status.as_u16()) || status.is_server_error() =>
         {

@@ -9,7 +9,7 @@ use hyper::{body::Incoming, server::conn::http1, service::service_fn};
 use hyper_util::rt::{TokioIo, TokioTimer};
 use sonard_runtime::supervisor::Task;
 use tokio::{
-    io::{AsyncRead, AsyncWrite, AsyncWriteExt as _},
+    io::{AsyncRead, AsyncReadExt as _, AsyncWrite, AsyncWriteExt as _},
     sync::OwnedSemaphorePermit,
     task::JoinSet,
     time::{sleep, timeout},
@@ -22,6 +22,8 @@ use super::{Listeners, Peer, Server, error_body::ErrorBodyStream, limits::Connec
 
 /// Time limit for the head of a request.
 const HEAD_TIMEOUT: Duration = Duration::from_secs(5);
+/// Time limit for the request of a rejected client.
+const REJECTED_TIMEOUT: Duration = Duration::from_millis(500);
 /// Time for clients to read pending data at shutdown.
 const DRAIN_TIMEOUT: Duration = Duration::from_secs(2);
 /// Buffer size of a connection, bytes: request heads and unread responses.
@@ -145,6 +147,12 @@ async fn reject_over_limit<S: AsyncRead + AsyncWrite>(stream: S, _permit: OwnedS
     let mut stream = pin!(stream);
     // A client that can't read even this response is dropped.
     drop(timeout(HEAD_TIMEOUT, stream.write_all(response.as_bytes())).await);
+    // Closing before the request has arrived would reset the connection, and with it the response.
+    let request = async {
+        stream.shutdown().await?;
+        tokio::io::copy(&mut stream.take(BUFFER_BYTES as u64), &mut tokio::io::sink()).await
+    };
+    drop(timeout(REJECTED_TIMEOUT, request).await);
 }
 
 /// Returns `true` if a connection ended because the client did not read.

@@ -50,7 +50,7 @@ pub enum LinkError {
     /// The port exists, but this user may not open it.
     #[error("no permission to open {0}")]
     Permission(PathBuf),
-    /// The cgroup's device policy or a security module denies access despite the file permissions.
+    /// The control group's device policy denies access despite the file permissions.
     #[error("the device policy of this service or container does not allow {0}")]
     DevicePolicy(PathBuf),
     /// Another program has the port open.
@@ -150,10 +150,16 @@ impl LinkError {
             Self::NotSerial(_) => {
                 "give a character device such as /dev/ttyACM0, or the link of a mock".into()
             }
-            Self::Io { source, .. } => exhausted(source).map_or_else(
-                || "unplug the board, plug it in again, and look at `dmesg`".into(),
-                str::to_owned,
-            ),
+            Self::Io { source, .. } => match Errno::from_io_error(source) {
+                Some(Errno::NXIO | Errno::NODEV) => {
+                    "the port has a name, but no hardware: give another port, or plug the board in"
+                        .into()
+                }
+                _ => exhausted(source).map_or_else(
+                    || "unplug the board, plug it in again, and look at `dmesg`".into(),
+                    str::to_owned,
+                ),
+            },
         }
     }
 }

@@ -16,7 +16,7 @@ pub struct PortOpener {
     /// Name of the last opened device.
     device: Option<String>,
     change: Option<String>,
-    /// Last reported latency timer of the adapter, milliseconds.
+    /// Latency timer of the last opened port's adapter above 1 ms, milliseconds.
     latency_ms: Option<u32>,
 }
 
@@ -71,6 +71,13 @@ impl PortOpener {
         let device = PortFolders::system().device_name(&resolved.path);
         self.note_device(port, device);
         Ok(line)
+    }
+
+    /// Latency timer of the last opened port's USB adapter, milliseconds; `None` without one, or up
+    /// to 1 ms.
+    #[must_use]
+    pub const fn latency_timer_ms(&self) -> Option<u32> {
+        self.latency_ms
     }
 
     /// Takes the description of a change of the device since the previous opening, if any.

@@ -27,6 +27,7 @@ impl LogFolder {
     ///   written to the new file.
     /// - Moved, replaced or hidden file: it keeps its records, and the current scan is finished in
     ///   it.
+    /// - File with text of another program: it keeps its readable records.
     ///
     /// # Errors
     /// Returns an error if the new file cannot be written; retried with the next call or record.
@@ -34,7 +35,7 @@ impl LogFolder {
         let Some(writer) = &self.writer else { return Ok(()) };
         // Ignores paths that cannot be examined.
         let Ok(displacement) = writer.displacement() else { return Ok(()) };
-        if !displacement.is_some_and(Displacement::loses_records) {
+        if matches!(displacement, None | Some(Displacement::Moved)) {
             self.retained.confirm();
         }
         let Some(displacement) = displacement else { return Ok(()) };
@@ -79,11 +80,18 @@ impl LogFolder {
                 n @ 1.. if is_lost => gap += &format!("; its last {n} record(s) are lost"),
                 _ => {}
             }
-            if !is_lost {
-                self.retained.restart();
-            }
             let writer = self.release_writer();
-            let repeated = if is_lost { self.retained.count() } else { 0 };
+            let mut repeated = self.retained.count();
+            if !is_lost {
+                // Another program's text within a line makes that line unreadable.
+                let is_changed = matches!(displacement, Some(Displacement::Resized { .. }));
+                let changed = writer.as_ref().filter(|_| is_changed);
+                let missing = changed.and_then(|log| log.missing(self.retained.lines()).ok());
+                let missing = missing.unwrap_or_default();
+                repeated = missing.iter().filter(|&&byte| byte == b'\n').count() as u64;
+                let note = format!("the other records of this scan are in {}", self.file_name());
+                self.retained.restart_with(&missing, &gap_line(note, now).0);
+            }
             let unsynced = self.appended_before - self.synced_before - self.uncertain;
             self.uncertain += unsynced.saturating_sub(repeated);
             let is_truncated = is_lost && displacement != Some(Displacement::Removed);
@@ -95,12 +103,8 @@ impl LogFolder {
         }
         self.is_displaced = false;
         self.incident = Some(gap.clone());
-        let event = Record::Event(Event { time: now, kind: EventKind::Gap, detail: gap });
-        let mut line = Vec::new();
-        // Only numbers can be invalid in a record.
-        if encode_line(&event, &mut line).is_ok() {
-            self.retained.push(&line, &event);
-        }
+        let (line, event) = gap_line(gap, now);
+        self.retained.push(&line, &event);
     }
 
     /// Creates the replacement with the current session and the retained lines. On failure the new
@@ -161,4 +165,13 @@ impl LogFolder {
             );
         }
     }
+}
+
+/// Creates an event about a gap, as line and record.
+fn gap_line(detail: String, time: Timestamp) -> (Vec<u8>, Record) {
+    let event = Record::Event(Event { time, kind: EventKind::Gap, detail });
+    let mut line = Vec::new();
+    // Only numbers can be invalid in a record.
+    let _ = encode_line(&event, &mut line);
+    (line, event)
 }

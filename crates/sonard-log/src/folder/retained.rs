@@ -1,7 +1,10 @@
 //! Copy of a log's newest lines, which are written again if the log is removed or truncated.
 
+use std::collections::HashSet;
+
 use sonard_records::Record;
 
+const SCAN_START: &[u8] = b"{\"type\":\"scan_start\"";
 /// Maximum size of the retained lines, bytes. Above it, the lines of the current scan before the
 /// last check are discarded first.
 const MAX_RETAINED_BYTES: usize = 16 << 20;
@@ -67,8 +70,34 @@ impl RetainedLines {
 
     /// Discards all lines but the first one of the current scan, with which the next file begins.
     pub(super) fn restart(&mut self) {
-        self.lines.clone_from(&self.scan_start);
-        (self.scan_at, self.unchecked_at, self.discarded) = (0, 0, 0);
+        self.restart_with(&[], &[]);
+    }
+
+    /// Discards all lines but the given ones, the first line of their scans, which is followed by
+    /// `note`, and the first line of the current scan.
+    pub(super) fn restart_with(&mut self, kept: &[u8], note: &[u8]) {
+        let kept: HashSet<&[u8]> = split_lines(kept).collect();
+        let lines: Vec<&[u8]> = split_lines(&self.lines).collect();
+        let (mut remaining, mut scan_at) = (Vec::new(), 0);
+        for scan in lines.chunk_by(|_, line| !line.starts_with(SCAN_START)) {
+            let is_current = self.is_in_scan() && scan.first() == Some(&&*self.scan_start);
+            if is_current {
+                scan_at = remaining.len();
+            }
+            if scan.iter().any(|line| kept.contains(line)) {
+                for line in scan {
+                    if line.starts_with(SCAN_START) {
+                        remaining.extend([line, note].concat());
+                    } else if kept.contains(line) {
+                        remaining.extend_from_slice(line);
+                    }
+                }
+            } else if is_current {
+                remaining.extend_from_slice(&self.scan_start);
+            }
+        }
+        (self.lines, self.scan_at) = (remaining, scan_at);
+        (self.unchecked_at, self.discarded) = (0, 0);
     }
 
     /// Returns `true` between the first and the last record of a scan.
@@ -107,6 +136,10 @@ impl RetainedLines {
             self.lines.append(&mut kept);
         }
     }
+}
+
+fn split_lines(lines: &[u8]) -> impl Iterator<Item = &[u8]> {
+    lines.split_inclusive(|&byte| byte == b'\n')
 }
 
 fn count_lines(lines: &[u8]) -> u64 {

@@ -84,14 +84,17 @@ fn readings(folder: &Path) -> Counts {
         let reader = open_for_reading(&path).expect("readable");
         let totals = check_log(reader, |finding| println!("{}: {finding}", file.name));
         assert_eq!(totals.expect("readable").problems, 0, "{}", file.name);
-        for line in fs::read_to_string(&path).expect("readable").lines() {
-            if let Record::Ping(ping) = decode_line(line.as_bytes()).expect("valid") {
-                let counts = counts.entry(ping.scan.as_u128()).or_insert_with(|| vec![0; 7]);
-                counts[ping.index as usize] += 1;
-            }
-        }
+        let text = fs::read_to_string(&path).expect("readable");
+        text.lines().for_each(|line| count_reading(line, &mut counts));
     }
     counts
+}
+
+fn count_reading(line: &str, counts: &mut Counts) {
+    if let Record::Ping(ping) = decode_line(line.as_bytes()).expect("valid") {
+        let counts = counts.entry(ping.scan.as_u128()).or_insert_with(|| vec![0; 7]);
+        counts[ping.index as usize] += 1;
+    }
 }
 
 fn once(scans: impl IntoIterator<Item = u128>) -> Counts {
@@ -264,4 +267,62 @@ fn no_room_for_the_new_file() {
     fs::remove_file(&folder).expect("it is there");
     rig.append(&third);
     assert_eq!(rig.close(), once([2, 3]));
+}
+
+#[test]
+fn text_within_a_line() {
+    use std::io::Write as _;
+    // Before a reading, the last reading, and the end of the scan.
+    for count in [3, 7, 8] {
+        let mut rig = Rig::new();
+        let damaged = rig.path();
+        let second = scan(2);
+        rig.append(&second[..count]);
+        let mut other = fs::OpenOptions::new().append(true).open(&damaged).expect("opens");
+        other.write_all(b"no line feed").expect("written");
+        rig.append(&second[count..]);
+        rig.append(&scan(3));
+        rig.log.close(rig.now).expect("syncs");
+        // The damaged file has all readings but one.
+        let text = fs::read_to_string(&damaged).expect("readable");
+        let lines = text.lines().filter(|line| !line.contains("no line feed"));
+        let mut counts = Counts::new();
+        lines.for_each(|line| count_reading(line, &mut counts));
+        fs::remove_file(&damaged).expect("it is there");
+        for (scan, repeated) in readings(&rig.parent.path().join("log")) {
+            let counts = counts.entry(scan).or_insert_with(|| vec![0; 7]);
+            counts.iter_mut().zip(repeated).for_each(|(count, more)| *count += more);
+        }
+        assert_eq!(counts, once([1, 2, 3]), "after {count} records");
+    }
+}
+
+#[test]
+fn log_of_a_single_scan() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let log = folder.path().join("scan.jsonl");
+    let open = || {
+        let mut writer = crate::LogWriter::open(&log).expect("opens");
+        scan(1).iter().for_each(|record| writer.append(record).expect("written"));
+        writer
+    };
+    let writer = open();
+    fs::remove_file(&log).expect("it is there");
+    writer.close().expect("written again");
+    assert_eq!(crate::load(&log).expect("readable").records, scan(1));
+    fs::remove_file(&log).expect("it is there");
+
+    let writer = open();
+    fs::rename(&log, folder.path().join("moved")).expect("renamed");
+    let error = writer.close().expect_err("it is elsewhere");
+    assert!(error.to_string().contains("was moved or replaced while it was written"), "{error}");
+    let writer = open();
+    fs::write(&log, "").expect("it is there");
+    let error = writer.close().expect_err("it is empty");
+    assert!(error.to_string().contains("0 bytes instead of"), "{error}");
+    fs::remove_file(&log).expect("it is there");
+    let writer = open();
+    fs::remove_dir_all(folder.path()).expect("it is there");
+    let error = writer.close().expect_err("no folder");
+    assert!(error.to_string().contains("was removed while it was written"), "{error}");
 }
