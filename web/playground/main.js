@@ -73,7 +73,8 @@ const trace = new EchoTrace(byId("trace"), selectArrival);
 const panel = /** @type {any} */ (new BeamPanel(byId("beam-panel"), showPath));
 const sideBySide = new SideBySide(byId("figures"), select);
 const controls = new Controls(state, (changes) => change(changes));
-const pulse = new Pulse(plan, trace, () => byId("stage").scrollIntoView({ block: "nearest" }));
+// The pulse travels within the room, which then fills the plan.
+const pulse = new Pulse(plan, trace, () => state.fit !== "room" && change({ fit: "room" }));
 const ranger = new Ranger(byId("stage"), plan.view, (pose) => change({ pose: poseWithinWalls(plan.scene, state.pose, pose) }, true), endDrag);
 const editor = new Editor(byId("stage"), plan.view, (scene, final, pose) => change(pose ? { scene, pose } : { scene }, !final));
 const files = new Files({ room: openEditedRoom, log: openLog, onError: (problem) => showProblem(problem) });
@@ -116,6 +117,8 @@ function change(changes, dragging = false) {
 /** Keeps the state before a change, unless it continues the last one. @param {Partial<State>} changes @param {boolean} dragging */
 function keepForUndo(changes, dragging) {
   const [keys, at_ms] = [Object.keys(changes).sort().join(), performance.now()];
+  // The view of the plan is no setting.
+  if (keys === "fit") return;
   const continues = lastChange?.keys === keys && (dragging || plan.held || at_ms - lastChange.at_ms < SAME_CHANGE_MS);
   lastChange = { keys, at_ms };
   if (!continues) undoStack.push(state);

@@ -475,7 +475,9 @@ fn links_csv_units_and_location() {
     browser.eval(&format!("(location.hash = '#scan={oldest}&beam=30')"));
     browser.until("document.querySelector('#live').ariaPressed === 'false'");
     until_has(&browser, "#beam-label", "beam 30, azimuth 108.0°");
-    browser.go();
+    browser.until("location.hash.endsWith('beam=30')");
+    browser.eval("(location.reload(), true)");
+    browser.until("document.getElementById('beam-label').textContent === 'none selected'");
     until_has(&browser, "#beam-label", "beam 30, azimuth 108.0°");
     browser.click("#live");
     browser.until("location.hash === '#beam=30'");
