@@ -204,11 +204,12 @@ impl Client {
             return Ok(response);
         }
         let body = read_body(response.into_body(), MAX_ERROR_BYTES).await?;
-        let Problem { error, help, .. } = serde_json::from_slice(&body).unwrap_or_else(|_| Problem {
-            error: String::from_utf8_lossy(&body).into_owned(),
-            help: "check that it is a sonard daemon of this version".into(),
-            ..Problem::default()
-        });
+        let Problem { error, help, .. } =
+            serde_json::from_slice(&body).unwrap_or_else(|_| Problem {
+                error: String::from_utf8_lossy(&body).into_owned(),
+                help: "check that it is a sonard daemon of this version".into(),
+                ..Problem::default()
+            });
         Err(ClientError::Refused { status, error, help })
     }
 }

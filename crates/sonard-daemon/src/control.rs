@@ -242,9 +242,7 @@ impl Control {
                 (Ok(()), Some(Interrupt::ScheduleChanged))
             }
             Order::Sensor(order) => (self.set_sensor(&order), Some(Interrupt::ScheduleChanged)),
-            Order::Settings(order) => {
-                (self.set_settings(*order), Some(Interrupt::ScheduleChanged))
-            }
+            Order::Settings(order) => (self.set_settings(*order), Some(Interrupt::ScheduleChanged)),
             Order::OwnSensor => {
                 self.use_sensor(self.configured_sensor.clone());
                 (Ok(()), Some(Interrupt::ScheduleChanged))

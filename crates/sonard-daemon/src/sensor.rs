@@ -35,8 +35,7 @@ pub fn ordered_sensor(
         let max_range_m = setup.model.options.max_range_m.unwrap_or(sensor.max_range_m);
         let listening = Listening { max_range_m, sound_speed_m_s, blanking_us: sensor.blanking_us };
         // Without a preset only the blanking affects the window.
-        let field =
-            if order.preset.is_some() { "sensor.preset" } else { "sensor.blanking_us" };
+        let field = if order.preset.is_some() { "sensor.preset" } else { "sensor.blanking_us" };
         Motion::from(&setup.motion)
             .check_window(&listening)
             .map_err(|error| conflict(error.to_string(), &error.help(), field))?;

@@ -53,12 +53,11 @@ pub(super) fn follow(
             if *placed.lock().unwrap_or_else(PoisonError::into_inner) == place {
                 return Ok(());
             }
-            let computing = tokio::task::spawn_blocking(move || {
-                world.soundings(&start.assumed(&scene, &pose))
-            });
+            let computing =
+                tokio::task::spawn_blocking(move || world.soundings(&start.assumed(&scene, &pose)));
             let computed = computing.await.map_err(|error| error.to_string())?;
-            let computed =
-                computed.map_err(|failure| format!("the mock can't move: {}", one_line(&failure)))?;
+            let computed = computed
+                .map_err(|failure| format!("the mock can't move: {}", one_line(&failure)))?;
             // The mock may have ended already.
             drop(soundings.send(computed));
             *placed.lock().unwrap_or_else(PoisonError::into_inner) = place;

@@ -106,7 +106,8 @@ impl Control {
         let mut next_air = self.air.clone();
         air.map_or(Ok(()), |order| next_air.order(&order, now))?;
         let sound_speed_m_s = next_air.status(now).sound_speed_m_s;
-        let sensor = sensor.map(|order| self.checked_sensor(&order, sound_speed_m_s)).transpose()?;
+        let sensor =
+            sensor.map(|order| self.checked_sensor(&order, sound_speed_m_s)).transpose()?;
         // Nothing below can fail.
         self.plan = plan.unwrap_or(self.plan);
         self.pose = pose.unwrap_or(self.pose);

@@ -90,7 +90,8 @@ impl DeviceTask {
                 }
             }
         }
-        if let Some((relocate, scene)) = self.relocate.as_mut().zip(self.control.settings.scene.clone())
+        if let Some((relocate, scene)) =
+            self.relocate.as_mut().zip(self.control.settings.scene.clone())
         {
             let moving = relocate(scene, pose);
             match with_orders(&mut self.control, moving).await {

@@ -191,7 +191,9 @@ fn moves_are_undone() {
     let first = pose(&browser);
     assert_eq!(browser.eval("document.getElementById('undo').disabled"), true);
     let [x, y] = middle(&browser, ".ranger");
-    for (kind, by) in [("mousePressed", 0.0), ("mouseMoved", 30.0), ("mouseMoved", 50.0), ("mouseReleased", 60.0)] {
+    for (kind, by) in
+        [("mousePressed", 0.0), ("mouseMoved", 30.0), ("mouseMoved", 50.0), ("mouseReleased", 60.0)]
+    {
         mouse(&browser, kind, x, y - by);
     }
     wait_until_idle(&browser);
@@ -217,7 +219,10 @@ fn moves_are_undone() {
     browser.click("#reset");
     wait_until_idle(&browser);
     assert_eq!(eval_json(&browser, "playground.state().temperature_c"), json!(20));
-    assert_eq!(eval_json(&browser, "playground.state().scene.materials.shelving.roughness"), json!(0));
+    assert_eq!(
+        eval_json(&browser, "playground.state().scene.materials.shelving.roughness"),
+        json!(0)
+    );
     // Reset itself is undone by the key.
     browser.eval("dispatchEvent(new KeyboardEvent('keydown', {key: 'z', ctrlKey: true}))");
     wait_until_idle(&browser);

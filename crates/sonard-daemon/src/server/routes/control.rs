@@ -2,7 +2,8 @@
 
 use axum::{Extension, Json, extract::State, http::StatusCode};
 use sonard_api::{
-    Accepted, AccessReport, AirOrder, CancelRequest, ScanRequest, Scanning, SensorOrder, SettingsOrder, Started,
+    Accepted, AccessReport, AirOrder, CancelRequest, ScanRequest, Scanning, SensorOrder,
+    SettingsOrder, Started,
 };
 use sonard_model::geometry::Pose;
 use sonard_records::ScanPlan;
