@@ -103,6 +103,8 @@ on request. If the ranger disconnects, it waits for it; readings that can't be l
 taken. SIGHUP reloads the configuration; SIGTERM and SIGINT stop the motor, close the scan and \
 sync the log. Control it with `sonard status`, `sonard watch` and curl.
 
+With --mock a mock ranger takes the place of the device. It follows PUT /v1/pose, unless --truth-pose pins it.
+
 With --simulate there is no device: the model simulates an array of rangers at fixed bearings on a \
 robot, fired in turn (pioneer-8: one every 40 ms, so each of the eight every 320 ms), round after \
 round unless scanning.mode differs. Every record is marked as simulated. PUT /v1/pose moves the \

@@ -72,8 +72,9 @@ const table = /** @type {any} */ (new BeamTable(byId("table")));
 const trace = new EchoTrace(byId("trace"), selectArrival);
 const panel = /** @type {any} */ (new BeamPanel(byId("beam-panel"), showPath));
 const sideBySide = new SideBySide(byId("figures"), select);
-const controls = new Controls(state, (changes) => change(changes));
-const pulse = new Pulse(plan, trace, () => byId("stage").scrollIntoView({ block: "nearest" }));
+const controls = new Controls(state, (changes) => change(changes, false, true));
+// The pulse travels within the room, which then fills the plan.
+const pulse = new Pulse(plan, trace, () => state.fit !== "room" && change({ fit: "room" }));
 const ranger = new Ranger(byId("stage"), plan.view, (pose) => change({ pose: poseWithinWalls(plan.scene, state.pose, pose) }, true), endDrag);
 const editor = new Editor(byId("stage"), plan.view, (scene, final, pose) => change(pose ? { scene, pose } : { scene }, !final));
 const files = new Files({ room: openEditedRoom, log: openLog, onError: (problem) => showProblem(problem) });
@@ -93,10 +94,11 @@ addTools(plan, () => {
  * Changes the state and shows it. The view of the plan stays while a handle is dragged.
  * @param {Partial<State>} changes
  * @param {boolean} [dragging]
+ * @param {boolean} [sliding] set for controls that send a change for each step
  */
-function change(changes, dragging = false) {
+function change(changes, dragging = false, sliding = false) {
   const { scene } = state;
-  keepForUndo(changes, dragging);
+  keepForUndo(changes, dragging, sliding);
   state = { ...state, ...changes };
   plan.held = dragging;
   if (state.scene !== scene) showScene();
@@ -113,10 +115,12 @@ function change(changes, dragging = false) {
   requestView();
 }
 
-/** Keeps the state before a change, unless it continues the last one. @param {Partial<State>} changes @param {boolean} dragging */
-function keepForUndo(changes, dragging) {
+/** Keeps the state before a change, unless it continues the last one. @param {Partial<State>} changes @param {boolean} dragging @param {boolean} sliding */
+function keepForUndo(changes, dragging, sliding) {
   const [keys, at_ms] = [Object.keys(changes).sort().join(), performance.now()];
-  const continues = lastChange?.keys === keys && (dragging || plan.held || at_ms - lastChange.at_ms < SAME_CHANGE_MS);
+  // The view of the plan is no setting.
+  if (keys === "fit") return;
+  const continues = lastChange?.keys === keys && (dragging || plan.held || (sliding && at_ms - lastChange.at_ms < SAME_CHANGE_MS));
   lastChange = { keys, at_ms };
   if (!continues) undoStack.push(state);
   if (undoStack.length > MAX_UNDO) undoStack.shift();

@@ -22,13 +22,13 @@ export class Pulse {
   /**
    * @param {any} plan
    * @param {EchoTrace} trace
-   * @param {() => void} onStart called before the first frame, to show the whole trace
+   * @param {() => void} onStart called before the pulse is shown
    */
   constructor(plan, trace, onStart) {
     this.plan = plan;
     this.trace = trace;
     this.onStart = onStart;
-    this.layer = plan.addLayer("pulse");
+    this.layer = plan.addLayer("fronts");
     /** @type {Beam | null} */
     this.beam = null;
     /** @type {Map<Peak, string>} */
@@ -62,7 +62,6 @@ export class Pulse {
   play() {
     if (!this.beam) return;
     if (this.at_us === null || this.at_us >= this.end_us) this.goTo(0);
-    this.onStart();
     this.frame_ms = performance.now();
     this.label();
     requestAnimationFrame((now) => this.frame(now));
@@ -79,6 +78,7 @@ export class Pulse {
     byId("pulse-time").value = 0;
     byId("pulse-hide").disabled = true;
     setText(byId("pulse-text"), "");
+    this.plan.hasTips = true;
     this.trace.redraw();
     this.redraw();
   }
@@ -108,7 +108,9 @@ export class Pulse {
 
   /** @param {number} at_us */
   goTo(at_us) {
-    [this.at_us, this.trace.cursor_us] = [at_us, at_us];
+    if (this.at_us === null) this.onStart();
+    [this.at_us, this.trace.cursor_us, this.plan.hasTips] = [at_us, at_us, false];
+    this.plan.tip.hide();
     byId("pulse-time").value = this.end_us ? Math.round((STEPS * at_us) / this.end_us) : 0;
     byId("pulse-hide").disabled = false;
     const text = this.text(at_us);
@@ -151,8 +153,8 @@ export class Pulse {
   /** @param {Peak} peak @param {number} travelled_m @param {number} body_m */
   drawFront(peak, travelled_m, body_m) {
     const { layer, plan } = this;
-    const isHeard = (this.outcomes.get(peak) ?? "").includes("echo");
-    const c = layer.pen(isHeard ? "front" : "faint", plan.palette);
+    const isDetected = (this.outcomes.get(peak) ?? "").includes("echo");
+    const c = layer.pen(isDetected ? "front" : "faint", plan.palette);
     const [from_m, to_m] = [Math.max(0, travelled_m - body_m), Math.min(travelled_m, peak.path.length_m)];
     const points = partOf(peak.polyline, from_m, to_m);
     if (points.length < 2) return;

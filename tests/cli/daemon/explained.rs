@@ -71,3 +71,29 @@ fn wrong_pose_is_reported_once() {
     assert!(events[0].contains("better explained: ") && events[2].contains("better explained: "));
     assert!(events[1].contains("no longer better explained"), "{events:?}");
 }
+
+#[test]
+fn few_beams_are_not_explained() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut rig = Rig::new(folder.path(), Pace::Virtual);
+    rig.plug("", 1);
+    let options = rig.options();
+    let options: Vec<&str> = options.iter().map(String::as_str).collect();
+    let daemon = Daemon::start(folder.path(), &options);
+    daemon.wait_for("ready");
+    let [x_m, y_m, heading_deg] = ["x_m", "y_m", "heading_deg"]
+        .map(|key| daemon.get("/v1/pose").json()[key].as_f64().expect("a number"));
+    let wrong = [x_m + 0.02, y_m + 0.02, heading_deg];
+    for (number, step_deg) in [(1, 18.0), (2, 0.9)] {
+        let plan = json!({"from_deg": 0, "to_deg": 360, "step_deg": step_deg, "pings_per_stop": 1});
+        assert_eq!(daemon.send("PUT", "/v1/plan", &plan.to_string()).status, 202);
+        scan(&daemon, wrong, number);
+    }
+    explanations(&daemon);
+    let latest = daemon.get("/v1/scan/latest").json();
+    let id = latest["start"]["scan"].as_str().expect("an id").to_owned();
+    assert_eq!(daemon.stop(), Some(0));
+    // Of the scans with 20 and with 400 beams, only the second one is explained.
+    let events = events(folder.path());
+    assert!(events.len() == 1 && events[0].contains(&id), "{id}: {events:?}");
+}

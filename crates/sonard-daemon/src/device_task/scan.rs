@@ -116,8 +116,8 @@ impl DeviceTask {
 
     /// Pauses scanning, or cancels only the request if the failure comes from its own plan or pose.
     /// A retry would fail again until an order or the configuration changes the scan.
-    fn abandon_scans(&mut self, why: &str, asked: Option<QueuedScans>) -> Option<ScanJob> {
-        match asked.filter(|request| request.plan.is_some() || request.pose.is_some()) {
+    fn abandon_scans(&mut self, why: &str, request: Option<QueuedScans>) -> Option<ScanJob> {
+        match request.filter(|request| request.plan.is_some() || request.pose.is_some()) {
             Some(request) => drop(self.control.schedule.cancel(request.request)),
             None => self.control.schedule.stop(),
         }

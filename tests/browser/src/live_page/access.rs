@@ -19,7 +19,6 @@ fn open(folder: &Path, further: &[&str]) -> (Daemon, Browser) {
     let options = [&["--set", &setting], further].concat();
     let (daemon, address) = daemon(folder, "127.0.0.1:0", &options);
     let browser = Browser::open(&address, DESK);
-    browser.until("document.getElementById('link').textContent === 'ready'");
     browser.until("document.body.dataset.write === 'token'");
     (daemon, browser)
 }

@@ -104,6 +104,12 @@ fn large_scans_and_many_scans() {
         p95(&drawing),
         p95(&frames)
     );
+    let svg = browser.eval(
+        "Promise.all(['main', 'picture'].map((name) => import(`/page/${name}.js`))).then(([{plan}, {renderSvg}]) => \
+         renderSvg(plan, {title: 'large', about: '', badge: undefined, counts: plan.scan.counts}).size)",
+    );
+    println!("65,535 beams: SVG of {svg} bytes");
+    assert!(svg.as_u64().is_some_and(|bytes| bytes < 3_000_000), "{svg} bytes");
     browser.click_at("#over", 0.5, 0.3);
     assert!(browser.text("#beam-label").starts_with("beam "), "{}", browser.text("#beam-label"));
     drop((browser, many));

@@ -479,7 +479,9 @@ fn links_csv_units_and_location() {
     browser.eval(&format!("(location.hash = '#scan={oldest}&beam=30')"));
     browser.until("document.querySelector('#live').ariaPressed === 'false'");
     until_has(&browser, "#beam-label", "beam 30, azimuth 108.0°");
-    browser.go();
+    browser.until("location.hash.endsWith('beam=30')");
+    browser.eval("(location.reload(), true)");
+    browser.until("document.getElementById('beam-label').textContent === 'none selected'");
     until_has(&browser, "#beam-label", "beam 30, azimuth 108.0°");
     browser.click("#live");
     browser.until("location.hash === '#beam=30'");
@@ -490,10 +492,9 @@ fn links_csv_units_and_location() {
         ));
     };
     unit("cm");
-    until_has(&browser, "#beam-label", "227.");
-    until_has(&browser, "#beam-label", " cm, predicted ");
+    until_has(&browser, "#beam-label", " cm, predicted 227.8");
     unit("m");
-    until_has(&browser, "#beam-label", "2.27");
+    until_has(&browser, "#beam-label", " m, predicted 2.278");
     browser.eval(
         "(() => { globalThis.saved = []; const make = URL.createObjectURL; \
          URL.createObjectURL = (blob) => { saved.push(blob); return make(blob); }; \
@@ -509,11 +510,11 @@ fn links_csv_units_and_location() {
     let lines: Vec<&str> = csv.lines().collect();
     assert!(lines[0].starts_with("beam,ranger,azimuth_deg,status,range_m,"), "{csv}");
     assert_eq!(lines.len(), 101);
-    assert!(lines[31].starts_with("30,,108,echo,2.27"), "{}", lines[31]);
+    assert!(lines[31].starts_with("30,,108,echo,2.2"), "{}", lines[31]);
     let csv = save("beam");
     let lines: Vec<&str> = csv.lines().collect();
     assert_eq!((lines[0], lines.len()), ("scan,time,azimuth_deg,range_m", 3), "{csv}");
-    assert!(lines[1].starts_with(oldest) && lines[1].contains(",108,2.27"), "{csv}");
+    assert!(lines[1].starts_with(oldest) && lines[1].contains(",108,2.2"), "{csv}");
     // The estimated pose is drawn and can be proposed; writing takes the token.
     browser.click("#locate");
     browser.until("document.getElementById('located').textContent.startsWith('(0.774, 0.085) m')");
@@ -545,5 +546,26 @@ fn newest_scan_is_the_same() {
     select_beam(&browser, 12);
     until_has(&browser, "#beam-label", "beam 12, azimuth 266.4°");
     until_has(&browser, "#series-label", "Beam 12 in 4 scans");
+    assert_clean(&browser);
+}
+
+#[test]
+fn selection_moves_nothing_else() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (_daemon, browser) = with_two_scans(folder.path(), &[]);
+    select_beam(&browser, 75);
+    let places = || {
+        browser.eval(
+            "['.history', '.next', '#residuals', '#scan-line'].map((name) => \
+             Math.round(document.querySelector(name).getBoundingClientRect().top + scrollY))",
+        )
+    };
+    let before = places();
+    // Until the details of the other beam are loaded, those of the last one keep their room.
+    browser.eval(
+        "(() => { const s = document.getElementById('beam'); s.value = 20; \
+         s.dispatchEvent(new Event('input')); })()",
+    );
+    assert_eq!(places(), before);
     assert_clean(&browser);
 }

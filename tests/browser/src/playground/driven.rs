@@ -155,6 +155,154 @@ fn middle(browser: &Browser, selector: &str) -> [f64; 2] {
 }
 
 #[test]
+fn ranger_stops_at_walls() {
+    let browser = open(DESK);
+    to_step(&browser, "The false wall");
+    let top = "document.getElementById('stage').getBoundingClientRect().top + scrollY";
+    let before = browser.eval(top);
+    let [x, y] = middle(&browser, ".ranger");
+    // Down and to the left: at the southern wall, 85 mm away, the ranger slides along it.
+    for (kind, share) in [("mousePressed", 0.0), ("mouseMoved", 0.5), ("mouseReleased", 1.0)] {
+        mouse(&browser, kind, x - 120.0 * share, y + 200.0 * share);
+    }
+    wait_until_idle(&browser);
+    let [x_m, y_m, _] = pose(&browser);
+    assert!((0.0..0.02).contains(&y_m) && (0.0..0.7).contains(&x_m), "({x_m}, {y_m})");
+    assert_eq!(browser.eval("document.getElementById('trouble').hidden"), true);
+    // Into a corner, where it stops.
+    let [x, y] = middle(&browser, ".ranger");
+    for (kind, by) in [("mousePressed", 0.0), ("mouseMoved", 500.0), ("mouseReleased", 900.0)] {
+        mouse(&browser, kind, x - by, y + by);
+    }
+    wait_until_idle(&browser);
+    let [x_m, y_m, _] = pose(&browser);
+    assert!((0.0..0.02).contains(&x_m) && (0.0..0.02).contains(&y_m), "({x_m}, {y_m})");
+    // A message moves nothing on the page.
+    browser.eval("playground.change({pose: {x_m: -3, y_m: 0, heading_deg: 0}})");
+    browser.until("!document.getElementById('trouble').hidden");
+    assert_eq!(browser.eval(top), before);
+    assert_clean(&browser);
+}
+
+#[test]
+fn moves_are_undone() {
+    let browser = open(DESK);
+    to_step(&browser, "The false wall");
+    let first = pose(&browser);
+    assert_eq!(browser.eval("document.getElementById('undo').disabled"), true);
+    let [x, y] = middle(&browser, ".ranger");
+    for (kind, by) in
+        [("mousePressed", 0.0), ("mouseMoved", 30.0), ("mouseMoved", 50.0), ("mouseReleased", 60.0)]
+    {
+        mouse(&browser, kind, x, y - by);
+    }
+    wait_until_idle(&browser);
+    let second = pose(&browser);
+    assert!(second[1] > first[1] + 0.05, "{second:?}");
+    browser.eval("document.querySelector('.ranger').focus()");
+    browser.press(Key::Left.into());
+    set(&browser, "temperature", "30");
+    // A drag is one step, and so is each key and each setting.
+    browser.click("#undo");
+    wait_until_idle(&browser);
+    assert_eq!(eval_json(&browser, "playground.state().temperature_c"), json!(20));
+    assert!((pose(&browser)[0] - second[0] + 0.01).abs() < 1e-3);
+    browser.click("#undo");
+    wait_until_idle(&browser);
+    assert_eq!(pose(&browser), second);
+    browser.click("#undo");
+    wait_until_idle(&browser);
+    assert_eq!(pose(&browser), first);
+    assert_eq!(browser.eval("document.getElementById('undo').disabled"), true);
+    set(&browser, "roughness", "0.4");
+    set(&browser, "temperature", "30");
+    browser.click("#reset");
+    wait_until_idle(&browser);
+    assert_eq!(eval_json(&browser, "playground.state().temperature_c"), json!(20));
+    assert_eq!(
+        eval_json(&browser, "playground.state().scene.materials.shelving.roughness"),
+        json!(0)
+    );
+    // Reset itself is undone by the key.
+    browser.eval("dispatchEvent(new KeyboardEvent('keydown', {key: 'z', ctrlKey: true}))");
+    wait_until_idle(&browser);
+    assert_eq!(eval_json(&browser, "playground.state().temperature_c"), json!(30));
+    assert_clean(&browser);
+}
+
+#[test]
+fn pulse_travels_along_the_paths() {
+    let browser = open(DESK);
+    to_step(&browser, "The false wall");
+    browser.until("!document.getElementById('pulse-play').disabled");
+    let time_us = || eval_json(&browser, "playground.pulse.at_us");
+    let painted = || {
+        browser.until_drawn();
+        eval_json(
+            &browser,
+            "(() => { const c = document.querySelector('canvas.fronts'); \
+             const copy = new OffscreenCanvas(c.width, c.height).getContext('2d', {willReadFrequently: true}); \
+             copy.drawImage(c, 0, 0); const d = copy.getImageData(0, 0, c.width, c.height).data; \
+             let n = 0; for (let i = 3; i < d.length; i += 4) n += d[i] > 128; return n; })()",
+        )
+    };
+    assert_eq!((time_us(), painted()), (json!(null), json!(0)));
+    browser.click("#pulse-play");
+    browser.until("playground.pulse.at_us > 100");
+    browser.until("document.getElementById('pulse-text').textContent.includes('receiver blanked')");
+    browser.click("#pulse-play");
+    let paused = time_us();
+    assert_eq!(browser.text("#pulse-play"), "Play pulse");
+    assert!(painted().as_u64() > Some(20), "{}", painted());
+    assert!(legend(&browser).contains("wave front that is detected"), "{}", legend(&browser));
+    browser.until("new Promise((done) => setTimeout(() => done(true), 200))");
+    assert_eq!(time_us(), paused);
+    // The slider moves the pulse: after 4.9 ms the third reflection has arrived.
+    let scrub = |at_us: f64| {
+        browser.eval(&format!(
+            "(() => {{ const s = document.getElementById('pulse-time'); \
+             s.value = Math.round(1000 * {at_us} / playground.pulse.end_us); \
+             s.dispatchEvent(new Event('input')); }})()"
+        ));
+        browser.text("#pulse-text")
+    };
+    let text = scrub(4900.0);
+    assert!(text.contains("signal above threshold"), "{text}");
+    assert!(text.contains("echo by south, north, south: detected as echo 1"), "{text}");
+    let text = scrub(600.0);
+    assert!(text.contains("receiver blanked") && text.contains("echo by south: blanked"), "{text}");
+    assert!(text.starts_with("0.60 ms, path 0.20"), "{text}");
+    // Half way between the first and the second reflection, the front is between both walls.
+    let drawn = "playground.pulse.trace.cursor_us";
+    assert_eq!(eval_json(&browser, drawn), time_us());
+    browser.eval("document.getElementById('pulse-time').focus()");
+    browser.press(Key::Right.into());
+    assert_ne!(time_us(), json!(600.0));
+    // Another beam keeps the time; hiding ends it.
+    browser.eval("playground.select(0)");
+    wait_until_idle(&browser);
+    browser.until("document.getElementById('pulse-text').textContent.includes('ms, path')");
+    browser.click("#pulse-hide");
+    assert_eq!((time_us(), painted()), (json!(null), json!(0)));
+    // On a phone the echo trace is next to the plan.
+    browser.look_through(PHONE);
+    browser.until("document.getElementById('trace').parentElement.id === 'pulse'");
+    assert_clean(&browser);
+}
+
+#[test]
+fn last_step_leads_on() {
+    let browser = open(DESK);
+    to_step(&browser, "What simpler models miss");
+    assert_eq!(browser.text("#tour-next"), "Start again");
+    browser.click("#tour-next");
+    wait_until_idle(&browser);
+    assert_eq!(browser.text("#tour-title"), "A room as the sensor measures it");
+    assert_eq!(browser.text("#tour-next"), "Next");
+    assert_clean(&browser);
+}
+
+#[test]
 fn pan_zoom_and_measure() {
     let browser = open(DESK);
     check_view(&browser, "Promise.resolve(playground.plan)");

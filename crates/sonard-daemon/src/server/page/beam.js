@@ -38,7 +38,7 @@ export class BeamPanel {
     this.ping = ping;
     this.facts.replaceChildren(...reading(ping));
     // The height stays until the details are loaded, so that what is below does not jump.
-    this.panel.style.minHeight = `${this.panel.offsetHeight}px`;
+    this.panel.style.minHeight = `${this.panel.getBoundingClientRect().height}px`;
     if (!sameBeam) this.details.replaceChildren();
     this.panel.replaceChildren(this.facts, this.details);
     if (this.fetchDetails && (!sameBeam || !this.loading)) {

@@ -6,7 +6,7 @@ import { circle, line } from "./layers.js";
 const SHADES = 6;
 const LETTERS = { plane: "P", corner: "C", edge: "E", unresolved: "?" };
 const FEATURE_PX = 9, LINE_PX = 6;
-/** Maximum distance of a line from the wall that it stands for, metres. */
+/** Maximum distance of a line from the wall that it represents, metres. */
 const WALL_M = 0.1;
 /** Minimum cosine of the angle between both legs at the ranger of a path by way of a corner. */
 const RETURNS = 0.9;
@@ -36,7 +36,7 @@ export function drawMap(layer, { view, palette }, { origin: [x0, y0], resolution
   layer.c.globalAlpha = 1;
 }
 
-/** Draws a line on a light edge, so that it stands out from the marks. @param {any} layer @param {any} plan @param {any} segment */
+/** Draws a line on a light edge, which contrasts with the marks. @param {any} layer @param {any} plan @param {any} segment */
 export function drawLine(layer, { view, palette }, { from, to, contradiction }) {
   const points = [view.px(from), view.px(to)];
   const c = layer.pen(contradiction ? "unconfirmed" : "found", palette);

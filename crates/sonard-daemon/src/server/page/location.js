@@ -32,10 +32,10 @@ export class Locator {
     this.show(null, "Locating …");
     this.button.disabled = true;
     try {
-      const { poses, doubts, lacks } = await requestJson(`/v1/scans/${scan.id}/location`);
+      const { poses, lacks } = await requestJson(`/v1/scans/${scan.id}/location`);
       const pose = nearestOf(poses, scan.start.pose);
       if (pose) this.show({ scan: scan.id, pose }, poseText(pose, poses.length));
-      else this.show(null, sentences(lacks ?? "no pose fits the readings", ...doubts.map(doubtText)));
+      else this.show(null, sentences(lacks ?? "no pose of the scene fits the readings; `sonard locate` lists possible causes"));
     } catch (/** @type {any} */ error) {
       this.show(null, failure("Not located", error));
     }
@@ -80,12 +80,3 @@ function poseText({ x_m, y_m, heading_deg, probability, sigma_x_m, sigma_y_m, si
   const others = hypotheses > 1 ? `; ${count(hypotheses - 1, "other pose")} possible` : "";
   return `(${x_m.toFixed(3)}, ${y_m.toFixed(3)}) m, heading ${heading_deg.toFixed(1)}°, ${sigmas}; probability ${probability.toFixed(2)}, ${(100 * explained).toFixed(0)} % of the readings explained${others}`;
 }
-
-const DOUBTS = {
-  other_place: ({ explained }) => `no pose of this scene explains more than ${(100 * explained).toFixed(0)} % of the readings`,
-  clockwise: () => "the readings fit better with clockwise azimuths",
-  radians: () => "the readings fit better with azimuths in radians",
-  unit: ({ factor }) => `the readings fit better with ranges in another unit (factor ${factor})`,
-};
-
-const doubtText = (doubt) => DOUBTS[doubt.kind]?.(doubt) ?? doubt.kind.replaceAll("_", " ");

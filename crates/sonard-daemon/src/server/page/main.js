@@ -115,7 +115,8 @@ function keepLink() {
 async function followLink() {
   const { scan, beam } = readLink();
   if (scan && scan !== history.shown?.id) await history.show(scan);
-  else if (!scan && history.shown) history.showLive();
+  // Before the first address was followed, a past scan was chosen on the page.
+  else if (!scan && history.shown && linked) history.showLive();
   if (beam !== null && beam !== selected?.index) select(beam);
   linked = true;
 }

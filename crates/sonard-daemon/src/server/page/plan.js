@@ -36,6 +36,8 @@ export class Plan {
     this.tip = new Tip(stage);
     /** Reading whose tip is shown while the pointer is over nothing else. */
     this.tipped = null;
+    /** Cleared while something else moves on the plan. */
+    this.hasTips = true;
     /** Frame in which the tip of a hovered point is shown. @type {number | null} */
     this.hovering = null;
     /** Frame in which a moved view is drawn. @type {number | null} */
@@ -345,9 +347,9 @@ export class Plan {
   hover(px) {
     cancelAnimationFrame(this.hovering);
     this.hovering = requestAnimationFrame(() => {
-      const ask = (/** @type {"describeAt" | "describeUnder"} */ how) => this.overlays.map((overlay) => overlay[how]?.(px, this)).find((text) => text);
+      const textFrom = (/** @type {"describeAt" | "describeUnder"} */ how) => this.overlays.map((overlay) => overlay[how]?.(px, this)).find((text) => text);
       const reading = () => this.readingAt(px, HOVER_PX);
-      const text = ask("describeAt") ?? (reading() ? describeReading(reading()) : ask("describeUnder"));
+      const text = textFrom("describeAt") ?? (reading() ? describeReading(reading()) : textFrom("describeUnder"));
       if (text) this.tip.show(text, px);
       else this.showTip();
     });
@@ -361,7 +363,7 @@ export class Plan {
   /** Shows the value of a reading next to its mark, until another one is given; `null` hides it. */
   showTip(ping = this.tipped) {
     this.tipped = ping;
-    const at = ping && this.scan && !this.measure?.on && this.view.width ? positionOf(ping) : null;
+    const at = ping && this.scan && this.hasTips && !this.measure?.on && this.view.width ? positionOf(ping) : null;
     const px = at && this.view.px(at);
     if (px && !this.view.isOutside(px)) this.tip.show(describeReading(ping), px);
     else this.tip.hide();

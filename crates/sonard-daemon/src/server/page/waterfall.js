@@ -267,7 +267,7 @@ export class Waterfall {
   async csv() {
     await this.load(true);
     const azimuth_deg = this.selected.azimuth_deg;
-    const lines = this.values().map(({ id, time, m }) => [id, new Date(time).toISOString(), azimuth_deg, m < Infinity ? m : ""].join());
+    const lines = this.values().map(({ id, time, m }) => [id, new Date(time).toISOString(), azimuth_deg, m < Infinity ? Number(m.toFixed(5)) : ""].join());
     return `scan,time,azimuth_deg,range_m\n${lines.join("\n")}\n`;
   }
 }
