@@ -2,10 +2,12 @@
 
 use super::{
     canvas::{Anchor, Layer, Px, Shape},
+    floor::Floor,
     legend::{Entry, Sample},
-    legend_entries, overlay,
+    legend_entries, lines, overlay,
     picture::Picture,
     plan::Plan,
+    readings::PlottedScan,
     scan_caption, theme,
 };
 use sonard_interpret::interpret::{Feature, FeatureKind};
@@ -27,7 +29,15 @@ pub fn draw_features(scans: &[ScanView], scene: Option<&Scene>, features: &[Feat
         arcs.chain([next_places(plan, scans, features)]).collect()
     };
     let labels = |plan: &Plan| Some(names(plan, scene, scans, features));
-    overlay::draw(scans, scene, counts(features), &[], over, labels, &entries(features, scene))
+    overlay::draw(
+        scans,
+        scene,
+        counts(features),
+        &[],
+        over,
+        labels,
+        &entries(scans, features, scene),
+    )
 }
 
 /// Number of features of each class.
@@ -68,7 +78,7 @@ const fn shape(kind: FeatureKind) -> Shape {
     }
 }
 
-fn entries(features: &[Feature], scene: Option<&Scene>) -> Vec<Entry> {
+fn entries(scans: &[ScanView], features: &[Feature], scene: Option<&Scene>) -> Vec<Entry> {
     let present = KINDS.into_iter().filter(|kind| features.iter().any(|f| f.kind == *kind));
     let kinds = present.map(|kind| {
         Entry::new(Sample::Mark { shape: shape(kind), colour: colour(kind) }, name(kind))
@@ -77,7 +87,7 @@ fn entries(features: &[Feature], scene: Option<&Scene>) -> Vec<Entry> {
     let next = Sample::Line { colour: theme::ORANGE, width_px: 2.0, dash: "none" };
     let proposes = features.iter().any(|feature| feature.next.is_some());
     kinds
-        .chain([Entry::new(dot, "reading")])
+        .chain(lines::has_ranges(scans).then(|| Entry::new(dot, "reading")))
         .chain(proposes.then(|| Entry::new(next, "proposed next pose")))
         .chain(scene.map(legend_entries::materials).into_iter().flatten())
         .collect()
@@ -133,6 +143,17 @@ fn names(plan: &Plan, scene: Option<&Scene>, scans: &[ScanView], features: &[Fea
     for feature in features {
         arc_of(plan, scans, feature).windows(2).for_each(|two| labels.keep_off(two[0], two[1]));
     }
+    for scan in scans {
+        let plotted = PlottedScan::from_scan(scan);
+        if let Some(pose) = scan_caption::pose_of(scan) {
+            Floor { plan, pose, scan: &plotted }.avoid_marks(&mut labels);
+        }
+    }
+    for feature in features {
+        if let (Some(pose), Some(range_m)) = (pose_of(scans, feature), feature.range_m) {
+            labels.avoid_mark(plan.px(pose.point_at(feature.bearing_deg, range_m)), 7.0);
+        }
+    }
     let mut layer = Layer::new("names").haloed();
     for feature in features {
         let (Some(pose), Some(range_m)) = (pose_of(scans, feature), feature.range_m) else {
@@ -147,7 +168,7 @@ fn names(plan: &Plan, scene: Option<&Scene>, scans: &[ScanView], features: &[Fea
             feature.extent_deg,
             beta.unwrap_or_default()
         );
-        let places = [
+        let mut places = [
             (Px::new(11.0, -8.0), Anchor::Start),
             (Px::new(11.0, 16.0), Anchor::Start),
             (Px::new(-11.0, -8.0), Anchor::End),
@@ -161,6 +182,9 @@ fn names(plan: &Plan, scene: Option<&Scene>, scans: &[ScanView], features: &[Fea
             (Px::new(-24.0, -22.0), Anchor::End),
             (Px::new(-24.0, 30.0), Anchor::End),
         ];
+        places.sort_by_key(|(shift, anchor)| {
+            labels.covered(at + *shift, *anchor, theme::SMALL_PX, &text)
+        });
         let free = places
             .into_iter()
             .find(|(shift, anchor)| labels.place(at + *shift, *anchor, theme::SMALL_PX, &text));
