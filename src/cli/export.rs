@@ -19,6 +19,7 @@ use crate::{
     export::{
         CsvExport, Export, ExportError, LogFile, McapExport, ParquetExport, Profile, Settings,
     },
+    scan::text::format_count,
 };
 
 /// Options of `sonard export`.
@@ -230,8 +231,13 @@ struct ExportCounts {
 
 impl ExportCounts {
     fn print(&self) {
-        let Self { logs, scans, readings } = self;
-        notice!("{logs} logs, {scans} scans, {readings} readings");
+        let Self { logs, scans, readings } = *self;
+        notice!(
+            "{}, {}, {}",
+            format_count(logs, "log"),
+            format_count(scans, "scan"),
+            format_count(readings, "reading")
+        );
     }
 }
 
