@@ -19,9 +19,11 @@ mod answer;
 mod array;
 #[cfg(feature = "pi")]
 mod board;
+mod build;
 mod calibrate;
 mod collect;
 mod compare;
+mod completions;
 mod daemon;
 mod doctor;
 mod export;
@@ -29,6 +31,7 @@ mod failure;
 mod findings;
 mod generate;
 mod groups;
+mod help;
 mod import;
 mod interpret;
 mod lines;
@@ -52,20 +55,26 @@ mod predictor;
 mod preset;
 mod prior;
 mod progress;
+mod report;
 mod run;
 mod runtime;
 mod scan;
 mod scene;
 mod scene_file;
 mod simulate;
+mod socket;
 mod status;
+mod suggest;
 mod sweeps;
+mod table;
 mod terminal;
+mod tour;
 mod trace;
 mod watch;
 mod what_if;
 mod worlds;
 
+use build::LONG_VERSION;
 pub use failure::{Failure, Outcome};
 pub use run::EmbeddedDaemon;
 
@@ -77,7 +86,7 @@ use crate::messages;
 
 /// Drive an ultrasonic ranger on a stepper, and predict its readings
 #[derive(Debug, Parser)]
-#[command(version, about, max_term_width = 100)]
+#[command(version, long_version = LONG_VERSION, about)]
 struct Cli {
     #[command(subcommand)]
     verb: Verb,
@@ -89,6 +98,9 @@ an output that can't be written), 3 device, link or disk error.";
 
 #[derive(Debug, Subcommand)]
 enum Verb {
+    /// Run the first commands of the documentation, step by step
+    #[command(long_about = tour::ABOUT)]
+    Tour(tour::Args),
     /// Take one or more scans and log each reading with the model's prediction
     #[command(long_about = scan::ABOUT)]
     Scan(scan::Args),
@@ -156,6 +168,12 @@ enum Verb {
     /// Check, repair or show a log
     #[command(subcommand)]
     Log(log::Verb),
+    /// Collect what a bug report needs in one archive
+    #[command(long_about = report::ABOUT)]
+    Report(report::Args),
+    /// Print a script that completes the command line in a shell
+    #[command(long_about = completions::ABOUT)]
+    Completions(completions::Args),
     /// Write manual pages and shell completions, for packages
     #[command(hide = true)]
     PackageFiles(package_files::Args),
@@ -170,10 +188,16 @@ enum Verb {
     Array(preset::ArrayVerb),
 }
 
-/// Builds the command line: verbs in groups, exit codes with every verb, and values that may be
-/// negative numbers, so that a minus followed by a digit never starts an option.
+/// Builds the command line for help texts as wide as the terminal.
 fn command_line() -> Command {
-    fn finish(command: Command) -> Command {
+    command_line_within(help::columns())
+}
+
+/// Builds the command line for help texts of the given width (0 is unlimited): verbs in groups,
+/// exit codes with every verb, completions, and values that may be negative numbers, so that a
+/// minus followed by a digit never starts an option.
+fn command_line_within(columns: usize) -> Command {
+    fn finish(command: Command, columns: usize) -> Command {
         let help = command.get_after_help().map(ToString::to_string).unwrap_or_default();
         let help = match (help.contains("Exit codes:"), help.is_empty()) {
             (true, _) => help,
@@ -181,24 +205,30 @@ fn command_line() -> Command {
             (false, false) => format!("{help}\n\n{EXIT_CODES}"),
         };
         command
-            .after_help(help)
+            .after_help(help::break_examples(&help, columns))
             .mut_args(|arg| match arg.get_action().takes_values() {
                 true => arg.allow_negative_numbers(true),
                 false => arg,
             })
-            .mut_subcommands(finish)
+            .mut_subcommands(|command| finish(command, columns))
     }
-    groups::in_groups(finish(Cli::command()))
+    let command = completions::with_values(finish(Cli::command(), columns));
+    groups::in_groups(command.term_width(columns))
 }
 
 /// Runs the command line of this process.
 #[must_use]
 pub fn main() -> ExitCode {
+    completions::serve_requests();
+    build::declare();
     ignore_file_size_signal();
     failure::print_whole_lines();
     let mut command = command_line();
-    let matches =
-        command.try_get_matches_from_mut(std::env::args_os()).unwrap_or_else(|error| error.exit());
+    let arguments: Vec<_> = std::env::args_os().collect();
+    let matches = command.try_get_matches_from_mut(&arguments).unwrap_or_else(|error| {
+        let arguments = arguments.iter().skip(1).map(AsRef::as_ref);
+        help::print_and_exit(&suggest::suggest(error, &command, arguments))
+    });
     if let Err(failure) = output::register_inputs(&command, &matches) {
         return failure::report(Err(failure));
     }
@@ -233,6 +263,9 @@ pub fn main() -> ExitCode {
         Verb::Plot(args) => plot::run(&args),
         Verb::Log(verb) => log::run(verb),
         Verb::Generate(args) => generate::run(&args),
+        Verb::Tour(args) => tour::run(&args),
+        Verb::Report(args) => report::run(&args),
+        Verb::Completions(args) => completions::run(&args),
         Verb::PackageFiles(args) => package_files::run(&args),
         Verb::Scene(verb) => scene::run(verb),
         Verb::Sensor(verb) => preset::sensor(&verb),

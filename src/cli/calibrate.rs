@@ -2,6 +2,7 @@
 
 mod checkpoint;
 mod diagnosis;
+mod picture;
 mod report;
 
 use std::{
@@ -9,24 +10,26 @@ use std::{
     sync::Arc,
 };
 
-use comfy_table::{CellAlignment, Table};
 use indicatif::ProgressBar;
 
 use super::{
     Failure, Outcome,
     answer::print_result,
-    compare::RULED,
     numbers::within,
     output::{OutPath, Overwrite},
     prior::{self, PriorSigma},
     progress,
     runtime::{self, Interrupts},
+    table::{align_right, fit, ruled},
     what_if::{WhatIf, WhatIfArgs},
     worlds::SweepArgs,
 };
-use crate::inverse::{
-    FitError, FitObserver, FitOptions, FitProgress, FitResult, FitSweep, ParameterGroup,
-    ParameterReport, Search, SearchResult, World, fit_observed,
+use crate::{
+    inverse::{
+        FitOptions, FitError, FitResult, SearchResult, ParameterGroup, FitProgress, Search, FitSweep, ParameterReport, FitObserver, World,
+        fit_observed,
+    },
+    scan::{Provenance, text::format_count},
 };
 use checkpoint::{Checkpoint, Head};
 use diagnosis::describe_misfits;
@@ -50,7 +53,8 @@ pub(super) struct Args {
     /// Search effort, and allowance for furniture
     #[arg(long, value_name = "HOW", default_value = "thorough", value_enum)]
     search: Search,
-    /// Output folder; fitted sensor, scene, air and poses, estimates, correlations, report
+    /// Output folder; fitted sensor, scene, air and poses, estimates, correlations, report, picture
+    /// of the residuals before and after
     #[arg(long, value_name = "DIR")]
     out: Option<OutPath>,
     #[command(flatten)]
@@ -113,7 +117,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     {
         report::check(out, args.overwrite)?;
     }
-    let (sweeps, world) = read(args, &what_if)?;
+    let Input { sweeps, world, sources } = read(args, &what_if)?;
     let priors = prior::parameters(&args.fit, &args.prior, &world, sweeps.len())?;
     let fit = FitOptions {
         search: args.search,
@@ -132,15 +136,25 @@ pub(super) fn run(args: &Args) -> Outcome {
     if let (Some(out), Some(checkpoint)) = (&args.out, checkpoint) {
         let overwrite = args.overwrite.or_forced(checkpoint.begin_results());
         write_folder(out, overwrite, &world, &sweeps, &fitted, &lines, &summary)?;
+        picture::write(out, overwrite, &world, &sweeps, &fitted, &sources)?;
         checkpoint.remove()?;
     }
     print_result(args.json, &lines, |out| print(out, &lines, &summary))
 }
 
+/// Sweeps with the sensor, air and scene that they share.
+struct Input {
+    sweeps: Vec<Sweep>,
+    world: Arc<World>,
+    sources: Vec<Provenance>,
+}
+
 /// Reads the sweeps and the sensor, air and scene that they share.
-fn read(args: &Args, what_if: &WhatIf) -> Result<(Vec<FitSweep>, Arc<World>), Failure> {
+fn read(args: &Args, what_if: &WhatIf) -> Result<Input, Failure> {
     let (mut sweeps, mut world): (Vec<FitSweep>, Option<Arc<World>>) = (Vec::new(), None);
-    args.sweeps.for_each(what_if, |log, sweep, of| {
+    let mut sources = Vec::new();
+    args.sweeps.for_each(what_if, |log, sweep, of, provenance| {
+        sources.push(provenance);
         let saved = world.get_or_insert_with(|| Arc::clone(of));
         if saved.sensor != of.sensor || saved.scene.sha256 != of.scene.sha256 {
             return Err(Failure::input(
@@ -154,7 +168,7 @@ fn read(args: &Args, what_if: &WhatIf) -> Result<(Vec<FitSweep>, Arc<World>), Fa
     let world = world.ok_or_else(|| {
         Failure::input("there is no sweep to fit to", "give logs of a ranger on a stepper")
     })?;
-    Ok((sweeps, world))
+    Ok(Input { sweeps, world, sources })
 }
 
 /// Fits the parameters, resuming from a checkpoint, until done or interrupted.
@@ -174,7 +188,7 @@ fn find(
         let (path, searches) = (checkpoint.path().display(), saved.len());
         notice!("{path}: resuming after {searches} searches");
     }
-    let bar = progress::spinner(&format!("fitting {} scan(s):", sweeps.len()));
+    let bar = progress::spinner(&format!("fitting {}:", format_count(sweeps.len(), "scan")));
     let watcher = Watcher { bar: bar.clone(), interrupts, checkpoint };
     let fitted = fit_observed(world, sweeps, fit, saved, &watcher);
     bar.finish_and_clear();
@@ -229,9 +243,7 @@ fn failure_from(error: &FitError, checkpoint: Option<&Checkpoint>) -> Failure {
 
 /// Prints the parameters as a table, followed by the summary.
 fn print(out: &mut impl Write, lines: &[ParameterReport], summary: &[String]) -> io::Result<()> {
-    let mut table = Table::new();
-    table.load_style(RULED);
-    table.set_header(["parameter", "initial", "estimate", "\u{b1}", "95 %", ""]);
+    let mut table = ruled(["parameter", "initial", "estimate", "\u{b1}", "95 %", ""]);
     for line in lines {
         table.add_row([
             line.title(),
@@ -242,9 +254,7 @@ fn print(out: &mut impl Write, lines: &[ParameterReport], summary: &[String]) ->
             line.remark().to_owned(),
         ]);
     }
-    for column in table.column_iter_mut().skip(1).take(4) {
-        column.set_cell_alignment(CellAlignment::Right);
-    }
-    writeln!(out, "{table}")?;
+    align_right(&mut table, 1..5);
+    writeln!(out, "{}", fit(table))?;
     summary.iter().try_for_each(|line| writeln!(out, "{line}"))
 }

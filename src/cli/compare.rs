@@ -24,7 +24,7 @@ use crate::{
 };
 use table::WorstBeams;
 
-pub(super) use table::{RULED, describe_path};
+pub(super) use table::describe_path;
 
 /// Options of `sonard compare`.
 #[derive(Debug, clap::Args)]

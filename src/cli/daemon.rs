@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::{Failure, Outcome};
+use super::{Failure, Outcome, socket::default_socket};
 use crate::{
     client::{Client, ClientError, Endpoint, ScansError},
     fleet::{Member, MemberError, PolledDaemon, check_members, read_members},
@@ -14,14 +14,10 @@ use crate::{
 /// Options that select one daemon.
 #[derive(Debug, Clone, clap::Args)]
 pub(super) struct DaemonArgs {
-    /// Unix socket of the daemon
-    #[arg(
-        long,
-        value_name = "PATH",
-        env = "SONARD_SERVER_SOCKET",
-        default_value = "/run/sonard/sonard.sock"
-    )]
-    socket: PathBuf,
+    /// Unix socket of the daemon [default: the user's in $XDG_RUNTIME_DIR/sonard if there is one,
+    /// else /run/sonard/sonard.sock]
+    #[arg(long, value_name = "PATH", env = "SONARD_SERVER_SOCKET")]
+    socket: Option<PathBuf>,
     /// TCP address of the daemon, HOST:PORT, instead of its socket
     #[arg(long, value_name = "ADDRESS")]
     address: Option<String>,
@@ -34,7 +30,8 @@ pub(super) struct DaemonArgs {
 impl DaemonArgs {
     pub(super) fn client(&self) -> Result<Client, Failure> {
         let Some(address) = &self.address else {
-            return Ok(Client::new(Endpoint::Socket(self.socket.clone()), None));
+            let socket = self.socket.clone().unwrap_or_else(default_socket);
+            return Ok(Client::new(Endpoint::Socket(socket), None));
         };
         let host = address.strip_prefix("http://").unwrap_or(address).trim_end_matches('/');
         if host.contains('/') {
@@ -52,13 +49,9 @@ impl DaemonArgs {
 /// Options that select any number of daemons.
 #[derive(Debug, Clone, clap::Args)]
 pub(super) struct DaemonsArgs {
-    /// Unix socket of the daemon; repeatable
-    #[arg(
-        long,
-        value_name = "PATH",
-        env = "SONARD_SERVER_SOCKET",
-        default_value = "/run/sonard/sonard.sock"
-    )]
+    /// Unix socket of the daemon; repeatable [default: the user's in $XDG_RUNTIME_DIR/sonard if
+    /// there is one, else /run/sonard/sonard.sock]
+    #[arg(long, value_name = "PATH", env = "SONARD_SERVER_SOCKET")]
     socket: Vec<PathBuf>,
     /// TCP address of the daemon, HOST:PORT, instead of its socket; repeatable
     #[arg(long, value_name = "ADDRESS")]
@@ -81,9 +74,9 @@ pub(super) enum Daemons {
 impl DaemonsArgs {
     pub(super) fn daemons(&self) -> Result<Daemons, Failure> {
         let (socket, address) = (self.socket.as_slice(), self.address.as_slice());
-        if let (None, [socket], [] | [_]) = (&self.fleet, socket, address) {
+        if let (None, [] | [_], [] | [_]) = (&self.fleet, socket, address) {
             let one = DaemonArgs {
-                socket: socket.clone(),
+                socket: socket.first().cloned(),
                 address: address.first().cloned(),
                 token_file: self.token_file.clone(),
             };
@@ -99,8 +92,13 @@ impl DaemonsArgs {
             return connect_all(read_members(file).map_err(wrong)?);
         }
         let (socket, address) = (self.socket.as_slice(), self.address.as_slice());
-        // A single socket may be the default, which addresses replace.
-        let sockets = if socket.len() > 1 || address.is_empty() { socket } else { &[] };
+        let default = [default_socket()];
+        // A single socket may be that of the environment, which addresses replace.
+        let sockets = match (socket, address) {
+            ([], []) => &default[..],
+            ([_], [_, ..]) => &[],
+            (sockets, _) => sockets,
+        };
         let sockets = sockets.iter().map(|path| Ok(Member::from_socket(path.clone())));
         let members = sockets.chain(address.iter().map(|address| Member::parse(address)));
         let members: Result<Vec<_>, _> = members.collect();

@@ -73,6 +73,19 @@ pub(super) fn run(args: &Args) -> Outcome {
     report.outcome()
 }
 
+/// Checks a port and the board on it without motion, and returns the checks as JSON.
+///
+/// # Errors
+///
+/// An interrupt, or a failed start of the runtime.
+pub(super) fn check_without_motion(port: &str) -> Result<String, Failure> {
+    let args = Args { port: Some(port.to_owned()), no_motion: true, pings: 10, json: true };
+    let report = runtime::run_interruptible(async |interrupts| {
+        Ok(examine::examine(port, &args, interrupts).await)
+    })?;
+    Ok(serde_json::to_string_pretty(&report).unwrap_or_default())
+}
+
 fn list(candidates: &[SerialPortInfo], json: bool) -> Outcome {
     if json {
         let text = serde_json::json!({ "port": null, "candidates": candidates }).to_string();

@@ -20,6 +20,7 @@ use crate::{
         AttachedLog, CsvExport, Export, ExportError, ExportSettings, McapExport, ParquetExport,
         Profile,
     },
+    scan::text::format_count,
 };
 
 /// Options of `sonard export`.
@@ -231,8 +232,13 @@ struct ExportCounts {
 
 impl ExportCounts {
     fn print(&self) {
-        let Self { logs, scans, readings } = self;
-        notice!("{logs} logs, {scans} scans, {readings} readings");
+        let Self { logs, scans, readings } = *self;
+        notice!(
+            "{}, {}, {}",
+            format_count(logs, "log"),
+            format_count(scans, "scan"),
+            format_count(readings, "reading")
+        );
     }
 }
 

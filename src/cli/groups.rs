@@ -5,7 +5,8 @@ use std::fmt::Write as _;
 use clap::Command;
 
 /// Verbs by purpose, in the order of a typical workflow.
-pub(super) const GROUPS: [(&str, &[&str]); 7] = [
+pub(super) const GROUPS: [(&str, &[&str]); 9] = [
+    ("First steps", &["tour"]),
     ("Measure", &["scan", "collect", "run", "status", "watch"]),
     ("Model", &["simulate", "paths", "trace", "predict", "generate"]),
     ("Logs and scans", &["plot", "compare", "interpret", "log", "import", "export"]),
@@ -13,6 +14,7 @@ pub(super) const GROUPS: [(&str, &[&str]); 7] = [
     ("Map", &["map", "lines"]),
     ("Device", &["doctor", "mock", "board"]),
     ("Scenes and presets", &["scene", "sensor", "array"]),
+    ("Shell and reports", &["completions", "report"]),
 ];
 
 /// Width of the column of names.

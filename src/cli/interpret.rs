@@ -5,22 +5,20 @@ use std::{
     path::PathBuf,
 };
 
-use comfy_table::{CellAlignment, Table};
-
 use super::{
     Failure, Outcome,
     answer::print_result,
-    compare::RULED,
     findings::{FindingsArgs, ScanOrigin},
     logs::first_log,
     numbers::{not_negative, positive, probability},
     picture::scene_for,
     sweeps::for_each_sweep,
+    table::{align_right, fit, ruled},
 };
 use crate::{
     interpret::{Extents, Feature, FeatureKind, InterpretSettings, Noise, interpret},
     plot::draw_features,
-    scan::ScanView,
+    scan::{ScanView, text::format_count},
 };
 
 /// Options of `sonard interpret`.
@@ -106,7 +104,7 @@ pub(super) fn run(args: &Args) -> Outcome {
 /// Reads the scans that can be interpreted, and classifies their features.
 fn classify(args: &Args) -> Result<(Vec<ScanView>, Vec<Feature>), Failure> {
     let (mut scans, mut sweeps) = (Vec::new(), Vec::new());
-    let mut of_arrays = 0;
+    let mut of_arrays = 0_u64;
     for_each_sweep(&args.logs, |scan, sweep| {
         if scan.is_array_scan() {
             of_arrays += 1;
@@ -117,7 +115,10 @@ fn classify(args: &Args) -> Result<(Vec<ScanView>, Vec<Feature>), Failure> {
     })?;
     if of_arrays > 0 {
         return Err(Failure::input(
-            format!("{of_arrays} scan(s) are of an array: arcs need a single rotating ranger"),
+            format!(
+                "{} of an array given: arcs need a single rotating ranger",
+                format_count(of_arrays, "scan")
+            ),
             "`sonard map` and `sonard lines` accept an array's readings",
         ));
     }
@@ -158,8 +159,7 @@ fn print(out: &mut impl Write, features: &[Feature]) -> io::Result<()> {
     if features.is_empty() {
         return writeln!(out, "no features: no beam has an echo");
     }
-    let mut table = Table::new();
-    table.load_style(RULED).set_header([
+    let mut table = ruled([
         "kind",
         "bearing",
         "range",
@@ -174,10 +174,8 @@ fn print(out: &mut impl Write, features: &[Feature]) -> io::Result<()> {
     for feature in features {
         table.add_row(row(feature));
     }
-    for column in table.column_iter_mut().skip(1).take(8) {
-        column.set_cell_alignment(CellAlignment::Right);
-    }
-    writeln!(out, "{table}")?;
+    align_right(&mut table, 1..9);
+    writeln!(out, "{}", fit(table))?;
     let mut printed = Vec::new();
     for next in features.iter().filter_map(|feature| feature.next) {
         if !printed.contains(&next.direction_deg) {

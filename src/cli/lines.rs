@@ -18,7 +18,7 @@ use super::{
 use crate::{
     interpret::lines::{LineMap, LineMapSettings, MapLine},
     plot::draw_lines,
-    scan::ScanView,
+    scan::{ScanView, text::format_count},
 };
 
 /// Options of `sonard lines`.
@@ -144,5 +144,10 @@ fn print(out: &mut impl Write, map: &LineMap, discarded: usize) -> io::Result<()
             line.confidence
         )?;
     }
-    writeln!(out, "{} lines; {discarded} readings discarded", map.lines().len())
+    writeln!(
+        out,
+        "{}; {} discarded",
+        format_count(map.lines().len(), "line"),
+        format_count(discarded, "reading")
+    )
 }

@@ -5,17 +5,16 @@ use std::{
     sync::Arc,
 };
 
-use comfy_table::{CellAlignment, Table};
 use serde::Serialize;
 use uuid::Uuid;
 
 use super::{
     Failure, Outcome,
     answer::print_result,
-    compare::RULED,
     numbers::within,
     prior::{self, PriorSigma},
     progress,
+    table::{align_right, fit, ruled},
     what_if::InsteadArgs,
     worlds::SweepArgs,
 };
@@ -127,7 +126,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     let mut current: Option<(Arc<World>, CoarseGrid)> = None;
     let mut course = args.course.odometry().map(Tracker::new);
     let mut found = false;
-    args.sweeps.for_each(&what_if, |log, sweep, world| {
+    args.sweeps.for_each(&what_if, |log, sweep, world, _| {
         if current.as_ref().is_none_or(|(of, _)| !Arc::ptr_eq(of, world)) {
             current = Some((Arc::clone(world), atlas(world, args)?));
         }
@@ -173,11 +172,9 @@ fn print(
     diagnoses: &[Misfit],
 ) -> io::Result<()> {
     writeln!(out, "{log}: scan {scan}")?;
-    let mut table = Table::new();
-    table.load_style(RULED);
-    let nuisance = modes.first().map_or(&[][..], |mode| &mode.nuisance);
+    let besides = modes.first().map_or(&[][..], |mode| &mode.besides);
     let head = ["probability", "x m", "y m", "heading deg", "explained"].map(str::to_owned);
-    table.set_header(head.into_iter().chain(nuisance.iter().map(|of| of.name.clone())));
+    let mut table = ruled(head.into_iter().chain(besides.iter().map(|of| of.name.clone())));
     for mode in modes {
         let pose = [
             format!("{:.3}", mode.probability),
@@ -189,9 +186,7 @@ fn print(
         let parameter = |of: &NuisanceEstimate| format!("{:.2} \u{b1} {:.2}", of.value, of.sigma);
         table.add_row(pose.into_iter().chain(mode.nuisance.iter().map(parameter)));
     }
-    for column in table.column_iter_mut() {
-        column.set_cell_alignment(CellAlignment::Right);
-    }
-    writeln!(out, "{table}")?;
-    diagnoses.iter().try_for_each(|diagnosis| writeln!(out, "warning: {diagnosis}"))
+    align_right(&mut table, 0..usize::MAX);
+    writeln!(out, "{}", fit(table))?;
+    doubts.iter().try_for_each(|diagnosis| writeln!(out, "warning: {diagnosis}"))
 }

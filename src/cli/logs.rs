@@ -10,7 +10,7 @@ use super::{Failure, output::register_input, progress};
 use crate::{
     collect::SCANS,
     compare::keep_every_second,
-    scan::{Record, ScanView},
+    scan::{Record, ScanView, text::format_count},
     store::{FileKind, Line, LineError, StoreError, log_files, open_for_reading, read_log},
 };
 
@@ -35,10 +35,8 @@ impl Damage {
     /// Reports the number of further damaged lines.
     pub(super) fn report_rest(&self, log: &Path) {
         if let Some(more) = self.count.checked_sub(MAX_REPORTED as u64).filter(|more| *more > 0) {
-            notice!(
-                "warning: {}: {more} more damaged lines; see `sonard log verify`",
-                log.display()
-            );
+            let more = format_count(more, "more damaged line");
+            notice!("warning: {}: {more}; see `sonard log verify`", log.display());
         }
     }
 }

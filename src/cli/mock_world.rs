@@ -15,7 +15,7 @@ use super::{
 use crate::{
     acoustics::{Air, Sensor, TofNoise},
     geometry::Pose,
-    mock::{BoardSettings, EchoTable, FAULT_HELP, FaultPlan, MockBoard, Pace, World},
+    mock::{BoardSettings, FAULT_HELP, FaultPlan, MockBoard, Pace, Replay, EchoTable, World},
     model::{Options, Simulator},
     scene::Scene,
 };
@@ -87,6 +87,15 @@ impl MockWorldArgs {
         self.board_at(pace, assumed)
     }
 
+    /// Creates the board that replays a log, paced and disturbed according to the options.
+    pub(super) fn replaying_board(&self, replay: Replay) -> MockBoard {
+        let pace = if self.realtime { Pace::RealTime } else { Pace::Virtual };
+        let steps_per_revolution = replay.steps_per_revolution();
+        let settings =
+            BoardSettings { is_replay: true, ..self.settings(pace, steps_per_revolution) };
+        MockBoard::new(settings, World::from_replay(replay))
+    }
+
     /// Creates the board with the given pace.
     pub(super) fn board_at(
         &self,
@@ -98,17 +107,20 @@ impl MockWorldArgs {
         let steps = self.steps_per_revolution;
         let noise = TofNoise::from_range_sigma_mm(self.noise_mm, sound_speed_m_s);
         let world = World::new(soundings, noise, self.missed_steps, self.seed);
-        // Consecutive mocks are different boots, so the boot number must not come from the seed.
-        let boot = rand::rng().random_range(1..=u16::MAX);
-        let settings = BoardSettings {
-            boot,
+        Ok(MockBoard::new(self.settings(pace, steps), world))
+    }
+
+    fn settings(&self, pace: Pace, steps_per_revolution: u16) -> BoardSettings {
+        BoardSettings {
+            // Consecutive mocks are different boots, so the boot number must not come from the seed.
+            boot: rand::rng().random_range(1..=u16::MAX),
             clock: 0,
-            steps_per_revolution: steps,
+            steps_per_revolution,
             faults: self.faults.unwrap_or_default(),
             seed: self.seed,
             pace,
-        };
-        Ok(MockBoard::new(settings, world))
+            is_replay: false,
+        }
     }
 
     /// Computes the echoes in the true world, at the true pose or else the assumed one.

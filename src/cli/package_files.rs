@@ -3,10 +3,10 @@
 use std::{fs, io, path::Path};
 
 use clap::Command;
-use clap_complete::{Shell, generate_to};
+use clap_complete::Shell;
 use clap_mangen::roff::{Roff, bold, italic, roman};
 
-use super::{Failure, Outcome, command_line, output::OutPath};
+use super::{Failure, Outcome, command_line_within, completions, output::OutPath};
 use crate::config::{Key, Section, sections};
 
 /// Options of `sonard package-files`.
@@ -16,21 +16,25 @@ pub(super) struct Args {
     dir: OutPath,
 }
 
+/// Completion scripts, named as the shells find them.
+const SCRIPTS: [(Shell, &str); 3] =
+    [(Shell::Bash, "sonard.bash"), (Shell::Zsh, "_sonard"), (Shell::Fish, "sonard.fish")];
+
 pub(super) fn run(args: &Args) -> Outcome {
     write_all(&args.dir)
         .map_err(|error| Failure::unwritable(&format!("into {}", args.dir.display()), &error))
 }
 
 fn write_all(dir: &Path) -> io::Result<()> {
-    let [pages, files, completions] = ["man1", "man5", "completions"].map(|part| dir.join(part));
-    for folder in [&pages, &files, &completions] {
+    let [pages, files, scripts] = ["man1", "man5", "completions"].map(|part| dir.join(part));
+    for folder in [&pages, &files, &scripts] {
         fs::create_dir_all(folder)?;
     }
     // Lines are wrapped by the pager.
-    let command = command_line().term_width(0);
+    let command = command_line_within(0);
     clap_mangen::generate_to(command.clone(), &pages)?;
-    for shell in [Shell::Bash, Shell::Zsh, Shell::Fish] {
-        generate_to(shell, &mut command.clone(), "sonard", &completions)?;
+    for (shell, name) in SCRIPTS {
+        fs::write(scripts.join(name), completions::script(shell)?)?;
     }
     fs::write(files.join("sonard.toml.5"), configuration_page(&command))
 }
@@ -103,7 +107,7 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         write_all(folder.path()).expect("there is room");
         let read = |name: &str| fs::read_to_string(folder.path().join(name)).expect("it is there");
-        for verb in command_line().get_subcommands().filter(|verb| !verb.is_hide_set()) {
+        for verb in command_line_within(0).get_subcommands().filter(|verb| !verb.is_hide_set()) {
             let page = read(&format!("man1/sonard-{}.1", verb.get_name()));
             assert!(page.contains(".SH OPTIONS"), "{}", verb.get_name());
         }
@@ -115,8 +119,9 @@ mod tests {
                 assert!(page.contains(&format!("\\fB{}\\fR", key.name)), "{}", key.name);
             }
         }
-        for name in ["sonard.bash", "_sonard", "sonard.fish"] {
-            assert!(read(&format!("completions/{name}")).contains("calibrate"), "{name}");
+        for (shell, name) in SCRIPTS {
+            let script = completions::script(shell).expect("a script");
+            assert_eq!(read(&format!("completions/{name}")).as_bytes(), script);
         }
     }
 }

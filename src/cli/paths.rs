@@ -5,13 +5,13 @@ use std::{
     sync::Arc,
 };
 
-use comfy_table::{CellAlignment, Table, presets::NOTHING};
 use serde::Serialize;
 
 use super::{
     Failure, Outcome,
     options::{AirArgs, SensorArgs},
     place::PlaceArgs,
+    table::{align_right, fit, plain},
 };
 use crate::{
     geometry::{Pose, wrap_360},
@@ -19,7 +19,10 @@ use crate::{
         EdgeLawKind, Options, PathOptions, Simulator,
         paths::{EchoPath, Paths},
     },
-    scan::{InteractionRecord, PathKind, PathRecord},
+    scan::{
+        InteractionRecord, PathKind, PathRecord,
+        text::{format_count, group_digits},
+    },
 };
 
 /// Options of `sonard paths`.
@@ -52,6 +55,9 @@ pub(super) struct Args {
     /// Disable the absorption of the air
     #[arg(long)]
     lossless: bool,
+    /// Print all findings; without it, the table ends after 50 rows
+    #[arg(long)]
+    all: bool,
     /// JSON instead of text; one object per path
     #[arg(long)]
     json: bool,
@@ -132,7 +138,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     let printed = paths.visit_between(transmitter, receiver, |paths| {
         let count = paths.len();
         let lines = paths.map(|path| path_line(&simulator, &path));
-        if args.json { write_json(lines) } else { write_table(lines, count) }
+        if args.json { write_json(lines) } else { write_table(lines, count, args.all) }
     });
     let written = printed.map_err(|error| Failure::input(error, "see `sonard paths --help`"))?;
     written.or_else(|error| Failure::from_write("to standard output", &error))
@@ -167,22 +173,11 @@ fn write_json(lines: impl Iterator<Item = PathLine>) -> io::Result<()> {
     out.flush()
 }
 
-fn write_table(lines: impl Iterator<Item = PathLine>, count: usize) -> io::Result<()> {
-    let mut table = Table::new();
-    table.load_style(NOTHING).set_header([
-        "length m",
-        "range m",
-        "departure",
-        "arrival",
-        "amplitude",
-        "path",
-    ]);
-    for index in 0..5 {
-        if let Some(column) = table.column_mut(index) {
-            column.set_cell_alignment(CellAlignment::Right);
-        }
-    }
-    for path_line in lines {
+fn write_table(lines: impl Iterator<Item = PathLine>, count: usize, all: bool) -> io::Result<()> {
+    let mut table = plain(["length m", "range m", "departure", "arrival", "amplitude", "path"]);
+    align_right(&mut table, 0..5);
+    let shown = if all { count } else { count.min(MAX_ROWS) };
+    for path_line in lines.take(shown) {
         table.add_row([
             format!("{:.4}", path_line.length_m),
             format!("{:.4}", path_line.length_m / 2.0),
@@ -193,7 +188,18 @@ fn write_table(lines: impl Iterator<Item = PathLine>, count: usize) -> io::Resul
         ]);
     }
     let mut out = io::BufWriter::new(io::stdout().lock());
-    writeln!(out, "{table}")?;
-    writeln!(out, "{count} paths")?;
+    writeln!(out, "{}", fit(table))?;
+    writeln!(out, "{}{}", format_count(count, "path"), describe_rest(count - shown))?;
     out.flush()
+}
+
+/// Maximum number of rows of a table without `--all`.
+pub(super) const MAX_ROWS: usize = 50;
+
+/// Remark on the rows that a table omits; empty if there are none.
+pub(super) fn describe_rest(omitted: usize) -> String {
+    match omitted {
+        0 => String::new(),
+        more => format!(", {} more; --all prints them", group_digits(more as u64)),
+    }
 }

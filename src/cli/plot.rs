@@ -90,10 +90,27 @@ pub(super) fn run(args: &Args) -> Outcome {
         (None, Kind::Scan) => draw_scans(&views, scene.as_ref()),
         (None, Kind::Polar) => draw_polar(&views, scene.as_ref()),
         (None, Kind::SideBySide) => draw_side_by_side(&views, scene.as_ref()),
-        (None, Kind::Confidence) => draw_confidence(&views, scene.as_ref()),
+        (None, Kind::Confidence) => {
+            check_confidences(log, &views)?;
+            draw_confidence(&views, scene.as_ref())
+        }
         (None, Kind::Residuals) => draw_residuals(&views, scene.as_ref()),
     };
     targets.iter().try_for_each(|target| target.write(&picture, args.picture.width))
+}
+
+/// Checks that there is a confidence to draw.
+fn check_confidences(log: &Path, views: &[ScanView]) -> Outcome {
+    if views.iter().flat_map(|view| &view.pings).any(|ping| ping.confidence.is_some()) {
+        return Ok(());
+    }
+    let log = log.display();
+    Err(Failure::input(
+        format!("{log}: no reading has a confidence"),
+        format!(
+            "`sonard log annotate {log} -o annotated.jsonl` adds confidences; then plot annotated.jsonl"
+        ),
+    ))
 }
 
 /// Reads the scans that are drawn.

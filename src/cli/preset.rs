@@ -2,7 +2,7 @@
 
 use std::io::{self, Write as _};
 
-use super::{Failure, Outcome};
+use super::{Failure, Outcome, table};
 use crate::{
     acoustics::Sensor,
     array::RangerArray,
@@ -43,7 +43,10 @@ pub(super) fn sensor(verb: &SensorVerb) -> Outcome {
     match verb {
         SensorVerb::List => {
             let described = |name| Sensor::preset(name).map(|sensor| sensor.description);
-            list(Sensor::preset_names().map(|name| (name, described(name).unwrap_or_default())))
+            list(
+                Sensor::preset_names()
+                    .map(|name| [name.into(), described(name).unwrap_or_default()]),
+            )
         }
         SensorVerb::Show(Name { name }) => {
             show("sensor", name, Sensor::preset_text(name), Sensor::preset_names())
@@ -56,7 +59,7 @@ pub(super) fn array(verb: &ArrayVerb) -> Outcome {
         ArrayVerb::List => {
             let described = |name| RangerArray::preset(name).map(|array| array.description);
             let names = RangerArray::preset_names();
-            list(names.map(|name| (name, described(name).unwrap_or_default())))
+            list(names.map(|name| [name.into(), described(name).unwrap_or_default()]))
         }
         ArrayVerb::Show(Name { name }) => {
             show("array", name, RangerArray::preset_text(name), RangerArray::preset_names())
@@ -69,11 +72,9 @@ pub(super) fn scene(Name { name }: &Name) -> Outcome {
     show("scene", name, shipped::text(name), shipped::names())
 }
 
-fn list(presets: impl Iterator<Item = (&'static str, String)>) -> Outcome {
-    let presets: Vec<_> = presets.collect();
-    let width = presets.iter().map(|(name, _)| name.len()).max().unwrap_or_default();
-    let lines = presets.iter().map(|(name, what)| format!("{name:width$}  {what}\n"));
-    print(&lines.collect::<String>())
+/// Prints names with their descriptions.
+pub(super) fn list(rows: impl IntoIterator<Item = [String; 2]>) -> Outcome {
+    print(&format!("{}\n", table::fit(table::list(rows))))
 }
 
 fn show<'a>(

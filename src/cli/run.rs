@@ -9,7 +9,7 @@ mod ros;
 mod sandbox;
 
 use std::{
-    path::PathBuf,
+    path::{Path, PathBuf},
     sync::{Arc, OnceLock},
     time::Duration,
 };
@@ -22,8 +22,10 @@ use super::{
     Failure, Outcome,
     mock_world::MockWorldArgs,
     runtime::{self, Interrupts},
+    socket,
 };
 use crate::{
+    config::Keys,
     daemon::{self, Handle, Journal, OpenPort, Order, Relocate, Resources, Settings},
     host_gpio,
     interrupts::{FORCED_END, Hangup},
@@ -35,6 +37,7 @@ use crate::{
 };
 pub use embedded::EmbeddedDaemon;
 use files::Files;
+pub(super) use load::CONFIG_FILE;
 use load::Loader;
 use mock::Mock;
 use ros::Ros;
@@ -210,6 +213,7 @@ async fn serve(
             host_gpio::open(&keys.gpio).map_err(|error| Failure::input(&error, error.help()))?,
         ),
     };
+    announce_user_places(keys)?;
     // Sockets first: unlike a log, they are removed if a later step fails.
     let listeners =
         Listeners::open(&keys.server).map_err(|error| Failure::device(&error, error.help()))?;
@@ -275,6 +279,22 @@ async fn serve(
         Some(error) => Err(Failure::device(format!("cannot close the log: {error}"), "")),
         None => Ok(()),
     }
+}
+
+/// Creates the folder of the user's socket, and reports the places that replace the system's.
+fn announce_user_places(keys: &Keys) -> Outcome {
+    let socket = Path::new(&keys.server.socket);
+    if socket == socket::user_socket() {
+        socket::create_user_folder(socket).map_err(|error| {
+            let help = "give --socket a path in a folder of yours";
+            Failure::device(format!("cannot use {}: {error}", socket.display()), help)
+        })?;
+        tracing::info!("no rights to /run/sonard; the socket is {}", socket.display());
+    }
+    if socket::user_logs().is_some_and(|logs| logs == Path::new(&keys.log.folder)) {
+        tracing::info!("no rights to /var/lib/sonard; the logs are in {}", keys.log.folder);
+    }
+    Ok(())
 }
 
 /// Opens ports; a changed device becomes an event of the daemon.

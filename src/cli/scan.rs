@@ -28,7 +28,7 @@ use crate::{
     mock::{EchoTable, MockBoard, MockPort},
     model::OptionKeys,
     ranger::{DriveError, Driver, Motion, PreparedScan, Ranger, ScanError, ScanSummary},
-    scan::Record,
+    scan::{Record, text::format_count},
 };
 use emulator::Emulator;
 use output::Output;
@@ -226,7 +226,7 @@ async fn measure(
         mock.stop().await;
     }
     if missing > 0 {
-        return Err(Failure::Found(Some(format!("{missing} beams are missing"))));
+        return Err(Failure::Found(Some(format!("{} missing", format_count(missing, "beam")))));
     }
     Ok(())
 }

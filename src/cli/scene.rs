@@ -196,14 +196,13 @@ fn with_drawn_poses(mut scene: Scene, pose: Option<&str>) -> Result<Scene, Failu
 }
 
 fn list() -> Outcome {
-    let mut lines = String::new();
-    let width = shipped::names().map(str::len).max().unwrap_or_default();
+    let mut rows = Vec::new();
     for name in shipped::names() {
         let scene = scene_file::shipped(name)?;
         let poses = scene.poses.keys().cloned().collect::<Vec<_>>().join(", ");
-        lines.push_str(&format!("{name:width$}  poses: {poses}\n"));
+        rows.push([name.to_owned(), format!("poses: {poses}")]);
     }
-    print(lines.trim_end())
+    preset::list(rows)
 }
 
 fn schema() -> Outcome {

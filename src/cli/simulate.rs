@@ -1,8 +1,14 @@
 //! `sonard simulate`.
 
 mod array;
+mod summary;
 
-use std::{fs, path::PathBuf, sync::Arc};
+use std::{
+    fs,
+    io::{self, IsTerminal as _},
+    path::PathBuf,
+    sync::Arc,
+};
 
 use indicatif::ProgressBar;
 use jiff::Timestamp;
@@ -28,6 +34,7 @@ use crate::{
 };
 
 use array::ArrayArgs;
+use summary::Summaries;
 
 /// Options of `sonard simulate`.
 #[derive(Debug, clap::Args)]
@@ -57,6 +64,9 @@ pub(super) struct Args {
     output: Option<OutPath>,
     #[command(flatten)]
     overwrite: Overwrite,
+    /// JSON instead of text; the records of a log, also on a terminal
+    #[arg(long)]
+    json: bool,
     #[command(flatten)]
     noise: NoiseArgs,
     #[command(flatten)]
@@ -100,7 +110,8 @@ impl NoiseArgs {
 pub(super) const ABOUT: &str = "\
 Predict a scan with the model alone.
 
-Writes the records of a log, one JSON object per line, with provenance `simulated`. Each reading \
+Writes the records of a log, one JSON object per line, with provenance `simulated`; on a terminal, \
+a summary of each scan unless --json is given. Each reading \
 has its propagation path, amplitude and level above threshold. A reading without an echo has the \
 strongest arrival relative to the threshold, with a negative level.
 
@@ -138,7 +149,7 @@ pub(super) fn run(args: &Args) -> Outcome {
         None => Some(simulator(args, &scene, &poses[0])?),
     };
     let noise = args.noise.noise()?;
-    let mut out = records_to(args.output.as_deref(), args.overwrite)?;
+    let mut out = records_for(args)?;
     let mut rng = Pcg64::seed_from_u64(args.noise.seed);
     let mut ping = |point: &ObservationPoint, direction_rad| match &noise {
         Some(noise) => point.ping_in_noise(direction_rad, noise, &mut rng),
@@ -170,6 +181,14 @@ pub(super) fn run(args: &Args) -> Outcome {
         Err(SimulationFailure::Write(error)) => closed(Err(error))?,
     }
     skipped
+}
+
+/// Returns the output of the records: a file, standard output, or a summary on a terminal.
+fn records_for(args: &Args) -> Result<Box<dyn RecordWriter>, Failure> {
+    if args.output.is_none() && !args.json && io::stdout().is_terminal() {
+        return Ok(Box::new(Summaries::default()));
+    }
+    records_to(args.output.as_deref(), args.overwrite)
 }
 
 /// Reason for an early end.

@@ -11,8 +11,9 @@ use super::{
     daemon::{Daemons, DaemonsArgs, failure_from},
     runtime,
 };
-use crate::api::{
-    Health, LinkReport, MqttReport, Pending, RosReport, ScanFit, SimulationReport, Status,
+use crate::{
+    api::{Health, LinkReport, MqttReport, Pending, RosReport, ScanFit, SimulationReport, Status},
+    scan::text::{format_count, format_length},
 };
 
 /// Options of `sonard status`.
@@ -149,10 +150,10 @@ fn broker(report: &MqttReport) -> String {
 fn agreement(fit: &ScanFit) -> Option<String> {
     let (share, off_m) = (fit.agree_fraction?, fit.median_abs_residual_m?);
     Some(format!(
-        "  model    {:.0} % of {} echoes of the last scan agree, median |residual| {:.0} mm",
+        "  model    {:.0} % of {} of the last scan agree, median |residual| {}",
         100.0 * share,
-        fit.both_echo,
-        1e3 * off_m,
+        format_count(fit.both_echo, "echo"),
+        format_length(off_m),
     ))
 }
 

@@ -1,6 +1,9 @@
 //! Lines on standard output and standard error.
 
-use std::io::{self, Write as _};
+use std::{
+    io::{self, Write as _},
+    os::fd::AsFd,
+};
 
 use anstream::{AutoStream, ColorChoice, adapter::strip_str};
 
@@ -19,4 +22,15 @@ pub(super) fn write_notice(line: &str) {
 pub(super) fn print_line(line: &str) {
     // A closed reader is ignored.
     drop(writeln!(anstream::stdout(), "{line}"));
+}
+
+/// Width of the terminal on standard output, columns; `None` without one.
+pub(super) fn stdout_columns() -> Option<u16> {
+    columns_of(io::stdout())
+}
+
+/// Width of a terminal, columns; `None` for other files, and for terminals of unknown width.
+pub(super) fn columns_of(stream: impl AsFd) -> Option<u16> {
+    let size = rustix::termios::tcgetwinsize(stream).ok()?;
+    Some(size.ws_col).filter(|columns| *columns > 0)
 }

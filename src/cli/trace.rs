@@ -2,21 +2,22 @@
 
 use std::{io::Write as _, sync::Arc};
 
-use comfy_table::{CellAlignment, Table, presets::NOTHING};
 use serde::Serialize;
 
 use super::{
     Failure, Outcome,
     options::{AirArgs, SensorArgs, engine_options},
+    paths::{MAX_ROWS, describe_rest},
     picture::{PictureArgs, Target},
     place::PlaceArgs,
+    table::{align_right, fit, plain},
 };
 use crate::{
     acoustics::{EchoTrace, EnvelopePeak},
     geometry::Pose,
     model::{ObservationPoint, OptionKeys, Simulator, TooCostly},
     plot::{TraceView, draw_trace},
-    scan::{PathRecord, PingStatus},
+    scan::{PathRecord, PingStatus, text::format_count},
 };
 
 /// Options of `sonard trace`.
@@ -34,6 +35,9 @@ pub(super) struct Args {
     /// Spacing of the samples, microseconds
     #[arg(long, value_name = "US", default_value_t = 5.0)]
     step_us: f64,
+    /// Print all findings; without it, the table ends after 50 rows
+    #[arg(long)]
+    all: bool,
     /// JSON instead of text; one object
     #[arg(long)]
     json: bool,
@@ -96,6 +100,8 @@ struct DetectionJson {
     status: PingStatus,
     range_m: Option<f64>,
     tof_us: Vec<f64>,
+    /// ECHO rises again after the last of these times.
+    has_more_echoes: bool,
     amplitude: Option<f64>,
     margin_db: Option<f64>,
     path: Option<PathRecord>,
@@ -124,8 +130,9 @@ pub(super) fn run(args: &Args) -> Outcome {
             .and_then(|()| writeln!(std::io::stdout()));
         printed.or_else(|error| Failure::from_write("to standard output", &error))?;
     } else if targets.is_empty() {
-        let table = ping.table();
-        writeln!(std::io::stdout(), "{table}\n{}", ping.describe_detection())
+        let table = ping.table(args.all);
+        let omitted = ping.describe_omitted().map(|note| format!("\n{note}")).unwrap_or_default();
+        writeln!(std::io::stdout(), "{table}\n{}{omitted}", ping.describe_detection())
             .or_else(|error| Failure::from_write("to standard output", &error))?;
     }
     ping.draw(&targets, args.picture.width)
@@ -203,6 +210,7 @@ impl<'a> PingTrace<'a> {
                 status: detection.status,
                 range_m: detection.range_m,
                 tof_us: detection.echoes_us.to_vec(),
+                has_more_echoes: detection.has_more_echoes,
                 amplitude: detection.amplitude,
                 margin_db: detection.margin_db,
                 path: self.path.clone(),
@@ -210,15 +218,11 @@ impl<'a> PingTrace<'a> {
         }
     }
 
-    fn table(&self) -> Table {
-        let mut table = Table::new();
-        table.load_style(NOTHING).set_header(["time us", "range m", "peak", "peak dB", "path"]);
-        for index in 0..4 {
-            if let Some(column) = table.column_mut(index) {
-                column.set_cell_alignment(CellAlignment::Right);
-            }
-        }
-        for (peak, path) in self.peaks() {
+    fn table(&self, all: bool) -> String {
+        let mut table = plain(["time us", "range m", "peak", "peak dB", "path"]);
+        align_right(&mut table, 0..4);
+        let shown = if all { self.paths.len() } else { self.paths.len().min(MAX_ROWS) };
+        for (peak, path) in self.peaks().take(shown) {
             table.add_row([
                 format!("{:.1}", peak.tof_us),
                 format!("{:.4}", path.length_m / 2.0),
@@ -227,7 +231,17 @@ impl<'a> PingTrace<'a> {
                 path.describe(),
             ]);
         }
-        table
+        let (count, rest) = (self.paths.len(), describe_rest(self.paths.len() - shown));
+        format!("{}\n{}{rest}", fit(table), format_count(count, "peak"))
+    }
+
+    /// Note on crossings of the threshold that a detection omits.
+    fn describe_omitted(&self) -> Option<String> {
+        let detection = &self.trace.detection;
+        let count = detection.echoes_us.len();
+        detection.has_more_echoes.then(|| {
+            format!("the signal crosses the threshold more than {count} times; the first {count} are shown")
+        })
     }
 
     /// Describes the receiver's output.
@@ -267,12 +281,15 @@ impl<'a> PingTrace<'a> {
                 self.azimuth_deg,
                 self.describe_detection()
             ),
-            lines: vec![format!(
+            lines: [format!(
                 "{} \u{b7} {:.2} m/s \u{b7} blanking {:.0} us",
                 self.simulator.sensor().name,
                 self.simulator.sound_speed_m_s(),
                 receiver.blanking_us
-            )],
+            )]
+            .into_iter()
+            .chain(self.describe_omitted())
+            .collect(),
             trace: &self.trace,
             names: self.paths.iter().map(PathRecord::describe).collect(),
             blanking_us: receiver.blanking_us,

@@ -14,7 +14,7 @@ use super::{
 };
 use crate::{
     inverse::{FitSweep, World},
-    scan::{ScanView, Session},
+    scan::{Provenance, ScanView, Session},
     scene::Scene,
 };
 
@@ -31,7 +31,8 @@ pub(super) struct SweepArgs {
 }
 
 impl SweepArgs {
-    /// Passes each sweep of the logs with its world to `take`; reports scans that are not sweeps.
+    /// Passes each sweep of the logs with its world and provenance to `take`; reports scans that
+    /// are not sweeps.
     ///
     /// # Errors
     ///
@@ -39,7 +40,7 @@ impl SweepArgs {
     pub(super) fn for_each(
         &self,
         what_if: &WhatIf,
-        mut take: impl FnMut(&Path, FitSweep, &Arc<World>) -> Result<(), Failure>,
+        mut take: impl FnMut(&Path, FitSweep, &Arc<World>, Provenance) -> Result<(), Failure>,
     ) -> Result<(), Failure> {
         let given = self.scene.as_deref().map(scene_file::load).transpose()?.map(Arc::new);
         let mut worlds = WorldCache { given, current: None };
@@ -48,7 +49,13 @@ impl SweepArgs {
             for_each_scan(log, |mut scan| {
                 assumptions.apply(&mut scan);
                 match FitSweep::from_scan(&scan) {
-                    Ok(sweep) => take(log, sweep, &worlds.world(log, &scan)?),
+                    Ok(sweep) => {
+                        let world = worlds.world(log, &scan)?;
+                        let session = scan.session.as_ref();
+                        let provenance =
+                            session.map_or(Provenance::Imported, |session| session.provenance);
+                        take(log, sweep, &world, provenance)
+                    }
                     Err(error) => {
                         notice!("warning: {}: {error}; scan skipped", log.display());
                         Ok(())

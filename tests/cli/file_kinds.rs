@@ -88,11 +88,11 @@ fn damaged_lines_are_limited() {
     for arguments in [&["compare", log][..], &["lines", log], &["log", "annotate", log]] {
         let message = stderr(&run(arguments));
         assert_eq!(message.matches("line skipped").count(), 5, "{arguments:?}: {message}");
-        assert!(message.contains("11635 more damaged lines"), "{arguments:?}: {message}");
+        assert!(message.contains("11,635 more damaged lines"), "{arguments:?}: {message}");
     }
     for verb in ["show", "verify"] {
         let text = String::from_utf8(run(&["log", verb, log]).stdout).expect("text");
-        assert!(text.contains("11635 more"), "{text}");
+        assert!(text.contains("11,635 more"), "{text}");
     }
 }
 

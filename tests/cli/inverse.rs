@@ -61,6 +61,13 @@ fn calibration_corrects_inputs() {
     let poses = fs::read_to_string(format!("{out}/poses.jsonl")).expect("there");
     let pose: Value = serde_json::from_str(&poses).expect("JSON");
     assert!((number(&pose, "x_m") - 0.80).abs() < 1e-3);
+    let picture = fs::read_to_string(format!("{out}/residuals.svg")).expect("drawn");
+    let agreeing = |name: &str| -> u32 {
+        let (_, figures) = picture.split_once(&format!("{name}: ")).expect(name);
+        figures.split(' ').next().expect("a count").parse().expect("a number")
+    };
+    assert!(agreeing("fitted values") > 2 * agreeing("initial values"), "{picture}");
+    assert!(picture.contains("SIMULATED") && Path::new(out).join("residuals.png").exists());
     // Sensor and scene are taken by other verbs, under which the readings then agree.
     let pose = ["x_m", "y_m", "heading_deg"].map(|name| number(&pose, name).to_string()).join(",");
     let (sensor, scene) = (format!("{out}/sensor.json"), format!("{out}/scene.json"));

@@ -39,7 +39,7 @@ const fn case(
     Case { output, input, arguments }
 }
 
-const CASES: [Case; 37] = [
+const CASES: [Case; 39] = [
     case("plot --output", ("a.svg", LOG), "plot IN -o IN"),
     case("plot --output", ("a.png", LOG), "plot IN -o IN --force"),
     case("plot --output", ("a.svg", SCENE), "plot LOG --scene IN -o IN"),
@@ -85,6 +85,8 @@ const CASES: [Case; 37] = [
     case("export --output", ("a.parquet", LOG), "export IN -o IN --force"),
     case("export --output", ("log.csv", LOG), "export IN --to csv -o IN --force"),
     case("generate --out", ("README.md", DATA_SET), "generate IN --out DIR"),
+    case("report --output", ("a", LOG), "report IN -o IN --force"),
+    case("calibrate --out", ("residuals.svg", LOG), "calibrate IN --out DIR --force"),
     case("calibrate --out", ("sensor.json", LOG), "calibrate IN --out DIR --force"),
     case("calibrate --out", ("scene.json", SCENE), "calibrate LOG --scene IN --out DIR --force"),
     case("calibrate --out", ("unfinished.jsonl", LOG), "calibrate IN --out DIR --force"),
@@ -112,7 +114,7 @@ const CASES: [Case; 37] = [
 ];
 
 /// Outputs of verbs that read no file.
-const WITHOUT_INPUT: [&str; 1] = ["package-files DIR"];
+const WITHOUT_INPUT: [&str; 2] = ["package-files DIR", "tour --out"];
 
 const POSES: &str = "{\"x_m\":0.774,\"y_m\":0.085,\"heading_deg\":0.0}\n";
 const TABLE: &str = "azimuth_deg,range_m\n0,1\n";

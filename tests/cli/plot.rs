@@ -93,7 +93,7 @@ fn selected_scan() {
 fn wrong_input() {
     let folder = folder_with_log();
     fs::write(folder.path().join("empty.jsonl"), "").expect("written");
-    let cases: [(&[&str], &str); 7] = [
+    let cases: [(&[&str], &str); 8] = [
         (&["nowhere.jsonl", "-o", "a.svg"], "nowhere.jsonl"),
         (&["empty.jsonl", "-o", "a.svg"], "contains no records"),
         (&["scan.jsonl", "-o", "a.pdf"], ".svg or .png"),
@@ -101,6 +101,7 @@ fn wrong_input() {
         (&["scan.jsonl", "-o", "a.svg", "--scan", "ff"], "no such scan"),
         (&["scan.jsonl", "-o", "a.svg", "--scene", "simple-rom"], "simple-room"),
         (&["scan.jsonl", "-o", "a.png", "--width", "0"], "--width"),
+        (&["scan.jsonl", "-o", "a.svg", "--kind", "confidence"], "sonard log annotate scan.jsonl"),
     ];
     for (arguments, words) in cases {
         sonard(folder.path()).args(arguments).assert().code(2).stderr(contains(words));

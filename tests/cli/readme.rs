@@ -130,6 +130,7 @@ pages! {
     first_scan: "first-scan.md",
     generate: "generate.md",
     import: "import.md",
+    install: "install.md",
     localisation: "localisation.md",
     log: "log.md",
     mapping: "mapping.md",

@@ -140,5 +140,5 @@ fn poses_outside_the_map() {
     let output = run(&["map", path, "--out", map, "--region", "10,10,11,11"]);
     assert!(output.status.success(), "{}", stderr(&output));
     let text = String::from_utf8_lossy(&output.stdout).into_owned();
-    assert!(text.contains("1 poses are outside the map") && text.contains("--region"), "{text}");
+    assert!(text.contains("1 pose outside the map") && text.contains("--region"), "{text}");
 }

@@ -60,7 +60,7 @@ fn isolated_faint_peak() {
     sonard(&["trace", "--scene", "echo-traces", "--pose", "d", "-o", svg]).success();
     let drawn = std::fs::read_to_string(svg).expect("written");
     // 18 dB below the threshold, and nothing else near it.
-    assert!(drawn.contains(">\n1   0.7") || drawn.contains(">1   0.7"), "{drawn}");
+    assert!(drawn.contains(">\n1: 0.7") || drawn.contains(">1: 0.7"), "{drawn}");
 }
 
 #[test]

@@ -26,8 +26,14 @@ pub struct SweepFiring {
 }
 
 impl SweepFiring {
-    pub(crate) const fn is_echo(&self) -> bool {
-        matches!(self.outcome, FiringOutcome::Echo { .. })
+    /// Range of an echo for a speed of sound, metres.
+    #[must_use]
+    pub fn range_m(&self, sound_speed_m_s: f64) -> Option<f64> {
+        self.outcome.range_m(sound_speed_m_s)
+    }
+
+    pub(crate) fn is_echo(&self) -> bool {
+        self.range_m(1.0).is_some()
     }
 }
 

@@ -14,7 +14,7 @@ use super::{
     identity::{BoardSettings, Pace, identity},
     invalid_replies::ReplyCorruptor,
     note::Note,
-    world::World,
+    world::{Firing, World},
 };
 
 const TICK_HZ: u32 = limits::TICK_HZ;
@@ -347,13 +347,17 @@ impl MockBoard {
             return;
         }
         let fired = self.now + FIRE_LEAD_TICKS;
-        let mut echo_ticks = self.world.fire(window_ticks, TICK_HZ);
+        let Firing { status, mut echo_ticks } = self.world.fire(window_ticks, TICK_HZ);
+        self.notes.extend(self.world.take_begun_scan());
         if no_echo {
             echo_ticks.clear();
         }
         let mut echoes = Echoes::from_ticks(&echo_ticks);
         echoes.truncate(max_echoes);
-        let status = if echoes.is_empty() { ReadingStatus::NoEcho } else { ReadingStatus::Echo };
+        let status = match status {
+            ReadingStatus::Echo if echoes.is_empty() => ReadingStatus::NoEcho,
+            status => status,
+        };
         let report = Box::new(EchoReport { fired_ticks: fired as u32, status, echoes });
         self.activity = Activity::Listening { report, until: fired + u64::from(window_ticks) };
         self.fired += 1;

@@ -22,6 +22,8 @@ pub struct BoardSettings {
     pub seed: u64,
     /// Real or virtual time; a virtual clock is reported to the host.
     pub pace: Pace,
+    /// Readings are those of a log, which is reported to the host.
+    pub is_replay: bool,
 }
 
 /// Passage of device time.
@@ -35,6 +37,10 @@ pub enum Pace {
 
 /// Builds the identity of the board, always as a simulated device.
 pub(super) fn identity(settings: &BoardSettings, boot: u16, reset_cause: ResetCause) -> Board {
+    let echoes = match settings.is_replay {
+        true => Capabilities::REPLAYED,
+        false => Capabilities::default(),
+    };
     let clock = match settings.pace {
         Pace::RealTime => Capabilities::default(),
         Pace::Virtual => Capabilities::VIRTUAL_CLOCK,
@@ -42,13 +48,14 @@ pub(super) fn identity(settings: &BoardSettings, boot: u16, reset_cause: ResetCa
     Board {
         boot,
         firmware: FirmwareVersion { major: 0, minor: 1, patch: 0 },
-        serial: *b"MOCK-00001",
+        serial: if settings.is_replay { *b"REPLAY-001" } else { *b"MOCK-00001" },
         steps_per_revolution: settings.steps_per_revolution,
         capabilities: Capabilities::INDEX_SENSOR
             .with(Capabilities::SHORT_BLANKING)
             .with(Capabilities::MULTIPLE_ECHOES)
             .with(Capabilities::COIL_RELEASE)
             .with(Capabilities::SIMULATED)
+            .with(echoes)
             .with(clock),
         reset_cause,
     }

@@ -1,4 +1,4 @@
-//! Mock ranger: the device state machine on a pty, with echoes from the acoustic model.
+//! Mock ranger: the device state machine on a pty, with echoes from the acoustic model or a log.
 //!
 //! [`World`] and [`MockBoard`] are a simulation without I/O; [`MockPort`] runs it on a
 //! [`Pty`](sonard_device::link::Pty). The mock is used only on explicit request, and its identity
@@ -11,6 +11,7 @@ mod identity;
 mod invalid_replies;
 mod memory;
 mod note;
+mod replay;
 mod serve;
 #[cfg(test)]
 mod tests;
@@ -22,5 +23,6 @@ pub use identity::{BoardSettings, Pace};
 pub use invalid_replies::{INVALID_REPLIES, InvalidReply};
 pub use memory::MemorySocket;
 pub use note::Note;
+pub use replay::{Replay, ReplayError, ReplayedReading};
 pub use serve::MockPort;
 pub use world::{EchoTable, World};

@@ -15,6 +15,8 @@ pub enum Note {
     Fired(u64),
     /// Stop of the motor on request, with its step.
     Stopped(i32),
+    /// First firing of a replayed scan: its number, and the number of scans.
+    Replayed(usize, usize),
     /// Release of the coils.
     CoilsReleased,
     /// Injected fault.
@@ -29,6 +31,7 @@ impl fmt::Display for Note {
             Self::Homed(drift) => write!(f, "homed, the index was {drift} steps off"),
             Self::Fired(count) => write!(f, "{count} firings"),
             Self::Stopped(step) => write!(f, "motor stopped at step {step}"),
+            Self::Replayed(scan, scans) => write!(f, "replaying scan {scan} of {scans}"),
             Self::CoilsReleased => f.write_str("coils released"),
             Self::Fault(fault) => write!(f, "fault: {fault}"),
         }

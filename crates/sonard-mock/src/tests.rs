@@ -34,6 +34,7 @@ pub(super) fn board(faults: FaultPlan) -> MockBoard {
         faults,
         seed: 1,
         pace: Pace::Virtual,
+        is_replay: false,
     };
     MockBoard::new(settings, world)
 }

@@ -2,6 +2,7 @@
 //!
 //! Pure: no clock, no I/O; readings are determined by the seed.
 
+use firmware_protocol::messages::ReadingStatus;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_pcg::Pcg64;
 use smallvec::SmallVec;
@@ -11,6 +12,11 @@ use sonard_model::{
     model::{Prediction, Simulator, TooCostly},
 };
 use sonard_records::{PingStatus, ScanPlan};
+
+use super::{
+    note::Note,
+    replay::{Replay, ReplayedReading},
+};
 
 /// Predicted echoes for each motor step of a revolution.
 #[derive(Debug, Clone)]
@@ -67,10 +73,26 @@ impl EchoTable {
     }
 }
 
+/// Source of a world's echoes.
+#[derive(Debug)]
+enum EchoSource {
+    Model(Soundings),
+    Log(Replay),
+}
+
+/// Outcome of a firing.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Firing {
+    /// Status that the board reports.
+    pub status: ReadingStatus,
+    /// Echo times after firing, ticks.
+    pub echo_ticks: SmallVec<[u32; 8]>,
+}
+
 /// Simulated motor and echoes.
 #[derive(Debug)]
 pub struct World {
-    soundings: EchoTable,
+    echoes: EchoSource,
     noise: TofNoise,
     missed_step_rate: f64,
     /// True position of the motor, steps.
@@ -84,12 +106,30 @@ impl World {
     #[must_use]
     pub fn new(soundings: EchoTable, noise: TofNoise, missed_step_rate: f64, seed: u64) -> Self {
         let rng = Pcg64::seed_from_u64(seed);
-        Self { soundings, noise, missed_step_rate: missed_step_rate.clamp(0.0, 1.0), step: 0, rng }
+        Self {
+            echoes: EchoSource::Model(soundings),
+            noise,
+            missed_step_rate: missed_step_rate.clamp(0.0, 1.0),
+            step: 0,
+            rng,
+        }
+    }
+
+    /// Creates a world with the readings of a log and the motor at home.
+    #[must_use]
+    pub fn from_replay(replay: Replay) -> Self {
+        Self {
+            echoes: EchoSource::Log(replay),
+            noise: TofNoise::NONE,
+            missed_step_rate: 0.0,
+            step: 0,
+            rng: Pcg64::seed_from_u64(0),
+        }
     }
 
     /// Replaces the echoes, for instance after a move of the robot.
     pub fn set_echo_table(&mut self, soundings: EchoTable) {
-        self.soundings = soundings;
+        self.echoes = EchoSource::Model(soundings);
     }
 
     /// Turns the motor by a commanded number of steps.
@@ -106,12 +146,36 @@ impl World {
 
     /// Turns the motor to the index. Returns the true distance, steps.
     pub fn seek_index(&mut self) -> i32 {
+        if let EchoSource::Log(replay) = &mut self.echoes {
+            replay.home();
+        }
         std::mem::take(&mut self.step)
     }
 
-    /// Fires and returns the echo times after firing, ticks of `tick_hz`, within the window.
-    pub fn fire(&mut self, window_ticks: u32, tick_hz: u32) -> SmallVec<[u32; 8]> {
-        let row = self.soundings.at(self.step).cloned().unwrap_or_default();
+    /// Takes the note of a replayed scan that has begun.
+    pub(super) fn take_begun_scan(&mut self) -> Option<Note> {
+        let EchoSource::Log(replay) = &mut self.echoes else { return None };
+        replay.take_begun().map(|scan| Note::Replayed(scan, replay.scans()))
+    }
+
+    /// Fires and returns the echoes within the window, in ticks of `tick_hz`.
+    pub fn fire(&mut self, window_ticks: u32, tick_hz: u32) -> Firing {
+        match &mut self.echoes {
+            EchoSource::Model(_) => {
+                let echo_ticks = self.simulate(window_ticks, tick_hz);
+                Firing { status: ReadingStatus::Echo, echo_ticks }
+            }
+            EchoSource::Log(replay) => {
+                let ReplayedReading { status, echo_ticks } = replay.fire(self.step);
+                let within = echo_ticks.into_iter().filter(|&ticks| ticks <= window_ticks);
+                Firing { status, echo_ticks: within.collect() }
+            }
+        }
+    }
+
+    fn simulate(&mut self, window_ticks: u32, tick_hz: u32) -> SmallVec<[u32; 8]> {
+        let EchoSource::Model(soundings) = &self.echoes else { return SmallVec::new() };
+        let row = soundings.at(self.step).cloned().unwrap_or_default();
         let ticks_per_us = f64::from(tick_hz) / 1e6;
         let mut echoes = SmallVec::new();
         let mut last = 0;
@@ -152,13 +216,17 @@ mod tests {
     fn echoes_depend_on_direction() {
         let mut world = World::new(soundings(), TofNoise::NONE, 0.0, 1);
         let echoes: SmallVec<[u32; 8]> = smallvec![6000, 10_000];
-        assert_eq!(world.fire(20_000, 2_000_000), echoes);
+        assert_eq!(world.fire(20_000, 2_000_000).echo_ticks, echoes);
         world.turn(-2);
-        assert_eq!(world.fire(20_000, 2_000_000)[..], [4760, 12_000]);
+        assert_eq!(world.fire(20_000, 2_000_000).echo_ticks[..], [4760, 12_000]);
         world.turn(1);
-        assert!(world.fire(20_000, 2_000_000).is_empty());
+        assert!(world.fire(20_000, 2_000_000).echo_ticks.is_empty());
         world.turn(4);
-        assert_eq!(world.fire(9_000, 2_000_000)[..], [6000], "the window ends before the second");
+        assert_eq!(
+            world.fire(9_000, 2_000_000).echo_ticks[..],
+            [6000],
+            "the window ends before the second"
+        );
     }
 
     #[test]
@@ -167,7 +235,7 @@ mod tests {
         let fire = |seed| {
             let mut world = World::new(soundings(), noise, 0.0, seed);
             world.turn(1);
-            world.fire(20_000, 2_000_000)
+            world.fire(20_000, 2_000_000).echo_ticks
         };
         assert_eq!(fire(3)[0], 4760);
         assert_ne!(fire(3)[1], 12_000);

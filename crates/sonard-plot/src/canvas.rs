@@ -10,7 +10,7 @@ use svg::node::{
     element::{Circle, Element, Group, Line, Path, Rectangle, Title},
 };
 
-use super::theme;
+use super::{font, theme};
 use sonard_model::geometry::DVec2;
 
 /// Point on the page, pixels, y down.
@@ -297,7 +297,15 @@ fn text_element(at: Px, anchor: Anchor, size_px: f64, text: &str) -> Element {
         Anchor::Middle => drop(attributes.insert("text-anchor".into(), "middle".into())),
         Anchor::End => drop(attributes.insert("text-anchor".into(), "end".into())),
     }
-    svg::node::Node::append(&mut element, TextNode::new(printable(text)));
+    // Viewers without the bundled font fit theirs into its width, in which a run of spaces is one.
+    let printable = printable(text);
+    let shown = printable.split_whitespace().collect::<Vec<_>>().join(" ");
+    let width_px = text_width_px(&shown, size_px);
+    if shown.chars().nth(1).is_some() {
+        attributes.insert("textLength".into(), tidy(width_px).into());
+        attributes.insert("lengthAdjust".into(), "spacingAndGlyphs".into());
+    }
+    svg::node::Node::append(&mut element, TextNode::new(printable));
     element
 }
 
@@ -330,13 +338,44 @@ fn printable(text: &str) -> String {
         .collect()
 }
 
-/// Approximate width of a text. Viewers choose the font, so this is an upper estimate.
+/// Width of a text in the bundled font, without kerning.
 pub fn text_width_px(text: &str, size_px: f64) -> f64 {
-    textwrap::core::display_width(text) as f64 * size_px * 0.52
+    size_px * text.chars().map(font::advance_em).sum::<f64>()
 }
 
 /// Wraps a text into lines that fit the width.
 pub fn wrap(text: &str, size_px: f64, width_px: f64) -> Vec<String> {
-    let columns = (width_px / (size_px * 0.52)).max(8.0) as usize;
-    textwrap::wrap(text, columns).into_iter().map(std::borrow::Cow::into_owned).collect()
+    // A word is as long as in the font, and at most as long as the line.
+    let (mut lines, mut line) = (Vec::new(), String::new());
+    let mut words: Vec<String> = text.split_whitespace().rev().map(str::to_owned).collect();
+    while let Some(word) = words.pop() {
+        let longer = if line.is_empty() { word.clone() } else { format!("{line} {word}") };
+        if text_width_px(&longer, size_px) <= width_px {
+            line = longer;
+        } else if line.is_empty() {
+            let (head, tail) = split_at_width(&word, size_px, width_px);
+            lines.push(head);
+            words.extend(tail);
+        } else {
+            lines.push(std::mem::take(&mut line));
+            words.push(word);
+        }
+    }
+    if !line.is_empty() || lines.is_empty() {
+        lines.push(line);
+    }
+    lines
+}
+
+/// Splits a word that is wider than a line.
+fn split_at_width(word: &str, size_px: f64, width_px: f64) -> (String, Option<String>) {
+    let mut used_px = 0.0;
+    let end = word.char_indices().skip(1).find_map(|(at, character)| {
+        used_px += size_px * font::advance_em(character);
+        (used_px > width_px - size_px).then_some(at)
+    });
+    match end {
+        Some(end) => (word[..end].to_owned(), Some(word[end..].to_owned())),
+        None => (word.to_owned(), None),
+    }
 }

@@ -9,7 +9,7 @@ use super::{
     theme,
 };
 use sonard_model::scene::Scene;
-use sonard_records::{Ping, PingStatus, ScanView};
+use sonard_records::{Ping, PingStatus, ScanView, text::format_count};
 
 /// Classes of confidence, highest first: lower limit, label, shape and colour. 0.48 is the default
 /// of `sonard map`; 0.25 is the minimum for a feature that should have been detected.
@@ -26,19 +26,30 @@ const CLASSES: [(f64, &str, MarkShape, &str); 4] = [
 pub fn draw_confidence(scans: &[ScanView], scene: Option<&Scene>) -> Picture {
     let classified: Vec<Vec<(usize, &Ping)>> = scans.iter().map(classify).collect();
     let count = |class: usize| classified.iter().flatten().filter(|(of, _)| *of == class).count();
-    let classes = CLASSES.iter().enumerate().map(|(class, (_, label, shape, colour))| {
+    let classes = CLASSES.iter().enumerate().filter_map(|(class, (_, label, shape, colour))| {
         let sample = LegendSample::Mark { shape: *shape, colour };
-        LegendEntry::new(sample, format!("{label} ({})", count(class)))
+        let entry = || LegendEntry::new(sample, format!("{label} ({})", count(class)));
+        (count(class) > 0).then(entry)
     });
-    let entries: Vec<LegendEntry> =
-        classes.chain(scene.map(legend_entries::materials).into_iter().flatten()).collect();
+    let dots = scans
+        .iter()
+        .flat_map(|scan| &scan.pings)
+        .filter(|ping| ping.range_m.is_some() && ping.confidence.is_none())
+        .count();
+    let dot = LegendSample::Mark { shape: MarkShape::Dot, colour: theme::NO_ECHO };
+    let dots = (dots > 0).then(|| LegendEntry::new(dot, format!("without a confidence ({dots})")));
+    let entries: Vec<LegendEntry> = classes
+        .chain(dots)
+        .chain(scene.map(legend_entries::materials).into_iter().flatten())
+        .collect();
     let confidences = scans.iter().flat_map(|scan| &scan.pings).filter_map(|ping| ping.confidence);
     let (sum, count) =
-        confidences.fold((0.0, 0), |(sum, count), confidence| (sum + confidence, count + 1));
+        confidences.fold((0.0, 0_u32), |(sum, count), confidence| (sum + confidence, count + 1));
     let finding = if count == 0 {
         "no reading has a confidence: run `sonard log annotate`".to_owned()
     } else {
-        format!("mean confidence of {count} readings: {:.3}", sum / f64::from(count))
+        let readings = format_count(count, "reading");
+        format!("mean confidence of {readings}: {:.3}", sum / f64::from(count))
     };
     let draw = |plan: &PlanProjection| {
         scans.iter().zip(&classified).filter_map(|(scan, pings)| layer(plan, scan, pings)).collect()

@@ -1,11 +1,13 @@
 //! Floor plan with the features found by the interpretation.
 
 use super::{
-    canvas::{Anchor, Layer, MarkShape, Px},
+    canvas::{Anchor, Layer, Px, MarkShape},
+    floor::Floor,
     legend::{LegendEntry, LegendSample},
-    legend_entries, overlay,
+    legend_entries, lines, overlay,
     picture::Picture,
     plan::PlanProjection,
+    readings::PlottedScan,
     scan_caption, theme,
 };
 use sonard_interpret::interpret::{Feature, FeatureKind};
@@ -27,7 +29,15 @@ pub fn draw_features(scans: &[ScanView], scene: Option<&Scene>, features: &[Feat
         arcs.chain([next_places(plan, scans, features)]).collect()
     };
     let labels = |plan: &PlanProjection| Some(names(plan, scene, scans, features));
-    overlay::draw(scans, scene, counts(features), &[], over, labels, &entries(features, scene))
+    overlay::draw(
+        scans,
+        scene,
+        counts(features),
+        &[],
+        over,
+        labels,
+        &entries(scans, features, scene),
+    )
 }
 
 /// Number of features of each class.
@@ -68,7 +78,7 @@ const fn shape(kind: FeatureKind) -> MarkShape {
     }
 }
 
-fn entries(features: &[Feature], scene: Option<&Scene>) -> Vec<LegendEntry> {
+fn entries(scans: &[ScanView], features: &[Feature], scene: Option<&Scene>) -> Vec<LegendEntry> {
     let present = KINDS.into_iter().filter(|kind| features.iter().any(|f| f.kind == *kind));
     let kinds = present.map(|kind| {
         LegendEntry::new(
@@ -80,7 +90,7 @@ fn entries(features: &[Feature], scene: Option<&Scene>) -> Vec<LegendEntry> {
     let next = LegendSample::Line { colour: theme::ORANGE, width_px: 2.0, dash: "none" };
     let proposes = features.iter().any(|feature| feature.next.is_some());
     kinds
-        .chain([LegendEntry::new(dot, "reading")])
+        .chain(lines::has_ranges(scans).then(|| LegendEntry::new(dot, "reading")))
         .chain(proposes.then(|| LegendEntry::new(next, "proposed next pose")))
         .chain(scene.map(legend_entries::materials).into_iter().flatten())
         .collect()
@@ -141,6 +151,17 @@ fn names(
     for feature in features {
         arc_of(plan, scans, feature).windows(2).for_each(|two| labels.keep_off(two[0], two[1]));
     }
+    for scan in scans {
+        let plotted = PlottedScan::from_scan(scan);
+        if let Some(pose) = scan_caption::pose_of(scan) {
+            Floor { plan, pose, scan: &plotted }.avoid_marks(&mut labels);
+        }
+    }
+    for feature in features {
+        if let (Some(pose), Some(range_m)) = (pose_of(scans, feature), feature.range_m) {
+            labels.avoid_mark(plan.px(pose.point_at(feature.bearing_deg, range_m)), 7.0);
+        }
+    }
     let mut layer = Layer::new("names").haloed();
     for feature in features {
         let (Some(pose), Some(range_m)) = (pose_of(scans, feature), feature.range_m) else {
@@ -155,7 +176,7 @@ fn names(
             feature.extent_deg,
             beta.unwrap_or_default()
         );
-        let places = [
+        let mut places = [
             (Px::new(11.0, -8.0), Anchor::Start),
             (Px::new(11.0, 16.0), Anchor::Start),
             (Px::new(-11.0, -8.0), Anchor::End),
@@ -169,6 +190,9 @@ fn names(
             (Px::new(-24.0, -22.0), Anchor::End),
             (Px::new(-24.0, 30.0), Anchor::End),
         ];
+        places.sort_by_key(|(shift, anchor)| {
+            labels.covered(at + *shift, *anchor, theme::SMALL_PX, &text)
+        });
         let free = places
             .into_iter()
             .find(|(shift, anchor)| labels.place(at + *shift, *anchor, theme::SMALL_PX, &text));

@@ -132,6 +132,7 @@ pub(super) fn session() -> Session {
         format: LOG_FORMAT,
         started: jiff::Timestamp::UNIX_EPOCH,
         sonard: "0.1.0".into(),
+        build: None,
         provenance: Provenance::Mock,
         robot: None,
         device: None,

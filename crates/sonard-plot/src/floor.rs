@@ -84,6 +84,20 @@ impl Floor<'_> {
         layer
     }
 
+    /// Lets labels avoid the marks of the readings, the rings of the predictions and the ranger.
+    pub(super) fn avoid_marks(&self, labels: &mut Labels) {
+        for beam in &self.scan.beams {
+            let ranges = [(beam.range_m, DOT_PX), (beam.model_range_m, RING_PX)];
+            for (range_m, radius_px) in ranges {
+                let at = range_m.map(|range_m| self.at(beam, range_m));
+                if let Some(at) = at.filter(|at| self.plan.panel.contains(*at)) {
+                    labels.avoid_mark(at, radius_px);
+                }
+            }
+        }
+        self.plan.avoid_pose(&self.pose, labels);
+    }
+
     /// Draws short ticks on the panel's border in the direction of each beam without a range.
     pub(super) fn border_ticks(&self) -> Layer {
         let mut layer = Layer::new("no-range");
@@ -115,14 +129,23 @@ impl Floor<'_> {
             arrow.polygon(&[nose, tail + side, tail - side]);
             layer.add(arrow);
             let text = cluster.label();
-            let base = tail - 4.0 * outward + Px::new(0.0, 4.0 - 5.0 * outward.y);
             let anchor = match outward.x {
                 x if x > 0.35 => Anchor::End,
                 x if x < -0.35 => Anchor::Start,
                 _ => Anchor::Middle,
             };
-            if labels.place(base, anchor, theme::SMALL_PX, &text) {
-                texts.text(base, anchor, theme::SMALL_PX, &text);
+            // At the arrow, else along the border or farther inside.
+            let base = tail - 4.0 * outward + Px::new(0.0, 4.0 - 5.0 * outward.y);
+            let along = outward.perp();
+            let shifts = [0.0, 1.0, -1.0, 2.0, -2.0].into_iter().flat_map(|side| {
+                [0.0, 1.0, 2.0].map(|inward| 14.0 * (side * along - inward * outward))
+            });
+            let mut places: Vec<Px> = shifts.map(|shift| base + shift).collect();
+            places.sort_by_key(|at| labels.covered(*at, anchor, theme::SMALL_PX, &text));
+            let free =
+                places.into_iter().find(|at| labels.place(*at, anchor, theme::SMALL_PX, &text));
+            if let Some(at) = free {
+                texts.text(at, anchor, theme::SMALL_PX, &text);
             }
         }
         layer.add(texts);

@@ -8,12 +8,13 @@ pub(super) struct Labels {
     panel: Rect,
     taken: Vec<Rect>,
     lines: Vec<(Px, Px)>,
+    marks: Vec<Rect>,
 }
 
 impl Labels {
     /// Empty panel.
     pub(super) fn new(panel: Rect) -> Self {
-        Self { panel, taken: Vec::new(), lines: Vec::new() }
+        Self { panel, taken: Vec::new(), lines: Vec::new(), marks: Vec::new() }
     }
 
     /// Keeps a rectangle free of labels.
@@ -26,15 +27,33 @@ impl Labels {
         self.lines.push((from, to));
     }
 
+    /// Keeps a mark free of labels that find another place.
+    pub(super) fn avoid_mark(&mut self, at: Px, radius_px: f64) {
+        let side = 2.0 * radius_px;
+        self.marks.push(Rect::new(at.x - radius_px, at.y - radius_px, side, side));
+    }
+
+    /// Number of marks that a text with its baseline at `at` would cover.
+    pub(super) fn covered(&self, at: Px, anchor: Anchor, size_px: f64, text: &str) -> usize {
+        let rect = text_rect(at, anchor, size_px, text);
+        self.marks.iter().filter(|mark| mark.meets(&rect)).count()
+    }
+
+    /// Number of marks that a text rotated about its middle at `at` would cover.
+    pub(super) fn covered_turned(&self, at: Px, turn_deg: f64, size_px: f64, text: &str) -> usize {
+        let back = Px::from_angle(-turn_deg.to_radians());
+        let half = Px::new(text_width_px(text, size_px), size_px) / 2.0;
+        let is_covered = |mark: &&Rect| {
+            let off = back.rotate(mark.center() - at).abs();
+            let reach = half + Px::splat(mark.width() / 2.0);
+            off.x < reach.x && off.y < reach.y
+        };
+        self.marks.iter().filter(is_covered).count()
+    }
+
     /// Reserves the area of a text with its baseline at `at`; returns `false` if it is occupied.
     pub(super) fn place(&mut self, at: Px, anchor: Anchor, size_px: f64, text: &str) -> bool {
-        let width = text_width_px(text, size_px);
-        let left = match anchor {
-            Anchor::Start => at.x,
-            Anchor::Middle => at.x - width / 2.0,
-            Anchor::End => at.x - width,
-        };
-        let rect = Rect::new(left, at.y - 0.8 * size_px, width, 1.1 * size_px);
+        let rect = text_rect(at, anchor, size_px, text);
         self.reserve(rect, 0.0, Px::new(rect.width(), rect.height()))
     }
 
@@ -64,6 +83,17 @@ impl Labels {
         }
         free
     }
+}
+
+/// Area of a text with its baseline at `at`.
+fn text_rect(at: Px, anchor: Anchor, size_px: f64, text: &str) -> Rect {
+    let width = text_width_px(text, size_px);
+    let left = match anchor {
+        Anchor::Start => at.x,
+        Anchor::Middle => at.x - width / 2.0,
+        Anchor::End => at.x - width,
+    };
+    Rect::new(left, at.y - 0.8 * size_px, width, 1.1 * size_px)
 }
 
 /// Returns `true` if a segment crosses a rectangle centred on the origin (Liang-Barsky clipping).
@@ -99,5 +129,18 @@ mod tests {
         let parallel = at(100.0, 100.0) + 10.0 * Px::new(-1.0, 1.0).normalize();
         assert!(labels.place_turned(parallel, 45.0, 12.0, "along"));
         assert!(!labels.place_turned(at(50.0, 50.0), 45.0, 12.0, "over"));
+    }
+
+    #[test]
+    fn covered_marks_are_counted() {
+        let mut labels = Labels::new(Rect::new(0.0, 0.0, 200.0, 200.0));
+        (0..10).for_each(|i| labels.avoid_mark(Px::new(20.0 * f64::from(i), 100.0), 3.0));
+        let covered = |y| labels.covered(Px::new(0.0, y), Anchor::Start, 12.0, "along the wall");
+        assert!(covered(104.0) >= 3, "{}", covered(104.0));
+        assert_eq!(covered(80.0), 0);
+        let turned = |y, turn_deg| {
+            labels.covered_turned(Px::new(100.0, y), turn_deg, 12.0, "along the wall")
+        };
+        assert!(turned(100.0, 0.0) >= 3 && turned(100.0, 90.0) == 1 && turned(80.0, 0.0) == 0);
     }
 }

@@ -10,10 +10,12 @@ use super::{
 use sonard_model::scene::Scene;
 
 /// Entries for a floor plan or polar plot of scans; `outside` counts readings outside the view.
+/// `with_rays`: beams of simulated scans are drawn as rays.
 pub(super) fn all(
     scans: &[PlottedScan],
     scene: Option<&Scene>,
     outside: usize,
+    with_rays: bool,
 ) -> Vec<LegendEntry> {
     let mut entries = with_range(scans);
     for (kind, n) in present(scans, &ReadingKind::WITHOUT_RANGE) {
@@ -24,8 +26,21 @@ pub(super) fn all(
         entries
             .push(LegendEntry::new(LegendSample::Outward, format!("outside the view ({outside})")));
     }
-    if scans.iter().any(|scan| scan.has_model) {
+    let is_predicted = |scan: &PlottedScan| {
+        scan.has_model && scan.beams.iter().any(|beam| beam.model_range_m.is_some())
+    };
+    if scans.iter().any(is_predicted) {
         entries.push(LegendEntry::new(LegendSample::Ring { colour: theme::SKY }, "prediction"));
+    }
+    // A simulated scan has rays to its readings, an array fans.
+    let has_rays = |scan: &PlottedScan| {
+        !scan.has_model
+            && scan.fan.is_none()
+            && scan.beams.iter().any(|beam| beam.range_m.is_some())
+    };
+    if with_rays && scans.iter().any(has_rays) {
+        let ray = Sample::Line { colour: theme::SKY, width_px: theme::HAIRLINE_PX, dash: "none" };
+        entries.push(Entry::new(ray, "direction of a beam"));
     }
     if let Some(range_m) = scans.iter().find_map(|scan| scan.min_range_m) {
         let sample =

@@ -117,3 +117,88 @@ fn residual_axis_states_logarithmic_scale() {
     assert!(texts(&svg).contains(&"measured \u{2212} predicted, mm".to_owned()));
     assert!(!svg.contains("class=\"band\""), "a band over everything carries no information");
 }
+
+#[test]
+fn text_fits_without_its_font() {
+    let svg = draw_scan(&scan_of_room(room().poses["fig9"], 0.9, 1), Some(&room())).to_svg();
+    let document = roxmltree::Document::parse(&svg).expect("well-formed");
+    let texts = document.descendants().filter(|node| node.has_tag_name("text"));
+    let mut checked = 0;
+    for node in texts.filter(|node| node.text().is_some_and(|text| text.trim().len() > 1)) {
+        let width_px: f64 = node.attribute("textLength").expect("a width").parse().expect("px");
+        let size_px =
+            node.attribute("font-size").map_or(theme::TEXT_PX, |px| px.parse().expect("px"));
+        // Widths of the letters, as the rasterizer lays them out.
+        let drawn_px = drawn_width_px(node.text().unwrap_or_default().trim(), size_px);
+        assert!(
+            (width_px - drawn_px).abs() < 0.04 * drawn_px + 1.5,
+            "{width_px} {drawn_px}: {node:?}"
+        );
+        checked += 1;
+    }
+    assert!(checked > 30, "{checked}");
+}
+
+/// Width of a text laid out in the bundled font by the rasterizer.
+fn drawn_width_px(text: &str, size_px: f64) -> f64 {
+    use resvg::usvg::{Node, Options, Tree};
+    let escaped = text.replace('&', "&amp;").replace('<', "&lt;");
+    let svg = format!(
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"2000\" height=\"50\"><text y=\"30\" \
+         font-size=\"{size_px}\">{escaped}</text></svg>"
+    );
+    let options = Options { fontdb: picture::fonts(), ..Options::default() };
+    let tree = Tree::from_str(&svg, &options).expect("a drawing");
+    let widths = tree.root().children().iter().filter_map(|node| match node {
+        Node::Text(text) => Some(f64::from(text.bounding_box().width())),
+        _ => None,
+    });
+    widths.sum()
+}
+
+#[test]
+fn titles_of_several_poses() {
+    let scene = room();
+    let scans = ["fig7", "fig9"].map(|name| scan_of_room(scene.poses[name], 9.0, 1));
+    let shown =
+        |scans: &[sonard_records::ScanView], scene| texts(&draw_scans(scans, scene).to_svg());
+    let named = shown(&scans, Some(&scene)).join("\n");
+    assert!(named.contains(", poses fig7, fig9"), "{named}");
+    assert!(!named.contains("heading 0"), "the line below is not that of the first pose: {named}");
+    let counted = shown(&scans, None).join("\n");
+    assert!(counted.contains(", 2 poses"), "{counted}");
+    let one = shown(&scans[..1], Some(&scene)).join("\n");
+    assert!(one.contains(", pose fig7") && one.contains("heading"), "{one}");
+}
+
+#[test]
+fn differing_sensors_are_counted() {
+    let mut scans = [1, 2].map(|seed| scan_of_room(room().poses["fig9"], 9.0, seed));
+    let mut session = scans[1].session.as_deref().expect("a session").clone();
+    session.sensor.name = "another".into();
+    session.air.temperature_c += 3.0;
+    scans[1].session = Some(session.into());
+    let shown = texts(&draw_scans(&scans, Some(&room())).to_svg()).join("\n");
+    assert!(shown.contains("2 sensors \u{b7} 2 air conditions"), "{shown}");
+}
+
+#[test]
+fn legends_list_what_is_drawn() {
+    let legend = |svg: &str| texts(svg).join("\n");
+    let scan = scan_of_room(room().poses["fig9"], 9.0, 1);
+    assert!(legend(&draw_scan(&scan, None).to_svg()).contains("prediction"));
+    let mut alone = scan.clone();
+    alone.pings.iter_mut().for_each(|ping| (ping.sim, ping.residual_m) = (None, None));
+    for picture in [draw_scan(&alone, None), draw_residuals(&[alone.clone()], None)] {
+        assert!(!legend(&picture.to_svg()).contains("prediction"));
+    }
+    assert!(legend(&draw_scan(&alone, None).to_svg()).contains("direction of a beam"));
+    alone.pings.iter_mut().for_each(|ping| ping.range_m = None);
+    let silent = legend(&draw_features(&[alone.clone()], None, &[]).to_svg());
+    assert!(!silent.lines().any(|line| line == "reading"), "{silent}");
+    let unrated = legend(&draw_confidence(&[scan], None).to_svg());
+    assert!(
+        unrated.contains("without a confidence (") && !unrated.contains("trusted"),
+        "{unrated}"
+    );
+}

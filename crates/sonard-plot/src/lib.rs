@@ -6,6 +6,7 @@
 #![warn(clippy::mod_module_files)]
 
 mod animation;
+mod before_after;
 pub mod canvas;
 pub mod caption;
 mod confidence;
@@ -13,6 +14,7 @@ mod convergence;
 mod fans;
 mod features;
 mod floor;
+mod font;
 mod labels;
 pub mod legend;
 mod legend_entries;
@@ -46,6 +48,7 @@ mod legibility;
 mod tests;
 
 pub use animation::animate;
+pub use before_after::{ComparedReading, draw_before_after};
 pub use confidence::draw_confidence;
 pub use convergence::{Convergence, draw_convergence};
 pub use features::draw_features;

@@ -10,7 +10,7 @@ use super::{
 };
 use sonard_interpret::interpret::lines::{LineKind, MapLine};
 use sonard_model::{geometry::DVec2, scene::Scene};
-use sonard_records::ScanView;
+use sonard_records::{ScanView, text::format_count};
 
 const KINDS: [(LineKind, &str, &str); 3] = [
     (LineKind::Sonar, "sonar line", theme::BLUE),
@@ -26,13 +26,18 @@ pub fn draw_lines(scans: &[ScanView], scene: Option<&Scene>, lines: &[MapLine]) 
     let dot = LegendSample::Mark { shape: MarkShape::Dot, colour: theme::NO_ECHO };
     let entries: Vec<LegendEntry> = samples
         .into_iter()
-        .chain([LegendEntry::new(dot, "reading")])
+        .chain(has_ranges(scans).then(|| LegendEntry::new(dot, "reading")))
         .chain(scene.map(legend_entries::materials).into_iter().flatten())
         .collect();
-    let finding = format!("{} lines", lines.len());
+    let finding = format_count(lines.len(), "line");
     let draw = |plan: &PlanProjection| lines.iter().map(|line| layer(plan, line)).collect();
     let ends: Vec<DVec2> = lines.iter().flat_map(|line| line.ends).collect();
     overlay::draw(scans, scene, finding, &ends, draw, |_| None, &entries)
+}
+
+/// Returns `true` if a reading has a range, and so a dot.
+pub(super) fn has_ranges(scans: &[ScanView]) -> bool {
+    scans.iter().flat_map(|scan| &scan.pings).any(|ping| ping.range_m.is_some())
 }
 
 /// Legend entries for the kinds of lines present.

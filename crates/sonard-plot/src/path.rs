@@ -106,6 +106,8 @@ fn beam(view: &PathView, plan: &PlanProjection) -> Layer {
 
 fn path(view: &PathView, plan: &PlanProjection, labels: &mut Labels) -> Layer {
     let stretches = apart(&view.points.iter().map(|point| plan.px(*point)).collect::<Vec<_>>());
+    stretches.iter().for_each(|&(from, to)| labels.keep_off(from, to));
+    plan.avoid_pose(&view.pose, labels);
     let mut layer = Layer::new("path").stroked(theme::VERMILLION, 1.8);
     let mut heads = Layer::new("heads").with("fill", theme::VERMILLION).with("stroke", "none");
     for &(from, to) in &stretches {

@@ -123,6 +123,12 @@ fn document(width_px: f64, height_px: f64) -> svg::Document {
         .set("fill", theme::INK)
 }
 
+/// Fonts of the rasterizer.
+#[cfg(test)]
+pub(super) fn fonts() -> Arc<fontdb::Database> {
+    FONTS.clone()
+}
+
 /// Bundled font, under its own name and as every generic family, so that a PNG looks the
 /// same on every machine.
 static FONTS: LazyLock<Arc<fontdb::Database>> = LazyLock::new(|| {

@@ -197,10 +197,14 @@ impl PlanProjection {
             }
             let turn_deg = upright_deg(along);
             let outward = side_away_from(self.px(middle), a, b);
-            // In the middle, else nearer to either end.
-            let places = [0.5, 0.25, 0.75]
-                .into_iter()
-                .flat_map(|part| [1.0, -1.0].map(|side| a + part * along + 10.0 * side * outward));
+            // In the middle, else nearer to either end, else farther off the wall.
+            let offsets_px = [10.0, -10.0, 18.0, -18.0];
+            let places = [0.5, 0.25, 0.75, 0.1, 0.9].into_iter().flat_map(|part| {
+                offsets_px.map(|offset_px| a + part * along + offset_px * outward)
+            });
+            let mut places: Vec<_> = places.collect();
+            places
+                .sort_by_key(|at| labels.covered_turned(*at, turn_deg, theme::SMALL_PX, &wall.id));
             for at in places {
                 if labels.place_turned(at, turn_deg, theme::SMALL_PX, &wall.id) {
                     // The baseline is slightly below the middle of the text.
@@ -220,7 +224,7 @@ impl PlanProjection {
             let middle = (low + corner) / 2.0;
             let left = self.px(DVec2::new(bounds.min.x, bounds.min.y));
             let above = Px::new((left.x + low.x) / 2.0, corner.y);
-            let places = [
+            let mut places = [
                 (low + Px::new(5.0, 12.0), Anchor::Start),
                 (corner + Px::new(5.0, -3.0), Anchor::Start),
                 (middle + Px::new(6.0, 4.0), Anchor::Start),
@@ -230,6 +234,7 @@ impl PlanProjection {
                 (Px::new(left.x - 5.0, corner.y - 3.0), Anchor::End),
                 (Px::new(above.x, middle.y + 4.0), Anchor::Middle),
             ];
+            places.sort_by_key(|(at, anchor)| labels.covered(*at, *anchor, theme::SMALL_PX, name));
             let free = places
                 .into_iter()
                 .find(|(at, anchor)| labels.place(*at, *anchor, theme::SMALL_PX, name));
@@ -255,6 +260,16 @@ impl PlanProjection {
         layer.add(solid);
         layer.add(body);
         layer
+    }
+
+    /// Keeps labels off the ranger and the arrow of its heading.
+    pub(crate) fn avoid_pose(&self, pose: &Pose, labels: &mut Labels) {
+        let at = self.px(pose.position());
+        labels.keep_free(Rect::new(at.x - 6.0, at.y - 6.0, 12.0, 12.0));
+        // The head of the arrow, which lies off the mark.
+        let heading = pose.direction_rad(0.0);
+        let head = at + 20.0 * Px::new(heading.cos(), -heading.sin());
+        labels.keep_free(Rect::new(head.x - 5.0, head.y - 5.0, 10.0, 10.0));
     }
 
     /// Draws a bar of round length, above the panel's right end.

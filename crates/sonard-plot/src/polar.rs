@@ -49,7 +49,8 @@ pub fn draw_polar(scans: &[ScanView], scene: Option<&Scene>) -> Picture {
     }
     let below = Px::new(theme::MARGIN_PX, center.y + RADIUS_PX + 40.0);
     let width = theme::PAGE_PX - 2.0 * theme::MARGIN_PX;
-    let (key, height) = legend::draw(&legend_entries::all(&readings, None, outside), below, width);
+    let (key, height) =
+        legend::draw(&legend_entries::all(&readings, None, outside, false), below, width);
     page.add(key);
     Picture::new(theme::PAGE_PX, below.y + height + theme::MARGIN_PX / 2.0, page)
 }

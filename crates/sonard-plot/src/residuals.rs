@@ -6,7 +6,7 @@ use super::{
     legend::{self, LegendEntry, LegendSample},
     legend_entries,
     picture::Picture,
-    readings::PlottedScan,
+    readings::{PlottedBeam, PlottedScan},
     scan_caption, scan_strips,
     strip::{AzimuthAxis, AzimuthStrip},
     theme,
@@ -47,7 +47,8 @@ pub fn draw_residuals(scans: &[ScanView], scene: Option<&Scene>) -> Picture {
     let below = Px::new(theme::MARGIN_PX, range.bottom + 46.0);
     let legend_width = theme::PAGE_PX - 2.0 * theme::MARGIN_PX;
     let mut entries = legend_entries::with_range(&readings);
-    if readings.iter().any(|scan| scan.has_model) {
+    let is_predicted = |beam: &PlottedBeam| beam.model_range_m.is_some();
+    if readings.iter().any(|scan| scan.has_model && scan.beams.iter().any(is_predicted)) {
         let sample = LegendSample::Line { colour: theme::SKY, width_px: 7.0, dash: "none" };
         entries.push(LegendEntry::new(sample, "prediction"));
     }

@@ -54,7 +54,7 @@ pub fn draw_scans(scans: &[ScanView], scene: Option<&Scene>) -> Picture {
     page.add(strips(&layout.strips, azimuths, &readings));
     let below = Px::new(theme::MARGIN_PX, layout.bottom + 10.0);
     let width = theme::PAGE_PX - 2.0 * theme::MARGIN_PX;
-    let entries = legend_entries::all(&readings, scene, outside);
+    let entries = legend_entries::all(&readings, scene, outside, true);
     let (entries, height) = legend::draw(&entries, below, width);
     page.add(entries);
     Picture::new(theme::PAGE_PX, below.y + height + theme::MARGIN_PX / 2.0, page)
@@ -158,6 +158,7 @@ fn floor_plan(
     inside.extend(by_pose.iter().map(|at_pose| plan.pose(&at_pose.pose)));
 
     let mut labels = plan.labels(scene);
+    by_pose.iter().for_each(|at_pose| at_pose.measured(plan).avoid_marks(&mut labels));
     let mut layer = Layer::new("floor-plan");
     layer.add(plan.frame());
     layer.add(inside);

@@ -2,13 +2,14 @@
 
 use sonard_interpret::compare::compare;
 use sonard_model::{geometry::Pose, scene::Scene};
-use sonard_records::{EventKind, Provenance, ScanView, Session};
+use sonard_records::{
+    EventKind, Provenance, ScanView, Session,
+    text::{format_count, format_length},
+};
 
 /// Title with the scene and the pose in it.
 pub(super) fn title(views: &[ScanView], scene: Option<&Scene>) -> String {
-    let logged = views.iter().find_map(|view| view.session.as_ref()?.scene.as_ref());
-    let name = scene.map(|scene| scene.name.as_str()).or(logged.map(|scene| scene.name.as_str()));
-    let name = name.unwrap_or("scan without a scene");
+    let name = scene_name(views, scene);
     let poses: Vec<Pose> = distinct_poses(views);
     match poses.as_slice() {
         [] => format!("{name}, pose unknown"),
@@ -16,7 +17,37 @@ pub(super) fn title(views: &[ScanView], scene: Option<&Scene>) -> String {
             Some(pose_name) => format!("{name}, pose {pose_name}"),
             None => format!("{name} at ({:.3}, {:.3}) m", pose.x_m, pose.y_m),
         },
-        many => format!("{name}, {} poses", many.len()),
+        many => {
+            let names: Vec<_> = many.iter().filter_map(|pose| pose_name(pose, scene)).collect();
+            match names.len() == many.len() && names.len() <= MAX_NAMED_POSES {
+                true => format!("{name}, poses {}", names.join(", ")),
+                false => format!("{name}, {} poses", many.len()),
+            }
+        }
+    }
+}
+
+/// Maximum number of poses whose names are listed in a title.
+const MAX_NAMED_POSES: usize = 4;
+
+/// Name of the scene that is drawn, or else of those in the log.
+fn scene_name(views: &[ScanView], scene: Option<&Scene>) -> String {
+    if let Some(scene) = scene {
+        return scene.name.clone();
+    }
+    let mut names: Vec<&str> = Vec::new();
+    for view in views {
+        let logged = view.session.as_ref().and_then(|session| session.scene.as_ref());
+        if let Some(logged) = logged
+            && !names.contains(&&*logged.name)
+        {
+            names.push(&logged.name);
+        }
+    }
+    match names.as_slice() {
+        [] => "scan without a scene".to_owned(),
+        [name] => (*name).to_owned(),
+        many => format_count(many.len(), "scene"),
     }
 }
 
@@ -55,12 +86,16 @@ pub fn badge_for(provenance: Option<Provenance>) -> Option<&'static str> {
 /// Lines below the title.
 pub(super) fn lines(views: &[ScanView]) -> Vec<String> {
     let mut lines = Vec::new();
-    if let Some(view) = views.first() {
-        let session = view.session.as_deref();
-        let mut parts: Vec<String> = pose_of(view).iter().map(pose).collect();
-        parts.extend(session.map(sensor));
-        parts.extend(session.map(air));
-        parts.extend(session.and_then(engine));
+    // The title counts several poses.
+    let mut parts: Vec<String> = match distinct_poses(views).as_slice() {
+        [only] => vec![pose(only)],
+        _ => Vec::new(),
+    };
+    let sessions = || views.iter().filter_map(|view| view.session.as_deref());
+    parts.extend(distinct(sessions().map(sensor), "sensor"));
+    parts.extend(distinct(sessions().map(air), "air condition"));
+    parts.extend(distinct(sessions().filter_map(engine), "model"));
+    if !parts.is_empty() {
         lines.push(parts.join(" \u{b7} "));
     }
     lines.push(counts(views));
@@ -75,6 +110,20 @@ pub(super) fn lines(views: &[ScanView]) -> Vec<String> {
         lines.push(format!("Events: {}", events.join("; ")));
     }
     lines
+}
+
+/// Description that all scans share, or the number of different ones.
+fn distinct(descriptions: impl Iterator<Item = String>, noun: &str) -> Option<String> {
+    let mut different: Vec<String> = Vec::new();
+    for description in descriptions {
+        if !different.contains(&description) {
+            different.push(description);
+        }
+    }
+    match different.len() {
+        0 | 1 => different.pop(),
+        many => Some(format_count(many, noun)),
+    }
 }
 
 /// Pose of the ranger, if logged with finite numbers.
@@ -141,9 +190,9 @@ fn counts(views: &[ScanView]) -> String {
     let beams: usize = views.iter().map(|view| view.pings.len()).sum();
     let mut parts = Vec::new();
     if views.len() > 1 {
-        parts.push(format!("{} scans overlaid", views.len()));
+        parts.push(format!("{} overlaid", format_count(views.len(), "scan")));
     }
-    parts.push(format!("{beams} beams"));
+    parts.push(format_count(beams, "beam"));
     let ends: Vec<_> = views.iter().filter_map(|view| view.end.as_ref()).collect();
     if ends.len() == views.len() && !ends.is_empty() {
         let missing: u64 = ends.iter().map(|end| u64::from(end.missing)).sum();
@@ -167,20 +216,11 @@ fn agreement(views: &[ScanView]) -> Option<String> {
     let (found, _) = compare(views);
     let percent = 100.0 * found.agree_fraction?;
     Some(format!(
-        "of {} echoes present in both, {} agree ({percent:.1} %) \u{b7} |residual|: median {}, \
+        "of {} present in both, {} agree ({percent:.1} %) \u{b7} |residual|: median {}, \
          90 % within {}",
-        found.both_echo,
+        format_count(found.both_echo, "echo"),
         found.agree,
-        length(found.median_abs_residual_m?),
-        length(found.p90_abs_residual_m?)
+        format_length(found.median_abs_residual_m?),
+        format_length(found.p90_abs_residual_m?)
     ))
-}
-
-/// Formats a length with a suitable unit.
-fn length(length_m: f64) -> String {
-    match length_m {
-        m if m < 0.1 => format!("{:.1} mm", 1e3 * m),
-        m if m < 1e4 => format!("{m:.2} m"),
-        m => format!("{m:.1e} m"),
-    }
 }

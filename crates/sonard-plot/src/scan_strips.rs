@@ -45,27 +45,33 @@ pub(super) fn residual(
 ) -> Layer {
     let strip = AzimuthStrip { panel, azimuths, scale: residual_scale(scans) };
     let mut layer = Layer::new("residual-strip");
-    // A linear scale lies within the band entirely.
+    layer.extend(linear_band(&strip));
     let title = match strip.scale {
         Scale::Linear { .. } => "measured \u{2212} predicted, mm",
-        Scale::SymLog { .. } => {
-            layer.add(strip.band(-RESIDUAL_LINEAR_MM, RESIDUAL_LINEAR_MM));
-            "measured \u{2212} predicted, mm (logarithmic beyond \u{b1}10)"
-        }
+        Scale::SymLog { .. } => "measured \u{2212} predicted, mm (logarithmic beyond \u{b1}10)",
     };
     layer.add(strip.frame(title, last));
     layer.add(marks(&strip, scans, |beam| beam.residual_m.map(|r| 1e3 * r)));
     layer
 }
 
+/// Band of the linear part of a residual scale; a linear scale lies within it entirely.
+pub(super) fn linear_band(strip: &AzimuthStrip) -> Option<Layer> {
+    let is_logarithmic = matches!(strip.scale, Scale::SymLog { .. });
+    is_logarithmic.then(|| strip.band(-RESIDUAL_LINEAR_MM, RESIDUAL_LINEAR_MM))
+}
+
 /// Linear if every residual is within 10 mm; otherwise logarithmic beyond that, up to 10 m, with
 /// arrows for larger residuals.
 pub(super) fn residual_scale(scans: &[PlottedScan]) -> Scale {
-    let largest_mm = scans
-        .iter()
-        .flat_map(PlottedScan::residuals)
-        .map(|(_, residual_m)| 1e3 * residual_m.abs())
-        .fold(0.0, f64::max);
+    scale_of_residuals(
+        scans.iter().flat_map(PlottedScan::residuals).map(|(_, residual_m)| residual_m),
+    )
+}
+
+/// Scale of residuals in metres, as [`residual_scale`].
+pub(super) fn scale_of_residuals(residuals_m: impl Iterator<Item = f64>) -> Scale {
+    let largest_mm = residuals_m.map(|residual_m| 1e3 * residual_m.abs()).fold(0.0, f64::max);
     if largest_mm <= RESIDUAL_LINEAR_MM {
         let max = (1.15 * largest_mm).max(MIN_SCALE_MM);
         return Scale::Linear { min: -max, max };

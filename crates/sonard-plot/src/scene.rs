@@ -73,11 +73,7 @@ fn poses(plan: &PlanProjection, scene: &Scene, labels: &mut Labels) -> Layer {
         layer.add(plan.body(scene, pose));
         layer.add(plan.pose(pose));
         let at = plan.px(pose.position());
-        labels.keep_free(Rect::new(at.x - 6.0, at.y - 6.0, 12.0, 12.0));
-        // The head of the arrow, which lies off the mark.
-        let heading = pose.direction_rad(0.0);
-        let head = at + 20.0 * Px::new(heading.cos(), -heading.sin());
-        labels.keep_free(Rect::new(head.x - 5.0, head.y - 5.0, 10.0, 10.0));
+        plan.avoid_pose(pose, labels);
         let places = [
             (Px::new(9.0, -9.0), Anchor::Start),
             (Px::new(9.0, 18.0), Anchor::Start),

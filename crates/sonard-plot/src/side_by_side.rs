@@ -55,7 +55,7 @@ pub fn draw_side_by_side(scans: &[ScanView], scene: Option<&Scene>) -> Picture {
         page.add(titles);
     }
     let below = Px::new(theme::MARGIN_PX, top + 40.0 + height + 28.0);
-    let entries = legend_entries::all(&readings, scene, 0);
+    let entries = legend_entries::all(&readings, scene, 0, true);
     let (key, key_height) = legend::draw(&entries, below, theme::PAGE_PX - 2.0 * theme::MARGIN_PX);
     page.add(key);
     Picture::new(theme::PAGE_PX, below.y + key_height + theme::MARGIN_PX / 2.0, page)

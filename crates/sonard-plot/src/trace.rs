@@ -62,7 +62,7 @@ pub fn draw_trace(view: &TraceView) -> Picture {
     }
     let below = Px::new(theme::MARGIN_PX, panels.echo.bottom + 52.0);
     let width = theme::PAGE_PX - 2.0 * theme::MARGIN_PX;
-    let (key, height) = legend::draw(&legend_entries(), below, width);
+    let (key, height) = legend::draw(&legend_entries(view, panels.until_us), below, width);
     page.add(key);
     let (list, bottom) = list(view, &numbered, below.y + height + 12.0);
     page.add(list);
@@ -242,7 +242,7 @@ impl TracePanels {
         threshold.runs([run(&mut active.map(|p| (p.t_us, p.threshold)))]);
         layer.extend([sent, received, threshold]);
         layer.add(self.rises(view));
-        layer.add(self.numbers(numbered));
+        layer.add(self.numbers(view, numbered));
         layer
     }
 
@@ -259,15 +259,24 @@ impl TracePanels {
         layer
     }
 
-    fn numbers(&self, numbered: &[NumberedPeak]) -> Layer {
+    fn numbers(&self, view: &TraceView, numbered: &[NumberedPeak]) -> Layer {
         let mut layer = Layer::new("numbers-of-peaks").haloed();
         let mut labels = Labels::new(self.levels);
+        for point in &view.trace.points {
+            labels.avoid_mark(Px::new(self.x(point.t_us), self.level_y(point.envelope)), 1.0);
+        }
         for (number, peak) in (1..).zip(numbered) {
             let text = format!("{number}");
             let at = Px::new(self.x(peak.peak_us), self.level_y(peak.peak) - 5.0);
-            // Next to each other, or stacked.
-            let place = (0..8)
+            // Next to each other, or stacked; off the line if possible.
+            let mut places: Vec<Px> = (0..8)
                 .flat_map(|row| [0.0, 12.0, -12.0].map(|x| at + Px::new(x, -14.0 * f64::from(row))))
+                .collect();
+            places.sort_by_key(|place| {
+                labels.covered(*place, Anchor::Middle, theme::SMALL_PX, &text)
+            });
+            let place = places
+                .into_iter()
                 .find(|place| labels.place(*place, Anchor::Middle, theme::SMALL_PX, &text));
             if let Some(place) = place {
                 layer.text(place, Anchor::Middle, theme::SMALL_PX, &text);
@@ -314,21 +323,24 @@ impl TracePanels {
     }
 }
 
-fn legend_entries() -> Vec<LegendEntry> {
+/// Entries for what the panels show.
+fn legend_entries(view: &TraceView, until_us: f64) -> Vec<LegendEntry> {
     let line = |colour| LegendSample::Line { colour, width_px: 2.0, dash: "none" };
-    vec![
-        LegendEntry::new(line(theme::ORANGE), "transmit pulse (clipped)"),
-        LegendEntry::new(line(theme::BLUE), "echo envelope"),
-        LegendEntry::new(line(theme::VERMILLION), "detection threshold"),
-        LegendEntry::new(
-            LegendSample::Mark { shape: MarkShape::Triangle, colour: theme::VERMILLION },
-            "ECHO rises",
-        ),
-        LegendEntry::new(
-            LegendSample::Line { colour: theme::SKY, width_px: 9.0, dash: "none" },
-            "blanking",
-        ),
+    let rise = LegendSample::Mark { shape: MarkShape::Triangle, colour: theme::VERMILLION };
+    let blanking = LegendSample::Line { colour: theme::SKY, width_px: 9.0, dash: "none" };
+    let rises = view.trace.detection.echoes_us.iter().any(|echo_us| *echo_us <= until_us);
+    [
+        (!view.trace.transmission.is_empty())
+            .then(|| LegendEntry::new(line(theme::ORANGE), "transmit pulse (clipped)")),
+        Some(LegendEntry::new(line(theme::BLUE), "echo envelope")),
+        (until_us > view.blanking_us)
+            .then(|| LegendEntry::new(line(theme::VERMILLION), "detection threshold")),
+        rises.then(|| LegendEntry::new(rise, "ECHO rises")),
+        (view.blanking_us > 0.0).then(|| LegendEntry::new(blanking, "blanking")),
     ]
+    .into_iter()
+    .flatten()
+    .collect()
 }
 
 /// Draws the list of the numbered paths; returns the layer and its lower end.
@@ -340,7 +352,7 @@ fn list(view: &TraceView, numbered: &[NumberedPeak], top: f64) -> (Layer, f64) {
         let times = if peak.count > 1 { format!(" ({} paths)", peak.count) } else { String::new() };
         let range_m = view.sound_speed_m_s * peak.tof_us * 1e-6 / 2.0;
         let db = 20.0 * peak.peak.log10();
-        let text = format!("{number}   {range_m:.3} m, {db:.1} dB: {}{times}", peak.name);
+        let text = format!("{number}: {range_m:.3} m, {db:.1} dB via {}{times}", peak.name);
         layer.text(Px::new(theme::MARGIN_PX + 8.0, y), Anchor::Start, theme::TEXT_PX, &text);
     }
     if numbered.is_empty() {

@@ -15,6 +15,7 @@ mod remaining;
 mod session;
 mod simulated;
 mod sink;
+pub mod text;
 mod trace;
 mod view;
 mod viewpoint;
@@ -31,8 +32,8 @@ pub use record::{
 };
 pub use remaining::BeamRun;
 pub use session::{
-    AirRecord, CollectionRef, Device, ImportRef, LOG_FORMAT, ModelRecord, Provenance, SceneRef,
-    Session,
+    AirRecord, Build, CollectionRef, Device, ImportRef, LOG_FORMAT, ModelRecord, Provenance,
+    SceneRef, Session,
 };
 pub use sink::{Sink, SinkError};
 pub use sonard_model::{

@@ -1,6 +1,6 @@
 //! Session record: the conditions of all records until the next session.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use jiff::Timestamp;
 use schemars::JsonSchema;
@@ -32,8 +32,27 @@ pub enum Provenance {
     Simulated,
     /// Converted from another format.
     Imported,
-    /// Conversion from another format.
+    /// Readings of an earlier log, reported again by a device state machine on a pty.
     Replay,
+}
+
+/// Build of the program that writes a session.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct Build {
+    /// Commit of the source, `unknown` outside of a checkout; ends in `-modified` after changes.
+    pub commit: String,
+    /// Cargo features of the program.
+    pub features: Vec<String>,
+}
+
+/// Build of this process; programs declare it at their start, libraries have none.
+static BUILD: OnceLock<Build> = OnceLock::new();
+
+impl Build {
+    /// Declares the build that new sessions of this process state. Later calls have no effect.
+    pub fn declare(self) {
+        drop(BUILD.set(self));
+    }
 }
 
 /// Opening record of a log, repeated after each reconnection to a different device.
@@ -45,6 +64,9 @@ pub struct Session {
     pub started: Timestamp,
     /// Version of the program that wrote the log.
     pub sonard: String,
+    /// Commit and features of that program.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub build: Option<Build>,
     /// Source of the readings.
     pub provenance: Provenance,
     /// Name of the robot, if a daemon wrote the session.
@@ -84,6 +106,7 @@ impl Session {
             format: LOG_FORMAT,
             started,
             sonard: env!("CARGO_PKG_VERSION").to_owned(),
+            build: BUILD.get().cloned(),
             provenance,
             robot: None,
             device: None,

@@ -80,6 +80,8 @@ impl Capabilities {
     pub const EMERGENCY_STOP: Self = Self(1 << 3);
     /// Can release the motor's coils.
     pub const COIL_RELEASE: Self = Self(1 << 4);
+    /// Reports the readings of a log, in addition to [`Self::SIMULATED`].
+    pub const REPLAYED: Self = Self(1 << 12);
     /// Has a clock that jumps: valid for intervals between firings, not for the time of day.
     pub const VIRTUAL_CLOCK: Self = Self(1 << 13);
     /// Runs the firmware's machine code in an emulator.
@@ -88,12 +90,13 @@ impl Capabilities {
     pub const SIMULATED: Self = Self(1 << 15);
 
     /// All capability bits with their names.
-    pub const NAMES: [(Self, &str); 8] = [
+    pub const NAMES: [(Self, &str); 9] = [
         (Self::INDEX_SENSOR, "INDEX_SENSOR"),
         (Self::SHORT_BLANKING, "SHORT_BLANKING"),
         (Self::MULTIPLE_ECHOES, "MULTIPLE_ECHOES"),
         (Self::EMERGENCY_STOP, "EMERGENCY_STOP"),
         (Self::COIL_RELEASE, "COIL_RELEASE"),
+        (Self::REPLAYED, "REPLAYED"),
         (Self::VIRTUAL_CLOCK, "VIRTUAL_CLOCK"),
         (Self::EMULATED, "EMULATED"),
         (Self::SIMULATED, "SIMULATED"),

@@ -10,7 +10,10 @@ use crate::{
         output::{Overwrite, Product, make_folder},
     },
     inverse::{FitResult, FitSweep, ParameterReport, World},
-    scan::AirRecord,
+    scan::{
+        AirRecord,
+        text::{format_count, format_length},
+    },
 };
 
 /// Files in the output folder.
@@ -34,10 +37,10 @@ pub(super) fn summarize(
 ) -> Vec<String> {
     let errors = &fitted.errors;
     let mut text = vec![format!(
-        "{} readings: {:.0} % explained, ranges within {:.1} mm (standard deviation), strengths within {:.1} dB",
-        fitted.readings,
+        "{}: {:.0} % explained, ranges within {} (standard deviation), strengths within {:.1} dB",
+        format_count(fitted.readings, "reading"),
         100.0 * errors.explained(),
-        1e3 * errors.sigma_m,
+        format_length(errors.sigma_m),
         errors.sigma_db
     )];
     let is_furnished = errors.outlier_arc_share > 0.0;
@@ -77,7 +80,9 @@ pub(super) fn summarize(
 ///
 /// A file that may not be replaced.
 pub(super) fn check(folder: &Path, overwrite: Overwrite) -> Outcome {
-    FILES.iter().try_for_each(|name| overwrite.check_in(folder, name, Product::Log))
+    let pictures = super::picture::FILES.into_iter();
+    let files = FILES.iter().map(|name| (*name, Product::Log)).chain(pictures);
+    files.into_iter().try_for_each(|(name, product)| overwrite.check_in(folder, name, product))
 }
 
 /// Writes the results as files that other verbs read.

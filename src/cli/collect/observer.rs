@@ -5,7 +5,10 @@ use std::time::Duration;
 use indicatif::{HumanDuration, ProgressBar, ProgressStyle};
 
 use super::{report, terminal::Terminal};
-use crate::collect::{CollectError, CollectionFolder, CollectionHistory, Observer};
+use crate::{
+    collect::{CollectionFolder, CollectError, CollectionHistory, Observer},
+    scan::text::format_count,
+};
 
 /// Terminal of a collection: a bar over all beams, messages above it, and questions.
 pub(super) struct TerminalObserver {
@@ -45,7 +48,7 @@ impl Observer for TerminalObserver {
     }
 
     fn scans_planned(&self, scans: u32, left_s: f64) {
-        notice!("{scans} scans to take, about {}", human_duration(left_s));
+        notice!("{} to take, about {}", format_count(scans, "scan"), human_duration(left_s));
     }
 
     /// Removes the bar until the next scan begins: an earlier redraw would cover a question.

@@ -11,8 +11,11 @@ use crate::{
         repeatability,
     },
     compare::{Comparison, compare},
-    plot::{Picture, Series, SeriesPoint, badge_among, draw_scans, draw_scene, draw_series},
-    scan::ScanView,
+    plot::{Picture, SeriesPoint, Series, badge_among, draw_scans, draw_scene, draw_series},
+    scan::{
+        ScanView,
+        text::{format_count, format_length},
+    },
     scene::Scene,
     store::load,
 };
@@ -100,18 +103,18 @@ fn format_head(history: &CollectionHistory, keys: &CollectionKeys) -> String {
     let mut text = format!("# {}\n\n", keys.collection.name);
     let _ = writeln!(
         text,
-        "{} of {} scans, {} rejected, {given_up} failed; {beams} beams, {missing} without a usable \
-         reading.",
+        "{} of {}, {} rejected, {given_up} failed; {}, {missing} without a usable reading.",
         accepted.len(),
-        requested.len(),
+        format_count(requested.len(), "scan"),
         history.set_aside().count(),
+        format_count(beams, "beam"),
     );
     let times = || accepted.iter().filter_map(|take| take.started);
     if let (Some(first), Some(last)) = (times().min(), times().max()) {
         let _ = writeln!(
             text,
-            "First scan {first:.0}, last {last:.0}; started {} times.",
-            history.starts.len()
+            "First scan {first:.0}, last {last:.0}; started {}.",
+            format_count(history.starts.len(), "time")
         );
     }
     // The sum of an empty iterator is -0; scans recovered from an earlier run have no duration.
@@ -137,8 +140,8 @@ fn format_head(history: &CollectionHistory, keys: &CollectionKeys) -> String {
     if history.plans.len() > 1 {
         let _ = writeln!(
             text,
-            "The plan was changed {} times; journal.jsonl contains each version.\n",
-            history.plans.len() - 1
+            "The plan was changed {}; journal.jsonl contains each version.\n",
+            format_count(history.plans.len() - 1, "time")
         );
     }
     text
@@ -154,7 +157,7 @@ struct Row<'a> {
 
 impl Row<'_> {
     fn line(&self) -> String {
-        let mm = |m: Option<f64>| m.map_or_else(|| "-".into(), |m| format!("{:.1} mm", 1e3 * m));
+        let length = |length_m: Option<f64>| length_m.map_or_else(|| "-".into(), format_length);
         let Self { number, pose, compared, repeat } = self;
         let share = compared.agree_fraction;
         format!(
@@ -165,10 +168,10 @@ impl Row<'_> {
             pose.pose.heading_deg,
             repeat.scans,
             share.map_or_else(|| "-".into(), |share| format!("{:.1} %", 100.0 * share)),
-            mm(compared.median_residual_m),
-            mm(compared.p90_abs_residual_m),
-            mm(repeat.median_spread_m),
-            mm(repeat.p90_spread_m),
+            length(compared.median_residual_m),
+            length(compared.p90_abs_residual_m),
+            length(repeat.median_spread_m),
+            length(repeat.p90_spread_m),
             repeat.unsteady,
         )
     }

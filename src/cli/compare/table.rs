@@ -2,20 +2,16 @@
 
 use std::io::{self, Write};
 
-use comfy_table::{CellAlignment, LineStyle, Table, TableStyle};
+use comfy_table::Table;
 
 use crate::{
-    compare::{
-        ChangeEstimate, ClassifiedPing, Comparison, Explanation, Verdict, keep_every_second,
+    cli::table::{align_right, fit, ruled},
+    compare::{Comparison, ChangeEstimate, Explanation, ClassifiedPing, Verdict, keep_every_second},
+    scan::{
+        PathKind, PathRecord, Ping, PingStatus,
+        text::{format_count, format_length},
     },
-    scan::{PathKind, PathRecord, Ping, PingStatus},
 };
-
-/// Table style with rules above the header, below it and at the end.
-pub(in crate::cli) const RULED: TableStyle = TableStyle::new()
-    .top_border(LineStyle::none().fill('─').junction('─'))
-    .header_separator(LineStyle::none().fill('─').junction('─'))
-    .bottom_border(LineStyle::none().fill('─').junction('─'));
 
 /// Prints the figures and the worst-fitting beams.
 pub(super) fn print(
@@ -25,10 +21,10 @@ pub(super) fn print(
 ) -> io::Result<()> {
     print_numbers(out, comparison)?;
     if comparison.beams > 0 {
-        writeln!(out, "{}", verdict_table(comparison))?;
+        writeln!(out, "{}", fit(verdict_table(comparison)))?;
     }
     if !comparison.explanations.is_empty() {
-        let table = explanations(&comparison.explanations);
+        let table = fit(explanations(&comparison.explanations));
         writeln!(out, "Better-fitting changes:\n{table}")?;
     } else if comparison.agree_fraction.is_some_and(|share| share < FEW_AGREE) {
         writeln!(
@@ -39,14 +35,14 @@ pub(super) fn print(
     }
     let apart = worst.apart();
     if !apart.is_empty() {
-        writeln!(out, "Largest residuals:\n{}", beam_table(&apart))?;
+        writeln!(out, "Largest residuals:\n{}", fit(beam_table(&apart)))?;
     }
     let one_sided = worst.one_sided();
     if !one_sided.is_empty() {
         writeln!(
             out,
             "Detected by one only, or at minimum range in one only:\n{}",
-            beam_table(&one_sided)
+            fit(beam_table(&one_sided))
         )?;
     }
     Ok(())
@@ -54,8 +50,12 @@ pub(super) fn print(
 
 fn print_numbers(out: &mut impl Write, comparison: &Comparison) -> io::Result<()> {
     let Comparison { beams, both_echo, agree, scans, poses, duplicates, .. } = *comparison;
-    let at = if poses > 1 { format!(" at {poses} poses, combined") } else { String::new() };
-    writeln!(out, "{beams} beams compared, in {scans} scan(s){at}")?;
+    let at = match poses {
+        0 | 1 => String::new(),
+        poses => format!(" at {}, combined", format_count(poses, "pose")),
+    };
+    let (beams, scans) = (format_count(beams, "beam"), format_count(scans, "scan"));
+    writeln!(out, "{beams} compared, in {scans}{at}")?;
     let skipped = comparison.not_compared;
     for (count, why) in [
         (skipped.link_lost, "not compared: the reading was lost"),
@@ -77,16 +77,15 @@ fn print_numbers(out: &mut impl Write, comparison: &Comparison) -> io::Result<()
     writeln!(
         out,
         "residual: median of |r| {}, 90 % within {}, bias {} (measured minus predicted)",
-        millimetres(comparison.median_abs_residual_m),
-        millimetres(comparison.p90_abs_residual_m),
-        millimetres(comparison.median_residual_m),
+        length(comparison.median_abs_residual_m),
+        length(comparison.p90_abs_residual_m),
+        length(comparison.median_residual_m),
     )
 }
 
 fn verdict_table(comparison: &Comparison) -> Table {
     let (counts, medians) = (comparison.verdicts, comparison.median_abs_residual_by_verdict_m);
-    let mut table = Table::new();
-    table.load_style(RULED).set_header(["verdict", "beams", "%", "median |r|"]);
+    let mut table = ruled(["verdict", "beams", "%", "median |r|"]);
     for (name, count, median_m) in [
         ("direct", counts.direct, medians.direct),
         ("multiple", counts.multiple, medians.multiple),
@@ -96,22 +95,21 @@ fn verdict_table(comparison: &Comparison) -> Table {
         ("unexplained", counts.unexplained, medians.unexplained),
     ] {
         let percent = 100.0 * f64::from(count) / f64::from(comparison.beams);
-        let row = [name.into(), count.to_string(), format!("{percent:.1}"), millimetres(median_m)];
+        let row = [name.into(), count.to_string(), format!("{percent:.1}"), length(median_m)];
         table.add_row(row);
     }
-    right_align(&mut table, 1);
+    align_right(&mut table, 1..4);
     table
 }
 
 fn explanations(found: &[Explanation]) -> Table {
-    let mut table = Table::new();
-    table.load_style(RULED).set_header(["change", "by", "explains", "gain"]);
+    let mut table = ruled(["change", "by", "explains", "gain"]);
     for Explanation { change, estimates, gain, explains } in found.iter().take(MAX_EXPLANATIONS) {
         let by: Vec<String> = estimates.iter().map(ChangeEstimate::to_string).collect();
-        let explains = format!("{explains} readings");
+        let explains = format_count(*explains, "reading");
         table.add_row([change.replace('_', " "), by.join(", "), explains, format!("{gain:.0}")]);
     }
-    right_align(&mut table, 2);
+    align_right(&mut table, 2..4);
     table
 }
 
@@ -122,16 +120,8 @@ const FEW_AGREE: f64 = 0.25;
 const MAX_EXPLANATIONS: usize = 6;
 
 fn beam_table(beams: &[&Beam]) -> Table {
-    let mut table = Table::new();
-    table.load_style(RULED).set_header([
-        "beam",
-        "azimuth",
-        "measured",
-        "predicted",
-        "residual",
-        "margin",
-        "predicted path",
-    ]);
+    let mut table =
+        ruled(["beam", "azimuth", "measured", "predicted", "residual", "margin", "predicted path"]);
     for Beam { ping, residual_m } in beams {
         let sim = ping.sim.as_ref();
         let margin_db = sim.and_then(|sim| sim.margin_db);
@@ -140,14 +130,12 @@ fn beam_table(beams: &[&Beam]) -> Table {
             format!("{:.1}", ping.azimuth_deg),
             format_reading(ping.status, ping.range_m),
             sim.map_or("-".into(), |sim| format_reading(sim.status, sim.range_m)),
-            millimetres(*residual_m),
+            length(*residual_m),
             margin_db.map_or("-".into(), |db| format!("{db:+.1} dB")),
             sim.and_then(|sim| sim.path.as_ref()).map_or(String::new(), describe_path),
         ]);
     }
-    for column in table.column_iter_mut().take(6) {
-        column.set_cell_alignment(CellAlignment::Right);
-    }
+    align_right(&mut table, 0..6);
     table
 }
 
@@ -226,12 +214,6 @@ fn size(beam: &Beam) -> f64 {
     beam.residual_m.map_or(0.0, f64::abs)
 }
 
-fn right_align(table: &mut Table, from: usize) {
-    for column in table.column_iter_mut().skip(from) {
-        column.set_cell_alignment(CellAlignment::Right);
-    }
-}
-
 fn format_reading(status: PingStatus, range_m: Option<f64>) -> String {
     match (status, range_m) {
         (PingStatus::Echo, Some(range_m)) => format!("{range_m:.3} m"),
@@ -242,8 +224,8 @@ fn format_reading(status: PingStatus, range_m: Option<f64>) -> String {
     }
 }
 
-fn millimetres(value_m: Option<f64>) -> String {
-    value_m.map_or("-".into(), |value_m| format!("{:.1} mm", value_m * 1e3))
+fn length(value_m: Option<f64>) -> String {
+    value_m.map_or("-".into(), format_length)
 }
 
 /// Describes a path, for example `3 reflections: south, north, south`.

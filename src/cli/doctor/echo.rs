@@ -3,6 +3,7 @@
 use firmware_protocol::messages::{Reading, ReadingStatus};
 
 use super::report::{Cause, Check};
+use crate::scan::text::format_length;
 
 /// Speed of sound for quoted ranges at 20 degrees Celsius, metres per second.
 const SOUND_M_S: f64 = 343.4;
@@ -82,9 +83,9 @@ fn check_spread(ranges_m: &[f64], median_m: f64, pings: usize) -> Check {
     let inner = ranges_m.get(tail..ranges_m.len() - tail).unwrap_or_default();
     let spread_m = inner.last().unwrap_or(&median_m) - inner.first().unwrap_or(&median_m);
     let detail = format!(
-        "{} of {pings} pings received an echo, at {median_m:.3} m (spread {:.1} mm)",
+        "{} of {pings} pings received an echo, at {median_m:.3} m (spread {})",
         ranges_m.len(),
-        spread_m * 1e3
+        format_length(spread_m)
     );
     if spread_m > MAX_SPREAD_M {
         return Check::failed(

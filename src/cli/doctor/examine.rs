@@ -368,7 +368,9 @@ fn device_failed(check: &'static str, error: &DriveError) -> Check {
 
 fn answered(identity: &Identity) -> Check {
     let firmware = identity.firmware;
-    let kind = if identity.capabilities.has(Capabilities::SIMULATED) {
+    let kind = if identity.capabilities.has(Capabilities::REPLAYED) {
+        " (a replayed log)"
+    } else if identity.capabilities.has(Capabilities::SIMULATED) {
         " (a mock)"
     } else if identity.capabilities.has(Capabilities::EMULATED) {
         " (an emulator)"

@@ -6,6 +6,7 @@ use std::{
 };
 
 use super::{Failure, Outcome};
+use crate::scan::text::format_count;
 use crate::store::{Repair, repair};
 
 /// Options of `sonard log repair`.
@@ -41,16 +42,16 @@ fn print(out: &mut impl Write, log: &Path, done: &Repair) -> io::Result<()> {
     for left in &done.removed {
         writeln!(
             out,
-            "{name}:{}: removed {} byte(s) at byte {}: {}",
-            left.line, left.length, left.offset, left.fault
+            "{name}:{}: removed {} at byte {}: {}",
+            left.line,
+            format_count(left.length, "byte"),
+            left.offset,
+            left.fault
         )?;
     }
     if let Some(torn) = &done.torn {
-        let (line, length, offset) = (torn.line, torn.length, torn.offset);
-        writeln!(
-            out,
-            "{name}:{line}: incomplete last line removed, {length} byte(s) at byte {offset}"
-        )?;
+        let (line, length, offset) = (torn.line, format_count(torn.length, "byte"), torn.offset);
+        writeln!(out, "{name}:{line}: incomplete last line removed, {length} at byte {offset}")?;
     }
     if done.newline_added {
         writeln!(out, "{name}: the last record was complete; newline added")?;
@@ -59,11 +60,11 @@ fn print(out: &mut impl Write, log: &Path, done: &Repair) -> io::Result<()> {
         let (line, fault) = (error.line, &error.fault);
         writeln!(out, "{name}:{line}: kept, unreadable by this version: {fault}")?;
     }
-    let kept = done.kept + done.kept_unread.len() as u64;
+    let kept = format_count(done.kept + done.kept_unread.len() as u64, "record");
     match &done.original {
         Some(original) => {
-            writeln!(out, "{name}: {kept} record(s) kept; the original is {}", original.display())
+            writeln!(out, "{name}: {kept} kept; the original is {}", original.display())
         }
-        None => writeln!(out, "{name}: {kept} record(s), nothing to repair"),
+        None => writeln!(out, "{name}: {kept}, nothing to repair"),
     }
 }

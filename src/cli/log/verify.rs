@@ -9,6 +9,7 @@ use std::{
 use serde::Serialize;
 
 use super::{Failure, Outcome};
+use crate::scan::text::{format_count, group_digits};
 use crate::store::{
     FindingKind, LogFinding, LogTotals, Severity, StoreError, check_log, is_locked,
     open_for_reading,
@@ -30,7 +31,7 @@ pub(in crate::cli) struct Args {
     /// backwards
     #[arg(long)]
     strict: bool,
-    /// Print all findings
+    /// Print all findings; without it, 40 per log
     #[arg(long)]
     all: bool,
     /// JSON instead of text; one object per finding, and one with the totals for each log
@@ -128,20 +129,23 @@ fn print_totals(
 ) -> io::Result<()> {
     let log = log.display();
     if hidden > 0 {
-        writeln!(out, "{log}: {hidden} more; use --all to list them")?;
+        writeln!(out, "{log}: {} more; use --all to list them", group_digits(hidden))?;
     }
     let LogTotals { lines, sessions, scans, pings, events, problems, warnings } = totals;
     let verdict = match (problems, warnings) {
         (0, 0) => "clean".into(),
-        (0, warnings) => format!("clean, {warnings} warning(s)"),
-        (problems, 0) => format!("not clean: {problems} problem(s)"),
-        (problems, warnings) => format!("not clean: {problems} problem(s), {warnings} warning(s)"),
+        (0, warnings) => format!("clean, {}", format_count(warnings, "warning")),
+        (problems, 0) => format!("not clean: {}", format_count(problems, "problem")),
+        (problems, warnings) => format!(
+            "not clean: {}, {}",
+            format_count(problems, "problem"),
+            format_count(warnings, "warning")
+        ),
     };
-    writeln!(
-        out,
-        "{log}: {verdict} ({lines} lines: {sessions} session(s), {scans} scan(s), {pings} \
-         readings, {events} event(s))"
-    )?;
+    let contents = [(sessions, "session"), (scans, "scan"), (pings, "reading"), (events, "event")]
+        .map(|(count, noun)| format_count(count, noun))
+        .join(", ");
+    writeln!(out, "{log}: {verdict} ({}: {contents})", format_count(lines, "line"))?;
     let written_now = torn && File::open(log.to_string()).is_ok_and(|file| is_locked(&file));
     match (torn, written_now) {
         (true, true) => {

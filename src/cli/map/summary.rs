@@ -8,7 +8,7 @@ use std::{
 use serde::Serialize;
 
 use super::{Args, Mapped, Switch};
-use crate::interpret::Sweep;
+use crate::{interpret::Sweep, scan::text::format_count};
 
 #[derive(Debug, Serialize)]
 pub(super) struct Summary<'a> {
@@ -62,9 +62,9 @@ impl Summary<'_> {
     /// Describes the map in the line below the picture's title.
     pub(super) fn describe_cells(&self) -> String {
         format!(
-            "{} scans, {} readings \u{b7} {}x{} cells of {} m: {} occupied, {} free, {} undecided",
-            self.scans,
-            self.readings,
+            "{}, {} \u{b7} {}x{} cells of {} m: {} occupied, {} free, {} undecided",
+            format_count(self.scans, "scan"),
+            format_count(self.readings, "reading"),
             self.width,
             self.height,
             self.resolution_m,
@@ -77,9 +77,9 @@ impl Summary<'_> {
     pub(super) fn print(&self, out: &mut impl Write) -> io::Result<()> {
         writeln!(
             out,
-            "{} scans, {} readings -> {}x{} cells of {} m in {}: {} occupied, {} free, {} undecided",
-            self.scans,
-            self.readings,
+            "{}, {} -> {}x{} cells of {} m in {}: {} occupied, {} free, {} undecided",
+            format_count(self.scans, "scan"),
+            format_count(self.readings, "reading"),
             self.width,
             self.height,
             self.resolution_m,
@@ -89,11 +89,8 @@ impl Summary<'_> {
             self.unknown_cells
         )?;
         if let Some(confidence) = self.mean_confidence {
-            writeln!(
-                out,
-                "mean confidence {confidence:.3}, {} readings discarded",
-                self.discarded
-            )?;
+            let discarded = format_count(self.left_out, "reading");
+            writeln!(out, "mean confidence {confidence:.3}, {discarded} discarded")?;
         }
         if self.evidence > 1 {
             writeln!(out, "scan weight {} (--scan-weight)", self.evidence)?;
@@ -101,8 +98,8 @@ impl Summary<'_> {
         if self.poses_outside > 0 {
             writeln!(
                 out,
-                "{} poses are outside the map: enlarge --region, or omit it",
-                self.poses_outside
+                "{} outside the map: enlarge --region, or omit it",
+                format_count(self.poses_outside, "pose")
             )?;
         }
         Ok(())

@@ -18,7 +18,7 @@ use crate::{
         Failure,
         array::{load_array, load_course},
         options::load_sensor,
-        scene_file,
+        scene_file, socket,
     },
     config::{ConfigError, ConfigLayers, Keys, Mode, robot_name_from_host},
     daemon::{ArraySimulation, OptionalOutputs, Settings, SettingsConflict},
@@ -26,7 +26,8 @@ use crate::{
     scene::{PoseError, parse_pose},
 };
 
-const FILE: &str = "/etc/sonard/sonard.toml";
+/// Configuration file without `--config`.
+pub(in crate::cli) const CONFIG_FILE: &str = "/etc/sonard/sonard.toml";
 
 /// Reader of the configuration, for the start and reloads.
 pub(super) struct Loader {
@@ -93,7 +94,7 @@ impl Loader {
         let mut layers = ConfigLayers::<Keys>::new();
         let (file, requested) = match &self.args.config {
             Some(file) => (file.clone(), true),
-            None => (PathBuf::from(FILE), false),
+            None => (PathBuf::from(CONFIG_FILE), false),
         };
         match fs::read_to_string(&file) {
             Ok(text) => {
@@ -145,23 +146,30 @@ impl Loader {
         Ok(layers)
     }
 
-    /// Fills in values from system and systemd, which replace defaults, and the mock's port, which
-    /// overrides all.
+    /// Fills in values from system and systemd and the places of a user without rights to the
+    /// system's, which replace defaults, and the mock's port, which overrides all.
     fn fill_in(&self, layers: &ConfigLayers, keys: &mut Keys) {
         // systemd separates several folders by colons; the first is used.
         let first = |variable| {
             let folders = env::var(variable).ok()?;
             folders.split(':').next().map(str::to_owned).filter(|folder| !folder.is_empty())
         };
+        let text = |path: PathBuf| path.into_os_string().into_string().ok();
         if layers.origin("log", "folder").is_none()
             && let Some(folder) = first("STATE_DIRECTORY")
+                .or_else(|| socket::instead_of(&keys.log.folder, socket::user_logs).and_then(text))
         {
             keys.log.folder = folder;
         }
-        if layers.origin("server", "socket").is_none()
-            && let Some(folder) = first("RUNTIME_DIRECTORY")
-        {
-            keys.server.socket = format!("{folder}/sonard.sock");
+        if layers.origin("server", "socket").is_none() {
+            let own = || {
+                let own = || Some(socket::user_socket());
+                socket::instead_of(&keys.server.socket, own).and_then(text)
+            };
+            let systemd = first("RUNTIME_DIRECTORY").map(|folder| format!("{folder}/sonard.sock"));
+            if let Some(socket) = systemd.or_else(own) {
+                keys.server.socket = socket;
+            }
         }
         let host = rustix::system::uname();
         if layers.origin("fleet", "robot").is_none()

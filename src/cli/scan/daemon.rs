@@ -10,7 +10,7 @@ use crate::{
     },
     client::RequestedScans,
     geometry::Pose,
-    scan::{Record, ScanEnd, ScanPlan},
+    scan::{Record, ScanEnd, ScanPlan, text::format_count},
 };
 
 pub(super) fn run(args: &Args) -> Outcome {
@@ -25,10 +25,10 @@ pub(super) fn run(args: &Args) -> Outcome {
         let status: Status =
             client.get_json("/v1/status").await.map_err(|error| failure_from(&error))?;
         check_scene(status.scene.as_ref(), &scene)?;
-        let requested = RequestedScans::request(client, &request)
-            .await
-            .map_err(|error| failure_from(&error))?;
-        notice!("the daemon takes {} scan(s), {}", args.repeat, describe_wait(&status));
+        let requested =
+            RequestedScans::request(client, &request).await.map_err(|error| failure_from(&error))?;
+        let (count, wait) = (format_count(args.repeat, "scan"), describe_wait(&status));
+        notice!("the daemon takes {count}, {wait}");
         let followed = scans.follow(requested, &interrupts).await;
         scans.output.end_scan();
         followed
@@ -76,7 +76,7 @@ impl Scans {
         }
         let missing: u32 = self.ends.iter().map(|end| end.missing).sum();
         if missing > 0 {
-            return Err(Failure::Found(Some(format!("{missing} beams are missing"))));
+            return Err(Failure::Found(Some(format!("{} missing", format_count(missing, "beam")))));
         }
         Ok(())
     }

@@ -6,7 +6,10 @@ use super::output::Output;
 use crate::{
     compare::{Comparison, compare},
     ranger::{PreparedScan, ScanSummary, provenance, serial_text},
-    scan::{PingStatus, Provenance, ScanEnd, ScanView},
+    scan::{
+        PingStatus, Provenance, ScanEnd, ScanView,
+        text::{format_count, format_length},
+    },
 };
 
 /// Prints the summary on standard error. Link statistics are the difference between the two given.
@@ -72,8 +75,8 @@ fn beams(end: &ScanEnd, view: Option<&ScanView>) -> String {
         view.map_or(0, |view| view.pings.iter().filter(|ping| ping.status == status).count())
     };
     let mut text = format!(
-        "  {} beams, {} missing, {} repaired: {} echo, {} minimum range, {} no echo",
-        end.beams,
+        "  {}, {} missing, {} repaired: {} echo, {} minimum range, {} no echo",
+        format_count(end.beams, "beam"),
         end.missing,
         end.repaired,
         count(PingStatus::Echo),
@@ -91,15 +94,13 @@ fn beams(end: &ScanEnd, view: Option<&ScanView>) -> String {
 }
 
 fn agreement(comparison: &Comparison, engine: &str) -> String {
-    let mm = |metres: Option<f64>| {
-        metres.map_or_else(|| "-".into(), |metres| format!("{:.1} mm", metres * 1e3))
-    };
+    let length = |length_m: Option<f64>| length_m.map_or_else(|| "-".into(), format_length);
     format!(
-        "  model ({engine}): {} of {} echoes agree; |residual| median {}, 90 % {}; missed {}, false {}",
+        "  model ({engine}): {} of {} agree; |residual| median {}, 90 % {}; missed {}, false {}",
         comparison.agree,
-        comparison.both_echo,
-        mm(comparison.median_abs_residual_m),
-        mm(comparison.p90_abs_residual_m),
+        format_count(comparison.both_echo, "echo"),
+        length(comparison.median_abs_residual_m),
+        length(comparison.p90_abs_residual_m),
         comparison.simulated_only,
         comparison.measured_only,
     )
@@ -115,7 +116,7 @@ fn time(end: &ScanEnd) -> String {
 
 /// Prints the link statistics over several scans.
 pub(super) fn print_total(scans: u32, link: &LinkStats) {
-    notice!("total {scans} scans\n{}", traffic(&LinkStats::default(), link));
+    notice!("total {}\n{}", format_count(scans, "scan"), traffic(&LinkStats::default(), link));
 }
 
 fn traffic(earlier: &LinkStats, current: &LinkStats) -> String {
@@ -126,22 +127,26 @@ fn traffic(earlier: &LinkStats, current: &LinkStats) -> String {
         u32::from(dropped.checksum) + u32::from(dropped.stuffing) + u32::from(dropped.too_long)
     };
     format!(
-        "  link: {received} bytes in, {sent} bytes out ({:.1} % of the traffic), {} frames damaged, {} \
-         requests repeated, {} readings rejected",
+        "  link: {} in, {} out ({:.1} % of the traffic), {} damaged, {} repeated, {} rejected",
+        format_count(received, "byte"),
+        format_count(sent, "byte"),
         100.0 * sent as f64 / (sent + received).max(1) as f64,
-        damaged(current) - damaged(earlier),
-        current.retries - earlier.retries,
-        current.rejected - earlier.rejected,
+        format_count(damaged(current) - damaged(earlier), "frame"),
+        format_count(current.retries - earlier.retries, "request"),
+        format_count(current.refused - earlier.refused, "reading"),
     )
 }
 
 fn warnings(summary: &ScanSummary) -> Option<String> {
     let mut parts = Vec::new();
     if summary.restarts > 0 {
-        parts.push(format!("the device reset {} times", summary.restarts));
+        parts.push(format!("the device reset {}", format_count(summary.restarts, "time")));
     }
     if let Some(drift) = summary.end.home_drift_steps.filter(|&drift| drift != 0) {
-        parts.push(format!("index error {drift} steps after the scan: azimuths are uncertain"));
+        parts.push(format!(
+            "index error {drift} {} after the scan: azimuths are uncertain",
+            if drift.abs() == 1 { "step" } else { "steps" }
+        ));
     }
     if let Some(error) = &summary.not_home {
         parts.push(format!("homing after the scan failed: {error}"));

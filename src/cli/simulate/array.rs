@@ -7,15 +7,12 @@ use rand::SeedableRng as _;
 use rand_pcg::Pcg64;
 use uuid::Uuid;
 
-use super::{Args, SimulatedPoses, SimulationFailure, simulated_poses};
+use super::{Args, SimulatedPoses, SimulationFailure, records_for, simulated_poses};
 use crate::{
     acoustics::ReceiverNoise,
     cli::{
-        Failure, Outcome,
-        array::load_array,
-        options::engine_options,
-        output::{closed, records_to},
-        progress, scene_file,
+        Failure, Outcome, array::load_array, options::engine_options, output::closed, progress,
+        scene_file,
     },
     geometry::Pose,
     model::{ArrayAtPose, ArrayModel, ModelError, Prediction, TooCostly},
@@ -51,7 +48,7 @@ pub(super) fn run(args: &Args, name: &str) -> Outcome {
         ArrayModel::new(Arc::new(array), &scene, &sensor, air, engine_options(&args.engine)?)
             .map_err(|error| failure_from(&error))?;
     let noise = args.noise.noise()?;
-    let mut out = records_to(args.output.as_deref(), args.overwrite)?;
+    let mut out = records_for(args)?;
     let mut simulator =
         ArraySimulator { model: &model, noise, rng: Pcg64::seed_from_u64(args.noise.seed) };
     match simulator.fire(&mut *out, &rounds) {

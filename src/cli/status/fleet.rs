@@ -8,8 +8,11 @@ use tokio::task::JoinSet;
 
 use crate::{
     api::{FleetState, Health, Status},
-    cli::{Failure, Outcome, compare::RULED, runtime},
-    fleet::{Observation, PolledDaemon, observe, poll},
+    cli::{
+        Failure, Outcome, runtime,
+        table::{fit, ruled},
+    },
+    fleet::{Asked, Seen, ask, judge},
 };
 
 /// Object of `--json` for a daemon.
@@ -29,7 +32,7 @@ pub(super) fn run(daemons: &[PolledDaemon], json: bool) -> Outcome {
     let rows: Vec<_> = daemons.iter().zip(&seen).map(|(of, seen)| fleet_row(of, seen)).collect();
     let mut text = match json {
         true => json_lines(&rows)?,
-        false => table(&rows).to_string(),
+        false => fit(table(&rows)),
     };
     text.push('\n');
     let written = std::io::stdout().lock().write_all(text.as_bytes());
@@ -73,16 +76,8 @@ fn json_lines(rows: &[FleetRow]) -> Result<String, Failure> {
 }
 
 fn table(rows: &[FleetRow]) -> Table {
-    let mut table = Table::new();
-    table.load_style(RULED).set_header([
-        "robot",
-        "state",
-        "scan",
-        "last reading",
-        "agreement",
-        "missing",
-        "problems",
-    ]);
+    let mut table =
+        ruled(["robot", "state", "scan", "last reading", "agreement", "missing", "problems"]);
     for row in rows {
         let fit = row.health.and_then(|health| health.fit.as_ref());
         let or_dash = |text: Option<String>| text.unwrap_or_else(|| "-".into());

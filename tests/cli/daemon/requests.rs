@@ -40,7 +40,7 @@ fn scan_with_its_own_plan() {
         .expect("it runs");
     assert_eq!(taken.status.code(), Some(0), "{}", stderr(&taken));
     let told = stderr(&taken);
-    for part in ["takes 2 scan(s), ", "scan 2 of 2 started: 50 beams", "mock", "echoes agree"] {
+    for part in ["takes 2 scans, ", "scan 2 of 2 started: 50 beams", "mock", "echoes agree"] {
         assert!(told.contains(part), "{part}: {told}");
     }
     let log = Log::read(&out.join("scan.jsonl"));

@@ -135,5 +135,5 @@ fn interrupt_and_lock() {
     assert_eq!(done.status.code(), Some(0), "{}", stderr(&done));
     assert!(known(&done) >= 2, "{}", stderr(&done));
     let names: Vec<String> = files(&case.path("out")).into_keys().collect();
-    assert_eq!(names.len(), 7, "{names:?}");
+    assert_eq!(names.len(), 9, "{names:?}");
 }

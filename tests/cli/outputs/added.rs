@@ -10,11 +10,7 @@ fn append_needs_the_same_setup() {
     assert!(first.status.success() && !stderr(&first).contains("appending"), "{}", stderr(&first));
     let second = short_scan("fig9", out, &[]);
     assert!(second.status.success(), "{}", stderr(&second));
-    assert!(
-        stderr(&second).contains("contains 1 scan(s) of the same setup"),
-        "{}",
-        stderr(&second)
-    );
+    assert!(stderr(&second).contains("contains 1 scan of the same setup"), "{}", stderr(&second));
     let was = fs::read(out.join("scan.jsonl")).expect("written");
     for (pose, further, difference) in [
         ("fig7", &[][..], "pose"),
@@ -46,7 +42,7 @@ fn compare_of_several_poses() {
     fs::write(&both, of("fig7") + &of("fig9")).expect("writable");
     let both = both.to_str().expect("plain path");
     let text = String::from_utf8(run(&["compare", both]).stdout).expect("text");
-    assert!(text.contains("2 scan(s) at 2 poses, combined"), "{text}");
+    assert!(text.contains("2 scans at 2 poses, combined"), "{text}");
     let json =
         Log::parse(&String::from_utf8(run(&["compare", "--json", both]).stdout).expect("text"));
     assert_eq!((&json.records[0]["scans"], &json.records[0]["poses"]), (&2.into(), &2.into()));

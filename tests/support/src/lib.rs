@@ -125,9 +125,17 @@ pub struct MockProcess {
 impl MockProcess {
     /// Starts one at `fig9` behind a link in `folder`, and waits until the link is there.
     pub fn start(folder: &Path, further: &[&str]) -> Self {
+        Self::spawn(folder, &[&["--scene", "simple-room", "--pose", "fig9"][..], further].concat())
+    }
+
+    /// Starts one that replays a log.
+    pub fn replay(folder: &Path, log: &Path) -> Self {
+        Self::spawn(folder, &["--replay", log.to_str().expect("plain path")])
+    }
+
+    fn spawn(folder: &Path, further: &[&str]) -> Self {
         let link = folder.join("ranger");
-        let mut arguments = vec!["mock", "--scene", "simple-room", "--pose", "fig9", "--link"];
-        arguments.push(link.to_str().expect("plain path"));
+        let mut arguments = vec!["mock", "--link", link.to_str().expect("plain path")];
         arguments.extend(further);
         let child = sonard(&arguments).stdout(Stdio::piped()).spawn().expect("the program starts");
         wait_until("the mock's link", || link.exists());

@@ -133,7 +133,15 @@ pub fn board(
     seed: u64,
     pace: Pace,
 ) -> MockBoard {
-    let settings = BoardSettings { boot, clock: 0, steps_per_revolution: 400, faults, seed, pace };
+    let settings = BoardSettings {
+        boot,
+        clock: 0,
+        steps_per_revolution: 400,
+        faults,
+        seed,
+        pace,
+        is_replay: false,
+    };
     MockBoard::new(settings, World::new(soundings, TofNoise::NONE, 0.0, seed))
 }
 

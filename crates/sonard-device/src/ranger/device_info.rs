@@ -10,7 +10,9 @@ use sonard_records::{Device, Provenance};
 /// evidence.
 #[must_use]
 pub const fn provenance(identity: &Identity) -> Provenance {
-    if identity.capabilities.has(Capabilities::SIMULATED) {
+    if identity.capabilities.has(Capabilities::REPLAYED) {
+        Provenance::Replay
+    } else if identity.capabilities.has(Capabilities::SIMULATED) {
         Provenance::Mock
     } else if identity.capabilities.has(Capabilities::EMULATED) {
         Provenance::Emulator

@@ -2,7 +2,7 @@
 
 use std::io::{self, Write};
 
-use comfy_table::{CellAlignment, Table};
+use comfy_table::Table;
 use uuid::Uuid;
 
 use super::{
@@ -10,8 +10,11 @@ use super::{
     summary::{Item, Scan, Summary},
 };
 use crate::{
-    cli::compare::{RULED, describe_path},
-    scan::{Ping, PingStatus, Record, Session},
+    cli::{
+        compare::describe_path,
+        table::{align_right, fit, ruled},
+    },
+    scan::{Ping, PingStatus, Record, Session, text::format_count},
     store::Line,
 };
 
@@ -38,7 +41,8 @@ pub(super) fn print(
             Item::MoreDamaged { lines } => {
                 writeln!(
                     out,
-                    "damaged   {lines} more lines; `sonard log verify --all` lists them"
+                    "damaged   {}; `sonard log verify --all` lists them",
+                    format_count(*lines, "more line")
                 )?;
             }
             Item::Scan(_) => {}
@@ -76,8 +80,10 @@ pub(super) fn print_line(out: &mut impl Write, line: &Line, pings: bool) -> io::
 fn print_session(out: &mut impl Write, session: &Session) -> io::Result<()> {
     let Session { started, sonard, provenance, device, sensor, array, air, scene, model, .. } =
         session;
+    let build = session.build.as_ref().map(|build| format!(" ({})", build.commit));
+    let build = build.unwrap_or_default();
     let provenance = format!("{provenance:?}").to_lowercase();
-    writeln!(out, "session   {}  {provenance}, sonard {sonard}", seconds(*started))?;
+    writeln!(out, "session   {}  {provenance}, sonard {sonard}{build}", seconds(*started))?;
     if let Some(robot) = &session.robot {
         writeln!(out, "  robot   {robot}")?;
     }
@@ -121,7 +127,7 @@ fn print_scans(
     if scans.is_empty() {
         return Ok(());
     }
-    writeln!(out, "{}", scan_table(scans))?;
+    writeln!(out, "{}", fit(scan_table(scans)))?;
     let scans = scans.drain(..);
     let Some(pings) = pings else { return Ok(()) };
     for scan in scans {
@@ -135,8 +141,7 @@ fn print_scans(
 }
 
 fn scan_table(scans: &[&Scan]) -> Table {
-    let mut table = Table::new();
-    table.load_style(RULED).set_header([
+    let mut table = ruled([
         "scan",
         "started",
         "pose",
@@ -171,9 +176,7 @@ fn scan_table(scans: &[&Scan]) -> Table {
             took,
         ]);
     }
-    for column in table.column_iter_mut().skip(3) {
-        column.set_cell_alignment(CellAlignment::Right);
-    }
+    align_right(&mut table, 3..12);
     table
 }
 

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use crate::{
     cli::{Failure, Outcome, output},
     geometry::Pose,
-    scan::{ModelRecord, Record, ScanPlan, ScanStart, Session},
+    scan::{ModelRecord, Record, ScanPlan, ScanStart, Session, text::format_count},
     store::{StoreError, open_for_reading, read_log},
 };
 
@@ -67,9 +67,9 @@ impl ExistingLog {
             ));
         }
         if self.scans > 0 {
-            let scans = self.scans;
+            let scans = format_count(self.scans, "scan");
             notice!(
-                "{log} contains {scans} scan(s) of the same setup: appending; the pictures show \
+                "{log} contains {scans} of the same setup: appending; the pictures show \
              the last scan"
             );
         }

@@ -22,8 +22,10 @@ pub struct Detection {
     pub amplitude: Option<f64>,
     /// Peak level above the effective threshold, decibels.
     pub margin_db: Option<f64>,
-    /// Times at which ECHO rises, microseconds after firing.
+    /// Times at which ECHO rises, microseconds after firing; the first eight.
     pub echoes_us: SmallVec<[f64; MAX_ECHOES]>,
+    /// ECHO rises again after the last of these times.
+    pub has_more_echoes: bool,
 }
 
 impl Receiver {
@@ -52,6 +54,9 @@ impl Receiver {
             echoes_us.push(next_us + envelope.crest_after_us(next_us));
             last_us = next_us;
         }
+        let has_more_echoes = latch == Latch::Rearmed
+            && echoes_us.len() == MAX_ECHOES
+            && envelope.next_rise(last_us + self.rearm_us).is_some();
         Detection {
             status,
             range_m: Some(self.range_m(reported_us)),
@@ -59,6 +64,7 @@ impl Receiver {
             amplitude: Some(peak),
             margin_db: Some(margin_db),
             echoes_us,
+            has_more_echoes,
         }
     }
 
@@ -109,6 +115,7 @@ impl Receiver {
             let mean_us = first_us.iter().sum::<f64>() / first_us.len() as f64;
             quantized.range_m = Some(self.range_m(mean_us));
             quantized.echoes_us = SmallVec::from_slice(&[mean_us]);
+            quantized.has_more_echoes = false;
         }
         quantized
     }
@@ -159,6 +166,7 @@ impl Receiver {
                 (20.0 * (peak / threshold).log10()).min(0.0)
             }),
             echoes_us,
+            has_more_echoes: false,
         }
     }
 }
