@@ -3,14 +3,12 @@
 use glam::{DAffine3, DVec3};
 use roxmltree::Node;
 
-use super::{
-    super::super::{Failure, Outcome},
-    Body, World, child,
-};
+use super::{Added, Body, World, child};
+use crate::PlanError;
 
 impl World<'_> {
     /// Adds a collision shape, in its frame.
-    pub(super) fn geometry(&mut self, geometry: Node, body: Body, frame: &DAffine3) -> Outcome {
+    pub(super) fn geometry(&mut self, geometry: Node, body: Body, frame: &DAffine3) -> Added {
         let Body { name, scale } = body;
         for shape in geometry.children().filter(Node::is_element) {
             match shape.tag_name().name() {
@@ -42,7 +40,7 @@ impl World<'_> {
     }
 
     /// Ignores a horizontal plane as the ground, and notes others.
-    fn plane(&mut self, shape: Node, name: &str, frame: &DAffine3) -> Outcome {
+    fn plane(&mut self, shape: Node, name: &str, frame: &DAffine3) -> Added {
         let normal = match child(shape, "normal") {
             Some(normal) => DVec3::from(self.numbers(normal)?),
             None => DVec3::Z,
@@ -75,7 +73,7 @@ impl World<'_> {
     }
 
     /// Adds an outline extruded from the ground of its frame.
-    fn outline(&mut self, shape: Node, Body { name, scale }: Body, frame: &DAffine3) -> Outcome {
+    fn outline(&mut self, shape: Node, Body { name, scale }: Body, frame: &DAffine3) -> Added {
         let [height_m] = self.numbers_of(shape, "height")?;
         let height_m = scale.z * height_m;
         let points = shape.children().filter(|child| child.has_tag_name("point"));
@@ -83,7 +81,7 @@ impl World<'_> {
             let [x, y] = self.numbers(point)?;
             Ok(frame.transform_point3(scale * DVec3::new(x, y, 0.0)).truncate())
         });
-        let corners = corners.collect::<Result<Vec<_>, Failure>>()?;
+        let corners = corners.collect::<Result<Vec<_>, PlanError>>()?;
         if axis_up(frame) != Some(AXIS_Z) {
             self.ignore_tilted(name);
         } else {
@@ -101,9 +99,11 @@ impl World<'_> {
     }
 
     /// Returns `true` if the slice intersects a body with this centre height and half-height,
-    /// metres.
-    fn cuts(&self, middle_z_m: f64, half_m: f64) -> bool {
-        (self.args.cut_z_m - middle_z_m).abs() <= half_m
+    /// metres; otherwise counts the body.
+    fn cuts(&mut self, middle_z_m: f64, half_m: f64) -> bool {
+        let is_cut = (self.options.cut_z_m - middle_z_m).abs() <= half_m;
+        self.at_other_heights += usize::from(!is_cut);
+        is_cut
     }
 
     /// Parses the numbers of an element's child.
@@ -111,17 +111,16 @@ impl World<'_> {
         &self,
         element: Node,
         name: &str,
-    ) -> Result<[f64; N], Failure> {
+    ) -> Result<[f64; N], PlanError> {
         match child(element, name) {
             Some(child) => self.numbers(child),
             None => {
-                Err(self
-                    .file_failure(element, &format!("{} has no {name}", element.tag_name().name())))
+                Err(self.invalid(element, &format!("{} has no {name}", element.tag_name().name())))
             }
         }
     }
 
-    pub(super) fn numbers<const N: usize>(&self, element: Node) -> Result<[f64; N], Failure> {
+    pub(super) fn numbers<const N: usize>(&self, element: Node) -> Result<[f64; N], PlanError> {
         let text = element.text().unwrap_or_default().trim();
         let numbers: Option<Vec<f64>> = text
             .split_whitespace()
@@ -129,7 +128,7 @@ impl World<'_> {
             .collect();
         numbers.and_then(|numbers| numbers.try_into().ok()).ok_or_else(|| {
             let name = element.tag_name().name();
-            self.file_failure(element, &format!("{name} is `{text}`: {N} numbers are expected"))
+            self.invalid(element, &format!("{name} is `{text}`: {N} numbers are expected"))
         })
     }
 }

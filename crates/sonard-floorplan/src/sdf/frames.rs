@@ -3,7 +3,8 @@
 use glam::{DAffine3, DMat3, DQuat, DVec3};
 use roxmltree::Node;
 
-use super::{super::super::Failure, World, child};
+use super::{World, child};
+use crate::PlanError;
 
 /// World, model or link whose members are placed in its frame.
 pub(super) struct Scope<'s, 'n> {
@@ -35,14 +36,18 @@ impl World<'_> {
         element: Node<'n, 'n>,
         scope: &Scope<'_, 'n>,
         depth: usize,
-    ) -> Result<Found, Failure> {
+    ) -> Result<Found, PlanError> {
         let pose = child(element, "pose");
         let attribute = |name: &str| {
             let pose = pose.and_then(|pose| pose.attribute(name));
             pose.filter(|frame| !frame.is_empty())
         };
         let attached = element.attribute("attached_to").filter(|frame| !frame.is_empty());
-        let relative_to = attribute("relative_to").or_else(|| attribute("frame")).or(attached);
+        // The frame of a joint is that of its child link.
+        let joined = child(element, "child").filter(|_| element.has_tag_name("joint"));
+        let joined = joined.and_then(|link| link.text()).map(str::trim);
+        let relative_to =
+            attribute("relative_to").or_else(|| attribute("frame")).or(attached).or(joined);
         let base = match relative_to {
             Some(name) => match self.named(name, scope, depth)? {
                 Ok(base) => base,
@@ -63,7 +68,12 @@ impl World<'_> {
     }
 
     /// Finds a frame by name, in a scope or the enclosing ones.
-    fn named<'n>(&self, name: &str, scope: &Scope<'_, 'n>, depth: usize) -> Result<Found, Failure> {
+    fn named<'n>(
+        &self,
+        name: &str,
+        scope: &Scope<'_, 'n>,
+        depth: usize,
+    ) -> Result<Found, PlanError> {
         let missing = || Ok(Err(name.to_owned()));
         if depth > MAX_DEPTH {
             return missing();
@@ -83,7 +93,10 @@ impl World<'_> {
         while let Some(scope) = around {
             let is_named = |node: &Node| {
                 node.attribute("name") == Some(first)
-                    && matches!(node.tag_name().name(), "link" | "model" | "frame" | "include")
+                    && matches!(
+                        node.tag_name().name(),
+                        "link" | "model" | "frame" | "include" | "joint"
+                    )
             };
             if let Some(element) = scope.element.children().find(is_named) {
                 let frame = self.frame(element, scope, depth + 1)?;
@@ -106,7 +119,7 @@ impl World<'_> {
     }
 
     /// Parses a pose: x y z, and roll pitch yaw or a quaternion.
-    pub(super) fn pose(&self, pose: Node) -> Result<DAffine3, Failure> {
+    pub(super) fn pose(&self, pose: Node) -> Result<DAffine3, PlanError> {
         if pose.text().unwrap_or_default().trim().is_empty() {
             return Ok(DAffine3::IDENTITY);
         }
@@ -114,7 +127,7 @@ impl World<'_> {
             let [x, y, z, qx, qy, qz, qw] = self.numbers(pose)?;
             let turn = DQuat::from_xyzw(qx, qy, qz, qw);
             if !turn.is_finite() || turn.length() < 1e-6 {
-                return Err(self.file_failure(pose, "the quaternion of the pose has no length"));
+                return Err(self.invalid(pose, "the quaternion of the pose has no length"));
             }
             return Ok(DAffine3::from_rotation_translation(turn.normalize(), DVec3::new(x, y, z)));
         }

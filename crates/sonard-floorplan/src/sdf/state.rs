@@ -4,7 +4,8 @@
 use glam::{DAffine3, DVec3};
 use roxmltree::Node;
 
-use super::{super::super::Failure, World, child};
+use super::{World, child};
+use crate::PlanError;
 
 /// State elements of a world or model; the last one takes precedence.
 #[derive(Debug, Clone, Default)]
@@ -39,12 +40,12 @@ impl<'s, 'n> State<'s, 'n> {
     }
 
     /// Returns the pose of the model in the world, if the state has one.
-    pub(super) fn pose(&self, world: &World) -> Result<Option<DAffine3>, Failure> {
+    pub(super) fn pose(&self, world: &World) -> Result<Option<DAffine3>, PlanError> {
         let pose = self.elements.iter().rev().find_map(|element| child(*element, "pose"));
         pose.map(|pose| world.pose(pose)).transpose()
     }
 
-    pub(super) fn scale(&self, world: &World) -> Result<DVec3, Failure> {
+    pub(super) fn scale(&self, world: &World) -> Result<DVec3, PlanError> {
         let scale = self.elements.iter().rev().find_map(|element| child(*element, "scale"));
         Ok(match scale {
             Some(scale) => DVec3::from(world.numbers(scale)?),
@@ -53,7 +54,7 @@ impl<'s, 'n> State<'s, 'n> {
     }
 
     /// Returns the pose in the world of a link of the model, if the state has one.
-    pub(super) fn of_link(&self, name: &str, world: &World) -> Result<Option<DAffine3>, Failure> {
+    pub(super) fn of_link(&self, name: &str, world: &World) -> Result<Option<DAffine3>, PlanError> {
         let links = self.elements.iter().rev().flat_map(|element| element.children());
         let mut links =
             links.filter(|node| node.has_tag_name("link") && node.attribute("name") == Some(name));

@@ -8,8 +8,13 @@ use dxf::{
 };
 use glam::DAffine2;
 
-use super::{super::made::arc, layers::Layers};
-use crate::{geometry::DVec2, scene::Surfaces};
+use sonard_model::{geometry::DVec2, scene::Surfaces};
+
+use super::{
+    layers::Layers,
+    reduce::{IgnoredEntity, Reduced},
+};
+use crate::curve::arc;
 
 /// Surface before it is moved to the origin, metres.
 enum Shape {
@@ -21,6 +26,7 @@ enum Shape {
 pub(super) struct Plan<'a> {
     drawing: &'a Drawing,
     layers: &'a Layers,
+    reduced: &'a Reduced,
     /// Transformation from units of the drawing or block to metres.
     frame: DAffine2,
     /// Layer of the current block, which its entities on layer 0 inherit.
@@ -40,10 +46,16 @@ const MAX_ENTITIES: usize = 1 << 20;
 const FAR_M: f64 = 1000.0;
 
 impl<'a> Plan<'a> {
-    pub(super) fn new(drawing: &'a Drawing, layers: &'a Layers, unit_m: f64) -> Self {
+    pub(super) fn new(
+        drawing: &'a Drawing,
+        reduced: &'a Reduced,
+        layers: &'a Layers,
+        unit_m: f64,
+    ) -> Self {
         Self {
             drawing,
             layers,
+            reduced,
             frame: DAffine2::from_scale(DVec2::splat(unit_m)),
             block_layer: None,
             depth: 0,
@@ -59,6 +71,22 @@ impl<'a> Plan<'a> {
         let drawing = self.drawing;
         for entity in drawing.entities() {
             self.add(entity);
+        }
+        self.ignore_entities("");
+    }
+
+    /// Counts the entities of a block that are not converted.
+    fn ignore_entities(&mut self, block: &str) {
+        let reduced = self.reduced;
+        for IgnoredEntity { kind: name, layer } in reduced.ignored.get(block).into_iter().flatten()
+        {
+            let layer = self.block_layer.clone().filter(|_| layer == "0").unwrap_or(layer.clone());
+            if self.layers.has(&layer) && name != "VIEWPORT" {
+                match kind(name) {
+                    Some(what) => self.ignore(what),
+                    None => self.ignore(&format!("other entities ({name})")),
+                }
+            }
         }
     }
 
@@ -98,7 +126,8 @@ impl<'a> Plan<'a> {
         if shift != DVec2::ZERO {
             notes.push(format!(
                 "plan moved to the origin, by {} m in x and {} m in y",
-                -shift.x, -shift.y
+                0.0 - shift.x,
+                0.0 - shift.y
             ));
         }
         let mut found = Surfaces::default();
@@ -166,8 +195,7 @@ impl<'a> Plan<'a> {
                 } = trace;
                 self.filled(layer, [a, b, d, c], &trace.extrusion_direction);
             }
-            EntityType::Seqend(_) | EntityType::Vertex(_) => {}
-            other => self.ignore(kind(other)),
+            _ => {}
         }
     }
 
@@ -209,6 +237,7 @@ impl<'a> Plan<'a> {
             for entity in &block.entities {
                 self.add(entity);
             }
+            self.ignore_entities(&block.name.to_uppercase());
         }
         self.depth -= 1;
         (self.frame, self.block_layer) = outer;
@@ -322,42 +351,32 @@ impl<'a> Plan<'a> {
     }
 }
 
-/// Description of an ignored entity.
-const fn kind(entity: &EntityType) -> &'static str {
-    match entity {
-        EntityType::Spline(_) | EntityType::Ellipse(_) | EntityType::Helix(_) => {
-            "splines and ellipses"
+/// Returns the description of an entity that is not converted.
+fn kind(name: &str) -> Option<&'static str> {
+    Some(match name {
+        "SPLINE" | "ELLIPSE" | "HELIX" => "splines and ellipses",
+        "MLINE" => "multiple lines (MLINE)",
+        "HATCH" | "MPOLYGON" => "hatches (HATCH, MPOLYGON)",
+        "3DFACE" | "3DSOLID" | "BODY" | "REGION" | "SURFACE" => {
+            "faces, regions and solids (3DFACE, REGION, 3DSOLID)"
         }
-        EntityType::MLine(_) => "multiple lines (MLINE)",
-        EntityType::Face3D(_)
-        | EntityType::Solid3D(_)
-        | EntityType::Body(_)
-        | EntityType::Region(_) => "faces, regions and solids (3DFACE, REGION, 3DSOLID)",
-        EntityType::Text(_)
-        | EntityType::MText(_)
-        | EntityType::RText(_)
-        | EntityType::ArcAlignedText(_)
-        | EntityType::Attribute(_)
-        | EntityType::AttributeDefinition(_) => "texts",
-        EntityType::RotatedDimension(_)
-        | EntityType::RadialDimension(_)
-        | EntityType::DiameterDimension(_)
-        | EntityType::AngularThreePointDimension(_)
-        | EntityType::OrdinateDimension(_)
-        | EntityType::Leader(_)
-        | EntityType::Tolerance(_) => "dimensions and leaders",
-        EntityType::Image(_)
-        | EntityType::OleFrame(_)
-        | EntityType::Ole2Frame(_)
-        | EntityType::Wipeout(_)
-        | EntityType::DgnUnderlay(_)
-        | EntityType::DwfUnderlay(_)
-        | EntityType::PdfUnderlay(_) => "images and underlays",
-        EntityType::Ray(_) | EntityType::XLine(_) => "infinite lines (RAY, XLINE)",
-        EntityType::ModelPoint(_) => "points",
-        EntityType::Shape(_) => "shapes of fonts (SHAPE)",
-        _ => "other entities",
-    }
+        "MESH" => "meshes (MESH)",
+        "TEXT" | "MTEXT" | "RTEXT" | "ARCALIGNEDTEXT" | "ATTDEF" => "texts",
+        "DIMENSION"
+        | "ARC_DIMENSION"
+        | "LARGE_RADIAL_DIMENSION"
+        | "LEADER"
+        | "MULTILEADER"
+        | "MLEADER"
+        | "TOLERANCE" => "dimensions and leaders",
+        "IMAGE" | "OLEFRAME" | "OLE2FRAME" | "WIPEOUT" | "DGNUNDERLAY" | "DWFUNDERLAY"
+        | "PDFUNDERLAY" => "images and underlays",
+        "RAY" | "XLINE" => "infinite lines (RAY, XLINE)",
+        "POINT" => "points",
+        "SHAPE" => "shapes of fonts (SHAPE)",
+        "ACAD_TABLE" => "tables (ACAD_TABLE)",
+        _ => return None,
+    })
 }
 
 /// Bulge below which a segment is straight: an angle of a thousandth of a degree.
