@@ -17,6 +17,7 @@
 #   AXE=0                without axe-core (npm)
 #   SCHEMATHESIS=0       without the API fuzzer (PyPI)
 #   EXPORT_PEERS=0       without other programs that read exports (PyPI)
+#   IMPORT_PEERS=0       without tools of the formats that are imported (PyPI)
 #   FOXGLOVE_PEER=0      without Foxglove's client library (npm, node)
 #   ROS_PEER=0           without Cyclone DDS (PyPI, a network namespace)
 #   MQTT_PEER=0          without mosquitto (Debian packages)
@@ -264,6 +265,8 @@ check_peer() {
 check_peers() {
   check_peer EXPORT_PEERS exports.sh "exports as other programs read them" \
     "an export does not say what its log does, or the readers can't be had"
+  check_peer IMPORT_PEERS imports.sh "imports of what other programs write" \
+    "an import or a scene differs from its file, or the formats' tools can't be had"
   check_peer FOXGLOVE_PEER foxglove.sh "live messages as Foxglove's library reads them" \
     "viewers are not told what the log says, or the library can't be had"
   check_peer ROS_PEER ros.sh "messages as ROS 2 gets them" \

@@ -16,7 +16,7 @@ coverage="--cfg fuzzing -Cpasses=sancov-module -Cllvm-args=-sanitizer-coverage-l
 RUSTFLAGS=$(echo $coverage) nice -n 10 cargo build --release --target "$triple"
 binaries=${CARGO_TARGET_DIR:-target}/$triple/release
 for target in $targets; do
-  mkdir -p "corpus/$target" "artifacts/$target"
-  "$binaries/$target" "corpus/$target" -max_total_time="$seconds" -max_len=4096 -timeout=10 \
+  mkdir -p "corpus/$target" "artifacts/$target" "seeds/$target"
+  "$binaries/$target" "corpus/$target" "seeds/$target" -max_total_time="$seconds" -max_len=4096 -timeout=10 \
     -artifact_prefix="artifacts/$target/" -print_final_stats=1
 done

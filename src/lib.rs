@@ -40,6 +40,8 @@
 #![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 
 pub use sonard_export as export;
+#[cfg(feature = "floorplan")]
+pub use sonard_floorplan as floorplan;
 #[cfg(feature = "store")]
 pub use sonard_generate as generate;
 pub use sonard_import as import;

@@ -17,9 +17,9 @@ const MAX_COLUMNS: usize = 100;
 pub(super) fn columns() -> usize {
     // The order in which clap looks for a terminal.
     let streams = [
-        terminal::columns_of(io::stdout()),
-        terminal::columns_of(io::stderr()),
-        terminal::columns_of(io::stdin()),
+        terminal::parse_columns(io::stdout()),
+        terminal::parse_columns(io::stderr()),
+        terminal::parse_columns(io::stdin()),
     ];
     let terminal = streams.into_iter().flatten().next().map(usize::from);
     let variable = || env::var("COLUMNS").ok()?.parse().ok();

@@ -162,24 +162,21 @@ impl ColumnCandidates {
         offers
     }
 
-    /// Returns the columns of unknown meaning that may be the direction or the range: a time whose
-    /// unit is also one of times of flight, or else any unused column, in the usual units.
-    fn unnamed_offers(&self, needs_direction: bool, needs_range: bool) -> [Vec<(Field, &str)>; 2] {
+    /// Returns the columns of unknown meaning that may be the range: a time whose unit is also one of
+    /// times of flight, or else any unused column, in the usual units.
+    fn unnamed_ranges(&self) -> Vec<(Field, &str)> {
         let times = self.found.iter().filter(|(field, _)| field.quantity() == FieldQuantity::Time);
         let times = times.filter_map(|(field, name)| {
-            let unit = field.unit().filter(|_| needs_range)?;
-            Field::with_unit(FieldQuantity::Tof, Some(unit)).map(|field| (field, name.as_str()))
+            Field::with_unit(FieldQuantity::Tof, Some(field.unit()?)).map(|field| (field, name.as_str()))
         });
         let unused = self.unused.iter().filter(|name| !column_names::is_no_reading(name));
-        let unused: Vec<&str> = unused.map(String::as_str).collect();
-        let each = |quantities: &[FieldQuantity], needed: bool| -> Vec<(Field, &str)> {
+        let unused = unused.flat_map(|name| {
+            let quantities = [FieldQuantity::Range, FieldQuantity::Tof];
             let fields =
-                quantities.iter().flat_map(|quantity| Field::of_quantity(*quantity).take(3));
-            let fields: Vec<Field> = fields.filter(|_| needed).collect();
-            unused.iter().flat_map(|name| fields.iter().map(|field| (*field, *name))).collect()
-        };
-        let ranges = times.chain(each(&[FieldQuantity::Range, FieldQuantity::Tof], needs_range));
-        [each(&[FieldQuantity::Azimuth], needs_direction && unused.len() == 1), ranges.collect()]
+                quantities.into_iter().flat_map(|quantity| Field::of_quantity(quantity).take(3));
+            fields.map(|field| (field, name.as_str()))
+        });
+        times.chain(unused).collect()
     }
 
     /// Checks that a direction and a range are mapped; the error offers complete options with the
@@ -200,7 +197,6 @@ impl ColumnCandidates {
             (true, false) => "no column is mapped to azimuth or bearing",
             _ => "no column is mapped to range or time of flight",
         };
-        let unnamed = self.unnamed_offers(needs_direction, needs_range);
         let without_unit = self.without_unit.iter().find(|(quantity, _)| match quantity {
             FieldQuantity::Azimuth | FieldQuantity::Bearing => needs_direction,
             FieldQuantity::Range | FieldQuantity::Tof => needs_range,
@@ -210,12 +206,7 @@ impl ColumnCandidates {
             Some((_, name)) => format!("the unit of column `{name}` is unknown"),
             None => format!("{lacks}; the columns are `{}`", names.join("`, `")),
         };
-        let [directions, ranges] = match unnamed {
-            [more_directions, more_ranges] => [
-                if directions.is_empty() { more_directions } else { directions },
-                if ranges.is_empty() { more_ranges } else { ranges },
-            ],
-        };
+        let ranges = if ranges.is_empty() { self.unnamed_ranges() } else { ranges };
         // Every combination of a direction and a range, if both are missing.
         let directions = if needs_direction { directions } else { Vec::new() };
         let ranges = if needs_range { ranges } else { Vec::new() };

@@ -278,7 +278,10 @@ fn labels(first: &[String], second: &[String]) -> Option<Vec<String>> {
 fn labelled(cell: &str) -> Option<(String, &str)> {
     let at = cell.find([':', '='])?;
     let (name, value) = (cell[..at].trim(), cell[at + 1..].trim());
+    // A word in place of a number is no unit.
+    let has_number = value.contains(|c: char| c.is_ascii_digit());
     let unit = value.trim_start_matches(|c: char| !c.is_alphabetic());
+    let unit = if has_number { unit } else { "" };
     let is_name = name.starts_with(char::is_alphabetic);
     let label = match unit.is_empty() {
         true => format!("{name}:"),

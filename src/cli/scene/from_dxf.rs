@@ -1,18 +1,12 @@
 //! `sonard scene from-dxf`.
 
-mod layers;
-mod plan;
-
-use std::{panic, path::PathBuf};
-
-use dxf::{Drawing, enums::Units};
+use std::path::PathBuf;
 
 use super::{
-    super::{Failure, Outcome, numbers::positive},
-    made::{MadeArgs, file_failure, read},
+    super::{Outcome, numbers::positive},
+    made::{MadeArgs, plan_failure, read},
 };
-use layers::Layers;
-use plan::Plan;
+use crate::floorplan::dxf::{self, DxfOptions};
 
 /// Options of `sonard scene from-dxf`.
 #[derive(Debug, clap::Args)]
@@ -48,95 +42,11 @@ Examples:
   sonard scene from-dxf plan.dxf --layer A-WALL,A-COLS --unit-m 0.001 -o plan.json
   sonard scene draw plan.json -o check.svg";
 
-/// Plausible sizes of a plan, metres.
-const SIZES_M: std::ops::RangeInclusive<f64> = 0.5..=2000.0;
-
 pub(super) fn run(args: &FromDxfArgs) -> Outcome {
-    let help = "give a DXF file, ASCII or binary, from a CAD program";
-    let bytes = read(&args.drawing, help)?;
-    let drawing = load(&bytes)
-        .map_err(|error| file_failure(&args.drawing, &format!("invalid DXF: {error}"), help))?;
-    let stated_m = metres(drawing.header.default_drawing_units);
-    let unit_m = args.unit_m.or(stated_m).ok_or_else(|| {
-        let help = "give the length of a unit: --unit-m 0.001 for millimetres";
-        file_failure(&args.drawing, &"the drawing has no units ($INSUNITS)", help)
-    })?;
-    let layers = Layers::select(&drawing, &bytes, &args.layer)
-        .map_err(|(what, help)| file_failure(&args.drawing, &what, &help))?;
-    let mut plan = Plan::new(&drawing, &layers, unit_m);
-    plan.add_all();
-    let size_m = plan.size_m();
-    if args.unit_m.is_none() && size_m.is_some_and(|size_m| !SIZES_M.contains(&size_m)) {
-        return Err(implausible(args, &drawing, unit_m, size_m.unwrap_or_default()));
-    }
+    let bytes = read(&args.drawing, "give a DXF file, ASCII or binary, from a CAD program")?;
+    let options = DxfOptions { unit_m: args.unit_m, layers: args.layer.clone() };
+    let plan = dxf::read(&bytes, &options).map_err(|error| plan_failure(&args.drawing, &error))?;
     let help =
         "draw walls as lines or polylines, on layers that are switched on or named with --layer";
-    let (found, mut notes) = plan.finish();
-    notes.extend(layers.notes(&args.layer));
-    args.made.write(&args.drawing, &found, &notes, help)
-}
-
-/// Failure for a plan of implausible size.
-fn implausible(args: &FromDxfArgs, drawing: &Drawing, unit_m: f64, size_m: f64) -> Failure {
-    let units = drawing.header.default_drawing_units;
-    let what = format!(
-        "by its units ($INSUNITS: {units:?}) the plan is {size_m:.3} m across, which is implausible: check the unit"
-    );
-    let fits = |unit: &&f64| (2.0..=200.0).contains(&(size_m / unit_m * **unit));
-    let options = [1.0, 0.01, 0.001, 0.0254, 0.3048];
-    let options: Vec<String> =
-        options.iter().filter(fits).map(|unit| format!("--unit-m {unit}")).collect();
-    let help = match options.is_empty() {
-        true => format!("give the length of a unit: --unit-m {unit_m} accepts this size"),
-        false => format!(
-            "give the length of a unit: {}; --unit-m {unit_m} accepts this size",
-            options.join(" or ")
-        ),
-    };
-    file_failure(&args.drawing, &what, &help)
-}
-
-/// Parses a drawing, despite panics of the parser at dates out of range.
-fn load(bytes: &[u8]) -> Result<Drawing, String> {
-    let hook = panic::take_hook();
-    panic::set_hook(Box::new(|_| {}));
-    let loaded = panic::catch_unwind(|| Drawing::load(&mut &bytes[..]));
-    panic::set_hook(hook);
-    match loaded {
-        Ok(loaded) => loaded.map_err(|error| error.to_string()),
-        Err(_) => Err("a value is out of range".to_owned()),
-    }
-}
-
-/// Length of a drawing unit, metres.
-const fn metres(units: Units) -> Option<f64> {
-    const INCH: f64 = 0.0254;
-    const SURVEY_FOOT: f64 = 1200.0 / 3937.0;
-    Some(match units {
-        Units::Unitless => return None,
-        Units::Inches => INCH,
-        Units::Feet => 12.0 * INCH,
-        Units::Miles => 63_360.0 * INCH,
-        Units::Millimeters => 1e-3,
-        Units::Centimeters => 1e-2,
-        Units::Meters => 1.0,
-        Units::Kilometers => 1e3,
-        Units::Microinches => 1e-6 * INCH,
-        Units::Mils => 1e-3 * INCH,
-        Units::Yards => 36.0 * INCH,
-        Units::Angstroms => 1e-10,
-        Units::Nanometers => 1e-9,
-        Units::Microns => 1e-6,
-        Units::Decimeters => 0.1,
-        Units::Decameters => 10.0,
-        Units::Hectometers => 100.0,
-        Units::Gigameters => 1e9,
-        Units::AstronomicalUnits => 149_597_870_700.0,
-        Units::LightYears => 9_460_730_472_580_800.0,
-        Units::Parsecs => 3.085_677_581_491_367e16,
-        Units::USSurveyFeet => SURVEY_FOOT,
-        Units::USSurveyInch => SURVEY_FOOT / 12.0,
-        Units::USSurveyYard => 3.0 * SURVEY_FOOT,
-        Units::USSurveyMile => 5280.0 * SURVEY_FOOT,
-    })
+    args.made.write_plan(&args.drawing, &plan, help)
 }

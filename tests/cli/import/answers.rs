@@ -1,6 +1,6 @@
 //! Questions of `sonard import`: each option that a message offers exists, and following it gives right readings.
 
-use std::fs;
+use std::{fs, path::PathBuf};
 
 use super::{done, refused};
 use crate::common::Log;
@@ -201,4 +201,37 @@ fn dry_run_writes_no_log() {
     refused(&["import", &path("a.csv"), "--dry-run", "-o", &path("a.jsonl")]);
     done(&["import", &path("a.csv"), "-o", &path("a.jsonl"), "--picture", &path("a.png")]);
     assert!(fs::read(path("a.png")).expect("drawn").starts_with(b"\x89PNG"));
+}
+
+/// Options of other programs and verbs that messages recommend.
+const OF_OTHERS: [&str; 5] = ["--src", "--dst", "--dst-storage", "--full-length", "--width-m"];
+
+/// Every option that a message of the importer names is one of the command.
+#[test]
+fn named_options_exist() {
+    let help = done(&["import", "--help"]);
+    let mut folders = vec![PathBuf::from("crates/sonard-import/src")];
+    let mut count = 0;
+    while let Some(folder) = folders.pop() {
+        for entry in fs::read_dir(&folder).expect("sources") {
+            let path = entry.expect("an entry").path();
+            if path.is_dir() {
+                folders.push(path);
+                continue;
+            }
+            let text = fs::read_to_string(&path).expect("text");
+            let code = text.lines().filter(|line| !line.trim_start().starts_with("//"));
+            for word in code.flat_map(|line| line.split("--").skip(1)) {
+                let end = word.find(|c: char| !c.is_ascii_lowercase() && c != '-' && c != '_');
+                let option =
+                    format!("--{}", word[..end.unwrap_or(word.len())].trim_end_matches('-'));
+                if option.len() < 4 || OF_OTHERS.contains(&option.as_str()) {
+                    continue;
+                }
+                count += 1;
+                assert!(help.contains(&option), "{}: {option}", path.display());
+            }
+        }
+    }
+    assert!(count > 50, "{count}");
 }

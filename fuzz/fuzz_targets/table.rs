@@ -1,0 +1,7 @@
+//! Fuzz target `table`; its body is in `bodies.rs`.
+#![no_main]
+
+#[path = "../bodies.rs"]
+mod bodies;
+
+libfuzzer_sys::fuzz_target!(|bytes: &[u8]| bodies::run("table", bytes));
