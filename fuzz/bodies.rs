@@ -17,7 +17,7 @@ use sonard::{
         svg::{self, SvgOptions},
     },
     geometry::Pose,
-    import::{Format, Mapping, Source, Assumptions, read_message},
+    import::{Assumptions, Format, ImportSource, Mapping, read_message},
     interpret::grid::{MapYaml, from_pgm},
     scan::Record,
 };

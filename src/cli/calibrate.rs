@@ -26,8 +26,8 @@ use super::{
 };
 use crate::{
     inverse::{
-        FitOptions, FitError, FitResult, SearchResult, ParameterGroup, FitProgress, Search, FitSweep, ParameterReport, FitObserver, World,
-        fit_observed,
+        FitError, FitObserver, FitOptions, FitProgress, FitResult, FitSweep, ParameterGroup,
+        ParameterReport, Search, SearchResult, World, fit_observed,
     },
     scan::{Provenance, text::format_count},
 };
@@ -144,7 +144,7 @@ pub(super) fn run(args: &Args) -> Outcome {
 
 /// Sweeps with the sensor, air and scene that they share.
 struct Input {
-    sweeps: Vec<Sweep>,
+    sweeps: Vec<FitSweep>,
     world: Arc<World>,
     sources: Vec<Provenance>,
 }

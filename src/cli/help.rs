@@ -17,9 +17,9 @@ const MAX_COLUMNS: usize = 100;
 pub(super) fn columns() -> usize {
     // The order in which clap looks for a terminal.
     let streams = [
-        terminal::parse_columns(io::stdout()),
-        terminal::parse_columns(io::stderr()),
-        terminal::parse_columns(io::stdin()),
+        terminal::column_count(io::stdout()),
+        terminal::column_count(io::stderr()),
+        terminal::column_count(io::stdin()),
     ];
     let terminal = streams.into_iter().flatten().next().map(usize::from);
     let variable = || env::var("COLUMNS").ok()?.parse().ok();

@@ -172,9 +172,9 @@ fn print(
     diagnoses: &[Misfit],
 ) -> io::Result<()> {
     writeln!(out, "{log}: scan {scan}")?;
-    let besides = modes.first().map_or(&[][..], |mode| &mode.besides);
+    let nuisance = modes.first().map_or(&[][..], |mode| &mode.nuisance);
     let head = ["probability", "x m", "y m", "heading deg", "explained"].map(str::to_owned);
-    let mut table = ruled(head.into_iter().chain(besides.iter().map(|of| of.name.clone())));
+    let mut table = ruled(head.into_iter().chain(nuisance.iter().map(|of| of.name.clone())));
     for mode in modes {
         let pose = [
             format!("{:.3}", mode.probability),
@@ -188,5 +188,5 @@ fn print(
     }
     align_right(&mut table, 0..usize::MAX);
     writeln!(out, "{}", fit(table))?;
-    doubts.iter().try_for_each(|diagnosis| writeln!(out, "warning: {diagnosis}"))
+    diagnoses.iter().try_for_each(|diagnosis| writeln!(out, "warning: {diagnosis}"))
 }

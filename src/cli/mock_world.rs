@@ -15,7 +15,7 @@ use super::{
 use crate::{
     acoustics::{Air, Sensor, TofNoise},
     geometry::Pose,
-    mock::{BoardSettings, FAULT_HELP, FaultPlan, MockBoard, Pace, Replay, EchoTable, World},
+    mock::{BoardSettings, EchoTable, FAULT_HELP, FaultPlan, MockBoard, Pace, Replay, World},
     model::{Options, Simulator},
     scene::Scene,
 };

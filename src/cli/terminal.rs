@@ -26,11 +26,11 @@ pub(super) fn print_line(line: &str) {
 
 /// Width of the terminal on standard output, columns; `None` without one.
 pub(super) fn stdout_columns() -> Option<u16> {
-    parse_columns(io::stdout())
+    column_count(io::stdout())
 }
 
 /// Width of a terminal, columns; `None` for other files, and for terminals of unknown width.
-pub(super) fn parse_columns(stream: impl AsFd) -> Option<u16> {
+pub(super) fn column_count(stream: impl AsFd) -> Option<u16> {
     let size = rustix::termios::tcgetwinsize(stream).ok()?;
     Some(size.ws_col).filter(|columns| *columns > 0)
 }

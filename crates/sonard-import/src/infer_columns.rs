@@ -167,7 +167,8 @@ impl ColumnCandidates {
     fn unnamed_ranges(&self) -> Vec<(Field, &str)> {
         let times = self.found.iter().filter(|(field, _)| field.quantity() == FieldQuantity::Time);
         let times = times.filter_map(|(field, name)| {
-            Field::with_unit(FieldQuantity::Tof, Some(field.unit()?)).map(|field| (field, name.as_str()))
+            Field::with_unit(FieldQuantity::Tof, Some(field.unit()?))
+                .map(|field| (field, name.as_str()))
         });
         let unused = self.unused.iter().filter(|name| !column_names::is_no_reading(name));
         let unused = unused.flat_map(|name| {

@@ -100,7 +100,7 @@ impl Replay {
         let (steps_per_revolution, max_deviation_deg) = fitting
             .clone()
             .find(|(_, deviation_deg)| *deviation_deg <= ON_STEP_DEG)
-            .or_else(|| fitting.last())
+            .or_else(|| fitting.clone().next_back())
             .unwrap_or((FINEST_MOTOR, 0.0));
         let mut all = Vec::new();
         for (number, scan) in (1..).zip(scans).filter(|(_, scan)| !scan.pings.is_empty()) {
@@ -185,7 +185,7 @@ fn max_deviation_deg(azimuths_deg: impl Iterator<Item = f64>, steps: u16) -> f64
 }
 
 fn readings(number: usize, scan: &ScanView, steps: u16) -> Result<ScanReadings, ReplayError> {
-    if scan.is_of_array() {
+    if scan.is_array_scan() {
         return Err(ReplayError::OfArray(number));
     }
     let session = scan.session.as_deref().ok_or(ReplayError::NoSession(number))?;
@@ -215,7 +215,7 @@ fn reading(ping: &Ping, tick_hz: u32, sound_speed_m_s: f64, blanking_us: f64) ->
         PingStatus::NoEcho => {
             return ReplayedReading { status: ReadingStatus::NoEcho, echo_ticks: SmallVec::new() };
         }
-        PingStatus::StepDoubtful => ReadingStatus::StepDoubtful,
+        PingStatus::StepUncertain => ReadingStatus::StepUncertain,
         PingStatus::LinkLost | PingStatus::ModuleFault => return ReplayedReading::missing(),
     };
     let logged = ping.echo_ticks.iter();

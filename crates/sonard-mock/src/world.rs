@@ -76,7 +76,7 @@ impl EchoTable {
 /// Source of a world's echoes.
 #[derive(Debug)]
 enum EchoSource {
-    Model(Soundings),
+    Model(EchoTable),
     Log(Replay),
 }
 

@@ -1,9 +1,9 @@
 //! Residuals before and after a change of the model, such as a calibration.
 
 use super::{
-    canvas::{Layer, Px, Rect, Shape},
+    canvas::{Layer, MarkShape, Px, Rect},
     caption,
-    legend::{self, Entry, Sample},
+    legend::{self, LegendEntry, LegendSample},
     picture::Picture,
     scan_strips,
     strip::{AzimuthAxis, AzimuthStrip, Scale},
@@ -92,9 +92,9 @@ fn describe(readings: &[ComparedReading]) -> String {
 }
 
 /// Style of agreeing and of other readings.
-const STYLES: [(bool, Shape, &str, &str); 2] = [
-    (true, Shape::Dot, theme::BLUE, "agrees with the model"),
-    (false, Shape::Cross, theme::INK, "disagrees with the model"),
+const STYLES: [(bool, MarkShape, &str, &str); 2] = [
+    (true, MarkShape::Dot, theme::BLUE, "agrees with the model"),
+    (false, MarkShape::Cross, theme::INK, "disagrees with the model"),
 ];
 
 fn marks(strip: &AzimuthStrip, readings: &[ComparedReading]) -> Layer {
@@ -112,19 +112,21 @@ fn marks(strip: &AzimuthStrip, readings: &[ComparedReading]) -> Layer {
     layer
 }
 
-fn entries(readings: [&[ComparedReading]; 2], scale: Scale) -> Vec<Entry> {
+fn entries(readings: [&[ComparedReading]; 2], scale: Scale) -> Vec<LegendEntry> {
     let drawn = |agreeing: bool| {
         let all = readings.iter().copied().flatten();
         all.filter(|reading| reading.residual_m().is_some())
             .any(|reading| reading.agrees() == agreeing)
     };
     let kinds = STYLES.iter().filter(|(agreeing, ..)| drawn(*agreeing));
-    let mut entries: Vec<Entry> = kinds
-        .map(|&(_, shape, colour, name)| Entry::new(Sample::Mark { shape, colour }, name))
+    let mut entries: Vec<LegendEntry> = kinds
+        .map(|&(_, shape, colour, name)| {
+            LegendEntry::new(LegendSample::Mark { shape, colour }, name)
+        })
         .collect();
     if matches!(scale, Scale::SymLog { .. }) {
-        entries.push(Entry::new(
-            Sample::Patch { colour: "#dcedf9" },
+        entries.push(LegendEntry::new(
+            LegendSample::Patch { colour: "#dcedf9" },
             "within 10 mm; the scale is logarithmic beyond",
         ));
     }

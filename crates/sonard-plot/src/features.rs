@@ -1,7 +1,7 @@
 //! Floor plan with the features found by the interpretation.
 
 use super::{
-    canvas::{Anchor, Layer, Px, MarkShape},
+    canvas::{Anchor, Layer, MarkShape, Px},
     floor::Floor,
     legend::{LegendEntry, LegendSample},
     legend_entries, lines, overlay,

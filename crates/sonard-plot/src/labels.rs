@@ -36,7 +36,7 @@ impl Labels {
     /// Number of marks that a text with its baseline at `at` would cover.
     pub(super) fn covered(&self, at: Px, anchor: Anchor, size_px: f64, text: &str) -> usize {
         let rect = text_rect(at, anchor, size_px, text);
-        self.marks.iter().filter(|mark| mark.meets(&rect)).count()
+        self.marks.iter().filter(|mark| mark.overlaps(&rect)).count()
     }
 
     /// Number of marks that a text rotated about its middle at `at` would cover.

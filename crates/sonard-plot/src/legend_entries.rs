@@ -39,8 +39,9 @@ pub(super) fn all(
             && scan.beams.iter().any(|beam| beam.range_m.is_some())
     };
     if with_rays && scans.iter().any(has_rays) {
-        let ray = Sample::Line { colour: theme::SKY, width_px: theme::HAIRLINE_PX, dash: "none" };
-        entries.push(Entry::new(ray, "direction of a beam"));
+        let ray =
+            LegendSample::Line { colour: theme::SKY, width_px: theme::HAIRLINE_PX, dash: "none" };
+        entries.push(LegendEntry::new(ray, "direction of a beam"));
     }
     if let Some(range_m) = scans.iter().find_map(|scan| scan.min_range_m) {
         let sample =

@@ -10,7 +10,7 @@ use crate::{
         output::{Overwrite, Product},
     },
     geometry::Pose,
-    inverse::{Fitted, Sweep, World, WorldError},
+    inverse::{FitResult, FitSweep, World, WorldError},
     plot::{ComparedReading, badge_among, draw_before_after},
     scan::{PingStatus, Provenance, text::format_count},
 };
@@ -31,8 +31,8 @@ pub(super) fn write(
     folder: &Path,
     overwrite: Overwrite,
     world: &World,
-    sweeps: &[Sweep],
-    fitted: &Fitted,
+    sweeps: &[FitSweep],
+    fitted: &FitResult,
     sources: &[Provenance],
 ) -> Outcome {
     let readings: usize = sweeps.iter().map(|sweep| sweep.beams.len()).sum();
@@ -69,11 +69,11 @@ pub(super) fn write(
 /// Compares the readings with the predictions of a world.
 fn compare(
     world: &World,
-    sweeps: &[Sweep],
+    sweeps: &[FitSweep],
     poses: &[Pose],
     every: usize,
 ) -> Result<Vec<ComparedReading>, WorldError> {
-    let pairs: Vec<(&Sweep, &Pose)> = sweeps.iter().zip(poses).collect();
+    let pairs: Vec<(&FitSweep, &Pose)> = sweeps.iter().zip(poses).collect();
     let compared: Result<Vec<Vec<_>>, _> =
         pairs.par_iter().map(|(sweep, pose)| compare_sweep(world, sweep, pose, every)).collect();
     Ok(compared?.into_iter().flatten().collect())
@@ -81,7 +81,7 @@ fn compare(
 
 fn compare_sweep(
     world: &World,
-    sweep: &Sweep,
+    sweep: &FitSweep,
     pose: &Pose,
     every: usize,
 ) -> Result<Vec<ComparedReading>, WorldError> {

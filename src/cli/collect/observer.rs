@@ -6,7 +6,7 @@ use indicatif::{HumanDuration, ProgressBar, ProgressStyle};
 
 use super::{report, terminal::Terminal};
 use crate::{
-    collect::{CollectionFolder, CollectError, CollectionHistory, Observer},
+    collect::{CollectError, CollectionFolder, CollectionHistory, Observer},
     scan::text::format_count,
 };
 

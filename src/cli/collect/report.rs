@@ -11,7 +11,7 @@ use crate::{
         repeatability,
     },
     compare::{Comparison, compare},
-    plot::{Picture, SeriesPoint, Series, badge_among, draw_scans, draw_scene, draw_series},
+    plot::{Picture, Series, SeriesPoint, badge_among, draw_scans, draw_scene, draw_series},
     scan::{
         ScanView,
         text::{format_count, format_length},

@@ -6,7 +6,9 @@ use comfy_table::Table;
 
 use crate::{
     cli::table::{align_right, fit, ruled},
-    compare::{Comparison, ChangeEstimate, Explanation, ClassifiedPing, Verdict, keep_every_second},
+    compare::{
+        ChangeEstimate, ClassifiedPing, Comparison, Explanation, Verdict, keep_every_second,
+    },
     scan::{
         PathKind, PathRecord, Ping, PingStatus,
         text::{format_count, format_length},

@@ -89,7 +89,7 @@ impl Summary<'_> {
             self.unknown_cells
         )?;
         if let Some(confidence) = self.mean_confidence {
-            let discarded = format_count(self.left_out, "reading");
+            let discarded = format_count(self.discarded, "reading");
             writeln!(out, "mean confidence {confidence:.3}, {discarded} discarded")?;
         }
         if self.evidence > 1 {

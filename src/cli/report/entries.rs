@@ -14,7 +14,7 @@ use super::{Args, system};
 use crate::{
     cli::{Failure, LONG_VERSION, doctor, output::register_input, run::CONFIG_FILE, runtime},
     client::Client,
-    config::{Keys, Layers},
+    config::{ConfigLayers, Keys},
 };
 
 /// Maximum length of an included line, bytes: longer ones are cut.
@@ -84,8 +84,16 @@ pub(super) fn collect(args: &Args, now: Timestamp) -> Result<Vec<Entry>, Failure
             "effective configuration, without comments and secrets",
             configuration.map(|keys| without_secrets(&toml::to_string(&keys).unwrap_or_default())),
         ),
-        Entry::from_result("status.json", "state of the daemon", status.map(pretty)),
-        Entry::from_result("health.json", "health of the daemon", health.map(pretty)),
+        Entry::from_result(
+            "status.json",
+            "state of the daemon",
+            status.map(|value| pretty(&value)),
+        ),
+        Entry::from_result(
+            "health.json",
+            "health of the daemon",
+            health.map(|value| pretty(&value)),
+        ),
         Entry::new("messages.txt", "last messages of the daemon's units", system::messages()),
         Entry::new("system.txt", "kernel, distribution, memory, user", system::describe()),
         Entry::new("ports.txt", "serial ports and their users", system::ports()),
@@ -127,11 +135,11 @@ fn version(now: Timestamp) -> String {
 /// Effective configuration, as `sonard run` reads it without options.
 fn configuration(file: Option<&Path>) -> Result<Keys, String> {
     let path = file.unwrap_or(Path::new(CONFIG_FILE));
-    let mut layers = Layers::<Keys>::new();
+    let mut layers = ConfigLayers::<Keys>::new();
     match fs::read_to_string(path) {
         Ok(text) => {
             layers = layers
-                .file(&path.display().to_string(), &text)
+                .with_file(&path.display().to_string(), &text)
                 .map_err(|error| format!("{error}; {}", error.help))?;
         }
         Err(error) if error.kind() == io::ErrorKind::NotFound && file.is_none() => {}
@@ -140,8 +148,8 @@ fn configuration(file: Option<&Path>) -> Result<Keys, String> {
     let variables = env::vars_os()
         .filter_map(|(name, value)| Some((name.into_string().ok()?, value.into_string().ok()?)));
     layers
-        .environment(variables)
-        .and_then(Layers::keys)
+        .with_environment(variables)
+        .and_then(ConfigLayers::into_keys)
         .map_err(|error| format!("{error}; {}", error.help))
 }
 
@@ -174,8 +182,8 @@ fn daemon(client: &Client) -> (Result<Value, String>, Result<Value, String>) {
     requested.unwrap_or_else(|_| (failed(), failed()))
 }
 
-fn pretty(value: Value) -> String {
-    serde_json::to_string_pretty(&value).unwrap_or_default()
+fn pretty(value: &Value) -> String {
+    serde_json::to_string_pretty(value).unwrap_or_default()
 }
 
 /// Result of `sonard doctor --no-motion`.

@@ -15,7 +15,7 @@ use rustix::{
     process::{getegid, geteuid, getgroups},
 };
 
-use crate::link::{self, Candidate, latency_timer_ms};
+use crate::link::{self, SerialPortInfo, latency_timer_ms};
 
 /// Words of kernel messages about serial ports.
 const SUBJECTS: [&str; 8] = ["tty", "usb", "cdc_acm", "ch341", "cp210", "ftdi", "pl2303", "sonard"];
@@ -68,7 +68,7 @@ pub(super) fn describe() -> String {
 
 /// Serial ports with their rights, their users and the latency of their adapters; none is opened.
 pub(super) fn ports() -> String {
-    let candidates = match link::candidates() {
+    let candidates = match link::list_ports() {
         Ok(candidates) => candidates,
         Err(error) => return format!("{error}\n"),
     };
@@ -76,7 +76,7 @@ pub(super) fn ports() -> String {
         return "no serial port\n".to_owned();
     }
     let mut described = String::new();
-    for Candidate { port, id, usb } in candidates {
+    for SerialPortInfo { port, id, usb } in candidates {
         let path = Path::new(&port);
         let _ = writeln!(described, "{port}");
         let _ = writeln!(described, "  stable name: {}", id.as_deref().unwrap_or("none"));

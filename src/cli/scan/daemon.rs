@@ -25,8 +25,9 @@ pub(super) fn run(args: &Args) -> Outcome {
         let status: Status =
             client.get_json("/v1/status").await.map_err(|error| failure_from(&error))?;
         check_scene(status.scene.as_ref(), &scene)?;
-        let requested =
-            RequestedScans::request(client, &request).await.map_err(|error| failure_from(&error))?;
+        let requested = RequestedScans::request(client, &request)
+            .await
+            .map_err(|error| failure_from(&error))?;
         let (count, wait) = (format_count(args.repeat, "scan"), describe_wait(&status));
         notice!("the daemon takes {count}, {wait}");
         let followed = scans.follow(requested, &interrupts).await;

@@ -133,7 +133,7 @@ fn traffic(earlier: &LinkStats, current: &LinkStats) -> String {
         100.0 * sent as f64 / (sent + received).max(1) as f64,
         format_count(damaged(current) - damaged(earlier), "frame"),
         format_count(current.retries - earlier.retries, "request"),
-        format_count(current.refused - earlier.refused, "reading"),
+        format_count(current.rejected - earlier.rejected, "reading"),
     )
 }
 

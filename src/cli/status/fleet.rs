@@ -12,7 +12,7 @@ use crate::{
         Failure, Outcome, runtime,
         table::{fit, ruled},
     },
-    fleet::{Asked, Seen, ask, judge},
+    fleet::{Observation, PolledDaemon, observe, poll},
 };
 
 /// Object of `--json` for a daemon.
