@@ -23,10 +23,10 @@ use sonard::{
 };
 
 /// Body of a target.
-pub type Body = fn(&[u8]);
+pub(crate) type Body = fn(&[u8]);
 
 /// Targets with their bodies.
-pub const BODIES: [(&str, Body); 11] = [
+pub(crate) const BODIES: [(&str, Body); 11] = [
     ("import", |bytes| import(None, bytes)),
     ("table", |bytes| import(Some(Format::Csv), bytes)),
     ("json", |bytes| import(Some(Format::Json), bytes)),
@@ -44,7 +44,7 @@ pub const BODIES: [(&str, Body); 11] = [
 ///
 /// # Panics
 /// Panics if there is no such target, or if the body finds a fault.
-pub fn run(target: &str, bytes: &[u8]) {
+pub(crate) fn run(target: &str, bytes: &[u8]) {
     let found = BODIES.iter().find(|(name, _)| *name == target);
     found.expect("a target").1(bytes);
 }

@@ -111,7 +111,7 @@ const fn metres(units: Units) -> Option<f64> {
     Some(match units {
         Units::Unitless => return None,
         Units::Inches => INCH,
-        Units::Feet => 12.0 * INCH,
+        Units::Feet => 0.3048,
         Units::Miles => 63_360.0 * INCH,
         Units::Millimeters => 1e-3,
         Units::Centimeters => 1e-2,
@@ -119,7 +119,7 @@ const fn metres(units: Units) -> Option<f64> {
         Units::Kilometers => 1e3,
         Units::Microinches => 1e-6 * INCH,
         Units::Mils => 1e-3 * INCH,
-        Units::Yards => 36.0 * INCH,
+        Units::Yards => 0.9144,
         Units::Angstroms => 1e-10,
         Units::Nanometers => 1e-9,
         Units::Microns => 1e-6,

@@ -316,11 +316,17 @@ pub(crate) fn is_unit(word: &str) -> bool {
     !words.is_empty() && words.iter().all(is_known)
 }
 
+/// Returns `true` for a time of one way, from which the range is computed in another way.
+fn is_one_way(words: &[String]) -> bool {
+    words.windows(2).any(|pair| pair[0] == "one" && pair[1] == "way")
+}
+
 /// Returns `true` for a name that rules out readings: a limit, a step, a quality.
 pub(crate) fn is_no_reading(name: &str) -> bool {
     let words = words(name);
     let has = |word: &str| words.iter().any(|known| known == word);
-    NON_READING_WORDS.iter().any(|word| has(word))
+    is_one_way(&words)
+        || NON_READING_WORDS.iter().any(|word| has(word))
         || ECHO_POSITION_WORDS.iter().any(|word| has(word))
 }
 
@@ -333,8 +339,7 @@ pub(crate) fn meaning(name: &str) -> NameMeaning {
     }
     // A pulse has a width and a travel time.
     let is_pulse = has(&["pulse"]) && has(&["width"]);
-    let is_one_way = words.windows(2).any(|pair| pair[0] == "one" && pair[1] == "way");
-    if is_one_way || (has(&NON_READING_WORDS) && !is_pulse) {
+    if is_one_way(&words) || (has(&NON_READING_WORDS) && !is_pulse) {
         return NameMeaning::Unknown;
     }
     let is_german_degree = has(&["grad"]) && has(&GERMAN_DIRECTION_WORDS);

@@ -1,5 +1,7 @@
 //! Inference of a mapping from column names.
 
+use std::collections::BTreeMap;
+
 use crate::{
     Column, Field, FieldQuantity, ImportError, Mapping,
     column_names::{self, NameMeaning},
@@ -76,7 +78,8 @@ impl ColumnCandidates {
     fn option(&self, with: &[(Field, &str)], names: &[String]) -> String {
         let role = |field: &Field| field.quantity().role();
         let is_replaced = |field: &Field| with.iter().any(|(other, _)| role(other) == role(field));
-        let kept = self.found.iter().filter(|(field, _)| !is_replaced(field));
+        let is_used = |name: &String| with.iter().any(|(_, used)| used == name);
+        let kept = self.found.iter().filter(|(field, name)| !is_replaced(field) && !is_used(name));
         let with = with.iter().map(|(field, name)| (*field, (*name).to_owned()));
         let mut all: Vec<(Field, String)> = with.chain(kept.cloned()).collect();
         all.sort();
@@ -123,6 +126,19 @@ impl ColumnCandidates {
             let is_same_role =
                 |(other, _): &&(Field, String)| other.quantity().role() == field.quantity().role();
             let duplicate = self.found[..at].iter().find(is_same_role);
+            if let Some((other, duplicate)) = duplicate.filter(|(_, other)| other == name) {
+                let numbers = (1..).zip(names).filter(|(_, known)| *known == name);
+                let options = numbers.take(2).map(|(number, _)| {
+                    let others = self.found.iter().filter(|(_, known)| known != name);
+                    let others = others.map(|(field, name)| (*field, Column::Name(name.clone())));
+                    let all = others.chain([(*other, Column::Number(number))]);
+                    columns_option(all.collect::<BTreeMap<_, _>>(), names)
+                });
+                return Err(ImportError::mapping(
+                    format!("two columns are named `{duplicate}`"),
+                    format!("choose: {}", options.collect::<Vec<_>>().join(" or ")),
+                ));
+            }
             if let Some((other, duplicate)) = duplicate {
                 let [first, second] = [(*other, duplicate.as_str()), (*field, name.as_str())]
                     .map(|choice| self.option(&[choice], names));
@@ -170,7 +186,9 @@ impl ColumnCandidates {
             Field::with_unit(FieldQuantity::Tof, Some(field.unit()?))
                 .map(|field| (field, name.as_str()))
         });
-        let unused = self.unused.iter().filter(|name| !column_names::is_no_reading(name));
+        let has_word = |name: &&String| name.contains(char::is_alphabetic);
+        let unused = self.unused.iter().filter(has_word);
+        let unused = unused.filter(|name| !column_names::is_no_reading(name));
         let unused = unused.flat_map(|name| {
             let quantities = [FieldQuantity::Range, FieldQuantity::Tof];
             let fields =
@@ -207,7 +225,11 @@ impl ColumnCandidates {
             Some((_, name)) => format!("the unit of column `{name}` is unknown"),
             None => format!("{lacks}; the columns are `{}`", names.join("`, `")),
         };
-        let ranges = if ranges.is_empty() { self.unnamed_ranges() } else { ranges };
+        // A single name is more likely a line of text.
+        let ranges = match ranges.is_empty() && names.len() > 1 {
+            true => self.unnamed_ranges(),
+            false => ranges,
+        };
         // Every combination of a direction and a range, if both are missing.
         let directions = if needs_direction { directions } else { Vec::new() };
         let ranges = if needs_range { ranges } else { Vec::new() };

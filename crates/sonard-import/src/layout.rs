@@ -151,7 +151,13 @@ impl TableLayout {
             return;
         }
         if second.len() > self.cells.len() {
-            (self.cells, self.is_first_cut) = (second, true);
+            // A capture that begins within a row; the others must agree.
+            let others = rows.iter().skip(1).map(|(_, line)| self.split(line).unwrap_or_default());
+            let is_usual = |cells: &Vec<String>| cells.len() == second.len();
+            let usual = others.clone().filter(is_usual).count();
+            if usual > 1 && 5 * usual >= 4 * (rows.len() - 1) {
+                (self.cells, self.is_first_cut) = (second, true);
+            }
         }
         self.take_names(above.iter().rev().find_map(|line| comment(line)));
     }
@@ -473,6 +479,7 @@ mod tests {
         let row = found.split("12:00:15.115 -> 16,32").expect("a row");
         assert_eq!(row, ["12:00:15.115", "16", "32"]);
         assert!(header("1\n0,100\n5,101\n").is_first_cut);
+        assert!(!header("0 100\n5 101 10 102\n15 103\n").is_first_cut);
     }
 
     #[test]

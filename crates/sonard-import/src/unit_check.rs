@@ -63,11 +63,16 @@ impl UnitContext<'_> {
             return fitting.map(|(name, _)| format!("--range-unit {name}")).collect();
         }
         let sound_speed_m_s = assumptions.air.sound_speed_m_s();
-        let fields = Field::of_quantity(FieldQuantity::Range).filter(|field| field.is_usual());
-        let fields = fields.chain(Field::of_quantity(FieldQuantity::Tof));
-        let fields = fields.filter(|field| fits(metres_per_unit(*field, sound_speed_m_s)));
-        let fields = fields.filter(|field| Some(*field) != self.field());
-        fields.map(|field| self.mapping.columns_option_with(field, self.names)).collect()
+        let own = self.field().map_or(FieldQuantity::Range, Field::quantity);
+        let other = if own == FieldQuantity::Tof { FieldQuantity::Range } else { FieldQuantity::Tof };
+        let options = |quantity: FieldQuantity| -> Vec<String> {
+            let fields = Field::of_quantity(quantity).filter(|field| field.is_usual());
+            let fields = fields.filter(|field| Some(*field) != self.field());
+            let fields = fields.filter(|field| fits(metres_per_unit(*field, sound_speed_m_s)));
+            fields.map(|field| self.mapping.columns_option_with(field, self.names)).collect()
+        };
+        // Times of flight are offered for distances only where no unit of length fits.
+        Some(options(own)).filter(|options| !options.is_empty()).unwrap_or_else(|| options(other))
     }
 
     /// Describes the unit in which the ranges were read.

@@ -204,7 +204,8 @@ fn dry_run_writes_no_log() {
 }
 
 /// Options of other programs and verbs that messages recommend.
-const OF_OTHERS: [&str; 5] = ["--src", "--dst", "--dst-storage", "--full-length", "--width-m"];
+const OF_OTHERS: [&str; 6] =
+    ["--src", "--dst", "--dst-storage", "--full-length", "--width-m", "--compression"];
 
 /// Every option that a message of the importer names is one of the command.
 #[test]

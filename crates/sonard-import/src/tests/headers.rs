@@ -123,7 +123,8 @@ fn offers_the_right_quantity() {
         ("angle_deg,time_us", "1,8700", "azimuth_deg=angle_deg,tof_us=time_us"),
         ("yaw,dist_cm", "1,150", "azimuth_deg=yaw,range_cm=dist_cm"),
         ("angle_deg,value", "1,150", "range_cm=value"),
-        ("angle_deg,distance_cm,distance_cm", "1,150,3", "range_cm=2"),
+        ("angle_deg,distance_cm,distance_cm", "1,150,3", "azimuth_deg=angle_deg,range_cm=3"),
+        ("angle_deg,one_way_tof_us", "1,4300", "give a file with ranges or times of flight"),
     ] {
         let message = error_text(mapped(header, row));
         assert!(message.contains(offered), "{header}: {message}");

@@ -43,7 +43,8 @@ pub(super) fn corners(
         let is_known = corners.last() == points.first();
         corners.extend(points.into_iter().skip(usize::from(is_known)));
     };
-    for stairs in flights(&runs) {
+    let pieces = split_at_ends(&runs, is_closed);
+    for stairs in pieces.into_iter().flat_map(flights) {
         for part in split_at_walls(stairs) {
             let mut nodes: Vec<Node> = part.iter().map(|run| run.from).collect();
             nodes.extend(part.last().map(|run| run.to));
@@ -78,6 +79,32 @@ fn runs(nodes: &[Node], is_closed: bool) -> Vec<StraightRun> {
         }
     }
     runs
+}
+
+/// Splits a chain at the ends of slanting walls, which are parts of their own: runs between stairs
+/// that turn back. Otherwise one face of a thin wall would include its end, and tilt.
+fn split_at_ends(runs: &[StraightRun], is_closed: bool) -> Vec<&[StraightRun]> {
+    let count = runs.len();
+    let direction = |at: usize, ahead: bool, by: usize| {
+        let other = if ahead { at + by } else { (at + count).checked_sub(by)? };
+        let is_within = is_closed || (if ahead { other < count } else { other >= count });
+        (is_within && by < count).then(|| runs[other % count].direction())
+    };
+    let is_end = |at: &usize| {
+        (1..=2).all(|by| match (direction(*at, false, by), direction(*at, true, by)) {
+            (Some(before), Some(after)) => before == (-after.0, -after.1),
+            _ => false,
+        })
+    };
+    let mut pieces = Vec::new();
+    let mut begin = 0;
+    for at in (0..count).filter(is_end) {
+        pieces
+            .extend([&runs[begin..at], &runs[at..=at]].into_iter().filter(|part| !part.is_empty()));
+        begin = at + 1;
+    }
+    pieces.extend(Some(&runs[begin..]).filter(|part| !part.is_empty()));
+    pieces
 }
 
 /// Groups consecutive runs into flights, each with runs in at most two directions that are not
@@ -163,6 +190,19 @@ mod tests {
         }
         let open = [(0, 0), (0, 9), (1, 9), (1, 0)];
         assert_eq!(traced(&open, false), as_places(&open));
+    }
+
+    #[test]
+    fn slanting_thin_wall_has_parallel_faces() {
+        // Stairs of three cells along each step, one cell thick.
+        let steps = 8;
+        let lower = (0..steps).flat_map(|step| [(3 * step, step), (3 * step + 3, step)]);
+        let upper =
+            (0..steps).rev().flat_map(|step| [(3 * step + 3, step + 1), (3 * step, step + 1)]);
+        let ring: Vec<Node> = lower.chain(upper).collect();
+        let found = traced(&ring, true);
+        let expected = [(0, 0), (3 * steps, steps - 1), (3 * steps, steps), (0, 1)];
+        assert_eq!(found, as_places(&expected));
     }
 
     #[test]
