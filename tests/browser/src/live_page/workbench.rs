@@ -569,3 +569,26 @@ fn selection_moves_nothing_else() {
     assert_eq!(places(), before);
     assert_clean(&browser);
 }
+
+#[test]
+fn contradictions_are_marked() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (_daemon, browser) = with_two_scans(folder.path(), &[]);
+    // Beams 74 to 76 are predicted to be a multiple reflection; the northern wall is at y = 0.742.
+    let marked = browser.eval(
+        "Promise.all(['main', 'findings'].map((name) => import(`/page/${name}.js`))).then(([{plan}, {markContradictions}]) => { \
+         const found = {features: [{kind: 'edge', beams: [74, 76]}, {kind: 'unresolved', beams: [74, 76]}, \
+             {kind: 'plane', beams: [24, 26]}], \
+           lines: [{from: [0.2, 0.75], to: [0.6, 0.75]}, {from: [0.2, 1.5], to: [0.6, 1.5]}]}; \
+         markContradictions(found, plan.scan, plan.scene); \
+         return [...found.features, ...found.lines].map(({contradiction}) => contradiction ?? null); })",
+    );
+    let expected = json!([
+        "the model predicts a multiple reflection here",
+        null,
+        null,
+        null,
+        "no wall of the scene here"
+    ]);
+    assert_eq!(marked, expected);
+}

@@ -40,7 +40,9 @@ export class Sketch {
       }
       if (ping.sim?.range_m != null) this.mark("prediction", ping, ping.sim.range_m);
     }
-    for (const ping of placed) {
+    // Marks of one kind after the other make a picture of a large scan smaller.
+    const ordered = this.occupied ? Object.keys(MARKS).flatMap((name) => placed.filter(({ mark }) => mark === name)) : placed;
+    for (const ping of ordered) {
       if (MARKS[ping.mark].shape === "tick") this.tick(ping);
       else this.mark(ping.mark, ping, ping.range_m);
     }

@@ -92,8 +92,8 @@ export class SvgContext {
     this.circle = isFullCircle && !this.path ? [x, y, r] : null;
     this.path += `${this.path ? "L" : "M"}${end(from)}`;
     // SVG omits an arc whose end equals its start, so a full circle takes two.
-    if (isFullCircle) this.path += `A${n(r)} ${n(r)} 0 0 1 ${end(from + Math.PI)}`;
-    this.path += `A${n(r)} ${n(r)} 0 ${!isFullCircle && to - from > Math.PI ? 1 : 0} 1 ${end(to)}`;
+    const half = (/** @type {number} */ sign) => `a${n(r)} ${n(r)} 0 0 1 ${n(sign * 2 * r * Math.cos(from))} ${n(sign * 2 * r * Math.sin(from))}`;
+    this.path += isFullCircle ? half(-1) + half(1) : `A${n(r)} ${n(r)} 0 ${to - from > Math.PI ? 1 : 0} 1 ${end(to)}`;
   }
 
   stroke() {
@@ -125,7 +125,7 @@ export class SvgContext {
   }
 
   fillRect(x, y, width, height) {
-    this.put(`rect x="${n(x)}" y="${n(y)}" width="${n(width)}" height="${n(height)}" fill="${this.fillStyle}"`);
+    this.putPath(`M${n(x)} ${n(y)}h${n(width)}v${n(height)}h${n(-width)}z`, `fill="${this.fillStyle}"`);
   }
 
   clearRect() {}
