@@ -64,7 +64,8 @@ impl UnitContext<'_> {
         }
         let sound_speed_m_s = assumptions.air.sound_speed_m_s();
         let own = self.field().map_or(FieldQuantity::Range, Field::quantity);
-        let other = if own == FieldQuantity::Tof { FieldQuantity::Range } else { FieldQuantity::Tof };
+        let other =
+            if own == FieldQuantity::Tof { FieldQuantity::Range } else { FieldQuantity::Tof };
         let options = |quantity: FieldQuantity| -> Vec<String> {
             let fields = Field::of_quantity(quantity).filter(|field| field.is_usual());
             let fields = fields.filter(|field| Some(*field) != self.field());
