@@ -5,7 +5,7 @@ use serde_json::Value;
 use super::{CollectionHistory, CollectionKeys, CollectionPlan, Poses, find_numbers};
 
 /// Keys that do not affect the collected scans.
-const IGNORED_KEYS: [&str; 3] = ["collection.folder", "collection.patience_s", "device.port"];
+const IGNORED_KEYS: [&str; 3] = ["collection.folder", "collection.retry_limit_s", "device.port"];
 
 /// Lists the differences from the journal's last plan, one message each.
 pub(super) fn plan_changes(

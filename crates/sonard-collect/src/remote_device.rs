@@ -273,7 +273,7 @@ impl RemoteDevice {
         }
     }
 
-    /// Waits until the daemon responds and has its ranger, at most `collection.patience_s`.
+    /// Waits until the daemon responds and has its ranger, at most `collection.retry_limit_s`.
     async fn ready(&self) -> Result<Status, CollectError> {
         let (deadline, mut reported) = (Instant::now() + self.patience, false);
         loop {

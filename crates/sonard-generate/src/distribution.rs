@@ -16,16 +16,16 @@ pub enum NumberDistribution {
     Fixed(f64),
     /// Uniform distribution: `[0.3, 0.7]`.
     Uniform([f64; 2]),
-    /// Truncated normal distribution: `{ mean = 20, sigma = 3, least = 10, most = 30 }`.
+    /// Truncated normal distribution: `{ mean = 20, sigma = 3, min = 10, max = 30 }`.
     Normal {
         /// Mean before truncation.
         mean: f64,
         /// Standard deviation before truncation.
         sigma: f64,
         /// Lower bound of the number.
-        least: f64,
+        min: f64,
         /// Upper bound of the number.
-        most: f64,
+        max: f64,
     },
     /// Uniform choice: `{ any_of = [0.02, 0.05] }`.
     AnyOf(Vec<f64>),
@@ -41,7 +41,7 @@ impl NumberDistribution {
     pub fn min(&self) -> f64 {
         match self {
             Self::Fixed(number) => *number,
-            Self::Uniform([least, _]) | Self::Normal { least, .. } => *least,
+            Self::Uniform([min, _]) | Self::Normal { min, .. } => *min,
             Self::AnyOf(numbers) => numbers.iter().copied().fold(f64::INFINITY, f64::min),
         }
     }
@@ -51,7 +51,7 @@ impl NumberDistribution {
     pub fn max(&self) -> f64 {
         match self {
             Self::Fixed(number) => *number,
-            Self::Uniform([_, most]) | Self::Normal { most, .. } => *most,
+            Self::Uniform([_, max]) | Self::Normal { max, .. } => *max,
             Self::AnyOf(numbers) => numbers.iter().copied().fold(f64::NEG_INFINITY, f64::max),
         }
     }
@@ -60,15 +60,15 @@ impl NumberDistribution {
     pub fn draw(&self, rng: &mut impl Rng) -> f64 {
         match self {
             Self::Fixed(number) => *number,
-            Self::Uniform([least, most]) if least < most => rng.random_range(*least..*most),
-            Self::Uniform([least, _]) => *least,
-            Self::Normal { mean, sigma, least, most } => {
+            Self::Uniform([min, max]) if min < max => rng.random_range(*min..*max),
+            Self::Uniform([min, _]) => *min,
+            Self::Normal { mean, sigma, min, max } => {
                 let mut draw = || {
                     let unit: f64 = StandardNormal.sample(rng);
                     mean + sigma * unit
                 };
-                let fits = |number: &f64| (*least..=*most).contains(number);
-                (0..MAX_DRAWS).map(|_| draw()).find(fits).unwrap_or(mean.clamp(*least, *most))
+                let fits = |number: &f64| (*min..=*max).contains(number);
+                (0..MAX_DRAWS).map(|_| draw()).find(fits).unwrap_or(mean.clamp(*min, *max))
             }
             Self::AnyOf(numbers) => numbers[rng.random_range(0..numbers.len())],
         }
@@ -77,18 +77,18 @@ impl NumberDistribution {
     /// Draws a count: for `[2, 4]` 2, 3 or 4, for other distributions rounded to a whole number.
     pub fn count(&self, rng: &mut impl Rng) -> usize {
         match self {
-            Self::Uniform([least, most]) => rng.random_range(*least as usize..=*most as usize),
+            Self::Uniform([min, max]) => rng.random_range(*min as usize..=*max as usize),
             other => other.draw(rng).round() as usize,
         }
     }
 
     /// Checks bounds and parameters.
     fn check(self) -> Result<Self, &'static str> {
-        let (least, most) = (self.min(), self.max());
-        if !(least.is_finite() && most.is_finite()) {
+        let (min, max) = (self.min(), self.max());
+        if !(min.is_finite() && max.is_finite()) {
             return Err("a distribution needs finite numbers, and any_of at least one");
         }
-        if least > most {
+        if min > max {
             return Err("the minimum comes first, then the maximum");
         }
         match self {
@@ -116,17 +116,17 @@ impl DistributionKeys {
             Self { mean: None, sigma: None, min: None, max: None, any_of: Some(numbers) } => {
                 Ok(NumberDistribution::AnyOf(numbers))
             }
-            Self { mean: Some(mean), sigma: Some(sigma), min: least, max: most, any_of: None } => {
+            Self { mean: Some(mean), sigma: Some(sigma), min, max, any_of: None } => {
                 // Truncated at six sigma, which one number in 10^9 exceeds.
-                let least = least.unwrap_or(mean - 6.0 * sigma);
+                let min = min.unwrap_or(mean - 6.0 * sigma);
                 Ok(NumberDistribution::Normal {
                     mean,
                     sigma,
-                    least,
-                    most: most.unwrap_or(mean + 6.0 * sigma),
+                    min,
+                    max: max.unwrap_or(mean + 6.0 * sigma),
                 })
             }
-            _ => Err("give mean and sigma (optionally least and most), or only any_of"),
+            _ => Err("give mean and sigma (optionally min and max), or only any_of"),
         }
     }
 }
@@ -138,7 +138,7 @@ impl<'de> Deserialize<'de> for NumberDistribution {
             type Value = NumberDistribution;
 
             fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str("a number, [least, most], { mean = , sigma = } or { any_of = [ , ] }")
+                f.write_str("a number, [min, max], { mean = , sigma = } or { any_of = [ , ] }")
             }
 
             fn visit_f64<E>(self, number: f64) -> Result<NumberDistribution, E> {
@@ -159,10 +159,10 @@ impl<'de> Deserialize<'de> for NumberDistribution {
             ) -> Result<NumberDistribution, A::Error> {
                 let mut next = || list.next_element::<f64>();
                 match (next()?, next()?, next()?) {
-                    (Some(least), Some(most), None) => {
-                        Ok(NumberDistribution::Uniform([least, most]))
+                    (Some(min), Some(max), None) => {
+                        Ok(NumberDistribution::Uniform([min, max]))
                     }
-                    _ => Err(A::Error::custom("a list is [least, most]; for a choice use any_of")),
+                    _ => Err(A::Error::custom("a list is [min, max]; for a choice use any_of")),
                 }
             }
 
@@ -181,8 +181,8 @@ impl Serialize for NumberDistribution {
         struct NormalKeys {
             mean: f64,
             sigma: f64,
-            least: f64,
-            most: f64,
+            min: f64,
+            max: f64,
         }
         #[derive(Serialize)]
         struct ChoiceKeys<'a> {
@@ -191,9 +191,9 @@ impl Serialize for NumberDistribution {
         match self {
             Self::Fixed(number) => number.serialize(serializer),
             Self::Uniform(ends) => ends.serialize(serializer),
-            Self::Normal { mean, sigma, least, most } => {
-                let (mean, sigma, least, most) = (*mean, *sigma, *least, *most);
-                NormalKeys { mean, sigma, least, most }.serialize(serializer)
+            Self::Normal { mean, sigma, min, max } => {
+                let (mean, sigma, min, max) = (*mean, *sigma, *min, *max);
+                NormalKeys { mean, sigma, min, max }.serialize(serializer)
             }
             Self::AnyOf(any_of) => ChoiceKeys { any_of }.serialize(serializer),
         }
@@ -218,17 +218,17 @@ mod tests {
             "3",
             "[-1, 2.5]",
             "[2, 2]",
-            r#"{"mean": 1, "sigma": 3, "least": 0, "most": 2}"#,
+            r#"{"mean": 1, "sigma": 3, "min": 0, "max": 2}"#,
             r#"{"mean": 1, "sigma": 0}"#,
             r#"{"any_of": [4, 1, 2.5]}"#,
         ] {
             let spread = read(text).expect(text);
             let numbers: Vec<f64> = (0..2000).map(|_| spread.draw(&mut rng)).collect();
-            let (least, most) = (spread.min(), spread.max());
-            assert!(numbers.iter().all(|number| (least..=most).contains(number)), "{text}");
-            let near = 0.02 * (most - least);
-            assert!(numbers.iter().any(|number| *number <= least + near), "{text}");
-            assert!(numbers.iter().any(|number| *number >= most - near), "{text}");
+            let (min, max) = (spread.min(), spread.max());
+            assert!(numbers.iter().all(|number| (min..=max).contains(number)), "{text}");
+            let near = 0.02 * (max - min);
+            assert!(numbers.iter().any(|number| *number <= min + near), "{text}");
+            assert!(numbers.iter().any(|number| *number >= max - near), "{text}");
             let again = serde_json::to_string(&spread).expect("JSON");
             assert_eq!(read(&again), Ok(spread), "{text}");
         }
@@ -249,14 +249,14 @@ mod tests {
     #[test]
     fn rejects_invalid_distributions() {
         for (text, part) in [
-            ("\"wide\"", "expected a number, [least, most]"),
-            ("[1]", "[least, most]"),
+            ("\"wide\"", "expected a number, [min, max]"),
+            ("[1]", "[min, max]"),
             ("[1, 2, 3]", "any_of"),
             ("[2, 1]", "comes first"),
             (r#"{"any_of": []}"#, "at least one"),
             (r#"{"mean": 1}"#, "give mean and sigma"),
             (r#"{"mean": 1, "sigma": -1}"#, "comes first"),
-            (r#"{"mean": 1, "sigma": 1, "least": 3, "most": 2}"#, "comes first"),
+            (r#"{"mean": 1, "sigma": 1, "min": 3, "max": 2}"#, "comes first"),
             (r#"{"median": 1}"#, "unknown field `median`"),
         ] {
             let error = read(text).expect_err(text);

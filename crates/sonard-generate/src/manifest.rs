@@ -111,7 +111,7 @@ impl ShardFacts {
             });
         }
         let drawn_by =
-            |by: &ShardIdentity| format!("{} (drawing {})", by.sonard, by.sampling_version);
+            |by: &ShardIdentity| format!("{} (sampling version {})", by.sonard, by.sampling_version);
         if (&found.sonard, found.sampling_version, found.format)
             != (&expected.sonard, expected.sampling_version, expected.format)
         {

@@ -159,7 +159,7 @@ const ENVELOPE: ColumnInfo = column(
     "envelope",
     ColumnKind::Numbers,
     false,
-    "envelope of the firing from time 0, sampled every keep.trace_step_us; without noise",
+    "envelope of the firing from time 0, sampled every keep.envelope_step_us; without noise",
 );
 
 fn readings(keep: &KeepKeys) -> Vec<ColumnInfo> {

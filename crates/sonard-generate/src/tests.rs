@@ -44,7 +44,7 @@ shape = "file"
 file = "two-surface-room"
 [materials]
 plaster = { reflectance = [0.9, 0.98] }
-felt = { reflectance = { mean = 0.4, sigma = 0.1, least = 0.1, most = 0.7 }, roughness = [0, 0.3] }
+felt = { reflectance = { mean = 0.4, sigma = 0.1, min = 0.1, max = 0.7 }, roughness = [0, 0.3] }
 [furniture]
 boxes = [0, 2]
 box_m = [0.2, 0.5]
@@ -61,7 +61,7 @@ step_deg = 30
 [sensor]
 any_of = ["senscomp-6500", "hc-sr04"]
 [air]
-temperature_c = { mean = 20, sigma = 4, least = 5, most = 35 }
+temperature_c = { mean = 20, sigma = 4, min = 5, max = 35 }
 [noise]
 floor = [0, 0.001]
 jitter_us = { any_of = [0, 5] }
@@ -70,9 +70,9 @@ max_range_m = 4
 [keep]
 strength = true
 path = true
-echoes_down_to = 0.05
-trace_to_m = 1
-trace_step_us = 100
+min_echo_amplitude = 0.05
+envelope_range_m = 1
+envelope_step_us = 100
 ideal_range = true
 features = true
 occupancy_m = 0.1
@@ -261,7 +261,7 @@ fn faults_have_position_and_advice() {
             "width_m = \"wide\"",
             "set.toml:8:11: scene[0].width_m",
             "invalid type",
-            "[least, most]",
+            "[min, max]",
         ),
         (
             "depth_m = [2, 3]",
@@ -326,7 +326,7 @@ fn faults_have_position_and_advice() {
         (
             "[[scene]]",
             "[keep]\ntrace_to_m = 90\ntrace_step_us = 1\n[[scene]]",
-            "set.toml:7:14: keep.trace_to_m",
+            "set.toml:7:14: keep.envelope_range_m",
             "samples",
             "steps",
         ),
@@ -364,7 +364,7 @@ fn facts_match_only_their_shard() {
     };
     assert!(matches!(read(&different, 1, &text), ManifestError::Specification { .. }));
     assert_eq!(read(&own, 2, &text), ManifestError::Number { found: 1, expected: 2 });
-    let older = text.replace("\"drawing\": 1", "\"drawing\": 0");
+    let older = text.replace("\"sampling_version\": 1", "\"sampling_version\": 0");
     assert!(matches!(read(&own, 1, &older), ManifestError::Version { .. }));
     let fewer = text.replace("echoes.parquet", "echos.parquet");
     assert_eq!(read(&own, 1, &fewer), ManifestError::Files);

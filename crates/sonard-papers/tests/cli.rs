@@ -44,7 +44,7 @@ fn exploration_writes_its_files() {
     let [object] = json_lines(&String::from_utf8_lossy(&output.stdout)).try_into().expect("one");
     let number = |name: &str| object[name].as_f64().unwrap_or_else(|| panic!("{name}: {object}"));
     assert_eq!(object["sensing"], "just-in-time");
-    assert_eq!((object["finished"].as_bool(), number("bumps")), (Some(true), 0.0));
+    assert_eq!((object["finished"].as_bool(), number("collisions")), (Some(true), 0.0));
     assert!(number("travel_m") > 5.0 && number("laser_shots") >= 4.0, "{object}");
     for error in ["map_error_m", "line_error_m", "endpoint_error_m"] {
         assert!(number(error) < 0.03, "{error}: {object}");

@@ -21,7 +21,7 @@ struct FleetRow<'a> {
     robot: Option<&'a str>,
     address: String,
     state: FleetState,
-    wrong: &'a [String],
+    problems: &'a [String],
     status: Option<&'a Status>,
     health: Option<&'a Health>,
 }
@@ -63,7 +63,7 @@ fn fleet_row<'a>(of: &'a PolledDaemon, seen: &'a Observation) -> FleetRow<'a> {
         robot: report.map(|report| &*report.status.robot).or(of.member.robot.as_deref()),
         address: of.member.address(),
         state: seen.state,
-        wrong: &seen.wrong,
+        problems: &seen.problems,
         status: report.map(|report| &report.status),
         health: report.map(|report| &report.health),
     }
@@ -91,7 +91,7 @@ fn table(rows: &[FleetRow]) -> Table {
             or_dash(age_s.map(|age_s| format!("{age_s:.1} s ago"))),
             or_dash(share.map(|share| format!("{:.0} %", 100.0 * share))),
             or_dash(fit.map(|fit| fit.missing.to_string())),
-            row.wrong.join("; "),
+            row.problems.join("; "),
         ]);
     }
     table

@@ -48,7 +48,7 @@ impl Registry {
         if robot.state != seen.state {
             (robot.state, robot.since) = (seen.state, now);
         }
-        robot.problems = seen.wrong;
+        robot.problems = seen.problems;
         if let Some(report) = seen.report {
             robot.last_report = Some(now);
             if let Some(reported_at) = self.reported_at.get_mut(number) {

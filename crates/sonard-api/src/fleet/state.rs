@@ -26,7 +26,7 @@ pub struct Observation {
     /// Observed state.
     pub state: FleetState,
     /// Problems, sanitized for display.
-    pub wrong: Vec<String>,
+    pub problems: Vec<String>,
     /// Report of the daemon, if it belongs to the expected robot.
     pub report: Option<DaemonReport>,
 }
@@ -35,7 +35,7 @@ pub struct Observation {
 #[must_use]
 pub fn observe(expected: Option<&str>, polled: Result<DaemonReport, PollError>) -> Observation {
     let without =
-        |state, why: &str| Observation { state, wrong: vec![sanitize(why)], report: None };
+        |state, why: &str| Observation { state, problems: vec![sanitize(why)], report: None };
     let report = match polled {
         Ok(report) => report,
         Err(PollError::NoResponse(why)) => return without(FleetState::NoResponse, &why),
@@ -55,10 +55,10 @@ pub fn observe(expected: Option<&str>, polled: Result<DaemonReport, PollError>) 
     let missing_beams = (missing > 0).then(|| format!("{missing} beams missing in the last scan"));
     let rejected = status.configuration.error.as_ref();
     let rejected = rejected.map(|error| format!("configuration rejected: {error}"));
-    let wrong = health.reasons.iter().cloned().chain(missing_beams).chain(rejected);
+    let problems = health.reasons.iter().cloned().chain(missing_beams).chain(rejected);
     Observation {
         state: if health.healthy { FleetState::Healthy } else { FleetState::Unhealthy },
-        wrong: wrong.take(MAX_REASONS).map(|why| sanitize(&why)).collect(),
+        problems: problems.take(MAX_REASONS).map(|why| sanitize(&why)).collect(),
         report: Some(report),
     }
 }

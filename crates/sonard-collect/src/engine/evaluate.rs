@@ -87,10 +87,10 @@ impl<D: ScanDevice, W: Observer> Collector<D, W> {
     }
 
     /// Waits after a lost scan, longer after each one. A loss is independent of the pose, so it
-    /// does not count as a retake; the collection ends after `collection.patience_s`.
+    /// does not count as a retake; the collection ends after `collection.retry_limit_s`.
     async fn wait_for_ranger(&mut self, lost: CollectError) -> Result<Next, CollectError> {
-        let patience = Duration::from_secs_f64(self.plan.keys.collection.retry_limit_s);
-        let losses = self.losses.get_or_insert_with(|| RetrySchedule::for_lost_scans(patience));
+        let retry_limit = Duration::from_secs_f64(self.plan.keys.collection.retry_limit_s);
+        let losses = self.losses.get_or_insert_with(|| RetrySchedule::for_lost_scans(retry_limit));
         let (CollectError::Failed { .. }, Some(wait)) = (&lost, losses.next_delay()) else {
             return match lost {
                 // The daemon dropped the request.

@@ -52,8 +52,8 @@ impl<D: ScanDevice, W: Observer> Collector<D, W> {
         let journal = CollectionJournal::open(&folder.journal())?;
         let id = journal.history().plans.last().map_or_else(Uuid::new_v4, |plan| plan.collection);
         let scan_s = budget(&plan)?.total_s();
-        let patience = Duration::from_secs_f64(plan.keys.collection.retry_limit_s);
-        device.resume(patience, journal.history().saved_settings.clone());
+        let retry_limit = Duration::from_secs_f64(plan.keys.collection.retry_limit_s);
+        device.resume(retry_limit, journal.history().saved_settings.clone());
         let mut collector = Self {
             choices,
             source: PoseSource::from(&plan.poses),

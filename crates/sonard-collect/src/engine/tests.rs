@@ -242,6 +242,6 @@ async fn retries_until_the_deadline() {
     let retry = "repeating the scan in 1 s: no response";
     assert!(messages.iter().any(|line| line.contains(retry)), "{messages:?}");
     let (outcome, _) =
-        run(&folder.path().join("never"), "[collection]\npatience_s = 0\n", u32::MAX).await;
+        run(&folder.path().join("never"), "[collection]\nretry_limit_s = 0\n", u32::MAX).await;
     assert!(matches!(&outcome, Err(CollectError::Failed { .. })), "{outcome:?}");
 }

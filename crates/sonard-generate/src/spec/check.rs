@@ -67,12 +67,12 @@ fn check_set(spec: &Spec) -> Result<(), SpecFault> {
     if set.name.trim().is_empty() || set.name.contains('\n') {
         return Err(SpecFault::new("set.name", "it is not a name", "give a few words on one line"));
     }
-    for (field, value, most) in [
+    for (field, value, max) in [
         ("set.shards", set.shards, MAX_SHARDS),
         ("set.scenes", set.scenes, MAX_SCENES),
         ("set.poses", set.poses, MAX_POSES),
     ] {
-        number(field, value.into(), 1.0, most.into())?;
+        number(field, value.into(), 1.0, max.into())?;
     }
     Ok(())
 }
@@ -114,13 +114,13 @@ fn check_scene(path: &str, keys: &SpecSceneKeys, spec: &Spec) -> Result<(), Spec
             return Err(not_allowed(field_path(field), field, &shape));
         }
     }
-    for (field, spread, least, most) in [
+    for (field, spread, min, max) in [
         ("width_m", &keys.width_m, 0.1, MAX_ROOM_M),
         ("depth_m", &keys.depth_m, 0.1, MAX_ROOM_M),
         ("notch", &keys.notch, 0.05, 0.9),
         ("turn_deg", &keys.turn_deg, -360.0, 360.0),
     ] {
-        spread.as_ref().map_or(Ok(()), |spread| within(field_path(field), spread, least, most))?;
+        spread.as_ref().map_or(Ok(()), |spread| within(field_path(field), spread, min, max))?;
     }
     if let Some(corners) = &keys.corners {
         count(field_path("corners"), corners, 3.0, MAX_FURNITURE)?;
@@ -163,9 +163,9 @@ fn check_furniture(spec: &Spec) -> Result<(), SpecFault> {
 }
 
 fn check_keep(keep: &KeepKeys) -> Result<(), SpecFault> {
-    number("keep.echoes_down_to", keep.min_echo_amplitude, 0.0, 1.0)?;
-    number("keep.trace_to_m", keep.envelope_range_m, 0.0, 100.0)?;
-    number("keep.trace_step_us", keep.envelope_step_us, 1.0, 10_000.0)?;
+    number("keep.min_echo_amplitude", keep.min_echo_amplitude, 0.0, 1.0)?;
+    number("keep.envelope_range_m", keep.envelope_range_m, 0.0, 100.0)?;
+    number("keep.envelope_step_us", keep.envelope_step_us, 1.0, 10_000.0)?;
     number("keep.occupancy_m", keep.occupancy_m, 0.0, 10.0)?;
     // Two-way, at a lower bound of the sound speed.
     let samples = 2e6 * keep.envelope_range_m / 200.0 / keep.envelope_step_us;
@@ -173,7 +173,7 @@ fn check_keep(keep: &KeepKeys) -> Result<(), SpecFault> {
         let message =
             format!("an envelope would have {samples:.0} samples, more than {MAX_SAMPLES}");
         return Err(SpecFault::new(
-            "keep.trace_to_m",
+            "keep.envelope_range_m",
             message,
             "give longer steps or a shorter range",
         ));
@@ -199,40 +199,40 @@ fn materials(path: &str, names: &[String], spec: &Spec) -> Result<(), SpecFault>
 fn count(
     path: impl Into<String>,
     spread: &NumberDistribution,
-    least: f64,
-    most: f64,
+    min: f64,
+    max: f64,
 ) -> Result<(), SpecFault> {
     let path = path.into();
     if spread.min().fract() != 0.0 || spread.max().fract() != 0.0 {
         return Err(SpecFault::new(path, "it counts things", "give whole numbers"));
     }
-    within(path, spread, least, most)
+    within(path, spread, min, max)
 }
 
 fn within(
     path: impl Into<String>,
     spread: &NumberDistribution,
-    least: f64,
-    most: f64,
+    min: f64,
+    max: f64,
 ) -> Result<(), SpecFault> {
-    match spread.min() >= least && spread.max() <= most {
+    match spread.min() >= min && spread.max() <= max {
         true => Ok(()),
         false => {
             let message = match spread.min() == spread.max() {
                 true => format!("it is {}", spread.min()),
                 false => format!("it can be {} to {}", spread.min(), spread.max()),
             };
-            Err(SpecFault::new(path, message, format!("give {least} to {most}")))
+            Err(SpecFault::new(path, message, format!("give {min} to {max}")))
         }
     }
 }
 
 /// Checks a number; also rejects NaN.
-fn number(path: impl Into<String>, value: f64, least: f64, most: f64) -> Result<(), SpecFault> {
-    match (least..=most).contains(&value) {
+fn number(path: impl Into<String>, value: f64, min: f64, max: f64) -> Result<(), SpecFault> {
+    match (min..=max).contains(&value) {
         true => Ok(()),
         false => {
-            Err(SpecFault::new(path, format!("it is {value}"), format!("give {least} to {most}")))
+            Err(SpecFault::new(path, format!("it is {value}"), format!("give {min} to {max}")))
         }
     }
 }

@@ -71,7 +71,7 @@ fn rejected_and_repeated_commands() {
         assert!(answer["help"].is_string());
     }
     assert_eq!(daemon.health()["scans"]["completed"], 0);
-    wait_until("they are counted", || mqtt(&daemon)["refused"] == 8);
+    wait_until("they are counted", || mqtt(&daemon)["rejected"] == 8);
     // A burst costs the connection at most, and the daemon goes on.
     for _ in 0..90 {
         broker.publish("sonard/kiwi/command/stop", b"", 0);
