@@ -216,9 +216,9 @@ check_log_folder() {
 }
 
 drop_in_is_suggested() {
-  local said
-  said=$(said_since sonard@away.service "$1")
-  [[ $said == *"systemctl edit sonard@away.service"* && $said == *"ReadWritePaths=$2"* ]]
+  local text
+  text=$(journalctl --unit=sonard@away.service --since="$1" --output=cat --no-pager)
+  [[ $text == *"systemctl edit sonard@away.service"* && $text == *"ReadWritePaths=$2"* ]]
 }
 
 # Device nodes without hardware: what the policy allows has no device, anything else is forbidden.
@@ -247,7 +247,7 @@ check_devices() {
 }
 
 link_is() { [[ $(get "/run/sonard/$1/sonard.sock" status) == *"$2"* ]]; }
-link_is_not() { local said; said=$(get "/run/sonard/$1/sonard.sock" status) && [[ $said != *"$2"* ]]; }
+link_is_not() { local text; text=$(get "/run/sonard/$1/sonard.sock" status) && [[ $text != *"$2"* ]]; }
 
 check_package() {
   step "upgrade while all run"

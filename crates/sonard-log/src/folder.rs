@@ -236,7 +236,7 @@ impl LogFolder {
         &mut self,
         now: Timestamp,
     ) -> Result<(&mut LogWriter, &mut RetainedLines), StoreError> {
-        // A file with records that was removed while it was closed is not created anew.
+        // A file with records that was removed while it was closed is replaced.
         let is_closed = self.writer.is_none() && self.replacement.is_none();
         if is_closed && !self.has_no_scan && self.lacks_file() {
             let detail = format!("{} {}", self.file_name(), Displacement::Removed);

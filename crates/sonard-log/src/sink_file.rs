@@ -228,13 +228,13 @@ impl LogOutput for FileOutput {
     }
 
     fn withdraw(&mut self, lines: &[u8]) -> io::Result<u64> {
-        let known: HashSet<&[u8]> = lines.split_inclusive(|&byte| byte == b'\n').collect();
+        let written_again: HashSet<&[u8]> = lines.split_inclusive(|&byte| byte == b'\n').collect();
         let length = self.file.metadata()?.len();
         let mut end = vec![0; lines.len().min(usize::try_from(length).unwrap_or(usize::MAX))];
         let end_at = length - end.len() as u64;
         self.file.read_exact_at(&mut end, end_at)?;
         let found = end.split_inclusive(|&byte| byte == b'\n').rev();
-        let repeated = found.take_while(|line| known.contains(line));
+        let repeated = found.take_while(|line| written_again.contains(line));
         let length = length - repeated.map(|line| line.len() as u64).sum::<u64>();
         self.file.set_len(length)?;
         self.length = length;

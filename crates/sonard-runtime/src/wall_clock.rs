@@ -45,7 +45,7 @@ pub enum ClockState {
 pub struct ClockEvidence {
     /// Synchronisation as reported by kernel or systemd; `None` if neither is accessible.
     pub is_synchronized: Option<bool>,
-    /// Latest time that is known to have passed.
+    /// Latest time that has certainly passed.
     pub passed: Option<SystemTime>,
 }
 

@@ -103,7 +103,7 @@ mod tests {
             (PollError::Invalid("html".into()), FleetState::InvalidResponse),
         ] {
             let seen = observe(Some("kiwi"), Err(error));
-            assert_eq!((seen.state, seen.wrong.len(), seen.report), (state, 1, None));
+            assert_eq!((seen.state, seen.problems.len(), seen.report), (state, 1, None));
         }
     }
 }
