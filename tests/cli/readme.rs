@@ -137,6 +137,7 @@ pages! {
     mock: "mock.md",
     model: "model.md",
     reality: "reality.md",
+    teaching: "teaching.md",
 }
 
 /// The page that a test of its own runs.
