@@ -174,7 +174,7 @@ fn scene_of(words: impl Iterator<Item = OsString>) -> Option<Scene> {
 mod tests {
     use super::*;
 
-    fn values(candidates: Vec<CompletionCandidate>) -> Vec<String> {
+    fn values(candidates: &[CompletionCandidate]) -> Vec<String> {
         candidates
             .iter()
             .map(|candidate| candidate.get_value().to_string_lossy().into_owned())
@@ -183,12 +183,12 @@ mod tests {
 
     #[test]
     fn names_by_their_beginning() {
-        let all = values(complete_sensor_name(OsStr::new("senscomp")));
+        let all = values(&complete_sensor_name(OsStr::new("senscomp")));
         assert!(all.contains(&"senscomp-6500".to_owned()), "{all:?}");
         assert!(all.iter().all(|name| name.starts_with("senscomp")), "{all:?}");
-        assert_eq!(values(complete_array_name(OsStr::new("pioneer-8"))), ["pioneer-8"]);
+        assert_eq!(values(&complete_array_name(OsStr::new("pioneer-8"))), ["pioneer-8"]);
         assert_eq!(
-            values(complete_shipped_scene(OsStr::new("simple-room-r"))),
+            values(&complete_shipped_scene(OsStr::new("simple-room-r"))),
             ["simple-room-robot"]
         );
     }

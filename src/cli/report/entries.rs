@@ -84,8 +84,16 @@ pub(super) fn collect(args: &Args, now: Timestamp) -> Result<Vec<Entry>, Failure
             "effective configuration, without comments and secrets",
             configuration.map(|keys| without_secrets(&toml::to_string(&keys).unwrap_or_default())),
         ),
-        Entry::from_result("status.json", "state of the daemon", status.map(pretty)),
-        Entry::from_result("health.json", "health of the daemon", health.map(pretty)),
+        Entry::from_result(
+            "status.json",
+            "state of the daemon",
+            status.map(|status| pretty(&status)),
+        ),
+        Entry::from_result(
+            "health.json",
+            "health of the daemon",
+            health.map(|health| pretty(&health)),
+        ),
         Entry::new("messages.txt", "last messages of the daemon's units", system::messages()),
         Entry::new("system.txt", "kernel, distribution, memory, user", system::describe()),
         Entry::new("ports.txt", "serial ports and their users", system::ports()),
@@ -174,8 +182,8 @@ fn daemon(client: &Client) -> (Result<Value, String>, Result<Value, String>) {
     requested.unwrap_or_else(|_| (failed(), failed()))
 }
 
-fn pretty(value: Value) -> String {
-    serde_json::to_string_pretty(&value).unwrap_or_default()
+fn pretty(value: &Value) -> String {
+    serde_json::to_string_pretty(value).unwrap_or_default()
 }
 
 /// Result of `sonard doctor --no-motion`.
