@@ -159,9 +159,7 @@ impl<'de> Deserialize<'de> for NumberDistribution {
             ) -> Result<NumberDistribution, A::Error> {
                 let mut next = || list.next_element::<f64>();
                 match (next()?, next()?, next()?) {
-                    (Some(min), Some(max), None) => {
-                        Ok(NumberDistribution::Uniform([min, max]))
-                    }
+                    (Some(min), Some(max), None) => Ok(NumberDistribution::Uniform([min, max])),
                     _ => Err(A::Error::custom("a list is [min, max]; for a choice use any_of")),
                 }
             }

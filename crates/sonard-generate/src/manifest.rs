@@ -110,8 +110,9 @@ impl ShardFacts {
                 expected: head(&expected.spec_sha256),
             });
         }
-        let drawn_by =
-            |by: &ShardIdentity| format!("{} (sampling version {})", by.sonard, by.sampling_version);
+        let drawn_by = |by: &ShardIdentity| {
+            format!("{} (sampling version {})", by.sonard, by.sampling_version)
+        };
         if (&found.sonard, found.sampling_version, found.format)
             != (&expected.sonard, expected.sampling_version, expected.format)
         {

@@ -87,7 +87,7 @@ impl Replay {
         let azimuths = || scans.iter().flat_map(|scan| &scan.pings).map(|ping| ping.azimuth_deg);
         let known = scans.iter().find_map(|scan| {
             let steps = scan.session.as_ref()?.device.as_ref()?.steps_per_revolution;
-            u16::try_from(steps).ok().filter(|steps| *steps > 0)
+            u16::try_from(steps).ok().filter(|steps| (4..=FINEST_MOTOR).contains(steps))
         });
         let planned = scans.iter().find_map(|scan| {
             let steps = 360.0 / scan.start.as_ref()?.plan.step_deg;
@@ -95,13 +95,11 @@ impl Replay {
             let range = 4.0..=f64::from(FINEST_MOTOR);
             (is_whole && range.contains(&steps)).then_some(steps.round() as u16)
         });
-        let candidates = known.into_iter().chain(planned).chain(MOTORS);
-        let fitting = candidates.map(|steps| (steps, max_deviation_deg(azimuths(), steps)));
-        let (steps_per_revolution, max_deviation_deg) = fitting
-            .clone()
-            .find(|(_, deviation_deg)| *deviation_deg <= ON_STEP_DEG)
-            .or_else(|| fitting.clone().next_back())
-            .unwrap_or((FINEST_MOTOR, 0.0));
+        let mut candidates = known.into_iter().chain(planned).chain(MOTORS);
+        let deviation_deg = |steps| max_deviation_deg(azimuths(), steps);
+        let fits = |steps: &u16| deviation_deg(*steps) <= ON_STEP_DEG;
+        let steps_per_revolution = candidates.find(fits).unwrap_or(FINEST_MOTOR);
+        let max_deviation_deg = deviation_deg(steps_per_revolution);
         let mut all = Vec::new();
         for (number, scan) in (1..).zip(scans).filter(|(_, scan)| !scan.pings.is_empty()) {
             all.push(readings(number, scan, steps_per_revolution)?);

@@ -87,12 +87,12 @@ pub(super) fn collect(args: &Args, now: Timestamp) -> Result<Vec<Entry>, Failure
         Entry::from_result(
             "status.json",
             "state of the daemon",
-            status.map(|value| pretty(&value)),
+            status.map(|status| pretty(&status)),
         ),
         Entry::from_result(
             "health.json",
             "health of the daemon",
-            health.map(|value| pretty(&value)),
+            health.map(|health| pretty(&health)),
         ),
         Entry::new("messages.txt", "last messages of the daemon's units", system::messages()),
         Entry::new("system.txt", "kernel, distribution, memory, user", system::describe()),

@@ -138,9 +138,9 @@ fn scene(kind: &SpecSceneKeys) -> String {
 fn distribution_text(spread: &NumberDistribution, unit: &str) -> String {
     match spread {
         NumberDistribution::Fixed(number) => format!("{number}{unit}"),
-        NumberDistribution::Uniform([least, most]) => format!("{least} to {most}{unit}"),
-        NumberDistribution::Normal { mean, sigma, least, most } => {
-            format!("{mean} ± {sigma}{unit} (within {least} to {most})")
+        NumberDistribution::Uniform([min, max]) => format!("{min} to {max}{unit}"),
+        NumberDistribution::Normal { mean, sigma, min, max } => {
+            format!("{mean} ± {sigma}{unit} (within {min} to {max})")
         }
         NumberDistribution::AnyOf(numbers) => {
             let numbers: Vec<_> = numbers.iter().map(ToString::to_string).collect();

@@ -121,7 +121,8 @@ fn rejects_foreign_files() {
     assert!(error.contains("shard 1 instead of 3"), "{error}");
     let facts = folder.path().join("shard-00003").join(FACTS);
     let text = fs::read_to_string(&facts).expect("there");
-    fs::write(&facts, text.replace("\"sampling_version\": ", "\"sampling_version\": 9")).expect("writable");
+    fs::write(&facts, text.replace("\"sampling_version\": ", "\"sampling_version\": 9"))
+        .expect("writable");
     let error = set.generate(3, &|_| {}).expect_err("older").to_string();
     assert!(error.contains("readings may differ"), "{error}");
     // Folder with other files.
