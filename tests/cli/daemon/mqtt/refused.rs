@@ -78,7 +78,8 @@ fn skip_sessions(max_bytes: usize) {
         let mut before = connections();
         wait_until("a lasting connection", || {
             thread::sleep(Duration::from_secs(5));
-            before == std::mem::replace(&mut before, connections())
+            let current = connections();
+            std::mem::replace(&mut before, current) == current
         });
     }
     assert_eq!(daemon.stop(), Some(0));
