@@ -7,7 +7,7 @@ single=/run/sonard/sonard.sock
 front=/run/sonard/front/sonard.sock
 rear=/run/sonard/rear/sonard.sock
 
-# Waits until a command says yes: within SECONDS COMMAND...
+# Waits until a command succeeds: within SECONDS COMMAND...
 within() {
   local limit=$1 until
   shift
@@ -80,13 +80,13 @@ configure() {
 }
 
 check_start() {
-  step "not ready before the ranger has told who it is, however long that takes"
+  step "not ready before the ranger has identified itself, however long that takes"
   start sonard.socket
   systemctl start --no-block sonard.service
   # Longer than TimeoutStartSec.
   sleep 14
   [ "$(property sonard.service ActiveState)" = activating ] || fail "$(systemctl status --no-pager sonard.service)"
-  [ "$(property sonard.service NRestarts)" = 0 ] || fail "it was not given the time that it asked for"
+  [ "$(property sonard.service NRestarts)" = 0 ] || fail "it was not given its start-up time"
   unhealthy "$single" || fail "well without a ranger: $(get "$single" health)"
   [ -n "$(property sonard.service StatusText)" ] || fail "no status text"
   start ranger@single.service
@@ -166,7 +166,7 @@ check_stop() {
   step "stopping one leaves the others"
   systemctl stop sonard.service
   reached "$front" "$rear"
-  # The socket waits for who asks, and starts the daemon for them.
+  # The socket waits for clients and starts the daemon.
   [ -S "$single" ] || fail "stopping the daemon removed its socket, which is the socket unit's"
   reached "$single"
   active sonard.service || fail "the daemon answers and is not active"
@@ -178,7 +178,7 @@ check_stop() {
 }
 
 check_folders() {
-  step "folders, files and what systemd says of them"
+  step "folders, files and warnings of systemd"
   local log
   for log in /var/lib/sonard /var/lib/sonard/front /var/lib/sonard/rear; do
     ls "$log"/*.jsonl >/dev/null || fail "no log in $log"
@@ -186,11 +186,11 @@ check_folders() {
   [ "$(stat -c '%a %U %G' /etc/sonard)" = '750 root sonard' ] || fail "$(ls -ld /etc/sonard)"
   [ "$(stat -c '%a %U %G' /run/sonard)" = '750 sonard sonard' ] || fail "$(ls -ld /run/sonard)"
   # Of the folders and settings of these units systemd has nothing to remark.
-  local said
-  said=$(journalctl --no-pager --output=cat _PID=1 | grep -F sonard | grep -iE 'mode is different|unknown|ignoring|deprecated|not supported' || true)
-  [ -z "$said" ] || fail "$said"
-  said=$(journalctl --no-pager --output=cat --unit='sonard*' | grep -iE 'mode is different|permission denied|panicked' || true)
-  [ -z "$said" ] || fail "$said"
+  local lines
+  lines=$(journalctl --no-pager --output=cat _PID=1 | grep -F sonard | grep -iE 'mode is different|unknown|ignoring|deprecated|not supported' || true)
+  [ -z "$lines" ] || fail "$lines"
+  lines=$(journalctl --no-pager --output=cat --unit='sonard*' | grep -iE 'mode is different|permission denied|panicked' || true)
+  [ -z "$lines" ] || fail "$lines"
 }
 
 # A log folder outside of /var/lib/sonard: the rejection names the drop-in, with which it works.

@@ -55,7 +55,7 @@ impl FieldQuantity {
 }
 
 impl FieldQuantity {
-    /// Returns the quantity that stands for all with the same role in a reading: azimuth or
+    /// Returns the quantity that represents all with the same role in a reading: azimuth or
     /// bearing, range or time of flight.
     pub(crate) const fn role(self) -> Self {
         match self {

@@ -84,7 +84,9 @@ async fn follow(one: PolledDaemon, path: String, send: mpsc::Sender<Line>) {
                     None => return,
                 }
             }
-            _ => format!("{}: {}", expected.as_deref().unwrap_or(&address), seen.problems.join("; ")),
+            _ => {
+                format!("{}: {}", expected.as_deref().unwrap_or(&address), seen.problems.join("; "))
+            }
         };
         if !notify(&send, &mut last, format!("{why}: reconnecting")).await {
             return;

@@ -13,7 +13,7 @@ fn published(broker: &Broker) -> Vec<String> {
     records(broker).values().map(|record| record["type"].as_str().expect("a type").into()).collect()
 }
 
-/// Details of the events that tell of records left out, as logged.
+/// Details of the events about omitted records, as logged.
 fn gaps(folder: &std::path::Path) -> Vec<String> {
     let log = clean_log(folder);
     let gaps = log.of_type("event").filter(|event| event["kind"] == "gap");

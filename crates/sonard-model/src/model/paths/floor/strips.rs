@@ -1,4 +1,4 @@
-//! Narrow strips of the floor plan: free-standing walls of a wavelength or less, which scatter from
+//! Narrow strips of the floor plan: isolated walls of a wavelength or less, which scatter from
 //! their middles.
 
 use std::f64::consts::TAU;
