@@ -9,7 +9,7 @@
 //!        └── rejected or incomplete: renamed into rejected/, then repeated
 //! ```
 //!
-//! [`collect`] takes the scans with any [`Device`] and reports to a [`Watcher`]. The command
+//! [`collect`] takes the scans with any [`ScanDevice`] and reports to a [`Observer`]. The command
 //! `sonard collect` adds options, terminal and figures.
 #![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 #![warn(clippy::expect_used, clippy::indexing_slicing, clippy::panic)]

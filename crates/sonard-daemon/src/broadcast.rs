@@ -38,7 +38,7 @@ pub struct SubscriptionFilter {
     /// Deadband of the range, metres: a reading is sent only if its range differs by more from the
     /// last one sent in its direction, or its status changed. `None` sends all readings.
     pub deadband_m: Option<f64>,
-    /// Adds verdict and viewpoint ([`Beside`]) to each reading.
+    /// Adds verdict and viewpoint ([`Annotations`]) to each reading.
     pub verdicts: bool,
 }
 

@@ -163,7 +163,7 @@ impl Journal {
     }
 
     /// Queues a record. A full queue delays the caller for a second at most;
-    /// [`is_well`](Self::is_well) is then false.
+    /// [`is_writable`](Self::is_writable) is then false.
     pub fn record(&self, record: &Record) {
         if self.progress.is_full() {
             let deadline = Instant::now() + QUEUE_TIMEOUT;

@@ -13,7 +13,7 @@
 //! - ECHO is time-stamped by the kernel when its interrupt is served, some 5 to 50 us after the
 //!   rise (1 to 9 mm too far). The microcontroller's capture unit is accurate to 0.5 us.
 //! - A further echo is detected only if BLNK follows the previous echo at once: within
-//!   [`LOOK_TICKS`] and the processor's latency.
+//!   [`ECHO_POLL_TICKS`] and the processor's latency.
 //! - After SIGKILL the pins keep their levels: a resistor must pull ENABLE high, and the service
 //!   must be restarted, which makes the pins safe first.
 

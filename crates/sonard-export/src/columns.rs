@@ -86,19 +86,19 @@ pub enum ColumnKind {
 /// Value of a cell.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Value<'a> {
-    /// Value of a [`Kind::Text`] column.
+    /// Value of a [`ColumnKind::Text`] column.
     Text(Cow<'a, str>),
-    /// Value of a [`Kind::Integer`] column.
+    /// Value of a [`ColumnKind::Integer`] column.
     Integer(i64),
-    /// Value of a [`Kind::Number`] column.
+    /// Value of a [`ColumnKind::Number`] column.
     Number(f64),
-    /// Value of a [`Kind::Flag`] column.
+    /// Value of a [`ColumnKind::Flag`] column.
     Flag(bool),
-    /// Value of a [`Kind::Time`] column.
+    /// Value of a [`ColumnKind::Time`] column.
     Time(Timestamp),
-    /// Value of a [`Kind::Integers`] column.
+    /// Value of a [`ColumnKind::Integers`] column.
     Integers(&'a [u32]),
-    /// Value of a [`Kind::Numbers`] column.
+    /// Value of a [`ColumnKind::Numbers`] column.
     Numbers(&'a [f32]),
 }
 

@@ -1,7 +1,7 @@
 //! Server side of Foxglove's WebSocket protocol, version 1, for publishing only. Lichtblick
 //! supports it, too.
 //!
-//! Sans-IO: a [`Session`] handles client messages and returns the actions to take; the other
+//! Sans-IO: a [`ViewerSession`] handles client messages and returns the actions to take; the other
 //! functions encode server messages. Text messages are JSON. Binary messages are a byte 1, the
 //! subscription id (32 bits), the time (nanoseconds, 64 bits), all little-endian, and the encoded
 //! message.

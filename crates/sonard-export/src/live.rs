@@ -25,7 +25,7 @@ const MAX_READINGS: usize = 4096;
 /// Message for live viewers.
 #[derive(Debug, Clone, Copy)]
 pub struct LiveMessage<'a> {
-    /// Topic name, one of [`Live::topics`].
+    /// Topic name, one of [`LiveConverter::topics`].
     pub topic: &'a str,
     /// Time at which the message was complete, nanoseconds since 1970.
     pub at_ns: u64,

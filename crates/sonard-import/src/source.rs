@@ -28,7 +28,7 @@ pub struct ImportSource<'a> {
 /// Assumptions for what a file does not contain.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Assumptions {
-    /// SHA-256 of the file, hexadecimal; set by [`Source::examine`].
+    /// SHA-256 of the file, hexadecimal; set by [`ImportSource::examine`].
     pub sha256: String,
     /// Pose of the robot, for the parts missing in the file.
     pub pose: Pose,

@@ -1,6 +1,6 @@
 //! Comparison of measured readings with predictions: residuals and verdicts.
 //!
-//! [`judge`] classifies one reading against its prediction; [`compare`] does so for whole scans
+//! [`classify`] classifies one reading against its prediction; [`compare`] does so for whole scans
 //! and counts. The counts are defined so that they add up:
 //!
 //! - Every beam is either *compared* (`beams`) or not (`not_compared`): its reading was lost on
@@ -141,7 +141,7 @@ pub struct VerdictCounts {
     pub edge: u32,
     /// Beams classified as [`Verdict::MinRange`].
     pub min_range: u32,
-    /// Beams classified as [`Verdict::Silent`].
+    /// Beams classified as [`Verdict::NoEcho`].
     pub silent: u32,
     /// Beams classified as [`Verdict::Unexplained`].
     pub unexplained: u32,

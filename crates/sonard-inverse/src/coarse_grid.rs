@@ -97,7 +97,7 @@ impl CoarseGrid {
     /// Predicts like [`new`](Self::new), with cancellation by `watch`.
     ///
     /// # Errors
-    /// As [`new`](Self::new), and [`AtlasError::Stopped`].
+    /// As [`new`](Self::new), and [`CoarseGridError::Stopped`].
     pub fn observed(
         world: &World,
         spacing_m: f64,

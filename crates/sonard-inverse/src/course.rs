@@ -41,7 +41,7 @@ const DRIFT_OF_TURN: f64 = 0.03;
 /// Tracker of a robot from sweep to sweep.
 ///
 /// Filter over the poses that explain each sweep (a hidden Markov model whose states are
-/// [`Mode`]s). The weight of a pose is its evidence, times its compatibility with a pose of the
+/// [`PoseMode`]s). The weight of a pose is its evidence, times its compatibility with a pose of the
 /// previous sweep and the odometry in between. After a kidnapping all poses are equally likely a
 /// priori. In a different scene than that of the previous sweep the filter is reset.
 #[derive(Debug, Clone, PartialEq)]

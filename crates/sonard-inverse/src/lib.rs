@@ -1,8 +1,8 @@
 //! Inverse problems: estimates sensor, air, scene and pose from measured readings.
 //!
-//! [`fit`] maximizes the posterior of the readings of [`Sweep`]s over the [`Parameter`]s of a
+//! [`fit`] maximizes the posterior of the readings of [`FitSweep`]s over the [`Parameter`]s of a
 //! [`World`] and returns estimates with their uncertainties. [`locate`] finds the pose of a sweep
-//! without an initial guess, with an [`Atlas`] of predicted readings, and a [`Course`] tracks a
+//! without an initial guess, with an [`CoarseGrid`] of predicted readings, and a [`Tracker`] tracks a
 //! robot from sweep to sweep.
 //!
 //! The likelihood assumes a receiver whose threshold varies a little from firing to firing. From

@@ -36,7 +36,7 @@ pub struct PoseMode {
     pub sigma_heading_deg: f64,
     /// Fraction of the readings explained by the scene.
     pub explained: f64,
-    /// Nuisance parameters fitted with the pose; see [`Atlas::fitting`].
+    /// Nuisance parameters fitted with the pose; see [`CoarseGrid::with_nuisance`].
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub nuisance: Vec<NuisanceEstimate>,
 }

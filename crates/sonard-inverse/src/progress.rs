@@ -4,7 +4,7 @@ use std::fmt;
 
 use crate::fit::SearchResult;
 
-/// Observer of a fit or a search for poses; see [`Unwatched`] for none.
+/// Observer of a fit or a search for poses; see [`NoObserver`] for none.
 pub trait FitObserver: Sync {
     /// Reports the progress of a fit.
     fn progress(&self, _progress: FitProgress) {}

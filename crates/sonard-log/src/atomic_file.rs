@@ -21,7 +21,7 @@ const MODE: u32 = 0o666;
 
 /// File that replaces another one atomically.
 ///
-/// A draft dropped before [`take_place`](Self::take_place) is removed, and the existing file stays.
+/// A draft dropped before [`commit`](Self::commit) is removed, and the existing file stays.
 /// Where the file system supports `O_TMPFILE`, the draft has no name, so a killed program
 /// leaves no file behind.
 #[derive(Debug)]

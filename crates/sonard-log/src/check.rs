@@ -47,7 +47,7 @@ pub fn check_log<R: BufRead>(
     Ok(checker.totals)
 }
 
-/// Incremental form of [`check`], for callers that supply the lines.
+/// Incremental form of [`check_log`], for callers that supply the lines.
 #[derive(Debug, Default)]
 pub struct Checker {
     totals: LogTotals,

@@ -147,10 +147,10 @@ impl<'a> DataSet<'a> {
     }
 
     /// Generates the shards of a part on all threads of the current pool. `progress` is called as
-    /// by [`make`](Self::make), and once with all readings of an existing shard.
+    /// by [`generate`](Self::generate), and once with all readings of an existing shard.
     ///
     /// # Errors
-    /// Returns the errors of [`make`](Self::make); shards that were started are finished first.
+    /// Returns the errors of [`generate`](Self::generate); shards that were started are finished first.
     pub fn generate_part(
         &self,
         part: SetPart,

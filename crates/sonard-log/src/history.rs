@@ -312,7 +312,7 @@ impl ScanSpan {
     }
 }
 
-/// Iterator of [`Passage::lines`], with one line in memory at a time.
+/// Iterator of [`ScanSpan::lines`], with one line in memory at a time.
 #[derive(Debug)]
 pub struct ScanSpanLines {
     file: io::Take<BufReader<File>>,

@@ -2,8 +2,8 @@
 //! by line number.
 //!
 //! [`LogWriter`] appends each record with one write. [`read_log`] returns every line of a log with
-//! its record or its fault. [`check`] validates a whole log, and [`repair`] removes unreadable
-//! lines. [`History`] finds the scans in a folder of logs.
+//! its record or its fault. [`check_log`] validates a whole log, and [`repair`] removes unreadable
+//! lines. [`LogIndex`] finds the scans in a folder of logs.
 #![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 #![warn(clippy::expect_used, clippy::indexing_slicing, clippy::panic)]
 

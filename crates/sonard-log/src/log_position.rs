@@ -12,7 +12,7 @@ use sha2::{Digest as _, Sha256};
 /// Number of bytes before a position that identify a log.
 pub const FINGERPRINT_BYTES: u64 = 256;
 
-/// Fingerprint of a position in a log: the preceding bytes, at most [`MARK_BYTES`].
+/// Fingerprint of a position in a log: the preceding bytes, at most [`FINGERPRINT_BYTES`].
 #[derive(Debug, Clone, Default)]
 pub struct PositionFingerprint(Vec<u8>);
 

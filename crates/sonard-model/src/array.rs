@@ -1,7 +1,7 @@
 //! Arrays: several rangers at fixed bearings on a robot, fired in sequence, in contrast to one
 //! ranger on a stepper.
 //!
-//! [`RangerArray`] holds an array's parameters, [`Course`] the trajectory of its robot.
+//! [`RangerArray`] holds an array's parameters, [`RobotCourse`] the trajectory of its robot.
 //! [`ArrayModel`](crate::model::ArrayModel) predicts the readings of the rangers, with crosstalk:
 //! rangers receive each other's sound if they fire simultaneously, or before the sound of the
 //! previous slot has decayed.

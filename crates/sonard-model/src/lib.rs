@@ -1,7 +1,7 @@
 //! Physical model of an ultrasonic ranger on a stepper, or of several rangers on a robot.
 //!
 //! From a [`scene`] (walls and cylinders with materials) and the [`acoustics`] of air, transducer
-//! and receiver, a [`model`] predicts the reading at each azimuth of a [`plan`]. An
+//! and receiver, a [`model`] predicts the reading at each azimuth of a [`scan_plan`]. An
 //! [`array`](mod@array) has several rangers at fixed bearings instead of one that rotates.
 //!
 //! A room in ten lines:

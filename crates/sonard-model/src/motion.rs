@@ -56,7 +56,7 @@ impl Trapezoid {
         }
     }
 
-    /// Same move, braked from `time_s` on, to the position of [`Self::braked_at`].
+    /// Same move, braked from `time_s` on, to the position of [`Self::braking_stop`].
     #[must_use]
     pub fn braked(&self, time_s: f64) -> Self {
         let (stop, _) = self.braking_stop(time_s);

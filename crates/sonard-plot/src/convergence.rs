@@ -25,7 +25,7 @@ pub struct Convergence {
 }
 
 /// Draws the error of each case against the resolution. The titles of both axes include units;
-/// `badge` states the provenance of the readings ([`badge_of`](crate::badge_of)).
+/// `badge` states the provenance of the readings ([`badge_for`](crate::badge_for)).
 #[must_use]
 pub fn draw_convergence(
     title: &str,

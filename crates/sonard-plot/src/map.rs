@@ -25,7 +25,7 @@ pub struct MapView<'a> {
     pub title: String,
     /// Lines below the title.
     pub lines: Vec<String>,
-    /// Provenance of the readings, unless from hardware ([`badge_of`](crate::badge_of)).
+    /// Provenance of the readings, unless from hardware ([`badge_for`](crate::badge_for)).
     pub badge: Option<&'static str>,
     /// Occupancy grid.
     pub grid: &'a Grid,

@@ -22,7 +22,7 @@ pub struct PathView<'a> {
     pub title: String,
     /// Lines below the title: reading and path.
     pub lines: Vec<String>,
-    /// Provenance of the readings, unless from hardware ([`badge_of`](crate::badge_of)).
+    /// Provenance of the readings, unless from hardware ([`badge_for`](crate::badge_for)).
     pub badge: Option<&'static str>,
     /// Scene without the robot.
     pub scene: &'a Scene,

@@ -43,7 +43,7 @@ impl DataSet<'_> {
     }
 
     /// Regenerates an existing shard and compares the digests; returns a message per problem.
-    /// `progress` is called as by [`make`](Self::make).
+    /// `progress` is called as by [`generate`](Self::generate).
     ///
     /// # Errors
     /// Returns an error if the shard cannot be generated.

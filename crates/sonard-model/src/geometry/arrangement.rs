@@ -28,7 +28,7 @@ pub struct Arrangement {
     pub points: Vec<DVec2>,
     /// Pieces of the segments; no two connect the same points.
     pub pieces: Vec<SegmentPiece>,
-    /// Overlapping segments that were given later, by the key ([`between`]) of the piece that
+    /// Overlapping segments that were given later, by the key ([`edge_key`]) of the piece that
     /// covers them.
     pub covered: HashMap<[u32; 2], Vec<u32>>,
     /// End points of each segment.

@@ -230,11 +230,11 @@ impl Scene {
         self.check_places_among(&SceneOutlines::from_scene(self), pose, places)
     }
 
-    /// Checks many poses as [`check_places`](Self::check_places) does, each with its face
+    /// Checks many poses as [`check_face_positions`](Self::check_face_positions) does, each with its face
     /// positions, finding the outlines once.
     ///
     /// # Errors
-    /// Returns the index of the first pose that fails, with the error of [`Self::check_places`].
+    /// Returns the index of the first pose that fails, with the error of [`Self::check_face_positions`].
     pub fn check_many_face_positions(
         &self,
         poses: impl IntoIterator<Item = (Pose, Vec<DVec2>)>,
@@ -270,7 +270,7 @@ impl Scene {
     }
 
     /// Accessibility of positions for the face of a ranger, by the rules of
-    /// [`check_places`](Self::check_places).
+    /// [`check_face_positions`](Self::check_face_positions).
     #[must_use]
     pub fn are_accessible(&self, places: &[DVec2]) -> Vec<bool> {
         let outlines = SceneOutlines::from_scene(self);
