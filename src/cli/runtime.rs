@@ -18,7 +18,7 @@ const THREADS: usize = 6;
 const MAX_BLOCKING_THREADS: usize = 32;
 /// Time until an idle thread for blocking calls ends. The runtime panics if it has none and the
 /// system denies a new one, so they are kept.
-const KEEP_ALIVE: Duration = Duration::from_hours(24 * 365);
+const KEEP_ALIVE: Duration = Duration::from_secs(365 * 24 * 3600);
 
 /// Creates a runtime with two threads.
 ///

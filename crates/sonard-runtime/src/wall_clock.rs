@@ -101,7 +101,7 @@ mod tests {
 
     use super::*;
 
-    const DAY: Duration = Duration::from_hours(24);
+    const DAY: Duration = Duration::from_secs(24 * 3600);
 
     /// Files of a computer, each with its modification time in days since 1970.
     fn computer(files: &[(&str, u32)]) -> tempfile::TempDir {

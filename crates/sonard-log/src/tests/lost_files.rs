@@ -26,7 +26,7 @@ impl Rig {
     fn new() -> Self {
         let parent = tempfile::tempdir().expect("a folder");
         let now = "2026-11-21T15:00:00Z".parse().expect("a time");
-        let sync_interval = Duration::from_hours(1);
+        let sync_interval = Duration::from_secs(3600);
         let rotation = Rotation { max_bytes: 1 << 20, daily: false, keep_bytes: 0, sync_interval };
         let log = LogFolder::open(&parent.path().join("log"), rotation, now).expect("opens");
         let mut rig = Self { parent, log, now };

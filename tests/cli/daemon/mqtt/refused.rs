@@ -78,7 +78,9 @@ fn skip_sessions(max_bytes: usize) {
         let mut before = connections();
         wait_until("a lasting connection", || {
             thread::sleep(Duration::from_secs(5));
-            before == std::mem::replace(&mut before, connections())
+            let (earlier, now) = (before.take(), connections());
+            before = now;
+            earlier == now
         });
     }
     assert_eq!(daemon.stop(), Some(0));
