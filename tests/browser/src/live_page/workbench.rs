@@ -592,3 +592,30 @@ fn contradictions_are_marked() {
     ]);
     assert_eq!(marked, expected);
 }
+
+#[test]
+fn located_pose_is_used() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = write_token(folder.path(), TOKEN);
+    let setting = format!("server.token_file={}", file.display());
+    // The ranger stays at its true pose, 3 cm from the assumed one.
+    let options = ["--set", &setting, "--truth-pose", "fig9"];
+    let (daemon, address) = daemon(folder.path(), "127.0.0.1:0", &options);
+    let wrong = r#"{"x_m":0.744,"y_m":0.085,"heading_deg":0}"#;
+    assert_eq!(daemon.send("PUT", "/v1/pose", wrong).status, 202);
+    let browser = Browser::open(&address, DESK);
+    browser.eval(&format!("sessionStorage.setItem('sonard-token', '{TOKEN}')"));
+    scan_once(&daemon);
+    // The result of the scan stays next to its explanation.
+    until_has(&browser, "#summary", "Last scan: 100 beams, ");
+    until_has(&browser, "#summary", "Better explained: ");
+    browser.click("#locate");
+    browser.until("!document.getElementById('use-pose').hidden");
+    browser.click("#use-pose");
+    until_has(&browser, "#next-status", "Preview (100 beams)");
+    browser.click("#apply");
+    until_has(&browser, "#summary", "Applied: pose");
+    let x_m = daemon.status()["pose"]["x_m"].as_f64();
+    assert!(x_m.is_some_and(|x_m| (x_m - 0.774).abs() < 0.002), "{x_m:?}");
+    assert_clean(&browser);
+}

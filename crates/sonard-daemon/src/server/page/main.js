@@ -311,6 +311,7 @@ async function readNewest() {
   }
   // A scan without end may also be left over from a killed daemon.
   live.running = !live.end && status.scan?.scan === live.id;
+  if (live.end) summary.last = live.summary();
   if (history.shown === null) {
     show(live);
     summary.showScan(live);

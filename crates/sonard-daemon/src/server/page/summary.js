@@ -61,7 +61,7 @@ export class Summary {
   showEvent({ kind, detail }) {
     // Explanations refer to the last scan by its identifier, which users do not see.
     const scanId = /^scan [0-9a-f-]{36}: /;
-    if (kind === "explanation") this.setNews(sentences(`Last scan: ${detail.replace(scanId, "")}`));
+    if (kind === "explanation") this.setNews(sentences(`last scan: ${this.last || detail.replace(scanId, "")}`, this.last && detail.replace(scanId, "")));
     else this.setNews(`${kind.replaceAll("_", " ")}: ${detail}`);
   }
 }
