@@ -112,7 +112,7 @@ fn dxf_other_files_and_line_ends() {
     assert!(error.help().contains("--unit-m"), "{}", error.help());
 }
 
-/// Library with one model, a box that stands on the ground.
+/// Library with one model, a box on the ground.
 struct Table;
 
 impl Library for Table {

@@ -323,7 +323,7 @@ pub(crate) fn check_messages(
     notes: &crate::limits::LimitNotes,
     assumptions: &crate::Taken,
 ) -> Result<(), ImportError> {
-    match notes.doubt() {
+    match notes.unit_fault() {
         Some((what, help)) if !assumptions.as_said => {
             Err(ImportError::Doubtful { what, help: help.to_owned() })
         }

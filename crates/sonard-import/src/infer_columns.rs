@@ -176,8 +176,8 @@ impl ColumnCandidates {
         offers
     }
 
-    /// Returns the columns of unknown meaning that may be the range: a time whose unit is also one of
-    /// times of flight, or else any unused column, in the usual units.
+    /// Returns the columns of unknown meaning that may be the range: a time whose unit is also one
+    /// of times of flight, or else any unused column, in the usual units.
     fn unnamed_ranges(&self) -> Vec<(Field, &str)> {
         let times = self.found.iter().filter(|(field, _)| field.quantity() == Quantity::Time);
         let times = times.filter_map(|(field, name)| {
@@ -268,8 +268,8 @@ impl ColumnCandidates {
 /// Maximum number of options in a message.
 const MAX_OFFERS: usize = 6;
 
-/// Returns the common field and the numbers of columns that may be the ranges of an array: more than
-/// two, adjacent and of one field.
+/// Returns the common field and the numbers of columns that may be the ranges of an array: more
+/// than two, adjacent and of one field.
 fn adjacent(ranges: &[(Field, &String)], names: &[String]) -> Option<(Field, Vec<usize>)> {
     let (field, _) = ranges.first()?;
     let place = |name: &String| names.iter().position(|known| known == name).map(|at| at + 1);

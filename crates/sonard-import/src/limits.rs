@@ -173,8 +173,8 @@ impl LimitNotes {
         self.nulls += count as u64;
     }
 
-    /// Returns the greatest plausible `max_range` of the messages, metres; `metres` is the length of
-    /// their unit.
+    /// Returns the greatest plausible `max_range` of the messages, metres; `metres` is the length
+    /// of their unit.
     pub(crate) fn max_stated_m(&self, metres: f64) -> f64 {
         let stated_m = self.max_stated * metres;
         if stated_m <= MAX_STATED_M { stated_m } else { 0.0 }
@@ -182,7 +182,7 @@ impl LimitNotes {
 
     /// Returns evidence of wrong units, with advice: all ranges beyond `max_range`, all below
     /// `min_range`, or angles in degrees.
-    pub(crate) fn doubt(&self) -> Option<(String, &'static str)> {
+    pub(crate) fn unit_fault(&self) -> Option<(String, &'static str)> {
         if self.max_angle_rad > MAX_ANGLE_RAD {
             let what = format!(
                 "angles reach {:.1} rad, which looks like degrees; a LaserScan has radians",

@@ -366,8 +366,8 @@ impl Bag {
         Ok((in_robot, Some(pose), tilt_deg))
     }
 
-    /// Returns the pose and the tilt (degrees) of the robot; for a rotating ranger, with the position
-    /// of its rotation axis.
+    /// Returns the pose and the tilt (degrees) of the robot; for a rotating ranger, with the
+    /// position of its rotation axis.
     fn pose(&self, source: &Topic, time_ns: i64) -> Result<(Pose, f64), TransformError> {
         let robot = self.frames.place(&source.robot, &source.world, time_ns)?;
         let at = match self.rotates {
