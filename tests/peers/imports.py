@@ -624,19 +624,19 @@ def check(trip, name):
     file = write(trip, log)
     pose = ["--sensor", "pioneer"] if kind == "array" else ["--pose=%g,%g,%g" % POSE, "--sensor", "hc-sr04"]
     imported = trip.run("import", file, *options, *pose)
-    said = " ".join(imported.stderr.split())
+    message = " ".join(imported.stderr.split())
     if rejected is not None:
         print(f"{name:<44} {len(log.readings):>8} {'rejected, with its option' if imported.returncode else 'NOT REJECTED':>30}")
-        is_right = imported.returncode == 2 and re.search(rejected, said)
-        return None if is_right else f"expected a rejection with {rejected!r}: {said}"
+        is_right = imported.returncode == 2 and re.search(rejected, message)
+        return None if is_right else f"expected a rejection with {rejected!r}: {message}"
     if imported.returncode:
-        return f"rejected: {said}"
+        return f"rejected: {message}"
     got = parse(imported.stdout)
     same = equal(got.readings, log.readings, off_m, off_deg)
     beams, share = agreement(trip, imported.stdout)
     print(f"{name:<44} {beams:>8} {same:>14} {100 * share:>13.1f} %")
     if (beams, same) != (len(log.readings), len(log.readings)) or share < AGREEMENT:
-        return f"{len(log.readings)} were written, {beams} read, {same} of them equal; {100 * share:.1f} % agree: {said}"
+        return f"{len(log.readings)} were written, {beams} read, {same} of them equal; {100 * share:.1f} % agree: {message}"
     return None
 
 

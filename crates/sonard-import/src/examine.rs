@@ -327,7 +327,7 @@ pub(crate) fn check_messages(
     notes: &crate::limits::LimitNotes,
     assumptions: &crate::Assumptions,
 ) -> Result<(), ImportError> {
-    match notes.implausibility() {
+    match notes.unit_fault() {
         Some((what, help)) if !assumptions.skip_checks => {
             Err(ImportError::Implausible { what, help: help.to_owned() })
         }

@@ -55,8 +55,8 @@ impl FieldQuantity {
 }
 
 impl FieldQuantity {
-    /// Returns the quantity that represents all with the same role in a reading: azimuth or
-    /// bearing, range or time of flight.
+    /// Returns the first quantity with the same role in a reading: azimuth for a bearing, range for
+    /// a time of flight.
     pub(crate) const fn role(self) -> Self {
         match self {
             Self::Bearing => Self::Azimuth,

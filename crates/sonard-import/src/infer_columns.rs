@@ -178,8 +178,8 @@ impl ColumnCandidates {
         offers
     }
 
-    /// Returns the columns of unknown meaning that may be the range: a time whose unit is also one of
-    /// times of flight, or else any unused column, in the usual units.
+    /// Returns the columns of unknown meaning that may be the range: a time whose unit is also one
+    /// of times of flight, or else any unused column, in the usual units.
     fn unnamed_ranges(&self) -> Vec<(Field, &str)> {
         let times = self.found.iter().filter(|(field, _)| field.quantity() == FieldQuantity::Time);
         let times = times.filter_map(|(field, name)| {

@@ -182,7 +182,7 @@ impl LimitNotes {
 
     /// Returns evidence of wrong units, with advice: all ranges beyond `max_range`, all below
     /// `min_range`, or angles in degrees.
-    pub(crate) fn implausibility(&self) -> Option<(String, &'static str)> {
+    pub(crate) fn unit_fault(&self) -> Option<(String, &'static str)> {
         if self.max_angle_rad > MAX_ANGLE_RAD {
             let what = format!(
                 "angles reach {:.1} rad, which looks like degrees; a LaserScan has radians",

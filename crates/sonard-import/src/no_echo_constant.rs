@@ -402,7 +402,7 @@ mod tests {
     }
 
     #[test]
-    fn finds_noisy_max_range_with_repeats() {
+    fn finds_noisy_repeated_maximum() {
         // Tenths of a centimetre repeat: the whole group is one constant.
         let noisy = |at: usize| 398.0 + (at * 7919 % 11) as f64 / 10.0;
         let found = sweep(400.0, |at| if at % 2 == 0 { noisy(at) } else { wall(at) });
@@ -411,7 +411,7 @@ mod tests {
     }
 
     #[test]
-    fn finds_low_constant_among_many_values() {
+    fn finds_low_constant() {
         let mut histogram = RangeHistogram::new(DirectionKind::Angles);
         for at in 0..9000_usize {
             let value = if at % 4 == 0 { 2.0 } else { 100.0 + at as f64 * 0.013 };

@@ -87,6 +87,11 @@ impl UnitContext<'_> {
     }
 }
 
+/// Builds the error for values that are implausible in their unit.
+fn implausible(what: String, help: String) -> ImportError {
+    ImportError::Implausible { what, help }
+}
+
 /// Returns the length in metres of one unit of a range or a time of flight.
 fn metres_per_unit(field: Field, sound_speed_m_s: f64) -> f64 {
     match field.quantity() {
@@ -233,23 +238,20 @@ impl RangeStats {
         let first = constant.first.map(|first| format!(" (first at {first})")).unwrap_or_default();
         let unit = units.unit();
         Err(if constant.is_cluster {
-            ImportError::Implausible {
-                what: format!(
-                    "{count} of {of} ranges are {value} or more {unit}: {}",
-                    constant.why
-                ),
-                help: format!(
+            implausible(
+                format!("{count} of {of} ranges are {value} or more {unit}: {}", constant.why),
+                format!(
                     "if they mean no echo: --no-echo-from={value}; if they are distances: --no-unit-check"
                 ),
-            }
+            )
         } else {
-            ImportError::Implausible {
-                what: format!("{count} of {of} ranges are {value} {unit}{first}: {}", constant.why),
-                help: format!(
+            implausible(
+                format!("{count} of {of} ranges are {value} {unit}{first}: {}", constant.why),
+                format!(
                     "if it means no echo: {}; if it is a distance: --no-unit-check",
                     units.mapping.none_option(&[value])
                 ),
-            }
+            )
         })
     }
 
@@ -279,7 +281,7 @@ impl RangeStats {
                 "mixed units? If they mean no echo: --no-echo-from={none_from:.3}; --no-unit-check skips this check"
             )
         };
-        Err(ImportError::Implausible { what, help })
+        Err(implausible(what, help))
     }
 
     /// Rejects ranges of which most are beyond the sensor's maximum range.
@@ -298,7 +300,7 @@ impl RangeStats {
             self.echoes,
             units.unit(),
         );
-        Err(self.doubtful_unit(what, units, assumptions))
+        Err(self.implausible_unit(what, units, assumptions))
     }
 
     fn check_near(
@@ -318,11 +320,11 @@ impl RangeStats {
             units.unit(),
             assumptions.sensor,
         );
-        Err(self.doubtful_unit(what, units, assumptions))
+        Err(self.implausible_unit(what, units, assumptions))
     }
 
     /// Builds the error for ranges that are implausible in their unit, with the units that fit.
-    fn doubtful_unit(
+    fn implausible_unit(
         &self,
         what: String,
         units: &UnitContext,
@@ -341,7 +343,7 @@ impl RangeStats {
                 )
             }
         };
-        ImportError::Implausible { what, help }
+        implausible(what, help)
     }
 }
 
@@ -523,29 +525,26 @@ impl SweepStats {
         let are_degrees = max_angle > 4.0 * std::f64::consts::TAU
             || (max_angle > MAX_RAD && self.directions.all_integers);
         if field.is_radians() && are_degrees {
-            return Err(ImportError::Implausible {
-                what: format!(
+            return Err(implausible(
+                format!(
                     "{field} spans {low:.1} to {high:.1} rad, {:.1} revolutions",
                     max_angle / std::f64::consts::TAU
                 ),
-                help: format!("if these are degrees: {option}; --no-unit-check skips this check"),
-            });
+                format!("if these are degrees: {option}; --no-unit-check skips this check"),
+            ));
         }
         if field.unit() == Some("deg") && self.directions.directions_look_like_radians() {
-            return Err(ImportError::Implausible {
-                what: format!("{field} spans {low:.3} to {high:.3}, which looks like radians"),
-                help: format!(
-                    "if these are radians: {option}; if they are degrees: --no-unit-check"
-                ),
-            });
+            return Err(implausible(
+                format!("{field} spans {low:.3} to {high:.3}, which looks like radians"),
+                format!("if these are radians: {option}; if they are degrees: --no-unit-check"),
+            ));
         }
         let step = self.directions.usual_step().unwrap_or(0.0);
         if field.unit() == Some("deg") && step >= 360.0 {
-            return Err(ImportError::Implausible {
-                what: format!("{field} changes by {step:.0} degrees from reading to reading"),
-                help: "is it the right column, and its unit? --no-unit-check skips this check"
-                    .to_owned(),
-            });
+            return Err(implausible(
+                format!("{field} changes by {step:.0} degrees from reading to reading"),
+                "check the column and its unit; --no-unit-check skips this check".to_owned(),
+            ));
         }
         Ok(())
     }
@@ -560,10 +559,10 @@ impl SweepStats {
         let option = Field::with_unit(FieldQuantity::Heading, Some("rad"))
             .map(|field| units.mapping.columns_option_with(field, units.names))
             .unwrap_or_default();
-        Err(ImportError::Implausible {
-            what: format!("{field} spans {low:.3} to {high:.3}, which looks like radians"),
-            help: format!("if these are radians: {option}; if they are degrees: --no-unit-check"),
-        })
+        Err(implausible(
+            format!("{field} spans {low:.3} to {high:.3}, which looks like radians"),
+            format!("if these are radians: {option}; if they are degrees: --no-unit-check"),
+        ))
     }
 
     fn check_places(&self, units: &UnitContext) -> Result<(), ImportError> {
@@ -580,16 +579,16 @@ impl SweepStats {
             .filter_map(|quantity| units.mapping.columns.get(&units.mapping.field(*quantity)?))
             .map(ToString::to_string)
             .collect();
-        Err(ImportError::Implausible {
-            what: format!(
+        Err(implausible(
+            format!(
                 "{} follow from direction and range: they are the position of the echo, not of the robot",
                 named.join(" and ")
             ),
-            help: format!(
+            format!(
                 "leave them out: {}; --no-unit-check takes them as the position of the robot",
                 crate::mapping::columns_option(columns, units.names)
             ),
-        })
+        ))
     }
 }
 

@@ -105,7 +105,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn other_entities_and_sections_are_removed() {
+    fn other_entities_are_removed() {
         let text = "  0\nSECTION\n  2\nTABLES\n  0\nTABLE\n  2\nLAYER\n 70\n3\n  0\nLAYER\n  2\nFurn\n 70\n5\n  0\nLAYER\n  2\n\
             locked\n 70\n4\n  0\nENDTAB\n  0\nENDSEC\n  0\nSECTION\n  2\nBLOCKS\n  0\nBLOCK\n  2\nDoor\n  0\nHATCH\n  8\nA\n\
             0\nENDBLK\n  0\nENDSEC\n  0\nSECTION\n  2\nENTITIES\n  0\nLINE\n  8\nA\n  0\nMULTILEADER\n  8\nB\n170\n1\n\

@@ -119,7 +119,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn markers_and_filters_are_blanked() {
+    fn markers_filters_are_blanked() {
         let svg = "<svg viewBox='0 0 1 1'><defs>\n<marker id='a'><path d='M 0 0 L 1 1'/>\n</marker></defs>\n\
             <path filter='url(#f)' style='stroke:red;filter:url(#f)' d='M 0 0 L 1 0'/></svg>";
         let Drawing { text, notes, has_size } = prepare(svg.as_bytes(), "").expect("a drawing");

@@ -66,8 +66,8 @@ impl Page {
         lines
     }
 
-    /// Approximates a Bezier curve by short lines. The deviation of `n` lines is at most `3 b / 4 n^2`,
-    /// with the greatest second difference `b` of the control points (Wang).
+    /// Approximates a Bezier curve by short lines. The deviation of `n` lines is at most
+    /// `3 b / 4 n^2`, with the greatest second difference `b` of the control points (Wang).
     fn curve(&self, corners: &mut Vec<DVec2>, points: [Point; 4]) {
         let [a, b, c, d] = points.map(|point| self.place(point));
         let bend_m = (a - 2.0 * b + c).length().max((b - 2.0 * c + d).length());

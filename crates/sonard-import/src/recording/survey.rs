@@ -276,7 +276,7 @@ impl Bag {
     /// Rejects rangers on several robots.
     fn check_robots(&self) -> Result<(), ImportError> {
         let mut robots: BTreeMap<&str, Vec<&str>> = BTreeMap::new();
-        // Without transforms, the root of a tree stands for the robot.
+        // Without transforms, the root of a tree replaces the robot.
         let is_named = |source: &Topic| robot_frame(&[&source.robot]).is_some();
         for (topic, source) in self.topics.iter().filter(|(_, source)| is_named(source)) {
             robots.entry(&source.robot).or_default().push(topic);

@@ -215,7 +215,7 @@ fn offers_range_unit() {
 
 /// Two robots that log to one file differ in their hosts.
 #[test]
-fn carmen_robots_are_told_apart() {
+fn carmen_robots_by_host() {
     let line = |host: &str, at: u32, range: &str| {
         format!(
             "ODOM {at} 0 0 0 0 0 1000.{at} {host} 0.{at}\nSONAR 0.26 2 {range} 1.5 0.2 0 0 0 0.1 1.57 1000.{at} {host} 0.{at}\n"
@@ -246,7 +246,7 @@ fn carmen_robots_are_told_apart() {
 }
 
 #[test]
-fn rounds_before_the_first_pose_are_skipped() {
+fn rounds_before_first_pose() {
     let sonar = "SONAR 0.26 2 1.0 1.5 0.2 0 0 0 0.1 1.57 1000.1 host 0.1\n";
     let odometry = "ODOM 3 0 0 0 0 0 1000.2 host 0.2\n";
     let truth = "TRUEPOS 4 0 0 0 0 0 1000.3 host 0.3\n";

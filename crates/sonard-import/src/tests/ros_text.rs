@@ -89,7 +89,7 @@ fn reads_lists_of_pairs() {
 }
 
 #[test]
-fn non_finite_ranges_follow_rep_117() {
+fn non_finite_ranges_of_json() {
     let text = SCAN.replace("1.1, null, 0.0", "Infinity, -Infinity, NaN");
     let records = import(&text, Mapping::default()).expect("a scan");
     let statuses: Vec<PingStatus> = pings(&records).iter().map(|ping| ping.status).collect();

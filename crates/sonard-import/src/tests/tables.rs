@@ -353,7 +353,7 @@ fn full_circle_and_back() {
     assert_eq!(ends.collect::<Vec<_>>(), [37, 36, 36]);
 }
 
-/// One range column per ranger, by names that have only the unit.
+/// Arrays with a column for each ranger, by names that have only the unit.
 #[test]
 fn array_columns_without_quantity() {
     let array = RangerArray::preset("pioneer-8").expect("a preset");

@@ -153,7 +153,7 @@ fn finds_headings_in_radians() {
 }
 
 #[test]
-fn offers_units_of_time_and_length() {
+fn offers_fitting_units() {
     let table = |scale: f64| -> String {
         (0..36)
             .map(|at| format!("{},{:.1}\n", 10 * at, scale * (1.2 + 0.01 * f64::from(at))))

@@ -241,7 +241,7 @@ fn sweeps_end_on_reversal() {
 }
 
 #[test]
-fn rejects_rangers_of_several_robots() {
+fn rejects_several_robots() {
     let mut bag = Bag::new(Order::Little);
     for robot in ["r1", "r2"] {
         let [base, sonar] = ["base_link", "sonar"].map(|name| format!("{robot}/{name}"));
@@ -266,7 +266,7 @@ fn rejects_rangers_of_several_robots() {
 }
 
 #[test]
-fn rejects_scans_in_degrees_and_near_ranges() {
+fn rejects_wrong_message_units() {
     let scan = LaserScan(
         header(1_700_000_000.0, "laser"),
         [-90.0, 90.0, 90.0, 0.0, 0.0, 0.1, 10.0],

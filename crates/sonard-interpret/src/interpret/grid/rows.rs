@@ -193,7 +193,7 @@ mod tests {
     }
 
     #[test]
-    fn slanting_thin_wall_has_parallel_faces() {
+    fn slanting_wall_has_two_faces() {
         // Stairs of three cells along each step, one cell thick.
         let steps = 8;
         let lower = (0..steps).flat_map(|step| [(3 * step, step), (3 * step + 3, step)]);
