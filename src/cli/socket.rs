@@ -22,10 +22,10 @@ const SOCKET: &str = "sonard.sock";
 /// one that `sonard run` of this user makes.
 pub(super) fn default_socket() -> PathBuf {
     let own = user_socket();
-    if own.exists() || !Path::new(SYSTEM_SOCKET).exists() && !is_writable(SYSTEM_SOCKET) {
-        return own;
-    }
-    SYSTEM_SOCKET.into()
+    // A daemon of another user, in a folder that anyone may create, is not taken for this user's.
+    let is_running = own.exists() && own.parent().is_some_and(is_private);
+    let has_system = Path::new(SYSTEM_SOCKET).exists() || is_writable(SYSTEM_SOCKET);
+    if is_running || !has_system { own } else { SYSTEM_SOCKET.into() }
 }
 
 /// Place of a file of a user without rights to the system's folder; `None` with them.
@@ -64,14 +64,20 @@ pub(super) fn create_user_folder(socket: &Path) -> io::Result<()> {
         Err(error) if error.kind() != io::ErrorKind::AlreadyExists => return Err(error),
         _ => {}
     }
-    let metadata = fs::symlink_metadata(folder)?;
-    if !metadata.is_dir() || metadata.uid() != geteuid().as_raw() || metadata.mode() & 0o022 != 0 {
+    if !is_private(folder) {
         return Err(io::Error::new(
             io::ErrorKind::PermissionDenied,
             format!("{} belongs to another user, or others may write to it", folder.display()),
         ));
     }
     Ok(())
+}
+
+/// Returns `true` for a folder of this user that no other user may write to.
+fn is_private(folder: &Path) -> bool {
+    fs::symlink_metadata(folder).is_ok_and(|found| {
+        found.is_dir() && found.uid() == geteuid().as_raw() && found.mode() & 0o022 == 0
+    })
 }
 
 /// Returns `true` if this process may make a file, or the folder that it is to be in.
