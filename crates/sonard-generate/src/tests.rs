@@ -325,8 +325,8 @@ fn faults_have_position_and_advice() {
         ),
         (
             "[[scene]]",
-            "[keep]\ntrace_to_m = 90\ntrace_step_us = 1\n[[scene]]",
-            "set.toml:7:14: keep.envelope_range_m",
+            "[keep]\nenvelope_range_m = 90\nenvelope_step_us = 1\n[[scene]]",
+            "set.toml:7:20: keep.envelope_range_m",
             "samples",
             "steps",
         ),
