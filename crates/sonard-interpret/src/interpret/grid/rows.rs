@@ -96,9 +96,21 @@ fn split_at_ends(runs: &[StraightRun], is_closed: bool) -> Vec<&[StraightRun]> {
             _ => false,
         })
     };
+    // Next to an end, the first run of a face may fit as well; the shorter run of the two is the
+    // end.
+    let is_shortest = |at: &usize| {
+        let before = (is_closed || *at > 0).then(|| (at + count - 1) % count);
+        let after = (is_closed || at + 1 < count).then(|| (at + 1) % count);
+        let is_shorter = |near: usize, or_equal: bool| {
+            let (own, other) = (runs[*at].cells(), runs[near].cells());
+            !is_end(&near) || own < other || (or_equal && own == other)
+        };
+        before.is_none_or(|near| is_shorter(near, false))
+            && after.is_none_or(|near| is_shorter(near, true))
+    };
     let mut pieces = Vec::new();
     let mut begin = 0;
-    for at in (0..count).filter(is_end) {
+    for at in (0..count).filter(|at| is_end(at) && is_shortest(at)) {
         pieces
             .extend([&runs[begin..at], &runs[at..=at]].into_iter().filter(|part| !part.is_empty()));
         begin = at + 1;
