@@ -10,7 +10,8 @@ use sonard_model::{
     geometry::Pose,
 };
 use sonard_records::{
-    AirRecord, RecordErrorKind, ModelRecord, Provenance, Record, ScanPlan, ScanView, Session, decode_line,
+    AirRecord, ModelRecord, Provenance, Record, RecordErrorKind, ScanPlan, ScanView, Session,
+    decode_line,
 };
 
 use crate::RequestError;

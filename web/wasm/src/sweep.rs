@@ -62,7 +62,10 @@ impl Sweep {
     }
 
     /// Computes the next readings, at most `count`.
-    pub(crate) fn next_readings(&mut self, count: usize) -> Result<Vec<AnnotatedPing>, RequestError> {
+    pub(crate) fn next_readings(
+        &mut self,
+        count: usize,
+    ) -> Result<Vec<AnnotatedPing>, RequestError> {
         let end = self.view.pings.len().min(self.next + count);
         let readings = (self.next..end).map(|position| self.reading(position)).collect();
         self.next = end;
