@@ -1,7 +1,7 @@
 //! Environment of the board: motor position and echoes.
 
 use firmware_protocol::messages::limits::{TICK_HZ, WINDOW_TICKS_MAX};
-use sonard_mock::World;
+use sonard_mock::{Firing, World};
 
 use crate::CYCLES_PER_TICK;
 
@@ -27,8 +27,8 @@ impl Environment for World {
     }
 
     fn fire(&mut self) -> Vec<u64> {
-        let echoes = World::fire(self, WINDOW_TICKS_MAX, TICK_HZ);
-        echoes.iter().map(|&ticks| u64::from(ticks) * CYCLES_PER_TICK).collect()
+        let Firing { echo_ticks, .. } = World::fire(self, WINDOW_TICKS_MAX, TICK_HZ);
+        echo_ticks.iter().map(|&ticks| u64::from(ticks) * CYCLES_PER_TICK).collect()
     }
 }
 

@@ -147,7 +147,7 @@ mod tests {
         let motion = Trapezoid::new(steps, speed, acceleration);
         let mut position = 0;
         for number in 1..=steps.unsigned_abs() {
-            let at = HZ + (motion.pulse_s(number) * HZ as f64) as u64;
+            let at = HZ + (motion.pulse_time_s(number) * HZ as f64) as u64;
             position += motor.pulse(at, steps.signum());
         }
         position + motor.follow(HZ * 60)

@@ -25,4 +25,4 @@ pub use memory::MemorySocket;
 pub use note::Note;
 pub use replay::{Replay, ReplayError, ReplayedReading};
 pub use serve::MockPort;
-pub use world::{EchoTable, World};
+pub use world::{EchoTable, Firing, World};

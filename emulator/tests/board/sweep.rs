@@ -70,7 +70,7 @@ fn readings_match_world() {
     for reading in readings {
         assert_eq!(reading.step, i32::from(reading.index));
         let expected = world.fire(FOUR_METRES.window_ticks, TICK_HZ);
-        let first = expected.first();
+        let first = expected.echo_ticks.first();
         assert_eq!(reading.echoes.is_empty(), first.is_none(), "{reading:?} {expected:?}");
         if let Some(first) = first {
             assert!(reading.echoes[0].abs_diff(*first) <= 1, "{reading:?} {expected:?}");
