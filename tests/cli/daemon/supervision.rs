@@ -69,19 +69,26 @@ fn failed_task_ends_the_process() {
         let _manager = manager.expect("a socket");
         let mut daemon = start_with_panic(task, folder.path());
         let status = wait_for_end(&mut daemon, Duration::from_secs(30));
-        let said = daemon.said();
-        let status = status.unwrap_or_else(|| panic!("{task} is dead and the daemon runs: {said}"));
-        assert_eq!((status.code(), status.signal()), (Some(3), None), "{task}: {said}");
-        assert!(
-            said.contains(&format!("the task \"{task}\" ended unexpectedly")),
-            "{task}: {said}"
-        );
-        assert!(!said.contains("panicked at"), "{task}: {said}");
+        let report = format!("the task \"{task}\" ended unexpectedly");
+        // The reader of standard error may be behind.
+        let since = Instant::now();
+        let messages = loop {
+            let messages = daemon.said();
+            if messages.contains(&report) || since.elapsed() > Duration::from_secs(10) {
+                break messages;
+            }
+            std::thread::sleep(Duration::from_millis(20));
+        };
+        let status =
+            status.unwrap_or_else(|| panic!("{task} is dead and the daemon runs: {messages}"));
+        assert_eq!((status.code(), status.signal()), (Some(3), None), "{task}: {messages}");
+        assert!(messages.contains(&report), "{task}: {messages}");
+        assert!(!messages.contains("panicked at"), "{task}: {messages}");
         assert!(!folder.path().join("s").exists(), "{task}: the socket is left");
-        // A thread that fails before its first record leaves the log empty.
+        // A daemon that fails before its first record leaves the log empty.
         let written = logs(folder.path())
             .into_iter()
-            .filter(|log| task != Task::Log || fs::metadata(log).is_ok_and(|log| log.len() > 0));
+            .filter(|log| fs::metadata(log).is_ok_and(|log| log.len() > 0));
         for log in written {
             let verified = run(&["log", "verify", log.to_str().expect("plain path")]);
             assert_eq!(verified.status.code(), Some(0), "{task}");
@@ -93,7 +100,7 @@ fn failed_task_ends_the_process() {
                 .map(|log| fs::read_to_string(log).expect("text"))
                 .collect();
             let count = |kind: &str| text.matches(&format!("{{\"type\":\"{kind}\"")).count();
-            assert_eq!(count("scan_start"), count("scan_end"), "{task}: {said}");
+            assert_eq!(count("scan_start"), count("scan_end"), "{task}: {messages}");
         }
     }
 }
