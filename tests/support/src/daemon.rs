@@ -122,6 +122,7 @@ impl Daemon {
 
     /// Where it says that it listens by TCP.
     pub fn address(&self) -> String {
+        wait_until("the address", || self.said().contains("http://"));
         let said = self.said();
         let address = said.split("http://").nth(1).expect("it says where it listens");
         address.split_whitespace().next().expect("an address").to_owned()
