@@ -4,6 +4,7 @@
 use super::{
     canvas::{Anchor, Layer, MarkShape, Px},
     floor::MIN_RANGE_DASH,
+    labels::Labels,
     plan::PlanProjection,
     readings::{PlottedBeam, PlottedScan},
     theme,
@@ -44,17 +45,37 @@ impl FanStyle {
     /// Draws the name of each ranger in its fan.
     fn names(&self, plan: &PlanProjection, scan: &PlottedScan) -> Layer {
         let mut names = Layer::new("rangers").with("fill", theme::QUIET).haloed();
-        for beam in &scan.beams {
-            let (Some(viewpoint), Some(name)) = (&beam.viewpoint, &beam.ranger) else { continue };
+        for (name, at) in self.places_of_names(plan, scan) {
+            names.text(at, Anchor::Middle, theme::SMALL_PX, name);
+        }
+        names
+    }
+
+    /// Keeps other labels off the names of the rangers.
+    pub(super) fn reserve_names(&self, plan: &Plan, scan: &PlottedScan, labels: &mut Labels) {
+        if scan.beams.len() <= MAX_LABELLED {
+            for (name, at) in self.places_of_names(plan, scan) {
+                // A name at the border has its place, too.
+                let _is_inside = labels.place(at, Anchor::Middle, theme::SMALL_PX, name);
+            }
+        }
+    }
+
+    /// Name of each ranger with its place in the fan.
+    fn places_of_names<'a>(
+        &'a self,
+        plan: &'a Plan,
+        scan: &'a PlottedScan,
+    ) -> impl Iterator<Item = (&'a str, Px)> {
+        scan.beams.iter().filter_map(move |beam| {
+            let (viewpoint, name) = (beam.viewpoint.as_ref()?, beam.ranger.as_deref()?);
             let range_m = beam.range_m.unwrap_or(self.max_range_m);
             // Where the fan is wide enough, but still within the picture; closer for a fan without
             // echo, where fewer other names are.
             let share = if beam.range_m.is_some() { 0.3 } else { 0.15 };
             let out_m = (0.6 * range_m).min(share * plan.view.size().min_element());
-            let at = plan.px(viewpoint.point_at(out_m)) + Px::new(0.0, 4.0);
-            names.text(at, Anchor::Middle, theme::SMALL_PX, name);
-        }
-        names
+            Some((name, plan.px(viewpoint.point_at(out_m)) + Px::new(0.0, 4.0)))
+        })
     }
 
     fn fan(&self, plan: &PlanProjection, beam: &PlottedBeam, from: &Viewpoint) -> Layer {

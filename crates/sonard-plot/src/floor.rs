@@ -95,6 +95,9 @@ impl Floor<'_> {
                 }
             }
         }
+        if let (Some(fan), false) = (self.scan.fan, self.scan.has_model) {
+            fan.reserve_names(self.plan, self.scan, labels);
+        }
         self.plan.avoid_pose(&self.pose, labels);
     }
 

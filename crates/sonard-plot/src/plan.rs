@@ -1,5 +1,7 @@
 //! Floor plans: conversion of metres to pixels, frame, grid, walls, poses and scale bar.
 
+use std::collections::HashSet;
+
 use super::{
     canvas::{Anchor, Layer, Px, Rect, text_width_px},
     labels::Labels,
@@ -188,10 +190,17 @@ impl PlanProjection {
         let mut layer = Layer::new("names").with("fill", theme::QUIET).haloed();
         let middle = Bounds::from_scene(scene).map_or(DVec2::ZERO, |b| (b.min + b.max) / 2.0);
         let mut groups: Vec<(&str, Bounds)> = Vec::new();
+        let is_short = |wall: &sonard_model::scene::Wall| {
+            let length_px = (self.px(wall.b) - self.px(wall.a)).length();
+            length_px < text_width_px(&wall.id, theme::SMALL_PX)
+        };
+        // A polyline with a segment that is too short for its name has one name.
+        let short = scene.walls.iter().filter(|wall| is_short(wall));
+        let grouped: HashSet<&str> = short.map(|wall| polyline_name(&wall.id)).collect();
         for wall in &scene.walls {
             let [a, b] = [self.px(wall.a), self.px(wall.b)];
             let along = b - a;
-            if along.length() < text_width_px(&wall.id, theme::SMALL_PX) {
+            if grouped.contains(&polyline_name(&wall.id)) {
                 note_group(&mut groups, &wall.id, wall.a, wall.b);
                 continue;
             }
@@ -288,9 +297,14 @@ impl PlanProjection {
     }
 }
 
+/// Name of the polyline of a segment `id.N`; the name of any other wall.
+fn polyline_name(id: &str) -> &str {
+    id.rsplit_once('.').map_or(id, |(name, _)| name)
+}
+
 /// Extends the bounds of the polyline that a short segment `id.N` belongs to.
 fn note_group<'a>(groups: &mut Vec<(&'a str, Bounds)>, id: &'a str, a: DVec2, b: DVec2) {
-    let name = id.rsplit_once('.').map_or(id, |(name, _)| name);
+    let name = polyline_name(id);
     match groups.iter_mut().find(|(known, _)| *known == name) {
         Some((_, bounds)) => *bounds = bounds.including([a, b]),
         None => groups.extend(Bounds::around([a, b]).map(|bounds| (name, bounds))),
