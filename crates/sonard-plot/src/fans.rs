@@ -52,7 +52,12 @@ impl FanStyle {
     }
 
     /// Keeps other labels off the names of the rangers.
-    pub(super) fn reserve_names(&self, plan: &Plan, scan: &PlottedScan, labels: &mut Labels) {
+    pub(super) fn reserve_names(
+        &self,
+        plan: &PlanProjection,
+        scan: &PlottedScan,
+        labels: &mut Labels,
+    ) {
         if scan.beams.len() <= MAX_LABELLED {
             for (name, at) in self.places_of_names(plan, scan) {
                 // A name at the border has its place, too.
@@ -64,7 +69,7 @@ impl FanStyle {
     /// Name of each ranger with its place in the fan.
     fn places_of_names<'a>(
         &'a self,
-        plan: &'a Plan,
+        plan: &'a PlanProjection,
         scan: &'a PlottedScan,
     ) -> impl Iterator<Item = (&'a str, Px)> {
         scan.beams.iter().filter_map(move |beam| {
