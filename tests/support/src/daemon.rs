@@ -113,14 +113,14 @@ impl Daemon {
         Ok(stream)
     }
 
-    /// Connects by TCP, where the daemon says it listens.
+    /// Connects by TCP, to the address in the log.
     pub fn connect_tcp(&self) -> TcpStream {
         let stream = TcpStream::connect(self.address()).expect("it listens there");
         stream.set_read_timeout(Some(Duration::from_secs(20))).expect("a socket");
         stream
     }
 
-    /// Where it says that it listens by TCP.
+    /// Address of the daemon's TCP server.
     pub fn address(&self) -> String {
         wait_until("the address", || self.said().contains("http://"));
         let said = self.said();
