@@ -1,7 +1,8 @@
 //! Bodies of the fuzz targets of decoders; `tests/decoders.rs` runs them on random bytes and on the
 //! kept seeds.
 //!
-//! Any bytes are read as a file: nothing panics, and an examination counts what a conversion yields.
+//! Any bytes are read as a file: nothing panics, and an examination counts what a conversion
+//! yields.
 
 use std::{
     io::{self, Cursor, Read},

@@ -23,7 +23,7 @@
 //! let sensor = Sensor::preset("senscomp-6500")?;
 //! let simulator = Simulator::new(scene, sensor, Air::default(), Options::default())?;
 //! let readings = simulator.predict(&pose, &ScanPlan::default())?;
-//! // At azimuth 270 the wall is 85 mm away; the echo was reflected by the near, the far and again the near wall.
+//! // At azimuth 270 the wall is 85 mm away; the near, the far and the near wall reflect the sound.
 //! let range_m = readings[300].range_m.ok_or("silent")?;
 //! let path = readings[300].arrival.as_ref().ok_or("silent")?;
 //! assert!((path.length_m - 1.654).abs() < 1e-6);

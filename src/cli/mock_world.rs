@@ -112,7 +112,8 @@ impl MockWorldArgs {
 
     fn settings(&self, pace: Pace, steps_per_revolution: u16) -> BoardSettings {
         BoardSettings {
-            // Consecutive mocks are different boots, so the boot number must not come from the seed.
+            // Consecutive mocks are different boots, so the boot number must not come from the
+            // seed.
             boot: rand::rng().random_range(1..=u16::MAX),
             clock: 0,
             steps_per_revolution,

@@ -3,8 +3,8 @@
 //! Readings and predictions become tables (CSV and, with the feature `parquet`, Parquet) or ROS 2
 //! recordings (MCAP). Maps, lines and features become recordings or GeoJSON.
 //!
-//! [`LiveConverter`] converts records to the messages of a recording as they arrive. [`foxglove`] implements
-//! the protocol of live viewers, [`dds`] the topic names and encapsulation of ROS 2.
+//! [`LiveConverter`] converts records to the messages of a recording as they arrive. [`foxglove`]
+//! implements the protocol of live viewers, [`dds`] the topic names and encapsulation of ROS 2.
 //!
 //! An [`Export`] takes scans one by one and writes to any `Write`, so its memory does not grow with
 //! their number.

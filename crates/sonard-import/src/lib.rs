@@ -3,10 +3,10 @@
 //! Supported sources are tables (CSV and similar), JSON, ROS messages as text, CARMEN and Player
 //! logs and, with the feature `recordings`, ROS 2 recordings (MCAP). [`FORMATS`] lists them.
 //!
-//! A [`Mapping`] states the meaning of the columns. [`ImportSource`] detects the format of a file and
-//! reads the file three times: for its hash and encoding, to check it against the mapping, and to
-//! produce records. At most one scan is held in memory; a JSON file that is not JSON Lines is held
-//! as a whole, up to 64 MB.
+//! A [`Mapping`] states the meaning of the columns. [`ImportSource`] detects the format of a file
+//! and reads the file three times: for its hash and encoding, to check it against the mapping, and
+//! to produce records. At most one scan is held in memory; a JSON file that is not JSON Lines is
+//! held as a whole, up to 64 MB.
 
 mod array_rounds;
 mod carmen;

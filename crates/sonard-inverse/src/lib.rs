@@ -2,8 +2,8 @@
 //!
 //! [`fit`] maximizes the posterior of the readings of [`FitSweep`]s over the [`Parameter`]s of a
 //! [`World`] and returns estimates with their uncertainties. [`locate`] finds the pose of a sweep
-//! without an initial guess, with an [`CoarseGrid`] of predicted readings, and a [`Tracker`] tracks a
-//! robot from sweep to sweep.
+//! without an initial guess, with a [`CoarseGrid`] of predicted readings, and a [`Tracker`] tracks
+//! a robot from sweep to sweep.
 //!
 //! The likelihood assumes a receiver whose threshold varies a little from firing to firing. From
 //! the lowest threshold to the highest it would report one arrival after the other, and finally

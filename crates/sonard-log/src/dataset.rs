@@ -150,7 +150,8 @@ impl<'a> DataSet<'a> {
     /// by [`generate`](Self::generate), and once with all readings of an existing shard.
     ///
     /// # Errors
-    /// Returns the errors of [`generate`](Self::generate); shards that were started are finished first.
+    /// Returns the errors of [`generate`](Self::generate); shards that were started are finished
+    /// first.
     pub fn generate_part(
         &self,
         part: SetPart,

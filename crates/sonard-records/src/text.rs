@@ -27,7 +27,8 @@ pub fn group_digits(count: u64) -> String {
     text
 }
 
-/// Formats a length, metres, in a unit that keeps its leading digit: `0.04 mm`, `123.4 mm`, `1.50 m`.
+/// Formats a length, metres, in a unit that keeps its leading digit: `0.04 mm`, `123.4 mm`, `1.50
+/// m`.
 #[must_use]
 pub fn format_length(length_m: f64) -> String {
     match length_m.abs() {

@@ -153,8 +153,8 @@ fn configuration(file: Option<&Path>) -> Result<Keys, String> {
         .map_err(|error| format!("{error}; {}", error.help))
 }
 
-/// Configuration without user names and passwords of addresses, and without values of keys that hold
-/// secrets.
+/// Configuration without user names and passwords of addresses, and without values of keys that
+/// hold secrets.
 fn without_secrets(text: &str) -> String {
     let line = |line: &str| {
         let (key, value) = line.split_once(" = ")?;

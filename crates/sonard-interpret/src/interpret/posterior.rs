@@ -23,8 +23,8 @@ const P_OTHER: [f64; 6] = [0.021, 0.32, 0.86, 0.945, 0.985, 0.993];
 /// Prior probabilities of plane, corner and edge, given that the arc is one of these.
 const P_KINDS: [f64; 3] = [0.58, 0.34, 0.08];
 
-/// Prior probabilities of plane, corner and edge for an arc near enough to be a repeat. Edges are too
-/// weak to be detected farther away.
+/// Prior probabilities of plane, corner and edge for an arc near enough to be a repeat. Edges are
+/// too weak to be detected farther away.
 const P_KINDS_NEAR: [f64; 3] = [0.70, 0.06, 0.24];
 
 /// Prior probability that an arc near enough is the repeat of a wall within the blanking interval.

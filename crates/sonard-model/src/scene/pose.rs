@@ -230,11 +230,12 @@ impl Scene {
         self.check_places_among(&SceneOutlines::from_scene(self), pose, places)
     }
 
-    /// Checks many poses as [`check_face_positions`](Self::check_face_positions) does, each with its face
-    /// positions, finding the outlines once.
+    /// Checks many poses as [`check_face_positions`](Self::check_face_positions) does, each with
+    /// its face positions, finding the outlines once.
     ///
     /// # Errors
-    /// Returns the index of the first pose that fails, with the error of [`Self::check_face_positions`].
+    /// Returns the index of the first pose that fails, with the error of
+    /// [`Self::check_face_positions`].
     pub fn check_many_face_positions(
         &self,
         poses: impl IntoIterator<Item = (Pose, Vec<DVec2>)>,
