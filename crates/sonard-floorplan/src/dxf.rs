@@ -9,7 +9,7 @@ use std::panic;
 
 use dxf::{Drawing, enums::Units};
 
-use crate::{FloorPlan, PlanError};
+use crate::{FloorPlan, PlanError, check_size};
 use layers::Layers;
 use plan::Plan;
 use reduce::reduce;
@@ -33,12 +33,13 @@ const HELP: &str = "give a DXF file, ASCII or binary, from a CAD program";
 /// Reads the walls of a drawing.
 ///
 /// # Errors
-/// Returns an error for a file that is not DXF, for an unknown or implausible unit, and for a
+/// Returns an error for a file that is not DXF or above the size limit, for an unknown or implausible unit, and for a
 /// requested layer that is empty.
 pub fn read(bytes: &[u8], options: &DxfOptions) -> Result<FloorPlan, PlanError> {
     if let Some((_, what, help)) = OTHER_KINDS.iter().find(|(magic, ..)| bytes.starts_with(magic)) {
         return Err(PlanError::new(format!("the file is {what}"), *help));
     }
+    check_size(bytes)?;
     let bytes = pairs::with_line_feeds(bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes));
     let reduced = reduce(&bytes);
     let drawing = load(&reduced.bytes)

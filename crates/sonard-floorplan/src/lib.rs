@@ -25,6 +25,19 @@ mod xml;
 pub use error::PlanError;
 use sonard_model::scene::Surfaces;
 
+/// Maximum size of a file, decompressed, bytes. A drawing of lines alone takes up to 60 times its
+/// size in memory.
+const MAX_FILE_BYTES: usize = 16 << 20;
+
+/// Rejects a file above [`MAX_FILE_BYTES`].
+fn check_size(bytes: &[u8]) -> Result<(), PlanError> {
+    if bytes.len() <= MAX_FILE_BYTES {
+        return Ok(());
+    }
+    let what = format!("the file is larger than {} MB (decompressed)", MAX_FILE_BYTES >> 20);
+    Err(PlanError::new(what, "save the walls alone: without furniture, meshes, texts and hatches"))
+}
+
 /// Surfaces found in a file, metres.
 #[derive(Debug, Default)]
 pub struct FloorPlan {

@@ -174,3 +174,25 @@ fn sdf_nesting_is_limited() {
                  </geometry></collision></link></model>";
     assert_eq!(walls(&world(joint))[0], [2.0, -0.5, 4.0, -0.5]);
 }
+
+#[test]
+fn large_files_are_rejected() {
+    use std::io::Write as _;
+
+    use flate2::{Compression, write::GzEncoder};
+
+    let large = vec![b' '; crate::MAX_FILE_BYTES + 1];
+    let mut encoder = GzEncoder::new(Vec::new(), Compression::fast());
+    encoder.write_all(&large).expect("in memory");
+    let compressed = encoder.finish().expect("in memory");
+    let svg = |bytes: &[u8]| svg::read(bytes, &SvgOptions { width_m: 10.0 });
+    for plan in [
+        dxf::read(&large, &DxfOptions::default()),
+        svg(&large),
+        svg(&compressed),
+        sdf::read(&large, &SdfOptions { cut_z_m: 0.3 }, &Table),
+    ] {
+        let error = plan.expect_err("too large");
+        assert!(error.to_string().contains("larger than 16 MB"), "{error}");
+    }
+}

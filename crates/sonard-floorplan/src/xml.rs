@@ -6,21 +6,20 @@ use encoding_rs::{Encoding, UTF_8};
 use flate2::read::GzDecoder;
 use roxmltree::{Document, ParsingOptions};
 
-use crate::PlanError;
-
-/// Maximum size of a decompressed file, bytes.
-const MAX_BYTES: u64 = 256 << 20;
+use crate::{MAX_FILE_BYTES, PlanError, check_size};
 
 /// Decodes an XML file, plain or compressed by gzip: its encoding is that of the byte order mark,
 /// else of the XML declaration, else UTF-8.
 ///
 /// # Errors
-/// Returns an error for damaged compressed data, an unknown encoding, or bytes that are no text.
+/// Returns an error for damaged compressed data, a file above the size limit, an unknown encoding, or
+/// bytes that are no text.
 pub(crate) fn text<'a>(bytes: &'a [u8], help: &str) -> Result<Cow<'a, str>, PlanError> {
     let plain = match bytes.starts_with(b"\x1f\x8b") {
         true => Cow::Owned(decompress(bytes, help)?),
         false => Cow::Borrowed(bytes),
     };
+    check_size(&plain)?;
     if let Some(what) = other_kind(&plain) {
         return Err(PlanError::new(format!("the file is {what}"), help));
     }
@@ -97,13 +96,10 @@ fn other_kind(bytes: &[u8]) -> Option<&'static str> {
 
 fn decompress(bytes: &[u8], help: &str) -> Result<Vec<u8>, PlanError> {
     let mut plain = Vec::new();
-    let read = GzDecoder::new(bytes).take(MAX_BYTES + 1).read_to_end(&mut plain);
-    let length =
-        read.map_err(|error| PlanError::new(format!("invalid gzip data: {error}"), help))?;
-    if length as u64 > MAX_BYTES {
-        let what = format!("the decompressed file is larger than {} MB", MAX_BYTES >> 20);
-        return Err(PlanError::new(what, help));
-    }
+    // A byte above the limit suffices to reject the file.
+    let limit = MAX_FILE_BYTES as u64 + 1;
+    let read = GzDecoder::new(bytes).take(limit).read_to_end(&mut plain);
+    read.map_err(|error| PlanError::new(format!("invalid gzip data: {error}"), help))?;
     Ok(plain)
 }
 

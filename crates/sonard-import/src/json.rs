@@ -10,7 +10,7 @@ use crate::{
 };
 
 /// Maximum size of a document that is not JSON Lines.
-const MAX_DOCUMENT_BYTES: usize = 64 << 20;
+const MAX_DOCUMENT_BYTES: usize = 16 << 20;
 
 /// Returns the rows of a JSON file: of a list of objects or lists, of a single object, or of one
 /// object per line. Lists in mapped members give one row per element, with scalar members repeated.

@@ -6,7 +6,7 @@
 //! A [`Mapping`] states the meaning of the columns. [`ImportSource`] detects the format of a file
 //! and reads the file three times: for its hash and encoding, to check it against the mapping, and
 //! to produce records. At most one scan is held in memory; a JSON file that is not JSON Lines is
-//! held as a whole, up to 64 MB.
+//! held as a whole, up to 16 MB.
 
 mod array_rounds;
 mod carmen;
