@@ -161,3 +161,62 @@ fn faults_are_counted() {
     assert_eq!(words_of(source), 2);
     assert_eq!(faults(Path::new("a.md"), "Somebody asks; a standard receiver."), 2);
 }
+
+/// Names of the types that a source declares and that cannot be English words: two capitals.
+fn declared_types(source: &str) -> Vec<&str> {
+    let is_compound = |name: &&str| {
+        name.chars().next().is_some_and(char::is_uppercase)
+            && name.chars().filter(|c| c.is_uppercase()).count() > 1
+            && name.chars().any(char::is_lowercase)
+    };
+    let kinds = ["struct ", "enum ", "trait ", "type "];
+    let declaration = |line: &'_ str| kinds.iter().find_map(|kind| line.split_once(kind)).is_some();
+    source
+        .lines()
+        .filter(|line| !line.trim_start().starts_with("//") && declaration(line))
+        .flat_map(|line| line.split(|c: char| !c.is_alphanumeric()))
+        .filter(is_compound)
+        .collect()
+}
+
+/// Words of a line's comment outside code, links and their targets.
+fn prose_of(line: &str) -> String {
+    let Some(text) = line.trim_start().strip_prefix("//") else { return String::new() };
+    // Every second part is between backticks, double ones in Python.
+    let words: String = text.replace("``", "`").split('`').step_by(2).collect::<Vec<_>>().join(" ");
+    // Targets of links are paths.
+    words.split_whitespace().filter(|word| !word.contains("::")).collect::<Vec<_>>().join(" ")
+}
+
+/// Doc comments in which the name of a type replaces a word, as a renaming by text leaves them:
+/// "`PlottedScan` outside the view" without its backticks.
+#[test]
+fn type_names_are_marked_as_code() {
+    let mut files = Vec::new();
+    collect(&root(), &mut files);
+    let mut faults = Vec::new();
+    for path in files.iter().filter(|path| path.extension().is_some_and(|e| e == "rs")) {
+        let source = fs::read_to_string(path).unwrap_or_default();
+        let types = declared_types(&source);
+        let mut in_code = false;
+        for (number, line) in (1..).zip(source.lines()) {
+            in_code ^= line.trim_start().starts_with("//") && line.contains("```");
+            let prose = prose_of(line);
+            let named = prose
+                .split(|c: char| !c.is_alphanumeric())
+                .find(|word| !in_code && types.contains(word));
+            if let Some(name) = named {
+                faults.push(format!("{}:{number}: {name}", path.display()));
+            }
+        }
+    }
+    assert!(faults.is_empty(), "{}", faults.join("\n"));
+}
+
+#[test]
+fn type_name_in_prose_is_found() {
+    let source = "/// PlottedScan outside the view.\nstruct PlottedScan;\n";
+    assert_eq!(declared_types(source), ["PlottedScan"]);
+    assert_eq!(prose_of("    /// A [`PlottedScan`](super::PlottedScan) of `x`."), "/ A [ of .");
+    assert!(prose_of(source.lines().next().expect("a line")).contains("PlottedScan"));
+}
