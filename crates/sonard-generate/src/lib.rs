@@ -6,7 +6,7 @@
 //! [`Generator::shard`] writes the tables of one shard to any `Write`.
 //!
 //! ```
-//! use sonard_generate::{Generator, Table};
+//! use sonard_generate::{Generator, ShardTable};
 //!
 //! let specification = r#"
 //!     [set]

@@ -7,7 +7,7 @@
 //! A room in ten lines:
 //!
 //! ```
-//! use sonard_model::{acoustics::*, geometry::Pose, model::*, plan::ScanPlan, scene::Scene};
+//! use sonard_model::{acoustics::*, geometry::Pose, model::*, scan_plan::ScanPlan, scene::Scene};
 //!
 //! let room = Scene::builder("room")
 //!     .material("plaster", 0.97)

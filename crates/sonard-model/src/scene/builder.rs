@@ -16,7 +16,7 @@ use super::{Scene, SceneError};
 ///     .material("plaster", 0.97)
 ///     .room("wall", &[[0.0, 0.0], [4.0, 0.0], [4.0, 3.0], [0.0, 3.0]], "plaster")
 ///     .walls("counter", &[[0.0, 2.4], [1.8, 2.4], [1.8, 3.0]], "plaster")
-///     .standing_from(0.0, 0.9)
+///     .z_range(0.0, 0.9)
 ///     .cylinder("leg", [2.5, 1.0], 0.02, "plaster")
 ///     .heights(0.0, 2.5)
 ///     .floor_and_ceiling("plaster", "plaster")
