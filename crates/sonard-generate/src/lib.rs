@@ -24,7 +24,7 @@
 //! let none = |name: &str| Err(std::io::Error::other(format!("no file {name} here")));
 //! let generator = Generator::from_toml("rooms.toml", specification, &none)?;
 //! let made = generator.shard(1, &mut |_| Ok(Box::new(std::io::sink())), &|_| {})?;
-//! assert_eq!(made.rows(Table::Readings), 3 * 12);
+//! assert_eq!(made.rows(ShardTable::Readings), 3 * 12);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
