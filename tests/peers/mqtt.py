@@ -362,7 +362,7 @@ def secrets(work):
     for wrong, told in [(("wrong", "ca"), "password"), (("right", "other"), "TLS")]:
         daemon = Daemon(folder, settings(*wrong))
         until(told, lambda: told in (daemon.mqtt()["error"] or ""))
-        print(f"told: {daemon.mqtt()['trouble']}")
+        print(f"told: {daemon.mqtt()['error']}")
         assert not daemon.mqtt()["connected"]
         daemon.stop()
     for host in ("localhost", "127.0.0.1"):

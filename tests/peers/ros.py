@@ -346,7 +346,7 @@ def initial_pose(daemon, me, namespace):
 
     wanted = lambda: json.loads(daemon.ask("GET", "/v1/pose"))
     before, status = wanted(), lambda: daemon.status()["ros"]
-    refused = status()["refused"]
+    refused = status()["rejected"]
     here, half = (0.5, 0.3, 0.0), math.sqrt(0.5)
     for wrong, why in (
         (("odom", here, (0, 0, 0, 1)), 'its frame is "odom"'),
@@ -357,7 +357,7 @@ def initial_pose(daemon, me, namespace):
     ):
         tell(*wrong)
         refused += 1
-        until(lambda: status()["refused"] == refused, f"a refusal: {why}")
+        until(lambda: status()["rejected"] == refused, f"a refusal: {why}")
         assert "/initialpose is rejected" in status()["refusal"] and why in status()["refusal"], status()
     assert wanted() == before, wanted()
     tell("map", here, (0, 0, half, half))
@@ -384,10 +384,10 @@ def commands():
     assert reply.success and reply.message == "stopped", reply
     until(lambda: scans()["stopped"] == 1 and scans()["completed"] == 0, f"a scan that was stopped")
     status = daemon.status()["ros"]
-    assert (status["commands"], status["refused"]) == (2, 0), status
+    assert (status["commands"], status["rejected"]) == (2, 0), status
     refused = initial_pose(daemon, me, "/kiwi")
     status = daemon.status()["ros"]
-    assert (status["commands"], status["refused"]) == (3, refused), status
+    assert (status["commands"], status["rejected"]) == (3, refused), status
     daemon.stop()
     daemon = Daemon("no-commands", ROOM, {"enabled": "true"})
     until(lambda: daemon.status()["ros"]["up"], "a node")
