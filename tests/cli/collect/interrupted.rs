@@ -144,7 +144,7 @@ fn running_sweep_is_stopped() {
 
 #[test]
 fn failing_ranger_backs_off() {
-    let plan = "[poses]\nlist = [\"fig9\"]\n[collection]\nrepeats = 20\npatience_s = 8\n";
+    let plan = "[poses]\nlist = [\"fig9\"]\n[collection]\nrepeats = 20\nretry_limit_s = 8\n";
     let case = Case::new(plan);
     let output = case.collect(&["--faults", "reset=1"]);
     let text = said(&output);
