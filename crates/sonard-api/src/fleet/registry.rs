@@ -147,7 +147,7 @@ mod tests {
         let sensor = Sensor::preset("senscomp-6500").expect("a preset");
         let status = json!({
             "robot": robot, "sonard": "0.1.0", "uptime_s": 1.0,
-            "link": {"state": "ready", "since": zero, "port": "", "trouble": null, "failures": 0,
+            "link": {"state": "ready", "since": zero, "port": "", "error": null, "failures": 0,
                      "retry_in_s": null},
             "device": null, "provenance": "mock", "last_reading_age_s": 2.0, "scan": null,
             "scanning": {"mode": "on-request", "every_s": 1.0, "paused": false, "requested": 0,

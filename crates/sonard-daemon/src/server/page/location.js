@@ -32,10 +32,10 @@ export class Locator {
     this.show(null, "Locating …");
     this.button.disabled = true;
     try {
-      const { poses, lacks } = await requestJson(`/v1/scans/${scan.id}/location`);
+      const { poses, unavailable_reason } = await requestJson(`/v1/scans/${scan.id}/location`);
       const pose = nearestOf(poses, scan.start.pose);
       if (pose) this.show({ scan: scan.id, pose }, poseText(pose, poses.length));
-      else this.show(null, sentences(lacks ?? "no pose of the scene fits the readings; `sonard locate` lists possible causes"));
+      else this.show(null, sentences(unavailable_reason ?? "no pose of the scene fits the readings; `sonard locate` lists possible causes"));
     } catch (/** @type {any} */ error) {
       this.show(null, failure("Not located", error));
     }

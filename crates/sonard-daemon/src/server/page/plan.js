@@ -348,8 +348,11 @@ export class Plan {
     cancelAnimationFrame(this.hovering);
     this.hovering = requestAnimationFrame(() => {
       const textFrom = (/** @type {"describeAt" | "describeUnder"} */ how) => this.overlays.map((overlay) => overlay[how]?.(px, this)).find((text) => text);
-      const reading = () => this.readingAt(px, HOVER_PX);
-      const text = textFrom("describeAt") ?? (reading() ? describeReading(reading()) : textFrom("describeUnder"));
+      const textOfReading = () => {
+        const reading = this.readingAt(px, HOVER_PX);
+        return reading ? describeReading(reading) : undefined;
+      };
+      const text = textFrom("describeAt") ?? textOfReading() ?? textFrom("describeUnder");
       if (text) this.tip.show(text, px);
       else this.showTip();
     });
