@@ -176,7 +176,7 @@ fn names(
             feature.extent_deg,
             beta.unwrap_or_default()
         );
-        let mut places = [
+        let places = [
             (Px::new(11.0, -8.0), Anchor::Start),
             (Px::new(11.0, 16.0), Anchor::Start),
             (Px::new(-11.0, -8.0), Anchor::End),
@@ -190,14 +190,9 @@ fn names(
             (Px::new(-24.0, -22.0), Anchor::End),
             (Px::new(-24.0, 30.0), Anchor::End),
         ];
-        places.sort_by_key(|(shift, anchor)| {
-            labels.covered(at + *shift, *anchor, theme::SMALL_PX, &text)
-        });
-        let free = places
-            .into_iter()
-            .find(|(shift, anchor)| labels.place(at + *shift, *anchor, theme::SMALL_PX, &text));
-        if let Some((shift, anchor)) = free {
-            layer.text(at + shift, anchor, theme::SMALL_PX, &text);
+        let places = places.map(|(shift, anchor)| (at + shift, anchor));
+        if let Some((at, anchor)) = labels.place_at_one(places, theme::SMALL_PX, &text) {
+            layer.text(at, anchor, theme::SMALL_PX, &text);
         }
     }
     layer

@@ -143,11 +143,8 @@ impl Floor<'_> {
             let shifts = [0.0, 1.0, -1.0, 2.0, -2.0].into_iter().flat_map(|side| {
                 [0.0, 1.0, 2.0].map(|inward| 14.0 * (side * along - inward * outward))
             });
-            let mut places: Vec<Px> = shifts.map(|shift| base + shift).collect();
-            places.sort_by_key(|at| labels.covered(*at, anchor, theme::SMALL_PX, &text));
-            let free =
-                places.into_iter().find(|at| labels.place(*at, anchor, theme::SMALL_PX, &text));
-            if let Some(at) = free {
+            let places = shifts.map(|shift| (base + shift, anchor));
+            if let Some((at, anchor)) = labels.place_at_one(places, theme::SMALL_PX, &text) {
                 texts.text(at, anchor, theme::SMALL_PX, &text);
             }
         }

@@ -34,7 +34,7 @@ impl Labels {
     }
 
     /// Number of marks that a text with its baseline at `at` would cover.
-    pub(super) fn covered(&self, at: Px, anchor: Anchor, size_px: f64, text: &str) -> usize {
+    fn covered(&self, at: Px, anchor: Anchor, size_px: f64, text: &str) -> usize {
         let rect = text_rect(at, anchor, size_px, text);
         self.marks.iter().filter(|mark| mark.overlaps(&rect)).count()
     }
@@ -55,6 +55,19 @@ impl Labels {
     pub(super) fn place(&mut self, at: Px, anchor: Anchor, size_px: f64, text: &str) -> bool {
         let rect = text_rect(at, anchor, size_px, text);
         self.reserve(rect, 0.0, Px::new(rect.width(), rect.height()))
+    }
+
+    /// Reserves the first free one of several places, those that cover the fewest marks first;
+    /// `None` if all are occupied.
+    pub(super) fn place_at_one(
+        &mut self,
+        places: impl IntoIterator<Item = (Px, Anchor)>,
+        size_px: f64,
+        text: &str,
+    ) -> Option<(Px, Anchor)> {
+        let mut places: Vec<_> = places.into_iter().collect();
+        places.sort_by_key(|(at, anchor)| self.covered(*at, *anchor, size_px, text));
+        places.into_iter().find(|(at, anchor)| self.place(*at, *anchor, size_px, text))
     }
 
     /// Reserves the area of a text rotated about its middle at `at`; `false` if it is occupied.

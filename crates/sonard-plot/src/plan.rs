@@ -233,7 +233,7 @@ impl PlanProjection {
             let middle = (low + corner) / 2.0;
             let left = self.px(DVec2::new(bounds.min.x, bounds.min.y));
             let above = Px::new((left.x + low.x) / 2.0, corner.y);
-            let mut places = [
+            let places = [
                 (low + Px::new(5.0, 12.0), Anchor::Start),
                 (corner + Px::new(5.0, -3.0), Anchor::Start),
                 (middle + Px::new(6.0, 4.0), Anchor::Start),
@@ -243,11 +243,7 @@ impl PlanProjection {
                 (Px::new(left.x - 5.0, corner.y - 3.0), Anchor::End),
                 (Px::new(above.x, middle.y + 4.0), Anchor::Middle),
             ];
-            places.sort_by_key(|(at, anchor)| labels.covered(*at, *anchor, theme::SMALL_PX, name));
-            let free = places
-                .into_iter()
-                .find(|(at, anchor)| labels.place(*at, *anchor, theme::SMALL_PX, name));
-            if let Some((at, anchor)) = free {
+            if let Some((at, anchor)) = labels.place_at_one(places, theme::SMALL_PX, name) {
                 layer.text(at, anchor, theme::SMALL_PX, name);
             }
         }

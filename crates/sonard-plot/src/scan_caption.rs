@@ -35,20 +35,9 @@ fn scene_name(views: &[ScanView], scene: Option<&Scene>) -> String {
     if let Some(scene) = scene {
         return scene.name.clone();
     }
-    let mut names: Vec<&str> = Vec::new();
-    for view in views {
-        let logged = view.session.as_ref().and_then(|session| session.scene.as_ref());
-        if let Some(logged) = logged
-            && !names.contains(&&*logged.name)
-        {
-            names.push(&logged.name);
-        }
-    }
-    match names.as_slice() {
-        [] => "scan without a scene".to_owned(),
-        [name] => (*name).to_owned(),
-        many => format_count(many.len(), "scene"),
-    }
+    let logged = views.iter().filter_map(|view| view.session.as_ref()?.scene.as_ref());
+    let names = logged.map(|scene| scene.name.clone());
+    distinct(names, "scene").unwrap_or_else(|| "scan without a scene".to_owned())
 }
 
 /// Provenance of the readings as a short label; `None` if all are from hardware.

@@ -269,17 +269,11 @@ impl TracePanels {
             let text = format!("{number}");
             let at = Px::new(self.x(peak.peak_us), self.level_y(peak.peak) - 5.0);
             // Next to each other, or stacked; off the line if possible.
-            let mut places: Vec<Px> = (0..8)
-                .flat_map(|row| [0.0, 12.0, -12.0].map(|x| at + Px::new(x, -14.0 * f64::from(row))))
-                .collect();
-            places.sort_by_key(|place| {
-                labels.covered(*place, Anchor::Middle, theme::SMALL_PX, &text)
-            });
-            let place = places
-                .into_iter()
-                .find(|place| labels.place(*place, Anchor::Middle, theme::SMALL_PX, &text));
-            if let Some(place) = place {
-                layer.text(place, Anchor::Middle, theme::SMALL_PX, &text);
+            let shifts = (0..8)
+                .flat_map(|row| [0.0, 12.0, -12.0].map(|x| Px::new(x, -14.0 * f64::from(row))));
+            let places = shifts.map(|shift| (at + shift, Anchor::Middle));
+            if let Some((at, anchor)) = labels.place_at_one(places, theme::SMALL_PX, &text) {
+                layer.text(at, anchor, theme::SMALL_PX, &text);
             }
         }
         layer
