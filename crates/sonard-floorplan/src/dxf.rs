@@ -33,8 +33,8 @@ const HELP: &str = "give a DXF file, ASCII or binary, from a CAD program";
 /// Reads the walls of a drawing.
 ///
 /// # Errors
-/// Returns an error for a file that is not DXF or above the size limit, for an unknown or implausible unit, and for a
-/// requested layer that is empty.
+/// Returns an error for a file that is not DXF or above the size limit, for an unknown or
+/// implausible unit, and for a requested layer that is empty.
 pub fn read(bytes: &[u8], options: &DxfOptions) -> Result<FloorPlan, PlanError> {
     if let Some((_, what, help)) = OTHER_KINDS.iter().find(|(magic, ..)| bytes.starts_with(magic)) {
         return Err(PlanError::new(format!("the file is {what}"), *help));

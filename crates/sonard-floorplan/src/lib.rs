@@ -27,7 +27,7 @@ use sonard_model::scene::Surfaces;
 
 /// Maximum size of a file, decompressed, bytes. A drawing of lines alone takes up to 60 times its
 /// size in memory.
-const MAX_FILE_BYTES: usize = 16 << 20;
+pub const MAX_FILE_BYTES: usize = 16 << 20;
 
 /// Rejects a file above [`MAX_FILE_BYTES`].
 fn check_size(bytes: &[u8]) -> Result<(), PlanError> {

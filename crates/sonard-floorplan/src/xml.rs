@@ -12,8 +12,8 @@ use crate::{MAX_FILE_BYTES, PlanError, check_size};
 /// else of the XML declaration, else UTF-8.
 ///
 /// # Errors
-/// Returns an error for damaged compressed data, a file above the size limit, an unknown encoding, or
-/// bytes that are no text.
+/// Returns an error for damaged compressed data, a file above the size limit, an unknown encoding,
+/// or bytes that are no text.
 pub(crate) fn text<'a>(bytes: &'a [u8], help: &str) -> Result<Cow<'a, str>, PlanError> {
     let plain = match bytes.starts_with(b"\x1f\x8b") {
         true => Cow::Owned(decompress(bytes, help)?),
@@ -29,27 +29,20 @@ pub(crate) fn text<'a>(bytes: &'a [u8], help: &str) -> Result<Cow<'a, str>, Plan
             PlanError::new(format!("unknown encoding `{label}`"), "save it as UTF-8")
         })?,
     };
-    let invalid = || {
-        let what = format!("the file is not {} text", encoding.name());
-        PlanError::new(what, help)
-    };
-    let text = match plain {
+    let (text, is_lossy) = match &plain {
         Cow::Borrowed(bytes) => {
             let (text, _, is_lossy) = encoding.decode(bytes);
-            if is_lossy {
-                return Err(invalid());
-            }
-            text
+            (text, is_lossy)
         }
         Cow::Owned(bytes) => {
-            let (text, _, is_lossy) = encoding.decode(&bytes);
-            if is_lossy {
-                return Err(invalid());
-            }
-            Cow::Owned(text.into_owned())
+            let (text, _, is_lossy) = encoding.decode(bytes);
+            (Cow::Owned(text.into_owned()), is_lossy)
         }
     };
-    Ok(text)
+    match is_lossy {
+        true => Err(PlanError::new(format!("the file is not {} text", encoding.name()), help)),
+        false => Ok(text),
+    }
 }
 
 /// Parses a document; a document type declaration is accepted and its entities are replaced.

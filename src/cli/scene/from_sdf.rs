@@ -1,13 +1,10 @@
 //! `sonard scene from-sdf`.
 
-use std::{
-    fs,
-    path::{Path, PathBuf},
-};
+use std::path::{Path, PathBuf};
 
 use super::{
     super::{Outcome, numbers::within, output::register_input},
-    made::{MadeArgs, plan_failure, read},
+    made::{MadeArgs, plan_failure, read, read_limited},
 };
 use crate::floorplan::sdf::{self, Library, SdfOptions};
 
@@ -55,14 +52,11 @@ struct LocalModels<'a> {
     world: &'a Path,
 }
 
-/// Maximum size of an included file, bytes.
-const MAX_BYTES: u64 = 64 << 20;
-
 impl Library for LocalModels<'_> {
     fn model(&self, uri: &str, from: Option<&Path>) -> Option<(PathBuf, Vec<u8>)> {
         let path = from.and_then(|from| local(uri, from)).or_else(|| local(uri, self.world))?;
         register_input(&path);
-        let bytes = fs::read(&path).ok()?;
+        let bytes = read_limited(&path).ok()?;
         Some((path, bytes))
     }
 }
@@ -78,9 +72,7 @@ fn local(uri: &str, from: &Path) -> Option<PathBuf> {
     }
     let within = |path: &Path| {
         let (path, folder) = (path.canonicalize().ok()?, folder.canonicalize().ok()?);
-        let is_short =
-            fs::metadata(&path).is_ok_and(|file| file.is_file() && file.len() <= MAX_BYTES);
-        (path.starts_with(folder) && is_short).then_some(path)
+        (path.starts_with(folder) && path.is_file()).then_some(path)
     };
     let places = [folder.join(name), folder.join("models").join(name)];
     places.iter().find_map(|place| within(place).or_else(|| within(&place.join("model.sdf"))))

@@ -1,6 +1,10 @@
 //! Scenes made from drawings, maps and worlds of other programs.
 
-use std::{fs, path::Path};
+use std::{
+    fs::File,
+    io::{self, Read as _},
+    path::Path,
+};
 
 use super::super::{
     Failure, Outcome,
@@ -8,7 +12,7 @@ use super::super::{
     output::{OutPath, Overwrite, Product, register_input},
 };
 use crate::{
-    floorplan::{FloorPlan, PlanError},
+    floorplan::{FloorPlan, MAX_FILE_BYTES, PlanError},
     scene::Surfaces,
 };
 
@@ -35,7 +39,14 @@ pub(in crate::cli) struct MadeArgs {
 /// The file can't be read; `help` is the advice.
 pub(super) fn read(path: &Path, help: &str) -> Result<Vec<u8>, Failure> {
     register_input(path);
-    fs::read(path).map_err(|error| file_failure(path, &error, help))
+    read_limited(path).map_err(|error| file_failure(path, &error, help))
+}
+
+/// Reads a file up to a byte above [`MAX_FILE_BYTES`], which suffices for its rejection.
+pub(super) fn read_limited(path: &Path) -> io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    File::open(path)?.take(MAX_FILE_BYTES as u64 + 1).read_to_end(&mut bytes)?;
+    Ok(bytes)
 }
 
 /// Failure with the name of a file.

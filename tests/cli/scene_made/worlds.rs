@@ -146,6 +146,12 @@ fn included_models() {
         "{:?}",
         scene.walls
     );
+    // A file above the size limit is rejected with its name, included or not.
+    let large = "x".repeat((64 << 20) + 1);
+    fs::write(folder.path().join("shelf/model.sdf"), &large).expect("writable");
+    refused(&["scene", "from-sdf", path.to_str().expect("a plain path")], "model.sdf");
+    fs::write(&path, &large).expect("writable");
+    refused(&["scene", "from-sdf", path.to_str().expect("a plain path")], "larger than 16 MB");
     // Not what is outside its folder.
     let outside = include.replace("model://shelf", "../shelf");
     fs::create_dir(folder.path().join("worlds")).expect("writable");

@@ -175,26 +175,23 @@ impl<'a> Plan<'a> {
             EntityType::Circle(circle) => self.circle(layer, circle),
             EntityType::Arc(arc) => self.arc(layer, arc),
             EntityType::Insert(insert) => self.insert(layer, insert),
-            EntityType::Solid(solid) => {
-                let Solid {
-                    first_corner: a,
-                    second_corner: b,
-                    third_corner: c,
-                    fourth_corner: d,
-                    ..
-                } = solid;
-                self.filled(layer, [a, b, d, c], &solid.extrusion_direction);
-            }
-            EntityType::Trace(trace) => {
-                let Trace {
-                    first_corner: a,
-                    second_corner: b,
-                    third_corner: c,
-                    fourth_corner: d,
-                    ..
-                } = trace;
-                self.filled(layer, [a, b, d, c], &trace.extrusion_direction);
-            }
+            // The third and the fourth corner are exchanged in the file.
+            EntityType::Solid(Solid {
+                first_corner: a,
+                second_corner: b,
+                third_corner: d,
+                fourth_corner: c,
+                extrusion_direction,
+                ..
+            })
+            | EntityType::Trace(Trace {
+                first_corner: a,
+                second_corner: b,
+                third_corner: d,
+                fourth_corner: c,
+                extrusion_direction,
+                ..
+            }) => self.filled(layer, [a, b, c, d], extrusion_direction),
             _ => {}
         }
     }
