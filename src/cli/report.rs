@@ -4,7 +4,7 @@ mod entries;
 mod system;
 
 use std::{
-    io::{self, BufRead as _, IsTerminal as _, Write as _},
+    io::{self, Write as _},
     path::{Path, PathBuf},
 };
 
@@ -16,6 +16,7 @@ use super::{
     daemon::DaemonArgs,
     output::{OutPath, Overwrite, Product},
     table::{align_right, fit, plain},
+    terminal,
 };
 use crate::scan::text::format_count;
 use entries::Entry;
@@ -112,17 +113,12 @@ fn list(entries: &[Entry]) -> Outcome {
 
 /// Prompts for a confirmation at a terminal; elsewhere the command is the confirmation.
 fn is_confirmed(path: &Path) -> Result<bool, Failure> {
-    if !(io::stdin().is_terminal() && io::stdout().is_terminal()) {
+    if !terminal::is_interactive() {
         return Ok(true);
     }
-    let mut out = io::stdout();
-    let mut answer = String::new();
-    write!(out, "write {}? [Y/n] ", path.display())
-        .and_then(|()| out.flush())
-        .and_then(|()| io::stdin().lock().read_line(&mut answer))
-        .map_err(|error| Failure::device(format!("cannot prompt: {error}"), "give --yes"))?;
+    let answer = terminal::prompt(&format!("write {}? [Y/n]", path.display()))?;
     // The end of the input is no confirmation.
-    Ok(answer.ends_with('\n') && matches!(answer.trim().to_lowercase().as_str(), "" | "y" | "yes"))
+    Ok(answer.is_some_and(|answer| matches!(answer.to_lowercase().as_str(), "" | "y" | "yes")))
 }
 
 fn pack(entries: &[Entry], now: Timestamp) -> io::Result<Vec<u8>> {

@@ -37,8 +37,8 @@ use crate::{
 };
 pub use embedded::EmbeddedDaemon;
 use files::Files;
-pub(super) use load::CONFIG_FILE;
 use load::Loader;
+pub(super) use load::{file_and_environment, one_line};
 use mock::Mock;
 use ros::Ros;
 

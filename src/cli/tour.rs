@@ -2,12 +2,12 @@
 
 use std::{
     env, fs,
-    io::{self, BufRead as _, IsTerminal as _, Write as _},
+    io::{self, IsTerminal as _, Write as _},
     path::{Path, PathBuf},
     process::{Command, Stdio},
 };
 
-use super::{Failure, Outcome, output::OutPath};
+use super::{Failure, Outcome, output::OutPath, terminal};
 
 /// Options of `sonard tour`.
 #[derive(Debug, clap::Args)]
@@ -102,7 +102,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     let program = env::current_exe().map_err(|error| {
         Failure::device(format!("cannot find this program: {error}"), "start it by its full path")
     })?;
-    let prompts = !args.yes && io::stdin().is_terminal() && io::stdout().is_terminal();
+    let prompts = !args.yes && terminal::is_interactive();
     let viewer = if args.no_open { None } else { viewer() };
     for (number, step) in (1..).zip(&STEPS) {
         introduce(number, step)?;
@@ -159,13 +159,8 @@ fn print_text(text: &str) -> Outcome {
 
 /// Waits for Enter; `q` and the end of the input end the tour.
 fn continues() -> Result<bool, Failure> {
-    let mut out = io::stdout();
-    let mut line = String::new();
-    write!(out, "  (Enter runs it, q ends the tour) ")
-        .and_then(|()| out.flush())
-        .and_then(|()| io::stdin().lock().read_line(&mut line))
-        .map_err(|error| Failure::device(format!("cannot prompt: {error}"), "give --yes"))?;
-    Ok(line.ends_with('\n') && !line.trim().eq_ignore_ascii_case("q"))
+    let answer = terminal::prompt("  (Enter runs it, q ends the tour)")?;
+    Ok(answer.is_some_and(|answer| !answer.eq_ignore_ascii_case("q")))
 }
 
 /// Runs the command of a step in the folder.

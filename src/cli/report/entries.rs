@@ -12,9 +12,14 @@ use serde_json::Value;
 
 use super::{Args, system};
 use crate::{
-    cli::{Failure, LONG_VERSION, doctor, output::register_input, run::CONFIG_FILE, runtime},
+    cli::{
+        Failure, LONG_VERSION, doctor,
+        output::register_input,
+        run::{file_and_environment, one_line},
+        runtime,
+    },
     client::Client,
-    config::{ConfigLayers, Keys},
+    config::Keys,
 };
 
 /// Maximum length of an included line, bytes: longer ones are cut.
@@ -134,23 +139,8 @@ fn version(now: Timestamp) -> String {
 
 /// Effective configuration, as `sonard run` reads it without options.
 fn configuration(file: Option<&Path>) -> Result<Keys, String> {
-    let path = file.unwrap_or(Path::new(CONFIG_FILE));
-    let mut layers = ConfigLayers::<Keys>::new();
-    match fs::read_to_string(path) {
-        Ok(text) => {
-            layers = layers
-                .with_file(&path.display().to_string(), &text)
-                .map_err(|error| format!("{error}; {}", error.help))?;
-        }
-        Err(error) if error.kind() == io::ErrorKind::NotFound && file.is_none() => {}
-        Err(error) => return Err(format!("{}: {error}", path.display())),
-    }
-    let variables = env::vars_os()
-        .filter_map(|(name, value)| Some((name.into_string().ok()?, value.into_string().ok()?)));
-    layers
-        .with_environment(variables)
-        .and_then(ConfigLayers::into_keys)
-        .map_err(|error| format!("{error}; {}", error.help))
+    let layers = file_and_environment(file).map_err(|failure| one_line(&failure))?;
+    layers.into_keys().map_err(|error| format!("{error}; {}", error.help))
 }
 
 /// Configuration without user names and passwords of addresses, and without values of keys that
@@ -215,7 +205,10 @@ fn log_entry(log: &Path, count: usize) -> io::Result<Entry> {
     let (mut last, mut session) = (VecDeque::new(), None);
     let mut line = Vec::new();
     while reader.read_until(b'\n', &mut line)? > 0 {
-        line.truncate(MAX_LINE_BYTES);
+        if line.len() > MAX_LINE_BYTES {
+            line.truncate(MAX_LINE_BYTES - 1);
+            line.push(b'\n');
+        }
         last.push_back(std::mem::take(&mut line));
         if last.len() > count
             && let Some(dropped) = last.pop_front()
@@ -267,6 +260,10 @@ mod tests {
         assert_eq!(last(1), format!("{}\n{}\n", lines[0], lines[2]));
         assert_eq!(last(5), lines.join("\n") + "\n");
         assert_eq!(last(0), format!("{}\n", lines[0]));
+        // A line that is cut ends like the others.
+        fs::write(&log, format!("{}\n{}\n", "x".repeat(MAX_LINE_BYTES + 5), lines[1]))
+            .expect("there is room");
+        assert!(last(2).ends_with(&format!("x\n{}\n", lines[1])));
     }
 
     #[test]

@@ -40,8 +40,8 @@ impl EmbeddedDaemon {
     /// task. Must be called within a tokio runtime.
     ///
     /// # Errors
-    /// Those of `sonard run`: wrong options, configuration or files, or a log that can't be
-    /// written. The work returns the first failure of a task, or of closing the log.
+    /// Wrong options, configuration or files, or a log that can't be written, as for `sonard run`.
+    /// The work returns the first failure of a task, or of closing the log.
     pub fn from_options(
         options: &[&str],
     ) -> Result<(Self, impl Future<Output = Result<(), String>> + Send + use<>), Failure> {

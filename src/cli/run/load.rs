@@ -27,7 +27,7 @@ use crate::{
 };
 
 /// Configuration file without `--config`.
-pub(in crate::cli) const CONFIG_FILE: &str = "/etc/sonard/sonard.toml";
+const CONFIG_FILE: &str = "/etc/sonard/sonard.toml";
 
 /// Reader of the configuration, for the start and reloads.
 pub(super) struct Loader {
@@ -91,31 +91,8 @@ impl Loader {
     }
 
     fn layers(&self) -> Result<ConfigLayers, Failure> {
-        let mut layers = ConfigLayers::<Keys>::new();
-        let (file, requested) = match &self.args.config {
-            Some(file) => (file.clone(), true),
-            None => (PathBuf::from(CONFIG_FILE), false),
-        };
-        match fs::read_to_string(&file) {
-            Ok(text) => {
-                layers = layers
-                    .with_file(&file.display().to_string(), &text)
-                    .map_err(|error| failure_from(&error))?;
-            }
-            Err(error) if error.kind() == io::ErrorKind::NotFound && !requested => {}
-            Err(error) => {
-                return Err(Failure::input(
-                    format!("cannot read the configuration {}: {error}", file.display()),
-                    "give --config a TOML file; `sonard run --print-config` prints one",
-                ));
-            }
-        }
-        // Names and values that are not UTF-8 can't be settings.
-        let variables = env::vars_os().filter_map(|(name, value)| {
-            Some((name.into_string().ok()?, value.into_string().ok()?))
-        });
-        layers = layers.with_environment(variables).map_err(|error| failure_from(&error))?;
         let args = &self.args;
+        let mut layers = file_and_environment(args.config.as_deref())?;
         let path = |path: &Option<PathBuf>| path.clone().map(PathBuf::into_os_string);
         let text = |text: &Option<String>| text.clone().map(OsString::from);
         let shortcuts = [
@@ -263,8 +240,36 @@ pub(super) fn effective_configuration(settings: &Settings) -> String {
     format!("# Configuration valid. Effective values:\n{text}")
 }
 
+/// Reads the configuration file, by default [`CONFIG_FILE`] if it exists, and the environment.
+///
+/// # Errors
+///
+/// An unreadable file, or a wrong key or value.
+pub(in crate::cli) fn file_and_environment(config: Option<&Path>) -> Result<ConfigLayers, Failure> {
+    let mut layers = ConfigLayers::<Keys>::new();
+    let file = config.unwrap_or(Path::new(CONFIG_FILE));
+    match fs::read_to_string(file) {
+        Ok(text) => {
+            layers = layers
+                .with_file(&file.display().to_string(), &text)
+                .map_err(|error| failure_from(&error))?;
+        }
+        Err(error) if error.kind() == io::ErrorKind::NotFound && config.is_none() => {}
+        Err(error) => {
+            return Err(Failure::input(
+                format!("cannot read the configuration {}: {error}", file.display()),
+                "give --config a TOML file; `sonard run --print-config` prints one",
+            ));
+        }
+    }
+    // Names and values that are not UTF-8 can't be settings.
+    let variables = env::vars_os()
+        .filter_map(|(name, value)| Some((name.into_string().ok()?, value.into_string().ok()?)));
+    layers.with_environment(variables).map_err(|error| failure_from(&error))
+}
+
 /// Formats a failure on one line.
-pub(super) fn one_line(failure: &Failure) -> String {
+pub(in crate::cli) fn one_line(failure: &Failure) -> String {
     match failure {
         Failure::Found(text) => text.clone().unwrap_or_default(),
         Failure::Input(report) | Failure::Device(report) => match report.help() {
